@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "base/both.h"
+#include "base/hd.h"
 
 typedef struct {
     uint64_t seed;
@@ -15,7 +15,7 @@ typedef struct {
     uint32_t use;    /* running counter inside (stream, step) */
 } Random;
 
-static inline MILD_BOTH uint64_t random_mix(uint64_t x) {
+MILD_HD_FN uint64_t random_mix(uint64_t x) {
     x ^= x >> 30;
     x *= 0xbf58476d1ce4e5b9u;
     x ^= x >> 27;
@@ -23,19 +23,19 @@ static inline MILD_BOTH uint64_t random_mix(uint64_t x) {
     return x ^ (x >> 31);
 }
 
-static inline MILD_BOTH Random random_at(uint64_t seed, uint32_t stream, uint32_t step) {
+MILD_HD_FN Random random_at(uint64_t seed, uint32_t stream, uint32_t step) {
     const Random random = {seed, stream, step, 0};
     return random;
 }
 
 /* The same numbers from the count-th on, for loops whose rounds draw apart. */
-static inline MILD_BOTH Random random_after(Random r, int count) {
+MILD_HD_FN Random random_after(Random r, int count) {
     r.use += (uint32_t)count;
     return r;
 }
 
 /* 64 random bits. The key is derived from (seed, stream); the counter is (step, use). */
-static inline MILD_BOTH uint64_t random_bits(Random *r) {
+MILD_HD_FN uint64_t random_bits(Random *r) {
     uint32_t x0 = r->step, x1 = r->use++;
     uint64_t k64 = random_mix(r->seed + 0x9e3779b97f4a7c15u * ((uint64_t)r->stream + 1u));
     uint32_t key = (uint32_t)(k64 ^ (k64 >> 32));
@@ -50,16 +50,16 @@ static inline MILD_BOTH uint64_t random_bits(Random *r) {
 }
 
 /* Uniform in [0, 1). */
-static inline MILD_BOTH double random_unit(Random *r) {
+MILD_HD_FN double random_unit(Random *r) {
     return (double)(random_bits(r) >> 11) * 0x1.0p-53;
 }
 
-static inline MILD_BOTH double random_uniform(Random *r, double low, double high) {
+MILD_HD_FN double random_uniform(Random *r, double low, double high) {
     return low + (high - low) * random_unit(r);
 }
 
 /* Integer in [0, count). */
-static inline MILD_BOTH uint32_t random_index(Random *r, uint32_t count) {
+MILD_HD_FN uint32_t random_index(Random *r, uint32_t count) {
     return (uint32_t)(((random_bits(r) >> 32) * (uint64_t)count) >> 32);
 }
 

@@ -6,7 +6,7 @@
 #ifndef MILD_GROUND_MOTION_H
 #define MILD_GROUND_MOTION_H
 
-#include "ground/real.h"
+#include "base/hd.h"
 
 typedef struct {
     Real x[3]; /* [m/s], [1/s], [1/s] */

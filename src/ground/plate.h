@@ -27,7 +27,7 @@
 #ifndef MILD_GROUND_PLATE_H
 #define MILD_GROUND_PLATE_H
 
-#include "base/both.h"
+#include "base/hd.h"
 #include "ground/friction.h"
 
 /* Once for each foot, so that it need not be inlined; gcc would round some last bits otherwise. */
@@ -63,7 +63,7 @@ MILD_HD Alpha plane_alpha(Real c2, Real s2, Real c, Real s) {
 /* The 3D theory (Agarwal et al. 2023, supplement): alpha = f1 n + f2 v + f3 (0, 0, -1). The
  * coefficients of f1, f2, f3 belong to powers of x1 = sin(gamma) = -v_z, x2 = cos(beta) = -n_z, x3
  * = n . v. */
-static inline MILD_BOTH const Real *space_coefficients(int k) {
+MILD_HD_FN const Real *space_coefficients(int k) {
     static const Real coefficients[3][20] = {
         {REAL(0.00212), REAL(-0.02320), REAL(-0.20890), REAL(-0.43083), REAL(-0.00259),
          REAL(0.48872), REAL(-0.00415), REAL(0.07204),  REAL(-0.02750), REAL(-0.08772),

@@ -10,7 +10,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "ground/real.h"
+#include "base/hd.h"
 
 #define POWER_DEPTH REAL(0.01)  /* z0 [m] */
 #define POWER_ROUND REAL(1e-4)  /* e^2 [-] */

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#include "ground/real.h"
+#include "base/hd.h"
 
 /* Position on a grid along one axis. */
 typedef struct {

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "base/both.h"
+#include "base/hd.h"
 
 #define ADAM_BETA1 0.9
 #define ADAM_BETA2 0.999
@@ -19,7 +19,7 @@ typedef struct {
 } AdamStep;
 
 /* t: number of this step, from 1. */
-static inline MILD_BOTH AdamStep adam_step(double learning_rate, int64_t t, double gradient_scale) {
+MILD_HD_FN AdamStep adam_step(double learning_rate, int64_t t, double gradient_scale) {
     AdamStep step;
     step.step_size = (float)(learning_rate / (1.0 - pow(ADAM_BETA1, (double)t)));
     step.second_scale = (float)(1.0 / (1.0 - pow(ADAM_BETA2, (double)t)));
@@ -29,8 +29,8 @@ static inline MILD_BOTH AdamStep adam_step(double learning_rate, int64_t t, doub
 
 /* m = b1 m + (1-b1) g, v = b2 v + (1-b2) g^2, p -= lr m^ / (sqrt(v^) + eps), with m^ and v^
  * corrected for their bias towards 0. */
-static inline MILD_BOTH void adam_element(AdamStep step, float gradient, float *parameter,
-                                          float *first, float *second) {
+MILD_HD_FN void adam_element(AdamStep step, float gradient, float *parameter, float *first,
+                             float *second) {
     const float g = gradient * step.gradient_scale;
     const float m = (float)ADAM_BETA1 * *first + (float)(1.0 - ADAM_BETA1) * g;
     const float v = (float)ADAM_BETA2 * *second + (float)(1.0 - ADAM_BETA2) * g * g;

@@ -7,7 +7,7 @@
 
 #include <math.h>
 
-#include "base/both.h"
+#include "base/hd.h"
 #include "learn/vector.h"
 
 /* The log-variance is clamped to these bounds, so that e^logvar cannot overflow early in
@@ -44,15 +44,15 @@ typedef struct {
 } LossSurrogate;
 
 /* Distance of an action from the mean, in standard deviations. inverse: 1 / std. */
-static inline MILD_BOTH float loss_standard(float action, float mean, float inverse) {
+MILD_HD_FN float loss_standard(float action, float mean, float inverse) {
     return (action - mean) * inverse;
 }
 
 /* The part of the surrogate that is the same for all samples: 1/std [actions], then the constants
  * of log_prob and of KL(old || new), which is
  *     sum log(std/old) + (old^2 + (old_mean - mean)^2) / (2 std^2) - 1/2. */
-static inline MILD_BOTH void loss_surrogate_constants(int actions, const float *std,
-                                                      const float *old_std, float *constant) {
+MILD_HD_FN void loss_surrogate_constants(int actions, const float *std, const float *old_std,
+                                         float *constant) {
     double log_prob = 0.0, kl = 0.0;
     for (int j = 0; j < actions; j++) {
         const double ratio = (double)old_std[j] / (double)std[j];
@@ -65,8 +65,8 @@ static inline MILD_BOTH void loss_surrogate_constants(int actions, const float *
 }
 
 /* log of the normal density of `action`, independent dimensions. */
-static inline MILD_BOTH float loss_log_prob(int actions, const float *action, const float *mean,
-                                            const float *std) {
+MILD_HD_FN float loss_log_prob(int actions, const float *action, const float *mean,
+                               const float *std) {
     double sum = 0.0;
     for (int j = 0; j < actions; j++) {
         const double t = ((double)action[j] - (double)mean[j]) / (double)std[j];
@@ -76,10 +76,10 @@ static inline MILD_BOTH float loss_log_prob(int actions, const float *action, co
 }
 
 /* constant [actions + 2]: see loss_surrogate_constants. */
-static inline MILD_BOTH LossSurrogate loss_surrogate(int actions, const float *constant, float clip,
-                                                     const float *action, const float *mean,
-                                                     const float *old_mean, float old_log_prob,
-                                                     float advantage) {
+MILD_HD_FN LossSurrogate loss_surrogate(int actions, const float *constant, float clip,
+                                        const float *action, const float *mean,
+                                        const float *old_mean, float old_log_prob,
+                                        float advantage) {
     LossSurrogate s;
     float log_prob = constant[actions];
     s.kl = constant[actions + 1];
@@ -102,11 +102,11 @@ static inline MILD_BOTH LossSurrogate loss_surrogate(int actions, const float *c
 
 /* Converts the gradient with respect to log_prob to those with respect to the mean and the log std
  * of an action. t: loss_standard. */
-static inline MILD_BOTH float loss_mean_gradient(float d_log_prob, float t, float inverse) {
+MILD_HD_FN float loss_mean_gradient(float d_log_prob, float t, float inverse) {
     return d_log_prob * t * inverse;
 }
 
-static inline MILD_BOTH float loss_log_std_gradient(float d_log_prob, float t) {
+MILD_HD_FN float loss_log_std_gradient(float d_log_prob, float t) {
     return d_log_prob * (t * t - 1.0f);
 }
 
@@ -115,9 +115,8 @@ static inline MILD_BOTH float loss_log_std_gradient(float d_log_prob, float t) {
 /* Returns the sum. The gradient flows through both means, because either may be the better one.
  * Adds to d_mean and overwrites d_image. weight: of the gradient, which is twice the weight of the
  * sum. */
-static inline MILD_BOTH float loss_mirror(int actions, const int *index, const float *sign,
-                                          float weight, const float *mean, const float *image,
-                                          float *d_mean, float *d_image) {
+MILD_HD_FN float loss_mirror(int actions, const int *index, const float *sign, float weight,
+                             const float *mean, const float *image, float *d_mean, float *d_image) {
     float sum = 0.0f;
     for (int j = 0; j < actions; j++) {
         d_image[j] = 0.0f;
@@ -136,9 +135,8 @@ static inline MILD_BOTH float loss_mirror(int actions, const int *index, const f
 
 /* Mean square of the estimates begin .. end-1; adds to d. weight: twice that of the mean. An empty
  * group costs nothing. */
-static inline MILD_BOTH double loss_estimates(int begin, int end, float weight,
-                                              const float *estimate, const float *target,
-                                              float *d) {
+MILD_HD_FN double loss_estimates(int begin, int end, float weight, const float *estimate,
+                                 const float *target, float *d) {
     if (begin == end) {
         return 0.0;
     }
@@ -154,48 +152,47 @@ static inline MILD_BOTH double loss_estimates(int begin, int end, float weight,
 
 /* ---- latent: z = mu + spread noise, KL(N(mu, e^logvar) || N(0, 1)) ---- */
 
-static inline MILD_BOTH float loss_held_logvar(float logvar) {
+MILD_HD_FN float loss_held_logvar(float logvar) {
     const float held = logvar < LOSS_LOGVAR_MIN ? LOSS_LOGVAR_MIN : logvar;
     return held > LOSS_LOGVAR_MAX ? LOSS_LOGVAR_MAX : held;
 }
 
 /* Standard deviation of the latent. */
-static inline MILD_BOTH float loss_spread(float logvar) {
+MILD_HD_FN float loss_spread(float logvar) {
     return vector_exp(0.5f * loss_held_logvar(logvar));
 }
 
 /* Dimension j of z: a draw, or mu without noise. */
-static inline MILD_BOTH float loss_latent(const float *mu, const float *logvar, const float *noise,
-                                          int j) {
+MILD_HD_FN float loss_latent(const float *mu, const float *logvar, const float *noise, int j) {
     return noise ? mu[j] + loss_spread(logvar[j]) * noise[j] : mu[j];
 }
 
 /* Twice the KL term of one dimension: mu^2 + e^logvar - 1 - logvar. */
-static inline MILD_BOTH float loss_latent_twice(float mu, float logvar, float spread) {
+MILD_HD_FN float loss_latent_twice(float mu, float logvar, float spread) {
     return mu * mu + spread * spread - 1.0f - loss_held_logvar(logvar);
 }
 
 /* Weight of the gradient of a dimension's KL term max(KL, free_bits) [nat] (Kingma et al. 2016,
  * "free bits"): the dimension may tell this much for nothing. twice: 2 KL. */
-static inline MILD_BOTH float loss_kl_weight(float weight, float free_bits, float twice) {
+MILD_HD_FN float loss_kl_weight(float weight, float free_bits, float twice) {
     return free_bits > 0.0f && twice < 2.0f * free_bits ? 0.0f : weight;
 }
 
 /* d_z of a sample: from the decoder, and from the actor if it got the same draw. d_mu: what the
  * actor has left. */
-static inline MILD_BOTH float loss_draw_gradient(int sampled, float d_z, float d_mu) {
+MILD_HD_FN float loss_draw_gradient(int sampled, float d_z, float d_mu) {
     return sampled ? d_z + d_mu : d_z;
 }
 
 /* d loss / d mu: from the decoder through z, and from the KL term. */
-static inline MILD_BOTH float loss_mu_gradient(float weight, float mu, float d_z) {
+MILD_HD_FN float loss_mu_gradient(float weight, float mu, float d_z) {
     return d_z + weight * mu;
 }
 
 /* d loss / d logvar. Outside its bounds the log-variance receives only gradients that lead back
  * inside. */
-static inline MILD_BOTH float loss_logvar_gradient(float weight, float logvar, float spread,
-                                                   float noise, float d_z) {
+MILD_HD_FN float loss_logvar_gradient(float weight, float logvar, float spread, float noise,
+                                      float d_z) {
     const float d = 0.5f * (d_z * spread * noise + weight * (spread * spread - 1.0f));
     const float outward = (logvar - loss_held_logvar(logvar)) * d;
     return outward < 0.0f ? 0.0f : d;
@@ -206,10 +203,9 @@ static inline MILD_BOTH float loss_logvar_gradient(float weight, float logvar, f
 /* Back through z~ = theta1 z + theta2, z: loss_latent. heads and d_heads are [estimates | mu |
  * logvar], d_input is [estimates | z~]; theta has two numbers, or two for each latent dimension.
  * Overwrites d_heads and d_theta. noise: NULL, z = mu. */
-static inline MILD_BOTH void loss_modulation(int estimates, int latent, int per_dimension,
-                                             const float *heads, const float *noise,
-                                             const float *theta, const float *d_input,
-                                             float *d_heads, float *d_theta) {
+MILD_HD_FN void loss_modulation(int estimates, int latent, int per_dimension, const float *heads,
+                                const float *noise, const float *theta, const float *d_input,
+                                float *d_heads, float *d_theta) {
     const float *mu = heads + estimates, *logvar = mu + latent;
     float d_scale = 0.0f;
     float d_shift = 0.0f;
@@ -241,8 +237,8 @@ static inline MILD_BOTH void loss_modulation(int estimates, int latent, int per_
 
 /* Returns the gap whose square is the loss, and writes half of the gradient. Where the clipped
  * branch is the larger one, its gradient is that of V inside the clip range and 0 outside. */
-static inline MILD_BOTH float loss_value(int clip_value, float clip, float value, float old_value,
-                                         float returns, float *half_gradient) {
+MILD_HD_FN float loss_value(int clip_value, float clip, float value, float old_value, float returns,
+                            float *half_gradient) {
     const float gap = value - returns;
     const float move = value - old_value;
     const float held_move = move < -clip ? -clip : move > clip ? clip : move;

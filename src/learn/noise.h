@@ -12,7 +12,7 @@
 void noise_normal(uint64_t key, int64_t first, int count, float *out);
 
 /* 32-bit integer hash, a bijection without visible bias (Wellons 2018, "lowbias32"). */
-static inline MILD_BOTH uint32_t noise_mix(uint32_t x) {
+MILD_HD_FN uint32_t noise_mix(uint32_t x) {
     x ^= x >> 16;
     x *= 0x7feb352du;
     x ^= x >> 15;
@@ -22,7 +22,7 @@ static inline MILD_BOTH uint32_t noise_mix(uint32_t x) {
 
 /* sin(pi a) and cos(pi a) for a in [-1/2, 1/2): Taylor series to a^11 and a^12, error below 1e-7.
  */
-static inline MILD_BOTH float noise_sin(float a) {
+MILD_HD_FN float noise_sin(float a) {
     float q = a * a;
     float p = -0.0073704309f;
     p = p * q + 0.0821458866f;
@@ -32,7 +32,7 @@ static inline MILD_BOTH float noise_sin(float a) {
     return a * (p * q + 3.1415926536f);
 }
 
-static inline MILD_BOTH float noise_cos(float a) {
+MILD_HD_FN float noise_cos(float a) {
     float q = a * a;
     float p = 0.0019295743f;
     p = p * q - 0.0258068913f;
@@ -45,8 +45,7 @@ static inline MILD_BOTH float noise_cos(float a) {
 
 /* Numbers 2 pair and 2 pair + 1 of the stream: radius sqrt(-2 ln u), angle 2 pi v. The angle is a
  * uniform half turn with a random sign in front, which keeps the series' argument small. */
-static inline MILD_BOTH void noise_pair(uint32_t key0, uint32_t key1, uint32_t pair, float *even,
-                                        float *odd) {
+MILD_HD_FN void noise_pair(uint32_t key0, uint32_t key1, uint32_t pair, float *even, float *odd) {
     uint32_t counter = pair * 0x9e3779b9u;
     uint32_t h0 = noise_mix(counter ^ key0), h1 = noise_mix(noise_mix(counter + key1) ^ key0);
     float u = (float)(int32_t)((h0 >> 8) + 1u) * 0x1.0p-24f;
@@ -58,7 +57,7 @@ static inline MILD_BOTH void noise_pair(uint32_t key0, uint32_t key1, uint32_t p
 }
 
 /* One number of the stream. */
-static inline MILD_BOTH float noise_number(uint64_t key, int64_t number) {
+MILD_HD_FN float noise_number(uint64_t key, int64_t number) {
     float even, odd;
     noise_pair((uint32_t)key, (uint32_t)(key >> 32), (uint32_t)(number / 2), &even, &odd);
     return number % 2 ? odd : even;

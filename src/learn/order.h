@@ -24,7 +24,7 @@
 #define ORDER_ROUNDS 16
 
 /* First of `count` items in part `part` of `parts` equal runs. */
-static inline MILD_BOTH int order_begin(int count, int part, int parts) {
+MILD_HD_FN int order_begin(int count, int part, int parts) {
     return (int)((int64_t)count * part / parts);
 }
 
@@ -34,7 +34,7 @@ typedef struct {
     int count; /* samples: steps * width */
 } OrderStratum;
 
-static inline MILD_BOTH OrderStratum order_stratum(int steps, int envs, int stratum) {
+MILD_HD_FN OrderStratum order_stratum(int steps, int envs, int stratum) {
     OrderStratum s;
     s.first = order_begin(envs, stratum, PPO_SHARDS);
     s.width = order_begin(envs, stratum + 1, PPO_SHARDS) - s.first;
@@ -43,13 +43,13 @@ static inline MILD_BOTH OrderStratum order_stratum(int steps, int envs, int stra
 }
 
 /* Place of sample k of the stratum in the rollout [steps][envs]. */
-static inline MILD_BOTH int order_sample(OrderStratum s, int envs, int k) {
+MILD_HD_FN int order_sample(OrderStratum s, int envs, int k) {
     return k / s.width * envs + s.first + k % s.width;
 }
 
 /* Cuts of minibatch m of `minibatches`: shard s is cut[s] .. cut[s + 1] - 1 of its samples. Returns
  * cut[PPO_SHARDS], the number of samples. */
-static inline MILD_BOTH int order_cuts(int steps, int envs, int m, int minibatches, int *cut) {
+MILD_HD_FN int order_cuts(int steps, int envs, int m, int minibatches, int *cut) {
     cut[0] = 0;
     for (int s = 0; s < PPO_SHARDS; s++) {
         const int count = order_stratum(steps, envs, s).count;
@@ -68,7 +68,7 @@ typedef struct {
 } OrderPart;
 
 /* ranks divides PPO_SHARDS. */
-static inline MILD_BOTH OrderPart order_part(int envs, int rank, int ranks) {
+MILD_HD_FN OrderPart order_part(int envs, int rank, int ranks) {
     OrderPart part;
     part.envs = envs;
     part.shards = PPO_SHARDS / ranks;
@@ -79,7 +79,7 @@ static inline MILD_BOTH OrderPart order_part(int envs, int rank, int ranks) {
 }
 
 /* The stratum in the arrays of the part; one of another process is empty. */
-static inline MILD_BOTH OrderStratum order_part_stratum(int steps, OrderPart part, int stratum) {
+MILD_HD_FN OrderStratum order_part_stratum(int steps, OrderPart part, int stratum) {
     OrderStratum s = order_stratum(steps, part.envs, stratum);
     if (stratum < part.shard || stratum >= part.shard + part.shards) {
         s.width = s.count = 0;
@@ -118,8 +118,7 @@ typedef struct {
     uint32_t right_bits, left_mask, right_mask; /* halves of the power of two */
 } Order;
 
-static inline MILD_BOTH Order order_make(int count, uint64_t seed, int64_t iteration, int epoch,
-                                         int stratum) {
+MILD_HD_FN Order order_make(int count, uint64_t seed, int64_t iteration, int epoch, int stratum) {
     Random random = random_at(seed ^ 0x6f72646572u, (uint32_t)iteration, (uint32_t)epoch);
     random.use = (uint32_t)stratum;
     const uint64_t key = random_bits(&random);
@@ -138,7 +137,7 @@ static inline MILD_BOTH Order order_make(int count, uint64_t seed, int64_t itera
 }
 
 /* What the permutation puts at this place. */
-static inline MILD_BOTH int order_at(const Order *order, int place) {
+MILD_HD_FN int order_at(const Order *order, int place) {
     const uint32_t golden = 0x9e3779b9u;
     uint32_t x = (uint32_t)place;
     do {

@@ -13,20 +13,20 @@
 /* ---- keys of the random numbers (learn/noise.h) ---- */
 
 /* Number env * actions + j of the stream is the noise of action j at time t. */
-static inline MILD_BOTH uint64_t step_action_key(uint64_t seed, int64_t iteration, int t) {
+MILD_HD_FN uint64_t step_action_key(uint64_t seed, int64_t iteration, int t) {
     Random random = random_at(seed, (uint32_t)iteration, (uint32_t)t);
     return random_bits(&random);
 }
 
 /* Number env * latent + j of the stream is the noise of z_j at time t with ppo.sample_latent, in
  * the rollout and in every minibatch. So an action's probability is that given its own noise. */
-static inline MILD_BOTH uint64_t step_sampled_key(uint64_t seed, int64_t iteration, int t) {
+MILD_HD_FN uint64_t step_sampled_key(uint64_t seed, int64_t iteration, int t) {
     Random random = random_at(seed ^ 0x7a6c6174u, (uint32_t)iteration, (uint32_t)t);
     return random_bits(&random);
 }
 
 /* draw: number of the minibatch in its update. See ppo_latent_rows. */
-static inline MILD_BOTH uint64_t step_latent_key(uint64_t seed, int64_t iteration, uint32_t draw) {
+MILD_HD_FN uint64_t step_latent_key(uint64_t seed, int64_t iteration, uint32_t draw) {
     Random random = random_at(seed ^ 0x76616573u, (uint32_t)iteration, draw);
     return random_bits(&random);
 }
@@ -34,12 +34,12 @@ static inline MILD_BOTH uint64_t step_latent_key(uint64_t seed, int64_t iteratio
 /* ---- the decoder's frames ---- */
 
 /* Bool: the decoder's frame is the next one. */
-static inline MILD_BOTH int step_frame_is_next(const PpoDef *def) {
+MILD_HD_FN int step_frame_is_next(const PpoDef *def) {
     return def->decoder_target == PPO_TARGET_NEXT || def->decoder_target == PPO_TARGET_BOTH;
 }
 
 /* Bool: batch.frame has the decoder's frames only after they were written there. */
-static inline MILD_BOTH int step_writes_frames(const PpoDef *def) {
+MILD_HD_FN int step_writes_frames(const PpoDef *def) {
     return def->decoder_target != PPO_TARGET_GROUND &&
            (step_frame_is_next(def) || !def->target_noise);
 }
@@ -47,7 +47,7 @@ static inline MILD_BOTH int step_writes_frames(const PpoDef *def) {
 /* ---- one minibatch ---- */
 
 /* Entropy of the action, a sum of log std + (1 + ln 2 pi) / 2. */
-static inline MILD_BOTH double step_entropy(int actions, const float *std) {
+MILD_HD_FN double step_entropy(int actions, const float *std) {
     double entropy = 0.0;
     for (int j = 0; j < actions; j++) {
         entropy += log((double)std[j]) + 1.4189385332046727;
@@ -57,8 +57,8 @@ static inline MILD_BOTH double step_entropy(int actions, const float *std) {
 
 /* Adds the means of a minibatch to the report. Returns 0 when one of them is not finite. weight,
  * mirror_weight: 1 / samples, 1 / samples with a mirror image. norm: of the gradient. */
-static inline MILD_BOTH int step_report(PpoReport *report, const LossSums *s, double weight,
-                                        double mirror_weight, double entropy, double norm) {
+MILD_HD_FN int step_report(PpoReport *report, const LossSums *s, double weight,
+                           double mirror_weight, double entropy, double norm) {
     const double check = s->surrogate + s->kl + s->reconstruction + s->vae_kl + s->estimate[0] +
                          s->estimate[1] + s->estimate[2] + s->mirror + s->value + norm;
     if (!isfinite(check)) {
@@ -81,7 +81,7 @@ static inline MILD_BOTH int step_report(PpoReport *report, const LossSums *s, do
 
 /* 0 before the annealing, 1 after it. A function of the iteration alone, so a resumed run
  * continues in the same way. */
-static inline MILD_BOTH double step_anneal(const PpoDef *def, int64_t iteration) {
+MILD_HD_FN double step_anneal(const PpoDef *def, int64_t iteration) {
     const int first = def->anneal[0], last = def->anneal[1];
     return first < last ? fmin(fmax((double)(iteration - first) / (last - first), 0.0), 1.0) : 0.0;
 }
@@ -89,8 +89,7 @@ static inline MILD_BOTH double step_anneal(const PpoDef *def, int64_t iteration)
 /* The rate that keeps the divergence from the rollout's policy near its target [vendor:
  * factor 1.5]. Below a millionth of the target the divergence is rounding: the first minibatch of
  * an update has none. */
-static inline MILD_BOTH double step_learning_rate(const PpoDef *def, int64_t iteration, double rate,
-                                                  double kl) {
+MILD_HD_FN double step_learning_rate(const PpoDef *def, int64_t iteration, double rate, double kl) {
     if (!(def->kl_target > 0.0)) {
         return rate;
     }
@@ -106,12 +105,12 @@ static inline MILD_BOTH double step_learning_rate(const PpoDef *def, int64_t ite
 }
 
 /* Factor on the gradient. */
-static inline MILD_BOTH double step_clip(const PpoDef *def, double norm) {
+MILD_HD_FN double step_clip(const PpoDef *def, double norm) {
     return norm > def->max_gradient_norm ? def->max_gradient_norm / norm : 1.0;
 }
 
 /* Lower bound of log std, after every step. */
-static inline MILD_BOTH float step_noise_floor(const PpoDef *def) {
+MILD_HD_FN float step_noise_floor(const PpoDef *def) {
     return (float)log(def->std_min);
 }
 
@@ -119,21 +118,21 @@ static inline MILD_BOTH float step_noise_floor(const PpoDef *def) {
 
 /* Upper bound of log std. It is applied between updates, so that the rollout samples from the
  * distribution that the update compares with. */
-static inline MILD_BOTH float step_noise_ceiling(const PpoDef *def, int64_t iteration) {
+MILD_HD_FN float step_noise_ceiling(const PpoDef *def, int64_t iteration) {
     return (float)(log(def->std_max[0]) +
                    step_anneal(def, iteration) * log(def->std_max[1] / def->std_max[0]));
 }
 
 /* Share of the present weights in their running mean. A young mean decays faster, because otherwise
  * it would retain the initial weights for long. */
-static inline MILD_BOTH float step_average(const PpoDef *def, int64_t iteration) {
+MILD_HD_FN float step_average(const PpoDef *def, int64_t iteration) {
     const double young = (1.0 + (double)iteration) / (10.0 + (double)iteration);
     return (float)(1.0 - fmin(def->average, young));
 }
 
 /* Sums over `taken` minibatches become means. */
-static inline MILD_BOTH void step_finish_report(PpoReport *report, int taken, int actions,
-                                                const float *std, double learning_rate) {
+MILD_HD_FN void step_finish_report(PpoReport *report, int taken, int actions, const float *std,
+                                   double learning_rate) {
     const double w = taken > 0 ? 1.0 / taken : 0.0;
     double *const means[] = {&report->surrogate,        &report->value_loss,
                              &report->entropy,          &report->kl,
@@ -152,8 +151,8 @@ static inline MILD_BOTH void step_finish_report(PpoReport *report, int taken, in
 
 /* From the moments over the usable samples. returns - value is the advantage before it is
  * normalised. */
-static inline MILD_BOTH void step_report_returns(PpoReport *report, double value_mean,
-                                                 double advantage_std, double returns_std) {
+MILD_HD_FN void step_report_returns(PpoReport *report, double value_mean, double advantage_std,
+                                    double returns_std) {
     report->value_mean = value_mean;
     report->advantage_std = advantage_std;
     report->explained_variance =

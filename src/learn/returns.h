@@ -5,11 +5,11 @@
 
 #include <math.h>
 
-#include "base/both.h"
+#include "base/hd.h"
 #include "learn/ppo_batch.h"
 
 /* Bool: sample i is valid and its numbers are finite. */
-static inline MILD_BOTH int returns_usable(const PpoBatch *b, int64_t i) {
+MILD_HD_FN int returns_usable(const PpoBatch *b, int64_t i) {
     return b->valid[i] && isfinite(b->value[i]) && isfinite(b->reward[i]);
 }
 
@@ -17,8 +17,7 @@ static inline MILD_BOTH int returns_usable(const PpoBatch *b, int64_t i) {
  *   delta_t = r_t + gamma V(s_t+1) (1 - done) - V(s_t),  A_t = delta_t + gamma lambda (1 - done)
  * A_t+1, where an end by time has r_t += gamma V(s_t), as if the episode went on. An unusable
  * sample cuts like an end. */
-static inline MILD_BOTH void returns_environment(double gamma, double lambda, const PpoBatch *b,
-                                                 int env) {
+MILD_HD_FN void returns_environment(double gamma, double lambda, const PpoBatch *b, int env) {
     double advantage = 0.0, next_value = b->value[(int64_t)b->steps * b->envs + env];
     next_value = isfinite(next_value) ? next_value : 0.0;
     for (int t = b->steps - 1; t >= 0; t--) {
@@ -41,7 +40,7 @@ static inline MILD_BOTH void returns_environment(double gamma, double lambda, co
 
 /* Bool: the frame of sample i = (t, env) is followed by one that it may be replaced with as the
  * decoder's target. The last frame of an episode and a frame before one that is not valid stay. */
-static inline MILD_BOTH int returns_has_next(const PpoBatch *b, int t, int64_t i) {
+MILD_HD_FN int returns_has_next(const PpoBatch *b, int t, int64_t i) {
     return !b->done[i] && (t + 1 == b->steps || b->valid[i + b->envs]);
 }
 

@@ -5,12 +5,12 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "base/both.h"
+#include "base/hd.h"
 
 /* e^x to 3e-7 relative for x in [-87, 88]; clamped outside; NaN stays NaN.
  * e^x = 2^n e^r, n = round(x / ln 2), |r| <= ln(2)/2, e^r by its Taylor series to r^6/720
  * (error 1.2e-7 relative). */
-static inline MILD_BOTH float vector_exp(float x) {
+MILD_HD_FN float vector_exp(float x) {
     const float shift =
         12582912.0f; /* 1.5 * 2^23: adding it rounds to an integer held in the low bits */
     float held = x < -87.0f ? -87.0f : x;
@@ -34,28 +34,28 @@ static inline MILD_BOTH float vector_exp(float x) {
 }
 
 /* Exponential linear unit, and its derivative from the output y: 1 for y > 0, else e^x = y + 1. */
-static inline MILD_BOTH float vector_elu(float x) {
+MILD_HD_FN float vector_elu(float x) {
     float negative = vector_exp(x > 0.0f ? 0.0f : x) - 1.0f;
     return x > 0.0f ? x : negative;
 }
 
-static inline MILD_BOTH float vector_elu_slope(float y) {
+MILD_HD_FN float vector_elu_slope(float y) {
     return y > 0.0f ? 1.0f : y + 1.0f;
 }
 
 /* Softsign x / (1 + |x|), and its derivative from the output y: (1 - |y|)^2. */
-static inline MILD_BOTH float vector_softsign(float x) {
+MILD_HD_FN float vector_softsign(float x) {
     return x / (1.0f + (x < 0.0f ? -x : x));
 }
 
-static inline MILD_BOTH float vector_softsign_slope(float y) {
+MILD_HD_FN float vector_softsign_slope(float y) {
     const float left = 1.0f - (y < 0.0f ? -y : y);
     return left * left;
 }
 
 /* Natural logarithm to 2e-7 for normal positive x. x = 2^e m with m in [sqrt(1/2), sqrt(2)); with s
  * = (m-1)/(m+1), ln m = 2 (s + s^3/3 + s^5/5 + ...), |s| <= 0.172, cut after s^9/9. */
-static inline MILD_BOTH float vector_log(float x) {
+MILD_HD_FN float vector_log(float x) {
     uint32_t bits;
     memcpy(&bits, &x, sizeof bits);
     int32_t exponent = (int32_t)((bits - 0x3f3504f3u) >> 23);

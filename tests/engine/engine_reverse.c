@@ -1,4 +1,4 @@
-#include "ground/batch/lanes.h"
+#include "base/hd.h"
 
 #undef EACH_LANE
 #define EACH_LANE(l) for (int l = LANES - 1; l >= 0; l--)

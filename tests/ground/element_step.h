@@ -1,4 +1,4 @@
-/* One step of one element in the scalar type of src/ground/real.h, with doubles outside. Included
+/* One step of one element in the scalar type of src/base/hd.h, with doubles outside. Included
  * by two files: once with Real = double, once with Real = float. */
 #ifndef ELEMENT_STEP_H
 #define ELEMENT_STEP_H

@@ -4,7 +4,7 @@
 #ifndef TASK_DEVICE_ROBOT_H
 #define TASK_DEVICE_ROBOT_H
 
-#include "base/both.h"
+#include "base/hd.h"
 #include "robot/table.h"
 
 typedef RobotTable Robot;
@@ -54,11 +54,11 @@ typedef struct {
 } TaskTerrain;
 
 #define DEVICE_ROBOT_LIST(name)                                                                    \
-    static inline MILD_BOTH const double *robot_##name(const Robot *robot) {                       \
+    MILD_HD_FN const double *robot_##name(const Robot *robot) {                                    \
         return robot->name;                                                                        \
     }
 #define DEVICE_ROBOT_NUMBER(name)                                                                  \
-    static inline MILD_BOTH double robot_##name(const Robot *robot) {                              \
+    MILD_HD_FN double robot_##name(const Robot *robot) {                                           \
         return robot->name;                                                                        \
     }
 DEVICE_ROBOT_LIST(default_pose)
@@ -79,45 +79,44 @@ DEVICE_ROBOT_NUMBER(nominal_height)
 DEVICE_ROBOT_NUMBER(action_scale)
 DEVICE_ROBOT_NUMBER(foot_force)
 
-static inline MILD_BOTH int robot_joints(const Robot *robot) {
+MILD_HD_FN int robot_joints(const Robot *robot) {
     return robot->joints;
 }
 
-static inline MILD_BOTH const int *robot_joint_foot(const Robot *robot) {
+MILD_HD_FN const int *robot_joint_foot(const Robot *robot) {
     return robot->joint_foot;
 }
 
-static inline MILD_BOTH double robot_gait_offset(const Robot *robot, int foot) {
+MILD_HD_FN double robot_gait_offset(const Robot *robot, int foot) {
     return robot->gait_offset[foot];
 }
 
-static inline MILD_BOTH const TaskReal *robot_sim_qpos(const RobotSim *sim) {
+MILD_HD_FN const TaskReal *robot_sim_qpos(const RobotSim *sim) {
     return sim->state->qpos;
 }
 
-static inline MILD_BOTH const TaskReal *robot_sim_qvel(const RobotSim *sim) {
+MILD_HD_FN const TaskReal *robot_sim_qvel(const RobotSim *sim) {
     return sim->state->qvel;
 }
 
-static inline MILD_BOTH const TaskReal *robot_sim_base_rotation(const RobotSim *sim) {
+MILD_HD_FN const TaskReal *robot_sim_base_rotation(const RobotSim *sim) {
     return sim->rotation;
 }
 
-static inline MILD_BOTH const RobotFoot *robot_sim_foot(const RobotSim *sim, int foot) {
+MILD_HD_FN const RobotFoot *robot_sim_foot(const RobotSim *sim, int foot) {
     return &sim->foot[foot];
 }
 
-static inline MILD_BOTH double robot_sim_body_clearance(const RobotSim *sim,
-                                                        const TaskTerrain *terrain) {
+MILD_HD_FN double robot_sim_body_clearance(const RobotSim *sim, const TaskTerrain *terrain) {
     (void)terrain;
     return sim->body_clearance;
 }
 
-static inline MILD_BOTH double robot_sim_knee_distance(const RobotSim *sim) {
+MILD_HD_FN double robot_sim_knee_distance(const RobotSim *sim) {
     return sim->knee_distance;
 }
 
-static inline MILD_BOTH double robot_sim_foot_distance(const RobotSim *sim) {
+MILD_HD_FN double robot_sim_foot_distance(const RobotSim *sim) {
     return sim->foot_distance;
 }
 

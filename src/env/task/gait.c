@@ -24,7 +24,7 @@ TASK_FN double task_gait_period(const TaskDef *def, const TaskReal command[3]) {
 }
 
 /* [-] Progress of the foot's swing, the half of the period before its stance; -1 in stance. */
-static inline MILD_BOTH double swing_progress(const Robot *robot, double phase, int foot) {
+MILD_HD_FN double swing_progress(const Robot *robot, double phase, int foot) {
     double offset = robot_gait_offset(robot, foot);
     double p = phase - (offset < 0.5 ? offset + 0.5 : offset - 0.5);
     p += p < 0 ? 1 : 0;
@@ -32,7 +32,7 @@ static inline MILD_BOTH double swing_progress(const Robot *robot, double phase, 
 }
 
 /* The foot's clock: positive in stance, negative in swing. */
-static inline MILD_BOTH double wave(const Robot *robot, double phase, int foot) {
+MILD_HD_FN double wave(const Robot *robot, double phase, int foot) {
     double offset = robot_gait_offset(robot, foot);
     return offset < 0.5 ? task_sin(TWO_PI * (phase - offset))
                         : -task_sin(TWO_PI * (phase - (offset - 0.5)));

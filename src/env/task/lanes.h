@@ -13,7 +13,7 @@
 #include <cuda_fp16.h>
 #endif
 
-#include "base/both.h"
+#include "base/hd.h"
 
 #ifndef TASK_JOINTS /* sizes of a robot's arrays; where the text is compiled for one, its own */
 #define TASK_JOINTS ROBOT_JOINTS_MAX
@@ -23,7 +23,7 @@
 /* TaskReal: a number that an environment keeps, in float on a device. Expressions are computed in
  * double where they read the task's definition or the robot's. */
 #ifdef TASK_ON_DEVICE
-#define TASK_FN static inline MILD_BOTH
+#define TASK_FN MILD_HD_FN
 typedef float TaskReal;
 #include "env/task/device_robot.h"
 #else
@@ -37,7 +37,7 @@ typedef MildTerrain TaskTerrain;
 #define TASK_PER_TURN 0.3183098861837907 /* 1/pi */
 
 /* On a GPU to the accuracy of float, for a tenth of the instructions. */
-static inline MILD_BOTH TaskReal task_exp(double x) {
+MILD_HD_FN TaskReal task_exp(double x) {
 #ifdef __CUDA_ARCH__
     return expf((float)x);
 #else
@@ -45,7 +45,7 @@ static inline MILD_BOTH TaskReal task_exp(double x) {
 #endif
 }
 
-static inline MILD_BOTH TaskReal task_sin(double x) {
+MILD_HD_FN TaskReal task_sin(double x) {
 #ifdef __CUDA_ARCH__
     return sinpif((float)(x * TASK_PER_TURN)); /* sinf has a long path for large x */
 #else
@@ -53,7 +53,7 @@ static inline MILD_BOTH TaskReal task_sin(double x) {
 #endif
 }
 
-static inline MILD_BOTH TaskReal task_cos(double x) {
+MILD_HD_FN TaskReal task_cos(double x) {
 #ifdef __CUDA_ARCH__
     return cospif((float)(x * TASK_PER_TURN));
 #else
@@ -61,7 +61,7 @@ static inline MILD_BOTH TaskReal task_cos(double x) {
 #endif
 }
 
-static inline MILD_BOTH TaskReal task_sqrt(double x) {
+MILD_HD_FN TaskReal task_sqrt(double x) {
 #ifdef __CUDA_ARCH__
     return sqrtf((float)x);
 #else
@@ -77,7 +77,7 @@ static inline MILD_BOTH TaskReal task_sqrt(double x) {
 #endif
 
 /* [m] Height of the base above the undisturbed surface. */
-static inline MILD_BOTH double task_height_above(const RobotSim *sim, const TaskTerrain *terrain) {
+MILD_HD_FN double task_height_above(const RobotSim *sim, const TaskTerrain *terrain) {
 #ifdef TASK_ON_DEVICE
     (void)terrain;
     return sim->above;
@@ -93,7 +93,7 @@ static inline MILD_BOTH double task_height_above(const RobotSim *sim, const Task
 #ifdef TASK_ON_DEVICE
 typedef uint16_t TaskFrame;
 
-static inline MILD_BOTH TaskFrame frame_pack(float x) {
+MILD_HD_FN TaskFrame frame_pack(float x) {
 #ifdef __CUDA_ARCH__
     return __half_as_ushort(__float2half_rn(fminf(fmaxf(x, -65504.0f), 65504.0f)));
 #else
@@ -104,7 +104,7 @@ static inline MILD_BOTH TaskFrame frame_pack(float x) {
 #endif
 }
 
-static inline MILD_BOTH float frame_unpack(TaskFrame frame) {
+MILD_HD_FN float frame_unpack(TaskFrame frame) {
 #ifdef __CUDA_ARCH__
     return __half2float(__ushort_as_half(frame));
 #else
@@ -146,7 +146,7 @@ enum { TASK_LANES = 8 };
 enum { TASK_LANES = 1 };
 #endif
 
-static inline MILD_BOTH int task_lane(void) {
+MILD_HD_FN int task_lane(void) {
 #ifdef __CUDA_ARCH__
     return (int)(threadIdx.x % TASK_LANES);
 #else
@@ -161,14 +161,14 @@ static inline __device__ unsigned task_lane_mask(void) {
 #endif
 
 /* Makes what each lane wrote visible to the others. */
-static inline MILD_BOTH void task_lanes_sync(void) {
+MILD_HD_FN void task_lanes_sync(void) {
 #ifdef __CUDA_ARCH__
     __syncwarp(task_lane_mask());
 #endif
 }
 
 /* Sets numbers of TaskReal, or of float, to 0. */
-static inline MILD_BOTH void task_clear(void *numbers, size_t bytes) {
+MILD_HD_FN void task_clear(void *numbers, size_t bytes) {
 #ifdef TASK_ON_DEVICE
     float *number = (float *)numbers;
     for (size_t i = (size_t)task_lane(); i < bytes / sizeof *number; i += TASK_LANES) {
@@ -180,7 +180,7 @@ static inline MILD_BOTH void task_clear(void *numbers, size_t bytes) {
 }
 
 /* The sum over the lanes. */
-static inline MILD_BOTH TaskReal task_lanes_sum(TaskReal x) {
+MILD_HD_FN TaskReal task_lanes_sum(TaskReal x) {
 #ifdef __CUDA_ARCH__
     for (int step = TASK_LANES / 2; step > 0; step /= 2) {
         x += __shfl_xor_sync(task_lane_mask(), x, step);

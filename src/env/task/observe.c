@@ -33,10 +33,9 @@ TASK_FN void task_read_motors(const RobotSim *sim, TaskReading *reading) {
 }
 
 /* A frame without noise. joint, speed: [joints]. */
-static inline MILD_BOTH void make_frame(const TaskEnv *env, const TaskDef *def, const double *pose,
-                                        const TaskReal *omega, const TaskReal *gravity,
-                                        const TaskReal *joint, const TaskReal *speed,
-                                        float *frame) {
+MILD_HD_FN void make_frame(const TaskEnv *env, const TaskDef *def, const double *pose,
+                           const TaskReal *omega, const TaskReal *gravity, const TaskReal *joint,
+                           const TaskReal *speed, float *frame) {
     int joints = env->shape.joints;
     for (int i = task_lane(); i < 3; i += TASK_LANES) {
         frame[i] = (float)omega[i];
@@ -57,14 +56,14 @@ static inline MILD_BOTH void make_frame(const TaskEnv *env, const TaskDef *def, 
 }
 
 /* Two of the numbers of this policy step, uniform in [-1, 1). */
-static inline MILD_BOTH void draw_noise(const TaskEnv *env, int pair, double noise[2]) {
+MILD_HD_FN void draw_noise(const TaskEnv *env, int pair, double noise[2]) {
     Random r = random_at(env->seed ^ RANDOM_USE_NOISE, env->index, env->tick);
     r.use = (uint32_t)(2 * pair);
     noise[0] = 2 * random_unit(&r) - 1;
     noise[1] = 2 * random_unit(&r) - 1;
 }
 
-static inline MILD_BOTH void add_noise(const TaskEnv *env, const TaskDef *def, float *frame) {
+MILD_HD_FN void add_noise(const TaskEnv *env, const TaskDef *def, float *frame) {
     float *q = frame + 9, *qd = q + env->shape.joints;
     for (int pair = task_lane(); pair < 3 + env->shape.joints; pair += TASK_LANES) {
         double noise[2];
@@ -80,15 +79,15 @@ static inline MILD_BOTH void add_noise(const TaskEnv *env, const TaskDef *def, f
 }
 
 /* Rotates a world vector into the base frame. */
-static inline MILD_BOTH void to_base(const TaskReal *rotation, const TaskReal *v, float *out) {
+MILD_HD_FN void to_base(const TaskReal *rotation, const TaskReal *v, float *out) {
     for (int i = 0; i < 3; i++) {
         out[i] = (float)(rotation[i] * v[0] + rotation[3 + i] * v[1] + rotation[6 + i] * v[2]);
     }
 }
 
 /* Velocity of the base, then velocities and heights of the feet. */
-static inline MILD_BOTH void write_estimates(const TaskEnv *env, const TaskDef *def,
-                                             const RobotSim *sim, float *estimate) {
+MILD_HD_FN void write_estimates(const TaskEnv *env, const TaskDef *def, const RobotSim *sim,
+                                float *estimate) {
     const TaskReal *rotation = robot_sim_base_rotation(sim);
     int feet = env->shape.feet;
     for (int n = task_lane(); n <= feet; n += TASK_LANES) {
@@ -106,8 +105,8 @@ static inline MILD_BOTH void write_estimates(const TaskEnv *env, const TaskDef *
 }
 
 /* Six numbers of each foot. */
-static inline MILD_BOTH void write_feet(const TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                        const RobotSim *sim, float *out) {
+MILD_HD_FN void write_feet(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                           const RobotSim *sim, float *out) {
     int standing = task_is_standing(def, env->command);
     const float force_scale = (float)(0.6 * robot_foot_force(robot)); /* [N] */
     for (int f = task_lane(); f < env->shape.feet; f += TASK_LANES) {
@@ -125,8 +124,8 @@ static inline MILD_BOTH void write_feet(const TaskEnv *env, const TaskDef *def, 
 }
 
 /* What was drawn for the episode. */
-static inline MILD_BOTH void write_episode(const TaskEnv *env, const TaskDef *def,
-                                           const Robot *robot, const RobotSim *sim, float *out) {
+MILD_HD_FN void write_episode(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                              const RobotSim *sim, float *out) {
     float buffer[TASK_GROUND_NUMBERS];
     const float *ground = task_ground_under(env, def, robot, sim, buffer);
     const RobotVariation *variation = &env->variation;
@@ -156,7 +155,7 @@ static inline MILD_BOTH void write_episode(const TaskEnv *env, const TaskDef *de
     }
 }
 
-static inline MILD_BOTH void copy_row(const float *from, int width, float *to) {
+MILD_HD_FN void copy_row(const float *from, int width, float *to) {
     for (int j = task_lane(); j < width; j += TASK_LANES) {
         to[j] = from[j];
     }
@@ -164,8 +163,7 @@ static inline MILD_BOTH void copy_row(const float *from, int width, float *to) {
 
 /* Five means of older frames before the frame, which then takes the place of the oldest in the
  * ring. At the start of an episode the first frame also fills the older ones. */
-static inline MILD_BOTH void write_history(TaskEnv *env, const TaskDef *def, int first,
-                                           float *history) {
+MILD_HD_FN void write_history(TaskEnv *env, const TaskDef *def, int first, float *history) {
     const int width = env->shape.observation, stride = def->history_stride;
     const uint32_t held = env->held;
     const float *frame = history + (TASK_FRAMES - 1) * width;

@@ -10,15 +10,15 @@
 #define RANDOM_USE_MAP 0x4d415050u
 #define RANDOM_USE_COMMAND 0x434f4d4du
 
-static inline MILD_BOTH double draw(Random *r, const double range[2]) {
+MILD_HD_FN double draw(Random *r, const double range[2]) {
     return random_uniform(r, range[0], range[1]);
 }
 
-static inline MILD_BOTH double spread(Random *r, double half_width) {
+MILD_HD_FN double spread(Random *r, double half_width) {
     return half_width * (2 * random_unit(r) - 1);
 }
 
-static inline MILD_BOTH int draw_lag(Random *r, const TaskDef *def) {
+MILD_HD_FN int draw_lag(Random *r, const TaskDef *def) {
     return (int)(draw(r, def->randomize.latency) / def->physics_dt + 0.5);
 }
 

@@ -5,16 +5,16 @@
 
 #include "env/task/task.h"
 
-static inline MILD_BOTH TaskReal square(TaskReal x) {
+MILD_HD_FN TaskReal square(TaskReal x) {
     return x * x;
 }
 
-static inline MILD_BOTH TaskReal clamp(TaskReal x, TaskReal low, TaskReal high) {
+MILD_HD_FN TaskReal clamp(TaskReal x, TaskReal low, TaskReal high) {
     return x < low ? low : x > high ? high : x;
 }
 
 /* Scales a sum over feet to two feet. */
-static inline MILD_BOTH TaskReal per_pair(const TaskMotion *m, TaskReal sum) {
+MILD_HD_FN TaskReal per_pair(const TaskMotion *m, TaskReal sum) {
     return sum * (2 / TASK_REAL(m->env->shape.feet));
 }
 
@@ -22,7 +22,7 @@ static inline MILD_BOTH TaskReal per_pair(const TaskMotion *m, TaskReal sum) {
  * too slow costs only 1 %. exp(-|e|/width) keeps its slope down to zero error. Both use the
  * velocity smoothed over half a gait period, because the sway within a step is not an error and
  * would hide one. */
-static inline MILD_BOTH TaskReal tracking(const TaskMotion *m, TaskReal error) {
+MILD_HD_FN TaskReal tracking(const TaskMotion *m, TaskReal error) {
     const RewardDef *def = &m->def->reward;
     const TaskReal narrow = TASK_REAL(def->tracking_narrow);
     return (1 - narrow) * task_exp(-def->tracking_sharpness * square(error)) +
@@ -31,17 +31,17 @@ static inline MILD_BOTH TaskReal tracking(const TaskMotion *m, TaskReal error) {
 
 /* Forward and sideways errors count separately. In the norm of both, a little sway would hide a
  * forward error. */
-static inline MILD_BOTH TaskReal reward_linear_velocity(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_linear_velocity(const TaskMotion *m) {
     const TaskReal *v = m->env->smooth_velocity, *command = m->env->command;
     return tracking(m, v[0] - command[0]) * tracking(m, v[1] - command[1]);
 }
 
-static inline MILD_BOTH TaskReal reward_yaw_rate(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_yaw_rate(const TaskMotion *m) {
     return tracking(m, m->env->smooth_velocity[2] - m->env->command[2]);
 }
 
 /* [m] Mean depth of the feet that the clock wants in stance, at least 0. */
-static inline MILD_BOTH TaskReal stance_depth(const TaskMotion *m) {
+MILD_HD_FN TaskReal stance_depth(const TaskMotion *m) {
     TaskReal sum = 0;
     int feet = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
@@ -57,7 +57,7 @@ static inline MILD_BOTH TaskReal stance_depth(const TaskMotion *m) {
  * as much per metre as lifting gains. The scale is such that following h_des = apex sin(pi s) gives
  * 1 on average over the swing. From a deep print a foot lifts far before it meets the surface:
  * TASK_CLEARANCE_RISE counts from the depth of the standing feet. */
-static inline MILD_BOTH TaskReal reward_feet_clearance(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_feet_clearance(const TaskMotion *m) {
     const int form = m->def->reward.clearance_form;
     const TaskReal depth = form == TASK_CLEARANCE_RISE ? stance_depth(m) : 0;
     TaskReal sum = 0;
@@ -77,7 +77,7 @@ static inline MILD_BOTH TaskReal reward_feet_clearance(const TaskMotion *m) {
 
 /* The paper's sum over two feet has its -0.3 once: both match 2.3, one 1, none -0.3. The mean has a
  * range that does not depend on the number of feet. */
-static inline MILD_BOTH TaskReal reward_gait(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_gait(const TaskMotion *m) {
     const int sums = m->def->reward.gait_form == TASK_GAIT_SUM;
     TaskReal sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
@@ -88,7 +88,7 @@ static inline MILD_BOTH TaskReal reward_gait(const TaskMotion *m) {
                 : sum / TASK_REAL(m->env->shape.feet);
 }
 
-static inline MILD_BOTH TaskReal reward_slip(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_slip(const TaskMotion *m) {
     TaskReal sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
         sum += m->contact[f] ? m->foot_speed[f] : 0;
@@ -96,11 +96,11 @@ static inline MILD_BOTH TaskReal reward_slip(const TaskMotion *m) {
     return per_pair(m, sum);
 }
 
-static inline MILD_BOTH TaskReal reward_base_acceleration(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_base_acceleration(const TaskMotion *m) {
     return task_exp(-3 * m->twist_change);
 }
 
-static inline MILD_BOTH TaskReal reward_action_smoothness(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_action_smoothness(const TaskMotion *m) {
     TaskReal sum = 0;
     for (int i = task_lane(); i < m->env->shape.actions; i += TASK_LANES) {
         TaskReal a = m->env->action[0][i], a1 = m->env->action[1][i], a2 = m->env->action[2][i];
@@ -109,7 +109,7 @@ static inline MILD_BOTH TaskReal reward_action_smoothness(const TaskMotion *m) {
     return task_lanes_sum(sum);
 }
 
-static inline MILD_BOTH TaskReal reward_reference_motion(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_reference_motion(const TaskMotion *m) {
     TaskReal sum = 0;
     for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
         sum +=
@@ -121,7 +121,7 @@ static inline MILD_BOTH TaskReal reward_reference_motion(const TaskMotion *m) {
 
 /* The vendor's exp(-100 x) alone is flat beyond a fifth of a radian, and so gives no signal
  * there. */
-static inline MILD_BOTH TaskReal reward_default_pose(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_default_pose(const TaskMotion *m) {
     const double *pose = robot_default_pose(m->robot), *still = robot_still(m->robot);
     TaskReal away = 0, all = 0;
     for (int f = -1; f < m->env->shape.feet; f++) { /* -1: the trunk's joints */
@@ -140,27 +140,26 @@ static inline MILD_BOTH TaskReal reward_default_pose(const TaskMotion *m) {
            TASK_REAL(0.01) * task_sqrt(task_lanes_sum(all));
 }
 
-static inline MILD_BOTH TaskReal reward_base_height(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_base_height(const TaskMotion *m) {
     return task_exp(-100 * fabs(m->base_height - task_nominal_height(m->def, m->robot)));
 }
 
-static inline MILD_BOTH TaskReal within(TaskReal distance, const double wanted[2],
-                                        const double own[2]) {
+MILD_HD_FN TaskReal within(TaskReal distance, const double wanted[2], const double own[2]) {
     const double *limits = wanted[1] > 0 ? wanted : own;
     TaskReal below = clamp(limits[0] - distance, 0, 0.5),
              above = clamp(distance - limits[1], 0, 0.5);
     return TASK_REAL(0.5) * (task_exp(-100 * below) + task_exp(-100 * above));
 }
 
-static inline MILD_BOTH TaskReal reward_feet_distance(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_feet_distance(const TaskMotion *m) {
     return within(m->foot_distance, m->def->reward.feet_range, robot_feet_range(m->robot));
 }
 
-static inline MILD_BOTH TaskReal reward_knee_distance(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_knee_distance(const TaskMotion *m) {
     return within(m->knee_distance, m->def->reward.knee_range, robot_knee_range(m->robot));
 }
 
-static inline MILD_BOTH TaskReal reward_orientation(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_orientation(const TaskMotion *m) {
     TaskReal tilt = task_sqrt(square(m->gravity[0]) + square(m->gravity[1]));
     return TASK_REAL(0.5) *
            (task_exp(-10 * (fabs(m->gravity[0]) + fabs(m->gravity[1]))) + task_exp(-4 * tilt));
@@ -169,16 +168,16 @@ static inline MILD_BOTH TaskReal reward_orientation(const TaskMotion *m) {
 /* Paid once, at touchdown. It is divided by the period, because rewards are rates that are
  * multiplied by the period. The vendor's version lacks this, so only a hundredth of it remains,
  * which a learner does not notice. */
-static inline MILD_BOTH TaskReal reward_air_time(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_air_time(const TaskMotion *m) {
     return m->standing ? 0 : per_pair(m, m->landed_air_time) / TASK_REAL(TASK_PERIOD);
 }
 
-static inline MILD_BOTH TaskReal reward_base_motion(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_base_motion(const TaskMotion *m) {
     return TASK_REAL(0.5) * (task_exp(-10 * square(m->velocity[2])) +
                              task_exp(-5 * task_sqrt(square(m->omega[0]) + square(m->omega[1]))));
 }
 
-static inline MILD_BOTH TaskReal reward_contact_force(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_contact_force(const TaskMotion *m) {
     TaskReal sum = 0, hard = robot_foot_force(m->robot);
     for (int f = 0; f < m->env->shape.feet; f++) {
         sum += clamp(m->foot_force[f] - hard, 0, TASK_REAL(0.8) * hard);
@@ -186,7 +185,7 @@ static inline MILD_BOTH TaskReal reward_contact_force(const TaskMotion *m) {
     return per_pair(m, sum);
 }
 
-static inline MILD_BOTH TaskReal reward_torque(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_torque(const TaskMotion *m) {
     TaskReal sum = 0;
     for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
         sum += square(m->torque[i]);
@@ -194,7 +193,7 @@ static inline MILD_BOTH TaskReal reward_torque(const TaskMotion *m) {
     return task_lanes_sum(sum);
 }
 
-static inline MILD_BOTH TaskReal reward_joint_speed(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_joint_speed(const TaskMotion *m) {
     TaskReal sum = 0;
     for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
         sum += square(m->qd[i]);
@@ -202,7 +201,7 @@ static inline MILD_BOTH TaskReal reward_joint_speed(const TaskMotion *m) {
     return task_lanes_sum(sum);
 }
 
-static inline MILD_BOTH TaskReal reward_joint_acceleration(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_joint_acceleration(const TaskMotion *m) {
     TaskReal sum = 0;
     for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
         sum += square((m->qd[i] - m->qd_before[i]) / TASK_REAL(TASK_PERIOD));
@@ -211,7 +210,7 @@ static inline MILD_BOTH TaskReal reward_joint_acceleration(const TaskMotion *m) 
 }
 
 /* What the cost of transport counts. */
-static inline MILD_BOTH TaskReal reward_power(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_power(const TaskMotion *m) {
     TaskReal sum = 0;
     for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
         sum += TASK_REAL(fabs(m->torque[i] * m->qd[i]));
@@ -220,7 +219,7 @@ static inline MILD_BOTH TaskReal reward_power(const TaskMotion *m) {
 }
 
 /* Penalises legs that are too close, because the engine computes no contact between them. */
-static inline MILD_BOTH TaskReal reward_collision(const TaskMotion *m) {
+MILD_HD_FN TaskReal reward_collision(const TaskMotion *m) {
     int close = (m->foot_distance < robot_feet_least(m->robot)) +
                 (m->knee_distance < robot_knee_least(m->robot));
     return TASK_REAL(close);

@@ -13,11 +13,11 @@
 
 /* ---- the block: TaskEnv, history, ring of frames ---- */
 
-static inline MILD_BOTH size_t whole_lines(size_t bytes) {
+MILD_HD_FN size_t whole_lines(size_t bytes) {
     return (bytes + 63) / 64 * 64;
 }
 
-static inline MILD_BOTH size_t history_bytes(const TaskShape *shape) {
+MILD_HD_FN size_t history_bytes(const TaskShape *shape) {
     return TASK_HAS_HISTORY ? (size_t)shape->history * sizeof(float) : 0;
 }
 
@@ -26,7 +26,7 @@ TASK_FN uint32_t task_frames_held(const TaskDef *def) {
 }
 
 /* A device has no history, and the frames right behind TaskEnv. */
-static inline MILD_BOTH size_t history_place(void) {
+MILD_HD_FN size_t history_place(void) {
     return TASK_HAS_HISTORY ? whole_lines(sizeof(TaskEnv)) : sizeof(TaskEnv);
 }
 
@@ -43,7 +43,7 @@ TASK_FN TaskFrame *task_env_frames(TaskEnv *env) {
     return (TaskFrame *)(void *)((char *)env + history_place() + history_bytes(&env->shape));
 }
 
-static inline MILD_BOTH const TaskGains *gains_of(const TaskEnv *env) {
+MILD_HD_FN const TaskGains *gains_of(const TaskEnv *env) {
 #ifdef TASK_ON_DEVICE
     return env->gains;
 #else
@@ -51,7 +51,7 @@ static inline MILD_BOTH const TaskGains *gains_of(const TaskEnv *env) {
 #endif
 }
 
-static inline MILD_BOTH void set_gains(TaskEnv *env, const TaskGains *gains) {
+MILD_HD_FN void set_gains(TaskEnv *env, const TaskGains *gains) {
 #ifdef TASK_ON_DEVICE
     env->gains = gains;
 #else
@@ -86,8 +86,7 @@ TASK_FN void task_set_progress(TaskEnv *env, TaskProgress kept) {
 
 /* depth: [m] how deep the feet stand in this ground, so that episodes start neither in the air nor
  * buried. */
-static inline MILD_BOTH void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                        double depth) {
+MILD_HD_FN void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot, double depth) {
     const RandomizeDef *z = &def->randomize;
     Random r = random_at(env->seed ^ RANDOM_USE_START, env->index, env->tick);
     const double *pose = robot_default_pose(robot);
@@ -116,14 +115,14 @@ static inline MILD_BOTH void draw_start(TaskEnv *env, const TaskDef *def, const 
     env->step_first = env->step;
 }
 
-static inline MILD_BOTH void see_command(TaskEnv *env) {
+MILD_HD_FN void see_command(TaskEnv *env) {
     for (int i = 0; i < 3; i++) {
         env->command_seen[i] = env->command[i];
     }
 }
 
 /* What an episode knows of the one before, and its command. */
-static inline MILD_BOTH void clear(TaskEnv *env, const TaskDef *def) {
+MILD_HD_FN void clear(TaskEnv *env, const TaskDef *def) {
     task_clear(&env->robot, sizeof env->robot);
     task_clear(env->action, sizeof env->action);
     task_clear(env->air_time, sizeof env->air_time);
@@ -157,7 +156,7 @@ TASK_FN void task_first_reading(TaskEnv *env, const RobotSim *sim, TaskReading *
 
 /* ---- before the physics ---- */
 
-static inline MILD_BOTH void accept_action(TaskEnv *env, const TaskDef *def, const float *action) {
+MILD_HD_FN void accept_action(TaskEnv *env, const TaskDef *def, const float *action) {
     float limit = (float)def->action_clip;
     for (int i = task_lane(); i < env->shape.actions; i += TASK_LANES) {
         float a = action[i];
@@ -167,7 +166,7 @@ static inline MILD_BOTH void accept_action(TaskEnv *env, const TaskDef *def, con
     }
 }
 
-static inline MILD_BOTH void push_base(TaskEnv *env, const TaskDef *def) {
+MILD_HD_FN void push_base(TaskEnv *env, const TaskDef *def) {
     const RandomizeDef *z = &def->randomize;
     for (int i = task_lane(); i < 6; i += TASK_LANES) {
         env->push[i] *= 0.95;
@@ -224,8 +223,8 @@ TASK_FN int task_motors_act(const TaskEnv *env, const TaskDef *def, int k, int s
 
 /* ---- after the physics ---- */
 
-static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                         const RobotSim *sim, TaskMotion *m) {
+MILD_HD_FN void feet_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                            const RobotSim *sim, TaskMotion *m) {
     const double half_period = 0.5 * task_gait_period(def, env->command_seen);
     TaskReal stance_height = 0;
     int stances = 0;
@@ -307,8 +306,7 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
 /* Bool: the base tilts too much, a shell touches the ground or is too deep in soft ground, or a
  * foot has passed through the other leg, because the engine computes no contact between the
  * legs. */
-static inline MILD_BOTH int has_fallen(const TaskEnv *env, const TaskDef *def,
-                                       const RobotSim *sim) {
+MILD_HD_FN int has_fallen(const TaskEnv *env, const TaskDef *def, const RobotSim *sim) {
     const double depth = env->variation.rigid ? 0 : def->shell_depth;
     return robot_sim_foot_distance(sim) < def->crossing_limit ||
            robot_sim_base_rotation(sim)[8] < task_cos(def->tilt_limit) ||
@@ -327,7 +325,7 @@ TASK_FN void task_advance_clock(TaskEnv *env, const TaskDef *def) {
     }
 }
 
-static inline MILD_BOTH void report_episode(const TaskEnv *env, TaskStep *out) {
+MILD_HD_FN void report_episode(const TaskEnv *env, TaskStep *out) {
     out->length = env->step - env->step_first;
     out->episode_reward = (float)env->reward_sum;
     out->episode_speed_error =
@@ -338,9 +336,8 @@ static inline MILD_BOTH void report_episode(const TaskEnv *env, TaskStep *out) {
 }
 
 /* Computes the reward of the step just made. Returns 0 when it is not finite. */
-static inline MILD_BOTH int take_reward(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                        const RobotSim *sim, const TaskReal *torque,
-                                        float *reward) {
+MILD_HD_FN int take_reward(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                           const RobotSim *sim, const TaskReal *torque, float *reward) {
     TaskReal terms[TASK_REWARD_COUNT];
     TaskMotion motion = task_describe_motion(env, def, robot, sim, torque);
     *reward = (float)task_reward(&motion, terms);

@@ -3,10 +3,10 @@
 #ifndef MILD_TASK_DEF_H
 #define MILD_TASK_DEF_H
 
+#include "env/task/lanes.h"
 #include "mild/error.h"
 #include "mild/field.h"
 #include "mild/map.h"
-#include "env/task/lanes.h"
 
 #define TASK_PERIOD 0.01   /* [s] policy step: 100 Hz (paper) */
 #define TASK_STRIDE_MAX 16 /* greatest task.history_stride */
@@ -184,12 +184,12 @@ MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildErro
 MildStatus task_gains(const TaskDef *def, const Robot *robot, double *kp, double *kd,
                       MildError *error);
 /* [rad] What the def or, where it has 0, the robot says. */
-static inline MILD_BOTH double task_action_scale(const TaskDef *def, const Robot *robot) {
+MILD_HD_FN double task_action_scale(const TaskDef *def, const Robot *robot) {
     return def->action_scale > 0 ? def->action_scale : robot_action_scale(robot);
 }
 
 /* [m] The same. */
-static inline MILD_BOTH double task_nominal_height(const TaskDef *def, const Robot *robot) {
+MILD_HD_FN double task_nominal_height(const TaskDef *def, const Robot *robot) {
     return def->reward.nominal_height > 0 ? def->reward.nominal_height
                                           : robot_nominal_height(robot);
 }

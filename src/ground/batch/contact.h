@@ -5,7 +5,7 @@
 #ifndef MILD_BATCH_CONTACT_H
 #define MILD_BATCH_CONTACT_H
 
-#include "ground/batch/lanes.h"
+#include "base/hd.h"
 #include "ground/begin.h"
 #include "ground/impulse.h"
 #include "ground/map_view.h"

@@ -1,8 +1,8 @@
-/* What the batch engine needs of the scalar type beyond ground/real.h, and of vectors of three. */
+/* What the batch engine needs of the scalar type beyond base/hd.h, and of vectors of three. */
 #ifndef MILD_ENGINE_REAL_H
 #define MILD_ENGINE_REAL_H
 
-#include "ground/batch/lanes.h"
+#include "base/hd.h"
 
 #ifdef MILD_REAL_FLOAT
 #ifdef __CUDA_ARCH__

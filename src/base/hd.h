@@ -1,6 +1,52 @@
-/* One text for a warp of a GPU and for the CPU.
+/* The dialect of functions that a CPU and a GPU run: the common subset of C17 and CUDA C++. They are
+ * functions of small structs, allocate nothing, and need only what CUDA has of libm.
  *
- * LANES lanes work together on one robot. On a GPU they are the threads of a warp; on the CPU one
+ *     MILD_HD     one thread has it to itself; always inlined
+ *     MILD_HD_FN  the same, where the compiler decides about inlining
+ *     WARP_FN     the lanes of a warp work on it together (below)
+ *
+ * Numbers are Real: double on a CPU, which runs an element a vector lane; float on a GPU, and where
+ * MILD_REAL_FLOAT is defined before the first include. */
+#ifndef MILD_HD_H
+#define MILD_HD_H
+
+#include <math.h>
+
+#ifdef MILD_REAL_FLOAT
+typedef float Real;
+#define REAL_SQRT sqrtf
+#define REAL_ABS fabsf
+#define REAL_LEAST 1e-30f /* added to a divisor so that 0/0 becomes 0 */
+#else
+typedef double Real;
+#define REAL_SQRT sqrt
+#define REAL_ABS fabs
+#define REAL_LEAST 1e-300
+#endif
+
+/* A constant in the scalar type. Integers need no conversion: write x / 2 or 2 * x. */
+#define REAL(number) ((Real)(number))
+
+#ifdef __CUDACC__
+#define MILD_BOTH __host__ __device__
+#define MILD_HD static MILD_BOTH __forceinline__
+#else
+#define MILD_BOTH
+#define MILD_HD static inline __attribute__((always_inline))
+#endif
+#define MILD_HD_FN static inline MILD_BOTH
+
+MILD_HD Real real_max(Real a, Real b) {
+    return a > b ? a : b;
+}
+
+MILD_HD Real real_min(Real a, Real b) {
+    return a < b ? a : b;
+}
+
+/* ---- lanes ---- */
+
+/* LANES lanes work together on one robot. On a GPU they are the threads of a warp; on the CPU one
  * thread does the work of all. A function of this kind is marked WARP_FN and is a sequence of
  * blocks:
  *
@@ -17,10 +63,6 @@
  * Groups: the lanes are divided into groups of `size`, a power of two, such as the lanes that work
  * on one foot. Sums are taken in the same order on both sides, so that they differ only as the
  * arithmetic does. */
-#ifndef MILD_BATCH_LANES_H
-#define MILD_BATCH_LANES_H
-
-#include "ground/real.h"
 
 enum { LANES = 32 };
 
