@@ -52,7 +52,7 @@ if(MILD_CUDA)
   envs_kernels(any "/* sizes: the largest */")
   file(CONFIGURE OUTPUT ${generated}/kernels.c CONTENT [=[
 #define MILD_REAL_FLOAT
-#include "env/batch_kernels.h"
+#include "env/kernels.h"
 
 @envs_names@
 const EnvsKernels *const envs_kernels[] = {@envs_list@ NULL};

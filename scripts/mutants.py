@@ -400,13 +400,19 @@ def report_text(options, results, named, wanted, seconds):
     return "\n".join(lines) + "\n"
 
 
+def folder_of(layer):
+    """src/LAYER, or src/ROOM/LAYER."""
+    found = [p for p in (ROOT / "src" / layer, *(ROOT / "src").glob(f"*/{layer}")) if p.is_dir()]
+    return found[0].relative_to(ROOT) if found else pathlib.Path("src") / layer
+
+
 def choose(options):
-    folder = pathlib.Path("src") / options.layer
-    paths = sorted(p.relative_to(TREE) for p in (TREE / folder).rglob("*")
+    folder = folder_of(options.layer)
+    paths = sorted(p.relative_to(TREE) for p in (TREE / folder).glob("*")
                    if p.suffix in (".c", ".h") and (not options.file or p.name == options.file))
     if not paths:
         sys.exit(f"mutants: no source in {folder}/{options.file or ''}; layers: "
-                 f"{' '.join(sorted(p.name for p in (ROOT / 'src').iterdir() if p.is_dir()))}")
+                 f"{' '.join(sorted(p.name for p in (ROOT / 'src').rglob('*') if p.is_dir()))}")
     files = {str(p): source_file(str(p)) for p in paths}
     return files, draw(files.values(), options.seed)
 
@@ -458,7 +464,7 @@ def judge_faults(faults, files, tests, workers):
                 if not waiting:
                     return
                 mutant = waiting.pop(0)
-            layer = pathlib.Path(mutant.path).parts[1]
+            layer = pathlib.Path(mutant.path).parent.name
             worker.tests = tests_of(layer, tests)
             verdict, detail = worker.judge(mutant, files[mutant.path].source)
             with lock:
@@ -498,7 +504,7 @@ def discard(workers):
 
 def parse_options():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("--layer", default="task", help="folder of src/ (task)")
+    parser.add_argument("--layer", default="task", help="a layer: a folder of src/, or one in a room (task)")
     parser.add_argument("-n", type=int, default=200, help="mutants that count (200)")
     parser.add_argument("--seed", default="1", help="the same seed draws the same mutants (1)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at once (all cores)")
@@ -528,7 +534,7 @@ def main():
         if options.list:
             print("\n".join(f"{m.path}:{m.line}: {m.name}" for m in faults))
             return
-        layers = sorted({pathlib.Path(p).parts[1] for p in files})
+        layers = sorted({pathlib.Path(p).parent.name for p in files})
         tests, workers = prepare(layers, options.jobs)
         survivors = judge_faults(faults, files, tests, workers)
         discard(workers)
@@ -543,7 +549,7 @@ def main():
     reasons = read_named()
     present = {m.name for m in order}
     for name in reasons:
-        if name.startswith(f"src/{options.layer}/") and not (options.file or options.again or
+        if name.startswith(f"{folder_of(options.layer)}/") and not (options.file or options.again or
                                                              name in present):
             print(f"mutants: {NAMED.name} names what is no longer there: {name}", flush=True)
     named = [(m, reasons[m.name]) for m in order if m.name in reasons]

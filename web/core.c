@@ -1,4 +1,4 @@
-/* A crowd of one robot (crowd/batch_step.inc) on the ground of mild/ground.h, whose solver is much
+/* One robot of the batch engine (env/batch_step.inc) on the ground of mild/ground.h, whose solver is much
  * faster on one processor than the batch's and which remembers prints. */
 #define MILD_REAL_FLOAT
 
@@ -38,7 +38,7 @@ static struct {
     /* the policy */
     float *weight;
     float *wide[2]; /* [widest layer] */
-    /* the crowd */
+    /* the batch engine */
     EnvsTask task;
     EnvsGround drawn; /* the only ground to draw */
     EnvsTrial trial;
@@ -675,7 +675,7 @@ static int open_soles(const WebModel *file) {
     return web.scratch != NULL;
 }
 
-/* The arrays of a crowd of one; all 0. */
+/* The arrays of one environment; all 0. */
 static int open_arrays(void) {
     EnvsArrays *all = &web.all;
     EnvsContact *contact = &all->contact;

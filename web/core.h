@@ -8,10 +8,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "robot/engine/model.h"
-#include "learn/policy_def.h"
-#include "robot/table.h"
 #include "env/task/task.h"
+#include "learn/policy_def.h"
+#include "robot/engine/model.h"
+#include "robot/table.h"
 
 /* ---- the file that pack.c writes ---- */
 

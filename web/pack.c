@@ -9,12 +9,12 @@
 #include <string.h>
 
 #include "base/file.h"
-#include "run/config/experiment_keys.h"
-#include "env/batch_kernels.h"
-#include "robot/engine/read.h"
+#include "env/kernels.h"
 #include "learn/network.h"
 #include "learn/policy.h"
 #include "robot/description.h"
+#include "robot/engine/read.h"
+#include "run/config/experiment_keys.h"
 
 #define HIDDEN_GROUP 3 /* of geoms that are not drawn */
 

@@ -4,14 +4,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "env/actuator/fit.h"
-#include "env/actuator/motor.h"
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/figure.h"
 #include "app/report.h"
 #include "app/robots.h"
 #include "base/file.h"
+#include "env/actuator/fit.h"
+#include "env/actuator/motor.h"
 #include "run/config/experiment_keys.h"
 #include "run/eval/motor_log.h"
 

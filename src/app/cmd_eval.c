@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "env/actuator/actuator.h"
 #include "app/build.h"
 #include "app/cli.h"
 #include "app/commands.h"
@@ -12,13 +11,14 @@
 #include "app/report.h"
 #include "app/robots.h"
 #include "base/paths.h"
+#include "control/controller.h"
+#include "env/actuator/actuator.h"
+#include "mild/batch.h"
 #include "run/config/config.h"
 #include "run/config/experiment_keys.h"
-#include "control/controller.h"
 #include "run/eval/actions.h"
 #include "run/eval/inside.h"
 #include "run/eval/track.h"
-#include "mild/batch.h"
 
 enum { ROWS_MAX = CLI_LIST_MAX * CLI_LIST_MAX };
 

@@ -10,8 +10,8 @@
 #include "app/grounds.h"
 #include "app/robots.h"
 #include "base/text.h"
-#include "run/config/experiment_keys.h"
 #include "learn/cuda/learner.h"
+#include "run/config/experiment_keys.h"
 
 /* Sources of the presets' numbers; docs/ has the details. */
 static const struct {

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "env/actuator/actuator.h"
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/figure.h"
@@ -15,6 +14,7 @@
 #include "app/robots.h"
 #include "base/paths.h"
 #include "base/text.h"
+#include "env/actuator/actuator.h"
 #include "run/config/config.h"
 #include "run/config/experiment_keys.h"
 

@@ -12,8 +12,8 @@
 #include "app/robots.h"
 #include "base/paths.h"
 #include "base/text.h"
-#include "run/config/experiment_keys.h"
 #include "device/ranks/ranks.h"
+#include "run/config/experiment_keys.h"
 #include "run/train/run.h"
 
 typedef struct {

@@ -4,9 +4,9 @@
 
 #include "app/commands.h"
 #include "app/grounds.h"
-#include "run/config/experiment_keys.h"
 #include "control/controller.h"
 #include "robot/robot.h"
+#include "run/config/experiment_keys.h"
 
 static const char head[] =
     "# Completion of mild for bash: source this file, or install it as\n"

@@ -3,11 +3,11 @@
 #define MILD_GROUNDS_H
 
 #include "app/cli.h"
-#include "run/config/experiment_keys.h"
-#include "run/eval/scene.h"
-#include "robot/robot.h"
 #include "env/task/task_def.h"
 #include "env/task/terrain.h"
+#include "robot/robot.h"
+#include "run/config/experiment_keys.h"
+#include "run/eval/scene.h"
 
 enum { GROUNDS_MAX = 32 };
 /* The names of the grounds of a model, and of all models. They return how many there are. */

@@ -3,9 +3,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "run/config/experiment_keys.h"
 #include "control/controller.h"
 #include "env/envs.h"
+#include "run/config/experiment_keys.h"
 
 enum { LINE = 100 }; /* characters */
 

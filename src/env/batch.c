@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "env/batch_kernels.h"
 #include "device/device.h"
+#include "env/kernels.h"
 #include "robot/engine/read.h"
 
 _Static_assert(ENVS_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fills");
@@ -22,12 +22,12 @@ typedef struct {
     DeviceFork *fork; /* streams of all shares but the first, on a GPU; else NULL */
     int shares;       /* of the robots */
     TaskShape shape;
-    size_t labels;               /* of the map, 1 without */
+    size_t labels;              /* of the map, 1 without */
     const EnvsKernels *kernels; /* NULL: on the host */
-    void *block;                 /* where the arrays are, but for task and model */
+    void *block;                /* where the arrays are, but for task and model */
     EnvsGround *drawn;          /* of the device: the grounds of EnvsTask */
-    void *trials;                /* where those of trials are */
-    Pool *pool;                  /* of the host */
+    void *trials;               /* where those of trials are */
+    Pool *pool;                 /* of the host */
     int device;
     size_t robot; /* [B] of EnvRobot */
     size_t bytes; /* of the device, without the ground */
@@ -83,9 +83,9 @@ static MildStatus open_ground(Batch *b, const EnvsDef *def, const TaskGrounds *g
         materials[i] = grounds->ground[i].material;
     }
     b->ground = mild_batch_create(&batch, error);
-    MildStatus status =
-        b->ground ? mild_batch_set_materials(b->ground, materials, grounds->count, error)
-                      : MILD_ERROR_ARGUMENT;
+    MildStatus status = b->ground
+                            ? mild_batch_set_materials(b->ground, materials, grounds->count, error)
+                            : MILD_ERROR_ARGUMENT;
     free(materials);
     if (status == MILD_OK && def->task->map) {
         status = mild_batch_set_map(b->ground, def->task->map, error);
@@ -107,8 +107,7 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
     const TaskShape *shape = &b->shape;
     EnvsArrays *all = &b->arrays;
     EnvsContact *contact = &all->contact;
-    const EnvsBytes of =
-        b->kernels ? b->kernels->bytes(task, shape) : envs_host_bytes(task, shape);
+    const EnvsBytes of = b->kernels ? b->kernels->bytes(task, shape) : envs_host_bytes(task, shape);
     const size_t envs = (size_t)all->envs;
     const size_t feet = (size_t)shape->feet, rows = envs * feet;
     all->stride = of.stride;
@@ -171,8 +170,8 @@ static MildStatus copy_grounds(Batch *b, const EnvsDef *def, const TaskGrounds *
         task_ground_numbers(def->robot, &grounds->ground[i].material, made[i].numbers);
     }
     b->drawn = take(b, bytes, error);
-    MildStatus status = b->drawn ? device_copy(b->device, b->drawn, made, bytes, error)
-                                     : MILD_ERROR_MEMORY;
+    MildStatus status =
+        b->drawn ? device_copy(b->device, b->drawn, made, bytes, error) : MILD_ERROR_MEMORY;
     free(made);
     return status;
 }
@@ -180,15 +179,15 @@ static MildStatus copy_grounds(Batch *b, const EnvsDef *def, const TaskGrounds *
 static MildStatus copy_task(Batch *b, const EnvsDef *def, const TaskGrounds *grounds,
                             MildError *error) {
     EnvsTask task = {.task = *def->task,
-                      .ground = b->drawn,
-                      .grounds = grounds->count,
-                      .map = b->ground->arrays.map,
-                      .has_map = def->task->map != NULL,
-                      .labels = labels_of(def->task),
-                      .striped = def->striped,
-                      .shape = task_shape(def->robot),
-                      .seed = def->seed,
-                      .first = def->first};
+                     .ground = b->drawn,
+                     .grounds = grounds->count,
+                     .map = b->ground->arrays.map,
+                     .has_map = def->task->map != NULL,
+                     .labels = labels_of(def->task),
+                     .striped = def->striped,
+                     .shape = task_shape(def->robot),
+                     .seed = def->seed,
+                     .first = def->first};
     if (task.has_map) {
         mild_map_extent(def->task->map, &task.map_extent[0], &task.map_extent[1]);
         task.uneven = !mild_map_is_level(def->task->map);
@@ -216,10 +215,10 @@ static MildStatus choose_kernels(Batch *b, const Robot *robot, const EngineTree 
     }
     b->kernels = kernels_for(tree);
     return b->kernels ? checked(b->kernels->open(), error)
-                          : mild_fail(error, MILD_ERROR_ARGUMENT,
-                                      "%s: this build has no kernels for a robot of its size; "
-                                      "train.robots = mujoco steps it",
-                                      robot_name(robot));
+                      : mild_fail(error, MILD_ERROR_ARGUMENT,
+                                  "%s: this build has no kernels for a robot of its size; "
+                                  "train.robots = mujoco steps it",
+                                  robot_name(robot));
 }
 
 /* The robot as the engine knows it, and what steps it. */
@@ -348,12 +347,12 @@ static EnvsStep step_from(const EnvsStep *step, const TaskShape *shape, size_t f
 static EnvsContact contact_from(const EnvsContact *c, size_t first, size_t feet) {
     const size_t row = first * feet;
     return (EnvsContact){.position = c->position + 3 * row,
-                          .rotation = c->rotation + 9 * row,
-                          .velocity = c->velocity + 6 * row,
-                          .inverse_inertia = c->inverse_inertia + 36 * row * feet,
-                          .free_velocity = c->free_velocity + 6 * row,
-                          .height = c->height + first,
-                          .foot = c->foot + row};
+                         .rotation = c->rotation + 9 * row,
+                         .velocity = c->velocity + 6 * row,
+                         .inverse_inertia = c->inverse_inertia + 36 * row * feet,
+                         .free_velocity = c->free_velocity + 6 * row,
+                         .height = c->height + first,
+                         .foot = c->foot + row};
 }
 
 /* `count` robots from `first` on. */
@@ -381,8 +380,7 @@ static Share share_of(const Batch *b, const EnvsStep *step, int i, void *stream)
     return (Share){.arrays = arrays_from(b, (size_t)first, count),
                    .step = step_from(step, &b->shape, (size_t)first),
                    .ground = batch_share(b->ground, (int)first, count),
-                   .stream =
-                       i > 0 && b->fork ? device_fork_stream(b->fork, i - 1) : stream};
+                   .stream = i > 0 && b->fork ? device_fork_stream(b->fork, i - 1) : stream};
 }
 
 /* ---- steps on the CPU ---- */
@@ -449,8 +447,7 @@ static MildStatus step_share(const Batch *b, Share *share, MildError *error) {
     for (call.part = 0; status == MILD_OK && call.part <= b->base.physics_steps; call.part++) {
         status = call.part > 0 ? step_ground(share, error) : MILD_OK;
         if (status == MILD_OK && b->kernels) {
-            status =
-                checked(b->kernels->part(all, &share->step, call.part, share->stream), error);
+            status = checked(b->kernels->part(all, &share->step, call.part, share->stream), error);
         } else if (status == MILD_OK) {
             pool_run(b->pool, all->envs, part_piece, &call);
         }
@@ -549,8 +546,7 @@ static MildStatus sums(Envs *envs, EnvsStats *sums, void *stream, MildError *err
 }
 
 /* Between the environments and `all->kept`. */
-static MildStatus move_kept(const Batch *b, const EnvsArrays *all, int back,
-                            MildError *error) {
+static MildStatus move_kept(const Batch *b, const EnvsArrays *all, int back, MildError *error) {
     if (b->device == MILD_BATCH_HOST) {
         envs_host_move_progress(all, back);
         return MILD_OK;
@@ -590,7 +586,7 @@ static MildStatus set_commands(Envs *envs, const double *command, MildError *err
     MildStatus status = device_copy(b->device, all->command, command,
                                     3 * (size_t)all->envs * sizeof *command, error);
     if (status == MILD_OK && b->device != MILD_BATCH_HOST) {
-        return checked(b->kernels->tell(all, NULL), error);
+        return checked(b->kernels->set_command(all, NULL), error);
     }
     if (status == MILD_OK) {
         pool_run(b->pool, all->envs, command_piece, &call);

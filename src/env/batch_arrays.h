@@ -1,13 +1,13 @@
-/* What a crowd keeps on its device. Include it after task.h. */
+/* What the batch engine keeps on its device. Include it after task.h. */
 #ifndef ENVS_ARRAYS_H
 #define ENVS_ARRAYS_H
 
-#include "ground/batch/batch.h"
 #include "env/envs_step.h"
-#include "env/trial.h"
-#include "robot/engine/model.h"
 #include "env/task/ground.h"
 #include "env/task/task.h"
+#include "env/trial.h"
+#include "ground/batch/batch.h"
+#include "robot/engine/model.h"
 
 /* Sums over the episodes of an environment that ended since the last envs_sums; see
  * EnvsStats. */
@@ -64,7 +64,7 @@ typedef struct {
     int envs;
     size_t stride;      /* [B] of a TaskEnv and its frames */
     char *env;          /* [envs][stride] */
-    void *robot;        /* [envs] EnvRobot of crowd.inc */
+    void *robot;        /* [envs] EnvRobot of batch_step.inc */
     int32_t *material;  /* [envs][labels] of the ground's table */
     Real *map_origin;   /* [envs][2] [m] */
     uint8_t *fresh;     /* [envs] bool: an episode began */

@@ -1,11 +1,11 @@
-/* A crowd on a GPU. The text is compiled for robots of one size (ENGINE_JOINTS ... of model.h), or
- * without these definitions for any, by cmake/Crowd.cmake. Before the inclusion: ENVS_KERNELS, the
+/* The batch engine on a GPU, compiled for robots of one size (ENGINE_JOINTS ... of model.h), or
+ * without these definitions for any, by cmake/Env.cmake. Before the inclusion: ENVS_KERNELS, the
  * name of what it gives. */
 #define MILD_REAL_FLOAT
 #include <cuda_runtime.h>
 
 #include "env/batch_step.inc"
-#include "env/batch_kernels.h"
+#include "env/kernels.h"
 
 #ifndef ENVS_WARPS
 #define ENVS_WARPS (ENGINE_FIXED ? 4 : 1) /* robots of a block */
@@ -17,7 +17,7 @@ enum {
     WARP_THREADS = LANES * ENVS_WARPS,
     TASK_THREADS = 128,
     TASK_ROBOTS = TASK_THREADS / TASK_LANES, /* of a block */
-    TASK_BLOCKS = 8,                          /* blocks of a multiprocessor, at least */
+    TASK_BLOCKS = 8,                         /* blocks of a multiprocessor, at least */
     TALLY_THREADS = 256,
     ORDER_THREADS = 1024
 };
@@ -48,7 +48,7 @@ static __global__ void __launch_bounds__(WARP_THREADS, ENVS_BLOCKS)
     const long place = warp_robot();
     if (place < all.envs) {
         env_part(&all, &call, all.order[place], k, WATCHED,
-                   (EnvWork *)shared + threadIdx.x / LANES);
+                 (EnvWork *)shared + threadIdx.x / LANES);
     }
 }
 
@@ -94,7 +94,7 @@ static __global__ void __launch_bounds__(TASK_THREADS, TASK_BLOCKS)
 }
 
 static __global__ void __launch_bounds__(TASK_THREADS)
-    tell(const __grid_constant__ EnvsArrays all) {
+    set_command(const __grid_constant__ EnvsArrays all) {
     const long robot = lanes_robot();
     if (robot < all.envs) {
         env_set_command(&all, robot);
@@ -217,7 +217,7 @@ static const char *kernels_move_progress(const EnvsArrays *all, int back, void *
 }
 
 static const char *kernels_set_command(const EnvsArrays *all, void *stream) {
-    tell<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    set_command<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
@@ -228,7 +228,8 @@ static const char *kernels_tally(const EnvsArrays *all, void *stream) {
 
 extern "C" {
 extern const EnvsKernels ENVS_KERNELS;
-const EnvsKernels ENVS_KERNELS = {ENGINE_FIXED,   kernels_fits,  kernels_open,  kernels_bytes,
-                                    kernels_create, kernels_begin, kernels_first, kernels_part,
-                                    kernels_end,    kernels_move_progress,  kernels_set_command,  kernels_tally};
+const EnvsKernels ENVS_KERNELS = {ENGINE_FIXED,          kernels_fits,        kernels_open,
+                                  kernels_bytes,         kernels_create,      kernels_begin,
+                                  kernels_first,         kernels_part,        kernels_end,
+                                  kernels_move_progress, kernels_set_command, kernels_tally};
 }

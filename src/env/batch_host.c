@@ -1,8 +1,8 @@
-/* A crowd on the CPU: the text of the GPU, environment after environment. */
+/* The batch engine on the CPU: the functions of the GPU, environment after environment. */
 #define MILD_REAL_FLOAT
 
 #include "env/batch_step.inc"
-#include "env/batch_kernels.h"
+#include "env/kernels.h"
 
 EnvsBytes envs_host_bytes(const TaskDef *def, const TaskShape *shape) {
     return (EnvsBytes){env_stride(def, shape), sizeof(EnvRobot)};

@@ -1,5 +1,5 @@
 /* A build without CUDA has no kernels. */
 #define MILD_REAL_FLOAT
-#include "env/batch_kernels.h"
+#include "env/kernels.h"
 
 const EnvsKernels *const envs_kernels[] = {NULL};

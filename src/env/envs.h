@@ -19,9 +19,9 @@
 
 #include "base/pool.h"
 #include "env/envs_step.h"
-#include "env/trial.h"
 #include "env/task/ground.h"
 #include "env/task/task.h"
+#include "env/trial.h"
 
 typedef struct Envs Envs;
 

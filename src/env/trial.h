@@ -1,4 +1,4 @@
-/* Trials of an evaluation in a crowd: what each has instead of what an episode draws, and what is
+/* Trials of an evaluation by the batch engine: what each has instead of what an episode draws, and what is
  * measured of it. */
 #ifndef ENVS_TRIAL_H
 #define ENVS_TRIAL_H
@@ -11,7 +11,7 @@
  * an evaluation. */
 typedef struct {
     uint32_t stream; /* number that selects its random numbers */
-    int ground;      /* of the crowd's */
+    int ground;      /* of EnvsDef.chosen */
     int rigid;       /* bool: on the engine's own contact, with TASK_RIGID_FRICTION */
 } EnvsTrial;
 

@@ -89,7 +89,7 @@ static void foot_peaks(const Advance *a, const Memory *memory) {
 
 /* Stores the plane that the step assumed for the ground under the element. */
 MILD_HD void slot_plane(const FootScratch *foot, double height, const Slots *s,
-                              const Memory *memory, int i, int e) {
+                        const Memory *memory, int i, int e) {
     const double slope_x = s->slope_x[i];
     const double slope_y = s->slope_y[i];
     memory->slope_x[e] = slope_x;
@@ -101,7 +101,7 @@ MILD_HD void slot_plane(const FootScratch *foot, double height, const Slots *s,
 /* Vector loop for a foot with all elements listed, on ground without imprints. Returns how many
  * elements remember something. */
 MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material,
-                                   int uneven) {
+                             int uneven) {
     const FootScratch foot = *a->foot;
     const Slots local = a->slot, *s = &local;
     const Memory own = *all, *memory = &own;

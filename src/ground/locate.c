@@ -18,8 +18,8 @@ static void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
     }
 }
 
-void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints, const double *position,
-                const double *R) {
+void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints,
+                 const double *position, const double *R) {
     for (int k = 0; k < 3; k++) {
         foot->origin[k] = position[k];
         foot->arm[0][k] = R[3 * k + 2] * foot->z;

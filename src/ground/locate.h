@@ -7,8 +7,8 @@
 /* Computes the depth of every element. Where the ground differs from place to place, also its world
  * position, and on uneven ground the gradient under it. imprints: bool, the ground keeps imprints.
  * position, R: pose of the foot. */
-void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints, const double *position,
-                const double *R);
+void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints,
+                 const double *position, const double *R);
 /* Lists the elements that may touch in this step, in ascending order. The common cases, all
  * elements or none, are found without a branch per element. steepest: upper bound [-] on the
  * gradient of the ground. f: index of the foot in `input`. */

@@ -5,8 +5,8 @@
 #define NEWTON_ITERATIONS 400 /* Newton steps in all, unless the caller sets a limit */
 #define NEWTON_PLAIN 20       /* plain steps before the friction bounds are held fixed */
 
-MILD_HD void system_open(System *system, const MildScratch *scratch,
-                               const MildContactInput *input, int first, int n, int parts) {
+MILD_HD void system_open(System *system, const MildScratch *scratch, const MildContactInput *input,
+                         int first, int n, int parts) {
     int stride = 6 * scratch->feet;
     system->first = first;
     for (int i = 0; i < n; i++) {
@@ -20,7 +20,7 @@ MILD_HD void system_open(System *system, const MildScratch *scratch,
 
 /* Solves for the n rows from `first` on. */
 MILD_HD void system_solve(MildScratch *scratch, const MildContactInput *input, int first,
-                                MildContactResult *result, int n, int parts) {
+                          MildContactResult *result, int n, int parts) {
     System opened, *system = &opened;
     Point best = {.residual = INFINITY};
     system_open(system, scratch, input, first, n, parts);

@@ -98,7 +98,7 @@ MILD_HD double system_norm(const System *system, const double *x, int n, int par
 }
 
 MILD_HD void point_evaluate(const System *system, MildScratch *scratch, Point *point, int n,
-                                  int parts) {
+                            int parts) {
     double apart[TWIST_MAX];
     contact_pass(scratch, system->dt, point->twist.at, system->first);
     for (int i = 0; i < n; i++) {
@@ -157,8 +157,8 @@ MILD_HD int rows_eliminate(Row *M, double *x, int n, int parts) {
  *
  * V then moves by A dP, and the rounding error is proportional to dP rather than to P. Returns
  * false when the matrix is singular. */
-MILD_HD int point_step(const System *system, MildScratch *scratch, const Point *at,
-                             Point *next, int correct, int n, int parts) {
+MILD_HD int point_step(const System *system, MildScratch *scratch, const Point *at, Point *next,
+                       int correct, int n, int parts) {
     Row M[TWIST_MAX];
     Row last;
     double moved[TWIST_MAX];
@@ -196,8 +196,7 @@ MILD_HD int point_step(const System *system, MildScratch *scratch, const Point *
     return 1;
 }
 
-MILD_HD void point_between(const Point *from, const Point *to, double t, Point *point,
-                                 int n) {
+MILD_HD void point_between(const Point *from, const Point *to, double t, Point *point, int n) {
     for (int i = 0; i < n; i++) {
         point->impulse.at[i] = from->impulse.at[i] + t * (to->impulse.at[i] - from->impulse.at[i]);
         point->twist.at[i] = from->twist.at[i] + t * (to->twist.at[i] - from->twist.at[i]);
@@ -221,8 +220,8 @@ MILD_HD int point_solves(const System *system, const Point *point, int n, int pa
 
 /* Plain Newton steps from `best`, at which the last pass was made. Leaves the best point seen in
  * `best`. Returns the number of steps. */
-MILD_HD int newton_plain(const System *system, MildScratch *scratch, Point *best, int limit,
-                               int n, int parts) {
+MILD_HD int newton_plain(const System *system, MildScratch *scratch, Point *best, int limit, int n,
+                         int parts) {
     Point at, next;
     int steps = 0, solved = 0;
     point_copy(&at, best, parts);

@@ -9,7 +9,7 @@
 #include "ground/impulse.h"
 
 MILD_HD void slot_normal(const Slots *s, int i, double dt, const Motion *motion, int uneven,
-                               int curves, int stops) {
+                         int curves, int stops) {
     const Element element = slot_element(s, i);
     const SlotVelocity v = slot_velocity(s, i, motion, uneven);
     const Impulse normal = element_impulse(&element, curves, stops, dt, v.descent);
@@ -19,7 +19,7 @@ MILD_HD void slot_normal(const Slots *s, int i, double dt, const Motion *motion,
 
 /* Normal impulses and their derivatives. */
 MILD_HD void foot_normal(const Slots *slot, int end, double dt, const Motion *m, int uneven,
-                               int curves, int stops) {
+                         int curves, int stops) {
     const Slots local = *slot, *s = &local;
     const Motion motion = *m;
 #pragma omp simd
@@ -67,7 +67,7 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
  * sums: of I, x I and y I. held: bool, the friction bounds are slot.bound. turned: bool, some
  * elements have a reversal velocity in slot.turn (energy.c). */
 MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int uneven, int held,
-                                 int turned, double sums[9]) {
+                           int turned, double sums[9]) {
     const Slots local = *slot, *s = &local;
     const Motion motion = *m;
     double f0 = 0.0, f1 = 0.0, f2 = 0.0; /* of I */

@@ -4,13 +4,13 @@
 
 #include "ground/begin.h"
 #include "ground/gather.h"
+#include "ground/locate.h"
 #include "ground/mixture.h"
 #include "ground/models.h"
-#include "ground/locate.h"
 #include "ground/terrain.h"
 
 MILD_HD void slot_begin(const Slots *s, int i, double dt, double rate, const Motion *motion,
-                              int curves) {
+                        int curves) {
     const SlotVelocity v = slot_velocity(s, i, motion, 1); /* on level ground the slopes are 0 */
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
@@ -19,8 +19,7 @@ MILD_HD void slot_begin(const Slots *s, int i, double dt, double rate, const Mot
 }
 
 /* Calls element_begin for all slots. */
-MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *now,
-                               int curves) {
+MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *now, int curves) {
     const Slots local = *slot, *s = &local;
     const Motion motion = *now;
     const double rate = 1.0 / dt;
@@ -57,8 +56,8 @@ static int slots_sink(const Slots *slot, int end, double dt) {
     return sinking > 0.0;
 }
 
-MILD_HD void slot_drag(const Slots *s, int i, double dt, const Motion *now,
-                             const Motion *free, int curves) {
+MILD_HD void slot_drag(const Slots *s, int i, double dt, const Motion *now, const Motion *free,
+                       int curves) {
     const double slower = slot_velocity(s, i, now, 1).descent;
     const double faster = slot_velocity(s, i, free, 1).descent;
     Element element = slot_element(s, i);
@@ -70,7 +69,7 @@ MILD_HD void slot_drag(const Slots *s, int i, double dt, const Motion *now,
 
 /* Calls element_drag for all slots. */
 MILD_HD void slots_drag(const Slots *slot, int end, double dt, const Motion *now,
-                              const Motion *free, int curves) {
+                        const Motion *free, int curves) {
     const Slots local = *slot, *s = &local;
     const Motion before = *now;
     const Motion after = *free;

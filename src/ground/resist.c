@@ -26,7 +26,7 @@ void mild_resist_space(const double normal[3], const double direction[3], double
 
 /* Adapts the law of one slot to its motion at the start of the step. */
 MILD_HD void slot_resist(const Slots *s, int i, double dt, double rate, const Plate *plate,
-                               const Motion *motion, int in_space, int curves) {
+                         const Motion *motion, int in_space, int curves) {
     const SlotVelocity v = slot_velocity(s, i, motion, 1);
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
@@ -38,7 +38,7 @@ MILD_HD void slot_resist(const Slots *s, int i, double dt, double rate, const Pl
 
 /* The same for all slots of a foot on this theory alone. */
 MILD_HD void slots_resist(const Slots *slot, int end, double dt, const Plate *sole,
-                                const Motion *now, int in_space) {
+                          const Motion *now, int in_space) {
     const Slots local = *slot, *s = &local;
     const Plate plate = *sole;
     const Motion motion = *now;
@@ -74,8 +74,8 @@ static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain
 }
 
 /* The foot's slots on `model`. in_space: bool, a constant. The padding has no strength. */
-MILD_HD void foot_resist(const FootScratch *foot, const MildTerrain *terrain, int model,
-                               double dt, const double *rotation, const Motion *now, int in_space) {
+MILD_HD void foot_resist(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
+                         const double *rotation, const Motion *now, int in_space) {
     const Plate plate = plate_of(rotation);
     if (terrain_only(terrain, model)) {
         slots_resist(&foot->slot, foot_end(foot), dt, &plate, now, in_space);

@@ -4,10 +4,10 @@
 #ifndef MILD_PPO_H
 #define MILD_PPO_H
 
+#include "device/ranks/ranks.h"
 #include "learn/policy.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
-#include "device/ranks/ranks.h"
 
 typedef struct Ppo Ppo;
 /* Borrows policy and pool. mirror: NULL for none; it is copied. */

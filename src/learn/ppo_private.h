@@ -3,13 +3,13 @@
 #define MILD_PPO_PRIVATE_H
 
 #include "base/pool.h"
+#include "device/ranks/ranks.h"
 #include "learn/backend.h"
 #include "learn/order.h"
 #include "learn/policy.h"
 #include "learn/policy_private.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
-#include "device/ranks/ranks.h"
 
 /* A minibatch consists of PPO_SHARDS runs of samples, each with its own gradient, and a shard is
  * cut into chunks. Sums are taken in the order of the shards. So no result depends on the number of

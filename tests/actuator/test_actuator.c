@@ -4,9 +4,9 @@
 
 #include <unistd.h>
 
+#include "base/file.h"
 #include "env/actuator/actuator.h"
 #include "env/actuator/motor.h"
-#include "base/file.h"
 #include "learn/safetensors.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"

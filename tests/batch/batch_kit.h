@@ -2,8 +2,8 @@
 #ifndef BATCH_KIT_H
 #define BATCH_KIT_H
 
-#include "ground/batch/batch.h"
 #include "device/device.h"
+#include "ground/batch/batch.h"
 #include "ground/ground_kit.h"
 
 /* Bool, said when it is not there. */

@@ -11,8 +11,8 @@
 #include <cmocka.h>
 
 #include "run/config/experiment_keys.h"
-#include "sa01.h"
 #include "run/train/trainer.h"
+#include "sa01.h"
 
 #define PAPER MILD_SOURCE_DIR "/configs/paper.ini"
 

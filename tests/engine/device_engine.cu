@@ -15,8 +15,8 @@
 #include <vector>
 
 extern "C" {
-#include "ground/batch/batch.h"
 #include "device_cases.h"
+#include "ground/batch/batch.h"
 }
 
 #include "robot/engine/robots.h"

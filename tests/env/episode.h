@@ -1,4 +1,4 @@
-/* What is in an environment of a crowd, which has a text of its own. */
+/* What is in an environment of the batch engine, whose layout is its own. */
 #ifndef TEST_EPISODE_H
 #define TEST_EPISODE_H
 

@@ -13,12 +13,12 @@
 
 #include <cmocka.h>
 
-#include "ground/batch/batch.h"
-#include "env/backend.h"
-#include "episode.h"
-#include "sa01.h"
 #include "device/device.h"
+#include "env/backend.h"
 #include "env/task/ground.h"
+#include "episode.h"
+#include "ground/batch/batch.h"
+#include "sa01.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
 

@@ -1,4 +1,4 @@
-/* A crowd on the CPU whose text is compiled for the Go1's size alone, as a GPU's is, in the place
+/* The batch engine on the CPU, compiled for the Go1's size alone, as a GPU's is, in the place
  * of the one for any robot; and what is in its environments. */
 #define ENGINE_JOINTS 12
 #define ENGINE_FEET 4

@@ -1,4 +1,4 @@
-/* A crowd on the CPU whose text is compiled for SA01's size alone, as a GPU's is. */
+/* The batch engine on the CPU, compiled for SA01's size alone, as a GPU's is. */
 #define ENGINE_JOINTS 12
 #define ENGINE_FEET 2
 #define ENGINE_CORNERS 8

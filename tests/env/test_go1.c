@@ -1,4 +1,4 @@
-/* As test_crowd.c, by the text that is compiled for the Go1 alone (go1.c). */
+/* As test_batch.c, by functions that are compiled for the Go1 alone (go1.c). */
 #include "follow.h"
 
 static void go1_follows_mujoco(void **unused) {

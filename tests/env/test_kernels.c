@@ -9,7 +9,7 @@
 
 #define MILD_REAL_FLOAT
 #include "env/backend.h"
-#include "env/batch_kernels.h"
+#include "env/kernels.h"
 
 static int fits_none(const EngineTree *tree) {
     (void)tree;

@@ -9,9 +9,9 @@
 
 #include <cmocka.h>
 
+#include "envs_kit.h"
 #include "run/config/experiment_keys.h"
 #include "run/envs/envs.h"
-#include "envs_kit.h"
 #include "sa01.h"
 
 enum { ENVS = 5, STEPS = 60 };

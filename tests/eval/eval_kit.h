@@ -13,10 +13,10 @@
 
 #include <cmocka.h>
 
-#include "run/eval/eval.h"
-#include "learn/policy.h"
-#include "sa01.h"
 #include "env/task/policy_keys.h"
+#include "learn/policy.h"
+#include "run/eval/eval.h"
+#include "sa01.h"
 
 #define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
 

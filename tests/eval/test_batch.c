@@ -2,8 +2,8 @@
  * few trials, whatever the number of threads and of other rows. */
 #include "eval_kit.h"
 
-#include "ground/batch/batch.h"
 #include "device/device.h"
+#include "ground/batch/batch.h"
 
 enum { ROWS = 4 };
 

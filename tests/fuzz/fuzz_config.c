@@ -1,7 +1,7 @@
 /* Any text as a config file, and as an override. It may fail, never crash, and what it accepts must
  * print and read back to the same values. */
-#include "run/config/experiment_keys.h"
 #include "fuzz.h"
+#include "run/config/experiment_keys.h"
 
 enum { SECTIONS = EXPERIMENT_SECTIONS + 1 };
 

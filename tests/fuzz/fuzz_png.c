@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <zlib.h>
 
-#include "fuzz.h"
 #include "env/task/image.h"
+#include "fuzz.h"
 
 enum { SIGNATURE = 8, FRAME = 12, PIXELS = 1 << 12, PIXELS_REFUSED = 1 << 27 };
 

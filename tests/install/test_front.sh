@@ -34,7 +34,7 @@ sees() {
     python3 tree/scripts/drawings.py --check 2>said && fail "the check does not see: $1"
     grep -q "$1" said || fail "the check says $(cat said) of: $1"
 }
-echo '#include "base/csv.h"' >>tree/src/device/ranks/ranks.h
+echo '#include "view/view.h"' >>tree/src/control/controller.h
 sees 'house.svg is not what src is'
 mkdir tree/src/attic
 sees 'attic: a folder of src without a row'

@@ -6,8 +6,8 @@
 #include "identify/press.h"
 #include "learn/toy.h"
 #include "pins.h"
-#include "task/task_kit.h"
 #include "run/train/trainer.h"
+#include "task/task_kit.h"
 
 /* ---- press ---- */
 

@@ -5,10 +5,10 @@
 
 #include "plugin_kit.h"
 
-#include "run/config/experiment_keys.h"
 #include "control/stand.h"
-#include "run/eval/eval.h"
 #include "robot/sim.h"
+#include "run/config/experiment_keys.h"
+#include "run/eval/eval.h"
 
 /* The robot in MuJoCo. NULL: robot_sim_step makes our own step. */
 static mjModel *model;

@@ -15,9 +15,9 @@
 #include <cmocka.h>
 
 #include "base/random.h"
+#include "env/task/task.h"
 #include "robot/robot.h"
 #include "sa01.h"
-#include "env/task/task.h"
 
 #define KIT_MODEL SA01
 #define KIT_PI 3.141592653589793

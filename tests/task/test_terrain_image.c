@@ -12,9 +12,9 @@
 #include <cmocka.h>
 #include <png.h>
 
-#include "mild/ground.h"
 #include "env/task/image.h"
 #include "env/task/terrain.h"
+#include "mild/ground.h"
 
 enum { COLUMNS = 37, ROWS = 23 };
 

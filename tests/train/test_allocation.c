@@ -15,12 +15,12 @@
 
 #include <cmocka.h>
 
-#include "env/actuator/fit.h"
 #include "control/controller.h"
+#include "env/actuator/fit.h"
 #include "identify/fit_csv.h"
 #include "mild/map.h"
-#include "sa01.h"
 #include "run/train/trainer.h"
+#include "sa01.h"
 
 #define MODEL SA01
 #define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"

@@ -12,12 +12,12 @@
 #include <cmocka.h>
 
 #define MILD_REAL_FLOAT
-#include "run/config/experiment_keys.h"
 #include "env/envs.h"
+#include "env/task/ground.h"
 #include "learn/policy.h"
 #include "mild/batch.h"
+#include "run/config/experiment_keys.h"
 #include "sa01.h"
-#include "env/task/ground.h"
 #include "web/core.h"
 
 #define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"

@@ -8,26 +8,26 @@
 #include "c_text.h" /* text_policy_h, text_policy_c, text_example_c: files of c/ */
 #include "deploy/export/export.h"
 
-enum { LANES = 16 }; /* as in c/policy.c */
+enum { C_LANES = 16 }; /* as in c/policy.c */
 
 #define NUMBERS "/* NUMBERS */\n" /* in c/policy.h */
 
 /* ---- policy_weights.h ---- */
 
 static int blocks(int width) {
-    return (width + LANES - 1) / LANES;
+    return (width + C_LANES - 1) / C_LANES;
 }
 
 static void print_float(FILE *file, int index, float number) {
     fprintf(file, "%s%.8ef,", index % 6 == 0 ? "\n    " : " ", (double)number);
 }
 
-/* For each block of LANES outputs [in][LANES], zero beyond the last. */
+/* For each block of C_LANES outputs [in][C_LANES], zero beyond the last. */
 static void print_weight(FILE *file, const float *weight, const MlpLayer *layer) {
     int index = 0;
-    for (int first = 0; first < layer->out; first += LANES) {
+    for (int first = 0; first < layer->out; first += C_LANES) {
         for (int i = 0; i < layer->in; i++) {
-            for (int j = first; j < first + LANES; j++) {
+            for (int j = first; j < first + C_LANES; j++) {
                 print_float(file, index++,
                             j < layer->out ? weight[(size_t)j * (size_t)layer->in + (size_t)i] : 0);
             }
@@ -36,7 +36,7 @@ static void print_weight(FILE *file, const float *weight, const MlpLayer *layer)
 }
 
 static void print_bias(FILE *file, const float *bias, int width) {
-    for (int j = 0; j < blocks(width) * LANES; j++) {
+    for (int j = 0; j < blocks(width) * C_LANES; j++) {
         print_float(file, j, j < width ? bias[j] : 0);
     }
 }
@@ -66,7 +66,7 @@ static int widest(const Export *export) {
     for (int i = 0; i < 3; i++) {
         most = widths[i] > most ? widths[i] : most;
     }
-    return blocks(most) * LANES;
+    return blocks(most) * C_LANES;
 }
 
 static void print_joints(FILE *file, const char *name, const double *numbers, int count,

@@ -2,8 +2,8 @@
 #ifndef MILD_EXPORT_H
 #define MILD_EXPORT_H
 
-#include "learn/network.h"
 #include "env/task/task.h"
+#include "learn/network.h"
 
 /* A policy and what goes around it. Everything is borrowed. */
 typedef struct {

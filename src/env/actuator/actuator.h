@@ -5,10 +5,10 @@
 #ifndef ACTUATOR_ACTUATOR_H
 #define ACTUATOR_ACTUATOR_H
 
+#include "env/task/task_def.h"
 #include "learn/mlp.h"
 #include "mild/error.h"
 #include "robot/robot.h"
-#include "env/task/task_def.h"
 
 enum {
     ACTUATOR_TIMES = 3,                   /* t, t - spacing, t - 2 spacing */

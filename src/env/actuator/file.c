@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/text.h"
 #include "env/actuator/file.h"
 #include "env/actuator/private.h"
-#include "base/text.h"
 
 #define FILE_KIND "mild actuator"
 #define FILE_VERSION "1"

@@ -2,9 +2,9 @@
 #ifndef ACTUATOR_FIT_H
 #define ACTUATOR_FIT_H
 
+#include "base/pool.h"
 #include "env/actuator/actuator.h"
 #include "env/actuator/record.h"
-#include "base/pool.h"
 
 typedef struct {
     double spacing; /* [s] of the history */

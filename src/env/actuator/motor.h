@@ -10,8 +10,8 @@
 #ifndef ACTUATOR_MOTOR_H
 #define ACTUATOR_MOTOR_H
 
-#include "robot/robot.h"
 #include "env/task/task_def.h"
+#include "robot/robot.h"
 
 typedef struct {
     double delay;   /* [s] in whole physics steps */

@@ -8,8 +8,8 @@
 #include <stdint.h>
 
 #include "base/random.h"
-#include "mild/error.h"
 #include "env/task/task_def.h"
+#include "mild/error.h"
 
 #define TASK_FRAMES 6 /* H + 1, newest last (paper, H = 5) */
 
@@ -44,7 +44,7 @@ typedef struct {
     double kd[ROBOT_JOINTS_MAX]; /* [N m s/rad] task.kd or the robot's */
 } TaskGains;
 
-/* As an environment has them: on the CPU its own, on a device those of its crowd. */
+/* As an environment has them: on the CPU its own, on a device one for all. */
 #ifdef TASK_ON_DEVICE
 typedef const TaskGains *TaskOwnGains;
 #else
@@ -225,7 +225,7 @@ TASK_FN void task_set_progress(TaskEnv *env, TaskProgress kept);
 /* Draws ground, robot and sensors of an episode (randomize.c). */
 TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot);
 TASK_FN void task_draw_command(TaskEnv *env, const TaskDef *def);
-/* Draws the ground of an episode: one material, or stripes of three (ground.c, crowd.inc). */
+/* Draws the ground of an episode: one material, or stripes of three (ground.c, env/batch_step.inc). */
 TASK_FN void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r);
 /* Draws where on the map it begins, and a material for each of its labels. */
 TASK_FN void task_draw_on_map(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r);

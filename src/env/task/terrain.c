@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "base/random.h"
-#include "mild/ground.h"
 #include "env/task/image.h"
+#include "mild/ground.h"
 
 #define RANDOM_USE_STRIPES 0x53545250u
 #define STRIPE_PIXEL 0.1       /* [m] */

@@ -1,6 +1,6 @@
 #include "ground/batch/batch.h"
-#include "ground/batch/contact_shapes.h"
 #include "device/device.h"
+#include "ground/batch/contact_shapes.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -8,8 +8,8 @@ extern "C" {
 #include "ground/batch/batch.h"
 }
 
-#include "ground/batch/contact.h"
 #include "device/cuda.h"
+#include "ground/batch/contact.h"
 
 #define CONTACT_CURVES KERNEL_CURVES
 #define CONTACT_POINTS KERNEL_POINTS

@@ -1,8 +1,8 @@
 /* The map that the robots of a batch stand on, in the memory of its device. */
 #include <stdlib.h>
 
-#include "ground/batch/batch.h"
 #include "device/device.h"
+#include "ground/batch/batch.h"
 #include "ground/grid.h"
 #include "ground/inside.h"
 

@@ -3,9 +3,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "device/device.h"
 #include "ground/batch/batch.h"
 #include "ground/batch/contact.h"
-#include "device/device.h"
 #include "ground/inside.h"
 
 enum { MEMORY_ROBOTS = 256 }; /* copied at once */

@@ -5,9 +5,9 @@ extern "C" {
 #include "ground/batch/batch.h"
 }
 
+#include "device/cuda.h"
 #include "ground/batch/contact.h"
 #include "ground/batch/robot.inc"
-#include "device/cuda.h"
 
 static __global__ void forget(BatchShape shape, BatchArrays arrays, const uint8_t *which) {
     const long robot = blockIdx.x;

@@ -1,6 +1,6 @@
 /* In the place of the kernels in a build without CUDA. */
-#include "ground/batch/batch.h"
 #include "device/device.h"
+#include "ground/batch/batch.h"
 
 const BatchKernel *const batch_kernels[] = {NULL};
 

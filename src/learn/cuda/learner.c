@@ -4,10 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "device/ranks/device.h"
 #include "learn/cuda/learner_private.h"
 #include "learn/ppo_gradient.h"
 #include "learn/ppo_step.h"
-#include "device/ranks/device.h"
 
 /* Rows go through the networks in chunks of at most this many. That fills a large device and bounds
  * the memory. */

@@ -7,8 +7,8 @@
 
 #include <cuda_runtime_api.h>
 
-#include "learn/cuda/kernels.h"
 #include "learn/adam.h"
+#include "learn/cuda/kernels.h"
 #include "learn/order.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"

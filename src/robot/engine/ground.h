@@ -3,8 +3,8 @@
 #ifndef MILD_ENGINE_GROUND_H
 #define MILD_ENGINE_GROUND_H
 
-#include "robot/engine/data.h"
 #include "ground/map_view.h"
+#include "robot/engine/data.h"
 
 typedef struct {
     const MapView *map;     /* NULL: level */

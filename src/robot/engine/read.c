@@ -6,8 +6,8 @@
 
 #include <mujoco/mujoco.h>
 
-#include "robot/engine/model.h"
 #include "robot/description.h"
+#include "robot/engine/model.h"
 
 _Static_assert(sizeof(EngineNumbers) == ENGINE_NUMBERS * sizeof(double),
                "numbers and nothing else");

@@ -3,11 +3,11 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "control/controller.h"
+#include "device/device.h"
 #include "ground/batch/batch.h"
 #include "run/bench/bench.h"
 #include "run/bench/record.h"
-#include "control/controller.h"
-#include "device/device.h"
 #include "run/train/envs.h"
 
 enum { DEVICE_EPISODES = 1000, HOST_EPISODES = 40 };
@@ -115,7 +115,7 @@ static MildStatus step(Side *side, const Controller *controller, const PolicyDef
     if (status == MILD_OK) {
         controller->act_on(controller->self, side->count, side->history, side->action);
         status = device_copy(side->device, side->device_action, side->action,
-                            n * (size_t)p->actions * size, error);
+                             n * (size_t)p->actions * size, error);
     }
     if (status == MILD_OK) {
         status = envs_step(side->envs.envs, &side->call, NULL, error);

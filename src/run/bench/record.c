@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "base/paths.h"
-#include "run/eval/eval.h"
-#include "learn/policy.h"
 #include "env/task/policy_keys.h"
+#include "learn/policy.h"
+#include "run/eval/eval.h"
 
 static const double walk_speed = 0.6,
                     walk_settle = 1.0; /* [m/s] commanded, [s] before the record begins */

@@ -1,12 +1,12 @@
 #include <stdlib.h>
 
 #include "base/clock.h"
+#include "control/controller.h"
+#include "device/device.h"
+#include "env/envs.h"
 #include "ground/batch/batch.h"
 #include "run/bench/bench.h"
 #include "run/bench/record.h"
-#include "control/controller.h"
-#include "env/envs.h"
-#include "device/device.h"
 
 /* Rows of the environments, in the memory of the device. */
 typedef struct {
@@ -136,7 +136,7 @@ static MildStatus write_script(Envs *envs, const Rows *rows, const ExperimentDef
     MildStatus status = envs_reset(envs, &view, NULL, error);
     for (int t = 0; t < warm_steps(rows) + timed_steps(rows) && status == MILD_OK; t++) {
         status = device_copy(rows->device, walker->history, rows->history,
-                            count * (size_t)(p->frames * p->observation) * sizeof(float), error);
+                             count * (size_t)(p->frames * p->observation) * sizeof(float), error);
         if (status == MILD_OK) {
             controller->act_on(controller->self, def->train.envs, walker->history, walker->action);
             status = device_copy(rows->device, script + (size_t)t * actions, walker->action,

@@ -5,9 +5,9 @@
 
 #include "base/clock.h"
 #include "base/random.h"
+#include "control/stand.h"
 #include "run/bench/bench.h"
 #include "run/bench/record.h"
-#include "control/stand.h"
 
 enum { SOLVERS = 2, TWIST_MAX = 6 * ROBOT_FEET_MAX, PROBLEMS_MAX = 400 };
 static const double solver_error = 1e-6;              /* [-] error at which both stop */

@@ -5,9 +5,9 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "control/stand.h"
 #include "run/bench/bench.h"
 #include "run/bench/record.h"
-#include "control/stand.h"
 
 #define REPEATS_MAX 1000
 #define WARM_STEPS 500

@@ -3,8 +3,8 @@
 #ifndef CONFIG_EXPERIMENT_KEYS_H
 #define CONFIG_EXPERIMENT_KEYS_H
 
-#include "run/config/config.h"
 #include "mild/ground.h"
+#include "run/config/config.h"
 #include "run/train/experiment.h"
 
 enum { EXPERIMENT_SECTIONS = 7 };

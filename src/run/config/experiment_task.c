@@ -2,9 +2,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "run/config/experiment_keys.h"
-#include "learn/policy.h"
 #include "env/task/policy_keys.h"
+#include "learn/policy.h"
+#include "run/config/experiment_keys.h"
 
 /* The robot of a policy, when its name is one of robots/. */
 static void take_robot(TrainDef *train, const char *robot) {

@@ -5,8 +5,8 @@
 
 #include <stdio.h>
 
-#include "run/eval/scene.h"
 #include "env/task/task.h"
+#include "run/eval/scene.h"
 
 /* One decision: the environment's true state, the newest frame of its history, and the action
  * [robot_joints] that came out. */

@@ -5,10 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "env/envs.h"
 #include "device/device.h"
-#include "run/eval/eval.h"
+#include "env/envs.h"
 #include "env/task/ground.h"
+#include "run/eval/eval.h"
 
 /* What the device writes in a policy step, one block there and its copy here. */
 typedef struct {

@@ -2,9 +2,9 @@
 #ifndef TRAIN_EXPERIMENT_H
 #define TRAIN_EXPERIMENT_H
 
-#include "learn/ppo.h"
 #include "env/task/task_def.h"
 #include "env/task/terrain.h"
+#include "learn/ppo.h"
 #include "run/train/train_def.h"
 
 typedef struct {

@@ -35,7 +35,7 @@ TrainDef train_def_default(void) {
 
 #define FIELD(member, type, min, max, help) MILD_FIELD(TrainDef, member, type, 1, min, max, help)
 static const char *const robots_names[TRAIN_ROBOTS] = {"auto", "mujoco", "batch"};
-#define MACHINE_FIELDS                                                                               \
+#define MACHINE_FIELDS                                                                             \
     MILD_FIELD(TrainDef, device, MILD_FIELD_TEXT, sizeof((TrainDef *)0)->device, 0, 0,             \
                "[-] where the networks run: cpu, cuda or cuda:N (docs/gpu.md)"),                   \
         MILD_FIELD_CHOICE(TrainDef, robots, robots_names, TRAIN_ROBOTS,                            \

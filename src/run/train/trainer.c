@@ -6,8 +6,8 @@
 
 #include "base/clock.h"
 #include "base/paths.h"
-#include "learn/cuda/learner.h"
 #include "device/ranks/device.h"
+#include "learn/cuda/learner.h"
 #include "run/train/envs.h"
 
 struct Trainer {

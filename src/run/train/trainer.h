@@ -3,9 +3,9 @@
 #ifndef TRAIN_TRAINER_H
 #define TRAIN_TRAINER_H
 
+#include "device/ranks/ranks.h"
 #include "env/envs.h"
 #include "learn/ppo.h"
-#include "device/ranks/ranks.h"
 #include "run/train/experiment.h"
 
 typedef struct Trainer Trainer;

@@ -1,4 +1,4 @@
-/* What the text of a crowd gives to crowd.c: on the CPU (host.c), and on a GPU (device.cu, or
+/* What steps an environment of the batch engine: on the CPU (batch_host.c), on a GPU (batch_device.cu, or
  * without_cuda.c). */
 #ifndef ENVS_TEXT_H
 #define ENVS_TEXT_H
@@ -48,11 +48,11 @@ typedef struct {
     const char *(*part)(const EnvsArrays *all, const EnvsStep *call, int k, void *stream);
     const char *(*end)(const EnvsArrays *all, const EnvsStep *call, void *stream);
     const char *(*keep)(const EnvsArrays *all, int back, void *stream);
-    const char *(*tell)(const EnvsArrays *all, void *stream);
+    const char *(*set_command)(const EnvsArrays *all, void *stream);
     const char *(*tally)(const EnvsArrays *all, void *stream);
 } EnvsKernels;
 
-/* Those of this build, NULL behind them: cmake/Crowd.cmake, or without_cuda.c. A robot takes the
+/* Those of this build, NULL behind them: cmake/Env.cmake, or batch_without_cuda.c. A robot takes the
  * first that fit. */
 extern const EnvsKernels *const envs_kernels[];
 
