@@ -46,7 +46,7 @@ def numbers(path):
 assert numpy.abs(0.75 * numbers("a") + 0.25 * numbers("b") - numbers("mean")).max() < 1e-6 < numpy.abs(numbers("a") - numbers("b")).max()
 CHECK
 expect 0 rigid "$mild" eval --policy mean --ground rigid --trials 1 --seconds 0.1
-worth() { "$python" "$root/scripts/paper/worth.py" "$@"; }
+worth() { "$python" "$root/scripts/paper/deviations.py" "$@"; }
 bad "worth: no NAME-SEED.json in ." worth .
 echo '{' >torn-1.json
 bad "worth: torn-1.json: not a table" worth .

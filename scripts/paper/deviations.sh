@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # What each deviation from the paper is worth: configs/models.ini with one choice set back to the paper's, half a minute each on one GPU,
-# then measured by walks in MuJoCo: FOLDER/NAME-SEED.json. What is there is kept. scripts/paper/worth.py FOLDER writes the table.
-# Usage: scripts/paper/worth.sh FOLDER [SEEDS [NAME ...]]
+# then measured by walks in MuJoCo: FOLDER/NAME-SEED.json. What is there is kept. scripts/paper/deviations.py FOLDER writes the table.
+# Usage: scripts/paper/deviations.sh FOLDER [SEEDS [NAME ...]]
 set -euo pipefail
-out=${1:?usage: scripts/paper/worth.sh FOLDER [SEEDS [NAME ...]]}
+out=${1:?usage: scripts/paper/deviations.sh FOLDER [SEEDS [NAME ...]]}
 seeds=${2:-1}
 shift $(($# < 2 ? $# : 2))
 # shellcheck source=scripts/paper/changes.sh
