@@ -9,7 +9,7 @@ FIRST = "as_it_is"
 
 
 def fail(text):
-    print(f"worth: {text}", file=sys.stderr)
+    print(f"deviations: {text}", file=sys.stderr)
     sys.exit(2)
 
 

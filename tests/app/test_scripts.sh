@@ -46,10 +46,10 @@ def numbers(path):
 assert numpy.abs(0.75 * numbers("a") + 0.25 * numbers("b") - numbers("mean")).max() < 1e-6 < numpy.abs(numbers("a") - numbers("b")).max()
 CHECK
 expect 0 rigid "$mild" eval --policy mean --ground rigid --trials 1 --seconds 0.1
-worth() { "$python" "$root/scripts/paper/deviations.py" "$@"; }
-bad "worth: no NAME-SEED.json in ." worth .
+deviations() { "$python" "$root/scripts/paper/deviations.py" "$@"; }
+bad "deviations: no NAME-SEED.json in ." deviations .
 echo '{' >torn-1.json
-bad "worth: torn-1.json: not a table" worth .
+bad "deviations: torn-1.json: not a table" deviations .
 # its figures need what scripts/paper/requirements.txt names
 "$python" -c 'import sklearn' 2>/dev/null && bad "paper.py: unknown experiment nosuch; there are table2 " "$python" -B "$root/scripts/paper/paper.py" nosuch
 
