@@ -16,7 +16,7 @@
 
 /* ---- a clock that only steps move: 2 s by the engine's own, 3 s by ours ---- */
 
-static double now;
+static double now, lowest_floor;
 static int is_false; /* bool: this clock */
 
 double clock_seconds(void) {
@@ -33,6 +33,8 @@ void __real_mj_step(const mjModel *m, mjData *d);
 void __wrap_mj_step(const mjModel *m, mjData *d);
 void __wrap_mj_step(const mjModel *m, mjData *d) {
     __real_mj_step(m, d);
+    const int name = mj_name2id(m, mjOBJ_GEOM, "floor");
+    lowest_floor = fmin(lowest_floor, name < 0 ? 0 : m->geom_pos[3 * name + 2]);
     now += 2;
 }
 
@@ -65,6 +67,29 @@ static void test_whole_time(void **unused) {
     robot_destroy(robot);
 }
 
+/* The same along a walk, where the engine's floor lies as deep as the soles on foam. */
+static void test_whole_walk(void **unused) {
+    (void)unused;
+    ReplayTimes times = {0};
+    MildError error = {0};
+    const ExperimentDef def = experiment_def_default();
+    const ReplayStop loose = {def.task.contact_tolerance, def.task.contact_iterations};
+    Robot *robot = bench_robot(&def, &error);
+    Replay *replay = bench_record_walk(&def, robot, "foam45", MILD_MODEL_MILD, 20, &error);
+    assert_non_null(replay);
+    is_false = 1;
+    lowest_floor = 0;
+    assert_int_equal(replay_time(replay, robot, loose, 2, &times, &error), MILD_OK);
+    is_false = 0;
+    print_message("engine %g s, ours %g and %g s; the floor at %.1f mm\n", 1e-6 * times.engine,
+                  1e-6 * times.loose, 1e-6 * times.tight, 1e3 * lowest_floor);
+    assert_true(fabs(times.engine - 2e6) < 1);
+    assert_true(fabs(times.loose - 3e6) < 1 && fabs(times.tight - 3e6) < 1);
+    assert_true(lowest_floor < -5e-3 && lowest_floor > -70e-3);
+    replay_destroy(replay);
+    robot_destroy(robot);
+}
+
 /* The benchmark runs and reports positive times; how long they are is not a test's business. */
 static void test_bench(void **unused) {
     (void)unused;
@@ -85,6 +110,7 @@ static void test_bench(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_whole_time),
+                                       cmocka_unit_test(test_whole_walk),
                                        cmocka_unit_test(test_bench)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
