@@ -116,6 +116,7 @@ web:
 
 web-test: web
 	@cmake --build build --parallel $(JOBS) --target mild
+	@node tests/web/test_page.mjs .
 	@scripts/web_test.py
 
 docs:

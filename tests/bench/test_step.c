@@ -1,14 +1,94 @@
 /* The benchmark of a step. */
+#include <math.h>
+#include <mujoco/mujoco.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
+#include <time.h>
 
 #include <cmocka.h>
 
+#include "base/clock.h"
 #include "run/bench/record.h"
 #include "run/bench/step.h"
+
+/* ---- a clock that only steps move: 2 s by the engine's own, 3 s by ours ---- */
+
+static double now, lowest_floor;
+static int is_false; /* bool: this clock */
+
+double clock_seconds(void) {
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return is_false ? now : (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+double clock_thread_seconds(void) {
+    return clock_seconds();
+}
+
+void __real_mj_step(const mjModel *m, mjData *d);
+void __wrap_mj_step(const mjModel *m, mjData *d);
+void __wrap_mj_step(const mjModel *m, mjData *d) {
+    __real_mj_step(m, d);
+    const int name = mj_name2id(m, mjOBJ_GEOM, "floor");
+    lowest_floor = fmin(lowest_floor, name < 0 ? 0 : m->geom_pos[3 * name + 2]);
+    now += 2;
+}
+
+int __real_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
+                          const MildTerrain *terrain, MildGround *ground);
+int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
+                          const MildTerrain *terrain, MildGround *ground);
+int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
+                          const MildTerrain *terrain, MildGround *ground) {
+    now += 3;
+    return __real_robot_sim_step(sim, torque, push, terrain, ground);
+}
+
+/* The time of a step is that of all steps by their number, none left out and none twice. */
+static void test_whole_time(void **unused) {
+    (void)unused;
+    RobotBench bench = {0};
+    MildError error = {0};
+    const ExperimentDef def = experiment_def_default();
+    Robot *robot = bench_robot(&def, &error);
+    is_false = 1;
+    assert_int_equal(robot_bench_step(robot, "foam60", 0.0025, 3, 20, &bench, &error), MILD_OK);
+    is_false = 0;
+    print_message("engine %g and %g s, ours %g, %g and %g s\n", 1e-6 * bench.engine_free,
+                  1e-6 * bench.engine_rigid, 1e-6 * bench.rigid, 1e-6 * bench.newton,
+                  1e-6 * bench.gauss_seidel);
+    assert_true(fabs(bench.engine_free - 2e6) < 1 && fabs(bench.engine_rigid - 2e6) < 1);
+    assert_true(fabs(bench.rigid - 3e6) < 1 && fabs(bench.newton - 3e6) < 1);
+    assert_true(fabs(bench.gauss_seidel - 3e6) < 1);
+    robot_destroy(robot);
+}
+
+/* The same along a walk, where the engine's floor lies as deep as the soles on foam. */
+static void test_whole_walk(void **unused) {
+    (void)unused;
+    ReplayTimes times = {0};
+    MildError error = {0};
+    const ExperimentDef def = experiment_def_default();
+    const ReplayStop loose = {def.task.contact_tolerance, def.task.contact_iterations};
+    Robot *robot = bench_robot(&def, &error);
+    Replay *replay = bench_record_walk(&def, robot, "foam45", MILD_MODEL_MILD, 20, &error);
+    assert_non_null(replay);
+    is_false = 1;
+    lowest_floor = 0;
+    assert_int_equal(replay_time(replay, robot, loose, 2, &times, &error), MILD_OK);
+    is_false = 0;
+    print_message("engine %g s, ours %g and %g s; the floor at %.1f mm\n", 1e-6 * times.engine,
+                  1e-6 * times.loose, 1e-6 * times.tight, 1e3 * lowest_floor);
+    assert_true(fabs(times.engine - 2e6) < 1);
+    assert_true(fabs(times.loose - 3e6) < 1 && fabs(times.tight - 3e6) < 1);
+    assert_true(lowest_floor < -5e-3 && lowest_floor > -70e-3);
+    replay_destroy(replay);
+    robot_destroy(robot);
+}
 
 /* The benchmark runs and reports positive times; how long they are is not a test's business. */
 static void test_bench(void **unused) {
@@ -29,6 +109,8 @@ static void test_bench(void **unused) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bench)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_whole_time),
+                                       cmocka_unit_test(test_whole_walk),
+                                       cmocka_unit_test(test_bench)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

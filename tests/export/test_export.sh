@@ -10,7 +10,7 @@ onnx=$3
 printf '[task]\nphysics_dt = 0.005\nobserve_noise = false\n[randomize]\nlatency = 0 0\n' >exact.ini
 "$mild" eval --config exact.ini --ground sand_loose --trials 2 --seconds 2 --stop 1.2 --sideways 0.1 --seed 3 \
     --actions exact.csv >/dev/null || fail "eval without noise"
-"$mild" eval --ground foam45 --trials 2 --seconds 1 --actions noisy.csv >/dev/null || fail "eval with noise"
+"$mild" eval --ground foam45 --trials 2 --seconds 1 --actions noisy.csv --latent latent.csv >/dev/null || fail "eval with noise"
 
 # another policy: other widths, one theta for each dimension of z, another task; every tensor random, so that nothing is 0 or 1
 "$python" "$tests/make_policy.py" "$root/policies/mild.safetensors" other.safetensors || fail "make_policy.py"
@@ -43,6 +43,9 @@ for program in run run_cpp; do
     near "$output" actions && near "$output" frames || fail "C of another policy, $program: $output"
 done
 [ "$(nm walk/run | grep -c -w -e malloc -e calloc -e realloc)" = 0 ] || fail "the C allocates"
+
+"${CC:-cc}" -O1 -shared -fPIC -Iwalk walk/policy.c "$tests/estimates.c" -lm -o estimates.so || fail "a library of the C"
+"$python" "$tests/estimates.py" noisy.csv latent.csv 0.5 estimates.so || fail "estimates of the C"
 
 # fault NAME OLD NEW: the C with NEW for OLD, of the other policy, must be noticed
 fault() {
@@ -89,6 +92,8 @@ fi
 "$python" "$tests/test_onnx.py" "$root" walk.onnx exact.csv noisy.csv || fail "walk.onnx"
 "$python" "$tests/test_onnx.py" - other.onnx other.csv policy_period=0.01 history_stride=3 gait_period=0.7 action_clip=0.6 \
     action_scale=0.3 standing_below=0.5 clock=1 gait_slowing=0.4 gait_slow_below=0.9 || fail "other.onnx"
+"$python" "$tests/estimates.py" noisy.csv latent.csv 0.5 estimates.so walk.onnx || fail "estimates of the ONNX"
+"$python" "$tests/metadata.py" "$root" walk.onnx noisy.csv walk || fail "metadata of walk.onnx"
 "$mild" export --onnx walk_double.onnx --double || fail "export --onnx --double"
 "$mild" export --policy other.safetensors "${other[@]}" --onnx other_double.onnx --double || fail "--double of another policy"
 "$python" "$tests/test_onnx.py" --double "$root" walk_double.onnx exact.csv noisy.csv || fail "walk_double.onnx"

@@ -90,6 +90,51 @@ static void at_rest_it_is_the_weight(void **state) {
     mj_deleteModel(m);
 }
 
+/* Two bodies that are alike, of which the second has its frame turned, and shifted by `shift`, and
+ * a site that undoes that. The mass is in front and to the left, so that each axis counts. */
+static mjModel *twins(const double turn[4], const double shift[3]) {
+#define SHAPE                                                                                      \
+    "<geom type='box' size='0.1 0.05 0.01' mass='1' contype='0' conaffinity='0'/><geom "           \
+    "type='box' pos='0.03 0.02 0.04' size='0.02 0.01 0.01' mass='4' contype='0' conaffinity='0'/>"
+    char head[1000], text[3000];
+    kit_head(head, sizeof head, 0.002, "implicitfast", "plain turned", "sand_loose", "");
+    snprintf(text, sizeof text,
+             "%s<worldbody><body name='plain' pos='0 0 0.015'><freejoint/>" SHAPE
+             "</body><body name='other'><freejoint/><frame pos='%g %g %g' quat='%g %g %g "
+             "%g'>" SHAPE "<site name='turned'/></frame></body></worldbody>%s</mujoco>",
+             head, shift[0], shift[1], shift[2], turn[0], -turn[1], -turn[2], -turn[3], SENSOR);
+    return kit_model(text);
+}
+
+/* Dropped alike, 1 m apart, they read the same: where the body's origin is shifted, too, for the
+ * steps in which MuJoCo integrates the two alike. */
+static void a_site_may_be_turned(void **state) {
+    (void)state;
+    const double turn[4] = {0.5, 0.1, -0.7, 0.5}, shifts[2][3] = {{0}, {0.04, -0.03, 0.02}};
+    for (int shifted = 0; shifted < 2; shifted++) {
+        mjModel *m = twins(turn, shifts[shifted]);
+        mjData *d = mj_makeData(m);
+        mjtNum arm[3], worst = 0, most = 0;
+        mju_rotVecQuat(arm, shifts[shifted], turn);
+        mju_sub3(d->qpos + 7, d->qpos, arm);
+        d->qpos[8] += 1;
+        mju_copy4(d->qpos + 10, turn);
+        for (int i = 0; i < (shifted ? 18 : 300); i++) {
+            mj_step(m, d);
+            const mjtNum *plain = reading(m, d, 0), *turned = reading(m, d, 1);
+            for (int k = 0; k < SENSOR_NUMBERS; k++) {
+                const double apart = k == PRESSURE + 1 && plain[AREA] > 0 ? 1 : 0;
+                worst = fmax(worst, fabs(turned[k] - plain[k] - apart));
+            }
+            most = fmax(most, fabs(plain[TORQUE + 1]));
+        }
+        print_message("a foot and a turned one differ by %.1e, torques to %.2f N m\n", worst, most);
+        assert_true(worst < (shifted ? 1e-2 : 1e-6) && most > 0.5);
+        mj_deleteData(d);
+        mj_deleteModel(m);
+    }
+}
+
 static void without_a_sensor_there_is_no_data(void **state) {
     (void)state;
     mjModel *m = plates("heavy light", "");
@@ -105,6 +150,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(readings_are_the_forces),
         cmocka_unit_test(at_rest_it_is_the_weight),
+        cmocka_unit_test(a_site_may_be_turned),
         cmocka_unit_test(without_a_sensor_there_is_no_data),
     };
     return cmocka_run_group_tests(tests, kit_setup, NULL);

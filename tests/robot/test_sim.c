@@ -118,7 +118,7 @@ static void test_feet(void **unused) {
     MildMap *map = waves();
     MildTerrain level = preset_terrain("grass"), wavy = level;
     level.height = -0.3;
-    wavy.map = map;
+    wavy.map = map, wavy.height = -0.2;
     for (uint32_t draw = 0; draw < 30; draw++) {
         RobotState state = draw_state(draw, 1, 0.8);
         robot_sim_load(sim, &state, &nominal);
@@ -152,7 +152,7 @@ static void test_feet_after_a_step(void **unused) {
     RobotVariation nominal = robot_variation_nominal();
     MildMap *map = waves();
     MildTerrain wavy = preset_terrain("grass");
-    wavy.map = map;
+    wavy.map = map, wavy.height = -0.2;
     MildGround *ground = new_ground();
     const mjModel *m = robot_sim_model(sim);
     for (uint32_t draw = 0; draw < 5; draw++) {

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -147,23 +148,42 @@ static uint64_t varint(const unsigned char **at) {
     }
 }
 
+/* The field at *at, and steps over it. */
+static Part next_part(const unsigned char **at, uint64_t *field) {
+    const uint64_t key = varint(at), wire = key & 7;
+    Part found = {*at, wire == 1 ? 8 : wire == 5 ? 4 : 0, 0};
+    if (wire == 0 || wire == 2) {
+        found.number = varint(at);
+        found.data = *at;
+        found.size = wire == 2 ? found.number : 0;
+    }
+    *at = found.data + found.size;
+    *field = key >> 3;
+    return found;
+}
+
 static Part part(Part whole, uint64_t field, int skip) {
     const unsigned char *at = whole.data, *end = whole.data + whole.size;
     while (at < end) {
-        const uint64_t key = varint(&at), wire = key & 7;
-        Part found = {at, wire == 1 ? 8 : wire == 5 ? 4 : 0, 0};
-        if (wire == 0 || wire == 2) {
-            found.number = varint(&at);
-            found.data = at;
-            found.size = wire == 2 ? found.number : 0;
-        }
-        at = found.data + found.size;
-        if (key >> 3 == field && skip-- == 0) {
+        uint64_t number;
+        const Part found = next_part(&at, &number);
+        if (number == field && skip-- == 0) {
             return found;
         }
     }
     fail_msg("no field %d", (int)field);
     return whole;
+}
+
+static int count_of(Part whole, uint64_t field) {
+    const unsigned char *at = whole.data, *end = whole.data + whole.size;
+    int count = 0;
+    while (at < end) {
+        uint64_t number;
+        next_part(&at, &number);
+        count += number == field;
+    }
+    return count;
 }
 
 /* Follows a path of field numbers. */
@@ -195,6 +215,18 @@ static Part record(const char *data, int n) {
     return (Part){(const unsigned char *)data + 12, little_endian((const unsigned char *)data), 0};
 }
 
+/* The path of the folder's event file. */
+static void find_events(char path[PATH_SIZE]) {
+    DIR *dir = opendir(folder);
+    path[0] = '\0';
+    for (struct dirent *entry; (entry = readdir(dir));) {
+        if (strncmp(entry->d_name, "events.", 7) == 0) {
+            path_join(folder, entry->d_name, path, NULL);
+        }
+    }
+    closedir(dir);
+}
+
 /* Field numbers of TensorBoard's event.proto, summary.proto, tensor.proto and hparams' plugin_data
  * .proto: an event's summary (5), its value (1): tag 1, tensor 8, metadata 9. */
 static void test_config(void **state) {
@@ -208,14 +240,8 @@ static void test_config(void **state) {
         log_config(log, "[train]\nenvs = 64\nvx = 0 1.2\n\n[ppo]\nmirror = true\n", &error),
         MILD_OK);
     log_close(log);
-    DIR *dir = opendir(folder);
-    char path[PATH_SIZE] = "";
-    for (struct dirent *entry; (entry = readdir(dir));) {
-        if (strncmp(entry->d_name, "events.", 7) == 0) {
-            path_join(folder, entry->d_name, path, NULL);
-        }
-    }
-    closedir(dir);
+    char path[PATH_SIZE];
+    find_events(path);
     read_file(path, data, sizeof data);
 
     const Part text = FOLLOW(record(data, 1), 5, 1);
@@ -236,6 +262,61 @@ static void test_config(void **state) {
     assert_text(FOLLOW(part(start, 1, 1), 2, 3), "0 1.2");
     assert_text(FOLLOW(part(start, 1, 2), 1), "ppo.mirror");
     assert_int_equal(FOLLOW(part(start, 1, 2), 2, 4).number, 1);
+}
+
+/* A number as the log's CSV has it, and as TensorBoard does: in 32 bits. */
+static void assert_same(Part summary, int n, const char *name, double number) {
+    const Part scalar = part(summary, 1, n);
+    float value;
+    assert_text(FOLLOW(scalar, 1), name);
+    assert_int_equal(FOLLOW(scalar, 2).size, 4);
+    memcpy(&value, FOLLOW(scalar, 2).data, 4);
+    assert_true(value == (float)number || (isnan(value) && isnan(number)));
+}
+
+/* TensorBoard shows the numbers of log.csv under their names, at their iterations: as many as make
+ * several events of each row. Of an event: wall time 1, step 2, summary 5; of its value: tag 1,
+ * simple_value 2. */
+static void test_scalars(void **state) {
+    (void)state;
+    enum { COLUMNS = 300, ROWS = 3 };
+    static char names[COLUMNS][120], data[400000];
+    static const char *columns[COLUMNS];
+    static double values[COLUMNS];
+    const double start = (double)time(NULL);
+    char path[PATH_SIZE];
+    MildError error = {0};
+    History history;
+    for (int i = 0; i < COLUMNS; i++) {
+        snprintf(names[i], sizeof names[i], "group/%090d", i);
+        columns[i] = names[i];
+    }
+    Log *log = log_open(folder, columns, COLUMNS, -1, &error);
+    for (int row = 0; row < ROWS; row++) {
+        for (int i = 0; i < COLUMNS; i++) {
+            values[i] = i == 7 ? NAN : (i % 2 ? -1e-6 : 1e3) * (1 + COLUMNS * row + i);
+        }
+        assert_int_equal(log_row(log, 200 + 3 * row, values, &error), MILD_OK);
+    }
+    log_close(log);
+    path_join(folder, "log.csv", path, NULL);
+    assert_int_equal(history_read(path, &history, &error), MILD_OK);
+    assert_int_equal(history.columns, 1 + COLUMNS);
+    find_events(path);
+    const size_t length = read_file(path, data, sizeof data);
+    int seen = 0;
+    for (size_t at = 0; at < length; at += 16 + little_endian((unsigned char *)data + at)) {
+        const Part event = record(data + at, 0);
+        for (int n = 0; at > 0 && n < count_of(FOLLOW(event, 5), 1); n++, seen++) {
+            const double *row = history.value + seen / COLUMNS * (1 + COLUMNS);
+            assert_int_equal(FOLLOW(event, 2).number, (uint64_t)row[0]);
+            assert_in_range(number_in(FOLLOW(event, 1)), start, start + 60);
+            assert_same(FOLLOW(event, 5), n, history.name[1 + seen % COLUMNS],
+                        row[1 + seen % COLUMNS]);
+        }
+    }
+    assert_int_equal(seen, ROWS * COLUMNS);
+    history_free(&history);
 }
 
 /* ---- log.csv read back ---- */
@@ -337,6 +418,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(test_csv_resume, make_folder, remove_folder),
         cmocka_unit_test_setup_teardown(test_records, make_folder, remove_folder),
         cmocka_unit_test_setup_teardown(test_config, make_folder, remove_folder),
+        cmocka_unit_test_setup_teardown(test_scalars, make_folder, remove_folder),
         cmocka_unit_test_setup_teardown(test_history, make_folder, remove_folder),
         cmocka_unit_test(test_settings),
     };

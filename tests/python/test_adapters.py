@@ -1,0 +1,152 @@
+"""What the adapters tell a learner about the end of an episode: a time-out where the robot still stands after the episode's time, no
+time-out where it fell. Of PyTorch, rsl_rl and Stable-Baselines3 stand-ins of NumPy are enough; `make python-check` has the real ones."""
+import sys
+import types
+import unittest
+
+import numpy as np
+
+
+class Tensor(np.ndarray):
+    """The methods of a tensor that mild.rsl_rl calls."""
+
+    def view(self, *shape):
+        return self.reshape(shape)
+
+    def long(self):
+        return self.astype(np.int64)
+
+    def detach(self):
+        return self
+
+    def to(self, device, kind):
+        return self.astype(kind)
+
+    def contiguous(self):
+        return self
+
+    def masked_fill_(self, mask, value):
+        self[mask] = value
+
+
+def tensor_of(make):
+    def made(*shape, dtype=np.float32, device=None):
+        return make(shape[0] if isinstance(shape[0], tuple) else shape, dtype).view(np.ndarray)
+    return lambda *shape, **keys: np.ndarray.view(made(*shape, **keys), Tensor)
+
+
+def stand_in(name, **members):
+    sys.modules[name] = types.ModuleType(name)
+    vars(sys.modules[name]).update(members)
+
+
+class VecEnv:
+    """Of either learner."""
+
+    def __init__(self, num_envs=0, observation_space=None, action_space=None):
+        self.num_envs, self._seeds = num_envs, [1] * num_envs
+
+    def _reset_seeds(self):
+        pass
+
+    _reset_options = _reset_seeds
+
+
+stand_in("torch", empty=tensor_of(np.empty), zeros=tensor_of(np.zeros), ones=tensor_of(np.ones), bool=np.bool_, long=np.int64,
+         float32=np.float32, device=lambda name: types.SimpleNamespace(type=name))
+stand_in("tensordict", TensorDict=lambda groups, **keys: groups)
+for package, module in (("rsl_rl", "env"), ("stable_baselines3", "common.vec_env")):
+    for at in range(len(module.split(".")) + 1):
+        stand_in(".".join([package, *module.split(".")[:at]]), VecEnv=VecEnv)
+
+from mild import gym, rsl_rl, sb3  # noqa: E402
+
+ENVS, LENGTH = 8, 50  # robots, steps of an episode
+KEYS = {"task.episode": 0.5, "task.assist": False, "task.standing_share": 1}
+
+
+def actions_of(step):
+    """The first half of the robots stand, the other half fall."""
+    actions = 8 * np.sin(2.7 * step + np.arange(12.0 * ENVS)).reshape(ENVS, 12).astype(np.float32)
+    actions[: ENVS // 2] = 0
+    return actions
+
+
+class Ends(unittest.TestCase):
+    def follow(self, step_of):
+        """Steps of an environment, step_of(actions) = (done, timeout), beside what the lengths of the episodes say. An environment's
+        first episode is of another length."""
+        length, first = np.zeros(ENVS, int), np.ones(ENVS, bool)
+        times = falls = 0
+        for step in range(6 * LENGTH):
+            done, timeout = map(np.asarray, step_of(actions_of(step)))
+            length += 1
+            self.assertEqual((done.shape, timeout.shape), ((ENVS,), (ENVS,)))
+            self.assertFalse((timeout & ~done).any())
+            known = ~first & done
+            np.testing.assert_array_equal(timeout[known], length[known] == LENGTH)
+            times, falls = times + (timeout & known).sum(), falls + (~timeout & known).sum()
+            first &= ~done
+            length[done] = 0
+        self.assertGreater(times, 4)
+        self.assertGreater(falls, 4)
+
+    def test_gym(self):
+        env = gym.VectorEnv(ENVS, overrides=KEYS)
+        env.reset(seed=1)
+
+        def step(actions):
+            _, _, ended, truncated, _ = env.step(actions)
+            self.assertFalse((ended & truncated).any())
+            return ended | truncated, truncated
+
+        self.follow(step)
+        env.close()
+
+    def test_gym_single(self):
+        """The same of one robot, which is reset by hand; time for the one that falls."""
+        for which in (0, ENVS - 1):
+            env = gym.Env(overrides={**KEYS, "task.episode": 20 if which else 0.5})
+            lengths = []
+            for _ in range(5):
+                env.reset(seed=None if lengths else 1)
+                over = [False, False]
+                for length in range(1, 4 * LENGTH):
+                    over = list(env.step(actions_of(length)[which])[2:4])
+                    if any(over):
+                        break
+                lengths.append(length)
+                self.assertEqual(over, [which > 0, which == 0])
+            self.assertTrue(which > 0 or max(lengths) <= LENGTH)
+            env.close()
+
+    def test_rsl_rl(self):
+        env = rsl_rl.Env(ENVS, overrides=KEYS)
+        self.assertEqual(env.max_episode_length, LENGTH)
+
+        def step(actions):
+            _, reward, done, extras = env.step(actions.view(Tensor))
+            self.assertEqual(reward.shape, (ENVS,))
+            self.assertTrue((np.asarray(env.episode_length_buf)[np.asarray(done) == 1] == 0).all())
+            return np.asarray(done) == 1, extras["time_outs"]
+
+        self.follow(step)
+        env.close()
+
+    def test_sb3(self):
+        env = sb3.Env(ENVS, overrides=KEYS)
+        env.reset()
+
+        def step(actions):
+            env.step_async(actions)
+            _, _, done, infos = env.step_wait()
+            for info, over in zip(infos, done, strict=True):
+                self.assertEqual("TimeLimit.truncated" in info, over)
+            return done, [info.get("TimeLimit.truncated", False) for info in infos]
+
+        self.follow(step)
+        env.close()
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,157 @@
+// The page without a browser: its classes on a document of the test's own. What keys, stick, gamepad and sliders ask for, by sign
+// and size; that it reads WebView (core.h) in its order; that each number appears at its own foot. Usage: node test_page.mjs ROOT
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+
+const root = process.argv[2];
+
+// ---- a document ----
+
+class Element {
+  constructor(id) {
+    Object.assign(this, { id, style: {}, handlers: {}, children: [], value: '0', textContent: '', drawn: [], width: 440, height: 480 });
+    this.classList = { add() {}, remove() {}, toggle() {} };
+  }
+
+  get firstElementChild() { return this.children[0] ??= new Element(); }
+  addEventListener(what, act) { this.handlers[what] = act; }
+  append(...more) { this.children.push(...more); }
+  prepend(first) { this.children.unshift(first); }
+  setAttribute() {}
+  setPointerCapture() {}
+  focus() {}
+  getBoundingClientRect() { return { left: 100, top: 200, width: 80, height: 80 }; }
+  getContext() { // of a canvas: what is filled and stroked
+    const shape = {}, drawn = this.drawn;
+    return {
+      canvas: this, clearRect() { drawn.length = 0; }, beginPath() {},
+      roundRect(x, y, w, h) { Object.assign(shape, { what: 'element', x: x + w / 2, y: y + h / 2 }); },
+      arc(x, y) { Object.assign(shape, { what: 'center', x, y }); },
+      fill() { drawn.push({ ...shape, color: this.fillStyle }); }, stroke() { drawn.push({ ...shape }); },
+    };
+  }
+}
+
+const elements = new Map(), handlers = {};
+const $ = (id) => elements.get(id) ?? elements.set(id, new Element(id)).get(id);
+let pads = [];
+Object.defineProperty(globalThis, 'navigator', { value: { getGamepads: () => pads }, configurable: true });
+Object.assign(globalThis, {
+  document: { getElementById: $, createElement: () => new Element() }, location: { search: '' },
+  addEventListener: (what, act) => { (handlers[what] ??= []).push(act); },
+});
+
+const source = fs.readFileSync(`${root}/web/mild.js`, 'utf8').replace(/^import .*$/m, '').replace(/^main\(\)\.catch[\s\S]*$/m, '');
+const { Core, Driver, Panel, App } = await import(`data:text/javascript,${encodeURIComponent(`${source}\nexport { Core, Driver, Panel, App };`)}`);
+
+// ---- what a hand does: [forward, left, turn to the left] ----
+
+const key = (what, code) => handlers[what].forEach((act) => act({ code, key: code, target: {}, preventDefault() {} }));
+const near = (found, wanted, what) => found.forEach((x, i) => assert.ok(Math.abs(x - wanted[i]) < 1e-5, `${what}: ${found} and not ${wanted}`));
+const driver = new Driver();
+const pace = 0.55; // of a key without Shift
+for (const [codes, asks] of [
+  [['KeyW'], [pace, 0, 0]], [['ArrowUp'], [pace, 0, 0]], [['KeyS'], [-pace, 0, 0]], [['ArrowDown'], [-pace, 0, 0]],
+  [['KeyQ'], [0, 1, 0]], [['KeyE'], [0, -1, 0]], [['KeyA'], [0, 0, 1]], [['ArrowLeft'], [0, 0, 1]], [['KeyD'], [0, 0, -1]],
+  [['ArrowRight'], [0, 0, -1]], [['KeyW', 'ShiftLeft'], [1, 0, 0]], [['KeyS', 'ShiftRight'], [-1, 0, 0]], [['KeyW', 'KeyD'], [pace, 0, -1]],
+]) {
+  codes.forEach((code) => key('keydown', code));
+  near(driver.ask(), asks, codes);
+  codes.forEach((code) => key('keyup', code));
+  near(driver.ask(), [0, 0, 0], `${codes} let go`);
+}
+
+const touch = (what, x, y) => $('stick').handlers[what]({ clientX: 140 + x, clientY: 240 + y, pointerId: 1, pressure: 1, buttons: 1 });
+for (const [x, y, asks] of [[40, 0, [0, 0, -1]], [-40, 0, [0, 0, 1]], [0, -40, [1, 0, 0]], [0, 20, [-0.5, 0, 0]], [400, 0, [0, 0, -1]]]) {
+  touch('pointerdown', x, y);
+  near(driver.ask(), asks, `stick at ${x} right, ${y} down`);
+  const knob = $('stick').firstElementChild.style.transform.match(/-?[\d.e-]+(?=px)/g).map(Number), reach = Math.max(40, Math.hypot(x, y));
+  near(knob, [(40 * x) / reach, (40 * y) / reach], 'the knob is under the finger');
+  touch('pointerup', x, y);
+  near(driver.ask(), [0, 0, 0], 'stick let go');
+}
+for (const [axes, asks] of [[[0, -1, 0], [1, 0, 0]], [[-1, 0, 0], [0, 1, 0]], [[0, 0, -1], [0, 0, 1]], [[0.1, 0.1, 0.1], [0, 0, 0]]]) {
+  pads = [null, { axes, buttons: [{ pressed: false }] }];
+  near(driver.ask(), asks, `gamepad ${axes}`);
+}
+pads = [{ axes: [], buttons: [{ pressed: true }] }];
+assert.ok(!driver.again && driver.ask() && driver.again);
+pads = [];
+
+// The command: its largest numbers and their rates [m/s, m/s, rad/s], and a heading that is held.
+const steps = (count, wanted, yaw) => { driver.wanted = wanted; let last; for (let i = 0; i < count; i++) last = driver.next(yaw); return last; };
+near(steps(1, [1, 1, 1], 0), [0.011, 0.009, 0.03], 'a first step');
+near(steps(400, [1, 1, 1], 0), [1.15, 0.35, 1], 'in the end');
+near(steps(400, [-1, -1, -1], 0), [-0.9, -0.35, -1], 'and backwards');
+near(steps(400, [1, 0, 0], 0.3), [1.15, 0, 0], 'straight');
+near(driver.next(0.4), [1.15, 0, -0.12], 'too far to the left: back to the right');
+near(driver.next(0.3 + 2 * Math.PI - 0.1), [1.15, 0, 0.12], 'and the other way round');
+
+// ---- what is read from the core ----
+
+// The fields of WebView in the order of core.h, in words.
+const header = fs.readFileSync(`${root}/web/core.h`, 'utf8'), sizes = { ENGINE_LINKS_MAX: 41, WEB_ELEMENTS_MAX: 128, WEB_DIRTY_MAX: 64, WebDirty: 4 };
+const fields = new Map();
+let words = 0;
+for (const [, type, name, array] of header.match(/typedef struct \{([^}]*)\} WebView;/)[1].matchAll(/(\w+) (\w+)((?:\[\w+\])*);/g)) {
+  fields.set(name, words);
+  words += [...array.matchAll(/\w+/g)].reduce((product, [size]) => product * (sizes[size] ?? Number(size)), sizes[type] ?? 1);
+}
+const memory = new ArrayBuffer(4 * words), numbers = new Float32Array(memory), whole = new Int32Array(memory);
+numbers.forEach((_, i) => { numbers[i] = i; });
+for (const name of ['links', 'elements', 'dirty_count', 'dirty']) whole[fields.get(name)] = fields.get(name);
+whole[0] = 4 * words;
+const core = Object.assign(Object.create(Core.prototype), { c: { memory: { buffer: memory }, web_view: () => 0 } });
+const seen = core.view();
+for (const [name, at] of fields) {
+  const found = seen[name === 'dirty_count' ? 'dirtyCount' : name];
+  if (name !== 'bytes') assert.equal(found[0] ?? found, at, `${name} of WebView`);
+}
+near(seen.load, [fields.get('load'), fields.get('load') + 1], 'load');
+
+// ---- what is shown ----
+
+const changed = [], stepped = [], started = [];
+Object.assign(core, { names: ['sand_loose', 'rigid'], c: { ...core.c, web_change: (...all) => changed.push(all), web_step: (...all) => { stepped.push(all); } } });
+const app = Object.assign(Object.create(App.prototype), { core, ground: 0, shape: 0, driver, before: new Float32Array(12 * 41), steps: 0, time: 0 });
+const panel = app.panel = new Panel(app);
+assert.deepEqual(changed, [[1, 1]]);
+$('stiffness').value = '0.5';
+$('friction').value = '-1';
+$('friction').handlers.input();
+assert.deepEqual(changed[1], [2, 0.2], 'the sliders: stiffness, friction');
+assert.deepEqual([$('stiffness-value').textContent, $('friction-value').textContent], ['× 2.00', '× 0.20']);
+
+// Two elements of each foot: one in front and to the left of its middle, one behind and to the right; only the former presses.
+const view = { elements: 2, pitch: 0.02, load: [300, 25], depth: [0.012, 0.003], center: [0.05, 0.01, 0.05, 0.01], x: new Float32Array(256),
+  y: new Float32Array(256), pressure: new Float32Array(256), velocity: [0.5, -0.1, 0.2], yaw: 0 };
+for (const f of [0, 1]) [view.x[128 * f], view.y[128 * f], view.x[128 * f + 1], view.y[128 * f + 1]] = [0.05, 0.01, -0.05, -0.02];
+view.pressure[0] = 4e4;
+view.pressure[128] = 1e3;
+panel.drawSoles(view);
+assert.deepEqual([$('left').textContent, $('right').textContent], ['300 N · 12 mm', '25 N · 3 mm']);
+const [front, back, center, front2, back2, center2] = $('soles').drawn;
+assert.ok([front, back, center].every((at) => at.x < 220) && [front2, back2, center2].every((at) => at.x > 220), 'the left foot is on the left');
+for (const [a, b, c] of [[front, back, center], [front2, back2, center2]]) {
+  assert.ok(a.x < b.x && a.y < b.y, 'left is to the left, front above');
+  near([a.x - c.x, a.y - c.y], [0, 0], 'the centre of pressure lies on the only element that presses');
+}
+const light = ({ color }) => color.match(/\d+/g).reduce((sum, n) => sum + Number(n), 0);
+assert.ok(front.color !== front2.color && back.color === back2.color && light(front) !== light(front2), 'each foot has its own pressures');
+app.ground = 1;
+panel.drawSoles(view);
+assert.equal($('right').textContent, '25 N · rigid');
+panel.drawSpeed(view, [-0.65, 0.1, 0.2], 1, 1e3);
+assert.equal($('numbers').innerHTML, '<b>0.50</b> m/s · -0.65 asked');
+near([parseFloat($('asked').style.left), parseFloat($('measured').style.left), parseFloat($('measured').style.width)], [25, 50, 50 * 0.5 / 1.3], 'speeds on their scale');
+
+// A step hands the command over as web_step takes it: forward, left, turn.
+Object.assign(driver, { command: [0, 0, 0], heading: null, wanted: [1, -1, 1] });
+app.step();
+near(stepped[0], [0.011, -0.009, 0.03], 'web_step');
+app.core.start = (...all) => started.push(all);
+Object.assign(app, { picture: { setHills() {} }, camera: {} });
+Object.assign(core, { hills: () => 0 });
+app.choose(1, 2);
+assert.deepEqual(started, [[1, 2]], 'ground, shape');
+console.log(`page: keys, stick, gamepad; ${fields.size} fields of WebView; soles and speeds`);
