@@ -108,6 +108,8 @@ class Runner:
 
     def __init__(self, mild, *options, patience=("--damp-after", "1", "--late", "1", "--stall-after", "20"), **how):
         Runner.count += 1
+        pairs = zip(patience[::2], patience[1::2])
+        patience = [text for pair in pairs if pair[0] not in options for text in pair]  # an option is given once
         self.json = pathlib.Path(f"runner{Runner.count}.json")
         self.process = subprocess.Popen(
             [mild, "drive", "--no-keys", "--listen", "127.0.0.1:0", "--json", str(self.json), *patience, *options],

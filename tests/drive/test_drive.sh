@@ -8,9 +8,10 @@ config=$(realpath "$tests/../../configs/walk.ini")
 
 # start NAME OPTIONS...: a runner in the background, $runner, at $address, which writes NAME.json, .out, .err
 start() {
-    local name=$1
+    local name=$1 patience=(--damp-after 20)
     shift
-    "$mild" drive --config "$config" --listen 127.0.0.1:0 --late 10 --damp-after 20 --stall-after 20 --json "$name.json" "$@" \
+    [[ " $* " != *" --damp-after "* ]] || patience=()
+    "$mild" drive --config "$config" --listen 127.0.0.1:0 --late 10 "${patience[@]}" --stall-after 20 --json "$name.json" "$@" \
         >"$name.out" 2>"$name.err" </dev/null &
     runner=$!
     for ((i = 0; i < 600; i++)); do

@@ -731,7 +731,7 @@ static int dense_settle(Dense *d) {
  * stored, or all; false where that is no matter. */
 static int dense_turn(Dense *d, int all) {
     double caused = 0.0, gift = 0.0, gifts[DENSE_ELEMENTS],
-           least = 0.02 * 0.5 * dot(d->rank, d->y, d->y);
+           least = 0.08 * 0.5 * dot(d->rank, d->y, d->y);
     for (int i = 0; i < d->elements; i++) {
         const DenseElement *e = &d->element[i];
         double v[4], I[2], held[2], work = 0.0;

@@ -59,7 +59,7 @@ static Cell cell_of(const MildMaterial *m, double tilt, double area) {
         return (Cell){0.0, alpha[2] * m->zeta * 1e6 * area, 1.0, 0.0, 1.0};
     }
     if (m->model == MILD_MODEL_BEKKER) {
-        return (Cell){0.0, 0.0, 1.0, (m->k_c / m->plate_width + m->k_phi) * area, m->exponent};
+        return (Cell){0.0, 0.0, 1.0, (m->k_c / fmin(LENGTH, WIDTH) + m->k_phi) * area, m->exponent};
     }
     if (m->model == MILD_MODEL_HUNT_CROSSLEY) {
         return (Cell){0.0, 0.0, 1.0, m->k_pen * pow(0.01, 1.0 - m->exponent), m->exponent};

@@ -99,6 +99,7 @@ static FitResult press_and_fit(const Case *c, Noise noise, int draw) {
 static double truth_of(const Case *c, const FitValue *value) {
     static const char *const carriers[] = {"nu", "sigma_cone", "c_g", "k_phi"};
     MildMaterial material = c->material;
+    material.plate_width = 0.1; /* of the plate of press_and_fit */
     if (value->field) {
         return *fit_number(&material, value->field);
     }

@@ -141,6 +141,7 @@ static void print_speed(const EvalRow *row, char *text, size_t size) {
 void eval_print_row(const EvalRow *row, char *text, int size) {
     char velocity[32], sideways[64] = "", turning[64] = "";
     char cot[TEXT_CELL], clearance[TEXT_CELL], sink[TEXT_CELL], drift[TEXT_CELL], part[TEXT_CELL];
+    char power[TEXT_CELL];
     print_speed(row, velocity, sizeof velocity);
     if (row->sideways != 0) {
         snprintf(sideways, sizeof sideways, "  sideways %s of %.2f m/s",
@@ -150,11 +151,12 @@ void eval_print_row(const EvalRow *row, char *text, int size) {
         snprintf(turning, sizeof turning, "  turning %s of %.2f rad/s",
                  text_cell("%.3f", row->velocity_turn, part), row->turn);
     }
-    snprintf(text, (size_t)size, "%-26s %5.2f %4d/%-2d %s %5s %7.1f %4s mm %4s mm %4s mm %7.0f%s%s",
+    snprintf(text, (size_t)size, "%-26s %5.2f %4d/%-2d %s %5s %7.1f %4s mm %4s mm %4s mm %7s%s%s",
              row->ground, row->speed, row->success, row->trials, velocity,
              text_cell("%.2f", row->cot, cot), row->torque_max,
              text_cell("%.0f", 1e3 * row->clearance, clearance),
              text_cell("%.1f", 1e3 * row->penetration, sink),
-             text_cell("%.1f", 1e3 * row->drift, drift), row->energy / row->seconds, sideways,
-             turning);
+             text_cell("%.1f", 1e3 * row->drift, drift),
+             text_cell("%.0f", row->seconds > 0 ? row->energy / row->seconds : NAN, power),
+             sideways, turning);
 }

@@ -1,8 +1,6 @@
-#include "env/envs.h"
+#include "env/backend.h"
 
 #include <math.h>
-
-#include "env/backend.h"
 
 _Static_assert((int)TASK_REWARD_COUNT <= (int)ENVS_TERMS_MAX, "room for every term");
 
