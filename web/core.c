@@ -1,5 +1,5 @@
-/* One robot of the batch engine (env/batch_step.inc) on the ground of mild/ground.h, whose solver is much
- * faster on one processor than the batch's and which remembers prints. */
+/* One robot of the batch engine (env/batch_step.inc) on the ground of mild/ground.h, whose solver
+ * is much faster on one processor than the batch's and which remembers prints. */
 #define MILD_REAL_FLOAT
 
 #include "env/batch_step.inc"

@@ -1,5 +1,5 @@
-/* The dialect of functions that a CPU and a GPU run: the common subset of C17 and CUDA C++. They are
- * functions of small structs, allocate nothing, and need only what CUDA has of libm.
+/* The dialect of functions that a CPU and a GPU run: the common subset of C17 and CUDA C++. They
+ * are functions of small structs, allocate nothing, and need only what CUDA has of libm.
  *
  *     MILD_HD     one thread has it to itself; always inlined
  *     MILD_HD_FN  the same, where the compiler decides about inlining

@@ -32,7 +32,7 @@ typedef struct {
     int count;           /* environments */
     uint32_t first;      /* number of the first one, which selects its random numbers */
     uint64_t seed;
-    int batch; /* bool: the batch engine steps the robots; else MuJoCo, with none of the following */
+    int batch;   /* bool: the batch engine steps the robots; else MuJoCo, without what follows */
     int device;  /* a CUDA device, or MILD_BATCH_HOST */
     int grounds; /* drawn beforehand; episodes choose among them */
     int striped; /* bool: the labels of task->map are stripes, which only the share patch_share of
@@ -41,8 +41,8 @@ typedef struct {
     const EnvsTrial *trial;    /* [count] copied; NULL: episodes draw their ground and command */
 } EnvsDef;
 
-/* NULL, with one line in *error, for what the batch engine does not have (imprints, blended borders,
- * patches other than stripes of a map), and when device or memory is missing. */
+/* NULL, with one line in *error, for what the batch engine does not have (imprints, blended
+ * borders, patches other than stripes of a map), and when device or memory is missing. */
 Envs *envs_create(const EnvsDef *def, MildError *error);
 void envs_destroy(Envs *envs); /* may be NULL */
 

@@ -1,5 +1,5 @@
-/* What steps an environment of the batch engine: on the CPU (batch_host.c), on a GPU (batch_device.cu, or
- * without_cuda.c). */
+/* What steps an environment of the batch engine: on the CPU (batch_host.c), on a GPU
+ * (batch_device.cu, or without_cuda.c). */
 #ifndef ENVS_TEXT_H
 #define ENVS_TEXT_H
 
@@ -52,8 +52,8 @@ typedef struct {
     const char *(*tally)(const EnvsArrays *all, void *stream);
 } EnvsKernels;
 
-/* Those of this build, NULL behind them: cmake/Env.cmake, or batch_without_cuda.c. A robot takes the
- * first that fit. */
+/* Those of this build, NULL behind them: cmake/Env.cmake, or batch_without_cuda.c. A robot takes
+ * the first that fit. */
 extern const EnvsKernels *const envs_kernels[];
 
 #endif

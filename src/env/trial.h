@@ -1,5 +1,5 @@
-/* Trials of an evaluation by the batch engine: what each has instead of what an episode draws, and what is
- * measured of it. */
+/* Trials of an evaluation by the batch engine: what each has instead of what an episode draws, and
+ * what is measured of it. */
 #ifndef ENVS_TRIAL_H
 #define ENVS_TRIAL_H
 

@@ -23,7 +23,8 @@ typedef struct {
      * differs. */
     void (*reference)(MildMaterial *material, double area);
 
-    /* LawMotion bit of `direction`, whose formulas src/ground/batch has too (contact_direct). 0: NULL. */
+    /* LawMotion bit of `direction`, whose formulas src/ground/batch has too (contact_direct). 0:
+     * NULL. */
     int motion;
 
     /* Called once per step after element_begin. Adapts the law or the friction of the foot's slots

@@ -28,8 +28,9 @@ MILD_HD void foot_normal(const Slots *slot, int end, double dt, const Motion *m,
     }
 }
 
-/* Picks the loop compiled for the curves and the slope of the ground under the foot. On level ground
- * the slopes are 0, so a loop for uneven ground does for both where a second one would gain little. */
+/* Picks the loop compiled for the curves and the slope of the ground under the foot. On level
+ * ground the slopes are 0, so a loop for uneven ground does for both where a second one would gain
+ * little. */
 static void foot_normals(const FootScratch *foot, double dt, const Motion *motion) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);

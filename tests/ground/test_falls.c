@@ -1,7 +1,8 @@
 /* A rigid body with one or two feet falls out of the air. The ground has stored nothing, so its
- * work on the body is never above 0, but for bodies of some grams that bounce within one step. Bodies and materials are those of robots, or anything that a
- * file may say: 1 g to 100 t, numbers at the ends of their ranges. Arguments: number of falls of
- * each kind (default 300) and the first seed (default 1); docs/testing.md says how many ran. */
+ * work on the body is never above 0, but for bodies of some grams that bounce within one step.
+ * Bodies and materials are those of robots, or anything that a file may say: 1 g to 100 t, numbers
+ * at the ends of their ranges. Arguments: number of falls of each kind (default 300) and the first
+ * seed (default 1); docs/testing.md says how many ran. */
 #include "ground_kit.h"
 
 #define TURN_MOST 0.1 /* [rad] in a step; beyond it the way of a foot is not its twist */

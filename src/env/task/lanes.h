@@ -1,7 +1,8 @@
 /* What the task's text asks of robot and ground. The files of one policy step (step.c, gait.c,
  * assist.c, observe.c, reward.c, draw.c) are compiled twice: as they are for the CPU, where robots
- * are stepped by RobotSim, and with TASK_ON_DEVICE by env/batch_step.inc, where Robot and RobotSim are plain
- * numbers on a device. TASK_FN marks the functions that one file of them calls in another. */
+ * are stepped by RobotSim, and with TASK_ON_DEVICE by env/batch_step.inc, where Robot and RobotSim
+ * are plain numbers on a device. TASK_FN marks the functions that one file of them calls in
+ * another. */
 #ifndef TASK_LANES_H
 #define TASK_LANES_H
 

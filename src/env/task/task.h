@@ -225,7 +225,8 @@ TASK_FN void task_set_progress(TaskEnv *env, TaskProgress kept);
 /* Draws ground, robot and sensors of an episode (randomize.c). */
 TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot);
 TASK_FN void task_draw_command(TaskEnv *env, const TaskDef *def);
-/* Draws the ground of an episode: one material, or stripes of three (ground.c, env/batch_step.inc). */
+/* Draws the ground of an episode: one material, or stripes of three (ground.c,
+ * env/batch_step.inc). */
 TASK_FN void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r);
 /* Draws where on the map it begins, and a material for each of its labels. */
 TASK_FN void task_draw_on_map(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r);

@@ -1,7 +1,7 @@
-/* A stand-in for the CUDA runtime as far as src/learn/cuda calls it: the device's memory is memory, and
- * what is enqueued is done at once. With it the layer runs on the processor, where the tests hold
- * it against the learner; speed and what only a GPU does (races between blocks, order of streams)
- * it cannot show. */
+/* A stand-in for the CUDA runtime as far as src/learn/cuda calls it: the device's memory is memory,
+ * and what is enqueued is done at once. With it the layer runs on the processor, where the tests
+ * hold it against the learner; speed and what only a GPU does (races between blocks, order of
+ * streams) it cannot show. */
 #ifndef MILD_EMULATED_CUDA_H
 #define MILD_EMULATED_CUDA_H
 
