@@ -453,9 +453,8 @@ static void test_sliders(void **state) {
     }
     for (int i = 0; i < 3; i++) {
         const double rival = rival_depth(stiffness[i]);
-        printf(
-            "  depth on foam45 at %.1f times its stiffness: %.1f mm; the batch engine's %.1f\n",
-            stiffness[i], 1e3 * depth[i], 1e3 * rival);
+        printf("  depth on foam45 at %.1f times its stiffness: %.1f mm; the batch engine's %.1f\n",
+               stiffness[i], 1e3 * depth[i], 1e3 * rival);
         /* with k_pen alone three times as large the feet are twice as deep */
         assert_true(fabs(depth[i] - rival) < 0.15 * rival);
     }
