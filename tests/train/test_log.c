@@ -308,14 +308,15 @@ static void test_scalars(void **state) {
     for (size_t at = 0; at < length; at += 16 + little_endian((unsigned char *)data + at)) {
         const Part event = record(data + at, 0);
         for (int n = 0; at > 0 && n < count_of(FOLLOW(event, 5), 1); n++, seen++) {
-            const double *row = history.value + seen / COLUMNS * (1 + COLUMNS);
+            const int written = COLUMNS - 1; /* a row; what was not measured is left out */
+            const int column = seen % written + (seen % written >= 7);
+            const double *row = history.value + seen / written * (1 + COLUMNS);
             assert_int_equal(FOLLOW(event, 2).number, (uint64_t)row[0]);
             assert_in_range(number_in(FOLLOW(event, 1)), start, start + 60);
-            assert_same(FOLLOW(event, 5), n, history.name[1 + seen % COLUMNS],
-                        row[1 + seen % COLUMNS]);
+            assert_same(FOLLOW(event, 5), n, history.name[1 + column], row[1 + column]);
         }
     }
-    assert_int_equal(seen, ROWS * COLUMNS);
+    assert_int_equal(seen, ROWS * (COLUMNS - 1));
     history_free(&history);
 }
 
