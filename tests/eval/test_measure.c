@@ -574,6 +574,7 @@ static void the_printed_row(void **state) {
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "mm       -"));
     row.speed = 0; /* standing has no cost of transport */
+    row.cot = NAN;
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "0.010     -    98.8"));
     row.sideways = -0.3;
