@@ -579,6 +579,7 @@ static void the_printed_row(void **state) {
     assert_non_null(strstr(text, "0.010     -    98.8"));
     row.sideways = -0.3;
     row.velocity_sideways = -0.2468;
+    row.cot = 1.234;
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "0.010  1.23    98.8"));
     assert_non_null(strstr(text, "       0  sideways -0.247 of -0.30 m/s"));
