@@ -582,11 +582,12 @@ static void the_printed_row(void **state) {
     row.cot = 1.234;
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "0.010  1.23    98.8"));
-    assert_non_null(strstr(text, "       0  sideways -0.247 of -0.30 m/s"));
+    assert_non_null(strstr(text, "       -  sideways -0.247 of -0.30 m/s"));
     row.measured = 1; /* one trial has no interval */
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "19/20  0.457 +-     -  1.23    98.8"));
     row.measured = 0; /* all fell before there was a speed to measure */
+    row.cot = NAN;
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "19/20      - +-     -     -    98.8"));
     char header[256];

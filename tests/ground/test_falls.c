@@ -100,7 +100,7 @@ static int draw_ground(uint64_t *random, int kind, MildMaterial *m, MildSole **s
     if (mild_material_check(m, &error) != MILD_OK || !(*sole = draw_sole(random))) {
         return 0;
     }
-    const int model = choose(random, 3) ? 0 : choose(random, 6);
+    const MildModel model = (MildModel)(choose(random, 3) ? 0 : choose(random, 6));
     MildMaterial rival = *m;
     int good = !model || mild_model_match(model, m, *sole, kit_uniform(random, 5, 300), &rival,
                                           &error) == MILD_OK;
