@@ -126,7 +126,7 @@ vectors() {
 # The widest vectors are what `make test` runs on no processor by itself. The lanes of batch and engine, which take as long to
 # compile as all the rest, are tried with these alone.
 stage_vectors() {
-    local layers=(base ground lab learn robot task)
+    local layers=(base ground identify learn robot task)
     vectors x86-64-v4 512 "${layers[@]}" batch engine
     vectors x86-64-v4 256 "${layers[@]}"
     vectors x86-64-v3 256 "${layers[@]}"

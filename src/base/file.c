@@ -58,7 +58,7 @@ void file_claims_drop(void) {
 /* Fails when the file, of which `info` tells, is an output of the program. */
 static MildStatus check_claims(const char *path, const struct stat *info, MildError *error) {
     for (int i = 0; i < claim_count; i++) {
-        struct stat output;
+        struct stat output = {0};
         if (stat(claims[i].path, &output) == 0 && same_inode(&output, info)) {
             return mild_fail(error, MILD_ERROR_ARGUMENT,
                              "%s: %.150s is also an input (%.150s) and would be overwritten; name "
@@ -82,7 +82,7 @@ static const char *not_regular(const struct stat *info) {
 }
 
 MildStatus file_check_own(const char *path, MildError *error) {
-    struct stat info;
+    struct stat info = {0};
     const char *reason = lstat(path, &info) != 0 ? NULL
                          : S_ISLNK(info.st_mode) ? "it is a link, which is not followed here"
                                                  : not_regular(&info);
@@ -106,7 +106,7 @@ static int open_regular(const char *path, struct stat *info, MildError *error) {
 }
 
 FILE *file_open(const char *path, MildError *error) {
-    struct stat info;
+    struct stat info = {0};
     int file = open_regular(path, &info, error);
     FILE *stream = file >= 0 ? fdopen(file, "rb") : NULL;
     if (file >= 0 && !stream) {
@@ -133,7 +133,7 @@ static int read_whole(int file, char *bytes, size_t size) {
 }
 
 char *file_read(const char *path, size_t limit, size_t *size, MildError *error) {
-    struct stat info;
+    struct stat info = {0};
     char most[32];
     int file = open_regular(path, &info, error);
     if (file < 0) {
@@ -174,7 +174,7 @@ static MildStatus cannot_write(const char *path, int failure, MildError *error) 
 
 /* Bool: the path is a device or a pipe, which is written to instead of replaced. */
 static int is_device(const char *path) {
-    struct stat info;
+    struct stat info = {0};
     return stat(path, &info) == 0 && !S_ISREG(info.st_mode);
 }
 
@@ -241,7 +241,7 @@ int file_is_temporary(const char *name) {
 }
 
 MildStatus file_check_write(const char *path, MildError *error) {
-    struct stat info;
+    struct stat info = {0};
     if (is_device(path)) { /* opening and closing a pipe would end it for its reader */
         int failed = stat(path, &info) == 0 && S_ISDIR(info.st_mode) ? EISDIR
                      : access(path, W_OK) != 0                       ? errno
@@ -389,7 +389,7 @@ static int is_lock(int file) {
 static MildStatus take_lock(int file, const char *path, int patience, int *again,
                             MildError *error) {
     struct flock whole = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
-    struct stat locked, named;
+    struct stat locked = {0}, named = {0};
     const int is = is_lock(file);
     if (is == 0 || (is < 0 && patience <= 0)) {
         return mild_fail(error, MILD_ERROR_FORMAT,

@@ -92,6 +92,8 @@ MILD_HD double system_norm(const System *system, const double *x, int n, int par
     row_clear(&y, parts);
     system_times(system, x, &y, n, parts);
     for (int i = 0; i < n; i++) {
+        /* row_clear has set these: n numbers are in `parts` parts */
+        /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult) */
         sum += x[i] * y.at[i];
     }
     return sqrt(fmax(sum, 0.0));
@@ -174,6 +176,7 @@ MILD_HD int point_step(const System *system, MildScratch *scratch, const Point *
         Row row;
         row_unit(&row, i, parts);
         for (int k = 0; k < 6; k++) {
+            /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): n is in sixes */
             right += H[k] * moved[foot + k];
             for (int p = 0; p < parts; p++) {
                 row.part[p] += H[k] * system->A[foot + k].part[p];

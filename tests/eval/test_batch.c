@@ -85,7 +85,8 @@ static MildStatus run_batch(Controller *controller, Pool *pool, const char *cons
 }
 
 static void near(const char *what, const EvalRow *row, double is, double wanted, double within) {
-    if (!(fabs(is - wanted) <= within)) {
+    const int neither = isnan(is) && isnan(wanted); /* nothing to measure */
+    if (!neither && !(fabs(is - wanted) <= within)) {
         fail_msg("%s %.1f m/s: %s is %g by the batch engine, %g by MuJoCo", row->ground, row->speed,
                  what, is, wanted);
     }

@@ -11,6 +11,7 @@
 
 #define BATCH_SIZE(groups, per) {groups, per},
 static const int batch_sizes[][2] = {CONTACT_KINDS(BATCH_SIZE)};
+/* NOLINTNEXTLINE(misc-redundant-expression): it is what this asserts */
 _Static_assert(MILD_BATCH_HOST == DEVICE_HOST, "the same number");
 _Static_assert(MILD_FEET_MAX == 4, "feet take 1, 2 or 4 groups");
 
