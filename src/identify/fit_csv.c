@@ -92,6 +92,7 @@ static MildStatus csv_row(Record *record, char *line, FitPoint *point, MildError
     double *const values[CSV_COLUMNS] = {&point->depth, &point->force, &point->time, &point->speed};
     int count = csv_split(line, cells);
     MildStatus status = MILD_OK;
+    *point = (FitPoint){.plate = 0}; /* until the caller says otherwise */
     if (count < 0) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "%.200s:%d: more than %d columns; keep those needed", record->text.path,
