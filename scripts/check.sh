@@ -5,7 +5,7 @@
 #   sanitize  clang, warnings as errors, address and undefined-behaviour sanitizers: every test
 #   tidy      clang-tidy 14 over src/, only files that changed since they last passed
 #   thread    gcc, warnings as errors, thread sanitizer: pool, task, evaluation, training
-#   vectors   the numeric layers for AVX2 and for AVX-512 with vectors of 256 and 512 bits: their tests
+#   vectors   the numeric layers for AVX2, and for AVX-512 with vectors of 512 bits: their tests (256: make test)
 #   aarch64   the library for another processor, run under qemu
 #   wheel     the Python package, made and installed as a user would; three of its examples
 #   recipes   what CONTRIBUTING.md says, done in a copy of the tree: a reward, a model, a terrain, a controller, a command
@@ -128,7 +128,6 @@ vectors() {
 stage_vectors() {
     local layers=(base ground identify learn robot task)
     vectors x86-64-v4 512 "${layers[@]}" batch engine
-    vectors x86-64-v4 256 "${layers[@]}"
     vectors x86-64-v3 256 "${layers[@]}"
 }
 
