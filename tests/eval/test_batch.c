@@ -92,11 +92,14 @@ static void near(const char *what, const EvalRow *row, double is, double wanted,
     }
 }
 
-/* All rows of a batch against MuJoCo's, each measure within what six trials scatter. */
+/* All rows of a batch against MuJoCo's, each measure within what six trials scatter; two trials are
+ * only begun where kit_short says so. */
 static void compare_rows(const char *const *names, const double *speeds, int speed_count,
                          double turn, int device) {
     MildError error = {0};
-    EvalDef eval = {.turn = turn, .trials = 6, .seconds = 6, .seed = 1};
+    const int is_short = kit_short();
+    EvalDef eval = {
+        .turn = turn, .trials = is_short ? 2 : 6, .seconds = is_short ? 1.2 : 6, .seed = 1};
     Pool *pool = pool_create(2);
     Controller controller = walker(pool, eval.trials);
     EvalRow rows[ROWS], own;
@@ -116,7 +119,10 @@ static void compare_rows(const char *const *names, const double *speeds, int spe
         eval_print_row(&own, line, sizeof line);
         printf("%s\n", line);
         assert_string_equal(row->ground, own.ground);
-        assert_true(row->speed == own.speed && row->trials == 6);
+        assert_true(row->speed == own.speed && row->trials == own.trials);
+        if (is_short) {
+            continue;
+        }
         assert_true(row->success == own.success && row->success == 6);
         near("velocity", row, row->velocity, own.velocity, 0.02);
         near("cot", row, row->cot / own.cot, 1, 0.04);
