@@ -2,18 +2,8 @@
 #ifndef ACTUATOR_KIT_H
 #define ACTUATOR_KIT_H
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "base/random.h"
+#include "kit.h"
 #include "robot/robot.h"
 #include "sa01.h"
 

@@ -1,18 +1,8 @@
 /* The ground that keys change: what each key does to the terrain, and that a standing robot sinks
  * to the depth of the law of the changed material. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "app/live.h"
 #include "control/stand.h"
+#include "kit.h"
 #include "sa01.h"
 
 #define DT 0.002

@@ -1,16 +1,7 @@
 /* Tables of fields: what is parsed, refused and printed, every message, every type. */
 #include <limits.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
-#include <cmocka.h>
-
+#include "kit.h"
 #include "mild/field.h"
 
 typedef struct {

@@ -1,20 +1,12 @@
 /* Files and texts of layer base: what is read and what is refused, written whole or not at all,
  * told apart, locked. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "base/file.h"
 #include "base/text.h"
+#include "kit.h"
 
 static char folder[] = "/tmp/mild_test_file_XXXXXX";
 

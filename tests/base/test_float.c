@@ -1,16 +1,8 @@
 /* Rounding to float happens, whatever the compiler makes of neighbouring numbers: results are held
  * against the definition, by the bits of the double. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "base/float.h"
 #include "base/random.h"
+#include "kit.h"
 
 enum { MOST = 19 };
 

@@ -1,21 +1,14 @@
 /* Every piece is run exactly once, by a thread of the team, whatever the number of threads. */
 #include <pthread.h>
 #include <sched.h>
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
 #include <stdatomic.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <time.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "base/clock.h"
 #include "base/pool.h"
+#include "kit.h"
 
 #define PIECES 1000
 

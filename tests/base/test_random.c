@@ -1,15 +1,7 @@
 /* Random numbers: known answers of the published generator, moments, independence of what is drawn
  * for different seeds, streams, steps and uses. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-
-#include <cmocka.h>
-
 #include "base/random.h"
+#include "kit.h"
 
 enum { COUNT = 200000 };
 

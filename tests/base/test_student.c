@@ -1,13 +1,6 @@
 /* Student's t: printed tables, and an integral of the density that shares no formula with it. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "base/student.h"
+#include "kit.h"
 
 /* Two sided, 95 % (e.g. Abramowitz and Stegun, table 26.10). */
 static void printed_tables(void **state) {

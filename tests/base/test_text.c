@@ -1,15 +1,8 @@
 /* Names, numbers and durations as text. */
 #include <limits.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 #include "base/text.h"
+#include "kit.h"
 #include "mild/error.h"
 
 static void test_distance(void **state) {

@@ -1,16 +1,9 @@
 /* The benchmark of a step. */
-#include <math.h>
 #include <mujoco/mujoco.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
 #include <time.h>
 
-#include <cmocka.h>
-
 #include "base/clock.h"
+#include "kit.h"
 #include "run/bench/record.h"
 #include "run/bench/step.h"
 

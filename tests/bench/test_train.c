@@ -1,15 +1,7 @@
 /* The times that the training bench and the log of a training tell, by a clock that ticks once each
  * time it is read: nothing is left out and nothing counts twice. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "base/clock.h"
+#include "kit.h"
 #include "run/bench/bench.h"
 #include "run/train/trainer.h"
 

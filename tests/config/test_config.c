@@ -1,15 +1,5 @@
 /* Config files: layering, round trip, and one clear line for every mistake. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
+#include "kit.h"
 #include "run/config/experiment_keys.h"
 
 typedef struct {

@@ -1,15 +1,6 @@
 /* configs/paper.ini against the paper: every number of its tables of rewards and of randomised
  * parameters, its implementation details, and nothing else but what is off. It trains, too. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
+#include "kit.h"
 #include "run/config/experiment_keys.h"
 #include "run/train/trainer.h"
 #include "sa01.h"

@@ -1,16 +1,7 @@
 /* The table of controllers, and those that need no policy, on the biped and on the quadruped. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "control/controller.h"
 #include "control/stand.h"
+#include "kit.h"
 
 /* A robot in an environment of its own, on loose sand. */
 typedef struct {

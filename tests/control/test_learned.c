@@ -1,18 +1,9 @@
 /* The learned controller: it is the policy's file, acting on what each environment remembers. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 #include "base/random.h"
 #include "control/learned.h"
+#include "kit.h"
 #include "learn/policy.h"
 #include "learn/policy_private.h"
 #include "sa01.h"

@@ -1,15 +1,7 @@
 /* The passivity-based controller: its torques against the dynamics of MuJoCo, then standing and
  * walking. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "kit.h"
 
-#include <cmocka.h>
 #include <mujoco/mujoco.h>
 
 #include "control/body.h"

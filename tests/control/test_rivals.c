@@ -1,18 +1,9 @@
 /* The rivals `clock` and `ht2` against PyTorch (make_rivals.py), over two episodes, and files that
  * are not theirs. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "control/controller.h"
+#include "kit.h"
 #include "learn/safetensors.h"
 #include "sa01.h"
 

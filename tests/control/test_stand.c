@@ -1,15 +1,7 @@
 /* The balanced stand: its pose and torques against statics, its answer to a tilt against geometry,
  * the same whichever way the robot looks; and it stands. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "kit.h"
 
-#include <cmocka.h>
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"

@@ -1,16 +1,7 @@
 /* The walk's plan with feet and a centre of mass that follow it exactly: where the feet go, for how
  * long, and that the targets are each other's derivatives. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "control/walk.h"
+#include "kit.h"
 
 #define DT 0.0025
 

@@ -1,17 +1,8 @@
 /* The wrench's program against mechanics, and its solution against the conditions of Karush, Kuhn
  * and Tucker, on random feet and wrenches. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "base/random.h"
 #include "control/wrench.h"
+#include "kit.h"
 
 #define WEIGHT 325.0 /* [N] */
 

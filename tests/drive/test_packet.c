@@ -1,23 +1,14 @@
 /* The packets, byte by byte as docs/drive.md says, and what is refused; the histogram; the
  * gamepad. */
 #include <linux/joystick.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 #include "base/random.h"
 #include "deploy/drive/input.h"
 #include "deploy/drive/packet.h"
 #include "deploy/drive/times.h"
+#include "kit.h"
 
 #define SA01_CRC 0x974b2030u
 #define SA01_TEXT "974b2030"

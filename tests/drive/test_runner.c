@@ -1,17 +1,8 @@
 /* The runner with time that the test gives: its targets are those of the task's own environment;
  * lost, late, old and damaged packets; a dead robot; limits. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "base/random.h"
 #include "deploy/drive/runner.h"
+#include "kit.h"
 #include "run/eval/scene.h"
 #include "sa01.h"
 

@@ -5,15 +5,8 @@
  * acceleration a has |a_i| <= sqrt((M^-1)_ii a^T M a), and so on for velocities, forces f with
  * sqrt(M_ii f^T M^-1 f) and twists with sqrt(A_rr v^T M v); entries of M and A relate to the
  * diagonal, M_ij to sqrt(M_ii M_jj). So a light ankle is not hidden behind a heavy trunk. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-
-#include <cmocka.h>
-
 #include "cases.h"
+#include "kit.h"
 #include "oracle.h"
 
 #include "control/stand.h"

@@ -2,22 +2,12 @@
 #ifndef TEST_FOLLOW_H
 #define TEST_FOLLOW_H
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "device/device.h"
 #include "env/backend.h"
 #include "env/task/ground.h"
 #include "episode.h"
 #include "ground/batch/batch.h"
+#include "kit.h"
 #include "sa01.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"

@@ -1,10 +1,5 @@
 /* Frames in 16 bits, as IEEE 754 has them. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "kit.h"
 
 #define TASK_ON_DEVICE
 #include "env/task/lanes.h"

@@ -1,11 +1,6 @@
 /* Which kernels of a build a robot takes: the first that fit, and envs_are_slow says when those are
  * for any robot. The table of the build is not linked here, this one stands in its place. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "kit.h"
 
 #define MILD_REAL_FLOAT
 #include "env/backend.h"

@@ -1,14 +1,7 @@
 /* Memory of a robot: what SA01 takes of a device under the default task, by the text that is
  * compiled for it (sa01.c), and not more than it may. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-
-#include <cmocka.h>
-
 #include "env/backend.h"
+#include "kit.h"
 #include "mild/batch.h"
 #include "sa01.h"
 

@@ -1,15 +1,6 @@
 /* The environments for other learners: the numbers of Envs, and errors. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "envs_kit.h"
+#include "kit.h"
 #include "run/config/experiment_keys.h"
 #include "run/envs/envs.h"
 #include "sa01.h"

@@ -2,18 +2,8 @@
 #ifndef EVAL_KIT_H
 #define EVAL_KIT_H
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "env/task/policy_keys.h"
+#include "kit.h"
 #include "learn/policy.h"
 #include "run/eval/eval.h"
 #include "sa01.h"

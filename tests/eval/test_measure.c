@@ -1,16 +1,6 @@
 /* Evaluation's measures on a walk whose numbers are worked out by hand: no simulator, a script of
  * forces, torques and positions. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
+#include "kit.h"
 #include "run/eval/eval.h"
 #include "sa01.h"
 

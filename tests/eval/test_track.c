@@ -1,15 +1,7 @@
 /* The track of a trial: the centre of mass from the engine's bodies, angles of a turned base, and
  * the CSV. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "kit.h"
 
-#include <cmocka.h>
 #include <mujoco/mujoco.h>
 
 #include "run/eval/track.h"

@@ -3,17 +3,7 @@
 #ifndef GROUND_KIT_H
 #define GROUND_KIT_H
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
+#include "kit.h"
 #include "mild/ground.h"
 
 #define KIT_PITCH 0.0195

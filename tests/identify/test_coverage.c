@@ -2,19 +2,9 @@
  * everything fitted that they tell. Usage: lab_test_coverage [DRAWS [GROUND]]; 200 draws take a
  * minute and a half and have a standard deviation of 1.5 %. Prints a table: for each kind of noise
  * the share of intervals that hold the truth and, in brackets, that are bounded on both sides. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "base/random.h"
 #include "identify/fit.h"
+#include "kit.h"
 
 enum { ROWS = 300, RECORDS = 3, NOISES = 3 };
 typedef enum { NOISE_PEAK, NOISE_ROW, NOISE_SLOW } Noise;

@@ -2,19 +2,11 @@
  * search that knows nothing of the fit, and what the data cannot tell has no value. Every noise is
  * seeded. test_coverage.c counts how often the intervals hold the truth. */
 #include <float.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 #include "base/random.h"
 #include "base/student.h"
 #include "identify/fit.h"
+#include "kit.h"
 
 enum { ROWS = 1000, SEEDS = 5 };
 typedef enum {

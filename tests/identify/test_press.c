@@ -1,16 +1,6 @@
 /* The press against the closed law of its elements, and what each kind of ground gives back. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "identify/press.h"
+#include "kit.h"
 
 static PressResult result;
 

@@ -2,14 +2,8 @@
 #ifndef MILD_TEST_LEARN_CHECK_H
 #define MILD_TEST_LEARN_CHECK_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "base/random.h"
+#include "kit.h"
 #include "learn/policy.h"
 
 /* A network small enough for differences and large enough to hold every feature. */

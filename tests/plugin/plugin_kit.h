@@ -2,16 +2,7 @@
 #ifndef PLUGIN_KIT_H
 #define PLUGIN_KIT_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
+#include "kit.h"
 #include "plugin/plugin.h"
 
 static char kit_said[1000]; /* MuJoCo's last warning or error, from compilation or after */

@@ -1,11 +1,6 @@
 /* The shared library as MuJoCo loads it, with the example: what a user does first. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
+#include "kit.h"
 
-#include <cmocka.h>
 #include <mujoco/mujoco.h>
 
 static void example_stands(void **state) {

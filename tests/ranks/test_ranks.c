@@ -1,19 +1,9 @@
 /* Every call of ranks.h, alone and, started by mpirun (app/test_ranks.sh), among 2, 4 and 8
  * processes: each computes what all should get by itself, and compares. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "base/random.h"
 #include "device/ranks/device.h"
 #include "device/ranks/ranks.h"
+#include "kit.h"
 
 enum { SHARDS = 8, COUNT = 40001 }; /* more than one block, and no multiple of one */
 

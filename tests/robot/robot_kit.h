@@ -3,17 +3,9 @@
 #ifndef ROBOT_KIT_H
 #define ROBOT_KIT_H
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-
-#include <cmocka.h>
-
 #include "base/random.h"
 #include "control/stand.h"
+#include "kit.h"
 #include "robot/robot.h"
 #include "sa01.h"
 
@@ -66,12 +58,6 @@ static inline MildMaterial preset(const char *name) {
 static inline MildTerrain preset_terrain(const char *name) {
     MildMaterial material = preset(name);
     return mild_terrain_uniform(&material);
-}
-
-static inline void expect_near(const char *what, double got, double wanted, double tolerance) {
-    if (!(fabs(got - wanted) <= tolerance)) {
-        fail_msg("%s: %.10g, not %.10g +- %.1e", what, got, wanted, tolerance);
-    }
 }
 
 /* Joints a little off their places, all of it in motion. */

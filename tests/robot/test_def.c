@@ -1,18 +1,9 @@
 /* robot.ini as text: every key of a made-up robot comes back, defaults included; what is missing,
  * twice, too much or inconsistent is refused with the line or the key in the message. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
+#include "kit.h"
 #include "robot/def.h"
 
 /* Two flat feet that alternate; numbers all different. Keys with defaults are left out of it. */

@@ -2,18 +2,12 @@
  * neither handlers nor descriptors; errors outside of a call reach the program as one line. */
 #include <errno.h>
 #include <fcntl.h>
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cmocka.h>
+#include "kit.h"
+
 #include <mujoco/mujoco.h>
 
 #include "robot/engine.h"

@@ -1,16 +1,8 @@
 /* The model file against the published numbers: robots/sa01/sa01.json, read here independently of
  * MuJoCo. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
-#include <cmocka.h>
+#include "kit.h"
 
 #include <cjson/cJSON.h>
 #include <mujoco/mujoco.h>
@@ -255,26 +247,24 @@ static int teardown(void **unused) {
     return 0;
 }
 
-static void near(double value, double expected, double tolerance, const char *what) {
-    if (!(fabs(value - expected) <= tolerance)) {
-        fail_msg("%s: %.9g instead of %.9g", what, value, expected);
-    }
-}
-
 static void test_limits_and_masses(void **unused) {
     (void)unused;
-    near(robot_total_mass(robot), number(numbers, "total_mass_kg"), 1e-9, "total mass");
+    expect_near("total mass", robot_total_mass(robot), number(numbers, "total_mass_kg"), 1e-9);
     const mjModel *m = robot_sim_model(sim);
     const cJSON *joints = cJSON_GetObjectItem(numbers, "joints");
     for (int i = 0; i < SA01_JOINTS; i++) {
         const cJSON *joint = cJSON_GetArrayItem(joints, i),
                     *range = cJSON_GetObjectItem(joint, "mjcf_range");
-        near(robot_joint_low(robot)[i], cJSON_GetArrayItem(range, 0)->valuedouble, 1e-12, "low");
-        near(robot_joint_high(robot)[i], cJSON_GetArrayItem(range, 1)->valuedouble, 1e-12, "high");
-        near(robot_effort(robot)[i], number(joint, "effort_Nm"), 1e-12, "effort");
-        near(robot_default_pose(robot)[i], number(joint, "q_default_training"), 1e-12, "pose");
-        near(m->dof_armature[6 + i], number(joint, "mjcf_armature"), 1e-12, "armature");
-        near(m->dof_damping[6 + i] + m->dof_frictionloss[6 + i], 0.0, 0.0, "damping and friction");
+        expect_near("low", robot_joint_low(robot)[i], cJSON_GetArrayItem(range, 0)->valuedouble,
+                    1e-12);
+        expect_near("high", robot_joint_high(robot)[i], cJSON_GetArrayItem(range, 1)->valuedouble,
+                    1e-12);
+        expect_near("effort", robot_effort(robot)[i], number(joint, "effort_Nm"), 1e-12);
+        expect_near("pose", robot_default_pose(robot)[i], number(joint, "q_default_training"),
+                    1e-12);
+        expect_near("armature", m->dof_armature[6 + i], number(joint, "mjcf_armature"), 1e-12);
+        expect_near("damping and friction", m->dof_damping[6 + i] + m->dof_frictionloss[6 + i], 0.0,
+                    0.0);
         assert_string_equal(mj_id2name(m, mjOBJ_JOINT, 1 + i),
                             cJSON_GetObjectItem(joint, "name")->valuestring);
     }
@@ -293,13 +283,15 @@ static void test_standing(void **unused) {
     robot_sim_load(sim, &state, &nominal);
     const mjModel *m = robot_sim_model(sim);
     const mjData *d = robot_sim_data(sim);
-    near(robot_stand_height(robot), number(expected, "base_above_sole"), 1e-6, "base above sole");
-    near(d->subtree_com[3 + 2], number(expected, "com_above_sole"), 1e-6, "com above sole");
-    near(robot_sim_foot(sim, 0)->sole_height, 0.0, 1e-12, "left sole");
-    near(robot_sim_foot(sim, 1)->sole_height, 0.0, 1e-12, "right sole");
+    expect_near("base above sole", robot_stand_height(robot), number(expected, "base_above_sole"),
+                1e-6);
+    expect_near("com above sole", d->subtree_com[3 + 2], number(expected, "com_above_sole"), 1e-6);
+    expect_near("left sole", robot_sim_foot(sim, 0)->sole_height, 0.0, 1e-12);
+    expect_near("right sole", robot_sim_foot(sim, 1)->sole_height, 0.0, 1e-12);
     for (int k = 0; k < 3; k++) {
-        near(robot_sim_foot(sim, 0)->position[k] - state.qpos[k], ankle[k], 1e-6, "left ankle");
-        near(d->subtree_com[3 + k] - state.qpos[k], com[k], 1e-6, "com in base");
+        expect_near("left ankle", robot_sim_foot(sim, 0)->position[k] - state.qpos[k], ankle[k],
+                    1e-6);
+        expect_near("com in base", d->subtree_com[3 + k] - state.qpos[k], com[k], 1e-6);
     }
     link_poses(state.qpos, position, turn);
     for (int b = 1; b < m->nbody;
@@ -322,8 +314,8 @@ static void test_standing(void **unused) {
     }
     const cJSON *rows = cJSON_GetObjectItem(expected, "composite_inertia_about_com");
     for (int k = 0; k < 9; k++) {
-        near(inertia[k], cJSON_GetArrayItem(cJSON_GetArrayItem(rows, k / 3), k % 3)->valuedouble,
-             2e-6, "composite inertia");
+        expect_near("composite inertia", inertia[k],
+                    cJSON_GetArrayItem(cJSON_GetArrayItem(rows, k / 3), k % 3)->valuedouble, 2e-6);
     }
 }
 
@@ -359,14 +351,14 @@ static void test_variation(void **unused) {
     RobotState state = stand_state();
     robot_sim_load(sim, &state, &varied);
     const mjModel *m = robot_sim_model(sim);
-    near(m->body_subtreemass[1], robot_total_mass(robot) + 2.5 + 0.2 * tree.mass[4], 1e-9,
-         "varied mass");
-    near(m->body_ipos[3], tree.com[0][0] + 0.01, 1e-12, "varied com");
-    near(m->dof_armature[6], 0.021, 1e-12, "varied armature");
-    near(m->pair_friction[0], 0.33, 1e-12, "varied friction");
+    expect_near("varied mass", m->body_subtreemass[1],
+                robot_total_mass(robot) + 2.5 + 0.2 * tree.mass[4], 1e-9);
+    expect_near("varied com", m->body_ipos[3], tree.com[0][0] + 0.01, 1e-12);
+    expect_near("varied armature", m->dof_armature[6], 0.021, 1e-12);
+    expect_near("varied friction", m->pair_friction[0], 0.33, 1e-12);
     robot_sim_load(sim, &state, &nominal);
-    near(m->body_subtreemass[1], robot_total_mass(robot), 1e-12, "mass back");
-    near(m->pair_friction[0], 0.8, 1e-12, "friction back");
+    expect_near("mass back", m->body_subtreemass[1], robot_total_mass(robot), 1e-12);
+    expect_near("friction back", m->pair_friction[0], 0.8, 1e-12);
 }
 
 /* Writes `text` with `from` as `to` into a file. */

@@ -17,12 +17,6 @@ static const char *const shells[3] = {"base_link", "leg_l4_link", "leg_r4_link"}
 /* Middle of each sole's bounds in its foot's frame: 60 mm ahead, 5.5 mm outward, 55 mm below. */
 static const double middle[SA01_FEET][3] = {{0.06, 0.0055, -0.055}, {0.06, -0.0055, -0.055}};
 
-static void near(const char *what, int i, double got, double wanted, double tolerance) {
-    if (!(fabs(got - wanted) <= tolerance)) {
-        fail_msg("%s %d: %.12g instead of %.12g", what, i, got, wanted);
-    }
-}
-
 /* Anywhere, turned any way about z and up to `tilt` otherwise, bent within the joints' ranges. */
 static RobotState draw_state(uint32_t draw, double height, double tilt) {
     Random r = random_at(41, draw, 0);
@@ -98,16 +92,16 @@ static void check_foot(const RobotSim *sim, const mjModel *m, const mjData *d, i
     point_velocity(m, d, body, ankle, twist, twist + 3);
     point_velocity(m, d, body, center, at_center, turning);
     for (int k = 0; k < 3; k++) {
-        near("ankle", k, foot->position[k], ankle[k], 1e-12);
-        near("sole's centre", k, foot->sole_center[k], center[k], 1e-4);
-        near("its velocity", k, foot->sole_center_velocity[k], at_center[k], 1e-3);
-        near("force before a step", k, foot->force[k], 0, 0);
+        expect_entry("ankle", k, foot->position[k], ankle[k], 1e-12);
+        expect_entry("sole's centre", k, foot->sole_center[k], center[k], 1e-4);
+        expect_entry("its velocity", k, foot->sole_center_velocity[k], at_center[k], 1e-3);
+        expect_entry("force before a step", k, foot->force[k], 0, 0);
     }
     for (int k = 0; k < 9; k++) {
-        near("foot's rotation", k, foot->rotation[k], d->xmat[9 * body + k], 1e-12);
+        expect_entry("foot's rotation", k, foot->rotation[k], d->xmat[9 * body + k], 1e-12);
     }
     for (int k = 0; k < 6; k++) {
-        near("twist", k, foot->velocity[k], twist[k], 1e-12);
+        expect_entry("twist", k, foot->velocity[k], twist[k], 1e-12);
     }
 }
 
@@ -133,9 +127,10 @@ static void test_feet(void **unused) {
             for (int f = 0; f < SA01_FEET; f++) {
                 double low = lowest_point(m, d, f, grounds[g]);
                 wanted = fmin(wanted, low);
-                near("height of a sole", f, robot_sim_foot(sim, f)->sole_height, low, 1e-12);
+                expect_entry("height of a sole", f, robot_sim_foot(sim, f)->sole_height, low,
+                             1e-12);
             }
-            near("clearance", g, grounds[g] ? least : wanted, wanted, 1e-12);
+            expect_entry("clearance", g, grounds[g] ? least : wanted, wanted, 1e-12);
         }
         check_foot(sim, m, d, 0);
         check_foot(sim, m, d, 1);
@@ -163,8 +158,8 @@ static void test_feet_after_a_step(void **unused) {
         mjData *d = engine_at(m, robot_sim_qpos(sim), robot_sim_qvel(sim));
         for (int f = 0; f < SA01_FEET; f++) {
             check_foot(sim, m, d, f);
-            near("height", f, robot_sim_foot(sim, f)->sole_height, lowest_point(m, d, f, &wavy),
-                 1e-12);
+            expect_entry("height", f, robot_sim_foot(sim, f)->sole_height,
+                         lowest_point(m, d, f, &wavy), 1e-12);
         }
         mj_deleteData(d);
     }
@@ -217,7 +212,8 @@ static void test_clearance_of_the_shells(void **unused) {
                 least = fmin(least, clearance);
             }
             lowest[which]++;
-            near("clearance", (int)draw, robot_sim_body_clearance(sim, terrain), least, 1e-9);
+            expect_entry("clearance", (int)draw, robot_sim_body_clearance(sim, terrain), least,
+                         1e-9);
         }
         mj_deleteData(d);
     }
@@ -245,14 +241,16 @@ static void test_lateral_distances(void **unused) {
         mju_cross(left, z, ahead);
         mju_sub3(between, d->xpos + 3 * mj_name2id(m, mjOBJ_BODY, knees[0]),
                  d->xpos + 3 * mj_name2id(m, mjOBJ_BODY, knees[1]));
-        near("knees", (int)draw, robot_sim_knee_distance(sim), mju_dot3(between, left), 1e-12);
+        expect_entry("knees", (int)draw, robot_sim_knee_distance(sim), mju_dot3(between, left),
+                     1e-12);
         for (int f = 0; f < SA01_FEET; f++) {
             int body = mj_name2id(m, mjOBJ_BODY, feet[f]);
             mju_mulMatVec3(sole[f], d->xmat + 9 * body, middle[f]);
             mju_addTo3(sole[f], d->xpos + 3 * body);
         }
         mju_sub3(between, sole[0], sole[1]);
-        near("feet", (int)draw, robot_sim_foot_distance(sim), mju_dot3(between, left), 2e-4);
+        expect_entry("feet", (int)draw, robot_sim_foot_distance(sim), mju_dot3(between, left),
+                     2e-4);
         mj_deleteData(d);
     }
     RobotState up = draw_state(1, 1, 0);
@@ -297,9 +295,9 @@ static void test_soft_step_in_the_air(void **unused) {
         }
         for (int i = 0; i < SA01_NV; i++) {
             worst = fmax(worst, fabs(d->qvel[i] - robot_sim_qvel(sim)[i]));
-            near("position", i, robot_sim_qpos(sim)[i], d->qpos[i], 1e-10);
+            expect_entry("position", i, robot_sim_qpos(sim)[i], d->qpos[i], 1e-10);
         }
-        near("time", joint, ((const mjData *)robot_sim_data(sim))->time, 0.004, 1e-12);
+        expect_entry("time", joint, ((const mjData *)robot_sim_data(sim))->time, 0.004, 1e-12);
         mj_deleteData(d);
     }
     print_message("soft step in the air against mj_step: worst %.1e\n", worst);
@@ -385,7 +383,7 @@ static void test_load_and_store(void **unused) {
     assert_memory_equal(robot_sim_contact(sim), &none, sizeof none);
     for (int f = 0; f < SA01_FEET; f++) {
         for (int k = 0; k < 3; k++) {
-            near("force", k, robot_sim_foot(sim, f)->force[k], 0, 0);
+            expect_entry("force", k, robot_sim_foot(sim, f)->force[k], 0, 0);
         }
         assert_int_equal(robot_sim_foot(sim, f)->result.contacts, 0);
     }
@@ -403,7 +401,7 @@ static void test_new_workspace(void **unused) {
     const double base[7] = {0, 0, robot_stand_height(robot), 1, 0, 0, 0};
     assert_memory_equal(q, base, sizeof base);
     assert_memory_equal(q + 7, robot_default_pose(robot), sizeof(double) * SA01_JOINTS);
-    near("sole", 0, robot_sim_foot(sim, 0)->sole_height, 0, 1e-9);
+    expect_entry("sole", 0, robot_sim_foot(sim, 0)->sole_height, 0, 1e-9);
     for (int i = 0; i < SA01_NV; i++) {
         assert_true(robot_sim_qvel(sim)[i] == 0);
     }
@@ -476,8 +474,8 @@ static void expect_normal(const mjModel *m, const mjContact *contact, const Mild
     double reach = 0.5 * contact->dist + m->geom_size[3 * contact->geom[1]], slope[2];
     mild_terrain_slope_at(terrain, contact->pos[0] + reach * normal[0],
                           contact->pos[1] + reach * normal[1], slope);
-    near("slope along x", 0, -normal[0] / normal[2], slope[0], 1e-9);
-    near("slope along y", 1, -normal[1] / normal[2], slope[1], 1e-9);
+    expect_entry("slope along x", 0, -normal[0] / normal[2], slope[0], 1e-9);
+    expect_entry("slope along y", 1, -normal[1] / normal[2], slope[1], 1e-9);
 }
 
 /* Contact by contact from the engine's data: a contact's force is on its second geom; ours acts on
@@ -520,14 +518,14 @@ static void check_zmp(const MildFootResult *r, const double rotation[9], const d
     mju_mulMatVec3(down, rotation, center);
     const double point[3] = {r->zmp_sole[0], r->zmp_sole[1], down[2]};
     mju_cross(moment, point, r->force);
-    near("level moment", 0, r->torque[0] - moment[0], 0, 1e-9 * (1 + fabs(r->torque[0])));
-    near("level moment", 1, r->torque[1] - moment[1], 0, 1e-9 * (1 + fabs(r->torque[1])));
-    near("axis across the force", 0, mju_dot3(r->zmp_axis, r->force), 0, 1e-9);
+    expect_entry("level moment", 0, r->torque[0] - moment[0], 0, 1e-9 * (1 + fabs(r->torque[0])));
+    expect_entry("level moment", 1, r->torque[1] - moment[1], 0, 1e-9 * (1 + fabs(r->torque[1])));
+    expect_entry("axis across the force", 0, mju_dot3(r->zmp_axis, r->force), 0, 1e-9);
     mju_cross(moment, r->zmp_axis, r->force);
     mju_sub3(rest, r->torque, moment);
     mju_scl3(along, r->force, mju_dot3(r->force, r->torque) / square);
     for (int k = 0; k < 3; k++) {
-        near("moment along the force", k, rest[k], along[k], 1e-8);
+        expect_entry("moment along the force", k, rest[k], along[k], 1e-8);
     }
 }
 
@@ -536,20 +534,21 @@ static void check_rigid(const RobotSim *sim, const Sum *sum, int f, const double
     const RobotFoot *foot = robot_sim_foot(sim, f);
     assert_int_equal(r->contacts, sum->contacts);
     for (int k = 0; k < 3; k++) {
-        near("force", k, r->force[k], sum->force[k], 1e-9);
-        near("torque", k, r->torque[k], sum->torque[k], 1e-9);
-        near("force of the foot", k, foot->force[k], r->force[k], 0);
-        near("torque of the foot", k, foot->torque[k], r->torque[k], 0);
+        expect_entry("force", k, r->force[k], sum->force[k], 1e-9);
+        expect_entry("torque", k, r->torque[k], sum->torque[k], 1e-9);
+        expect_entry("force of the foot", k, foot->force[k], r->force[k], 0);
+        expect_entry("torque of the foot", k, foot->torque[k], r->torque[k], 0);
     }
     assert_memory_equal(&foot->result, r, sizeof *r);
-    near("greatest depth", f, r->depth_max, sum->depth_max, 1e-12);
+    expect_entry("greatest depth", f, r->depth_max, sum->depth_max, 1e-12);
     if (sum->contacts == 0) {
-        near("mean depth", f, r->depth_mean, 0, 0);
+        expect_entry("mean depth", f, r->depth_mean, 0, 0);
         return;
     }
-    near("mean depth", f, r->depth_mean, sum->depth_sum / sum->contacts, 1e-12);
+    expect_entry("mean depth", f, r->depth_mean, sum->depth_sum / sum->contacts, 1e-12);
     for (int k = 0; k < 3; k++) {
-        near("centre of pressure", k, r->pressure_center[k], sum->pressure[k] / sum->load, 1e-12);
+        expect_entry("centre of pressure", k, r->pressure_center[k], sum->pressure[k] / sum->load,
+                     1e-12);
     }
     check_zmp(r, rotation, middle[f]);
 }
@@ -580,8 +579,8 @@ static int check_rigid_step(RobotSim *sim, const MildTerrain *terrain, int loade
         point_velocity(m, start, mj_name2id(m, mjOBJ_BODY, feet[f]), ankle[f], twist[f],
                        twist[f] + 3);
         for (int k = 0; k < 6; k++) {
-            near("twist at the end", k, robot_sim_contact(sim)->velocity[6 * f + k], twist[f][k],
-                 1e-9);
+            expect_entry("twist at the end", k, robot_sim_contact(sim)->velocity[6 * f + k],
+                         twist[f][k], 1e-9);
         }
         loaded[f] += sum[f].contacts > 0;
         partly += sum[f].contacts > 0 && sum[f].contacts < 4;

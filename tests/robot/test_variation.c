@@ -13,12 +13,6 @@ static const char *const links[1 + SA01_JOINTS] = {
     "leg_l5_link", "leg_l6_link", "leg_r1_link", "leg_r2_link", "leg_r3_link",
     "leg_r4_link", "leg_r5_link", "leg_r6_link"};
 
-static void near(const char *what, int i, double got, double wanted, double tolerance) {
-    if (!(fabs(got - wanted) <= tolerance)) {
-        fail_msg("%s %d: %.12g instead of %.12g", what, i, got, wanted);
-    }
-}
-
 /* All numbers different; draw 0 is nominal. */
 static RobotVariation draw_variation(uint32_t draw) {
     RobotVariation v = robot_variation_nominal();
@@ -44,12 +38,12 @@ static double check_link(const mjModel *m, const mjModel *plain, int i, const Ro
     int body = mj_name2id(m, mjOBJ_BODY, links[i]);
     assert_true(body > 0 && mj_name2id(plain, mjOBJ_BODY, links[i]) == body);
     double mass = plain->body_mass[body] * v->link_mass_scale[i] + (i == 0 ? v->base_mass_add : 0);
-    near("mass of link", i, m->body_mass[body], mass, 1e-12);
+    expect_entry("mass of link", i, m->body_mass[body], mass, 1e-12);
     for (int k = 0; k < 3; k++) {
         double inertia = plain->body_inertia[3 * body + k] * mass / plain->body_mass[body];
-        near("inertia of link", i, m->body_inertia[3 * body + k], inertia, 1e-12);
+        expect_entry("inertia of link", i, m->body_inertia[3 * body + k], inertia, 1e-12);
         double at = plain->body_ipos[3 * body + k] + (i == 0 ? v->com_offset[k] : 0);
-        near("centre of mass of link", i, m->body_ipos[3 * body + k], at, 1e-15);
+        expect_entry("centre of mass of link", i, m->body_ipos[3 * body + k], at, 1e-15);
     }
     return mass;
 }
@@ -62,12 +56,13 @@ static void check_subtrees(const mjModel *m, const double *mass) {
         for (int i = 6 * (leg + 1); i > 6 * leg; i--) {
             below += mass[i];
             int body = mj_name2id(m, mjOBJ_BODY, links[i]);
-            near("mass from link", i, m->body_subtreemass[body], below, 1e-12);
+            expect_entry("mass from link", i, m->body_subtreemass[body], below, 1e-12);
         }
         total += below;
     }
-    near("mass of all", 0, m->body_subtreemass[mj_name2id(m, mjOBJ_BODY, links[0])], total, 1e-12);
-    near("mass of the world", 0, m->body_subtreemass[0], total, 1e-12);
+    expect_entry("mass of all", 0, m->body_subtreemass[mj_name2id(m, mjOBJ_BODY, links[0])], total,
+                 1e-12);
+    expect_entry("mass of the world", 0, m->body_subtreemass[0], total, 1e-12);
 }
 
 static void test_numbers(void **unused) {
@@ -89,17 +84,18 @@ static void test_numbers(void **unused) {
         check_subtrees(m, mass);
         for (int i = 0; i < SA01_NV; i++) {
             double scale = i < 6 ? 1 : v.armature_scale;
-            near("armature", i, m->dof_armature[i], scale * plain->dof_armature[i], 1e-15);
+            expect_entry("armature", i, m->dof_armature[i], scale * plain->dof_armature[i], 1e-15);
         }
         assert_int_equal(m->npair, 8);
         for (int p = 0; p < m->npair; p++) {
             const double *solref = m->pair_solref + mjNREF * p;
             const double *own = plain->pair_solref + mjNREF * p;
-            near("time constant", p, solref[0], v.rigid_time > 0 ? v.rigid_time : own[0], 0);
-            near("damping ratio", p, solref[1], v.rigid_time > 0 ? 1 : own[1], 0);
+            expect_entry("time constant", p, solref[0], v.rigid_time > 0 ? v.rigid_time : own[0],
+                         0);
+            expect_entry("damping ratio", p, solref[1], v.rigid_time > 0 ? 1 : own[1], 0);
             for (int c = 0; c < 5; c++) {
                 double wanted = c < 2 ? v.rigid_friction : plain->pair_friction[5 * p + c];
-                near("friction", 5 * p + c, m->pair_friction[5 * p + c], wanted, 0);
+                expect_entry("friction", 5 * p + c, m->pair_friction[5 * p + c], wanted, 0);
             }
         }
     }

@@ -1,15 +1,7 @@
 /* A robot made up here: two legs behind a waist joint that both feet share. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
-#include <cmocka.h>
+#include "kit.h"
 
 #include <mujoco/mujoco.h>
 

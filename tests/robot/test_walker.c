@@ -2,17 +2,10 @@
  * that moves both legs, a neck that moves none, one flat and one round foot, shells of every kind:
  * what the code finds out about it, its feet against the engine's Jacobians, its step against the
  * engine's. And what makes it refused. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
-#include <cmocka.h>
+#include "kit.h"
+
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"
@@ -102,12 +95,6 @@ static int teardown(void **unused) {
     return rmdir(folder);
 }
 
-static void near(const char *what, int i, double got, double wanted, double tolerance) {
-    if (!(fabs(got - wanted) <= tolerance)) {
-        fail_msg("%s %d: %.12g instead of %.12g", what, i, got, wanted);
-    }
-}
-
 /* ---- what is known of it ---- */
 
 static void test_names(void **unused) {
@@ -133,18 +120,18 @@ static void test_joints(void **unused) {
         assert_int_equal(robot_joint_dof(robot)[i], dof_of[i]);
         assert_int_equal(robot_joint_foot(robot)[i], foot[i]);
         assert_int_equal(robot_mirror_joint(robot)[i], image[i]);
-        near("mirror_sign", i, robot_mirror_sign(robot)[i], sign[i], 0);
-        near("pose", i, robot_default_pose(robot)[i], pose[i], 0);
-        near("low", i, robot_joint_low(robot)[i], i == 2 ? -1.5 : -2, 0);
-        near("high", i, robot_joint_high(robot)[i], i == 2 ? 1.4 : 2, 0);
-        near("effort", i, robot_effort(robot)[i], effort[i], 0);
-        near("speed", i, robot_speed(robot)[i], i + 1, 0);
-        near("kp", i, robot_kp(robot)[i], i + 1, 0);
-        near("kd", i, robot_kd(robot)[i], 0.1 * (i + 1), 1e-12);
-        near("stand_kp", i, robot_stand_kp(robot)[i], i + 1, 0);
-        near("stand_kd", i, robot_stand_kd(robot)[i], 0.1 * (i + 1), 1e-12);
-        near("swing", i, robot_swing(robot)[i], swing[i], 0);
-        near("still", i, robot_still(robot)[i], still[i], 0);
+        expect_entry("mirror_sign", i, robot_mirror_sign(robot)[i], sign[i], 0);
+        expect_entry("pose", i, robot_default_pose(robot)[i], pose[i], 0);
+        expect_entry("low", i, robot_joint_low(robot)[i], i == 2 ? -1.5 : -2, 0);
+        expect_entry("high", i, robot_joint_high(robot)[i], i == 2 ? 1.4 : 2, 0);
+        expect_entry("effort", i, robot_effort(robot)[i], effort[i], 0);
+        expect_entry("speed", i, robot_speed(robot)[i], i + 1, 0);
+        expect_entry("kp", i, robot_kp(robot)[i], i + 1, 0);
+        expect_entry("kd", i, robot_kd(robot)[i], 0.1 * (i + 1), 1e-12);
+        expect_entry("stand_kp", i, robot_stand_kp(robot)[i], i + 1, 0);
+        expect_entry("stand_kd", i, robot_stand_kd(robot)[i], 0.1 * (i + 1), 1e-12);
+        expect_entry("swing", i, robot_swing(robot)[i], swing[i], 0);
+        expect_entry("still", i, robot_still(robot)[i], still[i], 0);
     }
 }
 
@@ -152,22 +139,22 @@ static void test_feet_and_body(void **unused) {
     (void)unused;
     for (int f = 0; f < FEET; f++) {
         assert_int_equal(robot_mirror_foot(robot, f), 1 - f);
-        near("offset", f, robot_gait_offset(robot, f), f ? 0.6 : 0.1, 0);
-        near("feet_range", f, robot_feet_range(robot)[f], f ? 0.3 : 0.1, 0);
-        near("knee_range", f, robot_knee_range(robot)[f], f ? 0.35 : 0.15, 0);
+        expect_entry("offset", f, robot_gait_offset(robot, f), f ? 0.6 : 0.1, 0);
+        expect_entry("feet_range", f, robot_feet_range(robot)[f], f ? 0.3 : 0.1, 0);
+        expect_entry("knee_range", f, robot_knee_range(robot)[f], f ? 0.35 : 0.15, 0);
     }
     assert_int_equal(robot_ankle(robot, FLAT), 3);
     assert_int_equal(robot_ankle(robot, ROUND), -1);
-    near("shift", 0, robot_mirror_shift(robot), 0.5, 1e-15);
-    near("mass", 0, robot_total_mass(robot), 22.9, 1e-9);
-    near("load of a foot", 0, robot_foot_load(robot), 22.9 * 10 / 2, 1e-9);
-    near("height", 0, robot_nominal_height(robot), 0.6, 0);
-    near("action_scale", 0, robot_action_scale(robot), 0.3, 0);
-    near("foot_force", 0, robot_foot_force(robot), 300, 0);
-    near("least", 0, robot_feet_least(robot), 0.07, 0);
-    near("least", 1, robot_knee_least(robot), 0.08, 0);
-    near("assist", 3, robot_assist(robot)[3], 20, 0);
-    near("assist", 0, robot_assist(robot)[0], 100, 0);
+    expect_entry("shift", 0, robot_mirror_shift(robot), 0.5, 1e-15);
+    expect_entry("mass", 0, robot_total_mass(robot), 22.9, 1e-9);
+    expect_entry("load of a foot", 0, robot_foot_load(robot), 22.9 * 10 / 2, 1e-9);
+    expect_entry("height", 0, robot_nominal_height(robot), 0.6, 0);
+    expect_entry("action_scale", 0, robot_action_scale(robot), 0.3, 0);
+    expect_entry("foot_force", 0, robot_foot_force(robot), 300, 0);
+    expect_entry("least", 0, robot_feet_least(robot), 0.07, 0);
+    expect_entry("least", 1, robot_knee_least(robot), 0.08, 0);
+    expect_entry("assist", 3, robot_assist(robot)[3], 20, 0);
+    expect_entry("assist", 0, robot_assist(robot)[0], 100, 0);
 }
 
 /* Base above the lower of the soles in the default pose: the flat one hangs 0.1 + 0.3 cos 0.2 twice
@@ -176,16 +163,17 @@ static void test_stand_height(void **unused) {
     (void)unused;
     double flat = 0.1 + 0.6 * cos(0.2) + 0.05;
     double ball = 0.1 + 0.6 * cos(0.25) + 0.03 * cos(0.25) + 0.01 * sin(0.25) + 0.04;
-    near("stand height", 0, robot_stand_height(robot), fmax(flat, ball), 1e-12);
+    expect_entry("stand height", 0, robot_stand_height(robot), fmax(flat, ball), 1e-12);
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
     assert_non_null(sim);
-    near("lowest sole", 0,
-         fmin(robot_sim_foot(sim, 0)->sole_height, robot_sim_foot(sim, 1)->sole_height), 0, 1e-12);
-    near("flat", 0, robot_sim_foot(sim, FLAT)->sole_height, robot_stand_height(robot) - flat,
-         1e-12);
-    near("ball", 0, robot_sim_foot(sim, ROUND)->sole_height, robot_stand_height(robot) - ball,
-         1e-12);
+    expect_entry("lowest sole", 0,
+                 fmin(robot_sim_foot(sim, 0)->sole_height, robot_sim_foot(sim, 1)->sole_height), 0,
+                 1e-12);
+    expect_entry("flat", 0, robot_sim_foot(sim, FLAT)->sole_height,
+                 robot_stand_height(robot) - flat, 1e-12);
+    expect_entry("ball", 0, robot_sim_foot(sim, ROUND)->sole_height,
+                 robot_stand_height(robot) - ball, 1e-12);
     robot_sim_destroy(sim);
 }
 
@@ -197,13 +185,13 @@ static void test_soles(void **unused) {
     assert_true(mild_sole_elements(soles[FLAT]) > 30);
     double area = mild_sole_elements(soles[ROUND]) * mild_sole_pitch(soles[ROUND]) *
                   mild_sole_pitch(soles[ROUND]);
-    near("area of the disc", 0, area, 3.14159 * 0.04 * 0.04, 0.0007);
+    expect_entry("area of the disc", 0, area, 3.14159 * 0.04 * 0.04, 0.0007);
     for (int i = 0; i < mild_sole_elements(soles[ROUND]); i++) {
         double x = mild_sole_x(soles[ROUND])[i], y = mild_sole_y(soles[ROUND])[i];
         assert_true(hypot(x, y) < 0.041);
     }
-    near("the disc's plane", 0, mild_sole_z(soles[ROUND]), 0, 0);
-    near("the sole's plane", 0, mild_sole_z(soles[FLAT]), -0.05, 0);
+    expect_entry("the disc's plane", 0, mild_sole_z(soles[ROUND]), 0, 0);
+    expect_entry("the sole's plane", 0, mild_sole_z(soles[FLAT]), -0.05, 0);
     robot_set_model(robot, MILD_MODEL_CON_CONE);
     assert_int_equal(mild_sole_elements(robot_soles(robot)[FLAT]), 1);
     assert_int_equal(mild_sole_elements(robot_soles(robot)[ROUND]), 1);
@@ -227,12 +215,12 @@ static void check_rigid_ground(const mjModel *m) {
         assert_int_equal(m->geom_bodyid[geom], robot_foot_body(robot, p == 3));
         assert_int_equal(m->geom_contype[geom] + m->geom_conaffinity[geom], 0);
         assert_int_equal(m->geom_type[geom], mjGEOM_SPHERE);
-        near("radius", p, m->geom_size[3 * geom], corner[p][3], 0);
+        expect_entry("radius", p, m->geom_size[3 * geom], corner[p][3], 0);
         for (int k = 0; k < 3; k++) {
-            near("corner", p, m->geom_pos[3 * geom + k], corner[p][k], 1e-12);
+            expect_entry("corner", p, m->geom_pos[3 * geom + k], corner[p][k], 1e-12);
         }
         for (int k = 0; k < 5; k++) {
-            near("friction", k, m->pair_friction[5 * p + k], friction[k], 1e-15);
+            expect_entry("friction", k, m->pair_friction[5 * p + k], friction[k], 1e-15);
         }
     }
 }
@@ -252,13 +240,14 @@ static void test_models(void **unused) {
     assert_int_equal(m->nv, NV);
     assert_int_equal(m->nbody, whole->nbody);
     for (int b = 0; b < m->nbody; b++) { /* inertia of the geoms that went */
-        near("mass", b, m->body_mass[b], whole->body_mass[b], 1e-12);
+        expect_entry("mass", b, m->body_mass[b], whole->body_mass[b], 1e-12);
         for (int k = 0; k < 3; k++) {
-            near("inertia", b, m->body_inertia[3 * b + k], whole->body_inertia[3 * b + k], 1e-12);
-            near("centre", b, m->body_ipos[3 * b + k], whole->body_ipos[3 * b + k], 1e-12);
+            expect_entry("inertia", b, m->body_inertia[3 * b + k], whole->body_inertia[3 * b + k],
+                         1e-12);
+            expect_entry("centre", b, m->body_ipos[3 * b + k], whole->body_ipos[3 * b + k], 1e-12);
         }
         for (int k = 0; k < 4; k++) {
-            near("axes", b, m->body_iquat[4 * b + k], whole->body_iquat[4 * b + k], 1e-12);
+            expect_entry("axes", b, m->body_iquat[4 * b + k], whole->body_iquat[4 * b + k], 1e-12);
         }
     }
     check_rigid_ground(m);
@@ -364,21 +353,21 @@ static void test_feet(void **unused) {
             if (f == FLAT) {
                 lowest[f] = measure_flat(d, point, middle);
             }
-            near("height", f, foot->sole_height, lowest[f], 1e-12);
+            expect_entry("height", f, foot->sole_height, lowest[f], 1e-12);
             const double *turn = f == ROUND ? identity : d->xmat + 9 * robot_foot_body(robot, f);
             for (int k = 0; k < 9; k++) {
-                near("rotation", k, foot->rotation[k], turn[k], 1e-12);
+                expect_entry("rotation", k, foot->rotation[k], turn[k], 1e-12);
             }
             for (int k = 0; k < 3; k++) {
-                near("reference", k, foot->position[k], point[k], 1e-12);
-                near("middle", k, foot->sole_center[k], middle[k], 1e-12);
+                expect_entry("reference", k, foot->position[k], point[k], 1e-12);
+                expect_entry("middle", k, foot->sole_center[k], middle[k], 1e-12);
             }
             for (int k = 0; k < 6; k++) {
-                near("twist", k, foot->velocity[k], twist[6 * f + k], 1e-12);
+                expect_entry("twist", k, foot->velocity[k], twist[6 * f + k], 1e-12);
             }
         }
-        near("clearance", 0, robot_sim_sole_clearance(sim, &terrain),
-             fmin(lowest[0], lowest[1]) - 0.3, 1e-12);
+        expect_entry("clearance", 0, robot_sim_sole_clearance(sim, &terrain),
+                     fmin(lowest[0], lowest[1]) - 0.3, 1e-12);
         mj_deleteData(d);
     }
     robot_sim_destroy(sim);
@@ -396,8 +385,8 @@ static void check_wrench(const RobotSim *sim, const mjData *d, const double *j,
     mju_mulMatTVec(by_force, j, column, ROWS, NV);
     mju_mulMatTVec(by_change, solved, column, ROWS, NV);
     for (int i = 0; i < NV; i++) {
-        near("force", i, force[i], by_force[i], 1e-11);
-        near("acceleration", i, change[i], by_change[i], 1e-9 * (1 + fabs(by_change[i])));
+        expect_entry("force", i, force[i], by_force[i], 1e-11);
+        expect_entry("acceleration", i, change[i], by_change[i], 1e-9 * (1 + fabs(by_change[i])));
     }
     double twist[6], sum[ROWS], rate[NV];
     for (int i = 0; i < NV; i++) {
@@ -407,7 +396,7 @@ static void check_wrench(const RobotSim *sim, const mjData *d, const double *j,
     for (int f = 0; f < FEET; f++) {
         foot_map_twist(sim, f, d->qvel, change, twist);
         for (int k = 0; k < 6; k++) {
-            near("twist to come", k, twist[k], sum[6 * f + k], 1e-11);
+            expect_entry("twist to come", k, twist[k], sum[6 * f + k], 1e-11);
         }
     }
 }
@@ -430,8 +419,8 @@ static void test_map(void **unused) {
         mj_solveM(m, d, solved, j, ROWS);
         mju_mulMatMatT(wanted, j, solved, ROWS, NV, ROWS);
         for (int i = 0; i < ROWS * ROWS; i++) {
-            near("inverse inertia", i, sim->input.inverse_inertia[i], wanted[i],
-                 1e-10 * (1 + fabs(wanted[i])));
+            expect_entry("inverse inertia", i, sim->input.inverse_inertia[i], wanted[i],
+                         1e-10 * (1 + fabs(wanted[i])));
         }
         check_wrench(sim, d, j, solved);
         mj_deleteData(d);
@@ -531,10 +520,11 @@ static void test_soft_landing(void **unused) {
         mj_solveM(m, d, free_rate, force, 1);
         robot_sim_store(sim, &after);
         for (int i = 0; i < JOINTS; i++) { /* from rest: velocity = dt M^-1 (J^T w - b) */
-            near("joint's velocity", i, after.qvel[6 + i], 0.0005 * free_rate[dof_of[i]], 1e-10);
+            expect_entry("joint's velocity", i, after.qvel[6 + i], 0.0005 * free_rate[dof_of[i]],
+                         1e-10);
         }
         for (int i = 0; i < 6; i++) {
-            near("base's velocity", i, after.qvel[i], 0.0005 * free_rate[i], 1e-10);
+            expect_entry("base's velocity", i, after.qvel[i], 0.0005 * free_rate[i], 1e-10);
         }
         mj_deleteData(d);
     }
@@ -593,7 +583,7 @@ static void test_shells(void **unused) {
             least = fmin(least, low);
         }
         least_of[which]++;
-        near("clearance", (int)draw, robot_sim_body_clearance(sim, &terrain), least, 1e-9);
+        expect_entry("clearance", (int)draw, robot_sim_body_clearance(sim, &terrain), least, 1e-9);
         mj_deleteData(d);
     }
     print_message("lowest shell: box %d, sphere %d, capsule %d times\n", least_of[0], least_of[1],

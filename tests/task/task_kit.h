@@ -3,19 +3,9 @@
 #ifndef TASK_KIT_H
 #define TASK_KIT_H
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "base/random.h"
 #include "env/task/task.h"
+#include "kit.h"
 #include "robot/robot.h"
 #include "sa01.h"
 
@@ -44,21 +34,6 @@ static inline int kit_teardown(void **unused) {
     (void)unused;
     robot_destroy(robot);
     return 0;
-}
-
-/* Fails with the name and both numbers. */
-static inline void expect_near(const char *what, double got, double wanted, double tolerance) {
-    if (!(fabs(got - wanted) <= tolerance)) {
-        fail_msg("%s: %.12g instead of %.12g (tolerance %.1g)", what, got, wanted, tolerance);
-    }
-}
-
-/* The same for entry i of an array. */
-static inline void expect_entry(const char *what, int i, double got, double wanted,
-                                double tolerance) {
-    char name[96];
-    snprintf(name, sizeof name, "%s[%d]", what, i);
-    expect_near(name, got, wanted, tolerance);
 }
 
 /* ---- one environment ---- */

@@ -1,16 +1,7 @@
 /* The task on a robot with four round feet: widths, and the mirror image. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "base/random.h"
 #include "env/task/task.h"
+#include "kit.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
 
@@ -123,12 +114,6 @@ static void look_at(const RobotState *state, double side, double phase, const fl
     task_observe(env, &def, robot, sim, &reading, 0, &view);
 }
 
-static void expect_near(const char *what, int i, double got, double wanted) {
-    if (!(fabs(got - wanted) < 1e-5)) {
-        fail_msg("%s[%d]: %.8g, not %.8g", what, i, got, wanted);
-    }
-}
-
 /* The frame of the mirrored robot is the mirrored frame, and the estimates' feet change sides. */
 static void mirror_image(void **unused) {
     (void)unused;
@@ -142,8 +127,8 @@ static void mirror_image(void **unused) {
         }
         for (int i = 0; i < JOINTS; i++) {
             turned[i] = (float)joint_sign[i % 3] * action[other_joint[i]];
-            expect_near("action", i, (double)turned[i],
-                        (double)(mirror.action_sign[i] * action[mirror.action_index[i]]));
+            expect_entry("action", i, (double)turned[i],
+                         (double)(mirror.action_sign[i] * action[mirror.action_index[i]]), 1e-5);
         }
         look_at(&state, 1, 0.2, action);
         memcpy(first, frame, sizeof first);
@@ -151,17 +136,17 @@ static void mirror_image(void **unused) {
         look_at(&image, -1, 0.7, turned);
         for (int i = 0; i < OBSERVATION; i++) {
             float wanted = mirror.observation_sign[i] * first[mirror.observation_index[i]];
-            expect_near("frame", i, (double)frame[i], (double)wanted);
+            expect_entry("frame", i, (double)frame[i], (double)wanted, 1e-5);
         }
         for (int f = 0; f < FEET; f++) {
             for (int k = 0; k < 3; k++) {
                 double wanted = (double)truth[3 + 3 * other_foot[f] + k];
-                expect_near("foot's velocity", 3 * f + k, (double)estimate[3 + 3 * f + k],
-                            k == 1 ? -wanted : wanted);
+                expect_entry("foot's velocity", 3 * f + k, (double)estimate[3 + 3 * f + k],
+                             k == 1 ? -wanted : wanted, 1e-5);
             }
             int height = 3 + 3 * FEET;
-            expect_near("foot's height", f, (double)estimate[height + f],
-                        (double)truth[height + other_foot[f]]);
+            expect_entry("foot's height", f, (double)estimate[height + f],
+                         (double)truth[height + other_foot[f]], 1e-5);
         }
     }
 }

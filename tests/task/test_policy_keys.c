@@ -1,14 +1,6 @@
 /* What a policy's file says of how it walks: printed and read again, and refused. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "env/task/policy_keys.h"
+#include "kit.h"
 
 #define GAINS "50 50 70 70 20 20 50 50 70 70 20 20"
 

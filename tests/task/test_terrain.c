@@ -1,18 +1,8 @@
 /* Robots on one map: results independent of thread count, state without pointers that continues bit
  * for bit, heights of start, feet and base above the ground under them. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "base/random.h"
 #include "envs_kit.h"
+#include "kit.h"
 #include "sa01.h"
 
 enum { ENVS = 6, STEPS = 60, TILES = 64 };

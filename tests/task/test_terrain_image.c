@@ -1,15 +1,8 @@
 /* Section [terrain]: pictures read and refused, maps made from them. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
-#include <cmocka.h>
+#include "kit.h"
+
 #include <png.h>
 
 #include "env/task/image.h"

@@ -2,22 +2,13 @@
  * or read: an error that says so each time, nothing leaked. The linker wraps the allocator
  * (tests/CMakeLists.txt), so this runs under the address sanitizer too; what MuJoCo and oneDNN
  * allocate inside is theirs. */
-#include <math.h>
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 #include "control/controller.h"
 #include "env/actuator/fit.h"
 #include "identify/fit_csv.h"
+#include "kit.h"
 #include "mild/map.h"
 #include "run/train/trainer.h"
 #include "sa01.h"

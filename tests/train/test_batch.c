@@ -1,16 +1,9 @@
 /* Training with the batch engine, here on the CPU: runs repeat, and either kind of robots goes on
  * from the other's checkpoint. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
+#include "kit.h"
 #include "run/train/trainer.h"
 
 #define CHECKPOINT "build_test_batch_checkpoint.safetensors"

@@ -1,21 +1,12 @@
 /* The run log: CSV that survives a kill and reads back, TensorBoard records whose frames check and
  * which hold the config. */
 #include <dirent.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "base/paths.h"
+#include "kit.h"
 #include "run/train/events.h"
 #include "run/train/history.h"
 #include "run/train/log.h"

@@ -1,16 +1,6 @@
 /* Every ground model of the table is really trained on: two iterations of rollout and update each,
  * losses finite, parameters changed and finite. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
+#include "kit.h"
 #include "run/train/trainer.h"
 
 enum { ITERATIONS = 2 };

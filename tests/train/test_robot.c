@@ -1,16 +1,8 @@
 /* Training robots other than the default: train.robot chooses, the policy remembers. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "control/controller.h"
+#include "kit.h"
 #include "run/train/trainer.h"
 
 #define POLICY "build_test_robot.safetensors"

@@ -1,12 +1,5 @@
 /* The camera's filter: by time and not by frames, and not behind what moves evenly. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
+#include "kit.h"
 #include "view/follow.h"
 
 #define LAG 0.4

@@ -1,14 +1,5 @@
 /* The visible ground: prints where the sole was, as deep as it was, and recovery by material. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
+#include "kit.h"
 #include "view/relief.h"
 
 #define CELL 0.01

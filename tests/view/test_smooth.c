@@ -1,14 +1,5 @@
 /* Edges of a picture that was drawn with one sample per pixel. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
+#include "kit.h"
 #include "view/smooth.h"
 
 #define WIDTH 96

@@ -1,18 +1,10 @@
 /* The video file: whole under its name with the right number of frames, or one clear line and no
  * file. */
 #include <dirent.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
+#include "kit.h"
 #include "view/video.h"
 
 #define WIDTH 96

@@ -1,17 +1,8 @@
 /* Frames of the real robot on soft ground, and the sole pressure gathered from it. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "control/stand.h"
+#include "kit.h"
 #include "sa01.h"
 #include "view/model.h"
 #include "view/pressure.h"

@@ -1,13 +1,6 @@
 /* The window's keys and mouse, pressed through a GLFW of the test's own: what each asks for, by its
  * sign and size, and that it asks once. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-#include <cmocka.h>
-
+#include "kit.h"
 #include "view/window.h"
 
 static void nothing_without_windows(void **state) {

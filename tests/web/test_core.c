@@ -1,15 +1,6 @@
 /* The core of the page, compiled for this machine, beside what it stands for: the batch engine on
  * the CPU and the policy on oneDNN. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "kit.h"
 
 #define MILD_REAL_FLOAT
 #include "env/envs.h"
