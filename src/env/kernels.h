@@ -1,5 +1,5 @@
 /* What steps an environment of the batch engine: on the CPU (batch_host.c), on a GPU
- * (batch_device.cu, or without_cuda.c). */
+ * (batch_device.cu, or batch_without_cuda.c). */
 #ifndef ENVS_TEXT_H
 #define ENVS_TEXT_H
 
@@ -7,7 +7,7 @@
 
 #define ENVS_MODEL_NUMBERS ((int)(sizeof(EngineNumbers) / sizeof(Real)))
 
-/* [B] of an environment in EnvsArrays, by the text of the CPU or of a device, which may be
+/* [B] of an environment in EnvsArrays, by the code of the CPU or of a device, which may be
  * compiled for one robot. */
 typedef struct {
     size_t stride;
@@ -35,8 +35,8 @@ void envs_host_tally(const EnvsArrays *all);
 
 /* ---- a GPU ---- */
 
-/* The same on a GPU, compiled for robots of one size or for any (device.cu). Functions put their
- * work into the stream and return NULL, or what went wrong. */
+/* The same on a GPU, compiled for robots of one size or for any (batch_device.cu). Functions put
+ * their work into the stream and return NULL, or what went wrong. */
 typedef struct {
     int fixed;                           /* bool: for robots of one size */
     int (*fits)(const EngineTree *tree); /* bool: for such a robot */

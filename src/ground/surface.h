@@ -1,4 +1,4 @@
-/* The surface of a map in one cell of its grid: one text for the ground of the CPU and of a GPU. */
+/* The surface of a map in one cell of its grid: one code for the ground of the CPU and of a GPU. */
 #ifndef MILD_GROUND_SURFACE_H
 #define MILD_GROUND_SURFACE_H
 

@@ -1,4 +1,4 @@
-/* Adam (Kingma & Ba 2015), for CPU (adam.c) and GPU (gpu/update.cu). Written in the common subset
+/* Adam (Kingma & Ba 2015), for CPU (adam.c) and GPU (cuda/update.cu). Written in the common subset
  * of C17 and CUDA C++. */
 #ifndef MILD_ADAM_H
 #define MILD_ADAM_H

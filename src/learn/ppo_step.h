@@ -1,5 +1,5 @@
 /* What an update decides around the gradients of its minibatches, for CPU (ppo.c) and GPU
- * (gpu/update.cu). Written in the common subset of C17 and CUDA C++. */
+ * (cuda/update.cu). Written in the common subset of C17 and CUDA C++. */
 #ifndef MILD_PPO_STEP_H
 #define MILD_PPO_STEP_H
 

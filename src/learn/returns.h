@@ -1,4 +1,4 @@
-/* Advantages of one environment, for CPU (ppo_returns.c) and GPU (gpu/update.cu). Written in the
+/* Advantages of one environment, for CPU (ppo_returns.c) and GPU (cuda/update.cu). Written in the
  * common subset of C17 and CUDA C++. */
 #ifndef MILD_RETURNS_H
 #define MILD_RETURNS_H

@@ -57,7 +57,7 @@ static void set_gains(Runner *r) {
     }
 }
 
-/* An episode that nothing is drawn for: what the task's text needs of it. */
+/* An episode that nothing is drawn for: what the task's code needs of it. */
 static void begin_episode(Runner *r) {
     const double still[3] = {0, 0, 0};
     task_env_init(r->env, &r->task, r->def.robot, 0, 0);

@@ -1,6 +1,6 @@
 /* Robot and RobotSim of a device: the numbers that the functions of robot.h return for the task's
- * text (place.h), as functions of the same names, and of robot/state.h what that text uses. Include
- * place.h; never together with robot.h. */
+ * code, as functions of the same names, and of robot/state.h what that code uses. Include lanes.h,
+ * which includes this file on a device; never together with robot.h. */
 #ifndef TASK_DEVICE_ROBOT_H
 #define TASK_DEVICE_ROBOT_H
 

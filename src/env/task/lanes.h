@@ -1,8 +1,8 @@
-/* What the task's text asks of robot and ground. The files of one policy step (step.c, gait.c,
- * assist.c, observe.c, reward.c, draw.c) are compiled twice: as they are for the CPU, where robots
- * are stepped by RobotSim, and with TASK_ON_DEVICE by env/batch_step.inc, where Robot and RobotSim
- * are plain numbers on a device. TASK_FN marks the functions that one file of them calls in
- * another. */
+/* What the task's code asks of robot and ground. The files of one policy step (step.c, gait.c,
+ * assist.c, observe.c, reward.c, randomize.c) are compiled twice: as they are for the CPU, where
+ * robots are stepped by RobotSim, and with TASK_ON_DEVICE by env/batch_step.inc (through
+ * env/batch_task.h), where Robot and RobotSim are plain numbers on a device (device_robot.h).
+ * TASK_FN marks the functions that one file of them calls in another. */
 #ifndef TASK_LANES_H
 #define TASK_LANES_H
 
@@ -16,7 +16,7 @@
 
 #include "base/hd.h"
 
-#ifndef TASK_JOINTS /* sizes of a robot's arrays; where the text is compiled for one, its own */
+#ifndef TASK_JOINTS /* sizes of a robot's arrays; where the code is compiled for one, its own */
 #define TASK_JOINTS ROBOT_JOINTS_MAX
 #define TASK_FEET ROBOT_FEET_MAX
 #endif

@@ -1,5 +1,5 @@
 /* Everything that is drawn once per episode (docs/task.md section 11), and the commands (section
- * 10): the text for the CPU and for a device (place.h). */
+ * 10): the code for the CPU and for a device (lanes.h). */
 #include <string.h>
 
 #include "base/random.h"

@@ -55,7 +55,7 @@ MILD_HD_FN TaskReal stance_depth(const TaskMotion *m) {
  * wrong height. The lift gives nothing to a foot that stays down (exp(-k error) would give it a
  * third of a perfect swing) and has a slope from the first millimetre. Lifting too high costs half
  * as much per metre as lifting gains. The scale is such that following h_des = apex sin(pi s) gives
- * 1 on average over the swing. From a deep print a foot lifts far before it meets the surface:
+ * 1 on average over the swing. From a deep imprint a foot lifts far before it meets the surface:
  * TASK_CLEARANCE_RISE counts from the depth of the standing feet. */
 MILD_HD_FN TaskReal reward_feet_clearance(const TaskMotion *m) {
     const int form = m->def->reward.clearance_form;

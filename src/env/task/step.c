@@ -1,5 +1,5 @@
-/* The policy step but for its physics, read top to bottom: the text for the CPU and for a device
- * (place.h). */
+/* The policy step but for its physics, read top to bottom: the code for the CPU and for a device
+ * (lanes.h). */
 #include <math.h>
 #include <string.h>
 

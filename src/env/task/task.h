@@ -183,7 +183,8 @@ TASK_FN void task_read_motors(const RobotSim *sim, TaskReading *reading);
 TASK_FN void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
                           const TaskReading *reading, int first, const TaskView *view);
 
-/* Everything that reward terms may use, computed once per policy step (env.c). */
+/* Everything that reward terms may use, computed once per policy step by
+ * task_describe_motion (step.c). */
 typedef struct {
     const TaskDef *def;
     const Robot *robot;

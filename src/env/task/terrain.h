@@ -9,8 +9,8 @@
 typedef struct {
     MildMapDef map;
     char image[200], labels[200]; /* PNG files of kind = image and patches = image */
-    int memory;                   /* bool: prints stay */
-    int tiles;                    /* of prints, see mild_ground_bytes_imprints */
+    int memory;                   /* bool: imprints stay */
+    int tiles;                    /* of imprints, see mild_ground_bytes_imprints */
 } TerrainDef;
 
 TerrainDef terrain_def_default(void);

@@ -117,7 +117,7 @@ MILD_HD void contact_direct(const ContactMaterial *material, const Real *rotatio
         element_resist(e, memory, &plate, (curves & LAW_SPACE) != 0, curves, dt, 1 / dt,
                        material->law.line_stiffness, now->x, now->y, now->descent);
         /* Not before `middle`, where float may round it to: on a way of no length the force would
-         * be infinite. The text in double is that of mild/ground.h. */
+         * be infinite. The code in double is that of mild/ground.h. */
         if (sizeof(Real) < sizeof(double)) {
             e->yield_depth = real_max(e->yield_depth, e->middle);
         }

@@ -1,4 +1,4 @@
-/* The batch on the CPU: the text of the GPU, robot after robot. */
+/* The batch on the CPU: the code of the GPU, robot after robot. */
 #define CONTACT_MAP 0
 #include "ground/batch/host.inc"
 

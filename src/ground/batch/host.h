@@ -1,4 +1,4 @@
-/* The step of one robot on the CPU, for those that have its engine in the same text. In float. */
+/* The step of one robot on the CPU, for those that have its engine in the same code. In float. */
 #ifndef MILD_BATCH_HOST_STEP_H
 #define MILD_BATCH_HOST_STEP_H
 

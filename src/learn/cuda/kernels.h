@@ -1,6 +1,6 @@
 /* Passes of the learner's networks and losses on the GPU; cuBLAS computes the products. Each pass
  * is the loop of the same name in src/learn (mlp.c, network.c, loss.c) over device arrays,
- * row-major with rows of `pitch` floats. The columns after a row's width are zero (gpu/network.h).
+ * row-major with rows of `pitch` floats. The columns after a row's width are zero (cuda/network.h).
  * A pass only enqueues work on the stream, so errors show at the next call of the runtime. Every
  * sum has one fixed tree, so no result depends on the order in which blocks run. */
 #ifndef MILD_GPU_KERNELS_H

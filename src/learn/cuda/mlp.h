@@ -1,4 +1,5 @@
-/* Networks on the GPU: mlp.c of src/learn over device arrays with padded widths (gpu/network.h). */
+/* Networks on the GPU: mlp.c of src/learn over device arrays with padded widths
+ * (cuda/network.h). */
 #ifndef MILD_GPU_MLP_H
 #define MILD_GPU_MLP_H
 

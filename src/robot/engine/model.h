@@ -1,4 +1,4 @@
-/* A robot as the batch engine knows it: the tree, and numbers in the scalar type of the text.
+/* A robot as the batch engine knows it: the tree, and numbers in the scalar type of the code.
  *
  * The frame of a link has its origin at the hinge's anchor and the axes of the link's body. */
 #ifndef MILD_ENGINE_MODEL_H
@@ -101,7 +101,7 @@ typedef struct {
 
 /* ---- sizes: of the working data, and of loops where the robot is known to the compiler ---- */
 
-/* Define these five before the first inclusion, as engine_model_sizes says, to compile the text for
+/* Define these five before the first inclusion, as engine_model_sizes says, to compile the code for
  * one robot: its working data then has no gaps and its loops have known lengths. */
 #ifdef ENGINE_JOINTS
 #define ENGINE_FIXED 1

@@ -1,4 +1,4 @@
-/* Writes the sizes of a robot, for texts that are compiled for it (model.h), as a header. Usage:
+/* Writes the sizes of a robot, for code that is compiled for it (model.h), as a header. Usage:
  * engine_sizes FOLDER HEADER */
 #include <stdio.h>
 #include <stdlib.h>

@@ -91,8 +91,8 @@ typedef struct {
     int rigid;          /* bool: on rigid ground */
 } EngineAction;
 
-/* N and its factor, and half of the way to the acceleration, which engine_accelerate goes on with:
- * L^-T force. After engine_kinematics. */
+/* N (constraint.h: M with the joint limits that are held) and its factor, and half of the way to
+ * the acceleration, which engine_accelerate goes on with: L^-T force. After engine_kinematics. */
 WARP_FN void engine_smooth(const EngineModel *model, const EngineAction *action, EngineWork *work) {
     const EngineTree *tree = &model->tree;
     engine_link_forces(model, action->variation, work);
