@@ -3,7 +3,7 @@
 # Kernels of a robot's contact step, one unit each: groups of lanes, at least as many as feet; elements of a lane; feet,
 # `flat` for any or `points` for those that transmit no moment; curves of the ground, `all` or the only ones, which is less
 # text and fewer registers; blocks of a multiprocessor. A batch takes the first that fits. The rows `flat all` are the sizes
-# that a batch can have, smallest first, on the CPU too.
+# that a batch can have, smallest first. On the CPU the same sizes are numbers of one step.
 #
 # Two blocks fit a multiprocessor; three would be 1 % faster at 65 536 robots, and 12 % slower at 4096, for they spill
 # registers. Of points three fit, four on cones. Of one element a lane only points have kernels for cones: there is little to
@@ -32,8 +32,8 @@ set(generated ${CMAKE_BINARY_DIR}/generated/batch)
 mild_layer(ground/batch layer_ground layer_device)
 target_include_directories(layer_batch PUBLIC ${generated})
 
-# contact_kinds.h: contact.inc for the CPU, in each size, and lists of them
-set(contact_texts "")
+# contact_shapes.h: lists of the sizes. The CPU has one step for all of them (host.inc)
+set(contact_per_max 1)
 set(contact_flat "")
 set(contact_points "")
 set(units "")
@@ -54,9 +54,9 @@ foreach(row ${batch_kernels})
   endif()
   if(curves STREQUAL "all")
     string(APPEND contact_${feet} " KIND(${groups}, ${per})")
-    string(APPEND contact_texts "#define CONTACT_POINTS ${points}\n#define CONTACT_FEET ${groups}\n"
-      "#define CONTACT_PER ${per}\n#define CONTACT(name) contact_##name##_${name}\n#include \"ground/batch/contact.inc\"\n"
-      "#undef CONTACT_POINTS\n")
+    if(per GREATER contact_per_max)
+      set(contact_per_max ${per})
+    endif()
   else()
     string(APPEND name _${curves})
   endif()
@@ -79,16 +79,8 @@ file(CONFIGURE OUTPUT ${generated}/ground/batch/contact_shapes.h @ONLY CONTENT [
 /* Groups of lanes and elements of a lane that a batch can have. */
 #define CONTACT_KINDS(KIND)@contact_flat@
 #define CONTACT_POINT_KINDS(KIND)@contact_points@
+#define CONTACT_PER_MAX @contact_per_max@ /* elements of a lane */
 ]=])
-file(CONFIGURE OUTPUT ${generated}/ground/batch/contact_kinds.h @ONLY CONTENT [=[
-/* contact.inc for the CPU in each of these sizes. Before the inclusion: CONTACT_MAP. */
-#include "ground/batch/contact.h"
-#include "ground/batch/contact_shapes.h"
-
-#define CONTACT_CURVES LAW_ALL
-@contact_texts@#undef CONTACT_CURVES
-]=])
-
 if(MILD_CUDA)
   add_library(batch_device STATIC ${units} ${CMAKE_SOURCE_DIR}/src/ground/batch/reset.cu)
   target_include_directories(batch_device PRIVATE ${CMAKE_BINARY_DIR}/layers/batch)

@@ -46,6 +46,7 @@ function(mild_library name description objects requires)
   if(NOT MILD_SANITIZE AND NOT MILD_FUZZ) # a call of anything else does not link
     target_link_options(${name}_shared PRIVATE -Wl,--no-undefined)
   endif()
+  target_link_options(${name}_shared PRIVATE -Wl,-z,noseparate-code) # no pages of padding: 4 kB
   mild_archive(${name}_static ${name} "${objects}" ${ARGN})
   # while the version begins with 0, a new minor version may change the interface
   set_target_properties(${name}_shared PROPERTIES VERSION ${PROJECT_VERSION}

@@ -5,39 +5,42 @@
 #define NEWTON_ITERATIONS 400 /* Newton steps in all, unless the caller sets a limit */
 #define NEWTON_PLAIN 20       /* plain steps before the friction bounds are held fixed */
 
-MILD_HD void system_open(System *system, const MildScratch *scratch, const MildContactInput *input,
-                         int first, int n, int parts) {
+/* The equations of the n rows from `first` on. */
+static void system_open(System *system, const MildScratch *scratch, const MildContactInput *input,
+                        int first, int n) {
     int stride = 6 * scratch->feet;
     system->first = first;
+    system->n = n;
+    system->parts = n / NEWTON_VECTOR + 1;
     for (int i = 0; i < n; i++) {
-        row_load(&system->A[i], input->inverse_inertia + (first + i) * stride + first, n, parts);
+        row_load(system, &system->A[i], input->inverse_inertia + (first + i) * stride + first);
     }
-    row_load(&system->free, input->free_velocity + first, n, parts);
+    row_load(system, &system->free, input->free_velocity + first);
     system->tolerance = input->tolerance > 0.0 ? input->tolerance : NEWTON_TOLERANCE;
     system->limit = input->max_iterations > 0 ? input->max_iterations : NEWTON_ITERATIONS;
     system->dt = input->dt;
 }
 
 /* Solves for the n rows from `first` on. */
-MILD_HD void system_solve(MildScratch *scratch, const MildContactInput *input, int first,
-                          MildContactResult *result, int n, int parts) {
+static void system_solve(MildScratch *scratch, const MildContactInput *input, int first, int n,
+                         MildContactResult *result) {
     System opened, *system = &opened;
     Point best = {.residual = INFINITY};
-    system_open(system, scratch, input, first, n, parts);
-    row_load(&best.twist, input->velocity[first / 6], n, parts);
+    system_open(system, scratch, input, first, n);
+    row_load(system, &best.twist, input->velocity[first / 6]);
     contact_pass(scratch, system->dt, best.twist.at, system->first);
     const int limit = system->limit < NEWTON_PLAIN ? system->limit : NEWTON_PLAIN;
-    int steps = newton_plain(system, scratch, &best, limit, n, parts);
-    result->converged = point_solves(system, &best, n, parts);
+    int steps = newton_plain(system, scratch, &best, limit);
+    result->converged = point_solves(system, &best);
     if (!result->converged) {
-        steps += newton_patient(system, scratch, &best, system->limit - steps, n, parts);
+        steps += newton_patient(system, scratch, &best, system->limit - steps);
         contact_pass(scratch, system->dt, best.twist.at, system->first);
-        result->converged = point_solves(system, &best, n, parts);
+        result->converged = point_solves(system, &best);
     }
-    double scale = system_norm(system, best.impulse.at, n, parts);
+    double scale = system_norm(system, best.impulse.at);
     result->residual = scale > 0.0 ? best.residual / scale : best.residual;
     if (!result->converged) {
-        steps += newton_unsolved(system, scratch, &best, result, n, parts);
+        steps += newton_unsolved(system, scratch, &best, result);
     }
     result->iterations = steps;
 }
@@ -50,20 +53,13 @@ void newton_solve(MildScratch *scratch, const MildContactInput *input, MildConta
     while (scratch->foot[end - 1].active == 0) {
         end--;
     }
-    int n = 6 * (end - first);
     memset(scratch->wrench, 0, sizeof scratch->wrench);
-    for (int f = first; f < end && n > 12; f++) { /* clear feet in the air between loaded ones */
+    for (int f = first; f < end; f++) { /* clear feet in the air between loaded ones */
         if (scratch->foot[f].active == 0) {
             memset(scratch->hessian[f], 0, sizeof scratch->hessian[f]);
         }
     }
-    if (n == 6) {
-        system_solve(scratch, input, 6 * first, result, 6, 1);
-    } else if (n == 12) {
-        system_solve(scratch, input, 6 * first, result, 12, 2);
-    } else {
-        system_solve(scratch, input, 6 * first, result, n, NEWTON_VECTORS);
-    }
+    system_solve(scratch, input, 6 * first, 6 * (end - first), result);
     for (int i = 0; i < stride; i++) {
         double sum = input->free_velocity[i];
         for (int j = 6 * first; j < 6 * end; j++) {

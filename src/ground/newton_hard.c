@@ -17,9 +17,9 @@ static int least(int a, int b) {
 /* With the friction bounds held fixed, the step minimises a convex function. This is its slope
  * along the step between two points, (P - W)^T A dP, at the point of the last pass. */
 static double step_slope(const System *system, const MildScratch *scratch, const Point *at,
-                         const Point *from, const Point *to, int n) {
+                         const Point *from, const Point *to) {
     double slope = 0.0;
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < system->n; i++) {
         slope += (at->impulse.at[i] - scratch->wrench[system->first + i]) *
                  (to->twist.at[i] - from->twist.at[i]);
     }
@@ -28,22 +28,21 @@ static double step_slope(const System *system, const MildScratch *scratch, const
 
 /* Minimises the convex function that the step has at fixed friction bounds. Newton's method with a
  * line search converges from any start. Returns the number of steps. */
-static int newton_held(const System *system, MildScratch *scratch, Point *at, int limit, int n,
-                       int parts) {
+static int newton_held(const System *system, MildScratch *scratch, Point *at, int limit) {
     int steps = 0, moves = 1;
     Point full, next = *at;
     contact_pass_held(scratch, system->dt, at->twist.at, system->first);
-    while (moves && steps < limit && point_step(system, scratch, at, &full, 0, n, parts)) {
+    while (moves && steps < limit && point_step(system, scratch, at, &full, 0)) {
         steps++;
-        double start = step_slope(system, scratch, at, at, &full, n);
+        double start = step_slope(system, scratch, at, at, &full);
         double end;
         double low = 0.0;
         double high = 1.0;
         double t = 1.0;
         for (int k = 0; k <= NEWTON_SEARCH; k++) {
-            point_between(at, &full, t, &next, n);
+            point_between(system, at, &full, t, &next);
             contact_pass_held(scratch, system->dt, next.twist.at, system->first);
-            end = step_slope(system, scratch, &next, at, &full, n);
+            end = step_slope(system, scratch, &next, at, &full);
             if (!(fabs(end) > 0.1 * fabs(start)) || (end < 0.0 && t == 1.0)) {
                 break;
             }
@@ -51,12 +50,12 @@ static int newton_held(const System *system, MildScratch *scratch, Point *at, in
             t = 0.5 * (low + high);
         }
         double moved[TWIST_MAX];
-        double scale = system_norm(system, next.impulse.at, n, parts);
-        for (int i = 0; i < n; i++) {
+        double scale = system_norm(system, next.impulse.at);
+        for (int i = 0; i < system->n; i++) {
             moved[i] = next.impulse.at[i] - at->impulse.at[i];
         }
         *at = next;
-        moves = !(system_norm(system, moved, n, parts) <= 0.1 * system->tolerance * scale);
+        moves = !(system_norm(system, moved) <= 0.1 * system->tolerance * scale);
     }
     return steps;
 }
@@ -124,8 +123,7 @@ static void bounds_move(MildScratch *scratch, Pace *pace) {
     }
 }
 
-int newton_patient(const System *system, MildScratch *scratch, Point *best, int limit, int n,
-                   int parts) {
+int newton_patient(const System *system, MildScratch *scratch, Point *best, int limit) {
     static const double wider[] = {3.0, 100.0, 10.0, 1e4};
     Point at = *best;
     Pace pace = {0.5, 0}; /* the first move doubles it */
@@ -135,13 +133,13 @@ int newton_patient(const System *system, MildScratch *scratch, Point *best, int 
     }
     contact_pass(scratch, system->dt, at.twist.at, system->first);
     bounds_begin(scratch, 1.0);
-    for (int round = 1; steps < limit && !point_solves(system, best, n, parts); round++) {
-        int held = newton_held(system, scratch, &at, least(limit - steps, NEWTON_ROUND), n, parts);
+    for (int round = 1; steps < limit && !point_solves(system, best); round++) {
+        int held = newton_held(system, scratch, &at, least(limit - steps, NEWTON_ROUND));
         if (held == 0) {
             break; /* singular or not a number */
         }
         steps += held;
-        point_evaluate(system, scratch, &at, n, parts);
+        point_evaluate(system, scratch, &at);
         if (round % BOUNDS_PATIENCE == 0) {
             bounds_begin(scratch, wider[(round / BOUNDS_PATIENCE - 1) % 4]);
             pace = (Pace){1.0, 1};
@@ -149,7 +147,7 @@ int newton_patient(const System *system, MildScratch *scratch, Point *best, int 
             bounds_move(scratch, &pace);
         }
         Point tried = at;
-        steps += newton_plain(system, scratch, &tried, least(limit - steps, NEWTON_TRY), n, parts);
+        steps += newton_plain(system, scratch, &tried, least(limit - steps, NEWTON_TRY));
         if (tried.rests || tried.residual < best->residual) {
             *best = tried;
         }
@@ -159,31 +157,30 @@ int newton_patient(const System *system, MildScratch *scratch, Point *best, int 
 
 /* Sets a point to what would be returned for it: P = W of the last pass and V = V^ + A W. Its
  * residual becomes relative. It is infinite where W = 0 but the law at V is not. */
-static void point_return(const System *system, MildScratch *scratch, Point *point, int n,
-                         int parts) {
+static void point_return(const System *system, MildScratch *scratch, Point *point) {
     point->impulse = (Row){{0.0}};
-    memcpy(point->impulse.at, scratch->wrench + system->first, (size_t)n * sizeof(double));
+    memcpy(point->impulse.at, scratch->wrench + system->first, (size_t)system->n * sizeof(double));
     point->twist = system->free;
-    system_times(system, point->impulse.at, &point->twist, n, parts);
-    point_evaluate(system, scratch, point, n, parts);
+    system_times(system, point->impulse.at, &point->twist);
+    point_evaluate(system, scratch, point);
     if (point->residual > 0.0) {
-        point->residual /= system_norm(system, point->impulse.at, n, parts);
+        point->residual /= system_norm(system, point->impulse.at);
     }
 }
 
 int newton_unsolved(const System *system, MildScratch *scratch, const Point *best,
-                    MildContactResult *result, int n, int parts) {
+                    MildContactResult *result) {
     Point safe = {.residual = INFINITY}, found = *best;
     safe.twist = system->free;
     bounds_begin(scratch, 0.0);
-    int steps = newton_held(system, scratch, &safe, NEWTON_ROUND, n, parts);
+    int steps = newton_held(system, scratch, &safe, NEWTON_ROUND);
     contact_pass(scratch, system->dt, safe.twist.at, system->first);
     bounds_begin(scratch, 1.0);
-    steps += newton_held(system, scratch, &safe, NEWTON_ROUND, n, parts);
+    steps += newton_held(system, scratch, &safe, NEWTON_ROUND);
     const Row safe_twist = safe.twist;
-    point_return(system, scratch, &safe, n, parts);
+    point_return(system, scratch, &safe);
     contact_pass(scratch, system->dt, best->twist.at, system->first);
-    point_return(system, scratch, &found, n, parts);
+    point_return(system, scratch, &found);
     if (found.residual <= safe.residual) {
         contact_pass(scratch, system->dt, best->twist.at, system->first);
     } else {

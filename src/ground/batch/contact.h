@@ -45,6 +45,9 @@ typedef struct {
 typedef struct {
     ContactSole sole[CONTACT_FEET_MAX];
     int feet;
+    int groups;     /* as in BatchShape; this and the next two only where the size is no constant */
+    int lanes;      /* of a group */
+    int per;        /* elements of a lane */
     Real dt;        /* [s] */
     Real tolerance; /* [-] of the residual, in the metric of kinetic energy */
     int limit;      /* of Newton steps */
