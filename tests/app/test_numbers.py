@@ -11,7 +11,7 @@ import sys
 import tempfile
 
 mild = os.path.realpath(sys.argv[1])
-failures = 0
+failures, told_of = 0, {}
 PITCH, GRAVITY = 0.0195, 9.81  # of the paper's elements [m], [m/s^2]
 PAPER = f"{11 * PITCH},{7 * PITCH}"  # the paper's sole
 SLOW = 5e-4  # [m/s] a press without inertia
@@ -20,7 +20,9 @@ SLOW = 5e-4  # [m/s] a press without inertia
 def near(what, value, wanted, within):
     global failures
     if not abs(value - wanted) <= within:
-        print(f"FAIL: {what}: {value}, not {wanted} +- {within}")
+        told_of[what] = told_of.get(what, 0) + 1
+        if told_of[what] <= 2:  # a column has thousands of rows
+            print(f"FAIL: {what}: {value}, not {wanted} +- {within}")
         failures += 1
 
 

@@ -1,5 +1,6 @@
 /* A walk in a window, with a window of the test's own: what the keys ask for is what the policy is
- * commanded and what the picture tells, by sign, size and bounds. The clock goes with the frames. */
+ * commanded and what the picture tells, by sign, size and bounds. The clock goes with the frames.
+ */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -129,7 +130,7 @@ static void keys_command(void **state) {
     expect_command(18, 0.3, -0.1, 0.2);
 }
 
-/* Until somebody steers, the heading is held by the task; a key that only goes forward leaves it. */
+/* Until somebody steers, the task holds the heading, also where a key goes forward. */
 static void the_heading_is_held_until_somebody_steers(void **state) {
     (void)state;
     clear();
