@@ -268,8 +268,8 @@ def info():
     info_ranges(rest.split("\nparameters\n")[1])
     info_robots()
     size, unit = re.search(r"memory +([\d.]+) (\w+)", told("info", "devices")).groups()
-    near("memory of this machine", float(size) * {"MiB": 2**20, "GiB": 2**30}[unit],
-         os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"), 0.006 * 2**30)
+    near("memory of this machine", float(size), os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") /
+         {"MiB": 2**20, "GiB": 2**30, "TiB": 2**40}[unit], 0.006)
     true("the version", told("--version").split()[1] == re.search(r"^mild +(\S+)", told("info", "build"), re.M).group(1))
 
 
