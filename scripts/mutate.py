@@ -307,6 +307,8 @@ class File:
     def removal(self, i):
         """The statement that begins at i, removed; declarations and what returns or frees stay."""
         before, token = self.tokens[i - 1], self.tokens[i]
+        if i + 1 == len(self.tokens):
+            return []  # the body of a macro at the end of a header
         begins = before.text in (";", "{", "}", "else") or (
             before.text == ")" and self.tokens[self.pair.get(i - 1, 0) - 1].text in ("if", "for", "while"))
         if not begins or self.in_for(i) or is_type(token) or FREEING_CALL.fullmatch(token.text) or (

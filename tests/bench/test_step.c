@@ -4,6 +4,7 @@
 
 #include "base/clock.h"
 #include "kit.h"
+#include "run/bench/bench.h"
 #include "run/bench/record.h"
 #include "run/bench/step.h"
 
@@ -11,6 +12,8 @@
 
 static double now, lowest_floor;
 static int is_false; /* bool: this clock */
+static int
+    by_case; /* bool: the engine 0.5 s more in contact, ours 1 s by Newton and 4 s by sweeps */
 
 double clock_seconds(void) {
     struct timespec time;
@@ -29,6 +32,7 @@ void __wrap_mj_step(const mjModel *m, mjData *d) {
     const int name = mj_name2id(m, mjOBJ_GEOM, "floor");
     lowest_floor = fmin(lowest_floor, name < 0 ? 0 : m->geom_pos[3 * name + 2]);
     now += 2;
+    now += by_case && d->ncon > 0 ? 0.5 : 0;
 }
 
 int __real_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
@@ -37,8 +41,11 @@ int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *pus
                           const MildTerrain *terrain, MildGround *ground);
 int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
                           const MildTerrain *terrain, MildGround *ground) {
+    const int bad = __real_robot_sim_step(sim, torque, push, terrain, ground);
+    const int iterations = robot_sim_contact(sim)->iterations;
     now += 3;
-    return __real_robot_sim_step(sim, torque, push, terrain, ground);
+    now += !by_case || iterations == 0 ? 0 : iterations < 20 ? 1 : 4;
+    return bad;
 }
 
 /* The time of a step is that of all steps by their number, none left out and none twice. */
@@ -83,6 +90,42 @@ static void test_whole_walk(void **unused) {
     robot_destroy(robot);
 }
 
+static double value_of(const BenchReport *report, const char *name) {
+    for (int i = 0; i < report->count; i++) {
+        if (strcmp(report->rows[i].name, name) == 0) {
+            return report->rows[i].value;
+        }
+    }
+    fail_msg("no row %s", name);
+    return NAN;
+}
+
+/* Each row has the time of the case that it names; the phases are the step of the soft ground. */
+static void test_rows(void **unused) {
+    (void)unused;
+    static BenchReport report;
+    MildError error = {0};
+    const ExperimentDef def = experiment_def_default();
+    is_false = by_case = 1;
+    assert_int_equal(bench_step(&def, &report, &error), MILD_OK);
+    is_false = by_case = 0;
+    static const struct {
+        const char *name;
+        double wanted;
+    } rows[] = {{"engine_free", 2e6},
+                {"engine_rigid", 2.5e6},
+                {"newton", 4e6},
+                {"gauss_seidel", 7e6},
+                {"ratio_to_rigid", 1.6}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        print_message("%-16s %g\n", rows[i].name, value_of(&report, rows[i].name));
+        assert_true(fabs(value_of(&report, rows[i].name) / rows[i].wanted - 1) < 1e-6);
+    }
+    assert_true(value_of(&report, "rigid") >= 3e6 && value_of(&report, "rigid") < 3.5e6);
+    const double iterations = value_of(&report, "newton_iterations");
+    assert_true(iterations >= 1 && iterations < 20);
+}
+
 /* The benchmark runs and reports positive times; how long they are is not a test's business. */
 static void test_bench(void **unused) {
     (void)unused;
@@ -104,6 +147,6 @@ static void test_bench(void **unused) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_whole_time),
                                        cmocka_unit_test(test_whole_walk),
-                                       cmocka_unit_test(test_bench)};
+                                       cmocka_unit_test(test_rows), cmocka_unit_test(test_bench)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

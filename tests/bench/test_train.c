@@ -1,5 +1,7 @@
 /* The times that the training bench and the log of a training tell, by a clock that ticks once each
  * time it is read: nothing is left out and nothing counts twice. */
+#include <pthread.h>
+
 #include "base/clock.h"
 #include "kit.h"
 #include "run/bench/bench.h"
@@ -8,6 +10,7 @@
 #define TICK 0.0009765625 /* [s] 1/1024, so that sums are exact */
 enum { ENVS = 6, STEPS = 4 };
 
+static pthread_mutex_t reading = PTHREAD_MUTEX_INITIALIZER;
 static double now;         /* [s] of the clock */
 static double first_after; /* [s] when the first iteration was over */
 static int iterations;
@@ -18,7 +21,10 @@ MildStatus __real_train_iterate(Trainer *trainer, TrainReport *report, MildError
 MildStatus __wrap_train_iterate(Trainer *trainer, TrainReport *report, MildError *error);
 
 double __wrap_clock_seconds(void) {
-    return now += TICK;
+    pthread_mutex_lock(&reading);
+    const double read = now += TICK;
+    pthread_mutex_unlock(&reading);
+    return read;
 }
 
 /* An iteration reads the clock first and last: its rate and its parts fill the time between. */
@@ -38,6 +44,8 @@ MildStatus __wrap_train_iterate(Trainer *trainer, TrainReport *report, MildError
         told.environments += t->environments;
         told.inference += t->inference;
         told.update += t->update;
+        told.physics += t->physics;
+        told.ground += t->ground;
     }
     return status;
 }
@@ -52,13 +60,14 @@ static double value_of(const BenchReport *report, const char *name) {
     return NAN;
 }
 
-static void the_parts_are_the_whole(void **state) {
-    (void)state;
-    static BenchReport report;
+static void check_parts(int threads) {
+    BenchReport report = {.count = 0};
     MildError error = {0};
     ExperimentDef def = experiment_def_default();
+    iterations = 0;
+    told = (TrainTimes){0};
     def.train.envs = ENVS;
-    def.train.threads = 1;
+    def.train.threads = threads;
     def.ppo.steps = STEPS;
     def.ppo.minibatches = 2;
     assert_int_equal(bench_train(&def, &report, &error), MILD_OK);
@@ -82,7 +91,19 @@ static void the_parts_are_the_whole(void **state) {
     const double inside =
         value_of(&report, "physics") + value_of(&report, "ground") + value_of(&report, "task");
     assert_true(fabs(inside - 1e6 * told.environments / steps) < 1e-6 * step);
-    assert_true(value_of(&report, "threads") == 1);
+    /* in physics and in the ground, its part, the threads are at once */
+    assert_true(told.ground > 0 && told.physics > told.ground);
+    assert_true(fabs(value_of(&report, "ground") - 1e6 * told.ground / threads / steps) <
+                1e-6 * step);
+    assert_true(fabs(value_of(&report, "physics") -
+                     1e6 * (told.physics - told.ground) / threads / steps) < 1e-6 * step);
+    assert_true(value_of(&report, "threads") == threads);
+}
+
+static void the_parts_are_the_whole(void **state) {
+    (void)state;
+    check_parts(1);
+    check_parts(2);
 }
 
 int main(void) {

@@ -110,6 +110,83 @@ static void log_of_the_motor(void **state) {
     free(other);
 }
 
+/* ---- a motor whose torque is the number of its joint, and which keeps what it was asked ---- */
+
+enum { ASKED_MAX = 4000 };
+static struct { double error[SA01_JOINTS], speed[SA01_JOINTS]; } asked[ASKED_MAX];
+static int times_asked;
+
+static void torque_of_number(const void *self, void *state, const double *error,
+                             const double *speed, double *torque) {
+    (void)self;
+    (void)state;
+    assert_true(times_asked < ASKED_MAX);
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        asked[times_asked].error[i] = error[i];
+        asked[times_asked].speed[i] = speed[i];
+        torque[i] = 0.01 * (i + 1);
+    }
+    times_asked++;
+}
+
+/* Every number under the name of its joint and quantity, at its time. */
+static void columns_are_what_they_name(void **state) {
+    (void)state;
+    static const char *const quantities[3] = {"error_rad", "speed_rad_s", "torque_nm"};
+    const TaskActuator numbered = {NULL, 0, torque_of_number};
+    char *text = NULL, *line, *rest, name[128];
+    size_t size = 0;
+    int falls, columns = 0, of[1 + 3 * SA01_JOINTS], row = 0, jumps = 0;
+    MildError error = {0};
+    Controller controller = policy();
+    const MotorLogDef log = {.task = &def,
+                             .robot = robot,
+                             .controller = &controller,
+                             .motors = &numbered,
+                             .seconds = 4,
+                             .seed = 3,
+                             .csv = open_memstream(&text, &size)};
+    times_asked = 0;
+    assert_int_equal(motor_log(&log, &falls, &error), MILD_OK);
+    fclose(log.csv);
+    controller_destroy(&controller);
+    line = strtok_r(text, "\n", &rest);
+    for (char *more, *word = strtok_r(line, ",", &more); word; word = strtok_r(NULL, ",", &more)) {
+        of[columns] = -1;
+        for (int n = 0; n < 3 * SA01_JOINTS; n++) {
+            snprintf(name, sizeof name, "%s.%s", robot_joint_name(robot, n / 3), quantities[n % 3]);
+            of[columns] = strcmp(name, word) == 0 ? n : of[columns];
+        }
+        assert_true(columns == 0 ? strcmp(word, "time_s") == 0 : of[columns] >= 0);
+        columns++;
+    }
+    assert_int_equal(columns, 1 + 3 * SA01_JOINTS);
+    double time = 0, before = 0;
+    while ((line = strtok_r(NULL, "\n", &rest))) {
+        for (int c = 0; c < columns; c++, line++) {
+            const double number = strtod(line, &line);
+            if (c == 0) {
+                time = number;
+                continue;
+            }
+            const int joint = of[c] / 3;
+            const double wanted[3] = {asked[row].error[joint], asked[row].speed[joint],
+                                      0.01 * (joint + 1)};
+            assert_true(fabs(number - wanted[of[c] % 3]) <= 1e-5 * fabs(wanted[of[c] % 3]));
+        }
+        const int jumped = time - before > 0.5;
+        assert_true(row == 0 || fabs(time - before - def.physics_dt - jumped) < 1e-6);
+        jumps += jumped;
+        before = time;
+        row++;
+    }
+    print_message("%d rows, %d falls, %d jumps of a second\n", row, falls, jumps);
+    assert_int_equal(row, times_asked);
+    assert_int_equal(row, (int)(log.seconds / def.physics_dt + 0.5));
+    assert_true(falls >= 2 && jumps >= falls - 1 && jumps <= falls);
+    free(text);
+}
+
 /* What the simulation says is not taken for memory that ran out. */
 static void failure_keeps_its_reason(void **state) {
     (void)state;
@@ -185,9 +262,8 @@ static void walks_as_with_the_motor(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(log_of_the_motor),
-        cmocka_unit_test(failure_keeps_its_reason),
-        cmocka_unit_test(network_beats_the_pd),
+        cmocka_unit_test(log_of_the_motor),         cmocka_unit_test(columns_are_what_they_name),
+        cmocka_unit_test(failure_keeps_its_reason), cmocka_unit_test(network_beats_the_pd),
         cmocka_unit_test(walks_as_with_the_motor),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

@@ -177,7 +177,9 @@ static void a_round_foot_is_a_point(void **unused) {
     assert_non_null(map);
     assert_int_equal(mild_terrain_set_map(&terrain, map, &error), MILD_OK);
     RobotVariation nominal = robot_variation_nominal();
-    double worst_place = 0, worst_speed = 0, worst_step = 0, largest = 0;
+    MildTerrain low = terrain;
+    low.height = -0.3;
+    double worst_place = 0, worst_speed = 0, worst_step = 0, worst_height = 0, largest = 0;
     for (uint32_t draw = 0; draw < 20; draw++) {
         RobotState state = moving_state(draw);
         double torque[JOINTS], jacobian[FEET][3 * NV], force[NV] = {0}, rate[NV];
@@ -193,6 +195,15 @@ static void a_round_foot_is_a_point(void **unused) {
                 worst_speed = fmax(worst_speed, fabs(foot->velocity[3 + k]));
             }
         }
+        /* above the rough ground under each foot, which is drawn lower */
+        double clearance = robot_sim_sole_clearance(sim, &low), least = 1e9;
+        for (int f = 0; f < FEET; f++) {
+            const double *at = robot_sim_foot(sim, f)->position;
+            const double height = at[2] - mild_terrain_height_at(&low, at[0], at[1]);
+            worst_height = fmax(worst_height, fabs(robot_sim_foot(sim, f)->sole_height - height));
+            least = fmin(least, height);
+        }
+        worst_height = fmax(worst_height, fabs(clearance - least));
         const mjModel *m = robot_sim_model(sim);
         mjData *d = mj_makeData(m);
         robot_engine_qpos(robot, state.qpos, d->qpos);
@@ -222,9 +233,12 @@ static void a_round_foot_is_a_point(void **unused) {
         }
         mj_deleteData(d);
     }
-    print_message("lowest points off by %.1e m, %.1e m/s; accelerations by %.1e under %.0f N\n",
-                  worst_place, worst_speed, worst_step, largest);
+    print_message(
+        "lowest points off by %.1e m, %.1e m/s, %.1e m of height; accelerations by %.1e under "
+        "%.0f N\n",
+        worst_place, worst_speed, worst_height, worst_step, largest);
     assert_true(worst_place < 1e-12 && worst_speed < 1e-12 && worst_step < 1e-8);
+    assert_true(worst_height < 1e-12);
     assert_true(largest > 5);
     mild_map_destroy(map);
     free(ground);

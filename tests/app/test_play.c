@@ -1,0 +1,195 @@
+/* A walk in a window, with a window of the test's own: what the keys ask for is what the policy is
+ * commanded and what the picture tells, by sign, size and bounds. The clock goes with the frames.
+ */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "app/play.h"
+#include "base/clock.h"
+#include "sa01.h"
+
+#define RATE 50.0 /* [1/s] frames: two policy steps each */
+enum { FRAMES_MAX = 60 };
+
+static WindowInput script[FRAMES_MAX]; /* what the window says after each frame */
+static int frames, resets;
+static double now;                      /* [s] */
+static double shown[FRAMES_MAX + 1][3]; /* commands that the picture tells */
+static double acted[FRAMES_MAX + 1][3]; /* commands that the policy last saw before a frame */
+static double walked[FRAMES_MAX + 1];   /* [s] that the picture tells */
+static double latest[3];
+static View *const no_view = (View *)(void *)latest; /* never looked into */
+
+double __wrap_clock_seconds(void);
+double __wrap_clock_seconds(void) {
+    return now;
+}
+
+void __wrap_view_observe(View *view, const RobotSim *sim);
+void __wrap_view_observe(View *view, const RobotSim *sim) {
+    assert_true(view == no_view && sim);
+}
+
+MildStatus __wrap_view_reset(View *view, const MildTerrain *terrain, MildError *error);
+MildStatus __wrap_view_reset(View *view, const MildTerrain *terrain, MildError *error) {
+    (void)error;
+    assert_true(view == no_view && terrain);
+    resets++;
+    return MILD_OK;
+}
+
+void __wrap_view_frame(View *view, const RobotSim *sim, const ViewInfo *info);
+void __wrap_view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
+    assert_true(view == no_view && sim && frames <= FRAMES_MAX);
+    memcpy(shown[frames], info->command, sizeof shown[0]);
+    memcpy(acted[frames], latest, sizeof latest);
+    walked[frames] = info->time;
+}
+
+void __wrap_view_show(View *view, WindowInput *input);
+void __wrap_view_show(View *view, WindowInput *input) {
+    assert_true(view == no_view);
+    *input = script[frames++];
+    input->time_scale = input->time_scale == 0 ? 1 : input->time_scale;
+    now += 1 / RATE + 1e-9;
+}
+
+static void hold(void *self, int rows, TaskEnv *const *envs, float *actions) {
+    assert_int_equal(rows, 1);
+    memcpy(latest, envs[0]->command, sizeof latest);
+    memset(actions, 0, sizeof *actions * (size_t) * (const int *)self);
+}
+
+/* Plays the script's first `count` frames. */
+static void play(int count) {
+    MildError error = {0};
+    TaskDef task = task_def_default();
+    Scene scene;
+    task_def_make_nominal(&task);
+    Robot *robot = robot_create(SA01, &error);
+    assert_non_null(robot);
+    int joints = robot_joints(robot);
+    Controller controller = {.self = &joints, .name = "hold", .act = hold};
+    assert_int_equal(scene_make(&scene, "grass", 2, &error), MILD_OK);
+    Play walk = {.task = &task,
+                 .robot = robot,
+                 .scene = &scene,
+                 .controller = &controller,
+                 .view = no_view,
+                 .rate = RATE,
+                 .seed = 1,
+                 .window = 1};
+    script[count - 1].quit = 1;
+    frames = resets = 0;
+    assert_int_equal(play_run(&walk, &error), MILD_OK);
+    assert_int_equal(frames, count);
+    robot_destroy(robot);
+}
+
+static void clear(void) {
+    memset(script, 0, sizeof script);
+}
+
+/* NaN: any. */
+static void expect_command(int frame, double forward, double left, double turn) {
+    const double wanted[3] = {forward, left, turn};
+    for (int c = 0; c < 3; c++) {
+        const double off =
+            fmax(fabs(shown[frame][c] - wanted[c]), fabs(acted[frame][c] - wanted[c]));
+        if (off > 1e-9) {
+            fail_msg("frame %d, part %d: the picture tells %g, the policy saw %g, asked was %g",
+                     frame, c, shown[frame][c], acted[frame][c], wanted[c]);
+        }
+    }
+}
+
+/* Each part of the command by itself, both ways; what was asked stays, and what is asked adds up.
+ * A command that came after a frame is seen by the second of its steps, so a frame later. */
+static void keys_command(void **state) {
+    (void)state;
+    clear();
+    script[0].command[0] = 0.4;
+    script[3].command[1] = 0.2;
+    script[6].command[2] = -0.3;
+    script[9].command[0] = -0.1;
+    script[12].command[1] = -0.3;
+    script[15].command[2] = 0.5;
+    play(19);
+    expect_command(3, 0.4, 0, NAN); /* the heading is held */
+    expect_command(6, 0.4, 0.2, 0);
+    expect_command(9, 0.4, 0.2, -0.3);
+    expect_command(12, 0.3, 0.2, -0.3);
+    expect_command(15, 0.3, -0.1, -0.3);
+    expect_command(18, 0.3, -0.1, 0.2);
+}
+
+/* Until somebody steers, the task holds the heading, also where a key goes forward. */
+static void the_heading_is_held_until_somebody_steers(void **state) {
+    (void)state;
+    clear();
+    script[0].command[0] = 0.2;
+    script[10].command[2] = 0.1;
+    script[13].command[2] = -0.1;
+    play(16);
+    double turned = 0;
+    for (int f = 2; f <= 10; f++) {
+        turned = fmax(turned, fabs(shown[f][2]));
+        assert_true(fabs(shown[f][0] - 0.2) < 1e-9);
+    }
+    assert_true(turned > 1e-6); /* the start's heading is not quite ahead */
+    expect_command(13, 0.2, 0, 0.1);
+    expect_command(15, 0.2, 0, 0);
+}
+
+/* S stops; the bounds are the ranges that the policy was trained on. */
+static void bounds_and_halt(void **state) {
+    (void)state;
+    clear();
+    for (int f = 0; f < 20; f++) {
+        script[f].command[0] = 0.1, script[f].command[1] = 0.1, script[f].command[2] = 0.1;
+    }
+    script[22].halt = 1;
+    for (int f = 26; f < 46; f++) {
+        script[f].command[0] = -0.1, script[f].command[1] = -0.1, script[f].command[2] = -0.1;
+    }
+    play(49);
+    expect_command(22, 1.3, 0.3, 0.8);
+    expect_command(26, 0, 0, 0);
+    expect_command(48, -1.3, -0.3, -0.8);
+}
+
+/* Space holds the time, = doubles it, R begins anew. */
+static void time_of_the_walk(void **state) {
+    (void)state;
+    clear();
+    for (int f = 0; f < 30; f++) {
+        script[f].paused = f >= 5 && f < 10;
+        script[f].time_scale = f >= 10 && f < 15 ? 2 : f >= 15 && f < 20 ? 0.5 : 1;
+    }
+    script[25].reset = 1;
+    play(30);
+    const double frame = 1 / RATE;
+    assert_true(fabs(walked[5] - 5 * frame) < 1e-6);
+    assert_true(fabs(walked[10] - walked[5]) < 1e-9);
+    assert_true(fabs(walked[15] - walked[10] - 10 * frame) < 1e-6);
+    assert_true(fabs(walked[20] - walked[15] - 2.5 * frame) < 0.011);
+    assert_int_equal(resets, 1);
+    assert_true(fabs(walked[29] - 4 * frame) < 0.011);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(keys_command),
+        cmocka_unit_test(the_heading_is_held_until_somebody_steers),
+        cmocka_unit_test(bounds_and_halt),
+        cmocka_unit_test(time_of_the_walk),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,125 @@
+/* The rows of the ground benches, by a clock that only the ground's own calls move, each by a time
+ * of its own: what a row measured can be read from it. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "base/clock.h"
+#include "run/bench/bench.h"
+
+/* [s] of the calls */
+enum {
+    NEWTON = 2,
+    SWEEPS = 5,
+    SLIPS = 10,
+    UNEVEN = 20,
+    IMPRINTS = 40,
+    OF_MODEL = 100,
+    ADVANCE = 1
+};
+
+static double now;         /* [s] of the clock */
+static size_t plain_bytes; /* of a ground without imprints; 0: not known yet */
+
+double __wrap_clock_thread_seconds(void);
+double __wrap_clock_thread_seconds(void) {
+    return now;
+}
+
+MildStatus __real_mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
+                                    const MildContactInput *input, MildScratch *scratch,
+                                    MildContactResult *result);
+MildStatus __wrap_mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
+                                    const MildContactInput *input, MildScratch *scratch,
+                                    MildContactResult *result);
+MildStatus __wrap_mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
+                                    const MildContactInput *input, MildScratch *scratch,
+                                    MildContactResult *result) {
+    plain_bytes = plain_bytes ? plain_bytes : mild_ground_size(ground);
+    now += input->solver == MILD_SOLVER_NEWTON ? NEWTON : SWEEPS;
+    now += input->velocity[0][0] > 0.1 && input->velocity[1][0] > 0.1 ? SLIPS : 0;
+    now += terrain->map ? UNEVEN : 0;
+    now += mild_ground_size(ground) > 2 * plain_bytes ? IMPRINTS : 0;
+    now += OF_MODEL * (double)terrain->materials[0].model;
+    return __real_mild_ground_solve(ground, terrain, input, scratch, result);
+}
+
+MildStatus __real_mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
+                                      const MildContactInput *input, MildScratch *scratch,
+                                      const MildContactResult *result);
+MildStatus __wrap_mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
+                                      const MildContactInput *input, MildScratch *scratch,
+                                      const MildContactResult *result);
+MildStatus __wrap_mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
+                                      const MildContactInput *input, MildScratch *scratch,
+                                      const MildContactResult *result) {
+    now += ADVANCE;
+    return __real_mild_ground_advance(ground, terrain, input, scratch, result);
+}
+
+/* The row in seconds where its unit is ns. */
+static void expect_row(const BenchReport *report, const char *name, double wanted) {
+    for (int i = 0; i < report->count; i++) {
+        const BenchRow *row = &report->rows[i];
+        if (strcmp(row->name, name) == 0) {
+            const double is = row->value * (strncmp(row->unit, "ns", 2) == 0 ? 1e-9 : 1);
+            print_message("%-24s %10g, wanted %10g\n", name, is, wanted);
+            assert_true(fabs(is - wanted) < 1e-9 * wanted);
+            return;
+        }
+    }
+    fail_msg("no row %s", name);
+}
+
+static void a_row_measures_what_it_names(void **state) {
+    (void)state;
+    static BenchReport report;
+    MildError error = {0};
+    const ExperimentDef def = experiment_def_default();
+    assert_int_equal(bench_ground(&def, &report, &error), MILD_OK);
+    expect_row(&report, "newton_stick", NEWTON);
+    expect_row(&report, "newton_stick_advance", NEWTON + ADVANCE);
+    expect_row(&report, "newton_slip", NEWTON + SLIPS);
+    expect_row(&report, "gauss_seidel_stick", SWEEPS);
+    expect_row(&report, "gauss_seidel_slip", SWEEPS + SLIPS);
+    expect_row(&report, "newton_uneven_advance", NEWTON + UNEVEN + ADVANCE);
+    expect_row(&report, "newton_prints_advance", NEWTON + IMPRINTS + ADVANCE);
+    expect_row(&report, "elements", 154);
+    for (int model = MILD_MODEL_MILD + 1; model < MILD_MODEL_RIGID; model++) {
+        char name[40];
+        snprintf(name, sizeof name, "newton_%s", mild_model_names[model]);
+        expect_row(&report, name, NEWTON + OF_MODEL * (double)model);
+    }
+    assert_int_equal(report.count, 8 + MILD_MODEL_RIGID - MILD_MODEL_MILD - 1);
+}
+
+/* Per element of both plates. */
+static void time_per_element(void **state) {
+    (void)state;
+    static BenchReport report;
+    MildError error = {0};
+    const ExperimentDef def = experiment_def_default();
+    plain_bytes = SIZE_MAX / 4; /* no imprints here */
+    assert_int_equal(bench_elements(&def, &report, &error), MILD_OK);
+    for (int i = 0; i < report.count; i++) {
+        int elements;
+        const int slips = sscanf(report.rows[i].name, "slip_%d", &elements) == 1;
+        assert_true(slips || sscanf(report.rows[i].name, "stick_%d", &elements) == 1);
+        expect_row(&report, report.rows[i].name,
+                   (NEWTON + ADVANCE + (slips ? SLIPS : 0)) / (double)elements);
+    }
+    expect_row(&report, "stick_20", (NEWTON + ADVANCE) / 20.0);
+    expect_row(&report, "slip_2000", (NEWTON + ADVANCE + SLIPS) / 2000.0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_row_measures_what_it_names),
+                                       cmocka_unit_test(time_per_element)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
