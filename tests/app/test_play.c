@@ -1,18 +1,9 @@
 /* A walk in a window, with a window of the test's own: what the keys ask for is what the policy is
  * commanded and what the picture tells, by sign, size and bounds. The clock goes with the frames.
  */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "app/play.h"
 #include "base/clock.h"
+#include "kit.h"
 #include "sa01.h"
 
 #define RATE 50.0 /* [1/s] frames: two policy steps each */

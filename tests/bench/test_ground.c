@@ -1,16 +1,7 @@
 /* The rows of the ground benches, by a clock that only the ground's own calls move, each by a time
  * of its own: what a row measured can be read from it. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "base/clock.h"
+#include "kit.h"
 #include "run/bench/bench.h"
 
 /* [s] of the calls */

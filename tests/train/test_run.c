@@ -1,16 +1,6 @@
 /* The log of a run: each column has the number that its name says, of the report of that
  * iteration. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
+#include "kit.h"
 #include "run/train/run.h"
 
 enum { ITERATIONS = 3, ENVS = 12, STEPS = 30, COLUMNS_MAX = 80 };
