@@ -147,6 +147,23 @@ static void take_row(Eval *e, FILE *table) {
     fflush(table);
 }
 
+static EvalRun eval_of(const Eval *e, const Robot *robot, Pool *pool, Controller *controller,
+                       const Scene *scenes, int scene_count, const double *speeds,
+                       int speed_count) {
+    const int device = train_device(&e->train);
+    return (EvalRun){.task = &e->task,
+                     .robot = robot,
+                     .pool = pool,
+                     .controller = controller,
+                     .batch = train_is_batch(&e->train),
+                     .device = device < 0 ? MILD_BATCH_HOST : device,
+                     .scenes = scenes,
+                     .scene_count = scene_count,
+                     .speeds = speeds,
+                     .speed_count = speed_count,
+                     .eval = e->eval};
+}
+
 /* Ground after ground, speed after speed, by MuJoCo. table: NULL: rows are not kept. */
 static MildStatus evaluate_rows(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
                                 FILE *table, MildError *error) {
@@ -158,8 +175,8 @@ static MildStatus evaluate_rows(Eval *e, const Robot *robot, Pool *pool, Control
         status =
             make_scene(e, e->grounds.name[i / e->speeds.count], e->eval.speed, &scene, &map, error);
         if (status == MILD_OK) {
-            status = eval_run(&e->task, robot, pool, controller, &scene, &e->eval,
-                              &e->rows[e->row_count], error);
+            const EvalRun run = eval_of(e, robot, pool, controller, &scene, 1, &e->eval.speed, 1);
+            status = eval_run(&run, &e->rows[e->row_count], error);
         }
         if (status == MILD_OK && table) {
             take_row(e, table);
@@ -199,7 +216,7 @@ static MildStatus ablate(Eval *e, const Robot *robot, Pool *pool, Controller *co
 /* With --latent or --ablate: rows whose controller is looked into. */
 static MildStatus evaluate_inside(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
                                   FILE *table, MildError *error) {
-    InsideLog log = {.task = &e->task, .feet = robot_feet(robot)};
+    InsideLog log = {.feet = robot_feet(robot)};
     const EvalWatch watch = {inside_decided, &log};
     Sheet sheet = {0};
     MildStatus status = learned_watch(controller, &log.inside, error);
@@ -225,25 +242,16 @@ static MildStatus evaluate_inside(Eval *e, const Robot *robot, Pool *pool, Contr
 /* All at once, by the batch engine. */
 static MildStatus evaluate_batch(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
                                  MildError *error) {
-    const int device = train_device(&e->train);
     MildMap *map = NULL; /* the same for all, because each has one material */
     MildStatus status = MILD_OK;
     for (int g = 0; status == MILD_OK && g < e->grounds.count; g++) {
         mild_map_destroy(map);
         status = make_scene(e, e->grounds.name[g], 0, &e->scenes[g], &map, error);
     }
-    const EvalBatch batch = {.task = &e->task,
-                             .robot = robot,
-                             .pool = pool,
-                             .controller = controller,
-                             .device = device < 0 ? MILD_BATCH_HOST : device,
-                             .scenes = e->scenes,
-                             .scene_count = e->grounds.count,
-                             .speeds = e->speeds.value,
-                             .speed_count = e->speeds.count,
-                             .eval = e->eval};
     if (status == MILD_OK) {
-        status = eval_run_batch(&batch, e->rows, error);
+        const EvalRun run = eval_of(e, robot, pool, controller, e->scenes, e->grounds.count,
+                                    e->speeds.value, e->speeds.count);
+        status = eval_run(&run, e->rows, error);
     }
     mild_map_destroy(map);
     return status;

@@ -1,6 +1,7 @@
 #define MILD_REAL_FLOAT
 #include "env/backend.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,6 +28,9 @@ typedef struct {
     void *block;                /* where the arrays are, but for task and model */
     EnvsGround *drawn;          /* of the device: the grounds of EnvsTask */
     void *trials;               /* where those of trials are */
+    EnvsSample *sample;         /* [envs][physics steps] of the caller; NULL: none */
+    EnvsRecord *record;         /* of the device, once samples were asked for */
+    EnvsRecord *seen;           /* its copy on the host, or the same */
     Pool *pool;                 /* of the host */
     int device;
     size_t robot; /* [B] of EnvRobot */
@@ -52,13 +56,18 @@ static MildStatus check_def(const EnvsDef *def, MildError *error) {
     MildStatus status = task_def_check_robot(task, def->robot, error);
     const int patches = task->randomize.patch_share > 0 && !def->striped &&
                         !(task->map && mild_map_label_count(task->map) > 1);
+    int course = 0; /* bool: a trial's */
+    for (int i = 0; def->trial && i < def->terrains; i++) {
+        course |= def->terrain[i].material_count > 1;
+    }
     const char *missing = patches             ? "randomize.patch_share above 0"
                           : task->print_tiles ? "terrain.memory"
                           : !task->newton     ? "task.newton = 0"
                           : task->motors      ? "task.actuator"
                           : def->trial && task->map && mild_map_label_count(task->map) > 1
                               ? "terrain.patches"
-                              : NULL;
+                          : course ? "a course of several grounds"
+                                   : NULL;
     return status == MILD_OK && missing
                ? mild_fail(error, MILD_ERROR_ARGUMENT,
                            "%s is not there on a device yet; train.robots = mujoco has it", missing)
@@ -293,6 +302,10 @@ static void destroy(Envs *envs) {
     device_free(b->device, b->drawn);
     device_free(b->device, b->block);
     device_free(b->device, b->trials);
+    device_free(b->device, b->record);
+    if (b->device != MILD_BATCH_HOST) {
+        free(b->seen);
+    }
     device_free(b->device, (void *)all->task);
     device_free(b->device, (void *)all->model);
     mild_batch_destroy(b->ground);
@@ -369,7 +382,7 @@ static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
     all.contact = contact_from(&all.contact, first, (size_t)b->shape.feet);
     all.trial = all.trial ? all.trial + first : NULL;
     all.command = all.command ? all.command + 3 * first : NULL;
-    all.sample = all.sample ? all.sample + first * (size_t)b->base.physics_steps : NULL;
+    all.record = all.record ? all.record + first * (size_t)b->base.physics_steps : NULL;
     return all;
 }
 
@@ -502,17 +515,68 @@ static MildStatus reset(Envs *envs, const EnvsView *first, void *stream, MildErr
     return each_share(own(envs), &none, stream, begin_share, error);
 }
 
-static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
-    return step->last.history || step->terms
-               ? mild_fail(error, MILD_ERROR_ARGUMENT,
-                           "the batch engine does not keep the end of an episode; train.robots = "
-                           "mujoco does")
-               : each_share(own(envs), step, stream, step_share, error);
-}
-
 static MildStatus wait(Envs *envs, MildError *error) {
     const Batch *b = own(envs);
     return b->device == MILD_BATCH_HOST ? MILD_OK : device_wait(b->device, error);
+}
+
+static void widen(const float *from, int count, double *to) {
+    for (int i = 0; i < count; i++) {
+        to[i] = (double)from[i];
+    }
+}
+
+static void sample_step(const TaskShape *shape, const EnvsRecord *from, EnvsSample *to) {
+    to->valid = from->valid;
+    to->joints = shape->joints;
+    to->feet = shape->feet;
+    to->above = (double)from->above;
+    to->mass_center[0] = to->mass_center[1] = to->mass_center[2] = (double)NAN;
+    widen(from->base, 3, to->base);
+    widen(from->quaternion, 4, to->quaternion);
+    widen(from->torque, shape->joints, to->torque);
+    widen(from->speed, shape->joints, to->speed);
+    for (int f = 0; f < shape->feet; f++) {
+        to->foot[f].load = (double)from->foot[f].load;
+        to->foot[f].height = (double)from->foot[f].height;
+        to->foot[f].depth = (double)from->foot[f].depth;
+        widen(from->foot[f].center, 2, to->foot[f].center);
+    }
+}
+
+static void sample_piece(void *context, int piece, int thread) {
+    const Batch *b = context;
+    (void)thread;
+    for (int k = 0; k < b->base.physics_steps; k++) {
+        const size_t i = (size_t)piece * (size_t)b->base.physics_steps + (size_t)k;
+        sample_step(&b->shape, &b->seen[i], &b->sample[i]);
+    }
+}
+
+static size_t record_bytes(const Batch *b) {
+    return (size_t)b->base.count * (size_t)b->base.physics_steps * sizeof *b->record;
+}
+
+static MildStatus take_samples(Batch *b, MildError *error) {
+    MildStatus status = wait(&b->base, error);
+    if (status == MILD_OK && b->seen != b->record) {
+        status = device_copy(b->device, b->seen, b->record, record_bytes(b), error);
+    }
+    if (status == MILD_OK) {
+        pool_run(b->pool, b->base.count, sample_piece, b);
+    }
+    return status;
+}
+
+static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+    Batch *b = own(envs);
+    if (step->last.history || step->terms) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "the batch engine does not keep the end of an episode; train.robots = "
+                         "mujoco does");
+    }
+    MildStatus status = each_share(b, step, stream, step_share, error);
+    return status == MILD_OK && b->sample ? take_samples(b, error) : status;
 }
 
 static MildStatus sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error) {
@@ -594,8 +658,18 @@ static MildStatus set_commands(Envs *envs, const double *command, MildError *err
     return status;
 }
 
-static void set_samples(Envs *envs, EnvsSample *sample) {
-    own(envs)->arrays.sample = sample;
+static MildStatus set_samples(Envs *envs, EnvsSample *sample, MildError *error) {
+    Batch *b = own(envs);
+    if (sample && !b->record) {
+        b->record = take(b, record_bytes(b), error);
+        b->seen = b->device == MILD_BATCH_HOST || !b->record ? b->record : malloc(record_bytes(b));
+    }
+    if (sample && !b->seen) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory for samples");
+    }
+    b->sample = sample;
+    b->arrays.record = sample ? b->record : NULL;
+    return MILD_OK;
 }
 
 static const EnvsBackend backend = {.destroy = destroy,
@@ -609,14 +683,31 @@ static const EnvsBackend backend = {.destroy = destroy,
                                     .set_commands = set_commands,
                                     .set_samples = set_samples};
 
+/* Those of trials, with the depth of a robot that stands on them. NULL: out of memory. */
+static TaskGrounds *trial_grounds(const EnvsDef *def, MildError *error) {
+    TaskGrounds *grounds = malloc(sizeof *grounds);
+    TaskGround *ground = calloc((size_t)def->terrains, sizeof *ground);
+    if (!grounds || !ground) {
+        free(grounds);
+        free(ground);
+        mild_fail(error, MILD_ERROR_MEMORY, "no memory for %d grounds", def->terrains);
+        return NULL;
+    }
+    for (int i = 0; i < def->terrains; i++) {
+        ground[i].material = def->terrain[i].materials[0];
+        ground[i].depth = task_standing_depth(def->robot, &ground[i].material);
+    }
+    *grounds = (TaskGrounds){def->terrains, ground};
+    return grounds;
+}
+
 Envs *envs_create_batch(const EnvsDef *def, MildError *error) {
     if (check_def(def, error) != MILD_OK) {
         return NULL;
     }
-    TaskGrounds *drawn = def->chosen ? NULL
-                                     : task_grounds_create(def->task, def->robot, def->grounds,
-                                                           def->seed, def->pool, error);
-    const TaskGrounds *grounds = def->chosen ? def->chosen : drawn;
+    TaskGrounds *grounds = def->trial ? trial_grounds(def, error)
+                                      : task_grounds_create(def->task, def->robot, def->grounds,
+                                                            def->seed, def->pool, error);
     Batch *b = grounds ? calloc(1, sizeof *b) : NULL;
     if (grounds && !b) {
         mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
@@ -628,7 +719,7 @@ Envs *envs_create_batch(const EnvsDef *def, MildError *error) {
         destroy(&b->base);
         b = NULL;
     }
-    task_grounds_destroy(drawn);
+    task_grounds_destroy(grounds);
     return b ? &b->base : NULL;
 }
 
