@@ -229,8 +229,9 @@ static int cmd_log_actuator(int argc, char **argv) {
          "output"},
         {"robot", CLI_TEXT, &c.context.robot_name, 0, 0, "NAME|DIR",
          ROBOTS_HELP " (default: the policy's, or sa01)"},
-        CONTEXT_CONTROLLER(&c.context),
-        CONTEXT_POLICY(&c.context, "policy that walks"),
+        context_controller(&c.context),
+        context_policy(&c.context,
+                       "policy that walks (default policies/mild.safetensors, or that of --robot)"),
         {"seconds", CLI_NUMBER, &c.log.seconds, 0.1, 3600, "T", "[s] of the log (default 60)"},
         {"shake", CLI_NUMBER, &c.log.shake, 0, 1, "A",
          "[rad] greatest amplitude of the sines of 0.5 to 8 Hz that are added to the targets "

@@ -329,9 +329,10 @@ int cmd_drive(int argc, char **argv) {
                            .torque_share = 1};
     d.simulated = (SimulatedDef){.patience = 30, .seed = 1};
     const CliOption options[] = {
-        CONTEXT_POLICY(&d.context, "policy to run"),
-        CONTEXT_ROBOT(&d.context),
-        CONTEXT_CONFIG(&d.context),
+        context_policy(&d.context,
+                       "policy to run (default policies/mild.safetensors, or that of --robot)"),
+        context_robot(&d.context),
+        context_config(&d.context),
         {"listen", CLI_TEXT, &d.listen, 0, 0, "HOST:PORT",
          "where states arrive; targets go to where they come from (default " ADDRESS ")"},
         {"peer", CLI_TEXT, &d.peer, 0, 0, "HOST[:PORT]",
@@ -377,7 +378,7 @@ int cmd_drive(int argc, char **argv) {
          "127.0.0.1)"},
         {"ground", CLI_TEXT, &d.ground, 0, 0, "NAME[+NAME]",
          "simulated robot: ground, or a course of them (default rigid)"},
-        CONTEXT_MODEL(&d.context),
+        context_model(&d.context),
         {"lockstep", CLI_FLAG, &d.lockstep, 0, 0, NULL,
          "simulated robot: its time stands still until a state is answered"},
         {"patience", CLI_NUMBER, &d.simulated.patience, 0.1, 3600, "T",

@@ -398,14 +398,15 @@ int cmd_eval(int argc, char **argv) {
     Context *c = &e->context;
     set_defaults(e);
     const CliOption options[] = {
-        CONTEXT_POLICY(c, "policy to measure"),
-        CONTEXT_ROBOT(c),
-        CONTEXT_CONTROLLER(c),
-        CONTEXT_CONFIG(c),
+        context_policy(c,
+                       "policy to measure (default policies/mild.safetensors, or that of --robot)"),
+        context_robot(c),
+        context_controller(c),
+        context_config(c),
         {"ground", CLI_NAMES, &e->grounds, 0, 0, "NAME[,NAME]",
          "grounds that `mild info grounds` lists, one row each; rubber+foam45 is a course of both, "
          "in which rigid is a very hard material (default rigid,foam45,sand_loose)"},
-        CONTEXT_MODEL(c),
+        context_model(c),
         {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]",
          "[m/s] commanded forward speeds, one row each (default 0.6; 0 for a controller that "
          "stands)"},

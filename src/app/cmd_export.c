@@ -53,9 +53,10 @@ int cmd_export(int argc, char **argv) {
     static Exporting e;
     e.context = context_default();
     const CliOption options[] = {
-        CONTEXT_POLICY(&e.context, "policy to export"),
-        CONTEXT_ROBOT(&e.context),
-        CONTEXT_CONFIG(&e.context),
+        context_policy(&e.context,
+                       "policy to export (default policies/mild.safetensors, or that of --robot)"),
+        context_robot(&e.context),
+        context_config(&e.context),
         {"onnx", CLI_OUTPUT, &e.onnx, 0, 0, "FILE",
          "write one graph with weights, history and metadata"},
         {"double", CLI_FLAG, &e.in_double, 0, 0, NULL,

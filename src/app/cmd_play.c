@@ -267,12 +267,13 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
 
 static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
     const CliOption options[] = {
-        CONTEXT_POLICY(&c->context, "policy to watch"),
-        CONTEXT_ROBOT(&c->context),
-        CONTEXT_CONTROLLER(&c->context),
+        context_policy(&c->context,
+                       "policy to watch (default policies/mild.safetensors, or that of --robot)"),
+        context_robot(&c->context),
+        context_controller(&c->context),
         {"ground", CLI_NAMES, &c->grounds, 0, 0, "NAME[,NAME]",
          "ground, or several that are crossed in order (default sand_loose)"},
-        CONTEXT_MODEL(&c->context),
+        context_model(&c->context),
         {"patch", CLI_NUMBER, &c->patch, 0.5, 100, "L",
          "[m] length of each ground of a course (default 2)"},
         {"video", CLI_OUTPUT, &c->video, 0, 0, "FILE.mp4",
@@ -285,7 +286,7 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
          "[s] length of the walk; 0: long enough for the course (default 0)"},
         {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S",
          "seed of start and sensor noise (default 1)"},
-        CONTEXT_CONFIG(&c->context),
+        context_config(&c->context),
         {"width", CLI_INT, &c->width, 64, 7680, "N", "[pixels] width of the picture (default 960)"},
         {"height", CLI_INT, &c->height, 64, 4320, "N",
          "[pixels] height of the picture (default 540)"},

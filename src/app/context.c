@@ -77,3 +77,50 @@ void context_close(Context *c) {
     robot_destroy(c->robot);
     pool_destroy(c->pool);
 }
+
+/* ---- options ---- */
+
+CliOption context_policy(Context *c, const char *help) {
+    return (CliOption){"policy", CLI_INPUT, &c->policy, 0, 0, "FILE", help};
+}
+
+CliOption context_robot(Context *c) {
+    return (CliOption){"robot",
+                       CLI_TEXT,
+                       &c->robot_name,
+                       0,
+                       0,
+                       "NAME|DIR",
+                       ROBOTS_HELP " (default: the config's, the policy's, or sa01)"};
+}
+
+CliOption context_controller(Context *c) {
+    return (CliOption){"controller",
+                       CLI_TEXT,
+                       &c->controller,
+                       0,
+                       0,
+                       "NAME",
+                       robots_controller_help(c->controller_help, sizeof c->controller_help)};
+}
+
+CliOption context_config(Context *c) {
+    return (CliOption){"config",
+                       CLI_INPUT,
+                       &c->config,
+                       0,
+                       0,
+                       "FILE",
+                       "config whose section [task] goes before what the policy's file says, such "
+                       "as that of its training"};
+}
+
+CliOption context_model(Context *c) {
+    return (CliOption){"model",
+                       CLI_TEXT,
+                       &c->model,
+                       0,
+                       0,
+                       "NAME",
+                       grounds_model_help(c->model_help, sizeof c->model_help)};
+}

@@ -1,4 +1,4 @@
-/* What a command that has a robot walk opens first: the task, the robot, the ground, who moves it. */
+/* What a command with a robot that walks opens first: task, robot, ground, and who moves it. */
 #ifndef APP_CONTEXT_H
 #define APP_CONTEXT_H
 
@@ -51,31 +51,10 @@ void context_close(Context *c);
 int context_has_policy(const Context *c);
 
 /* Rows of CliCommand.options. */
-#define CONTEXT_POLICY(c, what)                                                                    \
-    {                                                                                              \
-        "policy", CLI_INPUT, &(c)->policy, 0, 0, "FILE",                                           \
-            what " (default policies/mild.safetensors, or that of --robot)"                        \
-    }
-#define CONTEXT_ROBOT(c)                                                                           \
-    {                                                                                              \
-        "robot", CLI_TEXT, &(c)->robot_name, 0, 0, "NAME|DIR",                                     \
-            ROBOTS_HELP " (default: the config's, the policy's, or sa01)"                          \
-    }
-#define CONTEXT_CONFIG(c)                                                                               \
-    {                                                                                                   \
-        "config", CLI_INPUT, &(c)->config, 0, 0, "FILE",                                                \
-            "config whose section [task] goes before what the policy's file says, such as that of its " \
-            "training"                                                                                  \
-    }
-#define CONTEXT_CONTROLLER(c)                                                                      \
-    {                                                                                              \
-        "controller", CLI_TEXT, &(c)->controller, 0, 0, "NAME",                                    \
-            robots_controller_help((c)->controller_help, sizeof(c)->controller_help)               \
-    }
-#define CONTEXT_MODEL(c)                                                                           \
-    {                                                                                              \
-        "model", CLI_TEXT, &(c)->model, 0, 0, "NAME",                                              \
-            grounds_model_help((c)->model_help, sizeof(c)->model_help)                             \
-    }
+CliOption context_policy(Context *c, const char *help);
+CliOption context_robot(Context *c);
+CliOption context_controller(Context *c);
+CliOption context_config(Context *c);
+CliOption context_model(Context *c);
 
 #endif

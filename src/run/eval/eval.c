@@ -1,5 +1,5 @@
-/* Trials as one set of environments: of one row by MuJoCo, of all rows by the batch engine. A policy
- * step is one step of all, and one copy of what the host needs of it. */
+/* Trials as one set of environments, by MuJoCo or by the batch engine. A policy step is one step of
+ * all, and one copy of what the host needs of it. */
 #include "run/eval/eval.h"
 
 #include <math.h>
