@@ -86,8 +86,8 @@ MildStatus envs_set_commands(Envs *envs, const double *command, MildError *error
     return envs->backend->set_commands(envs, command, error);
 }
 
-MildStatus envs_set_samples(Envs *envs, EnvsSample *sample, MildError *error) {
-    return envs->backend->set_samples(envs, sample, error);
+void envs_set_samples(Envs *envs, EnvsSample *sample) {
+    envs->backend->set_samples(envs, sample);
 }
 
 TaskEnv *envs_env(Envs *envs, int i) {

@@ -16,7 +16,7 @@ typedef struct {
     MildStatus (*load_progress)(Envs *envs, const TaskProgress *progress, MildError *error);
     EnvsMemory (*memory)(const Envs *envs);
     MildStatus (*set_commands)(Envs *envs, const double *command, MildError *error);
-    MildStatus (*set_samples)(Envs *envs, EnvsSample *sample, MildError *error);
+    void (*set_samples)(Envs *envs, EnvsSample *sample);
     /* of MuJoCo, else NULL */
     void (*times)(Envs *envs, double *physics, double *ground);
     void *(*state)(Envs *envs, size_t *bytes);

@@ -1,7 +1,6 @@
 #define MILD_REAL_FLOAT
 #include "env/backend.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -28,9 +27,6 @@ typedef struct {
     void *block;                /* where the arrays are, but for task and model */
     EnvsGround *drawn;          /* of the device: the grounds of EnvsTask */
     void *trials;               /* where those of trials are */
-    EnvsSample *sample;         /* [envs][physics steps] of the caller; NULL: none */
-    EnvsRecord *record;         /* of the device, once samples were asked for */
-    EnvsRecord *seen;           /* its copy on the host, or the same */
     Pool *pool;                 /* of the host */
     int device;
     size_t robot; /* [B] of EnvRobot */
@@ -302,10 +298,6 @@ static void destroy(Envs *envs) {
     device_free(b->device, b->drawn);
     device_free(b->device, b->block);
     device_free(b->device, b->trials);
-    device_free(b->device, b->record);
-    if (b->device != MILD_BATCH_HOST) {
-        free(b->seen);
-    }
     device_free(b->device, (void *)all->task);
     device_free(b->device, (void *)all->model);
     mild_batch_destroy(b->ground);
@@ -382,7 +374,7 @@ static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
     all.contact = contact_from(&all.contact, first, (size_t)b->shape.feet);
     all.trial = all.trial ? all.trial + first : NULL;
     all.command = all.command ? all.command + 3 * first : NULL;
-    all.record = all.record ? all.record + first * (size_t)b->base.physics_steps : NULL;
+    all.sample = all.sample ? all.sample + first * (size_t)b->base.physics_steps : NULL;
     return all;
 }
 
@@ -515,68 +507,17 @@ static MildStatus reset(Envs *envs, const EnvsView *first, void *stream, MildErr
     return each_share(own(envs), &none, stream, begin_share, error);
 }
 
+static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+    return step->last.history || step->terms
+               ? mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "the batch engine does not keep the end of an episode; train.robots = "
+                           "mujoco does")
+               : each_share(own(envs), step, stream, step_share, error);
+}
+
 static MildStatus wait(Envs *envs, MildError *error) {
     const Batch *b = own(envs);
     return b->device == MILD_BATCH_HOST ? MILD_OK : device_wait(b->device, error);
-}
-
-static void widen(const float *from, int count, double *to) {
-    for (int i = 0; i < count; i++) {
-        to[i] = (double)from[i];
-    }
-}
-
-static void sample_step(const TaskShape *shape, const EnvsRecord *from, EnvsSample *to) {
-    to->valid = from->valid;
-    to->joints = shape->joints;
-    to->feet = shape->feet;
-    to->above = (double)from->above;
-    to->mass_center[0] = to->mass_center[1] = to->mass_center[2] = (double)NAN;
-    widen(from->base, 3, to->base);
-    widen(from->quaternion, 4, to->quaternion);
-    widen(from->torque, shape->joints, to->torque);
-    widen(from->speed, shape->joints, to->speed);
-    for (int f = 0; f < shape->feet; f++) {
-        to->foot[f].load = (double)from->foot[f].load;
-        to->foot[f].height = (double)from->foot[f].height;
-        to->foot[f].depth = (double)from->foot[f].depth;
-        widen(from->foot[f].center, 2, to->foot[f].center);
-    }
-}
-
-static void sample_piece(void *context, int piece, int thread) {
-    const Batch *b = context;
-    (void)thread;
-    for (int k = 0; k < b->base.physics_steps; k++) {
-        const size_t i = (size_t)piece * (size_t)b->base.physics_steps + (size_t)k;
-        sample_step(&b->shape, &b->seen[i], &b->sample[i]);
-    }
-}
-
-static size_t record_bytes(const Batch *b) {
-    return (size_t)b->base.count * (size_t)b->base.physics_steps * sizeof *b->record;
-}
-
-static MildStatus take_samples(Batch *b, MildError *error) {
-    MildStatus status = wait(&b->base, error);
-    if (status == MILD_OK && b->seen != b->record) {
-        status = device_copy(b->device, b->seen, b->record, record_bytes(b), error);
-    }
-    if (status == MILD_OK) {
-        pool_run(b->pool, b->base.count, sample_piece, b);
-    }
-    return status;
-}
-
-static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
-    Batch *b = own(envs);
-    if (step->last.history || step->terms) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "the batch engine does not keep the end of an episode; train.robots = "
-                         "mujoco does");
-    }
-    MildStatus status = each_share(b, step, stream, step_share, error);
-    return status == MILD_OK && b->sample ? take_samples(b, error) : status;
 }
 
 static MildStatus sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error) {
@@ -658,18 +599,8 @@ static MildStatus set_commands(Envs *envs, const double *command, MildError *err
     return status;
 }
 
-static MildStatus set_samples(Envs *envs, EnvsSample *sample, MildError *error) {
-    Batch *b = own(envs);
-    if (sample && !b->record) {
-        b->record = take(b, record_bytes(b), error);
-        b->seen = b->device == MILD_BATCH_HOST || !b->record ? b->record : malloc(record_bytes(b));
-    }
-    if (sample && !b->seen) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory for samples");
-    }
-    b->sample = sample;
-    b->arrays.record = sample ? b->record : NULL;
-    return MILD_OK;
+static void set_samples(Envs *envs, EnvsSample *sample) {
+    own(envs)->arrays.sample = sample;
 }
 
 static const EnvsBackend backend = {.destroy = destroy,

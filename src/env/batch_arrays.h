@@ -60,22 +60,6 @@ typedef struct {
 } EnvsContact;
 #define ENVS_FAR 1000 /* [m] below a robot on rigid ground: the soft one does not touch it */
 
-/* A physics step as a device writes it; see EnvsSample. */
-typedef struct {
-    int valid; /* bool */
-    float base[3];
-    float above;
-    float quaternion[4];
-    float torque[ROBOT_JOINTS_MAX];
-    float speed[ROBOT_JOINTS_MAX];
-    struct {
-        float load;
-        float center[2];
-        float height;
-        float depth;
-    } foot[ROBOT_FEET_MAX];
-} EnvsRecord;
-
 typedef struct {
     int envs;
     size_t stride;      /* [B] of a TaskEnv and its frames */
@@ -91,7 +75,7 @@ typedef struct {
     EnvsContact contact;
     const EnvsTrial *trial; /* [envs] or NULL */
     double *command;        /* [envs][3] of the trials */
-    EnvsRecord *record;     /* [envs][physics steps] or NULL */
+    EnvsSample *sample;     /* [envs][physics steps] or NULL */
     const EnvsTask *task;
     const EngineModel *model;
 } EnvsArrays;

@@ -192,7 +192,7 @@ static const char *kernels_begin(const EnvsArrays *all, void *stream) {
 }
 
 static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int k, void *stream) {
-    (all->record
+    (all->sample
          ? part<1>
          : part<0>)<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, (cudaStream_t)stream>>>(
         *all, *call, k);

@@ -24,7 +24,7 @@ void envs_host_first(const EnvsArrays *all, const EnvsStep *call, long robot) {
 
 void envs_host_part(const EnvsArrays *all, const EnvsStep *call, int k, long robot) {
     EnvWork place;
-    env_part(all, call, robot, k, all->record != NULL, &place);
+    env_part(all, call, robot, k, all->sample != NULL, &place);
 }
 
 void envs_host_set_command(const EnvsArrays *all, long robot) {

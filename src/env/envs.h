@@ -99,8 +99,8 @@ size_t envs_bytes(const Envs *envs);       /* of all */
  * TaskEnv.command; the first ones before envs_reset. Waits for the device. */
 MildStatus envs_set_commands(Envs *envs, const double *command, MildError *error);
 /* From now on the physics steps of each policy step are written to `sample`,
- * [count][envs_physics_steps] on the CPU, and envs_step waits for the device; NULL: no longer. */
-MildStatus envs_set_samples(Envs *envs, EnvsSample *sample, MildError *error);
+ * [count][envs_physics_steps] in the memory of the device; NULL: no longer. */
+void envs_set_samples(Envs *envs, EnvsSample *sample);
 int envs_physics_steps(const Envs *envs); /* of a policy step */
 
 /* What MuJoCo's robot did in the physics step that `sim` has just made. */

@@ -257,10 +257,8 @@ static MildStatus set_commands(Envs *envs, const double *command, MildError *err
     return MILD_OK;
 }
 
-static MildStatus set_samples(Envs *envs, EnvsSample *sample, MildError *error) {
-    (void)error;
+static void set_samples(Envs *envs, EnvsSample *sample) {
     own(envs)->sample = sample;
-    return MILD_OK;
 }
 
 static TaskEnv *env_of(Envs *envs, int i) {

@@ -23,14 +23,14 @@ typedef struct {
     double depth;     /* [m] deepest element; 0 on rigid ground */
 } EnvsFoot;
 
-/* A physics step, for the measures of an evaluation. The batch engine's numbers are floats. */
+/* A physics step, for the measures of an evaluation. The batch engine computes in float. */
 typedef struct {
     int valid;                       /* bool: the step was made; 0 from a divergence on */
     int joints, feet;                /* of the robot */
     double base[3];                  /* [m] world */
     double above;                    /* [m] height of the base above the ground under it */
     double quaternion[4];            /* [-] base -> world, w x y z */
-    double mass_center[3];           /* [m] of the robot, world; by MuJoCo, else NaN */
+    double mass_center[3];           /* [m] of the robot, world; by MuJoCo, else unset */
     double torque[ROBOT_JOINTS_MAX]; /* [N m] */
     double speed[ROBOT_JOINTS_MAX];  /* [rad/s] of the joints after the step */
     EnvsFoot foot[ROBOT_FEET_MAX];

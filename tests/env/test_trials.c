@@ -54,11 +54,11 @@ static Envs *start(int batch, EnvsDrive drive) {
         at.command[i][2] = -0.2;
     }
     Envs *envs = envs_create(&of, &error);
-    if (!envs || envs_set_samples(envs, at.sample[0], &error) != MILD_OK ||
-        envs_set_commands(envs, at.command[0], &error) != MILD_OK ||
+    if (!envs || envs_set_commands(envs, at.command[0], &error) != MILD_OK ||
         envs_reset(envs, &first, NULL, &error) != MILD_OK) {
         fail_msg("%s", error.text);
     }
+    envs_set_samples(envs, at.sample[0]);
     assert_int_equal(envs_physics_steps(envs), PHYSICS_STEPS);
     return envs;
 }
@@ -153,7 +153,7 @@ static void samples_of_both_are_alike(void **state) {
     for (int i = 0; i < TRIALS; i++) {
         const EnvsSample *a = &mujoco[i][0], *b = &at.sample[i][0];
         assert_true(b->valid && b->joints == a->joints && b->feet == a->feet);
-        assert_true(isnan(b->mass_center[0]) && isfinite(a->mass_center[0]));
+        assert_true(fabs(a->mass_center[0] - a->base[0]) < 0.1);
         for (int k = 0; k < 3; k++) {
             worst = fmax(worst, fabs(a->base[k] - b->base[k]));
         }
@@ -172,7 +172,7 @@ static void samples_of_both_are_alike(void **state) {
     }
     printf("after a physics step %.1e m (bound 1e-5) and %.1e N (bound 0.5) apart\n", worst, load);
     assert_true(worst < 1e-5 && load < 0.5);
-    assert_int_equal(envs_set_samples(envs, NULL, NULL), MILD_OK);
+    envs_set_samples(envs, NULL);
     at.sample[0][0].valid = 7;
     step(envs);
     assert_int_equal(at.sample[0][0].valid, 7); /* no longer written */

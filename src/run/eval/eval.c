@@ -63,8 +63,9 @@ static void push_trial(TaskEnv *env, double speed) {
 
 /* What the environments write in a policy step, one block where they are and its copy here. */
 typedef struct {
-    float *history; /* [trials][TaskShape.history] */
-    float *reward;  /* [trials] */
+    EnvsSample *sample; /* [trials][samples] */
+    float *history;     /* [trials][TaskShape.history] */
+    float *reward;      /* [trials] */
     uint8_t *done, *timeout, *valid;
 } Results;
 
@@ -81,12 +82,11 @@ typedef struct {
     void *device_block, *block;
     float *device_action; /* [trials][joints] on the device */
     Results device, host;
-    EnvsSample *sample; /* [trials][samples] */
-    float *action;      /* [trials][joints] */
-    double *command;    /* [trials][3] */
-    Measure *measure;   /* [trials] */
-    uint8_t *over;      /* [trials] fell or diverged */
-    Track track;        /* if EvalDef.track is given */
+    float *action;    /* [trials][joints] */
+    double *command;  /* [trials][3] */
+    Measure *measure; /* [trials] */
+    uint8_t *over;    /* [trials] fell or diverged */
+    Track track;      /* if EvalDef.track is given */
 } Trials;
 
 static int row_of(const Trials *t, int trial) {
@@ -169,7 +169,8 @@ static MildStatus open_envs(Trials *t, MildError *error) {
 static Results carve(const Trials *t, void *block) {
     const size_t trials = (size_t)t->trials;
     Results at;
-    at.history = block;
+    at.sample = block;
+    at.history = (float *)(void *)(at.sample + trials * (size_t)t->samples);
     at.reward = at.history + trials * (size_t)task_shape(t->run->robot).history;
     at.done = (uint8_t *)(at.reward + trials);
     at.timeout = at.done + trials;
@@ -181,15 +182,15 @@ static MildStatus open_arrays(Trials *t, MildError *error) {
     const size_t trials = (size_t)t->trials, joints = (size_t)robot_joints(t->run->robot);
     const size_t history = (size_t)task_shape(t->run->robot).history;
     t->samples = envs_physics_steps(t->envs);
-    t->bytes = trials * ((history + 1) * sizeof(float) + 3 * sizeof(uint8_t));
+    t->bytes = trials * ((size_t)t->samples * sizeof(EnvsSample) + (history + 1) * sizeof(float) +
+                         3 * sizeof(uint8_t));
     t->block = calloc(1, t->bytes);
-    t->sample = calloc(trials * (size_t)t->samples, sizeof *t->sample);
     t->action = calloc(trials * joints, sizeof *t->action);
     t->command = calloc(trials, 3 * sizeof *t->command);
     t->measure = calloc(trials, sizeof *t->measure);
     t->over = calloc(trials, 1);
     t->env = t->run->batch ? NULL : calloc(trials, sizeof *t->env);
-    if (!t->block || !t->sample || !t->action || !t->command || !t->measure || !t->over ||
+    if (!t->block || !t->action || !t->command || !t->measure || !t->over ||
         (!t->env && !t->run->batch)) {
         return fail_memory(t, error);
     }
@@ -216,7 +217,6 @@ static void close_trials(Trials *t) {
     free(t->trial);
     free(t->env);
     free(t->block);
-    free(t->sample);
     free(t->action);
     free(t->command);
     measure_free(t->measure, t->trials);
@@ -241,7 +241,7 @@ static void start_trial(void *context, int trial, int thread) {
 static void take_trial(void *context, int trial, int thread) {
     Trials *t = context;
     const EvalDef *eval = &t->run->eval;
-    const EnvsSample *first = t->sample + (size_t)trial * (size_t)t->samples, *at = first;
+    const EnvsSample *first = t->host.sample + (size_t)trial * (size_t)t->samples, *at = first;
     (void)thread;
     if (t->over[trial]) {
         return;
@@ -286,8 +286,8 @@ static void show_decisions(const Trials *t, int step) {
 static MildStatus start(Trials *t, MildError *error) {
     const EnvsView first = {.history = t->device.history};
     pool_run(t->run->pool, t->trials, start_trial, t);
-    MildStatus status = envs_set_samples(t->envs, t->sample, error);
-    status = status == MILD_OK ? envs_set_commands(t->envs, t->command, error) : status;
+    envs_set_samples(t->envs, t->device.sample);
+    MildStatus status = envs_set_commands(t->envs, t->command, error);
     status = status == MILD_OK ? envs_reset(t->envs, &first, NULL, error) : status;
     return status == MILD_OK
                ? device_copy(t->run->device, t->block, t->device_block, t->bytes, error)
