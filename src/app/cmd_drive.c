@@ -265,6 +265,9 @@ static MildStatus run_simulated(Drive *d, MildError *error) {
     Scene scene;
     const char *ground = d->ground ? d->ground : "rigid";
     MildStatus status = context_scene(&d->context, ground, 2.5, &scene, error);
+    if (status == MILD_OK) {
+        status = task_def_check_robot(&d->context.task, d->context.robot, error);
+    }
     return status == MILD_OK ? walk_on(d, &scene, error) : status;
 }
 

@@ -59,7 +59,7 @@ MildStatus context_scene(Context *c, const char *name, double patch, Scene *scen
         status = grounds_finish_scene(&c->grounds, scene, error);
     }
     if (status == MILD_OK) {
-        status = task_def_check_robot(&c->task, c->robot, error);
+        status = task_def_check(&c->task, error); /* its actuator is opened later */
     }
     return status == MILD_OK ? grounds_lay_map(&c->grounds, scene, &c->map, error) : status;
 }
