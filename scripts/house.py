@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Checks what clang-format 14 does not: no line of C is wider than 100 columns, and every body of an
-if, else, for, while and do has braces. Usage: scripts/house.py FILE..."""
+"""Checks what clang-format 14 does not: no line of C is wider than 100 columns, every body of an if,
+else, for, while and do has braces, no file has more than 800 lines, and no function but main more
+than 60, but for tests; a table in it, that is an initialiser, counts as one line. Usage: scripts/house.py FILE..."""
 
 import pathlib
 import sys
@@ -8,6 +9,8 @@ import sys
 from mutate import partners, tokens_of
 
 COLUMNS = 100
+FILE_LINES = 800
+FUNCTION_LINES = 60
 
 
 def wide_lines(source):
@@ -40,11 +43,66 @@ def bare_bodies(source):
         yield source.count("\n", 0, token.begin) + 1, f"the body of this {token.text} has no braces"
 
 
+def is_table(source, tokens, i):
+    """Whether the { of tokens[i] begins an initialiser: `= {`, or `(Type){`."""
+    before = tokens[i - 1]
+    return before.text == "=" or (before.text == ")" and before.end == tokens[i].begin)
+
+
+def table_lines(source, tokens, pair, begin, end):
+    """Lines that the outermost tables between two tokens take beyond their first."""
+    lines, i = 0, begin
+    while i < end:
+        if tokens[i].text == "{" and is_table(source, tokens, i):
+            lines += source.count("\n", tokens[i].begin, tokens[pair[i]].end)
+            i = pair[i]
+        i += 1
+    return lines
+
+
+def function_name(tokens, pair, i):
+    """Of the function whose body begins at tokens[i]; CONTACT(name)(...) { is one, too."""
+    before = pair[i - 1] - 1
+    return tokens[before].text if tokens[before].text != ")" else tokens[before - 1].text
+
+
+def long_functions(source):
+    """Functions that are longer than they may be, at their first brace."""
+    tokens = [t for t in tokens_of(source) if t.text != "#define"]
+    pair = partners(tokens)
+    i = 0
+    while i < len(tokens):
+        if tokens[i].text != "{" or i not in pair:
+            i += 1
+            continue
+        if tokens[i - 1].kind == "string":  # extern "C" {
+            i += 1
+            continue
+        if tokens[i - 1].text == ")" and not is_table(source, tokens, i):
+            name = function_name(tokens, pair, i)
+            inside = source.count("\n", tokens[i].begin, tokens[pair[i]].begin) - 1
+            lines = inside - table_lines(source, tokens, pair, i + 1, pair[i])
+            if lines > FUNCTION_LINES and name != "main":
+                line = source.count("\n", 0, tokens[i].begin) + 1
+                yield line, f"{name} has {lines} lines, {FUNCTION_LINES} are allowed"
+        i = pair[i] + 1
+
+
+def long_files(source):
+    lines = source.count("\n")
+    if lines > FILE_LINES:
+        yield lines, f"{lines} lines, {FILE_LINES} are allowed"
+
+
 def main():
     found = 0
     for name in sys.argv[1:]:
-        source = pathlib.Path(name).read_text(encoding="utf-8")
-        for number, what in sorted([*wide_lines(source), *bare_bodies(source)]):
+        path = pathlib.Path(name)
+        source = path.read_text(encoding="utf-8")
+        faults = [*wide_lines(source), *bare_bodies(source), *long_files(source)]
+        if "tests" not in path.parts:
+            faults += long_functions(source)
+        for number, what in sorted(faults):
             print(f"{name}:{number}: {what}")
             found += 1
     sys.exit(1 if found else 0)

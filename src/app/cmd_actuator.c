@@ -6,9 +6,9 @@
 
 #include "app/cli.h"
 #include "app/commands.h"
+#include "app/context.h"
 #include "app/figure.h"
 #include "app/report.h"
-#include "app/robots.h"
 #include "base/file.h"
 #include "env/actuator/fit.h"
 #include "env/actuator/motor.h"
@@ -167,20 +167,20 @@ static int cmd_fit_actuator(int argc, char **argv) {
 /* ---- log ---- */
 
 typedef struct {
-    const char *out, *robot, *policy, *controller;
+    Context context;
+    const char *out;
     MotorDef motor;
     Motor made_up;
-    Controller walker;
     MotorLogDef log;
-    TaskDef task;
 } LogCommand;
 
-static MildStatus write_log(LogCommand *c, const Robot *robot, MildError *error) {
+static MildStatus write_log(LogCommand *c, MildError *error) {
+    Context *on = &c->context;
     char *text = NULL;
     size_t size = 0;
     int falls;
-    motor_init(&c->made_up, &c->motor, robot, c->task.physics_dt);
-    c->log.task = &c->task, c->log.robot = robot, c->log.controller = &c->walker;
+    motor_init(&c->made_up, &c->motor, on->robot, on->task.physics_dt);
+    c->log.task = &on->task, c->log.robot = on->robot, c->log.controller = &on->mover;
     c->log.motors = &c->made_up.motors;
     c->log.csv = open_memstream(&text, &size);
     if (!c->log.csv) {
@@ -201,43 +201,37 @@ static MildStatus write_log(LogCommand *c, const Robot *robot, MildError *error)
     return status;
 }
 
-static MildStatus run_log(LogCommand *c, MildError *error) {
+static MildStatus run_log(LogCommand *c, const CliArgs *args, MildError *error) {
     if (!c->out) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "--out LOG.csv is missing");
     }
-    Robot *robot = robots_open(c->robot, "sa01", error);
-    if (!robot) {
-        return error->status;
-    }
-    char named[TRAIN_ROBOT_SIZE];
-    MildStatus status = experiment_task(&c->task, 0, named, NULL, c->policy, error);
-    c->task.randomize.push_interval = task_def_default().randomize.push_interval;
-    const ControllerDef def = {c->policy, &c->task, robot, NULL, 1};
+    Context *on = &c->context;
+    MildStatus status = context_open(on, args, error);
+    on->task.randomize.push_interval = task_def_default().randomize.push_interval;
     if (status == MILD_OK) {
-        status = controller_make(c->controller, &def, &c->walker, error);
+        status = context_move(on, 1, error);
     }
     if (status == MILD_OK) {
-        status = write_log(c, robot, error);
+        status = write_log(c, error);
     }
-    controller_destroy(&c->walker);
-    robot_destroy(robot);
+    context_close(on);
     return status;
 }
 
 static int cmd_log_actuator(int argc, char **argv) {
-    char shipped[PATH_SIZE], controller_help[ROBOTS_CONTROLLER_HELP];
-    LogCommand c = {.controller = "learned",
+    LogCommand c = {.context = context_default(),
                     .motor = motor_def_default(),
                     .log = {.seconds = 60, .shake = 0.1, .seed = 1}};
+    c.context.controller = "learned";
     const CliOption options[] = {
         {"out", CLI_OUTPUT, &c.out, 0, 0, "LOG.csv",
          "where the log is written; - for standard "
          "output"},
-        {"robot", CLI_TEXT, &c.robot, 0, 0, "NAME|DIR", ROBOTS_HELP " (default sa01)"},
-        {"controller", CLI_TEXT, &c.controller, 0, 0, "NAME",
-         robots_controller_help(controller_help, sizeof controller_help)},
-        {"policy", CLI_INPUT, &c.policy, 0, 0, "FILE",
-         "policy that walks (default policies/mild.safetensors, or that of --robot)"},
+        {"robot", CLI_TEXT, &c.context.robot_name, 0, 0, "NAME|DIR",
+         ROBOTS_HELP " (default: the policy's, or sa01)"},
+        context_controller(&c.context),
+        context_policy(&c.context,
+                       "policy that walks (default policies/mild.safetensors, or that of --robot)"),
         {"seconds", CLI_NUMBER, &c.log.seconds, 0.1, 3600, "T", "[s] of the log (default 60)"},
         {"shake", CLI_NUMBER, &c.log.shake, 0, 1, "A",
          "[rad] greatest amplitude of the sines of 0.5 to 8 Hz that are added to the targets "
@@ -272,8 +266,7 @@ static int cmd_log_actuator(int argc, char **argv) {
         return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     }
     MildError error = {0};
-    c.policy = c.policy ? c.policy : robot_policy(c.robot, shipped);
-    return run_log(&c, &error) == MILD_OK ? 0 : cli_fail("actuator log", &error);
+    return run_log(&c, &args, &error) == MILD_OK ? 0 : cli_fail("actuator log", &error);
 }
 
 /* ---- the command ---- */

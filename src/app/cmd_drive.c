@@ -7,23 +7,19 @@
 #include "app/build.h"
 #include "app/cli.h"
 #include "app/commands.h"
-#include "app/grounds.h"
+#include "app/context.h"
 #include "app/report.h"
-#include "app/robots.h"
-#include "base/paths.h"
 #include "deploy/drive/drive.h"
 #include "deploy/drive/simulated.h"
-#include "run/eval/scene.h"
 
 #define ADDRESS "127.0.0.1:9870"
 
 typedef struct {
-    const char *policy, *robot, *config, *json, *gamepad;
-    const char *listen, *connect, *bind, *peer, *key, *ground, *model; /* NULL: not given */
+    Context context;
+    const char *json, *gamepad, *listen, *connect, *bind, *peer, *key,
+        *ground; /* NULL: not given */
     CliNumbers command, delay;
     int simulate, no_keys, lockstep;
-    TaskDef task;
-    TerrainDef terrain;
     RunnerDef runner;
     SimulatedDef simulated;
     Key secret; /* of --key */
@@ -49,11 +45,10 @@ static cJSON *add_times(cJSON *parent, const char *name, const Times *times) {
     return o;
 }
 
-static cJSON *runner_json(const Drive *d, const Robot *robot, const DriveReport *report,
-                          const RunnerReport *runner) {
+static cJSON *runner_json(const Context *c, const DriveReport *report, const RunnerReport *runner) {
     cJSON *root = cJSON_CreateObject();
-    cJSON_AddStringToObject(root, "policy", d->policy);
-    cJSON_AddStringToObject(root, "robot", robot_name(robot));
+    cJSON_AddStringToObject(root, "policy", c->policy);
+    cJSON_AddStringToObject(root, "robot", robot_name(c->robot));
     cJSON_AddStringToObject(root, "version", build_version());
     cJSON_AddStringToObject(root, "end", report->end);
     cJSON_AddStringToObject(root, "why_damped", runner->why);
@@ -180,8 +175,9 @@ static void tell(const char *refusal) {
     fprintf(stderr, "mild drive: refused a packet: %s\n", refusal);
 }
 
-static MildStatus run_on(Drive *d, const Robot *robot, Runner *runner, Udp *udp, MildError *error) {
-    const TaskDef *t = &d->task;
+static MildStatus run_on(Drive *d, Runner *runner, Udp *udp, MildError *error) {
+    const Robot *robot = d->context.robot;
+    const TaskDef *t = &d->context.task;
     const double range[3] = {t->vx[1], greater(t->vy[1], -t->vy[0]), greater(t->wz[1], -t->wz[0])};
     const int taken = d->json && strcmp(d->json, "-") == 0;
     char text[32];
@@ -201,18 +197,18 @@ static MildStatus run_on(Drive *d, const Robot *robot, Runner *runner, Udp *udp,
     const RunnerReport *counts = runner_report(runner);
     print_runner(taken ? stderr : stdout, &report, counts);
     if (d->json) {
-        status = report_save(runner_json(d, robot, &report, counts), d->json, error);
+        status = report_save(runner_json(&d->context, &report, counts), d->json, error);
     }
     return status == MILD_OK && counts->why[0]
                ? mild_fail(error, MILD_ERROR_IO, "damped: %s", counts->why)
                : status;
 }
 
-static MildStatus run_runner(Drive *d, const Robot *robot, MildError *error) {
+static MildStatus run_runner(Drive *d, MildError *error) {
     Udp udp = {.file = -1};
-    d->runner.policy = d->policy;
-    d->runner.robot = robot;
-    d->runner.task = &d->task;
+    d->runner.policy = d->context.policy;
+    d->runner.robot = d->context.robot;
+    d->runner.task = &d->context.task;
     MildStatus status = key_draw_session(&d->runner.session, error);
     if (status == MILD_OK && d->peer) {
         status = udp_find_sender("peer", d->peer, &d->runner.peer, error);
@@ -223,7 +219,7 @@ static MildStatus run_runner(Drive *d, const Robot *robot, MildError *error) {
         status = udp_listen(&udp, "listen", d->listen ? d->listen : ADDRESS, error);
     }
     if (status == MILD_OK) {
-        status = run_on(d, robot, runner, &udp, error);
+        status = run_on(d, runner, &udp, error);
     }
     udp_close(&udp);
     runner_destroy(runner);
@@ -232,13 +228,12 @@ static MildStatus run_runner(Drive *d, const Robot *robot, MildError *error) {
 
 /* ---- the simulated robot ---- */
 
-static MildStatus walk_on(const Drive *d, const Robot *robot, const Scene *scene,
-                          MildError *error) {
+static MildStatus walk_on(const Drive *d, const Scene *scene, MildError *error) {
     Udp udp = {.file = -1};
     SimulatedDef def = d->simulated;
     SimulatedReport report;
-    def.robot = robot;
-    def.task = &d->task;
+    def.robot = d->context.robot;
+    def.task = &d->context.task;
     def.terrain = &scene->terrain;
     def.rigid = scene->rigid;
     def.udp = &udp;
@@ -260,35 +255,20 @@ static MildStatus walk_on(const Drive *d, const Robot *robot, const Scene *scene
     fprintf(d->json && strcmp(d->json, "-") == 0 ? stderr : stdout,
             "%s on %s: %s after %.2f s and %.2f m, %.2f of real time; states %ld, dropped %ld, "
             "delayed %ld; targets %ld, refused %ld, of strangers %ld; damped %.2f s\n",
-            robot_name(robot), scene->name, report.end, report.seconds, report.way[0], report.rate,
-            report.sent, report.dropped, report.delayed, report.targets, report.refused,
-            report.strangers, report.damped);
+            robot_name(def.robot), scene->name, report.end, report.seconds, report.way[0],
+            report.rate, report.sent, report.dropped, report.delayed, report.targets,
+            report.refused, report.strangers, report.damped);
     return d->json ? report_save(simulated_json(&report), d->json, error) : MILD_OK;
 }
 
-static MildStatus run_simulated(Drive *d, Robot *robot, const CliArgs *args, MildError *error) {
-    MildModel model;
+static MildStatus run_simulated(Drive *d, MildError *error) {
     Scene scene;
-    MildMap *map = NULL;
-    MildStatus status = grounds_model(d->model, args, &model, error);
+    const char *ground = d->ground ? d->ground : "rigid";
+    MildStatus status = context_scene(&d->context, ground, 2.5, &scene, error);
     if (status == MILD_OK) {
-        const GroundsDef finish = grounds_for_robot(model, robot, &d->task, &d->terrain, args);
-        status = scene_make(&scene, d->ground ? d->ground : "rigid", 2.5, error);
-        if (status == MILD_OK) {
-            status = grounds_finish_scene(&finish, &scene, error);
-        }
-        if (status == MILD_OK) {
-            status = task_def_check_robot(&d->task, robot, error);
-        }
-        if (status == MILD_OK) {
-            status = grounds_lay_map(&finish, &scene, &map, error);
-        }
+        status = task_def_check_robot(&d->context.task, d->context.robot, error);
     }
-    if (status == MILD_OK) {
-        status = walk_on(d, robot, &scene, error);
-    }
-    mild_map_destroy(map);
-    return status;
+    return status == MILD_OK ? walk_on(d, &scene, error) : status;
 }
 
 /* ---- the command ---- */
@@ -328,21 +308,20 @@ static MildStatus run_drive(Drive *d, const CliArgs *args, MildError *error) {
     if (status != MILD_OK) {
         return status;
     }
-    /* those of a simulated robot are read with its ground's */
-    Robot *robot = robots_open_task(&d->task, d->config, d->simulate ? NULL : d->policy,
-                                    d->simulate ? NULL : args, d->robot, error);
-    status = !robot        ? error->status
-             : d->simulate ? run_simulated(d, robot, args, error)
-                           : run_runner(d, robot, error);
-    robot_destroy(robot);
+    Context *c = &d->context;
+    c->without_policy = c->on_ground = d->simulate;
+    status = context_open(c, args, error);
+    if (status == MILD_OK) {
+        status = (d->simulate ? run_simulated : run_runner)(d, error);
+    }
+    context_close(c);
     return status;
 }
 
 int cmd_drive(int argc, char **argv) {
     static Drive d;
     static CliArgs args;
-    char shipped[PATH_SIZE], model_help[320];
-    d.terrain = terrain_def_default();
+    d.context = context_default();
     d.runner = (RunnerDef){.late = 0.02,
                            .damp_after = 0.1,
                            .stall_after = 0.05,
@@ -353,13 +332,10 @@ int cmd_drive(int argc, char **argv) {
                            .torque_share = 1};
     d.simulated = (SimulatedDef){.patience = 30, .seed = 1};
     const CliOption options[] = {
-        {"policy", CLI_INPUT, &d.policy, 0, 0, "FILE",
-         "policy to run (default policies/mild.safetensors, or that of --robot)"},
-        {"robot", CLI_TEXT, &d.robot, 0, 0, "NAME|DIR",
-         ROBOTS_HELP " (default: the config's, the policy's, or sa01)"},
-        {"config", CLI_INPUT, &d.config, 0, 0, "FILE",
-         "config whose section [task] goes before what the policy's file says, such as that of "
-         "its training"},
+        context_policy(&d.context,
+                       "policy to run (default policies/mild.safetensors, or that of --robot)"),
+        context_robot(&d.context),
+        context_config(&d.context),
         {"listen", CLI_TEXT, &d.listen, 0, 0, "HOST:PORT",
          "where states arrive; targets go to where they come from (default " ADDRESS ")"},
         {"peer", CLI_TEXT, &d.peer, 0, 0, "HOST[:PORT]",
@@ -405,8 +381,7 @@ int cmd_drive(int argc, char **argv) {
          "127.0.0.1)"},
         {"ground", CLI_TEXT, &d.ground, 0, 0, "NAME[+NAME]",
          "simulated robot: ground, or a course of them (default rigid)"},
-        {"model", CLI_TEXT, &d.model, 0, 0, "NAME",
-         grounds_model_help(model_help, sizeof model_help)},
+        context_model(&d.context),
         {"lockstep", CLI_FLAG, &d.lockstep, 0, 0, NULL,
          "simulated robot: its time stands still until a state is answered"},
         {"patience", CLI_NUMBER, &d.simulated.patience, 0.1, 3600, "T",
@@ -445,6 +420,5 @@ int cmd_drive(int argc, char **argv) {
         return bad;
     }
     MildError error = {0};
-    d.policy = d.policy ? d.policy : robot_policy(d.robot, shipped);
     return run_drive(&d, &args, &error) == MILD_OK ? 0 : cli_fail("drive", &error);
 }

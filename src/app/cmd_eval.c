@@ -7,15 +7,9 @@
 #include "app/build.h"
 #include "app/cli.h"
 #include "app/commands.h"
-#include "app/grounds.h"
+#include "app/context.h"
 #include "app/report.h"
-#include "app/robots.h"
-#include "base/paths.h"
-#include "control/controller.h"
-#include "env/actuator/actuator.h"
 #include "mild/batch.h"
-#include "run/config/config.h"
-#include "run/config/experiment_keys.h"
 #include "run/eval/actions.h"
 #include "run/eval/inside.h"
 #include "run/eval/track.h"
@@ -23,20 +17,15 @@
 enum { ROWS_MAX = CLI_LIST_MAX * CLI_LIST_MAX };
 
 typedef struct {
-    const char *policy, *config, *model, *json, *robot, *controller;
-    char config_robot[TRAIN_ROBOT_SIZE];
+    Context context;
+    const char *json, *latent, *ablate, *stances, *actions, *track; /* NULL: not given */
     CliNames grounds;
     CliNumbers speeds;
     int speed_given; /* bool */
     double patch;
-    const char *latent, *ablate, *stances, *actions, *track; /* NULL: not given */
     Ablation ablation;
-    int threads, randomize;
+    int threads;
     EvalDef eval;
-    TaskDef task;
-    TerrainDef terrain;
-    TrainDef train; /* what steps the robots, and where */
-    GroundsDef finish;
     Scene scenes[CLI_LIST_MAX]; /* of the batch engine */
     EvalRow rows[ROWS_MAX];
     int row_count;
@@ -80,16 +69,17 @@ static cJSON *row_json(const EvalRow *row) {
 }
 
 /* Writes the JSON. It names the file of the policy, or a controller that needs none. */
-static MildStatus write_json(const Eval *e, const Robot *robot, MildError *error) {
+static MildStatus write_json(const Eval *e, MildError *error) {
+    const Context *c = &e->context;
     cJSON *root = cJSON_CreateObject();
-    int learned = strcmp(e->controller, "learned") == 0;
-    cJSON_AddStringToObject(root, learned ? "policy" : "controller",
-                            learned ? e->policy : e->controller);
+    const int policy = context_has_policy(c);
+    cJSON_AddStringToObject(root, policy ? "policy" : "controller",
+                            policy ? c->policy : c->controller);
     if (e->ablate) {
         cJSON_AddStringToObject(root, "ablate", e->ablate);
     }
-    cJSON_AddStringToObject(root, "robot", robot_name(robot));
-    cJSON_AddStringToObject(root, "model", mild_model_names[e->finish.model]);
+    cJSON_AddStringToObject(root, "robot", robot_name(c->robot));
+    cJSON_AddStringToObject(root, "model", mild_model_names[c->grounds.model]);
     cJSON_AddStringToObject(root, "version", build_version());
     cJSON *rows = cJSON_AddArrayToObject(root, "rows");
     for (int i = 0; i < e->row_count; i++) {
@@ -99,20 +89,9 @@ static MildStatus write_json(const Eval *e, const Robot *robot, MildError *error
 }
 
 /* speed: of the walk; a course lies where it leads. */
-static MildStatus make_scene(Eval *e, const char *name, double speed, Scene *scene, MildMap **map,
+static MildStatus make_scene(Eval *e, const char *name, double speed, Scene *scene,
                              MildError *error) {
-    *map = NULL;
-    MildStatus status = scene_make(scene, name, speed < 0 ? -e->patch : e->patch, error);
-    if (status == MILD_OK) {
-        status = grounds_finish_scene(&e->finish, scene, error);
-    }
-    if (status == MILD_OK) {
-        status = task_def_check(&e->task, error);
-    }
-    if (status == MILD_OK) {
-        status = grounds_lay_map(&e->finish, scene, map, error);
-    }
-    return status;
+    return context_scene(&e->context, name, speed < 0 ? -e->patch : e->patch, scene, error);
 }
 
 /* A CSV in memory, so that its file is written whole or not at all. */
@@ -147,31 +126,44 @@ static void take_row(Eval *e, FILE *table) {
     fflush(table);
 }
 
+static EvalRun eval_of(Eval *e, const Scene *scenes, int scene_count, const double *speeds,
+                       int speed_count) {
+    Context *c = &e->context;
+    const int device = train_device(&c->train);
+    return (EvalRun){.task = &c->task,
+                     .robot = c->robot,
+                     .pool = c->pool,
+                     .controller = &c->mover,
+                     .batch = train_is_batch(&c->train),
+                     .device = device < 0 ? MILD_BATCH_HOST : device,
+                     .scenes = scenes,
+                     .scene_count = scene_count,
+                     .speeds = speeds,
+                     .speed_count = speed_count,
+                     .eval = e->eval};
+}
+
 /* Ground after ground, speed after speed, by MuJoCo. table: NULL: rows are not kept. */
-static MildStatus evaluate_rows(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
-                                FILE *table, MildError *error) {
+static MildStatus evaluate_rows(Eval *e, FILE *table, MildError *error) {
     MildStatus status = MILD_OK;
     for (int i = 0; status == MILD_OK && i < e->grounds.count * e->speeds.count; i++) {
         Scene scene;
-        MildMap *map;
-        e->eval.speed = e->speeds.value[i % e->speeds.count];
-        status =
-            make_scene(e, e->grounds.name[i / e->speeds.count], e->eval.speed, &scene, &map, error);
+        const char *ground = e->grounds.name[i / e->speeds.count];
+        const double speed = e->speeds.value[i % e->speeds.count];
+        status = make_scene(e, ground, speed, &scene, error);
         if (status == MILD_OK) {
-            status = eval_run(&e->task, robot, pool, controller, &scene, &e->eval,
-                              &e->rows[e->row_count], error);
+            const EvalRun run = eval_of(e, &scene, 1, &speed, 1);
+            status = eval_run(&run, &e->rows[e->row_count], error);
         }
         if (status == MILD_OK && table) {
             take_row(e, table);
         }
-        mild_map_destroy(map);
     }
     return status;
 }
 
 /* The means of all trials with the whole controller take the place of a part of it. */
-static MildStatus ablate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
-                         InsideLog *log, MildError *error) {
+static MildStatus ablate(Eval *e, InsideLog *log, MildError *error) {
     const int meant = e->ablation == ABLATION_z || e->ablation == ABLATION_estimates;
     const size_t width = (size_t)log->inside->latent + (size_t)log->inside->estimates;
     double *sum = calloc(width, sizeof *sum);
@@ -183,13 +175,13 @@ static MildStatus ablate(Eval *e, const Robot *robot, Pool *pool, Controller *co
         const EvalDef whole = e->eval;
         log->sum = sum;
         e->eval.stances = e->eval.actions = e->eval.track = NULL;
-        status = evaluate_rows(e, robot, pool, controller, NULL, error);
+        status = evaluate_rows(e, NULL, error);
         e->eval = whole;
         inside_means(log, means);
         log->sum = NULL;
     }
     if (status == MILD_OK) {
-        learned_ablate(controller, e->ablation, means);
+        learned_ablate(&e->context.mover, e->ablation, means);
     }
     free(sum);
     free(means);
@@ -197,17 +189,16 @@ static MildStatus ablate(Eval *e, const Robot *robot, Pool *pool, Controller *co
 }
 
 /* With --latent or --ablate: rows whose controller is looked into. */
-static MildStatus evaluate_inside(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
-                                  FILE *table, MildError *error) {
-    InsideLog log = {.task = &e->task, .feet = robot_feet(robot)};
+static MildStatus evaluate_inside(Eval *e, FILE *table, MildError *error) {
+    InsideLog log = {.feet = robot_feet(e->context.robot)};
     const EvalWatch watch = {inside_decided, &log};
     Sheet sheet = {0};
-    MildStatus status = learned_watch(controller, &log.inside, error);
+    MildStatus status = learned_watch(&e->context.mover, &log.inside, error);
     if (status != MILD_OK) {
         return status;
     }
     e->eval.watch = &watch;
-    status = e->ablate ? ablate(e, robot, pool, controller, &log, error) : MILD_OK;
+    status = e->ablate ? ablate(e, &log, error) : MILD_OK;
     if (status == MILD_OK && e->latent) {
         status = sheet_open(&sheet, error);
     }
@@ -216,74 +207,58 @@ static MildStatus evaluate_inside(Eval *e, const Robot *robot, Pool *pool, Contr
         inside_print_header(&log);
     }
     if (status == MILD_OK) {
-        status = evaluate_rows(e, robot, pool, controller, table, error);
+        status = evaluate_rows(e, table, error);
     }
     e->eval.watch = NULL;
     return sheet_close(&sheet, e->latent, status, error);
 }
 
-/* All at once, by the batch engine. */
-static MildStatus evaluate_batch(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
-                                 MildError *error) {
-    const int device = train_device(&e->train);
-    MildMap *map = NULL; /* the same for all, because each has one material */
+/* All at once, by the batch engine: its rows have one map, because each has one material. */
+static MildStatus evaluate_batch(Eval *e, MildError *error) {
     MildStatus status = MILD_OK;
     for (int g = 0; status == MILD_OK && g < e->grounds.count; g++) {
-        mild_map_destroy(map);
-        status = make_scene(e, e->grounds.name[g], 0, &e->scenes[g], &map, error);
+        status = make_scene(e, e->grounds.name[g], 0, &e->scenes[g], error);
     }
-    const EvalBatch batch = {.task = &e->task,
-                             .robot = robot,
-                             .pool = pool,
-                             .controller = controller,
-                             .device = device < 0 ? MILD_BATCH_HOST : device,
-                             .scenes = e->scenes,
-                             .scene_count = e->grounds.count,
-                             .speeds = e->speeds.value,
-                             .speed_count = e->speeds.count,
-                             .eval = e->eval};
     if (status == MILD_OK) {
-        status = eval_run_batch(&batch, e->rows, error);
+        const EvalRun run =
+            eval_of(e, e->scenes, e->grounds.count, e->speeds.value, e->speeds.count);
+        status = eval_run(&run, e->rows, error);
     }
-    mild_map_destroy(map);
     return status;
 }
 
 static void print_header(const Eval *e, FILE *table) {
     char line[256];
-    if (e->finish.model != MILD_MODEL_MILD) {
-        fprintf(table, "ground model %s\n", mild_model_names[e->finish.model]);
+    if (e->context.grounds.model != MILD_MODEL_MILD) {
+        fprintf(table, "ground model %s\n", mild_model_names[e->context.grounds.model]);
     }
     eval_print_header(line, sizeof line);
     fprintf(table, "%s\n", line);
 }
 
-static MildStatus evaluate_table(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
-                                 MildError *error) {
+static MildStatus evaluate_table(Eval *e, MildError *error) {
     const char *outputs[] = {e->json, e->latent, e->stances, e->actions, e->track};
     int taken = 0; /* bool: standard output */
     for (int i = 0; i < 5; i++) {
         taken = taken || (outputs[i] && strcmp(outputs[i], "-") == 0);
     }
     FILE *table = taken ? stderr : stdout;
-    const int batch = train_is_batch(&e->train);
-    MildStatus status = batch ? evaluate_batch(e, robot, pool, controller, error) : MILD_OK;
+    const int batch = train_is_batch(&e->context.train);
+    MildStatus status = batch ? evaluate_batch(e, error) : MILD_OK;
     if (status != MILD_OK) {
         return status;
     }
     print_header(e, table);
     if (!batch) {
-        status = (e->latent || e->ablate ? evaluate_inside
-                                         : evaluate_rows)(e, robot, pool, controller, table, error);
+        status = (e->latent || e->ablate ? evaluate_inside : evaluate_rows)(e, table, error);
     }
     while (batch && e->row_count < e->grounds.count * e->speeds.count) {
         take_row(e, table);
     }
-    return status == MILD_OK && e->json ? write_json(e, robot, error) : status;
+    return status == MILD_OK && e->json ? write_json(e, error) : status;
 }
 
-static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
-                           MildError *error) {
+static MildStatus evaluate(Eval *e, MildError *error) {
     Sheet stances = {0}, actions = {0}, track = {0};
     MildStatus status = e->stances ? sheet_open(&stances, error) : MILD_OK;
     if (status == MILD_OK && e->actions) {
@@ -296,7 +271,7 @@ static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *
         eval_print_stances_header(stances.file);
     }
     if (actions.file) {
-        actions_print_header(actions.file, robot);
+        actions_print_header(actions.file, e->context.robot);
     }
     if (track.file) {
         track_print_header(track.file);
@@ -305,7 +280,7 @@ static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *
     e->eval.actions = actions.file;
     e->eval.track = track.file;
     if (status == MILD_OK) {
-        status = evaluate_table(e, robot, pool, controller, error);
+        status = evaluate_table(e, error);
     }
     e->eval.stances = e->eval.actions = e->eval.track = NULL;
     status = sheet_close(&stances, e->stances, status, error);
@@ -319,15 +294,14 @@ static MildStatus check_grounds(Eval *e, MildError *error) {
     MildStatus status = MILD_OK;
     Scene scene;
     for (int g = 0; status == MILD_OK && g < e->grounds.count; g++) {
-        MildMap *map;
-        status = make_scene(e, e->grounds.name[g], 0, &scene, &map, error);
-        mild_map_destroy(map);
+        status = make_scene(e, e->grounds.name[g], 0, &scene, error);
     }
     return status;
 }
 
 static MildStatus check_place(const Eval *e, MildError *error) {
-    const int device = train_device(&e->train);
+    const TrainDef *train = &e->context.train;
+    const int device = train_device(train);
     const char *missing = e->latent           ? "--latent"
                           : e->ablate         ? "--ablate"
                           : e->actions        ? "--actions"
@@ -336,15 +310,15 @@ static MildStatus check_place(const Eval *e, MildError *error) {
                                               : NULL;
     if (device < -1) {
         return mild_fail(error, MILD_ERROR_RANGE, "train.device = %s: neither cpu, cuda nor cuda:N",
-                         e->train.device);
+                         train->device);
     }
-    if (device >= 0 && !train_is_batch(&e->train)) {
+    if (device >= 0 && !train_is_batch(train)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "train.device = %s: MuJoCo runs on the processor; leave it out, or give "
                          "--train.robots=batch",
-                         e->train.device);
+                         train->device);
     }
-    return missing && train_is_batch(&e->train)
+    return missing && train_is_batch(train)
                ? mild_fail(error, MILD_ERROR_ARGUMENT,
                            "%s is not there in the batch engine; leave it out, or give "
                            "--train.robots=mujoco",
@@ -354,65 +328,63 @@ static MildStatus check_place(const Eval *e, MildError *error) {
 
 /* A controller that follows no command is told to stand, so that no speed is shown as asked. */
 static MildStatus check_command(Eval *e, MildError *error) {
-    if (!e->speed_given && !controller_follows(e->controller)) {
+    const char *controller = e->context.controller;
+    if (!e->speed_given && !controller_has(controller, CONTROLLER_FOLLOWS)) {
         e->speeds.value[0] = 0;
     }
-    MildStatus status = robots_check_command(e->controller, "sideways", e->eval.sideways, error);
+    MildStatus status = robots_check_command(controller, "sideways", e->eval.sideways, error);
     if (status == MILD_OK) {
-        status = robots_check_command(e->controller, "turn", e->eval.turn, error);
+        status = robots_check_command(controller, "turn", e->eval.turn, error);
     }
     for (int i = 0; i < e->speeds.count && status == MILD_OK; i++) {
-        status = robots_check_command(e->controller, "speed", e->speeds.value[i], error);
+        status = robots_check_command(controller, "speed", e->speeds.value[i], error);
     }
     return status;
 }
 
-static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
-    MildModel model;
-    const char *policy = strcmp(e->controller, "learned") == 0 ? e->policy : NULL;
-    MildStatus status =
-        experiment_task(&e->task, e->randomize, e->config_robot, e->config, policy, error);
-    if (status == MILD_OK) {
-        status = controller_check(e->controller, error);
-    }
-    if (status == MILD_OK) {
-        status = check_command(e, error);
-    }
+/* What is asked for together must go together. */
+static MildStatus check(Eval *e, MildError *error) {
+    MildStatus status = check_command(e, error);
     if (status == MILD_OK && e->ablate) {
         status = ablation_find(e->ablate, &e->ablation, error);
     }
     if (status == MILD_OK) {
-        status = grounds_model(e->model, args, &model, error);
-    }
-    if (status != MILD_OK) {
-        return status;
-    }
-    Pool *pool = pool_create(e->threads);
-    Robot *robot = pool ? robots_open(e->robot, e->config_robot, error) : NULL;
-    Controller controller = {0};
-    Actuator *actuator = NULL;
-    if (robot) {
-        e->finish = grounds_for_robot(model, robot, &e->task, &e->terrain, args);
-        e->finish.train = &e->train;
         status = check_grounds(e, error);
-        status = status == MILD_OK ? check_place(e, error) : status;
-        status = status == MILD_OK ? actuator_open(&e->task, robot, &actuator, error) : status;
-    } else {
-        status = pool ? error->status : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
+    }
+    return status == MILD_OK ? check_place(e, error) : status;
+}
+
+static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
+    Context *c = &e->context;
+    c->pool = pool_create(e->threads);
+    MildStatus status = c->pool ? context_open(c, args, error)
+                                : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
+    if (status == MILD_OK) {
+        status = check(e, error);
     }
     if (status == MILD_OK) {
-        const ControllerDef def = {e->policy, &e->task, robot, pool, e->eval.trials};
-        status = controller_make(e->controller, &def, &controller, error);
+        status = context_move(c, e->eval.trials, error);
     }
     if (status == MILD_OK) {
-        robots_warn_slow("eval", &e->train, e->robot ? e->robot : e->config_robot);
-        status = evaluate(e, robot, pool, &controller, error);
+        robots_warn_slow("eval", &c->train, c->robot_name ? c->robot_name : c->named);
+        status = evaluate(e, error);
     }
-    controller_destroy(&controller);
-    actuator_destroy(actuator);
-    robot_destroy(robot);
-    pool_destroy(pool);
+    context_close(c);
     return status;
+}
+
+/* Defaults of all options but for those of the context. */
+static void set_defaults(Eval *e) {
+    e->context = context_default();
+    e->context.controller = "learned";
+    e->context.on_ground = e->context.machine = 1;
+    e->eval = (EvalDef){.trials = 10, .seconds = 20, .seed = 1};
+    e->patch = 2.5;
+    e->speeds = (CliNumbers){1, {0.6}};
+    e->grounds.count = 3;
+    strcpy(e->grounds.name[0], "rigid");
+    strcpy(e->grounds.name[1], "foam45");
+    strcpy(e->grounds.name[2], "sand_loose");
 }
 
 int cmd_eval(int argc, char **argv) {
@@ -423,32 +395,18 @@ int cmd_eval(int argc, char **argv) {
         free(args);
         return cli_fail_text("eval", "out of memory");
     }
-    char shipped[PATH_SIZE], model_help[320], controller_help[ROBOTS_CONTROLLER_HELP];
-    e->controller = "learned";
-    e->eval = (EvalDef){.trials = 10, .seconds = 20, .seed = 1};
-    e->patch = 2.5;
-    e->terrain = terrain_def_default();
-    e->train = train_def_default();
-    e->speeds = (CliNumbers){1, {0.6}};
-    e->grounds.count = 3;
-    strcpy(e->grounds.name[0], "rigid");
-    strcpy(e->grounds.name[1], "foam45");
-    strcpy(e->grounds.name[2], "sand_loose");
+    Context *c = &e->context;
+    set_defaults(e);
     const CliOption options[] = {
-        {"policy", CLI_INPUT, &e->policy, 0, 0, "FILE",
-         "policy to measure (default policies/mild.safetensors, or that of --robot)"},
-        {"robot", CLI_TEXT, &e->robot, 0, 0, "NAME|DIR",
-         ROBOTS_HELP " (default: the config's, the policy's, or sa01)"},
-        {"controller", CLI_TEXT, &e->controller, 0, 0, "NAME",
-         robots_controller_help(controller_help, sizeof controller_help)},
-        {"config", CLI_INPUT, &e->config, 0, 0, "FILE",
-         "config whose section [task] goes before what the policy's file says, such as that of "
-         "its training"},
+        context_policy(c,
+                       "policy to measure (default policies/mild.safetensors, or that of --robot)"),
+        context_robot(c),
+        context_controller(c),
+        context_config(c),
         {"ground", CLI_NAMES, &e->grounds, 0, 0, "NAME[,NAME]",
          "grounds that `mild info grounds` lists, one row each; rubber+foam45 is a course of both, "
          "in which rigid is a very hard material (default rigid,foam45,sand_loose)"},
-        {"model", CLI_TEXT, &e->model, 0, 0, "NAME",
-         grounds_model_help(model_help, sizeof model_help)},
+        context_model(c),
         {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]",
          "[m/s] commanded forward speeds, one row each (default 0.6; 0 for a controller that "
          "stands)"},
@@ -459,7 +417,7 @@ int cmd_eval(int argc, char **argv) {
          "(default 0: the heading is held along x)"},
         {"push", CLI_NUMBER, &e->eval.push, 0, 5, "V",
          "[m/s] added to the speed of the base every 4 s, in a random direction (default 0)"},
-        {"randomize", CLI_FLAG, &e->randomize, 0, 0, NULL,
+        {"randomize", CLI_FLAG, &c->randomized, 0, 0, NULL,
          "draw robots as in training, and push them so: section [randomize] of --config, but for "
          "its grounds"},
         {"stop", CLI_NUMBER, &e->eval.stop, 0, 3600, "T",
@@ -523,7 +481,6 @@ int cmd_eval(int argc, char **argv) {
     int code = outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     if (outcome == CLI_RUN) {
         MildError error = {0};
-        e->policy = e->policy ? e->policy : robot_policy(e->robot, shipped);
         e->speed_given =
             cli_first_given(&command, args, (const char *const[]){"speed", NULL}) != NULL;
         code = run_eval(e, args, &error) == MILD_OK ? 0 : cli_fail("eval", &error);

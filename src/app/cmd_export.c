@@ -6,26 +6,26 @@
 #include "app/build.h"
 #include "app/cli.h"
 #include "app/commands.h"
-#include "app/robots.h"
-#include "base/paths.h"
+#include "app/context.h"
 #include "control/learned.h"
 
 typedef struct {
-    const char *policy, *robot, *config, *onnx, *c; /* onnx, c: NULL: not given */
+    Context context;
+    const char *onnx, *c; /* NULL: not given */
     int in_double;
-    TaskDef task;
 } Exporting;
 
-static MildStatus write_files(const Exporting *e, const Robot *robot, MildError *error) {
+static MildStatus write_files(const Exporting *e, MildError *error) {
+    const Context *c = &e->context;
     char note[1024];
     Network network;
     MildStatus status = MILD_OK;
-    Policy *policy = learned_policy(e->policy, robot, note, sizeof note, error);
+    Policy *policy = learned_policy(c->policy, c->robot, note, sizeof note, error);
     if (!policy) {
         return error->status;
     }
-    const Export export = {.robot = robot,
-                           .task = &e->task,
+    const Export export = {.robot = c->robot,
+                           .task = &c->task,
                            .network = &network,
                            .parameters = policy_parameters(policy),
                            .note = note,
@@ -43,23 +43,20 @@ static MildStatus write_files(const Exporting *e, const Robot *robot, MildError 
 }
 
 static MildStatus run_export(Exporting *e, const CliArgs *args, MildError *error) {
-    Robot *robot = robots_open_task(&e->task, e->config, e->policy, args, e->robot, error);
-    MildStatus status = robot ? write_files(e, robot, error) : error->status;
-    robot_destroy(robot);
+    MildStatus status = context_open(&e->context, args, error);
+    status = status == MILD_OK ? write_files(e, error) : status;
+    context_close(&e->context);
     return status;
 }
 
 int cmd_export(int argc, char **argv) {
-    char shipped[PATH_SIZE];
-    Exporting e = {0};
+    static Exporting e;
+    e.context = context_default();
     const CliOption options[] = {
-        {"policy", CLI_INPUT, &e.policy, 0, 0, "FILE",
-         "policy to export (default policies/mild.safetensors, or that of --robot)"},
-        {"robot", CLI_TEXT, &e.robot, 0, 0, "NAME|DIR",
-         ROBOTS_HELP " (default: the config's, the policy's, or sa01)"},
-        {"config", CLI_INPUT, &e.config, 0, 0, "FILE",
-         "config whose section [task] goes before what the policy's file says, such as that of "
-         "its training"},
+        context_policy(&e.context,
+                       "policy to export (default policies/mild.safetensors, or that of --robot)"),
+        context_robot(&e.context),
+        context_config(&e.context),
         {"onnx", CLI_OUTPUT, &e.onnx, 0, 0, "FILE",
          "write one graph with weights, history and metadata"},
         {"double", CLI_FLAG, &e.in_double, 0, 0, NULL,
@@ -98,6 +95,5 @@ int cmd_export(int argc, char **argv) {
         return bad;
     }
     MildError error = {0};
-    e.policy = e.policy ? e.policy : robot_policy(e.robot, shipped);
     return run_export(&e, &args, &error) == MILD_OK ? 0 : cli_fail("export", &error);
 }

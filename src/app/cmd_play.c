@@ -7,16 +7,11 @@
 
 #include "app/cli.h"
 #include "app/commands.h"
+#include "app/context.h"
 #include "app/figure.h"
-#include "app/grounds.h"
 #include "app/play.h"
 #include "app/progress.h"
-#include "app/robots.h"
-#include "base/paths.h"
 #include "base/text.h"
-#include "env/actuator/actuator.h"
-#include "run/config/config.h"
-#include "run/config/experiment_keys.h"
 
 #define GRAVITY 9.81
 #define AREA_MARGIN 2.0   /* [m] ground drawn beyond the walk */
@@ -25,16 +20,11 @@
 #define COURSE_LEAST 12.0 /* [s] */
 
 typedef struct {
-    const char *policy, *config, *model, *video, *pressure, *robot, *controller;
-    char config_robot[TRAIN_ROBOT_SIZE];
+    Context context;
+    const char *video, *pressure; /* NULL: not given */
     CliNames grounds;
     double patch;
     int width, height;
-    GroundsDef finish;
-    TaskDef task;
-    TerrainDef terrain;
-    MildMap *map;
-    Actuator *actuator;
     Scene scene;
     const char *names[MILD_MATERIALS_MAX];
     Play play;
@@ -64,14 +54,7 @@ static MildStatus make_scene(Command *c, MildError *error) {
         snprintf(name + used, sizeof name - used, "%s%s", g ? "+" : "", c->grounds.name[g]);
         c->names[g] = c->grounds.name[g];
     }
-    MildStatus status = scene_make(&c->scene, name, c->patch, error);
-    if (status == MILD_OK) {
-        status = grounds_finish_scene(&c->finish, &c->scene, error);
-    }
-    if (status == MILD_OK) {
-        status = grounds_lay_map(&c->finish, &c->scene, &c->map, error);
-    }
-    return status == MILD_OK ? task_def_check(&c->task, error) : status;
+    return context_scene(&c->context, name, c->patch, &c->scene, error);
 }
 
 /* Appends the presets that the keys of a window choose from, as many as there is room for. */
@@ -84,7 +67,7 @@ static MildStatus add_presets(Command *c, MildError *error) {
         const int m = terrain->material_count;
         c->names[m] = mild_material_preset_name(i);
         mild_material_preset(c->names[m], &terrain->materials[m]);
-        status = grounds_finish(&c->finish, &terrain->materials[m], error);
+        status = grounds_finish(&c->context.grounds, &terrain->materials[m], error);
         terrain->material_count++;
         c->play.presets++;
     }
@@ -138,7 +121,7 @@ static void print_table(Command *c) {
             printf("%-12s   not reached\n", c->names[i]);
             continue;
         }
-        double distance = leg->end_x - leg->start_x, time = leg->steps * c->task.physics_dt;
+        double distance = leg->end_x - leg->start_x, time = leg->steps * c->context.task.physics_dt;
         double steady = fabs(m->end[0] - m->start[0]);
         measure_finish(m); /* a robot that stands has stances too */
         printf("%-12s %7.2f m %5.1f s %5.2f m/s %8s %7s mm %6s mm %5s\n", c->names[i], distance,
@@ -223,14 +206,10 @@ static MildStatus prepare(Command *c, MildError *error) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--pressure: rigid ground has no elements, choose a soft one");
     }
-    const ControllerDef def = {c->policy, &c->task, play->robot, NULL, 1};
-    status = actuator_open(&c->task, play->robot, &c->actuator, error);
-    if (status == MILD_OK) {
-        status = controller_make(c->controller, &def, play->controller, error);
-    }
+    status = context_move(&c->context, 1, error);
     if (status == MILD_OK && c->pressure) {
         play->pressure = pressure_create(play->robot, c->scene.terrain.material_count,
-                                         c->task.physics_dt, error);
+                                         c->context.task.physics_dt, error);
         if (!play->pressure) {
             status = error->status;
         }
@@ -241,40 +220,33 @@ static MildStatus prepare(Command *c, MildError *error) {
     return status;
 }
 
-static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
+/* Speed and time that were not given. */
+static MildStatus choose_walk(Command *c, MildError *error) {
     Play *play = &c->play;
-    Controller controller = {0};
-    MildModel model;
-    const char *policy = strcmp(c->controller, "learned") == 0 ? c->policy : NULL;
-    MildStatus status = experiment_task(&c->task, 0, c->config_robot, c->config, policy, error);
-    if (status == MILD_OK) {
-        status = controller_check(c->controller, error);
-    }
-    if (status == MILD_OK) {
-        const int still = isnan(play->speed) && !controller_follows(c->controller);
-        play->speed = still ? 0 : isnan(play->speed) ? 0.6 : play->speed;
-        status = robots_check_command(c->controller, "speed", play->speed, error);
-    }
-    if (status == MILD_OK) {
-        status = grounds_model(c->model, args, &model, error);
-    }
-    if (status != MILD_OK) {
-        return status;
+    const int follows = controller_has(c->context.controller, CONTROLLER_FOLLOWS);
+    if (isnan(play->speed)) {
+        play->speed = follows ? 0.6 : 0;
     }
     if (play->seconds == 0) {
         double course = c->grounds.count * c->patch / fmax(fabs(play->speed), 0.1) + COURSE_EXTRA;
-        play->seconds =
-            controller_follows(c->controller) ? fmax(course, COURSE_LEAST) : COURSE_LEAST;
+        play->seconds = follows ? fmax(course, COURSE_LEAST) : COURSE_LEAST;
     }
-    Robot *robot = robots_open(c->robot, c->config_robot, error);
-    if (!robot) {
-        return error->status;
+    return robots_check_command(c->context.controller, "speed", play->speed, error);
+}
+
+static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
+    Play *play = &c->play;
+    Context *on = &c->context;
+    MildStatus status = context_open(on, args, error);
+    if (status == MILD_OK) {
+        status = choose_walk(c, error);
     }
-    c->finish = grounds_for_robot(model, robot, &c->task, &c->terrain, args);
-    play->task = &c->task, play->scene = &c->scene, play->robot = robot,
-    play->controller = &controller;
+    play->task = &on->task, play->scene = &c->scene, play->robot = on->robot,
+    play->controller = &on->mover;
     play->window = !c->video && !c->pressure;
-    status = make_scene(c, error);
+    if (status == MILD_OK) {
+        status = make_scene(c, error);
+    }
     if (status == MILD_OK && play->window) {
         status = add_presets(c, error);
     }
@@ -289,26 +261,19 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     }
     view_destroy(play->view);
     pressure_destroy(play->pressure);
-    controller_destroy(&controller);
-    robot_destroy(robot);
-    mild_map_destroy(c->map);
-    actuator_destroy(c->actuator);
+    context_close(on);
     return status;
 }
 
 static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
-    char shipped[PATH_SIZE], model_help[320], controller_help[ROBOTS_CONTROLLER_HELP];
     const CliOption options[] = {
-        {"policy", CLI_INPUT, &c->policy, 0, 0, "FILE",
-         "policy to watch (default policies/mild.safetensors, or that of --robot)"},
-        {"robot", CLI_TEXT, &c->robot, 0, 0, "NAME|DIR",
-         ROBOTS_HELP " (default: the config's, the policy's, or sa01)"},
-        {"controller", CLI_TEXT, &c->controller, 0, 0, "NAME",
-         robots_controller_help(controller_help, sizeof controller_help)},
+        context_policy(&c->context,
+                       "policy to watch (default policies/mild.safetensors, or that of --robot)"),
+        context_robot(&c->context),
+        context_controller(&c->context),
         {"ground", CLI_NAMES, &c->grounds, 0, 0, "NAME[,NAME]",
          "ground, or several that are crossed in order (default sand_loose)"},
-        {"model", CLI_TEXT, &c->model, 0, 0, "NAME",
-         grounds_model_help(model_help, sizeof model_help)},
+        context_model(&c->context),
         {"patch", CLI_NUMBER, &c->patch, 0.5, 100, "L",
          "[m] length of each ground of a course (default 2)"},
         {"video", CLI_OUTPUT, &c->video, 0, 0, "FILE.mp4",
@@ -321,9 +286,7 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
          "[s] length of the walk; 0: long enough for the course (default 0)"},
         {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S",
          "seed of start and sensor noise (default 1)"},
-        {"config", CLI_INPUT, &c->config, 0, 0, "FILE",
-         "config whose section [task] goes before what the policy's file says, such as that of "
-         "its training"},
+        context_config(&c->context),
         {"width", CLI_INT, &c->width, 64, 7680, "N", "[pixels] width of the picture (default 960)"},
         {"height", CLI_INT, &c->height, 64, 4320, "N",
          "[pixels] height of the picture (default 540)"},
@@ -362,7 +325,6 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
     if (code) {
         return code;
     }
-    c->policy = c->policy ? c->policy : robot_policy(c->robot, shipped);
     return run_play(c, args, &error) == MILD_OK ? 0 : cli_fail("play", &error);
 }
 
@@ -371,9 +333,10 @@ int cmd_play(int argc, char **argv) {
     CliArgs *args = calloc(1, sizeof *args);
     int code = CLI_EXIT_BAD_INPUT;
     if (c && args) {
-        c->controller = "learned";
+        c->context = context_default();
+        c->context.controller = "learned";
+        c->context.on_ground = 1;
         c->patch = 2;
-        c->terrain = terrain_def_default();
         c->width = 960, c->height = 540;
         c->play.speed = NAN; /* not given */
         c->play.seed = 1;

@@ -13,22 +13,6 @@ Robot *robots_open(const char *option, const char *otherwise, MildError *error) 
     return robot_open(option ? option : otherwise, error);
 }
 
-Robot *robots_open_task(TaskDef *task, const char *config, const char *policy, const CliArgs *args,
-                        const char *option, MildError *error) {
-    char named[TRAIN_ROBOT_SIZE];
-    const ConfigSection section = {"task", task_fields, task_field_count, task};
-    MildStatus status = experiment_task(task, 0, named, config, policy, error);
-    if (status == MILD_OK && args) {
-        status = config_overrides(&section, 1, args->overrides, args->override_count, error);
-    }
-    Robot *robot = status == MILD_OK ? robots_open(option, named, error) : NULL;
-    if (robot && task_def_check_robot(task, robot, error) != MILD_OK) {
-        robot_destroy(robot);
-        return NULL;
-    }
-    return robot;
-}
-
 MildStatus robots_set(ExperimentDef *def, const char *option, MildError *error) {
     char text[512];
     const char *override = text;
@@ -109,7 +93,7 @@ int robots_print(void) {
 
 MildStatus robots_check_command(const char *controller, const char *option, double value,
                                 MildError *error) {
-    return value == 0 || controller_follows(controller)
+    return value == 0 || controller_has(controller, CONTROLLER_FOLLOWS)
                ? MILD_OK
                : mild_fail(error, MILD_ERROR_ARGUMENT,
                            "--%s %g: controller %s follows no command; leave it out", option, value,

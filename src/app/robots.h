@@ -10,10 +10,6 @@
 
 /* `option` of --robot, or `otherwise` where it is NULL. */
 Robot *robots_open(const char *option, const char *otherwise, MildError *error);
-/* The robot of a policy, and its task without disturbances: by config and policy (experiment_task),
- * by the overrides of section [task] in args (NULL: none), and by `option` of --robot. */
-Robot *robots_open_task(TaskDef *task, const char *config, const char *policy, const CliArgs *args,
-                        const char *option, MildError *error);
 /* Sets train.robot from --robot. Refuses names that a config file cannot hold, like an override. */
 MildStatus robots_set(ExperimentDef *def, const char *option, MildError *error);
 /* Says on standard error, in one line, that a GPU steps the robot by kernels for any robot. */

@@ -30,8 +30,9 @@ void controller_row_torque(void *row, const TaskEnv *env, RobotSim *sim, double 
 
 /* Properties of a controller, as bits. */
 enum {
-    CONTROLLER_FOLLOWS = 1,  /* walks as the command says; the others stand */
-    CONTROLLER_OWN_GAINS = 2 /* gains or torques of its own: task.actuator would have no effect */
+    CONTROLLER_FOLLOWS = 1,   /* walks as the command says; the others stand */
+    CONTROLLER_OWN_GAINS = 2, /* gains or torques of its own: task.actuator would have no effect */
+    CONTROLLER_POLICY = 4     /* the file of --policy says its task, too */
 };
 
 /* Name, properties and summary; the file defines controller_make_NAME. */
@@ -39,7 +40,7 @@ enum {
     X(clock, CONTROLLER_FOLLOWS,                                                                   \
       "a network that sees one frame, at 40 Hz (Singh et al. 2024), of --policy")                  \
     X(ht2, CONTROLLER_FOLLOWS, "a transformer (Radosavovic et al. 2024), of --policy")             \
-    X(learned, CONTROLLER_FOLLOWS, "the policy of --policy")                                       \
+    X(learned, CONTROLLER_FOLLOWS | CONTROLLER_POLICY, "the policy of --policy")                   \
     X(passivity, CONTROLLER_FOLLOWS | CONTROLLER_OWN_GAINS,                                        \
       "a biped that knows its true state: a DCM plan and whole-body impedances command torques")   \
     X(stand, CONTROLLER_OWN_GAINS,                                                                 \
@@ -64,8 +65,8 @@ CONTROLLER_LIST(CONTROLLER_MAKE)
 int controller_count(void);
 const char *controller_name(int index); /* index < controller_count() */
 const char *controller_summary(int index);
-/* Bool: a controller of this name walks as it is told. The others stand. */
-int controller_follows(const char *name);
+/* Bool: the row of this name has the property; no for an unknown name. */
+int controller_has(const char *name, int property);
 /* Fails when there is no controller of this name. The message contains the nearest name. */
 MildStatus controller_check(const char *name, MildError *error);
 /* The caller must destroy *controller. */

@@ -25,13 +25,12 @@ const char *controller_summary(int index) {
     return controllers[index].summary;
 }
 
-int controller_follows(const char *name) {
-    int follows = 0;
+int controller_has(const char *name, int property) {
+    int has = 0;
     for (int i = 0; i < CONTROLLERS; i++) {
-        follows |= controllers[i].properties & CONTROLLER_FOLLOWS &&
-                   strcmp(name, controllers[i].name) == 0;
+        has |= controllers[i].properties & property && strcmp(name, controllers[i].name) == 0;
     }
-    return follows;
+    return has;
 }
 
 MildStatus controller_check(const char *name, MildError *error) {

@@ -82,22 +82,16 @@ size_t envs_bytes(const Envs *envs) {
     return envs_robot_bytes(envs) * (size_t)envs->count;
 }
 
-static MildStatus fail_without_trials(MildError *error) {
-    return mild_fail(error, MILD_ERROR_ARGUMENT,
-                     "MuJoCo's environments have no trials; train.robots = batch has");
-}
-
 MildStatus envs_set_commands(Envs *envs, const double *command, MildError *error) {
-    return envs->backend->set_commands ? envs->backend->set_commands(envs, command, error)
-                                       : fail_without_trials(error);
+    return envs->backend->set_commands(envs, command, error);
 }
 
-MildStatus envs_set_samples(Envs *envs, EnvsSample *sample, MildError *error) {
-    if (!envs->backend->set_samples) {
-        return fail_without_trials(error);
-    }
+void envs_set_samples(Envs *envs, EnvsSample *sample) {
     envs->backend->set_samples(envs, sample);
-    return MILD_OK;
+}
+
+TaskEnv *envs_env(Envs *envs, int i) {
+    return envs->backend->env ? envs->backend->env(envs, i) : NULL;
 }
 
 int envs_physics_steps(const Envs *envs) {

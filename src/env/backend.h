@@ -15,13 +15,13 @@ typedef struct {
     MildStatus (*save_progress)(Envs *envs, TaskProgress *progress, MildError *error);
     MildStatus (*load_progress)(Envs *envs, const TaskProgress *progress, MildError *error);
     EnvsMemory (*memory)(const Envs *envs);
+    MildStatus (*set_commands)(Envs *envs, const double *command, MildError *error);
+    void (*set_samples)(Envs *envs, EnvsSample *sample);
     /* of MuJoCo, else NULL */
     void (*times)(Envs *envs, double *physics, double *ground);
     void *(*state)(Envs *envs, size_t *bytes);
     uint64_t (*hash)(const Envs *envs);
-    /* of the batch engine, else NULL */
-    MildStatus (*set_commands)(Envs *envs, const double *command, MildError *error);
-    void (*set_samples)(Envs *envs, EnvsSample *sample);
+    TaskEnv *(*env)(Envs *envs, int i);
 } EnvsBackend;
 
 /* The first member of each backend's own struct. */

@@ -52,13 +52,18 @@ static MildStatus check_def(const EnvsDef *def, MildError *error) {
     MildStatus status = task_def_check_robot(task, def->robot, error);
     const int patches = task->randomize.patch_share > 0 && !def->striped &&
                         !(task->map && mild_map_label_count(task->map) > 1);
+    int course = 0; /* bool: a trial's */
+    for (int i = 0; def->trial && i < def->terrains; i++) {
+        course |= def->terrain[i].material_count > 1;
+    }
     const char *missing = patches             ? "randomize.patch_share above 0"
                           : task->print_tiles ? "terrain.memory"
                           : !task->newton     ? "task.newton = 0"
                           : task->motors      ? "task.actuator"
                           : def->trial && task->map && mild_map_label_count(task->map) > 1
                               ? "terrain.patches"
-                              : NULL;
+                          : course ? "a course of several grounds"
+                                   : NULL;
     return status == MILD_OK && missing
                ? mild_fail(error, MILD_ERROR_ARGUMENT,
                            "%s is not there on a device yet; train.robots = mujoco has it", missing)
@@ -609,14 +614,31 @@ static const EnvsBackend backend = {.destroy = destroy,
                                     .set_commands = set_commands,
                                     .set_samples = set_samples};
 
+/* Those of trials, with the depth of a robot that stands on them. NULL: out of memory. */
+static TaskGrounds *trial_grounds(const EnvsDef *def, MildError *error) {
+    TaskGrounds *grounds = malloc(sizeof *grounds);
+    TaskGround *ground = calloc((size_t)def->terrains, sizeof *ground);
+    if (!grounds || !ground) {
+        free(grounds);
+        free(ground);
+        mild_fail(error, MILD_ERROR_MEMORY, "no memory for %d grounds", def->terrains);
+        return NULL;
+    }
+    for (int i = 0; i < def->terrains; i++) {
+        ground[i].material = def->terrain[i].materials[0];
+        ground[i].depth = task_standing_depth(def->robot, &ground[i].material);
+    }
+    *grounds = (TaskGrounds){def->terrains, ground};
+    return grounds;
+}
+
 Envs *envs_create_batch(const EnvsDef *def, MildError *error) {
     if (check_def(def, error) != MILD_OK) {
         return NULL;
     }
-    TaskGrounds *drawn = def->chosen ? NULL
-                                     : task_grounds_create(def->task, def->robot, def->grounds,
-                                                           def->seed, def->pool, error);
-    const TaskGrounds *grounds = def->chosen ? def->chosen : drawn;
+    TaskGrounds *grounds = def->trial ? trial_grounds(def, error)
+                                      : task_grounds_create(def->task, def->robot, def->grounds,
+                                                            def->seed, def->pool, error);
     Batch *b = grounds ? calloc(1, sizeof *b) : NULL;
     if (grounds && !b) {
         mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
@@ -628,7 +650,7 @@ Envs *envs_create_batch(const EnvsDef *def, MildError *error) {
         destroy(&b->base);
         b = NULL;
     }
-    task_grounds_destroy(drawn);
+    task_grounds_destroy(grounds);
     return b ? &b->base : NULL;
 }
 

@@ -25,6 +25,13 @@
 
 typedef struct Envs Envs;
 
+/* Torques in the place of the joints' PD in environment i, at the start of each physics step; see
+ * TaskDrive. NULL: none. */
+typedef struct {
+    void (*torque)(void *self, int i, const TaskEnv *env, RobotSim *sim, double *torque);
+    void *self;
+} EnvsDrive;
+
 typedef struct {
     const TaskDef *task; /* copied; its map and motors are borrowed */
     const Robot *robot;  /* borrowed */
@@ -32,13 +39,17 @@ typedef struct {
     int count;           /* environments */
     uint32_t first;      /* number of the first one, which selects its random numbers */
     uint64_t seed;
-    int batch;   /* bool: the batch engine steps the robots; else MuJoCo, without what follows */
+    int batch; /* bool: the batch engine steps the robots; else MuJoCo */
+    /* of the batch engine */
     int device;  /* a CUDA device, or MILD_BATCH_HOST */
-    int grounds; /* drawn beforehand; episodes choose among them */
+    int grounds; /* drawn beforehand; episodes choose among them. Not with trials */
     int striped; /* bool: the labels of task->map are stripes, which only the share patch_share of
                     the soft episodes has; the others are uniform */
-    const TaskGrounds *chosen; /* copied; NULL: `grounds` are drawn */
-    const EnvsTrial *trial;    /* [count] copied; NULL: episodes draw their ground and command */
+    /* of both again: trials of an evaluation */
+    const EnvsTrial *trial;     /* [count] borrowed; NULL: episodes draw their ground and command */
+    const MildTerrain *terrain; /* [terrains] borrowed; of the trials, all with task->map */
+    int terrains;
+    EnvsDrive drive; /* by MuJoCo */
 } EnvsDef;
 
 /* NULL, with one line in *error, for what the batch engine does not have (imprints, blended
@@ -81,15 +92,22 @@ EnvsMemory envs_memory(const Envs *envs);
 size_t envs_robot_bytes(const Envs *envs); /* their sum */
 size_t envs_bytes(const Envs *envs);       /* of all */
 
-/* ---- trials, of the batch engine ---- */
+/* ---- trials ---- */
 
-/* With EnvsDef.trial. Commands from the next policy step on, [count][3] on the CPU, see
+/* With EnvsDef.trial. The first episode of an environment is its trial; what follows its end is
+ * left to the backend. Commands from the next policy step on, [count][3] on the CPU, see
  * TaskEnv.command; the first ones before envs_reset. Waits for the device. */
 MildStatus envs_set_commands(Envs *envs, const double *command, MildError *error);
 /* From now on the physics steps of each policy step are written to `sample`,
  * [count][envs_physics_steps] in the memory of the device; NULL: no longer. */
-MildStatus envs_set_samples(Envs *envs, EnvsSample *sample, MildError *error);
+void envs_set_samples(Envs *envs, EnvsSample *sample);
 int envs_physics_steps(const Envs *envs); /* of a policy step */
+
+/* What MuJoCo's robot did in the physics step that `sim` has just made. */
+void envs_read_sample(const TaskEnv *env, const RobotSim *sim, const double *torque,
+                      EnvsSample *sample);
+/* One environment of MuJoCo; NULL for the batch engine. */
+TaskEnv *envs_env(Envs *envs, int i);
 
 /* ---- tests ---- */
 

@@ -19,6 +19,12 @@ typedef struct {
     RobotSim **sim;      /* [threads] */
     RobotPhases *phases; /* [threads] */
     EnvsStats stats;     /* sums */
+    /* of trials, else NULL */
+    const EnvsTrial *trial; /* [count] */
+    const MildTerrain *terrain;
+    uint8_t *over; /* [count] bool: the trial ended by a fall; its robot stays as it is */
+    EnvsDrive drive;
+    EnvsSample *sample; /* [count][physics steps] of the caller; NULL: none */
     /* arguments of the call in flight */
     const EnvsStep *step;
     const EnvsView *view;
@@ -61,6 +67,7 @@ static void destroy(Envs *envs) {
     free(m->phases);
     free(m->result);
     free(m->state);
+    free(m->over);
     free(m);
 }
 
@@ -70,7 +77,8 @@ static MildStatus open_arrays(Mujoco *m, MildError *error) {
     m->result = calloc(count, sizeof *m->result);
     m->sim = calloc(threads, sizeof(RobotSim *));
     m->phases = calloc(threads, sizeof *m->phases);
-    return m->state && m->result && m->sim && m->phases
+    m->over = calloc(count, sizeof *m->over);
+    return m->state && m->result && m->sim && m->phases && m->over
                ? MILD_OK
                : mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory for %d",
                            m->base.count);
@@ -89,7 +97,8 @@ static MildStatus open_sims(Mujoco *m, MildError *error) {
 
 static void init_envs(Mujoco *m, const EnvsDef *def) {
     for (int i = 0; i < def->count; i++) {
-        task_env_init(env_at(m, i), &m->def, m->robot, def->seed, def->first + (uint32_t)i);
+        const uint32_t stream = m->trial ? m->trial[i].stream : def->first + (uint32_t)i;
+        task_env_init(env_at(m, i), &m->def, m->robot, def->seed, stream);
     }
 }
 
@@ -98,7 +107,16 @@ static void init_envs(Mujoco *m, const EnvsDef *def) {
 static void reset_piece(void *context, int piece, int thread) {
     Mujoco *m = context;
     TaskView view = view_at(m, m->view, piece);
-    task_env_reset(env_at(m, piece), &m->def, m->robot, m->sim[thread], &view);
+    TaskEnv *env = env_at(m, piece);
+    RobotSim *sim = m->sim[thread];
+    if (m->trial) {
+        const EnvsTrial *trial = &m->trial[piece];
+        task_env_reset_on(env, &m->def, m->robot, sim, &m->terrain[trial->ground], trial->rigid,
+                          &view);
+        m->over[piece] = 0;
+    } else {
+        task_env_reset(env, &m->def, m->robot, sim, &view);
+    }
 }
 
 static MildStatus reset(Envs *envs, const EnvsView *first, void *stream, MildError *error) {
@@ -128,16 +146,55 @@ static void copy_last(const Mujoco *m, int piece, const TaskView *view) {
     copy_row(view->frame, shape->observation, valid, last.frame);
 }
 
+/* An environment in a policy step, for its TaskProbe and TaskDrive. */
+typedef struct {
+    const Mujoco *m;
+    int env;
+    EnvsSample *sample; /* of the next physics step; NULL: none */
+} Watched;
+
+static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const double *torque) {
+    Watched *watched = context;
+    if (watched->sample) {
+        envs_read_sample(env, sim, torque, watched->sample++);
+    }
+}
+
+static void drive(void *context, const TaskEnv *env, RobotSim *sim, double *torque) {
+    const Watched *watched = context;
+    const EnvsDrive *by = &watched->m->drive;
+    by->torque(by->self, watched->env, env, sim, torque);
+}
+
+/* The policy step of an environment; again: bool, a new episode follows where it ends. */
+static TaskStep step_env(const Mujoco *m, int i, RobotSim *sim, int again, const TaskView *view) {
+    const size_t steps = (size_t)m->base.physics_steps;
+    const float *action = m->step->action + (size_t)i * (size_t)m->shape.actions;
+    Watched watched = {m, i, m->sample ? m->sample + (size_t)i * steps : NULL};
+    const TaskDrive driven = {drive, &watched};
+    const TaskProbe probe = {watch, &watched, m->drive.torque ? &driven : NULL};
+    for (size_t k = 0; m->sample && k < steps; k++) {
+        watched.sample[k].valid = 0;
+    }
+    return task_env_step(env_at(m, i), &m->def, m->robot, sim, action, again, view,
+                         m->sample || m->drive.torque ? &probe : NULL);
+}
+
 static void step_piece(void *context, int piece, int thread) {
     Mujoco *m = context;
     const EnvsStep *step = m->step;
     TaskView view = view_at(m, &step->next, piece);
     TaskEnv *env = env_at(m, piece);
     TaskStep *result = &m->result[piece];
-    const float *action = step->action + (size_t)piece * (size_t)m->shape.actions;
     const int last = step->last.history != NULL;
-    *result = task_env_step(env, &m->def, m->robot, m->sim[thread], action, !last, &view, NULL);
-    if (result->done && last) {
+    if (m->trial && m->over[piece]) {
+        *result = (TaskStep){.valid = 1};
+        return;
+    }
+    *result = step_env(m, piece, m->sim[thread], !last && !m->trial, &view);
+    if (m->trial) {
+        m->over[piece] = result->done && !result->timeout;
+    } else if (result->done && last) {
         copy_last(m, piece, &view);
         task_env_reset(env, &m->def, m->robot, m->sim[thread], &view);
     }
@@ -185,6 +242,51 @@ static MildStatus wait(Envs *envs, MildError *error) {
     (void)envs;
     (void)error;
     return MILD_OK;
+}
+
+/* ---- trials ---- */
+
+static MildStatus set_commands(Envs *envs, const double *command, MildError *error) {
+    const Mujoco *m = own(envs);
+    (void)error;
+    for (int i = 0; i < m->base.count; i++) {
+        TaskEnv *env = env_at(m, i);
+        env->command_frozen = 1;
+        memcpy(env->command, command + 3 * (size_t)i, sizeof env->command);
+    }
+    return MILD_OK;
+}
+
+static void set_samples(Envs *envs, EnvsSample *sample) {
+    own(envs)->sample = sample;
+}
+
+static TaskEnv *env_of(Envs *envs, int i) {
+    return env_at(own(envs), i);
+}
+
+void envs_read_sample(const TaskEnv *env, const RobotSim *sim, const double *torque,
+                      EnvsSample *sample) {
+    const size_t joints = (size_t)env->shape.joints;
+    const double *qpos = robot_sim_qpos(sim);
+    sample->valid = 1;
+    sample->joints = env->shape.joints;
+    sample->feet = env->shape.feet;
+    memcpy(sample->base, qpos, sizeof sample->base);
+    sample->above = qpos[2] - mild_terrain_height_at(&env->terrain, qpos[0], qpos[1]);
+    memcpy(sample->quaternion, qpos + 3, sizeof sample->quaternion);
+    memcpy(sample->mass_center, robot_sim_mass_center(sim), sizeof sample->mass_center);
+    memcpy(sample->torque, torque, joints * sizeof *torque);
+    memcpy(sample->speed, robot_sim_qvel(sim) + 6, joints * sizeof *sample->speed);
+    for (int f = 0; f < sample->feet; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        sample->foot[f] = (EnvsFoot){
+            .load = foot->force[2],
+            .center = {foot->sole_center[0], foot->sole_center[1]},
+            .height = foot->sole_height,
+            .depth = env->variation.rigid ? 0 : foot->result.depth_max,
+        };
+    }
 }
 
 /* ---- statistics ---- */
@@ -278,9 +380,12 @@ static const EnvsBackend backend = {.destroy = destroy,
                                     .save_progress = save_progress,
                                     .load_progress = load_progress,
                                     .memory = memory,
+                                    .set_commands = set_commands,
+                                    .set_samples = set_samples,
                                     .times = times,
                                     .state = state,
-                                    .hash = hash};
+                                    .hash = hash,
+                                    .env = env_of};
 
 Envs *envs_create_mujoco(const EnvsDef *def, MildError *error) {
     if (task_def_check_robot(def->task, def->robot, error) != MILD_OK) {
@@ -296,6 +401,9 @@ Envs *envs_create_mujoco(const EnvsDef *def, MildError *error) {
                   .shape = task_shape(def->robot),
                   .robot = def->robot,
                   .pool = def->pool,
+                  .trial = def->trial,
+                  .terrain = def->terrain,
+                  .drive = def->drive,
                   .stride = task_env_bytes(def->task, def->robot)};
     if (open_arrays(m, error) != MILD_OK || open_sims(m, error) != MILD_OK) {
         destroy(&m->base);

@@ -1,5 +1,5 @@
-/* Trials of an evaluation by the batch engine: what each has instead of what an episode draws, and
- * what is measured of it. */
+/* Trials of an evaluation: what each has instead of what an episode draws, and what is measured of
+ * it. */
 #ifndef ENVS_TRIAL_H
 #define ENVS_TRIAL_H
 
@@ -11,24 +11,29 @@
  * an evaluation. */
 typedef struct {
     uint32_t stream; /* number that selects its random numbers */
-    int ground;      /* of EnvsDef.chosen */
+    int ground;      /* of EnvsDef.terrain */
     int rigid;       /* bool: on the engine's own contact, with TASK_RIGID_FRICTION */
 } EnvsTrial;
 
-/* A physics step, for the measures of an evaluation. */
+/* What is measured of a foot. */
 typedef struct {
-    int valid;                      /* bool: the step was made; 0 from a divergence on */
-    float base[3];                  /* [m] world */
-    float above;                    /* [m] height of the base above the ground under it */
-    float quaternion[4];            /* [-] base -> world, w x y z */
-    float torque[ROBOT_JOINTS_MAX]; /* [N m] */
-    float speed[ROBOT_JOINTS_MAX];  /* [rad/s] after the step */
-    struct {
-        float load;      /* [N] vertical force of the ground */
-        float center[2]; /* [m] centre of the sole, world */
-        float height;    /* [m] lowest sole point above the undisturbed ground */
-        float depth;     /* [m] deepest element; 0 on rigid ground */
-    } foot[ROBOT_FEET_MAX];
+    double load;      /* [N] vertical force of the ground on the foot */
+    double center[2]; /* [m] centre of the sole, world */
+    double height;    /* [m] lowest sole point above the undisturbed ground */
+    double depth;     /* [m] deepest element; 0 on rigid ground */
+} EnvsFoot;
+
+/* A physics step, for the measures of an evaluation. The batch engine computes in float. */
+typedef struct {
+    int valid;                       /* bool: the step was made; 0 from a divergence on */
+    int joints, feet;                /* of the robot */
+    double base[3];                  /* [m] world */
+    double above;                    /* [m] height of the base above the ground under it */
+    double quaternion[4];            /* [-] base -> world, w x y z */
+    double mass_center[3];           /* [m] of the robot, world; by MuJoCo, else unset */
+    double torque[ROBOT_JOINTS_MAX]; /* [N m] */
+    double speed[ROBOT_JOINTS_MAX];  /* [rad/s] of the joints after the step */
+    EnvsFoot foot[ROBOT_FEET_MAX];
 } EnvsSample;
 
 #endif

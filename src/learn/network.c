@@ -28,32 +28,34 @@ static MildStatus check_hidden(const int *hidden, const char *name, MildError *e
     return MILD_OK;
 }
 
+static MildStatus check_widths(const PolicyDef *def, MildError *error) {
+    const struct {
+        const char *name;
+        int width;
+    } in[] = {{"observation", def->observation},
+              {"frames", def->frames},
+              {"critic_input", def->critic_input},
+              {"estimates", def->estimates}};
+    const struct {
+        const char *name;
+        const int *hidden;
+    } net[] = {{"encoder_hidden", def->encoder_hidden},
+               {"decoder_hidden", def->decoder_hidden},
+               {"actor_hidden", def->actor_hidden},
+               {"critic_hidden", def->critic_hidden}};
+    MildStatus status = MILD_OK;
+    for (size_t i = 0; !status && i < sizeof in / sizeof *in; i++) {
+        status = check_width(in[i].width, 1, in[i].name, error);
+    }
+    for (size_t i = 0; !status && i < sizeof net / sizeof *net; i++) {
+        status = check_hidden(net[i].hidden, net[i].name, error);
+    }
+    return status;
+}
+
 static MildStatus check_def(const PolicyDef *def, MildError *error) {
     MildStatus status = mild_fields_check(policy_fields, policy_field_count, def, "policy", error);
-    if (!status) {
-        status = check_width(def->observation, 1, "observation", error);
-    }
-    if (!status) {
-        status = check_width(def->frames, 1, "frames", error);
-    }
-    if (!status) {
-        status = check_width(def->critic_input, 1, "critic_input", error);
-    }
-    if (!status) {
-        status = check_width(def->estimates, 1, "estimates", error);
-    }
-    if (!status) {
-        status = check_hidden(def->encoder_hidden, "encoder_hidden", error);
-    }
-    if (!status) {
-        status = check_hidden(def->decoder_hidden, "decoder_hidden", error);
-    }
-    if (!status) {
-        status = check_hidden(def->actor_hidden, "actor_hidden", error);
-    }
-    if (!status) {
-        status = check_hidden(def->critic_hidden, "critic_hidden", error);
-    }
+    status = status ? status : check_widths(def, error);
     if (status) {
         return status;
     }

@@ -66,6 +66,17 @@ static int take_mirror(Ppo *ppo, const PpoMirror *mirror) {
     return 1;
 }
 
+static void clear_all(Ppo *ppo) {
+    const Network *n = &ppo->policy->network;
+    const size_t bytes = (size_t)n->count * sizeof(float);
+    memset(ppo->batch_block, 0, ppo->batch_bytes);
+    ppo_carve_batch(&ppo->batch, n, ppo->batch_block);
+    memset(ppo->batch.valid, 1, (size_t)ppo->batch.steps * (size_t)ppo->batch.envs);
+    ppo->start = ppo->batch;
+    memset(ppo->first, 0, bytes);
+    memset(ppo->second, 0, bytes);
+}
+
 static int take_all(Ppo *ppo, const PpoMirror *mirror) {
     const Network *n = &ppo->policy->network;
     const size_t count = (size_t)n->count,
@@ -106,12 +117,7 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
         !ppo->order || !ppo->substitute) {
         return 0;
     }
-    memset(ppo->batch_block, 0, ppo->batch_bytes);
-    ppo_carve_batch(&ppo->batch, n, ppo->batch_block);
-    memset(ppo->batch.valid, 1, samples);
-    ppo->start = ppo->batch;
-    memset(ppo->first, 0, count * sizeof(float));
-    memset(ppo->second, 0, count * sizeof(float));
+    clear_all(ppo);
     return 1;
 }
 

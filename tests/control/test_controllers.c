@@ -54,8 +54,13 @@ static void names(void **unused) {
         MildError error = {0};
         assert_int_equal(controller_check(wanted[i], &error), MILD_OK);
     }
-    assert_true(controller_follows("learned") && controller_follows("passivity"));
-    assert_false(controller_follows("stand") || controller_follows("nobody"));
+    const int follows = CONTROLLER_FOLLOWS;
+    assert_true(controller_has("learned", follows) && controller_has("passivity", follows));
+    assert_false(controller_has("stand", follows) || controller_has("nobody", follows));
+    for (int i = 0; i < controller_count(); i++) { /* the only one whose file says its task */
+        const char *name = controller_name(i);
+        assert_int_equal(controller_has(name, CONTROLLER_POLICY), strcmp(name, "learned") == 0);
+    }
     for (int i = 0; i < controller_count(); i++) {
         MildError error = {0};
         assert_true(strlen(controller_summary(i)) > 5);

@@ -102,9 +102,9 @@ static void device_follows_mujoco(void **unused) {
 
 /* The sample of a physics step above the map. */
 static void check_sample(const EnvsSample *sample, const MildTerrain *terrain) {
-    const double x = (double)sample->base[0], y = (double)sample->base[1];
-    const double above = (double)sample->base[2] - mild_terrain_height_at(terrain, x, y);
-    assert_true(sample->valid && fabs((double)sample->above - above) < 1e-5);
+    const double *base = sample->base;
+    const double above = base[2] - mild_terrain_height_at(terrain, base[0], base[1]);
+    assert_true(sample->valid && fabs(sample->above - above) < 1e-5);
 }
 
 /* Trials have what was chosen for them in every episode, and no more: ground, the map's origin,
@@ -117,8 +117,7 @@ static void trials_are_chosen(void **unused) {
     waves.kind = MILD_MAP_WAVES;
     TaskDef def = some_def();
     MildMap *map = mild_map_create(&waves, &error);
-    TaskGround ground[3];
-    const TaskGrounds chosen = {3, ground};
+    MildTerrain ground[3];
     EnvsTrial trial[TRIALS];
     double command[TRIALS][3];
     static float history[TRIALS][SA01_HISTORY], action[TRIALS][SA01_JOINTS], reward[TRIALS];
@@ -141,9 +140,9 @@ static void trials_are_chosen(void **unused) {
     Robot *robot = robot_create(SA01, &error);
     Pool *pool = pool_create(2);
     for (int i = 0; i < 3; i++) {
-        ground[i].material = mild_material_default();
-        ground[i].material.k_pen = 300 + 100 * i;
-        ground[i].depth = 0.01 * i;
+        MildMaterial material = any;
+        material.k_pen = 300 + 100 * i;
+        ground[i] = mild_terrain_uniform(&material);
     }
     for (int i = 0; i < TRIALS; i++) {
         trial[i] = (EnvsTrial){.stream = (uint32_t)(i % 2), .ground = i / 2, .rigid = i == 3};
@@ -158,14 +157,15 @@ static void trials_are_chosen(void **unused) {
                         .device = MILD_BATCH_HOST,
                         .count = TRIALS,
                         .seed = 7,
-                        .chosen = &chosen,
-                        .trial = trial};
+                        .trial = trial,
+                        .terrain = ground,
+                        .terrains = 3};
     Envs *envs = envs_create(&of, &error);
     if (!envs) {
         fail_msg("%s", error.text);
     }
     assert_int_equal(envs_physics_steps(envs), 2);
-    assert_int_equal(envs_set_samples(envs, sample[0], &error), MILD_OK);
+    envs_set_samples(envs, sample[0]);
     assert_int_equal(envs_set_commands(envs, command[0], &error), MILD_OK);
     assert_int_equal(envs_reset(envs, &view, NULL, &error), MILD_OK);
     for (int t = 0; t <= 130; t++) { /* falls and time limits begin further episodes */

@@ -5,6 +5,7 @@
 #include "env/task/policy_keys.h"
 #include "kit.h"
 #include "learn/policy.h"
+#include "mild/batch.h"
 #include "run/eval/eval.h"
 #include "sa01.h"
 
@@ -33,6 +34,23 @@ static inline int kit_setup(void **state) {
         fprintf(stderr, "%s\n", error.text);
     }
     return !ready;
+}
+
+/* One row by MuJoCo. */
+static inline MildStatus kit_run(const TaskDef *task, Pool *pool, Controller *controller,
+                                 const Scene *scene, const EvalDef *eval, EvalRow *row,
+                                 MildError *error) {
+    const EvalRun run = {.task = task,
+                         .robot = robot,
+                         .pool = pool,
+                         .controller = controller,
+                         .device = MILD_BATCH_HOST,
+                         .scenes = scene,
+                         .scene_count = 1,
+                         .speeds = &eval->speed,
+                         .speed_count = 1,
+                         .eval = *eval};
+    return eval_run(&run, row, error);
 }
 
 static inline int kit_teardown(void **state) {

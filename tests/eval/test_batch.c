@@ -64,18 +64,19 @@ static MildStatus run_on(int device, Controller *controller, Pool *pool, const c
                          const double *speeds, int speed_count, EvalDef eval, EvalRow *rows,
                          MildError *error) {
     Scene scene[ROWS];
-    const EvalBatch batch = {.task = &def,
-                             .robot = robot,
-                             .pool = pool,
-                             .controller = controller,
-                             .device = device,
-                             .scenes = scene,
-                             .scene_count = scenes_of(names, scene),
-                             .speeds = speeds,
-                             .speed_count = speed_count,
-                             .eval = eval};
+    const EvalRun run = {.task = &def,
+                         .robot = robot,
+                         .pool = pool,
+                         .controller = controller,
+                         .batch = 1,
+                         .device = device,
+                         .scenes = scene,
+                         .scene_count = scenes_of(names, scene),
+                         .speeds = speeds,
+                         .speed_count = speed_count,
+                         .eval = eval};
     memset(rows, 0xff, ROWS * sizeof *rows);
-    return eval_run_batch(&batch, rows, error);
+    return eval_run(&run, rows, error);
 }
 
 static MildStatus run_batch(Controller *controller, Pool *pool, const char *const *names,
@@ -112,7 +113,7 @@ static void compare_rows(const char *const *names, const double *speeds, int spe
         const EvalRow *row = &rows[i];
         eval.speed = speeds[i % speed_count];
         assert_int_equal(
-            eval_run(&def, robot, pool, &controller, &scene[i / speed_count], &eval, &own, &error),
+            kit_run(&def, pool, &controller, &scene[i / speed_count], &eval, &own, &error),
             MILD_OK);
         eval_print_row(row, line, sizeof line);
         printf("%s\n", line);
@@ -235,7 +236,7 @@ static void falls_are_counted(void **state) {
     scenes_of(names, scene);
     assert_int_equal(run_batch(&controller, pool, names, &speed, 1, eval, rows, &error), MILD_OK);
     assert_true(asked.calls == 400 && asked.rows == 8);
-    assert_int_equal(eval_run(&def, robot, pool, &controller, scene, &eval, &own, &error), MILD_OK);
+    assert_int_equal(kit_run(&def, pool, &controller, scene, &eval, &own, &error), MILD_OK);
     assert_true(rows[0].success == own.success && rows[0].success == 0);
     assert_true(own.seconds > 0.2 && fabs(rows[0].seconds / own.seconds - 1) < 0.1);
     assert_true(fabs(rows[0].energy / own.energy - 1) < 0.1);
@@ -266,8 +267,7 @@ static void four_feet_are_measured(void **state) {
     assert_int_equal(run_batch(&controller, pool, names, &speed, 1, eval, rows, &error), MILD_OK);
     for (int i = 0; i < count; i++) {
         const EvalRow *row = &rows[i];
-        assert_int_equal(eval_run(&def, robot, pool, &controller, &scene[i], &eval, &own, &error),
-                         MILD_OK);
+        assert_int_equal(kit_run(&def, pool, &controller, &scene[i], &eval, &own, &error), MILD_OK);
         eval_print_row(row, line, sizeof line);
         printf("%s\n", line);
         eval_print_row(&own, line, sizeof line);

@@ -121,8 +121,7 @@ static EvalRow run(Zero *zero, const char *ground, EvalDef eval, int threads) {
     EvalRow row;
     memset(&row, 0xff, sizeof row);
     assert_int_equal(scene_make(&scene, ground, 2, &error), MILD_OK);
-    assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
-                     MILD_OK);
+    assert_int_equal(kit_run(&def, pool, &controller, &scene, &eval, &row, &error), MILD_OK);
     pool_destroy(pool);
     return row;
 }
@@ -230,8 +229,7 @@ static EvalRow walk(double seconds, double stop) {
     assert_int_equal(scene_make(&scene, "foam60", 2, &error), MILD_OK);
     assert_int_equal(controller_learned(POLICY, robot, NULL, 2, &controller, &error), MILD_OK);
     Pool *pool = pool_create(1);
-    assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
-                     MILD_OK);
+    assert_int_equal(kit_run(&def, pool, &controller, &scene, &eval, &row, &error), MILD_OK);
     pool_destroy(pool);
     controller_destroy(&controller);
     eval_print_row(&row, line, sizeof line);
@@ -266,8 +264,7 @@ static void a_row_is_what_its_trials_did(void **state) {
     assert_int_equal(scene_make(&scene, "foam60", 2, &error), MILD_OK);
     Pool *pool = pool_create(1);
     EvalRow row, own;
-    assert_int_equal(eval_run(&shorter, robot, pool, &controller, &scene, &eval, &row, &error),
-                     MILD_OK);
+    assert_int_equal(kit_run(&shorter, pool, &controller, &scene, &eval, &row, &error), MILD_OK);
     pool_destroy(pool);
 
     Measure measure[2];
@@ -346,8 +343,7 @@ static void walk_pushed(Noting *noting, double push) {
     assert_int_equal(controller_learned(POLICY, robot, pool, PUSHED, &noting->inner, &error),
                      MILD_OK);
     Controller controller = {noting, "noting", noting_act, NULL, NULL, NULL};
-    assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
-                     MILD_OK);
+    assert_int_equal(kit_run(&def, pool, &controller, &scene, &eval, &row, &error), MILD_OK);
     assert_true(row.push == push && row.success == PUSHED);
     controller_destroy(&noting->inner);
     pool_destroy(pool);
@@ -384,8 +380,7 @@ static EvalRow walk_on(const char *ground) {
     Pool *pool = pool_create(2);
     assert_int_equal(scene_make(&scene, ground, 50, &error), MILD_OK);
     assert_int_equal(controller_learned(POLICY, robot, pool, 3, &controller, &error), MILD_OK);
-    assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
-                     MILD_OK);
+    assert_int_equal(kit_run(&def, pool, &controller, &scene, &eval, &row, &error), MILD_OK);
     controller_destroy(&controller);
     pool_destroy(pool);
     return row;

@@ -26,7 +26,7 @@ static char *log_walk(InsideLog *log, Controller *controller) {
     log->csv = open_memstream(&text, &size);
     assert_non_null(log->csv);
     inside_print_header(log);
-    assert_int_equal(eval_run(&def, robot, pool, controller, &scene, &eval, &row, &error), MILD_OK);
+    assert_int_equal(kit_run(&def, pool, controller, &scene, &eval, &row, &error), MILD_OK);
     assert_int_equal(row.success, TRIALS);
     fclose(log->csv);
     pool_destroy(pool);
@@ -67,7 +67,7 @@ static Line read_line(char **text) {
  * base; estimates are in SI units, near what the robot does. */
 static void the_columns(void **state) {
     (void)state;
-    InsideLog log = {.task = &def};
+    InsideLog log = {0};
     Controller controller = learned();
     const double slowing = def.gait_slowing;
     def.gait_slowing = 0; /* or the period follows the turning that holds the heading */
@@ -131,7 +131,7 @@ static void the_numbers_are_the_policys(void **state) {
     TaskDef scaled = def; /* as if it had been trained with other scales */
     scaled.velocity_scale = 2;
     scaled.height_scale = 5;
-    InsideLog log = {.task = &scaled, .feet = SA01_FEET};
+    InsideLog log = {.feet = SA01_FEET};
     const EvalWatch watch = {inside_decided, &log};
     const EvalDef eval = {.speed = 0.5, .trials = TRIALS, .seconds = 0.2, .watch = &watch};
     Controller controller = {&keeping, "keeping", keeping_act, NULL, NULL, NULL};
@@ -145,8 +145,7 @@ static void the_numbers_are_the_policys(void **state) {
     assert_int_equal(learned_watch(&keeping.inner, &log.inside, &error), MILD_OK);
     log.csv = open_memstream(&text, &size);
     log.sum = sum;
-    assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
-                     MILD_OK);
+    assert_int_equal(kit_run(&scaled, pool, &controller, &scene, &eval, &row, &error), MILD_OK);
     fclose(log.csv);
     Policy *policy = policy_load(POLICY, NULL, 0, &error);
     assert_non_null(policy);

@@ -14,25 +14,21 @@ static void assert_close(const char *what, double ours, double expected, double 
     }
 }
 
-/* Torques and joint speeds of one step; the feet stand still under 100 N unless set. Behind the
- * robot's feet stands what must not count. */
+/* One step; the feet stand still under 100 N unless set. Behind the robot's feet stands what must
+ * not count. */
 typedef struct {
-    double torque[SA01_JOINTS], speed[SA01_JOINTS];
-    MeasureSample sample;
+    EnvsSample sample;
 } Script;
 
 static void script_start(Script *s) {
     *s = (Script){0};
-    s->sample = (MeasureSample){.feet = SA01_FEET,
-                                .torque = s->torque,
-                                .joint_speed = s->speed,
-                                .joints = SA01_JOINTS,
-                                .base_height = 0.8};
+    s->sample =
+        (EnvsSample){.feet = SA01_FEET, .joints = SA01_JOINTS, .above = 0.8, .quaternion = {1}};
     for (int f = 0; f < SA01_FEET; f++) {
         s->sample.foot[f].load = 100;
     }
     for (int f = SA01_FEET; f < ROBOT_FEET_MAX; f++) {
-        s->sample.foot[f] = (MeasureFoot){.load = 100, .depth = 9};
+        s->sample.foot[f] = (EnvsFoot){.load = 100, .depth = 9};
     }
 }
 
@@ -50,14 +46,14 @@ static Measure script_walk(double steady_end) {
     for (int k = 1; k <= STEPS(5); k++) {
         double t = k * DT, sign = t <= 2.5 ? 1 : -1;
         int steady = t > 2;
-        s.torque[0] = sign * 10;
-        s.speed[0] = 2;
-        s.torque[11] = -4;
-        s.speed[11] = sign * 3;
-        s.torque[5] = k == 100 ? -45 : k == 200 ? 30 : 0; /* at rest: no power */
+        s.sample.torque[0] = sign * 10;
+        s.sample.speed[0] = 2;
+        s.sample.torque[11] = -4;
+        s.sample.speed[11] = sign * 3;
+        s.sample.torque[5] = k == 100 ? -45 : k == 200 ? 30 : 0; /* at rest: no power */
         s.sample.base[0] = -1 + (steady ? 0.5 + 0.5 * (t - 2) : 0.25 * t);
         s.sample.base[1] = 3 + (steady ? 0.1 * (t - 2) : 0);
-        s.sample.base_height = !steady ? (k % 2 ? 0.5 : 1.0) : k % 3 ? 0.79 : 0.82;
+        s.sample.above = !steady ? (k % 2 ? 0.5 : 1.0) : k % 3 ? 0.79 : 0.82;
         measure_sample(&m, &s.sample);
     }
     return m;
@@ -102,7 +98,8 @@ static void speeds_of_a_turning_robot(void **state) {
         const double yaw = w * k * DT;
         s.sample.base[0] = (v * sin(yaw) + left * (cos(yaw) - 1)) / w;
         s.sample.base[1] = (v * (1 - cos(yaw)) + left * sin(yaw)) / w;
-        s.sample.yaw = remainder(yaw, 2 * 3.141592653589793);
+        s.sample.quaternion[0] = cos(0.5 * yaw);
+        s.sample.quaternion[3] = sin(0.5 * yaw);
         measure_sample(&m, &s.sample);
     }
     assert_close("turned", m.turned, w * 8, 1e-9);
@@ -135,7 +132,7 @@ static void nothing_is_steady_before_two_seconds(void **state) {
     Measure m;
     script_start(&s);
     measure_start(&m, DT);
-    s.torque[0] = s.speed[0] = 1;
+    s.sample.torque[0] = s.sample.speed[0] = 1;
     s.sample.base[0] = 3;
     for (int k = 0; k < STEPS(2); k++) {
         measure_sample(&m, &s.sample);
@@ -156,7 +153,7 @@ static void hold(Measure *m, Script *s, int steps) {
 }
 
 static void set_foot(Script *s, int f, double load, double x, double y, double depth) {
-    s->sample.foot[f] = (MeasureFoot){.load = load, .center = {x, y}, .depth = depth};
+    s->sample.foot[f] = (EnvsFoot){.load = load, .center = {x, y}, .depth = depth};
 }
 
 static void lift(Script *s, int f, double height) {
@@ -223,7 +220,8 @@ static void stances_are_kept(void **state) {
     Measure *m = calloc(1, sizeof *m);
     EvalRow row;
     script_start(&s);
-    s.sample.yaw = 0.5;
+    s.sample.quaternion[0] = cos(0.25);
+    s.sample.quaternion[3] = sin(0.25);
     measure_start(m, DT);
     m->keep = 1;
     hold(m, &s, 50);

@@ -221,8 +221,7 @@ static void walk(const TaskActuator *motors, EvalRow row[GROUNDS]) {
     for (int g = 0; g < GROUNDS; g++) {
         Scene scene;
         assert_int_equal(scene_make(&scene, ground[g], 2, &error), MILD_OK);
-        assert_int_equal(eval_run(&own, robot, pool, &controller, &scene, &eval, &row[g], &error),
-                         MILD_OK);
+        assert_int_equal(kit_run(&own, pool, &controller, &scene, &eval, &row[g], &error), MILD_OK);
     }
     controller_destroy(&controller);
 }

@@ -4,6 +4,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include "env/envs.h"
 #include "run/eval/track.h"
 #include "sa01.h"
 
@@ -33,7 +34,14 @@ static void a_point_of_a_turned_robot(void **state) {
 
     Track track;
     assert_int_equal(track_make(&track, 2, 3, &error), MILD_OK);
-    track_take(&track, 1, sim);
+    const double none[SA01_JOINTS] = {0};
+    const MildMaterial any = mild_material_default();
+    static TaskEnv env;
+    EnvsSample sample;
+    env.shape = task_shape(robot);
+    env.terrain = mild_terrain_uniform(&any);
+    envs_read_sample(&env, sim, none, &sample);
+    track_take(&track, 1, &sample);
     assert_true(track.count[0] == 0 && track.count[1] == 1);
     const TrackPoint *point = &track.point[3];
     const mjModel *m = robot_sim_model(sim);

@@ -6,6 +6,7 @@
 #include "plugin_kit.h"
 
 #include "control/stand.h"
+#include "mild/batch.h"
 #include "robot/sim.h"
 #include "run/config/experiment_keys.h"
 #include "run/eval/eval.h"
@@ -276,7 +277,17 @@ static EvalRow walk(const Walker *walker, const Robot *robot, const char *ground
     assert_int_equal(scene_make(&scene, ground, 3, &error), MILD_OK);
     EvalDef eval = {.speed = 0.5, .trials = trials, .seconds = 10, .seed = 1};
     EvalRow row;
-    if (eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error) != MILD_OK) {
+    const EvalRun run = {.task = &def,
+                         .robot = robot,
+                         .pool = pool,
+                         .controller = &controller,
+                         .device = MILD_BATCH_HOST,
+                         .scenes = &scene,
+                         .scene_count = 1,
+                         .speeds = &eval.speed,
+                         .speed_count = 1,
+                         .eval = eval};
+    if (eval_run(&run, &row, &error) != MILD_OK) {
         fail_msg("%s", error.text);
     }
     controller_destroy(&controller);

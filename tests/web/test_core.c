@@ -123,6 +123,8 @@ static void test_policy(void **state) {
 /* ---- beside the batch engine ---- */
 
 typedef struct {
+    EnvsTrial trial;
+    MildTerrain terrain;
     Envs *envs;
     float history[SA01_HISTORY], reward;
     uint8_t done, timeout, valid;
@@ -131,16 +133,15 @@ typedef struct {
 /* stiffness: factor of the material's. speed: [m/s] forward. */
 static void rival_start(Rival *rival, int ground, double stiffness, double speed) {
     MildError error = {0};
-    TaskGround material = {.material = mild_material_default()};
+    MildMaterial material = mild_material_default();
     const int rigid = ground == WEB_RIGID;
     if (!rigid) {
-        mild_material_preset(mild_material_preset_name(ground), &material.material);
+        mild_material_preset(mild_material_preset_name(ground), &material);
     }
-    material.material.k_pen *= stiffness;
-    material.material.sigma_cone *= stiffness;
-    material.depth = rigid ? 0 : task_standing_depth(robot, &material.material);
-    const TaskGrounds grounds = {1, &material};
-    const EnvsTrial trial = {.rigid = rigid};
+    material.k_pen *= stiffness;
+    material.sigma_cone *= stiffness;
+    rival->terrain = mild_terrain_uniform(&material);
+    rival->trial = (EnvsTrial){.rigid = rigid};
     const EnvsDef def = {.task = &task,
                          .robot = robot,
                          .pool = pool,
@@ -148,8 +149,9 @@ static void rival_start(Rival *rival, int ground, double stiffness, double speed
                          .device = MILD_BATCH_HOST,
                          .count = 1,
                          .seed = 1,
-                         .chosen = &grounds,
-                         .trial = &trial};
+                         .trial = &rival->trial,
+                         .terrain = &rival->terrain,
+                         .terrains = 1};
     const double stand[3] = {0, 0, 0}, walk[3] = {speed, 0, 0};
     const EnvsView view = {.history = rival->history};
     rival->envs = envs_create(&def, &error);
@@ -228,19 +230,17 @@ static double rival_walk(int ground) {
     EnvsSample sample[8];
     double before[2] = {0, 0};
     rival_start(&rival, ground, 1, 0.6);
-    assert_int_equal(envs_set_samples(rival.envs, sample, NULL), MILD_OK);
+    envs_set_samples(rival.envs, sample);
     for (int t = 0; t < 10 * SECOND; t++) {
         float action[SA01_JOINTS];
         policy_act(policy, NULL, 1, rival.history, action, NULL, NULL);
         rival_step(&rival, action);
         assert_false(rival.done);
         if (t == 2 * SECOND - 1) {
-            before[0] = (double)sample[0].base[0];
-            before[1] = (double)sample[0].base[1];
+            memcpy(before, sample[0].base, sizeof before);
         }
     }
-    const double x = (double)sample[0].base[0] - before[0];
-    const double y = (double)sample[0].base[1] - before[1];
+    const double x = sample[0].base[0] - before[0], y = sample[0].base[1] - before[1];
     envs_destroy(rival.envs);
     return hypot(x, y) / 8;
 }
@@ -421,13 +421,13 @@ static double rival_depth(double stiffness) {
     rival_start(&rival, preset("foam45"), stiffness, 0);
     EnvsSample sample[16];
     assert_true(envs_physics_steps(rival.envs) <= 16);
-    assert_int_equal(envs_set_samples(rival.envs, sample, NULL), MILD_OK);
+    envs_set_samples(rival.envs, sample);
     for (int t = 0; t < 8 * SECOND; t++) {
         float action[SA01_JOINTS];
         web_act(rival.history, action);
         rival_step(&rival, action);
         assert_false(rival.done);
-        sum += t < 2 * SECOND ? 0 : (double)(sample[0].foot[0].depth + sample[0].foot[1].depth) / 2;
+        sum += t < 2 * SECOND ? 0 : (sample[0].foot[0].depth + sample[0].foot[1].depth) / 2;
     }
     envs_destroy(rival.envs);
     return sum / (6 * SECOND);

@@ -202,26 +202,17 @@ static MildStatus compare(const ExperimentDef *def, const Robot *robot, Pool *po
 }
 
 MildStatus bench_episodes(const ExperimentDef *def, BenchReport *report, MildError *error) {
-    ExperimentDef local = *def;
+    BenchContext c;
     Controller controller = {0};
-    local.task.assist = 0;
-    local.task.randomize.patch_share = 0; /* the batch engine has patches on maps only */
-    Robot *robot = robot_open(def->train.robot, error);
-    Pool *pool = robot ? pool_create(def->train.threads) : NULL;
-    MildStatus status = robot ? MILD_OK : error->status;
-    if (robot && !pool) {
-        status = mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
+    MildStatus status = bench_open(&c, def, error);
+    if (status == MILD_OK) {
+        c.def.task.assist = 0;
+        status = bench_walker(c.robot, c.pool, DEVICE_EPISODES, &c.def.task, &controller, error);
     }
     if (status == MILD_OK) {
-        experiment_fit_robot(&local, robot);
-        robot_set_model(robot, (MildModel)local.task.randomize.model);
-        status = bench_walker(robot, pool, DEVICE_EPISODES, &local.task, &controller, error);
-    }
-    if (status == MILD_OK) {
-        status = compare(&local, robot, pool, &controller, report, error);
+        status = compare(&c.def, c.robot, c.pool, &controller, report, error);
         controller_destroy(&controller);
     }
-    pool_destroy(pool);
-    robot_destroy(robot);
+    bench_close(&c);
     return status;
 }

@@ -15,6 +15,23 @@ Robot *bench_robot(const ExperimentDef *def, MildError *error) {
     return robot_open(def->train.robot, error);
 }
 
+MildStatus bench_open(BenchContext *c, const ExperimentDef *def, MildError *error) {
+    *c = (BenchContext){.def = *def, .robot = bench_robot(def, error)};
+    if (!c->robot) {
+        return error->status;
+    }
+    c->def.task.randomize.patch_share = 0;
+    experiment_fit_robot(&c->def, c->robot);
+    robot_set_model(c->robot, (MildModel)c->def.task.randomize.model);
+    c->pool = pool_create(def->train.threads);
+    return c->pool ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
+}
+
+void bench_close(BenchContext *c) {
+    pool_destroy(c->pool);
+    robot_destroy(c->robot);
+}
+
 /* A robot that walks. */
 typedef struct {
     TaskDef def;

@@ -8,6 +8,15 @@
 
 /* NULL, with the reason in *error. */
 Robot *bench_robot(const ExperimentDef *def, MildError *error);
+/* What benches of environments have in common: the experiment fitted to its robot, without patches,
+ * which the batch engine has on maps only. Close it, whatever comes out. */
+typedef struct {
+    ExperimentDef def;
+    Robot *robot;
+    Pool *pool;
+} BenchContext;
+MildStatus bench_open(BenchContext *c, const ExperimentDef *def, MildError *error);
+void bench_close(BenchContext *c);
 /* The policy that ships for a robot, for `envs` of them, and in *task how its file says that it
  * walks. */
 MildStatus bench_walker(const Robot *robot, Pool *pool, int envs, TaskDef *task,

@@ -225,29 +225,21 @@ static MildStatus with_rows(const ExperimentDef *def, const Robot *robot, Pool *
 }
 
 MildStatus bench_robots(const ExperimentDef *def, BenchReport *report, MildError *error) {
-    ExperimentDef local = *def;
-    local.task.randomize.patch_share = 0;
+    BenchContext c;
+    ExperimentDef *own = &c.def;
     Controller controller;
     MildError unused;
-    Robot *robot = robot_open(def->train.robot, error);
-    Pool *pool = robot ? pool_create(def->train.threads) : NULL;
-    MildStatus status = robot ? MILD_OK : error->status;
-    if (robot && !pool) {
-        status = mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
-    }
+    MildStatus status = bench_open(&c, def, error);
     if (status == MILD_OK) {
-        experiment_fit_robot(&local, robot);
-        robot_set_model(robot, (MildModel)local.task.randomize.model);
-        status = with_rows(&local, robot, pool, NULL, report, error);
+        status = with_rows(own, c.robot, c.pool, NULL, report, error);
     }
     /* a robot for which no policy ships only marches */
-    if (status == MILD_OK &&
-        bench_walker(robot, pool, local.train.envs, &local.task, &controller, &unused) == MILD_OK) {
-        local.task.assist = 0;
-        status = with_rows(&local, robot, pool, &controller, report, error);
+    if (status == MILD_OK && bench_walker(c.robot, c.pool, own->train.envs, &own->task, &controller,
+                                          &unused) == MILD_OK) {
+        own->task.assist = 0;
+        status = with_rows(own, c.robot, c.pool, &controller, report, error);
         controller_destroy(&controller);
     }
-    pool_destroy(pool);
-    robot_destroy(robot);
+    bench_close(&c);
     return status;
 }

@@ -28,15 +28,15 @@ static void print_numbers(FILE *csv, const double *numbers, int count) {
     }
 }
 
-void actions_print_row(FILE *csv, const ActionsRow *row) {
-    TaskEnv *env = row->env;
+void actions_print_row(FILE *csv, const EvalDecision *decision) {
+    TaskEnv *env = decision->env;
     const TaskShape *shape = &env->shape;
     const double *qpos = env->robot.qpos, *qvel = env->robot.qvel;
-    const double clip = row->task->action_clip;
+    const double clip = decision->task->action_clip;
     const float *frame = task_env_history(env) + (TASK_FRAMES - 1) * shape->observation;
-    char ground[sizeof row->scene->name];
-    scene_ground_at(row->scene, qpos[0], qpos[1], ground, sizeof ground);
-    fprintf(csv, "%d,%s,%g,%.2f", row->trial, ground, row->speed, row->time);
+    char ground[sizeof decision->scene->name];
+    scene_ground_at(decision->scene, qpos[0], qpos[1], ground, sizeof ground);
+    fprintf(csv, "%d,%s,%g,%.2f", decision->trial, ground, decision->speed, decision->time);
     print_numbers(csv, env->command_seen, 3);
     print_numbers(csv, &env->phase, 1);
     print_numbers(csv, qpos + 3, 4);
@@ -47,7 +47,7 @@ void actions_print_row(FILE *csv, const ActionsRow *row) {
         fprintf(csv, ",%.9g", (double)frame[i]);
     }
     for (int i = 0; i < shape->actions; i++) {
-        fprintf(csv, ",%.9g", fmin(fmax((double)row->action[i], -clip), clip));
+        fprintf(csv, ",%.9g", fmin(fmax((double)decision->action[i], -clip), clip));
     }
     fprintf(csv, "\n");
 }

@@ -5,25 +5,12 @@
 
 #include <stdio.h>
 
-#include "env/task/task.h"
-#include "run/eval/scene.h"
-
-/* One decision: the environment's true state, the newest frame of its history, and the action
- * [robot_joints] that came out. */
-typedef struct {
-    const TaskDef *task;
-    const Scene *scene;
-    double speed; /* [m/s] commanded */
-    int trial;
-    double time; /* [s] */
-    TaskEnv *env;
-    const float *action;
-} ActionsRow;
+#include "run/eval/eval.h"
 
 /* The names of the columns: trial, ground, speed, time; command, phase, quaternion (w x y z) and
  * angular velocity of the base, angle and speed of each joint, all true; the observation, with
  * noise and delay; the action within its clip. SI units, but for phase, observation and action. */
 void actions_print_header(FILE *csv, const Robot *robot);
-void actions_print_row(FILE *csv, const ActionsRow *row);
+void actions_print_row(FILE *csv, const EvalDecision *decision);
 
 #endif

@@ -1,9 +1,13 @@
+/* Trials as one set of environments, by MuJoCo or by the batch engine. A policy step is one step of
+ * all, and one copy of what the host needs of it. */
 #include "run/eval/eval.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "device/device.h"
+#include "env/envs.h"
 #include "run/eval/actions.h"
 #include "run/eval/track.h"
 
@@ -13,6 +17,8 @@
 #define RANDOM_USE_PUSH 0x45505553u
 #define TWO_PI 6.283185307179586
 
+/* ---- commands and pushes ---- */
+
 static void hold_heading(const double quaternion[4], double speed, double sideways,
                          double command[3]) {
     const double turn = -HEADING_GAIN * measure_yaw(quaternion);
@@ -21,12 +27,16 @@ static void hold_heading(const double quaternion[4], double speed, double sidewa
     command[2] = speed == 0 && sideways == 0 ? 0 : fmin(fmax(turn, -HEADING_LIMIT), HEADING_LIMIT);
 }
 
-void eval_direct(const EvalDef *eval, double time, const double quaternion[4], double command[3]) {
+/* [m/s, m/s, rad/s] The command at a time of a trial [s] for a robot with the orientation
+ * `quaternion` (w x y z): that of eval_command, with `turn` where it is not 0, and none from the
+ * stop on. */
+static void direct(const EvalDef *eval, double speed, double time, const double quaternion[4],
+                   double command[3]) {
     if (eval->stop > 0 && time >= eval->stop) {
         hold_heading(quaternion, 0, 0, command);
         return;
     }
-    hold_heading(quaternion, eval->speed, eval->sideways, command);
+    hold_heading(quaternion, speed, eval->sideways, command);
     if (eval->turn != 0) {
         command[2] = eval->turn;
     }
@@ -49,144 +59,308 @@ static void push_trial(TaskEnv *env, double speed) {
     env->robot.qvel[1] += speed * sin(angle);
 }
 
+/* ---- trials ---- */
+
+/* What the environments write in a policy step, one block where they are and its copy here. */
 typedef struct {
-    const TaskDef *def;
-    const Robot *robot;
-    const Scene *scene;
-    const EvalDef *eval;
-    const Controller *controller;
-    TaskEnv **env;    /* [trials] */
-    RobotSim **sim;   /* [threads] */
+    EnvsSample *sample; /* [trials][samples] */
+    float *history;     /* [trials][TaskShape.history] */
+    float *reward;      /* [trials] */
+    uint8_t *done, *timeout, *valid;
+} Results;
+
+typedef struct {
+    const EvalRun *run;
+    TaskDef task;
+    MildTerrain *terrain; /* [scenes] */
+    EnvsTrial *trial;     /* [trials] */
+    Envs *envs;
+    TaskEnv **env;    /* [trials] by MuJoCo, else NULL */
+    int rows, trials; /* trials of all rows */
+    int samples;      /* physics steps of a policy step */
+    size_t bytes;     /* of the block */
+    void *device_block, *block;
+    float *device_action; /* [trials][joints] on the device */
+    Results device, host;
+    float *action;    /* [trials][joints] */
+    double *command;  /* [trials][3] */
     Measure *measure; /* [trials] */
-    float *action;    /* [trials][robot_joints] */
     uint8_t *over;    /* [trials] fell or diverged */
     Track track;      /* if EvalDef.track is given */
 } Trials;
 
-static void start_trial(void *context, int trial, int thread) {
-    static const double ahead[4] = {1, 0, 0, 0};
-    Trials *t = context;
-    TaskView none = {0};
-    TaskEnv *env = t->env[trial];
-    task_env_init(env, t->def, t->robot, t->eval->seed, (uint32_t)trial);
-    env->command_frozen = 1;
-    eval_direct(t->eval, 0, ahead, env->command);
-    task_env_reset_on(env, t->def, t->robot, t->sim[thread], &t->scene->terrain, t->scene->rigid,
-                      &none);
-    measure_start(&t->measure[trial], t->def->physics_dt);
-    t->measure[trial].steady_end = t->eval->stop;
-    t->measure[trial].keep = t->eval->stances != NULL;
+static int row_of(const Trials *t, int trial) {
+    return trial / t->run->eval.trials;
 }
 
-static void step_trial(void *context, int trial, int thread) {
-    Trials *t = context;
-    if (t->over[trial]) {
-        return;
-    }
-    TaskView none = {0};
-    ControllerRow row = {t->controller, trial};
-    TaskDrive drive = {controller_row_torque, &row};
-    TaskProbe probe = {measure_step, &t->measure[trial], t->controller->torque ? &drive : NULL};
-    TaskStep step = task_env_step(t->env[trial], t->def, t->robot, t->sim[thread],
-                                  t->action + trial * robot_joints(t->robot), 0, &none, &probe);
-    t->over[trial] = step.done && !step.timeout;
-    if (t->eval->track && !t->over[trial]) {
-        track_take(&t->track, trial, t->sim[thread]);
-    }
-    TaskEnv *env = t->env[trial];
-    eval_direct(t->eval, t->measure[trial].time, env->robot.qpos + 3, env->command);
-    push_trial(env, t->eval->push);
+static double speed_of(const Trials *t, int trial) {
+    return t->run->speeds[row_of(t, trial) % t->run->speed_count];
 }
 
-static void call_watch(const Trials *t, int step) {
-    const EvalWatch *watch = t->eval->watch;
-    for (int i = 0; watch && i < t->eval->trials; i++) {
-        if (!t->over[i]) {
-            watch->decided(watch->context, t->scene, t->eval->speed, i, step * TASK_PERIOD,
-                           t->env[i]);
-        }
-    }
+static const Scene *scene_of(const Trials *t, int trial) {
+    return &t->run->scenes[row_of(t, trial) / t->run->speed_count];
 }
 
-static void print_actions(const Trials *t, int step) {
-    for (int i = 0; t->eval->actions && i < t->eval->trials; i++) {
-        const ActionsRow row = {.task = t->def,
-                                .scene = t->scene,
-                                .speed = t->eval->speed,
-                                .trial = i,
-                                .time = step * TASK_PERIOD,
-                                .env = t->env[i],
-                                .action = t->action + i * robot_joints(t->robot)};
-        if (!t->over[i]) {
-            actions_print_row(t->eval->actions, &row);
-        }
-    }
-}
+/* ---- creation ---- */
 
-static void free_trials(Trials *t, int trials, int threads) {
-    for (int i = 0; t->env && i < trials; i++) {
-        free(t->env[i]);
+/* What only MuJoCo has. */
+static MildStatus check_batch(const EvalRun *run, MildError *error) {
+    const int rows = run->scene_count * run->speed_count;
+    if (!run->controller->act_on) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--controller %s reads what the batch engine does not hand over; give "
+                         "--train.robots=mujoco",
+                         run->controller->name);
     }
-    for (int i = 0; t->sim && i < threads; i++) {
-        robot_sim_destroy(t->sim[i]);
+    if (run->eval.trials > EVAL_ROBOTS_MAX / rows) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--trials %d of %d rows are more than %d robots at once; ask for fewer, "
+                         "or give --train.robots=mujoco",
+                         run->eval.trials, rows, EVAL_ROBOTS_MAX);
     }
-    free(t->env);
-    free(t->sim);
-    measure_free(t->measure, trials);
-    free(t->action);
-    free(t->over);
-    track_free(&t->track);
-}
-
-static MildStatus make_trials(Trials *t, int trials, int threads, MildError *error) {
-    t->env = calloc((size_t)trials, sizeof *t->env);
-    t->sim = calloc((size_t)threads, sizeof *t->sim);
-    t->measure = calloc((size_t)trials, sizeof *t->measure);
-    t->action = calloc((size_t)trials * (size_t)robot_joints(t->robot), sizeof *t->action);
-    t->over = calloc((size_t)trials, 1);
-    int good = t->env && t->sim && t->measure && t->action && t->over;
-    for (int i = 0; good && i < trials; i++) {
-        t->env[i] = aligned_alloc(64, task_env_bytes(t->def, t->robot));
-        good = t->env[i] != NULL;
-    }
-    if (!good) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "evaluation: out of memory for %d trials",
-                         trials);
-    }
-    for (int i = 0; i < threads; i++) {
-        t->sim[i] = robot_sim_create(t->robot, t->def->physics_dt, error);
-        if (!t->sim[i]) {
-            return MILD_ERROR_MEMORY;
+    for (int i = 0; i < run->scene_count; i++) {
+        if (run->scenes[i].terrain.material_count > 1) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "--ground %s: the batch engine has no courses; give "
+                             "--train.robots=mujoco, or single grounds",
+                             run->scenes[i].name);
         }
     }
     return MILD_OK;
 }
 
-MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controller *controller,
-                    const Scene *scene, const EvalDef *eval, EvalRow *row, MildError *error) {
-    TaskDef local = *def;
-    local.episode = eval->seconds;
-    Trials t = {
-        .def = &local, .robot = robot, .scene = scene, .eval = eval, .controller = controller};
-    MildStatus status = make_trials(&t, eval->trials, pool_threads(pool), error);
-    const int steps = (int)(eval->seconds / TASK_PERIOD + 0.5);
-    if (status == MILD_OK && eval->track) {
-        status = track_make(&t.track, eval->trials, steps, error);
+static MildStatus fail_memory(const Trials *t, MildError *error) {
+    return mild_fail(error, MILD_ERROR_MEMORY, "evaluation: out of memory for %d trials",
+                     t->trials);
+}
+
+static MildStatus open_envs(Trials *t, MildError *error) {
+    const EvalRun *run = t->run;
+    const Controller *controller = run->controller;
+    t->terrain = calloc((size_t)run->scene_count, sizeof *t->terrain);
+    t->trial = calloc((size_t)t->trials, sizeof *t->trial);
+    if (!t->terrain || !t->trial) {
+        return fail_memory(t, error);
+    }
+    for (int i = 0; i < run->scene_count; i++) {
+        t->terrain[i] = run->scenes[i].terrain;
+    }
+    for (int i = 0; i < t->trials; i++) {
+        const Scene *scene = scene_of(t, i);
+        t->trial[i] = (EnvsTrial){.stream = (uint32_t)(i % run->eval.trials),
+                                  .ground = (int)(scene - run->scenes),
+                                  .rigid = scene->rigid};
+    }
+    const EnvsDef envs = {.task = &t->task,
+                          .robot = run->robot,
+                          .pool = run->pool,
+                          .batch = run->batch,
+                          .device = run->device,
+                          .count = t->trials,
+                          .seed = run->eval.seed,
+                          .trial = t->trial,
+                          .terrain = t->terrain,
+                          .terrains = run->scene_count,
+                          .drive = {controller->torque, controller->self}};
+    t->envs = envs_create(&envs, error);
+    return t->envs ? MILD_OK : error->status;
+}
+
+static Results carve(const Trials *t, void *block) {
+    const size_t trials = (size_t)t->trials;
+    Results at;
+    at.sample = block;
+    at.history = (float *)(void *)(at.sample + trials * (size_t)t->samples);
+    at.reward = at.history + trials * (size_t)task_shape(t->run->robot).history;
+    at.done = (uint8_t *)(at.reward + trials);
+    at.timeout = at.done + trials;
+    at.valid = at.timeout + trials;
+    return at;
+}
+
+static MildStatus open_arrays(Trials *t, MildError *error) {
+    const size_t trials = (size_t)t->trials, joints = (size_t)robot_joints(t->run->robot);
+    const size_t history = (size_t)task_shape(t->run->robot).history;
+    t->samples = envs_physics_steps(t->envs);
+    t->bytes = trials * ((size_t)t->samples * sizeof(EnvsSample) + (history + 1) * sizeof(float) +
+                         3 * sizeof(uint8_t));
+    t->block = calloc(1, t->bytes);
+    t->action = calloc(trials * joints, sizeof *t->action);
+    t->command = calloc(trials, 3 * sizeof *t->command);
+    t->measure = calloc(trials, sizeof *t->measure);
+    t->over = calloc(trials, 1);
+    t->env = t->run->batch ? NULL : calloc(trials, sizeof *t->env);
+    if (!t->block || !t->action || !t->command || !t->measure || !t->over ||
+        (!t->env && !t->run->batch)) {
+        return fail_memory(t, error);
+    }
+    for (int i = 0; t->env && i < t->trials; i++) {
+        t->env[i] = envs_env(t->envs, i);
+    }
+    t->device_block = device_alloc(t->run->device, t->bytes, error);
+    if (t->device_block) {
+        t->device_action = device_alloc(t->run->device, trials * joints * sizeof(float), error);
+    }
+    if (!t->device_action) {
+        return MILD_ERROR_MEMORY;
+    }
+    t->device = carve(t, t->device_block);
+    t->host = carve(t, t->block);
+    return MILD_OK;
+}
+
+static void close_trials(Trials *t) {
+    device_free(t->run->device, t->device_block);
+    device_free(t->run->device, t->device_action);
+    envs_destroy(t->envs);
+    free(t->terrain);
+    free(t->trial);
+    free(t->env);
+    free(t->block);
+    free(t->action);
+    free(t->command);
+    measure_free(t->measure, t->trials);
+    free(t->over);
+    track_free(&t->track);
+}
+
+/* ---- steps ---- */
+
+static void start_trial(void *context, int trial, int thread) {
+    static const double ahead[4] = {1, 0, 0, 0};
+    Trials *t = context;
+    Measure *measure = &t->measure[trial];
+    (void)thread;
+    measure_start(measure, t->task.physics_dt);
+    measure->steady_end = t->run->eval.stop;
+    measure->keep = t->run->eval.stances != NULL;
+    direct(&t->run->eval, speed_of(t, trial), 0, ahead, t->command + 3 * (size_t)trial);
+}
+
+/* Measures the policy step, and says where to go in the next one. */
+static void take_trial(void *context, int trial, int thread) {
+    Trials *t = context;
+    const EvalDef *eval = &t->run->eval;
+    const EnvsSample *first = t->host.sample + (size_t)trial * (size_t)t->samples, *at = first;
+    (void)thread;
+    if (t->over[trial]) {
+        return;
+    }
+    while (at < first + t->samples && at->valid) {
+        measure_sample(&t->measure[trial], at++);
+    }
+    t->over[trial] = t->host.done[trial] && !t->host.timeout[trial];
+    if (t->over[trial]) {
+        return;
+    }
+    if (eval->track) {
+        track_take(&t->track, trial, at - 1);
+    }
+    direct(eval, speed_of(t, trial), t->measure[trial].time, (at - 1)->quaternion,
+           t->command + 3 * (size_t)trial);
+    if (t->env) {
+        push_trial(t->env[trial], eval->push);
+    }
+}
+
+/* Tells who watches what the controller has decided. */
+static void show_decisions(const Trials *t, int step) {
+    const EvalDef *eval = &t->run->eval;
+    for (int i = 0; t->env && i < t->trials; i++) {
+        const EvalDecision decision = {.task = &t->task,
+                                       .scene = scene_of(t, i),
+                                       .speed = speed_of(t, i),
+                                       .trial = i,
+                                       .time = step * TASK_PERIOD,
+                                       .env = t->env[i],
+                                       .action = t->action + i * robot_joints(t->run->robot)};
+        if (eval->watch && !t->over[i]) {
+            eval->watch->decided(eval->watch->context, &decision);
+        }
+        if (eval->actions && !t->over[i]) {
+            actions_print_row(eval->actions, &decision);
+        }
+    }
+}
+
+static MildStatus start(Trials *t, MildError *error) {
+    const EnvsView first = {.history = t->device.history};
+    pool_run(t->run->pool, t->trials, start_trial, t);
+    envs_set_samples(t->envs, t->device.sample);
+    MildStatus status = envs_set_commands(t->envs, t->command, error);
+    status = status == MILD_OK ? envs_reset(t->envs, &first, NULL, error) : status;
+    return status == MILD_OK
+               ? device_copy(t->run->device, t->block, t->device_block, t->bytes, error)
+               : status;
+}
+
+static MildStatus step(Trials *t, int step, MildError *error) {
+    const EvalRun *run = t->run;
+    const Controller *controller = run->controller;
+    const size_t bytes = (size_t)t->trials * (size_t)robot_joints(run->robot) * sizeof *t->action;
+    const EnvsStep call = {.action = t->device_action,
+                           .reward = t->device.reward,
+                           .done = t->device.done,
+                           .timeout = t->device.timeout,
+                           .valid = t->device.valid,
+                           .next = {.history = t->device.history}};
+    if (t->env) {
+        controller->act(controller->self, t->trials, t->env, t->action);
+    } else {
+        controller->act_on(controller->self, t->trials, t->host.history, t->action);
+    }
+    show_decisions(t, step);
+    MildStatus status = device_copy(run->device, t->device_action, t->action, bytes, error);
+    status = status == MILD_OK ? envs_step(t->envs, &call, NULL, error) : status;
+    if (status == MILD_OK) {
+        status = device_copy(run->device, t->block, t->device_block, t->bytes, error);
     }
     if (status == MILD_OK) {
-        pool_run(pool, eval->trials, start_trial, &t);
-        for (int step = 0; step < steps; step++) {
-            controller->act(controller->self, eval->trials, t.env, t.action);
-            call_watch(&t, step);
-            print_actions(&t, step);
-            pool_run(pool, eval->trials, step_trial, &t);
-        }
-        status = eval_summarise(row, scene->name, eval, t.measure, t.over,
-                                robot_total_mass(robot) * EVAL_GRAVITY, error);
+        pool_run(run->pool, t->trials, take_trial, t);
+        status = envs_set_commands(t->envs, t->command, error);
     }
-    if (status == MILD_OK && eval->track) {
-        track_print(&t.track, scene->name, eval->speed, TASK_PERIOD, eval->track);
+    return status;
+}
+
+/* ---- the run ---- */
+
+static MildStatus summarise(Trials *t, EvalRow *rows, MildError *error) {
+    EvalDef eval = t->run->eval;
+    MildStatus status = MILD_OK;
+    for (int row = 0; row < t->rows && status == MILD_OK; row++) {
+        const int first = row * eval.trials;
+        eval.speed = speed_of(t, first);
+        status =
+            eval_summarise(&rows[row], scene_of(t, first)->name, &eval, t->measure + first,
+                           t->over + first, robot_total_mass(t->run->robot) * EVAL_GRAVITY, error);
     }
-    free_trials(&t, eval->trials, pool_threads(pool));
+    if (status == MILD_OK && eval.track) {
+        track_print(&t->track, t->run->scenes[0].name, speed_of(t, 0), TASK_PERIOD, eval.track);
+    }
+    return status;
+}
+
+MildStatus eval_run(const EvalRun *run, EvalRow *rows, MildError *error) {
+    MildStatus status = run->batch ? check_batch(run, error) : MILD_OK;
+    if (status != MILD_OK) {
+        return status;
+    }
+    Trials t = {.run = run, .task = *run->task, .rows = run->scene_count * run->speed_count};
+    const int steps = (int)(run->eval.seconds / TASK_PERIOD + 0.5);
+    t.trials = t.rows * run->eval.trials;
+    t.task.episode = run->eval.seconds;
+    status = open_envs(&t, error);
+    status = status == MILD_OK ? open_arrays(&t, error) : status;
+    if (status == MILD_OK && run->eval.track) {
+        status = track_make(&t.track, t.trials, steps, error);
+    }
+    status = status == MILD_OK ? start(&t, error) : status;
+    for (int k = 0; status == MILD_OK && k < steps; k++) {
+        status = step(&t, k, error);
+    }
+    if (status == MILD_OK) {
+        status = summarise(&t, rows, error);
+    }
+    close_trials(&t);
     return status;
 }

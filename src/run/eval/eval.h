@@ -11,11 +11,21 @@
 #include "run/eval/measure.h"
 #include "run/eval/scene.h"
 
-/* Called after each decision of the controller for a trial that is not over, `trial` by `trial`, at
- * `time` [s]. */
+/* A decision of the controller: the environment's true state, the newest frame of its history, and
+ * the action that came out. */
 typedef struct {
-    void (*decided)(void *context, const Scene *scene, double speed, int trial, double time,
-                    const TaskEnv *env);
+    const TaskDef *task;
+    const Scene *scene;
+    double speed; /* [m/s] commanded */
+    int trial;
+    double time; /* [s] */
+    TaskEnv *env;
+    const float *action; /* [robot_joints] */
+} EvalDecision;
+
+/* Called after each decision for a trial that is not over, trial by trial. */
+typedef struct {
+    void (*decided)(void *context, const EvalDecision *decision);
     void *context;
 } EvalWatch;
 
@@ -28,10 +38,11 @@ typedef struct {
     double seconds; /* [s] per trial */
     double stop;    /* [s] when the command becomes 0 and speed measurement ends; 0: never */
     uint64_t seed;  /* trial k uses stream k */
-    const EvalWatch *watch; /* NULL: nobody; by MuJoCo */
-    FILE *stances;          /* a row of CSV for each stance of each trial; NULL: none */
-    FILE *actions;          /* one for each decision, see eval/actions.h; NULL: none; by MuJoCo */
-    FILE *track;            /* one for each policy step of each trial (track.h), by MuJoCo */
+    FILE *stances;  /* a row of CSV for each stance of each trial; NULL: none */
+    /* by MuJoCo, of one row; NULL: none */
+    const EvalWatch *watch;
+    FILE *actions; /* a row of CSV for each decision, see eval/actions.h */
+    FILE *track;   /* one for each policy step of each trial, see eval/track.h */
 } EvalDef;
 
 /* Means over the trials, SI units. NaN: nothing was measured, as the speed of trials that fell at
@@ -66,31 +77,29 @@ typedef struct {
     double seconds;          /* [s] mean time until a fall or the end */
 } EvalRow;
 
-/* Runs the trials of one row. `def` gives control, gait and sensors. Its randomisation should be
- * nominal (task_def_make_nominal). Trials run in parallel over the pool. The results depend only on
- * (def, scene, seed). */
-MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controller *controller,
-                    const Scene *scene, const EvalDef *eval, EvalRow *row, MildError *error);
-
-/* The same for all rows at once, by the batch engine. */
+/* Rows of trials. */
 typedef struct {
+    /* Control, gait and sensors. Its randomisation should be nominal (task_def_make_nominal). Its
+     * map is that of the scenes. */
     const TaskDef *task;
     const Robot *robot;
-    Pool *pool;
-    Controller *controller; /* one that acts on histories alone */
-    int device;             /* a CUDA device, or MILD_BATCH_HOST */
-    const Scene *scenes;    /* [scene_count] of one material each, on the map of `task` */
+    Pool *pool;             /* trials run in parallel */
+    Controller *controller; /* by the batch engine one with act_on */
+    int batch;              /* bool: the batch engine steps the robots, else MuJoCo */
+    int device;             /* a CUDA device, or MILD_BATCH_HOST; MuJoCo's is the latter */
+    const Scene *scenes;    /* [scene_count] by the batch engine of one material each */
     int scene_count;
     const double *speeds; /* [m/s] [speed_count] of each scene, in the place of eval.speed */
     int speed_count;
     EvalDef eval;
-} EvalBatch;
+} EvalRun;
 
-/* Robots of a batch, at most. */
+/* Robots of the batch engine, at most. */
 #define EVAL_ROBOTS_MAX 65536
-/* rows: [scene_count][speed_count]. The same measures; the same random numbers, but for the
- * latencies. Fails for what the batch engine has not, and for more robots. */
-MildStatus eval_run_batch(const EvalBatch *def, EvalRow *rows, MildError *error);
+/* rows: [scene_count][speed_count], all at once. The results depend only on the run and its seed.
+ * The two backends give the same measures and draw the same random numbers, but for the latencies.
+ * Fails for what the batch engine has not, and for more robots. */
+MildStatus eval_run(const EvalRun *run, EvalRow *rows, MildError *error);
 
 /* Finishes the measures of the trials, summarises them in a row, and prints the stances that they
  * kept. measures, fallen (bool):
@@ -98,10 +107,6 @@ MildStatus eval_run_batch(const EvalBatch *def, EvalRow *rows, MildError *error)
 MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
                           const uint8_t *fallen, double weight, MildError *error);
 
-/* [m/s, m/s, rad/s] The command at a time of a trial [s] for a robot with the orientation
- * `quaternion` (w x y z): that of eval_command, with `turn` where it is not 0, and none from the
- * stop on. */
-void eval_direct(const EvalDef *eval, double time, const double quaternion[4], double command[3]);
 /* Heading hold of eval and play: sets a command that turns the robot back to world x. speed,
  * sideways [m/s]: forward and to the left. If both are 0 the robot stands, without heading hold.
  * Writes env->command and freezes it. */

@@ -35,30 +35,31 @@ static void print_numbers(FILE *csv, const float *numbers, int count, double sca
     }
 }
 
-static void print_row(const InsideLog *log, const Scene *scene, double speed, int trial,
-                      double time, const TaskEnv *env) {
+static void print_row(const InsideLog *log, const EvalDecision *decision) {
     const LearnedInside *in = log->inside;
     const PolicyInside *rows = &in->rows;
-    const float *estimates = rows->estimates + (size_t)trial * (size_t)in->estimates;
-    const double *at = env->robot.qpos;
-    char ground[sizeof scene->name];
-    scene_ground_at(scene, at[0], at[1], ground, sizeof ground);
-    fprintf(log->csv, "%d,%s,%g,%.2f,%.6g", trial, ground, speed, time, env->phase);
-    print_numbers(log->csv, rows->latent + (size_t)trial * (size_t)in->latent, in->latent, 1);
-    print_numbers(log->csv, rows->modulated + (size_t)trial * (size_t)in->latent, in->latent, 1);
-    print_numbers(log->csv, rows->theta + (size_t)trial * (size_t)in->theta, in->theta, 1);
-    print_numbers(log->csv, estimates, 3, log->task->velocity_scale);
+    const size_t trial = (size_t)decision->trial;
+    const float *estimates = rows->estimates + trial * (size_t)in->estimates;
+    const double *at = decision->env->robot.qpos;
+    char ground[sizeof decision->scene->name];
+    scene_ground_at(decision->scene, at[0], at[1], ground, sizeof ground);
+    fprintf(log->csv, "%d,%s,%g,%.2f,%.6g", decision->trial, ground, decision->speed,
+            decision->time, decision->env->phase);
+    print_numbers(log->csv, rows->latent + trial * (size_t)in->latent, in->latent, 1);
+    print_numbers(log->csv, rows->modulated + trial * (size_t)in->latent, in->latent, 1);
+    print_numbers(log->csv, rows->theta + trial * (size_t)in->theta, in->theta, 1);
+    print_numbers(log->csv, estimates, 3, decision->task->velocity_scale);
     print_numbers(log->csv, estimates + 3, 3 * log->feet, 1);
-    print_numbers(log->csv, estimates + 3 + 3 * log->feet, log->feet, log->task->height_scale);
+    print_numbers(log->csv, estimates + 3 + 3 * log->feet, log->feet, decision->task->height_scale);
     fprintf(log->csv, "\n");
 }
 
-void inside_decided(void *context, const Scene *scene, double speed, int trial, double time,
-                    const TaskEnv *env) {
+void inside_decided(void *context, const EvalDecision *decision) {
     InsideLog *log = context;
     const LearnedInside *in = log->inside;
-    const float *latent = in->rows.latent + (size_t)trial * (size_t)in->latent;
-    const float *estimates = in->rows.estimates + (size_t)trial * (size_t)in->estimates;
+    const size_t trial = (size_t)decision->trial;
+    const float *latent = in->rows.latent + trial * (size_t)in->latent;
+    const float *estimates = in->rows.estimates + trial * (size_t)in->estimates;
     log->decisions++;
     for (int j = 0; log->sum && j < in->latent; j++) {
         log->sum[j] += (double)latent[j];
@@ -67,7 +68,7 @@ void inside_decided(void *context, const Scene *scene, double speed, int trial, 
         log->sum[in->latent + i] += (double)estimates[i];
     }
     if (log->csv) {
-        print_row(log, scene, speed, trial, time, env);
+        print_row(log, decision);
     }
 }
 

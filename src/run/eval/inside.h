@@ -9,7 +9,6 @@
 
 typedef struct {
     const LearnedInside *inside;
-    const TaskDef *task; /* of the policy: the scales of its estimates */
     int feet;
     FILE *csv;   /* a row per decision; NULL: none */
     double *sum; /* [latent] of z, then [estimates], over the decisions; NULL: none */
@@ -17,8 +16,7 @@ typedef struct {
 } InsideLog;
 
 /* An EvalWatch.decided; context: an InsideLog. */
-void inside_decided(void *context, const Scene *scene, double speed, int trial, double time,
-                    const TaskEnv *env);
+void inside_decided(void *context, const EvalDecision *decision);
 /* The names of the columns. SI units, but for the phase and for what the networks alone know. */
 void inside_print_header(const InsideLog *log);
 /* [latent + estimates] */

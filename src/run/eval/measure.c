@@ -69,7 +69,7 @@ static void end_stance(Measure *m, int f) {
     m->stances++;
 }
 
-static void measure_foot(Measure *m, int f, const MeasureFoot *foot) {
+static void measure_foot(Measure *m, int f, const EnvsFoot *foot) {
     if (foot->load > CONTACT_FORCE) {
         if (!m->in_stance[f]) {
             start_stance(m, f, foot->center);
@@ -90,7 +90,7 @@ static void measure_foot(Measure *m, int f, const MeasureFoot *foot) {
 
 /* The steady part starts at the position of the base before its first step, so that distance and
  * time match. */
-static void measure_steady(Measure *m, const MeasureSample *sample, double power_abs) {
+static void measure_steady(Measure *m, const EnvsSample *sample, double yaw, double power_abs) {
     if (m->steady_time == 0) {
         memcpy(m->start, m->base, sizeof m->start);
     }
@@ -99,53 +99,37 @@ static void measure_steady(Measure *m, const MeasureSample *sample, double power
     double c = cos(m->yaw), s = sin(m->yaw);
     m->way[0] += c * x + s * y;
     m->way[1] += c * y - s * x;
-    m->turned += remainder(sample->yaw - m->yaw, TWO_PI);
+    m->turned += remainder(yaw - m->yaw, TWO_PI);
     m->steady_time += m->dt;
     m->work += power_abs * m->dt;
-    m->base_low = fmin(m->base_low, sample->base_height);
-    m->base_high = fmax(m->base_high, sample->base_height);
+    m->base_low = fmin(m->base_low, sample->above);
+    m->base_high = fmax(m->base_high, sample->above);
 }
 
-void measure_sample(Measure *m, const MeasureSample *sample) {
+void measure_sample(Measure *m, const EnvsSample *sample) {
+    const double yaw = measure_yaw(sample->quaternion);
     double power = 0, power_abs = 0;
     for (int i = 0; i < sample->joints; i++) {
-        double joint_power = sample->torque[i] * sample->joint_speed[i];
+        double joint_power = sample->torque[i] * sample->speed[i];
         power += joint_power;
         power_abs += fabs(joint_power);
         m->torque_max = fmax(m->torque_max, fabs(sample->torque[i]));
     }
     m->energy += fabs(power) * m->dt;
     if (m->time >= MEASURE_STEADY && (m->steady_end == 0 || m->time < m->steady_end)) {
-        measure_steady(m, sample, power_abs);
+        measure_steady(m, sample, yaw, power_abs);
     }
     m->time += m->dt;
     memcpy(m->base, sample->base, sizeof m->base);
-    m->yaw = sample->yaw;
+    m->yaw = yaw;
     for (int f = 0; f < sample->feet; f++) {
         measure_foot(m, f, &sample->foot[f]);
     }
 }
 
 void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const double *torque) {
-    const double *qpos = robot_sim_qpos(sim);
-    MeasureSample sample = {
-        .torque = torque,
-        .joint_speed = robot_sim_qvel(sim) + 6,
-        .joints = env->shape.joints,
-        .feet = env->shape.feet,
-        .base = {qpos[0], qpos[1]},
-        .yaw = measure_yaw(qpos + 3),
-        .base_height = qpos[2] - mild_terrain_height_at(&env->terrain, qpos[0], qpos[1]),
-    };
-    for (int f = 0; f < sample.feet; f++) {
-        const RobotFoot *foot = robot_sim_foot(sim, f);
-        sample.foot[f] = (MeasureFoot){
-            .load = foot->force[2],
-            .center = {foot->sole_center[0], foot->sole_center[1]},
-            .height = foot->sole_height,
-            .depth = env->variation.rigid ? 0 : foot->result.depth_max,
-        };
-    }
+    EnvsSample sample;
+    envs_read_sample(env, sim, torque, &sample);
     measure_sample(measure, &sample);
 }
 

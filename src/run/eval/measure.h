@@ -2,29 +2,9 @@
 #ifndef MILD_MEASURE_H
 #define MILD_MEASURE_H
 
-#include "env/task/task.h"
+#include "env/envs.h"
 
 #define MEASURE_STEADY 2.0 /* [s] start of the steady part */
-
-/* What the measures read of a foot. */
-typedef struct {
-    double load;      /* [N] vertical force of the ground on the foot */
-    double center[2]; /* [m] centre of the sole, world */
-    double height;    /* [m] lowest sole point above the undisturbed ground */
-    double depth;     /* [m] deepest element; 0 on rigid ground */
-} MeasureFoot;
-
-/* One physics step in plain numbers. */
-typedef struct {
-    const double *torque;      /* [N m] [joints] */
-    const double *joint_speed; /* [rad/s] [joints] */
-    int joints;
-    double base[2];     /* [m] world x (along the walk) and y */
-    double base_height; /* [m] above the undisturbed ground */
-    double yaw;         /* [rad] of the base */
-    int feet;
-    MeasureFoot foot[ROBOT_FEET_MAX]; /* [feet] */
-} MeasureSample;
 
 /* A finished stance. */
 typedef struct {
@@ -78,8 +58,9 @@ typedef struct {
 /* [rad] Heading of a base with this orientation (w x y z). */
 double measure_yaw(const double quaternion[4]);
 void measure_start(Measure *measure, double dt);
-void measure_sample(Measure *measure, const MeasureSample *sample);
-/* The same from a robot: a TaskProbe. */
+/* One physics step. */
+void measure_sample(Measure *measure, const EnvsSample *sample);
+/* The same of a robot of MuJoCo: a TaskProbe. */
 void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const double *torque);
 /* Ends the trial. If no foot was ever lifted, the open stances count, so that sinkage and drift are
  * still measured. */

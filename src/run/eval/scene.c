@@ -40,6 +40,50 @@ static MildStatus find_preset(const char *name, MildMaterial *material, MildErro
     return mild_fail(error, MILD_ERROR_ARGUMENT, "unknown ground '%s'; known: %s", name, known);
 }
 
+/* Ground number `count` of a course, from `start` to `end` [m] on the way. */
+static MildStatus add_ground(Scene *scene, const char *name, int count, double start, double end,
+                             int back, MildError *error) {
+    MildTerrain *terrain = &scene->terrain;
+    MildMaterial material;
+    MildStatus status = find_preset(name, &material, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    if (count == 0) {
+        *terrain = mild_terrain_uniform(&material);
+        return MILD_OK;
+    }
+    if (count >= MILD_MATERIALS_MAX) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "a course has at most %d grounds: %s",
+                         MILD_MATERIALS_MAX, scene->name);
+    }
+    const MildPatch patch = {back ? -end : start, back ? -start : end, -SCENE_FAR, SCENE_FAR,
+                             count};
+    terrain->materials[terrain->material_count++] = material;
+    return mild_terrain_add_patch(terrain, &patch, error);
+}
+
+static MildStatus lay_course(Scene *scene, double patch_length, MildError *error) {
+    char parts[sizeof scene->name];
+    strcpy(parts, scene->name);
+    double start = -SCENE_FAR, end = fabs(patch_length);
+    int count = 0;
+    for (char *part = parts, *next; part; part = next, count++) {
+        next = strchr(part, '+');
+        if (next) {
+            *next++ = 0;
+        }
+        const double far = next ? end : SCENE_FAR;
+        MildStatus status = add_ground(scene, part, count, start, far, patch_length < 0, error);
+        if (status != MILD_OK) {
+            return status;
+        }
+        start = end;
+        end += fabs(patch_length);
+    }
+    return MILD_OK;
+}
+
 MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildError *error) {
     memset(scene, 0, sizeof *scene);
     if (strlen(name) >= sizeof scene->name) {
@@ -52,39 +96,7 @@ MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildE
         scene->rigid = 1;
         return MILD_OK;
     }
-    char parts[sizeof scene->name];
-    strcpy(parts, name);
-    const int back = patch_length < 0;
-    double start = -SCENE_FAR, end = fabs(patch_length);
-    int count = 0;
-    for (char *part = parts, *next; part; part = next, count++) {
-        next = strchr(part, '+');
-        if (next) {
-            *next++ = 0;
-        }
-        MildMaterial material;
-        MildStatus status = find_preset(part, &material, error);
-        if (status != MILD_OK) {
-            return status;
-        }
-        if (count == 0) {
-            scene->terrain = mild_terrain_uniform(&material);
-        } else if (count >= MILD_MATERIALS_MAX) {
-            return mild_fail(error, MILD_ERROR_ARGUMENT, "a course has at most %d grounds: %s",
-                             MILD_MATERIALS_MAX, name);
-        } else {
-            scene->terrain.materials[scene->terrain.material_count++] = material;
-        }
-        const double far = next ? end : SCENE_FAR;
-        MildPatch patch = {back ? -far : start, back ? -start : far, -SCENE_FAR, SCENE_FAR, count};
-        status = count > 0 ? mild_terrain_add_patch(&scene->terrain, &patch, error) : MILD_OK;
-        if (status != MILD_OK) {
-            return status;
-        }
-        start = end;
-        end += fabs(patch_length);
-    }
-    return MILD_OK;
+    return lay_course(scene, patch_length, error);
 }
 
 const char *scene_ground_at(const Scene *scene, double x, double y, char *text, int size) {

@@ -19,13 +19,15 @@ void track_free(Track *track) {
     free(track->count);
 }
 
-void track_take(Track *track, int trial, const RobotSim *sim) {
-    const double *turn = robot_sim_base_rotation(sim); /* its third row: up, in the base's axes */
+void track_take(Track *track, int trial, const EnvsSample *sample) {
+    const double *q = sample->quaternion;
+    const double up[3] = {2 * (q[1] * q[3] - q[0] * q[2]), 2 * (q[2] * q[3] + q[0] * q[1]),
+                          1 - 2 * (q[1] * q[1] + q[2] * q[2])}; /* in the base's axes */
     TrackPoint *point = track->point + (size_t)trial * (size_t)track->steps + track->count[trial]++;
-    memcpy(point->mass_center, robot_sim_mass_center(sim), sizeof point->mass_center);
-    memcpy(point->base, robot_sim_qpos(sim), sizeof point->base);
-    point->roll = atan2(turn[7], turn[8]);
-    point->pitch = atan2(-turn[6], hypot(turn[7], turn[8]));
+    memcpy(point->mass_center, sample->mass_center, sizeof point->mass_center);
+    memcpy(point->base, sample->base, sizeof point->base);
+    point->roll = atan2(up[1], up[2]);
+    point->pitch = atan2(-up[0], hypot(up[1], up[2]));
 }
 
 void track_print_header(FILE *csv) {

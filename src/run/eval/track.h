@@ -4,7 +4,8 @@
 
 #include <stdio.h>
 
-#include "robot/robot.h"
+#include "env/trial.h"
+#include "mild/error.h"
 
 typedef struct {
     double mass_center[3]; /* [m] of the whole robot, world */
@@ -21,8 +22,8 @@ typedef struct {
 
 MildStatus track_make(Track *track, int trials, int steps, MildError *error);
 void track_free(Track *track);
-/* Adds the point of a robot whose kinematics are valid. */
-void track_take(Track *track, int trial, const RobotSim *sim);
+/* Adds the point of a physics step. */
+void track_take(Track *track, int trial, const EnvsSample *sample);
 /* The names of the columns, and a row for each point; period: [s] of a policy step. */
 void track_print_header(FILE *csv);
 void track_print(const Track *track, const char *ground, double speed, double period, FILE *csv);
