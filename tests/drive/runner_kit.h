@@ -3,17 +3,8 @@
 #ifndef RUNNER_KIT_H
 #define RUNNER_KIT_H
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "deploy/drive/runner.h"
+#include "kit.h"
 #include "sa01.h"
 
 #define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"

@@ -1,17 +1,7 @@
 /* Trials on both backends: each has the ground, the command and the random numbers that the caller
  * chose, samples say what its physics steps did, and by MuJoCo one that fell stays as it is. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "env/envs.h"
+#include "kit.h"
 #include "mild/batch.h"
 #include "sa01.h"
 
