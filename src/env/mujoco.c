@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "env/task/task.h"
 #include "robot/phases.h"
 
 typedef struct {
@@ -260,7 +261,7 @@ static uint64_t hash(const Envs *envs) {
         size_t joints = (size_t)m->shape.joints, speeds = (6 + joints) * sizeof(double);
         sum = hash_bytes(sum, env->robot.qpos, (7 + joints) * sizeof(double));
         sum = hash_bytes(sum, env->robot.qvel, speeds);
-        sum = hash_bytes(sum, env->robot.qacc, speeds);
+        sum = hash_bytes(sum, task_env_rest(env)->qacc, speeds);
         sum = hash_bytes(sum, task_env_history(env), (size_t)m->shape.history * sizeof(float));
         sum = hash_bytes(sum, env->command, sizeof env->command);
         sum = hash_bytes(sum, &env->reward_sum, sizeof env->reward_sum);

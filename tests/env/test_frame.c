@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#define TASK_ON_DEVICE
+#define MILD_REAL_FLOAT
 #include "env/task/lanes.h"
 
 /* Numbers and their bits by the tables of IEEE 754-2008 binary16; ties go to even. */

@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "env/task/task.h"
 #include "envs_kit.h"
 #include "run/config/experiment_keys.h"
 #include "run/envs/envs.h"

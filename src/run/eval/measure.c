@@ -135,7 +135,7 @@ void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const 
         .feet = env->shape.feet,
         .base = {qpos[0], qpos[1]},
         .yaw = measure_yaw(qpos + 3),
-        .base_height = qpos[2] - mild_terrain_height_at(&env->terrain, qpos[0], qpos[1]),
+        .base_height = qpos[2] - mild_terrain_height_at(task_env_terrain(env), qpos[0], qpos[1]),
     };
     for (int f = 0; f < sample.feet; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
