@@ -508,7 +508,7 @@ def parse_options():
     parser.add_argument("-n", type=int, default=200, help="mutants that count (200)")
     parser.add_argument("--seed", default="1", help="the same seed draws the same mutants (1)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at once (all cores)")
-    parser.add_argument("--file", help="only this file of the layer, e.g. reward.c")
+    parser.add_argument("--file", help="only this file of the layer, e.g. reward.h")
     parser.add_argument("--again", action="store_true",
                         help="only what survived in the last report of this layer")
     parser.add_argument("--faults", action="store_true",

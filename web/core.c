@@ -1,8 +1,8 @@
-/* One robot of the batch engine (env/batch_step.inc) on the ground of mild/ground.h, whose solver
+/* One robot of the batch engine (env/batch_step.h) on the ground of mild/ground.h, whose solver
  * is much faster on one processor than the batch's and which remembers prints. */
 #define MILD_REAL_FLOAT
 
-#include "env/batch_step.inc"
+#include "env/batch_step.h"
 
 #include <stdlib.h>
 
@@ -165,7 +165,7 @@ static void show_foot(int f) {
     const MildFootResult *foot = &web.result.foot[f];
     const double area = mild_sole_pitch(web.sole[f]) * mild_sole_pitch(web.sole[f]);
     const int rigid = web.trial.rigid;
-    view->load[f] = web.robot->sim.foot[f].force[2];
+    view->load[f] = web.robot->reading.foot[f].force[2];
     view->depth[f] = rigid ? 0 : (float)foot->depth_max;
     for (int e = 0; e < view->elements; e++) {
         view->pressure[f][e] = rigid ? 0 : (float)(elements.normal[e] / area);
@@ -454,10 +454,10 @@ int web_move(const float *action, const float command[3]) {
         }
         env_part(&web.all, &web.call, 0, k, 0, web.place);
     }
-    const TaskStep step = task_end_step(env, &web.task.task, &web.task.robot, &web.robot->sim,
+    const TaskStep step = task_end_step(env, &web.task.task, &web.task.robot, &web.robot->reading,
                                         env->torque, web.robot->diverged);
-    task_observe(env, &web.task.task, &web.task.robot, &web.robot->sim, &web.robot->reading, 0,
-                 &view);
+    task_observe(env, &web.task.task, &web.task.robot, &web.robot->reading, NULL,
+                 &web.robot->sensors, 0, &view);
     return step.done;
 }
 
@@ -486,7 +486,7 @@ void web_change(double stiffness, double friction) {
         material->sigma_cone *= stiffness;
         material->mu *= friction;
     }
-    web_env()->variation.rigid_friction = TASK_REAL(TASK_RIGID_FRICTION * friction);
+    web_env()->variation.rigid_friction = REAL(TASK_RIGID_FRICTION * friction);
 }
 
 /* Stands the robot up at a place [m, m, rad]. Its sensors' noise goes on. */
@@ -683,7 +683,8 @@ static int open_arrays(void) {
     all->envs = 1;
     all->stride = env_stride(&web.task.task, &web.task.shape);
     all->env = calloc(1, all->stride);
-    all->robot = web.robot = aligned_alloc(16, (sizeof *web.robot + 15) / 16 * 16);
+    web.robot = aligned_alloc(16, (sizeof *web.robot + 15) / 16 * 16);
+    all->robot = (char *)web.robot;
     web.place = aligned_alloc(16, (sizeof *web.place + 15) / 16 * 16);
     all->material = calloc(labels, sizeof *all->material);
     all->map_origin = calloc(2, sizeof *all->map_origin);

@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "env/task/task.h"
+#include "env/task/state.h"
 #include "learn/policy_def.h"
 #include "robot/engine/model.h"
 #include "robot/table.h"

@@ -32,7 +32,7 @@ static MildStatus pack_model(const Robot *robot, const TaskDef *task, WebModel *
     MildStatus status = engine_model_read(robot, task->physics_dt, &tree, number, error);
     if (status == MILD_OK) {
         envs_model_fill(&tree, number, &file->model);
-        robot_fill_table(robot, &file->robot);
+        file->robot = *robot_table(robot);
         file->shape = task_shape(robot);
         file->gravity = -robot->model->opt.gravity[2];
         memcpy(file->task, task, sizeof file->task);

@@ -49,7 +49,7 @@ static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const 
     Walk *walk = context;
     Play *play = walk->play;
     const double *qpos = robot_sim_qpos(sim);
-    walk->ground = mild_terrain_material_at(&env->terrain, qpos[0], qpos[1]);
+    walk->ground = mild_terrain_material_at(task_env_terrain(env), qpos[0], qpos[1]);
     PlayLeg *leg = &play->leg[walk->ground];
     play->time += robot_sim_dt(sim);
     if (play->time < START_TIME || play->fell || play->changed) {
@@ -62,7 +62,7 @@ static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const 
     leg->end_x = qpos[0];
     measure_step(&leg->measure, env, sim, torque);
     if (play->pressure) {
-        pressure_observe(play->pressure, sim, &env->terrain);
+        pressure_observe(play->pressure, sim, task_env_terrain(env));
     }
 }
 
@@ -191,7 +191,7 @@ static MildStatus take_ground_keys(Walk *walk, const WindowInput *input, MildErr
         return MILD_OK;
     }
     const int other = live_take(&walk->live, walk->ground, input);
-    live_apply(&walk->live, &walk->env->terrain);
+    live_apply(&walk->live, &task_env_rest(walk->env)->terrain);
     walk->play->changed = 1;
     return other ? view_reset(walk->play->view, &walk->live.terrain, error) : MILD_OK;
 }

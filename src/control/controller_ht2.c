@@ -156,7 +156,7 @@ static void apply_layer(const Ht2 *ht2, const Layer *layer, const Scratch *s, in
 
 /* ---- a policy step ---- */
 
-/* Where the last action is in a frame (task/observe.c); the clock follows it. */
+/* Where the last action is in a frame (task/observe.h); the clock follows it. */
 static int action_place(const Ht2 *ht2) {
     return ht2->observation - ht2->joints - 2;
 }

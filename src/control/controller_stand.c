@@ -21,9 +21,9 @@ static void standing_act(void *self, int rows, TaskEnv *const *envs, float *acti
     const double *pose = robot_default_pose(standing->robot);
     for (int e = 0; e < rows; e++) {
         double target[ROBOT_JOINTS_MAX];
-        memcpy(envs[e]->gains.kp, robot_stand_kp(standing->robot), bytes);
-        memcpy(envs[e]->gains.kd, robot_stand_kd(standing->robot), bytes);
-        robot_sim_load(standing->sim, &envs[e]->robot, &envs[e]->variation);
+        memcpy(task_env_rest(envs[e])->gains.kp, robot_stand_kp(standing->robot), bytes);
+        memcpy(task_env_rest(envs[e])->gains.kd, robot_stand_kd(standing->robot), bytes);
+        task_env_load(envs[e], standing->sim);
         stand_target(standing->stand, standing->sim, target);
         for (int i = 0; i < joints; i++) {
             actions[e * joints + i] = (float)((target[i] - pose[i]) / standing->action_scale);
@@ -45,7 +45,7 @@ MildStatus controller_make_stand(const ControllerDef *def, Controller *controlle
         return mild_fail(error, MILD_ERROR_MEMORY, "stand: out of memory");
     }
     standing->robot = def->robot;
-    standing->action_scale = task_action_scale(def->task, def->robot);
+    standing->action_scale = task_action_scale(def->task, robot_table(def->robot));
     standing->stand = stand_create(def->robot, error);
     standing->sim = robot_sim_create(def->robot, def->task->physics_dt, error);
     if (!standing->stand || !standing->sim) {

@@ -35,7 +35,4 @@ struct Envs {
 Envs *envs_create_mujoco(const EnvsDef *def, MildError *error);
 Envs *envs_create_batch(const EnvsDef *def, MildError *error);
 
-/* The TaskEnv of an environment as a device has it (task/lanes.h), on the host only: for tests. */
-void *envs_batch_env(const Envs *envs, int i);
-
 #endif

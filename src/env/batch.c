@@ -197,7 +197,7 @@ static MildStatus copy_task(Batch *b, const EnvsDef *def, const TaskGrounds *gro
         mild_map_extent(def->task->map, &task.map_extent[0], &task.map_extent[1]);
         task.uneven = !mild_map_is_level(def->task->map);
     }
-    robot_fill_table(def->robot, &task.robot);
+    task.robot = *robot_table(def->robot);
     MildStatus status = task_gains(def->task, def->robot, task.gains.kp, task.gains.kd, error);
     EnvsTask *at = status == MILD_OK ? take(b, sizeof *at, error) : NULL;
     b->arrays.task = at;
@@ -365,7 +365,7 @@ static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
     EnvsArrays all = b->arrays;
     all.envs = count;
     all.env += first * all.stride;
-    all.robot = (char *)all.robot + first * b->robot;
+    all.robot += first * b->robot;
     all.material += first * b->labels;
     all.map_origin += 2 * first;
     all.fresh += first;
@@ -667,7 +667,6 @@ int envs_are_slow(const Robot *robot) {
     return kernels && !kernels->fixed;
 }
 
-void *envs_batch_env(const Envs *envs, int i) {
-    const Batch *b = own_const(envs);
-    return b->arrays.env + (size_t)i * b->arrays.stride;
+const EnvsArrays *envs_batch_arrays(const Envs *envs) {
+    return &own_const(envs)->arrays;
 }

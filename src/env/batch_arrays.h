@@ -1,10 +1,10 @@
-/* What the batch engine keeps on its device. Include it after task.h. */
+/* What the batch engine keeps on its device. */
 #ifndef ENVS_ARRAYS_H
 #define ENVS_ARRAYS_H
 
 #include "env/envs_step.h"
 #include "env/task/ground.h"
-#include "env/task/task.h"
+#include "env/task/state.h"
 #include "env/trial.h"
 #include "ground/batch/batch.h"
 #include "robot/engine/model.h"
@@ -32,7 +32,7 @@ typedef struct {
     float numbers[TASK_GROUND_NUMBERS];
 } EnvsGround;
 
-/* The same for all environments; the task comes first. */
+/* The same for all environments. */
 typedef struct {
     TaskDef task;
     RobotTable robot;
@@ -44,7 +44,7 @@ typedef struct {
     int uneven;           /* bool: the map is */
     int labels;           /* of the map; 1 without */
     int striped;          /* bool: the labels are stripes of the share patch_share of episodes */
-    /* what environments are made from, see task_env_init_head */
+    /* what environments are made from, see task_env_init_head and task_motor */
     TaskShape shape;
     TaskGains gains;
     uint64_t seed;
@@ -64,7 +64,7 @@ typedef struct {
     int envs;
     size_t stride;      /* [B] of a TaskEnv and its frames */
     char *env;          /* [envs][stride] */
-    void *robot;        /* [envs] EnvRobot of batch_step.inc */
+    char *robot;        /* [envs] EnvRobot of batch_env.h */
     int32_t *material;  /* [envs][labels] of the ground's table */
     Real *map_origin;   /* [envs][2] [m] */
     uint8_t *fresh;     /* [envs] bool: an episode began */

@@ -4,7 +4,7 @@
 #define MILD_REAL_FLOAT
 #include <cuda_runtime.h>
 
-#include "env/batch_step.inc"
+#include "env/batch_step.h"
 #include "env/kernels.h"
 
 #ifndef ENVS_WARPS

@@ -1,7 +1,7 @@
 /* The batch engine on the CPU: the functions of the GPU, environment after environment. */
 #define MILD_REAL_FLOAT
 
-#include "env/batch_step.inc"
+#include "env/batch_step.h"
 #include "env/kernels.h"
 
 EnvsBytes envs_host_bytes(const TaskDef *def, const TaskShape *shape) {

@@ -20,8 +20,9 @@
 #include "base/pool.h"
 #include "env/envs_step.h"
 #include "env/task/ground.h"
-#include "env/task/task.h"
+#include "env/task/state.h"
 #include "env/trial.h"
+#include "robot/robot.h"
 
 typedef struct Envs Envs;
 

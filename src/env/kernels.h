@@ -4,6 +4,7 @@
 #define ENVS_TEXT_H
 
 #include "env/batch_arrays.h"
+#include "env/envs.h"
 
 #define ENVS_MODEL_NUMBERS ((int)(sizeof(EngineNumbers) / sizeof(Real)))
 
@@ -55,5 +56,8 @@ typedef struct {
 /* Those of this build, NULL behind them: cmake/Env.cmake, or batch_without_cuda.c. A robot takes
  * the first that fit. */
 extern const EnvsKernels *const envs_kernels[];
+
+/* Of the batch engine: for tests. */
+const EnvsArrays *envs_batch_arrays(const Envs *envs);
 
 #endif

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "env/task/task.h"
 #include "robot/phases.h"
 
 typedef struct {
@@ -273,7 +274,7 @@ void envs_read_sample(const TaskEnv *env, const RobotSim *sim, const double *tor
     sample->joints = env->shape.joints;
     sample->feet = env->shape.feet;
     memcpy(sample->base, qpos, sizeof sample->base);
-    sample->above = qpos[2] - mild_terrain_height_at(&env->terrain, qpos[0], qpos[1]);
+    sample->above = qpos[2] - mild_terrain_height_at(task_env_terrain(env), qpos[0], qpos[1]);
     memcpy(sample->quaternion, qpos + 3, sizeof sample->quaternion);
     memcpy(sample->mass_center, robot_sim_mass_center(sim), sizeof sample->mass_center);
     memcpy(sample->torque, torque, joints * sizeof *torque);
@@ -362,7 +363,7 @@ static uint64_t hash(const Envs *envs) {
         size_t joints = (size_t)m->shape.joints, speeds = (6 + joints) * sizeof(double);
         sum = hash_bytes(sum, env->robot.qpos, (7 + joints) * sizeof(double));
         sum = hash_bytes(sum, env->robot.qvel, speeds);
-        sum = hash_bytes(sum, env->robot.qacc, speeds);
+        sum = hash_bytes(sum, task_env_rest(env)->qacc, speeds);
         sum = hash_bytes(sum, task_env_history(env), (size_t)m->shape.history * sizeof(float));
         sum = hash_bytes(sum, env->command, sizeof env->command);
         sum = hash_bytes(sum, &env->reward_sum, sizeof env->reward_sum);

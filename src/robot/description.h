@@ -6,6 +6,7 @@
 #include <mujoco/mujoco.h>
 
 #include "robot/def.h"
+#include "robot/table.h"
 
 #define ROBOT_FOOT_DOFS_MAX ROBOT_NV_MAX /* base six, then the hinges between base and foot */
 #define ROBOT_PATH_SIZE 1024
@@ -58,6 +59,7 @@ typedef struct Robot {
     RobotShell shell[ROBOT_SHELLS_MAX];
     double total_mass;   /* [kg] */
     double stand_height; /* [m] base above the soles in the default pose */
+    RobotTable table;    /* what the task needs of all this */
 } Robot;
 
 /* Compiles the MJCF at robot->path into robot->visual. Compiles the part that a step needs, with a

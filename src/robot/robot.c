@@ -371,6 +371,37 @@ static MildStatus read_robot(Robot *robot, const char *folder, MildError *error)
     return status;
 }
 
+/* Once the rest is known. */
+static void fill_table(Robot *robot) {
+    const RobotDef *def = &robot->def;
+    RobotTable *table = &robot->table;
+    table->joints = def->joints;
+    table->feet = def->feet;
+    for (int i = 0; i < def->joints; i++) {
+        table->joint_foot[i] = robot->joint_foot[i];
+        table->default_pose[i] = def->pose[i];
+        table->joint_low[i] = robot->low[i];
+        table->joint_high[i] = robot->high[i];
+        table->effort[i] = robot->effort[i];
+        table->speed[i] = def->speed[i];
+        table->swing[i] = def->swing[i];
+        table->still[i] = def->still[i];
+    }
+    for (int f = 0; f < def->feet; f++) {
+        table->gait_offset[f] = def->foot[f].offset;
+    }
+    memcpy(table->feet_range, def->feet_range, sizeof table->feet_range);
+    memcpy(table->knee_range, def->knee_range, sizeof table->knee_range);
+    table->feet_least = def->feet_least;
+    table->knee_least = def->knee_least;
+    memcpy(table->assist, def->assist, sizeof table->assist);
+    table->total_mass = robot->total_mass;
+    table->stand_height = robot->stand_height;
+    table->nominal_height = robot_nominal_height(robot);
+    table->action_scale = robot_action_scale(robot);
+    table->foot_force = robot_foot_force(robot);
+}
+
 typedef struct {
     Robot *robot;
     const char *folder;
@@ -392,6 +423,7 @@ Robot *robot_create(const char *folder, MildError *error) {
         robot_destroy(robot);
         return NULL;
     }
+    fill_table(robot);
     return robot;
 }
 
@@ -568,34 +600,8 @@ const double *robot_assist(const Robot *robot) {
     return robot->def.assist;
 }
 
-void robot_fill_table(const Robot *robot, RobotTable *table) {
-    const RobotDef *def = &robot->def;
-    memset(table, 0, sizeof *table);
-    table->joints = def->joints;
-    table->feet = def->feet;
-    for (int i = 0; i < def->joints; i++) {
-        table->joint_foot[i] = robot->joint_foot[i];
-        table->default_pose[i] = def->pose[i];
-        table->joint_low[i] = robot->low[i];
-        table->joint_high[i] = robot->high[i];
-        table->effort[i] = robot->effort[i];
-        table->speed[i] = def->speed[i];
-        table->swing[i] = def->swing[i];
-        table->still[i] = def->still[i];
-    }
-    for (int f = 0; f < def->feet; f++) {
-        table->gait_offset[f] = def->foot[f].offset;
-    }
-    memcpy(table->feet_range, def->feet_range, sizeof table->feet_range);
-    memcpy(table->knee_range, def->knee_range, sizeof table->knee_range);
-    table->feet_least = def->feet_least;
-    table->knee_least = def->knee_least;
-    memcpy(table->assist, def->assist, sizeof table->assist);
-    table->total_mass = robot->total_mass;
-    table->stand_height = robot->stand_height;
-    table->nominal_height = robot_nominal_height(robot);
-    table->action_scale = robot_action_scale(robot);
-    table->foot_force = robot_foot_force(robot);
+const RobotTable *robot_table(const Robot *robot) {
+    return &robot->table;
 }
 
 const MildSole *const *robot_soles(const Robot *robot) {

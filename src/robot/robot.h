@@ -75,8 +75,8 @@ double robot_knee_least(const Robot *robot);
 /* [4] Assistance early in training: stiffness [N m/rad] and damping [N m s/rad] against tilt, gain
  * [N s/m] towards the commanded velocity, and the limit of that force [N]. */
 const double *robot_assist(const Robot *robot);
-/* All of these that a task needs, as one block for a device. */
-void robot_fill_table(const Robot *robot, RobotTable *table);
+/* All of these that a task needs, as one block without pointers. */
+const RobotTable *robot_table(const Robot *robot);
 
 /* [robot_feet] The soles in use, see robot_set_model. */
 const MildSole *const *robot_soles(const Robot *robot);

@@ -1,5 +1,5 @@
-/* The numbers of a Robot that a task needs, without pointers, for a device. The fields are those of
- * the functions of the same names in robot.h. */
+/* The numbers of a Robot that a task needs, without pointers, so that a device can have them too.
+ * The fields are what the functions of the same names in robot.h return. */
 #ifndef ROBOT_TABLE_H
 #define ROBOT_TABLE_H
 

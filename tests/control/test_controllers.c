@@ -112,14 +112,15 @@ static void stand_acts_as_the_stand(void **unused) {
         scene.env->robot.qvel[0] = 0.1;
         scene.env->robot.qvel[1] = -0.1;
         Stand *stand = stand_create(scene.robot, &error);
-        robot_sim_load(scene.sim, &scene.env->robot, &scene.env->variation);
+        task_env_load(scene.env, scene.sim);
         stand_torque(stand, scene.sim, 1, wanted);
         scene.controller.act(scene.controller.self, 1, &scene.env, action);
         for (int i = 0; i < joints; i++) {
             double target = robot_default_pose(scene.robot)[i] +
                             robot_action_scale(scene.robot) * (double)action[i];
-            double torque = scene.env->gains.kp[i] * (target - scene.env->robot.qpos[7 + i]) -
-                            scene.env->gains.kd[i] * scene.env->robot.qvel[6 + i];
+            double torque =
+                task_env_rest(scene.env)->gains.kp[i] * (target - scene.env->robot.qpos[7 + i]) -
+                task_env_rest(scene.env)->gains.kd[i] * scene.env->robot.qvel[6 + i];
             double effort = robot_effort(scene.robot)[i];
             torque = fmax(-effort, fmin(effort, torque));
             worst = fmax(worst, fabs(torque - wanted[i]));

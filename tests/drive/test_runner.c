@@ -42,7 +42,7 @@ static void free_world(World *w) {
 
 static StatePacket state_of(const World *w, uint32_t sequence, double time) {
     StatePacket state = standing(sequence, time);
-    const RobotState *s = &w->env->robot;
+    const TaskPose *s = &w->env->robot;
     for (int i = 0; i < 4; i++) {
         state.quaternion[i] = (float)s->qpos[3 + i];
     }

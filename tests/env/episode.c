@@ -1,34 +1,34 @@
-#include "episode.h"
+#define MILD_REAL_FLOAT
+#include "env/batch_env.h"
 
 #include <string.h>
 
-#define TASK_ON_DEVICE
-#include "env/task/lanes.h"
-#undef TASK_FN
-#define TASK_FN /* the functions are not here */
-#include "env/task/task.h"
+#include "env/kernels.h"
+#include "episode.h"
 
-Episode episode_of(const void *env) {
-    const TaskEnv *from = env;
+Episode episode_of(const Envs *envs, int i) {
+    const EnvsArrays *all = envs_batch_arrays(envs);
+    const TaskEnv *from = env_at(all, i);
+    const Real *map = all->map_origin + 2 * i;
     Episode episode = {.index = from->index,
                        .step = from->step,
                        .rigid = from->variation.rigid,
                        .friction = from->variation.rigid_friction,
                        .rigid_time = from->variation.rigid_time,
-                       .map = {from->terrain.map_x, from->terrain.map_y}};
+                       .map = {map[0], map[1]}};
     memcpy(episode.ground, from->ground, sizeof episode.ground);
-    for (int i = 0; i < 3; i++) {
-        episode.command[i] = from->command[i];
+    for (int k = 0; k < 3; k++) {
+        episode.command[k] = from->command[k];
     }
-    for (int i = 0; i < 7 + from->shape.joints; i++) {
-        episode.qpos[i] = from->robot.qpos[i];
+    for (int k = 0; k < 7 + from->shape.joints; k++) {
+        episode.qpos[k] = from->robot.qpos[k];
     }
-    for (int i = 0; i < from->shape.joints; i++) {
-        episode.kp_scale[i] = from->kp_scale[i];
+    for (int k = 0; k < from->shape.joints; k++) {
+        episode.kp_scale[k] = from->kp_scale[k];
     }
     return episode;
 }
 
-void episode_throw(void *env, double speed) {
-    ((TaskEnv *)env)->robot.qvel[0] = (float)speed;
+void episode_throw(const Envs *envs, int i, double speed) {
+    env_at(envs_batch_arrays(envs), i)->robot.qvel[0] = (float)speed;
 }

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "robot/limits.h"
+#include "env/envs.h"
 
 /* Of TaskEnv. */
 typedef struct {
@@ -19,9 +19,9 @@ typedef struct {
     double kp_scale[ROBOT_JOINTS_MAX];
 } Episode;
 
-/* env: of envs_batch_env. */
-Episode episode_of(const void *env);
-/* Gives the base a speed [m/s] forward. */
-void episode_throw(void *env, double speed);
+/* Of environment i of the batch engine on the CPU. */
+Episode episode_of(const Envs *envs, int i);
+/* Gives its base a speed [m/s] forward. */
+void episode_throw(const Envs *envs, int i, double speed);
 
 #endif

@@ -5,6 +5,7 @@
 #include "device/device.h"
 #include "env/backend.h"
 #include "env/task/ground.h"
+#include "env/task/task.h"
 #include "episode.h"
 #include "ground/batch/batch.h"
 #include "kit.h"
@@ -190,12 +191,12 @@ static void same_episode(int e) {
     size_t bytes;
     const char *envs = envs_state(pair.mujoco, &bytes);
     const TaskEnv *a = (const TaskEnv *)(const void *)(envs + (size_t)e * (bytes / ENVS));
-    const Episode b = episode_of(envs_batch_env(pair.batch, e));
+    const Episode b = episode_of(pair.batch, e);
     assert_true(a->index == b.index && a->step == b.step);
     assert_true(a->ground[0] == b.ground[0] && a->variation.rigid == b.rigid);
     assert_near(a->variation.rigid_friction, b.friction, 1e-7);
-    assert_near(a->terrain.map_x, b.map[0], 1e-6);
-    assert_near(a->terrain.map_y, b.map[1], 1e-6);
+    assert_near(task_env_terrain(a)->map_x, b.map[0], 1e-6);
+    assert_near(task_env_terrain(a)->map_y, b.map[1], 1e-6);
     for (int i = 0; i < 3; i++) {
         assert_near(a->command[i], b.command[i], 1e-7);
     }

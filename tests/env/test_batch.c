@@ -73,13 +73,13 @@ static void one_diverges(void **unused) {
     const TaskDef def = some_def();
     pair_open(SA01, &def, MILD_BATCH_HOST);
     pair_reset();
-    episode_throw(envs_batch_env(pair.batch, 5), 1e4);
+    episode_throw(pair.batch, 5, 1e4);
     pair_step();
     for (int e = 0; e < ENVS; e++) {
         assert_int_equal(pair.b.valid[e], e != 5);
         assert_true(e != 5 || (pair.b.done[e] && !pair.b.timeout[e] && pair.b.reward[e] == 0));
     }
-    const Episode next = episode_of(envs_batch_env(pair.batch, 5));
+    const Episode next = episode_of(pair.batch, 5);
     assert_true(next.step == 0 && next.qpos[0] == 0);
     pair_close();
 }
@@ -170,7 +170,7 @@ static void trials_are_chosen(void **unused) {
     assert_int_equal(envs_reset(envs, &view, NULL, &error), MILD_OK);
     for (int t = 0; t <= 130; t++) { /* falls and time limits begin further episodes */
         for (int i = 0; i < TRIALS; i++) {
-            const Episode is = episode_of(envs_batch_env(envs, i));
+            const Episode is = episode_of(envs, i);
             assert_true(is.index == (uint32_t)(i % 2) && is.ground[0] == i / 2);
             assert_true(is.map[0] == 0 && is.map[1] == 0);
             assert_true(is.rigid == (i == 3));
@@ -180,8 +180,8 @@ static void trials_are_chosen(void **unused) {
             }
             assert_true(t > 0 || (is.step == 0 && is.qpos[6] == 0));
         }
-        const Episode first = episode_of(envs_batch_env(envs, 0));
-        const Episode fourth = episode_of(envs_batch_env(envs, 4));
+        const Episode first = episode_of(envs, 0);
+        const Episode fourth = episode_of(envs, 4);
         assert_true(t > 0 || memcmp(first.kp_scale, fourth.kp_scale, sizeof first.kp_scale) == 0);
         assert_int_equal(envs_step(envs, &step, NULL, &error), MILD_OK);
         for (int i = 0; i < TRIALS; i++) {
@@ -190,7 +190,7 @@ static void trials_are_chosen(void **unused) {
         }
     }
     /* one that is thrown diverges in the first physics step of the next policy step */
-    episode_throw(envs_batch_env(envs, 2), 1e4);
+    episode_throw(envs, 2, 1e4);
     assert_int_equal(envs_step(envs, &step, NULL, &error), MILD_OK);
     for (int i = 0; i < TRIALS; i++) {
         assert_true(flags[2][i] == (i != 2) && sample[i][0].valid == (i != 2));

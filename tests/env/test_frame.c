@@ -1,7 +1,7 @@
 /* Frames in 16 bits, as IEEE 754 has them. */
 #include "kit.h"
 
-#define TASK_ON_DEVICE
+#define MILD_REAL_FLOAT
 #include "env/task/lanes.h"
 
 /* Numbers and their bits by the tables of IEEE 754-2008 binary16; ties go to even. */

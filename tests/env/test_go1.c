@@ -1,4 +1,4 @@
-/* As test_batch.c, by functions that are compiled for the Go1 alone (go1.c). */
+/* As test_batch.c, by functions that are compiled for the Go1 alone (tests/CMakeLists.txt). */
 #include "follow.h"
 
 static void go1_follows_mujoco(void **unused) {

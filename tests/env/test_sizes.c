@@ -1,5 +1,5 @@
-/* Memory of a robot: what SA01 takes of a device under the default task, by the text that is
- * compiled for it (sa01.c), and not more than it may. */
+/* Memory of a robot: what SA01 takes of a device under the default task, by functions
+ * compiled for it, and not more than it may. */
 #include "env/backend.h"
 #include "kit.h"
 #include "mild/batch.h"

@@ -75,7 +75,7 @@ static void mujoco_does_what_was_chosen(void **state) {
         for (int i = 0; i < TRIALS; i++) {
             const TaskEnv *env = envs_env(envs, i);
             const EnvsSample *last = &at.sample[i][PHYSICS_STEPS - 1];
-            const MildMaterial *ground = &env->terrain.materials[0];
+            const MildMaterial *ground = &task_env_terrain(env)->materials[0];
             assert_true(env->index == trial[i].stream && env->variation.rigid == trial[i].rigid);
             assert_true(ground->k_pen == stiffness[trial[i].ground]);
             assert_memory_equal(env->command, at.command[i], sizeof at.command[i]);

@@ -1,4 +1,5 @@
 /* The environments for other learners: the numbers of Envs, and errors. */
+#include "env/task/task.h"
 #include "envs_kit.h"
 #include "kit.h"
 #include "run/config/experiment_keys.h"

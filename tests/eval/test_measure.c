@@ -600,18 +600,18 @@ static void a_robot_is_read(void **state) {
     assert_true(sim && env);
     task_env_init(env, &def, robot, 1, 0);
     MildMaterial sand = mild_material_default();
-    env->terrain = mild_terrain_uniform(&sand);
-    env->terrain.height = 0.3;
+    task_env_rest(env)->terrain = mild_terrain_uniform(&sand);
+    task_env_rest(env)->terrain.height = 0.3;
     for (int rigid = 0; rigid < 2; rigid++) {
-        env->variation = robot_variation_nominal();
-        env->variation.rigid = rigid;
+        RobotVariation variation = robot_variation_nominal();
+        variation.rigid = env->variation.rigid = rigid;
         RobotState start = {.qpos = {1.5, 0.2, 0.3 + robot_stand_height(robot) - 0.01, 1}};
         memcpy(start.qpos + 7, robot_default_pose(robot), SA01_JOINTS * sizeof(double));
         double none[SA01_JOINTS] = {0}, torque[SA01_JOINTS] = {[0] = 10, [11] = -4};
-        robot_sim_load(sim, &start, &env->variation);
+        robot_sim_load(sim, &start, &variation);
         for (int k = 0; k < 20; k++) {
-            assert_int_equal(robot_sim_step(sim, none, NULL, &env->terrain, task_env_ground(env)),
-                             0);
+            assert_int_equal(
+                robot_sim_step(sim, none, NULL, task_env_terrain(env), task_env_ground(env)), 0);
         }
         double load = robot_sim_foot(sim, 0)->force[2],
                depth = robot_sim_foot(sim, 0)->result.depth_max;
@@ -637,9 +637,10 @@ static void a_robot_is_read(void **state) {
             assert_true(m.deepest[f] == (rigid ? 0 : deepest));
         }
         start.qpos[2] += 0.11; /* 100 mm above the ground */
-        robot_sim_load(sim, &start, &env->variation);
+        robot_sim_load(sim, &start, &variation);
         mild_ground_reset(task_env_ground(env));
-        assert_int_equal(robot_sim_step(sim, none, NULL, &env->terrain, task_env_ground(env)), 0);
+        assert_int_equal(
+            robot_sim_step(sim, none, NULL, task_env_terrain(env), task_env_ground(env)), 0);
         measure_step(&m, env, sim, torque);
         assert_close("apex", m.apex[0], 0.1, 1e-4);
         assert_close("apex", m.apex[1], 0.1, 1e-4);
@@ -649,7 +650,7 @@ static void a_robot_is_read(void **state) {
     slope.slope = 0.1;
     MildMap *map = mild_map_create(&slope, &error);
     assert_non_null(map);
-    env->terrain.map = map;
+    task_env_rest(env)->terrain.map = map;
     Measure m;
     const double none[SA01_JOINTS] = {0}, *q = robot_sim_qpos(sim);
     measure_start(&m, 1e-3);

@@ -103,7 +103,8 @@ def include_flags(tree):
 
 def units(tree, touched):
     """The units that see what the recipes changed: each file, and for a header those that its rows make."""
-    made = {"src/env/task/task_def.h": ["src/env/task/task_def.c"], "include/mild/ground.h": ["src/ground/models.c", "src/ground/material.c"],
+    made = {"src/env/task/task_def.h": ["src/env/task/task_def.c"], "src/env/task/reward.h": ["src/env/task/env.c"],
+            "include/mild/ground.h": ["src/ground/models.c", "src/ground/material.c"],
             "include/mild/map.h": ["src/ground/map.c"], "src/control/controller.h": ["src/control/controllers.c"],
             "src/app/commands.h": ["src/app/commands.c"]}
     found = []

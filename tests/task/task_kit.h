@@ -105,21 +105,21 @@ static inline TaskStep rig_step(Rig *rig, const float *action) {
 
 /* Joints without torque: in the air the robot then falls without turning or bending. */
 static inline void rig_go_limp(Rig *rig) {
-    memset(rig->env->gains.kp, 0, sizeof rig->env->gains.kp);
-    memset(rig->env->gains.kd, 0, sizeof rig->env->gains.kd);
+    memset(task_env_rest(rig->env)->gains.kp, 0, sizeof task_env_rest(rig->env)->gains.kp);
+    memset(task_env_rest(rig->env)->gains.kd, 0, sizeof task_env_rest(rig->env)->gains.kd);
 }
 
 /* ---- states ---- */
 
 /* Quaternion w x y z of yaw, then pitch, then roll. */
-static inline void kit_turn(RobotState *state, double yaw, double pitch, double roll) {
+static inline void kit_turn(double *qpos, double yaw, double pitch, double roll) {
     double cy = cos(0.5 * yaw), sy = sin(0.5 * yaw);
     double cp = cos(0.5 * pitch), sp = sin(0.5 * pitch);
     double cr = cos(0.5 * roll), sr = sin(0.5 * roll);
-    state->qpos[3] = cy * cp * cr + sy * sp * sr;
-    state->qpos[4] = cy * cp * sr - sy * sp * cr;
-    state->qpos[5] = cy * sp * cr + sy * cp * sr;
-    state->qpos[6] = sy * cp * cr - cy * sp * sr;
+    qpos[3] = cy * cp * cr + sy * sp * sr;
+    qpos[4] = cy * cp * sr - sy * sp * cr;
+    qpos[5] = cy * sp * cr + sy * cp * sr;
+    qpos[6] = sy * cp * cr - cy * sp * sr;
 }
 
 /* Default pose at rest, base `height` above z = 0. */
@@ -129,13 +129,23 @@ static inline RobotState kit_state(double height) {
     return state;
 }
 
+static inline void kit_put(TaskEnv *env, RobotState state) {
+    task_env_set_state(env, &state);
+}
+
+/* robot_sim_load with what was drawn for the environment. */
+static inline void kit_load(RobotSim *sim, const RobotState *state, const TaskEnv *env) {
+    const RobotVariation variation = task_env_variation(env);
+    robot_sim_load(sim, state, &variation);
+}
+
 /* Turned, bent and in motion; all of it different from draw to draw. Joints inside their ranges. */
 static inline RobotState kit_moving_state(double height, uint32_t draw) {
     Random r = random_at(77, draw, 0);
     RobotState state = kit_state(height);
     state.qpos[0] = random_uniform(&r, -2, 2);
     state.qpos[1] = random_uniform(&r, -2, 2);
-    kit_turn(&state, random_uniform(&r, -3, 3), random_uniform(&r, -0.3, 0.3),
+    kit_turn(state.qpos, random_uniform(&r, -3, 3), random_uniform(&r, -0.3, 0.3),
              random_uniform(&r, -0.3, 0.3));
     for (int i = 0; i < SA01_JOINTS; i++) {
         state.qpos[7 + i] += random_uniform(&r, -0.2, 0.2);

@@ -262,12 +262,12 @@ static void gains(void **unused) {
 static void robot_or_task(void **unused) {
     (void)unused;
     TaskDef def = task_def_default();
-    expect_near("action scale", task_action_scale(&def, robot), 0.5, 0);
-    expect_near("height", task_nominal_height(&def, robot), 0.83, 0);
+    expect_near("action scale", task_action_scale(&def, robot_table(robot)), 0.5, 0);
+    expect_near("height", task_nominal_height(&def, robot_table(robot)), 0.83, 0);
     def.action_scale = 0.25;
     def.reward.nominal_height = 0.7;
-    expect_near("action scale", task_action_scale(&def, robot), 0.25, 0);
-    expect_near("height", task_nominal_height(&def, robot), 0.7, 0);
+    expect_near("action scale", task_action_scale(&def, robot_table(robot)), 0.25, 0);
+    expect_near("height", task_nominal_height(&def, robot_table(robot)), 0.7, 0);
 }
 
 /* Half, a quarter, a tenth and a twentieth of the policy step fit; nothing between. */

@@ -43,7 +43,7 @@ static void note_step(void *context, const TaskEnv *env, const RobotSim *sim,
 static TaskStep traced_step(const float *action) {
     const TaskProbe probe = {note_step, NULL, NULL};
     trace.count = 0;
-    robot_sim_load(rig.sim, &rig.env->robot, &rig.env->variation);
+    task_env_load(rig.env, rig.sim);
     note_state();
     return task_env_step(rig.env, &rig.def, robot, rig.sim, action, 0, &rig.view, &probe);
 }
@@ -61,7 +61,7 @@ static void ask_torque(void *context, const TaskEnv *env, RobotSim *sim, double 
 }
 
 static void put(const RobotState *state) {
-    rig.env->robot = *state;
+    task_env_set_state(rig.env, state);
 }
 
 static void open_with_dt(double dt) {

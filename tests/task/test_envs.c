@@ -162,7 +162,7 @@ typedef struct {
 /* A fall in environment 1, bad numbers in 2, time-outs in all others: each at a step of its own. */
 static void disturb(TaskEnv *env, int e, int step) {
     if (e == 1 && step == 3) {
-        kit_turn(&env->robot, 0, 1.5, 0);
+        kit_turn(env->robot.qpos, 0, 1.5, 0);
     }
     if (e == 2 && step == 5) {
         env->robot.qvel[8] = NAN;
@@ -316,7 +316,7 @@ static void hash(void **unused) {
         TaskEnv *env = env_of(e);
         wanted = fnv(wanted, env->robot.qpos, SA01_NQ * sizeof(double));
         wanted = fnv(wanted, env->robot.qvel, SA01_NV * sizeof(double));
-        wanted = fnv(wanted, env->robot.qacc, SA01_NV * sizeof(double));
+        wanted = fnv(wanted, task_env_rest(env)->qacc, SA01_NV * sizeof(double));
         wanted = fnv(wanted, task_env_history(env), SA01_HISTORY * sizeof(float));
         wanted = fnv(wanted, env->command, sizeof env->command);
         wanted = fnv(wanted, &env->reward_sum, sizeof env->reward_sum);

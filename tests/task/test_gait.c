@@ -49,13 +49,13 @@ static void schedule(void **unused) {
     (void)unused;
     const double first[] = {0, 0.01, 0.25, 0.4999}, second[] = {0.5, 0.51, 0.75, 0.9999};
     for (int i = 0; i < 4; i++) {
-        assert_true(task_gait_stance(robot, first[i], 0, SA01_LEFT));
-        assert_false(task_gait_stance(robot, first[i], 0, SA01_RIGHT));
-        assert_false(task_gait_stance(robot, second[i], 0, SA01_LEFT));
-        assert_true(task_gait_stance(robot, second[i], 0, SA01_RIGHT));
+        assert_true(task_gait_stance(robot_table(robot), first[i], 0, SA01_LEFT));
+        assert_false(task_gait_stance(robot_table(robot), first[i], 0, SA01_RIGHT));
+        assert_false(task_gait_stance(robot_table(robot), second[i], 0, SA01_LEFT));
+        assert_true(task_gait_stance(robot_table(robot), second[i], 0, SA01_RIGHT));
         for (int foot = 0; foot < SA01_FEET; foot++) {
-            assert_true(task_gait_stance(robot, first[i], 1, foot));
-            assert_true(task_gait_stance(robot, second[i], 1, foot));
+            assert_true(task_gait_stance(robot_table(robot), first[i], 1, foot));
+            assert_true(task_gait_stance(robot_table(robot), second[i], 1, foot));
         }
     }
 }
@@ -68,18 +68,22 @@ static void wanted_height(void **unused) {
                  wanted[] = {0.0309016994, 0.0587785252, 0.1, 0.0309016994};
     for (int i = 0; i < 4; i++) {
         double phase = 0.5 * s[i];
-        expect_entry("right", i, task_gait_height(&def, robot, phase, 0, SA01_RIGHT), wanted[i],
-                     1e-9);
-        expect_entry("left", i, task_gait_height(&def, robot, phase + 0.5, 0, SA01_LEFT), wanted[i],
-                     1e-9);
-        expect_entry("left in stance", i, task_gait_height(&def, robot, phase, 0, SA01_LEFT), 0, 0);
+        expect_entry("right", i, task_gait_height(&def, robot_table(robot), phase, 0, SA01_RIGHT),
+                     wanted[i], 1e-9);
+        expect_entry("left", i,
+                     task_gait_height(&def, robot_table(robot), phase + 0.5, 0, SA01_LEFT),
+                     wanted[i], 1e-9);
+        expect_entry("left in stance", i,
+                     task_gait_height(&def, robot_table(robot), phase, 0, SA01_LEFT), 0, 0);
         expect_entry("right in stance", i,
-                     task_gait_height(&def, robot, phase + 0.5, 0, SA01_RIGHT), 0, 0);
-        expect_entry("standing", i, task_gait_height(&def, robot, phase, 1, SA01_RIGHT), 0, 0);
+                     task_gait_height(&def, robot_table(robot), phase + 0.5, 0, SA01_RIGHT), 0, 0);
+        expect_entry("standing", i,
+                     task_gait_height(&def, robot_table(robot), phase, 1, SA01_RIGHT), 0, 0);
     }
-    expect_near("lift-off", task_gait_height(&def, robot, 0, 0, SA01_RIGHT), 0, 0);
+    expect_near("lift-off", task_gait_height(&def, robot_table(robot), 0, 0, SA01_RIGHT), 0, 0);
     def.swing_apex = 0.06;
-    expect_near("apex", task_gait_height(&def, robot, 0.25, 0, SA01_RIGHT), 0.06, 1e-12);
+    expect_near("apex", task_gait_height(&def, robot_table(robot), 0.25, 0, SA01_RIGHT), 0.06,
+                1e-12);
 }
 
 /* Which joints bend, by how much; all others keep the pose. */
@@ -87,7 +91,7 @@ static void expect_reference(const TaskDef *def, double phase, int standing, int
     const double *pose = robot_default_pose(robot);
     double q[SA01_JOINTS];
     for (int i = 0; i < robot_joints(robot); i++) {
-        q[i] = task_gait_reference(def, robot, phase, standing, i);
+        q[i] = task_gait_reference(def, robot_table(robot), phase, standing, i);
     }
     for (int i = 0; i < SA01_JOINTS; i++) {
         int joint = i % LEG_JOINTS;

@@ -102,16 +102,17 @@ static RobotState mirrored(const RobotState *state) {
 }
 
 static void look_at(const RobotState *state, double side, double phase, const float *action) {
-    TaskReading reading;
+    TaskSensors reading;
     const double command[3] = {0.6, 0.2 * side, -0.8 * side};
-    env->robot = *state;
-    robot_sim_load(sim, state, &env->variation);
+    task_env_set_state(env, state);
+    const RobotVariation variation = task_env_variation(env);
+    robot_sim_load(sim, state, &variation);
     memcpy(env->command_seen, command, sizeof command);
     memcpy(env->action[0], action, JOINTS * sizeof *action);
     env->phase = phase;
-    task_read_imu(sim, &reading);
-    task_read_motors(sim, &reading);
-    task_observe(env, &def, robot, sim, &reading, 0, &view);
+    task_read_imu(robot_sim_base_rotation(sim), robot_sim_qvel(sim), &reading);
+    task_read_motors(robot_sim_qpos(sim) + 7, robot_sim_qvel(sim) + 6, &reading);
+    task_env_observe(env, &def, robot, sim, &reading, 0, &view);
 }
 
 /* The frame of the mirrored robot is the mirrored frame, and the estimates' feet change sides. */
@@ -157,9 +158,9 @@ static void diagonals_stand_together(void **unused) {
     for (int half = 0; half < 2; half++) {
         for (int f = 0; f < FEET; f++) {
             int diagonal = f == 0 || f == 3; /* front left and rear right */
-            assert_int_equal(task_gait_stance(robot, 0.25 + 0.5 * half, 0, f) != 0,
+            assert_int_equal(task_gait_stance(robot_table(robot), 0.25 + 0.5 * half, 0, f) != 0,
                              diagonal == (half == 0));
-            assert_true(task_gait_stance(robot, 0.25 + 0.5 * half, 1, f));
+            assert_true(task_gait_stance(robot_table(robot), 0.25 + 0.5 * half, 1, f));
         }
     }
 }
@@ -169,12 +170,13 @@ static void the_swing_lifts(void **unused) {
     (void)unused;
     RobotState state = {.qpos = {0, 0, 1, 1, 0, 0, 0}};
     for (int i = 0; i < robot_joints(robot); i++) {
-        state.qpos[7 + i] = task_gait_reference(&def, robot, 0.25, 0, i);
+        state.qpos[7 + i] = task_gait_reference(&def, robot_table(robot), 0.25, 0, i);
     }
-    robot_sim_load(sim, &state, &env->variation);
+    const RobotVariation variation = task_env_variation(env);
+    robot_sim_load(sim, &state, &variation);
     for (int f = 0; f < FEET; f++) {
         double below = 1 - robot_sim_foot(sim, f)->position[2];
-        int swings = !task_gait_stance(robot, 0.25, 0, f);
+        int swings = !task_gait_stance(robot_table(robot), 0.25, 0, f);
         double wanted = robot_stand_height(robot);
         print_message("foot %d %s: %.3f m below the base, %.3f m in the default pose\n", f,
                       swings ? "swings" : "stands", below, wanted);

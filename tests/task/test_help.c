@@ -11,7 +11,7 @@ static void open_in_the_air(uint32_t index) {
     rig_open(&rig, &def, 3, index);
     rig_go_limp(&rig);
     rig_start(&rig, 0.5, 0, 0);
-    rig.env->robot = kit_state(3);
+    kit_put(rig.env, kit_state(3));
 }
 
 static int is_pushed(const double before[6]) {
@@ -33,7 +33,7 @@ static int find_pushes(uint32_t index, uint32_t first, int steps, int found[8]) 
         double before[6];
         uint32_t step = rig.env->step;
         memcpy(before, rig.env->push, sizeof before);
-        rig.env->robot = kit_state(3);
+        kit_put(rig.env, kit_state(3));
         rig_step(&rig, NULL);
         if (is_pushed(before)) {
             assert_true(count < 8);
@@ -72,7 +72,7 @@ static void size_and_independence(void **unused) {
     rig.def.randomize.push_interval = 0.01;
     double sum[6] = {0}, square[6] = {0}, product[6][6] = {{0}}, low[6] = {0}, high[6] = {0};
     for (int t = 0; t < PUSHES; t++) {
-        rig.env->robot = kit_state(3);
+        kit_put(rig.env, kit_state(3));
         rig.env->step = 1;
         rig_step(&rig, NULL);
         for (int i = 0; i < 6; i++) {
@@ -109,9 +109,9 @@ static void push_is_a_velocity_jump(void **unused) {
     RobotState state = kit_moving_state(3, 4), pushed;
     rig.def.randomize.push_interval = 0.01;
     rig.env->step = 5;
-    rig.env->robot = state;
+    task_env_set_state(rig.env, &state);
     rig_step(&rig, NULL);
-    pushed = rig.env->robot;
+    pushed = task_env_state(rig.env);
     double push[6];
     memcpy(push, rig.env->push, sizeof push);
     for (int i = 0; i < 6; i++) {
@@ -119,9 +119,10 @@ static void push_is_a_velocity_jump(void **unused) {
         expect_entry("critic", 70 + i, (double)rig.critic[70 + i], push[i], 1e-7);
     }
     rig.def.randomize.push_interval = 0;
-    rig.env->robot = state;
+    task_env_set_state(rig.env, &state);
     rig_step(&rig, NULL);
-    assert_memory_equal(&pushed, &rig.env->robot, sizeof pushed);
+    state = task_env_state(rig.env);
+    assert_memory_equal(&pushed, &state, sizeof pushed);
     for (int i = 0; i < 6; i++) {
         expect_entry("faded", i, rig.env->push[i], 0.95 * push[i], 1e-15);
         expect_entry("critic", 70 + i, (double)rig.critic[70 + i], 0.95 * push[i], 1e-7);
@@ -139,10 +140,10 @@ static void help(double level, double draw) {
 
 static int hand(double yaw, double pitch, double roll, double wrench[6]) {
     RobotState state = kit_state(3);
-    kit_turn(&state, yaw, pitch, roll);
+    kit_turn(state.qpos, yaw, pitch, roll);
     memcpy(state.qvel, rig.env->robot.qvel, sizeof state.qvel);
-    robot_sim_load(rig.sim, &state, &rig.env->variation);
-    return task_assist(rig.env, &rig.def, robot, robot_sim_base_rotation(rig.sim),
+    kit_load(rig.sim, &state, rig.env);
+    return task_assist(rig.env, &rig.def, robot_table(robot), robot_sim_base_rotation(rig.sim),
                        robot_sim_qvel(rig.sim), wrench);
 }
 
@@ -215,11 +216,11 @@ static void wrench_in_space(void **unused) {
     help(1, 0.5);
     for (uint32_t draw = 0; draw < 20; draw++) {
         RobotState state = kit_moving_state(3, draw);
-        robot_sim_load(rig.sim, &state, &rig.env->variation);
+        kit_load(rig.sim, &state, rig.env);
         Oracle o = oracle_of(rig.sim);
         const double z[3] = {0, 0, 1};
         double wrench[6], up[3], restoring[3], omega[3];
-        task_assist(rig.env, &rig.def, robot, robot_sim_base_rotation(rig.sim),
+        task_assist(rig.env, &rig.def, robot_table(robot), robot_sim_base_rotation(rig.sim),
                     robot_sim_qvel(rig.sim), wrench);
         mju_rotVecQuat(up, z, o.orientation);
         mju_cross(restoring, up, z);
@@ -238,7 +239,7 @@ static void hand_acts_in_the_step(void **unused) {
     open_in_the_air(0);
     rig.env->command[0] = 0;
     for (int helped = 0; helped < 2; helped++) {
-        rig.env->robot = kit_state(3);
+        kit_put(rig.env, kit_state(3));
         help(helped, 1);
         rig_step(&rig, NULL);
         const mjModel *m = robot_sim_model(rig.sim);
@@ -263,7 +264,7 @@ static void led_pose(void **unused) {
     help(0.5, 0.8);
     rig.env->phase = 0.25; /* right leg bent by 0.4, 0.8, 0.4 */
     for (int i = 0; i < robot_joints(robot); i++) {
-        pose[i] = task_assist_pose(rig.env, &rig.def, robot, i);
+        pose[i] = task_assist_pose(rig.env, &rig.def, robot_table(robot), i);
     }
     for (int i = 0; i < SA01_JOINTS; i++) {
         double turn = i == 8 || i == 10 ? -0.208 : i == 9 ? 0.416 : 0;
@@ -271,13 +272,13 @@ static void led_pose(void **unused) {
     }
     rig.env->command[0] = 0;
     for (int i = 0; i < robot_joints(robot); i++) {
-        pose[i] = task_assist_pose(rig.env, &rig.def, robot, i);
+        pose[i] = task_assist_pose(rig.env, &rig.def, robot_table(robot), i);
     }
     assert_memory_equal(pose, rest, sizeof pose);
     rig.env->command[0] = 0.5;
     rig.def.assist = 0;
     for (int i = 0; i < robot_joints(robot); i++) {
-        pose[i] = task_assist_pose(rig.env, &rig.def, robot, i);
+        pose[i] = task_assist_pose(rig.env, &rig.def, robot_table(robot), i);
     }
     assert_memory_equal(pose, rest, sizeof pose);
     rig_close(&rig);
@@ -287,14 +288,15 @@ static void led_pose(void **unused) {
 static void torque_follows_the_led_pose(void **unused) {
     (void)unused;
     open_in_the_air(0);
-    rig.env->gains.kp[KNEE] = rig.env->gains.kp[LEG_JOINTS + KNEE] = 10;
+    task_env_rest(rig.env)->gains.kp[KNEE] = task_env_rest(rig.env)->gains.kp[LEG_JOINTS + KNEE] =
+        10;
     rig.env->phase = 0.25;
     help(1, 0.5);
-    RobotState before = rig.env->robot;
+    RobotState before = task_env_state(rig.env);
     rig_step(&rig, NULL);
     double led = rig.env->robot.qvel[6 + 9], free_leg = rig.env->robot.qvel[6 + 3];
     assert_true(led > 0.05 && fabs(free_leg) < 0.3 * led);
-    rig.env->robot = before;
+    task_env_set_state(rig.env, &before);
     rig.env->phase = 0.25;
     rig.def.assist = 0;
     rig_step(&rig, NULL);
@@ -344,15 +346,15 @@ static void level_follows_the_episode(void **unused) {
     rig_step(&rig, NULL);
     expect_near("young", env->assist_level, 0.5, 0);
     env->step = 500;
-    env->robot = kit_state(3);
+    kit_put(env, kit_state(3));
     rig_step(&rig, NULL);
     expect_near("on its feet", env->assist_level, 0.499375, 1e-12);
     env->step = env->step_limit - 1;
-    env->robot = kit_state(3);
+    kit_put(env, kit_state(3));
     assert_true(rig_step(&rig, NULL).timeout);
     expect_near("time-out", env->assist_level, 0.499375 * 0.99875, 1e-12);
     env->assist_level = 0.5;
-    kit_turn(&env->robot, 0, 1.3, 0);
+    kit_turn(env->robot.qpos, 0, 1.3, 0);
     assert_true(rig_step(&rig, NULL).done);
     expect_near("fall", env->assist_level, 0.66, 1e-12);
     rig_close(&rig);

@@ -10,16 +10,22 @@ static Rig rig;
 /* In the air, turned, bent and moving, above ground at z = 0.05. */
 static Oracle place(uint32_t draw) {
     RobotState state = kit_moving_state(1.2, draw);
-    rig.env->robot = state;
-    rig.env->terrain.height = 0.05;
-    robot_sim_load(rig.sim, &state, &rig.env->variation);
-    robot_sim_sole_clearance(rig.sim, &rig.env->terrain);
+    task_env_set_state(rig.env, &state);
+    task_env_rest(rig.env)->terrain.height = 0.05;
+    kit_load(rig.sim, &state, rig.env);
+    robot_sim_sole_clearance(rig.sim, task_env_terrain(rig.env));
     return oracle_of(rig.sim);
+}
+
+static TaskMotion describe_step(const double *torque) {
+    RobotReading reading;
+    task_env_read(rig.env, rig.sim, &reading);
+    return task_describe_motion(rig.env, &rig.def, robot_table(robot), &reading, torque);
 }
 
 static TaskMotion describe(void) {
     static const double torque[SA01_JOINTS];
-    return task_describe_motion(rig.env, &rig.def, robot, rig.sim, torque);
+    return describe_step(torque);
 }
 
 static void base_and_joints(void **unused) {
@@ -32,7 +38,7 @@ static void base_and_joints(void **unused) {
             rig.env->joint_speed[i] = 0.1 * i;
             torque[i] = 3 - i;
         }
-        TaskMotion m = task_describe_motion(rig.env, &rig.def, robot, rig.sim, torque);
+        TaskMotion m = describe_step(torque);
         for (int i = 0; i < 3; i++) {
             expect_entry("velocity", i, m.velocity[i], o.heading[i], TOLERANCE);
             expect_entry("omega", i, m.omega[i], o.omega[i], TOLERANCE);
@@ -45,7 +51,7 @@ static void base_and_joints(void **unused) {
             expect_entry("joint_speed", i, rig.env->joint_speed[i], m.qd[i], 0);
             expect_entry("torque", i, m.torque[i], torque[i], 0);
         }
-        assert_ptr_equal(m.robot, robot);
+        assert_ptr_equal(m.robot, robot_table(robot));
         assert_ptr_equal(m.env, rig.env);
         assert_ptr_equal(m.def, &rig.def);
     }

@@ -9,8 +9,8 @@ static Rig rig;
 static const double flat_scale[3] = {2, 2, 1}; /* of the command */
 
 /* Readings that differ from the truth, so that one sees who looks at which. */
-static TaskReading other_reading(void) {
-    TaskReading reading;
+static TaskSensors other_reading(void) {
+    TaskSensors reading;
     for (int i = 0; i < 3; i++) {
         reading.omega[i] = 0.5 + i;
         reading.gravity[i] = 0.1 - 0.3 * i;
@@ -55,15 +55,15 @@ static void fill_env(TaskEnv *env) {
 /* In the air, above ground at 0.05 m. */
 static Oracle place(uint32_t draw) {
     RobotState state = kit_moving_state(1.2, draw);
-    rig.env->robot = state;
-    rig.env->terrain.height = 0.05;
-    robot_sim_load(rig.sim, &state, &rig.env->variation);
-    robot_sim_sole_clearance(rig.sim, &rig.env->terrain);
+    task_env_set_state(rig.env, &state);
+    task_env_rest(rig.env)->terrain.height = 0.05;
+    kit_load(rig.sim, &state, rig.env);
+    robot_sim_sole_clearance(rig.sim, task_env_terrain(rig.env));
     return oracle_of(rig.sim);
 }
 
-static void look(const TaskReading *reading) {
-    task_observe(rig.env, &rig.def, robot, rig.sim, reading, 0, &rig.view);
+static void look(const TaskSensors *reading) {
+    task_env_observe(rig.env, &rig.def, robot, rig.sim, reading, 0, &rig.view);
 }
 
 static void expect_frame(const char *what, const float *frame, const double omega[3],
@@ -92,7 +92,7 @@ static const double clock_at_03[2] = {0.9510565163, -0.3090169944}, no_clock[2] 
 static void frame(void **unused) {
     (void)unused;
     rig_open_quiet(&rig, 0.5);
-    TaskReading reading = other_reading();
+    TaskSensors reading = other_reading();
     for (uint32_t draw = 0; draw < 10; draw++) {
         Oracle o = place(draw);
         fill_env(rig.env);
@@ -109,9 +109,9 @@ static void readings(void **unused) {
     (void)unused;
     rig_open_quiet(&rig, 0.5);
     Oracle o = place(11);
-    TaskReading reading;
-    task_read_imu(rig.sim, &reading);
-    task_read_motors(rig.sim, &reading);
+    TaskSensors reading;
+    task_read_imu(robot_sim_base_rotation(rig.sim), robot_sim_qvel(rig.sim), &reading);
+    task_read_motors(robot_sim_qpos(rig.sim) + 7, robot_sim_qvel(rig.sim) + 6, &reading);
     for (int i = 0; i < 3; i++) {
         expect_entry("omega", i, reading.omega[i], o.omega[i], 1e-9);
         expect_entry("gravity", i, reading.gravity[i], o.gravity[i], 1e-9);
@@ -125,7 +125,7 @@ static void readings(void **unused) {
 static void the_clock(void **unused) {
     (void)unused;
     rig_open_quiet(&rig, 0.5);
-    TaskReading reading = other_reading();
+    TaskSensors reading = other_reading();
     Oracle o = place(1);
     fill_env(rig.env);
     memset(rig.env->command, 0, sizeof rig.env->command); /* not seen yet */
@@ -151,7 +151,7 @@ static void the_clock(void **unused) {
 static void estimates(void **unused) {
     (void)unused;
     rig_open_quiet(&rig, 0.5);
-    TaskReading reading = other_reading();
+    TaskSensors reading = other_reading();
     double velocity_scale = 4, height_scale = 10;
     for (uint32_t draw = 0; draw < 10; draw++) {
         if (draw == 5) {
@@ -182,7 +182,7 @@ static void estimates(void **unused) {
 static void feet_of_the_critic(void **unused) {
     (void)unused;
     rig_open_quiet(&rig, 0.5);
-    TaskReading reading = other_reading();
+    TaskSensors reading = other_reading();
     for (uint32_t draw = 0; draw < 10; draw++) {
         Oracle o = place(draw);
         fill_env(rig.env);
@@ -211,8 +211,8 @@ static void limits_of_the_critic(void **unused) {
     (void)unused;
     rig_open_quiet(&rig, 0.5);
     RobotState state = kit_state(1.2);
-    robot_sim_load(rig.sim, &state, &rig.env->variation);
-    TaskReading reading = other_reading();
+    kit_load(rig.sim, &state, rig.env);
+    TaskSensors reading = other_reading();
     fill_env(rig.env);
     rig.env->phase = 0.7;
     oracle_set_force(rig.sim, 0, 1600, -1600, 4.99);
@@ -258,11 +258,11 @@ static MildTerrain two_materials(double x, double y) {
 static void episode_of_the_critic(void **unused) {
     (void)unused;
     rig_open_quiet(&rig, 0.5);
-    TaskReading reading = other_reading();
+    TaskSensors reading = other_reading();
     place(12);
     fill_env(rig.env);
     const double *qpos = robot_sim_qpos(rig.sim);
-    rig.env->terrain = two_materials(qpos[0], qpos[1]);
+    task_env_rest(rig.env)->terrain = two_materials(qpos[0], qpos[1]);
     rig.def.assist = 1;
     const double ground[12] = {1.4, 1.2, 1.0, 1.7, 0.6, 0.5, 0.55, 0.9, 2.0, 0.3, 0.25, 1.2};
     for (int rigid = 0; rigid < 2; rigid++) {
@@ -296,11 +296,11 @@ static void concentric_ground(void **unused) {
     (void)unused;
     robot_set_model(robot, MILD_MODEL_CON_CONE);
     rig_open_quiet(&rig, 0.5);
-    TaskReading reading = other_reading();
+    TaskSensors reading = other_reading();
     place(12);
     const double *qpos = robot_sim_qpos(rig.sim);
-    rig.env->terrain = two_materials(qpos[0], qpos[1]);
-    MildMaterial *m = &rig.env->terrain.materials[1];
+    task_env_rest(rig.env)->terrain = two_materials(qpos[0], qpos[1]);
+    MildMaterial *m = &task_env_rest(rig.env)->terrain.materials[1];
     m->model = MILD_MODEL_CON_CONE;
     m->k_pen *= 77;
     m->k_drift *= 77;
@@ -350,7 +350,7 @@ static void noise(void **unused) {
     (void)unused;
     enum { DRAWS = 20000 };
     rig_open_quiet(&rig, 0.5);
-    TaskReading reading = other_reading();
+    TaskSensors reading = other_reading();
     place(13);
     fill_env(rig.env);
     look(&reading);
@@ -362,7 +362,7 @@ static void noise(void **unused) {
     TaskView view = {.frame = rig.frame};
     for (int t = 0; t < DRAWS; t++) {
         rig.env->tick = (uint32_t)t;
-        task_observe(rig.env, &rig.def, robot, rig.sim, &reading, 0, &view);
+        task_env_observe(rig.env, &rig.def, robot, rig.sim, &reading, 0, &view);
         for (int i = 0; i < SA01_OBSERVATION; i++) {
             double x = (double)(rig.frame[i] - quiet[i]);
             low[i] = fmin(low[i], x);
@@ -403,7 +403,7 @@ static void noise(void **unused) {
 static void noise_is_a_stream(void **unused) {
     (void)unused;
     rig_open_quiet(&rig, 0.5);
-    TaskReading reading = other_reading();
+    TaskSensors reading = other_reading();
     rig.def.observe_noise = 1;
     look(&reading);
     float first[SA01_OBSERVATION];
@@ -450,15 +450,15 @@ static void history(void **unused) {
         def.history_stride = strides[s];
         rig_open(&rig, &def, 3, 0);
         rig_start(&rig, 0.5, 0, 0);
-        TaskReading reading = other_reading();
+        TaskSensors reading = other_reading();
         for (int t = 0; t < 200; t++) {
             reading.omega[0] = t;
-            task_observe(rig.env, &rig.def, robot, rig.sim, &reading, t == 0, &rig.view);
+            task_env_observe(rig.env, &rig.def, robot, rig.sim, &reading, t == 0, &rig.view);
             expect_history(strides[s], t + 1);
         }
         assert_memory_equal(rig.history, task_env_history(rig.env), sizeof rig.history);
         reading.omega[0] = -5; /* the next episode knows nothing of this one */
-        task_observe(rig.env, &rig.def, robot, rig.sim, &reading, 1, &rig.view);
+        task_env_observe(rig.env, &rig.def, robot, rig.sim, &reading, 1, &rig.view);
         for (int i = 0; i < TASK_FRAMES; i++) {
             expect_entry("new history", i, (double)rig.history[i * SA01_OBSERVATION], -5, 1e-5);
         }
@@ -489,9 +489,9 @@ static void history_of_steps(void **unused) {
 static void views(void **unused) {
     (void)unused;
     rig_open_quiet(&rig, 0.5);
-    TaskReading reading = other_reading();
+    TaskSensors reading = other_reading();
     const TaskView none = {0};
-    task_observe(rig.env, &rig.def, robot, rig.sim, &reading, 0, &none);
+    task_env_observe(rig.env, &rig.def, robot, rig.sim, &reading, 0, &none);
     assert_true(task_env_history(rig.env)[SA01_HISTORY - SA01_OBSERVATION] == 0.5f);
     rig_close(&rig);
 }
@@ -518,14 +518,14 @@ static RobotState mirrored(const RobotState *state) {
 
 static void look_at(const RobotState *state, const double command[3], double phase,
                     const float *action) {
-    TaskReading reading;
-    rig.env->robot = *state;
-    robot_sim_load(rig.sim, state, &rig.env->variation);
+    TaskSensors reading;
+    task_env_set_state(rig.env, state);
+    kit_load(rig.sim, state, rig.env);
     memcpy(rig.env->command_seen, command, sizeof rig.env->command_seen);
     memcpy(rig.env->action[0], action, SA01_JOINTS * sizeof *action);
     rig.env->phase = phase;
-    task_read_imu(rig.sim, &reading);
-    task_read_motors(rig.sim, &reading);
+    task_read_imu(robot_sim_base_rotation(rig.sim), robot_sim_qvel(rig.sim), &reading);
+    task_read_motors(robot_sim_qpos(rig.sim) + 7, robot_sim_qvel(rig.sim) + 6, &reading);
     look(&reading);
 }
 

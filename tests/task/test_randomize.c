@@ -18,7 +18,7 @@ static void open_env(void) {
 /* The next episode's draw; 97: any number, so that ticks are not all multiples of 2. */
 static void draw_next(void) {
     env->tick += 97;
-    task_randomize(env, &def, robot);
+    task_env_draw(env, &def, robot);
 }
 
 /* ---- a table of draws: column by quantity ---- */
@@ -128,7 +128,7 @@ static void robot_and_sensors(void **unused) {
     int lags[3][6] = {{0}};
     for (int t = 0; t < DRAWS; t++) {
         draw_next();
-        const RobotVariation *v = &env->variation;
+        const TaskVariation *v = &env->variation;
         note("base_mass_add", -1, -4, 4, v->base_mass_add);
         note("armature_scale", -1, 0.7, 1.3, v->armature_scale);
         note("rigid_friction", -1, 0.2, 1.3, v->rigid_friction);
@@ -192,7 +192,7 @@ static void nominal(void **unused) {
     const RobotVariation still = robot_variation_nominal();
     for (int t = 0; t < 50; t++) {
         draw_next();
-        const RobotVariation *v = &env->variation;
+        const TaskVariation *v = &env->variation;
         assert_true(v->base_mass_add == 0 && v->armature_scale == 1 && !v->rigid);
         for (int i = 0; i < 3; i++) {
             assert_true(v->com_offset[i] == 0);
@@ -203,8 +203,8 @@ static void nominal(void **unused) {
             assert_true(env->kp_scale[i] == 1 && env->kd_scale[i] == 1 && env->strength[i] == 1);
             assert_true(env->motor_offset[i] == 0);
         }
-        assert_int_equal(env->terrain.patch_count, 0);
-        const MildMaterial *m = &env->terrain.materials[0];
+        assert_int_equal(task_env_rest(env)->terrain.patch_count, 0);
+        const MildMaterial *m = &task_env_rest(env)->terrain.materials[0];
         int found = 0;
         for (int p = 0; p < mild_material_preset_count(); p++) {
             MildMaterial preset = mild_material_default();
@@ -221,7 +221,7 @@ static void nominal(void **unused) {
 static void draws_are_a_function(void **unused) {
     (void)unused;
     open_env();
-    task_randomize(env, &def, robot);
+    task_env_draw(env, &def, robot);
     double first = env->motor_offset[3], command;
     task_draw_command(env, &def);
     command = env->command[0];
@@ -229,7 +229,7 @@ static void draws_are_a_function(void **unused) {
         env->seed += k == 1;
         env->index += k == 2;
         env->tick += k == 3;
-        task_randomize(env, &def, robot);
+        task_env_draw(env, &def, robot);
         task_draw_command(env, &def);
         assert_int_equal(env->motor_offset[3] == first, k == 0);
         assert_int_equal(env->command[0] == command && command != 0, k == 0);
@@ -255,15 +255,15 @@ static void every_bit_of_the_seed(void **unused) {
     for (int bit = -1; bit < 64; bit++) {
         uint64_t seed = env->seed;
         env->seed ^= bit < 0 ? 0 : (uint64_t)1 << bit;
-        task_randomize(env, &def, robot);
+        task_env_draw(env, &def, robot);
         task_draw_command(env, &def);
         assert_true(env->motor_offset[3] != offset);
         assert_true(env->command[0] != command);
-        assert_true(env->terrain.map_x != place);
+        assert_true(task_env_rest(env)->terrain.map_x != place);
         if (bit < 0) {
             offset = env->motor_offset[3];
             command = env->command[0];
-            place = env->terrain.map_x;
+            place = task_env_rest(env)->terrain.map_x;
         }
         env->seed = seed;
     }
@@ -310,9 +310,10 @@ static void shares_of_grounds(void **unused) {
     for (int t = 0; t < DRAWS; t++) {
         draw_next();
         rigid += env->variation.rigid;
-        striped += env->terrain.patch_count > 0;
+        striped += task_env_rest(env)->terrain.patch_count > 0;
         double factor[7];
-        int p = env->variation.rigid ? -1 : preset_of(&env->terrain.materials[0], factor);
+        int p = env->variation.rigid ? -1
+                                     : preset_of(&task_env_rest(env)->terrain.materials[0], factor);
         if (p >= 0) {
             presets++;
             by_preset[p]++;
@@ -322,7 +323,7 @@ static void shares_of_grounds(void **unused) {
                 }
             }
         }
-        assert_int_equal(env->terrain.materials[0].model, MILD_MODEL_MILD);
+        assert_int_equal(task_env_rest(env)->terrain.materials[0].model, MILD_MODEL_MILD);
     }
     expect_share("rigid", rigid, DRAWS, 0.1);
     expect_share("presets", presets, DRAWS, 0.5);
@@ -340,7 +341,8 @@ static void shares_of_grounds(void **unused) {
         draw_next();
         double factor[7];
         rigid += env->variation.rigid;
-        presets += !env->variation.rigid && preset_of(&env->terrain.materials[0], factor) >= 0;
+        presets += !env->variation.rigid &&
+                   preset_of(&task_env_rest(env)->terrain.materials[0], factor) >= 0;
     }
     expect_share("half rigid", rigid, DRAWS / 4, 0.5);
     expect_share("the other half presets", presets, DRAWS / 4, 0.5);
@@ -359,7 +361,7 @@ static void ranges_of_grounds(void **unused) {
     const MildMaterial sand = mild_material_default();
     for (int t = 0; t < DRAWS; t++) {
         draw_next();
-        const MildMaterial *m = &env->terrain.materials[0];
+        const MildMaterial *m = &task_env_rest(env)->terrain.materials[0];
         note("k_pen", -1, 8, 1400, m->k_pen);
         note("sigma_cone", -1, 0.01e6, 0.24e6, m->sigma_cone);
         note("alpha", -1, 0.698, 1.310, m->alpha);
@@ -394,11 +396,11 @@ static void drift_and_energy(void **unused) {
     int drawn = 0, apart = 0;
     for (int t = 0; t < DRAWS; t++) {
         draw_next();
-        const MildMaterial plain = env->terrain.materials[0];
+        const MildMaterial plain = task_env_rest(env)->terrain.materials[0];
         double factor[7];
         assert_true(plain.passive);
-        task_randomize(env, &wide, robot);
-        MildMaterial m = env->terrain.materials[0];
+        task_env_draw(env, &wide, robot);
+        MildMaterial m = task_env_rest(env)->terrain.materials[0];
         assert_false(m.passive);
         if (preset_of(&plain, factor) < 0) {
             note("k_drift", -1, 50, 900, m.k_drift);
@@ -428,10 +430,10 @@ static void limit_of_sinkage(void **unused) {
     for (int t = 0; t < draws; t++) {
         def.randomize.sinkage_max = 1;
         draw_next();
-        MildMaterial as_drawn = env->terrain.materials[0];
+        MildMaterial as_drawn = task_env_rest(env)->terrain.materials[0];
         def.randomize.sinkage_max = 0.07;
-        task_randomize(env, &def, robot);
-        MildMaterial limited = env->terrain.materials[0];
+        task_env_draw(env, &def, robot);
+        MildMaterial limited = task_env_rest(env)->terrain.materials[0];
         as_drawn.bed_depth = 10;
         double before = mild_sole_sinkage(sole, &as_drawn, weight);
         double factor = limited.k_pen / as_drawn.k_pen;
@@ -461,7 +463,7 @@ static void stripes(void **unused) {
     int of[3] = {0}, different = 0;
     for (int t = 0; t < DRAWS / 4; t++) {
         draw_next();
-        const MildTerrain *terrain = &env->terrain;
+        const MildTerrain *terrain = task_env_terrain(env);
         assert_int_equal(terrain->material_count, 3);
         assert_int_equal(terrain->patch_count, MILD_PATCHES_MAX);
         expect_near("first edge", terrain->patches[0].x_min, -16, 1e-12);
@@ -496,13 +498,13 @@ static void models_are_matched(void **unused) {
             env->tick = (uint32_t)(1000 + t);
             def.randomize.model = MILD_MODEL_MILD;
             robot_set_model(robot, MILD_MODEL_MILD);
-            task_randomize(env, &def, robot);
-            MildMaterial mild = env->terrain.materials[0];
+            task_env_draw(env, &def, robot);
+            MildMaterial mild = task_env_rest(env)->terrain.materials[0];
             double wanted = mild_sole_sinkage(robot_soles(robot)[0], &mild, load);
             def.randomize.model = model;
             robot_set_model(robot, (MildModel)model);
-            task_randomize(env, &def, robot);
-            const MildMaterial *m = &env->terrain.materials[0];
+            task_env_draw(env, &def, robot);
+            const MildMaterial *m = &task_env_rest(env)->terrain.materials[0];
             assert_int_equal(env->variation.rigid, model == MILD_MODEL_RIGID);
             if (model == MILD_MODEL_RIGID) {
                 continue;
@@ -538,12 +540,12 @@ static void place_on_a_map(void **unused) {
     def.map = map;
     for (int t = 0; t < DRAWS / 4; t++) {
         draw_next();
-        note("map_x", -1, -x / 2, x / 2, env->terrain.map_x);
-        note("map_y", -1, -y / 2, y / 2, env->terrain.map_y);
-        assert_int_equal(env->terrain.material_count, mild_map_label_count(map));
-        assert_int_equal(env->terrain.patch_count, 0);
-        assert_memory_not_equal(&env->terrain.materials[0], &env->terrain.materials[1],
-                                sizeof(MildMaterial));
+        note("map_x", -1, -x / 2, x / 2, task_env_rest(env)->terrain.map_x);
+        note("map_y", -1, -y / 2, y / 2, task_env_rest(env)->terrain.map_y);
+        assert_int_equal(task_env_rest(env)->terrain.material_count, mild_map_label_count(map));
+        assert_int_equal(task_env_rest(env)->terrain.patch_count, 0);
+        assert_memory_not_equal(&task_env_rest(env)->terrain.materials[0],
+                                &task_env_rest(env)->terrain.materials[1], sizeof(MildMaterial));
     }
     expect_columns();
     mild_map_destroy(map);
@@ -604,7 +606,7 @@ static void start(void **unused) {
         rig.env->tick = first ? 0 : (uint32_t)(100 + t);
         rig.env->index = (uint32_t)t;
         task_env_reset(rig.env, &rig.def, robot, rig.sim, &none);
-        const RobotState *s = &rig.env->robot;
+        const TaskPose *s = &rig.env->robot;
         note("yaw", -1, -KIT_PI, KIT_PI, 2 * atan2(s->qpos[6], s->qpos[3]));
         assert_true(s->qpos[0] == 0 && s->qpos[1] == 0 && s->qpos[4] == 0 && s->qpos[5] == 0);
         for (int i = 0; i < SA01_JOINTS; i++) {
@@ -615,7 +617,7 @@ static void start(void **unused) {
             note("twist", i, -0.1, 0.1, s->qvel[i]);
             expect_entry("base_twist", i, rig.env->base_twist[i], s->qvel[i], 0);
         }
-        const MildMaterial *m = &rig.env->terrain.materials[0];
+        const MildMaterial *m = &task_env_rest(rig.env)->terrain.materials[0];
         double depth = rig.env->variation.rigid
                            ? 0
                            : mild_sole_sinkage(robot_soles(robot)[0], m, robot_foot_load(robot));

@@ -20,7 +20,7 @@ static TaskMotion *new_scene(void) {
     TaskMotion *m = &scene.motion;
     m->def = &scene.def;
     m->env = &scene.env;
-    m->robot = robot;
+    m->robot = robot_table(robot);
     memcpy(m->q, robot_default_pose(robot), SA01_JOINTS * sizeof *m->q);
     scene.env.shape = task_shape(robot);
     m->gravity[2] = -1;

@@ -86,7 +86,7 @@ static void every_ground_model_carries(void **state) {
         rig_open(&rig, &def, 5, 2);
         rig.env->command_frozen = 1;
         task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
-        const MildMaterial *m = &rig.env->terrain.materials[0];
+        const MildMaterial *m = &task_env_rest(rig.env)->terrain.materials[0];
         assert_true(rig.env->variation.rigid == rigid);
         assert_true(rigid || m->model == model);
         double load = 0, depth = 0;

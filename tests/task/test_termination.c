@@ -14,7 +14,7 @@ static void open_limp(void) {
 
 /* One step from this state at the given step of the episode. */
 static TaskStep step_from(const RobotState *state, uint32_t step) {
-    rig.env->robot = *state;
+    task_env_set_state(rig.env, state);
     rig.env->step = step;
     mild_ground_reset(task_env_ground(rig.env));
     return rig_step(&rig, NULL);
@@ -47,7 +47,7 @@ static void tilt(void **unused) {
             for (int past = 0; past < 2; past++) {
                 double angle = sign * (limits[l] + (past ? 0.01 : -0.01));
                 RobotState state = kit_state(2);
-                kit_turn(&state, 0.7, k < 2 ? angle : 0, k < 2 ? 0 : angle);
+                kit_turn(state.qpos, 0.7, k < 2 ? angle : 0, k < 2 ? 0 : angle);
                 expect_end(past ? "past the tilt limit" : "below the tilt limit",
                            step_from(&state, 10), past, 0);
             }
@@ -61,7 +61,7 @@ static void upright_in_the_air(void **unused) {
     open_limp();
     for (int k = 0; k < 8; k++) {
         RobotState state = kit_state(1.5);
-        kit_turn(&state, k - 3.5, 0, 0);
+        kit_turn(state.qpos, k - 3.5, 0, 0);
         state.qvel[0] = k - 4; /* neither speed nor height ends an episode */
         state.qvel[2] = 0.5 * k;
         state.qvel[5] = 4 - k;
@@ -96,7 +96,7 @@ static void touch(const RobotState *from, const char *box, double height, const 
         RobotState state = *from;
         state.qvel[2] = -0.1;
         state.qpos[2] += height + FALL + (past ? -1e-3 : 1e-3) - lowest_of_box(&state, box);
-        rig.env->terrain.height = height;
+        task_env_rest(rig.env)->terrain.height = height;
         expect_end(what, step_from(&state, 10), past, 0);
     }
 }
@@ -111,7 +111,7 @@ static void deep(const RobotState *from, const char *box) {
             state.qvel[2] = -0.1;
             state.qpos[2] += FALL + (past ? -1e-3 : 1e-3) - lowest_of_box(&state, box);
             state.qpos[2] -= rigid ? 0 : rig.def.shell_depth;
-            rig.env->terrain.height = 0;
+            task_env_rest(rig.env)->terrain.height = 0;
             expect_end("deep", step_from(&state, 10), past, 0);
         }
     }
@@ -136,7 +136,7 @@ static void base_touches(void **unused) {
     open_limp();
     rig.def.tilt_limit = 3.1;
     RobotState state = folded();
-    kit_turn(&state, 0.3, -1.0, 0.1); /* on its back, legs up */
+    kit_turn(state.qpos, 0.3, -1.0, 0.1); /* on its back, legs up */
     const char *others[] = {"leg_l4_link_box", "leg_r4_link_box"};
     for (int i = 0; i < 2; i++) {
         assert_true(lowest_of_box(&state, others[i]) > lowest_of_box(&state, "base_link_box"));
@@ -160,7 +160,7 @@ static void shank_touches(int leg, const char *box) {
     up[HIP_PITCH] = -1.15;
     up[KNEE] = 0.02;
     up[ANKLE_PITCH] = 0;
-    kit_turn(&state, -0.8, -0.2, 0.05);
+    kit_turn(state.qpos, -0.8, -0.2, 0.05);
     assert_true(lowest_of_box(&state, "base_link_box") > lowest_of_box(&state, box) + 0.1);
     touch(&state, box, 0, box);
     touch(&state, box, -0.2, box);
@@ -178,9 +178,9 @@ static void crossing(void **unused) {
     (void)unused;
     open_limp();
     RobotState state = kit_state(2);
-    kit_turn(&state, 2.2, 0, 0);
+    kit_turn(state.qpos, 2.2, 0, 0);
     expect_alive("feet apart", step_from(&state, 10));
-    robot_sim_load(rig.sim, &state, &rig.env->variation);
+    kit_load(rig.sim, &state, rig.env);
     double apart = oracle_of(rig.sim).foot_distance;
     expect_near("distance of the feet in the default pose", apart, 0.1613, 1e-3);
     rig.def.crossing_limit = apart + 1e-3;
@@ -190,7 +190,7 @@ static void crossing(void **unused) {
     rig.def.crossing_limit = 0;
     state.qpos[7 + HIP_ROLL] = -0.2;
     state.qpos[7 + LEG_JOINTS + HIP_ROLL] = 0.2;
-    robot_sim_load(rig.sim, &state, &rig.env->variation);
+    kit_load(rig.sim, &state, rig.env);
     assert_true(oracle_of(rig.sim).foot_distance < -0.05);
     expect_fall("crossed", step_from(&state, 10));
     rig.def.crossing_limit = -0.9;
@@ -206,7 +206,7 @@ static void timeout(void **unused) {
     assert_int_equal(rig.env->step_limit, 2400);
     expect_alive("step 2399", step_from(&state, 2398));
     expect_end("step 2400", step_from(&state, 2399), 1, 1);
-    kit_turn(&state, 0, 1.2, 0);
+    kit_turn(state.qpos, 0, 1.2, 0);
     expect_fall("fallen at the last step", step_from(&state, 2399));
     rig_close(&rig);
     TaskDef def = kit_quiet_def();

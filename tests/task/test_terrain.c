@@ -1,6 +1,7 @@
 /* Robots on one map: results independent of thread count, state without pointers that continues bit
  * for bit, heights of start, feet and base above the ground under them. */
 #include "base/random.h"
+#include "env/task/task.h"
 #include "envs_kit.h"
 #include "kit.h"
 #include "sa01.h"
@@ -137,8 +138,8 @@ static void test_start(void **state) {
     for (int i = 0; i < 40; i++) {
         task_env_init(env, &def, robot, 3, (uint32_t)i);
         task_env_reset(env, &def, robot, sim, &none);
-        assert_null(env->terrain.map);
-        MildTerrain terrain = env->terrain;
+        assert_null(task_env_rest(env)->terrain.map);
+        MildTerrain terrain = task_env_rest(env)->terrain;
         terrain.map = map;
         double clearance = robot_sim_sole_clearance(sim, &terrain),
                base = mild_terrain_height_at(&terrain, 0, 0);
@@ -169,7 +170,7 @@ static void test_rigid(void **state) {
     for (int i = 0; i < 20; i++) {
         task_env_init(env, &def, robot, 4, (uint32_t)i);
         task_env_reset(env, &def, robot, sim, &none);
-        MildTerrain terrain = env->terrain;
+        MildTerrain terrain = task_env_rest(env)->terrain;
         terrain.map = map;
         off = fmax(off, fabs(robot_sim_sole_clearance(sim, &terrain) - 0.002));
         for (int s = 0; s < 200; s++) {

@@ -56,7 +56,7 @@ static void gait_of_any_offset(void **unused) {
     for (double phase = 0.003; phase < 1; phase += 0.0137) {
         double q[ROBOT_JOINTS_MAX];
         for (int i = 0; i < robot_joints(robot); i++) {
-            q[i] = task_gait_reference(&def, robot, phase, 0, i);
+            q[i] = task_gait_reference(&def, robot_table(robot), phase, 0, i);
         }
         for (int f = 0; f < LEGS; f++) {
             double since =
@@ -66,12 +66,13 @@ static void gait_of_any_offset(void **unused) {
             double height = swing ? def.swing_apex * sin(KIT_PI * (since - 0.5) / 0.5) : 0;
             double bend = -wave >= def.double_support ? -wave * def.reward.reference_amplitude : 0;
             swings += swing;
-            assert_int_equal(task_gait_stance(robot, phase, 0, f), !swing);
-            expect_near("height", task_gait_height(&def, robot, phase, 0, f), height, 1e-12);
-            assert_int_equal(task_gait_either(&def, robot, phase, 0, f),
+            assert_int_equal(task_gait_stance(robot_table(robot), phase, 0, f), !swing);
+            expect_near("height", task_gait_height(&def, robot_table(robot), phase, 0, f), height,
+                        1e-12);
+            assert_int_equal(task_gait_either(&def, robot_table(robot), phase, 0, f),
                              fabs(wave) < def.double_support);
-            assert_false(task_gait_either(&def, robot, phase, 1, f));
-            assert_true(task_gait_stance(robot, phase, 1, f));
+            assert_false(task_gait_either(&def, robot_table(robot), phase, 1, f));
+            assert_true(task_gait_stance(robot_table(robot), phase, 1, f));
             for (int i = 0; i < HINGES; i++) {
                 expect_entry("reference", f * HINGES + i, q[f * HINGES + i], (i ? 0.5 : -1) * bend,
                              1e-12);

@@ -48,9 +48,14 @@ struct Runner {
 
 /* ---- creation ---- */
 
+static TaskMotor motor_of(const Runner *r, int i) {
+    return task_motor(r->env, &r->task, robot_table(r->def.robot), &task_env_rest(r->env)->gains,
+                      i);
+}
+
 static void set_gains(Runner *r) {
     for (int i = 0; i < r->joints; i++) {
-        const TaskMotor motor = task_motor(r->env, &r->task, r->def.robot, i);
+        const TaskMotor motor = motor_of(r, i);
         r->target.kp[i] = (float)motor.kp;
         r->target.kd[i] = (float)motor.kd;
         r->target.limit[i] = (float)(r->def.torque_share * motor.limit);
@@ -63,8 +68,8 @@ static void begin_episode(Runner *r) {
     task_env_init(r->env, &r->task, r->def.robot, 0, 0);
     r->env->command_frozen = 1;
     memcpy(r->env->command, still, sizeof still);
-    task_randomize(r->env, &r->task, r->def.robot);
-    task_begin_episode(r->env, &r->task, r->def.robot, 0);
+    task_env_draw(r->env, &r->task, r->def.robot);
+    task_begin_episode(r->env, &r->task, robot_table(r->def.robot), 0, 0);
     r->env->phase = 0;
 }
 
@@ -250,7 +255,7 @@ void runner_damp(Runner *r, const char *why) {
 }
 
 /* Damps a robot that has tipped over. */
-static void check_tilt(Runner *r, const TaskReading *reading) {
+static void check_tilt(Runner *r, const TaskSensors *reading) {
     char why[sizeof r->report.why];
     const double tilt = acos(fmin(fmax(-reading->gravity[2], -1), 1));
     if (tilt > r->task.tilt_limit) {
@@ -294,9 +299,9 @@ static double limit_target(const TaskMotor *motor, double limit, double q, doubl
     return fmin(fmax(wanted, low), high);
 }
 
-static void set_targets(Runner *r, const TaskReading *reading) {
+static void set_targets(Runner *r, const TaskSensors *reading) {
     for (int i = 0; i < r->joints; i++) {
-        const TaskMotor motor = task_motor(r->env, &r->task, r->def.robot, i);
+        const TaskMotor motor = motor_of(r, i);
         const double limit = r->def.torque_share * motor.limit;
         const double target = limit_target(&motor, limit, reading->q[i], reading->qd[i]);
         r->report.targets_limited += target != motor.target[0];
@@ -333,15 +338,15 @@ static int is_finite(const Runner *r) {
 
 /* One step of the policy: as an environment's, but for its physics. A frame has the command of the
  * tick before it. */
-static void step_policy(Runner *r, const TaskReading *reading, const double command[3]) {
+static void step_policy(Runner *r, const TaskSensors *reading, const double command[3]) {
     const TaskView none = {0};
-    TaskReading shown = *reading;
+    TaskSensors shown = *reading;
     sensor_clip(r->def.robot, &shown);
     if (r->report.steps == 0) {
         set_command(r, command);
         memcpy(r->env->command_seen, r->env->command, sizeof r->env->command);
     }
-    task_observe(r->env, &r->task, r->def.robot, NULL, &shown, r->report.steps == 0, &none);
+    task_env_observe(r->env, &r->task, r->def.robot, NULL, &shown, r->report.steps == 0, &none);
     r->controller.act(r->controller.self, 1, &r->env, r->action);
     if (!is_finite(r)) {
         runner_damp(r, "the policy's action is not finite");
@@ -355,7 +360,7 @@ static void step_policy(Runner *r, const TaskReading *reading, const double comm
 }
 
 static void walk(Runner *r, double now, const double command[3]) {
-    const TaskReading reading = sensor_read(&r->state, r->joints);
+    const TaskSensors reading = sensor_read(&r->state, r->joints);
     check_tilt(r, &reading);
     if (r->mode == PACKET_damp) {
         return;

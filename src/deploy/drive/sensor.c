@@ -38,7 +38,7 @@ static double norm(const double v[3]) {
 }
 
 /* The base against its own angular velocity. Its heading may jump: nobody reads it. */
-static int is_base_jump(double limit, double dt, const TaskReading *before, const TaskReading *now,
+static int is_base_jump(double limit, double dt, const TaskSensors *before, const TaskSensors *now,
                         char *why, size_t size) {
     double change[3], dot = 0;
     for (int i = 0; i < 3; i++) {
@@ -61,8 +61,8 @@ static int is_base_jump(double limit, double dt, const TaskReading *before, cons
 }
 
 /* Each joint against its own speed. */
-static int is_joint_jump(const Robot *robot, double dt, const TaskReading *before,
-                         const TaskReading *now, char *why, size_t size) {
+static int is_joint_jump(const Robot *robot, double dt, const TaskSensors *before,
+                         const TaskSensors *now, char *why, size_t size) {
     for (int i = 0; i < robot_joints(robot); i++) {
         const double way = fabs(now->q[i] - before->q[i]),
                      speed = fmax(fabs(now->qd[i]), fabs(before->qd[i]));
@@ -80,7 +80,7 @@ static int is_jump(const Robot *robot, const SensorLimits *limits, const StatePa
     /* at least a period, because a robot that is simulated step by step sends at other times than
      * its own */
     const double dt = fmax(1e-6 * (double)(state->time - before->time), TASK_PERIOD);
-    const TaskReading old = sensor_read(before, robot_joints(robot)),
+    const TaskSensors old = sensor_read(before, robot_joints(robot)),
                       now = sensor_read(state, robot_joints(robot));
     return (limits->turn > 0 && is_base_jump(limits->turn, dt, &old, &now, why, size)) ||
            (limits->speed > 0 && is_joint_jump(robot, dt, &old, &now, why, size));
@@ -109,8 +109,8 @@ int sensor_is_impossible(const Robot *robot, const SensorLimits *limits, const S
 /* ---- what the policy is shown ---- */
 
 /* Gravity is minus the third row of the rotation that the quaternion stands for. */
-TaskReading sensor_read(const StatePacket *state, int joints) {
-    TaskReading reading = {{0}, {0}, {0}, {0}};
+TaskSensors sensor_read(const StatePacket *state, int joints) {
+    TaskSensors reading = {{0}, {0}, {0}, {0}};
     const double w = (double)state->quaternion[0], x = (double)state->quaternion[1],
                  y = (double)state->quaternion[2], z = (double)state->quaternion[3];
     reading.gravity[0] = -2 * (x * z - w * y);
@@ -130,7 +130,7 @@ static double clip(double x, double low, double high) {
     return fmin(fmax(x, low), high);
 }
 
-void sensor_clip(const Robot *robot, TaskReading *reading) {
+void sensor_clip(const Robot *robot, TaskSensors *reading) {
     for (int i = 0; i < 3; i++) {
         reading->omega[i] = clip(reading->omega[i], -SHOWN_TURN, SHOWN_TURN);
     }

@@ -16,9 +16,9 @@ typedef struct {
 int sensor_is_impossible(const Robot *robot, const SensorLimits *limits, const StatePacket *before,
                          const StatePacket *state, char *why, size_t size);
 
-TaskReading sensor_read(const StatePacket *state, int joints);
+TaskSensors sensor_read(const StatePacket *state, int joints);
 /* Brings the reading into the range that the training of the shipped policies sees
  * (docs/drive.md, section 2). */
-void sensor_clip(const Robot *robot, TaskReading *reading);
+void sensor_clip(const Robot *robot, TaskSensors *reading);
 
 #endif

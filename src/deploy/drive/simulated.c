@@ -191,7 +191,7 @@ static void set_torques(Simulated *s, double *torque) {
 
 static int has_fallen(const Simulated *s) {
     return robot_sim_base_rotation(s->sim)[8] < cos(s->def->task->tilt_limit) ||
-           robot_sim_body_clearance(s->sim, &s->env->terrain) < 0;
+           robot_sim_body_clearance(s->sim, task_env_terrain(s->env)) < 0;
 }
 
 /* Stands in its start until the runner answers. */
@@ -228,7 +228,7 @@ static void walk(Simulated *s) {
         }
         set_torques(s, torque);
         const int diverged =
-            robot_sim_step(s->sim, torque, NULL, &s->env->terrain, task_env_ground(s->env));
+            robot_sim_step(s->sim, torque, NULL, task_env_terrain(s->env), task_env_ground(s->env));
         s->time += dt;
         if (diverged || has_fallen(s) || s->target.mode == PACKET_end) {
             s->report->fallen = diverged || has_fallen(s);
@@ -270,7 +270,7 @@ MildStatus simulated_run(const SimulatedDef *def, SimulatedReport *report, MildE
         task_env_init(env, def->task, def->robot, def->seed, 0);
         env->command_frozen = 1;
         task_env_reset_on(env, def->task, def->robot, sim, def->terrain, def->rigid, &none);
-        env->terrain.map = def->task->map;
+        task_env_rest(env)->terrain.map = def->task->map;
         robot_sim_set_solver(sim, def->task->newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL,
                              def->task->contact_tolerance, def->task->contact_iterations);
         status = wait_for_runner(s, error);

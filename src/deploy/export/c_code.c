@@ -148,7 +148,7 @@ static void print_numbers(FILE *file, const Export *export) {
                  "[m/s] speed from which the clock is not slowed");
     print_number(file, "STANDING_BELOW", task->standing_below, "f",
                  "a command whose parts are all below this is to stand");
-    print_number(file, "ACTION_SCALE", task_action_scale(task, export->robot), "f",
+    print_number(file, "ACTION_SCALE", task_action_scale(task, robot_table(export->robot)), "f",
                  "[rad] per unit of action");
     print_number(file, "ACTION_CLIP", task->action_clip, "f", "[-] largest action");
 }

@@ -52,7 +52,7 @@ static void add_rules(Description *d, const Export *export) {
     const TaskDef *task = export->task;
     const int stride = task->history_stride;
     add(d, "policy_period", "%g", TASK_PERIOD);
-    add(d, "action_scale", "%.9g", task_action_scale(task, export->robot));
+    add(d, "action_scale", "%.9g", task_action_scale(task, robot_table(export->robot)));
     add(d, "action_clip", "%.9g", task->action_clip);
     add(d, "action_rule", "joint target [rad] = default_joint_pos + action_scale * action");
     add(d, "observation_names",

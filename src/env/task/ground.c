@@ -11,14 +11,6 @@
 #define RANDOM_USE_GROUNDS 0x47524e44u
 #define RANDOM_USE_DRIFT 0x44524654u
 
-static double draw(Random *r, const double range[2]) {
-    return random_uniform(r, range[0], range[1]);
-}
-
-static double spread(Random *r, double half_width) {
-    return half_width * (2 * random_unit(r) - 1);
-}
-
 /* A preset with each of its numbers changed a little. */
 static MildMaterial draw_preset(Random *r, const RandomizeDef *def) {
     MildMaterial m = mild_material_default();
@@ -28,7 +20,7 @@ static MildMaterial draw_preset(Random *r, const RandomizeDef *def) {
     double *const jittered[] = {&m.k_pen, &m.sigma_cone, &m.mu,     &m.c_d,
                                 &m.c_g,   &m.k_drift,    &m.b_drift};
     for (size_t i = 0; i < sizeof jittered / sizeof *jittered; i++) {
-        *jittered[i] *= 1 + spread(r, def->preset_jitter);
+        *jittered[i] *= 1 + task_spread(r, def->preset_jitter);
     }
     return m;
 }
@@ -53,19 +45,19 @@ static MildMaterial draw_ranges(Random *r, const RandomizeDef *def, const Robot 
     MildMaterial m = mild_material_default();
     Random drift = *r; /* apart, so that it moves no other draw */
     drift.seed ^= RANDOM_USE_DRIFT;
-    m.k_pen = draw(r, def->k_pen);
-    m.sigma_cone = draw(r, def->sigma_cone);
-    m.alpha = draw(r, def->alpha);
-    m.nu = draw(r, def->nu);
-    m.c_g = draw(r, def->c_g);
-    m.c_d = draw(r, def->c_d);
-    m.phi = draw(r, def->phi);
-    m.mu = draw(r, def->mu);
-    m.rho = draw(r, def->rho);
-    m.k_drift = draw(&drift, def->k_drift);
-    m.b_drift = draw(&drift, def->b_drift);
-    m.recovery = draw(r, def->recovery);
-    m.bed_depth = draw(r, def->bed_depth);
+    m.k_pen = task_draw(r, def->k_pen);
+    m.sigma_cone = task_draw(r, def->sigma_cone);
+    m.alpha = task_draw(r, def->alpha);
+    m.nu = task_draw(r, def->nu);
+    m.c_g = task_draw(r, def->c_g);
+    m.c_d = task_draw(r, def->c_d);
+    m.phi = task_draw(r, def->phi);
+    m.mu = task_draw(r, def->mu);
+    m.rho = task_draw(r, def->rho);
+    m.k_drift = task_draw(&drift, def->k_drift);
+    m.b_drift = task_draw(&drift, def->b_drift);
+    m.recovery = task_draw(r, def->recovery);
+    m.bed_depth = task_draw(r, def->bed_depth);
     limit_sinkage(&m, robot, def->sinkage_max);
     return m;
 }
@@ -113,7 +105,7 @@ static void draw_stripes(Random *r, const TaskDef *task, const Robot *robot, Mil
     }
     double x = -0.5 * MILD_PATCHES_MAX * 0.5 * (def->patch_length[0] + def->patch_length[1]);
     for (int i = 0; i < MILD_PATCHES_MAX; i++) {
-        double length = draw(r, def->patch_length);
+        double length = task_draw(r, def->patch_length);
         MildPatch patch;
         /* Clears the padding too, because environments are saved and compared byte by byte. */
         memset(&patch, 0, sizeof patch);
@@ -129,11 +121,11 @@ static void draw_stripes(Random *r, const TaskDef *task, const Robot *robot, Mil
 
 /* Starts somewhere on the map and draws a material for each of its labels. */
 void task_draw_on_map(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r) {
-    MildTerrain *terrain = &env->terrain;
+    MildTerrain *terrain = &task_env_rest(env)->terrain;
     double x, y;
     mild_map_extent(def->map, &x, &y);
-    terrain->map_x = spread(r, 0.5 * x);
-    terrain->map_y = spread(r, 0.5 * y);
+    terrain->map_x = task_spread(r, 0.5 * x);
+    terrain->map_y = task_spread(r, 0.5 * y);
     while (terrain->material_count < mild_map_label_count(def->map)) {
         terrain->materials[terrain->material_count++] = draw_material(r, def, robot, NULL);
     }
@@ -141,10 +133,11 @@ void task_draw_on_map(TaskEnv *env, const TaskDef *def, const Robot *robot, Rand
 
 void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r) {
     MildMaterial material = draw_material(r, def, robot, &env->ground[0]);
-    env->terrain = mild_terrain_uniform(&material);
+    MildTerrain *terrain = &task_env_rest(env)->terrain;
+    *terrain = mild_terrain_uniform(&material);
     int striped = random_unit(r) < def->randomize.patch_share;
     if (striped && !(def->map && mild_map_label_count(def->map) > 1)) {
-        draw_stripes(r, def, robot, &env->terrain);
+        draw_stripes(r, def, robot, terrain);
     }
 }
 
@@ -169,15 +162,6 @@ void task_ground_numbers(const Robot *robot, const MildMaterial *m, float *numbe
     for (int i = 0; i < TASK_GROUND_NUMBERS; i++) {
         numbers[i] = (float)values[i];
     }
-}
-
-const float *task_ground_under(const TaskEnv *env, const TaskDef *def, const Robot *robot,
-                               const RobotSim *sim, float *buffer) {
-    (void)def;
-    const double *qpos = robot_sim_qpos(sim);
-    const int material = mild_terrain_material_at(&env->terrain, qpos[0], qpos[1]);
-    task_ground_numbers(robot, &env->terrain.materials[material], buffer);
-    return buffer;
 }
 
 double task_standing_depth(const Robot *robot, const MildMaterial *material) {

@@ -21,4 +21,10 @@ TaskGrounds *task_grounds_create(const TaskDef *def, const Robot *robot, int cou
                                  Pool *pool, MildError *error);
 void task_grounds_destroy(TaskGrounds *grounds); /* may be NULL */
 
+/* The numbers of a material that the critic sees, each scaled to about one;
+ * [TASK_GROUND_NUMBERS]. */
+void task_ground_numbers(const Robot *robot, const MildMaterial *material, float *numbers);
+/* [m] Depth of the soles of a robot that stands on a material. */
+double task_standing_depth(const Robot *robot, const MildMaterial *material);
+
 #endif

@@ -1,8 +1,7 @@
-/* What the task's code asks of robot and ground. The files of one policy step (step.c, gait.c,
- * assist.c, observe.c, reward.c, randomize.c) are compiled twice: as they are for the CPU, where
- * robots are stepped by RobotSim, and with TASK_ON_DEVICE by env/batch_step.inc (through
- * env/batch_task.h), where Robot and RobotSim are plain numbers on a device (device_robot.h).
- * TASK_FN marks the functions that one file of them calls in another. */
+/* Numbers and lanes of the task's functions, which are the same text on the CPU and on a GPU:
+ * step.h, gait.h, assist.h, observe.h, reward.h, randomize.h. They are compiled twice, as the
+ * ground's law is: for robots that MuJoCo steps (task.h) with Real = double, and for those of the
+ * batch engine (env/batch_step.h) with Real = float. */
 #ifndef TASK_LANES_H
 #define TASK_LANES_H
 
@@ -15,58 +14,52 @@
 #endif
 
 #include "base/hd.h"
+#include "robot/limits.h"
 
 #ifndef TASK_JOINTS /* sizes of a robot's arrays; where the code is compiled for one, its own */
 #define TASK_JOINTS ROBOT_JOINTS_MAX
 #define TASK_FEET ROBOT_FEET_MAX
 #endif
 
-/* TaskReal: a number that an environment keeps, in float on a device. Expressions are computed in
- * double where they read the task's definition or the robot's. */
-#ifdef TASK_ON_DEVICE
-#define TASK_FN MILD_HD_FN
-typedef float TaskReal;
-#include "env/task/device_robot.h"
-#else
-#define TASK_FN
-typedef double TaskReal;
-#include "robot/robot.h"
-typedef MildTerrain TaskTerrain;
-#endif
-#define TASK_REAL(number) ((TaskReal)(number))
+/* ---- numbers ---- */
 
+/* What an environment keeps is a Real. Expressions are computed in double where they read the
+ * task's definition or the robot's. */
+
+#define TASK_PI 3.141592653589793
+#define TASK_TWO_PI 6.283185307179586
 #define TASK_PER_TURN 0.3183098861837907 /* 1/pi */
 
 /* On a GPU to the accuracy of float, for a tenth of the instructions. */
-MILD_HD_FN TaskReal task_exp(double x) {
+MILD_HD_FN Real task_exp(double x) {
 #ifdef __CUDA_ARCH__
     return expf((float)x);
 #else
-    return (TaskReal)exp(x);
+    return (Real)exp(x);
 #endif
 }
 
-MILD_HD_FN TaskReal task_sin(double x) {
+MILD_HD_FN Real task_sin(double x) {
 #ifdef __CUDA_ARCH__
     return sinpif((float)(x * TASK_PER_TURN)); /* sinf has a long path for large x */
 #else
-    return (TaskReal)sin(x);
+    return (Real)sin(x);
 #endif
 }
 
-MILD_HD_FN TaskReal task_cos(double x) {
+MILD_HD_FN Real task_cos(double x) {
 #ifdef __CUDA_ARCH__
     return cospif((float)(x * TASK_PER_TURN));
 #else
-    return (TaskReal)cos(x);
+    return (Real)cos(x);
 #endif
 }
 
-MILD_HD_FN TaskReal task_sqrt(double x) {
+MILD_HD_FN Real task_sqrt(double x) {
 #ifdef __CUDA_ARCH__
     return sqrtf((float)x);
 #else
-    return (TaskReal)sqrt(x);
+    return (Real)sqrt(x);
 #endif
 }
 
@@ -77,21 +70,18 @@ MILD_HD_FN TaskReal task_sqrt(double x) {
 #define TASK_UNROLL
 #endif
 
-/* [m] Height of the base above the undisturbed surface. */
-MILD_HD_FN double task_height_above(const RobotSim *sim, const TaskTerrain *terrain) {
-#ifdef TASK_ON_DEVICE
-    (void)terrain;
-    return sim->above;
-#else
-    const double *qpos = robot_sim_qpos(sim);
-    return qpos[2] - mild_terrain_height_at(terrain, qpos[0], qpos[1]);
-#endif
+MILD_HD_FN Real task_square(Real x) {
+    return x * x;
 }
 
-/* A number of a frame that is kept for the means of the history. On a device it has 16 bits, as in
- * IEEE 754, with a rounding error of at most 2^-11 of the number: the noise of sensors is a hundred
- * times larger. Scaled by 2^-112 a float has the exponent of the short one. */
-#ifdef TASK_ON_DEVICE
+MILD_HD_FN Real task_clamp(Real x, Real low, Real high) {
+    return x < low ? low : x > high ? high : x;
+}
+
+/* A number of a frame that is kept for the means of the history. Where Real is float it has 16
+ * bits, as in IEEE 754, with a rounding error of at most 2^-11 of the number: the noise of sensors
+ * is a hundred times larger. Scaled by 2^-112 a float has the exponent of the short one. */
+#ifdef MILD_REAL_FLOAT
 typedef uint16_t TaskFrame;
 
 MILD_HD_FN TaskFrame frame_pack(float x) {
@@ -118,21 +108,16 @@ MILD_HD_FN float frame_unpack(TaskFrame frame) {
 #else
 typedef float TaskFrame;
 
-static inline TaskFrame frame_pack(float x) {
+MILD_HD_FN TaskFrame frame_pack(float x) {
     return x;
 }
 
-static inline float frame_unpack(TaskFrame frame) {
+MILD_HD_FN float frame_unpack(TaskFrame frame) {
     return frame;
 }
 #endif
 
-/* Bool: the environment keeps its history for controllers. */
-#ifdef TASK_ON_DEVICE
-enum { TASK_HAS_HISTORY = 0 };
-#else
-enum { TASK_HAS_HISTORY = 1 };
-#endif
+/* ---- lanes ---- */
 
 /* On a GPU so many threads, the lanes of an environment, call the functions of a policy step
  * together and take the same way through them. Each has its share of a loop
@@ -168,9 +153,9 @@ MILD_HD_FN void task_lanes_sync(void) {
 #endif
 }
 
-/* Sets numbers of TaskReal, or of float, to 0. */
+/* Sets numbers to 0. */
 MILD_HD_FN void task_clear(void *numbers, size_t bytes) {
-#ifdef TASK_ON_DEVICE
+#ifdef __CUDA_ARCH__
     float *number = (float *)numbers;
     for (size_t i = (size_t)task_lane(); i < bytes / sizeof *number; i += TASK_LANES) {
         number[i] = 0;
@@ -181,7 +166,7 @@ MILD_HD_FN void task_clear(void *numbers, size_t bytes) {
 }
 
 /* The sum over the lanes. */
-MILD_HD_FN TaskReal task_lanes_sum(TaskReal x) {
+MILD_HD_FN Real task_lanes_sum(Real x) {
 #ifdef __CUDA_ARCH__
     for (int step = TASK_LANES / 2; step > 0; step /= 2) {
         x += __shfl_xor_sync(task_lane_mask(), x, step);

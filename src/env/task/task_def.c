@@ -4,6 +4,8 @@
 
 #include "env/task/task_def.h"
 
+#include "robot/robot.h"
+
 #define KP_MAX 500.0 /* [N m/rad] */
 #define KD_MAX 50.0  /* [N m s/rad] */
 

@@ -3,16 +3,19 @@
 #ifndef MILD_TASK_DEF_H
 #define MILD_TASK_DEF_H
 
-#include "env/task/lanes.h"
+#include "base/hd.h"
 #include "mild/error.h"
 #include "mild/field.h"
 #include "mild/map.h"
+#include "robot/table.h"
+
+typedef struct Robot Robot;
 
 #define TASK_PERIOD 0.01   /* [s] policy step: 100 Hz (paper) */
 #define TASK_STRIDE_MAX 16 /* greatest task.history_stride */
 
 /* Every reward term once: name, default weight, help. The struct, the config keys and the table of
- * functions (reward.c) are all made from this list. Weights are per second; source: paper Table II
+ * functions (reward.h) are all made from this list. Weights are per second; source: paper Table II
  * and docs/task.md section 8. */
 #define TASK_REWARD_LIST(X)                                                                        \
     X(linear_velocity, 2.0,                                                                        \
@@ -143,7 +146,7 @@ typedef struct {
     double tilt_limit;   /* [rad] */
     double crossing_limit;    /* [m] lateral distance of the feet below which the episode ends */
     double shell_depth;       /* [m] of the shells in soft ground, past which the episode ends */
-    int assist;               /* bool: helping hand for beginners (assist.c) */
+    int assist;               /* bool: helping hand for beginners (assist.h) */
     int newton;               /* bool: fast solver; off: the paper's sweeps */
     double contact_tolerance; /* [-] relative residual at which the contact solver stops */
     int contact_iterations;   /* [-] hard bound of its work */
@@ -184,14 +187,13 @@ MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildErro
 MildStatus task_gains(const TaskDef *def, const Robot *robot, double *kp, double *kd,
                       MildError *error);
 /* [rad] What the def or, where it has 0, the robot says. */
-MILD_HD_FN double task_action_scale(const TaskDef *def, const Robot *robot) {
-    return def->action_scale > 0 ? def->action_scale : robot_action_scale(robot);
+MILD_HD_FN double task_action_scale(const TaskDef *def, const RobotTable *robot) {
+    return def->action_scale > 0 ? def->action_scale : robot->action_scale;
 }
 
 /* [m] The same. */
-MILD_HD_FN double task_nominal_height(const TaskDef *def, const Robot *robot) {
-    return def->reward.nominal_height > 0 ? def->reward.nominal_height
-                                          : robot_nominal_height(robot);
+MILD_HD_FN double task_nominal_height(const TaskDef *def, const RobotTable *robot) {
+    return def->reward.nominal_height > 0 ? def->reward.nominal_height : robot->nominal_height;
 }
 
 extern const MildField task_fields[];

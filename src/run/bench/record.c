@@ -60,7 +60,7 @@ static int walk_step(Walk *walk, ReplayPeriod *period) {
     TaskProbe probe = {record_torque, walk, NULL};
     if (period) {
         MildGround *ground = task_env_ground(walk->env);
-        period->state = walk->env->robot;
+        period->state = task_env_state(walk->env);
         memcpy(period->ground, ground, mild_ground_size(ground));
     }
     walk->period = period;
@@ -109,8 +109,8 @@ static MildStatus walk_record(Walk *walk, const Scene *scene, Replay *replay, Mi
     // NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage): error->status is no success
     task_env_reset_on(walk->env, &walk->def, walk->robot, walk->sim, &scene->terrain, scene->rigid,
                       &none);
-    replay->variation = walk->env->variation;
-    replay->terrain = walk->env->terrain;
+    replay->variation = task_env_variation(walk->env);
+    replay->terrain = *task_env_terrain(walk->env);
     int settle = (int)(walk_settle / TASK_PERIOD), upright = 1;
     for (int i = -settle; i < replay->periods && upright; i++) {
         upright = walk_step(walk, i < 0 ? NULL : &replay->period[i]);

@@ -4,6 +4,7 @@
 
 #include "env/task/policy_keys.h"
 #include "learn/policy.h"
+#include "robot/robot.h"
 #include "run/config/experiment_keys.h"
 
 /* The robot of a policy, when its name is one of robots/. */

@@ -36,8 +36,8 @@ static void shake(const MotorLogDef *def, int step, float *action) {
         Random r = random_at(def->seed ^ RANDOM_USE_SHAKE, (uint32_t)i, (uint32_t)(step / period));
         const double size = def->shake * random_unit(&r);
         const double rate = SHAKE_SLOWEST * pow(SHAKE_FASTEST / SHAKE_SLOWEST, random_unit(&r));
-        action[i] +=
-            (float)(size * sin(TWO_PI * rate * time) / task_action_scale(def->task, def->robot));
+        action[i] += (float)(size * sin(TWO_PI * rate * time) /
+                             task_action_scale(def->task, robot_table(def->robot)));
     }
 }
 

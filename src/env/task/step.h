@@ -1,104 +1,76 @@
-/* The policy step but for its physics, read top to bottom: the code for the CPU and for a device
- * (lanes.h). */
+/* The policy step but for its physics, read top to bottom: what MuJoCo (task.h) and the batch
+ * engine (env/batch_step.h) have in common. */
+#ifndef TASK_STEP_H
+#define TASK_STEP_H
+
 #include <math.h>
 #include <string.h>
 
 #include "base/random.h"
-#include "env/task/task.h"
+#include "env/task/observe.h"
+#include "env/task/randomize.h"
+#include "env/task/reward.h"
 
-#define RANDOM_USE_START 0x53544152u
-#define RANDOM_USE_PUSH 0x50555348u
-#define CONTACT_FORCE 5.0 /* [N] */
-#define PI 3.141592653589793
+#define TASK_RANDOM_START 0x53544152u
+#define TASK_RANDOM_PUSH 0x50555348u
+#define TASK_CONTACT_FORCE 5.0 /* [N] */
 
-/* ---- the block: TaskEnv, history, ring of frames ---- */
+/* ---- the block of an environment ---- */
 
-MILD_HD_FN size_t whole_lines(size_t bytes) {
+MILD_HD_FN size_t task_whole_lines(size_t bytes) {
     return (bytes + 63) / 64 * 64;
 }
 
-MILD_HD_FN size_t history_bytes(const TaskShape *shape) {
-    return TASK_HAS_HISTORY ? (size_t)shape->history * sizeof(float) : 0;
-}
-
-TASK_FN uint32_t task_frames_held(const TaskDef *def) {
+/* Frames of the ring: as many as the means of the history reach back. */
+MILD_HD_FN uint32_t task_frames_held(const TaskDef *def) {
     return (uint32_t)((TASK_FRAMES - 1) * def->history_stride);
 }
 
-/* A device has no history, and the frames right behind TaskEnv. */
-MILD_HD_FN size_t history_place(void) {
-    return TASK_HAS_HISTORY ? whole_lines(sizeof(TaskEnv)) : sizeof(TaskEnv);
+/* Of a TaskEnv and its frames, which follow it. */
+MILD_HD_FN size_t task_env_head_bytes(const TaskShape *shape, uint32_t held) {
+    return task_whole_lines(sizeof(TaskEnv) +
+                            held * (size_t)shape->observation * sizeof(TaskFrame));
 }
 
-TASK_FN size_t task_env_head_bytes(const TaskShape *shape, uint32_t held) {
-    const size_t frames = held * (size_t)shape->observation * sizeof(TaskFrame);
-    return whole_lines(history_place() + history_bytes(shape) + frames);
-}
-
-TASK_FN float *task_env_history(TaskEnv *env) {
-    return (float *)(void *)((char *)env + history_place());
-}
-
-TASK_FN TaskFrame *task_env_frames(TaskEnv *env) {
-    return (TaskFrame *)(void *)((char *)env + history_place() + history_bytes(&env->shape));
-}
-
-MILD_HD_FN const TaskGains *gains_of(const TaskEnv *env) {
-#ifdef TASK_ON_DEVICE
-    return env->gains;
-#else
-    return &env->gains;
-#endif
-}
-
-MILD_HD_FN void set_gains(TaskEnv *env, const TaskGains *gains) {
-#ifdef TASK_ON_DEVICE
-    env->gains = gains;
-#else
-    env->gains = *gains;
-#endif
-}
-
-TASK_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape shape,
-                                const TaskGains *gains, uint64_t seed, uint32_t index) {
+/* A new environment. */
+MILD_HD_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape shape, uint64_t seed,
+                                   uint32_t index) {
     const uint32_t held = task_frames_held(def);
     memset(env, 0, task_env_head_bytes(&shape, held));
     env->shape = shape;
     env->held = held;
-    set_gains(env, gains);
     env->seed = seed;
     env->index = index;
     env->step_limit = (uint32_t)(def->episode / TASK_PERIOD + 0.5);
     env->assist_level = 1;
 }
 
-TASK_FN TaskProgress task_progress(const TaskEnv *env) {
+/* What an environment keeps, and back, before a new episode. */
+MILD_HD_FN TaskProgress task_progress(const TaskEnv *env) {
     const TaskProgress kept = {env->assist_level, env->tick};
     return kept;
 }
 
-TASK_FN void task_set_progress(TaskEnv *env, TaskProgress kept) {
+MILD_HD_FN void task_set_progress(TaskEnv *env, TaskProgress kept) {
     env->assist_level = kept.assist_level;
     env->tick = env->tick_first = (uint32_t)kept.tick;
 }
 
 /* ---- start of an episode ---- */
 
-/* depth: [m] how deep the feet stand in this ground, so that episodes start neither in the air nor
- * buried. */
-MILD_HD_FN void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot, double depth) {
+MILD_HD_FN void task_draw_start(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
+                                double height, double depth) {
     const RandomizeDef *z = &def->randomize;
-    Random r = random_at(env->seed ^ RANDOM_USE_START, env->index, env->tick);
-    const double *pose = robot_default_pose(robot);
-    double yaw = env->command_frozen ? 0 : PI * (2 * random_unit(&r) - 1);
-    env->robot.qpos[2] = env->terrain.height + robot_stand_height(robot) - depth + 0.002;
+    Random r = random_at(env->seed ^ TASK_RANDOM_START, env->index, env->tick);
+    const double *pose = robot->default_pose;
+    double yaw = env->command_frozen ? 0 : TASK_PI * (2 * random_unit(&r) - 1);
+    env->robot.qpos[2] = height + robot->stand_height - depth + 0.002;
     env->robot.qpos[3] = task_cos(0.5 * yaw);
     env->robot.qpos[6] = task_sin(0.5 * yaw);
     for (int i = task_lane(); i < env->shape.joints; i += TASK_LANES) {
         Random own = random_after(r, i);
         double q = pose[i] + z->initial_joint * (2 * random_unit(&own) - 1);
-        env->robot.qpos[7 + i] =
-            fmin(fmax(q, robot_joint_low(robot)[i]), robot_joint_high(robot)[i]);
+        env->robot.qpos[7 + i] = fmin(fmax(q, robot->joint_low[i]), robot->joint_high[i]);
     }
     r = random_after(r, env->shape.joints);
     for (int i = task_lane(); i < 6; i += TASK_LANES) {
@@ -115,14 +87,14 @@ MILD_HD_FN void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot,
     env->step_first = env->step;
 }
 
-MILD_HD_FN void see_command(TaskEnv *env) {
+MILD_HD_FN void task_see_command(TaskEnv *env) {
     for (int i = 0; i < 3; i++) {
         env->command_seen[i] = env->command[i];
     }
 }
 
 /* What an episode knows of the one before, and its command. */
-MILD_HD_FN void clear(TaskEnv *env, const TaskDef *def) {
+MILD_HD_FN void task_clear_episode(TaskEnv *env, const TaskDef *def) {
     task_clear(&env->robot, sizeof env->robot);
     task_clear(env->action, sizeof env->action);
     task_clear(env->air_time, sizeof env->air_time);
@@ -135,28 +107,32 @@ MILD_HD_FN void clear(TaskEnv *env, const TaskDef *def) {
         task_draw_command(env, def);
     }
     task_lanes_sync();
-    see_command(env);
+    task_see_command(env);
 }
 
-TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                double depth) {
-    clear(env, def);
+/* An episode on what has been drawn (randomize.h). height: [m] of the ground; depth: [m] how deep
+ * the feet stand in it, so that episodes start neither in the air nor buried. */
+MILD_HD_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
+                                   double height, double depth) {
+    task_clear_episode(env, def);
     task_lanes_sync();
-    draw_start(env, def, robot, depth);
+    task_draw_start(env, def, robot, height, depth);
     task_lanes_sync();
 }
 
-TASK_FN void task_first_reading(TaskEnv *env, const RobotSim *sim, TaskReading *reading) {
+/* What the sensors say in the first pose of an episode. */
+MILD_HD_FN void task_first_sensors(TaskEnv *env, const RobotReading *reading,
+                                   TaskSensors *sensors) {
     for (int i = 0; i < 6; i++) {
-        env->base_twist[i] = robot_sim_qvel(sim)[i];
+        env->base_twist[i] = env->robot.qvel[i];
     }
-    task_read_imu(sim, reading);
-    task_read_motors(sim, reading);
+    task_read_imu(reading->rotation, env->robot.qvel, sensors);
+    task_read_motors(env->robot.qpos + 7, env->robot.qvel + 6, sensors);
 }
 
 /* ---- before the physics ---- */
 
-MILD_HD_FN void accept_action(TaskEnv *env, const TaskDef *def, const float *action) {
+MILD_HD_FN void task_accept_action(TaskEnv *env, const TaskDef *def, const float *action) {
     float limit = (float)def->action_clip;
     for (int i = task_lane(); i < env->shape.actions; i += TASK_LANES) {
         float a = action[i];
@@ -166,7 +142,7 @@ MILD_HD_FN void accept_action(TaskEnv *env, const TaskDef *def, const float *act
     }
 }
 
-MILD_HD_FN void push_base(TaskEnv *env, const TaskDef *def) {
+MILD_HD_FN void task_push_base(TaskEnv *env, const TaskDef *def) {
     const RandomizeDef *z = &def->randomize;
     for (int i = task_lane(); i < 6; i += TASK_LANES) {
         env->push[i] *= 0.95;
@@ -175,7 +151,7 @@ MILD_HD_FN void push_base(TaskEnv *env, const TaskDef *def) {
     if (interval == 0 || env->step == 0 || (env->step + env->index * 97u) % interval != 0) {
         return;
     }
-    Random r = random_at(env->seed ^ RANDOM_USE_PUSH, env->index, env->tick);
+    Random r = random_at(env->seed ^ TASK_RANDOM_PUSH, env->index, env->tick);
     for (int i = task_lane(); i < 6; i += TASK_LANES) {
         Random own = random_after(r, i);
         double size = i == 2 ? 0 : i < 3 ? z->push_linear : z->push_angular;
@@ -184,58 +160,64 @@ MILD_HD_FN void push_base(TaskEnv *env, const TaskDef *def) {
     }
 }
 
-TASK_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const float *action) {
-    accept_action(env, def, action);
-    push_base(env, def);
+/* What comes before the physics steps of a policy step. */
+MILD_HD_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const float *action) {
+    task_accept_action(env, def, action);
+    task_push_base(env, def);
 }
 
 /* ---- motors ---- */
 
-TASK_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Robot *robot, int i) {
-    const TaskGains *gains = gains_of(env);
+/* The motor of joint i during a policy step. */
+MILD_HD_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const RobotTable *robot,
+                                const TaskGains *gains, int i) {
     TaskMotor motor;
     double rest = task_assist_pose(env, def, robot, i), scale = task_action_scale(def, robot);
     for (int late = 0; late < 2; late++) {
         motor.target[late] = rest + scale * (double)env->action[late][i] + env->motor_offset[i];
     }
-    motor.kp = env->strength[i] * TASK_REAL(gains->kp[i]) * env->kp_scale[i];
-    motor.kd = env->strength[i] * TASK_REAL(gains->kd[i]) * env->kd_scale[i];
-    motor.limit = def->torque_share * robot_effort(robot)[i];
-    motor.fastest = robot_speed(robot)[i];
+    motor.kp = env->strength[i] * REAL(gains->kp[i]) * env->kp_scale[i];
+    motor.kd = env->strength[i] * REAL(gains->kd[i]) * env->kd_scale[i];
+    motor.limit = def->torque_share * robot->effort[i];
+    motor.fastest = robot->speed[i];
     return motor;
 }
 
-/* tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). A motor at its speed limit gives
+/* [N m] Torque at angle q and speed qd. late: bool, the last action still counts.
+ *
+ * tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). A motor at its speed limit gives
  * no torque in the direction of motion. */
-TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd) {
+MILD_HD_FN double task_torque(const TaskMotor *motor, int late, double q, double qd) {
     double tau = motor->kp * (motor->target[late] - q) - motor->kd * qd;
     tau = tau > motor->limit ? motor->limit : tau < -motor->limit ? -motor->limit : tau;
     int over = motor->fastest > 0 && fabs(qd) >= motor->fastest && tau * qd > 0;
     return over ? 0 : tau;
 }
 
-/* With torque_hold the torque is computed when the action arrives, after lag_command steps, and
+/* Bool: physics step k of `steps` computes torques anew; else those of the step before go on, which
+ * env->torque has kept.
+ *
+ * With torque_hold the torque is computed when the action arrives, after lag_command steps, and
  * held for a whole policy period. A new episode has none to hold. */
-TASK_FN int task_motors_act(const TaskEnv *env, const TaskDef *def, int k, int steps) {
+MILD_HD_FN int task_motors_act(const TaskEnv *env, const TaskDef *def, int k, int steps) {
     const int begins = k == 0 && env->step == env->step_first;
     return !def->torque_hold || begins || k == env->lag_command % steps;
 }
 
 /* ---- after the physics ---- */
 
-MILD_HD_FN void feet_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                            const RobotSim *sim, TaskMotion *m) {
+MILD_HD_FN void task_feet_motion(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
+                                 const RobotReading *reading, TaskMotion *m) {
     const double half_period = 0.5 * task_gait_period(def, env->command_seen);
-    TaskReal stance_height = 0;
+    Real stance_height = 0;
     int stances = 0;
     for (int f = 0; f < env->shape.feet; f++) {
-        const RobotFoot *foot = robot_sim_foot(sim, f);
-        const TaskReal *v = foot->sole_center_velocity, *force = foot->force;
-        m->foot_height[f] = foot->sole_height;
+        const Real *v = reading->foot[f].sole_center_velocity, *force = reading->foot[f].force;
+        m->foot_height[f] = reading->foot[f].sole_height;
         m->foot_speed[f] = task_sqrt(v[0] * v[0] + v[1] * v[1]);
         m->foot_force[f] =
             task_sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
-        m->contact[f] = force[2] > CONTACT_FORCE;
+        m->contact[f] = force[2] > TASK_CONTACT_FORCE;
         m->stance[f] = task_gait_stance(robot, env->phase, m->standing, f);
         m->either[f] = task_gait_either(def, robot, env->phase, m->standing, f);
         m->wanted_height[f] = task_gait_height(def, robot, env->phase, m->standing, f);
@@ -243,26 +225,30 @@ MILD_HD_FN void feet_motion(TaskEnv *env, const TaskDef *def, const Robot *robot
             m->landed_air_time += fmin((double)env->air_time[f], half_period);
         }
         if (m->stance[f]) {
-            stance_height += foot->sole_center[2];
+            stance_height += reading->foot[f].sole_center[2];
             stances++;
         }
     }
-    m->base_height = robot_sim_qpos(sim)[2] - stance_height / (TaskReal)(stances ? stances : 1);
+    m->base_height = env->robot.qpos[2] - stance_height / (Real)(stances ? stances : 1);
     task_lanes_sync();
     for (int f = task_lane(); f < env->shape.feet; f += TASK_LANES) {
-        env->air_time[f] = m->contact[f] ? 0 : env->air_time[f] + TASK_REAL(TASK_PERIOD);
+        env->air_time[f] = m->contact[f] ? 0 : env->air_time[f] + REAL(TASK_PERIOD);
     }
 }
 
-TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                        const RobotSim *sim, const TaskReal *torque) {
+/* Describes the policy step just made. env still has the base twist, joint speeds, smoothed
+ * velocity and air times of the previous step, which are updated. torque: [joints] of the last
+ * physics step. */
+MILD_HD_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def,
+                                           const RobotTable *robot, const RobotReading *reading,
+                                           const Real *torque) {
     TaskMotion m;
     memset(&m, 0, sizeof m);
     m.def = def, m.robot = robot, m.env = env;
-    const TaskReal *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
-    TaskReal length = task_sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3]);
-    TaskReal c = length > 0 ? rotation[0] / length : 1, s = length > 0 ? rotation[3] / length : 0;
-    TaskReal twist[6], change = 0;
+    const Real *rotation = reading->rotation, *qvel = env->robot.qvel;
+    Real length = task_sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3]);
+    Real c = length > 0 ? rotation[0] / length : 1, s = length > 0 ? rotation[3] / length : 0;
+    Real twist[6], change = 0;
     m.standing = task_is_standing(def, env->command);
     m.velocity[0] = c * qvel[0] + s * qvel[1];
     m.velocity[1] = -s * qvel[0] + c * qvel[1];
@@ -281,14 +267,14 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     m.twist_change = task_sqrt(change);
     task_lanes_sync();
     for (int i = task_lane(); i < 3; i += TASK_LANES) {
-        const TaskReal now = i < 2 ? m.velocity[i] : m.omega[2];
-        env->smooth_velocity[i] += TASK_REAL(TASK_PERIOD) / TASK_REAL(def->reward.tracking_time) *
-                                   (now - env->smooth_velocity[i]);
+        const Real now = i < 2 ? m.velocity[i] : m.omega[2];
+        env->smooth_velocity[i] +=
+            REAL(TASK_PERIOD) / REAL(def->reward.tracking_time) * (now - env->smooth_velocity[i]);
     }
     for (int i = task_lane(); i < 6; i += TASK_LANES) {
         env->base_twist[i] = twist[i];
     }
-    const TaskReal *q = robot_sim_qpos(sim) + 7;
+    const Real *q = env->robot.qpos + 7;
     for (int i = task_lane(); i < env->shape.joints; i += TASK_LANES) {
         m.q[i] = q[i];
         m.qd[i] = qvel[6 + i];
@@ -296,9 +282,9 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
         env->joint_speed[i] = m.qd[i];
         m.torque[i] = torque[i];
     }
-    m.foot_distance = robot_sim_foot_distance(sim);
-    m.knee_distance = robot_sim_knee_distance(sim);
-    feet_motion(env, def, robot, sim, &m);
+    m.foot_distance = reading->foot_distance;
+    m.knee_distance = reading->knee_distance;
+    task_feet_motion(env, def, robot, reading, &m);
     task_lanes_sync();
     return m;
 }
@@ -306,40 +292,42 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
 /* Bool: the base tilts too much, a shell touches the ground or is too deep in soft ground, or a
  * foot has passed through the other leg, because the engine computes no contact between the
  * legs. */
-MILD_HD_FN int has_fallen(const TaskEnv *env, const TaskDef *def, const RobotSim *sim) {
+MILD_HD_FN int task_has_fallen(const TaskEnv *env, const TaskDef *def,
+                               const RobotReading *reading) {
     const double depth = env->variation.rigid ? 0 : def->shell_depth;
-    return robot_sim_foot_distance(sim) < def->crossing_limit ||
-           robot_sim_base_rotation(sim)[8] < task_cos(def->tilt_limit) ||
-           robot_sim_body_clearance(sim, &env->terrain) < -depth;
+    return reading->foot_distance < def->crossing_limit ||
+           reading->rotation[8] < task_cos(def->tilt_limit) || reading->body_clearance < -depth;
 }
 
-TASK_FN void task_advance_clock(TaskEnv *env, const TaskDef *def) {
+/* One policy step on the clocks of the episode: the phase, the command that the policy sees and, if
+ * the caller does not set it, a new command. */
+MILD_HD_FN void task_advance_clock(TaskEnv *env, const TaskDef *def) {
     env->tick++;
     env->step++;
     env->phase += TASK_PERIOD / task_gait_period(def, env->command_seen);
     env->phase -= floor(env->phase);
-    see_command(env);
+    task_see_command(env);
     uint32_t interval = (uint32_t)(def->command_interval / TASK_PERIOD + 0.5);
     if (!env->command_frozen && interval && env->step % interval == 0) {
         task_draw_command(env, def);
     }
 }
 
-MILD_HD_FN void report_episode(const TaskEnv *env, TaskStep *out) {
+MILD_HD_FN void task_report_episode(const TaskEnv *env, TaskStep *out) {
     out->length = env->step - env->step_first;
     out->episode_reward = (float)env->reward_sum;
     out->episode_speed_error =
-        (float)(env->speed_error_sum / (out->length ? (TaskReal)out->length : 1));
+        (float)(env->speed_error_sum / (out->length ? (Real)out->length : 1));
     for (int i = 0; i < TASK_REWARD_COUNT; i++) {
         out->episode_terms[i] = (float)env->term_sum[i];
     }
 }
 
 /* Computes the reward of the step just made. Returns 0 when it is not finite. */
-MILD_HD_FN int take_reward(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                           const RobotSim *sim, const TaskReal *torque, float *reward) {
-    TaskReal terms[TASK_REWARD_COUNT];
-    TaskMotion motion = task_describe_motion(env, def, robot, sim, torque);
+MILD_HD_FN int task_take_reward(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
+                                const RobotReading *reading, const Real *torque, float *reward) {
+    Real terms[TASK_REWARD_COUNT];
+    TaskMotion motion = task_describe_motion(env, def, robot, reading, torque);
     *reward = (float)task_reward(&motion, terms);
     if (!isfinite(*reward)) {
         return 0;
@@ -347,24 +335,26 @@ MILD_HD_FN int take_reward(TaskEnv *env, const TaskDef *def, const Robot *robot,
     if (task_lane() == 0) {
         env->speed_error_sum += hypot(env->smooth_velocity[0] - env->command[0],
                                       env->smooth_velocity[1] - env->command[1]);
-        env->reward_sum += (TaskReal)*reward;
+        env->reward_sum += (Real)*reward;
     }
     for (int i = task_lane(); i < TASK_REWARD_COUNT; i += TASK_LANES) {
-        env->term_sum[i] += terms[i] * TASK_REAL(TASK_PERIOD);
+        env->term_sum[i] += terms[i] * REAL(TASK_PERIOD);
     }
     return 1;
 }
 
-TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                               const RobotSim *sim, const TaskReal *torque, int diverged) {
+/* What comes after the physics steps. torque: [joints] of the last one. diverged: bool, they broke
+ * off, and the reading is of no use. */
+MILD_HD_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
+                                  const RobotReading *reading, const Real *torque, int diverged) {
     TaskStep out;
     memset(&out, 0, sizeof out);
-    int bad = diverged || !take_reward(env, def, robot, sim, torque, &out.reward);
+    int bad = diverged || !task_take_reward(env, def, robot, reading, torque, &out.reward);
     if (bad) {
         out.reward = 0;
     }
     out.valid = !bad;
-    int fallen = bad || has_fallen(env, def, sim);
+    int fallen = bad || task_has_fallen(env, def, reading);
     task_lanes_sync();
     if (task_lane() == 0) {
         task_advance_clock(env, def);
@@ -374,7 +364,9 @@ TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *ro
     out.timeout = !fallen && env->step >= env->step_limit;
     out.done = fallen || out.timeout;
     if (out.done) {
-        report_episode(env, &out);
+        task_report_episode(env, &out);
     }
     return out;
 }
+
+#endif

@@ -6,13 +6,16 @@
  * robot decays while it stays on its feet and rises when it falls. It settles where episodes last
  * about four seconds, and goes to 0 as they last longer. There is no assistance in evaluation
  * (task_def_make_nominal), where actions are deviations from the constant default pose. */
+#ifndef TASK_ASSIST_H
+#define TASK_ASSIST_H
+
 #include <math.h>
 
-#include "env/task/task.h"
+#include "env/task/gait.h"
 
 /* Key assist of robot.ini: stiffness and damping against tilt, gain towards the commanded velocity,
  * and the limit of that force. With a larger force a robot would learn to lean on it. */
-enum { HAND_TILT, HAND_DAMPING, HAND_DRAW, HAND_LIMIT };
+enum { ASSIST_HAND_TILT, ASSIST_HAND_DAMPING, ASSIST_HAND_DRAW, ASSIST_HAND_LIMIT };
 #define ASSIST_WEIGHT 0.5 /* [-] share of the weight that full assistance carries */
 #define ASSIST_LEAD                                                                                \
     1.3 /* [-] scale of the reference gait, because the joints lag behind their targets */
@@ -20,15 +23,16 @@ enum { HAND_TILT, HAND_DAMPING, HAND_DRAW, HAND_LIMIT };
 #define ASSIST_DECAY 8.0  /* [s] */
 #define ASSIST_RISE 1.3   /* [-] at a fall */
 #define ASSIST_LEAST 0.01 /* [-] added at a fall */
-#define GRAVITY 9.81
+#define ASSIST_GRAVITY 9.81
 
-TASK_FN double task_assist_share(const TaskEnv *env, const TaskDef *def) {
+/* [-] Share of full assistance that the environment has. */
+MILD_HD_FN double task_assist_share(const TaskEnv *env, const TaskDef *def) {
     return def->assist ? env->assist_level * env->assist_draw : 0;
 }
 
 /* Updates the level after a policy step. The level is steady when the robot falls every
  * ASSIST_GRACE + ASSIST_DECAY ln(ASSIST_RISE) seconds. */
-TASK_FN void task_assist_adapt(TaskEnv *env, int fallen) {
+MILD_HD_FN void task_assist_adapt(TaskEnv *env, int fallen) {
     if (fallen) {
         env->assist_level = fmin(1.0, ASSIST_RISE * env->assist_level + ASSIST_LEAST);
     } else if ((env->step - env->step_first) * TASK_PERIOD > ASSIST_GRACE) {
@@ -36,8 +40,11 @@ TASK_FN void task_assist_adapt(TaskEnv *env, int fallen) {
     }
 }
 
-TASK_FN double task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, int i) {
-    double share = task_assist_share(env, def), rest = robot_default_pose(robot)[i];
+/* [rad] What the action of joint i is added to: the angle of the default pose, moved along the
+ * reference gait while there is assistance. */
+MILD_HD_FN double task_assist_pose(const TaskEnv *env, const TaskDef *def, const RobotTable *robot,
+                                   int i) {
+    double share = task_assist_share(env, def), rest = robot->default_pose[i];
     if (share == 0) {
         return rest;
     }
@@ -46,31 +53,35 @@ TASK_FN double task_assist_pose(const TaskEnv *env, const TaskDef *def, const Ro
     return rest + share * ASSIST_LEAD * (reference - rest);
 }
 
-TASK_FN int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot,
-                        const TaskReal *rotation, const TaskReal *qvel, TaskReal wrench[6]) {
+/* Writes force and torque on the base, world, and returns 0 when there is none. rotation: [9] of
+ * the base; qvel: [6] its twist. */
+MILD_HD_FN int task_assist(const TaskEnv *env, const TaskDef *def, const RobotTable *robot,
+                           const Real *rotation, const Real *qvel, Real wrench[6]) {
     double share = task_assist_share(env, def);
     if (share == 0) {
         return 0;
     }
-    const TaskReal *turn = rotation, *v = qvel;
+    const Real *turn = rotation, *v = qvel;
     double length = task_sqrt(turn[0] * turn[0] + turn[3] * turn[3]);
     double c = length > 0 ? turn[0] / length : 1, s = length > 0 ? turn[3] / length : 0;
-    const double *hand = robot_assist(robot);
+    const double *hand = robot->assist;
     double wanted[2] = {c * env->command[0] - s * env->command[1],
                         s * env->command[0] + c * env->command[1]};
     for (int i = 0; i < 2; i++) {
-        double pull = hand[HAND_DRAW] * (wanted[i] - v[i]);
-        wrench[i] = share * fmin(fmax(pull, -hand[HAND_LIMIT]), hand[HAND_LIMIT]);
+        double pull = hand[ASSIST_HAND_DRAW] * (wanted[i] - v[i]);
+        wrench[i] = share * fmin(fmax(pull, -hand[ASSIST_HAND_LIMIT]), hand[ASSIST_HAND_LIMIT]);
     }
-    wrench[2] = share * ASSIST_WEIGHT * GRAVITY * robot_total_mass(robot);
+    wrench[2] = share * ASSIST_WEIGHT * ASSIST_GRAVITY * robot->total_mass;
     /* The base's z axis in the world is u = (turn[2], turn[5], turn[8]); u x e_z turns it upright.
      */
     double omega[3];
     for (int i = 0; i < 3; i++) {
         omega[i] = turn[3 * i] * v[3] + turn[3 * i + 1] * v[4] + turn[3 * i + 2] * v[5];
     }
-    wrench[3] = share * (hand[HAND_TILT] * turn[5] - hand[HAND_DAMPING] * omega[0]);
-    wrench[4] = share * (-hand[HAND_TILT] * turn[2] - hand[HAND_DAMPING] * omega[1]);
+    wrench[3] = share * (hand[ASSIST_HAND_TILT] * turn[5] - hand[ASSIST_HAND_DAMPING] * omega[0]);
+    wrench[4] = share * (-hand[ASSIST_HAND_TILT] * turn[2] - hand[ASSIST_HAND_DAMPING] * omega[1]);
     wrench[5] = 0;
     return 1;
 }
+
+#endif

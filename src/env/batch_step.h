@@ -1,4 +1,5 @@
-/* A policy step of one environment in the batch engine, for batch_host.c and batch_device.cu.
+/* A policy step of one environment in the batch engine, compiled for the CPU by batch_host.c and
+ * for a GPU by batch_device.cu, for any robot or for one size alone.
  *
  *     env_part(0)      a warp: action, and the first physics step up to the ground
  *     mild_batch_step    the ground
@@ -11,60 +12,20 @@
  *
  * Engine and ground are kernels of their own, because a GPU reads its instructions from a small
  * cache, and the two together are far too large for it. */
-#include "robot/engine/model.h"
+#ifndef ENVS_BATCH_STEP_H
+#define ENVS_BATCH_STEP_H
 
-#define TASK_ON_DEVICE
-#define TASK_JOINTS ENGINE_JOINTS
-#define TASK_FEET ENGINE_FEET
-#include "env/batch_task.h"
-
-#include "env/batch_arrays.h"
+#include "env/batch_env.h"
+#include "env/batch_sample.h"
+#include "env/task/step.h"
 #include "robot/engine/measure.h"
-#include "robot/engine/saved.h"
 #include "robot/engine/step.h"
 
-/* Of one environment besides its TaskEnv. */
-typedef struct {
-    alignas(16) EngineSaved saved; /* between the parts of a step */
-    RobotSim sim;
-    TaskReading reading;
-    TaskReal tally[TALLY_KEPT];
-    int diverged; /* bool: in this policy step */
-} EnvRobot;
-
-/* What a warp has in shared memory. */
-typedef struct {
-    EngineWork work;
-    EngineVariation variation;
-    TaskMotor motor[ENGINE_JOINTS];
-    Real torque[ENGINE_JOINTS]; /* [N m] in the order of robot.ini */
-    Real push[6];               /* [N, N m] at the base's centre of mass, world */
-    Real qpos[7 + ENGINE_JOINTS];
-    Real qvel[6 + ENGINE_JOINTS];
-    Real corner[ENGINE_CORNERS]; /* [m] depth of the corners in rigid ground */
-} EnvWork;
-
-MILD_HD TaskEnv *env_at(const EnvsArrays *all, long robot) {
-    return (TaskEnv *)(void *)(all->env + (size_t)robot * all->stride);
-}
-
-MILD_HD EnvRobot *env_robot_at(const EnvsArrays *all, long robot) {
-    return (EnvRobot *)all->robot + robot;
-}
-
-MILD_HD RobotSim *env_sim_at(const EnvsArrays *all, long robot) {
-    return &env_robot_at(all, robot)->sim;
-}
-
 /* What is under a robot. */
-MILD_HD EngineGround env_surface(const EnvsArrays *all, long robot, const TaskEnv *env) {
+MILD_HD EngineGround env_surface(const EnvsArrays *all, long robot) {
     const EngineGround ground = {all->task->has_map ? &all->task->map : NULL,
-                                 all->map_origin + 2 * robot, (Real)env->terrain.height};
+                                 all->map_origin + 2 * robot, 0};
     return ground;
-}
-
-MILD_HD int env_physics_steps(const EnvsTask *task) {
-    return (int)(TASK_PERIOD / task->task.physics_dt + 0.5);
 }
 
 /* [B] Of a TaskEnv and its frames. */
@@ -72,47 +33,46 @@ MILD_HD size_t env_stride(const TaskDef *def, const TaskShape *shape) {
     return task_env_head_bytes(shape, task_frames_held(def));
 }
 
-/* ---- ground of an episode, for randomize.c ---- */
+/* ---- ground of an episode ---- */
 
-/* The block that a task is part of. */
-MILD_HD_FN const EnvsTask *envs_task_of(const TaskDef *def) {
-    return (const EnvsTask *)(const void *)def;
+MILD_HD_FN void env_draw_label(const EnvsTask *task, TaskEnv *env, Random *r, int label) {
+    env->ground[label] = (int)random_index(r, (uint32_t)task->grounds);
 }
 
-MILD_HD_FN void draw_label(TaskEnv *env, const TaskDef *def, Random *r, int label) {
-    env->ground[label] = (int)random_index(r, (uint32_t)envs_task_of(def)->grounds);
-}
-
-/* As that of the CPU, but that stripes are labels of the map: EnvsTask.striped. */
-TASK_FN void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r) {
-    (void)robot;
-    const EnvsTask *task = envs_task_of(def);
-    env->terrain.height = env->terrain.map_x = env->terrain.map_y = 0;
-    draw_label(env, def, r, 0);
-    const int striped = random_unit(r) < def->randomize.patch_share;
+/* As task_draw_ground of the CPU, but that stripes are labels of the map: EnvsTask.striped. */
+MILD_HD_FN void env_draw_ground(const EnvsTask *task, TaskEnv *env, Random *r) {
+    env_draw_label(task, env, r, 0);
+    const int striped = random_unit(r) < task->task.randomize.patch_share;
     for (int label = 1; task->striped && label < task->labels; label++) {
         env->ground[label] = env->ground[0];
         if (striped) {
-            draw_label(env, def, r, label);
+            env_draw_label(task, env, r, label);
         }
     }
 }
 
-TASK_FN void task_draw_on_map(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r) {
-    (void)robot;
-    const EnvsTask *task = envs_task_of(def);
-    env->terrain.map_x = spread(r, 0.5 * task->map_extent[0]);
-    env->terrain.map_y = spread(r, 0.5 * task->map_extent[1]);
+/* As task_draw_on_map of the CPU. origin: [2] [m] */
+MILD_HD_FN void env_draw_on_map(const EnvsTask *task, TaskEnv *env, Real *origin) {
+    Random r = task_map_random(env);
+    origin[0] = (Real)task_spread(&r, 0.5 * task->map_extent[0]);
+    origin[1] = (Real)task_spread(&r, 0.5 * task->map_extent[1]);
     for (int label = 1; !task->striped && label < task->labels; label++) {
-        draw_label(env, def, r, label);
+        env_draw_label(task, env, &r, label);
     }
 }
 
-TASK_FN const float *task_ground_under(const TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                       const RobotSim *sim, float *buffer) {
-    (void)robot;
-    (void)buffer;
-    return envs_task_of(def)->ground[env->ground[sim->label]].numbers;
+/* Draws all of an episode but its start. */
+MILD_HD_FN void env_draw(const EnvsArrays *all, long robot, TaskEnv *env) {
+    const EnvsTask *task = all->task;
+    Real *origin = all->map_origin + 2 * robot;
+    Random r = task_draw_contact(env, &task->task);
+    env_draw_ground(task, env, &r);
+    task_draw_robot(env, &task->task, r);
+    origin[0] = origin[1] = 0;
+    if (task->task.map) {
+        env_draw_on_map(task, env, origin);
+    }
+    task_lanes_sync();
 }
 
 /* ---- from and to TaskEnv ---- */
@@ -151,22 +111,22 @@ WARP_FN void env_store(const EngineModel *model, EnvWork *place, TaskEnv *env) {
 
 /* What sensors read now, as task_read_imu and task_read_motors. */
 WARP_FN void env_read(const EngineModel *model, const TaskEnv *env, int steps_left,
-                      const EngineWork *work, TaskReading *reading) {
+                      const EngineWork *work, TaskSensors *sensors) {
     const EngineTree *tree = &model->tree;
     EACH_LANE(l) {
         if (steps_left == env->lag_imu && LANE(l) == 0) {
             Real R[9];
             quaternion_matrix(work->quaternion, R);
             for (int k = 0; k < 3; k++) {
-                reading->omega[k] = work->rate[3 + k];
-                reading->gravity[k] = -R[6 + k];
+                sensors->omega[k] = work->rate[3 + k];
+                sensors->gravity[k] = -R[6 + k];
             }
         }
         LANE_ROLLED
         for (int i = 1 + LANE(l); steps_left == env->lag_motor && i < engine_links(tree);
              i += LANES) {
-            reading->q[tree->joint[i]] = work->angle[i];
-            reading->qd[tree->joint[i]] = work->rate[5 + i];
+            sensors->q[tree->joint[i]] = work->angle[i];
+            sensors->qd[tree->joint[i]] = work->rate[5 + i];
         }
     }
     lanes_sync();
@@ -178,7 +138,7 @@ WARP_FN void env_read(const EngineModel *model, const TaskEnv *env, int steps_le
 MILD_HD void env_assist(const EnvsTask *task, const TaskEnv *env, EnvWork *place) {
     const EngineWork *work = &place->work;
     Real R[9];
-    TaskReal wrench[6];
+    Real wrench[6];
     quaternion_matrix(work->quaternion, R);
     task_assist(env, &task->task, &task->robot, R, work->rate, wrench);
     for (int d = 0; d < 6; d++) {
@@ -225,7 +185,7 @@ MILD_HD Real env_corner_depth(const EngineModel *model, const EnvWork *place, in
     return pushing > 0 ? sum / pushing : 0;
 }
 
-MILD_HD EngineRigid env_contact(const RobotVariation *variation) {
+MILD_HD EngineRigid env_contact(const TaskVariation *variation) {
     const EngineRigid rigid = {(Real)variation->rigid_friction, (Real)variation->rigid_time};
     return rigid;
 }
@@ -295,28 +255,28 @@ WARP_FN void env_import(const EnvsArrays *all, long robot, EngineWork *work) {
 }
 
 MILD_HD void env_measure_foot(const EngineModel *model, const EnvWork *place, int f, int contact,
-                              Real lowest, Real depth, RobotFoot *foot) {
+                              Real lowest, Real depth, RobotReading *reading) {
     const EngineWork *work = &place->work;
     Real center[3], velocity[3];
     sole_center(model, work, f, center, velocity);
     for (int k = 0; k < 3; k++) {
-        foot->sole_center[k] = center[k];
-        foot->sole_center_velocity[k] = velocity[k];
-        foot->force[k] = contact ? work->wrench[f][k] : 0;
+        reading->foot[f].sole_center[k] = center[k];
+        reading->foot[f].sole_center_velocity[k] = velocity[k];
+        reading->foot[f].force[k] = contact ? work->wrench[f][k] : 0;
     }
-    foot->result.depth_mean = contact ? depth : 0;
-    foot->sole_height = lowest;
+    reading->foot[f].depth_mean = contact ? depth : 0;
+    reading->foot[f].sole_height = lowest;
 }
 
 /* What the task asks of the pose. contact: bool, with forces and torques of the last physics
  * step. */
 WARP_FN void env_measure(const EnvsArrays *all, long robot, int contact, EnvWork *place) {
-    const TaskEnv *env = env_at(all, robot);
-    RobotSim *sim = env_sim_at(all, robot);
+    EnvRobot *own = env_robot_at(all, robot);
+    RobotReading *reading = &own->reading;
     const EngineModel *model = all->model;
     const EngineWork *work = &place->work;
     const int feet = engine_feet(&model->tree);
-    const EngineGround ground = env_surface(all, robot, env);
+    const EngineGround ground = env_surface(all, robot);
     Real lowest[LANE_COPIES]; /* of the lane's foot */
     LANE_ROLLED
     for (int f = 0; f < feet; f++) {
@@ -328,29 +288,27 @@ WARP_FN void env_measure(const EnvsArrays *all, long robot, int contact, EnvWork
     EACH_LANE(l) {
         if (LANE(l) < feet) {
             env_measure_foot(model, place, LANE(l), contact, lowest[l],
-                             all->contact.foot[robot * feet + LANE(l)].depth_mean,
-                             &sim->foot[LANE(l)]);
+                             all->contact.foot[robot * feet + LANE(l)].depth_mean, reading);
         }
     }
     const Real clearance = engine_body_clearance_on(model, work, &ground);
     EACH_LANE(l) {
         if (LANE(l) == 0) {
-            sim->state = &env->robot;
-            sim->body_clearance = clearance;
+            reading->body_clearance = clearance;
         }
         if (LANE(l) == 3) {
             const MapSpot spot = engine_spot(&ground, work);
-            sim->above = work->base[2] - engine_surface(&ground, work, &spot, 0, 0).height;
-            sim->label = ground.map ? map_label_near(ground.map, &spot, 0, 0) : 0;
+            reading->above = work->base[2] - engine_surface(&ground, work, &spot, 0, 0).height;
+            own->label = ground.map ? map_label_near(ground.map, &spot, 0, 0) : 0;
         }
         if (LANE(l) == 1) {
-            sim->knee_distance = knee_distance(model, work);
+            reading->knee_distance = knee_distance(model, work);
         }
         if (LANE(l) == 2) {
-            sim->foot_distance = foot_distance(model, work);
+            reading->foot_distance = foot_distance(model, work);
         }
         for (int k = LANE(l); k < 9; k += LANES) {
-            sim->rotation[k] = work->rotation[0][k];
+            reading->rotation[k] = work->rotation[0][k];
         }
     }
     lanes_sync();
@@ -376,7 +334,7 @@ WARP_FN int env_finish_step(const EnvsArrays *all, long robot, const TaskEnv *en
     const int rigid = env->variation.rigid;
     const int feet = engine_feet(&model->tree);
     if (rigid) {
-        const EngineGround ground = env_surface(all, robot, env);
+        const EngineGround ground = env_surface(all, robot);
         env_rigid(model, env_contact(&env->variation), &ground, place);
     } else {
         env_import(all, robot, work);
@@ -396,7 +354,7 @@ WARP_FN int env_finish_step(const EnvsArrays *all, long robot, const TaskEnv *en
 }
 
 /* Numbers lane, lane + LANES ... of what differs from robot to robot. */
-MILD_HD void env_vary(const RobotVariation *from, EngineVariation *to, int links, int lane) {
+MILD_HD void env_vary(const TaskVariation *from, EngineVariation *to, int links, int lane) {
     if (lane == 0) {
         to->base_mass_add = from->base_mass_add;
         to->armature_scale = from->armature_scale;
@@ -418,12 +376,12 @@ WARP_FN void env_start_step(const EnvsArrays *all, long robot, int k, int steps,
     const int helped = task_assist_share(env, &task->task) != 0;
     const EngineAction action = {&place->variation, place->torque, helped ? place->push : NULL,
                                  env->variation.rigid};
-    env_read(model, env, steps - k, &place->work, &env_robot_at(all, robot)->reading);
+    env_read(model, env, steps - k, &place->work, &env_robot_at(all, robot)->sensors);
     if (k < steps) {
         EACH_LANE(l) {
             LANE_ROLLED
             for (int j = LANE(l); j < env->shape.joints; j += LANES) {
-                place->motor[j] = task_motor(env, &task->task, &task->robot, j);
+                place->motor[j] = task_motor(env, &task->task, &task->robot, &task->gains, j);
             }
             env_vary(&env->variation, &place->variation, 1 + env->shape.joints, LANE(l));
         }
@@ -433,8 +391,6 @@ WARP_FN void env_start_step(const EnvsArrays *all, long robot, int k, int steps,
     }
     engine_begin(model, k < steps ? &action : NULL, &place->work);
 }
-
-#include "env/batch_sample.inc"
 
 /* watched: bool, a constant: with the samples of an evaluation. */
 WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, int k, int watched,
@@ -487,7 +443,7 @@ WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, i
 WARP_FN void env_pose(const EnvsArrays *all, long robot, EnvWork *place) {
     TaskEnv *env = env_at(all, robot);
     const EngineModel *model = all->model;
-    const EngineGround ground = env_surface(all, robot, env);
+    const EngineGround ground = env_surface(all, robot);
     if (!all->fresh[robot]) {
         return;
     }
@@ -502,8 +458,7 @@ WARP_FN void env_pose(const EnvsArrays *all, long robot, EnvWork *place) {
         }
         EACH_LANE(l) {
             if (again && LANE(l) == 0) {
-                const double level =
-                    env->robot.qpos[2] - env->terrain.height - all->task->robot.stand_height;
+                const double level = env->robot.qpos[2] - all->task->robot.stand_height;
                 env->robot.qpos[2] += level - (double)lowest;
             }
         }
@@ -519,7 +474,7 @@ MILD_HD void env_create(const EnvsArrays *all, long robot) {
     const EnvsTask *task = all->task;
     if (task_lane() == 0) {
         memset(env_robot_at(all, robot), 0, sizeof(EnvRobot));
-        task_env_init_head(env_at(all, robot), &task->task, task->shape, &task->gains, task->seed,
+        task_env_init_head(env_at(all, robot), &task->task, task->shape, task->seed,
                            all->trial ? all->trial[robot].stream : task->first + (uint32_t)robot);
     }
 }
@@ -548,26 +503,24 @@ MILD_HD int env_first_label(const EnvsArrays *all, long robot) {
 MILD_HD void env_begin(const EnvsArrays *all, long robot) {
     const EnvsTask *task = all->task;
     TaskEnv *env = env_at(all, robot);
-    task_randomize(env, &task->task, &task->robot);
+    env_draw(all, robot, env);
     if (all->trial) {
         env_set_trial(all, robot, env);
     }
-    all->map_origin[2 * robot] = (Real)env->terrain.map_x;
-    all->map_origin[2 * robot + 1] = (Real)env->terrain.map_y;
     for (int label = 0; label < task->labels; label++) {
         all->material[robot * task->labels + label] = env->ground[label];
     }
     const int ground = env->ground[env_first_label(all, robot)];
-    task_begin_episode(env, &task->task, &task->robot,
+    task_begin_episode(env, &task->task, &task->robot, 0,
                        env->variation.rigid ? 0 : task->ground[ground].depth);
     task_clear(env_robot_at(all, robot)->saved.state + ENGINE_ACCELERATION,
                (size_t)engine_dofs(&all->model->tree) * sizeof(Real));
     all->fresh[robot] = 1;
     all->rigid[robot] = env->variation.rigid != 0;
-    all->contact.height[robot] = env->variation.rigid ? -ENVS_FAR : (Real)env->terrain.height;
+    all->contact.height[robot] = env->variation.rigid ? -ENVS_FAR : 0;
 }
 
-MILD_HD void env_count(TaskReal *tally, const TaskStep *step) {
+MILD_HD void env_count(Real *tally, const TaskStep *step) {
     tally[TALLY_DIVERGED] += !step->valid;
     tally[TALLY_STEPS] += 1;
     tally[TALLY_PAID] += step->reward;
@@ -589,7 +542,7 @@ MILD_HD double env_tally(const EnvsArrays *all, long robot, int n) {
     if (n == TALLY_ASSIST) {
         return task_assist_share(env_at(all, robot), &all->task->task);
     }
-    TaskReal *tally = env_robot_at(all, robot)->tally;
+    Real *tally = env_robot_at(all, robot)->tally;
     const double number = tally[n];
     tally[n] = 0;
     return number;
@@ -598,8 +551,8 @@ MILD_HD double env_tally(const EnvsArrays *all, long robot, int n) {
 MILD_HD void env_end(const EnvsArrays *all, const EnvsStep *call, long robot) {
     EnvRobot *own = env_robot_at(all, robot);
     TaskEnv *env = env_at(all, robot);
-    const TaskStep step = task_end_step(env, &all->task->task, &all->task->robot,
-                                        env_sim_at(all, robot), env->torque, own->diverged);
+    const TaskStep step = task_end_step(env, &all->task->task, &all->task->robot, &own->reading,
+                                        env->torque, own->diverged);
     if (task_lane() == 0) {
         call->reward[robot] = step.reward;
         call->done[robot] = step.done;
@@ -625,11 +578,13 @@ MILD_HD void env_observe(const EnvsArrays *all, const EnvsStep *call, long robot
                            env_row(call->next.estimate, robot, shape->estimates),
                            env_row(call->next.frame, robot, shape->observation)};
     const int fresh = all->fresh[robot];
-    const RobotSim *sim = env_sim_at(all, robot);
-    TaskReading *reading = &env_robot_at(all, robot)->reading;
+    EnvRobot *own = env_robot_at(all, robot);
     if (fresh && task_lane() == 0) {
-        task_first_reading(env, sim, reading);
+        task_first_sensors(env, &own->reading, &own->sensors);
     }
     task_lanes_sync();
-    task_observe(env, &all->task->task, &all->task->robot, sim, reading, fresh, &view);
+    task_observe(env, &all->task->task, &all->task->robot, &own->reading,
+                 all->task->ground[env->ground[own->label]].numbers, &own->sensors, fresh, &view);
 }
+
+#endif

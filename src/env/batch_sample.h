@@ -1,10 +1,14 @@
-/* What an evaluation chooses and measures, for batch_step.inc. */
+/* What an evaluation chooses and measures. */
+#ifndef ENVS_BATCH_SAMPLE_H
+#define ENVS_BATCH_SAMPLE_H
+
+#include "env/batch_env.h"
 
 /* A trial in the place of what the episode drew. */
 MILD_HD void env_set_trial(const EnvsArrays *all, long robot, TaskEnv *env) {
     const EnvsTrial *trial = &all->trial[robot];
     env->ground[0] = trial->ground;
-    env->terrain.map_x = env->terrain.map_y = 0;
+    all->map_origin[2 * robot] = all->map_origin[2 * robot + 1] = 0;
     env->variation.rigid = trial->rigid;
     env->variation.rigid_friction = TASK_RIGID_FRICTION;
     env->variation.rigid_time = 0;
@@ -23,7 +27,7 @@ MILD_HD void env_set_command(const EnvsArrays *all, long robot) {
 WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, const EnvWork *place) {
     const EngineTree *tree = &all->model->tree;
     const EngineWork *work = &place->work;
-    const RobotSim *sim = env_sim_at(all, robot);
+    const RobotReading *reading = &env_robot_at(all, robot)->reading;
     const int feet = engine_feet(tree), rigid = all->rigid[robot];
     const int steps = env_physics_steps(all->task);
     EnvsSample *begun = all->sample + robot * steps + k, *done = begun - 1;
@@ -40,11 +44,10 @@ WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, const E
         }
         LANE_ROLLED
         for (int f = LANE(l); k > 0 && f < feet; f += LANES) {
-            const RobotFoot *foot = &sim->foot[f];
-            done->foot[f].load = (double)foot->force[2];
-            done->foot[f].center[0] = (double)foot->sole_center[0];
-            done->foot[f].center[1] = (double)foot->sole_center[1];
-            done->foot[f].height = (double)foot->sole_height;
+            done->foot[f].load = (double)reading->foot[f].force[2];
+            done->foot[f].center[0] = (double)reading->foot[f].sole_center[0];
+            done->foot[f].center[1] = (double)reading->foot[f].sole_center[1];
+            done->foot[f].height = (double)reading->foot[f].sole_height;
             done->foot[f].depth = rigid ? 0 : (double)all->contact.foot[robot * feet + f].depth_max;
         }
         if (LANE(l) == LANES - 1 && k < steps) {
@@ -59,9 +62,11 @@ WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, const E
             for (int i = 0; i < 4; i++) {
                 done->quaternion[i] = (double)work->quaternion[i];
             }
-            done->above = (double)sim->above;
+            done->above = (double)reading->above;
             done->valid = 1;
         }
     }
     lanes_sync();
 }
+
+#endif

@@ -1,0 +1,200 @@
+/* What an environment is made of: plain structs without pointers that the CPU and a GPU share (see
+ * lanes.h). Who steps the robot reads what it needs from a TaskEnv and answers with a
+ * RobotReading. */
+#ifndef TASK_STATE_H
+#define TASK_STATE_H
+
+#include <stdint.h>
+
+#include "env/task/lanes.h"
+#include "env/task/task_def.h"
+#include "robot/table.h"
+
+#define TASK_FRAMES 6 /* H + 1, newest last (paper, H = 5) */
+
+/* [-] Friction of rigid ground that a caller has chosen (task_env_reset_on). */
+#define TASK_RIGID_FRICTION 0.8
+
+/* Numbers per environment; they follow from the robot's joints and feet. */
+typedef struct {
+    int joints;
+    int feet;
+    int observation; /* one frame: angular velocity 3, command 3, gravity 3, joints' angles, speeds
+                        and last actions, clock 2 (observe.h) */
+    int history;     /* TASK_FRAMES frames */
+    int actions;     /* one per joint */
+    int estimates;   /* base velocity 3, feet velocities 3 each, feet heights */
+    int critic;      /* frame, estimates, 6 of each foot, 34 of the episode (observe.h) */
+} TaskShape;
+enum { /* of a robot with ROBOT_JOINTS_MAX joints and ROBOT_FEET_MAX feet */
+       TASK_OBSERVATION_MAX = 9 + 3 * ROBOT_JOINTS_MAX + 2,
+       TASK_HISTORY_MAX = TASK_FRAMES * TASK_OBSERVATION_MAX,
+       TASK_ESTIMATES_MAX = 3 + 4 * ROBOT_FEET_MAX,
+       TASK_CRITIC_MAX = TASK_OBSERVATION_MAX + TASK_ESTIMATES_MAX + 6 * ROBOT_FEET_MAX + 34
+};
+TaskShape task_shape(const Robot *robot);
+/* First of the ground's numbers in the critic's input: TASK_GROUND_NUMBERS, then whether it is
+ * rigid, where the numbers are 0. */
+int task_critic_ground(const TaskShape *shape);
+/* Numbers of the ground in the critic's input (task_ground_numbers). */
+enum { TASK_GROUND_NUMBERS = 12 };
+
+/* Mirror symmetry left <-> right: o'_i = sign_i o_index_i, and actions alike. */
+typedef struct {
+    int observation_index[TASK_OBSERVATION_MAX];
+    float observation_sign[TASK_OBSERVATION_MAX];
+    int action_index[ROBOT_JOINTS_MAX];
+    float action_sign[ROBOT_JOINTS_MAX];
+} TaskMirror;
+TaskMirror task_mirror(const Robot *robot);
+
+/* Gains of the joints, see task_gains; 0 beyond the robot's joints. */
+typedef struct {
+    double kp[ROBOT_JOINTS_MAX]; /* [N m/rad] task.kp or the robot's */
+    double kd[ROBOT_JOINTS_MAX]; /* [N m s/rad] task.kd or the robot's */
+} TaskGains;
+
+/* What differs from robot to robot; see RobotVariation. */
+typedef struct {
+    Real base_mass_add;                    /* [kg] */
+    Real com_offset[3];                    /* [m] of the base's centre of mass */
+    Real link_mass_scale[1 + TASK_JOINTS]; /* [-] base, bodies of the joints */
+    Real armature_scale;                   /* [-] */
+    Real rigid_friction;                   /* [-] */
+    Real rigid_time;                       /* [s] */
+    int rigid;                             /* bool: rigid ground, no soft one */
+} TaskVariation;
+
+/* Where the robot is, in the order of robot.ini; see RobotState. */
+typedef struct {
+    Real qpos[7 + TASK_JOINTS]; /* [m, -, rad] base, quaternion w x y z, joints */
+    Real qvel[6 + TASK_JOINTS]; /* [m/s, rad/s] base: world axes, base axes; joints */
+} TaskPose;
+
+/* What the task asks of a robot besides TaskEnv.robot, at the end of a policy step or at the start
+ * of an episode: observations, rewards and the end of an episode are computed from it. MuJoCo's
+ * robots fill it in task_env_read, the batch engine's in env_measure. */
+typedef struct {
+    Real rotation[9]; /* [-] base to world, row major */
+    struct {
+        Real force[3];                /* [N] of the ground on the foot, mean over a physics step */
+        Real sole_height;             /* [m] lowest sole point above the undisturbed surface */
+        Real sole_center[3];          /* [m] world */
+        Real sole_center_velocity[3]; /* [m/s] */
+        Real depth_mean;              /* [m] see MildFootResult */
+    } foot[TASK_FEET];
+    Real body_clearance; /* [m] see robot_sim_body_clearance */
+    Real knee_distance;  /* [m] see robot_sim_knee_distance */
+    Real foot_distance;  /* [m] see robot_sim_foot_distance */
+    Real above;          /* [m] height of the base above the undisturbed surface under it */
+} RobotReading;
+
+/* What the sensors say, each with its own latency. */
+typedef struct {
+    Real omega[3], gravity[3]; /* base frame */
+    Real q[TASK_JOINTS], qd[TASK_JOINTS];
+} TaskSensors;
+
+typedef struct {
+    TaskShape shape;
+    uint64_t seed;
+    uint32_t index;      /* number of the environment, which selects its stream of random numbers */
+    uint32_t tick;       /* policy steps since creation, never reset */
+    uint32_t tick_first; /* at creation or when the run went on: then episodes are staggered */
+    /* episode */
+    uint32_t step;        /* policy steps on the clock of this episode */
+    uint32_t step_limit;  /* step at which the episode times out */
+    uint32_t step_first;  /* step at which the episode began */
+    double phase;         /* [-] gait clock in [0, 1) */
+    Real command[3];      /* [m/s, m/s, rad/s] vx, vy, wz in the heading frame */
+    Real command_seen[3]; /* what the policy sees, one policy step late */
+    int command_frozen;   /* bool: eval and play set the command themselves */
+    /* what was drawn for this episode */
+    TaskVariation variation;
+    int ground[MILD_MATERIALS_MAX];      /* of TaskDef.grounds, by label; unused without them */
+    Real kp_scale[TASK_JOINTS];          /* [-] */
+    Real kd_scale[TASK_JOINTS];          /* [-] */
+    Real strength[TASK_JOINTS];          /* [-] of the torque */
+    Real motor_offset[TASK_JOINTS];      /* [rad] */
+    int lag_command, lag_motor, lag_imu; /* [physics steps] */
+    double assist_level; /* [-] level of assistance: decays while on its feet, rises with falls;
+                            persists across episodes */
+    Real assist_draw;    /* [-] share of the level used in this episode, in [0.5, 1) */
+    Real push[6];        /* [m/s, rad/s] last push, for the critic; decays */
+    /* state */
+    TaskPose robot;
+    float action[3][TASK_JOINTS]; /* now, one and two steps ago */
+    Real torque[TASK_JOINTS];     /* [N m] of the last physics step */
+    uint32_t oldest;              /* place of the oldest frame in the ring, the next to go */
+    uint32_t held;                /* frames of the ring */
+    Real base_twist[6]; /* one policy step ago: linear in the world, angular in the base frame */
+    Real smooth_velocity[3];       /* [m/s, m/s, rad/s] vx, vy, wz, heading frame, smoothed over
+                                reward.tracking_time */
+    Real joint_speed[TASK_JOINTS]; /* one policy step ago */
+    Real air_time[TASK_FEET];
+    /* sums over the running episode, for the log */
+    Real reward_sum, term_sum[TASK_REWARD_COUNT], speed_error_sum;
+} TaskEnv;
+
+/* What lasts beyond an episode. */
+typedef struct {
+    double assist_level;
+    uint64_t tick;
+} TaskProgress;
+
+/* Result of one policy step. */
+typedef struct {
+    float reward;
+    uint8_t done, timeout,
+        valid; /* valid 0: the simulation diverged, and the sample must get no weight */
+    /* of the episode that just ended (done) */
+    uint32_t length;
+    float episode_reward, episode_terms[TASK_REWARD_COUNT], episode_speed_error;
+} TaskStep;
+
+/* Where to write the next observation, with the widths of TaskShape. Any pointer may be NULL. */
+typedef struct {
+    float *history;  /* [history] noisy, newest frame last */
+    float *critic;   /* [critic] */
+    float *estimate; /* [estimates] true values, the regression targets */
+    float *frame;    /* [observation] newest noisy frame: the decoder's target */
+} TaskView;
+
+/* A motor during a policy step. */
+typedef struct {
+    Real target[2]; /* [rad] of the action now and of the one before */
+    Real kp;        /* [N m/rad] */
+    Real kd;        /* [N m s/rad] */
+    Real limit;     /* [N m] */
+    Real fastest;   /* [rad/s] 0: no limit */
+} TaskMotor;
+
+/* Everything that reward terms may use, computed once per policy step (task_describe_motion). */
+typedef struct {
+    const TaskDef *def;
+    const RobotTable *robot;
+    const TaskEnv *env;
+    Real velocity[3];              /* [m/s] of the base, heading frame */
+    Real omega[3];                 /* [rad/s] of the base, base frame */
+    Real gravity[3];               /* [-] unit vector along gravity, base frame */
+    Real twist_change;             /* norm of the change of the base twist in this step, or of its
+                                      linear part (acceleration_form) */
+    Real q[TASK_JOINTS];           /* [rad] */
+    Real qd[TASK_JOINTS];          /* [rad/s] */
+    Real qd_before[TASK_JOINTS];   /* [rad/s] one policy step ago */
+    Real torque[TASK_JOINTS];      /* [N m] */
+    Real base_height;              /* [m] above the stance soles */
+    Real foot_height[TASK_FEET];   /* [m] lowest sole point above the undisturbed surface */
+    Real foot_force[TASK_FEET];    /* [N] of the ground on the foot */
+    Real foot_speed[TASK_FEET];    /* [m/s] horizontal, of the sole */
+    Real landed_air_time;          /* [s] summed over the feet that touched down */
+    int contact[TASK_FEET];        /* bool: the ground carries the foot */
+    int stance[TASK_FEET];         /* bool: the clock wants the foot in stance */
+    int either[TASK_FEET];         /* bool: stance and swing are both right */
+    Real wanted_height[TASK_FEET]; /* [m] h_des of the clock */
+    Real foot_distance;            /* [m] see robot_sim_foot_distance */
+    Real knee_distance;            /* [m] see robot_sim_knee_distance */
+    int standing;                  /* bool: the command is to stand */
+} TaskMotion;
+
+#endif
