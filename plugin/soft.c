@@ -293,7 +293,7 @@ static void outcome(Soft *soft, const mjModel *m, const mjData *d, double *twist
         a[i] = direct ? d->qacc[dof] : d->qfrc_smooth[dof] + d->qfrc_constraint[dof];
     }
     if (!direct) {
-        metric_integrate(metric, m, a);
+        metric_integrate(metric, a);
     }
     twists(soft, nv, d->qvel, twist);
     add_rates(soft, nv, a, twist);
@@ -365,7 +365,7 @@ static void joint_outcome(Soft *soft, const mjModel *m, const mjData *d, const R
         mju_copy(a, rows->trial, n);
     } else {
         mju_mulMatVec(a, metric->mass, rows->trial, n, n);
-        metric_integrate(metric, m, a);
+        metric_integrate(metric, a);
     }
     twists(soft, nv, d->qvel, twist);
     add_rates(soft, nv, a, twist);
@@ -478,11 +478,11 @@ static void warn_of_tilt(Soft *soft, const mjModel *m, const mjData *d) {
 /* Ground and constraints in turn. Where the response is linear and known the first solve is
  * final. */
 static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
-    const int exact = d->nefc == 0 && m->opt.integrator != mjINT_IMPLICIT;
     const int simple = rows_are_simple(d);
     double wrench[FOOT_ROWS] = {0}, twist[FOOT_ROWS], change[FOOT_ROWS];
     forces_without_ground(m, d, !simple);
     metric_build(&soft->metric, m, d);
+    const int exact = d->nefc == 0 && !soft->metric.skew;
     const int jointly = simple && rows_start(&soft->rows, &soft->metric, m, d);
     if (simple && !jointly) { /* out of memory */
         mj_fwdConstraint(m, d);
