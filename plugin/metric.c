@@ -28,8 +28,10 @@ int metric_alloc(Metric *metric, const mjModel *m) {
     metric->held = calloc(square + 1, sizeof *metric->held);
     metric->full = calloc(square + 1, sizeof *metric->full);
     metric->pivot = calloc(nv + 1, sizeof *metric->pivot);
+    metric->column = calloc(nv + 1, sizeof *metric->column);
     return metric->dof && metric->place && metric->tree && metric->inertia && metric->factor &&
-           metric->mass && metric->stiff && metric->held && metric->full && metric->pivot;
+           metric->mass && metric->stiff && metric->held && metric->full && metric->pivot &&
+           metric->column;
 }
 
 void metric_free(Metric *metric) {
@@ -43,6 +45,7 @@ void metric_free(Metric *metric) {
     free(metric->held);
     free(metric->full);
     free(metric->pivot);
+    free(metric->column);
 }
 
 static int is_disabled(const mjModel *m, int flag) {
@@ -492,4 +495,45 @@ int metric_stiffen(Metric *metric, const mjModel *m, const mjData *d) {
 
 void metric_solve(const Metric *metric, const double *factor, double *x) {
     mju_cholSolve(x, factor, x, metric->dofs);
+}
+
+/* x[i] -= scale x[j]; [count] */
+static void row_subtract(double *restrict row, const double *restrict other, double scale,
+                         int count) {
+    for (int k = 0; k < count; k++) {
+        row[k] -= scale * other[k];
+    }
+}
+
+void metric_solve_all(const Metric *metric, const double *factor, int count, double *x) {
+    const int n = metric->dofs;
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < i; j++) {
+            row_subtract(x + i * count, x + j * count, factor[i * n + j], count);
+        }
+        mju_scl(x + i * count, x + i * count, 1 / factor[i * n + i], count);
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        for (int j = i + 1; j < n; j++) {
+            row_subtract(x + i * count, x + j * count, factor[j * n + i], count);
+        }
+        mju_scl(x + i * count, x + i * count, 1 / factor[i * n + i], count);
+    }
+}
+
+void metric_integrate_all(const Metric *metric, int count, double *x) {
+    const int n = metric->dofs;
+    if (!metric->skew) {
+        metric_solve_all(metric, metric->factor, count, x);
+        return;
+    }
+    for (int k = 0; k < count; k++) {
+        for (int i = 0; i < n; i++) {
+            metric->column[i] = x[i * count + k];
+        }
+        solve_full(metric, metric->column);
+        for (int i = 0; i < n; i++) {
+            x[i * count + k] = metric->column[i];
+        }
+    }
 }

@@ -31,6 +31,7 @@ typedef struct {
     int skew;        /* bool: the integrator's N has Coriolis terms, which `inertia` has not */
     double *full;    /* [dofs][dofs] LU factors of N with Coriolis terms, but under `discrete` */
     int *pivot;      /* [dofs] rows that were exchanged */
+    double *column;  /* [dofs] a vector of metric_integrate_all */
     uint64_t active; /* hash of the constraints in `stiff`; 0: none yet */
 } Metric;
 
@@ -47,6 +48,8 @@ int metric_is_step(const mjModel *m, const mjData *d);
 void metric_build(Metric *metric, const mjModel *m, mjData *d);
 /* x = N^-1 x in place, with the N of the integrator; [dofs]. */
 void metric_integrate(const Metric *metric, double *x);
+/* The same for `count` vectors side by side, [dofs][count]. */
+void metric_integrate_all(const Metric *metric, int count, double *x);
 /* Factors N + J_c^T D_c' J_c: how the velocity after the step responds to a force while the
  * constraints that are active now stay active. Needs the constraint forces. Returns 0 when the
  * constraints are those of the last call.
@@ -63,5 +66,8 @@ void metric_row_add(const Metric *metric, const mjModel *m, const mjData *d, int
                     double *vector);
 /* x = factor^-1 x in place. factor: metric->factor, stiff or held; x: [dofs]. */
 void metric_solve(const Metric *metric, const double *factor, double *x);
+
+/* The same for `count` vectors side by side, [dofs][count]. */
+void metric_solve_all(const Metric *metric, const double *factor, int count, double *x);
 
 #endif
