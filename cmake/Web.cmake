@@ -12,7 +12,10 @@ set_source_files_properties(${CMAKE_SOURCE_DIR}/web/core.c PROPERTIES COMPILE_OP
 set(web_robot ${CMAKE_BINARY_DIR}/generated/web/robot.bin)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/generated/web)
 set(shipped ${CMAKE_SOURCE_DIR}/policies/mild.safetensors ${CMAKE_SOURCE_DIR}/configs/walk.ini)
-add_custom_command(OUTPUT ${web_robot} COMMAND web_pack ${CMAKE_SOURCE_DIR}/robots/sa01 ${shipped} ${web_robot}
+# MILD_HOME: a build for elsewhere (scripts/deb.sh) has its data where nothing is yet
+add_custom_command(OUTPUT ${web_robot}
+  COMMAND ${CMAKE_COMMAND} -E env MILD_HOME=${CMAKE_SOURCE_DIR}
+    $<TARGET_FILE:web_pack> ${CMAKE_SOURCE_DIR}/robots/sa01 ${shipped} ${web_robot}
   DEPENDS web_pack ${shipped} ${CMAKE_SOURCE_DIR}/configs/default.ini ${CMAKE_SOURCE_DIR}/robots/sa01/robot.ini
   ${CMAKE_SOURCE_DIR}/robots/sa01/sa01.xml VERBATIM)
 add_custom_target(web_robot DEPENDS ${web_robot})

@@ -12,7 +12,8 @@ void mjd_smooth_vel(const mjModel *m, mjData *d, int flg_bias);
 mjtNum mj_actuatorDamping(const mjModel *m, mjtObj type, int id, mjtNum poly[mjNPOLY]);
 #endif
 
-#define PIVOT 1e-14                                /* smallest pivot of a factorisation */
+#define PIVOT 1e-14                                   /* smallest pivot of a factorisation */
+#define HAS_LONE_BODIES (mjVERSION_HEADER >= 3011000) /* bool: see is_lone_body */
 #define HAS_DISCRETE (mjVERSION_HEADER >= 3013000) /* bool: the integrator, and its arrays efm_ */
 
 int metric_alloc(Metric *metric, const mjModel *m) {
@@ -27,8 +28,10 @@ int metric_alloc(Metric *metric, const mjModel *m) {
     metric->held = calloc(square + 1, sizeof *metric->held);
     metric->full = calloc(square + 1, sizeof *metric->full);
     metric->pivot = calloc(nv + 1, sizeof *metric->pivot);
+    metric->column = calloc(nv + 1, sizeof *metric->column);
     return metric->dof && metric->place && metric->tree && metric->inertia && metric->factor &&
-           metric->mass && metric->stiff && metric->held && metric->full && metric->pivot;
+           metric->mass && metric->stiff && metric->held && metric->full && metric->pivot &&
+           metric->column;
 }
 
 void metric_free(Metric *metric) {
@@ -42,6 +45,7 @@ void metric_free(Metric *metric) {
     free(metric->held);
     free(metric->full);
     free(metric->pivot);
+    free(metric->column);
 }
 
 static int is_disabled(const mjModel *m, int flag) {
@@ -236,7 +240,28 @@ static void add_implicit(Metric *metric, const mjModel *m, mjData *d) {
     }
 }
 
-/* ---- `implicit`: N with the derivatives of Coriolis forces, which are not symmetric ---- */
+/* ---- N with the derivatives of Coriolis forces, which are not symmetric ---- */
+
+/* Bool: a rigid body on a free joint, whose Coriolis forces implicitfast and `discrete` treat as
+ * `implicit` does: since 3.11, and since 3.14 with other bodies fixed to it. */
+static int is_lone_body(const mjModel *m, int tree) {
+#if HAS_LONE_BODIES
+    const int body = m->dof_bodyid[m->tree_dofadr[tree]];
+    const int free = m->tree_dofnum[tree] == 6 && m->body_jntnum[body] == 1;
+    return free && (mjVERSION_HEADER >= 3014000 || m->body_subtreemass[body] == m->body_mass[body]);
+#else
+    (void)m, (void)tree;
+    return 0;
+#endif
+}
+
+static int is_skew(const Metric *metric, const mjModel *m) {
+    int lone = 0;
+    for (int t = 0; t < m->ntree; t++) {
+        lone |= metric->tree[t] && is_lone_body(m, t);
+    }
+    return m->opt.integrator == mjINT_IMPLICIT || (lone && m->opt.integrator != mjINT_EULER);
+}
 
 /* LU factors in place, with exchange of rows. */
 static void factor_full(Metric *metric) {
@@ -280,19 +305,17 @@ static void solve_full(const Metric *metric, double *x) {
 
 static void build_full(Metric *metric, const mjModel *m, mjData *d) {
     const int n = metric->dofs;
-    memset(metric->full, 0, (size_t)n * (size_t)n * sizeof *metric->full);
+    memcpy(metric->full, metric->inertia, (size_t)n * (size_t)n * sizeof *metric->full);
     mjd_smooth_vel(m, d, 1);
     for (int i = 0; i < n; i++) {
-        const int row = metric->dof[i];
-        for (int k = m->M_rowadr[row]; k < m->M_rowadr[row] + m->M_rownnz[row]; k++) {
-            const int j = metric->place[m->M_colind[k]];
-            metric->full[i * n + j] = metric->full[j * n + i] = d->M[k];
+        const int dof = metric->dof[i], start = m->D_rowadr[dof];
+        double *row = metric->full + (size_t)i * (size_t)n;
+        if (m->opt.integrator != mjINT_IMPLICIT && !is_lone_body(m, m->dof_treeid[dof])) {
+            continue;
         }
-    }
-    for (int i = 0; i < n; i++) {
-        const int row = metric->dof[i];
-        for (int k = m->D_rowadr[row]; k < m->D_rowadr[row] + m->D_rownnz[row]; k++) {
-            metric->full[i * n + metric->place[m->D_colind[k]]] -= m->opt.timestep * d->qDeriv[k];
+        memcpy(row, metric->mass + (size_t)i * (size_t)n, (size_t)n * sizeof *row);
+        for (int k = start; k < start + m->D_rownnz[dof]; k++) {
+            row[metric->place[m->D_colind[k]]] -= m->opt.timestep * d->qDeriv[k];
         }
     }
     factor_full(metric);
@@ -337,13 +360,14 @@ void metric_build(Metric *metric, const mjModel *m, mjData *d) {
     memcpy(metric->factor, metric->inertia, square * sizeof *metric->factor);
     mju_cholFactor(metric->factor, metric->dofs, PIVOT);
     metric->active = 0;
-    if (m->opt.integrator == mjINT_IMPLICIT) {
+    metric->skew = is_skew(metric, m);
+    if (metric->skew && !metric_is_discrete(m)) {
         build_full(metric, m, d);
     }
 }
 
-void metric_integrate(const Metric *metric, const mjModel *m, double *x) {
-    if (m->opt.integrator == mjINT_IMPLICIT) {
+void metric_integrate(const Metric *metric, double *x) {
+    if (metric->skew) {
         solve_full(metric, x);
     } else {
         metric_solve(metric, metric->factor, x);
@@ -471,4 +495,45 @@ int metric_stiffen(Metric *metric, const mjModel *m, const mjData *d) {
 
 void metric_solve(const Metric *metric, const double *factor, double *x) {
     mju_cholSolve(x, factor, x, metric->dofs);
+}
+
+/* x[i] -= scale x[j]; [count] */
+static void row_subtract(double *restrict row, const double *restrict other, double scale,
+                         int count) {
+    for (int k = 0; k < count; k++) {
+        row[k] -= scale * other[k];
+    }
+}
+
+void metric_solve_all(const Metric *metric, const double *factor, int count, double *x) {
+    const int n = metric->dofs;
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < i; j++) {
+            row_subtract(x + i * count, x + j * count, factor[i * n + j], count);
+        }
+        mju_scl(x + i * count, x + i * count, 1 / factor[i * n + i], count);
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        for (int j = i + 1; j < n; j++) {
+            row_subtract(x + i * count, x + j * count, factor[j * n + i], count);
+        }
+        mju_scl(x + i * count, x + i * count, 1 / factor[i * n + i], count);
+    }
+}
+
+void metric_integrate_all(const Metric *metric, int count, double *x) {
+    const int n = metric->dofs;
+    if (!metric->skew) {
+        metric_solve_all(metric, metric->factor, count, x);
+        return;
+    }
+    for (int k = 0; k < count; k++) {
+        for (int i = 0; i < n; i++) {
+            metric->column[i] = x[i * count + k];
+        }
+        solve_full(metric, metric->column);
+        for (int i = 0; i < n; i++) {
+            x[i * count + k] = metric->column[i];
+        }
+    }
 }

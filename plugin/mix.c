@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include <mujoco/mujoco.h>
+
 #define RIDGE 1e-12 /* [-] relative, keeps the normal equations solvable */
 
 void mix_start(Mix *mix, int rows) {
@@ -78,4 +80,63 @@ void mix_next(Mix *mix, double *x, const double *c) {
             x[r] -= share[j] * (mix->dx[j][r] + mix->dc[j][r]);
         }
     }
+}
+
+/* matrix = 1 + A H; [rows][rows] */
+static void one_plus_product(const double *A, const double *H, int rows, double *matrix) {
+    mju_mulMatMat(matrix, A, H, rows, rows, rows);
+    for (int r = 0; r < rows; r++) {
+        matrix[r * rows + r] += 1;
+    }
+}
+
+/* u = matrix^-1 u by Gauss elimination with exchange of rows; the matrix is lost. */
+static int eliminate(double *matrix, double *u, int n) {
+    for (int p = 0; p < n; p++) {
+        int best = p;
+        for (int i = p + 1; i < n; i++) {
+            best = fabs(matrix[i * n + p]) > fabs(matrix[best * n + p]) ? i : best;
+        }
+        if (!(fabs(matrix[best * n + p]) > 0)) {
+            return 0;
+        }
+        for (int j = p; j < n && best != p; j++) {
+            const double other = matrix[p * n + j];
+            matrix[p * n + j] = matrix[best * n + j];
+            matrix[best * n + j] = other;
+        }
+        const double other = u[p];
+        u[p] = u[best];
+        u[best] = other;
+        for (int i = p + 1; i < n; i++) {
+            const double factor = matrix[i * n + p] / matrix[p * n + p];
+            mju_addToScl(matrix + i * n + p, matrix + p * n + p, -factor, n - p);
+            u[i] -= factor * u[p];
+        }
+    }
+    for (int p = n - 1; p >= 0; p--) {
+        u[p] -= mju_dot(matrix + p * n + p + 1, u + p + 1, n - 1 - p);
+        u[p] /= matrix[p * n + p];
+    }
+    return 1;
+}
+
+int mix_newton(const Mix *mix, const double *A, const double *E, const double *H, const double *c,
+               double *x) {
+    const int n = mix->rows;
+    double matrix[MIX_ROWS * MIX_ROWS], u[MIX_ROWS], moved[MIX_ROWS];
+    memcpy(u, c, (size_t)n * sizeof *u);
+    one_plus_product(E, H, n, matrix);
+    if (!eliminate(matrix, u, n)) {
+        return 0;
+    }
+    one_plus_product(A, H, n, matrix);
+    mju_mulMatVec(moved, matrix, u, n, n);
+    for (int r = 0; r < n; r++) {
+        if (!isfinite(moved[r])) {
+            return 0;
+        }
+    }
+    mju_addTo(x, moved, n);
+    return 1;
 }

@@ -22,4 +22,16 @@ void mix_start(Mix *mix, int rows);
 /* Replaces x by the next one to try. c: [rows] change of x at x. */
 void mix_next(Mix *mix, double *x, const double *c);
 
+/* Newton's step in the place of mix_next, where the ground's response is known: it solves with
+ *
+ *     V = x + A P,    MuJoCo steps to V' = V_0 + E P,    P = P_0 - H V
+ *
+ * for V = V', with P the impulse of the ground and H = -dP/dV. From a change c = V' - V that is
+ *
+ *     x <- x + (1 + A H) (1 + E H)^-1 c
+ *
+ * A, E, H: [rows][rows]. Returns 0, with x as it was, when the matrix is singular. */
+int mix_newton(const Mix *mix, const double *A, const double *E, const double *H, const double *c,
+               double *x);
+
 #endif

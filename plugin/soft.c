@@ -17,8 +17,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "ground/scratch.h"
+
 #define JOINT_ROUNDS 30  /* solves of the ground with the constraints in its response */
 #define JOINT_TRIES 12   /* of them in the same zones */
+#define NEWTON_TRIES 4   /* the first of them by mix_newton */
 #define JOINT_CLOSE 1e-9 /* [m/s, rad/s] difference of the twists at which they end */
 #define ROUNDS_MAX 30    /* solves of ground and constraints in one step */
 #define ROUNDS_ACTIVE 12 /* of them with the response of the active constraints */
@@ -65,10 +68,11 @@ static int alloc_arrays(Soft *soft, const mjModel *m) {
     const size_t nv = (size_t)m->nv;
     soft->jacobian = calloc(FOOT_ROWS * nv + 1, sizeof *soft->jacobian);
     soft->response = calloc(FOOT_ROWS * nv + 1, sizeof *soft->response);
+    soft->forces = calloc(FOOT_ROWS * nv + 1, sizeof *soft->forces);
     soft->passive = calloc(nv + 1, sizeof *soft->passive);
     soft->acceleration = calloc(nv + 1, sizeof *soft->acceleration);
-    return soft->jacobian && soft->response && soft->passive && soft->acceleration &&
-           metric_alloc(&soft->metric, m) && rows_alloc(&soft->rows, m);
+    return soft->jacobian && soft->response && soft->forces && soft->passive &&
+           soft->acceleration && metric_alloc(&soft->metric, m) && rows_alloc(&soft->rows, m);
 }
 
 /* What the size of the state follows from. compiling: bool, as for feet_create. */
@@ -139,6 +143,7 @@ void soft_destroy(Soft *soft) {
     rows_free(&soft->rows);
     free(soft->jacobian);
     free(soft->response);
+    free(soft->forces);
     free(soft->passive);
     free(soft->acceleration);
     free(soft);
@@ -234,24 +239,41 @@ static void update_feet(Soft *soft, const mjModel *m, const mjData *d) {
     memcpy(soft->input.velocity, twist, (size_t)(6 * soft->feet) * sizeof *twist);
 }
 
+/* x = J^T of the metric's degrees of freedom; [dofs][6 feet] */
+static void foot_forces(const Soft *soft, int nv, double *x) {
+    const Metric *metric = &soft->metric;
+    const int rows = 6 * soft->feet;
+    for (int i = 0; i < metric->dofs; i++) {
+        for (int r = 0; r < rows; r++) {
+            x[i * rows + r] = soft->jacobian[(size_t)r * (size_t)nv + (size_t)metric->dof[i]];
+        }
+    }
+}
+
+/* matrix = J x; [6 feet][6 feet] */
+static void foot_motions(const Soft *soft, int nv, const double *x, double *matrix) {
+    const Metric *metric = &soft->metric;
+    const int rows = 6 * soft->feet;
+    for (int r = 0; r < rows; r++) {
+        double *line = matrix + r * rows;
+        mju_zero(line, rows);
+        for (int i = 0; i < metric->dofs; i++) {
+            const double scale = soft->jacobian[(size_t)r * (size_t)nv + (size_t)metric->dof[i]];
+            mju_addToScl(line, x + i * rows, scale, rows);
+        }
+    }
+}
+
 /* A = J x, with x = factor^-1 J^T in soft->response. */
 static void inverse_inertia(Soft *soft, const double *factor, int nv) {
-    const Metric *metric = &soft->metric;
-    const int rows = 6 * soft->feet, n = metric->dofs;
+    const int rows = 6 * soft->feet;
     double *a = soft->input.inverse_inertia;
+    foot_forces(soft, nv, soft->response);
+    metric_solve_all(&soft->metric, factor, rows, soft->response);
+    foot_motions(soft, nv, soft->response, a);
     for (int r = 0; r < rows; r++) {
-        double *x = soft->response + (size_t)r * (size_t)nv;
-        for (int i = 0; i < n; i++) {
-            x[i] = soft->jacobian[(size_t)r * (size_t)nv + (size_t)metric->dof[i]];
-        }
-        metric_solve(metric, factor, x);
-        for (int c = 0; c <= r; c++) {
-            const double *row = soft->jacobian + (size_t)c * (size_t)nv;
-            double sum = 0;
-            for (int i = 0; i < n; i++) {
-                sum += row[metric->dof[i]] * x[i];
-            }
-            a[r * rows + c] = a[c * rows + r] = sum;
+        for (int c = 0; c < r; c++) {
+            a[c * rows + r] = a[r * rows + c];
         }
     }
 }
@@ -293,7 +315,7 @@ static void outcome(Soft *soft, const mjModel *m, const mjData *d, double *twist
         a[i] = direct ? d->qacc[dof] : d->qfrc_smooth[dof] + d->qfrc_constraint[dof];
     }
     if (!direct) {
-        metric_integrate(metric, m, a);
+        metric_integrate(metric, a);
     }
     twists(soft, nv, d->qvel, twist);
     add_rates(soft, nv, a, twist);
@@ -342,6 +364,36 @@ static double disagreement(const Soft *soft, const double *twist, double *change
     return most;
 }
 
+/* ---- Newton's method where the integrator's response is not symmetric ---- */
+
+/* E = J N^-1 M K^-1 J^T, with the K of the zones. */
+static void exact_response(Soft *soft, int nv) {
+    const Metric *metric = &soft->metric;
+    const int rows = 6 * soft->feet, n = metric->dofs;
+    foot_forces(soft, nv, soft->response);
+    metric_solve_all(metric, metric->held, rows, soft->response);
+    mju_mulMatMat(soft->forces, metric->mass, soft->response, n, n, rows);
+    metric_integrate_all(metric, rows, soft->forces);
+    foot_motions(soft, nv, soft->forces, soft->exact);
+}
+
+/* The next V_free to try, from what MuJoCo gives beyond what the ground counts with. The ground's
+ * solver leaves its derivative in the scratch. */
+static void next_free(Soft *soft, int newton, const double *change) {
+    const int rows = 6 * soft->feet;
+    double *x = soft->input.free_velocity, derivative[FOOT_ROWS * FOOT_ROWS] = {0};
+    for (int r = 0; r < rows && newton; r++) {
+        const int f = r / 6;
+        if (soft->scratch->foot[f].active > 0) {
+            mju_copy(derivative + r * rows + 6 * f, soft->scratch->hessian[f] + 6 * (r % 6), 6);
+        }
+    }
+    if (!newton ||
+        !mix_newton(&soft->mix, soft->input.inverse_inertia, soft->exact, derivative, change, x)) {
+        mix_next(&soft->mix, x, change);
+    }
+}
+
 /* ---- ground and constraints together ---- */
 
 /* push = J^T W of the metric's degrees of freedom. */
@@ -365,7 +417,7 @@ static void joint_outcome(Soft *soft, const mjModel *m, const mjData *d, const R
         mju_copy(a, rows->trial, n);
     } else {
         mju_mulMatVec(a, metric->mass, rows->trial, n, n);
-        metric_integrate(metric, m, a);
+        metric_integrate(metric, a);
     }
     twists(soft, nv, d->qvel, twist);
     add_rates(soft, nv, a, twist);
@@ -397,7 +449,11 @@ static void joint_solve(Soft *soft, const mjModel *m, mjData *d, const MildGroun
         if (tries++ == 0) {
             joint_enter(soft, m, d, rows);
         } else {
-            mix_next(&soft->mix, soft->input.free_velocity, change);
+            const int newton = tries <= NEWTON_TRIES && !metric_is_step(m, d);
+            if (newton && tries == 2) {
+                exact_response(soft, (int)m->nv);
+            }
+            next_free(soft, newton, change);
         }
         mild_ground_solve(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
         read_wrench(soft, wrench);
@@ -478,11 +534,11 @@ static void warn_of_tilt(Soft *soft, const mjModel *m, const mjData *d) {
 /* Ground and constraints in turn. Where the response is linear and known the first solve is
  * final. */
 static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
-    const int exact = d->nefc == 0 && m->opt.integrator != mjINT_IMPLICIT;
     const int simple = rows_are_simple(d);
     double wrench[FOOT_ROWS] = {0}, twist[FOOT_ROWS], change[FOOT_ROWS];
     forces_without_ground(m, d, !simple);
     metric_build(&soft->metric, m, d);
+    const int exact = d->nefc == 0 && !soft->metric.skew;
     const int jointly = simple && rows_start(&soft->rows, &soft->metric, m, d);
     if (simple && !jointly) { /* out of memory */
         mj_fwdConstraint(m, d);

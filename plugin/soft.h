@@ -22,19 +22,21 @@ typedef struct {
     Metric metric;
     Rows rows;
     Mix mix;
-    double *jacobian; /* [6 feet][nv] twist of each foot: linear, angular; world axes */
-    double *response; /* [6 feet][nv] of the metric's degrees of freedom: N^-1 J^T, transposed */
-    double *passive;  /* [nv] qfrc_passive without the ground */
+    double *jacobian;     /* [6 feet][nv] twist of each foot: linear, angular; world axes */
+    double *response;     /* [dofs][6 feet] of the metric's degrees of freedom: N^-1 J^T */
+    double *forces;       /* [dofs][6 feet] M times a response */
+    double *passive;      /* [nv] qfrc_passive without the ground */
     double *acceleration; /* [nv] (v+ - v) / h of the metric's degrees of freedom */
-    int fresh;            /* bool: qfrc_passive was computed anew since the last solve */
-    int inside;           /* bool: MuJoCo calls back while it is called from here */
-    int solved;           /* bool: the scratch is that of `input` and `contact` */
-    int known;            /* bool: `input` and `contact` are those of a solve */
-    int refused;          /* bool: the integrator has been complained about */
-    int warned;           /* bool: a disagreement has been warned of since the last reset */
-    int tilted;           /* bool: a foot on its side has been warned of since the last reset */
-    int rounds;           /* of ground and constraints in the last solve */
-    MildGround layout;    /* header of a ground that remembers nothing */
+    double exact[FOOT_ROWS * FOOT_ROWS]; /* [6 feet][6 feet] E of mix_newton */
+    int fresh;         /* bool: qfrc_passive was computed anew since the last solve */
+    int inside;        /* bool: MuJoCo calls back while it is called from here */
+    int solved;        /* bool: the scratch is that of `input` and `contact` */
+    int known;         /* bool: `input` and `contact` are those of a solve */
+    int refused;       /* bool: the integrator has been complained about */
+    int warned;        /* bool: a disagreement has been warned of since the last reset */
+    int tilted;        /* bool: a foot on its side has been warned of since the last reset */
+    int rounds;        /* of ground and constraints in the last solve */
+    MildGround layout; /* header of a ground that remembers nothing */
     MildContactInput input;
     MildContactResult contact;
 } Soft;
