@@ -1,11 +1,10 @@
 /* The passivity-based controller: its torques against the dynamics of MuJoCo, then standing and
  * walking. */
-#include "kit.h"
-
 #include <mujoco/mujoco.h>
 
 #include "control/body.h"
 #include "control/controller.h"
+#include "kit.h"
 
 #define GRAVITY 9.81
 enum { NV = 18 };

@@ -1,11 +1,10 @@
 /* The balanced stand: its pose and torques against statics, its answer to a tilt against geometry,
  * the same whichever way the robot looks; and it stands. */
-#include "kit.h"
-
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"
 #include "control/stand.h"
+#include "kit.h"
 #include "sa01.h"
 
 #define SWAY 0.15 /* [s] of stand.c */

@@ -1,6 +1,7 @@
 /* Trials on both backends: each has the ground, the command and the random numbers that the caller
  * chose, samples say what its physics steps did, and by MuJoCo one that fell stays as it is. */
 #include "env/envs.h"
+#include "env/task/task.h"
 #include "kit.h"
 #include "mild/batch.h"
 #include "sa01.h"

@@ -1,10 +1,10 @@
 /* The track of a trial: the centre of mass from the engine's bodies, angles of a turned base, and
  * the CSV. */
-#include "kit.h"
-
 #include <mujoco/mujoco.h>
 
 #include "env/envs.h"
+#include "env/task/task.h"
+#include "kit.h"
 #include "run/eval/track.h"
 #include "sa01.h"
 
@@ -36,11 +36,13 @@ static void a_point_of_a_turned_robot(void **state) {
     assert_int_equal(track_make(&track, 2, 3, &error), MILD_OK);
     const double none[SA01_JOINTS] = {0};
     const MildMaterial any = mild_material_default();
-    static TaskEnv env;
+    const TaskDef def = task_def_default();
+    TaskEnv *env = aligned_alloc(64, task_env_bytes(&def, robot));
     EnvsSample sample;
-    env.shape = task_shape(robot);
-    env.terrain = mild_terrain_uniform(&any);
-    envs_read_sample(&env, sim, none, &sample);
+    assert_non_null(env);
+    task_env_init(env, &def, robot, 1, 0);
+    task_env_rest(env)->terrain = mild_terrain_uniform(&any);
+    envs_read_sample(env, sim, none, &sample);
     track_take(&track, 1, &sample);
     assert_true(track.count[0] == 0 && track.count[1] == 1);
     const TrackPoint *point = &track.point[3];
@@ -67,6 +69,7 @@ static void a_point_of_a_turned_robot(void **state) {
                               "0.25000,-0.50000\n");
     free(text);
     track_free(&track);
+    free(env);
     robot_sim_destroy(sim);
     robot_destroy(robot);
 }

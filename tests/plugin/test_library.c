@@ -1,8 +1,7 @@
 /* The shared library as MuJoCo loads it, with the example: what a user does first. */
-#include "kit.h"
-
 #include <mujoco/mujoco.h>
 
+#include "kit.h"
 static void example_stands(void **state) {
     (void)state;
     char error[500] = "";

@@ -6,10 +6,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "kit.h"
-
 #include <mujoco/mujoco.h>
 
+#include "kit.h"
 #include "robot/engine.h"
 
 typedef struct {

@@ -2,12 +2,11 @@
  * MuJoCo. */
 #include <unistd.h>
 
-#include "kit.h"
-
 #include <cjson/cJSON.h>
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"
+#include "kit.h"
 #include "robot/robot.h"
 #include "sa01.h"
 

@@ -1,10 +1,9 @@
 /* A robot made up here: two legs behind a waist joint that both feet share. */
 #include <unistd.h>
 
-#include "kit.h"
-
 #include <mujoco/mujoco.h>
 
+#include "kit.h"
 #include "robot/robot.h"
 
 enum { FEET = 2, JOINTS = 3, NV = 9 };

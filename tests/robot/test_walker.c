@@ -4,11 +4,10 @@
  * engine's. And what makes it refused. */
 #include <unistd.h>
 
-#include "kit.h"
-
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"
+#include "kit.h"
 #include "robot/sim.h"
 
 enum { JOINTS = 7, NQ = 14, NV = 13, FEET = 2, FLAT = 0, ROUND = 1, ROWS = 12 };

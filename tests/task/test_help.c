@@ -219,7 +219,7 @@ static void wrench_in_space(void **unused) {
         kit_load(rig.sim, &state, rig.env);
         Oracle o = oracle_of(rig.sim);
         const double z[3] = {0, 0, 1};
-        double wrench[6], up[3], restoring[3], omega[3];
+        double wrench[6] = {0}, up[3], restoring[3], omega[3];
         task_assist(rig.env, &rig.def, robot_table(robot), robot_sim_base_rotation(rig.sim),
                     robot_sim_qvel(rig.sim), wrench);
         mju_rotVecQuat(up, z, o.orientation);

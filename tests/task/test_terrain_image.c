@@ -1,12 +1,11 @@
 /* Section [terrain]: pictures read and refused, maps made from them. */
 #include <unistd.h>
 
-#include "kit.h"
-
 #include <png.h>
 
 #include "env/task/image.h"
 #include "env/task/terrain.h"
+#include "kit.h"
 #include "mild/ground.h"
 
 enum { COLUMNS = 37, ROWS = 23 };
