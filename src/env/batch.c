@@ -66,7 +66,7 @@ static MildStatus check_def(const EnvsDef *def, MildError *error) {
                                    : NULL;
     return status == MILD_OK && missing
                ? mild_fail(error, MILD_ERROR_ARGUMENT,
-                           "%s is not there on a device yet; train.robots = mujoco has it", missing)
+                           "%s is not supported by the batch engine; set train.robots = mujoco", missing)
                : status;
 }
 

@@ -79,8 +79,8 @@ for command in eval "play --pressure p.csv" "train --out x"; do
 done
 head -c 3000 motor.safetensors >cut.safetensors
 bad "cut.safetensors" "$mild" eval --task.actuator=cut.safetensors
-bad "task.actuator is not there on a device" "$mild" eval --task.actuator=motor.safetensors --train.robots=batch
-bad "task.actuator is not there on a device" "$mild" train --out x --task.actuator=motor.safetensors --train.robots=batch \
+bad "task.actuator is not supported by the batch engine" "$mild" eval --task.actuator=motor.safetensors --train.robots=batch
+bad "task.actuator is not supported by the batch engine" "$mild" train --out x --task.actuator=motor.safetensors --train.robots=batch \
     --randomize.patch_share=0 --train.envs=2
 bad "no effect on controller stand" "$mild" eval --controller stand --speed 0 --task.actuator=motor.safetensors
 bad "no effect on controller passivity" "$mild" eval --controller passivity --task.actuator=motor.safetensors
