@@ -188,9 +188,11 @@ int point_step(const System *system, MildScratch *scratch, const Point *at, Poin
                int correct) {
     const int n = system->n;
     Row M[TWIST_MAX];
-    double moved[TWIST_MAX];
+    double moved[TWIST_MAX] = {0.0};
     contact_hessian(scratch);
     for (int k = 0; k < n; k++) {
+        /* the parts in use have been set, and n numbers are in them */
+        /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult) */
         moved[k] = correct ? 0.0 : at->twist.at[k] - system->free.at[k];
     }
     for (int i = 0; i < n; i++) {

@@ -200,8 +200,8 @@ static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, 
     }
     task_env_load(env, sim);
     robot_sim_sole_clearance(sim, terrain);
-    RobotReading reading;
-    TaskSensors sensors;
+    RobotReading reading = {.above = 0};
+    TaskSensors sensors = {0};
     task_env_read(env, sim, &reading);
     task_first_sensors(env, &reading, &sensors);
     observe(env, def, robot, &reading, &sensors, 1, view);
@@ -265,7 +265,7 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     int steps = (int)(TASK_PERIOD / def->physics_dt + 0.5);
     const RobotTable *table = robot_table(robot);
     const TaskRest *rest = rest_of(env);
-    TaskMotor motor[ROBOT_JOINTS_MAX];
+    TaskMotor motor[ROBOT_JOINTS_MAX] = {0};
     for (int i = 0; i < env->shape.joints; i++) {
         motor[i] = task_motor(env, def, table, &rest->gains, i);
     }
@@ -302,8 +302,8 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
 TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                        const float *action, int auto_reset, const TaskView *view,
                        const TaskProbe *probe) {
-    TaskSensors sensors;
-    RobotReading reading;
+    TaskSensors sensors = {0};
+    RobotReading reading = {.above = 0};
     task_begin_step(env, def, action);
     lend_map(env, def);
     robot_sim_set_solver(sim, def->newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL,
