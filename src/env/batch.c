@@ -66,7 +66,8 @@ static MildStatus check_def(const EnvsDef *def, MildError *error) {
                                    : NULL;
     return status == MILD_OK && missing
                ? mild_fail(error, MILD_ERROR_ARGUMENT,
-                           "%s is not supported by the batch engine; set train.robots = mujoco", missing)
+                           "%s is not supported by the batch engine; set train.robots = mujoco",
+                           missing)
                : status;
 }
 
