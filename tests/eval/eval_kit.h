@@ -14,12 +14,6 @@
 static Robot *robot;
 static TaskDef def; /* nominal, of the policy's file; what a test changes it puts back */
 
-/* Whether walks are only begun: MILD_TEST_SHORT, which scripts/check.sh sets for builds with a
- * sanitizer, for what a walk measures is the same in every build. */
-static inline int kit_short(void) {
-    return getenv("MILD_TEST_SHORT") != NULL;
-}
-
 static inline int kit_setup(void **state) {
     (void)state;
     MildError error = {0};

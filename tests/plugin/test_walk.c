@@ -257,7 +257,8 @@ typedef struct {
     const char *robot, *policy, *config;
 } Walker;
 
-/* `trials` walks of ten seconds at 0.5 m/s, as `mild eval` makes them. */
+/* `trials` walks of ten seconds at 0.5 m/s, as `mild eval` makes them; only begun where kit_short
+ * says so. */
 static EvalRow walk(const Walker *walker, const Robot *robot, const char *ground, double dt,
                     int trials) {
     char file[300], name[TRAIN_ROBOT_SIZE];
@@ -275,7 +276,7 @@ static EvalRow walk(const Walker *walker, const Robot *robot, const char *ground
     }
     Scene scene;
     assert_int_equal(scene_make(&scene, ground, 3, &error), MILD_OK);
-    EvalDef eval = {.speed = 0.5, .trials = trials, .seconds = 10, .seed = 1};
+    EvalDef eval = {.speed = 0.5, .trials = trials, .seconds = kit_short() ? 1 : 10, .seed = 1};
     EvalRow row;
     const EvalRun run = {.task = &def,
                          .robot = robot,
@@ -309,6 +310,9 @@ static void check_walk(const Walker *walker, const Robot *robot, const char *gro
                   mujoco.velocity, 1e3 * mujoco.penetration, own.success, own.velocity,
                   1e3 * own.penetration);
     assert_int_equal(mujoco.success, trials);
+    if (kit_short()) {
+        return;
+    }
     assert_true(fabs(mujoco.velocity - own.velocity) < 0.004 * own.velocity);
     assert_true(fabs(mujoco.penetration - own.penetration) < 0.004 * own.penetration);
 }
