@@ -3,8 +3,7 @@
 #include <time.h>
 
 #include "base/clock.h"
-#include "kit.h"
-#include "run/bench/bench.h"
+#include "bench_kit.h"
 #include "run/bench/record.h"
 #include "run/bench/step.h"
 
@@ -88,16 +87,6 @@ static void test_whole_walk(void **unused) {
     assert_true(lowest_floor < -5e-3 && lowest_floor > -70e-3);
     replay_destroy(replay);
     robot_destroy(robot);
-}
-
-static double value_of(const BenchReport *report, const char *name) {
-    for (int i = 0; i < report->count; i++) {
-        if (strcmp(report->rows[i].name, name) == 0) {
-            return report->rows[i].value;
-        }
-    }
-    fail_msg("no row %s", name);
-    return NAN;
 }
 
 /* Each row has the time of the case that it names; the phases are the step of the soft ground. */

@@ -3,8 +3,7 @@
 #include <pthread.h>
 
 #include "base/clock.h"
-#include "kit.h"
-#include "run/bench/bench.h"
+#include "bench_kit.h"
 #include "run/train/trainer.h"
 
 #define TICK 0.0009765625 /* [s] 1/1024, so that sums are exact */
@@ -48,16 +47,6 @@ MildStatus __wrap_train_iterate(Trainer *trainer, TrainReport *report, MildError
         told.ground += t->ground;
     }
     return status;
-}
-
-static double value_of(const BenchReport *report, const char *name) {
-    for (int i = 0; i < report->count; i++) {
-        if (strcmp(report->rows[i].name, name) == 0) {
-            return report->rows[i].value;
-        }
-    }
-    fail_msg("no row %s", name);
-    return NAN;
 }
 
 static void check_parts(int threads) {
