@@ -153,7 +153,7 @@ static void point_copy(const System *system, Point *to, const Point *from) {
 }
 
 void point_evaluate(const System *system, MildScratch *scratch, Point *point) {
-    double apart[TWIST_MAX];
+    double apart[TWIST_MAX] = {0.0}; /* its first n are set, which no compiler can know */
     contact_pass(scratch, system->dt, point->twist.at, system->first);
     for (int i = 0; i < system->n; i++) {
         apart[i] = point->impulse.at[i] - scratch->wrench[system->first + i];
