@@ -225,13 +225,61 @@ int mild_sole_elements(const MildSole *sole);
 /* [m] Edge of an element. The area of an element is its square. */
 double mild_sole_pitch(const MildSole *sole);
 /* Shorter side [m] of the outline's bounding box in the foot frame: Bekker's b, unless the material
- * has a plate_width of its own. That of mild_sole_concentric is that of its sole. */
+ * has a plate_width of its own. That of mild_sole_concentric is that of its sole. That of a surface
+ * is the second longest side of its bounding box. */
 double mild_sole_width(const MildSole *sole);
 /* Centres of the elements in the foot frame [m]: arrays of mild_sole_elements() numbers for x and
  * y, owned by the sole, and the common height z. */
 const double *mild_sole_x(const MildSole *sole);
 const double *mild_sole_y(const MildSole *sole);
 double mild_sole_z(const MildSole *sole);
+/* ---- surfaces: elements anywhere on a body (docs/model.md, "Surfaces") ---- */
+
+/* What a shape is. Sizes are those of a MuJoCo geom. */
+typedef enum {
+    MILD_SHAPE_BOX = 0,     /* size: half of the edge along x, y and z */
+    MILD_SHAPE_CAPSULE = 1, /* size[0]: radius. size[1]: half of its cylinder along z */
+    MILD_SHAPE_SPHERE = 2,  /* size[0]: radius */
+    MILD_SHAPE_MESH = 3     /* vertices and triangles */
+} MildShapeType;
+
+/* A part of a body. Pointers are not kept. */
+typedef struct {
+    int type;               /* MildShapeType */
+    double size[3];         /* [m] above 0 where the type has it; at most 10 */
+    double pos[3];          /* [m] its centre in the body's frame */
+    double quat[4];         /* [-] its orientation, w x y z, of any length; all 0: none */
+    const double *vertices; /* mesh: [vertex_count][3] [m] within 10 m, at most 2^20 */
+    int vertex_count;       /* mesh */
+    const int *triangles;   /* mesh: [triangle_count][3] vertices, counterclockwise from outside */
+    int triangle_count;     /* mesh */
+} MildShape;
+
+/* What a surface is made from. */
+typedef struct {
+    const MildShape *shapes; /* [count] they may overlap */
+    int count;               /* 1 .. 256 */
+    double pitch;            /* [m] edge of an element in the law, 0.001 .. 1 */
+} MildSurfaceDef;
+
+/* Makes a sole whose elements cover the outer surface of a body, each with an outward normal and an
+ * area near pitch^2. The frame is that of the body; its origin is what other functions call the
+ * ankle. Elements inside another shape are left out; for that a mesh must be closed. The areas sum
+ * to that of the surface. An element carries load while its normal points down by more than 10
+ * degrees below the horizontal, with its area projected on the horizontal plane when it touched
+ * down. A surface serves wherever a sole does, except in mild_sole_concentric, mild_model_match and
+ * a MildBatch, which refuse it. Returns NULL, with the name of the field in *error, when a number is
+ * out of range, when a closed mesh has its triangles turned inward, when nothing is left or more
+ * than 65536 elements are, or when out of memory. `def` is not kept. */
+MildSole *mild_sole_surface(const MildSurfaceDef *def, MildError *error);
+/* Arrays of mild_sole_elements() numbers owned by the sole, for each element of a surface: height
+ * above the frame's origin [m] (mild_sole_z is their mean), component of the outward unit normal
+ * along an axis of the frame, axis 0 .. 2 [-], and area [m^2]. NULL for a sole of
+ * mild_sole_create. */
+const double *mild_sole_surface_z(const MildSole *sole);
+const double *mild_sole_surface_normal(const MildSole *sole, int axis);
+const double *mild_sole_surface_area(const MildSole *sole);
+
 /* Makes a sole of one element for the concentric models. The element lies at the centroid of the
  * elements of `sole` and has their total area. It transmits a force but no moment about its centre.
  * Destroy it like any other sole. Returns NULL when out of memory. */

@@ -92,6 +92,11 @@ MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const Mil
     if (status != MILD_OK) {
         return status;
     }
+    if (mild_sole_surface_z(sole)) {
+        return mild_fail(
+            error, MILD_ERROR_ARGUMENT,
+            "sole: a model is matched under a sole of mild_sole_create, not a surface");
+    }
     const ModelRow *row = model_row((int)model);
     const double cells = mild_sole_elements(sole);
     const double cell = mild_sole_pitch(sole) * mild_sole_pitch(sole);

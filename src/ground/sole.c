@@ -3,19 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "mild/ground.h"
+#include "ground/sole.h"
 
-#define SOLE_ELEMENTS_MAX 65536
 #define SOLE_POINTS_MAX 4096 /* limited because the search for crossing edges is quadratic in it */
 #define RASTER_PHASES 16     /* raster offsets tried along each axis */
-
-struct MildSole {
-    int elements;
-    double pitch;    /* [m] */
-    double width;    /* [m] shorter side of the outline's bounding box */
-    double z;        /* [m] */
-    double values[]; /* [m] x[elements], then y[elements] */
-};
 
 /* A raster of square cells with edge `pitch` that covers the outline. */
 typedef struct {
@@ -290,6 +281,7 @@ static MildSole *sole_from_cells(const MildSoleDef *def, const Outline *outline,
         return NULL;
     }
     sole->elements = count;
+    sole->faces = 0;
     sole->pitch = def->pitch;
     sole->width = fmin(outline->high[0] - outline->low[0], outline->high[1] - outline->low[1]);
     sole->z = def->sole_z;
@@ -335,6 +327,11 @@ MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
 }
 
 MildSole *mild_sole_concentric(const MildSole *sole, MildError *error) {
+    if (sole->faces) {
+        mild_fail(error, MILD_ERROR_ARGUMENT,
+                  "sole: a surface has no middle; a concentric model needs mild_sole_create");
+        return NULL;
+    }
     MildSole *one = malloc(sizeof *one + 2 * sizeof(double));
     if (!one) {
         mild_fail(error, MILD_ERROR_MEMORY, "sole: out of memory for one element");

@@ -35,6 +35,13 @@ static MildStatus check_def(const MildBatchDef *def, MildError *error) {
         return mild_fail(error, MILD_ERROR_RANGE, "batch: max_iterations = %d is negative",
                          def->max_iterations);
     }
+    for (int f = 0; f < def->feet; f++) {
+        if (mild_sole_surface_z(def->soles[f])) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "batch: sole %d is a surface; a batch takes soles of mild_sole_create",
+                             f);
+        }
+    }
     if (def->device < MILD_BATCH_HOST) {
         return mild_fail(error, MILD_ERROR_RANGE,
                          "batch: device = %d; devices count from 0, MILD_BATCH_HOST is the CPU",

@@ -1,0 +1,32 @@
+/* Elements of a surface while it is being made (sole_surface.c, sole_mesh.c). */
+#ifndef MILD_GROUND_SAMPLES_H
+#define MILD_GROUND_SAMPLES_H
+
+#include "mild/ground.h"
+
+typedef struct {
+    double at[3];     /* [m] */
+    double normal[3]; /* [-] outward */
+    double area;      /* [m^2] */
+    int64_t key;      /* shape; within sole_mesh.c the cell */
+} Sample;
+
+typedef struct {
+    Sample *list;
+    int count;
+    int room;   /* of the list */
+    int most;   /* of count */
+    int failed; /* bool: out of memory */
+    int full;   /* bool: more than `most` */
+} Samples;
+
+void samples_add(Samples *samples, const Sample *sample);
+/* Adds elements of a mesh, in its own frame. */
+void mesh_sample(const MildShape *mesh, double pitch, Samples *samples);
+/* Bool: the surface has no border. *volume: that it encloses [m^3], negative where the triangles
+ * face inward. */
+int mesh_closed(const MildShape *mesh, double *volume);
+/* Bool: a point in the mesh's frame lies inside a closed mesh. */
+int mesh_contains(const MildShape *mesh, const double point[3]);
+
+#endif
