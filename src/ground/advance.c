@@ -1,4 +1,5 @@
 /* Last stage of a contact step: mild_ground_advance updates what the ground remembers. */
+#include "ground/faces.h"
 #include "ground/remember.h"
 #include "ground/scratch.h"
 
@@ -46,8 +47,9 @@ static void element_imprint(const Advance *a, const Memory *memory, int i, int e
     }
     const double x0 = a->foot->point_x[e];
     const double y0 = a->foot->point_y[e];
-    const double x1 = x0 + a->dt * motion_at(a->motion.x, s->x[i], s->y[i]);
-    const double y1 = y0 + a->dt * motion_at(a->motion.y, s->x[i], s->y[i]);
+    const SlotVelocity v = slot_velocity(s, i, &a->motion, a->foot->faces);
+    const double x1 = x0 + a->dt * v.x;
+    const double y1 = y0 + a->dt * v.y;
     if (!lifted && imprints_same_cell(a->imprints, x0, y0, x1, y1)) {
         return;
     }
@@ -142,8 +144,24 @@ MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t 
     return uneven ? foot.elements : (int)touched;
 }
 
-/* The general case: some elements are listed, or the ground keeps imprints. Returns how many
- * elements remember something. */
+/* An element that is not listed forgets. One of a surface that faces up near the ground is buried
+ * until it comes out; if it was loaded it leaves an imprint. Returns whether it remembers that. */
+static int element_unlisted(const Advance *a, const Memory *memory, int e) {
+    const FootScratch *foot = a->foot;
+    const int buried =
+        foot->faces && !foot->away && !(foot->share[e] > 0.0) && foot->depth[e] > foot->least;
+    const int32_t material = memory->material[e];
+    if (buried && a->imprints && material >= 0 &&
+        foot->derived[material & 0xff].material.recovery < 1.0) {
+        const ImprintElement left = {foot->point_x[e], foot->point_y[e], foot->pitch, a->rotation};
+        imprints_press(a->imprints, &left, memory->depth_max[e]);
+    }
+    memory_forget(memory, e, buried ? MATERIAL_BURIED : MATERIAL_NONE);
+    return buried;
+}
+
+/* The general case: some elements are listed, the ground keeps imprints, or the foot is a surface.
+ * Returns how many elements remember something. */
 static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
     const FootScratch *foot = a->foot;
     const Slots *s = &a->slot;
@@ -153,9 +171,14 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
     for (int i = 0; i < foot->active; i++, next++) {
         const int e = foot->element[i];
         for (; next < e; next++) {
-            memory_forget(memory, next, MATERIAL_NONE);
+            touched += element_unlisted(a, memory, next);
         }
-        const SlotVelocity v = slot_velocity(s, i, &a->motion, 1);
+        if (foot->faces && !(s->share[i] > 0.0)) {
+            memory_forget(memory, e, MATERIAL_BURIED);
+            touched++;
+            continue;
+        }
+        const SlotVelocity v = slot_velocity(s, i, &a->motion, SLOT_UNEVEN | foot->faces);
         const double middle = s->depth[i] + a->dt / 2 * v.descent;
         const int lifted = element_lifted(a, i, middle);
         const int carried = memory->material[e] >= 0;
@@ -168,6 +191,9 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
             slot_peak(a, memory, i, e, v.descent, middle);
         }
         memory->material[e] = lifted ? lifted_material : material[i];
+        if (foot->faces) {
+            memory->share[e] = lifted ? 0.0 : s->share[i];
+        }
         if (a->imprints && (carried || !lifted)) {
             element_imprint(a, memory, i, e, lifted);
         }
@@ -177,7 +203,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         touched += !lifted || lifted_material != MATERIAL_NONE;
     }
     for (; next < foot->elements; next++) {
-        memory_forget(memory, next, MATERIAL_NONE);
+        touched += element_unlisted(a, memory, next);
     }
     return touched;
 }
@@ -195,18 +221,18 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
     for (int f = 0; f < ground->feet; f++) {
         const FootScratch *foot = &scratch->foot[f];
         ground->uneven[f] = foot->uneven;
-        if (ground->touched[f] == 0 && foot->active == 0) {
+        if (ground->touched[f] == 0 && foot->active == 0 && (!foot->faces || foot->away)) {
             continue;
         }
         const Memory memory = ground_memory(ground, f);
         Advance advance = {.foot = foot,
                            .slot = foot->slot,
                            .imprints = ground->tiles > 0 ? &imprints : NULL,
-                           .rotation = input->rotation[f],
+                           .rotation = foot->faces ? faces_level : input->rotation[f],
                            .motion = foot_motion(foot, result->velocity + 6 * f),
                            .dt = input->dt,
                            .height = terrain->height};
-        const int all = foot->active == foot->elements && ground->tiles == 0;
+        const int all = foot->active == foot->elements && ground->tiles == 0 && !foot->faces;
         if (all) {
             /* The step may have been solved on a copy of this ground, whose memory the slots
              * hold. */

@@ -65,6 +65,11 @@ static double foot_caused(const FootScratch *foot, const Motion *change) {
         const double iy = s->iy[i] + s->slope_y[i] * iz;
         sum += ix * motion_at(v.x, s->x[i], s->y[i]) + iy * motion_at(v.y, s->x[i], s->y[i]);
     }
+    for (int i = 0; foot->faces && i < foot->active; i++) {
+        const double ix = s->ix[i] + s->slope_x[i] * s->iz[i];
+        const double iy = s->iy[i] + s->slope_y[i] * s->iz[i];
+        sum += s->z[i] * (ix * v.lift[0] + iy * v.lift[1]);
+    }
     return -0.5 * sum;
 }
 
@@ -91,7 +96,7 @@ static double friction_caused(const MildScratch *scratch, const MildContactInput
             twist[k] = result->velocity[6 * f + k] - input->free_velocity[6 * f + k];
         }
         const Motion change = foot_motion(foot, twist);
-        const int sums = !foot->uneven && input->solver == MILD_SOLVER_NEWTON;
+        const int sums = !foot->uneven && !foot->faces && input->solver == MILD_SOLVER_NEWTON;
         sum += sums ? level_caused(scratch->sums[f], &change) : foot_caused(foot, &change);
     }
     return sum;
@@ -118,8 +123,8 @@ static double slot_gift(const Slots *s, int i, const SlotVelocity *u, const Slot
 static double foot_gift(const FootScratch *foot, const Motion *before, const Motion *after) {
     double sum = 0.0;
     for (int i = 0; i < foot->active; i++) {
-        const SlotVelocity u = slot_velocity(&foot->slot, i, before, 0);
-        const SlotVelocity v = slot_velocity(&foot->slot, i, after, 0);
+        const SlotVelocity u = slot_velocity(&foot->slot, i, before, foot->faces);
+        const SlotVelocity v = slot_velocity(&foot->slot, i, after, foot->faces);
         sum += fmax(slot_gift(&foot->slot, i, &u, &v), 0.0);
     }
     return sum;
@@ -129,8 +134,8 @@ static void foot_turn(FootScratch *foot, const Motion *before, const Motion *aft
     const Slots *s = &foot->slot;
     foot->turned = 1;
     for (int i = 0; i < foot->active; i++) {
-        const SlotVelocity u = slot_velocity(s, i, before, 0);
-        const SlotVelocity v = slot_velocity(s, i, after, 0);
+        const SlotVelocity u = slot_velocity(s, i, before, foot->faces);
+        const SlotVelocity v = slot_velocity(s, i, after, foot->faces);
         if (!all && !(slot_gift(s, i, &u, &v) > 0.0)) {
             continue;
         }

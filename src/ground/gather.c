@@ -55,7 +55,8 @@ void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory,
         const int m = memory->material[e];
         s->slope_x[i] = foot->slope_x[e];
         s->slope_y[i] = foot->slope_y[e];
-        if (!before || m == MATERIAL_NONE || (m == MATERIAL_FREE && s->depth[i] <= 0.0)) {
+        if (!before || m == MATERIAL_NONE || m == MATERIAL_BURIED ||
+            (m == MATERIAL_FREE && s->depth[i] <= 0.0)) {
             continue;
         }
         const double plane = height + memory->plane[e] + memory->slope_x[e] * foot->point_x[e] +

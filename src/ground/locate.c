@@ -7,8 +7,7 @@
  * motion. */
 #define LISTED_EXTRA_SPEED 2.0
 
-/* Depth of every element, and the gradient of the ground under it. */
-static void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
+void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
     for (int i = 0; i < foot->padded; i++) {
         double slope[2];
         foot->depth[i] =
@@ -25,8 +24,12 @@ void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints,
         foot->arm[0][k] = R[3 * k + 2] * foot->z;
         foot->arm[1][k] = R[3 * k];
         foot->arm[2][k] = R[3 * k + 1];
+        foot->arm[3][k] = R[3 * k + 2];
     }
     foot->uneven = !terrain_is_level(terrain);
+    if (foot->faces) {
+        return; /* faces_list goes on, unless it is far away */
+    }
     if (foot->uneven || imprints || !terrain_is_uniform(terrain)) {
         foot_points(foot);
     }
@@ -58,10 +61,14 @@ static double foot_descent(const FootScratch *foot, const double *V, double stee
            steepest * (level + foot->radius * sqrt(tilt + V[5] * V[5]));
 }
 
-void foot_list(FootScratch *foot, const MildContactInput *input, double steepest, int f) {
+double foot_least(const FootScratch *foot, const MildContactInput *input, double steepest, int f) {
     const double descent = real_max(foot_descent(foot, input->velocity[f], steepest),
                                     foot_descent(foot, input->free_velocity + 6 * f, steepest));
-    const double least = -LISTED_MARGIN - input->dt * (descent + LISTED_EXTRA_SPEED);
+    return -LISTED_MARGIN - input->dt * (descent + LISTED_EXTRA_SPEED);
+}
+
+void foot_list(FootScratch *foot, const MildContactInput *input, double steepest, int f) {
+    const double least = foot_least(foot, input, steepest, f);
     const double *depth = foot->depth;
     double near = 0.0;
     /* Count whole vectors, unless that would count the padding. */

@@ -96,7 +96,7 @@ static void bekker_shear(const FootScratch *foot, const MildTerrain *terrain, in
             continue;
         }
         const Shear shear = {slot_mu(terrain, foot->slot_material[i]), material->cohesion,
-                             material->shear_length, area};
+                             material->shear_length, foot->faces ? s->share[i] * area : area};
         const ElementMemory memory = slot_memory(s, i);
         Element element = slot_element(s, i);
         element_shear(&element, &memory, &shear, foot->curves, dt, 1.0 / dt);

@@ -9,9 +9,10 @@
 #include "base/hd.h"
 
 typedef struct {
-    Real x[3]; /* [m/s], [1/s], [1/s] */
-    Real y[3]; /* the same */
-    Real z[3]; /* the same */
+    Real x[3];    /* [m/s], [1/s], [1/s] */
+    Real y[3];    /* the same */
+    Real z[3];    /* the same */
+    Real lift[3]; /* [1/s] along x, y and z, for each metre above the plane: surfaces only */
 } Motion;
 
 /* The field of a foot with the twist V (linear, angular). arm: the point (0, 0, z) of the frame's
@@ -23,6 +24,7 @@ MILD_HD Motion motion_of(const Real arm[3][3], const Real *V) {
         m.x[k] = V[4] * q[2] - V[5] * q[1] + (k ? 0 : V[0]);
         m.y[k] = V[5] * q[0] - V[3] * q[2] + (k ? 0 : V[1]);
         m.z[k] = V[3] * q[1] - V[4] * q[0] + (k ? 0 : V[2]);
+        m.lift[k] = 0;
     }
     return m;
 }

@@ -8,23 +8,23 @@
 #include "ground/friction.h"
 #include "ground/impulse.h"
 
-MILD_HD void slot_normal(const Slots *s, int i, double dt, const Motion *motion, int uneven,
+MILD_HD void slot_normal(const Slots *s, int i, double dt, const Motion *motion, int kind,
                          int curves, int stops) {
     const Element element = slot_element(s, i);
-    const SlotVelocity v = slot_velocity(s, i, motion, uneven);
+    const SlotVelocity v = slot_velocity(s, i, motion, kind);
     const Impulse normal = element_impulse(&element, curves, stops, dt, v.descent);
     s->iz[i] = normal.value;
     s->hzz[i] = normal.slope;
 }
 
 /* Normal impulses and their derivatives. */
-MILD_HD void foot_normal(const Slots *slot, int end, double dt, const Motion *m, int uneven,
+MILD_HD void foot_normal(const Slots *slot, int end, double dt, const Motion *m, int kind,
                          int curves, int stops) {
     const Slots local = *slot, *s = &local;
     const Motion motion = *m;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        slot_normal(s, i, dt, &motion, uneven, curves, stops);
+        slot_normal(s, i, dt, &motion, kind, curves, stops);
     }
 }
 
@@ -34,6 +34,10 @@ MILD_HD void foot_normal(const Slots *slot, int end, double dt, const Motion *m,
 static void foot_normals(const FootScratch *foot, double dt, const Motion *motion) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
+    if (foot->faces) {
+        foot_normal(s, end, dt, motion, SLOT_UNEVEN | SLOT_FACES, LAW_ALL, 1);
+        return;
+    }
     switch (law_variant(foot->curves)) {
     case LAW_LINE:
         if (foot->uneven) {
@@ -65,21 +69,23 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
  *
  *     h = -dI/dv = f + k c g^T
  *
- * sums: of I, x I and y I. held: bool, the friction bounds are slot.bound. turned: bool, some
+ * sums: of I, x I, y I and, for a surface, height I. kind: SLOT_UNEVEN, SLOT_FACES. held: bool, the friction bounds are slot.bound. turned: bool, some
  * elements have a reversal velocity in slot.turn (energy.c). */
-MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int uneven, int held,
-                           int turned, double sums[9]) {
+MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int kind, int held,
+                           int turned, double sums[12]) {
     const Slots local = *slot, *s = &local;
     const Motion motion = *m;
     double f0 = 0.0, f1 = 0.0, f2 = 0.0; /* of I */
     double a0 = 0.0, a1 = 0.0, a2 = 0.0; /* of x I */
     double b0 = 0.0, b1 = 0.0, b2 = 0.0; /* of y I */
-#pragma omp simd reduction(+ : f0, f1, f2, a0, a1, a2, b0, b1, b2)
+    double c0 = 0.0, c1 = 0.0, c2 = 0.0; /* of height I */
+#pragma omp simd reduction(+ : f0, f1, f2, a0, a1, a2, b0, b1, b2, c0, c1, c2)
     for (int i = 0; i < end; i++) {
         const double x = s->x[i];
         const double y = s->y[i];
-        const double vx = motion_at(motion.x, x, y);
-        const double vy = motion_at(motion.y, x, y);
+        const SlotVelocity v = slot_velocity(s, i, &motion, kind);
+        const double vx = v.x;
+        const double vy = v.y;
         const double iz = s->iz[i];
         const double k = s->hzz[i];
         const Element element = slot_element(s, i);
@@ -94,7 +100,7 @@ MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int unev
         double hxx = friction.fall_xx;
         double hxy = friction.fall_xy;
         double hyy = friction.fall_yy;
-        if (uneven) {
+        if (kind & SLOT_UNEVEN) {
             const double gx = -s->slope_x[i];
             const double gy = -s->slope_y[i];
             ix += gx * iz;
@@ -124,8 +130,13 @@ MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int unev
         b0 += y * ix;
         b1 += y * iy;
         b2 += y * iz;
+        if (kind & SLOT_FACES) {
+            c0 += s->z[i] * ix;
+            c1 += s->z[i] * iy;
+            c2 += s->z[i] * iz;
+        }
     }
-    const double all[9] = {f0, f1, f2, a0, a1, a2, b0, b1, b2};
+    const double all[12] = {f0, f1, f2, a0, a1, a2, b0, b1, b2, c0, c1, c2};
     memcpy(sums, all, sizeof all);
 }
 
@@ -139,8 +150,10 @@ static inline void cross_add(const double *p, const double *I, double *torque) {
 /* Picks the loop compiled for the ground under the foot. Reversals and held bounds are seldom: one
  * loop does for both. */
 static void foot_frictions(const FootScratch *foot, const Motion *motion, int held,
-                           double sums[9]) {
-    if (held || foot->turned) {
+                           double sums[12]) {
+    if (foot->faces) {
+        foot_friction(&foot->slot, foot_end(foot), motion, SLOT_UNEVEN | SLOT_FACES, held, 1, sums);
+    } else if (held || foot->turned) {
         foot_friction(&foot->slot, foot_end(foot), motion, 1, held, 1, sums);
     } else if (foot->uneven) {
         foot_friction(&foot->slot, foot_end(foot), motion, 1, 0, 0, sums);
@@ -160,11 +173,14 @@ static void pass(MildScratch *scratch, double dt, const double *twist, int first
         const Motion motion = foot_motion(foot, twist + (6 * f - first));
         foot_normals(foot, dt, &motion);
         foot_frictions(foot, &motion, held, sums);
-        /* sum of B^T I = (sum I, sum p x I), p = arm0 + x arm1 + y arm2 */
+        /* sum of B^T I = (sum I, sum p x I), p = arm0 + x arm1 + y arm2 + height arm3 */
         memcpy(wrench, sums, 3 * sizeof *sums);
         memset(wrench + 3, 0, 3 * sizeof *wrench);
         for (int k = 0; k < 3; k++) {
             cross_add(foot->arm[k], sums + 3 * k, wrench + 3);
+        }
+        if (foot->faces) {
+            cross_add(foot->arm[3], sums + 9, wrench + 3);
         }
     }
 }
@@ -180,11 +196,12 @@ void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int
 /* Sums over the foot of each entry of h times 1, x, y, x^2, xy, y^2. They determine the foot's
  * hessian, because p is linear in x and y. */
 typedef double Moments[3][3][6];
+/* The same of a surface, times 1, x, y, z, x^2, xy, y^2, yz, z^2, zx. */
+typedef double FacesMoments[3][3][10];
 
 /* Moments of three entries at a time, which are as many sums as the registers hold. */
-static void moments(const Slots *s, int end, const double *a, const double *b, const double *c,
-                    double sums[3][6]) {
-    const double *xs = s->x, *ys = s->y;
+static void moments(const double *xs, const double *ys, int end, const double *a, const double *b,
+                    const double *c, double sums[3][6]) {
     double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0;
     double b0 = 0.0, b1 = 0.0, b2 = 0.0, b3 = 0.0, b4 = 0.0, b5 = 0.0;
     double c0 = 0.0, c1 = 0.0, c2 = 0.0, c3 = 0.0, c4 = 0.0, c5 = 0.0;
@@ -219,18 +236,38 @@ static void moments(const Slots *s, int end, const double *a, const double *b, c
 static void foot_moments(const FootScratch *foot, Moments M) {
     const Slots *s = &foot->slot;
     int end = foot_end(foot);
-    moments(s, end, s->hxx, s->hxy, s->hxz, M[0]);
+    moments(s->x, s->y, end, s->hxx, s->hxy, s->hxz, M[0]);
     if (foot->uneven) {
-        moments(s, end, s->hyx, s->hyy, s->hyz, M[1]);
-        moments(s, end, s->hzx, s->hzy, s->hzz, M[2]);
+        moments(s->x, s->y, end, s->hyx, s->hyy, s->hyz, M[1]);
+        moments(s->x, s->y, end, s->hzx, s->hzy, s->hzz, M[2]);
         return;
     }
     double rest[3][6];
-    moments(s, end, s->hyy, s->hyz, s->hzz, rest);
+    moments(s->x, s->y, end, s->hyy, s->hyz, s->hzz, rest);
     memcpy(M[1][0], M[0][1], sizeof M[1][0]);
     memcpy(M[1][1], rest, 2 * sizeof *rest);
     memset(M[2], 0, 2 * sizeof M[2][0]);
     memcpy(M[2][2], rest[2], sizeof *rest);
+}
+
+/* Three times the loop for x and y, over (x, y), (y, z) and (z, x): a loop of its own would be
+ * faster and larger. */
+static void faces_moments(const FootScratch *foot, FacesMoments M) {
+    static const int place[3][6] = {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 6, 7, 8}, {0, 3, 1, 8, 9, 4}};
+    const Slots *s = &foot->slot;
+    const double *const at[3] = {s->x, s->y, s->z};
+    const double *const h[3][3] = {
+        {s->hxx, s->hxy, s->hxz}, {s->hyx, s->hyy, s->hyz}, {s->hzx, s->hzy, s->hzz}};
+    for (int row = 0; row < 3; row++) {
+        for (int pair = 0; pair < 3; pair++) {
+            double sums[3][6];
+            moments(at[pair], at[(pair + 1) % 3], foot_end(foot), h[row][0], h[row][1], h[row][2],
+                    sums);
+            for (int k = 0; k < 18; k++) {
+                M[row][k / 6][place[pair][k % 6]] = sums[k / 6][k % 6];
+            }
+        }
+    }
 }
 
 /* H = sum of B^T h B, with B = [1, -[p]x] and p = sum over k of (1, x, y)_k arm_k. With M_kl the
@@ -267,10 +304,44 @@ static void foot_hessian(const FootScratch *foot, const Moments M, double *H) {
     }
 }
 
+/* The same with p = sum over four factors (1, x, y, height). */
+static void faces_hessian(const FootScratch *foot, double *H) {
+    static const int product[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 9}, {2, 5, 6, 7}, {3, 9, 7, 8}};
+    FacesMoments M;
+    faces_moments(foot, M);
+    memset(H, 0, 36 * sizeof *H);
+    for (int k = 0; k < 4; k++) {
+        double rows[3][6] = {{0.0}};
+        for (int r = 0; r < 3; r++) {
+            for (int l = 0; l < 4; l++) {
+                const int at = product[k][l];
+                cross_add(foot->arm[l], (const double[3]){M[r][0][at], M[r][1][at], M[r][2][at]},
+                          rows[r] + 3);
+            }
+            for (int c = 0; c < 3; c++) {
+                rows[r][c] = M[r][c][k];
+            }
+        }
+        for (int c = 0; c < 6; c++) { /* column c of the rows is a force: k = 0 adds it, too */
+            const double force[3] = {rows[0][c], rows[1][c], rows[2][c]};
+            double torque[3] = {0.0};
+            cross_add(foot->arm[k], force, torque);
+            for (int r = 0; r < 3; r++) {
+                H[6 * r + c] += k == 0 ? force[r] : 0.0;
+                H[6 * (3 + r) + c] += torque[r];
+            }
+        }
+    }
+}
+
 void contact_hessian(MildScratch *scratch) {
     for (int f = 0; f < scratch->feet; f++) {
         const FootScratch *foot = &scratch->foot[f];
         if (foot->active == 0) {
+            continue;
+        }
+        if (foot->faces) {
+            faces_hessian(foot, scratch->hessian[f]);
             continue;
         }
         Moments sums;

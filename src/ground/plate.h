@@ -110,19 +110,25 @@ typedef struct {
     Cubic f[3];     /* the polynomials at that normal */
 } Plate;
 
-/* rotation: [9] of the foot. */
-PLATE_FN Plate plate_of(const Real *rotation) {
-    const Real side = rotation[8] > 0 ? -1 : 1; /* the face of the sole that points down */
+/* normal: outward, of a face that points down. */
+PLATE_FN Plate plate_facing(const Real normal[3]) {
     Plate plate;
-    plate.normal[0] = side * rotation[2];
-    plate.normal[1] = side * rotation[5];
-    plate.normal[2] = real_min(side * rotation[8], REAL(-1e-6));
+    plate.normal[0] = normal[0];
+    plate.normal[1] = normal[1];
+    plate.normal[2] = real_min(normal[2], REAL(-1e-6));
     plate.tilt = REAL_SQRT(plate.normal[0] * plate.normal[0] + plate.normal[1] * plate.normal[1]) +
                  ELEMENT_TINY;
     for (int k = 0; k < 3; k++) {
         cubic_at(space_coefficients(k), -plate.normal[2], plate.f[k]);
     }
     return plate;
+}
+
+/* rotation: [9] of the foot. */
+PLATE_FN Plate plate_of(const Real *rotation) {
+    const Real side = rotation[8] > 0 ? -1 : 1; /* the face of the sole that points down */
+    const Real normal[3] = {side * rotation[2], side * rotation[5], side * rotation[8]};
+    return plate_facing(normal);
 }
 
 /* Coefficients against the heading and upward, for motion at the horizontal speed `level` and the

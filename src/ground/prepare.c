@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ground/begin.h"
+#include "ground/faces.h"
 #include "ground/gather.h"
 #include "ground/locate.h"
 #include "ground/mixture.h"
@@ -10,22 +11,23 @@
 #include "ground/terrain.h"
 
 MILD_HD void slot_begin(const Slots *s, int i, double dt, double rate, const Motion *motion,
-                        int curves) {
-    const SlotVelocity v = slot_velocity(s, i, motion, 1); /* on level ground the slopes are 0 */
+                        int curves, int kind) {
+    const SlotVelocity v = slot_velocity(s, i, motion, kind);
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
     element_begin(&element, &memory, curves, dt, rate, v.descent);
     slot_store(s, i, &element);
 }
 
-/* Calls element_begin for all slots. */
-MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *now, int curves) {
+/* Calls element_begin for all slots. On level ground the slopes are 0. */
+MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *now, int curves,
+                         int faces) {
     const Slots local = *slot, *s = &local;
     const Motion motion = *now;
     const double rate = 1.0 / dt;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        slot_begin(s, i, dt, rate, &motion, curves);
+        slot_begin(s, i, dt, rate, &motion, curves, SLOT_UNEVEN | faces);
     }
 }
 
@@ -33,12 +35,16 @@ MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *no
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
+    if (foot->faces) {
+        slots_begin(s, end, dt, now, LAW_ALL, SLOT_FACES);
+        return;
+    }
     switch (law_variant(foot->curves)) {
-    case LAW_LINE: slots_begin(s, end, dt, now, LAW_LINE); return;
-    case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE); return;
-    case LAW_POWER: slots_begin(s, end, dt, now, LAW_POWER); return;
-    case LAW_ELASTIC: slots_begin(s, end, dt, now, LAW_ELASTIC); return;
-    default: slots_begin(s, end, dt, now, LAW_ALL); return;
+    case LAW_LINE: slots_begin(s, end, dt, now, LAW_LINE, 0); return;
+    case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 0); return;
+    case LAW_POWER: slots_begin(s, end, dt, now, LAW_POWER, 0); return;
+    case LAW_ELASTIC: slots_begin(s, end, dt, now, LAW_ELASTIC, 0); return;
+    default: slots_begin(s, end, dt, now, LAW_ALL, 0); return;
     }
 }
 
@@ -57,9 +63,9 @@ static int slots_sink(const Slots *slot, int end, double dt) {
 }
 
 MILD_HD void slot_drag(const Slots *s, int i, double dt, const Motion *now, const Motion *free,
-                       int curves) {
-    const double slower = slot_velocity(s, i, now, 1).descent;
-    const double faster = slot_velocity(s, i, free, 1).descent;
+                       int curves, int kind) {
+    const double slower = slot_velocity(s, i, now, kind).descent;
+    const double faster = slot_velocity(s, i, free, kind).descent;
     Element element = slot_element(s, i);
     element_drag(&element, curves, dt, real_max(faster - slower, 0.0));
     s->entry_speed[i] = element.entry_speed;
@@ -69,13 +75,13 @@ MILD_HD void slot_drag(const Slots *s, int i, double dt, const Motion *now, cons
 
 /* Calls element_drag for all slots. */
 MILD_HD void slots_drag(const Slots *slot, int end, double dt, const Motion *now,
-                        const Motion *free, int curves) {
+                        const Motion *free, int curves, int faces) {
     const Slots local = *slot, *s = &local;
     const Motion before = *now;
     const Motion after = *free;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        slot_drag(s, i, dt, &before, &after, curves);
+        slot_drag(s, i, dt, &before, &after, curves, SLOT_UNEVEN | faces);
     }
 }
 
@@ -92,8 +98,8 @@ static int slots_explicit(const FootScratch *foot, int materials, double dt, con
             continue; /* above the ground or on the unloading line */
         }
         const Element element = slot_element(s, i);
-        s->explicit_impulse[i] =
-            element_explicit(&element, dt, slot_velocity(s, i, free, 1).descent);
+        s->explicit_impulse[i] = element_explicit(
+            &element, dt, slot_velocity(s, i, free, SLOT_UNEVEN | foot->faces).descent);
     }
     return any;
 }
@@ -121,25 +127,52 @@ static void foot_direct(const FootScratch *foot, const MildTerrain *terrain, dou
     }
 }
 
+/* Gives the slots their elements, material and ground: what they remember, and where they are. */
+static void foot_slots(FootScratch *foot, const MildGround *ground, int f,
+                       const MildTerrain *terrain, const Memory *memory, const double *R) {
+    if (foot->active == foot->elements && ground->tiles == 0) {
+        slots_direct(foot, memory);
+    } else {
+        slots_gather(foot, memory);
+    }
+    slots_materials(foot, terrain, memory);
+    if (foot->uneven) {
+        slots_uneven(foot, ground->uneven[f], memory, terrain->height);
+    }
+    if (ground->tiles > 0) {
+        Imprints imprints = ground_imprints(ground);
+        slots_imprints(foot, &imprints, memory, R);
+    }
+}
+
+/* The same for a surface. Its elements face anywhere: imprints take them for level squares. */
+static void faces_slots(FootScratch *foot, const MildGround *ground, int f,
+                        const MildTerrain *terrain, const Memory *memory, const Motion *now,
+                        double dt) {
+    slots_gather(foot, memory);
+    faces_gather(foot, memory);
+    if (foot->uneven) {
+        slots_uneven(foot, ground->uneven[f], memory, terrain->height);
+    }
+    faces_laws(foot, terrain, memory, now, dt);
+    if (ground->tiles > 0) {
+        Imprints imprints = ground_imprints(ground);
+        slots_imprints(foot, &imprints, memory, faces_level);
+    }
+    faces_unload(foot, memory, now, dt);
+}
+
 static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
                          const MildTerrain *terrain, const MildContactInput *input) {
     const Memory memory = ground_memory(ground, f);
     const double *R = input->rotation[f];
+    const Motion now = foot_motion(foot, input->velocity[f]);
     foot_laws(foot, terrain);
-    if (foot->active == foot->elements && ground->tiles == 0) {
-        slots_direct(foot, &memory);
+    if (foot->faces) {
+        faces_slots(foot, ground, f, terrain, &memory, &now, input->dt);
     } else {
-        slots_gather(foot, &memory);
+        foot_slots(foot, ground, f, terrain, &memory, R);
     }
-    slots_materials(foot, terrain, &memory);
-    if (foot->uneven) {
-        slots_uneven(foot, ground->uneven[f], &memory, terrain->height);
-    }
-    if (ground->tiles > 0) {
-        Imprints imprints = ground_imprints(ground);
-        slots_imprints(foot, &imprints, &memory, R);
-    }
-    Motion now = foot_motion(foot, input->velocity[f]);
     Motion free = foot_motion(foot, input->free_velocity + 6 * f);
     foot_begin(foot, input->dt, &now);
     if (foot->stops) {
@@ -147,10 +180,12 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     }
     foot->stops = slots_explicit(foot, terrain->material_count, input->dt, &free);
     if (slots_sink(&foot->slot, foot_end(foot), input->dt)) {
-        if (foot->curves & ~LAW_CONE) {
-            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ALL);
+        if (foot->faces) {
+            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ALL, SLOT_FACES);
+        } else if (foot->curves & ~LAW_CONE) {
+            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ALL, 0);
         } else {
-            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_CONE);
+            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_CONE, 0);
         }
         foot->stops = 1;
     }
@@ -166,7 +201,12 @@ int contact_prepare(const MildGround *ground, const MildTerrain *terrain,
             slots_level(foot);
         }
         foot_locate(foot, terrain, ground->tiles > 0, input->position[f], input->rotation[f]);
-        foot_list(foot, input, foot->uneven ? terrain_steepest(terrain) : 0.0, f);
+        const double steepest = foot->uneven ? terrain_steepest(terrain) : 0.0;
+        if (foot->faces) {
+            faces_list(foot, terrain, input, steepest, f);
+        } else {
+            foot_list(foot, input, steepest, f);
+        }
         if (foot->active > 0) {
             foot_prepare(foot, ground, f, terrain, input);
         }

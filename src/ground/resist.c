@@ -2,6 +2,7 @@
 #include "ground/resist.h"
 
 #include "ground/element_law.h"
+#include "ground/faces.h"
 
 void mild_resist_plane(double beta, double gamma, double alpha[2]) {
     const Alpha plane = plane_alpha(cos(2.0 * beta), sin(2.0 * beta), cos(gamma), sin(gamma));
@@ -26,8 +27,8 @@ void mild_resist_space(const double normal[3], const double direction[3], double
 
 /* Adapts the law of one slot to its motion at the start of the step. */
 MILD_HD void slot_resist(const Slots *s, int i, double dt, double rate, const Plate *plate,
-                         const Motion *motion, int in_space, int curves) {
-    const SlotVelocity v = slot_velocity(s, i, motion, 1);
+                         const Motion *motion, int in_space, int curves, int kind) {
+    const SlotVelocity v = slot_velocity(s, i, motion, kind);
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
     element_resist(&element, &memory, plate, in_space, curves, dt, rate, s->strength[i], v.x, v.y,
@@ -45,7 +46,7 @@ MILD_HD void slots_resist(const Slots *slot, int end, double dt, const Plate *so
     const double rate = 1.0 / dt;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        slot_resist(s, i, dt, rate, &plate, &motion, in_space, LAW_LINE);
+        slot_resist(s, i, dt, rate, &plate, &motion, in_space, LAW_LINE, SLOT_UNEVEN);
     }
 }
 
@@ -66,10 +67,17 @@ static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain
         if (terrain->materials[foot->slot_material[i] & 0xff].model != model) {
             continue; /* the nearer material decides */
         }
-        if (s->flat_stiffness[i] != 0.0 || s->power_force[i] != 0.0) {
+        if (!slot_directed(s, i)) {
             continue; /* blended with another curve: stays a level plate */
         }
-        slot_resist(s, i, dt, 1.0 / dt, plate, now, in_space, foot->curves);
+        Plate own = *plate;
+        if (foot->faces) {
+            double normal[3];
+            face_normal(foot, foot->element[i], normal);
+            own = plate_facing(normal);
+        }
+        slot_resist(s, i, dt, 1.0 / dt, &own, now, in_space, foot->curves,
+                    SLOT_UNEVEN | foot->faces);
     }
 }
 
@@ -77,7 +85,7 @@ static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain
 MILD_HD void foot_resist(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
                          const double *rotation, const Motion *now, int in_space) {
     const Plate plate = plate_of(rotation);
-    if (terrain_only(terrain, model)) {
+    if (terrain_only(terrain, model) && !foot->faces) {
         slots_resist(&foot->slot, foot_end(foot), dt, &plate, now, in_space);
     } else {
         foot_resist_some(foot, terrain, model, dt, &plate, now, in_space);

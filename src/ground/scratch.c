@@ -2,10 +2,18 @@
 #include <string.h>
 
 #include "ground/scratch.h"
+#include "ground/sole.h"
 
 /* Number of arrays of FootScratch outside the slots: x, y, depth, slope_x, slope_y, point_x,
  * point_y, point_z, normal, tangent_x, tangent_y and flat; state and slip share the last one. */
 #define FOOT_ARRAYS 13
+#define FACES_ARRAYS 6 /* more of a surface: height, face[3], area and share */
+
+/* Numbers of a foot in the block. */
+static size_t foot_doubles(const MildSole *sole) {
+    return (size_t)sole_padded(sole) *
+           (SLOT_ARRAYS + FOOT_ARRAYS + (sole->faces ? FACES_ARRAYS : 0));
+}
 
 /* Takes the next `count` numbers of the block. */
 static double *take(double **at, int count) {
@@ -46,6 +54,37 @@ static void foot_set(FootScratch *foot, const MildSole *sole, double **at) {
     foot->slip = foot->state + foot->padded;
 }
 
+/* Takes and fills the arrays of a surface. */
+static void foot_set_faces(FootScratch *foot, const MildSole *sole, double **at) {
+    if (!sole->faces) {
+        return;
+    }
+    const double *points[3] = {mild_sole_x(sole), mild_sole_y(sole), mild_sole_surface_z(sole)};
+    foot->faces = SLOT_FACES;
+    foot->height = take(at, foot->padded);
+    foot->area = take(at, foot->padded);
+    foot->share = take(at, foot->padded);
+    for (int k = 0; k < 3; k++) {
+        double low = INFINITY, high = -INFINITY;
+        foot->face[k] = take(at, foot->padded);
+        for (int i = 0; i < foot->elements; i++) {
+            foot->face[k][i] = mild_sole_surface_normal(sole, k)[i];
+            low = fmin(low, points[k][i]);
+            high = fmax(high, points[k][i]);
+        }
+        foot->middle[k] = 0.5 * (low + high);
+        foot->half[k] = 0.5 * (high - low);
+    }
+    foot->radius = 0.0;
+    for (int i = 0; i < foot->elements; i++) {
+        foot->height[i] = points[2][i] - foot->z;
+        foot->area[i] = mild_sole_surface_area(sole)[i] / (foot->pitch * foot->pitch);
+        const double square =
+            points[0][i] * points[0][i] + points[1][i] * points[1][i] + points[2][i] * points[2][i];
+        foot->radius = fmax(foot->radius, sqrt(square));
+    }
+}
+
 /* Takes the arrays of the slots. No slot has a law yet. */
 static void foot_set_slots(FootScratch *foot, double **at, int32_t *integers) {
     double **arrays = (double **)&foot->own;
@@ -63,7 +102,8 @@ static void foot_set_slots(FootScratch *foot, double **at, int32_t *integers) {
 int scratch_fits(const MildScratch *scratch, const MildGround *ground) {
     int fits = scratch->feet == ground->feet;
     for (int f = 0; f < ground->feet; f++) {
-        fits = fits && scratch->foot[f].elements == ground->elements[f];
+        fits = fits && scratch->foot[f].elements == ground->elements[f] &&
+               !scratch->foot[f].faces == !(ground->faces >> f & 1);
     }
     return fits;
 }
@@ -74,10 +114,11 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
         return NULL;
     }
     int slots = 0;
+    size_t doubles = 0;
     for (int f = 0; f < feet; f++) {
         slots += sole_padded(soles[f]);
+        doubles += foot_doubles(soles[f]);
     }
-    const size_t doubles = (size_t)slots * (SLOT_ARRAYS + FOOT_ARRAYS);
     const size_t used = doubles * sizeof(double) + 2 * (size_t)slots * sizeof(int32_t);
     const size_t bytes = (used + 63) / 64 * 64;
     MildScratch *scratch = calloc(1, sizeof *scratch);
@@ -96,6 +137,7 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
     for (int f = 0; f < feet; f++) {
         FootScratch *foot = &scratch->foot[f];
         foot_set(foot, soles[f], &at);
+        foot_set_faces(foot, soles[f], &at);
         foot_set_slots(foot, &at, integers);
         integers += 2 * foot->padded;
     }
@@ -140,5 +182,10 @@ void foot_points(const FootScratch *foot) {
         foot->point_x[i] = ox + ex * x[i] + nx * y[i];
         foot->point_y[i] = oy + ey * x[i] + ny * y[i];
         foot->point_z[i] = oz + ez * x[i] + nz * y[i];
+    }
+    for (int i = 0; foot->faces && i < foot->padded; i++) {
+        foot->point_x[i] += foot->arm[3][0] * foot->height[i];
+        foot->point_y[i] += foot->arm[3][1] * foot->height[i];
+        foot->point_z[i] += foot->arm[3][2] * foot->height[i];
     }
 }

@@ -30,10 +30,22 @@ typedef struct FootScratch {
     double center_y; /* [m] */
     double radius;   /* [m] distance from the ankle to the farthest element */
 
+    /* A surface (faces.c): mild_scratch_create. NULL and 0 for a plane sole. */
+    int faces;         /* SLOT_FACES, or 0: all elements lie at z and face down */
+    double *height;    /* [padded] [m] above z, in the foot frame */
+    double *face[3];   /* [padded] [-] outward normal, foot frame */
+    double *area;      /* [padded] [-] area over pitch^2 */
+    double *share;     /* [padded] [-] projected area over pitch^2; 0: faces up. faces_locate */
+    double middle[3];  /* [m] of the bounding box, foot frame */
+    double half[3];    /* [m] half of its sides */
+    double least;      /* [m] elements deeper than this may touch: foot_list */
+    int away;          /* bool: no element can touch; depth and share are not set */
+    double away_depth; /* [m] then an upper bound on the depths */
+
     /* Pose: foot_locate. The vector from the ankle to an element is p = arm[0] + x arm[1] + y
-     * arm[2]. */
+     * arm[2] + height arm[3]. */
     double origin[3]; /* [m] the ankle, world */
-    double arm[3][3]; /* world: the frame's point (0, 0, z) [m], its x axis [-], its y axis [-] */
+    double arm[4][3]; /* world: the frame's point (0, 0, z) [m], its axes [-], z for a surface */
     int uneven;       /* bool: the terrain is not level; otherwise all slopes are 0 */
     double *depth;    /* [padded] [m] */
     double *slope_x;  /* [padded] [-] gradient of the ground; uneven ground only */
@@ -70,8 +82,8 @@ typedef struct FootScratch {
 struct MildScratch {
     int feet;
     FootScratch foot[MILD_FEET_MAX];
-    double sums[MILD_FEET_MAX][9]; /* [N s, N s m] of I, x I and y I at the last pass */
-    double wrench[TWIST_MAX];      /* [N s, N m s] sum of B^T I at the last pass */
+    double sums[MILD_FEET_MAX][12]; /* [N s, N s m] of I, x I, y I, height I at the last pass */
+    double wrench[TWIST_MAX];       /* [N s, N m s] sum of B^T I at the last pass */
     /* [kg, kg m, kg m^2] -d wrench/d twist of each foot, 6 x 6, row major. */
     double hessian[MILD_FEET_MAX][36];
     double velocity[TWIST_MAX]; /* [m/s, rad/s] V+ of the last solve */
@@ -93,13 +105,23 @@ static inline int foot_end(const FootScratch *foot) {
 
 /* The velocity field of a foot with the twist V. */
 static inline Motion foot_motion(const FootScratch *foot, const double *V) {
-    return motion_of(foot->arm, V);
+    Motion motion = motion_of(foot->arm, V);
+    if (foot->faces) {
+        const double *q = foot->arm[3];
+        motion.lift[0] = V[4] * q[2] - V[5] * q[1];
+        motion.lift[1] = V[5] * q[0] - V[3] * q[2];
+        motion.lift[2] = V[3] * q[1] - V[4] * q[0];
+    }
+    return motion;
 }
 
 /* p: vector from the ankle to the element of a slot, world axes. */
 static inline void slot_arm(const FootScratch *foot, const Slots *s, int i, double p[3]) {
     for (int k = 0; k < 3; k++) {
         p[k] = foot->arm[0][k] + foot->arm[1][k] * s->x[i] + foot->arm[2][k] * s->y[i];
+        if (foot->faces) {
+            p[k] += foot->arm[3][k] * s->z[i];
+        }
     }
 }
 

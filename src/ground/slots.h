@@ -21,6 +21,10 @@ typedef struct {
     double *y;     /* [m] */
     double *depth; /* [m] */
 
+    /* Of a surface alone: faces_gather, faces_laws. */
+    double *z;     /* [m] above the plane of the foot */
+    double *share; /* [-] projected area over pitch^2; 0: carries nothing */
+
     /* Gradient of the ground under it: slots_uneven; 0 where the foot is not `uneven`. */
     double *slope_x; /* [-] */
     double *slope_y; /* [-] */
@@ -173,13 +177,24 @@ typedef struct {
     double descent; /* [m/s] */
 } SlotVelocity;
 
-/* uneven: bool, the ground slopes. It must be a constant in a loop over slots. */
-MILD_HD SlotVelocity slot_velocity(const Slots *s, int i, const Motion *motion, int uneven) {
+/* What a loop over slots has to count with. */
+enum {
+    SLOT_UNEVEN = 1, /* the ground slopes */
+    SLOT_FACES = 2,  /* the elements do not lie in a plane */
+};
+
+/* kind: the bits above. It must be a constant in a loop over slots. */
+MILD_HD SlotVelocity slot_velocity(const Slots *s, int i, const Motion *motion, int kind) {
     SlotVelocity v;
     v.x = motion_at(motion->x, s->x[i], s->y[i]);
     v.y = motion_at(motion->y, s->x[i], s->y[i]);
     v.descent = -motion_at(motion->z, s->x[i], s->y[i]);
-    if (uneven) {
+    if (kind & SLOT_FACES) {
+        v.x += motion->lift[0] * s->z[i];
+        v.y += motion->lift[1] * s->z[i];
+        v.descent -= motion->lift[2] * s->z[i];
+    }
+    if (kind & SLOT_UNEVEN) {
         v.descent += s->slope_x[i] * v.x + s->slope_y[i] * v.y;
     }
     return v;

@@ -17,7 +17,7 @@ static void foot_scatter(const MildScratch *scratch, int f) {
     for (int i = 0; i < foot->active; i++) {
         const int e = foot->element[i];
         const Element element = slot_element(s, i);
-        const SlotVelocity v = slot_velocity(s, i, &motion, 1);
+        const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | foot->faces);
         const double beyond = element.depth + dt / 2 * v.descent - element.yield_depth;
         const int loaded = s->iz[i] > 0.0;
         const int deeper = beyond > 0.0;
@@ -42,6 +42,9 @@ MildElements mild_scratch_elements(const MildScratch *scratch, int f) {
     memset(foot->state, 0, 2 * (size_t)foot->padded); /* clears slip too, which follows it */
     for (int e = 0; e < foot->padded; e++) {
         foot->flat[e] = 1.0;
+    }
+    for (int e = 0; foot->away && e < foot->elements; e++) {
+        foot->depth[e] = foot->away_depth;
     }
     foot_points(&scratch->foot[f]);
     foot_scatter(scratch, f);
@@ -80,9 +83,19 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
         return;
     }
     result->depth_mean = sum / loaded;
+    double z = 0.0;    /* [N s m] */
+    double area = 0.0; /* [-] of the loaded elements, over pitch^2 */
+    for (int i = 0; foot->faces && i < foot->active; i++) {
+        z += s->z[i] * s->iz[i];
+        area += s->iz[i] > 0.0 ? s->share[i] : 0.0;
+    }
+    if (foot->faces) {
+        result->area = area * foot->pitch * foot->pitch;
+    }
     for (int k = 0; k < 3; k++) {
         result->pressure_center[k] =
-            position[k] + foot->arm[0][k] + (x * foot->arm[1][k] + y * foot->arm[2][k]) / force;
+            position[k] + foot->arm[0][k] +
+            (x * foot->arm[1][k] + y * foot->arm[2][k] + z * foot->arm[3][k]) / force;
     }
 }
 

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "ground/element.h"
+#include "ground/sole.h"
 
 #define MEMORY_DOUBLES 12 /* nine of ElementMemory, three of the plane */
 
@@ -16,28 +17,26 @@ int sole_padded(const MildSole *sole) {
     return (mild_sole_elements(sole) + VECTOR_LANES - 1) / VECTOR_LANES * VECTOR_LANES;
 }
 
-static size_t foot_bytes(int32_t padded) {
-    return ((size_t)padded * (MEMORY_DOUBLES * sizeof(double) + sizeof(int32_t)) + 63) / 64 * 64;
+/* Arrays of numbers of a foot. A surface has one more. faces: MildGround.faces. */
+static size_t foot_doubles(int32_t faces, int foot) {
+    return MEMORY_DOUBLES + (size_t)(faces >> foot & 1);
 }
 
-static size_t feet_bytes(const int32_t *padded, int feet) {
+static size_t feet_bytes(const MildGround *ground, int feet) {
     size_t bytes = 0;
     for (int f = 0; f < feet; f++) {
-        bytes += foot_bytes(padded[f]);
+        const size_t element = foot_doubles(ground->faces, f) * sizeof(double) + sizeof(int32_t);
+        bytes += ((size_t)ground->padded[f] * element + 63) / 64 * 64;
     }
     return bytes;
 }
 
 size_t mild_ground_bytes_imprints(const MildSole *const *soles, int feet, int tiles) {
-    int32_t padded[MILD_FEET_MAX];
     if (feet < 1 || feet > MILD_FEET_MAX) {
         return 0;
     }
-    for (int f = 0; f < feet; f++) {
-        padded[f] = sole_padded(soles[f]);
-    }
-    return sizeof(MildGround) + feet_bytes(padded, feet) +
-           (imprints_bytes(imprints_round(tiles, MILD_IMPRINT_TILES_MAX)) + 63) / 64 * 64;
+    const MildGround layout = ground_layout(soles, feet, tiles);
+    return mild_ground_size(&layout);
 }
 
 size_t mild_ground_bytes(const MildSole *const *soles, int feet) {
@@ -45,15 +44,14 @@ size_t mild_ground_bytes(const MildSole *const *soles, int feet) {
 }
 
 size_t mild_ground_size(const MildGround *ground) {
-    return sizeof(MildGround) + feet_bytes(ground->padded, ground->feet) +
+    return sizeof(MildGround) + feet_bytes(ground, ground->feet) +
            (imprints_bytes(ground->tiles) + 63) / 64 * 64;
 }
 
 Memory ground_memory(const MildGround *ground, int foot) {
     /* The only place that divides the block into arrays. Callers with a const ground must only read
      * through them. */
-    double *at =
-        (double *)((uintptr_t)ground + sizeof(MildGround) + feet_bytes(ground->padded, foot));
+    double *at = (double *)((uintptr_t)ground + sizeof(MildGround) + feet_bytes(ground, foot));
     Memory memory;
     double **arrays[] = {&memory.depth_max, &memory.middle,    &memory.front_speed,
                          &memory.drift,     &memory.pending_x, &memory.pending_y,
@@ -62,13 +60,18 @@ Memory ground_memory(const MildGround *ground, int foot) {
     for (int k = 0; k < MEMORY_DOUBLES; k++, at += ground->padded[foot]) {
         *arrays[k] = at;
     }
+    memory.share = NULL;
+    if (ground->faces >> foot & 1) {
+        memory.share = at;
+        at += ground->padded[foot];
+    }
     memory.material = (int32_t *)at;
     return memory;
 }
 
 Imprints ground_imprints(const MildGround *ground) {
-    ImprintKey *keys = (ImprintKey *)((uintptr_t)ground + sizeof(MildGround) +
-                                      feet_bytes(ground->padded, ground->feet));
+    ImprintKey *keys =
+        (ImprintKey *)((uintptr_t)ground + sizeof(MildGround) + feet_bytes(ground, ground->feet));
     return (Imprints){keys, (uint16_t *)(keys + ground->tiles), ground->tiles,
                       1.0 / ground->imprint_cell, ground->imprint_time};
 }
@@ -78,6 +81,7 @@ MildGround ground_layout(const MildSole *const *soles, int feet, int tiles) {
     for (int f = 0; f < feet; f++) {
         layout.elements[f] = mild_sole_elements(soles[f]);
         layout.padded[f] = sole_padded(soles[f]);
+        layout.faces |= soles[f]->faces << f;
     }
     layout.tiles = imprints_round(tiles, MILD_IMPRINT_TILES_MAX);
     layout.imprint_cell = 0.5 * mild_sole_pitch(soles[0]);
@@ -104,7 +108,7 @@ MildGround *mild_ground_init(void *block, const MildSole *const *soles, int feet
 static void foot_forget(MildGround *ground, int foot) {
     Memory memory = ground_memory(ground, foot);
     size_t n = (size_t)ground->padded[foot];
-    memset(memory.depth_max, 0, MEMORY_DOUBLES * n * sizeof(double));
+    memset(memory.depth_max, 0, foot_doubles(ground->faces, foot) * n * sizeof(double));
     for (size_t i = 0; i < n; i++) {
         memory.material[i] = MATERIAL_NONE;
     }
@@ -135,6 +139,9 @@ void memory_forget(const Memory *memory, int e, int32_t material) {
     memory->held_x[e] = 0.0;
     memory->held_y[e] = 0.0;
     memory->held_stiffness[e] = 0.0;
+    if (memory->share) {
+        memory->share[e] = 0.0;
+    }
     memory->material[e] = material;
 }
 
@@ -143,11 +150,12 @@ double mild_ground_imprint_at(const MildGround *ground, double x, double y) {
     return imprints_depth(&imprints, x, y);
 }
 
-/* Bool: an encoded material that a step can follow. */
-static int material_is_valid(int32_t material) {
+/* Bool: an encoded material that a step can follow. faces: bool, of a surface. */
+static int material_is_valid(int32_t material, int faces) {
     return material >= 0 ? (material & 0xff) < MILD_MATERIALS_MAX &&
                                (material >> 8 & 0xff) < MILD_MATERIALS_MAX && material >> 24 == 0
-                         : material == MATERIAL_NONE || material == MATERIAL_FREE;
+                         : material == MATERIAL_NONE || material == MATERIAL_FREE ||
+                               (faces && material == MATERIAL_BURIED);
 }
 
 /* Bool: the memory of every element of a foot is finite, on materials that exist. */
@@ -155,11 +163,12 @@ static int foot_is_valid(const MildGround *ground, int foot) {
     const Memory memory = ground_memory(ground, foot);
     const size_t padded = (size_t)ground->padded[foot];
     int valid = ground->touched[foot] >= 0 && ground->touched[foot] <= ground->padded[foot];
-    for (size_t i = 0; i < MEMORY_DOUBLES * padded; i++) {
+    for (size_t i = 0; i < foot_doubles(ground->faces, foot) * padded; i++) {
         valid &= isfinite(memory.depth_max[i]) != 0;
     }
     for (size_t i = 0; i < padded; i++) {
-        valid &= material_is_valid(memory.material[i]);
+        valid &= material_is_valid(memory.material[i], memory.share != NULL);
+        valid &= !memory.share || memory.share[i] >= 0.0;
     }
     return valid;
 }
@@ -167,8 +176,8 @@ static int foot_is_valid(const MildGround *ground, int foot) {
 /* Bool: the headers are those of grounds of the same soles and tiles. */
 static int layouts_agree(const MildGround *a, const MildGround *b) {
     return a->feet == b->feet && memcmp(a->elements, b->elements, sizeof a->elements) == 0 &&
-           memcmp(a->padded, b->padded, sizeof a->padded) == 0 && a->tiles == b->tiles &&
-           a->imprint_cell == b->imprint_cell;
+           memcmp(a->padded, b->padded, sizeof a->padded) == 0 && a->faces == b->faces &&
+           a->tiles == b->tiles && a->imprint_cell == b->imprint_cell;
 }
 
 int ground_is_valid(const MildGround *ground, const MildGround *layout) {

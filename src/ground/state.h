@@ -20,13 +20,16 @@ struct MildGround {
     int32_t tiles;                   /* of imprints; 0: the ground forgets at lift-off */
     uint32_t imprint_time;           /* counts the steps that could change an imprint */
     double imprint_cell;             /* [m] edge of a cell */
-    int32_t reserved[10];            /* pads to 128 bytes, so that the arrays behind are aligned */
+    int32_t faces;                   /* bit f: foot f is a surface */
+    int32_t reserved[9];             /* pads to 128 bytes, so that the arrays behind are aligned */
 };
 
 /* What an element stands on: the index of a material, or first | second << 8 | share << 16 for a
  * mixture of two (share 255: all of the second). Negative: the element carries no load. */
 #define MATERIAL_NONE (-1) /* no load, and nothing is remembered of the last step */
 #define MATERIAL_FREE (-2) /* no load, but it was near the ground in the last step */
+#define MATERIAL_BURIED                                                                            \
+    (-3) /* of a surface: faced up near the ground, and found no way out since */
 
 /* Memory of one foot: arrays [padded] inside the state block. The first nine are explained at
  * ElementMemory in element.h. */
@@ -43,6 +46,7 @@ typedef struct {
     double *plane;     /* [m] uneven ground: the last step had u = plane + slope . (x, y) - z */
     double *slope_x;   /* [-] gradient of that plane, world axes */
     double *slope_y;   /* [-] */
+    double *share;     /* [-] of a surface (else NULL): Slots.share at touchdown; 0 without load */
     int32_t *material; /* the material it touched down on, encoded as above */
 } Memory;
 

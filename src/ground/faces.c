@@ -1,0 +1,125 @@
+#include "ground/faces.h"
+
+#include "ground/locate.h"
+#include "ground/mixture.h"
+#include "ground/models.h"
+#include "ground/terrain.h"
+
+/* [-] Cosine of 80 degrees: an element whose normal is nearer to the horizontal carries nothing. */
+#define FACES_LEAST 0.17364817766693034
+
+const double faces_level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+/* [m] Upper bound on the depth of any element: its bounding box against the ground under its middle
+ * and the steepest slope from there. */
+static double faces_deepest(const FootScratch *foot, const MildTerrain *terrain, double steepest) {
+    double at[3], low = 0.0, reach = 0.0, slope[2];
+    for (int k = 0; k < 3; k++) {
+        at[k] = foot->origin[k];
+        for (int j = 0; j < 3; j++) {
+            at[k] += foot->arm[1 + j][k] * foot->middle[j];
+        }
+        low += fabs(foot->arm[1 + k][2]) * foot->half[k];
+        reach += foot->half[k] * foot->half[k];
+    }
+    const double height =
+        foot->uneven ? terrain_surface(terrain, at[0], at[1], slope) + steepest * sqrt(reach)
+                     : terrain->height;
+    return height - at[2] + low;
+}
+
+/* Depth and share of every element. */
+static void faces_locate(FootScratch *foot, const MildTerrain *terrain) {
+    const double ez = foot->arm[1][2], nz = foot->arm[2][2], tz = foot->arm[3][2];
+    foot_points(foot);
+    if (foot->uneven) {
+        foot_surface(foot, terrain);
+    } else {
+        for (int i = 0; i < foot->padded; i++) {
+            foot->depth[i] = terrain->height - foot->point_z[i];
+        }
+    }
+    for (int i = 0; i < foot->elements; i++) {
+        const double down =
+            -(ez * foot->face[0][i] + nz * foot->face[1][i] + tz * foot->face[2][i]);
+        foot->share[i] = down > FACES_LEAST ? down * foot->area[i] : 0.0;
+    }
+    for (int i = foot->elements; i < foot->padded; i++) {
+        foot->depth[i] = PADDING_DEPTH;
+    }
+}
+
+void faces_list(FootScratch *foot, const MildTerrain *terrain, const MildContactInput *input,
+                double steepest, int f) {
+    foot->least = foot_least(foot, input, steepest, f);
+    foot->away_depth = faces_deepest(foot, terrain, steepest);
+    foot->away = foot->away_depth <= foot->least;
+    foot->active = 0;
+    if (foot->away) {
+        return;
+    }
+    faces_locate(foot, terrain);
+    for (int i = 0; i < foot->elements; i++) {
+        foot->element[foot->active] = i;
+        foot->active += foot->share[i] > 0.0 && foot->depth[i] > foot->least;
+    }
+}
+
+void faces_gather(const FootScratch *foot, const Memory *memory) {
+    const Slots *s = &foot->slot;
+    for (int i = 0; i < foot->active; i++) {
+        const int e = foot->element[i];
+        s->z[i] = foot->height[e];
+        s->share[i] = memory->material[e] >= 0 ? memory->share[e] : foot->share[e];
+    }
+    for (int i = foot->active; i < foot_end(foot); i++) {
+        s->z[i] = s->share[i] = 0.0;
+    }
+}
+
+/* Multiplies what a slot's law makes of forces and masses. */
+static void slot_scale(const Slots *s, int i, double share) {
+    double *const scaled[] = {s->flat_stiffness, s->line_stiffness, s->mass_rate,     s->drag_rate,
+                              s->bed_stiffness,  s->power_force,    s->elastic_force, s->exit_drag,
+                              s->entry_drag,     s->strength,       s->k_drift,       s->b_drift};
+    for (size_t k = 0; k < sizeof scaled / sizeof *scaled; k++) {
+        scaled[k][i] *= share;
+    }
+}
+
+/* [m] Depth of a slot in the middle of the last step, by its present speed. */
+static double slot_middle(const Slots *s, int i, const Motion *now, double dt) {
+    return s->depth[i] - 0.5 * dt * slot_velocity(s, i, now, SLOT_UNEVEN | SLOT_FACES).descent;
+}
+
+void faces_laws(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory,
+                const Motion *now, double dt) {
+    const Slots *s = &foot->slot;
+    for (int i = 0; i < foot->active; i++) {
+        foot->slot_material[i] = MATERIAL_NONE; /* scaled in the last step */
+    }
+    slots_materials(foot, terrain, memory);
+    for (int i = 0; i < foot->active; i++) {
+        const int e = foot->element[i];
+        const int model = terrain->materials[foot->slot_material[i] & 0xff].model;
+        const int buried = memory->material[e] == MATERIAL_BURIED;
+        if (buried && !(s->recovery[i] < 1.0) && slot_middle(s, i, now, dt) > 0.0) {
+            s->share[i] = 0.0;
+        }
+        /* The theory's coefficients count the slope themselves. */
+        const int directed = (model_row(model)->motion & LAW_RESIST) && slot_directed(s, i);
+        slot_scale(s, i, directed && s->share[i] > 0.0 ? foot->area[e] : s->share[i]);
+    }
+}
+
+void faces_unload(const FootScratch *foot, const Memory *memory, const Motion *now, double dt) {
+    const Slots *s = &foot->slot;
+    for (int i = 0; i < foot->active; i++) {
+        const double lasting = 1.0 - s->recovery[i];
+        const double m0 = slot_middle(s, i, now, dt);
+        if (memory->material[foot->element[i]] == MATERIAL_BURIED && lasting > 0.0 && m0 > 0.0) {
+            const double least = real_max(m0 / lasting, m0 + ELEMENT_ELASTIC);
+            s->depth_max[i] = real_max(s->depth_max[i], least);
+        }
+    }
+}
