@@ -35,13 +35,7 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
     switch (law_variant(foot->curves)) {
-    case LAW_LINE:
-        if (foot->uneven) {
-            foot_normal(s, end, dt, motion, 1, LAW_LINE, 0);
-        } else {
-            foot_normal(s, end, dt, motion, 0, LAW_LINE, 0);
-        }
-        return;
+    case LAW_LINE: foot_normal(s, end, dt, motion, 1, LAW_LINE, 0); return;
     case LAW_CONE:
         if (foot->uneven || foot->stops) {
             foot_normal(s, end, dt, motion, 1, LAW_CONE, 1);
@@ -69,6 +63,9 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
  * elements have a reversal velocity in slot.turn (energy.c). */
 MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int uneven, int held,
                            int turned, double sums[9]) {
+    if (end < VECTOR_LANES) {
+        return; /* never: callers skip empty feet. The compiler then adds no loop for a remainder */
+    }
     const Slots local = *slot, *s = &local;
     const Motion motion = *m;
     double f0 = 0.0, f1 = 0.0, f2 = 0.0; /* of I */
@@ -184,6 +181,10 @@ typedef double Moments[3][3][6];
 /* Moments of three entries at a time, which are as many sums as the registers hold. */
 static void moments(const Slots *s, int end, const double *a, const double *b, const double *c,
                     double sums[3][6]) {
+    if (end < VECTOR_LANES) {
+        return; /* as in foot_friction */
+    }
+    end &= -VECTOR_LANES; /* which it is: for the compiler, which does not see the caller */
     const double *xs = s->x, *ys = s->y;
     double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0;
     double b0 = 0.0, b1 = 0.0, b2 = 0.0, b3 = 0.0, b4 = 0.0, b5 = 0.0;
