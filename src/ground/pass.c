@@ -63,9 +63,6 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
  * elements have a reversal velocity in slot.turn (energy.c). */
 MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int uneven, int held,
                            int turned, double sums[9]) {
-    if (end < VECTOR_LANES) {
-        return; /* never: callers skip empty feet. The compiler then adds no loop for a remainder */
-    }
     const Slots local = *slot, *s = &local;
     const Motion motion = *m;
     double f0 = 0.0, f1 = 0.0, f2 = 0.0; /* of I */
@@ -137,12 +134,16 @@ static inline void cross_add(const double *p, const double *I, double *torque) {
  * loop does for both. */
 static void foot_frictions(const FootScratch *foot, const Motion *motion, int held,
                            double sums[9]) {
+    const int end = foot_end(foot);
+    if (end < VECTOR_LANES) {
+        return; /* never: pass skips empty feet. The compiler then adds no loop for a remainder */
+    }
     if (held || foot->turned) {
-        foot_friction(&foot->slot, foot_end(foot), motion, 1, held, 1, sums);
+        foot_friction(&foot->slot, end, motion, 1, held, 1, sums);
     } else if (foot->uneven) {
-        foot_friction(&foot->slot, foot_end(foot), motion, 1, 0, 0, sums);
+        foot_friction(&foot->slot, end, motion, 1, 0, 0, sums);
     } else {
-        foot_friction(&foot->slot, foot_end(foot), motion, 0, 0, 0, sums);
+        foot_friction(&foot->slot, end, motion, 0, 0, 0, sums);
     }
 }
 
@@ -182,7 +183,7 @@ typedef double Moments[3][3][6];
 static void moments(const Slots *s, int end, const double *a, const double *b, const double *c,
                     double sums[3][6]) {
     if (end < VECTOR_LANES) {
-        return; /* as in foot_friction */
+        return; /* never, as in foot_frictions */
     }
     end &= -VECTOR_LANES; /* which it is: for the compiler, which does not see the caller */
     const double *xs = s->x, *ys = s->y;
