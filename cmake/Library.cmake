@@ -47,6 +47,7 @@ function(mild_library name description objects requires)
     target_link_options(${name}_shared PRIVATE -Wl,--no-undefined)
   endif()
   target_link_options(${name}_shared PRIVATE -Wl,-z,noseparate-code) # no pages of padding: 4 kB
+  target_link_options(${name}_shared PRIVATE -Wl,-Bsymbolic-functions) # calls inside need no table of addresses: 2 kB
   mild_archive(${name}_static ${name} "${objects}" ${ARGN})
   # while the version begins with 0, a new minor version may change the interface
   set_target_properties(${name}_shared PROPERTIES VERSION ${PROJECT_VERSION}

@@ -132,8 +132,8 @@ def ablations(given):
     whole, without = ([r for r in rows if r["without"] == part] for part in ("nothing", "z"))
     falls = sum(r["success"] for r in whole) - sum(r["success"] for r in without)
     error = [mean(abs(r["velocity"] - r["speed"]) for r in own if r["success"]) for own in (whole, without)]
-    text = """The shipped policy on seven grounds at 0.6 and 1.0 m/s. z and estimates: their means over the same trials in their place;
-modulation: z~ = z; history: the newest frame in all places. Speed error and cost: of rows in which anybody stayed up."""
+    text = """The shipped policy on seven grounds at 0.6 and 1.0 m/s. z, estimates, and modulation's theta1 and theta2: their means over the same trials
+in their place; history: the newest frame in all places. Speed error and cost: of rows in which anybody stayed up."""
     matters = falls > 0.05 * sum(r["trials"] for r in whole) or error[1] > 1.5 * error[0]
     claim = Claim("the latent adapts the walk", "stated",
                   f"without z {falls} more falls, speed error {error[0]:.3f} -> {error[1]:.3f} m/s", matters, "hardware")

@@ -164,14 +164,14 @@ static MildStatus evaluate_rows(Eval *e, FILE *table, MildError *error) {
 
 /* The means of all trials with the whole controller take the place of a part of it. */
 static MildStatus ablate(Eval *e, InsideLog *log, MildError *error) {
-    const int meant = e->ablation == ABLATION_z || e->ablation == ABLATION_estimates;
-    const size_t width = (size_t)log->inside->latent + (size_t)log->inside->estimates;
+    const LearnedInside *in = log->inside;
+    const size_t width = (size_t)(in->latent + in->estimates + in->theta);
     double *sum = calloc(width, sizeof *sum);
     float *means = calloc(width, sizeof *means);
     MildStatus status = MILD_OK;
     if (!sum || !means) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
-    } else if (meant) {
+    } else if (ablation_has_means(e->ablation)) {
         const EvalDef whole = e->eval;
         log->sum = sum;
         e->eval.stances = e->eval.actions = e->eval.track = NULL;
@@ -436,9 +436,10 @@ int cmd_eval(int argc, char **argv) {
          "also write what passes between the networks at every decision, as CSV: trial, ground, "
          "speed, time, phase of the gait, z, z modulated, theta1, theta2, estimates"},
         {"ablate", CLI_TEXT, &e->ablate, 0, 0, "PART",
-         "take a part out of the policy: z (its mean instead), modulation (z as it is), estimates "
-         "(their means for the actor), history (the newest frame in each place); means are those "
-         "of the whole policy in the same trials of all rows, which run once more for them"},
+         "take a part out of the policy: z (its mean instead), modulation (the means of "
+         "theta1 and theta2), estimates (their means for the actor), history (the newest frame in "
+         "each place); means are those of the whole policy in the same trials of all rows, which "
+         "run once more for them"},
         {"stances", CLI_OUTPUT, &e->stances, 0, 0, "FILE",
          "also write each stance of each foot as CSV: ground, speed, trial, foot, start, duration, "
          "depth, slip along the heading and to the left, apex of the swing before"},

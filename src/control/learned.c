@@ -69,6 +69,11 @@ MildStatus ablation_find(const char *name, Ablation *ablation, MildError *error)
                      name, text_nearest(name, (const char **)names + 1, ABLATIONS - 1));
 }
 
+int ablation_has_means(Ablation ablation) {
+    return ablation == ABLATION_z || ablation == ABLATION_estimates ||
+           ablation == ABLATION_modulation;
+}
+
 MildStatus learned_watch(Controller *controller, const LearnedInside **inside, MildError *error) {
     Learned *learned = controller->self;
     if (controller->act != learned_act) {
@@ -81,8 +86,8 @@ MildStatus learned_watch(Controller *controller, const LearnedInside **inside, M
     const size_t rows = (size_t)learned->rows_max, latent = (size_t)def->latent,
                  estimates = (size_t)def->estimates, theta = (size_t)policy_theta(learned->policy);
     if (!learned->seen) {
-        learned->seen = calloc(rows * (2 * latent + theta + estimates) + latent + estimates,
-                               sizeof *learned->seen);
+        learned->seen =
+            calloc((rows + 1) * (2 * latent + theta + estimates), sizeof *learned->seen);
     }
     if (!learned->seen) {
         return mild_fail(error, MILD_ERROR_MEMORY, "controller: out of memory for %d rows",
@@ -103,14 +108,16 @@ void learned_ablate(Controller *controller, Ablation ablation, const float *mean
     Learned *learned = controller->self;
     const LearnedInside *seen = &learned->inside;
     const size_t latent = (size_t)seen->latent, estimates = (size_t)seen->estimates;
+    const size_t bytes = (latent + estimates + (size_t)seen->theta) * sizeof *means;
     float *kept = seen->rows.estimates + (size_t)learned->rows_max * estimates;
-    memset(&learned->instead, 0, sizeof learned->instead);
+    PolicyInstead *instead = &learned->instead;
+    memset(instead, 0, sizeof *instead);
     learned->newest = ablation == ABLATION_history;
-    learned->instead.plain = ablation == ABLATION_modulation;
-    if (ablation == ABLATION_z || ablation == ABLATION_estimates) {
-        memcpy(kept, means, (latent + estimates) * sizeof *kept);
-        learned->instead.latent = ablation == ABLATION_z ? kept : NULL;
-        learned->instead.estimates = ablation == ABLATION_estimates ? kept + latent : NULL;
+    if (ablation_has_means(ablation)) {
+        memcpy(kept, means, bytes);
+        instead->latent = ablation == ABLATION_z ? kept : NULL;
+        instead->estimates = ablation == ABLATION_estimates ? kept + latent : NULL;
+        instead->theta = ablation == ABLATION_modulation ? kept + latent + estimates : NULL;
     }
 }
 

@@ -15,7 +15,7 @@ Policy *learned_policy(const char *path, const Robot *robot, char *note, int not
 #define ABLATION_LIST(X)                                                                           \
     X(none, "")                                                                                    \
     X(z, "z is its mean")                                                                          \
-    X(modulation, "z~ is z")                                                                       \
+    X(modulation, "theta1 and theta2 are their means")                                             \
     X(estimates, "the actor's estimates are their means")                                          \
     X(history, "the older frames are the newest one")
 #define ABLATION_ENUM(name, what) ABLATION_##name,
@@ -24,6 +24,9 @@ typedef enum { ABLATION_LIST(ABLATION_ENUM) ABLATIONS } Ablation;
 
 /* The ablation of this name, but for `none`. The message contains the nearest name. */
 MildStatus ablation_find(const char *name, Ablation *ablation, MildError *error);
+
+/* Bool: means take the place of the part. */
+int ablation_has_means(Ablation ablation);
 
 /* What passed inside in the last call of `act`, with the widths of its rows. */
 typedef struct {
@@ -34,8 +37,8 @@ typedef struct {
 /* From now on each call of `act` is seen. Fails for a controller that is not learned. The result
  * lasts as long as the controller. */
 MildStatus learned_watch(Controller *controller, const LearnedInside **inside, MildError *error);
-/* Takes a part out, from the next call of `act` on. means: [latent] of z, then [estimates], for z
- * and estimates; copied. The controller is watched. */
+/* Takes a part out, from the next call of `act` on. means: [latent] of z, then [estimates], then
+ * [theta], for these three; copied. The controller is watched. */
 void learned_ablate(Controller *controller, Ablation ablation, const float *means);
 
 #endif

@@ -1,4 +1,5 @@
 /* Last stage of a contact step: mild_ground_advance updates what the ground remembers. */
+#define POWER_CALLED /* power.h: no vector loop here needs a power */
 #include "ground/faces.h"
 #include "ground/remember.h"
 #include "ground/scratch.h"

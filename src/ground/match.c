@@ -1,5 +1,6 @@
 /* Public functions on the law of a model: one element, a level sole, and the material of another
  * model that sinks equally deep. */
+#define POWER_CALLED /* power.h: no vector loop here needs a power */
 #include "ground/models.h"
 
 #include <math.h>

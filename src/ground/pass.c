@@ -39,13 +39,7 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
         return;
     }
     switch (law_variant(foot->curves)) {
-    case LAW_LINE:
-        if (foot->uneven) {
-            foot_normal(s, end, dt, motion, 1, LAW_LINE, 0);
-        } else {
-            foot_normal(s, end, dt, motion, 0, LAW_LINE, 0);
-        }
-        return;
+    case LAW_LINE: foot_normal(s, end, dt, motion, 1, LAW_LINE, 0); return;
     case LAW_CONE:
         if (foot->uneven || foot->stops) {
             foot_normal(s, end, dt, motion, 1, LAW_CONE, 1);
@@ -151,14 +145,18 @@ static inline void cross_add(const double *p, const double *I, double *torque) {
  * loop does for both. */
 static void foot_frictions(const FootScratch *foot, const Motion *motion, int held,
                            double sums[12]) {
+    const int end = foot_end(foot);
+    if (end < VECTOR_LANES) {
+        return; /* never: pass skips empty feet. The compiler then adds no loop for a remainder */
+    }
     if (foot->faces) {
-        foot_friction(&foot->slot, foot_end(foot), motion, SLOT_UNEVEN | SLOT_FACES, held, 1, sums);
+        foot_friction(&foot->slot, end, motion, SLOT_UNEVEN | SLOT_FACES, held, 1, sums);
     } else if (held || foot->turned) {
-        foot_friction(&foot->slot, foot_end(foot), motion, 1, held, 1, sums);
+        foot_friction(&foot->slot, end, motion, 1, held, 1, sums);
     } else if (foot->uneven) {
-        foot_friction(&foot->slot, foot_end(foot), motion, 1, 0, 0, sums);
+        foot_friction(&foot->slot, end, motion, 1, 0, 0, sums);
     } else {
-        foot_friction(&foot->slot, foot_end(foot), motion, 0, 0, 0, sums);
+        foot_friction(&foot->slot, end, motion, 0, 0, 0, sums);
     }
 }
 
@@ -202,6 +200,10 @@ typedef double FacesMoments[3][3][10];
 /* Moments of three entries at a time, which are as many sums as the registers hold. */
 static void moments(const double *xs, const double *ys, int end, const double *a, const double *b,
                     const double *c, double sums[3][6]) {
+    if (end < VECTOR_LANES) {
+        return; /* never, as in foot_frictions */
+    }
+    end &= -VECTOR_LANES; /* which it is: for the compiler, which does not see the caller */
     double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0;
     double b0 = 0.0, b1 = 0.0, b2 = 0.0, b3 = 0.0, b4 = 0.0, b5 = 0.0;
     double c0 = 0.0, c1 = 0.0, c2 = 0.0, c3 = 0.0, c4 = 0.0, c5 = 0.0;

@@ -31,7 +31,8 @@ MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *no
     }
 }
 
-/* Picks the loop compiled for the curves of the ground under the foot. */
+/* Picks the loop compiled for the curves of the ground under the foot. A line is a cone of which all
+ * numbers but the line's are 0: one loop does for both. */
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
@@ -40,7 +41,7 @@ static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
         return;
     }
     switch (law_variant(foot->curves)) {
-    case LAW_LINE: slots_begin(s, end, dt, now, LAW_LINE, 0); return;
+    case LAW_LINE:
     case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 0); return;
     case LAW_POWER: slots_begin(s, end, dt, now, LAW_POWER, 0); return;
     case LAW_ELASTIC: slots_begin(s, end, dt, now, LAW_ELASTIC, 0); return;

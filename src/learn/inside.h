@@ -14,7 +14,7 @@ typedef struct {
 typedef struct {
     const float *latent;    /* [latent] z; NULL: mu */
     const float *estimates; /* [estimates], for the actor alone; NULL: the encoder's */
-    int plain;              /* bool: z~ = z, theta1 = 1 and theta2 = 0 */
+    const float *theta;     /* [policy_theta]; NULL: that of the modulation */
 } PolicyInstead;
 
 #endif

@@ -163,11 +163,12 @@ static void modulate(const Network *network, const float *mu, const float *noise
                      const float *theta, const PolicyInstead *instead, float *modulated) {
     const int latent = network->def.latent, per_dimension = network->def.modulation_per_dimension;
     const float *logvar = mu + latent;
+    theta = instead && instead->theta ? instead->theta : theta;
     for (int j = 0; j < latent; j++) {
         float theta1 = theta[per_dimension ? j : 0], theta2 = theta[per_dimension ? latent + j : 1];
         const float z =
             instead && instead->latent ? instead->latent[j] : loss_latent(mu, logvar, noise, j);
-        modulated[j] = instead && instead->plain ? z : theta1 * z + theta2;
+        modulated[j] = theta1 * z + theta2;
     }
 }
 

@@ -155,8 +155,8 @@ static double worst_gap(const float *a, const float *b, int count) {
     return worst;
 }
 
-/* The same file, but that z~ = z: its modulation says 1 and 0 whatever it is told. */
-static void plain_actions(Policy *policy, const float *history, float *actions) {
+/* The same file, but that its modulation says `theta` whatever it is told. */
+static void actions_at(Policy *policy, const float *theta, const float *history, float *actions) {
     const char *name;
     const Mlp *modulation = network_mlp(&policy->network, 2, &name);
     const MlpLayer *last = &modulation->layer[modulation->layers - 1];
@@ -167,12 +167,12 @@ static void plain_actions(Policy *policy, const float *history, float *actions) 
         p[last->weight + i] = 0;
     }
     for (int i = 0; i < width; i++) {
-        p[last->bias + i] = i < width / 2;
+        p[last->bias + i] = theta[i];
     }
     policy_act(policy, NULL, ENVS, history, actions, NULL, NULL);
 }
 
-/* Rows of a controller without a part. means: latent, then estimates. */
+/* Rows of a controller without a part. means: latent, estimates, theta. */
 static const LearnedInside *act_without(Controller *controller, Ablation part, const float *means,
                                         float *actions) {
     MildError error = {0};
@@ -183,7 +183,7 @@ static const LearnedInside *act_without(Controller *controller, Ablation part, c
     return inside;
 }
 
-/* Row 0 gets its own z or its own estimates as the mean and acts as before; the others do not. */
+/* Row 0 gets its own numbers as the means and acts as before; the others do not. */
 static void means_take_the_place(Controller *controller, Ablation part, const float *whole) {
     float means[64], actions[ENVS * SA01_JOINTS], modulated[ENVS * 64];
     const LearnedInside *inside = act_without(controller, ABLATION_none, NULL, actions);
@@ -191,6 +191,7 @@ static void means_take_the_place(Controller *controller, Ablation part, const fl
     assert_memory_equal(actions, whole, sizeof actions);
     memcpy(means, inside->rows.latent, latent * sizeof *means);
     memcpy(means + latent, inside->rows.estimates, estimates * sizeof *means);
+    memcpy(means + latent + estimates, inside->rows.theta, (size_t)inside->theta * sizeof *means);
     memcpy(modulated, inside->rows.modulated, ENVS * latent * sizeof *modulated);
     act_without(controller, part, means, actions);
     assert_memory_equal(actions, whole, SA01_JOINTS * sizeof *actions);
@@ -199,7 +200,7 @@ static void means_take_the_place(Controller *controller, Ablation part, const fl
         assert_true(worst_gap(actions + row, whole + row, SA01_JOINTS) > 1e-4);
     }
     const double changed = worst_gap(modulated, inside->rows.modulated, ENVS * inside->latent);
-    assert_true(part == ABLATION_z ? changed > 0.1 : changed == 0);
+    assert_true(part == ABLATION_estimates ? changed == 0 : changed > 1e-2);
 }
 
 static void parts_are_taken_out(void **state) {
@@ -215,6 +216,7 @@ static void parts_are_taken_out(void **state) {
     controller.act(controller.self, ENVS, made, whole);
     means_take_the_place(&controller, ABLATION_z, whole);
     means_take_the_place(&controller, ABLATION_estimates, whole);
+    means_take_the_place(&controller, ABLATION_modulation, whole);
     for (int e = 0; e < ENVS; e++) {
         const float *newest = task_env_history(made[e]) + SA01_HISTORY - SA01_OBSERVATION;
         for (int i = 0; i < SA01_HISTORY; i++) {
@@ -225,15 +227,19 @@ static void parts_are_taken_out(void **state) {
     policy_act(policy, NULL, ENVS, history[0], wanted, NULL, NULL);
     assert_true(worst_gap(actions, wanted, ENVS * SA01_JOINTS) < 1e-6);
     assert_true(worst_gap(actions, whole, ENVS * SA01_JOINTS) > 1e-3);
-    const LearnedInside *inside = act_without(&controller, ABLATION_modulation, NULL, actions);
+    float means[64] = {0};
+    const LearnedInside *inside = act_without(&controller, ABLATION_none, NULL, actions);
+    float *theta = means + inside->latent + inside->estimates;
+    for (int i = 0; i < inside->theta; i++) {
+        theta[i] = i < inside->theta / 2 ? 0.4f : -0.3f;
+    }
+    act_without(&controller, ABLATION_modulation, means, actions);
     for (int e = 0; e < ENVS; e++) {
         memcpy(history[e], task_env_history(made[e]), sizeof history[e]);
     }
-    plain_actions(policy, history[0], wanted);
+    actions_at(policy, theta, history[0], wanted);
     assert_true(worst_gap(actions, wanted, ENVS * SA01_JOINTS) < 1e-6);
     assert_true(worst_gap(actions, whole, ENVS * SA01_JOINTS) > 1e-4);
-    assert_memory_equal(inside->rows.latent, inside->rows.modulated,
-                        ENVS * (size_t)inside->latent * sizeof(float));
     act_without(&controller, ABLATION_none, NULL, actions);
     assert_memory_equal(actions, whole, sizeof whole);
     controller_destroy(&controller);

@@ -375,30 +375,36 @@ static void test_awareness_matches_differences(void **state) {
 
 /* Each part of the decoder's output is a mean over its own numbers: 2^2 + 3^2, whatever the widths.
  */
-static void test_parts_of_the_decoder_weigh_the_same(void **state) {
-    (void)state;
+static void parts_weigh_the_same(int ground) {
+    const int width = 5 + ground;
     Case c;
     Random random = random_at(9, 0, 0);
     PolicyDef def = small_def();
     def.ground_offset = 5;
-    def.ground_count = 2;
+    def.ground_count = ground;
     case_open(&c, def);
-    assert_int_equal(c.network.decoded, 7);
+    assert_int_equal(c.network.decoded, width);
     fill_inputs(&c, &random);
     const MlpLayer *last = &c.network.decoder.layer[c.network.decoder.layers - 1];
     memset(c.parameters + last->weight, 0, (size_t)(last->in * last->out) * sizeof(float));
     memset(c.parameters + last->bias, 0, (size_t)last->out * sizeof(float));
-    for (int i = 0; i < ROWS * 7; i++) { /* decoded 0: squares 4 and 9 */
-        c.chunk.decoder_target[i] = i % 7 < 5 ? 2.0f : 3.0f;
+    for (int i = 0; i < ROWS * width; i++) { /* decoded 0: squares 4 and 9 */
+        c.chunk.decoder_target[i] = i % width < 5 ? 2.0f : 3.0f;
     }
     case_run(&c);
     double worst = 0.0;
     assert_near("loss", c.sums.reconstruction / ROWS, 4.0 + 9.0, 1e-6, &worst);
-    for (int j = 0; j < 7; j++) { /* epsilon 2 (0 - target) / width of the part */
+    for (int j = 0; j < width; j++) { /* epsilon 2 (0 - target) / width of the part */
         assert_near("gradient", c.gradient[last->bias + j],
-                    j < 5 ? -0.3 * 4.0 / 5.0 : -0.3 * 6.0 / 2.0, 1e-6, &worst);
+                    j < 5 ? -0.3 * 4.0 / 5.0 : -0.3 * 6.0 / ground, 1e-6, &worst);
     }
     case_close(&c);
+}
+
+static void test_parts_of_the_decoder_weigh_the_same(void **state) {
+    (void)state;
+    parts_weigh_the_same(2);
+    parts_weigh_the_same(1);
 }
 
 /* Chunks add up: the gradient with beta 1 on top of another is their sum. */

@@ -200,6 +200,33 @@ static void test_answers(void **state) {
 }
 
 /* theta1 = 1, theta2 = 0 at the start: the modulated latent is the encoder's mu. */
+/* The spread of a new policy's weights is 1/sqrt(inputs), in each network's last layer less. */
+static void test_initial_spread(void **state) {
+    (void)state;
+    static const double last_scale[NETWORK_MLPS] = {0.5, 1.0, 0.0, 0.02, 1.0};
+    PolicyDef def = policy_def_default();
+    def.critic_input = 98;
+    Policy *policy = policy_create(&def, 21, NULL);
+    assert_non_null(policy);
+    for (int n = 0; n < NETWORK_MLPS; n++) {
+        const char *name;
+        const Mlp *mlp = network_mlp(&policy->network, n, &name);
+        for (int l = 0; l < mlp->layers; l++) {
+            const MlpLayer *layer = &mlp->layer[l];
+            const int64_t count = layer->bias - layer->weight;
+            const double scale = l + 1 < mlp->layers ? 1.0 : last_scale[n];
+            double squares = 0.0;
+            for (int64_t i = layer->weight; i < layer->bias; i++) {
+                squares += pow((double)policy->parameters[i], 2) * layer->in / (double)count;
+            }
+            /* four deviations of a mean of squares */
+            assert_true(fabs(squares - scale * scale) <=
+                        4.0 * sqrt(2.0 / (double)count) * scale * scale);
+        }
+    }
+    policy_destroy(policy);
+}
+
 static void test_modulation_starts_at_identity(void **state) {
     (void)state;
     for (int per_dimension = 0; per_dimension < 2; per_dimension++) {
@@ -373,6 +400,7 @@ static void test_lying_headers(void **state) {
         {"[0,720]", "[0,1e9]"},
         {"\"F32\"", "\"F16\""},
         {"\"F32\"", "\"F64\""},
+        {"\"F32\"", "\"X32\""},
         {"\"policy.latent\":\"4\"", "\"policy.latent\":\"5\""},
         {"\"policy.latent\":\"4\"", "\"policy.latent\":\"x\""},
         {"\"policy.latent\"", "\"policy.latenz\""},
@@ -654,6 +682,7 @@ int main(void) {
         cmocka_unit_test(test_answers),
         cmocka_unit_test(test_act_and_value),
         cmocka_unit_test(test_rows_in_runs),
+        cmocka_unit_test(test_initial_spread),
         cmocka_unit_test(test_modulation_starts_at_identity),
         cmocka_unit_test(test_round_trip),
         cmocka_unit_test(test_name_of_the_robot),

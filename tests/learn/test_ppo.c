@@ -269,6 +269,13 @@ static void test_decoder_must_fit(void **state) {
     static const int ground[PPO_TARGETS] = {0, 0, 2, 2}, frame[PPO_TARGETS] = {1, 1, 0, 1};
     Pool *pool = pool_create(0);
     for (int target = 0; target < PPO_TARGETS; target++) {
+        PolicyDef asked = toy_policy_def();
+        PpoDef asks = toy_ppo_def();
+        asks.decoder_target = target;
+        ppo_set_decoder(&asks, 7, 2, &asked);
+        assert_int_equal(asked.ground_count, ground[target]);
+        assert_int_equal(asked.ground_offset, ground[target] ? 7 : 0);
+        assert_int_equal(asked.decoder_frame, frame[target]);
         for (int shape = 0; shape < PPO_TARGETS; shape++) {
             MildError error = {0};
             PolicyDef policy_def = toy_policy_def();

@@ -60,6 +60,7 @@ void inside_decided(void *context, const EvalDecision *decision) {
     const size_t trial = (size_t)decision->trial;
     const float *latent = in->rows.latent + trial * (size_t)in->latent;
     const float *estimates = in->rows.estimates + trial * (size_t)in->estimates;
+    const float *theta = in->rows.theta + trial * (size_t)in->theta;
     log->decisions++;
     for (int j = 0; log->sum && j < in->latent; j++) {
         log->sum[j] += (double)latent[j];
@@ -67,13 +68,17 @@ void inside_decided(void *context, const EvalDecision *decision) {
     for (int i = 0; log->sum && i < in->estimates; i++) {
         log->sum[in->latent + i] += (double)estimates[i];
     }
+    for (int i = 0; log->sum && i < in->theta; i++) {
+        log->sum[in->latent + in->estimates + i] += (double)theta[i];
+    }
     if (log->csv) {
         print_row(log, decision);
     }
 }
 
 void inside_means(const InsideLog *log, float *means) {
-    for (int i = 0; i < log->inside->latent + log->inside->estimates; i++) {
+    const LearnedInside *in = log->inside;
+    for (int i = 0; i < in->latent + in->estimates + in->theta; i++) {
         means[i] = (float)(log->sum[i] / (double)log->decisions);
     }
 }

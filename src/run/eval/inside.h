@@ -11,7 +11,7 @@ typedef struct {
     const LearnedInside *inside;
     int feet;
     FILE *csv;   /* a row per decision; NULL: none */
-    double *sum; /* [latent] of z, then [estimates], over the decisions; NULL: none */
+    double *sum; /* [latent] of z, [estimates], [theta] over the decisions; NULL: none */
     long decisions;
 } InsideLog;
 
@@ -19,7 +19,7 @@ typedef struct {
 void inside_decided(void *context, const EvalDecision *decision);
 /* The names of the columns. SI units, but for the phase and for what the networks alone know. */
 void inside_print_header(const InsideLog *log);
-/* [latent + estimates] */
+/* [latent + estimates + theta] */
 void inside_means(const InsideLog *log, float *means);
 
 #endif

@@ -1,0 +1,202 @@
+#!/usr/bin/env python3
+"""Which sentences does the paper's training lack? The smallest set of our choices with which it walks.
+
+Between configs/paper_intended.ini (the paper, its misprints as meant) and configs/models.ini (which walks) lie some eighty keys.
+They are joined to sentences, such as "the clock is observed". A training takes some of the sentences as ours and the others as
+the paper's, half a minute on one GPU, and is then judged on four grounds at 0.3 and 0.6 m/s: it walks when 90 % of 80 trials stay
+up and the mean speed is within 0.1 m/s of what is asked. From all of ours, which walks, sentences are taken away while it still
+walks: in ever smaller groups (delta debugging, Zeller and Hildebrandt 2002), JOBS trainings at a time. The result is minimal:
+without any one of its sentences it does not walk, or the search says that its time was over.
+
+Budget, commands and the physics step are those of models.ini throughout. FOLDER/tests.json has every training; what is there is
+not trained again. FOLDER/needed.json has the result.
+"""
+
+import argparse
+import configparser
+import json
+import os
+import pathlib
+import subprocess
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MILD = os.environ.get("MILD", str(ROOT / "build/mild"))
+# Not searched: the budget, the commands and the step.
+COMMON = ("train.", "task.vx", "task.vy", "task.wz", "task.backward_share", "task.standing_share", "task.straight_share",
+          "task.physics_dt", "ppo.matmul", "task.newton", "randomize.patch_share")
+# What belongs together, in the order of what docs/deviations.md says it is worth: the last are likely to go at once. Any other
+# key is a sentence of its own.
+SENTENCES = {
+    "helping hand": ("task.assist",),
+    "the weights of tracking": ("reward.linear_velocity", "reward.yaw_rate"),
+    "a gait to begin with": ("reward.reference_motion", "reward.air_time"),
+    "the form of the clearance": ("reward.clearance_form", "reward.feet_clearance"),
+    "scale and clip of the action": ("task.action_scale", "task.action_clip", "task.torque_share"),
+    "tracked is a mean of 0.4 s": ("reward.tracking_time",),
+    "how tracking falls off": ("reward.tracking_narrow", "reward.tracking_sharpness"),
+    "a sum below 0 counts as 0": ("reward.clip_sum",),
+    "balance and rest": ("reward.default_pose", "reward.base_height", "reward.feet_distance", "reward.orientation",
+                         "reward.knee_distance", "reward.base_motion", "reward.base_acceleration", "reward.acceleration_form"),
+    "means of the history": ("task.history_stride",),
+    "the clock is observed": ("task.clock",),
+    "exploration": ("policy.init_std", "ppo.std_max", "ppo.std_min"),
+    "PPO's numbers": ("ppo.lambda", "ppo.clip_value", "ppo.kl_target", "ppo.epsilon"),
+    "the form of the gait": ("reward.gait_form", "reward.gait"),
+    "prices on effort": ("reward.torque", "reward.joint_acceleration", "reward.joint_speed", "reward.action_smoothness",
+                         "reward.contact_force", "reward.power", "reward.slip", "reward.collision"),
+    "mirror": ("ppo.mirror_weight", "ppo.mirror_share"),
+    "scales of the estimates": ("task.velocity_scale", "task.height_scale"),
+    "kinds of ground": ("randomize.rigid_share", "randomize.preset_share"),
+    "ground that carries": ("randomize.sinkage_max", "randomize.bed_depth", "randomize.recovery"),
+    "gains": ("task.kp", "task.kd"),
+    "either contact near touchdown": ("task.double_support",),
+    "anneal and average": ("ppo.anneal", "ppo.average"),
+    "the mean of the latent": ("ppo.sample_latent",),
+    "the decoder's target": ("ppo.decoder_target",),
+    "small commands stand": ("task.standing_below",),
+    "PD at every physics step": ("task.torque_hold",),
+    "ground that creates no energy": ("randomize.passive",),
+    "pushes": ("randomize.push_interval", "randomize.push_linear", "randomize.push_angular"),
+    "randomised robots": ("randomize.link_mass", "randomize.armature", "randomize.gain", "randomize.strength",
+                          "randomize.base_mass", "randomize.com_offset", "randomize.motor_offset", "randomize.latency"),
+    "the start": ("randomize.initial_joint", "randomize.initial_velocity"),
+    "sensor noise": ("task.observe_noise",),
+    "theta for each dimension": ("policy.modulation_per_dimension",),
+}
+
+
+def read_keys(path):
+    """{section.key: value} of an ini file."""
+    parser = configparser.ConfigParser(inline_comment_prefixes=(";",))
+    parser.read(path)
+    return {f"{s}.{k}": " ".join(v.split()) for s in parser.sections() for k, v in parser[s].items()}
+
+
+def same(left, right):
+    """Bool: two values are the same text or the same numbers."""
+    try:
+        return [float(x) for x in left.split()] == [float(x) for x in right.split()]
+    except ValueError:
+        return left == right
+
+
+def sentences():
+    """{sentence: {key: (ours, the paper's)}} for all keys in which the two files differ."""
+    default, paper, ours = (read_keys(ROOT / "configs" / f"{name}.ini") for name in ("default", "paper_intended", "models"))
+    group = {key: name for name, keys in SENTENCES.items() for key in keys}
+    found = {}
+    for key in sorted({*paper, *ours}):
+        pair = ours.get(key, default.get(key)), paper.get(key, default.get(key))
+        if not same(*pair) and not key.startswith(COMMON):
+            found.setdefault(group.get(key, key), {})[key] = pair
+    order = list(SENTENCES)
+    return dict(sorted(found.items(), key=lambda item: order.index(item[0]) if item[0] in order else len(order)))
+
+
+class Search:
+    """Trainings, each by the set of sentences that are ours."""
+
+    def __init__(self, folder, jobs, seconds, seed):
+        self.folder, self.jobs, self.seed = pathlib.Path(folder), jobs, seed
+        self.end = time.time() + seconds
+        self.longest = 0.0
+        self.all = sentences()
+        self.file = self.folder / "tests.json"
+        self.tests = json.loads(self.file.read_text()) if self.file.exists() else []
+
+    def known(self, ours):
+        return next((t for t in self.tests if set(t["ours"]) == set(ours) and t["seed"] == self.seed), None)
+
+    def train(self, ours):
+        options = [f"--{key}={pair[0 if name in ours else 1].replace(' ', ',')}"
+                   for name, keys in self.all.items() for key, pair in keys.items()]
+        with tempfile.TemporaryDirectory() as work:
+            run, result = f"{work}/run", f"{work}/eval.json"
+            common = [f"--train.seed={self.seed}", *options]
+            subprocess.run([MILD, "train", "--config", str(ROOT / "configs/models.ini"), "--out", run, *common],
+                           check=True, capture_output=True)
+            subprocess.run([MILD, "eval", "--policy", f"{run}/policy.safetensors", "--config", f"{run}/config.ini", "--ground",
+                            "rigid,rubber,foam45,sand_loose", "--speed", "0.3,0.6", "--trials", "10", "--train.robots=batch",
+                            "--json", result],
+                           check=True, capture_output=True)
+            rows = json.loads(pathlib.Path(result).read_text())["rows"]
+        upright = sum(row["success"] for row in rows) / sum(row["trials"] for row in rows)
+        gaps = [abs(row["velocity"] - row["speed"]) for row in rows if row["velocity"] is not None]
+        gap = sum(gaps) / len(gaps) if gaps else None
+        walks = upright >= 0.9 and gap is not None and gap < 0.1
+        return {"ours": sorted(ours), "seed": self.seed, "upright": upright, "gap": gap, "walks": walks}
+
+    def walk(self, sets):
+        """For each set whether it walks, None where the time is over; JOBS trainings at a time."""
+        new = [s for s in sets if not self.known(s)]
+        for first in range(0, len(new), self.jobs):
+            begin = time.time()
+            if begin + self.longest > self.end:
+                break
+            with ThreadPoolExecutor(self.jobs) as pool:
+                for test in pool.map(self.train, new[first:first + self.jobs]):
+                    self.tests.append(test)
+                    lack = sorted(set(self.all) - set(test["ours"]))
+                    gap = "-" if test["gap"] is None else f"{test['gap']:.3f}"
+                    print(f"{'walks ' if test['walks'] else 'does not'} {test['upright']:.2f} {gap} "
+                          f"with {len(test['ours'])} of {len(self.all)}; not: {', '.join(lack)}", flush=True)
+            self.longest = max(self.longest, time.time() - begin)
+            self.file.write_text(json.dumps(self.tests, indent=1) + "\n")
+        return [known["walks"] if (known := self.known(s)) else None for s in sets]
+
+    def reduce(self):
+        """(needed, bool minimal)."""
+        needed, parts = list(self.all), 3
+        while True:
+            parts = min(parts, len(needed))
+            chunks = [needed[len(needed) * i // parts:len(needed) * (i + 1) // parts] for i in range(parts)]
+            without = [[s for s in needed if s not in chunk] for chunk in chunks]
+            walks = self.walk(without)
+            spare = [chunk for chunk, good in zip(chunks, walks) if good]
+            if len(spare) > 1:  # all of them at once, or else half, ...
+                taken = len(spare)
+                while taken > 1:
+                    fewer = [s for s in needed if not any(s in chunk for chunk in spare[:taken])]
+                    good = self.walk([fewer])[0]
+                    if good or good is None:
+                        break
+                    taken //= 2
+                needed = [s for s in needed if not any(s in chunk for chunk in spare[:taken if good else 1])]
+            elif spare:
+                needed = [s for s in needed if s not in spare[0]]
+            elif parts == len(needed):
+                return needed, None not in walks
+            else:
+                parts *= 2
+            if None in walks or not needed:
+                return needed, not needed
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder")
+    parser.add_argument("--jobs", type=int, default=3, help="trainings at a time on the GPU")
+    parser.add_argument("--seconds", type=float, default=1e9, help="no training begins that would not end by then")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--list", action="store_true", help="print the sentences and their keys, train nothing")
+    asked = parser.parse_args()
+    if asked.list:
+        for name, keys in sentences().items():
+            print(name + ": " + "; ".join(f"{key} = {ours} (the paper: {paper})" for key, (ours, paper) in keys.items()))
+        return
+    pathlib.Path(asked.folder).mkdir(parents=True, exist_ok=True)
+    search = Search(asked.folder, asked.jobs, asked.seconds, asked.seed)
+    walks = search.walk([sorted(search.all), []])
+    if not walks[0] or walks[1]:
+        raise SystemExit("intended.py: " + ("configs/models.ini does not walk" if not walks[0] else "the paper's training walks as it is"))
+    needed, minimal = search.reduce()
+    result = {"needed": needed, "minimal": minimal, "trainings": len(search.tests), "sentences": len(search.all)}
+    (search.folder / "needed.json").write_text(json.dumps(result, indent=1) + "\n")
+    print(json.dumps(result, indent=1))
+
+
+if __name__ == "__main__":
+    main()
