@@ -63,12 +63,8 @@ static double foot_caused(const FootScratch *foot, const Motion *change) {
         const double iz = s->iz[i];
         const double ix = s->ix[i] + s->slope_x[i] * iz;
         const double iy = s->iy[i] + s->slope_y[i] * iz;
-        sum += ix * motion_at(v.x, s->x[i], s->y[i]) + iy * motion_at(v.y, s->x[i], s->y[i]);
-    }
-    for (int i = 0; foot->faces && i < foot->active; i++) {
-        const double ix = s->ix[i] + s->slope_x[i] * s->iz[i];
-        const double iy = s->iy[i] + s->slope_y[i] * s->iz[i];
-        sum += s->z[i] * (ix * v.lift[0] + iy * v.lift[1]);
+        const SlotVelocity at = slot_velocity(s, i, &v, SLOT_FACES);
+        sum += ix * at.x + iy * at.y;
     }
     return -0.5 * sum;
 }
@@ -123,8 +119,8 @@ static double slot_gift(const Slots *s, int i, const SlotVelocity *u, const Slot
 static double foot_gift(const FootScratch *foot, const Motion *before, const Motion *after) {
     double sum = 0.0;
     for (int i = 0; i < foot->active; i++) {
-        const SlotVelocity u = slot_velocity(&foot->slot, i, before, foot->faces);
-        const SlotVelocity v = slot_velocity(&foot->slot, i, after, foot->faces);
+        const SlotVelocity u = slot_velocity(&foot->slot, i, before, SLOT_FACES);
+        const SlotVelocity v = slot_velocity(&foot->slot, i, after, SLOT_FACES);
         sum += fmax(slot_gift(&foot->slot, i, &u, &v), 0.0);
     }
     return sum;
@@ -134,8 +130,8 @@ static void foot_turn(FootScratch *foot, const Motion *before, const Motion *aft
     const Slots *s = &foot->slot;
     foot->turned = 1;
     for (int i = 0; i < foot->active; i++) {
-        const SlotVelocity u = slot_velocity(s, i, before, foot->faces);
-        const SlotVelocity v = slot_velocity(s, i, after, foot->faces);
+        const SlotVelocity u = slot_velocity(s, i, before, SLOT_FACES);
+        const SlotVelocity v = slot_velocity(s, i, after, SLOT_FACES);
         if (!all && !(slot_gift(s, i, &u, &v) > 0.0)) {
             continue;
         }

@@ -1,8 +1,12 @@
 #include "ground/faces.h"
 
+#include <string.h>
+
+#include "ground/gather.h"
 #include "ground/locate.h"
 #include "ground/mixture.h"
 #include "ground/models.h"
+#include "ground/pass.h"
 #include "ground/terrain.h"
 
 /* [-] Cosine of 80 degrees: an element whose normal is nearer to the horizontal carries nothing. */
@@ -65,7 +69,8 @@ void faces_list(FootScratch *foot, const MildTerrain *terrain, const MildContact
     }
 }
 
-void faces_gather(const FootScratch *foot, const Memory *memory) {
+/* Height and share of the slots. A loaded element keeps the share of its touchdown. */
+static void faces_gather(const FootScratch *foot, const Memory *memory) {
     const Slots *s = &foot->slot;
     for (int i = 0; i < foot->active; i++) {
         const int e = foot->element[i];
@@ -92,8 +97,19 @@ static double slot_middle(const Slots *s, int i, const Motion *now, double dt) {
     return s->depth[i] - 0.5 * dt * slot_velocity(s, i, now, SLOT_UNEVEN | SLOT_FACES).descent;
 }
 
-void faces_laws(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory,
-                const Motion *now, double dt) {
+/* Bool: the element of a slot, which carried nothing, was below the surface: it faced up there, or
+ * had lifted off in an imprint. */
+static int slot_is_under(const FootScratch *foot, int i, const Memory *memory, const Motion *now,
+                         double dt) {
+    const int e = foot->element[i];
+    return (memory->material[e] == MATERIAL_BURIED && slot_middle(&foot->slot, i, now, dt) > 0.0) ||
+           (memory->material[e] == MATERIAL_FREE && memory->middle[e] > 0.0);
+}
+
+/* Gives each slot the law of its material times its share. An element that was under elastic ground
+ * gets none. */
+static void faces_laws(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory,
+                       const Motion *now, double dt) {
     const Slots *s = &foot->slot;
     for (int i = 0; i < foot->active; i++) {
         foot->slot_material[i] = MATERIAL_NONE; /* scaled in the last step */
@@ -102,8 +118,7 @@ void faces_laws(const FootScratch *foot, const MildTerrain *terrain, const Memor
     for (int i = 0; i < foot->active; i++) {
         const int e = foot->element[i];
         const int model = terrain->materials[foot->slot_material[i] & 0xff].model;
-        const int buried = memory->material[e] == MATERIAL_BURIED;
-        if (buried && !(s->recovery[i] < 1.0) && slot_middle(s, i, now, dt) > 0.0) {
+        if (!(s->recovery[i] < 1.0) && slot_is_under(foot, i, memory, now, dt)) {
             s->share[i] = 0.0;
         }
         /* The theory's coefficients count the slope themselves. */
@@ -112,7 +127,9 @@ void faces_laws(const FootScratch *foot, const MildTerrain *terrain, const Memor
     }
 }
 
-void faces_unload(const FootScratch *foot, const Memory *memory, const Motion *now, double dt) {
+/* A buried element begins without force, at the end of the unloading line of some greater depth. */
+static void faces_unload(const FootScratch *foot, const Memory *memory, const Motion *now,
+                         double dt) {
     const Slots *s = &foot->slot;
     for (int i = 0; i < foot->active; i++) {
         const double lasting = 1.0 - s->recovery[i];
@@ -122,4 +139,99 @@ void faces_unload(const FootScratch *foot, const Memory *memory, const Motion *n
             s->depth_max[i] = real_max(s->depth_max[i], least);
         }
     }
+}
+
+void faces_slots(FootScratch *foot, const MildGround *ground, int f, const MildTerrain *terrain,
+                 const Memory *memory, const Motion *now, double dt) {
+    slots_gather(foot, memory);
+    faces_gather(foot, memory);
+    if (foot->uneven) {
+        slots_uneven(foot, ground->uneven[f], memory, terrain->height);
+    }
+    faces_laws(foot, terrain, memory, now, dt);
+    if (ground->tiles > 0) {
+        const Imprints imprints = ground_imprints(ground);
+        slots_imprints(foot, &imprints, memory, faces_level);
+    }
+    faces_unload(foot, memory, now, dt);
+}
+
+/* Moments of the entries of h, by 1, x, y, z, x^2, xy, y^2, yz, z^2, zx. */
+typedef double FacesMoments[3][3][10];
+
+/* Three times the loop for x and y, over (x, y), (y, z) and (z, x): a loop of its own would be
+ * faster and larger. */
+static void faces_moments(const FootScratch *foot, FacesMoments M) {
+    static const int place[3][6] = {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 6, 7, 8}, {0, 3, 1, 8, 9, 4}};
+    const Slots *s = &foot->slot;
+    const double *const at[3] = {s->x, s->y, s->z};
+    const double *const h[3][3] = {
+        {s->hxx, s->hxy, s->hxz}, {s->hyx, s->hyy, s->hyz}, {s->hzx, s->hzy, s->hzz}};
+    for (int row = 0; row < 3; row++) {
+        for (int pair = 0; pair < 3; pair++) {
+            double sums[3][6];
+            pass_moments(at[pair], at[(pair + 1) % 3], foot_end(foot), h[row][0], h[row][1],
+                         h[row][2], sums);
+            for (int k = 0; k < 18; k++) {
+                M[row][k / 6][place[pair][k % 6]] = sums[k / 6][k % 6];
+            }
+        }
+    }
+}
+
+/* torque += p x I */
+static void faces_cross(const double *p, const double *I, double *torque) {
+    for (int k = 0; k < 3; k++) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        torque[k] += p[i] * I[j] - p[j] * I[i];
+    }
+}
+
+void faces_hessian(const FootScratch *foot, double *H) {
+    static const int product[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 9}, {2, 5, 6, 7}, {3, 9, 7, 8}};
+    FacesMoments M;
+    faces_moments(foot, M);
+    memset(H, 0, 36 * sizeof *H);
+    for (int k = 0; k < 4; k++) {
+        double rows[3][6] = {{0.0}};
+        for (int r = 0; r < 3; r++) {
+            for (int l = 0; l < 4; l++) {
+                const int at = product[k][l];
+                faces_cross(foot->arm[l], (const double[3]){M[r][0][at], M[r][1][at], M[r][2][at]},
+                            rows[r] + 3);
+            }
+            for (int c = 0; c < 3; c++) {
+                rows[r][c] = M[r][c][k];
+            }
+        }
+        for (int c = 0; c < 6; c++) { /* column c of the rows is a force: k = 0 adds it, too */
+            const double force[3] = {rows[0][c], rows[1][c], rows[2][c]};
+            double torque[3] = {0.0};
+            faces_cross(foot->arm[k], force, torque);
+            for (int r = 0; r < 3; r++) {
+                H[6 * r + c] += k == 0 ? force[r] : 0.0;
+                H[6 * (3 + r) + c] += torque[r];
+            }
+        }
+    }
+}
+
+double faces_loaded(const FootScratch *foot, double *area) {
+    const Slots *s = &foot->slot;
+    double z = 0.0;
+    *area = 0.0;
+    for (int i = 0; i < foot->active; i++) {
+        z += s->z[i] * s->iz[i];
+        *area += s->iz[i] > 0.0 ? s->share[i] * foot->pitch * foot->pitch : 0.0;
+    }
+    return z;
+}
+
+void faces_plate(const FootScratch *foot, int e, Plate *plate) {
+    double normal[3];
+    for (int k = 0; k < 3; k++) {
+        normal[k] = foot->arm[1][k] * foot->face[0][e] + foot->arm[2][k] * foot->face[1][e] +
+                    foot->arm[3][k] * foot->face[2][e];
+    }
+    *plate = plate_facing(normal);
 }

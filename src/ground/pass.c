@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+#include "ground/faces.h"
 #include "ground/friction.h"
 #include "ground/impulse.h"
 
@@ -34,11 +35,7 @@ MILD_HD void foot_normal(const Slots *slot, int end, double dt, const Motion *m,
 static void foot_normals(const FootScratch *foot, double dt, const Motion *motion) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
-    if (foot->faces) {
-        foot_normal(s, end, dt, motion, SLOT_UNEVEN | SLOT_FACES, LAW_ALL, 1);
-        return;
-    }
-    switch (law_variant(foot->curves)) {
+    switch (foot_variant(foot)) {
     case LAW_LINE: foot_normal(s, end, dt, motion, 1, LAW_LINE, 0); return;
     case LAW_CONE:
         if (foot->uneven || foot->stops) {
@@ -49,7 +46,7 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
         return;
     case LAW_POWER: foot_normal(s, end, dt, motion, 1, LAW_POWER, 0); return;
     case LAW_ELASTIC: foot_normal(s, end, dt, motion, 1, LAW_ELASTIC, 0); return;
-    default: foot_normal(s, end, dt, motion, 1, LAW_ALL, 1); return;
+    default: foot_normal(s, end, dt, motion, SLOT_UNEVEN | SLOT_FACES, LAW_ALL, 1); return;
     }
 }
 
@@ -63,8 +60,9 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
  *
  *     h = -dI/dv = f + k c g^T
  *
- * sums: of I, x I, y I and, for a surface, height I. kind: SLOT_UNEVEN, SLOT_FACES. held: bool, the friction bounds are slot.bound. turned: bool, some
- * elements have a reversal velocity in slot.turn (energy.c). */
+ * sums: of I, x I, y I and, for a surface, height I. kind: SLOT_UNEVEN, SLOT_FACES. held: bool, the
+ * friction bounds are slot.bound. turned: bool, some elements have a reversal velocity in slot.turn
+ * (energy.c). */
 MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int kind, int held,
                            int turned, double sums[12]) {
     const Slots local = *slot, *s = &local;
@@ -142,17 +140,15 @@ static inline void cross_add(const double *p, const double *I, double *torque) {
 }
 
 /* Picks the loop compiled for the ground under the foot. Reversals and held bounds are seldom: one
- * loop does for both. */
+ * loop does for both, and for surfaces. */
 static void foot_frictions(const FootScratch *foot, const Motion *motion, int held,
                            double sums[12]) {
     const int end = foot_end(foot);
     if (end < VECTOR_LANES) {
         return; /* never: pass skips empty feet. The compiler then adds no loop for a remainder */
     }
-    if (foot->faces) {
+    if (held || foot->turned || foot->faces) {
         foot_friction(&foot->slot, end, motion, SLOT_UNEVEN | SLOT_FACES, held, 1, sums);
-    } else if (held || foot->turned) {
-        foot_friction(&foot->slot, end, motion, 1, held, 1, sums);
     } else if (foot->uneven) {
         foot_friction(&foot->slot, end, motion, 1, 0, 0, sums);
     } else {
@@ -194,12 +190,8 @@ void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int
 /* Sums over the foot of each entry of h times 1, x, y, x^2, xy, y^2. They determine the foot's
  * hessian, because p is linear in x and y. */
 typedef double Moments[3][3][6];
-/* The same of a surface, times 1, x, y, z, x^2, xy, y^2, yz, z^2, zx. */
-typedef double FacesMoments[3][3][10];
-
-/* Moments of three entries at a time, which are as many sums as the registers hold. */
-static void moments(const double *xs, const double *ys, int end, const double *a, const double *b,
-                    const double *c, double sums[3][6]) {
+void pass_moments(const double *xs, const double *ys, int end, const double *a, const double *b,
+                  const double *c, double sums[3][6]) {
     if (end < VECTOR_LANES) {
         return; /* never, as in foot_frictions */
     }
@@ -238,38 +230,18 @@ static void moments(const double *xs, const double *ys, int end, const double *a
 static void foot_moments(const FootScratch *foot, Moments M) {
     const Slots *s = &foot->slot;
     int end = foot_end(foot);
-    moments(s->x, s->y, end, s->hxx, s->hxy, s->hxz, M[0]);
+    pass_moments(s->x, s->y, end, s->hxx, s->hxy, s->hxz, M[0]);
     if (foot->uneven) {
-        moments(s->x, s->y, end, s->hyx, s->hyy, s->hyz, M[1]);
-        moments(s->x, s->y, end, s->hzx, s->hzy, s->hzz, M[2]);
+        pass_moments(s->x, s->y, end, s->hyx, s->hyy, s->hyz, M[1]);
+        pass_moments(s->x, s->y, end, s->hzx, s->hzy, s->hzz, M[2]);
         return;
     }
     double rest[3][6];
-    moments(s->x, s->y, end, s->hyy, s->hyz, s->hzz, rest);
+    pass_moments(s->x, s->y, end, s->hyy, s->hyz, s->hzz, rest);
     memcpy(M[1][0], M[0][1], sizeof M[1][0]);
     memcpy(M[1][1], rest, 2 * sizeof *rest);
     memset(M[2], 0, 2 * sizeof M[2][0]);
     memcpy(M[2][2], rest[2], sizeof *rest);
-}
-
-/* Three times the loop for x and y, over (x, y), (y, z) and (z, x): a loop of its own would be
- * faster and larger. */
-static void faces_moments(const FootScratch *foot, FacesMoments M) {
-    static const int place[3][6] = {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 6, 7, 8}, {0, 3, 1, 8, 9, 4}};
-    const Slots *s = &foot->slot;
-    const double *const at[3] = {s->x, s->y, s->z};
-    const double *const h[3][3] = {
-        {s->hxx, s->hxy, s->hxz}, {s->hyx, s->hyy, s->hyz}, {s->hzx, s->hzy, s->hzz}};
-    for (int row = 0; row < 3; row++) {
-        for (int pair = 0; pair < 3; pair++) {
-            double sums[3][6];
-            moments(at[pair], at[(pair + 1) % 3], foot_end(foot), h[row][0], h[row][1], h[row][2],
-                    sums);
-            for (int k = 0; k < 18; k++) {
-                M[row][k / 6][place[pair][k % 6]] = sums[k / 6][k % 6];
-            }
-        }
-    }
 }
 
 /* H = sum of B^T h B, with B = [1, -[p]x] and p = sum over k of (1, x, y)_k arm_k. With M_kl the
@@ -302,36 +274,6 @@ static void foot_hessian(const FootScratch *foot, const Moments M, double *H) {
             H[18 + c] += q[1] * rows[2][c] - q[2] * rows[1][c];
             H[24 + c] += q[2] * rows[0][c] - q[0] * rows[2][c];
             H[30 + c] += q[0] * rows[1][c] - q[1] * rows[0][c];
-        }
-    }
-}
-
-/* The same with p = sum over four factors (1, x, y, height). */
-static void faces_hessian(const FootScratch *foot, double *H) {
-    static const int product[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 9}, {2, 5, 6, 7}, {3, 9, 7, 8}};
-    FacesMoments M;
-    faces_moments(foot, M);
-    memset(H, 0, 36 * sizeof *H);
-    for (int k = 0; k < 4; k++) {
-        double rows[3][6] = {{0.0}};
-        for (int r = 0; r < 3; r++) {
-            for (int l = 0; l < 4; l++) {
-                const int at = product[k][l];
-                cross_add(foot->arm[l], (const double[3]){M[r][0][at], M[r][1][at], M[r][2][at]},
-                          rows[r] + 3);
-            }
-            for (int c = 0; c < 3; c++) {
-                rows[r][c] = M[r][c][k];
-            }
-        }
-        for (int c = 0; c < 6; c++) { /* column c of the rows is a force: k = 0 adds it, too */
-            const double force[3] = {rows[0][c], rows[1][c], rows[2][c]};
-            double torque[3] = {0.0};
-            cross_add(foot->arm[k], force, torque);
-            for (int r = 0; r < 3; r++) {
-                H[6 * r + c] += k == 0 ? force[r] : 0.0;
-                H[6 * (3 + r) + c] += torque[r];
-            }
         }
     }
 }

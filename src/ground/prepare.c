@@ -36,16 +36,12 @@ MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *no
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
-    if (foot->faces) {
-        slots_begin(s, end, dt, now, LAW_ALL, SLOT_FACES);
-        return;
-    }
-    switch (law_variant(foot->curves)) {
+    switch (foot_variant(foot)) {
     case LAW_LINE:
     case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 0); return;
     case LAW_POWER: slots_begin(s, end, dt, now, LAW_POWER, 0); return;
     case LAW_ELASTIC: slots_begin(s, end, dt, now, LAW_ELASTIC, 0); return;
-    default: slots_begin(s, end, dt, now, LAW_ALL, 0); return;
+    default: slots_begin(s, end, dt, now, LAW_ALL, SLOT_FACES); return;
     }
 }
 
@@ -146,23 +142,6 @@ static void foot_slots(FootScratch *foot, const MildGround *ground, int f,
     }
 }
 
-/* The same for a surface. Its elements face anywhere: imprints take them for level squares. */
-static void faces_slots(FootScratch *foot, const MildGround *ground, int f,
-                        const MildTerrain *terrain, const Memory *memory, const Motion *now,
-                        double dt) {
-    slots_gather(foot, memory);
-    faces_gather(foot, memory);
-    if (foot->uneven) {
-        slots_uneven(foot, ground->uneven[f], memory, terrain->height);
-    }
-    faces_laws(foot, terrain, memory, now, dt);
-    if (ground->tiles > 0) {
-        Imprints imprints = ground_imprints(ground);
-        slots_imprints(foot, &imprints, memory, faces_level);
-    }
-    faces_unload(foot, memory, now, dt);
-}
-
 static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
                          const MildTerrain *terrain, const MildContactInput *input) {
     const Memory memory = ground_memory(ground, f);
@@ -181,10 +160,8 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     }
     foot->stops = slots_explicit(foot, terrain->material_count, input->dt, &free);
     if (slots_sink(&foot->slot, foot_end(foot), input->dt)) {
-        if (foot->faces) {
+        if (foot_variant(foot) & ~LAW_CONE) {
             slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ALL, SLOT_FACES);
-        } else if (foot->curves & ~LAW_CONE) {
-            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ALL, 0);
         } else {
             slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_CONE, 0);
         }

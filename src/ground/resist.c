@@ -72,9 +72,7 @@ static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain
         }
         Plate own = *plate;
         if (foot->faces) {
-            double normal[3];
-            face_normal(foot, foot->element[i], normal);
-            own = plate_facing(normal);
+            faces_plate(foot, foot->element[i], &own);
         }
         slot_resist(s, i, dt, 1.0 / dt, &own, now, in_space, foot->curves,
                     SLOT_UNEVEN | foot->faces);

@@ -103,6 +103,12 @@ static inline int foot_end(const FootScratch *foot) {
     return (foot->active + VECTOR_LANES - 1) / VECTOR_LANES * VECTOR_LANES;
 }
 
+/* The curves of the compiled loop for a foot. The loop of all curves is also that of surfaces: it
+ * counts with the heights of the elements, which are 0 in a plane sole. */
+static inline int foot_variant(const FootScratch *foot) {
+    return foot->faces ? LAW_ALL : law_variant(foot->curves);
+}
+
 /* The velocity field of a foot with the twist V. */
 static inline Motion foot_motion(const FootScratch *foot, const double *V) {
     Motion motion = motion_of(foot->arm, V);
@@ -118,10 +124,8 @@ static inline Motion foot_motion(const FootScratch *foot, const double *V) {
 /* p: vector from the ankle to the element of a slot, world axes. */
 static inline void slot_arm(const FootScratch *foot, const Slots *s, int i, double p[3]) {
     for (int k = 0; k < 3; k++) {
-        p[k] = foot->arm[0][k] + foot->arm[1][k] * s->x[i] + foot->arm[2][k] * s->y[i];
-        if (foot->faces) {
-            p[k] += foot->arm[3][k] * s->z[i];
-        }
+        p[k] = foot->arm[0][k] + foot->arm[1][k] * s->x[i] + foot->arm[2][k] * s->y[i] +
+               foot->arm[3][k] * s->z[i];
     }
 }
 

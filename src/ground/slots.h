@@ -21,7 +21,7 @@ typedef struct {
     double *y;     /* [m] */
     double *depth; /* [m] */
 
-    /* Of a surface alone: faces_gather, faces_laws. */
+    /* Of a surface: faces_gather, faces_laws. Otherwise 0. */
     double *z;     /* [m] above the plane of the foot */
     double *share; /* [-] projected area over pitch^2; 0: carries nothing */
 

@@ -6,7 +6,7 @@
 #include "ground/samples.h"
 
 #define MESH_PIECES_MAX (1 << 21)
-#define MESH_CUT 0.5    /* [-] longest edge of a piece, over the pitch */
+#define MESH_CUT 0.25   /* [-] longest edge of a piece, over the pitch */
 #define MESH_INSET 1e-3 /* [-] of a cell: a face on the border between two cells is in the inner */
 #define MESH_OPEN 1e-6  /* [-] the area vectors of a closed mesh sum to less than this share */
 

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ground/energy.h"
+#include "ground/faces.h"
 #include "ground/friction.h"
 #include "ground/prepare.h"
 #include "ground/solver.h"
@@ -17,7 +18,7 @@ static void foot_scatter(const MildScratch *scratch, int f) {
     for (int i = 0; i < foot->active; i++) {
         const int e = foot->element[i];
         const Element element = slot_element(s, i);
-        const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | foot->faces);
+        const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
         const double beyond = element.depth + dt / 2 * v.descent - element.yield_depth;
         const int loaded = s->iz[i] > 0.0;
         const int deeper = beyond > 0.0;
@@ -83,15 +84,7 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
         return;
     }
     result->depth_mean = sum / loaded;
-    double z = 0.0;    /* [N s m] */
-    double area = 0.0; /* [-] of the loaded elements, over pitch^2 */
-    for (int i = 0; foot->faces && i < foot->active; i++) {
-        z += s->z[i] * s->iz[i];
-        area += s->iz[i] > 0.0 ? s->share[i] : 0.0;
-    }
-    if (foot->faces) {
-        result->area = area * foot->pitch * foot->pitch;
-    }
+    const double z = foot->faces ? faces_loaded(foot, &result->area) : 0.0;
     for (int k = 0; k < 3; k++) {
         result->pressure_center[k] =
             position[k] + foot->arm[0][k] +

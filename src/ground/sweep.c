@@ -154,7 +154,7 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
         const Motion motion = foot_motion(foot, input->velocity[f]);
         for (int i = 0; i < foot_end(foot); i++) { /* clears the padding too */
             double p[3];
-            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | foot->faces);
+            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
             slot_arm(foot, s, i, p);
             s->fx[i] = s->fy[i] = 0.0;
             s->iz[i] = slot_impulse(s, i, foot->curves, input->dt, v.descent).value;

@@ -41,17 +41,34 @@ static inline MildShape surface_wedge(double a, double b, double c, double verti
                        .triangle_count = 8};
 }
 
-/* One face of columns x rows elements that looks down at the height z: an open mesh. */
-static inline MildShape surface_plate(int columns, int rows, double z, double vertices[12]) {
-    static const int triangles[6] = {0, 2, 1, 0, 3, 2};
-    const double x = 0.5 * columns * KIT_PITCH, y = 0.5 * rows * KIT_PITCH;
-    const double corner[12] = {-x, -y, z, x, -y, z, x, y, z, -x, y, z};
-    memcpy(vertices, corner, sizeof corner);
+/* One face of columns x rows elements that looks down at the height z: an open mesh of two triangles
+ * for each. */
+typedef struct {
+    double vertices[49][3];
+    int triangles[72][3];
+} Plate36;
+
+static inline MildShape surface_plate(int columns, int rows, double z, Plate36 *plate) {
+    int count = 0;
+    for (int i = 0; i <= columns; i++) {
+        for (int j = 0; j <= rows; j++) {
+            double *at = plate->vertices[i * (rows + 1) + j];
+            at[0] = KIT_PITCH * (i - 0.5 * columns);
+            at[1] = KIT_PITCH * (j - 0.5 * rows);
+            at[2] = z;
+            if (i < columns && j < rows) {
+                const int a = i * (rows + 1) + j, b = a + rows + 1;
+                const int two[2][3] = {{a, a + 1, b + 1}, {a, b + 1, b}};
+                memcpy(plate->triangles[count], two, sizeof two);
+                count += 2;
+            }
+        }
+    }
     return (MildShape){.type = MILD_SHAPE_MESH,
-                       .vertices = vertices,
-                       .vertex_count = 4,
-                       .triangles = triangles,
-                       .triangle_count = 2};
+                       .vertices = *plate->vertices,
+                       .vertex_count = (columns + 1) * (rows + 1),
+                       .triangles = *plate->triangles,
+                       .triangle_count = count};
 }
 
 /* [m^2] */

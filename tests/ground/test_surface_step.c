@@ -1,0 +1,582 @@
+/* Contact steps of surfaces: against plane soles, closed forms, differences, closed motions. */
+#include "surface_kit.h"
+
+#include "ground/pass.h"
+#include "ground/scratch.h"
+
+/* A random material of each model in turn. */
+static MildMaterial any_material(uint64_t *random, int index) {
+    static const MildModel models[] = {MILD_MODEL_MILD,      MILD_MODEL_ECC_SPRING,
+                                       MILD_MODEL_ECC_QUASI, MILD_MODEL_ECC_QUASI_3D,
+                                       MILD_MODEL_BEKKER,    MILD_MODEL_HUNT_CROSSLEY};
+    MildMaterial m = kit_material(random);
+    m.model = (int)models[index % 6];
+    m.zeta = kit_uniform(random, 0.05, 1.5);
+    m.exponent = kit_uniform(random, 0.4, 2.0);
+    m.k_c = kit_uniform(random, 0.0, 50e3);
+    m.k_phi = pow(10.0, kit_uniform(random, 4.5, 6.0));
+    m.plate_width = 0.08;
+    m.cohesion = kit_uniform(random, 0.0, 10e3);
+    m.shear_length = kit_uniform(random, 0.001, 0.05);
+    m.dissipation = kit_uniform(random, 0.0, 5.0);
+    return m;
+}
+
+static double difference(const double *a, const double *b, int count) {
+    double most = 0.0, size = 1e-9;
+    for (int i = 0; i < count; i++) {
+        most = fmax(most, fabs(a[i] - b[i]));
+        size = fmax(size, fabs(a[i]) + fabs(b[i]));
+    }
+    return most / size;
+}
+
+/* A face that looks down, against a plane sole of the same raster: level when it touches down, so
+ * that every share is 1, and tilting afterwards. */
+static void a_face_is_a_sole(void **state) {
+    (void)state;
+    double worst = 0.0;
+    Plate36 plate;
+    const MildShape shape = surface_plate(5, 3, KIT_SOLE_Z, &plate);
+    MildSole *face = surface_make(&shape, 1, KIT_PITCH), *sole = kit_plate(5, 3);
+    uint64_t random = 3;
+    int steps = 0, loaded = 0, alike = 0;
+    for (int draw = 0; draw < 120; draw++) {
+        const MildMaterial m = any_material(&random, draw);
+        Kit one, two;
+        kit_open(&one, 1, face, NULL, &m, 1e-3);
+        kit_open(&two, 1, sole, NULL, &m, 1e-3);
+        if (draw % 2) {
+            kit_prints(&one, 32);
+            kit_prints(&two, 32);
+        }
+        one.input.position[0][0] = 0.0123; /* off the borders of imprints' cells */
+        one.input.position[0][1] = 0.0045;
+        one.input.position[0][2] -= 0.01;
+        one.mass[0] = 3.0;
+        one.inertia[0] = 0.02;
+        one.center[0][2] = kit_uniform(&random, 0.0, 0.3);
+        for (int k = 0; k < 6; k++) {
+            one.input.velocity[0][k] = kit_uniform(&random, -0.2, 0.2);
+        }
+        if (draw % 2) { /* imprints take the elements of a surface for level squares: no tilt */
+            memset(one.center[0], 0, sizeof one.center[0]);
+            memset(one.input.velocity[0] + 3, 0, 3 * sizeof(double));
+            one.inertia[0] = 1e9;
+        }
+        one.input.velocity[0][2] -= 0.3;
+        memcpy(&two.input, &one.input, sizeof two.input);
+        memcpy(two.center, one.center, sizeof two.center);
+        memcpy(two.mass, one.mass, sizeof two.mass);
+        memcpy(two.inertia, one.inertia, sizeof two.inertia);
+        for (int s = 0; s < 20; s++, steps++) {
+            kit_step(&one, NULL);
+            kit_step(&two, NULL);
+            loaded += one.result.foot[0].contacts;
+            const MildFootResult *a = &one.result.foot[0], *b = &two.result.foot[0];
+            worst = fmax(worst, difference(one.result.velocity, two.result.velocity, 6));
+            worst = fmax(worst, difference(a->force, b->force, 6));
+            worst = fmax(worst, difference(a->pressure_center, b->pressure_center, 3));
+            if (a->contacts == b->contacts) { /* else rounding loads an element with next to 0 */
+                worst = fmax(worst, difference(&a->area, &b->area, 3));
+                alike++;
+            }
+            for (int e = 0; e < 15; e++) {
+                if (mild_ground_depth_max(two.ground, 0)[e] == 0.0) {
+                    s = 20; /* it lifted off: its next share is not 1 */
+                }
+            }
+        }
+        kit_close(&one);
+        kit_close(&two);
+    }
+    print_message("a face against a sole: %d steps, %d with as many loaded, %d loaded elements, "
+                  "worst difference %.1e\n",
+                  steps, alike, loaded, worst);
+    assert_true(alike > 0.99 * steps);
+    assert_true(loaded > 15 * 1000);
+    assert_true(worst < 1e-9);
+    mild_sole_destroy(face);
+    mild_sole_destroy(sole);
+}
+
+/* [N] Force on a body that does not move. */
+static double held_force(const MildSole *sole, const MildMaterial *m, const double *turn,
+                         double height) {
+    Kit kit;
+    kit_open(&kit, 1, (MildSole *)(uintptr_t)sole, NULL, m, 1e-3);
+    kit_rotate(kit.input.rotation[0], turn);
+    kit.input.position[0][2] = height;
+    kit_solve(&kit); /* its inverse inertia is 0 */
+    assert_int_equal(kit.result.converged, 1);
+    const double force = kit.result.foot[0].force[2];
+    kit_close(&kit);
+    return force;
+}
+
+/* [N/m^2] Force of one element on virgin ground over its area. */
+static double pressure(const MildMaterial *m, double pitch, double depth) {
+    return depth > 0.0 ? mild_element_law(m, pitch, depth).force / (pitch * pitch) : 0.0;
+}
+
+/* Integrals over what is below the surface, projected: rings of a sphere, strips of a cylinder. */
+static double sphere_force(const MildMaterial *m, double pitch, double radius, double sunk) {
+    enum { RINGS = 4000 };
+    double sum = 0.0;
+    for (int i = 0; i < RINGS; i++) {
+        const double rho = radius * (i + 0.5) / RINGS;
+        const double depth = sunk - radius + sqrt(radius * radius - rho * rho);
+        sum += 2 * pi * rho * radius / RINGS * pressure(m, pitch, depth);
+    }
+    return sum;
+}
+
+static double cylinder_force(const MildMaterial *m, double pitch, double radius, double length,
+                             double sunk) {
+    enum { STRIPS = 4000 };
+    double sum = 0.0;
+    for (int i = 0; i < STRIPS; i++) {
+        const double y = radius * (2 * (i + 0.5) / STRIPS - 1);
+        const double depth = sunk - radius + sqrt(radius * radius - y * y);
+        sum += 2 * radius / STRIPS * length * pressure(m, pitch, depth);
+    }
+    return sum;
+}
+
+static void pressed_shapes_meet_closed_forms(void **state) {
+    (void)state;
+    const double radius = 0.1, half = 0.15, pitch = 0.006;
+    const MildShape ball = surface_sphere(radius), rod = surface_capsule(radius, half);
+    MildSole *sphere = surface_make(&ball, 1, pitch), *capsule = surface_make(&rod, 1, pitch);
+    const double still[3] = {0, 0, 0}, side[3] = {0.0, 0.5 * pi, 0.0};
+    MildMaterial spring = mild_material_default();
+    spring.model = MILD_MODEL_ECC_SPRING;
+    spring.k_pen = 2.0;
+    MildMaterial foam = mild_material_default();
+    mild_material_preset("foam45", &foam);
+    const MildMaterial grounds[3] = {spring, mild_material_default(), foam};
+    for (int g = 0; g < 3; g++) {
+        const MildMaterial *m = &grounds[g];
+        for (int s = 1; s < 4; s++) {
+            const double sunk = 0.02 * s;
+            const double got = held_force(sphere, m, still, radius - sunk);
+            const double want = sphere_force(m, pitch, radius, sunk);
+            const double lies = held_force(capsule, m, side, radius - sunk);
+            const double flat = cylinder_force(m, pitch, radius, 2 * half, sunk) + want;
+            print_message("%s sunk by %.2f m: sphere %.3f N (%.3f N), capsule on its side %.3f N "
+                          "(%.3f N)\n",
+                          g == 0   ? "springs"
+                          : g == 1 ? "sand"
+                                   : "foam",
+                          sunk, got, want, lies, flat);
+            expect_near("sphere", got, want, 0.015 * want);
+            expect_near("capsule", lies, flat, 0.015 * flat);
+        }
+        /* springs: k/pitch^2 times the volume of the cap below the surface */
+        if (g == 0) {
+            const double cap = pi * 0.04 * 0.04 * (3 * radius - 0.04) / 3;
+            expect_near("cap", sphere_force(m, pitch, radius, 0.04),
+                        spring.k_pen / pitch / pitch * cap,
+                        1e-3 * spring.k_pen / pitch / pitch * cap);
+        }
+    }
+    mild_sole_destroy(sphere);
+    mild_sole_destroy(capsule);
+}
+
+static MildSole *block(void) {
+    static MildShape parts[2];
+    parts[0] = surface_box(0.09, 0.05, 0.04);
+    parts[1] = surface_capsule(0.03, 0.06);
+    parts[1].pos[0] = 0.08;
+    parts[1].quat[0] = parts[1].quat[1] = 1.0;
+    return surface_make(parts, 2, 0.022);
+}
+
+static void random_pose(Kit *kit, uint64_t *random) {
+    for (int f = 0; f < kit->feet; f++) {
+        double turn[3];
+        for (int k = 0; k < 3; k++) {
+            turn[k] = kit_uniform(random, -3.0, 3.0);
+            kit->input.velocity[f][k] = kit_uniform(random, -0.5, 0.5);
+            kit->input.velocity[f][3 + k] = kit_uniform(random, -3.0, 3.0);
+        }
+        kit_rotate(kit->input.rotation[f], turn);
+        kit->input.position[f][2] = kit_uniform(random, -0.02, 0.06);
+        kit->mass[f] = kit_uniform(random, 0.5, 10.0);
+        kit->inertia[f] = kit->mass[f] * 0.01;
+    }
+}
+
+/* The derivatives of the wrench, away from kinks: those where two differences agree. */
+static void hessian_is_the_derivative(void **state) {
+    (void)state;
+    MildSole *body = block();
+    uint64_t random = 8;
+    double worst = 0.0;
+    int compared = 0, kinks = 0;
+    for (int draw = 0; draw < 60; draw++) {
+        const MildMaterial m = any_material(&random, draw);
+        Kit kit;
+        kit_open(&kit, 2, body, body, &m, 2e-3);
+        random_pose(&kit, &random);
+        for (int s = 0; s < 3; s++) {
+            kit_step(&kit, NULL);
+        }
+        kit_inverse_inertia(&kit);
+        kit_free(&kit, NULL);
+        kit_solve(&kit);
+        double twist[12], H[2][36], size = 1e-12;
+        memcpy(twist, kit.result.velocity, sizeof twist);
+        contact_pass(kit.scratch, kit.input.dt, twist, 0);
+        contact_hessian(kit.scratch);
+        memcpy(H, kit.scratch->hessian, sizeof H);
+        for (int i = 0; i < 72; i++) {
+            size = fmax(size, fabs(H[i / 36][i % 36]));
+        }
+        for (int c = 0; c < 12; c++) {
+            double slope[2][6];
+            for (int t = 0; t < 2; t++) {
+                const double h = t ? 1e-7 : 3e-7;
+                for (int way = -1; way < 2; way += 2) {
+                    twist[c] = kit.result.velocity[c] + way * h;
+                    contact_pass(kit.scratch, kit.input.dt, twist, 0);
+                    for (int r = 0; r < 6; r++) {
+                        const double w = kit.scratch->wrench[c / 6 * 6 + r];
+                        slope[t][r] = way < 0 ? w : -(w - slope[t][r]) / (2.0 * h);
+                    }
+                }
+                twist[c] = kit.result.velocity[c];
+            }
+            for (int r = 0; r < 6; r++) {
+                if (kit.scratch->foot[c / 6].active == 0) {
+                    continue;
+                }
+                if (fabs(slope[0][r] - slope[1][r]) > 1e-6 * size) {
+                    kinks++;
+                    continue;
+                }
+                compared++;
+                worst = fmax(worst, fabs(H[c / 6][6 * r + c % 6] - slope[0][r]) / size);
+            }
+        }
+        kit_close(&kit);
+    }
+    print_message("hessian: %d entries within %.1e of differences, %d near kinks\n", compared,
+                  worst, kinks);
+    assert_true(compared > 1500);
+    assert_true(worst < 1e-5);
+    mild_sole_destroy(body);
+}
+
+/* Led by hand around closed motions: [J] that the ground gives in a round after the first, and by
+ * how much of what it has taken. */
+static double led_round(Kit *kit, int rounds, int steps, double angle, const double *axis,
+                        double forth, double *taken) {
+    double last = 0.0;
+    for (int round = 0; round < rounds; round++) {
+        last = *taken = 0.0;
+        for (int s = 0; s < steps; s++) {
+            double before[6];
+            memcpy(before, kit->input.velocity[0], sizeof before);
+            const double phase = 2 * pi * (s + 0.5) / steps;
+            for (int k = 0; k < 3; k++) {
+                kit->input.free_velocity[3 + k] = angle / steps / kit->input.dt * axis[k];
+            }
+            kit->input.free_velocity[0] = forth / steps / kit->input.dt;
+            kit->input.free_velocity[2] = 0.004 * 2 * pi / steps / kit->input.dt * cos(phase);
+            kit_solve(kit);
+            assert_int_equal(kit->result.converged, 1);
+            const double work = kit_work(kit, 0, before);
+            last += work;
+            *taken += fabs(work);
+            kit_advance(kit);
+        }
+    }
+    return last;
+}
+
+/* Closed motions: a buried block that turns fully about any axis, and a capsule that rolls on. */
+static void closed_motions_give_nothing(void **state) {
+    (void)state;
+    const MildShape rod = surface_capsule(0.05, 0.1);
+    MildSole *bodies[2] = {block(), surface_make(&rod, 1, 0.012)};
+    uint64_t random = 17;
+    double worst = -INFINITY, least = INFINITY;
+    int count = 0;
+    for (int draw = 0; draw < 48; draw++) {
+        const int rolls = draw % 2;
+        MildMaterial m = any_material(&random, draw / 2);
+        m.recovery = draw / 12 % 2 ? m.recovery : draw / 24;
+        if (draw % 3 == 0) {
+            m.mu = m.k_drift = m.b_drift = 0.0;
+        }
+        m.passive = 1;
+        double axis[3] = {0.0, 1.0, 0.0}, side[3] = {0.5 * pi, 0.0, 0.0}, taken = 0.0;
+        Kit kit;
+        kit_open(&kit, 1, bodies[rolls], NULL, &m, 1e-3);
+        if (draw % 4 > 1) {
+            kit_prints(&kit, 64);
+        }
+        if (rolls) {
+            kit_rotate(kit.input.rotation[0], side);
+            kit.input.position[0][2] = 0.03;
+        } else {
+            double length = 0.0;
+            for (int k = 0; k < 3; k++) {
+                axis[k] = kit_uniform(&random, -1.0, 1.0);
+                length += axis[k] * axis[k];
+            }
+            for (int k = 0; k < 3; k++) {
+                axis[k] /= sqrt(length);
+            }
+            kit.input.position[0][2] = kit_uniform(&random, -0.1, 0.05);
+        }
+        const double given =
+            led_round(&kit, 2, 3000, 2 * pi, axis, rolls ? 2 * pi * 0.05 : 0.0, &taken);
+        if (taken > 0.0) {
+            worst = fmax(worst, given / taken);
+            least = fmin(least, given / taken);
+            count++;
+        }
+        kit_close(&kit);
+    }
+    print_message("closed motions: %d, of the work done the ground gives %.2e at most, %.2f at "
+                  "least\n",
+                  count, worst, least);
+    assert_true(count > 40);
+    assert_true(worst < 0.0);
+    mild_sole_destroy(bodies[0]);
+    mild_sole_destroy(bodies[1]);
+}
+
+/* A box lies on elastic or plastic ground, turns over without being moved, and turns back: what
+ * comes to face down under the surface carries nothing. */
+static void a_buried_face_begins_without_force(void **state) {
+    (void)state;
+    const MildShape shape = surface_box(0.1, 0.1, 0.02);
+    MildSole *box = surface_make(&shape, 1, 0.02);
+    const double turn[3] = {pi, 0.0, 0.0};
+    for (int elastic = 0; elastic < 2; elastic++) {
+        MildMaterial m = mild_material_default();
+        m.recovery = elastic;
+        Kit kit;
+        kit_open(&kit, 1, box, NULL, &m, 1e-3);
+        kit.input.position[0][2] = -0.03;
+        kit_solve(&kit);
+        const double first = kit.result.foot[0].force[2];
+        kit_advance(&kit);
+        kit_rotate(kit.input.rotation[0], turn);
+        kit_solve(&kit);
+        const double turned = kit.result.foot[0].force[2];
+        kit_advance(&kit);
+        kit.input.free_velocity[2] = -0.1;
+        for (int s = 0; s < 10; s++) {
+            kit_solve(&kit);
+            kit_advance(&kit);
+        }
+        const double deeper = kit.result.foot[0].force[2];
+        kit.input.free_velocity[2] = 1.0;
+        for (int s = 0; s < 100; s++) {
+            kit_solve(&kit);
+            kit_advance(&kit);
+        }
+        kit.input.free_velocity[2] = -1.0;
+        for (int s = 0; s < 100; s++) {
+            kit_solve(&kit);
+            kit_advance(&kit);
+        }
+        const double again = kit.result.foot[0].force[2];
+        print_message("recovery %d: %.1f N, turned over %.1e N, 1 mm deeper %.1f N, lifted and "
+                      "pressed again %.1f N\n",
+                      elastic, first, turned, deeper, again);
+        assert_true(first > 10.0);
+        assert_true(fabs(turned) < 1e-6 * first);
+        assert_true(elastic ? deeper == 0.0 : deeper > first);
+        assert_true(again > 0.99 * first);
+        kit_close(&kit);
+    }
+    mild_sole_destroy(box);
+}
+
+/* It lifts off in its imprint in plastic ground and is moved, still below the surface, to where the
+ * ground is elastic: that has not been pressed down, so it carries nothing. */
+static void elastic_ground_beside_an_imprint_carries_nothing(void **state) {
+    (void)state;
+    const MildShape shape = surface_box(0.1, 0.1, 0.05);
+    MildSole *box = surface_make(&shape, 1, 0.02);
+    MildMaterial sand = mild_material_default(), foam;
+    sand.recovery = 0.0;
+    mild_material_preset("foam45", &foam);
+    foam.recovery = 1.0;
+    Kit kit;
+    kit_open(&kit, 1, box, NULL, &sand, 1e-3);
+    kit_prints(&kit, 64);
+    kit.terrain.materials[kit.terrain.material_count++] = foam;
+    const MildPatch patch = {0.0, INFINITY, -INFINITY, INFINITY, 1};
+    mild_terrain_add_patch(&kit.terrain, &patch, NULL);
+    kit.input.position[0][0] = -0.5;
+    kit.input.position[0][2] = 0.051;
+    double pressed = 0.0;
+    for (int s = 0; s < 45; s++) {
+        kit.input.free_velocity[2] = s < 40 ? -1.0 : 0.4;
+        kit_solve(&kit);
+        pressed = fmax(pressed, kit.result.foot[0].force[2]);
+        kit_advance(&kit);
+    }
+    kit_solve(&kit);
+    const double lifted = kit.result.foot[0].force[2];
+    kit.input.position[0][0] = 0.5;
+    kit.input.free_velocity[2] = 0.0;
+    kit_solve(&kit);
+    const double beside = kit.result.foot[0].force[2];
+    kit_advance(&kit);
+    kit_solve(&kit);
+    print_message(
+        "pressed %.1f N, lifted by 2 mm %.1f N, moved onto foam %.1f N, and again %.1f N\n",
+        pressed, lifted, beside, kit.result.foot[0].force[2]);
+    assert_true(pressed > 100.0 && lifted == 0.0 && beside == 0.0);
+    assert_true(kit.result.foot[0].force[2] == 0.0);
+    kit_close(&kit);
+    mild_sole_destroy(box);
+}
+
+/* A face that leans after touchdown: the share stays that of the touchdown, and another touchdown
+ * finds another. */
+static void a_share_is_kept(void **state) {
+    (void)state;
+    Plate36 plate;
+    const MildShape shape = surface_plate(4, 4, 0.0, &plate);
+    MildSole *face = surface_make(&shape, 1, KIT_PITCH);
+    MildMaterial m = mild_material_default();
+    m.model = MILD_MODEL_HUNT_CROSSLEY;
+    m.exponent = 1.0;
+    m.dissipation = 0.0;
+    m.mu = m.k_drift = m.b_drift = 0.0;
+    const double tilt[3] = {0.0, pi / 3, 0.0}, back[3] = {0.0, -pi / 3, 0.0};
+    Kit kit;
+    kit_open(&kit, 1, face, NULL, &m, 1e-3);
+    kit_rotate(kit.input.rotation[0], tilt);
+    kit.input.position[0][2] = -0.04;
+    kit_solve(&kit);
+    const double tilted = kit.result.foot[0].force[2];
+    kit_advance(&kit);
+    kit_rotate(kit.input.rotation[0], back);
+    kit_solve(&kit);
+    const double kept = kit.result.foot[0].force[2];
+    mild_ground_reset(kit.ground);
+    kit_solve(&kit);
+    const double level = kit.result.foot[0].force[2];
+    print_message("tilted by 60 degrees %.3f N, then level %.3f N, set down level %.3f N\n", tilted,
+                  kept, level);
+    expect_near("kept", kept / level, 0.5, 1e-9);
+    kit_close(&kit);
+    mild_sole_destroy(face);
+}
+
+/* A copy of the state continues alike; a state of other soles, or with numbers that no step leaves,
+ * is refused. */
+static void states_are_copied(void **state) {
+    (void)state;
+    MildSole *body = block(), *plate = kit_plate(3, 2);
+    uint64_t random = 5;
+    const MildMaterial m = mild_material_default();
+    Kit one, two;
+    kit_open(&one, 2, body, plate, &m, 1e-3);
+    random_pose(&one, &random);
+    for (int s = 0; s < 60; s++) {
+        kit_step(&one, NULL);
+    }
+    kit_open(&two, 2, body, plate, &m, 1e-3);
+    assert_true(mild_ground_size(one.ground) == mild_ground_size(two.ground));
+    MildError error = {0};
+    assert_int_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
+    memcpy(&two.input, &one.input, sizeof two.input);
+    memcpy(two.mass, one.mass, sizeof two.mass);
+    memcpy(two.inertia, one.inertia, sizeof two.inertia);
+    for (int s = 0; s < 60; s++) {
+        kit_step(&one, NULL);
+        kit_step(&two, NULL);
+        assert_memory_equal(&one.result, &two.result, sizeof one.result);
+    }
+    assert_memory_equal(one.ground, two.ground, one.bytes);
+    Memory memory = ground_memory(one.ground, 0);
+    assert_non_null(memory.share);
+    memory.share[3] = -1.0;
+    assert_int_not_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
+    memory.share[3] = 0.0;
+    memory.material[3] = -4;
+    assert_int_not_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
+    memory.material[3] = MATERIAL_BURIED;
+    assert_int_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
+    memory = ground_memory(one.ground, 1);
+    assert_null(memory.share);
+    memory.material[3] = MATERIAL_BURIED; /* not of a plane sole */
+    assert_int_not_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
+    kit_close(&one);
+    kit_close(&two);
+    mild_sole_destroy(body);
+    mild_sole_destroy(plate);
+}
+
+/* A scratch of a plane sole with as many elements does not fit the ground of a surface. */
+static void a_scratch_of_soles_does_not_fit(void **state) {
+    (void)state;
+    Plate36 plate;
+    const MildShape shape = surface_plate(3, 2, 0.0, &plate);
+    MildSole *face = surface_make(&shape, 1, KIT_PITCH), *sole = kit_plate(3, 2);
+    const MildMaterial m = mild_material_default();
+    Kit one, two;
+    kit_open(&one, 1, face, NULL, &m, 1e-3);
+    kit_open(&two, 1, sole, NULL, &m, 1e-3);
+    mild_ground_solve(one.ground, &one.terrain, &one.input, two.scratch, &one.result);
+    assert_int_equal(one.result.converged, 0);
+    mild_ground_solve(two.ground, &one.terrain, &one.input, one.scratch, &one.result);
+    assert_int_equal(one.result.converged, 0);
+    kit_close(&one);
+    kit_close(&two);
+    mild_sole_destroy(face);
+    mild_sole_destroy(sole);
+}
+
+/* Far above the ground nothing is listed, and the elements say so. */
+static void in_the_air(void **state) {
+    (void)state;
+    MildSole *body = block();
+    const MildMaterial m = mild_material_default();
+    Kit kit;
+    kit_open(&kit, 1, body, NULL, &m, 1e-3);
+    kit.input.position[0][2] = 0.0;
+    kit_step(&kit, NULL);
+    assert_true(kit.result.foot[0].contacts > 0);
+    kit.input.position[0][2] = 0.5;
+    kit_step(&kit, NULL);
+    const MildElements elements = mild_scratch_elements(kit.scratch, 0);
+    for (int e = 0; e < mild_sole_elements(body); e++) {
+        assert_int_equal(elements.state[e], MILD_ELEMENT_FREE);
+        assert_true(elements.depth[e] < -0.3 && elements.normal[e] == 0.0);
+        assert_true(mild_ground_depth_max(kit.ground, 0)[e] == 0.0);
+    }
+    assert_int_equal(kit.ground->touched[0], 0);
+    kit.input.position[0][2] = NAN;
+    kit_solve(&kit);
+    assert_int_equal(kit.result.converged, 0);
+    kit_close(&kit);
+    mild_sole_destroy(body);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_face_is_a_sole),
+        cmocka_unit_test(pressed_shapes_meet_closed_forms),
+        cmocka_unit_test(hessian_is_the_derivative),
+        cmocka_unit_test(closed_motions_give_nothing),
+        cmocka_unit_test(a_buried_face_begins_without_force),
+        cmocka_unit_test(elastic_ground_beside_an_imprint_carries_nothing),
+        cmocka_unit_test(a_share_is_kept),
+        cmocka_unit_test(states_are_copied),
+        cmocka_unit_test(a_scratch_of_soles_does_not_fit),
+        cmocka_unit_test(in_the_air),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
