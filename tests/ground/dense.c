@@ -347,6 +347,9 @@ typedef struct {
     double pitch, normal[3]; /* of the face that looks down */
     int i;
     double p[3], at[3], slope[2]; /* ankle -> element, world point, gradient of the ground */
+    double share, area;           /* [-] of a surface: what it presses with, and its area, both
+                                     over those of a square of the raster; else 1 */
+    int faces;                    /* bool: a surface */
 } Find;
 
 /* Depth under the ground as it is here or, if that is less, under the plane that the last step took
@@ -359,7 +362,8 @@ static double find_depth(const Find *find) {
     if (!terrain->map || mild_map_is_level(terrain->map) || !find->kit->ground->uneven[find->f]) {
         return here;
     }
-    if (code == MATERIAL_NONE || (code == MATERIAL_FREE && here <= 0.0)) {
+    if (code == MATERIAL_NONE || code == MATERIAL_BURIED ||
+        (code == MATERIAL_FREE && here <= 0.0)) {
         return here;
     }
     double plane =
@@ -371,7 +375,8 @@ static double find_depth(const Find *find) {
  * whose line ends here. */
 static double find_deepest(const Find *find, double recovery) {
     const MildGround *ground = find->kit->ground;
-    const double *R = find->kit->input.rotation[find->f];
+    static const double level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    const double *R = find->faces ? level : find->kit->input.rotation[find->f];
     double deepest = find->memory.depth_max[find->i], m0 = find->memory.middle[find->i], sum = 0.0;
     if (ground->tiles == 0 || find->memory.material[find->i] >= 0 || recovery >= 1.0) {
         return deepest;
@@ -405,6 +410,33 @@ static const MildMaterial *find_law(const Find *find, DenseLaw *law, int *direct
     *directed = is_resistive(first) &&
                 (blend.share == 0.0 || (is_straight(second) && second->model != MILD_MODEL_BEKKER));
     return first;
+}
+
+/* What it presses with of a square of the raster, by its projected area when it touched down; by
+ * its whole area where the law counts the slope. 0: it came to face down below the surface of
+ * elastic ground, or was moved there in an imprint. Below that of other ground it begins at the end
+ * of the unloading line of a greater depth, *deepest. m0: where the step begins. */
+static double find_share(const Find *find, const DenseLaw *law, int directed, double m0,
+                         double *deepest) {
+    const int code = find->memory.material[find->i];
+    const int buried = code == MATERIAL_BURIED && m0 > 0.0;
+    const int lifted = code == MATERIAL_FREE && find->memory.middle[find->i] > 0.0;
+    if (law->recovery >= 1.0 && (buried || lifted)) {
+        return 0.0;
+    }
+    if (buried) {
+        *deepest = fmax(*deepest, fmax(m0 / (1.0 - law->recovery), m0 + ELEMENT_ELASTIC));
+    }
+    return directed ? find->area : find->share;
+}
+
+static void law_times(DenseLaw *law, double share) {
+    double *const forces[] = {&law->k_pen,     &law->kappa,         &law->mass_rate,
+                              &law->drag_rate, &law->bed_stiffness, &law->k_drift,
+                              &law->b_drift,   &law->sinkage,       &law->elastic};
+    for (size_t k = 0; k < sizeof forces / sizeof *forces; k++) {
+        *forces[k] *= share;
+    }
 }
 
 /* Janosi and Hanamoto: with the path j that the element has slid, the nearer material's strength
@@ -461,6 +493,16 @@ static void dense_element(Dense *d, const Find *find) {
         }
     }
     e->u0 = find_depth(find);
+    if (find->faces) {
+        const double share =
+            find_share(find, &e->law, directed, e->u0 - 0.5 * d->dt * now[3], &deepest);
+        if (share == 0.0) {
+            memset(e, 0, sizeof *e);
+            d->elements--;
+            return;
+        }
+        law_times(&e->law, share);
+    }
     memcpy(e->before, now, sizeof e->before);
     e->w0 = fmax(now[3], 0.0);
     e->m0 = memory->middle[i] > 0.0 ? memory->middle[i] : e->u0 - 0.5 * d->dt * now[3];
@@ -481,7 +523,7 @@ static void dense_element(Dense *d, const Find *find) {
         dense_resist(d->dt, e, nearer->model, find->normal, now, now[3]);
     }
     if (nearer->model == MILD_MODEL_BEKKER) {
-        element_shear(d->dt, e, nearer, find->pitch * find->pitch, memory->drift[i]);
+        element_shear(d->dt, e, nearer, find->share * find->pitch * find->pitch, memory->drift[i]);
     }
     element_hold(d->dt, e, memory->held_x[i], memory->held_y[i], memory->held_stiffness[i]);
 }
@@ -493,9 +535,27 @@ static void dense_foot(Dense *d, const Kit *kit, int f) {
                  .f = f,
                  .memory = ground_memory(kit->ground, f),
                  .pitch = mild_sole_pitch(sole),
-                 .normal = {side * R[2], side * R[5], side * R[8]}};
+                 .normal = {side * R[2], side * R[5], side * R[8]},
+                 .share = 1.0,
+                 .area = 1.0,
+                 .faces = mild_sole_surface_z(sole) != NULL};
     for (find.i = 0; find.i < mild_sole_elements(sole); find.i++) {
         double x = mild_sole_x(sole)[find.i], y = mild_sole_y(sole)[find.i], z = mild_sole_z(sole);
+        if (find.faces) {
+            z = mild_sole_surface_z(sole)[find.i];
+            find.area = mild_sole_surface_area(sole)[find.i] / (find.pitch * find.pitch);
+            for (int k = 0; k < 3; k++) {
+                find.normal[k] = 0.0;
+                for (int j = 0; j < 3; j++) {
+                    find.normal[k] += R[3 * k + j] * mild_sole_surface_normal(sole, j)[find.i];
+                }
+            }
+            find.share = find.memory.material[find.i] >= 0 ? find.memory.share[find.i]
+                                                           : -find.normal[2] * find.area;
+            if (!(-find.normal[2] > cos(80.0 / 180.0 * acos(-1.0)))) {
+                continue;
+            }
+        }
         for (int k = 0; k < 3; k++) {
             find.p[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * z;
             find.at[k] = kit->input.position[f][k] + find.p[k];

@@ -3,12 +3,30 @@
 #ifndef PROBLEMS_H
 #define PROBLEMS_H
 
-#include "ground_kit.h"
+#include "surface_kit.h"
 
 #define SOLES 8
 
 static MildSole *soles[SOLES];   /* left 77, right 77, one element, plates of six and more */
 static MildSole *centers[SOLES]; /* of each, for the concentric models */
+static MildSole *covered[SOLES]; /* bodies about as large as a foot, of up to 90 elements */
+
+/* A box with a round end, one with a wedge, and simple ones. */
+static void open_covered(void) {
+    static double vertices[18];
+    MildShape two[2] = {surface_box(0.07, 0.04, 0.04), surface_capsule(0.04, 0.04)};
+    two[1].pos[0] = 0.07;
+    two[1].quat[0] = two[1].quat[1] = 1.0;
+    covered[0] = surface_make(two, 2, 0.04);
+    two[1] = surface_wedge(0.05, 0.04, 0.03, vertices);
+    two[1].pos[2] = 0.05;
+    covered[1] = surface_make(two, 2, 0.045);
+    for (int i = 2; i < SOLES; i++) {
+        const MildShape one[3] = {surface_box(0.03 + 0.005 * i, 0.03, 0.05),
+                                  surface_capsule(0.04, 0.01 * i), surface_sphere(0.05)};
+        covered[i] = surface_make(&one[i % 3], 1, 0.035);
+    }
+}
 
 static int open_soles(void **state) {
     (void)state;
@@ -23,6 +41,7 @@ static int open_soles(void **state) {
     for (int i = 0; i < SOLES; i++) {
         centers[i] = mild_sole_concentric(soles[i], NULL);
     }
+    open_covered();
     return 0;
 }
 
@@ -31,6 +50,7 @@ static int close_soles(void **state) {
     for (int i = 0; i < SOLES; i++) {
         mild_sole_destroy(soles[i]);
         mild_sole_destroy(centers[i]);
+        mild_sole_destroy(covered[i]);
     }
     return 0;
 }
@@ -111,13 +131,14 @@ typedef enum {
     BEKKER,
     HUNT_CROSSLEY,
     EVERYTHING,
+    SURFACES,
     KINDS
 } Kind;
 static const char *const kind_names[KINDS] = {
     "springs",       "con_cone and con_spring", "ecc_quasi",
     "ecc_quasi_3d",  "uneven ground",           "materials that blend",
     "prints",        "passive = false",         "bekker",
-    "hunt_crossley", "everything at once"};
+    "hunt_crossley", "everything at once",      "everything under surfaces"};
 
 /* One of the models of the raster, with numbers for it. */
 static MildMaterial material_of(uint64_t *random, MildModel model) {
@@ -155,7 +176,7 @@ static MildMaterial kind_material(Kind kind, uint64_t *random) {
                                          [QUASI_3D] = MILD_MODEL_ECC_QUASI_3D,
                                          [BEKKER] = MILD_MODEL_BEKKER,
                                          [HUNT_CROSSLEY] = MILD_MODEL_HUNT_CROSSLEY};
-    MildModel model = kind == EVERYTHING ? models[kit_index(random, 6)]
+    MildModel model = kind >= EVERYTHING ? models[kit_index(random, 6)]
                       : kind == BLEND    ? blended[kit_index(random, 2)]
                                          : own[kind];
     MildMaterial m = material_of(random, model);
@@ -166,7 +187,7 @@ static MildMaterial kind_material(Kind kind, uint64_t *random) {
     if (kit_index(random, 5) == 0) {
         m.bed_depth = kit_uniform(random, 0.001, 0.02);
     }
-    m.passive = kind == ACTIVE ? 0 : kind == EVERYTHING ? kit_index(random, 3) > 0 : 1;
+    m.passive = kind == ACTIVE ? 0 : kind >= EVERYTHING ? kit_index(random, 3) > 0 : 1;
     return m;
 }
 
@@ -252,16 +273,39 @@ static void problem_visit(Kit *kit, uint64_t *random) {
     }
 }
 
+/* The bodies are turned in the ground by hand: loaded elements face up, and elements below it face
+ * down. */
+static void problem_turn(Kit *kit, uint64_t *random) {
+    enum { STEPS = 30 };
+    memset(kit->input.free_velocity, 0, sizeof kit->input.free_velocity);
+    for (int i = 0; i < 6 * kit->feet; i++) {
+        const double most = i % 6 < 3 ? 0.01 : 1.0; /* [m], [rad] in all */
+        kit->input.free_velocity[i] = kit_uniform(random, -most, most) / STEPS / kit->input.dt;
+    }
+    memset(kit->input.inverse_inertia, 0, sizeof kit->input.inverse_inertia);
+    for (int s = 0; s < STEPS; s++) {
+        kit_solve(kit);
+        kit_advance(kit);
+    }
+}
+
 /* *map: to be destroyed after the kit, may be NULL. */
 static int kind_problem(Kit *kit, MildMap **map, Kind kind, int number) {
     static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
     uint64_t random = (uint64_t)number * 1000003u + 29 + (uint64_t)kind * 7919u;
     MildMaterial m = kind_material(kind, &random);
     double dt = steps[kit_index(&random, 3)];
-    int all = kind == EVERYTHING;
-    problem_open(kit, &random, kind == CONCENTRIC ? centers : soles, number % 2 ? SOLES - 2 : 0, &m,
-                 dt);
+    int all = kind >= EVERYTHING;
+    MildSole *const *from = kind == CONCENTRIC ? centers : kind == SURFACES ? covered : soles;
+    problem_open(kit, &random, from, number % 2 ? SOLES - 2 : 0, &m, dt);
     *map = NULL;
+    for (int f = 0; kind == SURFACES && f < kit->feet; f++) {
+        double turn[3];
+        for (int k = 0; k < 3; k++) {
+            turn[k] = kit_uniform(&random, -3.0, 3.0);
+        }
+        kit_rotate(kit->input.rotation[f], turn);
+    }
     if (kind == CONCENTRIC) {
         problem_match(kit, &random);
     }
@@ -273,6 +317,9 @@ static int kind_problem(Kit *kit, MildMap **map, Kind kind, int number) {
     }
     if (kind == PRINTS || all) {
         problem_visit(kit, &random);
+    }
+    if (kind == SURFACES) {
+        problem_turn(kit, &random);
     }
     return problem_solve(kit, &random);
 }
