@@ -145,25 +145,32 @@ MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t 
     return uneven ? foot.elements : (int)touched;
 }
 
-/* An element that is not listed forgets. One of a surface that faces up near the ground is buried
- * until it comes out; if it was loaded it leaves an imprint. Returns whether it remembers that. */
-static int element_unlisted(const Advance *a, const Memory *memory, int e) {
+/* An element that is not listed forgets. Returns whether it remembers that it was here. */
+MILD_HD int element_unlisted(const Memory *memory, int e) {
+    memory_forget(memory, e, MATERIAL_NONE);
+    return 0;
+}
+
+/* The same of a surface: an element that faces up near the ground is buried until it comes out. If
+ * it was loaded it leaves an imprint. */
+static int face_unlisted(const Advance *a, const Memory *memory, int e) {
     const FootScratch *foot = a->foot;
-    const int buried =
-        foot->faces && !foot->away && !(foot->share[e] > 0.0) && foot->depth[e] > foot->least;
+    const int buried = !foot->away && !(foot->share[e] > 0.0) && foot->depth[e] > foot->least;
     const int32_t material = memory->material[e];
     if (buried && a->imprints && material >= 0 &&
         foot->derived[material & 0xff].material.recovery < 1.0) {
         const ImprintElement left = {foot->point_x[e], foot->point_y[e], foot->pitch, a->rotation};
         imprints_press(a->imprints, &left, memory->depth_max[e]);
     }
+    memory->share[e] = 0.0;
     memory_forget(memory, e, buried ? MATERIAL_BURIED : MATERIAL_NONE);
     return buried;
 }
 
 /* The general case: some elements are listed, the ground keeps imprints, or the foot is a surface.
- * Returns how many elements remember something. */
-static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
+ * Returns how many elements remember something. faces: SLOT_FACES or 0, a constant. */
+MILD_HD int foot_advance(const Advance *a, const Memory *memory, const int32_t *material,
+                         int faces) {
     const FootScratch *foot = a->foot;
     const Slots *s = &a->slot;
     const int32_t lifted_material = a->imprints || foot->uneven ? MATERIAL_FREE : MATERIAL_NONE;
@@ -172,14 +179,15 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
     for (int i = 0; i < foot->active; i++, next++) {
         const int e = foot->element[i];
         for (; next < e; next++) {
-            touched += element_unlisted(a, memory, next);
+            touched += faces ? face_unlisted(a, memory, next) : element_unlisted(memory, next);
         }
-        if (foot->faces && !(s->share[i] > 0.0)) {
+        if (faces && !(s->share[i] > 0.0)) { /* it carries nothing until it has come out */
+            memory->share[e] = 0.0;
             memory_forget(memory, e, MATERIAL_BURIED);
             touched++;
             continue;
         }
-        const SlotVelocity v = slot_velocity(s, i, &a->motion, SLOT_UNEVEN | foot->faces);
+        const SlotVelocity v = slot_velocity(s, i, &a->motion, SLOT_UNEVEN | faces);
         const double middle = s->depth[i] + a->dt / 2 * v.descent;
         const int lifted = element_lifted(a, i, middle);
         const int carried = memory->material[e] >= 0;
@@ -192,7 +200,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
             slot_peak(a, memory, i, e, v.descent, middle);
         }
         memory->material[e] = lifted ? lifted_material : material[i];
-        if (foot->faces) {
+        if (faces) {
             memory->share[e] = lifted ? 0.0 : s->share[i];
         }
         if (a->imprints && (carried || !lifted)) {
@@ -204,7 +212,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         touched += !lifted || lifted_material != MATERIAL_NONE;
     }
     for (; next < foot->elements; next++) {
-        touched += element_unlisted(a, memory, next);
+        touched += faces ? face_unlisted(a, memory, next) : element_unlisted(memory, next);
     }
     return touched;
 }
@@ -243,8 +251,10 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
             ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1);
         } else if (all) {
             ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0);
+        } else if (foot->faces) {
+            ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material, SLOT_FACES);
         } else {
-            ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material);
+            ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material, 0);
         }
     }
 }

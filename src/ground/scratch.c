@@ -100,10 +100,9 @@ static void foot_set_slots(FootScratch *foot, double **at, int32_t *integers) {
 }
 
 int scratch_fits(const MildScratch *scratch, const MildGround *ground) {
-    int fits = scratch->feet == ground->feet;
+    int fits = scratch->feet == ground->feet && scratch->faces == ground->faces;
     for (int f = 0; f < ground->feet; f++) {
-        fits = fits && scratch->foot[f].elements == ground->elements[f] &&
-               !scratch->foot[f].faces == !(ground->faces >> f & 1);
+        fits = fits && scratch->foot[f].elements == ground->elements[f];
     }
     return fits;
 }
@@ -138,6 +137,7 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
         FootScratch *foot = &scratch->foot[f];
         foot_set(foot, soles[f], &at);
         foot_set_faces(foot, soles[f], &at);
+        scratch->faces |= soles[f]->faces << f;
         foot_set_slots(foot, &at, integers);
         integers += 2 * foot->padded;
     }

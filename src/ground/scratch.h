@@ -81,6 +81,7 @@ typedef struct FootScratch {
 
 struct MildScratch {
     int feet;
+    int32_t faces; /* bit f: foot f is a surface */
     FootScratch foot[MILD_FEET_MAX];
     double sums[MILD_FEET_MAX][12]; /* [N s, N s m] of I, x I, y I, height I at the last pass */
     double wrench[TWIST_MAX];       /* [N s, N m s] sum of B^T I at the last pass */

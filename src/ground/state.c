@@ -139,9 +139,6 @@ void memory_forget(const Memory *memory, int e, int32_t material) {
     memory->held_x[e] = 0.0;
     memory->held_y[e] = 0.0;
     memory->held_stiffness[e] = 0.0;
-    if (memory->share) {
-        memory->share[e] = 0.0;
-    }
     memory->material[e] = material;
 }
 
