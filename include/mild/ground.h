@@ -233,7 +233,7 @@ double mild_sole_width(const MildSole *sole);
 const double *mild_sole_x(const MildSole *sole);
 const double *mild_sole_y(const MildSole *sole);
 double mild_sole_z(const MildSole *sole);
-/* ---- surfaces: elements anywhere on a body (docs/model.md, "Surfaces") ---- */
+/* ---- surfaces: elements anywhere on a body (docs/model.md section 20) ---- */
 
 /* What a shape is. Sizes are those of a MuJoCo geom. */
 typedef enum {
@@ -268,9 +268,10 @@ typedef struct {
  * to that of the surface. An element carries load while its normal points down by more than 10
  * degrees below the horizontal, with its area projected on the horizontal plane when it touched
  * down. A surface serves wherever a sole does, except in mild_sole_concentric, mild_model_match and
- * a MildBatch, which refuse it. Returns NULL, with the name of the field in *error, when a number is
- * out of range, when a closed mesh has its triangles turned inward, when nothing is left or more
- * than 65536 elements are, or when out of memory. `def` is not kept. */
+ * a MildBatch, which refuse it, and mild_sole_sinkage, which takes it for a level sole. Returns
+ * NULL, with the name of the field in *error, when a number is out of range, when a closed mesh has
+ * its triangles turned inward, when nothing is left or more than 65536 elements are, or when out of
+ * memory. `def` is not kept. */
 MildSole *mild_sole_surface(const MildSurfaceDef *def, MildError *error);
 /* Arrays of mild_sole_elements() numbers owned by the sole, for each element of a surface: height
  * above the frame's origin [m] (mild_sole_z is their mean), component of the outward unit normal
@@ -367,7 +368,7 @@ typedef struct {
     /* [m] Centre of pressure, world: sum of p f divided by sum of f, with f the normal forces of
      * the elements. For a level sole it is the ankle plus zmp_sole. 0 without load. */
     double pressure_center[3];
-    double area;       /* [m^2] of the loaded elements */
+    double area; /* [m^2] of the loaded elements; of a surface projected, see mild_sole_surface */
     double depth_max;  /* [m] largest depth of a loaded element */
     double depth_mean; /* [m] mean depth of the loaded elements */
     int contacts;      /* number of loaded elements */
@@ -469,7 +470,7 @@ typedef enum {
 typedef struct {
     /* [m] u at the start of the step, negative above the ground. On uneven ground the law,
      * depth_max and depth_mean take the smaller of this and what the ground of the last step
-     * gives. */
+     * gives. Where no element of a surface can touch, an upper bound of all. */
     const double *depth;
     const double *normal;    /* [N] vertical part of the force, mean over the step */
     const double *tangent_x; /* [N] horizontal part, world, mean over the step */

@@ -76,15 +76,13 @@ MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int kind
         const double x = s->x[i];
         const double y = s->y[i];
         const SlotVelocity v = slot_velocity(s, i, &motion, kind);
-        const double vx = v.x;
-        const double vy = v.y;
         const double iz = s->iz[i];
         const double k = s->hzz[i];
         const Element element = slot_element(s, i);
         const double bound = held ? s->bound[i] : friction_bound(&element, iz);
         const double mu = held ? 0.0 : element.mu;
-        const Friction friction = turned ? friction_turned(&element, bound, mu, vx, vy)
-                                         : friction_impulse(&element, bound, mu, vx, vy);
+        const Friction friction = turned ? friction_turned(&element, bound, mu, v.x, v.y)
+                                         : friction_impulse(&element, bound, mu, v.x, v.y);
         double ix = friction.x;
         double iy = friction.y;
         double hxz = friction.rise_x * k;
@@ -122,14 +120,12 @@ MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int kind
         b0 += y * ix;
         b1 += y * iy;
         b2 += y * iz;
-        if (kind & SLOT_FACES) {
-            c0 += s->z[i] * ix;
-            c1 += s->z[i] * iy;
-            c2 += s->z[i] * iz;
-        }
+        c0 += kind & SLOT_FACES ? s->z[i] * ix : 0.0;
+        c1 += kind & SLOT_FACES ? s->z[i] * iy : 0.0;
+        c2 += kind & SLOT_FACES ? s->z[i] * iz : 0.0;
     }
-    const double all[12] = {f0, f1, f2, a0, a1, a2, b0, b1, b2, c0, c1, c2};
-    memcpy(sums, all, sizeof all);
+    memcpy(sums, (const double[12]){f0, f1, f2, a0, a1, a2, b0, b1, b2, c0, c1, c2},
+           12 * sizeof f0);
 }
 
 /* torque += p x I */

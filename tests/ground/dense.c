@@ -1,5 +1,6 @@
 #include "dense.h"
 
+#include "dense_law.h"
 #include "dense_power.h"
 
 /* The constants of these five. */
@@ -110,87 +111,6 @@ static double law_normal(double dt, const DenseElement *e, double w) {
                                                      : -0.5 * back * back / IMPULSE_EASE;
     impulse += dt * ELEMENT_LAG * e->line * eased + dense_elastic(dt, e, m1);
     return fmax(impulse + e->active, 0.0);
-}
-
-/* ---- what the ground is made of ---- */
-
-static int is_resistive(const MildMaterial *m) {
-    return m->model == MILD_MODEL_ECC_QUASI || m->model == MILD_MODEL_ECC_QUASI_3D;
-}
-
-/* A cone that is complete at once: yielding springs, resistive force theory, and ground that is
- * nothing but a bed below its other curve. */
-static int is_straight(const MildMaterial *m) {
-    return is_resistive(m) || m->model == MILD_MODEL_CON_SPRING ||
-           m->model == MILD_MODEL_ECC_SPRING || m->model == MILD_MODEL_BEKKER ||
-           m->model == MILD_MODEL_HUNT_CROSSLEY;
-}
-
-/* Bekker: (k_c/b + k_phi) z^n on the element's area. Hunt and Crossley: k_pen u at 10 mm, damped by
- * 3/2 d; it springs back whole. */
-static void law_curve(const MildMaterial *m, double area, DenseLaw *law) {
-    if (m->model == MILD_MODEL_BEKKER) {
-        law->sinkage = (m->k_c / m->plate_width + m->k_phi) * pow(DENSE_DEPTH, m->exponent) * area;
-        law->sinkage_power = m->exponent;
-    } else if (m->model == MILD_MODEL_HUNT_CROSSLEY) {
-        law->elastic = m->k_pen * DENSE_DEPTH;
-        law->elastic_power = m->exponent;
-        law->loss = 1.5 * m->dissipation;
-        law->recovery = 1.0;
-    }
-}
-
-static DenseLaw law_material(const MildMaterial *m, double pitch) {
-    double area = pitch * pitch, c_g = m->passive ? fmax(m->c_g, 0.0) : m->c_g,
-           c_d = m->passive ? fmax(m->c_d, 0.5) : m->c_d;
-    DenseLaw law = {.bed = m->bed_depth,
-                    .bed_stiffness = LAW_BED_STRESS * area,
-                    .recovery = is_resistive(m) ? 0.0 : m->recovery,
-                    .mu = m->mu,
-                    .k_drift = m->k_drift,
-                    .b_drift = m->b_drift};
-    if (is_straight(m)) {
-        int spring = m->model == MILD_MODEL_CON_SPRING || m->model == MILD_MODEL_ECC_SPRING;
-        law.k_pen = law.kappa = is_resistive(m) ? m->zeta * LAW_RESIST_STRESS * area
-                                : spring        ? m->k_pen
-                                                : 0.0;
-        law.full = LAW_LINE_DEPTH;
-        law_curve(m, area, &law);
-        return law;
-    }
-    law.k_pen = m->k_pen;
-    law.kappa = m->sigma_cone * area / cos(m->alpha);
-    law.full = sqrt(area / acos(-1.0)) * tan(m->alpha) / m->nu;
-    law.mass_rate = c_g * m->phi * m->rho * m->nu * area;
-    law.drag_rate = c_d * law.mass_rate;
-    return law;
-}
-
-/* The power of a curve that only one of two laws has, and its damping, stay as they are. */
-static void law_alone(double one, double other, double *a, double *b) {
-    if (one == 0.0) {
-        *a = *b;
-    } else if (other == 0.0) {
-        *b = *a;
-    }
-}
-
-/* All numbers of one law change linearly into the other's. */
-static DenseLaw law_blend(const DenseLaw *one, const DenseLaw *other, double share) {
-    enum { NUMBERS = sizeof(DenseLaw) / sizeof(double) };
-    double a[NUMBERS], b[NUMBERS];
-    DenseLaw law, from = *one, to = *other;
-    law_alone(one->sinkage, other->sinkage, &from.sinkage_power, &to.sinkage_power);
-    law_alone(one->elastic, other->elastic, &from.elastic_power, &to.elastic_power);
-    law_alone(one->elastic, other->elastic, &from.loss, &to.loss);
-    memcpy(a, &from, sizeof a);
-    memcpy(b, &to, sizeof b);
-    for (int k = 0; k < NUMBERS; k++) {
-        a[k] = (1.0 - share) * a[k] + share * b[k];
-    }
-    memcpy(&law, a, sizeof a);
-    law.recovery = law.elastic > 0.0 ? 1.0 : law.recovery; /* part of it has no memory */
-    return law;
 }
 
 /* ---- the problem ---- */
@@ -428,15 +348,6 @@ static double find_share(const Find *find, const DenseLaw *law, int directed, do
         *deepest = fmax(*deepest, fmax(m0 / (1.0 - law->recovery), m0 + ELEMENT_ELASTIC));
     }
     return directed ? find->area : find->share;
-}
-
-static void law_times(DenseLaw *law, double share) {
-    double *const forces[] = {&law->k_pen,     &law->kappa,         &law->mass_rate,
-                              &law->drag_rate, &law->bed_stiffness, &law->k_drift,
-                              &law->b_drift,   &law->sinkage,       &law->elastic};
-    for (size_t k = 0; k < sizeof forces / sizeof *forces; k++) {
-        *forces[k] *= share;
-    }
 }
 
 /* Janosi and Hanamoto: with the path j that the element has slid, the nearer material's strength

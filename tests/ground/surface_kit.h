@@ -41,8 +41,8 @@ static inline MildShape surface_wedge(double a, double b, double c, double verti
                        .triangle_count = 8};
 }
 
-/* One face of columns x rows elements that looks down at the height z: an open mesh of two triangles
- * for each. */
+/* One face of columns x rows elements that looks down at the height z: an open mesh of two
+ * triangles for each. */
 typedef struct {
     double vertices[49][3];
     int triangles[72][3];
