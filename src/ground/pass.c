@@ -73,8 +73,7 @@ MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int kind
     double c0 = 0.0, c1 = 0.0, c2 = 0.0; /* of height I */
 #pragma omp simd reduction(+ : f0, f1, f2, a0, a1, a2, b0, b1, b2, c0, c1, c2)
     for (int i = 0; i < end; i++) {
-        const double x = s->x[i];
-        const double y = s->y[i];
+        const double x = s->x[i], y = s->y[i];
         const SlotVelocity v = slot_velocity(s, i, &motion, kind);
         const double iz = s->iz[i];
         const double k = s->hzz[i];
@@ -124,8 +123,8 @@ MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int kind
         c1 += kind & SLOT_FACES ? s->z[i] * iy : 0.0;
         c2 += kind & SLOT_FACES ? s->z[i] * iz : 0.0;
     }
-    memcpy(sums, (const double[12]){f0, f1, f2, a0, a1, a2, b0, b1, b2, c0, c1, c2},
-           12 * sizeof f0);
+    const double all[12] = {f0, f1, f2, a0, a1, a2, b0, b1, b2, c0, c1, c2};
+    memcpy(sums, all, sizeof all);
 }
 
 /* torque += p x I */

@@ -1,6 +1,6 @@
 /* Stepping allocates nothing, bad numbers stop nothing, and a state block is bytes: copy, continue,
  * same answer. */
-#include "ground_kit.h"
+#include "surface_kit.h"
 
 #if defined(__SANITIZE_ADDRESS__)
 #define COUNTING 0 /* the sanitizer brings its own allocator */
@@ -18,6 +18,7 @@ static int allocations, fail_at; /* fail_at: the allocation that fails, 0 = none
 #if COUNTING
 extern void *__libc_malloc(size_t size);
 extern void *__libc_calloc(size_t count, size_t size);
+extern void *__libc_realloc(void *at, size_t size);
 extern void *__libc_memalign(size_t alignment, size_t size);
 
 static int allocation_fails(void) {
@@ -31,6 +32,10 @@ void *malloc(size_t size) {
 
 void *calloc(size_t count, size_t size) {
     return allocation_fails() ? NULL : __libc_calloc(count, size);
+}
+
+void *realloc(void *at, size_t size) {
+    return allocation_fails() ? NULL : __libc_realloc(at, size);
 }
 
 void *aligned_alloc(size_t alignment, size_t size) {
@@ -94,6 +99,43 @@ static void test_failing_allocation(void **state) {
     }
     print_message("the n-th allocation failing: %d clean refusals\n", refused);
     assert_int_equal(refused, 5);
+    mild_sole_destroy(sole);
+}
+
+/* A surface grows its list, a mesh its pieces too; a step on it allocates nothing. */
+static void test_failing_surface(void **state) {
+    (void)state;
+    if (!COUNTING) {
+        skip();
+    }
+    double vertices[18];
+    const MildShape shapes[2] = {surface_wedge(0.1, 0.1, 0.1, vertices),
+                                 surface_box(0.2, 0.05, 0.05)};
+    const MildSurfaceDef def = {.shapes = shapes, .count = 2, .pitch = 0.01};
+    MildSole *sole = NULL;
+    int refused = 0;
+    for (int n = 1; !sole; n++) {
+        MildError error = {0};
+        fail_at = n;
+        sole = mild_sole_surface(&def, &error);
+        fail_at = 0;
+        if (!sole) {
+            assert_int_equal(error.status, MILD_ERROR_MEMORY);
+            refused++;
+        }
+    }
+    const MildMaterial m = mild_material_default();
+    Kit kit;
+    kit_open(&kit, 1, sole, NULL, &m, 1e-3);
+    const int before = allocations;
+    for (int s = 0; s < 50; s++) {
+        kit_step(&kit, NULL);
+    }
+    print_message("surfaces: %d clean refusals, %d allocations in 50 steps\n", refused,
+                  allocations - before);
+    assert_true(refused > 5);
+    assert_int_equal(allocations, before);
+    kit_close(&kit);
     mild_sole_destroy(sole);
 }
 
@@ -252,6 +294,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_restore),
                                        cmocka_unit_test(test_no_allocation),
                                        cmocka_unit_test(test_failing_allocation),
+                                       cmocka_unit_test(test_failing_surface),
                                        cmocka_unit_test(test_bad_numbers),
                                        cmocka_unit_test(test_taken_away),
                                        cmocka_unit_test(test_copy_continues),
