@@ -2,7 +2,6 @@
 #ifndef MILD_GROUND_FACES_H
 #define MILD_GROUND_FACES_H
 
-#include "ground/plate.h"
 #include "ground/scratch.h"
 
 /* After foot_locate: lists the elements that face down and may touch in this step. steepest, f: as
@@ -16,17 +15,7 @@ void faces_slots(FootScratch *foot, const MildGround *ground, int f, const MildT
 /* The rotation that imprints take for that of a surface. */
 extern const double faces_level[9];
 
-/* Its hessian after a pass: pass.c's with p = sum over four factors (1, x, y, height). */
-void faces_hessian(const FootScratch *foot, double *H);
 /* [N s m] Sum of the heights times the normal impulses. *area: [m^2] of the loaded elements. */
 double faces_loaded(const FootScratch *foot, double *area);
-/* The face of an element as a plate. */
-void faces_plate(const FootScratch *foot, int e, Plate *plate);
-
-/* Bool: the resistance of a slot depends on its direction, by resistive force theory: no other
- * curve is blended with it. */
-static inline int slot_directed(const Slots *s, int i) {
-    return s->flat_stiffness[i] == 0.0 && s->power_force[i] == 0.0;
-}
 
 #endif

@@ -5,9 +5,10 @@
 
 #include <string.h>
 
-#include "ground/faces.h"
+#include "ground/faces_hessian.h"
 #include "ground/friction.h"
 #include "ground/impulse.h"
+#include "ground/moments.h"
 
 MILD_HD void slot_normal(const Slots *s, int i, double dt, const Motion *motion, int kind,
                          int curves, int stops) {
@@ -185,54 +186,17 @@ void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int
 /* Sums over the foot of each entry of h times 1, x, y, x^2, xy, y^2. They determine the foot's
  * hessian, because p is linear in x and y. */
 typedef double Moments[3][3][6];
-void pass_moments(const double *xs, const double *ys, int end, const double *a, const double *b,
-                  const double *c, double sums[3][6]) {
-    if (end < VECTOR_LANES) {
-        return; /* never, as in foot_frictions */
-    }
-    end &= -VECTOR_LANES; /* which it is: for the compiler, which does not see the caller */
-    double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0;
-    double b0 = 0.0, b1 = 0.0, b2 = 0.0, b3 = 0.0, b4 = 0.0, b5 = 0.0;
-    double c0 = 0.0, c1 = 0.0, c2 = 0.0, c3 = 0.0, c4 = 0.0, c5 = 0.0;
-#pragma omp simd reduction(+ : a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5, c0, c1, c2, c3, c4, \
-                               c5)
-    for (int i = 0; i < end; i++) {
-        double x = xs[i], y = ys[i], xx = x * x, xy = x * y, yy = y * y;
-        a0 += a[i];
-        a1 += a[i] * x;
-        a2 += a[i] * y;
-        a3 += a[i] * xx;
-        a4 += a[i] * xy;
-        a5 += a[i] * yy;
-        b0 += b[i];
-        b1 += b[i] * x;
-        b2 += b[i] * y;
-        b3 += b[i] * xx;
-        b4 += b[i] * xy;
-        b5 += b[i] * yy;
-        c0 += c[i];
-        c1 += c[i] * x;
-        c2 += c[i] * y;
-        c3 += c[i] * xx;
-        c4 += c[i] * xy;
-        c5 += c[i] * yy;
-    }
-    const double all[3][6] = {
-        {a0, a1, a2, a3, a4, a5}, {b0, b1, b2, b3, b4, b5}, {c0, c1, c2, c3, c4, c5}};
-    memcpy(sums, all, sizeof all);
-}
-
 static void foot_moments(const FootScratch *foot, Moments M) {
     const Slots *s = &foot->slot;
     int end = foot_end(foot);
-    pass_moments(s->x, s->y, end, s->hxx, s->hxy, s->hxz, M[0]);
+    moments(s->x, s->y, end, s->hxx, s->hxy, s->hxz, M[0]);
     if (foot->uneven) {
-        pass_moments(s->x, s->y, end, s->hyx, s->hyy, s->hyz, M[1]);
-        pass_moments(s->x, s->y, end, s->hzx, s->hzy, s->hzz, M[2]);
+        moments(s->x, s->y, end, s->hyx, s->hyy, s->hyz, M[1]);
+        moments(s->x, s->y, end, s->hzx, s->hzy, s->hzz, M[2]);
         return;
     }
     double rest[3][6];
-    pass_moments(s->x, s->y, end, s->hyy, s->hyz, s->hzz, rest);
+    moments(s->x, s->y, end, s->hyy, s->hyz, s->hzz, rest);
     memcpy(M[1][0], M[0][1], sizeof M[1][0]);
     memcpy(M[1][1], rest, 2 * sizeof *rest);
     memset(M[2], 0, 2 * sizeof M[2][0]);

@@ -10,10 +10,6 @@ void contact_pass(MildScratch *scratch, double dt, const double *twist, int firs
 /* The same with the friction bounds fixed at slot.bound. The impulses are then minus the gradient
  * of a convex function of V. */
 void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int first);
-/* Sums over slots of each of a, b and c times 1, x, y, x^2, xy, y^2. Three at a time are as many
- * sums as the registers hold. end: slots, rounded up to whole vectors. */
-void pass_moments(const double *xs, const double *ys, int end, const double *a, const double *b,
-                  const double *c, double sums[3][6]);
 /* Computes the hessians of the feet from the derivatives of the last pass. */
 void contact_hessian(MildScratch *scratch);
 

@@ -2,7 +2,6 @@
 #include "ground/resist.h"
 
 #include "ground/element_law.h"
-#include "ground/faces.h"
 
 void mild_resist_plane(double beta, double gamma, double alpha[2]) {
     const Alpha plane = plane_alpha(cos(2.0 * beta), sin(2.0 * beta), cos(gamma), sin(gamma));
@@ -59,6 +58,16 @@ static int terrain_only(const MildTerrain *terrain, int model) {
     return only;
 }
 
+/* The face of an element of a surface. */
+static Plate face_plate(const FootScratch *foot, int e) {
+    double normal[3];
+    for (int k = 0; k < 3; k++) {
+        normal[k] = foot->arm[1][k] * foot->face[0][e] + foot->arm[2][k] * foot->face[1][e] +
+                    foot->arm[3][k] * foot->face[2][e];
+    }
+    return plate_facing(normal);
+}
+
 /* The foot's slots on `model`, among slots on others. in_space: bool. */
 static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain, int model,
                              double dt, const Plate *plate, const Motion *now, int in_space) {
@@ -72,7 +81,7 @@ static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain
         }
         Plate own = *plate;
         if (foot->faces) {
-            faces_plate(foot, foot->element[i], &own);
+            own = face_plate(foot, foot->element[i]);
         }
         slot_resist(s, i, dt, 1.0 / dt, &own, now, in_space, foot->curves,
                     SLOT_UNEVEN | foot->faces);

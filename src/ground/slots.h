@@ -200,4 +200,10 @@ MILD_HD SlotVelocity slot_velocity(const Slots *s, int i, const Motion *motion, 
     return v;
 }
 
+/* Bool: the resistance of a slot depends on its direction, by resistive force theory: no other
+ * curve is blended with it. */
+MILD_HD int slot_directed(const Slots *s, int i) {
+    return s->flat_stiffness[i] == 0.0 && s->power_force[i] == 0.0;
+}
+
 #endif

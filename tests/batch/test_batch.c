@@ -4,6 +4,7 @@
 #include "device/device.h"
 #include "ground/map_kit.h"
 #include "ground/state.h"
+#include "ground/surface_kit.h"
 
 #ifdef MILD_CUDA
 #include <cuda_runtime_api.h>
@@ -664,6 +665,11 @@ static void bad_input_is_refused(void **state) {
     soles[1] = large;
     refuse(&good, "130 elements");
     mild_sole_destroy(large);
+    const MildShape box = surface_box(0.1, 0.05, 0.03);
+    MildSole *surface = surface_make(&box, 1, 0.05);
+    soles[1] = surface;
+    refuse(&good, "sole 1 is a surface");
+    mild_sole_destroy(surface);
     soles[1] = right;
 
     MildError error = {0};
@@ -707,6 +713,9 @@ static void strange_ground_is_refused(void **state) {
     kit_open(&prints, 2, left, right, &sand, 5e-3);
     kit_open(&fits, 2, left, right, &sand, 5e-3);
     kit_prints(&prints, 8);
+    fits.ground->faces = 1; /* as of surfaces with as many elements */
+    says(mild_batch_load(batch, 0, fits.ground, &e), MILD_ERROR_ARGUMENT, &e, "other soles");
+    fits.ground->faces = 0;
     MildGround *good = fits.ground;
     says(mild_batch_load(batch, 0, one.ground, &e), MILD_ERROR_ARGUMENT, &e, "other soles");
     says(mild_batch_load(batch, 1, prints.ground, &e), MILD_ERROR_ARGUMENT, &e, "imprints");

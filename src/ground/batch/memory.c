@@ -133,7 +133,7 @@ static MildStatus check_robots(const BatchShape *shape, int first, int count, Mi
 /* Whether a ground may take part: the same soles, no imprints. */
 static MildStatus check_soles(const BatchShape *shape, int robot, const MildGround *ground,
                               MildError *error) {
-    int same = ground->feet == shape->feet;
+    int same = ground->feet == shape->feet && !ground->faces;
     for (int f = 0; same && f < shape->feet; f++) {
         same = ground->elements[f] == shape->elements[f];
     }

@@ -1,0 +1,10 @@
+/* Moments of the derivatives of a pass, in the frame of the foot. */
+#ifndef MILD_GROUND_MOMENTS_H
+#define MILD_GROUND_MOMENTS_H
+
+/* Sums over slots of each of a, b and c times 1, x, y, x^2, xy, y^2. Three at a time are as many
+ * sums as the registers hold. end: slots, rounded up to whole vectors. */
+void moments(const double *xs, const double *ys, int end, const double *a, const double *b,
+             const double *c, double sums[3][6]);
+
+#endif
