@@ -304,10 +304,10 @@ static void closed_motions_give_nothing(void **state) {
     uint64_t random = 17;
     double worst = -INFINITY, least = INFINITY;
     int count = 0;
-    for (int draw = 0; draw < 48; draw++) {
+    for (int draw = 0; draw < 24; draw++) {
         const int rolls = draw % 2;
         MildMaterial m = any_material(&random, draw / 2);
-        m.recovery = draw / 12 % 2 ? m.recovery : draw / 24;
+        m.recovery = draw / 6 % 2 ? m.recovery : draw / 12;
         if (draw % 3 == 0) {
             m.mu = m.k_drift = m.b_drift = 0.0;
         }
@@ -333,7 +333,7 @@ static void closed_motions_give_nothing(void **state) {
             kit.input.position[0][2] = kit_uniform(&random, -0.1, 0.05);
         }
         const double given =
-            led_round(&kit, 2, 3000, 2 * pi, axis, rolls ? 2 * pi * 0.05 : 0.0, &taken);
+            led_round(&kit, 2, 2000, 2 * pi, axis, rolls ? 2 * pi * 0.05 : 0.0, &taken);
         if (taken > 0.0) {
             worst = fmax(worst, given / taken);
             least = fmin(least, given / taken);
@@ -344,7 +344,7 @@ static void closed_motions_give_nothing(void **state) {
     print_message("closed motions: %d, of the work done the ground gives %.2e at most, %.2f at "
                   "least\n",
                   count, worst, least);
-    assert_true(count > 40);
+    assert_true(count > 20);
     assert_true(worst < 0.0);
     mild_sole_destroy(bodies[0]);
     mild_sole_destroy(bodies[1]);
