@@ -178,7 +178,7 @@ class Search:
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder")
-    parser.add_argument("--jobs", type=int, default=1, help="trainings at a time (an H100 gains nothing by several)")
+    parser.add_argument("--jobs", type=int, default=3, help="trainings at a time on the GPU")
     parser.add_argument("--seconds", type=float, default=1e9, help="no training begins that would not end by then")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--list", action="store_true", help="print the sentences and their keys, train nothing")
