@@ -182,8 +182,9 @@ typedef double Moments[3][3][6];
 /* Moments of three entries at a time, which are as many sums as the registers hold. */
 static void moments(const Slots *s, int end, const double *a, const double *b, const double *c,
                     double sums[3][6]) {
-    if (end < VECTOR_LANES) {
-        return; /* never, as in foot_frictions */
+    if (end < VECTOR_LANES) { /* never, as in foot_frictions */
+        memset(sums, 0, 3 * sizeof *sums);
+        return;
     }
     end &= -VECTOR_LANES; /* which it is: for the compiler, which does not see the caller */
     const double *xs = s->x, *ys = s->y;
