@@ -6,10 +6,11 @@
 
 void moments(const double *xs, const double *ys, int end, const double *a, const double *b,
              const double *c, double sums[3][6]) {
-    if (end < VECTOR_LANES) {
-        return; /* never, as in foot_frictions */
+    if (end < VECTOR_LANES) { /* never, as in foot_frictions */
+        memset(sums, 0, 3 * sizeof *sums);
+        return;
     }
-    end &= -VECTOR_LANES; /* which it is: for the compiler, which does not see the caller */
+    end &= -VECTOR_LANES; /* changes nothing; the compiler sees that no element is left over */
     double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0;
     double b0 = 0.0, b1 = 0.0, b2 = 0.0, b3 = 0.0, b4 = 0.0, b5 = 0.0;
     double c0 = 0.0, c1 = 0.0, c2 = 0.0, c3 = 0.0, c4 = 0.0, c5 = 0.0;
