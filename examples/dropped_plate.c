@@ -33,11 +33,15 @@ int main(void) {
     mild_material_preset("foam45", &foam);
     const MildTerrain terrain = mild_terrain_uniform(&foam);
 
-    MildContactInput in = {
-        .feet = 1, .dt = dt, .position = {{0, 0, 0.02}}, .rotation = {{1, 0, 0, 0, 1, 0, 0, 0, 1}}};
+    double A[36] = {0}; /* J M^-1 J^T */
+    MildContactInput in = {.feet = 1,
+                           .dt = dt,
+                           .inverse_inertia = A,
+                           .position = {{0, 0, 0.02}},
+                           .rotation = {{1, 0, 0, 0, 1, 0, 0, 0, 1}}};
     MildContactResult out;
     for (int i = 0; i < 6; i++) {
-        in.inverse_inertia[7 * i] = 1 / (i < 3 ? mass : inertia); /* A: 6 x 6, diagonal */
+        A[7 * i] = 1 / (i < 3 ? mass : inertia); /* A: 6 x 6, diagonal */
     }
 
     printf("%8s %10s %10s %10s %10s\n", "time/s", "height/mm", "speed/mm/s", "force/N", "elements");

@@ -40,10 +40,11 @@ int main(void) {
     MildMaterial sand = mild_material_default();
     mild_material_preset("sand_dense", &sand);
     const MildTerrain terrain = mild_terrain_uniform(&sand);
-    MildContactInput in = {.feet = 1, .dt = dt, .rotation = {{1, 0, 0, 0, 1, 0, 0, 0, 1}}};
+    double A[36] = {0}; /* J M^-1 J^T */
+    MildContactInput in = {
+        .feet = 1, .dt = dt, .inverse_inertia = A, .rotation = {{1, 0, 0, 0, 1, 0, 0, 0, 1}}};
     MildContactResult out;
-    in.inverse_inertia[2 * 6 + 2] =
-        1 / foot_mass; /* A: the foot moves up and down, and nowhere else */
+    A[2 * 6 + 2] = 1 / foot_mass; /* A: the foot moves up and down, and nowhere else */
 
     double body = leg_length + 0.1, foot = 0.1, body_speed = 0, foot_speed = 0; /* [m, m/s] */
     double force_max = 0, depth_max = 0, stance = 0;

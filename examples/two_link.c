@@ -70,7 +70,8 @@ int main(void) {
     MildMaterial foam = mild_material_default();
     mild_material_preset("foam45", &foam);
     const MildTerrain terrain = mild_terrain_uniform(&foam);
-    MildContactInput in = {.feet = 1, .dt = dt};
+    double A[36] = {0}; /* J M^-1 J^T */
+    MildContactInput in = {.feet = 1, .dt = dt, .inverse_inertia = A};
     MildContactResult out;
     double q[3] = {(thigh + shank) * cos(crouch) + ankle + 0.02, -crouch, crouch}, qd[3] = {0};
     printf("%7s %7s %8s %8s %9s\n", "time/s", "hip/m", "turn/rad", "up/N", "depth/mm");
@@ -97,7 +98,7 @@ int main(void) {
         for (int r = 0; r < 6; r++) {
             in.free_velocity[r] = dot(j[r], qd);
             for (int c = 0; c < 6; c++) {
-                in.inverse_inertia[6 * r + c] = dot(j[r], mj[c]);
+                A[6 * r + c] = dot(j[r], mj[c]);
             }
         }
         const double turn = q[2] - crouch, c = cos(turn), s = sin(turn),

@@ -200,6 +200,8 @@ int soft_owns(const Soft *soft, const MildGround *ground) {
 void soft_copy(Soft *soft, const mjModel *m, const Soft *from) {
     const size_t nv = (size_t)m->nv * sizeof(double);
     soft->input = from->input;
+    soft->input.inverse_inertia = soft->inverse_inertia;
+    memcpy(soft->inverse_inertia, from->inverse_inertia, sizeof soft->inverse_inertia);
     soft->contact = from->contact;
     soft->known = from->known;
     soft->solved = 0;
@@ -226,6 +228,7 @@ static void update_feet(Soft *soft, const mjModel *m, const mjData *d) {
     const int nv = (int)m->nv;
     double twist[FOOT_ROWS];
     soft->input.feet = soft->feet;
+    soft->input.inverse_inertia = soft->inverse_inertia;
     soft->input.dt = m->opt.timestep;
     for (int f = 0; f < soft->feet; f++) {
         double *rows = soft->jacobian + (size_t)(6 * f) * (size_t)nv;

@@ -38,6 +38,7 @@ typedef struct {
     int rounds;        /* of ground and constraints in the last solve */
     MildGround layout; /* header of a ground that remembers nothing */
     MildContactInput input;
+    double inverse_inertia[FOOT_ROWS * FOOT_ROWS]; /* of the input */
     MildContactResult contact;
 } Soft;
 

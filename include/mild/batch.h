@@ -34,7 +34,8 @@
 
 MILD_API_BEGIN
 
-#define MILD_BATCH_HOST (-1) /* the CPU in the place of a device */
+#define MILD_BATCH_HOST (-1)  /* the CPU in the place of a device */
+#define MILD_BATCH_FEET_MAX 4 /* feet of a robot */
 
 /* Ground under `robots` robots; see mild_batch_create. */
 typedef struct MildBatch MildBatch;
@@ -42,7 +43,7 @@ typedef struct MildBatch MildBatch;
 /* What a batch is made from. */
 typedef struct {
     int robots;                   /* at least 1 */
-    int feet;                     /* of each, 1 .. MILD_FEET_MAX */
+    int feet;                     /* of each, 1 .. MILD_BATCH_FEET_MAX */
     const MildSole *const *soles; /* [feet], not kept */
     double dt;                    /* [s] above 0, at most 0.1 */
     double tolerance;             /* [-] of the residual, below 1; 0: 1e-4 */

@@ -35,7 +35,7 @@
 
 MILD_API_BEGIN
 
-#define MILD_FEET_MAX 4       /* feet in one contact problem */
+#define MILD_FEET_MAX 16      /* feet in one contact problem */
 #define MILD_MATERIALS_MAX 12 /* materials in one terrain */
 #define MILD_PATCHES_MAX 16   /* patches in one terrain */
 
@@ -333,7 +333,7 @@ typedef enum {
     MILD_SOLVER_GAUSS_SEIDEL = 1 /* the paper's sweeps over the elements (Algorithm 1) */
 } MildSolver;
 
-/* What the engine knows before the step. Fixed size, no pointers. */
+/* What the engine knows before the step. A foot is any body with a sole. */
 typedef struct {
     int feet;                          /* the same as in scratch and ground */
     double dt;                         /* [s] step size, above 0 */
@@ -341,9 +341,12 @@ typedef struct {
     double rotation[MILD_FEET_MAX][9]; /* [-] foot to world, row major, orthonormal */
     /* [m/s, rad/s] Present twist at the ankle: linear, then angular; world axes. */
     double velocity[MILD_FEET_MAX][6];
-    /* A = J M^-1 J^T [1/kg, 1/(kg m), 1/(kg m^2)], row major with stride 6 feet. Symmetric and
-     * positive semidefinite; it may be singular. */
-    double inverse_inertia[6 * MILD_FEET_MAX * 6 * MILD_FEET_MAX];
+    /* A = J M^-1 J^T [1/kg, 1/(kg m), 1/(kg m^2)]: [6 feet][6 feet] numbers of the caller, only
+     * read. Symmetric and positive semidefinite; it may be singular. */
+    double *inverse_inertia;
+    /* Bit f: A has the rows of foot f. The others touch nothing in this step (mild_ground_near),
+     * and A is smaller by their rows and columns. 0: A has the rows of all feet. */
+    uint32_t rows;
     /* [m/s, rad/s] Twists after a step without ground, V_free = J (qvel + dt M^-1 (tau - b)). */
     double free_velocity[6 * MILD_FEET_MAX];
     MildSolver solver; /* the solver to use */
@@ -374,11 +377,12 @@ typedef struct {
     int contacts;      /* number of loaded elements */
 } MildFootResult;
 
-/* Result of a step. Fixed size, no pointers. */
+/* Result of a step, for the feet that the input has. */
 typedef struct {
     MildFootResult foot[MILD_FEET_MAX]; /* [feet] */
-    double velocity[6 * MILD_FEET_MAX]; /* [m/s, rad/s] twists at the ankles after the step,
-                                           V = V_free + A W with W the wrench impulses */
+    /* [m/s, rad/s] Twists at the ankles after the step, V = V_free + A W with W the wrench
+     * impulses; V_free of a foot without rows. */
+    double velocity[6 * MILD_FEET_MAX];
     /* [-] In the metric of kinetic energy. Newton: relative residual of V = V_free + A W(V).
      * Sweeps: relative change of the wrench in the last sweep; the two do not compare. A converged
      * step may exceed the tolerance if rounding permits no smaller residual. */
@@ -436,10 +440,15 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
 /* Frees a scratch; NULL is allowed. */
 void mild_scratch_destroy(MildScratch *scratch);
 
+/* Bit f: foot f may touch the ground in the step of `input`, whose inverse_inertia and rows need not
+ * be set yet. For robots of which many bodies have soles: ask, compute the rows of A for these feet
+ * alone, and set input.rows. It writes only scratch. Cost: a few dozen operations for each foot. */
+uint32_t mild_ground_near(const MildTerrain *terrain, const MildContactInput *input,
+                          MildScratch *scratch);
 /* Solves one contact step: impulses by eqs 4, 5, 13 and 14, twists by eq 9. It reads the ground
  * and writes only scratch and result, so it may be called any number of times before
  * mild_ground_advance. Scratch and ground must have the same soles; if their numbers of elements
- * differ, converged is 0, velocity is free_velocity, and mild_ground_advance does nothing. It
+ * differ, or inverse_inertia is NULL, converged is 0, velocity is free_velocity, and mild_ground_advance does nothing. It
  * always returns; check result->converged. If that is 0, the result is approximate: either the
  * impulses are those of the ground at twists near the returned ones, or they are exact except for
  * the friction bound (docs/model.md section 7). */

@@ -16,6 +16,7 @@ struct Ground {
     MildGround *ground = nullptr;
     MildScratch *scratch = nullptr;
     MildContactInput input = {};
+    std::vector<double> inverse_inertia; /* of the input */
     MildContactResult result = {};
     bool solved = false;
     std::atomic<bool> busy{false};
@@ -59,6 +60,8 @@ static void make(Ground *at, const nb::sequence &soles, nb::handle terrain, doub
         set_solver(*ground, solver);
         MildError error = {};
         ground->feet = ground->input.feet = (int)made.size();
+        ground->inverse_inertia.resize(36 * made.size() * made.size());
+        ground->input.inverse_inertia = ground->inverse_inertia.data();
         ground->block =
             std::aligned_alloc(64, mild_ground_bytes_imprints(made.data(), ground->feet, tiles));
         ground->scratch = mild_scratch_create(made.data(), ground->feet, &error);
@@ -134,26 +137,40 @@ static void set_state(Ground &ground, const nb::bytes &state) {
     ground.solved = false;
 }
 
+static size_t inertia_bytes(const Ground &ground) {
+    return ground.inverse_inertia.size() * sizeof(double);
+}
+
 static nb::tuple keep(Ground &ground) {
     const MildContactInput &input = ground.input;
     return nb::make_tuple(ground.soles, ground.terrain, input.dt, ground.tiles,
                           input.solver == MILD_SOLVER_NEWTON ? "newton" : "gauss_seidel",
                           input.tolerance, input.max_iterations, get_state(ground),
-                          nb::bytes(&input, sizeof input));
+                          nb::bytes(&input, sizeof input),
+                          nb::bytes(input.inverse_inertia, inertia_bytes(ground)));
 }
 
-/* What `keep` made: soles, terrain, dt, tiles, solver, tolerance, max_iterations, state, input. */
+/* What `keep` made: soles, terrain, dt, tiles, solver, tolerance, max_iterations, state, input,
+ * inverse_inertia. */
 using Kept = std::tuple<nb::sequence, nb::object, double, int, std::string, double, int, nb::bytes,
-                        nb::bytes>;
+                        nb::bytes, nb::bytes>;
 
 /* Takes the numbers that a caller can write; the others are arguments. */
-static void restore_input(Ground &ground, const nb::bytes &numbers) {
+static void restore_input(Ground &ground, const nb::bytes &numbers, const nb::bytes &inertia) {
     const MildContactInput made = ground.input;
     if (numbers.size() != sizeof made) {
         raise(PyExc_ValueError, "Ground: an input of " + std::to_string(numbers.size()) +
                                     " bytes, but it must have " + std::to_string(sizeof made));
     }
+    if (inertia.size() != inertia_bytes(ground)) {
+        raise(PyExc_ValueError, "Ground: an inverse_inertia of " + std::to_string(inertia.size()) +
+                                    " bytes, but it must have " +
+                                    std::to_string(inertia_bytes(ground)));
+    }
     std::memcpy(&ground.input, numbers.c_str(), sizeof made);
+    std::memcpy(made.inverse_inertia, inertia.c_str(), inertia.size());
+    ground.input.inverse_inertia = made.inverse_inertia;
+    ground.input.rows = made.rows;
     ground.input.feet = made.feet;
     ground.input.dt = made.dt;
     ground.input.solver = made.solver;
@@ -162,10 +179,11 @@ static void restore_input(Ground &ground, const nb::bytes &numbers) {
 }
 
 static void restore(Ground *ground, const Kept &kept) {
-    const auto &[soles, terrain, dt, tiles, solver, tolerance, iterations, state, input] = kept;
+    const auto &[soles, terrain, dt, tiles, solver, tolerance, iterations, state, input, inertia] =
+        kept;
     make(ground, soles, terrain, dt, tiles, solver, tolerance, iterations);
     try {
-        restore_input(*ground, input);
+        restore_input(*ground, input, inertia);
         set_state(*ground, state);
     } catch (...) {
         ground->~Ground();

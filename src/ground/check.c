@@ -1,5 +1,6 @@
 /* What a contact step takes on trust, checked number by number: for whoever writes an engine. */
 #include <math.h>
+#include <stdlib.h>
 
 #include "ground/map.h"
 #include "ground/state.h"
@@ -7,7 +8,6 @@
 #define TURN 1e-6     /* [-] products of a rotation's columns may be off by this */
 #define SYMMETRY 1e-6 /* [-] difference of two mirrored numbers of A, over its scale */
 #define DEFINITE 1e-5 /* [-] an eigenvalue of A may be negative by this, over its scale */
-#define ROWS (6 * MILD_FEET_MAX)
 
 static MildStatus check_finite(const char *name, int foot, const double *numbers, int count,
                                MildError *error) {
@@ -107,6 +107,32 @@ static MildStatus check_definite(double *a, int rows, MildError *error) {
     return MILD_OK;
 }
 
+/* The rows of A, of the feet that have some. */
+static MildStatus check_inertia(const MildContactInput *input, MildError *error) {
+    const uint32_t all = (1u << input->feet) - 1;
+    if (input->rows & ~all) {
+        return mild_fail(error, MILD_ERROR_RANGE, "input.rows = 0x%x names feet beyond %d",
+                         (unsigned)input->rows, input->feet);
+    }
+    if (!input->inverse_inertia) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "input.inverse_inertia is NULL");
+    }
+    int rows = 0;
+    for (uint32_t left = input->rows ? input->rows : all; left; left &= left - 1) {
+        rows += 6;
+    }
+    double *scaled = malloc((size_t)(rows * rows) * sizeof *scaled);
+    if (!scaled) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "contact: out of memory for %d rows", rows);
+    }
+    MildStatus status = scale_inertia(input->inverse_inertia, rows, scaled, error);
+    if (status == MILD_OK) {
+        status = check_definite(scaled, rows, error);
+    }
+    free(scaled);
+    return status;
+}
+
 /* Patches and map: that each place has a material. */
 static MildStatus check_places(const MildTerrain *terrain, MildError *error) {
     const int materials = terrain->material_count;
@@ -153,7 +179,6 @@ static MildStatus check_terrain(const MildTerrain *terrain, MildError *error) {
 
 MildStatus mild_contact_check(const MildGround *ground, const MildTerrain *terrain,
                               const MildContactInput *input, MildError *error) {
-    double scaled[ROWS * ROWS] = {0};
     MildStatus status = check_terrain(terrain, error);
     if (status == MILD_OK && input->feet != ground->feet) {
         status = mild_fail(error, MILD_ERROR_ARGUMENT, "input.feet = %d, but the ground has %d",
@@ -165,8 +190,5 @@ MildStatus mild_contact_check(const MildGround *ground, const MildTerrain *terra
     for (int f = 0; f < ground->feet && status == MILD_OK; f++) {
         status = check_foot(input, f, error);
     }
-    if (status == MILD_OK) {
-        status = scale_inertia(input->inverse_inertia, 6 * input->feet, scaled, error);
-    }
-    return status == MILD_OK ? check_definite(scaled, 6 * input->feet, error) : status;
+    return status == MILD_OK ? check_inertia(input, error) : status;
 }

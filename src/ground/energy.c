@@ -82,14 +82,12 @@ static double level_caused(const double sums[9], const Motion *change) {
 static double friction_caused(const MildScratch *scratch, const MildContactInput *input,
                               const MildContactResult *result) {
     double sum = 0.0;
-    for (int f = 0; f < scratch->feet; f++) {
+    for (int k = 0; k < scratch->listed; k++) {
+        const int f = scratch->list[k];
         const FootScratch *foot = &scratch->foot[f];
-        if (foot->active == 0) {
-            continue;
-        }
         double twist[6];
-        for (int k = 0; k < 6; k++) {
-            twist[k] = result->velocity[6 * f + k] - input->free_velocity[6 * f + k];
+        for (int i = 0; i < 6; i++) {
+            twist[i] = result->velocity[6 * f + i] - input->free_velocity[6 * f + i];
         }
         const Motion change = foot_motion(foot, twist);
         const int sums = !foot->uneven && !foot->faces && input->solver == MILD_SOLVER_NEWTON;
@@ -151,19 +149,19 @@ int energy_created(MildScratch *scratch, const MildContactInput *input,
     }
     Motion before[MILD_FEET_MAX], after[MILD_FEET_MAX];
     double gift = 0.0;
-    for (int f = 0; f < scratch->feet; f++) {
+    for (int k = 0; k < scratch->listed; k++) {
+        const int f = scratch->list[k];
         const FootScratch *foot = &scratch->foot[f];
         before[f] = foot_motion(foot, input->velocity[f]);
         after[f] = foot_motion(foot, result->velocity + 6 * f);
-        gift += foot->active > 0 ? foot_gift(foot, &before[f], &after[f]) : 0.0;
+        gift += foot_gift(foot, &before[f], &after[f]);
     }
     if (!(gift > least)) {
         return 0;
     }
-    for (int f = 0; f < scratch->feet; f++) {
-        if (scratch->foot[f].active > 0) {
-            foot_turn(&scratch->foot[f], &before[f], &after[f], all);
-        }
+    for (int k = 0; k < scratch->listed; k++) {
+        const int f = scratch->list[k];
+        foot_turn(&scratch->foot[f], &before[f], &after[f], all);
     }
     return 1;
 }

@@ -11,24 +11,6 @@
 
 const double faces_level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
-/* [m] Upper bound on the depth of any element: its bounding box against the ground under its middle
- * and the steepest slope from there. */
-static double faces_deepest(const FootScratch *foot, const MildTerrain *terrain, double steepest) {
-    double at[3], low = 0.0, reach = 0.0, slope[2];
-    for (int k = 0; k < 3; k++) {
-        at[k] = foot->origin[k];
-        for (int j = 0; j < 3; j++) {
-            at[k] += foot->arm[1 + j][k] * foot->middle[j];
-        }
-        low += fabs(foot->arm[1 + k][2]) * foot->half[k];
-        reach += foot->half[k] * foot->half[k];
-    }
-    const double height =
-        foot->uneven ? terrain_surface(terrain, at[0], at[1], slope) + steepest * sqrt(reach)
-                     : terrain->height;
-    return height - at[2] + low;
-}
-
 /* Depth and share of every element. */
 static void faces_locate(FootScratch *foot, const MildTerrain *terrain) {
     const double ez = foot->arm[1][2], nz = foot->arm[2][2], tz = foot->arm[3][2];
@@ -52,11 +34,8 @@ static void faces_locate(FootScratch *foot, const MildTerrain *terrain) {
 
 void faces_list(FootScratch *foot, const MildTerrain *terrain, const MildContactInput *input,
                 double steepest, int f) {
-    foot->least = foot_least(foot, input, steepest, f);
-    foot->away_depth = faces_deepest(foot, terrain, steepest);
-    foot->away = foot->away_depth <= foot->least;
     foot->active = 0;
-    if (foot->away) {
+    if (foot_is_away(foot, terrain, input, steepest, f)) {
         return;
     }
     faces_locate(foot, terrain);

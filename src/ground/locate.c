@@ -17,8 +17,8 @@ void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
     }
 }
 
-void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints,
-                 const double *position, const double *R) {
+void foot_set_pose(FootScratch *foot, const MildTerrain *terrain, const double *position,
+                   const double *R) {
     for (int k = 0; k < 3; k++) {
         foot->origin[k] = position[k];
         foot->arm[0][k] = R[3 * k + 2] * foot->z;
@@ -27,9 +27,10 @@ void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints,
         foot->arm[3][k] = R[3 * k + 2];
     }
     foot->uneven = !terrain_is_level(terrain);
-    if (foot->faces) {
-        return; /* faces_list goes on, unless it is far away */
-    }
+    foot->away = 0;
+}
+
+void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints) {
     if (foot->uneven || imprints || !terrain_is_uniform(terrain)) {
         foot_points(foot);
     }
@@ -40,7 +41,7 @@ void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints,
         const double *y = foot->y;
         const double ez = foot->arm[1][2];
         const double nz = foot->arm[2][2];
-        const double above = terrain->height - position[2] - foot->arm[0][2];
+        const double above = terrain->height - foot->origin[2] - foot->arm[0][2];
         double *depth = foot->depth;
 #pragma omp simd
         for (int i = 0; i < foot->padded; i++) {
@@ -65,6 +66,32 @@ double foot_least(const FootScratch *foot, const MildContactInput *input, double
     const double descent = real_max(foot_descent(foot, input->velocity[f], steepest),
                                     foot_descent(foot, input->free_velocity + 6 * f, steepest));
     return -LISTED_MARGIN - input->dt * (descent + LISTED_EXTRA_SPEED);
+}
+
+/* [m] Upper bound on the depth of any element: its bounding box against the ground under its middle
+ * and the steepest slope from there. */
+static double foot_reach(const FootScratch *foot, const MildTerrain *terrain, double steepest) {
+    double at[3], low = 0.0, reach = 0.0, slope[2];
+    for (int k = 0; k < 3; k++) {
+        at[k] = foot->origin[k];
+        for (int j = 0; j < 3; j++) {
+            at[k] += foot->arm[1 + j][k] * foot->middle[j];
+        }
+        low += fabs(foot->arm[1 + k][2]) * foot->half[k];
+        reach += foot->half[k] * foot->half[k];
+    }
+    const double height =
+        foot->uneven ? terrain_surface(terrain, at[0], at[1], slope) + steepest * sqrt(reach)
+                     : terrain->height;
+    return height - at[2] + low;
+}
+
+int foot_is_away(FootScratch *foot, const MildTerrain *terrain, const MildContactInput *input,
+                 double steepest, int f) {
+    foot->least = foot_least(foot, input, steepest, f);
+    foot->reach = foot_reach(foot, terrain, steepest);
+    foot->away = foot->reach <= foot->least;
+    return foot->away;
 }
 
 void foot_list(FootScratch *foot, const MildContactInput *input, double steepest, int f) {

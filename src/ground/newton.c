@@ -5,36 +5,44 @@
 #define NEWTON_ITERATIONS 400 /* Newton steps in all, unless the caller sets a limit */
 #define NEWTON_PLAIN 20       /* plain steps before the friction bounds are held fixed */
 
-/* The equations of the n rows from `first` on. */
-static void system_open(System *system, const MildScratch *scratch, const MildContactInput *input,
-                        int first, int n) {
-    int stride = 6 * scratch->feet;
-    system->first = first;
+/* The equations of the listed feet. */
+static void system_open(System *system, const MildScratch *scratch, const MildContactInput *input) {
+    const int n = 6 * scratch->listed, stride = 6 * scratch->given;
+    system->A = (Row *)scratch->rows;
+    system->M = system->A + n;
     system->n = n;
     system->parts = n / NEWTON_VECTOR + 1;
+    row_clear(system, &system->free);
     for (int i = 0; i < n; i++) {
-        row_load(system, &system->A[i], input->inverse_inertia + (first + i) * stride + first);
+        const int row = 6 * scratch->place[scratch->list[i / 6]] + i % 6;
+        row_clear(system, &system->A[i]);
+        for (int k = 0; k < scratch->listed; k++) {
+            memcpy(system->A[i].at + 6 * k,
+                   input->inverse_inertia + row * stride + 6 * scratch->place[scratch->list[k]],
+                   6 * sizeof(double));
+        }
+        system->free.at[i] = input->free_velocity[listed_row(scratch, i)];
     }
-    row_load(system, &system->free, input->free_velocity + first);
     system->tolerance = input->tolerance > 0.0 ? input->tolerance : NEWTON_TOLERANCE;
     system->limit = input->max_iterations > 0 ? input->max_iterations : NEWTON_ITERATIONS;
     system->dt = input->dt;
 }
 
-/* Solves for the n rows from `first` on. */
-static void system_solve(MildScratch *scratch, const MildContactInput *input, int first, int n,
-                         MildContactResult *result) {
+void newton_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {
     System opened, *system = &opened;
     Point best = {.residual = INFINITY};
-    system_open(system, scratch, input, first, n);
-    row_load(system, &best.twist, input->velocity[first / 6]);
-    contact_pass(scratch, system->dt, best.twist.at, system->first);
+    system_open(system, scratch, input);
+    memset(scratch->wrench, 0, 6 * (size_t)scratch->feet * sizeof(double));
+    for (int i = 0; i < system->n; i++) {
+        best.twist.at[i] = input->velocity[scratch->list[i / 6]][i % 6];
+    }
+    contact_pass(scratch, system->dt, best.twist.at);
     const int limit = system->limit < NEWTON_PLAIN ? system->limit : NEWTON_PLAIN;
     int steps = newton_plain(system, scratch, &best, limit);
     result->converged = point_solves(system, &best);
     if (!result->converged) {
         steps += newton_patient(system, scratch, &best, system->limit - steps);
-        contact_pass(scratch, system->dt, best.twist.at, system->first);
+        contact_pass(scratch, system->dt, best.twist.at);
         result->converged = point_solves(system, &best);
     }
     double scale = system_norm(system, best.impulse.at);
@@ -43,28 +51,4 @@ static void system_solve(MildScratch *scratch, const MildContactInput *input, in
         steps += newton_unsolved(system, scratch, &best, result);
     }
     result->iterations = steps;
-}
-
-void newton_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {
-    int stride = 6 * scratch->feet, first = 0, end = scratch->feet;
-    while (scratch->foot[first].active == 0) {
-        first++;
-    }
-    while (scratch->foot[end - 1].active == 0) {
-        end--;
-    }
-    memset(scratch->wrench, 0, sizeof scratch->wrench);
-    for (int f = first; f < end; f++) { /* clear feet in the air between loaded ones */
-        if (scratch->foot[f].active == 0) {
-            memset(scratch->hessian[f], 0, sizeof scratch->hessian[f]);
-        }
-    }
-    system_solve(scratch, input, 6 * first, 6 * (end - first), result);
-    for (int i = 0; i < stride; i++) {
-        double sum = input->free_velocity[i];
-        for (int j = 6 * first; j < 6 * end; j++) {
-            sum += input->inverse_inertia[i * stride + j] * scratch->wrench[j];
-        }
-        result->velocity[i] = sum;
-    }
 }

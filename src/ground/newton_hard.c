@@ -20,7 +20,7 @@ static double step_slope(const System *system, const MildScratch *scratch, const
                          const Point *from, const Point *to) {
     double slope = 0.0;
     for (int i = 0; i < system->n; i++) {
-        slope += (at->impulse.at[i] - scratch->wrench[system->first + i]) *
+        slope += (at->impulse.at[i] - scratch->wrench[listed_row(scratch, i)]) *
                  (to->twist.at[i] - from->twist.at[i]);
     }
     return slope;
@@ -31,7 +31,7 @@ static double step_slope(const System *system, const MildScratch *scratch, const
 static int newton_held(const System *system, MildScratch *scratch, Point *at, int limit) {
     int steps = 0, moves = 1;
     Point full, next = *at;
-    contact_pass_held(scratch, system->dt, at->twist.at, system->first);
+    contact_pass_held(scratch, system->dt, at->twist.at);
     while (moves && steps < limit && point_step(system, scratch, at, &full, 0)) {
         steps++;
         double start = step_slope(system, scratch, at, at, &full);
@@ -41,7 +41,7 @@ static int newton_held(const System *system, MildScratch *scratch, Point *at, in
         double t = 1.0;
         for (int k = 0; k <= NEWTON_SEARCH; k++) {
             point_between(system, at, &full, t, &next);
-            contact_pass_held(scratch, system->dt, next.twist.at, system->first);
+            contact_pass_held(scratch, system->dt, next.twist.at);
             end = step_slope(system, scratch, &next, at, &full);
             if (!(fabs(end) > 0.1 * fabs(start)) || (end < 0.0 && t == 1.0)) {
                 break;
@@ -68,9 +68,10 @@ static inline double bound_wanted(const Slots *s, int i) {
 
 /* Sets the friction bounds to a multiple of those for the last pass. */
 static void bounds_begin(MildScratch *scratch, double times) {
-    for (int f = 0; f < scratch->feet; f++) {
-        const Slots *s = &scratch->foot[f].slot;
-        for (int i = 0; i < foot_end(&scratch->foot[f]); i++) {
+    for (int k = 0; k < scratch->listed; k++) {
+        const FootScratch *foot = &scratch->foot[scratch->list[k]];
+        const Slots *s = &foot->slot;
+        for (int i = 0; i < foot_end(foot); i++) {
             s->bound[i] = times * bound_wanted(s, i);
             s->bound_moved[i] = 0.0;
         }
@@ -92,9 +93,10 @@ static void bounds_pace(const MildScratch *scratch, Pace *pace) {
     double now = 0.0;    /* [N^2 s^2] square of the wanted move */
     double before = 0.0; /* [N^2 s^2] square of the last move */
     double share = pace->share;
-    for (int f = 0; f < scratch->feet; f++) {
-        const Slots *s = &scratch->foot[f].slot;
-        for (int i = 0; i < foot_end(&scratch->foot[f]); i++) {
+    for (int k = 0; k < scratch->listed; k++) {
+        const FootScratch *foot = &scratch->foot[scratch->list[k]];
+        const Slots *s = &foot->slot;
+        for (int i = 0; i < foot_end(foot); i++) {
             double way = bound_wanted(s, i) - s->bound[i], last = s->bound_moved[i];
             along += way * last;
             now += way * way;
@@ -113,9 +115,10 @@ static void bounds_pace(const MildScratch *scratch, Pace *pace) {
 /* Moves the friction bounds towards those for the last pass. */
 static void bounds_move(MildScratch *scratch, Pace *pace) {
     bounds_pace(scratch, pace);
-    for (int f = 0; f < scratch->feet; f++) {
-        const Slots *s = &scratch->foot[f].slot;
-        for (int i = 0; i < foot_end(&scratch->foot[f]); i++) {
+    for (int k = 0; k < scratch->listed; k++) {
+        const FootScratch *foot = &scratch->foot[scratch->list[k]];
+        const Slots *s = &foot->slot;
+        for (int i = 0; i < foot_end(foot); i++) {
             double way = pace->share * (bound_wanted(s, i) - s->bound[i]);
             s->bound_moved[i] = fmax(way, -s->bound[i]);
             s->bound[i] += s->bound_moved[i];
@@ -131,7 +134,7 @@ int newton_patient(const System *system, MildScratch *scratch, Point *best, int 
     if (isinf(at.residual)) {
         at.twist = system->free; /* the point with zero impulse */
     }
-    contact_pass(scratch, system->dt, at.twist.at, system->first);
+    contact_pass(scratch, system->dt, at.twist.at);
     bounds_begin(scratch, 1.0);
     for (int round = 1; steps < limit && !point_solves(system, best); round++) {
         int held = newton_held(system, scratch, &at, least(limit - steps, NEWTON_ROUND));
@@ -158,8 +161,10 @@ int newton_patient(const System *system, MildScratch *scratch, Point *best, int 
 /* Sets a point to what would be returned for it: P = W of the last pass and V = V^ + A W. Its
  * residual becomes relative. It is infinite where W = 0 but the law at V is not. */
 static void point_return(const System *system, MildScratch *scratch, Point *point) {
-    point->impulse = (Row){{0.0}};
-    memcpy(point->impulse.at, scratch->wrench + system->first, (size_t)system->n * sizeof(double));
+    row_clear(system, &point->impulse);
+    for (int i = 0; i < system->n; i++) {
+        point->impulse.at[i] = scratch->wrench[listed_row(scratch, i)];
+    }
     point->twist = system->free;
     system_times(system, point->impulse.at, &point->twist);
     point_evaluate(system, scratch, point);
@@ -174,17 +179,17 @@ int newton_unsolved(const System *system, MildScratch *scratch, const Point *bes
     safe.twist = system->free;
     bounds_begin(scratch, 0.0);
     int steps = newton_held(system, scratch, &safe, NEWTON_ROUND);
-    contact_pass(scratch, system->dt, safe.twist.at, system->first);
+    contact_pass(scratch, system->dt, safe.twist.at);
     bounds_begin(scratch, 1.0);
     steps += newton_held(system, scratch, &safe, NEWTON_ROUND);
     const Row safe_twist = safe.twist;
     point_return(system, scratch, &safe);
-    contact_pass(scratch, system->dt, best->twist.at, system->first);
+    contact_pass(scratch, system->dt, best->twist.at);
     point_return(system, scratch, &found);
     if (found.residual <= safe.residual) {
-        contact_pass(scratch, system->dt, best->twist.at, system->first);
+        contact_pass(scratch, system->dt, best->twist.at);
     } else {
-        contact_pass_held(scratch, system->dt, safe_twist.at, system->first);
+        contact_pass_held(scratch, system->dt, safe_twist.at);
     }
     result->residual = fmin(found.residual, safe.residual);
     return steps;

@@ -9,15 +9,10 @@
 
 /* ---- rows ---- */
 
-static void row_clear(const System *system, Row *row) {
+void row_clear(const System *system, Row *row) {
     for (int p = 0; p < system->parts; p++) {
         row->part[p] = (Vector){0.0};
     }
-}
-
-void row_load(const System *system, Row *row, const double *values) {
-    row_clear(system, row);
-    memcpy(row->at, values, (size_t)system->n * sizeof *values);
 }
 
 /* sum + x_0 y_0 + ... + x_5 y_5. Written out, here and below: a loop over the six rows of a foot
@@ -154,9 +149,9 @@ static void point_copy(const System *system, Point *to, const Point *from) {
 
 void point_evaluate(const System *system, MildScratch *scratch, Point *point) {
     double apart[TWIST_MAX] = {0.0}; /* its first n are set, which no compiler can know */
-    contact_pass(scratch, system->dt, point->twist.at, system->first);
+    contact_pass(scratch, system->dt, point->twist.at);
     for (int i = 0; i < system->n; i++) {
-        apart[i] = point->impulse.at[i] - scratch->wrench[system->first + i];
+        apart[i] = point->impulse.at[i] - scratch->wrench[listed_row(scratch, i)];
     }
     point->residual = system_norm(system, apart);
 }
@@ -187,7 +182,7 @@ static void row_newton(const System *system, int i, int foot, const double *H, d
 int point_step(const System *system, MildScratch *scratch, const Point *at, Point *next,
                int correct) {
     const int n = system->n;
-    Row M[TWIST_MAX];
+    Row *M = system->M;
     double moved[TWIST_MAX] = {0.0};
     contact_hessian(scratch);
     for (int k = 0; k < n; k++) {
@@ -197,8 +192,9 @@ int point_step(const System *system, MildScratch *scratch, const Point *at, Poin
     }
     for (int i = 0; i < n; i++) {
         const int foot = i / 6 * 6;
-        const double *H = scratch->hessian[(system->first + foot) / 6] + 6 * (i - foot);
-        double right = scratch->wrench[system->first + i] - (correct ? at->impulse.at[i] : 0.0);
+        const double *H = scratch->hessian[scratch->list[i / 6]] + 6 * (i - foot);
+        double right =
+            scratch->wrench[listed_row(scratch, i)] - (correct ? at->impulse.at[i] : 0.0);
         row_newton(system, i, foot, H, six_dot(right, H, moved + foot), &M[i]);
     }
     next->rests = 0;
@@ -263,7 +259,7 @@ void point_correct(const System *system, MildScratch *scratch, Point *at, Point 
         return;
     }
     Point corrected;
-    contact_pass(scratch, system->dt, at->twist.at, system->first);
+    contact_pass(scratch, system->dt, at->twist.at);
     if (!point_step(system, scratch, at, &corrected, 1)) {
         return;
     }

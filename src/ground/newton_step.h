@@ -8,7 +8,7 @@
 #include "ground/pass.h"
 #include "ground/solver.h"
 
-/* A row of up to 4 x 6 numbers and its right-hand side, padded to whole vectors. It uses the
+/* A row of six numbers for each foot and its right-hand side, padded to whole vectors. It uses the
  * compiler's vector type because loops over rows this short take three times as long when the
  * compiler vectorises them itself. A vector is as wide as the processor's: of a wider type gcc
  * makes loads and stores of parts, which takes up to four times as long. */
@@ -19,23 +19,24 @@ enum { NEWTON_VECTOR = 4 };
 #else
 enum { NEWTON_VECTOR = 2 };
 #endif
-enum { NEWTON_LANES = 32, NEWTON_VECTORS = NEWTON_LANES / NEWTON_VECTOR };
+enum { NEWTON_LANES = ROW_LANES, NEWTON_VECTORS = NEWTON_LANES / NEWTON_VECTOR };
 typedef double Vector __attribute__((vector_size(NEWTON_VECTOR * sizeof(double))));
 typedef union {
     double at[NEWTON_LANES];
     Vector part[NEWTON_VECTORS];
 } Row;
 
-_Static_assert(TWIST_MAX < NEWTON_LANES, "a row holds all feet and a right-hand side");
+_Static_assert(TWIST_MAX % 8 == 0, "whole vectors, the last for the right-hand side");
 
-/* The equations of the loaded feet. The lanes of a row beyond the last foot are zero. */
+/* The equations of the listed feet, in the order of scratch->list. The lanes of a row beyond the
+ * last foot are zero. */
 typedef struct {
-    Row A[TWIST_MAX]; /* [1/kg, 1/(kg m), 1/(kg m^2)] inverse inertia, symmetric */
+    Row *A;           /* [n] [1/kg, 1/(kg m), 1/(kg m^2)] inverse inertia, symmetric */
+    Row *M;           /* [n] of point_step */
     Row free;         /* V^ [m/s, rad/s] twists of the free motion */
     double tolerance; /* [-] of the residual */
     double dt;        /* [s] */
     int limit;        /* Newton steps in all */
-    int first;        /* row of the first loaded foot in the step's arrays */
     int n;            /* rows, six for each foot */
     int parts;        /* vectors of a row that are in use; the last also has the right-hand side */
 } System;
@@ -48,8 +49,12 @@ typedef struct {
     int rests;       /* bool: Newton's step from here is no longer than rounding */
 } Point;
 
-/* Sets the first numbers of a row, as many as the system has, and clears the rest. */
-void row_load(const System *system, Row *row, const double *values);
+/* Clears the parts of a row that are in use. */
+void row_clear(const System *system, Row *row);
+/* Row r of the system's arrays is row listed_row(scratch, r) of those of all feet. */
+static inline int listed_row(const MildScratch *scratch, int r) {
+    return 6 * scratch->list[r / 6] + r % 6;
+}
 /* y += A x; A is symmetric. */
 void system_times(const System *system, const double *x, Row *y);
 /* sqrt(x^T A x), the norm of an impulse in the metric of kinetic energy. */

@@ -152,22 +152,20 @@ static void foot_frictions(const FootScratch *foot, const Motion *motion, int he
     }
 }
 
-static void pass(MildScratch *scratch, double dt, const double *twist, int first, int held) {
-    for (int f = 0; f < scratch->feet; f++) {
+static void pass(MildScratch *scratch, double dt, const double *twist, int held) {
+    for (int k = 0; k < scratch->listed; k++) {
+        const int f = scratch->list[k];
         const FootScratch *foot = &scratch->foot[f];
-        if (foot->active == 0) {
-            continue;
-        }
         double *sums = scratch->sums[f];
         double *wrench = scratch->wrench + 6 * f;
-        const Motion motion = foot_motion(foot, twist + (6 * f - first));
+        const Motion motion = foot_motion(foot, twist + 6 * k);
         foot_normals(foot, dt, &motion);
         foot_frictions(foot, &motion, held, sums);
         /* sum of B^T I = (sum I, sum p x I), p = arm0 + x arm1 + y arm2 + height arm3 */
         memcpy(wrench, sums, 3 * sizeof *sums);
         memset(wrench + 3, 0, 3 * sizeof *wrench);
-        for (int k = 0; k < 3; k++) {
-            cross_add(foot->arm[k], sums + 3 * k, wrench + 3);
+        for (int i = 0; i < 3; i++) {
+            cross_add(foot->arm[i], sums + 3 * i, wrench + 3);
         }
         if (foot->faces) {
             cross_add(foot->arm[3], sums + 9, wrench + 3);
@@ -175,12 +173,12 @@ static void pass(MildScratch *scratch, double dt, const double *twist, int first
     }
 }
 
-void contact_pass(MildScratch *scratch, double dt, const double *twist, int first) {
-    pass(scratch, dt, twist, first, 0);
+void contact_pass(MildScratch *scratch, double dt, const double *twist) {
+    pass(scratch, dt, twist, 0);
 }
 
-void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int first) {
-    pass(scratch, dt, twist, first, 1);
+void contact_pass_held(MildScratch *scratch, double dt, const double *twist) {
+    pass(scratch, dt, twist, 1);
 }
 
 /* Sums over the foot of each entry of h times 1, x, y, x^2, xy, y^2. They determine the foot's
@@ -238,11 +236,9 @@ static void foot_hessian(const FootScratch *foot, const Moments M, double *H) {
 }
 
 void contact_hessian(MildScratch *scratch) {
-    for (int f = 0; f < scratch->feet; f++) {
+    for (int k = 0; k < scratch->listed; k++) {
+        const int f = scratch->list[k];
         const FootScratch *foot = &scratch->foot[f];
-        if (foot->active == 0) {
-            continue;
-        }
         if (foot->faces) {
             faces_hessian(foot, scratch->hessian[f]);
             continue;

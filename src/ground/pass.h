@@ -5,11 +5,11 @@
 #include "ground/scratch.h"
 
 /* Computes the impulse of every slot at the twists V, its derivatives, and the wrenches of the
- * feet. twist: of the loaded feet; its first number belongs to row `first`. */
-void contact_pass(MildScratch *scratch, double dt, const double *twist, int first);
+ * feet. twist: [6 listed] of the listed feet, in their order. */
+void contact_pass(MildScratch *scratch, double dt, const double *twist);
 /* The same with the friction bounds fixed at slot.bound. The impulses are then minus the gradient
  * of a convex function of V. */
-void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int first);
+void contact_pass_held(MildScratch *scratch, double dt, const double *twist);
 /* Computes the hessians of the feet from the derivatives of the last pass. */
 void contact_hessian(MildScratch *scratch);
 

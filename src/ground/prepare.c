@@ -170,25 +170,53 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     foot_direct(foot, terrain, input->dt, R, &now);
 }
 
+/* Places of the feet in the input's rows. */
+static void feet_place(MildScratch *scratch, const MildContactInput *input) {
+    scratch->given = 0;
+    for (int f = 0; f < scratch->feet; f++) {
+        const int given = input->rows == 0 || (input->rows >> f & 1) != 0;
+        scratch->place[f] = given ? scratch->given : -1;
+        scratch->given += given;
+    }
+}
+
+uint32_t mild_ground_near(const MildTerrain *terrain, const MildContactInput *input,
+                          MildScratch *scratch) {
+    uint32_t near = 0;
+    for (int f = 0; f < scratch->feet; f++) {
+        FootScratch *foot = &scratch->foot[f];
+        foot_set_pose(foot, terrain, input->position[f], input->rotation[f]);
+        const double steepest = foot->uneven ? terrain_steepest(terrain) : 0.0;
+        near |= foot_is_away(foot, terrain, input, steepest, f) ? 0u : 1u << f;
+    }
+    return near;
+}
+
 int contact_prepare(const MildGround *ground, const MildTerrain *terrain,
                     const MildContactInput *input, MildScratch *scratch) {
-    int total = 0;
+    feet_place(scratch, input);
+    scratch->listed = 0;
     for (int f = 0; f < scratch->feet; f++) {
         FootScratch *foot = &scratch->foot[f];
         if (foot->uneven && terrain_is_level(terrain)) {
             slots_level(foot);
         }
-        foot_locate(foot, terrain, ground->tiles > 0, input->position[f], input->rotation[f]);
+        foot_set_pose(foot, terrain, input->position[f], input->rotation[f]);
         const double steepest = foot->uneven ? terrain_steepest(terrain) : 0.0;
-        if (foot->faces) {
+        if (scratch->place[f] < 0) {
+            foot_is_away(foot, terrain, input, steepest, f);
+            foot->away = 1;
+            foot->active = 0;
+        } else if (foot->faces) {
             faces_list(foot, terrain, input, steepest, f);
         } else {
+            foot_locate(foot, terrain, ground->tiles > 0);
             foot_list(foot, input, steepest, f);
         }
         if (foot->active > 0) {
             foot_prepare(foot, ground, f, terrain, input);
+            scratch->list[scratch->listed++] = f;
         }
-        total += foot->active;
     }
-    return total;
+    return scratch->listed;
 }

@@ -36,7 +36,6 @@ static void foot_set(FootScratch *foot, const MildSole *sole, double **at) {
     for (int i = 0; i < foot->elements; i++) {
         foot->center_x += x[i] / foot->elements;
         foot->center_y += y[i] / foot->elements;
-        foot->radius = fmax(foot->radius, sqrt(x[i] * x[i] + y[i] * y[i] + foot->z * foot->z));
     }
     foot->x = x;
     foot->y = y;
@@ -59,29 +58,37 @@ static void foot_set_faces(FootScratch *foot, const MildSole *sole, double **at)
     if (!sole->faces) {
         return;
     }
-    const double *points[3] = {mild_sole_x(sole), mild_sole_y(sole), mild_sole_surface_z(sole)};
     foot->faces = SLOT_FACES;
     foot->height = take(at, foot->padded);
     foot->area = take(at, foot->padded);
     foot->share = take(at, foot->padded);
     for (int k = 0; k < 3; k++) {
-        double low = INFINITY, high = -INFINITY;
         foot->face[k] = take(at, foot->padded);
-        for (int i = 0; i < foot->elements; i++) {
-            foot->face[k][i] = mild_sole_surface_normal(sole, k)[i];
-            low = fmin(low, points[k][i]);
-            high = fmax(high, points[k][i]);
-        }
-        foot->middle[k] = 0.5 * (low + high);
-        foot->half[k] = 0.5 * (high - low);
+        memcpy(foot->face[k], mild_sole_surface_normal(sole, k),
+               (size_t)foot->elements * sizeof(double));
     }
-    foot->radius = 0.0;
     for (int i = 0; i < foot->elements; i++) {
-        foot->height[i] = points[2][i] - foot->z;
+        foot->height[i] = mild_sole_surface_z(sole)[i] - foot->z;
         foot->area[i] = mild_sole_surface_area(sole)[i] / (foot->pitch * foot->pitch);
-        const double square =
-            points[0][i] * points[0][i] + points[1][i] * points[1][i] + points[2][i] * points[2][i];
-        foot->radius = fmax(foot->radius, sqrt(square));
+    }
+}
+
+/* Bounding box and radius. */
+static void foot_set_bounds(FootScratch *foot) {
+    double low[3] = {INFINITY, INFINITY, INFINITY};
+    double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (int i = 0; i < foot->elements; i++) {
+        const double p[3] = {foot->x[i], foot->y[i],
+                             foot->z + (foot->faces ? foot->height[i] : 0.0)};
+        for (int k = 0; k < 3; k++) {
+            low[k] = fmin(low[k], p[k]);
+            high[k] = fmax(high[k], p[k]);
+        }
+        foot->radius = fmax(foot->radius, sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]));
+    }
+    for (int k = 0; k < 3; k++) {
+        foot->middle[k] = 0.5 * (low[k] + high[k]);
+        foot->half[k] = 0.5 * (high[k] - low[k]);
     }
 }
 
@@ -118,9 +125,11 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
         slots += sole_padded(soles[f]);
         doubles += foot_doubles(soles[f]);
     }
+    const size_t rows = 2 * 6 * (size_t)feet * ROW_LANES;
+    doubles += rows;
     const size_t used = doubles * sizeof(double) + 2 * (size_t)slots * sizeof(int32_t);
     const size_t bytes = (used + 63) / 64 * 64;
-    MildScratch *scratch = calloc(1, sizeof *scratch);
+    MildScratch *scratch = calloc(1, sizeof *scratch + (size_t)feet * sizeof(FootScratch));
     double *block = aligned_alloc(64, bytes);
     if (!scratch || !block) {
         free(scratch);
@@ -131,12 +140,14 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
     memset(block, 0, bytes);
     scratch->feet = feet;
     scratch->block = block;
-    double *at = block;
+    scratch->rows = block;
+    double *at = block + rows;
     int32_t *integers = (int32_t *)(block + doubles);
     for (int f = 0; f < feet; f++) {
         FootScratch *foot = &scratch->foot[f];
         foot_set(foot, soles[f], &at);
         foot_set_faces(foot, soles[f], &at);
+        foot_set_bounds(foot);
         scratch->faces |= soles[f]->faces << f;
         foot_set_slots(foot, &at, integers);
         integers += 2 * foot->padded;

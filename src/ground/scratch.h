@@ -6,7 +6,8 @@
 #include "ground/state.h"
 
 #define TWIST_MAX (6 * MILD_FEET_MAX)
-#define PADDING_DEPTH (-1e3) /* [m] depth of the padding, which never touches the ground */
+#define ROW_LANES (TWIST_MAX + 8) /* numbers of a row of the equations: newton_step.h */
+#define PADDING_DEPTH (-1e3)      /* [m] depth of the padding, which never touches the ground */
 
 /* Law of a material as last derived. It is valid while the material's bytes stay the same. */
 typedef struct {
@@ -30,23 +31,24 @@ typedef struct FootScratch {
     double center_y; /* [m] */
     double radius;   /* [m] distance from the ankle to the farthest element */
 
+    double middle[3]; /* [m] of the bounding box, foot frame */
+    double half[3];   /* [m] half of its sides */
+
     /* A surface (faces.c): mild_scratch_create. NULL and 0 for a plane sole. */
-    int faces;         /* SLOT_FACES, or 0: all elements lie at z and face down */
-    double *height;    /* [padded] [m] above z, in the foot frame */
-    double *face[3];   /* [padded] [-] outward normal, foot frame */
-    double *area;      /* [padded] [-] area over pitch^2 */
-    double *share;     /* [padded] [-] projected area over pitch^2; 0: faces up. faces_locate */
-    double middle[3];  /* [m] of the bounding box, foot frame */
-    double half[3];    /* [m] half of its sides */
-    double least;      /* [m] elements deeper than this may touch: foot_list */
-    int away;          /* bool: no element can touch; depth and share are not set */
-    double away_depth; /* [m] then an upper bound on the depths */
+    int faces;       /* SLOT_FACES, or 0: all elements lie at z and face down */
+    double *height;  /* [padded] [m] above z, in the foot frame */
+    double *face[3]; /* [padded] [-] outward normal, foot frame */
+    double *area;    /* [padded] [-] area over pitch^2 */
+    double *share;   /* [padded] [-] projected area over pitch^2; 0: faces up. faces_locate */
+    double least;    /* [m] elements deeper than this may touch: foot_list */
 
     /* Pose: foot_locate. The vector from the ankle to an element is p = arm[0] + x arm[1] + y
      * arm[2] + height arm[3]. */
     double origin[3]; /* [m] the ankle, world */
     double arm[4][3]; /* world: the frame's point (0, 0, z) [m], its axes [-], z for a surface */
     int uneven;       /* bool: the terrain is not level; otherwise all slopes are 0 */
+    int away;         /* bool: no element can touch; depth and share are not set */
+    double reach;     /* [m] upper bound on the depths: foot_reach */
     double *depth;    /* [padded] [m] */
     double *slope_x;  /* [padded] [-] gradient of the ground; uneven ground only */
     double *slope_y;  /* [padded] [-] */
@@ -82,7 +84,12 @@ typedef struct FootScratch {
 struct MildScratch {
     int feet;
     int32_t faces; /* bit f: foot f is a surface */
-    FootScratch foot[MILD_FEET_MAX];
+    /* Feet in the step's equations: contact_prepare. */
+    int given;                      /* feet that input.inverse_inertia has rows of */
+    int place[MILD_FEET_MAX];       /* index of a foot among these; -1: none */
+    int listed;                     /* feet with listed elements */
+    int list[MILD_FEET_MAX];        /* [listed] their indices, ascending */
+    double *rows;                   /* [2][6 feet][ROW_LANES] of Newton's method */
     double sums[MILD_FEET_MAX][12]; /* [N s, N s m] of I, x I, y I, height I at the last pass */
     double wrench[TWIST_MAX];       /* [N s, N m s] sum of B^T I at the last pass */
     /* [kg, kg m, kg m^2] -d wrench/d twist of each foot, 6 x 6, row major. */
@@ -90,6 +97,7 @@ struct MildScratch {
     double velocity[TWIST_MAX]; /* [m/s, rad/s] V+ of the last solve */
     double dt;                  /* [s] of the last solve */
     double *block;              /* the one allocation behind all arrays */
+    FootScratch foot[];         /* [feet] */
 };
 
 /* Bool: made for soles of the same numbers of elements as the ground. */

@@ -45,7 +45,7 @@ MildElements mild_scratch_elements(const MildScratch *scratch, int f) {
         foot->flat[e] = 1.0;
     }
     for (int e = 0; foot->away && e < foot->elements; e++) {
-        foot->depth[e] = foot->away_depth;
+        foot->depth[e] = foot->reach;
     }
     foot_points(&scratch->foot[f]);
     foot_scatter(scratch, f);
@@ -161,6 +161,23 @@ static int all_finite(const MildContactInput *input, const MildContactResult *re
     return all;
 }
 
+/* V = V_free + A W of the feet that have rows. */
+static void step_twists(const MildScratch *scratch, const MildContactInput *input,
+                        MildContactResult *result) {
+    const int stride = 6 * scratch->given;
+    for (int i = 0; i < 6 * scratch->feet; i++) {
+        double sum = input->free_velocity[i];
+        const double *row = input->inverse_inertia + (6 * scratch->place[i / 6] + i % 6) * stride;
+        for (int k = 0; scratch->place[i / 6] >= 0 && k < scratch->listed; k++) {
+            const double *wrench = scratch->wrench + 6 * scratch->list[k];
+            for (int j = 0; j < 6; j++) {
+                sum += row[6 * scratch->place[scratch->list[k]] + j] * wrench[j];
+            }
+        }
+        result->velocity[i] = sum;
+    }
+}
+
 static void step_solve(MildScratch *scratch, const MildContactInput *input,
                        MildContactResult *result) {
     if (input->solver == MILD_SOLVER_GAUSS_SEIDEL) {
@@ -168,15 +185,18 @@ static void step_solve(MildScratch *scratch, const MildContactInput *input,
     } else {
         newton_solve(scratch, input, result);
     }
+    step_twists(scratch, input, result);
 }
 
 void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
                        const MildContactInput *input, MildScratch *scratch,
                        MildContactResult *result) {
     size_t bytes = 6 * (size_t)scratch->feet * sizeof(double);
-    memset(result, 0, sizeof *result);
+    memset(result->foot, 0, (size_t)scratch->feet * sizeof *result->foot);
+    result->residual = 0.0;
+    result->iterations = result->converged = 0;
     scratch->dt = input->dt;
-    if (!scratch_fits(scratch, ground)) {
+    if (!scratch_fits(scratch, ground) || !input->inverse_inertia) {
         memcpy(result->velocity, input->free_velocity, bytes);
         return;
     }
@@ -198,10 +218,8 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
     }
     memcpy(scratch->velocity, result->velocity, bytes);
     int nan = 0;
-    for (int f = 0; f < scratch->feet; f++) {
-        if (scratch->foot[f].active == 0) {
-            continue;
-        }
+    for (int k = 0; k < scratch->listed; k++) {
+        const int f = scratch->list[k];
         foot_result(scratch, input, f, &result->foot[f]);
         nan |= scratch->foot[f].nan;
     }

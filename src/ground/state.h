@@ -21,7 +21,7 @@ struct MildGround {
     uint32_t imprint_time;           /* counts the steps that could change an imprint */
     double imprint_cell;             /* [m] edge of a cell */
     int32_t faces;                   /* bit f: foot f is a surface */
-    int32_t reserved[9];             /* pads to 128 bytes, so that the arrays behind are aligned */
+    int32_t reserved[9];             /* pads to 320 bytes, so that the arrays behind are aligned */
 };
 
 /* What an element stands on: the index of a material, or first | second << 8 | share << 16 for a

@@ -18,10 +18,11 @@
  * O(1) and a sweep costs O(N). The mean over the preceding elements in delta_rb is a running
  * mean. */
 typedef struct {
-    int n;                   /* rows: 6 for each foot */
+    int n;                   /* rows: 6 for each foot that has rows in the input */
     double dt;               /* [s] */
+    const int *place;        /* of each foot among these */
     const double *A;         /* [n][n] inverse inertia */
-    double twist[TWIST_MAX]; /* [m/s, rad/s] V^ + A W for the present impulses */
+    double twist[TWIST_MAX]; /* [n] [m/s, rad/s] V^ + A W for the present impulses */
     /* Elements that this sweep has visited, foot by foot: */
     int preceding[MILD_FEET_MAX];    /* number of them */
     double before[MILD_FEET_MAX][2]; /* [m/s] sum of v_j - omega x p_j, horizontal */
@@ -39,7 +40,7 @@ static void sweep_apply(Sweep *sweep, int f, const double *p, const double *chan
                               p[2] * change[0] - p[0] * change[2],
                               p[0] * change[1] - p[1] * change[0]};
     for (int k = 0; k < 6; k++) {
-        const double *row = sweep->A + (6 * f + k) * sweep->n; /* A is symmetric */
+        const double *row = sweep->A + (6 * sweep->place[f] + k) * sweep->n; /* A is symmetric */
         for (int j = 0; j < sweep->n; j++) {
             sweep->twist[j] += row[j] * wrench[k];
         }
@@ -53,11 +54,12 @@ static void element_inverse_mass(const Sweep *sweep, int f, const double *p, dou
     const double J[3][6] = {{1, 0, 0, 0, p[2], -p[1]},
                             {0, 1, 0, -p[2], 0, p[0]},
                             {-a, -b, 1, p[1] + b * p[2], -p[0] - a * p[2], a * p[1] - b * p[0]}};
+    const double *A = sweep->A + 6 * sweep->place[f] * (sweep->n + 1);
     for (int axis = 0; axis < 3; axis++) {
         G[axis] = 0.0;
         for (int i = 0; i < 6; i++) {
             for (int j = 0; j < 6; j++) {
-                G[axis] += J[axis][i] * sweep->A[(6 * f + i) * sweep->n + 6 * f + j] * J[axis][j];
+                G[axis] += J[axis][i] * A[i * sweep->n + j] * J[axis][j];
             }
         }
     }
@@ -97,7 +99,7 @@ static void element_friction(const Slots *s, int i, const double *v, const doubl
 /* One iteration of the inner loop of Algorithm 1. The change of impulse moves the feet at once. */
 static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
     const Slots *s = &foot->slot;
-    const double *V = sweep->twist + 6 * f;
+    const double *V = sweep->twist + 6 * sweep->place[f];
     double p[3];
     slot_arm(foot, s, i, p);
     double turn[2] = {V[4] * p[2] - V[5] * p[1], V[5] * p[0] - V[3] * p[2]}; /* omega x p */
@@ -147,8 +149,14 @@ static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
 
 /* Start: I_xy = 0, I_z = dt F_GM at the present velocity. */
 static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInput *input) {
-    memcpy(sweep->twist, input->free_velocity, (size_t)sweep->n * sizeof(double));
     for (int f = 0; f < scratch->feet; f++) {
+        if (scratch->place[f] >= 0) {
+            memcpy(sweep->twist + 6 * scratch->place[f], input->free_velocity + 6 * f,
+                   6 * sizeof(double));
+        }
+    }
+    for (int k = 0; k < scratch->listed; k++) {
+        const int f = scratch->list[k];
         const FootScratch *foot = &scratch->foot[f];
         const Slots *s = &foot->slot;
         const Motion motion = foot_motion(foot, input->velocity[f]);
@@ -165,12 +173,13 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
     }
 }
 
-/* Sum of B^T I over the slots as they stand. */
+/* Sum of B^T I over the slots as they stand. wrench: [n] */
 static void sweep_wrench(const MildScratch *scratch, double *wrench) {
     memset(wrench, 0, TWIST_MAX * sizeof *wrench);
-    for (int f = 0; f < scratch->feet; f++) {
+    for (int k = 0; k < scratch->listed; k++) {
+        const int f = scratch->list[k];
         const Slots *s = &scratch->foot[f].slot;
-        double *W = wrench + 6 * f;
+        double *W = wrench + 6 * scratch->place[f];
         for (int i = 0; i < scratch->foot[f].active; i++) {
             double p[3];
             slot_arm(&scratch->foot[f], s, i, p);
@@ -198,15 +207,17 @@ static double sweep_distance(const Sweep *sweep, const double *a, const double *
 }
 
 void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {
-    Sweep sweep = {.n = 6 * scratch->feet, .dt = input->dt, .A = input->inverse_inertia};
+    Sweep sweep = {.n = 6 * scratch->given,
+                   .dt = input->dt,
+                   .place = scratch->place,
+                   .A = input->inverse_inertia};
     static const double zero[TWIST_MAX];
     int limit = input->max_iterations > 0 ? input->max_iterations : SWEEP_LIMIT;
     int iterations = 0;
     double tolerance = input->tolerance > 0.0 ? input->tolerance : SWEEP_TOLERANCE;
-    double change = INFINITY; /* of the wrench in the last sweep */
-    double scale = 0.0;       /* size of the wrench */
-    double *wrench = scratch->wrench;
-    double before[TWIST_MAX]; /* the wrench before the sweep */
+    double change = INFINITY;                    /* of the wrench in the last sweep */
+    double scale = 0.0;                          /* size of the wrench */
+    double wrench[TWIST_MAX], before[TWIST_MAX]; /* after the sweep, and before it */
     sweep_start(&sweep, scratch, input);
     sweep_wrench(scratch, wrench);
     int rests = 0;
@@ -216,7 +227,8 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
         memcpy(before, wrench, sizeof before);
         memset(sweep.before, 0, sizeof sweep.before);
         memset(sweep.preceding, 0, sizeof sweep.preceding);
-        for (int f = 0; f < scratch->feet; f++) {
+        for (int k = 0; k < scratch->listed; k++) {
+            const int f = scratch->list[k];
             for (int i = 0; i < scratch->foot[f].active; i++) {
                 sweep_element(&sweep, &scratch->foot[f], f, i);
             }
@@ -232,11 +244,9 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
     result->iterations = iterations;
     result->residual = scale > 0.0 ? change / scale : change;
     result->converged = rests && change <= tolerance * scale;
-    for (int i = 0; i < sweep.n; i++) {
-        double sum = input->free_velocity[i];
-        for (int j = 0; j < sweep.n; j++) {
-            sum += sweep.A[i * sweep.n + j] * wrench[j];
-        }
-        result->velocity[i] = sum;
+    memset(scratch->wrench, 0, sizeof scratch->wrench);
+    for (int k = 0; k < scratch->listed; k++) {
+        const int f = scratch->list[k];
+        memcpy(scratch->wrench + 6 * f, wrench + 6 * scratch->place[f], 6 * sizeof *wrench);
     }
 }

@@ -18,6 +18,7 @@ typedef struct {
     PressResult *result;
     MildTerrain terrain;
     MildContactInput input;
+    double inverse_inertia[36]; /* of the input */
     MildContactResult contact;
     MildGround *ground;
     MildScratch *scratch;
@@ -89,6 +90,7 @@ static MildStatus press_open(Press *press, const PressDef *def, const MildSole *
     double c = cos(def->tilt), s = sin(def->tilt);
     const double rotation[9] = {c, 0, s, 0, 1, 0, -s, 0, c}; /* about y */
     press->input.feet = 1;
+    press->input.inverse_inertia = press->inverse_inertia;
     press->input.solver = def->solver;
     for (int i = 0; i < 9; i++) {
         press->input.rotation[0][i] = rotation[i];

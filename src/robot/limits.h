@@ -2,10 +2,10 @@
 #ifndef ROBOT_LIMITS_H
 #define ROBOT_LIMITS_H
 
-#include "mild/ground.h"
+#include "mild/batch.h"
 
 #define ROBOT_JOINTS_MAX 40
-#define ROBOT_FEET_MAX MILD_FEET_MAX
+#define ROBOT_FEET_MAX MILD_BATCH_FEET_MAX
 #define ROBOT_NQ_MAX (7 + ROBOT_JOINTS_MAX) /* qpos of a free base and hinges */
 #define ROBOT_NV_MAX (6 + ROBOT_JOINTS_MAX) /* qvel */
 

@@ -46,6 +46,7 @@ RobotSim *robot_sim_create(const Robot *robot, double dt, MildError *error) {
     model->opt.timestep = dt;
     sim->input.feet = robot->def.feet;
     sim->input.dt = dt;
+    sim->input.inverse_inertia = sim->inverse_inertia;
     RobotState stand = {.qpos = {0, 0, robot->stand_height, 1, 0, 0, 0}};
     memcpy(stand.qpos + 7, robot->def.pose, sizeof robot->def.pose);
     RobotVariation nominal = robot_variation_nominal();

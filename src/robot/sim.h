@@ -31,6 +31,7 @@ struct RobotSim {
     FootMap map[ROBOT_FEET_MAX];
     Unheld without[ROBOT_JOINTS_MAX];
     MildContactInput input;
+    double inverse_inertia[36 * ROBOT_FEET_MAX * ROBOT_FEET_MAX]; /* of the input */
     MildScratch *scratch;
     MildContactResult contact;
     RobotFoot feet[ROBOT_FEET_MAX];

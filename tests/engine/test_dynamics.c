@@ -526,11 +526,11 @@ static void stand_on(const Kit *kit, Follower *follower, const MildTerrain *terr
     follower->text(&kit->tree, kit->number, in, &result);
     input.feet = kit->tree.feet;
     input.dt = DT;
-    memcpy(input.position, result.position, sizeof input.position);
-    memcpy(input.rotation, result.rotation, sizeof input.rotation);
-    memcpy(input.velocity, result.velocity, sizeof input.velocity);
-    memcpy(input.free_velocity, result.free_velocity, sizeof input.free_velocity);
-    memcpy(input.inverse_inertia, result.inverse_inertia, sizeof input.inverse_inertia);
+    memcpy(input.position, result.position, sizeof result.position);
+    memcpy(input.rotation, result.rotation, sizeof result.rotation);
+    memcpy(input.velocity, result.velocity, sizeof result.velocity);
+    memcpy(input.free_velocity, result.free_velocity, sizeof result.free_velocity);
+    input.inverse_inertia = result.inverse_inertia;
     mild_ground_solve(follower->ground, terrain, &input, follower->scratch, &contact);
     mild_ground_advance(follower->ground, terrain, &input, follower->scratch, &contact);
     for (int f = 0; f < kit->tree.feet; f++) {

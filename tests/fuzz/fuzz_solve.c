@@ -4,13 +4,13 @@
 #include "fuzz.h"
 #include "mild/ground.h"
 
-enum { STEPS = 2, NEWTON_WORK = 16, SWEEPS = 6, PRINT_TILES = 8 };
+enum { STEPS = 2, NEWTON_WORK = 16, SWEEPS = 6, PRINT_TILES = 8, FEET = 5 };
 
 /* What a model stands on: the raster, or one element in its middle. */
 typedef struct {
-    MildSole *soles[MILD_FEET_MAX];
-    MildScratch *scratch[MILD_FEET_MAX];  /* for one foot, for two, .. */
-    MildGround *ground[2][MILD_FEET_MAX]; /* without prints, with */
+    MildSole *soles[FEET];
+    MildScratch *scratch[FEET];  /* for one foot, for two, .. */
+    MildGround *ground[2][FEET]; /* without prints, with */
 } Feet;
 
 static Feet raster, concentric;
@@ -18,7 +18,7 @@ static MildMap *maps[3]; /* none, rough ground of two materials, a slope */
 
 static void feet_finish(Feet *feet) {
     const MildSole *const *all = (const MildSole *const *)feet->soles;
-    for (int count = 1; count <= MILD_FEET_MAX; count++) {
+    for (int count = 1; count <= FEET; count++) {
         feet->scratch[count - 1] = mild_scratch_create(all, count, NULL);
         fuzz_check(feet->scratch[count - 1] != NULL);
         for (int prints = 0; prints < 2; prints++) {
@@ -33,7 +33,7 @@ static void feet_finish(Feet *feet) {
 static void make_feet(void) {
     static const double outline[2][8] = {{-0.02, -0.01, 0.02, -0.01, 0.02, 0.01, -0.02, 0.01},
                                          {-0.02, -0.02, 0.02, -0.02, 0.02, 0.02, -0.02, 0.02}};
-    for (int f = 0; f < MILD_FEET_MAX; f++) {
+    for (int f = 0; f < FEET; f++) {
         MildSoleDef def = {
             .outline = outline[f % 2], .points = 4, .pitch = 0.0195, .sole_z = -0.05};
         raster.soles[f] = mild_sole_create(&def, NULL);
@@ -58,7 +58,9 @@ static void make_feet(void) {
 
 /* Feet just in the ground, level and at rest, 5 kg each. */
 static MildContactInput quiet_input(int feet) {
-    MildContactInput input = {.feet = feet, .dt = 0.002};
+    static double A[36 * FEET * FEET];
+    MildContactInput input = {.feet = feet, .dt = 0.002, .inverse_inertia = A};
+    memset(A, 0, sizeof A);
     for (int f = 0; f < feet; f++) {
         input.position[f][2] = 0.045;
         for (int k = 0; k < 3; k++) {
@@ -172,7 +174,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     MildTerrain terrain = take_terrain(&bytes);
     const Feet *feet =
         mild_model_is_concentric((MildModel)terrain.materials[0].model) ? &concentric : &raster;
-    int count = 1 + take_below(&bytes, MILD_FEET_MAX);
+    int count = 1 + take_below(&bytes, FEET);
     int prints = take_below(&bytes, 2);
     MildGround *memory = feet->ground[prints][count - 1];
     mild_ground_reset(memory);

@@ -112,6 +112,7 @@ typedef struct {
     size_t bytes;
     MildTerrain terrain;
     MildContactInput input;
+    double A[36 * MILD_FEET_MAX * MILD_FEET_MAX]; /* of the input */
     MildContactResult result;
     double mass[MILD_FEET_MAX], inertia[MILD_FEET_MAX],
         center[MILD_FEET_MAX][3]; /* body on each foot: kg, kg m^2, [m] foot frame */
@@ -134,6 +135,7 @@ static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right,
     kit->terrain = mild_terrain_uniform(material);
     kit->input.feet = feet;
     kit->input.dt = dt;
+    kit->input.inverse_inertia = kit->A;
     for (int f = 0; f < feet; f++) {
         for (int k = 0; k < 3; k++) {
             kit->input.rotation[f][4 * k] = 1.0;
@@ -143,6 +145,20 @@ static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right,
         kit->mass[f] = 20.0;
         kit->inertia[f] = 0.5;
     }
+}
+
+/* Input and A of another kit. */
+static inline void kit_copy_input(Kit *kit, const Kit *from) {
+    kit->input = from->input;
+    kit->input.inverse_inertia = kit->A;
+    memcpy(kit->A, from->A, sizeof kit->A);
+}
+
+static inline void kit_same_input(const Kit *kit, const Kit *other) {
+    MildContactInput input = other->input;
+    input.inverse_inertia = kit->input.inverse_inertia;
+    assert_memory_equal(&kit->input, &input, sizeof input);
+    assert_memory_equal(kit->A, other->A, sizeof kit->A);
 }
 
 /* Ground that remembers prints. */
@@ -175,7 +191,8 @@ static inline void kit_center(const Kit *kit, int f, double *r) {
 /* A of a free body (ball inertia): wrench at the ankle -> change of twist at the ankle. */
 static inline void kit_inverse_inertia(Kit *kit) {
     int n = 6 * kit->feet;
-    memset(kit->input.inverse_inertia, 0, sizeof kit->input.inverse_inertia);
+    memset(kit->A, 0, 36 * (size_t)(kit->feet * kit->feet) * sizeof *kit->A);
+    kit->input.inverse_inertia = kit->A;
     for (int f = 0; f < kit->feet; f++) {
         double r[3];
         kit_center(kit, f, r);

@@ -282,7 +282,8 @@ static void problem_turn(Kit *kit, uint64_t *random) {
         const double most = i % 6 < 3 ? 0.01 : 1.0; /* [m], [rad] in all */
         kit->input.free_velocity[i] = kit_uniform(random, -most, most) / STEPS / kit->input.dt;
     }
-    memset(kit->input.inverse_inertia, 0, sizeof kit->input.inverse_inertia);
+    memset(kit->A, 0, sizeof kit->A);
+    kit->input.inverse_inertia = kit->A;
     for (int s = 0; s < STEPS; s++) {
         kit_solve(kit);
         kit_advance(kit);

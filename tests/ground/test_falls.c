@@ -226,7 +226,7 @@ static void body_column(const double *lever, int j, double *twist) {
 static void body_input(Body *b, double lever[2][3]) {
     MildContactInput *in = &b->kit.input;
     const int n = 6 * b->feet;
-    memset(in->inverse_inertia, 0, sizeof in->inverse_inertia);
+    memset(b->kit.A, 0, sizeof b->kit.A);
     for (int f = 0; f < b->feet; f++) {
         double swing[3];
         body_turn(b, b->lever[f], lever[f]);

@@ -1,10 +1,15 @@
-/* One to four feet: bodies that are not coupled, solved together or each for itself, move alike. */
+/* Any number of feet: bodies that are not coupled, solved together or each for itself, move alike;
+ * and feet whose rows are left out because they are far from the ground change nothing. */
 #include "ground_kit.h"
 
-enum { STEPS = 150 };
+enum { STEPS = 150, ROWS = 6 * MILD_FEET_MAX };
 
-/* The second foot lands first, then the last: another lies in the air between and before them. */
-static const double height[MILD_FEET_MAX] = {0.004, 0.0, 0.006, 0.002}; /* [m] at the start */
+/* [m] At the start. Of four the second foot lands first, then the last: another lies in the air
+ * between and before them. */
+static double height_of(int body) {
+    static const double height[4] = {0.004, 0.0, 0.006, 0.002};
+    return height[body % 4] + 0.0003 * (body / 4);
+}
 
 static void set_motion(Kit *kit, int f, int body) {
     uint64_t random = 40 + (uint64_t)body;
@@ -13,7 +18,7 @@ static void set_motion(Kit *kit, int f, int body) {
     kit->center[f][2] = kit_uniform(&random, 0.0, 0.1);
     kit->input.position[f][0] = 0.4 * body;
     kit->input.position[f][1] = body % 2 ? -0.1 : 0.1;
-    kit->input.position[f][2] = -KIT_SOLE_Z + height[body];
+    kit->input.position[f][2] = -KIT_SOLE_Z + height_of(body);
     for (int k = 0; k < 3; k++) {
         kit->input.velocity[f][k] = kit_uniform(&random, -0.3, 0.3);
         kit->input.velocity[f][3 + k] = kit_uniform(&random, -1.0, 1.0);
@@ -26,7 +31,7 @@ static void set_motion(Kit *kit, int f, int body) {
 /* Largest difference of the twists over all steps, in m/s and rad/s. */
 static double together_and_alone(int feet, MildSolver solver, const MildMaterial *m) {
     MildSole *sole[2] = {kit_sole(0, 77), kit_sole(1, 77)};
-    Kit all, one[MILD_FEET_MAX];
+    static Kit all, one[MILD_FEET_MAX];
     double worst = 0.0;
     int touched = 0;
     kit_open(&all, feet, sole[0], sole[1], m, 1e-3);
@@ -67,17 +72,149 @@ static void test_together_as_alone(void **state) {
     static const char *const names[] = {"newton", "sweeps"};
     static const MildSolver solvers[] = {MILD_SOLVER_NEWTON, MILD_SOLVER_GAUSS_SEIDEL};
     MildMaterial sand = mild_material_default();
-    for (int feet = 1; feet <= MILD_FEET_MAX; feet++) {
+    static const int counts[] = {1, 2, 3, 4, 9, MILD_FEET_MAX};
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
         for (int k = 0; k < 2; k++) {
-            double worst = together_and_alone(feet, solvers[k], &sand);
-            print_message("%d feet, %s: together and alone differ by %.1e\n", feet, names[k],
+            double worst = together_and_alone(counts[i], solvers[k], &sand);
+            print_message("%d feet, %s: together and alone differ by %.1e\n", counts[i], names[k],
                           worst);
             assert_true(worst < 1e-9);
         }
     }
 }
 
+/* A body with many feet: all coupled through its mass, A = J M^-1 J^T. */
+static void couple(Kit *kit) {
+    const int n = 6 * kit->feet;
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            kit->A[i * n + j] = 0.3 * kit->A[i * n + j] + (i % 6 == j % 6 ? 0.01 : 0.0);
+        }
+    }
+}
+
+/* Leaves out the rows and columns of A of the feet that are not in `rows`. */
+static void keep_rows(Kit *kit, uint32_t rows) {
+    static double kept[ROWS * ROWS];
+    int n = 0;
+    for (int i = 0; i < 6 * kit->feet; i++) {
+        for (int j = 0; rows >> (i / 6) & 1 && j < 6 * kit->feet; j++) {
+            if (rows >> (j / 6) & 1) {
+                kept[n++] = kit->A[i * 6 * kit->feet + j];
+            }
+        }
+    }
+    kit->input.rows = rows;
+    memcpy(kit->A, kept, (size_t)n * sizeof *kept);
+}
+
+static int bits(uint32_t word) {
+    return word ? (int)(word & 1) + bits(word >> 1) : 0;
+}
+
+/* Feet at heights up to 10 cm come down one after the other, on level ground or a map. In one kit A
+ * has all rows, in the other those that mild_ground_near names. */
+static void near_as_all(MildSolver solver, const MildMap *map) {
+    MildSole *sole[2] = {kit_sole(0, 77), kit_sole(1, 77)};
+    MildMaterial sand = mild_material_default();
+    static Kit all, some;
+    Kit *const kits[] = {&all, &some};
+    int least = MILD_FEET_MAX, most = 0;
+    for (int k = 0; k < 2; k++) {
+        kit_open(kits[k], MILD_FEET_MAX, sole[0], sole[1], &sand, 1e-3);
+        for (int f = 0; f < MILD_FEET_MAX; f++) {
+            set_motion(kits[k], f, f);
+            kits[k]->input.position[f][2] += 0.006 * f;
+            kits[k]->input.tolerance = 1e-11;
+        }
+        kits[k]->input.solver = solver;
+        kits[k]->terrain.map = map;
+    }
+    for (int s = 0; s < 2 * STEPS; s++) {
+        for (int k = 0; k < 2; k++) {
+            kit_inverse_inertia(kits[k]);
+            couple(kits[k]);
+            kit_free(kits[k], NULL);
+        }
+        const uint32_t near = mild_ground_near(&some.terrain, &some.input, some.scratch);
+        least = bits(near) < least ? bits(near) : least;
+        most = bits(near) > most ? bits(near) : most;
+        some.input.rows = 0;
+        assert_int_equal(mild_contact_check(some.ground, &some.terrain, &some.input, NULL),
+                         MILD_OK);
+        keep_rows(&some, near);
+        if (near) {
+            assert_int_equal(mild_contact_check(some.ground, &some.terrain, &some.input, NULL),
+                             MILD_OK);
+        }
+        kit_solve(&all);
+        kit_solve(&some);
+        assert_true(all.result.converged && some.result.converged);
+        for (int f = 0; f < MILD_FEET_MAX; f++) {
+            assert_memory_equal(&all.result.foot[f], &some.result.foot[f],
+                                sizeof all.result.foot[f]);
+            if (near >> f & 1) {
+                assert_memory_equal(all.result.velocity + 6 * f, some.result.velocity + 6 * f,
+                                    6 * sizeof(double));
+            } else { /* the coupling moves it, which `some` does not know */
+                memcpy(some.result.velocity + 6 * f, all.result.velocity + 6 * f,
+                       6 * sizeof(double));
+            }
+        }
+        kit_advance(&all);
+        kit_advance(&some);
+        assert_memory_equal(all.ground, some.ground, all.bytes);
+    }
+    print_message("feet near the ground: %d to %d of %d\n", least, most, MILD_FEET_MAX);
+    assert_true(least <= 3 && most == MILD_FEET_MAX);
+    kit_close(&all);
+    kit_close(&some);
+    mild_sole_destroy(sole[0]);
+    mild_sole_destroy(sole[1]);
+}
+
+static void test_near_as_all(void **state) {
+    (void)state;
+    MildMapDef def = mild_map_def_default();
+    def.kind = MILD_MAP_ROUGH;
+    def.size = 20.0;
+    MildMap *rough = mild_map_create(&def, NULL);
+    near_as_all(MILD_SOLVER_NEWTON, NULL);
+    near_as_all(MILD_SOLVER_GAUSS_SEIDEL, NULL);
+    near_as_all(MILD_SOLVER_NEWTON, rough);
+    mild_map_destroy(rough);
+}
+
+/* No rows at all, rows of feet that do not exist, and no matrix. */
+static void test_refused_rows(void **state) {
+    (void)state;
+    MildSole *sole[2] = {kit_sole(0, 77), kit_sole(1, 77)};
+    MildMaterial sand = mild_material_default();
+    MildError error;
+    static Kit kit;
+    kit_open(&kit, 2, sole[0], sole[1], &sand, 1e-3);
+    kit_inverse_inertia(&kit);
+    kit_free(&kit, NULL);
+    kit.input.rows = 4;
+    assert_int_equal(mild_contact_check(kit.ground, &kit.terrain, &kit.input, &error),
+                     MILD_ERROR_RANGE);
+    assert_non_null(strstr(error.text, "input.rows"));
+    kit.input.rows = 0;
+    kit.input.inverse_inertia = NULL;
+    assert_int_equal(mild_contact_check(kit.ground, &kit.terrain, &kit.input, &error),
+                     MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "input.inverse_inertia"));
+    mild_ground_solve(kit.ground, &kit.terrain, &kit.input, kit.scratch, &kit.result);
+    assert_false(kit.result.converged);
+    assert_memory_equal(kit.result.velocity, kit.input.free_velocity, 12 * sizeof(double));
+    kit_close(&kit);
+    mild_sole_destroy(sole[0]);
+    mild_sole_destroy(sole[1]);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_together_as_alone)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_together_as_alone),
+                                       cmocka_unit_test(test_near_as_all),
+                                       cmocka_unit_test(test_refused_rows)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -118,7 +118,7 @@ static void step_both(Kit *own, Kit *twin, char **block, const Kit *other, uint6
     kit_inverse_inertia(own);
     kit_free(own, (const double(*)[3])force);
     kit_solve(own);
-    twin->input = own->input;
+    kit_copy_input(twin, own);
     twin->terrain = own->terrain;
     solve_bad(*other, random);
     for (int k = kit_index(random, 2); k >= 0; k--) {
@@ -223,7 +223,7 @@ static double path_difference(int prints, int draws) {
             fail_msg("%s", "labels");
         }
         for (int t = 0; t < 40; t++) {
-            b.input = a.input;
+            kit_copy_input(&b, &a);
             kit_step(&a, NULL);
             kit_step(&b, NULL);
             for (int i = 0; i < 12; i++) {

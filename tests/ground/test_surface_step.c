@@ -65,7 +65,7 @@ static void a_face_is_a_sole(void **state) {
             one.inertia[0] = 1e9;
         }
         one.input.velocity[0][2] -= 0.3;
-        memcpy(&two.input, &one.input, sizeof two.input);
+        kit_copy_input(&two, &one);
         memcpy(two.center, one.center, sizeof two.center);
         memcpy(two.mass, one.mass, sizeof two.mass);
         memcpy(two.inertia, one.inertia, sizeof two.inertia);
@@ -226,9 +226,13 @@ static void hessian_is_the_derivative(void **state) {
         kit_inverse_inertia(&kit);
         kit_free(&kit, NULL);
         kit_solve(&kit);
+        if (kit.scratch->listed < 2) {
+            kit_close(&kit);
+            continue;
+        }
         double twist[12], H[2][36], size = 1e-12;
         memcpy(twist, kit.result.velocity, sizeof twist);
-        contact_pass(kit.scratch, kit.input.dt, twist, 0);
+        contact_pass(kit.scratch, kit.input.dt, twist);
         contact_hessian(kit.scratch);
         memcpy(H, kit.scratch->hessian, sizeof H);
         for (int i = 0; i < 72; i++) {
@@ -240,7 +244,7 @@ static void hessian_is_the_derivative(void **state) {
                 const double h = t ? 1e-7 : 3e-7;
                 for (int way = -1; way < 2; way += 2) {
                     twist[c] = kit.result.velocity[c] + way * h;
-                    contact_pass(kit.scratch, kit.input.dt, twist, 0);
+                    contact_pass(kit.scratch, kit.input.dt, twist);
                     for (int r = 0; r < 6; r++) {
                         const double w = kit.scratch->wrench[c / 6 * 6 + r];
                         slope[t][r] = way < 0 ? w : -(w - slope[t][r]) / (2.0 * h);
@@ -249,9 +253,6 @@ static void hessian_is_the_derivative(void **state) {
                 twist[c] = kit.result.velocity[c];
             }
             for (int r = 0; r < 6; r++) {
-                if (kit.scratch->foot[c / 6].active == 0) {
-                    continue;
-                }
                 if (fabs(slope[0][r] - slope[1][r]) > 1e-6 * size) {
                     kinks++;
                     continue;
@@ -491,7 +492,7 @@ static void states_are_copied(void **state) {
     assert_true(mild_ground_size(one.ground) == mild_ground_size(two.ground));
     MildError error = {0};
     assert_int_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
-    memcpy(&two.input, &one.input, sizeof two.input);
+    kit_copy_input(&two, &one);
     memcpy(two.mass, one.mass, sizeof two.mass);
     memcpy(two.inertia, one.inertia, sizeof two.inertia);
     for (int s = 0; s < 60; s++) {

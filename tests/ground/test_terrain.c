@@ -371,7 +371,7 @@ static void test_translation(void **state) {
         kit_random_state(&a, &random);
         kit_open(&b, 1, sole, NULL, &m, 1e-3);
         b.terrain = a.terrain;
-        b.input = a.input;
+        kit_copy_input(&b, &a);
         memcpy(b.center, a.center, sizeof a.center);
         b.mass[0] = a.mass[0], b.inertia[0] = a.inertia[0];
         double shift = t % 2 ? 2.0 * (1 + t / 8) : 0.09375 * t;

@@ -225,13 +225,15 @@ static void reference_twists(mjModel *bare, mjData *e, const mjModel *m, const m
 static double ground_apart(const mjModel *m, const mjData *d, const double *twist) {
     const Soft *soft = plugin_soft(m, d);
     MildContactInput input = soft->input;
+    double A[36];
     MildContactResult result;
     MildScratch *scratch = mild_scratch_create(soft->soles, 1, NULL);
     double worst = 0, wrench[6];
     memcpy(wrench, soft->contact.foot[0].force, 3 * sizeof(double));
     memcpy(wrench + 3, soft->contact.foot[0].torque, 3 * sizeof(double));
+    input.inverse_inertia = A;
     for (int r = 0; r < 36; r++) {
-        input.inverse_inertia[r] *= 1.5;
+        A[r] = 1.5 * soft->input.inverse_inertia[r];
     }
     for (int r = 0; r < 6; r++) {
         input.free_velocity[r] =

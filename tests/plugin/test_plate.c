@@ -56,7 +56,9 @@ static void step_by_hand(const char *ground, double mass, double dt, int steps, 
     void *block = calloc(1, mild_ground_bytes(soles, 1));
     MildGround *memory = mild_ground_init(block, soles, 1);
     MildScratch *scratch = mild_scratch_create(soles, 1, &error);
-    MildContactInput input = {.feet = 1, .dt = dt, .rotation = {{1, 0, 0, 0, 1, 0, 0, 0, 1}}};
+    double A[36] = {0};
+    MildContactInput input = {
+        .feet = 1, .dt = dt, .inverse_inertia = A, .rotation = {{1, 0, 0, 0, 1, 0, 0, 0, 1}}};
     const double inertia[3] = {mass / 3 * (HALF_Y * HALF_Y + HALF_Z * HALF_Z),
                                mass / 3 * (HALF_X * HALF_X + HALF_Z * HALF_Z),
                                mass / 3 * (HALF_X * HALF_X + HALF_Y * HALF_Y)};

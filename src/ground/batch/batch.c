@@ -13,16 +13,16 @@
 static const int batch_sizes[][2] = {CONTACT_KINDS(BATCH_SIZE)};
 /* NOLINTNEXTLINE(misc-redundant-expression): it is what this asserts */
 _Static_assert(MILD_BATCH_HOST == DEVICE_HOST, "the same number");
-_Static_assert(MILD_FEET_MAX == 4, "feet take 1, 2 or 4 groups");
+_Static_assert(MILD_BATCH_FEET_MAX == 4, "feet take 1, 2 or 4 groups");
 
 static MildStatus check_def(const MildBatchDef *def, MildError *error) {
     if (def->robots < 1) {
         return mild_fail(error, MILD_ERROR_RANGE, "batch: robots = %d; it must be at least 1",
                          def->robots);
     }
-    if (def->feet < 1 || def->feet > MILD_FEET_MAX) {
+    if (def->feet < 1 || def->feet > MILD_BATCH_FEET_MAX) {
         return mild_fail(error, MILD_ERROR_RANGE, "batch: feet = %d is outside 1 .. %d", def->feet,
-                         MILD_FEET_MAX);
+                         MILD_BATCH_FEET_MAX);
     }
     if (!(def->dt > 0.0 && def->dt <= 0.1)) {
         return mild_fail(error, MILD_ERROR_RANGE, "batch: dt = %g s is outside 0 .. 0.1", def->dt);

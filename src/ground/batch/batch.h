@@ -18,9 +18,9 @@ typedef struct {
     int materials;               /* in the table; behind them one that is not a number */
     int map;                     /* bool: on BatchArrays.map, not on level ground */
     int points;                  /* bool: as MildBatchDef.points */
-    int elements[MILD_FEET_MAX]; /* of a sole */
-    float z[MILD_FEET_MAX];      /* [m] of its plane */
-    float area[MILD_FEET_MAX];   /* [m^2] of an element */
+    int elements[MILD_BATCH_FEET_MAX]; /* of a sole */
+    float z[MILD_BATCH_FEET_MAX];      /* [m] of its plane */
+    float area[MILD_BATCH_FEET_MAX];   /* [m^2] of an element */
 } BatchShape;
 
 /* Where a batch keeps what; on its device. */
@@ -36,8 +36,8 @@ struct MildBatch {
     BatchArrays arrays;
     int device;
     int curves;                  /* LawCurve bits of all materials */
-    double pitch[MILD_FEET_MAX]; /* [m] */
-    double width[MILD_FEET_MAX]; /* [m] shorter side of the sole */
+    double pitch[MILD_BATCH_FEET_MAX]; /* [m] */
+    double width[MILD_BATCH_FEET_MAX]; /* [m] shorter side of the sole */
 };
 
 /* [numbers] of a robot's memory. */

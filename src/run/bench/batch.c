@@ -20,6 +20,7 @@ static const char *const grounds[GROUNDS] = {"sand_loose", "grass"};
 /* One step of the walk: the problem, its solution in double, and the memory before it. */
 typedef struct {
     MildContactInput input;
+    double inverse_inertia[36 * ROBOT_FEET_MAX * ROBOT_FEET_MAX]; /* of the input */
     MildContactResult result;
     int material;
     float *memory;
@@ -68,7 +69,11 @@ static MildStatus record_problems(BatchBench *bench, const Replay *replay, int m
                 batch_memory_of(shape, ground, problem->memory);
             }
             robot_sim_step(sim, period->torque[s], NULL, &replay->terrain, ground);
+            const int feet = robot_feet(bench->robot);
             problem->input = *robot_sim_contact_input(sim);
+            memcpy(problem->inverse_inertia, problem->input.inverse_inertia,
+                   36 * (size_t)(feet * feet) * sizeof(double));
+            problem->input.inverse_inertia = problem->inverse_inertia;
             problem->result = *robot_sim_contact(sim);
         }
     }
@@ -176,7 +181,7 @@ static MildStatus load_case(BatchCase *c, const BatchBench *bench, MildError *er
     return c->memory && c->input.material ? MILD_OK : MILD_ERROR_MEMORY;
 }
 
-#define PROBLEM_INPUT(field) offsetof(Problem, input.field)
+#define PROBLEM_INPUT(field) offsetof(Problem, field)
 
 static MildStatus open_case(BatchCase *c, const BatchBench *bench, int robots, MildError *error) {
     const int feet = robot_feet(bench->robot);
@@ -187,12 +192,12 @@ static MildStatus open_case(BatchCase *c, const BatchBench *bench, int robots, M
     }
     const size_t all = (size_t)robots * (size_t)feet * 6 * sizeof(float);
     MildBatchInput *in = &c->input;
-    in->position = input_array(c, bench, PROBLEM_INPUT(position), 3 * feet, error);
-    in->rotation = input_array(c, bench, PROBLEM_INPUT(rotation), 9 * feet, error);
-    in->velocity = input_array(c, bench, PROBLEM_INPUT(velocity), 6 * feet, error);
+    in->position = input_array(c, bench, PROBLEM_INPUT(input.position), 3 * feet, error);
+    in->rotation = input_array(c, bench, PROBLEM_INPUT(input.rotation), 9 * feet, error);
+    in->velocity = input_array(c, bench, PROBLEM_INPUT(input.velocity), 6 * feet, error);
     in->inverse_inertia =
         input_array(c, bench, PROBLEM_INPUT(inverse_inertia), 36 * feet * feet, error);
-    in->free_velocity = input_array(c, bench, PROBLEM_INPUT(free_velocity), 6 * feet, error);
+    in->free_velocity = input_array(c, bench, PROBLEM_INPUT(input.free_velocity), 6 * feet, error);
     c->output.wrench = device_array(c, bench->device, NULL, all, error);
     c->output.velocity = device_array(c, bench->device, NULL, all, error);
     c->output.iterations =

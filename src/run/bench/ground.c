@@ -17,6 +17,7 @@ static const double ground_repeat = 0.003; /* [s] */
 typedef struct {
     MildTerrain terrain;
     MildContactInput input;
+    double inverse_inertia[ROWS * ROWS]; /* of the input */
     MildGround *ground;
     MildScratch *scratch;
 } GroundBench;
@@ -34,10 +35,13 @@ static void sole_center(const MildSole *sole, double center[2]) {
 /* Two level feet that stand: A couples them as a trunk would, and the smooth forces press each with
  * half of 33 kg at the centre of its sole, V_free = V + dt A w. The feet touch the surface
  * and rest. */
-static void ground_input(MildContactInput *input, const MildSole *const *soles, double dt) {
+static void ground_input(GroundBench *bench, const MildSole *const *soles, double dt) {
+    MildContactInput *input = &bench->input;
     const double linear = 1.0 / 20, angular = 1.0 / 0.3, coupling = 0.6, load = 33.0 / 2 * 9.81;
     double wrench[ROWS] = {0};
-    *input = (MildContactInput){.feet = BENCH_FEET, .dt = dt};
+    *input =
+        (MildContactInput){.feet = BENCH_FEET, .dt = dt, .inverse_inertia = bench->inverse_inertia};
+    memset(bench->inverse_inertia, 0, sizeof bench->inverse_inertia);
     for (int foot = 0; foot < BENCH_FEET; foot++) {
         const MildSole *sole = soles[foot];
         double center[2];
@@ -94,7 +98,7 @@ static void ground_settle(GroundBench *bench, const MildSole *const *soles, doub
     double push[ROWS];
     MildContactResult result;
     mild_ground_reset(bench->ground);
-    ground_input(&bench->input, soles, dt);
+    ground_input(bench, soles, dt);
     memcpy(push, bench->input.free_velocity, sizeof push);
     for (int step = 0; step < SETTLE_STEPS; step++) {
         mild_ground_solve(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);

@@ -20,6 +20,7 @@ static const char *const solver_names[SOLVERS] = {"newton", "gauss_seidel"};
 typedef struct {
     MildTerrain terrain;
     MildContactInput input;
+    double inverse_inertia[TWIST_MAX * TWIST_MAX]; /* of the input */
     MildGround *ground;
     MildScratch *scratch;
     double exact[TWIST_MAX]; /* [N s, N m s] the feet's impulses, by Newton to the last digits */
@@ -164,7 +165,7 @@ static void random_foot(MildContactInput *input, int foot, const MildSole *sole,
 static void random_inertia(MildContactInput *input, Random *r) {
     double G[TWIST_MAX][TWIST_MAX];
     int rows = 6 * input->feet;
-    memset(input->inverse_inertia, 0, sizeof input->inverse_inertia);
+    memset(input->inverse_inertia, 0, (size_t)(rows * rows) * sizeof *input->inverse_inertia);
     for (int foot = 0; foot < input->feet; foot++) {
         double mass = exp(random_uniform(r, log(1), log(40))),
                inertia = mass * random_uniform(r, 0.002, 0.1);
@@ -199,7 +200,9 @@ static void random_problem(SolverBench *bench, const Robot *robot, uint32_t numb
     MildContactInput *input = &bench->input;
     MildMaterial material = random_material(&r);
     bench->terrain = mild_terrain_uniform(&material);
-    *input = (MildContactInput){.feet = robot_feet(robot), .dt = steps[random_index(&r, 3)]};
+    *input = (MildContactInput){.feet = robot_feet(robot),
+                                .dt = steps[random_index(&r, 3)],
+                                .inverse_inertia = bench->inverse_inertia};
     for (int foot = 0; foot < input->feet; foot++) {
         random_foot(input, foot, robot_soles(robot)[foot], &r);
     }
