@@ -10,6 +10,7 @@
 #define PLUGIN_NAME "mild.ground"
 #define PLUGIN_TEXT_SIZE 1024
 #define PLUGIN_OUTLINE_SIZE 16384
+#define PLUGIN_FEET_MAX 4 /* feet of an instance */
 
 /* Section [plugin]: the attributes without a prefix. */
 typedef struct {

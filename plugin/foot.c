@@ -53,8 +53,8 @@ const char *foot_name(const mjModel *m, const Foot *foot) {
 static MildStatus add_foot(const mjModel *m, Foot *feet, int *count, int body, int site,
                            MildError *error) {
     const Foot added = {.body = body, .site = site};
-    if (*count == MILD_FEET_MAX) {
-        return mild_fail(error, MILD_ERROR_RANGE, "more than %d feet", MILD_FEET_MAX);
+    if (*count == PLUGIN_FEET_MAX) {
+        return mild_fail(error, MILD_ERROR_RANGE, "more than %d feet", PLUGIN_FEET_MAX);
     }
     for (int f = 0; f < *count; f++) {
         if (feet[f].body == body) {

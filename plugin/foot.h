@@ -16,7 +16,7 @@ typedef struct {
     MildSole *sole; /* the raster, or one element in its middle (mild_sole_concentric) */
 } Foot;
 
-/* Finds the feet of an instance and makes their soles. feet: [MILD_FEET_MAX], zeroed. Writes their
+/* Finds the feet of an instance and makes their soles. feet: [PLUGIN_FEET_MAX], zeroed. Writes their
  * number, also on failure, when those made so far must be destroyed.
  *
  * compiling: bool, the compiler asks for the size of the state. Meshes have no vertices yet. A sole

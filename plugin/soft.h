@@ -9,13 +9,13 @@
 #include "plugin/mix.h"
 #include "plugin/rows.h"
 
-#define FOOT_ROWS (6 * MILD_FEET_MAX)
+#define FOOT_ROWS (6 * PLUGIN_FEET_MAX)
 
 typedef struct {
     PluginDef def;
-    Foot foot[MILD_FEET_MAX];
+    Foot foot[PLUGIN_FEET_MAX];
     int feet;
-    const MildSole *soles[MILD_FEET_MAX];
+    const MildSole *soles[PLUGIN_FEET_MAX];
     MildMap *map; /* NULL: level ground of one material */
     MildTerrain terrain;
     MildScratch *scratch;

@@ -58,16 +58,6 @@ static void faces_gather(const FootScratch *foot, const Memory *memory) {
     }
 }
 
-/* Multiplies what a slot's law makes of forces and masses. */
-static void slot_scale(const Slots *s, int i, double share) {
-    double *const scaled[] = {s->flat_stiffness, s->line_stiffness, s->mass_rate,     s->drag_rate,
-                              s->bed_stiffness,  s->power_force,    s->elastic_force, s->exit_drag,
-                              s->entry_drag,     s->strength,       s->k_drift,       s->b_drift};
-    for (size_t k = 0; k < sizeof scaled / sizeof *scaled; k++) {
-        scaled[k][i] *= share;
-    }
-}
-
 /* [m] Depth of a slot in the middle of the last step, by its present speed. */
 static double slot_middle(const Slots *s, int i, const Motion *now, double dt) {
     return s->depth[i] - 0.5 * dt * slot_velocity(s, i, now, SLOT_UNEVEN | SLOT_FACES).descent;

@@ -68,6 +68,15 @@ void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory,
     }
 }
 
+void slot_scale(const Slots *s, int i, double share) {
+    double *const scaled[] = {s->flat_stiffness, s->line_stiffness, s->mass_rate,     s->drag_rate,
+                              s->bed_stiffness,  s->power_force,    s->elastic_force, s->exit_drag,
+                              s->entry_drag,     s->strength,       s->k_drift,       s->b_drift};
+    for (size_t k = 0; k < sizeof scaled / sizeof *scaled; k++) {
+        scaled[k][i] *= share;
+    }
+}
+
 void slots_imprints(const FootScratch *foot, const Imprints *imprints, const Memory *memory,
                     const double *R) {
     const Slots *s = &foot->slot;
@@ -76,7 +85,14 @@ void slots_imprints(const FootScratch *foot, const Imprints *imprints, const Mem
         const int m = memory->material[e];
         const double lasting = 1.0 - s->recovery[i];
         const double m0 = memory->middle[e];
-        if (m >= 0 || !(lasting > 0.0)) {
+        if (m >= 0) {
+            continue;
+        }
+        if (!(lasting > 0.0)) { /* not pressed by it: nothing, until it has come out */
+            if (m == MATERIAL_FREE && m0 > 0.0) {
+                slot_scale(s, i, 0.0);
+                foot->slot_material[i] = MATERIAL_FREE;
+            }
             continue;
         }
         const ImprintElement here = {foot->point_x[e], foot->point_y[e], foot->pitch, R};

@@ -21,9 +21,13 @@ void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory,
 /* Clears the slopes when a foot has left uneven ground. On level ground nothing writes them. */
 void slots_level(const FootScratch *foot);
 
+/* Multiplies what a slot's law makes of forces and masses. */
+void slot_scale(const Slots *s, int i, double share);
+
 /* Sets the greatest depth of unloaded elements to that of the imprint under them. Below h0, within
  * an imprint, it is at least the depth whose unloading line reaches zero at the element, so that
- * moving sideways in an imprint never loads the element. R: rotation of the foot. */
+ * moving sideways in an imprint never loads the element. Elastic ground beside an imprint has no
+ * such depth: there the element gets no law. R: rotation of the foot. */
 void slots_imprints(const FootScratch *foot, const Imprints *imprints, const Memory *memory,
                     const double *R);
 

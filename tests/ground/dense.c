@@ -340,14 +340,15 @@ static double find_share(const Find *find, const DenseLaw *law, int directed, do
                          double *deepest) {
     const int code = find->memory.material[find->i];
     const int buried = code == MATERIAL_BURIED && m0 > 0.0;
-    const int lifted = code == MATERIAL_FREE && find->memory.middle[find->i] > 0.0;
+    const int lifted = code == MATERIAL_FREE && find->memory.middle[find->i] > 0.0 &&
+                       (find->faces || find->kit->ground->tiles > 0);
     if (law->recovery >= 1.0 && (buried || lifted)) {
         return 0.0;
     }
     if (buried) {
         *deepest = fmax(*deepest, fmax(m0 / (1.0 - law->recovery), m0 + ELEMENT_ELASTIC));
     }
-    return directed ? find->area : find->share;
+    return !find->faces ? 1.0 : directed ? find->area : find->share;
 }
 
 /* Janosi and Hanamoto: with the path j that the element has slid, the nearer material's strength
@@ -404,14 +405,14 @@ static void dense_element(Dense *d, const Find *find) {
         }
     }
     e->u0 = find_depth(find);
+    const double share =
+        find_share(find, &e->law, directed, e->u0 - 0.5 * d->dt * now[3], &deepest);
+    if (share == 0.0) {
+        memset(e, 0, sizeof *e);
+        d->elements--;
+        return;
+    }
     if (find->faces) {
-        const double share =
-            find_share(find, &e->law, directed, e->u0 - 0.5 * d->dt * now[3], &deepest);
-        if (share == 0.0) {
-            memset(e, 0, sizeof *e);
-            d->elements--;
-            return;
-        }
         law_times(&e->law, share);
     }
     memcpy(e->before, now, sizeof e->before);

@@ -402,10 +402,8 @@ static void a_buried_face_begins_without_force(void **state) {
 
 /* It lifts off in its imprint in plastic ground and is moved, still below the surface, to where the
  * ground is elastic: that has not been pressed down, so it carries nothing. */
-static void elastic_ground_beside_an_imprint_carries_nothing(void **state) {
-    (void)state;
-    const MildShape shape = surface_box(0.1, 0.1, 0.05);
-    MildSole *box = surface_make(&shape, 1, 0.02);
+static void beside_an_imprint(MildSole *box) {
+    const double below = mild_sole_surface_z(box) ? 0.05 : -mild_sole_z(box); /* [m] its face */
     MildMaterial sand = mild_material_default(), foam;
     sand.recovery = 0.0;
     mild_material_preset("foam45", &foam);
@@ -417,7 +415,7 @@ static void elastic_ground_beside_an_imprint_carries_nothing(void **state) {
     const MildPatch patch = {0.0, INFINITY, -INFINITY, INFINITY, 1};
     mild_terrain_add_patch(&kit.terrain, &patch, NULL);
     kit.input.position[0][0] = -0.5;
-    kit.input.position[0][2] = 0.051;
+    kit.input.position[0][2] = 0.001 + below;
     double pressed = 0.0;
     for (int s = 0; s < 45; s++) {
         kit.input.free_velocity[2] = s < 40 ? -1.0 : 0.4;
@@ -438,8 +436,23 @@ static void elastic_ground_beside_an_imprint_carries_nothing(void **state) {
         pressed, lifted, beside, kit.result.foot[0].force[2]);
     assert_true(pressed > 100.0 && lifted == 0.0 && beside == 0.0);
     assert_true(kit.result.foot[0].force[2] == 0.0);
+    /* It presses again once it has come out. */
+    kit.input.position[0][2] = 0.001 + below;
+    for (int s = 0; s < 10; s++) {
+        kit.input.free_velocity[2] = -1.0;
+        kit_solve(&kit);
+        kit_advance(&kit);
+    }
+    assert_true(kit.result.foot[0].force[2] > 1.0);
     kit_close(&kit);
     mild_sole_destroy(box);
+}
+
+static void elastic_ground_beside_an_imprint_carries_nothing(void **state) {
+    (void)state;
+    const MildShape shape = surface_box(0.1, 0.1, 0.05);
+    beside_an_imprint(surface_make(&shape, 1, 0.02));
+    beside_an_imprint(kit_plate(10, 10)); /* a plane sole */
 }
 
 /* A face that leans after touchdown: the share stays that of the touchdown, and another touchdown
