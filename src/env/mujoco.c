@@ -229,6 +229,9 @@ static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError
         step->done[i] = result->done;
         step->timeout[i] = result->timeout;
         step->valid[i] = result->valid;
+        if (step->cause) {
+            step->cause[i] = result->cause;
+        }
         stats->diverged += !result->valid;
         stats->paid += (double)result->reward;
         if (result->done) {

@@ -28,6 +28,7 @@ typedef struct {
  * are inflated boxes of zero width. */
 typedef struct {
     int body;
+    int on_base;        /* bool: of the base, or of a body welded to it */
     double center[3];   /* [m] body frame */
     double rotation[9]; /* [-] box -> body, row major */
     double half[3];     /* [m] */

@@ -208,6 +208,7 @@ MildStatus robot_read_shells(Robot *robot, MildError *error) {
             return mild_fail(error, MILD_ERROR_FORMAT, "%s: the body of geom '%s' needs a name",
                              robot->path, name);
         }
+        shell->on_base = robot->model->body_weldid[shell->body] == robot->base_body;
         memcpy(shell->center, m->geom_pos + 3 * id, sizeof shell->center);
         mju_quat2Mat(shell->rotation, m->geom_quat + 4 * id);
     }

@@ -126,6 +126,8 @@ double robot_sim_sole_clearance(RobotSim *sim, const MildTerrain *terrain);
 /* [m] Height of the lowest point of the shells above the undisturbed ground; negative when a shell
  * touches it. */
 double robot_sim_body_clearance(const RobotSim *sim, const MildTerrain *terrain);
+/* [m] The same of the shells of the base and of bodies welded to it; 1e9 without any. */
+double robot_sim_base_clearance(const RobotSim *sim, const MildTerrain *terrain);
 /* [m] Smallest lateral distance between mirrored knees, and between mirrored sole centres, in the
  * base's heading frame. Negative when the legs are crossed; 1e9 without such a pair. */
 double robot_sim_knee_distance(const RobotSim *sim);
