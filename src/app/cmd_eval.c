@@ -45,6 +45,7 @@ static void add_each(cJSON *o, const EvalTrial *each, int trials) {
         cJSON *trial = cJSON_CreateObject();
         cJSON_AddStringToObject(trial, "end", task_end_names[each[i].end]);
         cJSON_AddNumberToObject(trial, "seconds", each[i].seconds);
+        cJSON_AddNumberToObject(trial, "legs", each[i].legs);
         cJSON_AddItemToArray(list, trial);
     }
 }
@@ -85,7 +86,8 @@ static cJSON *row_json(const EvalRow *row, const EvalTrial *each) {
                   {"velocity_deviation", row->velocity_deviation},
                   {"cot_deviation", row->cot_deviation},
                   {"torque_deviation", row->torque_deviation},
-                  {"measured", row->measured}};
+                  {"measured", row->measured},
+                  {"legs", row->legs}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(o, values[i].name, values[i].value);
     }

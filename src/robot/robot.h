@@ -132,6 +132,9 @@ double robot_sim_base_clearance(const RobotSim *sim, const MildTerrain *terrain)
  * base's heading frame. Negative when the legs are crossed; 1e9 without such a pair. */
 double robot_sim_knee_distance(const RobotSim *sim);
 double robot_sim_foot_distance(const RobotSim *sim);
+/* [m] Least distance of two legs, between the capsules of [robot] legs; negative: overlap. 1e9
+ * without two legs. */
+double robot_sim_leg_distance(const RobotSim *sim);
 const MildScratch *robot_sim_scratch(const RobotSim *sim);
 const MildContactResult *robot_sim_contact(const RobotSim *sim);
 /* Input of the last step on soft ground. */

@@ -320,6 +320,7 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
     sim->data->ncon = 0;
     if (rigid) {
         accelerate(sim);
+        legs_push(sim, 0);
         t = split(sim, &phases->smooth, t);
         rigid_collide(sim, terrain);
         t = split(sim, &phases->ground, t);
@@ -328,6 +329,7 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
     } else {
         const int rows = limits_make(sim), held = limits_hold(sim);
         accelerate(sim);
+        legs_push(sim, held);
         t = split(sim, &phases->smooth, t);
         free_feet(sim);
         t = split(sim, &phases->map, t);

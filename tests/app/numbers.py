@@ -56,6 +56,7 @@ near("trials by their ends", sum(r["ends"].values()), trials, 0)
 near("trials one by one", len(r["each"]), trials, 0)
 for end, count in r["ends"].items():
     near(f"trials ended by {end}", count, sum(x["end"] == end for x in r["each"]), 0)
+near("least distance of the legs", r["legs"], min(x["legs"] for x in r["each"]), 0)
 near("seconds of the trials", mean(x["seconds"] for x in r["each"]), r["seconds"], 1e-9)
 near("trials ended by time", r["ends"]["time"], upright, 0)
 

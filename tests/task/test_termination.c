@@ -225,7 +225,8 @@ static void broken_joint(void **unused) {
             out += past ? 0.02 : 0;
             state.qpos[7 + joint] = limit[joint] + sign * out;
             step = step_from(&state, 10);
-        } while (past && sign * (rig.env->robot.qpos[7 + joint] - limit[joint]) < 0.2 && out < 1);
+        } while (past && out < 2 &&
+                 sign * (rig.env->robot.qpos[7 + joint] - limit[joint]) < TASK_JOINT_BROKEN);
         expect_cause(robot_joint_name(robot, joint), step, past, TASK_END_joint);
     }
     rig_close(&rig);

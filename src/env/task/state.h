@@ -24,7 +24,8 @@ typedef enum { TASK_ENDS(TASK_END_ENUM) TASK_END_COUNT } TaskEnd;
 /* [TASK_END_COUNT] */
 extern const char *const task_end_names[];
 
-#define TASK_JOINT_BROKEN 0.2 /* [rad] a joint's limit gives way by less */
+#define TASK_JOINT_BROKEN                                                                          \
+    0.5 /* [rad] soft limits of light joints give way by half of it in a walk */
 
 #define TASK_FRAMES 6 /* H + 1, newest last (paper, H = 5) */
 

@@ -74,6 +74,7 @@ typedef struct {
     double drift_forward;    /* [m] magnitude of its part along the robot's heading */
     double drift_left;       /* [m] and across it */
     double energy;           /* [J] integral |tau . qd| dt */
+    double legs;             /* [m] least distance of two legs in all trials; negative: overlap */
     double base_oscillation; /* [m] peak to peak of the base height over the steady part */
     double seconds;          /* [s] mean time until a fall or the end */
 } EvalRow;
@@ -82,6 +83,7 @@ typedef struct {
 typedef struct {
     TaskEnd end;
     double seconds; /* [s] until then */
+    double legs;    /* [m] least distance of two legs; NaN without two */
 } EvalTrial;
 
 /* Rows of trials. */

@@ -90,7 +90,8 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
                      .sideways = eval->sideways,
                      .turn = eval->turn,
                      .push = eval->push,
-                     .trials = trials};
+                     .trials = trials,
+                     .legs = NAN};
     snprintf(row->ground, sizeof row->ground, "%s", ground);
     for (int i = 0; i < trials; i++) {
         Measure *m = &measures[i];
@@ -99,6 +100,7 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
         row->ends[ends[i]]++;
         row->energy += m->energy / trials;
         row->seconds += m->time / trials;
+        row->legs = fmin(row->legs, measure_legs(m)); /* of a number and NaN the number */
         row->torque_max += m->torque_max / trials;
         torque_square += m->torque_max * m->torque_max / trials;
         apex += m->apex_sum;
