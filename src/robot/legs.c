@@ -113,26 +113,27 @@ static LegCapsule capsule_of(const RobotSim *sim, int c) {
     return capsule;
 }
 
-static LegGap gap_of(const RobotSim *sim, int pair) {
+static void all_capsules(const RobotSim *sim, LegCapsule *capsule) {
+    for (int c = 0; c < sim->robot->capsules; c++) {
+        capsule[c] = capsule_of(sim, c);
+    }
+}
+
+static LegGap gap_of(const RobotSim *sim, const LegCapsule *capsule, int pair) {
     const int *of = sim->robot->leg_pair[pair];
-    const LegCapsule a = capsule_of(sim, of[0]), b = capsule_of(sim, of[1]);
     const double *turn = robot_sim_base_rotation(sim);
     const double across[3] = {turn[1], turn[4], turn[7]};
     LegGap gap = {.gap = LEGS_APART};
-    legs_gap(&a, &b, across, &gap);
+    legs_gap(&capsule[of[0]], &capsule[of[1]], across, &gap);
     return gap;
 }
 
-static int is_near(const RobotSim *sim, int pair) {
-    const int *of = sim->robot->leg_pair[pair];
-    const LegCapsule a = capsule_of(sim, of[0]), b = capsule_of(sim, of[1]);
-    return legs_near(&a, &b);
-}
-
 double robot_sim_leg_distance(const RobotSim *sim) {
+    LegCapsule capsule[ROBOT_CAPSULES_MAX];
     double least = LEGS_APART;
+    all_capsules(sim, capsule);
     for (int pair = 0; pair < sim->robot->leg_pairs; pair++) {
-        least = fmin(least, gap_of(sim, pair).gap);
+        least = fmin(least, gap_of(sim, capsule, pair).gap);
     }
     return least;
 }
@@ -172,9 +173,12 @@ static void push_pair(RobotSim *sim, int pair, const LegGap *gap, int held) {
 }
 
 void legs_push(RobotSim *sim, int held) {
+    LegCapsule capsule[ROBOT_CAPSULES_MAX];
+    all_capsules(sim, capsule);
     for (int pair = 0; pair < sim->robot->leg_pairs; pair++) {
-        if (is_near(sim, pair)) {
-            const LegGap gap = gap_of(sim, pair);
+        const int *of = sim->robot->leg_pair[pair];
+        if (legs_near(&capsule[of[0]], &capsule[of[1]])) {
+            const LegGap gap = gap_of(sim, capsule, pair);
             if (gap.gap < LEGS_NEAR) {
                 push_pair(sim, pair, &gap, held);
             }
