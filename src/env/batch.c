@@ -347,6 +347,7 @@ static EnvsStep step_from(const EnvsStep *step, const TaskShape *shape, size_t f
                       .done = flag_from(step->done, first),
                       .timeout = flag_from(step->timeout, first),
                       .valid = flag_from(step->valid, first),
+                      .cause = flag_from(step->cause, first),
                       .next = view_from(&step->next, shape, first)};
 }
 

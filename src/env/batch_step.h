@@ -291,10 +291,11 @@ WARP_FN void env_measure(const EnvsArrays *all, long robot, int contact, EnvWork
                              all->contact.foot[robot * feet + LANE(l)].depth_mean, reading);
         }
     }
-    const Real clearance = engine_body_clearance_on(model, work, &ground);
+    const EngineClearance clearance = engine_clearance_on(model, work, &ground);
     EACH_LANE(l) {
         if (LANE(l) == 0) {
-            reading->body_clearance = clearance;
+            reading->body_clearance = clearance.body;
+            reading->base_clearance = clearance.base;
         }
         if (LANE(l) == 3) {
             const MapSpot spot = engine_spot(&ground, work);
@@ -558,6 +559,9 @@ MILD_HD void env_end(const EnvsArrays *all, const EnvsStep *call, long robot) {
         call->done[robot] = step.done;
         call->timeout[robot] = step.timeout;
         call->valid[robot] = step.valid;
+        if (call->cause) {
+            call->cause[robot] = step.cause;
+        }
         all->fresh[robot] = step.done;
         env_count(own->tally, &step);
     }

@@ -229,6 +229,9 @@ static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError
         step->done[i] = result->done;
         step->timeout[i] = result->timeout;
         step->valid[i] = result->valid;
+        if (step->cause) {
+            step->cause[i] = result->cause;
+        }
         stats->diverged += !result->valid;
         stats->paid += (double)result->reward;
         if (result->done) {
@@ -275,6 +278,7 @@ void envs_read_sample(const TaskEnv *env, const RobotSim *sim, const double *tor
     sample->feet = env->shape.feet;
     memcpy(sample->base, qpos, sizeof sample->base);
     sample->above = qpos[2] - mild_terrain_height_at(task_env_terrain(env), qpos[0], qpos[1]);
+    sample->legs = robot_sim_leg_distance(sim);
     memcpy(sample->quaternion, qpos + 3, sizeof sample->quaternion);
     memcpy(sample->mass_center, robot_sim_mass_center(sim), sizeof sample->mass_center);
     memcpy(sample->torque, torque, joints * sizeof *torque);

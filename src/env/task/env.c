@@ -121,6 +121,7 @@ void task_env_read(const TaskEnv *env, const RobotSim *sim, RobotReading *readin
         reading->foot[f].depth_mean = foot->result.depth_mean;
     }
     reading->body_clearance = robot_sim_body_clearance(sim, terrain);
+    reading->base_clearance = robot_sim_base_clearance(sim, terrain);
     reading->knee_distance = robot_sim_knee_distance(sim);
     reading->foot_distance = robot_sim_foot_distance(sim);
     reading->above = at[2] - mild_terrain_height_at(terrain, at[0], at[1]);
