@@ -501,9 +501,9 @@ int cmd_eval(int argc, char **argv) {
             "each: trials without a fall, measured speed with its 95 % interval, cost of "
             "transport (COT), largest torque of a joint, clearance of the swinging foot "
             "above the undisturbed ground, deepest element (sink) and way of the sole "
-            "(drift) in a stance, power of the joints, and what ended the trials that fell. A - is what cannot be measured, "
-            "such as the speed of trials that fell within 2.5 s; the JSON has null there. The "
-            "sensors have the noise "
+            "(drift) in a stance, power of the joints, and what ended the trials that fell. A - is "
+            "what cannot be measured, such as the speed of trials that fell within 2.5 s; the "
+            "JSON has null there. The sensors have the noise "
             "and delay of training. The robot has its nominal parameters, and nobody pushes "
             "it, without --randomize or --push.",
         .options = options,

@@ -29,8 +29,8 @@ MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *no
     }
 }
 
-/* Picks the loop compiled for the curves of the ground under the foot. A line is a cone of which all
- * numbers but the line's are 0: one loop does for both. */
+/* Picks the loop compiled for the curves of the ground under the foot. A line is a cone whose other
+ * numbers are 0: one loop does for both. */
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);

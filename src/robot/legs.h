@@ -1,12 +1,13 @@
 /* Contact between two legs: the same text for MuJoCo's robots (robot/legs.c) and for the batch
- * engine's (robot/engine/legs.h). A leg is a few capsules. Two capsules of different legs push each
- * other along their normal, without friction, with
+ * engine's (robot/engine/legs.h). A leg is a few capsules. Two capsules of different legs push
+ * each other along their normal, without friction, with
  *
  *     F = max(0, -(v + r)/(dt (A + 1/m))),   r = d/dt apart, LEGS_RETURN d/dt in overlap:
  *
- * d is the distance of their surfaces, v its rate, A the inverse inertia along the normal, so that F
- * changes v by dt A F. The robot's mass m bounds the push where no joint can part them, A = 0. Legs apart may just come to touch in a step. Legs in overlap stop, and take
- * back a share of it, less than what brought them there: the contact only takes energy, at any dt.
+ * d is the distance of their surfaces, v its rate, A the inverse inertia along the normal, so that
+ * F changes v by dt A F. The robot's mass m bounds the push where no joint can part them, A = 0.
+ * Legs apart may just come to touch in a step. Legs in overlap stop, and take back a share of it,
+ * less than what brought them there: the contact only takes energy, at any dt.
  * Other forces of the step act beside it; a steady force P between two legs holds them at
  * d = -P dt^2 A/LEGS_RETURN. The ground is solved after F and counts with it. */
 #ifndef ROBOT_LEGS_H
