@@ -688,15 +688,15 @@ static int open_arrays(void) {
     web.place = aligned_alloc(16, (sizeof *web.place + 15) / 16 * 16);
     all->material = calloc(labels, sizeof *all->material);
     all->map_origin = calloc(2, sizeof *all->map_origin);
-    all->fresh = calloc(2, 1);
-    all->rigid = all->fresh ? all->fresh + 1 : NULL;
+    all->reset = calloc(2, 1);
+    all->rigid = all->reset ? all->reset + 1 : NULL;
     float *block = contact->position =
         calloc((3 + 9 + 6 + 6) * feet + 36 * feet * feet + 1, sizeof *block);
     contact->foot = calloc(feet, sizeof *contact->foot);
     web.shown = calloc(2 * (size_t)WEB_WINDOW * WEB_WINDOW, sizeof *web.shown);
     web.hills = calloc((size_t)WEB_HILLS * WEB_HILLS, sizeof *web.hills);
     if (!all->env || !web.robot || !web.place || !all->material || !all->map_origin ||
-        !all->fresh || !contact->position || !contact->foot || !web.shown || !web.hills) {
+        !all->reset || !contact->position || !contact->foot || !web.shown || !web.hills) {
         return 0;
     }
     memset(web.place, 0, sizeof *web.place);
@@ -724,7 +724,7 @@ static void close_all(void) {
                             web.place,
                             web.all.material,
                             web.all.map_origin,
-                            web.all.fresh,
+                            web.all.reset,
                             web.all.contact.position,
                             web.all.contact.foot,
                             web.shown,

@@ -221,7 +221,7 @@ static MildStatus ablate(Eval *e, InsideLog *log, MildError *error) {
 /* With --latent or --ablate: rows whose controller is looked into. */
 static MildStatus evaluate_inside(Eval *e, FILE *table, MildError *error) {
     InsideLog log = {.feet = robot_feet(e->context.robot)};
-    const EvalWatch watch = {inside_decided, &log};
+    const EvalCallback watch = {inside_decided, &log};
     Sheet sheet = {0};
     MildStatus status = learned_watch(&e->context.mover, &log.inside, error);
     if (status != MILD_OK) {

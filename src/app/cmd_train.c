@@ -131,11 +131,11 @@ static MildStatus train(const Command *command, MildError *error) {
                              .config = command->config_text,
                              .version = build_version(),
                              .note = command->note};
-    const TrainWatch watch = {.self = &display,
-                              .resumed = print_resumed,
-                              .passed_over = print_passed_over,
-                              .stop = stop,
-                              .iterated = display_take};
+    const TrainCallbacks watch = {.self = &display,
+                                  .resumed = print_resumed,
+                                  .passed_over = print_passed_over,
+                                  .stop = stop,
+                                  .iterated = display_take};
     if (leads && ranks_count(command->ranks) > 1) {
         const int threads = command->def.train.threads;
         printf("%d processes, %d threads each\n", ranks_count(command->ranks),

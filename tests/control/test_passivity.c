@@ -230,7 +230,7 @@ static Run run(const char *ground, double speed, double seconds) {
     TaskView none = {0};
     ControllerRow row = {&controller, 0};
     TaskDrive drive = {controller_row_torque, &row};
-    TaskProbe probe = {see_nothing, NULL, &drive};
+    TaskCallback probe = {see_nothing, NULL, &drive};
     Run out = {.z_low = 1e9};
     task_env_init(env, &def, robot, 1, 0);
     env->command_frozen = 1;

@@ -336,9 +336,9 @@ static void what_is_not_there_is_refused(void **state) {
     def.newton = 0;
     refused("grass", 1, 1, "task.newton = 0");
     def.newton = 1;
-    def.print_tiles = 8;
+    def.imprint_tiles = 8;
     refused("grass", 1, 1, "terrain.memory");
-    def.print_tiles = 0;
+    def.imprint_tiles = 0;
 }
 
 int main(void) {

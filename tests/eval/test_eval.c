@@ -283,7 +283,7 @@ static void a_row_is_what_its_trials_did(void **state) {
         measure_start(&measure[i], longer.physics_dt);
         for (int k = 0; k < 300; k++) {
             float action[SA01_JOINTS];
-            const TaskProbe probe = {measure_step, &measure[i], NULL};
+            const TaskCallback probe = {measure_step, &measure[i], NULL};
             controller.act(controller.self, 1, &env, action);
             const TaskStep step = task_env_step(env, &longer, robot, sim, action, 0, &none, &probe);
             assert_false(step.done && !step.timeout);
@@ -444,7 +444,7 @@ static void legs_do_not_cross(void **state) {
     Scene scene;
     Pool *pool = pool_create(1);
     Drawn drawn = {mj_makeData(robot_visual_model(robot)), 1};
-    const EvalWatch watch = {see_legs, &drawn};
+    const EvalCallback watch = {see_legs, &drawn};
     const double speed = 0;
     assert_int_equal(controller_learned(POLICY, robot, pool, 2, &controller, &error), MILD_OK);
     assert_int_equal(scene_make(&scene, "foam45", 2, &error), MILD_OK);

@@ -41,7 +41,7 @@ static void note_step(void *context, const TaskEnv *env, const RobotSim *sim,
 
 /* One policy step, traced. */
 static TaskStep traced_step(const float *action) {
-    const TaskProbe probe = {note_step, NULL, NULL};
+    const TaskCallback probe = {note_step, NULL, NULL};
     trace.count = 0;
     task_env_load(rig.env, rig.sim);
     note_state();
@@ -89,7 +89,7 @@ static void drive(void **unused) {
     open_with_dt(0.0025);
     int calls = 0;
     const TaskDrive asked = {ask_torque, &calls};
-    const TaskProbe probe = {note_step, NULL, &asked};
+    const TaskCallback probe = {note_step, NULL, &asked};
     float action[SA01_JOINTS] = {0};
     trace.count = 0;
     task_env_step(rig.env, &rig.def, robot, rig.sim, action, 0, &rig.view, &probe);

@@ -67,7 +67,7 @@ static void run(const ExperimentDef *def) {
                             .config = "[train]\nrobot = sa01\n",
                             .version = "0",
                             .note = "test"};
-    const TrainWatch watch = {.iterated = keep};
+    const TrainCallbacks watch = {.iterated = keep};
     TrainRun *run = train_run_open(&of, &watch, &error);
     if (!run) {
         fail_msg("%s", error.text);

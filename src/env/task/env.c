@@ -20,7 +20,7 @@ static size_t front_bytes(const TaskShape *shape, uint32_t held) {
 size_t task_env_bytes(const TaskDef *def, const Robot *robot) {
     TaskShape shape = task_shape(robot);
     return front_bytes(&shape, task_frames_held(def)) +
-           mild_ground_bytes_imprints(robot_soles(robot), shape.feet, def->print_tiles) +
+           mild_ground_bytes_imprints(robot_soles(robot), shape.feet, def->imprint_tiles) +
            (def->motors ? def->motors->bytes : 0);
 }
 
@@ -61,7 +61,7 @@ void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_
     task_env_init_head(env, def, shape, seed, index);
     task_env_rest(env)->gains = gains;
     mild_ground_init_imprints(task_env_ground(env), robot_soles(robot), env->shape.feet,
-                              def->print_tiles);
+                              def->imprint_tiles);
 }
 
 /* ---- the robot's state ---- */
@@ -262,7 +262,7 @@ static void joint_torque(TaskEnv *env, const TaskDef *def, const TaskMotor *moto
 /* Physics steps of one policy period, with the three latencies. Returns 1 when the simulation
  * diverged. */
 static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                       TaskSensors *sensors, const TaskProbe *probe) {
+                       TaskSensors *sensors, const TaskCallback *probe) {
     int steps = (int)(TASK_PERIOD / def->physics_dt + 0.5);
     const RobotTable *table = robot_table(robot);
     const TaskRest *rest = rest_of(env);
@@ -302,7 +302,7 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
 
 TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                        const float *action, int auto_reset, const TaskView *view,
-                       const TaskProbe *probe) {
+                       const TaskCallback *probe) {
     TaskSensors sensors = {0};
     RobotReading reading = {.above = 0};
     task_begin_step(env, def, action);

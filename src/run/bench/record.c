@@ -57,7 +57,7 @@ static void record_torque(void *context, const TaskEnv *env, const RobotSim *sim
 static int walk_step(Walk *walk, ReplayPeriod *period) {
     float action[ROBOT_JOINTS_MAX];
     TaskView none = {0};
-    TaskProbe probe = {record_torque, walk, NULL};
+    TaskCallback probe = {record_torque, walk, NULL};
     if (period) {
         MildGround *ground = task_env_ground(walk->env);
         period->state = task_env_state(walk->env);

@@ -27,7 +27,7 @@ typedef struct {
 typedef struct {
     void (*decided)(void *context, const EvalDecision *decision);
     void *context;
-} EvalWatch;
+} EvalCallback;
 
 typedef struct {
     double speed;    /* [m/s] commanded, forward */
@@ -40,7 +40,7 @@ typedef struct {
     uint64_t seed;  /* trial k uses stream k */
     FILE *stances;  /* a row of CSV for each stance of each trial; NULL: none */
     /* by MuJoCo, of one row; NULL: none */
-    const EvalWatch *watch;
+    const EvalCallback *watch;
     FILE *actions; /* a row of CSV for each decision, see eval/actions.h */
     FILE *track;   /* one for each policy step of each trial, see eval/track.h */
 } EvalDef;

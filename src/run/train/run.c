@@ -16,7 +16,7 @@ enum { COLUMNS_FIXED = 25, COLUMNS = COLUMNS_FIXED + TASK_REWARD_COUNT };
 
 struct TrainRun {
     TrainRunDef def;
-    TrainWatch watch;
+    TrainCallbacks watch;
     Trainer *trainer;
     Log *log;
     FileLock lock; /* on the folder, so that two processes do not mix two runs */
@@ -409,7 +409,7 @@ static MildStatus build(TrainRun *run, MildError *error) {
     return agree(run, status, error);
 }
 
-TrainRun *train_run_open(const TrainRunDef *def, const TrainWatch *watch, MildError *error) {
+TrainRun *train_run_open(const TrainRunDef *def, const TrainCallbacks *watch, MildError *error) {
     TrainRun *run = calloc(1, sizeof *run);
     MildStatus status = run ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     if (ranks_agree(def->ranks, status, error) != MILD_OK || !run) {
