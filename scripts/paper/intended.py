@@ -14,10 +14,12 @@ not trained again. FOLDER/needed.json has the result.
 
 import argparse
 import configparser
+import hashlib
 import json
 import os
 import pathlib
 import subprocess
+import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -75,6 +77,16 @@ def read_keys(path):
     return {f"{s}.{k}": " ".join(v.split()) for s in parser.sections() for k, v in parser[s].items()}
 
 
+def fail(text):
+    sys.exit(f"intended.py: {text}")
+
+
+def run_mild(*words):
+    done = subprocess.run([MILD, *words], capture_output=True, text=True)
+    if done.returncode != 0:
+        fail(f"mild {words[0]}: {(done.stderr.strip() or 'no message').splitlines()[-1]}")
+
+
 def same(left, right):
     """Bool: two values are the same text or the same numbers."""
     try:
@@ -104,11 +116,17 @@ class Search:
         self.end = time.time() + seconds
         self.longest = 0.0
         self.all = sentences()
+        self.keys = hashlib.sha256(json.dumps(self.all, sort_keys=True).encode()).hexdigest()[:16]
         self.file = self.folder / "tests.json"
-        self.tests = json.loads(self.file.read_text()) if self.file.exists() else []
+        try:
+            self.tests = json.loads(self.file.read_text()) if self.file.exists() else []
+        except ValueError as error:
+            fail(f"{self.file}: {error}; remove it, or give another folder")
 
     def known(self, ours):
-        return next((t for t in self.tests if set(t["ours"]) == set(ours) and t["seed"] == self.seed), None)
+        """The training of these sentences by the same keys; a change of configs/*.ini makes it another."""
+        wanted = set(ours), self.seed, self.keys
+        return next((t for t in self.tests if (set(t["ours"]), t["seed"], t.get("keys")) == wanted), None)
 
     def train(self, ours):
         options = [f"--{key}={pair[0 if name in ours else 1].replace(' ', ',')}"
@@ -116,12 +134,10 @@ class Search:
         with tempfile.TemporaryDirectory() as work:
             run, result = f"{work}/run", f"{work}/eval.json"
             common = [f"--train.seed={self.seed}", *options]
-            subprocess.run([MILD, "train", "--config", str(ROOT / "configs/models.ini"), "--out", run, *common],
-                           check=True, capture_output=True)
-            subprocess.run([MILD, "eval", "--policy", f"{run}/policy.safetensors", "--config", f"{run}/config.ini", "--ground",
-                            "rigid,rubber,foam45,sand_loose", "--speed", "0.3,0.6", "--trials", "10", "--train.robots=batch",
-                            "--json", result],
-                           check=True, capture_output=True)
+            run_mild("train", "--config", str(ROOT / "configs/models.ini"), "--out", run, *common)
+            run_mild("eval", "--policy", f"{run}/policy.safetensors", "--config", f"{run}/config.ini", "--ground",
+                     "rigid,rubber,foam45,sand_loose", "--speed", "0.3,0.6", "--trials", "10", "--train.robots=batch",
+                     "--json", result)
             rows = json.loads(pathlib.Path(result).read_text())["rows"]
         upright = sum(row["success"] for row in rows) / sum(row["trials"] for row in rows)
         gaps = [abs(row["velocity"] - row["speed"]) for row in rows if row["velocity"] is not None]
@@ -138,13 +154,15 @@ class Search:
                 break
             with ThreadPoolExecutor(self.jobs) as pool:
                 for test in pool.map(self.train, new[first:first + self.jobs]):
-                    self.tests.append(test)
+                    self.tests.append({**test, "keys": self.keys})
                     lack = sorted(set(self.all) - set(test["ours"]))
                     gap = "-" if test["gap"] is None else f"{test['gap']:.3f}"
                     print(f"{'walks ' if test['walks'] else 'does not'} {test['upright']:.2f} {gap} "
                           f"with {len(test['ours'])} of {len(self.all)}; not: {', '.join(lack)}", flush=True)
             self.longest = max(self.longest, time.time() - begin)
-            self.file.write_text(json.dumps(self.tests, indent=1) + "\n")
+            part = self.file.with_suffix(".part")
+            part.write_text(json.dumps(self.tests, indent=1) + "\n")
+            part.replace(self.file)
         return [known["walks"] if (known := self.known(s)) else None for s in sets]
 
     def reduce(self):
@@ -177,7 +195,7 @@ class Search:
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder")
+    parser.add_argument("folder", nargs="?", help="for tests.json and needed.json")
     parser.add_argument("--jobs", type=int, default=3, help="trainings at a time on the GPU")
     parser.add_argument("--seconds", type=float, default=1e9, help="no training begins that would not end by then")
     parser.add_argument("--seed", type=int, default=1)
@@ -187,11 +205,16 @@ def main():
         for name, keys in sentences().items():
             print(name + ": " + "; ".join(f"{key} = {ours} (the paper: {paper})" for key, (ours, paper) in keys.items()))
         return
+    if not asked.folder:
+        parser.error("give a folder")
+    if not os.access(MILD, os.X_OK):
+        fail(f"{MILD}: no such program; make build, or set MILD")
     pathlib.Path(asked.folder).mkdir(parents=True, exist_ok=True)
     search = Search(asked.folder, asked.jobs, asked.seconds, asked.seed)
     walks = search.walk([sorted(search.all), []])
     if not walks[0] or walks[1]:
-        raise SystemExit("intended.py: " + ("configs/models.ini does not walk" if not walks[0] else "the paper's training walks as it is"))
+        fail("the time is over" if walks[0] is None else "configs/models.ini does not walk" if not walks[0] else
+             "the paper's training walks as it is")
     needed, minimal = search.reduce()
     result = {"needed": needed, "minimal": minimal, "trainings": len(search.tests), "sentences": len(search.all)}
     (search.folder / "needed.json").write_text(json.dumps(result, indent=1) + "\n")

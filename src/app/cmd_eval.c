@@ -195,7 +195,7 @@ static MildStatus evaluate_rows(Eval *e, FILE *table, MildError *error) {
 /* The means of all trials with the whole controller take the place of a part of it. */
 static MildStatus ablate(Eval *e, InsideLog *log, MildError *error) {
     const LearnedInside *in = log->inside;
-    const size_t width = (size_t)(in->latent + in->estimates + in->theta);
+    const size_t width = (size_t)in->latent + (size_t)in->estimates + (size_t)in->theta;
     double *sum = calloc(width, sizeof *sum);
     float *means = calloc(width, sizeof *means);
     MildStatus status = MILD_OK;

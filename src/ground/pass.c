@@ -182,10 +182,11 @@ typedef double Moments[3][3][6];
 /* Moments of three entries at a time, which are as many sums as the registers hold. */
 static void moments(const Slots *s, int end, const double *a, const double *b, const double *c,
                     double sums[3][6]) {
-    if (end < VECTOR_LANES) {
-        return; /* never, as in foot_frictions */
+    if (end < VECTOR_LANES) { /* never, as in foot_frictions */
+        memset(sums, 0, 3 * sizeof *sums);
+        return;
     }
-    end &= -VECTOR_LANES; /* which it is: for the compiler, which does not see the caller */
+    end &= -VECTOR_LANES; /* changes nothing; the compiler sees that no element is left over */
     const double *xs = s->x, *ys = s->y;
     double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0;
     double b0 = 0.0, b1 = 0.0, b2 = 0.0, b3 = 0.0, b4 = 0.0, b5 = 0.0;

@@ -35,6 +35,8 @@ def main():
     names = sorted(intended.sentences())
     assert len(names) > 20 and "the clock is observed" in names
     assert not any(key.startswith(intended.COMMON) for keys in intended.sentences().values() for key in keys)
+    known = intended.read_keys(path.parents[2] / "configs/default.ini")
+    assert all(key in known for keys in intended.SENTENCES.values() for key in keys)
     printed, meant = (intended.read_keys(path.parents[2] / "configs" / name) for name in ("paper.ini", "paper_intended.ini"))
     assert {key for key in {*printed, *meant} if printed.get(key) != meant.get(key)} == {"reward.feet_clearance"}
     assert float(meant["reward.feet_clearance"]) == -float(printed["reward.feet_clearance"])
@@ -51,6 +53,9 @@ def main():
             assert all(set(needed) & set(any_of) for any_of in needs)
             most = max(most, len(search.tests))
             assert json.loads(search.file.read_text()) == search.tests
+            search.file.write_text(json.dumps([{**t, "keys": "others"} for t in search.tests]))
+            assert judged(folder, needs).known(names) is None  # trained with other keys
+            search.file.write_text(json.dumps(search.tests))
             again = judged(folder, needs)  # everything is known: nothing is trained
             again.train = None
             assert again.reduce() == (needed, minimal)

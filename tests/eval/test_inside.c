@@ -135,7 +135,7 @@ static void the_numbers_are_the_policys(void **state) {
     const EvalCallback watch = {inside_decided, &log};
     const EvalDef eval = {.speed = 0.5, .trials = TRIALS, .seconds = 0.2, .watch = &watch};
     Controller controller = {&keeping, "keeping", keeping_act, NULL, NULL, NULL};
-    double sum[LATENT + SA01_ESTIMATES] = {0};
+    double sum[LATENT + SA01_ESTIMATES + 2] = {0}; /* theta1, theta2 */
     Scene scene;
     EvalRow row;
     char *text = NULL, *at;
@@ -152,12 +152,14 @@ static void the_numbers_are_the_policys(void **state) {
     float actions[TRIALS * SA01_JOINTS], estimates[TRIALS][SA01_ESTIMATES], latent[TRIALS][LATENT];
     policy_act(policy, NULL, TRIALS, keeping.history[0], actions, estimates[0], latent[0]);
     at = text;
-    double z0 = 0, velocity = 0;
+    double z0 = 0, velocity = 0, theta[2] = {0};
     for (int k = 0; k < 20; k++) {
         for (int i = 0; i < TRIALS; i++) {
             const Line line = read_line(&at);
             z0 += line.value[Z] / (20 * TRIALS);
             velocity += 2 * line.value[ESTIMATES] / (20 * TRIALS);
+            theta[0] += line.value[THETA] / (20 * TRIALS);
+            theta[1] += line.value[THETA + 1] / (20 * TRIALS);
             for (int j = 0; k == 19 && j < SA01_ESTIMATES; j++) {
                 const double scale = j < 3 ? 2 : j < 9 ? 1 : 5;
                 assert_true(fabs(line.value[ESTIMATES + j] * scale - (double)estimates[i][j]) <
@@ -168,11 +170,14 @@ static void the_numbers_are_the_policys(void **state) {
             }
         }
     }
-    float means[LATENT + SA01_ESTIMATES];
+    float means[LATENT + SA01_ESTIMATES + 2];
     inside_means(&log, means);
     assert_int_equal(log.decisions, 20 * TRIALS);
     assert_true(fabs((double)means[0] - z0) < 1e-4);
     assert_true(fabs((double)means[LATENT] - velocity) < 1e-4);
+    for (int i = 0; i < 2; i++) {
+        assert_true(fabs((double)means[LATENT + SA01_ESTIMATES + i] - theta[i]) < 1e-4);
+    }
     policy_destroy(policy);
     free(text);
     pool_destroy(pool);

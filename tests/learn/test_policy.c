@@ -199,7 +199,6 @@ static void test_answers(void **state) {
     policy_destroy(policy);
 }
 
-/* theta1 = 1, theta2 = 0 at the start: the modulated latent is the encoder's mu. */
 /* The spread of a new policy's weights is 1/sqrt(inputs), in each network's last layer less. */
 static void test_initial_spread(void **state) {
     (void)state;
@@ -227,6 +226,7 @@ static void test_initial_spread(void **state) {
     policy_destroy(policy);
 }
 
+/* theta1 = 1, theta2 = 0 at the start: the modulated latent is the encoder's mu. */
 static void test_modulation_starts_at_identity(void **state) {
     (void)state;
     for (int per_dimension = 0; per_dimension < 2; per_dimension++) {

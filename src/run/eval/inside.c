@@ -54,6 +54,12 @@ static void print_row(const InsideLog *log, const EvalDecision *decision) {
     fprintf(log->csv, "\n");
 }
 
+static void add_numbers(double *sum, const float *numbers, int count) {
+    for (int i = 0; i < count; i++) {
+        sum[i] += (double)numbers[i];
+    }
+}
+
 void inside_decided(void *context, const EvalDecision *decision) {
     InsideLog *log = context;
     const LearnedInside *in = log->inside;
@@ -62,14 +68,10 @@ void inside_decided(void *context, const EvalDecision *decision) {
     const float *estimates = in->rows.estimates + trial * (size_t)in->estimates;
     const float *theta = in->rows.theta + trial * (size_t)in->theta;
     log->decisions++;
-    for (int j = 0; log->sum && j < in->latent; j++) {
-        log->sum[j] += (double)latent[j];
-    }
-    for (int i = 0; log->sum && i < in->estimates; i++) {
-        log->sum[in->latent + i] += (double)estimates[i];
-    }
-    for (int i = 0; log->sum && i < in->theta; i++) {
-        log->sum[in->latent + in->estimates + i] += (double)theta[i];
+    if (log->sum) {
+        add_numbers(log->sum, latent, in->latent);
+        add_numbers(log->sum + in->latent, estimates, in->estimates);
+        add_numbers(log->sum + in->latent + in->estimates, theta, in->theta);
     }
     if (log->csv) {
         print_row(log, decision);
