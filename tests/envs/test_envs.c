@@ -6,7 +6,7 @@
 #include "run/envs/envs.h"
 #include "sa01.h"
 
-enum { ENVS = 5, STEPS = 60 };
+enum { ENVS = 5, STEPS = 100 };
 
 static const char *const keys[] = {"train.envs=5", "train.threads=2", "train.seed=7",
                                    "terrain.kind=waves", "train.robots=mujoco"};
@@ -54,7 +54,7 @@ static void close_plain(Plain *plain) {
 
 static void draw_actions(int step, float action[ENVS][SA01_JOINTS]) {
     for (int i = 0; i < ENVS * SA01_JOINTS; i++) {
-        action[i / SA01_JOINTS][i % SA01_JOINTS] = (float)(1.5 * sin(0.3 * step + i));
+        action[i / SA01_JOINTS][i % SA01_JOINTS] = (float)(2.5 * sin(0.3 * step + i));
     }
 }
 
