@@ -221,13 +221,13 @@ static MildStatus ablate(Eval *e, InsideLog *log, MildError *error) {
 /* With --latent or --ablate: rows whose controller is looked into. */
 static MildStatus evaluate_inside(Eval *e, FILE *table, MildError *error) {
     InsideLog log = {.feet = robot_feet(e->context.robot)};
-    const EvalCallback watch = {inside_decided, &log};
+    const EvalCallback callback = {inside_decided, &log};
     Sheet sheet = {0};
     MildStatus status = learned_watch(&e->context.mover, &log.inside, error);
     if (status != MILD_OK) {
         return status;
     }
-    e->eval.watch = &watch;
+    e->eval.callback = &callback;
     status = e->ablate ? ablate(e, &log, error) : MILD_OK;
     if (status == MILD_OK && e->latent) {
         status = sheet_open(&sheet, error);
@@ -239,7 +239,7 @@ static MildStatus evaluate_inside(Eval *e, FILE *table, MildError *error) {
     if (status == MILD_OK) {
         status = evaluate_rows(e, table, error);
     }
-    e->eval.watch = NULL;
+    e->eval.callback = NULL;
     return sheet_close(&sheet, e->latent, status, error);
 }
 

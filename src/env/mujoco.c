@@ -173,12 +173,12 @@ static TaskStep step_env(const Mujoco *m, int i, RobotSim *sim, int again, const
     const float *action = m->step->action + (size_t)i * (size_t)m->shape.actions;
     Sampling sampling = {m, i, m->sample ? m->sample + (size_t)i * steps : NULL};
     const TaskDrive driven = {drive, &sampling};
-    const TaskCallback probe = {watch, &sampling, m->drive.torque ? &driven : NULL};
+    const TaskCallback callback = {watch, &sampling, m->drive.torque ? &driven : NULL};
     for (size_t k = 0; m->sample && k < steps; k++) {
         sampling.sample[k].valid = 0;
     }
     return task_env_step(env_at(m, i), &m->def, m->robot, sim, action, again, view,
-                         m->sample || m->drive.torque ? &probe : NULL);
+                         m->sample || m->drive.torque ? &callback : NULL);
 }
 
 static void step_piece(void *context, int piece, int thread) {

@@ -1,4 +1,4 @@
-/* Contact between two legs: the same text for MuJoCo's robots (robot/legs.c) and for the batch
+/* Contact between two legs: the same code for MuJoCo's robots (robot/legs.c) and for the batch
  * engine's (robot/engine/legs.h). A leg is a few capsules. Two capsules of different legs push
  * each other along their normal, without friction, with
  *

@@ -283,9 +283,10 @@ static void a_row_is_what_its_trials_did(void **state) {
         measure_start(&measure[i], longer.physics_dt);
         for (int k = 0; k < 300; k++) {
             float action[SA01_JOINTS];
-            const TaskCallback probe = {measure_step, &measure[i], NULL};
+            const TaskCallback callback = {measure_step, &measure[i], NULL};
             controller.act(controller.self, 1, &env, action);
-            const TaskStep step = task_env_step(env, &longer, robot, sim, action, 0, &none, &probe);
+            const TaskStep step =
+                task_env_step(env, &longer, robot, sim, action, 0, &none, &callback);
             assert_false(step.done && !step.timeout);
             eval_command(env, 0.5, 0.05);
         }
@@ -444,7 +445,7 @@ static void legs_do_not_cross(void **state) {
     Scene scene;
     Pool *pool = pool_create(1);
     Drawn drawn = {mj_makeData(robot_visual_model(robot)), 1};
-    const EvalCallback watch = {see_legs, &drawn};
+    const EvalCallback callback = {see_legs, &drawn};
     const double speed = 0;
     assert_int_equal(controller_learned(POLICY, robot, pool, 2, &controller, &error), MILD_OK);
     assert_int_equal(scene_make(&scene, "foam45", 2, &error), MILD_OK);
@@ -458,7 +459,7 @@ static void legs_do_not_cross(void **state) {
         .scene_count = 1,
         .speeds = &speed,
         .speed_count = 1,
-        .eval = {.sideways = 0.3, .trials = 2, .seconds = 6, .seed = 1, .watch = &watch},
+        .eval = {.sideways = 0.3, .trials = 2, .seconds = 6, .seed = 1, .callback = &callback},
         .each = each};
     assert_int_equal(eval_run(&run, &row, &error), MILD_OK);
     printf("sideways at 0.3 m/s: legs %.2f mm apart, drawn at decisions %.2f mm\n", 1e3 * row.legs,

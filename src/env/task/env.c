@@ -262,7 +262,7 @@ static void joint_torque(TaskEnv *env, const TaskDef *def, const TaskMotor *moto
 /* Physics steps of one policy period, with the three latencies. Returns 1 when the simulation
  * diverged. */
 static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                       TaskSensors *sensors, const TaskCallback *probe) {
+                       TaskSensors *sensors, const TaskCallback *callback) {
     int steps = (int)(TASK_PERIOD / def->physics_dt + 0.5);
     const RobotTable *table = robot_table(robot);
     const TaskRest *rest = rest_of(env);
@@ -284,8 +284,8 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
         }
         joint_torque(env, def, motor, task_motors_act(env, def, k, steps), k < env->lag_command, q,
                      qvel + 6);
-        if (probe && probe->drive) {
-            drive_torque(env, probe->drive, sim, motor, env->torque);
+        if (callback && callback->drive) {
+            drive_torque(env, callback->drive, sim, motor, env->torque);
         }
         double wrench[6];
         int helped = task_assist(env, def, table, rotation, qvel, wrench);
@@ -293,8 +293,8 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
                            task_env_ground(env))) {
             return 1;
         }
-        if (probe) {
-            probe->physics_step(probe->context, env, sim, env->torque);
+        if (callback) {
+            callback->physics_step(callback->context, env, sim, env->torque);
         }
     }
     return 0;
@@ -302,7 +302,7 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
 
 TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                        const float *action, int auto_reset, const TaskView *view,
-                       const TaskCallback *probe) {
+                       const TaskCallback *callback) {
     TaskSensors sensors = {0};
     RobotReading reading = {.above = 0};
     task_begin_step(env, def, action);
@@ -310,7 +310,7 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     robot_sim_set_solver(sim, def->newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL,
                          def->contact_tolerance, def->contact_iterations);
     task_env_load(env, sim);
-    int diverged = run_physics(env, def, robot, sim, &sensors, probe);
+    int diverged = run_physics(env, def, robot, sim, &sensors, callback);
     if (!diverged) {
         store(sim, env);
         task_env_read(env, sim, &reading);

@@ -47,13 +47,13 @@ MILD_HD_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape s
 
 /* What an environment keeps, and back, before a new episode. */
 MILD_HD_FN TaskProgress task_progress(const TaskEnv *env) {
-    const TaskProgress kept = {env->assist_level, env->tick};
-    return kept;
+    const TaskProgress progress = {env->assist_level, env->tick};
+    return progress;
 }
 
-MILD_HD_FN void task_set_progress(TaskEnv *env, TaskProgress kept) {
-    env->assist_level = kept.assist_level;
-    env->tick = env->tick_first = (uint32_t)kept.tick;
+MILD_HD_FN void task_set_progress(TaskEnv *env, TaskProgress progress) {
+    env->assist_level = progress.assist_level;
+    env->tick = env->tick_first = (uint32_t)progress.tick;
 }
 
 /* ---- start of an episode ---- */
@@ -301,7 +301,7 @@ MILD_HD_FN int task_joint_is_broken(const TaskEnv *env, const RobotTable *robot)
 }
 
 /* Why the episode ends with this pose; TASK_END_time where nothing but the time can end it. The
- * feet may not cross, because the engine computes no contact between the legs. */
+ * contact of the legs does not keep a foot from passing before the other to its far side. */
 MILD_HD_FN TaskEnd task_end_cause(const TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                   const RobotReading *reading) {
     const double depth = env->variation.rigid ? 0 : def->shell_depth;

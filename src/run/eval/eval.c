@@ -280,8 +280,8 @@ static void show_decisions(const Trials *t, int step) {
                                        .time = step * TASK_PERIOD,
                                        .env = t->env[i],
                                        .action = t->action + i * robot_joints(t->run->robot)};
-        if (eval->watch && !is_over(t, i)) {
-            eval->watch->decided(eval->watch->context, &decision);
+        if (eval->callback && !is_over(t, i)) {
+            eval->callback->decided(eval->callback->context, &decision);
         }
         if (eval->actions && !is_over(t, i)) {
             actions_print_row(eval->actions, &decision);

@@ -40,7 +40,7 @@ typedef struct {
     uint64_t seed;  /* trial k uses stream k */
     FILE *stances;  /* a row of CSV for each stance of each trial; NULL: none */
     /* by MuJoCo, of one row; NULL: none */
-    const EvalCallback *watch;
+    const EvalCallback *callback;
     FILE *actions; /* a row of CSV for each decision, see eval/actions.h */
     FILE *track;   /* one for each policy step of each trial, see eval/track.h */
 } EvalDef;
