@@ -96,7 +96,7 @@ static Press run(nb::handle material, const Sole &sole, nb::handle depth, nb::ha
     check_range("tiles", tiles, 0, MILD_IMPRINT_TILES_MAX);
     def.tilt = tilt;
     def.step = step > 0 ? std::fmax(step, 1e-7) : 0;
-    def.print_tiles = tiles;
+    def.imprint_tiles = tiles;
     def.map = map_of(map);
     if (drop.is_none() && impact == 0) {
         set_path(&def, depth, force, speed, cycles, drag);

@@ -29,9 +29,34 @@ typedef struct {
     Scene scenes[CLI_LIST_MAX]; /* of the batch engine */
     EvalRow rows[ROWS_MAX];
     int row_count;
+    EvalTrial *each; /* [rows][trials] */
 } Eval;
 
-static cJSON *row_json(const EvalRow *row) {
+static void add_ends(cJSON *o, const EvalRow *row) {
+    cJSON *ends = cJSON_AddObjectToObject(o, "ends");
+    for (int end = 0; end < TASK_END_COUNT; end++) {
+        cJSON_AddNumberToObject(ends, task_end_names[end], row->ends[end]);
+    }
+}
+
+static void add_each(cJSON *o, const EvalTrial *each, int trials) {
+    cJSON *list = cJSON_AddArrayToObject(o, "each");
+    for (int i = 0; i < trials; i++) {
+        cJSON *trial = cJSON_CreateObject();
+        cJSON_AddStringToObject(trial, "end", task_end_names[each[i].end]);
+        cJSON_AddNumberToObject(trial, "seconds", each[i].seconds);
+        cJSON_AddNumberToObject(trial, "legs", each[i].legs);
+        cJSON_AddItemToArray(list, trial);
+    }
+}
+
+/* The trials of a row. */
+static EvalTrial *each_of(const Eval *e, int row) {
+    return e->each + (size_t)row * (size_t)e->eval.trials;
+}
+
+/* each: [trials] */
+static cJSON *row_json(const EvalRow *row, const EvalTrial *each) {
     cJSON *o = cJSON_CreateObject();
     cJSON_AddStringToObject(o, "ground", row->ground);
     const struct {
@@ -61,10 +86,13 @@ static cJSON *row_json(const EvalRow *row) {
                   {"velocity_deviation", row->velocity_deviation},
                   {"cot_deviation", row->cot_deviation},
                   {"torque_deviation", row->torque_deviation},
-                  {"measured", row->measured}};
+                  {"measured", row->measured},
+                  {"legs", row->legs}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(o, values[i].name, values[i].value);
     }
+    add_ends(o, row);
+    add_each(o, each, row->trials);
     return o;
 }
 
@@ -83,7 +111,7 @@ static MildStatus write_json(const Eval *e, MildError *error) {
     cJSON_AddStringToObject(root, "version", build_version());
     cJSON *rows = cJSON_AddArrayToObject(root, "rows");
     for (int i = 0; i < e->row_count; i++) {
-        cJSON_AddItemToArray(rows, row_json(&e->rows[i]));
+        cJSON_AddItemToArray(rows, row_json(&e->rows[i], each_of(e, i)));
     }
     return report_save(root, e->json, error);
 }
@@ -120,7 +148,7 @@ static MildStatus sheet_close(Sheet *sheet, const char *path, MildStatus status,
 
 /* Prints a row and counts it. */
 static void take_row(Eval *e, FILE *table) {
-    char line[256];
+    char line[384];
     eval_print_row(&e->rows[e->row_count++], line, sizeof line);
     fprintf(table, "%s\n", line);
     fflush(table);
@@ -140,7 +168,8 @@ static EvalRun eval_of(Eval *e, const Scene *scenes, int scene_count, const doub
                      .scene_count = scene_count,
                      .speeds = speeds,
                      .speed_count = speed_count,
-                     .eval = e->eval};
+                     .eval = e->eval,
+                     .each = e->each};
 }
 
 /* Ground after ground, speed after speed, by MuJoCo. table: NULL: rows are not kept. */
@@ -152,7 +181,8 @@ static MildStatus evaluate_rows(Eval *e, FILE *table, MildError *error) {
         const double speed = e->speeds.value[i % e->speeds.count];
         status = make_scene(e, ground, speed, &scene, error);
         if (status == MILD_OK) {
-            const EvalRun run = eval_of(e, &scene, 1, &speed, 1);
+            EvalRun run = eval_of(e, &scene, 1, &speed, 1);
+            run.each = each_of(e, e->row_count);
             status = eval_run(&run, &e->rows[e->row_count], error);
         }
         if (status == MILD_OK && table) {
@@ -191,13 +221,13 @@ static MildStatus ablate(Eval *e, InsideLog *log, MildError *error) {
 /* With --latent or --ablate: rows whose controller is looked into. */
 static MildStatus evaluate_inside(Eval *e, FILE *table, MildError *error) {
     InsideLog log = {.feet = robot_feet(e->context.robot)};
-    const EvalWatch watch = {inside_decided, &log};
+    const EvalCallback callback = {inside_decided, &log};
     Sheet sheet = {0};
     MildStatus status = learned_watch(&e->context.mover, &log.inside, error);
     if (status != MILD_OK) {
         return status;
     }
-    e->eval.watch = &watch;
+    e->eval.callback = &callback;
     status = e->ablate ? ablate(e, &log, error) : MILD_OK;
     if (status == MILD_OK && e->latent) {
         status = sheet_open(&sheet, error);
@@ -209,7 +239,7 @@ static MildStatus evaluate_inside(Eval *e, FILE *table, MildError *error) {
     if (status == MILD_OK) {
         status = evaluate_rows(e, table, error);
     }
-    e->eval.watch = NULL;
+    e->eval.callback = NULL;
     return sheet_close(&sheet, e->latent, status, error);
 }
 
@@ -354,6 +384,14 @@ static MildStatus check(Eval *e, MildError *error) {
     return status == MILD_OK ? check_place(e, error) : status;
 }
 
+static MildStatus allocate(Eval *e, MildError *error) {
+    const size_t rows = (size_t)e->grounds.count * (size_t)e->speeds.count;
+    e->each = calloc(rows * (size_t)e->eval.trials, sizeof *e->each);
+    return e->each
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_MEMORY, "out of memory for %d trials", e->eval.trials);
+}
+
 static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     Context *c = &e->context;
     c->pool = pool_create(e->threads);
@@ -361,6 +399,9 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
                                 : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
     if (status == MILD_OK) {
         status = check(e, error);
+    }
+    if (status == MILD_OK) {
+        status = allocate(e, error);
     }
     if (status == MILD_OK) {
         status = context_move(c, e->eval.trials, error);
@@ -460,9 +501,9 @@ int cmd_eval(int argc, char **argv) {
             "each: trials without a fall, measured speed with its 95 % interval, cost of "
             "transport (COT), largest torque of a joint, clearance of the swinging foot "
             "above the undisturbed ground, deepest element (sink) and way of the sole "
-            "(drift) in a stance, and power of the joints. A - is what cannot be measured, "
-            "such as the speed of trials that fell within 2.5 s; the JSON has null there. The "
-            "sensors have the noise "
+            "(drift) in a stance, power of the joints, and what ended the trials that fell. A - is "
+            "what cannot be measured, such as the speed of trials that fell within 2.5 s; the "
+            "JSON has null there. The sensors have the noise "
             "and delay of training. The robot has its nominal parameters, and nobody pushes "
             "it, without --randomize or --push.",
         .options = options,
@@ -486,6 +527,7 @@ int cmd_eval(int argc, char **argv) {
             cli_first_given(&command, args, (const char *const[]){"speed", NULL}) != NULL;
         code = run_eval(e, args, &error) == MILD_OK ? 0 : cli_fail("eval", &error);
     }
+    free(e->each);
     free(e);
     free(args);
     return code;

@@ -542,7 +542,7 @@ int cmd_press(int argc, char **argv) {
         status = terrain_make(&terrain, 1, &map, &error);
     }
     def.map = map;
-    def.print_tiles = terrain_print_tiles(&terrain);
+    def.imprint_tiles = terrain_imprint_tiles(&terrain);
     if (status == MILD_OK) {
         status = press_report(&options, &tool, &def, &error);
     }

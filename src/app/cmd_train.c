@@ -131,17 +131,17 @@ static MildStatus train(const Command *command, MildError *error) {
                              .config = command->config_text,
                              .version = build_version(),
                              .note = command->note};
-    const TrainWatch watch = {.self = &display,
-                              .resumed = print_resumed,
-                              .passed_over = print_passed_over,
-                              .stop = stop,
-                              .iterated = display_take};
+    const TrainCallbacks callbacks = {.self = &display,
+                                      .resumed = print_resumed,
+                                      .passed_over = print_passed_over,
+                                      .stop = stop,
+                                      .iterated = display_take};
     if (leads && ranks_count(command->ranks) > 1) {
         const int threads = command->def.train.threads;
         printf("%d processes, %d threads each\n", ranks_count(command->ranks),
                threads ? threads : ranks_threads(command->ranks));
     }
-    TrainRun *run = train_run_open(&def, &watch, error);
+    TrainRun *run = train_run_open(&def, &callbacks, error);
     if (!run) {
         return error->status;
     }

@@ -161,7 +161,7 @@ MildStatus grounds_lay_map(const GroundsDef *def, Scene *scene, MildMap **map, M
     *map = made;
     if (def->task) {
         def->task->map = made;
-        def->task->print_tiles = terrain_print_tiles(def->terrain);
+        def->task->imprint_tiles = terrain_imprint_tiles(def->terrain);
     }
     return MILD_OK;
 }

@@ -44,7 +44,7 @@ typedef struct {
     int lost; /* bool: the simulation diverged, so the state must not be drawn */
 } Walk;
 
-/* TaskProbe: every physics step. */
+/* TaskCallback: every physics step. */
 static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const double *torque) {
     Walk *walk = context;
     Play *play = walk->play;
@@ -88,10 +88,10 @@ static void step(Walk *walk) {
     TaskView none = {0};
     ControllerRow row = {play->controller, 0};
     TaskDrive drive = {controller_row_torque, &row};
-    TaskProbe probe = {watch, walk, play->controller->torque ? &drive : NULL};
+    TaskCallback callback = {watch, walk, play->controller->torque ? &drive : NULL};
     play->controller->act(play->controller->self, 1, &walk->env, action);
     TaskStep out =
-        task_env_step(walk->env, &walk->task, play->robot, walk->sim, action, 0, &none, &probe);
+        task_env_step(walk->env, &walk->task, play->robot, walk->sim, action, 0, &none, &callback);
     const double *rotation = robot_sim_base_rotation(walk->sim), *qvel = robot_sim_qvel(walk->sim);
     double forward = (rotation[0] * qvel[0] + rotation[3] * qvel[1]) /
                      fmax(hypot(rotation[0], rotation[3]), 1e-6);

@@ -56,10 +56,10 @@ static MildStatus check_def(const EnvsDef *def, MildError *error) {
     for (int i = 0; def->trial && i < def->terrains; i++) {
         course |= def->terrain[i].material_count > 1;
     }
-    const char *missing = patches             ? "randomize.patch_share above 0"
-                          : task->print_tiles ? "terrain.memory"
-                          : !task->newton     ? "task.newton = 0"
-                          : task->motors      ? "task.actuator"
+    const char *missing = patches               ? "randomize.patch_share above 0"
+                          : task->imprint_tiles ? "terrain.memory"
+                          : !task->newton       ? "task.newton = 0"
+                          : task->motors        ? "task.actuator"
                           : def->trial && task->map && mild_map_label_count(task->map) > 1
                               ? "terrain.patches"
                           : course ? "a course of several grounds"
@@ -125,7 +125,7 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
                   {&all->robot, envs * b->robot},
                   {&all->material, envs * b->labels * sizeof *all->material},
                   {&all->map_origin, 2 * envs * sizeof *all->map_origin},
-                  {&all->fresh, envs},
+                  {&all->reset, envs},
                   {&all->rigid, envs},
                   {&all->order, envs * sizeof *all->order},
                   {&all->tally, TALLY_NUMBERS * sizeof *all->tally},
@@ -347,6 +347,7 @@ static EnvsStep step_from(const EnvsStep *step, const TaskShape *shape, size_t f
                       .done = flag_from(step->done, first),
                       .timeout = flag_from(step->timeout, first),
                       .valid = flag_from(step->valid, first),
+                      .cause = flag_from(step->cause, first),
                       .next = view_from(&step->next, shape, first)};
 }
 
@@ -369,7 +370,7 @@ static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
     all.robot += first * b->robot;
     all.material += first * b->labels;
     all.map_origin += 2 * first;
-    all.fresh += first;
+    all.reset += first;
     all.rigid += first;
     all.order += first;
     all.contact = contact_from(&all.contact, first, (size_t)b->shape.feet);
@@ -481,7 +482,7 @@ static MildStatus begin_share(const Batch *b, Share *share, MildError *error) {
 static MildStatus see_share(const Batch *b, Share *share, MildError *error) {
     const EnvsArrays *all = &share->arrays;
     Call call = {&share->arrays, &share->step, 0};
-    MildStatus status = mild_batch_reset(&share->ground, all->fresh, share->stream, error);
+    MildStatus status = mild_batch_reset(&share->ground, all->reset, share->stream, error);
     if (status == MILD_OK && b->kernels) {
         return checked(b->kernels->first(all, &share->step, share->stream), error);
     }
@@ -551,37 +552,39 @@ static MildStatus sums(Envs *envs, EnvsStats *sums, void *stream, MildError *err
     return MILD_OK;
 }
 
-/* Between the environments and `all->kept`. */
-static MildStatus move_kept(const Batch *b, const EnvsArrays *all, int back, MildError *error) {
+/* Between the environments and `all->progress`. */
+static MildStatus move_progress(const Batch *b, const EnvsArrays *all, int back, MildError *error) {
     if (b->device == MILD_BATCH_HOST) {
         envs_host_move_progress(all, back);
         return MILD_OK;
     }
     MildStatus status = device_wait(b->device, error);
-    status = status == MILD_OK ? checked(b->kernels->keep(all, back, NULL), error) : status;
+    status =
+        status == MILD_OK ? checked(b->kernels->move_progress(all, back, NULL), error) : status;
     return status == MILD_OK ? device_wait(b->device, error) : status;
 }
 
-static MildStatus save_progress(Envs *envs, TaskProgress *kept, MildError *error) {
+static MildStatus save_progress(Envs *envs, TaskProgress *progress, MildError *error) {
     const Batch *b = own(envs);
-    const size_t bytes = (size_t)b->arrays.envs * sizeof *kept;
+    const size_t bytes = (size_t)b->arrays.envs * sizeof *progress;
     EnvsArrays all = b->arrays;
-    all.kept = device_alloc(b->device, bytes, error);
-    MildStatus status = all.kept ? move_kept(b, &all, 0, error) : MILD_ERROR_MEMORY;
-    status = status == MILD_OK ? device_copy(b->device, kept, all.kept, bytes, error) : status;
-    device_free(b->device, all.kept);
+    all.progress = device_alloc(b->device, bytes, error);
+    MildStatus status = all.progress ? move_progress(b, &all, 0, error) : MILD_ERROR_MEMORY;
+    status =
+        status == MILD_OK ? device_copy(b->device, progress, all.progress, bytes, error) : status;
+    device_free(b->device, all.progress);
     return status;
 }
 
-static MildStatus load_progress(Envs *envs, const TaskProgress *kept, MildError *error) {
+static MildStatus load_progress(Envs *envs, const TaskProgress *progress, MildError *error) {
     const Batch *b = own(envs);
-    const size_t bytes = (size_t)b->arrays.envs * sizeof *kept;
+    const size_t bytes = (size_t)b->arrays.envs * sizeof *progress;
     EnvsArrays all = b->arrays;
-    all.kept = device_alloc(b->device, bytes, error);
-    MildStatus status =
-        all.kept ? device_copy(b->device, all.kept, kept, bytes, error) : MILD_ERROR_MEMORY;
-    status = status == MILD_OK ? move_kept(b, &all, 1, error) : status;
-    device_free(b->device, all.kept);
+    all.progress = device_alloc(b->device, bytes, error);
+    MildStatus status = all.progress ? device_copy(b->device, all.progress, progress, bytes, error)
+                                     : MILD_ERROR_MEMORY;
+    status = status == MILD_OK ? move_progress(b, &all, 1, error) : status;
+    device_free(b->device, all.progress);
     return status;
 }
 

@@ -62,16 +62,16 @@ typedef struct {
 
 typedef struct {
     int envs;
-    size_t stride;      /* [B] of a TaskEnv and its frames */
-    char *env;          /* [envs][stride] */
-    char *robot;        /* [envs] EnvRobot of batch_env.h */
-    int32_t *material;  /* [envs][labels] of the ground's table */
-    Real *map_origin;   /* [envs][2] [m] */
-    uint8_t *fresh;     /* [envs] bool: an episode began */
-    uint8_t *rigid;     /* [envs] bool: of the episode */
-    int32_t *order;     /* [envs] in which a GPU steps them: those on rigid ground first */
-    TaskProgress *kept; /* [envs] or NULL, in envs_save_progress and envs_load_progress */
-    double *tally;      /* [TALLY_NUMBERS] sums over the environments */
+    size_t stride;          /* [B] of a TaskEnv and its frames */
+    char *env;              /* [envs][stride] */
+    char *robot;            /* [envs] EnvRobot of batch_env.h */
+    int32_t *material;      /* [envs][labels] of the ground's table */
+    Real *map_origin;       /* [envs][2] [m] */
+    uint8_t *reset;         /* [envs] bool: an episode began */
+    uint8_t *rigid;         /* [envs] bool: of the episode */
+    int32_t *order;         /* [envs] in which a GPU steps them: those on rigid ground first */
+    TaskProgress *progress; /* [envs] or NULL, in envs_save_progress and envs_load_progress */
+    double *tally;          /* [TALLY_NUMBERS] sums over the environments */
     EnvsContact contact;
     const EnvsTrial *trial; /* [envs] or NULL */
     double *command;        /* [envs][3] of the trials */

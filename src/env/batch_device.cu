@@ -41,13 +41,13 @@ static int lanes_blocks(int envs) {
     return (envs + TASK_ROBOTS - 1) / TASK_ROBOTS;
 }
 
-template <int WATCHED>
+template <int SAMPLED>
 static __global__ void __launch_bounds__(WARP_THREADS, ENVS_BLOCKS)
     part(const __grid_constant__ EnvsArrays all, const __grid_constant__ EnvsStep call, int k) {
     extern __shared__ __align__(16) Real shared[];
     const long place = warp_robot();
     if (place < all.envs) {
-        env_part(&all, &call, all.order[place], k, WATCHED,
+        env_part(&all, &call, all.order[place], k, SAMPLED,
                  (EnvWork *)shared + threadIdx.x / LANES);
     }
 }
@@ -130,7 +130,7 @@ static __global__ void __launch_bounds__(ORDER_THREADS)
 }
 
 static __global__ void __launch_bounds__(TASK_THREADS)
-    keep(const __grid_constant__ EnvsArrays all, int back) {
+    move_progress(const __grid_constant__ EnvsArrays all, int back) {
     const long robot = lanes_robot();
     if (robot < all.envs) {
         env_move_progress(&all, robot, back);
@@ -212,7 +212,7 @@ static const char *kernels_first(const EnvsArrays *all, const EnvsStep *call, vo
 }
 
 static const char *kernels_move_progress(const EnvsArrays *all, int back, void *stream) {
-    keep<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
+    move_progress<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
     return launched();
 }
 

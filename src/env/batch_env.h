@@ -27,7 +27,7 @@ typedef struct {
     EngineVariation variation;
     TaskMotor motor[ENGINE_JOINTS];
     Real torque[ENGINE_JOINTS]; /* [N m] in the order of robot.ini */
-    Real push[6];               /* [N, N m] at the base's centre of mass, world */
+    Real base_wrench[6];        /* [N, N m] at the base's centre of mass, world */
     Real qpos[7 + ENGINE_JOINTS];
     Real qvel[6 + ENGINE_JOINTS];
     Real corner[ENGINE_CORNERS]; /* [m] depth of the corners in rigid ground */

@@ -17,14 +17,14 @@ void envs_host_begin(const EnvsArrays *all, long robot) {
 }
 
 void envs_host_first(const EnvsArrays *all, const EnvsStep *call, long robot) {
-    EnvWork place;
-    env_pose(all, robot, &place);
+    EnvWork scratch;
+    env_pose(all, robot, &scratch);
     env_observe(all, call, robot);
 }
 
 void envs_host_part(const EnvsArrays *all, const EnvsStep *call, int k, long robot) {
-    EnvWork place;
-    env_part(all, call, robot, k, all->sample != NULL, &place);
+    EnvWork scratch;
+    env_part(all, call, robot, k, all->sample != NULL, &scratch);
 }
 
 void envs_host_set_command(const EnvsArrays *all, long robot) {

@@ -3,6 +3,7 @@
 #define ENVS_BATCH_SAMPLE_H
 
 #include "env/batch_env.h"
+#include "robot/engine/legs.h"
 
 /* A trial in the place of what the episode drew. */
 MILD_HD void env_set_trial(const EnvsArrays *all, long robot, TaskEnv *env) {
@@ -24,19 +25,20 @@ MILD_HD void env_set_command(const EnvsArrays *all, long robot) {
 
 /* Torques of physics step k, which begins, and the state after step k - 1, which env_measure has
  * just seen. */
-WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, const EnvWork *place) {
+WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, const EnvWork *scratch) {
     const EngineTree *tree = &all->model->tree;
-    const EngineWork *work = &place->work;
+    const EngineWork *work = &scratch->work;
     const RobotReading *reading = &env_robot_at(all, robot)->reading;
     const int feet = engine_feet(tree), rigid = all->rigid[robot];
     const int steps = env_physics_steps(all->task);
     EnvsSample *begun = all->sample + robot * steps + k, *done = begun - 1;
+    const Real legs = k > 0 ? engine_leg_distance(all->model, work) : 0;
     EACH_LANE(l) {
         LANE_ROLLED
         for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {
             const int j = tree->joint[i];
             if (k < steps) {
-                begun->torque[j] = (double)place->torque[j];
+                begun->torque[j] = (double)scratch->torque[j];
             }
             if (k > 0) {
                 done->speed[j] = (double)work->rate[5 + i];
@@ -63,6 +65,7 @@ WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, const E
                 done->quaternion[i] = (double)work->quaternion[i];
             }
             done->above = (double)reading->above;
+            done->legs = (double)legs;
             done->valid = 1;
         }
     }

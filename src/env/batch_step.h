@@ -77,33 +77,33 @@ MILD_HD_FN void env_draw(const EnvsArrays *all, long robot, TaskEnv *env) {
 
 /* ---- from and to TaskEnv ---- */
 
-WARP_FN void env_load(const EngineModel *model, const TaskEnv *env, EnvWork *place) {
+WARP_FN void env_load(const EngineModel *model, const TaskEnv *env, EnvWork *scratch) {
     const int joints = model->tree.joints;
     EACH_LANE(l) {
         LANE_ROLLED
         for (int i = LANE(l); i < 7 + joints; i += LANES) {
-            place->qpos[i] = (Real)env->robot.qpos[i];
+            scratch->qpos[i] = (Real)env->robot.qpos[i];
         }
         LANE_ROLLED
         for (int i = LANE(l); i < 6 + joints; i += LANES) {
-            place->qvel[i] = (Real)env->robot.qvel[i];
+            scratch->qvel[i] = (Real)env->robot.qvel[i];
         }
     }
     lanes_sync();
-    engine_load(model, place->qpos, place->qvel, &place->work);
+    engine_load(model, scratch->qpos, scratch->qvel, &scratch->work);
 }
 
-WARP_FN void env_store(const EngineModel *model, EnvWork *place, TaskEnv *env) {
+WARP_FN void env_store(const EngineModel *model, EnvWork *scratch, TaskEnv *env) {
     const int joints = model->tree.joints;
-    engine_store(model, &place->work, place->qpos, place->qvel);
+    engine_store(model, &scratch->work, scratch->qpos, scratch->qvel);
     EACH_LANE(l) {
         LANE_ROLLED
         for (int i = LANE(l); i < 7 + joints; i += LANES) {
-            env->robot.qpos[i] = place->qpos[i];
+            env->robot.qpos[i] = scratch->qpos[i];
         }
         LANE_ROLLED
         for (int i = LANE(l); i < 6 + joints; i += LANES) {
-            env->robot.qvel[i] = place->qvel[i];
+            env->robot.qvel[i] = scratch->qvel[i];
         }
     }
     lanes_sync();
@@ -135,41 +135,41 @@ WARP_FN void env_read(const EngineModel *model, const TaskEnv *env, int steps_le
 /* ---- physics ---- */
 
 /* Force and torque of the assistance, by one lane. */
-MILD_HD void env_assist(const EnvsTask *task, const TaskEnv *env, EnvWork *place) {
-    const EngineWork *work = &place->work;
+MILD_HD void env_assist(const EnvsTask *task, const TaskEnv *env, EnvWork *scratch) {
+    const EngineWork *work = &scratch->work;
     Real R[9];
     Real wrench[6];
     quaternion_matrix(work->quaternion, R);
     task_assist(env, &task->task, &task->robot, R, work->rate, wrench);
     for (int d = 0; d < 6; d++) {
-        place->push[d] = wrench[d];
+        scratch->base_wrench[d] = wrench[d];
     }
 }
 
 /* Torques of the motors and the push of the assistance. late, act: bool, see task_torque. */
 WARP_FN void env_motors(const EnvsArrays *all, const TaskEnv *env, int late, int act, int helped,
-                        EnvWork *place) {
+                        EnvWork *scratch) {
     const EngineTree *tree = &all->model->tree;
-    const EngineWork *work = &place->work;
+    const EngineWork *work = &scratch->work;
     EACH_LANE(l) {
         LANE_ROLLED
         for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {
             const int j = tree->joint[i];
-            place->torque[j] =
-                act ? (Real)task_torque(&place->motor[j], late, work->angle[i], work->rate[5 + i])
+            scratch->torque[j] =
+                act ? (Real)task_torque(&scratch->motor[j], late, work->angle[i], work->rate[5 + i])
                     : env->torque[j];
         }
         if (helped && LANE(l) == LANES - 1) {
-            env_assist(all->task, env, place);
+            env_assist(all->task, env, scratch);
         }
     }
     lanes_sync();
 }
 
 /* [m] Mean depth of the corners of a foot that pushed in the last step. */
-MILD_HD Real env_corner_depth(const EngineModel *model, const EnvWork *place, int foot) {
+MILD_HD Real env_corner_depth(const EngineModel *model, const EnvWork *scratch, int foot) {
     const EngineTree *tree = &model->tree;
-    const EngineContact *contact = &place->work.now.support.ground.contact;
+    const EngineContact *contact = &scratch->work.now.support.ground.contact;
     Real sum = 0;
     Real pushing = 0;
     LANE_ROLLED
@@ -179,7 +179,7 @@ MILD_HD Real env_corner_depth(const EngineModel *model, const EnvWork *place, in
         for (int e = 4 * c; e < 4 * c + 4; e++) {
             pushes |= contact->weight[e] > 0 && contact->residual[e] < 0;
         }
-        sum += pushes ? place->corner[c] : 0;
+        sum += pushes ? scratch->corner[c] : 0;
         pushing += (Real)pushes;
     }
     return pushing > 0 ? sum / pushing : 0;
@@ -192,8 +192,8 @@ MILD_HD EngineRigid env_contact(const TaskVariation *variation) {
 
 /* Rigid ground, after engine_begin. */
 WARP_FN void env_rigid(const EngineModel *model, EngineRigid rigid, const EngineGround *ground,
-                       EnvWork *place) {
-    EngineWork *work = &place->work;
+                       EnvWork *scratch) {
+    EngineWork *work = &scratch->work;
     const MapSpot spot = engine_spot(ground, work);
     engine_collide_on(model, rigid, ground, work);
     EACH_LANE(l) {
@@ -204,7 +204,7 @@ WARP_FN void env_rigid(const EngineModel *model, EngineRigid rigid, const Engine
             const EngineSurface under = engine_surface(ground, work, &spot, center[0], center[1]);
             const Real square =
                 1 + under.slope[0] * under.slope[0] + under.slope[1] * under.slope[1];
-            place->corner[c] =
+            scratch->corner[c] =
                 (under.height - work->base[2] - center[2]) * REAL_INVERSE_SQRT(square) +
                 model->number.foot[model->tree.corner_foot[c]].corner_radius;
         }
@@ -254,9 +254,9 @@ WARP_FN void env_import(const EnvsArrays *all, long robot, EngineWork *work) {
     lanes_sync();
 }
 
-MILD_HD void env_measure_foot(const EngineModel *model, const EnvWork *place, int f, int contact,
+MILD_HD void env_measure_foot(const EngineModel *model, const EnvWork *scratch, int f, int contact,
                               Real lowest, Real depth, RobotReading *reading) {
-    const EngineWork *work = &place->work;
+    const EngineWork *work = &scratch->work;
     Real center[3], velocity[3];
     sole_center(model, work, f, center, velocity);
     for (int k = 0; k < 3; k++) {
@@ -270,11 +270,11 @@ MILD_HD void env_measure_foot(const EngineModel *model, const EnvWork *place, in
 
 /* What the task asks of the pose. contact: bool, with forces and torques of the last physics
  * step. */
-WARP_FN void env_measure(const EnvsArrays *all, long robot, int contact, EnvWork *place) {
+WARP_FN void env_measure(const EnvsArrays *all, long robot, int contact, EnvWork *scratch) {
     EnvRobot *own = env_robot_at(all, robot);
     RobotReading *reading = &own->reading;
     const EngineModel *model = all->model;
-    const EngineWork *work = &place->work;
+    const EngineWork *work = &scratch->work;
     const int feet = engine_feet(&model->tree);
     const EngineGround ground = env_surface(all, robot);
     Real lowest[LANE_COPIES]; /* of the lane's foot */
@@ -287,14 +287,15 @@ WARP_FN void env_measure(const EnvsArrays *all, long robot, int contact, EnvWork
     }
     EACH_LANE(l) {
         if (LANE(l) < feet) {
-            env_measure_foot(model, place, LANE(l), contact, lowest[l],
+            env_measure_foot(model, scratch, LANE(l), contact, lowest[l],
                              all->contact.foot[robot * feet + LANE(l)].depth_mean, reading);
         }
     }
-    const Real clearance = engine_body_clearance_on(model, work, &ground);
+    const EngineClearance clearance = engine_clearance_on(model, work, &ground);
     EACH_LANE(l) {
         if (LANE(l) == 0) {
-            reading->body_clearance = clearance;
+            reading->body_clearance = clearance.body;
+            reading->base_clearance = clearance.base;
         }
         if (LANE(l) == 3) {
             const MapSpot spot = engine_spot(&ground, work);
@@ -328,14 +329,15 @@ WARP_FN void env_act(const EnvsArrays *all, const EnvsStep *call, long robot, Ta
 }
 
 /* From the ground's forces to the next state. */
-WARP_FN int env_finish_step(const EnvsArrays *all, long robot, const TaskEnv *env, EnvWork *place) {
+WARP_FN int env_finish_step(const EnvsArrays *all, long robot, const TaskEnv *env,
+                            EnvWork *scratch) {
     const EngineModel *model = all->model;
-    EngineWork *work = &place->work;
+    EngineWork *work = &scratch->work;
     const int rigid = env->variation.rigid;
     const int feet = engine_feet(&model->tree);
     if (rigid) {
         const EngineGround ground = env_surface(all, robot);
-        env_rigid(model, env_contact(&env->variation), &ground, place);
+        env_rigid(model, env_contact(&env->variation), &ground, scratch);
     } else {
         env_import(all, robot, work);
     }
@@ -343,7 +345,7 @@ WARP_FN int env_finish_step(const EnvsArrays *all, long robot, const TaskEnv *en
     EACH_LANE(l) {
         if (rigid && LANE(l) < feet) {
             all->contact.foot[robot * feet + LANE(l)].depth_mean =
-                env_corner_depth(model, place, LANE(l));
+                env_corner_depth(model, scratch, LANE(l));
         }
         if (bad && LANE(l) == 0) {
             env_robot_at(all, robot)->diverged = 1;
@@ -370,91 +372,91 @@ MILD_HD void env_vary(const TaskVariation *from, EngineVariation *to, int links,
 
 /* Physics step k up to the ground; with k = steps the pose alone. */
 WARP_FN void env_start_step(const EnvsArrays *all, long robot, int k, int steps, const TaskEnv *env,
-                            EnvWork *place) {
+                            EnvWork *scratch) {
     const EngineModel *model = all->model;
     const EnvsTask *task = all->task;
     const int helped = task_assist_share(env, &task->task) != 0;
-    const EngineAction action = {&place->variation, place->torque, helped ? place->push : NULL,
-                                 env->variation.rigid};
-    env_read(model, env, steps - k, &place->work, &env_robot_at(all, robot)->sensors);
+    const EngineAction action = {&scratch->variation, scratch->torque,
+                                 helped ? scratch->base_wrench : NULL, env->variation.rigid};
+    env_read(model, env, steps - k, &scratch->work, &env_robot_at(all, robot)->sensors);
     if (k < steps) {
         EACH_LANE(l) {
             LANE_ROLLED
             for (int j = LANE(l); j < env->shape.joints; j += LANES) {
-                place->motor[j] = task_motor(env, &task->task, &task->robot, &task->gains, j);
+                scratch->motor[j] = task_motor(env, &task->task, &task->robot, &task->gains, j);
             }
-            env_vary(&env->variation, &place->variation, 1 + env->shape.joints, LANE(l));
+            env_vary(&env->variation, &scratch->variation, 1 + env->shape.joints, LANE(l));
         }
         lanes_sync();
         env_motors(all, env, k < env->lag_command, task_motors_act(env, &task->task, k, steps),
-                   helped, place);
+                   helped, scratch);
     }
-    engine_begin(model, k < steps ? &action : NULL, &place->work);
+    engine_begin(model, k < steps ? &action : NULL, &scratch->work);
 }
 
-/* watched: bool, a constant: with the samples of an evaluation. */
-WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, int k, int watched,
-                      EnvWork *place) {
+/* sampled: bool, a constant: with the samples of an evaluation. */
+WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, int k, int sampled,
+                      EnvWork *scratch) {
     TaskEnv *env = env_at(all, robot);
     EnvRobot *own = env_robot_at(all, robot);
     const EngineTree *tree = &all->model->tree;
     const int steps = env_physics_steps(all->task);
     if (k == 0) {
         env_act(all, call, robot, env);
-        env_load(all->model, env, place);
-        engine_restore_acceleration(tree, &own->saved, &place->work);
+        env_load(all->model, env, scratch);
+        engine_restore_acceleration(tree, &own->saved, &scratch->work);
     } else {
         if (own->diverged) {
             return;
         }
-        engine_restore(tree, env->variation.rigid, &own->saved, &place->work);
-        if (env_finish_step(all, robot, env, place)) {
+        engine_restore(tree, env->variation.rigid, &own->saved, &scratch->work);
+        if (env_finish_step(all, robot, env, scratch)) {
             return;
         }
     }
-    env_start_step(all, robot, k, steps, env, place);
-    if (watched && k > 0 && k < steps) {
-        env_measure(all, robot, 1, place);
+    env_start_step(all, robot, k, steps, env, scratch);
+    if (sampled && k > 0 && k < steps) {
+        env_measure(all, robot, 1, scratch);
     }
     if (k < steps) {
-        engine_save(tree, env->variation.rigid, &place->work, &own->saved);
+        engine_save(tree, env->variation.rigid, &scratch->work, &own->saved);
         const int kept = k == steps - 1 || all->task->task.torque_hold;
         EACH_LANE(l) {
             LANE_ROLLED
             for (int j = LANE(l); kept && j < env->shape.joints; j += LANES) {
-                env->torque[j] = place->torque[j];
+                env->torque[j] = scratch->torque[j];
             }
         }
         if (!env->variation.rigid) {
-            env_export(all, robot, &place->work);
+            env_export(all, robot, &scratch->work);
         }
     } else {
-        env_store(all->model, place, env);
-        engine_save_acceleration(tree, &place->work, &own->saved);
-        env_measure(all, robot, 1, place);
+        env_store(all->model, scratch, env);
+        engine_save_acceleration(tree, &scratch->work, &own->saved);
+        env_measure(all, robot, 1, scratch);
     }
-    if (watched) {
-        env_record_sample(all, robot, k, place);
+    if (sampled) {
+        env_record_sample(all, robot, k, scratch);
     }
 }
 
 /* The pose in which an episode begins. On uneven ground the lowest sole point starts at the depth
  * that the soles have on level ground. */
-WARP_FN void env_pose(const EnvsArrays *all, long robot, EnvWork *place) {
+WARP_FN void env_pose(const EnvsArrays *all, long robot, EnvWork *scratch) {
     TaskEnv *env = env_at(all, robot);
     const EngineModel *model = all->model;
     const EngineGround ground = env_surface(all, robot);
-    if (!all->fresh[robot]) {
+    if (!all->reset[robot]) {
         return;
     }
     LANE_ROLLED
     for (int again = all->task->uneven; again >= 0; again--) {
         Real lowest = MEASURE_NONE;
-        env_load(model, env, place);
-        engine_begin(model, NULL, &place->work);
+        env_load(model, env, scratch);
+        engine_begin(model, NULL, &scratch->work);
         LANE_ROLLED
         for (int f = 0; again && f < engine_feet(&model->tree); f++) {
-            lowest = real_min(lowest, engine_sole_height_on(model, &place->work, f, &ground));
+            lowest = real_min(lowest, engine_sole_height_on(model, &scratch->work, f, &ground));
         }
         EACH_LANE(l) {
             if (again && LANE(l) == 0) {
@@ -464,7 +466,7 @@ WARP_FN void env_pose(const EnvsArrays *all, long robot, EnvWork *place) {
         }
         lanes_sync();
     }
-    env_measure(all, robot, 0, place);
+    env_measure(all, robot, 0, scratch);
 }
 
 /* ---- the task, by TASK_LANES threads ---- */
@@ -479,13 +481,13 @@ MILD_HD void env_create(const EnvsArrays *all, long robot) {
     }
 }
 
-/* To or from arrays.kept. */
+/* To or from arrays.progress. */
 MILD_HD void env_move_progress(const EnvsArrays *all, long robot, int back) {
     TaskEnv *env = env_at(all, robot);
     if (back) {
-        task_set_progress(env, all->kept[robot]);
+        task_set_progress(env, all->progress[robot]);
     } else {
-        all->kept[robot] = task_progress(env);
+        all->progress[robot] = task_progress(env);
     }
 }
 
@@ -515,7 +517,7 @@ MILD_HD void env_begin(const EnvsArrays *all, long robot) {
                        env->variation.rigid ? 0 : task->ground[ground].depth);
     task_clear(env_robot_at(all, robot)->saved.state + ENGINE_ACCELERATION,
                (size_t)engine_dofs(&all->model->tree) * sizeof(Real));
-    all->fresh[robot] = 1;
+    all->reset[robot] = 1;
     all->rigid[robot] = env->variation.rigid != 0;
     all->contact.height[robot] = env->variation.rigid ? -ENVS_FAR : 0;
 }
@@ -558,7 +560,10 @@ MILD_HD void env_end(const EnvsArrays *all, const EnvsStep *call, long robot) {
         call->done[robot] = step.done;
         call->timeout[robot] = step.timeout;
         call->valid[robot] = step.valid;
-        all->fresh[robot] = step.done;
+        if (call->cause) {
+            call->cause[robot] = step.cause;
+        }
+        all->reset[robot] = step.done;
         env_count(own->tally, &step);
     }
     if (step.done) {
@@ -577,14 +582,14 @@ MILD_HD void env_observe(const EnvsArrays *all, const EnvsStep *call, long robot
                            env_row(call->next.critic, robot, shape->critic),
                            env_row(call->next.estimate, robot, shape->estimates),
                            env_row(call->next.frame, robot, shape->observation)};
-    const int fresh = all->fresh[robot];
+    const int reset = all->reset[robot];
     EnvRobot *own = env_robot_at(all, robot);
-    if (fresh && task_lane() == 0) {
+    if (reset && task_lane() == 0) {
         task_first_sensors(env, &own->reading, &own->sensors);
     }
     task_lanes_sync();
     task_observe(env, &all->task->task, &all->task->robot, &own->reading,
-                 all->task->ground[env->ground[own->label]].numbers, &own->sensors, fresh, &view);
+                 all->task->ground[env->ground[own->label]].numbers, &own->sensors, reset, &view);
 }
 
 #endif

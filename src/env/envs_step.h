@@ -22,6 +22,7 @@ typedef struct {
     uint8_t *done;       /* [envs] bool: the episode ended in this step, fallen or by time */
     uint8_t *timeout;    /* [envs] bool: it ended by time; bootstrap from the value before it */
     uint8_t *valid;      /* [envs] bool: 0: the simulation diverged; give the sample no weight */
+    uint8_t *cause;      /* [envs] TaskEnd (task/state.h) where done, else 0; NULL: not asked for */
     EnvsView next;       /* the observation after it */
     /* Of environments that ended, others are left alone. MuJoCo's only, else NULL. */
     EnvsView last; /* the observation at the end of the episode; 0 where it diverged. Not of a

@@ -1,7 +1,7 @@
 /* What steps an environment of the batch engine: on the CPU (batch_host.c), on a GPU
  * (batch_device.cu, or batch_without_cuda.c). */
-#ifndef ENVS_TEXT_H
-#define ENVS_TEXT_H
+#ifndef ENV_KERNELS_H
+#define ENV_KERNELS_H
 
 #include "env/batch_arrays.h"
 #include "env/envs.h"
@@ -29,7 +29,7 @@ void envs_host_end(const EnvsArrays *all, const EnvsStep *call, long robot);
 void envs_host_first(const EnvsArrays *all, const EnvsStep *call, long robot);
 /* From arrays.command to the environment. */
 void envs_host_set_command(const EnvsArrays *all, long robot);
-/* From the environment to arrays.kept, or back. */
+/* From the environment to arrays.progress, or back. */
 void envs_host_move_progress(const EnvsArrays *all, int back);
 /* Fills arrays.tally. */
 void envs_host_tally(const EnvsArrays *all);
@@ -48,7 +48,7 @@ typedef struct {
     const char *(*first)(const EnvsArrays *all, const EnvsStep *call, void *stream);
     const char *(*part)(const EnvsArrays *all, const EnvsStep *call, int k, void *stream);
     const char *(*end)(const EnvsArrays *all, const EnvsStep *call, void *stream);
-    const char *(*keep)(const EnvsArrays *all, int back, void *stream);
+    const char *(*move_progress)(const EnvsArrays *all, int back, void *stream);
     const char *(*set_command)(const EnvsArrays *all, void *stream);
     const char *(*tally)(const EnvsArrays *all, void *stream);
 } EnvsKernels;

@@ -147,38 +147,38 @@ static void copy_last(const Mujoco *m, int piece, const TaskView *view) {
     copy_row(view->frame, shape->observation, valid, last.frame);
 }
 
-/* An environment in a policy step, for its TaskProbe and TaskDrive. */
+/* An environment in a policy step, for its TaskCallback and TaskDrive. */
 typedef struct {
     const Mujoco *m;
     int env;
     EnvsSample *sample; /* of the next physics step; NULL: none */
-} Watched;
+} Sampling;
 
 static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const double *torque) {
-    Watched *watched = context;
-    if (watched->sample) {
-        envs_read_sample(env, sim, torque, watched->sample++);
+    Sampling *sampling = context;
+    if (sampling->sample) {
+        envs_read_sample(env, sim, torque, sampling->sample++);
     }
 }
 
 static void drive(void *context, const TaskEnv *env, RobotSim *sim, double *torque) {
-    const Watched *watched = context;
-    const EnvsDrive *by = &watched->m->drive;
-    by->torque(by->self, watched->env, env, sim, torque);
+    const Sampling *sampling = context;
+    const EnvsDrive *by = &sampling->m->drive;
+    by->torque(by->self, sampling->env, env, sim, torque);
 }
 
 /* The policy step of an environment; again: bool, a new episode follows where it ends. */
 static TaskStep step_env(const Mujoco *m, int i, RobotSim *sim, int again, const TaskView *view) {
     const size_t steps = (size_t)m->base.physics_steps;
     const float *action = m->step->action + (size_t)i * (size_t)m->shape.actions;
-    Watched watched = {m, i, m->sample ? m->sample + (size_t)i * steps : NULL};
-    const TaskDrive driven = {drive, &watched};
-    const TaskProbe probe = {watch, &watched, m->drive.torque ? &driven : NULL};
+    Sampling sampling = {m, i, m->sample ? m->sample + (size_t)i * steps : NULL};
+    const TaskDrive driven = {drive, &sampling};
+    const TaskCallback callback = {watch, &sampling, m->drive.torque ? &driven : NULL};
     for (size_t k = 0; m->sample && k < steps; k++) {
-        watched.sample[k].valid = 0;
+        sampling.sample[k].valid = 0;
     }
     return task_env_step(env_at(m, i), &m->def, m->robot, sim, action, again, view,
-                         m->sample || m->drive.torque ? &probe : NULL);
+                         m->sample || m->drive.torque ? &callback : NULL);
 }
 
 static void step_piece(void *context, int piece, int thread) {
@@ -229,6 +229,9 @@ static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError
         step->done[i] = result->done;
         step->timeout[i] = result->timeout;
         step->valid[i] = result->valid;
+        if (step->cause) {
+            step->cause[i] = result->cause;
+        }
         stats->diverged += !result->valid;
         stats->paid += (double)result->reward;
         if (result->done) {
@@ -275,6 +278,7 @@ void envs_read_sample(const TaskEnv *env, const RobotSim *sim, const double *tor
     sample->feet = env->shape.feet;
     memcpy(sample->base, qpos, sizeof sample->base);
     sample->above = qpos[2] - mild_terrain_height_at(task_env_terrain(env), qpos[0], qpos[1]);
+    sample->legs = robot_sim_leg_distance(sim);
     memcpy(sample->quaternion, qpos + 3, sizeof sample->quaternion);
     memcpy(sample->mass_center, robot_sim_mass_center(sim), sizeof sample->mass_center);
     memcpy(sample->torque, torque, joints * sizeof *torque);

@@ -75,7 +75,7 @@ static MildStatus press_open(Press *press, const PressDef *def, const MildSole *
         return error->status;
     }
     press->terrain.height = -mild_terrain_height_at(&press->terrain, 0, 0);
-    size_t bytes = mild_ground_bytes_imprints(&sole, 1, def->print_tiles);
+    size_t bytes = mild_ground_bytes_imprints(&sole, 1, def->imprint_tiles);
     press->block = aligned_alloc(64, 2 * bytes);
     if (!press->block) {
         return mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
@@ -85,7 +85,7 @@ static MildStatus press_open(Press *press, const PressDef *def, const MildSole *
         free(press->block);
         return MILD_ERROR_MEMORY;
     }
-    press->ground = mild_ground_init_imprints(press->block, &sole, 1, def->print_tiles);
+    press->ground = mild_ground_init_imprints(press->block, &sole, 1, def->imprint_tiles);
     press->spare = (char *)press->block + bytes;
     double c = cos(def->tilt), s = sin(def->tilt);
     const double rotation[9] = {c, 0, s, 0, 1, 0, -s, 0, c}; /* about y */

@@ -12,7 +12,7 @@ enum { PRESS_TURNS_MAX = 16 };
 typedef struct {
     MildMaterial material;
     const MildMap *map; /* borrowed; NULL: level. Its height at the start has depth 0 */
-    int print_tiles;    /* see mild_ground_bytes_imprints */
+    int imprint_tiles;  /* see mild_ground_bytes_imprints */
     MildSolver solver;
     double tilt; /* [rad] about y, front edge down positive */
     double step; /* [s] time step; 0: a thousandth of the first way (0.02 mm with by_force), 1e-4

@@ -37,6 +37,7 @@ typedef struct {
 typedef struct {
     RobotDef def; /* only the scalars of [robot] */
     char shells[LIST_SIZE];
+    char legs[LIST_SIZE];
 } RobotText;
 
 #define TEXT(Struct, member, help)                                                                 \
@@ -55,6 +56,7 @@ static const MildField robot_fields[] = {
     RT(source, "[text] source of the numbers, and their licence"),
     RT(base, "[text] body with the free joint"),
     TEXT(RobotText, shells, "[text] geoms of the MJCF that must not touch the ground"),
+    TEXT(RobotText, legs, "[text] geoms of the MJCF by which the legs touch each other"),
     R(height, 1, 0.01, 5, "[m] wanted height of the base above the stance soles"),
     R(action_scale, 1, 0.01, 2, "[rad] joint offset per unit of action"),
     R(feet_range, 2, 0, 5, "[m] limits of the lateral distance of mirrored feet"),
@@ -568,8 +570,9 @@ static MildStatus take_robot(Reader *reader) {
     RobotDef *def = reader->def;
     *def = reader->robot.def;
     for (int k = 0; k < ROBOT_KEYS; k++) {
-        if (!reader->robot_seen[k] && strcmp(robot_fields[k].name, "source") != 0) {
-            return fail_key(reader, "robot", robot_fields[k].name, "is missing");
+        const char *key = robot_fields[k].name;
+        if (!reader->robot_seen[k] && strcmp(key, "source") != 0 && strcmp(key, "legs") != 0) {
+            return fail_key(reader, "robot", key, "is missing");
         }
     }
     if (def->feet_range[0] > def->feet_range[1] || def->knee_range[0] > def->knee_range[1]) {
@@ -577,7 +580,9 @@ static MildStatus take_robot(Reader *reader) {
     }
     def->shells =
         take_names(reader, "robot", "shells", reader->robot.shells, def->shell, ROBOT_SHELLS_MAX);
-    return def->shells < 0 ? reader->status : MILD_OK;
+    def->legs =
+        take_names(reader, "robot", "legs", reader->robot.legs, def->leg, ROBOT_CAPSULES_MAX);
+    return def->shells < 0 || def->legs < 0 ? reader->status : MILD_OK;
 }
 
 static MildStatus take_all(Reader *reader) {

@@ -6,6 +6,8 @@
 
 #define ROBOT_NAME_SIZE 64
 #define ROBOT_SHELLS_MAX 32   /* geoms that must not touch the ground */
+#define ROBOT_CAPSULES_MAX 16 /* geoms by which legs touch each other */
+#define ROBOT_LEG_PAIRS_MAX 64
 #define ROBOT_OUTLINE_MAX 128 /* points of a sole's outline */
 #define ROBOT_CORNERS_MAX 16  /* spheres of a foot on the engine's rigid ground */
 #define ROBOT_ELEMENTS_MAX 65536
@@ -46,6 +48,8 @@ typedef struct {
     RobotName base;   /* body with the free joint */
     RobotName shell[ROBOT_SHELLS_MAX];
     int shells;
+    RobotName leg[ROBOT_CAPSULES_MAX];
+    int legs;             /* 0: legs do not touch each other */
     double height;        /* [m] wanted height of the base above the stance soles */
     double action_scale;  /* [rad] joint offset per unit of action */
     double feet_range[2]; /* [m] limits of the lateral distance of mirrored feet */

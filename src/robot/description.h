@@ -28,11 +28,21 @@ typedef struct {
  * are inflated boxes of zero width. */
 typedef struct {
     int body;
+    int on_base;        /* bool: of the base, or of a body welded to it */
     double center[3];   /* [m] body frame */
     double rotation[9]; /* [-] box -> body, row major */
     double half[3];     /* [m] */
     double radius;      /* [m] */
 } RobotShell;
+
+/* A part of a leg that touches other legs (robot/legs.h). */
+typedef struct {
+    int body;
+    int foot;         /* of its leg */
+    double center[3]; /* [m] body frame */
+    double half[3];   /* [m] from the centre to the end of the axis */
+    double radius;    /* [m] */
+} RobotCapsule;
 
 typedef struct Robot {
     RobotDef def;
@@ -57,9 +67,13 @@ typedef struct Robot {
     double effort[ROBOT_JOINTS_MAX];  /* [N m] */
     int shells;
     RobotShell shell[ROBOT_SHELLS_MAX];
-    double total_mass;   /* [kg] */
-    double stand_height; /* [m] base above the soles in the default pose */
-    RobotTable table;    /* what the task needs of all this */
+    int capsules;
+    RobotCapsule capsule[ROBOT_CAPSULES_MAX];
+    int leg_pairs;                        /* of capsules of different legs */
+    int leg_pair[ROBOT_LEG_PAIRS_MAX][2]; /* numbers of capsules */
+    double total_mass;                    /* [kg] */
+    double stand_height;                  /* [m] base above the soles in the default pose */
+    RobotTable table;                     /* what the task needs of all this */
 } Robot;
 
 /* Compiles the MJCF at robot->path into robot->visual. Compiles the part that a step needs, with a
@@ -75,6 +89,7 @@ MildStatus robot_read_bodies(Robot *robot, MildError *error);
 MildStatus robot_read_joints(Robot *robot, MildError *error);
 MildStatus robot_read_limbs(Robot *robot, MildError *error);
 MildStatus robot_read_shells(Robot *robot, MildError *error);
+MildStatus robot_read_legs(Robot *robot, MildError *error);
 MildStatus robot_read_soles(Robot *robot, MildError *error);
 MildStatus robot_read_stand(Robot *robot, MildError *error);
 

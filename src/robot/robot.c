@@ -208,6 +208,7 @@ MildStatus robot_read_shells(Robot *robot, MildError *error) {
             return mild_fail(error, MILD_ERROR_FORMAT, "%s: the body of geom '%s' needs a name",
                              robot->path, name);
         }
+        shell->on_base = robot->model->body_weldid[shell->body] == robot->base_body;
         memcpy(shell->center, m->geom_pos + 3 * id, sizeof shell->center);
         mju_quat2Mat(shell->rotation, m->geom_quat + 4 * id);
     }
@@ -363,8 +364,8 @@ static MildStatus read_robot(Robot *robot, const char *folder, MildError *error)
         return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", folder);
     }
     static MildStatus (*const parts[])(Robot *, MildError *) = {
-        robot_load_models, check_models,      robot_read_bodies, robot_read_joints,
-        robot_read_limbs,  robot_read_shells, robot_read_soles,  robot_read_stand};
+        robot_load_models, check_models,    robot_read_bodies, robot_read_joints, robot_read_limbs,
+        robot_read_shells, robot_read_legs, robot_read_soles,  robot_read_stand};
     for (size_t i = 0; status == MILD_OK && i < sizeof parts / sizeof *parts; i++) {
         status = parts[i](robot, error);
     }

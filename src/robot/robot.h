@@ -126,10 +126,15 @@ double robot_sim_sole_clearance(RobotSim *sim, const MildTerrain *terrain);
 /* [m] Height of the lowest point of the shells above the undisturbed ground; negative when a shell
  * touches it. */
 double robot_sim_body_clearance(const RobotSim *sim, const MildTerrain *terrain);
+/* [m] The same of the shells of the base and of bodies welded to it; 1e9 without any. */
+double robot_sim_base_clearance(const RobotSim *sim, const MildTerrain *terrain);
 /* [m] Smallest lateral distance between mirrored knees, and between mirrored sole centres, in the
  * base's heading frame. Negative when the legs are crossed; 1e9 without such a pair. */
 double robot_sim_knee_distance(const RobotSim *sim);
 double robot_sim_foot_distance(const RobotSim *sim);
+/* [m] Least distance of two legs, between the capsules of [robot] legs; negative: overlap. 1e9
+ * without two legs. */
+double robot_sim_leg_distance(const RobotSim *sim);
 const MildScratch *robot_sim_scratch(const RobotSim *sim);
 const MildContactResult *robot_sim_contact(const RobotSim *sim);
 /* Input of the last step on soft ground. */

@@ -321,6 +321,7 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
     sim->data->ncon = 0;
     if (rigid) {
         accelerate(sim);
+        legs_push(sim, 0);
         t = split(sim, &phases->smooth, t);
         rigid_collide(sim, terrain);
         t = split(sim, &phases->ground, t);
@@ -329,6 +330,7 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
     } else {
         const int rows = limits_make(sim), held = limits_hold(sim);
         accelerate(sim);
+        legs_push(sim, held);
         t = split(sim, &phases->smooth, t);
         free_feet(sim);
         t = split(sim, &phases->map, t);
@@ -392,13 +394,25 @@ static double shell_lowest(const RobotSim *sim, const RobotShell *shell, double 
     return low;
 }
 
-double robot_sim_body_clearance(const RobotSim *sim, const MildTerrain *terrain) {
+/* on_base: bool, of these shells alone. */
+static double least_clearance(const RobotSim *sim, const MildTerrain *terrain, int on_base) {
     double least = 1e9;
     for (int s = 0; s < sim->robot->shells; s++) {
-        double under[2], low = shell_lowest(sim, &sim->robot->shell[s], under);
-        least = fmin(least, low - mild_terrain_height_at(terrain, under[0], under[1]));
+        const RobotShell *shell = &sim->robot->shell[s];
+        double under[2], low = shell_lowest(sim, shell, under);
+        if (shell->on_base || !on_base) {
+            least = fmin(least, low - mild_terrain_height_at(terrain, under[0], under[1]));
+        }
     }
     return least;
+}
+
+double robot_sim_body_clearance(const RobotSim *sim, const MildTerrain *terrain) {
+    return least_clearance(sim, terrain, 0);
+}
+
+double robot_sim_base_clearance(const RobotSim *sim, const MildTerrain *terrain) {
+    return least_clearance(sim, terrain, 1);
 }
 
 /* [m] Component of b - a along the base's lateral axis (to the left), projected onto the horizontal

@@ -63,6 +63,10 @@ int limits_hold(RobotSim *sim);
 /* And back to M and f. */
 void limits_release(RobotSim *sim, int held);
 
+/* Adds the contact forces between the legs to qfrc_smooth and qacc_smooth. Needs the factorised
+ * mass matrix and qacc_smooth; held: of limits_hold. */
+void legs_push(RobotSim *sim, int held);
+
 /* The engine's own contact: finds the contacts of the feet's corners with the ground. */
 void rigid_collide(RobotSim *sim, const MildTerrain *terrain);
 /* Once they are solved: writes the mean wrench on each foot over the step to sim->contact. */

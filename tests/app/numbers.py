@@ -51,6 +51,15 @@ for what, is_, wanted, within in (
         ("measured", r["measured"], 2, 0), ("turn", r["turn"], 0, 0), ("push", r["push"], 0, 0)):
     near(what, is_, wanted, within)
 
+# what ended the trials, one by one
+near("trials by their ends", sum(r["ends"].values()), trials, 0)
+near("trials one by one", len(r["each"]), trials, 0)
+for end, count in r["ends"].items():
+    near(f"trials ended by {end}", count, sum(x["end"] == end for x in r["each"]), 0)
+near("least distance of the legs", r["legs"], min(x["legs"] for x in r["each"]), 0)
+near("seconds of the trials", mean(x["seconds"] for x in r["each"]), r["seconds"], 1e-9)
+near("trials ended by time", r["ends"]["time"], upright, 0)
+
 # the stances: what the means are of
 near("penetration of the stances", r["penetration"], mean(float(x["depth_m"]) for x in s), 1e-6)
 near("drift_forward", r["drift_forward"], mean(abs(float(x["forward_m"])) for x in s), 1e-6)

@@ -230,7 +230,7 @@ static Run run(const char *ground, double speed, double seconds) {
     TaskView none = {0};
     ControllerRow row = {&controller, 0};
     TaskDrive drive = {controller_row_torque, &row};
-    TaskProbe probe = {see_nothing, NULL, &drive};
+    TaskCallback callback = {see_nothing, NULL, &drive};
     Run out = {.z_low = 1e9};
     task_env_init(env, &def, robot, 1, 0);
     env->command_frozen = 1;
@@ -240,7 +240,7 @@ static Run run(const char *ground, double speed, double seconds) {
     for (int t = 0; !out.fell && t < (int)(seconds / TASK_PERIOD); t++) {
         float action[ROBOT_JOINTS_MAX];
         controller.act(controller.self, 1, &env, action);
-        if (task_env_step(env, &def, robot, sim, action, 0, &none, &probe).done) {
+        if (task_env_step(env, &def, robot, sim, action, 0, &none, &callback).done) {
             out.fell = t + 1;
         }
         out.z_low = fmin(out.z_low, env->robot.qpos[2]);

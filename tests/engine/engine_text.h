@@ -38,6 +38,7 @@ typedef struct {
     double body_clearance;                   /* [m] above the height of the case */
     double knee_distance;                    /* [m] */
     double foot_distance;                    /* [m] */
+    double leg_distance;                     /* [m] */
     double sole_height[ROBOT_FEET_MAX];      /* [m] */
     double sole_center[ROBOT_FEET_MAX][3];   /* [m] */
     double sole_velocity[ROBOT_FEET_MAX][3]; /* [m/s] */

@@ -8,6 +8,7 @@
 #include <mujoco/mujoco.h>
 
 #include "engine_text.h"
+#include "robot/legs.h"
 #include "robot/sim.h"
 
 enum { ROWS_MAX = 6 * ROBOT_FEET_MAX };
@@ -32,12 +33,14 @@ typedef struct {
     double body_clearance;
     double knee_distance;
     double foot_distance;
+    double leg_distance;
     double sole_height[ROBOT_FEET_MAX];
     double sole_center[ROBOT_FEET_MAX][3];
     double sole_velocity[ROBOT_FEET_MAX][3];
     double next_velocity[ROWS_MAX];
     double next_position[ROBOT_FEET_MAX][3];
     int rows; /* joints beyond a limit, or edges of contacts */
+    int legs; /* pairs that push */
     int held; /* limits that are taken to push */
     double held_inertia[ROBOT_NV_MAX], held_force[ROBOT_NV_MAX]; /* theirs: N - M and f' - f */
 } Oracle;
@@ -132,6 +135,45 @@ static inline void oracle_forces(RobotSim *sim, const EngineCase *in, Oracle *o)
         o->force[i] += o->held_force[i];
     }
     mj_solveM(m, d, o->smooth, o->force, 1);
+}
+
+static inline LegCapsule oracle_capsule(const RobotSim *sim, int c) {
+    const RobotCapsule *from = &sim->robot->capsule[c];
+    LegCapsule capsule = {.radius = from->radius};
+    mju_mulMatVec3(capsule.half, sim->data->xmat + 9 * from->body, from->half);
+    mju_mulMatVec3(capsule.center, sim->data->xmat + 9 * from->body, from->center);
+    mju_addTo3(capsule.center, sim->data->xpos + 3 * from->body);
+    return capsule;
+}
+
+/* Legs that meet, pair by pair: an impulse on the points of both bodies at which they touch. */
+static inline void oracle_legs(RobotSim *sim, Oracle *o) {
+    const mjModel *m = sim->model;
+    mjData *d = sim->data;
+    const double *R = d->xmat + 9 * sim->robot->base_body, left[3] = {R[1], R[4], R[7]};
+    for (int n = 0; n < sim->robot->leg_pairs; n++) {
+        const int *pair = sim->robot->leg_pair[n];
+        const LegCapsule a = oracle_capsule(sim, pair[0]), b = oracle_capsule(sim, pair[1]);
+        LegGap gap;
+        double row[ROBOT_NV_MAX] = {0}, gain[ROBOT_NV_MAX], away[3], none[3] = {0};
+        legs_gap(&a, &b, left, &gap);
+        if (gap.gap >= 0.01) {
+            continue;
+        }
+        mju_scl3(away, gap.normal, -1);
+        mj_applyFT(m, d, gap.normal, none, gap.point, sim->robot->capsule[pair[1]].body, row);
+        mj_applyFT(m, d, away, none, gap.point, sim->robot->capsule[pair[0]].body, row);
+        mj_solveM(m, d, gain, row, 1);
+        const double allowed = gap.gap > 0 ? -gap.gap / sim->dt : -gap.gap / 2 / sim->dt;
+        const double lacking = allowed - oracle_dot(row, d->qvel, (int)m->nv);
+        if (lacking > 0) {
+            const double force = lacking / sim->dt /
+                                 (oracle_dot(row, gain, (int)m->nv) + 1 / sim->robot->total_mass);
+            mju_addToScl(o->force, row, force, (int)m->nv);
+            mju_addToScl(o->smooth, gain, force, (int)m->nv);
+            o->legs++;
+        }
+    }
 }
 
 static inline void oracle_feet(RobotSim *sim, Oracle *o) {
@@ -253,6 +295,7 @@ static inline void oracle_measure(RobotSim *sim, const EngineCase *in, Oracle *o
     o->body_clearance = robot_sim_body_clearance(sim, &terrain);
     o->knee_distance = robot_sim_knee_distance(sim);
     o->foot_distance = robot_sim_foot_distance(sim);
+    o->leg_distance = robot_sim_leg_distance(sim);
     robot_sim_sole_clearance(sim, &terrain);
     for (int f = 0; f < sim->robot->def.feet; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
@@ -272,6 +315,8 @@ static inline void oracle_step(RobotSim *sim, const EngineCase *in, Oracle *o) {
     oracle_hold(sim, in, o);
     oracle_matrices(sim, o);
     oracle_forces(sim, in, o);
+    o->legs = 0;
+    oracle_legs(sim, o);
     oracle_feet(sim, o);
     memcpy(o->wrenched, o->smooth, sizeof o->smooth);
     sim->data->ncon = 0;

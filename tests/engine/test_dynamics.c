@@ -22,6 +22,10 @@
 #define LIMIT_HELD 1e-3   /* of N in float: 1/R of a limit that is exceeded by a ten thousandth */
 #define LIMIT_WRENCH 1e-3 /* of rigid ground in float: small differences of stiff rows */
 
+/* [m] Random poses put legs into each other, which no motion does. Where axes nearly meet, float
+ * does not have their normal. */
+#define LEGS_DEEP 0.01
+
 /* ---- robots ---- */
 
 typedef struct {
@@ -224,6 +228,7 @@ static void note_measures(const Kit *kit, Worst worst) {
     note(worst, MEASURES, fabs(result.body_clearance - oracle.body_clearance));
     note(worst, MEASURES, fabs(result.knee_distance - oracle.knee_distance));
     note(worst, MEASURES, fabs(result.foot_distance - oracle.foot_distance));
+    note(worst, MEASURES, fabs(result.leg_distance - oracle.leg_distance));
     for (int f = 0; f < kit->tree.feet; f++) {
         note(worst, MEASURES, fabs(result.sole_height[f] - oracle.sole_height[f]));
         for (int k = 0; k < 3; k++) {
@@ -298,7 +303,7 @@ static void run_case(const Kit *kit, const EngineCase *in, Worst at_double, doub
     engine_text_double(&kit->tree, kit->number, in, &result);
     note_case(kit, in, before, at_double);
     *newton = result.newton > *newton ? result.newton : *newton;
-    if (!at_float) {
+    if (!at_float || oracle.leg_distance < -LEGS_DEEP) {
         return;
     }
     engine_text_float(&kit->tree, kit->number, in, &result);
@@ -311,17 +316,19 @@ static void test_random_states(void **unused) {
     static const int cases[KITS] = {10000, 10000, 3000, 10000, 600};
     for (int k = 0; k < KITS; k++) {
         Worst at_double = {0}, at_float = {0};
-        int limited = 0, held = 0, newton = 0;
+        int limited = 0, held = 0, newton = 0, legs = 0;
         for (uint32_t draw = 0; draw < (uint32_t)cases[k]; draw++) {
             EngineCase in = random_case(kits[k].robot, draw);
             run_case(&kits[k], &in, at_double, at_float, &newton);
+            legs += oracle.legs > 0;
             limited += oracle.rows > 0;
             held += oracle.held > 0;
         }
         print_worst(kit_name[k], cases[k], at_double, at_float);
-        print_message("    beyond limits: %d, held %d; at most %d Newton steps\n", limited, held,
-                      newton);
+        print_message("    beyond limits: %d, held %d, legs meet: %d; at most %d Newton steps\n",
+                      limited, held, legs, newton);
         check_worst(at_double, at_float, LIMIT_FLOAT);
+        assert_true(legs > cases[k] / 60 || k > G1_KIT);
         assert_true(limited > cases[k] / 5 && held > limited / 3);
     }
 }

@@ -23,7 +23,7 @@ typedef struct {
     float frame[ENVS * TASK_OBSERVATION_MAX];
     float action[ENVS * ROBOT_JOINTS_MAX];
     float reward[ENVS];
-    uint8_t done[ENVS], timeout[ENVS], valid[ENVS];
+    uint8_t done[ENVS], timeout[ENVS], valid[ENVS], cause[ENVS];
 } Rows;
 
 typedef struct {
@@ -118,6 +118,7 @@ static EnvsStep step_of(Rows *rows) {
                       .done = rows->done,
                       .timeout = rows->timeout,
                       .valid = rows->valid,
+                      .cause = rows->cause,
                       .next = view_of(rows)};
 }
 
@@ -232,6 +233,7 @@ static void follow(const char *robot, TaskDef def, int device, const MildMapDef 
     MildMap *map = on ? mild_map_create(on, NULL) : NULL;
     def.map = map;
     int apart[ENVS] = {0}, steps = 0, together = 0, done = 0, timeouts = 0;
+    int ends[TASK_END_COUNT] = {0};
     double worst = 0;
     pair_open(robot, &def, device);
     pair_reset();
@@ -257,6 +259,8 @@ static void follow(const char *robot, TaskDef def, int device, const MildMapDef 
             }
             worst = fmax(worst, t < 10 ? gap : 0);
             assert_int_equal(pair.a.timeout[e], pair.b.timeout[e]);
+            assert_int_equal(pair.a.cause[e], pair.b.cause[e]);
+            ends[pair.b.cause[e]] += pair.b.done[e];
             assert_int_equal(pair.a.valid[e], pair.b.valid[e]);
             compare(t, e, 1e-2);
             if (device == MILD_BATCH_HOST && pair.b.done[e]) {
@@ -269,6 +273,9 @@ static void follow(const char *robot, TaskDef def, int device, const MildMapDef 
         "first ten steps differ by %.1e\n",
         robot_name(pair.robot), mild_model_names[model], device, together, steps, done, timeouts,
         worst);
+    for (int end = 0; end < TASK_END_COUNT; end++) {
+        printf("%s %d%s", task_end_names[end], ends[end], end < TASK_END_COUNT - 1 ? ", " : "\n");
+    }
     assert_true(together > least * steps && done > 20 && timeouts > 5);
     pair_close();
     mild_map_destroy(map);

@@ -6,7 +6,7 @@
 #include "run/envs/envs.h"
 #include "sa01.h"
 
-enum { ENVS = 5, STEPS = 60 };
+enum { ENVS = 5, STEPS = 100 };
 
 static const char *const keys[] = {"train.envs=5", "train.threads=2", "train.seed=7",
                                    "terrain.kind=waves", "train.robots=mujoco"};
@@ -54,7 +54,7 @@ static void close_plain(Plain *plain) {
 
 static void draw_actions(int step, float action[ENVS][SA01_JOINTS]) {
     for (int i = 0; i < ENVS * SA01_JOINTS; i++) {
-        action[i / SA01_JOINTS][i % SA01_JOINTS] = (float)(1.5 * sin(0.3 * step + i));
+        action[i / SA01_JOINTS][i % SA01_JOINTS] = (float)(2.5 * sin(0.3 * step + i));
     }
 }
 
@@ -178,8 +178,14 @@ static void ends(void **state) {
     for (int t = 0; t < 2 * STEPS; t++) {
         float action[ENVS][SA01_JOINTS];
         draw_actions(t, action);
-        const EnvsStep step = {action[0], a.reward, a.done, a.timeout,
-                               a.valid,   first,    end,    terms[0]};
+        const EnvsStep step = {.action = action[0],
+                               .reward = a.reward,
+                               .done = a.done,
+                               .timeout = a.timeout,
+                               .valid = a.valid,
+                               .next = first,
+                               .last = end,
+                               .terms = terms[0]};
         EnvsStep plainly = step;
         plainly.reward = b.reward;
         plainly.done = b.done;
@@ -223,8 +229,13 @@ static void no_ends(void **state) {
     batch[KEYS - 1] = "train.robots=batch";
     MildEnvs *envs = open_envs(batch, KEYS);
     float action[ENVS][SA01_JOINTS] = {{0}};
-    const EnvsStep step = {action[0],  rows.reward,    rows.done,      rows.timeout,
-                           rows.valid, view_of(&rows), view_of(&last), NULL};
+    const EnvsStep step = {.action = action[0],
+                           .reward = rows.reward,
+                           .done = rows.done,
+                           .timeout = rows.timeout,
+                           .valid = rows.valid,
+                           .next = view_of(&rows),
+                           .last = view_of(&last)};
     MildError error = {0};
     assert_int_equal(mild_envs_reset(envs, &step.next, NULL, NULL), MILD_OK);
     assert_int_equal(mild_envs_step(envs, &step, NULL, &error), MILD_ERROR_ARGUMENT);

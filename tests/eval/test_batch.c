@@ -238,6 +238,8 @@ static void falls_are_counted(void **state) {
     assert_true(asked.calls == 400 && asked.rows == 8);
     assert_int_equal(kit_run(&def, pool, &controller, scene, &eval, &own, &error), MILD_OK);
     assert_true(rows[0].success == own.success && rows[0].success == 0);
+    assert_memory_equal(rows[0].ends, own.ends, sizeof own.ends);
+    assert_int_equal(own.ends[TASK_END_time], 0);
     assert_true(own.seconds > 0.2 && fabs(rows[0].seconds / own.seconds - 1) < 0.1);
     assert_true(fabs(rows[0].energy / own.energy - 1) < 0.1);
     pool_destroy(pool);
@@ -334,9 +336,9 @@ static void what_is_not_there_is_refused(void **state) {
     def.newton = 0;
     refused("grass", 1, 1, "task.newton = 0");
     def.newton = 1;
-    def.print_tiles = 8;
+    def.imprint_tiles = 8;
     refused("grass", 1, 1, "terrain.memory");
-    def.print_tiles = 0;
+    def.imprint_tiles = 0;
 }
 
 int main(void) {

@@ -1,6 +1,8 @@
 /* Scenes by name, the heading hold, and trials: who falls, who does not, which random numbers. */
 #include "eval_kit.h"
 
+#include <mujoco/mujoco.h>
+
 static void scenes_by_name(void **state) {
     (void)state;
     Scene scene;
@@ -281,9 +283,10 @@ static void a_row_is_what_its_trials_did(void **state) {
         measure_start(&measure[i], longer.physics_dt);
         for (int k = 0; k < 300; k++) {
             float action[SA01_JOINTS];
-            const TaskProbe probe = {measure_step, &measure[i], NULL};
+            const TaskCallback callback = {measure_step, &measure[i], NULL};
             controller.act(controller.self, 1, &env, action);
-            const TaskStep step = task_env_step(env, &longer, robot, sim, action, 0, &none, &probe);
+            const TaskStep step =
+                task_env_step(env, &longer, robot, sim, action, 0, &none, &callback);
             assert_false(step.done && !step.timeout);
             eval_command(env, 0.5, 0.05);
         }
@@ -404,6 +407,73 @@ static void rigid_inside_a_course(void **state) {
     assert_true(course.penetration < 0.005 && soft.penetration > 0.02);
 }
 
+/* ---- the legs ---- */
+
+/* What is drawn, by MuJoCo, at every decision. */
+typedef struct {
+    mjData *data;
+    double least; /* [m] */
+} Drawn;
+
+static void see_legs(void *context, const EvalDecision *decision) {
+    static const char *const part[] = {"leg_%c3_capsule", "leg_%c4_capsule", "leg_%c6_capsule"};
+    Drawn *drawn = context;
+    const mjModel *m = robot_visual_model(robot);
+    robot_engine_qpos(robot, decision->env->robot.qpos, drawn->data->qpos);
+    mj_kinematics(m, drawn->data);
+    for (int n = 0; n < 9; n++) {
+        int geom[2];
+        for (int side = 0; side < 2; side++) {
+            char name[32];
+            const char *of = part[side ? n % 3 : n / 3];
+            snprintf(name, sizeof name, of, side ? 'r' : 'l');
+            geom[side] = mj_name2id(m, mjOBJ_GEOM, name);
+        }
+        const double distance = mj_geomDistance(m, drawn->data, geom[0], geom[1], 1, NULL);
+        drawn->least = fmin(drawn->least, distance);
+    }
+}
+
+/* Sideways the shipped policy's feet meet. They went 20 mm into each other when nothing held them;
+ * now they touch, and what is reported is what MuJoCo says of the same geoms. */
+static void legs_do_not_cross(void **state) {
+    (void)state;
+    MildError error = {0};
+    Controller controller;
+    EvalTrial each[2];
+    EvalRow row;
+    Scene scene;
+    Pool *pool = pool_create(1);
+    Drawn drawn = {mj_makeData(robot_visual_model(robot)), 1};
+    const EvalCallback callback = {see_legs, &drawn};
+    const double speed = 0;
+    assert_int_equal(controller_learned(POLICY, robot, pool, 2, &controller, &error), MILD_OK);
+    assert_int_equal(scene_make(&scene, "foam45", 2, &error), MILD_OK);
+    const EvalRun run = {
+        .task = &def,
+        .robot = robot,
+        .pool = pool,
+        .controller = &controller,
+        .device = MILD_BATCH_HOST,
+        .scenes = &scene,
+        .scene_count = 1,
+        .speeds = &speed,
+        .speed_count = 1,
+        .eval = {.sideways = 0.3, .trials = 2, .seconds = 6, .seed = 1, .callback = &callback},
+        .each = each};
+    assert_int_equal(eval_run(&run, &row, &error), MILD_OK);
+    printf("sideways at 0.3 m/s: legs %.2f mm apart, drawn at decisions %.2f mm\n", 1e3 * row.legs,
+           1e3 * drawn.least);
+    assert_true(row.success == 2 && row.velocity_sideways > 0.2);
+    assert_true(row.legs < 0 && row.legs > -0.004);
+    assert_true(row.legs <= drawn.least + 1e-5 && row.legs > drawn.least - 0.003);
+    assert_true(row.legs == fmin(each[0].legs, each[1].legs) && each[0].legs != each[1].legs);
+    assert_true(each[0].end == TASK_END_time && fabs(each[0].seconds - 6) < 1e-9);
+    mj_deleteData(drawn.data);
+    controller_destroy(&controller);
+    pool_destroy(pool);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scenes_by_name),
@@ -419,6 +489,7 @@ int main(void) {
         cmocka_unit_test(a_row_is_what_its_trials_did),
         cmocka_unit_test(the_shipped_policy_walks),
         cmocka_unit_test(speed_is_measured_until_the_stop),
+        cmocka_unit_test(legs_do_not_cross),
     };
     return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
 }

@@ -578,6 +578,12 @@ static void the_printed_row(void **state) {
     row.cot = NAN;
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "19/20      - +-     -     -    98.8"));
+    row.turn = row.sideways = 0;
+    row.ends[TASK_END_time] = 17;
+    row.ends[TASK_END_tilt] = 2;
+    row.ends[TASK_END_joint] = 1;
+    eval_print_row(&row, text, sizeof text);
+    assert_non_null(strstr(text, "       -  ended by: 2 tilt, 1 joint"));
     char header[256];
     eval_print_header(header, sizeof header);
     printf("%s\n%s\n", header, text);

@@ -77,7 +77,7 @@ static uint64_t hash_rollout(const TaskDef *def) {
     for (int t = 0; t < STEPS; t++) {
         for (int i = 0; i < ENVS * SA01_JOINTS; i++) {
             Random random = random_at(99, (uint32_t)i, (uint32_t)t);
-            action[i] = (float)(1.2 * random_normal(&random));
+            action[i] = (float)(2.5 * random_normal(&random));
         }
         envs_step(envs, &step, NULL, &error);
         hash = pin_hash(hash, history, sizeof history);
@@ -99,7 +99,7 @@ static void pin_short_walk(const char *ground, const TaskDef *like) {
     TaskDef def = kit_quiet_def();
     def.randomize.model = like->randomize.model;
     def.map = like->map;
-    def.print_tiles = like->print_tiles;
+    def.imprint_tiles = like->imprint_tiles;
     Rig rig;
     double reward = 0, load = 0;
     char name[96];
@@ -155,7 +155,7 @@ static void rollout_on_a_map(void **unused) {
     assert_non_null(map);
     TaskDef def = task_def_default();
     def.map = map;
-    def.print_tiles = 64;
+    def.imprint_tiles = 64;
     pin_exact("rollout.map", PIN_ON_MUJOCO, hash_rollout(&def));
     pin_short_walk("map", &def);
     mild_map_destroy(map);

@@ -41,11 +41,11 @@ static void note_step(void *context, const TaskEnv *env, const RobotSim *sim,
 
 /* One policy step, traced. */
 static TaskStep traced_step(const float *action) {
-    const TaskProbe probe = {note_step, NULL, NULL};
+    const TaskCallback callback = {note_step, NULL, NULL};
     trace.count = 0;
     task_env_load(rig.env, rig.sim);
     note_state();
-    return task_env_step(rig.env, &rig.def, robot, rig.sim, action, 0, &rig.view, &probe);
+    return task_env_step(rig.env, &rig.def, robot, rig.sim, action, 0, &rig.view, &callback);
 }
 
 /* A drive that asks for 3 N m of every joint, and for much more of the first of each leg. */
@@ -89,10 +89,10 @@ static void drive(void **unused) {
     open_with_dt(0.0025);
     int calls = 0;
     const TaskDrive asked = {ask_torque, &calls};
-    const TaskProbe probe = {note_step, NULL, &asked};
+    const TaskCallback callback = {note_step, NULL, &asked};
     float action[SA01_JOINTS] = {0};
     trace.count = 0;
-    task_env_step(rig.env, &rig.def, robot, rig.sim, action, 0, &rig.view, &probe);
+    task_env_step(rig.env, &rig.def, robot, rig.sim, action, 0, &rig.view, &callback);
     assert_int_equal(calls, 4);
     for (int k = 1; k <= 4; k++) {
         for (int i = 0; i < SA01_JOINTS; i++) {

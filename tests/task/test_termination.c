@@ -26,6 +26,15 @@ static void expect_end(const char *what, TaskStep step, int done, int timeout) {
     }
 }
 
+/* Both sides of a limit whose other side ends by `cause`. */
+static void expect_cause(const char *what, TaskStep step, int done, TaskEnd cause) {
+    expect_end(what, step, done, 0);
+    if (step.cause != (done ? cause : TASK_END_time)) {
+        fail_msg("%s: ended by %s instead of %s", what, task_end_names[step.cause],
+                 task_end_names[cause]);
+    }
+}
+
 static void expect_alive(const char *what, TaskStep step) {
     expect_end(what, step, 0, 0);
 }
@@ -48,8 +57,8 @@ static void tilt(void **unused) {
                 double angle = sign * (limits[l] + (past ? 0.01 : -0.01));
                 RobotState state = kit_state(2);
                 kit_turn(state.qpos, 0.7, k < 2 ? angle : 0, k < 2 ? 0 : angle);
-                expect_end(past ? "past the tilt limit" : "below the tilt limit",
-                           step_from(&state, 10), past, 0);
+                expect_cause(past ? "past the tilt limit" : "below the tilt limit",
+                             step_from(&state, 10), past, TASK_END_tilt);
             }
         }
     }
@@ -91,13 +100,14 @@ static double lowest_of_box(const RobotState *state, const char *name) {
 
 /* The box ends the step 1 mm above, or below, the ground at `height`. Legs that would reach the
  * ground earlier are folded up. */
-static void touch(const RobotState *from, const char *box, double height, const char *what) {
+static void touch(const RobotState *from, const char *box, double height, const char *what,
+                  TaskEnd cause) {
     for (int past = 0; past < 2; past++) {
         RobotState state = *from;
         state.qvel[2] = -0.1;
         state.qpos[2] += height + FALL + (past ? -1e-3 : 1e-3) - lowest_of_box(&state, box);
         task_env_rest(rig.env)->terrain.height = height;
-        expect_end(what, step_from(&state, 10), past, 0);
+        expect_cause(what, step_from(&state, 10), past, cause);
     }
 }
 
@@ -112,7 +122,7 @@ static void deep(const RobotState *from, const char *box) {
             state.qpos[2] += FALL + (past ? -1e-3 : 1e-3) - lowest_of_box(&state, box);
             state.qpos[2] -= rigid ? 0 : rig.def.shell_depth;
             task_env_rest(rig.env)->terrain.height = 0;
-            expect_end("deep", step_from(&state, 10), past, 0);
+            expect_cause("deep", step_from(&state, 10), past, TASK_END_base);
         }
     }
     rig.env->variation.rigid = 0;
@@ -141,8 +151,8 @@ static void base_touches(void **unused) {
     for (int i = 0; i < 2; i++) {
         assert_true(lowest_of_box(&state, others[i]) > lowest_of_box(&state, "base_link_box"));
     }
-    touch(&state, "base_link_box", 0, "base");
-    touch(&state, "base_link_box", 0.3, "base on higher ground");
+    touch(&state, "base_link_box", 0, "base", TASK_END_base);
+    touch(&state, "base_link_box", 0.3, "base on higher ground", TASK_END_base);
     deep(&state, "base_link_box");
     rig_close(&rig);
 }
@@ -162,8 +172,8 @@ static void shank_touches(int leg, const char *box) {
     up[ANKLE_PITCH] = 0;
     kit_turn(state.qpos, -0.8, -0.2, 0.05);
     assert_true(lowest_of_box(&state, "base_link_box") > lowest_of_box(&state, box) + 0.1);
-    touch(&state, box, 0, box);
-    touch(&state, box, -0.2, box);
+    touch(&state, box, 0, box, TASK_END_shell);
+    touch(&state, box, -0.2, box, TASK_END_shell);
     rig_close(&rig);
 }
 
@@ -184,7 +194,7 @@ static void crossing(void **unused) {
     double apart = oracle_of(rig.sim).foot_distance;
     expect_near("distance of the feet in the default pose", apart, 0.1613, 1e-3);
     rig.def.crossing_limit = apart + 1e-3;
-    expect_fall("nearer than the limit", step_from(&state, 10));
+    expect_cause("nearer than the limit", step_from(&state, 10), 1, TASK_END_crossing);
     rig.def.crossing_limit = apart - 1e-3;
     expect_alive("further than the limit", step_from(&state, 10));
     rig.def.crossing_limit = 0;
@@ -195,6 +205,30 @@ static void crossing(void **unused) {
     expect_fall("crossed", step_from(&state, 10));
     rig.def.crossing_limit = -0.9;
     expect_alive("allowed to cross", step_from(&state, 10));
+    rig_close(&rig);
+}
+
+/* Beyond either end of its range by more than the margin, each joint alone. */
+static void broken_joint(void **unused) {
+    (void)unused;
+    open_limp();
+    rig.def.crossing_limit = -1;
+    for (int k = 0; k < 4 * SA01_JOINTS; k++) {
+        const int joint = k / 4, high = k / 2 % 2, past = k % 2;
+        const double *limit = high ? robot_joint_high(robot) : robot_joint_low(robot);
+        const double sign = high ? 1 : -1;
+        RobotState state = kit_state(2);
+        TaskStep step;
+        /* the limit pushes back during the step: as far out as ends it where it must */
+        double out = TASK_JOINT_BROKEN + (past ? 0.0 : -0.02);
+        do {
+            out += past ? 0.02 : 0;
+            state.qpos[7 + joint] = limit[joint] + sign * out;
+            step = step_from(&state, 10);
+        } while (past && out < 2 &&
+                 sign * (rig.env->robot.qpos[7 + joint] - limit[joint]) < TASK_JOINT_BROKEN);
+        expect_cause(robot_joint_name(robot, joint), step, past, TASK_END_joint);
+    }
     rig_close(&rig);
 }
 
@@ -221,7 +255,7 @@ static void timeout(void **unused) {
         steps++;
     } while (!step.done);
     assert_int_equal(steps, 50);
-    assert_true(step.timeout);
+    assert_true(step.timeout && step.cause == TASK_END_time);
     assert_int_equal(step.length, 50);
     rig_close(&rig);
 }
@@ -239,6 +273,7 @@ static void bad_numbers(void **unused) {
         TaskStep step =
             task_env_step(rig.env, &rig.def, robot, rig.sim, action, 1, &rig.view, NULL);
         assert_true(step.done && !step.valid && !step.timeout && step.reward == 0);
+        assert_int_equal(step.cause, TASK_END_not_finite);
         assert_int_equal(rig.env->step, 0);
         for (int k = 0; k < SA01_HISTORY; k++) {
             assert_true(isfinite(rig.history[k]));
@@ -315,6 +350,7 @@ int main(void) {
         cmocka_unit_test(base_touches),
         cmocka_unit_test(shanks_touch),
         cmocka_unit_test(crossing),
+        cmocka_unit_test(broken_joint),
         cmocka_unit_test(timeout),
         cmocka_unit_test(bad_numbers),
         cmocka_unit_test(bad_reward),

@@ -37,7 +37,7 @@ static int teardown(void **state) {
 static TaskDef task_on_map(void) {
     TaskDef def = task_def_default();
     def.map = map;
-    def.print_tiles = TILES;
+    def.imprint_tiles = TILES;
     return def;
 }
 

@@ -345,11 +345,11 @@ static void test_when_a_map(void **state) {
 static void test_prints(void **state) {
     (void)state;
     TerrainDef def = terrain_def_default();
-    assert_int_equal(terrain_print_tiles(&def), 0);
+    assert_int_equal(terrain_imprint_tiles(&def), 0);
     def.memory = 1;
-    assert_int_equal(terrain_print_tiles(&def), 128);
+    assert_int_equal(terrain_imprint_tiles(&def), 128);
     def.tiles = 9;
-    assert_int_equal(terrain_print_tiles(&def), 9);
+    assert_int_equal(terrain_imprint_tiles(&def), 9);
 }
 
 /* Three materials: black, grey, white; a grey between two counts to the nearer. */

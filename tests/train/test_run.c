@@ -67,8 +67,8 @@ static void run(const ExperimentDef *def) {
                             .config = "[train]\nrobot = sa01\n",
                             .version = "0",
                             .note = "test"};
-    const TrainWatch watch = {.iterated = keep};
-    TrainRun *run = train_run_open(&of, &watch, &error);
+    const TrainCallbacks callbacks = {.iterated = keep};
+    TrainRun *run = train_run_open(&of, &callbacks, &error);
     if (!run) {
         fail_msg("%s", error.text);
     }

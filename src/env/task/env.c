@@ -20,7 +20,7 @@ static size_t front_bytes(const TaskShape *shape, uint32_t held) {
 size_t task_env_bytes(const TaskDef *def, const Robot *robot) {
     TaskShape shape = task_shape(robot);
     return front_bytes(&shape, task_frames_held(def)) +
-           mild_ground_bytes_imprints(robot_soles(robot), shape.feet, def->print_tiles) +
+           mild_ground_bytes_imprints(robot_soles(robot), shape.feet, def->imprint_tiles) +
            (def->motors ? def->motors->bytes : 0);
 }
 
@@ -61,7 +61,7 @@ void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_
     task_env_init_head(env, def, shape, seed, index);
     task_env_rest(env)->gains = gains;
     mild_ground_init_imprints(task_env_ground(env), robot_soles(robot), env->shape.feet,
-                              def->print_tiles);
+                              def->imprint_tiles);
 }
 
 /* ---- the robot's state ---- */
@@ -121,6 +121,7 @@ void task_env_read(const TaskEnv *env, const RobotSim *sim, RobotReading *readin
         reading->foot[f].depth_mean = foot->result.depth_mean;
     }
     reading->body_clearance = robot_sim_body_clearance(sim, terrain);
+    reading->base_clearance = robot_sim_base_clearance(sim, terrain);
     reading->knee_distance = robot_sim_knee_distance(sim);
     reading->foot_distance = robot_sim_foot_distance(sim);
     reading->above = at[2] - mild_terrain_height_at(terrain, at[0], at[1]);
@@ -261,7 +262,7 @@ static void joint_torque(TaskEnv *env, const TaskDef *def, const TaskMotor *moto
 /* Physics steps of one policy period, with the three latencies. Returns 1 when the simulation
  * diverged. */
 static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                       TaskSensors *sensors, const TaskProbe *probe) {
+                       TaskSensors *sensors, const TaskCallback *callback) {
     int steps = (int)(TASK_PERIOD / def->physics_dt + 0.5);
     const RobotTable *table = robot_table(robot);
     const TaskRest *rest = rest_of(env);
@@ -283,8 +284,8 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
         }
         joint_torque(env, def, motor, task_motors_act(env, def, k, steps), k < env->lag_command, q,
                      qvel + 6);
-        if (probe && probe->drive) {
-            drive_torque(env, probe->drive, sim, motor, env->torque);
+        if (callback && callback->drive) {
+            drive_torque(env, callback->drive, sim, motor, env->torque);
         }
         double wrench[6];
         int helped = task_assist(env, def, table, rotation, qvel, wrench);
@@ -292,8 +293,8 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
                            task_env_ground(env))) {
             return 1;
         }
-        if (probe) {
-            probe->physics_step(probe->context, env, sim, env->torque);
+        if (callback) {
+            callback->physics_step(callback->context, env, sim, env->torque);
         }
     }
     return 0;
@@ -301,7 +302,7 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
 
 TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                        const float *action, int auto_reset, const TaskView *view,
-                       const TaskProbe *probe) {
+                       const TaskCallback *callback) {
     TaskSensors sensors = {0};
     RobotReading reading = {.above = 0};
     task_begin_step(env, def, action);
@@ -309,7 +310,7 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     robot_sim_set_solver(sim, def->newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL,
                          def->contact_tolerance, def->contact_iterations);
     task_env_load(env, sim);
-    int diverged = run_physics(env, def, robot, sim, &sensors, probe);
+    int diverged = run_physics(env, def, robot, sim, &sensors, callback);
     if (!diverged) {
         store(sim, env);
         task_env_read(env, sim, &reading);

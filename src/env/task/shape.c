@@ -1,6 +1,9 @@
 /* Widths of a robot's observations, and their mirror image. */
 #include "env/task/task.h"
 
+#define TASK_END_NAME(name, help) #name,
+const char *const task_end_names[] = {TASK_ENDS(TASK_END_NAME)};
+
 TaskShape task_shape(const Robot *robot) {
     int joints = robot_joints(robot), feet = robot_feet(robot);
     TaskShape shape = {.joints = joints,

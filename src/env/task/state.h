@@ -10,6 +10,23 @@
 #include "env/task/task_def.h"
 #include "robot/table.h"
 
+/* Why an episode ended; where several are true, task_end_cause names the first that follows. */
+#define TASK_ENDS(X)                                                                               \
+    X(time, "its length is over: no fall")                                                         \
+    X(not_finite, "a number was not finite, or a speed above 1e3")                                 \
+    X(tilt, "the base tilted more than task.tilt_limit")                                           \
+    X(base, "a shell of the base, or of what is welded to it, touched the ground")                 \
+    X(shell, "another shell did, or was deeper than task.shell_depth in soft ground")              \
+    X(crossing, "the feet were laterally closer than task.crossing_limit")                         \
+    X(joint, "a joint was beyond its range by more than TASK_JOINT_BROKEN")
+#define TASK_END_ENUM(name, help) TASK_END_##name,
+typedef enum { TASK_ENDS(TASK_END_ENUM) TASK_END_COUNT } TaskEnd;
+/* [TASK_END_COUNT] */
+extern const char *const task_end_names[];
+
+#define TASK_JOINT_BROKEN                                                                          \
+    0.5 /* [rad] soft limits of light joints give way by half of it in a walk */
+
 #define TASK_FRAMES 6 /* H + 1, newest last (paper, H = 5) */
 
 /* [-] Friction of rigid ground that a caller has chosen (task_env_reset_on). */
@@ -84,6 +101,7 @@ typedef struct {
         Real depth_mean;              /* [m] see MildFootResult */
     } foot[TASK_FEET];
     Real body_clearance; /* [m] see robot_sim_body_clearance */
+    Real base_clearance; /* [m] see robot_sim_base_clearance */
     Real knee_distance;  /* [m] see robot_sim_knee_distance */
     Real foot_distance;  /* [m] see robot_sim_foot_distance */
     Real above;          /* [m] height of the base above the undisturbed surface under it */
@@ -146,7 +164,8 @@ typedef struct {
 typedef struct {
     float reward;
     uint8_t done, timeout,
-        valid; /* valid 0: the simulation diverged, and the sample must get no weight */
+        valid;     /* valid 0: the simulation diverged, and the sample must get no weight */
+    uint8_t cause; /* TaskEnd where done */
     /* of the episode that just ended (done) */
     uint32_t length;
     float episode_reward, episode_terms[TASK_REWARD_COUNT], episode_speed_error;

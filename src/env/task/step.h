@@ -47,13 +47,13 @@ MILD_HD_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape s
 
 /* What an environment keeps, and back, before a new episode. */
 MILD_HD_FN TaskProgress task_progress(const TaskEnv *env) {
-    const TaskProgress kept = {env->assist_level, env->tick};
-    return kept;
+    const TaskProgress progress = {env->assist_level, env->tick};
+    return progress;
 }
 
-MILD_HD_FN void task_set_progress(TaskEnv *env, TaskProgress kept) {
-    env->assist_level = kept.assist_level;
-    env->tick = env->tick_first = (uint32_t)kept.tick;
+MILD_HD_FN void task_set_progress(TaskEnv *env, TaskProgress progress) {
+    env->assist_level = progress.assist_level;
+    env->tick = env->tick_first = (uint32_t)progress.tick;
 }
 
 /* ---- start of an episode ---- */
@@ -289,14 +289,32 @@ MILD_HD_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def,
     return m;
 }
 
-/* Bool: the base tilts too much, a shell touches the ground or is too deep in soft ground, or a
- * foot has passed through the other leg, because the engine computes no contact between the
- * legs. */
-MILD_HD_FN int task_has_fallen(const TaskEnv *env, const TaskDef *def,
-                               const RobotReading *reading) {
+/* Bool: a joint was pushed out of its range. */
+MILD_HD_FN int task_joint_is_broken(const TaskEnv *env, const RobotTable *robot) {
+    int broken = 0;
+    for (int i = 0; i < env->shape.joints; i++) {
+        const double q = env->robot.qpos[7 + i];
+        broken |= q < robot->joint_low[i] - TASK_JOINT_BROKEN ||
+                  q > robot->joint_high[i] + TASK_JOINT_BROKEN;
+    }
+    return broken;
+}
+
+/* Why the episode ends with this pose; TASK_END_time where nothing but the time can end it. The
+ * contact of the legs does not keep a foot from passing before the other to its far side. */
+MILD_HD_FN TaskEnd task_end_cause(const TaskEnv *env, const TaskDef *def, const RobotTable *robot,
+                                  const RobotReading *reading) {
     const double depth = env->variation.rigid ? 0 : def->shell_depth;
-    return reading->foot_distance < def->crossing_limit ||
-           reading->rotation[8] < task_cos(def->tilt_limit) || reading->body_clearance < -depth;
+    if (reading->rotation[8] < task_cos(def->tilt_limit)) {
+        return TASK_END_tilt;
+    }
+    if (reading->body_clearance < -depth) {
+        return reading->base_clearance < -depth ? TASK_END_base : TASK_END_shell;
+    }
+    if (reading->foot_distance < def->crossing_limit) {
+        return TASK_END_crossing;
+    }
+    return task_joint_is_broken(env, robot) ? TASK_END_joint : TASK_END_time;
 }
 
 /* One policy step on the clocks of the episode: the phase, the command that the policy sees and, if
@@ -354,7 +372,8 @@ MILD_HD_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const RobotT
         out.reward = 0;
     }
     out.valid = !bad;
-    int fallen = bad || task_has_fallen(env, def, reading);
+    const TaskEnd cause = bad ? TASK_END_not_finite : task_end_cause(env, def, robot, reading);
+    const int fallen = cause != TASK_END_time;
     task_lanes_sync();
     if (task_lane() == 0) {
         task_advance_clock(env, def);
@@ -363,6 +382,7 @@ MILD_HD_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const RobotT
     task_lanes_sync();
     out.timeout = !fallen && env->step >= env->step_limit;
     out.done = fallen || out.timeout;
+    out.cause = (uint8_t)cause;
     if (out.done) {
         task_report_episode(env, &out);
     }

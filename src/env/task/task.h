@@ -38,7 +38,7 @@ typedef struct {
                          const double *torque);
     void *context;
     const TaskDrive *drive; /* NULL: the joints' PD on the actions */
-} TaskProbe;
+} TaskCallback;
 
 /* ---- the block ---- */
 
@@ -78,7 +78,7 @@ void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
  * observation is written. */
 TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                        const float *action, int auto_reset, const TaskView *view,
-                       const TaskProbe *probe);
+                       const TaskCallback *callback);
 
 /* ---- parts of the step on the CPU ---- */
 

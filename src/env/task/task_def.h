@@ -155,7 +155,7 @@ typedef struct {
     /* not of the config */
     const MildMap *map; /* borrowed: shape of the ground, and the pattern of the soft one; NULL:
                            level, one material */
-    int print_tiles;    /* of imprints, see mild_ground_bytes_imprints */
+    int imprint_tiles;  /* of imprints, see mild_ground_bytes_imprints */
     const struct TaskActuator *motors; /* borrowed: of the file `actuator`; NULL: the PD */
     const struct TaskGrounds *grounds; /* borrowed: what episodes draw their ground from; NULL: from
                                           the ranges */

@@ -50,7 +50,7 @@ static int terrain_has_map(const TerrainDef *def) {
     return def->map.kind != MILD_MAP_FLAT || def->map.patches != MILD_PATTERN_NONE;
 }
 
-int terrain_print_tiles(const TerrainDef *def) {
+int terrain_imprint_tiles(const TerrainDef *def) {
     return def->memory ? def->tiles : 0;
 }
 

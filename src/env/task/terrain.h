@@ -27,6 +27,6 @@ MildStatus terrain_make(const TerrainDef *def, int materials, MildMap **map, Mil
 MildStatus terrain_make_striped(const TerrainDef *def, int materials, const double length[2],
                                 uint64_t seed, MildMap **map, MildError *error);
 /* Tiles for mild_ground_bytes_imprints; 0 without memory. */
-int terrain_print_tiles(const TerrainDef *def);
+int terrain_imprint_tiles(const TerrainDef *def);
 
 #endif

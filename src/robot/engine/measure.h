@@ -60,21 +60,34 @@ MILD_HD Real shell_lowest(const EngineModel *model, const EngineWork *work, int 
 }
 
 /* [m] Least height of a shell's lowest point above the ground under its centre. */
-WARP_FN Real engine_body_clearance_on(const EngineModel *model, const EngineWork *work,
-                                      const EngineGround *ground) {
+typedef struct {
+    Real body; /* of all shells */
+    Real base; /* of those of the base and of what is welded to it */
+} EngineClearance;
+
+WARP_FN EngineClearance engine_clearance_on(const EngineModel *model, const EngineWork *work,
+                                            const EngineGround *ground) {
     Real most[LANE_COPIES];
+    Real base[LANE_COPIES];
     EACH_LANE(l) {
         const MapSpot spot = engine_spot(ground, work);
-        most[l] = -MEASURE_NONE;
+        most[l] = base[l] = -MEASURE_NONE;
         LANE_ROLLED
         for (int s = LANE(l); s < model->tree.shells; s += LANES) {
             Real under[2];
             const Real low = shell_lowest(model, work, s, under);
             const EngineSurface surface = engine_surface(ground, work, &spot, under[0], under[1]);
             most[l] = real_max(most[l], surface.height - low);
+            base[l] = model->tree.shell_link[s] ? base[l] : real_max(base[l], surface.height - low);
         }
     }
-    return -lane_max(most);
+    const EngineClearance clearance = {-lane_max(most), -lane_max(base)};
+    return clearance;
+}
+
+WARP_FN Real engine_body_clearance_on(const EngineModel *model, const EngineWork *work,
+                                      const EngineGround *ground) {
+    return engine_clearance_on(model, work, ground).body;
 }
 
 /* The same above level ground at `height`. */

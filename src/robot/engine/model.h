@@ -8,6 +8,7 @@
 
 #include "robot/engine/real.h"
 #include "robot/engine/tree.h"
+#include "robot/legs.h"
 
 /* MuJoCo's soft constraint (its manual, Computation, Parameters): with the violation r < 0 and the
  * impedance d(r) the reference acceleration is -damping v - stiffness d(r) r, and the regularizer
@@ -77,6 +78,8 @@ typedef struct {
     EngineFoot foot[ROBOT_FEET_MAX];
     Real corner[ENGINE_CORNERS_MAX][3]; /* [m] centres, frame of the foot's link */
     EngineShell shell[ROBOT_SHELLS_MAX];
+    LegCapsule capsule[ROBOT_CAPSULES_MAX]; /* link's frame */
+    Real leg_softness;                      /* [1/kg] 1/m of robot/legs.h */
 } EngineNumbers;
 
 typedef struct {

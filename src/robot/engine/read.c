@@ -329,6 +329,25 @@ static MildStatus read_shell(Reading *r, int s) {
     return MILD_OK;
 }
 
+static void read_legs(Reading *r) {
+    const Robot *robot = r->robot;
+    for (int c = 0; c < robot->capsules; c++) {
+        const RobotCapsule *from = &robot->capsule[c];
+        const Mount *mount = &r->mount[from->body];
+        LegCapsule *to = &r->number->capsule[c];
+        r->tree->capsule_link[c] = (EngineIndex)mount->link;
+        mju_mulMatVec3(to->center, mount->rotation, from->center);
+        mju_addTo3(to->center, mount->position);
+        mju_mulMatVec3(to->half, mount->rotation, from->half);
+        to->radius = from->radius;
+    }
+    r->number->leg_softness = 1 / robot->total_mass;
+    r->tree->leg_pairs = robot->leg_pairs;
+    for (int n = 0; n < 2 * robot->leg_pairs; n++) {
+        r->tree->leg_pair[n / 2][n % 2] = (EngineIndex)robot->leg_pair[n / 2][n % 2];
+    }
+}
+
 static MildStatus read_robot(Reading *r) {
     EngineTree *tree = r->tree;
     tree->joints = r->robot->def.joints;
@@ -347,6 +366,7 @@ static MildStatus read_robot(Reading *r) {
     for (int s = 0; status == MILD_OK && s < tree->shells; s++) {
         status = read_shell(r, s);
     }
+    read_legs(r);
     tree->pairs = r->robot->pairs;
     for (int n = 0; n < 2 * tree->pairs; n++) {
         tree->pair[n / 2][n % 2] = (EngineIndex)r->robot->pair[n / 2][n % 2];

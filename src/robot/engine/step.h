@@ -23,6 +23,7 @@
 #include "robot/engine/bias.h"
 #include "robot/engine/constraint.h"
 #include "robot/engine/kinematics.h"
+#include "robot/engine/legs.h"
 
 #define ENGINE_RATE_MAX 1000 /* [m/s, rad/s] beyond: the numbers went bad */
 
@@ -104,6 +105,7 @@ WARP_FN void engine_smooth(const EngineModel *model, const EngineAction *action,
     }
     engine_factorise(tree, work->mass[0], work->factor[0], work->inverse);
     engine_solve_transposed(tree, work->factor[0], work->inverse, work->acceleration);
+    engine_push_legs(model, work);
 }
 
 /* Poses and twists of links and feet; with an action also what engine_end needs, and what soft

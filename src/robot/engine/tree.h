@@ -71,6 +71,10 @@ typedef struct {
     /* ---- parts that must not touch the ground ---- */
     int shells;
     EngineIndex shell_link[ROBOT_SHELLS_MAX];
+    /* ---- parts of legs that touch other legs ---- */
+    EngineIndex capsule_link[ROBOT_CAPSULES_MAX];
+    int leg_pairs;
+    EngineIndex leg_pair[ROBOT_LEG_PAIRS_MAX][2];
 } EngineTree;
 
 #endif

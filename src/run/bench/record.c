@@ -57,7 +57,7 @@ static void record_torque(void *context, const TaskEnv *env, const RobotSim *sim
 static int walk_step(Walk *walk, ReplayPeriod *period) {
     float action[ROBOT_JOINTS_MAX];
     TaskView none = {0};
-    TaskProbe probe = {record_torque, walk, NULL};
+    TaskCallback callback = {record_torque, walk, NULL};
     if (period) {
         MildGround *ground = task_env_ground(walk->env);
         period->state = task_env_state(walk->env);
@@ -67,7 +67,7 @@ static int walk_step(Walk *walk, ReplayPeriod *period) {
     walk->step = 0;
     walk->controller.act(walk->controller.self, 1, &walk->env, action);
     TaskStep step =
-        task_env_step(walk->env, &walk->def, walk->robot, walk->sim, action, 0, &none, &probe);
+        task_env_step(walk->env, &walk->def, walk->robot, walk->sim, action, 0, &none, &callback);
     eval_command(walk->env, walk_speed, 0);
     return !step.done;
 }

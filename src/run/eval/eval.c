@@ -66,7 +66,7 @@ typedef struct {
     EnvsSample *sample; /* [trials][samples] */
     float *history;     /* [trials][TaskShape.history] */
     float *reward;      /* [trials] */
-    uint8_t *done, *timeout, *valid;
+    uint8_t *done, *timeout, *valid, *cause;
 } Results;
 
 typedef struct {
@@ -85,7 +85,7 @@ typedef struct {
     float *action;    /* [trials][joints] */
     double *command;  /* [trials][3] */
     Measure *measure; /* [trials] */
-    uint8_t *over;    /* [trials] fell or diverged */
+    uint8_t *end;     /* [trials] TaskEnd; TASK_END_time while it walks */
     Track track;      /* if EvalDef.track is given */
 } Trials;
 
@@ -99,6 +99,11 @@ static double speed_of(const Trials *t, int trial) {
 
 static const Scene *scene_of(const Trials *t, int trial) {
     return &t->run->scenes[row_of(t, trial) / t->run->speed_count];
+}
+
+/* Bool: it fell or diverged. */
+static int is_over(const Trials *t, int trial) {
+    return t->end[trial] != TASK_END_time;
 }
 
 /* ---- creation ---- */
@@ -175,6 +180,7 @@ static Results carve(const Trials *t, void *block) {
     at.done = (uint8_t *)(at.reward + trials);
     at.timeout = at.done + trials;
     at.valid = at.timeout + trials;
+    at.cause = at.valid + trials;
     return at;
 }
 
@@ -183,14 +189,14 @@ static MildStatus open_arrays(Trials *t, MildError *error) {
     const size_t history = (size_t)task_shape(t->run->robot).history;
     t->samples = envs_physics_steps(t->envs);
     t->bytes = trials * ((size_t)t->samples * sizeof(EnvsSample) + (history + 1) * sizeof(float) +
-                         3 * sizeof(uint8_t));
+                         4 * sizeof(uint8_t));
     t->block = calloc(1, t->bytes);
     t->action = calloc(trials * joints, sizeof *t->action);
     t->command = calloc(trials, 3 * sizeof *t->command);
     t->measure = calloc(trials, sizeof *t->measure);
-    t->over = calloc(trials, 1);
+    t->end = calloc(trials, 1);
     t->env = t->run->batch ? NULL : calloc(trials, sizeof *t->env);
-    if (!t->block || !t->action || !t->command || !t->measure || !t->over ||
+    if (!t->block || !t->action || !t->command || !t->measure || !t->end ||
         (!t->env && !t->run->batch)) {
         return fail_memory(t, error);
     }
@@ -220,7 +226,7 @@ static void close_trials(Trials *t) {
     free(t->action);
     free(t->command);
     measure_free(t->measure, t->trials);
-    free(t->over);
+    free(t->end);
     track_free(&t->track);
 }
 
@@ -243,14 +249,14 @@ static void take_trial(void *context, int trial, int thread) {
     const EvalDef *eval = &t->run->eval;
     const EnvsSample *first = t->host.sample + (size_t)trial * (size_t)t->samples, *at = first;
     (void)thread;
-    if (t->over[trial]) {
+    if (is_over(t, trial)) {
         return;
     }
     while (at < first + t->samples && at->valid) {
         measure_sample(&t->measure[trial], at++);
     }
-    t->over[trial] = t->host.done[trial] && !t->host.timeout[trial];
-    if (t->over[trial]) {
+    t->end[trial] = t->host.done[trial] ? t->host.cause[trial] : TASK_END_time;
+    if (is_over(t, trial)) {
         return;
     }
     if (eval->track) {
@@ -274,10 +280,10 @@ static void show_decisions(const Trials *t, int step) {
                                        .time = step * TASK_PERIOD,
                                        .env = t->env[i],
                                        .action = t->action + i * robot_joints(t->run->robot)};
-        if (eval->watch && !t->over[i]) {
-            eval->watch->decided(eval->watch->context, &decision);
+        if (eval->callback && !is_over(t, i)) {
+            eval->callback->decided(eval->callback->context, &decision);
         }
-        if (eval->actions && !t->over[i]) {
+        if (eval->actions && !is_over(t, i)) {
             actions_print_row(eval->actions, &decision);
         }
     }
@@ -303,6 +309,7 @@ static MildStatus step(Trials *t, int step, MildError *error) {
                            .done = t->device.done,
                            .timeout = t->device.timeout,
                            .valid = t->device.valid,
+                           .cause = t->device.cause,
                            .next = {.history = t->device.history}};
     if (t->env) {
         controller->act(controller->self, t->trials, t->env, t->action);
@@ -332,7 +339,11 @@ static MildStatus summarise(Trials *t, EvalRow *rows, MildError *error) {
         eval.speed = speed_of(t, first);
         status =
             eval_summarise(&rows[row], scene_of(t, first)->name, &eval, t->measure + first,
-                           t->over + first, robot_total_mass(t->run->robot) * EVAL_GRAVITY, error);
+                           t->end + first, robot_total_mass(t->run->robot) * EVAL_GRAVITY, error);
+    }
+    for (int i = 0; t->run->each && i < t->trials; i++) {
+        t->run->each[i] = (EvalTrial){
+            .end = t->end[i], .seconds = t->measure[i].time, .legs = measure_legs(&t->measure[i])};
     }
     if (status == MILD_OK && eval.track) {
         track_print(&t->track, t->run->scenes[0].name, speed_of(t, 0), TASK_PERIOD, eval.track);

@@ -27,7 +27,7 @@ typedef struct {
 typedef struct {
     void (*decided)(void *context, const EvalDecision *decision);
     void *context;
-} EvalWatch;
+} EvalCallback;
 
 typedef struct {
     double speed;    /* [m/s] commanded, forward */
@@ -40,7 +40,7 @@ typedef struct {
     uint64_t seed;  /* trial k uses stream k */
     FILE *stances;  /* a row of CSV for each stance of each trial; NULL: none */
     /* by MuJoCo, of one row; NULL: none */
-    const EvalWatch *watch;
+    const EvalCallback *callback;
     FILE *actions; /* a row of CSV for each decision, see eval/actions.h */
     FILE *track;   /* one for each policy step of each trial, see eval/track.h */
 } EvalDef;
@@ -49,10 +49,11 @@ typedef struct {
  * once, the sinkage without a stance, or a deviation of one trial. */
 typedef struct {
     char ground[160];
-    double speed;         /* [m/s] commanded, forward */
-    int trials;           /* number of trials */
-    int success;          /* trials without termination */
-    int measured;         /* trials that velocity and cot are means of; 0: all were too short */
+    double speed;             /* [m/s] commanded, forward */
+    int trials;               /* number of trials */
+    int success;              /* trials without termination */
+    int ends[TASK_END_COUNT]; /* trials that ended by each cause */
+    int measured;             /* trials that velocity and cot are means of; 0: all were too short */
     double velocity;      /* [m/s] forward, after the first 2 s, of trials that lasted longer: along
                         world x, or along the robot's heading when it is told to turn */
     double velocity_low;  /* [m/s] 95 % interval of the mean over trials: lower end */
@@ -73,9 +74,17 @@ typedef struct {
     double drift_forward;    /* [m] magnitude of its part along the robot's heading */
     double drift_left;       /* [m] and across it */
     double energy;           /* [J] integral |tau . qd| dt */
+    double legs;             /* [m] least distance of two legs in all trials; negative: overlap */
     double base_oscillation; /* [m] peak to peak of the base height over the steady part */
     double seconds;          /* [s] mean time until a fall or the end */
 } EvalRow;
+
+/* How a trial ended. */
+typedef struct {
+    TaskEnd end;
+    double seconds; /* [s] until then */
+    double legs;    /* [m] least distance of two legs; NaN without two */
+} EvalTrial;
 
 /* Rows of trials. */
 typedef struct {
@@ -92,6 +101,7 @@ typedef struct {
     const double *speeds; /* [m/s] [speed_count] of each scene, in the place of eval.speed */
     int speed_count;
     EvalDef eval;
+    EvalTrial *each; /* [scene_count][speed_count][eval.trials] where to write; NULL: nowhere */
 } EvalRun;
 
 /* Robots of the batch engine, at most. */
@@ -102,10 +112,9 @@ typedef struct {
 MildStatus eval_run(const EvalRun *run, EvalRow *rows, MildError *error);
 
 /* Finishes the measures of the trials, summarises them in a row, and prints the stances that they
- * kept. measures, fallen (bool):
- * [eval->trials]. weight: [N] of the robot. */
+ * kept. measures, ends (TaskEnd): [eval->trials]. weight: [N] of the robot. */
 MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
-                          const uint8_t *fallen, double weight, MildError *error);
+                          const uint8_t *ends, double weight, MildError *error);
 
 /* Heading hold of eval and play: sets a command that turns the robot back to world x. speed,
  * sideways [m/s]: forward and to the left. If both are 0 the robot stands, without heading hold.

@@ -15,7 +15,7 @@ typedef struct {
     long decisions;
 } InsideLog;
 
-/* An EvalWatch.decided; context: an InsideLog. */
+/* An EvalCallback.decided; context: an InsideLog. */
 void inside_decided(void *context, const EvalDecision *decision);
 /* The names of the columns. SI units, but for the phase and for what the networks alone know. */
 void inside_print_header(const InsideLog *log);

@@ -6,6 +6,7 @@
 
 #define CONTACT_FORCE 5.0  /* [N] */
 #define SWING_HEIGHT 0.005 /* [m] a lower lift does not count as a swing */
+#define LEGS_MOST 1e6      /* [m] further apart: there are none */
 #define TWO_PI 6.283185307179586
 #define CHATTER_TIME 0.03 /* [s] a shorter loss of contact does not end a stance */
 
@@ -18,6 +19,7 @@ void measure_start(Measure *measure, double dt) {
     measure->dt = dt;
     measure->base_low = 1e9;
     measure->base_high = -1e9;
+    measure->legs = INFINITY;
 }
 
 static void start_stance(Measure *m, int f, const double *at) {
@@ -120,6 +122,7 @@ void measure_sample(Measure *m, const EnvsSample *sample) {
         measure_steady(m, sample, yaw, power_abs);
     }
     m->time += m->dt;
+    m->legs = fmin(m->legs, sample->legs);
     memcpy(m->base, sample->base, sizeof m->base);
     m->yaw = yaw;
     for (int f = 0; f < sample->feet; f++) {
@@ -140,6 +143,10 @@ void measure_finish(Measure *m) {
             end_stance(m, f);
         }
     }
+}
+
+double measure_legs(const Measure *m) {
+    return m->legs < LEGS_MOST ? m->legs : NAN;
 }
 
 void measure_free(Measure *measures, int count) {

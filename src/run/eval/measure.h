@@ -24,6 +24,7 @@ typedef struct {
     double torque_max; /* [N m] */
     double base[2];    /* [m] after the latest step */
     double yaw;        /* [rad] after the latest step */
+    double legs;       /* [m] least distance of two legs */
 
     /* steady part */
     double steady_end;          /* [s] where it ends; 0: with the trial */
@@ -60,11 +61,13 @@ double measure_yaw(const double quaternion[4]);
 void measure_start(Measure *measure, double dt);
 /* One physics step. */
 void measure_sample(Measure *measure, const EnvsSample *sample);
-/* The same of a robot of MuJoCo: a TaskProbe. */
+/* The same of a robot of MuJoCo: a TaskCallback. */
 void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const double *torque);
 /* Ends the trial. If no foot was ever lifted, the open stances count, so that sinkage and drift are
  * still measured. */
 void measure_finish(Measure *measure);
+/* [m] Least distance of two legs; NaN where the robot has no two legs that touch. */
+double measure_legs(const Measure *measure);
 void measure_free(Measure *measures, int count); /* measures: from calloc; may be NULL */
 
 #endif

@@ -22,14 +22,14 @@ static double mean(double sum, int count) {
 
 /* Speed, cost of transport and base motion over the steady part of the trials without a fall,
  * because a robot that dives forward and falls is not fast. If all trials fell, of all trials. */
-static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_t *fallen,
+static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_t *ends,
                              double weight) {
     double v_sum = 0, v_square = 0, cot_sum = 0, cot_square = 0, left_sum = 0, turn_sum = 0;
     double oscillation = 0;
     int steady = 0;
     for (int i = 0; i < row->trials; i++) {
         const Measure *m = &measures[i];
-        if (m->steady_time <= STEADY_LEAST || (row->success && fallen[i])) {
+        if (m->steady_time <= STEADY_LEAST || (row->success && ends[i] != TASK_END_time)) {
             continue;
         }
         const int turns = row->turn != 0; /* world x is then nobody's direction */
@@ -81,7 +81,7 @@ static MildStatus print_stances(const EvalRow *row, int trial, const Measure *m,
 }
 
 MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
-                          const uint8_t *fallen, double weight, MildError *error) {
+                          const uint8_t *ends, double weight, MildError *error) {
     const int trials = eval->trials;
     MildStatus status = MILD_OK;
     int swings = 0, stances = 0;
@@ -90,14 +90,17 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
                      .sideways = eval->sideways,
                      .turn = eval->turn,
                      .push = eval->push,
-                     .trials = trials};
+                     .trials = trials,
+                     .legs = NAN};
     snprintf(row->ground, sizeof row->ground, "%s", ground);
     for (int i = 0; i < trials; i++) {
         Measure *m = &measures[i];
         measure_finish(m);
-        row->success += !fallen[i];
+        row->success += ends[i] == TASK_END_time;
+        row->ends[ends[i]]++;
         row->energy += m->energy / trials;
         row->seconds += m->time / trials;
+        row->legs = fmin(row->legs, measure_legs(m)); /* of a number and NaN the number */
         row->torque_max += m->torque_max / trials;
         torque_square += m->torque_max * m->torque_max / trials;
         apex += m->apex_sum;
@@ -112,7 +115,7 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
         }
     }
     row->torque_deviation = deviation(row->torque_max, torque_square, trials);
-    summarise_motion(row, measures, fallen, weight);
+    summarise_motion(row, measures, ends, weight);
     row->clearance = mean(apex, swings);
     row->penetration = mean(deepest, stances);
     row->drift = mean(drift, stances);
@@ -138,10 +141,24 @@ static void print_speed(const EvalRow *row, char *text, size_t size) {
     }
 }
 
+/* "  ended by: 2 tilt, 1 base", if not all by time. */
+static void print_ends(const EvalRow *row, char *text, size_t size) {
+    size_t used = 0;
+    text[0] = '\0';
+    for (int end = TASK_END_time + 1; end < TASK_END_COUNT; end++) {
+        if (row->ends[end] && used < size) {
+            used +=
+                (size_t)snprintf(text + used, size - used, "%s%d %s",
+                                 used ? ", " : "  ended by: ", row->ends[end], task_end_names[end]);
+        }
+    }
+}
+
 void eval_print_row(const EvalRow *row, char *text, int size) {
     char velocity[32], sideways[64] = "", turning[64] = "";
     char cot[TEXT_CELL], clearance[TEXT_CELL], sink[TEXT_CELL], drift[TEXT_CELL], part[TEXT_CELL];
-    char power[TEXT_CELL];
+    char power[TEXT_CELL], ends[96];
+    print_ends(row, ends, sizeof ends);
     print_speed(row, velocity, sizeof velocity);
     if (row->sideways != 0) {
         snprintf(sideways, sizeof sideways, "  sideways %s of %.2f m/s",
@@ -151,12 +168,12 @@ void eval_print_row(const EvalRow *row, char *text, int size) {
         snprintf(turning, sizeof turning, "  turning %s of %.2f rad/s",
                  text_cell("%.3f", row->velocity_turn, part), row->turn);
     }
-    snprintf(text, (size_t)size, "%-26s %5.2f %4d/%-2d %s %5s %7.1f %4s mm %4s mm %4s mm %7s%s%s",
+    snprintf(text, (size_t)size, "%-26s %5.2f %4d/%-2d %s %5s %7.1f %4s mm %4s mm %4s mm %7s%s%s%s",
              row->ground, row->speed, row->success, row->trials, velocity,
              text_cell("%.2f", row->cot, cot), row->torque_max,
              text_cell("%.0f", 1e3 * row->clearance, clearance),
              text_cell("%.1f", 1e3 * row->penetration, sink),
              text_cell("%.1f", 1e3 * row->drift, drift),
              text_cell("%.0f", row->seconds > 0 ? row->energy / row->seconds : NAN, power),
-             sideways, turning);
+             sideways, turning, ends);
 }

@@ -24,7 +24,7 @@ MildStatus train_envs_open(TrainEnvs *envs, ExperimentDef *def, const Robot *rob
         return error->status;
     }
     def->task.map = envs->map;
-    def->task.print_tiles = terrain_print_tiles(&def->terrain);
+    def->task.imprint_tiles = terrain_imprint_tiles(&def->terrain);
     if (actuator_open(&def->task, robot, &envs->actuator, error) != MILD_OK) {
         return error->status;
     }

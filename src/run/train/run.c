@@ -16,7 +16,7 @@ enum { COLUMNS_FIXED = 25, COLUMNS = COLUMNS_FIXED + TASK_REWARD_COUNT };
 
 struct TrainRun {
     TrainRunDef def;
-    TrainWatch watch;
+    TrainCallbacks callbacks;
     Trainer *trainer;
     Log *log;
     FileLock lock; /* on the folder, so that two processes do not mix two runs */
@@ -203,8 +203,8 @@ static MildStatus resume(TrainRun *run, MildError *error) {
         if (status == MILD_OK) {
             status = train_load(run->trainer, path, error);
         }
-        if (status == MILD_OK && leads(run) && run->watch.resumed) {
-            run->watch.resumed(run->watch.self, path);
+        if (status == MILD_OK && leads(run) && run->callbacks.resumed) {
+            run->callbacks.resumed(run->callbacks.self, path);
         }
         if (status == MILD_OK || status == MILD_ERROR_ARGUMENT) {
             return status;
@@ -213,8 +213,8 @@ static MildStatus resume(TrainRun *run, MildError *error) {
         if (number < 0) {
             return status;
         }
-        if (leads(run) && run->watch.passed_over) {
-            run->watch.passed_over(run->watch.self, error->text);
+        if (leads(run) && run->callbacks.passed_over) {
+            run->callbacks.passed_over(run->callbacks.self, error->text);
         }
     }
 }
@@ -409,7 +409,8 @@ static MildStatus build(TrainRun *run, MildError *error) {
     return agree(run, status, error);
 }
 
-TrainRun *train_run_open(const TrainRunDef *def, const TrainWatch *watch, MildError *error) {
+TrainRun *train_run_open(const TrainRunDef *def, const TrainCallbacks *callbacks,
+                         MildError *error) {
     TrainRun *run = calloc(1, sizeof *run);
     MildStatus status = run ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     if (ranks_agree(def->ranks, status, error) != MILD_OK || !run) {
@@ -418,7 +419,7 @@ TrainRun *train_run_open(const TrainRunDef *def, const TrainWatch *watch, MildEr
     }
     run->lock.file = -1;
     run->def = *def;
-    run->watch = *watch;
+    run->callbacks = *callbacks;
     if (build(run, error) != MILD_OK) {
         train_run_close(run);
         return NULL;
@@ -455,7 +456,7 @@ static double share_done(const TrainRun *run) {
 }
 
 static int goes_on(const TrainRun *run) {
-    const int stop = run->watch.stop && run->watch.stop(run->watch.self);
+    const int stop = run->callbacks.stop && run->callbacks.stop(run->callbacks.self);
     return !ranks_any(run->def.ranks, stop || share_done(run) >= 1);
 }
 
@@ -464,8 +465,8 @@ static MildStatus log_iteration(TrainRun *run, const TrainReport *report, MildEr
     const int64_t iteration = train_iteration(run->trainer);
     fill_row(run, report, row);
     MildStatus status = log_row(run->log, iteration, row, error);
-    if (run->watch.iterated) {
-        run->watch.iterated(run->watch.self, iteration, report, share_done(run));
+    if (run->callbacks.iterated) {
+        run->callbacks.iterated(run->callbacks.self, iteration, report, share_done(run));
     }
     return status;
 }

@@ -24,7 +24,7 @@ typedef struct {
     int (*stop)(void *self); /* called before every iteration; nonzero saves and ends the run */
     /* after every iteration. share: how much of the run is done, 0 .. 1; negative: no end */
     void (*iterated)(void *self, int64_t iteration, const TrainReport *report, double share);
-} TrainWatch;
+} TrainCallbacks;
 
 typedef struct TrainRun TrainRun;
 
@@ -35,13 +35,13 @@ MildStatus train_run_check_folder(const char *folder, int resume, MildError *err
 /* Claims (file_claim) the run's files, so that nothing can be read that the run would overwrite. */
 MildStatus train_run_claim(const char *folder, int resume, MildError *error);
 
-/* Makes the folder or continues in it. Borrows what `def` and `watch` point to. Returns NULL on
+/* Makes the folder or continues in it. Borrows what `def` and `callbacks` point to. Returns NULL on
  * failure, with the reason in *error. */
-TrainRun *train_run_open(const TrainRunDef *def, const TrainWatch *watch, MildError *error);
+TrainRun *train_run_open(const TrainRunDef *def, const TrainCallbacks *callbacks, MildError *error);
 void train_run_close(TrainRun *run); /* may be NULL */
 int64_t train_run_iteration(const TrainRun *run);
 
-/* Iterates until train.minutes or train.iterations are over or `watch` stops it, then saves. */
+/* Iterates until train.minutes or train.iterations are over or `stop` says so, then saves. */
 MildStatus train_run_loop(TrainRun *run, MildError *error);
 
 #endif

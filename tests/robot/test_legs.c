@@ -1,0 +1,204 @@
+/* Contact between the legs: the distance against MuJoCo's of the same geoms, and that it only takes
+ * energy. */
+#include <stdio.h>
+
+#include "kit.h"
+#include "robot/legs.h"
+#include "robot/robot.h"
+#include "robot/sim.h"
+
+#include "base/random.h"
+
+enum { ROBOTS = 3, POSES = 3000, THROWS = 200, THROW_STEPS = 80 };
+static const char *const names[ROBOTS] = {"sa01", "go1", "g1"};
+static Robot *robots[ROBOTS], *without[ROBOTS]; /* the latter's legs do not touch */
+
+static int setup(void **unused) {
+    (void)unused;
+    for (int r = 0; r < ROBOTS; r++) {
+        MildError error = {0};
+        robots[r] = robot_open(names[r], &error);
+        without[r] = robot_open(names[r], &error);
+        print_message("%s", error.text);
+        assert_true(robots[r] && without[r] && robots[r]->leg_pairs > 0);
+        without[r]->leg_pairs = 0;
+    }
+    return 0;
+}
+
+static int teardown(void **unused) {
+    (void)unused;
+    for (int r = 0; r < ROBOTS; r++) {
+        robot_destroy(robots[r]);
+        robot_destroy(without[r]);
+    }
+    return 0;
+}
+
+/* Anywhere, within the joints' ranges. */
+static RobotState random_pose(const Robot *robot, Random *random) {
+    RobotState state = {.qpos = {0, 0, 2}}; /* far from the ground */
+    for (int k = 3; k < 7; k++) {
+        state.qpos[k] = random_normal(random);
+    }
+    mju_normalize4(state.qpos + 3);
+    for (int j = 0; j < robot->def.joints; j++) {
+        state.qpos[7 + j] = random_uniform(random, robot->low[j], robot->high[j]);
+    }
+    return state;
+}
+
+/* [m] Of the geoms by MuJoCo; which leg a geom is of by the foot whose name it begins with, but for
+ * SA01's leg_l and leg_r. */
+static double geom_distance(const Robot *robot, const RobotState *state, mjData *d) {
+    const mjModel *m = robot->visual;
+    const int letters = robot->def.name[0] == 's' ? 5 : 2;
+    double least = 1e9;
+    robot_engine_qpos(robot, state->qpos, d->qpos);
+    mj_kinematics(m, d);
+    for (int a = 0; a < robot->def.legs; a++) {
+        for (int b = 0; b < a; b++) {
+            const char *one = robot->def.leg[a], *other = robot->def.leg[b];
+            if (strncmp(one, other, (size_t)letters) != 0) {
+                const int geom[2] = {mj_name2id(m, mjOBJ_GEOM, one),
+                                     mj_name2id(m, mjOBJ_GEOM, other)};
+                least = fmin(least, mj_geomDistance(m, d, geom[0], geom[1], 5, NULL));
+            }
+        }
+    }
+    return least;
+}
+
+static void distance_is_mujocos(void **unused) {
+    (void)unused;
+    const RobotVariation nominal = robot_variation_nominal();
+    for (int r = 0; r < ROBOTS; r++) {
+        mjData *d = mj_makeData(robots[r]->visual);
+        RobotSim *sim = robot_sim_create(robots[r], 0.0025, NULL);
+        Random random = random_at(61, (uint32_t)r, 0);
+        double worst = 0;
+        int overlaps = 0;
+        for (int n = 0; n < POSES; n++) {
+            const RobotState state = random_pose(robots[r], &random);
+            robot_sim_load(sim, &state, &nominal);
+            const double own = robot_sim_leg_distance(sim);
+            const double distance = geom_distance(robots[r], &state, d);
+            worst = fmax(worst, fabs(own - distance));
+            overlaps += distance < 0;
+        }
+        printf("%s: distances differ from MuJoCo's by %.1e m at most; %d of %d poses overlap\n",
+               names[r], worst, overlaps, POSES);
+        assert_true(worst < 2e-5 && overlaps > POSES / 100 && overlaps < POSES);
+        robot_sim_destroy(sim);
+        mj_deleteData(d);
+    }
+}
+
+/* ---- energy ---- */
+
+/* [J] Kinetic, with M of the beginning of the last step. */
+static double kinetic(RobotSim *sim) {
+    const int nv = sim->robot->nv;
+    double momentum[ROBOT_NV_MAX];
+    mj_mulM(sim->model, sim->data, momentum, sim->data->qvel);
+    return 0.5 * mju_dot(momentum, sim->data->qvel, nv);
+}
+
+/* A pose whose legs are apart, thrown so that they meet: joints' speeds at random. */
+static RobotState random_throw(const Robot *robot, RobotSim *sim, Random *random) {
+    const RobotVariation nominal = robot_variation_nominal();
+    RobotState state;
+    do {
+        state = random_pose(robot, random);
+        for (int d = 0; d < robot->nv; d++) {
+            state.qvel[d] = random_uniform(random, -4, 4);
+        }
+        robot_sim_load(sim, &state, &nominal);
+    } while (robot_sim_leg_distance(sim) < 0.005 || robot_sim_leg_distance(sim) > 0.1);
+    return state;
+}
+
+/* Of a throw: [J] the contact's work, as what it changes in each step. Returns bool: legs met.
+ * deepest [m]: least distance. */
+static int throw_legs(RobotSim *with, RobotSim *bare, RobotState state, MildGround *ground,
+                      double *work, double *deepest) {
+    const RobotVariation nominal = robot_variation_nominal();
+    const double torque[ROBOT_JOINTS_MAX] = {0};
+    const MildMaterial any = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(&any);
+    int met = 0;
+    terrain.height = -100;
+    *work = 0;
+    *deepest = 1;
+    for (int k = 0; k < THROW_STEPS; k++) {
+        robot_sim_load(with, &state, &nominal);
+        robot_sim_load(bare, &state, &nominal);
+        if (robot_sim_step(with, torque, NULL, &terrain, ground) ||
+            robot_sim_step(bare, torque, NULL, &terrain, ground)) {
+            return 0; /* an end of its own: limits throw light joints */
+        }
+        const double change = kinetic(with) - kinetic(bare);
+        met |= change != 0;
+        *work += change;
+        *deepest = fmin(*deepest, robot_sim_leg_distance(with));
+        robot_sim_store(with, &state);
+    }
+    return met;
+}
+
+static void contact_takes_energy(void **unused) {
+    (void)unused;
+    static const double steps[] = {0.001, 0.0025, 0.005};
+    for (int r = 0; r < ROBOTS; r++) {
+        for (int s = 0; s < 3; s++) {
+            MildError error = {0};
+            RobotSim *with = robot_sim_create(robots[r], steps[s], &error);
+            RobotSim *bare = robot_sim_create(without[r], steps[s], &error);
+            Random random = random_at(62, (uint32_t)(3 * r + s), 0);
+            const size_t bytes = mild_ground_bytes(robot_soles(robots[r]), robots[r]->def.feet);
+            MildGround *ground = aligned_alloc(64, (bytes + 63) / 64 * 64);
+            double most = -1e9, least = 0, deepest = 1;
+            int met = 0;
+            mild_ground_init(ground, robot_soles(robots[r]), robots[r]->def.feet);
+            mju_zero3(with->model->opt.gravity);
+            mju_zero3(bare->model->opt.gravity);
+            for (int n = 0; n < THROWS; n++) {
+                double work, distance;
+                const RobotState state = random_throw(robots[r], with, &random);
+                if (throw_legs(with, bare, state, ground, &work, &distance)) {
+                    most = fmax(most, work);
+                    least = fmin(least, work);
+                    deepest = fmin(deepest, distance);
+                    met++;
+                }
+            }
+            printf("%s, %g ms: %d of %d throws meet, work %.2g to %.2g J, deepest %.1f mm\n",
+                   names[r], 1e3 * steps[s], met, THROWS, least, most, -1e3 * deepest);
+            assert_true(met > THROWS / 20 && most < 1e-9 && least < -0.01);
+            free(ground);
+            robot_sim_destroy(with);
+            robot_sim_destroy(bare);
+        }
+    }
+}
+
+/* ---- the law by hand ---- */
+
+/* 2 kg on 1/A: approaching at 0.4 m/s from 0.5 mm in 2.5 ms, 0.2 m/s are too fast. In overlap of
+ * 1 mm at rest half of it is taken back in a step, at 0.2 m/s. */
+static void force_by_hand(void **unused) {
+    (void)unused;
+    expect_near("force", legs_force(0.0025, 0.0005, -0.4, 0.5), 0.2 / (0.0025 * 0.5), 1e-9);
+    expect_near("force", legs_force(0.0025, -0.001, 0, 0.5), 0.2 / (0.0025 * 0.5), 1e-9);
+    assert_true(legs_force(0.0025, 0.0005, -0.199, 0.5) == 0);
+    assert_true(legs_force(0.0025, -0.001, 0.201, 0.5) == 0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(distance_is_mujocos),
+        cmocka_unit_test(contact_takes_energy),
+        cmocka_unit_test(force_by_hand),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
