@@ -43,7 +43,7 @@ static struct {
     EnvsGround drawn; /* the only ground to draw */
     EnvsTrial trial;
     EnvRobot *robot;
-    EnvWork *scratch;
+    EnvWork *env_scratch;
     EnvsArrays all;
     EnvsStep call;
     float history[TASK_HISTORY_MAX];
@@ -144,7 +144,7 @@ void web_act(const float *history, float *action) {
 /* ---- the picture: poses ---- */
 
 static void show_links(void) {
-    const EngineWork *work = &web.scratch->work;
+    const EngineWork *work = &web.env_scratch->work;
     web.view.links = engine_links(&web.all.model->tree);
     for (int i = 0; i < web.view.links; i++) {
         for (int k = 0; k < 3; k++) {
@@ -235,7 +235,7 @@ static void recall_cells(int i0, int i1, int j0, int j1) {
 static void follow(void) {
     int first[2], again = 0;
     for (int k = 0; k < 2; k++) {
-        const double middle = (double)web.scratch->work.base[k] / window_cell();
+        const double middle = (double)web.env_scratch->work.base[k] / window_cell();
         first[k] = WINDOW_STRIDE * (int)floor(middle / WINDOW_STRIDE) - WEB_WINDOW / 2;
         again |= abs(first[k] - web.window[k]) >= WEB_WINDOW / 2;
     }
@@ -452,7 +452,7 @@ int web_move(const float *action, const float command[3]) {
             solve_ground();
             take_feet();
         }
-        env_part(&web.all, &web.call, 0, k, 0, web.scratch);
+        env_part(&web.all, &web.call, 0, k, 0, web.env_scratch);
     }
     const TaskStep step = task_end_step(env, &web.task.task, &web.task.robot, &web.robot->reading,
                                         env->torque, web.robot->diverged);
@@ -502,7 +502,7 @@ static void stand_up(double x, double y, double yaw) {
     env->robot.qpos[1] = (float)y;
     env->robot.qpos[3] = (float)cos(0.5 * yaw);
     env->robot.qpos[6] = (float)sin(0.5 * yaw);
-    env_pose(&web.all, 0, web.scratch);
+    env_pose(&web.all, 0, web.env_scratch);
     env_observe(&web.all, &web.call, 0);
     web_change(web.stiffness, web.friction);
     lift_feet();
@@ -685,7 +685,7 @@ static int open_arrays(void) {
     all->env = calloc(1, all->stride);
     web.robot = aligned_alloc(16, (sizeof *web.robot + 15) / 16 * 16);
     all->robot = (char *)web.robot;
-    web.scratch = aligned_alloc(16, (sizeof *web.scratch + 15) / 16 * 16);
+    web.env_scratch = aligned_alloc(16, (sizeof *web.env_scratch + 15) / 16 * 16);
     all->material = calloc(labels, sizeof *all->material);
     all->map_origin = calloc(2, sizeof *all->map_origin);
     all->reset = calloc(2, 1);
@@ -695,11 +695,11 @@ static int open_arrays(void) {
     contact->foot = calloc(feet, sizeof *contact->foot);
     web.shown = calloc(2 * (size_t)WEB_WINDOW * WEB_WINDOW, sizeof *web.shown);
     web.hills = calloc((size_t)WEB_HILLS * WEB_HILLS, sizeof *web.hills);
-    if (!all->env || !web.robot || !web.scratch || !all->material || !all->map_origin ||
+    if (!all->env || !web.robot || !web.env_scratch || !all->material || !all->map_origin ||
         !all->reset || !contact->position || !contact->foot || !web.shown || !web.hills) {
         return 0;
     }
-    memset(web.scratch, 0, sizeof *web.scratch);
+    memset(web.env_scratch, 0, sizeof *web.env_scratch);
     web.kept = web.shown + (size_t)WEB_WINDOW * WEB_WINDOW;
     contact->rotation = block + 3 * feet;
     contact->velocity = contact->rotation + 9 * feet;
@@ -721,7 +721,7 @@ static void close_all(void) {
                             web.wide[1],
                             web.all.env,
                             web.robot,
-                            web.scratch,
+                            web.env_scratch,
                             web.all.material,
                             web.all.map_origin,
                             web.all.reset,
