@@ -58,6 +58,7 @@ static struct {
     double stiffness;                       /* [-] factors of web_change */
     double friction;
     MildContactInput input;
+    double inverse_inertia[36 * ROBOT_FEET_MAX * ROBOT_FEET_MAX]; /* of the input */
     MildContactResult result;
     /* the picture */
     WebView view;
@@ -430,6 +431,7 @@ static void lift_feet(void) {
     MildContactInput *input = &web.input;
     memset(input, 0, sizeof *input);
     input->feet = web.feet;
+    input->inverse_inertia = web.inverse_inertia;
     input->dt = web.task.task.physics_dt;
     input->tolerance = web.task.task.contact_tolerance;
     input->max_iterations = web.task.task.contact_iterations;

@@ -57,6 +57,7 @@ MildStatus context_scene(Context *c, const char *name, double patch, Scene *scen
     MildStatus status = scene_make(scene, name, patch, error);
     if (status == MILD_OK) {
         status = grounds_finish_scene(&c->grounds, scene, error);
+        robot_set_shells(c->robot, c->task.shells_stand);
     }
     if (status == MILD_OK) {
         status = task_def_check(&c->task, error); /* its actuator is opened later */

@@ -59,6 +59,7 @@ static MildStatus check_def(const EnvsDef *def, MildError *error) {
     const char *missing = patches               ? "randomize.patch_share above 0"
                           : task->imprint_tiles ? "terrain.memory"
                           : !task->newton       ? "task.newton = 0"
+                          : task->shells_stand  ? "task.shells_stand"
                           : task->motors        ? "task.actuator"
                           : def->trial && task->map && mild_map_label_count(task->map) > 1
                               ? "terrain.patches"

@@ -56,6 +56,7 @@ static const MildField robot_fields[] = {
     RT(source, "[text] source of the numbers, and their licence"),
     RT(base, "[text] body with the free joint"),
     TEXT(RobotText, shells, "[text] geoms of the MJCF that must not touch the ground"),
+    R(shell_pitch, 1, 1e-3, 1, "[m] edge of the ground elements of the shells"),
     TEXT(RobotText, legs, "[text] geoms of the MJCF by which the legs touch each other"),
     R(height, 1, 0.01, 5, "[m] wanted height of the base above the stance soles"),
     R(action_scale, 1, 0.01, 2, "[rad] joint offset per unit of action"),
@@ -566,12 +567,21 @@ static MildStatus check_gait(Reader *reader) {
 
 /* ---- the whole ---- */
 
+static int optional(const char *key) {
+    static const char *const keys[] = {"source", "legs", "shell_pitch"};
+    int found = 0;
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
+        found |= strcmp(key, keys[i]) == 0;
+    }
+    return found;
+}
+
 static MildStatus take_robot(Reader *reader) {
     RobotDef *def = reader->def;
     *def = reader->robot.def;
     for (int k = 0; k < ROBOT_KEYS; k++) {
         const char *key = robot_fields[k].name;
-        if (!reader->robot_seen[k] && strcmp(key, "source") != 0 && strcmp(key, "legs") != 0) {
+        if (!reader->robot_seen[k] && !optional(key)) {
             return fail_key(reader, "robot", key, "is missing");
         }
     }
@@ -611,6 +621,7 @@ MildStatus robot_def_parse(const char *text, const char *path, RobotDef *def, Mi
     reader->rest = text;
     reader->def = def;
     reader->error = error;
+    reader->robot.def.shell_pitch = 0.03;
     int bad_line = ini_parse_stream(next_line, reader, take_key, reader);
     if (reader->status == MILD_OK && bad_line) {
         reader->line = bad_line;

@@ -10,8 +10,9 @@
 
 #define ROBOT_FOOT_DOFS_MAX ROBOT_NV_MAX /* base six, then the hinges between base and foot */
 #define ROBOT_PATH_SIZE 1024
+#define ROBOT_BODIES_MAX MILD_FEET_MAX /* feet, and bodies of shells */
 
-/* A foot in the model. */
+/* A foot in the model, or a body with shells, of which `body`, `dofs`, `dof` and `shared` are set. */
 typedef struct {
     int body;
     int knee_body;
@@ -21,13 +22,14 @@ typedef struct {
     double sole_center[3];        /* [m] flat: middle of the outline's bounds, body frame */
     int dofs;                     /* degrees of freedom that move the foot, base six first */
     int dof[ROBOT_FOOT_DOFS_MAX]; /* [dofs] ascending */
-    int shared[ROBOT_FEET_MAX];   /* how many of the leading ones also move the other foot */
+    int shared[ROBOT_BODIES_MAX]; /* how many of the leading ones also move the other body */
 } RobotLimb;
 
 /* A part of a body that must not touch the ground: a box inflated by a radius. Spheres and capsules
  * are inflated boxes of zero width. */
 typedef struct {
     int body;
+    int limb;           /* number of the body in Robot.limb */
     int on_base;        /* bool: of the base, or of a body welded to it */
     double center[3];   /* [m] body frame */
     double rotation[9]; /* [-] box -> body, row major */
@@ -49,14 +51,16 @@ typedef struct Robot {
     char path[ROBOT_PATH_SIZE];           /* of the MJCF */
     mjModel *model;                       /* bodies, joints, floor and corners: what a step needs */
     mjModel *visual;                      /* the whole file, for pictures */
-    MildSole *soles[ROBOT_FEET_MAX];      /* the rasters */
+    MildSole *soles[ROBOT_BODIES_MAX];    /* the rasters; then the surfaces of the shells */
     MildSole *concentric[ROBOT_FEET_MAX]; /* one element in the middle of each */
     int is_concentric;                    /* bool: the feet use `concentric`, not `soles` */
     int nq;                               /* 7 + joints */
     int nv;                               /* 6 + joints */
     int base_body;
     int floor_geom;
-    RobotLimb limb[ROBOT_FEET_MAX];
+    RobotLimb limb[ROBOT_BODIES_MAX];
+    int shell_bodies;                /* limbs behind the feet */
+    int shells_stand;                /* bool: they stand on soft ground */
     int pairs;                       /* of mirrored feet */
     int pair[ROBOT_FEET_MAX / 2][2]; /* left foot, right foot */
     int dof[ROBOT_JOINTS_MAX];       /* of joint i in the engine: qvel[dof], qpos[dof + 1] */
@@ -84,6 +88,13 @@ MildStatus robot_load_models(Robot *robot, MildError *error);
  * must be finite, and masses, inertias, gains and limits must have the right sign. */
 MildStatus robot_check_model(const mjModel *model, const char *path, MildError *error);
 
+/* Id of a named object, or -1 with a message that names the key that refers to it. */
+int robot_find(const Robot *robot, const mjModel *model, int type, const char *kind,
+               const char *name, const char *key, MildError *error);
+/* Sets the degrees of freedom of a limb from its body, and those that it shares with the limbs
+ * before it. */
+void robot_read_limb(Robot *robot, int limb);
+
 /* ---- parts of robot_create, in the order of their calls; each needs the ones before it ---- */
 MildStatus robot_read_bodies(Robot *robot, MildError *error);
 MildStatus robot_read_joints(Robot *robot, MildError *error);
@@ -91,6 +102,7 @@ MildStatus robot_read_limbs(Robot *robot, MildError *error);
 MildStatus robot_read_shells(Robot *robot, MildError *error);
 MildStatus robot_read_legs(Robot *robot, MildError *error);
 MildStatus robot_read_soles(Robot *robot, MildError *error);
+MildStatus robot_read_surfaces(Robot *robot, MildError *error);
 MildStatus robot_read_stand(Robot *robot, MildError *error);
 
 #endif

@@ -64,6 +64,10 @@ void foot_map_jacobian(RobotSim *sim) {
     }
 }
 
+void foot_map_shell(RobotSim *sim, int body) {
+    foot_jacobian(sim, body);
+}
+
 void foot_map_twist(const RobotSim *sim, int foot, const double *velocity,
                     const double *acceleration, double twist[6]) {
     const RobotLimb *limb = &sim->robot->limb[foot];
@@ -117,7 +121,7 @@ static void inner_product(const double *inverse_d, const double left[][ROBOT_LAN
 /* Block (f, g) of A and its mirror image. */
 static void store_block(RobotSim *sim, int f, int g, double block[6][ROBOT_LANES]) {
     double *a = sim->input.inverse_inertia;
-    int stride = 6 * sim->robot->def.feet;
+    int stride = 6 * sim->rows;
     for (int r = 0; r < 6; r++) {
         memcpy(a + (6 * f + r) * stride + 6 * g, block[r], 6 * sizeof *a);
         for (int c = 0; c < 6 && g < f; c++) {
@@ -127,18 +131,19 @@ static void store_block(RobotSim *sim, int f, int g, double block[6][ROBOT_LANES
 }
 
 void foot_map_inverse_inertia(RobotSim *sim) {
-    FootMap *map = sim->map;
-    for (int f = 0; f < sim->robot->def.feet; f++) {
-        const RobotLimb *limb = &sim->robot->limb[f];
+    for (int i = 0; i < sim->rows; i++) {
+        FootMap *map = &sim->map[sim->row[i]];
+        const RobotLimb *limb = &sim->robot->limb[sim->row[i]];
         double inverse_d[ROBOT_FOOT_DOFS_MAX], block[6][ROBOT_LANES];
         for (int k = 0; k < limb->dofs; k++) {
             inverse_d[k] = sim->data->qLDiagInv[limb->dof[k]];
         }
-        memcpy(map[f].half, map[f].jacobian, (size_t)limb->dofs * sizeof *map[f].half);
-        backward_substitute(sim->model, sim->data, limb, map[f].half);
-        for (int g = 0; g <= f; g++) { /* two feet share only the leading rows */
-            inner_product(inverse_d, map[f].half, map[g].half, limb->shared[g], block);
-            store_block(sim, f, g, block);
+        memcpy(map->half, map->jacobian, (size_t)limb->dofs * sizeof *map->half);
+        backward_substitute(sim->model, sim->data, limb, map->half);
+        for (int j = 0; j <= i; j++) { /* two bodies share only the leading rows */
+            const int other = sim->row[j];
+            inner_product(inverse_d, map->half, sim->map[other].half, limb->shared[other], block);
+            store_block(sim, i, j, block);
         }
     }
 }
@@ -161,14 +166,15 @@ void foot_map_wrench(const RobotSim *sim, double (*wrench)[6], double *force,
     int nv = sim->robot->nv;
     memset(force, 0, (size_t)nv * sizeof *force);
     memset(acceleration, 0, (size_t)nv * sizeof *acceleration);
-    for (int f = 0; f < sim->robot->def.feet; f++) {
-        const RobotLimb *limb = &sim->robot->limb[f];
+    for (int i = 0; i < sim->rows; i++) {
+        const int b = sim->row[i];
+        const RobotLimb *limb = &sim->robot->limb[b];
         for (int k = 0; k < limb->dofs; k++) {
-            const double *row = sim->map[f].jacobian[k], *half = sim->map[f].half[k];
+            const double *row = sim->map[b].jacobian[k], *half = sim->map[b].half[k];
             double direct = 0.0, solved = 0.0;
             for (int c = 0; c < 6; c++) {
-                direct += row[c] * wrench[f][c];
-                solved += half[c] * wrench[f][c];
+                direct += row[c] * wrench[i][c];
+                solved += half[c] * wrench[i][c];
             }
             force[limb->dof[k]] += direct;
             acceleration[limb->dof[k]] += solved;

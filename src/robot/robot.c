@@ -18,9 +18,8 @@ RobotVariation robot_variation_nominal(void) {
     return variation;
 }
 
-/* Id of a named object, or -1 with a message that names the key that refers to it. */
-static int find(const Robot *robot, const mjModel *model, int type, const char *kind,
-                const char *name, const char *key, MildError *error) {
+int robot_find(const Robot *robot, const mjModel *model, int type, const char *kind,
+               const char *name, const char *key, MildError *error) {
     int id = mj_name2id(model, type, name);
     if (id < 0) {
         mild_fail(error, MILD_ERROR_FORMAT, "%s: %s '%s' is missing; robot.ini names it in %s",
@@ -33,7 +32,7 @@ MildStatus robot_read_bodies(Robot *robot, MildError *error) {
     const mjModel *m = robot->model;
     const RobotDef *def = &robot->def;
     robot->floor_geom = mj_name2id(m, mjOBJ_GEOM, "floor");
-    robot->base_body = find(robot, m, mjOBJ_BODY, "body", def->base, "[robot] base", error);
+    robot->base_body = robot_find(robot, m, mjOBJ_BODY, "body", def->base, "[robot] base", error);
     if (robot->base_body < 0) {
         return MILD_ERROR_FORMAT;
     }
@@ -43,8 +42,8 @@ MildStatus robot_read_bodies(Robot *robot, MildError *error) {
         char key[ROBOT_NAME_SIZE + 16];
         snprintf(key, sizeof key, "[foot.%s]", foot->name);
         limb->round = foot->shape == ROBOT_SOLE_ROUND;
-        limb->body = find(robot, m, mjOBJ_BODY, "body", foot->body, key, error);
-        limb->knee_body = find(robot, m, mjOBJ_BODY, "body", foot->knee, key, error);
+        limb->body = robot_find(robot, m, mjOBJ_BODY, "body", foot->body, key, error);
+        limb->knee_body = robot_find(robot, m, mjOBJ_BODY, "body", foot->knee, key, error);
         if (limb->body < 0 || limb->knee_body < 0) {
             return MILD_ERROR_FORMAT;
         }
@@ -63,7 +62,7 @@ MildStatus robot_read_bodies(Robot *robot, MildError *error) {
 static MildStatus read_joint(Robot *robot, int i, MildError *error) {
     const mjModel *m = robot->model;
     const char *name = robot->def.joint[i];
-    int id = find(robot, m, mjOBJ_JOINT, "joint", name, "[joints] names", error);
+    int id = robot_find(robot, m, mjOBJ_JOINT, "joint", name, "[joints] names", error);
     if (id < 0) {
         return MILD_ERROR_FORMAT;
     }
@@ -127,7 +126,7 @@ MildStatus robot_read_joints(Robot *robot, MildError *error) {
     return MILD_OK;
 }
 
-/* Degrees of freedom between the base and the foot, ascending. */
+/* Degrees of freedom between the base and the body, ascending. */
 static int read_chain(const mjModel *m, int body, int dof[ROBOT_FOOT_DOFS_MAX]) {
     int reversed[ROBOT_FOOT_DOFS_MAX], count = 0;
     while (body > 0 && m->body_dofnum[body] == 0) { /* welded to its parent */
@@ -143,11 +142,25 @@ static int read_chain(const mjModel *m, int body, int dof[ROBOT_FOOT_DOFS_MAX]) 
     return count;
 }
 
+void robot_read_limb(Robot *robot, int b) {
+    RobotLimb *limb = &robot->limb[b];
+    limb->dofs = read_chain(robot->model, limb->body, limb->dof);
+    for (int c = 0; c <= b; c++) {
+        RobotLimb *other = &robot->limb[c];
+        const int least = limb->dofs < other->dofs ? limb->dofs : other->dofs;
+        int same = 0;
+        while (same < least && limb->dof[same] == other->dof[same]) {
+            same++;
+        }
+        limb->shared[c] = other->shared[b] = same;
+    }
+}
+
 MildStatus robot_read_limbs(Robot *robot, MildError *error) {
     const RobotDef *def = &robot->def;
     for (int f = 0; f < def->feet; f++) {
         RobotLimb *limb = &robot->limb[f];
-        limb->dofs = read_chain(robot->model, limb->body, limb->dof);
+        robot_read_limb(robot, f);
         if (limb->dofs <= 6 || limb->dof[5] != 5) {
             return mild_fail(error, MILD_ERROR_FORMAT,
                              "%s: no joint between the base and body '%s' of [foot.%s]",
@@ -156,14 +169,6 @@ MildStatus robot_read_limbs(Robot *robot, MildError *error) {
         limb->ankle = -1;
         for (int i = 0; i < def->joints; i++) {
             limb->ankle = strcmp(def->joint[i], def->foot[f].ankle) == 0 ? i : limb->ankle;
-        }
-        for (int g = 0; g <= f; g++) {
-            int same = 0,
-                least = limb->dofs < robot->limb[g].dofs ? limb->dofs : robot->limb[g].dofs;
-            while (same < least && limb->dof[same] == robot->limb[g].dof[same]) {
-                same++;
-            }
-            limb->shared[g] = robot->limb[g].shared[f] = same;
         }
     }
     for (int i = 0; i < def->joints; i++) {
@@ -177,42 +182,6 @@ MildStatus robot_read_limbs(Robot *robot, MildError *error) {
             }
         }
     }
-    return MILD_OK;
-}
-
-MildStatus robot_read_shells(Robot *robot, MildError *error) {
-    const mjModel *m = robot->visual;
-    for (int s = 0; s < robot->def.shells; s++) {
-        const char *name = robot->def.shell[s];
-        RobotShell *shell = &robot->shell[s];
-        int id = find(robot, m, mjOBJ_GEOM, "geom", name, "[robot] shells", error);
-        if (id < 0) {
-            return MILD_ERROR_FORMAT;
-        }
-        const double *size = m->geom_size + 3 * id;
-        switch (m->geom_type[id]) {
-        case mjGEOM_BOX: memcpy(shell->half, size, sizeof shell->half); break;
-        case mjGEOM_SPHERE: shell->radius = size[0]; break;
-        case mjGEOM_CAPSULE:
-            shell->radius = size[0];
-            shell->half[2] = size[1];
-            break;
-        default:
-            return mild_fail(error, MILD_ERROR_FORMAT,
-                             "%s: geom '%s' of [robot] shells must be a box, a sphere or a capsule",
-                             robot->path, name);
-        }
-        const char *body = mj_id2name(m, mjOBJ_BODY, m->geom_bodyid[id]);
-        shell->body = body ? mj_name2id(robot->model, mjOBJ_BODY, body) : -1;
-        if (shell->body < 0) {
-            return mild_fail(error, MILD_ERROR_FORMAT, "%s: the body of geom '%s' needs a name",
-                             robot->path, name);
-        }
-        shell->on_base = robot->model->body_weldid[shell->body] == robot->base_body;
-        memcpy(shell->center, m->geom_pos + 3 * id, sizeof shell->center);
-        mju_quat2Mat(shell->rotation, m->geom_quat + 4 * id);
-    }
-    robot->shells = robot->def.shells;
     return MILD_OK;
 }
 
@@ -364,8 +333,9 @@ static MildStatus read_robot(Robot *robot, const char *folder, MildError *error)
         return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", folder);
     }
     static MildStatus (*const parts[])(Robot *, MildError *) = {
-        robot_load_models, check_models,    robot_read_bodies, robot_read_joints, robot_read_limbs,
-        robot_read_shells, robot_read_legs, robot_read_soles,  robot_read_stand};
+        robot_load_models,   check_models,      robot_read_bodies, robot_read_joints,
+        robot_read_limbs,    robot_read_shells, robot_read_legs,   robot_read_soles,
+        robot_read_surfaces, robot_read_stand};
     for (size_t i = 0; status == MILD_OK && i < sizeof parts / sizeof *parts; i++) {
         status = parts[i](robot, error);
     }
@@ -432,8 +402,10 @@ void robot_destroy(Robot *robot) {
     if (!robot) {
         return;
     }
+    for (int b = 0; b < ROBOT_BODIES_MAX; b++) {
+        mild_sole_destroy(robot->soles[b]);
+    }
     for (int f = 0; f < ROBOT_FEET_MAX; f++) {
-        mild_sole_destroy(robot->soles[f]);
         mild_sole_destroy(robot->concentric[f]);
     }
     mj_deleteModel(robot->model);
@@ -607,6 +579,15 @@ const RobotTable *robot_table(const Robot *robot) {
 
 const MildSole *const *robot_soles(const Robot *robot) {
     return (const MildSole *const *)(robot->is_concentric ? robot->concentric : robot->soles);
+}
+
+int robot_bodies(const Robot *robot) {
+    const int shells = robot->shells_stand && !robot->is_concentric;
+    return robot->def.feet + (shells ? robot->shell_bodies : 0);
+}
+
+void robot_set_shells(Robot *robot, int stand) {
+    robot->shells_stand = stand;
 }
 
 const MildSole *const *robot_rasters(const Robot *robot) {

@@ -78,13 +78,20 @@ const double *robot_assist(const Robot *robot);
 /* All of these that a task needs, as one block without pointers. */
 const RobotTable *robot_table(const Robot *robot);
 
-/* [robot_feet] The soles in use, see robot_set_model. */
+/* [robot_bodies] The soles in use, see robot_set_model and robot_set_shells: of the feet, then of
+ * the bodies with shells. */
 const MildSole *const *robot_soles(const Robot *robot);
+/* Number of bodies that stand on soft ground: the feet, and with robot_set_shells those with
+ * shells. A concentric model has none for these. */
+int robot_bodies(const Robot *robot);
 /* [robot_feet] The rasterised outlines, regardless of the model. */
 const MildSole *const *robot_rasters(const Robot *robot);
 /* Gives the feet the soles of a ground model: a single element for concentric models, otherwise the
  * rasters (the default). Call it before making sims and ground memory. */
 void robot_set_model(Robot *robot, MildModel model);
+/* Lets the shells stand on soft ground too (stand: bool; at first they do not). Call it when
+ * robot_set_model may be called. */
+void robot_set_shells(Robot *robot, int stand);
 /* mild_model_match for this robot: the first foot's raster under robot_foot_load. */
 MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *mild,
                              MildMaterial *rival, MildError *error);

@@ -38,13 +38,17 @@ RobotSim *robot_sim_create(const Robot *robot, double dt, MildError *error) {
     sim->model = model;
     sim->data = data;
     sim->dt = dt;
-    sim->scratch = mild_scratch_create(robot_soles(robot), robot->def.feet, error);
+    sim->scratch = mild_scratch_create(robot_soles(robot), robot_bodies(robot), error);
     if (!sim->scratch) {
         robot_sim_destroy(sim);
         return NULL;
     }
     model->opt.timestep = dt;
-    sim->input.feet = robot->def.feet;
+    sim->input.feet = robot_bodies(robot);
+    sim->rows = robot->def.feet;
+    for (int f = 0; f < sim->rows; f++) {
+        sim->row[f] = f;
+    }
     sim->input.dt = dt;
     sim->input.inverse_inertia = sim->inverse_inertia;
     RobotState stand = {.qpos = {0, 0, robot->stand_height, 1, 0, 0, 0}};
@@ -245,21 +249,62 @@ static void update_feet(RobotSim *sim) {
     }
 }
 
-/* Inverse inertia and free motion of the feet: A = J M^-1 J^T and V_free = J (qvel + dt a). */
+/* Pose and twist of the bodies with shells. */
+static void update_shells(RobotSim *sim) {
+    MildContactInput *input = &sim->input;
+    const mjModel *m = sim->model;
+    const mjData *d = sim->data;
+    for (int b = sim->robot->def.feet; b < input->feet; b++) {
+        const int body = sim->robot->limb[b].body;
+        const double *com = d->subtree_com + 3 * m->body_rootid[body], *spin = d->cvel + 6 * body;
+        double arm[3];
+        memcpy(input->position[b], d->xpos + 3 * body, sizeof input->position[b]);
+        memcpy(input->rotation[b], d->xmat + 9 * body, sizeof input->rotation[b]);
+        mju_sub3(arm, input->position[b], com);
+        mju_cross(input->velocity[b], spin, arm);
+        mju_addTo3(input->velocity[b], spin + 3);
+        memcpy(input->velocity[b] + 3, spin, 3 * sizeof(double));
+        memcpy(input->free_velocity + 6 * b, input->velocity[b], sizeof input->velocity[b]);
+    }
+}
+
+/* The feet and those shells that may touch the ground get rows of A. Gravity adds to a velocity
+ * less than mild_ground_near allows for. */
+static void choose_rows(RobotSim *sim, const MildTerrain *terrain) {
+    const int feet = sim->robot->def.feet;
+    if (sim->input.feet == feet) {
+        return;
+    }
+    update_shells(sim);
+    sim->rows = feet;
+    sim->input.rows = (1u << feet) - 1;
+    const uint32_t near = mild_ground_near(terrain, &sim->input, sim->scratch);
+    for (int b = feet; b < sim->input.feet; b++) {
+        if (near >> b & 1) {
+            sim->input.rows |= 1u << b;
+            sim->row[sim->rows++] = b;
+            foot_map_shell(sim, b);
+        }
+    }
+}
+
+/* Inverse inertia and free motion of the rows: A = J M^-1 J^T and V_free = J (qvel + dt a). */
 static void free_feet(RobotSim *sim) {
     foot_map_inverse_inertia(sim);
-    for (int f = 0; f < sim->robot->def.feet; f++) {
-        foot_map_twist(sim, f, sim->data->qvel, sim->data->qacc_smooth,
-                       sim->input.free_velocity + 6 * f);
+    for (int i = 0; i < sim->rows; i++) {
+        const int b = sim->row[i];
+        foot_map_twist(sim, b, sim->data->qvel, sim->data->qacc_smooth,
+                       sim->input.free_velocity + 6 * b);
     }
 }
 
 static void add_ground_wrench(RobotSim *sim) {
     mjData *d = sim->data;
-    double wrench[ROBOT_FEET_MAX][6], force[ROBOT_NV_MAX], acceleration[ROBOT_NV_MAX];
-    for (int f = 0; f < sim->robot->def.feet; f++) {
-        memcpy(wrench[f], sim->contact.foot[f].force, 3 * sizeof(double));
-        memcpy(wrench[f] + 3, sim->contact.foot[f].torque, 3 * sizeof(double));
+    double wrench[ROBOT_BODIES_MAX][6], force[ROBOT_NV_MAX], acceleration[ROBOT_NV_MAX];
+    for (int i = 0; i < sim->rows; i++) {
+        const MildFootResult *body = &sim->contact.foot[sim->row[i]];
+        memcpy(wrench[i], body->force, 3 * sizeof(double));
+        memcpy(wrench[i] + 3, body->torque, 3 * sizeof(double));
     }
     foot_map_wrench(sim, wrench, force, acceleration);
     for (int i = 0; i < sim->robot->nv; i++) {
@@ -332,6 +377,7 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
         accelerate(sim);
         legs_push(sim, held);
         t = split(sim, &phases->smooth, t);
+        choose_rows(sim, terrain);
         free_feet(sim);
         t = split(sim, &phases->map, t);
         mild_ground_solve(ground, terrain, &sim->input, sim->scratch, &sim->contact);

@@ -28,10 +28,12 @@ struct RobotSim {
     RobotVariation variation;  /* the one the model is patched with */
     double qpos[ROBOT_NQ_MAX]; /* as in RobotState */
     double qvel[ROBOT_NV_MAX];
-    FootMap map[ROBOT_FEET_MAX];
+    FootMap map[ROBOT_BODIES_MAX];
+    int rows;                  /* bodies that A has rows of: the feet, and shells near the ground */
+    int row[ROBOT_BODIES_MAX]; /* [rows] their numbers, ascending */
     Unheld without[ROBOT_JOINTS_MAX];
     MildContactInput input;
-    double inverse_inertia[36 * ROBOT_FEET_MAX * ROBOT_FEET_MAX]; /* of the input */
+    double inverse_inertia[36 * ROBOT_BODIES_MAX * ROBOT_BODIES_MAX]; /* of the input */
     MildScratch *scratch;
     MildContactResult contact;
     RobotFoot feet[ROBOT_FEET_MAX];
@@ -46,13 +48,15 @@ void variation_apply(RobotSim *sim, const RobotVariation *variation);
 void foot_map_reference(const RobotSim *sim, int foot, double point[3]);
 /* J of all feet at the current pose. */
 void foot_map_jacobian(RobotSim *sim);
-/* Twist of foot f, J nu + dt J a; acceleration may be NULL. */
+/* The same of a body with shells. */
+void foot_map_shell(RobotSim *sim, int body);
+/* Twist of foot or body f, J nu + dt J a; acceleration may be NULL. */
 void foot_map_twist(const RobotSim *sim, int foot, const double *velocity,
                     const double *acceleration, double twist[6]);
-/* A = J M^-1 J^T into the contact input; needs the factorised mass matrix. */
+/* A = J M^-1 J^T of the rows into the contact input; needs the factorised mass matrix. */
 void foot_map_inverse_inertia(RobotSim *sim);
 /* Generalised force J^T w and its acceleration M^-1 J^T w, both [nv] in the engine's order, of one
- * wrench (force, torque) per foot. */
+ * wrench (force, torque) for each of the rows. */
 void foot_map_wrench(const RobotSim *sim, double (*wrench)[6], double *force, double *acceleration);
 
 /* Makes the engine's rows of joint limits and contacts. Returns 0 if there are none. */

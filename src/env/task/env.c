@@ -20,7 +20,7 @@ static size_t front_bytes(const TaskShape *shape, uint32_t held) {
 size_t task_env_bytes(const TaskDef *def, const Robot *robot) {
     TaskShape shape = task_shape(robot);
     return front_bytes(&shape, task_frames_held(def)) +
-           mild_ground_bytes_imprints(robot_soles(robot), shape.feet, def->imprint_tiles) +
+           mild_ground_bytes_imprints(robot_soles(robot), robot_bodies(robot), def->imprint_tiles) +
            (def->motors ? def->motors->bytes : 0);
 }
 
@@ -60,7 +60,7 @@ void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_
     memset(env, 0, front_bytes(&shape, task_frames_held(def)));
     task_env_init_head(env, def, shape, seed, index);
     task_env_rest(env)->gains = gains;
-    mild_ground_init_imprints(task_env_ground(env), robot_soles(robot), env->shape.feet,
+    mild_ground_init_imprints(task_env_ground(env), robot_soles(robot), robot_bodies(robot),
                               def->imprint_tiles);
 }
 

@@ -304,12 +304,16 @@ MILD_HD_FN int task_joint_is_broken(const TaskEnv *env, const RobotTable *robot)
  * contact of the legs does not keep a foot from passing before the other to its far side. */
 MILD_HD_FN TaskEnd task_end_cause(const TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                   const RobotReading *reading) {
-    const double depth = env->variation.rigid ? 0 : def->shell_depth;
+    const int stand = def->shells_stand && !env->variation.rigid;
+    const double depth = env->variation.rigid || stand ? 0 : def->shell_depth;
     if (reading->rotation[8] < task_cos(def->tilt_limit)) {
         return TASK_END_tilt;
     }
-    if (reading->body_clearance < -depth) {
-        return reading->base_clearance < -depth ? TASK_END_base : TASK_END_shell;
+    if (reading->base_clearance < -depth) {
+        return TASK_END_base;
+    }
+    if (!stand && reading->body_clearance < -depth) {
+        return TASK_END_shell;
     }
     if (reading->foot_distance < def->crossing_limit) {
         return TASK_END_crossing;

@@ -173,6 +173,9 @@ const MildField task_fields[] = {
     T(shell_depth, D, 1, 0, 1,
       "[m] on soft ground the episode ends when a geom of `shells` of robot.ini is deeper than "
       "this below the undisturbed surface"),
+    T(shells_stand, B, 1, 0, 1,
+      "[bool] geoms of `shells` of robot.ini stand on soft ground as soles do; then a shell of the "
+      "base ends the episode when it touches the ground, and no other (MuJoCo's robots alone)"),
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
     T(newton, B, 1, 0, 1,

@@ -22,6 +22,7 @@ static MildStatus build(MildEnvs *envs, MildError *error) {
     }
     experiment_fit_robot(def, envs->robot);
     robot_set_model(envs->robot, (MildModel)def->task.randomize.model);
+    robot_set_shells(envs->robot, def->task.shells_stand);
     envs->shape = task_shape(envs->robot);
     envs->pool = pool_create(def->train.threads);
     if (!envs->pool) {

@@ -70,6 +70,7 @@ static int make_learner(Trainer *trainer, MildError *error) {
     const PpoMirror mirror = {sides.observation_index, sides.observation_sign, sides.action_index,
                               sides.action_sign};
     robot_set_model(trainer->robot, (MildModel)def->task.randomize.model);
+    robot_set_shells(trainer->robot, def->task.shells_stand);
     const int threads = def->train.threads ? def->train.threads : ranks_threads(trainer->ranks);
     trainer->pool = pool_create(threads);
     if (!trainer->pool) {

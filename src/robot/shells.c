@@ -1,0 +1,100 @@
+/* The shells of a robot: parts of its bodies, from geoms of the MJCF, whose height above the ground
+ * is measured, and which may stand on soft ground as its soles do. */
+#include <string.h>
+
+#include "robot/description.h"
+
+/* Number of the body among the limbs; makes one behind the feet for a body that has none. */
+static int shell_limb(Robot *robot, int body, MildError *error) {
+    const int limbs = robot->def.feet + robot->shell_bodies;
+    for (int b = 0; b < limbs; b++) {
+        if (robot->limb[b].body == body) {
+            return b;
+        }
+    }
+    if (limbs == ROBOT_BODIES_MAX) {
+        mild_fail(error, MILD_ERROR_RANGE,
+                  "%s: the geoms of [robot] shells are on more than %d bodies", robot->path,
+                  ROBOT_BODIES_MAX - robot->def.feet);
+        return -1;
+    }
+    robot->shell_bodies++;
+    robot->limb[limbs].body = body;
+    robot_read_limb(robot, limbs);
+    return limbs;
+}
+
+MildStatus robot_read_shells(Robot *robot, MildError *error) {
+    const mjModel *m = robot->visual;
+    for (int s = 0; s < robot->def.shells; s++) {
+        const char *name = robot->def.shell[s];
+        RobotShell *shell = &robot->shell[s];
+        int id = robot_find(robot, m, mjOBJ_GEOM, "geom", name, "[robot] shells", error);
+        if (id < 0) {
+            return MILD_ERROR_FORMAT;
+        }
+        const double *size = m->geom_size + 3 * id;
+        switch (m->geom_type[id]) {
+        case mjGEOM_BOX: memcpy(shell->half, size, sizeof shell->half); break;
+        case mjGEOM_SPHERE: shell->radius = size[0]; break;
+        case mjGEOM_CAPSULE:
+            shell->radius = size[0];
+            shell->half[2] = size[1];
+            break;
+        default:
+            return mild_fail(error, MILD_ERROR_FORMAT,
+                             "%s: geom '%s' of [robot] shells must be a box, a sphere or a capsule",
+                             robot->path, name);
+        }
+        const char *body = mj_id2name(m, mjOBJ_BODY, m->geom_bodyid[id]);
+        shell->body = body ? mj_name2id(robot->model, mjOBJ_BODY, body) : -1;
+        if (shell->body < 0) {
+            return mild_fail(error, MILD_ERROR_FORMAT, "%s: the body of geom '%s' needs a name",
+                             robot->path, name);
+        }
+        shell->limb = shell_limb(robot, shell->body, error);
+        if (shell->limb < 0) {
+            return MILD_ERROR_RANGE;
+        }
+        shell->on_base = robot->model->body_weldid[shell->body] == robot->base_body;
+        memcpy(shell->center, m->geom_pos + 3 * id, sizeof shell->center);
+        mju_quat2Mat(shell->rotation, m->geom_quat + 4 * id);
+    }
+    robot->shells = robot->def.shells;
+    return MILD_OK;
+}
+
+/* What mild_sole_surface takes of a shell. */
+static MildShape shape_of(const RobotShell *shell) {
+    MildShape shape = {.type = MILD_SHAPE_BOX};
+    memcpy(shape.pos, shell->center, sizeof shape.pos);
+    mju_mat2Quat(shape.quat, shell->rotation);
+    memcpy(shape.size, shell->half, sizeof shape.size);
+    if (shell->radius > 0) {
+        shape.type = shell->half[2] > 0 ? MILD_SHAPE_CAPSULE : MILD_SHAPE_SPHERE;
+        shape.size[0] = shell->radius;
+        shape.size[1] = shell->half[2];
+    }
+    return shape;
+}
+
+MildStatus robot_read_surfaces(Robot *robot, MildError *error) {
+    for (int b = robot->def.feet; b < robot->def.feet + robot->shell_bodies; b++) {
+        MildShape shapes[ROBOT_SHELLS_MAX];
+        int count = 0;
+        for (int s = 0; s < robot->shells; s++) {
+            if (robot->shell[s].limb == b) {
+                shapes[count++] = shape_of(&robot->shell[s]);
+            }
+        }
+        const MildSurfaceDef def = {shapes, count, robot->def.shell_pitch};
+        MildError cause = {0};
+        robot->soles[b] = mild_sole_surface(&def, &cause);
+        if (!robot->soles[b]) {
+            return mild_fail(error, cause.status, "%s: robot.ini, [robot] shells of body '%s': %s",
+                             robot->path, mj_id2name(robot->model, mjOBJ_BODY, robot->limb[b].body),
+                             cause.text);
+        }
+    }
+    return MILD_OK;
+}
