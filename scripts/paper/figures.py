@@ -157,3 +157,46 @@ def course(found):
         each.set(title=way, xlabel="time [s]", ylabel="z~: 0 as on rubber, 1 as on foam28")
         each.legend(frameon=False)
     return figure
+
+
+# ---- a transition ----
+
+def strides(axes, rows, patch, quantity, scale):
+    """One quantity of every stride against the place where it ends; each trial a line, each foot's steps in turn."""
+    for trial in sorted({r["trial"] for r in rows}):
+        own = sorted((r for r in rows if r["trial"] == trial), key=lambda r: r["time"])
+        value = [1 / r["duration"] if quantity == "cadence" else r[quantity] for r in own]
+        axes.plot([r["place"] for r in own], [np.nan if v is None else scale * v for v in value], ".-", color="#555555", linewidth=0.6,
+                  markersize=3)
+    axes.axvspan(patch, 2 * patch, color="#8fd0e0", alpha=0.35, linewidth=0)
+
+
+def transition(walked, latent, grounds, patch, quantities):
+    """The paper's figure of a transition: strides forward (A) and backward (B), below each the t-SNE of z~ (C, D). walked: {way: strides},
+    latent: {way: rows of --latent}."""
+    from latent_stats import embed
+    figure = plt.figure(figsize=(12, 10), layout="constrained")
+    upper, lower = figure.subfigures(2, 1, height_ratios=(1.25, 1))
+    first, second = grounds
+    plots = upper.subplots(len(quantities), len(walked), sharex="col", sharey="row", squeeze=False)
+    for column, (way, rows) in enumerate(walked.items()):
+        for row, (name, (label, scale)) in enumerate(quantities.items()):
+            strides(plots[row][column], rows, patch, name, scale)
+            plots[row][column].spines[["top", "right"]].set_visible(False)
+            if not column:
+                plots[row][column].set_ylabel(label, fontsize=8)
+        plots[0][column].set_title(f"{'AB'[column]}  {way}: {first}, {second}, {first}")
+        plots[-1][column].set(xlabel="place where the stride ends, along the walk [m]")
+    for column, (axes, (way, rows)) in enumerate(zip(lower.subplots(1, len(walked), squeeze=False)[0], latent.items())):
+        own = [r for r in rows if r["trial"] == rows[0]["trial"] and float(r["time_s"]) >= 1]
+        place = embed(np.array([[float(v) for name, v in r.items() if name.startswith("modulated")] for r in own]))
+        border = next((i for i, r in enumerate(own) if r["ground"] == second), len(own))
+        names = [first if r["ground"] == first and i < border else f"{first} again" if r["ground"] == first else second
+                 for i, r in enumerate(own)]
+        axes.plot(*place.T, "-", color="#bbbbbb", linewidth=0.4)
+        for name, color in ((first, COLORS[first]), (second, COLORS[second]), (f"{first} again", "#c0392b")):
+            at = [i for i, n in enumerate(names) if n == name]
+            axes.plot(*place[at].T, ".", color=color, markersize=4, label=name)
+        axes.set(title=f"{'CD'[column]}  t-SNE of z~, single decisions, {way}", xlabel="t-SNE 1", ylabel="t-SNE 2", xticks=[], yticks=[])
+        axes.legend(frameon=False)
+    return figure

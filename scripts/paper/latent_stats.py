@@ -85,6 +85,18 @@ def explained(values, labels):
     return between / ((values - middle) ** 2).sum()
 
 
+def neighbours(place, labels, walks, count=10):
+    """Share of the `count` nearest points of other walks, in an embedding, that have the label of a point: its mean over the points; and
+    what it would be if places said nothing of labels."""
+    found, chance = [], []
+    for point, label, walk in zip(place, labels, walks):
+        other = np.flatnonzero(walks != walk)
+        near = other[np.argsort(((place[other] - point) ** 2).sum(1))[:count]]
+        found.append(np.mean(labels[near] == label))
+        chance.append(np.mean(labels[other] == label))
+    return float(np.mean(found)), float(np.mean(chance))
+
+
 def embed(values):
     with threadpool_limits(1):  # on busy cores its threads wait for each other
         return TSNE(random_state=1, perplexity=30).fit_transform((values - values.mean(0)) / (values.std(0) + 1e-9))
@@ -94,7 +106,8 @@ def latent(data):
     """({(from, what): share}, rows of periods, rows of moments), each row with its place in the embedding."""
     z = wide(data, "modulated")
     means, ground, speed, trial, time = periods(data, z)
-    estimates = periods(data, np.hstack([wide(data, "velocity"), wide(data, "foot")]))[0]
+    eleven = np.hstack([wide(data, "velocity"), wide(data, "foot")])
+    estimates = periods(data, eleven)[0]
     both = periods(data, wide(data, "z"))[0]  # mu
     walks = np.column_stack([np.unique(ground, return_inverse=True)[1], speed, trial])
     some = np.linspace(0, len(z) - 1, min(len(z), 40 * MOMENTS)).astype(int)  # enough for a discriminant
@@ -108,11 +121,19 @@ def latent(data):
              ("the estimates, one gait period", "ground"): named(estimates, ground, trial)}
     for what, labels in at.items():
         found[instant, what] = named(z[some], labels, data["trial"][some])
+    found["the estimates, one instant", "ground"] = named(eleven[some], at["ground"], data["trial"][some])
     for what, labels in at.items():
         found[instant, f"variance: {what}"] = explained(z[some], labels)
     place = embed(means)
+    near, chance = neighbours(place, ground, np.unique(walks, axis=0, return_inverse=True)[1].reshape(-1))
+    found["t-SNE of means over a period", "ground of the 10 nearest points of other walks"] = near
+    found["t-SNE of means over a period", "the same by chance"] = chance
     few = np.linspace(0, len(z) - 1, min(len(z), MOMENTS)).astype(int)
     where = embed(z[few])
+    of_walk = np.column_stack([np.unique(data["ground"][few], return_inverse=True)[1], data["speed_m_s"][few], data["trial"][few]])
+    near, chance = neighbours(where, data["ground"][few], np.unique(of_walk, axis=0, return_inverse=True)[1].reshape(-1))
+    found["t-SNE of single instants", "ground of the 10 nearest points of other walks"] = near
+    found["t-SNE of single instants", "the same by chance"] = chance
     rows = [{"ground": str(g), "speed": float(s), "trial": int(t), "time": float(c), "x": float(x), "y": float(y),
              **{f"z{i}": float(v) for i, v in enumerate(m)}}
             for g, s, t, c, (x, y), m in zip(ground, speed, trial, time, place, means)]

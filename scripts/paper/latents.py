@@ -7,7 +7,7 @@ import latent_stats
 from measure import SEVEN, evaluate, mean, mild, save, together
 from page import Claim, Section, Table
 
-KEPT = ("ground", "speed", "trials", "success", "velocity", "cot", "cot_deviation", "torque_max")
+KEPT = ("ground", "speed", "trials", "success", "velocity", "cot", "cot_deviation", "torque_max", "clearance", "stride", "cadence")
 HALF_WEIGHT = 33.1 * 9.81 / 2  # [N]
 
 
@@ -27,11 +27,19 @@ def latent(given):
     save(given, "latent_periods", periods)
     share = {key: 100 * value for key, value in found.items()}
     period, instant = ({b: v for (a, b), v in share.items() if a == f"z~, {what}"} for what in ("one gait period", "one instant"))
+    near = {a: v for (a, b), v in share.items() if b.startswith("ground of the 10")}
+    chance = share["t-SNE of single instants", "the same by chance"]
     text = f"""15 s walks at 0.4 and 0.8 m/s on seven grounds. A linear discriminant is fitted on two thirds of the trials and names the rest.
 From the mean of z~ over one gait period it names the ground in {period["ground"]:.0f} %; with the names of the grounds shuffled among the walks, in
 {period["ground, shuffled"]:.0f} % (one of seven: 14 %). The command it names in {period["command"]:.0f} % (chance: 50 %), and from one instant the
 phase of the gait, in eighths, in {instant["phase"]:.0f} % (chance: 13 %). So z~ holds the ground, and the phase and command too. The upper row
-has one embedding three times, coloured by each; the lower row means over a gait period, in which the phase is gone.
+has one embedding three times, coloured by each; the lower row means over a gait period, in which the phase is gone. Of the ten nearest points
+of other walks {near["t-SNE of single instants"]:.0f} % are of a point's own ground in the embedding of single instants,
+{near["t-SNE of means over a period"]:.0f} % in that of means (by chance {chance:.0f} %).
+
+The control: the eleven estimates (velocities of base and feet, heights of the feet) without z~ name the ground in
+{share["the estimates, one gait period", "ground"]:.0f} % of the gait periods and {share["the estimates, one instant", "ground"]:.0f} % of the
+instants; z~ at one instant in {instant["ground"]:.0f} %.
 
 Of the variance of z~ at an instant, the ground explains {instant["variance: ground"]:.0f} %, the phase {instant["variance: phase"]:.0f} %, the
 command {instant["variance: command"]:.0f} %; of its means over a period the ground {period["variance: ground"]:.0f} %, the command
@@ -112,6 +120,13 @@ borders and trials: {waits}."""
     return Section("Rubber, foam, rubber", text, [figures.course(found)], [], [claim], "hardware", ["course.csv"])
 
 
+def clearances(rows):
+    """({ground: [mm] with z, and with its mean}, [mm] how much higher on foam45 than on rigid ground with either) at 0.6 m/s."""
+    at = {(r["ground"], r["without"]): 1e3 * r["clearance"] for r in rows if r["speed"] == 0.6}
+    found = {g: [at[g, "nothing"], at[g, "z"]] for g in SEVEN}
+    return found, [found["foam45"][i] - found["rigid"][i] for i in range(2)]
+
+
 def ablations(given):
     """The policy without a part."""
     parts = [None, "z", "modulation", "estimates", "history"]
@@ -130,6 +145,7 @@ def ablations(given):
                       f"{mean(abs(r['velocity'] - r['speed']) for r in stood):.3f}" if stood else "-",
                       f"{mean(r['cot'] for r in stood):.2f}" if stood else "-", f"{mean(r['torque_max'] for r in own):.0f}"])
     whole, without = ([r for r in rows if r["without"] == part] for part in ("nothing", "z"))
+    high, rise = clearances(rows)
     falls = sum(r["success"] for r in whole) - sum(r["success"] for r in without)
     error = [mean(abs(r["velocity"] - r["speed"]) for r in own if r["success"]) for own in (whole, without)]
     text = """The shipped policy on seven grounds at 0.6 and 1.0 m/s. z, estimates, and modulation's theta1 and theta2: their means over the same trials
@@ -137,6 +153,10 @@ in their place; history: the newest frame in all places. Speed error and cost: o
     matters = falls > 0.05 * sum(r["trials"] for r in whole) or error[1] > 1.5 * error[0]
     claim = Claim("the latent adapts the walk", "stated",
                   f"without z {falls} more falls, speed error {error[0]:.3f} -> {error[1]:.3f} m/s", matters, "hardware")
+    lifts = Claim("the latent lifts the feet higher on softer ground", "stated",
+                  f"from rigid to foam45 {rise[0]:+.0f} mm, without z {rise[1]:+.0f} mm", rise[0] > rise[1] + 2)
     heads = ["without", "upright", "speed error [m/s]", "cost of transport", "largest torque [N m]"]
-    return Section("Without a part", text, [], [Table(heads, table)], [claim],
-                   "no ablation", ["ablations.csv"])
+    return Section("Without a part", text, [figures.grouped(high, ["with z", "its mean"], "clearance at 0.6 m/s [mm]")],
+                   [Table(heads, table), Table(["", *high], [[name, *(f"{high[g][i]:.0f}" for g in high)]
+                                                             for i, name in enumerate(("clearance with z [mm]", "with its mean"))])],
+                   [claim, lifts], "no ablation", ["ablations.csv"])

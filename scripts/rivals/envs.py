@@ -25,7 +25,7 @@ class View(ctypes.Structure):
 
 
 class Step(ctypes.Structure):
-    NAMES = ("action", "reward", "done", "timeout", "valid")
+    NAMES = ("action", "reward", "done", "timeout", "valid", "cause")
     _fields_ = [(name, c_void_p) for name in NAMES] + [("next", View), ("last", View), ("terms", c_void_p)]
 
 
@@ -75,7 +75,7 @@ class Envs:
         self.done, self.timeout, self.valid = (torch.zeros(rows, **flag) for _ in range(3))
         self.view = View(self.history.data_ptr(), self.critic.data_ptr(), None, self.frame.data_ptr())
         results = [tensor.data_ptr() for tensor in (self.reward, self.done, self.timeout, self.valid)]
-        self.call = Step(None, *results, self.view)
+        self.call = Step(None, *results, None, self.view)
 
     def close(self):
         if self.envs:

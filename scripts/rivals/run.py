@@ -1,5 +1,6 @@
 """What the training scripts of the rivals share: options, phases, the log, saving."""
 import argparse
+import dataclasses
 import pathlib
 import sys
 import time
@@ -26,6 +27,11 @@ def options(text, minutes):
     parser.add_argument("--device", default="cuda", help="cuda, cuda:N or cpu (default cuda)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--go-on", type=pathlib.Path, help="state.pt of an earlier run: only the last phase is trained, from there")
+    parser.add_argument("--config", type=pathlib.Path, default=CONFIG, help="the task (default configs/walk.ini)")
+    parser.add_argument("--model", help="train on this ground model and the task of --config as they are, in the place of stages on rigid "
+                        "ground (scripts/paper/factorial.py)")
+    parser.add_argument("--kl-target", type=float, help="[nat] of the learner (default: the method's)")
+    parser.add_argument("--entropy", type=float, help="weight of the learner (default: the method's)")
     parser.add_argument("--library", help="libmild_envs.so (default: in build/, or of this bundle)")
     return parser
 
@@ -41,11 +47,22 @@ def begin(arguments):
     return torch.device(arguments.device)
 
 
+def tuned(arguments, settings):
+    """Settings of the learner with what the options set."""
+    asked = {"kl_target": arguments.kl_target, "entropy": arguments.entropy}
+    return dataclasses.replace(settings, **{name: value for name, value in asked.items() if value is not None})
+
+
 def open_envs(arguments, keys):
+    """keys: of a stage; with --model only its helping hand, which is the method's and not the task's."""
     where = {"train__envs": arguments.envs, "train__device": arguments.device, "train__seed": arguments.seed}
     if arguments.device == "cpu":
         where["train__robots"] = "mujoco"
-    return Envs(CONFIG, arguments.library, **where, **RIGID, **keys)
+    if arguments.model:
+        keys = {"randomize__model": arguments.model, **{key: value for key, value in keys.items() if key == "task__assist"}}
+    else:
+        keys = {**RIGID, **keys}
+    return Envs(arguments.config, arguments.library, **where, **keys)
 
 
 class Progress:
@@ -67,7 +84,8 @@ class Progress:
     def log(self, numbers, steps):
         """steps: policy steps of all environments in this iteration. Returns whether a line was shown."""
         now = time.time()
-        row = {"iteration": self.iteration, "seconds": now - self.start, "steps_per_s": steps / (now - self.last), **numbers}
+        row = {"iteration": self.iteration, "seconds": now - self.start, "steps_per_s": steps / (now - self.last),
+               "policy_steps": steps * (self.iteration + 1), **numbers}
         if not self.names:
             self.names = list(row)
             print(",".join(self.names), file=self.file)

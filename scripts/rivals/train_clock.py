@@ -40,11 +40,11 @@ def make_actor(observation, actions):
 
 
 class Clock:
-    def __init__(self, envs, device):
+    def __init__(self, envs, device, settings):
         shape = envs.shape
         self.actor = make_actor(shape.observation, shape.actions).to(device)
         self.critic = ppo.make_critic(shape.critic).to(device)
-        self.ppo = ppo.Ppo(self.actor, self.critic, shape.actions, SETTINGS, device)
+        self.ppo = ppo.Ppo(self.actor, self.critic, shape.actions, settings, device)
         self.rollout = ppo.Rollout(SETTINGS.steps, shape.envs, shape.actions, shape.critic, device)
         self.frame = torch.zeros(SETTINGS.steps, shape.envs, shape.observation, device=device)
         self.mirror_frame, self.mirror_action = envs.mirror()
@@ -103,9 +103,9 @@ def train(arguments):
     device = run.begin(arguments)
     clock, progress, steps = None, run.Progress(arguments), arguments.envs * sum(HOLD) * SETTINGS.steps // 2
     path = arguments.out / "clock.safetensors"
-    for end, keys in PHASES[-1:] if arguments.go_on else PHASES:
+    for end, keys in ((1.0, {}),) if arguments.model else PHASES[-1:] if arguments.go_on else PHASES:
         envs = run.open_envs(arguments, keys)
-        clock = clock or Clock(envs, device)
+        clock = clock or Clock(envs, device, run.tuned(arguments, SETTINGS))
         if arguments.go_on:
             clock.ppo.load(arguments.go_on)
         clock.begin(envs)

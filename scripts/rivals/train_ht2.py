@@ -9,6 +9,7 @@ on uneven rigid ground. Task, rewards and commands are those of configs/walk.ini
   build/mild eval --controller ht2 --policy runs/ht2/ht2.safetensors --config configs/walk.ini --ground rigid --speed 0.6
 """
 import math
+import pathlib
 import time
 
 import torch
@@ -57,9 +58,9 @@ class Teacher:
 
 
 @torch.no_grad()
-def record(envs, steps):
+def record(envs, steps, teacher):
     """Trajectories of the teacher: a Memory of all steps, and its actions [steps][envs][actions]."""
-    shape, teacher = envs.shape, Teacher(run.ROOT / "policies" / "mild.safetensors", envs.device)
+    shape, teacher = envs.shape, Teacher(teacher, envs.device)
     memory = ht2.Memory(steps, shape.envs, shape.observation, ht2.CONTEXT, envs.device)
     actions = torch.zeros(steps, shape.envs, shape.actions, device=envs.device)
     noise = NOISE * (torch.arange(shape.envs, device=envs.device) % 2)[:, None]
@@ -96,7 +97,7 @@ def regression(net, memory, actions, scale, rows):
 def pretrain(arguments, device, autocast):
     envs = run.open_envs(arguments, FLAT)
     start = time.time()
-    memory, actions = record(envs, arguments.record)
+    memory, actions = record(envs, arguments.record, arguments.teacher)
     shape, statistics = envs.shape, envs.statistics()
     envs.close()
     print(f"recorded {memory.steps} x {memory.envs} steps in {time.time() - start:.0f} s, {statistics['falls']} falls", flush=True)
@@ -124,10 +125,10 @@ def pretrain(arguments, device, autocast):
 
 
 class Learner:
-    def __init__(self, net, envs, device, autocast):
+    def __init__(self, net, envs, device, autocast, settings):
         shape = envs.shape
         self.envs, self.net, self.autocast = envs, net, autocast
-        self.ppo = ppo.Ppo(net, ppo.make_critic(shape.critic).to(device), shape.actions, SETTINGS, device)
+        self.ppo = ppo.Ppo(net, ppo.make_critic(shape.critic).to(device), shape.actions, settings, device)
         self.rollout = ppo.Rollout(SETTINGS.steps, shape.envs, shape.actions, shape.critic, device)
         self.memory = ht2.Memory(SETTINGS.steps, shape.envs, shape.observation, net.context, device)
         self.every = torch.arange(shape.envs, device=device)
@@ -172,7 +173,7 @@ def train(arguments):
         net = pretrain(arguments, device, autocast)
         ht2.save(arguments.out / "ht2_first_stage.safetensors", net.state_dict(), ht2.HEADS, ht2.LAYERS,
                  "stage 1 of scripts/rivals/train_ht2.py")
-    learner = Learner(net, envs, device, autocast)
+    learner = Learner(net, envs, device, autocast, run.tuned(arguments, SETTINGS))
     if arguments.go_on:
         learner.ppo.load(arguments.go_on)
     steps = arguments.envs * SETTINGS.steps
@@ -194,5 +195,7 @@ if __name__ == "__main__":
     parser = run.options(__doc__, 8)
     parser.set_defaults(envs=4096)
     parser.add_argument("--record", type=int, default=RECORD, help=f"policy steps of the earlier policy (default {RECORD})")
+    parser.add_argument("--teacher", type=pathlib.Path, default=run.ROOT / "policies/mild.safetensors",
+                        help="the earlier policy (default: the shipped one)")
     parser.add_argument("--pretrain", type=int, default=3000, help="gradient steps of stage 1 (default 3000)")
     train(parser.parse_args())

@@ -46,6 +46,8 @@ static void add_each(cJSON *o, const EvalTrial *each, int trials) {
         cJSON_AddStringToObject(trial, "end", task_end_names[each[i].end]);
         cJSON_AddNumberToObject(trial, "seconds", each[i].seconds);
         cJSON_AddNumberToObject(trial, "legs", each[i].legs);
+        cJSON_AddNumberToObject(trial, "torque_max", each[i].torque);
+        cJSON_AddNumberToObject(trial, "x", each[i].x);
         cJSON_AddItemToArray(list, trial);
     }
 }
@@ -87,7 +89,10 @@ static cJSON *row_json(const EvalRow *row, const EvalTrial *each) {
                   {"cot_deviation", row->cot_deviation},
                   {"torque_deviation", row->torque_deviation},
                   {"measured", row->measured},
-                  {"legs", row->legs}};
+                  {"legs", row->legs},
+                  {"drift_path", row->drift_path},
+                  {"stride", row->stride},
+                  {"cadence", row->cadence}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(o, values[i].name, values[i].value);
     }
@@ -483,7 +488,8 @@ int cmd_eval(int argc, char **argv) {
          "run once more for them"},
         {"stances", CLI_OUTPUT, &e->stances, 0, 0, "FILE",
          "also write each stance of each foot as CSV: ground, speed, trial, foot, start, duration, "
-         "depth, slip along the heading and to the left, apex of the swing before"},
+         "depth, slip along the heading and to the left, apex of the swing before, place of the "
+         "touchdown, largest torque"},
         {"actions", CLI_OUTPUT, &e->actions, 0, 0, "FILE",
          "also write what the controller saw and did at every decision, as CSV: trial, ground, "
          "speed, time, the true state, the observation, the action (docs/policy.md)"},

@@ -206,8 +206,8 @@ static void modulation_backward(const LossContext *c, LossChunk *chunk, int all,
     const float *theta = network_theta(n, &chunk->outputs), *noise = chunk->outputs.noise;
     for (int64_t r = 0; r < all; r++) {
         loss_modulation(n->def.estimates, n->def.latent, n->def.modulation_per_dimension,
-                        heads + r * n->heads, noise ? noise + r * n->def.latent : NULL,
-                        theta + r * n->theta,
+                        c->def->modulation, heads + r * n->heads,
+                        noise ? noise + r * n->def.latent : NULL, theta + r * n->theta,
                         chunk->d_actor_input + r * (n->def.estimates + n->def.latent),
                         chunk->d_heads + r * n->heads, chunk->d_theta + r * n->theta);
     }

@@ -202,10 +202,11 @@ MILD_HD_FN float loss_logvar_gradient(float weight, float logvar, float spread, 
 
 /* Back through z~ = theta1 z + theta2, z: loss_latent. heads and d_heads are [estimates | mu |
  * logvar], d_input is [estimates | z~]; theta has two numbers, or two for each latent dimension.
- * Overwrites d_heads and d_theta. noise: NULL, z = mu. */
-MILD_HD_FN void loss_modulation(int estimates, int latent, int per_dimension, const float *heads,
-                                const float *noise, const float *theta, const float *d_input,
-                                float *d_heads, float *d_theta) {
+ * Overwrites d_heads and d_theta, the latter with 0 unless the modulation learns. noise: NULL, z =
+ * mu. */
+MILD_HD_FN void loss_modulation(int estimates, int latent, int per_dimension, int learns,
+                                const float *heads, const float *noise, const float *theta,
+                                const float *d_input, float *d_heads, float *d_theta) {
     const float *mu = heads + estimates, *logvar = mu + latent;
     float d_scale = 0.0f;
     float d_shift = 0.0f;
@@ -214,7 +215,8 @@ MILD_HD_FN void loss_modulation(int estimates, int latent, int per_dimension, co
     }
     for (int j = 0; j < latent; j++) {
         const float d = d_input[estimates + j];
-        const float d_times_z = d * loss_latent(mu, logvar, noise, j);
+        const float d_shifted = learns ? d : 0.0f;
+        const float d_times_z = d_shifted * loss_latent(mu, logvar, noise, j);
         const float d_z = d * theta[per_dimension ? j : 0];
         d_heads[estimates + j] = d_z;
         d_heads[estimates + latent + j] =
@@ -222,10 +224,10 @@ MILD_HD_FN void loss_modulation(int estimates, int latent, int per_dimension, co
                   : 0.0f;
         if (per_dimension) {
             d_theta[j] = d_times_z;
-            d_theta[latent + j] = d;
+            d_theta[latent + j] = d_shifted;
         }
         d_scale += d_times_z;
-        d_shift += d;
+        d_shift += d_shifted;
     }
     if (!per_dimension) {
         d_theta[0] = d_scale;

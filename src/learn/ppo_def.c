@@ -20,6 +20,7 @@ PpoDef ppo_def_default(void) {
         .decoder_target = PPO_TARGET_NEXT,
         .target_noise = 1,
         .kl_weight = 0.001,
+        .modulation = 1,
         .mirror_weight = 1.0,
         .mirror_share = 0.5,
         .std_min = 0.05,
@@ -80,6 +81,8 @@ const MildField ppo_fields[] = {
     MILD_FIELD(PpoDef, sample_latent, MILD_FIELD_BOOL, 1, 0, 1,
                "[bool] in training the actor gets a latent drawn around mu, as the decoder does; "
                "false: mu"),
+    MILD_FIELD(PpoDef, modulation, MILD_FIELD_BOOL, 1, 0, 1,
+               "[bool] the modulation learns; false: theta1 = 1 and theta2 = 0, as it starts"),
     MILD_FIELD(PpoDef, mirror_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
                "[-] weight of the mirror symmetry loss"),
     MILD_FIELD(PpoDef, mirror_share, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,

@@ -46,6 +46,7 @@ typedef struct {
     double kl_weight;   /* phi of the VAE's KL term */
     double free_bits;   /* [nat] KL of a latent dimension below which it costs nothing */
     int sample_latent;  /* bool: in training the actor's z is a draw of N(mu, e^logvar), else mu */
+    int modulation; /* bool: the modulation learns; 0: it stays as it starts, which is identity */
     double mirror_weight;
     double mirror_share;  /* share of each minibatch on which the mirror loss is evaluated */
     double std_min;       /* lower bound of the action noise */

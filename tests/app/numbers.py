@@ -66,6 +66,14 @@ near("drift_forward", r["drift_forward"], mean(abs(float(x["forward_m"])) for x 
 near("drift_left", r["drift_left"], mean(abs(float(x["left_m"])) for x in s), 1e-6)
 near("drift of the stances", r["drift"], mean(math.hypot(float(x["forward_m"]), float(x["left_m"])) for x in s), 2e-6)
 
+near("largest torque of the stances", max(x["torque_max"] for x in r["each"]), max(float(x["torque_n_m"]) for x in s), 1e-3)
+near("torque_max of the trials", r["torque_max"], mean(x["torque_max"] for x in r["each"]), 1e-9)
+strides = [(math.hypot(float(b["x_m"]) - float(a["x_m"]), float(b["y_m"]) - float(a["y_m"])), float(b["start_s"]) - float(a["start_s"]))
+           for k in "01" for foot in "01"
+           for own in [[x for x in s if (x["trial"], x["foot"]) == (k, foot) and float(x["start_s"]) >= 2]] for a, b in zip(own, own[1:])]
+near("stride", r["stride"], mean(way for way, _ in strides), 0.02)  # the last one, whose stance does not end, counts too
+near("cadence", r["cadence"], 1 / mean(time for _, time in strides), 0.02)
+
 # the track: speed, sideways speed, time, and how far the base goes up and down after 2 s
 trial = [[x for x in t if x["trial"] == str(k)] for k in range(2)]
 steady = [[x for x in own if float(x["time_s"]) >= 2] for own in trial]
@@ -78,6 +86,8 @@ def rate(own, column):
 height = [[float(x["base_z_m"]) for x in own] for own in steady]
 near("seconds", r["seconds"], mean(float(own[-1]["time_s"]) for own in trial), 0.011)
 near("velocity of the track", r["velocity"], mean(rate(own, "base_x_m") for own in steady), 0.005)
+for one_of, own in zip(r["each"], trial):
+    near("place of the base at the end", one_of["x"], float(own[-1]["base_x_m"]), 1e-5)
 near("velocity_sideways of the track", r["velocity_sideways"], mean(rate(own, "base_y_m") for own in steady), 0.005)
 near("base_oscillation", r["base_oscillation"], mean(max(own) - min(own) for own in height), 2e-3)
 

@@ -118,7 +118,7 @@ awk -F, 'NR == 1 { columns = NF; next } NF != columns { exit 1 } { n[$2]++ }
 bad "No space left" "$mild" eval --ground rigid --trials 1 --seconds 0.1 --latent /dev/full
 for robots in mujoco batch; do
     "$mild" eval --ground grass --trials 2 --seconds 2 --train.robots=$robots --stances stances.csv >table || fail "--stances, $robots"
-    grep -q '^ground,speed_m_s,trial,foot,start_s,duration_s,depth_m,forward_m,left_m,apex_m$' stances.csv || fail "stances.csv: its names"
+    grep -q '^ground,speed_m_s,trial,foot,start_s,duration_s,depth_m,forward_m,left_m,apex_m,x_m,y_m,torque_n_m$' stances.csv || fail "stances.csv: its names"
     awk -F, -v robots=$robots 'NR > 1 && ($1 != "grass" || $6 < 0.1 || $6 > 2 || $7 < 0.01 || $7 > 0.1 || $10 > 0.3) {bad++}
         END {exit bad || NR < 6}' stances.csv || fail "stances.csv of $robots"
 done

@@ -224,6 +224,7 @@ static void stances_are_kept(void **state) {
     s.sample.quaternion[3] = sin(0.25);
     measure_start(m, DT);
     m->keep = 1;
+    s.sample.torque[2] = -7; /* while foot 1 stands; more when it is in the air */
     hold(m, &s, 50);
     for (int k = 0; k < 40; k++) {
         set_foot(&s, 1, 100, 0.2, -0.1, 0.012);
@@ -231,7 +232,9 @@ static void stances_are_kept(void **state) {
         set_foot(&s, 1, 100, 0.203, -0.096, 0.006);
         hold(m, &s, 100);
         lift(&s, 1, 0.05);
+        s.sample.torque[2] = 30;
         hold(m, &s, 50);
+        s.sample.torque[2] = -7;
     }
     assert_int_equal(m->stances, 40);
     for (int k = 0; k < 40; k++) {
@@ -251,10 +254,45 @@ static void stances_are_kept(void **state) {
                  (39 * forward + m->kept[0].way[0]) / 40, 1e-12);
     assert_close("and across it", row.drift_left, (39 * left - m->kept[0].way[1]) / 40, 1e-12);
     fclose(csv);
-    assert_non_null(
-        strstr(text, "foam45,0.5,0,1,0.2930,0.1953,0.012000,0.004550,0.002072,0.050000\n"));
+    assert_non_null(strstr(text, "foam45,0.5,0,1,0.2930,0.1953,0.012000,0.004550,0.002072,0.050000,"
+                                 "0.20000,-0.10000,7.000\n"));
+    assert_close("way of the sole", row.drift_path,
+                 (39 * hypot(0.003, 0.004) + hypot(0.2, 0.1) + hypot(0.003, 0.004)) / 40, 1e-12);
     free(text);
     measure_free(m, 1);
+}
+
+/* A foot comes down every second, at 0.25, 1.25, ... s, first 0.3 m further on, from 5 s on 0.5 m;
+ * meanwhile it goes 20 mm forward and back. The other foot stands. Strides count whose both ends
+ * are between 2 and 8.5 s: two of 0.3 m, then four of 0.5 m from 4.25 s on. */
+static void strides_and_the_way_of_a_sole(void **state) {
+    (void)state;
+    const EvalDef eval = {.speed = 0.5, .trials = 1, .seconds = 10, .stop = 8.5};
+    const uint8_t walked = TASK_END_time;
+    Script s;
+    Measure m;
+    EvalRow row;
+    double x = 0;
+    script_start(&s);
+    measure_start(&m, DT);
+    m.steady_end = eval.stop;
+    lift(&s, 1, 0.05);
+    hold(&m, &s, STEPS(0.25));
+    for (int k = 0; k < 10; k++) {
+        x += k < 5 ? 0.3 : 0.5;
+        for (int out = 0; out < 3; out++) {
+            set_foot(&s, 1, 100, x + (out == 1 ? 0.02 : 0), 0, 0);
+            hold(&m, &s, STEPS(0.125));
+        }
+        lift(&s, 1, 0.05);
+        hold(&m, &s, STEPS(0.625));
+    }
+    eval_summarise(&row, "foam45", &eval, &m, &walked, 400, NULL);
+    assert_int_equal(m.strides, 6); /* from 2.25 s to 8.25 s */
+    assert_close("stride", row.stride, (2 * 0.3 + 4 * 0.5) / 6, 1e-12);
+    assert_close("cadence", row.cadence, 1, 1e-12);
+    assert_close("drift", row.drift, 0, 1e-15);
+    assert_close("way", row.drift_path, 0.04, 1e-12);
 }
 
 /* Contact is more than 5 N. */
@@ -676,6 +714,7 @@ int main(void) {
         cmocka_unit_test(yaw_of_an_orientation),
         cmocka_unit_test(nothing_is_steady_before_two_seconds),
         cmocka_unit_test(stances_are_kept),
+        cmocka_unit_test(strides_and_the_way_of_a_sole),
         cmocka_unit_test(one_stance_and_one_swing),
         cmocka_unit_test(contact_is_a_load_above_five_newton),
         cmocka_unit_test(chatter_ends_no_stance),

@@ -241,6 +241,8 @@ static void gradients_are_those_of_the_cpu(void **state) {
         ppo_set_decoder(&def, 4, 3, &small);
         compare_learner(&small, &def, 37, 100, worst);
     }
+    def.modulation = 0;
+    compare_learner(&small, &def, 37, 100, worst);
 #ifndef EMULATED
     def = ppo_def_default();
     PolicyDef full = policy_def_default();

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "learn/network.h"
 
 typedef struct {
     Policy *policy;
@@ -14,9 +15,8 @@ typedef struct {
     Toy toy;
 } Run;
 
-static void run_open(Run *run, int threads, int envs, PpoDef def) {
+static void run_open_policy(Run *run, int threads, int envs, PpoDef def, PolicyDef policy_def) {
     MildError error = {0};
-    PolicyDef policy_def = toy_policy_def();
     PpoMirror mirror = toy_mirror();
     ppo_set_decoder(&def, 2, 2, &policy_def); /* the speeds, if any */
     run->policy = policy_create(&policy_def, 5, &error);
@@ -26,6 +26,10 @@ static void run_open(Run *run, int threads, int envs, PpoDef def) {
     run->ppo = ppo_create(&def, run->policy, run->pool, &mirror, envs, 11, &error);
     assert_non_null(run->ppo);
     toy_start(&run->toy, run->ppo);
+}
+
+static void run_open(Run *run, int threads, int envs, PpoDef def) {
+    run_open_policy(run, threads, envs, def, toy_policy_def());
 }
 
 static void run_close(Run *run) {
@@ -263,6 +267,38 @@ static void test_sampled_latent(void **state) {
     }
 }
 
+/* A modulation that does not learn stays bit for bit where it started, while what is around it
+ * learns; one that learns does not. */
+static void test_modulation_that_does_not_learn(void **state) {
+    (void)state;
+    for (int learns = 0; learns < 2; learns++) {
+        for (int per_dimension = 0; per_dimension < 2; per_dimension++) {
+            Run run;
+            PpoDef def = toy_ppo_def();
+            def.modulation = learns;
+            PolicyDef asked = toy_policy_def();
+            asked.modulation_per_dimension = per_dimension;
+            run_open_policy(&run, 2, 16, def, asked);
+            Network n;
+            assert_int_equal(network_layout(&n, policy_def(run.policy), NULL), MILD_OK);
+            const int64_t first = n.modulation.layer[0].weight, last = n.actor.layer[0].weight;
+            const float *p = policy_parameters(run.policy);
+            const size_t bytes = (size_t)policy_parameter_count(run.policy) * sizeof *p;
+            float *before = malloc(bytes);
+            assert_non_null(before);
+            memcpy(before, p, bytes);
+            run_iterations(&run, 3);
+            assert_true(last > first);
+            const int same =
+                memcmp(p + first, before + first, (size_t)(last - first) * sizeof *p) == 0;
+            assert_int_equal(same, !learns);
+            assert_true(memcmp(p, before, (size_t)first * sizeof *p) != 0);
+            free(before);
+            run_close(&run);
+        }
+    }
+}
+
 /* A decoder of another shape than its target needs. */
 static void test_decoder_must_fit(void **state) {
     (void)state;
@@ -379,6 +415,7 @@ int main(void) {
         cmocka_unit_test(test_frames_of_the_decoder),
         cmocka_unit_test(test_decoder_must_fit),
         cmocka_unit_test(test_sampled_latent),
+        cmocka_unit_test(test_modulation_that_does_not_learn),
         cmocka_unit_test(test_invalid_samples_have_no_weight),
         cmocka_unit_test(test_nothing_valid_changes_nothing),
         cmocka_unit_test(test_learns_the_toy_task),

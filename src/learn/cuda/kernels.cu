@@ -324,7 +324,7 @@ static __global__ void modulation_backward(GpuWidths w, int rows, const float *h
                                            const float *d_input, float *d_heads, float *d_theta) {
     const int64_t r = item();
     if (r < rows) {
-        loss_modulation(w.estimates, w.latent, w.per_dimension, heads + r * w.heads,
+        loss_modulation(w.estimates, w.latent, w.per_dimension, w.modulation, heads + r * w.heads,
                         noise ? noise + r * w.latent : NULL, theta + r * w.theta,
                         d_input + r * w.actor_input + w.observation, d_heads + r * w.heads,
                         d_theta + r * w.theta);

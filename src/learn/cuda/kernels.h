@@ -62,6 +62,7 @@ void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y,
 /* ---- rows between the networks ---- */
 
 typedef struct {
+    int modulation; /* bool: it learns */
     int observation, estimates, latent, per_dimension, feet_offset, feet_count, actions;
     int decoded_frame, ground_offset, ground_count; /* of the decoder's target */
     int critic_input;                               /* from row to row in the rollout */

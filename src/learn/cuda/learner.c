@@ -58,7 +58,8 @@ static void set_sizes(GpuLearner *g, int envs) {
     g->images = most_images(ppo, g->rows);
     g->sum_blocks = gpu_blocks(g->rows + g->images);
     const Network *n = &g->network;
-    g->widths = (GpuWidths){.observation = def->observation,
+    g->widths = (GpuWidths){.modulation = ppo->def.modulation,
+                            .observation = def->observation,
                             .estimates = def->estimates,
                             .latent = def->latent,
                             .per_dimension = def->modulation_per_dimension,

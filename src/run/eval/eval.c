@@ -342,8 +342,11 @@ static MildStatus summarise(Trials *t, EvalRow *rows, MildError *error) {
                            t->end + first, robot_total_mass(t->run->robot) * EVAL_GRAVITY, error);
     }
     for (int i = 0; t->run->each && i < t->trials; i++) {
-        t->run->each[i] = (EvalTrial){
-            .end = t->end[i], .seconds = t->measure[i].time, .legs = measure_legs(&t->measure[i])};
+        t->run->each[i] = (EvalTrial){.end = t->end[i],
+                                      .seconds = t->measure[i].time,
+                                      .legs = measure_legs(&t->measure[i]),
+                                      .torque = t->measure[i].torque_max,
+                                      .x = t->measure[i].base[0]};
     }
     if (status == MILD_OK && eval.track) {
         track_print(&t->track, t->run->scenes[0].name, speed_of(t, 0), TASK_PERIOD, eval.track);

@@ -73,6 +73,10 @@ typedef struct {
     double drift;            /* [m] horizontal travel of the sole between touchdown and lift-off */
     double drift_forward;    /* [m] magnitude of its part along the robot's heading */
     double drift_left;       /* [m] and across it */
+    double drift_path;       /* [m] length of the way of the sole in a stance, not its straight
+                                distance */
+    double stride;           /* [m] from a foot's touchdown to its next one, after the first 2 s */
+    double cadence;          /* [1/s] of these strides */
     double energy;           /* [J] integral |tau . qd| dt */
     double legs;             /* [m] least distance of two legs in all trials; negative: overlap */
     double base_oscillation; /* [m] peak to peak of the base height over the steady part */
@@ -84,6 +88,8 @@ typedef struct {
     TaskEnd end;
     double seconds; /* [s] until then */
     double legs;    /* [m] least distance of two legs; NaN without two */
+    double torque;  /* [N m] largest over joints and time */
+    double x;       /* [m] world, where the base was then */
 } EvalTrial;
 
 /* Rows of trials. */

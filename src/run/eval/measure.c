@@ -22,17 +22,36 @@ void measure_start(Measure *measure, double dt) {
     measure->legs = INFINITY;
 }
 
+/* Bool: speed, cost and strides are measured at this time [s]. */
+static int is_steady(const Measure *m, double time) {
+    return time >= MEASURE_STEADY && (m->steady_end == 0 || time < m->steady_end);
+}
+
+/* A foot comes down at `time` [s]: a stride ends if the foot came down before, in the steady part.
+ */
+static void take_stride(Measure *m, int f, double time, const double *at) {
+    const int steady = is_steady(m, time);
+    if (m->landed[f] && steady) {
+        m->stride_sum += hypot(at[0] - m->touchdown[f][0], at[1] - m->touchdown[f][1]);
+        m->stride_time += time - m->began[f];
+        m->strides++;
+    }
+    m->landed[f] = steady;
+}
+
 static void start_stance(Measure *m, int f, const double *at) {
+    const double time = m->time - m->dt;
+    take_stride(m, f, time, at);
     m->swing[f] = 0;
     if (m->apex[f] > SWING_HEIGHT) {
         m->apex_sum += m->swing[f] = m->apex[f];
         m->swings++;
     }
     m->in_stance[f] = 1;
-    m->began[f] = m->time - m->dt;
-    m->touchdown[f][0] = at[0];
-    m->touchdown[f][1] = at[1];
-    m->deepest[f] = 0;
+    m->began[f] = time;
+    m->touchdown[f][0] = m->last[f][0] = at[0];
+    m->touchdown[f][1] = m->last[f][1] = at[1];
+    m->deepest[f] = m->path[f] = m->hardest[f] = 0;
 }
 
 static void keep_stance(Measure *m, const MeasureStance *stance) {
@@ -59,10 +78,13 @@ static void end_stance(Measure *m, int f) {
                                   .duration = m->lasted[f],
                                   .depth = m->deepest[f],
                                   .way = {c * x + s * y, c * y - s * x},
-                                  .apex = m->swing[f]};
+                                  .apex = m->swing[f],
+                                  .at = {m->touchdown[f][0], m->touchdown[f][1]},
+                                  .torque = m->hardest[f]};
     m->in_stance[f] = 0;
     m->deepest_sum += stance.depth;
     m->drift_sum += hypot(x, y);
+    m->path_sum += m->path[f];
     m->way_sum[0] += fabs(stance.way[0]);
     m->way_sum[1] += fabs(stance.way[1]);
     if (m->keep) {
@@ -77,6 +99,8 @@ static void measure_foot(Measure *m, int f, const EnvsFoot *foot) {
             start_stance(m, f, foot->center);
         }
         m->air_time[f] = m->apex[f] = 0;
+        m->path[f] += hypot(foot->center[0] - m->last[f][0], foot->center[1] - m->last[f][1]);
+        m->hardest[f] = fmax(m->hardest[f], m->torque);
         m->last[f][0] = foot->center[0];
         m->last[f][1] = foot->center[1];
         m->lasted[f] = m->time - m->began[f];
@@ -111,14 +135,16 @@ static void measure_steady(Measure *m, const EnvsSample *sample, double yaw, dou
 void measure_sample(Measure *m, const EnvsSample *sample) {
     const double yaw = measure_yaw(sample->quaternion);
     double power = 0, power_abs = 0;
+    m->torque = 0;
     for (int i = 0; i < sample->joints; i++) {
         double joint_power = sample->torque[i] * sample->speed[i];
         power += joint_power;
         power_abs += fabs(joint_power);
-        m->torque_max = fmax(m->torque_max, fabs(sample->torque[i]));
+        m->torque = fmax(m->torque, fabs(sample->torque[i]));
     }
+    m->torque_max = fmax(m->torque_max, m->torque);
     m->energy += fabs(power) * m->dt;
-    if (m->time >= MEASURE_STEADY && (m->steady_end == 0 || m->time < m->steady_end)) {
+    if (is_steady(m, m->time)) {
         measure_steady(m, sample, yaw, power_abs);
     }
     m->time += m->dt;

@@ -13,6 +13,8 @@ typedef struct {
     double depth;           /* [m] deepest element */
     double way[2]; /* [m] of the sole's centre, along the robot's heading and to the left */
     double apex;   /* [m] of the swing before it; 0: none */
+    double at[2];  /* [m] the sole's centre at the first contact, world */
+    double torque; /* [N m] largest of any joint while the foot stood */
 } MeasureStance;
 
 /* A stance begins when the ground carries the foot and ends with the last contact before a pause of
@@ -22,6 +24,7 @@ typedef struct {
     double time;       /* [s] since the start */
     double energy;     /* [J] integral |sum tau qd| dt */
     double torque_max; /* [N m] */
+    double torque;     /* [N m] largest of the latest step */
     double base[2];    /* [m] after the latest step */
     double yaw;        /* [rad] after the latest step */
     double legs;       /* [m] least distance of two legs */
@@ -46,11 +49,15 @@ typedef struct {
     double began[ROBOT_FEET_MAX];        /* [s] */
     double lasted[ROBOT_FEET_MAX];       /* [s] */
     double swing[ROBOT_FEET_MAX];        /* [m] apex of the swing before */
+    double path[ROBOT_FEET_MAX];         /* [m] of the sole centre since the first contact */
+    double hardest[ROBOT_FEET_MAX];      /* [N m] largest torque since then */
+    int landed[ROBOT_FEET_MAX];          /* bool: began and touchdown are of the steady part */
 
     /* finished ones */
-    int swings, stances;
-    double apex_sum, deepest_sum, drift_sum; /* [m] */
-    double way_sum[2];                       /* [m] of the magnitudes of MeasureStance.way */
+    int swings, stances, strides; /* a stride: from a foot's touchdown to its next one */
+    double apex_sum, deepest_sum, drift_sum, path_sum; /* [m] */
+    double stride_sum, stride_time;                    /* [m] [s] of the strides */
+    double way_sum[2];   /* [m] of the magnitudes of MeasureStance.way */
     int keep;            /* bool: each of them is kept; the owner frees `kept` */
     MeasureStance *kept; /* [stances]; NULL if memory ran out */
     int room;            /* of kept */

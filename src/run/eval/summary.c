@@ -63,8 +63,8 @@ static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_
 }
 
 void eval_print_stances_header(FILE *csv) {
-    fprintf(csv,
-            "ground,speed_m_s,trial,foot,start_s,duration_s,depth_m,forward_m,left_m,apex_m\n");
+    fprintf(csv, "ground,speed_m_s,trial,foot,start_s,duration_s,depth_m,forward_m,left_m,apex_m,"
+                 "x_m,y_m,torque_n_m\n");
 }
 
 static MildStatus print_stances(const EvalRow *row, int trial, const Measure *m, FILE *csv,
@@ -74,18 +74,46 @@ static MildStatus print_stances(const EvalRow *row, int trial, const Measure *m,
     }
     for (int i = 0; i < m->stances; i++) {
         const MeasureStance *s = &m->kept[i];
-        fprintf(csv, "%s,%g,%d,%d,%.4f,%.4f,%.6f,%.6f,%.6f,%.6f\n", row->ground, row->speed, trial,
-                s->foot, s->start, s->duration, s->depth, s->way[0], s->way[1], s->apex);
+        fprintf(csv, "%s,%g,%d,%d,%.4f,%.4f,%.6f,%.6f,%.6f,%.6f,%.5f,%.5f,%.3f\n", row->ground,
+                row->speed, trial, s->foot, s->start, s->duration, s->depth, s->way[0], s->way[1],
+                s->apex, s->at[0], s->at[1], s->torque);
     }
     return MILD_OK;
+}
+
+/* What the feet did, over all stances, swings and strides of the trials. */
+static void summarise_feet(EvalRow *row, const Measure *measures) {
+    int swings = 0, stances = 0, strides = 0;
+    double apex = 0, deepest = 0, drift = 0, path = 0, way[2] = {0, 0}, stride = 0, time = 0;
+    for (int i = 0; i < row->trials; i++) {
+        const Measure *m = &measures[i];
+        apex += m->apex_sum;
+        swings += m->swings;
+        deepest += m->deepest_sum;
+        drift += m->drift_sum;
+        path += m->path_sum;
+        way[0] += m->way_sum[0];
+        way[1] += m->way_sum[1];
+        stances += m->stances;
+        stride += m->stride_sum;
+        time += m->stride_time;
+        strides += m->strides;
+    }
+    row->clearance = mean(apex, swings);
+    row->penetration = mean(deepest, stances);
+    row->drift = mean(drift, stances);
+    row->drift_path = mean(path, stances);
+    row->drift_forward = mean(way[0], stances);
+    row->drift_left = mean(way[1], stances);
+    row->stride = mean(stride, strides);
+    row->cadence = strides ? strides / time : NAN;
 }
 
 MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
                           const uint8_t *ends, double weight, MildError *error) {
     const int trials = eval->trials;
     MildStatus status = MILD_OK;
-    int swings = 0, stances = 0;
-    double apex = 0, deepest = 0, drift = 0, way[2] = {0, 0}, torque_square = 0;
+    double torque_square = 0;
     *row = (EvalRow){.speed = eval->speed,
                      .sideways = eval->sideways,
                      .turn = eval->turn,
@@ -103,24 +131,13 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
         row->legs = fmin(row->legs, measure_legs(m)); /* of a number and NaN the number */
         row->torque_max += m->torque_max / trials;
         torque_square += m->torque_max * m->torque_max / trials;
-        apex += m->apex_sum;
-        swings += m->swings;
-        deepest += m->deepest_sum;
-        drift += m->drift_sum;
-        way[0] += m->way_sum[0];
-        way[1] += m->way_sum[1];
-        stances += m->stances;
         if (eval->stances && status == MILD_OK) {
             status = print_stances(row, i, m, eval->stances, error);
         }
     }
     row->torque_deviation = deviation(row->torque_max, torque_square, trials);
     summarise_motion(row, measures, ends, weight);
-    row->clearance = mean(apex, swings);
-    row->penetration = mean(deepest, stances);
-    row->drift = mean(drift, stances);
-    row->drift_forward = mean(way[0], stances);
-    row->drift_left = mean(way[1], stances);
+    summarise_feet(row, measures);
     return status;
 }
 
