@@ -46,6 +46,7 @@ static void add_each(cJSON *o, const EvalTrial *each, int trials) {
         cJSON_AddStringToObject(trial, "end", task_end_names[each[i].end]);
         cJSON_AddNumberToObject(trial, "seconds", each[i].seconds);
         cJSON_AddNumberToObject(trial, "legs", each[i].legs);
+        cJSON_AddNumberToObject(trial, "shells", each[i].shells);
         cJSON_AddNumberToObject(trial, "torque_max", each[i].torque);
         cJSON_AddNumberToObject(trial, "x", each[i].x);
         cJSON_AddItemToArray(list, trial);
@@ -90,6 +91,7 @@ static cJSON *row_json(const EvalRow *row, const EvalTrial *each) {
                   {"torque_deviation", row->torque_deviation},
                   {"measured", row->measured},
                   {"legs", row->legs},
+                  {"shells", row->shells},
                   {"drift_path", row->drift_path},
                   {"stride", row->stride},
                   {"cadence", row->cadence}};

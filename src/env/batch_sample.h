@@ -66,6 +66,7 @@ WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, const E
             }
             done->above = (double)reading->above;
             done->legs = (double)legs;
+            done->shell_load = 0;
             done->valid = 1;
         }
     }

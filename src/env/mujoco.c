@@ -279,6 +279,7 @@ void envs_read_sample(const TaskEnv *env, const RobotSim *sim, const double *tor
     memcpy(sample->base, qpos, sizeof sample->base);
     sample->above = qpos[2] - mild_terrain_height_at(task_env_terrain(env), qpos[0], qpos[1]);
     sample->legs = robot_sim_leg_distance(sim);
+    sample->shell_load = robot_sim_shell_load(sim);
     memcpy(sample->quaternion, qpos + 3, sizeof sample->quaternion);
     memcpy(sample->mass_center, robot_sim_mass_center(sim), sizeof sample->mass_center);
     memcpy(sample->torque, torque, joints * sizeof *torque);

@@ -31,6 +31,7 @@ typedef struct {
     double above;                    /* [m] height of the base above the ground under it */
     double quaternion[4];            /* [-] base -> world, w x y z */
     double legs;                     /* [m] least distance of two legs: robot_sim_leg_distance */
+    double shell_load;               /* [N] vertical force of the ground on the shells */
     double mass_center[3];           /* [m] of the robot, world; by MuJoCo, else unset */
     double torque[ROBOT_JOINTS_MAX]; /* [N m] */
     double speed[ROBOT_JOINTS_MAX];  /* [rad/s] of the joints after the step */

@@ -142,6 +142,8 @@ double robot_sim_foot_distance(const RobotSim *sim);
 /* [m] Least distance of two legs, between the capsules of [robot] legs; negative: overlap. 1e9
  * without two legs. */
 double robot_sim_leg_distance(const RobotSim *sim);
+/* [N] Vertical force of soft ground on the shells, mean over the last step. */
+double robot_sim_shell_load(const RobotSim *sim);
 const MildScratch *robot_sim_scratch(const RobotSim *sim);
 const MildContactResult *robot_sim_contact(const RobotSim *sim);
 /* Input of the last step on soft ground. */

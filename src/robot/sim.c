@@ -496,6 +496,14 @@ double robot_sim_foot_distance(const RobotSim *sim) {
     return least;
 }
 
+double robot_sim_shell_load(const RobotSim *sim) {
+    double sum = 0;
+    for (int i = sim->robot->def.feet; i < sim->rows; i++) {
+        sum += sim->contact.foot[sim->row[i]].force[2];
+    }
+    return sum;
+}
+
 const MildScratch *robot_sim_scratch(const RobotSim *sim) {
     return sim->scratch;
 }

@@ -154,6 +154,8 @@ static void base_touches(void **unused) {
     touch(&state, "base_link_box", 0, "base", TASK_END_base);
     touch(&state, "base_link_box", 0.3, "base on higher ground", TASK_END_base);
     deep(&state, "base_link_box");
+    rig.def.shells_stand = 1;
+    touch(&state, "base_link_box", 0, "base that stands", TASK_END_base);
     rig_close(&rig);
 }
 
@@ -174,6 +176,16 @@ static void shank_touches(int leg, const char *box) {
     assert_true(lowest_of_box(&state, "base_link_box") > lowest_of_box(&state, box) + 0.1);
     touch(&state, box, 0, box, TASK_END_shell);
     touch(&state, box, -0.2, box, TASK_END_shell);
+    /* One that stands may be in soft ground, and not in rigid ground. */
+    rig.def.shells_stand = 1;
+    for (int rigid = 0; rigid < 2; rigid++) {
+        RobotState deep = state;
+        rig.env->variation.rigid = rigid;
+        deep.qvel[2] = -0.1;
+        deep.qpos[2] += FALL - 1e-3 - lowest_of_box(&deep, box);
+        task_env_rest(rig.env)->terrain.height = 0;
+        expect_cause("a shell that stands", step_from(&deep, 10), rigid, TASK_END_shell);
+    }
     rig_close(&rig);
 }
 

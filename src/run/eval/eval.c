@@ -345,6 +345,7 @@ static MildStatus summarise(Trials *t, EvalRow *rows, MildError *error) {
         t->run->each[i] = (EvalTrial){.end = t->end[i],
                                       .seconds = t->measure[i].time,
                                       .legs = measure_legs(&t->measure[i]),
+                                      .shells = measure_shells(&t->measure[i]),
                                       .torque = t->measure[i].torque_max,
                                       .x = t->measure[i].base[0]};
     }

@@ -79,6 +79,7 @@ typedef struct {
     double cadence;          /* [1/s] of these strides */
     double energy;           /* [J] integral |tau . qd| dt */
     double legs;             /* [m] least distance of two legs in all trials; negative: overlap */
+    double shells;           /* [-] share of the load that shells carried, mean of the trials */
     double base_oscillation; /* [m] peak to peak of the base height over the steady part */
     double seconds;          /* [s] mean time until a fall or the end */
 } EvalRow;
@@ -88,6 +89,7 @@ typedef struct {
     TaskEnd end;
     double seconds; /* [s] until then */
     double legs;    /* [m] least distance of two legs; NaN without two */
+    double shells;  /* [-] share of the load that shells carried */
     double torque;  /* [N m] largest over joints and time */
     double x;       /* [m] world, where the base was then */
 } EvalTrial;

@@ -149,9 +149,12 @@ void measure_sample(Measure *m, const EnvsSample *sample) {
     }
     m->time += m->dt;
     m->legs = fmin(m->legs, sample->legs);
+    m->shell_load += sample->shell_load * m->dt;
+    m->load += sample->shell_load * m->dt;
     memcpy(m->base, sample->base, sizeof m->base);
     m->yaw = yaw;
     for (int f = 0; f < sample->feet; f++) {
+        m->load += sample->foot[f].load * m->dt;
         measure_foot(m, f, &sample->foot[f]);
     }
 }
@@ -169,6 +172,10 @@ void measure_finish(Measure *m) {
             end_stance(m, f);
         }
     }
+}
+
+double measure_shells(const Measure *m) {
+    return m->load > 0 ? m->shell_load / m->load : 0;
 }
 
 double measure_legs(const Measure *m) {

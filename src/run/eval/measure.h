@@ -28,6 +28,8 @@ typedef struct {
     double base[2];    /* [m] after the latest step */
     double yaw;        /* [rad] after the latest step */
     double legs;       /* [m] least distance of two legs */
+    double load;       /* [N s] of the feet and of the shells */
+    double shell_load; /* [N s] of the shells */
 
     /* steady part */
     double steady_end;          /* [s] where it ends; 0: with the trial */
@@ -73,6 +75,8 @@ void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const 
 /* Ends the trial. If no foot was ever lifted, the open stances count, so that sinkage and drift are
  * still measured. */
 void measure_finish(Measure *measure);
+/* [-] Share of the load that the shells carried; 0 without load. */
+double measure_shells(const Measure *measure);
 /* [m] Least distance of two legs; NaN where the robot has no two legs that touch. */
 double measure_legs(const Measure *measure);
 void measure_free(Measure *measures, int count); /* measures: from calloc; may be NULL */

@@ -128,6 +128,7 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
         row->ends[ends[i]]++;
         row->energy += m->energy / trials;
         row->seconds += m->time / trials;
+        row->shells += measure_shells(m) / trials;
         row->legs = fmin(row->legs, measure_legs(m)); /* of a number and NaN the number */
         row->torque_max += m->torque_max / trials;
         torque_square += m->torque_max * m->torque_max / trials;
