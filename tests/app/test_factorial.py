@@ -117,7 +117,7 @@ def all_of_it():
 
 def what_stops():
     with tempfile.TemporaryDirectory() as folder:
-        late = made(folder, "--seconds", "60")  # a training of the search takes 45 s, one of three minutes does not fit
+        late = made(folder, "--seconds", "170")  # a training of the search takes 45 s; one of three minutes does not fit
         done, _, _ = quietly(late.run)
         assert not done and len(late.calls) == 20 and all(task["kind"] == "tune" for task in late.calls)
         none = made(folder, "--seconds", "10")
