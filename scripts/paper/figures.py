@@ -200,3 +200,30 @@ def transition(walked, latent, grounds, patch, quantities):
         axes.set(title=f"{'CD'[column]}  t-SNE of z~, single decisions, {way}", xlabel="t-SNE 1", ylabel="t-SNE 2", xticks=[], yticks=[])
         axes.legend(frameon=False)
     return figure
+
+
+# ---- the net or the ground ----
+
+def factorial(values, answer, controllers, grounds):
+    """values: {part: {(controller, ground, seed): skill}}; answer: {part: shares of the variance}, or None."""
+    figure, axes = panels(len(values), 14, 4.6)
+    shades = dict(zip(controllers, ("#9a9a9a", "#d9972e", "#3d8c40", "#59b3d9", "#0b4f8a")))
+    for each, (part, own) in zip(axes, values.items()):
+        for i, name in enumerate(controllers):
+            seeds = [[v for (n, g, _), v in own.items() if (n, g) == (name, ground)] for ground in grounds]
+            place = np.arange(len(grounds)) + 0.06 * (i - (len(controllers) - 1) / 2)
+            known = [k for k, v in enumerate(seeds) if v]
+            if not known:
+                continue
+            each.plot(place[known], [np.mean(seeds[k]) for k in known], "-o", color=shades[name], label=controllers[name])
+            for k in known:
+                each.plot([place[k]] * len(seeds[k]), seeds[k], "_", color=shades[name], markersize=8)
+        title = part
+        if answer:
+            title += "\nvariance: " + ", ".join(f"{name} {share:.0%}" for name, share in answer[part].items())
+        each.set(title=title, xlabel="trained on", ylim=(-0.02, 1.02))
+        each.title.set_fontsize(10)
+        each.set_xticks(range(len(grounds)), grounds)
+    axes[0].set(ylabel="skill: upright share times 1 - |speed error| / speed")
+    axes[-1].legend(frameon=False, fontsize=8)
+    return figure

@@ -17,6 +17,14 @@ SEVEN = ["rigid", "rubber", "foam60", "foam45", "foam28", "grass", "sand_loose"]
 NINE = ["rigid", "rubber", "foam60", "foam45", "foam28", "foam25", "grass", "sand_loose", "sand_dense"]
 TRAINED = ["mild", "con_cone", "con_spring", "ecc_spring", "ecc_quasi", "ecc_quasi_3d", "rigid"]
 
+# [what, grounds, further options]: laws and numbers with which the shipped policy was never trained
+UNSEEN = [["Bekker's published soils", ["dry_sand", "sandy_loam", "clay", "snow", "lunar_soil"], []],
+          ["hunt_crossley", SEVEN[1:], ["--model", "hunt_crossley"]],
+          ["ecc_spring", SEVEN[1:], ["--model", "ecc_spring"]],
+          ["ecc_quasi_3d", SEVEN[1:], ["--model", "ecc_quasi_3d"]],
+          ["half as stiff as the softest foam", ["foam25"], ["--ground.k_pen=75", "--ground.sigma_cone=5.5e4"]],
+          ["a course of three grounds, 1 m each", ["rubber+foam28+sand_loose+rubber+foam28+sand_loose"], ["--patch", 1]]]
+
 
 def mild(*arguments):
     """Runs build/mild; what it prints."""

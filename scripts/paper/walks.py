@@ -1,6 +1,6 @@
 """The shipped policy on many grounds: clearance, energy, grounds that nobody trained on; and whether a measurement repeats."""
 import figures
-from measure import NINE, SEVEN, evaluate, mean, mild, read, save, together
+from measure import NINE, SEVEN, UNSEEN, evaluate, mean, mild, read, save, together
 from page import Cell, Claim, Section, Table
 
 
@@ -49,15 +49,6 @@ over weight x distance. Energy: integral of |sum of torque x speed|, of a whole 
         power, [f"{v} m/s" for v in speeds], "energy per second [W]")],
         [Table(["ground", "clearance [mm]", *(f"cost at {v}" for v in speeds), *(f"W at {v}" for v in speeds)], table)], claims,
         "hardware", ["terrains.csv"])
-
-
-# [what, grounds, further options]: laws and numbers with which the shipped policy was never trained
-UNSEEN = [["Bekker's published soils", ["dry_sand", "sandy_loam", "clay", "snow", "lunar_soil"], []],
-          ["hunt_crossley", SEVEN[1:], ["--model", "hunt_crossley"]],
-          ["ecc_spring", SEVEN[1:], ["--model", "ecc_spring"]],
-          ["ecc_quasi_3d", SEVEN[1:], ["--model", "ecc_quasi_3d"]],
-          ["half as stiff as the softest foam", ["foam25"], ["--ground.k_pen=75", "--ground.sigma_cone=5.5e4"]],
-          ["a course of three grounds, 1 m each", ["rubber+foam28+sand_loose+rubber+foam28+sand_loose"], ["--patch", 1]]]
 
 
 def unseen(given):

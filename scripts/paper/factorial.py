@@ -1,0 +1,420 @@
+#!/usr/bin/env python3
+"""The net or the ground? Trains five controllers on three grounds, with several seeds, one task (configs/factorial.ini), and judges them all.
+
+  scripts/paper/factorial.py runs/factorial --minutes 3 --jobs 2                       # on one GPU; 65 trainings
+  scripts/paper/factorial.py runs/factorial --minutes 3 --devices cuda:0,cuda:1 --seconds 1500
+  scripts/paper/factorial.py runs/factorial --report                                   # table and figure of what is there
+
+Controllers: mlp (the layers of ours, with no target but the reward, and no modulation), clock, ht2 (docs/rivals.md), flat (ours whose
+modulation does not learn), ours. Grounds: rigid, ecc_spring, mild (randomize.model). Each training has the same wall time, --minutes;
+--steps N trains to N policy steps instead, for all but ht2, into another folder. HT-2 imitates policies/paper/rigid-1 first, within its time.
+They are judged on nine grounds at four speeds, nine transitions at 0.6 and 1.2 m/s, and grounds that none of them met.
+
+One tuning budget: before that each controller is trained on rigid ground, seed 1, a quarter of the time, with each of the four choices of
+SEARCH (KL target that leads the learning rate, weight of the entropy); the one with the greatest skill on rigid ground and rubber is taken
+for all of its trainings. Skill: mean over cells of upright share times 1 - |speed error| / speed, not below 0.
+
+FOLDER/results.jsonl gets a line when a training ends and one when it is judged; started again, the command goes on from there, also after
+it was killed. What was trained with another --minutes, --steps or config is not counted. No training begins that would not end by --seconds.
+Keys after -- go to the trainings of mlp, flat and ours, as -- --train.envs=8192."""
+import argparse
+import csv
+import hashlib
+import itertools
+import json
+import os
+import pathlib
+import queue
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import transitions
+from measure import MILD, NINE, ROOT, UNSEEN, mean, mild
+
+CONTROLLERS = {"mlp": "MLP", "clock": "Clock", "ht2": "HT-2", "flat": "ours, no modulation", "ours": "ours"}
+GROUNDS = ["rigid", "ecc_spring", "mild"]
+SEARCH = [(kl_target, entropy) for kl_target in (0.01, 0.02) for entropy in (0.001, 0.004)]
+TUNING = 0.25  # share of the time
+SETTLED = 0.7  # share of the time at which the annealing begins
+OURS = {"mlp": ["--ppo.epsilon=0", "--ppo.modulation=false"], "flat": ["--ppo.modulation=false"], "ours": []}
+TEACHER = ROOT / "policies/paper/rigid-1.safetensors"
+SPEEDS = [0.3, 0.6, 0.9, 1.2]
+PAIRS = [f"{ground}>{NINE[(i + 4) % len(NINE)]}" for i, ground in enumerate(NINE)]  # each ground is left once and entered once
+PARTS = ("nine grounds", "transitions", "unseen grounds")
+DEFAULT = ROOT / "configs/default.ini"
+
+
+def fail(text):
+    print(f"factorial.py: {text}", file=sys.stderr)
+    sys.exit(2)
+
+
+# ---- measures ----
+
+def skill(cells):
+    """0: all fall or stand still; 1: all stay up at the asked speed."""
+    return mean(c["upright"] / c["trials"] * max(0.0, 1 - abs(c["error"]) / abs(c["speed"])) if c["error"] is not None else 0.0 for c in cells)
+
+
+def cell_of(row):
+    """Of a row of mild eval."""
+    return {"ground": row["ground"], "speed": row["speed"], "trials": row["trials"], "upright": row["success"], "cot": row["cot"],
+            "error": None if row["velocity"] is None else row["velocity"] - row["speed"], "torque": row["torque_max"]}
+
+
+def who_of(controller, policy, config):
+    """Options of mild eval."""
+    return ["--policy", policy, "--config", config, "--controller", controller if controller in ("clock", "ht2") else "learned"]
+
+
+def walked(who, grounds, speeds, trials, *more):
+    told = mild("eval", *who, "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)), "--trials", trials, "--threads", 1,
+                "--json", "-", *more)
+    return [cell_of(row) for row in json.loads(told)["rows"]]
+
+
+def judged(who, trials):
+    """{part: cells}"""
+    unseen = [{**cell, "kind": kind} for kind, grounds, more in UNSEEN if kind not in GROUNDS
+              for cell in walked(who, grounds, [0.6], trials, *more)]
+    return {PARTS[0]: walked(who, NINE, SPEEDS, trials), PARTS[1]: transitions.judge(who, PAIRS, [0.6, 1.2], trials), PARTS[2]: unseen}
+
+
+# ---- trainings ----
+
+def last_of(path, column):
+    with open(path, newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    if not rows:
+        raise RuntimeError(f"{path}: no iteration within the time")
+    return float(rows[-1][column])
+
+
+def run(words, log):
+    with open(log, "a", encoding="utf-8") as file:
+        done = subprocess.run(list(map(str, words)), stdout=file, stderr=subprocess.STDOUT, cwd=ROOT, check=False)
+    if done.returncode:
+        lines = pathlib.Path(log).read_text(encoding="utf-8").strip().splitlines() or ["no message"]
+        raise RuntimeError(f"{' '.join(map(str, words[:4]))}: {lines[-1]}")
+
+
+class Factorial:
+    """Trainings and their results. A task: {kind, controller, ground, seed, choice}; kind tune or train, choice: a place in SEARCH."""
+
+    def __init__(self, given):
+        self.given, self.folder = given, given.folder.resolve()
+        self.file = self.folder / "results.jsonl"
+        self.end = time.time() + given.seconds
+        self.lock, self.failed, self.longest = threading.Lock(), [], {}
+        told = [given.minutes, given.steps, given.config.read_text(encoding="utf-8"), SEARCH, OURS, given.options]
+        self.settings = hashlib.sha256(json.dumps(told).encode()).hexdigest()[:16]
+        self.lines = []
+        for text in self.file.read_text(encoding="utf-8").splitlines() if self.file.exists() else []:
+            try:
+                line = json.loads(text)
+            except ValueError:
+                continue  # killed while it was written
+            if line.get("settings") == self.settings:
+                self.lines.append(line)
+
+    def known(self, done, task):
+        """The line of this task that was written when it was `done`, trained or judged."""
+        return next((x for x in self.lines if x["done"] == done and x["task"] == task), None)
+
+    def add(self, done, task, found):
+        line = {"done": done, "task": task, **found, "settings": self.settings}
+        with self.lock:
+            self.lines.append(line)
+            torn = self.file.exists() and not self.file.read_bytes().endswith(b"\n") and self.file.stat().st_size > 0
+            with open(self.file, "a", encoding="utf-8") as file:
+                file.write(("\n" if torn else "") + json.dumps(line) + "\n")
+                file.flush()
+                os.fsync(file.fileno())
+        return line
+
+    # ---- one training ----
+
+    def policy_of(self, task):
+        of = f"tune{task['choice']}" if task["kind"] == "tune" else f"{task['seed']}"
+        return self.folder / "policies" / f"{task['controller']}-{task['ground']}-{of}.safetensors"
+
+    def seconds_of(self, task):
+        """[s] of its training, if time is the budget."""
+        return 60 * self.given.minutes * (TUNING if task["kind"] == "tune" else 1)
+
+    def train_ours(self, task, folder, device):
+        kl_target, entropy = SEARCH[task["choice"]]
+        minutes, log, words = self.seconds_of(task) / 60, folder / "run/log.csv", [*MILD, "train", "--out", folder / "run"]
+        first = ["--config", self.given.config.resolve(), f"--train.device={device}", f"--randomize.model={task['ground']}",
+                 f"--train.seed={task['seed']}", f"--ppo.kl_target={kl_target}", f"--ppo.entropy={entropy}",
+                 f"--train.threads={max(1, os.cpu_count() // self.given.slots)}", *OURS[task["controller"]],
+                 *(["--train.robots=batch"] if device == "cpu" else []), *self.given.options]
+        if self.given.steps:
+            count = round(self.given.steps * (TUNING if task["kind"] == "tune" else 1) / self.steps_each())
+            run([*words, *first, f"--train.iterations={count}", f"--ppo.anneal={round(SETTLED * count)},{count}"], folder / "log")
+        else:  # how many iterations fit is known when most of them are done; those left anneal
+            run([*words, *first, f"--train.minutes={SETTLED * minutes}"], folder / "log")
+            done = int(last_of(log, "iteration"))
+            count = done + max(1, round(done * (1 - SETTLED) / SETTLED))
+            run([*words, "--resume", f"--train.minutes={(1 - SETTLED) * minutes}", f"--train.iterations={count}", f"--ppo.anneal={done},{count}"],
+                folder / "log")
+        return {"steps": last_of(log, "rate/steps"), "file": folder / "run/policy.safetensors"}
+
+    def steps_each(self):
+        """Policy steps of an iteration of mild train."""
+        def key(name):
+            for path in (self.given.config, DEFAULT):
+                found = [line.split("=")[1].split(";")[0] for line in path.read_text(encoding="utf-8").splitlines() if line.startswith(f"{name} =")]
+                if found:
+                    return int(found[0])
+        return key("envs") * key("steps")
+
+    def train_rival(self, task, folder, device):
+        kl_target, entropy = SEARCH[task["choice"]]
+        name, minutes, more = task["controller"], self.seconds_of(task) / 60, []
+        if self.given.steps:
+            minutes, more = 1e6, ["--iterations", round(self.given.steps * (TUNING if task["kind"] == "tune" else 1) / (8192 * 60))]
+        more += ["--teacher", TEACHER] if name == "ht2" else []
+        run([self.given.python, ROOT / f"scripts/rivals/train_{name}.py", "--out", folder / "run", "--config", self.given.config.resolve(),
+             "--model", task["ground"], "--seed", task["seed"], "--kl-target", kl_target, "--entropy", entropy, "--device", device,
+             "--minutes", minutes, *more], folder / "log")
+        return {"steps": last_of(folder / "run/log.csv", "policy_steps"), "file": folder / f"run/{name}.safetensors"}
+
+    def train(self, task, device):
+        """Trains; {seconds, steps}. The policy is in policy_of(task)."""
+        begin = time.time()
+        with tempfile.TemporaryDirectory() as work:
+            found = (self.train_ours if task["controller"] in OURS else self.train_rival)(task, pathlib.Path(work), device)
+            place = self.policy_of(task)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(found["file"], place.with_suffix(".part"))
+            place.with_suffix(".part").replace(place)
+        return {"seconds": time.time() - begin, "steps": found["steps"], "device": device}
+
+    def judge(self, task):
+        """{part: cells}"""
+        who = who_of(task["controller"], self.policy_of(task), self.given.config.resolve())
+        if task["kind"] == "tune":
+            return {"tuning": walked(who, ["rigid", "rubber"], SPEEDS, self.given.trials)}
+        return judged(who, self.given.trials)
+
+    # ---- many ----
+
+    def begins(self, task):
+        """Bool: it would end in time."""
+        likely = self.longest.get((task["kind"], task["controller"]), 1.1 * self.seconds_of(task))
+        return time.time() + likely <= self.end
+
+    def work(self, task, devices, judges):
+        """Trains on the next free device, if it is not done; its judge starts when it is."""
+        if not self.known("trained", task):
+            device = devices.get()
+            try:
+                if not self.begins(task):
+                    return None
+                begin = time.time()
+                self.add("trained", task, self.train(task, device))
+                self.longest[task["kind"], task["controller"]] = time.time() - begin
+            finally:
+                devices.put(device)
+        return None if self.known("judged", task) else judges.submit(self.conclude, task)
+
+    def conclude(self, task):
+        parts = self.judge(task)
+        line = self.add("judged", task, {"skill": {part: skill(cells) for part, cells in parts.items()}, "cells": parts})
+        kl_target, entropy = SEARCH[task["choice"]]
+        trained = self.known("trained", task)
+        print(f"{task['kind']} {task['controller']} on {task['ground']}, seed {task['seed']}, kl {kl_target:g}, entropy {entropy:g}: "
+              f"{trained['steps'] / 1e6:.1f} M steps in {trained['seconds']:.0f} s; skill "
+              + ", ".join(f"{part} {value:.3f}" for part, value in line["skill"].items()), flush=True)
+
+    def all_of(self, tasks):
+        """Bool: all are trained and judged."""
+        devices = queue.Queue()
+        for device in self.given.devices * self.given.jobs:
+            devices.put(device)
+        with ThreadPoolExecutor(self.given.slots) as trainers, ThreadPoolExecutor(self.given.judges) as judges:
+            waiting = [(task, trainers.submit(self.work, task, devices, judges)) for task in tasks]
+            for task, future in waiting:
+                try:
+                    last = future.result()
+                    if last:
+                        last.result()
+                except (Exception, SystemExit) as error:  # the others go on
+                    self.failed.append(f"{task['controller']} on {task['ground']}, seed {task['seed']}: {error}")
+                    print(f"failed: {self.failed[-1]}", file=sys.stderr, flush=True)
+        return all(self.known("judged", task) for task in tasks)
+
+    def choices(self):
+        """{controller: place in SEARCH} of those whose search is done."""
+        found = {}
+        for name in self.given.controllers:
+            lines = [self.known("judged", tuning(name, i)) for i in range(len(SEARCH))]
+            if all(lines):
+                found[name] = max(range(len(SEARCH)), key=lambda i: lines[i]["skill"]["tuning"])
+        return found
+
+    def run(self):
+        """Bool: everything is done."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        done = self.all_of([tuning(name, i) for name in self.given.controllers for i in range(len(SEARCH))])
+        chosen = self.choices()
+        done &= self.all_of([{"kind": "train", "controller": name, "ground": ground, "seed": seed, "choice": chosen[name]}
+                             for seed in range(1, self.given.seeds + 1) for ground in GROUNDS for name in chosen])
+        return done
+
+
+def tuning(name, i):
+    return {"kind": "tune", "controller": name, "ground": "rigid", "seed": 1, "choice": i}
+
+
+# ---- what came out ----
+
+def shares(values):
+    """Of the variance of {(net, ground, seed): value}, which must have the same seeds everywhere: what net, ground, both together and the
+    seed make."""
+    nets, grounds, seeds = (list(dict.fromkeys(key[i] for key in values)) for i in range(3))
+    middle = mean(values.values())
+    of_net = {n: mean(values[n, g, s] for g in grounds for s in seeds) - middle for n in nets}
+    of_ground = {g: mean(values[n, g, s] for n in nets for s in seeds) - middle for g in grounds}
+    cell = {(n, g): mean(values[n, g, s] for s in seeds) for n in nets for g in grounds}
+    whole = sum((v - middle) ** 2 for v in values.values())
+    found = {"net": len(grounds) * len(seeds) * sum(v * v for v in of_net.values()),
+             "ground": len(nets) * len(seeds) * sum(v * v for v in of_ground.values()),
+             "both": len(seeds) * sum((cell[n, g] - middle - of_net[n] - of_ground[g]) ** 2 for n in nets for g in grounds),
+             "seed": sum((v - cell[n, g]) ** 2 for (n, g, _), v in values.items())}
+    return {name: value / whole if whole else 0.0 for name, value in found.items()}
+
+
+def table(lines):
+    """Rows of the table: a controller and a ground, over its seeds."""
+    rows = []
+    for name, ground in itertools.product(CONTROLLERS, GROUNDS):
+        own = [x for x in lines if x["task"]["controller"] == name and x["task"]["ground"] == ground]
+        if not own:
+            continue
+        row = {"controller": name, "ground": ground, "seeds": len(own)}
+        for part in PARTS:
+            cells = [c for x in own for c in x["cells"][part]]
+            stood = [c for c in cells if c["upright"] and c["error"] is not None]
+            each = [x["skill"][part] for x in own]
+            row[part] = {"skill": mean(each), "least": min(each), "most": max(each), "upright": sum(c["upright"] for c in cells),
+                         "trials": sum(c["trials"] for c in cells), "error": mean(abs(c["error"]) for c in stood) if stood else None,
+                         "cot": mean(c["cot"] for c in stood if c["cot"] is not None) if stood else None}
+        rows.append(row)
+    return rows
+
+
+def table2(lines):
+    """Table II again: speed, cost and torque on rigid ground at each command, means over the seeds' cells in which anybody stayed up."""
+    rows = []
+    for name, ground in itertools.product(CONTROLLERS, GROUNDS):
+        cells = [c for x in lines if (x["task"]["controller"], x["task"]["ground"]) == (name, ground) for c in x["cells"][PARTS[0]]
+                 if c["ground"] == "rigid"]
+        if cells:
+            by_speed = {v: [c for c in cells if c["speed"] == v and c["upright"] and c["error"] is not None] for v in SPEEDS}
+            rows.append({"controller": name, "ground": ground,
+                         "velocity": [mean(v + c["error"] for c in by_speed[v]) if by_speed[v] else None for v in SPEEDS],
+                         "cot": [mean(c["cot"] for c in by_speed[v]) if by_speed[v] else None for v in SPEEDS],
+                         "torque": [mean(c["torque"] for c in by_speed[v]) if by_speed[v] else None for v in SPEEDS]})
+    return rows
+
+
+def text_of(value, form):
+    return "-" if value is None else format(value, form)
+
+
+def report(factorial):
+    """Prints the tables, writes FOLDER/factorial.json and, where there is matplotlib, factorial.png."""
+    lines = [x for x in factorial.lines if x["done"] == "judged" and x["task"]["kind"] == "train"]
+    if not lines:
+        print("nothing is judged yet")
+        return
+    trained = [factorial.known("trained", x["task"]) for x in lines]
+    rows, second = table(lines), table2(lines)
+    print("| controller | trained on | seeds | M steps | seconds |" + "".join(f" {p}: skill | upright | error [m/s] | cost |" for p in PARTS))
+    print("|---" * (5 + 4 * len(PARTS)) + "|")
+    for row in rows:
+        own = [t for t in trained if (t["task"]["controller"], t["task"]["ground"]) == (row["controller"], row["ground"])]
+        row["steps"], row["seconds"] = (mean(t[key] for t in own) for key in ("steps", "seconds"))
+        print(f"| {CONTROLLERS[row['controller']]} | {row['ground']} | {row['seeds']} | {row['steps'] / 1e6:.1f} | {row['seconds']:.0f} |"
+              + "".join(f" {p['skill']:.3f} ({p['least']:.3f} to {p['most']:.3f}) | {p['upright']} of {p['trials']} | "
+                        f"{text_of(p['error'], '.3f')} | {text_of(p['cot'], '.2f')} |" for p in (row[part] for part in PARTS)))
+    print("\nOn rigid ground:\n\n| controller | trained on | m/s at " + ", ".join(map(str, SPEEDS)) + " | cost of transport | torque [N m] |\n"
+          "|---|---|---|---|---|")
+    for row in second:
+        cells = (", ".join(text_of(v, form) for v in row[key]) for key, form in (("velocity", ".2f"), ("cot", ".2f"), ("torque", ".0f")))
+        print(f"| {CONTROLLERS[row['controller']]} | {row['ground']} | " + " | ".join(cells) + " |")
+    values = {part: {(x["task"]["controller"], x["task"]["ground"], x["task"]["seed"]): x["skill"][part] for x in lines} for part in PARTS}
+    sizes = [len({key[i] for key in values[PARTS[0]]}) for i in range(3)]
+    whole = len(values[PARTS[0]]) == sizes[0] * sizes[1] * sizes[2]
+    answer = {part: shares(own) for part, own in values.items()} if whole else None
+    print("\n" + ("\n".join(f"{part}: of the variance of the skill the net makes {s['net']:.0%}, the ground {s['ground']:.0%}, both together "
+                            f"{s['both']:.0%}, the seed {s['seed']:.0%}" for part, s in answer.items())
+                  if whole else "the net or the ground: not before each net has all grounds and seeds"))
+    search = [{**{k: t["task"][k] for k in ("controller", "choice")}, "kl_target": SEARCH[t["task"]["choice"]][0],
+               "entropy": SEARCH[t["task"]["choice"]][1], "skill": t["skill"]["tuning"]}
+              for t in factorial.lines if t["done"] == "judged" and t["task"]["kind"] == "tune"]
+    told = {"minutes": factorial.given.minutes, "steps": factorial.given.steps, "settings": factorial.settings, "search": search,
+            "chosen": factorial.choices(), "rows": rows, "table2": second, "shares": answer}
+    (factorial.folder / "factorial.json").write_text(json.dumps(told, indent=1) + "\n")
+    try:
+        import figures
+    except ImportError:
+        print("no figure: matplotlib is missing (scripts/requirements.txt)")
+        return
+    figures.factorial(values, answer, CONTROLLERS, GROUNDS).savefig(factorial.folder / "factorial.png", dpi=110)
+    print(factorial.folder / "factorial.png")
+
+
+def parse(words):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--minutes", type=float, default=3.0, help="[min] of each training (default 3)")
+    parser.add_argument("--steps", type=float, default=0, help="policy steps of each training in the place of minutes; not for ht2")
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--controllers", default=None, help="some of " + ",".join(CONTROLLERS) + " (default: all)")
+    parser.add_argument("--config", type=pathlib.Path, default=ROOT / "configs/factorial.ini", help="the task")
+    parser.add_argument("--devices", default="cuda", help="of the trainings: cuda:0,cuda:1 (default cuda)")
+    parser.add_argument("--jobs", type=int, default=1, help="trainings at a time on each device (default 1)")
+    parser.add_argument("--judges", type=int, default=0, help="judges at a time, a core each (default: half of the cores)")
+    parser.add_argument("--trials", type=int, default=5, help="of each cell (default 5)")
+    parser.add_argument("--seconds", type=float, default=1e9, help="[s] no training begins that would not end by then")
+    parser.add_argument("--python", default=sys.executable, help="with PyTorch, for clock and ht2 (default: this one)")
+    parser.add_argument("--report", action="store_true", help="train nothing")
+    own, more = (words[:words.index("--")], words[words.index("--") + 1:]) if "--" in words else (words, [])
+    given = parser.parse_args(own)
+    given.options = more
+    given.controllers = given.controllers.split(",") if given.controllers else [c for c in CONTROLLERS if not (given.steps and c == "ht2")]
+    unknown = [name for name in given.controllers if name not in CONTROLLERS]
+    if unknown:
+        fail(f"--controllers {unknown[0]}: choose from {' '.join(CONTROLLERS)}")
+    if given.steps and "ht2" in given.controllers:
+        fail("--steps: ht2 would take days; leave it out")
+    if not given.config.is_file():
+        fail(f"{given.config}: no such file")
+    given.devices = given.devices.split(",")
+    given.slots = len(given.devices) * given.jobs
+    given.judges = given.judges or max(1, os.cpu_count() // 2)
+    return given
+
+
+def main():
+    given = parse(sys.argv[1:])
+    factorial = Factorial(given)
+    done = given.report or factorial.run()
+    report(factorial)
+    for text in factorial.failed:
+        print(f"factorial.py: failed: {text}", file=sys.stderr)
+    if not done and not factorial.failed:
+        print("factorial.py: the time is over; start it again to go on", file=sys.stderr)
+    sys.exit(0 if done else 1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,142 @@
+#!/usr/bin/env python3
+"""scripts/paper/factorial.py with a made-up trainer and judge in place of both: what is trained, with which choice, what a restart does
+again, and what the table says. Usage: test_factorial.py SOURCE_FOLDER"""
+import io
+import json
+import pathlib
+import sys
+import tempfile
+import threading
+import time
+from contextlib import redirect_stderr, redirect_stdout
+
+root = pathlib.Path(sys.argv[1]).resolve()
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(root / "scripts/paper"))
+import factorial  # noqa: E402
+
+NETS = {"mlp": 0.1, "clock": 0.2, "ht2": 0.3, "flat": 0.4, "ours": 0.5}
+BEST = {"mlp": 0, "clock": 1, "ht2": 2, "flat": 3, "ours": 0}
+
+
+class MadeUp(factorial.Factorial):
+    """The skill is that of the net, plus what the ground gives; in the search it is best with BEST."""
+
+    grounds, broken, pause = {"rigid": 0.0, "ecc_spring": 0.1, "mild": 0.2}, None, 0.0
+
+    def __init__(self, given):
+        super().__init__(given)
+        self.calls, self.busy, self.most, self.guard = [], {}, {}, threading.Lock()
+
+    def train(self, task, device):
+        with self.guard:
+            self.calls.append(task)
+            self.busy[device] = self.busy.get(device, 0) + 1
+            self.most[device] = max(self.most.get(device, 0), self.busy[device])
+        time.sleep(self.pause)
+        with self.guard:
+            self.busy[device] -= 1
+        if self.broken and all(task[key] == value for key, value in self.broken.items()):
+            raise RuntimeError("no memory")
+        return {"seconds": 2.0, "steps": 3e6, "device": device}
+
+    def judge(self, task):
+        def cells(skill):
+            return [{"ground": "rigid", "speed": v, "trials": 10, "upright": 10, "cot": 0.5, "error": v * (skill - 1), "torque": 60.0}
+                    for v in factorial.SPEEDS]
+        if task["kind"] == "tune":
+            return {"tuning": cells(0.9 if task["choice"] == BEST[task["controller"]] else 0.3)}
+        return {part: cells(NETS[task["controller"]] + self.grounds[task["ground"]]) for part in factorial.PARTS}
+
+
+def made(folder, *words, kind=MadeUp):
+    return kind(factorial.parse([str(folder), *words]))
+
+
+def quietly(work):
+    with redirect_stdout(io.StringIO()) as told, redirect_stderr(io.StringIO()) as wrong:
+        found = work()
+    return found, told.getvalue(), wrong.getvalue()
+
+
+def measures():
+    cell = {"speed": -0.5, "trials": 4, "upright": 2, "error": 0.1}
+    assert abs(factorial.skill([cell]) - 0.5 * 0.8) < 1e-12
+    assert factorial.skill([{**cell, "error": 0.5}]) == 0 and factorial.skill([{**cell, "error": -0.7}]) == 0
+    assert factorial.skill([{**cell, "error": None}, {**cell, "upright": 4, "error": 0}]) == 0.5
+    values = {(n, g, s): 1.0 * n + 2.0 * g for n in range(2) for g in range(2) for s in range(3)}
+    found = factorial.shares(values)  # squares 0.25 of the net and 1 of the ground in each
+    assert all(abs(found[k] - v) < 1e-12 for k, v in {"net": 0.2, "ground": 0.8, "both": 0, "seed": 0}.items()), found
+    crossed = factorial.shares({(n, g, s): float(n == g) for n in range(2) for g in range(2) for s in range(2)})
+    assert abs(crossed["both"] - 1) < 1e-12
+    seeds = factorial.shares({(n, g, s): float(s) for n in range(2) for g in range(2) for s in range(2)})
+    assert abs(seeds["seed"] - 1) < 1e-12
+    assert len(factorial.PAIRS) == 9 and all(len({p.split(">")[i] for p in factorial.PAIRS}) == 9 for i in range(2))
+    assert all(p in factorial.transitions.PAIRS for p in factorial.PAIRS)
+
+
+def all_of_it():
+    with tempfile.TemporaryDirectory() as folder:
+        words = ("--devices", "cuda:0,cuda:1", "--jobs", "2", "--seeds", "3")
+        search = made(folder, *words)
+        search.pause = 0.01
+        done, told, wrong = quietly(search.run)
+        assert done and not wrong and len(search.calls) == 5 * 4 + 5 * 3 * 3
+        assert all(task["kind"] == "tune" for task in search.calls[:17])
+        assert set(search.most) <= {"cuda:0", "cuda:1"} and max(search.most.values()) <= 2, search.most
+        assert search.choices() == BEST
+        assert all(task["choice"] == BEST[task["controller"]] for task in search.calls if task["kind"] == "train")
+        assert told.count("3.0 M steps in 2 s") == 65
+        lines = [json.loads(text) for text in search.file.read_text().splitlines()]
+        assert [x["done"] for x in lines].count("trained") == 65 == [x["done"] for x in lines].count("judged")
+
+        # killed in the middle: three are not trained, another is not judged, and the last line is torn
+        lost = [task for task in search.calls if task["kind"] == "train"][-4:]
+        kept = [x for x in lines if x["task"] not in lost or (x["task"] == lost[0] and x["done"] == "trained")]
+        torn = json.dumps({"done": "trained", "task": lost[1]})[:40]
+        search.file.write_text("".join(json.dumps(x) + "\n" for x in kept) + torn)
+        again = made(folder, *words)
+        assert quietly(again.run)[0] and len(again.calls) == 3 and all(task in again.calls for task in lost[1:]), again.calls
+        third = made(folder, *words)
+        assert quietly(third.run)[0] and not third.calls
+        lines = [json.loads(text) for text in third.file.read_text().splitlines() if text != torn]
+        assert [x["done"] for x in lines].count("judged") == 65
+
+        _, told, _ = quietly(lambda: factorial.report(third))
+        assert "| ours | mild | 3 | 3.0 | 2 | 0.700 (0.700 to 0.700) |" in told, told
+        whole = 3 * 3 * sum((v - 0.3) ** 2 for v in NETS.values())
+        share = whole / (whole + 5 * 3 * 2 * 0.01)
+        assert f"nine grounds: of the variance of the skill the net makes {share:.0%}" in told and "the seed 0%" in told, told
+        result = json.loads((pathlib.Path(folder) / "factorial.json").read_text())
+        assert result["chosen"] == BEST and len(result["search"]) == 20 and len(result["rows"]) == 15
+        assert abs(result["table2"][-1]["velocity"][3] - 0.7 * 1.2) < 1e-12  # ours, mild
+
+        other = made(folder, *words, "--minutes", "1")  # another budget: nothing of it counts
+        assert not other.lines
+
+
+def what_stops():
+    with tempfile.TemporaryDirectory() as folder:
+        late = made(folder, "--seconds", "170")  # a training of the search takes 45 s; one of three minutes does not fit
+        done, _, _ = quietly(late.run)
+        assert not done and len(late.calls) == 20 and all(task["kind"] == "tune" for task in late.calls)
+        none = made(folder, "--seconds", "10")
+        assert not quietly(none.run)[0] and not none.calls
+        assert "nothing is judged yet" in quietly(lambda: factorial.report(none))[1]
+        part = made(folder, "--controllers", "ours,clock", "--seeds", "1")
+        part.broken = {"kind": "train", "controller": "clock", "ground": "mild"}
+        done, _, wrong = quietly(part.run)
+        assert not done and len(part.calls) == 6 and part.failed == ["clock on mild, seed 1: no memory"] and "no memory" in wrong
+        assert "not before each net has all grounds" in quietly(lambda: factorial.report(part))[1]
+        for words in (["--controllers", "cpg"], ["--steps", "1e8", "--controllers", "ht2"], ["--config", "nosuch.ini"]):
+            try:
+                _, _, wrong = quietly(lambda: made(folder, *words))
+                raise AssertionError(words)
+            except SystemExit as stopped:
+                assert stopped.code == 2, stopped
+
+
+measures()
+all_of_it()
+what_stops()
+print("65 trainings, restarted, stopped and told")
