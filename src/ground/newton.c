@@ -8,16 +8,17 @@
 /* The equations of the listed feet. */
 static void system_open(System *system, const MildScratch *scratch, const MildContactInput *input) {
     const int n = 6 * scratch->listed, stride = 6 * scratch->given;
-    system->A = (Row *)scratch->rows;
-    system->M = system->A + n;
     system->n = n;
     system->parts = n / NEWTON_VECTOR + 1;
+    system->A = (Vector *)scratch->rows;
+    system->M = system->A + n * system->parts;
     row_clear(system, &system->free);
     for (int i = 0; i < n; i++) {
         const int row = 6 * scratch->place[scratch->list[i / 6]] + i % 6;
-        row_clear(system, &system->A[i]);
+        double *to = (double *)(system->A + i * system->parts);
+        memset(to, 0, (size_t)system->parts * sizeof(Vector));
         for (int k = 0; k < scratch->listed; k++) {
-            memcpy(system->A[i].at + 6 * k,
+            memcpy(to + 6 * k,
                    input->inverse_inertia + row * stride + 6 * scratch->place[scratch->list[k]],
                    6 * sizeof(double));
         }
@@ -30,8 +31,12 @@ static void system_open(System *system, const MildScratch *scratch, const MildCo
 
 void newton_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {
     System opened, *system = &opened;
-    Point best = {.residual = INFINITY};
+    Point best;
     system_open(system, scratch, input);
+    row_clear(system, &best.impulse);
+    row_clear(system, &best.twist);
+    best.residual = INFINITY;
+    best.rests = 0;
     memset(scratch->wrench, 0, 6 * (size_t)scratch->feet * sizeof(double));
     for (int i = 0; i < system->n; i++) {
         best.twist.at[i] = input->velocity[scratch->list[i / 6]][i % 6];

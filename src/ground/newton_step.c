@@ -27,32 +27,38 @@ static inline double six_dot(double sum, const double *x, const double *y) {
     return sum;
 }
 
-/* Vector p of the rows of a foot times a number each: sum + x_0 A_0 + ... + x_5 A_5. */
-static inline Vector six_times(Vector sum, const double *x, const Row *A, int p) {
-    sum += x[0] * A[0].part[p];
-    sum += x[1] * A[1].part[p];
-    sum += x[2] * A[2].part[p];
-    sum += x[3] * A[3].part[p];
-    sum += x[4] * A[4].part[p];
-    sum += x[5] * A[5].part[p];
+/* A vector of the rows of a foot, `parts` apart, times a number each: sum + x_0 A_0 + ... + x_5
+ * A_5. */
+static inline Vector six_times(Vector sum, const double *x, const Vector *A, int parts) {
+    sum += x[0] * A[0];
+    sum += x[1] * A[parts];
+    sum += x[2] * A[2 * parts];
+    sum += x[3] * A[3 * parts];
+    sum += x[4] * A[4 * parts];
+    sum += x[5] * A[5 * parts];
     return sum;
 }
 
-/* Subtracts a multiple of a vector from vector p of the rows of a foot. */
-static inline void six_less(Row *M, const double *factor, Vector pivot, int p) {
-    M[0].part[p] -= factor[0] * pivot;
-    M[1].part[p] -= factor[1] * pivot;
-    M[2].part[p] -= factor[2] * pivot;
-    M[3].part[p] -= factor[3] * pivot;
-    M[4].part[p] -= factor[4] * pivot;
-    M[5].part[p] -= factor[5] * pivot;
+/* Subtracts a multiple of a vector from one of the rows of a foot. */
+static inline void six_less(Vector *M, const double *factor, Vector pivot, int parts) {
+    M[0] -= factor[0] * pivot;
+    M[parts] -= factor[1] * pivot;
+    M[2 * parts] -= factor[2] * pivot;
+    M[3 * parts] -= factor[3] * pivot;
+    M[4 * parts] -= factor[4] * pivot;
+    M[5 * parts] -= factor[5] * pivot;
+}
+
+/* Number k of row i. */
+static inline double entry(const Vector *M, int parts, int i, int k) {
+    return ((const double *)(M + (ptrdiff_t)i * parts))[k];
 }
 
 void system_times(const System *system, const double *x, Row *y) {
     for (int p = 0; p < system->parts; p++) {
         Vector sum = y->part[p];
         for (int j = 0; j < system->n; j += 6) {
-            sum = six_times(sum, x + j, system->A + j, p);
+            sum = six_times(sum, x + j, system->A + j * system->parts + p, system->parts);
         }
         y->part[p] = sum;
     }
@@ -75,24 +81,26 @@ double system_norm(const System *system, const double *x) {
 
 /* Swaps row k with the row at or below it that has the largest number in column k. Returns false
  * when that number is zero. */
-static int rows_pivot(Row *M, int k, int n) {
+static int rows_pivot(Vector *M, int parts, int k, int n) {
     int pivot = k;
     for (int i = k + 1; i < n; i++) {
-        if (fabs(M[i].at[k]) > fabs(M[pivot].at[k])) {
+        if (fabs(entry(M, parts, i, k)) > fabs(entry(M, parts, pivot, k))) {
             pivot = i;
         }
     }
-    Row row = M[k];
-    M[k] = M[pivot];
-    M[pivot] = row;
-    return fabs(M[k].at[k]) > 0.0;
+    for (int p = 0; p < parts; p++) {
+        const Vector swapped = M[k * parts + p];
+        M[k * parts + p] = M[pivot * parts + p];
+        M[pivot * parts + p] = swapped;
+    }
+    return fabs(entry(M, parts, k, k)) > 0.0;
 }
 
 /* Factors of row k in the rows below it. Returns whether one is too large. */
-static int rows_factors(const Row *M, int k, int n, double inverse, double *factor) {
+static int rows_factors(const Vector *M, int parts, int k, int n, double inverse, double *factor) {
     int grown = 0;
     for (int i = k + 1; i < n; i++) {
-        factor[i] = M[i].at[k] * inverse;
+        factor[i] = entry(M, parts, i, k) * inverse;
         grown += fabs(factor[i]) <= NEWTON_GROWTH ? 0 : 1;
     }
     return grown;
@@ -101,36 +109,36 @@ static int rows_factors(const Row *M, int k, int n, double inverse, double *fact
 /* Solves M x = right by Gaussian elimination. The right-hand side is column n of the rows. The
  * diagonal serves as the pivot unless a factor exceeds NEWTON_GROWTH. Vectors that lie left of the
  * diagonal are left as they are, because nobody reads them. */
-static int rows_eliminate(const System *system, Row *M, double *x) {
-    const int n = system->n;
+static int rows_eliminate(const System *system, Vector *M, double *x) {
+    const int n = system->n, parts = system->parts;
     double inverse[TWIST_MAX], factor[TWIST_MAX];
     for (int k = 0; k < n; k++) {
-        inverse[k] = 1.0 / M[k].at[k];
-        if (rows_factors(M, k, n, inverse[k], factor)) {
-            if (!rows_pivot(M, k, n)) {
+        inverse[k] = 1.0 / entry(M, parts, k, k);
+        if (rows_factors(M, parts, k, n, inverse[k], factor)) {
+            if (!rows_pivot(M, parts, k, n)) {
                 return 0;
             }
-            inverse[k] = 1.0 / M[k].at[k];
-            rows_factors(M, k, n, inverse[k], factor);
+            inverse[k] = 1.0 / entry(M, parts, k, k);
+            rows_factors(M, parts, k, n, inverse[k], factor);
         }
         const int whole = (k / 6 + 1) * 6;
-        for (int p = k / NEWTON_VECTOR; p < system->parts; p++) {
-            const Vector pivot = M[k].part[p];
+        for (int p = k / NEWTON_VECTOR; p < parts; p++) {
+            const Vector pivot = M[k * parts + p];
             for (int i = k + 1; i < whole; i++) {
-                M[i].part[p] -= factor[i] * pivot;
+                M[i * parts + p] -= factor[i] * pivot;
             }
             for (int i = whole; i < n; i += 6) {
-                six_less(M + i, factor + i, pivot, p);
+                six_less(M + i * parts + p, factor + i, pivot, parts);
             }
         }
     }
     for (int i = 0; i < n; i++) {
-        x[i] = M[i].at[n];
+        x[i] = entry(M, parts, i, n);
     }
     for (int j = n - 1; j >= 0; j--) {
         x[j] *= inverse[j];
         for (int i = 0; i < j; i++) {
-            x[i] -= M[i].at[j] * x[j];
+            x[i] -= entry(M, parts, i, j) * x[j];
         }
     }
     return 1;
@@ -148,12 +156,13 @@ static void point_copy(const System *system, Point *to, const Point *from) {
 }
 
 void point_evaluate(const System *system, MildScratch *scratch, Point *point) {
-    double apart[TWIST_MAX] = {0.0}; /* its first n are set, which no compiler can know */
+    Row apart;
+    row_clear(system, &apart);
     contact_pass(scratch, system->dt, point->twist.at);
     for (int i = 0; i < system->n; i++) {
-        apart[i] = point->impulse.at[i] - scratch->wrench[listed_row(scratch, i)];
+        apart.at[i] = point->impulse.at[i] - scratch->wrench[listed_row(scratch, i)];
     }
-    point->residual = system_norm(system, apart);
+    point->residual = system_norm(system, apart.at);
 }
 
 int point_solves(const System *system, const Point *point) {
@@ -164,7 +173,7 @@ int point_solves(const System *system, const Point *point) {
 /* Row `i` of [1 + H A | right], i in the system. H: [6] of the row's foot, which has the rows from
  * `foot` on. */
 static void row_newton(const System *system, int i, int foot, const double *H, double right,
-                       Row *row) {
+                       Vector *row) {
     /* 1 in one lane, from a window over one 1 among zeros: a number that is stored into a vector
      * delays the load of it. */
     static const double window[2 * NEWTON_LANES] = {[NEWTON_LANES] = 1.0};
@@ -174,28 +183,29 @@ static void row_newton(const System *system, int i, int foot, const double *H, d
         Vector sum, end;
         memcpy(&sum, one + p * NEWTON_VECTOR, sizeof sum);
         memcpy(&end, last + p * NEWTON_VECTOR, sizeof end);
-        sum = six_times(sum, H, system->A + foot, p);
-        row->part[p] = sum + right * end;
+        sum = six_times(sum, H, system->A + foot * system->parts + p, system->parts);
+        row[p] = sum + right * end;
     }
 }
 
 int point_step(const System *system, MildScratch *scratch, const Point *at, Point *next,
                int correct) {
     const int n = system->n;
-    Row *M = system->M;
-    double moved[TWIST_MAX] = {0.0};
+    Vector *M = system->M;
+    Row moved;
+    row_clear(system, &moved);
     contact_hessian(scratch);
     for (int k = 0; k < n; k++) {
         /* the parts in use have been set, and n numbers are in them */
         /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult) */
-        moved[k] = correct ? 0.0 : at->twist.at[k] - system->free.at[k];
+        moved.at[k] = correct ? 0.0 : at->twist.at[k] - system->free.at[k];
     }
     for (int i = 0; i < n; i++) {
         const int foot = i / 6 * 6;
         const double *H = scratch->hessian[scratch->list[i / 6]] + 6 * (i - foot);
         double right =
             scratch->wrench[listed_row(scratch, i)] - (correct ? at->impulse.at[i] : 0.0);
-        row_newton(system, i, foot, H, six_dot(right, H, moved + foot), &M[i]);
+        row_newton(system, i, foot, H, six_dot(right, H, moved.at + foot), M + i * system->parts);
     }
     next->rests = 0;
     row_clear(system, &next->impulse);
@@ -240,7 +250,7 @@ static int step_is_rounding(const System *system, const Point *from, const Point
     for (int i = 0; i < n; i++) {
         double sum = fabs(system->free.at[i]);
         for (int j = 0; j < n; j++) {
-            sum += fabs(system->A[i].at[j] * from->impulse.at[j]);
+            sum += fabs(entry(system->A, system->parts, i, j) * from->impulse.at[j]);
         }
         size = fmax(size, sum);
     }

@@ -31,8 +31,8 @@ _Static_assert(TWIST_MAX % 8 == 0, "whole vectors, the last for the right-hand s
 /* The equations of the listed feet, in the order of scratch->list. The lanes of a row beyond the
  * last foot are zero. */
 typedef struct {
-    Row *A;           /* [n] [1/kg, 1/(kg m), 1/(kg m^2)] inverse inertia, symmetric */
-    Row *M;           /* [n] of point_step */
+    Vector *A;        /* [n][parts] [1/kg, 1/(kg m), 1/(kg m^2)] inverse inertia, symmetric */
+    Vector *M;        /* [n][parts] of point_step */
     Row free;         /* V^ [m/s, rad/s] twists of the free motion */
     double tolerance; /* [-] of the residual */
     double dt;        /* [s] */

@@ -165,16 +165,20 @@ static int all_finite(const MildContactInput *input, const MildContactResult *re
 static void step_twists(const MildScratch *scratch, const MildContactInput *input,
                         MildContactResult *result) {
     const int stride = 6 * scratch->given;
-    for (int i = 0; i < 6 * scratch->feet; i++) {
-        double sum = input->free_velocity[i];
-        const double *row = input->inverse_inertia + (6 * scratch->place[i / 6] + i % 6) * stride;
-        for (int k = 0; scratch->place[i / 6] >= 0 && k < scratch->listed; k++) {
-            const double *wrench = scratch->wrench + 6 * scratch->list[k];
-            for (int j = 0; j < 6; j++) {
-                sum += row[6 * scratch->place[scratch->list[k]] + j] * wrench[j];
+    memcpy(result->velocity, input->free_velocity, 6 * (size_t)scratch->feet * sizeof(double));
+    for (int f = 0; f < scratch->feet; f++) {
+        const double *row = input->inverse_inertia + 6 * scratch->place[f] * stride;
+        for (int i = 0; scratch->place[f] >= 0 && i < 6; i++, row += stride) {
+            double sum = result->velocity[6 * f + i];
+            for (int k = 0; k < scratch->listed; k++) {
+                const double *A = row + 6 * scratch->place[scratch->list[k]];
+                const double *wrench = scratch->wrench + 6 * scratch->list[k];
+                for (int j = 0; j < 6; j++) {
+                    sum += A[j] * wrench[j];
+                }
             }
+            result->velocity[6 * f + i] = sum;
         }
-        result->velocity[i] = sum;
     }
 }
 
