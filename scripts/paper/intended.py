@@ -110,6 +110,12 @@ def sentences():
     return dict(sorted(found.items(), key=lambda item: order.index(item[0]) if item[0] in order else len(order)))
 
 
+def split(names, parts):
+    """[(group, the others)] of so many parts."""
+    groups = [names[len(names) * i // parts:len(names) * (i + 1) // parts] for i in range(parts)]
+    return [(group, [name for name in names if name not in group]) for group in groups]
+
+
 class Search:
     """Trainings, each by the set of sentences that are ours."""
 
@@ -186,16 +192,15 @@ class Search:
         needed, parts = list(self.all), 3
         while True:
             parts = min(parts, len(needed))
-            chunks = [needed[len(needed) * i // parts:len(needed) * (i + 1) // parts] for i in range(parts)]
-            less = [[s for s in needed if s not in chunk] for chunk in chunks]
-            walks = self.walk(less)
-            spare = [(self.known(rest)["gap"], chunk) for rest, chunk, good in zip(less, chunks, walks) if good]
-            spare = [chunk for _, chunk in sorted(spare)]  # first the one without which it follows the speed best
+            groups = split(needed, parts)
+            walks = self.walk([rest for _, rest in groups])
+            spare = [(self.known(rest)["gap"], group) for (group, rest), good in zip(groups, walks) if good]
+            spare = [group for _, group in sorted(spare)]  # first the one without which it follows the speed best
             if spare:  # all of them at once, or half of them, ...: the most that it walks without
                 taken = [spare[:len(spare) >> k] for k in range(len(spare).bit_length())]
-                fewer = [[s for s in needed if not any(s in chunk for chunk in some)] for some in taken]
+                fewer = [[s for s in needed if not any(s in group for group in some)] for some in taken]
                 walks += self.walk(fewer)
-                needed = next(rest for rest, good in zip(fewer, walks[len(chunks):]) if good)
+                needed = next(rest for rest, good in zip(fewer, walks[parts:]) if good)
             elif parts == len(needed):
                 return needed, None not in walks
             else:
@@ -223,7 +228,8 @@ def main():
         fail(f"{MILD}: no such program; make build, or set MILD")
     pathlib.Path(asked.folder).mkdir(parents=True, exist_ok=True)
     search = Search(asked.folder, asked.jobs, asked.seconds, asked.seed, asked.gpus.split(","))
-    walks = search.walk([sorted(search.all), []])
+    every = list(search.all)
+    walks = search.walk([every, [], *(part for pair in split(every, 3) for part in pair)])  # what reduce asks first, at once
     if not walks[0] or walks[1]:
         fail("the time is over" if walks[0] is None else "configs/models.ini does not walk" if not walks[0] else
              "the paper's training walks as it is")
