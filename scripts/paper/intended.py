@@ -9,7 +9,7 @@ walks: in ever smaller groups (delta debugging, Zeller and Hildebrandt 2002), JO
 result is minimal: without any one of its sentences it does not walk, or the search says that its time was over.
 
 Budget, commands and the physics step are those of models.ini throughout. FOLDER/tests.json has every training; what is there is
-not trained again. FOLDER/needed.json has the result.
+not trained again. FOLDER/needed.json has the result. --figure draws them. docs/intended.json is the tests.json of docs/paper.md.
 """
 
 import argparse
@@ -159,7 +159,7 @@ class Search:
     def save(self, test):
         self.tests.append({**test, "keys": self.keys})
         part = self.file.with_suffix(".part")
-        part.write_text(json.dumps(self.tests, indent=1) + "\n")
+        part.write_text("[\n" + ",\n".join(map(json.dumps, self.tests)) + "\n]\n")
         part.replace(self.file)
         lack = sorted(set(self.all) - set(test["ours"]))
         gap = "-" if test["gap"] is None else f"{test['gap']:.3f}"
@@ -216,6 +216,7 @@ def main():
     parser.add_argument("--gpus", default=os.environ.get("CUDA_VISIBLE_DEVICES") or "0", help="that share them, by number: 0,1 (0)")
     parser.add_argument("--seconds", type=float, default=1e9, help="no training begins that would not end by then")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--figure", metavar="PICTURE.png", help="draw the trainings of FOLDER, train nothing")
     parser.add_argument("--list", action="store_true", help="print the sentences and their keys, train nothing")
     asked = parser.parse_args()
     if asked.list:
@@ -224,6 +225,11 @@ def main():
         return
     if not asked.folder:
         parser.error("give a folder")
+    if asked.figure:
+        import figures  # matplotlib is only asked of those who draw
+        search = Search(asked.folder, 1, 0, asked.seed)
+        figures.choices(list(search.all), [t for t in search.tests if (t.get("keys"), t["seed"]) == (search.keys, search.seed)]).savefig(asked.figure, dpi=100)
+        return
     if not os.access(MILD, os.X_OK):
         fail(f"{MILD}: no such program; make build, or set MILD")
     pathlib.Path(asked.folder).mkdir(parents=True, exist_ok=True)
