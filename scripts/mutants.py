@@ -164,10 +164,11 @@ def run_quiet(command, **more):
 
 
 def find_tests(layers):
-    """Tests of a layer from what CMake wrote for ctest, which knows them before they are built."""
+    """Tests of a layer from what CMake wrote for ctest, which knows them before they are built:
+    add_test([=[NAME]=] ...), or add_test("NAME" ...) by a newer CMake."""
     tests = []
     text = (BUILD / "tests" / "CTestTestfile.cmake").read_text()
-    for name, arguments in re.findall(r"^add_test\(\[=\[(.*?)\]=\] (.*)\)$", text, re.M):
+    for name, arguments in re.findall(r'^add_test\((?:\[=\[|")(.*?)(?:\]=\]|") (.*)\)$', text, re.M):
         command = [m.replace('\\"', '"') for m in re.findall(r'"((?:\\.|[^"\\])*)"', arguments)]
         if name.partition("/")[0] in layers:
             tests.append(Test(name, command, {}))

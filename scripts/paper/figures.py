@@ -227,3 +227,31 @@ def factorial(values, answer, controllers, grounds):
     axes[0].set(ylabel="skill: upright share times 1 - |speed error| / speed")
     axes[-1].legend(frameon=False, fontsize=8)
     return figure
+
+
+# ---- the search of intended.py
+
+def choices(names, tests):
+    """A row for each training, most of our choices first; a cell for each sentence that was ours, dark where it walked."""
+    figure, (axes,) = panels(1, 10, 9)
+    tests = sorted(tests, key=lambda t: (-len(t["ours"]), not t["walks"], -t["upright"]))
+    least = min((t["ours"] for t in tests if t["walks"]), key=len, default=[])
+    names = sorted(names, key=lambda name: name not in least)
+    for row, test in enumerate(tests):
+        columns = [names.index(name) for name in test["ours"]]
+        axes.plot(columns, [row] * len(columns), "s", markersize=7, color="#0b4f8a" if test["walks"] else "#e3b78f")
+        gap = "-" if test["gap"] is None else f"{test['gap']:.2f}"
+        axes.text(len(names) + 1.3, row, f"{100 * test['upright']:.0f} %", ha="right", va="center", fontsize=8)
+        axes.text(len(names) + 3, row, gap, ha="right", va="center", fontsize=8)
+    axes.text(len(names) + 0.7, -0.8, "upright", ha="left", fontsize=8, rotation=60)
+    axes.text(len(names) + 2.3, -0.8, "off [m/s]", ha="left", fontsize=8, rotation=60)
+    axes.plot([], [], "s", color="#0b4f8a", label="walks")
+    axes.plot([], [], "s", color="#e3b78f", label="does not")
+    axes.legend(frameon=False, ncols=2, loc="lower left", bbox_to_anchor=(0, -0.06))
+    axes.set_xticks(range(len(names)), names, rotation=60, ha="left", fontsize=8)
+    axes.xaxis.tick_top()
+    axes.tick_params(length=0)
+    axes.set(xlim=(-0.7, len(names) + 3), ylim=(len(tests) - 0.4, -0.6), yticks=[])
+    axes.axvspan(-0.5, len(least) - 0.5, color="#0b4f8a", alpha=0.08, linewidth=0)
+    axes.spines[["top", "left", "bottom"]].set_visible(False)
+    return figure

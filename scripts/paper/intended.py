@@ -5,11 +5,11 @@ Between configs/paper_intended.ini (the paper, its misprints as meant) and confi
 They are joined to sentences, such as "the clock is observed". A training takes some of the sentences as ours and the others as
 the paper's, half a minute on one GPU, and is then judged on four grounds at 0.3 and 0.6 m/s: it walks when 90 % of 80 trials stay
 up and the mean speed is within 0.1 m/s of what is asked. From all of ours, which walks, sentences are taken away while it still
-walks: in ever smaller groups (delta debugging, Zeller and Hildebrandt 2002), JOBS trainings at a time. The result is minimal:
-without any one of its sentences it does not walk, or the search says that its time was over.
+walks: in ever smaller groups (delta debugging, Zeller and Hildebrandt 2002), JOBS trainings at a time, shared among the GPUs. The
+result is minimal: without any one of its sentences it does not walk, or the search says that its time was over.
 
 Budget, commands and the physics step are those of models.ini throughout. FOLDER/tests.json has every training; what is there is
-not trained again. FOLDER/needed.json has the result.
+not trained again. FOLDER/needed.json has the result. --figure draws them. docs/intended.json is the tests.json of docs/paper.md.
 """
 
 import argparse
@@ -18,9 +18,11 @@ import hashlib
 import json
 import os
 import pathlib
+import queue
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
@@ -81,8 +83,8 @@ def fail(text):
     sys.exit(f"intended.py: {text}")
 
 
-def run_mild(*words):
-    done = subprocess.run([MILD, *words], capture_output=True, text=True)
+def run_mild(gpu, *words):
+    done = subprocess.run([MILD, *words], capture_output=True, text=True, env={**os.environ, "CUDA_VISIBLE_DEVICES": gpu})
     if done.returncode != 0:
         fail(f"mild {words[0]}: {(done.stderr.strip() or 'no message').splitlines()[-1]}")
 
@@ -108,11 +110,20 @@ def sentences():
     return dict(sorted(found.items(), key=lambda item: order.index(item[0]) if item[0] in order else len(order)))
 
 
+def split(names, parts):
+    """[(group, the others)] of so many parts."""
+    groups = [names[len(names) * i // parts:len(names) * (i + 1) // parts] for i in range(parts)]
+    return [(group, [name for name in names if name not in group]) for group in groups]
+
+
 class Search:
     """Trainings, each by the set of sentences that are ours."""
 
-    def __init__(self, folder, jobs, seconds, seed):
+    def __init__(self, folder, jobs, seconds, seed, gpus=("0",)):
         self.folder, self.jobs, self.seed = pathlib.Path(folder), jobs, seed
+        self.gpus, self.lock = queue.SimpleQueue(), threading.Lock()
+        for job in range(jobs):
+            self.gpus.put(gpus[job % len(gpus)])
         self.end = time.time() + seconds
         self.longest = 0.0
         self.all = sentences()
@@ -128,14 +139,14 @@ class Search:
         wanted = set(ours), self.seed, self.keys
         return next((t for t in self.tests if (set(t["ours"]), t["seed"], t.get("keys")) == wanted), None)
 
-    def train(self, ours):
+    def train(self, ours, gpu):
         options = [f"--{key}={pair[0 if name in ours else 1].replace(' ', ',')}"
                    for name, keys in self.all.items() for key, pair in keys.items()]
         with tempfile.TemporaryDirectory() as work:
             run, result = f"{work}/run", f"{work}/eval.json"
             common = [f"--train.seed={self.seed}", *options]
-            run_mild("train", "--config", str(ROOT / "configs/models.ini"), "--out", run, *common)
-            run_mild("eval", "--policy", f"{run}/policy.safetensors", "--config", f"{run}/config.ini", "--ground",
+            run_mild(gpu, "train", "--config", str(ROOT / "configs/models.ini"), "--out", run, *common)
+            run_mild(gpu, "eval", "--policy", f"{run}/policy.safetensors", "--config", f"{run}/config.ini", "--ground",
                      "rigid,rubber,foam45,sand_loose", "--speed", "0.3,0.6", "--trials", "10", "--train.robots=batch",
                      "--json", result)
             rows = json.loads(pathlib.Path(result).read_text())["rows"]
@@ -145,24 +156,35 @@ class Search:
         walks = upright >= 0.9 and gap is not None and gap < 0.1
         return {"ours": sorted(ours), "seed": self.seed, "upright": upright, "gap": gap, "walks": walks}
 
+    def save(self, test):
+        self.tests.append({**test, "keys": self.keys})
+        part = self.file.with_suffix(".part")
+        part.write_text("[\n" + ",\n".join(map(json.dumps, self.tests)) + "\n]\n")
+        part.replace(self.file)
+        lack = sorted(set(self.all) - set(test["ours"]))
+        gap = "-" if test["gap"] is None else f"{test['gap']:.3f}"
+        print(f"{'walks ' if test['walks'] else 'does not'} {test['upright']:.2f} {gap} "
+              f"with {len(test['ours'])} of {len(self.all)}; not: {', '.join(lack)}", flush=True)
+
+    def try_one(self, ours):
+        """Trains on the next free GPU, if there is time for it."""
+        begin = time.time()
+        if begin + self.longest > self.end:
+            return
+        gpu = self.gpus.get()
+        try:
+            test = self.train(ours, gpu)
+        finally:
+            self.gpus.put(gpu)
+        with self.lock:
+            self.longest = max(self.longest, time.time() - begin)
+            self.save(test)
+
     def walk(self, sets):
         """For each set whether it walks, None where the time is over; JOBS trainings at a time."""
-        new = [s for s in sets if not self.known(s)]
-        for first in range(0, len(new), self.jobs):
-            begin = time.time()
-            if begin + self.longest > self.end:
-                break
-            with ThreadPoolExecutor(self.jobs) as pool:
-                for test in pool.map(self.train, new[first:first + self.jobs]):
-                    self.tests.append({**test, "keys": self.keys})
-                    lack = sorted(set(self.all) - set(test["ours"]))
-                    gap = "-" if test["gap"] is None else f"{test['gap']:.3f}"
-                    print(f"{'walks ' if test['walks'] else 'does not'} {test['upright']:.2f} {gap} "
-                          f"with {len(test['ours'])} of {len(self.all)}; not: {', '.join(lack)}", flush=True)
-            self.longest = max(self.longest, time.time() - begin)
-            part = self.file.with_suffix(".part")
-            part.write_text(json.dumps(self.tests, indent=1) + "\n")
-            part.replace(self.file)
+        new = {frozenset(s): s for s in sets if not self.known(s)}
+        with ThreadPoolExecutor(self.jobs) as pool:
+            list(pool.map(self.try_one, new.values()))
         return [known["walks"] if (known := self.known(s)) else None for s in sets]
 
     def reduce(self):
@@ -170,21 +192,15 @@ class Search:
         needed, parts = list(self.all), 3
         while True:
             parts = min(parts, len(needed))
-            chunks = [needed[len(needed) * i // parts:len(needed) * (i + 1) // parts] for i in range(parts)]
-            without = [[s for s in needed if s not in chunk] for chunk in chunks]
-            walks = self.walk(without)
-            spare = [chunk for chunk, good in zip(chunks, walks) if good]
-            if len(spare) > 1:  # all of them at once, or else half, ...
-                taken = len(spare)
-                while taken > 1:
-                    fewer = [s for s in needed if not any(s in chunk for chunk in spare[:taken])]
-                    good = self.walk([fewer])[0]
-                    if good or good is None:
-                        break
-                    taken //= 2
-                needed = [s for s in needed if not any(s in chunk for chunk in spare[:taken if good else 1])]
-            elif spare:
-                needed = [s for s in needed if s not in spare[0]]
+            groups = split(needed, parts)
+            walks = self.walk([rest for _, rest in groups])
+            spare = [(self.known(rest)["gap"], group) for (group, rest), good in zip(groups, walks) if good]
+            spare = [group for _, group in sorted(spare)]  # first the one without which it follows the speed best
+            if spare:  # all of them at once, or half of them, ...: the most that it walks without
+                taken = [spare[:len(spare) >> k] for k in range(len(spare).bit_length())]
+                fewer = [[s for s in needed if not any(s in group for group in some)] for some in taken]
+                walks += self.walk(fewer)
+                needed = next(rest for rest, good in zip(fewer, walks[parts:]) if good)
             elif parts == len(needed):
                 return needed, None not in walks
             else:
@@ -196,9 +212,11 @@ class Search:
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", nargs="?", help="for tests.json and needed.json")
-    parser.add_argument("--jobs", type=int, default=3, help="trainings at a time on the GPU")
+    parser.add_argument("--jobs", type=int, default=3, help="trainings at a time on all GPUs")
+    parser.add_argument("--gpus", default=os.environ.get("CUDA_VISIBLE_DEVICES") or "0", help="that share them, by number: 0,1 (0)")
     parser.add_argument("--seconds", type=float, default=1e9, help="no training begins that would not end by then")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--figure", metavar="PICTURE.png", help="draw the trainings of FOLDER, train nothing")
     parser.add_argument("--list", action="store_true", help="print the sentences and their keys, train nothing")
     asked = parser.parse_args()
     if asked.list:
@@ -207,11 +225,17 @@ def main():
         return
     if not asked.folder:
         parser.error("give a folder")
+    if asked.figure:
+        import figures  # matplotlib is only asked of those who draw
+        search = Search(asked.folder, 1, 0, asked.seed)
+        figures.choices(list(search.all), [t for t in search.tests if (t.get("keys"), t["seed"]) == (search.keys, search.seed)]).savefig(asked.figure, dpi=100)
+        return
     if not os.access(MILD, os.X_OK):
         fail(f"{MILD}: no such program; make build, or set MILD")
     pathlib.Path(asked.folder).mkdir(parents=True, exist_ok=True)
-    search = Search(asked.folder, asked.jobs, asked.seconds, asked.seed)
-    walks = search.walk([sorted(search.all), []])
+    search = Search(asked.folder, asked.jobs, asked.seconds, asked.seed, asked.gpus.split(","))
+    every = list(search.all)
+    walks = search.walk([every, [], *(part for pair in split(every, 3) for part in pair)])  # what reduce asks first, at once
     if not walks[0] or walks[1]:
         fail("the time is over" if walks[0] is None else "configs/models.ini does not walk" if not walks[0] else
              "the paper's training walks as it is")

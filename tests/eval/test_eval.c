@@ -33,6 +33,12 @@ static void courses_have_bounds(void **state) {
     for (int i = 0; i < mild_material_preset_count(); i++) {
         assert_non_null(strstr(error.text, mild_material_preset_name(i)));
     }
+    for (int m = 0; m < MILD_MODELS; m++) {
+        const char *const *presets = mild_model_info((MildModel)m)->presets;
+        for (int k = 0; k < MILD_MODEL_PRESETS && presets[k]; k++) {
+            assert_non_null(strstr(error.text, presets[k]));
+        }
+    }
     for (int i = 1; i < MILD_MATERIALS_MAX; i++) {
         strcat(text, "+grass");
     }
@@ -399,6 +405,8 @@ static void rigid_inside_a_course(void **state) {
     assert_false(scene.rigid);
     assert_int_equal(mild_material_check(&scene.terrain.materials[1], &error), MILD_OK);
     assert_string_equal(scene_ground_at(&scene, 3, 0, name, sizeof name), "rigid");
+    const MildMaterial *hard = &scene.terrain.materials[1], *rubber = &scene.terrain.materials[2];
+    assert_true(hard->k_pen > 50 * rubber->k_pen && hard->k_drift > 5 * rubber->k_drift);
     EvalRow course = walk_on("rigid+foam45"), floor = walk_on("rigid"), soft = walk_on("foam60");
     assert_true(course.success == 3 && floor.success == 3);
     assert_true(fabs(course.velocity - floor.velocity) < 0.02);

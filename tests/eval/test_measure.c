@@ -357,6 +357,40 @@ static void low_lifts_are_no_swings(void **state) {
     }
 }
 
+/* A kept stance has the apex of its own foot's swing before it, and 0 after a low lift. */
+static void the_apex_before_a_stance(void **state) {
+    (void)state;
+    static const double apex[5] = {0, 0, 0.05, 0.04, 0};
+    static const int foot[5] = {0, 1, 1, 0, 1};
+    Script s;
+    Measure *m = calloc(1, sizeof *m);
+    script_start(&s);
+    measure_start(m, DT);
+    m->keep = 1;
+    hold(m, &s, 100);
+    lift(&s, 0, 0.04);
+    hold(m, &s, 100);
+    lift(&s, 1, 0.05);
+    hold(m, &s, 100);
+    set_foot(&s, 0, 100, 0, 0, 0);
+    set_foot(&s, 1, 100, 0, 0, 0);
+    hold(m, &s, 100);
+    lift(&s, 1, 0.003);
+    hold(m, &s, 100);
+    set_foot(&s, 1, 100, 0, 0, 0);
+    hold(m, &s, 100);
+    lift(&s, 0, 0.003);
+    hold(m, &s, 100);
+    lift(&s, 1, 0.003);
+    hold(m, &s, 100);
+    assert_int_equal(m->stances, 5);
+    for (int i = 0; i < 5; i++) {
+        assert_int_equal(m->kept[i].foot, foot[i]);
+        assert_close("apex", m->kept[i].apex, apex[i], 0);
+    }
+    measure_free(m, 1);
+}
+
 /* Who starts in the air has no stance to end; the first landing may end a swing. */
 static void a_foot_that_starts_in_the_air(void **state) {
     (void)state;
@@ -609,6 +643,9 @@ static void the_printed_row(void **state) {
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "0.010  1.23    98.8"));
     assert_non_null(strstr(text, "       -  sideways -0.247 of -0.30 m/s"));
+    row.measured = 2;
+    eval_print_row(&row, text, sizeof text);
+    assert_non_null(strstr(text, "19/20  0.457 +- 0.010  1.23    98.8"));
     row.measured = 1; /* one trial has no interval */
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "19/20  0.457 +-     -  1.23    98.8"));
@@ -719,6 +756,7 @@ int main(void) {
         cmocka_unit_test(contact_is_a_load_above_five_newton),
         cmocka_unit_test(chatter_ends_no_stance),
         cmocka_unit_test(low_lifts_are_no_swings),
+        cmocka_unit_test(the_apex_before_a_stance),
         cmocka_unit_test(a_foot_that_starts_in_the_air),
         cmocka_unit_test(open_stances_count_when_no_foot_was_lifted),
         cmocka_unit_test(one_lift_is_enough),

@@ -112,7 +112,7 @@ static void log_of_the_motor(void **state) {
 
 /* ---- a motor whose torque is the number of its joint, and which keeps what it was asked ---- */
 
-enum { ASKED_MAX = 4000 };
+enum { ASKED_MAX = 20000 };
 static struct { double error[SA01_JOINTS], speed[SA01_JOINTS]; } asked[ASKED_MAX];
 static int times_asked;
 
@@ -185,6 +185,94 @@ static void columns_are_what_they_name(void **state) {
     assert_int_equal(row, (int)(log.seconds / def.physics_dt + 0.5));
     assert_true(falls >= 2 && jumps >= falls - 1 && jumps <= falls);
     free(text);
+}
+
+/* ---- the shake ---- */
+
+enum { SHAKES = 20, PERIOD = 200 }; /* draws; policy steps of each */
+
+/* A controller that asks for nothing and keeps what was asked one step before: the shake alone. */
+static struct {
+    int calls;
+    double height; /* [m] of the base at the first call */
+    double action[SHAKES * PERIOD + 1][SA01_JOINTS];
+} shaken;
+
+static void nothing_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
+    (void)self;
+    (void)rows;
+    shaken.height = shaken.calls ? shaken.height : envs[0]->robot.qpos[2];
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        shaken.action[shaken.calls][i] = (double)envs[0]->action[0][i];
+        actions[i] = 0;
+    }
+    shaken.calls++;
+}
+
+static void log_shaken(uint64_t seed) {
+    const TaskActuator numbered = {NULL, 0, torque_of_number};
+    MildError error = {0};
+    int falls;
+    Controller controller = {NULL, "nothing", nothing_act, NULL, NULL, NULL};
+    const MotorLogDef log = {.task = &def,
+                             .robot = robot,
+                             .controller = &controller,
+                             .motors = &numbered,
+                             .seconds = 2 * SHAKES,
+                             .shake = 0.1,
+                             .seed = seed,
+                             .csv = fopen("/dev/null", "w")};
+    assert_non_null(log.csv);
+    times_asked = 0;
+    shaken.calls = 0;
+    assert_int_equal(motor_log(&log, &falls, &error), MILD_OK);
+    fclose(log.csv);
+    assert_int_equal(shaken.calls, SHAKES * PERIOD);
+}
+
+/* [Hz] Of the sine of a joint in a draw, from x(k+1) + x(k-1) = 2 cos(w dt) x(k); its largest
+ * value. The step after a fall is left out, where the action is 0 again. */
+static double frequency(int draw, int joint, double *largest) {
+    double product = 0, square = 0;
+    *largest = 0;
+    for (int k = draw * PERIOD + 2; k < (draw + 1) * PERIOD; k++) {
+        const double before = shaken.action[k - 1][joint], x = shaken.action[k][joint],
+                     after = shaken.action[k + 1][joint];
+        *largest = fmax(*largest, fabs(x));
+        if (k < SHAKES * PERIOD - 1 && before != 0 && x != 0 && after != 0) {
+            product += (before + after) * x;
+            square += 2 * x * x;
+        }
+    }
+    return acos(fmin(product / square, 1)) / (2 * 3.141592653589793 * 0.01);
+}
+
+/* A sine for each joint and two seconds, of 0.5 to 8 Hz, each octave as likely, and of up to
+ * `shake` in radians; of a robot that stands at the start; of another seed others. */
+static void shakes_are_sines(void **state) {
+    (void)state;
+    const double scale = task_action_scale(&def, robot_table(robot));
+    double low = 1e9, high = 0, octaves = 0, largest, most = 0, mean = 0, first[SA01_JOINTS];
+    log_shaken(1);
+    memcpy(first, shaken.action[PERIOD / 2], sizeof first);
+    assert_true(shaken.height > 0.3);
+    for (int draw = 0; draw < SHAKES; draw++) {
+        for (int joint = 0; joint < SA01_JOINTS; joint++) {
+            const double hz = frequency(draw, joint, &largest);
+            low = fmin(low, hz);
+            high = fmax(high, hz);
+            octaves += log2(hz) / (SHAKES * SA01_JOINTS);
+            most = fmax(most, largest * scale);
+            mean += largest * scale / (SHAKES * SA01_JOINTS);
+        }
+    }
+    print_message("%.3f to %.3f Hz, mean 2^%.2f; %.4f rad, mean %.4f\n", low, high, octaves, most,
+                  mean);
+    assert_true(low > 0.49 && low < 0.6 && high > 7 && high < 8.02);
+    assert_true(fabs(octaves - 1) < 0.25); /* log2 of the middle of 0.5 and 8 Hz */
+    assert_true(most > 0.09 && most <= 0.1 + 1e-6 && fabs(mean - 0.05) < 0.01);
+    log_shaken(2);
+    assert_memory_not_equal(first, shaken.action[PERIOD / 2], sizeof first);
 }
 
 /* What the simulation says is not taken for memory that ran out. */
@@ -261,9 +349,9 @@ static void walks_as_with_the_motor(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(log_of_the_motor),         cmocka_unit_test(columns_are_what_they_name),
-        cmocka_unit_test(failure_keeps_its_reason), cmocka_unit_test(network_beats_the_pd),
-        cmocka_unit_test(walks_as_with_the_motor),
+        cmocka_unit_test(log_of_the_motor),     cmocka_unit_test(columns_are_what_they_name),
+        cmocka_unit_test(shakes_are_sines),     cmocka_unit_test(failure_keeps_its_reason),
+        cmocka_unit_test(network_beats_the_pd), cmocka_unit_test(walks_as_with_the_motor),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -107,6 +107,34 @@ static void test_matched(void **state) {
     assert_true(worst_force < 2e-3); /* con_cone's drag at 1 cm/s */
 }
 
+/* con_cone is Choi's ground scaled: his k = 1e6 N/m^3 times the area of the foot beside his
+ * sigma_cone = 0.15e6 N/m^3, whatever it is matched to. */
+static void test_con_cone_is_scaled(void **state) {
+    (void)state;
+    const double pitch = mild_sole_pitch(raster[0]);
+    const double area = mild_sole_elements(raster[0]) * pitch * pitch;
+    for (int p = 0; p < mild_material_preset_count(); p++) {
+        const MildMaterial mild = preset(mild_material_preset_name(p));
+        const MildMaterial rival = rival_of(MILD_MODEL_CON_CONE, &mild);
+        assert_true(fabs(rival.k_pen / rival.sigma_cone * 0.15e6 / (1e6 * area) - 1.0) < 1e-9);
+    }
+}
+
+/* A preset of mild has numbers for the other models, too: bekker's are those of dry sand, the plate
+ * of resistive force theory is generic, and at 1 m/s hunt_crossley bounces back at 0.7 m/s. Drift
+ * settles within a physics step of 1 ms. */
+static void test_presets_serve_every_model(void **state) {
+    (void)state;
+    const MildMaterial sand = preset("dry_sand");
+    for (int p = 0; p < mild_material_preset_count(); p++) {
+        const MildMaterial m = preset(mild_material_preset_name(p));
+        assert_true(m.k_c == sand.k_c && m.k_phi == sand.k_phi && m.exponent == sand.exponent);
+        assert_true(m.cohesion == sand.cohesion && m.shear_length == sand.shear_length);
+        assert_true(m.zeta == 1.0 && fabs(1.0 - m.dissipation - 0.7) < 1e-12);
+        assert_true(m.b_drift > 0.0 && m.b_drift < 1e-3 * m.k_drift);
+    }
+}
+
 /* Materials from all of the accepted ranges: what a match returns can be used, or it fails, says
  * why and returns nothing. */
 static void test_match_is_accepted(void **state) {
@@ -680,13 +708,20 @@ static void test_bystanders(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_matched),        cmocka_unit_test(test_match_is_accepted),
-        cmocka_unit_test(test_refusals),       cmocka_unit_test(test_concentration),
-        cmocka_unit_test(test_equilibrium),    cmocka_unit_test(test_no_creep),
-        cmocka_unit_test(test_impact),         cmocka_unit_test(test_passive),
-        cmocka_unit_test(test_symmetry),       cmocka_unit_test(test_solvers_agree),
-        cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_moment),
-        cmocka_unit_test(test_bystanders)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_con_cone_is_scaled),
+                                       cmocka_unit_test(test_presets_serve_every_model),
+                                       cmocka_unit_test(test_matched),
+                                       cmocka_unit_test(test_match_is_accepted),
+                                       cmocka_unit_test(test_refusals),
+                                       cmocka_unit_test(test_concentration),
+                                       cmocka_unit_test(test_equilibrium),
+                                       cmocka_unit_test(test_no_creep),
+                                       cmocka_unit_test(test_impact),
+                                       cmocka_unit_test(test_passive),
+                                       cmocka_unit_test(test_symmetry),
+                                       cmocka_unit_test(test_solvers_agree),
+                                       cmocka_unit_test(test_copy_continues),
+                                       cmocka_unit_test(test_moment),
+                                       cmocka_unit_test(test_bystanders)};
     return cmocka_run_group_tests(tests, make_soles, drop_soles);
 }

@@ -211,6 +211,7 @@ static void test_advantages(void **state) {
         b->done[i] = random_unit(&random) < 0.1;
         b->timeout[i] = b->done[i] && random_unit(&random) < 0.5;
         b->valid[i] = random_unit(&random) > 0.05;
+        b->advantage[i] = b->returns[i] = 7.0f; /* of an earlier iteration */
     }
     PpoReport report = {0};
     ppo_returns(ppo, &report);

@@ -3,6 +3,7 @@
 #include "check.h"
 
 #include <dirent.h>
+#include <errno.h>
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
@@ -485,6 +486,7 @@ static void test_unreadable_header(void **state) {
     bytes[9] = 'x'; /* in the place of a quote */
     assert_true(safetensors_seal(bytes, size));
     write_bytes(PATH, bytes, size);
+    errno = ENOMEM; /* of something before */
     assert_null(policy_load(PATH, NULL, 0, &error));
     assert_non_null(strstr(error.text, PATH ": "));
     assert_non_null(strstr(error.text, "header cannot be read"));
@@ -597,6 +599,30 @@ static void test_half_precision(void **state) {
     unlink(PATH);
 }
 
+/* Files of other programs may have more tensors than ours; 2000 are refused in words. */
+static void test_a_thousand_tensors(void **state) {
+    (void)state;
+    enum { COUNT = 1000 };
+    static char names[2 * COUNT][8];
+    static Safetensor tensors[2 * COUNT];
+    const float number = 0.5f;
+    MildError error = {0};
+    for (int i = 0; i < 2 * COUNT; i++) {
+        snprintf(names[i], sizeof names[i], "t%d", i);
+        tensors[i] = (Safetensor){names[i], SAFETENSORS_F32, 1, {1}, &number, 0};
+    }
+    assert_int_equal(safetensors_write(PATH, tensors, COUNT, NULL, 0, &error), MILD_OK);
+    Safetensors *file = safetensors_read(PATH, &error);
+    assert_non_null(file);
+    assert_int_equal(safetensors_count(file), COUNT);
+    assert_memory_equal(safetensors_find(file, "t999")->data, &number, sizeof number);
+    safetensors_destroy(file);
+    assert_int_equal(safetensors_write(PATH, tensors, 2 * COUNT, NULL, 0, &error), MILD_OK);
+    assert_null(safetensors_read(PATH, &error));
+    assert_non_null(strstr(error.text, "header cannot be read"));
+    unlink(PATH);
+}
+
 /* A disk that fills up half way: the old file stays, no temporary one is left. */
 static void test_full_disk(void **state) {
     (void)state;
@@ -694,6 +720,7 @@ int main(void) {
         cmocka_unit_test(test_unreadable_header),
         cmocka_unit_test(test_extreme_shapes),
         cmocka_unit_test(test_half_precision),
+        cmocka_unit_test(test_a_thousand_tensors),
         cmocka_unit_test(test_full_disk),
         cmocka_unit_test(test_unusable_defs),
     };
