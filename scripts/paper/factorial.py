@@ -15,8 +15,8 @@ SEARCH (KL target that leads the learning rate, weight of the entropy); the one 
 for all of its trainings. Skill: mean over cells of upright share times 1 - |speed error| / speed, not below 0.
 
 FOLDER/results.jsonl gets a line when a training ends and one when it is judged; started again, the command goes on from there, also after
-it was killed. What was trained with another --minutes, --steps or config is not counted. No training begins that would not end by --seconds.
-Keys after -- go to the trainings of mlp, flat and ours, as -- --train.envs=8192."""
+it was killed. What was trained with another --minutes, --steps or config is not counted. No training begins that would not end by --seconds,
+and no judge after it. Keys after -- go to the trainings of mlp, flat and ours, as -- --train.envs=8192."""
 import argparse
 import csv
 import hashlib
@@ -225,6 +225,8 @@ class Factorial:
         return None if self.known("judged", task) else judges.submit(self.conclude, task)
 
     def conclude(self, task):
+        if time.time() > self.end:  # judged when it goes on
+            return
         parts = self.judge(task)
         line = self.add("judged", task, {"skill": {part: skill(cells) for part, cells in parts.items()}, "cells": parts})
         kl_target, entropy = SEARCH[task["choice"]]
