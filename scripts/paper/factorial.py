@@ -15,8 +15,8 @@ SEARCH (KL target that leads the learning rate, weight of the entropy); the one 
 for all of its trainings. Skill: mean over cells of upright share times 1 - |speed error| / speed, not below 0.
 
 FOLDER/results.jsonl gets a line when a training ends and one when it is judged; started again, the command goes on from there, also after
-it was killed. What was trained with another --minutes, --steps or config is not counted. No training begins that would not end by --seconds.
-Keys after -- go to the trainings of mlp, flat and ours, as -- --train.envs=8192."""
+it was killed. What was trained with another --minutes, --steps or config is not counted. No training begins that would not end by --seconds,
+and no judge after it. Keys after -- go to the trainings of mlp, flat and ours, as -- --train.envs=8192."""
 import argparse
 import csv
 import hashlib
@@ -40,6 +40,7 @@ CONTROLLERS = {"mlp": "MLP", "clock": "Clock", "ht2": "HT-2", "flat": "ours, no 
 GROUNDS = ["rigid", "ecc_spring", "mild"]
 SEARCH = [(kl_target, entropy) for kl_target in (0.01, 0.02) for entropy in (0.001, 0.004)]
 TUNING = 0.25  # share of the time
+STARTING = 20  # [s] beside the time of a training, until one has been seen
 SETTLED = 0.7  # share of the time at which the annealing begins
 OURS = {"mlp": ["--ppo.epsilon=0", "--ppo.modulation=false"], "flat": ["--ppo.modulation=false"], "ours": []}
 TEACHER = ROOT / "policies/paper/rigid-1.safetensors"
@@ -179,7 +180,9 @@ class Factorial:
         name, minutes, more = task["controller"], self.seconds_of(task) / 60, []
         if self.given.steps:
             minutes, more = 1e6, ["--iterations", round(self.given.steps * (TUNING if task["kind"] == "tune" else 1) / (8192 * 60))]
-        more += ["--teacher", TEACHER] if name == "ht2" else []
+        if name == "ht2":  # of its own 8 minutes, 3000 steps of imitation and 20 iterations of the critic alone
+            share = min(1.0, minutes / 8)
+            more += ["--teacher", TEACHER, "--pretrain", max(50, round(3000 * share)), "--warm", max(1, round(20 * share))]
         run([self.given.python, ROOT / f"scripts/rivals/train_{name}.py", "--out", folder / "run", "--config", self.given.config.resolve(),
              "--model", task["ground"], "--seed", task["seed"], "--kl-target", kl_target, "--entropy", entropy, "--device", device,
              "--minutes", minutes, *more], folder / "log")
@@ -207,7 +210,7 @@ class Factorial:
 
     def begins(self, task):
         """Bool: it would end in time."""
-        likely = self.longest.get((task["kind"], task["controller"]), 1.1 * self.seconds_of(task))
+        likely = self.longest.get((task["kind"], task["controller"]), self.seconds_of(task) + STARTING)
         return time.time() + likely <= self.end
 
     def work(self, task, devices, judges):
@@ -225,6 +228,8 @@ class Factorial:
         return None if self.known("judged", task) else judges.submit(self.conclude, task)
 
     def conclude(self, task):
+        if time.time() > self.end:  # judged when it goes on
+            return
         parts = self.judge(task)
         line = self.add("judged", task, {"skill": {part: skill(cells) for part, cells in parts.items()}, "cells": parts})
         kl_target, entropy = SEARCH[task["choice"]]

@@ -183,7 +183,7 @@ def train(arguments):
         learner.roll_out()
         envs.wait()
         rollout = time.time() - begin
-        report = learner.update(actor=arguments.go_on is not None or progress.iteration >= WARM)
+        report = learner.update(actor=arguments.go_on is not None or progress.iteration >= arguments.warm)
         if progress.log({**envs.statistics(), **report, "rollout_s": rollout}, steps):
             ht2.save(path, learner.ppo.mean_weights, ht2.HEADS, ht2.LAYERS,
                      f"scripts/rivals/train_ht2.py, iteration {progress.iteration} of {steps} steps")
@@ -195,6 +195,7 @@ if __name__ == "__main__":
     parser = run.options(__doc__, 8)
     parser.set_defaults(envs=4096)
     parser.add_argument("--record", type=int, default=RECORD, help=f"policy steps of the earlier policy (default {RECORD})")
+    parser.add_argument("--warm", type=int, default=WARM, help=f"iterations of stage 2 that train the critic alone (default {WARM})")
     parser.add_argument("--teacher", type=pathlib.Path, default=run.ROOT / "policies/mild.safetensors",
                         help="the earlier policy (default: the shipped one)")
     parser.add_argument("--pretrain", type=int, default=3000, help="gradient steps of stage 1 (default 3000)")

@@ -120,6 +120,10 @@ def what_stops():
         late = made(folder, "--seconds", "170")  # a training of the search takes 45 s; one of three minutes does not fit
         done, _, _ = quietly(late.run)
         assert not done and len(late.calls) == 20 and all(task["kind"] == "tune" for task in late.calls)
+        unjudged = late.known("judged", late.calls[0])
+        over = made(folder, "--seconds", "-1")
+        over.lines.remove(unjudged)
+        assert not quietly(over.run)[0] and not over.calls and not over.known("judged", late.calls[0])
         none = made(folder, "--seconds", "10")
         assert not quietly(none.run)[0] and not none.calls
         assert "nothing is judged yet" in quietly(lambda: factorial.report(none))[1]
