@@ -113,12 +113,12 @@ static void a_fall_ends_one_trial(void **state) {
     size_t size[2];
     MildError error = {0};
     Controller walks, falls = {&walks, "falls", falling_act, NULL, NULL, NULL};
-    const EvalWatch watch = {decided, NULL};
+    const EvalCallback callback = {decided, NULL};
     const EvalDef eval = {.speed = 0.5,
                           .trials = TRIALS,
                           .seconds = STEPS * 0.01,
                           .seed = 1,
-                          .watch = &watch,
+                          .callback = &callback,
                           .actions = open_memstream(&actions, &size[0]),
                           .track = open_memstream(&track, &size[1])};
     Scene scene;
