@@ -213,17 +213,22 @@ static void twists(const Soft *soft, int nv, const double *velocity, double *twi
     }
 }
 
-/* Pose and present twist of a foot in the input. Without a ground it keeps that twist. */
-static void locate_foot(Soft *soft, const mjModel *m, const mjData *d, int f) {
+/* Pose and present twist of a body, which also is its twist without a ground while it is in the air.
+ * cvel has the velocity of the point that moves with the body through the centre of its tree. */
+static void locate_body(Soft *soft, const mjModel *m, const mjData *d, int f) {
     MildContactInput *input = &soft->input;
-    double spin[6], *twist = input->velocity[f];
-    foot_pose(d, &soft->foot[f], input->position[f], input->rotation[f]);
-    if (soft->foot[f].surface) {
-        mj_objectVelocity(m, d, mjOBJ_XBODY, soft->foot[f].body, spin, 0);
-        mju_copy3(twist, spin + 3);
-        mju_copy3(twist + 3, spin);
-        mju_copy(input->free_velocity + (ptrdiff_t)6 * f, twist, 6);
+    const int body = soft->foot[f].body;
+    const mjtNum *at = d->xpos + 3 * (ptrdiff_t)body, *cvel = d->cvel + 6 * (ptrdiff_t)body;
+    const mjtNum *center = d->subtree_com + 3 * (ptrdiff_t)m->body_rootid[body];
+    double *twist = input->velocity[f], *free = input->free_velocity + (ptrdiff_t)6 * f;
+    for (int k = 0; k < 3; k++) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        input->position[f][k] = at[k];
+        twist[k] = cvel[3 + k] + cvel[i] * (at[j] - center[j]) - cvel[j] * (at[i] - center[i]);
+        twist[3 + k] = cvel[k];
     }
+    memcpy(input->rotation[f], d->xmat + 9 * (ptrdiff_t)body, sizeof input->rotation[f]);
+    memcpy(free, twist, sizeof input->velocity[f]);
 }
 
 /* Poses of the feet, and which of them have rows: all but the bodies in the air. */
@@ -235,9 +240,13 @@ static void find_near(Soft *soft, const mjModel *m, const mjData *d) {
     input->inverse_inertia = soft->inverse_inertia;
     input->dt = m->opt.timestep;
     for (int f = 0; f < soft->feet; f++) {
-        locate_foot(soft, m, d, f);
-        bodies += soft->foot[f].surface;
-        feet |= soft->foot[f].surface ? 0u : 1u << f;
+        if (soft->foot[f].surface) {
+            locate_body(soft, m, d, f);
+            bodies++;
+        } else {
+            foot_pose(d, &soft->foot[f], input->position[f], input->rotation[f]);
+            feet |= 1u << f;
+        }
     }
     input->rows = bodies ? feet | mild_ground_near(&soft->terrain, input, soft->scratch) : 0;
     if (bodies && input->rows == 0) {
