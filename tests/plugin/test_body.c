@@ -561,6 +561,43 @@ static void a_rigid_floor_is_said(void **state) {
     }
 }
 
+/* A mesh of crossed sheets has more elements than its bounding box was given room for. */
+static void a_folded_mesh_has_no_room(void **state) {
+    (void)state;
+    static const int side[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6},
+                                    {0, 1, 4}, {1, 5, 4}, {2, 6, 3}, {3, 6, 7},
+                                    {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    static char vertices[12000], faces[12000], asset[25000], text[27000];
+    enum { SHEETS = 24 };
+    vertices[0] = faces[0] = '\0';
+    for (int s = 0; s < SHEETS; s++) {
+        for (int c = 0; c < 8; c++) {
+            double at[3];
+            at[s % 3] = 0.05 * (s / 3 - 3.5) + (c & 4 ? .001 : -.001);
+            at[(s + 1) % 3] = c & 1 ? .2 : -.2;
+            at[(s + 2) % 3] = c & 2 ? .2 : -.2;
+            snprintf(vertices + strlen(vertices), sizeof vertices - strlen(vertices), "%g %g %g ",
+                     at[0], at[1], at[2]);
+        }
+        for (int t = 0; t < 12; t++) {
+            snprintf(faces + strlen(faces), sizeof faces - strlen(faces), "%d %d %d ",
+                     8 * s + side[t][0], 8 * s + side[t][1], 8 * s + side[t][2]);
+        }
+    }
+    snprintf(asset, sizeof asset, "<mesh name='fold' vertex='%s' face='%s'/>", vertices, faces);
+    snprintf(text, sizeof text,
+             "<mujoco><extension><plugin plugin='mild.ground'><instance name='soft'>" CONFIG(
+                 "body", "body") "</instance></plugin></extension><asset>%s</asset><worldbody>"
+                                 "<body name='body'><freejoint/><geom type='mesh' mesh='fold' "
+                                 "mass='1' " OFF "/></body></worldbody></mujoco>",
+             asset);
+    kit_said[0] = '\0';
+    assert_null(kit_compile(text));
+    print_message("%s\n", kit_said);
+    assert_non_null(strstr(kit_said, "meshes of 'body'"));
+    assert_non_null(strstr(kit_said, "room for"));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(in_the_air_they_change_no_bit),
@@ -574,6 +611,7 @@ int main(void) {
         cmocka_unit_test(wrong_bodies_are_refused),
         cmocka_unit_test(seventeen_are_too_many),
         cmocka_unit_test(a_rigid_floor_is_said),
+        cmocka_unit_test(a_folded_mesh_has_no_room),
     };
     return cmocka_run_group_tests(tests, kit_setup, NULL);
 }
