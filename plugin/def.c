@@ -11,7 +11,9 @@
     MILD_FIELD(PluginDef, member, type, count, low, high, help)
 const MildField plugin_fields[] = {
     FIELD(feet, MILD_FIELD_TEXT, PLUGIN_TEXT_SIZE, 0, 0,
-          "[text] bodies or sites that are feet, 1 .. 4; z points up from the sole"),
+          "[text] bodies or sites that are feet; z points up from the sole"),
+    FIELD(body, MILD_FIELD_TEXT, PLUGIN_TEXT_SIZE, 0, 0,
+          "[text] bodies whose shapes meet the ground on any side; with the feet at most 16"),
     FIELD(sole, MILD_FIELD_TEXT, PLUGIN_TEXT_SIZE, 0, 0,
           "[text] geoms that form the soles (default: the shapes of the foot's body); a single "
           "sphere is a round foot"),
@@ -22,6 +24,7 @@ const MildField plugin_fields[] = {
           "[text] preset; several when terrain.patches is set (default sand_loose)"),
     FIELD(sole_z, MILD_FIELD_DOUBLE, 1, -10, 10, "[m] height of the outline's plane in that frame"),
     FIELD(pitch, MILD_FIELD_DOUBLE, 1, 1e-4, 1, "[m] edge of a ground element"),
+    FIELD(body_pitch, MILD_FIELD_DOUBLE, 1, 1e-3, 1, "[m] between the elements of a body"),
     FIELD(elements, MILD_FIELD_INT, 1, 0, 65536, "[-] elements of a sole; 0: as many as fit"),
     FIELD(height, MILD_FIELD_DOUBLE, 1, -1e3, 1e3, "[m] of the surface above z = 0"),
     FIELD(prints, MILD_FIELD_INT, 1, 0, MILD_IMPRINT_TILES_MAX,
@@ -85,7 +88,7 @@ static MildStatus read_section(const mjModel *m, int instance, const Section *se
 
 MildStatus plugin_def_read(const mjModel *m, int instance, PluginDef *def, MildError *error) {
     *def = (PluginDef){
-        .ground = "sand_loose", .sole_z = 0, .pitch = 0.0195, .map = mild_map_def_default()};
+        .ground = "sand_loose", .pitch = 0.0195, .body_pitch = 0.03, .map = mild_map_def_default()};
     MildStatus status = read_section(m, instance, &sections[PLUGIN_SECTION], def, error);
     return status == MILD_OK ? read_section(m, instance, &sections[MAP_SECTION], &def->map, error)
                              : status;
@@ -158,6 +161,12 @@ static MildStatus finish_material(const mjModel *m, int instance, MildModel mode
     const MildMaterial mild = *material;
     MildStatus status = MILD_OK;
     if (mild.model == MILD_MODEL_MILD && model != MILD_MODEL_MILD) {
+        if (!sole) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "ground.model '%s' is matched to a preset under the sole of a foot; "
+                             "name a foot in feet, or leave out ground.model",
+                             mild_model_names[model]);
+        }
         status = mild_model_match(model, &mild, sole, load, material, error);
     }
     if (status == MILD_OK) {

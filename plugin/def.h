@@ -10,16 +10,17 @@
 #define PLUGIN_NAME "mild.ground"
 #define PLUGIN_TEXT_SIZE 1024
 #define PLUGIN_OUTLINE_SIZE 16384
-#define PLUGIN_FEET_MAX 4 /* feet of an instance */
 
 /* Section [plugin]: the attributes without a prefix. */
 typedef struct {
     char feet[PLUGIN_TEXT_SIZE];       /* names of bodies or sites */
+    char body[PLUGIN_TEXT_SIZE];       /* names of bodies that have elements all over */
     char sole[PLUGIN_TEXT_SIZE];       /* names of geoms */
     char outline[PLUGIN_OUTLINE_SIZE]; /* [m] polygons, one or one for each foot */
     char ground[PLUGIN_TEXT_SIZE];     /* names of presets, by label of the terrain's pattern */
     double sole_z;                     /* [m] plane of the outline in the frame of the foot */
     double pitch;                      /* [m] edge of an element */
+    double body_pitch;                 /* [m] between the elements of a body */
     int elements;                      /* of a sole; 0: as many as fit */
     double height;                     /* [m] of the surface */
     int prints;                        /* tiles of imprints; 0: none */
@@ -38,7 +39,8 @@ const char *plugin_text(const mjModel *m, int instance, const char *attribute);
 /* Reads everything but ground.*, which needs the soles. */
 MildStatus plugin_def_read(const mjModel *m, int instance, PluginDef *def, MildError *error);
 /* Lays the materials of `ground` in the terrain, as the commands of the program do: presets,
- * matched to ground.model on the sole under `load` [N], then the keys ground.*. */
+ * matched to ground.model on the sole under `load` [N], then the keys ground.*. sole: NULL without
+ * feet. */
 MildStatus plugin_def_materials(const mjModel *m, int instance, const PluginDef *def,
                                 const MildSole *sole, double load, MildTerrain *terrain,
                                 MildError *error);

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/text.h"
+#include "plugin/body.h"
 #include "plugin/wheel.h"
 
 #define WORD 128          /* bytes of a name */
@@ -33,9 +34,12 @@ static MildStatus unknown(const mjModel *m, int object, int count, const char *k
     if (filled > 0) {
         nearest = text_nearest(name, names, filled);
     }
+    const char *what = object == mjOBJ_GEOM       ? "geom"
+                       : strcmp(key, "body") == 0 ? "body"
+                                                  : "body or site";
     MildStatus status =
         mild_fail(error, MILD_ERROR_ARGUMENT, "%s: there is no %s '%.60s'; nearest is '%.60s'", key,
-                  object == mjOBJ_GEOM ? "geom" : "body or site", name, nearest);
+                  what, name, nearest);
     free(names);
     return status;
 }
@@ -53,8 +57,10 @@ const char *foot_name(const mjModel *m, const Foot *foot) {
 static MildStatus add_foot(const mjModel *m, Foot *feet, int *count, int body, int site,
                            MildError *error) {
     const Foot added = {.body = body, .site = site};
-    if (*count == PLUGIN_FEET_MAX) {
-        return mild_fail(error, MILD_ERROR_RANGE, "more than %d feet", PLUGIN_FEET_MAX);
+    if (*count == MILD_FEET_MAX) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "more than %d feet and bodies: '%.60s' is one too many", MILD_FEET_MAX,
+                         foot_name(m, &added));
     }
     for (int f = 0; f < *count; f++) {
         if (feet[f].body == body) {
@@ -115,6 +121,31 @@ static MildStatus find_geoms(const mjModel *m, const PluginDef *def, Foot *feet,
     return MILD_OK;
 }
 
+/* Bodies with elements all over, behind the feet. */
+static MildStatus find_bodies(const mjModel *m, const PluginDef *def, Foot *feet, int *count,
+                              MildError *error) {
+    const char *text = def->body;
+    char name[WORD];
+    while (plugin_word(&text, name, sizeof name)) {
+        const int body = mj_name2id(m, mjOBJ_BODY, name);
+        if (body < 0) {
+            return unknown(m, mjOBJ_BODY, (int)m->nbody, "body", name, error);
+        }
+        for (int f = 0; f < *count; f++) {
+            if (feet[f].body == body) {
+                return mild_fail(error, MILD_ERROR_ARGUMENT, "body: '%.60s' is %s; name it once",
+                                 name, feet[f].surface ? "named twice" : "a foot already");
+            }
+        }
+        MildStatus status = add_foot(m, feet, count, body, -1, error);
+        if (status != MILD_OK) {
+            return status;
+        }
+        feet[*count - 1].surface = 1;
+    }
+    return MILD_OK;
+}
+
 static int is_named(const mjModel *m, const char *text, int geom) {
     const char *name = mj_id2name(m, mjOBJ_GEOM, geom);
     char word[WORD];
@@ -126,8 +157,8 @@ static int is_named(const mjModel *m, const char *text, int geom) {
     return 0;
 }
 
-/* Bool: the body has a shape that is not a mesh; its meshes are then for pictures. */
-static int has_primitive(const mjModel *m, int body) {
+int foot_has_primitive(const mjModel *m, const Foot *foot) {
+    const int body = foot->body;
     for (int g = m->body_geomadr[body]; g < m->body_geomadr[body] + m->body_geomnum[body]; g++) {
         if (m->geom_type[g] != mjGEOM_MESH) {
             return 1;
@@ -145,13 +176,16 @@ int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int 
     if (plugin_word(&text, word, sizeof word)) {
         return is_named(m, def->sole, geom);
     }
-    return m->geom_type[geom] != mjGEOM_MESH || !has_primitive(m, foot->body);
+    return m->geom_type[geom] != mjGEOM_MESH || !foot_has_primitive(m, foot);
 }
 
 int foot_may_touch_floor(const mjModel *m, const Foot *foot, int geom) {
     double arm[3], local[3];
     if (m->geom_bodyid[geom] != foot->body) {
         return 0;
+    }
+    if (foot->surface) {
+        return 1;
     }
     if (foot->round) {
         mju_sub3(arm, m->geom_pos + 3 * geom, foot->center);
@@ -523,11 +557,6 @@ static MildStatus make_sole(const mjModel *m, const PluginDef *def, MildModel mo
                             int f, Foot *foot, MildError *error) {
     const int sphere = only_sphere(m, def, foot);
     MildStatus status;
-    if (m->body_weldid[foot->body] == 0) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "feet: body '%.60s' is fixed to the world; a foot must move",
-                         foot_body_name(m, foot));
-    }
     if (def->outline[0]) {
         status = sole_from_outline(def, f, foot, error);
     } else if (sphere >= 0) {
@@ -543,6 +572,33 @@ static MildStatus make_sole(const mjModel *m, const PluginDef *def, MildModel mo
     return foot->sole ? MILD_OK : MILD_ERROR_MEMORY;
 }
 
+static MildStatus check_moves(const mjModel *m, const Foot *foot, MildError *error) {
+    return m->body_weldid[foot->body] != 0
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "%s: body '%.60s' is fixed to the world; it must move",
+                           foot->surface ? "body" : "feet", foot_body_name(m, foot));
+}
+
+/* All of them, once they are found. */
+static MildStatus make_soles(const mjModel *m, const PluginDef *def, MildModel model, int compiling,
+                             Foot *feet, int count, MildError *error) {
+    MildStatus status = MILD_OK;
+    for (int f = 0; status == MILD_OK && f < count; f++) {
+        status = check_moves(m, &feet[f], error);
+        if (status == MILD_OK && feet[f].surface) {
+            const double pitch = f > 0 ? mild_sole_pitch(feet[0].sole) : def->pitch;
+            status = body_surface(m, def, pitch, compiling, &feet[f], error);
+        } else if (status == MILD_OK) {
+            status = make_sole(m, def, model, compiling, f, &feet[f], error);
+            if (status == MILD_OK && !compiling) {
+                status = wheel_check(m, def, &feet[f], error);
+            }
+        }
+    }
+    return status;
+}
+
 MildStatus feet_create(const mjModel *m, const PluginDef *def, MildModel model, int compiling,
                        Foot *feet, int *count, MildError *error) {
     *count = 0;
@@ -550,20 +606,18 @@ MildStatus feet_create(const mjModel *m, const PluginDef *def, MildModel model, 
     if (status == MILD_OK) {
         status = find_geoms(m, def, feet, count, error);
     }
-    if (status == MILD_OK && *count == 0) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "no feet: set feet to the names of the bodies that stand on the ground");
-    }
     if (status == MILD_OK && def->outline[0]) {
         status = check_outlines(def, *count, error);
     }
-    for (int f = 0; status == MILD_OK && f < *count; f++) {
-        status = make_sole(m, def, model, compiling, f, &feet[f], error);
-        if (status == MILD_OK && !compiling) {
-            status = wheel_check(m, def, &feet[f], error);
-        }
+    if (status == MILD_OK) {
+        status = find_bodies(m, def, feet, count, error);
     }
-    return status;
+    if (status == MILD_OK && *count == 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "no feet: set feet to the names of the bodies that stand on the ground, "
+                         "or body to those that meet it on any side");
+    }
+    return status == MILD_OK ? make_soles(m, def, model, compiling, feet, *count, error) : status;
 }
 
 void feet_destroy(Foot *feet, int count) {

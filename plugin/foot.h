@@ -1,4 +1,5 @@
-/* Private to the plugin: the feet of a model and their soles. */
+/* Private to the plugin: the feet of a model and their soles, and the other bodies that meet the
+ * ground, which count as feet with elements all over. */
 #ifndef PLUGIN_FOOT_H
 #define PLUGIN_FOOT_H
 
@@ -9,6 +10,7 @@
 typedef struct {
     int body;         /* that carries the sole */
     int site;         /* whose frame is the foot's; -1: the body's frame */
+    int surface;      /* bool: of `body`, elements all over its shapes (body.h) */
     int round;        /* bool: a sphere that transmits no moment */
     double center[3]; /* [m] round: centre of the sphere, body frame */
     double radius;    /* [m] round */
@@ -16,8 +18,8 @@ typedef struct {
     MildSole *sole; /* the raster, or one element in its middle (mild_sole_concentric) */
 } Foot;
 
-/* Finds the feet of an instance and makes their soles. feet: [PLUGIN_FEET_MAX], zeroed. Writes their
- * number, also on failure, when those made so far must be destroyed.
+/* Finds the feet of an instance, then its bodies, and makes their soles. feet: [MILD_FEET_MAX],
+ * zeroed. Writes their number, also on failure, when those made so far must be destroyed.
  *
  * compiling: bool, the compiler asks for the size of the state. Meshes have no vertices yet. A sole
  * of meshes is then a rectangle under their bounding boxes, with at least as many elements. */
@@ -30,9 +32,11 @@ const char *foot_name(const mjModel *m, const Foot *foot);
 /* Name of the foot's body; empty when it has none. */
 const char *foot_body_name(const mjModel *m, const Foot *foot);
 
+/* Bool: the body has a shape that is not a mesh; its meshes are then for pictures. */
+int foot_has_primitive(const mjModel *m, const Foot *foot);
 /* Bool: the geom is part of the foot's sole. */
 int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int geom);
-/* Bool: the geom is on the foot's body and would meet a floor that the sole sinks into. */
+/* Bool: the geom is on the foot's body and would meet a floor that the foot sinks into. */
 int foot_may_touch_floor(const mjModel *m, const Foot *foot, int geom);
 
 /* Present place of the foot's frame. */

@@ -24,8 +24,10 @@ static double dot(const double *a, const double *b, int rows) {
 static void remember(Mix *mix, const double *x, const double *c) {
     const size_t bytes = (size_t)mix->rows * sizeof *x;
     if (mix->known) {
-        memmove(mix->dx[1], mix->dx[0], sizeof mix->dx - sizeof mix->dx[0]);
-        memmove(mix->dc[1], mix->dc[0], sizeof mix->dc - sizeof mix->dc[0]);
+        for (int j = MIX_DEPTH - 1; j > 0; j--) {
+            memcpy(mix->dx[j], mix->dx[j - 1], bytes);
+            memcpy(mix->dc[j], mix->dc[j - 1], bytes);
+        }
         for (int r = 0; r < mix->rows; r++) {
             mix->dx[0][r] = x[r] - mix->x[r];
             mix->dc[0][r] = c[r] - mix->c[r];

@@ -4,8 +4,10 @@
 #ifndef PLUGIN_MIX_H
 #define PLUGIN_MIX_H
 
-#define MIX_DEPTH 4 /* steps remembered */
-#define MIX_ROWS 24 /* most numbers in x */
+#include "mild/ground.h"
+
+#define MIX_DEPTH 4                  /* steps remembered */
+#define MIX_ROWS (6 * MILD_FEET_MAX) /* most numbers in x */
 
 typedef struct {
     int rows;  /* in use */

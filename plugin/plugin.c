@@ -120,11 +120,8 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability) {
         sensor_write(soft, m, d, instance);
         return;
     }
-    MildGround *ground = own_state(soft, m, d, instance);
-    if (capability == mjPLUGIN_PASSIVE) {
-        soft_passive(soft, m, d, ground);
-    } else {
-        soft_actuation(soft, m, d, ground);
+    if (capability == mjPLUGIN_PASSIVE ? soft_passive(soft, m, d) : soft_actuation(soft, m, d)) {
+        soft_step(soft, m, d, own_state(soft, m, d, instance));
     }
 }
 

@@ -1,4 +1,4 @@
-/* Private to the plugin: what the ground does to the feet, as MuJoCo's sensor data. */
+/* Private to the plugin: what the ground does to feet and bodies, as MuJoCo's sensor data. */
 #ifndef PLUGIN_SENSOR_H
 #define PLUGIN_SENSOR_H
 
@@ -9,7 +9,7 @@
  * the step, world axes. All 0 in the air. */
 #define SENSOR_NUMBERS 12
 
-/* Writes them, foot after foot, to every sensor of the instance. */
+/* Writes them, foot after foot, then for each body, to every sensor of the instance. */
 void sensor_write(const Soft *soft, const mjModel *m, mjData *d, int instance);
 
 #endif

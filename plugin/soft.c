@@ -38,11 +38,14 @@ static int root_of(const mjModel *m, int body) {
     return body;
 }
 
-/* [N] Weight of everything that moves with the first foot, divided by the number of feet. The
- * compiler asks before it has summed the masses. */
+/* [N] Weight of everything that moves with the first foot, divided by the number of feet without
+ * bodies, if there are any. The compiler asks before it has summed the masses. */
 static double foot_load(const mjModel *m, const Foot *feet, int count) {
     const int root = root_of(m, feet[0].body);
     double mass = 0;
+    while (count > 1 && feet[count - 1].surface) {
+        count--;
+    }
     for (int b = 1; b < m->nbody; b++) {
         mass += root_of(m, b) == root ? m->body_mass[b] : 0;
     }
@@ -65,10 +68,10 @@ static size_t ground_bytes(const Soft *soft) {
 }
 
 static int alloc_arrays(Soft *soft, const mjModel *m) {
-    const size_t nv = (size_t)m->nv;
-    soft->jacobian = calloc(FOOT_ROWS * nv + 1, sizeof *soft->jacobian);
-    soft->response = calloc(FOOT_ROWS * nv + 1, sizeof *soft->response);
-    soft->forces = calloc(FOOT_ROWS * nv + 1, sizeof *soft->forces);
+    const size_t nv = (size_t)m->nv, rows = 6 * (size_t)soft->feet;
+    soft->jacobian = calloc(rows * nv + 1, sizeof *soft->jacobian);
+    soft->response = calloc(rows * nv + 1, sizeof *soft->response);
+    soft->forces = calloc(rows * nv + 1, sizeof *soft->forces);
     soft->passive = calloc(nv + 1, sizeof *soft->passive);
     soft->acceleration = calloc(nv + 1, sizeof *soft->acceleration);
     return soft->jacobian && soft->response && soft->forces && soft->passive &&
@@ -97,11 +100,12 @@ static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *er
     if (status == MILD_OK &&
         (size_t)m->plugin_statenum[instance] * sizeof(mjtNum) < ground_bytes(soft)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "the model was compiled with other feet, soles or prints; compile it "
-                         "again");
+                         "the model was compiled with other feet, bodies, soles or prints; compile "
+                         "it again");
     }
     if (status == MILD_OK) {
-        status = plugin_def_materials(m, instance, &soft->def, soft->foot[0].raster,
+        status = plugin_def_materials(m, instance, &soft->def,
+                                      soft->foot[0].surface ? NULL : soft->foot[0].raster,
                                       foot_load(m, soft->foot, soft->feet), &soft->terrain, error);
     }
     if (status == MILD_OK) {
@@ -176,32 +180,14 @@ void soft_reset(Soft *soft, void *state, size_t bytes) {
     soft->known = soft->solved = soft->warned = soft->tilted = 0;
 }
 
-/* Bool: a material as Memory encodes it (ground/state.h) is one of the terrain. */
-static int is_material(const MildTerrain *terrain, int32_t code) {
-    return code < 0 ||
-           ((code & 255) < terrain->material_count && (code >> 8 & 255) < terrain->material_count);
-}
-
-int soft_owns(const Soft *soft, const MildGround *ground) {
-    if (!ground_is_valid(ground, &soft->layout)) {
-        return 0;
-    }
-    for (int f = 0; f < soft->feet; f++) {
-        const Memory memory = ground_memory(ground, f);
-        for (int e = 0; e < ground->elements[f]; e++) {
-            if (!is_material(&soft->terrain, memory.material[e])) {
-                return 0;
-            }
-        }
-    }
-    return 1;
-}
-
 void soft_copy(Soft *soft, const mjModel *m, const Soft *from) {
     const size_t nv = (size_t)m->nv * sizeof(double);
+    const size_t rows = (size_t)from->near_rows;
     soft->input = from->input;
     soft->input.inverse_inertia = soft->inverse_inertia;
-    memcpy(soft->inverse_inertia, from->inverse_inertia, sizeof soft->inverse_inertia);
+    memcpy(soft->inverse_inertia, from->inverse_inertia, rows * rows * sizeof(double));
+    memcpy(soft->near, from->near, sizeof soft->near);
+    soft->near_rows = from->near_rows;
     soft->contact = from->contact;
     soft->known = from->known;
     soft->solved = 0;
@@ -210,42 +196,94 @@ void soft_copy(Soft *soft, const mjModel *m, const Soft *from) {
     soft->warned = from->warned;
     soft->tilted = from->tilted;
     memcpy(soft->passive, from->passive, nv);
-    memcpy(soft->jacobian, from->jacobian, FOOT_ROWS * nv);
+    memcpy(soft->jacobian, from->jacobian, rows * nv);
 }
 
 /* ---- the feet ---- */
 
-/* twist[r] = J_r . velocity; [6 feet]. */
+/* Index in the arrays of all feet of a row of the step. */
+static int place_of(const Soft *soft, int r) {
+    return 6 * soft->near[r / 6] + r % 6;
+}
+
+/* twist[r] = J_r . velocity; [near_rows]. */
 static void twists(const Soft *soft, int nv, const double *velocity, double *twist) {
-    for (int r = 0; r < 6 * soft->feet; r++) {
+    for (int r = 0; r < soft->near_rows; r++) {
         twist[r] = mju_dot(soft->jacobian + (size_t)r * (size_t)nv, velocity, nv);
     }
 }
 
-/* Pose, Jacobian and twist of the feet. A round foot transmits no moment, so that its angular rows
- * are 0. */
+/* Pose and present twist of a body, which also is its twist without a ground while it is in the air.
+ * cvel has the velocity of the point that moves with the body through the centre of its tree. */
+static void locate_body(Soft *soft, const mjModel *m, const mjData *d, int f) {
+    MildContactInput *input = &soft->input;
+    const int body = soft->foot[f].body;
+    const mjtNum *at = d->xpos + 3 * (ptrdiff_t)body, *cvel = d->cvel + 6 * (ptrdiff_t)body;
+    const mjtNum *center = d->subtree_com + 3 * (ptrdiff_t)m->body_rootid[body];
+    double *twist = input->velocity[f], *free = input->free_velocity + (ptrdiff_t)6 * f;
+    for (int k = 0; k < 3; k++) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        input->position[f][k] = at[k];
+        twist[k] = cvel[3 + k] + cvel[i] * (at[j] - center[j]) - cvel[j] * (at[i] - center[i]);
+        twist[3 + k] = cvel[k];
+    }
+    memcpy(input->rotation[f], d->xmat + 9 * (ptrdiff_t)body, sizeof input->rotation[f]);
+    memcpy(free, twist, sizeof input->velocity[f]);
+}
+
+/* Poses of the feet, and which of them have rows: all but the bodies in the air. */
+static void find_near(Soft *soft, const mjModel *m, const mjData *d) {
+    MildContactInput *input = &soft->input;
+    uint32_t feet = 0;
+    int bodies = 0;
+    input->feet = soft->feet;
+    input->inverse_inertia = soft->inverse_inertia;
+    input->dt = m->opt.timestep;
+    for (int f = 0; f < soft->feet; f++) {
+        if (soft->foot[f].surface) {
+            locate_body(soft, m, d, f);
+            bodies++;
+        } else {
+            foot_pose(d, &soft->foot[f], input->position[f], input->rotation[f]);
+            feet |= 1u << f;
+        }
+    }
+    input->rows = bodies ? feet | mild_ground_near(&soft->terrain, input, soft->scratch) : 0;
+    if (bodies && input->rows == 0) {
+        input->rows = 1; /* 0 would be all */
+    }
+    soft->near_rows = 0;
+    for (int f = 0; f < soft->feet; f++) {
+        if (input->rows == 0 || (input->rows >> f & 1) != 0) {
+            soft->near[soft->near_rows / 6] = f;
+            soft->near_rows += 6;
+        }
+    }
+}
+
+/* Jacobian and twist of the feet of the step. A round foot transmits no moment, so that its angular
+ * rows are 0. */
 static void update_feet(Soft *soft, const mjModel *m, const mjData *d) {
     const int nv = (int)m->nv;
     double twist[FOOT_ROWS];
-    soft->input.feet = soft->feet;
-    soft->input.inverse_inertia = soft->inverse_inertia;
-    soft->input.dt = m->opt.timestep;
-    for (int f = 0; f < soft->feet; f++) {
-        double *rows = soft->jacobian + (size_t)(6 * f) * (size_t)nv;
-        foot_pose(d, &soft->foot[f], soft->input.position[f], soft->input.rotation[f]);
+    for (int k = 0; k < soft->near_rows / 6; k++) {
+        const int f = soft->near[k];
+        double *rows = soft->jacobian + (size_t)(6 * k) * (size_t)nv;
         mj_jac(m, d, rows, rows + 3 * nv, soft->input.position[f], soft->foot[f].body);
         if (soft->foot[f].round) {
             mju_zero(rows + 3 * nv, 3 * nv);
         }
     }
     twists(soft, nv, d->qvel, twist);
-    memcpy(soft->input.velocity, twist, (size_t)(6 * soft->feet) * sizeof *twist);
+    for (int k = 0; k < soft->near_rows / 6; k++) {
+        mju_copy(soft->input.velocity[soft->near[k]], twist + (ptrdiff_t)6 * k, 6);
+    }
 }
 
-/* x = J^T of the metric's degrees of freedom; [dofs][6 feet] */
+/* x = J^T of the metric's degrees of freedom; [dofs][near_rows] */
 static void foot_forces(const Soft *soft, int nv, double *x) {
     const Metric *metric = &soft->metric;
-    const int rows = 6 * soft->feet;
+    const int rows = soft->near_rows;
     for (int i = 0; i < metric->dofs; i++) {
         for (int r = 0; r < rows; r++) {
             x[i * rows + r] = soft->jacobian[(size_t)r * (size_t)nv + (size_t)metric->dof[i]];
@@ -253,10 +291,10 @@ static void foot_forces(const Soft *soft, int nv, double *x) {
     }
 }
 
-/* matrix = J x; [6 feet][6 feet] */
+/* matrix = J x; [near_rows][near_rows] */
 static void foot_motions(const Soft *soft, int nv, const double *x, double *matrix) {
     const Metric *metric = &soft->metric;
-    const int rows = 6 * soft->feet;
+    const int rows = soft->near_rows;
     for (int r = 0; r < rows; r++) {
         double *line = matrix + r * rows;
         mju_zero(line, rows);
@@ -269,7 +307,7 @@ static void foot_motions(const Soft *soft, int nv, const double *x, double *matr
 
 /* A = J x, with x = factor^-1 J^T in soft->response. */
 static void inverse_inertia(Soft *soft, const double *factor, int nv) {
-    const int rows = 6 * soft->feet;
+    const int rows = soft->near_rows;
     double *a = soft->input.inverse_inertia;
     foot_forces(soft, nv, soft->response);
     metric_solve_all(&soft->metric, factor, rows, soft->response);
@@ -288,7 +326,7 @@ static void inverse_inertia(Soft *soft, const double *factor, int nv) {
 static void apply(const Soft *soft, const mjModel *m, mjData *d, const double *wrench, int act) {
     const int nv = (int)m->nv;
     mju_copy(d->qfrc_passive, soft->passive, nv);
-    for (int r = 0; r < 6 * soft->feet; r++) {
+    for (int r = 0; r < soft->near_rows; r++) {
         mju_addToScl(d->qfrc_passive, soft->jacobian + (size_t)r * (size_t)nv, wrench[r], nv);
     }
     if (act) {
@@ -300,7 +338,7 @@ static void apply(const Soft *soft, const mjModel *m, mjData *d, const double *w
 /* twist += h J a. a: [dofs] */
 static void add_rates(const Soft *soft, int nv, const double *a, double *twist) {
     const Metric *metric = &soft->metric;
-    for (int r = 0; r < 6 * soft->feet; r++) {
+    for (int r = 0; r < soft->near_rows; r++) {
         const double *row = soft->jacobian + (size_t)r * (size_t)nv;
         for (int i = 0; i < metric->dofs; i++) {
             twist[r] += soft->input.dt * row[metric->dof[i]] * a[i];
@@ -324,20 +362,26 @@ static void outcome(Soft *soft, const mjModel *m, const mjData *d, double *twist
     add_rates(soft, nv, a, twist);
 }
 
-static void read_wrench(const Soft *soft, double *wrench) {
-    for (int f = 0; f < soft->feet; f++) {
-        memcpy(wrench + 6 * f, soft->contact.foot[f].force, 3 * sizeof *wrench);
-        memcpy(wrench + 6 * f + 3, soft->contact.foot[f].torque, 3 * sizeof *wrench);
+/* Solves the ground with V_free and reads its wrench; [near_rows]. */
+static void solve_ground(Soft *soft, const MildGround *ground, double *wrench) {
+    for (int k = 0; k < soft->near_rows / 6; k++) {
+        mju_copy(soft->input.free_velocity + (ptrdiff_t)6 * soft->near[k],
+                 soft->free + (ptrdiff_t)6 * k, 6);
+    }
+    mild_ground_solve(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
+    for (int k = 0; k < soft->near_rows / 6; k++) {
+        const MildFootResult *foot = &soft->contact.foot[soft->near[k]];
+        mju_copy3(wrench + (ptrdiff_t)6 * k, foot->force);
+        mju_copy3(wrench + (ptrdiff_t)6 * k + 3, foot->torque);
     }
 }
 
 /* V_free = V - h A W, from the outcome V of the wrench W. */
 static void free_twists(Soft *soft, const double *twist, const double *wrench) {
-    const int rows = 6 * soft->feet;
+    const int rows = soft->near_rows;
     for (int r = 0; r < rows; r++) {
-        soft->input.free_velocity[r] =
-            twist[r] -
-            soft->input.dt * mju_dot(soft->input.inverse_inertia + r * rows, wrench, rows);
+        soft->free[r] = twist[r] - soft->input.dt * mju_dot(soft->input.inverse_inertia + r * rows,
+                                                            wrench, rows);
     }
 }
 
@@ -356,12 +400,12 @@ static void forces_without_ground(const mjModel *m, mjData *d, int constrain) {
     }
 }
 
-/* change = what MuJoCo gives beyond what the ground counts with; [6 feet]. Returns its largest
+/* change = what MuJoCo gives beyond what the ground counts with; [near_rows]. Returns its largest
  * number. */
 static double disagreement(const Soft *soft, const double *twist, double *change) {
     double most = 0;
-    for (int r = 0; r < 6 * soft->feet; r++) {
-        change[r] = twist[r] - soft->contact.velocity[r];
+    for (int r = 0; r < soft->near_rows; r++) {
+        change[r] = twist[r] - soft->contact.velocity[place_of(soft, r)];
         most = fmax(most, fabs(change[r]));
     }
     return most;
@@ -372,7 +416,7 @@ static double disagreement(const Soft *soft, const double *twist, double *change
 /* E = J N^-1 M K^-1 J^T, with the K of the zones. */
 static void exact_response(Soft *soft, int nv) {
     const Metric *metric = &soft->metric;
-    const int rows = 6 * soft->feet, n = metric->dofs;
+    const int rows = soft->near_rows, n = metric->dofs;
     foot_forces(soft, nv, soft->response);
     metric_solve_all(metric, metric->held, rows, soft->response);
     mju_mulMatMat(soft->forces, metric->mass, soft->response, n, n, rows);
@@ -383,17 +427,18 @@ static void exact_response(Soft *soft, int nv) {
 /* The next V_free to try, from what MuJoCo gives beyond what the ground counts with. The ground's
  * solver leaves its derivative in the scratch. */
 static void next_free(Soft *soft, int newton, const double *change) {
-    const int rows = 6 * soft->feet;
-    double *x = soft->input.free_velocity, derivative[FOOT_ROWS * FOOT_ROWS] = {0};
+    const int rows = soft->near_rows;
     for (int r = 0; r < rows && newton; r++) {
-        const int f = r / 6;
+        const int f = soft->near[r / 6];
+        mju_zero(soft->derivative + r * rows, rows);
         if (soft->scratch->foot[f].active > 0) {
-            mju_copy(derivative + r * rows + 6 * f, soft->scratch->hessian[f] + 6 * (r % 6), 6);
+            mju_copy(soft->derivative + r * rows + r / 6 * 6,
+                     soft->scratch->hessian[f] + 6 * (r % 6), 6);
         }
     }
-    if (!newton ||
-        !mix_newton(&soft->mix, soft->input.inverse_inertia, soft->exact, derivative, change, x)) {
-        mix_next(&soft->mix, x, change);
+    if (!newton || !mix_newton(&soft->mix, soft->input.inverse_inertia, soft->exact,
+                               soft->derivative, change, soft->free)) {
+        mix_next(&soft->mix, soft->free, change);
     }
 }
 
@@ -404,7 +449,7 @@ static void push_of(const Soft *soft, int nv, const double *wrench, double *push
     const Metric *metric = &soft->metric;
     for (int i = 0; i < metric->dofs; i++) {
         push[i] = 0;
-        for (int r = 0; r < 6 * soft->feet; r++) {
+        for (int r = 0; r < soft->near_rows; r++) {
             push[i] += soft->jacobian[(size_t)r * (size_t)nv + (size_t)metric->dof[i]] * wrench[r];
         }
     }
@@ -437,7 +482,7 @@ static void joint_enter(Soft *soft, const mjModel *m, const mjData *d, Rows *row
     rows_solve(rows, &soft->metric);
     joint_outcome(soft, m, d, rows, twist);
     free_twists(soft, twist, none);
-    mix_start(&soft->mix, 6 * soft->feet);
+    mix_start(&soft->mix, soft->near_rows);
 }
 
 /* Solves the ground with the response of the constraints in their zones, and finds those zones.
@@ -458,8 +503,7 @@ static void joint_solve(Soft *soft, const mjModel *m, mjData *d, const MildGroun
             }
             next_free(soft, newton, change);
         }
-        mild_ground_solve(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
-        read_wrench(soft, wrench);
+        solve_ground(soft, ground, wrench);
         push_of(soft, (int)m->nv, wrench, rows->push);
         rows_solve(rows, metric);
         joint_outcome(soft, m, d, rows, twist);
@@ -497,9 +541,9 @@ static void respond(Soft *soft, const mjModel *m, const mjData *d, const double 
     if (active ? metric_stiffen(metric, m, d) : soft->rounds == ROUNDS_ACTIVE) {
         inverse_inertia(soft, active ? metric->stiff : metric->factor, (int)m->nv);
         free_twists(soft, twist, wrench);
-        mix_start(&soft->mix, 6 * soft->feet);
+        mix_start(&soft->mix, soft->near_rows);
     } else {
-        mix_next(&soft->mix, soft->input.free_velocity, change);
+        mix_next(&soft->mix, soft->free, change);
     }
 }
 
@@ -523,7 +567,7 @@ static void warn_of_disagreement(Soft *soft, const mjModel *m, const mjData *d) 
 static void warn_of_tilt(Soft *soft, const mjModel *m, const mjData *d) {
     for (int f = 0; f < soft->feet && !soft->tilted; f++) {
         const double up = fabs(soft->input.rotation[f][8]);
-        if (soft->contact.foot[f].contacts > 0 && up < STANDS) {
+        if (!soft->foot[f].surface && soft->contact.foot[f].contacts > 0 && up < STANDS) {
             mju_warning(PLUGIN_NAME
                         ": foot '%s' stands on the ground with its sole tilted by %.0f "
                         "degrees at %g s; beyond 60 what touches is no longer the sole; "
@@ -555,8 +599,7 @@ static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *gro
             break;
         }
         respond(soft, m, d, twist, wrench, change);
-        mild_ground_solve(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
-        read_wrench(soft, wrench);
+        solve_ground(soft, ground, wrench);
         apply(soft, m, d, wrench, !exact);
         if (exact) {
             break;
@@ -570,8 +613,8 @@ static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *gro
 }
 
 static int finite_state(const Soft *soft) {
-    for (int r = 0; r < 6 * soft->feet; r++) {
-        if (!isfinite(soft->contact.velocity[r])) {
+    for (int r = 0; r < soft->near_rows; r++) {
+        if (!isfinite(soft->contact.velocity[place_of(soft, r)])) {
             return 0;
         }
     }
@@ -600,11 +643,37 @@ int soft_without_passive(const mjModel *m) {
     return (m->opt.disableflags & both) == both;
 }
 
-static void ground_step(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
+/* Bool: the ground acts now. */
+static int begin(Soft *soft, const mjModel *m, const mjData *d) {
     if (!integrator_fits(soft, m)) {
         soft->known = 0;
-        return;
+        return 0;
     }
+    find_near(soft, m, d);
+    return 1;
+}
+
+int soft_actuation(Soft *soft, const mjModel *m, const mjData *d) {
+    return !soft->inside && begin(soft, m, d);
+}
+
+/* Without actuators MuJoCo has no stage of actuation. The ground then acts here, before bias forces
+ * and constraints of this velocity are known; MuJoCo is made to compute them first. */
+int soft_passive(Soft *soft, const mjModel *m, mjData *d) {
+    if (soft->inside) {
+        return 0;
+    }
+    soft->fresh = 1;
+    if (!soft_without_actuation(m)) {
+        return 0;
+    }
+    soft->inside = 1;
+    mj_fwdVelocity(m, d);
+    soft->inside = 0;
+    return begin(soft, m, d);
+}
+
+void soft_step(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
     if (soft_without_passive(m)) {
         mju_zero(soft->passive, (int)m->nv);
     } else if (soft->fresh) {
@@ -615,43 +684,25 @@ static void ground_step(Soft *soft, const mjModel *m, mjData *d, const MildGroun
     soft->inside = 1;
     update_feet(soft, m, d);
     memset(soft->metric.tree, 0, (size_t)m->ntree * sizeof *soft->metric.tree);
-    for (int f = 0; f < soft->feet; f++) {
-        soft->metric.tree[m->body_treeid[soft->foot[f].body]] = 1;
+    for (int k = 0; k < soft->near_rows / 6; k++) {
+        soft->metric.tree[m->body_treeid[soft->foot[soft->near[k]].body]] = 1;
     }
     solve(soft, m, d, ground);
     soft->inside = 0;
 }
 
-void soft_actuation(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
-    if (!soft->inside) {
-        ground_step(soft, m, d, ground);
-    }
-}
-
-/* Without actuators MuJoCo has no stage of actuation. The ground then acts here, before bias forces
- * and constraints of this velocity are known; MuJoCo is made to compute them first. */
-void soft_passive(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
-    if (soft->inside) {
-        return;
-    }
-    soft->fresh = 1;
-    if (!soft_without_actuation(m)) {
-        return;
-    }
-    soft->inside = 1;
-    mj_fwdVelocity(m, d);
-    soft->inside = 0;
-    ground_step(soft, m, d, ground);
-}
-
 void soft_advance(Soft *soft, const mjModel *m, const mjData *d, MildGround *ground) {
+    double twist[FOOT_ROWS];
     if (!soft->known) {
         return;
     }
     if (!soft->solved) {
         mild_ground_solve(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
     }
-    twists(soft, (int)m->nv, d->qvel, soft->contact.velocity);
+    twists(soft, (int)m->nv, d->qvel, twist);
+    for (int r = 0; r < soft->near_rows; r++) {
+        soft->contact.velocity[place_of(soft, r)] = twist[r];
+    }
     if (finite_state(soft)) {
         mild_ground_advance(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
     }

@@ -9,25 +9,29 @@
 #include "plugin/mix.h"
 #include "plugin/rows.h"
 
-#define FOOT_ROWS (6 * PLUGIN_FEET_MAX)
+#define FOOT_ROWS (6 * MILD_FEET_MAX)
 
 typedef struct {
     PluginDef def;
-    Foot foot[PLUGIN_FEET_MAX];
-    int feet;
-    const MildSole *soles[PLUGIN_FEET_MAX];
+    Foot foot[MILD_FEET_MAX]; /* those of `feet`, then the bodies of `body` */
+    int feet;                 /* both */
+    const MildSole *soles[MILD_FEET_MAX];
     MildMap *map; /* NULL: level ground of one material */
     MildTerrain terrain;
     MildScratch *scratch;
     Metric metric;
     Rows rows;
     Mix mix;
-    double *jacobian;     /* [6 feet][nv] twist of each foot: linear, angular; world axes */
-    double *response;     /* [dofs][6 feet] of the metric's degrees of freedom: N^-1 J^T */
-    double *forces;       /* [dofs][6 feet] M times a response */
-    double *passive;      /* [nv] qfrc_passive without the ground */
-    double *acceleration; /* [nv] (v+ - v) / h of the metric's degrees of freedom */
-    double exact[FOOT_ROWS * FOOT_ROWS]; /* [6 feet][6 feet] E of mix_newton */
+    int near[MILD_FEET_MAX]; /* [near_rows / 6] the feet of the step: all but bodies in the air */
+    int near_rows;           /* six for each of these */
+    double *jacobian;        /* [near_rows][nv] twists of the feet: linear, angular; world axes */
+    double *response;        /* [dofs][near_rows] of the metric's degrees of freedom: N^-1 J^T */
+    double *forces;          /* [dofs][near_rows] M times a response */
+    double *passive;         /* [nv] qfrc_passive without the ground */
+    double *acceleration;    /* [nv] (v+ - v) / h of the metric's degrees of freedom */
+    double free[FOOT_ROWS];  /* [near_rows] V_free of the input */
+    double exact[FOOT_ROWS * FOOT_ROWS];      /* [near_rows][near_rows] E of mix_newton */
+    double derivative[FOOT_ROWS * FOOT_ROWS]; /* [near_rows][near_rows] H of mix_newton */
     int fresh;         /* bool: qfrc_passive was computed anew since the last solve */
     int inside;        /* bool: MuJoCo calls back while it is called from here */
     int solved;        /* bool: the scratch is that of `input` and `contact` */
@@ -38,7 +42,7 @@ typedef struct {
     int rounds;        /* of ground and constraints in the last solve */
     MildGround layout; /* header of a ground that remembers nothing */
     MildContactInput input;
-    double inverse_inertia[FOOT_ROWS * FOOT_ROWS]; /* of the input */
+    double inverse_inertia[FOOT_ROWS * FOOT_ROWS]; /* [near_rows][near_rows] of the input */
     MildContactResult contact;
 } Soft;
 
@@ -50,7 +54,7 @@ void soft_destroy(Soft *soft); /* may be NULL */
  * would fail. While a model is compiled, where meshes have no vertices yet, so that a sole of
  * meshes gets the room that their bounding boxes may need. */
 size_t soft_room(const mjModel *m, int instance);
-/* Number of its feet; 0 when it would fail. */
+/* Number of its feet and bodies; 0 when it would fail. */
 int soft_feet(const mjModel *m, int instance);
 /* Initialises the state, [bytes]: a ground that remembers nothing. */
 void soft_reset(Soft *soft, void *state, size_t bytes);
@@ -58,10 +62,13 @@ void soft_reset(Soft *soft, void *state, size_t bytes);
  * needed. */
 void soft_copy(Soft *soft, const mjModel *m, const Soft *from);
 
-/* Called where qfrc_passive has just been computed. */
-void soft_passive(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground);
-/* Called where actuator forces are computed: adds the ground's force to qfrc_passive. */
-void soft_actuation(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground);
+/* Called where qfrc_passive has just been computed, and where actuator forces are computed. Returns
+ * bool: the ground acts at this stage. The caller makes sure of the state (soft_owns), which is read
+ * for the feet of the step, and calls soft_step. */
+int soft_passive(Soft *soft, const mjModel *m, mjData *d);
+int soft_actuation(Soft *soft, const mjModel *m, const mjData *d);
+/* Adds the ground's force to qfrc_passive. */
+void soft_step(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground);
 /* Called when MuJoCo has stepped: moves the ground's memory, which must be of this ground. */
 void soft_advance(Soft *soft, const mjModel *m, const mjData *d, MildGround *ground);
 
@@ -71,7 +78,8 @@ int soft_without_actuation(const mjModel *m);
 int soft_without_passive(const mjModel *m);
 
 /* Bool: the state is that of this ground, and not one of another model, zeros or NaN. Everything
- * that reads the state asks first, because MuJoCo lets anybody write it at any time. */
+ * that reads the state asks first, because MuJoCo lets anybody write it at any time. It looks at
+ * what is read: not at the elements of a body in the air. */
 int soft_owns(const Soft *soft, const MildGround *ground);
 
 #endif

@@ -53,20 +53,18 @@ static void add_patch(mjvScene *scene, const MildTerrain *terrain, double x, dou
     add_plate(scene, mjCAT_DECOR, terrain, x, y, edge, 1.5 * ABOVE, ABOVE, rgba);
 }
 
-/* Elements that the feet press down now. */
-static void add_elements(const Soft *soft, const MildGround *ground, mjvScene *scene) {
-    for (int f = 0; f < soft->feet; f++) {
-        const MildSole *sole = soft->soles[f];
-        const double *depth = mild_ground_depth_max(ground, f);
-        const double *p = soft->input.position[f], *turn = soft->input.rotation[f];
-        const double z = mild_sole_z(sole);
-        for (int e = 0; e < mild_sole_elements(sole); e++) {
-            const double a = mild_sole_x(sole)[e], b = mild_sole_y(sole)[e];
-            if (depth[e] > 0) {
-                add_patch(scene, &soft->terrain, p[0] + turn[0] * a + turn[1] * b + turn[2] * z,
-                          p[1] + turn[3] * a + turn[4] * b + turn[5] * z, mild_sole_pitch(sole),
-                          depth[e]);
-            }
+/* Elements that a foot or body presses down now. */
+static void add_elements(const Soft *soft, const MildGround *ground, int f, mjvScene *scene) {
+    const MildSole *sole = soft->soles[f];
+    const double *depth = mild_ground_depth_max(ground, f), *area = mild_sole_surface_area(sole);
+    const double *p = soft->input.position[f], *turn = soft->input.rotation[f];
+    for (int e = 0; e < mild_sole_elements(sole) && ground->touched[f] > 0; e++) {
+        const double a = mild_sole_x(sole)[e], b = mild_sole_y(sole)[e];
+        const double z = area ? mild_sole_surface_z(sole)[e] : mild_sole_z(sole);
+        if (depth[e] > 0) {
+            add_patch(scene, &soft->terrain, p[0] + turn[0] * a + turn[1] * b + turn[2] * z,
+                      p[1] + turn[3] * a + turn[4] * b + turn[5] * z,
+                      area ? sqrt(area[e]) : mild_sole_pitch(sole), depth[e]);
         }
     }
 }
@@ -166,7 +164,9 @@ void visual_add(const Soft *soft, const mjModel *m, const mjData *d, const MildG
     if (option->flags[mjVIS_CONTACTFORCE]) {
         add_forces(soft, m, scene);
     }
-    add_elements(soft, ground, scene);
+    for (int f = 0; f < soft->feet; f++) {
+        add_elements(soft, ground, f, scene);
+    }
     add_prints(soft, ground, scene);
     if (shows_surface(soft, m, option)) {
         add_surface_below(soft, d, scene);

@@ -85,8 +85,8 @@ static const char *or_none(const char *name) {
 static MildStatus refuse(const mjModel *m, const Foot *foot, const char *how, const char *name,
                          MildError *error) {
     return mild_fail(error, MILD_ERROR_ARGUMENT,
-                     "feet: '%.60s' is a wheel, %s '%.60s', but a sole does not roll; name a body "
-                     "that does not turn so, or take a single sphere, a round foot",
+                     "feet: '%.60s' is a wheel, %s '%.60s', but a sole does not roll; name it in "
+                     "body in place of feet, or take a single sphere, a round foot",
                      foot_name(m, foot), how, name);
 }
 

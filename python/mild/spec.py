@@ -7,50 +7,67 @@ from . import _mujoco
 PLUGIN, FILE = "mild.ground", "libmild_plugin.so"
 
 
-def attach(spec, feet, ground="sand_loose", *, exclude=True, sensor=None, name="ground", library=None, **attributes):
+MOST = 16  # feet and bodies, MILD_FEET_MAX
+
+
+def attach(spec, feet=(), ground="sand_loose", *, body=(), exclude=True, sensor=None, name="ground", library=None, **attributes):
     """Puts soft ground under the feet of a mujoco.MjSpec, before spec.compile(); returns the plugin's instance.
 
-    feet: names of 1 .. 4 bodies or sites, z up from the sole. ground: a preset, a Material, or a list of presets where
-    terrain__patches is given. exclude: the feet no longer touch geoms of the world body, such as a rigid floor; all else
-    touches them as before. sensor: name of a sensor to add, whose data are (feet, 12) numbers, a row for each foot: force,
-    torque, centre of pressure, area, largest and mean depth (docs/plugin.md). attributes: those of the plugin with __ for
-    the dot: prints=64, ground__mu=0.5, terrain__kind="waves". library: the plugin's file; None: $MILD_PLUGIN, or the
-    package's own. Raises TypeError for what is no MjSpec, ValueError for feet that the spec does not have, RuntimeError
-    without the plugin; mujoco reports attributes that are wrong when it compiles."""
+    feet: names of bodies or sites, z up from the sole. body: names of other bodies, such as shins, a trunk or wheels, whose
+    shapes meet the ground on any side; with the feet 1 .. 16. ground: a preset, a Material, or a list of presets where
+    terrain__patches is given. exclude: feet and bodies no longer touch geoms of the world body, such as a rigid floor; all
+    else touches them as before. sensor: name of a sensor to add, whose data are (feet + bodies, 12) numbers, a row for each
+    foot and then for each body: force, torque, centre of pressure, area, largest and mean depth (docs/plugin.md).
+    attributes: those of the plugin with __ for the dot: prints=64, ground__mu=0.5, terrain__kind="waves". library: the
+    plugin's file; None: $MILD_PLUGIN, or the package's own. Raises TypeError for what is no MjSpec, ValueError for feet and
+    bodies that the spec does not have, RuntimeError without the plugin; mujoco reports attributes that are wrong when it
+    compiles."""
     import mujoco
 
     if not isinstance(spec, mujoco.MjSpec):
         raise TypeError(f"spec: a {type(spec).__name__}, but it must be a mujoco.MjSpec")
-    feet = [feet] if isinstance(feet, str) else list(feet)
+    feet, body = names_of(feet, "feet"), names_of(body, "body")
     for foot in feet:
-        if not isinstance(foot, str) or any(c in foot for c in " \t\r\n,"):
-            raise ValueError(f"feet: {foot!r}, but it must be a name without blanks and commas; name a site instead")
         if spec.body(foot) is None and spec.site(foot) is None:
             raise ValueError(f"feet: the spec has no body or site '{foot}'")
-    if not 1 <= len(feet) <= 4:
-        raise ValueError(f"feet: {len(feet)} of them, but there must be 1 .. 4")
-    bodies = [spec.body(foot) or spec.site(foot).parent for foot in feet]
-    for k, body in enumerate(bodies):
-        if body in bodies[:k]:
-            raise ValueError(f"feet: '{feet[bodies.index(body)]}' and '{feet[k]}' are on one body, '{body.name}', which would stand "
-                             "on the ground twice; name it once")
-    config = {"feet": " ".join(feet), **ground_of(ground)}
+    for one in body:
+        if spec.body(one) is None:
+            raise ValueError(f"body: the spec has no body '{one}'")
+    if not 1 <= len(feet) + len(body) <= MOST:
+        raise ValueError(f"feet: {len(feet)} of them and {len(body)} in body, but there must be 1 .. {MOST}")
+    names = feet + body
+    bodies = [spec.body(one) or spec.site(one).parent for one in names]
+    for k, one in enumerate(bodies):
+        if one in bodies[:k]:
+            raise ValueError(f"{'feet' if k < len(feet) else 'body'}: '{names[bodies.index(one)]}' and '{names[k]}' are on one body, "
+                             f"'{one.name}', which would stand on the ground twice; name it once")
+    config = {**({"feet": " ".join(feet)} if feet else {}), **({"body": " ".join(body)} if body else {}), **ground_of(ground)}
     config.update((key.replace("__", "."), text_of(value)) for key, value in attributes.items())
     load_plugin(library)
     spec.activate_plugin(PLUGIN)
     plugin = spec.add_plugin(plugin_name=PLUGIN, name=name)
     plugin.config = config
     if exclude:
-        exclude_world(spec, feet)
+        exclude_world(spec, names)
     if sensor:
         listener = spec.add_sensor(name=sensor, type=mujoco.mjtSensor.mjSENS_PLUGIN).plugin
         listener.active, listener.name, listener.plugin_name = True, name, PLUGIN
     return plugin
 
 
-def exclude_world(spec, feet):
-    """Excludes the contacts of the feet with the world body. A body without a name cannot be excluded."""
-    bodies = {(spec.body(foot) or spec.site(foot).parent).name for foot in feet}
+def names_of(given, key):
+    """A list of names that the plugin can read, from one name or several."""
+    names = [given] if isinstance(given, str) else list(given)
+    for name in names:
+        if not isinstance(name, str) or any(c in name for c in " \t\r\n,"):
+            raise ValueError(f"{key}: {name!r}, but it must be a name without blanks and commas; "
+                             f"{'name a site instead' if key == 'feet' else 'rename the body'}")
+    return names
+
+
+def exclude_world(spec, names):
+    """Excludes the contacts of feet and bodies with the world body. A body without a name cannot be excluded."""
+    bodies = {(spec.body(name) or spec.site(name).parent).name for name in names}
     known = {frozenset((pair.bodyname1, pair.bodyname2)) for pair in spec.excludes}
     for body in sorted(bodies - {"", spec.worldbody.name}):
         if frozenset((body, spec.worldbody.name)) not in known:

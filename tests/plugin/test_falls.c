@@ -1,4 +1,5 @@
-/* Rigid bodies with one or two feet fall on soft ground in MuJoCo. The ground has stored nothing,
+/* Rigid bodies with one or two feet, or with shells that meet the ground on any side, fall on soft
+ * ground in MuJoCo. The ground has stored nothing,
  * so that its work on the body is never above 0. Bodies are those of robots, or of 1 g to 100 t
  * with their mass anywhere; they turn, so that Coriolis forces are part of every step.
  * Arguments: number of falls of each kind (default 40), the first seed (default 1), the integrator
@@ -17,7 +18,7 @@ static double step = 0.005;
 
 static const char *const integrators[] = {"implicitfast", "Euler", "implicit", "discrete"};
 
-enum { ROBOT, ANY, KINDS };
+enum { ROBOT, ANY, SHELL, KINDS };
 
 /* ---- drawing a body ---- */
 
@@ -89,23 +90,42 @@ static void add_feet(uint64_t *random, int feet, char *text, size_t size) {
     }
 }
 
+/* Boxes, capsules and balls in any place and turned any way, with elements all over. */
+static void add_shells(uint64_t *random, int shells, char *text, size_t size) {
+    static const char *const types[] = {"box", "capsule", "sphere", "cylinder"};
+    for (int b = 0; b < shells; b++) {
+        add(text, size, "<body name='foot%d' pos='%.17g %.17g %.17g'>", b,
+            uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3));
+        add(text, size,
+            "<geom type='%s' size='%.17g %.17g %.17g' euler='%.17g %.17g 0' mass='0' "
+            "contype='0' conaffinity='0'/></body>",
+            types[choose(random, 4)], spread(random, 0.02, 0.15), spread(random, 0.02, 0.15),
+            spread(random, 0.02, 0.15), uniform(random, -180, 180), uniform(random, -90, 90));
+    }
+}
+
 /* The body, with the plugin and without it. */
 static void draw_models(uint64_t *random, int kind, const char *integrator, mjModel **soft,
                         mjModel **bare) {
     static char text[6000], body[2000], option[200];
-    const int feet = 1 + choose(random, 2);
+    const int feet = kind == SHELL ? 1 + choose(random, 4) : 1 + choose(random, 2);
     body[0] = '\0';
     snprintf(option, sizeof option, "<mujoco><option timestep='%.17g' integrator='%s'/>", step,
              integrator);
     text[0] = '\0';
     add(text, sizeof text,
-        "%s<extension><plugin plugin='mild.ground'><instance name='soft'><config key='feet' "
-        "value='foot0%s'/>",
-        option, feet > 1 ? " foot1" : "");
+        "%s<extension><plugin plugin='mild.ground'><instance name='soft'><config key='%s' "
+        "value='foot0%s%s%s'/>",
+        option, kind == SHELL ? "body" : "feet", feet > 1 ? " foot1" : "", feet > 2 ? " foot2" : "",
+        feet > 3 ? " foot3" : "");
     add_ground(random, text, sizeof text);
     add(body, sizeof body, "<worldbody><body name='body'><freejoint/>");
     add_inertia(random, kind, body, sizeof body);
-    add_feet(random, feet, body, sizeof body);
+    if (kind == SHELL) {
+        add_shells(random, feet, body, sizeof body);
+    } else {
+        add_feet(random, feet, body, sizeof body);
+    }
     add(body, sizeof body, "</body></worldbody></mujoco>");
     add(text, sizeof text, "</instance></plugin></extension>%s", body);
     *soft = kit_model(text);
@@ -113,10 +133,14 @@ static void draw_models(uint64_t *random, int kind, const char *integrator, mjMo
     *bare = kit_model(text);
 }
 
-/* [m] Lowest corner of the feet. */
+/* [m] Lowest corner of the feet, or of balls about the shells. */
 static double lowest(const mjModel *m, const mjData *d) {
     double low = INFINITY;
     for (int g = 0; g < m->ngeom; g++) {
+        if (plugin_soft(m, d)->foot[0].surface) {
+            low = fmin(low, d->geom_xpos[3 * g + 2] - m->geom_rbound[g]);
+            continue;
+        }
         for (int c = 0; c < 4; c++) {
             const double *half = m->geom_size + 3 * g, *turn = d->geom_xmat + 9 * g;
             const double x = c & 1 ? half[0] : -half[0], y = c & 2 ? half[1] : -half[1];
@@ -176,14 +200,12 @@ static double ground_work(const mjModel *bare, mjData *before, const Soft *soft)
     const int nv = (int)bare->nv;
     double work = 0;
     mj_step(bare, before);
-    for (int f = 0; f < soft->feet; f++) {
-        for (int k = 0; k < 6; k++) {
-            const MildFootResult *foot = &soft->contact.foot[f];
-            const int r = 6 * f + k;
-            const double free = mju_dot(soft->jacobian + r * nv, before->qvel, nv);
-            work += (k < 3 ? foot->force[k] : foot->torque[k - 3]) *
-                    (soft->contact.velocity[r] + free) / 2;
-        }
+    for (int r = 0; r < soft->near_rows; r++) {
+        const int f = soft->near[r / 6], k = r % 6;
+        const MildFootResult *foot = &soft->contact.foot[f];
+        const double free = mju_dot(soft->jacobian + r * nv, before->qvel, nv);
+        work += (k < 3 ? foot->force[k] : foot->torque[k - 3]) *
+                (soft->contact.velocity[6 * f + k] + free) / 2;
     }
     return bare->opt.timestep * work;
 }
@@ -258,7 +280,7 @@ static void fall_once(uint64_t seed, int kind, const char *integrator, Falls *al
 
 static void the_ground_never_gives_energy(void **state) {
     (void)state;
-    static const char *const names[KINDS] = {"robots", "anything"};
+    static const char *const names[KINDS] = {"robots", "anything", "shells"};
     for (int n = 0; n < 4 * KINDS; n++) {
         const char *integrator = integrators[n % 4];
         if (chosen && strcmp(chosen, integrator) != 0) {

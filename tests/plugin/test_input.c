@@ -7,7 +7,10 @@
     "<worldbody><geom name='floor' type='plane' size='1 1 .1' %s/><body name='pole'><geom "        \
     "name='post' size='.01'/></body><body name='foot' pos='0 0 .1' %s><freejoint/><geom "          \
     "name='box' mass='1' %s/><site name='sole' pos='0 0 -.01'/>"                                   \
-    "<site name='end' euler='0 90 0'/><body name='toe_a'/><body name='toe_b'/></body></worldbody>"
+    "<site name='end' euler='0 90 0'/><body name='b1'/><body name='b2'/><body name='b3'/><body "   \
+    "name='b4'/><body name='b5'/><body name='b6'/><body name='b7'/><body name='b8'/><body "        \
+    "name='b9'/><body name='b10'/><body name='b11'/><body name='b12'/><body name='b13'/><body "    \
+    "name='b14'/><body name='b15'/><body name='b16'/></body></worldbody>"
 #define BOX "type='box' size='.1 .05 .01' "
 
 /* The model of the keys, with attributes of floor, body and foot and an end. */
@@ -26,6 +29,7 @@ static mjModel *compile(const char *option, const char *configs, const char *flo
 
 #define OFF "contype='0' conaffinity='0'"
 #define FOOT CONFIG("feet", "foot")
+#define MANY "b1 b2 b3 b4 b5 b6 b7 b8 b9 b10 b11 b12 b13 b14 b15 b16"
 #define LEG "leg_of_a_robot_with_a_very_long_name_"
 #define LONG_NAME LEG LEG LEG LEG LEG
 
@@ -46,7 +50,7 @@ static void refuses_what_is_wrong(void **state) {
     (void)state;
     check_refused("", "", "no feet", "feet");
     check_refused("", CONFIG("feet", "fool"), "'fool'", "nearest is 'foot'");
-    check_refused("", CONFIG("feet", "foot pole toe_a toe_b world"), "more than 4", "feet");
+    check_refused("", CONFIG("feet", "foot " MANY), "more than 16", "'b16'");
     check_refused("", CONFIG("feet", "pole foot foot"), "'foot' and 'foot'", "one body, 'foot'");
     check_refused("", CONFIG("feet", "foot sole"), "'foot' and 'sole'", "one body, 'foot'");
     check_refused("", CONFIG("feet", "end pole sole"), "'end' and 'sole'", "one body, 'foot'");

@@ -73,12 +73,17 @@ class Attach(unittest.TestCase):
     def test_arguments(self):
         spec = mujoco.MjSpec.from_string(PLATE)
         for arguments, name in ((("plate", ["plate"]), "spec"), ((spec, ["foot"]), "foot"), ((spec, []), "feet"),
-                                ((spec, ["plate"] * 5), "feet"), ((spec, ["plate"] * 2), "'plate' and 'plate' are on one body, 'plate'"),
+                                ((spec, ["plate"] * 17), "feet: 17 of them and 0 in body"), ((spec, ["plate"] * 2), "'plate' and 'plate' are on one body, 'plate'"),
                                 ((spec, ["plate", "under"]), "'plate' and 'under' are on one body, 'plate'"),
                                 ((spec, ["left foot"]), "blanks"), ((spec, [5]), "feet: 5"),
                                 ((spec, ["plate"], 3), "ground"), ((spec, ["plate"], [3]), "ground")):
             with self.assertRaisesRegex((TypeError, ValueError), name):
                 mild.attach(*arguments)
+        for feet, body, name in (([], ["under"], "no body 'under'"), (["plate"], ["plate"], "body: 'plate' and 'plate'"),
+                                 (["under"], "plate", "'under' and 'plate' are on one body"), ([], ["a b"], "body: 'a b'.*rename"),
+                                 ([], ["plate"] * 17, "0 of them and 17 in body")):
+            with self.assertRaisesRegex(ValueError, name):
+                mild.attach(spec, feet, body=body)
         with self.assertRaisesRegex(RuntimeError, "no/such"):
             mild.attach(spec, "plate", library="no/such")
         with self.assertRaisesRegex(RuntimeError, "MuJoCo"):
@@ -133,6 +138,24 @@ class Attach(unittest.TestCase):
         row = data.sensor("feet").data.reshape(1, 12)[0]
         np.testing.assert_allclose(row[:6], [0, 0, 98.1, 0, 0, 0], atol=1e-3)
         np.testing.assert_allclose(row[10:], 0.01 - data.qpos[2], rtol=1e-3)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_body(self):
+        """A plate as a body rests where it does as a foot, not on the rigid floor, on its side too, and the sensor has its row."""
+        solid = PLATE.replace('0.1 0.05 0.01"', '0.117 0.078 0.01"').replace('contype="0" conaffinity="0"', "").replace(
+            "<worldbody>", '<worldbody><geom type="plane" size="1 1 1"/>')
+        depths = []
+        for feet, body in (("plate", ()), ((), "plate"), ((), ["plate"])):
+            spec = mujoco.MjSpec.from_string(solid)
+            mild.attach(spec, feet, "foam45", body=body, sensor="felt", body_pitch=0.02)
+            model = spec.compile()
+            data = mujoco.MjData(model)
+            if depths and isinstance(body, list):
+                data.qpos[2:7] = 0.1, np.sqrt(0.5), np.sqrt(0.5), 0, 0
+            mujoco.mj_step(model, data, 3000)
+            self.assertAlmostEqual(data.sensor("felt").data.reshape(1, 12)[0, 2], 98.1, delta=0.5)
+            depths.append(0.01 - data.qpos[2])
+        self.assertAlmostEqual(depths[1], depths[0], delta=0.005 * depths[0])
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_exclude_once(self):

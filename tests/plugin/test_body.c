@@ -1,0 +1,617 @@
+/* Bodies with elements all over: a robot that falls lies on its shells. While they are in the air
+ * they change nothing and cost next to nothing. */
+#include <math.h>
+#include <time.h>
+
+#include "plugin/sensor.h"
+#include "plugin_kit.h"
+
+#define OFF "contype='0' conaffinity='0'"
+#define SENSOR "<sensor><plugin name='felt' plugin='mild.ground' instance='soft'/></sensor>"
+
+/* A quadruped: a box with four legs of a capsule, a box and a round foot. */
+#define LEG(name, x, y)                                                                            \
+    "<body name='" name "_thigh' pos='" x " " y " 0'><joint name='" name "_hip' axis='0 1 0' "     \
+    "range='-60 60' damping='.5'/><geom type='capsule' fromto='0 0 0 0 0 -.2' size='.03' "         \
+    "mass='.8' " OFF "/><body name='" name "_shin' pos='0 0 -.2'><joint name='" name "_knee' "     \
+    "axis='0 1 0' range='-100 10' damping='.5'/><geom type='box' size='.02 .02 .07' pos='0 0 "     \
+    "-.07' mass='.3' " OFF "/><body name='" name "_foot' pos='0 0 -.21'><geom size='.03' "         \
+    "mass='.06' " OFF "/></body></body></body>"
+#define QUADRUPED                                                                                  \
+    "<worldbody><body name='base' pos='0 0 .45'><freejoint/><geom type='box' size='.2 .1 .05' "    \
+    "mass='6' " OFF "/>" LEG("fl", ".18", ".12") LEG("fr", ".18", "-.12") LEG("rl", "-.18", ".12") \
+        LEG("rr", "-.18", "-.12") "</body></worldbody>"
+#define SERVO(name)                                                                                \
+    "<position joint='" name "_hip' kp='80' kv='2'/><position joint='" name "_knee' kp='80' "      \
+    "kv='2'/>"
+#define SERVOS "<actuator>" SERVO("fl") SERVO("fr") SERVO("rl") SERVO("rr") "</actuator>"
+#define FEET "fl_foot fr_foot rl_foot rr_foot"
+#define BODIES "base fl_thigh fl_shin fr_thigh fr_shin rl_thigh rl_shin rr_thigh rr_shin"
+enum { BOTH = 13 }; /* feet and bodies */
+
+/* A humanoid of boxes, capsules, a cylinder and a ball, whose joints only have friction. */
+#define LIMB(name, kind, at, joint, size, length, mass)                                            \
+    "<body name='" name "_" kind "' pos='" at "'><joint axis='0 1 0' damping='2' "                 \
+    "frictionloss='3'/><geom type='" joint "' size='" size "' pos='0 0 -" length "' mass='" mass   \
+    "' " OFF "/>"
+#define SIDE(name, y)                                                                              \
+    LIMB(name, "thigh", "0 " y " -.1", "capsule", ".06 .14", ".17", "5")                           \
+    LIMB(name, "shin", "0 0 -.38", "box", ".05 .045 .18", ".17", "3")                              \
+    LIMB(name, "foot", "0 0 -.38", "box", ".11 .05 .02", ".03", "1")                               \
+    "</body></body></body>"
+#define ARM(name, y)                                                                               \
+    LIMB(name, "arm", "0 " y " .4", "capsule", ".04 .1", ".13", "2")                               \
+    LIMB(name, "hand", "0 0 -.28", "cylinder", ".035 .12", ".12", "1") "</body></body>"
+#define HUMANOID                                                                                   \
+    "<worldbody><body name='pelvis' pos='0 0 .9'><freejoint/><geom type='box' size='.06 .14 .08' " \
+    "mass='8' " OFF "/><body name='torso' pos='0 0 .08'><joint axis='0 1 0' damping='4' "          \
+    "frictionloss='5'/><geom type='box' size='.08 .15 .2' pos='0 0 .2' mass='14' " OFF "/>"        \
+    "<body name='head' pos='0 0 .5'><joint axis='0 1 0' damping='1' frictionloss='1'/><geom "      \
+    "size='.09' mass='3' " OFF "/></body>" ARM("l", ".21")                                         \
+        ARM("r", "-.21") "</body>" SIDE("l", ".09") SIDE("r", "-.09") "</body></worldbody>"
+#define SHELLS "pelvis torso head l_arm l_hand r_arm r_hand l_thigh l_shin r_thigh r_shin"
+#define MASS (8 + 14 + 3 + 2 * (2 + 1) + 2 * (5 + 3 + 1))
+#define GRAVITY 9.81
+
+static mjModel *make(double dt, const char *integrator, const char *feet, const char *ground,
+                     const char *keys, const char *rest) {
+    static char head[2000], text[12000];
+    kit_head(head, sizeof head, dt, integrator, feet, ground, keys);
+    snprintf(text, sizeof text, "%s%s%s</mujoco>", head, rest, SENSOR);
+    return kit_model(text);
+}
+
+static mjModel *quadruped(const char *integrator, const char *keys) {
+    return make(0.002, integrator, FEET, "foam45", keys, QUADRUPED SERVOS);
+}
+
+static mjModel *humanoid(double dt, const char *integrator, const char *ground) {
+    return make(dt, integrator, "l_foot r_foot", ground, CONFIG("body", SHELLS), HUMANOID);
+}
+
+/* Above the ground, turned about x (on its side) or y (on its back). */
+static void lay(mjData *d, int axis, double angle, double height) {
+    d->qpos[2] = height;
+    d->qpos[3] = cos(angle / 2);
+    d->qpos[4 + axis] = sin(angle / 2);
+}
+
+static const mjtNum *felt(const mjModel *m, const mjData *d, int foot) {
+    return d->sensordata + m->sensor_adr[0] + (ptrdiff_t)(SENSOR_NUMBERS * foot);
+}
+
+/* ---- in the air ---- */
+
+static void in_the_air_they_change_no_bit(void **state) {
+    (void)state;
+    static const char *const integrators[] = {"Euler", "implicitfast", "implicit", "discrete"};
+    for (int k = 0; k < 4; k++) {
+        mjModel *bare = quadruped(integrators[k], CONFIG("prints", "64"));
+        mjModel *full = quadruped(integrators[k], CONFIG("prints", "64") CONFIG("body", BODIES));
+        mjData *d = mj_makeData(bare), *e = mj_makeData(full);
+        int loaded = 0;
+        assert_int_equal(full->sensor_dim[0], BOTH * SENSOR_NUMBERS);
+        for (int i = 0; i < 300; i++) {
+            d->ctrl[1] = e->ctrl[1] = -0.3 * (i > 150);
+            mj_step(bare, d);
+            mj_step(full, e);
+            const Soft *soft = plugin_soft(full, e);
+            assert_int_equal(soft->near_rows, 24);
+            loaded += soft->contact.foot[0].contacts > 0;
+            assert_memory_equal(d->qpos, e->qpos, (size_t)full->nq * sizeof(mjtNum));
+            assert_memory_equal(d->qvel, e->qvel, (size_t)full->nv * sizeof(mjtNum));
+            assert_memory_equal(d->sensordata, e->sensordata, 4 * SENSOR_NUMBERS * sizeof(mjtNum));
+            for (int n = 4 * SENSOR_NUMBERS; n < BOTH * SENSOR_NUMBERS; n++) {
+                assert_true(e->sensordata[n] == 0);
+            }
+        }
+        assert_true(loaded > 200);
+        mj_deleteData(d);
+        mj_deleteData(e);
+        mj_deleteModel(bare);
+        mj_deleteModel(full);
+    }
+}
+
+/* [us] CPU time of a step of the standing robot. */
+static double cost(const mjModel *m, mjData *d, int steps) {
+    struct timespec from, to;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &from);
+    for (int i = 0; i < steps; i++) {
+        mj_step(m, d);
+    }
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &to);
+    return (1e6 * (double)(to.tv_sec - from.tv_sec) + 1e-3 * (double)(to.tv_nsec - from.tv_nsec)) /
+           steps;
+}
+
+/* Turn about, the least of many: what other programs add is left out. */
+static void in_the_air_they_cost_nothing(void **state) {
+    (void)state;
+    const char *const keys[] = {"", CONFIG("body", BODIES)};
+    mjModel *m[2];
+    mjData *d[2];
+    double least[3] = {INFINITY, INFINITY, INFINITY};
+    for (int k = 0; k < 2; k++) {
+        m[k] = quadruped("implicitfast", keys[k]);
+        d[k] = mj_makeData(m[k]);
+        kit_run(m[k], d[k], 0.5);
+    }
+    for (int round = 0; round < 60; round++) {
+        for (int k = 0; k < 2; k++) {
+            least[k] = fmin(least[k], cost(m[k], d[k], 50));
+        }
+    }
+    lay(d[1], 0, mjPI / 2, 0.2);
+    kit_run(m[1], d[1], 2);
+    const int rows = plugin_soft(m[1], d[1])->near_rows;
+    for (int round = 0; round < 20; round++) {
+        least[2] = fmin(least[2], cost(m[1], d[1], 50));
+    }
+    print_message("a step: %.2f us with four feet, %.2f with nine bodies in the air (%+.1f %%), "
+                  "%.2f on its side with %d of 13 near\n",
+                  least[0], least[1], 100 * (least[1] / least[0] - 1), least[2], rows / 6);
+    assert_true(least[1] < 1.15 * least[0]); /* 3 % on an idle machine */
+    for (int k = 0; k < 2; k++) {
+        mj_deleteData(d[k]);
+        mj_deleteModel(m[k]);
+    }
+}
+
+/* ---- on the ground ---- */
+
+/* [J] Of the ground in the last step: its impulse at the mean of the twists with and without it. */
+static double ground_work(const Soft *soft) {
+    double power = 0;
+    for (int r = 0; r < soft->near_rows; r++) {
+        const int f = soft->near[r / 6], k = r % 6;
+        const MildFootResult *foot = &soft->contact.foot[f];
+        power += (k < 3 ? foot->force[k] : foot->torque[k - 3]) *
+                 (soft->contact.velocity[6 * f + k] + soft->free[r]) / 2;
+    }
+    return soft->input.dt * power;
+}
+
+/* Drops the humanoid, lets it come to rest, and holds what it feels. */
+static void lie_down(int axis, double angle, const char *ground, const char *integrator) {
+    mjModel *m = humanoid(0.005, integrator, ground);
+    mjData *d = mj_makeData(m);
+    double force[3] = {0, 0, 0}, shells = 0, fastest = 0, work = 0, given = 0;
+    int most = 0, unsolved = 0, bodies = 0, rounds = 0;
+    lay(d, axis, angle, 0.35);
+    for (int i = 0; i < 1600; i++) {
+        int loaded = 0;
+        mj_step(m, d);
+        const Soft *soft = plugin_soft(m, d);
+        for (int f = 0; f < BOTH; f++) {
+            loaded += soft->contact.foot[f].contacts > 0;
+        }
+        most = loaded > most ? loaded : most;
+        unsolved += !soft->contact.converged;
+        work += ground_work(soft);
+        given = fmax(given, work);
+        rounds = soft->rounds > rounds ? soft->rounds : rounds;
+    }
+    for (int f = 0; f < BOTH; f++) {
+        mju_addTo3(force, felt(m, d, f));
+        shells += f < 2 ? 0 : felt(m, d, f)[2];
+        bodies += f >= 2 && felt(m, d, f)[2] > 0;
+    }
+    for (int i = 0; i < m->nv; i++) {
+        fastest = fmax(fastest, fabs(d->qvel[i]));
+    }
+    print_message(
+        "%-10s %-12s %s: %.3f N of %.3f, %.1f %% on %d bodies, %d of 13 touch at most, "
+        "%d steps unsolved, %d rounds, %.1e m/s left, %.1e N aside, the ground gave %.1e J and took %.0f\n",
+        ground, integrator, axis ? "back" : "side", force[2], MASS * GRAVITY,
+        100 * shells / force[2], bodies, most, unsolved, rounds, fastest, hypot(force[0], force[1]),
+        given, -work);
+    assert_true(given < 1e-9 && work < -0.1 * MASS * GRAVITY * 0.2);
+    assert_true(fabs(force[2] - MASS * GRAVITY) < 0.01 * MASS * GRAVITY);
+    assert_true(hypot(force[0], force[1]) < 0.01 * MASS * GRAVITY);
+    assert_true(fastest < 0.02);
+    assert_true(shells > 0.8 * force[2]);
+    assert_int_equal(unsolved, 0);
+    assert_int_equal(kit_messages, 0);
+    assert_in_range(most, axis ? 9 : 5, BOTH);
+    assert_in_range(bodies, axis ? 7 : 4, BOTH);
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
+static void it_comes_to_rest_on_its_shells(void **state) {
+    (void)state;
+    static const char *const grounds[] = {"foam45", "sand_loose"};
+    static const char *const integrators[] = {"implicitfast", "discrete", "Euler"};
+    for (int n = 0; n < 6; n++) {
+        lie_down(1, -mjPI / 2, grounds[n % 2], integrators[n / 2]);
+        lie_down(0, mjPI / 2, grounds[n % 2], integrators[n / 2]);
+    }
+}
+
+/* A plate that is a foot sinks as deep as one that is a body, however far apart its elements are. */
+static void a_body_sinks_as_a_foot_does(void **state) {
+    (void)state;
+    static const char *const grounds[] = {"rubber", "foam45", "sand_loose", "grass", "clay"};
+    static const char *const keys[] = {"", CONFIG("body_pitch", "0.012")};
+    for (int n = 0; n < 10; n++) {
+        char head[1500], text[3000];
+        kit_head(head, sizeof head, 0.002, "implicitfast", "foot", grounds[n / 2],
+                 CONFIG("body", "body"));
+        char *at = strstr(head, "<config key='body'");
+        char more[1500];
+        snprintf(more, sizeof more, "%s%s", keys[n % 2], at);
+        snprintf(at, sizeof head - (size_t)(at - head), "%s", more);
+        snprintf(text, sizeof text,
+                 "%s<worldbody><body name='foot' pos='0 0 .025'><freejoint/><geom type='box' "
+                 "size='.117 .078 .02' mass='9' " OFF "/></body><body name='body' pos='0 1 .025'>"
+                 "<freejoint/><geom type='box' size='.117 .078 .02' mass='9' " OFF
+                 "/></body></worldbody></mujoco>",
+                 head);
+        mjModel *m = kit_model(text);
+        mjData *d = mj_makeData(m);
+        kit_run(m, d, 3);
+        const double foot = 0.02 - d->qpos[2], body = 0.02 - d->qpos[9];
+        print_message("%-10s foot %.4f mm deep, body %.4f\n", grounds[n / 2], 1e3 * foot,
+                      1e3 * body);
+        assert_true(foot > 1e-4 && fabs(body - foot) < 2e-3 * foot);
+        mj_deleteData(d);
+        mj_deleteModel(m);
+    }
+}
+
+/* A wheel rolls, and drives itself. */
+static void a_wheel_rolls(void **state) {
+    (void)state;
+    mjModel *m = kit_model(
+        "<mujoco><option timestep='.002'/><extension><plugin plugin='mild.ground'><instance "
+        "name='soft'>" CONFIG("body", "wheel") CONFIG("ground", "rubber") CONFIG(
+            "body_pitch",
+            "0.01") "</instance></plugin></extension><worldbody><body "
+                    "pos='0 0 .11'><joint type='slide' axis='1 0 0'/><joint type='slide' axis='0 0 1'/>"
+                    "<geom size='.03' mass='4' " OFF
+                    "/><body name='wheel'><joint name='axle' axis='0 1 0'/>"
+                    "<geom type='cylinder' euler='90 0 0' size='.1 .03' mass='1' " OFF
+                    "/></body></body></worldbody><actuator><velocity joint='axle' kv='2' "
+                    "ctrlrange='-9 9'/></actuator></mujoco>");
+    mjData *d = mj_makeData(m);
+    d->ctrl[0] = 5;
+    kit_run(m, d, 1);
+    const double from = d->qpos[0];
+    kit_run(m, d, 2);
+    const double way = (d->qpos[0] - from) / 2, rim = 0.1 * d->qvel[2];
+    print_message("wheel rolls at %.3f m/s, its rim at %.3f\n", way, rim);
+    assert_true(way > 0.4 && fabs(way - rim) < 0.05 * rim);
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
+/* ---- shapes ---- */
+
+/* A model of one body of this geom, or NULL. */
+static mjModel *body_of(const char *geom, const char *keys, const char *asset) {
+    static char text[9000];
+    snprintf(text, sizeof text,
+             "<mujoco><extension><plugin plugin='mild.ground'><instance name='soft'>" CONFIG(
+                 "body", "body") "%s</instance></plugin></extension><asset>%s</asset><worldbody>"
+                                 "<geom name='floor' type='plane' size='1 1 1'/><body name='body' "
+                                 "pos='0 0 .4'><freejoint/>%s</body></worldbody></mujoco>",
+             keys, asset, geom);
+    kit_said[0] = '\0';
+    kit_messages = 0;
+    return kit_compile(text);
+}
+
+/* [m^2] of the surface; and that it is closed: no area is left over in any direction. */
+static double surface_of(const char *geom, const char *keys, const char *asset) {
+    mjModel *m = body_of(geom, keys, asset);
+    if (!m) {
+        fail_msg("%s", kit_said);
+    }
+    mjData *d = mj_makeData(m);
+    const MildSole *sole = plugin_soft(m, d)->soles[0];
+    double area = 0, left[3] = {0, 0, 0}, out = 0;
+    for (int e = 0; e < mild_sole_elements(sole); e++) {
+        const double a = mild_sole_surface_area(sole)[e];
+        const double at[3] = {mild_sole_x(sole)[e], mild_sole_y(sole)[e],
+                              mild_sole_surface_z(sole)[e]};
+        area += a;
+        for (int k = 0; k < 3; k++) {
+            left[k] += a * mild_sole_surface_normal(sole, k)[e];
+            out += a * mild_sole_surface_normal(sole, k)[e] * at[k];
+        }
+    }
+    print_message("%-60.60s %4d elements, %.5f m^2\n", geom, mild_sole_elements(sole), area);
+    assert_true(mju_norm3(left) < 0.02 * area);
+    assert_true(out > 0); /* three times the volume: normals face outward */
+    mj_deleteData(d);
+    mj_deleteModel(m);
+    return area;
+}
+
+#define VERTICES                                                                                   \
+    "-.1 -.06 -.02 .1 -.06 -.02 -.1 .06 -.02 .1 .06 -.02 -.1 -.06 .02 .1 -.06 .02 -.1 .06 .02 "    \
+    ".1 .06 .02"
+
+static void shapes_are_covered(void **state) {
+    (void)state;
+    const double box = 8 * (.1 * .06 + .06 * .02 + .1 * .02), r = .04, h = .1;
+    const double cylinder = 2 * mjPI * r * (r + 2 * h), capsule = 4 * mjPI * r * (r + h);
+    assert_true(fabs(surface_of("<geom type='box' size='.1 .06 .02'/>", "", "") / box - 1) < 1e-9);
+    assert_true(fabs(surface_of("<geom type='capsule' size='.04 .1'/>", "", "") / capsule - 1) <
+                1e-9);
+    assert_true(fabs(surface_of("<geom size='.1'/>", "", "") / (.04 * mjPI) - 1) < 1e-9);
+    assert_true(fabs(surface_of("<geom type='cylinder' size='.04 .1'/>", "", "") / cylinder - 1) <
+                0.02);
+    assert_true(fabs(surface_of("<geom type='ellipsoid' size='.1 .1 .1'/>", "", "") / (.04 * mjPI) -
+                     1) < 0.02);
+    for (int k = 0; k < 2; k++) { /* with MuJoCo's hull, and where it has none */
+        const char *const geoms[] = {"<geom type='mesh' mesh='box'/>",
+                                     "<geom type='mesh' mesh='box' " OFF "/>"};
+        assert_true(
+            fabs(surface_of(geoms[k], "", "<mesh name='box' vertex='" VERTICES "'/>") / box - 1) <
+            1e-6);
+    }
+    /* turned, shifted, and with a picture of it that is no part of it */
+    assert_true(
+        fabs(surface_of("<geom type='box' size='.1 .06 .02' pos='.2 .1 0' euler='10 20 30'/>"
+                        "<geom type='mesh' mesh='box' " OFF "/>",
+                        "", "<mesh name='box' vertex='" VERTICES "'/>") /
+                 box -
+             1) < 1e-9);
+}
+
+/* ---- the state ---- */
+
+static void steps(const mjModel *m, mjData *d, int count) {
+    for (int i = 0; i < count; i++) {
+        for (int u = 0; u < m->nu; u++) {
+            d->ctrl[u] = 0.6 * sin(20 * d->time + u);
+        }
+        mj_step(m, d);
+    }
+}
+
+static void check_same(const mjModel *m, const mjData *a, const mjData *b) {
+    assert_memory_equal(a->qpos, b->qpos, (size_t)m->nq * sizeof(double));
+    assert_memory_equal(a->qvel, b->qvel, (size_t)m->nv * sizeof(double));
+    assert_memory_equal(a->plugin_state, b->plugin_state, (size_t)m->npluginstate * sizeof(double));
+}
+
+/* Thrashing on its side: a copy, a restored state, another order of stages and a second evaluation
+ * go on bit by bit; other bytes in the state of a body are noticed. */
+static void the_state_is_complete(void **state) {
+    (void)state;
+    mjModel *m = quadruped("implicitfast", CONFIG("body", BODIES) CONFIG("prints", "64"));
+    mjData *d = mj_makeData(m), *other = mj_makeData(m);
+    const int size = mj_stateSize(m, mjSTATE_INTEGRATION);
+    double *saved = calloc((size_t)size, sizeof *saved);
+    lay(d, 0, mjPI / 2, 0.2);
+    steps(m, d, 300);
+    const Soft *soft = plugin_soft(m, d);
+    assert_in_range(soft->near_rows / 6, 6, 13);
+    mj_getState(m, d, saved, mjSTATE_INTEGRATION);
+    mjData *copy = mj_copyData(NULL, m, d);
+    mj_setState(m, other, saved, mjSTATE_INTEGRATION);
+    steps(m, d, 100);
+    steps(m, copy, 100);
+    check_same(m, d, copy);
+    for (int i = 0; i < 100; i++) {
+        for (int u = 0; u < m->nu; u++) {
+            other->ctrl[u] = 0.6 * sin(20 * other->time + u);
+        }
+        mj_forward(m, other);
+        mj_forwardSkip(m, other, mjSTAGE_POS, 1);
+        mj_forwardSkip(m, other, mjSTAGE_VEL, 1);
+        mj_implicit(m, other);
+    }
+    check_same(m, d, other);
+    mj_forward(m, d); /* a copy within a step */
+    mj_copyData(copy, m, d);
+    mj_implicit(m, d);
+    mj_implicit(m, copy);
+    check_same(m, d, copy);
+    const MildGround *ground = (const MildGround *)(const void *)d->plugin_state;
+    const double *depth = mild_ground_depth_max(ground, 4);
+    kit_messages = 0;
+    d->plugin_state[depth - d->plugin_state] = NAN;
+    mj_step(m, d);
+    assert_int_equal(kit_messages, 1);
+    assert_non_null(strstr(kit_said, "state"));
+    mj_resetData(m, d);
+    mj_resetData(m, other);
+    steps(m, d, 50);
+    steps(m, other, 50);
+    check_same(m, d, other);
+    free(saved);
+    mj_deleteData(copy);
+    mj_deleteData(d);
+    mj_deleteData(other);
+    mj_deleteModel(m);
+}
+
+/* Patches under the bodies, and an arrow for each that is loaded. */
+static void they_are_drawn(void **state) {
+    (void)state;
+    mjModel *m = humanoid(0.002, "implicitfast", "sand_loose");
+    mjData *d = mj_makeData(m);
+    mjvScene scene;
+    mjvOption option;
+    mjvCamera camera;
+    int patches = 0, arrows = 0, loaded = 0, pressed = 0;
+    mjv_defaultScene(&scene);
+    mjv_defaultOption(&option);
+    mjv_defaultCamera(&camera);
+    mjv_makeScene(m, &scene, 5000);
+    option.flags[mjVIS_CONTACTFORCE] = 1;
+    lay(d, 1, -mjPI / 2, 0.3);
+    kit_run(m, d, 1);
+    mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_DECOR, &scene);
+    for (int i = 0; i < scene.ngeom; i++) {
+        patches += scene.geoms[i].type == mjGEOM_BOX;
+        arrows += scene.geoms[i].type == mjGEOM_ARROW;
+    }
+    const Soft *soft = plugin_soft(m, d);
+    for (int f = 0; f < soft->feet; f++) {
+        const double *depth =
+            mild_ground_depth_max((const MildGround *)(const void *)d->plugin_state, f);
+        loaded += soft->contact.foot[f].contacts > 0;
+        for (int e = 0; e < mild_sole_elements(soft->soles[f]); e++) {
+            pressed += depth[e] > 0;
+        }
+    }
+    print_message("%d patches, %d arrows\n", patches, arrows);
+    assert_true(pressed > 100 && loaded > 4);
+    assert_int_equal(patches, pressed);
+    assert_int_equal(arrows, loaded);
+    mjv_freeScene(&scene);
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
+/* ---- what a user may get wrong ---- */
+
+static void check_refused(const char *keys, const char *geom, const char *asset, const char *word,
+                          const char *other) {
+    static char text[4000];
+    snprintf(text, sizeof text,
+             "<mujoco><extension><plugin plugin='mild.ground'><instance name='soft'>%s</instance>"
+             "</plugin></extension><asset>%s</asset><worldbody><body name='pole'><geom "
+             "size='.1'/></body><body name='foot'><freejoint/><geom type='box' size='.1 .1 .1' " OFF
+             "/><body name='shin' pos='0 0 1'>%s</body></body></worldbody></mujoco>",
+             keys, asset, geom);
+    kit_said[0] = '\0';
+    mjModel *m = kit_compile(text);
+    const char *said = strstr(kit_said, "mild.ground 'soft': ");
+    print_message("%s\n", kit_said);
+    assert_null(m);
+    assert_non_null(said);
+    assert_non_null(strstr(said, word));
+    assert_non_null(strstr(said, other));
+    assert_null(strstr(said + 1, "mild.ground 'soft': ")); /* said once */
+}
+
+#define SHIN "<geom type='box' size='.1 .1 .1' " OFF "/>"
+#define FOOT CONFIG("feet", "foot")
+
+static void wrong_bodies_are_refused(void **state) {
+    (void)state;
+    check_refused(FOOT CONFIG("body", "shim"), SHIN, "", "no body 'shim'", "nearest is 'shin'");
+    check_refused(FOOT CONFIG("body", "shin shin"), SHIN, "", "'shin'", "named twice");
+    check_refused(FOOT CONFIG("body", "shin foot"), SHIN, "", "'foot'", "a foot already");
+    check_refused(CONFIG("sole", "") CONFIG("feet", "foot") CONFIG("body", "pole"), SHIN, "",
+                  "'pole'", "fixed to the world");
+    check_refused(FOOT CONFIG("body", "shin"), "<site name='s'/>", "", "'shin'", "has no box");
+    check_refused(FOOT CONFIG("body", "shin"), "<geom type='box' size='20 20 20' " OFF "/>", "",
+                  "'shin'", "at most 10 m");
+    check_refused(FOOT CONFIG("body", "shin") CONFIG("body_pitch", "0.001"),
+                  "<geom type='box' size='1 1 1' " OFF "/>", "", "'shin'", "too many elements");
+    check_refused(FOOT CONFIG("body", "shin") CONFIG("body_pitch", "0"), SHIN, "", "body_pitch",
+                  "outside");
+    check_refused(CONFIG("body", "shin") CONFIG("ground.model", "bekker"), SHIN, "", "bekker",
+                  "name a foot");
+}
+
+/* Bodies and feet are 16 together. */
+static void seventeen_are_too_many(void **state) {
+    (void)state;
+    static char names[300], world[4000], text[6000];
+    names[0] = world[0] = '\0';
+    for (int b = 1; b <= 16; b++) {
+        snprintf(names + strlen(names), sizeof names - strlen(names), "b%d ", b);
+        snprintf(world + strlen(world), sizeof world - strlen(world),
+                 "<body name='b%d' pos='%d 0 1'><freejoint/>" SHIN "</body>", b, b);
+    }
+    for (int feet = 0; feet < 2; feet++) {
+        snprintf(text, sizeof text,
+                 "<mujoco><extension><plugin plugin='mild.ground'><instance name='soft'>%s<config "
+                 "key='body' value='%s'/></instance></plugin></extension><worldbody>%s<body "
+                 "name='foot'><freejoint/>" SHIN "</body></worldbody></mujoco>",
+                 feet ? FOOT : "", names, world);
+        kit_said[0] = '\0';
+        mjModel *m = kit_compile(text);
+        print_message("%s\n", kit_said);
+        assert_int_equal(m == NULL, feet);
+        assert_true(!feet || strstr(kit_said, "more than 16 feet and bodies: 'b16'"));
+        if (m) {
+            mjData *d = mj_makeData(m);
+            kit_run(m, d, 1);
+            assert_int_equal(plugin_soft(m, d)->near_rows, 96);
+            mj_deleteData(d);
+        }
+        mj_deleteModel(m);
+    }
+}
+
+/* A body that MuJoCo lets lie on its own floor too is warned about. */
+static void a_rigid_floor_is_said(void **state) {
+    (void)state;
+    for (int off = 0; off < 2; off++) {
+        mjModel *m = body_of(off ? "<geom name='box' type='box' size='.1 .1 .1' " OFF "/>"
+                                 : "<geom name='box' type='box' size='.1 .1 .1' pos='0 0 .3'/>",
+                             "", "");
+        assert_non_null(m);
+        mjData *d = mj_makeData(m);
+        print_message("%s\n", kit_said);
+        assert_int_equal(kit_messages, !off);
+        assert_true(off || (strstr(kit_said, "geom 'box' of body 'body'") &&
+                            strstr(kit_said, "geom 'floor'")));
+        mj_deleteData(d);
+        mj_deleteModel(m);
+    }
+}
+
+/* A mesh of crossed sheets has more elements than its bounding box was given room for. */
+static void a_folded_mesh_has_no_room(void **state) {
+    (void)state;
+    static const int side[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6},
+                                    {0, 1, 4}, {1, 5, 4}, {2, 6, 3}, {3, 6, 7},
+                                    {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    static char vertices[12000], faces[12000], asset[25000], text[27000];
+    enum { SHEETS = 24 };
+    vertices[0] = faces[0] = '\0';
+    for (int s = 0; s < SHEETS; s++) {
+        for (int c = 0; c < 8; c++) {
+            double at[3];
+            at[s % 3] = 0.05 * (s / 3 - 3.5) + (c & 4 ? .001 : -.001);
+            at[(s + 1) % 3] = c & 1 ? .2 : -.2;
+            at[(s + 2) % 3] = c & 2 ? .2 : -.2;
+            snprintf(vertices + strlen(vertices), sizeof vertices - strlen(vertices), "%g %g %g ",
+                     at[0], at[1], at[2]);
+        }
+        for (int t = 0; t < 12; t++) {
+            snprintf(faces + strlen(faces), sizeof faces - strlen(faces), "%d %d %d ",
+                     8 * s + side[t][0], 8 * s + side[t][1], 8 * s + side[t][2]);
+        }
+    }
+    snprintf(asset, sizeof asset, "<mesh name='fold' vertex='%s' face='%s'/>", vertices, faces);
+    snprintf(text, sizeof text,
+             "<mujoco><extension><plugin plugin='mild.ground'><instance name='soft'>" CONFIG(
+                 "body", "body") "</instance></plugin></extension><asset>%s</asset><worldbody>"
+                                 "<body name='body'><freejoint/><geom type='mesh' mesh='fold' "
+                                 "mass='1' " OFF "/></body></worldbody></mujoco>",
+             asset);
+    kit_said[0] = '\0';
+    assert_null(kit_compile(text));
+    print_message("%s\n", kit_said);
+    assert_non_null(strstr(kit_said, "meshes of 'body'"));
+    assert_non_null(strstr(kit_said, "room for"));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(in_the_air_they_change_no_bit),
+        cmocka_unit_test(in_the_air_they_cost_nothing),
+        cmocka_unit_test(it_comes_to_rest_on_its_shells),
+        cmocka_unit_test(a_body_sinks_as_a_foot_does),
+        cmocka_unit_test(a_wheel_rolls),
+        cmocka_unit_test(shapes_are_covered),
+        cmocka_unit_test(the_state_is_complete),
+        cmocka_unit_test(they_are_drawn),
+        cmocka_unit_test(wrong_bodies_are_refused),
+        cmocka_unit_test(seventeen_are_too_many),
+        cmocka_unit_test(a_rigid_floor_is_said),
+        cmocka_unit_test(a_folded_mesh_has_no_room),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, NULL);
+}
