@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Walks from one ground onto another: all 72 ordered pairs of the nine grounds, at several speeds, over a border as sharp as it is.
 
-  scripts/paper/transitions.py --out out/transitions                  # the shipped policy, 3600 trials: 8 minutes on two cores
+  scripts/paper/transitions.py --out out/transitions                  # the shipped policy, 3600 trials: 4 minutes on two cores
   scripts/paper/transitions.py --out out/one --pairs 'rigid>foam25,foam25>rigid' --speeds=-1.2,1.2 --trials 20
   scripts/paper/transitions.py --out out/figure --trials 4 --figure 'rubber>foam28' --pairs ''
 
