@@ -17,9 +17,7 @@ void sensor_write(const Soft *soft, const mjModel *m, mjData *d, int instance) {
         mjtNum *data = d->sensordata + m->sensor_adr[s];
         mju_zero(data, m->sensor_dim[s]);
         for (int f = 0; f < soft->feet && soft->known; f++) {
-            if (soft->contact.foot[f].contacts > 0) {
-                write_foot(&soft->contact.foot[f], data + (ptrdiff_t)(SENSOR_NUMBERS * f));
-            }
+            write_foot(&soft->contact.foot[f], data + (ptrdiff_t)(SENSOR_NUMBERS * f));
         }
     }
 }
