@@ -341,10 +341,11 @@ static void noting_act(void *self, int rows, TaskEnv *const *envs, float *action
 
 static Noting noted[2];
 
-static void walk_pushed(Noting *noting, double push) {
+static void walk_pushed(Noting *noting, double push, uint64_t seed) {
     MildError error = {0};
+    *noting = (Noting){.step = 0};
     const EvalDef eval = {
-        .speed = 0.3, .push = push, .trials = PUSHED, .seconds = PUSH_STEPS * 0.01, .seed = 1};
+        .speed = 0.3, .push = push, .trials = PUSHED, .seconds = PUSH_STEPS * 0.01, .seed = seed};
     Scene scene;
     EvalRow row;
     Pool *pool = pool_create(2);
@@ -358,18 +359,21 @@ static void walk_pushed(Noting *noting, double push) {
     pool_destroy(pool);
 }
 
-/* Every 4 s, each trial at another time, by the speed asked for, each in another direction; until
- * then nothing changes by a bit. */
+/* Every 4 s, each trial at another time, by the speed asked for, each in another direction, and so
+ * with another seed; until then nothing changes by a bit. */
 static void pushes_come_every_four_seconds(void **state) {
     (void)state;
-    double angle[PUSHED];
-    walk_pushed(&noted[0], 0);
-    walk_pushed(&noted[1], 0.3);
-    for (int i = 0; i < PUSHED; i++) {
-        const int at = i ? 400 - 97 * i : 400;
-        const double *before = noted[0].speed[i][at], *after = noted[1].speed[i][at];
-        assert_memory_equal(noted[0].speed[i], noted[1].speed[i],
-                            (size_t)at * sizeof noted[0].speed[i][0]);
+    double angle[2 * PUSHED];
+    for (int i = 0; i < 2 * PUSHED; i++) {
+        const int trial = i % PUSHED, at = trial ? 400 - 97 * trial : 400;
+        if (trial == 0) {
+            const uint64_t seed = i == 0 ? 1 : 2;
+            walk_pushed(&noted[0], 0, seed);
+            walk_pushed(&noted[1], 0.3, seed);
+        }
+        const double *before = noted[0].speed[trial][at], *after = noted[1].speed[trial][at];
+        assert_memory_equal(noted[0].speed[trial], noted[1].speed[trial],
+                            (size_t)at * sizeof noted[0].speed[trial][0]);
         assert_true(fabs(hypot(after[0] - before[0], after[1] - before[1]) - 0.3) < 1e-12);
         angle[i] = atan2(after[1] - before[1], after[0] - before[0]);
         for (int j = 0; j < i; j++) {
