@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ground/sole.h"
-
 #define SIDES 32     /* of what stands for a circle */
 #define PROFILE 17   /* points from pole to pole of an ellipsoid, at most */
 #define SHAPES 256   /* of a body, the limit of MildSurfaceDef */
@@ -233,7 +231,7 @@ static Shapes *shapes_of(const mjModel *m, const Foot *foot, int bounds, MildErr
 static int count_elements(const Shapes *shapes, double pitch) {
     int sum = 0;
     for (int i = 0; i < shapes->count; i++) {
-        const MildSurfaceDef alone = {&shapes->shape[i], 1, pitch};
+        const MildSurfaceDef alone = {.shapes = &shapes->shape[i], .count = 1, .pitch = pitch};
         MildSole *sole = mild_sole_surface(&alone, NULL);
         if (!sole) {
             return 0;
@@ -249,7 +247,7 @@ static MildSole *surface_of(int elements, MildError *error) {
     const double edge = 1e-3;
     const MildShape box = {.type = MILD_SHAPE_BOX,
                            .size = {0.5 * edge * (0.25 * elements + 1), edge / 2, edge / 2}};
-    const MildSurfaceDef def = {&box, 1, edge};
+    const MildSurfaceDef def = {.shapes = &box, .count = 1, .pitch = edge};
     return mild_sole_surface(&def, error);
 }
 
@@ -286,15 +284,15 @@ MildStatus body_surface(const mjModel *m, const PluginDef *def, double pitch, in
         return MILD_ERROR_ARGUMENT;
     }
     MildError why = {0};
-    const MildSurfaceDef surface = {shapes->shape, shapes->count, def->body_pitch};
+    const MildSurfaceDef surface = {.shapes = shapes->shape,
+                                    .count = shapes->count,
+                                    .pitch = pitch,
+                                    .spacing = def->body_pitch};
     foot->sole = foot->raster = mild_sole_surface(&surface, &why);
     shapes_free(shapes);
     if (!foot->sole) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "body: '%.60s': %s", foot_body_name(m, foot),
                          why.text);
     }
-    /* The law is that of an element of the feet; an element of a body has as many of it as its area
-     * says. */
-    foot->raster->pitch = pitch;
     return compiling ? MILD_OK : check_room(m, def, foot, error);
 }

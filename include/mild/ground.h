@@ -259,11 +259,13 @@ typedef struct {
 typedef struct {
     const MildShape *shapes; /* [count] they may overlap */
     int count;               /* 1 .. 256 */
-    double pitch;            /* [m] edge of an element in the law, 0.001 .. 1 */
+    double pitch;            /* [m] edge of an element in the law: that of the feet, 0.001 .. 1 */
+    double spacing;          /* [m] distance of the elements, 0.001 .. 1; 0: pitch */
 } MildSurfaceDef;
 
 /* Makes a sole whose elements cover the outer surface of a body, each with an outward normal and an
- * area near pitch^2. The frame is that of the body; its origin is what other functions call the
+ * area near spacing^2. A material's stiffness is that of an element of area pitch^2; an element
+ * here presses with as many of these as its area has. The frame is that of the body; its origin is what other functions call the
  * ankle. Elements inside another shape are left out; for that a mesh must be closed. The areas sum
  * to that of the surface. An element carries load while its normal points down by more than 10
  * degrees below the horizontal, with its area projected on the horizontal plane when it touched
@@ -479,7 +481,8 @@ typedef enum {
 typedef struct {
     /* [m] u at the start of the step, negative above the ground. On uneven ground the law,
      * depth_max and depth_mean take the smaller of this and what the ground of the last step
-     * gives. Where no element of a surface can touch, an upper bound of all. */
+     * gives. Where no element of a surface can touch, and of a foot without rows, an upper bound of
+     * all as mild_ground_near found it. */
     const double *depth;
     const double *normal;    /* [N] vertical part of the force, mean over the step */
     const double *tangent_x; /* [N] horizontal part, world, mean over the step */

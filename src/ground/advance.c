@@ -199,7 +199,8 @@ MILD_HD int foot_advance(const Advance *a, const Memory *memory, const int32_t *
         if (!lifted) {
             slot_peak(a, memory, i, e, v.descent, middle);
         }
-        memory->material[e] = lifted ? lifted_material : material[i];
+        const int barred = (material[i] & SLOT_BARRED) != 0;
+        memory->material[e] = lifted || barred ? lifted_material : material[i];
         if (faces) {
             memory->share[e] = lifted ? 0.0 : s->share[i];
         }

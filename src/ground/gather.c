@@ -91,7 +91,7 @@ void slots_imprints(const FootScratch *foot, const Imprints *imprints, const Mem
         if (!(lasting > 0.0)) { /* not pressed by it: nothing, until it has come out */
             if (m == MATERIAL_FREE && m0 > 0.0) {
                 slot_scale(s, i, 0.0);
-                foot->slot_material[i] = MATERIAL_FREE;
+                foot->slot_material[i] |= SLOT_BARRED;
             }
             continue;
         }

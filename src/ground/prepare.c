@@ -180,12 +180,21 @@ static void feet_place(MildScratch *scratch, const MildContactInput *input) {
     }
 }
 
+/* The pose of a foot. Its slopes are cleared where it has come from uneven to level ground. */
+static void foot_take_pose(FootScratch *foot, const MildTerrain *terrain,
+                           const MildContactInput *input, int f) {
+    if (foot->uneven && terrain_is_level(terrain)) {
+        slots_level(foot);
+    }
+    foot_set_pose(foot, terrain, input->position[f], input->rotation[f]);
+}
+
 uint32_t mild_ground_near(const MildTerrain *terrain, const MildContactInput *input,
                           MildScratch *scratch) {
     uint32_t near = 0;
     for (int f = 0; f < scratch->feet; f++) {
         FootScratch *foot = &scratch->foot[f];
-        foot_set_pose(foot, terrain, input->position[f], input->rotation[f]);
+        foot_take_pose(foot, terrain, input, f);
         const double steepest = foot->uneven ? terrain_steepest(terrain) : 0.0;
         near |= foot_is_away(foot, terrain, input, steepest, f) ? 0u : 1u << f;
     }
@@ -198,13 +207,9 @@ int contact_prepare(const MildGround *ground, const MildTerrain *terrain,
     scratch->listed = 0;
     for (int f = 0; f < scratch->feet; f++) {
         FootScratch *foot = &scratch->foot[f];
-        if (foot->uneven && terrain_is_level(terrain)) {
-            slots_level(foot);
-        }
-        foot_set_pose(foot, terrain, input->position[f], input->rotation[f]);
+        foot_take_pose(foot, terrain, input, f);
         const double steepest = foot->uneven ? terrain_steepest(terrain) : 0.0;
         if (scratch->place[f] < 0) {
-            foot_is_away(foot, terrain, input, steepest, f);
             foot->away = 1;
             foot->active = 0;
         } else if (foot->faces) {

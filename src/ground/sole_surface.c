@@ -136,17 +136,20 @@ static int sample_hidden(const MildSurfaceDef *def, const Sample *sample) {
     return 0;
 }
 
+static double spacing_of(const MildSurfaceDef *def) {
+    return def->spacing > 0.0 ? def->spacing : def->pitch;
+}
+
 static void shape_sample(const MildSurfaceDef *def, int index, Samples *samples) {
+    const double spacing = spacing_of(def);
     const MildShape *shape = &def->shapes[index];
     const Frame frame = frame_of(shape);
     const int first = samples->count;
     switch (shape->type) {
-    case MILD_SHAPE_BOX: box_sample(shape, def->pitch, samples); break;
-    case MILD_SHAPE_CAPSULE:
-        round_sample(shape->size[0], shape->size[1], def->pitch, samples);
-        break;
-    case MILD_SHAPE_SPHERE: round_sample(shape->size[0], 0.0, def->pitch, samples); break;
-    default: mesh_sample(shape, def->pitch, samples); break;
+    case MILD_SHAPE_BOX: box_sample(shape, spacing, samples); break;
+    case MILD_SHAPE_CAPSULE: round_sample(shape->size[0], shape->size[1], spacing, samples); break;
+    case MILD_SHAPE_SPHERE: round_sample(shape->size[0], 0.0, spacing, samples); break;
+    default: mesh_sample(shape, spacing, samples); break;
     }
     int kept = first;
     for (int i = first; i < samples->count; i++) {
@@ -232,6 +235,12 @@ static MildStatus check_def(const MildSurfaceDef *def, MildError *error) {
                          "surface.pitch = %g is outside 0.001 .. 1: [m] edge of an element",
                          def->pitch);
     }
+    if (def->spacing != 0.0 && !(def->spacing >= 1e-3 && def->spacing <= 1.0)) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "surface.spacing = %g is outside 0.001 .. 1, nor 0: [m] distance of the "
+                         "elements",
+                         def->spacing);
+    }
     MildStatus status = MILD_OK;
     for (int i = 0; i < def->count && status == MILD_OK; i++) {
         status = check_shape(&def->shapes[i], i, error);
@@ -283,8 +292,9 @@ MildSole *mild_sole_surface(const MildSurfaceDef *def, MildError *error) {
         shape_sample(def, i, &samples);
     }
     if (samples.full) {
-        mild_fail(error, MILD_ERROR_RANGE, "surface.pitch = %g makes too many elements, at most %d",
-                  def->pitch, SOLE_ELEMENTS_MAX);
+        mild_fail(error, MILD_ERROR_RANGE,
+                  "surface.spacing = %g makes too many elements, at most %d", spacing_of(def),
+                  SOLE_ELEMENTS_MAX);
     } else if (!samples.failed && samples.count == 0) {
         mild_fail(error, MILD_ERROR_RANGE, "surface.shapes have no outer surface");
     } else if (samples.failed || !(sole = sole_of(&samples, def->pitch))) {

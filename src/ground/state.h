@@ -31,6 +31,10 @@ struct MildGround {
 #define MATERIAL_BURIED                                                                            \
     (-3) /* of a surface: faced up near the ground, and found no way out since */
 
+/* Added to the material of a slot: its law has been scaled to nothing, and the element remembers
+ * MATERIAL_FREE (slots_imprints). */
+#define SLOT_BARRED (1 << 24)
+
 /* Memory of one foot: arrays [padded] inside the state block. The first nine are explained at
  * ElementMemory in element.h. */
 typedef struct {

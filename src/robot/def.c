@@ -56,7 +56,7 @@ static const MildField robot_fields[] = {
     RT(source, "[text] source of the numbers, and their licence"),
     RT(base, "[text] body with the free joint"),
     TEXT(RobotText, shells, "[text] geoms of the MJCF that must not touch the ground"),
-    R(shell_pitch, 1, 1e-3, 1, "[m] edge of the ground elements of the shells"),
+    R(shell_spacing, 1, 1e-3, 1, "[m] distance of the ground elements of the shells"),
     TEXT(RobotText, legs, "[text] geoms of the MJCF by which the legs touch each other"),
     R(height, 1, 0.01, 5, "[m] wanted height of the base above the stance soles"),
     R(action_scale, 1, 0.01, 2, "[rad] joint offset per unit of action"),
@@ -568,7 +568,7 @@ static MildStatus check_gait(Reader *reader) {
 /* ---- the whole ---- */
 
 static int optional(const char *key) {
-    static const char *const keys[] = {"source", "legs", "shell_pitch"};
+    static const char *const keys[] = {"source", "legs", "shell_spacing"};
     int found = 0;
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
         found |= strcmp(key, keys[i]) == 0;
@@ -621,7 +621,7 @@ MildStatus robot_def_parse(const char *text, const char *path, RobotDef *def, Mi
     reader->rest = text;
     reader->def = def;
     reader->error = error;
-    reader->robot.def.shell_pitch = 0.03;
+    reader->robot.def.shell_spacing = 0.03;
     int bad_line = ini_parse_stream(next_line, reader, take_key, reader);
     if (reader->status == MILD_OK && bad_line) {
         reader->line = bad_line;

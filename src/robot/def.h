@@ -49,7 +49,7 @@ typedef struct {
     RobotName shell[ROBOT_SHELLS_MAX];
     int shells;
     RobotName leg[ROBOT_CAPSULES_MAX];
-    double shell_pitch;   /* [m] edge of the shells' ground elements */
+    double shell_spacing; /* [m] distance of the shells' ground elements */
     int legs;             /* 0: legs do not touch each other */
     double height;        /* [m] wanted height of the base above the stance soles */
     double action_scale;  /* [rad] joint offset per unit of action */

@@ -87,7 +87,10 @@ MildStatus robot_read_surfaces(Robot *robot, MildError *error) {
                 shapes[count++] = shape_of(&robot->shell[s]);
             }
         }
-        const MildSurfaceDef def = {shapes, count, robot->def.shell_pitch};
+        const MildSurfaceDef def = {.shapes = shapes,
+                                    .count = count,
+                                    .pitch = robot->def.foot[0].pitch,
+                                    .spacing = robot->def.shell_spacing};
         MildError cause = {0};
         robot->soles[b] = mild_sole_surface(&def, &cause);
         if (!robot->soles[b]) {

@@ -217,9 +217,10 @@ static void bad_numbers_are_refused(void **state) {
     const struct {
         MildSurfaceDef def;
         const char *name;
-    } defs[] = {{{NULL, 1, 0.02}, "count"},   {{&box, 0, 0.02}, "count"},
-                {{&box, 257, 0.02}, "count"}, {{&box, 1, NAN}, "pitch"},
-                {{&box, 1, 1e-4}, "pitch"},   {{&large, 1, 0.001}, "at most 65536"}};
+    } defs[] = {{{NULL, 1, 0.02, 0}, "count"},           {{&box, 0, 0.02, 0}, "count"},
+                {{&box, 257, 0.02, 0}, "count"},         {{&box, 1, NAN, 0}, "pitch"},
+                {{&box, 1, 1e-4, 0}, "pitch"},           {{&large, 1, 0.001, 0}, "at most 65536"},
+                {{&box, 1, 0.02, 2}, "surface.spacing"}, {{&box, 1, 0.02, NAN}, "surface.spacing"}};
     for (size_t i = 0; i < sizeof defs / sizeof *defs; i++) {
         MildError error = {0};
         assert_null(mild_sole_surface(&defs[i].def, &error));

@@ -455,6 +455,34 @@ static void elastic_ground_beside_an_imprint_carries_nothing(void **state) {
     beside_an_imprint(kit_plate(10, 10)); /* a plane sole */
 }
 
+/* A level face sinks as deep as a sole of its area, whatever the distance of its elements. */
+static void spacing_is_not_in_the_law(void **state) {
+    (void)state;
+    MildSole *plate = kit_plate(12, 12);
+    const double half = 6 * KIT_PITCH;
+    const MildShape box = surface_box(half, half, 0.05);
+    const MildMaterial m = mild_material_default();
+    double force[4];
+    for (int k = 0; k < 4; k++) {
+        const double spacing[] = {0, 0.5 * KIT_PITCH, 3 * KIT_PITCH};
+        const MildSurfaceDef def = {&box, 1, KIT_PITCH, k ? spacing[k - 1] : 0};
+        MildSole *sole = k ? mild_sole_surface(&def, NULL) : NULL;
+        Kit kit;
+        kit_open(&kit, 1, k ? sole : plate, NULL, &m, 1e-3);
+        kit.input.position[0][2] = k ? 0.05 : -mild_sole_z(plate);
+        for (int s = 0; s < 40; s++) {
+            kit.input.free_velocity[2] = kit.input.velocity[0][2] = -0.5;
+            kit_solve(&kit);
+            kit_advance(&kit);
+        }
+        force[k] = kit.result.foot[0].force[2];
+        kit_close(&kit);
+        mild_sole_destroy(sole);
+        assert_true(fabs(force[k] - force[0]) < 1e-9 * force[0] && force[0] > 100.0);
+    }
+    mild_sole_destroy(plate);
+}
+
 /* A face that leans after touchdown: the share stays that of the touchdown, and another touchdown
  * finds another. */
 static void a_share_is_kept(void **state) {
@@ -587,6 +615,7 @@ int main(void) {
         cmocka_unit_test(closed_motions_give_nothing),
         cmocka_unit_test(a_buried_face_begins_without_force),
         cmocka_unit_test(elastic_ground_beside_an_imprint_carries_nothing),
+        cmocka_unit_test(spacing_is_not_in_the_law),
         cmocka_unit_test(a_share_is_kept),
         cmocka_unit_test(states_are_copied),
         cmocka_unit_test(a_scratch_of_soles_does_not_fit),

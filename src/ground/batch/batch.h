@@ -15,9 +15,9 @@ typedef struct {
     int stride; /* elements of a foot in memory */
     float dt, tolerance;
     int limit;
-    int materials;               /* in the table; behind them one that is not a number */
-    int map;                     /* bool: on BatchArrays.map, not on level ground */
-    int points;                  /* bool: as MildBatchDef.points */
+    int materials;                     /* in the table; behind them one that is not a number */
+    int map;                           /* bool: on BatchArrays.map, not on level ground */
+    int points;                        /* bool: as MildBatchDef.points */
     int elements[MILD_BATCH_FEET_MAX]; /* of a sole */
     float z[MILD_BATCH_FEET_MAX];      /* [m] of its plane */
     float area[MILD_BATCH_FEET_MAX];   /* [m^2] of an element */
@@ -35,7 +35,7 @@ struct MildBatch {
     BatchShape shape;
     BatchArrays arrays;
     int device;
-    int curves;                  /* LawCurve bits of all materials */
+    int curves;                        /* LawCurve bits of all materials */
     double pitch[MILD_BATCH_FEET_MAX]; /* [m] */
     double width[MILD_BATCH_FEET_MAX]; /* [m] shorter side of the sole */
 };
