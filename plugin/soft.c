@@ -213,8 +213,9 @@ static void twists(const Soft *soft, int nv, const double *velocity, double *twi
     }
 }
 
-/* Pose and present twist of a body, which also is its twist without a ground while it is in the air.
- * cvel has the velocity of the point that moves with the body through the centre of its tree. */
+/* Pose and present twist of a body, which also is its twist without a ground while it is in the
+ * air. cvel has the velocity of the point that moves with the body through the centre of its tree.
+ * */
 static void locate_body(Soft *soft, const mjModel *m, const mjData *d, int f) {
     MildContactInput *input = &soft->input;
     const int body = soft->foot[f].body;

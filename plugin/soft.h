@@ -63,8 +63,8 @@ void soft_reset(Soft *soft, void *state, size_t bytes);
 void soft_copy(Soft *soft, const mjModel *m, const Soft *from);
 
 /* Called where qfrc_passive has just been computed, and where actuator forces are computed. Returns
- * bool: the ground acts at this stage. The caller makes sure of the state (soft_owns), which is read
- * for the feet of the step, and calls soft_step. */
+ * bool: the ground acts at this stage. The caller makes sure of the state (soft_owns), which is
+ * read for the feet of the step, and calls soft_step. */
 int soft_passive(Soft *soft, const mjModel *m, mjData *d);
 int soft_actuation(Soft *soft, const mjModel *m, const mjData *d);
 /* Adds the ground's force to qfrc_passive. */

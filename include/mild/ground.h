@@ -265,15 +265,15 @@ typedef struct {
 
 /* Makes a sole whose elements cover the outer surface of a body, each with an outward normal and an
  * area near spacing^2. A material's stiffness is that of an element of area pitch^2; an element
- * here presses with as many of these as its area has. The frame is that of the body; its origin is what other functions call the
- * ankle. Elements inside another shape are left out; for that a mesh must be closed. The areas sum
- * to that of the surface. An element carries load while its normal points down by more than 10
- * degrees below the horizontal, with its area projected on the horizontal plane when it touched
- * down. A surface serves wherever a sole does, except in mild_sole_concentric, mild_model_match and
- * a MildBatch, which refuse it, and mild_sole_sinkage, which takes it for a level sole. Returns
- * NULL, with the name of the field in *error, when a number is out of range, when a closed mesh has
- * its triangles turned inward, when nothing is left or more than 65536 elements are, or when out of
- * memory. `def` is not kept. */
+ * here presses with as many of these as its area has. The frame is that of the body; its origin is
+ * what other functions call the ankle. Elements inside another shape are left out; for that a mesh
+ * must be closed. The areas sum to that of the surface. An element carries load while its normal
+ * points down by more than 10 degrees below the horizontal, with its area projected on the
+ * horizontal plane when it touched down. A surface serves wherever a sole does, except in
+ * mild_sole_concentric, mild_model_match and a MildBatch, which refuse it, and mild_sole_sinkage,
+ * which takes it for a level sole. Returns NULL, with the name of the field in *error, when a
+ * number is out of range, when a closed mesh has its triangles turned inward, when nothing is left
+ * or more than 65536 elements are, or when out of memory. `def` is not kept. */
 MildSole *mild_sole_surface(const MildSurfaceDef *def, MildError *error);
 /* Arrays of mild_sole_elements() numbers owned by the sole, for each element of a surface: height
  * above the frame's origin [m] (mild_sole_z is their mean), component of the outward unit normal
@@ -442,18 +442,19 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
 /* Frees a scratch; NULL is allowed. */
 void mild_scratch_destroy(MildScratch *scratch);
 
-/* Bit f: foot f may touch the ground in the step of `input`, whose inverse_inertia and rows need not
- * be set yet. For robots of which many bodies have soles: ask, compute the rows of A for these feet
- * alone, and set input.rows. It writes only scratch. Cost: a few dozen operations for each foot. */
+/* Bit f: foot f may touch the ground in the step of `input`, whose inverse_inertia and rows need
+ * not be set yet. For robots of which many bodies have soles: ask, compute the rows of A for these
+ * feet alone, and set input.rows. It writes only scratch. Cost: a few dozen operations for each
+ * foot. */
 uint32_t mild_ground_near(const MildTerrain *terrain, const MildContactInput *input,
                           MildScratch *scratch);
-/* Solves one contact step: impulses by eqs 4, 5, 13 and 14, twists by eq 9. It reads the ground
- * and writes only scratch and result, so it may be called any number of times before
+/* Solves one contact step: impulses by eqs 4, 5, 13 and 14, twists by eq 9. It reads the ground and
+ * writes only scratch and result, so it may be called any number of times before
  * mild_ground_advance. Scratch and ground must have the same soles; if their numbers of elements
- * differ, or inverse_inertia is NULL, converged is 0, velocity is free_velocity, and mild_ground_advance does nothing. It
- * always returns; check result->converged. If that is 0, the result is approximate: either the
- * impulses are those of the ground at twists near the returned ones, or they are exact except for
- * the friction bound (docs/model.md section 7). */
+ * differ, or inverse_inertia is NULL, converged is 0, velocity is free_velocity, and
+ * mild_ground_advance does nothing. It always returns; check result->converged. If that is 0, the
+ * result is approximate: either the impulses are those of the ground at twists near the returned
+ * ones, or they are exact except for the friction bound (docs/model.md section 7). */
 void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
                        const MildContactInput *input, MildScratch *scratch,
                        MildContactResult *result);

@@ -7,9 +7,9 @@
 /* Sets origin, arms and `uneven` from the pose. */
 void foot_set_pose(FootScratch *foot, const MildTerrain *terrain, const double *position,
                    const double *R);
-/* Computes the depth of every element of a plane sole after foot_set_pose. Where the ground differs from place to place, also its world
- * position, and on uneven ground the gradient under it. imprints: bool, the ground keeps
- * imprints. */
+/* Computes the depth of every element of a plane sole after foot_set_pose. Where the ground differs
+ * from place to place, also its world position, and on uneven ground the gradient under it.
+ * imprints: bool, the ground keeps imprints. */
 void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints);
 /* Depth of every element of a foot on uneven ground, and the gradient under it. */
 void foot_surface(FootScratch *foot, const MildTerrain *terrain);

@@ -12,7 +12,8 @@
 #define ROBOT_PATH_SIZE 1024
 #define ROBOT_BODIES_MAX MILD_FEET_MAX /* feet, and bodies of shells */
 
-/* A foot in the model, or a body with shells, of which `body`, `dofs`, `dof` and `shared` are set. */
+/* A foot in the model, or a body with shells, of which `body`, `dofs`, `dof` and `shared` are set.
+ * */
 typedef struct {
     int body;
     int knee_body;

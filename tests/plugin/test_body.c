@@ -202,7 +202,8 @@ static void lie_down(int axis, double angle, const char *ground, const char *int
     }
     print_message(
         "%-10s %-12s %s: %.3f N of %.3f, %.1f %% on %d bodies, %d of 13 touch at most, "
-        "%d steps unsolved, %d rounds, %.1e m/s left, %.1e N aside, the ground gave %.1e J and took %.0f\n",
+        "%d steps unsolved, %d rounds, %.1e m/s left, %.1e N aside, the ground gave %.1e J and "
+        "took %.0f\n",
         ground, integrator, axis ? "back" : "side", force[2], MASS * GRAVITY,
         100 * shells / force[2], bodies, most, unsolved, rounds, fastest, hypot(force[0], force[1]),
         given, -work);
@@ -229,7 +230,8 @@ static void it_comes_to_rest_on_its_shells(void **state) {
     }
 }
 
-/* A plate that is a foot sinks as deep as one that is a body, however far apart its elements are. */
+/* A plate that is a foot sinks as deep as one that is a body, however far apart its elements are.
+ * */
 static void a_body_sinks_as_a_foot_does(void **state) {
     (void)state;
     static const char *const grounds[] = {"rubber", "foam45", "sand_loose", "grass", "clay"};
@@ -265,15 +267,16 @@ static void a_wheel_rolls(void **state) {
     (void)state;
     mjModel *m = kit_model(
         "<mujoco><option timestep='.002'/><extension><plugin plugin='mild.ground'><instance "
-        "name='soft'>" CONFIG("body", "wheel") CONFIG("ground", "rubber") CONFIG(
-            "body_pitch",
-            "0.01") "</instance></plugin></extension><worldbody><body "
-                    "pos='0 0 .11'><joint type='slide' axis='1 0 0'/><joint type='slide' axis='0 0 1'/>"
-                    "<geom size='.03' mass='4' " OFF
-                    "/><body name='wheel'><joint name='axle' axis='0 1 0'/>"
-                    "<geom type='cylinder' euler='90 0 0' size='.1 .03' mass='1' " OFF
-                    "/></body></body></worldbody><actuator><velocity joint='axle' kv='2' "
-                    "ctrlrange='-9 9'/></actuator></mujoco>");
+        "name='soft'>" CONFIG("body", "wheel") CONFIG("ground", "rubber")
+            CONFIG("body_pitch",
+                   "0.01") "</instance></plugin></extension><worldbody><body "
+                           "pos='0 0 .11'><joint type='slide' axis='1 0 0'/>"
+                           "<joint type='slide' axis='0 0 1'/>"
+                           "<geom size='.03' mass='4' " OFF
+                           "/><body name='wheel'><joint name='axle' axis='0 1 0'/>"
+                           "<geom type='cylinder' euler='90 0 0' size='.1 .03' mass='1' " OFF
+                           "/></body></body></worldbody><actuator><velocity joint='axle' kv='2' "
+                           "ctrlrange='-9 9'/></actuator></mujoco>");
     mjData *d = mj_makeData(m);
     d->ctrl[0] = 5;
     kit_run(m, d, 1);
