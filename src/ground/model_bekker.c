@@ -92,7 +92,7 @@ static void bekker_shear(const FootScratch *foot, const MildTerrain *terrain, in
     const double area = foot->pitch * foot->pitch;
     for (int i = 0; i < foot->active; i++) {
         const MildMaterial *material = &terrain->materials[foot->slot_material[i] & 0xff];
-        if (material->model != model) {
+        if (material->model != model || foot->slot_material[i] & SLOT_BARRED) {
             continue;
         }
         const Shear shear = {slot_mu(terrain, foot->slot_material[i]), material->cohesion,

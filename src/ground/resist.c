@@ -76,7 +76,7 @@ static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain
         if (terrain->materials[foot->slot_material[i] & 0xff].model != model) {
             continue; /* the nearer material decides */
         }
-        if (!slot_directed(s, i)) {
+        if (!slot_directed(s, i) || foot->slot_material[i] & SLOT_BARRED) {
             continue; /* blended with another curve: stays a level plate */
         }
         Plate own = *plate;

@@ -22,7 +22,7 @@ sed -n '/^```c$/,/^```$/{/^```/d;p}' "$source/README.md" >front.c
 "${CC:-cc}" -std=c17 -Wall -Wextra -Wconversion -Werror -I"$source/include" -fsyntax-only front.c || fail "the C of README.md"
 sed -n '/^```python$/,/^```$/{/^```/d;p}' "$source/README.md" >front.py
 python3 -c 'compile(open("front.py").read(), "README.md", "exec")' || fail "the Python of README.md"
-grep -q 'mild.attach(spec, feet=\[.*ground=' front.py && grep -q 'def attach(spec, feet, ground' "$source/python/mild/spec.py" ||
+grep -q 'mild.attach(spec, feet=\[.*ground=' front.py && grep -q 'def attach(spec, feet=(), ground=' "$source/python/mild/spec.py" ||
     fail "README.md calls mild.attach in a way that python/mild/spec.py does not have"
 
 python3 "$source/scripts/drawings.py" --check || fail "drawings"
