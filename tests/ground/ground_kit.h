@@ -295,7 +295,7 @@ static inline void kit_step(Kit *kit, const double force[][3]) {
  * inertia of random rank. */
 static inline void kit_random_inertia(Kit *kit, uint64_t *random, int rank) {
     int n = 6 * kit->feet;
-    double G[12][12];
+    static double G[12][12]; /* not beside a Kit: gcc 12 takes it for aligned to 32 bytes there */
     kit_inverse_inertia(kit);
     if (rank >= n && kit->feet == 1) {
         return;
