@@ -12,8 +12,8 @@
 #define ROBOT_PATH_SIZE 1024
 #define ROBOT_BODIES_MAX MILD_FEET_MAX /* feet, and bodies of shells */
 
-/* A foot in the model, or a body with shells, of which `body`, `dofs`, `dof` and `shared` are set.
- * */
+/* A foot in the model, or a body with shells: then `body`, `dofs`, `dof` and `shared` alone are
+ * set. */
 typedef struct {
     int body;
     int knee_body;
@@ -92,6 +92,8 @@ MildStatus robot_check_model(const mjModel *model, const char *path, MildError *
 /* Id of a named object, or -1 with a message that names the key that refers to it. */
 int robot_find(const Robot *robot, const mjModel *model, int type, const char *kind,
                const char *name, const char *key, MildError *error);
+/* Body of robot->model that has the geom of robot->visual; -1: it has no name. */
+int robot_geom_body(const Robot *robot, int geom, MildError *error);
 /* Sets the degrees of freedom of a limb from its body, and those that it shares with the limbs
  * before it. */
 void robot_read_limb(Robot *robot, int limb);

@@ -52,17 +52,10 @@ static int foot_of(const Robot *robot, int body) {
 static MildStatus read_capsule(Robot *robot, const char *name, RobotCapsule *capsule,
                                MildError *error) {
     const mjModel *m = robot->visual;
-    const int geom = mj_name2id(m, mjOBJ_GEOM, name);
-    if (geom < 0) {
-        return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%s: geom '%s' is missing; robot.ini names it in [robot] legs",
-                         robot->path, name);
-    }
-    const char *body = mj_id2name(m, mjOBJ_BODY, m->geom_bodyid[geom]);
-    capsule->body = body ? mj_name2id(robot->model, mjOBJ_BODY, body) : -1;
+    const int geom = robot_find(robot, m, mjOBJ_GEOM, "geom", name, "[robot] legs", error);
+    capsule->body = geom < 0 ? -1 : robot_geom_body(robot, geom, error);
     if (capsule->body < 0) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "%s: the body of geom '%s' needs a name",
-                         robot->path, name);
+        return MILD_ERROR_FORMAT;
     }
     capsule->foot = foot_of(robot, capsule->body);
     if (capsule->foot < 0) {

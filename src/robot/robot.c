@@ -28,6 +28,17 @@ int robot_find(const Robot *robot, const mjModel *model, int type, const char *k
     return id;
 }
 
+int robot_geom_body(const Robot *robot, int geom, MildError *error) {
+    const mjModel *m = robot->visual;
+    const char *name = mj_id2name(m, mjOBJ_BODY, m->geom_bodyid[geom]);
+    const int body = name ? mj_name2id(robot->model, mjOBJ_BODY, name) : -1;
+    if (body < 0) {
+        mild_fail(error, MILD_ERROR_FORMAT, "%s: the body of geom '%s' needs a name", robot->path,
+                  mj_id2name(m, mjOBJ_GEOM, geom));
+    }
+    return body;
+}
+
 MildStatus robot_read_bodies(Robot *robot, MildError *error) {
     const mjModel *m = robot->model;
     const RobotDef *def = &robot->def;

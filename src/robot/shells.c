@@ -46,11 +46,9 @@ MildStatus robot_read_shells(Robot *robot, MildError *error) {
                              "%s: geom '%s' of [robot] shells must be a box, a sphere or a capsule",
                              robot->path, name);
         }
-        const char *body = mj_id2name(m, mjOBJ_BODY, m->geom_bodyid[id]);
-        shell->body = body ? mj_name2id(robot->model, mjOBJ_BODY, body) : -1;
+        shell->body = robot_geom_body(robot, id, error);
         if (shell->body < 0) {
-            return mild_fail(error, MILD_ERROR_FORMAT, "%s: the body of geom '%s' needs a name",
-                             robot->path, name);
+            return MILD_ERROR_FORMAT;
         }
         shell->limb = shell_limb(robot, shell->body, error);
         if (shell->limb < 0) {

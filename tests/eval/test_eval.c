@@ -486,8 +486,52 @@ static void legs_do_not_cross(void **state) {
     pool_destroy(pool);
 }
 
+/* Foam half as stiff as the softest: where shells do not stand a shank ends every trial, where they
+ * do none falls, and the shanks' share of the load is small and reported. */
+static void shells_stand(void **state) {
+    (void)state;
+    MildError error = {0};
+    Controller controller;
+    Scene scene;
+    Pool *pool = pool_create(1);
+    const double speed = 0.6;
+    assert_int_equal(controller_learned(POLICY, robot, pool, 2, &controller, &error), MILD_OK);
+    assert_int_equal(scene_make(&scene, "foam25", 2, &error), MILD_OK);
+    scene.terrain.materials[0].k_pen = 75;
+    scene.terrain.materials[0].sigma_cone = 5.5e4;
+    for (int stand = 0; stand < 2; stand++) {
+        EvalTrial each[2];
+        EvalRow row;
+        TaskDef task = def;
+        task.shells_stand = stand;
+        robot_set_shells(robot, stand);
+        const EvalRun run = {.task = &task,
+                             .robot = robot,
+                             .pool = pool,
+                             .controller = &controller,
+                             .device = MILD_BATCH_HOST,
+                             .scenes = &scene,
+                             .scene_count = 1,
+                             .speeds = &speed,
+                             .speed_count = 1,
+                             .eval = {.trials = 2, .seconds = 12, .seed = 1},
+                             .each = each};
+        assert_int_equal(eval_run(&run, &row, &error), MILD_OK);
+        printf("shells %s: %d of 2 upright, shells carry %.1e of the load\n",
+               stand ? "stand" : "end a trial", row.success, row.shells);
+        assert_int_equal(row.success, stand ? 2 : 0);
+        assert_int_equal(row.ends[TASK_END_shell], stand ? 0 : 2);
+        assert_true(stand ? row.shells > 1e-7 && row.shells < 1e-3 : row.shells == 0);
+        assert_true(fabs(row.shells - (each[0].shells + each[1].shells) / 2) < 1e-15);
+    }
+    robot_set_shells(robot, 0);
+    controller_destroy(&controller);
+    pool_destroy(pool);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shells_stand),
         cmocka_unit_test(scenes_by_name),
         cmocka_unit_test(courses_have_bounds),
         cmocka_unit_test(heading_is_held),

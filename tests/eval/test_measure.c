@@ -59,6 +59,21 @@ static Measure script_walk(double steady_end) {
     return m;
 }
 
+/* Two feet carry 100 N each for a second, and then shells 50 N more for a second. */
+static void shells_share_the_load(void **state) {
+    (void)state;
+    Script s;
+    Measure m;
+    script_start(&s);
+    measure_start(&m, DT);
+    assert_close("no step", measure_shells(&m), 0, 0);
+    for (int k = 1; k <= STEPS(2); k++) {
+        s.sample.shell_load = k > STEPS(1) ? 50 : 0;
+        measure_sample(&m, &s.sample);
+    }
+    assert_close("share of the shells", measure_shells(&m), 50.0 / 450, 1e-12);
+}
+
 static void power_and_speed(void **state) {
     (void)state;
     Measure m = script_walk(0);
@@ -747,6 +762,7 @@ static void a_robot_is_read(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(power_and_speed),
+        cmocka_unit_test(shells_share_the_load),
         cmocka_unit_test(speeds_of_a_turning_robot),
         cmocka_unit_test(yaw_of_an_orientation),
         cmocka_unit_test(nothing_is_steady_before_two_seconds),

@@ -90,6 +90,7 @@ static void spoil(Bytes *bytes, MildContactInput *input) {
     input->solver = take_below(bytes, 2) ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON;
     input->max_iterations =
         input->solver == MILD_SOLVER_NEWTON ? take_below(bytes, NEWTON_WORK) : SWEEPS;
+    input->rows = take_below(bytes, 2) ? (uint32_t)take_below(bytes, 1 << FEET) : 0;
     for (int edits = take_below(bytes, 16); edits > 0; edits--) {
         int area = take_below(bytes, 7);
         areas[area][take_below(bytes, counts[area])] = take_number(bytes, usual[area]);
@@ -182,6 +183,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         MildContactInput input = quiet_input(count);
         MildContactResult result;
         spoil(&bytes, &input);
+        mild_ground_near(&terrain, &input, feet->scratch[count - 1]);
         mild_ground_solve(memory, &terrain, &input, feet->scratch[count - 1], &result);
         check_result(&input, &result, feet);
         mild_ground_advance(memory, &terrain, &input, feet->scratch[count - 1], &result);

@@ -185,6 +185,43 @@ static void test_near_as_all(void **state) {
     mild_map_destroy(rough);
 }
 
+/* Rough ground, then level ground, on which nothing may be left of the slopes: the same steps with
+ * and without the question which feet are near. */
+static void test_near_forgets_slopes(void **state) {
+    (void)state;
+    MildSole *sole[2] = {kit_sole(0, 77), kit_sole(1, 77)};
+    MildMaterial sand = mild_material_default();
+    MildMapDef def = mild_map_def_default();
+    def.kind = MILD_MAP_ROUGH;
+    def.size = 20.0;
+    MildMap *rough = mild_map_create(&def, NULL);
+    static Kit kit[2];
+    for (int k = 0; k < 2; k++) {
+        kit_open(&kit[k], 2, sole[0], sole[1], &sand, 1e-3);
+        set_motion(&kit[k], 0, 0);
+        set_motion(&kit[k], 1, 1);
+    }
+    for (int s = 0; s < STEPS; s++) {
+        for (int k = 0; k < 2; k++) {
+            kit[k].terrain.map = s < STEPS / 2 ? rough : NULL;
+            kit_inverse_inertia(&kit[k]);
+            kit_free(&kit[k], NULL);
+            if (k == 1) {
+                mild_ground_near(&kit[k].terrain, &kit[k].input, kit[k].scratch);
+            }
+            kit_solve(&kit[k]);
+            kit_advance(&kit[k]);
+        }
+        assert_memory_equal(&kit[0].result, &kit[1].result, sizeof kit[0].result);
+    }
+    assert_true(kit[0].result.foot[0].contacts > 0);
+    kit_close(&kit[0]);
+    kit_close(&kit[1]);
+    mild_map_destroy(rough);
+    mild_sole_destroy(sole[0]);
+    mild_sole_destroy(sole[1]);
+}
+
 /* No rows at all, rows of feet that do not exist, and no matrix. */
 static void test_refused_rows(void **state) {
     (void)state;
@@ -213,8 +250,8 @@ static void test_refused_rows(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_together_as_alone),
-                                       cmocka_unit_test(test_near_as_all),
-                                       cmocka_unit_test(test_refused_rows)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_together_as_alone), cmocka_unit_test(test_near_as_all),
+        cmocka_unit_test(test_near_forgets_slopes), cmocka_unit_test(test_refused_rows)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -100,6 +100,26 @@ static void concentric_models_have_none(void **unused) {
     assert_true(robot_bodies(robots[0]) > robot_feet(robots[0]));
 }
 
+/* The law under a shell is that of the feet's elements, whatever the distance of its own; its area
+ * is that of the geoms: the two boxes of SA01's shanks, 5 x 5 x 28 cm. */
+static void they_have_the_law_of_the_feet(void **unused) {
+    (void)unused;
+    for (int r = 0; r < ROBOTS; r++) {
+        robot_set_shells(robots[r], 1);
+        const MildSole *const *soles = robot_soles(robots[r]);
+        for (int b = robot_feet(robots[r]); b < robot_bodies(robots[r]); b++) {
+            assert_true(mild_sole_pitch(soles[b]) == mild_sole_pitch(soles[0]));
+        }
+    }
+    const MildSole *shank = robot_soles(robots[0])[robot_bodies(robots[0]) - 1];
+    double area = 0;
+    for (int i = 0; i < mild_sole_elements(shank); i++) {
+        area += mild_sole_surface_area(shank)[i];
+    }
+    assert_true(fabs(area - (4 * 0.05 * 0.28 + 2 * 0.05 * 0.05)) < 1e-12);
+    assert_true(fabs(sqrt(area / mild_sole_elements(shank)) - 0.03) < 0.006);
+}
+
 /* ---- lying ---- */
 
 /* Dropped on its back or side it comes to rest, and feet and shells carry its weight. */
@@ -245,6 +265,7 @@ int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(in_the_air_they_change_nothing),
         cmocka_unit_test(concentric_models_have_none),
+        cmocka_unit_test(they_have_the_law_of_the_feet),
         cmocka_unit_test(they_carry_a_robot_that_lies),
         cmocka_unit_test(falls_take_energy),
     };

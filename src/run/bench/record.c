@@ -23,6 +23,7 @@ MildStatus bench_open(BenchContext *c, const ExperimentDef *def, MildError *erro
     c->def.task.randomize.patch_share = 0;
     experiment_fit_robot(&c->def, c->robot);
     robot_set_model(c->robot, (MildModel)c->def.task.randomize.model);
+    robot_set_shells(c->robot, c->def.task.shells_stand);
     c->pool = pool_create(def->train.threads);
     return c->pool ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
 }
