@@ -200,7 +200,7 @@ static MildStatus copy_task(Batch *b, const EnvsDef *def, const TaskGrounds *gro
         task.uneven = !mild_map_is_level(def->task->map);
     }
     task.robot = *robot_table(def->robot);
-    MildStatus status = task_gains(def->task, def->robot, task.gains.kp, task.gains.kd, error);
+    MildStatus status = task_gains(def->task, def->robot, &task.gains, error);
     EnvsTask *at = status == MILD_OK ? take(b, sizeof *at, error) : NULL;
     b->arrays.task = at;
     return at ? device_copy(b->device, at, &task, sizeof task, error) : MILD_ERROR_MEMORY;

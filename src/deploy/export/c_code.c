@@ -82,7 +82,7 @@ static MildStatus print_weights(FILE *file, const Export *export, MildError *err
     const Robot *robot = export->robot;
     const int joints = robot_joints(robot);
     TaskGains gains;
-    MildStatus status = task_gains(export->task, robot, gains.kp, gains.kd, error);
+    MildStatus status = task_gains(export->task, robot, &gains, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -95,7 +95,7 @@ static MildStatus print_weights(FILE *file, const Export *export, MildError *err
     print_joints(file, "pose", robot_default_pose(robot), joints, 1);
     print_joints(file, "kp", gains.kp, joints, 1);
     print_joints(file, "kd", gains.kd, joints, 1);
-    print_joints(file, "limit", robot_effort(robot), joints, export->task->torque_share);
+    print_joints(file, "limit", gains.limit, joints, 1);
     print_joints(file, "low", robot_joint_low(robot), joints, 1);
     print_joints(file, "high", robot_joint_high(robot), joints, 1);
     fprintf(file, "\n#define WIDEST %d /* of the layers' outputs, in whole blocks */\n\n",

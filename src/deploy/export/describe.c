@@ -42,7 +42,7 @@ static void add_robot(Description *d, const Export *export, const TaskGains *gai
     add_numbers(d, "default_joint_pos", robot_default_pose(robot), joints, 1);
     add_numbers(d, "joint_stiffness", gains->kp, joints, 1);
     add_numbers(d, "joint_damping", gains->kd, joints, 1);
-    add_numbers(d, "joint_effort_limit", robot_effort(robot), joints, export->task->torque_share);
+    add_numbers(d, "joint_effort_limit", gains->limit, joints, 1);
     add_numbers(d, "joint_velocity_limit", robot_speed(robot), joints, 1);
     add_numbers(d, "joint_pos_low", robot_joint_low(robot), joints, 1);
     add_numbers(d, "joint_pos_high", robot_joint_high(robot), joints, 1);
@@ -87,7 +87,7 @@ static void add_rules(Description *d, const Export *export) {
 
 MildStatus describe(const Export *export, Description *description, MildError *error) {
     TaskGains gains;
-    MildStatus status = task_gains(export->task, export->robot, gains.kp, gains.kd, error);
+    MildStatus status = task_gains(export->task, export->robot, &gains, error);
     description->count = 0;
     if (status == MILD_OK) {
         add(description, "producer", "mild %s", export->version);

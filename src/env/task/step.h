@@ -178,7 +178,7 @@ MILD_HD_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Ro
     }
     motor.kp = env->strength[i] * REAL(gains->kp[i]) * env->kp_scale[i];
     motor.kd = env->strength[i] * REAL(gains->kd[i]) * env->kd_scale[i];
-    motor.limit = def->torque_share * robot->effort[i];
+    motor.limit = gains->limit[i];
     motor.fastest = robot->speed[i];
     return motor;
 }
