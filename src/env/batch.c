@@ -221,7 +221,7 @@ static MildStatus choose_kernels(Batch *b, const Robot *robot, const EngineTree 
         return MILD_OK;
     }
     b->kernels = kernels_for(tree);
-    return b->kernels ? checked(b->kernels->open(), error)
+    return b->kernels ? checked(b->kernels->open(b->device), error)
                       : mild_fail(error, MILD_ERROR_ARGUMENT,
                                   "%s: this build has no kernels for a robot of its size; "
                                   "train.robots = mujoco steps it",
@@ -284,6 +284,7 @@ static MildStatus open_batch(Batch *b, const EnvsDef *def, const TaskGrounds *gr
     b->pool = def->pool;
     b->labels = (size_t)labels_of(def->task);
     b->arrays.envs = def->count;
+    b->arrays.device = def->device;
     MildStatus status = open_ground(b, def, grounds, error);
     status = status == MILD_OK ? open_shares(b, error) : status;
     status = status == MILD_OK ? copy_model(b, def, error) : status;

@@ -62,6 +62,7 @@ typedef struct {
 
 typedef struct {
     int envs;
+    int device;             /* MILD_BATCH_HOST or number of the GPU */
     size_t stride;          /* [B] of a TaskEnv and its frames */
     char *env;              /* [envs][stride] */
     char *robot;            /* [envs] EnvRobot of batch_env.h */

@@ -4,6 +4,7 @@
 #define MILD_REAL_FLOAT
 #include <cuda_runtime.h>
 
+#include "device/cuda.h"
 #include "env/batch_step.h"
 #include "env/kernels.h"
 
@@ -174,7 +175,8 @@ static int kernels_fits(const EngineTree *tree) {
                              tree->chain == ENGINE_CHAIN);
 }
 
-static const char *kernels_open(void) {
+static const char *kernels_open(int device) {
+    OnDevice on(device);
     cudaFuncSetAttribute(part<0>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)work_bytes);
     cudaFuncSetAttribute(pose, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)work_bytes);
     cudaFuncSetAttribute(part<1>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)work_bytes);
@@ -182,16 +184,19 @@ static const char *kernels_open(void) {
 }
 
 static const char *kernels_create(const EnvsArrays *all, void *stream) {
+    OnDevice on(all->device);
     create<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
 static const char *kernels_begin(const EnvsArrays *all, void *stream) {
+    OnDevice on(all->device);
     begin<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
 static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int k, void *stream) {
+    OnDevice on(all->device);
     (all->sample
          ? part<1>
          : part<0>)<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, (cudaStream_t)stream>>>(
@@ -200,11 +205,13 @@ static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int
 }
 
 static const char *kernels_end(const EnvsArrays *all, const EnvsStep *call, void *stream) {
+    OnDevice on(all->device);
     end<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     return launched();
 }
 
 static const char *kernels_first(const EnvsArrays *all, const EnvsStep *call, void *stream) {
+    OnDevice on(all->device);
     pose<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, (cudaStream_t)stream>>>(*all);
     observe<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     arrange<<<1, ORDER_THREADS, 0, (cudaStream_t)stream>>>(*all);
@@ -212,16 +219,19 @@ static const char *kernels_first(const EnvsArrays *all, const EnvsStep *call, vo
 }
 
 static const char *kernels_move_progress(const EnvsArrays *all, int back, void *stream) {
+    OnDevice on(all->device);
     move_progress<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
     return launched();
 }
 
 static const char *kernels_set_command(const EnvsArrays *all, void *stream) {
+    OnDevice on(all->device);
     set_command<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
 static const char *kernels_tally(const EnvsArrays *all, void *stream) {
+    OnDevice on(all->device);
     tally<<<TALLY_NUMBERS, TALLY_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }

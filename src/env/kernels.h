@@ -41,7 +41,7 @@ void envs_host_tally(const EnvsArrays *all);
 typedef struct {
     int fixed;                           /* bool: for robots of one size */
     int (*fits)(const EngineTree *tree); /* bool: for such a robot */
-    const char *(*open)(void);           /* before all that follow; waits */
+    const char *(*open)(int device);     /* before all that follow; waits */
     EnvsBytes (*bytes)(const TaskDef *def, const TaskShape *shape);
     const char *(*create)(const EnvsArrays *all, void *stream);
     const char *(*begin)(const EnvsArrays *all, void *stream);
