@@ -160,6 +160,10 @@ typedef struct {
     double force[FORCES];
 } Worst;
 
+static double worse(double a, double b) {
+    return !(a > b) && a == a ? b : a; /* NaN where one is */
+}
+
 static double apart(const double *a, const double *b, int count, double scale) {
     double difference = 0, size = 0;
     for (int i = 0; i < count; i++) {
@@ -175,20 +179,20 @@ static void compare(Worst *worst, const BodiesCase *c, const Kit *kit) {
         const MildFootResult *foot = &kit->result.foot[b];
         memcpy(force + 3 * b, c->wrench + 6 * b, 3 * sizeof(double));
         memcpy(wanted + 3 * b, foot->force, 3 * sizeof(double));
-        worst->wrench = fmax(worst->wrench, apart(c->wrench + 6 * b + 3, foot->torque, 3, 1.0));
+        worst->wrench = worse(worst->wrench, apart(c->wrench + 6 * b + 3, foot->torque, 3, 1.0));
         if (foot->contacts > 0 && foot->force[2] > 1.0) {
             worst->loaded += c->faces[b];
-            worst->foot = fmax(worst->foot, apart(c->foot[b], foot->pressure_center, 3, 0.1));
-            worst->foot = fmax(worst->foot, apart(c->foot[b] + 3, &foot->depth_max, 1, 1e-3));
+            worst->foot = worse(worst->foot, apart(c->foot[b], foot->pressure_center, 3, 0.1));
+            worst->foot = worse(worst->foot, apart(c->foot[b] + 3, &foot->depth_max, 1, 1e-3));
             /* an element within rounding of the surface is loaded in one of the two */
             worst->means += apart(c->foot[b] + 4, &foot->depth_mean, 1, 1e-3) > 1e-9;
         }
     }
     const double gap = apart(force, wanted, 3 * c->bodies, 1.0);
     assert_true(worst->steps < FORCES);
-    worst->wrench = fmax(worst->wrench, gap);
+    worst->wrench = worse(worst->wrench, gap);
     worst->force[worst->steps++] = gap;
-    worst->twist = fmax(worst->twist, apart(c->after, kit->result.velocity, 6 * c->bodies, 0.01));
+    worst->twist = worse(worst->twist, apart(c->after, kit->result.velocity, 6 * c->bodies, 0.01));
     worst->iterations += c->iterations;
     worst->iterations_ground += kit->result.iterations;
 }
@@ -202,12 +206,12 @@ static void compare_element(Worst *worst, const BodiesCase *c, const Kit *kit, c
     for (int n = 0; n < CASE_MEMORY; n++) {
         const double a = c->memory[n][b][e];
         const double wanted = n == 1 && material < 0 ? a : all[n][e];
-        worst->memory = fmax(worst->memory, fabs(a - wanted) / (fabs(wanted) + scale[n]));
+        worst->memory = worse(worst->memory, fabs(a - wanted) / (fabs(wanted) + scale[n]));
     }
     if (c->faces[b]) {
         worst->buried += material == MATERIAL_BURIED;
         assert_int_equal((int)c->memory[12][b][e], state_of(material));
-        worst->memory = fmax(worst->memory, fabs(c->memory[13][b][e] - memory->share[e]));
+        worst->memory = worse(worst->memory, fabs(c->memory[13][b][e] - memory->share[e]));
     }
     if (kit->ground->uneven[b] && (material >= 0 || material == MATERIAL_FREE)) {
         const double x = c->memory[10][b][e], y = c->memory[11][b][e];
@@ -215,7 +219,7 @@ static void compare_element(Worst *worst, const BodiesCase *c, const Kit *kit, c
             c->memory[9][b][e] - x * c->own[0][b] - y * c->own[1][b] + c->own[2][b] - c->own[3][b];
         const double found[3] = {plane, x, y};
         const double wanted[3] = {memory->plane[e], memory->slope_x[e], memory->slope_y[e]};
-        worst->memory = fmax(worst->memory, apart(found, wanted, 3, 0.1));
+        worst->memory = worse(worst->memory, apart(found, wanted, 3, 0.1));
     }
 }
 
