@@ -30,6 +30,7 @@ typedef struct {
     int elements;
     const ContactMaterial *table; /* material m at [m step] */
     int step;
+    int memory; /* a surface: where its memory begins in that of a robot */
 } BodiesSole;
 
 /* The same for all robots and steps: feet first. */
