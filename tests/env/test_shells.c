@@ -1,0 +1,201 @@
+/* Environments of the batch engine whose robots' shells stand on soft ground, against those of the
+ * CPU, which MuJoCo steps; and against themselves without, where no shell is near the ground. With
+ * MILD_CUDA on the device too. */
+#include "env/batch_arrays.h"
+#include "env/kernels.h"
+#include "follow.h"
+#include "ground/batch/bodies.h"
+
+#define G1 MILD_SOURCE_DIR "/robots/g1"
+
+static int has_device(void) {
+    MildError error;
+    return device_open(0, &error) == MILD_OK;
+}
+
+/* Robots that fall: until the base is on the ground. */
+static TaskDef shells_def(void) {
+    TaskDef def = some_def();
+    def.shells_stand = 1;
+    def.tilt_limit = 2;
+    def.randomize.rigid_share = 0.1;
+    return def;
+}
+
+/* Of environments of the batch engine, in the last physics step: had shells near the ground. */
+static void read_held(uint8_t held[ENVS]) {
+    MildError error = {0};
+    const EnvsArrays *all = envs_batch_arrays(pair.batch);
+    assert_int_equal(device_copy(pair.device, held, all->shells.held, ENVS, &error), MILD_OK);
+}
+
+/* Largest difference of what the critic sees, but for the depths of corners, which jump. */
+static double critics_apart(int e) {
+    const TaskShape *shape = &pair.shape;
+    const int depths = shape->observation + shape->estimates;
+    double most = 0;
+    for (int i = 0; i < shape->critic; i++) {
+        const int depth = i >= depths && i < depths + 6 * shape->feet && (i - depths) % 6 == 5;
+        const int at = e * shape->critic + i;
+        const double gap = fabs((double)pair.a.critic[at] - (double)pair.b.critic[at]);
+        most = depth ? most : gap > most || gap != gap ? gap : most;
+    }
+    return most;
+}
+
+/* The same in all steps of an environment, so that it falls. */
+static void draw_falls(int t, double most) {
+    draw_actions(t);
+    for (int e = 0; e < ENVS; e++) {
+        Random r = random_at(4, (uint32_t)e, 0);
+        for (int i = 0; i < pair.shape.actions; i++) {
+            pair.a.action[e * pair.shape.actions + i] += (float)(most * (2 * random_unit(&r) - 1));
+        }
+    }
+}
+
+/* Steps, and those in which the two agree; with shells near the ground, the same. */
+typedef struct {
+    int steps, together, near, near_together;
+    int ends[TASK_END_COUNT];
+    double first; /* largest difference of the critics where shells have just come near */
+} Falls;
+
+/* As follow, of robots that fall. An environment is left alone once it differs, until its next
+ * episode: a fall doubles a difference within a few steps. */
+static Falls fall(const char *robot, TaskDef def, int device, const MildMapDef *on, double most) {
+    MildMap *map = on ? mild_map_create(on, NULL) : NULL;
+    Falls falls = {0};
+    int apart[ENVS] = {0};
+    uint8_t held[ENVS], before[ENVS] = {0};
+    def.map = map;
+    pair_open(robot, &def, device);
+    pair_reset();
+    for (int t = 0; t < STEPS; t++) {
+        draw_falls(t, most);
+        pair_step();
+        read_held(held);
+        for (int e = 0; e < ENVS; e++) {
+            const double gap = critics_apart(e);
+            const int done = pair.a.done[e] != 0, same = done == (pair.b.done[e] != 0);
+            apart[e] |= !same || !(gap < 1e-2);
+            falls.steps++;
+            falls.together += !apart[e];
+            falls.near += held[e] != 0;
+            falls.near_together += held[e] && !apart[e];
+            if (!apart[e]) {
+                assert_int_equal(pair.a.cause[e], pair.b.cause[e]);
+                falls.ends[pair.b.cause[e]] += done;
+                falls.first = fmax(falls.first, held[e] && !before[e] && !done ? gap : 0);
+            }
+            apart[e] = done && same ? 0 : apart[e];
+            before[e] = done ? 0 : held[e];
+        }
+    }
+    printf(
+        "%s, device %d%s: %d of %d steps together, with shells near the ground %d of %d; critics "
+        "differ by %.1e at most where they come near;",
+        robot_name(pair.robot), device, on ? ", on a map" : "", falls.together, falls.steps,
+        falls.near_together, falls.near, falls.first);
+    for (int end = 0; end < TASK_END_COUNT; end++) {
+        printf(" %s %d%s", task_end_names[end], falls.ends[end],
+               end < TASK_END_COUNT - 1 ? "," : "\n");
+    }
+    pair_close();
+    mild_map_destroy(map);
+    return falls;
+}
+
+static void check(Falls falls, double least) {
+    assert_true(falls.near > 200 && falls.near_together > least * falls.near);
+    assert_true(falls.together > least * falls.steps);
+}
+
+static void falls_are_those_of_mujoco(void **unused) {
+    (void)unused;
+    const MildMapDef map = some_map();
+    const Falls level = fall(SA01, shells_def(), MILD_BATCH_HOST, NULL, 2);
+    check(level, 0.5);
+    assert_true(level.ends[TASK_END_base] > 0);
+    check(fall(SA01, shells_def(), MILD_BATCH_HOST, &map, 2), 0.5);
+    check(fall(G1, shells_def(), MILD_BATCH_HOST, NULL, 2), 0.5);
+    check(fall(GO1, shells_def(), MILD_BATCH_HOST, &map, 2), 0.5);
+}
+
+/* In the air they change no bit: robots that do not fall, with and without. */
+static void far_shells_change_no_bit(void **unused) {
+    (void)unused;
+    static Rows without[STEPS];
+    uint8_t held[ENVS], near[ENVS] = {0};
+    int same = 0;
+    for (int stand = 0; stand < 2; stand++) {
+        TaskDef def = shells_def();
+        def.shells_stand = stand;
+        def.shell_depth = 1; /* no end either */
+        pair_open(SA01, &def, MILD_BATCH_HOST);
+        pair_reset();
+        for (int t = 0; t < STEPS; t++) {
+            draw_actions(t);
+            pair_step();
+            if (!stand) {
+                without[t] = pair.b;
+                continue;
+            }
+            read_held(held);
+            for (int e = 0; e < ENVS; e++) {
+                const int width = pair.shape.critic;
+                near[e] |= held[e];
+                if (!near[e]) {
+                    assert_memory_equal(pair.b.critic + e * width, without[t].critic + e * width,
+                                        (size_t)width * sizeof(float));
+                    assert_true(pair.b.reward[e] == without[t].reward[e]);
+                    same++;
+                }
+            }
+        }
+        pair_close();
+    }
+    print_message("%d of %d steps without a shell near the ground: the same bits\n", same,
+                  ENVS * STEPS);
+    assert_true(same > ENVS * STEPS / 2);
+}
+
+/* Robots that stagger, whose shells may come near. */
+static void standing_robots_follow_mujoco(void **unused) {
+    (void)unused;
+    follow(SA01, shells_def(), MILD_BATCH_HOST, NULL, 0.85);
+}
+
+/* A model of one element has none for shells. */
+static void models_of_one_element_have_no_shells(void **unused) {
+    (void)unused;
+    TaskDef def = shells_def();
+    def.randomize.model = MILD_MODEL_CON_CONE;
+    pair_open(SA01, &def, MILD_BATCH_HOST);
+    assert_null(envs_batch_arrays(pair.batch)->shells.setup);
+    pair_close();
+}
+
+static void device_falls_are_those_of_mujoco(void **unused) {
+    (void)unused;
+    if (!has_device()) {
+        skip();
+    }
+    const MildMapDef map = some_map();
+    check(fall(SA01, shells_def(), 0, NULL, 2), 0.5);
+    check(fall(SA01, shells_def(), 0, &map, 2), 0.5);
+    check(fall(G1, shells_def(), 0, NULL, 2), 0.5);
+    check(fall(GO1, shells_def(), 0, &map, 2), 0.5);
+    follow(SA01, shells_def(), 0, NULL, 0.85);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(falls_are_those_of_mujoco),
+        cmocka_unit_test(far_shells_change_no_bit),
+        cmocka_unit_test(standing_robots_follow_mujoco),
+        cmocka_unit_test(models_of_one_element_have_no_shells),
+        cmocka_unit_test(device_falls_are_those_of_mujoco),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
