@@ -511,8 +511,8 @@ static void falls_gain(int falls, void (*run)(BodiesCase *), double tolerance, d
 
 static void falls_gain_nothing(void **state) {
     (void)state;
-    falls_gain(kit_draws(65), bodies_double, 1e-11, 1e-9);
-    falls_gain(kit_draws(65), bodies_float, 1e-4, 1e-3);
+    falls_gain(kit_draws(39), bodies_double, 1e-11, 1e-9);
+    falls_gain(kit_draws(39), bodies_float, 1e-4, 1e-3);
 }
 
 int main(void) {

@@ -486,9 +486,9 @@ static void legs_do_not_cross(void **state) {
     pool_destroy(pool);
 }
 
-/* Foam half as stiff as the softest: where shells do not stand a shank ends every trial, where they
- * do none falls, and the shanks' share of the load is small and reported. By MuJoCo and by the batch
- * engine. */
+/* Foam half as stiff as the softest: where shells do not stand a shank ends every trial. Where they
+ * do none falls, and the shanks' share of the load is small and reported. By MuJoCo and by the
+ * batch engine. */
 static void shells_stand(void **state) {
     (void)state;
     MildError error = {0};
