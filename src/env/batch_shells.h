@@ -79,8 +79,7 @@ WARP_FN void env_shells_near(const EnvsArrays *all, long robot, const EngineGrou
 
 /* Bool: there is something to do for a robot. */
 MILD_HD int env_shells_wait(const EnvsArrays *all, long robot) {
-    return all->shells.near[robot] || all->shells.held[robot] ||
-           env_shells_at(all, robot)->load != 0;
+    return all->shells.near[robot] || all->shells.held[robot];
 }
 
 /* Memory of foot f, in the layout of contact.h. */

@@ -122,17 +122,17 @@ static void falls_are_those_of_mujoco(void **unused) {
     check(fall(GO1, shells_def(), MILD_BATCH_HOST, &map, 2), 0.5);
 }
 
-/* In the air they change no bit: robots that do not fall, with and without. */
-static void far_shells_change_no_bit(void **unused) {
-    (void)unused;
+/* Robots that do not fall, with shells that stand and without. Steps up to the first one with a
+ * shell near the ground, and those of them that have the same bits. */
+static void stand_twice(int device, int *far, int *same) {
     static Rows without[STEPS];
     uint8_t held[ENVS], near[ENVS] = {0};
-    int same = 0;
+    *far = *same = 0;
     for (int stand = 0; stand < 2; stand++) {
         TaskDef def = shells_def();
         def.shells_stand = stand;
         def.shell_depth = 1; /* no end either */
-        pair_open(SA01, &def, MILD_BATCH_HOST);
+        pair_open(SA01, &def, device);
         pair_reset();
         for (int t = 0; t < STEPS; t++) {
             draw_actions(t);
@@ -143,21 +143,27 @@ static void far_shells_change_no_bit(void **unused) {
             }
             read_held(held);
             for (int e = 0; e < ENVS; e++) {
-                const int width = pair.shape.critic;
+                const size_t width = (size_t)pair.shape.critic, at = (size_t)e * width;
                 near[e] |= held[e];
-                if (!near[e]) {
-                    assert_memory_equal(pair.b.critic + e * width, without[t].critic + e * width,
-                                        (size_t)width * sizeof(float));
-                    assert_true(pair.b.reward[e] == without[t].reward[e]);
-                    same++;
-                }
+                *far += !near[e];
+                *same +=
+                    !near[e] && pair.b.reward[e] == without[t].reward[e] &&
+                    memcmp(pair.b.critic + at, without[t].critic + at, width * sizeof(float)) == 0;
             }
         }
         pair_close();
     }
-    print_message("%d of %d steps without a shell near the ground: the same bits\n", same,
-                  ENVS * STEPS);
-    assert_true(same > ENVS * STEPS / 2);
+    print_message(
+        "device %d: %d of %d steps without a shell near the ground, %d with the same bits\n",
+        device, *far, ENVS * STEPS, *same);
+}
+
+/* In the air they change no bit. */
+static void far_shells_change_no_bit(void **unused) {
+    (void)unused;
+    int far, same;
+    stand_twice(MILD_BATCH_HOST, &far, &same);
+    assert_true(far > ENVS * STEPS / 2 && same == far);
 }
 
 /* Robots that stagger, whose shells may come near. */
@@ -187,6 +193,9 @@ static void device_falls_are_those_of_mujoco(void **unused) {
     check(fall(G1, shells_def(), 0, NULL, 2), 0.5);
     check(fall(GO1, shells_def(), 0, &map, 2), 0.5);
     follow(SA01, shells_def(), 0, NULL, 0.85);
+    int far, same;
+    stand_twice(0, &far, &same); /* `part` is compiled once more, which may round in other places */
+    assert_true(far > ENVS * STEPS / 2);
 }
 
 int main(void) {

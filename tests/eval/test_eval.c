@@ -486,8 +486,9 @@ static void legs_do_not_cross(void **state) {
     pool_destroy(pool);
 }
 
-/* Foam half as stiff as the softest: where shells do not stand a shank ends every trial, where they
- * do none falls, and the shanks' share of the load is small and reported. */
+/* Foam half as stiff as the softest: where shells do not stand a shank ends every trial. Where they
+ * do none falls, and the shanks' share of the load is small and reported. By MuJoCo and by the
+ * batch engine. */
 static void shells_stand(void **state) {
     (void)state;
     MildError error = {0};
@@ -499,7 +500,8 @@ static void shells_stand(void **state) {
     assert_int_equal(scene_make(&scene, "foam25", 2, &error), MILD_OK);
     scene.terrain.materials[0].k_pen = 75;
     scene.terrain.materials[0].sigma_cone = 5.5e4;
-    for (int stand = 0; stand < 2; stand++) {
+    for (int n = 0; n < 4; n++) {
+        const int stand = n % 2, batch = n / 2;
         EvalTrial each[2];
         EvalRow row;
         TaskDef task = def;
@@ -510,6 +512,7 @@ static void shells_stand(void **state) {
                              .pool = pool,
                              .controller = &controller,
                              .device = MILD_BATCH_HOST,
+                             .batch = batch,
                              .scenes = &scene,
                              .scene_count = 1,
                              .speeds = &speed,
@@ -517,8 +520,9 @@ static void shells_stand(void **state) {
                              .eval = {.trials = 2, .seconds = 12, .seed = 1},
                              .each = each};
         assert_int_equal(eval_run(&run, &row, &error), MILD_OK);
-        printf("shells %s: %d of 2 upright, shells carry %.1e of the load\n",
-               stand ? "stand" : "end a trial", row.success, row.shells);
+        printf("shells %s%s: %d of 2 upright, shells carry %.1e of the load\n",
+               stand ? "stand" : "end a trial", batch ? ", batch engine" : "", row.success,
+               row.shells);
         assert_int_equal(row.success, stand ? 2 : 0);
         assert_int_equal(row.ends[TASK_END_shell], stand ? 0 : 2);
         assert_true(stand ? row.shells > 1e-7 && row.shells < 1e-3 : row.shells == 0);

@@ -177,7 +177,7 @@ const MildField task_fields[] = {
       "this below the undisturbed surface"),
     T(shells_stand, B, 1, 0, 1,
       "[bool] geoms of `shells` of robot.ini stand on soft ground as soles do; then a shell of the "
-      "base ends the episode when it touches the ground, and no other (MuJoCo's robots alone)"),
+      "base ends the episode when it touches the ground, and no other"),
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
     T(newton, B, 1, 0, 1,

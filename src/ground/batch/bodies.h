@@ -526,7 +526,9 @@ WARP_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advan
 
 /* A surface far from the ground forgets. */
 WARP_FN void bodies_leave(const BodiesMemory *memory, int elements) {
-    if (memory->body[BODIES_TOUCHED] > 0) {
+    const int touched = memory->body[BODIES_TOUCHED] > 0;
+    lanes_sync(); /* all lanes have read it */
+    if (touched) {
         EACH_LANE(l) {
             LANE_ROLLED
             for (int n = LANE(l); n < bodies_memory_numbers(elements); n += LANES) {

@@ -75,7 +75,7 @@ typedef struct {
     /* ---- bodies with shells, where these stand on soft ground ---- */
     int bodies;
     EngineIndex body_link[ENGINE_BODIES_MAX];
-    /* Degrees of freedom that move a body and a foot, or another body, which come after the feet. */
+    /* Degrees of freedom that move a body and a foot, or another body: they follow the feet. */
     EngineIndex body_shared[ENGINE_BODIES_MAX][ROBOT_FEET_MAX + ENGINE_BODIES_MAX];
     /* ---- parts of legs that touch other legs ---- */
     EngineIndex capsule_link[ROBOT_CAPSULES_MAX];
