@@ -77,6 +77,35 @@ WARP_FN void env_shells_near(const EnvsArrays *all, long robot, const EngineGrou
 
 /* ---- the step ---- */
 
+/* Of the bits in `near`, those of bodies with an element that may touch the ground in this step. */
+WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, int near) {
+    const EngineModel *model = all->model;
+    const BodiesSetup *setup = env_bodies(all);
+    const EngineSaved *saved = &env_robot_at(all, robot)->saved;
+    const EngineLinks links = engine_links_saved(&env_shells_at(all, robot)->links);
+    int touch = 0;
+    LANE_ROLLED
+    for (int body = 0; body < model->tree.bodies; body++) {
+        const int at = setup->feet + body;
+        Real position[3], rotation[9], twist[6];
+        if (!(near >> body & 1)) {
+            continue;
+        }
+        engine_body_pose(model, &links, body, position, rotation);
+        engine_body_twist(&model->tree, &links, saved->state + ENGINE_SAVED(rate), body, position,
+                          twist);
+        for (int k = 0; k < 3; k++) {
+            position[k] += saved->state[ENGINE_SAVED(base) + k];
+        }
+        const Real least = bodies_least(setup, setup->sole[at].radius, twist, twist);
+        if (bodies_touch(setup, at, position, rotation, all->map_origin + 2 * robot,
+                         all->contact.height[robot], least)) {
+            touch |= 1 << body;
+        }
+    }
+    return touch;
+}
+
 /* Bool: there is something to do for a robot. */
 MILD_HD int env_shells_wait(const EnvsArrays *all, long robot) {
     return all->shells.near[robot] || all->shells.held[robot];
@@ -211,7 +240,8 @@ WARP_FN void env_shells_step(const EnvsArrays *all, long robot, int near, EnvShe
 
 /* After part k of a policy step. In a new episode the shells remember nothing. */
 WARP_FN void env_shells(const EnvsArrays *all, long robot, int k, EnvShellsWork *work) {
-    const int near = all->shells.near[robot];
+    const int listed = all->shells.near[robot];
+    const int near = listed ? env_shells_touch(all, robot, listed) : 0;
     const int held = all->shells.held[robot];
     if (held) {
         env_shells_leave(all, robot, k == 0 && all->reset[robot] ? 0 : near);
@@ -221,6 +251,7 @@ WARP_FN void env_shells(const EnvsArrays *all, long robot, int k, EnvShellsWork 
     }
     EACH_LANE(l) {
         if (LANE(l) == 0) {
+            all->shells.near[robot] = (uint8_t)near;
             all->shells.held[robot] = near != 0;
             if (!near) {
                 env_shells_at(all, robot)->load = 0;

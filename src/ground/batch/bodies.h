@@ -193,6 +193,31 @@ MILD_HD Real bodies_reach(const BodiesSetup *setup, int body, const Real *positi
     return above - at[2] + setup->steepest * REAL_SQRT(square) + low;
 }
 
+/* Bool: an element of a body at that pose is deeper than `least`. Exact, where bodies_reach is a bound
+ * that steep places of a map make wide. */
+WARP_FN int bodies_touch(const BodiesSetup *setup, int body, const Real *position, const Real *R,
+                         const Real *map_origin, Real height, Real least) {
+    const BodiesSole *sole = &setup->sole[body];
+    Real found[LANE_COPIES];
+    MapSpot spot;
+    if (setup->has_map) {
+        spot = map_spot(&setup->map, position, map_origin, height);
+    }
+    EACH_LANE(l) {
+        found[l] = 0;
+        LANE_ROLLED
+        for (int s = LANE(l); s < sole->elements; s += LANES) {
+            Real p[3], slope[2];
+            bodies_point(sole, R, s, p);
+            const Real above = setup->has_map
+                                   ? map_surface_near(&setup->map, &spot, p[0], p[1], slope)
+                                   : height - position[2];
+            found[l] += above - p[2] > least ? 1 : 0;
+        }
+    }
+    return lane_sum(found) > 0;
+}
+
 /* ---- an element at the start of a step ---- */
 
 MILD_HD ElementMemory bodies_recall(const BodiesMemory *memory, int s) {
