@@ -7,8 +7,8 @@
 static const char usage[] =
     "usage: grains [options] --case 'NAME SHAPE TILT STAGE...' [--case ...]\n"
     "\n"
-    "Fills beds of grains, one for each seed, lets them settle, and runs each case on all of them,\n"
-    "from the settled beds. Each gives FOLDER/NAME-SEED.csv. Rows are means over their time.\n"
+    "Fills beds of grains, one for each seed, lets them settle, and runs each case on all of\n"
+    "them, from the settled beds. Each gives FOLDER/NAME-SEED.csv. Rows are means over time.\n"
     "\n"
     "  --out FOLDER          where the CSVs go (default .)\n"
     "  --seeds A[-B]         one bed each (default 1)\n"
@@ -28,8 +28,8 @@ static const char usage[] =
     "  --write-bed FILE      writes the first settled bed so\n"
     "  --rows N              about how many rows a record has (default 150)\n"
     "  --case TEXT           a case; stages are press:DEPTH@SPEED, drag:PATH@SPEED,\n"
-    "                        load:PATH@SPEED, swipe:DEG@RATE, hold:T, drop:MASS@SPEED,T; shapes are\n"
-    "                        disc:D, rect:L,W, polygon:X,Y,..., sphere:R\n";
+    "                        load:PATH@SPEED, swipe:DEG@RATE, hold:T, drop:MASS@SPEED,T;\n"
+    "                        shapes are disc:D, rect:L,W, polygon:X,Y,..., sphere:R\n";
 
 struct Options {
     BedDef bed;
