@@ -330,7 +330,6 @@ inline std::vector<std::pair<char *, size_t>> bed_parts(const Grains &g) {
         {(char *)g.place, n * sizeof(Place)},
         {(char *)g.velocity, n * sizeof(Vec)},
         {(char *)g.spin, n * sizeof(Vec)},
-        {(char *)g.listed, n * sizeof(Place)},
         {(char *)g.touching, n * sizeof(uint32_t)},
         {(char *)g.neighbour, n * NEIGHBOURS * sizeof(int)},
         {(char *)g.slip, n * SLOTS * sizeof(Vec)}};
@@ -354,7 +353,7 @@ inline void bed_restore(Bed *bed, const std::vector<char *> &saved) {
     for (size_t k = 0; k < parts.size(); k++) {
         copy(parts[k].first, (const char *)saved[k], parts[k].second);
     }
-    bed->steps = 0;
+    bed->steps = bed->lists = 0; /* the next step makes lists anew */
 }
 
 #endif

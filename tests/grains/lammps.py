@@ -47,7 +47,7 @@ def ours(program, folder, seed):
     for name, (tilt, drag) in CASES.items():
         stages = f"press:{DEPTH}@{SPEED}" + (f" drag:{PATH}@{SPEED}" if drag else "")
         lines += ["--case", f"{name} rect:{PLATE},{PLATE} {tilt} {stages}"]
-    run = subprocess.run([*common, "--settle", "0", "--bed", bed, "--rows", "240", *lines], check=True, capture_output=True,
+    run = subprocess.run([*common, "--settle", "0", "--bed", bed, "--rows", "240", *lines], check=True, stdout=subprocess.PIPE,
                          text=True)
     made = json.loads(run.stdout.splitlines()[0])["bed"]
     rows = {}
