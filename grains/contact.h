@@ -5,7 +5,7 @@
  * within Coulomb's cone (Cundall and Strack 1979). Rolling, optional: a spring and dashpot on the
  * path rolled, held within mu_roll times the normal force (Luding 2008). These are `hooke` or
  * `hertz`, `linear_history` and `sds` of LAMMPS's pair style `granular`, with which
- * tests/grains/lammps.py compares. */
+ * tests/grains/with_lammps.py compares. */
 #ifndef GRAINS_CONTACT_H
 #define GRAINS_CONTACT_H
 

