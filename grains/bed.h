@@ -283,17 +283,27 @@ inline void bed_measure(Bed *bed) {
 
 /* ---- levelling ---- */
 
-/* Takes away the grains that stand above `depth`, puts the others in the order of their cells, so
- * that neighbours lie near each other in memory, and forgets every contact. */
+/* Bits of a number with two zeros between them. */
+inline uint64_t bits_apart(int number) {
+    uint64_t out = 0;
+    for (int k = 0; k < 20; k++) {
+        out |= (uint64_t)(number >> k & 1) << (3 * k);
+    }
+    return out;
+}
+
+/* The order of cells along Morton's curve: near each other in space, mostly near in memory. */
+inline uint64_t cell_order(const Grains &g, const Place &p) {
+    return bits_apart(cell_along(p.x, g.cells_x)) | bits_apart(cell_along(p.y, g.cells_y)) << 1 |
+           bits_apart(cell_along(p.z, g.cells_z)) << 2;
+}
+
+/* Takes away the grains that stand above `depth`, puts the others in the order of their cells, and
+ * forgets every contact. */
 inline void bed_level(Bed *bed) {
     Grains &g = bed->g;
     std::vector<Place> place = bed_places(*bed);
-    const auto key = [&g](const Place &p) {
-        const uint64_t x = (uint64_t)cell_along(p.x, g.cells_x),
-                       y = (uint64_t)cell_along(p.y, g.cells_y);
-        const uint64_t z = (uint64_t)cell_along(p.z, g.cells_z);
-        return p.radius > 0 ? (z * 65536 + y) * 65536 + x : UINT64_MAX;
-    };
+    const auto key = [&g](const Place &p) { return p.radius > 0 ? cell_order(g, p) : UINT64_MAX; };
     for (Place &p : place) {
         if ((float)p.z * g.unit.z + p.radius > bed->def.depth) {
             p.radius = 0;

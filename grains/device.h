@@ -75,7 +75,7 @@ DEVICE void add_to(long long *sum, long long value) {
 
 template <class System, void (*act)(int, const System &)>
 void each(int count, const System &system) {
-#pragma omp parallel for schedule(static) if (count > 256)
+#pragma omp parallel for schedule(static) if (count > 4000)
     for (int i = 0; i < count; i++) {
         act(i, system);
     }

@@ -4,6 +4,7 @@
     grains/run.py --list                                what there is, and what it is expected to cost
     grains/run.py --program build/grains/grains --gpus 0,1     all that is not there yet
     grains/run.py --only 'sand/disc120' --out out/again        one case again, to compare
+    grains/run.py --have grains/records --out new --seconds 500    what is not there yet, as far as the time goes
 
 A block is one start of the program: beds of one family, which settle once, and some cases on all of them. Blocks are in the
 order in which they are worth having; an interrupted run goes on where it stopped, case by case. Records are
@@ -183,11 +184,13 @@ def check():
 # ---- running ----
 
 class Manifest:
-    """manifest.json: {"FAMILY": bed, "FAMILY/CASE": case}, written whole after each case."""
+    """manifest.json: {"FAMILY": bed, "FAMILY/CASE": case}, written whole after each case. It begins with that of `have`."""
 
-    def __init__(self, folder):
-        self.file, self.lock = folder / "manifest.json", threading.Lock()
-        self.rows = json.loads(self.file.read_text()) if self.file.exists() else {}
+    def __init__(self, folder, have):
+        self.file, self.lock, self.rows = folder / "manifest.json", threading.Lock(), {}
+        for file in (have / "manifest.json" if have else None, self.file):
+            if file and file.exists():
+                self.rows |= json.loads(file.read_text())
 
     def put(self, key, row):
         with self.lock:
@@ -206,8 +209,9 @@ def missing(args, family, cases):
     """Cases of a block that are asked for and have not a record of each seed."""
     for case in cases:
         name = case.split()[0]
-        files = [args.out / family / f"{name}-{seed}.csv" for seed in seeds_of(family, args.seeds)]
-        if re.search(args.only, f"{family}/{name}") and not all(file.exists() for file in files):
+        files = [f"{family}/{name}-{seed}.csv" for seed in seeds_of(family, args.seeds)]
+        there = all((args.out / file).exists() or (args.have and (args.have / file).exists()) for file in files)
+        if re.search(args.only, f"{family}/{name}") and not there:
             yield case
 
 
@@ -223,6 +227,8 @@ def run_block(args, manifest, family, cases, gpu):
     environment = dict(os.environ, **({"CUDA_VISIBLE_DEVICES": gpu} if gpu else {}))
     words = command(args, family, cases)
     program = subprocess.Popen([args.program, "--out", folder, *words], stdout=subprocess.PIPE, text=True, env=environment)
+    args.running.append(program)
+    grains = grains_of(family) * beds_of(family, args.seeds)
     texts = {case.split()[0]: case for case in cases}
     for line in program.stdout:
         row = json.loads(line)
@@ -232,18 +238,27 @@ def run_block(args, manifest, family, cases, gpu):
             manifest.put(family, {**row.pop("bed"), **row, "options": command(args, family, [])})
             continue
         name = row.pop("case")
+        rate = row["steps"] * grains / max(row["seconds"], 1e-3)
         row["hours"] = round(row.pop("seconds") / 3600, 5)
         row["command"] = f"grains/run.py --only '^{family}/{name}$' --out FOLDER"
         row["case"], row["seeds"] = texts[name], args.seeds or FAMILIES[family]["seeds"]
         manifest.put(f"{family}/{name}", row)
-        print(f"{family}/{name}: {3600 * row['hours']:.1f} s{' on GPU ' + gpu if gpu else ''}", flush=True)
-    if program.wait():
+        print(f"{family}/{name}: {3600 * row['hours']:.1f} s{' on GPU ' + gpu if gpu else ''}, {rate:.2g} grain-steps a second",
+              flush=True)
+    if program.wait() and not args.late.is_set():
         print(f"run.py: {family}: the program ended with {program.returncode}; its finished cases are kept", file=sys.stderr)
-    return program.returncode
+    return 0 if args.late.is_set() else program.returncode
+
+
+def out_of_time(args):
+    """Ends the programs; their finished cases are kept."""
+    args.late.set()
+    for program in args.running:
+        program.terminate()
 
 
 def worker(args, manifest, blocks, gpu, failures):
-    while True:
+    while not args.late.is_set():
         try:
             family, cases = blocks.get_nowait()
         except queue.Empty:
@@ -268,7 +283,7 @@ def show(args):
             total += work
             share, side = widths[family, case]
             print(f"  {case.split()[0]:20} {work / args.rate:6.0f} s   {side:5.1f} grains wide, {100 * share:.1f} % of the box")
-    gpus = len(args.gpus.split(",")) if args.gpus else 1
+    gpus = len(args.gpus.split(","))
     print(f"{total / args.rate:.0f} s at {args.rate:.1e} grain-steps a second; {total / args.rate / gpus:.0f} s on {gpus}")
 
 
@@ -281,7 +296,9 @@ def main():
     parser.add_argument("--only", default="", help="cases FAMILY/CASE that this regular expression finds")
     parser.add_argument("--seeds", default="", help="A or A-B instead of each family's own")
     parser.add_argument("--rows", type=int, default=130, help="of a record, about")
-    parser.add_argument("--rate", type=float, default=4e9, help="grain-steps a second, for --list")
+    parser.add_argument("--have", type=pathlib.Path, help="folder of records that need not be made again")
+    parser.add_argument("--seconds", type=float, default=0, help="end after this time, and keep what is finished")
+    parser.add_argument("--rate", type=float, default=2e9, help="grain-steps a second, for what it is expected to cost")
     parser.add_argument("--device", default="", help="what to call the machine in the manifest")
     parser.add_argument("--list", action="store_true")
     args = parser.parse_args()
@@ -292,17 +309,24 @@ def main():
     if not args.program.exists():
         sys.exit(f"run.py: {args.program} is not there: cmake --build build --target grains (docs/grains.md)")
     args.out.mkdir(parents=True, exist_ok=True)
-    for part in args.out.glob("*/*.part"):
-        part.unlink()
-    blocks, failures, manifest = queue.Queue(), [], Manifest(args.out)
+    args.running, args.late = [], threading.Event()
+    blocks, failures, manifest = queue.Queue(), [], Manifest(args.out, args.have)
     for block in BLOCKS:
         blocks.put(block)
     gpus = [gpu for gpu in args.gpus.split(",") for _ in range(args.per_gpu)] or [""]
     threads = [threading.Thread(target=worker, args=(args, manifest, blocks, gpu, failures), daemon=True) for gpu in gpus]
+    timer = threading.Timer(args.seconds, out_of_time, [args])
+    timer.daemon = True
+    if args.seconds > 0:
+        timer.start()
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
+    for part in args.out.glob("*/*.part"):
+        part.unlink()
+    if args.late.is_set():
+        print("out of time; the same command goes on")
     sys.exit(1 if failures else 0)
 
 
