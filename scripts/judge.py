@@ -23,7 +23,8 @@ import numpy as np
 
 import mild
 from judge_cases import COLUMNS, MEASURES, Case, measures, scale
-from judge_entries import (Archimedes, FunctionEntry, GroundEntry, TableEntry, chrono_scm, rft_stress, wong_dry_sand)
+from judge_entries import (Archimedes, FunctionEntry, GroundEntry, TableEntry, c_function, chrono_scm, rft_stress,
+                           wong_dry_sand)
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Families of beds, what a model is fitted to there, and the families that the same fit predicts.
@@ -90,6 +91,23 @@ def grain_values(case, beds):
 
 # ---- models ----
 
+def function_entry(text):
+    """FILE.py:FUNCTION or LIB.so:FUNCTION."""
+    file, _, name = text.rpartition(":")
+    path = pathlib.Path(file).resolve()
+    if not file or not path.exists():
+        sys.exit(f"judge.py: --entry {text}: it must be FILE.py:FUNCTION or LIB.so:FUNCTION")
+    try:
+        if path.suffix != ".py":
+            return FunctionEntry(name, c_function(str(path), name))
+        spec = importlib.util.spec_from_file_location("entry", path)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return FunctionEntry(name, getattr(module, name))
+    except (OSError, AttributeError) as error:
+        sys.exit(f"judge.py: --entry {text}: {error}")
+
+
 def entries(args, ground):
     friction = FRICTION.get(ground["friction"], 0.38)
     stress = rft_stress(ground, friction)
@@ -102,16 +120,7 @@ def entries(args, ground):
     yield FunctionEntry("chrono scm", chrono_scm)
     yield FunctionEntry("wong dry sand", wong_dry_sand)
     yield FunctionEntry("archimedes", Archimedes())
-    for text in args.entry:
-        file, _, name = text.partition(":")
-        spec = importlib.util.spec_from_file_location("entry", file)
-        if not name or spec is None or not pathlib.Path(file).exists():
-            sys.exit(f"judge.py: --entry {text}: it must be FILE.py:FUNCTION")
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        if not hasattr(module, name):
-            sys.exit(f"judge.py: --entry {text}: {file} has no {name}")
-        yield FunctionEntry(name, getattr(module, name))
+    yield from (function_entry(text) for text in args.entry)
     for text in args.table:
         name, _, file = text.partition("=")
         if not file or not pathlib.Path(file).exists():
@@ -287,7 +296,7 @@ def main():
     parser.add_argument("--records", default=ROOT / "grains" / "records", type=pathlib.Path)
     parser.add_argument("--families", default=",".join(FITS), help="beds to fit on, of " + ", ".join(FITS))
     parser.add_argument("--models", default="", help="of mild; default: all that yield")
-    parser.add_argument("--entry", action="append", default=[], help="FILE.py:FUNCTION, a model of your own")
+    parser.add_argument("--entry", action="append", default=[], help="FILE.py:FUNCTION or LIB.so:FUNCTION, a model of your own")
     parser.add_argument("--table", action="append", default=[], help="NAME=FILE.csv, predictions of your own")
     parser.add_argument("--out", type=pathlib.Path, help="folder for judge.csv and figures.html")
     args = parser.parse_args()

@@ -5,8 +5,14 @@
 
 depth [m] of the middle of the bottom, tilt [rad] positive when the front (+x) is lower, slip [m] forward in the ground, sole:
 x, y, area of its squares and depths(depth, tilt). The wrench is that on the sole, about the middle of its bottom, in world
-axes. It is asked on ways down and forward; on a way up the force is 0. A function with an attribute `fit` is given
-fit(records, ground) first: {case: (Case, rows)} of two level plates and a drag, and the manifest's numbers of the bed."""
+axes. It is asked on ways down and forward; on a way up the force is 0. An object with a method `fit` is given
+fit(records, ground) first: {case: (Case, rows)} of two level plates and a drag, and the manifest's numbers of the bed.
+
+The same in C, `judge.py --entry LIB.so:NAME`, is a function of a shared library:
+
+    void NAME(double depth, double tilt, double slip, const double *x, const double *y, const double *area, int squares,
+              double wrench[6]);"""
+import ctypes
 import math
 
 import numpy as np
@@ -59,7 +65,8 @@ class GroundEntry:
         parts = [mild.loading(rows["time"], rows["depth"], rows["fz"]) for _, rows in level]
         # what the data do not tell is that of loose sand that carries as much
         load = float(np.interp(0.015, level[0][1]["depth"], level[0][1]["fz"]))
-        fill = mild.Material("sand_loose") if self.model == "mild" else mild.Material("sand_loose").match(self.model, soles[0], load)
+        sand = mild.Material("sand_loose")
+        fill = sand if self.model == "mild" else sand.match(self.model, soles[0], load)
         found = mild.GroundFit(soles, self.model, fill=fill).fit([X[:, :1] for X, _ in parts], [y for _, y in parts])
         self.material = found.material_
         if not self.model.startswith("ecc_quasi"):  # whose coefficients contain friction
@@ -161,6 +168,20 @@ class FunctionEntry:
                 table.append((time, stage, depth, slip, tilt, w[0], w[2], w[4]))
             load = table[-1][6]
         return as_rows(table, case)
+
+
+def c_function(file, name):
+    """The function of a shared library, as Python's. Raises OSError or AttributeError where there is none."""
+    function = getattr(ctypes.CDLL(file), name)
+    function.restype = None
+    real, reals = ctypes.c_double, np.ctypeslib.ndpointer(np.float64, flags="C_CONTIGUOUS")
+    function.argtypes = [real, real, real, reals, reals, reals, ctypes.c_int, reals]
+
+    def wrench(depth, tilt, slip, sole):
+        out = np.zeros(6)
+        function(depth, tilt, slip, sole.x, sole.y, sole.area, len(sole.x), out)
+        return out
+    return wrench
 
 
 def stress_wrench(sole, depth, tilt, pressure, shear):

@@ -19,8 +19,8 @@ from judge_entries import GroundEntry  # noqa: E402
 
 TRUTH = mild.Material("sand_loose", mu=0.4, recovery=0.0)
 NOISE, BEDS = 0.03, 4
-KEEP = ("sand/disc120", "sand/square100", "sand/square100-drag15", "sand/disc100", "sand/square100-tilt15", "sand/square100-load10",
-        "sand/square100-swipe15", "sand/square100-again", "sand/square100-drop05", "wide/sa01")
+KEEP = ("sand/disc120", "sand/square100", "sand/square100-drag15", "sand/disc100", "sand/square100-tilt15",
+        "sand/square100-load10", "sand/square100-swipe15", "sand/square100-again", "sand/square100-drop05", "wide/sa01")
 
 
 def cases():
@@ -81,10 +81,14 @@ def measures_by_hand():
 def the_truth_is_found_and_others_are_not(folder):
     mine = folder / "mine.py"
     mine.write_text("def half(depth, tilt, slip, sole):\n    return 0, 0, 0.5 * 1e6 * max(depth, 0) * sole.area.sum(), 0, 0, 0\n")
+    (folder / "c.c").write_text("void twice(double d, double t, double s, const double *x, const double *y, const double *a,"
+                                "int n, double *w) { (void)t, (void)s, (void)x, (void)y; for (int i = 0; i < n; i++)"
+                                "w[2] += 1e6 * (d > 0 ? d : 0) * a[i]; }")
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", folder / "c.so", folder / "c.c"], check=True)
     table = folder / "table.csv"
     table.write_text("case,time_s,depth_m,force_x_n,force_z_n,moment_y_nm\ndisc100,0,0,0,0,0\ndisc100,1,0.05,0,100,0\n")
-    run = judge("--records", folder, "--families", "sand", "--models", "mild,con_spring,hunt_crossley", "--entry", f"{mine}:half",
-                "--table", f"theirs={table}", "--out", folder / "out")
+    run = judge("--records", folder, "--families", "sand", "--models", "mild,con_spring,hunt_crossley",
+                "--entry", f"{mine}:half", "--entry", f"{folder / 'c.so'}:twice", "--table", f"theirs={table}", "--out", folder / "out")
     print(run.stdout, run.stderr)
     assert run.returncode == 0, run.stderr
     with open(folder / "out" / "judge.csv", newline="", encoding="utf-8") as file:
@@ -96,13 +100,17 @@ def the_truth_is_found_and_others_are_not(folder):
             assert abs(value) < (0.5 if measure in ("pressure_center", "sinkage") else noise), (case, measure, value)
     assert abs(error["sand/square100-tilt15", "moment", "con_spring"]) > 0.9, "one spring in the middle rights nothing"
     assert error["sand/square100-again", "again", "hunt_crossley"] > 0.8, "a spring without memory gives all of the work again"
+    forces = [{row["model"]: float(row["value"]) for row in rows if row["case"] == "sand/disc100" and row["measure"] == "force"}]
+    assert abs(forces[0]["twice"] / forces[0]["half"] - 2) < 1e-4
     assert {model for _, _, model in error} >= {"half", "theirs", "chrono scm", "archimedes", "3d-rft, no fit"}
     assert "figures.html" in run.stdout and (folder / "out" / "figures.html").stat().st_size > 10000
 
 
 def mistakes_are_one_line(folder):
     for args in (("--records", folder / "none"), ("--records", folder, "--families", "mud"),
-                 ("--records", folder, "--entry", "none.py"), ("--records", folder, "--table", "x")):
+                 ("--records", folder, "--entry", "none.py"),
+                 ("--records", folder, "--entry", f"{folder / 'mine.py'}:none"),
+                 ("--records", folder, "--entry", f"{folder / 'c.so'}:none"), ("--records", folder, "--table", "x")):
         run = judge(*args)
         print(args[-1], "->", run.stderr.strip())
         assert run.returncode == 1 and run.stderr.startswith("judge.py: ") and run.stderr.count("\n") == 1
