@@ -24,7 +24,7 @@ import numpy as np
 import mild
 from judge_cases import COLUMNS, MEASURES, Case, measures, scale
 from judge_entries import (Archimedes, FunctionEntry, GroundEntry, TableEntry, c_function, chrono_scm, rft_stress,
-                           wong_dry_sand)
+                           wong_sand)
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Families of beds, what a model is fitted to there, and the families that the same fit predicts.
@@ -113,12 +113,12 @@ def entries(args, ground):
     stress = rft_stress(ground, friction)
     rft = GroundEntry("ecc_quasi_3d", mild.Material("sand_loose", model="ecc_quasi_3d", zeta=stress / 1e6, mu=0, k_drift=0,
                                                     b_drift=0))
-    rft.name, rft.fit = "3d-rft, no fit", lambda records, ground: None
+    rft.name, rft.fit = "3d_rft", lambda records, ground: None
     models = [name for name in args.models.split(",") if name] or [name for name in mild.models() if name != "rigid"]
     yield from (GroundEntry(model) for model in models)
     yield rft
-    yield FunctionEntry("chrono scm", chrono_scm)
-    yield FunctionEntry("wong dry sand", wong_dry_sand)
+    yield FunctionEntry("chrono_scm", chrono_scm)
+    yield FunctionEntry("wong_sand", wong_sand)
     yield FunctionEntry("archimedes", Archimedes())
     yield from (function_entry(text) for text in args.entry)
     for text in args.table:
@@ -204,29 +204,33 @@ def print_results(results):
         names = list(dict.fromkeys(name for row in rows for name in row[6]))
         print(f"\nfitted on {', '.join(dict.fromkeys(row[1] for row in rows if row[2]))}\n"
               "errors [%; % of the force before; mm], one bed's noise in the same unit")
-        print(f"{'':34}{'grains':>9}{'noise':>7} " + " ".join(f"{name[:9]:>9}" for name in names))
+        print(f"{'':41}{'grains':>8}{'noise':>6}" + "".join(f"{name[:12]:>13}" for name in names))
         for _, key, used, measure, value, noise, values in rows:
             by = scale(measure, value)
             unit = 1 if MEASURES[measure][1] == "mm" else 100
             errors = [text_of((values.get(name, np.nan) - value) / by, noise / by, measure) for name in names]
-            print(f"{key + (' (fit)' if used else ''):24.24}{measure:15.15}{value:9.3g}{unit * noise / by:7.1f} "[:50] +
-                  " ".join(f"{error:>9}" for error in errors))
+            print(f"{key + ' fit' * used:29.29}{measure:12.12}{value:8.3g}{unit * noise / by:6.1f}" +
+                  "".join(f"{error:>13}" for error in errors))
 
 
 def print_score(results):
-    """Median and largest size of the errors that were predicted, in units of the noise too."""
-    print("\npredicted cases only: median error [%], largest, and the share of rows within twice the noise")
+    """Median and largest size of the errors that were predicted, and how many the noise explains."""
+    print("\npredicted cases only: errors [%], median and largest; lengths [mm], the same; share of all within twice the noise")
     names = list(dict.fromkeys(name for row in results for name in row[6]))
     for name in names:
-        errors, within = [], []
+        errors, lengths, within = [], [], []
         for _, _, used, measure, value, noise, values in results:
             got = values.get(name, np.nan)
-            if used or MEASURES[measure][1] == "mm" or not np.isfinite(got):
+            if used or not np.isfinite(got):
                 continue
-            errors.append(100 * abs(got - value) / scale(measure, value))
+            if MEASURES[measure][1] == "mm":
+                lengths.append(abs(got - value))
+            else:
+                errors.append(100 * abs(got - value) / scale(measure, value))
             within.append(abs(got - value) <= 2 * noise)
-        if errors:
-            print(f"  {name:16}{np.median(errors):7.1f}{np.max(errors):8.0f}   {np.mean(within):.2f} of {len(errors)}")
+        parts = [f"{np.median(part):8.1f}{np.max(part):7.0f}" if part else f"{'-':>8}{'-':>7}" for part in (errors, lengths)]
+        if within:
+            print(f"  {name:14}{parts[0]}{parts[1]}   {np.mean(within):.2f} of {len(within)}")
 
 
 def print_anchors(args, results):

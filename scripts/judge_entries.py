@@ -200,7 +200,7 @@ def chrono_scm(depth, tilt, slip, sole):
     return stress_wrench(sole, depth, tilt, pressure, pressure * math.tan(math.radians(30)) * (1 - math.exp(-abs(slip) / 0.01)))
 
 
-def wong_dry_sand(depth, tilt, slip, sole):
+def wong_sand(depth, tilt, slip, sole):
     """The same law with Wong's dry sand (Theory of Ground Vehicles, table 2.3: n 1.1, k_c 0.99e3, k_phi 1528e3, c 1.04e3,
     28 deg), as Chrono's examples have it, K 0.02."""
     sunk = np.maximum(sole.depths(depth, tilt), 0.0)
