@@ -39,6 +39,11 @@ FAMILIES = {
 }
 
 
+def fail(text):
+    print(f"run.py: {text}", file=sys.stderr)
+    sys.exit(2)
+
+
 def outline(robot, section):
     """A robot's sole about the middle of its area."""
     ini = configparser.ConfigParser(inline_comment_prefixes=(";",))
@@ -174,9 +179,9 @@ def check():
             name, shape = case.split()[:2]
             area, side = area_of(shape)
             if area > 0.08 * length * width:
-                sys.exit(f"run.py: {family}/{name} covers {100 * area / (length * width):.1f} % of its box, 8 are allowed")
+                fail(f"{family}/{name} covers {100 * area / (length * width):.1f} % of its box, 8 are allowed")
             if (family, name) in names:
-                sys.exit(f"run.py: two cases {family}/{name}")
+                fail(f"two cases {family}/{name}")
             names.add((family, name))
             yield family, case, area / (length * width), side / FAMILIES[family]["grain"]
 
@@ -307,7 +312,7 @@ def main():
     if args.list:
         return
     if not args.program.exists():
-        sys.exit(f"run.py: {args.program} is not there: cmake --build build --target grains (docs/grains.md)")
+        fail(f"{args.program} is not there: cmake --build build --target grains (docs/grains.md)")
     args.out.mkdir(parents=True, exist_ok=True)
     args.running, args.late = [], threading.Event()
     blocks, failures, manifest = queue.Queue(), [], Manifest(args.out, args.have)

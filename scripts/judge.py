@@ -40,6 +40,11 @@ CSV_COLUMNS = {"time_s": "time", "stage": "stage", "depth_m": "depth", "path_m":
                "force_x_n": "fx", "force_z_n": "fz", "moment_y_nm": "my"}
 
 
+def fail(text):
+    print(f"judge.py: {text}", file=sys.stderr)
+    sys.exit(2)
+
+
 # ---- records ----
 
 class Records:
@@ -48,7 +53,7 @@ class Records:
     def __init__(self, folder):
         file = folder / "manifest.json"
         if not file.exists():
-            sys.exit(f"judge.py: {file} is not there: make records with grains/run.py")
+            fail(f"{file} is not there: make records with grains/run.py")
         self.manifest, self.cases = json.loads(file.read_text()), {}
         for key, row in self.manifest.items():
             if "case" not in row:
@@ -72,7 +77,7 @@ def read_record(file):
     table = np.genfromtxt(file, delimiter=",", names=True)
     missing = [name for name in CSV_COLUMNS if name not in table.dtype.names]
     if missing:
-        sys.exit(f"judge.py: {file} has no column {missing[0]}: it must be a record of grains")
+        fail(f"{file} has no column {missing[0]}: it must be a record of grains")
     return {short: table[name] for name, short in CSV_COLUMNS.items()}
 
 
@@ -96,7 +101,7 @@ def function_entry(text):
     file, _, name = text.rpartition(":")
     path = pathlib.Path(file).resolve()
     if not file or not path.exists():
-        sys.exit(f"judge.py: --entry {text}: it must be FILE.py:FUNCTION or LIB.so:FUNCTION")
+        fail(f"--entry {text}: it must be FILE.py:FUNCTION or LIB.so:FUNCTION")
     try:
         if path.suffix != ".py":
             return FunctionEntry(name, c_function(str(path), name))
@@ -105,7 +110,7 @@ def function_entry(text):
         spec.loader.exec_module(module)
         return FunctionEntry(name, getattr(module, name))
     except (OSError, AttributeError) as error:
-        sys.exit(f"judge.py: --entry {text}: {error}")
+        fail(f"--entry {text}: {error}")
 
 
 def entries(args, ground):
@@ -124,7 +129,7 @@ def entries(args, ground):
     for text in args.table:
         name, _, file = text.partition("=")
         if not file or not pathlib.Path(file).exists():
-            sys.exit(f"judge.py: --table {text}: it must be NAME=FILE.csv")
+            fail(f"--table {text}: it must be NAME=FILE.csv")
         yield TableEntry(name, file)
 
 
@@ -308,10 +313,10 @@ def main():
     records = Records(args.records)
     for fitted in args.families.split(","):
         if fitted not in FITS:
-            sys.exit(f"judge.py: --families: {fitted} is not one of {', '.join(FITS)}")
+            fail(f"--families: {fitted} is not one of {', '.join(FITS)}")
         judge_family(args, records, fitted, results)
     if not results:
-        sys.exit("judge.py: nothing to judge")
+        fail("nothing to judge")
     print_results(results)
     print_score(results)
     print_anchors(args, results)

@@ -68,6 +68,9 @@ def records_are_made_once(folder):
 
 
 def mistakes_are_one_line():
+    got = subprocess.run([sys.executable, SOURCE / "grains" / "run.py", "--program", "/none"], capture_output=True, text=True)
+    print("run.py ->", got.stderr.strip())
+    assert got.returncode == 2 and got.stderr.startswith("run.py: ") and got.stderr.count("\n") == 1
     for args in (["--grain", "x"], ["--nothing", "1"], ["--case", "a disc:0.1 0"], ["--case", "a cube:1 0 press:0.1@1"],
                  ["--case", "a disc:0.1 0 press:0.1"], ["--case", "a disc:0.1 0 fly:1@1"], ["--box", "1,1"],
                  ["--box", "0.01,0.01,0.01"], ["--seeds", "3-1"], ["--bed", "/none"], ["--contact", "glue"], ["--grain"]):

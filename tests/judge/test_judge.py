@@ -113,7 +113,7 @@ def mistakes_are_one_line(folder):
                  ("--records", folder, "--entry", f"{folder / 'c.so'}:none"), ("--records", folder, "--table", "x")):
         run = judge(*args)
         print(args[-1], "->", run.stderr.strip())
-        assert run.returncode == 1 and run.stderr.startswith("judge.py: ") and run.stderr.count("\n") == 1
+        assert run.returncode == 2 and run.stderr.startswith("judge.py: ") and run.stderr.count("\n") == 1
 
 
 if __name__ == "__main__":
