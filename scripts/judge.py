@@ -54,7 +54,10 @@ class Records:
         file = folder / "manifest.json"
         if not file.exists():
             fail(f"{file} is not there: make records with grains/run.py")
-        self.manifest, self.cases = json.loads(file.read_text()), {}
+        try:
+            self.manifest, self.cases = json.loads(file.read_text()), {}
+        except (OSError, ValueError) as error:
+            fail(f"{file}: {error}")
         for key, row in self.manifest.items():
             if "case" not in row:
                 continue
