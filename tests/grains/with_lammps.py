@@ -7,7 +7,7 @@
 Both start from the positions of beds that our program settled, without memory of contacts, with the same law, time step and
 plate (a block of 40 x 40 mm, 8 grains). Printed: how closely the forces run beside each other at first; means over
 the last part of the way, their difference, and its standard error from the scatter of the beds. Fails when it is more than
-three of these, or the first forces differ by more than 10 %. Twenty minutes of two cores."""
+three of these, or the first forces differ by more than 10 %. A quarter of an hour on two cores."""
 import argparse
 import json
 import math
@@ -23,7 +23,7 @@ GRAIN, DENSITY, STIFFNESS, FRICTION, RESTITUTION = 0.005, 2500.0, 1e6, 0.5, 0.5
 PLATE, HEIGHT = 0.04, 0.06
 SPEED, DEPTH, PATH = 0.1, 0.012, 0.012  # [m/s], [m]
 CASES = {"press": (0.0, False), "tilted": (10.0, False), "drag": (0.0, True)}  # tilt [deg], whether it is dragged
-SEEDS = range(1, 7)
+SEEDS = (1, 2, 3)
 
 
 def damping():
