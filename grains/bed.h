@@ -97,8 +97,13 @@ inline std::vector<Vec> bed_read(const std::string &file) {
     return grains;
 }
 
+/* Of all beds. */
+inline size_t cells_of(const Grains &g) {
+    return (size_t)g.beds * (size_t)g.cells_x * (size_t)g.cells_y * (size_t)g.cells_z;
+}
+
 inline void bed_allocate(Grains *g) {
-    const size_t n = (size_t)g->count, cells = (size_t)g->cells_x * g->cells_y * g->cells_z;
+    const size_t n = (size_t)g->count, cells = cells_of(*g);
     g->place = allocate<Place>(n);
     g->next_place = allocate<Place>(n);
     g->listed = allocate<Place>(n);
@@ -117,8 +122,8 @@ inline void bed_allocate(Grains *g) {
     for (Vec **v : {&g->roll, &g->next_roll}) {
         *v = g->law.mu_roll > 0 ? allocate<Vec>(n * SLOTS) : nullptr;
     }
-    g->cell_count = allocate<int>(cells * (size_t)g->beds);
-    g->cell = allocate<int>(cells * (size_t)g->beds * CELL_GRAINS);
+    g->cell_count = allocate<int>(cells);
+    g->cell = allocate<int>(cells * CELL_GRAINS);
     g->flags = allocate<int>(1);
     g->plate = allocate<Plate>((size_t)g->beds);
 }
@@ -145,7 +150,7 @@ inline void bed_put(Bed *bed, int b, const std::vector<Vec> &grains) {
                     shifted(0, fmodf(p.y, g.size_y), g.unit.y), shifted(0, p.z, g.unit.z),
                     p.unused};
     }
-    copy(g.place + (size_t)b * g.per, place.data(), place.size());
+    copy(g.place + (size_t)(b * g.per), place.data(), place.size());
 }
 
 /* The grains where they are put at first. Nothing moves before bed_go. */
@@ -187,7 +192,7 @@ inline void bed_open(Bed *bed, const BedDef &def) {
 
 inline void bed_list(Bed *bed) {
     Grains &g = bed->g;
-    clear(g.cell_count, (size_t)g.beds * g.cells_x * g.cells_y * g.cells_z);
+    clear(g.cell_count, cells_of(g));
     each<Grains, grain_enter_cell>(g.count, g);
     each<Grains, grain_list>(g.count, g);
     std::swap(g.neighbour, g.next_neighbour);
@@ -273,7 +278,7 @@ inline void bed_measure(Bed *bed) {
     bed->solid.clear();
     bed->filled.clear();
     for (int b = 0; b < bed->g.beds; b++) {
-        const Place *own = &place[(size_t)b * bed->g.per];
+        const Place *own = &place[(size_t)(b * bed->g.per)];
         const auto there = [](const Place &p) { return p.radius > 0; };
         bed->surface.push_back(bed_surface(*bed, own));
         bed->solid.push_back(bed_solid(*bed, own));

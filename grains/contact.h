@@ -23,7 +23,7 @@ struct Law {
     bool hertz;
 };
 
-enum : int { SHEAR_DAMPING_PERCENT = 50 }; /* tangential dashpot over the normal one */
+constexpr float SHEAR_DAMPING = 0.5f; /* tangential dashpot over the normal one */
 
 /* Speed with which two parts part over that with which they met, at this share of critical damping:
  * the collision in units of its mass, stiffness and deepest overlap. As they never pull, it is more
@@ -98,7 +98,7 @@ DEVICE Vec contact_force(const Law &law, const Contact &c, Memory *memory, Vec *
     const float normal = fmaxf(elastic - damping * closing, 0.0f);
 
     const Vec sliding = c.velocity - closing * c.normal;
-    const float stiff = law.shear * slope, damp = 0.01f * SHEAR_DAMPING_PERCENT * damping;
+    const float stiff = law.shear * slope, damp = SHEAR_DAMPING * damping;
     memory->slip = turned(memory->slip, c.normal) + law.dt * sliding;
     const Vec shear = held(&memory->slip, sliding, stiff, damp, law.mu * normal);
 

@@ -57,6 +57,11 @@ BOTH uint32_t shifted(uint32_t at, float way, float unit) {
     return at + (uint32_t)(int32_t)lrintf(way / unit);
 }
 
+/* Where slot s of grain i is. */
+BOTH size_t slot(const Grains &g, int s, int i) {
+    return (size_t)s * (size_t)g.count + (size_t)i;
+}
+
 /* ---- neighbours ---- */
 
 BOTH int cell_along(uint32_t at, int cells) {
@@ -117,7 +122,7 @@ DEVICE int list_cell(const Grains &g, int i, const Place &a, int c, int *list, i
 
 /* Brings what contact `from` remembers to slot `to` of the new list. */
 DEVICE uint32_t carry(const Grains &g, int i, int from, int to) {
-    const size_t at = (size_t)to * g.count + i, old = (size_t)from * g.count + i;
+    const size_t at = slot(g, to, i), old = slot(g, from, i);
     g.next_slip[at] = g.slip[old];
     if (g.roll) {
         g.next_roll[at] = g.roll[old];
@@ -130,9 +135,9 @@ DEVICE void grain_keep_contacts(const Grains &g, int i, const int *list, int cou
     uint32_t kept = 0;
     for (int s = 0; s < NEIGHBOURS; s++) {
         const int j = s < count ? list[s] : -1;
-        g.next_neighbour[(size_t)s * g.count + i] = j;
+        g.next_neighbour[slot(g, s, i)] = j;
         for (int old = 0; old < NEIGHBOURS && j >= 0; old++) {
-            if ((touching >> old & 1u) && g.neighbour[(size_t)old * g.count + i] == j) {
+            if ((touching >> old & 1u) && g.neighbour[slot(g, old, i)] == j) {
                 kept |= carry(g, i, old, s);
             }
         }
@@ -167,7 +172,8 @@ DEVICE void grain_list(int i, const Grains &g) {
 /* Says when lists are due: two grains that each move less than half the skin stay apart. */
 DEVICE void grain_watch(int i, const Grains &g) {
     const Vec d = from_to(g, g.listed[i], g.place[i]);
-    const float moved = length(d), next = 2.0f * CHECK_STEPS * g.law.dt * length(g.velocity[i]);
+    const float moved = length(d),
+                next = 2.0f * (float)CHECK_STEPS * g.law.dt * length(g.velocity[i]);
     if (moved + next > 0.5f * g.skin) {
         raise(g, moved > 0.5f * g.skin ? LIST_DUE | LIST_LATE : LIST_DUE);
     }
@@ -190,9 +196,9 @@ BOTH float grain_mass(const Law &law, float radius) {
 DEVICE Memory recall(const Grains &g, int i, int s, uint32_t touching) {
     Memory memory = {vec(0, 0, 0), vec(0, 0, 0)};
     if (touching >> s & 1u) {
-        memory.slip = g.slip[(size_t)s * g.count + i];
+        memory.slip = g.slip[slot(g, s, i)];
         if (g.roll) {
-            memory.roll = g.roll[(size_t)s * g.count + i];
+            memory.roll = g.roll[slot(g, s, i)];
         }
     }
     return memory;
@@ -203,9 +209,9 @@ DEVICE Vec grain_touch(const Grains &g, int i, int s, uint32_t touching, const C
                        float arm, Body *a) {
     Memory memory = recall(g, i, s, touching);
     const Vec force = contact_force(g.law, c, &memory, &a->torque);
-    g.slip[(size_t)s * g.count + i] = memory.slip;
+    g.slip[slot(g, s, i)] = memory.slip;
     if (g.roll) {
-        g.roll[(size_t)s * g.count + i] = memory.roll;
+        g.roll[slot(g, s, i)] = memory.roll;
     }
     a->force = a->force + force;
     a->torque = a->torque - arm * cross(c.normal, force);
@@ -213,7 +219,7 @@ DEVICE Vec grain_touch(const Grains &g, int i, int s, uint32_t touching, const C
 }
 
 DEVICE bool grain_touch_grain(const Grains &g, int i, int s, uint32_t touching, Body *a) {
-    const int j = g.neighbour[(size_t)s * g.count + i];
+    const int j = g.neighbour[slot(g, s, i)];
     const Place b = g.place[j];
     const Vec d = from_to(g, b, a->place);
     const float reach = a->place.radius + b.radius, square = dot(d, d);
@@ -316,7 +322,7 @@ DEVICE void grain_step(int i, const Grains &g) {
     a.torque = vec(0, 0, 0);
     const uint32_t touching = g.touching[i];
     uint32_t now = 0;
-    for (int s = 0; s < NEIGHBOURS && g.neighbour[(size_t)s * g.count + i] >= 0; s++) {
+    for (int s = 0; s < NEIGHBOURS && g.neighbour[slot(g, s, i)] >= 0; s++) {
         now |= grain_touch_grain(g, i, s, touching, &a) ? 1u << s : 0u;
     }
     now |= grain_touch_floor(g, i, touching, &a) ? 1u << FLOOR : 0u;

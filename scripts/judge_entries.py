@@ -66,7 +66,10 @@ class GroundEntry:
         # what the data do not tell is that of loose sand that carries as much
         load = float(np.interp(0.015, level[0][1]["depth"], level[0][1]["fz"]))
         sand = mild.Material("sand_loose")
-        fill = sand if self.model == "mild" else sand.match(self.model, soles[0], load)
+        try:
+            fill = sand if self.model == "mild" else sand.match(self.model, soles[0], load)
+        except ValueError:  # a model without a match, or beyond its ranges
+            fill = mild.Material(sand, model=self.model)
         found = mild.GroundFit(soles, self.model, fill=fill).fit([X[:, :1] for X, _ in parts], [y for _, y in parts])
         self.material = found.material_
         if not self.model.startswith("ecc_quasi"):  # whose coefficients contain friction
