@@ -42,6 +42,7 @@ __global__ void each_kernel(int count, const System system) {
 template <class System, void (*act)(int, const System &)>
 void each(int count, const System &system) {
     each_kernel<System, act><<<(unsigned)(count + 127) / 128, 128>>>(count, system);
+    check(cudaGetLastError());
 }
 
 template <class T> void copy(T *to, const T *from, size_t count) {
