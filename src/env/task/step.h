@@ -315,7 +315,7 @@ MILD_HD_FN TaskEnd task_end_cause(const TaskEnv *env, const TaskDef *def, const 
     if (!stand && reading->body_clearance < -depth) {
         return TASK_END_shell;
     }
-    if (reading->foot_distance < def->crossing_limit) {
+    if (def->crossing_limit > -1 && reading->foot_distance < def->crossing_limit) {
         return TASK_END_crossing;
     }
     return task_joint_is_broken(env, robot) ? TASK_END_joint : TASK_END_time;

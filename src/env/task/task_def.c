@@ -44,7 +44,8 @@ TaskDef task_def_default(void) {
         .velocity_scale = 4,
         .height_scale = 10,
         .tilt_limit = 1.0,
-        .crossing_limit = 0.0,
+        .crossing_limit = -1.0,
+        .shells_stand = 1,
         .assist = 1,
         .newton = 1,
         .contact_tolerance = 1e-4,
@@ -170,13 +171,12 @@ const MildField task_fields[] = {
     T(height_scale, D, 1, 0.01, 100, "[-] scale of the feet heights among the estimates"),
     T(tilt_limit, D, 1, 0.1, 3.1, "[rad] the episode ends when the base tilts more than this"),
     T(crossing_limit, D, 1, -1, 1,
-      "[m] the episode ends when the feet are laterally closer than this, because the simulated "
-      "legs cannot touch each other"),
+      "[m] the episode ends when the feet are laterally closer than this; -1: never"),
     T(shell_depth, D, 1, 0, 1,
-      "[m] on soft ground the episode ends when a geom of `shells` of robot.ini is deeper than "
-      "this below the undisturbed surface"),
+      "[m] without shells_stand: the episode ends when a geom of `shells` of robot.ini is deeper "
+      "than this below the undisturbed surface of soft ground"),
     T(shells_stand, B, 1, 0, 1,
-      "[bool] geoms of `shells` of robot.ini stand on soft ground as soles do; then a shell of the "
+      "[bool] geoms of `shells` of robot.ini stand on soft ground as soles do; there a shell of the "
       "base ends the episode when it touches the ground, and no other"),
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
