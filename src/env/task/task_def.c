@@ -126,8 +126,8 @@ const MildField task_fields[] = {
     T(action_scale, D, 1, 0, 2, "[rad] joint offset per unit of action; 0: the robot's"),
     T(action_clip, D, 1, 0.1, 100, "[-] actions are clipped to plus or minus this"),
     T(torque_share, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0,
-      "[-] torque limit as a share of the joint's effort, from 0.1 to 1: one number, one per joint, "
-      "or one per joint of a leg"),
+      "[-] torque limit as a share of the joint's effort, from 0.1 to 1: one number, one per "
+      "joint, or one per joint of a leg"),
     T(torque_hold, B, 1, 0, 1,
       "[bool] the PD torque is computed once per policy step, when the action arrives, and held "
       "(paper: 100 Hz); false: at every physics step"),
@@ -176,8 +176,8 @@ const MildField task_fields[] = {
       "[m] without shells_stand: the episode ends when a geom of `shells` of robot.ini is deeper "
       "than this below the undisturbed surface of soft ground"),
     T(shells_stand, B, 1, 0, 1,
-      "[bool] geoms of `shells` of robot.ini stand on soft ground as soles do; there a shell of the "
-      "base ends the episode when it touches the ground, and no other"),
+      "[bool] geoms of `shells` of robot.ini stand on soft ground as soles do; there a shell of "
+      "the base ends the episode when it touches the ground, and no other"),
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
     T(newton, B, 1, 0, 1,

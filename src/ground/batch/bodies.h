@@ -193,8 +193,8 @@ MILD_HD Real bodies_reach(const BodiesSetup *setup, int body, const Real *positi
     return above - at[2] + setup->steepest * REAL_SQRT(square) + low;
 }
 
-/* Bool: an element of a body at that pose is deeper than `least`. Exact, where bodies_reach is a bound
- * that steep places of a map make wide. */
+/* Bool: an element of a body at that pose is deeper than `least`. Exact, where bodies_reach is a
+ * bound that steep places of a map make wide. */
 WARP_FN int bodies_touch(const BodiesSetup *setup, int body, const Real *position, const Real *R,
                          const Real *map_origin, Real height, Real least) {
     const BodiesSole *sole = &setup->sole[body];
