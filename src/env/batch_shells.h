@@ -97,9 +97,8 @@ WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, int near) {
         for (int k = 0; k < 3; k++) {
             position[k] += saved->state[ENGINE_SAVED(base) + k];
         }
-        const Real least = bodies_least(setup, setup->sole[at].radius, twist, twist);
-        if (bodies_touch(setup, at, position, rotation, all->map_origin + 2 * robot,
-                         all->contact.height[robot], least)) {
+        if (bodies_touch(setup, at, position, rotation, twist, all->map_origin + 2 * robot,
+                         all->contact.height[robot])) {
             touch |= 1 << body;
         }
     }

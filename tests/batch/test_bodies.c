@@ -3,6 +3,7 @@
  * and on maps. */
 #include "batch_kit.h"
 #include "bodies_case.h"
+#include "case_law.h"
 #include "ground/begin.h"
 #include "ground/grid.h"
 #include "ground/map_kit.h"
@@ -37,20 +38,6 @@ static int close_soles(void **state) {
 }
 
 /* ---- a kit's problem as a case ---- */
-
-static void case_law(CaseMaterial *c, const MildMaterial *m, const MildSole *sole) {
-    const Law law = law_of(m, mild_sole_pitch(sole), mild_sole_width(sole));
-    memcpy(c->law, &law, sizeof c->law);
-    c->curves = law_curves(&law) | model_row(m->model)->motion;
-    c->recovery = law_recovery(&law, recovery_of(m));
-    c->mu = m->mu;
-    c->k_drift = m->k_drift;
-    c->b_drift = m->b_drift;
-    c->exit_drag = law_exit_drag(&law);
-    c->entry_drag = law_entry_drag(&law);
-    c->cohesion = m->cohesion;
-    c->shear_length = m->shear_length;
-}
 
 static void case_sole(BodiesCase *c, const Kit *kit, int b) {
     const MildSole *sole = kit->soles[b];

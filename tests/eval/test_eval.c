@@ -384,7 +384,11 @@ static void pushes_come_every_four_seconds(void **state) {
 
 /* ---- rigid ground inside a course ---- */
 
-static EvalRow walk_on(const char *ground) {
+/* How deep an edge sinks depends on how a policy stamps; this one does not change with what
+ * ships. */
+#define ON_RIGID MILD_SOURCE_DIR "/policies/paper/rigid-1.safetensors"
+
+static EvalRow walk_on(const char *policy, const char *ground) {
     MildError error = {0};
     Controller controller;
     const EvalDef eval = {.speed = 0.5, .trials = 3, .seconds = 5, .seed = 1};
@@ -392,7 +396,7 @@ static EvalRow walk_on(const char *ground) {
     EvalRow row;
     Pool *pool = pool_create(2);
     assert_int_equal(scene_make(&scene, ground, 50, &error), MILD_OK);
-    assert_int_equal(controller_learned(POLICY, robot, pool, 3, &controller, &error), MILD_OK);
+    assert_int_equal(controller_learned(policy, robot, pool, 3, &controller, &error), MILD_OK);
     assert_int_equal(kit_run(&def, pool, &controller, &scene, &eval, &row, &error), MILD_OK);
     controller_destroy(&controller);
     pool_destroy(pool);
@@ -411,12 +415,13 @@ static void rigid_inside_a_course(void **state) {
     assert_string_equal(scene_ground_at(&scene, 3, 0, name, sizeof name), "rigid");
     const MildMaterial *hard = &scene.terrain.materials[1], *rubber = &scene.terrain.materials[2];
     assert_true(hard->k_pen > 50 * rubber->k_pen && hard->k_drift > 5 * rubber->k_drift);
-    EvalRow course = walk_on("rigid+foam45"), floor = walk_on("rigid"), soft = walk_on("foam60");
+    EvalRow course = walk_on(POLICY, "rigid+foam45"), floor = walk_on(POLICY, "rigid");
+    EvalRow stamp = walk_on(ON_RIGID, "rigid+foam45"), soft = walk_on(POLICY, "foam60");
     assert_true(course.success == 3 && floor.success == 3);
     assert_true(fabs(course.velocity - floor.velocity) < 0.02);
     assert_true(fabs(course.cot / floor.cot - 1) < 0.05);
     assert_true(fabs(course.clearance - floor.clearance) < 0.004);
-    assert_true(course.penetration < 0.006 && soft.penetration > 0.02);
+    assert_true(stamp.penetration < 0.005 && soft.penetration > 0.02);
 }
 
 /* ---- the legs ---- */

@@ -7,7 +7,7 @@ python=$2
 export MILD_PLUGIN=$3 PYTHONDONTWRITEBYTECODE=1
 
 # same ROBOT POLICY CONFIG GROUND STEP INTEGRATOR BOUND: the share by which the speeds may differ. Euler is eval's own integrator;
-# the others damp by the gains kd at the end of the step.
+# the others damp by the gains kd at the end of the step. plugin_walk.py has ground under the feet alone, and so has eval here.
 same() {
     { cat "$root/configs/$3.ini"; printf '\n[task]\nobserve_noise = false\n[randomize]\nlatency = 0 0\n'; } >exact.ini
     "$mild" eval --policy "$root/policies/$2.safetensors" --config exact.ini --ground "$4" --speed 0.5 --seconds 10 --trials 2 \

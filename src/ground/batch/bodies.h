@@ -129,6 +129,12 @@ typedef struct {
     int curves;
 } BodiesElement;
 
+/* A spot without a map. */
+MILD_HD MapSpot bodies_no_spot(void) {
+    const MapSpot none = {{0, 0}, {0, 0}, {0, 0}, {0, 0}, 0};
+    return none;
+}
+
 /* p of element s. */
 MILD_HD void bodies_point(const BodiesSole *sole, const Real *R, int s, Real *p) {
     const Real at[3] = {sole->x[s], sole->y[s], sole->face ? sole->face[s] : sole->z};
@@ -159,12 +165,18 @@ MILD_HD ContactVelocity bodies_velocity(const BodiesElement *own, const Real *V)
 
 /* ---- which bodies and elements ---- */
 
+/* [m/s] Upper bounds on the speeds of a point of a body downward and level. */
+MILD_HD void bodies_speeds(Real radius, const Real *V, Real *down, Real *level) {
+    const Real tilt = V[3] * V[3] + V[4] * V[4];
+    *down = real_max(-V[2], 0) + radius * REAL_SQRT(tilt);
+    *level = REAL_SQRT(V[0] * V[0] + V[1] * V[1]) + radius * REAL_SQRT(tilt + V[5] * V[5]);
+}
+
 /* [m/s] Upper bound on the speed at which a point of a body gets deeper; foot_descent. */
 MILD_HD Real bodies_descent(const BodiesSetup *setup, Real radius, const Real *V) {
-    const Real tilt = V[3] * V[3] + V[4] * V[4];
-    const Real level = REAL_SQRT(V[0] * V[0] + V[1] * V[1]);
-    return real_max(-V[2], 0) + radius * REAL_SQRT(tilt) +
-           setup->steepest * (level + radius * REAL_SQRT(tilt + V[5] * V[5]));
+    Real down, level;
+    bodies_speeds(radius, V, &down, &level);
+    return down + setup->steepest * level;
 }
 
 /* [m] Depth below which elements are listed; foot_least. */
@@ -193,26 +205,28 @@ MILD_HD Real bodies_reach(const BodiesSetup *setup, int body, const Real *positi
     return above - at[2] + setup->steepest * REAL_SQRT(square) + low;
 }
 
-/* Bool: an element of a body at that pose is deeper than `least`. Exact, where bodies_reach is a
- * bound that steep places of a map make wide. */
+/* Bool: an element of a body at that pose may touch the ground in this step. bodies_reach is a
+ * bound that the steepest place of a map makes wide; an element meets the plane under itself
+ * (bodies_velocity). V: twist. */
 WARP_FN int bodies_touch(const BodiesSetup *setup, int body, const Real *position, const Real *R,
-                         const Real *map_origin, Real height, Real least) {
+                         const Real *V, const Real *map_origin, Real height) {
     const BodiesSole *sole = &setup->sole[body];
-    Real found[LANE_COPIES];
-    MapSpot spot;
-    if (setup->has_map) {
-        spot = map_spot(&setup->map, position, map_origin, height);
-    }
+    const MapSpot spot =
+        setup->has_map ? map_spot(&setup->map, position, map_origin, height) : bodies_no_spot();
+    Real found[LANE_COPIES], down, level;
+    bodies_speeds(sole->radius, V, &down, &level);
     EACH_LANE(l) {
         found[l] = 0;
         LANE_ROLLED
         for (int s = LANE(l); s < sole->elements; s += LANES) {
-            Real p[3], slope[2];
+            Real p[3], slope[2] = {0, 0};
             bodies_point(sole, R, s, p);
             const Real above = setup->has_map
                                    ? map_surface_near(&setup->map, &spot, p[0], p[1], slope)
                                    : height - position[2];
-            found[l] += above - p[2] > least ? 1 : 0;
+            const Real steep = REAL_SQRT(slope[0] * slope[0] + slope[1] * slope[1]);
+            const Real descent = down + steep * level + BODIES_EXTRA_SPEED;
+            found[l] += above - p[2] + BODIES_MARGIN + setup->dt * descent > 0 ? 1 : 0;
         }
     }
     return lane_sum(found) > 0;

@@ -5,9 +5,8 @@
 
 /* The body at place i on the map. */
 MILD_HD MapSpot bodies_spot(const BodiesSetup *setup, const BodiesWork *work, int i) {
-    const MapSpot none = {{0, 0}, {0, 0}, {0, 0}, {0, 0}, 0};
     return setup->has_map ? map_spot(&setup->map, work->position[i], work->map_origin, work->height)
-                          : none;
+                          : bodies_no_spot();
 }
 
 /* Row r of A x. */
