@@ -102,6 +102,15 @@ BLOCKS = [
 ]
 
 
+
+def families():
+    """A block for each family: its beds settle once."""
+    whole = {}
+    for family, cases in BLOCKS:
+        whole.setdefault(family, []).extend(cases)
+    return list(whole.items())
+
+
 # ---- what it costs ----
 
 def size_of(family):
@@ -276,7 +285,7 @@ def worker(args, manifest, blocks, gpu, failures):
 def show(args):
     total = 0.0
     widths = {(family, case): (share, side) for family, case, share, side in check()}
-    for family, cases in BLOCKS:
+    for family, cases in families() if args.together else BLOCKS:
         left = list(missing(args, family, cases))
         if not left:
             continue
@@ -297,6 +306,7 @@ def main():
     parser.add_argument("--program", default=ROOT / "build" / "grains" / "grains", type=pathlib.Path)
     parser.add_argument("--gpus", default="", help="their numbers, e.g. 0,1; without it one program on what there is")
     parser.add_argument("--per-gpu", type=int, default=1, help="programs on each; the beds of one fill an H100")
+    parser.add_argument("--together", action="store_true", help="family by family: beds settle once")
     parser.add_argument("--out", default=RECORDS, type=pathlib.Path)
     parser.add_argument("--only", default="", help="cases FAMILY/CASE that this regular expression finds")
     parser.add_argument("--seeds", default="", help="A or A-B instead of each family's own")
@@ -316,7 +326,7 @@ def main():
     args.out.mkdir(parents=True, exist_ok=True)
     args.running, args.late = [], threading.Event()
     blocks, failures, manifest = queue.Queue(), [], Manifest(args.out, args.have)
-    for block in BLOCKS:
+    for block in families() if args.together else BLOCKS:
         blocks.put(block)
     gpus = [gpu for gpu in args.gpus.split(",") for _ in range(args.per_gpu)] or [""]
     threads = [threading.Thread(target=worker, args=(args, manifest, blocks, gpu, failures), daemon=True) for gpu in gpus]
