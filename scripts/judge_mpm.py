@@ -134,9 +134,10 @@ class Bed:
         solver = self.newton.solvers.SolverImplicitMPM
         builder = self.newton.ModelBuilder(gravity=(0.0, 0.0, -GRAVITY))
         solver.register_custom_attributes(builder)
-        self.add_ground(builder, args, voxels, density, ground_friction, friction, seed)
+        self.add_ground(builder, args, voxels, density, friction, seed)
         self.add_plate(builder, sole, friction)
         self.model = builder.finalize(device=args.device or None)
+        self.model.mpm.friction.fill_(ground_friction)
         config = solver.Config()
         config.voxel_size, config.max_iterations, config.tolerance = args.voxel, args.iterations, args.tolerance
         config.collider_basis = args.basis
@@ -144,12 +145,12 @@ class Bed:
         self.state = self.model.state()
         self.collide(0.0)
 
-    def add_ground(self, builder, args, voxels, density, ground_friction, friction, seed):
+    def add_ground(self, builder, args, voxels, density, friction, seed):
         points = particles_of(voxels, args.voxel, args.particles, seed)
         spacing, count = args.voxel / args.particles, len(points)
         self.particles = count
         builder.add_particles(pos=points.tolist(), vel=[(0.0, 0.0, 0.0)] * count, mass=[density * spacing**3] * count,
-                              radius=[spacing / 2] * count, custom_attributes={"mpm:friction": [ground_friction] * count})
+                              radius=[spacing / 2] * count)
         length, width, depth = args.voxel * voxels / [2, 2, 1]
         thick, high = 4 * args.voxel, depth + 0.2
         shape = self.newton.ModelBuilder.ShapeConfig
@@ -448,7 +449,8 @@ def main():
     if not wanted:
         fail(f"--only {args.only}: no case has such a name")
     if args.list:
-        print("\n".join(wanted.values()))
+        for key, text in wanted.items():
+            print(f"{key:28} {sum(way[1] for way in Case(text).ways):.2f} s")
         return
     if args.check:
         check(args, every)
