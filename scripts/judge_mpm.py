@@ -282,7 +282,8 @@ def columns(rows):
 
 def grains_force(args, key, case):
     """Force of a level press in grains, mean over beds."""
-    files = sorted(args.records.glob(f"{key}-*.csv"))
+    name = re.escape(key.split("/")[1])
+    files = [file for file in sorted(args.records.glob(f"{key}-*.csv")) if re.fullmatch(name + r"-\d+", file.stem)]
     if not files:
         fail(f"{args.records / key}-*.csv is not there: make it with grains/run.py, or give --friction")
     names = {"time_s": "time", "stage": "stage", "depth_m": "depth", "path_m": "path", "force_x_n": "fx", "force_z_n": "fz",

@@ -121,6 +121,16 @@ def records_are_those_of_grains(folder):
     assert abs(last["depth_m"] - 0.015) < 1e-6 and abs(last["pitch_rad"] - math.radians(15)) < 1e-4
 
 
+def the_force_of_grains_is_that_of_the_press(folder):
+    """Mean over beds, and not over the drags of the same plate."""
+    for name, force in (("disc120-1", 10), ("disc120-2", 14), ("disc120-load15-1", 99), ("disc120-swipe15-1", 99)):
+        rows, _ = mpm.play(Case("x disc:0.12 0 press:0.025@0.05"), Spring(), options())
+        mpm.write_rows(folder / "grains" / f"{name}.csv", [{**row, "wrench": np.array([0, 0, force, 0, 0, 0])} for row in rows])
+    got = mpm.grains_force(types.SimpleNamespace(records=folder), "grains/disc120", Case("x disc:0.12 0 press:0.025@0.05"))
+    print(f"force of two beds {got} N, by hand 12")
+    assert abs(got - 12) < 1e-9
+
+
 def friction_is_found():
     """The force of a press grows as measured: 0.86 at 0.40, 1.15 at 0.45."""
     tried = [[0.3, math.exp(5.8 * (0.3 - 0.426))]]
@@ -153,4 +163,5 @@ if __name__ == "__main__":
     friction_is_found()
     with tempfile.TemporaryDirectory() as name:
         records_are_those_of_grains(pathlib.Path(name))
+        the_force_of_grains_is_that_of_the_press(pathlib.Path(name))
         mistakes_are_one_line(pathlib.Path(name))
