@@ -215,6 +215,11 @@ class OutOfTime(Exception):
     pass
 
 
+def in_time(args):
+    if args.ends and time.time() > args.ends:
+        raise OutOfTime
+
+
 def stage_steps(way, args):
     """Steps of a stage and their length [s]; a plate goes at most --travel in one."""
     fastest = max(abs(way[2]), abs(way[3]))
@@ -229,6 +234,7 @@ def play(case, bed, args):
     total = sum(way[1] for way in case.ways)
     pose, rows, costs, now = np.array([0.0, -case.start, case.tilt]), [], [], 0.0
     for _ in range(round(SETTLE / args.dt)):
+        in_time(args)
         bed.step(pose, np.zeros(3), args.dt)
     for stage, (kind, seconds, vx, vz, rate, mass) in enumerate(case.ways):
         steps, dt = stage_steps(case.ways[stage], args)
@@ -239,8 +245,7 @@ def play(case, bed, args):
         count = min(steps, max(10, round(args.rows * seconds / total)))
         speed, begin, sums, first = np.array([vx, vz, rate]), -pose[1], [], 0
         for step in range(steps):
-            if args.ends and time.time() > args.ends:
-                raise OutOfTime
+            in_time(args)
             clock = time.time()
             free = speed - [0, GRAVITY * dt if mass else 0, 0]
             sums.append(bed.step(pose, free, dt))
