@@ -4,6 +4,7 @@ prints the error of each beside one bed's noise.
 
     PYTHONPATH=build/python .venv/bin/python scripts/judge.py
     ... scripts/judge.py --entry mine.py:law --table theirs=predictions.csv      models of others (scripts/judge_entries.py)
+    ... scripts/judge.py --rival newton=out/mpm      another simulator's records of the same cases (scripts/judge_mpm.py)
 
 An error is model over grains less 1; of a share of the force before (F0) and of lengths it is the difference. The noise is the
 standard deviation over beds of the same number. `*` is an error above twice the noise. --out has all numbers as judge.csv and
@@ -66,6 +67,7 @@ class Records:
                     if re.fullmatch(re.escape(name) + r"-\d+", file.stem)]
             if beds:
                 self.cases[key] = Case(row["case"]), beds
+                self.cases[key][0].key = key
 
     def ground(self, family):
         """Numbers of the beds of a family."""
@@ -82,6 +84,20 @@ def read_record(file):
     if missing:
         fail(f"{file} has no column {missing[0]}: it must be a record of grains")
     return {short: table[name] for name, short in CSV_COLUMNS.items()}
+
+
+class Rival:
+    """Another simulator: a folder of records, each case played as the mean of its beds."""
+
+    def __init__(self, name, folder):
+        self.name, self.cases = name, Records(folder).cases
+
+    def fit(self, records, ground):
+        pass
+
+    def play(self, case):
+        found = self.cases.get(case.key)
+        return mean_rows(found[1]) if found and found[0].text == case.text else None
 
 
 def mean_rows(beds):
@@ -134,6 +150,11 @@ def entries(args, ground):
         if not file or not pathlib.Path(file).exists():
             fail(f"--table {text}: it must be NAME=FILE.csv")
         yield TableEntry(name, file)
+    for text in args.rival:
+        name, _, folder = text.partition("=")
+        if not folder or not pathlib.Path(folder).is_dir():
+            fail(f"--rival {text}: it must be NAME=FOLDER of records")
+        yield Rival(name, pathlib.Path(folder))
 
 
 # ---- rows of the judgement ----
@@ -310,6 +331,7 @@ def main():
     parser.add_argument("--models", default="", help="of mild; default: all that yield")
     parser.add_argument("--entry", action="append", default=[], help="FILE.py:FUNCTION or LIB.so:FUNCTION, a model of your own")
     parser.add_argument("--table", action="append", default=[], help="NAME=FILE.csv, predictions of your own")
+    parser.add_argument("--rival", action="append", default=[], help="NAME=FOLDER, records of another simulator")
     parser.add_argument("--out", type=pathlib.Path, help="folder for judge.csv and figures.html")
     args = parser.parse_args()
     args.curves, args.fitted, results, begin = {}, {}, [], time.time()

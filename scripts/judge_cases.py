@@ -48,6 +48,7 @@ class Case:
     """NAME SHAPE TILT STAGE..., as grains/plan.h has it. ways: (kind, seconds, vx, vz up, pitch rate, mass) of each stage."""
 
     def __init__(self, text):
+        self.key = ""  # FAMILY/NAME, for who knows the family
         self.name, shape, tilt, *stages = text.split()
         self.text, self.sole, self.tilt = text, Sole(shape), math.radians(float(tilt))
         self.start = -GAP - max(float((self.sole.outline[:, 0] * math.sin(self.tilt)).max()), 0.0) * (not self.sole.radius)

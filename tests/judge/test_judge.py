@@ -88,7 +88,8 @@ def the_truth_is_found_and_others_are_not(folder):
     table = folder / "table.csv"
     table.write_text("case,time_s,depth_m,force_x_n,force_z_n,moment_y_nm\ndisc100,0,0,0,0,0\ndisc100,1,0.05,0,100,0\n")
     run = judge("--records", folder, "--families", "sand", "--models", "mild,con_spring,hunt_crossley",
-                "--entry", f"{mine}:half", "--entry", f"{folder / 'c.so'}:twice", "--table", f"theirs={table}", "--out", folder / "out")
+                "--entry", f"{mine}:half", "--entry", f"{folder / 'c.so'}:twice", "--table", f"theirs={table}",
+                "--rival", f"same={folder}", "--out", folder / "out")
     print(run.stdout, run.stderr)
     assert run.returncode == 0, run.stderr
     with open(folder / "out" / "judge.csv", newline="", encoding="utf-8") as file:
@@ -102,6 +103,9 @@ def the_truth_is_found_and_others_are_not(folder):
     assert error["sand/square100-again", "again", "hunt_crossley"] > 0.8, "a spring without memory gives all of the work again"
     forces = [{row["model"]: float(row["value"]) for row in rows if row["case"] == "sand/disc100" and row["measure"] == "force"}]
     assert abs(forces[0]["twice"] / forces[0]["half"] - 2) < 1e-4
+    same = {key: value for key, value in error.items() if key[2] == "same"}
+    print(f"the records themselves as a rival: {len(same)} numbers, largest error {max(map(abs, same.values())):.1e}")
+    assert len(same) == sum(key[2] == "mild" for key in error) and max(map(abs, same.values())) < 1e-3
     assert {model for _, _, model in error} >= {"half", "theirs", "chrono_scm", "archimedes", "3d_rft"}
     assert "figures.html" in run.stdout and (folder / "out" / "figures.html").stat().st_size > 10000
 
@@ -110,7 +114,8 @@ def mistakes_are_one_line(folder):
     for args in (("--records", folder / "none"), ("--records", folder, "--families", "mud"),
                  ("--records", folder, "--entry", "none.py"),
                  ("--records", folder, "--entry", f"{folder / 'mine.py'}:none"),
-                 ("--records", folder, "--entry", f"{folder / 'c.so'}:none"), ("--records", folder, "--table", "x")):
+                 ("--records", folder, "--entry", f"{folder / 'c.so'}:none"), ("--records", folder, "--table", "x"),
+                 ("--records", folder, "--rival", "x=/none")):
         run = judge(*args)
         print(args[-1], "->", run.stderr.strip())
         assert run.returncode == 2 and run.stderr.startswith("judge.py: ") and run.stderr.count("\n") == 1
