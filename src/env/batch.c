@@ -142,6 +142,8 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
                   {&all->shells.robot, shells * b->shells},
                   {&all->shells.near, shells},
                   {&all->shells.held, shells},
+                  {&all->shells.list, shells * sizeof *all->shells.list},
+                  {&all->shells.waiting, 2 * shells * sizeof *all->shells.waiting},
                   {&contact->position, 3 * rows * sizeof(float)},
                   {&contact->rotation, 9 * rows * sizeof(float)},
                   {&contact->velocity, 6 * rows * sizeof(float)},
@@ -398,6 +400,8 @@ static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
         all.shells.memory += first * all.shells.numbers;
         all.shells.near += first;
         all.shells.held += first;
+        all.shells.list += first;
+        all.shells.waiting += 2 * first;
     }
     all.contact = contact_from(&all.contact, first, (size_t)b->shape.feet);
     all.trial = all.trial ? all.trial + first : NULL;

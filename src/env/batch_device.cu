@@ -19,7 +19,10 @@ enum {
     TASK_THREADS = 128,
     TASK_ROBOTS = TASK_THREADS / TASK_LANES, /* of a block */
     TASK_BLOCKS = 8,                         /* blocks of a multiprocessor, at least */
-    SHELLS_ROBOTS = 8,
+    SHELLS_WARPS = 4,                        /* of a robot with shells near the ground */
+    SHELLS_BLOCKS = 3,                       /* such robots of a multiprocessor, at least */
+    SHELLS_ROBOTS = 1024,                    /* stepped at once, at most */
+    FIND_WARPS = 4,                          /* robots of a block that are looked at */
     TALLY_THREADS = 256,
     ORDER_THREADS = 1024
 };
@@ -48,23 +51,43 @@ static __global__ void __launch_bounds__(WARP_THREADS, ENVS_BLOCKS)
     part(const __grid_constant__ EnvsArrays all, const __grid_constant__ EnvsStep call, int k) {
     extern __shared__ __align__(16) Real shared[];
     const long place = warp_robot();
+    if (SHELLS && blockIdx.x == 0 && threadIdx.x < 2) {
+        all.shells.waiting[threadIdx.x] = 0;
+    }
     if (place < all.envs) {
         env_part(&all, &call, all.order[place], k, SAMPLED, SHELLS,
                  (EnvWork *)shared + threadIdx.x / LANES);
     }
 }
 
-/* A warp looks at SHELLS_ROBOTS robots: few of them have shells near the ground. */
-static __global__ void __launch_bounds__(LANES)
-    shells(const __grid_constant__ EnvsArrays all, int k) {
+/* Lists the robots whose shells may touch the ground. The order is that of arrival: each robot is
+ * stepped by itself. */
+static __global__ void __launch_bounds__(LANES *FIND_WARPS)
+    find(const __grid_constant__ EnvsArrays all, int k) {
+    const long robot = (long)blockIdx.x * FIND_WARPS + threadIdx.x / LANES;
+    if (robot < all.envs && env_shells_wait(&all, robot) && env_shells_find(&all, robot, k) &&
+        threadIdx.x % LANES == 0) {
+        all.shells.list[atomicAdd(&all.shells.waiting[0], 1)] = (int32_t)robot;
+    }
+}
+
+/* Steps the robots in the list, a block one after the other. */
+static __global__ void __launch_bounds__(LANES *SHELLS_WARPS, SHELLS_BLOCKS)
+    shells(const __grid_constant__ EnvsArrays all) {
     extern __shared__ __align__(16) Real shared[];
-    const long own = blockIdx.x + (long)(threadIdx.x % SHELLS_ROBOTS) * gridDim.x;
-    const int there = threadIdx.x < SHELLS_ROBOTS && own < all.envs;
-    unsigned todo = __ballot_sync(0xffffffffu, there && env_shells_wait(&all, own));
-    while (todo) {
-        const int next = __ffs((int)todo) - 1;
-        env_shells(&all, blockIdx.x + (long)next * gridDim.x, k, (EnvShellsWork *)shared);
-        todo &= todo - 1;
+    __shared__ int place;
+    const int count = all.shells.waiting[0];
+    for (;;) {
+        if (threadIdx.x == 0) {
+            place = atomicAdd(&all.shells.waiting[1], 1);
+        }
+        __syncthreads();
+        const int own = place;
+        if (own >= count) {
+            return;
+        }
+        env_shells_step(&all, all.shells.list[own], (EnvShellsWork *)shared);
+        __syncthreads();
     }
 }
 
@@ -224,8 +247,10 @@ static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int
 
 static const char *kernels_shells(const EnvsArrays *all, int k, void *stream) {
     OnDevice on(all->device);
-    const int blocks = (all->envs + SHELLS_ROBOTS - 1) / SHELLS_ROBOTS;
-    shells<<<blocks, LANES, sizeof(EnvShellsWork), (cudaStream_t)stream>>>(*all, k);
+    const int looked = (all->envs + FIND_WARPS - 1) / FIND_WARPS;
+    const int steps = all->envs < SHELLS_ROBOTS ? all->envs : SHELLS_ROBOTS;
+    find<<<looked, LANES * FIND_WARPS, 0, (cudaStream_t)stream>>>(*all, k);
+    shells<<<steps, LANES * SHELLS_WARPS, sizeof(EnvShellsWork), (cudaStream_t)stream>>>(*all);
     return launched();
 }
 

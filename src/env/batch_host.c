@@ -30,7 +30,9 @@ void envs_host_part(const EnvsArrays *all, const EnvsStep *call, int k, long rob
 void envs_host_shells(const EnvsArrays *all, int k, long robot) {
     EnvShellsWork work;
     work.engine.count = work.ground.count = 0; /* gcc does not see that a lane sets them */
-    env_shells(all, robot, k, &work);
+    if (env_shells_wait(all, robot) && env_shells_find(all, robot, k)) {
+        env_shells_step(all, robot, &work);
+    }
 }
 
 void envs_host_set_command(const EnvsArrays *all, long robot) {

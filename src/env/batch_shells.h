@@ -8,7 +8,7 @@
 #include "robot/engine/ground.h"
 #include "robot/engine/shells.h"
 
-/* [m] A body so far above the ground does not reach it in a step. It saves its twist. */
+/* [m] A body so far above the ground does not reach it in a step. */
 #define ENV_SHELLS_FAR REAL(0.15)
 
 /* In shared memory. */
@@ -31,25 +31,18 @@ WARP_FN void env_shells_away(const EnvsArrays *all, long robot) {
     lanes_sync();
 }
 
-/* Bool: the body may touch the ground in this step, as mild_ground_near says. */
+/* Bool: the body is near the ground. */
 MILD_HD int env_body_near(const EnvsArrays *all, const EngineGround *ground, const EngineWork *work,
                           int body) {
     const EngineModel *model = all->model;
-    const BodiesSetup *setup = env_bodies(all);
     const EngineLinks links = engine_links_of(work);
-    const int at = engine_feet(&model->tree) + body;
-    Real from_base[3], position[3], rotation[9], twist[6];
-    engine_body_pose(model, &links, body, from_base, rotation);
+    Real position[3], rotation[9];
+    engine_body_pose(model, &links, body, position, rotation);
     for (int k = 0; k < 3; k++) {
-        position[k] = from_base[k] + work->base[k];
+        position[k] += work->base[k];
     }
-    const Real reach =
-        bodies_reach(setup, at, position, rotation, ground->map_origin, ground->height);
-    if (!(reach > -ENV_SHELLS_FAR)) {
-        return 0;
-    }
-    engine_body_twist(&model->tree, &links, work->rate, body, from_base, twist);
-    return reach > bodies_least(setup, setup->sole[at].radius, twist, twist);
+    return bodies_reach(env_bodies(all), engine_feet(&model->tree) + body, position, rotation,
+                        ground->map_origin, ground->height) > -ENV_SHELLS_FAR;
 }
 
 /* Which bodies are near the ground, after engine_begin. */
@@ -77,6 +70,18 @@ WARP_FN void env_shells_near(const EnvsArrays *all, long robot, const EngineGrou
 
 /* ---- the step ---- */
 
+/* Bool: a body, with feet before it, has an element that may touch the ground in this step. First
+ * the bound of mild_ground_near. */
+WARP_FN int env_body_touches(const EnvsArrays *all, long robot, int at, const Real *position,
+                             const Real *rotation, const Real *twist) {
+    const BodiesSetup *setup = env_bodies(all);
+    const Real *origin = all->map_origin + 2 * robot;
+    const Real height = all->contact.height[robot];
+    const Real reach = bodies_reach(setup, at, position, rotation, origin, height);
+    return reach > bodies_least(setup, setup->sole[at].radius, twist, twist) &&
+           bodies_touch(setup, at, position, rotation, twist, origin, height);
+}
+
 /* Of the bits in `near`, those of bodies with an element that may touch the ground in this step. */
 WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, int near) {
     const EngineModel *model = all->model;
@@ -97,8 +102,7 @@ WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, int near) {
         for (int k = 0; k < 3; k++) {
             position[k] += saved->state[ENGINE_SAVED(base) + k];
         }
-        if (bodies_touch(setup, at, position, rotation, twist, all->map_origin + 2 * robot,
-                         all->contact.height[robot])) {
+        if (env_body_touches(all, robot, at, position, rotation, twist)) {
             touch |= 1 << body;
         }
     }
@@ -138,12 +142,34 @@ WARP_FN void env_shells_leave(const EnvsArrays *all, long robot, int near) {
     }
 }
 
+/* After part k of a policy step: which bodies may touch the ground, in `near`. The others forget, and
+ * in a new episode all do. Bool: env_shells_step is to follow. */
+WARP_FN int env_shells_find(const EnvsArrays *all, long robot, int k) {
+    const int listed = all->shells.near[robot];
+    const int near = listed ? env_shells_touch(all, robot, listed) : 0;
+    const int held = all->shells.held[robot];
+    if (held) {
+        env_shells_leave(all, robot, k == 0 && all->reset[robot] ? 0 : near);
+    }
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            all->shells.near[robot] = (uint8_t)near;
+            all->shells.held[robot] = near != 0;
+            if (!near) {
+                env_shells_at(all, robot)->load = 0;
+            }
+        }
+    }
+    lanes_sync();
+    return near != 0;
+}
+
 /* Feet, then the bodies of the bits in `near`. */
-WARP_FN void env_shells_list(const EnvsArrays *all, long robot, int near, EnvShellsWork *work) {
+TEAM_FN void env_shells_list(const EnvsArrays *all, long robot, int near, EnvShellsWork *work) {
     const BodiesSetup *setup = env_bodies(all);
     const int feet = setup->feet;
     EACH_LANE(l) {
-        if (LANE(l) == 0) {
+        if (TEAM_LANE(l) == 0) {
             BodiesWork *to = &work->ground;
             int count = 0;
             for (int b = 0; b < setup->bodies; b++) {
@@ -162,21 +188,21 @@ WARP_FN void env_shells_list(const EnvsArrays *all, long robot, int near, EnvShe
             work->engine.count = count - feet;
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
 /* n numbers of each lane. */
-WARP_FN void env_shells_copy(const Real *from, int count, Real *to) {
+TEAM_FN void env_shells_copy(const Real *from, int count, Real *to) {
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int i = LANE(l); i < count; i += LANES) {
+        for (int i = TEAM_LANE(l); i < count; i += TEAM) {
             to[i] = from[i];
         }
     }
 }
 
 /* What the ground asks of the feet, from env_export. */
-WARP_FN void env_shells_feet(const EnvsArrays *all, long robot, BodiesWork *to) {
+TEAM_FN void env_shells_feet(const EnvsArrays *all, long robot, BodiesWork *to) {
     const int feet = env_bodies(all)->feet;
     const EnvsContact *at = &all->contact;
     const Real *A = at->inverse_inertia + robot * 36 * feet * feet;
@@ -187,22 +213,22 @@ WARP_FN void env_shells_feet(const EnvsArrays *all, long robot, BodiesWork *to) 
     env_shells_copy(at->free_velocity + robot * 6 * feet, 6 * feet, to->free_velocity);
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int i = LANE(l); i < 36 * feet * feet; i += LANES) {
+        for (int i = TEAM_LANE(l); i < 36 * feet * feet; i += TEAM) {
             to->inverse_inertia[i / (6 * feet) * rows + i % (6 * feet)] = A[i];
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
 /* Wrenches of the feet for env_import and of the bodies for engine_end; the measures. */
-WARP_FN void env_shells_results(const EnvsArrays *all, long robot, const EnvShellsWork *work) {
+TEAM_FN void env_shells_results(const EnvsArrays *all, long robot, const EnvShellsWork *work) {
     const int feet = env_bodies(all)->feet;
     const BodiesWork *from = &work->ground;
     env_shells_copy(from->wrench, 6 * feet, all->contact.velocity + robot * 6 * feet);
     EACH_LANE(l) {
-        if (LANE(l) < feet) {
-            const ContactFoot *foot = &from->foot[LANE(l)];
-            MildBatchFoot *to = &all->contact.foot[robot * feet + LANE(l)];
+        if (TEAM_LANE(l) < feet) {
+            const ContactFoot *foot = &from->foot[TEAM_LANE(l)];
+            MildBatchFoot *to = &all->contact.foot[robot * feet + TEAM_LANE(l)];
             for (int k = 0; k < 3; k++) {
                 to->pressure_center[k] = foot->pressure_center[k];
             }
@@ -210,7 +236,7 @@ WARP_FN void env_shells_results(const EnvsArrays *all, long robot, const EnvShel
             to->depth_mean = foot->depth_mean;
             to->area = foot->area;
         }
-        if (LANE(l) == LANES - 1) {
+        if (TEAM_LANE(l) == TEAM - 1) {
             Real load = 0;
             for (int i = feet; i < from->count; i++) {
                 load += from->wrench[6 * i + 2];
@@ -223,7 +249,8 @@ WARP_FN void env_shells_results(const EnvsArrays *all, long robot, const EnvShel
 }
 
 /* The step of a robot with bodies near the ground. */
-WARP_FN void env_shells_step(const EnvsArrays *all, long robot, int near, EnvShellsWork *work) {
+TEAM_FN void env_shells_step(const EnvsArrays *all, long robot, EnvShellsWork *work) {
+    const int near = all->shells.near[robot];
     const int feet = env_bodies(all)->feet;
     BodiesWork *ground = &work->ground;
     env_shells_list(all, robot, near, work);
@@ -235,29 +262,6 @@ WARP_FN void env_shells_step(const EnvsArrays *all, long robot, int near, EnvShe
                         &env_shells_at(all, robot)->links, &work->engine, &bodies);
     bodies_step(env_bodies(all), ground, 1);
     env_shells_results(all, robot, work);
-}
-
-/* After part k of a policy step. In a new episode the shells remember nothing. */
-WARP_FN void env_shells(const EnvsArrays *all, long robot, int k, EnvShellsWork *work) {
-    const int listed = all->shells.near[robot];
-    const int near = listed ? env_shells_touch(all, robot, listed) : 0;
-    const int held = all->shells.held[robot];
-    if (held) {
-        env_shells_leave(all, robot, k == 0 && all->reset[robot] ? 0 : near);
-    }
-    if (near) {
-        env_shells_step(all, robot, near, work);
-    }
-    EACH_LANE(l) {
-        if (LANE(l) == 0) {
-            all->shells.near[robot] = (uint8_t)near;
-            all->shells.held[robot] = near != 0;
-            if (!near) {
-                env_shells_at(all, robot)->load = 0;
-            }
-        }
-    }
-    lanes_sync();
 }
 
 #endif

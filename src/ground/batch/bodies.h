@@ -1,16 +1,20 @@
-/* The contact step of one robot whose shells are near the ground, by a warp: any number of bodies,
+/* The contact step of one robot whose shells are near the ground, by a team: any number of bodies,
  * soles and surfaces (docs/model.md section 20), level or on a map.
  *
- * Few robots take this step at a time, so it has one text for all sizes. Elements keep nothing in
- * registers: whatever a step needs of one follows from its memory whenever it is asked for. What
- * the lanes share is in BodiesWork. The method is that of contact.inc, and so are the names. */
+ * Few robots take this step at a time, so it has one text for all sizes. Elements that may touch are
+ * listed, and dealt to warps in rounds of one body each; those of a warp's first BODIES_KEPT rounds
+ * are kept, and others follow from their memory whenever they are asked for. What the lanes share
+ * is in BodiesWork. The method is that of contact.inc, and so are the names. */
 #ifndef MILD_BATCH_BODIES_H
 #define MILD_BATCH_BODIES_H
 
+#include "base/team.h"
 #include "ground/batch/contact.h"
 
 #define BODIES_MAX 9 /* feet, and bodies with shells: those of the Go1 */
 #define BODIES_ROWS (6 * BODIES_MAX)
+#define BODIES_ELEMENTS 1536 /* of all bodies */
+#define BODIES_ROUNDS (BODIES_ELEMENTS / LANES + BODIES_MAX)
 #define BODIES_SUMS 42                         /* of an evaluation: a wrench and a 6 x 6 hessian */
 #define BODIES_STEEP REAL(0.17364817766693034) /* [-] cosine of 80 degrees, as in faces.c */
 #define BODIES_MARGIN REAL(1e-3)               /* [m] as in locate.c */
@@ -108,11 +112,19 @@ typedef struct {
     Real residual; /* [-] relative */
     int iterations;
     /* ---- of the solution ---- */
-    Real least[BODIES_MAX]; /* [m] elements less deep do not touch in this step */
+    Real least[BODIES_MAX];         /* [m] elements less deep do not touch in this step */
+    int listed[BODIES_MAX];         /* elements in the list, which begins at */
+    int begin[BODIES_MAX];          /* for each place */
+    int first[BODIES_MAX + 1];      /* round of a place; those of a place follow each other */
+    uint8_t place[BODIES_ROUNDS];   /* of a round */
+    uint16_t list[BODIES_ELEMENTS]; /* numbers of elements */
+    int active; /* rows of bodies with listed elements; P and W of others are 0 */
+    uint8_t active_row[BODIES_ROWS];
+    Real part[BODIES_ROUNDS][BODIES_SUMS];
     BodiesPoint at, full, next, best;
     Real hessian[BODIES_MAX][36];
     Real row[2][BODIES_ROWS];                     /* what is summed over rows */
-    Real matrix[BODIES_ROWS * (BODIES_ROWS + 1)]; /* [1 + H A | W + H (V - V_free)] */
+    Real matrix[BODIES_ROWS * (BODIES_ROWS + 1)]; /* [1 + H A | W + H (V - V_free)], active rows */
 } BodiesWork;
 
 /* One element at the start of a step. */
@@ -121,6 +133,7 @@ typedef struct {
     Real depth;
     Real slope[2];
     Real share;     /* [-] 1 for a sole; 0: carries nothing */
+    int state;      /* before the step, of bodies_state */
     int label;      /* that it stands on */
     int faces_down; /* bool: of a surface; 1 for a sole */
     int listed;     /* bool: may touch in this step */
@@ -360,7 +373,7 @@ MILD_HD void bodies_direct(const BodiesSole *sole, const Real *R, int s,
 }
 
 /* Its law in this step; foot_prepare. */
-MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int i, int s, int state,
+MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
                           BodiesElement *own) {
     const BodiesSole *sole = &setup->sole[work->body[i]];
     const int wanted = work->label_material ? work->label_material[own->label] : 0;
@@ -373,7 +386,7 @@ MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int 
     contact_stand_on(material, e);
     own->curves = material->curves;
     if (sole->face) {
-        bodies_share(setup, work, i, s, state, material, own);
+        bodies_share(setup, work, i, s, own->state, material, own);
     }
     e->depth = own->depth;
     e->stop_drag = e->stop_growth = e->explicit_impulse = e->turn_x = e->turn_y = 0;
@@ -388,14 +401,12 @@ MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int 
     bodies_direct(sole, work->rotation[i], s, material, &now, dt, own);
 }
 
-/* Element s of the body at place i. Where it is not listed, all but depth, share and memory is
- * unset. all: bool, begin those that are not listed, too. */
-MILD_HD void bodies_element(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
-                            const MapSpot *spot, int all, BodiesElement *own) {
+/* Where element s of the body at place i is. Its law and what it remembers are unset. */
+MILD_HD void bodies_locate(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
+                           const MapSpot *spot, BodiesElement *own) {
     const BodiesSole *sole = &setup->sole[work->body[i]];
     const Real *R = work->rotation[i];
-    const int state = bodies_state(setup, sole, &work->memory[i], s);
-    own->before = bodies_recall(&work->memory[i], s);
+    own->state = bodies_state(setup, sole, &work->memory[i], s);
     own->slope[0] = own->slope[1] = 0;
     own->label = 0;
     own->share = 1;
@@ -408,13 +419,21 @@ MILD_HD void bodies_element(const BodiesSetup *setup, const BodiesWork *work, in
     }
     own->faces_down = own->share > 0;
     if (setup->has_map) {
-        bodies_survey(setup, work, i, s, state, spot, own);
+        bodies_survey(setup, work, i, s, own->state, spot, own);
     } else {
         own->depth = work->height - work->position[i][2] - own->p[2];
     }
     own->listed = own->faces_down && own->depth > work->least[i];
+}
+
+/* All of it. Where it is not listed, its law is unset. all: bool, begin those that are not listed,
+ * too. */
+MILD_HD void bodies_element(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
+                            const MapSpot *spot, int all, BodiesElement *own) {
+    bodies_locate(setup, work, i, s, spot, own);
+    own->before = bodies_recall(&work->memory[i], s);
     if (own->listed || all) {
-        bodies_begin(setup, work, i, s, state, own);
+        bodies_begin(setup, work, i, s, own);
     }
 }
 
@@ -527,10 +546,10 @@ WARP_FN void bodies_report(BodiesWork *work, int i, const BodiesLoads *lane) {
     }
 }
 
-/* Memory and reports at the twists of `next`. */
-WARP_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advance) {
+/* Memory and reports at the twists of `next`; a warp takes a body. */
+TEAM_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advance) {
     LANE_ROLLED
-    for (int i = 0; i < work->count; i++) {
+    for (int i = TEAM_WARP; i < work->count; i += TEAM_WARPS) {
         const BodiesSole *sole = &setup->sole[work->body[i]];
         const BodiesMemory *memory = &work->memory[i];
         const MapSpot spot = bodies_spot(setup, work, i);
@@ -560,7 +579,7 @@ WARP_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advan
             }
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
 /* A surface far from the ground forgets. */
@@ -579,26 +598,26 @@ WARP_FN void bodies_leave(const BodiesMemory *memory, int elements) {
 }
 
 /* A whole step. advance: bool, the memory moves to its end. */
-WARP_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance) {
+TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance) {
     const int rows = 6 * work->count;
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int i = LANE(l); i < work->count; i += LANES) {
+        for (int i = TEAM_LANE(l); i < work->count; i += TEAM) {
             work->least[i] = bodies_least(setup, setup->sole[work->body[i]].radius,
                                           work->velocity[i], work->free_velocity + 6 * i);
         }
     }
-    lanes_sync();
+    team_sync();
     bodies_newton(setup, work);
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int r = LANE(l); r < rows; r += LANES) {
+        for (int r = TEAM_LANE(l); r < rows; r += TEAM) {
             work->next.twist[r] =
                 work->free_velocity[r] + bodies_times(work, rows, r, work->best.wrench);
             work->wrench[r] = work->best.wrench[r] / setup->dt;
         }
     }
-    lanes_sync();
+    team_sync();
     bodies_finish(setup, work, advance);
 }
 

@@ -178,6 +178,15 @@ MildStatus batch_bodies_open(BatchBodies *bodies, const MildBatch *batch,
             "batch: %d feet and %d bodies with shells; at most %d stand on soft ground",
             shape->feet, surfaces, BODIES_MAX);
     }
+    int elements = 0;
+    for (int b = 0; b < setup.bodies; b++) {
+        elements += mild_sole_elements(soles[b]);
+    }
+    if (elements > BODIES_ELEMENTS) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "batch: feet and shells have %d elements; at most %d stand on soft ground",
+                         elements, BODIES_ELEMENTS);
+    }
     MildStatus status =
         set_materials(bodies, batch, soles + shape->feet, surfaces, materials, count, error);
     return status == MILD_OK ? set_all(bodies, &setup, batch, soles, surfaces, error) : status;

@@ -1,5 +1,5 @@
 /* Newton's method of bodies.h on the twists of the bodies, see contact.inc: in P = W(V), V = V_free
- * + A P the unknown is P. Rows are dealt to the lanes. */
+ * + A P the unknown is P. Rows are dealt to the lanes of a team. */
 #ifndef MILD_BATCH_BODIES_NEWTON_H
 #define MILD_BATCH_BODIES_NEWTON_H
 
@@ -9,11 +9,12 @@ MILD_HD MapSpot bodies_spot(const BodiesSetup *setup, const BodiesWork *work, in
                           : bodies_no_spot();
 }
 
-/* Row r of A x. */
+/* Row r of A x, of an x that is 0 but in active rows. */
 MILD_HD Real bodies_times(const BodiesWork *work, int rows, int r, const Real *x) {
     Real sum = 0;
     LANE_ROLLED
-    for (int j = 0; j < rows; j++) {
+    for (int n = 0; n < work->active; n++) {
+        const int j = work->active_row[n];
         sum += work->inverse_inertia[j * rows + r] * x[j];
     }
     return sum;
@@ -63,66 +64,199 @@ MILD_HD void bodies_pass(const BodiesSetup *setup, const BodiesElement *own, con
     bodies_add(own->p, I, h, sums, l);
 }
 
-/* W and H at the twist of a point. */
-WARP_FN void bodies_evaluate(const BodiesSetup *setup, BodiesWork *work, BodiesPoint *point) {
+/* ---- which elements ---- */
+
+/* Rounds of elements that a warp keeps. On a GPU these are in registers. */
+#ifdef __CUDACC__
+#define BODIES_KEPT 1
+#else
+#define BODIES_KEPT 8
+#endif
+
+/* Lists those of the body at place i that may touch; by a warp. */
+WARP_FN void bodies_list_body(const BodiesSetup *setup, BodiesWork *work, int i) {
+    const int elements = setup->sole[work->body[i]].elements;
+    const MapSpot spot = bodies_spot(setup, work, i);
+    uint16_t *list = work->list + work->begin[i];
+    int count = 0;
     LANE_ROLLED
-    for (int i = 0; i < work->count; i++) {
-        const int elements = setup->sole[work->body[i]].elements;
-        const MapSpot spot = bodies_spot(setup, work, i);
-        Real part[BODIES_SUMS][LANE_COPIES], whole[BODIES_SUMS][LANE_COPIES];
+    for (int from = 0; from < elements; from += LANES) {
+        int flag[LANE_COPIES], rank[LANE_COPIES];
         EACH_LANE(l) {
-            LANE_UNROLL
-            for (int n = 0; n < BODIES_SUMS; n++) {
-                part[n][l] = 0;
-            }
-            LANE_ROLLED
-            for (int s = LANE(l); s < elements; s += LANES) {
+            flag[l] = 0;
+            if (from + LANE(l) < elements) {
                 BodiesElement own;
-                bodies_element(setup, work, i, s, &spot, 0, &own);
-                if (own.listed && own.share > 0) {
-                    bodies_pass(setup, &own, point->twist + 6 * i, part, l);
-                }
+                bodies_locate(setup, work, i, from + LANE(l), &spot, &own);
+                flag[l] = own.listed;
             }
         }
-        group_sums(part, BODIES_SUMS, LANES, whole);
+        const int found = lanes_rank(flag, rank);
         EACH_LANE(l) {
-            LANE_UNROLL
-            for (int n = 0; n < BODIES_SUMS; n++) {
-                if (LANE(l) == n % LANES) {
-                    *(n < 6 ? &point->wrench[6 * i + n] : &work->hessian[i][n - 6]) = whole[n][l];
-                }
+            if (flag[l]) {
+                list[count + rank[l]] = (uint16_t)(from + LANE(l));
+            }
+        }
+        count += found;
+    }
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            work->listed[i] = count;
+        }
+    }
+}
+
+/* The list, and its rounds. */
+TEAM_FN void bodies_list(const BodiesSetup *setup, BodiesWork *work) {
+    EACH_LANE(l) {
+        if (TEAM_LANE(l) == 0) {
+            int begin = 0;
+            for (int i = 0; i < work->count; i++) {
+                work->begin[i] = begin;
+                begin += setup->sole[work->body[i]].elements;
             }
         }
     }
-    lanes_sync();
+    team_sync();
+    LANE_ROLLED
+    for (int i = TEAM_WARP; i < work->count; i += TEAM_WARPS) {
+        bodies_list_body(setup, work, i);
+    }
+    team_sync();
+    EACH_LANE(l) {
+        if (TEAM_LANE(l) == 0) {
+            int round = 0;
+            work->active = 0;
+            for (int i = 0; i < work->count; i++) {
+                for (int r = 6 * i; r < 6 * i + 6 && work->listed[i] > 0; r++) {
+                    work->active_row[work->active++] = (uint8_t)r;
+                }
+                work->first[i] = round;
+                for (int from = 0; from < work->listed[i]; from += LANES) {
+                    work->place[round++] = (uint8_t)i;
+                }
+            }
+            work->first[work->count] = round;
+        }
+    }
+    team_sync();
+}
+
+/* The element of lane l in a round. Bool: there is one. */
+MILD_HD int bodies_of_round(const BodiesSetup *setup, const BodiesWork *work, int round, int l,
+                            BodiesElement *own) {
+    const int i = work->place[round];
+    const int n = (round - work->first[i]) * LANES + l;
+    if (n >= work->listed[i]) {
+        own->share = 0;
+        return 0;
+    }
+    const MapSpot spot = bodies_spot(setup, work, i);
+    bodies_element(setup, work, i, work->list[work->begin[i] + n], &spot, 0, own);
+    return own->share > 0;
+}
+
+/* Those that a warp keeps. */
+TEAM_FN void bodies_keep(const BodiesSetup *setup, const BodiesWork *work,
+                         BodiesElement (*kept)[LANE_COPIES]) {
+    LANE_UNROLL
+    for (int turn = 0; turn < BODIES_KEPT; turn++) {
+        const int round = TEAM_WARP + turn * TEAM_WARPS;
+        EACH_LANE(l) {
+            kept[turn][l].share = 0;
+            if (round < work->first[work->count]) {
+                bodies_of_round(setup, work, round, LANE(l), &kept[turn][l]);
+            }
+        }
+    }
+}
+
+/* ---- an evaluation ---- */
+
+/* Wrench and hessian of a round. */
+TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const BodiesPoint *point,
+                          int turn, const BodiesElement (*kept)[LANE_COPIES]) {
+    const int round = TEAM_WARP + turn * TEAM_WARPS;
+    const Real *twist = point->twist + 6 * work->place[round];
+    Real part[BODIES_SUMS][LANE_COPIES], whole[BODIES_SUMS][LANE_COPIES];
+    EACH_LANE(l) {
+        LANE_UNROLL
+        for (int n = 0; n < BODIES_SUMS; n++) {
+            part[n][l] = 0;
+        }
+        if (turn < BODIES_KEPT) {
+            const BodiesElement *own = &kept[BODIES_KEPT > 1 ? turn : 0][l];
+            if (own->share > 0) {
+                bodies_pass(setup, own, twist, part, l);
+            }
+        } else {
+            BodiesElement own;
+            if (bodies_of_round(setup, work, round, LANE(l), &own)) {
+                bodies_pass(setup, &own, twist, part, l);
+            }
+        }
+    }
+    group_sums(part, BODIES_SUMS, LANES, whole);
+    EACH_LANE(l) {
+        LANE_UNROLL
+        for (int n = 0; n < BODIES_SUMS; n++) {
+            if (LANE(l) == n % LANES) {
+                work->part[round][n] = whole[n][l];
+            }
+        }
+    }
+}
+
+/* W and H at the twist of a point. */
+TEAM_FN void bodies_evaluate(const BodiesSetup *setup, BodiesWork *work, BodiesPoint *point,
+                             const BodiesElement (*kept)[LANE_COPIES]) {
+    LANE_ROLLED
+    for (int turn = 0; TEAM_WARP + turn * TEAM_WARPS < work->first[work->count]; turn++) {
+        bodies_round(setup, work, point, turn, kept);
+    }
+    team_sync();
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int n = TEAM_LANE(l); n < work->count * BODIES_SUMS; n += TEAM) {
+            const int i = n / BODIES_SUMS;
+            const int m = n % BODIES_SUMS;
+            Real sum = 0;
+            LANE_ROLLED
+            for (int round = work->first[i]; round < work->first[i + 1]; round++) {
+                sum += work->part[round][m];
+            }
+            *(m < 6 ? &point->wrench[6 * i + m] : &work->hessian[i][m - 6]) = sum;
+        }
+    }
+    team_sync();
 }
 
 /* |P - W| and |P| in the metric of kinetic energy. */
-WARP_FN void bodies_residual(BodiesWork *work, int rows, const BodiesPoint *point, Real *residual,
+TEAM_FN void bodies_residual(BodiesWork *work, int rows, const BodiesPoint *point, Real *residual,
                              Real *scale) {
     Real moved[LANE_COPIES], done[LANE_COPIES];
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int r = LANE(l); r < rows; r += LANES) {
+        for (int r = TEAM_LANE(l); r < rows; r += TEAM) {
             work->row[0][r] = point->impulse[r] - point->wrench[r];
         }
     }
-    lanes_sync();
+    team_sync();
     EACH_LANE(l) {
         moved[l] = done[l] = 0;
         LANE_ROLLED
-        for (int r = LANE(l); r < rows; r += LANES) {
+        for (int n = LANE(l); n < work->active; n += LANES) {
+            const int r = work->active_row[n];
             moved[l] += work->row[0][r] * bodies_times(work, rows, r, work->row[0]);
             done[l] += point->impulse[r] * (point->twist[r] - work->free_velocity[r]);
         }
     }
-    lanes_sync();
+    team_sync();
     *residual = REAL_SQRT(real_max(lane_sum(moved), 0));
     *scale = REAL_SQRT(real_max(lane_sum(done), 0));
 }
 
-/* Gauss and Jordan; the last column becomes the solution. */
-WARP_FN void bodies_eliminate(BodiesWork *work, int rows) {
+/* Gauss and Jordan; the last column becomes the solution. Each warp has its share of the columns. */
+TEAM_FN void bodies_eliminate(BodiesWork *work, int rows) {
     const int stride = rows + 1;
     LANE_ROLLED
     for (int k = 0; k < rows; k++) {
@@ -130,86 +264,85 @@ WARP_FN void bodies_eliminate(BodiesWork *work, int rows) {
         const Real inverse = 1 / pivot[k];
         EACH_LANE(l) {
             LANE_ROLLED
-            for (int r = LANE(l); r < rows; r += LANES) {
+            for (int n = TEAM_LANE(l); n < rows * TEAM_WARPS; n += TEAM) {
+                const int r = n / TEAM_WARPS;
                 Real *row = work->matrix + r * stride;
                 const Real factor = row[k] * inverse;
                 LANE_ROLLED
-                for (int j = k + 1; j < stride && r != k; j++) {
+                for (int j = k + 1 + n % TEAM_WARPS; j < stride && r != k; j += TEAM_WARPS) {
                     row[j] -= factor * pivot[j];
                 }
             }
         }
-        lanes_sync();
+        team_sync();
     }
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int r = LANE(l); r < rows; r += LANES) {
+        for (int r = TEAM_LANE(l); r < rows; r += TEAM) {
             work->matrix[r * stride + rows] /= work->matrix[r * stride + r];
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
 /* Newton's step from `at`, where H was taken: (1 + H A) P = W + H (V - V_free). */
-WARP_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, BodiesPoint *next) {
-    const int stride = rows + 1;
+TEAM_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, BodiesPoint *next) {
+    const int active = work->active;
+    const int stride = active + 1;
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int r = LANE(l); r < rows; r += LANES) {
+        for (int n = TEAM_LANE(l); n < active * stride; n += TEAM) {
+            const int right = n % stride == active; /* the right side */
+            const int r = work->active_row[n / stride];
+            const int j = work->active_row[right ? 0 : n % stride];
             const int first = r / 6 * 6;
             const Real *H = work->hessian[r / 6] + 6 * (r % 6);
             const Real *A = work->inverse_inertia + first * rows;
-            Real *row = work->matrix + r * stride;
-            row[rows] = at->wrench[r];
+            Real sum = right ? at->wrench[r] : r == j ? 1 : 0;
             for (int k = 0; k < 6; k++) {
-                row[rows] += H[k] * (at->twist[first + k] - work->free_velocity[first + k]);
+                sum += H[k] * (right ? at->twist[first + k] - work->free_velocity[first + k]
+                                     : A[k * rows + j]);
             }
-            LANE_ROLLED
-            for (int j = 0; j < rows; j++) {
-                Real sum = r == j ? 1 : 0;
-                for (int k = 0; k < 6; k++) {
-                    sum += H[k] * A[k * rows + j];
-                }
-                row[j] = sum;
-            }
+            work->matrix[n] = sum;
         }
     }
-    lanes_sync();
-    bodies_eliminate(work, rows);
+    team_sync();
+    bodies_eliminate(work, active);
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int r = LANE(l); r < rows; r += LANES) {
-            next->impulse[r] = work->matrix[r * stride + rows];
+        for (int n = TEAM_LANE(l); n < active; n += TEAM) {
+            next->impulse[work->active_row[n]] = work->matrix[n * stride + active];
         }
     }
-    lanes_sync();
+    team_sync();
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int r = LANE(l); r < rows; r += LANES) {
+        for (int n = TEAM_LANE(l); n < active; n += TEAM) {
+            const int r = work->active_row[n];
             next->twist[r] = work->free_velocity[r] + bodies_times(work, rows, r, next->impulse);
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
-WARP_FN void bodies_copy(int rows, const BodiesPoint *from, BodiesPoint *to) {
+TEAM_FN void bodies_copy(int rows, const BodiesPoint *from, BodiesPoint *to) {
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int r = LANE(l); r < rows; r += LANES) {
+        for (int r = TEAM_LANE(l); r < rows; r += TEAM) {
             to->impulse[r] = from->impulse[r];
             to->twist[r] = from->twist[r];
             to->wrench[r] = from->wrench[r];
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
 /* Where Newton's method begins: the motion now. A body that transmits no moment begins at rest
  * (contact.inc says why), and turns as it will. */
-WARP_FN void bodies_start(BodiesWork *work, int rows, BodiesPoint *point) {
+TEAM_FN void bodies_start(BodiesWork *work, int rows, BodiesPoint *point) {
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int r = LANE(l); r < rows; r += LANES) {
+        for (int r = TEAM_LANE(l); r < rows; r += TEAM) {
             const int first = r / 6 * 6;
             Real turns = 0; /* trace of the inverse inertia of rotation */
             for (int k = first + 3; k < first + 6; k++) {
@@ -220,32 +353,35 @@ WARP_FN void bodies_start(BodiesWork *work, int rows, BodiesPoint *point) {
             point->impulse[r] = point->wrench[r] = 0;
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
 /* The point between `at` and `full`. */
-WARP_FN void bodies_between(BodiesWork *work, int rows, Real way) {
+TEAM_FN void bodies_between(BodiesWork *work, int rows, Real way) {
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int r = LANE(l); r < rows; r += LANES) {
+        for (int r = TEAM_LANE(l); r < rows; r += TEAM) {
             const BodiesPoint *at = &work->at, *full = &work->full;
             work->next.impulse[r] = at->impulse[r] + way * (full->impulse[r] - at->impulse[r]);
             work->next.twist[r] = at->twist[r] + way * (full->twist[r] - at->twist[r]);
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
 /* As in contact.inc; the least residual's point is left in work->best. */
-WARP_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work) {
+TEAM_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work) {
     const int rows = 6 * work->count;
     Real least = -1, at_residual = 0, way = 1, relative = 0;
     int steps = 0, halved = 0;
+    BodiesElement kept[BODIES_KEPT][LANE_COPIES];
+    bodies_list(setup, work);
+    bodies_keep(setup, work, kept);
     bodies_start(work, rows, &work->next);
     bodies_copy(rows, &work->next, &work->best);
     for (;;) {
         Real residual, scale;
-        bodies_evaluate(setup, work, &work->next);
+        bodies_evaluate(setup, work, &work->next, (const BodiesElement(*)[LANE_COPIES])kept);
         bodies_residual(work, rows, &work->next, &residual, &scale);
         const Real wanted = halved ? (1 - way / 10) * at_residual : at_residual;
         if (steps > 1 && !(residual < wanted) && halved < CONTACT_HALVINGS) {
@@ -274,12 +410,12 @@ WARP_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work) {
         steps++;
     }
     EACH_LANE(l) {
-        if (LANE(l) == 0) {
+        if (TEAM_LANE(l) == 0) {
             work->residual = relative;
             work->iterations = steps;
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
 #endif

@@ -11,6 +11,7 @@
 #ifndef MILD_ENGINE_SHELLS_H
 #define MILD_ENGINE_SHELLS_H
 
+#include "base/team.h"
 #include "robot/engine/feet.h"
 #include "robot/engine/saved.h"
 
@@ -105,10 +106,10 @@ WARP_FN void engine_save_links(const EngineTree *tree, const EngineWork *work,
 }
 
 /* The factor from its list. */
-WARP_FN void shells_factor(const EngineTree *tree, const EngineSaved *saved, EngineShells *shells) {
+TEAM_FN void shells_factor(const EngineTree *tree, const EngineSaved *saved, EngineShells *shells) {
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
+        for (int e = TEAM_LANE(l); e < engine_entries(tree); e += TEAM) {
             const EngineEntry entry = tree->entry[e];
             if (entry.place == tree->above[entry.dof]) {
                 shells->inverse[entry.dof] = saved->factor[e];
@@ -120,22 +121,22 @@ WARP_FN void shells_factor(const EngineTree *tree, const EngineSaved *saved, Eng
 }
 
 /* Poses and J. */
-WARP_FN void shells_pose(const EngineModel *model, const EngineSaved *saved,
+TEAM_FN void shells_pose(const EngineModel *model, const EngineSaved *saved,
                          const EngineLinks *links, EngineShells *shells,
                          const EngineShellsGround *ground) {
     const EngineTree *tree = &model->tree;
     const int chain = engine_chain(tree);
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int i = LANE(l); i < shells->count; i += LANES) {
+        for (int i = TEAM_LANE(l); i < shells->count; i += TEAM) {
             engine_body_pose(model, links, shells->body[i], ground->position[i],
                              ground->rotation[i]);
         }
     }
-    lanes_sync();
+    team_sync();
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int n = LANE(l); n < chain * shells->count; n += LANES) {
+        for (int n = TEAM_LANE(l); n < chain * shells->count; n += TEAM) {
             const int i = n / chain;
             const int link = tree->body_link[shells->body[i]];
             if (n % chain < engine_row_length(tree, link)) {
@@ -144,25 +145,25 @@ WARP_FN void shells_pose(const EngineModel *model, const EngineSaved *saved,
             }
         }
     }
-    lanes_sync();
+    team_sync();
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int n = LANE(l); n < 3 * shells->count; n += LANES) {
+        for (int n = TEAM_LANE(l); n < 3 * shells->count; n += TEAM) {
             ground->position[n / 3][n % 3] += saved->state[ENGINE_SAVED(base) + n % 3];
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
 /* Twists, half <- L^-T J^T in place, and V_free: engine_half_solve. */
-WARP_FN void shells_half(const EngineModel *model, const EngineSaved *saved, EngineShells *shells,
+TEAM_FN void shells_half(const EngineModel *model, const EngineSaved *saved, EngineShells *shells,
                          const EngineShellsGround *ground) {
     const EngineTree *tree = &model->tree;
     const Real *rate = saved->state + ENGINE_SAVED(rate);
     const Real *y = saved->state + ENGINE_ACCELERATION;
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int n = LANE(l); n < 6 * shells->count; n += LANES) {
+        for (int n = TEAM_LANE(l); n < 6 * shells->count; n += TEAM) {
             const int i = n / 6;
             const int c = n % 6;
             const int link = tree->body_link[shells->body[i]];
@@ -189,17 +190,17 @@ WARP_FN void shells_half(const EngineModel *model, const EngineSaved *saved, Eng
             ground->free_velocity[n] = speed + model->number.dt * gain;
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
 /* Rows and columns of A with a body. */
-WARP_FN void shells_inertia(const EngineTree *tree, const EngineSaved *saved,
+TEAM_FN void shells_inertia(const EngineTree *tree, const EngineSaved *saved,
                             const EngineShells *shells, const EngineShellsGround *ground) {
     const int feet = engine_feet(tree);
     const int rows = 6 * (feet + shells->count);
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int n = LANE(l); n < 6 * shells->count * rows; n += LANES) {
+        for (int n = TEAM_LANE(l); n < 6 * shells->count * rows; n += TEAM) {
             const int i = n / rows / 6;
             const int j = n % rows / 6;
             const int other = j < feet ? j : feet + shells->body[j - feet];
@@ -218,11 +219,11 @@ WARP_FN void shells_inertia(const EngineTree *tree, const EngineSaved *saved,
             }
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
 /* What the ground asks of the bodies in shells->body. */
-WARP_FN void engine_shells_begin(const EngineModel *model, const EngineSaved *saved,
+TEAM_FN void engine_shells_begin(const EngineModel *model, const EngineSaved *saved,
                                  const EngineSavedLinks *poses, EngineShells *shells,
                                  const EngineShellsGround *ground) {
     const EngineLinks links = engine_links_saved(poses);
@@ -233,11 +234,11 @@ WARP_FN void engine_shells_begin(const EngineModel *model, const EngineSaved *sa
 }
 
 /* y += L^-T J^T wrench of the bodies. wrench: [6 count] [N, N m]. */
-WARP_FN void engine_shells_end(const EngineTree *tree, const EngineShells *shells,
+TEAM_FN void engine_shells_end(const EngineTree *tree, const EngineShells *shells,
                                const Real *wrench, EngineSaved *saved) {
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+        for (int d = TEAM_LANE(l); d < engine_dofs(tree); d += TEAM) {
             Real sum = 0;
             LANE_ROLLED
             for (int i = 0; i < shells->count; i++) {
@@ -249,7 +250,7 @@ WARP_FN void engine_shells_end(const EngineTree *tree, const EngineShells *shell
             saved->state[ENGINE_ACCELERATION + d] += sum;
         }
     }
-    lanes_sync();
+    team_sync();
 }
 
 #endif
