@@ -12,6 +12,8 @@
 #define SEED 1
 #define FOOT_FAR 100.0 /* [m] above the ground: nothing touches */
 #define HEADS_MAX 512  /* numbers that the encoder gives */
+/* Feet, then bodies with shells: who stands on the ground. */
+#define STANDING_MAX (ROBOT_FEET_MAX + ENGINE_BODIES_MAX)
 
 /* of the picture */
 #define WINDOW_STRIDE 32    /* cells that the window moves at once */
@@ -24,6 +26,7 @@
 #define SLOPE_LEAST 0.006   /* [m] */
 
 _Static_assert(offsetof(WebModel, task) % 8 == 0, "as TaskDef");
+_Static_assert(STANDING_MAX <= MILD_FEET_MAX, "the ground has a place for all");
 _Static_assert(offsetof(WebModel, geom) - offsetof(WebModel, geoms) == 4, "as web_picture says");
 
 /* Distances from the outline of a sole, negative inside [m]. */
@@ -49,7 +52,8 @@ static struct {
     float history[TASK_HISTORY_MAX];
     /* the ground */
     int feet;
-    MildSole *sole[ROBOT_FEET_MAX];
+    int standing; /* feet and bodies with shells */
+    MildSole *sole[STANDING_MAX];
     MildScratch *scratch;
     MildGround *ground;
     MildMap *map;
@@ -58,8 +62,10 @@ static struct {
     double stiffness;                       /* [-] factors of web_change */
     double friction;
     MildContactInput input;
-    double inverse_inertia[36 * ROBOT_FEET_MAX * ROBOT_FEET_MAX]; /* of the input */
+    double inverse_inertia[36 * STANDING_MAX * STANDING_MAX]; /* of the input */
     MildContactResult result;
+    EngineSavedLinks links; /* while shells are near the ground, as `shells` */
+    EngineShells shells;
     /* the picture */
     WebView view;
     Outline outline[ROBOT_FEET_MAX];
@@ -407,38 +413,118 @@ static void give_feet(void) {
     widen(contact->free_velocity, 6 * feet, input->free_velocity);
 }
 
+/* Where the bodies with shells are, and their numbers, if they may touch the ground: choose_rows of
+ * robot/sim.c. */
+static void find_shells(void) {
+    const EngineModel *model = &web.file->model;
+    const EngineWork *work = &web.env_scratch->work;
+    const EngineLinks links = engine_links_of(work);
+    MildContactInput *input = &web.input;
+    web.shells.count = 0;
+    input->rows = (1u << web.feet) - 1;
+    if (web.standing == web.feet) {
+        return;
+    }
+    for (int b = 0; b < web.standing - web.feet; b++) {
+        const int at = web.feet + b;
+        Real position[3], rotation[9], twist[6];
+        engine_body_pose(model, &links, b, position, rotation);
+        engine_body_twist(&model->tree, &links, work->rate, b, position, twist);
+        for (int k = 0; k < 3; k++) {
+            position[k] += work->base[k];
+        }
+        widen(position, 3, input->position[at]);
+        widen(rotation, 9, input->rotation[at]);
+        widen(twist, 6, input->velocity[at]);
+        widen(twist, 6, input->free_velocity + 6 * at);
+    }
+    const uint32_t near = mild_ground_near(&web.terrain, input, web.scratch);
+    for (int b = 0; b < web.standing - web.feet; b++) {
+        if (near >> (web.feet + b) & 1) {
+            input->rows |= 1u << (web.feet + b);
+            web.shells.body[web.shells.count++] = b;
+        }
+    }
+}
+
+/* From the engine's bodies in web.shells to the ground, which then has the feet. */
+static void give_shells(void) {
+    const EngineModel *model = &web.file->model;
+    const int feet = 6 * web.feet, rows = feet + 6 * web.shells.count;
+    Real position[ENGINE_BODIES_MAX][3], rotation[ENGINE_BODIES_MAX][9];
+    Real velocity[ENGINE_BODIES_MAX][6], free_velocity[6 * ENGINE_BODIES_MAX];
+    Real inertia[36 * STANDING_MAX * STANDING_MAX];
+    const EngineShellsGround ground = {position, rotation, velocity, free_velocity, inertia};
+    for (int n = 0; n < feet * feet; n++) {
+        inertia[n / feet * rows + n % feet] = web.all.contact.inverse_inertia[n];
+    }
+    engine_save_links(&model->tree, &web.env_scratch->work, &web.links);
+    engine_shells_begin(model, &web.robot->saved, &web.links, &web.shells, &ground);
+    widen(inertia, rows * rows, web.input.inverse_inertia);
+    for (int i = 0; i < web.shells.count; i++) {
+        const int at = web.feet + web.shells.body[i];
+        widen(free_velocity + 6 * i, 6, web.input.free_velocity + 6 * at);
+    }
+}
+
 static void solve_ground(void) {
     mild_ground_solve(web.ground, &web.terrain, &web.input, web.scratch, &web.result);
     mild_ground_advance(web.ground, &web.terrain, &web.input, web.scratch, &web.result);
 }
 
-/* And back, as mild_batch_step. */
-static void take_feet(void) {
-    const EnvsContact *contact = &web.all.contact;
-    for (int f = 0; f < web.feet; f++) {
-        const MildFootResult *foot = &web.result.foot[f];
-        for (int k = 0; k < 3; k++) {
-            contact->velocity[6 * f + k] = (float)foot->force[k];
-            contact->velocity[6 * f + 3 + k] = (float)foot->torque[k];
-        }
-        contact->foot[f].depth_mean = (float)foot->depth_mean;
+static void take_wrench(const MildFootResult *from, Real *wrench) {
+    for (int k = 0; k < 3; k++) {
+        wrench[k] = (Real)from->force[k];
+        wrench[3 + k] = (Real)from->torque[k];
     }
 }
 
-/* Lets the ground forget the feet, but not their prints. */
+/* And back, as mild_batch_step and env_shells_results. */
+static void take_wrenches(void) {
+    const EnvsContact *contact = &web.all.contact;
+    Real wrench[6 * ENGINE_BODIES_MAX];
+    for (int f = 0; f < web.feet; f++) {
+        take_wrench(&web.result.foot[f], contact->velocity + 6 * f);
+        contact->foot[f].depth_mean = (float)web.result.foot[f].depth_mean;
+    }
+    web.view.shell_load = 0;
+    for (int i = 0; i < web.shells.count; i++) {
+        take_wrench(&web.result.foot[web.feet + web.shells.body[i]], wrench + 6 * i);
+        web.view.shell_load += wrench[6 * i + 2];
+    }
+    if (web.shells.count > 0) {
+        engine_shells_end(&web.file->model.tree, &web.shells, wrench, &web.robot->saved);
+    }
+}
+
+/* The ground's part of a physics step. */
+static void stand_on_ground(void) {
+    give_feet();
+    find_shells();
+    if (web.shells.count > 0) {
+        give_shells();
+    }
+    solve_ground();
+    take_wrenches();
+}
+
+/* Lets the ground forget feet and shells, but not their prints. */
 static void lift_feet(void) {
     static const double level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     MildContactInput *input = &web.input;
     memset(input, 0, sizeof *input);
-    input->feet = web.feet;
+    input->feet = web.standing;
+    input->rows = (1u << web.feet) - 1;
     input->inverse_inertia = web.inverse_inertia;
     input->dt = web.task.task.physics_dt;
     input->tolerance = web.task.task.contact_tolerance;
     input->max_iterations = web.task.task.contact_iterations;
-    for (int f = 0; f < web.feet; f++) {
+    for (int f = 0; f < web.standing; f++) {
         input->position[f][2] = FOOT_FAR;
         memcpy(input->rotation[f], level, sizeof level);
     }
+    web.shells.count = 0;
+    web.view.shell_load = 0;
     solve_ground();
 }
 
@@ -450,9 +536,7 @@ int web_move(const float *action, const float command[3]) {
     web.call.action = action;
     for (int k = 0; k <= steps; k++) {
         if (k > 0 && !web.trial.rigid) {
-            give_feet();
-            solve_ground();
-            take_feet();
+            stand_on_ground();
         }
         env_part(&web.all, &web.call, 0, k, 0, 0, web.env_scratch);
     }
@@ -460,20 +544,20 @@ int web_move(const float *action, const float command[3]) {
                                         env->torque, web.robot->diverged);
     task_observe(env, &web.task.task, &web.task.robot, &web.robot->reading, NULL,
                  &web.robot->sensors, 0, &view);
-    return step.done;
+    return step.done ? step.cause : TASK_END_time;
 }
 
 int web_step(float vx, float vy, float wz) {
     const float command[3] = {vx, vy, wz};
     float action[ROBOT_JOINTS_MAX];
     web_act(web.history, action);
-    const int fallen = web_move(action, command);
+    const int end = web_move(action, command);
     show_links();
     for (int f = 0; f < web.feet; f++) {
         show_foot(f);
     }
     show_ground();
-    return fallen;
+    return end;
 }
 
 /* ---- where it walks ---- */
@@ -574,7 +658,7 @@ const char *web_start(int ground, int relief, int prints) {
     }
     const MildSole *const *soles = (const MildSole *const *)web.sole;
     const int tiles = prints ? WEB_TILES : 0;
-    void *block = aligned_alloc(64, mild_ground_bytes_imprints(soles, web.feet, tiles));
+    void *block = aligned_alloc(64, mild_ground_bytes_imprints(soles, web.standing, tiles));
     if (!block) {
         return "out of memory";
     }
@@ -584,7 +668,7 @@ const char *web_start(int ground, int relief, int prints) {
         return wrong;
     }
     free(web.ground);
-    web.ground = mild_ground_init_imprints(block, soles, web.feet, tiles);
+    web.ground = mild_ground_init_imprints(block, soles, web.standing, tiles);
     show_hills();
     stand_up(ground == WEB_STRIPES ? WEB_STRIPE / 2 : 0, 0, 0);
     memset(web.shown, 0, 2 * sizeof *web.shown * WEB_WINDOW * WEB_WINDOW);
@@ -654,9 +738,28 @@ static int open_policy(const WebModel *file) {
     return web.weight && web.wide[0] && web.wide[1];
 }
 
+/* The surface of a body with shells. */
+static MildSole *open_surface(const WebModel *file, int body) {
+    MildShape shapes[ROBOT_SHELLS_MAX];
+    MildSurfaceDef def = {shapes, 0, file->sole[0].pitch, file->shell_spacing};
+    for (int s = 0; s < file->shells; s++) {
+        const WebShell *shell = &file->shell[s];
+        MildShape *shape = &shapes[def.count];
+        if (shell->body == body) {
+            *shape = (MildShape){.type = shell->type};
+            memcpy(shape->size, shell->size, sizeof shape->size);
+            memcpy(shape->pos, shell->pos, sizeof shape->pos);
+            memcpy(shape->quat, shell->quat, sizeof shape->quat);
+            def.count++;
+        }
+    }
+    return mild_sole_surface(&def, NULL);
+}
+
 static int open_soles(const WebModel *file) {
     WebView *view = &web.view;
     web.feet = file->model.tree.feet;
+    web.standing = web.feet + file->model.tree.bodies;
     for (int f = 0; f < web.feet; f++) {
         const WebSole *sole = &file->sole[f];
         const MildSoleDef def = {sole->outline, sole->points, sole->pitch, sole->z, sole->elements};
@@ -670,10 +773,16 @@ static int open_soles(const WebModel *file) {
             view->y[f][e] = (float)mild_sole_y(web.sole[f])[e];
         }
     }
+    for (int b = web.feet; b < web.standing; b++) {
+        web.sole[b] = open_surface(file, b - web.feet);
+        if (!web.sole[b]) {
+            return 0;
+        }
+    }
     view->bytes = (int32_t)sizeof *view;
     view->pitch = (float)mild_sole_pitch(web.sole[0]);
     view->cell = (float)window_cell();
-    web.scratch = mild_scratch_create((const MildSole *const *)web.sole, web.feet, NULL);
+    web.scratch = mild_scratch_create((const MildSole *const *)web.sole, web.standing, NULL);
     return web.scratch != NULL;
 }
 
@@ -712,8 +821,10 @@ static int open_arrays(void) {
 }
 
 static void close_all(void) {
+    for (int b = 0; b < STANDING_MAX; b++) {
+        mild_sole_destroy(web.sole[b]);
+    }
     for (int f = 0; f < ROBOT_FEET_MAX; f++) {
-        mild_sole_destroy(web.sole[f]);
         free(web.outline[f].distance);
     }
     mild_scratch_destroy(web.scratch);
