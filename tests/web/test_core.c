@@ -395,6 +395,78 @@ static void test_prints(void **state) {
     assert_true(pressed() == 0);
 }
 
+/* [m] Drawn at a point. */
+static double drawn(const double point[3]) {
+    const double cell = (double)web_view()->cell;
+    const int i = (int)floor(point[0] / cell) & (WEB_WINDOW - 1);
+    const int j = (int)floor(point[1] / cell) & (WEB_WINDOW - 1);
+    return (double)web_window()[j * WEB_WINDOW + i];
+}
+
+/* [m, world] The lowest corner of a shell as drawn. */
+static void lowest_corner(int s, double lowest[3]) {
+    const EngineShell *shell = &model->model.number.shell[s];
+    const float *link = web_view()->link[model->model.tree.shell_link[s]];
+    lowest[0] = lowest[1] = 0;
+    lowest[2] = 1e9;
+    for (int corner = 0; corner < 8; corner++) {
+        double p[3], at[3];
+        for (int k = 0; k < 3; k++) {
+            p[k] = (double)shell->center[k];
+            for (int c = 0; c < 3; c++) {
+                const double half = (double)(shell->rotation[3 * k + c] * shell->half[c]);
+                p[k] += corner >> c & 1 ? half : -half;
+            }
+        }
+        for (int k = 0; k < 3; k++) {
+            const float *row = link + 4 * k;
+            at[k] = (double)row[0] * p[0] + (double)row[1] * p[1] + (double)row[2] * p[2] +
+                    (double)row[3];
+        }
+        if (at[2] < lowest[2]) {
+            memcpy(lowest, at, sizeof at);
+        }
+    }
+}
+
+/* Shanks in the ground press what is drawn of it, as deep as they are: an imprint that stays in
+ * sand and springs back in foam. A corner of their boxes on end is narrower than a cell. */
+static void test_imprints_of_shells(void **state) {
+    static const float still[3] = {0, 0, 0};
+    static const float kneel[6] = {0, 0, -0.5f, 4, -2, 0};
+    (void)state;
+    for (int sand = 0; sand < 2; sand++) {
+        float action[SA01_JOINTS];
+        double deepest[3] = {0, 0, 0}, above = 0, shown = 0;
+        memcpy(action, kneel, sizeof kneel);
+        memcpy(action + 6, kneel, sizeof kneel);
+        start(preset(sand ? "sand_loose" : "foam28"), WEB_LEVEL, 1);
+        for (int end = 0; !end;) {
+            end = web_move(action, still);
+            web_show();
+            for (int s = 1; s < model->model.tree.shells; s++) { /* shell 0 is the base */
+                double at[3];
+                lowest_corner(s, at);
+                above = fmax(above, -at[2] - drawn(at));
+                if (at[2] < deepest[2]) {
+                    memcpy(deepest, at, sizeof at);
+                    shown = drawn(at);
+                }
+            }
+        }
+        web_again();
+        web_move(action, still);
+        web_show();
+        const double left = drawn(deepest);
+        printf(
+            "  a shank %.0f mm in %s, drawn %.0f mm deep; at most %.1f mm deeper than drawn (bound "
+            "25); %.0f mm once it has left\n",
+            -1e3 * deepest[2], sand ? "sand" : "foam", 1e3 * shown, 1e3 * above, 1e3 * left);
+        assert_true(deepest[2] < -0.03 && above < 0.025 && shown < 0.01 - deepest[2]);
+        assert_true(sand ? left > 0.9 * shown : left == 0);
+    }
+}
+
 /* [m^2] Deeper than `depth` between two places along x. */
 static double pressed_between(double low, double high, float depth) {
     const double cell = (double)web_view()->cell;
@@ -588,12 +660,19 @@ static void test_again(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_files),      cmocka_unit_test(test_policy),
-        cmocka_unit_test(test_same_steps), cmocka_unit_test(test_walks),
-        cmocka_unit_test(test_hills),      cmocka_unit_test(test_prints),
-        cmocka_unit_test(test_window),     cmocka_unit_test(test_sliders),
-        cmocka_unit_test(test_soles),      cmocka_unit_test(test_stripes),
-        cmocka_unit_test(test_again),      cmocka_unit_test(test_shells),
+        cmocka_unit_test(test_files),
+        cmocka_unit_test(test_policy),
+        cmocka_unit_test(test_same_steps),
+        cmocka_unit_test(test_walks),
+        cmocka_unit_test(test_hills),
+        cmocka_unit_test(test_prints),
+        cmocka_unit_test(test_window),
+        cmocka_unit_test(test_sliders),
+        cmocka_unit_test(test_soles),
+        cmocka_unit_test(test_stripes),
+        cmocka_unit_test(test_again),
+        cmocka_unit_test(test_shells),
+        cmocka_unit_test(test_imprints_of_shells),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
