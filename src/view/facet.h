@@ -12,7 +12,8 @@
 typedef struct {
     double at[3];    /* [m] its centre, world */
     double slope[2]; /* [-] of its plane along world x and y */
-    double radius;   /* [m] in its plane */
+    double radius;   /* [m] in its plane, to the corners of its square */
+    double lowest;   /* [m] height: a steep disc does not reach below the body's edge */
 } Facet;
 
 /* Writes the elements of a body that face down and reach below the undisturbed ground. surface: of
@@ -30,12 +31,13 @@ static inline int facets_of(const MildSole *surface, const double *rotation,
                 normal[k] += rotation[3 * k + axis] * along;
             }
         }
-        const double radius = sqrt(area[e] / 2); /* to the corners of its square */
-        if (elements->depth[e] > -radius && -normal[2] > FACET_LEVEL) {
-            facets[count++] =
-                (Facet){{elements->point_x[e], elements->point_y[e], elements->point_z[e]},
-                        {-normal[0] / normal[2], -normal[1] / normal[2]},
-                        radius};
+        const double edge = sqrt(area[e]), tilt = hypot(normal[0], normal[1]);
+        const double z = elements->point_z[e];
+        if (elements->depth[e] > -edge && -normal[2] > FACET_LEVEL) {
+            facets[count++] = (Facet){.at = {elements->point_x[e], elements->point_y[e], z},
+                                      .slope = {-normal[0] / normal[2], -normal[1] / normal[2]},
+                                      .radius = sqrt(0.5) * edge,
+                                      .lowest = z - 0.5 * edge * tilt};
         }
     }
     return count;
@@ -49,7 +51,7 @@ static inline double facet_height(const Facet *facet, double x, double y, double
     const double level = dx * dx + dy * dy, length = sqrt(level + dz * dz);
     const double share = length > facet->radius ? facet->radius / length : 1;
     *away = (1 - share) * sqrt(level);
-    return facet->at[2] + share * dz;
+    return fmax(facet->at[2] + share * dz, facet->lowest);
 }
 
 #endif
