@@ -16,6 +16,8 @@
 #define SLOPE_FOAM 0.55     /* [-] the same of ground that springs back */
 #define SLOPE_LEAST 0.006   /* [m] of that width */
 #define SLOPE_MOST 0.108    /* [m] */
+#define SOLE_LEVEL 0.3      /* [-] cosine of the tilt of a foot that lies on its side */
+#define SOLE_JUMP 4         /* [cells] a foot that moves farther is not where it was */
 
 /* Distances from the outline of a sole, negative inside [m]. */
 typedef struct {
@@ -35,7 +37,9 @@ static struct {
     float *shown; /* [WEB_WINDOW][WEB_WINDOW] [m] depth of the surface */
     float *kept;  /* the same without what presses it now */
     Facet *facet; /* of the body that is pressed in */
-    Box pressed;  /* by bodies with shells, when it was last drawn */
+    /* when it was last drawn: */
+    Box sole[ROBOT_FEET_MAX]; /* around each foot */
+    Box pressed;              /* by bodies with shells */
 } window;
 
 /* ---- cells ---- */
@@ -210,6 +214,23 @@ static Box sole_box(const WindowScene *scene, int f) {
                  (int)ceil((p[1] + R[3] * x + reach) / scene->cell)};
 }
 
+static void press_feet(const WindowScene *scene, WebView *view) {
+    double deepest[ROBOT_FEET_MAX];
+    for (int f = 0; f < scene->feet; f++) {
+        const int on_side = scene->input->rotation[f][8] <= SOLE_LEVEL;
+        deepest[f] = on_side ? 0 : sole_deepest(scene, f);
+    }
+    press_soles(scene, &window.pressed, deepest, view); /* it springs back where bodies were */
+    for (int f = 0; f < scene->feet; f++) {
+        const Box box = sole_box(scene, f), last = window.sole[f];
+        if (abs(box.i0 - last.i0) > SOLE_JUMP || abs(box.j0 - last.j0) > SOLE_JUMP) {
+            press_soles(scene, &last, deepest, view);
+        }
+        press_soles(scene, &box, deepest, view);
+        window.sole[f] = box;
+    }
+}
+
 /* ---- other bodies ---- */
 
 /* Draws an element of a body. Returns the cells. */
@@ -266,21 +287,11 @@ static void press_bodies(const WindowScene *scene, WebView *view) {
 
 void window_show(const WindowScene *scene, double x, double y, int rigid, WebView *view) {
     const double middle[2] = {x, y};
-    double deepest[ROBOT_FEET_MAX];
     follow(scene, middle, view);
     if (rigid) {
         return;
     }
-    for (int f = 0; f < scene->feet; f++) {
-        deepest[f] = sole_deepest(scene, f);
-    }
-    press_soles(scene, &window.pressed, deepest, view); /* it springs back where bodies were */
-    for (int f = 0; f < scene->feet; f++) {
-        const Box box = sole_box(scene, f);
-        if (scene->input->rotation[f][8] > 0.3) { /* not on its side */
-            press_soles(scene, &box, deepest, view);
-        }
-    }
+    press_feet(scene, view);
     press_bodies(scene, view);
 }
 
@@ -355,6 +366,7 @@ void window_close(void) {
 void window_clear(WebView *view) {
     memset(window.shown, 0, 2 * sizeof *window.shown * WEB_WINDOW * WEB_WINDOW);
     window.first[0] = window.first[1] = -WEB_WINDOW / 2;
+    memset(window.sole, 0, sizeof window.sole);
     window.pressed = (Box){0, 0, 0, 0};
     view->dirty_count = -1;
 }

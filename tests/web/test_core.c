@@ -656,6 +656,12 @@ static void test_again(void **state) {
            facing());
     assert_true(turned > 1 && turned < 2 && fabs((double)web_view()->yaw - turned) < 1e-5);
     assert_true(fabs(facing() - turned) < 0.01);
+    start(preset("foam25"), WEB_LEVEL, 1);
+    walk(4, 0.6f);
+    const double foam = pressed();
+    web_again();
+    printf("  foam pressed %.3f m^2, then %.3f m^2\n", foam, pressed());
+    assert_true(foam > 0.01 && pressed() == 0);
 }
 
 int main(void) {
