@@ -1,7 +1,8 @@
 /* The visible ground: a height map that soles and other bodies press in and that springs back by
  * its material's `recovery`. Under a sole it is as deep as the sole; around it the surface rises in
- * a smooth slope. It is only for drawing; physics never reads it. The map is divided into square tiles, so
- * that a renderer need refresh only those that changed. It does not depend on a renderer. */
+ * a smooth slope. It is only for drawing; physics never reads it. The map is divided into square
+ * tiles, so that a renderer need refresh only those that changed. It does not depend on a renderer.
+ */
 #ifndef VIEW_RELIEF_H
 #define VIEW_RELIEF_H
 
