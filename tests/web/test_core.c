@@ -289,7 +289,7 @@ static void test_shells(void **state) {
         fall(&falls[i], &mine, &theirs);
         assert_true(theirs.carried > 5 && mine.carried > 5 && mine.first < 0.1);
         assert_true(abs(mine.steps - theirs.steps) <= 3);
-        assert_true(fabs(mine.load / theirs.load - 1) < 0.2);
+        assert_true(fabs(mine.load / theirs.load - 1) < 0.05);
         most = fmax(most, mine.load / (0.01 * mine.carried));
     }
     const double weight = 9.81 * robot_total_mass(robot);
