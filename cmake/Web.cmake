@@ -3,11 +3,12 @@
 add_executable(web_pack ${CMAKE_SOURCE_DIR}/web/pack.c)
 target_link_libraries(web_pack PRIVATE layer_config mild_options)
 target_include_directories(web_pack PRIVATE ${CMAKE_SOURCE_DIR})
-add_library(web_core STATIC ${CMAKE_SOURCE_DIR}/web/core.c)
+add_library(web_core STATIC ${CMAKE_SOURCE_DIR}/web/core.c ${CMAKE_SOURCE_DIR}/web/window.c)
 target_link_libraries(web_core PUBLIC layer_env PRIVATE mild_options)
-target_include_directories(web_core PUBLIC ${CMAKE_SOURCE_DIR} PRIVATE ${CMAKE_BINARY_DIR}/layers/learn)
+target_include_directories(web_core PUBLIC ${CMAKE_SOURCE_DIR} PRIVATE ${CMAKE_BINARY_DIR}/layers/learn
+  ${CMAKE_BINARY_DIR}/layers/view)
 # as env/batch_host.c; options of the file, which come behind those of mild_options
-set_source_files_properties(${CMAKE_SOURCE_DIR}/web/core.c PROPERTIES COMPILE_OPTIONS
+set_source_files_properties(${CMAKE_SOURCE_DIR}/web/core.c ${CMAKE_SOURCE_DIR}/web/window.c PROPERTIES COMPILE_OPTIONS
   "-O2;-Wno-float-conversion;$<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>")
 set(web_robot ${CMAKE_BINARY_DIR}/generated/web/robot.bin)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/generated/web)

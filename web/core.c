@@ -8,30 +8,17 @@
 
 #include "learn/vector.h"
 #include "web/core.h"
+#include "web/window.h"
 
 #define SEED 1
 #define FOOT_FAR 100.0 /* [m] above the ground: nothing touches */
 #define HEADS_MAX 512  /* numbers that the encoder gives */
-
-/* of the picture */
-#define WINDOW_STRIDE 32    /* cells that the window moves at once */
-#define WINDOW_LEAST 1e-4f  /* [m] a smaller change is not drawn */
-#define OUTLINE_STEP 0.005  /* [m] */
-#define OUTLINE_MARGIN 0.12 /* [m] ground around a sole that it may draw down */
-#define UNDER_SOLE 0.0015   /* [m] gap below a sole, which prevents flicker */
-#define SLOPE_SAND 0.45     /* [-] width of the slope around a print, over its depth */
-#define SLOPE_FOAM 0.55     /* [-] the same of ground that springs back */
-#define SLOPE_LEAST 0.006   /* [m] */
+/* Feet, then bodies with shells: who stands on the ground. */
+#define STANDING_MAX (ROBOT_FEET_MAX + ENGINE_BODIES_MAX)
 
 _Static_assert(offsetof(WebModel, task) % 8 == 0, "as TaskDef");
+_Static_assert(STANDING_MAX <= MILD_FEET_MAX, "the ground has a place for all");
 _Static_assert(offsetof(WebModel, geom) - offsetof(WebModel, geoms) == 4, "as web_picture says");
-
-/* Distances from the outline of a sole, negative inside [m]. */
-typedef struct {
-    double x, y; /* [m] the first node */
-    int columns, rows;
-    float *distance; /* [rows][columns] */
-} Outline;
 
 static struct {
     const WebModel *file;
@@ -49,7 +36,8 @@ static struct {
     float history[TASK_HISTORY_MAX];
     /* the ground */
     int feet;
-    MildSole *sole[ROBOT_FEET_MAX];
+    int standing; /* feet and bodies with shells */
+    MildSole *sole[STANDING_MAX];
     MildScratch *scratch;
     MildGround *ground;
     MildMap *map;
@@ -58,14 +46,13 @@ static struct {
     double stiffness;                       /* [-] factors of web_change */
     double friction;
     MildContactInput input;
-    double inverse_inertia[36 * ROBOT_FEET_MAX * ROBOT_FEET_MAX]; /* of the input */
+    double inverse_inertia[36 * STANDING_MAX * STANDING_MAX]; /* of the input */
     MildContactResult result;
+    EngineSavedLinks links; /* while shells are near the ground, as `shells` */
+    EngineShells shells;
     /* the picture */
     WebView view;
-    Outline outline[ROBOT_FEET_MAX];
-    int window[2]; /* first cell that is drawn */
-    float *shown;  /* [WEB_WINDOW][WEB_WINDOW] [m] depth of the surface */
-    float *kept;   /* the same without feet */
+    WindowScene scene;
     float *hills;
 } web;
 
@@ -180,211 +167,10 @@ static void show_foot(int f) {
     }
 }
 
-/* ---- the picture: the window of ground around the robot ---- */
-
-static double window_cell(void) {
-    return 0.5 * mild_sole_pitch(web.sole[0]); /* as prints have */
-}
-
-static size_t window_at(int i, int j) {
-    return (size_t)(j & (WEB_WINDOW - 1)) * WEB_WINDOW + (size_t)(i & (WEB_WINDOW - 1));
-}
-
-static void mark(int x, int y, int width, int height) {
-    WebView *view = &web.view;
-    if (view->dirty_count >= WEB_DIRTY_MAX || view->dirty_count < 0) {
-        view->dirty_count = -1;
-        return;
-    }
-    view->dirty[view->dirty_count++] = (WebDirty){x, y, width, height};
-}
-
-/* Marks cells i0 .. i1 - 1, j0 .. j1 - 1 of the world, which lie in up to four pieces. */
-static void mark_cells(int i0, int i1, int j0, int j1) {
-    for (int j = j0; j < j1;) {
-        const int y = j & (WEB_WINDOW - 1);
-        const int height = j1 - j < WEB_WINDOW - y ? j1 - j : WEB_WINDOW - y;
-        for (int i = i0; i < i1;) {
-            const int x = i & (WEB_WINDOW - 1);
-            const int width = i1 - i < WEB_WINDOW - x ? i1 - i : WEB_WINDOW - x;
-            mark(x, y, width, height);
-            i += width;
-        }
-        j += height;
-    }
-}
-
-static const MildMaterial *material_at(double x, double y) {
-    return &web.terrain.materials[mild_terrain_material_at(&web.terrain, x, y)];
-}
-
-/* What the ground remembers there. */
-static void recall_cells(int i0, int i1, int j0, int j1) {
-    const double cell = window_cell();
-    for (int j = j0; j < j1; j++) {
-        for (int i = i0; i < i1; i++) {
-            const double x = (i + 0.5) * cell, y = (j + 0.5) * cell;
-            const double depth = mild_ground_imprint_at(web.ground, x, y);
-            const double stays = depth > 0 ? 1 - material_at(x, y)->recovery : 0;
-            web.kept[window_at(i, j)] = web.shown[window_at(i, j)] = (float)(depth * stays);
-        }
-    }
-    mark_cells(i0, i1, j0, j1);
-}
-
-/* Moves the window so that the robot is in its middle. */
-static void follow(void) {
-    int first[2], again = 0;
-    for (int k = 0; k < 2; k++) {
-        const double middle = (double)web.env_scratch->work.base[k] / window_cell();
-        first[k] = WINDOW_STRIDE * (int)floor(middle / WINDOW_STRIDE) - WEB_WINDOW / 2;
-        again |= abs(first[k] - web.window[k]) >= WEB_WINDOW / 2;
-    }
-    const int x = web.window[0], y = web.window[1];
-    const int i0 = first[0], i1 = i0 + WEB_WINDOW, j0 = first[1], j1 = j0 + WEB_WINDOW;
-    web.window[0] = i0;
-    web.window[1] = j0;
-    if (again) {
-        recall_cells(i0, i1, j0, j1);
-        web.view.dirty_count = -1;
-        return;
-    }
-    if (i0 != x) {
-        recall_cells(i0 > x ? x + WEB_WINDOW : i0, i0 > x ? i1 : x, j0, j1);
-    }
-    if (j0 != y) {
-        recall_cells(i0, i1, j0 > y ? y + WEB_WINDOW : j0, j0 > y ? j1 : y);
-    }
-}
-
-/* [m] From the outline, at a point of the foot's frame. */
-static double outline_distance(const Outline *outline, double x, double y) {
-    const double u = (x - outline->x) / OUTLINE_STEP, v = (y - outline->y) / OUTLINE_STEP;
-    if (!(u >= 0 && v >= 0 && u < outline->columns - 1 && v < outline->rows - 1)) {
-        return OUTLINE_MARGIN;
-    }
-    const int i = (int)u, j = (int)v;
-    const double s = u - i, t = v - j;
-    const float *at = outline->distance + (size_t)j * (size_t)outline->columns + i;
-    const float *above = at + outline->columns;
-    return (1 - t) * ((1 - s) * (double)at[0] + s * (double)at[1]) +
-           t * ((1 - s) * (double)above[0] + s * (double)above[1]);
-}
-
-/* [m] Depth of the deepest point of a sole. */
-static double sole_deepest(int f) {
-    const WebSole *sole = &web.file->sole[f];
-    const double *p = web.input.position[f], *R = web.input.rotation[f];
-    double deepest = 0;
-    for (int i = 0; i < sole->points; i++) {
-        const double *at = sole->outline + 2 * i;
-        const double x = p[0] + R[0] * at[0] + R[1] * at[1] + R[2] * sole->z;
-        const double y = p[1] + R[3] * at[0] + R[4] * at[1] + R[5] * sole->z;
-        const double z = p[2] + R[6] * at[0] + R[7] * at[1] + R[8] * sole->z;
-        deepest = fmax(deepest, mild_terrain_height_at(&web.terrain, x, y) - z);
-    }
-    return deepest;
-}
-
-/* [m] Depth of the surface under a sole, and on the slope around it, at a cell. most: of the sole,
- * whose plane goes on beyond it. */
-static double sole_depth(int f, double most, double x, double y, double *stays) {
-    const double *p = web.input.position[f], *R = web.input.rotation[f];
-    const double dx = x - p[0], dy = y - p[1];
-    const double dz = (mild_sole_z(web.sole[f]) - R[2] * dx - R[5] * dy) / R[8];
-    const double depth = fmin(mild_terrain_height_at(&web.terrain, x, y) - p[2] - dz, most);
-    if (depth <= 0) {
-        return 0;
-    }
-    const double away = outline_distance(&web.outline[f], R[0] * dx + R[3] * dy + R[6] * dz,
-                                         R[1] * dx + R[4] * dy + R[7] * dz);
-    const double recovery = material_at(x, y)->recovery;
-    const double slope = SLOPE_SAND + recovery * (SLOPE_FOAM - SLOPE_SAND);
-    const double width = fmin(SLOPE_LEAST + depth * slope, 0.9 * OUTLINE_MARGIN);
-    const double share = fmin(fmax(1 - away / width, 0), 1);
-    *stays = 1 - recovery;
-    return share > 0 ? (depth + UNDER_SOLE) * share * share : 0;
-}
-
-/* Draws the soles in a box of cells. most: [feet] [m] their depths. */
-static void press_cells(const int box[4], const double *most) {
-    const double cell = window_cell();
-    for (int j = box[2]; j < box[3]; j++) {
-        for (int i = box[0]; i < box[1]; i++) {
-            const size_t at = window_at(i, j);
-            double deepest = 0, stays = 0;
-            for (int f = 0; f < web.feet; f++) {
-                const double x = (i + 0.5) * cell, y = (j + 0.5) * cell;
-                deepest = fmax(deepest, most[f] > 0 ? sole_depth(f, most[f], x, y, &stays) : 0);
-            }
-            web.kept[at] = fmaxf(web.kept[at], (float)(deepest * stays));
-            const float depth = fmaxf(web.kept[at], (float)deepest);
-            if (fabsf(depth - web.shown[at]) > WINDOW_LEAST || deepest == 0) {
-                web.shown[at] = depth;
-            }
-        }
-    }
-    mark_cells(box[0], box[1], box[2], box[3]);
-}
-
 static void show_ground(void) {
-    const double cell = window_cell();
-    double most[ROBOT_FEET_MAX];
-    follow();
-    for (int f = 0; f < web.feet; f++) {
-        most[f] = sole_deepest(f);
-    }
-    for (int f = 0; f < web.feet && !web.trial.rigid; f++) {
-        const double *p = web.input.position[f], *R = web.input.rotation[f];
-        const Outline *outline = &web.outline[f];
-        const double reach = 0.5 * OUTLINE_STEP * outline->columns, x = outline->x + reach;
-        const int box[4] = {(int)floor((p[0] + R[0] * x - reach) / cell),
-                            (int)ceil((p[0] + R[0] * x + reach) / cell),
-                            (int)floor((p[1] + R[3] * x - reach) / cell),
-                            (int)ceil((p[1] + R[3] * x + reach) / cell)};
-        if (R[8] > 0.3) { /* not on its side */
-            press_cells(box, most);
-        }
-    }
-}
-
-/* [m] From a point to the polygon, negative inside. */
-static double polygon_distance(const WebSole *sole, double x, double y) {
-    double least = OUTLINE_MARGIN * OUTLINE_MARGIN;
-    int inside = 0;
-    for (int i = 0; i < sole->points; i++) {
-        const double *a = sole->outline + 2 * i;
-        const double *b = sole->outline + 2 * ((i + 1) % sole->points);
-        const double ex = b[0] - a[0], ey = b[1] - a[1];
-        const double along = ((x - a[0]) * ex + (y - a[1]) * ey) / (ex * ex + ey * ey);
-        const double share = fmin(fmax(along, 0), 1);
-        const double dx = x - a[0] - share * ex, dy = y - a[1] - share * ey;
-        least = fmin(least, dx * dx + dy * dy);
-        if ((a[1] > y) != (b[1] > y) && x < a[0] + (y - a[1]) / ey * ex) {
-            inside = !inside;
-        }
-    }
-    return inside ? -sqrt(least) : sqrt(least);
-}
-
-static int open_outline(const WebSole *sole, Outline *outline) {
-    double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
-    for (int i = 0; i < 2 * sole->points; i++) {
-        low[i % 2] = fmin(low[i % 2], sole->outline[i]);
-        high[i % 2] = fmax(high[i % 2], sole->outline[i]);
-    }
-    outline->x = low[0] - OUTLINE_MARGIN;
-    outline->y = low[1] - OUTLINE_MARGIN;
-    outline->columns = (int)ceil((high[0] - low[0] + 2 * OUTLINE_MARGIN) / OUTLINE_STEP) + 1;
-    outline->rows = (int)ceil((high[1] - low[1] + 2 * OUTLINE_MARGIN) / OUTLINE_STEP) + 1;
-    const int nodes = outline->columns * outline->rows;
-    outline->distance = malloc((size_t)nodes * sizeof *outline->distance);
-    for (int n = 0; n < nodes && outline->distance; n++) {
-        const double x = outline->x + OUTLINE_STEP * (n % outline->columns);
-        const double y = outline->y + OUTLINE_STEP * (n / outline->columns);
-        outline->distance[n] = (float)polygon_distance(sole, x, y);
-    }
-    return outline->distance != NULL;
+    const Real *base = web.env_scratch->work.base;
+    web.scene.ground = web.ground;
+    window_show(&web.scene, (double)base[0], (double)base[1], web.trial.rigid, &web.view);
 }
 
 /* ---- physics ---- */
@@ -407,38 +193,118 @@ static void give_feet(void) {
     widen(contact->free_velocity, 6 * feet, input->free_velocity);
 }
 
+/* Where the bodies with shells are, and their numbers, if they may touch the ground: choose_rows of
+ * robot/sim.c. */
+static void find_shells(void) {
+    const EngineModel *model = &web.file->model;
+    const EngineWork *work = &web.env_scratch->work;
+    const EngineLinks links = engine_links_of(work);
+    MildContactInput *input = &web.input;
+    web.shells.count = 0;
+    input->rows = (1u << web.feet) - 1;
+    if (web.standing == web.feet) {
+        return;
+    }
+    for (int b = 0; b < web.standing - web.feet; b++) {
+        const int at = web.feet + b;
+        Real position[3], rotation[9], twist[6];
+        engine_body_pose(model, &links, b, position, rotation);
+        engine_body_twist(&model->tree, &links, work->rate, b, position, twist);
+        for (int k = 0; k < 3; k++) {
+            position[k] += work->base[k];
+        }
+        widen(position, 3, input->position[at]);
+        widen(rotation, 9, input->rotation[at]);
+        widen(twist, 6, input->velocity[at]);
+        widen(twist, 6, input->free_velocity + 6 * at);
+    }
+    const uint32_t near = mild_ground_near(&web.terrain, input, web.scratch);
+    for (int b = 0; b < web.standing - web.feet; b++) {
+        if (near >> (web.feet + b) & 1) {
+            input->rows |= 1u << (web.feet + b);
+            web.shells.body[web.shells.count++] = b;
+        }
+    }
+}
+
+/* From the engine's bodies in web.shells to the ground, which then has the feet. */
+static void give_shells(void) {
+    const EngineModel *model = &web.file->model;
+    const int feet = 6 * web.feet, rows = feet + 6 * web.shells.count;
+    Real position[ENGINE_BODIES_MAX][3], rotation[ENGINE_BODIES_MAX][9];
+    Real velocity[ENGINE_BODIES_MAX][6], free_velocity[6 * ENGINE_BODIES_MAX];
+    Real inertia[36 * STANDING_MAX * STANDING_MAX];
+    const EngineShellsGround ground = {position, rotation, velocity, free_velocity, inertia};
+    for (int n = 0; n < feet * feet; n++) {
+        inertia[n / feet * rows + n % feet] = web.all.contact.inverse_inertia[n];
+    }
+    engine_save_links(&model->tree, &web.env_scratch->work, &web.links);
+    engine_shells_begin(model, &web.robot->saved, &web.links, &web.shells, &ground);
+    widen(inertia, rows * rows, web.input.inverse_inertia);
+    for (int i = 0; i < web.shells.count; i++) {
+        const int at = web.feet + web.shells.body[i];
+        widen(free_velocity + 6 * i, 6, web.input.free_velocity + 6 * at);
+    }
+}
+
 static void solve_ground(void) {
     mild_ground_solve(web.ground, &web.terrain, &web.input, web.scratch, &web.result);
     mild_ground_advance(web.ground, &web.terrain, &web.input, web.scratch, &web.result);
 }
 
-/* And back, as mild_batch_step. */
-static void take_feet(void) {
-    const EnvsContact *contact = &web.all.contact;
-    for (int f = 0; f < web.feet; f++) {
-        const MildFootResult *foot = &web.result.foot[f];
-        for (int k = 0; k < 3; k++) {
-            contact->velocity[6 * f + k] = (float)foot->force[k];
-            contact->velocity[6 * f + 3 + k] = (float)foot->torque[k];
-        }
-        contact->foot[f].depth_mean = (float)foot->depth_mean;
+static void take_wrench(const MildFootResult *from, Real *wrench) {
+    for (int k = 0; k < 3; k++) {
+        wrench[k] = (Real)from->force[k];
+        wrench[3 + k] = (Real)from->torque[k];
     }
 }
 
-/* Lets the ground forget the feet, but not their prints. */
+/* And back, as mild_batch_step and env_shells_results. */
+static void take_wrenches(void) {
+    const EnvsContact *contact = &web.all.contact;
+    Real wrench[6 * ENGINE_BODIES_MAX];
+    for (int f = 0; f < web.feet; f++) {
+        take_wrench(&web.result.foot[f], contact->velocity + 6 * f);
+        contact->foot[f].depth_mean = (float)web.result.foot[f].depth_mean;
+    }
+    web.view.shell_load = 0;
+    for (int i = 0; i < web.shells.count; i++) {
+        take_wrench(&web.result.foot[web.feet + web.shells.body[i]], wrench + 6 * i);
+        web.view.shell_load += wrench[6 * i + 2];
+    }
+    if (web.shells.count > 0) {
+        engine_shells_end(&web.file->model.tree, &web.shells, wrench, &web.robot->saved);
+    }
+}
+
+/* The ground's part of a physics step. */
+static void stand_on_ground(void) {
+    give_feet();
+    find_shells();
+    if (web.shells.count > 0) {
+        give_shells();
+    }
+    solve_ground();
+    take_wrenches();
+}
+
+/* Lets the ground forget feet and shells, but not their prints. */
 static void lift_feet(void) {
     static const double level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     MildContactInput *input = &web.input;
     memset(input, 0, sizeof *input);
-    input->feet = web.feet;
+    input->feet = web.standing;
+    input->rows = (1u << web.feet) - 1;
     input->inverse_inertia = web.inverse_inertia;
     input->dt = web.task.task.physics_dt;
     input->tolerance = web.task.task.contact_tolerance;
     input->max_iterations = web.task.task.contact_iterations;
-    for (int f = 0; f < web.feet; f++) {
+    for (int f = 0; f < web.standing; f++) {
         input->position[f][2] = FOOT_FAR;
         memcpy(input->rotation[f], level, sizeof level);
     }
+    web.shells.count = 0;
+    web.view.shell_load = 0;
     solve_ground();
 }
 
@@ -450,9 +316,7 @@ int web_move(const float *action, const float command[3]) {
     web.call.action = action;
     for (int k = 0; k <= steps; k++) {
         if (k > 0 && !web.trial.rigid) {
-            give_feet();
-            solve_ground();
-            take_feet();
+            stand_on_ground();
         }
         env_part(&web.all, &web.call, 0, k, 0, 0, web.env_scratch);
     }
@@ -460,20 +324,24 @@ int web_move(const float *action, const float command[3]) {
                                         env->torque, web.robot->diverged);
     task_observe(env, &web.task.task, &web.task.robot, &web.robot->reading, NULL,
                  &web.robot->sensors, 0, &view);
-    return step.done;
+    return step.done ? step.cause : TASK_END_time;
+}
+
+void web_show(void) {
+    show_links();
+    for (int f = 0; f < web.feet; f++) {
+        show_foot(f);
+    }
+    show_ground();
 }
 
 int web_step(float vx, float vy, float wz) {
     const float command[3] = {vx, vy, wz};
     float action[ROBOT_JOINTS_MAX];
     web_act(web.history, action);
-    const int fallen = web_move(action, command);
-    show_links();
-    for (int f = 0; f < web.feet; f++) {
-        show_foot(f);
-    }
-    show_ground();
-    return fallen;
+    const int end = web_move(action, command);
+    web_show();
+    return end;
 }
 
 /* ---- where it walks ---- */
@@ -489,6 +357,10 @@ void web_change(double stiffness, double friction) {
         material->mu *= friction;
     }
     web_env()->variation.rigid_friction = REAL(TASK_RIGID_FRICTION * friction);
+}
+
+static const MildMaterial *material_at(double x, double y) {
+    return &web.terrain.materials[mild_terrain_material_at(&web.terrain, x, y)];
 }
 
 /* Stands the robot up at a place [m, m, rad]. Its sensors' noise goes on. */
@@ -574,7 +446,7 @@ const char *web_start(int ground, int relief, int prints) {
     }
     const MildSole *const *soles = (const MildSole *const *)web.sole;
     const int tiles = prints ? WEB_TILES : 0;
-    void *block = aligned_alloc(64, mild_ground_bytes_imprints(soles, web.feet, tiles));
+    void *block = aligned_alloc(64, mild_ground_bytes_imprints(soles, web.standing, tiles));
     if (!block) {
         return "out of memory";
     }
@@ -584,12 +456,10 @@ const char *web_start(int ground, int relief, int prints) {
         return wrong;
     }
     free(web.ground);
-    web.ground = mild_ground_init_imprints(block, soles, web.feet, tiles);
+    web.ground = mild_ground_init_imprints(block, soles, web.standing, tiles);
     show_hills();
     stand_up(ground == WEB_STRIPES ? WEB_STRIPE / 2 : 0, 0, 0);
-    memset(web.shown, 0, 2 * sizeof *web.shown * WEB_WINDOW * WEB_WINDOW);
-    web.window[0] = web.window[1] = -WEB_WINDOW / 2;
-    web.view.dirty_count = -1;
+    window_clear(&web.view);
     return NULL;
 }
 
@@ -654,14 +524,33 @@ static int open_policy(const WebModel *file) {
     return web.weight && web.wide[0] && web.wide[1];
 }
 
+/* The surface of a body with shells. */
+static MildSole *open_surface(const WebModel *file, int body) {
+    MildShape shapes[ROBOT_SHELLS_MAX];
+    MildSurfaceDef def = {shapes, 0, file->sole[0].pitch, file->shell_spacing};
+    for (int s = 0; s < file->shells; s++) {
+        const WebShell *shell = &file->shell[s];
+        MildShape *shape = &shapes[def.count];
+        if (shell->body == body) {
+            *shape = (MildShape){.type = shell->type};
+            memcpy(shape->size, shell->size, sizeof shape->size);
+            memcpy(shape->pos, shell->pos, sizeof shape->pos);
+            memcpy(shape->quat, shell->quat, sizeof shape->quat);
+            def.count++;
+        }
+    }
+    return mild_sole_surface(&def, NULL);
+}
+
 static int open_soles(const WebModel *file) {
     WebView *view = &web.view;
     web.feet = file->model.tree.feet;
+    web.standing = web.feet + file->model.tree.bodies;
     for (int f = 0; f < web.feet; f++) {
         const WebSole *sole = &file->sole[f];
         const MildSoleDef def = {sole->outline, sole->points, sole->pitch, sole->z, sole->elements};
         web.sole[f] = mild_sole_create(&def, NULL);
-        if (!web.sole[f] || !open_outline(sole, &web.outline[f])) {
+        if (!web.sole[f]) {
             return 0;
         }
         view->elements = mild_sole_elements(web.sole[f]);
@@ -670,11 +559,29 @@ static int open_soles(const WebModel *file) {
             view->y[f][e] = (float)mild_sole_y(web.sole[f])[e];
         }
     }
+    for (int b = web.feet; b < web.standing; b++) {
+        web.sole[b] = open_surface(file, b - web.feet);
+        if (!web.sole[b]) {
+            return 0;
+        }
+    }
     view->bytes = (int32_t)sizeof *view;
     view->pitch = (float)mild_sole_pitch(web.sole[0]);
-    view->cell = (float)window_cell();
-    web.scratch = mild_scratch_create((const MildSole *const *)web.sole, web.feet, NULL);
+    web.scratch = mild_scratch_create((const MildSole *const *)web.sole, web.standing, NULL);
     return web.scratch != NULL;
+}
+
+static int open_window(const WebModel *file) {
+    web.scene = (WindowScene){.feet = web.feet,
+                              .standing = web.standing,
+                              .outline = file->sole,
+                              .sole = web.sole,
+                              .terrain = &web.terrain,
+                              .input = &web.input,
+                              .scratch = web.scratch,
+                              .cell = 0.5 * mild_sole_pitch(web.sole[0])}; /* as imprints have */
+    web.view.cell = (float)web.scene.cell;
+    return window_open(&web.scene);
 }
 
 /* The arrays of one environment; all 0. */
@@ -695,14 +602,12 @@ static int open_arrays(void) {
     float *block = contact->position =
         calloc((3 + 9 + 6 + 6) * feet + 36 * feet * feet + 1, sizeof *block);
     contact->foot = calloc(feet, sizeof *contact->foot);
-    web.shown = calloc(2 * (size_t)WEB_WINDOW * WEB_WINDOW, sizeof *web.shown);
     web.hills = calloc((size_t)WEB_HILLS * WEB_HILLS, sizeof *web.hills);
     if (!all->env || !web.robot || !web.env_scratch || !all->material || !all->map_origin ||
-        !all->reset || !contact->position || !contact->foot || !web.shown || !web.hills) {
+        !all->reset || !contact->position || !contact->foot || !web.hills) {
         return 0;
     }
     memset(web.env_scratch, 0, sizeof *web.env_scratch);
-    web.kept = web.shown + (size_t)WEB_WINDOW * WEB_WINDOW;
     contact->rotation = block + 3 * feet;
     contact->velocity = contact->rotation + 9 * feet;
     contact->free_velocity = contact->velocity + 6 * feet;
@@ -712,10 +617,10 @@ static int open_arrays(void) {
 }
 
 static void close_all(void) {
-    for (int f = 0; f < ROBOT_FEET_MAX; f++) {
-        mild_sole_destroy(web.sole[f]);
-        free(web.outline[f].distance);
+    for (int b = 0; b < STANDING_MAX; b++) {
+        mild_sole_destroy(web.sole[b]);
     }
+    window_close();
     mild_scratch_destroy(web.scratch);
     mild_map_destroy(web.map);
     void *const blocks[] = {web.weight,
@@ -729,7 +634,6 @@ static void close_all(void) {
                             web.all.reset,
                             web.all.contact.position,
                             web.all.contact.foot,
-                            web.shown,
                             web.hills,
                             web.ground};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
@@ -753,7 +657,7 @@ const char *web_open(const WebModel *file, size_t bytes) {
     task->ground = &web.drawn;
     task->grounds = task->labels = 1;
     web.stiffness = web.friction = 1;
-    if (!open_policy(file) || !open_soles(file) || !open_arrays()) {
+    if (!open_policy(file) || !open_soles(file) || !open_window(file) || !open_arrays()) {
         return "out of memory, or a sole without elements";
     }
     web.file = file;
@@ -778,7 +682,7 @@ const float *web_history(void) {
 }
 
 const float *web_window(void) {
-    return web.shown;
+    return window_depths();
 }
 
 const float *web_hills(void) {

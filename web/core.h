@@ -39,6 +39,15 @@ typedef struct {
     double outline[2 * ROBOT_OUTLINE_MAX]; /* [m] */
 } WebSole;
 
+/* A part of the surface of a body with shells; see MildShape. */
+typedef struct {
+    int32_t body; /* of EngineTree.bodies */
+    int32_t type; /* MildShapeType */
+    double size[3];
+    double pos[3];
+    double quat[4];
+} WebShell;
+
 /* The widths of a network: input, hidden layers, output. */
 typedef struct {
     int32_t layers;
@@ -71,6 +80,9 @@ typedef struct {
     TaskGains gains;
     double gravity; /* [m/s^2] */
     WebSole sole[ROBOT_FEET_MAX];
+    double shell_spacing; /* [m] */
+    int32_t shells;       /* that stand on soft ground */
+    WebShell shell[ROBOT_SHELLS_MAX];
     WebPolicy policy;
     int32_t geoms;
     WebGeom geom[WEB_GEOMS_MAX];
@@ -113,6 +125,7 @@ typedef struct {
     float load[2];                       /* [N] on each foot */
     float depth[2];                      /* [m] deepest element */
     float center[2][2];                  /* [m] of pressure, foot's frame */
+    float shell_load;                    /* [N] on the shells: shanks and body */
     float x[2][WEB_ELEMENTS_MAX];        /* [m] elements, foot's frame */
     float y[2][WEB_ELEMENTS_MAX];        /* [m] */
     float pressure[2][WEB_ELEMENTS_MAX]; /* [Pa] */
@@ -130,7 +143,8 @@ const char *web_start(int ground, int relief, int prints);
 void web_again(void);
 /* Changes the ground while the robot walks: factor of stiffness, factor of friction [-]. */
 void web_change(double stiffness, double friction);
-/* A policy step of 10 ms with a command [m/s, m/s, rad/s]. Returns whether the robot has fallen. */
+/* A policy step of 10 ms with a command [m/s, m/s, rad/s]. Returns why the trial has ended, a
+ * TaskEnd; 0: it has not. */
 int web_step(float vx, float vy, float wz);
 WebView *web_view(void);
 /* The number of the robot's parts, and behind it the parts (WebModel.geom). */
@@ -147,7 +161,9 @@ const float *web_hills(void);
 const float *web_history(void);
 /* Action for a history. */
 void web_act(const float *history, float *action);
-/* A policy step with a given action and command. */
+/* The same with a given action, but for the picture. */
 int web_move(const float *action, const float command[3]);
+/* The picture of the present. */
+void web_show(void);
 
 #endif

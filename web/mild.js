@@ -31,6 +31,10 @@ const choice = (key, count, otherwise) => {
   return Number.isInteger(number) && number >= 0 && number < count ? number : otherwise;
 };
 
+// Why a trial ends: TaskEnd.
+const ENDS = ['', 'It is no longer finite', 'It leans too far', 'Its body touches the ground', 'A shank touches the ground', 'Its feet cross',
+  'A joint broke out'];
+
 // ---- the core ----
 
 class Core {
@@ -88,7 +92,7 @@ class Core {
     const [bytes, links, elements] = takeInts(3), [pitch, cell, period] = take(3);
     const view = {
       links, elements, pitch, cell, period, velocity: take(3), yaw: take(1)[0], load: take(2), depth: take(2), center: take(4),
-      x: take(256), y: take(256), pressure: take(256), link: take(12 * 41), dirtyCount: takeInts(1), dirty: takeInts(4 * 64),
+      shellLoad: take(1)[0], x: take(256), y: take(256), pressure: take(256), link: take(12 * 41), dirtyCount: takeInts(1), dirty: takeInts(4 * 64),
     };
     if (at - start !== bytes) throw new Error('mild.wasm and mild.js are of different builds');
     return view;
@@ -243,6 +247,7 @@ class Panel {
       const depth = this.app.core.names[this.app.ground] === 'rigid' ? 'rigid' : `${Math.round(1e3 * view.depth[f])} mm`;
       $(f === 0 ? 'left' : 'right').textContent = `${Math.round(view.load[f])} N · ${depth}`;
     }
+    $('shells').textContent = view.shellLoad > 0 ? `shanks and body ${Math.round(view.shellLoad)} N` : '';
   }
 
   drawSpeed(view, command, pace, seconds) {
@@ -362,9 +367,10 @@ class App {
     this.asked = command;
     this.steps++;
     this.time += PERIOD;
-    if (core.c.web_step(...command) && !this.fallen) {
+    const end = core.c.web_step(...command);
+    if (end && !this.fallen) {
       this.fallen = this.time;
-      this.panel.say('It fell. It stands up again in a moment.', 2.2);
+      this.panel.say(`${ENDS[end]}. It stands up again in a moment.`, 2.2);
     }
   }
 

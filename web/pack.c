@@ -25,6 +25,23 @@ static int stop(const char *text) {
 
 /* ---- the robot ---- */
 
+/* The shells that stand, body by body. */
+static void pack_shells(const Robot *robot, WebModel *file) {
+    MildShape shapes[ROBOT_SHELLS_MAX];
+    for (int b = 0; b < file->model.tree.bodies; b++) {
+        const int count = robot_shell_shapes(robot, robot->def.feet + b, shapes);
+        for (int s = 0; s < count; s++) {
+            WebShell *shell = &file->shell[file->shells++];
+            shell->body = b;
+            shell->type = shapes[s].type;
+            memcpy(shell->size, shapes[s].size, sizeof shell->size);
+            memcpy(shell->pos, shapes[s].pos, sizeof shell->pos);
+            memcpy(shell->quat, shapes[s].quat, sizeof shell->quat);
+        }
+    }
+    file->shell_spacing = robot->def.shell_spacing;
+}
+
 static MildStatus pack_model(const Robot *robot, const TaskDef *task, WebModel *file,
                              MildError *error) {
     static double number[ENGINE_NUMBERS];
@@ -43,6 +60,9 @@ static MildStatus pack_model(const Robot *robot, const TaskDef *task, WebModel *
         WebSole *sole = &file->sole[f];
         *sole = (WebSole){foot->outline_points, foot->elements, foot->pitch, foot->z, {0}};
         memcpy(sole->outline, foot->outline, sizeof sole->outline);
+    }
+    if (status == MILD_OK) {
+        pack_shells(robot, file);
     }
     return status;
 }
@@ -197,7 +217,7 @@ static MildStatus write_file(const char *path, const WebModel *file, const uint1
     return status;
 }
 
-static int pack(const Robot *robot, Policy *policy, const TaskDef *task, const char *path,
+static int pack(Robot *robot, Policy *policy, const TaskDef *task, const char *path,
                 MildError *error) {
     static WebModel file;
     const TaskShape shape = task_shape(robot);
@@ -206,6 +226,7 @@ static int pack(const Robot *robot, Policy *policy, const TaskDef *task, const c
     if (shape.feet != 2 || policy_def(policy)->observation != shape.observation) {
         return stop("the page is for a biped and a policy of its own");
     }
+    robot_set_shells(robot, task->shells_stand);
     MildStatus status = pack_model(robot, task, &file, error);
     status = status == MILD_OK ? pack_picture(robot, &file, error) : status;
     uint16_t *weights = status == MILD_OK ? pack_policy(policy, &file) : NULL;

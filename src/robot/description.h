@@ -97,6 +97,8 @@ int robot_geom_body(const Robot *robot, int geom, MildError *error);
 /* Sets the degrees of freedom of a limb from its body, and those that it shares with the limbs
  * before it. */
 void robot_read_limb(Robot *robot, int limb);
+/* The shells of a limb behind the feet, as mild_sole_surface takes them. Returns how many. */
+int robot_shell_shapes(const Robot *robot, int limb, MildShape shapes[ROBOT_SHELLS_MAX]);
 
 /* ---- parts of robot_create, in the order of their calls; each needs the ones before it ---- */
 MildStatus robot_read_bodies(Robot *robot, MildError *error);

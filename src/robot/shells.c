@@ -76,15 +76,20 @@ static MildShape shape_of(const RobotShell *shell) {
     return shape;
 }
 
+int robot_shell_shapes(const Robot *robot, int limb, MildShape shapes[ROBOT_SHELLS_MAX]) {
+    int count = 0;
+    for (int s = 0; s < robot->shells; s++) {
+        if (robot->shell[s].limb == limb) {
+            shapes[count++] = shape_of(&robot->shell[s]);
+        }
+    }
+    return count;
+}
+
 MildStatus robot_read_surfaces(Robot *robot, MildError *error) {
     for (int b = robot->def.feet; b < robot->def.feet + robot->shell_bodies; b++) {
         MildShape shapes[ROBOT_SHELLS_MAX];
-        int count = 0;
-        for (int s = 0; s < robot->shells; s++) {
-            if (robot->shell[s].limb == b) {
-                shapes[count++] = shape_of(&robot->shell[s]);
-            }
-        }
+        const int count = robot_shell_shapes(robot, b, shapes);
         const MildSurfaceDef def = {.shapes = shapes,
                                     .count = count,
                                     .pitch = robot->def.foot[0].pitch,

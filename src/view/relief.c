@@ -47,6 +47,9 @@ struct Relief {
     Look look[MILD_MATERIALS_MAX + 1]; /* last: rigid */
     SoleMask mask[MILD_FEET_MAX];
     Box last[MILD_FEET_MAX];
+    const Facet *facets; /* [facet_count] of other bodies, borrowed */
+    int facet_count;
+    Box facet_box; /* vertices that they may press */
     double position[MILD_FEET_MAX][3], rotation[MILD_FEET_MAX][9];
     float *peak, *shown; /* [ny][nx] deepest and present depth of the surface */
     float *base;         /* [ny][nx] [m] undisturbed height */
@@ -217,7 +220,30 @@ static float sole_depth(const Relief *relief, int foot, double x, double y, doub
     return (float)skirt(depth, hypot(sx - qx, sy - qy), recovery);
 }
 
+/* The same of the facets. */
+static float facets_depth(const Relief *relief, double x, double y, double surface,
+                          double recovery) {
+    float deepest = NO_DEPTH;
+    for (int n = 0; n < relief->facet_count; n++) {
+        const Facet *facet = &relief->facets[n];
+        const double reach = facet->radius + SKIRT_MAX;
+        double away;
+        if (fabs(x - facet->at[0]) > reach || fabs(y - facet->at[1]) > reach) {
+            continue;
+        }
+        const double depth = surface - facet_height(facet, x, y, &away) + UNDER_SOLE;
+        if (depth > UNDER_SOLE) {
+            deepest = fmaxf(deepest, (float)skirt(depth, away, recovery));
+        }
+    }
+    return deepest;
+}
+
 /* ---- surface ---- */
+
+static int box_has(const Box *box, int i, int j) {
+    return i >= box->i0 && i < box->i1 && j >= box->j0 && j < box->j1;
+}
 
 static const MildMaterial *material_at(const Relief *relief, double x, double y) {
     return &relief->terrain.materials[mild_terrain_material_at(&relief->terrain, x, y)];
@@ -244,6 +270,9 @@ static void update_vertex(Relief *relief, int i, int j) {
     for (int f = 0; f < relief->feet; f++) {
         depth = fmaxf(depth, sole_depth(relief, f, x, y, (double)relief->base[at], recovery));
     }
+    if (box_has(&relief->facet_box, i, j)) {
+        depth = fmaxf(depth, facets_depth(relief, x, y, (double)relief->base[at], recovery));
+    }
     if (depth <= 0.0F && relief->peak[at] <= 0.0F) {
         return;
     }
@@ -257,6 +286,18 @@ static void update_vertex(Relief *relief, int i, int j) {
     }
 }
 
+/* The vertices between two places. */
+static Box box_between(const Relief *relief, const double low[2], const double high[2]) {
+    const double i0 = floor((low[0] - relief->x0) / relief->cell);
+    const double i1 = ceil((high[0] - relief->x0) / relief->cell);
+    const double j0 = floor((low[1] - relief->y0) / relief->cell);
+    const double j1 = ceil((high[1] - relief->y0) / relief->cell);
+    return (Box){.i0 = (int)fmin(fmax(i0, 0), relief->nx),
+                 .i1 = (int)fmin(fmax(i1, 0), relief->nx),
+                 .j0 = (int)fmin(fmax(j0, 0), relief->ny),
+                 .j1 = (int)fmin(fmax(j1, 0), relief->ny)};
+}
+
 /* The vertices that a foot may press: none while it swings above the highest ground. */
 static Box foot_box(const Relief *relief, int foot) {
     const SoleMask *mask = &relief->mask[foot];
@@ -265,17 +306,21 @@ static Box foot_box(const Relief *relief, int foot) {
     double x_end = x + mask->columns * mask->step, y_end = y + mask->rows * mask->step;
     double lowest =
         p[2] + r[8] * mask->z + fmin(r[6] * x, r[6] * x_end) + fmin(r[7] * y, r[7] * y_end);
-    Box box = {0, 0, 0, 0};
-    if (lowest > relief->high) {
-        return box;
+    const double low[2] = {p[0] - reach, p[1] - reach}, high[2] = {p[0] + reach, p[1] + reach};
+    return lowest > relief->high ? (Box){0, 0, 0, 0} : box_between(relief, low, high);
+}
+
+/* And those that the facets may press. */
+static Box facets_box(const Relief *relief) {
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    for (int n = 0; n < relief->facet_count; n++) {
+        const Facet *facet = &relief->facets[n];
+        for (int k = 0; k < 2; k++) {
+            low[k] = fmin(low[k], facet->at[k] - facet->radius - SKIRT_MAX);
+            high[k] = fmax(high[k], facet->at[k] + facet->radius + SKIRT_MAX);
+        }
     }
-    double i0 = floor((p[0] - reach - relief->x0) / relief->cell),
-           i1 = ceil((p[0] + reach - relief->x0) / relief->cell);
-    double j0 = floor((p[1] - reach - relief->y0) / relief->cell),
-           j1 = ceil((p[1] + reach - relief->y0) / relief->cell);
-    box.i0 = (int)fmin(fmax(i0, 0), relief->nx), box.i1 = (int)fmin(fmax(i1, 0), relief->nx);
-    box.j0 = (int)fmin(fmax(j0, 0), relief->ny), box.j1 = (int)fmin(fmax(j1, 0), relief->ny);
-    return box;
+    return relief->facet_count == 0 ? (Box){0, 0, 0, 0} : box_between(relief, low, high);
 }
 
 static void update_box(Relief *relief, Box box) {
@@ -297,6 +342,18 @@ void relief_press(Relief *relief, const double (*position)[3], const double (*ro
         relief->last[f] = foot_box(relief, f);
         update_box(relief, relief->last[f]);
     }
+}
+
+void relief_press_facets(Relief *relief, const Facet *facets, int count) {
+    const Box last = relief->facet_box;
+    if (relief->rigid) {
+        return;
+    }
+    relief->facets = facets;
+    relief->facet_count = count;
+    relief->facet_box = facets_box(relief);
+    update_box(relief, last); /* the ground springs back where they were */
+    update_box(relief, relief->facet_box);
 }
 
 /* ---- creation ---- */

@@ -1,11 +1,12 @@
-/* The visible ground: a height map that the soles press in and that springs back by its material's
- * `recovery`. Under a sole it is as deep as the sole; around it the surface rises in a smooth
- * slope. It is only for drawing; physics never reads it. The map is divided into square tiles, so
- * that a renderer need refresh only those that changed. It does not depend on a renderer. */
+/* The visible ground: a height map that soles and other bodies press in and that springs back by
+ * its material's `recovery`. Under a sole it is as deep as the sole; around it the surface rises in
+ * a smooth slope. It is only for drawing; physics never reads it. The map is divided into square
+ * tiles, so that a renderer need refresh only those that changed. It does not depend on a renderer.
+ */
 #ifndef VIEW_RELIEF_H
 #define VIEW_RELIEF_H
 
-#include "mild/ground.h"
+#include "view/facet.h"
 
 #define RELIEF_TILE_CELLS 64
 #define RELIEF_TILE_VERTICES (RELIEF_TILE_CELLS + 1)
@@ -29,6 +30,9 @@ void relief_destroy(Relief *relief);
 /* Presses the surface to the present pose of the soles. position [feet][3], rotation [feet][9]: of
  * the ankles. */
 void relief_press(Relief *relief, const double (*position)[3], const double (*rotation)[9]);
+/* The same of the other bodies in the ground, by their elements [count], which are borrowed until
+ * the next call. */
+void relief_press_facets(Relief *relief, const Facet *facets, int count);
 
 int relief_tile_columns(const Relief *relief); /* along x */
 int relief_tile_rows(const Relief *relief);    /* along y */

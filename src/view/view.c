@@ -46,6 +46,7 @@ struct View {
     ViewDef def;
     const Robot *robot;
     int feet;
+    int bodies; /* that stand on the ground: feet, then those with shells */
     const MildSole *const *soles,
         *const *rasters; /* what the feet have; their shape, for the prints */
     MildTerrain terrain;
@@ -62,6 +63,7 @@ struct View {
     double time;           /* [s] of the last frame */
     int jumped;            /* bool: the cameras jump to the robot in the next frame */
     Relief *relief;
+    Facet *facets;                             /* of shells in the ground */
     Slot slots[VIEW_PLAIN_UNEVEN + VIEW_FINE]; /* first those without imprints */
     int plain_count, slot_count;
     int *slot_of;                              /* [tiles] -1: none */
@@ -141,6 +143,14 @@ static Relief *make_relief(const View *view, MildError *error) {
     return relief_create(&relief, &view->terrain, view->rasters, view->feet, error);
 }
 
+static Facet *make_facets(const View *view) {
+    size_t elements = 1;
+    for (int b = view->feet; b < view->bodies; b++) {
+        elements += (size_t)mild_sole_elements(view->soles[b]);
+    }
+    return malloc(elements * sizeof(Facet));
+}
+
 static int make_buffers(View *view) {
     int tiles = relief_tile_columns(view->relief) * relief_tile_rows(view->relief);
     view->slot_of = malloc((size_t)tiles * sizeof *view->slot_of);
@@ -151,9 +161,10 @@ static int make_buffers(View *view) {
     view->scene_pixels = malloc(frame);
     view->labelled = malloc(frame);
     view->luma = malloc(frame / 3 + (size_t)view->def.width);
+    view->facets = make_facets(view);
     view->data = mj_makeData(view->model);
     if (!view->slot_of || !view->inset || !view->pixels || !view->scene_pixels || !view->labelled ||
-        !view->luma || !view->data) {
+        !view->luma || !view->facets || !view->data) {
         return 0;
     }
     for (int t = 0; t < tiles; t++) {
@@ -200,6 +211,7 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
     view->def = *def;
     view->robot = robot;
     view->feet = robot_feet(robot);
+    view->bodies = robot_bodies(robot);
     view->soles = robot_soles(robot);
     view->rasters = robot_rasters(robot);
     view->terrain = *terrain;
@@ -251,6 +263,7 @@ void view_destroy(View *view) {
     free(view->scene_pixels);
     free(view->labelled);
     free(view->luma);
+    free(view->facets);
     free(view);
 }
 
@@ -278,6 +291,18 @@ const char *view_backend(const View *view) {
 
 /* ---- ground ---- */
 
+static void press_shells(View *view, const RobotSim *sim) {
+    const MildContactInput *input = robot_sim_contact_input(sim);
+    int count = 0;
+    for (int b = view->feet; b < view->bodies; b++) {
+        if (robot_sim_contact(sim)->foot[b].contacts > 0) {
+            const MildElements elements = mild_scratch_elements(robot_sim_scratch(sim), b);
+            count += facets_of(view->soles[b], input->rotation[b], &elements, view->facets + count);
+        }
+    }
+    relief_press_facets(view->relief, view->facets, count);
+}
+
 void view_observe(View *view, const RobotSim *sim) {
     double position[ROBOT_FEET_MAX][3], rotation[ROBOT_FEET_MAX][9];
     for (int f = 0; f < view->feet; f++) {
@@ -286,6 +311,7 @@ void view_observe(View *view, const RobotSim *sim) {
         memcpy(rotation[f], foot->rotation, sizeof rotation[f]);
     }
     relief_press(view->relief, (const double(*)[3])position, (const double(*)[9])rotation);
+    press_shells(view, sim);
 }
 
 static double tile_distance(const View *view, int tile) {

@@ -1,6 +1,6 @@
 /* Pictures of a robot on its ground: offscreen (for videos) or in a window. The soft surface is
- * drawn as a height map that the soles press in; sole pressure in the lower right corner, text in
- * the upper left. One per process is enough; create, use and destroy it on one thread. */
+ * drawn as a height map that soles and shells press in; sole pressure in the lower right corner,
+ * text in the upper left. One per process is enough; create, use and destroy it on one thread. */
 #ifndef VIEW_VIEW_H
 #define VIEW_VIEW_H
 
@@ -36,8 +36,8 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
 void view_destroy(View *view);
 const char *view_backend(const View *view); /* "EGL", "OSMesa" or "GLFW" */
 
-/* Presses the feet into the visible ground. Call it about once per policy step, so that imprints
- * made between two frames appear. */
+/* Presses the feet, and the shells that stand on it, into the visible ground. Call it about once
+ * per policy step, so that imprints made between two frames appear. */
 void view_observe(View *view, const RobotSim *sim);
 /* Draws one frame. */
 void view_frame(View *view, const RobotSim *sim, const ViewInfo *info);

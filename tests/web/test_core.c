@@ -37,7 +37,9 @@ static int setup(void **state) {
     policy = policy_load(POLICY, NULL, 0, &error);
     assert_non_null(robot);
     assert_non_null(policy);
-    return (int)experiment_task(&task, 0, unused, WALK, POLICY, &error);
+    assert_int_equal(experiment_task(&task, 0, unused, WALK, POLICY, &error), MILD_OK);
+    robot_set_shells(robot, task.shells_stand);
+    return 0;
 }
 
 static int teardown(void **state) {
@@ -127,7 +129,7 @@ typedef struct {
     MildTerrain terrain;
     Envs *envs;
     float history[SA01_HISTORY], reward;
-    uint8_t done, timeout, valid;
+    uint8_t done, timeout, valid, cause;
 } Rival;
 
 /* stiffness: factor of the material's. speed: [m/s] forward. */
@@ -168,6 +170,7 @@ static void rival_step(Rival *rival, const float *action) {
                            .done = &rival->done,
                            .timeout = &rival->timeout,
                            .valid = &rival->valid,
+                           .cause = &rival->cause,
                            .next = {.history = rival->history}};
     assert_int_equal(envs_step(rival->envs, &step, NULL, &error), MILD_OK);
 }
@@ -206,6 +209,92 @@ static void test_same_steps(void **state) {
         assert_true(first < 2e-4 && worst < 0.02);
         envs_destroy(rival.envs);
     }
+}
+
+/* ---- shells ---- */
+
+/* Hip pitch, knee and ankle pitch of both legs, held from the start: the robot falls onto shanks or
+ * base. */
+typedef struct {
+    const char *ground;
+    float hip, knee, ankle; /* [-] actions */
+    TaskEnd end;
+} Fall;
+
+/* What came of a fall. */
+typedef struct {
+    int steps;    /* policy steps until the end */
+    int carried;  /* of these, with a load on the shells */
+    double load;  /* [N s] sum of the load over the steps, times their length */
+    double first; /* largest difference of the histories until two steps after the shells first
+                     carried */
+} Fallen;
+
+static void fall(const Fall *def, Fallen *mine, Fallen *theirs) {
+    static const float still[3] = {0, 0, 0};
+    float action[SA01_JOINTS] = {0};
+    Rival rival = {0};
+    EnvsSample sample[16];
+    int end = TASK_END_time;
+    for (int leg = 0; leg < 2; leg++) {
+        action[6 * leg + 2] = def->hip;
+        action[6 * leg + 3] = def->knee;
+        action[6 * leg + 4] = def->ankle;
+    }
+    start(preset(def->ground), WEB_LEVEL, 0);
+    rival_start(&rival, preset(def->ground), 1, 0);
+    envs_set_samples(rival.envs, sample);
+    const int last = envs_physics_steps(rival.envs) - 1;
+    *mine = *theirs = (Fallen){0};
+    while (mine->steps < 3 * SECOND && (!end || !rival.done)) {
+        if (!rival.done) {
+            rival_step(&rival, action);
+            theirs->steps++;
+            theirs->carried += sample[last].shell_load > 0;
+            theirs->load += 0.01 * sample[last].shell_load;
+        }
+        if (!end) {
+            end = web_move(action, still);
+            mine->steps++;
+            mine->carried += web_view()->shell_load > 0;
+            mine->load += 0.01 * (double)web_view()->shell_load;
+        }
+        if (!end && !rival.done && theirs->carried < 3) {
+            mine->first = fmax(mine->first, apart(web_history(), rival.history));
+        }
+    }
+    printf(
+        "  %s: carried %d of %d steps, %.1f N s, ends by %s; the batch engine %d of %d, %.1f N s,"
+        " %s; apart by %.1e where shells touch down (bound 0.1)\n",
+        def->ground, mine->carried, mine->steps, mine->load, task_end_names[end], theirs->carried,
+        theirs->steps, theirs->load, task_end_names[rival.cause], mine->first);
+    assert_int_equal(end, def->end);
+    assert_int_equal(rival.cause, def->end);
+    envs_destroy(rival.envs);
+}
+
+/* The ground carries shanks and base as it does in the batch engine, and ends the trial by the same
+ * rule. On its knees the robot leaves much of its weight to the shanks. */
+static void test_shells(void **state) {
+    static const Fall falls[] = {
+        {"foam28", -0.5f, 4, -2, TASK_END_tilt},
+        {"foam28", -0.5f, 3, -2, TASK_END_base},
+        {"foam45", -1, 4, -1, TASK_END_tilt},
+        {"sand_loose", -0.5f, 3.5f, 0, TASK_END_base},
+    };
+    double most = 0;
+    (void)state;
+    for (size_t i = 0; i < sizeof falls / sizeof *falls; i++) {
+        Fallen mine, theirs;
+        fall(&falls[i], &mine, &theirs);
+        assert_true(theirs.carried > 5 && mine.carried > 5 && mine.first < 0.1);
+        assert_true(abs(mine.steps - theirs.steps) <= 3);
+        assert_true(fabs(mine.load / theirs.load - 1) < 0.05);
+        most = fmax(most, mine.load / (0.01 * mine.carried));
+    }
+    const double weight = 9.81 * robot_total_mass(robot);
+    printf("  shells carry up to %.0f N of %.0f N, mean of a fall\n", most, weight);
+    assert_true(most > 0.5 * weight);
 }
 
 /* ---- walks ---- */
@@ -304,6 +393,78 @@ static void test_prints(void **state) {
     assert_true(foam > 0.01 && foam < 0.2);
     start(preset("sand_loose"), WEB_LEVEL, 1);
     assert_true(pressed() == 0);
+}
+
+/* [m] Drawn at a point. */
+static double drawn(const double point[3]) {
+    const double cell = (double)web_view()->cell;
+    const int i = (int)floor(point[0] / cell) & (WEB_WINDOW - 1);
+    const int j = (int)floor(point[1] / cell) & (WEB_WINDOW - 1);
+    return (double)web_window()[j * WEB_WINDOW + i];
+}
+
+/* [m, world] The lowest corner of a shell as drawn. */
+static void lowest_corner(int s, double lowest[3]) {
+    const EngineShell *shell = &model->model.number.shell[s];
+    const float *link = web_view()->link[model->model.tree.shell_link[s]];
+    lowest[0] = lowest[1] = 0;
+    lowest[2] = 1e9;
+    for (int corner = 0; corner < 8; corner++) {
+        double p[3], at[3];
+        for (int k = 0; k < 3; k++) {
+            p[k] = (double)shell->center[k];
+            for (int c = 0; c < 3; c++) {
+                const double half = (double)(shell->rotation[3 * k + c] * shell->half[c]);
+                p[k] += corner >> c & 1 ? half : -half;
+            }
+        }
+        for (int k = 0; k < 3; k++) {
+            const float *row = link + 4 * k;
+            at[k] = (double)row[0] * p[0] + (double)row[1] * p[1] + (double)row[2] * p[2] +
+                    (double)row[3];
+        }
+        if (at[2] < lowest[2]) {
+            memcpy(lowest, at, sizeof at);
+        }
+    }
+}
+
+/* Shanks in the ground press what is drawn of it, as deep as they are: an imprint that stays in
+ * sand and springs back in foam. A corner of their boxes on end is narrower than a cell. */
+static void test_imprints_of_shells(void **state) {
+    static const float still[3] = {0, 0, 0};
+    static const float kneel[6] = {0, 0, -0.5f, 4, -2, 0};
+    (void)state;
+    for (int sand = 0; sand < 2; sand++) {
+        float action[SA01_JOINTS];
+        double deepest[3] = {0, 0, 0}, above = 0, shown = 0;
+        memcpy(action, kneel, sizeof kneel);
+        memcpy(action + 6, kneel, sizeof kneel);
+        start(preset(sand ? "sand_loose" : "foam28"), WEB_LEVEL, 1);
+        for (int end = 0; !end;) {
+            end = web_move(action, still);
+            web_show();
+            for (int s = 1; s < model->model.tree.shells; s++) { /* shell 0 is the base */
+                double at[3];
+                lowest_corner(s, at);
+                above = fmax(above, -at[2] - drawn(at));
+                if (at[2] < deepest[2]) {
+                    memcpy(deepest, at, sizeof at);
+                    shown = drawn(at);
+                }
+            }
+        }
+        web_again();
+        web_move(action, still);
+        web_show();
+        const double left = drawn(deepest);
+        printf(
+            "  a shank %.0f mm in %s, drawn %.0f mm deep; at most %.1f mm deeper than drawn (bound "
+            "25); %.0f mm once it has left\n",
+            -1e3 * deepest[2], sand ? "sand" : "foam", 1e3 * shown, 1e3 * above, 1e3 * left);
+        assert_true(deepest[2] < -0.03 && above < 0.025 && shown < 0.01 - deepest[2]);
+        assert_true(sand ? left > 0.9 * shown : left == 0);
+    }
 }
 
 /* [m^2] Deeper than `depth` between two places along x. */
@@ -495,16 +656,29 @@ static void test_again(void **state) {
            facing());
     assert_true(turned > 1 && turned < 2 && fabs((double)web_view()->yaw - turned) < 1e-5);
     assert_true(fabs(facing() - turned) < 0.01);
+    start(preset("foam25"), WEB_LEVEL, 1);
+    walk(4, 0.6f);
+    const double foam = pressed();
+    web_again();
+    printf("  foam pressed %.3f m^2, then %.3f m^2\n", foam, pressed());
+    assert_true(foam > 0.01 && pressed() == 0);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_files),      cmocka_unit_test(test_policy),
-        cmocka_unit_test(test_same_steps), cmocka_unit_test(test_walks),
-        cmocka_unit_test(test_hills),      cmocka_unit_test(test_prints),
-        cmocka_unit_test(test_window),     cmocka_unit_test(test_sliders),
-        cmocka_unit_test(test_soles),      cmocka_unit_test(test_stripes),
+        cmocka_unit_test(test_files),
+        cmocka_unit_test(test_policy),
+        cmocka_unit_test(test_same_steps),
+        cmocka_unit_test(test_walks),
+        cmocka_unit_test(test_hills),
+        cmocka_unit_test(test_prints),
+        cmocka_unit_test(test_window),
+        cmocka_unit_test(test_sliders),
+        cmocka_unit_test(test_soles),
+        cmocka_unit_test(test_stripes),
         cmocka_unit_test(test_again),
+        cmocka_unit_test(test_shells),
+        cmocka_unit_test(test_imprints_of_shells),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -42,7 +42,7 @@ Object.assign(globalThis, {
 });
 
 const source = fs.readFileSync(`${root}/web/mild.js`, 'utf8').replace(/^import .*$/m, '').replace(/^main\(\)\.catch[\s\S]*$/m, '');
-const { Core, Driver, Panel, App } = await import(`data:text/javascript,${encodeURIComponent(`${source}\nexport { Core, Driver, Panel, App };`)}`);
+const { Core, Driver, Panel, App, ENDS } = await import(`data:text/javascript,${encodeURIComponent(`${source}\nexport { Core, Driver, Panel, App, ENDS };`)}`);
 
 // ---- what a hand does: [forward, left, turn to the left] ----
 
@@ -104,9 +104,14 @@ whole[0] = 4 * words;
 const core = Object.assign(Object.create(Core.prototype), { c: { memory: { buffer: memory }, web_view: () => 0 } });
 const seen = core.view();
 for (const [name, at] of fields) {
-  const found = seen[name === 'dirty_count' ? 'dirtyCount' : name];
+  const found = seen[name.replace(/_(.)/g, (_, letter) => letter.toUpperCase())];
   if (name !== 'bytes') assert.equal(found[0] ?? found, at, `${name} of WebView`);
 }
+
+// A sentence for each end of a trial, in the order of TaskEnd.
+const ends = [...fs.readFileSync(`${root}/src/env/task/state.h`, 'utf8').match(/#define TASK_ENDS[\s\S]*?\n#define/)[0].matchAll(/X\((\w+),/g)].map((end) => end[1]);
+assert.equal(ENDS.length, ends.length, 'ends of a trial');
+for (const [end, word] of [['time', /^$/], ['tilt', /leans/], ['base', /body/], ['shell', /shank/], ['joint', /joint/]]) assert.match(ENDS[ends.indexOf(end)], word);
 near(seen.load, [fields.get('load'), fields.get('load') + 1], 'load');
 
 // ---- what is shown ----
@@ -124,12 +129,15 @@ assert.deepEqual([$('stiffness-value').textContent, $('friction-value').textCont
 
 // Two elements of each foot: one in front and to the left of its middle, one behind and to the right; only the former presses.
 const view = { elements: 2, pitch: 0.02, load: [300, 25], depth: [0.012, 0.003], center: [0.05, 0.01, 0.05, 0.01], x: new Float32Array(256),
-  y: new Float32Array(256), pressure: new Float32Array(256), velocity: [0.5, -0.1, 0.2], yaw: 0 };
+  y: new Float32Array(256), pressure: new Float32Array(256), velocity: [0.5, -0.1, 0.2], yaw: 0, shellLoad: 0 };
 for (const f of [0, 1]) [view.x[128 * f], view.y[128 * f], view.x[128 * f + 1], view.y[128 * f + 1]] = [0.05, 0.01, -0.05, -0.02];
 view.pressure[0] = 4e4;
 view.pressure[128] = 1e3;
 panel.drawSoles(view);
 assert.deepEqual([$('left').textContent, $('right').textContent], ['300 N · 12 mm', '25 N · 3 mm']);
+assert.equal($('shells').textContent, '');
+panel.drawSoles({ ...view, shellLoad: 41.6 });
+assert.equal($('shells').textContent, 'shanks and body 42 N');
 const [front, back, center, front2, back2, center2] = $('soles').drawn;
 assert.ok([front, back, center].every((at) => at.x < 220) && [front2, back2, center2].every((at) => at.x > 220), 'the left foot is on the left');
 for (const [a, b, c] of [[front, back, center], [front2, back2, center2]]) {
