@@ -180,7 +180,7 @@ def walk(address, bounds):
             f"the robot fell or leans, {report['upright']:.2f}": report["upright"] > 0.95 and not report["fell"],
             f"it walks at {report['speed']:.2f} m/s of {report['asked']:.2f}": abs(report["speed"] / report["asked"] - 1) < SPEED,
         }
-        wrong = [text for text, good in checks.items() if bounds and not good]
+        wrong += [text for text, good in checks.items() if bounds and not good]
     else:
         wrong.append("no report")
     wrong += browser.errors

@@ -142,8 +142,8 @@ WARP_FN void env_shells_leave(const EnvsArrays *all, long robot, int near) {
     }
 }
 
-/* After part k of a policy step: which bodies may touch the ground, in `near`. The others forget, and
- * in a new episode all do. Bool: env_shells_step is to follow. */
+/* After part k of a policy step: which bodies may touch the ground, in `near`. The others forget,
+ * and in a new episode all do. Bool: env_shells_step is to follow. */
 WARP_FN int env_shells_find(const EnvsArrays *all, long robot, int k) {
     const int listed = all->shells.near[robot];
     const int near = listed ? env_shells_touch(all, robot, listed) : 0;

@@ -1,10 +1,10 @@
 /* The contact step of one robot whose shells are near the ground, by a team: any number of bodies,
  * soles and surfaces (docs/model.md section 20), level or on a map.
  *
- * Few robots take this step at a time, so it has one text for all sizes. Elements that may touch are
- * listed, and dealt to warps in rounds of one body each; those of a warp's first BODIES_KEPT rounds
- * are kept, and others follow from their memory whenever they are asked for. What the lanes share
- * is in BodiesWork. The method is that of contact.inc, and so are the names. */
+ * Few robots take this step at a time, so it has one text for all sizes. Elements that may touch
+ * are listed, and dealt to warps in rounds of one body each; those of a warp's first BODIES_KEPT
+ * rounds are kept, and others follow from their memory whenever they are asked for. What the lanes
+ * share is in BodiesWork. The method is that of contact.inc, and so are the names. */
 #ifndef MILD_BATCH_BODIES_H
 #define MILD_BATCH_BODIES_H
 

@@ -255,7 +255,7 @@ TEAM_FN void bodies_residual(BodiesWork *work, int rows, const BodiesPoint *poin
     *scale = REAL_SQRT(real_max(lane_sum(done), 0));
 }
 
-/* Gauss and Jordan; the last column becomes the solution. Each warp has its share of the columns. */
+/* Gauss and Jordan; the last column becomes the solution. A warp has its share of the columns. */
 TEAM_FN void bodies_eliminate(BodiesWork *work, int rows) {
     const int stride = rows + 1;
     LANE_ROLLED
