@@ -72,7 +72,7 @@ static void element_imprint(const Advance *a, const Memory *memory, int i, int e
  * then deeper than at either end. */
 static void slot_peak(const Advance *a, const Memory *memory, int i, int e, double speed,
                       double middle) {
-    const Element element = slot_element(&a->slot, i);
+    const Element element = slot_loaded(&a->slot, i, a->foot->curves);
     const double peak = element_peak(&element, a->foot->curves, a->slot.iz[i], speed, middle);
     const double depth = element.virgin_depth + peak - element.yield_depth;
     memory->depth_max[e] = fmax(memory->depth_max[e], depth);
@@ -101,10 +101,10 @@ MILD_HD void slot_plane(const FootScratch *foot, double height, const Slots *s,
                        foot->point_z[e] - height;
 }
 
-/* Vector loop for a foot with all elements listed, on ground without imprints. Returns how many
- * elements remember something. */
+/* Vector loop for a foot with all elements listed, on ground without imprints. heap: LAW_HEAP or
+ * 0. Returns how many elements remember something. */
 MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material,
-                             int uneven) {
+                             int uneven, int heap) {
     const FootScratch foot = *a->foot;
     const Slots local = a->slot, *s = &local;
     const Memory own = *all, *memory = &own;
@@ -121,8 +121,13 @@ MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t 
         const Element element = slot_element(s, i);
         const ElementMemory before = slot_memory(s, i);
         const int stays = s->depth[i] + dt / 2 * v.descent > 0.0;
-        const ElementMemory after =
+        ElementMemory after =
             element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
+        if (heap) {
+            const Share share = slot_share(s, i);
+            memory->worn[i] = element_wear(&element, &share, &before, &after, dt, s->iz[i], v.x,
+                                           v.y, v.descent, stays);
+        }
         memory_store(memory, i, &after);
         if (uneven) {
             slot_plane(&foot, height, s, memory, i, i);
@@ -193,8 +198,13 @@ MILD_HD int foot_advance(const Advance *a, const Memory *memory, const int32_t *
         const int carried = memory->material[e] >= 0;
         const Element element = slot_element(s, i);
         const ElementMemory before = slot_memory(s, i);
-        const ElementMemory after = element_remember(&element, &before, a->dt, 1.0 / a->dt,
-                                                     s->iz[i], v.x, v.y, v.descent, !lifted);
+        ElementMemory after = element_remember(&element, &before, a->dt, 1.0 / a->dt, s->iz[i], v.x,
+                                               v.y, v.descent, !lifted);
+        if (foot->curves & LAW_HEAP) {
+            const Share share = slot_share(s, i);
+            memory->worn[e] = element_wear(&element, &share, &before, &after, a->dt, s->iz[i], v.x,
+                                           v.y, v.descent, !lifted);
+        }
         memory_store(memory, e, &after);
         if (!lifted) {
             slot_peak(a, memory, i, e, v.descent, middle);
@@ -248,10 +258,13 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
              * hold. */
             slots_remember(&advance.slot, &memory);
         }
-        if (all && foot->uneven) {
-            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1);
+        if (all && foot->curves & LAW_HEAP) {
+            ground->touched[f] =
+                foot_advance_all(&advance, &memory, foot->slot_material, foot->uneven, LAW_HEAP);
+        } else if (all && foot->uneven) {
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1, 0);
         } else if (all) {
-            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0);
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0, 0);
         } else if (foot->faces) {
             ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material, SLOT_FACES);
         } else {

@@ -2,6 +2,7 @@
  * model that sinks equally deep. */
 #define POWER_CALLED /* power.h: no vector loop here needs a power */
 #include "ground/models.h"
+#include "ground/sole.h"
 
 #include <math.h>
 
@@ -14,8 +15,8 @@ static MildElementLaw element_law(const MildMaterial *material, double pitch, do
         .force = law_force(&law, curves, depth) + elastic,
         .stiffness = law_slope(&law, curves, depth) + law_elastic_slope(&law, curves, depth),
         .damping = law.elastic_damping * elastic,
-        .added_mass = law.mass_rate * law_recruited(&law, depth),
-        .added_mass_per_depth = law.mass_rate * law_flat_share(&law, depth),
+        .added_mass = law.mass_rate * law_recruited(&law, curves, depth),
+        .added_mass_per_depth = law.mass_rate * law_flat_share(&law, curves, depth),
     };
 }
 
@@ -23,9 +24,39 @@ MildElementLaw mild_element_law(const MildMaterial *material, double pitch, doub
     return element_law(material, pitch, pitch, depth);
 }
 
+/* Sum over the elements of a level sole whose cones merge. */
+static MildElementLaw merged_law(const MildMaterial *material, const MildSole *sole,
+                                 double depth) {
+    const Law law = law_of(material, mild_sole_pitch(sole), mild_sole_width(sole));
+    const int curves = curves_of(material, &law);
+    MildElementLaw sum = {0};
+    for (int i = 0; i < mild_sole_elements(sole); i++) {
+        const SoleHeap heap = sole_heap(sole, i);
+        const Law own = law_merged(law, heap.begin, heap.width);
+        sum.force += law_force(&own, curves, depth);
+        sum.stiffness += law_slope(&own, curves, depth);
+        sum.added_mass += law.mass_rate * law_recruited(&own, curves, depth);
+        sum.added_mass_per_depth += law.mass_rate * law_flat_share(&own, curves, depth);
+    }
+    return sum;
+}
+
+MildElementLaw mild_sole_law(const MildMaterial *material, const MildSole *sole, double depth) {
+    if (model_row(material->model)->merged) {
+        return merged_law(material, sole, depth);
+    }
+    const double elements = mild_sole_elements(sole);
+    const MildElementLaw one =
+        element_law(material, mild_sole_pitch(sole), mild_sole_width(sole), depth);
+    return (MildElementLaw){.force = elements * one.force,
+                            .stiffness = elements * one.stiffness,
+                            .damping = elements * one.damping,
+                            .added_mass = elements * one.added_mass,
+                            .added_mass_per_depth = elements * one.added_mass_per_depth};
+}
+
 static double sole_force(const MildSole *sole, const MildMaterial *material, double depth) {
-    return mild_sole_elements(sole) *
-           element_law(material, mild_sole_pitch(sole), mild_sole_width(sole), depth).force;
+    return mild_sole_law(material, sole, depth).force;
 }
 
 double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, double load) {
@@ -56,12 +87,15 @@ static double *material_number(MildMaterial *m, const char *key) {
 
 /* Above the bed, a law is proportional to its `scaled` fields, so a single factor matches it.
  * pressure: [N/m^2] that the ground above the bed carries. area: [m^2] of one element of the
- * rival. width: [m] of the sole. */
+ * rival. */
 static void rival_scale(MildMaterial *m, const ModelRow *row, double pressure, double area,
-                        double width, double depth) {
+                        const MildSole *sole, double depth) {
     MildMaterial bottomless = *m;
     bottomless.bed_depth = INFINITY;
-    const double scale = pressure * area / element_law(&bottomless, sqrt(area), width, depth).force;
+    const double force =
+        row->merged ? sole_force(sole, &bottomless, depth) / mild_sole_elements(sole)
+                    : element_law(&bottomless, sqrt(area), mild_sole_width(sole), depth).force;
+    const double scale = pressure * area / force;
     for (int k = 0; k < MILD_MODEL_SCALED && row->info.scaled[k]; k++) {
         *material_number(m, row->info.scaled[k]) *= scale;
     }
@@ -115,7 +149,7 @@ MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const Mil
         row->reference(&matched, area);
     }
     if (row->info.scaled[0]) {
-        rival_scale(&matched, row, pressure, area, mild_sole_width(sole), depth);
+        rival_scale(&matched, row, pressure, area, sole, depth);
     }
     MildError why;
     status = mild_material_check(&matched, &why);

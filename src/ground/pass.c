@@ -12,7 +12,7 @@
 
 MILD_HD void slot_normal(const Slots *s, int i, double dt, const Motion *motion, int kind,
                          int curves, int stops) {
-    const Element element = slot_element(s, i);
+    const Element element = slot_loaded(s, i, curves);
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
     const Impulse normal = element_impulse(&element, curves, stops, dt, v.descent);
     s->iz[i] = normal.value;
@@ -45,9 +45,10 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
             foot_normal(s, end, dt, motion, 0, LAW_CONE, 0);
         }
         return;
+    case LAW_CONE | LAW_HEAP: foot_normal(s, end, dt, motion, 1, LAW_CONE | LAW_HEAP, 1); return;
     case LAW_POWER: foot_normal(s, end, dt, motion, 1, LAW_POWER, 0); return;
     case LAW_ELASTIC: foot_normal(s, end, dt, motion, 1, LAW_ELASTIC, 0); return;
-    default: foot_normal(s, end, dt, motion, SLOT_UNEVEN | SLOT_FACES, LAW_ALL, 1); return;
+    default: foot_normal(s, end, dt, motion, SLOT_UNEVEN | SLOT_FACES, LAW_ANY, 1); return;
     }
 }
 

@@ -10,38 +10,57 @@
 #include "ground/models.h"
 #include "ground/terrain.h"
 
+/* [-] Cosine between the sole and the ground under a slot. up: normal of the sole, world. */
+MILD_HD double slot_level(const Slots *s, int i, const double up[3]) {
+    const double gx = s->slope_x[i], gy = s->slope_y[i];
+    const double along = up[2] - gx * up[0] - gy * up[1];
+    return real_min(real_max(along / sqrt(1.0 + gx * gx + gy * gy), SHARE_LEAN), 1.0);
+}
+
 MILD_HD void slot_begin(const Slots *s, int i, double dt, double rate, const Motion *motion,
-                        int curves, int kind) {
+                        const double up[3], int curves, int kind) {
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
+    if (curves & LAW_HEAP) {
+        element.law.cone_begin = s->cone_begin[i];
+    }
     element_begin(&element, &memory, curves, dt, rate, v.descent);
+    if (curves & LAW_HEAP) {
+        Share share = slot_share(s, i);
+        element_share(&element, &memory, &share, curves, dt, rate, slot_level(s, i, up));
+        s->mu[i] = element.mu;
+        s->lean[i] = share.lean;
+        s->carry[i] = share.carry;
+    }
     slot_store(s, i, &element);
 }
 
 /* Calls element_begin for all slots. On level ground the slopes are 0. */
-MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *now, int curves,
+MILD_HD void slots_begin(const FootScratch *foot, double dt, const Motion *now, int curves,
                          int faces) {
-    const Slots local = *slot, *s = &local;
+    const Slots local = foot->slot, *s = &local;
     const Motion motion = *now;
     const double rate = 1.0 / dt;
+    const double side = foot->arm[3][2] < 0.0 ? -1.0 : 1.0; /* the face that looks down */
+    const double up[3] = {side * foot->arm[3][0], side * foot->arm[3][1], side * foot->arm[3][2]};
+    const int end = foot_end(foot);
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        slot_begin(s, i, dt, rate, &motion, curves, SLOT_UNEVEN | faces);
+        slot_begin(s, i, dt, rate, &motion, up, curves, SLOT_UNEVEN | faces);
     }
 }
 
 /* Picks the loop compiled for the curves of the ground under the foot. A line is a cone of which
  * all numbers but the line's are 0: one loop does for both. */
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
-    const Slots *s = &foot->slot;
-    const int end = foot_end(foot);
     switch (foot_variant(foot)) {
     case LAW_LINE:
-    case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 0); return;
-    case LAW_POWER: slots_begin(s, end, dt, now, LAW_POWER, 0); return;
-    case LAW_ELASTIC: slots_begin(s, end, dt, now, LAW_ELASTIC, 0); return;
-    default: slots_begin(s, end, dt, now, LAW_ALL, SLOT_FACES); return;
+    case LAW_CONE: slots_begin(foot, dt, now, LAW_CONE, 0); return;
+    case LAW_CONE | LAW_HEAP: slots_begin(foot, dt, now, LAW_CONE | LAW_HEAP, 0); return;
+    case LAW_POWER: slots_begin(foot, dt, now, LAW_POWER, 0); return;
+    case LAW_ELASTIC: slots_begin(foot, dt, now, LAW_ELASTIC, 0); return;
+    default: slots_begin(foot, dt, now, LAW_ANY, SLOT_FACES); return;
     }
 }
 
@@ -63,7 +82,7 @@ MILD_HD void slot_drag(const Slots *s, int i, double dt, const Motion *now, cons
                        int curves, int kind) {
     const double slower = slot_velocity(s, i, now, kind).descent;
     const double faster = slot_velocity(s, i, free, kind).descent;
-    Element element = slot_element(s, i);
+    Element element = slot_loaded(s, i, curves);
     element_drag(&element, curves, dt, real_max(faster - slower, 0.0));
     s->entry_speed[i] = element.entry_speed;
     s->stop_drag[i] = element.stop_drag;
@@ -94,9 +113,10 @@ static int slots_explicit(const FootScratch *foot, int materials, double dt, con
         if (!(s->depth[i] > 0.0) || s->middle[i] < s->depth_max[i]) {
             continue; /* above the ground or on the unloading line */
         }
-        const Element element = slot_element(s, i);
-        s->explicit_impulse[i] = element_explicit(
-            &element, dt, slot_velocity(s, i, free, SLOT_UNEVEN | foot->faces).descent);
+        const Element element = slot_loaded(s, i, foot->curves);
+        s->explicit_impulse[i] =
+            element_explicit_of(&element, foot->curves, dt,
+                                slot_velocity(s, i, free, SLOT_UNEVEN | foot->faces).descent);
     }
     return any;
 }
@@ -161,7 +181,7 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     foot->stops = slots_explicit(foot, terrain->material_count, input->dt, &free);
     if (slots_sink(&foot->slot, foot_end(foot), input->dt)) {
         if (foot_variant(foot) & ~LAW_CONE) {
-            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ALL, SLOT_FACES);
+            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ANY, SLOT_FACES);
         } else {
             slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_CONE, 0);
         }

@@ -3,6 +3,7 @@
 #define MILD_GROUND_SCRATCH_H
 
 #include "ground/slots.h"
+#include "ground/sole.h"
 #include "ground/state.h"
 
 #define TWIST_MAX (6 * MILD_FEET_MAX)
@@ -13,7 +14,8 @@
 typedef struct {
     MildMaterial material;
     Law law;
-    int curves; /* LawCurve bits of the law */
+    Share share; /* the material's numbers of it */
+    int curves;  /* LawCurve bits of the law */
     int known;  /* bool: the law has been derived */
     int nan;    /* bool: a number of the law or the material is NaN */
 } DerivedLaw;
@@ -30,6 +32,7 @@ typedef struct FootScratch {
     double center_x; /* [m] centroid in the foot frame */
     double center_y; /* [m] */
     double radius;   /* [m] distance from the ankle to the farthest element */
+    SoleHeap *heap;  /* [elements] merged cones */
 
     double middle[3]; /* [m] of the bounding box, foot frame */
     double half[3];   /* [m] half of its sides */
@@ -67,6 +70,7 @@ typedef struct FootScratch {
     int turned;             /* bool: turn_x or turn_y may be nonzero */
     int stops;              /* bool: stop_drag, stop_growth or explicit_impulse may be nonzero */
     int32_t *slot_material; /* [padded] material whose law the slot has, encoded as in Memory */
+    int32_t *slot_holder;   /* [padded] element whose law it has, for merged cones */
     DerivedLaw derived[MILD_MATERIALS_MAX];
     Slots own;  /* arrays that the scratch owns */
     Slots slot; /* arrays of this step: `own`, except that when all elements are listed x, y, depth
@@ -115,7 +119,7 @@ static inline int foot_end(const FootScratch *foot) {
 /* The curves of the compiled loop for a foot. The loop of all curves is also that of surfaces: it
  * counts with the heights of the elements, which are 0 in a plane sole. */
 static inline int foot_variant(const FootScratch *foot) {
-    return foot->faces ? LAW_ALL : law_variant(foot->curves);
+    return foot->faces ? LAW_ANY : law_variant(foot->curves);
 }
 
 /* The velocity field of a foot with the twist V. */

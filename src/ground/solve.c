@@ -17,7 +17,7 @@ static void foot_scatter(const MildScratch *scratch, int f) {
     const double rate = 1.0 / dt;
     for (int i = 0; i < foot->active; i++) {
         const int e = foot->element[i];
-        const Element element = slot_element(s, i);
+        const Element element = slot_loaded(s, i, foot->curves);
         const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
         const double beyond = element.depth + dt / 2 * v.descent - element.yield_depth;
         const int loaded = s->iz[i] > 0.0;
@@ -26,7 +26,7 @@ static void foot_scatter(const MildScratch *scratch, int f) {
         foot->tangent_x[e] = s->ix[i] * rate;
         foot->tangent_y[e] = s->iy[i] * rate;
         foot->flat[e] =
-            law_flat_share(&element.law, element.virgin_depth + (deeper ? beyond : 0.0));
+            law_flat_share(&element.law, foot->curves, element.virgin_depth + (deeper ? beyond : 0.0));
         foot->state[e] = (uint8_t)(!loaded  ? MILD_ELEMENT_FREE
                                    : deeper ? MILD_ELEMENT_VIRGIN
                                             : MILD_ELEMENT_UNLOADING);

@@ -125,8 +125,8 @@ static void plate_forces(const FitPlate *plate, const MildMaterial *raw, const F
         const double elastic = law_elastic_force(&law, curves, depth);
         double sum = law_force(&law, curves, depth) + elastic * (1 + law.elastic_damping * speed);
         if (curves & LAW_CONE) {
-            sum += law.drag_rate * law_flat_share(&law, depth) * speed * speed;
-            sum += law.mass_rate * law_recruited(&law, depth) * points[i].acceleration;
+            sum += law.drag_rate * law_flat_share(&law, curves, depth) * speed * speed;
+            sum += law.mass_rate * law_recruited(&law, curves, depth) * points[i].acceleration;
         }
         force[i] = plate->elements * sum;
     }
