@@ -56,7 +56,8 @@ MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, 
     e->entry_speed = real_max(speed, 0);
     e->added_mass = 0;
     if (curves & LAW_CONE) {
-        e->added_mass = real_max(e->law.mass_rate * law_recruited(&e->law, curves, e->yield_depth), 0);
+        e->added_mass =
+            real_max(e->law.mass_rate * law_recruited(&e->law, curves, e->yield_depth), 0);
     }
 
     e->drift_bound = dt * e->k_drift * memory->drift * real_max(e->depth, 0);
@@ -106,7 +107,8 @@ MILD_HD void element_drag(Element *e, int curves, Real dt, Real gain) {
 
     e->entry_speed = h;
     e->stop_drag = drags ? extra * (stop - REAL(0.5)) / (h + ELEMENT_TINY) : 0;
-    e->stop_growth = drags ? law_recruited(&e->law, curves, u0) - law_recruited(&e->law, curves, a) : 0;
+    e->stop_growth =
+        drags ? law_recruited(&e->law, curves, u0) - law_recruited(&e->law, curves, a) : 0;
 }
 
 /* Impulse of parameters that create energy (passive = false), which are negative added mass and

@@ -25,8 +25,7 @@ MildElementLaw mild_element_law(const MildMaterial *material, double pitch, doub
 }
 
 /* Sum over the elements of a level sole whose cones merge. */
-static MildElementLaw merged_law(const MildMaterial *material, const MildSole *sole,
-                                 double depth) {
+static MildElementLaw merged_law(const MildMaterial *material, const MildSole *sole, double depth) {
     const Law law = law_of(material, mild_sole_pitch(sole), mild_sole_width(sole));
     const int curves = curves_of(material, &law);
     MildElementLaw sum = {0};

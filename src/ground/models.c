@@ -51,7 +51,9 @@ Share share_of(const MildMaterial *material) {
     const int slips = row->slips && material->slip_length > 0.0;
     return (Share){.projects = row->merged,
                    .slip_rate = slips ? 1.0 / material->slip_length : 0.0,
-                   .regain_rate = row->merged || slips ? 1.0 / fmax(material->regain_length, REGAIN_LEAST) : 0.0,
+                   .regain_rate = row->merged || slips
+                                      ? 1.0 / fmax(material->regain_length, REGAIN_LEAST)
+                                      : 0.0,
                    .grip = slips ? material->grip : 0.0,
                    .mu = material->mu};
 }

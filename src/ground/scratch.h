@@ -16,8 +16,8 @@ typedef struct {
     Law law;
     Share share; /* the material's numbers of it */
     int curves;  /* LawCurve bits of the law */
-    int known;  /* bool: the law has been derived */
-    int nan;    /* bool: a number of the law or the material is NaN */
+    int known;   /* bool: the law has been derived */
+    int nan;     /* bool: a number of the law or the material is NaN */
 } DerivedLaw;
 
 typedef struct FootScratch {

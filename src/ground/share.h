@@ -21,10 +21,10 @@
 
 #include "ground/remember.h"
 
-#define SHARE_LEAN REAL(0.02)  /* [-] least cosine: a sole on its edge */
-#define SHARE_GRIP REAL(0.1)   /* [-] friction that an element at its yield load keeps */
-#define SHARE_FORGET REAL(40)  /* [-] da/u0 beyond which nothing is left */
-#define SHARE_WEAR REAL(1e6)   /* [-] most wear */
+#define SHARE_LEAN REAL(0.02) /* [-] least cosine: a sole on its edge */
+#define SHARE_GRIP REAL(0.1)  /* [-] friction that an element at its yield load keeps */
+#define SHARE_FORGET REAL(40) /* [-] da/u0 beyond which nothing is left */
+#define SHARE_WEAR REAL(1e6)  /* [-] most wear */
 
 /* What the share depends on. */
 typedef struct {
@@ -94,12 +94,13 @@ MILD_HD Real element_wear(const Element *e, const Share *share, const ElementMem
     const Real held_y = e->hold_y - e->hold_stiffness * vy;
     const Real bound = friction_bound(e, normal);
     const int slides = held_x * held_x + held_y * held_y >= bound * bound;
-    const int counts =
-        (slides && share->slip_rate > 0) || square > REMEMBER_BAND * REMEMBER_BAND;
+    const int counts = (slides && share->slip_rate > 0) || square > REMEMBER_BAND * REMEMBER_BAND;
     const Real slid = counts ? REAL_SQRT(square) : 0;
     const Real fresh = real_max(e->depth + dt / 2 * speed - e->yield_depth, 0);
     const Real worn = share_worn(e, share, slid, fresh);
     const Real lead = real_max(1 / (1 + worn) - share->carry, 0) * ELEMENT_ELASTIC;
+    /* The added mass grows with the lead; it keeps its momentum. P is concave. */
+    after->front_speed *= after->depth_max / (after->depth_max + lead + ELEMENT_TINY);
     after->depth_max = stays ? after->depth_max + lead : 0;
     after->drift = stays ? real_min(memory->drift + slid, REMEMBER_DRIFT) : 0;
     after->pending_x = stays && !counts ? x : 0;

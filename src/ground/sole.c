@@ -251,8 +251,9 @@ static int cells_choose(const MildSoleDef *def, const Raster *raster, Cell *cell
         double corner[2] = {raster->origin[0] + cell / raster->rows * def->pitch,
                             raster->origin[1] + cell % raster->rows * def->pitch};
         Cell *c = &cells[cell];
-        *c = (Cell){cell_coverage(def, corner, work), cell,
-                    outline_inside(def, corner[0] + 0.5 * def->pitch, corner[1] + 0.5 * def->pitch)};
+        *c =
+            (Cell){cell_coverage(def, corner, work), cell,
+                   outline_inside(def, corner[0] + 0.5 * def->pitch, corner[1] + 0.5 * def->pitch)};
         inside += c->inside;
     }
     qsort(cells, (size_t)total, sizeof *cells, cell_compare);

@@ -33,7 +33,8 @@ static int edges_near(const MildSoleDef *def, double x, double y, int *near, dou
     for (int i = 0; i < def->points; i++) {
         *nearest = fmin(*nearest, edge_distance(def, i, x, y));
     }
-    for (int i = 0; i < def->points; i++) { /* no point is further from the centre than 0.71 edges */
+    for (int i = 0; i < def->points;
+         i++) { /* no point is further from the centre than 0.71 edges */
         if (edge_distance(def, i, x, y) <= *nearest + 1.5 * def->pitch) {
             near[count++] = i;
         }

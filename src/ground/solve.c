@@ -25,8 +25,8 @@ static void foot_scatter(const MildScratch *scratch, int f) {
         foot->normal[e] = s->iz[i] * rate;
         foot->tangent_x[e] = s->ix[i] * rate;
         foot->tangent_y[e] = s->iy[i] * rate;
-        foot->flat[e] =
-            law_flat_share(&element.law, foot->curves, element.virgin_depth + (deeper ? beyond : 0.0));
+        foot->flat[e] = law_flat_share(&element.law, foot->curves,
+                                       element.virgin_depth + (deeper ? beyond : 0.0));
         foot->state[e] = (uint8_t)(!loaded  ? MILD_ELEMENT_FREE
                                    : deeper ? MILD_ELEMENT_VIRGIN
                                             : MILD_ELEMENT_UNLOADING);

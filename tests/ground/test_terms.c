@@ -492,7 +492,8 @@ static void test_drag(void **state) {
     element_drag(&e, LAW_CONE, 1e-3, 1e-3 * KIT_GRAVITY);
     assert_close("faster", e.entry_speed, sqrt(0.36 + 2 * KIT_GRAVITY * 0.003), 1e-12);
     assert_close("growth", e.stop_growth,
-                 law_recruited(&e.law, LAW_CONE, 0.005) - law_recruited(&e.law, LAW_CONE, 0.004), 1e-18);
+                 law_recruited(&e.law, LAW_CONE, 0.005) - law_recruited(&e.law, LAW_CONE, 0.004),
+                 1e-18);
     e.entry_speed = 0.6, e.depth = 0.0037; /* 0.4 mm to the front; half a step leads 0.3 mm on */
     element_drag(&e, LAW_CONE, 1e-3, 1e-3 * KIT_GRAVITY);
     assert_true(e.entry_speed == 0.6 && e.stop_drag == 0.0 && e.stop_growth == 0.0);
