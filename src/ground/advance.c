@@ -101,10 +101,10 @@ MILD_HD void slot_plane(const FootScratch *foot, double height, const Slots *s,
                        foot->point_z[e] - height;
 }
 
-/* Vector loop for a foot with all elements listed, on ground without imprints. heap: LAW_HEAP or
- * 0. Returns how many elements remember something. */
+/* Vector loop for a foot with all elements listed, on ground without imprints. Returns how
+ * many elements remember something. */
 MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material,
-                             int uneven, int heap) {
+                             int uneven) {
     const FootScratch foot = *a->foot;
     const Slots local = a->slot, *s = &local;
     const Memory own = *all, *memory = &own;
@@ -121,13 +121,8 @@ MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t 
         const Element element = slot_element(s, i);
         const ElementMemory before = slot_memory(s, i);
         const int stays = s->depth[i] + dt / 2 * v.descent > 0.0;
-        ElementMemory after =
+        const ElementMemory after =
             element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
-        if (heap) {
-            const Share share = slot_share(s, i);
-            memory->worn[i] = element_wear(&element, &share, &before, &after, dt, s->iz[i], v.x,
-                                           v.y, v.descent, stays);
-        }
         memory_store(memory, i, &after);
         if (uneven) {
             slot_plane(&foot, height, s, memory, i, i);
@@ -172,6 +167,16 @@ static int face_unlisted(const Advance *a, const Memory *memory, int e) {
     return buried;
 }
 
+/* [-] The wear of slot i after the step; adds to `after`. */
+static __attribute__((noinline)) double slot_wear(const Advance *a, int i,
+                                                  const ElementMemory *before, ElementMemory *after,
+                                                  const SlotVelocity *v, int stays) {
+    const Element element = slot_element(&a->slot, i);
+    const Share share = slot_share(&a->slot, i);
+    return element_wear(&element, &share, before, after, a->dt, a->slot.iz[i], v->x, v->y,
+                        v->descent, stays);
+}
+
 /* The general case: some elements are listed, the ground keeps imprints, or the foot is a surface.
  * Returns how many elements remember something. faces: SLOT_FACES or 0, a constant. */
 MILD_HD int foot_advance(const Advance *a, const Memory *memory, const int32_t *material,
@@ -201,9 +206,7 @@ MILD_HD int foot_advance(const Advance *a, const Memory *memory, const int32_t *
         ElementMemory after = element_remember(&element, &before, a->dt, 1.0 / a->dt, s->iz[i], v.x,
                                                v.y, v.descent, !lifted);
         if (foot->curves & LAW_HEAP) {
-            const Share share = slot_share(s, i);
-            memory->worn[e] = element_wear(&element, &share, &before, &after, a->dt, s->iz[i], v.x,
-                                           v.y, v.descent, !lifted);
+            memory->worn[e] = slot_wear(a, i, &before, &after, &v, !lifted);
         }
         memory_store(memory, e, &after);
         if (!lifted) {
@@ -252,19 +255,17 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                            .motion = foot_motion(foot, result->velocity + 6 * f),
                            .dt = input->dt,
                            .height = terrain->height};
-        const int all = foot->active == foot->elements && ground->tiles == 0 && !foot->faces;
-        if (all) {
+        const int listed = foot->active == foot->elements && ground->tiles == 0 && !foot->faces;
+        const int all = listed && !(foot->curves & LAW_HEAP);
+        if (listed) {
             /* The step may have been solved on a copy of this ground, whose memory the slots
              * hold. */
             slots_remember(&advance.slot, &memory);
         }
-        if (all && foot->curves & LAW_HEAP) {
-            ground->touched[f] =
-                foot_advance_all(&advance, &memory, foot->slot_material, foot->uneven, LAW_HEAP);
-        } else if (all && foot->uneven) {
-            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1, 0);
+        if (all && foot->uneven) {
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1);
         } else if (all) {
-            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0, 0);
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0);
         } else if (foot->faces) {
             ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material, SLOT_FACES);
         } else {

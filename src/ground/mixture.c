@@ -60,14 +60,14 @@ static void slot_set_law(const Slots *s, int i, const Law *law, const Share *sha
     s->regain_rate[i] = share->regain_rate;
     s->grip[i] = share->grip;
     s->whole_mu[i] = share->mu;
+    s->carry[i] = 1.0;
     s->exit_drag[i] = law_exit_drag(law);
     s->entry_drag[i] = law_entry_drag(law);
     s->strength[i] = law->line_stiffness;
     s->recovery[i] = law_recovery(law, recovery_of(material));
     s->mu[i] = material->mu;
-    /* Path costs support where it does not add resistance. */
-    s->k_drift[i] = share->slip_rate > 0.0 ? 0.0 : material->k_drift;
-    s->b_drift[i] = share->slip_rate > 0.0 ? 0.0 : material->b_drift;
+    s->k_drift[i] = material->k_drift;
+    s->b_drift[i] = material->b_drift;
 }
 
 static double between(double a, double b, double share) {
@@ -87,6 +87,11 @@ static Law element_law(const FootScratch *foot, const DerivedLaw *derived, int e
     const SoleHeap *heap = &foot->heap[e];
     return derived->share.projects > 0.0 ? law_merged(derived->law, heap->begin, heap->width)
                                          : derived->law;
+}
+
+/* A number of drift resistance: where path costs support it adds none. */
+static double drift_of(const DerivedLaw *derived, double number) {
+    return derived->share.slip_rate > 0.0 ? 0.0 : number;
 }
 
 /* Surfaces are projected when they touch down (faces.c). */
@@ -109,8 +114,8 @@ static void slot_set_mixture(const FootScratch *foot, int i, int e, int32_t mixt
     const Share share = foot_share(foot, share_between(&a->share, &b->share, t));
     const MildMaterial material = {
         .mu = between(m->mu, n->mu, t),
-        .k_drift = between(m->k_drift, n->k_drift, t),
-        .b_drift = between(m->b_drift, n->b_drift, t),
+        .k_drift = between(drift_of(a, m->k_drift), drift_of(b, n->k_drift), t),
+        .b_drift = between(drift_of(a, m->b_drift), drift_of(b, n->b_drift), t),
         .recovery = between(recovery_of(m), recovery_of(n), t),
     };
     slot_set_law(&foot->slot, i, &law, &share, &material);
@@ -121,7 +126,10 @@ static void slot_set_material(const FootScratch *foot, int i, int e, int m,
                               const MildMaterial *material) {
     const Law law = element_law(foot, &foot->derived[m], e);
     const Share share = foot_share(foot, foot->derived[m].share);
-    slot_set_law(&foot->slot, i, &law, &share, material);
+    MildMaterial own = *material;
+    own.k_drift = drift_of(&foot->derived[m], own.k_drift);
+    own.b_drift = drift_of(&foot->derived[m], own.b_drift);
+    slot_set_law(&foot->slot, i, &law, &share, &own);
 }
 
 void slots_pad(const FootScratch *foot) {

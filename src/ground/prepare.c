@@ -10,15 +10,8 @@
 #include "ground/models.h"
 #include "ground/terrain.h"
 
-/* [-] Cosine between the sole and the ground under a slot. up: normal of the sole, world. */
-MILD_HD double slot_level(const Slots *s, int i, const double up[3]) {
-    const double gx = s->slope_x[i], gy = s->slope_y[i];
-    const double along = up[2] - gx * up[0] - gy * up[1];
-    return real_min(real_max(along / sqrt(1.0 + gx * gx + gy * gy), SHARE_LEAN), 1.0);
-}
-
 MILD_HD void slot_begin(const Slots *s, int i, double dt, double rate, const Motion *motion,
-                        const double up[3], int curves, int kind) {
+                        int curves, int kind) {
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
@@ -26,13 +19,6 @@ MILD_HD void slot_begin(const Slots *s, int i, double dt, double rate, const Mot
         element.law.cone_begin = s->cone_begin[i];
     }
     element_begin(&element, &memory, curves, dt, rate, v.descent);
-    if (curves & LAW_HEAP) {
-        Share share = slot_share(s, i);
-        element_share(&element, &memory, &share, curves, dt, rate, slot_level(s, i, up));
-        s->mu[i] = element.mu;
-        s->lean[i] = share.lean;
-        s->carry[i] = share.carry;
-    }
     slot_store(s, i, &element);
 }
 
@@ -42,12 +28,10 @@ MILD_HD void slots_begin(const FootScratch *foot, double dt, const Motion *now, 
     const Slots local = foot->slot, *s = &local;
     const Motion motion = *now;
     const double rate = 1.0 / dt;
-    const double side = foot->arm[3][2] < 0.0 ? -1.0 : 1.0; /* the face that looks down */
-    const double up[3] = {side * foot->arm[3][0], side * foot->arm[3][1], side * foot->arm[3][2]};
     const int end = foot_end(foot);
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        slot_begin(s, i, dt, rate, &motion, up, curves, SLOT_UNEVEN | faces);
+        slot_begin(s, i, dt, rate, &motion, curves, SLOT_UNEVEN | faces);
     }
 }
 
@@ -61,6 +45,36 @@ static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     case LAW_POWER: slots_begin(foot, dt, now, LAW_POWER, 0); return;
     case LAW_ELASTIC: slots_begin(foot, dt, now, LAW_ELASTIC, 0); return;
     default: slots_begin(foot, dt, now, LAW_ANY, SLOT_FACES); return;
+    }
+}
+
+/* [-] Cosine between the sole and the ground under a slot. up: normal of the sole, world. */
+MILD_HD double slot_level(const Slots *s, int i, const double up[3]) {
+    const double gx = s->slope_x[i], gy = s->slope_y[i];
+    const double along = up[2] - gx * up[0] - gy * up[1];
+    return real_min(real_max(along / sqrt(1.0 + gx * gx + gy * gy), SHARE_LEAN), 1.0);
+}
+
+/* The share of its load that each slot carries, on ground with LAW_HEAP. */
+static void foot_share(const FootScratch *foot, double dt) {
+    const Slots local = foot->slot, *s = &local;
+    const double rate = 1.0 / dt;
+    const double side = foot->arm[3][2] < 0.0 ? -1.0 : 1.0; /* the face that looks down */
+    const double up[3] = {side * foot->arm[3][0], side * foot->arm[3][1], side * foot->arm[3][2]};
+    const int end = foot_end(foot);
+#pragma omp simd
+    for (int i = 0; i < end; i++) {
+        const ElementMemory memory = slot_memory(s, i);
+        Element element = slot_element(s, i);
+        Share share = slot_share(s, i);
+        element_share(&element, &memory, &share, dt, rate, slot_level(s, i, up));
+        s->mu[i] = element.mu;
+        s->lean[i] = share.lean;
+        s->carry[i] = share.carry;
+        s->zero_depth[i] = element.zero_depth;
+        s->hold_x[i] = element.hold_x;
+        s->hold_y[i] = element.hold_y;
+        s->hold_stiffness[i] = element.hold_stiffness;
     }
 }
 
@@ -175,6 +189,9 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     }
     Motion free = foot_motion(foot, input->free_velocity + 6 * f);
     foot_begin(foot, input->dt, &now);
+    if (foot->curves & LAW_HEAP) {
+        foot_share(foot, input->dt);
+    }
     if (foot->stops) {
         slots_clear(foot);
     }

@@ -38,21 +38,29 @@ typedef struct {
     Real carry;       /* [-] q */
 } Share;
 
-/* Sets lean and carry, and with them the unloading line and friction, after element_begin. level:
- * cosine between sole and ground. */
-MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, int curves,
-                           Real dt, Real rate, Real level) {
+/* Sets lean and carry, and with them the unloading line and friction, after element_begin: the
+ * line says the whole force at the yield depth. level: cosine between sole and ground. */
+MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, Real dt,
+                           Real rate, Real level) {
     const Real a = e->yield_depth;
+    const Real k = e->unload_stiffness;
     const Real c = 1 - share->projects * (1 - level);
     const Real q = real_min(1 / (1 + share->worn), c);
-    const Real force = q * law_bedless_force(&e->law, curves, a) + law_bed_force(&e->law, a);
-    const Real slack = a - force / (e->unload_stiffness + ELEMENT_TINY);
-    e->zero_depth = q < 1 ? slack : e->zero_depth;
+    const Real bed = law_bed_force(&e->law, a);
+    const Real force = q * (k * (a - e->zero_depth) - bed) + bed;
+    const Real grips = real_max(4 * share->grip * (1 - q / c), SHARE_GRIP);
+    const Real mu = share->grip > 0 ? real_min(share->mu, grips) : share->mu;
+    const int changes = q < 1 || mu != e->mu;
     share->lean = c;
     share->carry = q;
-    const Real grips = real_max(4 * share->grip * (1 - q / c), SHARE_GRIP);
-    e->mu = share->grip > 0 ? real_min(share->mu, grips) : share->mu;
-    friction_hold(e, memory, dt, rate, force + law_elastic_force(&e->law, curves, e->middle));
+    Element held = *e;
+    held.mu = mu;
+    friction_hold(&held, memory, dt, rate, force);
+    e->zero_depth = q < 1 ? a - force / (k + ELEMENT_TINY) : e->zero_depth;
+    e->hold_x = changes ? held.hold_x : e->hold_x;
+    e->hold_y = changes ? held.hold_y : e->hold_y;
+    e->hold_stiffness = changes ? held.hold_stiffness : e->hold_stiffness;
+    e->mu = mu;
 }
 
 /* Virgin ground as the element feels it. Called wherever an element with LAW_HEAP is loaded for

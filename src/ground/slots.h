@@ -59,7 +59,7 @@ typedef struct {
     double *grip;        /* [-] */
     double *whole_mu;    /* [-] Share.mu, of which `mu` is what is left in this step */
 
-    /* Share of this step: slots_begin; only with LAW_HEAP. */
+    /* Share of this step: foot_share; without LAW_HEAP carry is 1. */
     double *lean;  /* [-] */
     double *carry; /* [-] */
 

@@ -303,7 +303,11 @@ MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
             sole = sole_from_cells(def, &outline, &raster, cells, chosen);
         }
         if (sole) {
-            sole_edges(sole, def, outline.area, outline.low, outline.high, (int *)work);
+            const EdgeBox box = {
+                outline.area, {outline.low[0], outline.low[1]}, {outline.high[0], outline.high[1]}};
+            double *x = sole->values;
+            sole_edges(def, &box, chosen, x, x + chosen, x + SOLE_EDGE * chosen,
+                       x + SOLE_SPREAD * chosen, (int *)work);
         }
     }
     free(cells);
@@ -373,4 +377,22 @@ const double *mild_sole_y(const MildSole *sole) {
 
 double mild_sole_z(const MildSole *sole) {
     return sole->z;
+}
+
+SoleHeap sole_heap(const MildSole *sole, int element) {
+    if (sole->faces) {
+        return (SoleHeap){0.0, 1.0};
+    }
+    const int n = sole->elements;
+    const double radius = sole->pitch / sqrt(3.14159265358979323846);
+    const double edge = sole->values[SOLE_EDGE * n + element] / radius;
+    const double spread = sole->values[SOLE_SPREAD * n + element] / radius;
+    /* The flat share (1 - t)^2 says that distances from `begin` on have the density 2 (1 - t): the
+     * mean is a third of the width, the variance an 18th of its square. */
+    const double width = fmax(fmin(sqrt(18.0) * spread, 3.0 * edge), 1e-6);
+    return (SoleHeap){fmax(edge - width / 3.0, 0.0), width};
+}
+
+const double *mild_sole_edge(const MildSole *sole) {
+    return sole->faces ? NULL : sole->values + (size_t)SOLE_EDGE * (size_t)sole->elements;
 }

@@ -42,8 +42,9 @@ static int edges_near(const MildSoleDef *def, double x, double y, int *near, dou
     return count;
 }
 
-/* Mean and standard deviation over a cell, by points; 0 outside the outline. The distance changes by the way itself, so
- * the part of a cell that a point stands for has the variance of its own edge. */
+/* Mean and standard deviation over a cell, by points; 0 outside the outline. The distance changes
+ * by the way itself, so the part of a cell that a point stands for has the variance of its own
+ * edge. */
 static void cell_edge(const MildSoleDef *def, double x, double y, int *near, double *mean,
                       double *spread) {
     const double part = def->pitch / EDGE_SAMPLES;
@@ -70,50 +71,31 @@ static void cell_edge(const MildSoleDef *def, double x, double y, int *near, dou
 
 /* [m] Mean over the outline, by cells of the sole's raster, in which the point (x, y) is a
  * centre. */
-static double outline_mean(const MildSoleDef *def, double area, const double *low,
-                           const double *high, double x, double y, int *work) {
+static double outline_mean(const MildSoleDef *def, const EdgeBox *box, double x, double y,
+                           int *work) {
     const double pitch = def->pitch;
     double sum = 0.0, mean, spread;
-    for (double cx = x - ceil((x - low[0]) / pitch) * pitch; cx < high[0] + pitch; cx += pitch) {
-        for (double cy = y - ceil((y - low[1]) / pitch) * pitch; cy < high[1] + pitch;
+    for (double cx = x - ceil((x - box->low[0]) / pitch) * pitch; cx < box->high[0] + pitch;
+         cx += pitch) {
+        for (double cy = y - ceil((y - box->low[1]) / pitch) * pitch; cy < box->high[1] + pitch;
              cy += pitch) {
             cell_edge(def, cx, cy, work, &mean, &spread);
             sum += mean * pitch * pitch;
         }
     }
-    return sum / area;
+    return sum / box->area;
 }
 
-void sole_edges(MildSole *sole, const MildSoleDef *def, double area, const double *low,
-                const double *high, int *work) {
-    const int n = sole->elements;
-    double *x = sole->values, *y = x + n, *edge = x + SOLE_EDGE * n, *spread = x + SOLE_SPREAD * n;
+void sole_edges(const MildSoleDef *def, const EdgeBox *box, int n, const double *x, const double *y,
+                double *edge, double *spread, int *work) {
     double sum = 0.0;
     for (int i = 0; i < n; i++) {
         cell_edge(def, x[i], y[i], work, &edge[i], &spread[i]);
         sum += edge[i] / n;
     }
-    const double scale = outline_mean(def, area, low, high, x[0], y[0], work) / sum;
+    const double scale = outline_mean(def, box, x[0], y[0], work) / sum;
     for (int i = 0; i < n && isfinite(scale); i++) {
         edge[i] *= scale;
         spread[i] *= scale;
     }
-}
-
-SoleHeap sole_heap(const MildSole *sole, int element) {
-    if (sole->faces) {
-        return (SoleHeap){0.0, 1.0};
-    }
-    const int n = sole->elements;
-    const double radius = sole->pitch / sqrt(3.14159265358979323846);
-    const double edge = sole->values[SOLE_EDGE * n + element] / radius;
-    const double spread = sole->values[SOLE_SPREAD * n + element] / radius;
-    /* The flat share (1 - t)^2 says that distances from `begin` on have the density 2 (1 - t): the
-     * mean is a third of the width, the variance an 18th of its square. */
-    const double width = fmax(fmin(sqrt(18.0) * spread, 3.0 * edge), 1e-6);
-    return (SoleHeap){fmax(edge - width / 3.0, 0.0), width};
-}
-
-const double *mild_sole_edge(const MildSole *sole) {
-    return sole->faces ? NULL : sole->values + (size_t)SOLE_EDGE * (size_t)sole->elements;
 }
