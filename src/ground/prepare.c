@@ -62,12 +62,14 @@ static void foot_share(const FootScratch *foot, double dt) {
     const double side = foot->arm[3][2] < 0.0 ? -1.0 : 1.0; /* the face that looks down */
     const double up[3] = {side * foot->arm[3][0], side * foot->arm[3][1], side * foot->arm[3][2]};
     const int end = foot_end(foot);
+    const int curves = foot->curves & LAW_ELASTIC;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
         const ElementMemory memory = slot_memory(s, i);
         Element element = slot_element(s, i);
         Share share = slot_share(s, i);
-        element_share(&element, &memory, &share, dt, rate, slot_level(s, i, up));
+        const double elastic = law_elastic_force(&element.law, curves, element.middle);
+        element_share(&element, &memory, &share, elastic, dt, rate, slot_level(s, i, up));
         s->mu[i] = element.mu;
         s->lean[i] = share.lean;
         s->carry[i] = share.carry;

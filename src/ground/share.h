@@ -39,9 +39,10 @@ typedef struct {
 } Share;
 
 /* Sets lean and carry, and with them the unloading line and friction, after element_begin: the
- * line says the whole force at the yield depth. level: cosine between sole and ground. */
-MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, Real dt,
-                           Real rate, Real level) {
+ * line says the whole force at the yield depth. elastic: [N] force of ground without memory. level:
+ * cosine between sole and ground. */
+MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, Real elastic,
+                           Real dt, Real rate, Real level) {
     const Real a = e->yield_depth;
     const Real k = e->unload_stiffness;
     const Real c = 1 - share->projects * (1 - level);
@@ -55,7 +56,7 @@ MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share
     share->carry = q;
     Element held = *e;
     held.mu = mu;
-    friction_hold(&held, memory, dt, rate, force);
+    friction_hold(&held, memory, dt, rate, force + elastic);
     e->zero_depth = q < 1 ? a - force / (k + ELEMENT_TINY) : e->zero_depth;
     e->hold_x = changes ? held.hold_x : e->hold_x;
     e->hold_y = changes ? held.hold_y : e->hold_y;
