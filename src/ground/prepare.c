@@ -55,14 +55,14 @@ MILD_HD double slot_level(const Slots *s, int i, const double up[3]) {
     return real_min(real_max(along / sqrt(1.0 + gx * gx + gy * gy), SHARE_LEAN), 1.0);
 }
 
-/* The share of its load that each slot carries, on ground with LAW_HEAP. */
-static void foot_share(const FootScratch *foot, double dt) {
+/* The share of its load that each slot carries, on ground with LAW_HEAP. curves: LAW_ELASTIC or
+ * 0. */
+MILD_HD void foot_share(const FootScratch *foot, double dt, int curves) {
     const Slots local = foot->slot, *s = &local;
     const double rate = 1.0 / dt;
     const double side = foot->arm[3][2] < 0.0 ? -1.0 : 1.0; /* the face that looks down */
     const double up[3] = {side * foot->arm[3][0], side * foot->arm[3][1], side * foot->arm[3][2]};
     const int end = foot_end(foot);
-    const int curves = foot->curves & LAW_ELASTIC;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
         const ElementMemory memory = slot_memory(s, i);
@@ -191,8 +191,10 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     }
     Motion free = foot_motion(foot, input->free_velocity + 6 * f);
     foot_begin(foot, input->dt, &now);
-    if (foot->curves & LAW_HEAP) {
-        foot_share(foot, input->dt);
+    if (foot->curves & LAW_HEAP && foot->curves & LAW_ELASTIC) {
+        foot_share(foot, input->dt, LAW_ELASTIC);
+    } else if (foot->curves & LAW_HEAP) {
+        foot_share(foot, input->dt, 0);
     }
     if (foot->stops) {
         slots_clear(foot);

@@ -293,8 +293,8 @@ static void plates(void **state) {
     static const char *const grounds[] = {"foam45", "clay", "sandy_loam"};
     for (size_t g = 0; g < sizeof grounds / sizeof *grounds; g++) {
         FitDef truth = plate(grounds[g]);
-        truth.plate[0] = (FitPlate){40, 0.0195, 0.1};
-        truth.plate[1] = (FitPlate){160, 0.0195, 0.2};
+        truth.plate[0] = (FitPlate){40, 0.0195, 0.1, NULL};
+        truth.plate[1] = (FitPlate){160, 0.0195, 0.2, NULL};
         truth.plates = 2;
         for (int i = 0; i < 2 * ROWS; i++) {
             points[i] =
