@@ -244,6 +244,7 @@ static void models(void **state) {
         {MILD_MODEL_ECC_QUASI_3D, "zeta "},
         {MILD_MODEL_BEKKER, "k_c k_phi exponent "},
         {MILD_MODEL_HUNT_CROSSLEY, "k_pen exponent dissipation "},
+        {MILD_MODEL_MILD_MERGED, "k_pen sigma_cone alpha nu c_g c_d phi rho "},
         {MILD_MODEL_RIGID, ""},
     };
     (void)state;
