@@ -6,52 +6,48 @@
 
 #include <math.h>
 
+static MildElementLaw law_at(const Law *law, int curves, double depth) {
+    const double elastic = law_elastic_force(law, curves, depth);
+    return (MildElementLaw){
+        .force = law_force(law, curves, depth) + elastic,
+        .stiffness = law_slope(law, curves, depth) + law_elastic_slope(law, curves, depth),
+        .damping = law->elastic_damping * elastic,
+        .added_mass = law->mass_rate * law_recruited(law, curves, depth),
+        .added_mass_per_depth = law->mass_rate * law_flat_share(law, curves, depth),
+    };
+}
+
 static MildElementLaw element_law(const MildMaterial *material, double pitch, double width,
                                   double depth) {
     const Law law = law_of(material, pitch, width);
-    const int curves = law_curves(&law);
-    const double elastic = law_elastic_force(&law, curves, depth);
-    return (MildElementLaw){
-        .force = law_force(&law, curves, depth) + elastic,
-        .stiffness = law_slope(&law, curves, depth) + law_elastic_slope(&law, curves, depth),
-        .damping = law.elastic_damping * elastic,
-        .added_mass = law.mass_rate * law_recruited(&law, curves, depth),
-        .added_mass_per_depth = law.mass_rate * law_flat_share(&law, curves, depth),
-    };
+    return law_at(&law, law_curves(&law), depth);
 }
 
 MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth) {
     return element_law(material, pitch, pitch, depth);
 }
 
-/* Sum over the elements of a level sole whose cones merge. */
-static MildElementLaw merged_law(const MildMaterial *material, const MildSole *sole, double depth) {
-    const Law law = law_of(material, mild_sole_pitch(sole), mild_sole_width(sole));
-    const int curves = curves_of(material, &law);
-    MildElementLaw sum = {0};
-    for (int i = 0; i < mild_sole_elements(sole); i++) {
-        const SoleHeap heap = sole_heap(sole, i);
-        const Law own = law_merged(law, heap.begin, heap.width);
-        sum.force += law_force(&own, curves, depth);
-        sum.stiffness += law_slope(&own, curves, depth);
-        sum.added_mass += law.mass_rate * law_recruited(&own, curves, depth);
-        sum.added_mass_per_depth += law.mass_rate * law_flat_share(&own, curves, depth);
-    }
-    return sum;
+/* Adds `count` elements to a sum. */
+static void law_add(MildElementLaw *sum, double count, const MildElementLaw *one) {
+    sum->force += count * one->force;
+    sum->stiffness += count * one->stiffness;
+    sum->damping += count * one->damping;
+    sum->added_mass += count * one->added_mass;
+    sum->added_mass_per_depth += count * one->added_mass_per_depth;
 }
 
 MildElementLaw mild_sole_law(const MildMaterial *material, const MildSole *sole, double depth) {
-    if (model_row(material->model)->merged) {
-        return merged_law(material, sole, depth);
+    const Law law = law_of(material, mild_sole_pitch(sole), mild_sole_width(sole));
+    const int merged = model_row(material->model)->merged;
+    const int elements = mild_sole_elements(sole);
+    MildElementLaw sum = {0};
+    for (int i = 0; i < (merged ? elements : 1); i++) {
+        const SoleHeap heap = merged ? sole_heap(sole, i) : (SoleHeap){0.0, 1.0};
+        const Law own = merged ? law_merged(law, heap.begin, heap.width) : law;
+        const MildElementLaw one = law_at(&own, curves_of(material, &law), depth);
+        law_add(&sum, merged ? 1.0 : elements, &one);
     }
-    const double elements = mild_sole_elements(sole);
-    const MildElementLaw one =
-        element_law(material, mild_sole_pitch(sole), mild_sole_width(sole), depth);
-    return (MildElementLaw){.force = elements * one.force,
-                            .stiffness = elements * one.stiffness,
-                            .damping = elements * one.damping,
-                            .added_mass = elements * one.added_mass,
-                            .added_mass_per_depth = elements * one.added_mass_per_depth};
+    return sum;
 }
 
 static double sole_force(const MildSole *sole, const MildMaterial *material, double depth) {

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ground/begin.h"
+#include "ground/carry.h"
 #include "ground/faces.h"
 #include "ground/gather.h"
 #include "ground/locate.h"
@@ -45,38 +46,6 @@ static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     case LAW_POWER: slots_begin(foot, dt, now, LAW_POWER, 0); return;
     case LAW_ELASTIC: slots_begin(foot, dt, now, LAW_ELASTIC, 0); return;
     default: slots_begin(foot, dt, now, LAW_ANY, SLOT_FACES); return;
-    }
-}
-
-/* [-] Cosine between the sole and the ground under a slot. up: normal of the sole, world. */
-MILD_HD double slot_level(const Slots *s, int i, const double up[3]) {
-    const double gx = s->slope_x[i], gy = s->slope_y[i];
-    const double along = up[2] - gx * up[0] - gy * up[1];
-    return real_min(real_max(along / sqrt(1.0 + gx * gx + gy * gy), SHARE_LEAN), 1.0);
-}
-
-/* The share of its load that each slot carries, on ground with LAW_HEAP. curves: LAW_ELASTIC or
- * 0. */
-MILD_HD void foot_share(const FootScratch *foot, double dt, int curves) {
-    const Slots local = foot->slot, *s = &local;
-    const double rate = 1.0 / dt;
-    const double side = foot->arm[3][2] < 0.0 ? -1.0 : 1.0; /* the face that looks down */
-    const double up[3] = {side * foot->arm[3][0], side * foot->arm[3][1], side * foot->arm[3][2]};
-    const int end = foot_end(foot);
-#pragma omp simd
-    for (int i = 0; i < end; i++) {
-        const ElementMemory memory = slot_memory(s, i);
-        Element element = slot_element(s, i);
-        Share share = slot_share(s, i);
-        const double elastic = law_elastic_force(&element.law, curves, element.middle);
-        element_share(&element, &memory, &share, elastic, dt, rate, slot_level(s, i, up));
-        s->mu[i] = element.mu;
-        s->lean[i] = share.lean;
-        s->carry[i] = share.carry;
-        s->zero_depth[i] = element.zero_depth;
-        s->hold_x[i] = element.hold_x;
-        s->hold_y[i] = element.hold_y;
-        s->hold_stiffness[i] = element.hold_stiffness;
     }
 }
 
@@ -123,7 +92,8 @@ static int slots_explicit(const FootScratch *foot, int materials, double dt, con
     const Slots *s = &foot->slot;
     int any = 0;
     for (int m = 0; m < materials; m++) {
-        any |= foot->derived[m].law.mass_rate < 0.0 || foot->derived[m].law.drag_rate < 0.0;
+        any |=
+            foot->derived[m].slot.law.mass_rate < 0.0 || foot->derived[m].slot.law.drag_rate < 0.0;
     }
     for (int i = 0; any && i < foot->active; i++) {
         if (!(s->depth[i] > 0.0) || s->middle[i] < s->depth_max[i]) {
@@ -191,10 +161,8 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     }
     Motion free = foot_motion(foot, input->free_velocity + 6 * f);
     foot_begin(foot, input->dt, &now);
-    if (foot->curves & LAW_HEAP && foot->curves & LAW_ELASTIC) {
-        foot_share(foot, input->dt, LAW_ELASTIC);
-    } else if (foot->curves & LAW_HEAP) {
-        foot_share(foot, input->dt, 0);
+    if (foot->curves & LAW_HEAP) {
+        foot_carry(foot, input->dt);
     }
     if (foot->stops) {
         slots_clear(foot);

@@ -10,14 +10,22 @@
 #define ROW_LANES (TWIST_MAX + 8) /* numbers of a row of the equations: newton_step.h */
 #define PADDING_DEPTH (-1e3)      /* [m] depth of the padding, which never touches the ground */
 
+/* What a material gives a slot. */
+typedef struct {
+    Law law;
+    Share share;     /* the material's numbers of it, with its friction */
+    double k_drift;  /* [N/m^2] 0 where path costs support */
+    double b_drift;  /* [N s/m] */
+    double recovery; /* [-] */
+} SlotLaw;
+
 /* Law of a material as last derived. It is valid while the material's bytes stay the same. */
 typedef struct {
     MildMaterial material;
-    Law law;
-    Share share; /* the material's numbers of it */
-    int curves;  /* LawCurve bits of the law */
-    int known;   /* bool: the law has been derived */
-    int nan;     /* bool: a number of the law or the material is NaN */
+    SlotLaw slot;
+    int curves; /* LawCurve bits of the law */
+    int known;  /* bool: the law has been derived */
+    int nan;    /* bool: a number of the law or the material is NaN */
 } DerivedLaw;
 
 typedef struct FootScratch {

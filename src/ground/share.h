@@ -85,7 +85,7 @@ MILD_HD Real share_worn(const Element *e, const Share *share, Real slid, Real fr
     const Real worn = real_max(share->worn, inverse - 1) + slid * share->slip_rate * inverse;
     const Real relative = share->lean * (1 + worn) - 1; /* 1/lambda - 1, lambda = q/c */
     const Real spent = real_min(fresh * share->regain_rate, SHARE_FORGET);
-    const Real left = real_exp2(REAL(-1.4426950408889634074) * spent); /* 1/ln 2 */
+    const Real left = spent > 0 ? real_exp2(REAL(-1.4426950408889634074) * spent) : 1; /* 1/ln 2 */
     const Real kept = relative * left / (1 + relative * (1 - left));
     const Real grown = (1 + kept) * inverse - 1;
     return real_min(share_grows(e, share) ? grown : worn, SHARE_WEAR);
