@@ -454,7 +454,7 @@ int web_move(const float *action, const float command[3]) {
             solve_ground();
             take_feet();
         }
-        env_part(&web.all, &web.call, 0, k, 0, web.env_scratch);
+        env_part(&web.all, &web.call, 0, k, 0, 0, web.env_scratch);
     }
     const TaskStep step = task_end_step(env, &web.task.task, &web.task.robot, &web.robot->reading,
                                         env->torque, web.robot->diverged);

@@ -36,7 +36,7 @@ static MildStatus pack_model(const Robot *robot, const TaskDef *task, WebModel *
         file->shape = task_shape(robot);
         file->gravity = -robot->model->opt.gravity[2];
         memcpy(file->task, task, sizeof file->task);
-        status = task_gains(task, robot, file->gains.kp, file->gains.kd, error);
+        status = task_gains(task, robot, &file->gains, error);
     }
     for (int f = 0; status == MILD_OK && f < robot->def.feet; f++) {
         const RobotFootDef *foot = &robot->def.foot[f];

@@ -10,8 +10,8 @@ modulation does not learn), ours. Grounds: rigid, ecc_spring, mild (randomize.mo
 --steps N trains to N policy steps instead, for all but ht2, into another folder. HT-2 imitates policies/paper/rigid-1 first, within its time.
 They are judged on nine grounds at four speeds, nine transitions at 0.6 and 1.2 m/s, and grounds that none of them met.
 
-One tuning budget: before that each controller is trained on rigid ground, seed 1, a quarter of the time, with each of the four choices of
-SEARCH (KL target that leads the learning rate, weight of the entropy); the one with the greatest skill on rigid ground and rubber is taken
+One tuning budget: before that each controller is trained on `mild`, seed 1, a quarter of the time, with each of the four choices of
+SEARCH (KL target that leads the learning rate, weight of the entropy); the one with the greatest skill on nine grounds is taken
 for all of its trainings. Skill: mean over cells of upright share times 1 - |speed error| / speed, not below 0.
 
 FOLDER/results.jsonl gets a line when a training ends and one when it is judged; started again, the command goes on from there, also after
@@ -203,7 +203,7 @@ class Factorial:
         """{part: cells}"""
         who = who_of(task["controller"], self.policy_of(task), self.given.config.resolve())
         if task["kind"] == "tune":
-            return {"tuning": walked(who, ["rigid", "rubber"], SPEEDS, self.given.trials)}
+            return {"tuning": walked(who, NINE, SPEEDS, self.given.trials)}
         return judged(who, self.given.trials)
 
     # ---- many ----
@@ -275,7 +275,7 @@ class Factorial:
 
 
 def tuning(name, i):
-    return {"kind": "tune", "controller": name, "ground": "rigid", "seed": 1, "choice": i}
+    return {"kind": "tune", "controller": name, "ground": "mild", "seed": 1, "choice": i}
 
 
 # ---- what came out ----

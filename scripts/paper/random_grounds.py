@@ -3,7 +3,7 @@
 configs/default.ini has for it.
 
   scripts/paper/random_grounds.py --out out/random                               # 60 grounds, three speeds, two trials: 360 trials
-  scripts/paper/random_grounds.py --out out/random --seed 2 -- --task.shells_stand=1
+  scripts/paper/random_grounds.py --out out/random --seed 2 -- --task.shells_stand=false
 
 Prints how many trials stay upright at each speed, and the grounds on which some do not; OUT/random_grounds.csv has a row for each ground
 and speed. Options after -- go to every `mild eval`."""
@@ -36,6 +36,17 @@ def options(ground):
     return [f"--ground.{key}={value:.6g}" for key, value in ground.items()]
 
 
+def judge(who, speeds, trials, seed=1, jobs=1, count=60):
+    """(grounds, [rows of mild eval of each]). who: options of mild eval that say who walks."""
+    limits, chance = ranges(), random.Random(seed)
+    grounds = [draw(limits, chance) for _ in range(count)]
+
+    def walk(number):
+        return json.loads(mild("eval", "--ground", "foam45", *options(grounds[number]), f"--speed={speeds}", "--trials", trials,
+                               "--seed", number + 1, "--threads", 1, "--json", "-", *who))["rows"]
+
+    return grounds, together(SimpleNamespace(jobs=jobs), walk, range(count))
+
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -48,18 +59,11 @@ def main():
     parser.add_argument("options", nargs="*", help="after --: of mild eval")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
-    limits, chance = ranges(), random.Random(given.seed)
-    grounds = [draw(limits, chance) for _ in range(given.grounds)]
-
-    def walk(number):
-        rows = json.loads(mild("eval", "--ground", "foam45", *options(grounds[number]), f"--speed={given.speeds}", "--trials", given.trials,
-                               "--seed", number + 1, "--threads", 1, "--json", "-", *given.options))["rows"]
-        return [{"ground": number, "speed": row["speed"], "upright": row["success"], "trials": row["trials"], "velocity": row["velocity"],
-                 "cot": row["cot"], "torque_max": row["torque_max"], "shells": row["shells"],
-                 "ends": " ".join(f"{end}:{n}" for end, n in row["ends"].items() if n and end != "time"),
-                 **{key: float(f"{value:.6g}") for key, value in grounds[number].items()}} for row in rows]
-
-    rows = [row for found in together(SimpleNamespace(jobs=given.jobs), walk, range(given.grounds)) for row in found]
+    grounds, found = judge(given.options, given.speeds, given.trials, given.seed, given.jobs, given.grounds)
+    rows = [{"ground": number, "speed": row["speed"], "upright": row["success"], "trials": row["trials"], "velocity": row["velocity"],
+             "cot": row["cot"], "torque_max": row["torque_max"], "shells": row["shells"],
+             "ends": " ".join(f"{end}:{n}" for end, n in row["ends"].items() if n and end != "time"),
+             **{key: float(f"{value:.6g}") for key, value in grounds[number].items()}} for number, own in enumerate(found) for row in own]
     save(given, "random_grounds", rows)
     for speed in sorted({row["speed"] for row in rows}):
         own = [row for row in rows if row["speed"] == speed]

@@ -97,7 +97,7 @@ static void read_sole(Body *body, int f) {
     }
 }
 
-Body *body_create(const Robot *robot, const BodyDef *def, double torque_share, MildError *error) {
+Body *body_create(const Robot *robot, const BodyDef *def, const double *limit, MildError *error) {
     if (!is_biped(robot)) {
         mild_fail(error, MILD_ERROR_ARGUMENT,
                   "controller passivity: robot %s is no biped with six joints a leg; give another "
@@ -119,7 +119,7 @@ Body *body_create(const Robot *robot, const BodyDef *def, double torque_share, M
     int count[WALK_FEET] = {0};
     for (int i = 0; i < robot_joints(robot); i++) {
         const int f = robot_joint_foot(robot)[i];
-        body->limit[i] = torque_share * robot_effort(robot)[i];
+        body->limit[i] = limit[i];
         body->joint[f][count[f]] = i;
         body->dof[f][count[f]++] = robot_joint_dof(robot)[i];
     }

@@ -36,9 +36,9 @@ typedef struct {
 typedef struct Body Body;
 
 BodyDef body_def_default(void);
-/* torque_share: [-] of the joints' efforts. Refuses robots other than bipeds with six joints a leg.
+/* limit: [joints] [N m] torque limits. Refuses robots other than bipeds with six joints a leg.
  * Borrows the robot. */
-Body *body_create(const Robot *robot, const BodyDef *def, double torque_share, MildError *error);
+Body *body_create(const Robot *robot, const BodyDef *def, const double *limit, MildError *error);
 void body_destroy(Body *body); /* may be NULL */
 
 /* Computes what depends on the state of `sim` alone. Overwrites the mass matrix and the bias force

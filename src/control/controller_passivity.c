@@ -64,7 +64,12 @@ static void passivity_destroy(void *self) {
 
 MildStatus controller_make_passivity(const ControllerDef *def, Controller *controller,
                                      MildError *error) {
-    const BodyDef gains = body_def_default();
+    const BodyDef body = body_def_default();
+    TaskGains gains;
+    MildStatus status = task_gains(def->task, def->robot, &gains, error);
+    if (status != MILD_OK) {
+        return status;
+    }
     Passivity *passivity =
         calloc(1, sizeof *passivity + (size_t)def->rows_max * sizeof *passivity->row);
     if (!passivity) {
@@ -74,7 +79,7 @@ MildStatus controller_make_passivity(const ControllerDef *def, Controller *contr
     passivity->joints = robot_joints(def->robot);
     passivity->rows = def->rows_max;
     for (int i = 0; i < def->rows_max; i++) {
-        passivity->row[i].body = body_create(def->robot, &gains, def->task->torque_share, error);
+        passivity->row[i].body = body_create(def->robot, &body, gains.limit, error);
         if (!passivity->row[i].body) {
             passivity_destroy(passivity);
             return error->status;

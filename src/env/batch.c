@@ -6,6 +6,7 @@
 
 #include "device/device.h"
 #include "env/kernels.h"
+#include "ground/batch/bodies_batch.h"
 #include "robot/engine/read.h"
 
 _Static_assert(ENVS_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fills");
@@ -19,8 +20,9 @@ typedef struct {
     Envs base;
     EnvsArrays arrays; /* their memory is the device's */
     MildBatch *ground;
-    DeviceFork *fork; /* streams of all shares but the first, on a GPU; else NULL */
-    int shares;       /* of the robots */
+    BatchBodies bodies; /* with shells that stand; all 0: none */
+    DeviceFork *fork;   /* streams of all shares but the first, on a GPU; else NULL */
+    int shares;         /* of the robots */
     TaskShape shape;
     size_t labels;              /* of the map, 1 without */
     const EnvsKernels *kernels; /* NULL: on the host */
@@ -29,8 +31,9 @@ typedef struct {
     void *trials;               /* where those of trials are */
     Pool *pool;                 /* of the host */
     int device;
-    size_t robot; /* [B] of EnvRobot */
-    size_t bytes; /* of the device, without the ground */
+    size_t robot;  /* [B] of EnvRobot */
+    size_t shells; /* [B] of EnvShells */
+    size_t bytes;  /* of the device, without the ground */
 } Batch;
 
 static Batch *own(Envs *envs) {
@@ -59,7 +62,6 @@ static MildStatus check_def(const EnvsDef *def, MildError *error) {
     const char *missing = patches               ? "randomize.patch_share above 0"
                           : task->imprint_tiles ? "terrain.memory"
                           : !task->newton       ? "task.newton = 0"
-                          : task->shells_stand  ? "task.shells_stand"
                           : task->motors        ? "task.actuator"
                           : def->trial && task->map && mild_map_label_count(task->map) > 1
                               ? "terrain.patches"
@@ -93,10 +95,15 @@ static MildStatus open_ground(Batch *b, const EnvsDef *def, const TaskGrounds *g
     MildStatus status = b->ground
                             ? mild_batch_set_materials(b->ground, materials, grounds->count, error)
                             : MILD_ERROR_ARGUMENT;
-    free(materials);
     if (status == MILD_OK && def->task->map) {
         status = mild_batch_set_map(b->ground, def->task->map, error);
     }
+    const int bodies = robot_bodies(def->robot) - batch.feet;
+    if (status == MILD_OK && bodies > 0) {
+        status = batch_bodies_open(&b->bodies, b->ground, batch.soles, bodies, def->task->map,
+                                   materials, grounds->count, error);
+    }
+    free(materials);
     return status;
 }
 
@@ -117,8 +124,10 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
     const EnvsBytes of = b->kernels ? b->kernels->bytes(task, shape) : envs_host_bytes(task, shape);
     const size_t envs = (size_t)all->envs;
     const size_t feet = (size_t)shape->feet, rows = envs * feet;
+    const size_t shells = b->bodies.setup ? envs : 0;
     all->stride = of.stride;
     b->robot = of.robot;
+    b->shells = of.shells;
     const struct {
         void *at; /* pointer to the array's pointer */
         size_t bytes;
@@ -130,6 +139,9 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
                   {&all->rigid, envs},
                   {&all->order, envs * sizeof *all->order},
                   {&all->tally, TALLY_NUMBERS * sizeof *all->tally},
+                  {&all->shells.robot, shells * b->shells},
+                  {&all->shells.near, shells},
+                  {&all->shells.held, shells},
                   {&contact->position, 3 * rows * sizeof(float)},
                   {&contact->rotation, 9 * rows * sizeof(float)},
                   {&contact->velocity, 6 * rows * sizeof(float)},
@@ -147,6 +159,9 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
         memcpy(arrays[i].at, &at, sizeof at);
         at += (arrays[i].bytes + 255) / 256 * 256;
     }
+    all->shells.setup = b->bodies.setup;
+    all->shells.memory = b->bodies.memory;
+    all->shells.numbers = b->bodies.numbers;
     return b->block ? MILD_OK : MILD_ERROR_MEMORY;
 }
 
@@ -200,7 +215,7 @@ static MildStatus copy_task(Batch *b, const EnvsDef *def, const TaskGrounds *gro
         task.uneven = !mild_map_is_level(def->task->map);
     }
     task.robot = *robot_table(def->robot);
-    MildStatus status = task_gains(def->task, def->robot, task.gains.kp, task.gains.kd, error);
+    MildStatus status = task_gains(def->task, def->robot, &task.gains, error);
     EnvsTask *at = status == MILD_OK ? take(b, sizeof *at, error) : NULL;
     b->arrays.task = at;
     return at ? device_copy(b->device, at, &task, sizeof task, error) : MILD_ERROR_MEMORY;
@@ -221,7 +236,7 @@ static MildStatus choose_kernels(Batch *b, const Robot *robot, const EngineTree 
         return MILD_OK;
     }
     b->kernels = kernels_for(tree);
-    return b->kernels ? checked(b->kernels->open(), error)
+    return b->kernels ? checked(b->kernels->open(b->device), error)
                       : mild_fail(error, MILD_ERROR_ARGUMENT,
                                   "%s: this build has no kernels for a robot of its size; "
                                   "train.robots = mujoco steps it",
@@ -284,6 +299,7 @@ static MildStatus open_batch(Batch *b, const EnvsDef *def, const TaskGrounds *gr
     b->pool = def->pool;
     b->labels = (size_t)labels_of(def->task);
     b->arrays.envs = def->count;
+    b->arrays.device = def->device;
     MildStatus status = open_ground(b, def, grounds, error);
     status = status == MILD_OK ? open_shares(b, error) : status;
     status = status == MILD_OK ? copy_model(b, def, error) : status;
@@ -302,6 +318,7 @@ static void destroy(Envs *envs) {
     device_free(b->device, b->trials);
     device_free(b->device, (void *)all->task);
     device_free(b->device, (void *)all->model);
+    batch_bodies_close(&b->bodies, b->device);
     mild_batch_destroy(b->ground);
     device_fork_destroy(b->fork);
     free(b);
@@ -310,10 +327,12 @@ static void destroy(Envs *envs) {
 static EnvsMemory memory(const Envs *envs) {
     const Batch *b = own_const(envs);
     const size_t task = b->arrays.stride, engine = b->robot;
+    const size_t shells = b->bodies.numbers * sizeof *b->bodies.memory;
+    const size_t all = b->bytes + b->bodies.bytes;
     return (EnvsMemory){.task = task,
                         .engine = engine,
-                        .ground = mild_batch_robot_bytes(b->ground),
-                        .rest = b->bytes / (size_t)b->arrays.envs - task - engine};
+                        .ground = mild_batch_robot_bytes(b->ground) + shells,
+                        .rest = all / (size_t)b->arrays.envs - task - engine};
 }
 
 /* ---- shares ---- */
@@ -374,6 +393,12 @@ static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
     all.reset += first;
     all.rigid += first;
     all.order += first;
+    if (all.shells.setup) {
+        all.shells.robot += first * b->shells;
+        all.shells.memory += first * all.shells.numbers;
+        all.shells.near += first;
+        all.shells.held += first;
+    }
     all.contact = contact_from(&all.contact, first, (size_t)b->shape.feet);
     all.trial = all.trial ? all.trial + first : NULL;
     all.command = all.command ? all.command + 3 * first : NULL;
@@ -385,10 +410,16 @@ static Share share_of(const Batch *b, const EnvsStep *step, int i, void *stream)
     const long envs = b->arrays.envs;
     const long first = envs * i / b->shares, end = envs * (i + 1) / b->shares;
     const int count = (int)(end - first);
-    return (Share){.arrays = arrays_from(b, (size_t)first, count),
+    Share share = {.arrays = arrays_from(b, (size_t)first, count),
                    .step = step_from(step, &b->shape, (size_t)first),
                    .ground = batch_share(b->ground, (int)first, count),
                    .stream = i > 0 && b->fork ? device_fork_stream(b->fork, i - 1) : stream};
+    if (share.arrays.shells.setup) {
+        share.arrays.shells.shape = share.ground.shape;
+        share.arrays.shells.ground = share.ground.arrays;
+        share.ground.arrays.skip = share.arrays.shells.near;
+    }
+    return share;
 }
 
 /* ---- steps on the CPU ---- */
@@ -414,6 +445,12 @@ static void part_piece(void *context, int piece, int thread) {
 static void command_piece(void *context, int piece, int thread) {
     (void)thread;
     envs_host_set_command(((const Call *)context)->arrays, piece);
+}
+
+static void shells_piece(void *context, int piece, int thread) {
+    const Call *call = context;
+    (void)thread;
+    envs_host_shells(call->arrays, call->part, piece);
 }
 
 static void end_piece(void *context, int piece, int thread) {
@@ -447,13 +484,28 @@ static MildStatus step_ground(Share *share, MildError *error) {
     return mild_batch_step(&share->ground, &input, &output, 1, share->stream, error);
 }
 
+/* The same under robots with shells near it, after part k. */
+static MildStatus step_shells(const Batch *b, const Share *share, int k, MildError *error) {
+    const EnvsArrays *all = &share->arrays;
+    Call call = {all, &share->step, k};
+    if (!all->shells.setup) {
+        return MILD_OK;
+    }
+    if (b->kernels) {
+        return checked(b->kernels->shells(all, k, share->stream), error);
+    }
+    pool_run(b->pool, all->envs, shells_piece, &call);
+    return MILD_OK;
+}
+
 /* The physics steps of a policy step: parts with the ground between them. Then the task. */
 static MildStatus step_share(const Batch *b, Share *share, MildError *error) {
     const EnvsArrays *all = &share->arrays;
     Call call = {&share->arrays, &share->step, 0};
     MildStatus status = MILD_OK;
     for (call.part = 0; status == MILD_OK && call.part <= b->base.physics_steps; call.part++) {
-        status = call.part > 0 ? step_ground(share, error) : MILD_OK;
+        status = call.part > 0 ? step_shells(b, share, call.part - 1, error) : MILD_OK;
+        status = status == MILD_OK && call.part > 0 ? step_ground(share, error) : status;
         if (status == MILD_OK && b->kernels) {
             status = checked(b->kernels->part(all, &share->step, call.part, share->stream), error);
         } else if (status == MILD_OK) {

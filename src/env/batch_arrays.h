@@ -58,10 +58,22 @@ typedef struct {
     float *position, *rotation, *velocity, *inverse_inertia, *free_velocity, *height;
     MildBatchFoot *foot; /* of which depth_mean is the engine's on rigid ground */
 } EnvsContact;
+/* Bodies with shells that stand on soft ground (ground/batch/bodies.h). */
+typedef struct {
+    const void *setup; /* BodiesSetup; NULL: there are none */
+    char *robot;       /* [envs] EnvShells of batch_env.h */
+    float *memory;     /* [envs][numbers] of the ground */
+    size_t numbers;
+    uint8_t *near;      /* [envs] a bit for each body that is near the ground in this step */
+    uint8_t *held;      /* [envs] bool: the memory is not all 0 */
+    BatchShape shape;   /* of the feet's ground */
+    BatchArrays ground; /* the feet's */
+} EnvsShells;
 #define ENVS_FAR 1000 /* [m] below a robot on rigid ground: the soft one does not touch it */
 
 typedef struct {
     int envs;
+    int device;             /* MILD_BATCH_HOST or number of the GPU */
     size_t stride;          /* [B] of a TaskEnv and its frames */
     char *env;              /* [envs][stride] */
     char *robot;            /* [envs] EnvRobot of batch_env.h */
@@ -73,6 +85,7 @@ typedef struct {
     TaskProgress *progress; /* [envs] or NULL, in envs_save_progress and envs_load_progress */
     double *tally;          /* [TALLY_NUMBERS] sums over the environments */
     EnvsContact contact;
+    EnvsShells shells;
     const EnvsTrial *trial; /* [envs] or NULL */
     double *command;        /* [envs][3] of the trials */
     EnvsSample *sample;     /* [envs][physics steps] or NULL */

@@ -4,6 +4,7 @@
 #define MILD_REAL_FLOAT
 #include <cuda_runtime.h>
 
+#include "device/cuda.h"
 #include "env/batch_step.h"
 #include "env/kernels.h"
 
@@ -18,6 +19,7 @@ enum {
     TASK_THREADS = 128,
     TASK_ROBOTS = TASK_THREADS / TASK_LANES, /* of a block */
     TASK_BLOCKS = 8,                         /* blocks of a multiprocessor, at least */
+    SHELLS_ROBOTS = 8,
     TALLY_THREADS = 256,
     ORDER_THREADS = 1024
 };
@@ -41,14 +43,28 @@ static int lanes_blocks(int envs) {
     return (envs + TASK_ROBOTS - 1) / TASK_ROBOTS;
 }
 
-template <int SAMPLED>
+template <int SAMPLED, int SHELLS>
 static __global__ void __launch_bounds__(WARP_THREADS, ENVS_BLOCKS)
     part(const __grid_constant__ EnvsArrays all, const __grid_constant__ EnvsStep call, int k) {
     extern __shared__ __align__(16) Real shared[];
     const long place = warp_robot();
     if (place < all.envs) {
-        env_part(&all, &call, all.order[place], k, SAMPLED,
+        env_part(&all, &call, all.order[place], k, SAMPLED, SHELLS,
                  (EnvWork *)shared + threadIdx.x / LANES);
+    }
+}
+
+/* A warp looks at SHELLS_ROBOTS robots: few of them have shells near the ground. */
+static __global__ void __launch_bounds__(LANES)
+    shells(const __grid_constant__ EnvsArrays all, int k) {
+    extern __shared__ __align__(16) Real shared[];
+    const long own = blockIdx.x + (long)(threadIdx.x % SHELLS_ROBOTS) * gridDim.x;
+    const int there = threadIdx.x < SHELLS_ROBOTS && own < all.envs;
+    unsigned todo = __ballot_sync(0xffffffffu, there && env_shells_wait(&all, own));
+    while (todo) {
+        const int next = __ffs((int)todo) - 1;
+        env_shells(&all, blockIdx.x + (long)next * gridDim.x, k, (EnvShellsWork *)shared);
+        todo &= todo - 1;
     }
 }
 
@@ -164,7 +180,7 @@ static const char *launched(void) {
 }
 
 static EnvsBytes kernels_bytes(const TaskDef *def, const TaskShape *shape) {
-    const EnvsBytes bytes = {env_stride(def, shape), sizeof(EnvRobot)};
+    const EnvsBytes bytes = {env_stride(def, shape), sizeof(EnvRobot), sizeof(EnvShells)};
     return bytes;
 }
 
@@ -174,37 +190,53 @@ static int kernels_fits(const EngineTree *tree) {
                              tree->chain == ENGINE_CHAIN);
 }
 
-static const char *kernels_open(void) {
-    cudaFuncSetAttribute(part<0>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)work_bytes);
-    cudaFuncSetAttribute(pose, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)work_bytes);
-    cudaFuncSetAttribute(part<1>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)work_bytes);
+static const char *kernels_open(int device) {
+    OnDevice on(device);
+    const cudaFuncAttribute most = cudaFuncAttributeMaxDynamicSharedMemorySize;
+    cudaFuncSetAttribute(part<0, 0>, most, (int)work_bytes);
+    cudaFuncSetAttribute(part<1, 0>, most, (int)work_bytes);
+    cudaFuncSetAttribute(part<0, 1>, most, (int)work_bytes);
+    cudaFuncSetAttribute(part<1, 1>, most, (int)work_bytes);
+    cudaFuncSetAttribute(pose, most, (int)work_bytes);
+    cudaFuncSetAttribute(shells, most, (int)sizeof(EnvShellsWork));
     return launched();
 }
 
 static const char *kernels_create(const EnvsArrays *all, void *stream) {
+    OnDevice on(all->device);
     create<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
 static const char *kernels_begin(const EnvsArrays *all, void *stream) {
+    OnDevice on(all->device);
     begin<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
 static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int k, void *stream) {
-    (all->sample
-         ? part<1>
-         : part<0>)<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, (cudaStream_t)stream>>>(
-        *all, *call, k);
+    OnDevice on(all->device);
+    const auto run = all->shells.setup ? (all->sample ? part<1, 1> : part<0, 1>)
+                                       : (all->sample ? part<1, 0> : part<0, 0>);
+    run<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, (cudaStream_t)stream>>>(*all, *call, k);
+    return launched();
+}
+
+static const char *kernels_shells(const EnvsArrays *all, int k, void *stream) {
+    OnDevice on(all->device);
+    const int blocks = (all->envs + SHELLS_ROBOTS - 1) / SHELLS_ROBOTS;
+    shells<<<blocks, LANES, sizeof(EnvShellsWork), (cudaStream_t)stream>>>(*all, k);
     return launched();
 }
 
 static const char *kernels_end(const EnvsArrays *all, const EnvsStep *call, void *stream) {
+    OnDevice on(all->device);
     end<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     return launched();
 }
 
 static const char *kernels_first(const EnvsArrays *all, const EnvsStep *call, void *stream) {
+    OnDevice on(all->device);
     pose<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, (cudaStream_t)stream>>>(*all);
     observe<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     arrange<<<1, ORDER_THREADS, 0, (cudaStream_t)stream>>>(*all);
@@ -212,24 +244,27 @@ static const char *kernels_first(const EnvsArrays *all, const EnvsStep *call, vo
 }
 
 static const char *kernels_move_progress(const EnvsArrays *all, int back, void *stream) {
+    OnDevice on(all->device);
     move_progress<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
     return launched();
 }
 
 static const char *kernels_set_command(const EnvsArrays *all, void *stream) {
+    OnDevice on(all->device);
     set_command<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
 static const char *kernels_tally(const EnvsArrays *all, void *stream) {
+    OnDevice on(all->device);
     tally<<<TALLY_NUMBERS, TALLY_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
 extern "C" {
 extern const EnvsKernels ENVS_KERNELS;
-const EnvsKernels ENVS_KERNELS = {ENGINE_FIXED,          kernels_fits,        kernels_open,
-                                  kernels_bytes,         kernels_create,      kernels_begin,
-                                  kernels_first,         kernels_part,        kernels_end,
-                                  kernels_move_progress, kernels_set_command, kernels_tally};
+const EnvsKernels ENVS_KERNELS = {
+    ENGINE_FIXED,          kernels_fits,        kernels_open, kernels_bytes,  kernels_create,
+    kernels_begin,         kernels_first,       kernels_part, kernels_shells, kernels_end,
+    kernels_move_progress, kernels_set_command, kernels_tally};
 }

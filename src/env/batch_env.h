@@ -10,6 +10,7 @@
 #include "env/batch_arrays.h"
 #include "robot/engine/data.h"
 #include "robot/engine/saved.h"
+#include "robot/engine/shells.h"
 
 /* Of one environment besides its TaskEnv. */
 typedef struct {
@@ -20,6 +21,12 @@ typedef struct {
     Real tally[TALLY_KEPT];
     int diverged; /* bool: in this policy step */
 } EnvRobot;
+
+/* Besides, where shells stand. */
+typedef struct {
+    alignas(16) EngineSavedLinks links; /* of a robot with shells near the ground */
+    Real load;                          /* [N] on the shells, vertical, in the last step */
+} EnvShells;
 
 /* What a warp has in shared memory. */
 typedef struct {
@@ -39,6 +46,10 @@ MILD_HD TaskEnv *env_at(const EnvsArrays *all, long robot) {
 
 MILD_HD EnvRobot *env_robot_at(const EnvsArrays *all, long robot) {
     return (EnvRobot *)(void *)all->robot + robot;
+}
+
+MILD_HD EnvShells *env_shells_at(const EnvsArrays *all, long robot) {
+    return (EnvShells *)(void *)all->shells.robot + robot;
 }
 
 MILD_HD int env_physics_steps(const EnvsTask *task) {

@@ -5,7 +5,7 @@
 #include "env/kernels.h"
 
 EnvsBytes envs_host_bytes(const TaskDef *def, const TaskShape *shape) {
-    return (EnvsBytes){env_stride(def, shape), sizeof(EnvRobot)};
+    return (EnvsBytes){env_stride(def, shape), sizeof(EnvRobot), sizeof(EnvShells)};
 }
 
 void envs_host_create(const EnvsArrays *all, long robot) {
@@ -24,7 +24,13 @@ void envs_host_first(const EnvsArrays *all, const EnvsStep *call, long robot) {
 
 void envs_host_part(const EnvsArrays *all, const EnvsStep *call, int k, long robot) {
     EnvWork scratch;
-    env_part(all, call, robot, k, all->sample != NULL, &scratch);
+    env_part(all, call, robot, k, all->sample != NULL, all->shells.setup != NULL, &scratch);
+}
+
+void envs_host_shells(const EnvsArrays *all, int k, long robot) {
+    EnvShellsWork work;
+    work.engine.count = work.ground.count = 0; /* gcc does not see that a lane sets them */
+    env_shells(all, robot, k, &work);
 }
 
 void envs_host_set_command(const EnvsArrays *all, long robot) {

@@ -24,8 +24,9 @@ MILD_HD void env_set_command(const EnvsArrays *all, long robot) {
 }
 
 /* Torques of physics step k, which begins, and the state after step k - 1, which env_measure has
- * just seen. */
-WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, const EnvWork *scratch) {
+ * just seen. shells: bool, a constant: they stand. */
+WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, int shells,
+                               const EnvWork *scratch) {
     const EngineTree *tree = &all->model->tree;
     const EngineWork *work = &scratch->work;
     const RobotReading *reading = &env_robot_at(all, robot)->reading;
@@ -66,7 +67,7 @@ WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, const E
             }
             done->above = (double)reading->above;
             done->legs = (double)legs;
-            done->shell_load = 0;
+            done->shell_load = shells ? (double)env_shells_at(all, robot)->load : 0;
             done->valid = 1;
         }
     }

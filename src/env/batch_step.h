@@ -2,7 +2,8 @@
  * for a GPU by batch_device.cu, for any robot or for one size alone.
  *
  *     env_part(0)      a warp: action, and the first physics step up to the ground
- *     mild_batch_step    the ground
+ *     env_shells(0)    a warp: the ground under robots with shells near it, where shells stand
+ *     mild_batch_step    the ground under the others
  *     env_part(1)      a warp: the rest of that physics step, the next one up to the ground
  *     ...
  *     env_part(steps)  a warp: the rest of the last physics step, what the task asks of the pose
@@ -17,6 +18,7 @@
 
 #include "env/batch_env.h"
 #include "env/batch_sample.h"
+#include "env/batch_shells.h"
 #include "env/task/step.h"
 #include "robot/engine/measure.h"
 #include "robot/engine/step.h"
@@ -394,13 +396,16 @@ WARP_FN void env_start_step(const EnvsArrays *all, long robot, int k, int steps,
     engine_begin(model, k < steps ? &action : NULL, &scratch->work);
 }
 
-/* sampled: bool, a constant: with the samples of an evaluation. */
+/* Bools and constants: sampled: with the samples of an evaluation; shells: they stand. */
 WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, int k, int sampled,
-                      EnvWork *scratch) {
+                      int shells, EnvWork *scratch) {
     TaskEnv *env = env_at(all, robot);
     EnvRobot *own = env_robot_at(all, robot);
     const EngineTree *tree = &all->model->tree;
     const int steps = env_physics_steps(all->task);
+    if (shells) {
+        env_shells_away(all, robot);
+    }
     if (k == 0) {
         env_act(all, call, robot, env);
         env_load(all->model, env, scratch);
@@ -429,6 +434,10 @@ WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, i
         }
         if (!env->variation.rigid) {
             env_export(all, robot, &scratch->work);
+            if (shells) {
+                const EngineGround ground = env_surface(all, robot);
+                env_shells_near(all, robot, &ground, &scratch->work);
+            }
         }
     } else {
         env_store(all->model, scratch, env);
@@ -436,7 +445,7 @@ WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, i
         env_measure(all, robot, 1, scratch);
     }
     if (sampled) {
-        env_record_sample(all, robot, k, scratch);
+        env_record_sample(all, robot, k, shells, scratch);
     }
 }
 

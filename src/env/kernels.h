@@ -13,6 +13,7 @@
 typedef struct {
     size_t stride;
     size_t robot;
+    size_t shells;
 } EnvsBytes;
 EnvsBytes envs_host_bytes(const TaskDef *def, const TaskShape *shape);
 /* From what engine_model_read fills. */
@@ -24,6 +25,8 @@ void envs_host_create(const EnvsArrays *all, long robot);
 void envs_host_begin(const EnvsArrays *all, long robot);
 /* Part k of a policy step, and what follows the last one up to the next episode. */
 void envs_host_part(const EnvsArrays *all, const EnvsStep *call, int k, long robot);
+/* After part k, where shells stand: the ground under a robot with shells near it. */
+void envs_host_shells(const EnvsArrays *all, int k, long robot);
 void envs_host_end(const EnvsArrays *all, const EnvsStep *call, long robot);
 /* Pose of a new episode, and the observation. */
 void envs_host_first(const EnvsArrays *all, const EnvsStep *call, long robot);
@@ -41,12 +44,13 @@ void envs_host_tally(const EnvsArrays *all);
 typedef struct {
     int fixed;                           /* bool: for robots of one size */
     int (*fits)(const EngineTree *tree); /* bool: for such a robot */
-    const char *(*open)(void);           /* before all that follow; waits */
+    const char *(*open)(int device);     /* before all that follow; waits */
     EnvsBytes (*bytes)(const TaskDef *def, const TaskShape *shape);
     const char *(*create)(const EnvsArrays *all, void *stream);
     const char *(*begin)(const EnvsArrays *all, void *stream);
     const char *(*first)(const EnvsArrays *all, const EnvsStep *call, void *stream);
     const char *(*part)(const EnvsArrays *all, const EnvsStep *call, int k, void *stream);
+    const char *(*shells)(const EnvsArrays *all, int k, void *stream);
     const char *(*end)(const EnvsArrays *all, const EnvsStep *call, void *stream);
     const char *(*move_progress)(const EnvsArrays *all, int back, void *stream);
     const char *(*set_command)(const EnvsArrays *all, void *stream);

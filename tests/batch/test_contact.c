@@ -2,7 +2,7 @@
  * text in double and in float, of one, two and four feet, on level ground and on maps. */
 #include "base/float.h"
 #include "batch_kit.h"
-#include "contact_case.h"
+#include "case_law.h"
 #include "ground/begin.h"
 #include "ground/grid.h"
 #include "ground/map_kit.h"
@@ -30,20 +30,6 @@ static int close_soles(void **state) {
         mild_sole_destroy(all[i]);
     }
     return 0;
-}
-
-static void case_law(CaseMaterial *c, const MildMaterial *m, const MildSole *sole) {
-    const Law law = law_of(m, mild_sole_pitch(sole), mild_sole_width(sole));
-    memcpy(c->law, &law, sizeof c->law);
-    c->curves = law_curves(&law) | model_row(m->model)->motion;
-    c->recovery = law_recovery(&law, recovery_of(m));
-    c->mu = m->mu;
-    c->k_drift = m->k_drift;
-    c->b_drift = m->b_drift;
-    c->exit_drag = law_exit_drag(&law);
-    c->entry_drag = law_entry_drag(&law);
-    c->cohesion = m->cohesion;
-    c->shear_length = m->shear_length;
 }
 
 static void case_memory(ContactCase *c, const MildGround *ground, int into) {

@@ -109,7 +109,7 @@ static void the_robot_is_the_papers(void **unused) {
     (void)unused;
     MildError error = {0};
     const double kp[6] = {50, 50, 70, 70, 20, 20}, kd[6] = {5, 5, 7, 7, 0.2, 0.2};
-    double own_kp[ROBOT_JOINTS_MAX], own_kd[ROBOT_JOINTS_MAX];
+    TaskGains own;
     ExperimentDef def = read_paper();
     Robot *robot = robot_create(SA01, &error);
     assert_non_null(robot);
@@ -119,10 +119,10 @@ static void the_robot_is_the_papers(void **unused) {
         assert_true(mild_sole_pitch(robot_rasters(robot)[f]) == 0.0195);
     }
     assert_int_equal(elements, 154);
-    assert_int_equal(task_gains(&def.task, robot, own_kp, own_kd, &error), MILD_OK);
+    assert_int_equal(task_gains(&def.task, robot, &own, &error), MILD_OK);
     assert_int_equal(robot_joints(robot), 12);
     for (int i = 0; i < 12; i++) {
-        assert_true(own_kp[i] == kp[i % 6] && own_kd[i] == kd[i % 6]);
+        assert_true(own.kp[i] == kp[i % 6] && own.kd[i] == kd[i % 6]);
     }
     robot_destroy(robot);
 }

@@ -83,7 +83,7 @@ static void torques_give_the_planned_motion(void **unused) {
         BodyDef def = body_def_default();
         def.stance_damping = def.stance_turn_damping = def.turn_damping = 0;
         def.still_turn_damping = def.turn_stiffness = 0;
-        Body *body = body_create(robot, &def, 1, &error);
+        Body *body = body_create(robot, &def, robot_effort(robot), &error);
         RobotSim *sim = robot_sim_create(robot, 0.001, &error);
         assert_non_null(body);
         assert_non_null(sim);
@@ -143,7 +143,7 @@ static void moving_soles_are_damped(void **unused) {
     for (int damped = 0; damped < 2; damped++) {
         def.stance_damping = damped ? 50 : 0;
         def.stance_turn_damping = damped ? 2 : 0;
-        Body *body = body_create(robot, &def, 1, &error);
+        Body *body = body_create(robot, &def, robot_effort(robot), &error);
         WalkTarget target = {.stands = {1, 1}, .share = {1, 1}, .swing = -1};
         robot_sim_load(sim, &start, &nominal);
         body_measure(body, sim, 0.24, &state);
@@ -174,7 +174,7 @@ static void base_is_turned_back(void **unused) {
     (void)unused;
     MildError error = {0};
     BodyDef def = body_def_default();
-    Body *body = body_create(robot, &def, 1, &error);
+    Body *body = body_create(robot, &def, robot_effort(robot), &error);
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
     RobotVariation nominal = robot_variation_nominal();
     for (int axis = 0; axis < 3; axis++) {

@@ -62,6 +62,7 @@ static void pair_open(const char *robot, const TaskDef *def, int device) {
     assert_non_null(pair.robot);
     pair.shape = task_shape(pair.robot);
     robot_set_model(pair.robot, (MildModel)def->randomize.model);
+    robot_set_shells(pair.robot, def->shells_stand);
     pair.pool = pool_create(2);
     pair.grounds = task_grounds_create(def, pair.robot, GROUNDS, 7, pair.pool, &error);
     assert_non_null(pair.grounds);

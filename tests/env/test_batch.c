@@ -5,9 +5,9 @@
 #include "device/device.h"
 #include "mild/batch.h"
 
-static int has_device(void) {
+static int has_device(int device) {
     MildError error;
-    return device_open(0, &error) == MILD_OK;
+    return device_open(device, &error) == MILD_OK;
 }
 
 static void follows_mujoco(void **unused) {
@@ -86,7 +86,7 @@ static void one_diverges(void **unused) {
 
 static void device_follows_mujoco(void **unused) {
     (void)unused;
-    if (!has_device()) {
+    if (!has_device(0)) {
         skip();
     }
     const MildMapDef map = some_map();
@@ -98,6 +98,15 @@ static void device_follows_mujoco(void **unused) {
     follow(SA01, model_def(MILD_MODEL_ECC_QUASI), 0, NULL, 0.85);
     follow(SA01, model_def(MILD_MODEL_ECC_QUASI_3D), 0, &map, 0.6);
     follow(SA01, model_def(MILD_MODEL_BEKKER), 0, NULL, 0.85);
+}
+
+/* Whatever device is the caller's current one. */
+static void second_device_follows_mujoco(void **unused) {
+    (void)unused;
+    if (!has_device(1)) {
+        skip();
+    }
+    follow(SA01, some_def(), 1, NULL, 0.85);
 }
 
 /* The sample of a physics step above the map. */
@@ -211,6 +220,7 @@ int main(void) {
         cmocka_unit_test(one_diverges),
         cmocka_unit_test(go1_follows_mujoco),
         cmocka_unit_test(device_follows_mujoco),
+        cmocka_unit_test(second_device_follows_mujoco),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

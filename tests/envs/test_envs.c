@@ -8,8 +8,10 @@
 
 enum { ENVS = 5, STEPS = 100 };
 
-static const char *const keys[] = {"train.envs=5", "train.threads=2", "train.seed=7",
-                                   "terrain.kind=waves", "train.robots=mujoco"};
+static const char *const keys[] = {
+    "train.envs=5",       "train.threads=2",         "train.seed=7",
+    "terrain.kind=waves", "task.shells_stand=false", "task.crossing_limit=0",
+    "train.robots=mujoco"};
 enum { KEYS = sizeof keys / sizeof *keys };
 
 /* Rows of all arrays. */

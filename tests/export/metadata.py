@@ -27,12 +27,12 @@ widths = dict(zip(data["observation_names"].split(","), map(int, data["observati
 assert list(widths) == ["base_ang_vel", "command", "projected_gravity", "joint_pos", "joint_vel", "last_action", "clock"]
 assert list(widths.values()) == [3, 3, 3, 12, 12, 12, 2]
 
-# a list for the joints each, as in robot.ini; 0.85 of the drives' torques, and no limit of speed, as in the MJCF
+# a list for the joints each, as in robot.ini; 0.62 of the drives' torques and 0.85 at the ankles, and no limit of speed, as in the MJCF
 joints = {key: value.partition(";")[0].split() for key, value in robot["joints"].items()}
 assert joints["names"] == names
 for key, name in (("default_joint_pos", "pose"), ("joint_stiffness", "kp"), ("joint_damping", "kd")):
     assert numbers[key] == list(map(float, joints[name])), (key, numbers[key])
-assert numbers["joint_effort_limit"] == ([119] * 4 + [20.4] * 2) * 2 and numbers["joint_velocity_limit"] == [0] * 12
+assert numbers["joint_effort_limit"] == ([86.8] * 4 + [20.4] * 2) * 2 and numbers["joint_velocity_limit"] == [0] * 12
 mjcf = (root / "robots/sa01/sa01.xml").read_text(encoding="utf-8")
 for name, low, high in zip(names, numbers["joint_pos_low"], numbers["joint_pos_high"], strict=True):
     assert re.search(rf'name="{name}"[^>]*range="([^"]*)"', mjcf)[1] == f"{low:g} {high:g}", (name, low, high)

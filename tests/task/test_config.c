@@ -234,15 +234,15 @@ static void gains(void **unused) {
                  {"1,2,3, 4 5 6 7 8 9 10 11 12.5", 1, 4, 10, 12.5}};
     for (int i = 0; i < 4; i++) {
         TaskDef def = task_def_default();
-        double kp[ROBOT_JOINTS_MAX], kd[ROBOT_JOINTS_MAX];
+        TaskGains own;
         strcpy(def.kp, cases[i].text);
         assert_int_equal(task_def_check_robot(&def, robot, NULL), MILD_OK);
-        assert_int_equal(task_gains(&def, robot, kp, kd, NULL), MILD_OK);
-        expect_entry("first", i, kp[0], cases[i].first, 0);
-        expect_entry("knee", i, kp[KNEE], cases[i].knee, 0);
-        expect_entry("right knee", i, kp[LEG_JOINTS + KNEE], cases[i].right_knee, 0);
-        expect_entry("last", i, kp[11], cases[i].last, 0);
-        expect_entry("kd", i, kd[ANKLE_PITCH], 0.2, 0);
+        assert_int_equal(task_gains(&def, robot, &own, NULL), MILD_OK);
+        expect_entry("first", i, own.kp[0], cases[i].first, 0);
+        expect_entry("knee", i, own.kp[KNEE], cases[i].knee, 0);
+        expect_entry("right knee", i, own.kp[LEG_JOINTS + KNEE], cases[i].right_knee, 0);
+        expect_entry("last", i, own.kp[11], cases[i].last, 0);
+        expect_entry("kd", i, own.kd[ANKLE_PITCH], 0.2, 0);
     }
     static const char *const wrong[] = {"", "robots", "1 2 3 4 5", "501", "-1", "1 2 x"};
     for (int i = 0; i < 6; i++) {
@@ -255,6 +255,28 @@ static void gains(void **unused) {
         strcpy(def.kd, wrong[i]);
         assert_int_equal(task_def_check_robot(&def, robot, &error), MILD_ERROR_RANGE);
         assert_non_null(strstr(error.text, "task.kd"));
+    }
+}
+
+/* A share of the effort: the same for all joints, or a leg's. */
+static void torque_limits(void **unused) {
+    (void)unused;
+    TaskDef def = task_def_default();
+    TaskGains own;
+    assert_int_equal(task_gains(&def, robot, &own, NULL), MILD_OK);
+    expect_near("hip", own.limit[0], 0.85 * 140, 1e-12);
+    expect_near("ankle", own.limit[ANKLE_PITCH], 0.85 * 24, 1e-12);
+    strcpy(def.torque_share, "0.6 0.6 0.6 0.5 0.85 1");
+    assert_int_equal(task_gains(&def, robot, &own, NULL), MILD_OK);
+    expect_near("knee", own.limit[KNEE], 70, 1e-12);
+    expect_near("right knee", own.limit[LEG_JOINTS + KNEE], 70, 1e-12);
+    expect_near("right ankle", own.limit[11], 24, 1e-12);
+    static const char *const wrong[] = {"", "robot", "0.6 0.6 0.6 0.6 0.6", "1.01", "0.09", "nan"};
+    for (int i = 0; i < 6; i++) {
+        MildError error = {0};
+        strcpy(def.torque_share, wrong[i]);
+        assert_int_equal(task_def_check_robot(&def, robot, &error), MILD_ERROR_RANGE);
+        assert_non_null(strstr(error.text, "task.torque_share"));
     }
 }
 
@@ -290,7 +312,7 @@ int main(void) {
         cmocka_unit_test(defaults),      cmocka_unit_test(paths_of_pictures),
         cmocka_unit_test(nominal),       cmocka_unit_test(refused),
         cmocka_unit_test(gains),         cmocka_unit_test(physics_steps),
-        cmocka_unit_test(robot_or_task),
+        cmocka_unit_test(robot_or_task), cmocka_unit_test(torque_limits),
     };
     return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
 }

@@ -2,6 +2,7 @@
 #include "env/task/policy_keys.h"
 #include "kit.h"
 
+#define SHARES "0.6 0.6 0.6 0.6 0.85 0.85"
 #define GAINS "50 50 70 70 20 20 50 50 70 70 20 20"
 
 /* All keys away from their defaults, and others too. */
@@ -17,7 +18,7 @@ static TaskDef changed(void) {
     def.height_scale = 5;
     def.action_scale = 0.3;
     def.action_clip = 7;
-    def.torque_share = 0.6;
+    strcpy(def.torque_share, SHARES);
     def.torque_hold = 1;
     def.shell_depth = 0.04;
     strcpy(def.kp, GAINS);
@@ -38,7 +39,8 @@ static void printed_and_read(void **state) {
     assert_true(to.gait_slowing == 0.4 && to.gait_slow_below == 0.9);
     assert_true(to.history_stride == 3 && to.velocity_scale == 2 && to.height_scale == 5);
     assert_true(to.action_scale == 0.3 && to.action_clip == 7);
-    assert_true(to.torque_share == 0.6 && to.torque_hold == 1 && to.shell_depth == 0.04);
+    assert_string_equal(to.torque_share, SHARES);
+    assert_true(to.torque_hold == 1 && to.shell_depth == 0.04);
     assert_string_equal(to.kp, GAINS);
     assert_string_equal(to.kd, "1.5");
     assert_true(to.physics_dt == task_def_default().physics_dt); /* no matter of the policy's */

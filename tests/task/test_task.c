@@ -79,7 +79,7 @@ static void every_ground_model_carries(void **state) {
         TaskDef def = kit_quiet_def();
         strcpy(def.kp, "240 240 240 240 200 200");
         strcpy(def.kd, "6 6 6 6 1 1");
-        def.torque_share = 1;
+        strcpy(def.torque_share, "1");
         def.randomize.model = model;
         robot_set_model(robot, (MildModel)model);
         Rig rig;

@@ -153,6 +153,7 @@ static void base_touches(void **unused) {
     }
     touch(&state, "base_link_box", 0, "base", TASK_END_base);
     touch(&state, "base_link_box", 0.3, "base on higher ground", TASK_END_base);
+    rig.def.shells_stand = 0;
     deep(&state, "base_link_box");
     rig.def.shells_stand = 1;
     touch(&state, "base_link_box", 0, "base that stands", TASK_END_base);
@@ -174,6 +175,7 @@ static void shank_touches(int leg, const char *box) {
     up[ANKLE_PITCH] = 0;
     kit_turn(state.qpos, -0.8, -0.2, 0.05);
     assert_true(lowest_of_box(&state, "base_link_box") > lowest_of_box(&state, box) + 0.1);
+    rig.def.shells_stand = 0;
     touch(&state, box, 0, box, TASK_END_shell);
     touch(&state, box, -0.2, box, TASK_END_shell);
     /* One that stands may be in soft ground, and not in rigid ground. */

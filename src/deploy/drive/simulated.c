@@ -176,7 +176,7 @@ static void set_torques(Simulated *s, double *torque) {
     const double *q = robot_sim_qpos(s->sim) + 7, *qd = robot_sim_qvel(s->sim) + 6;
     const int silent = s->silent || s->time - s->target_time > SILENCE;
     for (int i = 0; i < s->joints; i++) {
-        const double most = s->def->task->torque_share * robot_effort(robot)[i];
+        const double most = task_env_rest(s->env)->gains.limit[i];
         const TaskMotor motor = {.target = {(double)s->target.angle[i]},
                                  .kp = silent ? 0 : (double)s->target.kp[i],
                                  .kd = (double)s->target.kd[i],

@@ -69,11 +69,10 @@ static int widest(const Export *export) {
     return blocks(most) * C_LANES;
 }
 
-static void print_joints(FILE *file, const char *name, const double *numbers, int count,
-                         double scale) {
+static void print_joints(FILE *file, const char *name, const double *numbers, int count) {
     fprintf(file, "const float policy_%s[POLICY_JOINTS] = {", name);
     for (int i = 0; i < count; i++) {
-        fprintf(file, "%s%.8ef", i ? ", " : "", scale * numbers[i]);
+        fprintf(file, "%s%.8ef", i ? ", " : "", numbers[i]);
     }
     fprintf(file, "};\n");
 }
@@ -82,7 +81,7 @@ static MildStatus print_weights(FILE *file, const Export *export, MildError *err
     const Robot *robot = export->robot;
     const int joints = robot_joints(robot);
     TaskGains gains;
-    MildStatus status = task_gains(export->task, robot, gains.kp, gains.kd, error);
+    MildStatus status = task_gains(export->task, robot, &gains, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -92,12 +91,12 @@ static MildStatus print_weights(FILE *file, const Export *export, MildError *err
         fprintf(file, "    \"%s\",\n", robot_joint_name(robot, i));
     }
     fprintf(file, "};\n");
-    print_joints(file, "pose", robot_default_pose(robot), joints, 1);
-    print_joints(file, "kp", gains.kp, joints, 1);
-    print_joints(file, "kd", gains.kd, joints, 1);
-    print_joints(file, "limit", robot_effort(robot), joints, export->task->torque_share);
-    print_joints(file, "low", robot_joint_low(robot), joints, 1);
-    print_joints(file, "high", robot_joint_high(robot), joints, 1);
+    print_joints(file, "pose", robot_default_pose(robot), joints);
+    print_joints(file, "kp", gains.kp, joints);
+    print_joints(file, "kd", gains.kd, joints);
+    print_joints(file, "limit", gains.limit, joints);
+    print_joints(file, "low", robot_joint_low(robot), joints);
+    print_joints(file, "high", robot_joint_high(robot), joints);
     fprintf(file, "\n#define WIDEST %d /* of the layers' outputs, in whole blocks */\n\n",
             widest(export));
     print_mlp(file, export, &export->network->encoder, "encoder");

@@ -13,13 +13,12 @@ static void add(Description *d, const char *key, const char *format, ...) {
     va_end(arguments);
 }
 
-static void add_numbers(Description *d, const char *key, const double *numbers, int count,
-                        double scale) {
+static void add_numbers(Description *d, const char *key, const double *numbers, int count) {
     char *value = d->value[d->count];
     size_t used = 0;
     for (int i = 0; i < count; i++) {
         used += (size_t)snprintf(value + used, DESCRIBE_VALUE - used, "%s%.6g", i ? "," : "",
-                                 scale * numbers[i]);
+                                 numbers[i]);
     }
     snprintf(d->key[d->count++], DESCRIBE_KEY, "%s", key);
 }
@@ -39,13 +38,13 @@ static void add_robot(Description *d, const Export *export, const TaskGains *gai
     const int joints = robot_joints(robot);
     add(d, "robot", "%s", robot_name(robot));
     add_joint_names(d, robot);
-    add_numbers(d, "default_joint_pos", robot_default_pose(robot), joints, 1);
-    add_numbers(d, "joint_stiffness", gains->kp, joints, 1);
-    add_numbers(d, "joint_damping", gains->kd, joints, 1);
-    add_numbers(d, "joint_effort_limit", robot_effort(robot), joints, export->task->torque_share);
-    add_numbers(d, "joint_velocity_limit", robot_speed(robot), joints, 1);
-    add_numbers(d, "joint_pos_low", robot_joint_low(robot), joints, 1);
-    add_numbers(d, "joint_pos_high", robot_joint_high(robot), joints, 1);
+    add_numbers(d, "default_joint_pos", robot_default_pose(robot), joints);
+    add_numbers(d, "joint_stiffness", gains->kp, joints);
+    add_numbers(d, "joint_damping", gains->kd, joints);
+    add_numbers(d, "joint_effort_limit", gains->limit, joints);
+    add_numbers(d, "joint_velocity_limit", robot_speed(robot), joints);
+    add_numbers(d, "joint_pos_low", robot_joint_low(robot), joints);
+    add_numbers(d, "joint_pos_high", robot_joint_high(robot), joints);
 }
 
 static void add_rules(Description *d, const Export *export) {
@@ -87,7 +86,7 @@ static void add_rules(Description *d, const Export *export) {
 
 MildStatus describe(const Export *export, Description *description, MildError *error) {
     TaskGains gains;
-    MildStatus status = task_gains(export->task, export->robot, gains.kp, gains.kd, error);
+    MildStatus status = task_gains(export->task, export->robot, &gains, error);
     description->count = 0;
     if (status == MILD_OK) {
         add(description, "producer", "mild %s", export->version);

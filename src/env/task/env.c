@@ -53,8 +53,8 @@ void *task_env_motors(TaskEnv *env) {
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
                    uint32_t index) {
     const TaskShape shape = task_shape(robot);
-    TaskGains gains = {{0}, {0}};
-    MildStatus status = task_gains(def, robot, gains.kp, gains.kd, NULL);
+    TaskGains gains;
+    MildStatus status = task_gains(def, robot, &gains, NULL);
     assert(status == MILD_OK); /* task_def_check_robot has seen them */
     (void)status;
     memset(env, 0, front_bytes(&shape, task_frames_held(def)));

@@ -65,12 +65,6 @@ typedef struct {
 } TaskMirror;
 TaskMirror task_mirror(const Robot *robot);
 
-/* Gains of the joints, see task_gains; 0 beyond the robot's joints. */
-typedef struct {
-    double kp[ROBOT_JOINTS_MAX]; /* [N m/rad] task.kp or the robot's */
-    double kd[ROBOT_JOINTS_MAX]; /* [N m s/rad] task.kd or the robot's */
-} TaskGains;
-
 /* What differs from robot to robot; see RobotVariation. */
 typedef struct {
     Real base_mass_add;                    /* [kg] */

@@ -178,7 +178,7 @@ MILD_HD_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Ro
     }
     motor.kp = env->strength[i] * REAL(gains->kp[i]) * env->kp_scale[i];
     motor.kd = env->strength[i] * REAL(gains->kd[i]) * env->kd_scale[i];
-    motor.limit = def->torque_share * robot->effort[i];
+    motor.limit = gains->limit[i];
     motor.fastest = robot->speed[i];
     return motor;
 }
@@ -315,7 +315,7 @@ MILD_HD_FN TaskEnd task_end_cause(const TaskEnv *env, const TaskDef *def, const 
     if (!stand && reading->body_clearance < -depth) {
         return TASK_END_shell;
     }
-    if (reading->foot_distance < def->crossing_limit) {
+    if (def->crossing_limit > -1 && reading->foot_distance < def->crossing_limit) {
         return TASK_END_crossing;
     }
     return task_joint_is_broken(env, robot) ? TASK_END_joint : TASK_END_time;

@@ -16,7 +16,7 @@ TaskDef task_def_default(void) {
     TaskDef def = {
         .physics_dt = 0.0025,
         .action_clip = 8.0,
-        .torque_share = 0.85,
+        .torque_share = "0.85",
         .torque_hold = 0,
         .kp = "robot",
         .kd = "robot",
@@ -44,7 +44,8 @@ TaskDef task_def_default(void) {
         .velocity_scale = 4,
         .height_scale = 10,
         .tilt_limit = 1.0,
-        .crossing_limit = 0.0,
+        .crossing_limit = -1.0,
+        .shells_stand = 1,
         .assist = 1,
         .newton = 1,
         .contact_tolerance = 1e-4,
@@ -124,7 +125,9 @@ const MildField task_fields[] = {
     T(physics_dt, D, 1, 0.0005, 0.005, "[s] physics step; must divide 0.01, the policy step"),
     T(action_scale, D, 1, 0, 2, "[rad] joint offset per unit of action; 0: the robot's"),
     T(action_clip, D, 1, 0.1, 100, "[-] actions are clipped to plus or minus this"),
-    T(torque_share, D, 1, 0.1, 1, "[-] torque limit as a share of the joint's effort"),
+    T(torque_share, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0,
+      "[-] torque limit as a share of the joint's effort, from 0.1 to 1: one number, one per "
+      "joint, or one per joint of a leg"),
     T(torque_hold, B, 1, 0, 1,
       "[bool] the PD torque is computed once per policy step, when the action arrives, and held "
       "(paper: 100 Hz); false: at every physics step"),
@@ -168,14 +171,13 @@ const MildField task_fields[] = {
     T(height_scale, D, 1, 0.01, 100, "[-] scale of the feet heights among the estimates"),
     T(tilt_limit, D, 1, 0.1, 3.1, "[rad] the episode ends when the base tilts more than this"),
     T(crossing_limit, D, 1, -1, 1,
-      "[m] the episode ends when the feet are laterally closer than this, because the simulated "
-      "legs cannot touch each other"),
+      "[m] the episode ends when the feet are laterally closer than this; -1: never"),
     T(shell_depth, D, 1, 0, 1,
-      "[m] on soft ground the episode ends when a geom of `shells` of robot.ini is deeper than "
-      "this below the undisturbed surface"),
+      "[m] without shells_stand: the episode ends when a geom of `shells` of robot.ini is deeper "
+      "than this below the undisturbed surface of soft ground"),
     T(shells_stand, B, 1, 0, 1,
-      "[bool] geoms of `shells` of robot.ini stand on soft ground as soles do; then a shell of the "
-      "base ends the episode when it touches the ground, and no other (MuJoCo's robots alone)"),
+      "[bool] geoms of `shells` of robot.ini stand on soft ground as soles do; there a shell of "
+      "the base ends the episode when it touches the ground, and no other"),
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
     T(newton, B, 1, 0, 1,
@@ -294,66 +296,87 @@ static MildStatus check_section(const MildField *fields, int count, const void *
     return status;
 }
 
-/* Reads the numbers of a list of gains. Returns their number, or -1 with a message. */
-static int read_gains(const char *key, const char *text, double most, double *list,
-                      MildError *error) {
+/* A key whose text has numbers for the joints. */
+typedef struct {
+    const char *key, *text;
+    double least, most;
+    const double *own; /* [joints] what the word robot stands for; NULL: nothing */
+    double *numbers;   /* [joints] out */
+} JointList;
+
+/* Reads the numbers of a list. Returns their number, or -1 with a message. */
+static int read_numbers(const JointList *list, double *number, MildError *error) {
     int count = 0;
-    for (const char *at = text + strspn(text, " ,\t"); *at; at += strspn(at, " ,\t")) {
+    for (const char *at = list->text + strspn(list->text, " ,\t"); *at; at += strspn(at, " ,\t")) {
         char *end = NULL;
         double value = strtod(at, &end);
-        if (end == at || !(value >= 0.0 && value <= most) || count == ROBOT_JOINTS_MAX) {
-            mild_fail(error, MILD_ERROR_RANGE,
-                      "task.%s = %.60s: neither robot nor up to %d numbers from 0 to %g", key, text,
-                      ROBOT_JOINTS_MAX, most);
+        if (end == at || !(value >= list->least && value <= list->most) ||
+            count == ROBOT_JOINTS_MAX) {
+            mild_fail(error, MILD_ERROR_RANGE, "task.%s = %.60s: %sup to %d numbers from %g to %g",
+                      list->key, list->text, list->own ? "neither robot nor " : "not ",
+                      ROBOT_JOINTS_MAX, list->least, list->most);
             return -1;
         }
-        list[count++] = value;
+        number[count++] = value;
         at = end;
     }
     return count;
 }
 
 /* joints 0: of any robot. */
-static MildStatus take_gains(const char *key, const char *text, double most, int joints,
-                             const double *own, double *gains, MildError *error) {
-    double list[ROBOT_JOINTS_MAX];
-    if (strcmp(text, "robot") == 0) {
-        memcpy(gains, own, (size_t)joints * sizeof *gains);
+static MildStatus take_list(const JointList *list, int joints, MildError *error) {
+    double number[ROBOT_JOINTS_MAX];
+    if (list->own && strcmp(list->text, "robot") == 0) {
+        memcpy(list->numbers, list->own, (size_t)joints * sizeof *number);
         return MILD_OK;
     }
-    int count = read_gains(key, text, most, list, error);
+    int count = read_numbers(list, number, error);
     if (count < 0) {
         return MILD_ERROR_RANGE;
     }
     if (count == 0 || joints % count != 0) {
-        return mild_fail(error, MILD_ERROR_RANGE,
-                         "task.%s = %.60s: %d numbers do not fit %d joints; robot takes the "
-                         "robot's own",
-                         key, text, count, joints);
+        return mild_fail(
+            error, MILD_ERROR_RANGE, "task.%s = %.60s: %d numbers do not fit %d joints%s",
+            list->key, list->text, count, joints, list->own ? "; robot takes the robot's own" : "");
     }
     for (int i = 0; i < joints; i++) {
-        gains[i] = list[i % count];
+        list->numbers[i] = number[i % count];
     }
     return MILD_OK;
 }
 
-MildStatus task_gains(const TaskDef *def, const Robot *robot, double *kp, double *kd,
-                      MildError *error) {
-    int joints = robot_joints(robot);
-    MildStatus status = take_gains("kp", def->kp, KP_MAX, joints, robot_kp(robot), kp, error);
-    return status == MILD_OK ? take_gains("kd", def->kd, KD_MAX, joints, robot_kd(robot), kd, error)
-                             : status;
+/* joints 0, own NULL: of any robot. */
+static MildStatus take_gains(const TaskDef *def, int joints, const double *kp, const double *kd,
+                             TaskGains *gains, MildError *error) {
+    const JointList lists[] = {{"kp", def->kp, 0, KP_MAX, kp, gains->kp},
+                               {"kd", def->kd, 0, KD_MAX, kd, gains->kd},
+                               {"torque_share", def->torque_share, 0.1, 1, NULL, gains->limit}};
+    MildStatus status = MILD_OK;
+    memset(gains, 0, sizeof *gains);
+    for (size_t i = 0; status == MILD_OK && i < sizeof lists / sizeof *lists; i++) {
+        status = take_list(&lists[i], joints, error);
+    }
+    return status;
+}
+
+MildStatus task_gains(const TaskDef *def, const Robot *robot, TaskGains *gains, MildError *error) {
+    const int joints = robot_joints(robot);
+    MildStatus status = take_gains(def, joints, robot_kp(robot), robot_kd(robot), gains, error);
+    for (int i = 0; i < joints; i++) {
+        gains->limit[i] *= robot_effort(robot)[i];
+    }
+    return status;
 }
 
 MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildError *error) {
-    double kp[ROBOT_JOINTS_MAX], kd[ROBOT_JOINTS_MAX];
+    TaskGains gains;
     MildStatus status = task_def_check(def, error);
     if (status == MILD_OK && def->actuator[0] && !def->motors) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "task.actuator = %.100s: there is no actuator network here; leave it out",
                          def->actuator);
     }
-    return status == MILD_OK ? task_gains(def, robot, kp, kd, error) : status;
+    return status == MILD_OK ? task_gains(def, robot, &gains, error) : status;
 }
 
 MildStatus task_def_check(const TaskDef *def, MildError *error) {
@@ -365,9 +388,9 @@ MildStatus task_def_check(const TaskDef *def, MildError *error) {
         status = check_section(randomize_fields, randomize_field_count, &def->randomize,
                                "randomize", error);
     }
-    double any[ROBOT_JOINTS_MAX];
-    status = status == MILD_OK ? take_gains("kp", def->kp, KP_MAX, 0, any, any, error) : status;
-    status = status == MILD_OK ? take_gains("kd", def->kd, KD_MAX, 0, any, any, error) : status;
+    TaskGains gains;
+    const double any[ROBOT_JOINTS_MAX] = {0};
+    status = status == MILD_OK ? take_gains(def, 0, any, any, &gains, error) : status;
     double steps = TASK_PERIOD / def->physics_dt;
     if (status == MILD_OK && !(fabs(steps - floor(steps + 0.5)) < 1e-9)) {
         return mild_fail(error, MILD_ERROR_RANGE,

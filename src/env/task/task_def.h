@@ -118,11 +118,11 @@ typedef struct {
 enum { TASK_GAINS_SIZE = 152 }; /* characters of a list of gains, as long as a config's text */
 
 typedef struct {
-    double physics_dt;              /* [s] */
-    double action_scale;            /* [rad] per unit action; 0: the robot's */
-    double action_clip;             /* [-] */
-    double torque_share;            /* [-] of the joint's effort */
-    int torque_hold;                /* bool: one torque per policy step */
+    double physics_dt;                  /* [s] */
+    double action_scale;                /* [rad] per unit action; 0: the robot's */
+    double action_clip;                 /* [-] */
+    int torque_hold;                    /* bool: one torque per policy step */
+    char torque_share[TASK_GAINS_SIZE]; /* [-] of the joint's effort: numbers, see task_gains */
     char kp[TASK_GAINS_SIZE];       /* [N m/rad] "robot": the robot's; or numbers, see task_gains */
     char kd[TASK_GAINS_SIZE];       /* [N m s/rad] */
     char actuator[TASK_GAINS_SIZE]; /* file of an actuator network; "": the PD */
@@ -183,10 +183,15 @@ void task_def_make_nominal(TaskDef *def);
 MildStatus task_def_check(const TaskDef *def, MildError *error);
 /* The same, that the lists of gains fit the robot, and that a file of an actuator has been read. */
 MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildError *error);
-/* Gains of each joint [robot_joints]: the robot's, or the list of the def: one number, one per
- * joint, or one per joint of a leg, which every leg repeats. */
-MildStatus task_gains(const TaskDef *def, const Robot *robot, double *kp, double *kd,
-                      MildError *error);
+/* Gains of each joint [robot_joints]; 0 beyond the robot's joints. */
+typedef struct {
+    double kp[ROBOT_JOINTS_MAX];    /* [N m/rad] task.kp or the robot's */
+    double kd[ROBOT_JOINTS_MAX];    /* [N m s/rad] task.kd or the robot's */
+    double limit[ROBOT_JOINTS_MAX]; /* [N m] task.torque_share of the joint's effort */
+} TaskGains;
+/* Each list of the def has one number, one per joint, or one per joint of a leg, which every leg
+ * repeats. */
+MildStatus task_gains(const TaskDef *def, const Robot *robot, TaskGains *gains, MildError *error);
 /* [rad] What the def or, where it has 0, the robot says. */
 MILD_HD_FN double task_action_scale(const TaskDef *def, const RobotTable *robot) {
     return def->action_scale > 0 ? def->action_scale : robot->action_scale;

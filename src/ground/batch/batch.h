@@ -29,6 +29,7 @@ typedef struct {
     MaterialNumbers *materials; /* [materials + 1][feet] */
     float *memory;              /* [robots] of contact.h */
     MapView map;                /* all 0 without a map */
+    const uint8_t *skip; /* [robots] bool: a step leaves it alone; NULL: none. Of the caller */
 } BatchArrays;
 
 struct MildBatch {
@@ -51,6 +52,8 @@ MildBatch batch_share(const MildBatch *batch, int first, int count);
 /* Makes a view of a map whose arrays are copies in the memory of a device. Fails for a map that a
  * batch does not know yet. error: not NULL. */
 MildStatus batch_map_open(MapView *view, const MildMap *map, int device, MildError *error);
+/* [-] Upper bound on the gradient of a map; NULL: 0. */
+double batch_map_steepest(const MildMap *map);
 void batch_map_close(const MapView *view, int device);
 
 /* ---- the CPU: host.c ---- */

@@ -18,6 +18,9 @@ void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBat
     for (long robot = 0; robot < shape->robots; robot++) {
         ContactProblem problem;
         ContactResult result;
+        if (arrays->skip && arrays->skip[robot]) {
+            continue;
+        }
         batch_problem(shape, arrays, input, robot, &problem);
         batch_result(shape, output, robot, &result);
         step(&setup, &problem, batch_memory(shape, arrays, robot), advance, &result);

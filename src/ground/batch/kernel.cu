@@ -39,7 +39,7 @@ enum { WARPS = 4, THREADS = WARPS * LANES }; /* robots of a block */
         __shared__ version##_Shared shared[WARPS];                                                 \
         const int warp = (int)(threadIdx.x / LANES);                                               \
         const long robot = (long)blockIdx.x * WARPS + warp;                                        \
-        if (robot >= shape.robots) {                                                               \
+        if (robot >= shape.robots || (arrays.skip && arrays.skip[robot])) {                        \
             return;                                                                                \
         }                                                                                          \
         ContactProblem problem;                                                                    \

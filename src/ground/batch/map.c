@@ -64,6 +64,10 @@ MildStatus batch_map_open(MapView *view, const MildMap *map, int device, MildErr
     return MILD_OK;
 }
 
+double batch_map_steepest(const MildMap *map) {
+    return map ? map->steepest : 0.0;
+}
+
 /* Bool: nothing differs from place to place. */
 static int map_is_plain(const MildMap *map) {
     return !map || (mild_map_is_level(map) && !map->label);

@@ -30,25 +30,41 @@ MILD_HD void foot_pose_number(const EngineModel *model, EngineWork *work, int f,
     }
 }
 
-/* Twist of a foot per unit of the degree of freedom at a place of its row. */
-MILD_HD void foot_column(const EngineTree *tree, EngineWork *work, int f, int place) {
-    Real *column = work->now.support.jacobian[f][place];
-    const int j = engine_dof_link(tree->row_dof[tree->foot_link[f]][place]);
+/* Where the links are, as in EngineWork. */
+typedef struct {
+    const Real (*rotation)[9];
+    const Real (*position)[3];
+    const Real (*axis)[3];
+} EngineLinks;
+
+/* Twist of a point that moves with a link, [m] from the base, per unit of the degree of freedom at
+ * a place of the link's row. */
+MILD_HD void link_column(const EngineTree *tree, const EngineLinks *links, int link,
+                         const Real *point, int place, Real *column) {
+    const int j = engine_dof_link(tree->row_dof[link][place]);
     const int turns = place < 3 ? place : place - 3; /* column of the base's rotation */
-    const Real *from = place < 6 ? work->rotation[0] + turns : work->axis[j];
+    const Real *from = place < 6 ? links->rotation[0] + turns : links->axis[j];
     const int step = place < 6 ? 3 : 1;
     Real axis[3];
     Real arm[3];
     Real move[3];
     for (int k = 0; k < 3; k++) {
         axis[k] = from[step * k];
-        arm[k] = work->foot_position[f][k] - work->position[j][k];
+        arm[k] = point[k] - links->position[j][k];
     }
     cross3(axis, arm, move);
     for (int k = 0; k < 3; k++) {
         column[k] = place < 3 ? (place == k) : move[k];
         column[3 + k] = place < 3 ? 0 : axis[k];
     }
+}
+
+/* The same of a foot. */
+MILD_HD void foot_column(const EngineTree *tree, EngineWork *work, int f, int place) {
+    const EngineLinks links = {(const Real(*)[9])work->rotation, (const Real(*)[3])work->position,
+                               (const Real(*)[3])work->axis};
+    link_column(tree, &links, tree->foot_link[f], work->foot_position[f], place,
+                work->now.support.jacobian[f][place]);
 }
 
 /* Component c of the twist of a foot at the velocity x. */
@@ -179,10 +195,14 @@ WARP_FN void engine_foot_inertia(const EngineTree *tree, EngineWork *work) {
     lanes_sync();
 }
 
-/* bool: foot f moves with degree of freedom d. */
-MILD_HD int foot_moves(const EngineTree *tree, int f, int d) {
-    const int hinge = 5 + tree->foot_link[f];
+/* bool: a link moves with degree of freedom d. */
+MILD_HD int link_moves(const EngineTree *tree, int link, int d) {
+    const int hinge = 5 + link;
     return (hinge >= d) & (hinge < tree->behind[d]);
+}
+
+MILD_HD int foot_moves(const EngineTree *tree, int f, int d) {
+    return link_moves(tree, tree->foot_link[f], d);
 }
 
 /* Degree of freedom d of the sum over the feet of rows^T wrench; rows [feet * chain][6]: J^T or

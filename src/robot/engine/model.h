@@ -66,6 +66,12 @@ typedef struct {
     Real radius;      /* [m] */
 } EngineShell;
 
+/* A body with shells that stand on soft ground. */
+typedef struct {
+    Real position[3]; /* [m] of its frame, in the link's */
+    Real turn[9];     /* [-] body -> link */
+} EngineBody;
+
 /* Real numbers only, so that it may be filled from doubles number by number. */
 typedef struct {
     EngineLink link[ENGINE_LINKS_MAX]; /* of link 0 `welded` only */
@@ -78,6 +84,7 @@ typedef struct {
     EngineFoot foot[ROBOT_FEET_MAX];
     Real corner[ENGINE_CORNERS_MAX][3]; /* [m] centres, frame of the foot's link */
     EngineShell shell[ROBOT_SHELLS_MAX];
+    EngineBody body[ENGINE_BODIES_MAX];
     LegCapsule capsule[ROBOT_CAPSULES_MAX]; /* link's frame */
     Real leg_softness;                      /* [1/kg] 1/m of robot/legs.h */
 } EngineNumbers;

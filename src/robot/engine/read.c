@@ -329,6 +329,36 @@ static MildStatus read_shell(Reading *r, int s) {
     return MILD_OK;
 }
 
+/* Bodies whose shells stand on soft ground. */
+static MildStatus read_bodies_of_shells(Reading *r) {
+    const Robot *robot = r->robot;
+    const int feet = robot->def.feet;
+    const int bodies = robot_bodies(robot) - feet;
+    if (bodies > ENGINE_BODIES_MAX) {
+        return mild_fail(r->error, MILD_ERROR_RANGE,
+                         "%.200s: the geoms of [robot] shells are on %d bodies; the batch engine "
+                         "lets those of %d stand on soft ground",
+                         robot->path, bodies, ENGINE_BODIES_MAX);
+    }
+    r->tree->bodies = bodies;
+    for (int b = 0; b < bodies; b++) {
+        const RobotLimb *limb = &robot->limb[feet + b];
+        const Mount *mount = &r->mount[limb->body];
+        r->tree->body_link[b] = (EngineIndex)mount->link;
+        mju_copy3(r->number->body[b].position, mount->position);
+        memcpy(r->number->body[b].turn, mount->rotation, sizeof mount->rotation);
+        for (int other = 0; other <= feet + b; other++) {
+            const int same = other == feet + b;
+            const EngineIndex shared = (EngineIndex)(same ? limb->dofs : limb->shared[other]);
+            r->tree->body_shared[b][other] = shared;
+            if (other >= feet) {
+                r->tree->body_shared[other - feet][feet + b] = shared;
+            }
+        }
+    }
+    return MILD_OK;
+}
+
 static void read_legs(Reading *r) {
     const Robot *robot = r->robot;
     for (int c = 0; c < robot->capsules; c++) {
@@ -366,6 +396,7 @@ static MildStatus read_robot(Reading *r) {
     for (int s = 0; status == MILD_OK && s < tree->shells; s++) {
         status = read_shell(r, s);
     }
+    status = status == MILD_OK ? read_bodies_of_shells(r) : status;
     read_legs(r);
     tree->pairs = r->robot->pairs;
     for (int n = 0; n < 2 * tree->pairs; n++) {

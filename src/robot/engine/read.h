@@ -9,7 +9,8 @@
 enum {
     ENGINE_FOOT_NUMBERS = 21 + 2 * ROBOT_OUTLINE_MAX,
     ENGINE_NUMBERS = 21 + 76 * ENGINE_LINKS_MAX + ENGINE_FOOT_NUMBERS * ROBOT_FEET_MAX +
-                     3 * ENGINE_CORNERS_MAX + 16 * ROBOT_SHELLS_MAX + 7 * ROBOT_CAPSULES_MAX + 1
+                     3 * ENGINE_CORNERS_MAX + 16 * ROBOT_SHELLS_MAX + 12 * ENGINE_BODIES_MAX +
+                     7 * ROBOT_CAPSULES_MAX + 1
 };
 
 #ifdef __cplusplus

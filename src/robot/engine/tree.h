@@ -20,6 +20,7 @@
 #define ENGINE_ENTRIES_MAX (ENGINE_DOFS_MAX * (ENGINE_DOFS_MAX + 1) / 2) /* of a single chain */
 #define ENGINE_CORNERS_MAX 64 /* spheres under the feet on rigid ground */
 #define ENGINE_BASE_ENTRIES 21
+#define ENGINE_BODIES_MAX 8 /* with shells that stand on soft ground: bits of a byte */
 
 typedef unsigned char EngineIndex;
 typedef unsigned long long EnginePath; /* a bit for each degree of freedom */
@@ -71,6 +72,11 @@ typedef struct {
     /* ---- parts that must not touch the ground ---- */
     int shells;
     EngineIndex shell_link[ROBOT_SHELLS_MAX];
+    /* ---- bodies with shells, where these stand on soft ground ---- */
+    int bodies;
+    EngineIndex body_link[ENGINE_BODIES_MAX];
+    /* Degrees of freedom that move a body and a foot, or another body: they follow the feet. */
+    EngineIndex body_shared[ENGINE_BODIES_MAX][ROBOT_FEET_MAX + ENGINE_BODIES_MAX];
     /* ---- parts of legs that touch other legs ---- */
     EngineIndex capsule_link[ROBOT_CAPSULES_MAX];
     int leg_pairs;

@@ -1,0 +1,358 @@
+/* Beds of grains, several at once: `beds` boxes with `per` grains each, periodic in x and y, with a
+ * floor at z = 0 and a plate each. A grain knows the neighbours within its reach by a list, which
+ * is made anew, by cells, before any grain outside it can touch.
+ *
+ * Positions are whole numbers of 2^-32 of the box. So differences are right across the box's
+ * borders without a test, and a grain that moves 1e-9 m in a step does move: in single precision
+ * such a step would be lost beside a position of 0.4 m. */
+#ifndef GRAINS_GRAINS_H
+#define GRAINS_GRAINS_H
+
+#include "contact.h"
+#include "plate.h"
+
+enum : int {
+    NEIGHBOURS = 22,
+    FLOOR = NEIGHBOURS, /* slots of the contacts with the floor and the plate */
+    PLATE,
+    SLOTS,
+    CELL_GRAINS = 12,
+    CHECK_STEPS = 8, /* between two looks at how far grains have moved */
+};
+
+/* What can go wrong, as bits. */
+enum : int { LIST_DUE = 1, LIST_LATE = 2, CELL_FULL = 4, LIST_FULL = 8 };
+
+struct alignas(16) Place {
+    uint32_t x, y, z;
+    float radius; /* [m]; 0: a grain that was taken away */
+};
+
+struct Grains {
+    int beds, per, count;
+    float size_x, size_y, size_z; /* of the box [m] */
+    Vec unit;                     /* of positions [m] */
+    float skin;                   /* [m]: lists hold all grains whose surfaces are nearer */
+    int cells_x, cells_y, cells_z;
+    Law law;
+    Shape shape;
+
+    Place *place, *next_place; /* after a step they change places */
+    Vec *velocity, *next_velocity, *spin, *next_spin;
+    Place *listed; /* places when the lists were made */
+    int *neighbour, *next_neighbour;
+    uint32_t *touching, *next_touching; /* bits of the slots that remember something */
+    Vec *slip, *next_slip, *roll, *next_roll;
+    int *cell_count, *cell;
+    int *flags;
+    Plate *plate;
+};
+
+BOTH Vec from_to(const Grains &g, const Place &a, const Place &b) {
+    return vec((float)(int32_t)(b.x - a.x) * g.unit.x, (float)(int32_t)(b.y - a.y) * g.unit.y,
+               (float)(int32_t)(b.z - a.z) * g.unit.z);
+}
+
+BOTH uint32_t shifted(uint32_t at, float way, float unit) {
+    return at + (uint32_t)(int32_t)lrintf(way / unit);
+}
+
+/* Where slot s of grain i is. */
+BOTH size_t slot(const Grains &g, int s, int i) {
+    return (size_t)s * (size_t)g.count + (size_t)i;
+}
+
+/* ---- neighbours ---- */
+
+BOTH int cell_along(uint32_t at, int cells) {
+    return (int)(((uint64_t)at * (uint64_t)cells) >> 32);
+}
+
+BOTH int cell_index(const Grains &g, int bed, int x, int y, int z) {
+    return ((bed * g.cells_z + z) * g.cells_y + y) * g.cells_x + x;
+}
+
+DEVICE void raise(const Grains &g, int flag) {
+#ifdef __CUDACC__
+    atomicOr(g.flags, flag);
+#else
+    __atomic_fetch_or(g.flags, flag, __ATOMIC_RELAXED);
+#endif
+}
+
+DEVICE void grain_enter_cell(int i, const Grains &g) {
+    const Place a = g.place[i];
+    g.listed[i] = a;
+    if (a.radius <= 0.0f) {
+        return;
+    }
+    const int c = cell_index(g, i / g.per, cell_along(a.x, g.cells_x), cell_along(a.y, g.cells_y),
+                             cell_along(a.z, g.cells_z));
+    const int k = take_one(&g.cell_count[c]);
+    if (k < CELL_GRAINS) {
+        g.cell[c * CELL_GRAINS + k] = i;
+    } else {
+        raise(g, CELL_FULL);
+    }
+}
+
+/* Adds to `list`, which is sorted by number, the grains of a cell that are near enough. */
+DEVICE int list_cell(const Grains &g, int i, const Place &a, int c, int *list, int count) {
+    const int grains = g.cell_count[c] < CELL_GRAINS ? g.cell_count[c] : CELL_GRAINS;
+    for (int k = 0; k < grains; k++) {
+        const int j = g.cell[c * CELL_GRAINS + k];
+        const Place b = g.place[j];
+        const Vec d = from_to(g, b, a);
+        const float near = a.radius + b.radius + g.skin;
+        if (j == i || dot(d, d) >= near * near) {
+            continue;
+        }
+        if (count == NEIGHBOURS) {
+            raise(g, LIST_FULL);
+            return count;
+        }
+        int at = count++;
+        for (; at > 0 && list[at - 1] > j; at--) {
+            list[at] = list[at - 1];
+        }
+        list[at] = j;
+    }
+    return count;
+}
+
+/* Brings what contact `from` remembers to slot `to` of the new list. */
+DEVICE uint32_t carry(const Grains &g, int i, int from, int to) {
+    const size_t at = slot(g, to, i), old = slot(g, from, i);
+    g.next_slip[at] = g.slip[old];
+    if (g.roll) {
+        g.next_roll[at] = g.roll[old];
+    }
+    return 1u << to;
+}
+
+DEVICE void grain_keep_contacts(const Grains &g, int i, const int *list, int count) {
+    const uint32_t touching = g.touching[i];
+    uint32_t kept = 0;
+    for (int s = 0; s < NEIGHBOURS; s++) {
+        const int j = s < count ? list[s] : -1;
+        g.next_neighbour[slot(g, s, i)] = j;
+        for (int old = 0; old < NEIGHBOURS && j >= 0; old++) {
+            if ((touching >> old & 1u) && g.neighbour[slot(g, old, i)] == j) {
+                kept |= carry(g, i, old, s);
+            }
+        }
+    }
+    for (int s = FLOOR; s < SLOTS; s++) {
+        if (touching >> s & 1u) {
+            kept |= carry(g, i, s, s);
+        }
+    }
+    g.next_touching[i] = kept;
+}
+
+DEVICE void grain_list(int i, const Grains &g) {
+    const Place a = g.place[i];
+    int list[NEIGHBOURS], count = 0;
+    if (a.radius > 0.0f) {
+        const int x = cell_along(a.x, g.cells_x), y = cell_along(a.y, g.cells_y);
+        const int z = cell_along(a.z, g.cells_z);
+        for (int k = 0; k < 27; k++) {
+            const int cz = z + k / 9 - 1;
+            if (cz < 0 || cz >= g.cells_z) {
+                continue;
+            }
+            const int cy = (y + k / 3 % 3 - 1 + g.cells_y) % g.cells_y;
+            const int cx = (x + k % 3 - 1 + g.cells_x) % g.cells_x;
+            count = list_cell(g, i, a, cell_index(g, i / g.per, cx, cy, cz), list, count);
+        }
+    }
+    grain_keep_contacts(g, i, list, count);
+}
+
+/* Says when lists are due: two grains that each move less than half the skin stay apart. */
+DEVICE void grain_watch(int i, const Grains &g) {
+    const Vec d = from_to(g, g.listed[i], g.place[i]);
+    const float moved = length(d),
+                next = 2.0f * (float)CHECK_STEPS * g.law.dt * length(g.velocity[i]);
+    if (moved + next > 0.5f * g.skin) {
+        raise(g, moved > 0.5f * g.skin ? LIST_DUE | LIST_LATE : LIST_DUE);
+    }
+}
+
+/* ---- a step ---- */
+
+struct Body {
+    Place place;
+    Vec velocity, spin;
+    float mass;
+    Vec force, torque;
+};
+
+BOTH float grain_mass(const Law &law, float radius) {
+    return law.density * 4.18879020f * radius * radius * radius;
+}
+
+/* What grain `i` remembers of slot `s`; nothing when it is new. */
+DEVICE Memory recall(const Grains &g, int i, int s, uint32_t touching) {
+    Memory memory = {vec(0, 0, 0), vec(0, 0, 0)};
+    if (touching >> s & 1u) {
+        memory.slip = g.slip[slot(g, s, i)];
+        if (g.roll) {
+            memory.roll = g.roll[slot(g, s, i)];
+        }
+    }
+    return memory;
+}
+
+/* Adds the force of a contact to grain `i`, and returns it. `arm` is from its centre. */
+DEVICE Vec grain_touch(const Grains &g, int i, int s, uint32_t touching, const Contact &c,
+                       float arm, Body *a) {
+    Memory memory = recall(g, i, s, touching);
+    const Vec force = contact_force(g.law, c, &memory, &a->torque);
+    g.slip[slot(g, s, i)] = memory.slip;
+    if (g.roll) {
+        g.roll[slot(g, s, i)] = memory.roll;
+    }
+    a->force = a->force + force;
+    a->torque = a->torque - arm * cross(c.normal, force);
+    return force;
+}
+
+DEVICE bool grain_touch_grain(const Grains &g, int i, int s, uint32_t touching, Body *a) {
+    const int j = g.neighbour[slot(g, s, i)];
+    const Place b = g.place[j];
+    const Vec d = from_to(g, b, a->place);
+    const float reach = a->place.radius + b.radius, square = dot(d, d);
+    if (square >= reach * reach) {
+        return false;
+    }
+    const float apart = fmaxf(sqrtf(square), 1e-9f), mass = grain_mass(g.law, b.radius);
+    const Vec spin = g.spin[j];
+    Contact c;
+    c.normal = (1.0f / apart) * d;
+    c.overlap = reach - apart;
+    c.mass = a->mass * mass / (a->mass + mass);
+    c.radius = a->place.radius * b.radius / reach;
+    c.turning = a->spin - spin;
+    const float arm = a->place.radius - 0.5f * c.overlap, other = b.radius - 0.5f * c.overlap;
+    c.velocity = a->velocity - g.velocity[j] - cross(arm * a->spin + other * spin, c.normal);
+    grain_touch(g, i, s, touching, c, arm, a);
+    return true;
+}
+
+/* A wall that moves with `velocity` and turns with `turning`, at `overlap`. */
+DEVICE Vec grain_touch_wall(const Grains &g, int i, int s, uint32_t touching, Vec normal,
+                            float overlap, Vec velocity, Vec turning, Body *a) {
+    Contact c;
+    c.normal = normal;
+    c.overlap = overlap;
+    c.mass = a->mass;
+    c.radius = a->place.radius;
+    c.turning = a->spin - turning;
+    const float arm = a->place.radius - 0.5f * overlap;
+    c.velocity = a->velocity - velocity - cross(arm * a->spin, normal);
+    return grain_touch(g, i, s, touching, c, arm, a);
+}
+
+DEVICE bool grain_touch_floor(const Grains &g, int i, uint32_t touching, Body *a) {
+    const float overlap = a->place.radius - (float)a->place.z * g.unit.z;
+    if (overlap <= 0.0f) {
+        return false;
+    }
+    const Vec still = vec(0, 0, 0);
+    grain_touch_wall(g, i, FLOOR, touching, vec(0, 0, 1), overlap, still, still, a);
+    return true;
+}
+
+DEVICE bool grain_touch_plate(const Grains &g, int i, uint32_t touching, Body *a) {
+    if (g.shape.reach <= 0.0f) {
+        return false;
+    }
+    Plate *plate = &g.plate[i / g.per];
+    const Place origin = {plate->cell_x, 1u << 31, plate->cell_z, 0};
+    const Vec d = from_to(g, origin, a->place);
+    const float radius = a->place.radius, far = g.shape.reach + radius;
+    const Vec p = plate_from_world(*plate, d);
+    if (dot(d, d) >= far * far || p.z < -radius) {
+        return false;
+    }
+    Vec normal;
+    const float gap = shape_nearest(g.shape, p, &normal) - radius;
+    if (gap >= 0.0f) {
+        return false;
+    }
+    normal = plate_to_world(*plate, normal);
+    const Vec at = d - (radius + 0.5f * gap) * normal; /* of the contact, from the origin */
+    const Vec turning = vec(0, (float)plate->rate, 0);
+    const Vec velocity = vec((float)plate->vx, 0, (float)plate->vz) + cross(turning, at);
+    const Vec before = a->torque;
+    const Vec force = grain_touch_wall(g, i, PLATE, touching, normal, -gap, velocity, turning, a);
+    const float arm = radius + 0.5f * gap;
+    const Vec rolling = a->torque - before + arm * cross(normal, force);
+    const Vec back = vec(-force.x, -force.y, -force.z);
+    plate_add(plate, back, cross(at, back) - rolling);
+    return true;
+}
+
+/* Leapfrog: velocities half a step before the places. */
+DEVICE void grain_move(const Grains &g, int i, const Body &a) {
+    const float h = g.law.dt / a.mass, r = a.place.radius;
+    const Vec velocity = a.velocity + h * a.force;
+    const Vec spin = a.spin + (2.5f * h / (r * r)) * a.torque;
+    Place place = a.place;
+    place.x = shifted(place.x, g.law.dt * velocity.x, g.unit.x);
+    place.y = shifted(place.y, g.law.dt * velocity.y, g.unit.y);
+    place.z = shifted(place.z, g.law.dt * velocity.z, g.unit.z);
+    g.next_place[i] = place;
+    g.next_velocity[i] = velocity;
+    g.next_spin[i] = spin;
+}
+
+DEVICE void grain_step(int i, const Grains &g) {
+    Body a;
+    a.place = g.place[i];
+    if (a.place.radius <= 0.0f) {
+        g.next_place[i] = a.place;
+        return;
+    }
+    a.velocity = g.velocity[i];
+    a.spin = g.spin[i];
+    a.mass = grain_mass(g.law, a.place.radius);
+    a.force = vec(0, 0, -a.mass * g.law.gravity);
+    a.torque = vec(0, 0, 0);
+    const uint32_t touching = g.touching[i];
+    uint32_t now = 0;
+    for (int s = 0; s < NEIGHBOURS && g.neighbour[slot(g, s, i)] >= 0; s++) {
+        now |= grain_touch_grain(g, i, s, touching, &a) ? 1u << s : 0u;
+    }
+    now |= grain_touch_floor(g, i, touching, &a) ? 1u << FLOOR : 0u;
+    now |= grain_touch_plate(g, i, touching, &a) ? 1u << PLATE : 0u;
+    if (now != touching) {
+        g.touching[i] = now;
+    }
+    grain_move(g, i, a);
+}
+
+/* The plate's place in the units of the grains, from its pose. */
+BOTH void plate_place(Plate *p, const Grains &g) {
+    p->cell_x = (1u << 31) + (uint32_t)(int32_t)llrint(p->x / (double)g.unit.x);
+    p->cell_z = (uint32_t)(int32_t)llrint(p->z / (double)g.unit.z);
+    p->sine = (float)sin(p->pitch);
+    p->cosine = (float)cos(p->pitch);
+}
+
+DEVICE void plate_step(int bed, const Grains &g) {
+    Plate *p = &g.plate[bed];
+    const double dt = (double)g.law.dt;
+    const double force = (double)(p->sum[2] - p->pushed) / (double)(1 << SUM_BITS);
+    p->pushed = p->sum[2];
+    if (p->mass > 0) {
+        p->vz += dt * (force / p->mass - (double)g.law.gravity);
+    }
+    p->x += dt * p->vx;
+    p->z += dt * p->vz;
+    p->pitch += dt * p->rate;
+    plate_place(p, g);
+}
+
+#endif

@@ -1,0 +1,90 @@
+/* The rigid plate of a bed: a block on an outline, or a sphere. Its origin is the middle of its
+ * bottom. It moves in x and z and turns about y, led or as a falling mass. */
+#ifndef GRAINS_PLATE_H
+#define GRAINS_PLATE_H
+
+#include "device.h"
+
+enum : int { SHAPE_POINTS = 64 };
+
+struct Shape {
+    int points;   /* of the outline, counter-clockwise or not; 0: a sphere, or no plate */
+    float radius; /* of a sphere; 0: none [m] */
+    float height; /* of the block [m] */
+    float reach;  /* no point of it is farther from its origin [m] */
+    float x[SHAPE_POINTS], y[SHAPE_POINTS];
+};
+
+/* Fixed point, so that a sum does not depend on its order: the same seed gives the same bits. */
+enum : int { SUM_BITS = 30 };
+
+struct Plate {
+    double x, z, pitch;      /* pose; the middle of the box and the floor are 0 [m], [rad] */
+    double vx, vz, rate;     /* [m/s], [rad/s] */
+    double mass;             /* above 0: moves in z under this mass's weight [kg] */
+    long long sum[6];        /* force and moment about its origin, over the steps since a row */
+    long long pushed;        /* sum[2] before this step */
+    uint32_t cell_x, cell_z; /* its place in the units of the grains */
+    float sine, cosine;
+};
+
+/* The point of the shape that is nearest to `p`, in the plate's frame, and the normal from it to p.
+ * Returns their distance [m], below 0 inside. */
+DEVICE float outline_nearest(const Shape &s, float px, float py, float *qx, float *qy) {
+    float best = 1e30f;
+    bool inside = false;
+    for (int i = 0, j = s.points - 1; i < s.points; j = i++) {
+        const float ex = s.x[j] - s.x[i], ey = s.y[j] - s.y[i];
+        const float wx = px - s.x[i], wy = py - s.y[i];
+        const float t = fminf(fmaxf((wx * ex + wy * ey) / (ex * ex + ey * ey), 0.0f), 1.0f);
+        const float dx = wx - t * ex, dy = wy - t * ey, d = dx * dx + dy * dy;
+        if (d < best) {
+            best = d;
+            *qx = px - dx;
+            *qy = py - dy;
+        }
+        if ((s.y[i] > py) != (s.y[j] > py) && wx < ex * wy / ey) {
+            inside = !inside;
+        }
+    }
+    return inside ? -sqrtf(best) : sqrtf(best);
+}
+
+DEVICE float shape_nearest(const Shape &s, Vec p, Vec *normal) {
+    if (s.points == 0) { /* a sphere that rests on the origin */
+        const Vec d = p - vec(0, 0, s.radius);
+        const float far = length(d);
+        *normal = (1.0f / fmaxf(far, 1e-12f)) * d;
+        return far - s.radius;
+    }
+    float qx = 0, qy = 0;
+    const float side = outline_nearest(s, p.x, p.y, &qx, &qy);
+    if (side < 0.0f && p.z > 0.0f &&
+        p.z < s.height) { /* a centre within: back through the bottom */
+        *normal = vec(0, 0, -1);
+        return -p.z;
+    }
+    const float z = fminf(fmaxf(p.z, 0.0f), s.height);
+    const Vec d = side < 0.0f ? vec(0, 0, p.z - z) : vec(p.x - qx, p.y - qy, p.z - z);
+    const float far = length(d);
+    *normal = (1.0f / fmaxf(far, 1e-12f)) * d;
+    return far;
+}
+
+/* From the plate's frame to the world's, and back. A positive pitch lowers the edge at +x. */
+DEVICE Vec plate_to_world(const Plate &plate, Vec p) {
+    return vec(plate.cosine * p.x + plate.sine * p.z, p.y, plate.cosine * p.z - plate.sine * p.x);
+}
+
+DEVICE Vec plate_from_world(const Plate &plate, Vec p) {
+    return vec(plate.cosine * p.x - plate.sine * p.z, p.y, plate.cosine * p.z + plate.sine * p.x);
+}
+
+DEVICE void plate_add(Plate *plate, Vec force, Vec moment) {
+    const float part[6] = {force.x, force.y, force.z, moment.x, moment.y, moment.z};
+    for (int k = 0; k < 6; k++) {
+        add_to(&plate->sum[k], (long long)((double)part[k] * (double)(1 << SUM_BITS)));
+    }
+}
+
+#endif

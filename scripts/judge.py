@@ -1,0 +1,335 @@
+#!/usr/bin/env python3
+"""Judges ground models by grains (docs/grains.md): fits each on two level plates and one drag, predicts all other cases, and
+prints the error of each beside one bed's noise.
+
+    PYTHONPATH=build/python .venv/bin/python scripts/judge.py
+    ... scripts/judge.py --entry mine.py:law --table theirs=predictions.csv      models of others (scripts/judge_entries.py)
+
+An error is model over grains less 1; of a share of the force before (F0) and of lengths it is the difference. The noise is the
+standard deviation over beds of the same number. `*` is an error above twice the noise. --out has all numbers as judge.csv and
+figures.html with the curves."""
+import argparse
+import base64
+import csv
+import importlib.util
+import io
+import json
+import pathlib
+import re
+import sys
+import time
+
+import numpy as np
+
+import mild
+from judge_cases import COLUMNS, MEASURES, Case, measures, scale
+from judge_entries import (Archimedes, FunctionEntry, GroundEntry, TableEntry, c_function, chrono_scm, rft_stress,
+                           wong_sand)
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+# Families of beds, what a model is fitted to there, and the families that the same fit predicts.
+FITS = {
+    "sand": (("disc120", "square100", "square100-drag15"), ("sand", "wide")),
+    "slick": (("disc120", "square100", "square100-drag15"), ("slick",)),
+    "fine": (("disc60", "strip", "strip-drag15"), ("fine",)),
+    "hertz": (("disc120", "square100", "square100-drag15"), ()),
+    "rolling": (("disc120", "square100", "square100-drag15"), ()),
+}
+FRICTION = {0.5: 0.38, 0.3: 0.33}  # internal friction of spheres by that of grains, for 3D-RFT: critical state, [lit]
+CSV_COLUMNS = {"time_s": "time", "stage": "stage", "depth_m": "depth", "path_m": "path", "pitch_rad": "pitch",
+               "force_x_n": "fx", "force_z_n": "fz", "moment_y_nm": "my"}
+
+
+def fail(text):
+    print(f"judge.py: {text}", file=sys.stderr)
+    sys.exit(2)
+
+
+# ---- records ----
+
+class Records:
+    """Cases of a folder of records: key FAMILY/NAME: (Case, [rows of each bed])."""
+
+    def __init__(self, folder):
+        file = folder / "manifest.json"
+        if not file.exists():
+            fail(f"{file} is not there: make records with grains/run.py")
+        try:
+            self.manifest, self.cases = json.loads(file.read_text()), {}
+        except (OSError, ValueError) as error:
+            fail(f"{file}: {error}")
+        for key, row in self.manifest.items():
+            if "case" not in row:
+                continue
+            family, name = key.split("/")
+            beds = [read_record(file) for file in sorted(folder.glob(f"{family}/{name}-*.csv"))
+                    if re.fullmatch(re.escape(name) + r"-\d+", file.stem)]
+            if beds:
+                self.cases[key] = Case(row["case"]), beds
+
+    def ground(self, family):
+        """Numbers of the beds of a family."""
+        row = self.manifest.get(family, {})
+        options = row.get("options", [])
+        given = {name.removeprefix("--"): value for name, value in zip(options[::2], options[1::2])}
+        return {"solid": row.get("solid", [0.59]), "density": float(given.get("density", 2500)),
+                "friction": float(given.get("friction", 0.5)), "grain": float(given.get("grain", 0.005))}
+
+
+def read_record(file):
+    table = np.genfromtxt(file, delimiter=",", names=True)
+    missing = [name for name in CSV_COLUMNS if name not in table.dtype.names]
+    if missing:
+        fail(f"{file} has no column {missing[0]}: it must be a record of grains")
+    return {short: table[name] for name, short in CSV_COLUMNS.items()}
+
+
+def mean_rows(beds):
+    """The mean bed, at the rows of the first."""
+    return {name: np.mean([np.interp(beds[0]["time"], rows["time"], rows[name]) for rows in beds], 0) if name != "stage"
+            else beds[0]["stage"] for name in COLUMNS}
+
+
+def grain_values(case, beds):
+    """{measure: (mean over beds, standard deviation of one)}."""
+    each = [measures(case, rows) for rows in beds]
+    return {name: (np.mean([values[name] for values in each]), np.std([values[name] for values in each], ddof=1) if len(each) > 1
+                   else np.nan) for name in each[0]}
+
+
+# ---- models ----
+
+def function_entry(text):
+    """FILE.py:FUNCTION or LIB.so:FUNCTION."""
+    file, _, name = text.rpartition(":")
+    path = pathlib.Path(file).resolve()
+    if not file or not path.exists():
+        fail(f"--entry {text}: it must be FILE.py:FUNCTION or LIB.so:FUNCTION")
+    try:
+        if path.suffix != ".py":
+            return FunctionEntry(name, c_function(str(path), name))
+        spec = importlib.util.spec_from_file_location("entry", path)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return FunctionEntry(name, getattr(module, name))
+    except (OSError, AttributeError) as error:
+        fail(f"--entry {text}: {error}")
+
+
+def entries(args, ground):
+    friction = FRICTION.get(ground["friction"], 0.38)
+    stress = rft_stress(ground, friction)
+    rft = GroundEntry("ecc_quasi_3d", mild.Material("sand_loose", model="ecc_quasi_3d", zeta=stress / 1e6, mu=0, k_drift=0,
+                                                    b_drift=0))
+    rft.name, rft.fit = "3d_rft", lambda records, ground: None
+    models = [name for name in args.models.split(",") if name] or [name for name in mild.models() if name != "rigid"]
+    yield from (GroundEntry(model) for model in models)
+    yield rft
+    yield FunctionEntry("chrono_scm", chrono_scm)
+    yield FunctionEntry("wong_sand", wong_sand)
+    yield FunctionEntry("archimedes", Archimedes())
+    yield from (function_entry(text) for text in args.entry)
+    for text in args.table:
+        name, _, file = text.partition("=")
+        if not file or not pathlib.Path(file).exists():
+            fail(f"--table {text}: it must be NAME=FILE.csv")
+        yield TableEntry(name, file)
+
+
+# ---- rows of the judgement ----
+
+def judge_family(args, records, fitted, results):
+    """Fits every model on a family and predicts; adds (fit, case, measure, grains, noise, {model: value}) to results."""
+    names, families = FITS[fitted]
+    keys = [f"{fitted}/{name}" for name in names]
+    lacking = [key for key in keys if key not in records.cases]
+    if lacking:
+        print(f"{fitted}: no record of {lacking[0]}, so nothing is fitted there")
+        return
+    given = {key: (records.cases[key][0], mean_rows(records.cases[key][1])) for key in keys}
+    ground, models = records.ground(fitted), []
+    for entry in entries(args, ground):
+        try:
+            entry.fit(given, ground)
+            models.append(entry)
+        except (ValueError, RuntimeError) as error:
+            print(f"{fitted}: {entry.name} is not fitted: {error}")
+    args.fitted[fitted] = models
+    for key, (case, beds) in sorted(records.cases.items(), key=lambda row: (row[0] not in keys, row[0])):
+        if key.split("/")[0] not in (*families, fitted):
+            continue
+        played = {entry.name: entry.play(case) for entry in models}
+        found = {name: measures(case, rows) for name, rows in played.items() if rows is not None}
+        for measure, (value, noise) in grain_values(case, beds).items():
+            values = {name: numbers.get(measure, np.nan) for name, numbers in found.items()}
+            results.append((fitted, key, key in keys, measure, value, noise, values))
+        args.curves.setdefault(key, (beds, played))
+
+
+def strip_ratio(entry):
+    """Pressure under a strip 50 mm wide over that under one of 150 mm, 15 mm deep, both four times as long."""
+    force = []
+    for width in (0.05, 0.15):
+        rows = entry.play(Case(f"strip rect:{4 * width},{width} 0 press:0.015@0.05"))
+        if rows is None:
+            return np.nan
+        force.append(rows["fz"][-1] / (4 * width**2))
+    return force[0] / force[1]
+
+
+def anchors(args, results):
+    """Real numbers: what, number, source, what the grains have or None, {model: value}."""
+    def row(measure, case):
+        found = next((r for r in results if r[3] == measure and r[1] == case), None)
+        return (None, {}) if found is None else (f"{found[4]:.3f} +- {found[5]:.3f}", found[6])
+    yield ("largest H/V0 of a foundation dragged at constant depth", 0.123, "swipe tests of Gottardi, Govoni, Butterfield",
+           *row("grip", "sand/square100-drag15"))
+    yield ("largest M/(B V0) of one that is turned", 0.09, "the same", *row("swipe", "sand/square100-swipe15"))
+    yield ("pressure of a strip 50 mm wide over one of 150 mm, dry sand", (0.99 / 0.05 + 1528.43) / (0.99 / 0.15 + 1528.43),
+           "k_c, k_phi of Wong 2008, Theory of Ground Vehicles, table 2.3", None,
+           {entry.name: strip_ratio(entry) for entry in args.fitted.get("sand", []) if not isinstance(entry, TableEntry)})
+    for text, real, source in (
+            ("stress over depth in loose poppy seeds [MPa/m]", 0.254, "Li, Zhang, Goldman 2013, arXiv 1303.7065: another ground"),
+            ("the same in close ones [MPa/m]", 0.464, "the same"),
+            ("feet of four shapes on three quartz sands", None, "Han 2020, Energies 13:1867: curves, not in numbers here"),
+            ("error of jumps predicted with added mass [%]", 6, "Hubicki 2016: needs a robot")):
+        yield text, real, source, None, {}
+
+
+# ---- what is printed ----
+
+def text_of(value, noise, measure):
+    unit = MEASURES[measure][1]
+    if not np.isfinite(value):
+        return "-"
+    star = "*" if np.isfinite(noise) and abs(value) > 2 * noise else " "
+    return f"{value:+.1f}{star}" if unit == "mm" else f"{100 * value:+.0f}{star}"
+
+
+def print_results(results):
+    for fitted in dict.fromkeys(row[0] for row in results):
+        rows = [row for row in results if row[0] == fitted]
+        names = list(dict.fromkeys(name for row in rows for name in row[6]))
+        print(f"\nfitted on {', '.join(dict.fromkeys(row[1] for row in rows if row[2]))}\n"
+              "errors [%; % of the force before; mm], one bed's noise in the same unit")
+        print(f"{'':41}{'grains':>8}{'noise':>6}" + "".join(f"{name[:12]:>13}" for name in names))
+        for _, key, used, measure, value, noise, values in rows:
+            by = scale(measure, value)
+            unit = 1 if MEASURES[measure][1] == "mm" else 100
+            errors = [text_of((values.get(name, np.nan) - value) / by, noise / by, measure) for name in names]
+            print(f"{key + ' fit' * used:29.29}{measure:12.12}{value:8.3g}{unit * noise / by:6.1f}" +
+                  "".join(f"{error:>13}" for error in errors))
+
+
+def print_score(results):
+    """Median and largest size of the errors that were predicted, and how many the noise explains."""
+    print("\npredicted cases only: errors [%], median and largest; lengths [mm], the same; share of all within twice the noise")
+    names = list(dict.fromkeys(name for row in results for name in row[6]))
+    for name in names:
+        errors, lengths, within = [], [], []
+        for _, _, used, measure, value, noise, values in results:
+            got = values.get(name, np.nan)
+            if used or not np.isfinite(got):
+                continue
+            if MEASURES[measure][1] == "mm":
+                lengths.append(abs(got - value))
+            else:
+                errors.append(100 * abs(got - value) / scale(measure, value))
+            within.append(abs(got - value) <= 2 * noise)
+        parts = [f"{np.median(part):8.1f}{np.max(part):7.0f}" if part else f"{'-':>8}{'-':>7}" for part in (errors, lengths)]
+        if within:
+            print(f"  {name:14}{parts[0]}{parts[1]}   {np.mean(within):.2f} of {len(within)}")
+
+
+def print_anchors(args, results):
+    print("\nreal numbers")
+    for text, real, source, grains, values in anchors(args, results):
+        print(f"  {text}: {'-' if real is None else format(real, '.4g')} ({source})")
+        here = [f"grains {grains}"] if grains else []
+        here += [f"{name} {value:.3f}" for name, value in values.items() if np.isfinite(value)]
+        if here:
+            print("    " + ", ".join(here))
+
+
+def write_csv(results, file):
+    with open(file, "w", newline="", encoding="utf-8") as out:
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(["fitted_on", "case", "used_in_fit", "measure", "unit", "grains", "noise", "model", "value", "error"])
+        for fitted, key, used, measure, value, noise, values in results:
+            for name, got in values.items():
+                writer.writerow([fitted, key, int(used), measure, MEASURES[measure][1], f"{value:.5g}", f"{noise:.3g}", name,
+                                 f"{got:.5g}", f"{(got - value) / scale(measure, value):.4g}"])
+
+
+# ---- figures ----
+
+def curve_axes(case):
+    """What a case is drawn over, and what: columns, labels, factors."""
+    if case.kind in ("press", "again"):
+        return ("depth", "depth [mm]", 1e3), ("my" if case.tilt else "fz", "moment [N m]" if case.tilt else "force [N]", 1.0)
+    if case.kind == "load":
+        return ("path", "path [mm]", 1e3), ("depth", "depth [mm]", 1e3)
+    if case.kind == "drag":
+        return ("path", "path [mm]", 1e3), ("fz", "force [N]", 1.0)
+    if case.kind == "swipe":
+        return ("pitch", "turn [deg]", 57.2958), ("my", "moment [N m]", 1.0)
+    return ("time", "time [ms]", 1e3), ("depth", "depth [mm]", 1e3)
+
+
+def write_figures(args, records, file):
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    parts = ["<!doctype html><meta charset=utf-8><title>Ground models and grains</title><body style='font-family:sans-serif'>"
+             "<h1>Ground models and grains</h1><p>Grey: each bed. Lines: models, fitted on two level plates and one drag.</p>"]
+    for key, (beds, played) in sorted(args.curves.items()):
+        case = records.cases[key][0]
+        (x, xlabel, xf), (y, ylabel, yf) = curve_axes(case)
+        figure, axes = plt.subplots(figsize=(5.2, 3.4))
+        for rows in beds:
+            axes.plot(xf * rows[x], yf * rows[y], color="0.75", lw=0.8)
+        for name, rows in played.items():
+            if rows is not None:
+                axes.plot(xf * rows[x], yf * rows[y], lw=2 if name.startswith("mild") else 1, label=name)
+        high = 2 * max(float(np.abs(yf * rows[y]).max()) for rows in beds)
+        axes.set(title=key, xlabel=xlabel, ylabel=ylabel)
+        axes.set_ylim(max(axes.get_ylim()[0], -high), min(axes.get_ylim()[1], high))
+        axes.legend(fontsize=6)
+        data = io.BytesIO()
+        figure.tight_layout()
+        figure.savefig(data, format="svg")
+        plt.close(figure)
+        parts.append(f"<img alt='{key}' src='data:image/svg+xml;base64,{base64.b64encode(data.getvalue()).decode()}'>")
+    file.write_text("\n".join(parts) + "\n", encoding="utf-8")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--records", default=ROOT / "grains" / "records", type=pathlib.Path)
+    parser.add_argument("--families", default=",".join(FITS), help="beds to fit on, of " + ", ".join(FITS))
+    parser.add_argument("--models", default="", help="of mild; default: all that yield")
+    parser.add_argument("--entry", action="append", default=[], help="FILE.py:FUNCTION or LIB.so:FUNCTION, a model of your own")
+    parser.add_argument("--table", action="append", default=[], help="NAME=FILE.csv, predictions of your own")
+    parser.add_argument("--out", type=pathlib.Path, help="folder for judge.csv and figures.html")
+    args = parser.parse_args()
+    args.curves, args.fitted, results, begin = {}, {}, [], time.time()
+    records = Records(args.records)
+    for fitted in args.families.split(","):
+        if fitted not in FITS:
+            fail(f"--families: {fitted} is not one of {', '.join(FITS)}")
+        judge_family(args, records, fitted, results)
+    if not results:
+        fail("nothing to judge")
+    print_results(results)
+    print_score(results)
+    print_anchors(args, results)
+    if args.out:
+        args.out.mkdir(parents=True, exist_ok=True)
+        write_csv(results, args.out / "judge.csv")
+        write_figures(args, records, args.out / "figures.html")
+        print(f"\n{args.out / 'judge.csv'}, {args.out / 'figures.html'}")
+    print(f"{time.time() - begin:.0f} s")
+
+
+if __name__ == "__main__":
+    main()

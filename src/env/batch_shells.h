@@ -1,0 +1,263 @@
+/* Soft ground under the shells of a robot, where these stand: a step of their own for robots that
+ * have one near the ground. All others are stepped as without shells. */
+#ifndef ENVS_BATCH_SHELLS_H
+#define ENVS_BATCH_SHELLS_H
+
+#include "env/batch_env.h"
+#include "ground/batch/bodies.h"
+#include "robot/engine/ground.h"
+#include "robot/engine/shells.h"
+
+/* [m] A body so far above the ground does not reach it in a step. It saves its twist. */
+#define ENV_SHELLS_FAR REAL(0.15)
+
+/* In shared memory. */
+typedef struct {
+    EngineShells engine;
+    BodiesWork ground;
+} EnvShellsWork;
+
+MILD_HD const BodiesSetup *env_bodies(const EnvsArrays *all) {
+    return (const BodiesSetup *)all->shells.setup;
+}
+
+/* No body is near the ground. */
+WARP_FN void env_shells_away(const EnvsArrays *all, long robot) {
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            all->shells.near[robot] = 0;
+        }
+    }
+    lanes_sync();
+}
+
+/* Bool: the body may touch the ground in this step, as mild_ground_near says. */
+MILD_HD int env_body_near(const EnvsArrays *all, const EngineGround *ground, const EngineWork *work,
+                          int body) {
+    const EngineModel *model = all->model;
+    const BodiesSetup *setup = env_bodies(all);
+    const EngineLinks links = engine_links_of(work);
+    const int at = engine_feet(&model->tree) + body;
+    Real from_base[3], position[3], rotation[9], twist[6];
+    engine_body_pose(model, &links, body, from_base, rotation);
+    for (int k = 0; k < 3; k++) {
+        position[k] = from_base[k] + work->base[k];
+    }
+    const Real reach =
+        bodies_reach(setup, at, position, rotation, ground->map_origin, ground->height);
+    if (!(reach > -ENV_SHELLS_FAR)) {
+        return 0;
+    }
+    engine_body_twist(&model->tree, &links, work->rate, body, from_base, twist);
+    return reach > bodies_least(setup, setup->sole[at].radius, twist, twist);
+}
+
+/* Which bodies are near the ground, after engine_begin. */
+WARP_FN void env_shells_near(const EnvsArrays *all, long robot, const EngineGround *ground,
+                             const EngineWork *work) {
+    const EngineTree *tree = &all->model->tree;
+    Real bit[LANE_COPIES];
+    EACH_LANE(l) {
+        bit[l] = 0;
+        if (LANE(l) < tree->bodies && env_body_near(all, ground, work, LANE(l))) {
+            bit[l] = (Real)(1 << LANE(l));
+        }
+    }
+    const int near = (int)lane_sum(bit);
+    if (!near) {
+        return;
+    }
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            all->shells.near[robot] = (uint8_t)near;
+        }
+    }
+    engine_save_links(tree, work, &env_shells_at(all, robot)->links);
+}
+
+/* ---- the step ---- */
+
+/* Of the bits in `near`, those of bodies with an element that may touch the ground in this step. */
+WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, int near) {
+    const EngineModel *model = all->model;
+    const BodiesSetup *setup = env_bodies(all);
+    const EngineSaved *saved = &env_robot_at(all, robot)->saved;
+    const EngineLinks links = engine_links_saved(&env_shells_at(all, robot)->links);
+    int touch = 0;
+    LANE_ROLLED
+    for (int body = 0; body < model->tree.bodies; body++) {
+        const int at = setup->feet + body;
+        Real position[3], rotation[9], twist[6];
+        if (!(near >> body & 1)) {
+            continue;
+        }
+        engine_body_pose(model, &links, body, position, rotation);
+        engine_body_twist(&model->tree, &links, saved->state + ENGINE_SAVED(rate), body, position,
+                          twist);
+        for (int k = 0; k < 3; k++) {
+            position[k] += saved->state[ENGINE_SAVED(base) + k];
+        }
+        if (bodies_touch(setup, at, position, rotation, twist, all->map_origin + 2 * robot,
+                         all->contact.height[robot])) {
+            touch |= 1 << body;
+        }
+    }
+    return touch;
+}
+
+/* Bool: there is something to do for a robot. */
+MILD_HD int env_shells_wait(const EnvsArrays *all, long robot) {
+    return all->shells.near[robot] || all->shells.held[robot];
+}
+
+/* Memory of foot f, in the layout of contact.h. */
+MILD_HD BodiesMemory env_foot_memory(const EnvsShells *shells, long robot, int f) {
+    const BatchShape *shape = &shells->shape;
+    const int all = shape->groups * shape->stride;
+    Real *memory = shells->ground.memory + robot * contact_memory_numbers(all, shape->map);
+    const BodiesMemory at = {memory + f * shape->stride, all, memory + all * CONTACT_MAP_MEMORY + f,
+                             shape->groups};
+    return at;
+}
+
+MILD_HD BodiesMemory env_body_memory(const EnvsArrays *all, long robot, int body) {
+    const BodiesSole *sole = &env_bodies(all)->sole[body];
+    return bodies_memory(all->shells.memory + robot * (long)all->shells.numbers + sole->memory,
+                         sole->elements);
+}
+
+/* Bodies other than those of the bits in `near` forget. */
+WARP_FN void env_shells_leave(const EnvsArrays *all, long robot, int near) {
+    const BodiesSetup *setup = env_bodies(all);
+    LANE_ROLLED
+    for (int b = setup->feet; b < setup->bodies; b++) {
+        if (!(near >> (b - setup->feet) & 1)) {
+            const BodiesMemory memory = env_body_memory(all, robot, b);
+            bodies_leave(&memory, setup->sole[b].elements);
+        }
+    }
+}
+
+/* Feet, then the bodies of the bits in `near`. */
+WARP_FN void env_shells_list(const EnvsArrays *all, long robot, int near, EnvShellsWork *work) {
+    const BodiesSetup *setup = env_bodies(all);
+    const int feet = setup->feet;
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            BodiesWork *to = &work->ground;
+            int count = 0;
+            for (int b = 0; b < setup->bodies; b++) {
+                if (b < feet || near >> (b - feet) & 1) {
+                    to->body[count] = b;
+                    to->memory[count] = b < feet ? env_foot_memory(&all->shells, robot, b)
+                                                 : env_body_memory(all, robot, b);
+                    work->engine.body[count < feet ? 0 : count - feet] = b - feet;
+                    count++;
+                }
+            }
+            to->count = count;
+            to->label_material = all->material + robot * all->task->labels;
+            to->map_origin = all->map_origin + 2 * robot;
+            to->height = all->contact.height[robot];
+            work->engine.count = count - feet;
+        }
+    }
+    lanes_sync();
+}
+
+/* n numbers of each lane. */
+WARP_FN void env_shells_copy(const Real *from, int count, Real *to) {
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int i = LANE(l); i < count; i += LANES) {
+            to[i] = from[i];
+        }
+    }
+}
+
+/* What the ground asks of the feet, from env_export. */
+WARP_FN void env_shells_feet(const EnvsArrays *all, long robot, BodiesWork *to) {
+    const int feet = env_bodies(all)->feet;
+    const EnvsContact *at = &all->contact;
+    const Real *A = at->inverse_inertia + robot * 36 * feet * feet;
+    const int rows = 6 * to->count;
+    env_shells_copy(at->position + robot * 3 * feet, 3 * feet, to->position[0]);
+    env_shells_copy(at->rotation + robot * 9 * feet, 9 * feet, to->rotation[0]);
+    env_shells_copy(at->velocity + robot * 6 * feet, 6 * feet, to->velocity[0]);
+    env_shells_copy(at->free_velocity + robot * 6 * feet, 6 * feet, to->free_velocity);
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int i = LANE(l); i < 36 * feet * feet; i += LANES) {
+            to->inverse_inertia[i / (6 * feet) * rows + i % (6 * feet)] = A[i];
+        }
+    }
+    lanes_sync();
+}
+
+/* Wrenches of the feet for env_import and of the bodies for engine_end; the measures. */
+WARP_FN void env_shells_results(const EnvsArrays *all, long robot, const EnvShellsWork *work) {
+    const int feet = env_bodies(all)->feet;
+    const BodiesWork *from = &work->ground;
+    env_shells_copy(from->wrench, 6 * feet, all->contact.velocity + robot * 6 * feet);
+    EACH_LANE(l) {
+        if (LANE(l) < feet) {
+            const ContactFoot *foot = &from->foot[LANE(l)];
+            MildBatchFoot *to = &all->contact.foot[robot * feet + LANE(l)];
+            for (int k = 0; k < 3; k++) {
+                to->pressure_center[k] = foot->pressure_center[k];
+            }
+            to->depth_max = foot->depth_max;
+            to->depth_mean = foot->depth_mean;
+            to->area = foot->area;
+        }
+        if (LANE(l) == LANES - 1) {
+            Real load = 0;
+            for (int i = feet; i < from->count; i++) {
+                load += from->wrench[6 * i + 2];
+            }
+            env_shells_at(all, robot)->load = load;
+        }
+    }
+    engine_shells_end(&all->model->tree, &work->engine, from->wrench + 6 * feet,
+                      &env_robot_at(all, robot)->saved);
+}
+
+/* The step of a robot with bodies near the ground. */
+WARP_FN void env_shells_step(const EnvsArrays *all, long robot, int near, EnvShellsWork *work) {
+    const int feet = env_bodies(all)->feet;
+    BodiesWork *ground = &work->ground;
+    env_shells_list(all, robot, near, work);
+    env_shells_feet(all, robot, ground);
+    const EngineShellsGround bodies = {ground->position + feet, ground->rotation + feet,
+                                       ground->velocity + feet, ground->free_velocity + 6 * feet,
+                                       ground->inverse_inertia};
+    engine_shells_begin(all->model, &env_robot_at(all, robot)->saved,
+                        &env_shells_at(all, robot)->links, &work->engine, &bodies);
+    bodies_step(env_bodies(all), ground, 1);
+    env_shells_results(all, robot, work);
+}
+
+/* After part k of a policy step. In a new episode the shells remember nothing. */
+WARP_FN void env_shells(const EnvsArrays *all, long robot, int k, EnvShellsWork *work) {
+    const int listed = all->shells.near[robot];
+    const int near = listed ? env_shells_touch(all, robot, listed) : 0;
+    const int held = all->shells.held[robot];
+    if (held) {
+        env_shells_leave(all, robot, k == 0 && all->reset[robot] ? 0 : near);
+    }
+    if (near) {
+        env_shells_step(all, robot, near, work);
+    }
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            all->shells.near[robot] = (uint8_t)near;
+            all->shells.held[robot] = near != 0;
+            if (!near) {
+                env_shells_at(all, robot)->load = 0;
+            }
+        }
+    }
+    lanes_sync();
+}
+
+#endif

@@ -1,0 +1,605 @@
+/* The contact step of one robot whose shells are near the ground, by a warp: any number of bodies,
+ * soles and surfaces (docs/model.md section 20), level or on a map.
+ *
+ * Few robots take this step at a time, so it has one text for all sizes. Elements keep nothing in
+ * registers: whatever a step needs of one follows from its memory whenever it is asked for. What
+ * the lanes share is in BodiesWork. The method is that of contact.inc, and so are the names. */
+#ifndef MILD_BATCH_BODIES_H
+#define MILD_BATCH_BODIES_H
+
+#include "ground/batch/contact.h"
+
+#define BODIES_MAX 9 /* feet, and bodies with shells: those of the Go1 */
+#define BODIES_ROWS (6 * BODIES_MAX)
+#define BODIES_SUMS 42                         /* of an evaluation: a wrench and a 6 x 6 hessian */
+#define BODIES_STEEP REAL(0.17364817766693034) /* [-] cosine of 80 degrees, as in faces.c */
+#define BODIES_MARGIN REAL(1e-3)               /* [m] as in locate.c */
+#define BODIES_EXTRA_SPEED REAL(2)             /* [m/s] as in locate.c */
+
+/* The elements of a body. */
+typedef struct {
+    const Real *x;    /* [elements] [m] centre in the body's frame */
+    const Real *y;    /* [m] */
+    const Real *face; /* a sole: NULL; a surface: [5][elements] z [m], outward normal, area over
+                         `square` */
+    Real z;           /* [m] of a sole's plane */
+    Real square;      /* [m^2] area of an element in the law */
+    Real middle[3];   /* [m] of the bounding box, body's frame */
+    Real half[3];     /* [m] */
+    Real radius;      /* [m] of the body's origin to the farthest element */
+    int elements;
+    const ContactMaterial *table; /* material m at [m step] */
+    int step;
+    int memory; /* a surface: where its memory begins in that of a robot */
+} BodiesSole;
+
+/* The same for all robots and steps: feet first. */
+typedef struct {
+    BodiesSole sole[BODIES_MAX];
+    int feet;
+    int bodies;
+    Real dt;        /* [s] */
+    Real tolerance; /* as in ContactSetup */
+    int limit;
+    int materials; /* in the tables; behind them one that is not a number */
+    Real steepest; /* [-] upper bound on the gradient of the map */
+    int has_map;   /* bool */
+    MapView map;
+} BodiesSetup;
+
+/* Memory of a body. Number n of element s is at element[n next + s]: CONTACT_MEMORY numbers, then
+ * plane [m], its gradient [-] along x and y, a label, as in contact.h; of a surface the last is the
+ * state and the area's share [-] follows. Numbers of the body are `step` apart: the reference point
+ * and height of the last step [m], whether there was a step; of a surface then whether anything is
+ * remembered. */
+typedef struct {
+    Real *element;
+    int next;
+    Real *body;
+    int step;
+} BodiesMemory;
+enum {
+    BODIES_PLANE = CONTACT_MEMORY, /* with a map, or of a surface */
+    BODIES_STATE = BODIES_PLANE + 3,
+    BODIES_SHARE,
+    BODIES_NUMBERS,     /* of an element of a surface */
+    BODIES_STEPPED = 4, /* of the numbers of a body */
+    BODIES_TOUCHED,
+    BODIES_OWN = 8 /* numbers of a body */
+};
+/* State of an element of a surface: 1 plus the label that it touched down on, or one of these: the
+ * MATERIAL_NONE, MATERIAL_FREE and MATERIAL_BURIED of ground/state.h. */
+enum { BODIES_NONE = 0, BODIES_FREE = -1, BODIES_BURIED = -2 };
+
+/* [numbers] of the memory of a surface. */
+MILD_HD int bodies_memory_numbers(int elements) {
+    return BODIES_NUMBERS * elements + BODIES_OWN;
+}
+
+/* That of a surface, at `memory`. */
+MILD_HD BodiesMemory bodies_memory(Real *memory, int elements) {
+    const BodiesMemory at = {memory, elements, memory + BODIES_NUMBERS * elements, 1};
+    return at;
+}
+
+/* A point of the search. */
+typedef struct {
+    Real impulse[BODIES_ROWS]; /* [N s, N m s] P */
+    Real twist[BODIES_ROWS];   /* [m/s, rad/s] V */
+    Real wrench[BODIES_ROWS];  /* [N s, N m s] W */
+} BodiesPoint;
+
+/* A robot in a step, in shared memory: its feet, then its bodies near the ground. In: all up to
+ * `inverse_inertia`. Out: wrench [N, N m], velocity after the step, foot. */
+typedef struct {
+    int count;
+    int body[BODIES_MAX]; /* number of a place */
+    BodiesMemory memory[BODIES_MAX];
+    const int *label_material; /* as in ContactProblem */
+    const Real *map_origin;
+    Real height; /* [m] of the surface */
+    Real position[BODIES_MAX][3];
+    Real rotation[BODIES_MAX][9];
+    Real velocity[BODIES_MAX][6];
+    Real free_velocity[BODIES_ROWS];
+    Real inverse_inertia[BODIES_ROWS * BODIES_ROWS]; /* [6 count][6 count] */
+    Real wrench[BODIES_ROWS];
+    ContactFoot foot[BODIES_MAX];
+    Real residual; /* [-] relative */
+    int iterations;
+    /* ---- of the solution ---- */
+    Real least[BODIES_MAX]; /* [m] elements less deep do not touch in this step */
+    BodiesPoint at, full, next, best;
+    Real hessian[BODIES_MAX][36];
+    Real row[2][BODIES_ROWS];                     /* what is summed over rows */
+    Real matrix[BODIES_ROWS * (BODIES_ROWS + 1)]; /* [1 + H A | W + H (V - V_free)] */
+} BodiesWork;
+
+/* One element at the start of a step. */
+typedef struct {
+    Real p[3]; /* [m] from the body's reference point, world axes */
+    Real depth;
+    Real slope[2];
+    Real share;     /* [-] 1 for a sole; 0: carries nothing */
+    int label;      /* that it stands on */
+    int faces_down; /* bool: of a surface; 1 for a sole */
+    int listed;     /* bool: may touch in this step */
+    ElementMemory before;
+    Element element;
+    int curves;
+} BodiesElement;
+
+/* A spot without a map. */
+MILD_HD MapSpot bodies_no_spot(void) {
+    const MapSpot none = {{0, 0}, {0, 0}, {0, 0}, {0, 0}, 0};
+    return none;
+}
+
+/* p of element s. */
+MILD_HD void bodies_point(const BodiesSole *sole, const Real *R, int s, Real *p) {
+    const Real at[3] = {sole->x[s], sole->y[s], sole->face ? sole->face[s] : sole->z};
+    for (int k = 0; k < 3; k++) {
+        p[k] = R[3 * k] * at[0] + R[3 * k + 1] * at[1] + R[3 * k + 2] * at[2];
+    }
+}
+
+/* Outward normal, world. */
+MILD_HD void bodies_normal(const BodiesSole *sole, const Real *R, int s, Real *normal) {
+    const Real *n = sole->face + sole->elements + s;
+    const int next = sole->elements;
+    for (int k = 0; k < 3; k++) {
+        normal[k] = R[3 * k] * n[0] + R[3 * k + 1] * n[next] + R[3 * k + 2] * n[2 * next];
+    }
+}
+
+/* Velocity of an element under a twist. */
+MILD_HD ContactVelocity bodies_velocity(const BodiesElement *own, const Real *V) {
+    const Real *p = own->p;
+    const Real z = V[2] + V[3] * p[1] - V[4] * p[0];
+    ContactVelocity v;
+    v.x = V[0] + V[4] * p[2] - V[5] * p[1];
+    v.y = V[1] + V[5] * p[0] - V[3] * p[2];
+    v.descent = own->slope[0] * v.x + own->slope[1] * v.y - z;
+    return v;
+}
+
+/* ---- which bodies and elements ---- */
+
+/* [m/s] Upper bounds on the speeds of a point of a body downward and level. */
+MILD_HD void bodies_speeds(Real radius, const Real *V, Real *down, Real *level) {
+    const Real tilt = V[3] * V[3] + V[4] * V[4];
+    *down = real_max(-V[2], 0) + radius * REAL_SQRT(tilt);
+    *level = REAL_SQRT(V[0] * V[0] + V[1] * V[1]) + radius * REAL_SQRT(tilt + V[5] * V[5]);
+}
+
+/* [m/s] Upper bound on the speed at which a point of a body gets deeper; foot_descent. */
+MILD_HD Real bodies_descent(const BodiesSetup *setup, Real radius, const Real *V) {
+    Real down, level;
+    bodies_speeds(radius, V, &down, &level);
+    return down + setup->steepest * level;
+}
+
+/* [m] Depth below which elements are listed; foot_least. */
+MILD_HD Real bodies_least(const BodiesSetup *setup, Real radius, const Real *V, const Real *free) {
+    const Real descent =
+        real_max(bodies_descent(setup, radius, V), bodies_descent(setup, radius, free));
+    return -BODIES_MARGIN - setup->dt * (descent + BODIES_EXTRA_SPEED);
+}
+
+/* [m] Upper bound on the depth of any element of a body at that pose; foot_reach. */
+MILD_HD Real bodies_reach(const BodiesSetup *setup, int body, const Real *position, const Real *R,
+                          const Real *map_origin, Real height) {
+    const BodiesSole *sole = &setup->sole[body];
+    Real at[3], slope[2], low = 0, square = 0;
+    for (int k = 0; k < 3; k++) {
+        at[k] = R[3 * k] * sole->middle[0] + R[3 * k + 1] * sole->middle[1] +
+                R[3 * k + 2] * sole->middle[2];
+        low += REAL_ABS(R[6 + k]) * sole->half[k];
+        square += sole->half[k] * sole->half[k];
+    }
+    if (!setup->has_map) {
+        return height - position[2] - at[2] + low;
+    }
+    const MapSpot spot = map_spot(&setup->map, position, map_origin, height);
+    const Real above = map_surface_near(&setup->map, &spot, at[0], at[1], slope);
+    return above - at[2] + setup->steepest * REAL_SQRT(square) + low;
+}
+
+/* Bool: an element of a body at that pose may touch the ground in this step. bodies_reach is a
+ * bound that the steepest place of a map makes wide; an element meets the plane under itself
+ * (bodies_velocity). V: twist. */
+WARP_FN int bodies_touch(const BodiesSetup *setup, int body, const Real *position, const Real *R,
+                         const Real *V, const Real *map_origin, Real height) {
+    const BodiesSole *sole = &setup->sole[body];
+    const MapSpot spot =
+        setup->has_map ? map_spot(&setup->map, position, map_origin, height) : bodies_no_spot();
+    Real found[LANE_COPIES], down, level;
+    bodies_speeds(sole->radius, V, &down, &level);
+    EACH_LANE(l) {
+        found[l] = 0;
+        LANE_ROLLED
+        for (int s = LANE(l); s < sole->elements; s += LANES) {
+            Real p[3], slope[2] = {0, 0};
+            bodies_point(sole, R, s, p);
+            const Real above = setup->has_map
+                                   ? map_surface_near(&setup->map, &spot, p[0], p[1], slope)
+                                   : height - position[2];
+            const Real steep = REAL_SQRT(slope[0] * slope[0] + slope[1] * slope[1]);
+            const Real descent = down + steep * level + BODIES_EXTRA_SPEED;
+            found[l] += above - p[2] + BODIES_MARGIN + setup->dt * descent > 0 ? 1 : 0;
+        }
+    }
+    return lane_sum(found) > 0;
+}
+
+/* ---- an element at the start of a step ---- */
+
+MILD_HD ElementMemory bodies_recall(const BodiesMemory *memory, int s) {
+    const Real *at = memory->element + s;
+    const int next = memory->next;
+    const ElementMemory before = {at[0],        at[next],     at[2 * next],
+                                  at[3 * next], at[4 * next], at[5 * next],
+                                  at[6 * next], at[7 * next], at[8 * next]};
+    return before;
+}
+
+MILD_HD void bodies_record(const BodiesMemory *memory, int s, const ElementMemory *after) {
+    Real *at = memory->element + s;
+    const int next = memory->next;
+    at[0] = after->depth_max;
+    at[next] = after->middle;
+    at[2 * next] = after->front_speed;
+    at[3 * next] = after->drift;
+    at[4 * next] = after->pending_x;
+    at[5 * next] = after->pending_y;
+    at[6 * next] = after->held_x;
+    at[7 * next] = after->held_y;
+    at[8 * next] = after->held_stiffness;
+}
+
+/* State of element s of a body; of a sole, whose elements keep no state, from what it remembers. */
+MILD_HD int bodies_state(const BodiesSetup *setup, const BodiesSole *sole,
+                         const BodiesMemory *memory, int s) {
+    const Real *at = memory->element + s;
+    if (sole->face) {
+        return (int)at[BODIES_STATE * memory->next];
+    }
+    if (at[0] > 0) {
+        return setup->has_map ? 1 + (int)at[BODIES_STATE * memory->next] : 1;
+    }
+    return BODIES_FREE;
+}
+
+/* Surface and label under an element; the depth is not below the last step's plane
+ * (slots_uneven). */
+MILD_HD void bodies_survey(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
+                           int state, const MapSpot *spot, BodiesElement *own) {
+    const MapView *map = &setup->map;
+    const BodiesMemory *memory = &work->memory[i];
+    const Real *plane = memory->element + BODIES_PLANE * memory->next + s;
+    const Real *last = memory->body;
+    const Real *p = own->p;
+    own->depth = map_surface_near(map, spot, p[0], p[1], own->slope) - p[2];
+    const int stood = state > 0 && state <= map->labels;
+    own->label = stood ? state - 1 : map_label_near(map, spot, p[0], p[1]);
+    const int remembers = state > 0 || (state == BODIES_FREE && own->depth > 0);
+    if (map->uneven && last[BODIES_STEPPED * memory->step] > 0 && remembers) {
+        const Real *at = work->position[i];
+        const Real x = at[0] - last[0] + p[0];
+        const Real y = at[1] - last[memory->step] + p[1];
+        const Real raised = work->height - last[3 * memory->step];
+        const Real z = at[2] - last[2 * memory->step] - raised + p[2];
+        const Real below = plane[0] + plane[memory->next] * x + plane[2 * memory->next] * y - z;
+        own->depth = real_min(own->depth, below);
+    }
+}
+
+/* slot_scale: numbers that make force or mass. */
+MILD_HD void bodies_scale(Element *e, Real share) {
+    e->law.flat_stiffness *= share;
+    e->law.line_stiffness *= share;
+    e->law.mass_rate *= share;
+    e->law.drag_rate *= share;
+    e->law.bed_stiffness *= share;
+    e->law.power_force *= share;
+    e->law.elastic_force *= share;
+    e->exit_drag *= share;
+    e->entry_drag *= share;
+    e->k_drift *= share;
+    e->b_drift *= share;
+}
+
+/* The share of an element of a surface, and its law times that: faces_laws and faces_unload. A
+ * buried element begins without force; under elastic ground it has none. */
+MILD_HD void bodies_share(const BodiesSetup *setup, const BodiesWork *work, int i, int s, int state,
+                          const ContactMaterial *material, BodiesElement *own) {
+    const BodiesSole *sole = &setup->sole[work->body[i]];
+    const BodiesMemory *memory = &work->memory[i];
+    Element *e = &own->element;
+    const Real m0 = own->depth - setup->dt / 2 * bodies_velocity(own, work->velocity[i]).descent;
+    const int buried = state == BODIES_BURIED && m0 > 0;
+    const Real lasting = 1 - e->recovery;
+    own->share = state > 0 ? memory->element[BODIES_SHARE * memory->next + s] : own->share;
+    if (!(lasting > 0) && (buried || (state == BODIES_FREE && own->before.middle > 0))) {
+        own->share = 0;
+    }
+    if (lasting > 0 && buried) {
+        const Real least = real_max(m0 / lasting, m0 + ELEMENT_ELASTIC);
+        own->before.depth_max = real_max(own->before.depth_max, least);
+    }
+    const int directed = (material->curves & LAW_RESIST) && material->law.flat_stiffness == 0 &&
+                         material->law.power_force == 0;
+    const Real whole = sole->face[4 * sole->elements + s];
+    bodies_scale(e, directed && own->share > 0 ? whole : own->share);
+}
+
+/* contact_direct for a plate of its own. */
+MILD_HD void bodies_direct(const BodiesSole *sole, const Real *R, int s,
+                           const ContactMaterial *material, const ContactVelocity *now, Real dt,
+                           BodiesElement *own) {
+    Element *e = &own->element;
+    if (!sole->face) {
+        contact_direct(material, R, sole->square, now, dt, &own->before, e);
+        return;
+    }
+    if (own->curves & LAW_RESIST) {
+        Real normal[3];
+        bodies_normal(sole, R, s, normal);
+        const Plate plate = plate_facing(normal);
+        element_resist(e, &own->before, &plate, (own->curves & LAW_SPACE) != 0, own->curves, dt,
+                       1 / dt, e->law.line_stiffness, now->x, now->y, now->descent);
+        if (sizeof(Real) < sizeof(double)) { /* contact_direct says why */
+            e->yield_depth = real_max(e->yield_depth, e->middle);
+        }
+    }
+    if (own->curves & LAW_SHEAR) {
+        const Shear shear = {material->mu, material->cohesion, material->shear_length,
+                             sole->square * own->share};
+        element_shear(e, &own->before, &shear, own->curves, dt, 1 / dt);
+    }
+}
+
+/* Its law in this step; foot_prepare. */
+MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int i, int s, int state,
+                          BodiesElement *own) {
+    const BodiesSole *sole = &setup->sole[work->body[i]];
+    const int wanted = work->label_material ? work->label_material[own->label] : 0;
+    const int known = wanted >= 0 && wanted < setup->materials ? wanted : setup->materials;
+    const ContactMaterial *material = &sole->table[known * sole->step];
+    const ContactVelocity now = bodies_velocity(own, work->velocity[i]);
+    const Real free = bodies_velocity(own, work->free_velocity + 6 * i).descent;
+    const Real dt = setup->dt;
+    Element *e = &own->element;
+    contact_stand_on(material, e);
+    own->curves = material->curves;
+    if (sole->face) {
+        bodies_share(setup, work, i, s, state, material, own);
+    }
+    e->depth = own->depth;
+    e->stop_drag = e->stop_growth = e->explicit_impulse = e->turn_x = e->turn_y = 0;
+    element_begin(e, &own->before, own->curves, dt, 1 / dt, now.descent);
+    if (own->curves & LAW_CONE) {
+        const int created = e->law.mass_rate < 0 || e->law.drag_rate < 0;
+        if (created && own->depth > 0 && e->middle >= own->before.depth_max) {
+            e->explicit_impulse = element_explicit(e, dt, free);
+        }
+        element_drag(e, LAW_CONE, dt, real_max(free - now.descent, 0));
+    }
+    bodies_direct(sole, work->rotation[i], s, material, &now, dt, own);
+}
+
+/* Element s of the body at place i. Where it is not listed, all but depth, share and memory is
+ * unset. all: bool, begin those that are not listed, too. */
+MILD_HD void bodies_element(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
+                            const MapSpot *spot, int all, BodiesElement *own) {
+    const BodiesSole *sole = &setup->sole[work->body[i]];
+    const Real *R = work->rotation[i];
+    const int state = bodies_state(setup, sole, &work->memory[i], s);
+    own->before = bodies_recall(&work->memory[i], s);
+    own->slope[0] = own->slope[1] = 0;
+    own->label = 0;
+    own->share = 1;
+    bodies_point(sole, R, s, own->p);
+    if (sole->face) {
+        Real normal[3];
+        bodies_normal(sole, R, s, normal);
+        own->share =
+            -normal[2] > BODIES_STEEP ? -normal[2] * sole->face[4 * sole->elements + s] : 0;
+    }
+    own->faces_down = own->share > 0;
+    if (setup->has_map) {
+        bodies_survey(setup, work, i, s, state, spot, own);
+    } else {
+        own->depth = work->height - work->position[i][2] - own->p[2];
+    }
+    own->listed = own->faces_down && own->depth > work->least[i];
+    if (own->listed || all) {
+        bodies_begin(setup, work, i, s, state, own);
+    }
+}
+
+#include "ground/batch/bodies_newton.h"
+
+/* ---- the end of a step ---- */
+
+/* What is summed over a body's loaded elements. */
+typedef struct {
+    Real loaded, depth, force, area, deepest, p[3];
+} BodiesLoads;
+
+MILD_HD void bodies_chart(const BodiesMemory *memory, int s, const BodiesElement *own) {
+    Real *plane = memory->element + BODIES_PLANE * memory->next + s;
+    const Real *p = own->p;
+    plane[0] = own->depth - own->slope[0] * p[0] - own->slope[1] * p[1] + p[2];
+    plane[memory->next] = own->slope[0];
+    plane[2 * memory->next] = own->slope[1];
+}
+
+/* An element that does not take part forgets. One that faces up near the ground is buried until it
+ * comes out; so is one that carries nothing. */
+MILD_HD void bodies_forget(const BodiesMemory *memory, int s, int buried) {
+    const ElementMemory none = {0, 0, 0, 0, 0, 0, 0, 0, 0};
+    bodies_record(memory, s, &none);
+    memory->element[BODIES_STATE * memory->next + s] = buried ? BODIES_BURIED : BODIES_NONE;
+    memory->element[BODIES_SHARE * memory->next + s] = 0;
+}
+
+/* Memory of an element at the twist V. advance: bool, of contact.inc. */
+MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
+                                   const MapSpot *spot, const Real *V, int advance,
+                                   BodiesLoads *loads) {
+    const BodiesSole *sole = &setup->sole[work->body[i]];
+    const BodiesMemory *memory = &work->memory[i];
+    const int uneven = setup->has_map && setup->map.uneven;
+    const Real dt = setup->dt;
+    BodiesElement own;
+    bodies_element(setup, work, i, s, spot, !sole->face, &own);
+    if (sole->face && !(own.listed && own.share > 0)) {
+        const int up = !own.faces_down && own.depth > work->least[i];
+        if (advance) {
+            bodies_forget(memory, s, own.listed || up);
+        }
+        return;
+    }
+    const Element *e = &own.element;
+    const ContactVelocity v = bodies_velocity(&own, V);
+    const Real middle = own.depth + dt / 2 * v.descent;
+    const int stays = middle > 0;
+    const Real normal = element_impulse(e, own.curves, 1, dt, v.descent).value;
+    ElementMemory after =
+        element_remember(e, &own.before, dt, 1 / dt, normal, v.x, v.y, v.descent, stays);
+    if (stays) {
+        const Real peak = element_peak(e, own.curves, normal, v.descent, middle);
+        after.depth_max = real_max(after.depth_max, e->virgin_depth + peak - e->yield_depth);
+    }
+    if (advance) {
+        Real *state = memory->element + BODIES_STATE * memory->next + s;
+        bodies_record(memory, s, &after);
+        if (sole->face) {
+            *state = (Real)(stays ? 1 + own.label : uneven ? BODIES_FREE : BODIES_NONE);
+            state[memory->next] = stays ? own.share : 0;
+        } else if (setup->has_map) {
+            *state = (Real)own.label;
+        }
+        if (setup->has_map) {
+            bodies_chart(memory, s, &own);
+        }
+    }
+    if (normal > 0) {
+        loads->loaded += 1;
+        loads->depth += own.depth;
+        loads->force += normal;
+        loads->area += own.share * sole->square;
+        loads->deepest = real_max(loads->deepest, own.depth);
+        for (int k = 0; k < 3; k++) {
+            loads->p[k] += normal * own.p[k];
+        }
+    }
+}
+
+WARP_FN void bodies_report(BodiesWork *work, int i, const BodiesLoads *lane) {
+    Real sum[8][LANE_COPIES], deepest[LANE_COPIES];
+    EACH_LANE(l) {
+        const BodiesLoads *own = &lane[l];
+        const Real all[8] = {own->loaded, own->depth, own->force, own->area,
+                             own->p[0],   own->p[1],  own->p[2],  0};
+        for (int n = 0; n < 8; n++) {
+            sum[n][l] = all[n];
+        }
+        deepest[l] = own->deepest;
+    }
+    Real whole[8];
+    for (int n = 0; n < 8; n++) {
+        whole[n] = lane_sum(sum[n]);
+    }
+    const Real most = lane_max(deepest);
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            const int any = whole[0] > 0;
+            ContactFoot *foot = &work->foot[i];
+            for (int k = 0; k < 3; k++) {
+                foot->pressure_center[k] = any ? work->position[i][k] + whole[4 + k] / whole[2] : 0;
+            }
+            foot->depth_max = most;
+            foot->depth_mean = any ? whole[1] / whole[0] : 0;
+            foot->area = whole[3];
+        }
+    }
+}
+
+/* Memory and reports at the twists of `next`. */
+WARP_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advance) {
+    LANE_ROLLED
+    for (int i = 0; i < work->count; i++) {
+        const BodiesSole *sole = &setup->sole[work->body[i]];
+        const BodiesMemory *memory = &work->memory[i];
+        const MapSpot spot = bodies_spot(setup, work, i);
+        BodiesLoads loads[LANE_COPIES];
+        EACH_LANE(l) {
+            const BodiesLoads none = {0, 0, 0, 0, 0, {0, 0, 0}};
+            loads[l] = none;
+            LANE_ROLLED
+            for (int s = LANE(l); s < sole->elements; s += LANES) {
+                bodies_finish_element(setup, work, i, s, &spot, work->next.twist + 6 * i, advance,
+                                      &loads[l]);
+            }
+        }
+        lanes_sync(); /* what the lanes read of the body's memory is written below */
+        bodies_report(work, i, loads);
+        EACH_LANE(l) {
+            if (LANE(l) == 0 && advance && (sole->face || setup->has_map)) {
+                const int step = memory->step;
+                for (int k = 0; k < 3; k++) {
+                    memory->body[k * step] = work->position[i][k];
+                }
+                memory->body[3 * step] = work->height;
+                memory->body[BODIES_STEPPED * step] = 1;
+                if (sole->face) {
+                    memory->body[BODIES_TOUCHED] = 1;
+                }
+            }
+        }
+    }
+    lanes_sync();
+}
+
+/* A surface far from the ground forgets. */
+WARP_FN void bodies_leave(const BodiesMemory *memory, int elements) {
+    const int touched = memory->body[BODIES_TOUCHED] > 0;
+    lanes_sync(); /* all lanes have read it */
+    if (touched) {
+        EACH_LANE(l) {
+            LANE_ROLLED
+            for (int n = LANE(l); n < bodies_memory_numbers(elements); n += LANES) {
+                memory->element[n] = 0;
+            }
+        }
+        lanes_sync();
+    }
+}
+
+/* A whole step. advance: bool, the memory moves to its end. */
+WARP_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance) {
+    const int rows = 6 * work->count;
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int i = LANE(l); i < work->count; i += LANES) {
+            work->least[i] = bodies_least(setup, setup->sole[work->body[i]].radius,
+                                          work->velocity[i], work->free_velocity + 6 * i);
+        }
+    }
+    lanes_sync();
+    bodies_newton(setup, work);
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int r = LANE(l); r < rows; r += LANES) {
+            work->next.twist[r] =
+                work->free_velocity[r] + bodies_times(work, rows, r, work->best.wrench);
+            work->wrench[r] = work->best.wrench[r] / setup->dt;
+        }
+    }
+    lanes_sync();
+    bodies_finish(setup, work, advance);
+}
+
+#endif

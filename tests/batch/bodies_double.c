@@ -1,0 +1,2 @@
+#define BODIES_RUN bodies_double
+#include "bodies_case.inc"

@@ -1,0 +1,25 @@
+/* The law of a material under a sole, as a case of the batch's ground has it. */
+#ifndef TEST_CASE_LAW_H
+#define TEST_CASE_LAW_H
+
+#include <string.h>
+
+#include "contact_case.h"
+#include "ground/begin.h"
+#include "ground/models.h"
+
+static void case_law(CaseMaterial *c, const MildMaterial *m, const MildSole *sole) {
+    const Law law = law_of(m, mild_sole_pitch(sole), mild_sole_width(sole));
+    memcpy(c->law, &law, sizeof c->law);
+    c->curves = law_curves(&law) | model_row(m->model)->motion;
+    c->recovery = law_recovery(&law, recovery_of(m));
+    c->mu = m->mu;
+    c->k_drift = m->k_drift;
+    c->b_drift = m->b_drift;
+    c->exit_drag = law_exit_drag(&law);
+    c->entry_drag = law_entry_drag(&law);
+    c->cohesion = m->cohesion;
+    c->shear_length = m->shear_length;
+}
+
+#endif

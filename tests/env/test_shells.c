@@ -1,0 +1,228 @@
+/* Environments of the batch engine whose robots' shells stand on soft ground, against those of the
+ * CPU, which MuJoCo steps; and against themselves without, where no shell is near the ground. With
+ * MILD_CUDA on the device too. */
+#include "env/batch_arrays.h"
+#include "env/kernels.h"
+#include "follow.h"
+#include "ground/batch/bodies.h"
+
+#define G1 MILD_SOURCE_DIR "/robots/g1"
+
+static int has_device(void) {
+    MildError error;
+    return device_open(0, &error) == MILD_OK;
+}
+
+/* Robots that fall: until the base is on the ground. */
+static TaskDef shells_def(void) {
+    TaskDef def = some_def();
+    def.shells_stand = 1;
+    def.tilt_limit = 2;
+    def.randomize.rigid_share = 0.1;
+    return def;
+}
+
+/* Of environments of the batch engine, in the last physics step: had shells near the ground. */
+static void read_held(uint8_t held[ENVS]) {
+    MildError error = {0};
+    const EnvsArrays *all = envs_batch_arrays(pair.batch);
+    assert_int_equal(device_copy(pair.device, held, all->shells.held, ENVS, &error), MILD_OK);
+}
+
+/* Largest difference of what the critic sees, but for the depths of corners, which jump. */
+static double critics_apart(int e) {
+    const TaskShape *shape = &pair.shape;
+    const int depths = shape->observation + shape->estimates;
+    double most = 0;
+    for (int i = 0; i < shape->critic; i++) {
+        const int depth = i >= depths && i < depths + 6 * shape->feet && (i - depths) % 6 == 5;
+        const int at = e * shape->critic + i;
+        const double gap = fabs((double)pair.a.critic[at] - (double)pair.b.critic[at]);
+        most = depth ? most : gap > most || gap != gap ? gap : most;
+    }
+    return most;
+}
+
+/* The same in all steps of an environment, so that it falls. */
+static void draw_falls(int t, double most) {
+    draw_actions(t);
+    for (int e = 0; e < ENVS; e++) {
+        Random r = random_at(4, (uint32_t)e, 0);
+        for (int i = 0; i < pair.shape.actions; i++) {
+            pair.a.action[e * pair.shape.actions + i] += (float)(most * (2 * random_unit(&r) - 1));
+        }
+    }
+}
+
+/* Steps, and those in which the two agree; with shells near the ground, the same. */
+typedef struct {
+    int steps, together, near, near_together;
+    int ends[TASK_END_COUNT];
+    double first; /* largest difference of the critics where shells have just come near */
+} Falls;
+
+/* As follow, of robots that fall. An environment is left alone once it differs, until its next
+ * episode: a fall doubles a difference within a few steps. */
+static Falls fall(const char *robot, TaskDef def, int device, const MildMapDef *on, double most) {
+    MildMap *map = on ? mild_map_create(on, NULL) : NULL;
+    Falls falls = {0};
+    int apart[ENVS] = {0};
+    uint8_t held[ENVS], before[ENVS] = {0};
+    def.map = map;
+    pair_open(robot, &def, device);
+    pair_reset();
+    for (int t = 0; t < STEPS; t++) {
+        draw_falls(t, most);
+        pair_step();
+        read_held(held);
+        for (int e = 0; e < ENVS; e++) {
+            const double gap = critics_apart(e);
+            const int done = pair.a.done[e] != 0, same = done == (pair.b.done[e] != 0);
+            apart[e] |= !same || !(gap < 1e-2);
+            falls.steps++;
+            falls.together += !apart[e];
+            falls.near += held[e] != 0;
+            falls.near_together += held[e] && !apart[e];
+            if (!apart[e]) {
+                assert_int_equal(pair.a.cause[e], pair.b.cause[e]);
+                falls.ends[pair.b.cause[e]] += done;
+                falls.first = fmax(falls.first, held[e] && !before[e] && !done ? gap : 0);
+            }
+            apart[e] = done && same ? 0 : apart[e];
+            before[e] = done ? 0 : held[e];
+        }
+    }
+    printf(
+        "%s, device %d%s: %d of %d steps together, with shells near the ground %d of %d; critics "
+        "differ by %.1e at most where they come near;",
+        robot_name(pair.robot), device, on ? ", on a map" : "", falls.together, falls.steps,
+        falls.near_together, falls.near, falls.first);
+    for (int end = 0; end < TASK_END_COUNT; end++) {
+        printf(" %s %d%s", task_end_names[end], falls.ends[end],
+               end < TASK_END_COUNT - 1 ? "," : "\n");
+    }
+    pair_close();
+    mild_map_destroy(map);
+    return falls;
+}
+
+static void check(Falls falls, double least) {
+    assert_true(falls.near > 200 && falls.near_together > least * falls.near);
+    assert_true(falls.together > least * falls.steps);
+}
+
+static void falls_are_those_of_mujoco(void **unused) {
+    (void)unused;
+    const MildMapDef map = some_map();
+    const Falls level = fall(SA01, shells_def(), MILD_BATCH_HOST, NULL, 2);
+    check(level, 0.5);
+    assert_true(level.ends[TASK_END_base] > 0);
+    check(fall(SA01, shells_def(), MILD_BATCH_HOST, &map, 2), 0.5);
+    check(fall(G1, shells_def(), MILD_BATCH_HOST, NULL, 2), 0.5);
+    check(fall(GO1, shells_def(), MILD_BATCH_HOST, &map, 2), 0.5);
+}
+
+/* Robots that do not fall, with shells that stand and without. Steps up to the first one with a
+ * shell near the ground, and those of them that have the same bits. */
+static void stand_twice(int device, const MildMapDef *on, int *far, int *same) {
+    static Rows without[STEPS];
+    uint8_t held[ENVS], near[ENVS] = {0};
+    MildMap *map = on ? mild_map_create(on, NULL) : NULL;
+    *far = *same = 0;
+    for (int stand = 0; stand < 2; stand++) {
+        TaskDef def = shells_def();
+        def.shells_stand = stand;
+        def.shell_depth = 1; /* no end either */
+        def.map = map;
+        pair_open(SA01, &def, device);
+        pair_reset();
+        for (int t = 0; t < STEPS; t++) {
+            draw_actions(t);
+            pair_step();
+            if (!stand) {
+                without[t] = pair.b;
+                continue;
+            }
+            read_held(held);
+            for (int e = 0; e < ENVS; e++) {
+                const size_t width = (size_t)pair.shape.critic, at = (size_t)e * width;
+                near[e] |= held[e];
+                *far += !near[e];
+                *same +=
+                    !near[e] && pair.b.reward[e] == without[t].reward[e] &&
+                    memcmp(pair.b.critic + at, without[t].critic + at, width * sizeof(float)) == 0;
+            }
+        }
+        pair_close();
+    }
+    mild_map_destroy(map);
+    print_message(
+        "device %d%s: %d of %d steps without a shell near the ground, %d with the same bits\n",
+        device, on ? ", on a map" : "", *far, ENVS * STEPS, *same);
+}
+
+/* Low steps, with edges as steep as they can be: the bound on the depth of a shell has the steepest
+ * place of the map in it, its elements have not. */
+static MildMapDef steep_map(void) {
+    MildMapDef map = mild_map_def_default();
+    map.kind = MILD_MAP_STEPS;
+    map.amplitude = 0.02;
+    map.cell = 0.002;
+    return map;
+}
+
+/* In the air they change no bit. */
+static void far_shells_change_no_bit(void **unused) {
+    (void)unused;
+    const MildMapDef map = steep_map();
+    int far, same;
+    stand_twice(MILD_BATCH_HOST, NULL, &far, &same);
+    assert_true(far > ENVS * STEPS / 2 && same == far);
+    /* `held` is of the last physics step: some had a shell near the ground in the first alone */
+    stand_twice(MILD_BATCH_HOST, &map, &far, &same);
+    assert_true(far > ENVS * STEPS * 3 / 4);
+}
+
+/* Robots that stagger, whose shells may come near. */
+static void standing_robots_follow_mujoco(void **unused) {
+    (void)unused;
+    follow(SA01, shells_def(), MILD_BATCH_HOST, NULL, 0.85);
+}
+
+/* A model of one element has none for shells. */
+static void models_of_one_element_have_no_shells(void **unused) {
+    (void)unused;
+    TaskDef def = shells_def();
+    def.randomize.model = MILD_MODEL_CON_CONE;
+    pair_open(SA01, &def, MILD_BATCH_HOST);
+    assert_null(envs_batch_arrays(pair.batch)->shells.setup);
+    pair_close();
+}
+
+static void device_falls_are_those_of_mujoco(void **unused) {
+    (void)unused;
+    if (!has_device()) {
+        skip();
+    }
+    const MildMapDef map = some_map();
+    check(fall(SA01, shells_def(), 0, NULL, 2), 0.5);
+    check(fall(SA01, shells_def(), 0, &map, 2), 0.5);
+    check(fall(G1, shells_def(), 0, NULL, 2), 0.5);
+    check(fall(GO1, shells_def(), 0, &map, 2), 0.5);
+    follow(SA01, shells_def(), 0, NULL, 0.85);
+    int far, same;
+    stand_twice(0, NULL, &far,
+                &same); /* `part` is compiled once more, which may round in other places */
+    assert_true(far > ENVS * STEPS / 2);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(falls_are_those_of_mujoco),
+        cmocka_unit_test(far_shells_change_no_bit),
+        cmocka_unit_test(standing_robots_follow_mujoco),
+        cmocka_unit_test(models_of_one_element_have_no_shells),
+        cmocka_unit_test(device_falls_are_those_of_mujoco),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,373 @@
+/* grains/: collisions, sliding and rolling by hand, the weight of a bed, Newton's third law on the
+ * plate, energy, and the same bits for the same seed. On the CPU; docs/grains.md. */
+#include "grains/record.h"
+
+extern "C" { /* cmocka's header has no such words */
+#include "kit.h"
+}
+
+/* A box for single grains, which are put one by one. */
+static Bed stage_open(BedDef def, const std::vector<Vec> &grains, float gravity) {
+    Bed bed;
+    def.length = def.width = 0.1f;
+    def.depth = 0.001f;
+    def.gravity = gravity;
+    bed_open(&bed, def);
+    std::vector<Place> none((size_t)bed.g.per, Place{0, 0, 0, 0});
+    copy(bed.g.place, none.data(), none.size());
+    copy(bed.g.next_place, none.data(), none.size());
+    bed_put(&bed, 0, grains);
+    return bed;
+}
+
+static double height_of(const Bed &bed, int i) {
+    return (double)bed.g.place[i].z * (double)bed.g.unit.z;
+}
+
+static Vec position(const Bed &bed, int i) {
+    return vec((float)bed.g.place[i].x * bed.g.unit.x, (float)bed.g.place[i].y * bed.g.unit.y,
+               (float)bed.g.place[i].z * bed.g.unit.z);
+}
+
+static double energy_of(const Bed &bed, int i) {
+    const double m = (double)grain_mass(bed.g.law, bed.g.place[i].radius);
+    const double r = (double)bed.g.place[i].radius;
+    const Vec v = bed.g.velocity[i], w = bed.g.spin[i];
+    return 0.5 * m * ((double)dot(v, v) + 0.4 * r * r * (double)dot(w, w));
+}
+
+static Vec ball(float x, float y, float z, float radius) {
+    Vec p = vec(x, y, z);
+    p.unused = radius;
+    return p;
+}
+
+/* ---- two grains ---- */
+
+static double parted(bool hertz, float restitution, float speed) {
+    BedDef def;
+    def.hertz = hertz;
+    def.restitution = restitution;
+    def.steps = 200;
+    def.stiffness = hertz ? 1e8f : 1e6f;
+    Bed bed = stage_open(
+        def, {ball(0.05f, 0.05f, 0.05f, 0.0025f), ball(0.0552f, 0.05f, 0.05f, 0.002f)}, 0);
+    bed.g.velocity[0].x = speed;
+    bed_go(&bed, (long)(0.004 / (double)bed.g.law.dt));
+    const double after = (double)(bed.g.velocity[1].x - bed.g.velocity[0].x);
+    const double m0 = (double)grain_mass(bed.g.law, 0.0025f),
+                 m1 = (double)grain_mass(bed.g.law, 0.002f);
+    const double momentum = m0 * (double)bed.g.velocity[0].x + m1 * (double)bed.g.velocity[1].x;
+    expect_near("momentum", momentum / (m0 * (double)speed), 1, 1e-5);
+    bed_close(&bed);
+    return after / (double)speed;
+}
+
+static void grains_part_with_the_restitution(void **) {
+    for (const bool hertz : {false, true}) {
+        for (const float e : {0.2f, 0.5f, 0.9f, 1.0f}) {
+            const double got = parted(hertz, e, 0.3f);
+            printf("%s: restitution %.2f, measured %.4f (bound 0.01)\n", hertz ? "hertz" : "linear",
+                   (double)e, got);
+            expect_near("restitution", got, (double)e, 0.01);
+        }
+    }
+}
+
+/* Oblique and spinning, with friction: the two never leave with more than they had. */
+static void a_collision_gives_no_energy(void **) {
+    double worst = -1;
+    srand(1);
+    const auto uniform = [] { return (float)rand() / (float)RAND_MAX - 0.5f; };
+    for (int k = 0; k < 400; k++) {
+        BedDef def;
+        def.hertz = k % 2;
+        def.steps = 100;
+        def.stiffness = def.hertz ? 1e8f : 1e6f;
+        def.restitution = k % 3 ? 0.5f : 1.0f;
+        def.rolling = k % 5 ? 0.0f : 0.1f;
+        def.friction = k % 7 ? 0.5f : 2.0f;
+        Bed bed = stage_open(def,
+                             {ball(0.05f, 0.05f, 0.05f, 0.0025f),
+                              ball(0.0555f, 0.05f + 0.003f * uniform(), 0.05f, 0.0025f)},
+                             0);
+        bed.g.velocity[0] = vec(0.5f, 0.3f * uniform(), 0.3f * uniform());
+        for (int i = 0; i < 2; i++) {
+            bed.g.spin[i] = vec(200 * uniform(), 200 * uniform(), 200 * uniform());
+        }
+        const double before = energy_of(bed, 0) + energy_of(bed, 1);
+        bed_go(&bed, (long)(0.01 / (double)bed.g.law.dt));
+        worst = fmax(worst, (energy_of(bed, 0) + energy_of(bed, 1)) / before - 1);
+        bed_close(&bed);
+    }
+    printf("largest gain in a collision: %.2e of the energy (bound 3e-4)\n", worst);
+    assert_true(worst < 3e-4);
+}
+
+/* ---- a grain on the floor ---- */
+
+static void a_grain_slides_then_rolls(void **) {
+    BedDef def;
+    def.friction = 0.3f;
+    const float radius = 0.0025f, speed = 0.2f;
+    Bed bed = stage_open(def, {ball(0.02f, 0.05f, radius, radius)}, 9.81f);
+    bed.g.velocity[0].x = speed;
+    const double mu = 0.3, g = 9.81, rolls = 2.0 * (double)speed / (7 * mu * g);
+    bed_go(&bed, bed_steps(bed, 0.5 * rolls));
+    const double slides = ((double)speed - (double)bed.g.velocity[0].x) / (0.5 * rolls) / g;
+    bed_go(&bed, bed_steps(bed, rolls));
+    printf("friction %.3f measured %.4f; rolls at %.4f of its speed, by hand 5/7 = %.4f\n", mu,
+           slides, (double)bed.g.velocity[0].x / (double)speed, 5.0 / 7);
+    expect_near("friction", slides, mu, 0.02 * mu);
+    expect_near("rolling speed", (double)bed.g.velocity[0].x / (double)speed, 5.0 / 7, 0.01);
+    bed_close(&bed);
+}
+
+static void rolling_is_resisted(void **) {
+    BedDef def;
+    def.rolling = 0.05f;
+    const float radius = 0.0025f, speed = 0.2f;
+    Bed bed = stage_open(def, {ball(0.02f, 0.05f, radius, radius)}, 9.81f);
+    bed.g.velocity[0].x = speed;
+    bed.g.spin[0].y = speed / radius;
+    bed_go(&bed, bed_steps(bed, 0.1));
+    const double slowing = ((double)speed - (double)bed.g.velocity[0].x) / 0.1 / 9.81;
+    printf("rolling resistance: slows by %.4f g, by hand mu_roll/1.4 = %.4f\n", slowing,
+           0.05 / 1.4);
+    expect_near("slowing", slowing, 0.05 / 1.4, 0.03 * 0.05 / 1.4);
+    bed_close(&bed);
+}
+
+/* ---- a bed ---- */
+
+static BedDef small_bed(void) {
+    BedDef def;
+    def.length = 0.04f;
+    def.width = 0.035f;
+    def.depth = 0.025f;
+    def.settle = 0.2f;
+    return def;
+}
+
+/* The floor carries the grains' weight, told by the overlaps on it. */
+static void the_floor_carries_the_weight(void **) {
+    Bed bed;
+    bed_open(&bed, small_bed());
+    bed_settle(&bed);
+    double weight = 0, carried = 0, kinetic = 0;
+    for (int i = 0; i < bed.g.per; i++) {
+        const double radius = (double)bed.g.place[i].radius;
+        if (radius > 0) {
+            weight += (double)grain_mass(bed.g.law, (float)radius) * 9.81;
+            carried += (double)bed.g.law.stiffness * fmax(radius - height_of(bed, i), 0);
+            kinetic += energy_of(bed, i);
+        }
+    }
+    const double fall = kinetic / (weight * 0.005);
+    printf("%d grains, solid share %.3f, surface %.1f mm\n", bed.filled[0], (double)bed.solid[0],
+           1e3 * (double)bed.surface[0]);
+    printf(
+        "weight %.4f N, the floor carries %.4f N (1 %%); kinetic energy %.1e of that of a fall by "
+        "a grain (bound 1e-3)\n",
+        weight, carried, fall);
+    expect_near("floor", carried / weight, 1, 0.01);
+    assert_true(fall < 1e-3);
+    bed_close(&bed);
+}
+
+/* A cloud of grains without weight flies against a tilted plate: what the grains lose in momentum
+ * and angular momentum the plate has got, about its origin. */
+static void the_plate_gets_what_the_grains_lose(void **) {
+    std::vector<Vec> grains;
+    for (int k = 0; k < 60; k++) {
+        grains.push_back(
+            ball(0.04f + 0.0056f * (float)(k % 5), 0.035f + 0.0056f * (float)(k / 5 % 4),
+                 0.02f + 0.0056f * (float)(k / 20), 0.0022f + 0.0001f * (float)(k % 7)));
+    }
+    BedDef def;
+    def.rolling = 0.1f;
+    Bed bed = stage_open(def, grains, 0);
+    const Case c = case_read("cloud rect:0.03,0.05 20 hold:0.06");
+    bed.g.shape = c.shape;
+    bed.g.plate[0] = {};
+    bed.g.plate[0].z = 0.05;
+    bed.g.plate[0].pitch = c.tilt;
+    plate_place(&bed.g.plate[0], bed.g);
+    double before[6] = {0}, after[6] = {0};
+    for (double *sum : {before, after}) {
+        for (int i = 0; i < (int)grains.size(); i++) {
+            if (sum == before) {
+                bed.g.velocity[i] = vec(0.1f, 0.02f * (float)(i % 3), 0.6f);
+                bed.g.spin[i] = vec((float)(i % 5), -20.0f, 7.0f);
+            }
+            const float m = grain_mass(bed.g.law, bed.g.place[i].radius), r = bed.g.place[i].radius;
+            const Vec p = m * bed.g.velocity[i];
+            const Vec arm = position(bed, i) - vec(0.05f, 0.05f, 0.05f);
+            const Vec turn = cross(arm, p) + 0.4f * m * r * r * bed.g.spin[i];
+            const float part[6] = {p.x, p.y, p.z, turn.x, turn.y, turn.z};
+            for (int k = 0; k < 6; k++) {
+                sum[k] += (double)part[k];
+            }
+        }
+        if (sum == before) {
+            bed_go(&bed, bed_steps(bed, 0.06));
+        }
+    }
+    for (int k = 0; k < 6; k++) {
+        const double got =
+            (double)bed.g.plate[0].sum[k] / (double)(1 << SUM_BITS) * (double)bed.g.law.dt;
+        const double size = k < 3 ? fabs(before[2]) : fabs(before[2]) * 0.02;
+        printf("%s %d: the grains lose %+.4e, the plate gets %+.4e (bound %.0e)\n",
+               k < 3 ? "momentum" : "angular momentum", k % 3, before[k] - after[k], got,
+               1e-3 * size);
+        expect_entry("plate", k, got, before[k] - after[k], 1e-3 * size);
+    }
+    assert_true(fabs(before[2] - after[2]) > 0.1 * fabs(before[2]));
+    bed_close(&bed);
+}
+
+/* A plate that lies on the bed pushes with its weight. */
+static void a_resting_plate_pushes_with_its_weight(void **) {
+    Bed bed;
+    bed_open(&bed, small_bed());
+    bed_settle(&bed);
+    const Case c = case_read("rest rect:0.02,0.02 0 drop:0.05@0.05,0.2 hold:0.01");
+    const char *folder = getenv("TMPDIR") ? getenv("TMPDIR") : "/tmp";
+    case_run(&bed, c, 40, folder);
+    const std::string file = std::string(folder) + "/rest-1.csv";
+    FILE *in = fopen(file.c_str(), "r");
+    assert_non_null(in);
+    char line[512];
+    double force = 0, depth = 0;
+    int rows = 0, stage = 0;
+    while (fgets(line, sizeof line, in)) {
+        double f, d;
+        if (sscanf(line, "%*f,%d,%lf,%*f,%*f,%*f,%*f,%*f,%lf", &stage, &d, &f) == 3 && stage == 0) {
+            force = f;
+            depth = d;
+            rows++;
+        }
+    }
+    fclose(in);
+    remove(file.c_str());
+    printf("%d rows; a plate of 50 g lies at %.2f mm and pushes with %.4f N, by hand %.4f (2 %%)\n",
+           rows, 1e3 * depth, force, 0.05 * 9.81);
+    expect_near("weight", force / (0.05 * 9.81), 1, 0.02);
+    bed_close(&bed);
+}
+
+/* A bed is its seed's, whichever beds are made beside it and whenever lists were made. */
+static void a_seed_gives_the_same_bits(void **) {
+    BedDef def = small_bed();
+    def.settle = 0.05f;
+    Bed alone, beside;
+    def.seeds = {7};
+    bed_open(&alone, def);
+    def.seeds = {3, 7};
+    bed_open(&beside, def);
+    beside.g.skin *= 0.8f;
+    bed_go(&alone, 4000);
+    bed_go(&beside, 4000);
+    const Place *same = beside.g.place + beside.g.per;
+    printf("lists made %ld and %ld times\n", alone.lists, beside.lists);
+    assert_int_equal(alone.g.per, beside.g.per);
+    assert_true(alone.lists != beside.lists);
+    assert_memory_equal(alone.g.place, same, (size_t)alone.g.per * sizeof(Place));
+    assert_memory_not_equal(alone.g.place, beside.g.place, (size_t)alone.g.per * sizeof(Place));
+    bed_close(&alone);
+    bed_close(&beside);
+}
+
+/* Pairs that overlap and are not in each other's list. */
+static int pairs_missed(const Grains &g) {
+    int missed = 0;
+    for (int i = 0; i < g.count; i++) {
+        for (int j = 0; j < g.count; j++) {
+            const Vec d = from_to(g, g.place[i], g.place[j]);
+            if (i == j || length(d) >= g.place[i].radius + g.place[j].radius) {
+                continue;
+            }
+            bool listed = false;
+            for (int s = 0; s < NEIGHBOURS; s++) {
+                listed |= g.neighbour[(size_t)s * (size_t)g.count + (size_t)i] == j;
+            }
+            missed += !listed;
+        }
+    }
+    return missed;
+}
+
+static void no_contact_is_missed(void **) {
+    Bed bed;
+    bed_open(&bed, small_bed());
+    int missed = 0;
+    for (int k = 0; k < 40; k++) { /* while they fall and while they come to rest */
+        bed_go(&bed, 251);
+        missed += pairs_missed(bed.g);
+    }
+    printf("%d pairs missed in 40 looks, with %ld lists for %ld steps\n", missed, bed.lists,
+           bed.steps);
+    assert_int_equal(missed, 0);
+    bed_close(&bed);
+}
+
+/* What is restored goes on as it did, before the first list too. */
+static void a_restored_bed_goes_on(void **) {
+    for (const long before : {0L, 3000L}) {
+        Bed bed;
+        bed_open(&bed, small_bed());
+        bed_go(&bed, before);
+        const std::vector<char *> saved = bed_save(bed);
+        bed_go(&bed, 3000);
+        const std::vector<Place> once = bed_places(bed);
+        bed_restore(&bed, saved);
+        bed_go(&bed, 3000);
+        assert_memory_equal(once.data(), bed.g.place, once.size() * sizeof(Place));
+        for (char *data : saved) {
+            release(data);
+        }
+        bed_close(&bed);
+    }
+}
+
+/* The nearest point of a block, against that of an axis-aligned box. */
+static void a_block_is_nearest_where_a_box_is(void **) {
+    const Shape s = shape_read("rect:0.06,0.12");
+    srand(2);
+    const auto uniform = [] { return (float)rand() / (float)RAND_MAX - 0.5f; };
+    double worst = 0, shift = 0;
+    for (int k = 0; k < 20000; k++) {
+        const Vec p = vec(0.2f * uniform(), 0.2f * uniform(), 0.2f * uniform());
+        const Vec q = vec(fminf(fmaxf(p.x, -0.03f), 0.03f), fminf(fmaxf(p.y, -0.06f), 0.06f),
+                          fminf(fmaxf(p.z, 0), s.height));
+        Vec normal = vec(0, 0, 0);
+        const float far = shape_nearest(s, p, &normal), wanted = length(p - q);
+        if (wanted > 0) {
+            worst = fmax(worst, (double)fabsf(far - wanted));
+            shift = fmax(shift, (double)length(p - far * normal - q));
+        } else {
+            assert_true(far <= 0);
+        }
+    }
+    /* two points of the outline can be equally near in single precision */
+    printf("nearest points of a block: distance off by %.1e m (bound 1e-7), place by %.1e (1e-5)\n",
+           worst, shift);
+    assert_true(worst < 1e-7 && shift < 1e-5);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(grains_part_with_the_restitution),
+        cmocka_unit_test(a_collision_gives_no_energy),
+        cmocka_unit_test(a_grain_slides_then_rolls),
+        cmocka_unit_test(rolling_is_resisted),
+        cmocka_unit_test(the_floor_carries_the_weight),
+        cmocka_unit_test(the_plate_gets_what_the_grains_lose),
+        cmocka_unit_test(a_resting_plate_pushes_with_its_weight),
+        cmocka_unit_test(a_seed_gives_the_same_bits),
+        cmocka_unit_test(no_contact_is_missed),
+        cmocka_unit_test(a_restored_bed_goes_on),
+        cmocka_unit_test(a_block_is_nearest_where_a_box_is),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

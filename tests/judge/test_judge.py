@@ -1,0 +1,125 @@
+"""judge.py on made-up records: cases of grains/run.py played by `mild` with a known material, with noise from bed to bed. The
+judge must then find mild right in everything, and others wrong where they are known to differ.
+test_judge.py SOURCE"""
+import csv
+import importlib.util
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+SOURCE = pathlib.Path(sys.argv[1])
+sys.path.insert(0, str(SOURCE / "scripts"))
+import mild  # noqa: E402
+from judge_cases import Case, Sole, measures  # noqa: E402
+from judge_entries import GroundEntry  # noqa: E402
+
+TRUTH = mild.Material("sand_loose", mu=0.4, recovery=0.0)
+NOISE, BEDS = 0.03, 4
+KEEP = ("sand/disc120", "sand/square100", "sand/square100-drag15", "sand/disc100", "sand/square100-tilt15",
+        "sand/square100-load10", "sand/square100-swipe15", "sand/square100-again", "sand/square100-drop05", "wide/sa01")
+
+
+def cases():
+    """{FAMILY/NAME: text} of grains/run.py."""
+    spec = importlib.util.spec_from_file_location("run", SOURCE / "grains" / "run.py")
+    run = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(run)
+    return {f"{family}/{case.split()[0]}": case for family, block in run.BLOCKS for case in block}
+
+
+def make(folder):
+    """Records as grains writes them."""
+    random, every, manifest = np.random.default_rng(1), cases(), {"sand": {"solid": [0.59], "options": ["--friction", "0.5"]}}
+    for key in KEEP:
+        family, name = key.split("/")
+        (folder / family).mkdir(exist_ok=True)
+        case = Case(every[key])
+        rows = GroundEntry("mild", TRUTH).play(case)
+        for seed in range(1, BEDS + 1):
+            factor = 1 + NOISE * random.standard_normal() * np.ones(3)
+            with open(folder / family / f"{name}-{seed}.csv", "w", encoding="utf-8") as file:
+                file.write("time_s,stage,depth_m,path_m,pitch_rad,sinkage_m,force_x_n,force_y_n,force_z_n,moment_x_nm,"
+                           "moment_y_nm,moment_z_nm,cop_x_m,cop_y_m\n")
+                for k in range(len(rows["time"])):
+                    row = [rows[name][k] for name in ("time", "stage", "depth", "path", "pitch")]
+                    fx, fz, my = factor * [rows["fx"][k], rows["fz"][k], rows["my"][k]]
+                    file.write(",".join(f"{v:.6g}" for v in (*row, 0, fx, 0, fz, 0, my, 0, 0, 0)) + "\n")
+        manifest[key] = {"case": every[key], "seeds": f"1-{BEDS}"}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+
+
+def judge(*args):
+    return subprocess.run([sys.executable, SOURCE / "scripts" / "judge.py", *map(str, args)], capture_output=True, text=True)
+
+
+def a_sole_has_its_area():
+    for text, area in (("rect:0.1,0.06", 0.006), ("disc:0.12", np.pi / 4 * 0.12**2), ("sphere:0.023", np.pi * 0.023**2)):
+        got = Sole(text).area.sum()
+        print(f"{text}: area {got:.6f}, by hand {area:.6f} (2 %)")
+        assert abs(got / area - 1) < 0.02
+    turned = Sole("rect:0.1,0.06")
+    assert abs(turned.depths(0.01, 0.3).max() - (0.01 + 0.048 * np.sin(0.3))) < 1e-9
+
+
+def measures_by_hand():
+    """A spring: force 1000 N/m times depth, half of it after a drag."""
+    case = Case("x rect:0.1,0.1 0 press:0.02@0.05 drag:0.02@0.05")
+    time = np.linspace(0.01, 0.81, 81)
+    stage = (time > 0.41).astype(int)
+    depth = np.where(stage == 0, 0.05 * time - 0.0005, 0.02)
+    rows = {"time": time, "stage": stage, "depth": depth, "path": np.where(stage, 0.05 * (time - 0.41), 0), "pitch": 0 * time,
+            "fx": -3.0 * stage, "fz": np.where(stage, 10.0, 1000 * depth), "my": 0 * time}
+    got = measures(case, rows)
+    print({name: round(float(value), 4) for name, value in got.items()})
+    assert abs(got["load_10mm"] - 0.5) < 0.03 and abs(got["grip"] - 3.0 / 19.5) < 0.01
+
+
+def the_truth_is_found_and_others_are_not(folder):
+    mine = folder / "mine.py"
+    mine.write_text("def half(depth, tilt, slip, sole):\n    return 0, 0, 0.5 * 1e6 * max(depth, 0) * sole.area.sum(), 0, 0, 0\n")
+    (folder / "c.c").write_text("void twice(double d, double t, double s, const double *x, const double *y, const double *a,"
+                                "int n, double *w) { (void)t, (void)s, (void)x, (void)y; for (int i = 0; i < n; i++)"
+                                "w[2] += 1e6 * (d > 0 ? d : 0) * a[i]; }")
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", folder / "c.so", folder / "c.c"], check=True)
+    table = folder / "table.csv"
+    table.write_text("case,time_s,depth_m,force_x_n,force_z_n,moment_y_nm\ndisc100,0,0,0,0,0\ndisc100,1,0.05,0,100,0\n")
+    run = judge("--records", folder, "--families", "sand", "--models", "mild,con_spring,hunt_crossley",
+                "--entry", f"{mine}:half", "--entry", f"{folder / 'c.so'}:twice", "--table", f"theirs={table}", "--out", folder / "out")
+    print(run.stdout, run.stderr)
+    assert run.returncode == 0, run.stderr
+    with open(folder / "out" / "judge.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    error = {(row["case"], row["measure"], row["model"]): float(row["error"]) for row in rows}
+    noise = 3 * NOISE / BEDS**0.5 + 0.02
+    for (case, measure, model), value in error.items():
+        if model == "mild":  # lengths in mm
+            assert abs(value) < (0.5 if measure in ("pressure_center", "sinkage") else noise), (case, measure, value)
+    assert abs(error["sand/square100-tilt15", "moment", "con_spring"]) > 0.9, "one spring in the middle rights nothing"
+    assert error["sand/square100-again", "again", "hunt_crossley"] > 0.8, "a spring without memory gives all of the work again"
+    forces = [{row["model"]: float(row["value"]) for row in rows if row["case"] == "sand/disc100" and row["measure"] == "force"}]
+    assert abs(forces[0]["twice"] / forces[0]["half"] - 2) < 1e-4
+    assert {model for _, _, model in error} >= {"half", "theirs", "chrono_scm", "archimedes", "3d_rft"}
+    assert "figures.html" in run.stdout and (folder / "out" / "figures.html").stat().st_size > 10000
+
+
+def mistakes_are_one_line(folder):
+    for args in (("--records", folder / "none"), ("--records", folder, "--families", "mud"),
+                 ("--records", folder, "--entry", "none.py"),
+                 ("--records", folder, "--entry", f"{folder / 'mine.py'}:none"),
+                 ("--records", folder, "--entry", f"{folder / 'c.so'}:none"), ("--records", folder, "--table", "x")):
+        run = judge(*args)
+        print(args[-1], "->", run.stderr.strip())
+        assert run.returncode == 2 and run.stderr.startswith("judge.py: ") and run.stderr.count("\n") == 1
+
+
+if __name__ == "__main__":
+    a_sole_has_its_area()
+    measures_by_hand()
+    with tempfile.TemporaryDirectory() as name:
+        make(pathlib.Path(name))
+        the_truth_is_found_and_others_are_not(pathlib.Path(name))
+        mistakes_are_one_line(pathlib.Path(name))
