@@ -45,7 +45,13 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
             foot_normal(s, end, dt, motion, 0, LAW_CONE, 0);
         }
         return;
-    case LAW_CONE | LAW_HEAP: foot_normal(s, end, dt, motion, 1, LAW_CONE | LAW_HEAP, 1); return;
+    case LAW_CONE | LAW_HEAP:
+        if (foot->uneven || foot->stops) {
+            foot_normal(s, end, dt, motion, 1, LAW_CONE | LAW_HEAP, 1);
+        } else {
+            foot_normal(s, end, dt, motion, 0, LAW_CONE | LAW_HEAP, 0);
+        }
+        return;
     case LAW_POWER: foot_normal(s, end, dt, motion, 1, LAW_POWER, 0); return;
     case LAW_ELASTIC: foot_normal(s, end, dt, motion, 1, LAW_ELASTIC, 0); return;
     default: foot_normal(s, end, dt, motion, SLOT_UNEVEN | SLOT_FACES, LAW_ANY, 1); return;

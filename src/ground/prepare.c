@@ -24,12 +24,11 @@ MILD_HD void slot_begin(const Slots *s, int i, double dt, double rate, const Mot
 }
 
 /* Calls element_begin for all slots. On level ground the slopes are 0. */
-MILD_HD void slots_begin(const FootScratch *foot, double dt, const Motion *now, int curves,
+MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *now, int curves,
                          int faces) {
-    const Slots local = foot->slot, *s = &local;
+    const Slots local = *slot, *s = &local;
     const Motion motion = *now;
     const double rate = 1.0 / dt;
-    const int end = foot_end(foot);
 #pragma omp simd
     for (int i = 0; i < end; i++) {
         slot_begin(s, i, dt, rate, &motion, curves, SLOT_UNEVEN | faces);
@@ -39,13 +38,15 @@ MILD_HD void slots_begin(const FootScratch *foot, double dt, const Motion *now, 
 /* Picks the loop compiled for the curves of the ground under the foot. A line is a cone of which
  * all numbers but the line's are 0: one loop does for both. */
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
+    const Slots *s = &foot->slot;
+    const int end = foot_end(foot);
     switch (foot_variant(foot)) {
     case LAW_LINE:
-    case LAW_CONE: slots_begin(foot, dt, now, LAW_CONE, 0); return;
-    case LAW_CONE | LAW_HEAP: slots_begin(foot, dt, now, LAW_CONE | LAW_HEAP, 0); return;
-    case LAW_POWER: slots_begin(foot, dt, now, LAW_POWER, 0); return;
-    case LAW_ELASTIC: slots_begin(foot, dt, now, LAW_ELASTIC, 0); return;
-    default: slots_begin(foot, dt, now, LAW_ANY, SLOT_FACES); return;
+    case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 0); return;
+    case LAW_CONE | LAW_HEAP: slots_begin(s, end, dt, now, LAW_CONE | LAW_HEAP, 0); return;
+    case LAW_POWER: slots_begin(s, end, dt, now, LAW_POWER, 0); return;
+    case LAW_ELASTIC: slots_begin(s, end, dt, now, LAW_ELASTIC, 0); return;
+    default: slots_begin(s, end, dt, now, LAW_ANY, SLOT_FACES); return;
     }
 }
 

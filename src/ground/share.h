@@ -6,7 +6,7 @@
  *     q <= c                             c: cosine between sole and ground; 1 unless projected
  *     1/q <- 1/q + ds/(j0 c)             ds: horizontal path in the ground
  *     c - q <- (c - q) exp(-da/u0)       da: fresh penetration, beyond the yield depth
- * The element remembers 1/q - 1, its wear.
+ * The element remembers 1 - q, its wear.
  *
  * The share is held in a step. It scales virgin ground; the unloading stiffness k stays that of the
  * whole load, so the element yields at q F_g(a) and the line ends at a - q F_g(a)/k.
@@ -21,10 +21,10 @@
 
 #include "ground/remember.h"
 
-#define SHARE_LEAN REAL(0.02) /* [-] least cosine: a sole on its edge */
-#define SHARE_GRIP REAL(0.1)  /* [-] friction that an element at its yield load keeps */
-#define SHARE_FORGET REAL(40) /* [-] da/u0 beyond which nothing is left */
-#define SHARE_WEAR REAL(1e6)  /* [-] most wear */
+#define SHARE_LEAN REAL(0.02)  /* [-] least cosine: a sole on its edge */
+#define SHARE_GRIP REAL(0.1)   /* [-] friction that an element at its yield load keeps */
+#define SHARE_FORGET REAL(40)  /* [-] da/u0 beyond which nothing is left */
+#define SHARE_LEAST REAL(1e-6) /* [-] least share */
 
 /* What the share depends on. */
 typedef struct {
@@ -33,7 +33,7 @@ typedef struct {
     Real regain_rate; /* [1/m] 1/u0 */
     Real grip;        /* [-] t, the greatest friction by the virgin load; 0: mu alone */
     Real mu;          /* [-] of the material */
-    Real worn;        /* [-] memory */
+    Real worn;        /* [-] memory: 1 - q */
     Real lean;        /* [-] c */
     Real carry;       /* [-] q */
 } Share;
@@ -46,7 +46,7 @@ MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share
     const Real a = e->yield_depth;
     const Real k = e->unload_stiffness;
     const Real c = 1 - share->projects * (1 - level);
-    const Real q = real_min(1 / (1 + share->worn), c);
+    const Real q = real_min(1 - share->worn, c);
     const Real bed = law_bed_force(&e->law, a);
     const Real force = q * (k * (a - e->zero_depth) - bed) + bed;
     const Real grips = real_max(4 * share->grip * (1 - q / c), SHARE_GRIP);
@@ -79,16 +79,15 @@ MILD_HD int share_grows(const Element *e, const Share *share) {
            travel >= share->carry * (ELEMENT_ELASTIC * REAL(1 - 1e-6));
 }
 
-/* Wear after a step. slid: [m] horizontal path; fresh: [m] penetration. */
-MILD_HD Real share_worn(const Element *e, const Share *share, Real slid, Real fresh) {
-    const Real inverse = 1 / share->lean;
-    const Real worn = real_max(share->worn, inverse - 1) + slid * share->slip_rate * inverse;
-    const Real relative = share->lean * (1 + worn) - 1; /* 1/lambda - 1, lambda = q/c */
+/* [-] The share after a step. slid: [m] horizontal path; fresh: [m] penetration. */
+MILD_HD Real share_after(const Element *e, const Share *share, Real slid, Real fresh) {
+    const Real c = share->lean;
+    const Real q = share->carry;
+    const Real slipped = q * (c / (c + q * slid * share->slip_rate));
     const Real spent = real_min(fresh * share->regain_rate, SHARE_FORGET);
-    const Real left = spent > 0 ? real_exp2(REAL(-1.4426950408889634074) * spent) : 1; /* 1/ln 2 */
-    const Real kept = relative * left / (1 + relative * (1 - left));
-    const Real grown = (1 + kept) * inverse - 1;
-    return real_min(share_grows(e, share) ? grown : worn, SHARE_WEAR);
+    const Real left = real_exp2(REAL(-1.4426950408889634074) * spent); /* 1/ln 2; 1 at 0 */
+    const Real grown = slipped + (c - slipped) * (1 - left);
+    return real_max(share_grows(e, share) ? grown : slipped, SHARE_LEAST);
 }
 
 /* Adds to what element_remember has found. Where slip costs support, path counts at once where
@@ -103,18 +102,19 @@ MILD_HD Real element_wear(const Element *e, const Share *share, const ElementMem
     const Real held_y = e->hold_y - e->hold_stiffness * vy;
     const Real bound = friction_bound(e, normal);
     const int slides = held_x * held_x + held_y * held_y >= bound * bound;
-    const int counts = (slides && share->slip_rate > 0) || square > REMEMBER_BAND * REMEMBER_BAND;
+    const Real least = share->slip_rate > 0 ? REAL(-1) : REMEMBER_BAND * REMEMBER_BAND;
+    const int counts = square > (slides ? least : REMEMBER_BAND * REMEMBER_BAND);
     const Real slid = counts ? REAL_SQRT(square) : 0;
     const Real fresh = real_max(e->depth + dt / 2 * speed - e->yield_depth, 0);
-    const Real worn = share_worn(e, share, slid, fresh);
-    const Real lead = real_max(1 / (1 + worn) - share->carry, 0) * ELEMENT_ELASTIC;
+    const Real q = share_after(e, share, slid, fresh);
+    const Real lead = real_max(q - share->carry, 0) * ELEMENT_ELASTIC;
     /* The added mass grows with the lead; it keeps its momentum. P is concave. */
     after->front_speed *= after->depth_max / (after->depth_max + lead + ELEMENT_TINY);
     after->depth_max = stays ? after->depth_max + lead : 0;
     after->drift = stays ? real_min(memory->drift + slid, REMEMBER_DRIFT) : 0;
     after->pending_x = stays && !counts ? x : 0;
     after->pending_y = stays && !counts ? y : 0;
-    return stays ? worn : 0;
+    return stays ? 1 - q : 0;
 }
 
 #endif

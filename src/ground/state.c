@@ -168,7 +168,7 @@ static int foot_is_valid(const MildGround *ground, int foot) {
     for (size_t i = 0; i < padded; i++) {
         valid &= material_is_valid(memory.material[i], memory.share != NULL);
         valid &= !memory.share || memory.share[i] >= 0.0;
-        valid &= memory.worn[i] >= 0.0;
+        valid &= memory.worn[i] >= 0.0 && memory.worn[i] < 1.0;
     }
     return valid;
 }

@@ -372,7 +372,7 @@ static void dense_share(DenseElement *e, const Find *find) {
                    sqrt(1.0 + g[0] * g[0] + g[1] * g[1]);
     level = fmin(fmax(level, 0.02), 1.0);
     double c = find->faces ? 1.0 : 1.0 - law->projected * (1.0 - level),
-           q = fmin(1.0 / (1.0 + find->memory.worn[find->i]), c), soil = virgin_force(law, a),
+           q = fmin(1.0 - find->memory.worn[find->i], c), soil = virgin_force(law, a),
            bed = law->bed_stiffness * fmax(a - law->bed, 0.0);
     if (law->grip > 0.0) {
         law->mu = fmin(law->mu, fmax(0.1, 4.0 * law->grip * (1.0 - q / c)));
