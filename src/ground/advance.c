@@ -69,8 +69,8 @@ static void element_imprint(const Advance *a, const Memory *memory, int i, int e
 }
 
 /* [m] element_peak of a slot that reversed within the step. */
-static __attribute__((noinline)) double slot_peak(const Advance *a, int i, double speed,
-                                                  double middle) {
+static __attribute__((cold, noinline)) double slot_peak(const Advance *a, int i, double speed,
+                                                        double middle) {
     const Element element = slot_loaded(&a->slot, i, a->foot->curves);
     return element_peak(&element, a->foot->curves, a->slot.iz[i], speed, middle);
 }
@@ -88,7 +88,7 @@ static void slot_raise(const Advance *a, const Memory *memory, int i, int e, dou
 
 /* The same for all elements of a foot. It is not part of the vector loop, where taking the address
  * of a local variable would prevent vectorisation. */
-static __attribute__((noinline)) void foot_peaks(const Advance *a, const Memory *memory) {
+static __attribute__((cold, noinline)) void foot_peaks(const Advance *a, const Memory *memory) {
     for (int i = 0; i < a->foot->elements; i++) {
         const SlotVelocity v = slot_velocity(&a->slot, i, &a->motion, 1);
         const double middle = a->slot.depth[i] + a->dt / 2 * v.descent;
@@ -139,9 +139,9 @@ MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t 
     const double dt = a->dt;
     const double rate = 1.0 / dt;
     const double height = a->height;
-    const int end = foot.padded & -VECTOR_LANES; /* the same; no element is left over */
+    const int end = foot.padded & -VECTOR_LANES; /* changes nothing; see moments.c */
     if (end < VECTOR_LANES) {
-        return 0;
+        return 0; /* never. The compiler then adds no loop for a remainder */
     }
     double touched = 0.0;
     double turned = 0.0;
@@ -211,10 +211,10 @@ static __attribute__((noinline)) double slot_wear(const Advance *a, int i,
 }
 
 /* The general case: some elements are listed, the ground keeps imprints, or the foot is a surface.
- * Returns how many elements remember something. faces: SLOT_FACES or 0, a constant. */
-MILD_HD int foot_advance(const Advance *a, const Memory *memory, const int32_t *material,
-                         int faces) {
+ * Returns how many elements remember something. */
+static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
     const FootScratch *foot = a->foot;
+    const int faces = foot->faces;
     const Slots *s = &a->slot;
     const int32_t lifted_material = a->imprints || foot->uneven ? MATERIAL_FREE : MATERIAL_NONE;
     int next = 0;
@@ -300,10 +300,8 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
             ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1, 0);
         } else if (all) {
             ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0, 0);
-        } else if (foot->faces) {
-            ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material, SLOT_FACES);
         } else {
-            ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material, 0);
+            ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material);
         }
     }
 }

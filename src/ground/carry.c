@@ -50,6 +50,9 @@ void foot_carry(const FootScratch *foot, double dt) {
     const Slots local = foot->slot, *s = &local;
     const double rate = 1.0 / dt;
     const int end = foot_end(foot);
+    if (end < VECTOR_LANES) {
+        return; /* never. The compiler then adds no loop for a remainder */
+    }
 #pragma omp simd
     for (int i = 0; i < end; i++) {
         slot_carry(s, i, dt, rate);

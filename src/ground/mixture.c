@@ -23,7 +23,8 @@ static int share_is_nan(const Share *share) {
 
 /* Derives what a material gives a slot. Surfaces are projected when they touch down (faces.c). Where
  * path costs support it adds no resistance. */
-static void law_derive(const FootScratch *foot, const MildMaterial *material, DerivedLaw *derived) {
+static __attribute__((cold)) void law_derive(const FootScratch *foot, const MildMaterial *material,
+                                             DerivedLaw *derived) {
     const Law law = law_of(material, foot->pitch, foot->width);
     Share share = share_of(material);
     share.projects = foot->faces ? 0.0 : share.projects;

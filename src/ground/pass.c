@@ -36,6 +36,9 @@ MILD_HD void foot_normal(const Slots *slot, int end, double dt, const Motion *m,
 static void foot_normals(const FootScratch *foot, double dt, const Motion *motion) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
+    if (end < VECTOR_LANES) {
+        return; /* never: pass skips empty feet. The compiler then adds no loop for a remainder */
+    }
     switch (foot_variant(foot)) {
     case LAW_LINE: foot_normal(s, end, dt, motion, 1, LAW_LINE, 0); return;
     case LAW_CONE:
@@ -148,7 +151,7 @@ static void foot_frictions(const FootScratch *foot, const Motion *motion, int he
                            double sums[12]) {
     const int end = foot_end(foot);
     if (end < VECTOR_LANES) {
-        return; /* never: pass skips empty feet. The compiler then adds no loop for a remainder */
+        return; /* never, as above */
     }
     if (held || foot->turned || foot->faces) {
         foot_friction(&foot->slot, end, motion, SLOT_UNEVEN | SLOT_FACES, held, 1, sums);

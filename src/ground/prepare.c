@@ -40,6 +40,9 @@ MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *no
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
+    if (end < VECTOR_LANES) {
+        return; /* never. The compiler then adds no loop for a remainder */
+    }
     switch (foot_variant(foot)) {
     case LAW_LINE:
     case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 0); return;
@@ -81,6 +84,9 @@ MILD_HD void slots_drag(const Slots *slot, int end, double dt, const Motion *now
     const Slots local = *slot, *s = &local;
     const Motion before = *now;
     const Motion after = *free;
+    if (end < VECTOR_LANES) {
+        return; /* never */
+    }
 #pragma omp simd
     for (int i = 0; i < end; i++) {
         slot_drag(s, i, dt, &before, &after, curves, SLOT_UNEVEN | faces);

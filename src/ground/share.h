@@ -79,13 +79,35 @@ MILD_HD int share_grows(const Element *e, const Share *share) {
            travel >= share->carry * (ELEMENT_ELASTIC * REAL(1 - 1e-6));
 }
 
+/* exp(-x) within 1e-14, 0 <= x <= SHARE_FORGET, and 1 at 0. The series of real_exp2, of which each
+ * term waits for the one before, in two that do not: 3 % of a step. */
+MILD_HD Real share_left(Real x) {
+    const Real power = REAL(-1.4426950408889634074) * x; /* 1/ln 2 */
+    const Real shifted = power + POWER_MAGIC;
+    const Real f = (power - (shifted - POWER_MAGIC)) * REAL(0.69314718055994530942);
+    const Real square = f * f;
+    Real even = REAL(1.0 / 3628800);
+    Real odd = REAL(1.0 / 39916800);
+    even = even * square + REAL(1.0 / 40320);
+    odd = odd * square + REAL(1.0 / 362880);
+    even = even * square + REAL(1.0 / 720);
+    odd = odd * square + REAL(1.0 / 5040);
+    even = even * square + REAL(1.0 / 24);
+    odd = odd * square + REAL(1.0 / 120);
+    even = even * square + REAL(0.5);
+    odd = odd * square + REAL(1.0 / 6);
+    even = even * square + 1;
+    odd = odd * square + 1;
+    return (even + odd * f) * real_from_bits((real_bits(shifted) << 52) + real_bits(1.0));
+}
+
 /* [-] The share after a step. slid: [m] horizontal path; fresh: [m] penetration. */
 MILD_HD Real share_after(const Element *e, const Share *share, Real slid, Real fresh) {
     const Real c = share->lean;
     const Real q = share->carry;
     const Real slipped = q * (c / (c + q * slid * share->slip_rate));
     const Real spent = real_min(fresh * share->regain_rate, SHARE_FORGET);
-    const Real left = real_exp2(REAL(-1.4426950408889634074) * spent); /* 1/ln 2; 1 at 0 */
+    const Real left = share_left(spent);
     const Real grown = slipped + (c - slipped) * (1 - left);
     return real_max(share_grows(e, share) ? grown : slipped, SHARE_LEAST);
 }

@@ -66,6 +66,9 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
     double x = 0.0;       /* [N s m] of x times the normal impulse */
     double y = 0.0;       /* [N s m] */
     int end = foot_end(foot);
+    if (end < VECTOR_LANES) {
+        return; /* never. The compiler then adds no loop for a remainder */
+    }
 #pragma omp simd reduction(+ : sum, loaded, force, x, y) reduction(max : deepest)
     for (int i = 0; i < end; i++) {
         double on = s->iz[i] > 0.0 ? 1.0 : 0.0;
