@@ -113,8 +113,9 @@ MILD_HD void slot_plane(const FootScratch *foot, double height, const Slots *s,
  * element reversed. */
 static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory *all,
                                                   const int32_t *material, int turned) {
-    const Memory memory = *all;
-    const int end = a->foot->padded;
+    const int end = a->foot->padded & -VECTOR_LANES; /* changes nothing; see moments.c */
+    const double *depth_max = all->depth_max;
+    int32_t *remembered = all->material;
     if (turned) {
         foot_peaks(a, all);
     }
@@ -122,8 +123,9 @@ static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory
         memory_forget(all, i, MATERIAL_NONE);
     }
     const int32_t lifted = a->foot->uneven ? MATERIAL_FREE : MATERIAL_NONE;
+#pragma omp simd
     for (int i = 0; i < end; i++) {
-        memory.material[i] = memory.depth_max[i] > 0.0 ? material[i] : lifted;
+        remembered[i] = depth_max[i] > 0.0 ? material[i] : lifted;
     }
 }
 

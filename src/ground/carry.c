@@ -1,3 +1,4 @@
+#define POWER_CALLED /* power.h: no vector loop here needs a power */
 #include "ground/carry.h"
 
 #include <string.h>

@@ -1,3 +1,4 @@
+#define POWER_CALLED /* power.h: no vector loop here needs a power */
 /* Resistive force theory (plate.h) for the slots of a foot, and for plates on their own. */
 #include "ground/resist.h"
 
