@@ -21,8 +21,8 @@ static int share_is_nan(const Share *share) {
     return isnan(share->slip_rate + share->regain_rate + share->grip);
 }
 
-/* Derives what a material gives a slot. Surfaces are projected when they touch down (faces.c). Where
- * path costs support it adds no resistance. */
+/* Derives what a material gives a slot. Surfaces are projected when they touch down (faces.c).
+ * Where path costs support it adds no resistance. */
 static __attribute__((cold)) void law_derive(const FootScratch *foot, const MildMaterial *material,
                                              DerivedLaw *derived) {
     const Law law = law_of(material, foot->pitch, foot->width);

@@ -87,8 +87,8 @@ MILD_HD Real real_log2(Real x) {
     return whole + s * sum * 2.8853900817779268147; /* 2/ln 2 */
 }
 
-/* x^y for a normal x > 0. POWER_CALLED: defined by a file whose vector loops need no power. It calls
- * the one of power.c, in place of a copy for each use. */
+/* x^y for a normal x > 0. POWER_CALLED: defined by a file whose vector loops need no power. It
+ * calls the one of power.c, in place of a copy for each use. */
 #ifdef POWER_CALLED
 Real real_pow(Real x, Real y);
 #else

@@ -5,7 +5,8 @@
 #include "ground/sole.h"
 
 /* Number of arrays of FootScratch outside the slots: x, y, depth, slope_x, slope_y, point_x,
- * point_y, point_z, normal, tangent_x, tangent_y and flat; state and slip share the next; heap has two. */
+ * point_y, point_z, normal, tangent_x, tangent_y and flat; state and slip share the next; heap has
+ * two. */
 #define FOOT_ARRAYS 15
 #define FACES_ARRAYS 6 /* more of a surface: height, face[3], area and share */
 

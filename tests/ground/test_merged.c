@@ -290,7 +290,8 @@ static void test_regain(void **state) {
     mild_sole_destroy(sole);
 }
 
-/* A foot that slips under load sinks; the force of a sliding sole and its drag keep grip's bound. */
+/* A foot that slips under load sinks; the force of a sliding sole and its drag keep to grip's
+ * bound. */
 static void test_sinks(void **state) {
     (void)state;
     MildSole *sole = rectangle(0.12, 0.06, 0.01);
@@ -428,12 +429,12 @@ static double lead_way(Kit *kit, double forward, double down) {
     return work;
 }
 
-/* [J] Energy that the ground gives over a closed motion. A foot is pressed in; then, again and again,
- * it slips by 100 j0, is pressed on by three times u0 in a step, and is lifted. Worn ground costs
- * nothing to press, and the press restores it: the lift would give what nobody has paid for, were the
- * yield depth not put ahead of the element by what the share has grown. paid: [J] work of the presses.
- * The energy counts in the middles of the steps, and the way from one to the next is the mean of two
- * twists. */
+/* [J] Energy that the ground gives over a closed motion. A foot is pressed in; then, again and
+ * again, it slips by 100 j0, is pressed on by three times u0 in a step, and is lifted. Worn ground
+ * costs nothing to press, and the press restores it: the lift would give what nobody has paid for,
+ * were the yield depth not put ahead of the element by what the share has grown. paid: [J] work of
+ * the presses. The energy counts in the middles of the steps, and the way from one to the next is
+ * the mean of two twists. */
 static double pumped(int model, double *paid) {
     enum { CYCLES = 200, STEPS = 16 };
     /* The middles go by 0.4 mm down, ten times 0.01 mm up (in slow steps, because unloading ground
