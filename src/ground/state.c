@@ -158,7 +158,7 @@ static int material_is_valid(int32_t material, int faces) {
 }
 
 /* Bool: the memory of every element of a foot is finite, on materials that exist. */
-static int foot_is_valid(const MildGround *ground, int foot) {
+static __attribute__((cold)) int foot_is_valid(const MildGround *ground, int foot) {
     const Memory memory = ground_memory(ground, foot);
     const size_t padded = (size_t)ground->padded[foot];
     int valid = ground->touched[foot] >= 0 && ground->touched[foot] <= ground->padded[foot];
