@@ -55,6 +55,7 @@ MILD_API_BEGIN
     ROW(ECC_QUASI_3D, ecc_quasi_3d)  /* resistive force theory in three dimensions */              \
     ROW(BEKKER, bekker)              /* pressure a power of the sinkage, shear grows with slip */  \
     ROW(HUNT_CROSSLEY, hunt_crossley) /* damped elastic contact, as most simulators have it */     \
+    ROW(MILD_MERGED, mild_merged)    /* the cones of one sole merge into a heap */                 \
     ROW(RIGID, rigid)                /* must be last: the engine's own contact, has no material */
 /* clang-format on */
 
@@ -121,6 +122,12 @@ typedef struct {
     double plate_width;  /* [m] bekker: b, shorter side of the loaded plate; 0: of the sole */
     double cohesion;     /* [N/m^2] bekker: c, shear strength without load */
     double shear_length; /* [m] bekker: K, slip over which the shear strength builds up */
+    double slip_length;  /* [m] mild, mild_merged: j0, path over which slip halves the support; 0:
+                           slip costs no support. Above 0 k_drift and b_drift are not read */
+    double regain_length; /* [m] mild, mild_merged: u0, fresh penetration over which the support
+                            comes back */
+    double grip;          /* [-] mild, mild_merged with a slip_length: t, greatest friction of a
+                            sliding element by its virgin load; 0: mu alone */
 } MildMaterial;
 
 /* Fields of MildMaterial with unit, range and meaning, for configuration files, sliders and random
@@ -233,6 +240,10 @@ double mild_sole_width(const MildSole *sole);
 const double *mild_sole_x(const MildSole *sole);
 const double *mild_sole_y(const MildSole *sole);
 double mild_sole_z(const MildSole *sole);
+/* [m] Mean over the cell of each element of the distance to the edge of the outline, outside which
+ * it is 0: an array of mild_sole_elements() numbers owned by the sole (docs/model.md section 21).
+ * NULL for a surface. */
+const double *mild_sole_edge(const MildSole *sole);
 /* ---- surfaces: elements anywhere on a body (docs/model.md section 20) ---- */
 
 /* What a shape is. Sizes are those of a MuJoCo geom. */
@@ -301,8 +312,12 @@ typedef struct {
     double added_mass_per_depth; /* dm_a/du [kg/m] */
 } MildElementLaw;
 /* The law of an element of area pitch^2 [m^2] at a depth u >= 0 [m] in virgin ground. The firm bed
- * is part of it. A plate_width of 0 is `pitch` here, because the element is the whole plate. */
+ * is part of it. A plate_width of 0 is `pitch` here, because the element is the whole plate; so an
+ * element of mild_merged is that of mild. */
 MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth);
+/* The same for a whole level sole: the sum over its elements. Of mild_merged each has the law of
+ * its place in the sole. */
+MildElementLaw mild_sole_law(const MildMaterial *material, const MildSole *sole, double depth);
 /* [m] Depth at which a level sole that is pressed slowly into virgin ground carries `load` [N]. */
 double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, double load);
 /* Derives the material of another model for a fair comparison with `mild`, a material of

@@ -8,7 +8,8 @@ extern "C" {
 }
 
 static FitPlate plate_of(const Sole &sole) {
-    return {mild_sole_elements(sole.made), mild_sole_pitch(sole.made), mild_sole_width(sole.made)};
+    return {mild_sole_elements(sole.made), mild_sole_pitch(sole.made), mild_sole_width(sole.made),
+            sole.made};
 }
 
 /* Fills plates[FIT_PLATES_MAX]; returns their number. */

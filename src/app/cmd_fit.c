@@ -1,6 +1,7 @@
 /* mild fit: finds parameters of a ground from recorded presses; prints a table, writes JSON,
  * draws. */
 #include <math.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -255,8 +256,8 @@ static MildStatus plate_lay(const CliNumbers *size, int concentric, FitPlate *la
     if (!sole) {
         return error->status;
     }
-    *laid = (FitPlate){mild_sole_elements(sole), mild_sole_pitch(sole), mild_sole_width(sole)};
-    mild_sole_destroy(sole);
+    *laid =
+        (FitPlate){mild_sole_elements(sole), mild_sole_pitch(sole), mild_sole_width(sole), sole};
     return MILD_OK;
 }
 
@@ -602,5 +603,8 @@ int cmd_fit(int argc, char **argv) {
         status = fit_report(&options, &args, &work, &error);
     }
     free(work.points);
+    for (int i = 0; i < work.def.plates; i++) {
+        mild_sole_destroy((MildSole *)(uintptr_t)work.def.plate[i].sole);
+    }
     return status == MILD_OK ? 0 : cli_fail("fit", &error);
 }

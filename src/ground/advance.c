@@ -68,24 +68,32 @@ static void element_imprint(const Advance *a, const Memory *memory, int i, int e
     memory->front_speed[e] = 0.0;
 }
 
+/* [m] element_peak of a slot that reversed within the step. */
+static __attribute__((cold, noinline)) double slot_peak(const Advance *a, int i, double speed,
+                                                        double middle) {
+    const Element element = slot_loaded(&a->slot, i, a->foot->curves);
+    return element_peak(&element, a->foot->curves, a->slot.iz[i], speed, middle);
+}
+
 /* Raises the greatest depth of slot i, element e, if the element reversed within the step: it was
  * then deeper than at either end. */
-static void slot_peak(const Advance *a, const Memory *memory, int i, int e, double speed,
-                      double middle) {
-    const Element element = slot_element(&a->slot, i);
-    const double peak = element_peak(&element, a->foot->curves, a->slot.iz[i], speed, middle);
-    const double depth = element.virgin_depth + peak - element.yield_depth;
+static void slot_raise(const Advance *a, const Memory *memory, int i, int e, double speed,
+                       double middle) {
+    const Slots *s = &a->slot;
+    const int turns = element_turns(s->entry_speed[i], speed);
+    const double peak = turns ? slot_peak(a, i, speed, middle) : middle;
+    const double depth = s->virgin_depth[i] + peak - s->yield_depth[i];
     memory->depth_max[e] = fmax(memory->depth_max[e], depth);
 }
 
 /* The same for all elements of a foot. It is not part of the vector loop, where taking the address
  * of a local variable would prevent vectorisation. */
-static void foot_peaks(const Advance *a, const Memory *memory) {
+static __attribute__((cold, noinline)) void foot_peaks(const Advance *a, const Memory *memory) {
     for (int i = 0; i < a->foot->elements; i++) {
         const SlotVelocity v = slot_velocity(&a->slot, i, &a->motion, 1);
         const double middle = a->slot.depth[i] + a->dt / 2 * v.descent;
         if (middle > 0.0 && element_turns(a->slot.entry_speed[i], v.descent)) {
-            slot_peak(a, memory, i, i, v.descent, middle);
+            slot_raise(a, memory, i, i, v.descent, middle);
         }
     }
 }
@@ -101,10 +109,31 @@ MILD_HD void slot_plane(const FootScratch *foot, double height, const Slots *s,
                        foot->point_z[e] - height;
 }
 
+/* After the vector loop: peaks, the padding, and the material of each element. turned: bool, an
+ * element reversed. */
+static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory *all,
+                                                  const int32_t *material, int turned) {
+    const int end = a->foot->padded & -VECTOR_LANES; /* changes nothing; see moments.c */
+    const double *depth_max = all->depth_max;
+    int32_t *remembered = all->material;
+    if (turned) {
+        foot_peaks(a, all);
+    }
+    for (int i = a->foot->elements; i < end; i++) {
+        memory_forget(all, i, MATERIAL_NONE);
+    }
+    const int32_t lifted = a->foot->uneven ? MATERIAL_FREE : MATERIAL_NONE;
+#pragma omp simd
+    for (int i = 0; i < end; i++) {
+        remembered[i] = depth_max[i] > 0.0 ? material[i] : lifted;
+    }
+}
+
 /* Vector loop for a foot with all elements listed, on ground without imprints. Returns how many
- * elements remember something. */
-MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material,
-                             int uneven) {
+ * elements remember something. kind: SLOT_UNEVEN or 0. heap: bool, shares wear. Both are constants.
+ */
+MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material, int kind,
+                             int heap) {
     const FootScratch foot = *a->foot;
     const Slots local = a->slot, *s = &local;
     const Memory own = *all, *memory = &own;
@@ -112,37 +141,43 @@ MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t 
     const double dt = a->dt;
     const double rate = 1.0 / dt;
     const double height = a->height;
-    const int end = foot.padded;
+    const int end = foot.padded & -VECTOR_LANES; /* changes nothing; see moments.c */
+    if (end < VECTOR_LANES) {
+        return 0; /* never. The compiler then adds no loop for a remainder */
+    }
     double touched = 0.0;
     double turned = 0.0;
 #pragma omp simd reduction(+ : touched, turned)
     for (int i = 0; i < end; i++) {
-        const SlotVelocity v = slot_velocity(s, i, &motion, uneven);
+        const SlotVelocity v = slot_velocity(s, i, &motion, kind);
         const Element element = slot_element(s, i);
         const ElementMemory before = slot_memory(s, i);
         const int stays = s->depth[i] + dt / 2 * v.descent > 0.0;
-        const ElementMemory after =
+        ElementMemory after =
             element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
+        if (heap) {
+            const Share share = slot_share(s, i);
+            memory->worn[i] = element_wear(&element, &share, &before, &after, dt, s->iz[i], v.x,
+                                           v.y, v.descent, stays);
+        }
         memory_store(memory, i, &after);
-        if (uneven) {
+        if (kind && !heap) {
             slot_plane(&foot, height, s, memory, i, i);
         }
         touched += stays ? 1.0 : 0.0;
         turned += stays && element_turns(element.entry_speed, v.descent) ? 1.0 : 0.0;
     }
-    if (turned > 0.0) {
-        foot_peaks(a, all);
+    foot_finish(a, all, material, turned > 0.0);
+    return foot.uneven ? foot.elements : (int)touched;
+}
+
+/* The same on ground whose elements carry a share of their load: one loop serves level ground too,
+ * where the slopes are 0. */
+static int foot_advance_heaps(const Advance *a, const Memory *memory, const int32_t *material) {
+    for (int i = 0; a->foot->uneven && i < a->foot->elements; i++) {
+        slot_plane(a->foot, a->height, &a->slot, memory, i, i);
     }
-    for (int i = foot.elements; i < end; i++) {
-        memory_forget(memory, i, MATERIAL_NONE); /* the padding */
-    }
-    const double *depth_max = memory->depth_max;
-    int32_t *remembered = memory->material;
-    const int32_t lifted = uneven ? MATERIAL_FREE : MATERIAL_NONE;
-    for (int i = 0; i < end; i++) {
-        remembered[i] = depth_max[i] > 0.0 ? material[i] : lifted;
-    }
-    return uneven ? foot.elements : (int)touched;
+    return foot_advance_all(a, memory, material, SLOT_UNEVEN, 1);
 }
 
 /* An element that is not listed forgets. Returns whether it remembers that it was here. */
@@ -167,11 +202,21 @@ static int face_unlisted(const Advance *a, const Memory *memory, int e) {
     return buried;
 }
 
+/* [-] The wear of slot i after the step; adds to `after`. */
+static __attribute__((noinline)) double slot_wear(const Advance *a, int i,
+                                                  const ElementMemory *before, ElementMemory *after,
+                                                  const SlotVelocity *v, int stays) {
+    const Element element = slot_element(&a->slot, i);
+    const Share share = slot_share(&a->slot, i);
+    return element_wear(&element, &share, before, after, a->dt, a->slot.iz[i], v->x, v->y,
+                        v->descent, stays);
+}
+
 /* The general case: some elements are listed, the ground keeps imprints, or the foot is a surface.
- * Returns how many elements remember something. faces: SLOT_FACES or 0, a constant. */
-MILD_HD int foot_advance(const Advance *a, const Memory *memory, const int32_t *material,
-                         int faces) {
+ * Returns how many elements remember something. */
+static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
     const FootScratch *foot = a->foot;
+    const int faces = foot->faces;
     const Slots *s = &a->slot;
     const int32_t lifted_material = a->imprints || foot->uneven ? MATERIAL_FREE : MATERIAL_NONE;
     int next = 0;
@@ -193,11 +238,14 @@ MILD_HD int foot_advance(const Advance *a, const Memory *memory, const int32_t *
         const int carried = memory->material[e] >= 0;
         const Element element = slot_element(s, i);
         const ElementMemory before = slot_memory(s, i);
-        const ElementMemory after = element_remember(&element, &before, a->dt, 1.0 / a->dt,
-                                                     s->iz[i], v.x, v.y, v.descent, !lifted);
+        ElementMemory after = element_remember(&element, &before, a->dt, 1.0 / a->dt, s->iz[i], v.x,
+                                               v.y, v.descent, !lifted);
+        if (foot->curves & LAW_HEAP) {
+            memory->worn[e] = slot_wear(a, i, &before, &after, &v, !lifted);
+        }
         memory_store(memory, e, &after);
         if (!lifted) {
-            slot_peak(a, memory, i, e, v.descent, middle);
+            slot_raise(a, memory, i, e, v.descent, middle);
         }
         const int barred = (material[i] & SLOT_BARRED) != 0;
         memory->material[e] = lifted || barred ? lifted_material : material[i];
@@ -248,14 +296,14 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
              * hold. */
             slots_remember(&advance.slot, &memory);
         }
-        if (all && foot->uneven) {
-            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1);
+        if (all && foot->curves & LAW_HEAP) {
+            ground->touched[f] = foot_advance_heaps(&advance, &memory, foot->slot_material);
+        } else if (all && foot->uneven) {
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1, 0);
         } else if (all) {
-            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0);
-        } else if (foot->faces) {
-            ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material, SLOT_FACES);
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0, 0);
         } else {
-            ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material, 0);
+            ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material);
         }
     }
 }

@@ -47,7 +47,8 @@ int law_curves(const Law *law) {
 
 #define LAW_INDEX(name) LAW_INDEX_##name,
 enum { LAW_NUMBERS(LAW_INDEX) LAW_COUNT };
-_Static_assert(sizeof(Law) == LAW_COUNT * sizeof(Real), "LAW_NUMBERS lists every field of Law");
+_Static_assert(sizeof(Law) == (LAW_COUNT + 1) * sizeof(Real),
+               "LAW_NUMBERS lists every field of Law but cone_begin");
 
 #define LAW_ADD(name) sum += law->name;
 int law_is_nan(const Law *law) {
@@ -77,6 +78,7 @@ static double between_curves(double force_a, double a, double force_b, double b,
 Law law_between(const Law *a, const Law *b, double share) {
     Law law = {LAW_NUMBERS(LAW_BETWEEN)};
     law.inverse_cone_depth = 1.0 / law.cone_depth;
+    law.cone_begin = between(a->cone_begin, b->cone_begin, share);
     law.power_exponent =
         between_curves(a->power_force, a->power_exponent, b->power_force, b->power_exponent, share);
     law.elastic_exponent = between_curves(a->elastic_force, a->elastic_exponent, b->elastic_force,

@@ -58,6 +58,9 @@ static double foot_caused(const FootScratch *foot, const Motion *change) {
     const Motion v = *change;
     const int end = foot_end(foot);
     double sum = 0.0;
+    if (end < VECTOR_LANES) {
+        return 0.0; /* never. The compiler then adds no loop for a remainder */
+    }
 #pragma omp simd reduction(+ : sum)
     for (int i = 0; i < end; i++) {
         const double iz = s->iz[i];
@@ -114,7 +117,8 @@ static double slot_gift(const Slots *s, int i, const SlotVelocity *u, const Slot
 }
 
 /* [J] Sum over the slots whose friction gave energy. Slots that took energy do not count. */
-static double foot_gift(const FootScratch *foot, const Motion *before, const Motion *after) {
+static __attribute__((cold)) double foot_gift(const FootScratch *foot, const Motion *before,
+                                              const Motion *after) {
     double sum = 0.0;
     for (int i = 0; i < foot->active; i++) {
         const SlotVelocity u = slot_velocity(&foot->slot, i, before, SLOT_FACES);
@@ -124,7 +128,8 @@ static double foot_gift(const FootScratch *foot, const Motion *before, const Mot
     return sum;
 }
 
-static void foot_turn(FootScratch *foot, const Motion *before, const Motion *after, int all) {
+static __attribute__((cold)) void foot_turn(FootScratch *foot, const Motion *before,
+                                            const Motion *after, int all) {
     const Slots *s = &foot->slot;
     foot->turned = 1;
     for (int i = 0; i < foot->active; i++) {

@@ -28,10 +28,12 @@ void slots_gather(FootScratch *foot, const Memory *memory) {
     const double *const all[] = {from.x,         from.y,           from.depth,
                                  from.depth_max, from.last_middle, from.last_speed,
                                  from.drift,     from.pending_x,   from.pending_y,
-                                 from.held_x,    from.held_y,      from.held_stiffness};
+                                 from.held_x,    from.held_y,      from.held_stiffness,
+                                 from.worn};
     double *const listed[] = {s->x,           s->y,          s->depth,  s->depth_max,
                               s->last_middle, s->last_speed, s->drift,  s->pending_x,
-                              s->pending_y,   s->held_x,     s->held_y, s->held_stiffness};
+                              s->pending_y,   s->held_x,     s->held_y, s->held_stiffness,
+                              s->worn};
     const int end = foot_end(foot);
     const int active = foot->active;
     for (size_t a = 0; a < sizeof all / sizeof *all; a++) {

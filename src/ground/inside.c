@@ -8,7 +8,7 @@ InsideLaw mild_inside_law(const MildMaterial *material, double pitch, double wid
     return (InsideLaw){
         .law = law,
         .recovery = law_recovery(&law, recovery_of(material)),
-        .curves = law_curves(&law) | model_row(material->model)->motion,
+        .curves = curves_of(material, &law) | model_row(material->model)->motion,
     };
 }
 

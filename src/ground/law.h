@@ -29,6 +29,11 @@
  * Nothing cancels at small u or small nu/tan(alpha), because u_f is the only length left. F_g is
  * concave when k_pen > kappa, convex otherwise, and straight beyond u_f.
  *
+ * A heap (docs/model.md section 21) is a cone that closes from the depth u_b on:
+ *
+ *     P(u)   = min(u, u_b) + u_f (t - t^2 + t^3/3),   t = clamp((u - u_b)/u_f, 0, 1)
+ * The other formulas stay. With u_b = 0 it is the cone above.
+ *
  * The elastic curve is the only one that is not about virgin ground. It acts at every depth, on
  * the way down and up, in a term of its own (impulse.h).
  *
@@ -51,7 +56,10 @@ typedef enum {
     LAW_CONE = 1,    /* the developing cone, its added mass and its drag */
     LAW_POWER = 2,   /* the power of the depth */
     LAW_ELASTIC = 4, /* the elastic curve without memory */
-    LAW_ALL = LAW_CONE | LAW_POWER | LAW_ELASTIC
+    LAW_ALL = LAW_CONE | LAW_POWER | LAW_ELASTIC,
+    LAW_HEAP = 8, /* the cone may begin to close below the surface, and the element may carry a
+                     share of its load (share.h). Not in batches, so not in LAW_ALL */
+    LAW_ANY = LAW_ALL | LAW_HEAP
 } LawCurve;
 
 /* How an element's law or friction depends on its motion so far; bits beside those of LawCurve. */
@@ -76,9 +84,20 @@ typedef struct {
     Real elastic_force;      /* S [N] of the elastic curve */
     Real elastic_exponent;   /* n [-] */
     Real elastic_damping;    /* d [s/m] relative growth of its force with the downward speed */
+#ifndef MILD_REAL_FLOAT
+    Real cone_begin; /* u_b [m] depth from which the cone closes; only with LAW_HEAP */
+#endif
 } Law;
 
-/* The numbers of Law in order. Slots, loads, stores and checks are generated from this list. */
+/* Batches have no heaps. */
+#ifdef MILD_REAL_FLOAT
+#define LAW_BEGIN(law) REAL(0)
+#else
+#define LAW_BEGIN(law) (law)->cone_begin
+#endif
+
+/* The numbers of Law in order, but for cone_begin, which belongs to the place of an element in its
+ * sole. Slots, loads, stores and checks are generated from this list. */
 #define LAW_NUMBERS(NUMBER)                                                                        \
     NUMBER(flat_stiffness)                                                                         \
     NUMBER(line_stiffness)                                                                         \
@@ -94,32 +113,38 @@ typedef struct {
     NUMBER(elastic_exponent)                                                                       \
     NUMBER(elastic_damping)
 
-/* The bits of the compiled loop that serves these curves: the loop of a single curve, or of all. */
+/* The bits of the compiled loop that serves these curves: the loop of a single curve, that of a
+ * heap, or that of any. */
 MILD_HD int law_variant(int curves) {
     const int one =
         curves == LAW_LINE || curves == LAW_CONE || curves == LAW_POWER || curves == LAW_ELASTIC;
-    return one ? curves : LAW_ALL;
+    if (curves == LAW_HEAP || curves == (LAW_CONE | LAW_HEAP)) {
+        return LAW_CONE | LAW_HEAP;
+    }
+    return one ? curves : LAW_ANY;
 }
 
 /* t [-], 1 when the cone is complete. */
-MILD_HD Real law_cone_progress(const Law *law, Real depth) {
-    return real_min(depth * law->inverse_cone_depth, 1);
+MILD_HD Real law_cone_progress(const Law *law, int curves, Real depth) {
+    const Real closing = curves & LAW_HEAP ? real_max(depth - LAW_BEGIN(law), 0) : depth;
+    return real_min(closing * law->inverse_cone_depth, 1);
 }
 
 /* 1 - (1 - t)^3 [-], the recruited share of what the complete cone recruits. */
-MILD_HD Real law_cone_share(const Law *law, Real depth) {
-    const Real t = law_cone_progress(law, depth);
+MILD_HD Real law_cone_share(const Law *law, int curves, Real depth) {
+    const Real t = law_cone_progress(law, curves, depth);
     return t * (3 - t * (3 - t));
 }
 
 /* P(u) [m], u >= 0. */
-MILD_HD Real law_recruited(const Law *law, Real depth) {
-    return law->cone_depth * REAL(1.0 / 3.0) * law_cone_share(law, depth);
+MILD_HD Real law_recruited(const Law *law, int curves, Real depth) {
+    const Real closing = law->cone_depth * REAL(1.0 / 3.0) * law_cone_share(law, curves, depth);
+    return curves & LAW_HEAP ? real_min(depth, LAW_BEGIN(law)) + closing : closing;
 }
 
 /* P'(u) [-], 1 at the surface, 0 once the cone is complete. */
-MILD_HD Real law_flat_share(const Law *law, Real depth) {
-    const Real open = 1 - law_cone_progress(law, depth);
+MILD_HD Real law_flat_share(const Law *law, int curves, Real depth) {
+    const Real open = 1 - law_cone_progress(law, curves, depth);
     return open * open;
 }
 
@@ -137,7 +162,7 @@ MILD_HD Real law_bed_slope(const Law *law, Real depth) {
 MILD_HD Real law_bedless_force(const Law *law, int curves, Real depth) {
     Real force = law->line_stiffness * depth;
     if (curves & LAW_CONE) {
-        force = law->flat_stiffness * law_recruited(law, depth) + force;
+        force = law->flat_stiffness * law_recruited(law, curves, depth) + force;
     }
     if (curves & LAW_POWER) {
         force += power_force(law->power_force, law->power_exponent, depth);
@@ -149,7 +174,7 @@ MILD_HD Real law_bedless_force(const Law *law, int curves, Real depth) {
 MILD_HD Real law_bedless_slope(const Law *law, int curves, Real depth) {
     Real slope = law->line_stiffness;
     if (curves & LAW_CONE) {
-        slope = law->flat_stiffness * law_flat_share(law, depth) + slope;
+        slope = law->flat_stiffness * law_flat_share(law, curves, depth) + slope;
     }
     if (curves & LAW_POWER) {
         slope += power_slope(law->power_force, law->power_exponent, depth);
@@ -212,16 +237,24 @@ MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way) {
     over.recruited_slope = 0;
     if (curves & LAW_CONE) {
         const Real whole = law->cone_depth * REAL(1.0 / 3.0);
-        const Real share_begin = law_cone_share(law, begin);
-        const Real share_half = law_cone_share(law, half);
-        const Real share_end = law_cone_share(law, end);
+        const Real share_begin = law_cone_share(law, curves, begin);
+        const Real share_half = law_cone_share(law, curves, half);
+        const Real share_end = law_cone_share(law, curves, end);
         const Real share_mean = (share_begin + 4 * share_half + share_end) * REAL(1.0 / 6.0);
-        const Real flat_half = law_flat_share(law, half);
-        const Real flat_end = law_flat_share(law, end);
+        const Real flat_half = law_flat_share(law, curves, half);
+        const Real flat_end = law_flat_share(law, curves, end);
         over.mean += law->flat_stiffness * whole * share_mean;
         over.mean_slope += law->flat_stiffness * (2 * flat_half + flat_end) * REAL(1.0 / 6.0);
         over.recruited = way > 0 ? whole * (share_end - share_begin) : 0;
         over.recruited_slope = way > 0 ? flat_end : 0;
+    }
+    if (curves & LAW_HEAP) {
+        const Real open_begin = real_min(begin, LAW_BEGIN(law));
+        const Real open_half = real_min(half, LAW_BEGIN(law));
+        const Real open_end = real_min(end, LAW_BEGIN(law));
+        over.mean +=
+            law->flat_stiffness * ((open_begin + 4 * open_half + open_end) * REAL(1.0 / 6.0));
+        over.recruited += way > 0 ? open_end - open_begin : 0;
     }
     if (curves & LAW_POWER) {
         const PowerWay power = power_way(law->power_force, law->power_exponent, begin, way);

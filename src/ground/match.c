@@ -2,30 +2,56 @@
  * model that sinks equally deep. */
 #define POWER_CALLED /* power.h: no vector loop here needs a power */
 #include "ground/models.h"
+#include "ground/sole.h"
 
 #include <math.h>
+
+static MildElementLaw law_at(const Law *law, int curves, double depth) {
+    const double elastic = law_elastic_force(law, curves, depth);
+    return (MildElementLaw){
+        .force = law_force(law, curves, depth) + elastic,
+        .stiffness = law_slope(law, curves, depth) + law_elastic_slope(law, curves, depth),
+        .damping = law->elastic_damping * elastic,
+        .added_mass = law->mass_rate * law_recruited(law, curves, depth),
+        .added_mass_per_depth = law->mass_rate * law_flat_share(law, curves, depth),
+    };
+}
 
 static MildElementLaw element_law(const MildMaterial *material, double pitch, double width,
                                   double depth) {
     const Law law = law_of(material, pitch, width);
-    const int curves = law_curves(&law);
-    const double elastic = law_elastic_force(&law, curves, depth);
-    return (MildElementLaw){
-        .force = law_force(&law, curves, depth) + elastic,
-        .stiffness = law_slope(&law, curves, depth) + law_elastic_slope(&law, curves, depth),
-        .damping = law.elastic_damping * elastic,
-        .added_mass = law.mass_rate * law_recruited(&law, depth),
-        .added_mass_per_depth = law.mass_rate * law_flat_share(&law, depth),
-    };
+    return law_at(&law, law_curves(&law), depth);
 }
 
 MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth) {
     return element_law(material, pitch, pitch, depth);
 }
 
+/* Adds `count` elements to a sum. */
+static void law_add(MildElementLaw *sum, double count, const MildElementLaw *one) {
+    sum->force += count * one->force;
+    sum->stiffness += count * one->stiffness;
+    sum->damping += count * one->damping;
+    sum->added_mass += count * one->added_mass;
+    sum->added_mass_per_depth += count * one->added_mass_per_depth;
+}
+
+MildElementLaw mild_sole_law(const MildMaterial *material, const MildSole *sole, double depth) {
+    const Law law = law_of(material, mild_sole_pitch(sole), mild_sole_width(sole));
+    const int merged = model_row(material->model)->merged;
+    const int elements = mild_sole_elements(sole);
+    MildElementLaw sum = {0};
+    for (int i = 0; i < (merged ? elements : 1); i++) {
+        const SoleHeap heap = merged ? sole_heap(sole, i) : (SoleHeap){0.0, 1.0};
+        const Law own = merged ? law_merged(law, heap.begin, heap.width) : law;
+        const MildElementLaw one = law_at(&own, curves_of(material, &law), depth);
+        law_add(&sum, merged ? 1.0 : elements, &one);
+    }
+    return sum;
+}
+
 static double sole_force(const MildSole *sole, const MildMaterial *material, double depth) {
-    return mild_sole_elements(sole) *
-           element_law(material, mild_sole_pitch(sole), mild_sole_width(sole), depth).force;
+    return mild_sole_law(material, sole, depth).force;
 }
 
 double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, double load) {
@@ -56,12 +82,15 @@ static double *material_number(MildMaterial *m, const char *key) {
 
 /* Above the bed, a law is proportional to its `scaled` fields, so a single factor matches it.
  * pressure: [N/m^2] that the ground above the bed carries. area: [m^2] of one element of the
- * rival. width: [m] of the sole. */
+ * rival. */
 static void rival_scale(MildMaterial *m, const ModelRow *row, double pressure, double area,
-                        double width, double depth) {
+                        const MildSole *sole, double depth) {
     MildMaterial bottomless = *m;
     bottomless.bed_depth = INFINITY;
-    const double scale = pressure * area / element_law(&bottomless, sqrt(area), width, depth).force;
+    const double force =
+        row->merged ? sole_force(sole, &bottomless, depth) / mild_sole_elements(sole)
+                    : element_law(&bottomless, sqrt(area), mild_sole_width(sole), depth).force;
+    const double scale = pressure * area / force;
     for (int k = 0; k < MILD_MODEL_SCALED && row->info.scaled[k]; k++) {
         *material_number(m, row->info.scaled[k]) *= scale;
     }
@@ -115,7 +144,7 @@ MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const Mil
         row->reference(&matched, area);
     }
     if (row->info.scaled[0]) {
-        rival_scale(&matched, row, pressure, area, mild_sole_width(sole), depth);
+        rival_scale(&matched, row, pressure, area, sole, depth);
     }
     MildError why;
     status = mild_material_check(&matched, &why);

@@ -35,6 +35,12 @@ const MildField mild_material_fields[] = {
     FIELD(plate_width, 0.0, 1.0, "[m] bekker: b, shorter side of the loaded plate; 0: of the sole"),
     FIELD(cohesion, 0.0, 1e6, "[N/m^2] bekker: shear strength without load"),
     FIELD(shear_length, 0.001, 0.1, "[m] bekker: slip over which the shear strength builds up"),
+    FIELD(slip_length, 0.0, 1.0,
+          "[m] mild, mild_merged: path over which slip halves the support; 0: it does not"),
+    FIELD(regain_length, 1e-4, 1.0,
+          "[m] mild, mild_merged: fresh penetration over which the support comes back"),
+    FIELD(grip, 0.0, 1.0,
+          "[-] with slip_length: greatest friction of a sliding sole by its virgin load; 0: mu"),
 };
 const int mild_material_field_count =
     (int)(sizeof mild_material_fields / sizeof *mild_material_fields);
@@ -120,6 +126,7 @@ static MildMaterial preset_material(const Preset *preset) {
         .plate_width = 0.0,
         .cohesion = 1040.0,
         .shear_length = 0.01,
+        .regain_length = 0.00068, /* of grains, section 22 */
     };
 }
 

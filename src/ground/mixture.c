@@ -17,6 +17,27 @@ static int material_is_nan(const MildMaterial *m) {
     return isnan(m->mu + m->k_drift + m->b_drift + m->recovery + m->cohesion + m->shear_length);
 }
 
+static int share_is_nan(const Share *share) {
+    return isnan(share->slip_rate + share->regain_rate + share->grip);
+}
+
+/* Derives what a material gives a slot. Surfaces are projected when they touch down (faces.c).
+ * Where path costs support it adds no resistance. */
+static __attribute__((cold)) void law_derive(const FootScratch *foot, const MildMaterial *material,
+                                             DerivedLaw *derived) {
+    const Law law = law_of(material, foot->pitch, foot->width);
+    Share share = share_of(material);
+    share.projects = foot->faces ? 0.0 : share.projects;
+    const int slips = share.slip_rate > 0.0;
+    *derived =
+        (DerivedLaw){.material = *material,
+                     .slot = {law, share, slips ? 0.0 : material->k_drift,
+                              slips ? 0.0 : material->b_drift, recovery_of(material)},
+                     .curves = curves_of(material, &law),
+                     .known = 1,
+                     .nan = law_is_nan(&law) || material_is_nan(material) || share_is_nan(&share)};
+}
+
 void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
     foot->nan = 0;
     foot->curves = LAW_LINE;
@@ -25,12 +46,7 @@ void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
         const MildMaterial *wanted = &terrain->materials[m];
         // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): a difference costs time only
         if (!derived->known || memcmp(&derived->material, wanted, sizeof *wanted) != 0) {
-            const Law law = law_of(wanted, foot->pitch, foot->width);
-            *derived = (DerivedLaw){.material = *wanted,
-                                    .law = law,
-                                    .curves = law_curves(&law),
-                                    .known = 1,
-                                    .nan = law_is_nan(&law) || material_is_nan(wanted)};
+            law_derive(foot, wanted, derived);
             for (int i = 0; i < foot->padded; i++) {
                 if (mixture_has(foot->slot_material[i], m)) {
                     foot->slot_material[i] = MATERIAL_NONE;
@@ -42,47 +58,71 @@ void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
     }
 }
 
-#define SLOT_LAW_STORE(name) s->name[i] = law->name;
+#define SLOT_LAW_STORE(name) s->name[i] = from->law.name;
 /* Sets the law of slot i, and its friction and recovery. */
-static void slot_set_law(const Slots *s, int i, const Law *law, const MildMaterial *material) {
+static void slot_set_law(const Slots *s, int i, const SlotLaw *from) {
+    const Share *share = &from->share;
     LAW_NUMBERS(SLOT_LAW_STORE)
-    s->exit_drag[i] = law_exit_drag(law);
-    s->entry_drag[i] = law_entry_drag(law);
-    s->strength[i] = law->line_stiffness;
-    s->recovery[i] = law_recovery(law, recovery_of(material));
-    s->mu[i] = material->mu;
-    s->k_drift[i] = material->k_drift;
-    s->b_drift[i] = material->b_drift;
+    s->cone_begin[i] = from->law.cone_begin;
+    s->projects[i] = share->projects;
+    s->slip_rate[i] = share->slip_rate;
+    s->regain_rate[i] = share->regain_rate;
+    s->grip[i] = share->grip;
+    s->whole_mu[i] = share->mu;
+    s->carry[i] = 1.0;
+    s->exit_drag[i] = law_exit_drag(&from->law);
+    s->entry_drag[i] = law_entry_drag(&from->law);
+    s->strength[i] = from->law.line_stiffness;
+    s->recovery[i] = law_recovery(&from->law, from->recovery);
+    s->mu[i] = share->mu;
+    s->k_drift[i] = from->k_drift;
+    s->b_drift[i] = from->b_drift;
 }
 
 static double between(double a, double b, double share) {
     return a + share * (b - a);
 }
 
-/* Sets a slot to a mixture of two materials. Law, friction and recovery are interpolated
- * linearly. */
-static void slot_set_mixture(const Slots *s, int i, const DerivedLaw *derived, int32_t mixture) {
-    const DerivedLaw *a = &derived[mixture & 0xff];
-    const DerivedLaw *b = &derived[mixture >> 8 & 0xff];
-    const MildMaterial *m = &a->material;
-    const MildMaterial *n = &b->material;
-    const double t = (mixture >> 16) / 255.0;
-    const Law law = law_between(&a->law, &b->law, t);
-    const MildMaterial material = {
-        .mu = between(m->mu, n->mu, t),
-        .k_drift = between(m->k_drift, n->k_drift, t),
-        .b_drift = between(m->b_drift, n->b_drift, t),
-        .recovery = between(recovery_of(m), recovery_of(n), t),
-    };
-    slot_set_law(s, i, &law, &material);
+/* What material m gives a slot with element e. */
+static SlotLaw slot_law(const FootScratch *foot, int m, int e) {
+    SlotLaw own = foot->derived[m].slot;
+    if (own.share.projects > 0.0) {
+        own.law = law_merged(own.law, foot->heap[e].begin, foot->heap[e].width);
+    }
+    return own;
+}
+
+/* Changes what one material gives into that of a mixture with another. Law, friction and recovery
+ * are interpolated linearly. */
+static void slot_law_mix(SlotLaw *a, const SlotLaw *b, double t) {
+    Share *share = &a->share;
+    a->law = law_between(&a->law, &b->law, t);
+    share->projects = between(share->projects, b->share.projects, t);
+    share->slip_rate = between(share->slip_rate, b->share.slip_rate, t);
+    share->regain_rate = between(share->regain_rate, b->share.regain_rate, t);
+    share->grip = between(share->grip, b->share.grip, t);
+    share->mu = between(share->mu, b->share.mu, t);
+    a->k_drift = between(a->k_drift, b->k_drift, t);
+    a->b_drift = between(a->b_drift, b->b_drift, t);
+    a->recovery = between(a->recovery, b->recovery, t);
+}
+
+/* Sets slot i, of element e, to a material or a mixture of two. */
+static void slot_set_mixture(const FootScratch *foot, int i, int e, int32_t mixture) {
+    SlotLaw own = slot_law(foot, mixture & 0xff, e);
+    if (mixture > 0xff) {
+        const SlotLaw other = slot_law(foot, mixture >> 8 & 0xff, e);
+        slot_law_mix(&own, &other, (mixture >> 16) / 255.0);
+    }
+    slot_set_law(&foot->slot, i, &own);
 }
 
 void slots_pad(const FootScratch *foot) {
-    static const Law none;
-    static const MildMaterial nothing;
+    static const SlotLaw none;
     for (int i = foot->active; i < foot_end(foot); i++) {
         foot->slot_material[i] = MATERIAL_NONE;
-        slot_set_law(&foot->slot, i, &none, &nothing);
+        foot->slot_holder[i] = -1;
+        slot_set_law(&foot->slot, i, &none);
     }
 }
 
@@ -98,6 +138,9 @@ static int slots_are_uniform(const FootScratch *foot, const Memory *memory) {
     for (int i = 0; i < foot->active; i++) {
         differs |= set[i];
     }
+    for (int i = 0; foot->curves & LAW_HEAP && i < foot->active; i++) {
+        differs |= foot->slot_holder[i] - foot->element[i];
+    }
     return !differs;
 }
 
@@ -111,14 +154,12 @@ void slots_materials(const FootScratch *foot, const MildTerrain *terrain, const 
         if (m < 0 || (m & 0xff) >= count || (m >> 8 & 0xff) >= count) {
             m = terrain_mixture(terrain, foot->point_x[e], foot->point_y[e]);
         }
-        if (foot->slot_material[i] == m) {
+        if (foot->slot_material[i] == m &&
+            (!(foot->curves & LAW_HEAP) || foot->slot_holder[i] == e)) {
             continue;
         }
         foot->slot_material[i] = m;
-        if (m <= 0xff) {
-            slot_set_law(&foot->slot, i, &foot->derived[m].law, &terrain->materials[m]);
-        } else {
-            slot_set_mixture(&foot->slot, i, foot->derived, m);
-        }
+        foot->slot_holder[i] = e;
+        slot_set_mixture(foot, i, e, m);
     }
 }

@@ -17,6 +17,12 @@ typedef struct {
     /* Law of one element of area pitch^2. NULL: the model has no soft ground. */
     Law (*law)(const MildMaterial *material, double pitch);
 
+    /* Bool: the cones of one sole merge: an element's place in the sole gives its law, and it
+     * presses with its projected area (share.h). */
+    int merged;
+    /* Bool: slip takes the support away where the material has a slip_length. */
+    int slips;
+
     /* Used by mild_model_match: changes a material of mild into one of this model, where the two
      * differ. The `scaled` fields are then multiplied by a factor that gives the same sinkage, so
      * only their ratios matter here. area: [m^2] of an element of the model. NULL: nothing

@@ -95,10 +95,13 @@ static void bekker_shear(const FootScratch *foot, const MildTerrain *terrain, in
         if (material->model != model || foot->slot_material[i] & SLOT_BARRED) {
             continue;
         }
-        const Shear shear = {slot_mu(terrain, foot->slot_material[i]), material->cohesion,
-                             material->shear_length, foot->faces ? s->share[i] * area : area};
+        const double mu = foot->curves & LAW_HEAP /* what slip has left, beside such ground */
+                              ? s->mu[i]
+                              : slot_mu(terrain, foot->slot_material[i]);
+        const Shear shear = {mu, material->cohesion, material->shear_length,
+                             foot->faces ? s->share[i] * area : area};
         const ElementMemory memory = slot_memory(s, i);
-        Element element = slot_element(s, i);
+        Element element = slot_loaded(s, i, foot->curves);
         element_shear(&element, &memory, &shear, foot->curves, dt, 1.0 / dt);
         s->mu[i] = element.mu;
         slot_store(s, i, &element);

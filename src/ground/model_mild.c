@@ -4,6 +4,8 @@ const ModelRow model_mild = {
     .info = {.summary = "a developing cone under every element",
              .source = "the paper",
              .fields = {"k_pen", "sigma_cone", "alpha", "nu", "c_g", "c_d", "phi", "rho", "mu",
-                        "k_drift", "b_drift", "recovery", "bed_depth", "passive"}},
+                        "k_drift", "b_drift", "recovery", "bed_depth", "passive", "slip_length",
+                        "regain_length", "grip"}},
     .law = law_cone,
+    .slips = 1,
 };

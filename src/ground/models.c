@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#define REGAIN_LEAST 1e-4 /* [m] share.h: no shorter than the elastic travel */
+
 #define MODEL_DECLARE(id, name) extern const ModelRow model_##name;
 MILD_MODEL_LIST(MODEL_DECLARE)
 
@@ -42,6 +44,30 @@ Law law_of(const MildMaterial *material, double pitch, double width) {
         loaded.plate_width = fmax(width, MATERIAL_PLATE_MIN);
     }
     return model_row(material->model)->law(&loaded, pitch);
+}
+
+Share share_of(const MildMaterial *material) {
+    const ModelRow *row = model_row(material->model);
+    const int slips = row->slips && material->slip_length > 0.0;
+    return (Share){.projects = row->merged,
+                   .slip_rate = slips ? 1.0 / material->slip_length : 0.0,
+                   .regain_rate = row->merged || slips
+                                      ? 1.0 / fmax(material->regain_length, REGAIN_LEAST)
+                                      : 0.0,
+                   .grip = slips ? material->grip : 0.0,
+                   .mu = material->mu};
+}
+
+int curves_of(const MildMaterial *material, const Law *law) {
+    const Share share = share_of(material);
+    return law_curves(law) | (share.projects + share.slip_rate > 0.0 ? LAW_HEAP : 0);
+}
+
+Law law_merged(Law law, double begin, double width) {
+    law.cone_begin = law.cone_depth * begin;
+    law.cone_depth *= width;
+    law.inverse_cone_depth = 1.0 / law.cone_depth;
+    return law;
 }
 
 double recovery_of(const MildMaterial *material) {

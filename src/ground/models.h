@@ -3,6 +3,7 @@
 #define MILD_GROUND_MODELS_H
 
 #include "ground/model.h"
+#include "ground/share.h"
 
 /* [m] Least plate_width, given or of a sole, because Bekker's pressure grows with k_c/b. */
 #define MATERIAL_PLATE_MIN 0.005
@@ -12,6 +13,13 @@
 const ModelRow *model_row(int model);
 /* Law of one element of area pitch^2 of a sole whose shorter side is `width`. */
 Law law_of(const MildMaterial *material, double pitch, double width);
+/* LawCurve bits of a material whose law is `law`. */
+int curves_of(const MildMaterial *material, const Law *law);
+/* The share of its load that the ground carries (share.h): the material's numbers. The rest is
+ * 0. */
+Share share_of(const MildMaterial *material);
+/* The law of an element of a merged sole, from law_of: `begin` and `width` are those of Sole. */
+Law law_merged(Law law, double begin, double width);
 /* [-] Share of the depth that its virgin ground springs back: the material's, but 0 in resistive
  * force theory, whose unloading line has no other length (plate.h). */
 double recovery_of(const MildMaterial *material);

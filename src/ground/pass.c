@@ -12,7 +12,7 @@
 
 MILD_HD void slot_normal(const Slots *s, int i, double dt, const Motion *motion, int kind,
                          int curves, int stops) {
-    const Element element = slot_element(s, i);
+    const Element element = slot_loaded(s, i, curves);
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
     const Impulse normal = element_impulse(&element, curves, stops, dt, v.descent);
     s->iz[i] = normal.value;
@@ -36,6 +36,9 @@ MILD_HD void foot_normal(const Slots *slot, int end, double dt, const Motion *m,
 static void foot_normals(const FootScratch *foot, double dt, const Motion *motion) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
+    if (end < VECTOR_LANES) {
+        return; /* never: pass skips empty feet. The compiler then adds no loop for a remainder */
+    }
     switch (foot_variant(foot)) {
     case LAW_LINE: foot_normal(s, end, dt, motion, 1, LAW_LINE, 0); return;
     case LAW_CONE:
@@ -45,9 +48,16 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
             foot_normal(s, end, dt, motion, 0, LAW_CONE, 0);
         }
         return;
+    case LAW_CONE | LAW_HEAP:
+        if (foot->uneven || foot->stops) {
+            foot_normal(s, end, dt, motion, 1, LAW_CONE | LAW_HEAP, 1);
+        } else {
+            foot_normal(s, end, dt, motion, 0, LAW_CONE | LAW_HEAP, 0);
+        }
+        return;
     case LAW_POWER: foot_normal(s, end, dt, motion, 1, LAW_POWER, 0); return;
     case LAW_ELASTIC: foot_normal(s, end, dt, motion, 1, LAW_ELASTIC, 0); return;
-    default: foot_normal(s, end, dt, motion, SLOT_UNEVEN | SLOT_FACES, LAW_ALL, 1); return;
+    default: foot_normal(s, end, dt, motion, SLOT_UNEVEN | SLOT_FACES, LAW_ANY, 1); return;
     }
 }
 
@@ -141,7 +151,7 @@ static void foot_frictions(const FootScratch *foot, const Motion *motion, int he
                            double sums[12]) {
     const int end = foot_end(foot);
     if (end < VECTOR_LANES) {
-        return; /* never: pass skips empty feet. The compiler then adds no loop for a remainder */
+        return; /* never, as above */
     }
     if (held || foot->turned || foot->faces) {
         foot_friction(&foot->slot, end, motion, SLOT_UNEVEN | SLOT_FACES, held, 1, sums);

@@ -28,14 +28,6 @@ MILD_HD Real real_pow(Real x, Real y) {
 
 #else
 
-/* POWER_CALLED: defined by a file whose vector loops need no power. It then has one copy of the
- * power in place of one for each use. */
-#ifdef POWER_CALLED
-#define POWER_FN static __attribute__((noinline, unused))
-#else
-#define POWER_FN MILD_HD
-#endif
-
 /* The bits of a double, and back. */
 MILD_HD uint64_t real_bits(double x) {
     uint64_t bits;
@@ -95,10 +87,15 @@ MILD_HD Real real_log2(Real x) {
     return whole + s * sum * 2.8853900817779268147; /* 2/ln 2 */
 }
 
-/* x^y for a normal x > 0. */
-POWER_FN Real real_pow(Real x, Real y) {
+/* x^y for a normal x > 0. POWER_CALLED: defined by a file whose vector loops need no power. It
+ * calls the one of power.c, in place of a copy for each use. */
+#ifdef POWER_CALLED
+Real real_pow(Real x, Real y);
+#else
+MILD_HD Real real_pow(Real x, Real y) {
     return real_exp2(y * real_log2(x));
 }
+#endif
 
 #endif
 

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ground/begin.h"
+#include "ground/carry.h"
 #include "ground/faces.h"
 #include "ground/gather.h"
 #include "ground/locate.h"
@@ -15,6 +16,9 @@ MILD_HD void slot_begin(const Slots *s, int i, double dt, double rate, const Mot
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
+    if (curves & LAW_HEAP) {
+        element.law.cone_begin = s->cone_begin[i];
+    }
     element_begin(&element, &memory, curves, dt, rate, v.descent);
     slot_store(s, i, &element);
 }
@@ -36,12 +40,16 @@ MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *no
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
+    if (end < VECTOR_LANES) {
+        return; /* never. The compiler then adds no loop for a remainder */
+    }
     switch (foot_variant(foot)) {
     case LAW_LINE:
     case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 0); return;
+    case LAW_CONE | LAW_HEAP: slots_begin(s, end, dt, now, LAW_CONE | LAW_HEAP, 0); return;
     case LAW_POWER: slots_begin(s, end, dt, now, LAW_POWER, 0); return;
     case LAW_ELASTIC: slots_begin(s, end, dt, now, LAW_ELASTIC, 0); return;
-    default: slots_begin(s, end, dt, now, LAW_ALL, SLOT_FACES); return;
+    default: slots_begin(s, end, dt, now, LAW_ANY, SLOT_FACES); return;
     }
 }
 
@@ -63,7 +71,7 @@ MILD_HD void slot_drag(const Slots *s, int i, double dt, const Motion *now, cons
                        int curves, int kind) {
     const double slower = slot_velocity(s, i, now, kind).descent;
     const double faster = slot_velocity(s, i, free, kind).descent;
-    Element element = slot_element(s, i);
+    Element element = slot_loaded(s, i, curves);
     element_drag(&element, curves, dt, real_max(faster - slower, 0.0));
     s->entry_speed[i] = element.entry_speed;
     s->stop_drag[i] = element.stop_drag;
@@ -76,6 +84,9 @@ MILD_HD void slots_drag(const Slots *slot, int end, double dt, const Motion *now
     const Slots local = *slot, *s = &local;
     const Motion before = *now;
     const Motion after = *free;
+    if (end < VECTOR_LANES) {
+        return; /* never */
+    }
 #pragma omp simd
     for (int i = 0; i < end; i++) {
         slot_drag(s, i, dt, &before, &after, curves, SLOT_UNEVEN | faces);
@@ -88,15 +99,17 @@ static int slots_explicit(const FootScratch *foot, int materials, double dt, con
     const Slots *s = &foot->slot;
     int any = 0;
     for (int m = 0; m < materials; m++) {
-        any |= foot->derived[m].law.mass_rate < 0.0 || foot->derived[m].law.drag_rate < 0.0;
+        any |=
+            foot->derived[m].slot.law.mass_rate < 0.0 || foot->derived[m].slot.law.drag_rate < 0.0;
     }
     for (int i = 0; any && i < foot->active; i++) {
         if (!(s->depth[i] > 0.0) || s->middle[i] < s->depth_max[i]) {
             continue; /* above the ground or on the unloading line */
         }
-        const Element element = slot_element(s, i);
-        s->explicit_impulse[i] = element_explicit(
-            &element, dt, slot_velocity(s, i, free, SLOT_UNEVEN | foot->faces).descent);
+        const Element element = slot_loaded(s, i, foot->curves);
+        s->explicit_impulse[i] =
+            element_explicit_of(&element, foot->curves, dt,
+                                slot_velocity(s, i, free, SLOT_UNEVEN | foot->faces).descent);
     }
     return any;
 }
@@ -155,13 +168,16 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     }
     Motion free = foot_motion(foot, input->free_velocity + 6 * f);
     foot_begin(foot, input->dt, &now);
+    if (foot->curves & LAW_HEAP) {
+        foot_carry(foot, input->dt);
+    }
     if (foot->stops) {
         slots_clear(foot);
     }
     foot->stops = slots_explicit(foot, terrain->material_count, input->dt, &free);
     if (slots_sink(&foot->slot, foot_end(foot), input->dt)) {
         if (foot_variant(foot) & ~LAW_CONE) {
-            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ALL, SLOT_FACES);
+            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ANY, SLOT_FACES);
         } else {
             slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_CONE, 0);
         }

@@ -1,3 +1,4 @@
+#define POWER_CALLED /* power.h: no vector loop here needs a power */
 /* Resistive force theory (plate.h) for the slots of a foot, and for plates on their own. */
 #include "ground/resist.h"
 
@@ -43,6 +44,9 @@ MILD_HD void slots_resist(const Slots *slot, int end, double dt, const Plate *so
     const Plate plate = *sole;
     const Motion motion = *now;
     const double rate = 1.0 / dt;
+    if (end < VECTOR_LANES) {
+        return; /* never. The compiler then adds no loop for a remainder */
+    }
 #pragma omp simd
     for (int i = 0; i < end; i++) {
         slot_resist(s, i, dt, rate, &plate, &motion, in_space, LAW_LINE, SLOT_UNEVEN);

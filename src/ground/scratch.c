@@ -5,8 +5,9 @@
 #include "ground/sole.h"
 
 /* Number of arrays of FootScratch outside the slots: x, y, depth, slope_x, slope_y, point_x,
- * point_y, point_z, normal, tangent_x, tangent_y and flat; state and slip share the last one. */
-#define FOOT_ARRAYS 13
+ * point_y, point_z, normal, tangent_x, tangent_y and flat; state and slip share the next; heap has
+ * two. */
+#define FOOT_ARRAYS 15
 #define FACES_ARRAYS 6 /* more of a surface: height, face[3], area and share */
 
 /* Numbers of a foot in the block. */
@@ -51,6 +52,10 @@ static void foot_set(FootScratch *foot, const MildSole *sole, double **at) {
     foot->slope_y = take(at, foot->padded);
     foot->state = (uint8_t *)take(at, foot->padded);
     foot->slip = foot->state + foot->padded;
+    foot->heap = (SoleHeap *)take(at, 2 * foot->padded);
+    for (int i = 0; i < foot->elements; i++) {
+        foot->heap[i] = sole_heap(sole, i);
+    }
 }
 
 /* Takes and fills the arrays of a surface. */
@@ -101,8 +106,10 @@ static void foot_set_slots(FootScratch *foot, double **at, int32_t *integers) {
     foot->slot = foot->own;
     foot->element = integers;
     foot->slot_material = integers + foot->padded;
+    foot->slot_holder = integers + 2 * foot->padded;
     for (int i = 0; i < foot->padded; i++) {
         foot->slot_material[i] = MATERIAL_NONE;
+        foot->slot_holder[i] = -1;
     }
 }
 
@@ -127,7 +134,7 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
     }
     const size_t rows = 2 * 6 * (size_t)feet * ROW_LANES;
     doubles += rows;
-    const size_t used = doubles * sizeof(double) + 2 * (size_t)slots * sizeof(int32_t);
+    const size_t used = doubles * sizeof(double) + 3 * (size_t)slots * sizeof(int32_t);
     const size_t bytes = (used + 63) / 64 * 64;
     MildScratch *scratch = calloc(1, sizeof *scratch + (size_t)feet * sizeof(FootScratch));
     double *block = aligned_alloc(64, bytes);
@@ -150,7 +157,7 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
         foot_set_bounds(foot);
         scratch->faces |= soles[f]->faces << f;
         foot_set_slots(foot, &at, integers);
-        integers += 2 * foot->padded;
+        integers += 3 * foot->padded;
     }
     return scratch;
 }
@@ -173,6 +180,7 @@ void slots_remember(Slots *s, const Memory *memory) {
     s->held_x = memory->held_x;
     s->held_y = memory->held_y;
     s->held_stiffness = memory->held_stiffness;
+    s->worn = memory->worn;
 }
 
 void foot_points(const FootScratch *foot) {

@@ -3,16 +3,26 @@
 #define MILD_GROUND_SCRATCH_H
 
 #include "ground/slots.h"
+#include "ground/sole.h"
 #include "ground/state.h"
 
 #define TWIST_MAX (6 * MILD_FEET_MAX)
 #define ROW_LANES (TWIST_MAX + 8) /* numbers of a row of the equations: newton_step.h */
 #define PADDING_DEPTH (-1e3)      /* [m] depth of the padding, which never touches the ground */
 
+/* What a material gives a slot. */
+typedef struct {
+    Law law;
+    Share share;     /* the material's numbers of it, with its friction */
+    double k_drift;  /* [N/m^2] 0 where path costs support */
+    double b_drift;  /* [N s/m] */
+    double recovery; /* [-] */
+} SlotLaw;
+
 /* Law of a material as last derived. It is valid while the material's bytes stay the same. */
 typedef struct {
     MildMaterial material;
-    Law law;
+    SlotLaw slot;
     int curves; /* LawCurve bits of the law */
     int known;  /* bool: the law has been derived */
     int nan;    /* bool: a number of the law or the material is NaN */
@@ -30,6 +40,7 @@ typedef struct FootScratch {
     double center_x; /* [m] centroid in the foot frame */
     double center_y; /* [m] */
     double radius;   /* [m] distance from the ankle to the farthest element */
+    SoleHeap *heap;  /* [elements] merged cones */
 
     double middle[3]; /* [m] of the bounding box, foot frame */
     double half[3];   /* [m] half of its sides */
@@ -67,6 +78,7 @@ typedef struct FootScratch {
     int turned;             /* bool: turn_x or turn_y may be nonzero */
     int stops;              /* bool: stop_drag, stop_growth or explicit_impulse may be nonzero */
     int32_t *slot_material; /* [padded] material whose law the slot has, encoded as in Memory */
+    int32_t *slot_holder;   /* [padded] element whose law it has, for merged cones */
     DerivedLaw derived[MILD_MATERIALS_MAX];
     Slots own;  /* arrays that the scratch owns */
     Slots slot; /* arrays of this step: `own`, except that when all elements are listed x, y, depth
@@ -115,7 +127,7 @@ static inline int foot_end(const FootScratch *foot) {
 /* The curves of the compiled loop for a foot. The loop of all curves is also that of surfaces: it
  * counts with the heights of the elements, which are 0 in a plane sole. */
 static inline int foot_variant(const FootScratch *foot) {
-    return foot->faces ? LAW_ALL : law_variant(foot->curves);
+    return foot->faces ? LAW_ANY : law_variant(foot->curves);
 }
 
 /* The velocity field of a foot with the twist V. */

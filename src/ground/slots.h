@@ -8,10 +8,8 @@
 #ifndef MILD_GROUND_SLOTS_H
 #define MILD_GROUND_SLOTS_H
 
-#include "ground/element.h"
 #include "ground/motion.h"
-
-#define MILD_HD static inline __attribute__((always_inline))
+#include "ground/share.h"
 
 /* Arrays of a foot's slots [padded]. Meaning and symbol are at the field of the same name of
  * Element or ElementMemory. Given here are the unit and the function that writes the array. */
@@ -40,6 +38,7 @@ typedef struct {
     double *held_x;         /* [N] */
     double *held_y;         /* [N] */
     double *held_stiffness; /* [N/m] */
+    double *worn;           /* [-] Share.worn */
 
     /* Material: slots_materials, when it changes. */
 #define SLOT_LAW_ARRAY(name) double *name; /* of Law; slots_resist changes line_stiffness */
@@ -51,6 +50,18 @@ typedef struct {
     double *mu;         /* [-] */
     double *k_drift;    /* [N/m^2] */
     double *b_drift;    /* [N s/m] */
+
+    /* The same of ground with LAW_HEAP: Law.cone_begin and the fields of Share. */
+    double *cone_begin;  /* [m] */
+    double *projects;    /* [-] */
+    double *slip_rate;   /* [1/m] */
+    double *regain_rate; /* [1/m] */
+    double *grip;        /* [-] */
+    double *whole_mu;    /* [-] Share.mu, of which `mu` is what is left in this step */
+
+    /* Share of this step: foot_share; without LAW_HEAP carry is 1. */
+    double *lean;  /* [-] */
+    double *carry; /* [-] */
 
     /* Law of this step: slots_begin, changed by slots_resist. */
     double *middle;           /* [m] */
@@ -135,6 +146,30 @@ MILD_HD Element slot_element(const Slots *s, int i) {
         .turn_x = s->turn_x[i],
         .turn_y = s->turn_y[i],
     };
+}
+
+/* The share of a slot. */
+MILD_HD Share slot_share(const Slots *s, int i) {
+    return (Share){
+        .projects = s->projects[i],
+        .slip_rate = s->slip_rate[i],
+        .regain_rate = s->regain_rate[i],
+        .grip = s->grip[i],
+        .mu = s->whole_mu[i],
+        .worn = s->worn[i],
+        .lean = s->lean[i],
+        .carry = s->carry[i],
+    };
+}
+
+/* The element of a slot for the law of a step. curves: of the ground under the foot. */
+MILD_HD Element slot_loaded(const Slots *s, int i, int curves) {
+    Element element = slot_element(s, i);
+    if (curves & LAW_HEAP) {
+        element.law.cone_begin = s->cone_begin[i];
+        element_carry(&element, s->carry[i]);
+    }
+    return element;
 }
 
 /* What the element of a slot remembers. */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "ground/sole.h"
+#include "ground/sole_edge.h"
 
 #define SOLE_POINTS_MAX 4096 /* limited because the search for crossing edges is quadratic in it */
 #define RASTER_PHASES 16     /* raster offsets tried along each axis */
@@ -150,17 +151,6 @@ static double cell_coverage(const MildSoleDef *def, const double *corner, double
     return 0.5 * fabs(twice) / (def->pitch * def->pitch);
 }
 
-static int point_inside(const MildSoleDef *def, double x, double y) {
-    int inside = 0;
-    for (int i = 0; i < def->points; i++) {
-        const double *p = &def->outline[2 * i], *q = &def->outline[2 * ((i + 1) % def->points)];
-        if ((p[1] > y) != (q[1] > y) && x < p[0] + (y - p[1]) / (q[1] - p[1]) * (q[0] - p[0])) {
-            inside = !inside;
-        }
-    }
-    return inside;
-}
-
 /* The raster with a cell border at phase[k] * pitch from the middle of the outline's bounding box.
  * It is measured from the middle so that mirrored outlines get mirrored rasters. */
 static Raster raster_at(const MildSoleDef *def, const Outline *outline, const double *phase) {
@@ -187,7 +177,7 @@ static int raster_count(const MildSoleDef *def, const Outline *outline, const Ra
         for (int j = 0; j < raster->rows; j++) {
             double x = raster->origin[0] + (i + 0.5) * def->pitch;
             double y = raster->origin[1] + (j + 0.5) * def->pitch;
-            if (!point_inside(def, x, y)) {
+            if (!outline_inside(def, x, y)) {
                 continue;
             }
             count++;
@@ -261,8 +251,9 @@ static int cells_choose(const MildSoleDef *def, const Raster *raster, Cell *cell
         double corner[2] = {raster->origin[0] + cell / raster->rows * def->pitch,
                             raster->origin[1] + cell % raster->rows * def->pitch};
         Cell *c = &cells[cell];
-        *c = (Cell){cell_coverage(def, corner, work), cell,
-                    point_inside(def, corner[0] + 0.5 * def->pitch, corner[1] + 0.5 * def->pitch)};
+        *c =
+            (Cell){cell_coverage(def, corner, work), cell,
+                   outline_inside(def, corner[0] + 0.5 * def->pitch, corner[1] + 0.5 * def->pitch)};
         inside += c->inside;
     }
     qsort(cells, (size_t)total, sizeof *cells, cell_compare);
@@ -276,7 +267,7 @@ static int cells_choose(const MildSoleDef *def, const Raster *raster, Cell *cell
 
 static MildSole *sole_from_cells(const MildSoleDef *def, const Outline *outline,
                                  const Raster *raster, const Cell *cells, int count) {
-    MildSole *sole = malloc(sizeof *sole + 2 * (size_t)count * sizeof(double));
+    MildSole *sole = malloc(sizeof *sole + SOLE_PLANE_ARRAYS * (size_t)count * sizeof(double));
     if (!sole) {
         return NULL;
     }
@@ -311,6 +302,13 @@ MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
         if (reached) {
             sole = sole_from_cells(def, &outline, &raster, cells, chosen);
         }
+        if (sole) {
+            const EdgeBox box = {
+                outline.area, {outline.low[0], outline.low[1]}, {outline.high[0], outline.high[1]}};
+            double *x = sole->values;
+            sole_edges(def, &box, chosen, x, x + chosen, x + SOLE_EDGE * chosen,
+                       x + SOLE_SPREAD * chosen, (int *)work);
+        }
     }
     free(cells);
     free(work);
@@ -332,7 +330,7 @@ MildSole *mild_sole_concentric(const MildSole *sole, MildError *error) {
                   "sole: a surface has no middle; a concentric model needs mild_sole_create");
         return NULL;
     }
-    MildSole *one = malloc(sizeof *one + 2 * sizeof(double));
+    MildSole *one = malloc(sizeof *one + SOLE_PLANE_ARRAYS * sizeof(double));
     if (!one) {
         mild_fail(error, MILD_ERROR_MEMORY, "sole: out of memory for one element");
         return NULL;
@@ -341,6 +339,10 @@ MildSole *mild_sole_concentric(const MildSole *sole, MildError *error) {
                       .pitch = sole->pitch * sqrt((double)sole->elements),
                       .width = sole->width,
                       .z = sole->z};
+    /* A disc of that area. */
+    const double radius = one->pitch / sqrt(3.14159265358979323846);
+    one->values[SOLE_EDGE] = radius / 3.0;
+    one->values[SOLE_SPREAD] = radius / sqrt(18.0);
     one->values[0] = one->values[1] = 0.0;
     for (int i = 0; i < sole->elements; i++) {
         one->values[0] += sole->values[i] / sole->elements;
@@ -375,4 +377,22 @@ const double *mild_sole_y(const MildSole *sole) {
 
 double mild_sole_z(const MildSole *sole) {
     return sole->z;
+}
+
+SoleHeap sole_heap(const MildSole *sole, int element) {
+    if (sole->faces) {
+        return (SoleHeap){0.0, 1.0};
+    }
+    const int n = sole->elements;
+    const double radius = sole->pitch / sqrt(3.14159265358979323846);
+    const double edge = sole->values[SOLE_EDGE * n + element] / radius;
+    const double spread = sole->values[SOLE_SPREAD * n + element] / radius;
+    /* The flat share (1 - t)^2 says that distances from `begin` on have the density 2 (1 - t): the
+     * mean is a third of the width, the variance an 18th of its square. */
+    const double width = fmax(fmin(sqrt(18.0) * spread, 3.0 * edge), 1e-6);
+    return (SoleHeap){fmax(edge - width / 3.0, 0.0), width};
+}
+
+const double *mild_sole_edge(const MildSole *sole) {
+    return sole->faces ? NULL : sole->values + (size_t)SOLE_EDGE * (size_t)sole->elements;
 }

@@ -6,8 +6,11 @@
 
 #define SOLE_ELEMENTS_MAX 65536
 
-/* Arrays of a surface, in this order; a plane raster has the first two. */
+/* Arrays of a surface, in this order. */
 enum { SOLE_X, SOLE_Y, SOLE_Z, SOLE_NORMAL, SOLE_AREA = SOLE_NORMAL + 3, SOLE_ARRAYS };
+/* Arrays of a plane raster, after x and y. The distance to the edge of the outline over a cell has
+ * this mean and this standard deviation. */
+enum { SOLE_EDGE = SOLE_Y + 1, SOLE_SPREAD, SOLE_PLANE_ARRAYS };
 
 struct MildSole {
     int elements;
@@ -15,7 +18,15 @@ struct MildSole {
     double pitch;    /* [m] */
     double width;    /* [m] Bekker's b */
     double z;        /* [m] of the plane; of a surface the mean over its elements */
-    double values[]; /* [2 or SOLE_ARRAYS][elements] */
+    double values[]; /* [SOLE_PLANE_ARRAYS or SOLE_ARRAYS][elements] */
 };
+
+/* The merged cone of an element, in radii of the disc of its area: it closes from `begin` on, over
+ * `width`, times tan(alpha)/nu. An element of a surface is a disc by itself. */
+typedef struct {
+    double begin; /* [-] */
+    double width; /* [-] */
+} SoleHeap;
+SoleHeap sole_heap(const MildSole *sole, int element);
 
 #endif

@@ -17,7 +17,7 @@ static void foot_scatter(const MildScratch *scratch, int f) {
     const double rate = 1.0 / dt;
     for (int i = 0; i < foot->active; i++) {
         const int e = foot->element[i];
-        const Element element = slot_element(s, i);
+        const Element element = slot_loaded(s, i, foot->curves);
         const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
         const double beyond = element.depth + dt / 2 * v.descent - element.yield_depth;
         const int loaded = s->iz[i] > 0.0;
@@ -25,8 +25,8 @@ static void foot_scatter(const MildScratch *scratch, int f) {
         foot->normal[e] = s->iz[i] * rate;
         foot->tangent_x[e] = s->ix[i] * rate;
         foot->tangent_y[e] = s->iy[i] * rate;
-        foot->flat[e] =
-            law_flat_share(&element.law, element.virgin_depth + (deeper ? beyond : 0.0));
+        foot->flat[e] = law_flat_share(&element.law, foot->curves,
+                                       element.virgin_depth + (deeper ? beyond : 0.0));
         foot->state[e] = (uint8_t)(!loaded  ? MILD_ELEMENT_FREE
                                    : deeper ? MILD_ELEMENT_VIRGIN
                                             : MILD_ELEMENT_UNLOADING);
@@ -66,6 +66,9 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
     double x = 0.0;       /* [N s m] of x times the normal impulse */
     double y = 0.0;       /* [N s m] */
     int end = foot_end(foot);
+    if (end < VECTOR_LANES) {
+        return; /* never. The compiler then adds no loop for a remainder */
+    }
 #pragma omp simd reduction(+ : sum, loaded, force, x, y) reduction(max : deepest)
     for (int i = 0; i < end; i++) {
         double on = s->iz[i] > 0.0 ? 1.0 : 0.0;

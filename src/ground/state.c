@@ -6,7 +6,7 @@
 #include "ground/element.h"
 #include "ground/sole.h"
 
-#define MEMORY_DOUBLES 12 /* nine of ElementMemory, three of the plane */
+#define MEMORY_DOUBLES 13 /* nine of ElementMemory, the wear, three of the plane */
 
 _Static_assert(sizeof(ElementMemory) == 9 * sizeof(double),
                "another number of ElementMemory also goes to Memory and here, to slots.h (Slots, "
@@ -56,7 +56,8 @@ Memory ground_memory(const MildGround *ground, int foot) {
     double **arrays[] = {&memory.depth_max, &memory.middle,    &memory.front_speed,
                          &memory.drift,     &memory.pending_x, &memory.pending_y,
                          &memory.held_x,    &memory.held_y,    &memory.held_stiffness,
-                         &memory.plane,     &memory.slope_x,   &memory.slope_y};
+                         &memory.worn,      &memory.plane,     &memory.slope_x,
+                         &memory.slope_y};
     for (int k = 0; k < MEMORY_DOUBLES; k++, at += ground->padded[foot]) {
         *arrays[k] = at;
     }
@@ -139,6 +140,7 @@ void memory_forget(const Memory *memory, int e, int32_t material) {
     memory->held_x[e] = 0.0;
     memory->held_y[e] = 0.0;
     memory->held_stiffness[e] = 0.0;
+    memory->worn[e] = 0.0;
     memory->material[e] = material;
 }
 
@@ -156,7 +158,7 @@ static int material_is_valid(int32_t material, int faces) {
 }
 
 /* Bool: the memory of every element of a foot is finite, on materials that exist. */
-static int foot_is_valid(const MildGround *ground, int foot) {
+static __attribute__((cold)) int foot_is_valid(const MildGround *ground, int foot) {
     const Memory memory = ground_memory(ground, foot);
     const size_t padded = (size_t)ground->padded[foot];
     int valid = ground->touched[foot] >= 0 && ground->touched[foot] <= ground->padded[foot];
@@ -166,6 +168,7 @@ static int foot_is_valid(const MildGround *ground, int foot) {
     for (size_t i = 0; i < padded; i++) {
         valid &= material_is_valid(memory.material[i], memory.share != NULL);
         valid &= !memory.share || memory.share[i] >= 0.0;
+        valid &= memory.worn[i] >= 0.0 && memory.worn[i] < 1.0;
     }
     return valid;
 }

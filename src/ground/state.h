@@ -47,6 +47,7 @@ typedef struct {
     double *held_x;         /* [N] */
     double *held_y;         /* [N] */
     double *held_stiffness; /* [N/m] */
+    double *worn;           /* [-] Share.worn, share.h */
     double *plane;     /* [m] uneven ground: the last step had u = plane + slope . (x, y) - z */
     double *slope_x;   /* [-] gradient of that plane, world axes */
     double *slope_y;   /* [-] */

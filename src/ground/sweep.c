@@ -67,7 +67,7 @@ static void element_inverse_mass(const Sweep *sweep, int f, const double *p, dou
 
 /* Normal impulse of one slot at the downward speed w. */
 static Impulse slot_impulse(const Slots *s, int i, int curves, double dt, double w) {
-    const Element element = slot_element(s, i);
+    const Element element = slot_loaded(s, i, curves);
     return element_impulse(&element, curves, 1, dt, w);
 }
 

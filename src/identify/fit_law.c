@@ -74,7 +74,7 @@ void fit_range(const MildField *field, double *low, double *high) {
 
 /* Bool: the force at some depth changes with the parameter. */
 static int is_sensed(MildModel model, const MildField *field, double speed, double acceleration) {
-    const FitPlate plate = {1, 0.0195, 0.1};
+    const FitPlate plate = {1, 0.0195, 0.1, NULL};
     const FitPoint point = {.depth = 0.005, .speed = speed, .acceleration = acceleration};
     MildMaterial material = mild_material_default();
     double before, after;
@@ -114,9 +114,25 @@ int fit_is_rate(MildModel model, const MildField *field) {
 
 /* ---- force ---- */
 
+/* The same of a plate whose cones merge. */
+static void merged_forces(const FitPlate *plate, const MildMaterial *raw, const FitPoint *points,
+                          int count, double *force) {
+    const double drag = raw->c_d;
+    for (int i = 0; i < count; i++) {
+        const double speed = points[i].speed;
+        const MildElementLaw law = mild_sole_law(raw, plate->sole, fmax(points[i].depth, 0));
+        force[i] = law.force + drag * law.added_mass_per_depth * speed * speed +
+                   law.added_mass * points[i].acceleration;
+    }
+}
+
 /* The forces of neighbouring rows that share a plate. */
 static void plate_forces(const FitPlate *plate, const MildMaterial *raw, const FitPoint *points,
                          int count, double *force) {
+    if (plate->sole && model_row(raw->model)->merged) {
+        merged_forces(plate, raw, points, count, force);
+        return;
+    }
     const Law law = law_of(raw, plate->pitch, plate->width);
     const int curves = law_curves(&law);
     for (int i = 0; i < count; i++) {
@@ -125,8 +141,8 @@ static void plate_forces(const FitPlate *plate, const MildMaterial *raw, const F
         const double elastic = law_elastic_force(&law, curves, depth);
         double sum = law_force(&law, curves, depth) + elastic * (1 + law.elastic_damping * speed);
         if (curves & LAW_CONE) {
-            sum += law.drag_rate * law_flat_share(&law, depth) * speed * speed;
-            sum += law.mass_rate * law_recruited(&law, depth) * points[i].acceleration;
+            sum += law.drag_rate * law_flat_share(&law, curves, depth) * speed * speed;
+            sum += law.mass_rate * law_recruited(&law, curves, depth) * points[i].acceleration;
         }
         force[i] = plate->elements * sum;
     }

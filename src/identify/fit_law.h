@@ -16,8 +16,9 @@ enum { FIT_PARAMETERS_MAX = MILD_MODEL_FIELDS };
 /* A plate, in the elements of its model. */
 typedef struct {
     int elements;
-    double pitch; /* [m] */
-    double width; /* [m] its shorter side: plate_width of bekker */
+    double pitch;         /* [m] */
+    double width;         /* [m] its shorter side: plate_width of bekker */
+    const MildSole *sole; /* borrowed, for mild_merged; NULL: every element is a disc by itself */
 } FitPlate;
 
 /* What the data tell where they do not tell a parameter by itself. */

@@ -223,7 +223,7 @@ def info_matched(text, sinkage, grounds):
         words = line.split()
         if len(words) == 2 + len(grounds) and re.fullmatch(r"[\d.e+-]+", words[2]):
             models.setdefault(words[0], []).append((words[1], dict(zip(grounds, words[2:]))))
-    near("models that are matched", len(models), 7, 0)
+    near("models that are matched", len(models), 8, 0)
     for model, rows in models.items():
         for ground in ("foam28", "sand_loose", "rubber"):
             values = [f"--ground.{key}={cells[ground]}" for key, cells in rows]

@@ -682,6 +682,16 @@ static void bad_input_is_refused(void **state) {
     materials[1].model = MILD_MODEL_RIGID;
     assert_int_equal(mild_batch_set_materials(batch, materials, 2, &error), MILD_ERROR_RANGE);
     assert_non_null(strstr(error.text, "rigid"));
+    materials[1] = mild_material_default();
+    materials[1].model = MILD_MODEL_MILD_MERGED; /* what batches do not have, by name */
+    assert_int_equal(mild_batch_set_materials(batch, materials, 2, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "material 1: ground.model = mild_merged"));
+    materials[1] = mild_material_default();
+    materials[1].slip_length = 0.002;
+    assert_int_equal(mild_batch_set_materials(batch, materials, 2, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "material 1: ground.slip_length is above 0"));
+    materials[1].model = MILD_MODEL_HUNT_CROSSLEY; /* which does not read it */
+    assert_int_equal(mild_batch_set_materials(batch, materials, 2, &error), MILD_OK);
     assert_true(mild_material_preset("snow", &materials[1]));
     assert_int_equal(mild_batch_set_materials(batch, materials, 2, &error), MILD_OK);
     assert_int_equal(mild_batch_set_materials(batch, materials, 0, &error), MILD_ERROR_RANGE);

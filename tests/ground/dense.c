@@ -10,6 +10,7 @@
 #include "ground/impulse.h"
 #include "ground/resist.h"
 #include "ground/scratch.h"
+#include "ground/sole.h"
 
 #define DENSE_STEPS 200 /* of Newton's method at given bounds */
 #define DENSE_ROUNDS 3000
@@ -22,13 +23,13 @@
 /* P(u) = u_f/3 (1 - (1 - t)^3), t = min(u/u_f, 1): the flat area's integral over the depth, by the
  * element's area. */
 static double cone_share(const DenseLaw *law, double u) {
-    double left = 1.0 - fmin(u / law->full, 1.0);
-    return law->full / 3.0 * (1.0 - left * left * left);
+    double left = 1.0 - fmin(fmax(u - law->begin, 0.0) / law->full, 1.0);
+    return fmin(u, law->begin) + law->full / 3.0 * (1.0 - left * left * left);
 }
 
 /* Share of the element's area that is still flat. */
 static double cone_flat(const DenseLaw *law, double u) {
-    double left = 1.0 - fmin(u / law->full, 1.0);
+    double left = 1.0 - fmin(fmax(u - law->begin, 0.0) / law->full, 1.0);
     return left * left;
 }
 
@@ -270,6 +271,7 @@ typedef struct {
     double share, area;           /* [-] of a surface: what it presses with, and its area, both
                                      over those of a square of the raster; else 1 */
     int faces;                    /* bool: a surface */
+    double heap[2];               /* [-] of the element, see dense_law.h */
 } Find;
 
 /* Depth under the ground as it is here or, if that is less, under the plane that the last step took
@@ -325,7 +327,8 @@ static const MildMaterial *find_law(const Find *find, DenseLaw *law, int *direct
     }
     const MildMaterial *first = &terrain->materials[blend.first],
                        *second = &terrain->materials[blend.second];
-    DenseLaw one = law_material(first, find->pitch), other = law_material(second, find->pitch);
+    DenseLaw one = law_material(first, find->pitch, find->heap),
+             other = law_material(second, find->pitch, find->heap);
     *law = blend.share > 0.0 ? law_blend(&one, &other, blend.share) : one;
     *directed = is_resistive(first) &&
                 (blend.share == 0.0 || (is_straight(second) && second->model != MILD_MODEL_BEKKER));
@@ -358,6 +361,26 @@ static void element_shear(double dt, DenseElement *e, const MildMaterial *m, dou
     double share = -expm1(-slid / m->shear_length);
     e->law.mu *= share;
     e->radius += e->u0 > 0.0 ? dt * share * m->cohesion * area : 0.0;
+}
+
+/* The share of virgin ground that it carries: the line keeps its slope and ends deeper. up: normal
+ * of the sole's upper face. */
+static void dense_share(DenseElement *e, const Find *find) {
+    DenseLaw *law = &e->law;
+    const double *g = find->slope, a = e->deep;
+    double level = (-find->normal[2] + g[0] * find->normal[0] + g[1] * find->normal[1]) /
+                   sqrt(1.0 + g[0] * g[0] + g[1] * g[1]);
+    level = fmin(fmax(level, 0.02), 1.0);
+    double c = find->faces ? 1.0 : 1.0 - law->projected * (1.0 - level),
+           q = fmin(1.0 - find->memory.worn[find->i], c), soil = virgin_force(law, a),
+           bed = law->bed_stiffness * fmax(a - law->bed, 0.0);
+    if (law->grip > 0.0) {
+        law->mu = fmin(law->mu, fmax(0.1, 4.0 * law->grip * (1.0 - q / c)));
+    }
+    e->slack = e->line > 0.0 ? a - (q * soil + bed) / e->line : a;
+    law->k_pen *= q;
+    law->kappa *= q;
+    law->sinkage *= q;
 }
 
 /* Velocity of a point at p, and the speed at which its depth grows, of a foot's twist. */
@@ -430,6 +453,7 @@ static void dense_element(Dense *d, const Find *find) {
             fmin(e->law.drag_rate, 0.0) * cone_flat(&e->law, e->deep) * d->dt * e->w0 * e->w0;
     }
     element_line(e);
+    dense_share(e, find);
     dense_drag(d->dt, e, e->free[3] - now[3]);
     if (directed) {
         dense_resist(d->dt, e, nearer->model, find->normal, now, now[3]);
@@ -468,6 +492,9 @@ static void dense_foot(Dense *d, const Kit *kit, int f) {
                 continue;
             }
         }
+        const SoleHeap heap = sole_heap(sole, find.i);
+        find.heap[0] = heap.begin;
+        find.heap[1] = heap.width;
         for (int k = 0; k < 3; k++) {
             find.p[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * z;
             find.at[k] = kit->input.position[f][k] + find.p[k];

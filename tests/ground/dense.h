@@ -25,6 +25,8 @@ typedef struct {
     double recovery, mu, k_drift, b_drift; /* of the material */
     double sinkage, sinkage_power;         /* [N], [-] pressure and sinkage under the element */
     double elastic, elastic_power, loss;   /* [N], [-], [s/m] without memory: F (1 + loss w) */
+    double begin;                          /* [m] depth from which a heap closes; 0 under a cone */
+    double projected, slip, grip;          /* [-], [1/m], [-] docs/model.md sections 21 and 22 */
 } DenseLaw;
 
 /* One element: what it remembers, its unloading line, the drift's friction and how it moves with y.

@@ -34,7 +34,9 @@ static void law_curve(const MildMaterial *m, double area, DenseLaw *law) {
     }
 }
 
-static DenseLaw law_material(const MildMaterial *m, double pitch) {
+/* heap: where the merged cone of the element begins to close, and its width, by the radius of a
+ * disc of the element's area. */
+static DenseLaw law_material(const MildMaterial *m, double pitch, const double heap[2]) {
     double area = pitch * pitch, c_g = m->passive ? fmax(m->c_g, 0.0) : m->c_g,
            c_d = m->passive ? fmax(m->c_d, 0.5) : m->c_d;
     DenseLaw law = {.bed = m->bed_depth,
@@ -55,6 +57,16 @@ static DenseLaw law_material(const MildMaterial *m, double pitch) {
     law.k_pen = m->k_pen;
     law.kappa = m->sigma_cone * area / cos(m->alpha);
     law.full = sqrt(area / acos(-1.0)) * tan(m->alpha) / m->nu;
+    if (m->model == MILD_MODEL_MILD_MERGED) {
+        law.begin = law.full * heap[0];
+        law.full *= heap[1];
+        law.projected = 1.0;
+    }
+    if (m->slip_length > 0.0) {
+        law.slip = 1.0 / m->slip_length;
+        law.grip = m->grip;
+        law.k_drift = law.b_drift = 0.0;
+    }
     law.mass_rate = c_g * m->phi * m->rho * m->nu * area;
     law.drag_rate = c_d * law.mass_rate;
     return law;

@@ -130,21 +130,36 @@ typedef enum {
     ACTIVE,
     BEKKER,
     HUNT_CROSSLEY,
+    MERGED,
     EVERYTHING,
     SURFACES,
     KINDS
 } Kind;
-static const char *const kind_names[KINDS] = {
-    "springs",       "con_cone and con_spring", "ecc_quasi",
-    "ecc_quasi_3d",  "uneven ground",           "materials that blend",
-    "prints",        "passive = false",         "bekker",
-    "hunt_crossley", "everything at once",      "everything under surfaces"};
+static const char *const kind_names[KINDS] = {"springs",
+                                              "con_cone and con_spring",
+                                              "ecc_quasi",
+                                              "ecc_quasi_3d",
+                                              "uneven ground",
+                                              "materials that blend",
+                                              "prints",
+                                              "passive = false",
+                                              "bekker",
+                                              "hunt_crossley",
+                                              "mild_merged and slip",
+                                              "everything at once",
+                                              "everything under surfaces"};
 
 /* One of the models of the raster, with numbers for it. */
 static MildMaterial material_of(uint64_t *random, MildModel model) {
     MildMaterial m = kit_material(random);
     m.model = (int)model;
-    if (model == MILD_MODEL_MILD || model == MILD_MODEL_ECC_SPRING) {
+    if (model == MILD_MODEL_MILD_MERGED) {
+        m.slip_length = kit_index(random, 2) ? kit_uniform(random, 0.0005, 0.01) : 0.0;
+        m.regain_length = kit_uniform(random, 0.0001, 0.005);
+        m.grip = kit_index(random, 2) ? kit_uniform(random, 0.05, 0.3) : 0.0;
+    }
+    if (model == MILD_MODEL_MILD || model == MILD_MODEL_ECC_SPRING ||
+        model == MILD_MODEL_MILD_MERGED) {
         return m;
     }
     m.zeta = kit_uniform(random, 0.05, 1.5);
@@ -167,16 +182,15 @@ static MildMaterial material_of(uint64_t *random, MildModel model) {
 }
 
 static MildMaterial kind_material(Kind kind, uint64_t *random) {
-    static const MildModel models[6] = {MILD_MODEL_MILD,      MILD_MODEL_ECC_SPRING,
-                                        MILD_MODEL_ECC_QUASI, MILD_MODEL_ECC_QUASI_3D,
-                                        MILD_MODEL_BEKKER,    MILD_MODEL_HUNT_CROSSLEY};
+    static const MildModel models[7] = {
+        MILD_MODEL_MILD,   MILD_MODEL_ECC_SPRING,    MILD_MODEL_ECC_QUASI,  MILD_MODEL_ECC_QUASI_3D,
+        MILD_MODEL_BEKKER, MILD_MODEL_HUNT_CROSSLEY, MILD_MODEL_MILD_MERGED};
     static const MildModel blended[2] = {MILD_MODEL_MILD, MILD_MODEL_BEKKER};
-    static const MildModel own[KINDS] = {[SPRING] = MILD_MODEL_ECC_SPRING,
-                                         [QUASI] = MILD_MODEL_ECC_QUASI,
-                                         [QUASI_3D] = MILD_MODEL_ECC_QUASI_3D,
-                                         [BEKKER] = MILD_MODEL_BEKKER,
-                                         [HUNT_CROSSLEY] = MILD_MODEL_HUNT_CROSSLEY};
-    MildModel model = kind >= EVERYTHING ? models[kit_index(random, 6)]
+    static const MildModel own[KINDS] = {
+        [SPRING] = MILD_MODEL_ECC_SPRING,           [QUASI] = MILD_MODEL_ECC_QUASI,
+        [QUASI_3D] = MILD_MODEL_ECC_QUASI_3D,       [BEKKER] = MILD_MODEL_BEKKER,
+        [HUNT_CROSSLEY] = MILD_MODEL_HUNT_CROSSLEY, [MERGED] = MILD_MODEL_MILD_MERGED};
+    MildModel model = kind >= EVERYTHING ? models[kit_index(random, 7)]
                       : kind == BLEND    ? blended[kit_index(random, 2)]
                                          : own[kind];
     MildMaterial m = material_of(random, model);

@@ -125,6 +125,9 @@ static void test_tilted_plate(void **state) {
     MildSole *one = mild_sole_concentric(plate, &error);
     double worst = 0.0;
     for (int model = 0; model < SOFT_MODELS; model++) {
+        if (model == MILD_MODEL_MILD_MERGED) {
+            continue; /* test_tilt in test_merged.c: the place of an element matters */
+        }
         double worst_force = 0.0, worst_moment = 0.0, largest = 0.0;
         for (int g = 0; g < 3; g++) {
             for (int d = 0; d < 4; d++) {

@@ -270,7 +270,7 @@ static void test_restore(void **state) {
     assert_int_equal(mild_ground_restore(kit.ground, saved, kit.bytes, &error), MILD_OK);
     assert_memory_equal(kit.ground, saved, kit.bytes);
     /* feet, elements, padded, touched, tiles, cell; a number and a material of the first foot */
-    const size_t number = 320 + 80 * sizeof(double), material = 320 + 80 * 12 * sizeof(double);
+    const size_t number = 320 + 80 * sizeof(double), material = 320 + 80 * 13 * sizeof(double);
     const size_t places[] = {0, 4, 68, 132, 260, 272, number, material};
     const uint64_t inf = 0x7ff0000000000000u, far = 77777;
     for (size_t i = 0; i < sizeof places / sizeof *places; i++) {

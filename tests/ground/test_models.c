@@ -351,16 +351,14 @@ static MildMaterial choi(void) {
  * equation, by small steps. */
 static double exact_stop(const MildMaterial *material, const MildSole *sole, double mass,
                          double speed) {
-    const double step = 1e-6, pitch = mild_sole_pitch(sole);
-    const int elements = mild_sole_elements(sole);
-    MildMaterial m = *material;
-    m.plate_width = mild_sole_width(sole); /* of bekker; an element alone has none */
+    const double step = 1e-6;
+    const MildMaterial m = *material;
     double energy = 0.5 * speed * speed, u = 0.0;
     for (; energy > 0.0; u += step) {
-        MildElementLaw law = mild_element_law(&m, pitch, u + 0.5 * step);
-        double n = elements, drag = 2.0 * m.c_d * n * law.added_mass_per_depth,
-               weight = mass * KIT_GRAVITY - n * (law.force + law.damping * sqrt(2.0 * energy));
-        double inert = mass + n * law.added_mass;
+        MildElementLaw law = mild_sole_law(&m, sole, u + 0.5 * step);
+        double drag = 2.0 * m.c_d * law.added_mass_per_depth,
+               weight = mass * KIT_GRAVITY - (law.force + law.damping * sqrt(2.0 * energy));
+        double inert = mass + law.added_mass;
         energy = (energy * (1.0 - 0.5 * step * drag / inert) + step * weight / inert) /
                  (1.0 + 0.5 * step * drag / inert);
     }

@@ -112,6 +112,13 @@ static void test_fields(void **state) {
             base.model = model;
             base.recovery = 0.3;
             base.bed_depth = 0.017;
+            const int regains = strcmp(field->name, "regain_length") == 0;
+            if (regains || strcmp(field->name, "grip") == 0) { /* of ground that slip weakens */
+                base.slip_length = 0.002;
+                base.recovery = 0.0;
+                base.regain_length = 0.05;
+                base.grip = 0.1;
+            }
             if (field->type == MILD_FIELD_BOOL) {
                 base.c_d = 0.3; /* the clamp acts */
             }

@@ -70,7 +70,7 @@ static FitResult press_and_fit(const Case *c, Noise noise, int draw) {
     FitResult result;
     MildError error = {0};
     if (mild_model_is_concentric((MildModel)c->material.model)) {
-        def.plate[0] = (FitPlate){1, sqrt(55) * 0.0195, 0.1};
+        def.plate[0] = (FitPlate){1, sqrt(55) * 0.0195, 0.1, NULL};
     }
     for (int r = 0; r < c->records; r++) {
         for (int i = 0; i < ROWS; i++) {

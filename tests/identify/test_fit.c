@@ -244,6 +244,7 @@ static void models(void **state) {
         {MILD_MODEL_ECC_QUASI_3D, "zeta "},
         {MILD_MODEL_BEKKER, "k_c k_phi exponent "},
         {MILD_MODEL_HUNT_CROSSLEY, "k_pen exponent dissipation "},
+        {MILD_MODEL_MILD_MERGED, "k_pen sigma_cone alpha nu c_g c_d phi rho "},
         {MILD_MODEL_RIGID, ""},
     };
     (void)state;
@@ -293,8 +294,8 @@ static void plates(void **state) {
     static const char *const grounds[] = {"foam45", "clay", "sandy_loam"};
     for (size_t g = 0; g < sizeof grounds / sizeof *grounds; g++) {
         FitDef truth = plate(grounds[g]);
-        truth.plate[0] = (FitPlate){40, 0.0195, 0.1};
-        truth.plate[1] = (FitPlate){160, 0.0195, 0.2};
+        truth.plate[0] = (FitPlate){40, 0.0195, 0.1, NULL};
+        truth.plate[1] = (FitPlate){160, 0.0195, 0.2, NULL};
         truth.plates = 2;
         for (int i = 0; i < 2 * ROWS; i++) {
             points[i] =
@@ -321,6 +322,44 @@ static void plates(void **state) {
                       result.residual_share);
         assert_true(result.residual_share > 0.1);
     }
+}
+
+/* Cones of one sole merge: records that the ground itself wrote on two plates come back, and the
+ * wider plate bears more than the same number of discs. */
+static void merged_plates(void **state) {
+    (void)state;
+    FitDef truth = plate("grass");
+    MildSole *soles[2];
+    truth.material.model = MILD_MODEL_MILD_MERGED;
+    truth.plates = 2;
+    for (int i = 0; i < 2; i++) {
+        const double x = i ? 0.1 : 0.05, y = i ? 0.06 : 0.04;
+        const double outline[] = {-x, -y, x, -y, x, y, -x, y};
+        const MildSoleDef def = {outline, 4, 0.0195, 0, 0};
+        soles[i] = mild_sole_create(&def, NULL);
+        assert_non_null(soles[i]);
+        truth.plate[i] = (FitPlate){mild_sole_elements(soles[i]), mild_sole_pitch(soles[i]),
+                                    mild_sole_width(soles[i]), soles[i]};
+    }
+    for (int i = 0; i < 2 * ROWS; i++) {
+        points[i] =
+            (FitPoint){.time = NAN, .depth = 0.04 * (i % ROWS + 1) / ROWS, .plate = i / ROWS};
+        points[i].force =
+            mild_sole_law(&truth.material, soles[points[i].plate], points[i].depth).force;
+    }
+    FitDef def = truth;
+    hold(&def, "alpha nu c_g c_d phi rho");
+    FitResult result = run(&def, 2 * ROWS);
+    is_near(&result, "k_pen", truth.material.k_pen);
+    is_near(&result, "sigma_cone", truth.material.sigma_cone);
+    assert_true(result.residual_share < 1e-6);
+    def.material.model = MILD_MODEL_MILD;
+    result = run(&def, 2 * ROWS);
+    print_message("discs on the record of merged cones: residual %.3f of the force\n",
+                  result.residual_share);
+    assert_true(result.residual_share > 0.01);
+    mild_sole_destroy(soles[0]);
+    mild_sole_destroy(soles[1]);
 }
 
 /* ---- intervals ---- */
@@ -619,14 +658,14 @@ static void refused(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(recovery),        cmocka_unit_test(exact),
-        cmocka_unit_test(shapes),          cmocka_unit_test(held),
-        cmocka_unit_test(models),          cmocka_unit_test(plates),
-        cmocka_unit_test(interval_linear), cmocka_unit_test(interval_profile),
-        cmocka_unit_test(interval_many),   cmocka_unit_test(untold),
-        cmocka_unit_test(filled),          cmocka_unit_test(not_filled),
-        cmocka_unit_test(neighbours),      cmocka_unit_test(loading),
-        cmocka_unit_test(refused),
+        cmocka_unit_test(recovery),         cmocka_unit_test(exact),
+        cmocka_unit_test(shapes),           cmocka_unit_test(held),
+        cmocka_unit_test(models),           cmocka_unit_test(plates),
+        cmocka_unit_test(merged_plates),    cmocka_unit_test(interval_linear),
+        cmocka_unit_test(interval_profile), cmocka_unit_test(interval_many),
+        cmocka_unit_test(untold),           cmocka_unit_test(filled),
+        cmocka_unit_test(not_filled),       cmocka_unit_test(neighbours),
+        cmocka_unit_test(loading),          cmocka_unit_test(refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

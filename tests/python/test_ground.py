@@ -371,6 +371,21 @@ class Fit(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "plate_width"):
             mild.GroundFit(model="bekker", hold={"plate_width": 0.1}).fit(X[0], y[0])
 
+    def test_merged(self):
+        """Cones of one plate merge: a press on it gives its numbers back, and the fit plays the force of the press."""
+        truth, sizes = mild.Material("grass"), [(0.1, 0.08), (0.2, 0.12)]
+        truth.model = "mild_merged"
+        records = [mild.press(truth, mild.Sole.plate(*size), depth=0.025) for size in sizes]
+        X, y = zip(*(mild.loading(press.time, press.depth, press.force) for press in records))
+        held = {name: getattr(truth, name) for name in ("alpha", "nu", "c_g", "c_d", "phi", "rho")}
+        fit = mild.GroundFit(plate=sizes, model="mild_merged", hold=held).fit(X, y)
+        for name in ("k_pen", "sigma_cone"):
+            self.assertLess(abs(fit.parameters_[name] / getattr(truth, name) - 1), 0.01, name)
+        other = mild.GroundFit(plate=sizes, model="mild", hold=held).fit(X, y)
+        for own, alone, force in zip(fit.predict(X), other.predict(X), y):
+            np.testing.assert_allclose(own, force, atol=0.01 * force.max())
+            self.assertGreater(np.abs(alone - force).max(), 0.01 * force.max())
+
     def test_estimator(self):
         fit = mild.GroundFit(model="bekker")
         self.assertEqual(fit.get_params(), {"plate": (0.2, 0.1), "model": "bekker", "hold": None, "fill": None})

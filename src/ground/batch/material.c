@@ -14,6 +14,13 @@ MildStatus material_numbers(const MildMaterial *material, double pitch, double w
         return mild_fail(error, MILD_ERROR_RANGE, "batch: material %d: %s", index, cause.text);
     }
     const InsideLaw inside = mild_inside_law(material, pitch, width);
+    if (inside.curves & LAW_HEAP) {
+        const int merged = material->model == MILD_MODEL_MILD_MERGED;
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "batch: material %d: %s, which batches do not have yet: choose %s", index,
+                         merged ? "ground.model = mild_merged" : "ground.slip_length is above 0",
+                         merged ? "mild" : "slip_length = 0");
+    }
     const Law law = inside.law;
     int n = 0;
 #define MATERIAL_LAW_STORE(name) numbers->law[n++] = (float)law.name;

@@ -192,6 +192,8 @@ static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchRe
             char name[sizeof report->rows->name];
             snprintf(name, sizeof name, "newton_%s", mild_model_names[model]);
             bench_add(report, "ground", name, ground_time(&bench, 0), "ns");
+            snprintf(name, sizeof name, "newton_%s_advance", mild_model_names[model]);
+            bench_add(report, "ground", name, ground_time(&bench, 1), "ns");
         }
     } else {
         status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");

@@ -1,0 +1,11 @@
+/* The share of its load that each slot of a foot carries. */
+#ifndef MILD_GROUND_CARRY_H
+#define MILD_GROUND_CARRY_H
+
+#include "ground/scratch.h"
+
+/* Sets the share of this step and what follows from it, after slots_begin. For ground with
+ * LAW_HEAP. */
+void foot_carry(const FootScratch *foot, double dt);
+
+#endif

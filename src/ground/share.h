@@ -1,0 +1,142 @@
+/* The share q of its virgin load that an element carries (docs/model.md sections 21 and 22). Two
+ * things lower it: a sole that is tilted against the ground presses with its projected area, and
+ * slip wears the support away.
+ *
+ *     F <= q F_g(u)                      at rest: the yield load
+ *     q <= c                             c: cosine between sole and ground; 1 unless projected
+ *     1/q <- 1/q + ds/(j0 c)             ds: horizontal path in the ground
+ *     c - q <- (c - q) exp(-da/u0)       da: fresh penetration, beyond the yield depth
+ * The element remembers 1 - q, its wear.
+ *
+ * The share is held in a step. It scales virgin ground; the unloading stiffness k stays that of the
+ * whole load, so the element yields at q F_g(a) and the line ends at a - q F_g(a)/k.
+ *
+ * It creates no energy. The line stores k x^2/2 with x the compression. A falling q moves the end
+ * of the line down: x falls. A growing q would move it up; therefore the yield depth moves ahead of
+ * the element by what keeps the end where it is, ELEMENT_ELASTIC times the growth. The line is then
+ * stiffer by F'/F of that lead; the fresh penetration that the growth comes with has paid for it.
+ * That needs u0 no shorter than the elastic travel. So q grows on plastic ground alone. */
+#ifndef MILD_GROUND_SHARE_H
+#define MILD_GROUND_SHARE_H
+
+#include "ground/remember.h"
+
+#define SHARE_LEAN REAL(0.02)  /* [-] least cosine: a sole on its edge */
+#define SHARE_GRIP REAL(0.1)   /* [-] friction that an element at its yield load keeps */
+#define SHARE_FORGET REAL(40)  /* [-] da/u0 beyond which nothing is left */
+#define SHARE_LEAST REAL(1e-6) /* [-] least share */
+
+/* What the share depends on. */
+typedef struct {
+    Real projects;    /* [-] 1: the sole presses with its projected area; 0: with all of it */
+    Real slip_rate;   /* [1/m] 1/j0; 0: slip costs nothing */
+    Real regain_rate; /* [1/m] 1/u0 */
+    Real grip;        /* [-] t, the greatest friction by the virgin load; 0: mu alone */
+    Real mu;          /* [-] of the material */
+    Real worn;        /* [-] memory: 1 - q */
+    Real lean;        /* [-] c */
+    Real carry;       /* [-] q */
+} Share;
+
+/* Sets lean and carry, and with them the unloading line and friction, after element_begin: the
+ * line says the whole force at the yield depth. elastic: [N] force of ground without memory. level:
+ * cosine between sole and ground. */
+MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, Real elastic,
+                           Real dt, Real rate, Real level) {
+    const Real a = e->yield_depth;
+    const Real k = e->unload_stiffness;
+    const Real c = 1 - share->projects * (1 - level);
+    const Real q = real_min(1 - share->worn, c);
+    const Real bed = law_bed_force(&e->law, a);
+    const Real force = q * (k * (a - e->zero_depth) - bed) + bed;
+    const Real grips = real_max(4 * share->grip * (1 - q / c), SHARE_GRIP);
+    const Real mu = share->grip > 0 ? real_min(share->mu, grips) : share->mu;
+    const int changes = q < 1 || mu != e->mu;
+    share->lean = c;
+    share->carry = q;
+    Element held = *e;
+    held.mu = mu;
+    friction_hold(&held, memory, dt, rate, force + elastic);
+    e->zero_depth = q < 1 ? a - force / (k + ELEMENT_TINY) : e->zero_depth;
+    e->hold_x = changes ? held.hold_x : e->hold_x;
+    e->hold_y = changes ? held.hold_y : e->hold_y;
+    e->hold_stiffness = changes ? held.hold_stiffness : e->hold_stiffness;
+    e->mu = mu;
+}
+
+/* Virgin ground as the element feels it. Called wherever an element with LAW_HEAP is loaded for
+ * the law of a step. */
+MILD_HD void element_carry(Element *e, Real carry) {
+    e->law.flat_stiffness *= carry;
+    e->law.line_stiffness *= carry;
+    e->law.power_force *= carry;
+}
+
+/* Bool: the ground at the yield depth is plastic, so that the share may grow. */
+MILD_HD int share_grows(const Element *e, const Share *share) {
+    const Real travel = e->yield_depth - e->zero_depth;
+    return e->recovery * e->yield_depth <= ELEMENT_ELASTIC &&
+           travel >= share->carry * (ELEMENT_ELASTIC * REAL(1 - 1e-6));
+}
+
+/* exp(-x) within 1e-14, 0 <= x <= SHARE_FORGET, and 1 at 0. The series of real_exp2, of which each
+ * term waits for the one before, in two that do not: 3 % of a step. */
+MILD_HD Real share_left(Real x) {
+    const Real power = REAL(-1.4426950408889634074) * x; /* 1/ln 2 */
+    const Real shifted = power + POWER_MAGIC;
+    const Real f = (power - (shifted - POWER_MAGIC)) * REAL(0.69314718055994530942);
+    const Real square = f * f;
+    Real even = REAL(1.0 / 3628800);
+    Real odd = REAL(1.0 / 39916800);
+    even = even * square + REAL(1.0 / 40320);
+    odd = odd * square + REAL(1.0 / 362880);
+    even = even * square + REAL(1.0 / 720);
+    odd = odd * square + REAL(1.0 / 5040);
+    even = even * square + REAL(1.0 / 24);
+    odd = odd * square + REAL(1.0 / 120);
+    even = even * square + REAL(0.5);
+    odd = odd * square + REAL(1.0 / 6);
+    even = even * square + 1;
+    odd = odd * square + 1;
+    return (even + odd * f) * real_from_bits((real_bits(shifted) << 52) + real_bits(1.0));
+}
+
+/* [-] The share after a step. slid: [m] horizontal path; fresh: [m] penetration. */
+MILD_HD Real share_after(const Element *e, const Share *share, Real slid, Real fresh) {
+    const Real c = share->lean;
+    const Real q = share->carry;
+    const Real slipped = q * (c / (c + q * slid * share->slip_rate));
+    const Real spent = real_min(fresh * share->regain_rate, SHARE_FORGET);
+    const Real left = share_left(spent);
+    const Real grown = slipped + (c - slipped) * (1 - left);
+    return real_max(share_grows(e, share) ? grown : slipped, SHARE_LEAST);
+}
+
+/* Adds to what element_remember has found. Where slip costs support, path counts at once where
+ * friction slides, so that the loss does not depend on the step. Returns the wear to remember. */
+MILD_HD Real element_wear(const Element *e, const Share *share, const ElementMemory *memory,
+                          ElementMemory *after, Real dt, Real normal, Real vx, Real vy, Real speed,
+                          int stays) {
+    const Real x = memory->pending_x + dt * vx;
+    const Real y = memory->pending_y + dt * vy;
+    const Real square = x * x + y * y;
+    const Real held_x = e->hold_x - e->hold_stiffness * vx;
+    const Real held_y = e->hold_y - e->hold_stiffness * vy;
+    const Real bound = friction_bound(e, normal);
+    const int slides = held_x * held_x + held_y * held_y >= bound * bound;
+    const Real least = share->slip_rate > 0 ? REAL(-1) : REMEMBER_BAND * REMEMBER_BAND;
+    const int counts = square > (slides ? least : REMEMBER_BAND * REMEMBER_BAND);
+    const Real slid = counts ? REAL_SQRT(square) : 0;
+    const Real fresh = real_max(e->depth + dt / 2 * speed - e->yield_depth, 0);
+    const Real q = share_after(e, share, slid, fresh);
+    const Real lead = real_max(q - share->carry, 0) * ELEMENT_ELASTIC;
+    /* The added mass grows with the lead; it keeps its momentum. P is concave. */
+    after->front_speed *= after->depth_max / (after->depth_max + lead + ELEMENT_TINY);
+    after->depth_max = stays ? after->depth_max + lead : 0;
+    after->drift = stays ? real_min(memory->drift + slid, REMEMBER_DRIFT) : 0;
+    after->pending_x = stays && !counts ? x : 0;
+    after->pending_y = stays && !counts ? y : 0;
+    return stays ? 1 - q : 0;
+}
+
+#endif
