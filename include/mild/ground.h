@@ -128,6 +128,7 @@ typedef struct {
                             comes back */
     double grip;          /* [-] mild, mild_merged with a slip_length: t, greatest friction of a
                             sliding element by its virgin load; 0: mu alone */
+    double refill;        /* [-] share of an imprint's depth that flows back as the foot leaves */
 } MildMaterial;
 
 /* Fields of MildMaterial with unit, range and meaning, for configuration files, sliders and random

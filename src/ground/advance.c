@@ -38,10 +38,12 @@ static int element_lifted(const Advance *a, int i, double m1) {
     return a->imprints && s->recovery[i] < 1.0 && m1 <= s->zero_depth[i];
 }
 
-/* A loaded element writes its depth into the ground where it lifts off and in every cell that it
- * slides out of. When it slides into a deeper imprint it takes over that depth. A greater depth
- * never means more force, so this adds no energy. */
-static void element_imprint(const Advance *a, const Memory *memory, int i, int e, int lifted) {
+/* A loaded element writes its depth into the ground where it lifts off, less what flows back there,
+ * and in every cell that it slides out of. When it slides into a deeper imprint it takes over that
+ * depth. A greater depth never means more force, and an element takes a lesser one while it carries
+ * nothing, so this adds no energy. refill: [-] of the material. */
+static void element_imprint(const Advance *a, const Memory *memory, int i, int e, int lifted,
+                            double refill) {
     const Slots *s = &a->slot;
     if (!(s->recovery[i] < 1.0)) {
         return;
@@ -55,6 +57,10 @@ static void element_imprint(const Advance *a, const Memory *memory, int i, int e
         return;
     }
     const ImprintElement left = {x0, y0, a->foot->pitch, a->rotation};
+    if (lifted && refill > 0.0) {
+        imprints_fill(a->imprints, &left, (1.0 - refill) * s->virgin_depth[i]);
+        return;
+    }
     imprints_press(a->imprints, &left, lifted ? s->virgin_depth[i] : memory->depth_max[e]);
     if (lifted) {
         return;
@@ -253,7 +259,8 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
             memory->share[e] = lifted ? 0.0 : s->share[i];
         }
         if (a->imprints && (carried || !lifted)) {
-            element_imprint(a, memory, i, e, lifted);
+            const double refill = foot->derived[material[i] & 0xff].material.refill;
+            element_imprint(a, memory, i, e, lifted, refill);
         }
         if (foot->uneven) {
             slot_plane(foot, a->height, s, memory, i, e);

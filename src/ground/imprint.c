@@ -110,11 +110,10 @@ double imprints_read(const Imprints *imprints, const ImprintElement *element) {
     return sum * (IMPRINT_UNIT / (IMPRINT_SAMPLES * IMPRINT_SAMPLES));
 }
 
-void imprints_press(const Imprints *imprints, const ImprintElement *element, double depth) {
-    double units = depth / IMPRINT_UNIT + 0.5;
-    uint16_t pressed =
-        (uint16_t)(units > 1.0 ? (units < 65535.0 ? units : 65535.0) : 0.0); /* NaN: 0 */
-    for (int k = 0; pressed > 0 && k < IMPRINT_SAMPLES * IMPRINT_SAMPLES; k++) {
+/* least: [units] of a cell that was shallower; a deeper one becomes `most` at most. */
+static void set_cells(const Imprints *imprints, const ImprintElement *element, uint16_t least,
+                      uint16_t most) {
+    for (int k = 0; k < IMPRINT_SAMPLES * IMPRINT_SAMPLES; k++) {
         double x, y;
         element_sample(element, k, &x, &y);
         Spot spot = spot_at(imprints, x, y);
@@ -123,10 +122,31 @@ void imprints_press(const Imprints *imprints, const ImprintElement *element, dou
         }
         uint16_t *at =
             imprints->depths + (size_t)tile_take(imprints, spot.place) * TILE_CELLS + spot.cell;
-        if (*at < pressed) {
-            *at = pressed;
+        if (*at < least) {
+            *at = least;
+        }
+        if (*at > most) {
+            *at = most;
         }
     }
+}
+
+/* [units] NaN: 0 */
+static uint16_t units_of(double depth) {
+    const double units = depth / IMPRINT_UNIT + 0.5;
+    return (uint16_t)(units > 1.0 ? (units < 65535.0 ? units : 65535.0) : 0.0);
+}
+
+void imprints_press(const Imprints *imprints, const ImprintElement *element, double depth) {
+    const uint16_t pressed = units_of(depth);
+    if (pressed > 0) {
+        set_cells(imprints, element, pressed, UINT16_MAX);
+    }
+}
+
+void imprints_fill(const Imprints *imprints, const ImprintElement *element, double depth) {
+    const uint16_t left = units_of(depth);
+    set_cells(imprints, element, left, left);
 }
 
 double imprints_depth(const Imprints *imprints, double x, double y) {

@@ -46,6 +46,8 @@ void imprints_clear(const Imprints *imprints);
 double imprints_read(const Imprints *imprints, const ImprintElement *element);
 /* Records that the cells under an element have been pressed down to `depth` [m]. */
 void imprints_press(const Imprints *imprints, const ImprintElement *element, double depth);
+/* Sets the cells under an element to `depth` [m]. */
+void imprints_fill(const Imprints *imprints, const ImprintElement *element, double depth);
 /* Depth of the cell that holds a point [m]; 0 where nothing is remembered. */
 double imprints_depth(const Imprints *imprints, double x, double y);
 /* Bool: the two points lie in the same cell. */

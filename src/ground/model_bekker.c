@@ -112,7 +112,7 @@ const ModelRow model_bekker = {
     .info = {.summary = "pressure a power of the sinkage; shear strength grows with slip",
              .source = "Bekker 1969, Janosi and Hanamoto 1961",
              .fields = {"k_c", "k_phi", "exponent", "plate_width", "cohesion", "mu", "shear_length",
-                        "k_drift", "b_drift", "recovery", "bed_depth"},
+                        "k_drift", "b_drift", "recovery", "bed_depth", "refill"},
              .scaled = {"k_c", "k_phi"},
              .presets = {"dry_sand", "sandy_loam", "clay", "snow", "lunar_soil"},
              .match_note = "exponent 1.1, k_c : k_phi of dry sand, cohesion 0"},

@@ -20,7 +20,7 @@ const ModelRow model_con_cone = {
     .info = {.summary = "one developing cone under the whole sole",
              .source = "Choi et al. 2023, scaled",
              .fields = {"k_pen", "sigma_cone", "alpha", "nu", "c_g", "c_d", "phi", "rho", "mu",
-                        "k_drift", "b_drift", "recovery", "bed_depth", "passive"},
+                        "k_drift", "b_drift", "recovery", "bed_depth", "refill", "passive"},
              .scaled = {"k_pen", "sigma_cone"},
              .match_note = "alpha 1.047, nu 2, c_g 2.7, c_d 17.2, phi 0.57, rho 1000 (Choi)",
              .concentric = 1},

@@ -3,7 +3,7 @@
 const ModelRow model_con_spring = {
     .info = {.summary = "one yielding spring under the middle of the sole",
              .source = "Lynch et al. 2020",
-             .fields = {"k_pen", "mu", "k_drift", "b_drift", "recovery", "bed_depth"},
+             .fields = {"k_pen", "mu", "k_drift", "b_drift", "recovery", "bed_depth", "refill"},
              .scaled = {"k_pen"},
              .concentric = 1,
              .match_note = "recovery 0"},

@@ -4,7 +4,7 @@
 const ModelRow model_ecc_quasi_3d = {
     .info = {.summary = "three-dimensional resistive force theory under every element",
              .source = "Agarwal et al. 2023",
-             .fields = {"zeta", "mu", "k_drift", "b_drift", "bed_depth"},
+             .fields = {"zeta", "mu", "k_drift", "b_drift", "bed_depth", "refill"},
              .scaled = {"zeta"},
              .match_note = "recovery 0; mu, k_drift, b_drift 0: friction is part of zeta"},
     .law = resist_law,
