@@ -119,6 +119,12 @@ static void test_ends_of_the_range(void **state) {
         press(&imprints, 0.055, 0.055, depth[k]);
         assert_true(fabs(imprints_depth(&imprints, 0.055, 0.055) - kept[k]) < 1e-9);
     }
+    const ImprintElement element = {0.055, 0.055, CELL,
+                                    (const double[9]){1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    for (int k = 0; k < 3; k++) { /* filled: deeper and shallower, and up to the surface */
+        imprints_fill(&imprints, &element, 0.02 * ((k + 1) % 3));
+        assert_true(fabs(imprints_depth(&imprints, 0.055, 0.055) - 0.02 * ((k + 1) % 3)) < 1e-9);
+    }
     imprints_clear(&imprints); /* the world repeats after 65536 tiles */
     press(&imprints, 0.055, -0.055, 0.03);
     const double around = 65536.0 * IMPRINT_EDGE * CELL;

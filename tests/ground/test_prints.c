@@ -25,8 +25,8 @@ static double move_to(Kit *kit, double u) {
 }
 
 /* Pressed to 20 mm, lifted out, pressed again at the same place: nothing until the print is met,
- * then the unloading line up to the old depth less what flowed back, then virgin ground. Elsewhere, and on elastic
- * ground, the first curve again. */
+ * then the unloading line up to the old depth less what flowed back, then virgin ground. Elsewhere,
+ * and on elastic ground, the first curve again. */
 static void test_second_step(void **state) {
     (void)state;
     MildSole *sole = kit_plate(4, 4);
