@@ -24,7 +24,7 @@ import numpy as np
 
 import mild
 from judge_cases import COLUMNS, MEASURES, Case, measures, scale
-from judge_entries import (Archimedes, FunctionEntry, GroundEntry, TableEntry, c_function, chrono_scm, rft_stress,
+from judge_entries import (PITCH, Archimedes, FunctionEntry, GroundEntry, TableEntry, c_function, chrono_scm, rft_stress,
                            wong_sand)
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -136,10 +136,10 @@ def entries(args, ground):
     friction = FRICTION.get(ground["friction"], 0.38)
     stress = rft_stress(ground, friction)
     rft = GroundEntry("ecc_quasi_3d", mild.Material("sand_loose", model="ecc_quasi_3d", zeta=stress / 1e6, mu=0, k_drift=0,
-                                                    b_drift=0))
+                                                    b_drift=0), args.pitch)
     rft.name, rft.fit = "3d_rft", lambda records, ground: None
     models = [name for name in args.models.split(",") if name] or [name for name in mild.models() if name != "rigid"]
-    yield from (GroundEntry(model) for model in models)
+    yield from (GroundEntry(model, None, args.pitch) for model in models)
     yield rft
     yield FunctionEntry("chrono_scm", chrono_scm)
     yield FunctionEntry("wong_sand", wong_sand)
@@ -327,6 +327,7 @@ def write_figures(args, records, file):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--records", default=ROOT / "grains" / "records", type=pathlib.Path)
+    parser.add_argument("--pitch", default=PITCH, type=float, help="[m] elements of mild's soles")
     parser.add_argument("--families", default=",".join(FITS), help="beds to fit on, of " + ", ".join(FITS))
     parser.add_argument("--models", default="", help="of mild; default: all that yield")
     parser.add_argument("--entry", action="append", default=[], help="FILE.py:FUNCTION or LIB.so:FUNCTION, a model of your own")

@@ -58,14 +58,14 @@ class GroundEntry:
     """A ground model of mild, fitted to level presses by mild.GroundFit; its friction is the drag's. Or not fitted: with a
     material."""
 
-    def __init__(self, model, material=None):
-        self.name, self.model, self.material = model, model, material
+    def __init__(self, model, material=None, pitch=PITCH):
+        self.name, self.model, self.material, self.pitch = model, model, material, pitch
 
     def fit(self, records, ground):
         self.grain = ground["grain"]
         level = [(case, rows) for case, rows in records.values() if case.kind == "press"]
         drags = [(case, rows) for case, rows in records.values() if case.kind == "drag"]
-        soles = [mild.Sole(case.sole.outline, PITCH) for case, _ in level]
+        soles = [mild.Sole(case.sole.outline, self.pitch) for case, _ in level]
         parts = [mild.loading(rows["time"], rows["depth"], rows["fz"]) for _, rows in level]
         # the best curve, also where its parameters have no interval: a judge needs numbers
         data = [X[:, :1] for X, _ in parts], [y for _, y in parts]
@@ -103,7 +103,7 @@ class GroundEntry:
             self.material = mild.Material(self.material, mu=float(np.clip(self.material.mu * wanted / got, 0.02, 1.5)))
 
     def sole(self, case):
-        sole = mild.Sole(case.sole.outline, PITCH)
+        sole = mild.Sole(case.sole.outline, self.pitch)
         return sole.concentric() if self.model.startswith("con_") else sole
 
     def play(self, case):

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "ground/models.h"
+#include "ground/sole.h"
 
 /* ---- combinations ---- */
 
@@ -114,19 +115,68 @@ int fit_is_rate(MildModel model, const MildField *field) {
 
 /* ---- force ---- */
 
-/* The same of a plate whose cones merge. */
+/* Force of an element at a row. */
+static double point_force(const Law *law, int curves, const FitPoint *point) {
+    const double depth = fmax(point->depth, 0);
+    const double speed = point->speed;
+    const double elastic = law_elastic_force(law, curves, depth);
+    double sum = law_force(law, curves, depth) + elastic * (1 + law->elastic_damping * speed);
+    if (curves & LAW_CONE) {
+        sum += law->drag_rate * law_flat_share(law, curves, depth) * speed * speed;
+        sum += law->mass_rate * law_recruited(law, curves, depth) * point->acceleration;
+    }
+    return sum;
+}
+
+/* Elements whose cones are alike: a plate has few kinds, because it is symmetric. */
+enum { HEAPS = 64 };
+typedef struct {
+    SoleHeap heap;
+    int elements;
+} Heaps;
+
+/* Gathers elements from number `first` on until there are HEAPS kinds. Returns the next element. */
+static int heaps_gather(const MildSole *sole, int first, Heaps *kind, int *kinds) {
+    const double same = 1e-9;
+    *kinds = 0;
+    for (int e = first; e < mild_sole_elements(sole); e++) {
+        const SoleHeap own = sole_heap(sole, e);
+        int k = 0;
+        while (k < *kinds && !(fabs(kind[k].heap.begin - own.begin) < same &&
+                               fabs(kind[k].heap.width - own.width) < same)) {
+            k++;
+        }
+        if (k == HEAPS) {
+            return e;
+        }
+        if (k == *kinds) {
+            kind[(*kinds)++] = (Heaps){own, 0};
+        }
+        kind[k].elements++;
+    }
+    return mild_sole_elements(sole);
+}
+
+/* The forces of neighbouring rows that share a plate whose cones merge. */
 static void merged_forces(const FitPlate *plate, const MildMaterial *raw, const FitPoint *points,
                           int count, double *force) {
-    const double drag = raw->c_d;
-    for (int i = 0; i < count; i++) {
-        const double speed = points[i].speed;
-        const MildElementLaw law = mild_sole_law(raw, plate->sole, fmax(points[i].depth, 0));
-        force[i] = law.force + drag * law.added_mass_per_depth * speed * speed +
-                   law.added_mass * points[i].acceleration;
+    const Law law = law_of(raw, plate->pitch, plate->width);
+    const int curves = curves_of(raw, &law);
+    Heaps kind[HEAPS];
+    int kinds;
+    memset(force, 0, (size_t)count * sizeof *force);
+    for (int e = 0; e < mild_sole_elements(plate->sole);) {
+        e = heaps_gather(plate->sole, e, kind, &kinds);
+        for (int k = 0; k < kinds; k++) {
+            const Law own = law_merged(law, kind[k].heap.begin, kind[k].heap.width);
+            for (int i = 0; i < count; i++) {
+                force[i] += kind[k].elements * point_force(&own, curves, &points[i]);
+            }
+        }
     }
 }
 
-/* The forces of neighbouring rows that share a plate. */
+/* The same of any plate. */
 static void plate_forces(const FitPlate *plate, const MildMaterial *raw, const FitPoint *points,
                          int count, double *force) {
     if (plate->sole && model_row(raw->model)->merged) {
@@ -136,15 +186,7 @@ static void plate_forces(const FitPlate *plate, const MildMaterial *raw, const F
     const Law law = law_of(raw, plate->pitch, plate->width);
     const int curves = law_curves(&law);
     for (int i = 0; i < count; i++) {
-        const double depth = fmax(points[i].depth, 0);
-        const double speed = points[i].speed;
-        const double elastic = law_elastic_force(&law, curves, depth);
-        double sum = law_force(&law, curves, depth) + elastic * (1 + law.elastic_damping * speed);
-        if (curves & LAW_CONE) {
-            sum += law.drag_rate * law_flat_share(&law, curves, depth) * speed * speed;
-            sum += law.mass_rate * law_recruited(&law, curves, depth) * points[i].acceleration;
-        }
-        force[i] = plate->elements * sum;
+        force[i] = plate->elements * point_force(&law, curves, &points[i]);
     }
 }
 

@@ -18,7 +18,7 @@ static void check(const FitValue *value) {
 
 static void fit(const FitPoint *points, int count, int model) {
     const MildMaterial fill = mild_material_default();
-    FitDef def = {.plate = {{55, 0.0195, 0.1}},
+    FitDef def = {.plate = {{55, 0.0195, 0.1, NULL}},
                   .plates = 1,
                   .material = fill,
                   .fill = model % 2 ? &fill : NULL};

@@ -65,7 +65,7 @@ static void noise_add(FitPoint *rows, Noise noise, Random *random) {
 }
 
 static FitResult press_and_fit(const Case *c, Noise noise, int draw) {
-    FitDef def = {.plate = {{55, 0.0195, 0.1}}, .plates = 1, .material = c->material};
+    FitDef def = {.plate = {{55, 0.0195, 0.1, NULL}}, .plates = 1, .material = c->material};
     Random random = random_at((uint64_t)(1000 + draw), (uint32_t)noise, (uint32_t)c->number);
     FitResult result;
     MildError error = {0};

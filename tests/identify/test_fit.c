@@ -17,7 +17,7 @@ typedef enum {
 static FitPoint points[3 * ROWS], many[50 * ROWS];
 
 static FitDef plate(const char *ground) {
-    FitDef def = {.plate = {{55, 0.0195, 0.1}}, .plates = 1};
+    FitDef def = {.plate = {{55, 0.0195, 0.1, NULL}}, .plates = 1};
     assert_true(mild_material_preset(ground, &def.material));
     def.material.bed_depth = 10;
     return def;

@@ -38,7 +38,7 @@ def make(folder):
         family, name = key.split("/")
         (folder / family).mkdir(exist_ok=True)
         case = Case(every[key])
-        rows = GroundEntry("mild", TRUTH).play(case)
+        rows = GroundEntry("mild", TRUTH, 0.0195).play(case)
         for seed in range(1, BEDS + 1):
             factor = 1 + NOISE * random.standard_normal() * np.ones(3)
             with open(folder / family / f"{name}-{seed}.csv", "w", encoding="utf-8") as file:
@@ -87,7 +87,7 @@ def the_truth_is_found_and_others_are_not(folder):
     subprocess.run(["cc", "-shared", "-fPIC", "-o", folder / "c.so", folder / "c.c"], check=True)
     table = folder / "table.csv"
     table.write_text("case,time_s,depth_m,force_x_n,force_z_n,moment_y_nm\ndisc100,0,0,0,0,0\ndisc100,1,0.05,0,100,0\n")
-    run = judge("--records", folder, "--families", "sand", "--models", "mild,con_spring,hunt_crossley",
+    run = judge("--records", folder, "--families", "sand", "--models", "mild,con_spring,hunt_crossley", "--pitch", "0.0195",
                 "--entry", f"{mine}:half", "--entry", f"{folder / 'c.so'}:twice", "--table", f"theirs={table}",
                 "--rival", f"same={folder}", "--out", folder / "out")
     print(run.stdout, run.stderr)
