@@ -75,13 +75,15 @@ static double outline_mean(const MildSoleDef *def, const EdgeBox *box, double x,
                            int *work) {
     const double pitch = def->pitch;
     double sum = 0.0, mean, spread;
-    for (double cx = x - ceil((x - box->low[0]) / pitch) * pitch; cx < box->high[0] + pitch;
-         cx += pitch) {
-        for (double cy = y - ceil((y - box->low[1]) / pitch) * pitch; cy < box->high[1] + pitch;
-             cy += pitch) {
+    double cx = x - ceil((x - box->low[0]) / pitch) * pitch;
+    while (cx < box->high[0] + pitch) {
+        double cy = y - ceil((y - box->low[1]) / pitch) * pitch;
+        while (cy < box->high[1] + pitch) {
             cell_edge(def, cx, cy, work, &mean, &spread);
             sum += mean * pitch * pitch;
+            cy += pitch;
         }
+        cx += pitch;
     }
     return sum / box->area;
 }
