@@ -102,7 +102,6 @@ BLOCKS = [
 ]
 
 
-
 def families():
     """A block for each family: its beds settle once."""
     whole = {}

@@ -58,8 +58,9 @@ class GroundEntry:
     """A ground model of mild, fitted to level presses by mild.GroundFit; its friction is the drag's. Or not fitted: with a
     material."""
 
-    def __init__(self, model, material=None, pitch=PITCH):
+    def __init__(self, model, material=None, pitch=PITCH, slips=False):
         self.name, self.model, self.material, self.pitch = model, model, material, pitch
+        self.slips = slips or model == "mild_merged"
 
     def fit(self, records, ground):
         self.grain = ground["grain"]
@@ -73,7 +74,7 @@ class GroundEntry:
             self.material = mild.Material(mild.GroundFit(soles, self.model).fit(*data).material_, mu=0.5)
         except ValueError:  # tan(alpha)/nu is told, not both: a flatter cone keeps nu within its range
             self.material = mild.GroundFit(soles, self.model, hold={"alpha": 0.3}).fit(*data).material_
-        if self.model == "mild_merged":
+        if self.slips:
             self.fit_slip(drags)
         elif self.model.startswith("ecc_quasi"):  # whose coefficients contain friction
             self.material = mild.Material(self.material, mu=0, k_drift=0, b_drift=0)
