@@ -2,7 +2,7 @@
 
 # Kernels of a robot's contact step, one unit each: groups of lanes, at least as many as feet; elements of a lane; feet,
 # `flat` for any or `points` for those that transmit no moment; curves of the ground, `all` or the only ones, which is less
-# text and fewer registers; blocks of a multiprocessor. A batch takes the first that fits. The rows `flat all` are the sizes
+# text and fewer registers, or `heap` for cones that merge or wear, `any` for all of these; blocks of a multiprocessor. A batch takes the first that fits. The rows `flat all` are the sizes
 # that a batch can have, smallest first. On the CPU the same sizes are numbers of one step.
 #
 # Two blocks fit a multiprocessor; three would be 1 % faster at 65 536 robots, and 12 % slower at 4096, for they spill
@@ -27,7 +27,17 @@ set(batch_kernels
   "2 8 flat   all    2"
   "4 1 flat   all    2"
   "4 4 flat   all    2"
-  "4 8 flat   all    2")
+  "4 8 flat   all    2"
+  "2 5 flat   heap   2"
+  "1 1 flat   any    2"
+  "1 3 flat   any    2"
+  "1 8 flat   any    2"
+  "2 1 flat   any    2"
+  "2 5 flat   any    2"
+  "2 8 flat   any    2"
+  "4 1 flat   any    2"
+  "4 4 flat   any    2"
+  "4 8 flat   any    2")
 set(generated ${CMAKE_BINARY_DIR}/generated/batch)
 mild_layer(ground/batch layer_ground layer_device)
 target_include_directories(layer_batch PUBLIC ${generated})
@@ -61,13 +71,21 @@ foreach(row ${batch_kernels})
     string(APPEND name _${curves})
   endif()
   set(unit ${generated}/contact_${name}.cu)
-  string(TOUPPER ${curves} curves)
+  string(TOUPPER "LAW_${curves}" curves)
+  set(heap 0)
+  if(curves MATCHES "HEAP|ANY")
+    set(heap 1)
+  endif()
+  if(curves STREQUAL "LAW_HEAP")
+    set(curves "(LAW_CONE | LAW_HEAP)")
+  endif()
   file(CONFIGURE OUTPUT ${unit} CONTENT [=[
 #define KERNEL contact_@name@
 #define KERNEL_GROUPS @groups@
 #define KERNEL_PER @per@
 #define KERNEL_POINTS @points@
-#define KERNEL_CURVES LAW_@curves@
+#define KERNEL_CURVES @curves@
+#define KERNEL_HEAP @heap@
 #define KERNEL_BLOCKS @blocks@
 #include "ground/batch/kernel.cu"
 ]=] @ONLY)

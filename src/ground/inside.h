@@ -3,14 +3,18 @@
 #ifndef MILD_GROUND_INSIDE_H
 #define MILD_GROUND_INSIDE_H
 
-#include "ground/law.h"
 #include "ground/map_view.h"
+#include "ground/share.h"
+#include "ground/sole.h"
 #include "ground/state.h"
 
 /* The law of a material under one element. */
 typedef struct {
     Law law;
+    Share share;     /* the material's numbers of it */
     double recovery; /* [-] */
+    double k_drift;  /* [N/m^2] */
+    double b_drift;  /* [N s/m] */
     int curves;      /* LawCurve and LawMotion bits */
 } InsideLaw;
 
@@ -18,6 +22,8 @@ MILD_API_BEGIN
 
 /* pitch: [m] edge of the element. width: [m] shorter side of the sole. */
 InsideLaw mild_inside_law(const MildMaterial *material, double pitch, double width);
+/* See sole_heap. */
+SoleHeap mild_inside_heap(const MildSole *sole, int element);
 /* See ground_memory. */
 Memory mild_inside_memory(const MildGround *ground, int foot);
 /* See map_view. */

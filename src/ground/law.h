@@ -58,7 +58,7 @@ typedef enum {
     LAW_ELASTIC = 4, /* the elastic curve without memory */
     LAW_ALL = LAW_CONE | LAW_POWER | LAW_ELASTIC,
     LAW_HEAP = 8, /* the cone may begin to close below the surface, and the element may carry a
-                     share of its load (share.h). Not in batches, so not in LAW_ALL */
+                     share of its load (share.h). LAW_ALL and the loops for it leave it out */
     LAW_ANY = LAW_ALL | LAW_HEAP
 } LawCurve;
 
@@ -84,17 +84,8 @@ typedef struct {
     Real elastic_force;      /* S [N] of the elastic curve */
     Real elastic_exponent;   /* n [-] */
     Real elastic_damping;    /* d [s/m] relative growth of its force with the downward speed */
-#ifndef MILD_REAL_FLOAT
-    Real cone_begin; /* u_b [m] depth from which the cone closes; only with LAW_HEAP */
-#endif
+    Real cone_begin;         /* u_b [m] depth from which the cone closes; only with LAW_HEAP */
 } Law;
-
-/* Batches have no heaps. */
-#ifdef MILD_REAL_FLOAT
-#define LAW_BEGIN(law) REAL(0)
-#else
-#define LAW_BEGIN(law) (law)->cone_begin
-#endif
 
 /* The numbers of Law in order, but for cone_begin, which belongs to the place of an element in its
  * sole. Slots, loads, stores and checks are generated from this list. */
@@ -124,9 +115,17 @@ MILD_HD int law_variant(int curves) {
     return one ? curves : LAW_ANY;
 }
 
+/* The law of an element of a merged sole, from that of a disc. begin, width: [-] as in SoleHeap. */
+MILD_HD Law law_merged(Law law, Real begin, Real width) {
+    law.cone_begin = law.cone_depth * begin;
+    law.cone_depth *= width;
+    law.inverse_cone_depth = 1 / law.cone_depth;
+    return law;
+}
+
 /* t [-], 1 when the cone is complete. */
 MILD_HD Real law_cone_progress(const Law *law, int curves, Real depth) {
-    const Real closing = curves & LAW_HEAP ? real_max(depth - LAW_BEGIN(law), 0) : depth;
+    const Real closing = curves & LAW_HEAP ? real_max(depth - law->cone_begin, 0) : depth;
     return real_min(closing * law->inverse_cone_depth, 1);
 }
 
@@ -139,7 +138,7 @@ MILD_HD Real law_cone_share(const Law *law, int curves, Real depth) {
 /* P(u) [m], u >= 0. */
 MILD_HD Real law_recruited(const Law *law, int curves, Real depth) {
     const Real closing = law->cone_depth * REAL(1.0 / 3.0) * law_cone_share(law, curves, depth);
-    return curves & LAW_HEAP ? real_min(depth, LAW_BEGIN(law)) + closing : closing;
+    return curves & LAW_HEAP ? real_min(depth, law->cone_begin) + closing : closing;
 }
 
 /* P'(u) [-], 1 at the surface, 0 once the cone is complete. */
@@ -249,9 +248,9 @@ MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way) {
         over.recruited_slope = way > 0 ? flat_end : 0;
     }
     if (curves & LAW_HEAP) {
-        const Real open_begin = real_min(begin, LAW_BEGIN(law));
-        const Real open_half = real_min(half, LAW_BEGIN(law));
-        const Real open_end = real_min(end, LAW_BEGIN(law));
+        const Real open_begin = real_min(begin, law->cone_begin);
+        const Real open_half = real_min(half, law->cone_begin);
+        const Real open_end = real_min(end, law->cone_begin);
         over.mean +=
             law->flat_stiffness * ((open_begin + 4 * open_half + open_end) * REAL(1.0 / 6.0));
         over.recruited += way > 0 ? open_end - open_begin : 0;

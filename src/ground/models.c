@@ -63,13 +63,6 @@ int curves_of(const MildMaterial *material, const Law *law) {
     return law_curves(law) | (share.projects + share.slip_rate > 0.0 ? LAW_HEAP : 0);
 }
 
-Law law_merged(Law law, double begin, double width) {
-    law.cone_begin = law.cone_depth * begin;
-    law.cone_depth *= width;
-    law.inverse_cone_depth = 1.0 / law.cone_depth;
-    return law;
-}
-
 double recovery_of(const MildMaterial *material) {
     return model_row(material->model)->motion & LAW_RESIST ? 0.0 : material->recovery;
 }

@@ -18,8 +18,6 @@ int curves_of(const MildMaterial *material, const Law *law);
 /* The share of its load that the ground carries (share.h): the material's numbers. The rest is
  * 0. */
 Share share_of(const MildMaterial *material);
-/* The law of an element of a merged sole, from law_of: `begin` and `width` are those of Sole. */
-Law law_merged(Law law, double begin, double width);
 /* [-] Share of the depth that its virgin ground springs back: the material's, but 0 in resistive
  * force theory, whose unloading line has no other length (plate.h). */
 double recovery_of(const MildMaterial *material);

@@ -25,6 +25,11 @@
 #define SHARE_GRIP REAL(0.1)   /* [-] friction that an element at its yield load keeps */
 #define SHARE_FORGET REAL(40)  /* [-] da/u0 beyond which nothing is left */
 #define SHARE_LEAST REAL(1e-6) /* [-] least share */
+#ifdef MILD_REAL_FLOAT
+#define SHARE_ROUND REAL(1e-3) /* [-] of the elastic travel: what rounding may take from it */
+#else
+#define SHARE_ROUND REAL(1e-6)
+#endif
 
 /* What the share depends on. */
 typedef struct {
@@ -76,12 +81,15 @@ MILD_HD void element_carry(Element *e, Real carry) {
 MILD_HD int share_grows(const Element *e, const Share *share) {
     const Real travel = e->yield_depth - e->zero_depth;
     return e->recovery * e->yield_depth <= ELEMENT_ELASTIC &&
-           travel >= share->carry * (ELEMENT_ELASTIC * REAL(1 - 1e-6));
+           travel >= share->carry * (ELEMENT_ELASTIC * (1 - SHARE_ROUND));
 }
 
 /* exp(-x) within 1e-14, 0 <= x <= SHARE_FORGET, and 1 at 0. The series of real_exp2, of which each
  * term waits for the one before, in two that do not: 3 % of a step. */
 MILD_HD Real share_left(Real x) {
+#ifdef MILD_REAL_FLOAT
+    return real_exp2(REAL(-1.4426950408889634074) * x);
+#else
     const Real power = REAL(-1.4426950408889634074) * x; /* 1/ln 2 */
     const Real shifted = power + POWER_MAGIC;
     const Real f = (power - (shifted - POWER_MAGIC)) * REAL(0.69314718055994530942);
@@ -99,6 +107,7 @@ MILD_HD Real share_left(Real x) {
     even = even * square + 1;
     odd = odd * square + 1;
     return (even + odd * f) * real_from_bits((real_bits(shifted) << 52) + real_bits(1.0));
+#endif
 }
 
 /* [-] The share after a step. slid: [m] horizontal path; fresh: [m] penetration. */

@@ -5,13 +5,14 @@
 
 #include "contact_case.h"
 
-enum { BODIES = 5, BODIES_ELEMENTS = 512, BODIES_MEMORY = 14, BODIES_PLACES = 8 };
+enum { BODIES = 5, BODIES_ELEMENTS = 512, BODIES_MEMORY = 15, BODIES_PLACES = 8 };
 
 typedef struct {
     int feet, bodies;
     int elements[BODIES], faces[BODIES]; /* faces: bool, a surface */
     /* x, y, z, normal, area over that of the law */
     double place[7][BODIES][BODIES_ELEMENTS];
+    double begin[BODIES][BODIES_ELEMENTS], width[BODIES][BODIES_ELEMENTS]; /* of SoleHeap */
     double z[BODIES], square[BODIES], middle[BODIES][3], half[BODIES][3], radius[BODIES];
     CaseMaterial material[CASE_LABELS][BODIES];
     double dt, tolerance, height, steepest;

@@ -10,12 +10,17 @@
 
 static void case_law(CaseMaterial *c, const MildMaterial *m, const MildSole *sole) {
     const Law law = law_of(m, mild_sole_pitch(sole), mild_sole_width(sole));
+    const Share share = share_of(m);
     memcpy(c->law, &law, sizeof c->law);
-    c->curves = law_curves(&law) | model_row(m->model)->motion;
+    c->curves = curves_of(m, &law) | model_row(m->model)->motion;
     c->recovery = law_recovery(&law, recovery_of(m));
     c->mu = m->mu;
-    c->k_drift = m->k_drift;
-    c->b_drift = m->b_drift;
+    c->k_drift = share.slip_rate > 0.0 ? 0.0 : m->k_drift;
+    c->b_drift = share.slip_rate > 0.0 ? 0.0 : m->b_drift;
+    c->projects = share.projects;
+    c->slip_rate = share.slip_rate;
+    c->regain_rate = share.regain_rate;
+    c->grip = share.grip;
     c->exit_drag = law_exit_drag(&law);
     c->entry_drag = law_entry_drag(&law);
     c->cohesion = m->cohesion;

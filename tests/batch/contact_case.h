@@ -4,11 +4,11 @@
 
 #include "ground/map_view.h"
 
-enum { CASE_FEET = 4, CASE_ELEMENTS = 256, CASE_MEMORY = 9, CASE_LAW = 13, CASE_LABELS = 4 };
+enum { CASE_FEET = 4, CASE_ELEMENTS = 256, CASE_MEMORY = 10, CASE_LAW = 14, CASE_LABELS = 4 };
 
 typedef struct {
     double law[CASE_LAW], recovery, mu, k_drift, b_drift, exit_drag, entry_drag;
-    double cohesion, shear_length;
+    double cohesion, shear_length, projects, slip_rate, regain_rate, grip;
     int curves;
 } CaseMaterial;
 
@@ -17,6 +17,7 @@ typedef struct {
     int points; /* bool: by the version for feet that transmit no moment */
     int elements[CASE_FEET];
     double x[CASE_FEET][CASE_ELEMENTS], y[CASE_FEET][CASE_ELEMENTS], z[CASE_FEET];
+    double begin[CASE_FEET][CASE_ELEMENTS], width[CASE_FEET][CASE_ELEMENTS]; /* of SoleHeap */
     double area[CASE_FEET];
     double dt, tolerance, height;
     int limit;

@@ -9,6 +9,7 @@
 #include "ground/map_kit.h"
 #include "ground/models.h"
 #include "ground/scratch.h"
+#include "ground/sole.h"
 #include "ground/surface_kit.h"
 
 enum { FEET = 2, WALK = 60, FALL = 250, FORCES = 20000 };
@@ -58,6 +59,9 @@ static void case_sole(BodiesCase *c, const Kit *kit, int b) {
         for (int k = 0; z && k < 3; k++) {
             c->place[3 + k][b][i] = mild_sole_surface_normal(sole, k)[i];
         }
+        const SoleHeap heap = sole_heap(sole, i);
+        c->begin[b][i] = heap.begin;
+        c->width[b][i] = heap.width;
         c->place[6][b][i] = z ? mild_sole_surface_area(sole)[i] / square : 0;
     }
     for (int m = 0; m < kit->terrain.material_count; m++) {
@@ -80,10 +84,13 @@ static void case_map(BodiesCase *c, const MildTerrain *terrain) {
     c->map_origin[1] = terrain->map_y;
 }
 
+/* Numbers of BodiesCase.memory behind those of an element on level ground. */
+enum { PLANE = CASE_MEMORY, SLOPE_X, SLOPE_Y, STATE, SHARE };
+
 static void memory_arrays(const Memory *m, double *const all[CASE_MEMORY]) {
-    double *const arrays[CASE_MEMORY] = {m->depth_max, m->middle,    m->front_speed,
-                                         m->drift,     m->pending_x, m->pending_y,
-                                         m->held_x,    m->held_y,    m->held_stiffness};
+    double *const arrays[CASE_MEMORY] = {m->depth_max,      m->middle,    m->front_speed, m->drift,
+                                         m->pending_x,      m->pending_y, m->held_x,      m->held_y,
+                                         m->held_stiffness, m->worn};
     memcpy((void *)all, arrays, sizeof arrays);
 }
 
@@ -108,11 +115,11 @@ static void case_remember(BodiesCase *c, const Kit *kit, int b) {
             c->memory[n][b][e] = all[n][e];
         }
         const int there = kit->ground->uneven[b] && material != MATERIAL_NONE;
-        c->memory[9][b][e] = there ? memory.plane[e] : 1e6;
-        c->memory[10][b][e] = there ? memory.slope_x[e] : 0;
-        c->memory[11][b][e] = there ? memory.slope_y[e] : 0;
-        c->memory[12][b][e] = c->faces[b] ? state_of(material) : material > 0 ? material : 0;
-        c->memory[13][b][e] = c->faces[b] ? memory.share[e] : 0;
+        c->memory[PLANE][b][e] = there ? memory.plane[e] : 1e6;
+        c->memory[SLOPE_X][b][e] = there ? memory.slope_x[e] : 0;
+        c->memory[SLOPE_Y][b][e] = there ? memory.slope_y[e] : 0;
+        c->memory[STATE][b][e] = c->faces[b] ? state_of(material) : material > 0 ? material : 0;
+        c->memory[SHARE][b][e] = c->faces[b] ? memory.share[e] : 0;
     }
 }
 
@@ -186,7 +193,8 @@ static void compare(Worst *worst, const BodiesCase *c, const Kit *kit) {
 
 static void compare_element(Worst *worst, const BodiesCase *c, const Kit *kit, const Memory *memory,
                             int b, int e) {
-    static const double scale[CASE_MEMORY] = {1e-3, 1e-3, 0.1, 1e-3, 1e-5, 1e-5, 1.0, 1.0, 1e4};
+    static const double scale[CASE_MEMORY] = {1e-3, 1e-3, 0.1, 1e-3, 1e-5,
+                                              1e-5, 1.0,  1.0, 1e4,  1.0};
     const int32_t material = memory->material[e];
     double *all[CASE_MEMORY];
     memory_arrays(memory, all);
@@ -197,13 +205,13 @@ static void compare_element(Worst *worst, const BodiesCase *c, const Kit *kit, c
     }
     if (c->faces[b]) {
         worst->buried += material == MATERIAL_BURIED;
-        assert_int_equal((int)c->memory[12][b][e], state_of(material));
-        worst->memory = worse(worst->memory, fabs(c->memory[13][b][e] - memory->share[e]));
+        assert_int_equal((int)c->memory[STATE][b][e], state_of(material));
+        worst->memory = worse(worst->memory, fabs(c->memory[SHARE][b][e] - memory->share[e]));
     }
     if (kit->ground->uneven[b] && (material >= 0 || material == MATERIAL_FREE)) {
-        const double x = c->memory[10][b][e], y = c->memory[11][b][e];
-        const double plane =
-            c->memory[9][b][e] - x * c->own[0][b] - y * c->own[1][b] + c->own[2][b] - c->own[3][b];
+        const double x = c->memory[SLOPE_X][b][e], y = c->memory[SLOPE_Y][b][e];
+        const double plane = c->memory[PLANE][b][e] - x * c->own[0][b] - y * c->own[1][b] +
+                             c->own[2][b] - c->own[3][b];
         const double found[3] = {plane, x, y};
         const double wanted[3] = {memory->plane[e], memory->slope_x[e], memory->slope_y[e]};
         worst->memory = worse(worst->memory, apart(found, wanted, 3, 0.1));
@@ -285,6 +293,9 @@ static const Place places[] = {
      MILD_PATTERN_CHECKER},
     {"waves, bekker too", MILD_MODEL_MILD, MILD_MODEL_BEKKER, 1, MILD_MAP_WAVES,
      MILD_PATTERN_CHECKER},
+    {"level, mild_merged", MILD_MODEL_MILD_MERGED, 0, 0, 0, 0},
+    {"rough, mild_merged too", MILD_MODEL_MILD, MILD_MODEL_MILD_MERGED, 1, MILD_MAP_ROUGH,
+     MILD_PATTERN_CHECKER},
 };
 enum { PLACES = sizeof places / sizeof *places };
 
@@ -292,6 +303,13 @@ static MildMaterial draw_material(int model, uint64_t *random) {
     MildMaterial m = kit_material(random), rival = m;
     m.passive = 1;
     if (model == MILD_MODEL_MILD) {
+        return m;
+    }
+    if (model == MILD_MODEL_MILD_MERGED) { /* where slip costs support */
+        m.model = MILD_MODEL_MILD_MERGED;
+        m.slip_length = kit_uniform(random, 1e-3, 5e-3);
+        m.regain_length = kit_uniform(random, 2e-3, 2e-2);
+        m.grip = kit_index(random, 2) ? kit_uniform(random, 0.05, 0.5) : 0.0;
         return m;
     }
     const MildMaterial sand = mild_material_default();

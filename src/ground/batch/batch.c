@@ -1,6 +1,7 @@
 #include "ground/batch/batch.h"
 #include "device/device.h"
 #include "ground/batch/contact_shapes.h"
+#include "ground/inside.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -93,22 +94,31 @@ static void shape_def(MildBatch *batch, const MildBatchDef *def) {
     }
 }
 
-static MildStatus store_centers(MildBatch *batch, const MildSole *const *soles, MildError *error) {
+static size_t element_bytes(const BatchShape *shape) {
+    return 4 * (size_t)shape->feet * (size_t)shape->stride * sizeof(float);
+}
+
+static MildStatus store_elements(MildBatch *batch, const MildSole *const *soles, MildError *error) {
     const BatchShape *shape = &batch->shape;
     const size_t feet = (size_t)shape->feet, stride = (size_t)shape->stride;
-    const size_t bytes = 2 * feet * stride * sizeof(float);
-    float *centers = calloc(1, bytes);
-    if (!centers) {
+    float *elements = calloc(1, element_bytes(shape));
+    if (!elements) {
         return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
     }
     for (size_t f = 0; f < feet; f++) {
-        for (int i = 0; i < shape->elements[f]; i++) {
-            centers[f * stride + (size_t)i] = (float)mild_sole_x(soles[f])[i];
-            centers[(feet + f) * stride + (size_t)i] = (float)mild_sole_y(soles[f])[i];
+        float *own = elements + f * stride;
+        for (size_t i = 0; i < stride; i++) {
+            const int in = (int)i < shape->elements[f];
+            const SoleHeap heap = in ? mild_inside_heap(soles[f], (int)i) : (SoleHeap){0.0, 1.0};
+            own[i] = in ? (float)mild_sole_x(soles[f])[i] : 0.0f;
+            own[feet * stride + i] = in ? (float)mild_sole_y(soles[f])[i] : 0.0f;
+            own[2 * feet * stride + i] = (float)heap.begin;
+            own[3 * feet * stride + i] = (float)heap.width;
         }
     }
-    MildStatus status = device_copy(batch->device, batch->arrays.centers, centers, bytes, error);
-    free(centers);
+    MildStatus status =
+        device_copy(batch->device, batch->arrays.elements, elements, element_bytes(shape), error);
+    free(elements);
     return status;
 }
 
@@ -119,18 +129,17 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
     }
     const BatchShape *shape = &batch->shape;
     BatchArrays *arrays = &batch->arrays;
-    const size_t feet = (size_t)shape->feet, robots = (size_t)shape->robots;
+    const size_t robots = (size_t)shape->robots;
     arrays->map.labels = 1;
-    arrays->centers =
-        device_alloc(batch->device, 2 * feet * (size_t)shape->stride * sizeof(float), error);
-    arrays->memory = arrays->centers
+    arrays->elements = device_alloc(batch->device, element_bytes(shape), error);
+    arrays->memory = arrays->elements
                          ? device_alloc(batch->device,
                                         robots * batch_memory_numbers(shape) * sizeof(float), error)
                          : NULL;
     if (!arrays->memory) {
         return MILD_ERROR_MEMORY;
     }
-    status = store_centers(batch, def->soles, error);
+    status = store_elements(batch, def->soles, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -159,7 +168,7 @@ void mild_batch_destroy(MildBatch *batch) {
     if (!batch) {
         return;
     }
-    device_free(batch->device, batch->arrays.centers);
+    device_free(batch->device, batch->arrays.elements);
     device_free(batch->device, batch->arrays.materials);
     device_free(batch->device, batch->arrays.memory);
     batch_map_close(&batch->arrays.map, batch->device);

@@ -25,7 +25,7 @@ typedef struct {
 
 /* Where a batch keeps what; on its device. */
 typedef struct {
-    float *centers;             /* [2][feet][stride] [m] x and y of the elements */
+    float *elements;            /* [4][feet][stride] x and y [m], begin and width of SoleHeap [-] */
     MaterialNumbers *materials; /* [materials + 1][feet] */
     float *memory;              /* [robots] of contact.h */
     MapView map;                /* all 0 without a map */

@@ -22,15 +22,17 @@
 
 /* The elements of a body. */
 typedef struct {
-    const Real *x;    /* [elements] [m] centre in the body's frame */
-    const Real *y;    /* [m] */
-    const Real *face; /* a sole: NULL; a surface: [5][elements] z [m], outward normal, area over
+    const Real *x;     /* [elements] [m] centre in the body's frame */
+    const Real *y;     /* [m] */
+    const Real *begin; /* [-] a sole: of SoleHeap; a surface: NULL */
+    const Real *width; /* [-] */
+    const Real *face;  /* a sole: NULL; a surface: [5][elements] z [m], outward normal, area over
                          `square` */
-    Real z;           /* [m] of a sole's plane */
-    Real square;      /* [m^2] area of an element in the law */
-    Real middle[3];   /* [m] of the bounding box, body's frame */
-    Real half[3];     /* [m] */
-    Real radius;      /* [m] of the body's origin to the farthest element */
+    Real z;            /* [m] of a sole's plane */
+    Real square;       /* [m^2] area of an element in the law */
+    Real middle[3];    /* [m] of the bounding box, body's frame */
+    Real half[3];      /* [m] */
+    Real radius;       /* [m] of the body's origin to the farthest element */
     int elements;
     const ContactMaterial *table; /* material m at [m step] */
     int step;
@@ -138,7 +140,8 @@ typedef struct {
     int faces_down; /* bool: of a surface; 1 for a sole */
     int listed;     /* bool: may touch in this step */
     ElementMemory before;
-    Element element;
+    Element element; /* with its share of the load */
+    Share carried;   /* that share, on ground with LAW_HEAP */
     int curves;
 } BodiesElement;
 
@@ -256,7 +259,8 @@ MILD_HD ElementMemory bodies_recall(const BodiesMemory *memory, int s) {
     return before;
 }
 
-MILD_HD void bodies_record(const BodiesMemory *memory, int s, const ElementMemory *after) {
+MILD_HD void bodies_record(const BodiesMemory *memory, int s, const ElementMemory *after,
+                           Real worn) {
     Real *at = memory->element + s;
     const int next = memory->next;
     at[0] = after->depth_max;
@@ -268,6 +272,7 @@ MILD_HD void bodies_record(const BodiesMemory *memory, int s, const ElementMemor
     at[6 * next] = after->held_x;
     at[7 * next] = after->held_y;
     at[8 * next] = after->held_stiffness;
+    at[CONTACT_WORN * next] = worn;
 }
 
 /* State of element s of a body; of a sole, whose elements keep no state, from what it remembers. */
@@ -346,6 +351,30 @@ MILD_HD void bodies_share(const BodiesSetup *setup, const BodiesWork *work, int 
     bodies_scale(e, directed && own->share > 0 ? whole : own->share);
 }
 
+/* The merged cone of element s, on ground with LAW_HEAP. A surface's is a disc by itself. */
+MILD_HD void bodies_merge(const BodiesSole *sole, int s, const ContactMaterial *material,
+                          Element *e) {
+    if (!sole->face && material->projects > 0) {
+        e->law = law_merged(e->law, sole->begin[s], sole->width[s]);
+    }
+}
+
+/* Its share of the load, there too. */
+MILD_HD void bodies_carry(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
+                          const ContactMaterial *material, BodiesElement *own) {
+    const BodiesSole *sole = &setup->sole[work->body[i]];
+    const BodiesMemory *memory = &work->memory[i];
+    const Real *R = work->rotation[i];
+    const Real normal[3] = {R[2], R[5], R[8]};
+    const Real lean = contact_lean(normal, own->slope[0], own->slope[1]);
+    const Real worn = memory->element[CONTACT_WORN * memory->next + s];
+    const Real elastic = law_elastic_force(&own->element.law, own->curves, own->element.middle);
+    own->carried = contact_share(material, sole->face ? 0 : material->projects, worn);
+    element_share(&own->element, &own->before, &own->carried, elastic, setup->dt, 1 / setup->dt,
+                  lean);
+    element_carry(&own->element, own->carried.carry);
+}
+
 /* contact_direct for a plate of its own. */
 MILD_HD void bodies_direct(const BodiesSole *sole, const Real *R, int s,
                            const ContactMaterial *material, const ContactVelocity *now, Real dt,
@@ -390,13 +419,20 @@ MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int 
     }
     e->depth = own->depth;
     e->stop_drag = e->stop_growth = e->explicit_impulse = e->turn_x = e->turn_y = 0;
+    if (own->curves & LAW_HEAP) {
+        bodies_merge(sole, s, material, e);
+    }
     element_begin(e, &own->before, own->curves, dt, 1 / dt, now.descent);
+    if (own->curves & LAW_HEAP) {
+        bodies_carry(setup, work, i, s, material, own);
+    }
     if (own->curves & LAW_CONE) {
+        const int cone = own->curves & (LAW_CONE | LAW_HEAP);
         const int created = e->law.mass_rate < 0 || e->law.drag_rate < 0;
         if (created && own->depth > 0 && e->middle >= own->before.depth_max) {
-            e->explicit_impulse = element_explicit(e, dt, free);
+            e->explicit_impulse = element_explicit_of(e, cone, dt, free);
         }
-        element_drag(e, LAW_CONE, dt, real_max(free - now.descent, 0));
+        element_drag(e, cone, dt, real_max(free - now.descent, 0));
     }
     bodies_direct(sole, work->rotation[i], s, material, &now, dt, own);
 }
@@ -458,7 +494,7 @@ MILD_HD void bodies_chart(const BodiesMemory *memory, int s, const BodiesElement
  * comes out; so is one that carries nothing. */
 MILD_HD void bodies_forget(const BodiesMemory *memory, int s, int buried) {
     const ElementMemory none = {0, 0, 0, 0, 0, 0, 0, 0, 0};
-    bodies_record(memory, s, &none);
+    bodies_record(memory, s, &none, 0);
     memory->element[BODIES_STATE * memory->next + s] = buried ? BODIES_BURIED : BODIES_NONE;
     memory->element[BODIES_SHARE * memory->next + s] = 0;
 }
@@ -487,13 +523,18 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
     const Real normal = element_impulse(e, own.curves, 1, dt, v.descent).value;
     ElementMemory after =
         element_remember(e, &own.before, dt, 1 / dt, normal, v.x, v.y, v.descent, stays);
+    Real worn = 0;
+    if (own.curves & LAW_HEAP) {
+        worn = element_wear(e, &own.carried, &own.before, &after, dt, normal, v.x, v.y, v.descent,
+                            stays);
+    }
     if (stays) {
         const Real peak = element_peak(e, own.curves, normal, v.descent, middle);
         after.depth_max = real_max(after.depth_max, e->virgin_depth + peak - e->yield_depth);
     }
     if (advance) {
         Real *state = memory->element + BODIES_STATE * memory->next + s;
-        bodies_record(memory, s, &after);
+        bodies_record(memory, s, &after, worn);
         if (sole->face) {
             *state = (Real)(stays ? 1 + own.label : uneven ? BODIES_FREE : BODIES_NONE);
             state[memory->next] = stays ? own.share : 0;

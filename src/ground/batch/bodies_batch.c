@@ -53,8 +53,10 @@ static void set_sole(BodiesSole *to, const MildSole *sole) {
 static void set_foot(BodiesSole *to, const MildBatch *batch, const MildSole *sole, int f) {
     const BatchShape *shape = &batch->shape;
     set_sole(to, sole);
-    to->x = batch->arrays.centers + f * shape->stride;
-    to->y = batch->arrays.centers + (shape->feet + f) * shape->stride;
+    to->x = batch->arrays.elements + f * shape->stride;
+    to->y = batch->arrays.elements + (shape->feet + f) * shape->stride;
+    to->begin = batch->arrays.elements + (2 * shape->feet + f) * shape->stride;
+    to->width = batch->arrays.elements + (3 * shape->feet + f) * shape->stride;
     to->table = (const ContactMaterial *)(const void *)(batch->arrays.materials + f);
     to->step = shape->feet;
 }

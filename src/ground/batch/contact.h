@@ -11,7 +11,7 @@
 #include "ground/map_view.h"
 #include "ground/motion.h"
 #include "ground/plate.h"
-#include "ground/remember.h"
+#include "ground/share.h"
 #include "ground/shear.h"
 
 #define CONTACT_FEET_MAX 4
@@ -29,15 +29,21 @@ typedef struct {
     Real entry_drag;   /* [kg/m] */
     Real cohesion;     /* [N/m^2] as in Shear */
     Real shear_length; /* [m] */
+    Real projects;     /* [-] as in Share; the next three too */
+    Real slip_rate;    /* [1/m] */
+    Real regain_rate;  /* [1/m] */
+    Real grip;         /* [-] */
     int curves;        /* LawCurve and LawMotion bits of the law */
 } ContactMaterial;
 
 /* One foot's sole. */
 typedef struct {
-    const Real *x; /* [stride] [m] element centres in the foot frame; beyond `elements` 0 */
-    const Real *y; /* [stride] [m] */
-    Real z;        /* [m] sole plane in the foot frame */
-    Real area;     /* [m^2] of an element */
+    const Real *x;     /* [stride] [m] element centres in the foot frame; beyond `elements` 0 */
+    const Real *y;     /* [stride] [m] */
+    const Real *begin; /* [stride] [-] of SoleHeap; read on ground with LAW_HEAP */
+    const Real *width; /* [stride] [-] beyond `elements` 1 */
+    Real z;            /* [m] sole plane in the foot frame */
+    Real area;         /* [m^2] of an element */
     int elements;
 } ContactSole;
 
@@ -70,8 +76,8 @@ typedef struct {
     const Real *map_origin; /* [2] [m] world; NULL: 0 */
 } ContactProblem;
 
-/* Memory of a robot: CONTACT_MEMORY numbers of each element, in the order of ElementMemory, as
- * [number][foot][stride].
+/* Memory of a robot: CONTACT_MEMORY numbers of each element, in the order of ElementMemory, then
+ * its wear (share.h), as [number][foot][stride].
  *
  * With a map four more of each follow: number `plane` [m] and the gradient [-] along x and y of the
  * plane that the last step had for the ground, and the label that a loaded element touched down on.
@@ -79,7 +85,8 @@ typedef struct {
  * gradient . (r_x, r_y) - r_z. Then [5][foot] follow: x, y and z of that point and the height of
  * the ground [m], and whether there was a step, 1 or 0. */
 enum {
-    CONTACT_MEMORY = sizeof(ElementMemory) / sizeof(Real),
+    CONTACT_WORN = sizeof(ElementMemory) / sizeof(Real),
+    CONTACT_MEMORY,
     CONTACT_MAP_MEMORY = CONTACT_MEMORY + 4,
     CONTACT_FOOT_MEMORY = LANES /* numbers that [5][foot] have room in */
 };
@@ -107,6 +114,22 @@ MILD_HD void contact_stand_on(const ContactMaterial *material, Element *e) {
     e->b_drift = material->b_drift;
     e->exit_drag = material->exit_drag;
     e->entry_drag = material->entry_drag;
+}
+
+/* [-] Cosine between a sole and the ground, at least SHARE_LEAN; slots_lean. normal: of the sole,
+ * world. x, y: gradient of the ground. */
+MILD_HD Real contact_lean(const Real normal[3], Real x, Real y) {
+    const Real side = normal[2] < 0 ? -1 : 1; /* the face that looks down */
+    const Real along = side * (normal[2] - x * normal[0] - y * normal[1]);
+    return real_min(real_max(along / REAL_SQRT(1 + x * x + y * y), SHARE_LEAN), 1);
+}
+
+/* The share of an element before the step. projects: [-] as in Share; 0 for a surface. */
+MILD_HD Share contact_share(const ContactMaterial *material, Real projects, Real worn) {
+    const Share share = {
+        projects, material->slip_rate, material->regain_rate, material->grip, material->mu, worn, 1,
+        1};
+    return share;
 }
 
 /* Adapts an element to its motion at the start of the step, after element_begin. rotation: [9] of

@@ -3,7 +3,8 @@
 #include "ground/batch/contact.h"
 #include "ground/batch/contact_shapes.h"
 
-#define CONTACT_CURVES LAW_ALL
+#define CONTACT_CURVES LAW_ANY
+#define CONTACT_HEAP 1
 #define CONTACT_POINTS 0
 #define CONTACT(name) contact_##name##_feet
 #include "ground/batch/contact.inc"
@@ -12,4 +13,5 @@
 #define CONTACT(name) contact_##name##_points
 #include "ground/batch/contact.inc"
 #undef CONTACT_POINTS
+#undef CONTACT_HEAP
 #undef CONTACT_CURVES

@@ -1,7 +1,7 @@
 /* The contact step of a batch on a GPU: a warp a robot. cmake/Batch.cmake makes a unit of each
  * size. Before the inclusion: KERNEL, the name of what it gives; KERNEL_GROUPS, KERNEL_PER,
- * KERNEL_POINTS and KERNEL_CURVES, what they are for (contact.inc); KERNEL_BLOCKS of a
- * multiprocessor. */
+ * KERNEL_POINTS, KERNEL_CURVES and KERNEL_HEAP, what they are for (contact.inc); KERNEL_BLOCKS of
+ * a multiprocessor. */
 #define MILD_REAL_FLOAT
 
 extern "C" {
@@ -12,6 +12,7 @@ extern "C" {
 #include "ground/batch/contact.h"
 
 #define CONTACT_CURVES KERNEL_CURVES
+#define CONTACT_HEAP KERNEL_HEAP
 #define CONTACT_POINTS KERNEL_POINTS
 #define CONTACT_MAP 0
 #define CONTACT_FEET KERNEL_GROUPS
@@ -67,5 +68,8 @@ static MildStatus step(const MildBatch *batch, const MildBatchInput *input,
 extern "C" {
 extern const BatchKernel KERNEL;
 const BatchKernel KERNEL = {KERNEL_GROUPS, KERNEL_PER, KERNEL_POINTS,
-                            KERNEL_CURVES == LAW_ALL ? ~0 : KERNEL_CURVES, step};
+                            KERNEL_CURVES == LAW_ANY   ? ~0
+                            : KERNEL_CURVES == LAW_ALL ? ~LAW_HEAP
+                                                       : KERNEL_CURVES,
+                            step};
 }

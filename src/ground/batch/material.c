@@ -5,7 +5,7 @@
 
 #define MATERIAL_LAW_INDEX(name) MATERIAL_LAW_##name,
 enum { LAW_NUMBERS(MATERIAL_LAW_INDEX) MATERIAL_LAW_COUNT };
-_Static_assert(MATERIAL_LAW_COUNT == MATERIAL_LAW_NUMBERS, "all numbers");
+_Static_assert(MATERIAL_LAW_COUNT + 1 == MATERIAL_LAW_NUMBERS, "all numbers");
 
 MildStatus material_numbers(const MildMaterial *material, double pitch, double width, int index,
                             MaterialNumbers *numbers, MildError *error) {
@@ -14,25 +14,23 @@ MildStatus material_numbers(const MildMaterial *material, double pitch, double w
         return mild_fail(error, MILD_ERROR_RANGE, "batch: material %d: %s", index, cause.text);
     }
     const InsideLaw inside = mild_inside_law(material, pitch, width);
-    if (inside.curves & LAW_HEAP) {
-        const int merged = material->model == MILD_MODEL_MILD_MERGED;
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "batch: material %d: %s, which batches do not have yet: choose %s", index,
-                         merged ? "ground.model = mild_merged" : "ground.slip_length is above 0",
-                         merged ? "mild" : "slip_length = 0");
-    }
     const Law law = inside.law;
     int n = 0;
 #define MATERIAL_LAW_STORE(name) numbers->law[n++] = (float)law.name;
     LAW_NUMBERS(MATERIAL_LAW_STORE)
+    numbers->law[n] = (float)law.cone_begin; /* 0: the place of an element in its sole says more */
     numbers->recovery = (float)inside.recovery;
     numbers->mu = (float)material->mu;
-    numbers->k_drift = (float)material->k_drift;
-    numbers->b_drift = (float)material->b_drift;
+    numbers->k_drift = (float)inside.k_drift;
+    numbers->b_drift = (float)inside.b_drift;
     numbers->exit_drag = (float)law_exit_drag(&law);
     numbers->entry_drag = (float)law_entry_drag(&law);
     numbers->cohesion = (float)material->cohesion;
     numbers->shear_length = (float)material->shear_length;
+    numbers->projects = (float)inside.share.projects;
+    numbers->slip_rate = (float)inside.share.slip_rate;
+    numbers->regain_rate = (float)inside.share.regain_rate;
+    numbers->grip = (float)inside.share.grip;
     numbers->curves = inside.curves;
     return MILD_OK;
 }

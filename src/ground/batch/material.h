@@ -5,12 +5,13 @@
 
 #include "mild/ground.h"
 
-#define MATERIAL_LAW_NUMBERS 13
+#define MATERIAL_LAW_NUMBERS 14
 
 typedef struct {
-    float law[MATERIAL_LAW_NUMBERS];                             /* in the order of LAW_NUMBERS */
+    float law[MATERIAL_LAW_NUMBERS];                             /* in the order of Law */
     float recovery, mu, k_drift, b_drift, exit_drag, entry_drag; /* as in ContactMaterial */
     float cohesion, shear_length;
+    float projects, slip_rate, regain_rate, grip;
     int curves;
 } MaterialNumbers;
 

@@ -14,11 +14,11 @@ size_t batch_memory_numbers(const BatchShape *shape) {
     return (size_t)contact_memory_numbers(shape->groups * shape->stride, shape->map);
 }
 
-/* The arrays of a foot's memory in the order of ElementMemory. */
+/* The arrays of a foot's memory in the order of contact.h. */
 #define MEMORY_ARRAYS(of)                                                                          \
     {                                                                                              \
         (of).depth_max, (of).middle, (of).front_speed, (of).drift, (of).pending_x, (of).pending_y, \
-            (of).held_x, (of).held_y, (of).held_stiffness                                          \
+            (of).held_x, (of).held_y, (of).held_stiffness, (of).worn                               \
     }
 
 /* Number n of a foot's elements, or with a map of what follows them. */
