@@ -418,6 +418,44 @@ static void drift_and_energy(void **unused) {
     free(env);
 }
 
+/* Slip costs support on the share that was asked for of the grounds that stay dented, and moves no
+ * other draw. */
+static void slip_on_a_share(void **unused) {
+    (void)unused;
+    open_env();
+    clear_columns();
+    def.randomize.rigid_share = 0;
+    TaskDef slips = def;
+    const double length[2] = {0.002, 0.003}, grip[2] = {0.1, 0.15};
+    slips.randomize.slip_share = 0.4;
+    memcpy(slips.randomize.slip_length, length, sizeof length);
+    memcpy(slips.randomize.grip, grip, sizeof grip);
+    int dented = 0, slipping = 0, apart = 0;
+    for (int t = 0; t < DRAWS; t++) {
+        draw_next();
+        const MildMaterial plain = task_env_rest(env)->terrain.materials[0];
+        assert_true(plain.slip_length == 0 && plain.grip == 0);
+        task_env_draw(env, &slips, robot);
+        MildMaterial m = task_env_rest(env)->terrain.materials[0];
+        dented += m.recovery <= 0.2;
+        if (m.slip_length > 0) {
+            assert_true(m.recovery <= 0.2);
+            note("slip_length", -1, 0.002, 0.003, m.slip_length);
+            note("grip", -1, 0.1, 0.15, m.grip);
+            apart += fabs((m.slip_length - 0.002) / 0.001 - (m.grip - 0.1) / 0.05) > 0.01;
+            m.slip_length = plain.slip_length;
+            m.grip = plain.grip;
+            slipping++;
+        }
+        assert_memory_equal(&m, &plain, sizeof m);
+    }
+    expect_columns();
+    assert_true(dented > DRAWS / 5 && apart > 0.95 * slipping);
+    double share = (double)slipping / dented;
+    assert_true(fabs(share - 0.4) < 4 * sqrt(0.4 * 0.6 / dented));
+    free(env);
+}
+
 /* Whatever is drawn, one foot under the whole weight rests no deeper than 0.07 m; what rests higher
  * is left alone; what was stiffened rests at 0.07 m. k_pen and sigma_cone grow by one factor. */
 static void limit_of_sinkage(void **unused) {
@@ -719,6 +757,7 @@ int main(void) {
         cmocka_unit_test(latencies_are_independent),
         cmocka_unit_test(ranges_of_grounds),
         cmocka_unit_test(drift_and_energy),
+        cmocka_unit_test(slip_on_a_share),
         cmocka_unit_test(start),
         cmocka_unit_test(robot_and_sensors),
     };

@@ -10,6 +10,8 @@
 #define DRAW_TRIES 100 /* of a material that the model can match */
 #define RANDOM_USE_GROUNDS 0x47524e44u
 #define RANDOM_USE_DRIFT 0x44524654u
+#define RANDOM_USE_SLIP 0x534c4950u
+#define SLIP_RECOVERY 0.2 /* [-] ground that springs back by more has no grains that flow */
 
 /* A preset with each of its numbers changed a little. */
 static MildMaterial draw_preset(Random *r, const RandomizeDef *def) {
@@ -62,11 +64,26 @@ static MildMaterial draw_ranges(Random *r, const RandomizeDef *def, const Robot 
     return m;
 }
 
+/* Slip costs support on a share of the grounds that stay dented. start: the draw before any of the
+ * material's own, which this moves none of. */
+static void draw_slip(const Random *start, const RandomizeDef *def, MildMaterial *m) {
+    Random r = *start;
+    r.seed ^= RANDOM_USE_SLIP;
+    int slips = random_unit(&r) < def->slip_share;
+    double length = task_draw(&r, def->slip_length);
+    double grip = task_draw(&r, def->grip);
+    if (slips && m->recovery <= SLIP_RECOVERY) {
+        m->slip_length = length;
+        m->grip = grip;
+    }
+}
+
 /* Draws a material for the model. If its match would be out of range (mild_model_match), another
  * one is drawn. */
 static MildMaterial draw_new(Random *r, const RandomizeDef *def, const Robot *robot) {
     double preset = def->rigid_share < 1 ? def->preset_share / (1 - def->rigid_share) : 0;
     MildMaterial m, rival;
+    const Random start = *r;
     for (int tries = 0; tries < DRAW_TRIES; tries++) {
         m = random_unit(r) < preset ? draw_preset(r, def) : draw_ranges(r, def, robot);
         m.passive = def->passive;
@@ -74,6 +91,7 @@ static MildMaterial draw_new(Random *r, const RandomizeDef *def, const Robot *ro
             return m; /* the engine's contact does not use it */
         }
         if (robot_match_model(robot, (MildModel)def->model, &m, &rival, NULL) == MILD_OK) {
+            draw_slip(&start, def, &rival);
             return rival;
         }
     }

@@ -74,6 +74,8 @@ TaskDef task_def_default(void) {
                       .b_drift = {0.10, 0.10},
                       .recovery = {0, 1},
                       .bed_depth = {0.10, 0.15},
+                      .slip_length = {0.001, 0.005},
+                      .grip = {0.05, 0.2},
                       .passive = 1,
                       .sinkage_max = 0.07,
                       .base_mass = {-4, 4},
@@ -258,6 +260,11 @@ const MildField randomize_fields[] = {
     Z(b_drift, 2, 0, 1e3, "[N s/m] drift damping b_D of an element, low and high"),
     Z(recovery, 2, 0, 1, "[-] share of the depth that springs back, low and high"),
     Z(bed_depth, 2, 0.001, 10, "[m] depth of the firm bed below the surface, low and high"),
+    Z(slip_share, 1, 0, 1,
+      "[-] share of the grounds that stay dented, recovery up to 0.2, on which slip costs support "
+      "(models mild and mild_merged)"),
+    Z(slip_length, 2, 1e-4, 1, "[m] of those: path over which slip halves it, low and high"),
+    Z(grip, 2, 0, 1, "[-] of those: greatest friction by the virgin load, low and high"),
     MILD_FIELD(RandomizeDef, passive, B, 1, 0, 1,
                "[bool] c_g below 0 acts as 0 and c_d below 1/2 as 1/2, so that no ground creates "
                "energy; false: as drawn (paper)"),

@@ -97,7 +97,10 @@ typedef struct {
     double patch_length[2]; /* [m] */
     double k_pen[2], sigma_cone[2], alpha[2], nu[2], c_g[2], c_d[2], phi[2], mu[2], rho[2],
         k_drift[2], b_drift[2], recovery[2], bed_depth[2];
-    int passive;        /* bool: of the materials, see MildMaterial */
+    double slip_share;     /* [-] soft grounds that stay dented, on which slip costs support */
+    double slip_length[2]; /* [m] there */
+    double grip[2];        /* [-] there */
+    int passive;           /* bool: of the materials, see MildMaterial */
     double sinkage_max; /* [m] a draw whose one-foot static sinkage is deeper is made stiffer until
                            it fits */
     /* robot */
