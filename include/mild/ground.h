@@ -345,11 +345,15 @@ void mild_resist_space(const double normal[3], const double direction[3], double
 
 /* ---- one contact step (docs/model.md sections 6, 7) ---- */
 
-/* Both solvers give the same answer. */
+/* The first two solve the same implicit equations and give the same answer. The third is for
+ * comparison: it creates energy, and is stable with small steps or soft ground alone. */
 typedef enum {
-    MILD_SOLVER_NEWTON = 0,      /* Newton's method on the twists of the feet: the fast one */
-    MILD_SOLVER_GAUSS_SEIDEL = 1 /* the paper's sweeps over the elements (Algorithm 1) */
+    MILD_SOLVER_NEWTON = 0,       /* Newton's method on the twists of the feet: the fast one */
+    MILD_SOLVER_GAUSS_SEIDEL = 1, /* the paper's sweeps over the elements (Algorithm 1) */
+    MILD_SOLVER_EXPLICIT = 2      /* Algorithm 1 to the letter: forces of the state before the step */
 } MildSolver;
+#define MILD_SOLVERS 3
+extern const char *const mild_solver_names[MILD_SOLVERS];
 
 /* What the engine knows before the step. A foot is any body with a sole. */
 typedef struct {

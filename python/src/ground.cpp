@@ -36,10 +36,13 @@ MildGround *block_of(nb::handle ground) {
 /* ---- creation ---- */
 
 static void set_solver(Ground &ground, const std::string &solver) {
-    if (solver != "newton" && solver != "gauss_seidel") {
-        raise(PyExc_ValueError, "solver: '" + solver + "' is neither newton nor gauss_seidel");
+    for (int i = 0; i < MILD_SOLVERS; i++) {
+        if (solver == mild_solver_names[i]) {
+            ground.input.solver = static_cast<MildSolver>(i);
+            return;
+        }
     }
-    ground.input.solver = solver == "newton" ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL;
+    raise(PyExc_ValueError, "solver: '" + solver + "' is none of newton, gauss_seidel, explicit");
 }
 
 static void make(Ground *at, const nb::sequence &soles, nb::handle terrain, double dt, int tiles,
@@ -144,7 +147,7 @@ static size_t inertia_bytes(const Ground &ground) {
 static nb::tuple keep(Ground &ground) {
     const MildContactInput &input = ground.input;
     return nb::make_tuple(ground.soles, ground.terrain, input.dt, ground.tiles,
-                          input.solver == MILD_SOLVER_NEWTON ? "newton" : "gauss_seidel",
+                          mild_solver_names[input.solver],
                           input.tolerance, input.max_iterations, get_state(ground),
                           nb::bytes(&input, sizeof input),
                           nb::bytes(input.inverse_inertia, inertia_bytes(ground)));

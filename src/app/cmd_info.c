@@ -194,9 +194,10 @@ static int info_models(void) {
         printf("\n");
     }
     printf(
-        "\ncontact solvers of the soft models (--task.newton)\n"
+        "\ncontact solvers of the soft models (--task.solver)\n"
         "  newton        solves the step as one small convex problem (default)\n"
-        "  gauss_seidel  sweeps over the elements as in the paper; same answer, for comparison\n");
+        "  gauss_seidel  sweeps over the elements as in the paper; same answer, for comparison\n"
+        "  explicit      the paper's Algorithm 1 to the letter; creates energy, for comparison\n");
     return 0;
 }
 

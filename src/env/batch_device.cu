@@ -245,11 +245,16 @@ static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int
     return launched();
 }
 
-static const char *kernels_shells(const EnvsArrays *all, int k, void *stream) {
+static const char *kernels_find(const EnvsArrays *all, int k, void *stream) {
     OnDevice on(all->device);
-    const int looked = (all->envs + FIND_WARPS - 1) / FIND_WARPS;
+    const int blocks = (all->envs + FIND_WARPS - 1) / FIND_WARPS;
+    find<<<blocks, LANES * FIND_WARPS, 0, (cudaStream_t)stream>>>(*all, k);
+    return launched();
+}
+
+static const char *kernels_shells(const EnvsArrays *all, void *stream) {
+    OnDevice on(all->device);
     const int steps = all->envs < SHELLS_ROBOTS ? all->envs : SHELLS_ROBOTS;
-    find<<<looked, LANES * FIND_WARPS, 0, (cudaStream_t)stream>>>(*all, k);
     shells<<<steps, LANES * SHELLS_WARPS, sizeof(EnvShellsWork), (cudaStream_t)stream>>>(*all);
     return launched();
 }
@@ -289,7 +294,7 @@ static const char *kernels_tally(const EnvsArrays *all, void *stream) {
 extern "C" {
 extern const EnvsKernels ENVS_KERNELS;
 const EnvsKernels ENVS_KERNELS = {
-    ENGINE_FIXED,          kernels_fits,        kernels_open, kernels_bytes,  kernels_create,
-    kernels_begin,         kernels_first,       kernels_part, kernels_shells, kernels_end,
-    kernels_move_progress, kernels_set_command, kernels_tally};
+    ENGINE_FIXED,  kernels_fits,          kernels_open,        kernels_bytes, kernels_create,
+    kernels_begin, kernels_first,         kernels_part,        kernels_find,  kernels_shells,
+    kernels_end,   kernels_move_progress, kernels_set_command, kernels_tally};
 }

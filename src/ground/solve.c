@@ -8,6 +8,8 @@
 #include "ground/prepare.h"
 #include "ground/solver.h"
 
+const char *const mild_solver_names[MILD_SOLVERS] = {"newton", "gauss_seidel", "explicit"};
+
 /* Copies the slots back to the elements: forces in N, and what each element did in the step. */
 static void foot_scatter(const MildScratch *scratch, int f) {
     const FootScratch *foot = &scratch->foot[f];
@@ -187,10 +189,10 @@ static void step_twists(const MildScratch *scratch, const MildContactInput *inpu
 
 static void step_solve(MildScratch *scratch, const MildContactInput *input,
                        MildContactResult *result) {
-    if (input->solver == MILD_SOLVER_GAUSS_SEIDEL) {
-        sweep_solve(scratch, input, result);
-    } else {
+    if (input->solver == MILD_SOLVER_NEWTON) {
         newton_solve(scratch, input, result);
+    } else {
+        sweep_solve(scratch, input, result);
     }
     step_twists(scratch, input, result);
 }
@@ -214,8 +216,9 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
         energy_begin(scratch);
         step_solve(scratch, input, result);
         int iterations = result->iterations;
-        for (int round = 1; round <= ENERGY_ROUNDS; round++) {
-            if (!energy_created(scratch, input, result, round == ENERGY_ROUNDS)) {
+        const int rounds = input->solver == MILD_SOLVER_EXPLICIT ? 0 : ENERGY_ROUNDS;
+        for (int round = 1; round <= rounds; round++) {
+            if (!energy_created(scratch, input, result, round == rounds)) {
                 break;
             }
             step_solve(scratch, input, result);

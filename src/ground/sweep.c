@@ -22,6 +22,7 @@ typedef struct {
     double dt;               /* [s] */
     const int *place;        /* of each foot among these */
     const double *A;         /* [n][n] inverse inertia */
+    int literal;             /* bool: MILD_SOLVER_EXPLICIT */
     double twist[TWIST_MAX]; /* [n] [m/s, rad/s] V^ + A W for the present impulses */
     /* Elements that this sweep has visited, foot by foot: */
     int preceding[MILD_FEET_MAX];    /* number of them */
@@ -96,6 +97,79 @@ static void element_friction(const Slots *s, int i, const double *v, const doubl
     s->fy[i] = y * scale;
 }
 
+/* Eqs 3 to 5: dt F_GM [N s] of the depth and the downward speed w before the step, on the way up
+ * too. */
+static double slot_literal(const Slots *s, int i, int curves, double dt, double w) {
+    const Element element = slot_loaded(s, i, curves);
+    const double u = element.depth;
+    double force = law_force(&element.law, curves, u) + law_elastic_force(&element.law, curves, u);
+    if (curves & LAW_CONE) {
+        force += element.law.drag_rate * law_flat_share(&element.law, curves, u) * w * w;
+    }
+    return u > 0.0 ? dt * fmax(force, 0.0) : 0.0;
+}
+
+/* Eq 13 as element_friction, of a cone without anything else. */
+static void element_literal(const Slots *s, int i, const double *v, const double *delta, double G) {
+    const double beta = 0.5 / G; /* [kg] */
+    const double gamma = 0.1 * beta;
+    const double x = s->fx[i] - gamma * delta[0] - beta * v[0];
+    const double y = s->fy[i] - gamma * delta[1] - beta * v[1];
+    const double radius = s->mu[i] * s->iz[i];
+    const double length = sqrt(x * x + y * y);
+    const double scale = length > radius ? radius / length : 1.0;
+    s->fx[i] = x * scale;
+    s->fy[i] = y * scale;
+    s->ix[i] = s->fx[i] - s->slope_x[i] * s->iz[i];
+    s->iy[i] = s->fy[i] - s->slope_y[i] * s->iz[i];
+}
+
+/* Eq 14: drift resistance against the velocity before the step. */
+static void sweep_drift(const MildScratch *scratch, const MildContactInput *input) {
+    for (int k = 0; k < scratch->listed; k++) {
+        const int f = scratch->list[k];
+        const FootScratch *foot = &scratch->foot[f];
+        const Slots *s = &foot->slot;
+        const Motion motion = foot_motion(foot, input->velocity[f]);
+        for (int i = 0; i < foot->active; i++) {
+            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
+            const double speed = sqrt(v.x * v.x + v.y * v.y);
+            const double drag = s->drift_bound[i] + s->damping[i] * speed;
+            s->ix[i] -= speed > 0.0 ? drag * v.x / speed : 0.0;
+            s->iy[i] -= speed > 0.0 ? drag * v.y / speed : 0.0;
+        }
+    }
+}
+
+/* Normal impulse, friction and drift damping of one element at its velocities v and w. */
+static void element_implicit(const Sweep *sweep, const FootScratch *foot, int i, const double *v,
+                             double w, const double *delta, const double *G, double G_xy) {
+    const Slots *s = &foot->slot;
+    const double old[3] = {s->ix[i], s->iy[i], s->iz[i]};
+    const double fx = s->fx[i];
+    const double fy = s->fy[i];
+    s->iz[i] = element_normal(s, i, foot->curves, sweep->dt, w, G[2]);
+    double d[2] = {v[0], v[1]}; /* what friction opposes */
+    if (foot->turned) {
+        const Element element = slot_element(s, i);
+        friction_turn(&element, &d[0], &d[1]);
+    }
+    element_friction(s, i, d, delta, G_xy);
+    /* Drift damping is implicit, like the normal impulse. */
+    double b = s->damping[i];
+    double relax = 1.0 / (1.0 + b * G_xy);
+
+    /* On a slope the normal impulse has a horizontal part, downhill. */
+    double nx = s->slope_x[i] * s->iz[i];
+    double ny = s->slope_y[i] * s->iz[i];
+
+    /* Damping part of the horizontal impulse before this sweep. */
+    double bx = old[0] + s->slope_x[i] * old[2] - fx;
+    double by = old[1] + s->slope_y[i] * old[2] - fy;
+    s->ix[i] = s->fx[i] + bx - relax * (b * d[0] + bx) - nx;
+    s->iy[i] = s->fy[i] + by - relax * (b * d[1] + by) - ny;
+}
+
 /* One iteration of the inner loop of Algorithm 1. The change of impulse moves the feet at once. */
 static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
     const Slots *s = &foot->slot;
@@ -118,29 +192,12 @@ static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
     sweep->preceding[f]++;
     element_inverse_mass(sweep, f, p, s->slope_x[i], s->slope_y[i], G);
     double G_xy = fmax(fmax(G[0], G[1]), SWEEP_LEAST_G);
-    double old[3] = {s->ix[i], s->iy[i], s->iz[i]};
-    double fx = s->fx[i];
-    double fy = s->fy[i];
-    s->iz[i] = element_normal(s, i, foot->curves, sweep->dt, w, G[2]);
-    double d[2] = {v[0], v[1]}; /* what friction opposes */
-    if (foot->turned) {
-        const Element element = slot_element(s, i);
-        friction_turn(&element, &d[0], &d[1]);
+    const double old[3] = {s->ix[i], s->iy[i], s->iz[i]};
+    if (sweep->literal) {
+        element_literal(s, i, v, delta, G_xy);
+    } else {
+        element_implicit(sweep, foot, i, v, w, delta, G, G_xy);
     }
-    element_friction(s, i, d, delta, G_xy);
-    /* Drift damping is implicit, like the normal impulse. */
-    double b = s->damping[i];
-    double relax = 1.0 / (1.0 + b * G_xy);
-
-    /* On a slope the normal impulse has a horizontal part, downhill. */
-    double nx = s->slope_x[i] * s->iz[i];
-    double ny = s->slope_y[i] * s->iz[i];
-
-    /* Damping part of the horizontal impulse before this sweep. */
-    double bx = old[0] + s->slope_x[i] * old[2] - fx;
-    double by = old[1] + s->slope_y[i] * old[2] - fy;
-    s->ix[i] = s->fx[i] + bx - relax * (b * d[0] + bx) - nx;
-    s->iy[i] = s->fy[i] + by - relax * (b * d[1] + by) - ny;
     const double change[3] = {s->ix[i] - old[0], s->iy[i] - old[1], s->iz[i] - old[2]};
     sweep->changed += fabs(change[0]) + fabs(change[1]) + fabs(change[2]);
     sweep->total += fabs(s->ix[i]) + fabs(s->iy[i]) + fabs(s->iz[i]);
@@ -165,7 +222,9 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
             const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
             slot_arm(foot, s, i, p);
             s->fx[i] = s->fy[i] = 0.0;
-            s->iz[i] = slot_impulse(s, i, foot->curves, input->dt, v.descent).value;
+            s->iz[i] = sweep->literal
+                           ? slot_literal(s, i, foot->curves, input->dt, v.descent)
+                           : slot_impulse(s, i, foot->curves, input->dt, v.descent).value;
             s->ix[i] = -s->slope_x[i] * s->iz[i];
             s->iy[i] = -s->slope_y[i] * s->iz[i];
             sweep_apply(sweep, f, p, (const double[3]){s->ix[i], s->iy[i], s->iz[i]});
@@ -210,7 +269,8 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
     Sweep sweep = {.n = 6 * scratch->given,
                    .dt = input->dt,
                    .place = scratch->place,
-                   .A = input->inverse_inertia};
+                   .A = input->inverse_inertia,
+                   .literal = input->solver == MILD_SOLVER_EXPLICIT};
     static const double zero[TWIST_MAX];
     int limit = input->max_iterations > 0 ? input->max_iterations : SWEEP_LIMIT;
     int iterations = 0;
@@ -240,6 +300,10 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
         if (isnan(change)) {
             break;
         }
+    }
+    if (sweep.literal) {
+        sweep_drift(scratch, input);
+        sweep_wrench(scratch, wrench);
     }
     result->iterations = iterations;
     result->residual = scale > 0.0 ? change / scale : change;

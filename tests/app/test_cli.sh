@@ -147,7 +147,7 @@ cmp -s one.json two.json || fail "rows of the batch engine depend on --threads"
 expect 0 'grass .*2/2 ' "${batch[@]}" --ground rigid,grass --terrain.kind=waves
 expect 0 'clay .*2/2 ' "${batch[@]}" --ground clay
 expect 0 'foam45 .*2/2 ' "${batch[@]}" --ground foam45 --task.shells_stand=true
-for option in "--controller stand" "--ground rubber+grass" "--terrain.memory=true" "--task.newton=0" \
+for option in "--controller stand" "--ground rubber+grass" "--terrain.memory=true" "--task.solver=gauss_seidel" \
     "--push 0.5" "--latent latent.csv" "--ablate z"; do
     bad "train.robots *= *mujoco" "${batch[@]}" $option
 done

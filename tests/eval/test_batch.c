@@ -333,9 +333,9 @@ static void what_is_not_there_is_refused(void **state) {
     refused("rubber+grass", 1, 1, "--ground rubber+grass");
     refused("grass", EVAL_ROBOTS_MAX + 1, 1, "--trials 65537");
     refused("grass", 1, 0, "--controller zero");
-    def.newton = 0;
-    refused("grass", 1, 1, "task.newton = 0");
-    def.newton = 1;
+    def.solver = MILD_SOLVER_GAUSS_SEIDEL;
+    refused("grass", 1, 1, "task.solver other than newton");
+    def.solver = MILD_SOLVER_NEWTON;
     def.imprint_tiles = 8;
     refused("grass", 1, 1, "terrain.memory");
     def.imprint_tiles = 0;

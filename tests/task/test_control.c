@@ -462,7 +462,7 @@ static void solver_follows_the_keys(void **unused) {
     (void)unused;
     open_with_dt(0.0025);
     for (int newton = 0; newton < 2; newton++) {
-        rig.def.newton = newton;
+        rig.def.solver = newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL;
         rig.def.contact_tolerance = newton ? 1e-3 : 1e-5;
         rig.def.contact_iterations = 30 + newton;
         rig_step(&rig, NULL);

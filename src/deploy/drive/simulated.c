@@ -271,8 +271,8 @@ MildStatus simulated_run(const SimulatedDef *def, SimulatedReport *report, MildE
         env->command_frozen = 1;
         task_env_reset_on(env, def->task, def->robot, sim, def->terrain, def->rigid, &none);
         task_env_rest(env)->terrain.map = def->task->map;
-        robot_sim_set_solver(sim, def->task->newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL,
-                             def->task->contact_tolerance, def->task->contact_iterations);
+        robot_sim_set_solver(sim, (MildSolver)def->task->solver, def->task->contact_tolerance,
+                             def->task->contact_iterations);
         status = wait_for_runner(s, error);
     }
     if (status == MILD_OK) {

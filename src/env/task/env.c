@@ -307,8 +307,8 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     RobotReading reading = {.above = 0};
     task_begin_step(env, def, action);
     lend_map(env, def);
-    robot_sim_set_solver(sim, def->newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL,
-                         def->contact_tolerance, def->contact_iterations);
+    robot_sim_set_solver(sim, (MildSolver)def->solver, def->contact_tolerance,
+                         def->contact_iterations);
     task_env_load(env, sim);
     int diverged = run_physics(env, def, robot, sim, &sensors, callback);
     if (!diverged) {

@@ -47,7 +47,7 @@ TaskDef task_def_default(void) {
         .crossing_limit = -1.0,
         .shells_stand = 1,
         .assist = 1,
-        .newton = 1,
+        .solver = MILD_SOLVER_NEWTON,
         .contact_tolerance = 1e-4,
         .contact_iterations = 20,
         .reward = {.clip_sum = 1,
@@ -182,9 +182,10 @@ const MildField task_fields[] = {
       "the base ends the episode when it touches the ground, and no other"),
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
-    T(newton, B, 1, 0, 1,
-      "[bool] contact solver: true for Newton (fast), false for sweeps as in the paper's Algorithm "
-      "1, over the same implicit equations"),
+    MILD_FIELD_CHOICE(
+        TaskDef, solver, mild_solver_names, MILD_SOLVERS,
+        "contact solver: newton (fast); gauss_seidel, the paper's sweeps over the same "
+        "implicit equations; explicit, its Algorithm 1 to the letter"),
     T(contact_tolerance, D, 1, 1e-12, 0.1,
       "[-] relative residual at which the contact solver stops"),
     T(contact_iterations, MILD_FIELD_INT, 1, 1, 100000,

@@ -151,7 +151,7 @@ typedef struct {
     int shells_stand;         /* bool: shells stand on soft ground (robot_set_shells) */
     double shell_depth;       /* [m] of the shells in soft ground, past which the episode ends */
     int assist;               /* bool: helping hand for beginners (assist.h) */
-    int newton;               /* bool: fast solver; off: the paper's sweeps */
+    int solver;               /* MildSolver */
     double contact_tolerance; /* [-] relative residual at which the contact solver stops */
     int contact_iterations;   /* [-] hard bound of its work */
     RewardDef reward;

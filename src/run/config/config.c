@@ -67,6 +67,33 @@ static int text_fits_line(const char *text) {
     return length <= TEXT_MAX && code_length(text) == length && !blanks;
 }
 
+/* A key that the last version read with this value (VERSIONING.md), and what stands for it now. */
+typedef struct {
+    const char *section, *key, *value, *key_now, *value_now;
+} ConfigRename;
+static const ConfigRename renames[] = {
+    {"task", "newton", "true", "solver", "newton"},
+    {"task", "newton", "1", "solver", "newton"},
+    {"task", "newton", "false", "solver", "gauss_seidel"},
+    {"task", "newton", "0", "solver", "gauss_seidel"},
+};
+
+/* Puts the new names in the place of old ones, with a line that says so. */
+static void key_rename(const char *section, const char **key, const char **value,
+                       const char *where) {
+    for (size_t i = 0; i < sizeof renames / sizeof *renames; i++) {
+        const ConfigRename *old = &renames[i];
+        if (strcmp(section, old->section) == 0 && strcmp(*key, old->key) == 0 &&
+            strcmp(*value, old->value) == 0) {
+            fprintf(stderr, "%s: %s.%s = %s is now %s.%s = %s\n", where, section, old->key,
+                    old->value, section, old->key_now, old->value_now);
+            *key = old->key_now;
+            *value = old->value_now;
+            return;
+        }
+    }
+}
+
 static MildStatus key_set(const ConfigSection *sections, int count, const char *section_name,
                           const char *key, const char *value, const char *where,
                           const MildField **field_set, MildError *error) {
@@ -75,6 +102,7 @@ static MildStatus key_set(const ConfigSection *sections, int count, const char *
     if (!section) {
         return section_fail(where, section_name, nearest, error);
     }
+    key_rename(section->name, &key, &value, where);
     const MildField *field = mild_field_find(section->fields, section->count, key, &nearest);
     if (!field) {
         return key_fail(sections, count, section, key, nearest, where, error);
