@@ -64,6 +64,12 @@ static const Shape shapes[] = {
      MILD_PATTERN_NONE},
     {"bekker, four feet on waves", 4, MILD_MODEL_BEKKER, MILD_MAP_WAVES, MILD_PATTERN_CHECKER},
     {"hunt_crossley on waves", 2, MILD_MODEL_HUNT_CROSSLEY, MILD_MAP_WAVES, MILD_PATTERN_CHECKER},
+    {"mild_merged", 2, MILD_MODEL_MILD_MERGED, MILD_MAP_FLAT, MILD_PATTERN_NONE},
+    {"mild_merged, one foot on a slope", 1, MILD_MODEL_MILD_MERGED, MILD_MAP_SLOPE,
+     MILD_PATTERN_NONE},
+    {"mild_merged, rough, checker", 2, MILD_MODEL_MILD_MERGED, MILD_MAP_ROUGH,
+     MILD_PATTERN_CHECKER},
+    {"mild_merged, four feet", 4, MILD_MODEL_MILD_MERGED, MILD_MAP_FLAT, MILD_PATTERN_NONE},
 };
 /* Those that further tests take. */
 static const Shape *const level = &shapes[0];
@@ -143,6 +149,10 @@ static void herd_open(Herd *herd, const Shape *shape) {
             assert_int_equal(
                 mild_model_match(shape->model, &sand, left, 150.0, &herd->material[m], NULL),
                 MILD_OK);
+        }
+        if (shape->model == MILD_MODEL_MILD_MERGED && m % 2) { /* slip costs support */
+            herd->material[m].slip_length = 1e-3 * (1 + m);
+            herd->material[m].grip = m % 4 > 1 ? 0.2 : 0.0;
         }
     }
     for (int r = 0; r < ROBOTS; r++) {
