@@ -30,6 +30,7 @@ plate=(--plate 0.2,0.1)
 
 echo "errors of the fit with nothing held, without noise, and with 2 % noise, seeds 5, 6, 7"
 while read -r ground k_pen sigma_cone alpha nu; do
+    ! short || [ "$ground" = foam45 ] || continue
     "$mild" press --ground "$ground" "${plate[@]}" --depth 0.04 --csv press.csv >/dev/null || fail "press $ground"
     "$mild" fit press.csv "${plate[@]}" --json fit.json >/dev/null || fail "fit $ground"
     near "$ground k_pen, exact" "$(value fit.json k_pen)" "$k_pen" 0.01
