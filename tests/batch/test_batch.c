@@ -69,7 +69,7 @@ static const Shape shapes[] = {
  * set. */
 static int some_steps(void) {
     const int some = kit_draws(STEPS);
-    return some < 8 ? 8 : some;
+    return some < STEPS / 2 ? STEPS / 2 : some;
 }
 
 /* Those that further tests take. */

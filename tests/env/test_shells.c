@@ -71,7 +71,7 @@ static Falls fall(const char *robot, TaskDef def, int device, const MildMapDef *
     def.map = map;
     pair_open(robot, &def, device);
     pair_reset();
-    for (int t = 0; t < some_steps(); t++) {
+    for (int t = 0; t < STEPS; t++) {
         draw_falls(t, most);
         pair_step();
         read_held(held);
@@ -107,7 +107,7 @@ static Falls fall(const char *robot, TaskDef def, int device, const MildMapDef *
 }
 
 static void check(Falls falls, double least) {
-    assert_true(falls.near > (kit_short() ? 20 : 200) && falls.near_together > least * falls.near);
+    assert_true(falls.near > 200 && falls.near_together > least * falls.near);
     assert_true(falls.together > least * falls.steps);
 }
 
@@ -117,8 +117,10 @@ static void falls_are_those_of_mujoco(void **unused) {
     const Falls level = fall(SA01, shells_def(), MILD_BATCH_HOST, NULL, 2);
     check(level, 0.5);
     assert_true(level.ends[TASK_END_base] > 0);
-    check(fall(SA01, shells_def(), MILD_BATCH_HOST, &map, 2), 0.5);
-    check(fall(G1, shells_def(), MILD_BATCH_HOST, NULL, 2), 0.5);
+    if (!kit_short()) {
+        check(fall(SA01, shells_def(), MILD_BATCH_HOST, &map, 2), 0.5);
+        check(fall(G1, shells_def(), MILD_BATCH_HOST, NULL, 2), 0.5);
+    }
     check(fall(GO1, shells_def(), MILD_BATCH_HOST, &map, 2), 0.5);
 }
 

@@ -228,6 +228,9 @@ static void it_comes_to_rest_on_its_shells(void **state) {
     static const char *const grounds[] = {"foam45", "sand_loose"};
     static const char *const integrators[] = {"implicitfast", "discrete", "Euler"};
     for (int n = 0; n < 6; n++) {
+        if (kit_short() && n != 0 && n != 3) {
+            continue; /* each ground and two integrators */
+        }
         lie_down(1, -mjPI / 2, grounds[n % 2], integrators[n / 2]);
         lie_down(0, mjPI / 2, grounds[n % 2], integrators[n / 2]);
     }
