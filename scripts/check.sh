@@ -4,7 +4,7 @@
 #   format    clang-format 14 has nothing to change, 100 columns, braces
 #   sanitize  clang, warnings as errors, address and undefined-behaviour sanitizers: every test of our own code, the long ones begun
 #   tidy      clang-tidy 14 over src/, only files that changed since they last passed
-#   thread    gcc, warnings as errors, thread sanitizer: pool, task, evaluation, training
+#   thread    gcc, thread sanitizer: pool, task, evaluation, training
 #   vectors   the layers with loops over vectors, for AVX2 and for AVX-512 with vectors of 512 bits: their tests (256: make test)
 #   aarch64   the library for another processor, run under qemu
 #   wheel     the Python package, made and installed as a user would; three of its examples
@@ -90,7 +90,7 @@ stage_tidy() {
 
 # Tests of what starts threads. That gcc has no warnings is seen by `.ci/run`, whose `make test` takes them for errors.
 stage_thread() {
-    configure thread -DCMAKE_C_COMPILER=gcc -DMILD_SANITIZE=thread -DCMAKE_BUILD_TYPE=Release
+    configure thread -DCMAKE_C_COMPILER=gcc -DMILD_SANITIZE=thread -DCMAKE_BUILD_TYPE=Release -DMILD_WERROR=OFF
     build thread mild base_test_pool eval_test_batch eval_test_eval task_test_envs task_test_task task_test_terrain
     # this runtime fails on unusual memory layouts; disable address randomisation if the container allows it
     local fixed=()
