@@ -74,12 +74,17 @@ static void grains_part_with_the_restitution(void **) {
     }
 }
 
+/* Steps or draws of a test that says the same of any number of them. */
+static long some(long steps) {
+    return kit_short() ? steps / 8 : steps;
+}
+
 /* Oblique and spinning, with friction: the two never leave with more than they had. */
 static void a_collision_gives_no_energy(void **) {
     double worst = -1;
     srand(1);
     const auto uniform = [] { return (float)rand() / (float)RAND_MAX - 0.5f; };
-    for (int k = 0; k < 400; k++) {
+    for (int k = 0; k < some(400); k++) {
         BedDef def;
         def.hertz = k % 2;
         def.steps = 100;
@@ -147,11 +152,6 @@ static BedDef small_bed(void) {
     def.depth = 0.025f;
     def.settle = 0.2f;
     return def;
-}
-
-/* Steps of a test that says the same of any number of them. */
-static long some(long steps) {
-    return kit_short() ? steps / 8 : steps;
 }
 
 /* The floor carries the grains' weight, told by the overlaps on it. */
