@@ -58,7 +58,7 @@ program: setup
 	@scripts/quietly.sh build/log/compile.log "building build/mild" cmake --build build --parallel $(JOBS) --target mild
 
 test: build
-	@ctest --test-dir build --output-on-failure --parallel $(JOBS) --timeout 280
+	@ctest --test-dir build --output-on-failure --parallel $$(($(JOBS) + 1)) --timeout 280
 
 # Own builds, under build/check. Installs the tools it needs, which `make test` does without.
 check:

@@ -9,7 +9,7 @@ target_include_directories(web_core PUBLIC ${CMAKE_SOURCE_DIR} PRIVATE ${CMAKE_B
   ${CMAKE_BINARY_DIR}/layers/view)
 # as env/batch_host.c; options of the file, which come behind those of mild_options
 set_source_files_properties(${CMAKE_SOURCE_DIR}/web/core.c ${CMAKE_SOURCE_DIR}/web/window.c PROPERTIES COMPILE_OPTIONS
-  "-O2;-Wno-float-conversion;$<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>")
+  "$<$<NOT:${mild_sanitized}>:-O2>;-Wno-float-conversion;$<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>")
 set(web_robot ${CMAKE_BINARY_DIR}/generated/web/robot.bin)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/generated/web)
 set(shipped ${CMAKE_SOURCE_DIR}/policies/mild.safetensors ${CMAKE_SOURCE_DIR}/configs/walk.ini)

@@ -7,6 +7,11 @@ trap 'rm -rf "$work"' EXIT
 cd "$work"
 failures=0
 
+# Whether only the beginning of a repetition is run: MILD_TEST_SHORT, as in kit.h.
+short() {
+    [ -n "${MILD_TEST_SHORT:-}" ]
+}
+
 fail() {
     echo "FAIL: $*" >&2
     failures=$((failures + 1))

@@ -30,6 +30,7 @@ plate=(--plate 0.2,0.1)
 
 echo "errors of the fit with nothing held, without noise, and with 2 % noise, seeds 5, 6, 7"
 while read -r ground k_pen sigma_cone alpha nu; do
+    ! short || [[ $ground = foam45 || $ground = sand_* ]] || continue
     "$mild" press --ground "$ground" "${plate[@]}" --depth 0.04 --csv press.csv >/dev/null || fail "press $ground"
     "$mild" fit press.csv "${plate[@]}" --json fit.json >/dev/null || fail "fit $ground"
     near "$ground k_pen, exact" "$(value fit.json k_pen)" "$k_pen" 0.01
@@ -39,7 +40,7 @@ while read -r ground k_pen sigma_cone alpha nu; do
     "$mild" fit press.csv "${plate[@]}" --hold alpha="$alpha" --json fit.json >/dev/null || fail "fit $ground"
     near "$ground nu, alpha held" "$(value fit.json nu)" "$nu" 0.01
     near "$ground sigma_cone, alpha held" "$(value fit.json sigma_cone)" "$sigma_cone" 0.01
-    for seed in 7 6 5; do
+    for seed in $(short || echo 7 6) 5; do
         noise "$seed" <press.csv >"$ground.csv"
         "$mild" fit "$ground.csv" "${plate[@]}" --hold-from "$ground" --fit k_pen,sigma_cone --json fit.json >table.txt ||
             fail "fit $ground"

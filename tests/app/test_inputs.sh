@@ -3,7 +3,7 @@
 # written or read are found out before the work begins. Usage: test_inputs.sh PATH_TO_MILD
 source "$(dirname "$0")/../kit.sh" "$1"
 
-# every key of the config: not a number, too many numbers
+# every key of the config: not a number, too many numbers. All keys are read by one function: a sanitizer sees some of them
 keys=0
 section=
 while read -r key _; do
@@ -12,9 +12,10 @@ while read -r key _; do
     '' | \#*) ;;
     *)
         name=$section.$key
+        keys=$((keys + 1))
+        ! short || ((keys % 8 == 0)) || continue
         bad "$name" "$mild" train --out run "--$name=nan"
         bad "$name" "$mild" train --out run "--$name=1 2 3 4 5 6 7 8 9 10 11 12 13"
-        keys=$((keys + 1))
         ;;
     esac
 done < <("$mild" info config)
@@ -27,10 +28,11 @@ bad "policy.actor_hidden" "$mild" train --out run --policy.actor_hidden=32,-1,0,
 # every parameter of a ground
 parameters=0
 for key in $("$mild" info grounds | awk '$1 == "rubber" { table = 1; next } table && NF == 0 { exit } table { print $1 }'); do
+    parameters=$((parameters + 1))
+    ! short || ((parameters % 8 == 0)) || continue
     for value in nan -1e9 1e400 seven ''; do
         bad "ground.$key" "$mild" press --ground sand_loose "--ground.$key=$value"
     done
-    parameters=$((parameters + 1))
 done
 [ "$parameters" -gt 12 ] || fail "only $parameters parameters of a ground"
 

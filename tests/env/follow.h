@@ -15,6 +15,11 @@
 
 enum { ENVS = 48, GROUNDS = 64, STEPS = 110 };
 
+/* Steps of a test: all, or the first of them, in which robots fall and begin again, too. */
+static inline int some_steps(void) {
+    return kit_short() ? 40 : STEPS;
+}
+
 /* Rows of one time, with the widths of the robot's TaskShape. */
 typedef struct {
     float history[ENVS * TASK_HISTORY_MAX];
@@ -244,7 +249,7 @@ static void follow(const char *robot, TaskDef def, int device, const MildMapDef 
             same_episode(e);
         }
     }
-    for (int t = 0; t < STEPS; t++) {
+    for (int t = 0; t < some_steps(); t++) {
         draw_actions(t);
         pair_step();
         for (int e = 0; e < ENVS; e++) {
@@ -277,7 +282,8 @@ static void follow(const char *robot, TaskDef def, int device, const MildMapDef 
     for (int end = 0; end < TASK_END_COUNT; end++) {
         printf("%s %d%s", task_end_names[end], ends[end], end < TASK_END_COUNT - 1 ? ", " : "\n");
     }
-    assert_true(together > least * steps && done > 20 && timeouts > 5);
+    assert_true(together > least * steps);
+    assert_true(kit_short() ? done > 0 : done > 20 && timeouts > 5);
     pair_close();
     mild_map_destroy(map);
 }

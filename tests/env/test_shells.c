@@ -117,8 +117,10 @@ static void falls_are_those_of_mujoco(void **unused) {
     const Falls level = fall(SA01, shells_def(), MILD_BATCH_HOST, NULL, 2);
     check(level, 0.5);
     assert_true(level.ends[TASK_END_base] > 0);
-    check(fall(SA01, shells_def(), MILD_BATCH_HOST, &map, 2), 0.5);
-    check(fall(G1, shells_def(), MILD_BATCH_HOST, NULL, 2), 0.5);
+    if (!kit_short()) {
+        check(fall(SA01, shells_def(), MILD_BATCH_HOST, &map, 2), 0.5);
+        check(fall(G1, shells_def(), MILD_BATCH_HOST, NULL, 2), 0.5);
+    }
     check(fall(GO1, shells_def(), MILD_BATCH_HOST, &map, 2), 0.5);
 }
 
@@ -136,7 +138,7 @@ static void stand_twice(int device, const MildMapDef *on, int *far, int *same) {
         def.map = map;
         pair_open(SA01, &def, device);
         pair_reset();
-        for (int t = 0; t < STEPS; t++) {
+        for (int t = 0; t < some_steps(); t++) {
             draw_actions(t);
             pair_step();
             if (!stand) {
@@ -158,7 +160,7 @@ static void stand_twice(int device, const MildMapDef *on, int *far, int *same) {
     mild_map_destroy(map);
     print_message(
         "device %d%s: %d of %d steps without a shell near the ground, %d with the same bits\n",
-        device, on ? ", on a map" : "", *far, ENVS * STEPS, *same);
+        device, on ? ", on a map" : "", *far, ENVS * some_steps(), *same);
 }
 
 /* Low steps, with edges as steep as they can be: the bound on the depth of a shell has the steepest
@@ -177,10 +179,10 @@ static void far_shells_change_no_bit(void **unused) {
     const MildMapDef map = steep_map();
     int far, same;
     stand_twice(MILD_BATCH_HOST, NULL, &far, &same);
-    assert_true(far > ENVS * STEPS / 2 && same == far);
+    assert_true(far > ENVS * some_steps() / 2 && same == far);
     /* `held` is of the last physics step: some had a shell near the ground in the first alone */
     stand_twice(MILD_BATCH_HOST, &map, &far, &same);
-    assert_true(far > ENVS * STEPS * 3 / 4);
+    assert_true(far > ENVS * some_steps() * 3 / 4);
 }
 
 /* Robots that stagger, whose shells may come near. */
@@ -213,7 +215,7 @@ static void device_falls_are_those_of_mujoco(void **unused) {
     int far, same;
     stand_twice(0, NULL, &far,
                 &same); /* `part` is compiled once more, which may round in other places */
-    assert_true(far > ENVS * STEPS / 2);
+    assert_true(far > ENVS * some_steps() / 2);
 }
 
 int main(void) {

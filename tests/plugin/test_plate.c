@@ -139,17 +139,18 @@ static double settled_depth(mjModel *m) {
  * back, as the law says. */
 static void check_limit(const char *ground, const char *integrator, const char *joint,
                         const char *solver) {
-    static const double steps[] = {0.001, 0.002, 0.005};
+    static const double steps[] = {0.005, 0.002, 0.001};
+    const int count = kit_short() ? 2 : 3; /* the finest takes longest */
     const double law = sinkage(ground, 8);
-    double depth[3];
-    for (int s = 0; s < 3; s++) {
+    double depth[3] = {0, 0, 0};
+    for (int s = 0; s < count; s++) {
         depth[s] = settled_depth(limited_plate(steps[s], integrator, ground, 7, 1, joint, solver));
     }
-    print_message("%-10s %-12s %-12s %-8.30s %.2f %.2f %.2f mm at 1, 2 and 5 ms, law %.2f\n",
+    print_message("%-10s %-12s %-12s %-8.30s %.2f %.2f %.2f mm at 5, 2 and 1 ms, law %.2f\n",
                   ground, integrator, joint, solver, 1e3 * depth[0], 1e3 * depth[1], 1e3 * depth[2],
                   1e3 * law);
-    for (int s = 0; s < 3; s++) {
-        assert_true(fabs(depth[s] - depth[0]) < 0.02 * depth[0]);
+    for (int s = 0; s < count; s++) {
+        assert_true(fabs(depth[s] - depth[count - 1]) < 0.02 * depth[count - 1]);
         assert_true(strcmp(ground, "rubber") != 0 || fabs(depth[s] - law) < 0.05 * law);
     }
 }
