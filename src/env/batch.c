@@ -20,10 +20,9 @@ typedef struct {
     Envs base;
     EnvsArrays arrays; /* their memory is the device's */
     MildBatch *ground;
-    BatchBodies bodies;         /* with shells that stand; all 0: none */
-    DeviceFork *fork;           /* streams of all shares but the first, on a GPU; else NULL */
-    DeviceFork *beside[SHARES]; /* of each share, a stream for robots with shells; else NULL */
-    int shares;                 /* of the robots */
+    BatchBodies bodies; /* with shells that stand; all 0: none */
+    DeviceFork *fork;   /* streams of all shares but the first, on a GPU; else NULL */
+    int shares;         /* of the robots */
     TaskShape shape;
     size_t labels;              /* of the map, 1 without */
     const EnvsKernels *kernels; /* NULL: on the host */
@@ -163,6 +162,7 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
         at += (arrays[i].bytes + 255) / 256 * 256;
     }
     all->shells.setup = b->bodies.setup;
+    all->shells.heap = (b->ground->curves & LAW_HEAP) != 0;
     all->shells.memory = b->bodies.memory;
     all->shells.numbers = b->bodies.numbers;
     return b->block ? MILD_OK : MILD_ERROR_MEMORY;
@@ -288,16 +288,11 @@ static MildStatus create_envs(Batch *b, MildError *error) {
 
 static MildStatus open_shares(Batch *b, MildError *error) {
     b->shares = b->arrays.envs >= SHARES ? SHARES : 1;
-    if (b->device == MILD_BATCH_HOST) {
+    if (b->device == MILD_BATCH_HOST || b->shares == 1) {
         return MILD_OK;
     }
-    b->fork = b->shares > 1 ? device_fork_create(b->device, b->shares - 1, error) : NULL;
-    int opened = b->fork || b->shares == 1;
-    for (int i = 0; opened && b->bodies.setup && i < b->shares; i++) {
-        b->beside[i] = device_fork_create(b->device, 1, error);
-        opened = b->beside[i] != NULL;
-    }
-    return opened ? MILD_OK : error->status;
+    b->fork = device_fork_create(b->device, b->shares - 1, error);
+    return b->fork ? MILD_OK : error->status;
 }
 
 static MildStatus open_batch(Batch *b, const EnvsDef *def, const TaskGrounds *grounds,
@@ -329,9 +324,6 @@ static void destroy(Envs *envs) {
     batch_bodies_close(&b->bodies, b->device);
     mild_batch_destroy(b->ground);
     device_fork_destroy(b->fork);
-    for (int i = 0; i < SHARES; i++) {
-        device_fork_destroy(b->beside[i]);
-    }
     free(b);
 }
 
@@ -354,7 +346,6 @@ typedef struct {
     EnvsArrays arrays;
     EnvsStep step;
     MildBatch ground;
-    DeviceFork *beside; /* Batch.beside */
     void *stream;
 } Share;
 
@@ -427,7 +418,6 @@ static Share share_of(const Batch *b, const EnvsStep *step, int i, void *stream)
     Share share = {.arrays = arrays_from(b, (size_t)first, count),
                    .step = step_from(step, &b->shape, (size_t)first),
                    .ground = batch_share(b->ground, (int)first, count),
-                   .beside = b->beside[i],
                    .stream = i > 0 && b->fork ? device_fork_stream(b->fork, i - 1) : stream};
     if (share.arrays.shells.setup) {
         share.arrays.shells.shape = share.ground.shape;
@@ -499,22 +489,18 @@ static MildStatus step_ground(Share *share, MildError *error) {
     return mild_batch_step(&share->ground, &input, &output, 1, share->stream, error);
 }
 
-/* The same after part k where shells stand: a GPU steps the robots whose shells are near the ground
- * beside the others, for it waits for the slowest of these few. */
-static MildStatus step_bodies(const Batch *b, Share *share, int k, MildError *error) {
+/* The same under robots with shells near it, after part k. */
+static MildStatus step_shells(const Batch *b, const Share *share, int k, MildError *error) {
     const EnvsArrays *all = &share->arrays;
-    if (!b->kernels) {
-        Call call = {all, &share->step, k};
-        pool_run(b->pool, all->envs, shells_piece, &call);
-        return step_ground(share, error);
+    Call call = {all, &share->step, k};
+    if (!all->shells.setup) {
+        return MILD_OK;
     }
-    MildStatus status = checked(b->kernels->find(all, k, share->stream), error);
-    status = status == MILD_OK ? device_fork(share->beside, share->stream, error) : status;
-    if (status == MILD_OK) {
-        status = checked(b->kernels->shells(all, device_fork_stream(share->beside, 0)), error);
+    if (b->kernels) {
+        return checked(b->kernels->shells(all, k, share->stream), error);
     }
-    status = status == MILD_OK ? step_ground(share, error) : status;
-    return status == MILD_OK ? device_join(share->beside, share->stream, error) : status;
+    pool_run(b->pool, all->envs, shells_piece, &call);
+    return MILD_OK;
 }
 
 /* The physics steps of a policy step: parts with the ground between them. Then the task. */
@@ -523,10 +509,8 @@ static MildStatus step_share(const Batch *b, Share *share, MildError *error) {
     Call call = {&share->arrays, &share->step, 0};
     MildStatus status = MILD_OK;
     for (call.part = 0; status == MILD_OK && call.part <= b->base.physics_steps; call.part++) {
-        if (call.part > 0) {
-            status = all->shells.setup ? step_bodies(b, share, call.part - 1, error)
-                                       : step_ground(share, error);
-        }
+        status = call.part > 0 ? step_shells(b, share, call.part - 1, error) : MILD_OK;
+        status = status == MILD_OK && call.part > 0 ? step_ground(share, error) : status;
         if (status == MILD_OK && b->kernels) {
             status = checked(b->kernels->part(all, &share->step, call.part, share->stream), error);
         } else if (status == MILD_OK) {

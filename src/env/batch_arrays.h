@@ -61,6 +61,7 @@ typedef struct {
 /* Bodies with shells that stand on soft ground (ground/batch/bodies.h). */
 typedef struct {
     const void *setup; /* BodiesSetup; NULL: there are none */
+    int heap;          /* bool: materials with LAW_HEAP are among those of the ground */
     char *robot;       /* [envs] EnvShells of batch_env.h */
     float *memory;     /* [envs][numbers] of the ground */
     size_t numbers;

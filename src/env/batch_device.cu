@@ -72,6 +72,7 @@ static __global__ void __launch_bounds__(LANES *FIND_WARPS)
 }
 
 /* Steps the robots in the list, a block one after the other. */
+template <int HEAP>
 static __global__ void __launch_bounds__(LANES *SHELLS_WARPS, SHELLS_BLOCKS)
     shells(const __grid_constant__ EnvsArrays all) {
     extern __shared__ __align__(16) Real shared[];
@@ -86,7 +87,7 @@ static __global__ void __launch_bounds__(LANES *SHELLS_WARPS, SHELLS_BLOCKS)
         if (own >= count) {
             return;
         }
-        env_shells_step(&all, all.shells.list[own], (EnvShellsWork *)shared);
+        env_shells_step(&all, all.shells.list[own], (EnvShellsWork *)shared, HEAP);
         __syncthreads();
     }
 }
@@ -221,7 +222,8 @@ static const char *kernels_open(int device) {
     cudaFuncSetAttribute(part<0, 1>, most, (int)work_bytes);
     cudaFuncSetAttribute(part<1, 1>, most, (int)work_bytes);
     cudaFuncSetAttribute(pose, most, (int)work_bytes);
-    cudaFuncSetAttribute(shells, most, (int)sizeof(EnvShellsWork));
+    cudaFuncSetAttribute(shells<0>, most, (int)sizeof(EnvShellsWork));
+    cudaFuncSetAttribute(shells<1>, most, (int)sizeof(EnvShellsWork));
     return launched();
 }
 
@@ -245,17 +247,13 @@ static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int
     return launched();
 }
 
-static const char *kernels_find(const EnvsArrays *all, int k, void *stream) {
+static const char *kernels_shells(const EnvsArrays *all, int k, void *stream) {
     OnDevice on(all->device);
-    const int blocks = (all->envs + FIND_WARPS - 1) / FIND_WARPS;
-    find<<<blocks, LANES * FIND_WARPS, 0, (cudaStream_t)stream>>>(*all, k);
-    return launched();
-}
-
-static const char *kernels_shells(const EnvsArrays *all, void *stream) {
-    OnDevice on(all->device);
+    const int looked = (all->envs + FIND_WARPS - 1) / FIND_WARPS;
     const int steps = all->envs < SHELLS_ROBOTS ? all->envs : SHELLS_ROBOTS;
-    shells<<<steps, LANES * SHELLS_WARPS, sizeof(EnvShellsWork), (cudaStream_t)stream>>>(*all);
+    find<<<looked, LANES * FIND_WARPS, 0, (cudaStream_t)stream>>>(*all, k);
+    const auto run = all->shells.heap ? shells<1> : shells<0>;
+    run<<<steps, LANES * SHELLS_WARPS, sizeof(EnvShellsWork), (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
@@ -294,7 +292,7 @@ static const char *kernels_tally(const EnvsArrays *all, void *stream) {
 extern "C" {
 extern const EnvsKernels ENVS_KERNELS;
 const EnvsKernels ENVS_KERNELS = {
-    ENGINE_FIXED,  kernels_fits,          kernels_open,        kernels_bytes, kernels_create,
-    kernels_begin, kernels_first,         kernels_part,        kernels_find,  kernels_shells,
-    kernels_end,   kernels_move_progress, kernels_set_command, kernels_tally};
+    ENGINE_FIXED,          kernels_fits,        kernels_open, kernels_bytes,  kernels_create,
+    kernels_begin,         kernels_first,       kernels_part, kernels_shells, kernels_end,
+    kernels_move_progress, kernels_set_command, kernels_tally};
 }

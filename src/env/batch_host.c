@@ -31,7 +31,7 @@ void envs_host_shells(const EnvsArrays *all, int k, long robot) {
     EnvShellsWork work;
     work.engine.count = work.ground.count = 0; /* gcc does not see that a lane sets them */
     if (env_shells_wait(all, robot) && env_shells_find(all, robot, k)) {
-        env_shells_step(all, robot, &work);
+        env_shells_step(all, robot, &work, 1);
     }
 }
 

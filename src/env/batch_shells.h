@@ -248,8 +248,8 @@ TEAM_FN void env_shells_results(const EnvsArrays *all, long robot, const EnvShel
                       &env_robot_at(all, robot)->saved);
 }
 
-/* The step of a robot with bodies near the ground. */
-TEAM_FN void env_shells_step(const EnvsArrays *all, long robot, EnvShellsWork *work) {
+/* The step of a robot with bodies near the ground. heap: of bodies_step. */
+TEAM_FN void env_shells_step(const EnvsArrays *all, long robot, EnvShellsWork *work, int heap) {
     const int near = all->shells.near[robot];
     const int feet = env_bodies(all)->feet;
     BodiesWork *ground = &work->ground;
@@ -260,7 +260,7 @@ TEAM_FN void env_shells_step(const EnvsArrays *all, long robot, EnvShellsWork *w
                                        ground->inverse_inertia};
     engine_shells_begin(all->model, &env_robot_at(all, robot)->saved,
                         &env_shells_at(all, robot)->links, &work->engine, &bodies);
-    bodies_step(env_bodies(all), ground, 1);
+    bodies_step(env_bodies(all), ground, 1, heap);
     env_shells_results(all, robot, work);
 }
 

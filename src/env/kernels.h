@@ -50,9 +50,7 @@ typedef struct {
     const char *(*begin)(const EnvsArrays *all, void *stream);
     const char *(*first)(const EnvsArrays *all, const EnvsStep *call, void *stream);
     const char *(*part)(const EnvsArrays *all, const EnvsStep *call, int k, void *stream);
-    /* Lists the robots with shells near the ground after part k, then steps those in the list. */
-    const char *(*find)(const EnvsArrays *all, int k, void *stream);
-    const char *(*shells)(const EnvsArrays *all, void *stream);
+    const char *(*shells)(const EnvsArrays *all, int k, void *stream);
     const char *(*end)(const EnvsArrays *all, const EnvsStep *call, void *stream);
     const char *(*move_progress)(const EnvsArrays *all, int back, void *stream);
     const char *(*set_command)(const EnvsArrays *all, void *stream);

@@ -401,9 +401,9 @@ MILD_HD void bodies_direct(const BodiesSole *sole, const Real *R, int s,
     }
 }
 
-/* Its law in this step; foot_prepare. */
+/* Its law in this step; foot_prepare. heap: bool, of bodies_step. */
 MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
-                          BodiesElement *own) {
+                          BodiesElement *own, int heap) {
     const BodiesSole *sole = &setup->sole[work->body[i]];
     const int wanted = work->label_material ? work->label_material[own->label] : 0;
     const int known = wanted >= 0 && wanted < setup->materials ? wanted : setup->materials;
@@ -413,7 +413,7 @@ MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int 
     const Real dt = setup->dt;
     Element *e = &own->element;
     contact_stand_on(material, e);
-    own->curves = material->curves;
+    own->curves = heap ? material->curves : material->curves & ~LAW_HEAP;
     if (sole->face) {
         bodies_share(setup, work, i, s, own->state, material, own);
     }
@@ -465,11 +465,11 @@ MILD_HD void bodies_locate(const BodiesSetup *setup, const BodiesWork *work, int
 /* All of it. Where it is not listed, its law is unset. all: bool, begin those that are not listed,
  * too. */
 MILD_HD void bodies_element(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
-                            const MapSpot *spot, int all, BodiesElement *own) {
+                            const MapSpot *spot, int all, BodiesElement *own, int heap) {
     bodies_locate(setup, work, i, s, spot, own);
     own->before = bodies_recall(&work->memory[i], s);
     if (own->listed || all) {
-        bodies_begin(setup, work, i, s, own);
+        bodies_begin(setup, work, i, s, own, heap);
     }
 }
 
@@ -502,13 +502,13 @@ MILD_HD void bodies_forget(const BodiesMemory *memory, int s, int buried) {
 /* Memory of an element at the twist V. advance: bool, of contact.inc. */
 MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
                                    const MapSpot *spot, const Real *V, int advance,
-                                   BodiesLoads *loads) {
+                                   BodiesLoads *loads, int heap) {
     const BodiesSole *sole = &setup->sole[work->body[i]];
     const BodiesMemory *memory = &work->memory[i];
     const int uneven = setup->has_map && setup->map.uneven;
     const Real dt = setup->dt;
     BodiesElement own;
-    bodies_element(setup, work, i, s, spot, !sole->face, &own);
+    bodies_element(setup, work, i, s, spot, !sole->face, &own, heap);
     if (sole->face && !(own.listed && own.share > 0)) {
         const int up = !own.faces_down && own.depth > work->least[i];
         if (advance) {
@@ -588,7 +588,7 @@ WARP_FN void bodies_report(BodiesWork *work, int i, const BodiesLoads *lane) {
 }
 
 /* Memory and reports at the twists of `next`; a warp takes a body. */
-TEAM_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advance) {
+TEAM_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advance, int heap) {
     LANE_ROLLED
     for (int i = TEAM_WARP; i < work->count; i += TEAM_WARPS) {
         const BodiesSole *sole = &setup->sole[work->body[i]];
@@ -601,7 +601,7 @@ TEAM_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advan
             LANE_ROLLED
             for (int s = LANE(l); s < sole->elements; s += LANES) {
                 bodies_finish_element(setup, work, i, s, &spot, work->next.twist + 6 * i, advance,
-                                      &loads[l]);
+                                      &loads[l], heap);
             }
         }
         lanes_sync(); /* what the lanes read of the body's memory is written below */
@@ -638,8 +638,9 @@ WARP_FN void bodies_leave(const BodiesMemory *memory, int elements) {
     }
 }
 
-/* A whole step. advance: bool, the memory moves to its end. */
-TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance) {
+/* A whole step. advance: bool, the memory moves to its end. heap: bool, materials may have LAW_HEAP; a
+ * constant, for the text is shorter without. */
+TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance, int heap) {
     const int rows = 6 * work->count;
     EACH_LANE(l) {
         LANE_ROLLED
@@ -649,7 +650,7 @@ TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance
         }
     }
     team_sync();
-    bodies_newton(setup, work);
+    bodies_newton(setup, work, heap);
     EACH_LANE(l) {
         LANE_ROLLED
         for (int r = TEAM_LANE(l); r < rows; r += TEAM) {
@@ -659,7 +660,7 @@ TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance
         }
     }
     team_sync();
-    bodies_finish(setup, work, advance);
+    bodies_finish(setup, work, advance, heap);
 }
 
 #endif

@@ -143,7 +143,7 @@ TEAM_FN void bodies_list(const BodiesSetup *setup, BodiesWork *work) {
 
 /* The element of lane l in a round. Bool: there is one. */
 MILD_HD int bodies_of_round(const BodiesSetup *setup, const BodiesWork *work, int round, int l,
-                            BodiesElement *own) {
+                            BodiesElement *own, int heap) {
     const int i = work->place[round];
     const int n = (round - work->first[i]) * LANES + l;
     if (n >= work->listed[i]) {
@@ -151,20 +151,20 @@ MILD_HD int bodies_of_round(const BodiesSetup *setup, const BodiesWork *work, in
         return 0;
     }
     const MapSpot spot = bodies_spot(setup, work, i);
-    bodies_element(setup, work, i, work->list[work->begin[i] + n], &spot, 0, own);
+    bodies_element(setup, work, i, work->list[work->begin[i] + n], &spot, 0, own, heap);
     return own->share > 0;
 }
 
 /* Those that a warp keeps. */
 TEAM_FN void bodies_keep(const BodiesSetup *setup, const BodiesWork *work,
-                         BodiesElement (*kept)[LANE_COPIES]) {
+                         BodiesElement (*kept)[LANE_COPIES], int heap) {
     LANE_UNROLL
     for (int turn = 0; turn < BODIES_KEPT; turn++) {
         const int round = TEAM_WARP + turn * TEAM_WARPS;
         EACH_LANE(l) {
             kept[turn][l].share = 0;
             if (round < work->first[work->count]) {
-                bodies_of_round(setup, work, round, LANE(l), &kept[turn][l]);
+                bodies_of_round(setup, work, round, LANE(l), &kept[turn][l], heap);
             }
         }
     }
@@ -174,7 +174,7 @@ TEAM_FN void bodies_keep(const BodiesSetup *setup, const BodiesWork *work,
 
 /* Wrench and hessian of a round. */
 TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const BodiesPoint *point,
-                          int turn, const BodiesElement (*kept)[LANE_COPIES]) {
+                          int turn, const BodiesElement (*kept)[LANE_COPIES], int heap) {
     const int round = TEAM_WARP + turn * TEAM_WARPS;
     const Real *twist = point->twist + 6 * work->place[round];
     Real part[BODIES_SUMS][LANE_COPIES], whole[BODIES_SUMS][LANE_COPIES];
@@ -190,7 +190,7 @@ TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const Bodi
             }
         } else {
             BodiesElement own;
-            if (bodies_of_round(setup, work, round, LANE(l), &own)) {
+            if (bodies_of_round(setup, work, round, LANE(l), &own, heap)) {
                 bodies_pass(setup, &own, twist, part, l);
             }
         }
@@ -208,10 +208,10 @@ TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const Bodi
 
 /* W and H at the twist of a point. */
 TEAM_FN void bodies_evaluate(const BodiesSetup *setup, BodiesWork *work, BodiesPoint *point,
-                             const BodiesElement (*kept)[LANE_COPIES]) {
+                             const BodiesElement (*kept)[LANE_COPIES], int heap) {
     LANE_ROLLED
     for (int turn = 0; TEAM_WARP + turn * TEAM_WARPS < work->first[work->count]; turn++) {
-        bodies_round(setup, work, point, turn, kept);
+        bodies_round(setup, work, point, turn, kept, heap);
     }
     team_sync();
     EACH_LANE(l) {
@@ -370,18 +370,18 @@ TEAM_FN void bodies_between(BodiesWork *work, int rows, Real way) {
 }
 
 /* As in contact.inc; the least residual's point is left in work->best. */
-TEAM_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work) {
+TEAM_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work, int heap) {
     const int rows = 6 * work->count;
     Real least = -1, at_residual = 0, way = 1, relative = 0;
     int steps = 0, halved = 0;
     BodiesElement kept[BODIES_KEPT][LANE_COPIES];
     bodies_list(setup, work);
-    bodies_keep(setup, work, kept);
+    bodies_keep(setup, work, kept, heap);
     bodies_start(work, rows, &work->next);
     bodies_copy(rows, &work->next, &work->best);
     for (;;) {
         Real residual, scale;
-        bodies_evaluate(setup, work, &work->next, (const BodiesElement(*)[LANE_COPIES])kept);
+        bodies_evaluate(setup, work, &work->next, (const BodiesElement(*)[LANE_COPIES])kept, heap);
         bodies_residual(work, rows, &work->next, &residual, &scale);
         const Real wanted = halved ? (1 - way / 10) * at_residual : at_residual;
         if (steps > 1 && !(residual < wanted) && halved < CONTACT_HALVINGS) {
