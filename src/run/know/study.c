@@ -72,6 +72,7 @@ static void draw_walk(const StudyDef *def, uint32_t number, StudyWalk *walk) {
     walk->grounds = 1;
     walk->walk.terrain = mild_terrain_uniform(&material);
     walk->walk.rigid = def->rigid;
+    walk->seconds = def->seconds;
     draw_commands(def, straight, &r, &walk->walk);
     if (changes) {
         draw_border(def, &r, walk);

@@ -31,7 +31,8 @@ typedef struct {
     int grounds;
     int drawn;    /* bool: the robot is randomised */
     double noise; /* [-] of that of training */
-    int lasted;   /* [policy steps] */
+    int lasted;   /* [policy steps] until a fall or the end */
+    double seconds; /* [s] that were asked for */
     Walk walk;
 } StudyWalk;
 
