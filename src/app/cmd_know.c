@@ -253,9 +253,9 @@ static MildStatus open_study(Know *k, const CliArgs *args, MildError *error) {
     c->pool = pool_create(k->threads);
     MildStatus status = c->pool ? context_open(c, args, error)
                                 : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
-    if (status == MILD_OK && task_shape(c->robot).observation != BELIEF_FRAME) {
+    if (status == MILD_OK && !belief_has(robot_name(c->robot))) {
         status = mild_fail(error, MILD_ERROR_ARGUMENT,
-                           "robot %s has another frame than SA01, for whom the weights are",
+                           "robot %s: only sa01 has learned to know its ground (docs/identify.md)",
                            robot_name(c->robot));
     }
     status = status == MILD_OK ? context_move(c, STUDY_BATCH, error) : status;

@@ -300,16 +300,26 @@ double belief_place(const BeliefNet *net, BeliefParameter parameter, double valu
     return fmin(fmax(step * (i + share) - KNOT_LAST, -KNOT_LAST), KNOT_LAST);
 }
 
-void belief_text(const Belief *belief, const BeliefNet *net, char *text, int size) {
+static void write_all(const Belief *belief, const BeliefNet *net, const char *between,
+                      const char *end, char *text, int size) {
     int used = 0;
     text[0] = 0;
     for (int i = 0; i < BELIEF_PARAMETERS && used < size; i++) {
         const BeliefName *name = &belief_names[i];
-        const double low = belief_quantile(belief, net, (BeliefParameter)i, 0.05),
-                     middle = belief_quantile(belief, net, (BeliefParameter)i, 0.5),
-                     high = belief_quantile(belief, net, (BeliefParameter)i, 0.95);
-        used += snprintf(text + used, (size_t)(size - used), "%s%s %.3g %s (%.3g .. %.3g)",
-                         i ? ", " : "", name->name, name->scale * middle, name->unit,
-                         name->scale * low, name->scale * high);
+        const BeliefParameter p = (BeliefParameter)i;
+        const char *unit = name->unit[0] == '-' ? "" : name->unit;
+        used += snprintf(text + used, (size_t)(size - used), "%s%s %.3g%s%s (%.3g .. %.3g)%s",
+                         i ? between : "", name->name,
+                         name->scale * belief_quantile(belief, net, p, 0.5), *unit ? " " : "", unit,
+                         name->scale * belief_quantile(belief, net, p, 0.05),
+                         name->scale * belief_quantile(belief, net, p, 0.95), end);
     }
+}
+
+void belief_text(const Belief *belief, const BeliefNet *net, char *text, int size) {
+    write_all(belief, net, ", ", "", text, size);
+}
+
+void belief_lines(const Belief *belief, const BeliefNet *net, char *text, int size) {
+    write_all(belief, net, "", "\n", text, size);
 }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/paths.h"
 #include "learn/safetensors.h"
 
 /* Tensor, its numbers, where they go. */
@@ -75,4 +76,18 @@ BeliefNet *belief_read(const char *path, MildError *error) {
         return NULL;
     }
     return net;
+}
+
+int belief_has(const char *robot) {
+    return strcmp(robot, "sa01") == 0;
+}
+
+MildStatus belief_open(const char *robot, BeliefNet **net, MildError *error) {
+    char shipped[PATH_SIZE];
+    *net = NULL;
+    if (belief_has(robot)) {
+        *net = belief_read(path_data(BELIEF_SHIPPED, shipped), error);
+        return *net ? MILD_OK : error->status;
+    }
+    return MILD_OK;
 }
