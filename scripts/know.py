@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Learns the weights by which a robot knows its ground (docs/identify.md), from walks that `mild know --walks` writes.
 
-  scripts/know.py walk --out out/know       # 10 800 walks of 12 s for learning, 192 of 60 s for the alarm; an hour of two cores
+  scripts/know.py walk --out out/know       # 12 000 walks of 12 s for learning, 192 of 60 s for the alarm; an hour of two cores
   scripts/know.py train out/know --out policies/knows.safetensors
   scripts/know.py bound out/know            # R2 of the sensors beside that of the true states, by the same networks
 
@@ -22,14 +22,16 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 NAMES = ("sinkage", "k_pen", "sigma_cone", "mu", "slip_length")
 COUNT = len(NAMES)
-FRAME, BINS, EMBED, HIDDEN, ODDS, KNOTS, MEMORY = 47, 8, 96, 64, 24, 31, 24
+FRAME, BINS, EMBED, HIDDEN, KNOTS, MEMORY = 47, 8, 96, 64, 31, 24
+ODDS = 3 * EMBED + 8, 48, 16  # widths of the alarm: input, hidden
 START, SHORTEST, LONGEST = 2, 20, 80  # footsteps that are not looked at; frames of a footstep
-SHARE, STEP_PER_10_MIN = 0.9, 0.4  # nominal coverage; false alarms in 10 minutes that the threshold is set to
+SHARE, STEP_PER_10_MIN = 0.9, 0.3  # nominal coverage; false alarms in 10 minutes that the threshold is set to
+COMMAND = slice(BINS * 42, BINS * 42 + 3)  # among the features
 LEGS = np.array([6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5])
 SIGNS = np.array([-1, -1, 1, 1, 1, -1] * 2)
 LEARN = ("--seconds", 12, "--changes", 0.35, "--quiet", 0.2)
 WALKS = {"learn1": ("--grounds", 6000, "--seed", 1, *LEARN),
-         "learn2": ("--grounds", 4800, "--seed", 2, *LEARN),
+         "learn2": ("--grounds", 6000, "--seed", 2, *LEARN),
          "long": ("--grounds", 192, "--seconds", 60, "--changes", 0, "--quiet", 0.2, "--seed", 5)}
 
 
@@ -278,44 +280,57 @@ def calibrated(network, walks):
 def windows(network, walks, of):
     """Inputs of the alarm at each footstep but the first two of these walks, and labels: 0 old ground, 1 new, -1 neither."""
     inputs, labels, walk = [], [], []
-    h = network.embedded(walks.features)
+    h, command = network.embedded(walks.features), walks.features[:, COMMAND]
     cut = np.flatnonzero(np.diff(walks.walk)) + 1
     for begin, end in zip(np.r_[0, cut], np.r_[cut, len(h)]):
         if not of(walks.walk[begin]):
             continue
-        mean, before, second = np.zeros(EMBED, np.float32), 0.0, walks.second[begin:end]
+        mean, asked, before, second = np.zeros(EMBED, np.float32), np.zeros(3, np.float32), 0.0, walks.second[begin:end]
         for j in range(begin + 2, end):
             before = min(before + 1, MEMORY)
             mean = mean + (h[j - 2] - mean) / np.float32(before)
+            asked = asked + (command[j - 2] - asked) / np.float32(before)
             now, earlier = second[j - begin - 1 : j - begin + 1], second[: j - begin - 1]
             same = (earlier < 0.5).all() if now.max() < 0.5 else (earlier > 0.5).all()
             new = now.min() > 0.5 and (earlier < 0.5).any() and (earlier > 0.5).sum() <= 2
-            inputs.append(np.concatenate([h[j] - mean, h[j - 1] - mean, [1 / before, math.log(before) / 3]]).astype(np.float32))
+            inputs.append(np.concatenate([h[j] - mean, h[j - 1] - mean, mean, command[j] - asked, command[j - 1] - asked,
+                                          [1 / before, math.log(before) / 3]]).astype(np.float32))
             labels.append(1 if new else 0 if same and (now.max() < 0.5 or now.min() > 0.5) else -1)
             walk.append(walks.walk[begin])
     return np.array(inputs), np.array(labels), np.array(walk)
 
 
 class Alarm:
+    """Log odds that the last two footsteps are on other ground."""
+
     def __init__(self, rng):
-        self.odds, self.odds_bias = layer(rng, 2 * EMBED + 2, ODDS)
-        self.odds_out, self.odds_out_bias = layer(rng, ODDS, 1)
+        self.layers = [layer(rng, inputs, outputs) for inputs, outputs in zip(ODDS, (*ODDS[1:], 1))]
 
-    def read(self, x):
-        return (elu(x @ self.odds + self.odds_bias) @ self.odds_out + self.odds_out_bias)[:, 0]
+    def read(self, x, rng=None, drop=0.15):
+        """rng: for training, whose inputs of layers and dropouts are kept."""
+        self.inputs, self.kept = [], []
+        for i, (weight, bias) in enumerate(self.layers):
+            self.inputs.append(x)
+            x = x @ weight + bias
+            if i < len(self.layers) - 1:
+                x = elu(x)
+                self.kept.append((x, 1 if rng is None else (rng.random(x.shape, dtype=np.float32) > drop) / np.float32(1 - drop)))
+                x = x * self.kept[-1][1]
+        return x[:, 0]
 
-    def train(self, x, new, rng, steps=6000, rate=1e-3, batch=512):
-        adam = Adam([self.odds, self.odds_bias, self.odds_out, self.odds_out_bias], 0.3)
+    def train(self, x, new, rng, steps=8000, rate=1e-3, batch=512):
+        adam = Adam([p for pair in self.layers for p in pair], 0.3)
         old, late = np.flatnonzero(~new), np.flatnonzero(new)
         for k in range(steps):
             own = np.r_[rng.choice(old, batch * 3 // 4), rng.choice(late, batch // 4)]
-            wide = elu(x[own] @ self.odds + self.odds_bias)
-            keep = (rng.random(wide.shape, dtype=np.float32) > 0.1) / np.float32(0.9)
-            share = 1 / (1 + np.exp(-np.clip(wide * keep @ self.odds_out + self.odds_out_bias, -30, 30)))
-            g = ((share - new[own][:, None]) / batch).astype(np.float32)
-            g_wide = g @ self.odds_out.T * keep * np.where(wide > 0, 1, wide + 1)
-            adam.step([x[own].T @ g_wide, g_wide.sum(0), (wide * keep).T @ g, g.sum(0)],
-                      rate * 0.5 * (1 + math.cos(math.pi * k / steps)))
+            share = 1 / (1 + np.exp(-np.clip(self.read(x[own], rng), -30, 30)))
+            g, gradients = ((share - new[own]) / batch).astype(np.float32)[:, None], []
+            for i in range(len(self.layers) - 1, -1, -1):
+                gradients = [self.inputs[i].T @ g, g.sum(0), *gradients]
+                if i:
+                    out, keep = self.kept[i - 1]
+                    g = g @ self.layers[i][0].T * keep * np.where(out > 0, 1, out + 1)
+            adam.step(gradients, rate * 0.5 * (1 + math.cos(math.pi * k / steps)))
         return self
 
 
@@ -367,7 +382,7 @@ def train(given):
     widen = calibrated(network, walks)
     x, label, own = windows(network, walks, lambda i: i % 5 != 0)
     alarm = Alarm(rng).train(x[label >= 0], label[label >= 0] == 1, rng)
-    alarm.odds = halves(alarm.odds)
+    alarm.layers = [(halves(weight), bias) for weight, bias in alarm.layers]
     long = Walks([given.walks / "long.npy"], knots=walks.knots)
     calm = alarm.read(windows(network, long, lambda i: True)[0])
     x, label, own = windows(network, walks, lambda i: i % 5 == 0)
@@ -377,10 +392,11 @@ def train(given):
     print(f"alarm at log odds of {threshold:.2f}, {minutes:.0f} min of held-out footsteps; flags "
           f"{(alarm.read(x[label == 1]) > threshold).mean():.2f} of held-out footsteps after a border")
     flat = {"embed_bias": network.embed_bias, "hidden_bias": network.hidden_bias, "out": network.out, "out_bias": network.out_bias,
-            "prior": walks.knots, "widen": widen, "odds_bias": alarm.odds_bias, "odds_out": alarm.odds_out[:, 0],
-            "odds_out_bias": alarm.odds_out_bias, "alarm": np.array([threshold])}
-    save(given.out, {**{name: ("f2", array) for name, array in (("embed", network.embed), ("hidden", network.hidden),
-                                                                ("odds", alarm.odds))},
+            "prior": walks.knots, "widen": widen, "alarm": np.array([threshold])}
+    big = {"embed": network.embed, "hidden": network.hidden}
+    for name, (weight, bias) in zip(("odds", "odds_second", "odds_out"), alarm.layers):
+        big[name], flat[f"{name}_bias"] = weight, bias
+    save(given.out, {**{name: ("f2", array) for name, array in big.items()},
                      **{name: ("f4", np.asarray(array)) for name, array in flat.items()}}, f"scripts/know.py train --seed {given.seed}")
 
 
@@ -391,7 +407,7 @@ def main():
     one.add_argument("--out", type=pathlib.Path, required=True)
     one.add_argument("--threads", type=int, default=0)
     one.set_defaults(run=walk)
-    for name, run, epochs in (("train", train, 100), ("bound", bound, 100)):
+    for name, run, epochs in (("train", train, 60), ("bound", bound, 60)):
         one = parts.add_parser(name)
         one.add_argument("walks", type=pathlib.Path)
         one.add_argument("--seed", type=int, default=1)

@@ -18,7 +18,8 @@
 
 _Static_assert(offsetof(WebModel, task) % 8 == 0, "as TaskDef");
 _Static_assert(STANDING_MAX <= MILD_FEET_MAX, "the ground has a place for all");
-_Static_assert(3 * BELIEF_PARAMETERS == sizeof ((WebView *)0)->known / sizeof(float), "WebView.known");
+_Static_assert(3 * BELIEF_PARAMETERS == sizeof((WebView *)0)->known / sizeof(float),
+               "WebView.known");
 _Static_assert(offsetof(WebModel, geom) - offsetof(WebModel, geoms) == 4, "as web_picture says");
 
 static struct {
@@ -350,10 +351,9 @@ static void look_at_ground(void) {
     view->alarms = (float)web.belief.alarms;
     for (int i = 0; i < 3 * BELIEF_PARAMETERS; i++) {
         const double share[3] = {0.05, 0.5, 0.95};
-        view->known[i] =
-            (float)(belief_names[i / 3].scale * belief_quantile(&web.belief, &file->belief,
-                                                                (BeliefParameter)(i / 3),
-                                                                share[i % 3]));
+        view->known[i] = (float)(belief_names[i / 3].scale *
+                                 belief_quantile(&web.belief, &file->belief,
+                                                 (BeliefParameter)(i / 3), share[i % 3]));
     }
 }
 

@@ -85,7 +85,7 @@ typedef struct {
     int32_t shells;       /* that stand on soft ground */
     WebShell shell[ROBOT_SHELLS_MAX];
     WebPolicy policy;
-    int32_t knows;    /* bool: the robot knows its ground, by `belief` */
+    int32_t knows; /* bool: the robot knows its ground, by `belief` */
     BeliefNet belief;
     int32_t geoms;
     WebGeom geom[WEB_GEOMS_MAX];

@@ -10,8 +10,8 @@
 #include <string.h>
 
 #include "base/file.h"
-#include "identify/belief/file.h"
 #include "env/kernels.h"
+#include "identify/belief/file.h"
 #include "learn/network.h"
 #include "learn/policy.h"
 #include "robot/description.h"

@@ -18,13 +18,13 @@
 
 typedef struct {
     Context context;
-    const char *json, *gamepad, *listen, *connect, *bind, *peer, *key,
-        *ground, *log; /* NULL: not given */
+    const char *json, *gamepad, *listen, *connect, *bind, *peer, *key, *ground,
+        *log; /* NULL: not given */
     CliNumbers command, delay;
     int simulate, no_keys, lockstep;
     RunnerDef runner;
     SimulatedDef simulated;
-    Key secret; /* of --key */
+    Key secret;        /* of --key */
     BeliefNet *belief; /* NULL: the robot has none */
     double seconds;
 } Drive;

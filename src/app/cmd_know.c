@@ -49,17 +49,17 @@ static void log_step(void *context, const WalkStep *step) {
         row[ROW - FEET + f] = (float)step->material[f];
     }
     const long at = NPY_HEAD + ((long)step->walk * log->steps + step->step) * (long)sizeof row;
-    log->failed |= fseek(log->file, at, SEEK_SET) != 0 ||
-                   fwrite(row, sizeof row, 1, log->file) != 1;
+    log->failed |=
+        fseek(log->file, at, SEEK_SET) != 0 || fwrite(row, sizeof row, 1, log->file) != 1;
 }
 
 /* Of NumPy's format 1.0. */
 static void log_head(const Log *log, int walks) {
     static const char magic[10] = "\x93NUMPY\x01\x00v"; /* 118 characters follow */
     char head[NPY_HEAD], shape[NPY_HEAD];
-    const int length = snprintf(
-        shape, sizeof shape, "{'descr': '<f4', 'fortran_order': False, 'shape': (%d, %d, %d), }",
-        walks, log->steps, ROW);
+    const int length = snprintf(shape, sizeof shape,
+                                "{'descr': '<f4', 'fortran_order': False, 'shape': (%d, %d, %d), }",
+                                walks, log->steps, ROW);
     memset(head, ' ', sizeof head);
     memcpy(head, magic, sizeof magic);
     memcpy(head + sizeof magic, shape, (size_t)length);
@@ -80,8 +80,8 @@ static void log_truths(const StudyWalk *walk, int count, FILE *csv) {
                 w->walk.commands, w->walk.command[0][0]);
         for (int g = 0; g < 2; g++) {
             const PriorGround *p = &w->ground[g];
-            fprintf(csv, ",%.6g,%.6g,%.6g,%.6g,%.6g,%d", p->sinkage, p->k_pen, p->sigma_cone,
-                    p->mu, p->slip_length, p->preset);
+            fprintf(csv, ",%.6g,%.6g,%.6g,%.6g,%.6g,%d", p->sinkage, p->k_pen, p->sigma_cone, p->mu,
+                    p->slip_length, p->preset);
         }
         fprintf(csv, "\n");
     }
@@ -103,8 +103,8 @@ static MildStatus log_walks(const Know *k, StudyWalk *walk, MildError *error) {
     log.file = fopen(k->walks, "wb");
     FILE *csv = fopen(truths, "w");
     if (!log.file || !csv) {
-        status = mild_fail(error, MILD_ERROR_ARGUMENT, "%s: cannot write it and %s", k->walks,
-                           truths);
+        status =
+            mild_fail(error, MILD_ERROR_ARGUMENT, "%s: cannot write it and %s", k->walks, truths);
     }
     if (status == MILD_OK) {
         log_head(&log, k->grounds);
@@ -160,7 +160,8 @@ static void print_changes(const JudgeResult *result) {
                names[b], border->borders, border->in_two, border->in_four,
                text_cell("%.1f", border->delay, text));
     }
-    printf("%d walks fell; a step takes %.2f us\n", result->fell, 1e6 * result->step);
+    printf("%d walks fell, %d with an alarm in the second before; a step takes %.2f us\n",
+           result->fell, result->before_falls, 1e6 * result->step);
 }
 
 static cJSON *result_json(const Know *k, const JudgeResult *result) {
@@ -194,6 +195,7 @@ static cJSON *result_json(const Know *k, const JudgeResult *result) {
         cJSON_AddItemToArray(borders, row);
     }
     cJSON_AddNumberToObject(root, "false_alarms", result->false_alarms);
+    cJSON_AddNumberToObject(root, "before_falls", result->before_falls);
     cJSON_AddNumberToObject(root, "minutes", result->minutes);
     cJSON_AddNumberToObject(root, "fell", result->fell);
     cJSON_AddNumberToObject(root, "step_s", result->step);
@@ -203,8 +205,8 @@ static cJSON *result_json(const Know *k, const JudgeResult *result) {
 static MildStatus judge(const Know *k, MildError *error) {
     char shipped[PATH_SIZE];
     JudgeResult result;
-    BeliefNet *net = belief_read(k->weights ? k->weights : path_data(BELIEF_SHIPPED, shipped),
-                                 error);
+    BeliefNet *net =
+        belief_read(k->weights ? k->weights : path_data(BELIEF_SHIPPED, shipped), error);
     if (!net) {
         return error->status;
     }
@@ -236,10 +238,10 @@ static MildStatus choose_ground(Know *k, MildError *error) {
         s->preset = s->rigid ? NULL : &k->preset;
     }
     if (status == MILD_OK && k->context.model && !mild_model_find(k->context.model, &model)) {
-        status = mild_fail(error, MILD_ERROR_ARGUMENT,
-                           "--model: unknown model '%.40s'; nearest is '%s'", k->context.model,
-                           text_nearest(k->context.model, (const char **)mild_model_names,
-                                        MILD_MODELS));
+        status =
+            mild_fail(error, MILD_ERROR_ARGUMENT, "--model: unknown model '%.40s'; nearest is '%s'",
+                      k->context.model,
+                      text_nearest(k->context.model, (const char **)mild_model_names, MILD_MODELS));
     }
     s->rigid |= model == MILD_MODEL_RIGID;
     s->model = s->rigid ? MILD_MODEL_MILD : model;
@@ -279,9 +281,9 @@ static MildStatus run_know(Know *k, const CliArgs *args, MildError *error) {
     MildStatus status = open_study(k, args, error);
     if (status == MILD_OK && k->walks) {
         StudyWalk *walk = calloc((size_t)k->grounds, sizeof *walk);
-        status = walk ? log_walks(k, walk, error)
-                      : mild_fail(error, MILD_ERROR_MEMORY, "out of memory for %d walks",
-                                  k->grounds);
+        status =
+            walk ? log_walks(k, walk, error)
+                 : mild_fail(error, MILD_ERROR_MEMORY, "out of memory for %d walks", k->grounds);
         free(walk);
     } else if (status == MILD_OK) {
         status = judge(k, error);
@@ -296,8 +298,9 @@ static int parse_and_run(Know *k, CliArgs *args, int argc, char **argv) {
         context_config(&k->context),
         {"weights", CLI_INPUT, &k->weights, 0, 0, "FILE",
          "weights to judge (default policies/knows.safetensors)"},
-        {"grounds", CLI_INT, &k->grounds, 1, 100000, "N", "walks, each on a ground of its own "
-                                                          "(default 600)"},
+        {"grounds", CLI_INT, &k->grounds, 1, 100000, "N",
+         "walks, each on a ground of its own "
+         "(default 600)"},
         {"seconds", CLI_NUMBER, &k->study.seconds, 1, 3600, "T",
          "[s] length of each walk (default 12)"},
         {"changes", CLI_NUMBER, &k->study.change_share, 0, 1, "P",
@@ -317,10 +320,12 @@ static int parse_and_run(Know *k, CliArgs *args, int argc, char **argv) {
         {"walks", CLI_OUTPUT, &k->walks, 0, 0, "FILE.npy",
          "write the walks to FILE.npy and their grounds to FILE.csv, and judge nothing"},
         {"seed", CLI_UINT64, &k->study.seed, 0, 0, "S", "seed of everything drawn (default 99)"},
-        {"threads", CLI_INT, &k->threads, 0, 1024, "N", "threads; 0: one for each core (default "
-                                                        "0)"},
-        {"json", CLI_OUTPUT, &k->json, 0, 0, "FILE", "write the results to FILE; - for standard "
-                                                     "output"},
+        {"threads", CLI_INT, &k->threads, 0, 1024, "N",
+         "threads; 0: one for each core (default "
+         "0)"},
+        {"json", CLI_OUTPUT, &k->json, 0, 0, "FILE",
+         "write the results to FILE; - for standard "
+         "output"},
     };
     const CliCommand command = {
         .name = "know",

@@ -35,15 +35,15 @@ typedef struct {
     uint64_t seed;
     const BeliefNet *belief; /* what the robot knows of its ground; NULL: it has none */
     FILE *log;               /* of the frames that its policy sees (belief/log.h); NULL: none */
-    int window;  /* bool: real time, keys */
+    int window;              /* bool: real time, keys */
     int presets; /* materials at the end of the scene's terrain that keys lay under the robot */
     /* filled */
     PlayLeg leg[MILD_MATERIALS_MAX];
-    double time; /* [s] walked */
-    int fell;    /* bool */
-    Belief knows;                   /* with `belief`: at the end */
-    double alarm[PLAY_ALARMS];      /* [s] when the robot felt another ground; the first ones */
-    int changed; /* bool: keys changed the ground; the legs are measured until then */
+    double time;               /* [s] walked */
+    int fell;                  /* bool */
+    Belief knows;              /* with `belief`: at the end */
+    double alarm[PLAY_ALARMS]; /* [s] when the robot felt another ground; the first ones */
+    int changed;               /* bool: keys changed the ground; the legs are measured until then */
     int frames;
 } Play;
 

@@ -54,7 +54,8 @@ static int teardown(void **state) {
  * mirror, where it begins with the other foot. */
 static void make_frame(int t, double loud, int mirrored, float frame[BELIEF_FRAME]) {
     static const int legs[12] = {6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5};
-    static const double sign[6] = {-1, -1, 1, 1, 1, -1}, first[9] = {-1, 1, -1, 1, -1, -1, 1, -1, 1};
+    static const double sign[6] = {-1, -1, 1, 1, 1, -1},
+                        first[9] = {-1, 1, -1, 1, -1, -1, 1, -1, 1};
     const double phase = (t + 0.5) / (2 * STEP);
     Random r = random_at(7, (uint32_t)t, 0);
     float plain[BELIEF_FRAME];

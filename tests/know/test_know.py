@@ -38,22 +38,24 @@ def elu(x):
 
 def follow(frames, w):
     """[(frame, alarm, log odds, centers, spreads)]: the recursion in 64 bits, all footsteps kept."""
-    said, steps, memory, before, newest = [], know.footsteps(frames), np.zeros(know.EMBED), 0, []
+    said, steps, memory, asked, before, newest = [], know.footsteps(frames), np.zeros(know.EMBED), np.zeros(3), 0, []
     for values, _, end in steps:
         h = elu(values.astype(np.float32).astype(float) @ w["embed"] + w["embed_bias"])
         if len(newest) == 2:
             before = min(before + 1, know.MEMORY)
-            memory = memory + (newest[0] - memory) / before
-        newest = [*newest, h][-2:]
+            memory = memory + (newest[0][0] - memory) / before
+            asked = asked + (newest[0][1] - asked) / before
+        newest = [*newest, (h, values[know.COMMAND])][-2:]
         odds = None
         if before:
-            x = np.r_[h - memory, newest[0] - memory, 1 / before, math.log(before) / 3]
-            odds = float(elu(x @ w["odds"] + w["odds_bias"]) @ w["odds_out"] + w["odds_out_bias"].sum())
+            x = np.r_[h - memory, newest[0][0] - memory, memory, newest[1][1] - asked, newest[0][1] - asked, 1 / before, math.log(before) / 3]
+            x = elu(elu(x @ w["odds"] + w["odds_bias"]) @ w["odds_second"] + w["odds_second_bias"])
+            odds = float((x @ w["odds_out"] + w["odds_out_bias"]).sum())
         alarm = odds is not None and odds > w["alarm"].sum()
         if alarm:
-            before, memory = 0, np.zeros(know.EMBED)
+            before, memory, asked = 0, np.zeros(know.EMBED), np.zeros(3)
         n = min(before + len(newest), know.MEMORY)
-        mean = (before * memory + sum(newest)) / (before + len(newest))
+        mean = (before * memory + sum(h for h, _ in newest)) / (before + len(newest))
         out = elu(np.r_[mean, 1 / n, math.log(n) / 3] @ w["hidden"] + w["hidden_bias"]) @ w["out"] + w["out_bias"]
         widen = [np.interp(math.log2(n), np.arange(6), row) for row in w["widen"]]
         said.append((end, alarm, odds, out[: know.COUNT], np.exp(0.5 * np.clip(out[know.COUNT :], -6, 3)) * widen))

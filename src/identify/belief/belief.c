@@ -37,8 +37,7 @@ static void read_frame(const float *frame, int mirror, double channel[BELIEF_CHA
     for (int i = 0; i < 3 * JOINTS; i++) {
         const int kind = i / JOINTS, at = i % JOINTS;
         const int from = mirror ? (at + LEG) % JOINTS : at;
-        channel[6 + i] =
-            (double)frame[9 + kind * JOINTS + from] * (mirror ? joint[at % LEG] : 1);
+        channel[6 + i] = (double)frame[9 + kind * JOINTS + from] * (mirror ? joint[at % LEG] : 1);
     }
 }
 
@@ -142,18 +141,27 @@ static void find_posterior(Belief *belief, const BeliefNet *net, const float *me
 
 /* Log odds that the last two footsteps are on other ground than those of the mean. */
 static float find_odds(const Belief *belief, const BeliefNet *net) {
-    float in[2 * BELIEF_EMBED + 2], hidden[BELIEF_ODDS], out = net->odds_out_bias;
+    float in[3 * BELIEF_EMBED + 8], hidden[BELIEF_ODDS], second[BELIEF_ODDS_SECOND];
+    float *commands = in + 3 * BELIEF_EMBED, out = net->odds_out_bias;
     for (int i = 0; i < BELIEF_EMBED; i++) {
         in[i] = belief->last[0][i] - belief->mean[i];
         in[BELIEF_EMBED + i] = belief->last[1][i] - belief->mean[i];
+        in[2 * BELIEF_EMBED + i] = belief->mean[i];
     }
-    in[2 * BELIEF_EMBED] = 1 / belief->before;
-    in[2 * BELIEF_EMBED + 1] = logf(belief->before) / 3;
+    for (int i = 0; i < 3; i++) {
+        commands[i] = belief->last_command[0][i] - belief->mean_command[i];
+        commands[3 + i] = belief->last_command[1][i] - belief->mean_command[i];
+    }
+    commands[6] = 1 / belief->before;
+    commands[7] = logf(belief->before) / 3;
     memcpy(hidden, net->odds_bias, sizeof hidden);
-    add_product(2 * BELIEF_EMBED + 2, BELIEF_ODDS, net->odds[0], in, hidden);
+    add_product(3 * BELIEF_EMBED + 8, BELIEF_ODDS, net->odds[0], in, hidden);
     elu(hidden, BELIEF_ODDS);
-    for (int i = 0; i < BELIEF_ODDS; i++) {
-        out += hidden[i] * net->odds_out[i];
+    memcpy(second, net->odds_second_bias, sizeof second);
+    add_product(BELIEF_ODDS, BELIEF_ODDS_SECOND, net->odds_second[0], hidden, second);
+    elu(second, BELIEF_ODDS_SECOND);
+    for (int i = 0; i < BELIEF_ODDS_SECOND; i++) {
+        out += second[i] * net->odds_out[i];
     }
     return out;
 }
@@ -161,15 +169,21 @@ static float find_odds(const Belief *belief, const BeliefNet *net) {
 /* ---- recursion ---- */
 
 /* Moves the older of the last two footsteps into the mean. */
-static void shift(Belief *belief, const float *embedded) {
+static void shift(Belief *belief, const float *embedded, const float *command) {
     if (belief->lasts == 2) {
         belief->before = fminf(belief->before + 1, BELIEF_MEMORY);
         for (int i = 0; i < BELIEF_EMBED; i++) {
             belief->mean[i] += (belief->last[1][i] - belief->mean[i]) / belief->before;
         }
+        for (int i = 0; i < 3; i++) {
+            belief->mean_command[i] +=
+                (belief->last_command[1][i] - belief->mean_command[i]) / belief->before;
+        }
     }
     memcpy(belief->last[1], belief->last[0], sizeof belief->last[1]);
     memcpy(belief->last[0], embedded, sizeof belief->last[0]);
+    memcpy(belief->last_command[1], belief->last_command[0], sizeof belief->last_command[1]);
+    memcpy(belief->last_command[0], command, sizeof belief->last_command[0]);
     belief->lasts += belief->lasts < 2;
 }
 
@@ -199,12 +213,13 @@ static int take_footstep(Belief *belief, const BeliefNet *net) {
     memcpy(embedded, net->embed_bias, sizeof embedded);
     add_product(BELIEF_FEATURES, BELIEF_EMBED, net->embed[0], features, embedded);
     elu(embedded, BELIEF_EMBED);
-    shift(belief, embedded);
+    shift(belief, embedded, features + BELIEF_BINS * BELIEF_CHANNELS);
     belief->footsteps++;
     belief->log_odds = belief->before > 0 ? find_odds(belief, net) : -INFINITY;
     if (belief->log_odds > net->alarm) {
         belief->before = 0; /* the last two footsteps are all that is known of the new ground */
         memset(belief->mean, 0, sizeof belief->mean);
+        memset(belief->mean_command, 0, sizeof belief->mean_command);
         belief->footsteps = belief->lasts;
         belief->alarms++;
         event |= BELIEF_ALARM;
@@ -273,9 +288,9 @@ static double value_at(const float knot[BELIEF_KNOTS], double place) {
 
 double belief_quantile(const Belief *belief, const BeliefNet *net, BeliefParameter parameter,
                        double share) {
-    return exp(value_at(net->prior[parameter], (double)belief->center[parameter] +
-                                                   (double)belief->spread[parameter] *
-                                                       normal_quantile(share)));
+    return exp(value_at(net->prior[parameter],
+                        (double)belief->center[parameter] +
+                            (double)belief->spread[parameter] * normal_quantile(share)));
 }
 
 double belief_log_mean(const Belief *belief, const BeliefNet *net, BeliefParameter parameter) {

@@ -43,7 +43,8 @@ enum {
     BELIEF_FEATURES = (BELIEF_BINS + 1) * BELIEF_CHANNELS + 4,
     BELIEF_EMBED = 96,
     BELIEF_HIDDEN = 64,
-    BELIEF_ODDS = 24,   /* hidden width of the alarm */
+    BELIEF_ODDS = 48, /* hidden widths of the alarm */
+    BELIEF_ODDS_SECOND = 16,
     BELIEF_KNOTS = 31,  /* of a prior, from -3 to 3 standard deviations */
     BELIEF_DEPTHS = 6,  /* of evidence: 1, 2, 4, 8, 16, 32 footsteps */
     BELIEF_MEMORY = 24, /* footsteps; of more the oldest fade */
@@ -62,9 +63,12 @@ typedef struct {
     float prior[BELIEF_PARAMETERS][BELIEF_KNOTS];
     /* factors of the standard deviations, by log2 of the footsteps: calibrated */
     float widen[BELIEF_PARAMETERS][BELIEF_DEPTHS];
-    float odds[2 * BELIEF_EMBED + 2][BELIEF_ODDS];
+    /* last two footsteps less the mean, the mean, the same of their commands, 1/n, log(n)/3 */
+    float odds[3 * BELIEF_EMBED + 8][BELIEF_ODDS];
     float odds_bias[BELIEF_ODDS];
-    float odds_out[BELIEF_ODDS];
+    float odds_second[BELIEF_ODDS][BELIEF_ODDS_SECOND];
+    float odds_second_bias[BELIEF_ODDS_SECOND];
+    float odds_out[BELIEF_ODDS_SECOND];
     float odds_out_bias;
     float alarm; /* log odds above which the ground has changed */
 } BeliefNet;
@@ -81,6 +85,8 @@ typedef struct {
     /* of the last two footsteps, the newer one first, and the mean of those before */
     float last[2][BELIEF_EMBED];
     float mean[BELIEF_EMBED];
+    float last_command[2][3]; /* as in the frames */
+    float mean_command[3];
     int32_t lasts;     /* 0 .. 2 */
     float before;      /* footsteps in the mean */
     int32_t footsteps; /* since the reset or the last alarm */

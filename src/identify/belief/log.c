@@ -49,9 +49,9 @@ static MildStatus read_header(Reader *reader, MildError *error) {
     }
     reader->time = find_column(cells, count, "time_s");
     reader->trial = find_column(cells, count, "trial");
-    return reader->time >= 0 ? MILD_OK
-                             : mild_fail(error, MILD_ERROR_FORMAT, "%.200s: no column time_s",
-                                         reader->text.path);
+    return reader->time >= 0
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_FORMAT, "%.200s: no column time_s", reader->text.path);
 }
 
 static MildStatus read_number(const Reader *reader, char *const *cells, int count, int place,

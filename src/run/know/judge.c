@@ -21,6 +21,8 @@ typedef struct {
     int touched;             /* step of the first contact with the second ground; 0: none yet */
     int crossed;             /* footsteps on the second ground */
     int flagged;             /* the same, when the alarm came; 0: it has not */
+    int false_alarms;
+    int latest; /* policy step of the latest of them */
 } Judged;
 
 typedef struct {
@@ -53,14 +55,15 @@ static void keep_depths(const Judge *j, Judged *judged) {
 }
 
 /* A footstep counts as one on the second ground if at least half of it came after the contact. */
-static void count_footstep(Judge *j, Judged *judged, int step, int event) {
+static void count_footstep(Judged *judged, int step, int event) {
     if (judged->touched && 2 * (step - judged->touched) >= step - judged->began) {
         judged->crossed++;
     }
     judged->began = step;
     if (event & BELIEF_ALARM) {
         if (!judged->touched) {
-            j->result->false_alarms++;
+            judged->false_alarms++;
+            judged->latest = step;
         } else if (!judged->flagged) {
             judged->flagged = judged->crossed > 0 ? judged->crossed : 1;
         }
@@ -81,7 +84,7 @@ static void judge_step(void *context, const WalkStep *step) {
     }
     j->calm += !judged->touched;
     if (event & BELIEF_FOOTSTEP) {
-        count_footstep(j, judged, step->step, event);
+        count_footstep(judged, step->step, event);
         if (!judged->touched) {
             keep_depths(j, judged);
         }
@@ -157,7 +160,13 @@ static void judge_borders(const Judge *j, int count) {
 static void judge_all(Judge *j, int count, double *factor) {
     for (int i = 0; i < count; i++) {
         Judged *judged = &j->judged[i];
-        j->result->fell += j->walk[i].lasted * TASK_PERIOD < j->walk[i].seconds - 0.5 * TASK_PERIOD;
+        const StudyWalk *walk = &j->walk[i];
+        const int fell = walk->lasted * TASK_PERIOD < walk->seconds - 0.5 * TASK_PERIOD;
+        const int falling =
+            fell && judged->false_alarms && (walk->lasted - judged->latest) * TASK_PERIOD <= 1;
+        j->result->fell += fell;
+        j->result->before_falls += falling;
+        j->result->false_alarms += judged->false_alarms - falling;
         if (!judged->touched && judged->belief.footsteps > 0) {
             keep(j, judged, JUDGE_LAST);
         }
@@ -177,10 +186,9 @@ MildStatus judge_run(const StudyDef *study, const BeliefNet *net, int count, Jud
     StudyWalk *walk = calloc((size_t)count, sizeof *walk);
     Judged *judged = calloc((size_t)count, sizeof *judged);
     double *factor = calloc((size_t)count, sizeof *factor);
-    MildStatus status = walk && judged && factor
-                            ? MILD_OK
-                            : mild_fail(error, MILD_ERROR_MEMORY, "out of memory for %d walks",
-                                        count);
+    MildStatus status = walk && judged && factor ? MILD_OK
+                                                 : mild_fail(error, MILD_ERROR_MEMORY,
+                                                             "out of memory for %d walks", count);
     memset(result, 0, sizeof *result);
     if (status == MILD_OK) {
         Judge j = {.net = net, .walk = walk, .judged = judged, .result = result};

@@ -37,7 +37,8 @@ typedef struct {
     JudgeCell cell[JUDGE_DEPTHS][BELIEF_PARAMETERS];
     JudgeBorders border[JUDGE_BORDERS];
     double minutes;   /* [min] of walking with footsteps, before a border */
-    int false_alarms; /* in these */
+    int false_alarms; /* in these, but for those in the last second before a fall */
+    int before_falls; /* these */
     int fell;         /* walks */
     double step;      /* [s] of belief_step, mean */
 } JudgeResult;

@@ -29,9 +29,9 @@ typedef struct {
 typedef struct {
     PriorGround ground[2]; /* of the terrain's materials */
     int grounds;
-    int drawn;    /* bool: the robot is randomised */
-    double noise; /* [-] of that of training */
-    int lasted;   /* [policy steps] until a fall or the end */
+    int drawn;      /* bool: the robot is randomised */
+    double noise;   /* [-] of that of training */
+    int lasted;     /* [policy steps] until a fall or the end */
     double seconds; /* [s] that were asked for */
     Walk walk;
 } StudyWalk;

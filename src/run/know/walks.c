@@ -47,10 +47,10 @@ static void show(const Walks *w, int i, int step) {
                     .command = w->command + 3 * (size_t)i};
     for (int f = 0; f < w->shape.feet; f++) {
         const EnvsFoot *foot = &last->foot[f];
-        now.material[f] = step == 0 || foot->load < FOOT_LOAD
-                              ? -1
-                              : mild_terrain_material_at(&w->terrain[i], foot->center[0],
-                                                         foot->center[1]);
+        now.material[f] =
+            step == 0 || foot->load < FOOT_LOAD
+                ? -1
+                : mild_terrain_material_at(&w->terrain[i], foot->center[0], foot->center[1]);
     }
     w->def->stepped(w->def->context, &now);
 }

@@ -22,10 +22,10 @@ typedef struct {
 /* A policy step of a walk that has not fallen. */
 typedef struct {
     int walk, step;
-    const float *frame;                /* [TaskShape.observation] what the policy sees */
-    const float *critic;               /* [TaskShape.critic] the same without noise, and the truth */
-    const double *command;             /* [3] */
-    int material[ROBOT_FEET_MAX];      /* of the terrain, under the foot; -1: the foot is free */
+    const float *frame;           /* [TaskShape.observation] what the policy sees */
+    const float *critic;          /* [TaskShape.critic] the same without noise, and the truth */
+    const double *command;        /* [3] */
+    int material[ROBOT_FEET_MAX]; /* of the terrain, under the foot; -1: the foot is free */
 } WalkStep;
 
 typedef struct {
