@@ -19,7 +19,7 @@
 typedef struct {
     Context context;
     const char *walks, *weights, *prior, *ground, *json;
-    CliNumbers speed;
+    CliNumbers speed, slick, care;
     int grounds, threads;
     StudyDef study;
     TaskDef drawn; /* the randomised robots' */
@@ -108,7 +108,8 @@ static MildStatus log_walks(const Know *k, StudyWalk *walk, MildError *error) {
     }
     if (status == MILD_OK) {
         log_head(&log, k->grounds);
-        status = study_run(&k->study, walk, k->grounds, log_step, &log, error);
+        const StudyWatcher watcher = {log_step, NULL, &log};
+        status = study_run(&k->study, walk, k->grounds, &watcher, error);
     }
     if (status == MILD_OK) {
         log_truths(walk, k->grounds, csv);
@@ -210,7 +211,8 @@ static MildStatus judge(const Know *k, MildError *error) {
     if (!net) {
         return error->status;
     }
-    MildStatus status = judge_run(&k->study, net, k->grounds, &result, error);
+    const JudgeCare care = {k->care.value[0], k->care.value[1]};
+    MildStatus status = judge_run(&k->study, net, &care, k->grounds, &result, error);
     free(net);
     if (status != MILD_OK) {
         return status;
@@ -248,6 +250,17 @@ static MildStatus choose_ground(Know *k, MildError *error) {
     return status;
 }
 
+static MildStatus check_pairs(const Know *k, MildError *error) {
+    if (k->slick.count && (k->slick.count != 2 || k->slick.value[1] < k->slick.value[0])) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--slick: lowest and highest friction, as 0.2,0.3");
+    }
+    if (k->care.count && k->care.count != 2) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--care: friction and speed, as 0.3,0.4");
+    }
+    return MILD_OK;
+}
+
 static MildStatus open_study(Know *k, const CliArgs *args, MildError *error) {
     Context *c = &k->context;
     StudyDef *s = &k->study;
@@ -274,7 +287,8 @@ static MildStatus open_study(Know *k, const CliArgs *args, MildError *error) {
     s->pool = c->pool;
     s->controller = &c->mover;
     memcpy(s->speed, k->speed.value, sizeof s->speed);
-    return status;
+    memcpy(s->slick, k->slick.value, sizeof s->slick);
+    return status == MILD_OK ? check_pairs(k, error) : status;
 }
 
 static MildStatus run_know(Know *k, const CliArgs *args, MildError *error) {
@@ -313,6 +327,11 @@ static int parse_and_run(Know *k, CliArgs *args, int argc, char **argv) {
         {"speed", CLI_NUMBERS, &k->speed, -1.3, 1.3, "LOW[,HIGH]",
          "[m/s] straight walks of speeds between these (default: any command, also changing "
          "ones)"},
+        {"slick", CLI_NUMBERS, &k->slick, 0.05, 2, "LOW,HIGH",
+         "[-] friction of each walk's ground, or of that behind its border (default: as drawn)"},
+        {"care", CLI_NUMBERS, &k->care, 0, 2, "MU,V",
+         "[-, m/s] the robot walks no faster than V while it believes friction to be below MU "
+         "(default: it does nothing)"},
         {"robots", CLI_NUMBER, &k->study.robots, 0, 1, "P",
          "[-] share of the walks with robots drawn and pushed as in training (default 0.5)"},
         {"quiet", CLI_NUMBER, &k->study.quiet, 0, 1, "P",

@@ -111,7 +111,7 @@ double belief_quantile(const Belief *belief, const BeliefNet *net, BeliefParamet
 double belief_log_mean(const Belief *belief, const BeliefNet *net, BeliefParameter parameter);
 /* [prior standard deviations] Of a value [SI]; the prior ends at 3. */
 double belief_place(const BeliefNet *net, BeliefParameter parameter, double value);
-/* Writes the median and the 90 % interval of each parameter in a line: "sinkage 12 mm (9 .. 16)". */
+/* Writes the median and the 90 % interval of each parameter in a line: "sinkage 12 mm (9 .. 16)" */
 void belief_text(const Belief *belief, const BeliefNet *net, char *text, int size);
 /* The same with a line for each. */
 void belief_lines(const Belief *belief, const BeliefNet *net, char *text, int size);

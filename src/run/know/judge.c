@@ -27,6 +27,7 @@ typedef struct {
 
 typedef struct {
     const BeliefNet *net;
+    const JudgeCare *care;
     const StudyWalk *walk;
     Judged *judged;
     JudgeResult *result;
@@ -89,6 +90,14 @@ static void judge_step(void *context, const WalkStep *step) {
             keep_depths(j, judged);
         }
     }
+}
+
+static double limit_speed(void *context, int walk) {
+    const Judge *j = context;
+    const Belief *belief = &j->judged[walk].belief;
+    return belief->footsteps > 0 && belief_quantile(belief, j->net, BELIEF_mu, 0.5) < j->care->mu
+               ? j->care->speed
+               : INFINITY;
 }
 
 static double truth_of(const PriorGround *ground, int parameter) {
@@ -181,8 +190,8 @@ static void judge_all(Judge *j, int count, double *factor) {
     j->result->step = j->steps ? j->spent / (double)j->steps : 0;
 }
 
-MildStatus judge_run(const StudyDef *study, const BeliefNet *net, int count, JudgeResult *result,
-                     MildError *error) {
+MildStatus judge_run(const StudyDef *study, const BeliefNet *net, const JudgeCare *care, int count,
+                     JudgeResult *result, MildError *error) {
     StudyWalk *walk = calloc((size_t)count, sizeof *walk);
     Judged *judged = calloc((size_t)count, sizeof *judged);
     double *factor = calloc((size_t)count, sizeof *factor);
@@ -191,11 +200,12 @@ MildStatus judge_run(const StudyDef *study, const BeliefNet *net, int count, Jud
                                                              "out of memory for %d walks", count);
     memset(result, 0, sizeof *result);
     if (status == MILD_OK) {
-        Judge j = {.net = net, .walk = walk, .judged = judged, .result = result};
+        Judge j = {.net = net, .care = care, .walk = walk, .judged = judged, .result = result};
         for (int i = 0; i < count; i++) {
             belief_reset(&judged[i].belief);
         }
-        status = study_run(study, walk, count, judge_step, &j, error);
+        const StudyWatcher watcher = {judge_step, care->mu > 0 ? limit_speed : NULL, &j};
+        status = study_run(study, walk, count, &watcher, error);
         if (status == MILD_OK) {
             judge_all(&j, count, factor);
         }

@@ -43,8 +43,15 @@ typedef struct {
     double step;      /* [s] of belief_step, mean */
 } JudgeResult;
 
+/* What the robot does with what it knows: it walks no faster than `speed` [m/s] while the median
+ * of its friction is below `mu`. */
+typedef struct {
+    double mu; /* [-] 0: nothing */
+    double speed;
+} JudgeCare;
+
 /* count: walks. */
-MildStatus judge_run(const StudyDef *study, const BeliefNet *net, int count, JudgeResult *result,
-                     MildError *error);
+MildStatus judge_run(const StudyDef *study, const BeliefNet *net, const JudgeCare *care, int count,
+                     JudgeResult *result, MildError *error);
 
 #endif

@@ -77,6 +77,11 @@ static void draw_walk(const StudyDef *def, uint32_t number, StudyWalk *walk) {
     if (changes) {
         draw_border(def, &r, walk);
     }
+    if (def->slick[1] > 0) {
+        const int last = walk->grounds - 1;
+        const double mu = def->slick[0] * pow(def->slick[1] / def->slick[0], random_unit(&r));
+        walk->walk.terrain.materials[last].mu = walk->ground[last].mu = mu;
+    }
 }
 
 static TaskDef draw_task(const StudyDef *def, uint32_t batch, StudyWalk *walk, int count) {
@@ -98,8 +103,7 @@ static TaskDef draw_task(const StudyDef *def, uint32_t batch, StudyWalk *walk, i
 /* ---- the run ---- */
 
 typedef struct {
-    void (*stepped)(void *context, const WalkStep *step);
-    void *context;
+    const StudyWatcher *watcher;
     int first;
 } Numbered;
 
@@ -107,11 +111,15 @@ static void count_on(void *context, const WalkStep *step) {
     const Numbered *numbered = context;
     WalkStep same = *step;
     same.walk += numbered->first;
-    numbered->stepped(numbered->context, &same);
+    numbered->watcher->stepped(numbered->watcher->context, &same);
 }
 
-MildStatus study_run(const StudyDef *def, StudyWalk *walk, int count,
-                     void (*stepped)(void *context, const WalkStep *step), void *context,
+static double limit_on(void *context, int walk) {
+    const Numbered *numbered = context;
+    return numbered->watcher->limit(numbered->watcher->context, walk + numbered->first);
+}
+
+MildStatus study_run(const StudyDef *def, StudyWalk *walk, int count, const StudyWatcher *watcher,
                      MildError *error) {
     MildStatus status = MILD_OK;
     robot_set_model(def->robot, def->model);
@@ -119,7 +127,7 @@ MildStatus study_run(const StudyDef *def, StudyWalk *walk, int count,
         const int batch = count - first < STUDY_BATCH ? count - first : STUDY_BATCH;
         Walk walks[STUDY_BATCH];
         int lasted[STUDY_BATCH];
-        Numbered numbered = {stepped, context, first};
+        Numbered numbered = {watcher, first};
         for (int i = 0; i < batch; i++) {
             draw_walk(def, (uint32_t)(first + i), &walk[first + i]);
             walks[i] = walk[first + i].walk;
@@ -135,7 +143,8 @@ MildStatus study_run(const StudyDef *def, StudyWalk *walk, int count,
                               .seed = def->seed,
                               .first = (uint32_t)first,
                               .stepped = count_on,
-                              .context = &numbered};
+                              .context = &numbered,
+                              .limit = watcher->limit ? limit_on : NULL};
         status = walks_run(&run, lasted, error);
         for (int i = 0; i < batch && status == MILD_OK; i++) {
             walk[first + i].lasted = lasted[i];

@@ -18,6 +18,8 @@ typedef struct {
     MildModel model;     /* another than mild: the material is matched to what was drawn */
     double change_share; /* [-] of the walks, from one ground onto another; these go straight */
     double speed[2];     /* [m/s] of straight walks alone; 0 0: any command */
+    double slick[2];     /* [-] friction of the last ground of each walk, evenly in its logarithm;
+                            0 0: as drawn */
     double robots;       /* [-] share of the batches with randomised robots */
     double quiet;        /* [-] share of the batches with less noise than in training */
     int rigid;           /* bool: on the engine's own contact */
@@ -36,10 +38,15 @@ typedef struct {
     Walk walk;
 } StudyWalk;
 
-/* walk: [count], a multiple of STUDY_BATCH or less than one. stepped: as WalksDef's, with the
- * number of the walk. */
-MildStatus study_run(const StudyDef *def, StudyWalk *walk, int count,
-                     void (*stepped)(void *context, const WalkStep *step), void *context,
+/* Who looks at the walks; as WalksDef has it, with the number of the walk in the study. */
+typedef struct {
+    void (*stepped)(void *context, const WalkStep *step);
+    double (*limit)(void *context, int walk); /* NULL: none */
+    void *context;
+} StudyWatcher;
+
+/* walk: [count] */
+MildStatus study_run(const StudyDef *def, StudyWalk *walk, int count, const StudyWatcher *watcher,
                      MildError *error);
 
 #endif

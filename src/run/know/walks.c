@@ -32,6 +32,12 @@ static void direct(Walks *w, int i, int step) {
     const double *asked = walk->command[step * walk->commands / w->steps];
     double *command = w->command + 3 * (size_t)i;
     memcpy(command, asked, 3 * sizeof *command);
+    if (w->def->limit) {
+        const double speed = hypot(asked[0], asked[1]);
+        const double share = fmin(1, w->def->limit(w->def->context, i) / fmax(speed, 1e-9));
+        command[0] *= share;
+        command[1] *= share;
+    }
     if (asked[2] == 0 && (asked[0] != 0 || asked[1] != 0)) {
         const double turn = -HEADING_GAIN * yaw_of(w->env[i]->robot.qpos + 3);
         command[2] = fmin(fmax(turn, -HEADING_LIMIT), HEADING_LIMIT);

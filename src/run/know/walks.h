@@ -41,6 +41,8 @@ typedef struct {
     /* In the order of steps, then of walks. */
     void (*stepped)(void *context, const WalkStep *step);
     void *context;
+    /* [m/s] Largest speed that the robot allows itself in this walk; NULL: any. */
+    double (*limit)(void *context, int walk);
 } WalksDef;
 
 /* lasted: [count] policy steps until a fall or the end. */
