@@ -65,13 +65,13 @@ static void add_frame(Belief *belief, const float *frame, int bin) {
     belief->frames++;
 }
 
-int belief_features(const Belief *belief, float *features) {
+int belief_features(const Belief *belief, double *features) {
     const double frames = belief->frames;
     if (frames < FOOTSTEP_MIN || frames > FOOTSTEP_MAX) {
         return 0;
     }
     double rest[BELIEF_CHANNELS] = {0};
-    float *at = features;
+    double *at = features;
     for (int b = 0; b < BELIEF_BINS; b++) {
         const double count = belief->count[b];
         if (count == 0) {
@@ -80,16 +80,16 @@ int belief_features(const Belief *belief, float *features) {
         for (int c = 0; c < BELIEF_CHANNELS; c++) {
             const double mean = belief->sum[b][c] / count;
             rest[c] += fmax(belief->square[b][c] - count * mean * mean, 0);
-            *at++ = (float)mean;
+            *at++ = mean;
         }
     }
     for (int i = 0; i < 3; i++) {
-        *at++ = (float)(belief->command[i] / frames);
+        *at++ = belief->command[i] / frames;
     }
     for (int c = 0; c < BELIEF_CHANNELS; c++) {
-        *at++ = (float)log(rest[c] / frames + VARIANCE_LEAST);
+        *at++ = log(rest[c] / frames + VARIANCE_LEAST);
     }
-    *at = (float)(frames / 50);
+    *at = frames / 50;
     return 1;
 }
 
@@ -166,10 +166,27 @@ static float find_odds(const Belief *belief, const BeliefNet *net) {
     return out;
 }
 
+/* In double, because a reading that hardly varies has large weights. */
+static void embed(const BeliefNet *net, const double *features, float embedded[BELIEF_EMBED]) {
+    double wide[BELIEF_EMBED];
+    for (int j = 0; j < BELIEF_EMBED; j++) {
+        wide[j] = (double)net->embed_bias[j];
+    }
+    for (int i = 0; i < BELIEF_FEATURES; i++) {
+        for (int j = 0; j < BELIEF_EMBED; j++) {
+            wide[j] += features[i] * (double)net->embed[i][j];
+        }
+    }
+    for (int j = 0; j < BELIEF_EMBED; j++) {
+        embedded[j] = (float)wide[j];
+    }
+    elu(embedded, BELIEF_EMBED);
+}
+
 /* ---- recursion ---- */
 
 /* Moves the older of the last two footsteps into the mean. */
-static void shift(Belief *belief, const float *embedded, const float *command) {
+static void shift(Belief *belief, const float *embedded, const double *command) {
     if (belief->lasts == 2) {
         belief->before = fminf(belief->before + 1, BELIEF_MEMORY);
         for (int i = 0; i < BELIEF_EMBED; i++) {
@@ -183,7 +200,9 @@ static void shift(Belief *belief, const float *embedded, const float *command) {
     memcpy(belief->last[1], belief->last[0], sizeof belief->last[1]);
     memcpy(belief->last[0], embedded, sizeof belief->last[0]);
     memcpy(belief->last_command[1], belief->last_command[0], sizeof belief->last_command[1]);
-    memcpy(belief->last_command[0], command, sizeof belief->last_command[0]);
+    for (int i = 0; i < 3; i++) {
+        belief->last_command[0][i] = (float)command[i];
+    }
     belief->lasts += belief->lasts < 2;
 }
 
@@ -201,7 +220,8 @@ static float mean_of_all(const Belief *belief, float *mean) {
 }
 
 static int take_footstep(Belief *belief, const BeliefNet *net) {
-    float features[BELIEF_FEATURES], embedded[BELIEF_EMBED], mean[BELIEF_EMBED];
+    double features[BELIEF_FEATURES];
+    float embedded[BELIEF_EMBED], mean[BELIEF_EMBED];
     if (!belief->whole || !belief_features(belief, features)) {
         return 0;
     }
@@ -210,9 +230,7 @@ static int take_footstep(Belief *belief, const BeliefNet *net) {
         return 0;
     }
     int event = BELIEF_FOOTSTEP;
-    memcpy(embedded, net->embed_bias, sizeof embedded);
-    add_product(BELIEF_FEATURES, BELIEF_EMBED, net->embed[0], features, embedded);
-    elu(embedded, BELIEF_EMBED);
+    embed(net, features, embedded);
     shift(belief, embedded, features + BELIEF_BINS * BELIEF_CHANNELS);
     belief->footsteps++;
     belief->log_odds = belief->before > 0 ? find_odds(belief, net) : -INFINITY;

@@ -119,6 +119,6 @@ void belief_lines(const Belief *belief, const BeliefNet *net, char *text, int si
 /* ---- for tests and training ---- */
 
 /* The features of the footstep that the next frame ends; 0: it is none that counts. */
-int belief_features(const Belief *belief, float *features);
+int belief_features(const Belief *belief, double *features);
 
 #endif
