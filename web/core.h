@@ -129,7 +129,7 @@ typedef struct {
     float depth[2];                      /* [m] deepest element */
     float center[2][2];                  /* [m] of pressure, foot's frame */
     float shell_load;                    /* [N] on the shells: shanks and body */
-    float footsteps;                     /* that `known` is of; 0: nothing is known */
+    float footsteps;                     /* on this ground, for `known`, or 0 */
     float alarms;                        /* changes of ground that the robot felt */
     float known[15];                     /* of each BeliefParameter 5 %, 50 %, 95 %, in its unit */
     float x[2][WEB_ELEMENTS_MAX];        /* [m] elements, foot's frame */

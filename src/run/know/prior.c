@@ -16,7 +16,7 @@ static void draw_wide(Random *r, MildMaterial *m) {
 static void draw_paper(Random *r, MildMaterial *m) {
     m->k_pen = draw_log(r, 150, 1400);
     m->sigma_cone = draw_log(r, 8e4, 2.4e5);
-    m->slip_length = 1;
+    m->slip_length = draw_log(r, PRIOR_NO_SLIP, 1); /* none */
 }
 
 PriorGround prior_ground(const MildMaterial *material, const MildSole *sole, double load) {
