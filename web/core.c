@@ -18,6 +18,8 @@
 
 _Static_assert(offsetof(WebModel, task) % 8 == 0, "as TaskDef");
 _Static_assert(STANDING_MAX <= MILD_FEET_MAX, "the ground has a place for all");
+_Static_assert(3 * BELIEF_PARAMETERS == sizeof((WebView *)0)->known / sizeof(float),
+               "WebView.known");
 _Static_assert(offsetof(WebModel, geom) - offsetof(WebModel, geoms) == 4, "as web_picture says");
 
 static struct {
@@ -50,6 +52,8 @@ static struct {
     MildContactResult result;
     EngineSavedLinks links; /* while shells are near the ground, as `shells` */
     EngineShells shells;
+    /* what the robot knows of it */
+    Belief belief;
     /* the picture */
     WebView view;
     WindowScene scene;
@@ -335,9 +339,28 @@ void web_show(void) {
     show_ground();
 }
 
+/* The newest frame of the history, and what it tells of the ground. */
+static void look_at_ground(void) {
+    const WebModel *file = web.file;
+    const float *frame = web.history + file->shape.history - file->shape.observation;
+    WebView *view = &web.view;
+    if (!file->knows || !(belief_step(&web.belief, &file->belief, frame) & BELIEF_FOOTSTEP)) {
+        return;
+    }
+    view->footsteps = (float)web.belief.footsteps;
+    view->alarms = (float)web.belief.alarms;
+    for (int i = 0; i < 3 * BELIEF_PARAMETERS; i++) {
+        const double share[3] = {0.05, 0.5, 0.95};
+        view->known[i] = (float)(belief_names[i / 3].scale *
+                                 belief_quantile(&web.belief, &file->belief,
+                                                 (BeliefParameter)(i / 3), share[i % 3]));
+    }
+}
+
 int web_step(float vx, float vy, float wz) {
     const float command[3] = {vx, vy, wz};
     float action[ROBOT_JOINTS_MAX];
+    look_at_ground();
     web_act(web.history, action);
     const int end = web_move(action, command);
     web_show();
@@ -366,6 +389,8 @@ static const MildMaterial *material_at(double x, double y) {
 /* Stands the robot up at a place [m, m, rad]. Its sensors' noise goes on. */
 static void stand_up(double x, double y, double yaw) {
     TaskEnv *env = web_env();
+    belief_reset(&web.belief);
+    web.view.footsteps = web.view.alarms = 0;
     const double load = web.task.robot.total_mass * web.file->gravity / web.feet;
     memset(env->command, 0, sizeof env->command);
     env->command_frozen = 1;

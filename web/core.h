@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "env/task/state.h"
+#include "identify/belief/belief.h"
 #include "learn/policy_def.h"
 #include "robot/engine/model.h"
 #include "robot/table.h"
@@ -84,6 +85,8 @@ typedef struct {
     int32_t shells;       /* that stand on soft ground */
     WebShell shell[ROBOT_SHELLS_MAX];
     WebPolicy policy;
+    int32_t knows; /* bool: the robot knows its ground, by `belief` */
+    BeliefNet belief;
     int32_t geoms;
     WebGeom geom[WEB_GEOMS_MAX];
 } WebModel;
@@ -126,6 +129,9 @@ typedef struct {
     float depth[2];                      /* [m] deepest element */
     float center[2][2];                  /* [m] of pressure, foot's frame */
     float shell_load;                    /* [N] on the shells: shanks and body */
+    float footsteps;                     /* on this ground, for `known`, or 0 */
+    float alarms;                        /* changes of ground that the robot felt */
+    float known[15];                     /* of each BeliefParameter 5 %, 50 %, 95 %, in its unit */
     float x[2][WEB_ELEMENTS_MAX];        /* [m] elements, foot's frame */
     float y[2][WEB_ELEMENTS_MAX];        /* [m] */
     float pressure[2][WEB_ELEMENTS_MAX]; /* [Pa] */

@@ -35,6 +35,9 @@ const choice = (key, count, otherwise) => {
 const ENDS = ['', 'It is no longer finite', 'It leans too far', 'Its body touches the ground', 'A shank touches the ground', 'Its feet cross',
   'A joint broke out'];
 
+// What the robot knows of its ground: BeliefParameter. Low to high: 90 %.
+const KNOWN = [['sinks', ' mm'], ['k_pen', ' N/m'], ['sigma', ' kN/m³'], ['friction', ''], ['slip length', ' mm']];
+
 // ---- the core ----
 
 class Core {
@@ -92,7 +95,7 @@ class Core {
     const [bytes, links, elements] = takeInts(3), [pitch, cell, period] = take(3);
     const view = {
       links, elements, pitch, cell, period, velocity: take(3), yaw: take(1)[0], load: take(2), depth: take(2), center: take(4),
-      shellLoad: take(1)[0], x: take(256), y: take(256), pressure: take(256), link: take(12 * 41), dirtyCount: takeInts(1), dirty: takeInts(4 * 64),
+      shellLoad: take(1)[0], footsteps: take(1)[0], alarms: take(1)[0], known: take(15), x: take(256), y: take(256), pressure: take(256), link: take(12 * 41), dirtyCount: takeInts(1), dirty: takeInts(4 * 64),
     };
     if (at - start !== bytes) throw new Error('mild.wasm and mild.js are of different builds');
     return view;
@@ -248,6 +251,14 @@ class Panel {
       $(f === 0 ? 'left' : 'right').textContent = `${Math.round(view.load[f])} N · ${depth}`;
     }
     $('shells').textContent = view.shellLoad > 0 ? `shanks and body ${Math.round(view.shellLoad)} N` : '';
+  }
+
+  drawKnowledge(view) {
+    const number = (x) => (x >= 100 ? x.toFixed(0) : x.toPrecision(2));
+    $('knows').textContent = view.footsteps === 0 ? 'It has not felt the ground yet.' : KNOWN.map(([name, unit], i) => {
+      const [low, middle, high] = view.known.subarray(3 * i, 3 * i + 3);
+      return `${name} ${number(middle)}${unit} (${number(low)} to ${number(high)})`;
+    }).concat(`${view.footsteps} steps on it; it changed ${view.alarms} times`).join('\n');
   }
 
   drawSpeed(view, command, pace, seconds) {
@@ -419,6 +430,7 @@ class App {
     this.picture.draw(links, camera, this.ground === names.length ? -1 : this.ground, this.time);
     if (this.driver.touched) $('hint').classList.add('gone');
     this.panel.drawSoles(view);
+    this.panel.drawKnowledge(view);
     this.panel.drawSpeed(view, this.asked || [0, 0, 0], this.pace, seconds);
     this.rest(() => requestAnimationFrame((t) => this.frame(t)));
   }

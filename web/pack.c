@@ -1,4 +1,5 @@
-/* Writes what the page needs of a robot and its policy as one file (core.h).
+/* Writes what the page needs of a robot and its policy as one file (core.h), with the shipped
+ * weights by which the robot knows its ground, if it has some.
  * Usage: web_pack ROBOT_FOLDER POLICY CONFIG OUTPUT */
 #define MILD_REAL_FLOAT
 #include "web/core.h"
@@ -10,6 +11,7 @@
 
 #include "base/file.h"
 #include "env/kernels.h"
+#include "identify/belief/file.h"
 #include "learn/network.h"
 #include "learn/policy.h"
 #include "robot/description.h"
@@ -217,6 +219,17 @@ static MildStatus write_file(const char *path, const WebModel *file, const uint1
     return status;
 }
 
+static MildStatus pack_belief(const Robot *robot, WebModel *file, MildError *error) {
+    BeliefNet *net;
+    MildStatus status = belief_open(robot_name(robot), &net, error);
+    file->knows = net != NULL;
+    if (net) {
+        file->belief = *net;
+        free(net);
+    }
+    return status;
+}
+
 static int pack(Robot *robot, Policy *policy, const TaskDef *task, const char *path,
                 MildError *error) {
     static WebModel file;
@@ -228,6 +241,9 @@ static int pack(Robot *robot, Policy *policy, const TaskDef *task, const char *p
     }
     robot_set_shells(robot, task->shells_stand);
     MildStatus status = pack_model(robot, task, &file, error);
+    if (status == MILD_OK) {
+        status = pack_belief(robot, &file, error);
+    }
     status = status == MILD_OK ? pack_picture(robot, &file, error) : status;
     uint16_t *weights = status == MILD_OK ? pack_policy(policy, &file) : NULL;
     if (status == MILD_OK) {

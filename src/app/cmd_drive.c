@@ -11,18 +11,21 @@
 #include "app/report.h"
 #include "deploy/drive/drive.h"
 #include "deploy/drive/simulated.h"
+#include "identify/belief/file.h"
+#include "identify/belief/log.h"
 
 #define ADDRESS "127.0.0.1:9870"
 
 typedef struct {
     Context context;
-    const char *json, *gamepad, *listen, *connect, *bind, *peer, *key,
-        *ground; /* NULL: not given */
+    const char *json, *gamepad, *listen, *connect, *bind, *peer, *key, *ground,
+        *log; /* NULL: not given */
     CliNumbers command, delay;
     int simulate, no_keys, lockstep;
     RunnerDef runner;
     SimulatedDef simulated;
-    Key secret; /* of --key */
+    Key secret;        /* of --key */
+    BeliefNet *belief; /* NULL: the robot has none */
     double seconds;
 } Drive;
 
@@ -165,6 +168,29 @@ static cJSON *simulated_json(const SimulatedReport *report) {
     return root;
 }
 
+/* What the robot's own sensors say of the ground at the end; nothing before the first footstep. */
+static void print_ground(FILE *file, const BeliefNet *net, const Belief *belief) {
+    char text[400];
+    if (net && belief->footsteps > 0) {
+        belief_text(belief, net, text, sizeof text);
+        fprintf(file, "ground, of %d footsteps, with 90 %%: %s; it changed %d times\n",
+                belief->footsteps, text, belief->alarms);
+    }
+}
+
+static void add_ground(cJSON *root, const BeliefNet *net, const Belief *belief) {
+    cJSON *o = cJSON_AddObjectToObject(root, "ground");
+    cJSON_AddNumberToObject(o, "footsteps", net ? belief->footsteps : 0);
+    cJSON_AddNumberToObject(o, "changes", net ? belief->alarms : 0);
+    for (int i = 0; net && belief->footsteps > 0 && i < BELIEF_PARAMETERS; i++) {
+        cJSON *one = cJSON_AddObjectToObject(o, belief_names[i].name);
+        const BeliefParameter p = (BeliefParameter)i;
+        cJSON_AddNumberToObject(one, "median", belief_quantile(belief, net, p, 0.5));
+        cJSON_AddNumberToObject(one, "low", belief_quantile(belief, net, p, 0.05));
+        cJSON_AddNumberToObject(one, "high", belief_quantile(belief, net, p, 0.95));
+    }
+}
+
 /* ---- the runner ---- */
 
 static double greater(double a, double b) {
@@ -196,12 +222,34 @@ static MildStatus run_on(Drive *d, Runner *runner, Udp *udp, MildError *error) {
     input_close(&input);
     const RunnerReport *counts = runner_report(runner);
     print_runner(taken ? stderr : stdout, &report, counts);
+    print_ground(taken ? stderr : stdout, d->belief, &counts->belief);
     if (d->json) {
-        status = report_save(runner_json(&d->context, &report, counts), d->json, error);
+        cJSON *root = runner_json(&d->context, &report, counts);
+        add_ground(root, d->belief, &counts->belief);
+        status = report_save(root, d->json, error);
     }
     return status == MILD_OK && counts->why[0]
                ? mild_fail(error, MILD_ERROR_IO, "damped: %s", counts->why)
                : status;
+}
+
+/* What the runner looks at the ground with, and its log. */
+static MildStatus open_ground(Drive *d, MildError *error) {
+    MildStatus status = belief_open(robot_name(d->context.robot), &d->belief, error);
+    d->runner.belief = d->belief;
+    if (status != MILD_OK || !d->log) {
+        return status;
+    }
+    if (!d->belief) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--log: only sa01 has learned to know its ground (docs/identify.md)");
+    }
+    d->runner.log = fopen(d->log, "w");
+    if (!d->runner.log) {
+        return mild_fail(error, MILD_ERROR_IO, "%s: cannot write", d->log);
+    }
+    belief_log_print_header(d->runner.log);
+    return MILD_OK;
 }
 
 static MildStatus run_runner(Drive *d, MildError *error) {
@@ -210,6 +258,9 @@ static MildStatus run_runner(Drive *d, MildError *error) {
     d->runner.robot = d->context.robot;
     d->runner.task = &d->context.task;
     MildStatus status = key_draw_session(&d->runner.session, error);
+    if (status == MILD_OK) {
+        status = open_ground(d, error);
+    }
     if (status == MILD_OK && d->peer) {
         status = udp_find_sender("peer", d->peer, &d->runner.peer, error);
     }
@@ -223,6 +274,10 @@ static MildStatus run_runner(Drive *d, MildError *error) {
     }
     udp_close(&udp);
     runner_destroy(runner);
+    free(d->belief);
+    if (d->runner.log && fclose(d->runner.log) != 0 && status == MILD_OK) {
+        status = mild_fail(error, MILD_ERROR_IO, "%s: cannot write all of it", d->log);
+    }
     return status;
 }
 
@@ -278,7 +333,7 @@ static int refuse_other_half(const CliCommand *command, const CliArgs *args, int
     static const char *const runner[] = {"policy",      "listen",       "command",    "gamepad",
                                          "no-keys",     "late",         "damp-after", "speed-limit",
                                          "angle-limit", "torque-share", "peer",       "turn-limit",
-                                         "glitch",      "stall-after",  NULL},
+                                         "glitch",      "stall-after",  "log",        NULL},
                              *const robot[] = {"connect",  "bind", "ground", "model", "lockstep",
                                                "patience", "drop", "delay",  "seed",  NULL};
     const char *other = cli_first_given(command, args, simulate ? runner : robot);
@@ -393,6 +448,8 @@ int cmd_drive(int argc, char **argv) {
          "[-, s] simulated robot: share of its states that are sent so late (default 0,0)"},
         {"seed", CLI_UINT64, &d.simulated.seed, 0, 0, "S",
          "simulated robot: its start, and what is lost (default 1)"},
+        {"log", CLI_OUTPUT, &d.log, 0, 0, "FILE.csv",
+         "also write the frames that the policy sees, for mild fit FILE.csv"},
         {"json", CLI_OUTPUT, &d.json, 0, 0, "FILE",
          "also write counts and times as JSON to FILE; - for standard output"},
     };
@@ -415,7 +472,8 @@ int cmd_drive(int argc, char **argv) {
     if (outcome != CLI_RUN) {
         return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     }
-    const int bad = refuse_other_half(&command, &args, d.simulate);
+    int bad = refuse_other_half(&command, &args, d.simulate);
+    bad = bad ? bad : cli_refuse_dash("drive", "log", d.log);
     if (bad) {
         return bad;
     }

@@ -1,5 +1,5 @@
-/* mild fit: finds parameters of a ground from recorded presses; prints a table, writes JSON,
- * draws. */
+/* mild fit: finds parameters of a ground from recorded presses, or from the log of a walk; prints a
+ * table, writes JSON, draws. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -9,10 +9,12 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/figure.h"
+#include "app/fit_walk.h"
 #include "app/grounds.h"
 #include "app/report.h"
 #include "base/file.h"
 #include "base/text.h"
+#include "identify/belief/log.h"
 #include "identify/fit.h"
 #include "identify/fit_csv.h"
 #include "identify/press.h"
@@ -21,6 +23,7 @@ typedef struct {
     const char *model, *from, *json, *figure;
     CliNumbersEach plate;
     CliNames fit, hold; /* hold: NAME=VALUE */
+    int trial;
 } FitOptions;
 
 typedef struct {
@@ -56,6 +59,8 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
          "grounds`)"},
         {"fit", CLI_NAMES, &options->fit, 0, 0, "NAME[,NAME]",
          "fit these only and hold all others at the preset of --hold-from"},
+        {"trial", CLI_INT, &options->trial, 0, 1e6, "N",
+         "of a log of several walks, as mild eval --actions writes it: which (default 0)"},
         {"json", CLI_OUTPUT, &options->json, 0, 0, "FILE",
          "write values and intervals to FILE; - for standard output"},
         {"figure", CLI_OUTPUT, &options->figure, 0, 0, "FILE.png",
@@ -63,7 +68,7 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
     };
     const CliCommand command = {
         .name = "fit",
-        .usage = "DATA.csv [DATA2.csv ...] --plate L,W [options]",
+        .usage = "DATA.csv [DATA2.csv ...] --plate L,W [options] | WALK.csv [options]",
         .summary =
             "Finds the parameters of a ground from presses of a level plate: all those that "
             "the data determine, each with its 95 % interval by profile likelihood. Nothing "
@@ -74,7 +79,9 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
             "Several files may differ in speed, which c_d and dissipation need; c_g also "
             "needs a record that brakes, such as a drop. They may differ in their plate, "
             "which k_c of bekker needs (--plate once for each file). Rows that are not deeper than "
-            "all before them (unloading) are ignored.",
+            "all before them (unloading) are ignored. Of a walk's log (mild drive --log, mild play "
+            "--log) it says what the robot's own sensors tell of the ground, each parameter with "
+            "its 90 % interval (docs/identify.md).",
         .options = table,
         .option_count = sizeof table / sizeof *table,
         .examples = "  mild press --ground grass --depth 0.04 --csv grass.csv\n"
@@ -82,7 +89,8 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
                     "  mild fit grass.csv --plate 0.2,0.1 --hold alpha=1.1\n"
                     "  mild fit slow.csv fast.csv --plate 0.2,0.1 --hold-from sand_loose\n"
                     "  mild fit small.csv large.csv --plate 0.15,0.1 --plate 0.3,0.2\n"
-                    "  mild fit slow.csv --plate 0.2,0.1 --model bekker --json out.json\n",
+                    "  mild fit slow.csv --plate 0.2,0.1 --model bekker --json out.json\n"
+                    "  mild fit walk.csv\n",
         .positional_max = CLI_LIST_MAX,
         .picture = "figure",
         .numbers = NUMBERS_END,
@@ -581,6 +589,24 @@ static int plates_check(const CliNumbersEach *plates, int files) {
     return 0;
 }
 
+/* A walk's log alone, without options of a press. Returns the exit code. */
+static int walk_fit(const FitOptions *options, const CliArgs *args) {
+    MildError error = {0};
+    if (args->positional_count > 1) {
+        return cli_fail_text("fit", "%s is a walk's log; give it alone", args->positional[0]);
+    }
+    if (options->plate.count || options->fit.count || options->hold.count || options->from ||
+        options->model || options->figure) {
+        return cli_fail_text("fit",
+                             "%s is a walk's log, which takes --trial and --json alone; leave the "
+                             "options of a press out",
+                             args->positional[0]);
+    }
+    return fit_walk(args->positional[0], options->trial, options->json, &error) == MILD_OK
+               ? 0
+               : cli_fail("fit", &error);
+}
+
 int cmd_fit(int argc, char **argv) {
     FitOptions options = {0};
     CliArgs args;
@@ -591,6 +617,9 @@ int cmd_fit(int argc, char **argv) {
     if (!args.positional_count) {
         return cli_fail_text(
             "fit", "no record given: mild fit DATA.csv --plate L,W (mild press --csv writes one)");
+    }
+    if (belief_log_is(args.positional[0])) {
+        return walk_fit(&options, &args);
     }
     code = plates_check(&options.plate, args.positional_count);
     if (code) {

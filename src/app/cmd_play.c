@@ -12,6 +12,8 @@
 #include "app/play.h"
 #include "app/progress.h"
 #include "base/text.h"
+#include "identify/belief/file.h"
+#include "identify/belief/log.h"
 
 #define GRAVITY 9.81
 #define AREA_MARGIN 2.0   /* [m] ground drawn beyond the walk */
@@ -21,12 +23,13 @@
 
 typedef struct {
     Context context;
-    const char *video, *pressure; /* NULL: not given */
+    const char *video, *pressure, *log; /* NULL: not given */
     CliNames grounds;
     double patch;
     int width, height;
     Scene scene;
     const char *names[MILD_MATERIALS_MAX];
+    BeliefNet *belief; /* NULL: the robot has none */
     Play play;
 } Command;
 
@@ -132,6 +135,50 @@ static void print_table(Command *c) {
     }
 }
 
+/* What the robot's own sensors say of the ground at the end. */
+static void print_knowledge(const Play *play) {
+    char text[400];
+    if (!play->belief || play->knows.footsteps == 0) {
+        return;
+    }
+    belief_text(&play->knows, play->belief, text, sizeof text);
+    printf("from its own sensors the robot says of the last %d footsteps, with 90 %%:\n    %s\n",
+           play->knows.footsteps, text);
+    for (int i = 0; i < play->knows.alarms && i < PLAY_ALARMS; i++) {
+        printf("%s%.1f s%s", i ? ", " : "it felt another ground at ", play->alarm[i],
+               i == play->knows.alarms - 1 || i == PLAY_ALARMS - 1 ? "\n" : "");
+    }
+}
+
+/* Opens what looks at the ground, and the log. */
+static MildStatus open_knowledge(Command *c, MildError *error) {
+    Play *play = &c->play;
+    MildStatus status = belief_open(robot_name(c->context.robot), &c->belief, error);
+    play->belief = c->belief;
+    if (status != MILD_OK || !c->log) {
+        return status;
+    }
+    if (!c->belief) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--log: only sa01 has learned to know its ground (docs/identify.md)");
+    }
+    play->log = fopen(c->log, "w");
+    if (!play->log) {
+        return mild_fail(error, MILD_ERROR_IO, "%s: cannot write", c->log);
+    }
+    belief_log_print_header(play->log);
+    return MILD_OK;
+}
+
+static MildStatus close_knowledge(Command *c, MildStatus status, MildError *error) {
+    free(c->belief);
+    c->belief = NULL;
+    if (c->play.log && fclose(c->play.log) != 0 && status == MILD_OK) {
+        return mild_fail(error, MILD_ERROR_IO, "%s: cannot write all of it", c->log);
+    }
+    return status;
+}
+
 /* Writes the CSV and draws the picture from it; for a name that ends in .csv only the CSV. */
 static MildStatus save_pressure(const Command *c, MildError *error) {
     char data[PATH_SIZE], names[MILD_MATERIALS_MAX][96];
@@ -185,6 +232,7 @@ static MildStatus walk(Command *c, MildError *error) {
         return status;
     }
     print_table(c);
+    print_knowledge(play);
     if (c->video) {
         printf("video %s: %d frames\n", c->video, play->frames);
     }
@@ -254,8 +302,12 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
         status = prepare(c, error);
     }
     if (status == MILD_OK) {
+        status = open_knowledge(c, error);
+    }
+    if (status == MILD_OK) {
         status = walk(c, error);
     }
+    status = close_knowledge(c, status, error);
     if (play->video) {
         finish_video(c, status, error);
     }
@@ -280,6 +332,8 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
          "write a video; without this and --pressure a window opens"},
         {"pressure", CLI_OUTPUT, &c->pressure, 0, 0, "FILE.png",
          "draw the sole pressure on each ground; the numbers go to FILE.csv beside it"},
+        {"log", CLI_OUTPUT, &c->log, 0, 0, "FILE.csv",
+         "write the frames that the policy sees, for mild fit FILE.csv"},
         {"speed", CLI_NUMBER, &c->play.speed, -1.3, 1.3, "V",
          "[m/s] commanded forward speed (default 0.6; 0 for a controller that stands)"},
         {"seconds", CLI_NUMBER, &c->play.seconds, 0, 3600, "T",
@@ -322,6 +376,7 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
     MildError error = {0};
     int code = cli_refuse_dash("play", "video", c->video);
     code = code ? code : cli_refuse_dash("play", "pressure", c->pressure);
+    code = code ? code : cli_refuse_dash("play", "log", c->log);
     if (code) {
         return code;
     }

@@ -13,6 +13,7 @@
     X(play, "watch a policy walk, in a window or as a video", NULL)                                \
     X(press, "press a plate or a sole into a ground and record the force", NULL)                   \
     X(fit, "find the parameters of a ground from recorded presses", NULL)                          \
+    X(know, "judge what a robot knows of its ground from its own sensors", NULL)                   \
     X(actuator, "fit a network to logs of a robot's motors", actuator_parts)                       \
     X(export, "write a policy as an ONNX graph or as C, to run it elsewhere", NULL)                \
     X(drive, "run a policy for a robot over UDP, or be that robot, simulated", NULL)               \

@@ -9,6 +9,7 @@
 #include "app/live.h"
 #include "app/progress.h"
 #include "base/clock.h"
+#include "identify/belief/log.h"
 #include "run/eval/eval.h"
 
 #define START_TIME 1.0  /* [s] time for starting, not counted in speeds and pressures */
@@ -76,10 +77,25 @@ static void set_command(Walk *walk) {
 static void start(Walk *walk) {
     Play *play = walk->play;
     TaskView none = {0};
+    belief_reset(&play->knows);
     set_command(walk);
     task_env_reset_on(walk->env, &walk->task, play->robot, walk->sim, &walk->live.terrain,
                       play->scene->rigid, &none);
     walk->speed = 0;
+}
+
+/* The frame that the policy sees next. */
+static void look_at_ground(Walk *walk) {
+    Play *play = walk->play;
+    const float *frame =
+        task_env_history(walk->env) + (TASK_FRAMES - 1) * (size_t)walk->env->shape.observation;
+    if (play->belief && belief_step(&play->knows, play->belief, frame) & BELIEF_ALARM &&
+        play->knows.alarms <= PLAY_ALARMS) {
+        play->alarm[play->knows.alarms - 1] = play->time;
+    }
+    if (play->log) {
+        belief_log_print(play->log, play->time, frame);
+    }
 }
 
 static void step(Walk *walk) {
@@ -89,6 +105,7 @@ static void step(Walk *walk) {
     ControllerRow row = {play->controller, 0};
     TaskDrive drive = {controller_row_torque, &row};
     TaskCallback callback = {watch, walk, play->controller->torque ? &drive : NULL};
+    look_at_ground(walk);
     play->controller->act(play->controller->self, 1, &walk->env, action);
     TaskStep out =
         task_env_step(walk->env, &walk->task, play->robot, walk->sim, action, 0, &none, &callback);
@@ -116,13 +133,16 @@ static MildStatus frame(Walk *walk, MildError *error) {
         return MILD_OK;
     }
     ViewInfo info = {.time = play->time, .speed = walk->speed, .fell = play->fell};
-    char ground[96] = "rigid ground", note[300];
+    char ground[96] = "rigid ground", note[700], knows[400] = "";
     memcpy(info.command, walk->env->command, sizeof info.command);
     if (play->window) {
         if (!play->scene->rigid) {
             live_describe(&walk->live, walk->ground, ground, sizeof ground);
         }
-        snprintf(note, sizeof note, "%s%s\n%.2f x real time (- =)", ground,
+        if (play->belief && play->knows.footsteps > 0) {
+            belief_lines(&play->knows, play->belief, knows, sizeof knows);
+        }
+        snprintf(note, sizeof note, "%s%s%s\n%.2f x real time (- =)", knows, ground,
                  play->presets ? ", other ground (1 2 3 ...)" : "", walk->pace.factor);
         info.note = note;
     }

@@ -2,7 +2,10 @@
 #ifndef MILD_PLAY_H
 #define MILD_PLAY_H
 
+#include <stdio.h>
+
 #include "control/controller.h"
+#include "identify/belief/belief.h"
 #include "run/eval/measure.h"
 #include "run/eval/scene.h"
 #include "view/pressure.h"
@@ -17,6 +20,8 @@ typedef struct {
     int fell;              /* bool: it fell on this ground */
 } PlayLeg;
 
+enum { PLAY_ALARMS = 16 };
+
 typedef struct {
     /* set by the caller */
     const TaskDef *task;
@@ -28,13 +33,17 @@ typedef struct {
     Pressure *pressure;          /* NULL: not measured */
     double seconds, speed, rate; /* [s], [m/s], [1/s] frames */
     uint64_t seed;
-    int window;  /* bool: real time, keys */
+    const BeliefNet *belief; /* what the robot knows of its ground; NULL: it has none */
+    FILE *log;               /* of the frames that its policy sees (belief/log.h); NULL: none */
+    int window;              /* bool: real time, keys */
     int presets; /* materials at the end of the scene's terrain that keys lay under the robot */
     /* filled */
     PlayLeg leg[MILD_MATERIALS_MAX];
-    double time; /* [s] walked */
-    int fell;    /* bool */
-    int changed; /* bool: keys changed the ground; the legs are measured until then */
+    double time;               /* [s] walked */
+    int fell;                  /* bool */
+    Belief knows;              /* with `belief`: at the end */
+    double alarm[PLAY_ALARMS]; /* [s] when the robot felt another ground; the first ones */
+    int changed;               /* bool: keys changed the ground; the legs are measured until then */
     int frames;
 } Play;
 

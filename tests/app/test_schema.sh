@@ -37,6 +37,13 @@ fit bench bench.json
 "$mild" fit sand.csv --plate 0.1,0.1 --model bekker --json bekker.json >/dev/null || fail "fit --model"
 fit fit foam.json sand.json bekker.json
 
+"$mild" eval --ground grass --trials 1 --seconds 6 --actions walk.csv >/dev/null || fail "eval --actions"
+"$mild" fit walk.csv --json fit_walk.json >/dev/null || fail "fit of a walk"
+fit fit_walk fit_walk.json
+"$mild" know --grounds 2 --seconds 5 --json know.json >/dev/null || fail "know"
+fit know know.json
+sed 's/"alarms":.*/"alarms": -1,/' fit_walk.json >bad.json && unfit fit_walk '.alarms: below 0'
+
 # each kind of fault, in a copy of what fits
 sed 's/"trials":.*/"trials": 1.5,/' walk.json >bad.json && unfit eval '.rows\[0\].trials: no integer'
 sed 's/"cot":.*/"cot": "-",/' walk.json >bad.json && unfit eval '.rows\[0\].cot: no number or null'

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "deploy/drive/sensor.h"
+#include "identify/belief/log.h"
 
 #define CLOCK_DRIFT 1e-3 /* [-] by which two clocks may run apart */
 #define CLOCK_JUMP 1.0   /* [s] by which no state is faster than the fastest */
@@ -87,6 +88,7 @@ Runner *runner_create(const RunnerDef *def, MildError *error) {
     r->limits = (SensorLimits){def->turn_limit, def->speed_limit, def->angle_limit};
     r->target.session = def->session;
     r->ticked = -1;
+    belief_reset(&r->report.belief);
     r->format = (PacketFormat){r->joints, packet_robot(def->robot), def->key};
     if (controller_learned(def->policy, def->robot, NULL, 1, &r->controller, error) != MILD_OK) {
         free(r);
@@ -336,6 +338,18 @@ static int is_finite(const Runner *r) {
     return finite;
 }
 
+/* The newest frame of the policy's history. */
+static void look_at_ground(Runner *r) {
+    const float *frame =
+        task_env_history(r->env) + (TASK_FRAMES - 1) * (size_t)r->env->shape.observation;
+    if (r->def.belief) {
+        belief_step(&r->report.belief, r->def.belief, frame);
+    }
+    if (r->def.log) {
+        belief_log_print(r->def.log, (double)r->report.steps * TASK_PERIOD, frame);
+    }
+}
+
 /* One step of the policy: as an environment's, but for its physics. A frame has the command of the
  * tick before it. */
 static void step_policy(Runner *r, const TaskSensors *reading, const double command[3]) {
@@ -347,6 +361,7 @@ static void step_policy(Runner *r, const TaskSensors *reading, const double comm
         memcpy(r->env->command_seen, r->env->command, sizeof r->env->command);
     }
     task_env_observe(r->env, &r->task, r->def.robot, NULL, &shown, r->report.steps == 0, &none);
+    look_at_ground(r);
     r->controller.act(r->controller.self, 1, &r->env, r->action);
     if (!is_finite(r)) {
         runner_damp(r, "the policy's action is not finite");

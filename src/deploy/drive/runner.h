@@ -11,9 +11,12 @@
 #ifndef DRIVE_RUNNER_H
 #define DRIVE_RUNNER_H
 
+#include <stdio.h>
+
 #include "control/controller.h"
 #include "deploy/drive/packet.h"
 #include "deploy/drive/times.h"
+#include "identify/belief/belief.h"
 
 typedef struct {
     const char *policy;  /* file */
@@ -32,6 +35,8 @@ typedef struct {
     uint64_t session;    /* of this runner, a fresh random number, not 0 */
     uint64_t peer;       /* only this sender is heard; 0: the first; port 0: any of the host */
     const Key *key;      /* borrowed; NULL: none */
+    const BeliefNet *belief; /* borrowed; what the robot knows of its ground; NULL: nothing */
+    FILE *log;               /* borrowed; the frames that the policy sees (belief/log.h); NULL */
 } RunnerDef;
 /* A sender: address and port (udp_sender). */
 #define RUNNER_PORT 0xffffu
@@ -49,6 +54,7 @@ typedef struct {
     long damps;           /* ticks */
     long targets_limited; /* of single joints */
     Times age;            /* of the state used in a step, since it arrived */
+    Belief belief;        /* with RunnerDef.belief */
     char why[240];        /* the reason for damping; "": none */
     char refusal[160];    /* why the newest packet was refused; "": it was not, or no more to say */
 } RunnerReport;
