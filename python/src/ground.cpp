@@ -147,9 +147,8 @@ static size_t inertia_bytes(const Ground &ground) {
 static nb::tuple keep(Ground &ground) {
     const MildContactInput &input = ground.input;
     return nb::make_tuple(ground.soles, ground.terrain, input.dt, ground.tiles,
-                          mild_solver_names[input.solver],
-                          input.tolerance, input.max_iterations, get_state(ground),
-                          nb::bytes(&input, sizeof input),
+                          mild_solver_names[input.solver], input.tolerance, input.max_iterations,
+                          get_state(ground), nb::bytes(&input, sizeof input),
                           nb::bytes(input.inverse_inertia, inertia_bytes(ground)));
 }
 
