@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "grains.h"
+#include "ride.h"
 
 /* What a bed is made of; every number is an option of the program. */
 struct BedDef {
@@ -193,8 +193,8 @@ inline void bed_open(Bed *bed, const BedDef &def) {
 inline void bed_list(Bed *bed) {
     Grains &g = bed->g;
     clear(g.cell_count, cells_of(g));
-    each<Grains, grain_enter_cell>(g.count, g);
-    each<Grains, grain_list>(g.count, g);
+    each<Grains, grain_enter_cell>(range_size(g, g.near), g);
+    each<Grains, grain_list>(range_size(g, g.moving), g);
     std::swap(g.neighbour, g.next_neighbour);
     std::swap(g.touching, g.next_touching);
     std::swap(g.slip, g.next_slip);
@@ -207,7 +207,7 @@ inline void bed_look(Bed *bed) {
     Grains &g = bed->g;
     int flags = 0;
     if (bed->lists > 0) {
-        each<Grains, grain_watch>(g.count, g);
+        each<Grains, grain_watch>(range_size(g, g.moving), g);
         copy(&flags, g.flags, 1);
     }
     if (flags & LIST_LATE) {
@@ -228,8 +228,12 @@ inline void bed_go(Bed *bed, long steps) {
         if (bed->steps++ % CHECK_STEPS == 0) {
             bed_look(bed);
         }
-        each<Grains, grain_step>(g.count, g);
-        each<Grains, plate_step>(g.beds, g);
+        each<Grains, grain_step>(range_size(g, g.moving), g);
+        if (g.ride) {
+            each<Grains, ride_step>(1, g);
+        } else {
+            each<Grains, plate_step>(g.beds, g);
+        }
         std::swap(g.place, g.next_place);
         std::swap(g.velocity, g.next_velocity);
         std::swap(g.spin, g.next_spin);
