@@ -35,6 +35,7 @@ static const char usage[] =
     "Under a robot, as COMMAND of `mild eval --program COMMAND` (docs/grains.md): no case, and\n"
     "  --sole SHAPE          outline of the first foot's sole, in the foot's frame\n"
     "  --sole-z Z            [m] height of the sole in the foot's frame (default 0)\n"
+    "  --sole-height H       [m] of the block that the foot is (default 0.06)\n"
     "  --sides S,S...        of each foot: 1, or -1 for the mirror image (default 1,-1)\n"
     "  --track L             [m] length of the way (default 4)\n"
     "  --reach R             [m] grains nearer to the middle of a sole move (default 0.3)\n"
@@ -98,7 +99,7 @@ static void option_box(BedDef *def, const std::string &value) {
 /* Bool: it is one of a walk. */
 static bool option_walk(WalkDef *walk, const std::string &name, const std::string &value) {
     if (name == "--sole") {
-        walk->shape = shape_read(value, SOLE_HEIGHT);
+        walk->shape = shape_read(value);
     } else if (name == "--sides") {
         walk->sides = numbers(":" + value);
         if (walk->sides.empty() || walk->sides.size() > RANGE_BEDS) {
@@ -106,6 +107,8 @@ static bool option_walk(WalkDef *walk, const std::string &name, const std::strin
         }
     } else if (name == "--sole-z") {
         walk->sole_z = number(value, name);
+    } else if (name == "--sole-height") {
+        walk->height = (float)number(value, name);
     } else if (name == "--track") {
         walk->track = number(value, name);
     } else if (name == "--reach") {

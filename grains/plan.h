@@ -67,12 +67,11 @@ inline void shape_point(Shape *s, double x, double y) {
     s->reach = fmaxf(s->reach, sqrtf((float)(x * x + y * y) + s->height * s->height));
 }
 
-/* height: of a block, above every depth, so that no grain comes over it [m]. */
-inline Shape shape_read(const std::string &word, float height = 0.06f) {
+inline Shape shape_read(const std::string &word) {
     const std::string kind = word.substr(0, word.find(':'));
     const std::vector<double> v = numbers(word);
     Shape s = {};
-    s.height = height;
+    s.height = 0.06f; /* above every depth, so that no grain comes over it */
     if (kind == "disc" && v.size() == 1) {
         for (int k = 0; k < 48; k++) {
             const double angle = k * 6.283185307179586 / 48;

@@ -12,13 +12,13 @@ struct WalkDef {
     Shape shape;                         /* of the first foot's sole, in the foot's frame */
     std::vector<double> sides = {1, -1}; /* -1: this foot has its mirror image */
     double sole_z = 0;                   /* [m] of the sole in the foot's frame */
+    float height = 0.06f;                /* [m] of the block that the foot is */
     double reach = 0.3;                  /* [m] grains nearer to the middle of the sole move */
     double track = 4;                    /* [m] length of the way */
     double frames = 25;                  /* pictures a second */
 };
 
 constexpr double PRESS_SPEED = 0.25;    /* [m/s] of the soles before the first step */
-constexpr float SOLE_HEIGHT = 0.2f;     /* [m] of the block: no grain comes over it */
 constexpr double PICTURE_UNIT = 0.0002; /* [m] */
 enum : int { PICTURE_MOVED = 2 };       /* units; grains that moved less are not drawn anew */
 
@@ -551,6 +551,8 @@ inline void walk_open(Walk *w, const BedDef &bed, const WalkDef &def, int trial)
     w->middle = 0.5 * (double)(low + high);
     Grains &g = w->track.bed.g;
     g.shape = def.shape;
+    g.shape.height = def.height;
+    g.shape.reach = sqrtf(def.shape.reach * def.shape.reach + def.height * def.height);
     g.ride = allocate<Ride>(1);
     w->plate.resize((size_t)g.beds);
 }
