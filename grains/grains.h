@@ -39,8 +39,8 @@ struct Ride;
 
 struct Grains {
     int beds, per, count;
-    Range moving; /* the others stand still */
-    Range near;   /* the others are far from those that move */
+    Range moving;                 /* the others stand still */
+    Range near;                   /* the others are far from those that move */
     float size_x, size_y, size_z; /* of the box [m] */
     Vec unit;                     /* of positions [m] */
     float skin;                   /* [m]: lists hold all grains whose surfaces are nearer */

@@ -40,9 +40,10 @@ BOTH void ride_turn(double *q, const double *spin, double dt) {
 BOTH void ride_place(const Ride &r, int b, const Grains &g, Plate *p) {
     const double *at = r.place + 3 * b, *q = r.turn + 4 * b;
     const double w = q[0], x = q[1], y = q[2], z = q[3];
-    const double turn[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-                            2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                            2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+    const double turn[9] = {
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+        2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
     float v[6];
     plate_cells(p, g, at[0], at[1], at[2]);
     for (int k = 0; k < 9; k++) {

@@ -20,7 +20,7 @@ struct WalkDef {
 
 constexpr double PRESS_SPEED = 0.25;    /* [m/s] of the soles before the first step */
 constexpr double PICTURE_UNIT = 0.0002; /* [m] */
-enum : int { PICTURE_MOVED = 2 };       /* units; grains that moved less are not drawn anew */
+enum : int { PICTURE_MOVED = 3 };       /* units; grains that moved less are not drawn anew */
 
 /* ---- the long bed ---- */
 
@@ -177,34 +177,51 @@ inline void picture_beds(Track *t, FILE *out) {
     }
 }
 
-/* Grains that have moved since they were drawn: for each bed their number, then for each grain its
- * number (32 bit) and place. */
+/* Places in a range of a bed. */
+inline std::vector<Place> range_places(const Grains &g, int b, const Range &range) {
+    std::vector<Place> place((size_t)range.count[b]);
+    const int first = range.first[b], end = std::min(first + range.count[b], g.per);
+    const Place *own = g.place + (size_t)b * (size_t)g.per;
+    copy(place.data(), own + first, (size_t)(end - first));
+    copy(place.data() + (end - first), own, place.size() - (size_t)(end - first));
+    return place;
+}
+
+/* Grains that have moved since they were drawn. For each bed: how many (32 bit), their numbers, each
+ * less the one before, and by how many units they moved in x, in y, in z (16 bit). What packs well
+ * stands together. */
 inline void picture_take(Track *t, FILE *out) {
     const Grains &g = t->bed.g;
     for (int b = 0; b < g.beds; b++) {
+        const std::vector<Place> place = range_places(g, b, g.moving);
         std::vector<uint16_t> &drawn = t->picture[(size_t)b];
         std::vector<uint32_t> number;
-        std::vector<uint16_t> moved;
-        std::vector<Place> place((size_t)g.moving.count[b]);
-        const int first = g.moving.first[b], end = std::min(first + g.moving.count[b], g.per);
-        const Place *own = g.place + (size_t)b * (size_t)g.per;
-        copy(place.data(), own + first, (size_t)(end - first));
-        copy(place.data() + (end - first), own, place.size() - (size_t)(end - first));
+        std::vector<int16_t> way[3];
+        uint32_t last = 0;
         for (size_t k = 0; k < place.size(); k++) {
-            const size_t i = ((size_t)first + k) % (size_t)g.per;
+            const size_t i = ((size_t)g.moving.first[b] + k) % (size_t)g.per;
             uint16_t now[3];
+            int16_t by[3];
             picture_of(g, place[k], now);
-            const auto off = [&now, &drawn, i](int a) { return abs(now[a] - drawn[3 * i + (size_t)a]); };
-            if (std::max(off(0), std::max(off(1), off(2))) >= PICTURE_MOVED) {
-                std::copy(now, now + 3, &drawn[3 * i]);
-                moved.insert(moved.end(), now, now + 3);
-                number.push_back((uint32_t)i);
+            for (size_t a = 0; a < 3; a++) {
+                by[a] = (int16_t)(now[a] - drawn[3 * i + a]);
+            }
+            if (std::max(abs(by[0]), std::max(abs(by[1]), abs(by[2]))) < PICTURE_MOVED) {
+                continue;
+            }
+            std::copy(now, now + 3, &drawn[3 * i]);
+            number.push_back((uint32_t)i - last);
+            last = (uint32_t)i;
+            for (size_t a = 0; a < 3; a++) {
+                way[a].push_back(by[a]);
             }
         }
         const uint32_t count = (uint32_t)number.size();
         fwrite(&count, sizeof count, 1, out);
         fwrite(number.data(), sizeof count, number.size(), out);
-        fwrite(moved.data(), sizeof(uint16_t), moved.size(), out);
+        for (const std::vector<int16_t> &w : way) {
+            fwrite(w.data(), sizeof(int16_t), w.size(), out);
+        }
     }
 }
 
@@ -397,9 +414,9 @@ struct Walk {
     Track track;
     Ride ride;
     std::vector<Plate> plate;
-    double middle; /* [m] of the outline along x */
-    long steps;    /* of the robot */
-    double pressed; /* [m] way of the soles before the first step */
+    double middle;        /* [m] of the outline along x */
+    long steps;           /* of the robot */
+    double pressed;       /* [m] way of the soles before the first step */
     double turned, moved; /* [m] largest way by which a pose was put right in a step */
     double parted;        /* [m/s] largest difference of the robot's speed and the sole's */
 };
@@ -428,7 +445,8 @@ inline void depths(const Walk &w, const Foot &f, double side, double *deep, doub
     const Shape &s = w.def.shape;
     *deep = -1e9;
     for (int k = 0; k < s.points; k++) {
-        const double z = f.place[2] + f.turn[6] * (double)s.x[k] + f.turn[7] * side * (double)s.y[k];
+        const double z =
+            f.place[2] + f.turn[6] * (double)s.x[k] + f.turn[7] * side * (double)s.y[k];
         *deep = std::max(*deep, -z);
     }
     *mean = -(f.place[2] + f.turn[6] * w.middle);
@@ -557,8 +575,7 @@ inline void walk_open(Walk *w, const BedDef &bed, const WalkDef &def, int trial)
     w->plate.resize((size_t)g.beds);
 }
 
-inline FILE *walk_file(const std::string &folder, const char *name, int trial,
-                       const char *kind) {
+inline FILE *walk_file(const std::string &folder, const char *name, int trial, const char *kind) {
     const std::string path = folder + "/" + name + "-" + std::to_string(trial) + kind;
     FILE *out = fopen(path.c_str(), "wb");
     if (!out) {

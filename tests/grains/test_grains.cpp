@@ -376,7 +376,7 @@ static void a_free_sole_keeps_momentum(void **) {
                  0.08f + 0.0056f * (float)(k / 30), 0.0022f + 0.0001f * (float)(k % 7)));
     }
     Bed bed = stage_open(BedDef(), grains, 0);
-    const double mass = 0.05, inertia = 1e-5, start[3] = {0.004, -0.006, 0.105};
+    const double mass = 0.05, inertia = 3e-6, start[3] = {0.012, -0.012, 0.105};
     Ride ride = {};
     bed.g.shape = shape_read("polygon:-0.02,-0.015,0.02,-0.01,0.015,0.02,-0.02,0.01");
     std::copy(start, start + 3, ride.place);
@@ -426,8 +426,8 @@ static void a_free_sole_keeps_momentum(void **) {
     }
     printf("energy %.4e J before, %.4e after; the block's speed %.3f, %.3f m/s\n", sum[0][6],
            sum[1][6], twist[2], ride.twist[2]);
-    assert_true(given > 0.15 * mass * fabs(twist[2]) && sum[1][6] < sum[0][6]);
-    assert_true(fabs(ride.twist[3] - twist[3]) > 0.5);
+    assert_true(given > 0.05 * mass * fabs(twist[2]) && sum[1][6] < sum[0][6]);
+    assert_true(fabs(ride.twist[3] - twist[3]) > 1 && fabs(ride.twist[4] - twist[4]) > 1);
     bed.g.ride = nullptr;
     bed_close(&bed);
 }
@@ -459,9 +459,17 @@ static double fastest_of(const Grains &g) {
     return fastest;
 }
 
+static int moved_since(const Grains &g, const std::vector<Place> &start) {
+    int moved = 0;
+    for (int i = 0; i < g.count; i++) {
+        moved += length(from_to(g, start[(size_t)i], g.place[i])) > 2e-5f;
+    }
+    return moved;
+}
+
 /* A settled bed, put behind itself four times: windows that open, close and open again make no
- * grain faster than the last ones that still roll in the settled bed, move one in a hundred, and
- * miss no contact across the ends of the pieces. */
+ * grain faster than the last ones that still roll in the settled bed, move no larger share of them
+ * than move there, and miss no contact across the ends of the pieces. */
 static void a_long_bed_stays_at_rest(void **) {
     BedDef def = small_bed();
     def.seeds = {1, 2};
@@ -470,7 +478,15 @@ static void a_long_bed_stays_at_rest(void **) {
     Bed tile;
     bed_open(&tile, def);
     bed_settle(&tile);
+    const std::vector<char *> saved = bed_save(tile);
+    const std::vector<Place> rest = bed_places(tile);
     const double before = fastest_of(tile.g);
+    bed_go(&tile, 900);
+    const int own = moved_since(tile.g, rest);
+    bed_restore(&tile, saved);
+    for (char *data : saved) {
+        release(data);
+    }
     WalkDef walk;
     walk.reach = 0.02;
     walk.track = 0.27;
@@ -480,7 +496,7 @@ static void a_long_bed_stays_at_rest(void **) {
     const std::vector<Place> start = bed_places(t.bed);
     assert_int_equal(t.tiles, 4);
     double fastest = 0;
-    int missed = 0, moved = 0;
+    int missed = 0;
     for (const double x : {0.0, 0.03, 0.06, 0.11, 0.15, 0.0, 0.2}) {
         for (int b = 0; b < 2; b++) {
             track_follow(&t, b, x + 0.01 * b);
@@ -492,13 +508,11 @@ static void a_long_bed_stays_at_rest(void **) {
             missed += i < 0 || g.place[i].radius <= 0 ? 0 : near_missed(g, i);
         }
     }
-    for (int i = 0; i < g.count; i++) {
-        moved += length(from_to(g, start[(size_t)i], g.place[i])) > 2e-5f;
-    }
-    printf("%d windows of %d grains; fastest %.1e m/s, in the settled bed %.1e; %d of %d grains "
-           "moved by 0.02 mm (bound 1 %%), %d pairs missed\n",
-           t.moves, g.moving.most, fastest, before, moved, g.count, missed);
-    assert_true(fastest < before && moved < g.count / 100 && t.moves > 6);
+    const int moved = moved_since(g, start);
+    printf("%d windows of %d grains; fastest %.1e m/s, in the settled bed %.1e; %d grains moved by "
+           "0.02 mm, in the settled bed %d of a fourth as many; %d pairs missed\n",
+           t.moves, g.moving.most, fastest, before, moved, own, missed);
+    assert_true(fastest < before && moved < 4 * own && t.moves > 6);
     assert_int_equal(missed, 0);
     bed_close(&t.bed);
 }
