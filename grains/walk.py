@@ -114,12 +114,38 @@ def on_models(args):
                 walk(args, folder_of(args, family, speed, model), speed, ground_of(family, model), args.trials)
 
 
+def draw_figure(args):
+    import walk_pictures
+    walk_pictures.write_stances(args.out, args.families, args.speeds, args.out / "walk.csv")
+    for family in args.families:
+        image = args.image if family == args.families[0] else args.image.with_stem(f"{args.image.stem}-{family}")
+        walk_pictures.figure(args.out, family, args.speeds, image)
+        print(image)
+
+
+def film(args):
+    import walk_pictures
+    for family in args.families:
+        for speed in args.speeds:
+            folder = folder_of(args, family, speed, "grains")
+            file = args.out / f"{family}-{speed}.mp4"
+            if not (folder / "frames-0.bin").exists():
+                fail(f"{folder}/frames-0.bin is not there: grains/walk.py grains")
+            still = (args.still, file.with_suffix(".png")) if args.still >= 0 else None
+            pictures, failed = walk_pictures.video(ROOT, args.robot, folder, args.draw, file, still)
+            if failed:
+                fail(f"{file}: ffmpeg or {args.draw} failed")
+            print(f"{file}: {pictures} pictures")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=("fit", "grains", "models", "figure", "video"))
     parser.add_argument("--out", default=ROOT / "out" / "walk", type=pathlib.Path)
     parser.add_argument("--mild", default=ROOT / "build" / "mild", type=pathlib.Path)
     parser.add_argument("--program", default=ROOT / "build" / "grains" / "grains", type=pathlib.Path)
+    parser.add_argument("--draw", default=ROOT / "build" / "grains" / "grains_draw", type=pathlib.Path, help="of the video")
+    parser.add_argument("--still", default=-1, type=int, help="picture of each video that is kept as PNG too")
     parser.add_argument("--robot", default="sa01")
     parser.add_argument("--families", default="sand", type=lambda text: text.split(","), help="of " + ", ".join(BEDS))
     parser.add_argument("--speeds", default="0.3,0.6", type=lambda text: text.split(","))
@@ -134,10 +160,10 @@ def main():
     parser.add_argument("--bed-seed", default=1, type=int)
     parser.add_argument("--reach", default=0.3, type=float, help="[m] grains nearer to the middle of a sole move")
     parser.add_argument("--sole-height", default=0.06, type=float, help="[m] of the block that a foot is")
-    parser.add_argument("--image", default=ROOT / "docs" / "images" / "walk-on-grains.svg", type=pathlib.Path)
+    parser.add_argument("--image", default=ROOT / "docs" / "walk-on-grains.png", type=pathlib.Path)
     args = parser.parse_args()
     args.out = args.out.resolve()
-    {"fit": fit, "grains": on_grains, "models": on_models}[args.what](args)
+    {"fit": fit, "grains": on_grains, "models": on_models, "figure": draw_figure, "video": film}[args.what](args)
 
 
 if __name__ == "__main__":
