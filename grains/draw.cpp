@@ -66,7 +66,8 @@ static void draw(Picture *p, const Camera &c, const Sphere &s) {
             depth = near;
             float normal[3];
             for (int k = 0; k < 3; k++) {
-                normal[k] = flat ? s.normal[k] : a * c.right[k] + b * c.up[k] - front * c.forward[k];
+                normal[k] =
+                    flat ? s.normal[k] : a * c.right[k] + b * c.up[k] - front * c.forward[k];
             }
             paint(p, px, py, normal, s.colour);
         }
@@ -94,7 +95,7 @@ int main() {
         for (const Sphere &s : spheres) {
             draw(&p, c, s);
         }
-        if (fwrite(p.rgb.data(), 1, p.rgb.size(), stdout) != p.rgb.size()) {
+        if (fwrite(p.rgb.data(), 1, p.rgb.size(), stdout) != p.rgb.size() || fflush(stdout)) {
             return 1;
         }
     }
