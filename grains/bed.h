@@ -30,6 +30,8 @@ struct Bed {
     Grains g = {};
     BedDef def;
     long steps = 0, lists = 0;  /* that were made */
+    long late = 0;              /* lists that came too late */
+    bool late_stops = true;     /* that ends the program */
     std::vector<float> surface; /* of each bed [m] */
     std::vector<float> solid;   /* share of grains in the volume of each, in its middle */
     std::vector<int> filled;    /* grains of each */
@@ -210,7 +212,8 @@ inline void bed_look(Bed *bed) {
         each<Grains, grain_watch>(range_size(g, g.moving), g);
         copy(&flags, g.flags, 1);
     }
-    if (flags & LIST_LATE) {
+    bed->late += flags & LIST_LATE ? 1 : 0;
+    if (flags & LIST_LATE && bed->late_stops) {
         stop("a grain moved farther than its list of neighbours reaches: take more --steps");
     }
     if (flags & (CELL_FULL | LIST_FULL)) {

@@ -573,6 +573,8 @@ inline void walk_open(Walk *w, const BedDef &bed, const WalkDef &def, int trial)
     g.shape.reach = sqrtf(def.shape.reach * def.shape.reach + def.height * def.height);
     g.ride = allocate<Ride>(1);
     w->plate.resize((size_t)g.beds);
+    w->track.bed.late = 0;
+    w->track.bed.late_stops = false; /* a grain that a foot kicks away; they are counted */
 }
 
 inline FILE *walk_file(const std::string &folder, const char *name, int trial, const char *kind) {
@@ -604,6 +606,7 @@ inline void walk_report(const Walk &w, int trial, int pictures, double time, dou
                    {"dt_s", (double)g.law.dt},
                    {"steps", (double)t.bed.steps},
                    {"robot_steps", (double)w.steps},
+                   {"late_lists", (double)t.bed.late},
                    {"windows", (double)t.moves},
                    {"moving", (double)g.moving.most},
                    {"pressed_m", w.pressed},
