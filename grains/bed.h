@@ -15,6 +15,7 @@ struct BedDef {
     std::vector<uint64_t> seeds = {1}; /* one bed each */
     float grain = 0.005f;              /* mean diameter [m] */
     float spread = 0.1f;               /* diameters are uniform within this share of the mean */
+    float skin = 0.15f;                /* [grains] that lists of neighbours reach beyond contact */
     float length = 0.45f, width = 0.35f, depth = 0.12f; /* [m] */
     float friction = 0.5f, rolling = 0.0f, restitution = 0.5f;
     float density = 2500.0f; /* [kg/m^3] */
@@ -31,6 +32,7 @@ struct Bed {
     BedDef def;
     long steps = 0, lists = 0;  /* that were made */
     long late = 0;              /* lists that came too late */
+    long full = 0;              /* lists or cells without room: contacts were left out */
     bool late_stops = true;     /* that ends the program */
     std::vector<float> surface; /* of each bed [m] */
     std::vector<float> solid;   /* share of grains in the volume of each, in its middle */
@@ -176,7 +178,7 @@ inline void bed_open(Bed *bed, const BedDef &def) {
     g.size_z = 2.0f * fmaxf(top, def.depth) + 0.1f; /* differences reach half of it */
     const float whole = 4294967296.0f;
     g.unit = vec(g.size_x / whole, g.size_y / whole, g.size_z / whole);
-    g.skin = 0.15f * def.grain;
+    g.skin = def.skin * def.grain;
     const float cell = def.grain * (1 + def.spread) + g.skin;
     g.cells_x = (int)(g.size_x / cell);
     g.cells_y = (int)(g.size_y / cell);
@@ -204,7 +206,8 @@ inline void bed_list(Bed *bed) {
     bed->lists++;
 }
 
-/* Makes the lists anew where a grain has moved far. Stops the program where that came too late. */
+/* Makes the lists anew where a grain has moved far. Stops the program where that came too late, and
+ * where there is no room for them; in a walk it counts both. */
 inline void bed_look(Bed *bed) {
     Grains &g = bed->g;
     int flags = 0;
@@ -216,7 +219,8 @@ inline void bed_look(Bed *bed) {
     if (flags & LIST_LATE && bed->late_stops) {
         stop("a grain moved farther than its list of neighbours reaches: take more --steps");
     }
-    if (flags & (CELL_FULL | LIST_FULL)) {
+    bed->full += flags & (CELL_FULL | LIST_FULL) ? 1 : 0;
+    if (flags & (CELL_FULL | LIST_FULL) && bed->late_stops) {
         stop(flags & CELL_FULL ? "too many grains in a cell" : "too many neighbours of a grain");
     }
     if (flags || bed->lists == 0) {

@@ -18,9 +18,10 @@ struct WalkDef {
     double frames = 25;                  /* pictures a second */
 };
 
+constexpr float WALK_SKIN = 0.3f;       /* [grains]: a foot throws grains, which are fast */
 constexpr double PRESS_SPEED = 0.25;    /* [m/s] of the soles before the first step */
 constexpr double PICTURE_UNIT = 0.0002; /* [m] */
-enum : int { PICTURE_MOVED = 3 };       /* units; grains that moved less are not drawn anew */
+enum : int { PICTURE_MOVED = 6 };       /* units; grains that moved less are not drawn anew */
 
 /* ---- the long bed ---- */
 
@@ -554,6 +555,7 @@ inline void walk_open(Walk *w, const BedDef &bed, const WalkDef &def, int trial)
     w->def = def;
     w->steps = 0;
     w->pressed = w->turned = w->moved = w->parted = 0;
+    beds.skin = WALK_SKIN;
     beds.seeds.clear();
     for (size_t b = 0; b < def.sides.size(); b++) {
         beds.seeds.push_back(bed.seeds[0] + (uint64_t)trial * def.sides.size() + b);
@@ -607,6 +609,8 @@ inline void walk_report(const Walk &w, int trial, int pictures, double time, dou
                    {"steps", (double)t.bed.steps},
                    {"robot_steps", (double)w.steps},
                    {"late_lists", (double)t.bed.late},
+                   {"full_lists", (double)t.bed.full},
+                   {"lists", (double)t.bed.lists},
                    {"windows", (double)t.moves},
                    {"moving", (double)g.moving.most},
                    {"pressed_m", w.pressed},

@@ -101,7 +101,7 @@ def on_grains(args):
         for speed in args.speeds:
             folder = folder_of(args, family, speed, "grains")
             bed = {"grain": args.grain, "box": args.box, **BEDS[family], "settle": args.settle, "seeds": args.bed_seed,
-                   "sole-height": args.sole_height, "reach": args.reach, "track": abs(float(speed)) * args.seconds + 1.5}
+                   "sole-height": args.sole_height, "reach": args.reach, "frames": args.frames, "track": abs(float(speed)) * args.seconds + 1.5}
             options = [word for name, value in bed.items() for word in (f"--{name}", value)]
             walk(args, folder, speed, ground_of(family, "mild"), 1,
                  [args.program, "--sole", sole, "--sole-z", height, "--out", folder, *options])
@@ -160,6 +160,7 @@ def main():
     parser.add_argument("--bed-seed", default=1, type=int)
     parser.add_argument("--reach", default=0.3, type=float, help="[m] grains nearer to the middle of a sole move")
     parser.add_argument("--sole-height", default=0.06, type=float, help="[m] of the block that a foot is")
+    parser.add_argument("--frames", default=25, type=float, help="[1/s] pictures of the grains")
     parser.add_argument("--image", default=ROOT / "docs" / "walk-on-grains.png", type=pathlib.Path)
     args = parser.parse_args()
     args.out = args.out.resolve()
