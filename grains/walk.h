@@ -5,6 +5,7 @@
 #define GRAINS_WALK_H
 
 #include <chrono>
+#include <csignal>
 
 #include "plan.h"
 
@@ -420,17 +421,25 @@ struct Walk {
     double pressed;       /* [m] way of the soles before the first step */
     double turned, moved; /* [m] largest way by which a pose was put right in a step */
     double parted;        /* [m/s] largest difference of the robot's speed and the sole's */
+    double lost;          /* [s] when a sole was lost; below 0: none was */
 };
 
+/* Of any rotation: the largest of the four numbers is found first. */
 inline void quaternion_of(const double *m, double *q) {
-    const double trace = m[0] + m[4] + m[8];
-    if (trace <= 0) {
-        stop("a sole is upside down");
+    const double square[4] = {m[0] + m[4] + m[8], m[0] - m[4] - m[8], m[4] - m[0] - m[8],
+                              m[8] - m[0] - m[4]};
+    const size_t most = (size_t)(std::max_element(square, square + 4) - square);
+    const double skew[3] = {m[7] - m[5], m[2] - m[6], m[3] - m[1]};
+    const double large = 0.5 * sqrt(1 + square[most]), part = 1 / (4 * large);
+    q[0] = most == 0 ? large : part * skew[most - 1];
+    for (size_t k = 0; k < 3; k++) {
+        if (most == 0) {
+            q[k + 1] = part * skew[k];
+        } else {
+            const size_t row = most - 1;
+            q[k + 1] = k == row ? large : part * (m[3 * row + k] + m[3 * k + row]);
+        }
     }
-    q[0] = 0.5 * sqrt(1 + trace);
-    q[1] = (m[7] - m[5]) / (4 * q[0]);
-    q[2] = (m[2] - m[6]) / (4 * q[0]);
-    q[3] = (m[3] - m[1]) / (4 * q[0]);
 }
 
 /* The rotation from orientation a to b as a vector [rad]; it is small. */
@@ -522,9 +531,38 @@ inline void walk_meet(Walk *w, const Question &q) {
     }
 }
 
-/* A step of the robot. */
-inline void walk_step(Walk *w, const Question &q) {
+/* Bool: a sole is upside down, at the floor, or so far along the way that it meets its start. */
+inline bool sole_is_lost(const Walk &w, const Question &q) {
+    const Bed &bed = w.track.bed;
+    const double way = (double)bed.g.size_x - 2 * w.def.reach;
+    for (size_t b = 0; b < q.foot.size(); b++) {
+        const Foot &f = q.foot[b];
+        double deep, mean;
+        depths(w, f, w.def.sides[b], &deep, &mean);
+        if (!(f.turn[8] > 0 && deep < (double)bed.surface[b] && fabs(f.place[0]) < way)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* A step of the robot. From a lost sole on there is no ground: the robot falls, and those who judge
+ * it end the trial by their own rule. Bool: the answer was taken. */
+inline bool walk_step(Walk *w, const Question &q) {
     Bed &bed = w->track.bed;
+    if (w->lost < 0 && sole_is_lost(*w, q)) {
+        w->lost = q.time;
+    }
+    if (w->lost >= 0) {
+        const double none[6] = {0, 0, 0, 0, 0, 0};
+        for (const Foot &f : q.foot) {
+            answer_write(f, none, 0, 0);
+        }
+        return fflush(stdout) == 0;
+    }
+    if (w->steps == 0) {
+        walk_press(w, q);
+    }
     const long steps = (long)ceil(q.dt / (double)bed_law(bed.def).dt);
     bed.g.law.dt = (float)(q.dt / (double)steps);
     for (size_t b = 0; b < q.foot.size(); b++) {
@@ -545,8 +583,8 @@ inline void walk_step(Walk *w, const Question &q) {
         answer_write(q.foot[b], mean, stands ? std::max(deep, 0.0) : 0,
                      stands ? std::max(middle, 0.0) : 0);
     }
-    fflush(stdout);
     w->steps++;
+    return fflush(stdout) == 0;
 }
 
 inline void walk_open(Walk *w, const BedDef &bed, const WalkDef &def, int trial) {
@@ -555,6 +593,7 @@ inline void walk_open(Walk *w, const BedDef &bed, const WalkDef &def, int trial)
     w->def = def;
     w->steps = 0;
     w->pressed = w->turned = w->moved = w->parted = 0;
+    w->lost = -1;
     beds.skin = WALK_SKIN;
     beds.seeds.clear();
     for (size_t b = 0; b < def.sides.size(); b++) {
@@ -590,7 +629,8 @@ inline FILE *walk_file(const std::string &folder, const char *name, int trial, c
 
 /* What the pictures and the figure need to know. */
 inline void walk_report(const Walk &w, int trial, int pictures, double time, double seconds,
-                        FILE *out) {
+                        const std::string &folder) {
+    FILE *out = walk_file(folder, "walk", trial, ".json");
     const Track &t = w.track;
     const Grains &g = t.bed.g;
     const struct {
@@ -623,19 +663,27 @@ inline void walk_report(const Walk &w, int trial, int pictures, double time, dou
     for (const auto &n : numbers) {
         fprintf(out, "\"%s\": %.9g,\n ", n.name, n.value);
     }
+    if (w.lost < 0) {
+        fprintf(out, "\"lost_sole_s\": null,\n ");
+    } else {
+        fprintf(out, "\"lost_sole_s\": %.9g,\n ", w.lost);
+    }
     fprintf(out, "\"surface_m\": [");
     for (size_t b = 0; b < t.bed.surface.size(); b++) {
         fprintf(out, "%s%.6g", b ? ", " : "", (double)t.bed.surface[b]);
     }
     fprintf(out, "]}\n");
+    fclose(out);
 }
 
+/* Files are whole after each picture, so a walk that is killed leaves what it has. */
 inline void walk_run(const BedDef &bed, const WalkDef &def, const std::string &folder) {
     Question q;
     const int feet = (int)def.sides.size();
     if (!question_read(&q, feet, def.sole_z)) {
         return;
     }
+    signal(SIGPIPE, SIG_IGN); /* a robot that has gone is the end of the walk */
     const int trial = q.trial;
     Walk w;
     walk_open(&w, bed, def, trial);
@@ -644,20 +692,23 @@ inline void walk_run(const BedDef &bed, const WalkDef &def, const std::string &f
     FILE *frames = walk_file(folder, "frames", trial, ".bin");
     picture_beds(&w.track, beds);
     fclose(beds);
-    walk_press(&w, q);
     int pictures = 0;
+    const auto report = [&]() {
+        const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+        walk_report(w, trial, pictures, q.time, took.count(), folder);
+    };
+    bool taken = true;
     do {
-        walk_step(&w, q);
+        taken = walk_step(&w, q);
         if (q.time * def.frames >= pictures) {
             picture_take(&w.track, frames);
+            fflush(frames);
             pictures++;
+            report();
         }
-    } while (question_read(&q, feet, def.sole_z));
+    } while (taken && question_read(&q, feet, def.sole_z));
     fclose(frames);
-    FILE *report = walk_file(folder, "walk", trial, ".json");
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    walk_report(w, trial, pictures, q.time, took.count(), report);
-    fclose(report);
+    report();
     release(w.track.bed.g.ride);
     bed_close(&w.track.bed);
 }
