@@ -26,7 +26,7 @@ typedef struct {
     uint8_t *over; /* [count] bool: the trial ended by a fall; its robot stays as it is */
     EnvsDrive drive;
     const RobotGround *ground; /* [count] or NULL */
-    EnvsSample *sample; /* [count][physics steps] of the caller; NULL: none */
+    EnvsSample *sample;        /* [count][physics steps] of the caller; NULL: none */
     /* arguments of the call in flight */
     const EnvsStep *step;
     const EnvsView *view;

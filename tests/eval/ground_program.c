@@ -32,11 +32,9 @@ static int ask(MildContactInput *input, double *inverse_inertia) {
 static void answer(const MildContactResult *result, int feet, int turned) {
     for (int f = 0; f < feet; f++) {
         const MildFootResult *foot = &result->foot[f];
-        const double numbers[] = {
-            foot->force[0],  foot->force[1],
-            foot->force[2],  foot->torque[0],
-            foot->torque[1], foot->torque[2],
-            foot->depth_max, foot->depth_mean};
+        const double numbers[] = {foot->force[0],  foot->force[1],  foot->force[2],
+                                  foot->torque[0], foot->torque[1], foot->torque[2],
+                                  foot->depth_max, foot->depth_mean};
         double out[8];
         memcpy(out, numbers, sizeof out);
         out[4] = turned ? -out[4] : out[4];
