@@ -2,8 +2,8 @@
  *
  * A frame: camera's place 3, its right, up and forward 9, focal length [pixels], width, height, and
  * the number n of spheres, 16 floats; then n spheres: place 3, radius, normal 3 (0: that of a
- * sphere), and its colour as red + 256 green + 65536 blue, 8 floats. Of overlapping ones the nearest
- * is seen. */
+ * sphere), and its colour as red + 256 green + 65536 blue, 8 floats. Of overlapping ones the
+ * nearest is seen. */
 #include <cmath>
 #include <cstdint>
 #include <cstdio>

@@ -189,9 +189,9 @@ inline std::vector<Place> range_places(const Grains &g, int b, const Range &rang
     return place;
 }
 
-/* Grains that have moved since they were drawn. For each bed: how many (32 bit), their numbers, each
- * less the one before, and by how many units they moved in x, in y, in z (16 bit). What packs well
- * stands together. */
+/* Grains that have moved since they were drawn. For each bed: how many (32 bit), their numbers,
+ * each less the one before, and by how many units they moved in x, in y, in z (16 bit). What packs
+ * well stands together. */
 inline void picture_take(Track *t, FILE *out) {
     const Grains &g = t->bed.g;
     for (int b = 0; b < g.beds; b++) {

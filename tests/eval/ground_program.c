@@ -1,7 +1,7 @@
 /* COMMAND of `mild eval --program` that answers with libmild's own ground, so that a walk on it is
  * one that `mild eval` makes by itself: src/run/eval/other_ground.h has what is said.
  *
- * ground_program ROBOT GROUND [turned]    turned: with the sign of every moment about y exchanged */
+ * ground_program ROBOT GROUND [turned]    turned: every moment about y has the other sign */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
