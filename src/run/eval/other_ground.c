@@ -95,7 +95,7 @@ static int write_question(const Child *child, const MildContactInput *input, dou
 static int solve(void *self, const MildContactInput *input, MildContactResult *result) {
     Child *child = self;
     double question[HEAD + ROBOT_FEET_MAX * (FOOT + 6 + 36 * ROBOT_FEET_MAX)];
-    double answer[ROBOT_FEET_MAX * ANSWER];
+    double answer[ROBOT_FEET_MAX * ANSWER] = {0};
     child->time += input->dt;
     const size_t size = (size_t)write_question(child, input, question) * sizeof *question;
     const size_t back = (size_t)child->feet * ANSWER * sizeof *answer;
