@@ -8,13 +8,14 @@
 #include <utility>
 #include <vector>
 
-#include "grains.h"
+#include "ride.h"
 
 /* What a bed is made of; every number is an option of the program. */
 struct BedDef {
     std::vector<uint64_t> seeds = {1}; /* one bed each */
     float grain = 0.005f;              /* mean diameter [m] */
     float spread = 0.1f;               /* diameters are uniform within this share of the mean */
+    float skin = 0.15f;                /* [grains] that lists of neighbours reach beyond contact */
     float length = 0.45f, width = 0.35f, depth = 0.12f; /* [m] */
     float friction = 0.5f, rolling = 0.0f, restitution = 0.5f;
     float density = 2500.0f; /* [kg/m^3] */
@@ -30,6 +31,9 @@ struct Bed {
     Grains g = {};
     BedDef def;
     long steps = 0, lists = 0;  /* that were made */
+    long late = 0;              /* lists that came too late */
+    long full = 0;              /* lists or cells without room: contacts were left out */
+    bool late_stops = true;     /* that ends the program */
     std::vector<float> surface; /* of each bed [m] */
     std::vector<float> solid;   /* share of grains in the volume of each, in its middle */
     std::vector<int> filled;    /* grains of each */
@@ -174,7 +178,7 @@ inline void bed_open(Bed *bed, const BedDef &def) {
     g.size_z = 2.0f * fmaxf(top, def.depth) + 0.1f; /* differences reach half of it */
     const float whole = 4294967296.0f;
     g.unit = vec(g.size_x / whole, g.size_y / whole, g.size_z / whole);
-    g.skin = 0.15f * def.grain;
+    g.skin = def.skin * def.grain;
     const float cell = def.grain * (1 + def.spread) + g.skin;
     g.cells_x = (int)(g.size_x / cell);
     g.cells_y = (int)(g.size_y / cell);
@@ -193,8 +197,8 @@ inline void bed_open(Bed *bed, const BedDef &def) {
 inline void bed_list(Bed *bed) {
     Grains &g = bed->g;
     clear(g.cell_count, cells_of(g));
-    each<Grains, grain_enter_cell>(g.count, g);
-    each<Grains, grain_list>(g.count, g);
+    each<Grains, grain_enter_cell>(range_size(g, g.near), g);
+    each<Grains, grain_list>(range_size(g, g.moving), g);
     std::swap(g.neighbour, g.next_neighbour);
     std::swap(g.touching, g.next_touching);
     std::swap(g.slip, g.next_slip);
@@ -202,18 +206,21 @@ inline void bed_list(Bed *bed) {
     bed->lists++;
 }
 
-/* Makes the lists anew where a grain has moved far. Stops the program where that came too late. */
+/* Makes the lists anew where a grain has moved far. Stops the program where that came too late, and
+ * where there is no room for them; in a walk it counts both. */
 inline void bed_look(Bed *bed) {
     Grains &g = bed->g;
     int flags = 0;
     if (bed->lists > 0) {
-        each<Grains, grain_watch>(g.count, g);
+        each<Grains, grain_watch>(range_size(g, g.moving), g);
         copy(&flags, g.flags, 1);
     }
-    if (flags & LIST_LATE) {
+    bed->late += flags & LIST_LATE ? 1 : 0;
+    if (flags & LIST_LATE && bed->late_stops) {
         stop("a grain moved farther than its list of neighbours reaches: take more --steps");
     }
-    if (flags & (CELL_FULL | LIST_FULL)) {
+    bed->full += flags & (CELL_FULL | LIST_FULL) ? 1 : 0;
+    if (flags & (CELL_FULL | LIST_FULL) && bed->late_stops) {
         stop(flags & CELL_FULL ? "too many grains in a cell" : "too many neighbours of a grain");
     }
     if (flags || bed->lists == 0) {
@@ -228,8 +235,12 @@ inline void bed_go(Bed *bed, long steps) {
         if (bed->steps++ % CHECK_STEPS == 0) {
             bed_look(bed);
         }
-        each<Grains, grain_step>(g.count, g);
-        each<Grains, plate_step>(g.beds, g);
+        each<Grains, grain_step>(range_size(g, g.moving), g);
+        if (g.ride) {
+            each<Grains, ride_step>(1, g);
+        } else {
+            each<Grains, plate_step>(g.beds, g);
+        }
         std::swap(g.place, g.next_place);
         std::swap(g.velocity, g.next_velocity);
         std::swap(g.spin, g.next_spin);

@@ -28,8 +28,19 @@ struct alignas(16) Place {
     float radius; /* [m]; 0: a grain that was taken away */
 };
 
+/* Grains of each bed by number, from `first` on and around the bed's end. */
+enum : int { RANGE_BEDS = 4 };
+struct Range {
+    int most; /* in any bed; 0: all grains of all beds */
+    int first[RANGE_BEDS], count[RANGE_BEDS];
+};
+
+struct Ride;
+
 struct Grains {
     int beds, per, count;
+    Range moving;                 /* the others stand still */
+    Range near;                   /* the others are far from those that move */
     float size_x, size_y, size_z; /* of the box [m] */
     Vec unit;                     /* of positions [m] */
     float skin;                   /* [m]: lists hold all grains whose surfaces are nearer */
@@ -46,7 +57,21 @@ struct Grains {
     int *cell_count, *cell;
     int *flags;
     Plate *plate;
+    Ride *ride; /* moves the plates; NULL: their own cases do */
 };
+
+BOTH int range_size(const Grains &g, const Range &range) {
+    return range.most ? g.beds * range.most : g.count;
+}
+
+/* Number of the k-th grain of a range; -1: there is none. */
+BOTH int range_grain(const Grains &g, const Range &range, int k) {
+    if (range.most == 0) {
+        return k;
+    }
+    const int bed = k / range.most, at = k % range.most;
+    return at < range.count[bed] ? bed * g.per + (range.first[bed] + at) % g.per : -1;
+}
 
 BOTH Vec from_to(const Grains &g, const Place &a, const Place &b) {
     return vec((float)(int32_t)(b.x - a.x) * g.unit.x, (float)(int32_t)(b.y - a.y) * g.unit.y,
@@ -80,7 +105,11 @@ DEVICE void raise(const Grains &g, int flag) {
 #endif
 }
 
-DEVICE void grain_enter_cell(int i, const Grains &g) {
+DEVICE void grain_enter_cell(int k, const Grains &g) {
+    const int i = range_grain(g, g.near, k);
+    if (i < 0) {
+        return;
+    }
     const Place a = g.place[i];
     g.listed[i] = a;
     if (a.radius <= 0.0f) {
@@ -88,9 +117,9 @@ DEVICE void grain_enter_cell(int i, const Grains &g) {
     }
     const int c = cell_index(g, i / g.per, cell_along(a.x, g.cells_x), cell_along(a.y, g.cells_y),
                              cell_along(a.z, g.cells_z));
-    const int k = take_one(&g.cell_count[c]);
-    if (k < CELL_GRAINS) {
-        g.cell[c * CELL_GRAINS + k] = i;
+    const int at = take_one(&g.cell_count[c]);
+    if (at < CELL_GRAINS) {
+        g.cell[c * CELL_GRAINS + at] = i;
     } else {
         raise(g, CELL_FULL);
     }
@@ -150,7 +179,11 @@ DEVICE void grain_keep_contacts(const Grains &g, int i, const int *list, int cou
     g.next_touching[i] = kept;
 }
 
-DEVICE void grain_list(int i, const Grains &g) {
+DEVICE void grain_list(int number, const Grains &g) {
+    const int i = range_grain(g, g.moving, number);
+    if (i < 0) {
+        return;
+    }
     const Place a = g.place[i];
     int list[NEIGHBOURS], count = 0;
     if (a.radius > 0.0f) {
@@ -170,7 +203,11 @@ DEVICE void grain_list(int i, const Grains &g) {
 }
 
 /* Says when lists are due: two grains that each move less than half the skin stay apart. */
-DEVICE void grain_watch(int i, const Grains &g) {
+DEVICE void grain_watch(int k, const Grains &g) {
+    const int i = range_grain(g, g.moving, k);
+    if (i < 0) {
+        return;
+    }
     const Vec d = from_to(g, g.listed[i], g.place[i]);
     const float moved = length(d),
                 next = 2.0f * (float)CHECK_STEPS * g.law.dt * length(g.velocity[i]);
@@ -269,7 +306,7 @@ DEVICE bool grain_touch_plate(const Grains &g, int i, uint32_t touching, Body *a
         return false;
     }
     Plate *plate = &g.plate[i / g.per];
-    const Place origin = {plate->cell_x, 1u << 31, plate->cell_z, 0};
+    const Place origin = {plate->cell_x, plate->cell_y, plate->cell_z, 0};
     const Vec d = from_to(g, origin, a->place);
     const float radius = a->place.radius, far = g.shape.reach + radius;
     const Vec p = plate_from_world(*plate, d);
@@ -283,8 +320,7 @@ DEVICE bool grain_touch_plate(const Grains &g, int i, uint32_t touching, Body *a
     }
     normal = plate_to_world(*plate, normal);
     const Vec at = d - (radius + 0.5f * gap) * normal; /* of the contact, from the origin */
-    const Vec turning = vec(0, (float)plate->rate, 0);
-    const Vec velocity = vec((float)plate->vx, 0, (float)plate->vz) + cross(turning, at);
+    const Vec velocity = plate->velocity + cross(plate->spin, at), turning = plate->spin;
     const Vec before = a->torque;
     const Vec force = grain_touch_wall(g, i, PLATE, touching, normal, -gap, velocity, turning, a);
     const float arm = radius + 0.5f * gap;
@@ -308,7 +344,11 @@ DEVICE void grain_move(const Grains &g, int i, const Body &a) {
     g.next_spin[i] = spin;
 }
 
-DEVICE void grain_step(int i, const Grains &g) {
+DEVICE void grain_step(int k, const Grains &g) {
+    const int i = range_grain(g, g.moving, k);
+    if (i < 0) {
+        return;
+    }
     Body a;
     a.place = g.place[i];
     if (a.place.radius <= 0.0f) {
@@ -333,12 +373,26 @@ DEVICE void grain_step(int i, const Grains &g) {
     grain_move(g, i, a);
 }
 
-/* The plate's place in the units of the grains, from its pose. */
+/* The origin's place in the units of the grains. */
+BOTH void plate_cells(Plate *p, const Grains &g, double x, double y, double z) {
+    p->cell_x = (1u << 31) + (uint32_t)llrint(x / (double)g.unit.x);
+    p->cell_y = (1u << 31) + (uint32_t)llrint(y / (double)g.unit.y);
+    p->cell_z = (uint32_t)llrint(z / (double)g.unit.z);
+}
+
+/* What grains feel, from pose and motion of a case. A positive pitch lowers the edge at +x. */
 BOTH void plate_place(Plate *p, const Grains &g) {
-    p->cell_x = (1u << 31) + (uint32_t)(int32_t)llrint(p->x / (double)g.unit.x);
-    p->cell_z = (uint32_t)(int32_t)llrint(p->z / (double)g.unit.z);
-    p->sine = (float)sin(p->pitch);
-    p->cosine = (float)cos(p->pitch);
+    const float sine = (float)sin(p->pitch), cosine = (float)cos(p->pitch);
+    plate_cells(p, g, p->x, 0, p->z);
+    for (int k = 0; k < 9; k++) {
+        p->turn[k] = 0;
+    }
+    p->turn[0] = p->turn[8] = cosine;
+    p->turn[2] = sine;
+    p->turn[6] = -sine;
+    p->turn[4] = p->side = 1;
+    p->velocity = vec((float)p->vx, 0, (float)p->vz);
+    p->spin = vec(0, (float)p->rate, 0);
 }
 
 DEVICE void plate_step(int bed, const Grains &g) {

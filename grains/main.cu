@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "record.h"
+#include "walk.h"
 
 static const char usage[] =
     "usage: grains [options] --case 'NAME SHAPE TILT STAGE...' [--case ...]\n"
@@ -29,13 +30,25 @@ static const char usage[] =
     "  --rows N              about how many rows a record has (default 150)\n"
     "  --case TEXT           a case; stages are press:DEPTH@SPEED, drag:PATH@SPEED,\n"
     "                        load:PATH@SPEED, swipe:DEG@RATE, hold:T, drop:MASS@SPEED,T;\n"
-    "                        shapes are disc:D, rect:L,W, polygon:X,Y,..., sphere:R\n";
+    "                        shapes are disc:D, rect:L,W, polygon:X,Y,..., sphere:R\n"
+    "\n"
+    "Under a robot, as COMMAND of `mild eval --program COMMAND` (docs/grains.md): no case, and\n"
+    "  --sole SHAPE          outline of the first foot's sole, in the foot's frame\n"
+    "  --sole-z Z            [m] height of the sole in the foot's frame (default 0)\n"
+    "  --sole-height H       [m] of the block that the foot is (default 0.06)\n"
+    "  --sides S,S...        of each foot: 1, or -1 for the mirror image (default 1,-1)\n"
+    "  --track L             [m] length of the way (default 4)\n"
+    "  --reach R             [m] grains nearer to the middle of a sole move (default 0.3)\n"
+    "  --frames F            [1/s] pictures of the grains (default 25)\n"
+    "A bed of --box for each foot settles, and is put behind itself until the way is long enough.\n"
+    "Writes FOLDER/beds-TRIAL.bin, frames-TRIAL.bin and walk-TRIAL.json.\n";
 
 struct Options {
     BedDef bed;
     std::string out = ".", write_bed;
     int rows = 150;
     std::vector<Case> cases;
+    WalkDef walk;
 };
 
 struct FloatOption {
@@ -83,8 +96,33 @@ static void option_box(BedDef *def, const std::string &value) {
     def->depth = (float)v[2];
 }
 
+/* Bool: it is one of a walk. */
+static bool option_walk(WalkDef *walk, const std::string &name, const std::string &value) {
+    if (name == "--sole") {
+        walk->shape = shape_read(value);
+    } else if (name == "--sides") {
+        walk->sides = numbers(":" + value);
+        if (walk->sides.empty() || walk->sides.size() > RANGE_BEDS) {
+            stop("--sides: one to four numbers");
+        }
+    } else if (name == "--sole-z") {
+        walk->sole_z = number(value, name);
+    } else if (name == "--sole-height") {
+        walk->height = (float)number(value, name);
+    } else if (name == "--track") {
+        walk->track = number(value, name);
+    } else if (name == "--reach") {
+        walk->reach = number(value, name);
+    } else if (name == "--frames") {
+        walk->frames = number(value, name);
+    } else {
+        return false;
+    }
+    return true;
+}
+
 static void option_read(Options *o, const std::string &name, const std::string &value) {
-    if (option_float(&o->bed, name, value)) {
+    if (option_float(&o->bed, name, value) || option_walk(&o->walk, name, value)) {
         return;
     }
     if (name == "--out") {
@@ -155,6 +193,10 @@ int main(int count, char **word) {
             return 0;
         }
         option_read(&o, word[k], k + 1 < count ? word[k + 1] : "");
+    }
+    if (o.walk.shape.points > 0) {
+        walk_run(o.bed, o.walk, o.out);
+        return 0;
     }
     Bed bed;
     auto start = std::chrono::steady_clock::now();

@@ -1,5 +1,6 @@
-/* The rigid plate of a bed: a block on an outline, or a sphere. Its origin is the middle of its
- * bottom. It moves in x and z and turns about y, led or as a falling mass. */
+/* The rigid plate of a bed: a block on an outline, or a sphere. Its origin lies in its bottom. In a
+ * case it moves in x and z and turns about y, led or as a falling mass; the sole of a robot moves
+ * freely (ride.h). */
 #ifndef GRAINS_PLATE_H
 #define GRAINS_PLATE_H
 
@@ -19,13 +20,17 @@ struct Shape {
 enum : int { SUM_BITS = 30 };
 
 struct Plate {
-    double x, z, pitch;      /* pose; the middle of the box and the floor are 0 [m], [rad] */
-    double vx, vz, rate;     /* [m/s], [rad/s] */
-    double mass;             /* above 0: moves in z under this mass's weight [kg] */
-    long long sum[6];        /* force and moment about its origin, over the steps since a row */
-    long long pushed;        /* sum[2] before this step */
-    uint32_t cell_x, cell_z; /* its place in the units of the grains */
-    float sine, cosine;
+    /* of a case */
+    double x, z, pitch;  /* pose; the middle of the box and the floor are 0 [m], [rad] */
+    double vx, vz, rate; /* [m/s], [rad/s] */
+    double mass;         /* above 0: moves in z under this mass's weight [kg] */
+    long long pushed;    /* sum[2] before this step */
+    /* of all, what grains feel */
+    long long sum[6];                /* force and moment about its origin, over the steps so far */
+    uint32_t cell_x, cell_y, cell_z; /* its place in the units of the grains */
+    float turn[9];                   /* its frame to the world, row major */
+    float side;                      /* -1: the shape's mirror image in its x-z plane, else 1 */
+    Vec velocity, spin;              /* of its origin [m/s], [rad/s] */
 };
 
 /* The point of the shape that is nearest to `p`, in the plate's frame, and the normal from it to p.
@@ -71,13 +76,18 @@ DEVICE float shape_nearest(const Shape &s, Vec p, Vec *normal) {
     return far;
 }
 
-/* From the plate's frame to the world's, and back. A positive pitch lowers the edge at +x. */
+/* From the shape's frame to the world's, and back. */
 DEVICE Vec plate_to_world(const Plate &plate, Vec p) {
-    return vec(plate.cosine * p.x + plate.sine * p.z, p.y, plate.cosine * p.z - plate.sine * p.x);
+    const float *t = plate.turn, y = plate.side * p.y;
+    return vec(t[0] * p.x + t[1] * y + t[2] * p.z, t[3] * p.x + t[4] * y + t[5] * p.z,
+               t[6] * p.x + t[7] * y + t[8] * p.z);
 }
 
 DEVICE Vec plate_from_world(const Plate &plate, Vec p) {
-    return vec(plate.cosine * p.x - plate.sine * p.z, p.y, plate.cosine * p.z + plate.sine * p.x);
+    const float *t = plate.turn;
+    return vec(t[0] * p.x + t[3] * p.y + t[6] * p.z,
+               plate.side * (t[1] * p.x + t[4] * p.y + t[7] * p.z),
+               t[2] * p.x + t[5] * p.y + t[8] * p.z);
 }
 
 DEVICE void plate_add(Plate *plate, Vec force, Vec moment) {

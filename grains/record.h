@@ -70,6 +70,7 @@ inline void stage_begin(const Bed &bed, const Stage &s, Record *r) {
         if (free && p->mass <= 0) {
             stop("a load stage begins on a plate that carries nothing: ", s.kind.c_str());
         }
+        plate_place(p, bed.g);
     }
     plates_write(bed, r->plate);
 }

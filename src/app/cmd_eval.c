@@ -11,14 +11,17 @@
 #include "app/report.h"
 #include "mild/batch.h"
 #include "run/eval/actions.h"
+#include "run/eval/feet.h"
 #include "run/eval/inside.h"
+#include "run/eval/other_ground.h"
 #include "run/eval/track.h"
 
 enum { ROWS_MAX = CLI_LIST_MAX * CLI_LIST_MAX };
 
 typedef struct {
     Context context;
-    const char *json, *latent, *ablate, *stances, *actions, *track; /* NULL: not given */
+    /* NULL: not given */
+    const char *json, *latent, *ablate, *stances, *actions, *track, *feet, *program;
     CliNames grounds;
     CliNumbers speeds;
     int speed_given; /* bool */
@@ -179,6 +182,25 @@ static EvalRun eval_of(Eval *e, const Scene *scenes, int scene_count, const doub
                      .each = e->each};
 }
 
+/* One row, on the ground of --program if there is one. */
+static MildStatus evaluate_row(Eval *e, EvalRun *run, MildError *error) {
+    EvalRow *row = &e->rows[e->row_count];
+    if (!e->program) {
+        return eval_run(run, row, error);
+    }
+    if (run->scenes->rigid) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--program computes soft ground; --ground %s is not", run->scenes->name);
+    }
+    OtherGround *other = other_ground_start(e->program, run->robot, e->eval.trials, error);
+    if (!other) {
+        return error->status;
+    }
+    run->ground = other_ground_of(other);
+    MildStatus status = eval_run(run, row, error);
+    return other_ground_stop(other, status, error);
+}
+
 /* Ground after ground, speed after speed, by MuJoCo. table: NULL: rows are not kept. */
 static MildStatus evaluate_rows(Eval *e, FILE *table, MildError *error) {
     MildStatus status = MILD_OK;
@@ -190,7 +212,7 @@ static MildStatus evaluate_rows(Eval *e, FILE *table, MildError *error) {
         if (status == MILD_OK) {
             EvalRun run = eval_of(e, &scene, 1, &speed, 1);
             run.each = each_of(e, e->row_count);
-            status = eval_run(&run, &e->rows[e->row_count], error);
+            status = evaluate_row(e, &run, error);
         }
         if (status == MILD_OK && table) {
             take_row(e, table);
@@ -211,7 +233,7 @@ static MildStatus ablate(Eval *e, InsideLog *log, MildError *error) {
     } else if (ablation_has_means(e->ablation)) {
         const EvalDef whole = e->eval;
         log->sum = sum;
-        e->eval.stances = e->eval.actions = e->eval.track = NULL;
+        e->eval.stances = e->eval.actions = e->eval.track = e->eval.feet = NULL;
         status = evaluate_rows(e, NULL, error);
         e->eval = whole;
         inside_means(log, means);
@@ -274,9 +296,9 @@ static void print_header(const Eval *e, FILE *table) {
 }
 
 static MildStatus evaluate_table(Eval *e, MildError *error) {
-    const char *outputs[] = {e->json, e->latent, e->stances, e->actions, e->track};
+    const char *outputs[] = {e->json, e->latent, e->stances, e->actions, e->track, e->feet};
     int taken = 0; /* bool: standard output */
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < (int)(sizeof outputs / sizeof *outputs); i++) {
         taken = taken || (outputs[i] && strcmp(outputs[i], "-") == 0);
     }
     FILE *table = taken ? stderr : stdout;
@@ -296,13 +318,16 @@ static MildStatus evaluate_table(Eval *e, MildError *error) {
 }
 
 static MildStatus evaluate(Eval *e, MildError *error) {
-    Sheet stances = {0}, actions = {0}, track = {0};
+    Sheet stances = {0}, actions = {0}, track = {0}, feet = {0};
     MildStatus status = e->stances ? sheet_open(&stances, error) : MILD_OK;
     if (status == MILD_OK && e->actions) {
         status = sheet_open(&actions, error);
     }
     if (status == MILD_OK && e->track) {
         status = sheet_open(&track, error);
+    }
+    if (status == MILD_OK && e->feet) {
+        status = sheet_open(&feet, error);
     }
     if (stances.file) {
         eval_print_stances_header(stances.file);
@@ -313,16 +338,21 @@ static MildStatus evaluate(Eval *e, MildError *error) {
     if (track.file) {
         track_print_header(track.file);
     }
+    if (feet.file) {
+        feet_print_header(feet.file);
+    }
     e->eval.stances = stances.file;
     e->eval.actions = actions.file;
     e->eval.track = track.file;
+    e->eval.feet = feet.file;
     if (status == MILD_OK) {
         status = evaluate_table(e, error);
     }
-    e->eval.stances = e->eval.actions = e->eval.track = NULL;
+    e->eval.stances = e->eval.actions = e->eval.track = e->eval.feet = NULL;
     status = sheet_close(&stances, e->stances, status, error);
     status = sheet_close(&actions, e->actions, status, error);
-    return sheet_close(&track, e->track, status, error);
+    status = sheet_close(&track, e->track, status, error);
+    return sheet_close(&feet, e->feet, status, error);
 }
 
 /* Checks all grounds before the first trial: a typing error in the last one should not cost an
@@ -343,6 +373,8 @@ static MildStatus check_place(const Eval *e, MildError *error) {
                           : e->ablate         ? "--ablate"
                           : e->actions        ? "--actions"
                           : e->track          ? "--track"
+                          : e->feet           ? "--feet"
+                          : e->program        ? "--program"
                           : e->eval.push != 0 ? "--push"
                                               : NULL;
     if (device < -1) {
@@ -498,6 +530,12 @@ int cmd_eval(int argc, char **argv) {
         {"track", CLI_OUTPUT, &e->track, 0, 0, "FILE",
          "also write where the robot went, after every policy step, as CSV: ground, speed, trial, "
          "time, centre of mass, base, roll and pitch of the base"},
+        {"feet", CLI_OUTPUT, &e->feet, 0, 0, "FILE",
+         "also write what the ground does to each foot, after every policy step, as CSV: ground, "
+         "speed, trial, foot, time, ankle, its rotation, force and moment, pressure centre, depth"},
+        {"program", CLI_TEXT, &e->program, 0, 0, "COMMAND",
+         "a program that computes the soft ground in the place of the model, asked in every "
+         "physics step; one runs for each trial (docs/grains.md)"},
         {"json", CLI_OUTPUT, &e->json, 0, 0, "FILE",
          "also write the table as JSON to FILE; - for standard output"},
     };

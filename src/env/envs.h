@@ -51,6 +51,8 @@ typedef struct {
     const MildTerrain *terrain; /* [terrains] borrowed; of the trials, all with task->map */
     int terrains;
     EnvsDrive drive; /* by MuJoCo */
+    /* [count] by MuJoCo, borrowed: who computes the soft ground; NULL: libmild */
+    const RobotGround *ground;
 } EnvsDef;
 
 /* NULL, with one line in *error, for what the batch engine does not have (imprints, blended

@@ -25,7 +25,8 @@ typedef struct {
     const MildTerrain *terrain;
     uint8_t *over; /* [count] bool: the trial ended by a fall; its robot stays as it is */
     EnvsDrive drive;
-    EnvsSample *sample; /* [count][physics steps] of the caller; NULL: none */
+    const RobotGround *ground; /* [count] or NULL */
+    EnvsSample *sample;        /* [count][physics steps] of the caller; NULL: none */
     /* arguments of the call in flight */
     const EnvsStep *step;
     const EnvsView *view;
@@ -173,6 +174,7 @@ static TaskStep step_env(const Mujoco *m, int i, RobotSim *sim, int again, const
     const float *action = m->step->action + (size_t)i * (size_t)m->shape.actions;
     Sampling sampling = {m, i, m->sample ? m->sample + (size_t)i * steps : NULL};
     const TaskDrive driven = {drive, &sampling};
+    robot_sim_set_ground(sim, m->ground ? &m->ground[i] : NULL);
     const TaskCallback callback = {watch, &sampling, m->drive.torque ? &driven : NULL};
     for (size_t k = 0; m->sample && k < steps; k++) {
         sampling.sample[k].valid = 0;
@@ -292,6 +294,10 @@ void envs_read_sample(const TaskEnv *env, const RobotSim *sim, const double *tor
             .height = foot->sole_height,
             .depth = env->variation.rigid ? 0 : foot->result.depth_max,
         };
+        memcpy(sample->foot[f].position, foot->position, sizeof foot->position);
+        memcpy(sample->foot[f].rotation, foot->rotation, sizeof foot->rotation);
+        memcpy(sample->foot[f].force, foot->force, sizeof foot->force);
+        memcpy(sample->foot[f].torque, foot->torque, sizeof foot->torque);
     }
 }
 
@@ -410,6 +416,7 @@ Envs *envs_create_mujoco(const EnvsDef *def, MildError *error) {
                   .trial = def->trial,
                   .terrain = def->terrain,
                   .drive = def->drive,
+                  .ground = def->ground,
                   .stride = task_env_bytes(def->task, def->robot)};
     if (open_arrays(m, error) != MILD_OK || open_sims(m, error) != MILD_OK) {
         destroy(&m->base);

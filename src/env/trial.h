@@ -21,6 +21,8 @@ typedef struct {
     double center[2]; /* [m] centre of the sole, world */
     double height;    /* [m] lowest sole point above the undisturbed ground */
     double depth;     /* [m] deepest element; 0 on rigid ground */
+    /* by MuJoCo, else unset: see RobotFoot */
+    double position[3], rotation[9], force[3], torque[3];
 } EnvsFoot;
 
 /* A physics step, for the measures of an evaluation. The batch engine computes in float. */

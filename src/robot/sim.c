@@ -353,13 +353,28 @@ static void report_forces(RobotSim *sim) {
     }
 }
 
+/* The ground's wrenches. Returns 1 when another ground has failed. */
+static int stand(RobotSim *sim, const MildTerrain *terrain, MildGround *ground) {
+    if (sim->other) {
+        memset(&sim->contact, 0, sizeof sim->contact);
+        return sim->other->solve(sim->other->self, &sim->input, &sim->contact);
+    }
+    mild_ground_solve(ground, terrain, &sim->input, sim->scratch, &sim->contact);
+    mild_ground_advance(ground, terrain, &sim->input, sim->scratch, &sim->contact);
+    return 0;
+}
+
+void robot_sim_set_ground(RobotSim *sim, const RobotGround *ground) {
+    sim->other = ground;
+}
+
 /* The step of docs/task.md section 2, with six rows per foot. mild/ground.h shows the same step for
  * any engine. */
 int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
                    const MildTerrain *terrain, MildGround *ground) {
     RobotPhases none = {0}, *phases = sim->phases ? sim->phases : &none;
     double t = sim->phases ? clock_seconds() : 0.0;
-    int rigid = sim->variation.rigid;
+    int rigid = sim->variation.rigid, bad = 0;
 
     smooth_dynamics(sim, torque, push);
     update_feet(sim);
@@ -380,8 +395,7 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
         choose_rows(sim, terrain);
         free_feet(sim);
         t = split(sim, &phases->map, t);
-        mild_ground_solve(ground, terrain, &sim->input, sim->scratch, &sim->contact);
-        mild_ground_advance(ground, terrain, &sim->input, sim->scratch, &sim->contact);
+        bad = stand(sim, terrain, ground);
         t = split(sim, &phases->ground, t);
         limits_release(sim, held);
         add_ground_wrench(sim);
@@ -390,7 +404,7 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
         }
         constrain(sim, rows);
     }
-    int bad = integrate(sim);
+    bad = bad || integrate(sim);
     if (!bad) {
         update_pose(sim, terrain);
         report_forces(sim);

@@ -35,6 +35,7 @@ struct RobotSim {
     MildContactInput input;
     double inverse_inertia[36 * ROBOT_BODIES_MAX * ROBOT_BODIES_MAX]; /* of the input */
     MildScratch *scratch;
+    const RobotGround *other; /* computes the ground; NULL: libmild */
     MildContactResult contact;
     RobotFoot feet[ROBOT_FEET_MAX];
     RobotPhases *phases; /* NULL: no timing */

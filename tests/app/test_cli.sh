@@ -128,6 +128,12 @@ expect 0 '' "$mild" eval --ground rigid,grass --speed 0,0.3 --trials 2 --seconds
 awk -F, 'NR == 1 && !/^ground,speed_m_s,trial,time_s,com_x_m/ || NF != 12 {bad = 1} END {exit bad}' track.csv && [ "$(wc -l <track.csv)" = 161 ] ||
     fail "rows of track.csv: $(wc -l <track.csv)"
 bad "leave it out" "$mild" eval --ground grass --trials 1 --seconds 0.1 --train.robots=batch --track track.csv
+expect 0 '' "$mild" eval --ground rigid,grass --speed 0,0.3 --trials 2 --seconds 0.2 --feet feet.csv
+awk -F, 'NR == 1 && !/^ground,speed_m_s,trial,foot,time_s,ankle_x_m/ || NF != 21 {bad = 1} END {exit bad}' feet.csv && [ "$(wc -l <feet.csv)" = 321 ] ||
+    fail "rows of feet.csv: $(wc -l <feet.csv)"
+bad "leave it out" "$mild" eval --ground grass --trials 1 --seconds 0.1 --train.robots=batch --feet feet.csv
+bad "leave it out" "$mild" eval --ground grass --trials 1 --seconds 0.1 --train.robots=batch --program true
+bad "No space left" "$mild" eval --ground rigid --trials 1 --seconds 0.1 --feet /dev/full
 # the weights of the paper's experiments, in half precision
 for file in "$root"/policies/paper/*.safetensors; do
     kind=learned

@@ -1,6 +1,7 @@
 /* grains/: collisions, sliding and rolling by hand, the weight of a bed, Newton's third law on the
  * plate, energy, and the same bits for the same seed. On the CPU; docs/grains.md. */
 #include "grains/record.h"
+#include "grains/walk.h"
 
 extern "C" { /* cmocka's header has no such words */
 #include "kit.h"
@@ -286,21 +287,28 @@ static void a_seed_gives_the_same_bits(void **) {
     bed_close(&beside);
 }
 
+/* Grains of its bed that overlap grain i and are not in its list. */
+static int near_missed(const Grains &g, int i) {
+    int missed = 0;
+    for (int j = i / g.per * g.per; j < (i / g.per + 1) * g.per; j++) {
+        const Vec d = from_to(g, g.place[i], g.place[j]);
+        if (i == j || length(d) >= g.place[i].radius + g.place[j].radius) {
+            continue;
+        }
+        bool listed = false;
+        for (int s = 0; s < NEIGHBOURS; s++) {
+            listed |= g.neighbour[(size_t)s * (size_t)g.count + (size_t)i] == j;
+        }
+        missed += !listed;
+    }
+    return missed;
+}
+
 /* Pairs that overlap and are not in each other's list. */
 static int pairs_missed(const Grains &g) {
     int missed = 0;
     for (int i = 0; i < g.count; i++) {
-        for (int j = 0; j < g.count; j++) {
-            const Vec d = from_to(g, g.place[i], g.place[j]);
-            if (i == j || length(d) >= g.place[i].radius + g.place[j].radius) {
-                continue;
-            }
-            bool listed = false;
-            for (int s = 0; s < NEIGHBOURS; s++) {
-                listed |= g.neighbour[(size_t)s * (size_t)g.count + (size_t)i] == j;
-            }
-            missed += !listed;
-        }
+        missed += near_missed(g, i);
     }
     return missed;
 }
@@ -363,6 +371,160 @@ static void a_block_is_nearest_where_a_box_is(void **) {
     assert_true(worst < 1e-7 && shift < 1e-5);
 }
 
+/* ---- the soles of a robot ---- */
+
+/* A free block of mass m with moments of inertia, tilted, with spin, hits a cloud of grains without
+ * weight: what the grains gain in momentum and angular momentum about a fixed point the block has
+ * lost, and its kinetic energy and theirs do not grow. */
+static void a_free_sole_keeps_momentum(void **) {
+    std::vector<Vec> grains;
+    for (int k = 0; k < 90; k++) {
+        grains.push_back(
+            ball(0.035f + 0.0056f * (float)(k % 6), 0.035f + 0.0056f * (float)(k / 6 % 5),
+                 0.08f + 0.0056f * (float)(k / 30), 0.0022f + 0.0001f * (float)(k % 7)));
+    }
+    Bed bed = stage_open(BedDef(), grains, 0);
+    const double mass = 0.05, inertia = 3e-6, start[3] = {0.012, -0.012, 0.105};
+    Ride ride = {};
+    bed.g.shape = shape_read("polygon:-0.02,-0.015,0.02,-0.01,0.015,0.02,-0.02,0.01");
+    std::copy(start, start + 3, ride.place);
+    const double turn[4] = {0.98, 0.1, -0.12, 0.115};
+    std::copy(turn, turn + 4, ride.turn);
+    ride_turn(ride.turn, start, 0); /* makes it a unit quaternion */
+    const double twist[6] = {0.1, -0.05, -0.6, 3, -2, 5};
+    std::copy(twist, twist + 6, ride.twist);
+    for (int k = 0; k < 6; k++) {
+        ride.response[7 * k] = 1 / (k < 3 ? mass : inertia);
+    }
+    bed.g.ride = &ride;
+    bed.g.plate[0] = {};
+    bed.g.plate[0].side = -1;
+    ride_place(ride, 0, bed.g, &bed.g.plate[0]);
+    double sum[2][7] = {{0}, {0}};
+    for (int when = 0; when < 2; when++) {
+        if (when == 1) {
+            bed_go(&bed, bed_steps(bed, 0.04));
+        }
+        for (int i = 0; i < (int)grains.size(); i++) {
+            const float m = grain_mass(bed.g.law, bed.g.place[i].radius), r = bed.g.place[i].radius;
+            const Vec p = m * bed.g.velocity[i];
+            const Vec arm = position(bed, i) - vec(0.05f, 0.05f, 0.05f);
+            const Vec about = cross(arm, p) + 0.4f * m * r * r * bed.g.spin[i];
+            const float part[6] = {p.x, p.y, p.z, about.x, about.y, about.z};
+            for (int k = 0; k < 6; k++) {
+                sum[when][k] += (double)part[k];
+            }
+            sum[when][6] += energy_of(bed, i);
+        }
+        const double *x = ride.place, *v = ride.twist;
+        const double about[3] = {x[1] * v[2] - (x[2] - 0.05) * v[1],
+                                 (x[2] - 0.05) * v[0] - x[0] * v[2], x[0] * v[1] - x[1] * v[0]};
+        for (int k = 0; k < 3; k++) {
+            sum[when][k] += mass * v[k];
+            sum[when][3 + k] += mass * about[k] + inertia * v[3 + k];
+            sum[when][6] += 0.5 * mass * v[k] * v[k] + 0.5 * inertia * v[3 + k] * v[3 + k];
+        }
+    }
+    const double given = mass * fabs(ride.twist[2] - twist[2]);
+    for (int k = 0; k < 6; k++) {
+        const double size = k < 3 ? given : 0.02 * given;
+        printf("%s %d: %+.5e before, %+.5e after (bound %.0e)\n",
+               k < 3 ? "momentum" : "angular momentum", k % 3, sum[0][k], sum[1][k], 2e-3 * size);
+        expect_entry("sum", k, sum[1][k], sum[0][k], 2e-3 * size);
+    }
+    printf("energy %.4e J before, %.4e after; the block's speed %.3f, %.3f m/s\n", sum[0][6],
+           sum[1][6], twist[2], ride.twist[2]);
+    assert_true(given > 0.05 * mass * fabs(twist[2]) && sum[1][6] < sum[0][6]);
+    assert_true(fabs(ride.twist[3] - twist[3]) > 1 && fabs(ride.twist[4] - twist[4]) > 1);
+    bed.g.ride = nullptr;
+    bed_close(&bed);
+}
+
+/* Twists and inertia at the sole's origin: the wrench that comes back does the same work there as
+ * about the ankle. */
+static void wrenches_move_with_their_twists(void **) {
+    const double arm[3] = {0.02, -0.01, -0.055}, v[6] = {1, 2, -3, 4, -5, 6},
+                 w[6] = {3, -1, 40, 2, 5, -7};
+    double moved[6], about[3], work[2] = {0, 0};
+    std::copy(v, v + 6, moved);
+    to_origin(moved, 1, arm);
+    about[0] = w[3] + arm[1] * w[2] - arm[2] * w[1];
+    about[1] = w[4] + arm[2] * w[0] - arm[0] * w[2];
+    about[2] = w[5] + arm[0] * w[1] - arm[1] * w[0];
+    for (int k = 0; k < 6; k++) {
+        work[0] += moved[k] * w[k];
+        work[1] += v[k] * (k < 3 ? w[k] : about[k - 3]);
+    }
+    expect_near("work", work[0], work[1], 1e-12);
+    expect_near("lever", moved[0], 1 + -5 * -0.055 - 6 * -0.01, 1e-12);
+}
+
+static double fastest_of(const Grains &g) {
+    double fastest = 0;
+    for (int i = 0; i < g.count; i++) {
+        fastest = fmax(fastest, (double)length(g.velocity[i]));
+    }
+    return fastest;
+}
+
+static int moved_since(const Grains &g, const std::vector<Place> &start) {
+    int moved = 0;
+    for (int i = 0; i < g.count; i++) {
+        moved += length(from_to(g, start[(size_t)i], g.place[i])) > 2e-5f;
+    }
+    return moved;
+}
+
+/* A settled bed, put behind itself four times: windows that open, close and open again make no
+ * grain faster than the last ones that still roll in the settled bed, move no larger share of them
+ * than move there, and miss no contact across the ends of the pieces. */
+static void a_long_bed_stays_at_rest(void **) {
+    BedDef def = small_bed();
+    def.seeds = {1, 2};
+    def.length = 0.08f;
+    def.settle = 0.3f;
+    Bed tile;
+    bed_open(&tile, def);
+    bed_settle(&tile);
+    const std::vector<char *> saved = bed_save(tile);
+    const std::vector<Place> rest = bed_places(tile);
+    const double before = fastest_of(tile.g);
+    bed_go(&tile, 900);
+    const int own = moved_since(tile.g, rest);
+    bed_restore(&tile, saved);
+    for (char *data : saved) {
+        release(data);
+    }
+    WalkDef walk;
+    walk.reach = 0.02;
+    walk.track = 0.27;
+    Track t;
+    track_open(&t, &tile, walk);
+    Grains &g = t.bed.g;
+    const std::vector<Place> start = bed_places(t.bed);
+    assert_int_equal(t.tiles, 4);
+    double fastest = 0;
+    int missed = 0;
+    for (const double x : {0.0, 0.03, 0.06, 0.11, 0.15, 0.0, 0.2}) {
+        for (int b = 0; b < 2; b++) {
+            track_follow(&t, b, x + 0.01 * b);
+        }
+        bed_go(&t.bed, 300);
+        fastest = fmax(fastest, fastest_of(g));
+        for (int k = 0; k < range_size(g, g.moving); k++) {
+            const int i = range_grain(g, g.moving, k);
+            missed += i < 0 || g.place[i].radius <= 0 ? 0 : near_missed(g, i);
+        }
+    }
+    const int moved = moved_since(g, start);
+    printf("%d windows of %d grains; fastest %.1e m/s, in the settled bed %.1e; %d grains moved by "
+           "0.02 mm, in the settled bed %d of a fourth as many; %d pairs missed\n",
+           t.moves, g.moving.most, fastest, before, moved, own, missed);
+    assert_true(fastest < before && moved < 4 * own && t.moves > 6);
+    assert_int_equal(missed, 0);
+    bed_close(&t.bed);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(grains_part_with_the_restitution),
@@ -376,6 +538,9 @@ int main(void) {
         cmocka_unit_test(no_contact_is_missed),
         cmocka_unit_test(a_restored_bed_goes_on),
         cmocka_unit_test(a_block_is_nearest_where_a_box_is),
+        cmocka_unit_test(a_free_sole_keeps_momentum),
+        cmocka_unit_test(wrenches_move_with_their_twists),
+        cmocka_unit_test(a_long_bed_stays_at_rest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

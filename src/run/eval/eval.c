@@ -9,6 +9,7 @@
 #include "device/device.h"
 #include "env/envs.h"
 #include "run/eval/actions.h"
+#include "run/eval/feet.h"
 #include "run/eval/track.h"
 
 #define HEADING_GAIN 1.0  /* [1/s] */
@@ -87,6 +88,7 @@ typedef struct {
     Measure *measure; /* [trials] */
     uint8_t *end;     /* [trials] TaskEnd; TASK_END_time while it walks */
     Track track;      /* if EvalDef.track is given */
+    Feet feet;        /* if EvalDef.feet is given */
 } Trials;
 
 static int row_of(const Trials *t, int trial) {
@@ -166,7 +168,8 @@ static MildStatus open_envs(Trials *t, MildError *error) {
                           .trial = t->trial,
                           .terrain = t->terrain,
                           .terrains = run->scene_count,
-                          .drive = {controller->torque, controller->self}};
+                          .drive = {controller->torque, controller->self},
+                          .ground = run->ground};
     t->envs = envs_create(&envs, error);
     return t->envs ? MILD_OK : error->status;
 }
@@ -228,6 +231,7 @@ static void close_trials(Trials *t) {
     measure_free(t->measure, t->trials);
     free(t->end);
     track_free(&t->track);
+    feet_free(&t->feet);
 }
 
 /* ---- steps ---- */
@@ -261,6 +265,9 @@ static void take_trial(void *context, int trial, int thread) {
     }
     if (eval->track) {
         track_take(&t->track, trial, at - 1);
+    }
+    if (eval->feet) {
+        feet_take(&t->feet, trial, first, (int)(at - first));
     }
     direct(eval, speed_of(t, trial), t->measure[trial].time, (at - 1)->quaternion,
            t->command + 3 * (size_t)trial);
@@ -352,6 +359,9 @@ static MildStatus summarise(Trials *t, EvalRow *rows, MildError *error) {
     if (status == MILD_OK && eval.track) {
         track_print(&t->track, t->run->scenes[0].name, speed_of(t, 0), TASK_PERIOD, eval.track);
     }
+    if (status == MILD_OK && eval.feet) {
+        feet_print(&t->feet, t->run->scenes[0].name, speed_of(t, 0), TASK_PERIOD, eval.feet);
+    }
     return status;
 }
 
@@ -368,6 +378,9 @@ MildStatus eval_run(const EvalRun *run, EvalRow *rows, MildError *error) {
     status = status == MILD_OK ? open_arrays(&t, error) : status;
     if (status == MILD_OK && run->eval.track) {
         status = track_make(&t.track, t.trials, steps, error);
+    }
+    if (status == MILD_OK && run->eval.feet) {
+        status = feet_make(&t.feet, run->robot, t.trials, steps, error);
     }
     status = status == MILD_OK ? start(&t, error) : status;
     for (int k = 0; status == MILD_OK && k < steps; k++) {

@@ -43,6 +43,7 @@ typedef struct {
     const EvalCallback *callback;
     FILE *actions; /* a row of CSV for each decision, see eval/actions.h */
     FILE *track;   /* one for each policy step of each trial, see eval/track.h */
+    FILE *feet;    /* one for each foot in each policy step, see eval/feet.h */
 } EvalDef;
 
 /* Means over the trials, SI units. NaN: nothing was measured, as the speed of trials that fell at
@@ -109,6 +110,8 @@ typedef struct {
     const double *speeds; /* [m/s] [speed_count] of each scene, in the place of eval.speed */
     int speed_count;
     EvalDef eval;
+    /* [eval.trials] by MuJoCo, of one row: who computes the soft ground; NULL: libmild */
+    const RobotGround *ground;
     EvalTrial *each; /* [scene_count][speed_count][eval.trials] where to write; NULL: nowhere */
 } EvalRun;
 
