@@ -350,7 +350,7 @@ void mild_resist_space(const double normal[3], const double direction[3], double
 typedef enum {
     MILD_SOLVER_NEWTON = 0,       /* Newton's method on the twists of the feet: the fast one */
     MILD_SOLVER_GAUSS_SEIDEL = 1, /* the paper's sweeps over the elements (Algorithm 1) */
-    MILD_SOLVER_EXPLICIT = 2      /* Algorithm 1 to the letter: forces of the state before the step */
+    MILD_SOLVER_EXPLICIT = 2 /* Algorithm 1 to the letter: forces of the state before the step */
 } MildSolver;
 #define MILD_SOLVERS 3
 extern const char *const mild_solver_names[MILD_SOLVERS];
