@@ -67,7 +67,7 @@ static MildStatus read_number(const Reader *reader, char *const *cells, int coun
 /* Bool in *taken: the row is of the trial. */
 static MildStatus read_row(Reader *reader, char *line, float *frame, int *taken, MildError *error) {
     char *cells[CSV_CELLS_MAX];
-    double time, value, trial = reader->wanted;
+    double time = 0.0, value = 0.0, trial = reader->wanted;
     const int count = csv_split(line, cells);
     MildStatus status = MILD_OK;
     if (reader->trial >= 0) {
