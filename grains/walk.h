@@ -220,6 +220,9 @@ inline void picture_take(Track *t, FILE *out) {
         }
         const uint32_t count = (uint32_t)number.size();
         fwrite(&count, sizeof count, 1, out);
+        if (number.empty()) {
+            continue;
+        }
         fwrite(number.data(), sizeof count, number.size(), out);
         for (const std::vector<int16_t> &w : way) {
             fwrite(w.data(), sizeof(int16_t), w.size(), out);
