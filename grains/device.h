@@ -83,7 +83,9 @@ void each(int count, const System &system) {
 }
 
 template <class T> void copy(T *to, const T *from, size_t count) {
-    memcpy(static_cast<void *>(to), from, count * sizeof(T));
+    if (count > 0) { /* of an empty vector there is no address */
+        memcpy(static_cast<void *>(to), from, count * sizeof(T));
+    }
 }
 
 template <class T> void clear(T *data, size_t count) {

@@ -10,7 +10,7 @@
 #include "plan.h"
 
 struct WalkDef {
-    Shape shape;                         /* of the first foot's sole, in the foot's frame */
+    Shape shape = {};                    /* of the first foot's sole, in the foot's frame */
     std::vector<double> sides = {1, -1}; /* -1: this foot has its mirror image */
     double sole_z = 0;                   /* [m] of the sole in the foot's frame */
     float height = 0.06f;                /* [m] of the block that the foot is */
