@@ -2,8 +2,8 @@
 
 # Kernels of a robot's contact step, one unit each: groups of lanes, at least as many as feet; elements of a lane; feet,
 # `flat` for any or `points` for those that transmit no moment; curves of the ground, `all` or the only ones, which is less
-# text and fewer registers, or `heap` for cones that merge or wear, `any` for all of these; blocks of a multiprocessor. A batch takes the first that fits. The rows `flat all` are the sizes
-# that a batch can have, smallest first. On the CPU the same sizes are numbers of one step.
+# text and fewer registers, or `heap` for cones that merge or wear, `any` for all of these; blocks of a multiprocessor. A
+# batch takes the first that fits. The rows `flat all` are the sizes that a batch can have, smallest first. On the CPU the same sizes are numbers of one step.
 #
 # Two blocks fit a multiprocessor; three would be 1 % faster at 65 536 robots, and 12 % slower at 4096, for they spill
 # registers. Of points three fit, four on cones. Of one element a lane only points have kernels for cones: there is little to

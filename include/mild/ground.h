@@ -346,7 +346,7 @@ void mild_resist_space(const double normal[3], const double direction[3], double
 /* ---- one contact step (docs/model.md sections 6, 7) ---- */
 
 /* The first two solve the same implicit equations and give the same answer. The third is for
- * comparison: it creates energy, and is stable with small steps or soft ground alone. */
+ * comparison: it creates energy, and on ground with much drag shorter steps do not cure it. */
 typedef enum {
     MILD_SOLVER_NEWTON = 0,       /* Newton's method on the twists of the feet: the fast one */
     MILD_SOLVER_GAUSS_SEIDEL = 1, /* the paper's sweeps over the elements (Algorithm 1) */
