@@ -2,10 +2,12 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <spawn.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -13,11 +15,14 @@ extern char **environ;
 
 enum { HEAD = 4, FOOT = 18, ANSWER = 8 }; /* doubles */
 
+#define PATIENCE 600 /* [s] for an answer: a bed of grains settles before the first */
+
 typedef struct {
     pid_t child;
     int socket; /* -1: closed */
     int feet, trial;
     int failed;  /* bool: it gave no answer */
+    int late;    /* bool: for it did not end either */
     double time; /* [s] */
 } Child;
 
@@ -49,6 +54,7 @@ static int send_all(int socket, const void *data, size_t size) {
 static int receive_all(int socket, void *data, size_t size) {
     char *at = data;
     while (size > 0) {
+        errno = 0;
         const ssize_t got = recv(socket, at, size, 0);
         if (got < 0 && errno == EINTR) {
             continue;
@@ -99,8 +105,10 @@ static int solve(void *self, const MildContactInput *input, MildContactResult *r
     child->time += input->dt;
     const size_t size = (size_t)write_question(child, input, question) * sizeof *question;
     const size_t back = (size_t)child->feet * ANSWER * sizeof *answer;
+    errno = 0;
     if (child->failed || send_all(child->socket, question, size) ||
         receive_all(child->socket, answer, back)) {
+        child->late |= !child->failed && errno == EAGAIN;
         child->failed = 1;
         return 1;
     }
@@ -122,7 +130,9 @@ static MildStatus start_child(Child *child, const char *command, MildError *erro
     if (socketpair(AF_UNIX, SOCK_STREAM, 0, ends) != 0) {
         return mild_fail(error, MILD_ERROR_IO, "--program: no socket: %s", strerror(errno));
     }
+    const struct timeval patience = {PATIENCE, 0};
     fcntl(ends[0], F_SETFD, FD_CLOEXEC);
+    setsockopt(ends[0], SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     char shell[] = "sh", option[] = "-c", *text = strdup(command);
     char *arguments[] = {shell, option, text, NULL};
     posix_spawn_file_actions_t actions;
@@ -182,11 +192,17 @@ MildStatus other_ground_stop(OtherGround *other, MildStatus status, MildError *e
             continue;
         }
         close(child->socket);
+        if (child->late) {
+            kill(child->child, SIGTERM);
+        }
         while (waitpid(child->child, &code, 0) < 0 && errno == EINTR) {
             continue;
         }
         const int well = WIFEXITED(code) && WEXITSTATUS(code) == 0;
-        if (status == MILD_OK && (child->failed || !well)) {
+        if (status == MILD_OK && child->late) {
+            status = mild_fail(error, MILD_ERROR_IO, "--program: of trial %d: no answer for %d s",
+                               i, PATIENCE);
+        } else if (status == MILD_OK && (child->failed || !well)) {
             status = mild_fail(error, MILD_ERROR_IO, "--program: of trial %d: %s", i,
                                well ? "it ended without an answer" : "it failed");
         }
