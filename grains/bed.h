@@ -10,12 +10,13 @@
 
 #include "ride.h"
 
+constexpr float LEEWAY = 0.075f; /* [grains] that a grain moves before lists are made anew */
+
 /* What a bed is made of; every number is an option of the program. */
 struct BedDef {
     std::vector<uint64_t> seeds = {1}; /* one bed each */
     float grain = 0.005f;              /* mean diameter [m] */
     float spread = 0.1f;               /* diameters are uniform within this share of the mean */
-    float skin = 0.15f;                /* [grains] that lists of neighbours reach beyond contact */
     float length = 0.45f, width = 0.35f, depth = 0.12f; /* [m] */
     float friction = 0.5f, rolling = 0.0f, restitution = 0.5f;
     float density = 2500.0f; /* [kg/m^3] */
@@ -157,6 +158,14 @@ inline void bed_put(Bed *bed, int b, const std::vector<Vec> &grains) {
     copy(g.place + (size_t)(b * g.per), place.data(), place.size());
 }
 
+/* Grains that may touch are in cells side by side. */
+inline void bed_cells(Grains *g, const BedDef &def) {
+    const float cell = def.grain * (1 + def.spread) + 2 * g->most_leeway;
+    g->cells_x = (int)(g->size_x / cell);
+    g->cells_y = (int)(g->size_y / cell);
+    g->cells_z = (int)(g->size_z / cell);
+}
+
 /* The grains where they are put at first. Nothing moves before bed_go. */
 inline void bed_open(Bed *bed, const BedDef &def) {
     std::vector<std::vector<Vec>> grains;
@@ -178,11 +187,8 @@ inline void bed_open(Bed *bed, const BedDef &def) {
     g.size_z = 2.0f * fmaxf(top, def.depth) + 0.1f; /* differences reach half of it */
     const float whole = 4294967296.0f;
     g.unit = vec(g.size_x / whole, g.size_y / whole, g.size_z / whole);
-    g.skin = def.skin * def.grain;
-    const float cell = def.grain * (1 + def.spread) + g.skin;
-    g.cells_x = (int)(g.size_x / cell);
-    g.cells_y = (int)(g.size_y / cell);
-    g.cells_z = (int)(g.size_z / cell);
+    g.leeway = g.most_leeway = LEEWAY * def.grain;
+    bed_cells(&g, def);
     if (g.cells_x < 3 || g.cells_y < 3) {
         stop("--box: at least four grains in length and width");
     }
@@ -223,8 +229,10 @@ inline void bed_look(Bed *bed) {
     if (flags & (CELL_FULL | LIST_FULL) && bed->late_stops) {
         stop(flags & CELL_FULL ? "too many grains in a cell" : "too many neighbours of a grain");
     }
-    if (flags || bed->lists == 0) {
+    if (flags) {
         clear(g.flags, 1);
+    }
+    if (flags & LIST_DUE || bed->lists == 0) {
         bed_list(bed);
     }
 }

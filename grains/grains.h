@@ -12,12 +12,13 @@
 #include "plate.h"
 
 enum : int {
-    NEIGHBOURS = 22,
+    NEIGHBOURS = 30,
     FLOOR = NEIGHBOURS, /* slots of the contacts with the floor and the plate */
     PLATE,
     SLOTS,
-    CELL_GRAINS = 12,
+    CELL_GRAINS = 20,
     CHECK_STEPS = 8, /* between two looks at how far grains have moved */
+    LIST_STEPS = 64, /* that a list lasts, if grains keep their speeds */
 };
 
 /* What can go wrong, as bits. */
@@ -43,14 +44,14 @@ struct Grains {
     Range near;                   /* the others are far from those that move */
     float size_x, size_y, size_z; /* of the box [m] */
     Vec unit;                     /* of positions [m] */
-    float skin;                   /* [m]: lists hold all grains whose surfaces are nearer */
+    float leeway, most_leeway;    /* [m] that a grain may move before lists are due; a fast one */
     int cells_x, cells_y, cells_z;
     Law law;
     Shape shape;
 
     Place *place, *next_place; /* after a step they change places */
     Vec *velocity, *next_velocity, *spin, *next_spin;
-    Place *listed; /* places when the lists were made */
+    Place *listed; /* places when the lists were made; its radius has the grain's leeway in it */
     int *neighbour, *next_neighbour;
     uint32_t *touching, *next_touching; /* bits of the slots that remember something */
     Vec *slip, *next_slip, *roll, *next_roll;
@@ -105,6 +106,8 @@ DEVICE void raise(const Grains &g, int flag) {
 #endif
 }
 
+/* Lists hold the grains whose surfaces are nearer than both leeways. So until one of the two has
+ * moved as far as its own, they cannot touch unseen. A fast grain gets more of it. */
 DEVICE void grain_enter_cell(int k, const Grains &g) {
     const int i = range_grain(g, g.near, k);
     if (i < 0) {
@@ -115,6 +118,8 @@ DEVICE void grain_enter_cell(int k, const Grains &g) {
     if (a.radius <= 0.0f) {
         return;
     }
+    const float way = (float)LIST_STEPS * g.law.dt * length(g.velocity[i]);
+    g.listed[i].radius = a.radius + fminf(fmaxf(way, g.leeway), g.most_leeway);
     const int c = cell_index(g, i / g.per, cell_along(a.x, g.cells_x), cell_along(a.y, g.cells_y),
                              cell_along(a.z, g.cells_z));
     const int at = take_one(&g.cell_count[c]);
@@ -130,9 +135,9 @@ DEVICE int list_cell(const Grains &g, int i, const Place &a, int c, int *list, i
     const int grains = g.cell_count[c] < CELL_GRAINS ? g.cell_count[c] : CELL_GRAINS;
     for (int k = 0; k < grains; k++) {
         const int j = g.cell[c * CELL_GRAINS + k];
-        const Place b = g.place[j];
+        const Place b = g.listed[j];
         const Vec d = from_to(g, b, a);
-        const float near = a.radius + b.radius + g.skin;
+        const float near = a.radius + b.radius;
         if (j == i || dot(d, d) >= near * near) {
             continue;
         }
@@ -163,18 +168,16 @@ DEVICE void grain_keep_contacts(const Grains &g, int i, const int *list, int cou
     const uint32_t touching = g.touching[i];
     uint32_t kept = 0;
     for (int s = 0; s < NEIGHBOURS; s++) {
-        const int j = s < count ? list[s] : -1;
-        g.next_neighbour[slot(g, s, i)] = j;
-        for (int old = 0; old < NEIGHBOURS && j >= 0; old++) {
-            if ((touching >> old & 1u) && g.neighbour[slot(g, old, i)] == j) {
-                kept |= carry(g, i, old, s);
-            }
+        g.next_neighbour[slot(g, s, i)] = s < count ? list[s] : -1;
+    }
+    for (int old = 0; old < NEIGHBOURS; old++) {
+        const int j = touching >> old & 1u ? g.neighbour[slot(g, old, i)] : -1;
+        for (int s = 0; s < count && j >= 0; s++) {
+            kept |= list[s] == j ? carry(g, i, old, s) : 0u;
         }
     }
     for (int s = FLOOR; s < SLOTS; s++) {
-        if (touching >> s & 1u) {
-            kept |= carry(g, i, s, s);
-        }
+        kept |= touching >> s & 1u ? carry(g, i, s, s) : 0u;
     }
     g.next_touching[i] = kept;
 }
@@ -184,7 +187,7 @@ DEVICE void grain_list(int number, const Grains &g) {
     if (i < 0) {
         return;
     }
-    const Place a = g.place[i];
+    const Place a = g.listed[i];
     int list[NEIGHBOURS], count = 0;
     if (a.radius > 0.0f) {
         const int x = cell_along(a.x, g.cells_x), y = cell_along(a.y, g.cells_y);
@@ -202,17 +205,17 @@ DEVICE void grain_list(int number, const Grains &g) {
     grain_keep_contacts(g, i, list, count);
 }
 
-/* Says when lists are due: two grains that each move less than half the skin stay apart. */
+/* Says when lists are due: two grains that each move less than their leeway stay apart. */
 DEVICE void grain_watch(int k, const Grains &g) {
     const int i = range_grain(g, g.moving, k);
     if (i < 0) {
         return;
     }
     const Vec d = from_to(g, g.listed[i], g.place[i]);
-    const float moved = length(d),
-                next = 2.0f * (float)CHECK_STEPS * g.law.dt * length(g.velocity[i]);
-    if (moved + next > 0.5f * g.skin) {
-        raise(g, moved > 0.5f * g.skin ? LIST_DUE | LIST_LATE : LIST_DUE);
+    const float moved = length(d), leeway = g.listed[i].radius - g.place[i].radius;
+    const float next = 2.0f * (float)CHECK_STEPS * g.law.dt * length(g.velocity[i]);
+    if (moved + next > leeway) {
+        raise(g, moved > leeway ? LIST_DUE | LIST_LATE : LIST_DUE);
     }
 }
 

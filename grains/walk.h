@@ -19,7 +19,7 @@ struct WalkDef {
     double frames = 25;                  /* pictures a second */
 };
 
-constexpr float WALK_SKIN = 0.3f;       /* [grains]: a foot throws grains, which are fast */
+constexpr float WALK_LEEWAY = 0.32f;    /* [grains]: a foot throws grains, which are fast */
 constexpr double PRESS_SPEED = 0.25;    /* [m/s] of the soles before the first step */
 constexpr double PICTURE_UNIT = 0.0002; /* [m] */
 enum : int { PICTURE_MOVED = 6 };       /* units; grains that moved less are not drawn anew */
@@ -311,7 +311,10 @@ inline void track_open(Track *t, Bed *tile, const WalkDef &def) {
     g.count = g.beds * g.per;
     g.size_x *= (float)t->tiles;
     g.unit.x *= (float)t->tiles;
-    g.cells_x *= t->tiles;
+    const float widest = tile->def.grain * (1 + tile->def.spread);
+    g.most_leeway = fminf(WALK_LEEWAY * tile->def.grain, 0.16f * g.size_y - 0.5f * widest);
+    g.most_leeway = fmaxf(g.most_leeway, g.leeway);
+    bed_cells(&g, tile->def);
     bed_allocate(&g);
     const std::vector<Place> place = bed_places(*tile);
     std::vector<int> list((size_t)tile->g.count * NEIGHBOURS);
@@ -597,7 +600,6 @@ inline void walk_open(Walk *w, const BedDef &bed, const WalkDef &def, int trial)
     w->steps = 0;
     w->pressed = w->turned = w->moved = w->parted = 0;
     w->lost = -1;
-    beds.skin = WALK_SKIN;
     beds.seeds.clear();
     for (size_t b = 0; b < def.sides.size(); b++) {
         beds.seeds.push_back(bed.seeds[0] + (uint64_t)trial * def.sides.size() + b);

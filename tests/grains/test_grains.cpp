@@ -274,7 +274,8 @@ static void a_seed_gives_the_same_bits(void **) {
     bed_open(&alone, def);
     def.seeds = {3, 7};
     bed_open(&beside, def);
-    beside.g.skin *= 0.8f;
+    beside.g.leeway *= 0.8f;
+    beside.g.most_leeway *= 0.8f;
     bed_go(&alone, 4000);
     bed_go(&beside, 4000);
     const Place *same = beside.g.place + beside.g.per;
