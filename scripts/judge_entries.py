@@ -24,6 +24,7 @@ STEP = 1e-3  # [s] of the ground models
 PITCH = 0.01  # [m] of their soles' elements: at 19.5 mm a plate's raster is up to 6 % off its area, which no law can mend
 REGAIN = 0.136  # [grains] regain_length of mild_merged, from loads that slide on grains of 5 mm
 REFILL = 0.22  # [-] from an imprint pressed again, sand/square100-again
+YIELD = 3 + math.sqrt(8)  # of the friction of a sole that slides: share.h
 
 
 def row_times(case, rows=150):
@@ -83,15 +84,17 @@ class GroundEntry:
                 self.fit_friction(case, rows)
 
     def fit_slip(self, drags):
-        """slip_length of F/F0 = 1/(1 + s/j0), and grip, the largest horizontal force over F0: slip-sinkage at constant depth.
-        A level drag does not tell regain_length, and nothing fitted tells refill."""
+        """slip_length of F/F0 = 1/(1 + s/j0), and grip of the friction H/F after 5 to 12 mm, where it has built up: slip-sinkage at
+        constant depth. A level drag does not tell regain_length, and nothing fitted tells refill."""
         lengths, grips = [], []
         for _, rows in drags:
             slides = (rows["stage"] == 1) & (rows["path"] > 1e-3)
             before = rows["fz"][rows["stage"] == 0][-3:].mean()
             lost = np.maximum(before / np.maximum(rows["fz"][slides], 1e-3) - 1, 1e-3)
             lengths.append(np.median(rows["path"][slides] / lost))
-            grips.append(np.abs(rows["fx"][slides]).max() / before)
+            slid = slides & (rows["path"] > 5e-3) & (rows["path"] < 12e-3)
+            gone = 1 - rows["fz"][slid] / before
+            grips.append(np.median(np.abs(rows["fx"][slid]) / rows["fz"][slid] * (1 + gone) / (YIELD * gone)))
         self.material = mild.Material(self.material, slip_length=float(np.clip(np.mean(lengths), 1e-4, 1.0)),
                                       grip=float(np.clip(np.mean(grips), 0.0, 1.0)),
                                       regain_length=REGAIN * self.grain, refill=REFILL)

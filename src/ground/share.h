@@ -8,6 +8,11 @@
  *     c - q <- (c - q) exp(-da/u0)       da: fresh penetration, beyond the yield depth
  * The element remembers 1 - q, its wear.
  *
+ * A sliding element at the share lambda = q/c of its yield load is held by at most
+ *     H = (3 + sqrt 8) t lambda (1 - lambda)/(2 - lambda) F_g,
+ * whose greatest value is t F_g, at lambda = 2 - sqrt 2. Grains hold a sole that slides under load
+ * so (docs/grains.md); a parabola, as of footings, would hold it by a third less.
+ *
  * The share is held in a step. It scales virgin ground; the unloading stiffness k stays that of the
  * whole load, so the element yields at q F_g(a) and the line ends at a - q F_g(a)/k.
  *
@@ -21,10 +26,11 @@
 
 #include "ground/remember.h"
 
-#define SHARE_LEAN REAL(0.02)  /* [-] least cosine: a sole on its edge */
-#define SHARE_GRIP REAL(0.1)   /* [-] friction that an element at its yield load keeps */
-#define SHARE_FORGET REAL(40)  /* [-] da/u0 beyond which nothing is left */
-#define SHARE_LEAST REAL(1e-6) /* [-] least share */
+#define SHARE_LEAN REAL(0.02) /* [-] least cosine: a sole on its edge */
+#define SHARE_GRIP REAL(0.1)  /* [-] friction that an element at its yield load keeps */
+#define SHARE_YIELD REAL(5.8284271247461903) /* 3 + sqrt 8 */
+#define SHARE_FORGET REAL(40)                /* [-] da/u0 beyond which nothing is left */
+#define SHARE_LEAST REAL(1e-6)               /* [-] least share */
 #ifdef MILD_REAL_FLOAT
 #define SHARE_ROUND REAL(1e-3) /* [-] of the elastic travel: what rounding may take from it */
 #else
@@ -54,7 +60,8 @@ MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share
     const Real q = real_min(1 - share->worn, c);
     const Real bed = law_bed_force(&e->law, a);
     const Real force = q * (k * (a - e->zero_depth) - bed) + bed;
-    const Real grips = real_max(4 * share->grip * (1 - q / c), SHARE_GRIP);
+    const Real lost = 1 - q / c;
+    const Real grips = real_max(SHARE_YIELD * share->grip * lost / (1 + lost), SHARE_GRIP);
     const Real mu = share->grip > 0 ? real_min(share->mu, grips) : share->mu;
     const int changes = q < 1 || mu != e->mu;
     share->lean = c;

@@ -375,7 +375,7 @@ static void dense_share(DenseElement *e, const Find *find) {
            q = fmin(1.0 - find->memory.worn[find->i], c), soil = virgin_force(law, a),
            bed = law->bed_stiffness * fmax(a - law->bed, 0.0);
     if (law->grip > 0.0) {
-        law->mu = fmin(law->mu, fmax(0.1, 4.0 * law->grip * (1.0 - q / c)));
+        law->mu = fmin(law->mu, fmax(0.1, (3.0 + sqrt(8.0)) * law->grip * (c - q) / (2.0 * c - q)));
     }
     e->slack = e->line > 0.0 ? a - (q * soil + bed) / e->line : a;
     law->k_pen *= q;
