@@ -64,10 +64,15 @@ DEVICE float shape_nearest(const Shape &s, Vec p, Vec *normal) {
     }
     float qx = 0, qy = 0;
     const float side = outline_nearest(s, p.x, p.y, &qx, &qy);
-    if (side < 0.0f && p.z > 0.0f &&
-        p.z < s.height) { /* a centre within: back through the bottom */
-        *normal = vec(0, 0, -1);
-        return -p.z;
+    const float over = s.height - p.z; /* a centre within goes back the shortest way */
+    if (side < 0.0f && p.z > 0.0f && over > 0.0f && fminf(p.z, over) < -side) {
+        *normal = vec(0, 0, p.z < over ? -1 : 1);
+        return -fminf(p.z, over);
+    }
+    if (side < 0.0f && p.z > 0.0f && over > 0.0f) {
+        const Vec out = vec(qx - p.x, qy - p.y, 0);
+        *normal = (1.0f / fmaxf(length(out), 1e-12f)) * out;
+        return side;
     }
     const float z = fminf(fmaxf(p.z, 0.0f), s.height);
     const Vec d = side < 0.0f ? vec(0, 0, p.z - z) : vec(p.x - qx, p.y - qy, p.z - z);

@@ -4,7 +4,7 @@
     grains/walk.py fit                      the models' numbers from grains/records, into grains/walk/grounds.json
     grains/walk.py grains --out out/walk    the walks on grains, by build/grains/grains; wants a GPU
     grains/walk.py models --out out/walk    the same walks on the models, some seconds each
-    grains/walk.py figure --out out/walk    OUT/walk.csv with a row for each stance, and the figure
+    grains/walk.py figure --out out/walk    OUT/walk.csv with a row for each stance, OUT/walks.json for each walk, and the figure
     grains/walk.py video --out out/walk     a video of each walk on grains
 
 Every walk is `mild eval` with the same policy, sensors, delays, seed and physics step; only the ground differs. What is there
@@ -74,8 +74,8 @@ def walk(args, folder, speed, ground, trials, program=None):
     if (folder / "eval.json").exists():
         return
     folder.mkdir(parents=True, exist_ok=True)
-    words = [args.mild, "eval", "--robot", args.robot, "--speed", speed, "--trials", trials, "--seconds", args.seconds, "--seed",
-             args.seed, *ground, "--task.physics_dt", args.dt, "--terrain.memory=true", "--threads", args.threads]
+    words = [args.mild, "eval", "--robot", args.robot, "--policy", args.policy, "--speed", speed, "--trials", trials, "--seconds",
+             args.seconds, "--seed", args.seed, *ground, "--task.physics_dt", args.dt, "--terrain.memory=true", "--threads", args.threads]
     for name in ("stances", "feet", "actions", "track"):
         words += [f"--{name}", folder / f"{name}.csv"]
     if program:
@@ -117,6 +117,7 @@ def on_models(args):
 def draw_figure(args):
     import walk_pictures
     walk_pictures.write_stances(args.out, args.families, args.speeds, args.out / "walk.csv")
+    walk_pictures.write_walks(args.out, args.families, args.speeds, args.out / "walks.json")
     for family in args.families:
         image = args.image if family == args.families[0] else args.image.with_stem(f"{args.image.stem}-{family}")
         walk_pictures.figure(args.out, family, args.speeds, image)
@@ -147,6 +148,7 @@ def main():
     parser.add_argument("--draw", default=ROOT / "build" / "grains" / "grains_draw", type=pathlib.Path, help="of the video")
     parser.add_argument("--still", default=-1, type=int, help="picture of each video that is kept as PNG too")
     parser.add_argument("--robot", default="sa01")
+    parser.add_argument("--policy", default=ROOT / "policies" / "mild.safetensors", type=pathlib.Path)
     parser.add_argument("--families", default="sand", type=lambda text: text.split(","), help="of " + ", ".join(BEDS))
     parser.add_argument("--speeds", default="0.3,0.6", type=lambda text: text.split(","))
     parser.add_argument("--seconds", default=10, type=float)

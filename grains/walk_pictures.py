@@ -8,6 +8,7 @@ import numpy as np
 CONTACT, PAUSE, SHORTEST = 5.0, 0.03, 0.15  # [N] [s] [s] of a stance
 COLOURS = {"grains": "#222222", "mild": "#1f77b4", "mild_merged": "#d62728", "bekker": "#2ca02c", "ecc_quasi_3d": "#9467bd"}
 SHARE = np.linspace(0, 1, 41)  # of a stance
+HEAP = 0.03  # [m] over the surface; what is higher flies
 
 
 def read(file):
@@ -91,6 +92,25 @@ def write_stances(out, families, speeds, file):
                         writer.writerow(row)
 
 
+def write_walks(out, families, speeds, file):
+    """What became of each walk; of one on grains that was killed, how far it had come."""
+    walks = []
+    for family in families:
+        for speed in speeds:
+            for name in COLOURS:
+                folder = out / family / speed / name
+                row = {"family": family, "speed_m_s": float(speed), "ground": name}
+                if (folder / "walk-0.json").exists():
+                    told = json.loads((folder / "walk-0.json").read_text())
+                    row["grains"] = {key: told[key] for key in ("time_s", "lost_sole_s", "seconds", "steps", "late_lists", "full_lists", "surface_m")}
+                if (folder / "eval.json").exists():
+                    judged = json.loads((folder / "eval.json").read_text())["rows"][0]
+                    row |= {key: judged[key] for key in ("trials", "success", "ends", "seconds", "velocity", "cot", "penetration", "torque_max")}
+                if len(row) > 3:
+                    walks.append(row)
+    file.write_text(json.dumps(walks, indent=1) + "\n")
+
+
 # ---- figure ----
 
 def draw_curves(axis, name, found, pick, scale):
@@ -157,10 +177,11 @@ class Grains:
             self.radius.append(np.tile(bed[:, 3], self.tiles) * 1e-6)
             self.start.append(self.place[-1].copy())
         self.moved = [np.zeros(len(place), bool) for place in self.place]
+        self.flies = [np.zeros(len(place), np.int16) for place in self.place]  # pictures since it last moved
 
     def step(self):
         """Bool: there is another picture."""
-        for place, moved in zip(self.place, self.moved):
+        for place, moved, flies in zip(self.place, self.moved, self.flies):
             head = self.file.read(4)
             if len(head) < 4:
                 return False
@@ -169,6 +190,8 @@ class Grains:
             way = np.frombuffer(self.file.read(6 * count), np.int16).reshape(3, count)
             place[number] += way.T
             moved[number] = True
+            flies += 1
+            flies[number] = 0
         return True
 
     def metres(self, bed, which, places=None):
@@ -192,6 +215,7 @@ def grain_spheres(grains, eye_x, span=1.1, deep=0.15):
         y = place[:, 1] * grains.unit - 0.5 * grains.info["width_m"]
         z = place[:, 2] * grains.unit - grains.info["surface_m"][bed]
         near = (np.abs(x - eye_x) < span) & (side * y >= 0) & (grains.radius[bed] > 0)
+        near &= (z < HEAP) | (grains.flies[bed] < 2)  # those that a window left in the air are not shown
         shown = np.flatnonzero(near & ((z > -0.025) | (grains.moved[bed] & (z > -deep)) | (np.abs(y) > 0.5 * grains.info["width_m"] - 0.012)))
         at = grains.metres(bed, shown)
         before = grains.metres(bed, shown, grains.start)
@@ -305,7 +329,7 @@ def video(root, robot, folder, draw, file, still=None):
         x = body.pose(picture / rate)
         smooth = x if smooth is None else smooth + 0.15 * (x - smooth)
         parts = grain_spheres(grains, smooth) + list(body.spheres())
-        head = np.array([*camera(smooth, size, (0.05, 0.02, 0.16), 1.9), sum(len(part) for part in parts)], np.float32)
+        head = np.array([*camera(smooth, size, (0.05, 0.02, 0.10), 2.15), sum(len(part) for part in parts)], np.float32)
         painter.stdin.write(head.tobytes() + b"".join(part.tobytes() for part in parts))
         painter.stdin.flush()
         frame = painter.stdout.read(3 * size[0] * size[1])

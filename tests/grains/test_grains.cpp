@@ -347,12 +347,12 @@ static void a_restored_bed_goes_on(void **) {
     }
 }
 
-/* The nearest point of a block, against that of an axis-aligned box. */
+/* The nearest point of a block, against that of an axis-aligned box; the way out of it. */
 static void a_block_is_nearest_where_a_box_is(void **) {
     const Shape s = shape_read("rect:0.06,0.12");
     srand(2);
     const auto uniform = [] { return (float)rand() / (float)RAND_MAX - 0.5f; };
-    double worst = 0, shift = 0;
+    double worst = 0, shift = 0, inside = 0;
     for (int k = 0; k < 20000; k++) {
         const Vec p = vec(0.2f * uniform(), 0.2f * uniform(), 0.2f * uniform());
         const Vec q = vec(fminf(fmaxf(p.x, -0.03f), 0.03f), fminf(fmaxf(p.y, -0.06f), 0.06f),
@@ -362,14 +362,19 @@ static void a_block_is_nearest_where_a_box_is(void **) {
         if (wanted > 0) {
             worst = fmax(worst, (double)fabsf(far - wanted));
             shift = fmax(shift, (double)length(p - far * normal - q));
-        } else {
-            assert_true(far <= 0);
+        } else { /* out by the nearest of five faces */
+            const float side = fminf(0.03f - fabsf(p.x), 0.06f - fabsf(p.y));
+            const float out = fminf(side, fminf(p.z, s.height - p.z));
+            const Vec face = p - far * normal;
+            assert_true(far <= 0 && fabsf(far + out) < 1e-7f && fabsf(length(normal) - 1) < 1e-5f);
+            inside = fmax(inside, fabs((double)shape_nearest(s, face, &normal)));
         }
     }
     /* two points of the outline can be equally near in single precision */
     printf("nearest points of a block: distance off by %.1e m (bound 1e-7), place by %.1e (1e-5)\n",
            worst, shift);
-    assert_true(worst < 1e-7 && shift < 1e-5);
+    printf("a centre within is led to a face within %.1e m (bound 1e-7)\n", inside);
+    assert_true(worst < 1e-7 && shift < 1e-5 && inside < 1e-7);
 }
 
 /* ---- the soles of a robot ---- */
