@@ -1,0 +1,347 @@
+"""A robot of any MJCF on a ground for mild.trial: its feet found, its actuators as the description says, compiled."""
+import dataclasses
+import pathlib
+
+import numpy as np
+
+from .describe import by_joint, choose
+from .spec import MOST, attach
+
+SOLE = 0.01  # [m] shapes within this of the lowest point of a foot are its sole, as in the plugin
+ROUND = 0.01  # [m] the smallest sphere that is a round foot and no corner of a sole
+
+
+def read_spec(model):
+    """A mujoco.MjSpec from a file, XML text, or a MjSpec, which is copied. Meshes whose files are not there are left out where
+    they carry no mass; what was left out, as a line or ''."""
+    import mujoco
+
+    if isinstance(model, mujoco.MjSpec):
+        return model.copy(), ""
+    text = str(model)
+    if text.lstrip().startswith("<"):
+        return mujoco.MjSpec.from_string(text), ""
+    path = pathlib.Path(text)
+    if not path.is_file():
+        raise ValueError(f"model: there is no file '{text}'")
+    spec = mujoco.MjSpec.from_file(text)
+    return spec, _leave_out(spec, path.parent)
+
+
+def _leave_out(spec, folder):
+    """Deletes meshes without a file. A body whose mass they would make is refused."""
+    gone, inferred = [], []
+    for mesh in list(spec.meshes):
+        if mesh.file and not any((place / mesh.file).is_file() for place in (folder / spec.meshdir, folder, pathlib.Path(spec.meshdir))):
+            gone.append(mesh)
+    names = {mesh.name or pathlib.Path(mesh.file).stem for mesh in gone}
+    for geom in list(spec.geoms) if gone else ():
+        if geom.meshname in names:
+            if geom.parent != spec.worldbody and not geom.parent.explicitinertial and geom.mass != 0:
+                inferred.append(geom.parent.name)
+            spec.delete(geom)
+    if inferred:
+        raise ValueError(f"model: the mass of {', '.join(sorted(set(inferred)))} is that of meshes whose files are not there: "
+                         f"{', '.join(sorted(names))}")
+    for mesh in gone:
+        spec.delete(mesh)
+    return f"{len(gone)} meshes whose files are not there are left out" if gone else ""
+
+
+@dataclasses.dataclass
+class Robot:
+    """A compiled model and where its parts are. Arrays are in the order of the policy but where they say otherwise."""
+    model: object
+    joints: list  # names of those that the policy moves
+    held: list  # names of those that it does not
+    qpos: np.ndarray  # addresses of joints, then of held ones
+    qvel: np.ndarray
+    seen: tuple  # (qpos, qvel) addresses of the observed joints
+    seen_default: np.ndarray
+    kp: np.ndarray  # of joints, then of held ones, as the rest
+    kd: np.ndarray
+    default: np.ndarray
+    effort: np.ndarray
+    scale: np.ndarray  # of joints
+    drive: np.ndarray  # actuator of each, -1: none
+    gear: np.ndarray  # [N m] of an actuator's ctrl of 1
+    base: int  # body
+    frame: tuple  # (mjtObj, id)
+    feet: list
+    bodies: list
+    start: np.ndarray  # qpos
+    mass: float
+    remark: str = ""
+
+
+def joint_names(model):
+    """Names of hinges and slides in the order of the model."""
+    import mujoco
+
+    kinds = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+    return [model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] in kinds]
+
+
+def stand(model, description, ground, attributes):
+    """The Robot on a ground: "rigid" is MuJoCo's own floor, that of the file if it has one."""
+    import mujoco
+
+    d = description
+    spec, remark = read_spec(model)
+    if d.policy["step"]:
+        spec.option.timestep = d.policy["step"]
+    if d.policy["integrator"]:
+        spec.option.integrator = getattr(mujoco.mjtIntegrator, "mjINT_" + d.policy["integrator"].upper())
+    if not any(geom.type in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD) for geom in spec.worldbody.geoms):
+        spec.worldbody.add_geom(name="floor_of_trial", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], rgba=[0.6, 0.6, 0.6, 1])
+    bare = spec.copy().compile()
+    names = joint_names(bare)
+    order, seen = choose(d.policy["joints"], names, "joints"), choose(d.policy["observed"] or d.policy["joints"], names, "observed")
+    order += [j for j in range(len(names)) if j not in order]
+    count = len(choose(d.policy["joints"], names, "joints"))
+    tables = {name: by_joint(getattr(d, name), names, otherwise, name)
+              for name, otherwise in (("kp", 0.0), ("kd", 0.0), ("default", 0.0), ("effort", np.inf), ("armature", -1.0))}
+    scale = by_joint(d.scale, [names[j] for j in order[:count]], 1.0, "scale")
+    start = _start(bare, d, names, tables["default"])
+    feet, bodies, sole = _feet(spec, bare, start, d)
+    for name, armature in zip(names, tables["armature"]):
+        if armature >= 0:
+            spec.joint(name).armature = armature
+    _actuate(spec, bare, d, names, tables)
+    if ground != "rigid":
+        _unpair(spec, feet + bodies)
+        _undress(spec, bodies)
+        attach(spec, feet, ground, body=bodies, sensor="feet_of_trial", name="ground_of_trial", **{"sole": " ".join(sole), **attributes})
+    compiled = spec.compile()
+    drive, gear = _drives(compiled, [names[j] for j in order])
+    if d.actuator["kind"] != "torque" and (drive[:count] < 0).any():
+        raise ValueError(f"actuator.kind: model has no actuator for {', '.join(names[order[i]] for i in np.flatnonzero(drive[:count] < 0))}")
+    ids = [compiled.joint(name).id for name in names]
+    qpos, qvel = compiled.jnt_qposadr[ids], compiled.jnt_dofadr[ids]
+    base = _base(compiled)
+    return Robot(compiled, [names[j] for j in order[:count]], [names[j] for j in order[count:]], qpos[order], qvel[order],
+                 (qpos[seen], qvel[seen]), tables["default"][seen], tables["kp"][order], tables["kd"][order], tables["default"][order],
+                 tables["effort"][order], scale, drive, gear, base, _frame(compiled, d, base), feet, bodies, start,
+                 float(compiled.body_subtreemass[base]), remark)
+
+
+def _base(model):
+    """The body on the free joint."""
+    import mujoco
+
+    free = np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
+    if not len(free):
+        raise ValueError("model: no body has a free joint")
+    return int(model.jnt_bodyid[free[0]])
+
+
+def _frame(model, description, base):
+    import mujoco
+
+    name = description.policy["frame"]
+    for kind in (mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_XBODY):
+        index = mujoco.mj_name2id(model, kind, name) if name else -1
+        if index >= 0:
+            return kind, index
+    if name:
+        raise ValueError(f"policy.frame: the model has no site or body '{name}'")
+    return mujoco.mjtObj.mjOBJ_XBODY, base
+
+
+def _start(model, description, names, default):
+    """qpos of the start, with the lowest point of the robot at start.lift above 0."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    key = description.start["keyframe"]
+    if key:
+        index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, key)
+        if index < 0:
+            raise ValueError(f"start.keyframe: the model has no keyframe '{key}'")
+        mujoco.mj_resetDataKeyframe(model, data, index)
+    else:
+        for name, value in zip(names, default):
+            data.joint(name).qpos = value
+    free = model.jnt_qposadr[model.body_jntadr[_base(model)]]
+    mujoco.mj_kinematics(model, data)
+    low = [lowest(model, data, g) for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] and solid(model, g)]
+    if not low:
+        raise ValueError("model: no shape of the robot collides")
+    data.qpos[free + 2] += description.start["lift"] - min(low)
+    return data.qpos.copy()
+
+
+def solid(model, geom):
+    """Whether a geom collides, by its type of contact or by a pair."""
+    return bool(model.geom_contype[geom] or model.geom_conaffinity[geom] or (model.pair_geom1 == geom).any()
+                or (model.pair_geom2 == geom).any())
+
+
+def lowest(model, data, geom):
+    """[m] height of the lowest point of a geom."""
+    import mujoco
+
+    kind, size, down = mujoco.mjtGeom(model.geom_type[geom]), model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3)[2]
+    kinds, z = mujoco.mjtGeom, data.geom_xpos[geom][2]
+    if kind == kinds.mjGEOM_MESH:
+        mesh = model.geom_dataid[geom]
+        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        return z + float((model.mesh_vert[first : first + count] @ down).min())
+    if kind == kinds.mjGEOM_SPHERE:
+        return z - size[0]
+    if kind == kinds.mjGEOM_CAPSULE:
+        return z - size[0] - size[1] * abs(down[2])
+    if kind == kinds.mjGEOM_CYLINDER:
+        return z - size[0] * np.hypot(down[0], down[1]) - size[1] * abs(down[2])
+    if kind == kinds.mjGEOM_ELLIPSOID:
+        return z - float(np.linalg.norm(size * down))
+    return z - float(np.abs(size * down).sum())
+
+
+def _feet(spec, model, start, description):
+    """Names of feet, of other bodies that meet the ground, and of the geoms of the soles. Bodies that have no name get one."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    data.qpos[:] = start
+    mujoco.mj_kinematics(model, data)
+    shapes = {}  # body: [(lowest point, geom)]
+    for geom in range(model.ngeom):
+        if model.body_rootid[model.geom_bodyid[geom]] and solid(model, geom):
+            shapes.setdefault(int(model.geom_bodyid[geom]), []).append((lowest(model, data, geom), geom))
+    low = {body: min(own)[0] for body, own in shapes.items()}
+    given = description.feet["names"]
+    if given:
+        feet = [_body_of(model, name) for name in given]
+    else:
+        feet = [body for body in sorted(low) if low[body] < min(low.values()) + 0.03]
+        feet = [body for body in feet if not any(body in _parents(model, other) for other in feet)]
+    names, soles = [], []
+    for k, body in enumerate(feet):
+        if body not in shapes:
+            raise ValueError(f"feet.names: '{given[k]}' has no shape that collides")
+        bottom = sorted(geom for depth, geom in shapes[body] if depth < low[body] + SOLE)
+        ball = len(bottom) == 1 and model.geom_type[bottom[0]] == int(mujoco.mjtGeom.mjGEOM_SPHERE) and model.geom_size[bottom[0]][0] >= ROUND
+        for geom in bottom if ball else [geom for _, geom in shapes[body]]:
+            soles.append(_name(spec.geoms[geom], f"sole_of_trial_{geom}"))
+        names.append(given[k] if given else _foot(spec, data, body, spec.geoms[bottom[0]] if ball else None))
+    half = 0.5 * data.xpos[_base(model)][2]
+    others = sorted((low[body], body) for body in low if body not in feet and low[body] < half)
+    bodies = [_name(spec.bodies[body], f"body_of_trial_{body}") for _, body in others[: MOST - len(feet)]]
+    wanted = description.feet["bodies"]
+    return names, ([] if wanted == ["-"] else wanted) if wanted is not None else bodies, description.feet["sole"] or soles
+
+
+def _body_of(model, name):
+    import mujoco
+
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
+    if body < 0 and site < 0:
+        raise ValueError(f"feet.names: the model has no body or site '{name}'")
+    return body if body >= 0 else int(model.site_bodyid[site])
+
+
+def _parents(model, body):
+    found = []
+    while body:
+        body = int(model.body_parentid[body])
+        found.append(body)
+    return found
+
+
+def _name(element, otherwise):
+    if not element.name:
+        element.name = otherwise
+    return element.name
+
+
+def _foot(spec, data, body, ball):
+    """The name of a foot whose z axis points up: the body, or a site on it. A round foot has a site at its centre."""
+    import mujoco
+
+    rotation, element = data.xmat[body].reshape(3, 3), spec.bodies[body]
+    _name(element, f"foot_of_trial_{body}")
+    if ball is None and rotation[2, 2] > 0.7:
+        return element.name
+    if ball is not None:
+        quat = np.zeros(4)
+        mujoco.mju_mat2Quat(quat, rotation.T.ravel())  # the world's axes
+        place = ball.pos
+    else:
+        axis = int(np.argmax(np.abs(rotation[2])))
+        up = np.sign(rotation[2, axis]) * np.eye(3)[axis]
+        quat, place = np.zeros(4), [0, 0, 0]
+        mujoco.mju_quatZ2Vec(quat, up)
+    return element.add_site(name=f"foot_of_trial_{body}", pos=place, quat=quat).name
+
+
+def _unpair(spec, names):
+    """Deletes pairs of geoms of these bodies with the world: exclusions do not hold for pairs."""
+    bodies = {(spec.body(name) or spec.site(name).parent).name for name in names}
+    owner = {geom.name: geom.parent.name for geom in spec.geoms if geom.name}
+    world = spec.worldbody.name
+    for pair in list(spec.pairs):
+        ends = {owner.get(pair.geomname1), owner.get(pair.geomname2)}
+        if world in ends and ends & bodies:
+            spec.delete(pair)
+
+
+def _undress(spec, names):
+    """Moves what only looks, of bodies that have a shape that collides, to bodies of its own: the plugin would take meshes that
+    collide and those that look for one solid, which they are not where they coincide."""
+    for name in names:
+        body = spec.body(name)
+        looks = [geom for geom in body.geoms if not geom.contype and not geom.conaffinity]
+        if not looks or len(looks) == len(body.geoms) or (not body.explicitinertial and any(geom.density and geom.mass != 0 for geom in looks)):
+            continue
+        child = body.add_body(name=f"{name}_looks_of_trial")
+        for geom in looks:
+            child.add_geom(type=geom.type, meshname=geom.meshname, size=geom.size, pos=geom.pos, quat=geom.quat, rgba=geom.rgba,
+                           material=geom.material, group=geom.group, contype=0, conaffinity=0, mass=0)
+            spec.delete(geom)
+
+
+def _actuate(spec, model, description, names, tables):
+    """Motors without a law for torque, position actuators for servo; the model's own for model."""
+    import mujoco
+
+    kind = description.actuator["kind"]
+    if kind == "model":
+        return
+    plain = {}  # joints with a motor of their own
+    for a in range(model.nu):
+        joint = model.joint(model.actuator_trnid[a][0]).name if model.actuator_trntype[a] == int(mujoco.mjtTrn.mjTRN_JOINT) else ""
+        if (kind == "torque" and joint in names and model.actuator_gaintype[a] == int(mujoco.mjtGain.mjGAIN_FIXED)
+                and model.actuator_biastype[a] == int(mujoco.mjtBias.mjBIAS_NONE) and model.actuator_dyntype[a] == int(mujoco.mjtDyn.mjDYN_NONE)):
+            plain[a] = joint
+    for a, actuator in reversed(list(enumerate(spec.actuators))):
+        if a not in plain:
+            for sensor in [one for one in spec.sensors if one.objname == actuator.name and actuator.name]:
+                spec.delete(sensor)
+            spec.delete(actuator)
+    if len(plain) < model.nu:
+        for key in list(spec.keys):
+            key.ctrl = []
+    for k, name in enumerate(names):
+        if name in plain.values():
+            continue
+        motor = spec.add_actuator(name=f"{kind}_of_trial_{k}", target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        if np.isfinite(tables["effort"][k]):
+            motor.forcelimited, motor.forcerange = mujoco.mjtLimited.mjLIMITED_TRUE, [-tables["effort"][k], tables["effort"][k]]
+        if kind == "servo":
+            motor.set_to_position(kp=tables["kp"][k], kv=tables["kd"][k])
+
+
+def _drives(model, names):
+    """For each joint its actuator, -1 without one, and the force of ctrl 1."""
+    import mujoco
+
+    drive, gear = np.full(len(names), -1), np.ones(len(names))
+    for a in range(model.nu):
+        if model.actuator_trntype[a] == int(mujoco.mjtTrn.mjTRN_JOINT):
+            joint = model.joint(model.actuator_trnid[a][0]).name
+            if joint in names:
+                drive[names.index(joint)] = a
+                gear[names.index(joint)] = model.actuator_gear[a][0] * model.actuator_gainprm[a][0]
+    return drive, gear
