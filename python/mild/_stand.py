@@ -49,6 +49,15 @@ def _leave_out(spec, folder):
 
 
 @dataclasses.dataclass
+class Feet:
+    """What of a robot meets soft ground."""
+    names: list  # of bodies or sites, z up from the sole
+    bodies: list  # names of others that meet it on any side
+    soles: list  # names of geoms
+    outlines: list  # [m] (n, 2), of each foot
+
+
+@dataclasses.dataclass
 class Robot:
     """A compiled model and where its parts are. Arrays are in the order of the policy but where they say otherwise."""
     model: object
@@ -66,20 +75,22 @@ class Robot:
     drive: np.ndarray  # actuator of each, -1: none
     gear: np.ndarray  # [N m] of an actuator's ctrl of 1
     base: int  # body
+    place: int  # address of its place and rotation in qpos
+    zero: float  # [m] height at which that place is 0
     frame: tuple  # (mjtObj, id)
-    feet: list
-    bodies: list
+    feet: Feet
+    soles: list  # geoms of feet.soles
     start: np.ndarray  # qpos
     mass: float
     remark: str = ""
 
 
 def joint_names(model):
-    """Names of hinges and slides in the order of the model."""
+    """Names of hinges and slides in the order of the model, but for those of the floating base."""
     import mujoco
 
-    kinds = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-    return [model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] in kinds]
+    kinds, base = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)), floating(model)[0]
+    return [model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] in kinds and model.jnt_bodyid[j] != base]
 
 
 def stand(model, description, ground, attributes):
@@ -103,36 +114,45 @@ def stand(model, description, ground, attributes):
               for name, otherwise in (("kp", 0.0), ("kd", 0.0), ("default", 0.0), ("effort", np.inf), ("armature", -1.0))}
     scale = by_joint(d.scale, [names[j] for j in order[:count]], 1.0, "scale")
     start = _start(bare, d, names, tables["default"])
-    feet, bodies, sole = _feet(spec, bare, start, d)
+    if d.start["keyframe"] and not d.default:  # its angles are the default ones
+        tables["default"] = np.array([start[bare.joint(name).qposadr[0]] for name in names])
+    feet = _feet(spec, bare, start, d)
     for name, armature in zip(names, tables["armature"]):
         if armature >= 0:
             spec.joint(name).armature = armature
     _actuate(spec, bare, d, names, tables)
     if ground != "rigid":
-        _unpair(spec, feet + bodies)
-        _undress(spec, bodies)
-        attach(spec, feet, ground, body=bodies, sensor="feet_of_trial", name="ground_of_trial", **{"sole": " ".join(sole), **attributes})
+        _unpair(spec, feet.names + feet.bodies)
+        _undress(spec, feet.bodies)
+        attach(spec, feet.names, ground, body=feet.bodies, sensor="feet_of_trial", name="ground_of_trial",
+               **{"sole": " ".join(feet.soles), **attributes})
     compiled = spec.compile()
     drive, gear = _drives(compiled, [names[j] for j in order])
     if d.actuator["kind"] != "torque" and (drive[:count] < 0).any():
         raise ValueError(f"actuator.kind: model has no actuator for {', '.join(names[order[i]] for i in np.flatnonzero(drive[:count] < 0))}")
     ids = [compiled.joint(name).id for name in names]
     qpos, qvel = compiled.jnt_qposadr[ids], compiled.jnt_dofadr[ids]
-    base = _base(compiled)
+    base, place, zero = floating(compiled)
     return Robot(compiled, [names[j] for j in order[:count]], [names[j] for j in order[count:]], qpos[order], qvel[order],
                  (qpos[seen], qvel[seen]), tables["default"][seen], tables["kp"][order], tables["kd"][order], tables["default"][order],
-                 tables["effort"][order], scale, drive, gear, base, _frame(compiled, d, base), feet, bodies, start,
+                 tables["effort"][order], scale, drive, gear, base, place, zero, _frame(compiled, d, base), feet,
+                 [compiled.geom(name).id for name in feet.soles], start,
                  float(compiled.body_subtreemass[base]), remark)
 
 
-def _base(model):
-    """The body on the free joint."""
+def floating(model):
+    """The body that floats, the address of its place in qpos, and the height at which that place is 0. It floats on a free joint, or on
+    three slides and a ball, whose coordinates are those of a free joint."""
     import mujoco
 
-    free = np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
-    if not len(free):
-        raise ValueError("model: no body has a free joint")
-    return int(model.jnt_bodyid[free[0]])
+    free, slide, ball = (int(kind) for kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_BALL))
+    for body in range(1, model.nbody):
+        first, kinds = model.body_jntadr[body], model.jnt_type[model.body_jntadr[body] :][: model.body_jntnum[body]].tolist()
+        if kinds == [free]:
+            return body, int(model.jnt_qposadr[first]), 0.0
+        if kinds == [slide, slide, slide, ball] and (model.jnt_axis[first : first + 3] == np.eye(3)).all():
+            return body, int(model.jnt_qposadr[first]), float(model.body_pos[body][2])
+    raise ValueError("model: no body has a free joint, or three slides along x, y, z and a ball")
 
 
 def _frame(model, description, base):
@@ -149,7 +169,7 @@ def _frame(model, description, base):
 
 
 def _start(model, description, names, default):
-    """qpos of the start, with the lowest point of the robot at start.lift above 0."""
+    """qpos of the start, with the lowest point of the robot at 0."""
     import mujoco
 
     data = mujoco.MjData(model)
@@ -162,12 +182,12 @@ def _start(model, description, names, default):
     else:
         for name, value in zip(names, default):
             data.joint(name).qpos = value
-    free = model.jnt_qposadr[model.body_jntadr[_base(model)]]
+    place = floating(model)[1]
     mujoco.mj_kinematics(model, data)
     low = [lowest(model, data, g) for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] and solid(model, g)]
     if not low:
         raise ValueError("model: no shape of the robot collides")
-    data.qpos[free + 2] += description.start["lift"] - min(low)
+    data.qpos[place + 2] -= min(low)
     return data.qpos.copy()
 
 
@@ -199,7 +219,7 @@ def lowest(model, data, geom):
 
 
 def _feet(spec, model, start, description):
-    """Names of feet, of other bodies that meet the ground, and of the geoms of the soles. Bodies that have no name get one."""
+    """The Feet. Bodies and geoms that have no name get one."""
     import mujoco
 
     data = mujoco.MjData(model)
@@ -216,20 +236,28 @@ def _feet(spec, model, start, description):
     else:
         feet = [body for body in sorted(low) if low[body] < min(low.values()) + 0.03]
         feet = [body for body in feet if not any(body in _parents(model, other) for other in feet)]
-    names, soles = [], []
+    names, soles, outlines = [], [], []
     for k, body in enumerate(feet):
         if body not in shapes:
             raise ValueError(f"feet.names: '{given[k]}' has no shape that collides")
         bottom = sorted(geom for depth, geom in shapes[body] if depth < low[body] + SOLE)
         ball = len(bottom) == 1 and model.geom_type[bottom[0]] == int(mujoco.mjtGeom.mjGEOM_SPHERE) and model.geom_size[bottom[0]][0] >= ROUND
-        for geom in bottom if ball else [geom for _, geom in shapes[body]]:
+        geoms = bottom if ball else _all_of(model, body) if description.feet["sole"] == ["all"] else [geom for _, geom in shapes[body]]
+        for geom in geoms:
             soles.append(_name(spec.geoms[geom], f"sole_of_trial_{geom}"))
-        names.append(given[k] if given else _foot(spec, data, body, spec.geoms[bottom[0]] if ball else None))
-    half = 0.5 * data.xpos[_base(model)][2]
+        name, outline = _round(spec, model, body, geoms[0]) if ball else _flat(spec, model, data, body, geoms)
+        names.append(given[k] if given else name)
+        outlines.append(outline)
+    half = 0.5 * data.xpos[floating(model)[0]][2]
     others = sorted((low[body], body) for body in low if body not in feet and low[body] < half)
     bodies = [_name(spec.bodies[body], f"body_of_trial_{body}") for _, body in others[: MOST - len(feet)]]
     wanted = description.feet["bodies"]
-    return names, ([] if wanted == ["-"] else wanted) if wanted is not None else bodies, description.feet["sole"] or soles
+    sole = description.feet["sole"]
+    return Feet(names, ([] if wanted == ["-"] else wanted) if wanted is not None else bodies, soles if sole in (None, ["all"]) else sole, outlines)
+
+
+def _all_of(model, body):
+    return [geom for geom in range(model.ngeom) if model.geom_bodyid[geom] == body]
 
 
 def _body_of(model, name):
@@ -256,24 +284,75 @@ def _name(element, otherwise):
     return element.name
 
 
-def _foot(spec, data, body, ball):
-    """The name of a foot whose z axis points up: the body, or a site on it. A round foot has a site at its centre."""
+def _flat(spec, model, data, body, geoms):
+    """The name and the outline of a flat foot: the body where its z axis points up from the sole, or a site on it. Up is that direction, of the axes of
+    the body, those of its boxes, and the vertical at the start, across which the sole is largest."""
     import mujoco
 
     rotation, element = data.xmat[body].reshape(3, 3), spec.bodies[body]
     _name(element, f"foot_of_trial_{body}")
-    if ball is None and rotation[2, 2] > 0.7:
-        return element.name
-    if ball is not None:
-        quat = np.zeros(4)
-        mujoco.mju_mat2Quat(quat, rotation.T.ravel())  # the world's axes
-        place = ball.pos
-    else:
-        axis = int(np.argmax(np.abs(rotation[2])))
-        up = np.sign(rotation[2, axis]) * np.eye(3)[axis]
-        quat, place = np.zeros(4), [0, 0, 0]
-        mujoco.mju_quatZ2Vec(quat, up)
-    return element.add_site(name=f"foot_of_trial_{body}", pos=place, quat=quat).name
+    boxes = [data.geom_xmat[g].reshape(3, 3).T for g in geoms if model.geom_type[g] == int(mujoco.mjtGeom.mjGEOM_BOX)]
+    ways = [np.sign(way[2]) * way for way in np.vstack([rotation.T, *boxes, np.array([[0, 0, 1.0]])]) if abs(way[2]) > 0.7]
+    up = rotation.T @ max(ways, key=lambda way: round(area(_outline(model, data, geoms, way)), 6))
+    outline = _outline(model, data, geoms, rotation @ up)
+    if up[2] > 0.9999:
+        return element.name, outline
+    quat = np.zeros(4)
+    mujoco.mju_quatZ2Vec(quat, up)
+    return element.add_site(name=f"foot_of_trial_{body}_up", pos=[0, 0, 0], quat=quat).name, outline
+
+
+def _round(spec, model, body, geom):
+    """The same of a round foot, a sphere."""
+    angle = 2 * np.pi * np.arange(32) / 32
+    return _name(spec.bodies[body], f"foot_of_trial_{body}"), model.geom_size[geom][0] * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _points(model, data, geom, up):
+    """Points of a geom (n, 3) [m], world, among which are its lowest along -up."""
+    import mujoco
+
+    kind, size, turn, place = mujoco.mjtGeom(model.geom_type[geom]), model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
+    kinds = mujoco.mjtGeom
+    if kind == kinds.mjGEOM_MESH:
+        mesh = model.geom_dataid[geom]
+        return place + model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]] @ turn.T
+    if kind == kinds.mjGEOM_BOX:
+        return place + (np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T * size) @ turn.T
+    if kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE):
+        ends = np.array([[0, 0, -1.0], [0, 0, 1.0]]) * (size[1] if kind == kinds.mjGEOM_CAPSULE else 0)
+        return place + ends @ turn.T - size[0] * up
+    angle = 2 * np.pi * np.arange(16) / 16
+    rim = np.column_stack([size[0] * np.cos(angle), size[0 if kind == kinds.mjGEOM_CYLINDER else 1] * np.sin(angle), 0 * angle])
+    if kind == kinds.mjGEOM_CYLINDER:
+        return place + np.vstack([rim + [0, 0, size[1]], rim - [0, 0, size[1]]]) @ turn.T
+    return place + np.vstack([rim, np.diag(size), -np.diag(size)]) @ turn.T
+
+
+def _outline(model, data, geoms, up):
+    """Corners [m] (n, 2) of the convex hull, seen along up, of what lies within SOLE of the lowest point."""
+    points = np.vstack([_points(model, data, geom, up) for geom in geoms])
+    height = points @ up
+    points = points[height < height.min() + SOLE]
+    side = np.cross(up, [1.0, 0, 0] if abs(up[0]) < 0.5 else [0, 1.0, 0])
+    side /= np.linalg.norm(side)
+    flat = sorted({(round(x, 6), round(y, 6)) for x, y in zip(points @ side, points @ np.cross(up, side))})
+    hull = []
+    for line in (flat, flat[::-1]):
+        first = len(hull)
+        for point in line:
+            while len(hull) - first >= 2 and (hull[-1][0] - hull[-2][0]) * (point[1] - hull[-2][1]) <= \
+                    (hull[-1][1] - hull[-2][1]) * (point[0] - hull[-2][0]):
+                hull.pop()
+            hull.append(point)
+        hull.pop()
+    return np.array(hull).reshape(-1, 2)
+
+
+def area(outline):
+    """[m^2] of a polygon."""
+    x, y = outline.T
+    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) if len(outline) > 2 else 0.0
 
 
 def _unpair(spec, names):

@@ -86,11 +86,11 @@ KEYS = {
     },
     "start": {
         "keyframe": Key(str, "", "of the model; without: the default angles"),
-        "lift": Key(float, 0.002, "[m] of the lowest point of the feet above the ground"),
+        "lift": Key(float, 0.0, "[m] of the feet above where they carry the robot"),
     },
     "feet": {
         "names": Key(words, None, "bodies or sites; without: found by what is lowest at the start"),
-        "sole": Key(words, None, "geoms that are the soles; without: found"),
+        "sole": Key(words, None, "geoms that are the soles; without: those of the feet that collide; all: every geom of the feet"),
         "bodies": Key(words, None, "other bodies that meet soft ground; without: those that are low at the start; -: none"),
     },
     "noise": {  # +-, uniform; half of what most trainings have

@@ -12,7 +12,7 @@ import sys
 import numpy as np
 
 from . import networks
-from ._stand import joint_names, read_spec, stand
+from ._stand import area, lowest, stand
 from .describe import KEYS, TABLES, TERMS, Description, Observer, State, layouts
 
 GROUNDS = ("rigid", "rubber", "foam60", "foam45", "foam28", "foam25", "grass", "sand_loose", "sand_dense")
@@ -164,15 +164,26 @@ class Walker:
         self.state = State(description, r.model, self.data, r.frame, r.seen)
         self.observer = Observer(description, len(r.seen[0]), len(r.joints))
         self.delay = round(description.policy["delay"] / r.model.opt.timestep)
+        self.depth = 0.0 if ground == "rigid" else self.standing_depth()
 
     def about(self):
         """Of the robot, as docs/schema/trial.json."""
         import mujoco
 
         r, d = self.robot, self.description
-        return {"mujoco": mujoco.mj_versionString(), "mass": r.mass, "feet": r.feet, "bodies": r.bodies, "joints": r.joints,
+        return {"mujoco": mujoco.mj_versionString(), "mass": r.mass, "feet": r.feet.names, "bodies": r.feet.bodies, "sole": [area(outline) for outline in r.feet.outlines], "joints": r.joints,
                 "step": r.model.opt.timestep, "rate": 1 / (d.policy["decimation"] * r.model.opt.timestep), "actuator": d.actuator["kind"],
                 "remark": r.remark}
+
+    def standing_depth(self):
+        """[m] at which virgin ground carries the robot at rest, level, where a trial starts; as in mild eval."""
+        from . import Material, Sole
+
+        r, given = self.robot, self.options["attributes"]
+        material = Material(self.ground, **{key[8:]: float(value) for key, value in given.items()
+                                            if key.startswith("ground__") and key not in ("ground__model",)})
+        load = r.mass * float(np.linalg.norm(r.model.opt.gravity)) / len(r.feet.names)
+        return float(np.mean([Sole(outline).sinkage(material, load) for outline in r.feet.outlines]))
 
     def begin(self, command, seed):
         """Puts the robot at a start of its own."""
@@ -181,18 +192,21 @@ class Walker:
         self.random = np.random.default_rng([seed, 26])
         r, s, noise = self.robot, self.state, self.description.noise
         mujoco.mj_resetData(r.model, self.data)
-        q, free = r.start.copy(), r.model.jnt_qposadr[r.model.body_jntadr[r.base]]
+        q, free = r.start.copy(), r.place
         yaw, turned = math.pi * self.draw(1, 1)[0], np.zeros(4)
         mujoco.mju_mulQuat(turned, np.array([math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)]), q[free + 3 : free + 7])
         q[free + 3 : free + 7] = turned
         q[free : free + 2] += self.draw(noise["start_place"], 2)
         q[r.qpos] += self.draw(noise["start_joint"], len(r.qpos))
         self.data.qpos[:] = q
+        mujoco.mj_kinematics(r.model, self.data)
+        low = min(lowest(r.model, self.data, geom) for geom in r.soles)
+        self.data.qpos[free + 2] += self.description.start["lift"] - self.depth - low
         mujoco.mj_forward(r.model, self.data)
         s.command, s.action, s.default = np.array(command), np.zeros(len(r.joints)), r.seen_default
         self.observer.reset()
         self.network.reset()
-        self.height, self.target = q[free + 2], r.default.copy()
+        self.height, self.target = r.zero + r.start[free + 2], r.default.copy()
 
     def draw(self, amplitude, count):
         return self.options["noise"] * amplitude * self.random.uniform(-1, 1, count)
@@ -252,10 +266,10 @@ class Walker:
         if d.warning[mujoco.mjtWarning.mjWARN_BADQACC].number or d.warning[mujoco.mjtWarning.mjWARN_BADQPOS].number \
                 or d.warning[mujoco.mjtWarning.mjWARN_BADQVEL].number or not np.isfinite(d.qpos).all():
             return "not_finite"
-        x, y = d.qpos[r.model.jnt_qposadr[r.model.body_jntadr[r.base]] + 4 :][:2]
+        x, y = d.qpos[r.place + 4 : r.place + 6]
         if 1 - 2 * (x * x + y * y) < math.cos(TILT):
             return "tilt"
-        return "base" if d.qpos[r.model.jnt_qposadr[r.model.body_jntadr[r.base]] + 2] < LOW * self.height else ""
+        return "base" if r.zero + d.qpos[r.place + 2] < LOW * self.height else ""
 
 
 class Measure:
@@ -263,10 +277,10 @@ class Measure:
 
     def __init__(self, walker):
         self.r, self.d, self.ground = walker.robot, walker.data, walker.ground
-        self.free = int(self.r.model.jnt_qposadr[self.r.model.body_jntadr[self.r.base]])
+        self.free = self.r.place
         self.place = self.d.qpos[self.free : self.free + 2].copy()
         self.path, self.work, self.torque = np.zeros(2), 0.0, 0.0
-        self.deep, self.stances, self.lifted = np.zeros(len(self.r.feet)), [], False
+        self.deep, self.stances, self.lifted = np.zeros(len(self.r.feet.names)), [], False
 
     def step(self, time):
         r, d = self.r, self.d
@@ -280,7 +294,7 @@ class Measure:
             self.work += float(np.abs(torque * d.qvel[r.qvel]).sum()) * r.model.opt.timestep
         self.place = d.qpos[self.free : self.free + 2].copy()
         if self.ground != "rigid":
-            depth = d.sensor("feet_of_trial").data.reshape(-1, 12)[: len(r.feet), 10]
+            depth = d.sensor("feet_of_trial").data.reshape(-1, 12)[: len(r.feet.names), 10]
             for foot in np.flatnonzero((depth == 0) & (self.deep > 0)):
                 self.stances.append(self.deep[foot])
             self.deep = np.where(depth > 0, np.maximum(self.deep, depth), 0)
@@ -410,7 +424,8 @@ def _check(arguments, description):
     walker.begin((arguments.speed[0], arguments.sideways, arguments.turn), 0)
     walker.state.read(walker.draw)
     frame = walker.observer.frame(walker.state)
-    print(f"{r.mass:.1f} kg, step {r.model.opt.timestep:g} s, {walker.about()['rate']:g} Hz; feet {' '.join(r.feet)}; bodies {' '.join(r.bodies) or '-'}")
+    print(f"{r.mass:.1f} kg, step {r.model.opt.timestep:g} s, {walker.about()['rate']:g} Hz; feet {' '.join(r.feet.names)}, soles "
+          f"{' '.join(f'{1e4 * area(outline):.0f}' for outline in r.feet.outlines)} cm^2; bodies {' '.join(r.feet.bodies) or '-'}")
     for k, name in enumerate(r.joints + r.held):
         print(f"{name:<32}{'held' if k >= len(r.joints) else f'scale {r.scale[k]:g}':<12} default {r.default[k]:7.3f}  kp {r.kp[k]:g}  "
               f"kd {r.kd[k]:g}  effort {r.effort[k]:g}")
