@@ -1,6 +1,7 @@
 """A robot of any MJCF on a ground for mild.trial: its feet found, its actuators as the description says, compiled."""
 import dataclasses
 import pathlib
+import re
 
 import numpy as np
 
@@ -24,8 +25,31 @@ def read_spec(model):
     path = pathlib.Path(text)
     if not path.is_file():
         raise ValueError(f"model: there is no file '{text}'")
-    spec = mujoco.MjSpec.from_file(text)
-    return spec, _leave_out(spec, path.parent)
+    try:
+        spec, remark = mujoco.MjSpec.from_file(text), ""
+    except ValueError as error:
+        spec, remark = _older(path, str(error))
+    return spec, "; ".join(filter(None, (remark, _leave_out(spec, path.parent))))
+
+
+def _older(path, error):
+    """A file with attributes that MuJoCo knew once, without them."""
+    import mujoco
+
+    text, gone = path.read_text(), []
+    while True:
+        found = re.search(r"unrecognized attribute: '(\w+)'", error)
+        if not found or found[1] in gone:
+            raise ValueError(f"model: {' '.join(error.split())}")
+        gone.append(found[1])
+        text = re.sub(rf"\s{found[1]}\s*=\s*(\"[^\"]*\"|'[^']*')", "", text)
+        try:
+            spec = mujoco.MjSpec.from_string(text)
+        except ValueError as next_error:
+            error = str(next_error)
+            continue
+        spec.meshdir, spec.texturedir = str(path.parent / spec.meshdir), str(path.parent / spec.texturedir)
+        return spec, f"attributes that MuJoCo no longer knows are left out: {', '.join(gone)}"
 
 
 def _leave_out(spec, folder):
@@ -103,7 +127,8 @@ def stand(model, description, ground, attributes):
         spec.option.timestep = d.policy["step"]
     if d.policy["integrator"]:
         spec.option.integrator = getattr(mujoco.mjtIntegrator, "mjINT_" + d.policy["integrator"].upper())
-    if not any(geom.type in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD) for geom in spec.worldbody.geoms):
+    remark = "; ".join(filter(None, (remark, _clear(spec))))
+    if not any(geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in spec.worldbody.geoms):
         spec.worldbody.add_geom(name="floor_of_trial", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], rgba=[0.6, 0.6, 0.6, 1])
     bare = spec.copy().compile()
     names = joint_names(bare)
@@ -138,6 +163,21 @@ def stand(model, description, ground, attributes):
                  tables["effort"][order], scale, drive, gear, base, place, zero, _frame(compiled, d, base), feet,
                  [compiled.geom(name).id for name in feet.soles], start,
                  float(compiled.body_subtreemass[base]), remark)
+
+
+def _clear(spec):
+    """Deletes what stands in the world beside planes, such as stairs and height fields: the ground of a trial is level. What went, as a line."""
+    import mujoco
+
+    bodies, gone = [spec.worldbody], 0
+    while bodies:
+        body = bodies.pop()
+        bodies += [child for child in body.bodies if not child.joints and not child.mocap]
+        for geom in list(body.geoms):
+            if geom.type != mujoco.mjtGeom.mjGEOM_PLANE and (geom.contype or geom.conaffinity):
+                spec.delete(geom)
+                gone += 1
+    return f"{gone} obstacles of the world are left out" if gone else ""
 
 
 def floating(model):

@@ -130,7 +130,15 @@ def _place(thing):
     return str(thing) if isinstance(thing, (str, pathlib.Path)) and "<" not in str(thing) else type(thing).__name__
 
 
+def _quietly():
+    """MuJoCo's and the ground's warnings, of robots that fall most of all, go nowhere; what ended a walk says what counts."""
+    import mujoco
+
+    mujoco.set_mju_user_warning(lambda text: None)
+
+
 def _cell(arguments):
+    _quietly()
     (model, policy, describe, changes, options), ground, command = arguments
     d = Description(describe, changes)
     walker = Walker(model, networks.load(policy, d), d, ground, options)
@@ -453,6 +461,7 @@ def main(argv=None):
         if arguments.check:
             _check(arguments, Description(arguments.describe, changes))
             return 0
+        _quietly()
         out = sys.stderr if arguments.json == "-" else sys.stdout
         table = trial(arguments.model, arguments.policy, arguments.describe, grounds=arguments.ground, speeds=arguments.speed,
                       sideways=arguments.sideways, turn=arguments.turn, trials=arguments.trials, seconds=arguments.seconds, seed=arguments.seed,
