@@ -78,16 +78,15 @@ def main():
     parser.add_argument("--list", action="store_true", help="print what to clone")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/public"))
     parser.add_argument("--only", default=",".join(POLICIES), help="names, separated by commas")
-    parser.add_argument("rest", nargs=argparse.REMAINDER, help="options of mild trial, after --")
+    parser.add_argument("--options", default="--trials 10 --seconds 20 --speed 0.5", help="of mild trial")
     arguments = parser.parse_args()
     if arguments.list or not arguments.clones:
         show()
         return
     arguments.out.mkdir(parents=True, exist_ok=True)
-    options = [word for word in arguments.rest if word != "--"] or ["--trials", "10", "--seconds", "20", "--speed", "0.5"]
     lines = []
     for name in arguments.only.split(","):
-        rows = run(arguments.clones, arguments.out, name, options)["rows"]
+        rows = run(arguments.clones, arguments.out, name, arguments.options.split())["rows"]
         if not lines:
             lines = ["| policy | " + " | ".join(row["ground"] for row in rows) + " |", "|---" * (len(rows) + 1) + "|"]
         lines.append(f"| {name}: {POLICIES[name][0]} | " + " | ".join(map(cell, rows)) + " |")

@@ -9,6 +9,7 @@ from .describe import by_joint, choose
 from .spec import MOST, attach
 
 SOLE = 0.01  # [m] shapes within this of the lowest point of a foot are its sole, as in the plugin
+NARROW = 1e-4  # [m^2] below this shapes have no sole
 ROUND = 0.01  # [m] the smallest sphere that is a round foot and no corner of a sole
 
 
@@ -138,6 +139,8 @@ def stand(model, description, ground, attributes):
     tables = {name: by_joint(getattr(d, name), names, otherwise, name)
               for name, otherwise in (("kp", 0.0), ("kd", 0.0), ("default", 0.0), ("effort", np.inf), ("armature", -1.0))}
     scale = by_joint(d.scale, [names[j] for j in order[:count]], 1.0, "scale")
+    if ground == "rigid" and not any(bare.geom_contype[geom] or bare.geom_conaffinity[geom] or bare.npair for geom in solids(bare)):
+        raise ValueError("model: no shape of the robot collides, so that it would fall through the rigid floor")
     start = _start(bare, d, names, tables["default"])
     if d.start["keyframe"] and not d.default:  # its angles are the default ones
         tables["default"] = np.array([start[bare.joint(name).qposadr[0]] for name in names])
@@ -224,17 +227,18 @@ def _start(model, description, names, default):
             data.joint(name).qpos = value
     place = floating(model)[1]
     mujoco.mj_kinematics(model, data)
-    low = [lowest(model, data, g) for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] and solid(model, g)]
-    if not low:
-        raise ValueError("model: no shape of the robot collides")
-    data.qpos[place + 2] -= min(low)
+    data.qpos[place + 2] -= min(lowest(model, data, geom) for geom in solids(model))
     return data.qpos.copy()
 
 
-def solid(model, geom):
-    """Whether a geom collides, by its type of contact or by a pair."""
-    return bool(model.geom_contype[geom] or model.geom_conaffinity[geom] or (model.pair_geom1 == geom).any()
-                or (model.pair_geom2 == geom).any())
+def solids(model):
+    """Geoms of the robot that collide, by their type of contact or by a pair; all of them where none does."""
+    own = [geom for geom in range(model.ngeom) if model.body_weldid[model.geom_bodyid[geom]]]
+    pairs = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
+    found = [geom for geom in own if model.geom_contype[geom] or model.geom_conaffinity[geom] or geom in pairs]
+    if not own:
+        raise ValueError("model: the robot has no shape")
+    return found or own
 
 
 def lowest(model, data, geom):
@@ -266,9 +270,8 @@ def _feet(spec, model, start, description):
     data.qpos[:] = start
     mujoco.mj_kinematics(model, data)
     shapes = {}  # body: [(lowest point, geom)]
-    for geom in range(model.ngeom):
-        if model.body_rootid[model.geom_bodyid[geom]] and solid(model, geom):
-            shapes.setdefault(int(model.geom_bodyid[geom]), []).append((lowest(model, data, geom), geom))
+    for geom in solids(model):
+        shapes.setdefault(int(model.geom_bodyid[geom]), []).append((lowest(model, data, geom), geom))
     low = {body: min(own)[0] for body, own in shapes.items()}
     given = description.feet["names"]
     if given:
@@ -282,9 +285,10 @@ def _feet(spec, model, start, description):
             raise ValueError(f"feet.names: '{given[k]}' has no shape that collides")
         bottom = sorted(geom for depth, geom in shapes[body] if depth < low[body] + SOLE)
         ball = len(bottom) == 1 and model.geom_type[bottom[0]] == int(mujoco.mjtGeom.mjGEOM_SPHERE) and model.geom_size[bottom[0]][0] >= ROUND
-        geoms = bottom if ball else _all_of(model, body) if description.feet["sole"] == ["all"] else [geom for _, geom in shapes[body]]
-        for geom in geoms:
-            soles.append(_name(spec.geoms[geom], f"sole_of_trial_{geom}"))
+        geoms = bottom if ball else [geom for _, geom in shapes[body]]
+        if not ball and (description.feet["sole"] == ["all"] or area(_outline(model, data, geoms, _up(model, data, body, geoms))) < NARROW):
+            geoms = [geom for geom in range(model.ngeom) if model.geom_bodyid[geom] == body]
+        soles += [_name(spec.geoms[geom], f"sole_of_trial_{geom}") for geom in geoms]
         name, outline = _round(spec, model, body, geoms[0]) if ball else _flat(spec, model, data, body, geoms)
         names.append(given[k] if given else name)
         outlines.append(outline)
@@ -294,10 +298,6 @@ def _feet(spec, model, start, description):
     wanted = description.feet["bodies"]
     sole = description.feet["sole"]
     return Feet(names, ([] if wanted == ["-"] else wanted) if wanted is not None else bodies, soles if sole in (None, ["all"]) else sole, outlines)
-
-
-def _all_of(model, body):
-    return [geom for geom in range(model.ngeom) if model.geom_bodyid[geom] == body]
 
 
 def _body_of(model, name):
@@ -324,19 +324,28 @@ def _name(element, otherwise):
     return element.name
 
 
-def _flat(spec, model, data, body, geoms):
-    """The name and the outline of a flat foot: the body where its z axis points up from the sole, or a site on it. Up is that direction, of the axes of
-    the body, those of its boxes, and the vertical at the start, across which the sole is largest."""
+def _up(model, data, body, geoms):
+    """Up from the sole [world]: of the axes of the body, those of its boxes, and the vertical at the start, the direction across which the
+    sole is largest."""
     import mujoco
 
-    rotation, element = data.xmat[body].reshape(3, 3), spec.bodies[body]
-    _name(element, f"foot_of_trial_{body}")
     boxes = [data.geom_xmat[g].reshape(3, 3).T for g in geoms if model.geom_type[g] == int(mujoco.mjtGeom.mjGEOM_BOX)]
-    ways = [np.sign(way[2]) * way for way in np.vstack([rotation.T, *boxes, np.array([[0, 0, 1.0]])]) if abs(way[2]) > 0.7]
-    up = rotation.T @ max(ways, key=lambda way: round(area(_outline(model, data, geoms, way)), 6))
-    outline = _outline(model, data, geoms, rotation @ up)
+    axes = np.vstack([data.xmat[body].reshape(3, 3).T, *boxes, np.array([[0, 0, 1.0]])])
+    ways = [np.sign(way[2]) * way for way in axes if abs(way[2]) > 0.7]
+    return max(ways, key=lambda way: round(area(_outline(model, data, geoms, way)), 6))
+
+
+def _flat(spec, model, data, body, geoms):
+    """The name and the outline of a flat foot: the body where its z axis points up from the sole, or a site on it."""
+    import mujoco
+
+    way, element = _up(model, data, body, geoms), spec.bodies[body]
+    name, outline = _name(element, f"foot_of_trial_{body}"), _outline(model, data, geoms, way)
+    if area(outline) < NARROW:
+        raise ValueError(f"feet: the shapes of '{name}' have no flat side below; name its sole in feet.sole")
+    up = data.xmat[body].reshape(3, 3).T @ way
     if up[2] > 0.9999:
-        return element.name, outline
+        return name, outline
     quat = np.zeros(4)
     mujoco.mju_quatZ2Vec(quat, up)
     return element.add_site(name=f"foot_of_trial_{body}_up", pos=[0, 0, 0], quat=quat).name, outline
@@ -353,16 +362,19 @@ def _points(model, data, geom, up):
     import mujoco
 
     kind, size, turn, place = mujoco.mjtGeom(model.geom_type[geom]), model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
-    kinds = mujoco.mjtGeom
+    kinds, angle = mujoco.mjtGeom, 2 * np.pi * np.arange(16) / 16
     if kind == kinds.mjGEOM_MESH:
         mesh = model.geom_dataid[geom]
         return place + model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]] @ turn.T
     if kind == kinds.mjGEOM_BOX:
         return place + (np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T * size) @ turn.T
     if kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE):
-        ends = np.array([[0, 0, -1.0], [0, 0, 1.0]]) * (size[1] if kind == kinds.mjGEOM_CAPSULE else 0)
-        return place + ends @ turn.T - size[0] * up
-    angle = 2 * np.pi * np.arange(16) / 16
+        ends = place + (np.array([[0, 0, -1.0], [0, 0, 1.0]]) * (size[1] if kind == kinds.mjGEOM_CAPSULE else 0)) @ turn.T
+        high = min(0.999 * SOLE, size[0])  # a ring of the ball as high above its lowest point
+        side = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+        ring = np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * np.cross(up, side)
+        ring *= np.sqrt(high * (2 * size[0] - high)) / np.linalg.norm(side)
+        return np.vstack([[end - size[0] * up, *(end + ring - (size[0] - high) * up)] for end in ends])
     rim = np.column_stack([size[0] * np.cos(angle), size[0 if kind == kinds.mjGEOM_CYLINDER else 1] * np.sin(angle), 0 * angle])
     if kind == kinds.mjGEOM_CYLINDER:
         return place + np.vstack([rim + [0, 0, size[1]], rim - [0, 0, size[1]]]) @ turn.T

@@ -46,7 +46,9 @@ class Row:
         return sum(walk.end == "time" for walk in self.walks)
 
     def mean(self, key):
-        values = [getattr(walk, key) for walk in self.walks if getattr(walk, key) is not None]
+        """Of a key of Walk; of speeds and cost over those that stayed upright."""
+        walks = self.walks if key == "sinkage" else [walk for walk in self.walks if walk.end == "time"]
+        values = [getattr(walk, key) for walk in walks if getattr(walk, key) is not None]
         return float(np.mean(values)) if values else None
 
     @property
@@ -55,9 +57,9 @@ class Row:
 
     @property
     def falls(self):
-        """[s] first and last time of a fall, or None."""
+        """[s] first and last time of a fall; empty without one."""
         times = [walk.time for walk in self.walks if walk.end != "time"]
-        return (min(times), max(times)) if times else None
+        return (min(times), max(times)) if times else ()
 
 
 @dataclasses.dataclass
@@ -70,7 +72,7 @@ class Table:
         """As docs/schema/trial.json."""
         rows = [{"ground": row.ground, "command": list(row.command), "trials": len(row.walks), "upright": row.upright,
                  "speed": row.mean("speed"), "sideways": row.mean("sideways"), "cost": row.mean("cost"), "torque": row.torque,
-                 "sinkage": row.mean("sinkage"), "falls": list(row.falls) if row.falls else None,
+                 "sinkage": row.mean("sinkage"), "falls": list(row.falls),
                  "each": [dataclasses.asdict(walk) for walk in row.walks]} for row in self.rows]
         return {**self.about, "rows": rows}
 
@@ -81,7 +83,7 @@ class Table:
             sinkage = row.mean("sinkage")
             lines.append(f"{row.ground:<12}{row.command[0]:>8.2f}{f'{row.upright} of {len(row.walks)}':>10}{_text(row.mean('speed'), 2):>8}"
                          f"{_text(row.mean('cost'), 2):>7}{row.torque:>8.0f}{_text(None if sinkage is None else 1e3 * sinkage, 0):>9}  {falls}")
-        lines.append("m/s, cost of transport, N m (largest), mm (mean over stances of the deepest element); - where nothing was measured")
+        lines.append("m/s, cost of transport, N m (largest), mm (mean over stances of the deepest element); speed and cost of those upright")
         return "\n".join(line.rstrip() for line in lines)
 
 
@@ -172,6 +174,9 @@ class Walker:
         self.state = State(description, r.model, self.data, r.frame, r.seen)
         self.observer = Observer(description, len(r.seen[0]), len(r.joints))
         self.delay = round(description.policy["delay"] / r.model.opt.timestep)
+        given = options["attributes"]  # soles that the plugin is told
+        self.outlines = [np.array(text.split(), float).reshape(-1, 2) for text in given["outline"].split(";")] if "outline" in given else []
+        self.sole_z = float(given.get("sole_z", 0))
         self.depth = 0.0 if ground == "rigid" else self.standing_depth()
 
     def about(self):
@@ -191,7 +196,23 @@ class Walker:
         material = Material(self.ground, **{key[8:]: float(value) for key, value in given.items()
                                             if key.startswith("ground__") and key not in ("ground__model",)})
         load = r.mass * float(np.linalg.norm(r.model.opt.gravity)) / len(r.feet.names)
-        return float(np.mean([Sole(outline).sinkage(material, load) for outline in r.feet.outlines]))
+        return float(np.mean([Sole(outline).sinkage(material, load) for outline in self.outlines or r.feet.outlines]))
+
+    def lowest(self):
+        """[m] height of the lowest point of the soles."""
+        import mujoco
+
+        r, d = self.robot, self.data
+        mujoco.mj_kinematics(r.model, d)
+        if not self.outlines:
+            return min(lowest(r.model, d, geom) for geom in r.soles)
+        heights = []
+        for k, name in enumerate(r.feet.names):
+            site, body = (mujoco.mj_name2id(r.model, kind, name) for kind in (mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_BODY))
+            place, turn = (d.xpos[body], d.xmat[body]) if body >= 0 else (d.site_xpos[site], d.site_xmat[site])
+            corners = np.insert(self.outlines[k % len(self.outlines)], 2, self.sole_z, axis=1)
+            heights.append(place[2] + float((corners @ turn.reshape(3, 3)[2]).min()))
+        return min(heights)
 
     def begin(self, command, seed):
         """Puts the robot at a start of its own."""
@@ -207,9 +228,7 @@ class Walker:
         q[free : free + 2] += self.draw(noise["start_place"], 2)
         q[r.qpos] += self.draw(noise["start_joint"], len(r.qpos))
         self.data.qpos[:] = q
-        mujoco.mj_kinematics(r.model, self.data)
-        low = min(lowest(r.model, self.data, geom) for geom in r.soles)
-        self.data.qpos[free + 2] += self.description.start["lift"] - self.depth - low
+        self.data.qpos[free + 2] += self.description.start["lift"] - self.depth - self.lowest()
         mujoco.mj_forward(r.model, self.data)
         s.command, s.action, s.default = np.array(command), np.zeros(len(r.joints)), r.seen_default
         self.observer.reset()
@@ -328,18 +347,20 @@ def _film(path):
     if not path:
         yield None
         return
-    film = Film(path)
+    film, whole = Film(path), False
     try:
         yield film
+        whole = True
     finally:
         film.close()
+        if not whole:
+            pathlib.Path(path).unlink(missing_ok=True)
 
 
 class Film:
     """Pictures of MuJoCo's renderer to ffmpeg."""
 
     def __init__(self, path):
-        os.environ.setdefault("MUJOCO_GL", "egl")
         width, height, rate = FILM
         try:
             self.ffmpeg = subprocess.Popen(["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
@@ -357,7 +378,11 @@ class Film:
             if self.renderer:
                 self.renderer.close()
             r.model.vis.global_.offwidth, r.model.vis.global_.offheight = max(width, r.model.vis.global_.offwidth), max(height, r.model.vis.global_.offheight)
-            self.renderer, self.of, self.next = mujoco.Renderer(r.model, height, width), r.model, 0.0
+            try:
+                self.renderer, self.of, self.next = mujoco.Renderer(r.model, height, width), r.model, 0.0
+            except (ImportError, RuntimeError, AttributeError) as error:
+                raise RuntimeError(f"video: MuJoCo cannot draw: {error}; set MUJOCO_GL=egl or osmesa before Python starts, "
+                                   "and `pip install pyopengl`") from None
             self.camera = mujoco.MjvCamera()
             self.camera.type, self.camera.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, r.base
             self.camera.distance, self.camera.azimuth, self.camera.elevation = 3.2 * walker.height + 0.6, 130, -15
@@ -461,6 +486,8 @@ def main(argv=None):
         if arguments.check:
             _check(arguments, Description(arguments.describe, changes))
             return 0
+        if arguments.video:
+            os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo reads it once, when it is imported
         _quietly()
         out = sys.stderr if arguments.json == "-" else sys.stdout
         table = trial(arguments.model, arguments.policy, arguments.describe, grounds=arguments.ground, speeds=arguments.speed,
