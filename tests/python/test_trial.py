@@ -27,7 +27,7 @@ PLUGIN = os.environ.get("MILD_PLUGIN", "")
 BIPED = """<mujoco model="biped"><compiler angle="radian"/><option timestep="0.002"/>
 <asset><mesh name="look" vertex="0 0 0  .01 0 0  0 .01 0  0 0 .01"/></asset>
 <worldbody><geom name="stair" type="box" size="0.1 1 0.1" pos="0.6 0 0"/>
-  <body name="trunk" pos="0 0 0.5"><freejoint/><geom type="box" size="0.08 0.1 0.1" mass="8"/><site name="imu" pos="0.03 0 0" euler="0 0 1.5707963"/>
+  <body name="trunk" pos="0 0 0.7"><freejoint/><geom type="box" size="0.08 0.1 0.1" mass="8"/><site name="imu" pos="0.03 0 0" euler="0 0 1.5707963"/>
     {legs}
   </body></worldbody>
 <actuator>{motors}</actuator></mujoco>"""
@@ -207,6 +207,12 @@ class Standing(unittest.TestCase):
         self.assertAlmostEqual(robot.start[2], 0.12 + 0.34 + 0.04, places=6)
         world = [geom for geom in range(robot.model.ngeom) if robot.model.geom_bodyid[geom] == 0]
         self.assertEqual([robot.model.geom_type[geom] for geom in world], [int(mujoco.mjtGeom.mjGEOM_PLANE)])
+
+    def test_heel(self):
+        """Of a body and its child that are both low the child is the foot, and the other meets the ground on any side."""
+        text = biped().replace('fromto="0 0 -0.03 0 0 -0.28" mass="1"/>', 'fromto="0 0 -0.03 0 0 -0.28" mass="1"/><geom type="sphere" size="0.02" pos="-0.15 0 -0.35"/>')
+        robot = self.stand(text)
+        self.assertEqual((robot.feet.names, robot.feet.bodies), (["left_foot", "right_foot"], ["left_leg", "right_leg"]))
 
     def test_turned(self):
         """A foot whose body's axes lie gets a site whose z axis points up from the sole, also where the sole is not level at the start."""
@@ -444,6 +450,20 @@ class Trials(unittest.TestCase):
         np.testing.assert_allclose(seen[0], [1, 0.2, 0.1, 0, 0, 0, 0], atol=1e-6)
         np.testing.assert_allclose([o[3] for o in seen], [0, 1, 2], atol=1e-6)
         np.testing.assert_allclose(targets, [0] * 2 + [0.01] * 5 + [0.02] * 8, atol=1e-9)
+        first = seen[:]
+        seen.clear()
+        walker.walk((0.5, 0.1, 0.4), 1)  # another walk begins anew
+        np.testing.assert_array_equal(seen, first)
+        for rule, wanted in (("clipped", [2, 2]), ("raw", [8, 9])):  # the fourth and fifth action are clipped to 2
+            d = Description(stander(observation={"action": 1}, action={"clip": 2, "seen": rule}, history={"frames": 2}, scale={".*": 0}))
+            seen.clear()
+            seen += [None] * 7
+            walker = trials.Walker(biped(), networks.load(policy, d), d, "rigid", {"noise": 0.0, "attributes": {}, "seconds": 0.03})
+            for _ in range(2):
+                del seen[7:]
+                walker.walk((0, 0, 0), 1)
+                self.assertEqual([o[4] for o in seen[7:]], [0, *wanted])
+                self.assertEqual(seen[7][0], 0)  # nothing is left of the walk before
         with self.assertRaisesRegex(ValueError, "it answers 3 numbers, and moves 4 joints"):
             mild.trial(biped(), lambda o: np.zeros(3), stander(), grounds=["rigid"], trials=1)
 
