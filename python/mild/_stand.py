@@ -9,6 +9,8 @@ from .describe import by_joint, choose
 from .spec import MOST, attach
 
 SOLE = 0.01  # [m] shapes within this of the lowest point of a foot are its sole, as in the plugin
+COLORS = {"sand": (0.80, 0.68, 0.48), "dry_sand": (0.80, 0.68, 0.48), "grass": (0.42, 0.55, 0.30), "foam": (0.55, 0.62, 0.72), "rubber": (0.35, 0.35, 0.38),
+          "sandy_loam": (0.55, 0.43, 0.30), "clay": (0.55, 0.38, 0.30), "snow": (0.93, 0.95, 0.98), "lunar": (0.5, 0.5, 0.5)}
 NARROW = 1e-4  # [m^2] below this shapes have no sole
 ROUND = 0.01  # [m] the smallest sphere that is a round foot and no corner of a sole
 
@@ -118,8 +120,8 @@ def joint_names(model):
     return [model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] in kinds and model.jnt_bodyid[j] != base]
 
 
-def stand(model, description, ground, attributes):
-    """The Robot on a ground: "rigid" is MuJoCo's own floor, that of the file if it has one."""
+def stand(model, description, ground, attributes, seen=False):
+    """The Robot on a ground: "rigid" is MuJoCo's own floor, that of the file if it has one. seen: the floor has the ground's colour."""
     import mujoco
 
     d = description
@@ -131,6 +133,8 @@ def stand(model, description, ground, attributes):
     remark = "; ".join(filter(None, (remark, _clear(spec))))
     if not any(geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in spec.worldbody.geoms):
         spec.worldbody.add_geom(name="floor_of_trial", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], rgba=[0.6, 0.6, 0.6, 1])
+    if seen:
+        _paint(spec, ground)
     bare = spec.copy().compile()
     names = joint_names(bare)
     order, seen = choose(d.policy["joints"], names, "joints"), choose(d.policy["observed"] or d.policy["joints"], names, "observed")
@@ -181,6 +185,28 @@ def _clear(spec):
                 spec.delete(geom)
                 gone += 1
     return f"{gone} obstacles of the world are left out" if gone else ""
+
+
+def _paint(spec, ground):
+    """Gives the floor the ground's colour, in squares that show the way, under a bright sky."""
+    import mujoco
+
+    color = np.array(next((rgb for name, rgb in COLORS.items() if ground.startswith(name)), (0.6, 0.6, 0.62)))
+    squares = spec.add_texture(name="floor_of_trial", type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+                               width=256, height=256, rgb1=color, rgb2=0.93 * color)
+    paint = spec.add_material(name="floor_of_trial", texrepeat=[2, 2], texuniform=True, reflectance=0, specular=0)
+    paint.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = squares.name
+    for geom in spec.worldbody.geoms:
+        if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
+            geom.material, geom.rgba = paint.name, [1, 1, 1, 1]
+    for texture in list(spec.textures):
+        if texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
+            spec.delete(texture)
+    spec.visual.rgba.haze = [0.95, 0.97, 1, 1]
+    spec.add_texture(name="sky_of_trial", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+                     width=64, height=64, rgb1=[0.75, 0.85, 0.95], rgb2=[0.95, 0.97, 1])
+    if not spec.worldbody.lights:
+        spec.worldbody.add_light(pos=[0, 0, 4], dir=[0.2, 0.3, -1], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
 
 
 def floating(model):

@@ -106,7 +106,7 @@ def trial(model, policy, describe, *, grounds=GROUNDS, speeds=(0.5,), sideways=0
     cells = [(ground, (float(speed), float(sideways), float(turn))) for ground in grounds for speed in speeds]
     if not cells or trials < 1 or not seconds > 0:
         raise ValueError("trial: needs a ground, a speed, and more than 0 trials and seconds")
-    options = dict(trials=int(trials), seconds=float(seconds), seed=int(seed), noise=float(noise), attributes=dict(attributes))
+    options = dict(trials=int(trials), seconds=float(seconds), seed=int(seed), noise=float(noise), attributes=dict(attributes), seen=bool(video))
     if jobs > 1 and not video:
         rows, about = _rows_of_processes((str(model), str(policy), str(describe), dict(changes), options), cells, jobs, report)
     else:
@@ -168,7 +168,7 @@ class Walker:
         import mujoco
 
         self.network, self.description, self.ground, self.options = network, description, ground, options
-        self.robot = stand(model, description, ground, options["attributes"])
+        self.robot = stand(model, description, ground, options["attributes"], options.get("seen", False))
         self.data = mujoco.MjData(self.robot.model)
         r = self.robot
         self.state = State(description, r.model, self.data, r.frame, r.seen)
@@ -280,11 +280,22 @@ class Walker:
             measure.step(k * step)
             end = self.fallen()
             if end:
+                self.lie(film)
                 break
             if film:
                 film.show(self)
             end = "time"
         return measure.walk(seed, (k + 1) * step, end)
+
+    def lie(self, film):
+        """Shows a second more of a robot that has fallen, with its last targets."""
+        import mujoco
+
+        until = self.data.time + 1 if film else 0
+        while self.data.time < until:
+            self.drive(self.target)
+            mujoco.mj_step(self.robot.model, self.data)
+            film.show(self)
 
     def fallen(self):
         import mujoco
@@ -385,7 +396,7 @@ class Film:
                                    "and `pip install pyopengl`") from None
             self.camera = mujoco.MjvCamera()
             self.camera.type, self.camera.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, r.base
-            self.camera.distance, self.camera.azimuth, self.camera.elevation = 3.2 * walker.height + 0.6, 130, -15
+            self.camera.distance, self.camera.azimuth, self.camera.elevation = 2.6 * walker.height + 0.5, 130, -15
         if d.time < 1.5 / rate:
             self.next = 0.0
         if d.time >= self.next:
