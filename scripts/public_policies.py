@@ -27,6 +27,7 @@ GYM, SIM2SIM = "unitree_rl_gym/deploy/pre_train/{}/motion.pt", "mujoco_playgroun
 OWN = str(ROOT / "examples/trial/policies.py")
 POLICIES = {  # description in examples/trial: robot, model, policy
     "unitree_g1": ("Unitree G1, 12 joints", "unitree_rl_gym/resources/robots/g1_description/scene.xml", GYM.format("g1")),
+    "unitree_g1_sole": ("Unitree G1, 12 joints, sole of its mesh", "unitree_rl_gym/resources/robots/g1_description/scene.xml", GYM.format("g1")),
     "unitree_h1": ("Unitree H1", "unitree_rl_gym/resources/robots/h1/scene.xml", GYM.format("h1")),
     "unitree_h1_2": ("Unitree H1-2", "unitree_rl_gym/resources/robots/h1_2/scene.xml", GYM.format("h1_2")),
     "unitree_g1_29": ("Unitree G1, 29 joints", "unitree_mujoco/unitree_robots/g1/scene_29dof.xml",

@@ -133,7 +133,7 @@ class Term:
     count: int  # of a constant; 0 elsewhere
 
 
-def layouts():
+def layouts() -> list[str]:
     """Names of the layouts that come with the package."""
     return sorted(path.stem for path in FOLDER.glob("*.ini"))
 
@@ -142,7 +142,7 @@ class Description:
     """The keys of a description: .policy, .history, .clock, .action, .actuator, .start, .feet, .noise are dicts, .terms a list of
     Term, .kp and the other tables lists of (pattern, number)."""
 
-    def __init__(self, source=None, changes=()):
+    def __init__(self, source: "str | pathlib.Path | dict | None" = None, changes=()):
         """source: a file, the name of a layout, a dict of sections, or None; changes: {"section.key": text}, over the file."""
         parser = configparser.ConfigParser(delimiters=("=",), comment_prefixes=("#", ";"), inline_comment_prefixes=("#", ";"),
                                            interpolation=None, empty_lines_in_values=False)

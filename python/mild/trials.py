@@ -8,12 +8,18 @@ import os
 import pathlib
 import subprocess
 import sys
+import types
+import typing
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from . import networks
 from ._stand import area, lowest, stand
 from .describe import KEYS, TABLES, TERMS, Description, Observer, State, layouts
+
+if typing.TYPE_CHECKING:
+    import mujoco
 
 GROUNDS = ("rigid", "rubber", "foam60", "foam45", "foam28", "foam25", "grass", "sand_loose", "sand_dense")
 TILT = 1.0  # [rad] a base that leans more has fallen
@@ -38,25 +44,25 @@ class Walk:
 class Row:
     """One ground and one speed."""
     ground: str
-    command: tuple
-    walks: list
+    command: tuple[float, float, float]
+    walks: list[Walk]
 
     @property
-    def upright(self):
+    def upright(self) -> int:
         return sum(walk.end == "time" for walk in self.walks)
 
-    def mean(self, key):
+    def mean(self, key: str) -> float | None:
         """Of a key of Walk; of speeds and cost over those that stayed upright."""
         walks = self.walks if key == "sinkage" else [walk for walk in self.walks if walk.end == "time"]
         values = [getattr(walk, key) for walk in walks if getattr(walk, key) is not None]
         return float(np.mean(values)) if values else None
 
     @property
-    def torque(self):
+    def torque(self) -> float:
         return max(walk.torque for walk in self.walks)
 
     @property
-    def falls(self):
+    def falls(self) -> tuple[float, ...]:
         """[s] first and last time of a fall; empty without one."""
         times = [walk.time for walk in self.walks if walk.end != "time"]
         return (min(times), max(times)) if times else ()
@@ -65,10 +71,10 @@ class Row:
 @dataclasses.dataclass
 class Table:
     """What mild.trial returns: rows, and about what."""
-    about: dict
-    rows: list
+    about: dict[str, object]
+    rows: list[Row]
 
-    def as_dict(self):
+    def as_dict(self) -> dict:
         """As docs/schema/trial.json."""
         rows = [{"ground": row.ground, "command": list(row.command), "trials": len(row.walks), "upright": row.upright,
                  "speed": row.mean("speed"), "sideways": row.mean("sideways"), "cost": row.mean("cost"), "torque": row.torque,
@@ -76,7 +82,7 @@ class Table:
                  "each": [dataclasses.asdict(walk) for walk in row.walks]} for row in self.rows]
         return {**self.about, "rows": rows}
 
-    def __str__(self):
+    def __str__(self) -> str:
         lines = [f"{'ground':<12}{'command':>8}{'upright':>10}{'speed':>8}{'cost':>7}{'torque':>8}{'sinkage':>9}  falls after"]
         for row in self.rows:
             falls = f"{row.falls[0]:.1f} to {row.falls[1]:.1f} s" if row.falls else ""
@@ -91,8 +97,11 @@ def _text(value, digits):
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def trial(model, policy, describe, *, grounds=GROUNDS, speeds=(0.5,), sideways=0.0, turn=0.0, trials=10, seconds=10.0, seed=1,
-          noise=1.0, changes=(), attributes=(), video=None, jobs=1, report=None):
+def trial(model: "str | os.PathLike | mujoco.MjSpec", policy: "str | os.PathLike | Callable[[np.ndarray], Sequence[float]]",
+          describe: "str | os.PathLike | Mapping | Description", *, grounds: Sequence[str] = GROUNDS, speeds: Sequence[float] = (0.5,),
+          sideways: float = 0.0, turn: float = 0.0, trials: int = 10, seconds: float = 10.0, seed: int = 1, noise: float = 1.0,
+          changes: Mapping[str, object] = types.MappingProxyType({}), attributes: Mapping[str, object] = types.MappingProxyType({}),
+          video: "str | os.PathLike | None" = None, jobs: int = 1, report: "Callable[[Row], None] | None" = None) -> "Table":
     """Lets a policy walk on grounds, and returns a Table, whose text is one row for each ground and speed.
 
     model: an MJCF file, XML text, or a mujoco.MjSpec. policy: a file .onnx or .pt (TorchScript), FILE.py:NAME, or a callable that
@@ -417,8 +426,15 @@ def _list(read):
     return lambda text: [read(word) for word in text.split(",") if word]
 
 
+EXAMPLES = """examples:
+  mild trial robot.xml policy.onnx --describe mine.ini --check
+  mild trial robot.xml policy.pt --describe unitree_rl_gym --set policy.decimation=4 --ground rigid,grass
+  mild trial robot.xml mine.py:Policy --describe mine.ini --speed 0.3,0.6 --attach ground.mu=0.5 --video walk.mp4"""
+
+
 def parser():
-    p = argparse.ArgumentParser(prog="mild trial", description="Lets any policy walk on rigid and soft ground, and prints one row for each ground and speed.")
+    p = argparse.ArgumentParser(prog="mild trial", description="Lets any policy walk on rigid and soft ground, and prints one row for each ground and speed.",
+                                formatter_class=argparse.RawDescriptionHelpFormatter, epilog=EXAMPLES)
     p.add_argument("model", nargs="?", help="MJCF of the robot")
     p.add_argument("policy", nargs="?", help="policy: .onnx, .pt (TorchScript), or FILE.py:NAME")
     p.add_argument("--describe", metavar="FILE|LAYOUT", help=f"what it sees and does; layouts: {', '.join(layouts())}")
