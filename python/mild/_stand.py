@@ -9,8 +9,9 @@ from .describe import by_joint, choose
 from .spec import MOST, attach
 
 SOLE = 0.01  # [m] shapes within this of the lowest point of a foot are its sole, as in the plugin
-COLORS = {"sand": (0.80, 0.68, 0.48), "dry_sand": (0.80, 0.68, 0.48), "grass": (0.42, 0.55, 0.30), "foam": (0.55, 0.62, 0.72), "rubber": (0.35, 0.35, 0.38),
-          "sandy_loam": (0.55, 0.43, 0.30), "clay": (0.55, 0.38, 0.30), "snow": (0.93, 0.95, 0.98), "lunar": (0.5, 0.5, 0.5)}
+COLORS = {"sandy_loam": (0.55, 0.43, 0.30), "sand": (0.80, 0.68, 0.48), "dry_sand": (0.80, 0.68, 0.48), "grass": (0.42, 0.55, 0.30),
+          "foam": (0.55, 0.62, 0.72), "rubber": (0.35, 0.35, 0.38), "clay": (0.55, 0.38, 0.30), "snow": (0.93, 0.95, 0.98),
+          "lunar": (0.5, 0.5, 0.5)}  # of presets, by how their names begin
 NARROW = 1e-4  # [m^2] below this shapes have no sole
 ROUND = 0.01  # [m] the smallest sphere that is a round foot and no corner of a sole
 
@@ -120,21 +121,27 @@ def joint_names(model):
     return [model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] in kinds and model.jnt_bodyid[j] != base]
 
 
-def stand(model, description, ground, attributes, seen=False):
-    """The Robot on a ground: "rigid" is MuJoCo's own floor, that of the file if it has one. seen: the floor has the ground's colour."""
+def _world(model, description, ground, painted):
+    """The spec on a level floor, with the step and the integrator of the description, and what was left out."""
     import mujoco
 
-    d = description
     spec, remark = read_spec(model)
-    if d.policy["step"]:
-        spec.option.timestep = d.policy["step"]
-    if d.policy["integrator"]:
-        spec.option.integrator = getattr(mujoco.mjtIntegrator, "mjINT_" + d.policy["integrator"].upper())
+    if description.policy["step"]:
+        spec.option.timestep = description.policy["step"]
+    if description.policy["integrator"]:
+        spec.option.integrator = getattr(mujoco.mjtIntegrator, "mjINT_" + description.policy["integrator"].upper())
     remark = "; ".join(filter(None, (remark, _clear(spec))))
     if not any(geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in spec.worldbody.geoms):
         spec.worldbody.add_geom(name="floor_of_trial", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], rgba=[0.6, 0.6, 0.6, 1])
-    if seen:
+    if painted:
         _paint(spec, ground)
+    return spec, remark
+
+
+def stand(model, description, ground, attributes, painted=False):
+    """The Robot on a ground: "rigid" is MuJoCo's own floor, that of the file if it has one. painted: the floor has the ground's colour."""
+    d = description
+    spec, remark = _world(model, d, ground, painted)
     bare = spec.copy().compile()
     names = joint_names(bare)
     order, seen = choose(d.policy["joints"], names, "joints"), choose(d.policy["observed"] or d.policy["joints"], names, "observed")
@@ -160,8 +167,9 @@ def stand(model, description, ground, attributes, seen=False):
                **{"sole": " ".join(feet.soles), **attributes})
     compiled = spec.compile()
     drive, gear = _drives(compiled, [names[j] for j in order])
-    if d.actuator["kind"] != "torque" and (drive[:count] < 0).any():
-        raise ValueError(f"actuator.kind: model has no actuator for {', '.join(names[order[i]] for i in np.flatnonzero(drive[:count] < 0))}")
+    without = [names[order[i]] for i in np.flatnonzero(drive[:count] < 0)]
+    if without:
+        raise ValueError(f"actuator.kind: model has no actuator for {', '.join(without)}")
     ids = [compiled.joint(name).id for name in names]
     qpos, qvel = compiled.jnt_qposadr[ids], compiled.jnt_dofadr[ids]
     base, place, zero = floating(compiled)

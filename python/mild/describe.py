@@ -43,10 +43,6 @@ def choice(*names):
     return read
 
 
-def flag(text):
-    return choice("true", "false")(text) == "true"
-
-
 KEYS = {
     "policy": {
         "layout": Key(str, None, "a layout of the package, or a file beside this one, that this file completes"),
@@ -106,7 +102,10 @@ KEYS = {
 
 
 def _sensor(state, name):
-    return state.data.sensor(name).data
+    try:
+        return state.data.sensor(name).data
+    except KeyError:
+        raise ValueError(f"observation.sensor:{name}: the model has no such sensor") from None
 
 
 # Terms of an observation: how many numbers (of the joints seen, the joints moved and the words after the scale), and which.

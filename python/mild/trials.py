@@ -87,8 +87,9 @@ class Table:
         for row in self.rows:
             falls = f"{row.falls[0]:.1f} to {row.falls[1]:.1f} s" if row.falls else ""
             sinkage = row.mean("sinkage")
-            lines.append(f"{row.ground:<12}{row.command[0]:>8.2f}{f'{row.upright} of {len(row.walks)}':>10}{_text(row.mean('speed'), 2):>8}"
-                         f"{_text(row.mean('cost'), 2):>7}{row.torque:>8.0f}{_text(None if sinkage is None else 1e3 * sinkage, 0):>9}  {falls}")
+            upright, sinkage = f"{row.upright} of {len(row.walks)}", _text(None if sinkage is None else 1e3 * sinkage, 0)
+            lines.append(f"{row.ground:<12}{row.command[0]:>8.2f}{upright:>10}{_text(row.mean('speed'), 2):>8}"
+                         f"{_text(row.mean('cost'), 2):>7}{row.torque:>8.0f}{sinkage:>9}  {falls}")
         lines.append("m/s, cost of transport, N m (largest), mm (mean over stances of the deepest element); speed and cost of those upright")
         return "\n".join(line.rstrip() for line in lines)
 
@@ -115,7 +116,7 @@ def trial(model: "str | os.PathLike | mujoco.MjSpec", policy: "str | os.PathLike
     cells = [(ground, (float(speed), float(sideways), float(turn))) for ground in grounds for speed in speeds]
     if not cells or trials < 1 or not seconds > 0:
         raise ValueError("trial: needs a ground, a speed, and more than 0 trials and seconds")
-    options = dict(trials=int(trials), seconds=float(seconds), seed=int(seed), noise=float(noise), attributes=dict(attributes), seen=bool(video))
+    options = dict(trials=int(trials), seconds=float(seconds), seed=int(seed), noise=float(noise), attributes=dict(attributes), painted=bool(video))
     if jobs > 1 and not video:
         rows, about = _rows_of_processes((str(model), str(policy), str(describe), dict(changes), options), cells, jobs, report)
     else:
@@ -177,7 +178,7 @@ class Walker:
         import mujoco
 
         self.network, self.description, self.ground, self.options = network, description, ground, options
-        self.robot = stand(model, description, ground, options["attributes"], options.get("seen", False))
+        self.robot = stand(model, description, ground, options["attributes"], options.get("painted", False))
         self.data = mujoco.MjData(self.robot.model)
         r = self.robot
         self.state = State(description, r.model, self.data, r.frame, r.seen)
@@ -193,7 +194,8 @@ class Walker:
         import mujoco
 
         r, d = self.robot, self.description
-        return {"mujoco": mujoco.mj_versionString(), "mass": r.mass, "feet": r.feet.names, "bodies": r.feet.bodies, "sole": [area(outline) for outline in r.feet.outlines], "joints": r.joints,
+        return {"mujoco": mujoco.mj_versionString(), "mass": r.mass, "feet": r.feet.names, "bodies": r.feet.bodies,
+                "sole": [area(outline) for outline in r.feet.outlines], "joints": r.joints,
                 "step": r.model.opt.timestep, "rate": 1 / (d.policy["decimation"] * r.model.opt.timestep), "actuator": d.actuator["kind"],
                 "remark": r.remark}
 
@@ -397,7 +399,8 @@ class Film:
         if self.of is not r.model:
             if self.renderer:
                 self.renderer.close()
-            r.model.vis.global_.offwidth, r.model.vis.global_.offheight = max(width, r.model.vis.global_.offwidth), max(height, r.model.vis.global_.offheight)
+            screen = r.model.vis.global_
+            screen.offwidth, screen.offheight = max(width, screen.offwidth), max(height, screen.offheight)
             try:
                 self.renderer, self.of, self.next = mujoco.Renderer(r.model, height, width), r.model, 0.0
             except (ImportError, RuntimeError, AttributeError) as error:
@@ -433,8 +436,8 @@ EXAMPLES = """examples:
 
 
 def parser():
-    p = argparse.ArgumentParser(prog="mild trial", description="Lets any policy walk on rigid and soft ground, and prints one row for each ground and speed.",
-                                formatter_class=argparse.RawDescriptionHelpFormatter, epilog=EXAMPLES)
+    p = argparse.ArgumentParser(prog="mild trial", description="Lets any policy walk on rigid and soft ground, and prints one row for each "
+                                "ground and speed.", formatter_class=argparse.RawDescriptionHelpFormatter, epilog=EXAMPLES)
     p.add_argument("model", nargs="?", help="MJCF of the robot")
     p.add_argument("policy", nargs="?", help="policy: .onnx, .pt (TorchScript), or FILE.py:NAME")
     p.add_argument("--describe", metavar="FILE|LAYOUT", help=f"what it sees and does; layouts: {', '.join(layouts())}")
@@ -513,14 +516,14 @@ def main(argv=None):
         if arguments.check:
             _check(arguments, Description(arguments.describe, changes))
             return 0
+        attributes = {key.replace(".", "__"): value for key, value in _pairs(arguments.attach, "attach").items()}
         if arguments.video:
             os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo reads it once, when it is imported
         _quietly()
         out = sys.stderr if arguments.json == "-" else sys.stdout
         table = trial(arguments.model, arguments.policy, arguments.describe, grounds=arguments.ground, speeds=arguments.speed,
                       sideways=arguments.sideways, turn=arguments.turn, trials=arguments.trials, seconds=arguments.seconds, seed=arguments.seed,
-                      noise=arguments.noise, changes=changes, attributes={key.replace(".", "__"): value for key, value in _pairs(arguments.attach, "attach").items()},
-                      video=arguments.video, jobs=arguments.jobs)
+                      noise=arguments.noise, changes=changes, attributes=attributes, video=arguments.video, jobs=arguments.jobs)
         print(table, file=out)
         if table.about["remark"]:
             print(table.about["remark"], file=out)
@@ -529,6 +532,6 @@ def main(argv=None):
         elif arguments.json:
             pathlib.Path(arguments.json).write_text(json.dumps(table.as_dict(), indent=2) + "\n")
     except (ValueError, RuntimeError, OSError) as error:
-        print(f"mild trial: {error}", file=sys.stderr)
+        print(f"mild trial: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     return 0

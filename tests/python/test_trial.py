@@ -559,6 +559,7 @@ class Command(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)
             (folder / "robot.xml").write_text(biped())
+            (folder / "bad.xml").write_text("<mujoco>\n<worldbody>\n<bodies/></worldbody></mujoco>")
             (folder / "mine.py").write_text("import numpy as np\ndef still(o):\n    return np.zeros(4)\n")
             (folder / "mine.ini").write_text("[policy]\ndecimation = 5\n[observation]\ngravity = 1\n[kp]\n.* = 400\n[kd]\n.* = 8\n")
             model, policy, describe = folder / "robot.xml", f"{folder}/mine.py:still", ("--describe", folder / "mine.ini")
@@ -577,7 +578,8 @@ class Command(unittest.TestCase):
             for arguments, line in (((model,), "needs MODEL, POLICY"), ((model, policy, "--describe", "nobody"), "no file 'nobody'"),
                                     ((model, policy, *describe, "--set", "a"), "KEY=VALUE"), ((model, policy, *describe, "--set", "policy.x=1"), "no key 'x'"),
                                     ((model, policy, *describe, "--trials", 0), "more than 0"), ((model, policy, *describe, "--ground", "soup"), "soup"),
-                                    ((folder / "no.xml", policy, *describe), "no file"), ((model, "no.onnx", *describe), "no file")):
+                                    ((folder / "no.xml", policy, *describe), "no file"), ((folder / "bad.xml", policy, *describe), "bodies"),
+                                    ((model, policy, *describe, "--set", "observation.sensor:ear=1"), "sensor:ear: the model has no such"), ((model, "no.onnx", *describe), "no file")):
                 status, _, error = self.run_main(*arguments)
                 self.assertEqual((status, error.count("\n"), error.startswith("mild trial: ")), (2, 1, True), error)
                 self.assertIn(line, error)
