@@ -455,6 +455,20 @@ class Trials(unittest.TestCase):
         self.assertTrue(0.05 < fold.rows[0].falls[0] <= fold.rows[0].falls[1] < 2)
         self.assertIn("0 of 2", str(fold))
 
+    def test_starts(self):
+        """Starts differ in heading, place and joints, by as much as the description says; the soles just touch the floor."""
+        d = Description(stander(noise={"start_place": 0.3, "start_joint": 0.1}))
+        walker = trials.Walker(biped(), networks.Callable(still), d, "rigid", {"noise": 1.0, "attributes": {}, "seconds": 1})
+        starts = []
+        for seed in range(200):
+            walker.begin((0, 0, 0), seed)
+            self.assertAlmostEqual(walker.lowest(), 0, delta=1e-9)
+            q = walker.data.qpos.copy()
+            starts.append([2 * math.atan2(q[6], q[3]), *q[:2], *q[7:]])
+        spread = np.abs(np.array(starts)).max(axis=0)
+        bounds = np.array([math.pi, 0.3, 0.3, 0.1, 0.1, 0.1, 0.1])
+        self.assertTrue((spread <= bounds + 1e-9).all() and (spread > 0.95 * bounds).all(), spread / bounds)
+
     def test_commands(self):
         """What the policy sees of the command, and the delay from an observation to its action."""
         seen = []
@@ -506,6 +520,25 @@ class Trials(unittest.TestCase):
         self.assertAlmostEqual(paired.rows[0].mean("sinkage"), table.rows[1].mean("sinkage"), delta=1e-6)
         softer = mild.trial(biped(), still, stander(), grounds=["foam45"], trials=1, seconds=3, noise=0, attributes={"ground__k_pen": 400})
         self.assertNotAlmostEqual(softer.rows[0].mean("sinkage"), table.rows[1].mean("sinkage"), places=4)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_looks(self):
+        """A shin of a mesh that collides and a larger one that only looks meets the ground as the mesh that collides."""
+        corners = [" ".join(f"{x} {y} {z}" for x in (-r, r) for y in (-r, r) for z in (-.25 - r, -.03)) for r in (.03, .05)]
+        legs = {}
+        for looks in (False, True):
+            text = biped().replace("<asset>", f'<asset><mesh name="shin" vertex="{corners[0]}"/><mesh name="shell" vertex="{corners[1]}"/>')
+            shin = '<geom type="mesh" mesh="shin" mass="1"/>' + looks * '<geom type="mesh" mesh="shell" contype="0" conaffinity="0" mass="0"/>'
+            text = text.replace('<geom type="capsule" size="0.03" fromto="0 0 -0.03 0 0 -0.28" mass="1"/>', '<inertial pos="0 0 -0.15" mass="1" '
+                                'diaginertia="0.01 0.01 0.01"/>' + shin)
+            robot = _stand.stand(text, Description(stander()), "foam45", {})
+            data = mujoco.MjData(robot.model)
+            data.qpos[:] = robot.start
+            data.qpos[2] -= 0.15  # the shins reach 50 mm deep
+            mujoco.mj_step(robot.model, data)
+            legs[looks] = data.sensor("feet_of_trial").data.reshape(-1, 12)[2:]
+        self.assertGreater(legs[False][0, 2], 10)
+        np.testing.assert_allclose(legs[True], legs[False], atol=1e-9)
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_ours(self):
