@@ -66,11 +66,11 @@ def run(clones, out, name, options):
 
 
 def cell(row):
-    """10 at 0.49 of those upright; or how many, and when the others fell."""
-    if row["upright"] == row["trials"]:
-        return f"**{row['upright']}** {row['speed']:.2f}"
+    """How many were upright, their speed, and the median time of the falls."""
+    speeds = [walk["speed"] for walk in row["each"] if walk["end"] == "time" and walk["speed"] is not None]
     times = sorted(walk["time"] for walk in row["each"] if walk["end"] != "time")
-    return f"{row['upright']} ({times[len(times) // 2]:.1f} s)"
+    count = f"**{row['upright']}**" if row["upright"] == row["trials"] else str(row["upright"])
+    return count + (f" {sum(speeds) / len(speeds):.2f}" if speeds else "") + (f" ({times[len(times) // 2]:.1f} s)" if times else "")
 
 
 def main():
