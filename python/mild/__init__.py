@@ -5,9 +5,10 @@ RuntimeError that names it."""
 from ._ground import Batch, Ground, Map, Material, Press, Sole, Terrain, __version__, models, presets, press
 from .fit import GroundFit, loading
 from .spec import attach, load_plugin
+from .trials import layouts, trial
 
-__all__ = ["Batch", "Ground", "GroundFit", "Map", "Material", "Press", "Sole", "Terrain", "attach", "load_plugin", "loading",
-           "models", "presets", "press"]
+__all__ = ["Batch", "Ground", "GroundFit", "Map", "Material", "Press", "Sole", "Terrain", "attach", "layouts", "load_plugin",
+           "loading", "models", "presets", "press", "trial"]
 
 try:
     import gymnasium as _gymnasium

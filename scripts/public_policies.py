@@ -1,0 +1,98 @@
+#!/usr/bin/env python3
+"""Public policies on the nine grounds (docs/public-policies.md).
+
+    scripts/public_policies.py --list                  # what to clone, and where
+    scripts/public_policies.py CLONES --out out/public # CLONES/REPOSITORY for each; a table and a JSON for each policy
+
+Needs the package mild with onnxruntime and torch. A policy whose JSON is there already is not run again."""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+PLAYGROUND = "mujoco_playground/_src/locomotion/{}/xmls/scene_mjx_feetonly_flat_terrain.xml"
+REPOSITORIES = {  # folder of CLONES: place, commit, licence
+    "unitree_rl_gym": ("unitreerobotics/unitree_rl_gym", "276801e46c5d433564f24658bac64f254b7d2d4b", "BSD-3-Clause"),
+    "unitree_rl_lab": ("unitreerobotics/unitree_rl_lab", "e72a072c4db68b79a816b3b89bf3b6a0525d113e", "Apache-2.0"),
+    "unitree_mujoco": ("unitreerobotics/unitree_mujoco", "c598f103acb87a5fd3de7c9037f4dab6aa7f232b", "BSD-3-Clause"),
+    "mujoco_playground": ("google-deepmind/mujoco_playground", "d5e6b47531328468da1eec33b8b304a00bb0873c", "Apache-2.0"),
+    "booster_gym": ("BoosterRobotics/booster_gym", "da396a06d6eed99e2de72d7749c48ee8748950f9", "Apache-2.0"),
+    "humanoid-gym": ("roboterax/humanoid-gym", "ae46e201c85a2b17e7f2cea59a441dae7ea88a8f", "BSD-3-Clause"),
+    "rl_sar": ("fan-ziqi/rl_sar", "e384912fb4b24cb09bfe190686b113b7348019c9", "Apache-2.0"),
+    "pnd_rl_mjlab": ("pndbotics/pnd_rl_mjlab", "6c724bf11823c9b9d50f78d86662b721dc1a8bfe", "Apache-2.0"),
+}
+GYM, SIM2SIM = "unitree_rl_gym/deploy/pre_train/{}/motion.pt", "mujoco_playground/mujoco_playground/experimental/sim2sim/onnx/{}_policy.onnx"
+OWN = str(ROOT / "examples/trial/policies.py")
+POLICIES = {  # description in examples/trial: robot, model, policy
+    "unitree_g1": ("Unitree G1, 12 joints", "unitree_rl_gym/resources/robots/g1_description/scene.xml", GYM.format("g1")),
+    "unitree_g1_sole": ("Unitree G1, 12 joints, sole of its mesh", "unitree_rl_gym/resources/robots/g1_description/scene.xml", GYM.format("g1")),
+    "unitree_h1": ("Unitree H1", "unitree_rl_gym/resources/robots/h1/scene.xml", GYM.format("h1")),
+    "unitree_h1_2": ("Unitree H1-2", "unitree_rl_gym/resources/robots/h1_2/scene.xml", GYM.format("h1_2")),
+    "unitree_g1_29": ("Unitree G1, 29 joints", "unitree_mujoco/unitree_robots/g1/scene_29dof.xml",
+                      "unitree_rl_lab/deploy/robots/g1/config/policy/velocity/v0/exported/policy.onnx"),
+    "playground_g1": ("Unitree G1, 29 joints", "mujoco_playground/" + PLAYGROUND.format("g1"), SIM2SIM.format("g1")),
+    "playground_t1": ("Booster T1", "mujoco_playground/" + PLAYGROUND.format("t1"), SIM2SIM.format("t1")),
+    "booster_t1": ("Booster T1, 12 joints", "booster_gym/resources/T1/T1_locomotion.xml", "booster_gym/deploy/models/T1.pt"),
+    "playground_bh": ("Berkeley Humanoid", "mujoco_playground/" + PLAYGROUND.format("berkeley_humanoid"), SIM2SIM.format("bh")),
+    "playground_apollo": ("Apptronik Apollo", "mujoco_playground/" + PLAYGROUND.format("apollo"), SIM2SIM.format("apollo")),
+    "robotera_xbot": ("RobotEra XBot-L", "humanoid-gym/resources/robots/XBot/mjcf/XBot-L.xml",
+                      "humanoid-gym/logs/XBot_ppo/exported/policies/policy_example.pt"),
+    "pnd_adam": ("PNDbotics Adam SP", "pnd_rl_mjlab/deploy/adam_despription/scene.xml", "pnd_rl_mjlab/deploy/models/adam_sp_velocity_flat/policy.onnx"),
+    "playground_go1": ("Unitree Go1", "mujoco_playground/" + PLAYGROUND.format("go1"), SIM2SIM.format("go1")),
+    "himloco_go2": ("Unitree Go2, HIMLoco", "unitree_mujoco/unitree_robots/go2/scene.xml", "rl_sar/policy/go2/himloco/himloco.pt"),
+    "robot_lab_go2": ("Unitree Go2, robot_lab", "unitree_mujoco/unitree_robots/go2/scene.xml", "rl_sar/policy/go2/robot_lab/policy.pt"),
+    "robot_lab_b2": ("Unitree B2, robot_lab", "unitree_mujoco/unitree_robots/b2/scene.xml", "rl_sar/policy/b2/robot_lab/policy.pt"),
+    "mild_g1": ("Unitree G1, 12 joints: ours", "unitree_rl_gym/resources/robots/g1_description/scene.xml", OWN + ":G1"),
+    "mild_go1": ("Unitree Go1: ours", "mujoco_playground/" + PLAYGROUND.format("go1"), OWN + ":Go1"),
+}
+
+
+def show():
+    for folder, (place, commit, licence) in REPOSITORIES.items():
+        print(f"git clone https://github.com/{place} {folder} && git -C {folder} checkout -q {commit}    # {licence}")
+
+
+def run(clones, out, name, options):
+    """The JSON of one policy."""
+    target = out / f"{name}.json"
+    if not target.is_file():
+        _, model, policy = POLICIES[name]
+        policy = policy if policy.startswith("/") else str(clones / policy)
+        subprocess.run([sys.executable, "-m", "mild.trial", str(clones / model), policy, "--describe", str(ROOT / f"examples/trial/{name}.ini"),
+                        "--json", str(target), *options], check=True)
+    return json.loads(target.read_text())
+
+
+def cell(row):
+    """How many were upright, their speed, and the median time of the falls."""
+    speeds = [walk["speed"] for walk in row["each"] if walk["end"] == "time" and walk["speed"] is not None]
+    times = sorted(walk["time"] for walk in row["each"] if walk["end"] != "time")
+    count = f"**{row['upright']}**" if row["upright"] == row["trials"] else str(row["upright"])
+    return count + (f" {sum(speeds) / len(speeds):.2f}" if speeds else "") + (f" ({times[len(times) // 2]:.1f} s)" if times else "")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("clones", nargs="?", type=pathlib.Path)
+    parser.add_argument("--list", action="store_true", help="print what to clone")
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/public"))
+    parser.add_argument("--only", default=",".join(POLICIES), help="names, separated by commas")
+    parser.add_argument("--options", default="--trials 10 --seconds 20 --speed 0.5", help="of mild trial")
+    arguments = parser.parse_args()
+    if arguments.list or not arguments.clones:
+        show()
+        return
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    lines = []
+    for name in arguments.only.split(","):
+        rows = run(arguments.clones, arguments.out, name, arguments.options.split())["rows"]
+        if not lines:
+            lines = ["| policy | " + " | ".join(row["ground"] for row in rows) + " |", "|---" * (len(rows) + 1) + "|"]
+        lines.append(f"| {name}: {POLICIES[name][0]} | " + " | ".join(map(cell, rows)) + " |")
+    print("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()
