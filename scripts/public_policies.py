@@ -70,7 +70,7 @@ def cell(row):
     speeds = [walk["speed"] for walk in row["each"] if walk["end"] == "time" and walk["speed"] is not None]
     times = sorted(walk["time"] for walk in row["each"] if walk["end"] != "time")
     count = f"**{row['upright']}**" if row["upright"] == row["trials"] else str(row["upright"])
-    return count + (f" {sum(speeds) / len(speeds):.2f}" if speeds else "") + (f" ({times[len(times) // 2]:.1f} s)" if times else "")
+    return count + (f" {sum(speeds) / len(speeds):.2f}".replace("-0.00", "0.00") if speeds else "") + (f" ({times[len(times) // 2]:.1f} s)" if times else "")
 
 
 def main():
