@@ -6,6 +6,7 @@
 
 Needs the package mild with onnxruntime and torch. A policy whose JSON is there already is not run again."""
 import argparse
+import csv
 import json
 import pathlib
 import subprocess
@@ -70,7 +71,23 @@ def cell(row):
     speeds = [walk["speed"] for walk in row["each"] if walk["end"] == "time" and walk["speed"] is not None]
     times = sorted(walk["time"] for walk in row["each"] if walk["end"] != "time")
     count = f"**{row['upright']}**" if row["upright"] == row["trials"] else str(row["upright"])
-    return count + (f" {sum(speeds) / len(speeds):.2f}" if speeds else "") + (f" ({times[len(times) // 2]:.1f} s)" if times else "")
+    return count + (f" {sum(speeds) / len(speeds):.2f}".replace("-0.00", "0.00") if speeds else "") + (f" ({times[len(times) // 2]:.1f} s)" if times else "")
+
+
+def write_csv(path, tables):
+    """Every cell of the table with cost, torque and sinkage; empty where nothing was measured."""
+    def mean(row, key, upright):
+        values = [walk[key] for walk in row["each"] if walk[key] is not None and (walk["end"] == "time" or not upright)]
+        return f"{sum(values) / len(values):.3f}" if values else ""
+
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["policy", "ground", "trials", "upright", "speed [m/s]", "cost", "largest torque [N m]", "sinkage [m]", "median fall [s]"])
+        for name, table in tables.items():
+            for row in table["rows"]:
+                times = sorted(walk["time"] for walk in row["each"] if walk["end"] != "time")
+                writer.writerow([name, row["ground"], row["trials"], row["upright"], mean(row, "speed", True), mean(row, "cost", True),
+                                 f"{row['torque']:.1f}", mean(row, "sinkage", False), f"{times[len(times) // 2]:.2f}" if times else ""])
 
 
 def main():
@@ -80,14 +97,18 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/public"))
     parser.add_argument("--only", default=",".join(POLICIES), help="names, separated by commas")
     parser.add_argument("--options", default="--trials 10 --seconds 20 --speed 0.5", help="of mild trial")
+    parser.add_argument("--csv", type=pathlib.Path, help="also write every cell, with cost, torque and sinkage")
     arguments = parser.parse_args()
     if arguments.list or not arguments.clones:
         show()
         return
     arguments.out.mkdir(parents=True, exist_ok=True)
+    tables = {name: run(arguments.clones, arguments.out, name, arguments.options.split()) for name in arguments.only.split(",")}
+    if arguments.csv:
+        write_csv(arguments.csv, tables)
     lines = []
-    for name in arguments.only.split(","):
-        rows = run(arguments.clones, arguments.out, name, arguments.options.split())["rows"]
+    for name, table in tables.items():
+        rows = table["rows"]
         if not lines:
             lines = ["| policy | " + " | ".join(row["ground"] for row in rows) + " |", "|---" * (len(rows) + 1) + "|"]
         lines.append(f"| {name}: {POLICIES[name][0]} | " + " | ".join(map(cell, rows)) + " |")
