@@ -1,13 +1,13 @@
 # The Python package (python/, docs/python.md): the modules mild._ground and mild._envs, which in this build lie in
-# build/python/mild beside links to the package's files. A wheel (pyproject.toml) is a build with MILD_APP=OFF, which takes
-# of the layers only what environments need: no learner, no drawing.
+# build/python/mild beside links to the package's files. A wheel (cmake/Wheel.cmake) has a module _envs for each MuJoCo, and
+# the program. Its modules are for the stable interface of CPython 3.11 and newer: nanobind is a package of its own there.
 if(MILD_PYTHON STREQUAL "AUTO" AND (NOT MILD_APP OR MILD_SANITIZE OR MILD_FUZZ))
   return() # the library alone, and what an interpreter does not load
 endif()
 if(NOT SKBUILD)
   set(Python_EXECUTABLE ${CMAKE_SOURCE_DIR}/.venv/bin/python)
+  find_package(Python 3.11 QUIET COMPONENTS Interpreter Development.Module)
 endif()
-find_package(Python 3.11 QUIET COMPONENTS Interpreter Development.Module)
 if(Python_Development.Module_FOUND)
   execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir OUTPUT_VARIABLE nanobind_DIR
     OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
@@ -22,44 +22,6 @@ endif()
 enable_language(CXX)
 find_package(nanobind CONFIG REQUIRED)
 
-# ---- layers of a wheel ----
-set(environments ON)
-if(NOT MILD_APP)
-  include(${CMAKE_SOURCE_DIR}/cmake/Versions.cmake)
-  find_library(INIH_LIBRARY inih)
-  find_package(PNG QUIET)
-  if(INIH_LIBRARY AND PNG_FOUND)
-    if(NOT EXISTS "${MUJOCO_ROOT}") # the wheel that pip installed for this build
-      execute_process(COMMAND ${Python_EXECUTABLE} -c "import importlib.util as u; print(u.find_spec('mujoco').origin)"
-        OUTPUT_VARIABLE mujoco_init OUTPUT_STRIP_TRAILING_WHITESPACE)
-      get_filename_component(mujoco_wheel ${mujoco_init} DIRECTORY)
-      set(MUJOCO_ROOT ${mujoco_wheel} CACHE PATH "MuJoCo release folder, or Python package" FORCE)
-    endif()
-    include(${CMAKE_SOURCE_DIR}/cmake/MuJoCo.cmake)
-    list(GET mujoco_versions -1 newest)
-    add_library(mujoco_headers INTERFACE) # the modules are linked with a library for each version
-    target_include_directories(mujoco_headers INTERFACE ${mujoco_headers}/${newest})
-    list(REMOVE_ITEM left_out "/actuator/without_learner\\.c$")
-    list(APPEND left_out "/ranks/mpi\\.c$" "/ranks/without_nccl\\.c$")
-    set(only_actuator "/without_learner\\.c$")
-    set(only_learn "_def\\.c$")
-    set(only_train "/(envs|experiment|train_def)\\.c$")
-    mild_layer(device/ranks layer_base)
-    mild_layer(learn layer_ground layer_ranks)
-    mild_layer(robot layer_ground mujoco_headers inih)
-    mild_layer(robot/engine layer_robot layer_batch)
-    mild_layer(env/task layer_robot PNG::PNG)
-    include(${CMAKE_SOURCE_DIR}/cmake/Env.cmake)
-    mild_layer(env/actuator layer_task layer_learn)
-    mild_layer(run/train layer_env layer_learn layer_actuator)
-    mild_layer(run/config layer_train inih)
-    mild_layer(run/envs layer_config layer_actuator)
-  else()
-    set(environments OFF)
-    message(WARNING "mild without environments: they need libinih-dev and libpng-dev (apt-get install both)")
-  endif()
-endif()
-
 # ---- modules ----
 set(package ${CMAKE_BINARY_DIR}/python/mild)
 set(python ${CMAKE_SOURCE_DIR}/python)
@@ -68,7 +30,11 @@ add_custom_target(python ALL)
 # mild_python_module(NAME FOLDER SOURCE...): mild.NAME, in a folder of the package; with a version in NAME, as
 # _envs-4.0.0, it is the module _envs for that version of MuJoCo.
 function(mild_python_module name folder)
-  nanobind_add_module(${name} NB_STATIC ${ARGN})
+  if(SKBUILD)
+    nanobind_add_module(${name} BACKEND_MODULE nanobind_backend ${ARGN})
+  else()
+    nanobind_add_module(${name} NB_STATIC ${ARGN})
+  endif()
   string(REGEX REPLACE "-.*" "" module ${name})
   set_target_properties(${name} PROPERTIES OUTPUT_NAME ${module} LIBRARY_OUTPUT_DIRECTORY ${package}/${folder} CXX_STANDARD 17)
   target_compile_options(${name} PRIVATE -Wall -Wextra -march=${MILD_MARCH})
@@ -78,7 +44,7 @@ function(mild_python_module name folder)
 endfunction()
 function(mild_python_stub name module folder)
   nanobind_add_stub(${name}_stub MODULE ${module} OUTPUT ${package}/${module}.pyi PYTHON_PATH ${package}/${folder} DEPENDS ${name})
-  install(FILES ${package}/${module}.pyi DESTINATION mild COMPONENT python)
+  install(FILES ${package}/${module}.pyi DESTINATION mild COMPONENT python_data)
   add_dependencies(python ${name}_stub)
 endfunction()
 set(source ${python}/src)
@@ -87,19 +53,22 @@ mild_python_module(_ground . ${source}/ground.cpp ${source}/material.cpp ${sourc
 mild_python_stub(_ground _ground .)
 target_link_libraries(_ground PRIVATE layer_identify layer_batch)
 target_compile_definitions(_ground PRIVATE MILD_VERSION="${PROJECT_VERSION}")
-if(environments AND MILD_APP)
+if(MILD_APP AND NOT SKBUILD)
   mild_python_module(_envs . ${source}/envs.cpp)
   mild_python_stub(_envs _envs .)
   target_link_libraries(_envs PRIVATE layer_envs)
-elseif(environments) # a module for each version whose structs are those of the newest (tests/plugin/test_wheel.sh)
+elseif(MILD_APP) # a module for each version whose structs are those of the newest (tests/plugin/test_wheel.sh)
+  # linked before the layer of the same functions with a learner, so oneDNN is not in the process
+  add_library(envs_plain OBJECT ${CMAKE_SOURCE_DIR}/src/env/actuator/without_learner.c)
+  target_link_libraries(envs_plain PRIVATE layer_actuator mild_options)
+  set_target_properties(envs_plain PROPERTIES POSITION_INDEPENDENT_CODE ON)
   get_target_property(here mujoco::mujoco IMPORTED_LOCATION)
   foreach(version ${mujoco_versions})
     if(version VERSION_GREATER_EQUAL 4.0)
       set(name _envs-${version})
       mild_python_module(${name} mujoco/${version} ${source}/envs.cpp)
-      target_link_libraries(${name} PRIVATE layer_envs -Wl,--no-as-needed)
-      # MuJoCo is a neighbour in site-packages; inih and libpng, which another machine may lack, come along
-      set_target_properties(${name} PROPERTIES INSTALL_RPATH "$ORIGIN/../../../mujoco:$ORIGIN/../../lib")
+      target_link_libraries(${name} PRIVATE envs_plain layer_envs -Wl,--no-as-needed)
+      set_target_properties(${name} PROPERTIES INSTALL_RPATH "$ORIGIN/../../../mujoco") # a neighbour in site-packages
       if(here MATCHES "\\.so\\.${version}$")
         target_link_libraries(${name} PRIVATE mujoco::mujoco)
         mild_python_stub(${name} _envs mujoco/${version})
@@ -108,19 +77,41 @@ elseif(environments) # a module for each version whose structs are those of the 
       endif()
     endif()
   endforeach()
-  foreach(library ${INIH_LIBRARY} ${PNG_LIBRARY_RELEASE})
-    file(REAL_PATH ${library} file)
-    execute_process(COMMAND ${CMAKE_OBJDUMP} -p ${file} OUTPUT_VARIABLE header)
-    string(REGEX MATCH "SONAME +([^ \n]+)" soname "${header}")
-    install(FILES ${file} DESTINATION mild/lib RENAME ${CMAKE_MATCH_1} COMPONENT python)
-  endforeach()
+  # The program, with the MuJoCo that it was built with: that of the user may be another.
+  add_dependencies(python mild)
+  set_target_properties(mild PROPERTIES OUTPUT_NAME mild-${MILD_MARCH} INSTALL_RPATH "$ORIGIN/../lib")
+  install(TARGETS mild RUNTIME DESTINATION mild/data/bin COMPONENT python)
+  install(FILES ${mujoco_file} DESTINATION mild/data/lib COMPONENT python_data)
 endif()
 
-# ---- what else is in the package ----
+# ---- a copy of what is compiled, for another processor ----
+if(SKBUILD AND MILD_SECOND_MARCH)
+  include(ExternalProject)
+  set(second ${CMAKE_BINARY_DIR}/${MILD_SECOND_MARCH})
+  set(arguments "")
+  foreach(name SKBUILD SKBUILD_STATE SKBUILD_SOABI SKBUILD_SOSABI SKBUILD_SABI_COMPONENT SKBUILD_SABI_VERSION CMAKE_BUILD_TYPE
+      CMAKE_MAKE_PROGRAM CMAKE_PREFIX_PATH Python_EXECUTABLE MUJOCO_ROOT DAQP_ROOT MILD_DATA_DIR MILD_MPI MILD_PLUGIN MILD_PYTHON
+      MILD_TESTS MILD_WERROR)
+    if(DEFINED ${name})
+      list(APPEND arguments "-D${name}:STRING=${${name}}")
+    endif()
+  endforeach()
+  cmake_host_system_information(RESULT cores QUERY NUMBER_OF_LOGICAL_CORES)
+  ExternalProject_Add(second SOURCE_DIR ${CMAKE_SOURCE_DIR} BINARY_DIR ${second} BUILD_ALWAYS ON EXCLUDE_FROM_ALL ON
+    CMAKE_ARGS ${arguments} -DMILD_MARCH=${MILD_SECOND_MARCH}
+    BUILD_COMMAND ${CMAKE_COMMAND} --build <BINARY_DIR> --parallel ${cores} --target python
+    INSTALL_COMMAND ${CMAKE_COMMAND} --install <BINARY_DIR> --component python --strip --prefix ${second}/prefix)
+  add_dependencies(python second)
+  set(compiled ${second}/prefix/mild)
+  install(DIRECTORY ${compiled}/ DESTINATION mild/${MILD_SECOND_MARCH} USE_SOURCE_PERMISSIONS COMPONENT python_data
+    PATTERN data EXCLUDE)
+  install(DIRECTORY ${compiled}/data DESTINATION mild USE_SOURCE_PERMISSIONS COMPONENT python_data)
+endif()
+
+# ---- what else is in the package of this build ----
 file(GLOB modules CONFIGURE_DEPENDS ${python}/mild/*)
 foreach(module ${modules})
   get_filename_component(file ${module} NAME)
   file(CREATE_LINK ${module} ${package}/${file} SYMBOLIC)
 endforeach()
 file(CREATE_LINK ${CMAKE_SOURCE_DIR} ${package}/data SYMBOLIC)
-install(DIRECTORY ${CMAKE_SOURCE_DIR}/configs ${CMAKE_SOURCE_DIR}/robots DESTINATION mild/data COMPONENT python)
