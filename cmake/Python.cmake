@@ -67,14 +67,14 @@ elseif(MILD_APP) # a module for each version whose structs are those of the newe
     if(version VERSION_GREATER_EQUAL 4.0)
       set(name _envs-${version})
       mild_python_module(${name} mujoco/${version} ${source}/envs.cpp)
-      target_link_libraries(${name} PRIVATE envs_plain layer_envs -Wl,--no-as-needed)
+      target_link_libraries(${name} PRIVATE envs_plain layer_envs)
       set_target_properties(${name} PROPERTIES INSTALL_RPATH "$ORIGIN/../../../mujoco") # a neighbour in site-packages
+      set(library mujoco_${version})
       if(here MATCHES "\\.so\\.${version}$")
-        target_link_libraries(${name} PRIVATE mujoco::mujoco)
+        set(library mujoco::mujoco)
         mild_python_stub(${name} _envs mujoco/${version})
-      else()
-        target_link_libraries(${name} PRIVATE mujoco_${version})
       endif()
+      target_link_libraries(${name} PRIVATE -Wl,--push-state,--no-as-needed ${library} -Wl,--pop-state)
     endif()
   endforeach()
   # The program, with the MuJoCo that it was built with: that of the user may be another.

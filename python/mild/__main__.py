@@ -1,0 +1,34 @@
+"""The command `mild`, and `python -m mild`: the program of this package. `mild trial` is the package's own (mild.trial)."""
+import importlib.util
+import os
+import shutil
+import sys
+
+from . import _processor
+
+
+def environment():
+    """What the program is told of the packages beside it."""
+    told = dict(os.environ, MILD_PYTHON=sys.executable)
+    if "MILD_FFMPEG" not in told and not shutil.which("ffmpeg") and importlib.util.find_spec("imageio_ffmpeg"):
+        import imageio_ffmpeg
+
+        told["MILD_FFMPEG"] = imageio_ffmpeg.get_ffmpeg_exe()
+    return told
+
+
+def main(arguments=None):
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    if arguments[:1] == ["trial"]:
+        from . import trial
+
+        return trial.main(arguments[1:])
+    program = _processor.program()
+    if program is None:
+        return "mild: this installation has no program, because libraries that it needs were missing where it was built (docs/install.md)"
+    sys.stdout.flush()
+    os.execve(program, ["mild", *arguments], environment())
+
+
+if __name__ == "__main__":
+    sys.exit(main())
