@@ -37,6 +37,11 @@ if(MILD_APP)
     DESTINATION mild/data/scripts COMPONENT python_data) # --figure, --pressure
   install(DIRECTORY ${CMAKE_SOURCE_DIR}/docs/schema DESTINATION mild/data/docs COMPONENT python_data)
   install(DIRECTORY ${CMAKE_SOURCE_DIR}/build/web DESTINATION mild/data/build COMPONENT python_data OPTIONAL) # `make web` ran
+  find_library(MILD_FOUND_glfw libglfw.so.3) # for windows: loaded where there is a display
+  if(MILD_FOUND_glfw)
+    file(REAL_PATH ${MILD_FOUND_glfw} glfw)
+    install(FILES ${glfw} DESTINATION mild/data/lib RENAME libglfw.so.3 COMPONENT python_data)
+  endif()
   # Licences of what comes along, as Debian has them.
   foreach(library libdnnl2 libgomp1 libinih1 libcjson1 libpng16-16 libsodium23 libprotobuf-c1 ocl-icd-libopencl1 libglfw3)
     install(FILES /usr/share/doc/${library}/copyright DESTINATION mild/data/licences RENAME ${library} COMPONENT python_data OPTIONAL)

@@ -27,6 +27,7 @@ typedef struct {
     CliNames grounds;
     double patch;
     int width, height;
+    int printed; /* bool: neither video nor window */
     Scene scene;
     const char *names[MILD_MATERIALS_MAX];
     BeliefNet *belief; /* NULL: the robot has none */
@@ -75,6 +76,23 @@ static MildStatus add_presets(Command *c, MildError *error) {
         c->play.presets++;
     }
     return status;
+}
+
+/* Without a display: the walk in characters. */
+static MildStatus make_sketch(Command *c, MildError *error) {
+    SketchDef def = sketch_def_default();
+    Play *play = &c->play;
+    const double reach = play->speed * play->seconds;
+    def.rigid = c->scene.rigid;
+    def.x_min = fmin(reach, 0) - AREA_MARGIN;
+    def.x_max = fmax(reach, 0) + AREA_MARGIN;
+    play->sketch = sketch_create(&def, play->robot, &c->scene.terrain, error);
+    if (!play->sketch) {
+        return error->status;
+    }
+    fprintf(stderr, "mild play: no window here (no display, or no GLFW), so the walk is printed; "
+                    "--video walk.mp4 makes a video\n");
+    return MILD_OK;
 }
 
 static MildStatus make_view(Command *c, MildError *error) {
@@ -264,6 +282,8 @@ static MildStatus prepare(Command *c, MildError *error) {
     }
     if (status == MILD_OK && (c->video || play->window)) {
         status = make_view(c, error);
+    } else if (status == MILD_OK && c->printed) {
+        status = make_sketch(c, error);
     }
     return status;
 }
@@ -291,7 +311,8 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     }
     play->task = &on->task, play->scene = &c->scene, play->robot = on->robot,
     play->controller = &on->mover;
-    play->window = !c->video && !c->pressure;
+    play->window = !c->video && !c->pressure && window_available();
+    c->printed = !c->video && !c->pressure && !play->window;
     if (status == MILD_OK) {
         status = make_scene(c, error);
     }
@@ -312,6 +333,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
         finish_video(c, status, error);
     }
     view_destroy(play->view);
+    sketch_destroy(play->sketch);
     pressure_destroy(play->pressure);
     context_close(on);
     return status;
@@ -329,7 +351,8 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
         {"patch", CLI_NUMBER, &c->patch, 0.5, 100, "L",
          "[m] length of each ground of a course (default 2)"},
         {"video", CLI_OUTPUT, &c->video, 0, 0, "FILE.mp4",
-         "write a video; without this and --pressure a window opens"},
+         "write a video; without this and --pressure a window opens, and where there is none the "
+         "walk is printed"},
         {"pressure", CLI_OUTPUT, &c->pressure, 0, 0, "FILE.png",
          "draw the sole pressure on each ground; the numbers go to FILE.csv beside it"},
         {"log", CLI_OUTPUT, &c->log, 0, 0, "FILE.csv",
