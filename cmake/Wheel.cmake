@@ -11,6 +11,10 @@ if(NOT EXISTS "${MUJOCO_ROOT}") # the wheel that pip installed for this build
 endif()
 include(${CMAKE_SOURCE_DIR}/cmake/Versions.cmake)
 
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
+  add_compile_options("SHELL:-include ${CMAKE_SOURCE_DIR}/cmake/glibc.h")
+endif()
+
 set(lacking "")
 foreach(library dnnl inih cjson png sodium z)
   find_library(MILD_FOUND_${library} ${library})

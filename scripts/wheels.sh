@@ -1,14 +1,18 @@
 #!/usr/bin/env bash
 # Makes the wheel, build/dist/mild-VERSION-cp311-abi3-manylinux_*.whl, and tries it in bare environments, one for each CPython
-# 3.11 or newer that is found. Usage: [MARCH=x86-64-v3] scripts/wheels.sh [--plain] [--untried | PYTHON ...]
-# --plain     without the second copy for AVX-512: half the time to compile.
-# --untried   only made and looked at. PYTHON: tried with these interpreters instead.
+# 3.11 or newer that is found. Usage: [MARCH=x86-64-v3] scripts/wheels.sh [--plain | WHEEL] [--untried | PYTHON ...]
+# --plain     without the second copy for AVX-512: half the time to compile. WHEEL: not made, but this one looked at and tried.
+# --untried   made and looked at alone. PYTHON: tried with these interpreters instead.
 set -euo pipefail
 shopt -s extglob nullglob
 cd "$(dirname "$0")/.."
 root=$PWD/build/dist march=${MARCH:-x86-64-v3} second=x86-64-v4 most=40 # [MB]
 [ "$march" != native ] || march=x86-64-v3
-[ "${1:-}" != --plain ] || { second=; shift; }
+wheel=
+case ${1:-} in
+--plain) second='' && shift ;;
+*.whl) wheel=$(realpath "$1") && shift ;;
+esac
 
 fail() { echo "wheels: $*" >&2; exit 1; }
 said() { echo "wheels: $*"; }
@@ -37,8 +41,8 @@ look_at_wheel() {
     said "$((size / 1000000)) MB, at most $most"
     ((size <= most * 1000000)) || fail "larger than $most MB"
     quiet auditwheel show "$wheel"
-    platform=$(tr '\n' ' ' <"$root/log" | grep -oE 'consistent with the following platform tag: +"[a-z0-9_]*"' | grep -oE '(many)?linux_[a-z0-9_]*')
-    [[ $wheel = *-abi3-manylinux_*"$platform"* ]] || fail "named $(basename "$wheel"), but it is of $platform"
+    platform=$(tr '\n' ' ' <"$root/log" | sed -n 's/.*constrains the platform tag to "\([a-z0-9_]*\)".*/\1/p') # MuJoCo apart
+    [[ $wheel = *-abi3-"${platform:-?}".whl ]] || fail "$(basename "$wheel") is of the platform $platform"
     quiet abi3audit --strict "$wheel"
     # What each file links is in mild.libs, MuJoCo's, or on every Linux (PEP 600); of the library of windows, X11.
     rm -rf "$inside"
@@ -110,7 +114,7 @@ cmp -s scripts/wheels.txt "$tools/installed" || {
     cp scripts/wheels.txt "$tools/installed"
 }
 export PATH=$tools/bin:$PATH
-make_wheel
+[ -n "$wheel" ] || make_wheel
 look_at_wheel
 [ "${1:-}" != --untried ] || exit 0
 [ $# -gt 0 ] || mapfile -t found < <(interpreters)
