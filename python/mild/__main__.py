@@ -1,4 +1,5 @@
-"""The command `mild`, and `python -m mild`: the program of this package. `mild trial` is the package's own (mild.trial)."""
+"""The command `mild`, and `python -m mild`: the program of this package. `mild trial` is the package's own (mild.trials)."""
+import importlib
 import importlib.util
 import os
 import shutil
@@ -20,12 +21,12 @@ def environment():
 def main(arguments=None):
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     if arguments[:1] == ["trial"]:
-        from . import trial
-
-        return trial.main(arguments[1:])
+        return importlib.import_module("mild.trials").main(arguments[1:])
     program = _processor.program()
     if program is None:
-        return "mild: this installation has no program, because libraries that it needs were missing where it was built (docs/install.md)"
+        print("mild: this installation has no program, because libraries of it were missing where it was built; `pip install mild` "
+              "takes a wheel that has it", file=sys.stderr)
+        return 2
     sys.stdout.flush()
     os.execve(program, ["mild", *arguments], environment())
 

@@ -36,7 +36,9 @@ def levels():
 
 def program():
     """The program's file, or None: a wheel's, or that of the build tree around this package."""
-    names = [HERE / "data/bin" / f"mild-{name}" for name in levels() + ["native"]] + [HERE / "data/build/mild"]
+    names = [HERE / "data/bin" / f"mild-{name}" for name in levels() + ["native"]]
+    if HERE.parent.name == "python":
+        names.append(HERE.parents[1] / "mild")
     return next((name for name in names if os.access(name, os.X_OK)), None)
 
 
