@@ -170,11 +170,7 @@ static void wait_until(double time) {
 static void print_sketch(Walk *walk, int terminal) {
     Play *play = walk->play;
     if (play->frames++ > 0 && terminal) {
-        char up[24];
-        snprintf(up, sizeof up, "\033[%dA\r", sketch_rows(play->sketch) + 1);
-        if (write(STDOUT_FILENO, up, strlen(up)) < 0) {
-            terminal = 0;
-        }
+        dprintf(STDOUT_FILENO, "\033[%dA\r", sketch_rows(play->sketch) + 1);
     }
     printf("%5.1f s  x %5.2f m  %4.2f m/s %-12s\n%s", play->time, robot_sim_qpos(walk->sim)[0],
            walk->speed, play->fell ? "it fell" : "", sketch_draw(play->sketch, walk->sim));

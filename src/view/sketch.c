@@ -10,7 +10,7 @@
 
 #define CELL 0.02        /* [m] vertices of the ground */
 #define WIDTH 1.0        /* [m] of the ground to each side */
-#define STRIP 0.3        /* [m] to each side of the base: imprints there are drawn */
+#define STRIP 12         /* to each side of the base: imprints so many steps beside it are drawn */
 #define STRIP_STEP 0.025 /* [m] */
 #define LEAD 0.3         /* share of the width behind the robot */
 #define ROUND 12         /* points of a circle */
@@ -93,9 +93,10 @@ void sketch_observe(Sketch *sketch, const RobotSim *sim) {
 /* [m] Of the surface at x, where the deepest imprint beside the robot is. */
 static double surface_at(const Sketch *sketch, double x, double y) {
     double lowest = INFINITY;
-    for (double side = -STRIP; side <= STRIP; side += STRIP_STEP) {
-        const double height = relief_height_at(sketch->relief, x, y + side) -
-                              relief_depth_at(sketch->relief, x, y + side);
+    for (int i = -STRIP; i <= STRIP; i++) {
+        const double at = y + i * STRIP_STEP;
+        const double height =
+            relief_height_at(sketch->relief, x, at) - relief_depth_at(sketch->relief, x, at);
         lowest = fmin(lowest, height);
     }
     return lowest;
