@@ -38,8 +38,8 @@ if(MILD_APP)
   file(GLOB policies ${CMAKE_SOURCE_DIR}/policies/*.safetensors) # not the paper's, 12 MB
   install(FILES ${policies} DESTINATION mild/data/policies COMPONENT python_data)
   install(FILES ${CMAKE_SOURCE_DIR}/scripts/press.py ${CMAKE_SOURCE_DIR}/scripts/fit.py ${CMAKE_SOURCE_DIR}/scripts/pressure.py
-    DESTINATION mild/data/scripts COMPONENT python_data) # --figure, --pressure
-  install(DIRECTORY ${CMAKE_SOURCE_DIR}/docs/schema DESTINATION mild/data/docs COMPONENT python_data)
+    DESTINATION mild/data/scripts COMPONENT python_data OPTIONAL) # --figure, --pressure
+  install(DIRECTORY ${CMAKE_SOURCE_DIR}/docs/schema DESTINATION mild/data/docs COMPONENT python_data OPTIONAL)
   install(DIRECTORY ${CMAKE_SOURCE_DIR}/build/web DESTINATION mild/data/build COMPONENT python_data OPTIONAL) # `make web` ran
   find_library(MILD_FOUND_glfw libglfw.so.3) # for windows: loaded where there is a display
   if(MILD_FOUND_glfw)
