@@ -25,6 +25,9 @@ find_package(nanobind CONFIG REQUIRED)
 # ---- modules ----
 set(package ${CMAKE_BINARY_DIR}/python/mild)
 set(python ${CMAKE_SOURCE_DIR}/python)
+if(NOT SKBUILD)
+  set(mild_package mild)
+endif()
 file(MAKE_DIRECTORY ${package})
 add_custom_target(python ALL)
 # mild_python_module(NAME FOLDER SOURCE...): mild.NAME, in a folder of the package; with a version in NAME, as
@@ -39,7 +42,7 @@ function(mild_python_module name folder)
   set_target_properties(${name} PROPERTIES OUTPUT_NAME ${module} LIBRARY_OUTPUT_DIRECTORY ${package}/${folder} CXX_STANDARD 17)
   target_compile_options(${name} PRIVATE -Wall -Wextra -march=${MILD_MARCH})
   target_link_options(${name} PRIVATE -Wl,--exclude-libs,ALL -Wl,--as-needed)
-  install(TARGETS ${name} DESTINATION mild/${folder} COMPONENT python)
+  install(TARGETS ${name} DESTINATION ${mild_package}/${folder} COMPONENT python)
   add_dependencies(python ${name})
 endfunction()
 function(mild_python_stub name module folder)
@@ -80,7 +83,10 @@ elseif(MILD_APP) # a module for each version whose structs are those of the newe
   # The program, with the MuJoCo that it was built with: that of the user may be another.
   add_dependencies(python mild)
   set_target_properties(mild PROPERTIES OUTPUT_NAME mild-${MILD_MARCH} INSTALL_RPATH "$ORIGIN/../lib")
-  install(TARGETS mild RUNTIME DESTINATION mild/data/bin COMPONENT python)
+  if(MILD_CUDA) # cuBLAS is a package of its own
+    set_target_properties(mild PROPERTIES INSTALL_RPATH "$ORIGIN/../../../mild/data/lib:$ORIGIN/../../../nvidia/cu13/lib")
+  endif()
+  install(TARGETS mild RUNTIME DESTINATION ${mild_package}/data/bin COMPONENT python)
   install(FILES ${mujoco_file} DESTINATION mild/data/lib COMPONENT python_data)
 endif()
 
@@ -89,7 +95,7 @@ if(SKBUILD AND MILD_SECOND_MARCH)
   include(ExternalProject)
   set(second ${CMAKE_BINARY_DIR}/${MILD_SECOND_MARCH})
   set(arguments "")
-  foreach(name SKBUILD SKBUILD_STATE SKBUILD_SOABI SKBUILD_SOSABI SKBUILD_SABI_COMPONENT SKBUILD_SABI_VERSION CMAKE_BUILD_TYPE
+  foreach(name SKBUILD SKBUILD_PROJECT_NAME SKBUILD_STATE SKBUILD_SOABI SKBUILD_SOSABI SKBUILD_SABI_COMPONENT SKBUILD_SABI_VERSION CMAKE_BUILD_TYPE
       CMAKE_MAKE_PROGRAM CMAKE_PREFIX_PATH Python_EXECUTABLE MUJOCO_ROOT DAQP_ROOT MILD_DATA_DIR MILD_MPI MILD_PLUGIN MILD_PYTHON
       MILD_TESTS MILD_WERROR)
     if(DEFINED ${name})

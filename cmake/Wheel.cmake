@@ -1,6 +1,7 @@
 # A wheel (pyproject.toml, docs/install.md): the Python package for every supported MuJoCo and, where their libraries are, the
 # environments and the program. Compiled for MILD_MARCH and, when it is given, for MILD_SECOND_MARCH too; what is imported
 # or run is what the processor can (python/mild/_processor.py).
+string(REPLACE "-" "_" mild_package ${SKBUILD_PROJECT_NAME}) # mild, or mild_cuda (python/cuda)
 set(MILD_SECOND_MARCH "" CACHE STRING "x86-64-v4: the wheel has a second copy for such processors; empty: it has not")
 find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
 if(NOT EXISTS "${MUJOCO_ROOT}") # the wheel that pip installed for this build
@@ -12,7 +13,7 @@ endif()
 include(${CMAKE_SOURCE_DIR}/cmake/Versions.cmake)
 
 if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
-  add_compile_options("SHELL:-include ${CMAKE_SOURCE_DIR}/cmake/glibc.h")
+  add_compile_options("$<$<COMPILE_LANGUAGE:C,CXX>:SHELL:-include ${CMAKE_SOURCE_DIR}/cmake/glibc.h>")
 endif()
 
 set(lacking "")
@@ -31,6 +32,9 @@ if(lacking)
   message(WARNING "mild without its program and environments, because there is no ${lacking}; `make setup` installs these")
   set(MILD_APP OFF)
 endif()
+
+file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/VERSION CONTENT "${PROJECT_VERSION}\n")
+install(FILES ${CMAKE_BINARY_DIR}/generated/VERSION DESTINATION ${mild_package} COMPONENT python)
 
 # What else is in the package: data where the program finds it, two folders above itself.
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/configs ${CMAKE_SOURCE_DIR}/robots DESTINATION mild/data COMPONENT python_data)

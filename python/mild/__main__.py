@@ -11,6 +11,8 @@ from . import _processor
 def environment():
     """What the program is told of the packages beside it."""
     told = dict(os.environ, MILD_PYTHON=sys.executable)
+    if (_processor.HERE / "data/bin").is_dir():  # a wheel's; the program may be that of mild_cuda
+        told.setdefault("MILD_HOME", str(_processor.HERE / "data"))
     if "MILD_FFMPEG" not in told and not shutil.which("ffmpeg") and importlib.util.find_spec("imageio_ffmpeg"):
         import imageio_ffmpeg
 

@@ -34,10 +34,12 @@ class Processor(unittest.TestCase):
         for flags, wanted, levels in ((V4, None, ["x86-64-v4", "x86-64-v3", "x86-64-v2"]), (V3, None, ["x86-64-v3", "x86-64-v2"]),
                                       (V4 - {"avx512vl"}, None, ["x86-64-v3", "x86-64-v2"]), (V4 - {"avx2"}, None, ["x86-64-v2"]),
                                       (set(), None, ["x86-64-v3", "x86-64-v2"]), ({"fp"}, None, []),
-                                      (V4, "x86-64-v3", ["x86-64-v3", "x86-64-v2"]), (V3, "x86-64-v4", ["x86-64-v3", "x86-64-v2"])):
+                                      (V4, "x86-64-v3", ["x86-64-v3", "x86-64-v2"]), (set(), "x86-64-v2", ["x86-64-v2"]),
+                                      (V4, "cuda", ["x86-64-v4", "x86-64-v3", "x86-64-v2"]), (set(), "cuda", ["x86-64-v3", "x86-64-v2"]),
+                                      (V3, "x86-64-v4", ["x86-64-v3", "x86-64-v2"])):
             with on(flags, wanted):
                 self.assertEqual(_processor.levels(), levels)
-        with on(V4, "x86-64-v5"), self.assertRaisesRegex(ImportError, "^MILD_PROCESSOR: 'x86-64-v5' is none of x86-64-v2, x86-64-v3, x86-64-v4$"):
+        with on(V4, "x86-64-v5"), self.assertRaisesRegex(ImportError, "^MILD_PROCESSOR: 'x86-64-v5' is none of x86-64-v2, x86-64-v3, x86-64-v4, cuda$"):
             _processor.levels()
 
     @unittest.skipUnless(pathlib.Path("/lib64/ld-linux-x86-64.so.2").exists(), "another system")
@@ -63,6 +65,27 @@ class Processor(unittest.TestCase):
                     self.assertEqual((_processor.folder(), _processor.program().name), (place, f"mild-{level}"))
             with on(V2), self.assertRaisesRegex(ImportError, r"AVX2 .*MARCH=x86-64-v2 make wheel$"):
                 _processor.folder()
+
+
+    def test_gpu(self):
+        """The package mild_cuda beside this one, where there is a driver or it is asked for, and of the same version."""
+        with tempfile.TemporaryDirectory() as name:
+            here, other = pathlib.Path(name) / "mild", pathlib.Path(name) / "mild_cuda"
+            driver = pathlib.Path(name) / "driver"
+            for place in (here, other):
+                (place / "data/bin").mkdir(parents=True)
+                (place / "VERSION").write_text("1.2.3\n")
+                (place / "data/bin/mild-x86-64-v3").touch(mode=0o755)
+            with unittest.mock.patch.multiple(_processor, HERE=here, DRIVERS=("/none", str(driver))):
+                for there, wanted, place in ((False, None, here), (False, "cuda", other), (True, None, other), (True, "x86-64-v3", here)):
+                    driver.touch() if there else driver.unlink(missing_ok=True)
+                    with on(V4, wanted):
+                        self.assertEqual((_processor.folder(), _processor.program()), (place, place / "data/bin/mild-x86-64-v3"))
+                (other / "VERSION").write_text("1.2.4\n")
+                with on(V4), self.assertRaisesRegex(ImportError, "^mild is 1.2.3, but mild_cuda 1.2.4: pip install mild-cuda==1.2.3$"):
+                    _processor.folder()
+                with on(V4, "x86-64-v4"):
+                    self.assertEqual(_processor.folder(), here)
 
 
 class Program(unittest.TestCase):
@@ -103,6 +126,8 @@ class Program(unittest.TestCase):
             with unittest.mock.patch("shutil.which", lambda name: "/usr/bin/ffmpeg"):
                 self.assertNotIn("MILD_FFMPEG", main.environment())
         self.assertEqual(main.environment()["MILD_PYTHON"], sys.executable)
+        with unittest.mock.patch.dict(os.environ, MILD_HOME="/mine"):
+            self.assertEqual(main.environment()["MILD_HOME"], "/mine")
 
 
 if __name__ == "__main__":
