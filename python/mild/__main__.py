@@ -26,8 +26,8 @@ def main(arguments=None):
         return importlib.import_module("mild.trials").main(arguments[1:])
     program = _processor.program()
     if program is None:
-        print("mild: this installation has no program, because libraries of it were missing where it was built; `pip install mild` "
-              "takes a wheel that has it", file=sys.stderr)
+        print("mild: this installation has no program, because libraries of it were missing where it was built; a wheel has it "
+              "(docs/install.md)", file=sys.stderr)
         return 2
     sys.stdout.flush()
     os.execve(program, ["mild", *arguments], environment())

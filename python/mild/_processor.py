@@ -42,7 +42,7 @@ def gpu():
         return None
     versions = [(folder / "VERSION").read_text().strip() for folder in (HERE, place)]
     if versions[0] != versions[1]:
-        raise ImportError(f"mild is {versions[0]}, but mild_cuda {versions[1]}: pip install mild-cuda=={versions[0]}")
+        raise ImportError(f"mild is {versions[0]}, but mild_cuda {versions[1]}: install one of the same version")
     return place
 
 

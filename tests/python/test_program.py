@@ -82,7 +82,7 @@ class Processor(unittest.TestCase):
                     with on(V4, wanted):
                         self.assertEqual((_processor.folder(), _processor.program()), (place, place / "data/bin/mild-x86-64-v3"))
                 (other / "VERSION").write_text("1.2.4\n")
-                with on(V4), self.assertRaisesRegex(ImportError, "^mild is 1.2.3, but mild_cuda 1.2.4: pip install mild-cuda==1.2.3$"):
+                with on(V4), self.assertRaisesRegex(ImportError, "^mild is 1.2.3, but mild_cuda 1.2.4: install one of the same version$"):
                     _processor.folder()
                 with on(V4, "x86-64-v4"):
                     self.assertEqual(_processor.folder(), here)
@@ -109,7 +109,7 @@ class Program(unittest.TestCase):
         errors = io.StringIO()
         with unittest.mock.patch.object(_processor, "program", lambda: None), contextlib.redirect_stderr(errors):
             self.assertEqual(main.main(["play"]), 2)
-        self.assertRegex(errors.getvalue(), r"^mild: this installation has no program[^\n]*`pip install mild`[^\n]*\n$")
+        self.assertRegex(errors.getvalue(), r"^mild: this installation has no program[^\n]*docs/install.md[^\n]*\n$")
 
     def test_environment(self):
         """Beside it imageio-ffmpeg, if the system has no ffmpeg and nobody named one; this Python draws figures."""
