@@ -83,8 +83,10 @@ elseif(MILD_APP) # a module for each version whose structs are those of the newe
   # The program, with the MuJoCo that it was built with: that of the user may be another.
   add_dependencies(python mild)
   set_target_properties(mild PROPERTIES OUTPUT_NAME mild-${MILD_MARCH} INSTALL_RPATH "$ORIGIN/../lib")
-  if(MILD_CUDA) # cuBLAS is a package of its own
+  if(mild_package STREQUAL "mild_cuda") # cuBLAS is a package of its own
     set_target_properties(mild PROPERTIES INSTALL_RPATH "$ORIGIN/../../../mild/data/lib:$ORIGIN/../../../nvidia/cu13/lib")
+  elseif(MILD_CUDA) # that of the toolkit here
+    set_target_properties(mild PROPERTIES INSTALL_RPATH_USE_LINK_PATH ON)
   endif()
   install(TARGETS mild RUNTIME DESTINATION ${mild_package}/data/bin COMPONENT python)
   install(FILES ${mujoco_file} DESTINATION mild/data/lib COMPONENT python_data)
