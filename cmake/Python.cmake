@@ -30,6 +30,18 @@ if(NOT SKBUILD)
 endif()
 file(MAKE_DIRECTORY ${package})
 add_custom_target(python ALL)
+# In mild_cuda modules and program share the kernels, which are most of their size. Linked before the archives that hold them.
+set(kernels "")
+if(mild_package STREQUAL "mild_cuda")
+  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/kernels_empty.c CONTENT "typedef int empty;\n")
+  add_library(mild_kernels SHARED ${CMAKE_BINARY_DIR}/generated/kernels_empty.c)
+  target_link_libraries(mild_kernels PRIVATE -Wl,--whole-archive $<TARGET_FILE:batch_device> $<TARGET_FILE:device_gpu>
+    $<TARGET_FILE:envs_device> $<TARGET_FILE:gpu_kernels> -Wl,--no-whole-archive layer_base CUDA::cudart_static stdc++)
+  target_link_options(mild_kernels PRIVATE -Wl,--as-needed -Wl,--no-undefined)
+  add_dependencies(mild_kernels batch_device device_gpu envs_device gpu_kernels)
+  install(TARGETS mild_kernels LIBRARY DESTINATION ${mild_package}/lib COMPONENT python)
+  set(kernels -Wl,--push-state,--no-as-needed mild_kernels -Wl,--pop-state)
+endif()
 # mild_python_module(NAME FOLDER SOURCE...): mild.NAME, in a folder of the package; with a version in NAME, as
 # _envs-4.0.0, it is the module _envs for that version of MuJoCo.
 function(mild_python_module name folder)
@@ -54,7 +66,10 @@ set(source ${python}/src)
 mild_python_module(_ground . ${source}/ground.cpp ${source}/material.cpp ${source}/terrain.cpp ${source}/press.cpp
   ${source}/fit.cpp ${source}/batch.cpp)
 mild_python_stub(_ground _ground .)
-target_link_libraries(_ground PRIVATE layer_identify layer_batch)
+target_link_libraries(_ground PRIVATE ${kernels} layer_identify layer_batch)
+if(kernels)
+  set_target_properties(_ground PROPERTIES INSTALL_RPATH "$ORIGIN/lib")
+endif()
 target_compile_definitions(_ground PRIVATE MILD_VERSION="${PROJECT_VERSION}")
 if(MILD_APP AND NOT SKBUILD)
   mild_python_module(_envs . ${source}/envs.cpp)
@@ -70,8 +85,8 @@ elseif(MILD_APP) # a module for each version whose structs are those of the newe
     if(version VERSION_GREATER_EQUAL 4.0)
       set(name _envs-${version})
       mild_python_module(${name} mujoco/${version} ${source}/envs.cpp)
-      target_link_libraries(${name} PRIVATE envs_plain layer_envs)
-      set_target_properties(${name} PROPERTIES INSTALL_RPATH "$ORIGIN/../../../mujoco") # a neighbour in site-packages
+      target_link_libraries(${name} PRIVATE envs_plain ${kernels} layer_envs)
+      set_target_properties(${name} PROPERTIES INSTALL_RPATH "$ORIGIN/../../../mujoco:$ORIGIN/../../lib") # a neighbour in site-packages
       set(library mujoco_${version})
       if(here MATCHES "\\.so\\.${version}$")
         set(library mujoco::mujoco)
@@ -84,7 +99,9 @@ elseif(MILD_APP) # a module for each version whose structs are those of the newe
   add_dependencies(python mild)
   set_target_properties(mild PROPERTIES OUTPUT_NAME mild-${MILD_MARCH} INSTALL_RPATH "$ORIGIN/../lib")
   if(mild_package STREQUAL "mild_cuda") # cuBLAS is a package of its own
-    set_target_properties(mild PROPERTIES INSTALL_RPATH "$ORIGIN/../../../mild/data/lib:$ORIGIN/../../../nvidia/cu13/lib")
+    set_target_properties(mild PROPERTIES
+      INSTALL_RPATH "$ORIGIN/../../lib:$ORIGIN/../../../mild/data/lib:$ORIGIN/../../../nvidia/cu13/lib")
+    target_link_libraries(mild PRIVATE ${kernels})
   elseif(MILD_CUDA) # that of the toolkit here
     set_target_properties(mild PROPERTIES INSTALL_RPATH_USE_LINK_PATH ON)
   endif()
