@@ -31,6 +31,8 @@ if(lacking)
   list(JOIN lacking ", " lacking)
   message(WARNING "mild without its program and environments, because there is no ${lacking}; `make setup` installs these")
   set(MILD_APP OFF)
+elseif(NOT DEFINED MILD_APP)
+  set(MILD_APP ON)
 endif()
 
 file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/VERSION CONTENT "${PROJECT_VERSION}\n")
