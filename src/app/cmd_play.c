@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 #include "app/cli.h"
 #include "app/commands.h"
@@ -78,9 +80,25 @@ static MildStatus add_presets(Command *c, MildError *error) {
     return status;
 }
 
+/* A smaller terminal gets a smaller picture, with a line above it and one below. */
+static void fit_terminal(SketchDef *def) {
+    struct winsize window;
+    if (!isatty(STDOUT_FILENO) || ioctl(STDOUT_FILENO, TIOCGWINSZ, &window) != 0) {
+        return;
+    }
+    if (window.ws_col > 20 && window.ws_col <= def->columns) {
+        def->columns = window.ws_col - 1;
+    }
+    if (window.ws_row > 6 && window.ws_row < def->rows + 2) {
+        def->dots *= (window.ws_row - 2.0) / def->rows;
+        def->rows = window.ws_row - 2;
+    }
+}
+
 /* Without a display: the walk in characters. */
 static MildStatus make_sketch(Command *c, MildError *error) {
     SketchDef def = sketch_def_default();
+    fit_terminal(&def);
     Play *play = &c->play;
     const double reach = play->speed * play->seconds;
     def.rigid = c->scene.rigid;

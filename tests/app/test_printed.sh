@@ -18,6 +18,10 @@ if command -v script >/dev/null; then
     pictures=$(grep -c ' s  x .* m  .* m/s' terminal.txt)
     ((pictures > 3)) || fail "$pictures pictures in a second on a terminal"
     [ "$(grep -c $'\033\[19A' terminal.txt)" = $((pictures - 1)) ] || fail "the cursor goes elsewhere"
+    script -qec "stty rows 12 cols 40; $mild play --ground rubber --seconds 0.1" /dev/null >terminal.txt </dev/null
+    grep -q $'\033\\[11A' terminal.txt || fail "12 rows of a terminal get another picture: $(head -3 terminal.txt)"
+    row=$(LC_ALL=C grep -aP '^\xe2' terminal.txt | tail -1 | tr -d '\r\n' | wc -c)
+    [ "$row" = $((39 * 3)) ] || fail "40 columns of a terminal get $row bytes"
 fi
 
 # a walk that ends in a fall says so
