@@ -14,10 +14,11 @@ FAULTS ?=
 STAGES ?=
 MUJOCO_ROOT ?=
 QUICK ?=
+ARCHS ?=
 VERSION ?=
 TEST ?=
 
-.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel python-check check export-check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -38,7 +39,9 @@ help:
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make deb     the program and libmild as a Debian package, build/deb/mild_*.deb; TEST=1: tried in a bare chroot"
 	@echo "make site    all documentation as static pages, build/site/index.html, with its links checked"
-	@echo "make wheel   the Python package as a wheel, build/dist (docs/python.md), for MARCH=x86-64-v3 unless given"
+	@echo "make wheels  the Python package with the program as one wheel, build/dist, tried in bare environments (docs/install.md)"
+	@echo "make wheel-cuda  the compiled files for GPUs as a wheel beside it, for ARCHS=90 or for all"
+	@echo "make wheel   the same in half the time: untried, for MARCH=x86-64-v3 alone unless given"
 	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/python-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
@@ -136,9 +139,14 @@ site:
 	@echo build/site/index.html
 
 wheel: setup
-	@.venv/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w build/dist . \
-		--config-settings=cmake.define.MILD_MARCH=$(if $(filter native,$(MARCH)),x86-64-v3,$(MARCH))
-	@ls build/dist/*.whl
+	@MARCH=$(MARCH) scripts/wheels.sh --plain --untried
+
+# Its own compiler, from the package index (2 GB).
+wheel-cuda: setup
+	@ARCHS="$(ARCHS)" scripts/wheel_cuda.sh
+
+wheels: setup
+	@MARCH=$(MARCH) scripts/wheels.sh
 
 # Learners are large: an environment of its own, with the wheel as a user has it.
 python-check: wheel

@@ -24,3 +24,10 @@ get_filename_component(mujoco_folder ${mujoco_library} DIRECTORY)
 add_library(mujoco::mujoco SHARED IMPORTED GLOBAL)
 set_target_properties(mujoco::mujoco PROPERTIES IMPORTED_LOCATION ${mujoco_library}
   INTERFACE_INCLUDE_DIRECTORIES ${mujoco_include})
+
+# What the layers link: the library, or in a wheel the headers alone (cmake/Versions.cmake).
+if(SKBUILD)
+  set(mild_mujoco mujoco_headers)
+else()
+  set(mild_mujoco mujoco::mujoco)
+endif()

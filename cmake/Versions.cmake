@@ -16,3 +16,6 @@ foreach(version ${mujoco_versions})
   set_target_properties(mujoco_${version} PROPERTIES OUTPUT_NAME mujoco SOVERSION ${version}
     LIBRARY_OUTPUT_DIRECTORY ${mujoco_headers}/lib-${version})
 endforeach()
+list(GET mujoco_versions -1 newest)
+add_library(mujoco_headers INTERFACE)
+target_include_directories(mujoco_headers INTERFACE ${mujoco_headers}/${newest})

@@ -7,7 +7,7 @@
 #   thread    gcc, thread sanitizer: pool, task, evaluation, training
 #   vectors   the layers with loops over vectors, for AVX2 and for AVX-512 with vectors of 512 bits: their tests (256: make test)
 #   aarch64   the library for another processor, run under qemu
-#   wheel     the Python package, made and installed as a user would; three of its examples
+#   wheel     the Python package with the program: made, looked at, and used where nothing else is
 #   recipes   what CONTRIBUTING.md says, done in a copy of the tree: a reward, a model, a terrain, a controller, a command
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -145,18 +145,7 @@ stage_aarch64() {
 }
 
 stage_wheel() {
-    local example wheel here=$PWD
-    rm -rf build/dist "$root/wheel"
-    mkdir -p "$root"
-    make --no-print-directory wheel >"$root/wheel.log" 2>&1 || { tail -30 "$root/wheel.log" >&2; return 1; }
-    wheel=$(echo "$here"/build/dist/mild-*.whl)
-    .venv/bin/python -m venv "$root/wheel"
-    "$root/wheel/bin/pip" install --quiet --disable-pip-version-check --require-hashes -r scripts/wheel.txt
-    "$root/wheel/bin/pip" install --quiet --disable-pip-version-check --no-deps "$wheel"
-    "$root/wheel/bin/pip" check # scripts/wheel.txt has all that the wheel asks for
-    for example in plate gym_random walk; do
-        (cd "$root/wheel" && PYTHONPATH='' bin/python "$here/examples/python/$example.py")
-    done
+    scripts/wheels.sh --plain .venv/bin/python
 }
 
 stage_recipes() {

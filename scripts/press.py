@@ -6,7 +6,10 @@ Force over depth; beside it whatever else moved: the resistance over the way (dr
 import csv
 import sys
 
-import matplotlib
+try:
+    import matplotlib
+except ImportError:
+    sys.exit(1)  # the program says what is missing
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402

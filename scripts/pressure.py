@@ -7,7 +7,10 @@ import csv
 import sys
 from collections import OrderedDict
 
-import matplotlib
+try:
+    import matplotlib
+except ImportError:
+    sys.exit(1)  # the program says what is missing
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402

@@ -61,7 +61,7 @@ def run(clones, out, name, options):
     if not target.is_file():
         _, model, policy = POLICIES[name]
         policy = policy if policy.startswith("/") else str(clones / policy)
-        subprocess.run([sys.executable, "-m", "mild.trial", str(clones / model), policy, "--describe", str(ROOT / f"examples/trial/{name}.ini"),
+        subprocess.run([sys.executable, "-m", "mild", "trial", str(clones / model), policy, "--describe", str(ROOT / f"examples/trial/{name}.ini"),
                         "--json", str(target), *options], check=True)
     return json.loads(target.read_text())
 

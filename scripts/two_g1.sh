@@ -7,7 +7,7 @@ gym=$1/unitree_rl_gym
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 film() {
-    MUJOCO_GL=${MUJOCO_GL:-egl} "${PYTHON:-python3}" -m mild.trial "$gym/resources/robots/g1_description/scene.xml" "$2" --describe "$here/examples/trial/$1.ini" \
+    MUJOCO_GL=${MUJOCO_GL:-egl} "${PYTHON:-python3}" -m mild trial "$gym/resources/robots/g1_description/scene.xml" "$2" --describe "$here/examples/trial/$1.ini" \
         --ground sand_loose --trials 1 --seconds 7 --noise 0 --attach prints=256 --video "$work/$1.mp4"
 }
 film unitree_g1 "$gym/deploy/pre_train/g1/motion.pt"

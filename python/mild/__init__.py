@@ -2,6 +2,10 @@
 
 Units are SI and radians, z points up. What is wrong with an argument is raised as one ValueError, TypeError or
 RuntimeError that names it."""
+from . import _processor
+
+__path__.insert(0, str(_processor.folder()))  # the compiled files for this processor
+
 from ._ground import Batch, Ground, Map, Material, Press, Sole, Terrain, __version__, models, presets, press
 from .fit import GroundFit, loading
 from .spec import attach, load_plugin

@@ -1,7 +1,7 @@
 """What is made for one version of MuJoCo: the package's mujoco/VERSION has the engine plugin and the module _envs for it."""
-import pathlib
+from . import _processor
 
-FOLDER = pathlib.Path(__file__).parent / "mujoco"
+FOLDER = _processor.folder() / "mujoco"
 
 
 def folder(name, what):

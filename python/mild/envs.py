@@ -4,14 +4,13 @@ import importlib
 import importlib.util
 import numbers
 import os
-import pathlib
 
 import mild
 
-from . import _mujoco
+from . import _mujoco, _processor
 
 FILES = "_envs.*.so"  # of the module
-DATA = pathlib.Path(os.path.abspath(__file__)).parent / "data"
+DATA = _processor.HERE / "data"
 
 
 def open_envs(num_envs=None, *, config=None, overrides=None, robot=None, device=None, seed=None, threads=None):
@@ -39,7 +38,7 @@ def load():
     os.environ.setdefault("MILD_HOME", str(DATA))  # where the library finds configs and robots
     if importlib.util.find_spec("mild._envs") is None:
         if not _mujoco.versions(FILES):
-            raise ImportError("this build of mild has no environments: install libinih-dev and libpng-dev, then mild again")
+            raise ImportError("this build of mild has no environments: their libraries were missing (docs/install.md)")
         try:
             mild.__path__.append(str(_mujoco.folder(FILES, "environments")))
         except RuntimeError as error:

@@ -1,4 +1,4 @@
-"""Anybody's policy on soft ground (docs/public-policies.md): mild.trial, and the command `python -m mild.trial`."""
+"""Anybody's policy on soft ground (docs/public-policies.md): mild.trial, and the command `mild trial`."""
 import argparse
 import contextlib
 import dataclasses

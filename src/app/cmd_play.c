@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 #include "app/cli.h"
 #include "app/commands.h"
@@ -27,6 +29,7 @@ typedef struct {
     CliNames grounds;
     double patch;
     int width, height;
+    int printed; /* bool: neither video nor window */
     Scene scene;
     const char *names[MILD_MATERIALS_MAX];
     BeliefNet *belief; /* NULL: the robot has none */
@@ -75,6 +78,39 @@ static MildStatus add_presets(Command *c, MildError *error) {
         c->play.presets++;
     }
     return status;
+}
+
+/* A smaller terminal gets a smaller picture, with a line above it and one below. */
+static void fit_terminal(SketchDef *def) {
+    struct winsize window;
+    if (!isatty(STDOUT_FILENO) || ioctl(STDOUT_FILENO, TIOCGWINSZ, &window) != 0) {
+        return;
+    }
+    if (window.ws_col > 20 && window.ws_col <= def->columns) {
+        def->columns = window.ws_col - 1;
+    }
+    if (window.ws_row > 6 && window.ws_row < def->rows + 2) {
+        def->dots *= (window.ws_row - 2.0) / def->rows;
+        def->rows = window.ws_row - 2;
+    }
+}
+
+/* Without a display: the walk in characters. */
+static MildStatus make_sketch(Command *c, MildError *error) {
+    SketchDef def = sketch_def_default();
+    fit_terminal(&def);
+    Play *play = &c->play;
+    const double reach = play->speed * play->seconds;
+    def.rigid = c->scene.rigid;
+    def.x_min = fmin(reach, 0) - AREA_MARGIN;
+    def.x_max = fmax(reach, 0) + AREA_MARGIN;
+    play->sketch = sketch_create(&def, play->robot, &c->scene.terrain, error);
+    if (!play->sketch) {
+        return error->status;
+    }
+    fprintf(stderr, "mild play: no window here (no display, or no GLFW), so the walk is printed; "
+                    "--video walk.mp4 makes a video\n");
+    return MILD_OK;
 }
 
 static MildStatus make_view(Command *c, MildError *error) {
@@ -264,6 +300,8 @@ static MildStatus prepare(Command *c, MildError *error) {
     }
     if (status == MILD_OK && (c->video || play->window)) {
         status = make_view(c, error);
+    } else if (status == MILD_OK && c->printed) {
+        status = make_sketch(c, error);
     }
     return status;
 }
@@ -291,7 +329,8 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     }
     play->task = &on->task, play->scene = &c->scene, play->robot = on->robot,
     play->controller = &on->mover;
-    play->window = !c->video && !c->pressure;
+    play->window = !c->video && !c->pressure && window_available();
+    c->printed = !c->video && !c->pressure && !play->window;
     if (status == MILD_OK) {
         status = make_scene(c, error);
     }
@@ -312,6 +351,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
         finish_video(c, status, error);
     }
     view_destroy(play->view);
+    sketch_destroy(play->sketch);
     pressure_destroy(play->pressure);
     context_close(on);
     return status;
@@ -329,7 +369,8 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
         {"patch", CLI_NUMBER, &c->patch, 0.5, 100, "L",
          "[m] length of each ground of a course (default 2)"},
         {"video", CLI_OUTPUT, &c->video, 0, 0, "FILE.mp4",
-         "write a video; without this and --pressure a window opens"},
+         "write a video; without this and --pressure a window opens, and where there is none the "
+         "walk is printed"},
         {"pressure", CLI_OUTPUT, &c->pressure, 0, 0, "FILE.png",
          "draw the sole pressure on each ground; the numbers go to FILE.csv beside it"},
         {"log", CLI_OUTPUT, &c->log, 0, 0, "FILE.csv",

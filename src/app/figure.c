@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <spawn.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -25,7 +26,8 @@ MildStatus figure_draw(const char *script, const char *data, const char *picture
     snprintf(to, sizeof to, "%s", picture);
     snprintf(above, sizeof above, "%s", title ? title : "");
     if (access(python, X_OK) != 0) {
-        snprintf(python, sizeof python, "python3");
+        const char *caller = getenv("MILD_PYTHON"); /* of python -m mild */
+        snprintf(python, sizeof python, "%s", caller && *caller ? caller : "python3");
     }
     char *arguments[] = {python, code_path, from, to, title ? above : NULL, NULL};
     pid_t child;
@@ -37,7 +39,7 @@ MildStatus figure_draw(const char *script, const char *data, const char *picture
         return MILD_OK;
     }
     return mild_fail(error, MILD_ERROR_IO,
-                     "%.150s: not drawn, Python with matplotlib is needed (make setup); the "
-                     "numbers are in %.150s",
+                     "%.150s: not drawn, Python with matplotlib is needed (make setup, or pip "
+                     "install matplotlib); the numbers are in %.150s",
                      picture, data);
 }

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "app/live.h"
 #include "app/progress.h"
@@ -18,6 +19,7 @@
 #define PACE_TIME 0.5   /* [s] over which the real-time factor is measured */
 #define OWED_MAX 0.2    /* [s] delay behind real time that is caught up with at once */
 #define WINDOW_TIME 1e6 /* [s] a window's walk has no end */
+#define SKETCH_RATE 20  /* [1/s] pictures on a terminal */
 
 /* [m/s, m/s, rad/s] Largest command of the keys, which is the range that the shipped policy was
  * trained on. */
@@ -117,6 +119,9 @@ static void step(Walk *walk) {
     if (play->view && out.valid) {
         view_observe(play->view, walk->sim);
     }
+    if (play->sketch && out.valid) {
+        sketch_observe(play->sketch, walk->sim);
+    }
     if (!out.done || out.timeout) {
         return;
     }
@@ -151,6 +156,44 @@ static MildStatus frame(Walk *walk, MildError *error) {
     return play->video ? video_frame(play->video, view_pixels(play->view), error) : MILD_OK;
 }
 
+static void wait_until(double time) {
+    double left = time - clock_seconds();
+    if (left <= 0) {
+        return;
+    }
+    struct timespec pause = {(time_t)left, (long)(1e9 * (left - floor(left)))};
+    nanosleep(&pause, NULL);
+}
+
+/* On a terminal in the place of the one before; in a file one below the other. Written past the
+ * stream, which lets no cursor move. */
+static void print_sketch(Walk *walk, int terminal) {
+    Play *play = walk->play;
+    if (play->frames++ > 0 && terminal) {
+        dprintf(STDOUT_FILENO, "\033[%dA\r", sketch_rows(play->sketch) + 1);
+    }
+    printf("%5.1f s  x %5.2f m  %4.2f m/s %-12s\n%s", play->time, robot_sim_qpos(walk->sim)[0],
+           walk->speed, play->fell ? "it fell" : "", sketch_draw(play->sketch, walk->sim));
+    fflush(stdout);
+}
+
+/* In real time on a terminal; in a file a picture each second. */
+static void run_printed(Walk *walk) {
+    Play *play = walk->play;
+    const int terminal = isatty(STDOUT_FILENO);
+    const double rate = terminal ? SKETCH_RATE : 1, begin = clock_seconds();
+    while (play->time < walk->end && !interrupt_requested()) {
+        if (play->time * rate >= play->frames) {
+            wait_until(terminal ? begin + play->time : 0);
+            print_sketch(walk, terminal);
+        }
+        step(walk);
+    }
+    if (!walk->lost) {
+        print_sketch(walk, terminal);
+    }
+}
+
 static MildStatus run_filmed(Walk *walk, MildError *error) {
     Play *play = walk->play;
     Progress progress = progress_begin("playing");
@@ -172,15 +215,6 @@ static MildStatus run_filmed(Walk *walk, MildError *error) {
     progress_end(&progress, "%.1f s walked, x %.2f m%s", play->time, robot_sim_qpos(walk->sim)[0],
                  play->fell ? ", fell" : "");
     return status;
-}
-
-static void wait_until(double time) {
-    double left = time - clock_seconds();
-    if (left <= 0) {
-        return;
-    }
-    struct timespec pause = {(time_t)left, (long)(1e9 * (left - floor(left)))};
-    nanosleep(&pause, NULL);
 }
 
 static MildStatus restart(Walk *walk, MildError *error) {
@@ -274,7 +308,11 @@ MildStatus play_run(Play *play, MildError *error) {
     if (status == MILD_OK) {
         task_env_init(walk.env, &walk.task, play->robot, play->seed, 0);
         start(&walk);
-        status = play->window ? run_window(&walk, error) : run_filmed(&walk, error);
+        if (play->sketch) {
+            run_printed(&walk);
+        } else {
+            status = play->window ? run_window(&walk, error) : run_filmed(&walk, error);
+        }
     }
     robot_sim_destroy(walk.sim);
     free(walk.env);

@@ -9,6 +9,7 @@
 #include "run/eval/measure.h"
 #include "run/eval/scene.h"
 #include "view/pressure.h"
+#include "view/sketch.h"
 #include "view/video.h"
 #include "view/view.h"
 
@@ -30,6 +31,7 @@ typedef struct {
     Controller *controller;
     View *view;                  /* NULL: not watched */
     Video *video;                /* NULL: none, or a window */
+    Sketch *sketch;              /* NULL: not printed; otherwise the walk is, in real time */
     Pressure *pressure;          /* NULL: not measured */
     double seconds, speed, rate; /* [s], [m/s], [1/s] frames */
     uint64_t seed;

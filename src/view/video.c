@@ -68,10 +68,12 @@ static MildStatus spawn_ffmpeg(Video *video, double fps, MildError *error) {
                          strerror(errno));
     }
     fcntl(ends[0], F_SETFD, FD_CLOEXEC);
-    char size[32], rate[32];
+    char size[32], rate[32], ffmpeg[PATH_SIZE];
+    const char *other = getenv("MILD_FFMPEG"); /* that of a Python package */
+    snprintf(ffmpeg, sizeof ffmpeg, "%s", other && *other ? other : "ffmpeg");
     snprintf(size, sizeof size, "%dx%d", video->width, video->height);
     snprintf(rate, sizeof rate, "%g", fps);
-    char *arguments[] = {"ffmpeg",
+    char *arguments[] = {ffmpeg,
                          "-nostdin",
                          "-loglevel",
                          "error",
@@ -113,15 +115,17 @@ static MildStatus spawn_ffmpeg(Video *video, double fps, MildError *error) {
     posix_spawnattr_t attributes;
     posix_spawnattr_init(&attributes);
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-    int failure = posix_spawnp(&video->child, "ffmpeg", &actions, &attributes, arguments, environ);
+    int failure = posix_spawnp(&video->child, ffmpeg, &actions, &attributes, arguments, environ);
     posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
     close(ends[1]);
     if (failure) {
         close(ends[0]);
-        return mild_fail(error, MILD_ERROR_IO,
-                         "video %s: cannot start ffmpeg (%s); install it: apt-get install ffmpeg",
-                         video->path, strerror(failure));
+        return mild_fail(
+            error, MILD_ERROR_IO,
+            "video %s: cannot start ffmpeg (%s); install it: apt-get install ffmpeg, or "
+            "pip install imageio-ffmpeg",
+            video->path, strerror(failure));
     }
     video->pipe = ends[0];
     return MILD_OK;

@@ -638,8 +638,17 @@ static void smooth_picture(View *view, mjrRect size) {
     flip_rows(view->labelled, size, view->pixels);
 }
 
+/* What of the part lies in the picture, which may be smaller than the inset. */
+static mjrRect part_inside(mjrRect size, mjrRect part) {
+    const int left = part.left > 0 ? part.left : 0, bottom = part.bottom > 0 ? part.bottom : 0;
+    const int right = part.left + part.width, top = part.bottom + part.height;
+    return (mjrRect){left, bottom, (right < size.width ? right : size.width) - left,
+                     (top < size.height ? top : size.height) - bottom};
+}
+
 /* Copies the pixels of a part of the picture that the labels changed. */
-static void paste_labels(View *view, mjrRect size, mjrRect part) {
+static void paste_labels(View *view, mjrRect size, mjrRect whole) {
+    const mjrRect part = part_inside(size, whole);
     const size_t width = (size_t)size.width * 3, row = (size_t)part.width * 3;
     mjr_readPixels(view->labelled, NULL, part, &view->context);
     for (int r = 0; r < part.height; r++) {

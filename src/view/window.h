@@ -1,4 +1,5 @@
-/* A window with an OpenGL context, when the program was built with GLFW and there is a display. */
+/* A window with an OpenGL context, where there are a display and GLFW, and the program was built
+ * with its header. */
 #ifndef VIEW_WINDOW_H
 #define VIEW_WINDOW_H
 
@@ -18,7 +19,7 @@ typedef struct {
     double turn, lift, zoom; /* camera: mouse drag [rad], wheel [-], since the last call */
 } WindowInput;
 
-/* Whether this build has windows at all. */
+/* Whether there can be windows. */
 int window_available(void);
 /* Makes the window's context current on the calling thread (which must be the main one). */
 Window *window_create(int width, int height, const char *title, MildError *error);

@@ -619,8 +619,8 @@ class Command(unittest.TestCase):
 
 
     def test_module(self):
-        """`python -m mild.trial` warns of nothing, and mild.trial can be called where the module has been imported."""
-        done = subprocess.run([sys.executable, "-m", "mild.trial", "--help"], capture_output=True, text=True)
+        """`python -m mild trial` warns of nothing, and mild.trial is a function."""
+        done = subprocess.run([sys.executable, "-m", "mild", "trial", "--help"], capture_output=True, text=True)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         self.assertIn("--describe", done.stdout)
         code = "import mild; assert not isinstance(mild.trial, type(mild)); import mild.trial; mild.trial('no.xml', 'no.onnx', 'rsl_rl')"

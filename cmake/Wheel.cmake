@@ -1,0 +1,63 @@
+# A wheel (pyproject.toml, docs/install.md): the Python package for every supported MuJoCo and, where their libraries are, the
+# environments and the program. Compiled for MILD_MARCH and, when it is given, for MILD_SECOND_MARCH too; what is imported
+# or run is what the processor can (python/mild/_processor.py).
+string(REPLACE "-" "_" mild_package ${SKBUILD_PROJECT_NAME}) # mild, or mild_cuda (python/cuda)
+set(MILD_SECOND_MARCH "" CACHE STRING "x86-64-v4: the wheel has a second copy for such processors; empty: it has not")
+find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
+if(NOT EXISTS "${MUJOCO_ROOT}") # the wheel that pip installed for this build
+  execute_process(COMMAND ${Python_EXECUTABLE} -c "import importlib.util as u; print(u.find_spec('mujoco').origin)"
+    OUTPUT_VARIABLE mujoco_init OUTPUT_STRIP_TRAILING_WHITESPACE)
+  get_filename_component(mujoco_wheel ${mujoco_init} DIRECTORY)
+  set(MUJOCO_ROOT ${mujoco_wheel} CACHE PATH "MuJoCo release folder, or Python package" FORCE)
+endif()
+include(${CMAKE_SOURCE_DIR}/cmake/Versions.cmake)
+
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
+  add_compile_options("$<$<COMPILE_LANGUAGE:C,CXX>:SHELL:-include ${CMAKE_SOURCE_DIR}/cmake/glibc.h>")
+endif()
+
+set(lacking "")
+foreach(library dnnl inih cjson png sodium z)
+  find_library(MILD_FOUND_${library} ${library})
+  if(NOT MILD_FOUND_${library})
+    list(APPEND lacking lib${library})
+  endif()
+endforeach()
+file(GLOB daqp ${DAQP_ROOT}/csrc ${CMAKE_SOURCE_DIR}/.venv/daqp-*/csrc)
+if(NOT daqp)
+  list(APPEND lacking "DAQP's sources")
+endif()
+if(lacking)
+  list(JOIN lacking ", " lacking)
+  message(WARNING "mild without its program and environments, because there is no ${lacking}; `make setup` installs these")
+  set(MILD_APP OFF)
+elseif(NOT DEFINED MILD_APP)
+  set(MILD_APP ON)
+endif()
+
+file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/VERSION CONTENT "${PROJECT_VERSION}\n")
+install(FILES ${CMAKE_BINARY_DIR}/generated/VERSION DESTINATION ${mild_package} COMPONENT python)
+
+# What else is in the package: data where the program finds it, two folders above itself.
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/configs ${CMAKE_SOURCE_DIR}/robots DESTINATION mild/data COMPONENT python_data)
+if(MILD_APP)
+  file(GLOB policies ${CMAKE_SOURCE_DIR}/policies/*.safetensors) # not the paper's, 12 MB
+  install(FILES ${policies} DESTINATION mild/data/policies COMPONENT python_data)
+  install(FILES ${CMAKE_SOURCE_DIR}/scripts/press.py ${CMAKE_SOURCE_DIR}/scripts/fit.py ${CMAKE_SOURCE_DIR}/scripts/pressure.py
+    DESTINATION mild/data/scripts COMPONENT python_data OPTIONAL) # --figure, --pressure
+  install(DIRECTORY ${CMAKE_SOURCE_DIR}/docs/schema DESTINATION mild/data/docs COMPONENT python_data OPTIONAL)
+  install(DIRECTORY ${CMAKE_SOURCE_DIR}/build/web DESTINATION mild/data/build COMPONENT python_data OPTIONAL) # `make web` ran
+  find_library(MILD_FOUND_glfw libglfw.so.3) # for windows: loaded where there is a display
+  if(MILD_FOUND_glfw)
+    file(REAL_PATH ${MILD_FOUND_glfw} glfw)
+    install(FILES ${glfw} DESTINATION mild/data/lib RENAME libglfw.so.3 COMPONENT python_data)
+  endif()
+  # Licences of what comes along, as Debian has them.
+  foreach(library libdnnl2 libgomp1 libinih1 libcjson1 libpng16-16 libsodium23 libprotobuf-c1 ocl-icd-libopencl1 libglfw3)
+    install(FILES /usr/share/doc/${library}/copyright DESTINATION mild/data/licences RENAME ${library} COMPONENT python_data OPTIONAL)
+  endforeach()
+  file(GLOB mujoco_licences ${MUJOCO_ROOT}/../mujoco*.dist-info/licenses/*)
+  install(FILES ${mujoco_licences} DESTINATION mild/data/licences/mujoco COMPONENT python_data)
+  list(GET daqp 0 daqp)
+  install(FILES ${daqp}/../LICENSE DESTINATION mild/data/licences RENAME daqp COMPONENT python_data OPTIONAL)
+endif()

@@ -1,0 +1,37 @@
+"""The command `mild`, and `python -m mild`: the program of this package. `mild trial` is the package's own (mild.trials)."""
+import importlib
+import importlib.util
+import os
+import shutil
+import sys
+
+from . import _processor
+
+
+def environment():
+    """What the program is told of the packages beside it."""
+    told = dict(os.environ, MILD_PYTHON=sys.executable)
+    if (_processor.HERE / "data/bin").is_dir():  # a wheel's; the program may be that of mild_cuda
+        told.setdefault("MILD_HOME", str(_processor.HERE / "data"))
+    if "MILD_FFMPEG" not in told and not shutil.which("ffmpeg") and importlib.util.find_spec("imageio_ffmpeg"):
+        import imageio_ffmpeg
+
+        told["MILD_FFMPEG"] = imageio_ffmpeg.get_ffmpeg_exe()
+    return told
+
+
+def main(arguments=None):
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    if arguments[:1] == ["trial"]:
+        return importlib.import_module("mild.trials").main(arguments[1:])
+    program = _processor.program()
+    if program is None:
+        print("mild: this installation has no program, because libraries of it were missing where it was built; a wheel has it "
+              "(docs/install.md)", file=sys.stderr)
+        return 2
+    sys.stdout.flush()
+    os.execve(program, ["mild", *arguments], environment())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,123 @@
+#!/usr/bin/env bash
+# Makes the wheel, build/dist/mild-VERSION-cp311-abi3-manylinux_*.whl, and tries it in bare environments, one for each CPython
+# 3.11 or newer that is found. Usage: [MARCH=x86-64-v3] scripts/wheels.sh [--plain | WHEEL] [--untried | PYTHON ...]
+# --plain     without the second copy for AVX-512: half the time to compile. WHEEL: not made, but this one looked at and tried.
+# --untried   made and looked at alone. PYTHON: tried with these interpreters instead.
+set -euo pipefail
+shopt -s extglob nullglob
+cd "$(dirname "$0")/.."
+root=$PWD/build/dist march=${MARCH:-x86-64-v3} second=x86-64-v4 most=40 # [MB]
+[ "$march" != native ] || march=x86-64-v3
+wheel=
+case ${1:-} in
+--plain) second='' && shift ;;
+*.whl) wheel=$(realpath "$1") && shift ;;
+esac
+
+fail() { echo "wheels: $*" >&2; exit 1; }
+said() { echo "wheels: $*"; }
+# quiet COMMAND...: what it prints is shown when it fails.
+quiet() {
+    "$@" >"$root/log" 2>&1 || { tail -40 "$root/log" >&2; fail "failed: $*"; }
+}
+
+make_wheel() {
+    local begin=$SECONDS
+    if command -v ccache >/dev/null; then
+        export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
+    fi
+    rm -rf "$root"/raw "$root"/mild-*.whl
+    quiet .venv/bin/python -m pip wheel --disable-pip-version-check --no-deps --no-build-isolation -w "$root/raw" . \
+        --config-settings=cmake.define.MILD_MARCH="$march" --config-settings=cmake.define.MILD_SECOND_MARCH=$second
+    # Libraries that not every Linux has come along, in mild.libs. MuJoCo is a neighbour, or the program's own.
+    quiet auditwheel repair --exclude 'libmujoco.so.*' --wheel-dir "$root" "$root"/raw/mild-*.whl
+    wheel=$(echo "$root"/mild-*.whl)
+    said "$(basename "$wheel") for $march${second:+ and $second}, made in $((SECONDS - begin)) s"
+}
+
+look_at_wheel() {
+    local size platform library inside=$root/inside
+    size=$(stat -c %s "$wheel")
+    said "$((size / 1000000)) MB, at most $most"
+    ((size <= most * 1000000)) || fail "larger than $most MB"
+    quiet auditwheel show "$wheel"
+    platform=$(tr '\n' ' ' <"$root/log" | sed -n 's/.*constrains the platform tag to "\([a-z0-9_]*\)".*/\1/p') # MuJoCo apart
+    [[ $wheel = *-abi3-"${platform:-?}".whl ]] || fail "$(basename "$wheel") is of the platform $platform"
+    quiet abi3audit --strict "$wheel"
+    # What each file links is in mild.libs, MuJoCo's, or on every Linux (PEP 600); of the library of windows, X11.
+    rm -rf "$inside"
+    .venv/bin/python -m zipfile -e "$wheel" "$inside"
+    for library in $(find "$inside" -type f -exec readelf -d {} \; 2>/dev/null | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p' | sort -u); do
+        case $library in
+        lib[cm].so.6 | lib@(dl|rt|pthread).so.[0-9] | ld-linux-x86-64.so.2 | libgcc_s.so.1 | libstdc++.so.6 | libz.so.1 | libX11.so.6) ;;
+        libmujoco.so.*) ;;
+        *) [ -e "$inside/mild.libs/$library" ] || fail "$library is neither in the wheel nor on every Linux" ;;
+        esac
+    done
+    ! grep -rlF "$PWD" "$inside" || fail "these name a folder of this machine"
+    rm -rf "$inside"
+    said "links what every Linux of $platform has; abi3audit finds nothing"
+}
+
+# Interpreters on the PATH and of pyenv, one of each version.
+interpreters() {
+    local version python
+    for version in 3.11 3.12 3.13 3.14 3.15; do
+        for python in /usr/bin/python$version "$(command -v python$version)" "${PYENV_ROOT:-$HOME/.pyenv}"/versions/$version*/bin/python$version; do
+            if [ -x "$python" ] && "$python" -c 'import venv, ensurepip' 2>/dev/null; then
+                echo "$python"
+                break
+            fi
+        done
+    done
+}
+
+# try_wheel PYTHON: as a user who has nothing: no display, no tree beside, nothing on the PATH but the system's.
+try_wheel() {
+    local begin python=$1 version folder example
+    version=$("$python" -c 'import sys; print("%d.%d.%d" % sys.version_info[:3])')
+    folder=$root/try-$version
+    rm -rf "$folder"
+    "$python" -m venv "$folder"
+    mkdir "$folder/empty"
+    begin=$(date +%s%N)
+    quiet "$folder/bin/pip" install --disable-pip-version-check --require-hashes -r scripts/wheel.txt
+    quiet "$folder/bin/pip" install --disable-pip-version-check --no-deps "$wheel"
+    bare "$folder" play --seconds 1 >"$folder/walk.txt" 2>&1 || { cat "$folder/walk.txt" >&2; fail "play"; }
+    grep -q '0.0 s  x .* m/s' "$folder/walk.txt" && grep -q '^sand_loose .* yes ' "$folder/walk.txt" || fail "play: $(cat "$folder/walk.txt")"
+    local seconds=$((($(date +%s%N) - begin) / 1000000))
+    quiet "$folder/bin/pip" check # scripts/wheel.txt has all that the wheel asks for
+    bare "$folder" eval --robot sa01 --ground rubber --speed 0.5 --trials 1 --seconds 2 >"$folder/eval.txt"
+    grep -q '^rubber .* 1/1 ' "$folder/eval.txt" || fail "eval: $(cat "$folder/eval.txt")"
+    bare "$folder" press --ground foam45 --plate 0.1,0.1 --csv press.csv >/dev/null
+    bare "$folder" train --out run --train.envs=16 --train.minutes=0 --train.iterations=2 --ppo.steps=4 --ppo.minibatches=2 >/dev/null 2>&1 ||
+        fail "train"
+    [ "$(bare "$folder" --version)" = "$(cd "$folder/empty" && env -i "$folder/bin/python" -m mild --version)" ] || fail "python -m mild"
+    (cd "$folder/empty" && env -i "$folder/bin/python" "$OLDPWD/tests/python/check_wheel.py")
+    MILD_PROCESSOR=x86-64-v3 "$folder/bin/python" "$PWD/tests/python/check_wheel.py" >/dev/null
+    for example in plate gym_random walk; do
+        (cd "$folder/empty" && env -i "$folder/bin/python" "$OLDPWD/examples/python/$example.py" >/dev/null)
+    done
+    said "Python $version: $((seconds / 1000)).$((seconds % 1000 / 100)) s from pip install to a picture of a walk"
+    rm -rf "$folder"
+}
+# bare VENV ARGUMENTS...: its program.
+bare() {
+    (cd "$1/empty" && env -i PATH=/usr/bin:/bin "$1/bin/mild" "${@:2}" </dev/null)
+}
+
+mkdir -p "$root"
+tools=$root/tools
+cmp -s scripts/wheels.txt "$tools/installed" || {
+    .venv/bin/python -m venv --clear "$tools"
+    quiet "$tools/bin/pip" install --disable-pip-version-check --require-hashes -r scripts/wheels.txt
+    cp scripts/wheels.txt "$tools/installed"
+}
+export PATH=$tools/bin:$PATH
+[ -n "$wheel" ] || make_wheel
+look_at_wheel
+[ "${1:-}" != --untried ] || exit 0
+[ $# -gt 0 ] || mapfile -t found < <(interpreters)
+for python in "${@:-${found[@]}}"; do
+    try_wheel "$python"
+done
