@@ -617,13 +617,12 @@ class Command(unittest.TestCase):
                 self.assertEqual((status, error.count("\n"), error.startswith("mild trial: ")), (2, 1, True), error)
                 self.assertIn(line, error)
 
-
     def test_module(self):
         """`python -m mild trial` warns of nothing, and mild.trial is a function."""
         done = subprocess.run([sys.executable, "-m", "mild", "trial", "--help"], capture_output=True, text=True)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         self.assertIn("--describe", done.stdout)
-        code = "import mild; assert not isinstance(mild.trial, type(mild)); import mild.trial; mild.trial('no.xml', 'no.onnx', 'rsl_rl')"
+        code = "import mild; assert not isinstance(mild.trial, type(mild)); mild.trial('no.xml', 'no.onnx', 'rsl_rl')"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
         self.assertIn("ValueError: policy: there is no file 'no.onnx'", done.stderr)
 
