@@ -13,7 +13,7 @@
 /* Numbers of a foot in the block. */
 static size_t foot_doubles(const MildSole *sole) {
     return (size_t)sole_padded(sole) *
-           (SLOT_ARRAYS + FOOT_ARRAYS + (sole->faces ? FACES_ARRAYS : 0));
+           (SLOT_NUMBERS + FOOT_ARRAYS + (sole->faces ? FACES_ARRAYS : 0));
 }
 
 /* Takes the next `count` numbers of the block. */
@@ -97,13 +97,9 @@ static void foot_set_bounds(FootScratch *foot) {
     }
 }
 
-/* Takes the arrays of the slots. No slot has a law yet. */
+/* Takes the slots. None has a law yet. */
 static void foot_set_slots(FootScratch *foot, double **at, int32_t *integers) {
-    double **arrays = (double **)&foot->own;
-    for (size_t k = 0; k < SLOT_ARRAYS; k++) {
-        arrays[k] = take(at, foot->padded);
-    }
-    foot->slot = foot->own;
+    foot->slot = (Slots *)take(at, (int)SLOT_NUMBERS * foot->padded);
     foot->element = integers;
     foot->slot_material = integers + foot->padded;
     foot->slot_holder = integers + 2 * foot->padded;
@@ -168,19 +164,6 @@ void mild_scratch_destroy(MildScratch *scratch) {
     }
     free(scratch->block);
     free(scratch);
-}
-
-void slots_remember(Slots *s, const Memory *memory) {
-    s->depth_max = memory->depth_max;
-    s->last_middle = memory->middle;
-    s->last_speed = memory->front_speed;
-    s->drift = memory->drift;
-    s->pending_x = memory->pending_x;
-    s->pending_y = memory->pending_y;
-    s->held_x = memory->held_x;
-    s->held_y = memory->held_y;
-    s->held_stiffness = memory->held_stiffness;
-    s->worn = memory->worn;
 }
 
 void foot_points(const FootScratch *foot) {

@@ -4,6 +4,7 @@
 
 #include "ground/energy.h"
 #include "ground/faces.h"
+#include "ground/moments.h"
 #include "ground/friction.h"
 #include "ground/prepare.h"
 #include "ground/solver.h"
@@ -13,12 +14,13 @@ const char *const mild_solver_names[MILD_SOLVERS] = {"newton", "gauss_seidel", "
 /* Copies the slots back to the elements: forces in N, and what each element did in the step. */
 static void foot_scatter(const MildScratch *scratch, int f) {
     const FootScratch *foot = &scratch->foot[f];
-    const Slots *s = &foot->slot;
     const Motion motion = foot_motion(foot, scratch->velocity + 6 * f);
     const double dt = scratch->dt;
     const double rate = 1.0 / dt;
-    for (int i = 0; i < foot->active; i++) {
-        const int e = foot->element[i];
+    for (int slot = 0; slot < foot->active; slot++) {
+        const Slots *s = slot_block(foot, slot);
+        const int i = slot % SLOT_LANES;
+        const int e = foot->element[slot];
         const Element element = slot_loaded(s, i, foot->curves);
         const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
         const double beyond = element.depth + dt / 2 * v.descent - element.yield_depth;
@@ -60,40 +62,41 @@ MildElements mild_scratch_elements(const MildScratch *scratch, int f) {
 static void foot_loaded(const MildScratch *scratch, const double *position, int f,
                         MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
-    const Slots local = foot->slot, *s = &local;
-    double sum = 0.0;     /* [m] of the depths */
+    Lanes lanes[5] = {{0.0}};
+    Lanes deep = {0.0};
+    for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            const double on = s->iz[i] > 0.0 ? 1.0 : 0.0;
+            const double depth = on * s->depth[i];
+            deep[i] = depth > deep[i] ? depth : deep[i];
+            lanes[0][i] += depth;
+            lanes[1][i] += on;
+            lanes[2][i] += s->iz[i];
+            lanes[3][i] += s->x[i] * s->iz[i];
+            lanes[4][i] += s->y[i] * s->iz[i];
+        }
+    }
+    double sums[5];
+    lanes_sum(lanes, 5, sums);
     double deepest = 0.0; /* [m] */
-    double loaded = 0.0;  /* number of loaded elements */
-    double force = 0.0;   /* [N s] of the normal impulses */
-    double x = 0.0;       /* [N s m] of x times the normal impulse */
-    double y = 0.0;       /* [N s m] */
-    int end = foot_end(foot);
-    if (end < VECTOR_LANES) {
-        return; /* never. The compiler then adds no loop for a remainder */
+    for (int i = 0; i < SLOT_LANES; i++) {
+        deepest = fmax(deepest, deep[i]);
     }
-#pragma omp simd reduction(+ : sum, loaded, force, x, y) reduction(max : deepest)
-    for (int i = 0; i < end; i++) {
-        double on = s->iz[i] > 0.0 ? 1.0 : 0.0;
-        double depth = on * s->depth[i];
-        loaded += on;
-        sum += depth;
-        deepest = depth > deepest ? depth : deepest;
-        force += s->iz[i];
-        x += s->x[i] * s->iz[i];
-        y += s->y[i] * s->iz[i];
-    }
+    const double loaded = sums[1]; /* number of loaded elements */
+    const double force = sums[2];  /* [N s] of the normal impulses */
     result->contacts = (int)loaded;
     result->area = loaded * foot->pitch * foot->pitch;
     result->depth_max = deepest;
     if (!(loaded > 0.0)) {
         return;
     }
-    result->depth_mean = sum / loaded;
+    result->depth_mean = sums[0] / loaded;
     const double z = foot->faces ? faces_loaded(foot, &result->area) : 0.0;
     for (int k = 0; k < 3; k++) {
         result->pressure_center[k] =
             position[k] + foot->arm[0][k] +
-            (x * foot->arm[1][k] + y * foot->arm[2][k] + z * foot->arm[3][k]) / force;
+            (sums[3] * foot->arm[1][k] + sums[4] * foot->arm[2][k] + z * foot->arm[3][k]) / force;
     }
 }
 

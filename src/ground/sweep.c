@@ -82,7 +82,7 @@ static double element_normal(const Slots *s, int i, int curves, double dt, doubl
 /* Paper eq 13: predict, correct by the continuity error, project onto the friction disc. Within the
  * disc the law is I = t of friction.h, so v = (dt f - I)/(dt^2 k + c), which is a compliance in
  * series with G. On the rim I has the direction of t, which any scale of t gives. */
-static void element_friction(const Slots *s, int i, const double *v, const double *delta,
+static void element_friction(Slots *s, int i, const double *v, const double *delta,
                              double G) {
     double radius = s->mu[i] * s->iz[i] + s->drift_bound[i];     /* r [N s] */
     double stiff = s->hold_stiffness[i] + FRICTION_LAG * radius; /* dt^2 k + c [kg] */
@@ -110,7 +110,7 @@ static double slot_literal(const Slots *s, int i, int curves, double dt, double 
 }
 
 /* Eq 13 as element_friction, of a cone without anything else. */
-static void element_literal(const Slots *s, int i, const double *v, const double *delta, double G) {
+static void element_literal(Slots *s, int i, const double *v, const double *delta, double G) {
     const double beta = 0.5 / G; /* [kg] */
     const double gamma = 0.1 * beta;
     const double x = s->fx[i] - gamma * delta[0] - beta * v[0];
@@ -129,9 +129,10 @@ static void sweep_drift(const MildScratch *scratch, const MildContactInput *inpu
     for (int k = 0; k < scratch->listed; k++) {
         const int f = scratch->list[k];
         const FootScratch *foot = &scratch->foot[f];
-        const Slots *s = &foot->slot;
         const Motion motion = foot_motion(foot, input->velocity[f]);
-        for (int i = 0; i < foot->active; i++) {
+        for (int slot = 0; slot < foot->active; slot++) {
+            Slots *s = slot_block(foot, slot);
+            const int i = slot % SLOT_LANES;
             const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
             const double speed = sqrt(v.x * v.x + v.y * v.y);
             const double drag = s->drift_bound[i] + s->damping[i] * speed;
@@ -142,9 +143,9 @@ static void sweep_drift(const MildScratch *scratch, const MildContactInput *inpu
 }
 
 /* Normal impulse, friction and drift damping of one element at its velocities v and w. */
-static void element_implicit(const Sweep *sweep, const FootScratch *foot, int i, const double *v,
-                             double w, const double *delta, const double *G, double G_xy) {
-    const Slots *s = &foot->slot;
+static void element_implicit(const Sweep *sweep, const FootScratch *foot, Slots *s, int i,
+                             const double *v, double w, const double *delta, const double *G,
+                             double G_xy) {
     const double old[3] = {s->ix[i], s->iy[i], s->iz[i]};
     const double fx = s->fx[i];
     const double fy = s->fy[i];
@@ -171,8 +172,7 @@ static void element_implicit(const Sweep *sweep, const FootScratch *foot, int i,
 }
 
 /* One iteration of the inner loop of Algorithm 1. The change of impulse moves the feet at once. */
-static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
-    const Slots *s = &foot->slot;
+static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, Slots *s, int i) {
     const double *V = sweep->twist + 6 * sweep->place[f];
     double p[3];
     slot_arm(foot, s, i, p);
@@ -196,7 +196,7 @@ static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
     if (sweep->literal) {
         element_literal(s, i, v, delta, G_xy);
     } else {
-        element_implicit(sweep, foot, i, v, w, delta, G, G_xy);
+        element_implicit(sweep, foot, s, i, v, w, delta, G, G_xy);
     }
     const double change[3] = {s->ix[i] - old[0], s->iy[i] - old[1], s->iz[i] - old[2]};
     sweep->changed += fabs(change[0]) + fabs(change[1]) + fabs(change[2]);
@@ -215,9 +215,10 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
     for (int k = 0; k < scratch->listed; k++) {
         const int f = scratch->list[k];
         const FootScratch *foot = &scratch->foot[f];
-        const Slots *s = &foot->slot;
         const Motion motion = foot_motion(foot, input->velocity[f]);
-        for (int i = 0; i < foot_end(foot); i++) { /* clears the padding too */
+        for (int slot = 0; slot < foot_end(foot); slot++) { /* clears the padding too */
+            Slots *s = slot_block(foot, slot);
+            const int i = slot % SLOT_LANES;
             double p[3];
             const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
             slot_arm(foot, s, i, p);
@@ -237,9 +238,10 @@ static void sweep_wrench(const MildScratch *scratch, double *wrench) {
     memset(wrench, 0, TWIST_MAX * sizeof *wrench);
     for (int k = 0; k < scratch->listed; k++) {
         const int f = scratch->list[k];
-        const Slots *s = &scratch->foot[f].slot;
         double *W = wrench + 6 * scratch->place[f];
-        for (int i = 0; i < scratch->foot[f].active; i++) {
+        for (int slot = 0; slot < scratch->foot[f].active; slot++) {
+            const Slots *s = slot_block(&scratch->foot[f], slot);
+            const int i = slot % SLOT_LANES;
             double p[3];
             slot_arm(&scratch->foot[f], s, i, p);
             W[0] += s->ix[i];
@@ -289,8 +291,9 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
         memset(sweep.preceding, 0, sizeof sweep.preceding);
         for (int k = 0; k < scratch->listed; k++) {
             const int f = scratch->list[k];
-            for (int i = 0; i < scratch->foot[f].active; i++) {
-                sweep_element(&sweep, &scratch->foot[f], f, i);
+            const FootScratch *foot = &scratch->foot[f];
+            for (int i = 0; i < foot->active; i++) {
+                sweep_element(&sweep, foot, f, slot_block(foot, i), i % SLOT_LANES);
             }
         }
         sweep_wrench(scratch, wrench);
