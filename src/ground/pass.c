@@ -14,7 +14,9 @@ MILD_HD void slot_normal(Slots *s, int i, double dt, const Motion *motion, int k
                          int curves, int stops) {
     const Element element = slot_loaded(s, i, curves);
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
-    const Impulse normal = element_impulse(&element, curves, stops, dt, v.descent);
+    const ImpulsePowers powers = {{s->power[0][i], s->power[1][i], s->power[2][i]},
+                                  {s->elastic[0][i], s->elastic[1][i], s->elastic[2][i]}};
+    const Impulse normal = element_impulse_of(&element, curves, stops, dt, v.descent, &powers);
     s->iz[i] = normal.value;
     s->hzz[i] = normal.slope;
 }
@@ -27,6 +29,42 @@ MILD_HD void foot_normal(const FootScratch *foot, double dt, const Motion *m, in
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
             slot_normal(s, i, dt, &motion, kind, curves, stops);
+        }
+    }
+}
+
+/* The way of a slot's element over which the law has a power of the depth. */
+MILD_HD void slot_way(const Slots *s, int i, double dt, const Motion *motion, int curve,
+                      double *begin, double *way) {
+    const SlotVelocity v = slot_velocity(s, i, motion, SLOT_UNEVEN | SLOT_FACES);
+    const double middle = s->depth[i] + dt / 2 * v.descent;
+    const double from = real_max(s->middle[i], 0);
+    *begin = curve == LAW_POWER ? s->virgin_depth[i] : from;
+    *way = curve == LAW_POWER ? real_max(middle - s->yield_depth[i], 0) : real_max(middle, 0) - from;
+}
+
+/* Sets what element_powers gives a slot for a curve, LAW_POWER or LAW_ELASTIC: Slots.power or
+ * elastic. Of both, and of a way's depths, the power itself is the same loop. */
+static __attribute__((noinline)) void foot_powers(const FootScratch *foot, double dt,
+                                                  const Motion *m, int curve) {
+    const Motion motion = *m;
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+        const double *exponent = curve == LAW_POWER ? s->power_exponent : s->elastic_exponent;
+        Lanes *power = curve == LAW_POWER ? s->power : s->elastic;
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            double begin, way;
+            slot_way(s, i, dt, &motion, curve, &begin, &way);
+            const PowerEnds ends = power_ends(begin, way);
+            power[0][i] = (ends.q0 + ends.q1) / 2;
+            power[1][i] = ends.q0;
+            power[2][i] = ends.q1;
+        }
+        for (int k = 0; k < 3; k++) {
+#pragma omp simd
+            for (int i = 0; i < SLOT_LANES; i++) {
+                power[k][i] = real_pow(power[k][i], (exponent[i] - 1) / 2);
+            }
         }
     }
 }
@@ -170,6 +208,11 @@ static void pass(MildScratch *scratch, double dt, const double *twist, int held)
         double *sums = scratch->sums[f];
         double *wrench = scratch->wrench + 6 * f;
         const Motion motion = foot_motion(foot, twist + 6 * k);
+        for (int curve = LAW_POWER; curve <= LAW_ELASTIC; curve *= LAW_ELASTIC / LAW_POWER) {
+            if (foot->curves & curve) { /* elsewhere they are multiplied by 0 */
+                foot_powers(foot, dt, &motion, curve);
+            }
+        }
         foot_normals(foot, dt, &motion);
         foot_frictions(foot, &motion, held);
         foot_sums(foot, sums);
