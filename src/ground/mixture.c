@@ -131,11 +131,14 @@ void slots_pad(const FootScratch *foot) {
 static int slots_are_uniform(const FootScratch *foot, const Memory *memory) {
     const int32_t *remembered = memory->material;
     const int32_t *set = foot->slot_material;
+    const int elements = foot->elements, active = foot->active;
     int32_t differs = 0;
-    for (int e = 0; e < foot->elements; e++) {
+#pragma omp simd reduction(| : differs)
+    for (int e = 0; e < elements; e++) {
         differs |= remembered[e] > 0;
     }
-    for (int i = 0; i < foot->active; i++) {
+#pragma omp simd reduction(| : differs)
+    for (int i = 0; i < active; i++) {
         differs |= set[i];
     }
     for (int i = 0; foot->curves & LAW_HEAP && i < foot->active; i++) {

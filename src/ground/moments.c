@@ -12,11 +12,11 @@ void lanes_sum(const Lanes *lanes, int count, double *sums) {
 
 void moments(const double *xs, const double *ys, int end, const double *a, const double *b,
              const double *c, double sums[3][6]) {
-    Vector A[6] = {{0.0}}, B[6] = {{0.0}}, C[6] = {{0.0}};
+    LaneVector A[6] = {{0.0}}, B[6] = {{0.0}}, C[6] = {{0.0}};
     for (int i = 0; i < end * (int)SLOT_NUMBERS; i += SLOT_LANES * (int)SLOT_NUMBERS) {
-        const Vector x = lanes_load(xs + i), y = lanes_load(ys + i);
-        const Vector xx = x * x, xy = x * y, yy = y * y;
-        const Vector p = lanes_load(a + i), q = lanes_load(b + i), r = lanes_load(c + i);
+        const LaneVector x = lanes_load(xs + i), y = lanes_load(ys + i);
+        const LaneVector xx = x * x, xy = x * y, yy = y * y;
+        const LaneVector p = lanes_load(a + i), q = lanes_load(b + i), r = lanes_load(c + i);
         A[0] += p;
         A[1] += p * x;
         A[2] += p * y;

@@ -159,10 +159,10 @@ MILD_HD void foot_friction(const FootScratch *foot, const Motion *m, int kind, i
 
 /* Sums over the foot of I, x I, y I and, for a surface, height I. */
 static void foot_sums(const FootScratch *foot, double sums[12]) {
-    Vector all[12] = {{0.0}};
+    LaneVector all[12] = {{0.0}};
     for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
-        const Vector x = lanes_load(s->x), y = lanes_load(s->y);
-        const Vector ix = lanes_load(s->ix), iy = lanes_load(s->iy), iz = lanes_load(s->iz);
+        const LaneVector x = lanes_load(s->x), y = lanes_load(s->y);
+        const LaneVector ix = lanes_load(s->ix), iy = lanes_load(s->iy), iz = lanes_load(s->iz);
         all[0] += ix;
         all[1] += iy;
         all[2] += iz;
@@ -174,7 +174,7 @@ static void foot_sums(const FootScratch *foot, double sums[12]) {
         all[8] += y * iz;
     }
     for (const Slots *s = foot->slot, *end = slots_end(foot); foot->faces && s < end; s++) {
-        const Vector z = lanes_load(s->z);
+        const LaneVector z = lanes_load(s->z);
         all[9] += z * lanes_load(s->ix);
         all[10] += z * lanes_load(s->iy);
         all[11] += z * lanes_load(s->iz);

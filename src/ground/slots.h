@@ -128,10 +128,10 @@ typedef struct {
 #define SLOT_NUMBERS (sizeof(Slots) / sizeof(Lanes))
 
 /* The lanes of one number in a register, for sums over all blocks. */
-typedef double Vector __attribute__((vector_size(sizeof(Lanes)), may_alias));
+typedef double LaneVector __attribute__((vector_size(sizeof(Lanes)), may_alias));
 
-MILD_HD Vector lanes_load(const double *lanes) {
-    return *(const Vector *)lanes;
+MILD_HD LaneVector lanes_load(const double *lanes) {
+    return *(const LaneVector *)lanes;
 }
 
 #define SLOT_LAW_LOAD(name) .name = s->name[i],
