@@ -114,6 +114,19 @@ MILD_HD void slot_plane(const FootScratch *foot, double height, const Slots *s,
                        foot->point_z[e] - height;
 }
 
+/* The same for all elements of a foot. */
+static void foot_planes(const FootScratch *all, double height, const Memory *memory) {
+    const FootScratch foot = *all; /* copies keep the addresses in registers */
+    const Memory own = *memory;
+    int e = 0;
+    for (const Slots *s = foot.slot, *end = slots_end(&foot); s < end; s++, e += SLOT_LANES) {
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            slot_plane(&foot, height, s, &own, i, e + i);
+        }
+    }
+}
+
 /* After the vector loop: peaks, the padding, and the material of each element. turned: bool, an
  * element reversed. */
 static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory *all,
@@ -135,22 +148,21 @@ static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory
 }
 
 /* Vector loop for a foot with all elements listed, on ground without imprints. Returns how many
- * elements remember something. kind: SLOT_UNEVEN or 0. heap: bool, shares wear. Both are constants.
- */
-MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material, int kind,
+ * elements remember something. heap: bool, shares wear; a constant. On level ground the slopes are
+ * 0. */
+MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material,
                              int heap) {
-    const FootScratch foot = *a->foot; /* a copy, as of the addresses below: see Memory */
+    const FootScratch *foot = a->foot;
     const Memory own = *all, *memory = &own;
     const Motion motion = a->motion;
     const double dt = a->dt;
     const double rate = 1.0 / dt;
-    const double height = a->height;
     Lanes count[2] = {{0.0}}; /* touched, turned */
     int e = 0;
-    for (const Slots *s = foot.slot, *end = slots_end(&foot); s < end; s++, e += SLOT_LANES) {
+    for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++, e += SLOT_LANES) {
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
-            const SlotVelocity v = slot_velocity(s, i, &motion, kind);
+            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN);
             const Element element = slot_element(s, i);
             const ElementMemory before = slot_memory(s, i);
             const int stays = s->depth[i] + dt / 2 * v.descent > 0.0;
@@ -162,26 +174,17 @@ MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t 
                                                    v.x, v.y, v.descent, stays);
             }
             memory_store(memory, e + i, &after);
-            if (kind && !heap) {
-                slot_plane(&foot, height, s, memory, i, e + i);
-            }
             count[0][i] += stays ? 1.0 : 0.0;
             count[1][i] += stays && element_turns(element.entry_speed, v.descent) ? 1.0 : 0.0;
         }
     }
     double sums[2];
     lanes_sum(count, 2, sums);
-    foot_finish(a, all, material, sums[1] > 0.0);
-    return foot.uneven ? foot.elements : (int)sums[0];
-}
-
-/* The same on ground whose elements carry a share of their load: one loop serves level ground too,
- * where the slopes are 0. */
-static int foot_advance_heaps(const Advance *a, const Memory *memory, const int32_t *material) {
-    for (int i = 0; a->foot->uneven && i < a->foot->elements; i++) {
-        slot_plane(a->foot, a->height, slot_block(a->foot, i), memory, i % SLOT_LANES, i);
+    if (foot->uneven) {
+        foot_planes(foot, a->height, memory);
     }
-    return foot_advance_all(a, memory, material, SLOT_UNEVEN, 1);
+    foot_finish(a, all, material, sums[1] > 0.0);
+    return foot->uneven ? foot->elements : (int)sums[0];
 }
 
 /* An element that is not listed forgets. Returns whether it remembers that it was here. */
@@ -297,11 +300,9 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                            .height = terrain->height};
         const int all = foot->active == foot->elements && ground->tiles == 0 && !foot->faces;
         if (all && foot->curves & LAW_HEAP) {
-            ground->touched[f] = foot_advance_heaps(&advance, &memory, foot->slot_material);
-        } else if (all && foot->uneven) {
-            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1, 0);
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1);
         } else if (all) {
-            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0, 0);
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0);
         } else {
             ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material);
         }

@@ -37,11 +37,12 @@ MILD_HD void slots_begin(const FootScratch *foot, double dt, const Motion *now, 
 }
 
 /* Picks the loop compiled for the curves of the ground under the foot. A line is a cone of which
- * all numbers but the line's are 0: one loop does for both. */
+ * all numbers but the line's are 0, and a cone is a heap that begins at the surface and carries all
+ * of its load: one loop does for the three. */
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     switch (foot_variant(foot)) {
     case LAW_LINE:
-    case LAW_CONE: slots_begin(foot, dt, now, LAW_CONE, 0); return;
+    case LAW_CONE:
     case LAW_CONE | LAW_HEAP: slots_begin(foot, dt, now, LAW_CONE | LAW_HEAP, 0); return;
     case LAW_POWER: slots_begin(foot, dt, now, LAW_POWER, 0); return;
     case LAW_ELASTIC: slots_begin(foot, dt, now, LAW_ELASTIC, 0); return;
@@ -79,15 +80,22 @@ MILD_HD void slot_drag(Slots *s, int i, double dt, const Motion *now, const Moti
     s->stop_growth[i] = element.stop_growth;
 }
 
-/* Calls element_drag for all slots. */
-MILD_HD void slots_drag(const FootScratch *foot, double dt, const Motion *now, const Motion *free,
-                        int curves, int faces) {
+/* Calls element_drag for all slots. The loop for cones and heaps, which have drag, is in vectors;
+ * that for surfaces and ground with a power beside them is not. */
+static void slots_drag(const FootScratch *foot, double dt, const Motion *now, const Motion *free) {
     const Motion before = *now;
     const Motion after = *free;
+    if (foot_variant(foot) & ~(LAW_CONE | LAW_HEAP)) {
+        for (int i = 0; i < foot->active; i++) {
+            slot_drag(slot_block(foot, i), i % SLOT_LANES, dt, now, free, foot->curves,
+                      SLOT_UNEVEN | SLOT_FACES);
+        }
+        return;
+    }
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
-            slot_drag(s, i, dt, &before, &after, curves, SLOT_UNEVEN | faces);
+            slot_drag(s, i, dt, &before, &after, LAW_CONE | LAW_HEAP, SLOT_UNEVEN);
         }
     }
 }
@@ -173,11 +181,7 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     }
     foot->stops = slots_explicit(foot, terrain->material_count, input->dt, &free);
     if (slots_sink(foot, input->dt)) {
-        if (foot_variant(foot) & ~LAW_CONE) {
-            slots_drag(foot, input->dt, &now, &free, LAW_ANY, SLOT_FACES);
-        } else {
-            slots_drag(foot, input->dt, &now, &free, LAW_CONE, 0);
-        }
+        slots_drag(foot, input->dt, &now, &free);
         foot->stops = 1;
     }
     foot_direct(foot, terrain, input->dt, R, &now);
