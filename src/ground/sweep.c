@@ -3,6 +3,7 @@
 
 #include "ground/friction.h"
 #include "ground/impulse.h"
+#include "ground/literal.h"
 #include "ground/solver.h"
 
 #define SWEEP_TOLERANCE 1e-10 /* [-] of the wrench's change, unless the caller sets one */
@@ -97,51 +98,6 @@ static void element_friction(Slots *s, int i, const double *v, const double *del
     s->fy[i] = y * scale;
 }
 
-/* Eqs 3 to 5: dt F_GM [N s] of the depth and the downward speed w before the step, on the way up
- * too. */
-static double slot_literal(const Slots *s, int i, int curves, double dt, double w) {
-    const Element element = slot_loaded(s, i, curves);
-    const double u = element.depth;
-    double force = law_force(&element.law, curves, u) + law_elastic_force(&element.law, curves, u);
-    if (curves & LAW_CONE) {
-        force += element.law.drag_rate * law_flat_share(&element.law, curves, u) * w * w;
-    }
-    return u > 0.0 ? dt * fmax(force, 0.0) : 0.0;
-}
-
-/* Eq 13 as element_friction, of a cone without anything else. */
-static void element_literal(Slots *s, int i, const double *v, const double *delta, double G) {
-    const double beta = 0.5 / G; /* [kg] */
-    const double gamma = 0.1 * beta;
-    const double x = s->fx[i] - gamma * delta[0] - beta * v[0];
-    const double y = s->fy[i] - gamma * delta[1] - beta * v[1];
-    const double radius = s->mu[i] * s->iz[i];
-    const double length = sqrt(x * x + y * y);
-    const double scale = length > radius ? radius / length : 1.0;
-    s->fx[i] = x * scale;
-    s->fy[i] = y * scale;
-    s->ix[i] = s->fx[i] - s->slope_x[i] * s->iz[i];
-    s->iy[i] = s->fy[i] - s->slope_y[i] * s->iz[i];
-}
-
-/* Eq 14: drift resistance against the velocity before the step. */
-static void sweep_drift(const MildScratch *scratch, const MildContactInput *input) {
-    for (int k = 0; k < scratch->listed; k++) {
-        const int f = scratch->list[k];
-        const FootScratch *foot = &scratch->foot[f];
-        const Motion motion = foot_motion(foot, input->velocity[f]);
-        for (int slot = 0; slot < foot->active; slot++) {
-            Slots *s = slot_block(foot, slot);
-            const int i = slot % SLOT_LANES;
-            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
-            const double speed = sqrt(v.x * v.x + v.y * v.y);
-            const double drag = s->drift_bound[i] + s->damping[i] * speed;
-            s->ix[i] -= speed > 0.0 ? drag * v.x / speed : 0.0;
-            s->iy[i] -= speed > 0.0 ? drag * v.y / speed : 0.0;
-        }
-    }
-}
-
 /* Normal impulse, friction and drift damping of one element at its velocities v and w. */
 static void element_implicit(const Sweep *sweep, const FootScratch *foot, Slots *s, int i,
                              const double *v, double w, const double *delta, const double *G,
@@ -194,7 +150,7 @@ static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, Slots *s
     double G_xy = fmax(fmax(G[0], G[1]), SWEEP_LEAST_G);
     const double old[3] = {s->ix[i], s->iy[i], s->iz[i]};
     if (sweep->literal) {
-        element_literal(s, i, v, delta, G_xy);
+        literal_friction(s, i, v, delta, G_xy);
     } else {
         element_implicit(sweep, foot, s, i, v, w, delta, G, G_xy);
     }
@@ -224,7 +180,7 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
             slot_arm(foot, s, i, p);
             s->fx[i] = s->fy[i] = 0.0;
             s->iz[i] = sweep->literal
-                           ? slot_literal(s, i, foot->curves, input->dt, v.descent)
+                           ? literal_normal(s, i, foot->curves, input->dt, v.descent)
                            : slot_impulse(s, i, foot->curves, input->dt, v.descent).value;
             s->ix[i] = -s->slope_x[i] * s->iz[i];
             s->iy[i] = -s->slope_y[i] * s->iz[i];
@@ -273,13 +229,13 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
                    .place = scratch->place,
                    .A = input->inverse_inertia,
                    .literal = input->solver == MILD_SOLVER_EXPLICIT};
-    static const double zero[TWIST_MAX];
     int limit = input->max_iterations > 0 ? input->max_iterations : SWEEP_LIMIT;
     int iterations = 0;
     double tolerance = input->tolerance > 0.0 ? input->tolerance : SWEEP_TOLERANCE;
     double change = INFINITY;                    /* of the wrench in the last sweep */
     double scale = 0.0;                          /* size of the wrench */
     double wrench[TWIST_MAX], before[TWIST_MAX]; /* after the sweep, and before it */
+    const double zero[TWIST_MAX] = {0.0};
     sweep_start(&sweep, scratch, input);
     sweep_wrench(scratch, wrench);
     int rests = 0;
@@ -305,7 +261,7 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
         }
     }
     if (sweep.literal) {
-        sweep_drift(scratch, input);
+        literal_drift(scratch, input);
         sweep_wrench(scratch, wrench);
     }
     result->iterations = iterations;
