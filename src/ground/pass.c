@@ -256,6 +256,9 @@ static void foot_moments(const FootScratch *foot, Moments M) {
     memcpy(M[2][2], rest[2], sizeof *rest);
 }
 
+/* Three numbers in a register. */
+typedef double Three __attribute__((vector_size(4 * sizeof(double))));
+
 /* H = sum of B^T h B, with B = [1, -[p]x] and p = sum over k of (1, x, y)_k arm_k. With M_kl the
  * moment of h by the product of factors k and l, and N_k = -sum over l of M_kl [arm_l]x,
  *
@@ -263,29 +266,31 @@ static void foot_moments(const FootScratch *foot, Moments M) {
  *     torque rows    sum over k of [arm_k]x [M_k0, N_k] */
 static void foot_hessian(const FootScratch *foot, const Moments M, double *H) {
     static const int product[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+    Three m[3][6]; /* of the three rows of h, for each column and product */
+    for (int c = 0; c < 3; c++) {
+        for (int at = 0; at < 6; at++) {
+            m[c][at] = (Three){M[0][c][at], M[1][c][at], M[2][c][at]};
+        }
+    }
     memset(H, 0, 36 * sizeof *H);
     for (int k = 0; k < 3; k++) {
-        double rows[3][6] = {{0.0}};
-        for (int r = 0; r < 3; r++) {
-            for (int c = 0; c < 3; c++) {
-                rows[r][c] = M[r][c][k];
-            }
-            for (int l = 0; l < 3; l++) { /* -m [q]x = q x m */
-                const int at = product[k][l];
-                cross_add(foot->arm[l], (const double[3]){M[r][0][at], M[r][1][at], M[r][2][at]},
-                          rows[r] + 3);
-            }
+        Three rows[6] = {m[0][k], m[1][k], m[2][k]}; /* for each column */
+        for (int l = 0; l < 3; l++) {                /* -m [p]x = p x m */
+            const double *p = foot->arm[l];
+            const int at = product[k][l];
+            rows[3] += p[1] * m[2][at] - p[2] * m[1][at];
+            rows[4] += p[2] * m[0][at] - p[0] * m[2][at];
+            rows[5] += p[0] * m[1][at] - p[1] * m[0][at];
         }
         const double *q = foot->arm[k];
         for (int c = 0; c < 6; c++) {
-            if (k == 0) {
-                for (int r = 0; r < 3; r++) {
-                    H[6 * r + c] = rows[r][c];
-                }
+            const Three row = rows[c];
+            for (int r = 0; k == 0 && r < 3; r++) {
+                H[6 * r + c] = row[r];
             }
-            H[18 + c] += q[1] * rows[2][c] - q[2] * rows[1][c];
-            H[24 + c] += q[2] * rows[0][c] - q[0] * rows[2][c];
-            H[30 + c] += q[0] * rows[1][c] - q[1] * rows[0][c];
+            H[18 + c] += q[1] * row[2] - q[2] * row[1];
+            H[24 + c] += q[2] * row[0] - q[0] * row[2];
+            H[30 + c] += q[0] * row[1] - q[1] * row[0];
         }
     }
 }

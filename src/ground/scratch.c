@@ -144,6 +144,7 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
     scratch->feet = feet;
     scratch->block = block;
     scratch->rows = block;
+    scratch->window[ROW_LANES] = 1.0;
     double *at = block + rows;
     int32_t *integers = (int32_t *)(block + doubles);
     for (int f = 0; f < feet; f++) {

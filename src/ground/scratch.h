@@ -100,6 +100,7 @@ struct MildScratch {
     int listed;                     /* feet with listed elements */
     int list[MILD_FEET_MAX];        /* [listed] their indices, ascending */
     double *rows;                   /* [2][6 feet][ROW_LANES] of Newton's method */
+    double window[2 * ROW_LANES];   /* 1 at ROW_LANES, else 0: newton_step.c */
     double sums[MILD_FEET_MAX][12]; /* [N s, N s m] of I, x I, y I, height I at the last pass */
     double wrench[TWIST_MAX];       /* [N s, N m s] sum of B^T I at the last pass */
     /* [kg, kg m, kg m^2] -d wrench/d twist of each foot, 6 x 6, row major. */
