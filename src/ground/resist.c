@@ -1,43 +1,42 @@
 #define POWER_CALLED /* power.h: no vector loop here needs a power */
-/* Resistive force theory (plate.h) for the slots of a foot, and for plates on their own. */
+/* Resistive force theory (plate.h) for the slots of a foot. */
 #include "ground/resist.h"
 
 #include "ground/element_law.h"
 
-void mild_resist_plane(double beta, double gamma, double alpha[2]) {
-    const Alpha plane = plane_alpha(cos(2.0 * beta), sin(2.0 * beta), cos(gamma), sin(gamma));
-    alpha[0] = plane.x;
-    alpha[1] = plane.z;
-}
-
-void mild_resist_space(const double normal[3], const double direction[3], double alpha[3]) {
-    double x = -direction[2];
-    double z = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
-    double f[3];
-    for (int k = 0; k < 3; k++) {
-        Cubic a;
-        cubic_at(space_coefficients(k), -normal[2], a);
-        f[k] = cubic(a, x, z);
-    }
-    double scale = z < 0.0 ? 0.0 : 1.0 / RESIST_LEVEL; /* no force on a trailing face */
-    for (int k = 0; k < 3; k++) {
-        alpha[k] = scale * (f[0] * normal[k] + f[1] * direction[k] - (k == 2 ? f[2] : 0.0));
-    }
-}
-
 /* Adapts the law of one slot to its motion at the start of the step. */
 MILD_HD void slot_resist(Slots *s, int i, double dt, double rate, const Plate *plate,
-                         const Motion *motion, int in_space, int curves, int kind) {
-    const SlotVelocity v = slot_velocity(s, i, motion, kind);
+                         const Motion *motion, int in_space) {
+    const SlotVelocity v = slot_velocity(s, i, motion, SLOT_UNEVEN);
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
-    element_resist(&element, &memory, plate, in_space, curves, dt, rate, s->strength[i], v.x, v.y,
+    element_resist(&element, &memory, plate, in_space, LAW_LINE, dt, rate, s->strength[i], v.x, v.y,
                    v.descent);
     s->line_stiffness[i] = element.law.line_stiffness;
     slot_store(s, i, &element);
 }
 
-/* The same for all slots of a foot on this theory alone. */
+/* One text of both theories, in place of four inlined. */
+static __attribute__((noinline)) Alpha some_alpha(const Plate *plate, int in_space, double lean,
+                                                  double level, double down) {
+    return plate_alpha(plate, in_space, lean, level, down);
+}
+
+/* The same of any slot. */
+static void some_resist(Slots *s, int i, double dt, const Plate *plate, const Motion *motion,
+                        int in_space, int curves) {
+    const SlotVelocity v = slot_velocity(s, i, motion, SLOT_UNEVEN | SLOT_FACES);
+    const ElementMemory memory = slot_memory(s, i);
+    const PlateMotion m = plate_motion(plate, v.x, v.y, v.descent);
+    const Alpha sinking = some_alpha(plate, in_space, m.lean, m.level, m.down + RESIST_REST);
+    const Alpha sliding = some_alpha(plate, in_space, m.lean, m.level + RESIST_REST, m.down);
+    Element element = slot_element(s, i);
+    element_yield(&element, &memory, dt, 1.0 / dt, s->strength[i], sliding.x, sinking.z, curves);
+    s->line_stiffness[i] = element.law.line_stiffness;
+    slot_store(s, i, &element);
+}
+
+/* slot_resist for all slots of a foot on this theory alone. */
 MILD_HD void slots_resist(const FootScratch *foot, double dt, const Plate *sole, const Motion *now,
                           int in_space) {
     const Plate plate = *sole;
@@ -46,7 +45,7 @@ MILD_HD void slots_resist(const FootScratch *foot, double dt, const Plate *sole,
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
-            slot_resist(s, i, dt, rate, &plate, &motion, in_space, LAW_LINE, SLOT_UNEVEN);
+            slot_resist(s, i, dt, rate, &plate, &motion, in_space);
         }
     }
 }
@@ -86,8 +85,7 @@ static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain
         if (foot->faces) {
             own = face_plate(foot, foot->element[i]);
         }
-        slot_resist(s, l, dt, 1.0 / dt, &own, now, in_space, foot->curves,
-                    SLOT_UNEVEN | foot->faces);
+        some_resist(s, l, dt, &own, now, in_space, foot->curves);
     }
 }
 
