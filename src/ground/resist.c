@@ -4,6 +4,21 @@
 
 #include "ground/element_law.h"
 
+void mild_resist_space(const double normal[3], const double direction[3], double alpha[3]) {
+    double x = -direction[2];
+    double z = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
+    double f[3];
+    for (int k = 0; k < 3; k++) {
+        Cubic a;
+        cubic_at(space_coefficients(k), -normal[2], a);
+        f[k] = cubic(a, x, z);
+    }
+    double scale = z < 0.0 ? 0.0 : 1.0 / RESIST_LEVEL; /* no force on a trailing face */
+    for (int k = 0; k < 3; k++) {
+        alpha[k] = scale * (f[0] * normal[k] + f[1] * direction[k] - (k == 2 ? f[2] : 0.0));
+    }
+}
+
 /* Adapts the law of one slot to its motion at the start of the step. */
 MILD_HD void slot_resist(Slots *s, int i, double dt, double rate, const Plate *plate,
                          const Motion *motion, int in_space) {
