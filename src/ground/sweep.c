@@ -2,8 +2,8 @@
 #include <string.h>
 
 #include "ground/friction.h"
-#include "ground/impulse.h"
 #include "ground/literal.h"
+#include "ground/slot_impulse.h"
 #include "ground/solver.h"
 
 #define SWEEP_TOLERANCE 1e-10 /* [-] of the wrench's change, unless the caller sets one */
@@ -65,12 +65,6 @@ static void element_inverse_mass(const Sweep *sweep, int f, const double *p, dou
             }
         }
     }
-}
-
-/* Normal impulse of one slot at the downward speed w. */
-static Impulse slot_impulse(const Slots *s, int i, int curves, double dt, double w) {
-    const Element element = slot_loaded(s, i, curves);
-    return element_impulse(&element, curves, 1, dt, w);
 }
 
 /* Implicit normal impulse: one Newton step on I - I(w). An impulse dI slows the element by G_zz
