@@ -111,11 +111,10 @@ MILD_HD Impulse lag_impulse(const Element *e, Real dt, Real speed) {
  *     dt mean F + d (E(m1) - E(m0))
  * The part of the way through the air has no force. Both terms increase with m1, so the step stays
  * convex. The damping term has the sign of the motion, so it takes energy. */
-MILD_HD Impulse elastic_impulse_of(const Element *e, Real dt, Real middle, const PowerOver *grows) {
+MILD_HD Impulse elastic_impulse_of(const Element *e, Real dt, Real middle, const PowerWay *power) {
     const Real x0 = real_max(e->middle, 0);
     const Real x1 = real_max(middle, 0);
-    const PowerWay over =
-        power_way_of(e->law.elastic_force, e->law.elastic_exponent, x0, x1 - x0, grows);
+    const PowerWay over = *power;
     const Real whole = REAL_ABS(middle - e->middle);
     const Real inside = REAL_ABS(x1 - x0);
     const Real inverse_way = 1 / (whole + ELEMENT_TINY);
@@ -137,28 +136,28 @@ MILD_HD Impulse elastic_impulse_of(const Element *e, Real dt, Real middle, const
 
 /* The powers in an impulse. */
 typedef struct {
-    PowerOver virgin;  /* of virgin ground; unused without LAW_POWER */
-    PowerOver elastic; /* of the elastic curve; unused without LAW_ELASTIC */
+    PowerWay virgin;  /* of virgin ground; unused without LAW_POWER */
+    PowerWay elastic; /* of the elastic curve; unused without LAW_ELASTIC */
 } ImpulsePowers;
 
-MILD_HD PowerOver elastic_over(const Element *e, Real middle) {
+MILD_HD PowerWay elastic_way(const Element *e, Real middle) {
     const Real x0 = real_max(e->middle, 0);
     const Real x1 = real_max(middle, 0);
-    return power_over(e->law.elastic_exponent, x0, x1 - x0);
+    return power_way(e->law.elastic_force, e->law.elastic_exponent, x0, x1 - x0);
 }
 
 MILD_HD Impulse elastic_impulse(const Element *e, Real dt, Real middle) {
-    const PowerOver grows = elastic_over(e, middle);
-    return elastic_impulse_of(e, dt, middle, &grows);
+    const PowerWay power = elastic_way(e, middle);
+    return elastic_impulse_of(e, dt, middle, &power);
 }
 
 MILD_HD ImpulsePowers element_powers(const Element *e, int curves, Real dt, Real speed) {
     const Real middle = e->depth + dt / 2 * speed;
     const Real virgin_way = real_max(middle - e->yield_depth, 0);
-    ImpulsePowers powers = {{0, 0, 0}, {0, 0, 0}};
-    powers.virgin = law_power_over(&e->law, curves, e->virgin_depth, virgin_way);
+    ImpulsePowers powers = {{0, 0}, {0, 0}};
+    powers.virgin = law_power_way(&e->law, curves, e->virgin_depth, virgin_way);
     if (curves & LAW_ELASTIC) {
-        powers.elastic = elastic_over(e, middle);
+        powers.elastic = elastic_way(e, middle);
     }
     return powers;
 }

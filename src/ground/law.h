@@ -227,7 +227,7 @@ typedef struct {
  * difference. On a way of length 0 the recruited depth is set to 0, because a fused multiply-add
  * may leave a rounding error in the difference. */
 MILD_HD LawWay law_way_of(const Law *law, int curves, Real begin, Real way,
-                          const PowerOver *grows) {
+                          const PowerWay *power) {
     const Real half = begin + way / 2;
     const Real end = begin + way;
     LawWay over;
@@ -257,26 +257,24 @@ MILD_HD LawWay law_way_of(const Law *law, int curves, Real begin, Real way,
         over.recruited += way > 0 ? open_end - open_begin : 0;
     }
     if (curves & LAW_POWER) {
-        const PowerWay power =
-            power_way_of(law->power_force, law->power_exponent, begin, way, grows);
-        over.mean += power.mean;
-        over.mean_slope += power.slope;
+        over.mean += power->mean;
+        over.mean_slope += power->slope;
     }
     return over;
 }
 
-/* The power over a way, for law_way_of; 0 where the law has none. */
-MILD_HD PowerOver law_power_over(const Law *law, int curves, Real begin, Real way) {
-    PowerOver grows = {0, 0, 0};
+/* The power over that way, for law_way_of; 0 where the law has none. */
+MILD_HD PowerWay law_power_way(const Law *law, int curves, Real begin, Real way) {
+    PowerWay power = {0, 0};
     if (curves & LAW_POWER) {
-        grows = power_over(law->power_exponent, begin, way);
+        power = power_way(law->power_force, law->power_exponent, begin, way);
     }
-    return grows;
+    return power;
 }
 
 MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way) {
-    const PowerOver grows = law_power_over(law, curves, begin, way);
-    return law_way_of(law, curves, begin, way, &grows);
+    const PowerWay power = law_power_way(law, curves, begin, way);
+    return law_way_of(law, curves, begin, way, &power);
 }
 
 #endif

@@ -14,8 +14,8 @@ MILD_HD void slot_normal(Slots *s, int i, double dt, const Motion *motion, int k
                          int curves, int stops) {
     const Element element = slot_loaded(s, i, curves);
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
-    const ImpulsePowers powers = {{s->power[0][i], s->power[1][i], s->power[2][i]},
-                                  {s->elastic[0][i], s->elastic[1][i], s->elastic[2][i]}};
+    const ImpulsePowers powers = {{s->power[0][i], s->power[1][i]},
+                                  {s->elastic[0][i], s->elastic[1][i]}};
     const Impulse normal = element_impulse_of(&element, curves, stops, dt, v.descent, &powers);
     s->iz[i] = normal.value;
     s->hzz[i] = normal.slope;
@@ -44,27 +44,36 @@ MILD_HD void slot_way(const Slots *s, int i, double dt, const Motion *motion, in
 }
 
 /* Sets what element_powers gives a slot for a curve, LAW_POWER or LAW_ELASTIC: Slots.power or
- * elastic. Of both, and of a way's depths, the power itself is the same loop. */
+ * elastic. The same loops do it for both, and for the three powers of each. */
 static __attribute__((noinline)) void foot_powers(const FootScratch *foot, double dt,
                                                   const Motion *m, int curve) {
     const Motion motion = *m;
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
         const double *exponent = curve == LAW_POWER ? s->power_exponent : s->elastic_exponent;
         Lanes *power = curve == LAW_POWER ? s->power : s->elastic;
+        Lanes begin, way, grown[3];
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
-            double begin, way;
-            slot_way(s, i, dt, &motion, curve, &begin, &way);
-            const PowerEnds ends = power_ends(begin, way);
-            power[0][i] = (ends.q0 + ends.q1) / 2;
-            power[1][i] = ends.q0;
-            power[2][i] = ends.q1;
+            slot_way(s, i, dt, &motion, curve, &begin[i], &way[i]);
+            const PowerEnds ends = power_ends(begin[i], way[i]);
+            grown[0][i] = (ends.q0 + ends.q1) / 2;
+            grown[1][i] = ends.q0;
+            grown[2][i] = ends.q1;
         }
         for (int k = 0; k < 3; k++) {
 #pragma omp simd
             for (int i = 0; i < SLOT_LANES; i++) {
-                power[k][i] = real_pow(power[k][i], (exponent[i] - 1) / 2);
+                grown[k][i] = real_pow(grown[k][i], (exponent[i] - 1) / 2);
             }
+        }
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            const PowerOver grows = {grown[0][i], grown[1][i], grown[2][i]};
+            const double force =
+                curve == LAW_POWER ? s->power_force[i] * s->carry[i] : s->elastic_force[i];
+            const PowerWay over = power_way_of(force, exponent[i], begin[i], way[i], &grows);
+            power[0][i] = over.mean;
+            power[1][i] = over.slope;
         }
     }
 }

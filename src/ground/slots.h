@@ -99,8 +99,8 @@ typedef struct {
     Lanes explicit_impulse; /* [N s] */
 
     /* Powers at the last trial twist: contact_pass. */
-    Lanes power[3];   /* [-] ImpulsePowers.virgin; 0 unless the foot's curves have LAW_POWER */
-    Lanes elastic[3]; /* [-] ImpulsePowers.elastic; 0 unless they have LAW_ELASTIC */
+    Lanes power[2];   /* ImpulsePowers.virgin */
+    Lanes elastic[2]; /* ImpulsePowers.elastic */
 
     /* Impulse at the last trial twist, world: contact_pass, sweep_element. */
     Lanes ix; /* [N s] */
