@@ -60,6 +60,7 @@ static __attribute__((noinline)) void foot_powers(const FootScratch *foot, doubl
             grown[1][i] = ends.q0;
             grown[2][i] = ends.q1;
         }
+#pragma GCC unroll 3
         for (int k = 0; k < 3; k++) {
 #pragma omp simd
             for (int i = 0; i < SLOT_LANES; i++) {
