@@ -4,6 +4,7 @@
 
 #include "ground/begin.h"
 #include "ground/carry.h"
+#include "ground/drag.h"
 #include "ground/faces.h"
 #include "ground/gather.h"
 #include "ground/locate.h"
@@ -69,27 +70,13 @@ static int slots_sink(const FootScratch *foot, double dt) {
     return sum > 0.0;
 }
 
-MILD_HD void slot_drag(Slots *s, int i, double dt, const Motion *now, const Motion *free,
-                       int curves, int kind) {
-    const double slower = slot_velocity(s, i, now, kind).descent;
-    const double faster = slot_velocity(s, i, free, kind).descent;
-    Element element = slot_loaded(s, i, curves);
-    element_drag(&element, curves, dt, real_max(faster - slower, 0.0));
-    s->entry_speed[i] = element.entry_speed;
-    s->stop_drag[i] = element.stop_drag;
-    s->stop_growth[i] = element.stop_growth;
-}
-
 /* Calls element_drag for all slots. The loop for cones and heaps, which have drag, is in vectors;
  * that for surfaces and ground with a power beside them is not. */
 static void slots_drag(const FootScratch *foot, double dt, const Motion *now, const Motion *free) {
     const Motion before = *now;
     const Motion after = *free;
     if (foot_variant(foot) & ~(LAW_CONE | LAW_HEAP)) {
-        for (int i = 0; i < foot->active; i++) {
-            slot_drag(slot_block(foot, i), i % SLOT_LANES, dt, now, free, foot->curves,
-                      SLOT_UNEVEN | SLOT_FACES);
-        }
+        slots_drag_any(foot, dt, now, free);
         return;
     }
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
@@ -98,28 +85,6 @@ static void slots_drag(const FootScratch *foot, double dt, const Motion *now, co
             slot_drag(s, i, dt, &before, &after, LAW_CONE | LAW_HEAP, SLOT_UNEVEN);
         }
     }
-}
-
-/* Sets the explicit impulse of materials that create energy (passive = false). Returns true when
- * the terrain has such a material. */
-static int slots_explicit(const FootScratch *foot, int materials, double dt, const Motion *free) {
-    int any = 0;
-    for (int m = 0; m < materials; m++) {
-        any |=
-            foot->derived[m].slot.law.mass_rate < 0.0 || foot->derived[m].slot.law.drag_rate < 0.0;
-    }
-    for (int i = 0; any && i < foot->active; i++) {
-        Slots *s = slot_block(foot, i);
-        const int l = i % SLOT_LANES;
-        if (!(s->depth[l] > 0.0) || s->middle[l] < s->depth_max[l]) {
-            continue; /* above the ground or on the unloading line */
-        }
-        const Element element = slot_loaded(s, l, foot->curves);
-        s->explicit_impulse[l] =
-            element_explicit_of(&element, foot->curves, dt,
-                                slot_velocity(s, l, free, SLOT_UNEVEN | foot->faces).descent);
-    }
-    return any;
 }
 
 /* Clears what slots_drag and slots_explicit wrote in the step before. */
