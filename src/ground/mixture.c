@@ -131,7 +131,8 @@ void slots_pad(const FootScratch *foot) {
 static int slots_are_uniform(const FootScratch *foot, const Memory *memory) {
     const int32_t *remembered = memory->material;
     const int32_t *set = foot->slot_material;
-    const int elements = foot->elements, active = foot->active;
+    const int elements = foot->padded & -VECTOR_LANES; /* the padding remembers no material */
+    const int active = foot->active;
     int32_t differs = 0;
 #pragma omp simd reduction(| : differs)
     for (int e = 0; e < elements; e++) {

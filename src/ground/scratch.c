@@ -180,8 +180,9 @@ void foot_points(const FootScratch *foot) {
     const double nx = foot->arm[2][0];
     const double ny = foot->arm[2][1];
     const double nz = foot->arm[2][2];
+    const int end = foot->padded & -VECTOR_LANES; /* changes nothing; no loop for a remainder */
 #pragma omp simd
-    for (int i = 0; i < foot->padded; i++) {
+    for (int i = 0; i < end; i++) {
         foot->point_x[i] = ox + ex * x[i] + nx * y[i];
         foot->point_y[i] = oy + ey * x[i] + ny * y[i];
         foot->point_z[i] = oz + ez * x[i] + nz * y[i];
