@@ -147,11 +147,38 @@ static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory
     }
 }
 
+/* Shares wear: adds to what foot_advance_all has stored. */
+static void foot_wear(const Advance *a, const Memory *all) {
+    const Memory own = *all, *memory = &own;
+    const Motion motion = a->motion;
+    const double dt = a->dt;
+    int e = 0;
+    for (const Slots *s = a->foot->slot, *end = slots_end(a->foot); s < end;
+         s++, e += SLOT_LANES) {
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN);
+            const Element element = slot_element(s, i);
+            const ElementMemory before = slot_memory(s, i);
+            const Share share = slot_share(s, i);
+            const int stays = s->depth[i] + dt / 2 * v.descent > 0.0;
+            ElementMemory after = before;
+            after.depth_max = memory->depth_max[e + i];
+            after.front_speed = memory->front_speed[e + i];
+            memory->worn[e + i] = element_wear(&element, &share, &before, &after, dt, s->iz[i], v.x,
+                                               v.y, v.descent, stays);
+            memory->depth_max[e + i] = after.depth_max;
+            memory->front_speed[e + i] = after.front_speed;
+            memory->drift[e + i] = after.drift;
+            memory->pending_x[e + i] = after.pending_x;
+            memory->pending_y[e + i] = after.pending_y;
+        }
+    }
+}
+
 /* Vector loop for a foot with all elements listed, on ground without imprints. Returns how many
- * elements remember something. heap: bool, shares wear; a constant. On level ground the slopes are
- * 0. */
-MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material,
-                             int heap) {
+ * elements remember something. On level ground the slopes are 0. */
+static int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material) {
     const FootScratch *foot = a->foot;
     const Memory own = *all, *memory = &own;
     const Motion motion = a->motion;
@@ -166,13 +193,8 @@ MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t 
             const Element element = slot_element(s, i);
             const ElementMemory before = slot_memory(s, i);
             const int stays = s->depth[i] + dt / 2 * v.descent > 0.0;
-            ElementMemory after =
+            const ElementMemory after =
                 element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
-            if (heap) {
-                const Share share = slot_share(s, i);
-                memory->worn[e + i] = element_wear(&element, &share, &before, &after, dt, s->iz[i],
-                                                   v.x, v.y, v.descent, stays);
-            }
             memory_store(memory, e + i, &after);
             count[0][i] += stays ? 1.0 : 0.0;
             count[1][i] += stays && element_turns(element.entry_speed, v.descent) ? 1.0 : 0.0;
@@ -180,6 +202,9 @@ MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t 
     }
     double sums[2];
     lanes_sum(count, 2, sums);
+    if (foot->curves & LAW_HEAP) {
+        foot_wear(a, memory);
+    }
     if (foot->uneven) {
         foot_planes(foot, a->height, memory);
     }
@@ -299,10 +324,8 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                            .dt = input->dt,
                            .height = terrain->height};
         const int all = foot->active == foot->elements && ground->tiles == 0 && !foot->faces;
-        if (all && foot->curves & LAW_HEAP) {
-            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1);
-        } else if (all) {
-            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0);
+        if (all) {
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material);
         } else {
             ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material);
         }

@@ -193,7 +193,7 @@ static void foot_sums(const FootScratch *foot, double sums[12]) {
 }
 
 /* torque += p x I */
-static inline void cross_add(const double *p, const double *I, double *torque) {
+static __attribute__((noinline)) void cross_add(const double *p, const double *I, double *torque) {
     torque[0] += p[1] * I[2] - p[2] * I[1];
     torque[1] += p[2] * I[0] - p[0] * I[2];
     torque[2] += p[0] * I[1] - p[1] * I[0];
