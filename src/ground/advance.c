@@ -79,8 +79,8 @@ static __attribute__((cold, noinline)) double slot_peak(const Advance *a, const 
     return element_peak(&element, a->foot->curves, s->iz[i], speed, middle);
 }
 
-/* Raises the greatest depth of a slot, of element e, if the element reversed within the step: it was
- * then deeper than at either end. */
+/* Raises the greatest depth of a slot, of element e, if the element reversed within the step: it
+ * was then deeper than at either end. */
 static void slot_raise(const Advance *a, const Memory *memory, const Slots *s, int i, int e,
                        double speed, double middle) {
     const int turns = element_turns(s->entry_speed[i], speed);
@@ -153,8 +153,7 @@ static void foot_wear(const Advance *a, const Memory *all) {
     const Motion motion = a->motion;
     const double dt = a->dt;
     int e = 0;
-    for (const Slots *s = a->foot->slot, *end = slots_end(a->foot); s < end;
-         s++, e += SLOT_LANES) {
+    for (const Slots *s = a->foot->slot, *end = slots_end(a->foot); s < end; s++, e += SLOT_LANES) {
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
             const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN);
@@ -318,11 +317,11 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
         }
         const Memory memory = ground_memory(ground, f);
         const Advance advance = {.foot = foot,
-                           .imprints = ground->tiles > 0 ? &imprints : NULL,
-                           .rotation = foot->faces ? faces_level : input->rotation[f],
-                           .motion = foot_motion(foot, result->velocity + 6 * f),
-                           .dt = input->dt,
-                           .height = terrain->height};
+                                 .imprints = ground->tiles > 0 ? &imprints : NULL,
+                                 .rotation = foot->faces ? faces_level : input->rotation[f],
+                                 .motion = foot_motion(foot, result->velocity + 6 * f),
+                                 .dt = input->dt,
+                                 .height = terrain->height};
         const int all = foot->active == foot->elements && ground->tiles == 0 && !foot->faces;
         if (all) {
             ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material);

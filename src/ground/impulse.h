@@ -169,8 +169,7 @@ MILD_HD Impulse element_impulse_of(const Element *e, int curves, int stops, Real
                                    const ImpulsePowers *powers) {
     const Real middle = e->depth + dt / 2 * speed;
     const Real virgin_way = real_max(middle - e->yield_depth, 0);
-    const LawWay virgin =
-        law_way_of(&e->law, curves, e->virgin_depth, virgin_way, &powers->virgin);
+    const LawWay virgin = law_way_of(&e->law, curves, e->virgin_depth, virgin_way, &powers->virgin);
 
     Impulse sum = path_impulse(e, dt, middle, virgin_way, &virgin);
     const Impulse lag = lag_impulse(e, dt, speed);

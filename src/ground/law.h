@@ -42,7 +42,7 @@
  * (element_law.c). A model's `law` (model.h) fills in the numbers. `curves` is a constant in the
  * vector loops, so a curve costs nothing on ground that does not have it. law_variant says which
  * loop serves a foot; for a loop of the new curve alone, add it there and to the switches of
- * pass.c and prepare.c. Look at element_drag's callers (prepare.c, contact.inc) if the curve has a
+ * pass.c and prepare.c. Look at element_drag's callers (prepare.c, drag.h, contact.inc) if the curve has a
  * drag, and at resist.c if a resistive force may be blended with it. */
 #ifndef MILD_GROUND_LAW_H
 #define MILD_GROUND_LAW_H
@@ -226,8 +226,7 @@ typedef struct {
  * with its force at the end of the way, because it is so stiff that a mean would make no
  * difference. On a way of length 0 the recruited depth is set to 0, because a fused multiply-add
  * may leave a rounding error in the difference. */
-MILD_HD LawWay law_way_of(const Law *law, int curves, Real begin, Real way,
-                          const PowerWay *power) {
+MILD_HD LawWay law_way_of(const Law *law, int curves, Real begin, Real way, const PowerWay *power) {
     const Real half = begin + way / 2;
     const Real end = begin + way;
     LawWay over;

@@ -171,8 +171,8 @@ int point_solves(const System *system, const Point *point) {
 }
 
 /* Row `i` of [1 + H A | right], i in the system. H: [6] of the row's foot, which has the rows from
- * `foot` on. lane: 1 in one lane, from a window over one 1 among zeros: a number that is stored into
- * a vector delays the load of it. */
+ * `foot` on. lane: a 1 among zeros; a window over it has 1 in one lane. A number that is stored into
+ * a vector would delay the load of it. */
 static void row_newton(const System *system, int i, int foot, const double *H, double right,
                        const double *lane, Vector *row) {
     const double *one = lane - i;
@@ -228,7 +228,8 @@ void point_between(const System *system, const Point *from, const Point *to, dou
     }
 }
 
-__attribute__((cold)) void point_halve(const System *system, MildScratch *scratch, const Point *at, Point *next) {
+__attribute__((cold)) void point_halve(const System *system, MildScratch *scratch, const Point *at,
+                                       Point *next) {
     const Point full = *next;
     double t = 1.0;
     for (int k = 0; k < NEWTON_HALVINGS; k++) {
@@ -243,7 +244,8 @@ __attribute__((cold)) void point_halve(const System *system, MildScratch *scratc
 
 /* Bool: the step between two points is within the rounding error of V^ + A P and of the depths to
  * which dt V is added. */
-static __attribute__((cold)) int step_is_rounding(const System *system, const Point *from, const Point *to) {
+static __attribute__((cold)) int step_is_rounding(const System *system, const Point *from,
+                                                  const Point *to) {
     const int n = system->n;
     double size = 0.0;
     for (int i = 0; i < n; i++) {
@@ -262,7 +264,8 @@ static __attribute__((cold)) int step_is_rounding(const System *system, const Po
     return 1;
 }
 
-__attribute__((cold)) void point_correct(const System *system, MildScratch *scratch, Point *at, Point *next) {
+__attribute__((cold)) void point_correct(const System *system, MildScratch *scratch, Point *at,
+                                         Point *next) {
     double scale = system_norm(system, at->impulse.at);
     if (!(at->residual <= NEWTON_NEAR * scale + NEWTON_LENGTH)) {
         return;

@@ -10,8 +10,8 @@
 #include "ground/impulse.h"
 #include "ground/moments.h"
 
-MILD_HD void slot_normal(Slots *s, int i, double dt, const Motion *motion, int kind,
-                         int curves, int stops) {
+MILD_HD void slot_normal(Slots *s, int i, double dt, const Motion *motion, int kind, int curves,
+                         int stops) {
     const Element element = slot_loaded(s, i, curves);
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
     const ImpulsePowers powers = {{s->power[0][i], s->power[1][i]},
@@ -40,7 +40,8 @@ MILD_HD void slot_way(const Slots *s, int i, double dt, const Motion *motion, in
     const double middle = s->depth[i] + dt / 2 * v.descent;
     const double from = real_max(s->middle[i], 0);
     *begin = curve == LAW_POWER ? s->virgin_depth[i] : from;
-    *way = curve == LAW_POWER ? real_max(middle - s->yield_depth[i], 0) : real_max(middle, 0) - from;
+    *way =
+        curve == LAW_POWER ? real_max(middle - s->yield_depth[i], 0) : real_max(middle, 0) - from;
 }
 
 /* Sets what element_powers gives a slot for a curve, LAW_POWER or LAW_ELASTIC: Slots.power or
@@ -115,8 +116,8 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
  *
  *     h = -dI/dv = f + k c g^T
  *
- * kind: SLOT_UNEVEN, SLOT_FACES. held: bool, the friction bounds are Slots.bound. turned: bool, some
- * elements have a reversal velocity in Slots.turn_x and turn_y (energy.c). */
+ * kind: SLOT_UNEVEN, SLOT_FACES. held: bool, the friction bounds are Slots.bound. turned: bool,
+ * some elements have a reversal velocity in Slots.turn_x and turn_y (energy.c). */
 MILD_HD void block_friction(Slots *s, const Motion *motion, int kind, int held, int turned) {
 #pragma omp simd
     for (int i = 0; i < SLOT_LANES; i++) {

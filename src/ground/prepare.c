@@ -12,8 +12,8 @@
 #include "ground/models.h"
 #include "ground/terrain.h"
 
-MILD_HD void slot_begin(Slots *s, int i, double dt, double rate, const Motion *motion,
-                        int curves, int kind) {
+MILD_HD void slot_begin(Slots *s, int i, double dt, double rate, const Motion *motion, int curves,
+                        int kind) {
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);

@@ -131,7 +131,6 @@ static inline Slots *slot_block(const FootScratch *foot, int i) {
     return foot->slot + i / SLOT_LANES;
 }
 
-
 /* The curves of the compiled loop for a foot. The loop of all curves is also that of surfaces: it
  * counts with the heights of the elements, which are 0 in a plane sole. */
 static inline int foot_variant(const FootScratch *foot) {

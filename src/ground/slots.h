@@ -3,15 +3,15 @@
  * A slot is one listed element: lane i % SLOT_LANES of block i / SLOT_LANES. The list is padded to
  * whole blocks. The law of the padding has no force at any depth.
  *
- * A loop over blocks has a loop over lanes inside, which is one vector. All numbers of a block lie at
- * constant distances, so one address serves them all. */
+ * A loop over blocks has a loop over lanes inside, which is one vector. All numbers of a block lie
+ * at constant distances, so one address serves them all. */
 #ifndef MILD_GROUND_SLOTS_H
 #define MILD_GROUND_SLOTS_H
 
 #include "ground/motion.h"
 #include "ground/share.h"
 
-/* Lanes of a vector. cmake/Library.cmake sets it where vectors of 512 bits are preferred. */
+/* Lanes of a vector. src/CMakeLists.txt sets it where vectors of 512 bits are preferred. */
 #ifndef SLOT_LANES
 #ifdef __AVX__
 #define SLOT_LANES 4
@@ -135,8 +135,8 @@ MILD_HD LaneVector lanes_load(const double *lanes) {
 }
 
 #define SLOT_LAW_LOAD(name) .name = s->name[i],
-/* The element of lane i of a block, by value. The compiler does not load fields that the caller does
- * not use. */
+/* The element of lane i of a block, by value. The compiler does not load fields that the caller
+ * does not use. */
 MILD_HD Element slot_element(const Slots *s, int i) {
     return (Element){
         .law = {LAW_NUMBERS(SLOT_LAW_LOAD)},

@@ -4,8 +4,8 @@
 
 #include "ground/energy.h"
 #include "ground/faces.h"
-#include "ground/moments.h"
 #include "ground/friction.h"
+#include "ground/moments.h"
 #include "ground/prepare.h"
 #include "ground/solver.h"
 

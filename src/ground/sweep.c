@@ -77,8 +77,7 @@ static double element_normal(const Slots *s, int i, int curves, double dt, doubl
 /* Paper eq 13: predict, correct by the continuity error, project onto the friction disc. Within the
  * disc the law is I = t of friction.h, so v = (dt f - I)/(dt^2 k + c), which is a compliance in
  * series with G. On the rim I has the direction of t, which any scale of t gives. */
-static void element_friction(Slots *s, int i, const double *v, const double *delta,
-                             double G) {
+static void element_friction(Slots *s, int i, const double *v, const double *delta, double G) {
     double radius = s->mu[i] * s->iz[i] + s->drift_bound[i];     /* r [N s] */
     double stiff = s->hold_stiffness[i] + FRICTION_LAG * radius; /* dt^2 k + c [kg] */
     double compliance = stiff > 0.0 ? 1.0 / stiff : 0.0;         /* [1/kg] */
