@@ -171,8 +171,8 @@ int point_solves(const System *system, const Point *point) {
 }
 
 /* Row `i` of [1 + H A | right], i in the system. H: [6] of the row's foot, which has the rows from
- * `foot` on. lane: a 1 among zeros; a window over it has 1 in one lane. A number that is stored into
- * a vector would delay the load of it. */
+ * `foot` on. lane: a 1 among zeros; a window over it has 1 in one lane. A number that is stored
+ * into a vector would delay the load of it. */
 static void row_newton(const System *system, int i, int foot, const double *H, double right,
                        const double *lane, Vector *row) {
     const double *one = lane - i;
