@@ -11,13 +11,14 @@
 #include "ground/motion.h"
 #include "ground/share.h"
 
-/* Lanes of a vector. src/CMakeLists.txt sets it where vectors of 512 bits are preferred. */
-#ifndef SLOT_LANES
-#ifdef __AVX__
+/* Lanes of a vector. MILD_WIDEST_VECTORS: the compiler takes the widest that there are
+ * (src/CMakeLists.txt). */
+#if defined(__AVX512F__) && defined(MILD_WIDEST_VECTORS)
+#define SLOT_LANES 8
+#elif defined(__AVX__)
 #define SLOT_LANES 4
 #else
 #define SLOT_LANES 2
-#endif
 #endif
 
 typedef double Lanes[SLOT_LANES];
