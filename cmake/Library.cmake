@@ -59,6 +59,7 @@ function(mild_library name description objects requires)
   target_link_options(${name}_shared PRIVATE -Wl,-z,noseparate-code) # no pages of padding: 4 kB
   target_link_options(${name}_shared PRIVATE -Wl,-Bsymbolic-functions) # calls inside need no table of addresses: 2 kB
   target_link_options(${name}_shared PRIVATE -Wl,--gc-sections) # what no function of the interface calls: 1 kB
+  target_link_options(${name}_shared PRIVATE -Wl,-z,now) # with -fno-plt: no table of jumps to libc: 1 kB
   if(mild_packs_addresses)
     target_link_options(${name}_shared PRIVATE -Wl,-z,pack-relative-relocs)
   endif()

@@ -1,13 +1,13 @@
 /* Last stage of a contact step: mild_ground_advance updates what the ground remembers. */
 #define POWER_CALLED /* power.h: no vector loop here needs a power */
 #include "ground/faces.h"
+#include "ground/moments.h"
 #include "ground/remember.h"
 #include "ground/scratch.h"
 
 /* The elements of a foot in one step. */
 typedef struct {
     const FootScratch *foot;
-    Slots slot;               /* its memory arrays are those of the ground to advance */
     const Imprints *imprints; /* NULL: the ground forgets at lift-off */
     const double *rotation;   /* [9] foot to world */
     Motion motion;            /* of the foot after the step */
@@ -30,8 +30,7 @@ MILD_HD void memory_store(const Memory *memory, int e, const ElementMemory *afte
 /* Bool: the element lifts off. Without imprints it does so when it rises above the undisturbed
  * surface, with imprints as soon as its unloading line carries no force. m1: depth in the middle of
  * the step. */
-static int element_lifted(const Advance *a, int i, double m1) {
-    const Slots *s = &a->slot;
+static int element_lifted(const Advance *a, const Slots *s, int i, double m1) {
     if (!(m1 > 0.0)) {
         return 1;
     }
@@ -42,9 +41,8 @@ static int element_lifted(const Advance *a, int i, double m1) {
  * and in every cell that it slides out of. When it slides into a deeper imprint it takes over that
  * depth. A greater depth never means more force, and an element takes a lesser one while it carries
  * nothing, so this adds no energy. refill: [-] of the material. */
-static void element_imprint(const Advance *a, const Memory *memory, int i, int e, int lifted,
-                            double refill) {
-    const Slots *s = &a->slot;
+static void element_imprint(const Advance *a, const Memory *memory, const Slots *s, int i, int e,
+                            int lifted, double refill) {
     if (!(s->recovery[i] < 1.0)) {
         return;
     }
@@ -75,19 +73,18 @@ static void element_imprint(const Advance *a, const Memory *memory, int i, int e
 }
 
 /* [m] element_peak of a slot that reversed within the step. */
-static __attribute__((cold, noinline)) double slot_peak(const Advance *a, int i, double speed,
-                                                        double middle) {
-    const Element element = slot_loaded(&a->slot, i, a->foot->curves);
-    return element_peak(&element, a->foot->curves, a->slot.iz[i], speed, middle);
+static __attribute__((cold, noinline)) double slot_peak(const Advance *a, const Slots *s, int i,
+                                                        double speed, double middle) {
+    const Element element = slot_loaded(s, i, a->foot->curves);
+    return element_peak(&element, a->foot->curves, s->iz[i], speed, middle);
 }
 
-/* Raises the greatest depth of slot i, element e, if the element reversed within the step: it was
- * then deeper than at either end. */
-static void slot_raise(const Advance *a, const Memory *memory, int i, int e, double speed,
-                       double middle) {
-    const Slots *s = &a->slot;
+/* Raises the greatest depth of a slot, of element e, if the element reversed within the step: it
+ * was then deeper than at either end. */
+static void slot_raise(const Advance *a, const Memory *memory, const Slots *s, int i, int e,
+                       double speed, double middle) {
     const int turns = element_turns(s->entry_speed[i], speed);
-    const double peak = turns ? slot_peak(a, i, speed, middle) : middle;
+    const double peak = turns ? slot_peak(a, s, i, speed, middle) : middle;
     const double depth = s->virgin_depth[i] + peak - s->yield_depth[i];
     memory->depth_max[e] = fmax(memory->depth_max[e], depth);
 }
@@ -95,11 +92,13 @@ static void slot_raise(const Advance *a, const Memory *memory, int i, int e, dou
 /* The same for all elements of a foot. It is not part of the vector loop, where taking the address
  * of a local variable would prevent vectorisation. */
 static __attribute__((cold, noinline)) void foot_peaks(const Advance *a, const Memory *memory) {
-    for (int i = 0; i < a->foot->elements; i++) {
-        const SlotVelocity v = slot_velocity(&a->slot, i, &a->motion, 1);
-        const double middle = a->slot.depth[i] + a->dt / 2 * v.descent;
-        if (middle > 0.0 && element_turns(a->slot.entry_speed[i], v.descent)) {
-            slot_raise(a, memory, i, i, v.descent, middle);
+    for (int e = 0; e < a->foot->elements; e++) {
+        const Slots *s = slot_block(a->foot, e);
+        const int i = e % SLOT_LANES;
+        const SlotVelocity v = slot_velocity(s, i, &a->motion, 1);
+        const double middle = s->depth[i] + a->dt / 2 * v.descent;
+        if (middle > 0.0 && element_turns(s->entry_speed[i], v.descent)) {
+            slot_raise(a, memory, s, i, e, v.descent, middle);
         }
     }
 }
@@ -113,6 +112,19 @@ MILD_HD void slot_plane(const FootScratch *foot, double height, const Slots *s,
     memory->slope_y[e] = slope_y;
     memory->plane[e] = s->depth[i] - slope_x * foot->point_x[e] - slope_y * foot->point_y[e] +
                        foot->point_z[e] - height;
+}
+
+/* The same for all elements of a foot. */
+static void foot_planes(const FootScratch *all, double height, const Memory *memory) {
+    const FootScratch foot = *all; /* copies keep the addresses in registers */
+    const Memory own = *memory;
+    int e = 0;
+    for (const Slots *s = foot.slot, *end = slots_end(&foot); s < end; s++, e += SLOT_LANES) {
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            slot_plane(&foot, height, s, &own, i, e + i);
+        }
+    }
 }
 
 /* After the vector loop: peaks, the padding, and the material of each element. turned: bool, an
@@ -135,55 +147,68 @@ static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory
     }
 }
 
+/* Shares wear: adds to what foot_advance_all has stored. */
+static void foot_wear(const Advance *a, const Memory *all) {
+    const Memory own = *all, *memory = &own;
+    const Motion motion = a->motion;
+    const double dt = a->dt;
+    int e = 0;
+    for (const Slots *s = a->foot->slot, *end = slots_end(a->foot); s < end; s++, e += SLOT_LANES) {
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN);
+            const Element element = slot_element(s, i);
+            const ElementMemory before = slot_memory(s, i);
+            const Share share = slot_share(s, i);
+            const int stays = s->depth[i] + dt / 2 * v.descent > 0.0;
+            ElementMemory after = before;
+            after.depth_max = memory->depth_max[e + i];
+            after.front_speed = memory->front_speed[e + i];
+            memory->worn[e + i] = element_wear(&element, &share, &before, &after, dt, s->iz[i], v.x,
+                                               v.y, v.descent, stays);
+            memory->depth_max[e + i] = after.depth_max;
+            memory->front_speed[e + i] = after.front_speed;
+            memory->drift[e + i] = after.drift;
+            memory->pending_x[e + i] = after.pending_x;
+            memory->pending_y[e + i] = after.pending_y;
+        }
+    }
+}
+
 /* Vector loop for a foot with all elements listed, on ground without imprints. Returns how many
- * elements remember something. kind: SLOT_UNEVEN or 0. heap: bool, shares wear. Both are constants.
- */
-MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material, int kind,
-                             int heap) {
-    const FootScratch foot = *a->foot;
-    const Slots local = a->slot, *s = &local;
+ * elements remember something. On level ground the slopes are 0. */
+static int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material) {
+    const FootScratch *foot = a->foot;
     const Memory own = *all, *memory = &own;
     const Motion motion = a->motion;
     const double dt = a->dt;
     const double rate = 1.0 / dt;
-    const double height = a->height;
-    const int end = foot.padded & -VECTOR_LANES; /* changes nothing; see moments.c */
-    if (end < VECTOR_LANES) {
-        return 0; /* never. The compiler then adds no loop for a remainder */
-    }
-    double touched = 0.0;
-    double turned = 0.0;
-#pragma omp simd reduction(+ : touched, turned)
-    for (int i = 0; i < end; i++) {
-        const SlotVelocity v = slot_velocity(s, i, &motion, kind);
-        const Element element = slot_element(s, i);
-        const ElementMemory before = slot_memory(s, i);
-        const int stays = s->depth[i] + dt / 2 * v.descent > 0.0;
-        ElementMemory after =
-            element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
-        if (heap) {
-            const Share share = slot_share(s, i);
-            memory->worn[i] = element_wear(&element, &share, &before, &after, dt, s->iz[i], v.x,
-                                           v.y, v.descent, stays);
+    Lanes count[2] = {{0.0}}; /* touched, turned */
+    int e = 0;
+    for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++, e += SLOT_LANES) {
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN);
+            const Element element = slot_element(s, i);
+            const ElementMemory before = slot_memory(s, i);
+            const int stays = s->depth[i] + dt / 2 * v.descent > 0.0;
+            const ElementMemory after =
+                element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
+            memory_store(memory, e + i, &after);
+            count[0][i] += stays ? 1.0 : 0.0;
+            count[1][i] += stays && element_turns(element.entry_speed, v.descent) ? 1.0 : 0.0;
         }
-        memory_store(memory, i, &after);
-        if (kind && !heap) {
-            slot_plane(&foot, height, s, memory, i, i);
-        }
-        touched += stays ? 1.0 : 0.0;
-        turned += stays && element_turns(element.entry_speed, v.descent) ? 1.0 : 0.0;
     }
-    foot_finish(a, all, material, turned > 0.0);
-    return foot.uneven ? foot.elements : (int)touched;
-}
-
-/* The same on ground whose elements carry a share of their load: one loop serves level ground too,
- * where the slopes are 0. */
-static int foot_advance_heaps(const Advance *a, const Memory *memory, const int32_t *material) {
-    for (int i = 0; a->foot->uneven && i < a->foot->elements; i++) {
-        slot_plane(a->foot, a->height, &a->slot, memory, i, i);
+    double sums[2];
+    lanes_sum(count, 2, sums);
+    if (foot->curves & LAW_HEAP) {
+        foot_wear(a, memory);
     }
-    return foot_advance_all(a, memory, material, SLOT_UNEVEN, 1);
+    if (foot->uneven) {
+        foot_planes(foot, a->height, memory);
+    }
+    foot_finish(a, all, material, sums[1] > 0.0);
+    return foot->uneven ? foot->elements : (int)sums[0];
 }
 
 /* An element that is not listed forgets. Returns whether it remembers that it was here. */
@@ -208,14 +233,14 @@ static int face_unlisted(const Advance *a, const Memory *memory, int e) {
     return buried;
 }
 
-/* [-] The wear of slot i after the step; adds to `after`. */
-static __attribute__((noinline)) double slot_wear(const Advance *a, int i,
+/* [-] The wear of a slot after the step; adds to `after`. */
+static __attribute__((noinline)) double slot_wear(const Advance *a, const Slots *s, int i,
                                                   const ElementMemory *before, ElementMemory *after,
                                                   const SlotVelocity *v, int stays) {
-    const Element element = slot_element(&a->slot, i);
-    const Share share = slot_share(&a->slot, i);
-    return element_wear(&element, &share, before, after, a->dt, a->slot.iz[i], v->x, v->y,
-                        v->descent, stays);
+    const Element element = slot_element(s, i);
+    const Share share = slot_share(s, i);
+    return element_wear(&element, &share, before, after, a->dt, s->iz[i], v->x, v->y, v->descent,
+                        stays);
 }
 
 /* The general case: some elements are listed, the ground keeps imprints, or the foot is a surface.
@@ -223,12 +248,13 @@ static __attribute__((noinline)) double slot_wear(const Advance *a, int i,
 static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
     const FootScratch *foot = a->foot;
     const int faces = foot->faces;
-    const Slots *s = &a->slot;
     const int32_t lifted_material = a->imprints || foot->uneven ? MATERIAL_FREE : MATERIAL_NONE;
     int next = 0;
     int touched = 0;
-    for (int i = 0; i < foot->active; i++, next++) {
-        const int e = foot->element[i];
+    for (int slot = 0; slot < foot->active; slot++, next++) {
+        const Slots *s = slot_block(foot, slot);
+        const int i = slot % SLOT_LANES;
+        const int e = foot->element[slot];
         for (; next < e; next++) {
             touched += faces ? face_unlisted(a, memory, next) : element_unlisted(memory, next);
         }
@@ -240,27 +266,27 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         }
         const SlotVelocity v = slot_velocity(s, i, &a->motion, SLOT_UNEVEN | faces);
         const double middle = s->depth[i] + a->dt / 2 * v.descent;
-        const int lifted = element_lifted(a, i, middle);
+        const int lifted = element_lifted(a, s, i, middle);
         const int carried = memory->material[e] >= 0;
         const Element element = slot_element(s, i);
         const ElementMemory before = slot_memory(s, i);
         ElementMemory after = element_remember(&element, &before, a->dt, 1.0 / a->dt, s->iz[i], v.x,
                                                v.y, v.descent, !lifted);
         if (foot->curves & LAW_HEAP) {
-            memory->worn[e] = slot_wear(a, i, &before, &after, &v, !lifted);
+            memory->worn[e] = slot_wear(a, s, i, &before, &after, &v, !lifted);
         }
         memory_store(memory, e, &after);
         if (!lifted) {
-            slot_raise(a, memory, i, e, v.descent, middle);
+            slot_raise(a, memory, s, i, e, v.descent, middle);
         }
-        const int barred = (material[i] & SLOT_BARRED) != 0;
-        memory->material[e] = lifted || barred ? lifted_material : material[i];
+        const int barred = (material[slot] & SLOT_BARRED) != 0;
+        memory->material[e] = lifted || barred ? lifted_material : material[slot];
         if (faces) {
             memory->share[e] = lifted ? 0.0 : s->share[i];
         }
         if (a->imprints && (carried || !lifted)) {
-            const double refill = foot->derived[material[i] & 0xff].material.refill;
-            element_imprint(a, memory, i, e, lifted, refill);
+            const double refill = foot->derived[material[slot] & 0xff].material.refill;
+            element_imprint(a, memory, s, i, e, lifted, refill);
         }
         if (foot->uneven) {
             slot_plane(foot, a->height, s, memory, i, e);
@@ -290,25 +316,15 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
             continue;
         }
         const Memory memory = ground_memory(ground, f);
-        Advance advance = {.foot = foot,
-                           .slot = foot->slot,
-                           .imprints = ground->tiles > 0 ? &imprints : NULL,
-                           .rotation = foot->faces ? faces_level : input->rotation[f],
-                           .motion = foot_motion(foot, result->velocity + 6 * f),
-                           .dt = input->dt,
-                           .height = terrain->height};
+        const Advance advance = {.foot = foot,
+                                 .imprints = ground->tiles > 0 ? &imprints : NULL,
+                                 .rotation = foot->faces ? faces_level : input->rotation[f],
+                                 .motion = foot_motion(foot, result->velocity + 6 * f),
+                                 .dt = input->dt,
+                                 .height = terrain->height};
         const int all = foot->active == foot->elements && ground->tiles == 0 && !foot->faces;
         if (all) {
-            /* The step may have been solved on a copy of this ground, whose memory the slots
-             * hold. */
-            slots_remember(&advance.slot, &memory);
-        }
-        if (all && foot->curves & LAW_HEAP) {
-            ground->touched[f] = foot_advance_heaps(&advance, &memory, foot->slot_material);
-        } else if (all && foot->uneven) {
-            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1, 0);
-        } else if (all) {
-            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0, 0);
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material);
         } else {
             ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material);
         }

@@ -6,32 +6,31 @@
 /* Force of ground without memory [N], into the working array fx. It is 0 but for hunt_crossley
  * beside ground with LAW_HEAP, so this loop is not in vectors, for which a power is long. */
 static void slots_elastic(const FootScratch *foot) {
-    const Slots *s = &foot->slot;
-    memset(s->fx, 0, (size_t)foot_end(foot) * sizeof *s->fx);
-    for (int i = 0; foot->curves & LAW_ELASTIC && i < foot->active; i++) {
-        const Element element = slot_element(s, i);
-        s->fx[i] = law_elastic_force(&element.law, LAW_ELASTIC, element.middle);
+    for (int i = 0; i < foot_end(foot); i++) {
+        Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
+        const Element element = slot_element(s, l);
+        const int elastic = foot->curves & LAW_ELASTIC && i < foot->active;
+        s->fx[l] = elastic ? law_elastic_force(&element.law, LAW_ELASTIC, element.middle) : 0.0;
     }
 }
 
 /* Cosine between the sole and the ground under each slot, into `lean`. */
 static void slots_lean(const FootScratch *foot) {
-    const Slots local = foot->slot, *s = &local;
     const double side = foot->arm[3][2] < 0.0 ? -1.0 : 1.0; /* the face that looks down */
     const double up[3] = {side * foot->arm[3][0], side * foot->arm[3][1], side * foot->arm[3][2]};
     const double level = real_min(real_max(up[2], SHARE_LEAN), 1.0);
-    const int end = foot_end(foot);
-    for (int i = 0; i < end; i++) {
-        s->lean[i] = level;
-    }
-    for (int i = 0; foot->uneven && i < end; i++) {
-        const double gx = s->slope_x[i], gy = s->slope_y[i];
-        const double along = up[2] - gx * up[0] - gy * up[1];
-        s->lean[i] = real_min(real_max(along / sqrt(1.0 + gx * gx + gy * gy), SHARE_LEAN), 1.0);
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+        for (int i = 0; i < SLOT_LANES; i++) {
+            const double gx = s->slope_x[i], gy = s->slope_y[i];
+            const double along = up[2] - gx * up[0] - gy * up[1];
+            const double lean = along / sqrt(1.0 + gx * gx + gy * gy);
+            s->lean[i] = foot->uneven ? real_min(real_max(lean, SHARE_LEAN), 1.0) : level;
+        }
     }
 }
 
-MILD_HD void slot_carry(const Slots *s, int i, double dt, double rate) {
+MILD_HD void slot_carry(Slots *s, int i, double dt, double rate) {
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
     Share share = slot_share(s, i);
@@ -48,14 +47,11 @@ MILD_HD void slot_carry(const Slots *s, int i, double dt, double rate) {
 void foot_carry(const FootScratch *foot, double dt) {
     slots_elastic(foot);
     slots_lean(foot);
-    const Slots local = foot->slot, *s = &local;
     const double rate = 1.0 / dt;
-    const int end = foot_end(foot);
-    if (end < VECTOR_LANES) {
-        return; /* never. The compiler then adds no loop for a remainder */
-    }
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
 #pragma omp simd
-    for (int i = 0; i < end; i++) {
-        slot_carry(s, i, dt, rate);
+        for (int i = 0; i < SLOT_LANES; i++) {
+            slot_carry(s, i, dt, rate);
+        }
     }
 }

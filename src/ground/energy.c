@@ -23,6 +23,7 @@
 #include <string.h>
 
 #include "ground/friction.h"
+#include "ground/moments.h"
 
 /* [-] Share of the impulses' energy above which a step is solved again. Steps in walking stay below
  * it. The impulses' energy is up to four times the kinetic energy of the feet, because a passive
@@ -34,8 +35,10 @@ void energy_begin(MildScratch *scratch) {
     for (int f = 0; f < scratch->feet; f++) {
         FootScratch *foot = &scratch->foot[f];
         if (foot->turned) {
-            memset(foot->own.turn_x, 0, (size_t)foot->padded * sizeof(double));
-            memset(foot->own.turn_y, 0, (size_t)foot->padded * sizeof(double));
+            for (Slots *s = foot->slot; s < foot->slot + foot->padded / SLOT_LANES; s++) {
+                memset(s->turn_x, 0, sizeof s->turn_x);
+                memset(s->turn_y, 0, sizeof s->turn_y);
+            }
             foot->turned = 0;
         }
     }
@@ -54,21 +57,20 @@ static double impulse_energy(const MildScratch *scratch, const MildContactInput 
 /* [J] Work of a foot's friction at the mean speed less its work at the new speed: -I . dv/2, where
  * dv = A W is the velocity change that the ground causes. change: dv. */
 static double foot_caused(const FootScratch *foot, const Motion *change) {
-    const Slots local = foot->slot, *s = &local;
     const Motion v = *change;
-    const int end = foot_end(foot);
-    double sum = 0.0;
-    if (end < VECTOR_LANES) {
-        return 0.0; /* never. The compiler then adds no loop for a remainder */
+    Lanes lanes = {0.0};
+    double sum;
+    for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            const double iz = s->iz[i];
+            const double ix = s->ix[i] + s->slope_x[i] * iz;
+            const double iy = s->iy[i] + s->slope_y[i] * iz;
+            const SlotVelocity at = slot_velocity(s, i, &v, SLOT_FACES);
+            lanes[i] += ix * at.x + iy * at.y;
+        }
     }
-#pragma omp simd reduction(+ : sum)
-    for (int i = 0; i < end; i++) {
-        const double iz = s->iz[i];
-        const double ix = s->ix[i] + s->slope_x[i] * iz;
-        const double iy = s->iy[i] + s->slope_y[i] * iz;
-        const SlotVelocity at = slot_velocity(s, i, &v, SLOT_FACES);
-        sum += ix * at.x + iy * at.y;
-    }
+    lanes_sum((const Lanes *)&lanes, 1, &sum);
     return -0.5 * sum;
 }
 
@@ -121,28 +123,31 @@ static __attribute__((cold)) double foot_gift(const FootScratch *foot, const Mot
                                               const Motion *after) {
     double sum = 0.0;
     for (int i = 0; i < foot->active; i++) {
-        const SlotVelocity u = slot_velocity(&foot->slot, i, before, SLOT_FACES);
-        const SlotVelocity v = slot_velocity(&foot->slot, i, after, SLOT_FACES);
-        sum += fmax(slot_gift(&foot->slot, i, &u, &v), 0.0);
+        const Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
+        const SlotVelocity u = slot_velocity(s, l, before, SLOT_FACES);
+        const SlotVelocity v = slot_velocity(s, l, after, SLOT_FACES);
+        sum += fmax(slot_gift(s, l, &u, &v), 0.0);
     }
     return sum;
 }
 
 static __attribute__((cold)) void foot_turn(FootScratch *foot, const Motion *before,
                                             const Motion *after, int all) {
-    const Slots *s = &foot->slot;
     foot->turned = 1;
     for (int i = 0; i < foot->active; i++) {
-        const SlotVelocity u = slot_velocity(s, i, before, SLOT_FACES);
-        const SlotVelocity v = slot_velocity(s, i, after, SLOT_FACES);
-        if (!all && !(slot_gift(s, i, &u, &v) > 0.0)) {
+        Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
+        const SlotVelocity u = slot_velocity(s, l, before, SLOT_FACES);
+        const SlotVelocity v = slot_velocity(s, l, after, SLOT_FACES);
+        if (!all && !(slot_gift(s, l, &u, &v) > 0.0)) {
             continue;
         }
-        s->turn_x[i] = u.x;
-        s->turn_y[i] = u.y;
-        s->hold_x[i] = 0.0;
-        s->hold_y[i] = 0.0;
-        s->hold_stiffness[i] = 0.0;
+        s->turn_x[l] = u.x;
+        s->turn_y[l] = u.y;
+        s->hold_x[l] = 0.0;
+        s->hold_y[l] = 0.0;
+        s->hold_stiffness[l] = 0.0;
     }
 }
 

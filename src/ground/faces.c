@@ -47,14 +47,15 @@ void faces_list(FootScratch *foot, const MildTerrain *terrain, const MildContact
 
 /* Height and share of the slots. A loaded element keeps the share of its touchdown. */
 static void faces_gather(const FootScratch *foot, const Memory *memory) {
-    const Slots *s = &foot->slot;
-    for (int i = 0; i < foot->active; i++) {
-        const int e = foot->element[i];
-        s->z[i] = foot->height[e];
-        s->share[i] = memory->material[e] >= 0 ? memory->share[e] : foot->share[e];
-    }
-    for (int i = foot->active; i < foot_end(foot); i++) {
-        s->z[i] = s->share[i] = 0.0;
+    for (int i = 0; i < foot_end(foot); i++) {
+        Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
+        s->z[l] = s->share[l] = 0.0;
+        if (i < foot->active) {
+            const int e = foot->element[i];
+            s->z[l] = foot->height[e];
+            s->share[l] = memory->material[e] >= 0 ? memory->share[e] : foot->share[e];
+        }
     }
 }
 
@@ -68,7 +69,8 @@ static double slot_middle(const Slots *s, int i, const Motion *now, double dt) {
 static int slot_is_under(const FootScratch *foot, int i, const Memory *memory, const Motion *now,
                          double dt) {
     const int e = foot->element[i];
-    return (memory->material[e] == MATERIAL_BURIED && slot_middle(&foot->slot, i, now, dt) > 0.0) ||
+    const double middle = slot_middle(slot_block(foot, i), i % SLOT_LANES, now, dt);
+    return (memory->material[e] == MATERIAL_BURIED && middle > 0.0) ||
            (memory->material[e] == MATERIAL_FREE && memory->middle[e] > 0.0);
 }
 
@@ -76,33 +78,35 @@ static int slot_is_under(const FootScratch *foot, int i, const Memory *memory, c
  * gets none. */
 static void faces_laws(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory,
                        const Motion *now, double dt) {
-    const Slots *s = &foot->slot;
     for (int i = 0; i < foot->active; i++) {
         foot->slot_material[i] = MATERIAL_NONE; /* scaled in the last step */
     }
     slots_materials(foot, terrain, memory);
     for (int i = 0; i < foot->active; i++) {
+        Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
         const int e = foot->element[i];
         const int model = terrain->materials[foot->slot_material[i] & 0xff].model;
-        if (!(s->recovery[i] < 1.0) && slot_is_under(foot, i, memory, now, dt)) {
-            s->share[i] = 0.0;
+        if (!(s->recovery[l] < 1.0) && slot_is_under(foot, i, memory, now, dt)) {
+            s->share[l] = 0.0;
         }
         /* The theory's coefficients count the slope themselves. */
-        const int directed = (model_row(model)->motion & LAW_RESIST) && slot_directed(s, i);
-        slot_scale(s, i, directed && s->share[i] > 0.0 ? foot->area[e] : s->share[i]);
+        const int directed = (model_row(model)->motion & LAW_RESIST) && slot_directed(s, l);
+        slot_scale(s, l, directed && s->share[l] > 0.0 ? foot->area[e] : s->share[l]);
     }
 }
 
 /* A buried element begins without force, at the end of the unloading line of some greater depth. */
 static void faces_unload(const FootScratch *foot, const Memory *memory, const Motion *now,
                          double dt) {
-    const Slots *s = &foot->slot;
     for (int i = 0; i < foot->active; i++) {
-        const double lasting = 1.0 - s->recovery[i];
-        const double m0 = slot_middle(s, i, now, dt);
+        Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
+        const double lasting = 1.0 - s->recovery[l];
+        const double m0 = slot_middle(s, l, now, dt);
         if (memory->material[foot->element[i]] == MATERIAL_BURIED && lasting > 0.0 && m0 > 0.0) {
             const double least = real_max(m0 / lasting, m0 + ELEMENT_ELASTIC);
-            s->depth_max[i] = real_max(s->depth_max[i], least);
+            s->depth_max[l] = real_max(s->depth_max[l], least);
         }
     }
 }
@@ -123,12 +127,13 @@ void faces_slots(FootScratch *foot, const MildGround *ground, int f, const MildT
 }
 
 double faces_loaded(const FootScratch *foot, double *area) {
-    const Slots *s = &foot->slot;
     double z = 0.0;
     *area = 0.0;
     for (int i = 0; i < foot->active; i++) {
-        z += s->z[i] * s->iz[i];
-        *area += s->iz[i] > 0.0 ? s->share[i] * foot->pitch * foot->pitch : 0.0;
+        const Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
+        z += s->z[l] * s->iz[l];
+        *area += s->iz[l] > 0.0 ? s->share[l] * foot->pitch * foot->pitch : 0.0;
     }
     return z;
 }

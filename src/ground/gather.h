@@ -4,11 +4,8 @@
 
 #include "ground/scratch.h"
 
-/* For a foot with all elements listed on ground without imprints: points the slots at the arrays of
- * the elements themselves, so that nothing is copied. */
-void slots_direct(FootScratch *foot, const Memory *memory);
 /* Copies the listed elements into consecutive slots. */
-void slots_gather(FootScratch *foot, const Memory *memory);
+void slots_gather(const FootScratch *foot, const Memory *memory);
 
 /* Sets slope and depth of the slots on uneven ground. before: bool, it was uneven in the last step
  * too. height: of the terrain [m].
@@ -22,7 +19,7 @@ void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory,
 void slots_level(const FootScratch *foot);
 
 /* Multiplies what a slot's law makes of forces and masses. */
-void slot_scale(const Slots *s, int i, double share);
+void slot_scale(Slots *s, int i, double share);
 
 /* Sets the greatest depth of unloaded elements to that of the imprint under them. Below h0, within
  * an imprint, it is at least the depth whose unloading line reaches zero at the element, so that

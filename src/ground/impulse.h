@@ -111,10 +111,10 @@ MILD_HD Impulse lag_impulse(const Element *e, Real dt, Real speed) {
  *     dt mean F + d (E(m1) - E(m0))
  * The part of the way through the air has no force. Both terms increase with m1, so the step stays
  * convex. The damping term has the sign of the motion, so it takes energy. */
-MILD_HD Impulse elastic_impulse(const Element *e, Real dt, Real middle) {
+MILD_HD Impulse elastic_impulse_of(const Element *e, Real dt, Real middle, const PowerWay *power) {
     const Real x0 = real_max(e->middle, 0);
     const Real x1 = real_max(middle, 0);
-    const PowerWay over = power_way(e->law.elastic_force, e->law.elastic_exponent, x0, x1 - x0);
+    const PowerWay over = *power;
     const Real whole = REAL_ABS(middle - e->middle);
     const Real inside = REAL_ABS(x1 - x0);
     const Real inverse_way = 1 / (whole + ELEMENT_TINY);
@@ -134,13 +134,42 @@ MILD_HD Impulse elastic_impulse(const Element *e, Real dt, Real middle) {
     return elastic;
 }
 
+/* The powers in an impulse. */
+typedef struct {
+    PowerWay virgin;  /* of virgin ground; unused without LAW_POWER */
+    PowerWay elastic; /* of the elastic curve; unused without LAW_ELASTIC */
+} ImpulsePowers;
+
+MILD_HD PowerWay elastic_way(const Element *e, Real middle) {
+    const Real x0 = real_max(e->middle, 0);
+    const Real x1 = real_max(middle, 0);
+    return power_way(e->law.elastic_force, e->law.elastic_exponent, x0, x1 - x0);
+}
+
+MILD_HD Impulse elastic_impulse(const Element *e, Real dt, Real middle) {
+    const PowerWay power = elastic_way(e, middle);
+    return elastic_impulse_of(e, dt, middle, &power);
+}
+
+MILD_HD ImpulsePowers element_powers(const Element *e, int curves, Real dt, Real speed) {
+    const Real middle = e->depth + dt / 2 * speed;
+    const Real virgin_way = real_max(middle - e->yield_depth, 0);
+    ImpulsePowers powers = {{0, 0}, {0, 0}};
+    powers.virgin = law_power_way(&e->law, curves, e->virgin_depth, virgin_way);
+    if (curves & LAW_ELASTIC) {
+        powers.elastic = elastic_way(e, middle);
+    }
+    return powers;
+}
+
 /* The whole impulse at the new downward speed. curves: LawCurve bits of the law. stops: bool,
  * stop_drag, stop_growth or explicit_impulse may be nonzero. Both are constants in a loop over
  * elements. */
-MILD_HD Impulse element_impulse(const Element *e, int curves, int stops, Real dt, Real speed) {
+MILD_HD Impulse element_impulse_of(const Element *e, int curves, int stops, Real dt, Real speed,
+                                   const ImpulsePowers *powers) {
     const Real middle = e->depth + dt / 2 * speed;
     const Real virgin_way = real_max(middle - e->yield_depth, 0);
-    const LawWay virgin = law_way(&e->law, curves, e->virgin_depth, virgin_way);
+    const LawWay virgin = law_way_of(&e->law, curves, e->virgin_depth, virgin_way, &powers->virgin);
 
     Impulse sum = path_impulse(e, dt, middle, virgin_way, &virgin);
     const Impulse lag = lag_impulse(e, dt, speed);
@@ -151,7 +180,7 @@ MILD_HD Impulse element_impulse(const Element *e, int curves, int stops, Real dt
         sum.slope += mass.slope + growth.slope;
     }
     if (curves & LAW_ELASTIC) {
-        const Impulse elastic = elastic_impulse(e, dt, middle);
+        const Impulse elastic = elastic_impulse_of(e, dt, middle, &powers->elastic);
         sum.value += elastic.value;
         sum.slope += elastic.slope;
     }
@@ -163,6 +192,11 @@ MILD_HD Impulse element_impulse(const Element *e, int curves, int stops, Real dt
     sum.value *= pushes;
     sum.slope *= pushes;
     return sum;
+}
+
+MILD_HD Impulse element_impulse(const Element *e, int curves, int stops, Real dt, Real speed) {
+    const ImpulsePowers powers = element_powers(e, curves, dt, speed);
+    return element_impulse_of(e, curves, stops, dt, speed, &powers);
 }
 
 #endif

@@ -42,8 +42,8 @@
  * (element_law.c). A model's `law` (model.h) fills in the numbers. `curves` is a constant in the
  * vector loops, so a curve costs nothing on ground that does not have it. law_variant says which
  * loop serves a foot; for a loop of the new curve alone, add it there and to the switches of
- * pass.c and prepare.c. Look at element_drag's callers (prepare.c, contact.inc) if the curve has a
- * drag, and at resist.c if a resistive force may be blended with it. */
+ * pass.c and prepare.c. Look at element_drag's callers (prepare.c, drag.h, contact.inc) if the
+ * curve has a drag, and at resist.c if a resistive force may be blended with it. */
 #ifndef MILD_GROUND_LAW_H
 #define MILD_GROUND_LAW_H
 
@@ -226,7 +226,7 @@ typedef struct {
  * with its force at the end of the way, because it is so stiff that a mean would make no
  * difference. On a way of length 0 the recruited depth is set to 0, because a fused multiply-add
  * may leave a rounding error in the difference. */
-MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way) {
+MILD_HD LawWay law_way_of(const Law *law, int curves, Real begin, Real way, const PowerWay *power) {
     const Real half = begin + way / 2;
     const Real end = begin + way;
     LawWay over;
@@ -256,11 +256,24 @@ MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way) {
         over.recruited += way > 0 ? open_end - open_begin : 0;
     }
     if (curves & LAW_POWER) {
-        const PowerWay power = power_way(law->power_force, law->power_exponent, begin, way);
-        over.mean += power.mean;
-        over.mean_slope += power.slope;
+        over.mean += power->mean;
+        over.mean_slope += power->slope;
     }
     return over;
+}
+
+/* The power over that way, for law_way_of; 0 where the law has none. */
+MILD_HD PowerWay law_power_way(const Law *law, int curves, Real begin, Real way) {
+    PowerWay power = {0, 0};
+    if (curves & LAW_POWER) {
+        power = power_way(law->power_force, law->power_exponent, begin, way);
+    }
+    return power;
+}
+
+MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way) {
+    const PowerWay power = law_power_way(law, curves, begin, way);
+    return law_way_of(law, curves, begin, way, &power);
 }
 
 #endif

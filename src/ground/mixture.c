@@ -59,8 +59,8 @@ void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
 }
 
 #define SLOT_LAW_STORE(name) s->name[i] = from->law.name;
-/* Sets the law of slot i, and its friction and recovery. */
-static void slot_set_law(const Slots *s, int i, const SlotLaw *from) {
+/* Sets the law of lane i of a block, and its friction and recovery. */
+static void slot_set_law(Slots *s, int i, const SlotLaw *from) {
     const Share *share = &from->share;
     LAW_NUMBERS(SLOT_LAW_STORE)
     s->cone_begin[i] = from->law.cone_begin;
@@ -114,7 +114,7 @@ static void slot_set_mixture(const FootScratch *foot, int i, int e, int32_t mixt
         const SlotLaw other = slot_law(foot, mixture >> 8 & 0xff, e);
         slot_law_mix(&own, &other, (mixture >> 16) / 255.0);
     }
-    slot_set_law(&foot->slot, i, &own);
+    slot_set_law(slot_block(foot, i), i % SLOT_LANES, &own);
 }
 
 void slots_pad(const FootScratch *foot) {
@@ -122,7 +122,7 @@ void slots_pad(const FootScratch *foot) {
     for (int i = foot->active; i < foot_end(foot); i++) {
         foot->slot_material[i] = MATERIAL_NONE;
         foot->slot_holder[i] = -1;
-        slot_set_law(&foot->slot, i, &none);
+        slot_set_law(slot_block(foot, i), i % SLOT_LANES, &none);
     }
 }
 
@@ -131,11 +131,15 @@ void slots_pad(const FootScratch *foot) {
 static int slots_are_uniform(const FootScratch *foot, const Memory *memory) {
     const int32_t *remembered = memory->material;
     const int32_t *set = foot->slot_material;
+    const int elements = foot->padded & -VECTOR_LANES; /* the padding remembers no material */
+    const int active = foot->active;
     int32_t differs = 0;
-    for (int e = 0; e < foot->elements; e++) {
+#pragma omp simd reduction(| : differs)
+    for (int e = 0; e < elements; e++) {
         differs |= remembered[e] > 0;
     }
-    for (int i = 0; i < foot->active; i++) {
+#pragma omp simd reduction(| : differs)
+    for (int i = 0; i < active; i++) {
         differs |= set[i];
     }
     for (int i = 0; foot->curves & LAW_HEAP && i < foot->active; i++) {

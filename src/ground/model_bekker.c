@@ -88,23 +88,24 @@ static void bekker_shear(const FootScratch *foot, const MildTerrain *terrain, in
                          const double *rotation, const Motion *now) {
     (void)rotation;
     (void)now;
-    const Slots *s = &foot->slot;
     const double area = foot->pitch * foot->pitch;
     for (int i = 0; i < foot->active; i++) {
+        Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
         const MildMaterial *material = &terrain->materials[foot->slot_material[i] & 0xff];
         if (material->model != model || foot->slot_material[i] & SLOT_BARRED) {
             continue;
         }
         const double mu = foot->curves & LAW_HEAP /* what slip has left, beside such ground */
-                              ? s->mu[i]
+                              ? s->mu[l]
                               : slot_mu(terrain, foot->slot_material[i]);
         const Shear shear = {mu, material->cohesion, material->shear_length,
-                             foot->faces ? s->share[i] * area : area};
-        const ElementMemory memory = slot_memory(s, i);
-        Element element = slot_loaded(s, i, foot->curves);
+                             foot->faces ? s->share[l] * area : area};
+        const ElementMemory memory = slot_memory(s, l);
+        Element element = slot_loaded(s, l, foot->curves);
         element_shear(&element, &memory, &shear, foot->curves, dt, 1.0 / dt);
-        s->mu[i] = element.mu;
-        slot_store(s, i, &element);
+        s->mu[l] = element.mu;
+        slot_store(s, l, &element);
     }
 }
 

@@ -70,8 +70,9 @@ static inline double bound_wanted(const Slots *s, int i) {
 static void bounds_begin(MildScratch *scratch, double times) {
     for (int k = 0; k < scratch->listed; k++) {
         const FootScratch *foot = &scratch->foot[scratch->list[k]];
-        const Slots *s = &foot->slot;
-        for (int i = 0; i < foot_end(foot); i++) {
+        for (int slot = 0; slot < foot_end(foot); slot++) {
+            Slots *s = slot_block(foot, slot);
+            const int i = slot % SLOT_LANES;
             s->bound[i] = times * bound_wanted(s, i);
             s->bound_moved[i] = 0.0;
         }
@@ -95,8 +96,9 @@ static void bounds_pace(const MildScratch *scratch, Pace *pace) {
     double share = pace->share;
     for (int k = 0; k < scratch->listed; k++) {
         const FootScratch *foot = &scratch->foot[scratch->list[k]];
-        const Slots *s = &foot->slot;
-        for (int i = 0; i < foot_end(foot); i++) {
+        for (int slot = 0; slot < foot_end(foot); slot++) {
+            Slots *s = slot_block(foot, slot);
+            const int i = slot % SLOT_LANES;
             double way = bound_wanted(s, i) - s->bound[i], last = s->bound_moved[i];
             along += way * last;
             now += way * way;
@@ -117,8 +119,9 @@ static void bounds_move(MildScratch *scratch, Pace *pace) {
     bounds_pace(scratch, pace);
     for (int k = 0; k < scratch->listed; k++) {
         const FootScratch *foot = &scratch->foot[scratch->list[k]];
-        const Slots *s = &foot->slot;
-        for (int i = 0; i < foot_end(foot); i++) {
+        for (int slot = 0; slot < foot_end(foot); slot++) {
+            Slots *s = slot_block(foot, slot);
+            const int i = slot % SLOT_LANES;
             double way = pace->share * (bound_wanted(s, i) - s->bound[i]);
             s->bound_moved[i] = fmax(way, -s->bound[i]);
             s->bound[i] += s->bound_moved[i];

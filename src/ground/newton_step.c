@@ -81,7 +81,7 @@ double system_norm(const System *system, const double *x) {
 
 /* Swaps row k with the row at or below it that has the largest number in column k. Returns false
  * when that number is zero. */
-static int rows_pivot(Vector *M, int parts, int k, int n) {
+static __attribute__((cold)) int rows_pivot(Vector *M, int parts, int k, int n) {
     int pivot = k;
     for (int i = k + 1; i < n; i++) {
         if (fabs(entry(M, parts, i, k)) > fabs(entry(M, parts, pivot, k))) {
@@ -171,14 +171,12 @@ int point_solves(const System *system, const Point *point) {
 }
 
 /* Row `i` of [1 + H A | right], i in the system. H: [6] of the row's foot, which has the rows from
- * `foot` on. */
+ * `foot` on. lane: a 1 among zeros; a window over it has 1 in one lane. A number that is stored
+ * into a vector would delay the load of it. */
 static void row_newton(const System *system, int i, int foot, const double *H, double right,
-                       Vector *row) {
-    /* 1 in one lane, from a window over one 1 among zeros: a number that is stored into a vector
-     * delays the load of it. */
-    static const double window[2 * NEWTON_LANES] = {[NEWTON_LANES] = 1.0};
-    const double *one = window + NEWTON_LANES - i;
-    const double *last = window + NEWTON_LANES - system->n;
+                       const double *lane, Vector *row) {
+    const double *one = lane - i;
+    const double *last = lane - system->n;
     for (int p = 0; p < system->parts; p++) {
         Vector sum, end;
         memcpy(&sum, one + p * NEWTON_VECTOR, sizeof sum);
@@ -205,7 +203,8 @@ int point_step(const System *system, MildScratch *scratch, const Point *at, Poin
         const double *H = scratch->hessian[scratch->list[i / 6]] + 6 * (i - foot);
         double right =
             scratch->wrench[listed_row(scratch, i)] - (correct ? at->impulse.at[i] : 0.0);
-        row_newton(system, i, foot, H, six_dot(right, H, moved.at + foot), M + i * system->parts);
+        row_newton(system, i, foot, H, six_dot(right, H, moved.at + foot),
+                   scratch->window + ROW_LANES, M + i * system->parts);
     }
     next->rests = 0;
     row_clear(system, &next->impulse);
@@ -229,7 +228,8 @@ void point_between(const System *system, const Point *from, const Point *to, dou
     }
 }
 
-void point_halve(const System *system, MildScratch *scratch, const Point *at, Point *next) {
+__attribute__((cold)) void point_halve(const System *system, MildScratch *scratch, const Point *at,
+                                       Point *next) {
     const Point full = *next;
     double t = 1.0;
     for (int k = 0; k < NEWTON_HALVINGS; k++) {
@@ -244,7 +244,8 @@ void point_halve(const System *system, MildScratch *scratch, const Point *at, Po
 
 /* Bool: the step between two points is within the rounding error of V^ + A P and of the depths to
  * which dt V is added. */
-static int step_is_rounding(const System *system, const Point *from, const Point *to) {
+static __attribute__((cold)) int step_is_rounding(const System *system, const Point *from,
+                                                  const Point *to) {
     const int n = system->n;
     double size = 0.0;
     for (int i = 0; i < n; i++) {
@@ -263,7 +264,8 @@ static int step_is_rounding(const System *system, const Point *from, const Point
     return 1;
 }
 
-void point_correct(const System *system, MildScratch *scratch, Point *at, Point *next) {
+__attribute__((cold)) void point_correct(const System *system, MildScratch *scratch, Point *at,
+                                         Point *next) {
     double scale = system_norm(system, at->impulse.at);
     if (!(at->residual <= NEWTON_NEAR * scale + NEWTON_LENGTH)) {
         return;

@@ -10,23 +10,73 @@
 #include "ground/impulse.h"
 #include "ground/moments.h"
 
-MILD_HD void slot_normal(const Slots *s, int i, double dt, const Motion *motion, int kind,
-                         int curves, int stops) {
+MILD_HD void slot_normal(Slots *s, int i, double dt, const Motion *motion, int kind, int curves,
+                         int stops) {
     const Element element = slot_loaded(s, i, curves);
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
-    const Impulse normal = element_impulse(&element, curves, stops, dt, v.descent);
+    const ImpulsePowers powers = {{s->power[0][i], s->power[1][i]},
+                                  {s->elastic[0][i], s->elastic[1][i]}};
+    const Impulse normal = element_impulse_of(&element, curves, stops, dt, v.descent, &powers);
     s->iz[i] = normal.value;
     s->hzz[i] = normal.slope;
 }
 
 /* Normal impulses and their derivatives. */
-MILD_HD void foot_normal(const Slots *slot, int end, double dt, const Motion *m, int kind,
-                         int curves, int stops) {
-    const Slots local = *slot, *s = &local;
+MILD_HD void foot_normal(const FootScratch *foot, double dt, const Motion *m, int kind, int curves,
+                         int stops) {
     const Motion motion = *m;
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
 #pragma omp simd
-    for (int i = 0; i < end; i++) {
-        slot_normal(s, i, dt, &motion, kind, curves, stops);
+        for (int i = 0; i < SLOT_LANES; i++) {
+            slot_normal(s, i, dt, &motion, kind, curves, stops);
+        }
+    }
+}
+
+/* The way of a slot's element over which the law has a power of the depth. */
+MILD_HD void slot_way(const Slots *s, int i, double dt, const Motion *motion, int curve,
+                      double *begin, double *way) {
+    const SlotVelocity v = slot_velocity(s, i, motion, SLOT_UNEVEN | SLOT_FACES);
+    const double middle = s->depth[i] + dt / 2 * v.descent;
+    const double from = real_max(s->middle[i], 0);
+    *begin = curve == LAW_POWER ? s->virgin_depth[i] : from;
+    *way =
+        curve == LAW_POWER ? real_max(middle - s->yield_depth[i], 0) : real_max(middle, 0) - from;
+}
+
+/* Sets what element_powers gives a slot for a curve, LAW_POWER or LAW_ELASTIC: Slots.power or
+ * elastic. The same loops do it for both, and for the three powers of each. */
+static __attribute__((noinline)) void foot_powers(const FootScratch *foot, double dt,
+                                                  const Motion *m, int curve) {
+    const Motion motion = *m;
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+        const double *exponent = curve == LAW_POWER ? s->power_exponent : s->elastic_exponent;
+        Lanes *power = curve == LAW_POWER ? s->power : s->elastic;
+        Lanes begin, way, grown[3];
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            slot_way(s, i, dt, &motion, curve, &begin[i], &way[i]);
+            const PowerEnds ends = power_ends(begin[i], way[i]);
+            grown[0][i] = (ends.q0 + ends.q1) / 2;
+            grown[1][i] = ends.q0;
+            grown[2][i] = ends.q1;
+        }
+#pragma GCC unroll 3
+        for (int k = 0; k < 3; k++) {
+#pragma omp simd
+            for (int i = 0; i < SLOT_LANES; i++) {
+                grown[k][i] = real_pow(grown[k][i], (exponent[i] - 1) / 2);
+            }
+        }
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            const PowerOver grows = {grown[0][i], grown[1][i], grown[2][i]};
+            const double force =
+                curve == LAW_POWER ? s->power_force[i] * s->carry[i] : s->elastic_force[i];
+            const PowerWay over = power_way_of(force, exponent[i], begin[i], way[i], &grows);
+            power[0][i] = over.mean;
+            power[1][i] = over.slope;
+        }
     }
 }
 
@@ -34,34 +84,29 @@ MILD_HD void foot_normal(const Slots *slot, int end, double dt, const Motion *m,
  * ground the slopes are 0, so a loop for uneven ground does for both where a second one would gain
  * little. */
 static void foot_normals(const FootScratch *foot, double dt, const Motion *motion) {
-    const Slots *s = &foot->slot;
-    const int end = foot_end(foot);
-    if (end < VECTOR_LANES) {
-        return; /* never: pass skips empty feet. The compiler then adds no loop for a remainder */
-    }
     switch (foot_variant(foot)) {
-    case LAW_LINE: foot_normal(s, end, dt, motion, 1, LAW_LINE, 0); return;
+    case LAW_LINE: foot_normal(foot, dt, motion, 1, LAW_LINE, 0); return;
     case LAW_CONE:
         if (foot->uneven || foot->stops) {
-            foot_normal(s, end, dt, motion, 1, LAW_CONE, 1);
+            foot_normal(foot, dt, motion, 1, LAW_CONE, 1);
         } else {
-            foot_normal(s, end, dt, motion, 0, LAW_CONE, 0);
+            foot_normal(foot, dt, motion, 0, LAW_CONE, 0);
         }
         return;
     case LAW_CONE | LAW_HEAP:
         if (foot->uneven || foot->stops) {
-            foot_normal(s, end, dt, motion, 1, LAW_CONE | LAW_HEAP, 1);
+            foot_normal(foot, dt, motion, 1, LAW_CONE | LAW_HEAP, 1);
         } else {
-            foot_normal(s, end, dt, motion, 0, LAW_CONE | LAW_HEAP, 0);
+            foot_normal(foot, dt, motion, 0, LAW_CONE | LAW_HEAP, 0);
         }
         return;
-    case LAW_POWER: foot_normal(s, end, dt, motion, 1, LAW_POWER, 0); return;
-    case LAW_ELASTIC: foot_normal(s, end, dt, motion, 1, LAW_ELASTIC, 0); return;
-    default: foot_normal(s, end, dt, motion, SLOT_UNEVEN | SLOT_FACES, LAW_ANY, 1); return;
+    case LAW_POWER: foot_normal(foot, dt, motion, 1, LAW_POWER, 0); return;
+    case LAW_ELASTIC: foot_normal(foot, dt, motion, 1, LAW_ELASTIC, 0); return;
+    default: foot_normal(foot, dt, motion, SLOT_UNEVEN | SLOT_FACES, LAW_ANY, 1); return;
     }
 }
 
-/* Adds friction to the impulses and sums them over the foot. Where the ground is not level the
+/* Adds friction to the impulses. Where the ground is not level the
  * normal impulse is I_z g with g = (-slope, 1) = -grad u, so it does work exactly when u changes.
  * Its vertical part is the paper's. With
  *
@@ -71,21 +116,12 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
  *
  *     h = -dI/dv = f + k c g^T
  *
- * sums: of I, x I, y I and, for a surface, height I. kind: SLOT_UNEVEN, SLOT_FACES. held: bool, the
- * friction bounds are slot.bound. turned: bool, some elements have a reversal velocity in slot.turn
- * (energy.c). */
-MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int kind, int held,
-                           int turned, double sums[12]) {
-    const Slots local = *slot, *s = &local;
-    const Motion motion = *m;
-    double f0 = 0.0, f1 = 0.0, f2 = 0.0; /* of I */
-    double a0 = 0.0, a1 = 0.0, a2 = 0.0; /* of x I */
-    double b0 = 0.0, b1 = 0.0, b2 = 0.0; /* of y I */
-    double c0 = 0.0, c1 = 0.0, c2 = 0.0; /* of height I */
-#pragma omp simd reduction(+ : f0, f1, f2, a0, a1, a2, b0, b1, b2, c0, c1, c2)
-    for (int i = 0; i < end; i++) {
-        const double x = s->x[i], y = s->y[i];
-        const SlotVelocity v = slot_velocity(s, i, &motion, kind);
+ * kind: SLOT_UNEVEN, SLOT_FACES. held: bool, the friction bounds are Slots.bound. turned: bool,
+ * some elements have a reversal velocity in Slots.turn_x and turn_y (energy.c). */
+MILD_HD void block_friction(Slots *s, const Motion *motion, int kind, int held, int turned) {
+#pragma omp simd
+    for (int i = 0; i < SLOT_LANES; i++) {
+        const SlotVelocity v = slot_velocity(s, i, motion, kind);
         const double iz = s->iz[i];
         const double k = s->hzz[i];
         const Element element = slot_element(s, i);
@@ -121,25 +157,44 @@ MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int kind
         s->hyz[i] = hyz;
         s->ix[i] = ix;
         s->iy[i] = iy;
-        f0 += ix;
-        f1 += iy;
-        f2 += iz;
-        a0 += x * ix;
-        a1 += x * iy;
-        a2 += x * iz;
-        b0 += y * ix;
-        b1 += y * iy;
-        b2 += y * iz;
-        c0 += kind & SLOT_FACES ? s->z[i] * ix : 0.0;
-        c1 += kind & SLOT_FACES ? s->z[i] * iy : 0.0;
-        c2 += kind & SLOT_FACES ? s->z[i] * iz : 0.0;
     }
-    const double all[12] = {f0, f1, f2, a0, a1, a2, b0, b1, b2, c0, c1, c2};
-    memcpy(sums, all, sizeof all);
+}
+
+MILD_HD void foot_friction(const FootScratch *foot, const Motion *m, int kind, int held,
+                           int turned) {
+    const Motion motion = *m;
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+        block_friction(s, &motion, kind, held, turned);
+    }
+}
+
+/* Sums over the foot of I, x I, y I and, for a surface, height I. */
+static void foot_sums(const FootScratch *foot, double sums[12]) {
+    LaneVector all[12] = {{0.0}};
+    for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+        const LaneVector x = lanes_load(s->x), y = lanes_load(s->y);
+        const LaneVector ix = lanes_load(s->ix), iy = lanes_load(s->iy), iz = lanes_load(s->iz);
+        all[0] += ix;
+        all[1] += iy;
+        all[2] += iz;
+        all[3] += x * ix;
+        all[4] += x * iy;
+        all[5] += x * iz;
+        all[6] += y * ix;
+        all[7] += y * iy;
+        all[8] += y * iz;
+    }
+    for (const Slots *s = foot->slot, *end = slots_end(foot); foot->faces && s < end; s++) {
+        const LaneVector z = lanes_load(s->z);
+        all[9] += z * lanes_load(s->ix);
+        all[10] += z * lanes_load(s->iy);
+        all[11] += z * lanes_load(s->iz);
+    }
+    lanes_sum((const Lanes *)all, 12, sums);
 }
 
 /* torque += p x I */
-static inline void cross_add(const double *p, const double *I, double *torque) {
+static __attribute__((noinline)) void cross_add(const double *p, const double *I, double *torque) {
     torque[0] += p[1] * I[2] - p[2] * I[1];
     torque[1] += p[2] * I[0] - p[0] * I[2];
     torque[2] += p[0] * I[1] - p[1] * I[0];
@@ -147,18 +202,13 @@ static inline void cross_add(const double *p, const double *I, double *torque) {
 
 /* Picks the loop compiled for the ground under the foot. Reversals and held bounds are seldom: one
  * loop does for both, and for surfaces. */
-static void foot_frictions(const FootScratch *foot, const Motion *motion, int held,
-                           double sums[12]) {
-    const int end = foot_end(foot);
-    if (end < VECTOR_LANES) {
-        return; /* never, as above */
-    }
+static void foot_frictions(const FootScratch *foot, const Motion *motion, int held) {
     if (held || foot->turned || foot->faces) {
-        foot_friction(&foot->slot, end, motion, SLOT_UNEVEN | SLOT_FACES, held, 1, sums);
+        foot_friction(foot, motion, SLOT_UNEVEN | SLOT_FACES, held, 1);
     } else if (foot->uneven) {
-        foot_friction(&foot->slot, end, motion, 1, 0, 0, sums);
+        foot_friction(foot, motion, 1, 0, 0);
     } else {
-        foot_friction(&foot->slot, end, motion, 0, 0, 0, sums);
+        foot_friction(foot, motion, 0, 0, 0);
     }
 }
 
@@ -169,8 +219,14 @@ static void pass(MildScratch *scratch, double dt, const double *twist, int held)
         double *sums = scratch->sums[f];
         double *wrench = scratch->wrench + 6 * f;
         const Motion motion = foot_motion(foot, twist + 6 * k);
+        for (int curve = LAW_POWER; curve <= LAW_ELASTIC; curve *= LAW_ELASTIC / LAW_POWER) {
+            if (foot->curves & curve) { /* elsewhere they are multiplied by 0 */
+                foot_powers(foot, dt, &motion, curve);
+            }
+        }
         foot_normals(foot, dt, &motion);
-        foot_frictions(foot, &motion, held, sums);
+        foot_frictions(foot, &motion, held);
+        foot_sums(foot, sums);
         /* sum of B^T I = (sum I, sum p x I), p = arm0 + x arm1 + y arm2 + height arm3 */
         memcpy(wrench, sums, 3 * sizeof *sums);
         memset(wrench + 3, 0, 3 * sizeof *wrench);
@@ -195,8 +251,8 @@ void contact_pass_held(MildScratch *scratch, double dt, const double *twist) {
  * hessian, because p is linear in x and y. */
 typedef double Moments[3][3][6];
 static void foot_moments(const FootScratch *foot, Moments M) {
-    const Slots *s = &foot->slot;
-    int end = foot_end(foot);
+    const Slots *s = foot->slot;
+    const int end = foot_end(foot);
     moments(s->x, s->y, end, s->hxx, s->hxy, s->hxz, M[0]);
     if (foot->uneven) {
         moments(s->x, s->y, end, s->hyx, s->hyy, s->hyz, M[1]);
@@ -211,6 +267,9 @@ static void foot_moments(const FootScratch *foot, Moments M) {
     memcpy(M[2][2], rest[2], sizeof *rest);
 }
 
+/* Three numbers in a register. */
+typedef double Three __attribute__((vector_size(4 * sizeof(double))));
+
 /* H = sum of B^T h B, with B = [1, -[p]x] and p = sum over k of (1, x, y)_k arm_k. With M_kl the
  * moment of h by the product of factors k and l, and N_k = -sum over l of M_kl [arm_l]x,
  *
@@ -218,29 +277,31 @@ static void foot_moments(const FootScratch *foot, Moments M) {
  *     torque rows    sum over k of [arm_k]x [M_k0, N_k] */
 static void foot_hessian(const FootScratch *foot, const Moments M, double *H) {
     static const int product[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+    Three m[3][6]; /* of the three rows of h, for each column and product */
+    for (int c = 0; c < 3; c++) {
+        for (int at = 0; at < 6; at++) {
+            m[c][at] = (Three){M[0][c][at], M[1][c][at], M[2][c][at]};
+        }
+    }
     memset(H, 0, 36 * sizeof *H);
     for (int k = 0; k < 3; k++) {
-        double rows[3][6] = {{0.0}};
-        for (int r = 0; r < 3; r++) {
-            for (int c = 0; c < 3; c++) {
-                rows[r][c] = M[r][c][k];
-            }
-            for (int l = 0; l < 3; l++) { /* -m [q]x = q x m */
-                const int at = product[k][l];
-                cross_add(foot->arm[l], (const double[3]){M[r][0][at], M[r][1][at], M[r][2][at]},
-                          rows[r] + 3);
-            }
+        Three rows[6] = {m[0][k], m[1][k], m[2][k]}; /* for each column */
+        for (int l = 0; l < 3; l++) {                /* -m [p]x = p x m */
+            const double *p = foot->arm[l];
+            const int at = product[k][l];
+            rows[3] += p[1] * m[2][at] - p[2] * m[1][at];
+            rows[4] += p[2] * m[0][at] - p[0] * m[2][at];
+            rows[5] += p[0] * m[1][at] - p[1] * m[0][at];
         }
         const double *q = foot->arm[k];
         for (int c = 0; c < 6; c++) {
-            if (k == 0) {
-                for (int r = 0; r < 3; r++) {
-                    H[6 * r + c] = rows[r][c];
-                }
+            const Three row = rows[c];
+            for (int r = 0; k == 0 && r < 3; r++) {
+                H[6 * r + c] = row[r];
             }
-            H[18 + c] += q[1] * rows[2][c] - q[2] * rows[1][c];
-            H[24 + c] += q[2] * rows[0][c] - q[0] * rows[2][c];
-            H[30 + c] += q[0] * rows[1][c] - q[1] * rows[0][c];
+            H[18 + c] += q[1] * row[2] - q[2] * row[1];
+            H[24 + c] += q[2] * row[0] - q[0] * row[2];
+            H[30 + c] += q[0] * row[1] - q[1] * row[0];
         }
     }
 }

@@ -184,25 +184,37 @@ MILD_HD void element_yield(Element *e, const ElementMemory *memory, Real dt, Rea
     friction_hold(e, memory, dt, rate, held);
 }
 
-/* Adapts the law of an element to its velocity at the start of the step (vx and vy along the
- * world's axes, `descent` downward), after element_begin. */
-MILD_HD void element_resist(Element *e, const ElementMemory *memory, const Plate *plate,
-                            int in_space, int curves, Real dt, Real rate, Real strength, Real vx,
-                            Real vy, Real descent) {
-    const Real down = real_max(descent, 0);
+/* The motion of a plate, as plate_alpha takes it. */
+typedef struct {
+    Real lean;  /* [-] component of the normal along the heading */
+    Real level; /* [m/s] horizontal speed; 0 where friction may still hold it */
+    Real down;  /* [m/s] downward speed */
+} PlateMotion;
 
+/* vx and vy: velocity along the world's axes. descent: downward. */
+MILD_HD PlateMotion plate_motion(const Plate *plate, Real vx, Real vy, Real descent) {
     /* The heading is that of the motion plus RESIST_REST along the tilt. If both vanish the plate
      * is level, and every heading gives the same result. */
     const Real rest = RESIST_REST / plate->tilt;
     const Real hx = vx + rest * plate->normal[0];
     const Real hy = vy + rest * plate->normal[1];
     const Real scale = 1 / (REAL_SQRT(hx * hx + hy * hy) + ELEMENT_TINY);
-    const Real lean = (plate->normal[0] * hx + plate->normal[1] * hy) * scale;
-
     const Real moves = REAL_SQRT(vx * vx + vy * vy);
-    const Real level = moves * FRICTION_LAG < 1 ? 0 : moves; /* friction may still hold it */
-    const Alpha sinking = plate_alpha(plate, in_space, lean, level, down + RESIST_REST);
-    const Alpha sliding = plate_alpha(plate, in_space, lean, level + RESIST_REST, down);
+    PlateMotion motion;
+    motion.lean = (plate->normal[0] * hx + plate->normal[1] * hy) * scale;
+    motion.level = moves * FRICTION_LAG < 1 ? 0 : moves;
+    motion.down = real_max(descent, 0);
+    return motion;
+}
+
+/* Adapts the law of an element to its velocity at the start of the step (vx and vy along the
+ * world's axes, `descent` downward), after element_begin. */
+MILD_HD void element_resist(Element *e, const ElementMemory *memory, const Plate *plate,
+                            int in_space, int curves, Real dt, Real rate, Real strength, Real vx,
+                            Real vy, Real descent) {
+    const PlateMotion m = plate_motion(plate, vx, vy, descent);
+    const Alpha sinking = plate_alpha(plate, in_space, m.lean, m.level, m.down + RESIST_REST);
+    const Alpha sliding = plate_alpha(plate, in_space, m.lean, m.level + RESIST_REST, m.down);
     element_yield(e, memory, dt, rate, strength, sliding.x, sinking.z, curves);
 }
 

@@ -124,18 +124,54 @@ typedef struct {
     Real slope; /* [N/m] its derivative with respect to the way */
 } PowerWay;
 
+/* q^m over a way, with q and m as below: all that takes long. */
+typedef struct {
+    Real middle; /* [-] Q^m */
+    Real begin;  /* [-] q0^m */
+    Real end;    /* [-] q1^m */
+} PowerOver;
+
+/* The depths of a way. */
+typedef struct {
+    Real x0; /* [-] u/z0 at its begin */
+    Real x1; /* [-] at its end */
+    Real q0; /* [-] x0^2 + e^2 */
+    Real q1; /* [-] x1^2 + e^2 */
+} PowerEnds;
+
+MILD_HD PowerEnds power_ends(Real begin, Real way) {
+    PowerEnds ends;
+    ends.x0 = begin / POWER_DEPTH;
+    ends.x1 = (begin + way) / POWER_DEPTH;
+    ends.q0 = ends.x0 * ends.x0 + POWER_ROUND;
+    ends.q1 = ends.x1 * ends.x1 + POWER_ROUND;
+    return ends;
+}
+
+MILD_HD PowerOver power_over(Real exponent, Real begin, Real way) {
+    const Real m = (exponent - 1) / 2;
+    const PowerEnds ends = power_ends(begin, way);
+    PowerOver over;
+    over.middle = real_pow((ends.q0 + ends.q1) / 2, m);
+    over.begin = real_pow(ends.q0, m);
+    over.end = real_pow(ends.q1, m);
+    return over;
+}
+
 /* From x0 to x1 the mean is S (q1^(m+1) - q0^(m+1))/((2 m + 2) (x1 - x0)). Where that cancels, it
  * is expanded about the mean Q of q0 and q1, with h the mean of x0 and x1:
  *
  *     mean = S h Q^m g(rho),  rho = (q1 - q0)/(q1 + q0),  g = sum of C(m, 2 k) rho^2k/(2 k + 1)
  * up to rho^10. The remainder is below 1e-13 of the mean. */
-MILD_HD PowerWay power_way(Real force, Real exponent, Real begin, Real way) {
+MILD_HD PowerWay power_way_of(Real force, Real exponent, Real begin, Real way,
+                              const PowerOver *grows) {
     const Real m = (exponent - 1) / 2;
-    const Real x0 = begin / POWER_DEPTH;
-    const Real x1 = (begin + way) / POWER_DEPTH;
+    const PowerEnds ends = power_ends(begin, way);
+    const Real x0 = ends.x0;
+    const Real x1 = ends.x1;
     const Real h = (x0 + x1) / 2;
-    const Real q0 = x0 * x0 + POWER_ROUND;
-    const Real q1 = x1 * x1 + POWER_ROUND;
+    const Real q0 = ends.q0;
+    const Real q1 = ends.q1;
     const Real q = (q0 + q1) / 2;
     const Real rho = h * (x1 - x0) / q;
     const int near = rho < POWER_SERIES && rho > -POWER_SERIES;
@@ -150,19 +186,22 @@ MILD_HD PowerWay power_way(Real force, Real exponent, Real begin, Real way) {
     const Real g_slope =
         rho *
         (c2 * 2 / 3 + r * (c4 * 4 / 5 + r * (c6 * 6 / 7 + r * (c8 * 8 / 9 + r * (c10 * 10 / 11)))));
-    const Real grown = force * real_pow(q, m);
+    const Real grown = force * grows->middle;
     const Real turned = h * x1 / q * (m * g + (1 - rho) * g_slope);
 
-    const Real grown0 = real_pow(q0, m);
-    const Real grown1 = real_pow(q1, m);
     const Real inverse = 1 / (near ? 1 : x1 - x0);
-    const Real far = force * (q1 * grown1 - q0 * grown0) / (2 * m + 2) * inverse;
-    const Real far_slope = (force * x1 * grown1 - far) * inverse;
+    const Real far = force * (q1 * grows->end - q0 * grows->begin) / (2 * m + 2) * inverse;
+    const Real far_slope = (force * x1 * grows->end - far) * inverse;
 
     PowerWay over;
     over.mean = near ? h * grown * g : far;
     over.slope = (near ? grown * (g / 2 + turned) : far_slope) / POWER_DEPTH;
     return over;
+}
+
+MILD_HD PowerWay power_way(Real force, Real exponent, Real begin, Real way) {
+    const PowerOver grows = power_over(exponent, begin, way);
+    return power_way_of(force, exponent, begin, way, &grows);
 }
 
 #endif

@@ -4,6 +4,7 @@
 
 #include "ground/begin.h"
 #include "ground/carry.h"
+#include "ground/drag.h"
 #include "ground/faces.h"
 #include "ground/gather.h"
 #include "ground/locate.h"
@@ -11,8 +12,8 @@
 #include "ground/models.h"
 #include "ground/terrain.h"
 
-MILD_HD void slot_begin(const Slots *s, int i, double dt, double rate, const Motion *motion,
-                        int curves, int kind) {
+MILD_HD void slot_begin(Slots *s, int i, double dt, double rate, const Motion *motion, int curves,
+                        int kind) {
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
@@ -24,102 +25,75 @@ MILD_HD void slot_begin(const Slots *s, int i, double dt, double rate, const Mot
 }
 
 /* Calls element_begin for all slots. On level ground the slopes are 0. */
-MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *now, int curves,
+MILD_HD void slots_begin(const FootScratch *foot, double dt, const Motion *now, int curves,
                          int faces) {
-    const Slots local = *slot, *s = &local;
     const Motion motion = *now;
     const double rate = 1.0 / dt;
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
 #pragma omp simd
-    for (int i = 0; i < end; i++) {
-        slot_begin(s, i, dt, rate, &motion, curves, SLOT_UNEVEN | faces);
+        for (int i = 0; i < SLOT_LANES; i++) {
+            slot_begin(s, i, dt, rate, &motion, curves, SLOT_UNEVEN | faces);
+        }
     }
 }
 
 /* Picks the loop compiled for the curves of the ground under the foot. A line is a cone of which
- * all numbers but the line's are 0: one loop does for both. */
+ * all numbers but the line's are 0, and a cone is a heap that begins at the surface and carries all
+ * of its load: one loop does for the three. */
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
-    const Slots *s = &foot->slot;
-    const int end = foot_end(foot);
-    if (end < VECTOR_LANES) {
-        return; /* never. The compiler then adds no loop for a remainder */
-    }
     switch (foot_variant(foot)) {
     case LAW_LINE:
-    case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 0); return;
-    case LAW_CONE | LAW_HEAP: slots_begin(s, end, dt, now, LAW_CONE | LAW_HEAP, 0); return;
-    case LAW_POWER: slots_begin(s, end, dt, now, LAW_POWER, 0); return;
-    case LAW_ELASTIC: slots_begin(s, end, dt, now, LAW_ELASTIC, 0); return;
-    default: slots_begin(s, end, dt, now, LAW_ANY, SLOT_FACES); return;
+    case LAW_CONE:
+    case LAW_CONE | LAW_HEAP: slots_begin(foot, dt, now, LAW_CONE | LAW_HEAP, 0); return;
+    case LAW_POWER: slots_begin(foot, dt, now, LAW_POWER, 0); return;
+    case LAW_ELASTIC: slots_begin(foot, dt, now, LAW_ELASTIC, 0); return;
+    default: slots_begin(foot, dt, now, LAW_ANY, SLOT_FACES); return;
     }
 }
 
 /* Bool: an element on ground with drag will enter virgin ground in this step by more than the
  * elastic travel. */
-static int slots_sink(const Slots *slot, int end, double dt) {
-    const Slots local = *slot, *s = &local;
-    double sinking = 0.0;
-#pragma omp simd reduction(+ : sinking)
-    for (int i = 0; i < end; i++) {
-        const Element element = slot_element(s, i);
-        const double way = element_virgin_way(&element, dt, element.entry_speed);
-        sinking += element.entry_drag > 0.0 ? way : 0.0;
+static int slots_sink(const FootScratch *foot, double dt) {
+    Lanes sinking = {0.0};
+    double sum = 0.0;
+    for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            const Element element = slot_element(s, i);
+            const double way = element_virgin_way(&element, dt, element.entry_speed);
+            sinking[i] += element.entry_drag > 0.0 ? way : 0.0;
+        }
     }
-    return sinking > 0.0;
+    for (int i = 0; i < SLOT_LANES; i++) {
+        sum += sinking[i];
+    }
+    return sum > 0.0;
 }
 
-MILD_HD void slot_drag(const Slots *s, int i, double dt, const Motion *now, const Motion *free,
-                       int curves, int kind) {
-    const double slower = slot_velocity(s, i, now, kind).descent;
-    const double faster = slot_velocity(s, i, free, kind).descent;
-    Element element = slot_loaded(s, i, curves);
-    element_drag(&element, curves, dt, real_max(faster - slower, 0.0));
-    s->entry_speed[i] = element.entry_speed;
-    s->stop_drag[i] = element.stop_drag;
-    s->stop_growth[i] = element.stop_growth;
-}
-
-/* Calls element_drag for all slots. */
-MILD_HD void slots_drag(const Slots *slot, int end, double dt, const Motion *now,
-                        const Motion *free, int curves, int faces) {
-    const Slots local = *slot, *s = &local;
+/* Calls element_drag for all slots. The loop for cones and heaps, which have drag, is in vectors;
+ * that for surfaces and ground with a power beside them is not. */
+static void slots_drag(const FootScratch *foot, double dt, const Motion *now, const Motion *free) {
     const Motion before = *now;
     const Motion after = *free;
-    if (end < VECTOR_LANES) {
-        return; /* never */
+    if (foot_variant(foot) & ~(LAW_CONE | LAW_HEAP)) {
+        slots_drag_any(foot, dt, now, free);
+        return;
     }
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
 #pragma omp simd
-    for (int i = 0; i < end; i++) {
-        slot_drag(s, i, dt, &before, &after, curves, SLOT_UNEVEN | faces);
-    }
-}
-
-/* Sets the explicit impulse of materials that create energy (passive = false). Returns true when
- * the terrain has such a material. */
-static int slots_explicit(const FootScratch *foot, int materials, double dt, const Motion *free) {
-    const Slots *s = &foot->slot;
-    int any = 0;
-    for (int m = 0; m < materials; m++) {
-        any |=
-            foot->derived[m].slot.law.mass_rate < 0.0 || foot->derived[m].slot.law.drag_rate < 0.0;
-    }
-    for (int i = 0; any && i < foot->active; i++) {
-        if (!(s->depth[i] > 0.0) || s->middle[i] < s->depth_max[i]) {
-            continue; /* above the ground or on the unloading line */
+        for (int i = 0; i < SLOT_LANES; i++) {
+            slot_drag(s, i, dt, &before, &after, LAW_CONE | LAW_HEAP, SLOT_UNEVEN);
         }
-        const Element element = slot_loaded(s, i, foot->curves);
-        s->explicit_impulse[i] =
-            element_explicit_of(&element, foot->curves, dt,
-                                slot_velocity(s, i, free, SLOT_UNEVEN | foot->faces).descent);
     }
-    return any;
 }
 
 /* Clears what slots_drag and slots_explicit wrote in the step before. */
 static void slots_clear(const FootScratch *foot) {
-    const size_t bytes = (size_t)foot->padded * sizeof(double);
-    memset(foot->own.stop_drag, 0, bytes);
-    memset(foot->own.stop_growth, 0, bytes);
-    memset(foot->own.explicit_impulse, 0, bytes);
+    for (Slots *s = foot->slot; s < foot->slot + foot->padded / SLOT_LANES; s++) {
+        memset(s->stop_drag, 0, sizeof s->stop_drag);
+        memset(s->stop_growth, 0, sizeof s->stop_growth);
+        memset(s->explicit_impulse, 0, sizeof s->explicit_impulse);
+    }
 }
 
 /* Applies the models whose law depends on the motion. */
@@ -140,11 +114,7 @@ static void foot_direct(const FootScratch *foot, const MildTerrain *terrain, dou
 /* Gives the slots their elements, material and ground: what they remember, and where they are. */
 static void foot_slots(FootScratch *foot, const MildGround *ground, int f,
                        const MildTerrain *terrain, const Memory *memory, const double *R) {
-    if (foot->active == foot->elements && ground->tiles == 0) {
-        slots_direct(foot, memory);
-    } else {
-        slots_gather(foot, memory);
-    }
+    slots_gather(foot, memory);
     slots_materials(foot, terrain, memory);
     if (foot->uneven) {
         slots_uneven(foot, ground->uneven[f], memory, terrain->height);
@@ -175,12 +145,8 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
         slots_clear(foot);
     }
     foot->stops = slots_explicit(foot, terrain->material_count, input->dt, &free);
-    if (slots_sink(&foot->slot, foot_end(foot), input->dt)) {
-        if (foot_variant(foot) & ~LAW_CONE) {
-            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ANY, SLOT_FACES);
-        } else {
-            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_CONE, 0);
-        }
+    if (slots_sink(foot, input->dt)) {
+        slots_drag(foot, input->dt, &now, &free);
         foot->stops = 1;
     }
     foot_direct(foot, terrain, input->dt, R, &now);

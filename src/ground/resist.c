@@ -1,14 +1,8 @@
 #define POWER_CALLED /* power.h: no vector loop here needs a power */
-/* Resistive force theory (plate.h) for the slots of a foot, and for plates on their own. */
+/* Resistive force theory (plate.h) for the slots of a foot. */
 #include "ground/resist.h"
 
 #include "ground/element_law.h"
-
-void mild_resist_plane(double beta, double gamma, double alpha[2]) {
-    const Alpha plane = plane_alpha(cos(2.0 * beta), sin(2.0 * beta), cos(gamma), sin(gamma));
-    alpha[0] = plane.x;
-    alpha[1] = plane.z;
-}
 
 void mild_resist_space(const double normal[3], const double direction[3], double alpha[3]) {
     double x = -direction[2];
@@ -26,30 +20,48 @@ void mild_resist_space(const double normal[3], const double direction[3], double
 }
 
 /* Adapts the law of one slot to its motion at the start of the step. */
-MILD_HD void slot_resist(const Slots *s, int i, double dt, double rate, const Plate *plate,
-                         const Motion *motion, int in_space, int curves, int kind) {
-    const SlotVelocity v = slot_velocity(s, i, motion, kind);
+MILD_HD void slot_resist(Slots *s, int i, double dt, double rate, const Plate *plate,
+                         const Motion *motion, int in_space) {
+    const SlotVelocity v = slot_velocity(s, i, motion, SLOT_UNEVEN);
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
-    element_resist(&element, &memory, plate, in_space, curves, dt, rate, s->strength[i], v.x, v.y,
+    element_resist(&element, &memory, plate, in_space, LAW_LINE, dt, rate, s->strength[i], v.x, v.y,
                    v.descent);
     s->line_stiffness[i] = element.law.line_stiffness;
     slot_store(s, i, &element);
 }
 
-/* The same for all slots of a foot on this theory alone. */
-MILD_HD void slots_resist(const Slots *slot, int end, double dt, const Plate *sole,
-                          const Motion *now, int in_space) {
-    const Slots local = *slot, *s = &local;
+/* One text of both theories, in place of four inlined. */
+static __attribute__((noinline)) Alpha some_alpha(const Plate *plate, int in_space, double lean,
+                                                  double level, double down) {
+    return plate_alpha(plate, in_space, lean, level, down);
+}
+
+/* The same of any slot. */
+static void some_resist(Slots *s, int i, double dt, const Plate *plate, const Motion *motion,
+                        int in_space, int curves) {
+    const SlotVelocity v = slot_velocity(s, i, motion, SLOT_UNEVEN | SLOT_FACES);
+    const ElementMemory memory = slot_memory(s, i);
+    const PlateMotion m = plate_motion(plate, v.x, v.y, v.descent);
+    const Alpha sinking = some_alpha(plate, in_space, m.lean, m.level, m.down + RESIST_REST);
+    const Alpha sliding = some_alpha(plate, in_space, m.lean, m.level + RESIST_REST, m.down);
+    Element element = slot_element(s, i);
+    element_yield(&element, &memory, dt, 1.0 / dt, s->strength[i], sliding.x, sinking.z, curves);
+    s->line_stiffness[i] = element.law.line_stiffness;
+    slot_store(s, i, &element);
+}
+
+/* slot_resist for all slots of a foot on this theory alone. */
+MILD_HD void slots_resist(const FootScratch *foot, double dt, const Plate *sole, const Motion *now,
+                          int in_space) {
     const Plate plate = *sole;
     const Motion motion = *now;
     const double rate = 1.0 / dt;
-    if (end < VECTOR_LANES) {
-        return; /* never. The compiler then adds no loop for a remainder */
-    }
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
 #pragma omp simd
-    for (int i = 0; i < end; i++) {
-        slot_resist(s, i, dt, rate, &plate, &motion, in_space, LAW_LINE, SLOT_UNEVEN);
+        for (int i = 0; i < SLOT_LANES; i++) {
+            slot_resist(s, i, dt, rate, &plate, &motion, in_space);
+        }
     }
 }
 
@@ -75,20 +87,20 @@ static Plate face_plate(const FootScratch *foot, int e) {
 /* The foot's slots on `model`, among slots on others. in_space: bool. */
 static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain, int model,
                              double dt, const Plate *plate, const Motion *now, int in_space) {
-    const Slots *s = &foot->slot;
     for (int i = 0; i < foot->active; i++) {
+        Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
         if (terrain->materials[foot->slot_material[i] & 0xff].model != model) {
             continue; /* the nearer material decides */
         }
-        if (!slot_directed(s, i) || foot->slot_material[i] & SLOT_BARRED) {
+        if (!slot_directed(s, l) || foot->slot_material[i] & SLOT_BARRED) {
             continue; /* blended with another curve: stays a level plate */
         }
         Plate own = *plate;
         if (foot->faces) {
             own = face_plate(foot, foot->element[i]);
         }
-        slot_resist(s, i, dt, 1.0 / dt, &own, now, in_space, foot->curves,
-                    SLOT_UNEVEN | foot->faces);
+        some_resist(s, l, dt, &own, now, in_space, foot->curves);
     }
 }
 
@@ -97,7 +109,7 @@ MILD_HD void foot_resist(const FootScratch *foot, const MildTerrain *terrain, in
                          const double *rotation, const Motion *now, int in_space) {
     const Plate plate = plate_of(rotation);
     if (terrain_only(terrain, model) && !foot->faces) {
-        slots_resist(&foot->slot, foot_end(foot), dt, &plate, now, in_space);
+        slots_resist(foot, dt, &plate, now, in_space);
     } else {
         foot_resist_some(foot, terrain, model, dt, &plate, now, in_space);
     }

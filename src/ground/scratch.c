@@ -13,7 +13,7 @@
 /* Numbers of a foot in the block. */
 static size_t foot_doubles(const MildSole *sole) {
     return (size_t)sole_padded(sole) *
-           (SLOT_ARRAYS + FOOT_ARRAYS + (sole->faces ? FACES_ARRAYS : 0));
+           (SLOT_NUMBERS + FOOT_ARRAYS + (sole->faces ? FACES_ARRAYS : 0));
 }
 
 /* Takes the next `count` numbers of the block. */
@@ -97,13 +97,9 @@ static void foot_set_bounds(FootScratch *foot) {
     }
 }
 
-/* Takes the arrays of the slots. No slot has a law yet. */
+/* Takes the slots. None has a law yet. */
 static void foot_set_slots(FootScratch *foot, double **at, int32_t *integers) {
-    double **arrays = (double **)&foot->own;
-    for (size_t k = 0; k < SLOT_ARRAYS; k++) {
-        arrays[k] = take(at, foot->padded);
-    }
-    foot->slot = foot->own;
+    foot->slot = (Slots *)take(at, (int)SLOT_NUMBERS * foot->padded);
     foot->element = integers;
     foot->slot_material = integers + foot->padded;
     foot->slot_holder = integers + 2 * foot->padded;
@@ -148,6 +144,7 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
     scratch->feet = feet;
     scratch->block = block;
     scratch->rows = block;
+    scratch->window[ROW_LANES] = 1.0;
     double *at = block + rows;
     int32_t *integers = (int32_t *)(block + doubles);
     for (int f = 0; f < feet; f++) {
@@ -170,19 +167,6 @@ void mild_scratch_destroy(MildScratch *scratch) {
     free(scratch);
 }
 
-void slots_remember(Slots *s, const Memory *memory) {
-    s->depth_max = memory->depth_max;
-    s->last_middle = memory->middle;
-    s->last_speed = memory->front_speed;
-    s->drift = memory->drift;
-    s->pending_x = memory->pending_x;
-    s->pending_y = memory->pending_y;
-    s->held_x = memory->held_x;
-    s->held_y = memory->held_y;
-    s->held_stiffness = memory->held_stiffness;
-    s->worn = memory->worn;
-}
-
 void foot_points(const FootScratch *foot) {
     const double *x = foot->x;
     const double *y = foot->y;
@@ -196,8 +180,9 @@ void foot_points(const FootScratch *foot) {
     const double nx = foot->arm[2][0];
     const double ny = foot->arm[2][1];
     const double nz = foot->arm[2][2];
+    const int end = foot->padded & -VECTOR_LANES; /* changes nothing; no loop for a remainder */
 #pragma omp simd
-    for (int i = 0; i < foot->padded; i++) {
+    for (int i = 0; i < end; i++) {
         foot->point_x[i] = ox + ex * x[i] + nx * y[i];
         foot->point_y[i] = oy + ey * x[i] + ny * y[i];
         foot->point_z[i] = oz + ez * x[i] + nz * y[i];

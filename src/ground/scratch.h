@@ -80,9 +80,7 @@ typedef struct FootScratch {
     int32_t *slot_material; /* [padded] material whose law the slot has, encoded as in Memory */
     int32_t *slot_holder;   /* [padded] element whose law it has, for merged cones */
     DerivedLaw derived[MILD_MATERIALS_MAX];
-    Slots own;  /* arrays that the scratch owns */
-    Slots slot; /* arrays of this step: `own`, except that when all elements are listed x, y, depth
-                   and memory are read where they lie */
+    Slots *slot; /* [padded/SLOT_LANES] blocks of slots */
 
     /* Output of mild_scratch_elements, arrays [padded], see MildElements. */
     double *normal;    /* [N] */
@@ -102,6 +100,7 @@ struct MildScratch {
     int listed;                     /* feet with listed elements */
     int list[MILD_FEET_MAX];        /* [listed] their indices, ascending */
     double *rows;                   /* [2][6 feet][ROW_LANES] of Newton's method */
+    double window[2 * ROW_LANES];   /* 1 at ROW_LANES, else 0: newton_step.c */
     double sums[MILD_FEET_MAX][12]; /* [N s, N s m] of I, x I, y I, height I at the last pass */
     double wrench[TWIST_MAX];       /* [N s, N m s] sum of B^T I at the last pass */
     /* [kg, kg m, kg m^2] -d wrench/d twist of each foot, 6 x 6, row major. */
@@ -114,14 +113,22 @@ struct MildScratch {
 
 /* Bool: made for soles of the same numbers of elements as the ground. */
 int scratch_fits(const MildScratch *scratch, const MildGround *ground);
-/* Points the slots at the arrays of the memory instead of their own copies. */
-void slots_remember(Slots *s, const Memory *memory);
 /* Computes the world position of every element: point_x, point_y, point_z. */
 void foot_points(const FootScratch *foot);
 
-/* Slots in use, rounded up to whole vectors. */
+/* Slots in use, rounded up to whole blocks. */
 static inline int foot_end(const FootScratch *foot) {
-    return (foot->active + VECTOR_LANES - 1) / VECTOR_LANES * VECTOR_LANES;
+    return (foot->active + SLOT_LANES - 1) / SLOT_LANES * SLOT_LANES;
+}
+
+/* One past the last block in use. */
+static inline Slots *slots_end(const FootScratch *foot) {
+    return foot->slot + (foot->active + SLOT_LANES - 1) / SLOT_LANES;
+}
+
+/* The block of slot i. Its lane there is i % SLOT_LANES. */
+static inline Slots *slot_block(const FootScratch *foot, int i) {
+    return foot->slot + i / SLOT_LANES;
 }
 
 /* The curves of the compiled loop for a foot. The loop of all curves is also that of surfaces: it
@@ -135,8 +142,9 @@ static inline Motion foot_motion(const FootScratch *foot, const double *V) {
     Motion motion = motion_of(foot->arm, V);
     if (foot->faces) {
         const double *q = foot->arm[3];
-        motion.lift[0] = V[4] * q[2] - V[5] * q[1];
-        motion.lift[1] = V[5] * q[0] - V[3] * q[2];
+        const double x = V[5] * q[1], y = V[3] * q[2]; /* first: pass.c fuses these products */
+        motion.lift[0] = V[4] * q[2] - x;
+        motion.lift[1] = V[5] * q[0] - y;
         motion.lift[2] = V[3] * q[1] - V[4] * q[0];
     }
     return motion;

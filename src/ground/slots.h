@@ -1,121 +1,143 @@
-/* The elements of a foot that take part in a step, as a structure of arrays.
+/* The elements of a foot that take part in a step, in blocks of a vector each.
  *
- * A slot is one listed element. The list is padded to whole vectors. The law of the padding has no
- * force at any depth.
+ * A slot is one listed element: lane i % SLOT_LANES of block i / SLOT_LANES. The list is padded to
+ * whole blocks. The law of the padding has no force at any depth.
  *
- * Loops over slots use a local copy of Slots. Through a pointer the compiler would have to assume
- * that a store changes the addresses of the arrays; it would reload them and not vectorise. */
+ * A loop over blocks has a loop over lanes inside, which is one vector. All numbers of a block lie
+ * at constant distances, so one address serves them all. */
 #ifndef MILD_GROUND_SLOTS_H
 #define MILD_GROUND_SLOTS_H
 
 #include "ground/motion.h"
 #include "ground/share.h"
 
-/* Arrays of a foot's slots [padded]. Meaning and symbol are at the field of the same name of
- * Element or ElementMemory. Given here are the unit and the function that writes the array. */
+/* Lanes of a vector. MILD_WIDEST_VECTORS: the compiler takes the widest that there are
+ * (src/CMakeLists.txt). */
+#if defined(__AVX512F__) && defined(MILD_WIDEST_VECTORS)
+#define SLOT_LANES 8
+#elif defined(__AVX__)
+#define SLOT_LANES 4
+#else
+#define SLOT_LANES 2
+#endif
+
+typedef double Lanes[SLOT_LANES];
+
+/* A block of slots. Meaning and symbol are at the field of the same name of Element or
+ * ElementMemory. Given here are the unit and the function that writes the numbers. */
 typedef struct {
-    /* Where the element is: slots_direct or slots_gather. */
-    double *x;     /* [m] centre in the foot frame */
-    double *y;     /* [m] */
-    double *depth; /* [m] */
+    /* Where the element is: slots_gather. */
+    Lanes x;     /* [m] centre in the foot frame */
+    Lanes y;     /* [m] */
+    Lanes depth; /* [m] */
 
     /* Of a surface: faces_gather, faces_laws. Otherwise 0. */
-    double *z;     /* [m] above the plane of the foot */
-    double *share; /* [-] projected area over pitch^2; 0: carries nothing */
+    Lanes z;     /* [m] above the plane of the foot */
+    Lanes share; /* [-] projected area over pitch^2; 0: carries nothing */
 
     /* Gradient of the ground under it: slots_uneven; 0 where the foot is not `uneven`. */
-    double *slope_x; /* [-] */
-    double *slope_y; /* [-] */
+    Lanes slope_x; /* [-] */
+    Lanes slope_y; /* [-] */
 
-    /* Memory before the step: slots_direct or slots_gather; slots_imprints also writes
-     * depth_max. */
-    double *depth_max;      /* [m] */
-    double *last_middle;    /* [m] ElementMemory.middle */
-    double *last_speed;     /* [m/s] ElementMemory.front_speed */
-    double *drift;          /* [m] */
-    double *pending_x;      /* [m] */
-    double *pending_y;      /* [m] */
-    double *held_x;         /* [N] */
-    double *held_y;         /* [N] */
-    double *held_stiffness; /* [N/m] */
-    double *worn;           /* [-] Share.worn */
+    /* Memory before the step: slots_gather; slots_imprints also writes depth_max. */
+    Lanes depth_max;      /* [m] */
+    Lanes last_middle;    /* [m] ElementMemory.middle */
+    Lanes last_speed;     /* [m/s] ElementMemory.front_speed */
+    Lanes drift;          /* [m] */
+    Lanes pending_x;      /* [m] */
+    Lanes pending_y;      /* [m] */
+    Lanes held_x;         /* [N] */
+    Lanes held_y;         /* [N] */
+    Lanes held_stiffness; /* [N/m] */
+    Lanes worn;           /* [-] Share.worn */
 
     /* Material: slots_materials, when it changes. */
-#define SLOT_LAW_ARRAY(name) double *name; /* of Law; slots_resist changes line_stiffness */
-    LAW_NUMBERS(SLOT_LAW_ARRAY)
-    double *exit_drag;  /* [kg/m] */
-    double *entry_drag; /* [kg/m] */
-    double *strength;   /* [N/m] line_stiffness before slots_resist changes it */
-    double *recovery;   /* [-] */
-    double *mu;         /* [-] */
-    double *k_drift;    /* [N/m^2] */
-    double *b_drift;    /* [N s/m] */
+#define SLOT_LAW_LANES(name) Lanes name; /* of Law; slots_resist changes line_stiffness */
+    LAW_NUMBERS(SLOT_LAW_LANES)
+    Lanes exit_drag;  /* [kg/m] */
+    Lanes entry_drag; /* [kg/m] */
+    Lanes strength;   /* [N/m] line_stiffness before slots_resist changes it */
+    Lanes recovery;   /* [-] */
+    Lanes mu;         /* [-] */
+    Lanes k_drift;    /* [N/m^2] */
+    Lanes b_drift;    /* [N s/m] */
 
     /* The same of ground with LAW_HEAP: Law.cone_begin and the fields of Share. */
-    double *cone_begin;  /* [m] */
-    double *projects;    /* [-] */
-    double *slip_rate;   /* [1/m] */
-    double *regain_rate; /* [1/m] */
-    double *grip;        /* [-] */
-    double *whole_mu;    /* [-] Share.mu, of which `mu` is what is left in this step */
+    Lanes cone_begin;  /* [m] */
+    Lanes projects;    /* [-] */
+    Lanes slip_rate;   /* [1/m] */
+    Lanes regain_rate; /* [1/m] */
+    Lanes grip;        /* [-] */
+    Lanes whole_mu;    /* [-] Share.mu, of which `mu` is what is left in this step */
 
     /* Share of this step: foot_share; without LAW_HEAP carry is 1. */
-    double *lean;  /* [-] */
-    double *carry; /* [-] */
+    Lanes lean;  /* [-] */
+    Lanes carry; /* [-] */
 
     /* Law of this step: slots_begin, changed by slots_resist. */
-    double *middle;           /* [m] */
-    double *yield_depth;      /* [m] */
-    double *virgin_depth;     /* [m] */
-    double *unload_stiffness; /* [N/m] */
-    double *zero_depth;       /* [m] */
-    double *added_mass;       /* [kg] */
-    double *front_speed;      /* [m/s] */
-    double *yield_speed;      /* [m/s] */
-    double *entry_speed;      /* [m/s] also slots_drag */
-    double *drift_bound;      /* [N s] */
-    double *damping;          /* [kg] */
-    double *hold_x;           /* [N s] */
-    double *hold_y;           /* [N s] */
-    double *hold_stiffness;   /* [kg] */
+    Lanes middle;           /* [m] */
+    Lanes yield_depth;      /* [m] */
+    Lanes virgin_depth;     /* [m] */
+    Lanes unload_stiffness; /* [N/m] */
+    Lanes zero_depth;       /* [m] */
+    Lanes added_mass;       /* [kg] */
+    Lanes front_speed;      /* [m/s] */
+    Lanes yield_speed;      /* [m/s] */
+    Lanes entry_speed;      /* [m/s] also slots_drag */
+    Lanes drift_bound;      /* [N s] */
+    Lanes damping;          /* [kg] */
+    Lanes hold_x;           /* [N s] */
+    Lanes hold_y;           /* [N s] */
+    Lanes hold_stiffness;   /* [kg] */
 
     /* Only where the foot is `turned`: energy_created; otherwise 0. */
-    double *turn_x; /* [m/s] */
-    double *turn_y; /* [m/s] */
+    Lanes turn_x; /* [m/s] */
+    Lanes turn_y; /* [m/s] */
 
     /* Only where the foot `stops`: slots_drag, slots_explicit; otherwise 0. */
-    double *stop_drag;        /* [kg s/m^2] */
-    double *stop_growth;      /* [m] */
-    double *explicit_impulse; /* [N s] */
+    Lanes stop_drag;        /* [kg s/m^2] */
+    Lanes stop_growth;      /* [m] */
+    Lanes explicit_impulse; /* [N s] */
+
+    /* Powers at the last trial twist: contact_pass. */
+    Lanes power[2];   /* ImpulsePowers.virgin */
+    Lanes elastic[2]; /* ImpulsePowers.elastic */
 
     /* Impulse at the last trial twist, world: contact_pass, sweep_element. */
-    double *ix; /* [N s] */
-    double *iy; /* [N s] */
-    double *iz; /* [N s] */
+    Lanes ix; /* [N s] */
+    Lanes iy; /* [N s] */
+    Lanes iz; /* [N s] */
 
     /* Minus its derivative with respect to the velocity of the element: contact_pass. On level
      * ground hyx = hxy and hzx = hzy = 0, and these three are not written. */
-    double *hxx; /* [kg] */
-    double *hxy; /* [kg] */
-    double *hxz; /* [kg] */
-    double *hyx; /* [kg] */
-    double *hyy; /* [kg] */
-    double *hyz; /* [kg] */
-    double *hzx; /* [kg] */
-    double *hzy; /* [kg] */
-    double *hzz; /* [kg] */
+    Lanes hxx; /* [kg] */
+    Lanes hxy; /* [kg] */
+    Lanes hxz; /* [kg] */
+    Lanes hyx; /* [kg] */
+    Lanes hyy; /* [kg] */
+    Lanes hyz; /* [kg] */
+    Lanes hzx; /* [kg] */
+    Lanes hzy; /* [kg] */
+    Lanes hzz; /* [kg] */
 
     /* Working arrays of the solvers. */
-    double *bound;       /* [N s] friction bound held by Newton's method: bounds_move */
-    double *bound_moved; /* [N s] its last change */
-    double *fx;          /* [N s] friction without drift damping: sweep_element */
-    double *fy;          /* [N s] */
+    Lanes bound;       /* [N s] friction bound held by Newton's method: bounds_move */
+    Lanes bound_moved; /* [N s] its last change */
+    Lanes fx;          /* [N s] friction without drift damping: sweep_element */
+    Lanes fy;          /* [N s] */
 } Slots;
-#define SLOT_ARRAYS (sizeof(Slots) / sizeof(double *))
+#define SLOT_NUMBERS (sizeof(Slots) / sizeof(Lanes))
+
+/* The lanes of one number in a register, for sums over all blocks. */
+typedef double LaneVector __attribute__((vector_size(sizeof(Lanes)), may_alias));
+
+MILD_HD LaneVector lanes_load(const double *lanes) {
+    return *(const LaneVector *)lanes;
+}
 
 #define SLOT_LAW_LOAD(name) .name = s->name[i],
-/* The element of a slot, by value. The compiler does not load fields that the caller does not
- * use. */
+/* The element of lane i of a block, by value. The compiler does not load fields that the caller
+ * does not use. */
 MILD_HD Element slot_element(const Slots *s, int i) {
     return (Element){
         .law = {LAW_NUMBERS(SLOT_LAW_LOAD)},
@@ -188,7 +210,7 @@ MILD_HD ElementMemory slot_memory(const Slots *s, int i) {
 }
 
 /* Stores the fields that element_begin sets. */
-MILD_HD void slot_store(const Slots *s, int i, const Element *e) {
+MILD_HD void slot_store(Slots *s, int i, const Element *e) {
     s->middle[i] = e->middle;
     s->yield_depth[i] = e->yield_depth;
     s->virgin_depth[i] = e->virgin_depth;

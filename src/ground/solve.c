@@ -5,95 +5,51 @@
 #include "ground/energy.h"
 #include "ground/faces.h"
 #include "ground/friction.h"
+#include "ground/moments.h"
 #include "ground/prepare.h"
 #include "ground/solver.h"
 
 const char *const mild_solver_names[MILD_SOLVERS] = {"newton", "gauss_seidel", "explicit"};
 
-/* Copies the slots back to the elements: forces in N, and what each element did in the step. */
-static void foot_scatter(const MildScratch *scratch, int f) {
-    const FootScratch *foot = &scratch->foot[f];
-    const Slots *s = &foot->slot;
-    const Motion motion = foot_motion(foot, scratch->velocity + 6 * f);
-    const double dt = scratch->dt;
-    const double rate = 1.0 / dt;
-    for (int i = 0; i < foot->active; i++) {
-        const int e = foot->element[i];
-        const Element element = slot_loaded(s, i, foot->curves);
-        const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
-        const double beyond = element.depth + dt / 2 * v.descent - element.yield_depth;
-        const int loaded = s->iz[i] > 0.0;
-        const int deeper = beyond > 0.0;
-        foot->normal[e] = s->iz[i] * rate;
-        foot->tangent_x[e] = s->ix[i] * rate;
-        foot->tangent_y[e] = s->iy[i] * rate;
-        foot->flat[e] = law_flat_share(&element.law, foot->curves,
-                                       element.virgin_depth + (deeper ? beyond : 0.0));
-        foot->state[e] = (uint8_t)(!loaded  ? MILD_ELEMENT_FREE
-                                   : deeper ? MILD_ELEMENT_VIRGIN
-                                            : MILD_ELEMENT_UNLOADING);
-        foot->slip[e] = loaded && friction_slides(&element, s->iz[i], v.x, v.y);
-    }
-}
-
-MildElements mild_scratch_elements(const MildScratch *scratch, int f) {
-    const FootScratch *foot = &scratch->foot[f];
-    size_t bytes = (size_t)foot->padded * sizeof(double);
-    memset(foot->normal, 0, bytes);
-    memset(foot->tangent_x, 0, bytes);
-    memset(foot->tangent_y, 0, bytes);
-    memset(foot->state, 0, 2 * (size_t)foot->padded); /* clears slip too, which follows it */
-    for (int e = 0; e < foot->padded; e++) {
-        foot->flat[e] = 1.0;
-    }
-    for (int e = 0; foot->away && e < foot->elements; e++) {
-        foot->depth[e] = foot->reach;
-    }
-    foot_points(&scratch->foot[f]);
-    foot_scatter(scratch, f);
-    return (MildElements){foot->depth,   foot->normal,  foot->tangent_x, foot->tangent_y,
-                          foot->point_x, foot->point_y, foot->point_z,   foot->flat,
-                          foot->state,   foot->slip};
-}
-
 /* Sums over the loaded elements: contact count, area, depths, centre of pressure. */
 static void foot_loaded(const MildScratch *scratch, const double *position, int f,
                         MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
-    const Slots local = foot->slot, *s = &local;
-    double sum = 0.0;     /* [m] of the depths */
+    Lanes lanes[5] = {{0.0}};
+    Lanes deep = {0.0};
+    for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            const double on = s->iz[i] > 0.0 ? 1.0 : 0.0;
+            const double depth = on * s->depth[i];
+            deep[i] = depth > deep[i] ? depth : deep[i];
+            lanes[0][i] += depth;
+            lanes[1][i] += on;
+            lanes[2][i] += s->iz[i];
+            lanes[3][i] += s->x[i] * s->iz[i];
+            lanes[4][i] += s->y[i] * s->iz[i];
+        }
+    }
+    double sums[5];
+    lanes_sum(lanes, 5, sums);
     double deepest = 0.0; /* [m] */
-    double loaded = 0.0;  /* number of loaded elements */
-    double force = 0.0;   /* [N s] of the normal impulses */
-    double x = 0.0;       /* [N s m] of x times the normal impulse */
-    double y = 0.0;       /* [N s m] */
-    int end = foot_end(foot);
-    if (end < VECTOR_LANES) {
-        return; /* never. The compiler then adds no loop for a remainder */
+    for (int i = 0; i < SLOT_LANES; i++) {
+        deepest = fmax(deepest, deep[i]);
     }
-#pragma omp simd reduction(+ : sum, loaded, force, x, y) reduction(max : deepest)
-    for (int i = 0; i < end; i++) {
-        double on = s->iz[i] > 0.0 ? 1.0 : 0.0;
-        double depth = on * s->depth[i];
-        loaded += on;
-        sum += depth;
-        deepest = depth > deepest ? depth : deepest;
-        force += s->iz[i];
-        x += s->x[i] * s->iz[i];
-        y += s->y[i] * s->iz[i];
-    }
+    const double loaded = sums[1]; /* number of loaded elements */
+    const double force = sums[2];  /* [N s] of the normal impulses */
     result->contacts = (int)loaded;
     result->area = loaded * foot->pitch * foot->pitch;
     result->depth_max = deepest;
     if (!(loaded > 0.0)) {
         return;
     }
-    result->depth_mean = sum / loaded;
+    result->depth_mean = sums[0] / loaded;
     const double z = foot->faces ? faces_loaded(foot, &result->area) : 0.0;
     for (int k = 0; k < 3; k++) {
         result->pressure_center[k] =
             position[k] + foot->arm[0][k] +
-            (x * foot->arm[1][k] + y * foot->arm[2][k] + z * foot->arm[3][k]) / force;
+            (sums[3] * foot->arm[1][k] + sums[4] * foot->arm[2][k] + z * foot->arm[3][k]) / force;
     }
 }
 

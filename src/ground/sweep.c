@@ -2,7 +2,8 @@
 #include <string.h>
 
 #include "ground/friction.h"
-#include "ground/impulse.h"
+#include "ground/literal.h"
+#include "ground/slot_impulse.h"
 #include "ground/solver.h"
 
 #define SWEEP_TOLERANCE 1e-10 /* [-] of the wrench's change, unless the caller sets one */
@@ -66,12 +67,6 @@ static void element_inverse_mass(const Sweep *sweep, int f, const double *p, dou
     }
 }
 
-/* Normal impulse of one slot at the downward speed w. */
-static Impulse slot_impulse(const Slots *s, int i, int curves, double dt, double w) {
-    const Element element = slot_loaded(s, i, curves);
-    return element_impulse(&element, curves, 1, dt, w);
-}
-
 /* Implicit normal impulse: one Newton step on I - I(w). An impulse dI slows the element by G_zz
  * dI. */
 static double element_normal(const Slots *s, int i, int curves, double dt, double w, double G) {
@@ -82,8 +77,7 @@ static double element_normal(const Slots *s, int i, int curves, double dt, doubl
 /* Paper eq 13: predict, correct by the continuity error, project onto the friction disc. Within the
  * disc the law is I = t of friction.h, so v = (dt f - I)/(dt^2 k + c), which is a compliance in
  * series with G. On the rim I has the direction of t, which any scale of t gives. */
-static void element_friction(const Slots *s, int i, const double *v, const double *delta,
-                             double G) {
+static void element_friction(Slots *s, int i, const double *v, const double *delta, double G) {
     double radius = s->mu[i] * s->iz[i] + s->drift_bound[i];     /* r [N s] */
     double stiff = s->hold_stiffness[i] + FRICTION_LAG * radius; /* dt^2 k + c [kg] */
     double compliance = stiff > 0.0 ? 1.0 / stiff : 0.0;         /* [1/kg] */
@@ -97,54 +91,10 @@ static void element_friction(const Slots *s, int i, const double *v, const doubl
     s->fy[i] = y * scale;
 }
 
-/* Eqs 3 to 5: dt F_GM [N s] of the depth and the downward speed w before the step, on the way up
- * too. */
-static double slot_literal(const Slots *s, int i, int curves, double dt, double w) {
-    const Element element = slot_loaded(s, i, curves);
-    const double u = element.depth;
-    double force = law_force(&element.law, curves, u) + law_elastic_force(&element.law, curves, u);
-    if (curves & LAW_CONE) {
-        force += element.law.drag_rate * law_flat_share(&element.law, curves, u) * w * w;
-    }
-    return u > 0.0 ? dt * fmax(force, 0.0) : 0.0;
-}
-
-/* Eq 13 as element_friction, of a cone without anything else. */
-static void element_literal(const Slots *s, int i, const double *v, const double *delta, double G) {
-    const double beta = 0.5 / G; /* [kg] */
-    const double gamma = 0.1 * beta;
-    const double x = s->fx[i] - gamma * delta[0] - beta * v[0];
-    const double y = s->fy[i] - gamma * delta[1] - beta * v[1];
-    const double radius = s->mu[i] * s->iz[i];
-    const double length = sqrt(x * x + y * y);
-    const double scale = length > radius ? radius / length : 1.0;
-    s->fx[i] = x * scale;
-    s->fy[i] = y * scale;
-    s->ix[i] = s->fx[i] - s->slope_x[i] * s->iz[i];
-    s->iy[i] = s->fy[i] - s->slope_y[i] * s->iz[i];
-}
-
-/* Eq 14: drift resistance against the velocity before the step. */
-static void sweep_drift(const MildScratch *scratch, const MildContactInput *input) {
-    for (int k = 0; k < scratch->listed; k++) {
-        const int f = scratch->list[k];
-        const FootScratch *foot = &scratch->foot[f];
-        const Slots *s = &foot->slot;
-        const Motion motion = foot_motion(foot, input->velocity[f]);
-        for (int i = 0; i < foot->active; i++) {
-            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
-            const double speed = sqrt(v.x * v.x + v.y * v.y);
-            const double drag = s->drift_bound[i] + s->damping[i] * speed;
-            s->ix[i] -= speed > 0.0 ? drag * v.x / speed : 0.0;
-            s->iy[i] -= speed > 0.0 ? drag * v.y / speed : 0.0;
-        }
-    }
-}
-
 /* Normal impulse, friction and drift damping of one element at its velocities v and w. */
-static void element_implicit(const Sweep *sweep, const FootScratch *foot, int i, const double *v,
-                             double w, const double *delta, const double *G, double G_xy) {
-    const Slots *s = &foot->slot;
+static void element_implicit(const Sweep *sweep, const FootScratch *foot, Slots *s, int i,
+                             const double *v, double w, const double *delta, const double *G,
+                             double G_xy) {
     const double old[3] = {s->ix[i], s->iy[i], s->iz[i]};
     const double fx = s->fx[i];
     const double fy = s->fy[i];
@@ -171,8 +121,7 @@ static void element_implicit(const Sweep *sweep, const FootScratch *foot, int i,
 }
 
 /* One iteration of the inner loop of Algorithm 1. The change of impulse moves the feet at once. */
-static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
-    const Slots *s = &foot->slot;
+static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, Slots *s, int i) {
     const double *V = sweep->twist + 6 * sweep->place[f];
     double p[3];
     slot_arm(foot, s, i, p);
@@ -194,9 +143,9 @@ static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
     double G_xy = fmax(fmax(G[0], G[1]), SWEEP_LEAST_G);
     const double old[3] = {s->ix[i], s->iy[i], s->iz[i]};
     if (sweep->literal) {
-        element_literal(s, i, v, delta, G_xy);
+        literal_friction(s, i, v, delta, G_xy);
     } else {
-        element_implicit(sweep, foot, i, v, w, delta, G, G_xy);
+        element_implicit(sweep, foot, s, i, v, w, delta, G, G_xy);
     }
     const double change[3] = {s->ix[i] - old[0], s->iy[i] - old[1], s->iz[i] - old[2]};
     sweep->changed += fabs(change[0]) + fabs(change[1]) + fabs(change[2]);
@@ -215,15 +164,16 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
     for (int k = 0; k < scratch->listed; k++) {
         const int f = scratch->list[k];
         const FootScratch *foot = &scratch->foot[f];
-        const Slots *s = &foot->slot;
         const Motion motion = foot_motion(foot, input->velocity[f]);
-        for (int i = 0; i < foot_end(foot); i++) { /* clears the padding too */
+        for (int slot = 0; slot < foot_end(foot); slot++) { /* clears the padding too */
+            Slots *s = slot_block(foot, slot);
+            const int i = slot % SLOT_LANES;
             double p[3];
             const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
             slot_arm(foot, s, i, p);
             s->fx[i] = s->fy[i] = 0.0;
             s->iz[i] = sweep->literal
-                           ? slot_literal(s, i, foot->curves, input->dt, v.descent)
+                           ? literal_normal(s, i, foot->curves, input->dt, v.descent)
                            : slot_impulse(s, i, foot->curves, input->dt, v.descent).value;
             s->ix[i] = -s->slope_x[i] * s->iz[i];
             s->iy[i] = -s->slope_y[i] * s->iz[i];
@@ -237,9 +187,10 @@ static void sweep_wrench(const MildScratch *scratch, double *wrench) {
     memset(wrench, 0, TWIST_MAX * sizeof *wrench);
     for (int k = 0; k < scratch->listed; k++) {
         const int f = scratch->list[k];
-        const Slots *s = &scratch->foot[f].slot;
         double *W = wrench + 6 * scratch->place[f];
-        for (int i = 0; i < scratch->foot[f].active; i++) {
+        for (int slot = 0; slot < scratch->foot[f].active; slot++) {
+            const Slots *s = slot_block(&scratch->foot[f], slot);
+            const int i = slot % SLOT_LANES;
             double p[3];
             slot_arm(&scratch->foot[f], s, i, p);
             W[0] += s->ix[i];
@@ -271,13 +222,13 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
                    .place = scratch->place,
                    .A = input->inverse_inertia,
                    .literal = input->solver == MILD_SOLVER_EXPLICIT};
-    static const double zero[TWIST_MAX];
     int limit = input->max_iterations > 0 ? input->max_iterations : SWEEP_LIMIT;
     int iterations = 0;
     double tolerance = input->tolerance > 0.0 ? input->tolerance : SWEEP_TOLERANCE;
     double change = INFINITY;                    /* of the wrench in the last sweep */
     double scale = 0.0;                          /* size of the wrench */
     double wrench[TWIST_MAX], before[TWIST_MAX]; /* after the sweep, and before it */
+    const double zero[TWIST_MAX] = {0.0};
     sweep_start(&sweep, scratch, input);
     sweep_wrench(scratch, wrench);
     int rests = 0;
@@ -289,8 +240,9 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
         memset(sweep.preceding, 0, sizeof sweep.preceding);
         for (int k = 0; k < scratch->listed; k++) {
             const int f = scratch->list[k];
-            for (int i = 0; i < scratch->foot[f].active; i++) {
-                sweep_element(&sweep, &scratch->foot[f], f, i);
+            const FootScratch *foot = &scratch->foot[f];
+            for (int i = 0; i < foot->active; i++) {
+                sweep_element(&sweep, foot, f, slot_block(foot, i), i % SLOT_LANES);
             }
         }
         sweep_wrench(scratch, wrench);
@@ -302,7 +254,7 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
         }
     }
     if (sweep.literal) {
-        sweep_drift(scratch, input);
+        literal_drift(scratch, input);
         sweep_wrench(scratch, wrench);
     }
     result->iterations = iterations;

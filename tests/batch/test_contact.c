@@ -139,7 +139,7 @@ static double distance(const double *a, const double *b, int count, double scale
 static const double *kit_depths(const Kit *kit, int f) {
     const FootScratch *foot = &kit->scratch->foot[f];
     for (int i = 0; i < foot->active; i++) {
-        foot->depth[foot->element[i]] = foot->slot.depth[i];
+        foot->depth[foot->element[i]] = slot_block(foot, i)->depth[i % SLOT_LANES];
     }
     return foot->depth;
 }
