@@ -166,7 +166,10 @@ def main():
     parser.add_argument("--image", default=ROOT / "docs" / "walk-on-grains.png", type=pathlib.Path)
     args = parser.parse_args()
     args.out = args.out.resolve()
-    {"fit": fit, "grains": on_grains, "models": on_models, "figure": draw_figure, "video": film}[args.what](args)
+    try:
+        {"fit": fit, "grains": on_grains, "models": on_models, "figure": draw_figure, "video": film}[args.what](args)
+    except ModuleNotFoundError as error:
+        fail(f"{args.what} needs the Python package {error.name}: .venv/bin/python grains/walk.py, after make setup")
 
 
 if __name__ == "__main__":
