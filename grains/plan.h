@@ -2,7 +2,8 @@
  *
  *     NAME SHAPE TILT STAGE...
  *
- * SHAPE  disc:D | rect:L,W | polygon:X,Y,X,Y,... | sphere:R   [m], the front is at +x
+ * SHAPE  disc:D[,H] | rect:L,W[,H] | polygon:X,Y,X,Y,... | sphere:R   [m], the front is at +x;
+ *        H: height of the block, 0.06 without it; deeper, grains come over it
  * TILT   [deg], positive when the front edge is lower
  * STAGE  press:DEPTH@SPEED   straight down or up to this depth of the bottom's middle [m, m/s]
  *        drag:PATH@SPEED     forward, at constant depth
@@ -71,13 +72,17 @@ inline Shape shape_read(const std::string &word) {
     const std::string kind = word.substr(0, word.find(':'));
     const std::vector<double> v = numbers(word);
     Shape s = {};
-    s.height = 0.06f; /* above every depth, so that no grain comes over it */
-    if (kind == "disc" && v.size() == 1) {
+    const size_t sizes = kind == "disc" ? 1 : kind == "rect" ? 2 : 0; /* without a height */
+    s.height = sizes && v.size() == sizes + 1 ? (float)v[sizes] : 0.06f;
+    if (!(s.height > 0)) {
+        stop("the height of a plate is above 0, not as in ", word.c_str());
+    }
+    if (kind == "disc" && (v.size() == 1 || v.size() == 2)) {
         for (int k = 0; k < 48; k++) {
             const double angle = k * 6.283185307179586 / 48;
             shape_point(&s, 0.5 * v[0] * cos(angle), 0.5 * v[0] * sin(angle));
         }
-    } else if (kind == "rect" && v.size() == 2) {
+    } else if (kind == "rect" && (v.size() == 2 || v.size() == 3)) {
         for (int k = 0; k < 4; k++) {
             shape_point(&s, (k == 1 || k == 2 ? 0.5 : -0.5) * v[0], (k > 1 ? 0.5 : -0.5) * v[1]);
         }
@@ -89,7 +94,8 @@ inline Shape shape_read(const std::string &word) {
         s.radius = (float)v[0];
         s.reach = 2 * s.radius;
     } else {
-        stop("a plate is disc:D, rect:L,W, polygon:X,Y,... or sphere:R, not ", word.c_str());
+        stop("a plate is disc:D[,H], rect:L,W[,H], polygon:X,Y,... or sphere:R, not ",
+             word.c_str());
     }
     return s;
 }

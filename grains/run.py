@@ -27,13 +27,14 @@ RECORDS = ROOT / "grains" / "records"
 V = 0.05  # [m/s] of plates that are led: inertial number under 0.005
 
 # Options of the beds. sand: the ground that laws are fitted to; slick: less friction; fine: half the grain; wide: room for
-# soles and large plates; hertz, rolling: other contacts.
-BOX, WIDE, FINE = "0.45,0.35,0.12", "0.72,0.44,0.12", "0.33,0.28,0.08"
+# soles and large plates; deep: as far as a robot's foot goes down; hertz, rolling: other contacts.
+BOX, WIDE, FINE, DEEP = "0.45,0.35,0.12", "0.72,0.44,0.12", "0.33,0.28,0.08", "0.5,0.4,0.25"
 FAMILIES = {
     "sand": {"seeds": "1-8", "box": BOX, "grain": 0.005, "friction": 0.5},
     "slick": {"seeds": "1-8", "box": BOX, "grain": 0.005, "friction": 0.3},
     "wide": {"seeds": "1-8", "box": WIDE, "grain": 0.005, "friction": 0.5},
     "fine": {"seeds": "1-4", "box": FINE, "grain": 0.0025, "friction": 0.5, "settle": 0.4},
+    "deep": {"seeds": "1-4", "box": DEEP, "grain": 0.005, "friction": 0.5, "settle": 0.8},
     "hertz": {"seeds": "1-4", "box": BOX, "grain": 0.005, "friction": 0.5, "contact": "hertz", "stiffness": 1e7},
     "rolling": {"seeds": "1-4", "box": BOX, "grain": 0.005, "friction": 0.5, "rolling": 0.1},
 }
@@ -63,6 +64,10 @@ SA01, G1, GO1 = outline("sa01", "foot.left"), outline("g1", "foot.left"), "spher
 
 def press(depth):
     return f"press:{depth}@{V}"
+
+
+def deep(name, shape, depth, stage="load:0.03@0.05"):
+    return f"{name} {shape} 0 press:{depth}@0.1 {stage}"
 
 
 def drag(path=0.03, kind="drag"):
@@ -99,6 +104,12 @@ BLOCKS = [
               f"go1 {GO1} 0 {press(0.02)}", f"go1-drop10 {GO1} 0 drop:0.3@1,0.1"]),
     ("hertz", FIRST),
     ("rolling", FIRST),
+    ("deep", [deep("square100-load80", SQUARE, 0.08), deep("square100-load80-tall", SQUARE + ",0.2", 0.08),
+              deep("square100-load20", SQUARE, 0.02), deep("square100-load80-fast", SQUARE, 0.08, "load:0.05@0.5"),
+              deep("square100-drag80", SQUARE, 0.08, "drag:0.03@0.05")]),
+    ("deep", [deep("square100-load120", SQUARE, 0.12), deep("square100-load40", SQUARE, 0.04),
+              deep("square100-load20-fast", SQUARE, 0.02, "load:0.05@0.5"), deep("disc120-load80", DISC, 0.08),
+              deep("strip-load80", STRIP, 0.08)]),
 ]
 
 
@@ -173,7 +184,7 @@ def area_of(shape):
         area = abs(sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(points, points[1:] + points[:1]))) / 2
         return area, min(max(p[k] for p in points) - min(p[k] for p in points) for k in (0, 1))
     if kind == "rect":
-        return v[0] * v[1], min(v)
+        return v[0] * v[1], min(v[:2])
     diameter = v[0] * (2 if kind == "sphere" else 1)
     return math.pi / 4 * diameter**2, diameter
 

@@ -30,7 +30,7 @@ from judge_entries import (PITCH, Archimedes, FunctionEntry, GroundEntry, TableE
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Families of beds, what a model is fitted to there, and the families that the same fit predicts.
 FITS = {
-    "sand": (("disc120", "square100", "square100-drag15"), ("sand", "wide")),
+    "sand": (("disc120", "square100", "square100-drag15"), ("sand", "wide", "deep")),
     "slick": (("disc120", "square100", "square100-drag15"), ("slick",)),
     "fine": (("disc60", "strip", "strip-drag15"), ("fine",)),
     "hertz": (("disc120", "square100", "square100-drag15"), ()),

@@ -72,16 +72,27 @@ class GroundEntry:
         # the best curve, also where its parameters have no interval: a judge needs numbers
         data = [X[:, :1] for X, _ in parts], [y for _, y in parts]
         try:
-            self.material = mild.Material(mild.GroundFit(soles, self.model).fit(*data).material_, mu=0.5)
-        except ValueError:  # tan(alpha)/nu is told, not both: a flatter cone keeps nu within its range
+            hold = {"alpha": 0.3} if self.slips else {}  # presses tell tan(alpha)/nu; alpha, the added mass in all
+            self.material = mild.Material(mild.GroundFit(soles, self.model, hold=hold).fit(*data).material_, mu=0.5)
+        except ValueError:  # a flatter cone keeps nu within its range
             self.material = mild.GroundFit(soles, self.model, hold={"alpha": 0.3}).fit(*data).material_
         if self.slips:
+            self.weigh(ground)
             self.fit_slip(drags)
         elif self.model.startswith("ecc_quasi"):  # whose coefficients contain friction
             self.material = mild.Material(self.material, mu=0, k_drift=0, b_drift=0)
         else:
             for case, rows in drags:
                 self.fit_friction(case, rows)
+
+    def weigh(self, ground):
+        """The bed's density, which the soil at the sides of a sole presses with, and the grains' friction; the added mass
+        per depth stays."""
+        numbers = self.material.as_dict()
+        mass = float(numbers["c_g"]) * float(numbers["phi"]) * float(numbers["rho"])
+        solid = float(np.mean(ground["solid"]))
+        self.material = mild.Material(self.material, phi=solid, rho=ground["density"], c_g=mass / (solid * ground["density"]),
+                                      mu=ground["friction"])
 
     def fit_slip(self, drags):
         """slip_length of F/F0 = 1/(1 + s/j0), and grip of the friction H/F after 5 to 12 mm, where it has built up: slip-sinkage at

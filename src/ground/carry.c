@@ -33,9 +33,11 @@ static void slots_lean(const FootScratch *foot) {
 MILD_HD void slot_carry(Slots *s, int i, double dt, double rate) {
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
+    element.law.cone_begin = s->cone_begin[i];
     Share share = slot_share(s, i);
     element_share(&element, &memory, &share, s->fx[i], dt, rate, share.lean);
     s->mu[i] = element.mu;
+    s->drift_bound[i] = element.drift_bound;
     s->lean[i] = share.lean;
     s->carry[i] = share.carry;
     s->zero_depth[i] = element.zero_depth;

@@ -5,7 +5,7 @@
 
 InsideLaw mild_inside_law(const MildMaterial *material, double pitch, double width) {
     const Law law = law_of(material, pitch, width);
-    const Share share = share_of(material);
+    const Share share = share_of(material, pitch, width);
     const int slips = share.slip_rate > 0.0; /* then path adds no resistance */
     return (InsideLaw){
         .law = law,

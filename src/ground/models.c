@@ -46,20 +46,23 @@ Law law_of(const MildMaterial *material, double pitch, double width) {
     return model_row(material->model)->law(&loaded, pitch);
 }
 
-Share share_of(const MildMaterial *material) {
+Share share_of(const MildMaterial *material, double pitch, double width) {
     const ModelRow *row = model_row(material->model);
     const int slips = row->slips && material->slip_length > 0.0;
+    const int sides = slips && material->grip > 0.0 && width > 0.0;
+    const double weight = material->phi * material->rho * 9.81; /* [N/m^3] of the ground */
     return (Share){.projects = row->merged,
                    .slip_rate = slips ? 1.0 / material->slip_length : 0.0,
                    .regain_rate = row->merged || slips
                                       ? 1.0 / fmax(material->regain_length, REGAIN_LEAST)
                                       : 0.0,
                    .grip = slips ? material->grip : 0.0,
+                   .side = sides ? SHARE_PASSIVE / 2.0 * weight * pitch * pitch / width : 0.0,
                    .mu = material->mu};
 }
 
 int curves_of(const MildMaterial *material, const Law *law) {
-    const Share share = share_of(material);
+    const Share share = share_of(material, 0.0, 0.0);
     return law_curves(law) | (share.projects + share.slip_rate > 0.0 ? LAW_HEAP : 0);
 }
 

@@ -11,7 +11,15 @@
  * A sliding element at the share lambda = q/c of its yield load is held by at most
  *     H = (3 + sqrt 8) t lambda (1 - lambda)/(2 - lambda) F_g,
  * whose greatest value is t F_g, at lambda = 2 - sqrt 2. Grains hold a sole that slides under load
- * so (docs/grains.md); a parabola, as of footings, would hold it by a third less.
+ * so (docs/grains.md); a parabola, as of footings, would hold it by a third less. Two things hold
+ * it besides. Ground that the sole strikes and sets in motion pushes with the force G of the drag:
+ * it is held by the whole of mu, so the coefficient is the mean of both by F and G. And ground at
+ * the sides of a sole that is u deep, of the width W, which is pushed away (Rankine):
+ *
+ *     G = c_d m_a' h^2                   h: speed at which virgin ground is reached
+ *     H <= mu F + K_p phi rho g u^2 s/(2 W)
+ * Summed over a sole that is W u^2/2 of it times its length by its width, near the mean over all
+ * directions of its width (SHARE_PASSIVE).
  *
  * The share is held in a step. It scales virgin ground; the unloading stiffness k stays that of the
  * whole load, so the element yields at q F_g(a) and the line ends at a - q F_g(a)/k.
@@ -29,6 +37,7 @@
 #define SHARE_LEAN REAL(0.02) /* [-] least cosine: a sole on its edge */
 #define SHARE_GRIP REAL(0.1)  /* [-] friction that an element at its yield load keeps */
 #define SHARE_YIELD REAL(5.8284271247461903) /* 3 + sqrt 8 */
+#define SHARE_PASSIVE 3.0                    /* [-] K_p of ground with 30 degrees of friction */
 #define SHARE_FORGET REAL(40)                /* [-] da/u0 beyond which nothing is left */
 #define SHARE_LEAST REAL(1e-6)               /* [-] least share */
 #ifdef MILD_REAL_FLOAT
@@ -43,6 +52,7 @@ typedef struct {
     Real slip_rate;   /* [1/m] 1/j0; 0: slip costs nothing */
     Real regain_rate; /* [1/m] 1/u0 */
     Real grip;        /* [-] t, the greatest friction by the virgin load; 0: mu alone */
+    Real side;        /* [N/m^2] K_p phi rho g s/(2 W) */
     Real mu;          /* [-] of the material */
     Real worn;        /* [-] memory: 1 - q */
     Real lean;        /* [-] c */
@@ -62,17 +72,26 @@ MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share
     const Real force = q * (k * (a - e->zero_depth) - bed) + bed;
     const Real lost = 1 - q / c;
     const Real grips = real_max(SHARE_YIELD * share->grip * lost / (1 + lost), SHARE_GRIP);
-    const Real mu = share->grip > 0 ? real_min(share->mu, grips) : share->mu;
-    const int changes = q < 1 || mu != e->mu;
+    const Real held = real_min(share->mu, grips);
+
+    /* The recruited mass is set in motion by the whole of mu. */
+    const Real h = e->entry_speed;
+    const Real way = real_max(e->depth + dt / 2 * h - a, 0);
+    const Real drag = real_max(e->law.drag_rate, 0) * law_flat_share(&e->law, LAW_HEAP, a);
+    const Real strikes = drag * way * h * rate;
+    const Real moves = strikes / (strikes + force + ELEMENT_TINY);
+    const Real mu = share->grip > 0 ? held + (share->mu - held) * moves : share->mu;
+    const int changes = q < 1 || mu != e->mu || share->side > 0;
     share->lean = c;
     share->carry = q;
-    Element held = *e;
-    held.mu = mu;
-    friction_hold(&held, memory, dt, rate, force + elastic);
+    e->drift_bound += dt * share->side * e->depth * real_max(e->depth, 0);
+    Element still = *e;
+    still.mu = mu;
+    friction_hold(&still, memory, dt, rate, force + elastic);
     e->zero_depth = q < 1 ? a - force / (k + ELEMENT_TINY) : e->zero_depth;
-    e->hold_x = changes ? held.hold_x : e->hold_x;
-    e->hold_y = changes ? held.hold_y : e->hold_y;
-    e->hold_stiffness = changes ? held.hold_stiffness : e->hold_stiffness;
+    e->hold_x = changes ? still.hold_x : e->hold_x;
+    e->hold_y = changes ? still.hold_y : e->hold_y;
+    e->hold_stiffness = changes ? still.hold_stiffness : e->hold_stiffness;
     e->mu = mu;
 }
 

@@ -68,6 +68,7 @@ typedef struct {
     Lanes slip_rate;   /* [1/m] */
     Lanes regain_rate; /* [1/m] */
     Lanes grip;        /* [-] */
+    Lanes side;        /* [N/m^2] */
     Lanes whole_mu;    /* [-] Share.mu, of which `mu` is what is left in this step */
 
     /* Share of this step: foot_share; without LAW_HEAP carry is 1. */
@@ -177,6 +178,7 @@ MILD_HD Share slot_share(const Slots *s, int i) {
         .slip_rate = s->slip_rate[i],
         .regain_rate = s->regain_rate[i],
         .grip = s->grip[i],
+        .side = s->side[i],
         .mu = s->whole_mu[i],
         .worn = s->worn[i],
         .lean = s->lean[i],

@@ -10,7 +10,7 @@
 
 static void case_law(CaseMaterial *c, const MildMaterial *m, const MildSole *sole) {
     const Law law = law_of(m, mild_sole_pitch(sole), mild_sole_width(sole));
-    const Share share = share_of(m);
+    const Share share = share_of(m, mild_sole_pitch(sole), mild_sole_width(sole));
     memcpy(c->law, &law, sizeof c->law);
     c->curves = curves_of(m, &law) | model_row(m->model)->motion;
     c->recovery = law_recovery(&law, recovery_of(m));
@@ -21,6 +21,7 @@ static void case_law(CaseMaterial *c, const MildMaterial *m, const MildSole *sol
     c->slip_rate = share.slip_rate;
     c->regain_rate = share.regain_rate;
     c->grip = share.grip;
+    c->side = share.side;
     c->exit_drag = law_exit_drag(&law);
     c->entry_drag = law_entry_drag(&law);
     c->cohesion = m->cohesion;

@@ -265,7 +265,8 @@ typedef struct {
     const Kit *kit;
     int f;
     Memory memory;
-    double pitch, normal[3]; /* of the face that looks down */
+    double pitch, width,
+        normal[3]; /* width: [m] shorter side; normal: of the face that looks down */
     int i;
     double p[3], at[3], slope[2]; /* ankle -> element, world point, gradient of the ground */
     double share, area;           /* [-] of a surface: what it presses with, and its area, both
@@ -365,7 +366,7 @@ static void element_shear(double dt, DenseElement *e, const MildMaterial *m, dou
 
 /* The share of virgin ground that it carries: the line keeps its slope and ends deeper. up: normal
  * of the sole's upper face. */
-static void dense_share(DenseElement *e, const Find *find) {
+static void dense_share(double dt, DenseElement *e, const Find *find) {
     DenseLaw *law = &e->law;
     const double *g = find->slope, a = e->deep;
     double level = (-find->normal[2] + g[0] * find->normal[0] + g[1] * find->normal[1]) /
@@ -375,7 +376,15 @@ static void dense_share(DenseElement *e, const Find *find) {
            q = fmin(1.0 - find->memory.worn[find->i], c), soil = virgin_force(law, a),
            bed = law->bed_stiffness * fmax(a - law->bed, 0.0);
     if (law->grip > 0.0) {
-        law->mu = fmin(law->mu, fmax(0.1, (3.0 + sqrt(8.0)) * law->grip * (c - q) / (2.0 * c - q)));
+        double held = fmin(law->mu,
+                           fmax(0.1, (3.0 + sqrt(8.0)) * law->grip * (c - q) / (2.0 * c - q))),
+               way = fmax(e->u0 + 0.5 * dt * e->w0 - a, 0.0), carried = q * soil + bed,
+               struck = fmax(law->drag_rate, 0.0) * cone_flat(law, a) * way * e->w0 / dt;
+        law->mu = held + (law->mu - held) * struck / fmax(carried + struck, 1e-300);
+    }
+    if (!find->faces) {
+        double side = 1.5 * law->weight * find->pitch * find->pitch / find->width;
+        e->radius += dt * side * e->u0 * fmax(e->u0, 0.0);
     }
     e->slack = e->line > 0.0 ? a - (q * soil + bed) / e->line : a;
     law->k_pen *= q;
@@ -453,7 +462,7 @@ static void dense_element(Dense *d, const Find *find) {
             fmin(e->law.drag_rate, 0.0) * cone_flat(&e->law, e->deep) * d->dt * e->w0 * e->w0;
     }
     element_line(e);
-    dense_share(e, find);
+    dense_share(d->dt, e, find);
     dense_drag(d->dt, e, e->free[3] - now[3]);
     if (directed) {
         dense_resist(d->dt, e, nearer->model, find->normal, now, now[3]);
@@ -471,6 +480,7 @@ static void dense_foot(Dense *d, const Kit *kit, int f) {
                  .f = f,
                  .memory = ground_memory(kit->ground, f),
                  .pitch = mild_sole_pitch(sole),
+                 .width = mild_sole_width(sole),
                  .normal = {side * R[2], side * R[5], side * R[8]},
                  .share = 1.0,
                  .area = 1.0,

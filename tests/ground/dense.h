@@ -27,6 +27,7 @@ typedef struct {
     double elastic, elastic_power, loss;   /* [N], [-], [s/m] without memory: F (1 + loss w) */
     double begin;                          /* [m] depth from which a heap closes; 0 under a cone */
     double projected, slip, grip;          /* [-], [1/m], [-] docs/model.md sections 21 and 22 */
+    double weight;                         /* [N/m^3] of ground that is pushed away at the sides */
 } DenseLaw;
 
 /* One element: what it remembers, its unloading line, the drift's friction and how it moves with y.

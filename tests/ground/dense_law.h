@@ -65,6 +65,7 @@ static DenseLaw law_material(const MildMaterial *m, double pitch, const double h
     if (m->slip_length > 0.0) {
         law.slip = 1.0 / m->slip_length;
         law.grip = m->grip;
+        law.weight = m->grip > 0.0 ? m->phi * m->rho * 9.81 : 0.0;
         law.k_drift = law.b_drift = 0.0;
     }
     law.mass_rate = c_g * m->phi * m->rho * m->nu * area;

@@ -369,7 +369,7 @@ MILD_HD void bodies_carry(const BodiesSetup *setup, const BodiesWork *work, int 
     const Real lean = contact_lean(normal, own->slope[0], own->slope[1]);
     const Real worn = memory->element[CONTACT_WORN * memory->next + s];
     const Real elastic = law_elastic_force(&own->element.law, own->curves, own->element.middle);
-    own->carried = contact_share(material, sole->face ? 0 : material->projects, worn);
+    own->carried = contact_share(material, !sole->face, worn);
     element_share(&own->element, &own->before, &own->carried, elastic, setup->dt, 1 / setup->dt,
                   lean);
     element_carry(&own->element, own->carried.carry);

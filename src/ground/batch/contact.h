@@ -29,10 +29,11 @@ typedef struct {
     Real entry_drag;   /* [kg/m] */
     Real cohesion;     /* [N/m^2] as in Shear */
     Real shear_length; /* [m] */
-    Real projects;     /* [-] as in Share; the next three too */
+    Real projects;     /* [-] as in Share; the next four too */
     Real slip_rate;    /* [1/m] */
     Real regain_rate;  /* [1/m] */
     Real grip;         /* [-] */
+    Real side;         /* [N/m^2] */
     int curves;        /* LawCurve and LawMotion bits of the law */
 } ContactMaterial;
 
@@ -124,11 +125,17 @@ MILD_HD Real contact_lean(const Real normal[3], Real x, Real y) {
     return real_min(real_max(along / REAL_SQRT(1 + x * x + y * y), SHARE_LEAN), 1);
 }
 
-/* The share of an element before the step. projects: [-] as in Share; 0 for a surface. */
-MILD_HD Share contact_share(const ContactMaterial *material, Real projects, Real worn) {
-    const Share share = {
-        projects, material->slip_rate, material->regain_rate, material->grip, material->mu, worn, 1,
-        1};
+/* The share of an element before the step. plane: bool, of a sole; else of a surface. */
+MILD_HD Share contact_share(const ContactMaterial *material, int plane, Real worn) {
+    const Share share = {plane ? material->projects : 0,
+                         material->slip_rate,
+                         material->regain_rate,
+                         material->grip,
+                         plane ? material->side : 0,
+                         material->mu,
+                         worn,
+                         1,
+                         1};
     return share;
 }
 
