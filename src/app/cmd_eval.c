@@ -427,7 +427,7 @@ static MildStatus check_command(Eval *e, MildError *error) {
 static MildStatus take_start(Eval *e, MildError *error) {
     const MildField *field = mild_field_find(task_fields, task_field_count, "start", NULL);
     TaskDef *task = &e->context.task;
-    MildStatus status = mild_field_parse(field, task, e->start, "--start", error);
+    MildStatus status = mild_field_parse(field, task, e->start, "task", error);
     if (status == MILD_OK && task->start != TASK_START_STAND) {
         task->start_share = task->may_lie = 1;
         e->speeds.value[0] = e->speed_given ? e->speeds.value[0] : 0;
