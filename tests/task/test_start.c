@@ -1,6 +1,6 @@
-/* Episodes of the Go1 that begin lying: where the engine's own functions say that its geoms are, how
- * attitudes and joints are spread, which episodes begin so, that the motors then only damp, and what
- * ends an episode of a robot that may lie. */
+/* Episodes of the Go1 that begin lying: where the engine's own functions say that its geoms are,
+ * how attitudes and joints are spread, which episodes begin so, that the motors then only damp, and
+ * what ends an episode of a robot that may lie. */
 #include <mujoco/mujoco.h>
 
 #include "env/task/task.h"
@@ -180,8 +180,9 @@ static void back_and_side(void **unused) {
     close_env();
 }
 
-/* Each axis of the base is as likely to point anywhere: the vertical component of an axis is uniform
- * in [-1, 1], mean 0 and mean square 1/3; 4 standard deviations of 400 draws are 0.115 and 0.06. */
+/* Each axis of the base is as likely to point anywhere: the vertical component of an axis is
+ * uniform in [-1, 1], mean 0 and mean square 1/3; 4 standard deviations of 400 draws are 0.115 and
+ * 0.06. */
 static void any_attitude_is_as_likely(void **unused) {
     (void)unused;
     double sum[3] = {0}, square[3] = {0};
@@ -318,8 +319,8 @@ static void motors_only_damp_at_first(void **unused) {
 
 /* ---- what ends it ---- */
 
-/* Dropped on its back it lies there until its time is over; without may_lie its tilt, or its base on
- * the ground, ends the episode at once, and on rigid ground in either case. */
+/* Dropped on its back it lies there until its time is over; without may_lie its tilt, or its base
+ * on the ground, ends the episode at once, and on rigid ground in either case. */
 static void a_robot_that_may_lie_is_not_ended(void **unused) {
     (void)unused;
     const float none[JOINTS] = {0};
