@@ -21,7 +21,7 @@ enum { ROWS_MAX = CLI_LIST_MAX * CLI_LIST_MAX };
 typedef struct {
     Context context;
     /* NULL: not given */
-    const char *json, *latent, *ablate, *stances, *actions, *track, *feet, *program;
+    const char *json, *latent, *ablate, *stances, *actions, *track, *feet, *program, *start;
     CliNames grounds;
     CliNumbers speeds;
     int speed_given; /* bool */
@@ -47,6 +47,7 @@ static void add_each(cJSON *o, const EvalTrial *each, int trials) {
     for (int i = 0; i < trials; i++) {
         cJSON *trial = cJSON_CreateObject();
         cJSON_AddStringToObject(trial, "end", task_end_names[each[i].end]);
+        cJSON_AddNumberToObject(trial, "up", each[i].up);
         cJSON_AddNumberToObject(trial, "seconds", each[i].seconds);
         cJSON_AddNumberToObject(trial, "legs", each[i].legs);
         cJSON_AddNumberToObject(trial, "shells", each[i].shells);
@@ -97,10 +98,13 @@ static cJSON *row_json(const EvalRow *row, const EvalTrial *each) {
                   {"shells", row->shells},
                   {"drift_path", row->drift_path},
                   {"stride", row->stride},
-                  {"cadence", row->cadence}};
+                  {"cadence", row->cadence},
+                  {"righted", row->righted},
+                  {"up", row->up}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(o, values[i].name, values[i].value);
     }
+    cJSON_AddStringToObject(o, "start", task_start_names[row->start]);
     add_ends(o, row);
     add_each(o, each, row->trials);
     return o;
@@ -129,7 +133,15 @@ static MildStatus write_json(const Eval *e, MildError *error) {
 /* speed: of the walk; a course lies where it leads. */
 static MildStatus make_scene(Eval *e, const char *name, double speed, Scene *scene,
                              MildError *error) {
-    return context_scene(&e->context, name, speed < 0 ? -e->patch : e->patch, scene, error);
+    MildStatus status =
+        context_scene(&e->context, name, speed < 0 ? -e->patch : e->patch, scene, error);
+    if (status == MILD_OK && e->start && scene->rigid) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--start %s: a robot cannot lie on --model rigid, which its feet alone "
+                         "touch; leave it out",
+                         e->start);
+    }
+    return status;
 }
 
 /* A CSV in memory, so that its file is written whole or not at all. */
@@ -411,9 +423,24 @@ static MildStatus check_command(Eval *e, MildError *error) {
     return status;
 }
 
+/* How trials begin. Where a robot begins lying, it may lie, and is told to stand. */
+static MildStatus take_start(Eval *e, MildError *error) {
+    const MildField *field = mild_field_find(task_fields, task_field_count, "start", NULL);
+    TaskDef *task = &e->context.task;
+    MildStatus status = mild_field_parse(field, task, e->start, "task", error);
+    if (status == MILD_OK && task->start != TASK_START_STAND) {
+        task->start_share = task->may_lie = 1;
+        e->speeds.value[0] = e->speed_given ? e->speeds.value[0] : 0;
+    }
+    return status;
+}
+
 /* What is asked for together must go together. */
 static MildStatus check(Eval *e, MildError *error) {
-    MildStatus status = check_command(e, error);
+    MildStatus status = e->start ? take_start(e, error) : MILD_OK;
+    if (status == MILD_OK) {
+        status = check_command(e, error);
+    }
     if (status == MILD_OK && e->ablate) {
         status = ablation_find(e->ablate, &e->ablation, error);
     }
@@ -497,6 +524,11 @@ int cmd_eval(int argc, char **argv) {
          "(default 0: the heading is held along x)"},
         {"push", CLI_NUMBER, &e->eval.push, 0, 5, "V",
          "[m/s] added to the speed of the base every 4 s, in a random direction (default 0)"},
+        {"start", CLI_TEXT, &e->start, 0, 0, "HOW",
+         "how trials begin: stand; or back, side, any: dropped so, with any angles of the joints "
+         "and motors that only damp for task.settle; then rigid is a very hard material, --speed "
+         "is 0, and a row says how many were up at the end, for 2 s, and when they came up "
+         "(default stand)"},
         {"randomize", CLI_FLAG, &c->randomized, 0, 0, NULL,
          "draw robots as in training, and push them so: section [randomize] of --config, but for "
          "its grounds"},
@@ -563,6 +595,7 @@ int cmd_eval(int argc, char **argv) {
             "  mild eval --ground sand_loose --terrain.kind=rough --terrain.amplitude=0.02\n"
             "  mild eval --robot go1\n"
             "  mild eval --robot go1 --controller stand --speed 0\n"
+            "  mild eval --robot go1 --start back\n"
             "  mild eval --train.device=cuda --trials 1000\n",
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);

@@ -449,8 +449,7 @@ WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, i
     }
 }
 
-/* The pose in which an episode begins. On uneven ground the lowest sole point starts at the depth
- * that the soles have on level ground. */
+/* The pose in which an episode begins: see place of env/task/env.c. */
 WARP_FN void env_pose(const EnvsArrays *all, long robot, EnvWork *scratch) {
     TaskEnv *env = env_at(all, robot);
     const EngineModel *model = all->model;
@@ -458,14 +457,18 @@ WARP_FN void env_pose(const EnvsArrays *all, long robot, EnvWork *scratch) {
     if (!all->reset[robot]) {
         return;
     }
+    const int dropped = env->dropped;
     LANE_ROLLED
-    for (int again = all->task->uneven; again >= 0; again--) {
+    for (int again = all->task->uneven || dropped; again >= 0; again--) {
         Real lowest = MEASURE_NONE;
         env_load(model, env, scratch);
         engine_begin(model, NULL, &scratch->work);
         LANE_ROLLED
         for (int f = 0; again && f < engine_feet(&model->tree); f++) {
             lowest = real_min(lowest, engine_sole_height_on(model, &scratch->work, f, &ground));
+        }
+        if (again && dropped) {
+            lowest = real_min(lowest, engine_body_clearance_on(model, &scratch->work, &ground));
         }
         EACH_LANE(l) {
             if (again && LANE(l) == 0) {

@@ -104,6 +104,13 @@ expect 0 '1/1 ' "$mild" eval --ground grass --speed=-1.5,1.5 --sideways=-1.5 --t
 grep -q '"turn":.*1.5' told.json && grep -q '"push":.*0.3' told.json || fail "told.json: $(cat told.json)"
 walk() { "$mild" eval --ground grass --trials 2 --seconds 1 "$@" --json - 2>/dev/null | grep -v randomize; }
 [ "$(walk)" != "$(walk --randomize)" ] || fail "--randomize changes nothing"
+# lying: rigid is a material then, whoever asks for the engine's own is told; shells must stand
+expect 0 'rigid .* 0/2 .*up after - s' "$mild" eval --robot go1 --start back --ground rigid --trials 2 --seconds 1.5
+expect 0 'foam45 .* 0/2 .*up after - s' "$mild" eval --robot go1 --start side --ground foam45 --trials 2 --seconds 1.5 --train.robots=batch
+expect 0 'grass .*2/2 ' "$mild" eval --start stand --ground grass --trials 2 --seconds 0.2
+bad "nearest is 'back'" "$mild" eval --start bck
+bad "a robot cannot lie on --model rigid" "$mild" eval --start any --model rigid --ground grass --trials 1 --seconds 0.1
+bad "task.shells_stand = true" "$mild" eval --start any --task.shells_stand=false --ground grass --trials 1 --seconds 0.1
 bad "outside" "$mild" eval --turn 1.6
 bad "outside" "$mild" eval --push=-1
 bad "nearest is 'history'" "$mild" eval --ablate histroy

@@ -19,7 +19,8 @@ short=("${eval[@]}" --seconds 0.3)
 "${short[@]}" --ground grass --ablate z --turn 0.4 --json ablate.json >/dev/null || fail "eval --ablate"
 "${eval[@]}" --ground grass --controller stand --speed 0 --seconds 3 --json stand.json >/dev/null || fail "eval --controller"
 "${short[@]}" --ground grass --train.robots=batch --json batch.json >/dev/null || fail "eval in the batch engine"
-fit eval walk.json ablate.json stand.json batch.json
+"${short[@]}" --robot go1 --ground rigid,grass --start back --json back.json >/dev/null || fail "eval --start"
+fit eval walk.json ablate.json stand.json batch.json back.json
 # what the table shows as "-" is null: of trials of 0.3 s all that needs 2.5 s, and without a step the swing
 for key in velocity velocity_low velocity_high velocity_deviation velocity_sideways velocity_turn cot cot_deviation torque_deviation base_oscillation; do
     grep -c "\"$key\":[[:space:]]*null" walk.json | grep -qx 4 || fail "$key of a trial that is too short: $(grep "\"$key\"" walk.json)"

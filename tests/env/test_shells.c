@@ -124,6 +124,46 @@ static void falls_are_those_of_mujoco(void **unused) {
     check(fall(GO1, shells_def(), MILD_BATCH_HOST, &map, 2), 0.5);
 }
 
+/* Robots of every fourth episode stand, the others are dropped and may lie. */
+static TaskDef drop_def(TaskStart start) {
+    TaskDef def = shells_def();
+    def.start = (int)start;
+    def.start_share = 0.75;
+    def.settle = 0.3;
+    def.may_lie = 1;
+    return def;
+}
+
+/* From the first pose on: same_episode compares it. No tilt and no base ends one on soft ground. */
+static void drops_are_those_of_mujoco(void **unused) {
+    (void)unused;
+    const MildMapDef map = some_map();
+    TaskDef def = drop_def(TASK_START_ANY);
+    for (int on_map = 0; on_map < 2; on_map++) {
+        MildMap *uneven = on_map ? mild_map_create(&map, NULL) : NULL;
+        int dropped = 0;
+        def.map = uneven;
+        pair_open(GO1, &def, MILD_BATCH_HOST);
+        pair_reset();
+        for (int e = 0; e < ENVS; e++) {
+            size_t bytes;
+            const char *envs = envs_state(pair.mujoco, &bytes);
+            const size_t stride = bytes / ENVS;
+            dropped += ((const TaskEnv *)(const void *)(envs + (size_t)e * stride))->dropped;
+            same_episode(e);
+            compare(-1, e, 2e-5);
+        }
+        assert_true(dropped > ENVS / 2 && dropped < ENVS * 0.9);
+        pair_close();
+        mild_map_destroy(uneven);
+    }
+    def.map = NULL;
+    const Falls level = fall(GO1, def, MILD_BATCH_HOST, NULL, 2);
+    check(level, 0.5);
+    const Falls waves = fall(GO1, drop_def(TASK_START_BACK), MILD_BATCH_HOST, &map, 2);
+    check(waves, 0.5);
+}
+
 /* Robots that do not fall, with shells that stand and without. Steps up to the first one with a
  * shell near the ground, and those of them that have the same bits. */
 static void stand_twice(int device, const MildMapDef *on, int *far, int *same) {
@@ -211,6 +251,7 @@ static void device_falls_are_those_of_mujoco(void **unused) {
     check(fall(SA01, shells_def(), 0, &map, 2), 0.5);
     check(fall(G1, shells_def(), 0, NULL, 2), 0.5);
     check(fall(GO1, shells_def(), 0, &map, 2), 0.5);
+    check(fall(GO1, drop_def(TASK_START_ANY), 0, NULL, 2), 0.5);
     follow(SA01, shells_def(), 0, NULL, 0.85);
     int far, same;
     stand_twice(0, NULL, &far,
@@ -221,6 +262,7 @@ static void device_falls_are_those_of_mujoco(void **unused) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(falls_are_those_of_mujoco),
+        cmocka_unit_test(drops_are_those_of_mujoco),
         cmocka_unit_test(far_shells_change_no_bit),
         cmocka_unit_test(standing_robots_follow_mujoco),
         cmocka_unit_test(models_of_one_element_have_no_shells),

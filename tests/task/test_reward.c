@@ -97,6 +97,43 @@ static void tracking_as_printed(void **unused) {
     expect_term(REWARD_linear_velocity, "a quarter", 1.2957637713);
 }
 
+/* Tilted by 60 degrees g_z = -1/2: upright (1 + 1/2)/2 = 3/4, on its back 0. The gate's third power
+ * is 27/64, of all that is paid but of upright and of no price. */
+static void upright_rise_and_gate(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    double *weight = scene.def.reward.weight;
+    weight[REWARD_upright] = 4;
+    weight[REWARD_rise] = 2;
+    weight[REWARD_power] = -0.01;
+    m->torque[3] = 10;
+    m->qd[3] = -5;
+    expect_term(REWARD_upright, "upright", 4);
+    expect_term(REWARD_rise, "at the nominal height", 2);
+    m->base_height = 0.83 / 4;
+    expect_term(REWARD_rise, "at a quarter of it", 0.5);
+    m->base_height = -0.1;
+    expect_term(REWARD_rise, "below its feet", 0);
+    m->base_height = 2;
+    expect_term(REWARD_rise, "above it", 2);
+    set_command(0.6, 0.1, 0);
+    set_velocity(0.6, 0.1, 0);
+    m->gravity[0] = sqrt(0.75);
+    m->gravity[2] = -0.5;
+    expect_term(REWARD_upright, "tilted, no gate", 3);
+    expect_term(REWARD_rise, "tilted, no gate", 2);
+    scene.def.reward.gate = 3;
+    expect_term(REWARD_upright, "tilted, gate 3", 3);
+    expect_term(REWARD_rise, "tilted, gate 3", 2 * 0.421875);
+    expect_term(REWARD_linear_velocity, "tilted, gate 3", 2 * 0.421875);
+    expect_term(REWARD_power, "a price has no gate", -0.5);
+    m->gravity[0] = 0;
+    m->gravity[2] = 1;
+    expect_term(REWARD_upright, "on its back", 0);
+    expect_term(REWARD_linear_velocity, "on its back, gate 3", 0);
+    expect_term(REWARD_power, "on its back", -0.5);
+}
+
 /* f(0.4) = (e^-0.8 + e^-4)/2 = 0.23382230. */
 static void yaw_rate(void **unused) {
     (void)unused;
@@ -455,6 +492,7 @@ int main(void) {
         cmocka_unit_test(names_follow_the_enum),
         cmocka_unit_test(linear_velocity),
         cmocka_unit_test(tracking_as_printed),
+        cmocka_unit_test(upright_rise_and_gate),
         cmocka_unit_test(yaw_rate),
         cmocka_unit_test(feet_clearance),
         cmocka_unit_test(clearance_from_the_print),

@@ -1,5 +1,6 @@
 /* An environment on the CPU: its block, and the policy step around the physics of RobotSim. */
 #include <assert.h>
+#include <math.h>
 #include <string.h>
 
 #include "env/task/ground.h"
@@ -137,13 +138,17 @@ static void return_map(TaskEnv *env) {
     task_env_rest(env)->terrain.map = NULL;
 }
 
-/* On uneven ground the lowest sole point starts at the depth that both soles have on level
- * ground. */
-static void start_on_map(TaskEnv *env, const Robot *robot, RobotSim *sim) {
+/* On uneven ground the lowest sole point starts at the depth that both soles have on level ground;
+ * a robot that is dropped starts with its lowest point at the height of the drop. */
+static void place(TaskEnv *env, const Robot *robot, RobotSim *sim) {
     const MildTerrain *terrain = task_env_terrain(env);
     double level = env->robot.qpos[2] - terrain->height - robot_stand_height(robot);
     task_env_load(env, sim);
-    env->robot.qpos[2] += level - robot_sim_sole_clearance(sim, terrain);
+    double lowest = robot_sim_sole_clearance(sim, terrain);
+    if (env->dropped) {
+        lowest = fmin(lowest, robot_sim_body_clearance(sim, terrain));
+    }
+    env->robot.qpos[2] += level - lowest;
 }
 
 /* Into the block's history, of which the view has a copy. */
@@ -196,8 +201,8 @@ static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, 
     double depth = env->variation.rigid ? 0 : task_standing_depth(robot, material);
     task_begin_episode(env, def, robot_table(robot), terrain->height, depth);
     memset(task_env_rest(env)->qacc, 0, sizeof task_env_rest(env)->qacc);
-    if (terrain->map && !mild_map_is_level(terrain->map)) {
-        start_on_map(env, robot, sim);
+    if (env->dropped || (terrain->map && !mild_map_is_level(terrain->map))) {
+        place(env, robot, sim);
     }
     task_env_load(env, sim);
     robot_sim_sole_clearance(sim, terrain);
@@ -249,7 +254,7 @@ static void joint_torque(TaskEnv *env, const TaskDef *def, const TaskMotor *moto
     double error[ROBOT_JOINTS_MAX], asked[ROBOT_JOINTS_MAX];
     if (def->motors) {
         for (int i = 0; i < env->shape.joints; i++) {
-            error[i] = motor[i].target[late] - q[i];
+            error[i] = task_is_limp(env, def) ? 0 : motor[i].target[late] - q[i];
         }
         def->motors->torque(def->motors->self, task_env_motors(env), error, qd, asked);
     }

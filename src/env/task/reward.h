@@ -212,6 +212,25 @@ MILD_HD_FN Real reward_power(const TaskMotion *m) {
     return task_lanes_sum(sum);
 }
 
+MILD_HD_FN Real reward_upright(const TaskMotion *m) {
+    return task_clamp(REAL(0.5) * (1 - m->gravity[2]), 0, 1);
+}
+
+/* Has a slope wherever the base is, unlike base_height. */
+MILD_HD_FN Real reward_rise(const TaskMotion *m) {
+    return task_clamp(m->base_height / REAL(task_nominal_height(m->def, m->robot)), 0, 1);
+}
+
+/* [-] By what all terms with a positive weight but upright are multiplied, so that a robot that
+ * lies still is not paid for standing still. */
+MILD_HD_FN Real reward_gate(const TaskMotion *m) {
+    Real gate = 1;
+    for (int i = 0; i < m->def->reward.gate; i++) {
+        gate *= reward_upright(m);
+    }
+    return gate;
+}
+
 /* Penalises legs that are too close, because the engine computes no contact between them. */
 MILD_HD_FN Real reward_collision(const TaskMotion *m) {
     int close =
@@ -222,10 +241,14 @@ MILD_HD_FN Real reward_collision(const TaskMotion *m) {
 /* Writes the weighted terms per second to `terms`. Returns their clipped sum times the period. */
 MILD_HD_FN Real task_reward(const TaskMotion *motion, Real terms[TASK_REWARD_COUNT]) {
     const double *weight = motion->def->reward.weight;
+    const Real gate = reward_gate(motion);
     Real sum = 0;
 #define TASK_REWARD_TERM(name, weight_, help)                                                      \
     terms[REWARD_##name] =                                                                         \
         weight[REWARD_##name] == 0 ? 0 : REAL(weight[REWARD_##name]) * reward_##name(motion);      \
+    if (weight[REWARD_##name] > 0 && REWARD_##name != REWARD_upright) {                            \
+        terms[REWARD_##name] *= gate;                                                              \
+    }                                                                                              \
     sum += terms[REWARD_##name];
     TASK_REWARD_LIST(TASK_REWARD_TERM)
 #undef TASK_REWARD_TERM

@@ -117,6 +117,7 @@ typedef struct {
     uint32_t step;        /* policy steps on the clock of this episode */
     uint32_t step_limit;  /* step at which the episode times out */
     uint32_t step_first;  /* step at which the episode began */
+    int dropped;          /* bool: the episode began lying, see TaskStart */
     double phase;         /* [-] gait clock in [0, 1) */
     Real command[3];      /* [m/s, m/s, rad/s] vx, vy, wz in the heading frame */
     Real command_seen[3]; /* what the policy sees, one policy step late */

@@ -13,6 +13,9 @@
 
 #define TASK_RANDOM_START 0x53544152u
 #define TASK_RANDOM_PUSH 0x50555348u
+#define TASK_RANDOM_DROP 0x44524f50u
+#define TASK_DROP 0.1          /* [m] greatest height of a drop */
+#define TASK_DROP_LEAN 0.3     /* [rad] greatest lean from the back or the side */
 #define TASK_CONTACT_FORCE 5.0 /* [N] */
 
 /* ---- the block of an environment ---- */
@@ -58,6 +61,63 @@ MILD_HD_FN void task_set_progress(TaskEnv *env, TaskProgress progress) {
 
 /* ---- start of an episode ---- */
 
+/* Quaternion (w x y z) of a turn by `yaw` about z, after one by `pitch` about y, after one by `roll`
+ * about x. */
+MILD_HD_FN void task_turn(double yaw, double pitch, double roll, Real *quaternion) {
+    const double cy = task_cos(0.5 * yaw), sy = task_sin(0.5 * yaw);
+    const double cp = task_cos(0.5 * pitch), sp = task_sin(0.5 * pitch);
+    const double cr = task_cos(0.5 * roll), sr = task_sin(0.5 * roll);
+    quaternion[0] = (Real)(cy * cp * cr + sy * sp * sr);
+    quaternion[1] = (Real)(cy * cp * sr - sy * sp * cr);
+    quaternion[2] = (Real)(cy * sp * cr + sy * cp * sr);
+    quaternion[3] = (Real)(sy * cp * cr - cy * sp * sr);
+}
+
+/* Lies on its back, on a side, or (Shoemake 1992) in any attitude. */
+MILD_HD_FN void task_draw_attitude(TaskEnv *env, const TaskDef *def, Random *r) {
+    Real *q = env->robot.qpos + 3;
+    if (def->start == TASK_START_ANY) {
+        const double u = random_unit(r), a = TASK_TWO_PI * random_unit(r);
+        const double b = TASK_TWO_PI * random_unit(r);
+        const double low = task_sqrt(1 - u), high = task_sqrt(u);
+        q[0] = (Real)(high * task_cos(b));
+        q[1] = (Real)(low * task_sin(a));
+        q[2] = (Real)(low * task_cos(a));
+        q[3] = (Real)(high * task_sin(b));
+        return;
+    }
+    const double turn = random_unit(r) < 0.5 ? -1 : 1;
+    const double roll = def->start == TASK_START_BACK ? TASK_PI : 0.5 * TASK_PI * turn;
+    const double yaw = TASK_PI * (2 * random_unit(r) - 1);
+    const double pitch = task_spread(r, TASK_DROP_LEAN);
+    task_turn(yaw, pitch, roll + task_spread(r, TASK_DROP_LEAN), q);
+}
+
+/* Whether the episode begins lying, and how: attitude and joints, and in the place of the height of
+ * the base that of a robot whose lowest point is above the ground by the height of the drop.
+ * task_place puts it there. */
+MILD_HD_FN void task_draw_drop(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
+                               double height) {
+    Random r = random_at(env->seed ^ TASK_RANDOM_DROP, env->index, env->tick);
+    const int stands = !def->shells_stand || env->variation.rigid;
+    env->dropped = random_unit(&r) < def->start_share && !stands && def->start != TASK_START_STAND;
+    if (!env->dropped) {
+        return;
+    }
+    task_draw_attitude(env, def, &r);
+    env->robot.qpos[2] = (Real)(height + robot->stand_height + TASK_DROP * random_unit(&r));
+    for (int i = task_lane(); i < env->shape.joints; i += TASK_LANES) {
+        Random own = random_after(r, i);
+        env->robot.qpos[7 + i] =
+            (Real)random_uniform(&own, robot->joint_low[i], robot->joint_high[i]);
+    }
+}
+
+/* Bool: the start of a drop, in which the motors only damp. */
+MILD_HD_FN int task_is_limp(const TaskEnv *env, const TaskDef *def) {
+    return env->dropped && (env->step - env->step_first) * TASK_PERIOD < def->settle;
+}
+
 MILD_HD_FN void task_draw_start(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                 double height, double depth) {
     const RandomizeDef *z = &def->randomize;
@@ -85,6 +145,8 @@ MILD_HD_FN void task_draw_start(TaskEnv *env, const TaskDef *def, const RobotTab
                     ? (uint32_t)(random_unit(&r) * 0.9 * env->step_limit)
                     : 0;
     env->step_first = env->step;
+    task_lanes_sync();
+    task_draw_drop(env, def, robot, height);
 }
 
 MILD_HD_FN void task_see_command(TaskEnv *env) {
@@ -176,7 +238,8 @@ MILD_HD_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Ro
     for (int late = 0; late < 2; late++) {
         motor.target[late] = rest + scale * (double)env->action[late][i] + env->motor_offset[i];
     }
-    motor.kp = env->strength[i] * REAL(gains->kp[i]) * env->kp_scale[i];
+    motor.kp =
+        task_is_limp(env, def) ? 0 : env->strength[i] * REAL(gains->kp[i]) * env->kp_scale[i];
     motor.kd = env->strength[i] * REAL(gains->kd[i]) * env->kd_scale[i];
     motor.limit = gains->limit[i];
     motor.fastest = robot->speed[i];
@@ -306,10 +369,11 @@ MILD_HD_FN TaskEnd task_end_cause(const TaskEnv *env, const TaskDef *def, const 
                                   const RobotReading *reading) {
     const int stand = def->shells_stand && !env->variation.rigid;
     const double depth = env->variation.rigid || stand ? 0 : def->shell_depth;
-    if (reading->rotation[8] < task_cos(def->tilt_limit)) {
+    const int lies = stand && def->may_lie;
+    if (!lies && reading->rotation[8] < task_cos(def->tilt_limit)) {
         return TASK_END_tilt;
     }
-    if (reading->base_clearance < -depth) {
+    if (!lies && reading->base_clearance < -depth) {
         return TASK_END_base;
     }
     if (!stand && reading->body_clearance < -depth) {

@@ -20,6 +20,8 @@ TaskDef task_def_default(void) {
         .torque_hold = 0,
         .kp = "robot",
         .kd = "robot",
+        .start_share = 1,
+        .settle = 1,
         .episode = 24,
         .command_interval = 8,
         .vx = {0, 1.2},
@@ -105,6 +107,8 @@ void task_def_choose_ground(TaskDef *def) {
     r->preset_jitter = 0;
     r->patch_share = 0;
     def->assist = 0;
+    def->start = TASK_START_STAND;
+    def->may_lie = 0;
 }
 
 void task_def_make_nominal(TaskDef *def) {
@@ -123,6 +127,7 @@ void task_def_make_nominal(TaskDef *def) {
 #define B MILD_FIELD_BOOL
 #define T(member, type, count, min, max, help)                                                     \
     MILD_FIELD(TaskDef, member, type, count, min, max, help)
+const char *const task_start_names[TASK_STARTS] = {"stand", "back", "side", "any"};
 const MildField task_fields[] = {
     T(physics_dt, D, 1, 0.0005, 0.005, "[s] physics step; must divide 0.01, the policy step"),
     T(action_scale, D, 1, 0, 2, "[rad] joint offset per unit of action; 0: the robot's"),
@@ -139,6 +144,14 @@ const MildField task_fields[] = {
     T(actuator, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0,
       "[text] file of an actuator network, written by `mild actuator fit`, in the place of the PD; "
       "empty: none"),
+    MILD_FIELD_CHOICE(TaskDef, start, task_start_names, TASK_STARTS,
+                      "[-] how episodes begin: stand, on the feet; or dropped with any angles of "
+                      "the joints on the back, on a side, in any attitude"),
+    T(start_share, D, 1, 0, 1,
+      "[-] share of the episodes on soft ground that begin so; the others stand"),
+    T(settle, D, 1, 0, 10, "[s] time after such a start in which the motors only damp"),
+    T(may_lie, B, 1, 0, 1,
+      "[bool] on soft ground neither tilt nor a shell of the base ends an episode"),
     T(episode, D, 1, 0.1, 1000, "[s] longest episode"),
     T(command_interval, D, 1, 0.1, 1000, "[s] time after which a new command is drawn"),
     T(vx, D, 2, -3, 3, "[m/s] forward command, low and high"),
@@ -210,6 +223,9 @@ static const char *const acceleration_names[TASK_ACCELERATIONS] = {"twist", "lin
 const MildField reward_fields[] = {
     TASK_REWARD_LIST(TASK_REWARD_FIELD)
         R(clip_sum, B, 1, 0, 1, "[bool] the reward of a step is never below 0"),
+    R(gate, MILD_FIELD_INT, 1, 0, 16,
+      "[-] power of (1 - g_z)/2, see upright, by which all other terms with a positive weight are "
+      "multiplied; 0: none"),
     R(nominal_height, D, 1, 0, 2, "[m] base height above the stance soles; 0: the robot's"),
     R(tracking_time, D, 1, 0.01, 10,
       "[s] time over which the velocity is smoothed before it is compared with the command"),
@@ -404,6 +420,13 @@ MildStatus task_def_check(const TaskDef *def, MildError *error) {
         return mild_fail(error, MILD_ERROR_RANGE,
                          "task.physics_dt: %g s is not a whole multiple of %g", TASK_PERIOD,
                          def->physics_dt);
+    }
+    if (status == MILD_OK && !def->shells_stand &&
+        (def->may_lie || def->start != TASK_START_STAND)) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "task.%s: a robot lies on its shells; give "
+                         "task.shells_stand = true",
+                         def->may_lie ? "may_lie" : "start");
     }
     if (status == MILD_OK && def->randomize.rigid_share + def->randomize.preset_share > 1 + 1e-12) {
         return mild_fail(error, MILD_ERROR_RANGE,

@@ -46,6 +46,9 @@ typedef struct Robot Robot;
     X(joint_speed, -1e-5, "the sum of squared joint speeds [rad^2/s^2] (vendor)")                  \
     X(joint_acceleration, -5e-9, "the sum of squared joint accelerations [rad^2/s^4] (vendor)")    \
     X(power, 0, "the sum of |torque times speed| of the joints [W] (field)")                       \
+    X(upright, 0,                                                                                  \
+      "(1 - g_z)/2, g_z: unit gravity along the base's z axis; 1 upright, 0 on its back")          \
+    X(rise, 0, "the height above the stance soles over the nominal one, in [0, 1]")                \
     X(collision, -1.0,                                                                             \
       "feet or knees being closer than feet_least, knee_least of robot.ini (vendor)")
 
@@ -68,14 +71,25 @@ typedef enum {
     TASK_ACCELERATIONS
 } TaskAcceleration;
 
+/* How an episode begins: on its feet in the default pose, or dropped with any angles of the joints
+ * on its back, on a side, or in any attitude. */
+typedef enum {
+    TASK_START_STAND,
+    TASK_START_BACK,
+    TASK_START_SIDE,
+    TASK_START_ANY,
+    TASK_STARTS
+} TaskStart;
+
 typedef struct {
     double weight[TASK_REWARD_COUNT]; /* [1/s] */
     int clip_sum;                     /* bool: the sum of a step is never below 0 (vendor) */
-    double nominal_height;            /* [m] of the base above the stance soles; 0: the robot's */
-    double tracking_sharpness;        /* [s^2/m^2] k = 5 in the velocity terms */
-    double tracking_narrow;           /* [-] share of the narrow part of the velocity terms */
-    double tracking_width;            /* [m/s] of the narrow part */
-    double tracking_time;             /* [s] over which the tracked velocity is smoothed */
+    int gate; /* [-] power of (1 - g_z)/2 on all terms with a positive weight but upright */
+    double nominal_height;     /* [m] of the base above the stance soles; 0: the robot's */
+    double tracking_sharpness; /* [s^2/m^2] k = 5 in the velocity terms */
+    double tracking_narrow;    /* [-] share of the narrow part of the velocity terms */
+    double tracking_width;     /* [m/s] of the narrow part */
+    double tracking_time;      /* [s] over which the tracked velocity is smoothed */
     double feet_range[2], knee_range[2]; /* [m] limits; 0 0: the robot's */
     double reference_amplitude;          /* [rad] */
     int clearance_form;                  /* a TaskClearance */
@@ -129,8 +143,12 @@ typedef struct {
     char kp[TASK_GAINS_SIZE];       /* [N m/rad] "robot": the robot's; or numbers, see task_gains */
     char kd[TASK_GAINS_SIZE];       /* [N m s/rad] */
     char actuator[TASK_GAINS_SIZE]; /* file of an actuator network; "": the PD */
-    double episode;                 /* [s] */
-    double command_interval;        /* [s] */
+    int start;                      /* a TaskStart */
+    double start_share; /* [-] of the episodes on soft ground; the others begin on their feet */
+    double settle;      /* [s] at the start of those in which the motors only damp */
+    int may_lie;    /* bool: on soft ground neither tilt nor a shell of the base ends an episode */
+    double episode; /* [s] */
+    double command_interval; /* [s] */
     double vx[2], vy[2], wz[2];
     double backward_share, backward_vx[2], standing_share, straight_share;
     double standing_below; /* [m/s, rad/s] a command whose parts are all below this is to stand */
@@ -205,6 +223,7 @@ MILD_HD_FN double task_nominal_height(const TaskDef *def, const RobotTable *robo
     return def->reward.nominal_height > 0 ? def->reward.nominal_height : robot->nominal_height;
 }
 
+extern const char *const task_start_names[TASK_STARTS];
 extern const MildField task_fields[];
 extern const int task_field_count;
 extern const MildField reward_fields[]; /* offsets into RewardDef */

@@ -244,6 +244,7 @@ static void start_trial(void *context, int trial, int thread) {
     measure_start(measure, t->task.physics_dt);
     measure->steady_end = t->run->eval.stop;
     measure->keep = t->run->eval.stances != NULL;
+    measure->nominal_height = robot_nominal_height(t->run->robot);
     direct(&t->run->eval, speed_of(t, trial), 0, ahead, t->command + 3 * (size_t)trial);
 }
 
@@ -341,6 +342,7 @@ static MildStatus step(Trials *t, int step, MildError *error) {
 static MildStatus summarise(Trials *t, EvalRow *rows, MildError *error) {
     EvalDef eval = t->run->eval;
     MildStatus status = MILD_OK;
+    eval.start = t->task.start;
     for (int row = 0; row < t->rows && status == MILD_OK; row++) {
         const int first = row * eval.trials;
         eval.speed = speed_of(t, first);
@@ -350,6 +352,7 @@ static MildStatus summarise(Trials *t, EvalRow *rows, MildError *error) {
     }
     for (int i = 0; t->run->each && i < t->trials; i++) {
         t->run->each[i] = (EvalTrial){.end = t->end[i],
+                                      .up = is_over(t, i) ? NAN : measure_up(&t->measure[i]),
                                       .seconds = t->measure[i].time,
                                       .legs = measure_legs(&t->measure[i]),
                                       .shells = measure_shells(&t->measure[i]),

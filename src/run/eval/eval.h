@@ -38,6 +38,7 @@ typedef struct {
     double seconds; /* [s] per trial */
     double stop;    /* [s] when the command becomes 0 and speed measurement ends; 0: never */
     uint64_t seed;  /* trial k uses stream k */
+    int start;      /* a TaskStart: that of EvalRun.task */
     FILE *stances;  /* a row of CSV for each stance of each trial; NULL: none */
     /* by MuJoCo, of one row; NULL: none */
     const EvalCallback *callback;
@@ -54,6 +55,9 @@ typedef struct {
     int trials;               /* number of trials */
     int success;              /* trials without termination */
     int ends[TASK_END_COUNT]; /* trials that ended by each cause */
+    int start;                /* a TaskStart */
+    int righted;              /* trials that were up when their time ended: measure_up */
+    double up;                /* [s] when these came up */
     int measured;             /* trials that velocity and cot are means of; 0: all were too short */
     double velocity;      /* [m/s] forward, after the first 2 s, of trials that lasted longer: along
                         world x, or along the robot's heading when it is told to turn */
@@ -88,6 +92,7 @@ typedef struct {
 /* How a trial ended. */
 typedef struct {
     TaskEnd end;
+    double up; /* [s] when it came up, see measure_up; NaN: it was not up when its time ended */
     double seconds; /* [s] until then */
     double legs;    /* [m] least distance of two legs; NaN without two */
     double shells;  /* [-] share of the load that shells carried */

@@ -20,6 +20,7 @@ void measure_start(Measure *measure, double dt) {
     measure->base_low = 1e9;
     measure->base_high = -1e9;
     measure->legs = INFINITY;
+    measure->up_since = NAN;
 }
 
 /* Bool: speed, cost and strides are measured at this time [s]. */
@@ -132,6 +133,17 @@ static void measure_steady(Measure *m, const EnvsSample *sample, double yaw, dou
     m->base_high = fmax(m->base_high, sample->above);
 }
 
+/* Bool: tilt and height are those of a robot that stands. */
+static int is_up(const Measure *m, const EnvsSample *sample) {
+    const double *q = sample->quaternion;
+    double soles = 0;
+    for (int f = 0; f < sample->feet; f++) {
+        soles += sample->foot[f].height / sample->feet;
+    }
+    return 1 - 2 * (q[1] * q[1] + q[2] * q[2]) > cos(MEASURE_UP_TILT) &&
+           sample->above - soles > MEASURE_UP_HEIGHT * m->nominal_height;
+}
+
 void measure_sample(Measure *m, const EnvsSample *sample) {
     const double yaw = measure_yaw(sample->quaternion);
     double power = 0, power_abs = 0;
@@ -153,6 +165,11 @@ void measure_sample(Measure *m, const EnvsSample *sample) {
     m->load += sample->shell_load * m->dt;
     memcpy(m->base, sample->base, sizeof m->base);
     m->yaw = yaw;
+    if (!is_up(m, sample)) {
+        m->up_since = NAN;
+    } else if (isnan(m->up_since)) {
+        m->up_since = m->time;
+    }
     for (int f = 0; f < sample->feet; f++) {
         m->load += sample->foot[f].load * m->dt;
         measure_foot(m, f, &sample->foot[f]);
@@ -172,6 +189,10 @@ void measure_finish(Measure *m) {
             end_stance(m, f);
         }
     }
+}
+
+double measure_up(const Measure *m) {
+    return m->time - m->up_since >= MEASURE_UP_TIME ? m->up_since : NAN;
 }
 
 double measure_shells(const Measure *m) {

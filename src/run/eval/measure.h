@@ -4,7 +4,10 @@
 
 #include "env/envs.h"
 
-#define MEASURE_STEADY 2.0 /* [s] start of the steady part */
+#define MEASURE_STEADY 2.0    /* [s] start of the steady part */
+#define MEASURE_UP_TILT 0.3   /* [rad] a robot that is up tilts less */
+#define MEASURE_UP_HEIGHT 0.7 /* [-] and its base is higher over its soles, of the nominal height */
+#define MEASURE_UP_TIME 2.0   /* [s] so long */
 
 /* A finished stance. */
 typedef struct {
@@ -20,16 +23,18 @@ typedef struct {
 /* A stance begins when the ground carries the foot and ends with the last contact before a pause of
  * CHATTER_TIME. */
 typedef struct {
-    double dt;         /* [s] physics step */
-    double time;       /* [s] since the start */
-    double energy;     /* [J] integral |sum tau qd| dt */
-    double torque_max; /* [N m] */
-    double torque;     /* [N m] largest of the latest step */
-    double base[2];    /* [m] after the latest step */
-    double yaw;        /* [rad] after the latest step */
-    double legs;       /* [m] least distance of two legs */
-    double load;       /* [N s] of the feet and of the shells */
-    double shell_load; /* [N s] of the shells */
+    double dt;             /* [s] physics step */
+    double time;           /* [s] since the start */
+    double energy;         /* [J] integral |sum tau qd| dt */
+    double torque_max;     /* [N m] */
+    double torque;         /* [N m] largest of the latest step */
+    double base[2];        /* [m] after the latest step */
+    double yaw;            /* [rad] after the latest step */
+    double legs;           /* [m] least distance of two legs */
+    double load;           /* [N s] of the feet and of the shells */
+    double shell_load;     /* [N s] of the shells */
+    double nominal_height; /* [m] of the base above the soles; set by the caller for measure_up */
+    double up_since;       /* [s] start of the running time in which it is up; NaN: it is not */
 
     /* steady part */
     double steady_end;          /* [s] where it ends; 0: with the trial */
@@ -75,6 +80,9 @@ void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const 
 /* Ends the trial. If no foot was ever lifted, the open stances count, so that sinkage and drift are
  * still measured. */
 void measure_finish(Measure *measure);
+/* [s] When it came up: tilt and height over the soles (MEASURE_UP_...) have been those of a robot
+ * that stands from then to the latest step, for MEASURE_UP_TIME at least; NaN: it is not up. */
+double measure_up(const Measure *measure);
 /* [-] Share of the load that the shells carried; 0 without load. */
 double measure_shells(const Measure *measure);
 /* [m] Least distance of two legs; NaN where the robot has no two legs that touch. */

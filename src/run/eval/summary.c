@@ -113,11 +113,12 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
                           const uint8_t *ends, double weight, MildError *error) {
     const int trials = eval->trials;
     MildStatus status = MILD_OK;
-    double torque_square = 0;
+    double torque_square = 0, up = 0;
     *row = (EvalRow){.speed = eval->speed,
                      .sideways = eval->sideways,
                      .turn = eval->turn,
                      .push = eval->push,
+                     .start = eval->start,
                      .trials = trials,
                      .legs = NAN};
     snprintf(row->ground, sizeof row->ground, "%s", ground);
@@ -125,6 +126,10 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
         Measure *m = &measures[i];
         measure_finish(m);
         row->success += ends[i] == TASK_END_time;
+        if (ends[i] == TASK_END_time && !isnan(measure_up(m))) {
+            row->righted++;
+            up += measure_up(m);
+        }
         row->ends[ends[i]]++;
         row->energy += m->energy / trials;
         row->seconds += m->time / trials;
@@ -136,6 +141,7 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
             status = print_stances(row, i, m, eval->stances, error);
         }
     }
+    row->up = mean(up, row->righted);
     row->torque_deviation = deviation(row->torque_max, torque_square, trials);
     summarise_motion(row, measures, ends, weight);
     summarise_feet(row, measures);
@@ -172,12 +178,23 @@ static void print_ends(const EvalRow *row, char *text, size_t size) {
     }
 }
 
+/* "  up after 2.1 s", if the robots began lying. */
+static void print_up(const EvalRow *row, char *text, size_t size) {
+    char up[TEXT_CELL];
+    text[0] = '\0';
+    if (row->start != TASK_START_STAND) {
+        snprintf(text, size, "  up after %s s", text_cell("%.1f", row->up, up));
+    }
+}
+
 void eval_print_row(const EvalRow *row, char *text, int size) {
-    char velocity[32], sideways[64] = "", turning[64] = "";
+    const int upright = row->start == TASK_START_STAND ? row->success : row->righted;
+    char velocity[32], sideways[64] = "", turning[64] = "", up[64];
     char cot[TEXT_CELL], clearance[TEXT_CELL], sink[TEXT_CELL], drift[TEXT_CELL], part[TEXT_CELL];
     char power[TEXT_CELL], ends[96];
     print_ends(row, ends, sizeof ends);
     print_speed(row, velocity, sizeof velocity);
+    print_up(row, up, sizeof up);
     if (row->sideways != 0) {
         snprintf(sideways, sizeof sideways, "  sideways %s of %.2f m/s",
                  text_cell("%.3f", row->velocity_sideways, part), row->sideways);
@@ -186,12 +203,11 @@ void eval_print_row(const EvalRow *row, char *text, int size) {
         snprintf(turning, sizeof turning, "  turning %s of %.2f rad/s",
                  text_cell("%.3f", row->velocity_turn, part), row->turn);
     }
-    snprintf(text, (size_t)size, "%-26s %5.2f %4d/%-2d %s %5s %7.1f %4s mm %4s mm %4s mm %7s%s%s%s",
-             row->ground, row->speed, row->success, row->trials, velocity,
-             text_cell("%.2f", row->cot, cot), row->torque_max,
-             text_cell("%.0f", 1e3 * row->clearance, clearance),
-             text_cell("%.1f", 1e3 * row->penetration, sink),
-             text_cell("%.1f", 1e3 * row->drift, drift),
-             text_cell("%.0f", row->seconds > 0 ? row->energy / row->seconds : NAN, power),
-             sideways, turning, ends);
+    snprintf(
+        text, (size_t)size, "%-26s %5.2f %4d/%-2d %s %5s %7.1f %4s mm %4s mm %4s mm %7s%s%s%s%s",
+        row->ground, row->speed, upright, row->trials, velocity, text_cell("%.2f", row->cot, cot),
+        row->torque_max, text_cell("%.0f", 1e3 * row->clearance, clearance),
+        text_cell("%.1f", 1e3 * row->penetration, sink), text_cell("%.1f", 1e3 * row->drift, drift),
+        text_cell("%.0f", row->seconds > 0 ? row->energy / row->seconds : NAN, power), sideways,
+        turning, up, ends);
 }

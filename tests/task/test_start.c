@@ -1,0 +1,371 @@
+/* Episodes of the Go1 that begin lying: where the engine's own functions say that its geoms are,
+ * how attitudes and joints are spread, which episodes begin so, that the motors then only damp, and
+ * what ends an episode of a robot that may lie. */
+#include <mujoco/mujoco.h>
+
+#include "env/task/task.h"
+#include "kit.h"
+
+#define GO1 MILD_SOURCE_DIR "/robots/go1"
+
+enum { JOINTS = 12, FEET = 4, DRAWS = 400 };
+
+static Robot *robot;
+static mjModel *model; /* the whole file */
+static mjData *data;
+static TaskDef def;
+static TaskEnv *env;
+static RobotSim *sim;
+static const TaskView view;
+static const MildTerrain *ground;
+
+static int setup(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    char text[256] = "";
+    robot = robot_create(GO1, &error);
+    model = mj_loadXML(GO1 "/go1.xml", NULL, text, sizeof text);
+    if (!robot || !model) {
+        fail_msg("%s%s", error.text, text);
+    }
+    data = mj_makeData(model);
+    robot_set_shells(robot, 1);
+    return 0;
+}
+
+static int teardown(void **unused) {
+    (void)unused;
+    mj_deleteData(data);
+    mj_deleteModel(model);
+    robot_destroy(robot);
+    return 0;
+}
+
+static void open_env(TaskStart start) {
+    MildError error = {0};
+    def = task_def_default();
+    task_def_make_nominal(&def);
+    def.start = (int)start;
+    def.may_lie = 1;
+    def.randomize.latency[0] = def.randomize.latency[1] = 0;
+    def.randomize.initial_velocity = 0;
+    sim = robot_sim_create(robot, def.physics_dt, &error);
+    env = aligned_alloc(64, task_env_bytes(&def, robot));
+    assert_non_null(sim);
+    assert_non_null(env);
+    task_env_init(env, &def, robot, 3, 0);
+}
+
+static void close_env(void) {
+    robot_sim_destroy(sim);
+    free(env);
+}
+
+/* Draw `draw` of an episode on foam, or on a slope of it. */
+static void begin(uint32_t draw, int rigid) {
+    MildMaterial foam;
+    assert_true(mild_material_preset("foam45", &foam));
+    MildTerrain terrain = mild_terrain_uniform(&foam);
+    terrain.height = 0.2;
+    env->tick = draw;
+    task_env_reset_on(env, &def, robot, sim, &terrain, rigid, &view);
+    ground = task_env_terrain(env);
+}
+
+/* ---- geometry ---- */
+
+/* [m] Lowest point of a geom above z = 0. */
+static double lowest_of(int geom) {
+    const double *size = model->geom_size + 3 * geom, *R = data->geom_xmat + 9 * geom;
+    const double z = data->geom_xpos[3 * geom + 2];
+    switch (model->geom_type[geom]) {
+    case mjGEOM_SPHERE: return z - size[0];
+    case mjGEOM_CAPSULE: return z - size[0] - fabs(R[8]) * size[1];
+    default:
+        assert_int_equal(model->geom_type[geom], mjGEOM_BOX);
+        return z - fabs(R[6]) * size[0] - fabs(R[7]) * size[1] - fabs(R[8]) * size[2];
+    }
+}
+
+/* [m] The same of the robot in env: its shells, which are the collision geoms but for the calves,
+ * and its feet, the spheres of rubber. */
+static double lowest(void) {
+    double least = 1e9;
+    const int rubber = mj_name2id(model, mjOBJ_MATERIAL, "rubber");
+    int seen = 0;
+    mju_copy(data->qpos, env->robot.qpos, 7 + JOINTS);
+    mj_kinematics(model, data);
+    for (int g = 0; g < model->ngeom; g++) {
+        const char *name = mj_id2name(model, mjOBJ_GEOM, g);
+        const int shell = name && !strstr(name, "calf");
+        if (shell || model->geom_matid[g] == rubber) {
+            least = fmin(least, lowest_of(g));
+            seen++;
+        }
+    }
+    assert_int_equal(seen, 2 + 2 * FEET + FEET);
+    return least;
+}
+
+/* Its lowest point is within 0.1 m of the ground and not below it; its quaternion has length 1. */
+static void nothing_begins_below_the_ground(void **unused) {
+    (void)unused;
+    for (int start = TASK_START_BACK; start < TASK_STARTS; start++) {
+        double least = 1e9, most = -1e9;
+        open_env((TaskStart)start);
+        for (uint32_t k = 0; k < DRAWS; k++) {
+            begin(k, 0);
+            const double gap = lowest() - 0.2, *q = env->robot.qpos + 3;
+            const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+            assert_true(env->dropped);
+            assert_true(fabs(square - 1) < 1e-12);
+            least = fmin(least, gap);
+            most = fmax(most, gap);
+        }
+        print_message("%s: lowest point %.2f to %.2f mm above the ground\n",
+                      task_start_names[start], 1e3 * least, 1e3 * most);
+        assert_true(least > -1e-9 && least < 0.002 && most > 0.098 && most < 0.1);
+        close_env();
+    }
+}
+
+/* On a slope the lowest sole or shell, each above the ground under it, is that high. */
+static void on_a_slope_too(void **unused) {
+    (void)unused;
+    MildMapDef slope = mild_map_def_default();
+    slope.kind = MILD_MAP_SLOPE;
+    slope.slope = 0.2;
+    MildMap *map = mild_map_create(&slope, NULL);
+    assert_non_null(map);
+    open_env(TASK_START_ANY);
+    def.map = map;
+    for (uint32_t k = 0; k < DRAWS / 4; k++) {
+        begin(k, 0);
+        MildTerrain terrain = *ground;
+        terrain.map = map;
+        task_env_load(env, sim);
+        const double gap =
+            fmin(robot_sim_sole_clearance(sim, &terrain), robot_sim_body_clearance(sim, &terrain));
+        assert_true(gap > -1e-9 && gap < 0.1);
+    }
+    close_env();
+    mild_map_destroy(map);
+}
+
+/* ---- attitudes and joints ---- */
+
+/* [-] Upward component of the base's z and y axes. */
+static double up_of(int axis) {
+    double R[9];
+    mju_quat2Mat(R, env->robot.qpos + 3);
+    return R[6 + axis];
+}
+
+/* Leans of at most 0.3 rad in roll and pitch: the cosine of both is cos(0.3)^2 = 0.91267. */
+static void back_and_side(void **unused) {
+    (void)unused;
+    int left = 0;
+    open_env(TASK_START_BACK);
+    for (uint32_t k = 0; k < DRAWS; k++) {
+        begin(k, 0);
+        assert_true(up_of(2) < -0.9126);
+    }
+    def.start = TASK_START_SIDE;
+    for (uint32_t k = 0; k < DRAWS; k++) {
+        begin(k, 0);
+        assert_true(fabs(up_of(1)) > 0.9126);
+        left += up_of(1) < 0;
+    }
+    assert_true(left > DRAWS * 0.4 && left < DRAWS * 0.6);
+    close_env();
+}
+
+/* Each axis of the base is as likely to point anywhere: the vertical component of an axis is
+ * uniform in [-1, 1], mean 0 and mean square 1/3; 4 standard deviations of 400 draws are 0.115 and
+ * 0.06. */
+static void any_attitude_is_as_likely(void **unused) {
+    (void)unused;
+    double sum[3] = {0}, square[3] = {0};
+    open_env(TASK_START_ANY);
+    for (uint32_t k = 0; k < DRAWS; k++) {
+        begin(k, 0);
+        for (int i = 0; i < 3; i++) {
+            sum[i] += up_of(i) / DRAWS;
+            square[i] += up_of(i) * up_of(i) / DRAWS;
+        }
+    }
+    for (int i = 0; i < 3; i++) {
+        assert_true(fabs(sum[i]) < 0.115 && fabs(square[i] - 1.0 / 3) < 0.06);
+    }
+    close_env();
+}
+
+/* Joints are within their ranges and reach both ends. */
+static void joints_are_anywhere(void **unused) {
+    (void)unused;
+    const double *low = robot_joint_low(robot), *high = robot_joint_high(robot);
+    double least[JOINTS], most[JOINTS];
+    open_env(TASK_START_BACK);
+    for (int i = 0; i < JOINTS; i++) {
+        least[i] = 1e9;
+        most[i] = -1e9;
+    }
+    for (uint32_t k = 0; k < DRAWS; k++) {
+        begin(k, 0);
+        for (int i = 0; i < JOINTS; i++) {
+            const double share = (env->robot.qpos[7 + i] - low[i]) / (high[i] - low[i]);
+            least[i] = fmin(least[i], share);
+            most[i] = fmax(most[i], share);
+        }
+    }
+    for (int i = 0; i < JOINTS; i++) {
+        assert_true(least[i] >= 0 && least[i] < 0.03 && most[i] <= 1 && most[i] > 0.97);
+    }
+    close_env();
+}
+
+/* ---- which episodes ---- */
+
+/* As many as asked for; none on rigid ground, which shells do not touch; the others stand as if
+ * nobody had asked. */
+static void the_share_is_kept(void **unused) {
+    (void)unused;
+    int dropped = 0;
+    open_env(TASK_START_ANY);
+    def.start_share = 0.3;
+    for (uint32_t k = 0; k < DRAWS; k++) {
+        begin(k, 1);
+        assert_false(env->dropped);
+        const TaskPose rigid = env->robot;
+        def.start = TASK_START_STAND;
+        begin(k, 1);
+        assert_memory_equal(&rigid, &env->robot, sizeof rigid);
+        begin(k, 0);
+        const TaskPose stands = env->robot;
+        def.start = TASK_START_ANY;
+        begin(k, 0);
+        dropped += env->dropped;
+        assert_true(env->dropped || memcmp(&stands, &env->robot, sizeof stands) == 0);
+    }
+    assert_true(dropped > DRAWS * 0.3 - 37 && dropped < DRAWS * 0.3 + 37); /* 4 deviations */
+    close_env();
+}
+
+/* A lying robot needs shells that stand. */
+static void without_shells_it_is_refused(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    TaskDef bad = task_def_default();
+    bad.shells_stand = 0;
+    assert_int_equal(task_def_check(&bad, &error), MILD_OK);
+    bad.start = TASK_START_BACK;
+    assert_int_equal(task_def_check(&bad, &error), MILD_ERROR_RANGE);
+    assert_non_null(strstr(error.text, "task.start"));
+    bad.start = TASK_START_STAND;
+    bad.may_lie = 1;
+    assert_int_equal(task_def_check(&bad, &error), MILD_ERROR_RANGE);
+    assert_non_null(strstr(error.text, "task.may_lie"));
+}
+
+/* ---- limp, then not ---- */
+
+static TaskStep step(const float *action) {
+    return task_env_step(env, &def, robot, sim, action, 0, &view, NULL);
+}
+
+/* Speeds of the joints before a physics step, and the greatest distance of a torque from that of
+ * damping alone, within the limit of the motor. */
+typedef struct {
+    double speed[JOINTS], apart;
+} Damping;
+
+static void compare_damping(void *context, const TaskEnv *at, const RobotSim *with,
+                            const double *torque) {
+    Damping *damping = context;
+    const TaskGains *gains = &task_env_rest(env)->gains;
+    (void)at;
+    for (int i = 0; i < JOINTS; i++) {
+        const double limit = gains->limit[i], asked = -gains->kd[i] * damping->speed[i];
+        const double wanted = fmin(fmax(asked, -limit), limit);
+        damping->apart = fmax(damping->apart, fabs(torque[i] - wanted));
+        damping->speed[i] = robot_sim_qvel(with)[6 + i];
+    }
+}
+
+/* For `settle` the torques are those of damping, whatever the action; then no longer. */
+static void motors_only_damp_at_first(void **unused) {
+    (void)unused;
+    float action[JOINTS];
+    for (int i = 0; i < JOINTS; i++) {
+        action[i] = i % 2 ? 1 : -1;
+    }
+    open_env(TASK_START_BACK);
+    def.settle = 0.5;
+    begin(7, 0);
+    Damping damping = {.apart = 0};
+    const TaskCallback callback = {compare_damping, &damping, NULL};
+    for (int k = 0; k < 51; k++) {
+        damping.apart = 0;
+        task_env_step(env, &def, robot, sim, action, 0, &view, &callback);
+        assert_true(k < 50 ? damping.apart < 1e-12 : damping.apart > 5);
+    }
+    def.start = TASK_START_STAND;
+    begin(7, 0);
+    memset(&damping, 0, sizeof damping);
+    task_env_step(env, &def, robot, sim, action, 0, &view, &callback);
+    assert_true(damping.apart > 1);
+    close_env();
+}
+
+/* ---- what ends it ---- */
+
+/* Dropped on its back it lies there until its time is over; without may_lie its tilt, or its base
+ * on the ground, ends the episode at once, and on rigid ground in either case. */
+static void a_robot_that_may_lie_is_not_ended(void **unused) {
+    (void)unused;
+    const float none[JOINTS] = {0};
+    open_env(TASK_START_BACK);
+    begin(1, 0);
+    for (int k = 0; k < 300; k++) {
+        const TaskStep out = step(none);
+        assert_true(!out.done && out.valid && out.cause == TASK_END_time);
+    }
+    assert_true(up_of(2) < -0.9);
+    env->step = env->step_limit;
+    assert_true(step(none).timeout);
+    def.may_lie = 0;
+    assert_int_equal(step(none).cause, TASK_END_tilt);
+    def.tilt_limit = 3.1;
+    mju_euler2Quat(env->robot.qpos + 3, (const double[3]){2.8, 0, 0}, "xyz");
+    assert_int_equal(step(none).cause, TASK_END_base);
+    def.may_lie = 1;
+    assert_int_equal(step(none).cause, TASK_END_time);
+    env->robot.qpos[7] = 0.863 + 0.8; /* a hip out of its range */
+    assert_int_equal(step(none).cause, TASK_END_joint);
+    env->robot.qpos[7] = 0;
+    env->robot.qvel[0] = NAN;
+    assert_int_equal(step(none).cause, TASK_END_not_finite);
+    env->robot.qvel[0] = 0;
+    env->robot.qvel[1] = 0;
+    env->variation.rigid = 1;
+    def.tilt_limit = 1;
+    begin(2, 1);
+    mju_euler2Quat(env->robot.qpos + 3, (const double[3]){2.8, 0, 0}, "xyz");
+    assert_int_equal(step(none).cause, TASK_END_tilt);
+    close_env();
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(nothing_begins_below_the_ground),
+        cmocka_unit_test(on_a_slope_too),
+        cmocka_unit_test(back_and_side),
+        cmocka_unit_test(any_attitude_is_as_likely),
+        cmocka_unit_test(joints_are_anywhere),
+        cmocka_unit_test(the_share_is_kept),
+        cmocka_unit_test(without_shells_it_is_refused),
+        cmocka_unit_test(motors_only_damp_at_first),
+        cmocka_unit_test(a_robot_that_may_lie_is_not_ended),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
