@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Draws the figures of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain] [walk]
-# [robots] [actuator] [motion]; without a name all. The drawings are scripts/drawings.py's.
+# [robots] [rise] [actuator] [motion]; without a name all. The drawings are scripts/drawings.py's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mild=build/mild
@@ -87,6 +87,14 @@ robots() {
     still "$work/robots.mkv" docs/robots.png "scale=1280:-1:flags=area"
 }
 
+# The Go1 rights itself on loose sand: six moments.
+rise() {
+    "$mild" play --robot go1 --policy policies/go1_rise.safetensors --ground sand_loose --speed 0 --seconds 4 \
+        --task.start=back --task.may_lie=true --video "$work/rise.mp4"
+    still "$work/rise.mp4" docs/rise.png \
+        "select='eq(n,24)+eq(n,29)+eq(n,33)+eq(n,36)+eq(n,42)+eq(n,90)',scale=480:-1:flags=area,tile=3x2"
+}
+
 # A robot among its imprints on waves of two materials, after five seconds.
 terrain() {
     "$mild" play --ground sand_dense,sand_loose --speed 0.5 --seconds 5.2 --video "$work/terrain.mp4" \
@@ -105,9 +113,9 @@ actuator() {
 for name in "${@:-all}"; do
     case $name in
     presets | recovery | impact | eccentric) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
-    terrain | walk | robots | actuator | motion) "$name" ;;
+    terrain | walk | robots | rise | actuator | motion) "$name" ;;
     sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
-    all) for each in presets recovery impact sinkage eccentric terrain walk robots actuator motion; do "$0" "$each"; done ;;
-    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots actuator motion" >&2 && exit 2 ;;
+    all) for each in presets recovery impact sinkage eccentric terrain walk robots rise actuator motion; do "$0" "$each"; done ;;
+    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots rise actuator motion" >&2 && exit 2 ;;
     esac
 done
