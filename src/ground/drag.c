@@ -3,7 +3,7 @@
 
 void slots_drag_any(const FootScratch *foot, double dt, const Motion *now, const Motion *free) {
     for (int i = 0; i < foot->active; i++) {
-        slot_drag(slot_block(foot, i), i % SLOT_LANES, dt, now, free, foot->curves,
+        slot_drag(slot_block(foot, i), i % SLOT_LANES, dt, now, free, LAW_ANY,
                   SLOT_UNEVEN | SLOT_FACES);
     }
 }
@@ -20,9 +20,9 @@ int slots_explicit(const FootScratch *foot, int materials, double dt, const Moti
         if (!(s->depth[l] > 0.0) || s->middle[l] < s->depth_max[l]) {
             continue; /* above the ground or on the unloading line */
         }
-        const Element element = slot_loaded(s, l, foot->curves);
+        const Element element = slot_loaded(s, l, LAW_ANY);
         s->explicit_impulse[l] =
-            element_explicit_of(&element, foot->curves, dt,
+            element_explicit_of(&element, LAW_ANY, dt,
                                 slot_velocity(s, l, free, SLOT_UNEVEN | foot->faces).descent);
     }
     return any;
