@@ -1,6 +1,6 @@
-/* What ground with imprints remembers, by the public interface alone: an element of two by two cells
- * that nothing can move is set down and taken away. Against a plain array of cells, what is kept
- * when the memory is full, and the ends of its range. */
+/* What ground with imprints remembers, by the public interface alone: an element of two by two
+ * cells that nothing can move is set down and taken away. Against a plain array of cells, what is
+ * kept when the memory is full, and the ends of its range. */
 #include "ground_kit.h"
 
 #define CELL 0.01         /* [m] edge of a cell */
