@@ -9,9 +9,9 @@
 
 typedef struct {
     Runner *runner;
-    Udp *udp;                          /* its peer is whom the runner hears */
-    Input *input;                      /* of commands */
-    double seconds;                    /* [s] since the first target; 0: no end */
+    Udp *udp;                             /* its peer is whom the runner hears */
+    Input *input;                         /* of commands */
+    double seconds;                       /* [s] since the first target; 0: no end */
     void (*refused)(const char *refusal); /* once for each kind of refusal that has a remedy */
 } DriveDef;
 
