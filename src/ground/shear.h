@@ -16,7 +16,8 @@ typedef struct {
     Real area;     /* [m^2] of the element */
 } Shear;
 
-/* Sets the friction of an element, after element_begin. force: [N] at the yield depth. rate: 1/dt. */
+/* Sets the friction of an element, after element_begin. force: [N] at the yield depth. rate:
+ * 1/dt. */
 MILD_HD void element_shear_of(Element *e, const ElementMemory *memory, const Shear *shear,
                               Real force, Real dt, Real rate) {
     const Real slid = memory->drift / shear->length;                       /* j/K [-] */

@@ -196,11 +196,12 @@ static void test_ends_of_the_range(void **state) {
     const double around = 65536.0 * EDGE;
     assert_true(fabs(stamp_at(&stamp, 0.055 + around, -0.055 - around) - 0.03) < 1e-9);
     assert_true(stamp_at(&stamp, 0.055 + around / 2, -0.055) == 0.0);
-    stamp_press(&stamp, 0.0, 0.0, 0.0, 0.03);
+    stamp_press(&stamp, 0.0, 0.0, 0.0, 0.03); /* in four tiles, the last of them at the origin */
+    stamp_press(&stamp, -0.005, 0.075, 0.0, 0.03); /* in the last cell of the one before it */
     static const double far[4] = {1e8, -1e12, INFINITY, NAN}; /* nothing is remembered there */
     for (int k = 0; k < 4; k++) {
-        stamp_press(&stamp, far[k], 0.0, 0.0, 0.02);
-        stamp_press(&stamp, 0.0, far[k], 0.0, 0.02);
+        stamp_press(&stamp, far[k], 0.0, 0.0, 0.04);
+        stamp_press(&stamp, 0.0, far[k], 0.0, 0.04);
         assert_true(stamp_at(&stamp, 0.0, far[k]) == 0.0);
         assert_true(stamp_at(&stamp, far[k], 0.0) == 0.0);
         stamp_stand(&stamp, far[k], 0.0, 0.0, 0.01); /* nor found */
@@ -208,6 +209,7 @@ static void test_ends_of_the_range(void **state) {
         stamp_stand(&stamp, far[k], 0.0, 0.0, -5e-4);
     }
     assert_true(fabs(stamp_at(&stamp, 0.0, 0.0) - 0.03) < 1e-9);
+    assert_true(fabs(stamp_at(&stamp, -0.005, 0.075) - 0.03) < 1e-9);
     stamp_close(&stamp);
 }
 
