@@ -2,8 +2,10 @@
 #include "ground/drag.h"
 
 void slots_drag_any(const FootScratch *foot, double dt, const Motion *now, const Motion *free) {
+    const int curves =
+        foot->curves | LAW_CONE | LAW_HEAP; /* no branches for these; a power is long */
     for (int i = 0; i < foot->active; i++) {
-        slot_drag(slot_block(foot, i), i % SLOT_LANES, dt, now, free, LAW_ANY,
+        slot_drag(slot_block(foot, i), i % SLOT_LANES, dt, now, free, curves,
                   SLOT_UNEVEN | SLOT_FACES);
     }
 }
