@@ -64,18 +64,19 @@ static void element_imprint(const Advance *a, const Memory *memory, const Slots 
 }
 
 /* [m] element_peak of a slot that reversed within the step. */
-static __attribute__((cold, noinline)) double slot_peak(const Slots *s, int i, double speed,
-                                                        double middle) {
-    const Element element = slot_loaded(s, i, LAW_ANY);
-    return element_peak(&element, LAW_ANY, s->iz[i], speed, middle);
+static __attribute__((cold, noinline)) double slot_peak(const Slots *s, int i, int curves,
+                                                        double speed, double middle) {
+    curves |= LAW_CONE | LAW_HEAP; /* no branches for these; a power is long */
+    const Element element = slot_loaded(s, i, curves);
+    return element_peak(&element, curves, s->iz[i], speed, middle);
 }
 
 /* Raises the greatest depth of a slot, of element e, if the element reversed within the step: it
  * was then deeper than at either end. */
-static void slot_raise(const Memory *memory, const Slots *s, int i, int e, double speed,
+static void slot_raise(const Memory *memory, const Slots *s, int i, int e, int curves, double speed,
                        double middle) {
     const int turns = element_turns(s->entry_speed[i], speed);
-    const double peak = turns ? slot_peak(s, i, speed, middle) : middle;
+    const double peak = turns ? slot_peak(s, i, curves, speed, middle) : middle;
     const double depth = s->virgin_depth[i] + peak - s->yield_depth[i];
     memory->depth_max[e] = fmax(memory->depth_max[e], depth);
 }
@@ -89,7 +90,7 @@ static __attribute__((cold, noinline)) void foot_peaks(const Advance *a, const M
         const SlotVelocity v = slot_velocity(s, i, &a->motion, 1);
         const double middle = s->depth[i] + a->dt / 2 * v.descent;
         if (middle > 0.0 && element_turns(s->entry_speed[i], v.descent)) {
-            slot_raise(memory, s, i, e, v.descent, middle);
+            slot_raise(memory, s, i, e, a->foot->curves, v.descent, middle);
         }
     }
 }
@@ -294,7 +295,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
             to[k][e] = after[k][i];
         }
         if (!lifted) {
-            slot_raise(memory, s, i, e, v.descent, middle);
+            slot_raise(memory, s, i, e, foot->curves, v.descent, middle);
         }
         const int barred = (material[slot] & SLOT_BARRED) != 0;
         memory->material[e] = lifted || barred ? lifted_material : material[slot];

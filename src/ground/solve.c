@@ -100,7 +100,7 @@ static void foot_result(const MildScratch *scratch, const MildContactInput *inpu
 
 /* Bool: all values are finite. Each is tested on its own, without a branch or a sum, so that the
  * tests do not wait for each other. */
-static __attribute__((noinline)) int finite(const double *values, int count) {
+static int finite(const double *values, int count) {
     int bad = 0;
     for (int i = 0; i < count; i++) {
         bad |= !(fabs(values[i]) <= DBL_MAX);
@@ -112,11 +112,11 @@ static __attribute__((noinline)) int finite(const double *values, int count) {
  * own, because a foot at NaN touches nothing and no equation fails. */
 static int all_finite(const MildContactInput *input, const MildContactResult *result, int feet) {
     const double rate = 1.0 / input->dt;
-    int all = finite(result->velocity, 6 * feet) & (rate > 0.0) & finite(&rate, 1) &
-              finite(input->position[0], 3 * feet) & finite(input->rotation[0], 9 * feet);
+    int all = finite(result->velocity, 6 * feet) & (rate > 0.0) & finite(&rate, 1);
     for (int f = 0; f < feet; f++) {
         const MildFootResult *foot = &result->foot[f];
-        all &= finite(foot->force, 3) & finite(foot->torque, 3) & finite(foot->zmp_axis, 3) &
+        all &= finite(input->position[f], 3) & finite(input->rotation[f], 9) &
+               finite(foot->force, 3) & finite(foot->torque, 3) & finite(foot->zmp_axis, 3) &
                finite(foot->zmp_sole, 2) & finite(foot->pressure_center, 3);
     }
     return all;
