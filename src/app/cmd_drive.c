@@ -197,7 +197,7 @@ static double greater(double a, double b) {
     return a > b ? a : b;
 }
 
-static void tell(const char *refusal) {
+static void print_refusal(const char *refusal) {
     fprintf(stderr, "mild drive: refused a packet: %s\n", refusal);
 }
 
@@ -217,7 +217,7 @@ static MildStatus run_on(Drive *d, Runner *runner, Udp *udp, MildError *error) {
     fprintf(stderr, "mild drive: %s at %s; robot %08x; %s\n", robot_name(robot),
             udp_text(&udp->own, text), (unsigned)packet_robot(robot),
             input.keys ? INPUT_KEYS : "Ctrl-C ends");
-    const DriveDef def = {runner, udp, &input, d->seconds, tell};
+    const DriveDef def = {runner, udp, &input, d->seconds, print_refusal};
     drive_run(&def, &report);
     input_close(&input);
     const RunnerReport *counts = runner_report(runner);

@@ -1,5 +1,7 @@
 /* Last stage of a contact step: mild_ground_advance updates what the ground remembers. */
 #define POWER_CALLED /* power.h: no vector loop here needs a power */
+#include <string.h>
+
 #include "ground/faces.h"
 #include "ground/moments.h"
 #include "ground/remember.h"
@@ -15,26 +17,15 @@ typedef struct {
     double height;            /* [m] of the terrain, without its map */
 } Advance;
 
-MILD_HD void memory_store(const Memory *memory, int e, const ElementMemory *after) {
-    memory->depth_max[e] = after->depth_max;
-    memory->middle[e] = after->middle;
-    memory->front_speed[e] = after->front_speed;
-    memory->drift[e] = after->drift;
-    memory->pending_x[e] = after->pending_x;
-    memory->pending_y[e] = after->pending_y;
-    memory->held_x[e] = after->held_x;
-    memory->held_y[e] = after->held_y;
-    memory->held_stiffness[e] = after->held_stiffness;
-}
+/* The numbers that a step gives the memory of an element, in the order of Memory. */
+enum { ADVANCE_NUMBERS = 10 };
 
-/* Bool: the element lifts off. Without imprints it does so when it rises above the undisturbed
- * surface, with imprints as soon as its unloading line carries no force. m1: depth in the middle of
- * the step. */
-static int element_lifted(const Advance *a, const Slots *s, int i, double m1) {
-    if (!(m1 > 0.0)) {
-        return 1;
-    }
-    return a->imprints && s->recovery[i] < 1.0 && m1 <= s->zero_depth[i];
+/* Bool: the element stays in the ground. Without imprints it lifts off when it rises above the
+ * undisturbed surface, with imprints as soon as its unloading line carries no force. m1: depth in
+ * the middle of the step. prints: bool. */
+MILD_HD int slot_stays(const Slots *s, int i, double m1, int prints) {
+    const int pressed = (prints != 0) & (s->recovery[i] < 1.0);
+    return (m1 > 0.0) & !(pressed & (m1 <= s->zero_depth[i]));
 }
 
 /* A loaded element writes its depth into the ground where it lifts off, less what flows back there,
@@ -73,18 +64,19 @@ static void element_imprint(const Advance *a, const Memory *memory, const Slots 
 }
 
 /* [m] element_peak of a slot that reversed within the step. */
-static __attribute__((cold, noinline)) double slot_peak(const Advance *a, const Slots *s, int i,
+static __attribute__((cold, noinline)) double slot_peak(const Slots *s, int i, int curves,
                                                         double speed, double middle) {
-    const Element element = slot_loaded(s, i, a->foot->curves);
-    return element_peak(&element, a->foot->curves, s->iz[i], speed, middle);
+    curves |= LAW_CONE | LAW_HEAP; /* no branches for these; a power is long */
+    const Element element = slot_loaded(s, i, curves);
+    return element_peak(&element, curves, s->iz[i], speed, middle);
 }
 
 /* Raises the greatest depth of a slot, of element e, if the element reversed within the step: it
  * was then deeper than at either end. */
-static void slot_raise(const Advance *a, const Memory *memory, const Slots *s, int i, int e,
-                       double speed, double middle) {
+static void slot_raise(const Memory *memory, const Slots *s, int i, int e, int curves, double speed,
+                       double middle) {
     const int turns = element_turns(s->entry_speed[i], speed);
-    const double peak = turns ? slot_peak(a, s, i, speed, middle) : middle;
+    const double peak = turns ? slot_peak(s, i, curves, speed, middle) : middle;
     const double depth = s->virgin_depth[i] + peak - s->yield_depth[i];
     memory->depth_max[e] = fmax(memory->depth_max[e], depth);
 }
@@ -98,7 +90,7 @@ static __attribute__((cold, noinline)) void foot_peaks(const Advance *a, const M
         const SlotVelocity v = slot_velocity(s, i, &a->motion, 1);
         const double middle = s->depth[i] + a->dt / 2 * v.descent;
         if (middle > 0.0 && element_turns(s->entry_speed[i], v.descent)) {
-            slot_raise(a, memory, s, i, e, v.descent, middle);
+            slot_raise(memory, s, i, e, a->foot->curves, v.descent, middle);
         }
     }
 }
@@ -147,67 +139,85 @@ static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory
     }
 }
 
-/* Shares wear: adds to what foot_advance_all has stored. */
-static void foot_wear(const Advance *a, const Memory *all) {
-    const Memory own = *all, *memory = &own;
-    const Motion motion = a->motion;
-    const double dt = a->dt;
-    int e = 0;
-    for (const Slots *s = a->foot->slot, *end = slots_end(a->foot); s < end; s++, e += SLOT_LANES) {
-#pragma omp simd
-        for (int i = 0; i < SLOT_LANES; i++) {
-            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN);
-            const Element element = slot_element(s, i);
-            const ElementMemory before = slot_memory(s, i);
-            const Share share = slot_share(s, i);
-            const int stays = s->depth[i] + dt / 2 * v.descent > 0.0;
-            ElementMemory after = before;
-            after.depth_max = memory->depth_max[e + i];
-            after.front_speed = memory->front_speed[e + i];
-            memory->worn[e + i] = element_wear(&element, &share, &before, &after, dt, s->iz[i], v.x,
-                                               v.y, v.descent, stays);
-            memory->depth_max[e + i] = after.depth_max;
-            memory->front_speed[e + i] = after.front_speed;
-            memory->drift[e + i] = after.drift;
-            memory->pending_x[e + i] = after.pending_x;
-            memory->pending_y[e + i] = after.pending_y;
-        }
-    }
-}
-
-/* Vector loop for a foot with all elements listed, on ground without imprints. Returns how many
- * elements remember something. On level ground the slopes are 0. */
-static int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material) {
-    const FootScratch *foot = a->foot;
-    const Memory own = *all, *memory = &own;
+/* Stores what the elements of some blocks remember, from number e of `memory` on. Adds to the lanes
+ * of `count` 1 for each element that stays in the ground, and 1 for each of these that reversed. On
+ * level ground the slopes are 0, and without faces the heights. */
+static __attribute__((noinline)) void blocks_remember(const Advance *a, const Slots *first,
+                                                      const Slots *end, const Memory *memory, int e,
+                                                      Lanes count[2]) {
+    const Memory to = *memory; /* copies keep the addresses in registers */
     const Motion motion = a->motion;
     const double dt = a->dt;
     const double rate = 1.0 / dt;
-    Lanes count[2] = {{0.0}}; /* touched, turned */
-    int e = 0;
-    for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++, e += SLOT_LANES) {
+    const int prints = a->imprints != NULL;
+    for (const Slots *s = first; s < end; s++, e += SLOT_LANES) {
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
-            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN);
+            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
             const Element element = slot_element(s, i);
             const ElementMemory before = slot_memory(s, i);
-            const int stays = s->depth[i] + dt / 2 * v.descent > 0.0;
+            const int stays = slot_stays(s, i, s->depth[i] + dt / 2 * v.descent, prints);
             const ElementMemory after =
                 element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
-            memory_store(memory, e + i, &after);
+            to.depth_max[e + i] = after.depth_max;
+            to.middle[e + i] = after.middle;
+            to.front_speed[e + i] = after.front_speed;
+            to.drift[e + i] = after.drift;
+            to.pending_x[e + i] = after.pending_x;
+            to.pending_y[e + i] = after.pending_y;
+            to.held_x[e + i] = after.held_x;
+            to.held_y[e + i] = after.held_y;
+            to.held_stiffness[e + i] = after.held_stiffness;
             count[0][i] += stays ? 1.0 : 0.0;
             count[1][i] += stays && element_turns(element.entry_speed, v.descent) ? 1.0 : 0.0;
         }
     }
+}
+
+/* Shares wear: adds to what blocks_remember has stored. */
+static __attribute__((noinline)) void blocks_wear(const Advance *a, const Slots *first,
+                                                  const Slots *end, const Memory *memory, int e) {
+    const Memory to = *memory;
+    const Motion motion = a->motion;
+    const double dt = a->dt;
+    const int prints = a->imprints != NULL;
+    for (const Slots *s = first; s < end; s++, e += SLOT_LANES) {
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
+            const Element element = slot_element(s, i);
+            const ElementMemory before = slot_memory(s, i);
+            const Share share = slot_share(s, i);
+            const int stays = slot_stays(s, i, s->depth[i] + dt / 2 * v.descent, prints);
+            ElementMemory after = before;
+            after.depth_max = to.depth_max[e + i];
+            after.front_speed = to.front_speed[e + i];
+            to.worn[e + i] = element_wear(&element, &share, &before, &after, dt, s->iz[i], v.x, v.y,
+                                          v.descent, stays);
+            to.depth_max[e + i] = after.depth_max;
+            to.front_speed[e + i] = after.front_speed;
+            to.drift[e + i] = after.drift;
+            to.pending_x[e + i] = after.pending_x;
+            to.pending_y[e + i] = after.pending_y;
+        }
+    }
+}
+
+/* A foot with all elements listed, on ground without imprints. Returns how many elements remember
+ * something. */
+static int foot_advance_all(const Advance *a, const Memory *memory, const int32_t *material) {
+    const FootScratch *foot = a->foot;
+    Lanes count[2] = {{0.0}};
     double sums[2];
+    blocks_remember(a, foot->slot, slots_end(foot), memory, 0, count);
     lanes_sum(count, 2, sums);
     if (foot->curves & LAW_HEAP) {
-        foot_wear(a, memory);
+        blocks_wear(a, foot->slot, slots_end(foot), memory, 0);
     }
     if (foot->uneven) {
         foot_planes(foot, a->height, memory);
     }
-    foot_finish(a, all, material, sums[1] > 0.0);
+    foot_finish(a, memory, material, sums[1] > 0.0);
     return foot->uneven ? foot->elements : (int)sums[0];
 }
 
@@ -233,28 +243,41 @@ static int face_unlisted(const Advance *a, const Memory *memory, int e) {
     return buried;
 }
 
-/* [-] The wear of a slot after the step; adds to `after`. */
-static __attribute__((noinline)) double slot_wear(const Advance *a, const Slots *s, int i,
-                                                  const ElementMemory *before, ElementMemory *after,
-                                                  const SlotVelocity *v, int stays) {
-    const Element element = slot_element(s, i);
-    const Share share = slot_share(s, i);
-    return element_wear(&element, &share, before, after, a->dt, s->iz[i], v->x, v->y, v->descent,
-                        stays);
-}
-
 /* The general case: some elements are listed, the ground keeps imprints, or the foot is a surface.
  * Returns how many elements remember something. */
 static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
     const FootScratch *foot = a->foot;
     const int faces = foot->faces;
     const int32_t lifted_material = a->imprints || foot->uneven ? MATERIAL_FREE : MATERIAL_NONE;
+    Lanes after[ADVANCE_NUMBERS], stays[2]; /* of a block */
+    const Memory block = {.depth_max = after[0],
+                          .middle = after[1],
+                          .front_speed = after[2],
+                          .drift = after[3],
+                          .pending_x = after[4],
+                          .pending_y = after[5],
+                          .held_x = after[6],
+                          .held_y = after[7],
+                          .held_stiffness = after[8],
+                          .worn = after[9]};
+    double *const to[] = {memory->depth_max, memory->middle,    memory->front_speed,
+                          memory->drift,     memory->pending_x, memory->pending_y,
+                          memory->held_x,    memory->held_y,    memory->held_stiffness,
+                          memory->worn};
+    const int numbers = foot->curves & LAW_HEAP ? ADVANCE_NUMBERS : ADVANCE_NUMBERS - 1;
     int next = 0;
     int touched = 0;
     for (int slot = 0; slot < foot->active; slot++, next++) {
         const Slots *s = slot_block(foot, slot);
         const int i = slot % SLOT_LANES;
         const int e = foot->element[slot];
+        if (i == 0) {
+            memset(stays, 0, sizeof stays);
+            blocks_remember(a, s, s + 1, &block, 0, stays);
+            if (foot->curves & LAW_HEAP) {
+                blocks_wear(a, s, s + 1, &block, 0);
+            }
+        }
         for (; next < e; next++) {
             touched += faces ? face_unlisted(a, memory, next) : element_unlisted(memory, next);
         }
@@ -266,18 +289,13 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         }
         const SlotVelocity v = slot_velocity(s, i, &a->motion, SLOT_UNEVEN | faces);
         const double middle = s->depth[i] + a->dt / 2 * v.descent;
-        const int lifted = element_lifted(a, s, i, middle);
+        const int lifted = !(stays[0][i] > 0.0);
         const int carried = memory->material[e] >= 0;
-        const Element element = slot_element(s, i);
-        const ElementMemory before = slot_memory(s, i);
-        ElementMemory after = element_remember(&element, &before, a->dt, 1.0 / a->dt, s->iz[i], v.x,
-                                               v.y, v.descent, !lifted);
-        if (foot->curves & LAW_HEAP) {
-            memory->worn[e] = slot_wear(a, s, i, &before, &after, &v, !lifted);
+        for (int k = 0; k < numbers; k++) {
+            to[k][e] = after[k][i];
         }
-        memory_store(memory, e, &after);
         if (!lifted) {
-            slot_raise(a, memory, s, i, e, v.descent, middle);
+            slot_raise(memory, s, i, e, foot->curves, v.descent, middle);
         }
         const int barred = (material[slot] & SLOT_BARRED) != 0;
         memory->material[e] = lifted || barred ? lifted_material : material[slot];

@@ -3,9 +3,9 @@
 
 #include <string.h>
 
-/* Force of ground without memory [N], into the working array fx. It is 0 but for hunt_crossley
- * beside ground with LAW_HEAP, so this loop is not in vectors, for which a power is long. */
-static void slots_elastic(const FootScratch *foot) {
+/* This loop is not in vectors, for which a power is long: few feet stand on ground without memory
+ * beside other ground. */
+void slots_elastic(const FootScratch *foot) {
     for (int i = 0; i < foot_end(foot); i++) {
         Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;

@@ -2,8 +2,10 @@
 #include "ground/drag.h"
 
 void slots_drag_any(const FootScratch *foot, double dt, const Motion *now, const Motion *free) {
+    const int curves =
+        foot->curves | LAW_CONE | LAW_HEAP; /* no branches for these; a power is long */
     for (int i = 0; i < foot->active; i++) {
-        slot_drag(slot_block(foot, i), i % SLOT_LANES, dt, now, free, foot->curves,
+        slot_drag(slot_block(foot, i), i % SLOT_LANES, dt, now, free, curves,
                   SLOT_UNEVEN | SLOT_FACES);
     }
 }
@@ -20,10 +22,9 @@ int slots_explicit(const FootScratch *foot, int materials, double dt, const Moti
         if (!(s->depth[l] > 0.0) || s->middle[l] < s->depth_max[l]) {
             continue; /* above the ground or on the unloading line */
         }
-        const Element element = slot_loaded(s, l, foot->curves);
-        s->explicit_impulse[l] =
-            element_explicit_of(&element, foot->curves, dt,
-                                slot_velocity(s, l, free, SLOT_UNEVEN | foot->faces).descent);
+        const Element element = slot_loaded(s, l, LAW_ANY);
+        s->explicit_impulse[l] = element_explicit_of(
+            &element, LAW_ANY, dt, slot_velocity(s, l, free, SLOT_UNEVEN | foot->faces).descent);
     }
     return any;
 }

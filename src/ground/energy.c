@@ -102,7 +102,8 @@ static double friction_caused(const MildScratch *scratch, const MildContactInput
 }
 
 /* [J] Work of a slot's friction at the mean speed, less the elastic energy that it released. */
-static double slot_gift(const Slots *s, int i, const SlotVelocity *u, const SlotVelocity *v) {
+static __attribute__((cold, noinline)) double
+slot_gift(const Slots *s, int i, const SlotVelocity *u, const SlotVelocity *v) {
     const Element e = slot_element(s, i);
     const double ix = s->ix[i] + s->slope_x[i] * s->iz[i];
     const double iy = s->iy[i] + s->slope_y[i] * s->iz[i];

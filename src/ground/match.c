@@ -6,7 +6,9 @@
 
 #include <math.h>
 
-static MildElementLaw law_at(const Law *law, int curves, double depth) {
+/* A curve that the law does not have adds 0. */
+static MildElementLaw law_at(const Law *law, double depth) {
+    enum { curves = LAW_ANY };
     const double elastic = law_elastic_force(law, curves, depth);
     return (MildElementLaw){
         .force = law_force(law, curves, depth) + elastic,
@@ -20,7 +22,7 @@ static MildElementLaw law_at(const Law *law, int curves, double depth) {
 static MildElementLaw element_law(const MildMaterial *material, double pitch, double width,
                                   double depth) {
     const Law law = law_of(material, pitch, width);
-    return law_at(&law, law_curves(&law), depth);
+    return law_at(&law, depth);
 }
 
 MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth) {
@@ -44,7 +46,7 @@ MildElementLaw mild_sole_law(const MildMaterial *material, const MildSole *sole,
     for (int i = 0; i < (merged ? elements : 1); i++) {
         const SoleHeap heap = merged ? sole_heap(sole, i) : (SoleHeap){0.0, 1.0};
         const Law own = merged ? law_merged(law, heap.begin, heap.width) : law;
-        const MildElementLaw one = law_at(&own, curves_of(material, &law), depth);
+        const MildElementLaw one = law_at(&own, depth);
         law_add(&sum, merged ? 1.0 : elements, &one);
     }
     return sum;

@@ -5,6 +5,7 @@
  *     s = (c + p mu) (1 - exp(-j/K))
  * j is the distance that the element has slid since it touched down, which is its drift
  * (ElementMemory in element.h). */
+#include "ground/carry.h"
 #include "ground/model.h"
 #include "ground/scratch.h"
 #include "ground/shear.h"
@@ -83,29 +84,62 @@ static double slot_mu(const MildTerrain *terrain, int32_t mixture) {
     return mixture >> 16 ? near + (mixture >> 16) / 255.0 * (far - near) : near;
 }
 
+/* The shear of a block of slots. */
+typedef struct {
+    Lanes mu, cohesion, length, area; /* Shear */
+    Lanes own;                        /* bool: the nearer material of the slot is of this model */
+} ShearLanes;
+
+/* What the materials of the slots from `first` on say. */
+static __attribute__((noinline)) void shear_lanes(const FootScratch *foot,
+                                                  const MildTerrain *terrain, int model, int first,
+                                                  ShearLanes *to) {
+    const double area = foot->pitch * foot->pitch;
+    const Slots *s = slot_block(foot, first);
+    *to = (ShearLanes){.own = {0.0}};
+    for (int l = 0; l < SLOT_LANES && first + l < foot->active; l++) {
+        const int32_t mixture = foot->slot_material[first + l];
+        const MildMaterial *material = &terrain->materials[mixture & 0xff];
+        to->own[l] = material->model == model && !(mixture & SLOT_BARRED);
+        to->mu[l] = foot->curves & LAW_HEAP /* what slip has left, beside such ground */
+                        ? s->mu[l]
+                        : slot_mu(terrain, mixture);
+        to->cohesion[l] = material->cohesion;
+        to->length[l] = material->shear_length;
+        to->area[l] = foot->faces ? s->share[l] * area : area;
+    }
+}
+
+MILD_HD void slot_shear(Slots *s, int l, const ShearLanes *lanes, double dt, double rate) {
+    const Shear shear = {lanes->mu[l], lanes->cohesion[l], lanes->length[l], lanes->area[l]};
+    const int own = lanes->own[l] > 0.0;
+    const ElementMemory memory = slot_memory(s, l);
+    Element element = slot_loaded(s, l, LAW_ANY);
+    const double force =
+        law_force(&element.law, LAW_ANY, element.yield_depth) + s->fx[l]; /* slots_elastic */
+    element_shear_of(&element, &memory, &shear, force, dt, rate);
+    s->mu[l] = own ? element.mu : s->mu[l];
+    s->drift_bound[l] = own ? element.drift_bound : s->drift_bound[l];
+    s->hold_x[l] = own ? element.hold_x : s->hold_x[l];
+    s->hold_y[l] = own ? element.hold_y : s->hold_y[l];
+    s->hold_stiffness[l] = own ? element.hold_stiffness : s->hold_stiffness[l];
+}
+
 /* Sets friction by the shear law in the slots whose nearer material is of this model. */
 static void bekker_shear(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
                          const double *rotation, const Motion *now) {
     (void)rotation;
     (void)now;
-    const double area = foot->pitch * foot->pitch;
-    for (int i = 0; i < foot->active; i++) {
-        Slots *s = slot_block(foot, i);
-        const int l = i % SLOT_LANES;
-        const MildMaterial *material = &terrain->materials[foot->slot_material[i] & 0xff];
-        if (material->model != model || foot->slot_material[i] & SLOT_BARRED) {
-            continue;
+    const double rate = 1.0 / dt;
+    slots_elastic(foot);
+    for (int first = 0; first < foot->active; first += SLOT_LANES) {
+        Slots *s = slot_block(foot, first);
+        ShearLanes lanes;
+        shear_lanes(foot, terrain, model, first, &lanes);
+#pragma omp simd
+        for (int l = 0; l < SLOT_LANES; l++) {
+            slot_shear(s, l, &lanes, dt, rate);
         }
-        const double mu = foot->curves & LAW_HEAP /* what slip has left, beside such ground */
-                              ? s->mu[l]
-                              : slot_mu(terrain, foot->slot_material[i]);
-        const Shear shear = {mu, material->cohesion, material->shear_length,
-                             foot->faces ? s->share[l] * area : area};
-        const ElementMemory memory = slot_memory(s, l);
-        Element element = slot_loaded(s, l, foot->curves);
-        element_shear(&element, &memory, &shear, foot->curves, dt, 1.0 / dt);
-        s->mu[l] = element.mu;
-        slot_store(s, l, &element);
     }
 }
 

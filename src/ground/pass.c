@@ -218,7 +218,7 @@ static void pass(MildScratch *scratch, double dt, const double *twist, int held)
         const FootScratch *foot = &scratch->foot[f];
         double *sums = scratch->sums[f];
         double *wrench = scratch->wrench + 6 * f;
-        const Motion motion = foot_motion(foot, twist + 6 * k);
+        const Motion motion = foot_moves(foot, twist + 6 * k);
         for (int curve = LAW_POWER; curve <= LAW_ELASTIC; curve *= LAW_ELASTIC / LAW_POWER) {
             if (foot->curves & curve) { /* elsewhere they are multiplied by 0 */
                 foot_powers(foot, dt, &motion, curve);
@@ -270,39 +270,44 @@ static void foot_moments(const FootScratch *foot, Moments M) {
 /* Three numbers in a register. */
 typedef double Three __attribute__((vector_size(4 * sizeof(double))));
 
+/* Adds to H what the factor k of p does (foot_hessian). One text for the three factors. */
+static __attribute__((noinline)) void factor_add(const FootScratch *foot, const Moments M, int k,
+                                                 double *H) {
+    static const int product[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+    Three rows[6] = {{0.0}}; /* of the three rows of h: [M_k0, N_k] */
+    for (int l = 0; l < 3; l++) {
+        const double *p = foot->arm[l];
+        const int at = product[k][l];
+        Three m[3]; /* M_kl */
+        for (int c = 0; c < 3; c++) {
+            m[c] = (Three){M[0][c][at], M[1][c][at], M[2][c][at]};
+            rows[c] = l == 0 ? m[c] : rows[c];
+        }
+        rows[3] += p[1] * m[2] - p[2] * m[1]; /* -m [p]x = p x m */
+        rows[4] += p[2] * m[0] - p[0] * m[2];
+        rows[5] += p[0] * m[1] - p[1] * m[0];
+    }
+    const double *q = foot->arm[k];
+    for (int c = 0; c < 6; c++) {
+        const Three row = rows[c];
+        for (int r = 0; k == 0 && r < 3; r++) {
+            H[6 * r + c] = row[r];
+        }
+        H[18 + c] += q[1] * row[2] - q[2] * row[1];
+        H[24 + c] += q[2] * row[0] - q[0] * row[2];
+        H[30 + c] += q[0] * row[1] - q[1] * row[0];
+    }
+}
+
 /* H = sum of B^T h B, with B = [1, -[p]x] and p = sum over k of (1, x, y)_k arm_k. With M_kl the
  * moment of h by the product of factors k and l, and N_k = -sum over l of M_kl [arm_l]x,
  *
  *     force rows     [M_00, N_0]
  *     torque rows    sum over k of [arm_k]x [M_k0, N_k] */
 static void foot_hessian(const FootScratch *foot, const Moments M, double *H) {
-    static const int product[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
-    Three m[3][6]; /* of the three rows of h, for each column and product */
-    for (int c = 0; c < 3; c++) {
-        for (int at = 0; at < 6; at++) {
-            m[c][at] = (Three){M[0][c][at], M[1][c][at], M[2][c][at]};
-        }
-    }
     memset(H, 0, 36 * sizeof *H);
     for (int k = 0; k < 3; k++) {
-        Three rows[6] = {m[0][k], m[1][k], m[2][k]}; /* for each column */
-        for (int l = 0; l < 3; l++) {                /* -m [p]x = p x m */
-            const double *p = foot->arm[l];
-            const int at = product[k][l];
-            rows[3] += p[1] * m[2][at] - p[2] * m[1][at];
-            rows[4] += p[2] * m[0][at] - p[0] * m[2][at];
-            rows[5] += p[0] * m[1][at] - p[1] * m[0][at];
-        }
-        const double *q = foot->arm[k];
-        for (int c = 0; c < 6; c++) {
-            const Three row = rows[c];
-            for (int r = 0; k == 0 && r < 3; r++) {
-                H[6 * r + c] = row[r];
-            }
-            H[18 + c] += q[1] * row[2] - q[2] * row[1];
-            H[24 + c] += q[2] * row[0] - q[0] * row[2];
-            H[30 + c] += q[0] * row[1] - q[1] * row[0];
-        }
+        factor_add(foot, M, k, H);
     }
 }
 

@@ -16,17 +16,7 @@
 #define POWER_ROUND REAL(1e-4)  /* e^2 [-] */
 #define POWER_SERIES REAL(0.15) /* |rho| below which power_way uses a series */
 
-#ifdef MILD_REAL_FLOAT
-
-MILD_HD Real real_exp2(Real x) {
-    return exp2f(x);
-}
-
-MILD_HD Real real_pow(Real x, Real y) {
-    return powf(x, y);
-}
-
-#else
+#ifndef MILD_REAL_FLOAT
 
 /* The bits of a double, and back. */
 MILD_HD uint64_t real_bits(double x) {
@@ -43,9 +33,42 @@ MILD_HD double real_from_bits(uint64_t bits) {
 
 #define POWER_MAGIC 0x1.8p52 /* the low bits of this plus an integer are the integer */
 
+#endif
+
+/* The mean of F over a way, up or down. */
+typedef struct {
+    Real mean;  /* [N] */
+    Real slope; /* [N/m] its derivative with respect to the way */
+} PowerWay;
+
+/* POWER_CALLED: defined by a file whose vector loops need no power. It calls the functions of
+ * power.c, in place of a copy for each use. */
+#ifdef POWER_CALLED
+Real real_exp2(Real x);
+Real real_pow(Real x, Real y);
+Real power_force(Real force, Real exponent, Real depth);
+Real power_slope(Real force, Real exponent, Real depth);
+PowerWay power_way(Real force, Real exponent, Real begin, Real way);
+#else
+#ifndef POWER_FN
+#define POWER_FN MILD_HD
+#endif
+
+#ifdef MILD_REAL_FLOAT
+
+POWER_FN Real real_exp2(Real x) {
+    return exp2f(x);
+}
+
+POWER_FN Real real_pow(Real x, Real y) {
+    return powf(x, y);
+}
+
+#else
+
 /* 2^x for |x| < 1000, within 4e-16: 2^k exp(f ln 2) with |f| <= 1/2, using the series of exp up to
  * (ln 2/2)^13/13!. It has no branch, so that loops vectorise. */
-MILD_HD Real real_exp2(Real x) {
+POWER_FN Real real_exp2(Real x) {
     const double shifted = x + POWER_MAGIC;
     const double f = (x - (shifted - POWER_MAGIC)) * 0.69314718055994530942;
     double sum = 1.0 / 6227020800;
@@ -87,42 +110,26 @@ MILD_HD Real real_log2(Real x) {
     return whole + s * sum * 2.8853900817779268147; /* 2/ln 2 */
 }
 
-/* x^y for a normal x > 0. POWER_CALLED: defined by a file whose vector loops need no power. It
- * calls the one of power.c, in place of a copy for each use. */
-#ifdef POWER_CALLED
-Real real_pow(Real x, Real y);
-#else
-MILD_HD Real real_pow(Real x, Real y) {
+/* x^y for a normal x > 0. */
+POWER_FN Real real_pow(Real x, Real y) {
     return real_exp2(y * real_log2(x));
 }
-#endif
 
 #endif
 
 /* F(u) [N]. force: S [N], the force at z0. exponent: n [-]. */
-MILD_HD Real power_force(Real force, Real exponent, Real depth) {
+POWER_FN Real power_force(Real force, Real exponent, Real depth) {
     const Real x = depth / POWER_DEPTH;
     return force * x * real_pow(x * x + POWER_ROUND, (exponent - 1) / 2);
 }
 
 /* F'(u) [N/m]. */
-MILD_HD Real power_slope(Real force, Real exponent, Real depth) {
+POWER_FN Real power_slope(Real force, Real exponent, Real depth) {
     const Real x = depth / POWER_DEPTH;
     const Real q = x * x + POWER_ROUND;
     const Real grown = real_pow(q, (exponent - 1) / 2) / q;
     return force / POWER_DEPTH * grown * (exponent * x * x + POWER_ROUND);
 }
-
-/* [N/m] The largest F' at any depth down to u. */
-MILD_HD Real power_steepest(Real force, Real exponent, Real depth) {
-    return real_max(power_slope(force, exponent, 0), power_slope(force, exponent, depth));
-}
-
-/* The mean of F over a way, up or down. */
-typedef struct {
-    Real mean;  /* [N] */
-    Real slope; /* [N/m] its derivative with respect to the way */
-} PowerWay;
 
 /* q^m over a way, with q and m as below: all that takes long. */
 typedef struct {
@@ -199,9 +206,16 @@ MILD_HD PowerWay power_way_of(Real force, Real exponent, Real begin, Real way,
     return over;
 }
 
-MILD_HD PowerWay power_way(Real force, Real exponent, Real begin, Real way) {
+POWER_FN PowerWay power_way(Real force, Real exponent, Real begin, Real way) {
     const PowerOver grows = power_over(exponent, begin, way);
     return power_way_of(force, exponent, begin, way, &grows);
+}
+
+#endif
+
+/* [N/m] The largest F' at any depth down to u. */
+MILD_HD Real power_steepest(Real force, Real exponent, Real depth) {
+    return real_max(power_slope(force, exponent, 0), power_slope(force, exponent, depth));
 }
 
 #endif

@@ -104,14 +104,18 @@ static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain
     }
 }
 
-/* The foot's slots on `model`. in_space: bool, a constant. The padding has no strength. */
-MILD_HD void foot_resist(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
-                         const double *rotation, const Motion *now, int in_space) {
+/* The foot's slots on `model`. in_space: bool. The padding has no strength. */
+static __attribute__((noinline)) void foot_resist(const FootScratch *foot,
+                                                  const MildTerrain *terrain, int model, double dt,
+                                                  const double *rotation, const Motion *now,
+                                                  int in_space) {
     const Plate plate = plate_of(rotation);
-    if (terrain_only(terrain, model) && !foot->faces) {
-        slots_resist(foot, dt, &plate, now, in_space);
-    } else {
+    if (!terrain_only(terrain, model) || foot->faces) {
         foot_resist_some(foot, terrain, model, dt, &plate, now, in_space);
+    } else if (in_space) {
+        slots_resist(foot, dt, &plate, now, 1);
+    } else {
+        slots_resist(foot, dt, &plate, now, 0);
     }
 }
 

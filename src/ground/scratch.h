@@ -138,7 +138,9 @@ static inline int foot_variant(const FootScratch *foot) {
 }
 
 /* The velocity field of a foot with the twist V. */
-static inline Motion foot_motion(const FootScratch *foot, const double *V) {
+Motion foot_motion(const FootScratch *foot, const double *V);
+/* The same in the loops of a pass. */
+static inline Motion foot_moves(const FootScratch *foot, const double *V) {
     Motion motion = motion_of(foot->arm, V);
     if (foot->faces) {
         const double *q = foot->arm[3];

@@ -16,17 +16,23 @@ typedef struct {
     Real area;     /* [m^2] of the element */
 } Shear;
 
-/* Sets the friction of an element, after element_begin. rate: 1/dt. */
-MILD_HD void element_shear(Element *e, const ElementMemory *memory, const Shear *shear, int curves,
-                           Real dt, Real rate) {
+/* Sets the friction of an element, after element_begin. force: [N] at the yield depth. rate:
+ * 1/dt. */
+MILD_HD void element_shear_of(Element *e, const ElementMemory *memory, const Shear *shear,
+                              Real force, Real dt, Real rate) {
     const Real slid = memory->drift / shear->length;                       /* j/K [-] */
     const Real share = 1 - real_exp2(REAL(-1.4426950408889634074) * slid); /* 1/ln 2 */
     const Real cohesion = e->depth > 0 ? shear->cohesion : 0;
     e->mu = share * shear->mu;
     e->drift_bound += dt * share * cohesion * shear->area;
+    friction_hold(e, memory, dt, rate, force);
+}
+
+MILD_HD void element_shear(Element *e, const ElementMemory *memory, const Shear *shear, int curves,
+                           Real dt, Real rate) {
     const Real force =
         law_force(&e->law, curves, e->yield_depth) + law_elastic_force(&e->law, curves, e->middle);
-    friction_hold(e, memory, dt, rate, force);
+    element_shear_of(e, memory, shear, force, dt, rate);
 }
 
 #endif

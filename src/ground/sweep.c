@@ -33,6 +33,9 @@ typedef struct {
     double total;   /* [N s] sum of the absolute impulses */
 } Sweep;
 
+/* Two rows of a foot, which has six. */
+typedef double Two __attribute__((vector_size(2 * sizeof(double)), aligned(8), may_alias));
+
 /* V += A B^T dI */
 static void sweep_apply(Sweep *sweep, int f, const double *p, const double *change) {
     const double wrench[6] = {change[0],
@@ -41,11 +44,15 @@ static void sweep_apply(Sweep *sweep, int f, const double *p, const double *chan
                               p[1] * change[2] - p[2] * change[1],
                               p[2] * change[0] - p[0] * change[2],
                               p[0] * change[1] - p[1] * change[0]};
-    for (int k = 0; k < 6; k++) {
-        const double *row = sweep->A + (6 * sweep->place[f] + k) * sweep->n; /* A is symmetric */
-        for (int j = 0; j < sweep->n; j++) {
-            sweep->twist[j] += row[j] * wrench[k];
+    const int n = sweep->n;
+    const double *rows = sweep->A + 6 * sweep->place[f] * n; /* A is symmetric */
+    for (int j = 0; j < n; j += 2) {
+        Two *twist = (Two *)(sweep->twist + j);
+        Two sum = *twist;
+        for (int k = 0; k < 6; k++) {
+            sum += *(const Two *)(rows + k * n + j) * wrench[k];
         }
+        *twist = sum;
     }
 }
 

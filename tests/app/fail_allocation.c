@@ -47,7 +47,7 @@ void *aligned_alloc(size_t alignment, size_t size) {
     return fails() ? NULL : __libc_memalign(alignment, size);
 }
 
-__attribute__((destructor)) static void tell(void) {
+__attribute__((destructor)) static void print_count(void) {
     char text[40];
     int length = snprintf(text, sizeof text, "%ld allocations\n", atomic_load(&allocations));
     if (!getenv("FAIL_AT") && write(STDERR_FILENO, text, (size_t)length) < 0) {

@@ -65,7 +65,7 @@ typedef struct {
     pthread_t caller;
 } Meeting;
 
-static void meet(void *context, int piece, int thread) {
+static void wait_for_all(void *context, int piece, int thread) {
     (void)piece;
     Meeting *meeting = context;
     sigset_t mask;
@@ -90,7 +90,7 @@ static void test_whole_team(void **state) {
         assert_non_null(pool);
         for (int run = 0; run < 20; run++) {
             Meeting meeting = {.threads = threads, .caller = pthread_self()};
-            pool_run(pool, threads, meet, &meeting);
+            pool_run(pool, threads, wait_for_all, &meeting);
             assert_int_equal(atomic_load(&meeting.arrived), threads);
             assert_int_equal(atomic_load(&meeting.blocked), threads - 1);
         }

@@ -318,7 +318,7 @@ static MildMaterial draw_material(int model, uint64_t *random) {
     return rival;
 }
 
-static MildMap *place_map(const Place *place, uint64_t *random) {
+static MildMap *map_of_place(const Place *place, uint64_t *random) {
     if (!place->on_map) {
         return NULL;
     }
@@ -363,7 +363,7 @@ static void throw_bodies(Kit *kit, uint64_t *random) {
 static MildMap *open_place(Kit *kit, const Place *place, uint64_t *random) {
     static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
     const MildMaterial first = draw_material(place->model, random);
-    MildMap *map = place_map(place, random);
+    MildMap *map = map_of_place(place, random);
     kit_open(kit, BODIES, soles[0], soles[1], &first, steps[kit_index(random, 3)]);
     mild_scratch_destroy(kit->scratch);
     free(kit->ground);

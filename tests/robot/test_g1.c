@@ -211,7 +211,7 @@ static const Part parts[] = {
 enum { PARTS = sizeof parts / sizeof *parts };
 
 /* Frames of the parts in the pelvis. */
-static void place_parts(double position[PARTS][3], double quaternion[PARTS][4]) {
+static void parts_places(double position[PARTS][3], double quaternion[PARTS][4]) {
     for (int p = 0; p < PARTS; p++) {
         const Part *part = &parts[p];
         double joint[4] = {cos(0.5 * part->angle), 0, 0, 0}, body[4];
@@ -248,7 +248,7 @@ static void add_inertia(double tensor[9], const double turn[4], const double ine
 static void the_upper_body_by_hand(void **unused) {
     (void)unused;
     double position[PARTS][3], quaternion[PARTS][4], mass = 0, center[3] = {0}, sum[9] = {0};
-    place_parts(position, quaternion);
+    parts_places(position, quaternion);
     double at[PARTS][3];
     for (int p = 0; p < PARTS; p++) {
         mju_rotVecQuat(at[p], parts[p].center, quaternion[p]);

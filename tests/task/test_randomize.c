@@ -562,7 +562,7 @@ static void models_are_matched(void **unused) {
 }
 
 /* Somewhere on the map, uniformly; the patterns' materials are drawn apart. */
-static void place_on_a_map(void **unused) {
+static void placed_on_a_map(void **unused) {
     (void)unused;
     MildError error = {0};
     MildMapDef shape = mild_map_def_default();
@@ -751,7 +751,7 @@ int main(void) {
         cmocka_unit_test(models_are_matched),
         cmocka_unit_test(limit_of_sinkage),
         cmocka_unit_test(commands),
-        cmocka_unit_test(place_on_a_map),
+        cmocka_unit_test(placed_on_a_map),
         cmocka_unit_test(stripes),
         cmocka_unit_test(shares_of_grounds),
         cmocka_unit_test(latencies_are_independent),

@@ -48,7 +48,7 @@ static void take_packets(const DriveDef *def, double *arrived) {
             def->udp->has_peer = 1;
             *arrived = now;
         } else if (report->refusal[0] && report->refused[fault] == 1) {
-            def->tell(report->refusal);
+            def->refused(report->refusal);
         }
     }
 }

@@ -9,10 +9,10 @@
 
 typedef struct {
     Runner *runner;
-    Udp *udp;                          /* its peer is whom the runner hears */
-    Input *input;                      /* of commands */
-    double seconds;                    /* [s] since the first target; 0: no end */
-    void (*tell)(const char *refusal); /* once for each kind of refusal that has a remedy */
+    Udp *udp;                             /* its peer is whom the runner hears */
+    Input *input;                         /* of commands */
+    double seconds;                       /* [s] since the first target; 0: no end */
+    void (*refused)(const char *refusal); /* once for each kind of refusal that has a remedy */
 } DriveDef;
 
 typedef struct {
