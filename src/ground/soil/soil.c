@@ -26,7 +26,7 @@ static int presets_list(const char *names[PRESETS_MAX]) {
 }
 
 MildStatus soil_preset(const char *name, MildMaterial *material, MildError *error) {
-    const char *names[PRESETS_MAX];
+    const char *names[PRESETS_MAX + 1];
     if (mild_material_preset(name, material)) {
         return MILD_OK;
     }
@@ -34,7 +34,9 @@ MildStatus soil_preset(const char *name, MildMaterial *material, MildError *erro
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "ground 'rigid' is the engine's own contact and has no soft-ground law");
     }
-    const char *nearest = text_nearest(name, names, presets_list(names));
+    int count = presets_list(names);
+    names[count++] = "rigid"; /* which some callers know */
+    const char *nearest = text_nearest(name, names, count);
     return mild_fail(error, MILD_ERROR_ARGUMENT,
                      "unknown ground '%.60s'; nearest is '%s' (mild info grounds lists all; the "
                      "name of a file ends in .ini)",
