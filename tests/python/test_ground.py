@@ -1,6 +1,7 @@
 """The ground of the package: numbers compared with formulas, with the program, and with the laws of mechanics."""
 import copy
 import os
+import pathlib
 import pickle
 import subprocess
 import tempfile
@@ -304,6 +305,34 @@ class Material(unittest.TestCase):
         self.assertEqual(material.mu, 0.9)
         for name in mild.presets():
             mild.Material(name)
+
+    def test_file(self):
+        """A soil's file comes back to the last digit, wherever it is read; what is wrong names file, line and key."""
+        soil = mild.Material("clay", mu=1 / 3, k_c=np.nextafter(13190, 2e4))
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "mars.ini"
+            soil.save(path, head="from my bevameter\nring 12", notes={"mu": "tan of 18.4 degrees"})
+            self.assertEqual(mild.Material(str(path)), soil)
+            self.assertEqual(mild.Material(path, mu=0.5).mu, 0.5)
+            text = path.read_text()
+            self.assertTrue(text.startswith("# from my bevameter\n# ring 12\n[ground]\nmodel = bekker\n"), text)
+            self.assertIn("# tan of 18.4 degrees\nmu = ", text)
+            self.assertEqual(mild.press(path, mild.Sole.plate(0.2, 0.1), depth=0.01).peak_force,
+                             mild.press(soil, mild.Sole.plate(0.2, 0.1), depth=0.01).peak_force)
+            if PROGRAM:
+                out = subprocess.run([PROGRAM, "press", "--ground", path, "--depth", "0.01"], capture_output=True, text=True, check=True)
+                self.assertIn(f"{path} (bekker)", out.stdout)
+            for call, error, words in ((lambda: soil.save(pathlib.Path(folder) / "mars.txt"), ValueError, "ends in .ini"),
+                                       (lambda: soil.save(pathlib.Path(folder) / "no" / "mars.ini"), Exception, "mars.ini"),
+                                       (lambda: soil.save(path, notes={"mv": "x"}), ValueError, "'mv'"),
+                                       (lambda: soil.save(3), TypeError, ""),
+                                       (lambda: mild.Material(folder + "/venus.ini"), Exception, "venus.ini")):
+                with self.assertRaisesRegex(error, words):
+                    call()
+            self.assertEqual(mild.Material(path), soil)
+            path.write_text(text.replace("\nmu =", "\nmv ="))
+            with self.assertRaisesRegex(ValueError, r"mars.ini:\d+: unknown key 'mv'; nearest is 'mu'"):
+                mild.Material(path)
 
     def test_match(self):
         """The same sinkage under the load, by the definition of a match."""

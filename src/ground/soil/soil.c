@@ -36,11 +36,15 @@ MildStatus soil_preset(const char *name, MildMaterial *material, MildError *erro
     }
     int count = presets_list(names);
     names[count++] = "rigid"; /* which some callers know */
-    const char *nearest = text_nearest(name, names, count);
+    char known[300] = "rigid";
+    for (int i = 0; i + 1 < count; i++) {
+        const size_t used = strlen(known);
+        snprintf(known + used, sizeof known - used, ", %s", names[i]);
+    }
     return mild_fail(error, MILD_ERROR_ARGUMENT,
-                     "unknown ground '%.60s'; nearest is '%s' (mild info grounds lists all; the "
-                     "name of a file ends in .ini)",
-                     name, nearest);
+                     "unknown ground '%.60s'; nearest is '%s'; known: %s, and files whose names "
+                     "end in .ini",
+                     name, text_nearest(name, names, count), known);
 }
 
 int soil_reads(const MildMaterial *material, const MildField *field) {
@@ -176,13 +180,13 @@ static MildStatus value_apply(const Reader *r, const MildField *field, MildMater
 
 /* What the file starts from: the preset, or the default of the library, and the model. */
 static MildStatus base_find(const Reader *r, MildMaterial *material, MildError *error) {
-    char what[300];
+    char what[400];
     const MildField *model =
         mild_field_find(mild_material_fields, mild_material_field_count, "model", NULL);
     *material = mild_material_default();
     MildError cause = {0};
     if (r->preset.line && soil_preset(r->preset.text, material, &cause) != MILD_OK) {
-        snprintf(what, sizeof what, "preset: %.250s", cause.text);
+        snprintf(what, sizeof what, "preset: %.330s", cause.text);
         return line_fail(r, r->preset.line, error, what);
     }
     const int own = material->model;
