@@ -20,6 +20,21 @@ int fit_loading(FitPoint *points, int count) {
     return kept;
 }
 
+int fit_unloading(const FitPoint *points, int count, FitPoint *back) {
+    int top = 0, kept = 0;
+    for (int i = 1; i < count; i++) {
+        top = points[i].depth > points[top].depth ? i : top;
+    }
+    for (int i = top; i < count; i++) {
+        const double depth = points[i].depth;
+        if (depth > 0 && (!kept || depth < back[kept - 1].depth)) {
+            back[kept] = points[i];
+            back[kept++].load = points[top].depth;
+        }
+    }
+    return kept < FIT_POINTS_MIN ? 0 : kept;
+}
+
 /* Speed and acceleration of row `i` from a least-squares polynomial through the depths around it.
  * It is a quartic through a twentieth of the rows, because a decelerating plate needs its small
  * bias, or a parabola when there are few rows. Both are 0 when the times are missing. At most

@@ -181,7 +181,7 @@ edit 'NR == 9 { $2 = "" } { print }' && refuse 'bad.csv:9: depth_m is missing; f
 edit 'NR == 9 { print $1; next } { print }' && refuse 'bad.csv:9: depth_m is missing' "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR == 9 { $2 = "1 mm" } { print }' && refuse "bad.csv:9: depth_m '1 mm'" "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR == 9 { $3 = "1e999" } { print }' && refuse "bad.csv:9: force_n '1e999' is not a finite" "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $3 = "12,5" } { print }' && refuse 'bad.csv:9: 8 values under 7 columns; a decimal point' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $3 = "12,5" } { print }' && refuse 'bad.csv:9: 9 values under 8 columns; a decimal point' "${fit[@]}" bad.csv "${plate[@]}"
 awk 'BEGIN { print "depth_m,force_n"; for (i = 0; i <= 1000000; i++) print i * 1e-8 "," i }' >bad.csv
 refuse 'bad.csv:1000002: more than 1000000 rows; take every tenth' "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR == 9 { $1 = 0 } { print }' && refuse 'bad.csv:9: time_s 0 does not come after' "${fit[@]}" bad.csv "${plate[@]}"
