@@ -537,14 +537,14 @@ static MildStatus fit_report(const FitOptions *options, const char *command, con
     if (!options->json || strcmp(options->json, "-") != 0) {
         fit_print(work);
     }
-    if (options->json) {
+    if (options->soil) {
+        status = fit_soil_save(work, command, options->soil, error);
+    }
+    if (status == MILD_OK && options->json) {
         status = fit_json_save(work, options->json, error);
     }
     if (status == MILD_OK && options->figure) {
         status = figure_save(work, options->figure, error);
-    }
-    if (status == MILD_OK && options->soil) {
-        status = fit_soil_save(work, command, options->soil, error);
     }
     return status;
 }
