@@ -99,6 +99,21 @@ static int take(Soil *s, const MildField *field, int held, char *note) {
     return 0;
 }
 
+/* Names a number that nobody knows, with the bound that the records set. */
+static void missing_add(Soil *s, const MildField *field) {
+    const size_t used = strlen(s->missing);
+    char bound[60] = "";
+    FitKind kind;
+    const FitValue *value = value_find(s->work, field, &kind);
+    if (value && value->state == FIT_LIMIT) {
+        const int most = isfinite(value->high);
+        snprintf(bound, sizeof bound, " (at %s %.5g)", most ? "most" : "least",
+                 most ? value->high : value->low);
+    }
+    snprintf(s->missing + used, sizeof s->missing - used, "%s%s%s", used ? ", " : "", field->name,
+             bound);
+}
+
 static void fields_take(Soil *s) {
     for (int i = 0; i < mild_material_field_count; i++) {
         const MildField *field = &mild_material_fields[i];
@@ -110,9 +125,7 @@ static void fields_take(Soil *s) {
             s->note[i] = s->text[i];
             continue;
         }
-        const size_t used = strlen(s->missing);
-        snprintf(s->missing + used, sizeof s->missing - used, "%s%s", used ? ", " : "",
-                 field->name);
+        missing_add(s, field);
     }
 }
 
