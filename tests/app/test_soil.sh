@@ -64,6 +64,10 @@ grep -B1 '^k_c = ' mars.ini | grep -q '^# 95 %: [0-9.]* \.\. [0-9.]* N/m^(n+1)$'
 grep -B1 '^bed_depth = 1$' mars.ini | grep -q '^# held$' || fail "what is held: $(cat mars.ini)"
 value() { sed -n "s/^$1 = //p" mars.ini; }
 [ "$(value k_c | tr -d . | wc -c)" -ge 15 ] || fail "k_c is rounded: $(value k_c)"
+for name in k_c k_phi exponent mu shear_length cohesion recovery; do # the numbers of the table
+    tr -d ' \t\n' <fit.json | sed -n "s/.*\"$name\":{\"value\":\([^,]*\),.*/\1/p" |
+        awk -v f="$(value $name)" '{ ok = (f - $1) ^ 2 < 1e-16 * f ^ 2 } END { exit !ok }' || fail "the file's $name is $(value $name)"
+done
 keys=()
 for key in $(sed -n 's/^\([a-z_]*\) = .*/\1/p' mars.ini | grep -v model); do
     keys+=("--ground.$key=$(value "$key")")
@@ -134,6 +138,11 @@ bad '--ring: 2 rings for 1 file; give one' "$mild" fit r5.csv --model bekker --r
 bad '--plate: 3 plates for 2 files' "$mild" fit d5.csv r5.csv wide.csv "${sizes[@]}"
 printf 'slip_m,pressure_pa\n1,2\n' >bad.csv
 bad 'bad.csv:1: no column shear_pa; name the columns' "$mild" fit bad.csv --model bekker
+awk=("${awk[@]}" -v kc=0) # then k_c has a limit, which the preset's 990 is beyond
+press 1 0.025 "$p25" >n5.csv
+press 2 0.075 "$p75" >n15.csv
+bad '--soil: the records do not tell k_c (at most [0-9.]*); say' "$mild" fit n5.csv n15.csv --model bekker --plate 0.05 --plate 0.15 \
+    --hold-from dry_sand --soil new.ini
 cmp -s mars.ini before.ini || fail "a refused fit changed the soil"
 
 # shear alone; one pressure; a preset for what is missing; a soil as what is missing

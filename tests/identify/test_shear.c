@@ -264,6 +264,7 @@ static void kinds_of_files(void **state) {
     assert_int_equal(file.back_count, 10);
     assert_true(file.points[3].area == 0.0123 && file.back[0].load == 0.015);
     assert_true(file.back[0].depth == 0.015 && file.back[9].depth == 0.006);
+    assert_true(file.back[9].load == 0.015);
     fit_file_close(&file);
     snprintf(text, sizeof text, "pressure_pa,slip_m,shear_pa\n");
     for (int i = 0; i < 20; i++) {

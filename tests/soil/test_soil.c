@@ -22,6 +22,20 @@ static MildMaterial parsed(const char *text) {
     return material;
 }
 
+/* What a terminal would obey does not get into a file. */
+static void test_remarks(void **state) {
+    (void)state;
+    const MildMaterial m = mild_material_default();
+    const char *notes[64] = {"a\tb", "\x1b[31mred\r"};
+    const SoilNotes remarks = {"mild fit \x1b]0;x\x07.csv", notes};
+    char *text = soil_text(&m, &remarks);
+    assert_non_null(strstr(text, "# mild fit ?]0;x?.csv\n"));
+    for (const char *c = text; *c; c++) {
+        assert_true(*c >= ' ' || *c == '\n');
+    }
+    free(text);
+}
+
 /* The message says `wanted`, and the material is left alone. */
 static void refused(const char *text, MildStatus status, const char *wanted) {
     MildMaterial material = mild_material_default();
@@ -208,6 +222,7 @@ int main(void) {
         cmocka_unit_test(test_hand),     cmocka_unit_test(test_round_trip),
         cmocka_unit_test(test_files),    cmocka_unit_test(test_names),
         cmocka_unit_test(test_mistakes), cmocka_unit_test(test_lost_lines),
+        cmocka_unit_test(test_remarks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

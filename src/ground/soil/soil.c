@@ -232,8 +232,8 @@ static MildStatus keys_apply(const Reader *r, MildMaterial *material, MildError 
     return MILD_OK;
 }
 
-static MildStatus text_read(const char *text, const char *name, MildMaterial *material,
-                            MildError *error) {
+MildStatus soil_parse(const char *text, const char *name, MildMaterial *material,
+                      MildError *error) {
     Reader reader = {.name = name};
     MildMaterial read;
     MildError cause = {0};
@@ -260,15 +260,6 @@ static MildStatus text_read(const char *text, const char *name, MildMaterial *ma
     }
     if (status == MILD_OK) {
         *material = read;
-    }
-    return status;
-}
-
-MildStatus soil_parse(const char *text, const char *name, MildMaterial *material,
-                      MildError *error) {
-    const MildStatus status = text_read(text, name, material, error);
-    if (status != MILD_OK && error) { /* it quotes the file */
-        text_plain(error->text, strlen(error->text), "");
     }
     return status;
 }
