@@ -76,7 +76,8 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
             "which k_c of bekker needs (--plate once for each file). The way up from the greatest "
             "depth tells recovery. A file with the columns slip_m, shear_pa and pressure_pa, or of "
             "a ring angle_rad, torque_nm and force_n (--ring), tells cohesion, mu and shear_length "
-            "of bekker. --soil writes what was found as a ground (docs/soil.md). Of a walk's log (mild drive --log, mild play "
+            "of bekker. --soil writes what was found as a ground (docs/soil.md). Of a walk's log "
+            "(mild drive --log, mild play "
             "--log) it says what the robot's own sensors tell of the ground, each parameter with "
             "its 90 % interval (docs/identify.md).",
         .options = table,

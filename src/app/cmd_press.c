@@ -358,8 +358,8 @@ static int options_read(int argc, char **argv, PressOptions *options, CliArgs *a
         {"model", CLI_TEXT, &options->model, 0, 0, "NAME",
          grounds_model_help(model_help, sizeof model_help)},
         {"plate", CLI_TEXT, &options->plate, 0, 0, "L,W|D|sole",
-         "[m] length and width of a plate, D, the diameter of a round one, or `sole` for the robot's "
-         "sole (default 0.2,0.1)"},
+         "[m] length and width of a plate, D, the diameter of a round one, or `sole` for the "
+         "robot's sole (default 0.2,0.1)"},
         {"robot", CLI_TEXT, &options->robot, 0, 0, "NAME|DIR",
          ROBOTS_HELP "; its sole, and the weight that models are matched under (default sa01)"},
         {"tilt", CLI_NUMBER, &options->tilt_deg, -45, 45, "DEG",

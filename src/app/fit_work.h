@@ -1,4 +1,4 @@
-/* What the files of `mild fit` share: the records, a fit for each kind of rows, and their results. */
+/* What the files of `mild fit` share: the records, and a fit for each kind of rows. */
 #ifndef APP_FIT_WORK_H
 #define APP_FIT_WORK_H
 

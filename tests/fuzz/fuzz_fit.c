@@ -1,5 +1,5 @@
-/* Any bytes as a record of a press, a slip or a ring. Refused with a message, or (a sample: a fit takes a thousand
- * times longer than a file) fitted to finite values inside their bounds. */
+/* Any bytes as a record of a press, a slip or a ring. Refused with a message, or (a sample: a fit
+ * takes a thousand times longer than a file) fitted to finite values inside their bounds. */
 #include <stdio.h>
 
 #include "fuzz.h"

@@ -20,7 +20,8 @@ MildStatus soil_preset(const char *name, MildMaterial *material, MildError *erro
  * key and remedy. `rigid` is not a material. */
 MildStatus soil_find(const char *name, MildMaterial *material, MildError *error);
 
-/* Reads the text of a file. `name` is the file's in messages. On failure *material is left alone. */
+/* Reads the text of a file. `name` is the file's in messages. On failure *material is left
+ * alone. */
 MildStatus soil_parse(const char *text, const char *name, MildMaterial *material, MildError *error);
 
 /* What a written soil says beside its numbers. */
