@@ -400,6 +400,30 @@ class Fit(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "plate_width"):
             mild.GroundFit(model="bekker", hold={"plate_width": 0.1}).fit(X[0], y[0])
 
+    def test_save(self):
+        """What was fitted becomes a soil's file, the rest is the fill's; numbers that nobody knows are refused."""
+        truth, X = mild.Material("clay", k_c=9000, mu=0.3), [np.linspace(0.001, 0.04, 60)[:, None]] * 2
+        sizes = [(0.1, 0.08), (0.3, 0.2)]
+        y = [mild.Sole.plate(*size).elements * 0.0195**2 * (truth.k_c / min(size) + truth.k_phi) * x[:, 0] ** truth.exponent
+             for size, x in zip(sizes, X)]
+        fit = mild.GroundFit(sizes, model="bekker", fill=truth)
+        with self.assertRaisesRegex(RuntimeError, "nothing is fitted"):
+            fit.save("x.ini")
+        fit.fit(X, y)
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "clay.ini"
+            fit.save(path)
+            found = mild.Material(path)
+            self.assertAlmostEqual(found.k_c, 9000, delta=20)
+            self.assertEqual((found.mu, found.cohesion), (0.3, truth.cohesion))
+            self.assertEqual(found.k_c, fit.parameters_["k_c"])
+            self.assertRegex(path.read_text(), r"# 95 %: [0-9.]+ \.\. [0-9.]+ N/m\^\(n\+1\)\nk_c = ")
+            with self.assertRaisesRegex(ValueError, "friction and what else no press tells"):
+                mild.GroundFit(sizes, model="bekker").fit(X, y).save(path)
+            with self.assertRaisesRegex(ValueError, "k_c, k_phi: not known"):
+                mild.GroundFit(sizes[0], model="bekker").fit(X[0], y[0]).save(path)
+            self.assertEqual(mild.Material(path), found)
+
     def test_merged(self):
         """Cones of one plate merge: a press on it gives its numbers back, and the fit plays the force of the press."""
         truth, sizes = mild.Material("grass"), [(0.1, 0.08), (0.2, 0.12)]
