@@ -7,6 +7,10 @@
 
 enum { LOCAL_ROWS = 200, TERMS = 5 };
 
+/* [1/s] A way up faster than this by its depth, such as the rebound of a dropped body, is not the
+ * unloading line: ground follows 5 ms late (docs/model.md section 6). */
+#define UNLOAD_RATE 2.0
+
 int fit_loading(FitPoint *points, int count) {
     int kept = 0;
     double deepest = DBL_MIN; /* at depth 0 the law gives no information */
@@ -32,7 +36,12 @@ int fit_unloading(const FitPoint *points, int count, FitPoint *back) {
             back[kept++].load = points[top].depth;
         }
     }
-    return kept < FIT_POINTS_MIN ? 0 : kept;
+    if (kept < FIT_POINTS_MIN) {
+        return 0;
+    }
+    const FitPoint *middle = &back[kept / 2];
+    const double rate = (back->depth - middle->depth) / (middle->time - back->time); /* NaN: slow */
+    return rate > UNLOAD_RATE * back->depth ? 0 : kept;
 }
 
 /* Speed and acceleration of row `i` from a least-squares polynomial through the depths around it.

@@ -29,7 +29,7 @@ typedef struct {
 int fit_loading(FitPoint *points, int count);
 /* Copies the unloading part of a record to `back` [count]: the deepest row and the rows behind it
  * that are above the bottom, below the surface and no deeper than all since. Returns their count;
- * 0 when they are fewer than FIT_POINTS_MIN. */
+ * 0 when they are fewer than FIT_POINTS_MIN, or fast. */
 int fit_unloading(const FitPoint *points, int count, FitPoint *back);
 /* Fills unknown speeds and all accelerations from the times of one record's loading part. Each
  * comes from a polynomial through the nearest twentieth of the rows. Without times both are 0. */

@@ -266,6 +266,17 @@ static void kinds_of_files(void **state) {
     assert_true(file.back[0].depth == 0.015 && file.back[9].depth == 0.006);
     assert_true(file.back[9].load == 0.015);
     fit_file_close(&file);
+    for (int fast = 0; fast < 2; fast++) { /* 15 mm up in 1 s and in 0.1 s */
+        snprintf(text, sizeof text, "time_s,depth_m,force_n\n");
+        for (int i = 0; i < 30; i++) {
+            const double depth = 1e-3 * (i < 15 ? i + 1 : 29 - i);
+            snprintf(text + strlen(text), 60, "%g,%g,%g\n", (fast ? 0.1 : 1) / 15 * i, depth,
+                     1e4 * depth);
+        }
+        file = read_text(text);
+        assert_int_equal(file.back_count, fast ? 0 : 15);
+        fit_file_close(&file);
+    }
     snprintf(text, sizeof text, "pressure_pa,slip_m,shear_pa\n");
     for (int i = 0; i < 20; i++) {
         snprintf(text + strlen(text), 60, "7000,%g,%g\n", 1e-3 * i, 100.0 * i);
