@@ -9,7 +9,7 @@ SIZE = (640, 480)  # [pixels]
 
 
 class Camera:
-    """Draws robots of one MJCF on a level floor in the colour of a ground, into which soles sink out of sight."""
+    """Draws robots of one MJCF on a level floor in the colour of a ground, the first of several, into which soles sink out of sight."""
 
     def __init__(self, path, ground, size=SIZE):
         if not os.environ.get("DISPLAY"):

@@ -135,7 +135,8 @@ class _Task:
         if self._camera is None:
             from ._camera import Camera
 
-            self._camera = Camera(self._envs.model, os.fspath(self._ground) if isinstance(self._ground, (str, os.PathLike)) else "")
+            ground = self._ground[0] if isinstance(self._ground, (list, tuple)) else self._ground
+            self._camera = Camera(self._envs.model, os.fspath(ground) if isinstance(ground, (str, os.PathLike)) else "")
         return tuple(self._camera.picture(pose) for pose in poses)
 
     def _shut(self):

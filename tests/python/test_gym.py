@@ -160,9 +160,12 @@ class Pictures(unittest.TestCase):
             env.step(env.action_space.sample())
         self.assertGreater(np.abs(env.render().astype(int) - first).max(), 50)
         env.close()
-        env = gymnasium.make_vec("mild/Go1-v0", num_envs=2, render_mode="rgb_array", ground=mild.Material("foam45"))
+        env = gymnasium.make_vec("mild/Go1-v0", num_envs=2, render_mode="rgb_array", ground=["grass", mild.Material("foam45")])
         env.reset(seed=1)
-        self.assertEqual([picture.shape for picture in env.render()], [(480, 640, 3)] * 2)
+        pictures = env.render()
+        self.assertEqual([picture.shape for picture in pictures], [(480, 640, 3)] * 2)
+        below = pictures[1][300:].reshape(-1, 3).mean(0)
+        self.assertTrue(below[1] > below[0] > below[2], f"the first ground is not seen: {below}")
         env.close()
 
     def test_without(self):
