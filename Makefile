@@ -38,7 +38,7 @@ help:
 	@echo "make web-test   ten seconds of it in headless Chromium"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make deb     the program and libmild as a Debian package, build/deb/mild_*.deb; TEST=1: tried in a bare chroot"
-	@echo "make site    all documentation as static pages, build/site/index.html, with its links checked"
+	@echo "make site    all documentation as a site with search, build/site/index.html, with its links checked"
 	@echo "make wheels  the Python package with the program as one wheel, build/dist, tried in bare environments (docs/install.md)"
 	@echo "make wheel-cuda  the compiled files for GPUs as a wheel beside it, for ARCHS=90 or for all"
 	@echo "make wheel   the same in half the time: untried, for MARCH=x86-64-v3 alone unless given"
@@ -131,10 +131,11 @@ docs:
 deb: setup
 	@JOBS=$(JOBS) scripts/deb.sh $(if $(TEST),test)
 
-# Its own Python environment, for one package more than the program needs.
+# Its own Python environment; once it is there, no network.
 site:
-	@[ -x build/site-venv/bin/markdown_py ] || { python3 -m venv build/site-venv && \
-		build/site-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/site.txt; }
+	@cmp -s scripts/site.txt build/site-venv/installed || { python3 -m venv --clear build/site-venv && \
+		build/site-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/site.txt && \
+		cp scripts/site.txt build/site-venv/installed; }
 	@build/site-venv/bin/python scripts/site.py build/site
 	@echo build/site/index.html
 
