@@ -2,13 +2,14 @@
 """Follows a tutorial of docs/tutorials block by block in an empty folder, as a reader does, and compares what it prints.
 
 A block behind 'This is `FILE`' (or `FILE`, in a line that ends with a colon) is saved as FILE. Blocks of sh are run, with `mild` and
-`python` on the PATH. A block of text is what the block before it prints: words are equal, numbers within 3 % or one of the last digit;
+`python` on the PATH. A block of text is what the block before it prints: words are equal, numbers within 5 % or one of the last digit;
 a line '...' stands for any lines. Trainings are cut short by SHORT. The page ends with a picture, which must have been made.
 Usage: test_tutorials.py SOURCE_FOLDER PATH_TO_MILD PYTHON_PACKAGE PAGE [--keep FOLDER]"""
 import argparse
 import os
 import pathlib
 import re
+import socket
 import subprocess
 import sys
 import tempfile
@@ -22,6 +23,11 @@ SHORT = [
     ("your-robot", "--train.minutes=5 --train.envs=512 --train.iterations=0", "--train.minutes=0 --train.envs=32 --train.iterations=2"),
     ("train-on-a-gpu", "--train.device=cuda", "--train.device=cpu --train.robots=batch --train.envs=32 --train.iterations=2"),
 ]
+
+
+with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:  # another test may have the page's
+    free.bind(("127.0.0.1", 0))
+    PORT = free.getsockname()[1]
 
 
 class Wrong(Exception):
@@ -55,7 +61,7 @@ def near(wanted, got):
     for a, b in zip(NUMBER.findall(wanted), NUMBER.findall(got)):
         digits = len(a.split("e")[0].partition(".")[2])
         unit = 10.0 ** -digits * (10.0 ** int(a.split("e")[1]) if "e" in a else 1)
-        if abs(float(a) - float(b)) > max(1.01 * unit, 0.03 * abs(float(a))):
+        if abs(float(a) - float(b)) > max(1.01 * unit, 0.05 * abs(float(a))):
             return False
     return True
 
@@ -79,7 +85,8 @@ def compare(wanted, printed):
     return None if anywhere or at == len(lines) else f"(no more, but) {lines[at]}"
 
 
-def shorten(page, text):
+def shorten(page, text, source):
+    text = text.replace("~/mild/", f"{source}/").replace("127.0.0.1:9870", f"127.0.0.1:{PORT}").replace("127.0.0.1 9870", f"127.0.0.1 {PORT}")
     for name, words, instead in SHORT:
         text = text.replace(words, instead) if name == page else text
     return text
@@ -99,7 +106,7 @@ def follow(source, page, work, environment):
             (work / step[1]).parent.mkdir(parents=True, exist_ok=True)
             (work / step[1]).write_text(step[2], encoding="utf-8")
         elif step[0] == "run":
-            done = subprocess.run(["bash", "-e", "-c", shorten(page, step[1])], cwd=work, env=environment, stdin=subprocess.DEVNULL,
+            done = subprocess.run(["bash", "-e", "-c", shorten(page, step[1], source)], cwd=work, env=environment, stdin=subprocess.DEVNULL,
                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=240, check=False)
             if done.returncode:
                 raise Wrong(f"exit {done.returncode}:\n{step[1]}{done.stdout[-2000:]}{done.stderr[-2000:]}")
@@ -116,7 +123,7 @@ def follow(source, page, work, environment):
 
 def check_itself():
     """What this test is for is seen."""
-    for wanted, printed in [("a 1.00", "a 1.04"), ("a 1", "b 1"), ("a", "a\nb"), ("a\nb", "a"), ("a\n...\nc", "a\nb"), ("1 mm", "1 m"), ("3/3", "2/3")]:
+    for wanted, printed in [("a 1.00", "a 1.06"), ("a 1", "b 1"), ("a", "a\nb"), ("a\nb", "a"), ("a\n...\nc", "a\nb"), ("1 mm", "1 m"), ("3/3", "2/3")]:
         if compare(wanted, printed) is None:
             raise Wrong(f"the test does not tell {wanted!r} from {printed!r}")
     for wanted, printed in [("a 1.00", "a   1.02"), ("0.01", "0.02"), ("a\n...", "a\nb\nc"), ("...\nc 5e+05", "a\nc 5.1e+05")]:
