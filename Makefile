@@ -23,7 +23,7 @@ TEST ?=
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
 	@echo "make test    set up, build, run every test"
-	@echo "make check   format, clang-tidy, sanitizers, gcc and clang with -Werror, aarch64, wheel, recipes (STAGES=format: that one)"
+	@echo "make check   format, clang-tidy, sanitizers, gcc and clang with -Werror, aarch64, wheel, recipes, site (STAGES=format: that one)"
 	@echo "make build   set up, build build/mild"
 	@echo "make bench   set up, build, measure speed and memory"
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"

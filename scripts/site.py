@@ -18,10 +18,9 @@ HERE = pathlib.Path(__file__).resolve().parent
 PICTURES = (".png", ".webp", ".svg", ".csv")
 KINDS = {".c": "c", ".h": "c", ".cu": "cuda", ".cpp": "cpp", ".py": "python", ".sh": "bash", ".json": "json", ".ini": "ini", ".xml": "xml",
          ".ipynb": "json", ".cff": "yaml", ".mjs": "javascript", ".js": "javascript"}
-LAST = dict.fromkeys(["CHANGELOG.md", "docs/training-log.md"], "---\nsearch:\n  boost: 0.3\n---\n\n")  # of what a search finds
+LAST = dict.fromkeys(["CHANGELOG.md", "docs/training-log.md", "docs/api.md"], "---\nsearch:\n  boost: 0.3\n---\n\n")  # of what a search finds
 # What the index of docs/README.md leaves to the tree's other pages.
-MORE = ["docs/README.md", "docs/api.md", "configs/default.ini", "examples/README.md", "CHANGELOG.md", "VERSIONING.md", "SECURITY.md", "CITATION.cff",
-        "src/README.md"]
+MORE = ["docs/README.md", "docs/api.md", "configs/default.ini", "examples/README.md", "CHANGELOG.md", "VERSIONING.md", "SECURITY.md", "src/README.md"]
 
 
 def title_of(text):
@@ -134,7 +133,7 @@ def config(tree, number):
         "extra_css": ["assets/site.css"],
         "plugins": ["search", "offline"],
         "markdown_extensions": [
-            "tables", "sane_lists", {"toc": {"permalink": True}}, {"pymdownx.highlight": {"use_pygments": True}}, "pymdownx.superfences"],
+            "tables", "sane_lists", {"toc": {"permalink": True}}, {"pymdownx.highlight": {"use_pygments": True}}, "pymdownx.superfences", "pymdownx.tasklist"],
         "validation": {"nav": {"omitted_files": "ignore"}, "links": {"anchors": "warn", "unrecognized_links": "warn", "absolute_links": "warn"}},
         "strict": True,
     }
@@ -175,7 +174,7 @@ def main(folder):
     build(tree, folder / number, number)
     numbers = sorted((path.parent.name for path in folder.glob("*/index.html")), key=lambda text: [int(part) for part in text.split(".")], reverse=True)
     (folder / "versions.json").write_text(json.dumps([{"version": text, "title": text, "aliases": []} for text in numbers]), encoding="utf-8")
-    (folder / "index.html").write_text(f'<!doctype html><meta charset=utf-8><title>mild</title><meta http-equiv=refresh content="0; url={numbers[0]}/index.html">\n',
+    (folder / "index.html").write_text(f'<!doctype html><meta charset=utf-8><title>mild</title><link rel=icon href="data:,"><meta http-equiv=refresh content="0; url={numbers[0]}/index.html">\n',
                                        encoding="utf-8")
     print(f"{len(tree.texts)} pages, {len(tree.shown)} files beside them; versions {', '.join(numbers)}")
 

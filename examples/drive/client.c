@@ -1,5 +1,5 @@
-/* The robot's side of `mild drive` (docs/drive.md): sends what the sensors say, and hands the drives
- * what the policy asks for.
+/* The robot's side of `mild drive` (docs/drive.md): sends what the sensors say, and hands the
+ * drives what the policy asks for.
  *
  *     cc -std=c17 -O2 examples/drive/client.c -o client
  *     ./client HOST PORT [--lockstep]
