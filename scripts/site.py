@@ -13,6 +13,7 @@ import subprocess
 import sys
 
 import links
+import notebook
 
 HERE = pathlib.Path(__file__).resolve().parent
 PICTURES = (".png", ".webp", ".svg", ".csv")
@@ -69,9 +70,18 @@ class Tree:
         path.write_text(text, encoding="utf-8")
 
     def page(self, name, text):
+        if name.startswith("docs/tutorials/") and "New file [" not in text and "```sh" in text and not name.endswith("README.md"):
+            book = name.replace(".md", ".ipynb")
+            self.write(book, notebook.notebook(text))
+            text += f"\n[This page as a notebook]({os.path.basename(book)}){{ download }}\n"
+            return self.linked(name, text, {os.path.basename(book)})
+        return self.linked(name, text, set())
+
+    def linked(self, name, text, made):
         found, at = [], 0
         for match in links.LINK.finditer(links.prose(text)):
-            found += [text[at:match.start(3)], self.target(name, match.group(3))]
+            url = match.group(3)
+            found += [text[at:match.start(3)], url if url in made else self.target(name, url)]
             at = match.end(3)
         return "".join([*found, text[at:]])
 
@@ -133,7 +143,7 @@ def config(tree, number):
         "extra_css": ["assets/site.css"],
         "plugins": ["search", "offline"],
         "markdown_extensions": [
-            "tables", "sane_lists", {"toc": {"permalink": True}}, {"pymdownx.highlight": {"use_pygments": True}}, "pymdownx.superfences", "pymdownx.tasklist"],
+            "tables", "sane_lists", {"toc": {"permalink": True}}, {"pymdownx.highlight": {"use_pygments": True}}, "pymdownx.superfences", "pymdownx.tasklist", "attr_list"],
         "validation": {"nav": {"omitted_files": "ignore"}, "links": {"anchors": "warn", "unrecognized_links": "warn", "absolute_links": "warn"}},
         "strict": True,
     }
