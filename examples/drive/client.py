@@ -18,7 +18,6 @@ JOINTS = [f"leg_{side}{i}_joint" for side in "lr" for i in range(1, 7)]  # as in
 SILENCE = 0.1  # [s] without a target after which the robot is damped
 HEAD = struct.Struct("<4s4BIIQQQI")
 WAIT, WALK, HOLD, DAMP, END = range(5)
-N = len(JOINTS)
 
 
 def read():
@@ -34,10 +33,10 @@ def write(target):
 
 
 class Client:
-    def __init__(self, host, port, key=None):
+    def __init__(self, host, port, joints, key=None):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.connect((host, port))  # hears that address alone
-        self.key, self.robot = key, zlib.crc32("\n".join(JOINTS).encode())
+        self.key, self.n, self.robot = key, len(joints), zlib.crc32("\n".join(joints).encode())
         self.session = int.from_bytes(os.urandom(8), "little") | 1
         self.runner = self.sequence = self.newest = self.answers = 0  # the runner's session, 0: not known yet
         self.mode, self.target, self.heard = WAIT, None, 0.0
@@ -49,24 +48,24 @@ class Client:
 
     def send(self, state, mode=WALK):
         self.sequence = self.sequence + 1 & 0xFFFFFFFF
-        head = HEAD.pack(b"MILD", 2, 1, N, mode, self.sequence, self.newest, time.monotonic_ns() // 1000, self.session, self.runner, self.robot)
+        head = HEAD.pack(b"MILD", 2, 1, self.n, mode, self.sequence, self.newest, time.monotonic_ns() // 1000, self.session, self.runner, self.robot)
         try:
-            self.socket.send(self.seal(head + struct.pack(f"<{7 + 2 * N}f", *state)))
+            self.socket.send(self.seal(head + struct.pack(f"<{7 + 2 * self.n}f", *state)))
         except ConnectionRefusedError:
             pass  # no runner is there yet
 
     def take(self, packet):
         """Takes a packet if it is a target for this robot and newer than the last one; anything else is left alone."""
-        body = packet[: HEAD.size + 16 * N]
-        if len(body) < HEAD.size + 16 * N or self.seal(body) != packet:
+        body = packet[: HEAD.size + 16 * self.n]
+        if len(body) < HEAD.size + 16 * self.n or self.seal(body) != packet:
             return
         magic, version, kind, n, mode, sequence, answers, _, session, peer, robot = HEAD.unpack_from(body)
-        if (magic, version, kind, n, peer, robot) != (b"MILD", 2, 2, N, self.session, self.robot) or mode > END:
+        if (magic, version, kind, n, peer, robot) != (b"MILD", 2, 2, self.n, self.session, self.robot) or mode > END:
             return
         if self.runner and (session != self.runner or not 0 < (sequence - self.newest & 0xFFFFFFFF) < 1 << 31):
             return
-        numbers = struct.unpack_from(f"<{4 * N}f", body, HEAD.size)
-        if not all(map(math.isfinite, numbers)) or min(numbers[N:]) < 0:
+        numbers = struct.unpack_from(f"<{4 * self.n}f", body, HEAD.size)
+        if not all(map(math.isfinite, numbers)) or min(numbers[self.n:]) < 0:
             return
         self.runner, self.newest, self.answers, self.mode = session, sequence, answers, mode
         if mode != WAIT:
@@ -85,6 +84,12 @@ class Client:
             except ConnectionRefusedError:
                 pass
 
+    def wanted(self, patient=False):
+        """The newest target, damped when it is old; None: none has come."""
+        if self.target and time.monotonic() - self.heard > SILENCE and not patient:
+            self.target[self.n : 2 * self.n] = [0.0] * self.n
+        return self.target
+
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -93,14 +98,13 @@ def main():
     parser.add_argument("--lockstep", action="store_true", help="wait for the answer to each state: for a robot whose time stands still meanwhile")
     parser.add_argument("--key", help="the file that the runner has, too")
     given = parser.parse_args()
-    client, last = Client(given.host, given.port, open(given.key, "rb").read() if given.key else None), [1.0] + [0.0] * (6 + 2 * N)
+    client = Client(given.host, given.port, JOINTS, open(given.key, "rb").read() if given.key else None)
+    last = [1.0] + [0.0] * (6 + 2 * client.n)
     while client.mode != END and (state := read()):
         last = state
         client.send(state)
         client.listen(given.lockstep)
-        if client.target and time.monotonic() - client.heard > SILENCE and not given.lockstep:
-            client.target[N : 2 * N] = [0.0] * N  # the runner is gone: damp
-        write(client.target)
+        write(client.wanted(patient=given.lockstep))
     for _ in range(3):
         client.send(last, END)
     said = "has ended" if client.mode == END else "still runs" if client.runner else "was never there"
