@@ -43,7 +43,7 @@ help:
 	@echo "make wheel-cuda  the compiled files for GPUs as a wheel beside it, for ARCHS=90 or for all"
 	@echo "make wheel   the same in half the time: untried, for MARCH=x86-64-v3 alone unless given"
 	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/python-venv"
-	@echo "make dds-check   examples/drive/unitree.py: a G1 walks by Unitree's messages over DDS, in build/dds-venv"
+	@echo "make dds-check   examples/drive: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
 
@@ -158,12 +158,13 @@ python-check: wheel
 	@build/python-venv/bin/python tests/python/check_learners.py
 	@build/python-venv/bin/python tests/python/check_cuda.py
 
-# The bridge of examples/drive/unitree.py; DDS in a Python environment of its own.
+# The bridges of examples/drive; DDS in a Python environment of its own.
 dds-check: build
 	@cmp -s scripts/dds.txt build/dds-venv/installed || { python3 -m venv --clear build/dds-venv && \
 		build/dds-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/dds.txt && \
 		cp scripts/dds.txt build/dds-venv/installed; }
 	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_unitree.py build/mild
+	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_ros2.py build/mild
 
 clean:
 	rm -rf build

@@ -1,12 +1,11 @@
 """A bridge between `mild drive` and a robot that speaks the messages of Unitree's SDK2 over DDS: states of `rt/lowstate` go to the
-runner, its targets to `rt/lowcmd` (docs/drive.md). Needs client.py beside it and `pip install cyclonedds`. For the G1, whose legs
+runner, its targets to `rt/lowcmd` (docs/drive.md). Needs client.py and dds.py beside it and `pip install cyclonedds`. For the G1, whose legs
 are the first twelve of its motors; waist and arms are held where they are at the start.
 
     python unitree.py HOST PORT [--interface NAME] [--lockstep]
 
 Fields and topics are those of Unitree's public message definitions, unitree_hg (BSD-3-Clause); the text is ours. No robot has walked by it."""
 import argparse
-import os
 import struct
 import sys
 import time
@@ -14,20 +13,17 @@ import zlib
 from dataclasses import dataclass
 
 from client import END, Client
-from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.annotations import autoid, final
 from cyclonedds.idl.types import array, float32, int16, uint8, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
+from dds import FIRST, SILENT, came, connect
 
 JOINTS = [f"{side}_{name}_joint" for side in ("left", "right") for name in ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")]
 LEGS, MOVED, MOTORS = 12, 29, 35
 HOLD_KP, HOLD_KD = 60.0, 1.5  # [N m/rad, N m s/rad] of waist and arms
-SILENT = 5.0  # [s] without a state after which the bridge ends
-NETWORK = """<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="{name}" multicast="{multicast}"/></Interfaces></General>
-<Discovery><ParticipantIndex>auto</ParticipantIndex>{peers}</Discovery></Domain></CycloneDDS>"""
 
 
 @dataclass
@@ -120,14 +116,6 @@ def state_crc(s):
     return crc_of(head + motors + bytes(s.wireless_remote) + struct.pack("<4I", *s.reserve))
 
 
-def connect(interface):
-    """A participant of the robot's domain, 0. The loopback has no multicast: each names the other."""
-    loop = interface == "lo"
-    os.environ.setdefault("CYCLONEDDS_URI", NETWORK.format(name=interface, multicast="false" if loop else "default",
-                                                          peers='<Peers><Peer address="localhost"/></Peers>' if loop else ""))
-    return DomainParticipant(0)
-
-
 def command(state, target, held, answers):
     """The message that asks for what the runner wants, of the machine whose state it was."""
     n = len(target) // 4
@@ -152,13 +140,13 @@ def main():
     parser.add_argument("--interface", default="lo", help="network interface of the robot, such as eth0")
     parser.add_argument("--lockstep", action="store_true", help="for a simulated robot whose time stands still until each state is answered")
     given = parser.parse_args()
-    participant = connect(given.interface)
+    participant = connect(given.interface, 0)
     states = DataReader(participant, Topic(participant, "rt/lowstate", LowState))
     commands = DataWriter(participant, Topic(participant, "rt/lowcmd", LowCmd))
-    client, heard, sent, refused = Client(given.host, given.port, JOINTS), time.monotonic(), 0, 0
+    client, heard, sent, refused = Client(given.host, given.port, JOINTS), time.monotonic() + FIRST - SILENT, 0, 0
     state = held = numbers = None
     while client.mode != END and time.monotonic() - heard < SILENT:
-        new = [sample for sample in states.take(16) if sample.sample_info.valid_data]
+        new = came(states)
         good = [sample for sample in new if sample.crc == state_crc(sample)]
         refused += len(new) - len(good)
         if good:

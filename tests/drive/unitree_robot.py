@@ -10,6 +10,7 @@ import unitree
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
+from dds import came, connect
 
 MACHINE = 5  # what mode_machine says of this robot
 UPPER = [0.01 * i for i in range(17)]  # angles of waist and arms
@@ -52,7 +53,7 @@ def state_of(numbers, tick):
 
 
 def main():
-    participant = unitree.connect("lo")
+    participant = connect("lo", 0)
     states = DataWriter(participant, Topic(participant, "rt/lowstate", unitree.LowState))
     commands = DataReader(participant, Topic(participant, "rt/lowcmd", unitree.LowCmd))
     tick, target = 0, None
@@ -67,7 +68,7 @@ def main():
         states.write(state)
         until = time.monotonic() + (5 if target else 0.02)
         while time.monotonic() < until:
-            new = [sample for sample in commands.take(8) if sample.sample_info.valid_data]
+            new = came(commands)
             for c in new:
                 assert c.crc == firmware_crc(command_bytes(c)), "a command with a wrong CRC"
                 assert (c.mode_pr, c.mode_machine) == (0, MACHINE)
