@@ -18,12 +18,12 @@ ARCHS ?=
 VERSION ?=
 TEST ?=
 
-.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check check export-check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check dds-check check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
 	@echo "make test    set up, build, run every test"
-	@echo "make check   format, clang-tidy, sanitizers, gcc and clang with -Werror, aarch64, wheel, recipes (STAGES=format: that one)"
+	@echo "make check   format, clang-tidy, sanitizers, gcc and clang with -Werror, aarch64, wheel, recipes, site (STAGES=format: that one)"
 	@echo "make build   set up, build build/mild"
 	@echo "make bench   set up, build, measure speed and memory"
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
@@ -38,11 +38,12 @@ help:
 	@echo "make web-test   ten seconds of it in headless Chromium"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make deb     the program and libmild as a Debian package, build/deb/mild_*.deb; TEST=1: tried in a bare chroot"
-	@echo "make site    all documentation as static pages, build/site/index.html, with its links checked"
+	@echo "make site    all documentation as a site with search, build/site/index.html, with its links checked"
 	@echo "make wheels  the Python package with the program as one wheel, build/dist, tried in bare environments (docs/install.md)"
 	@echo "make wheel-cuda  the compiled files for GPUs as a wheel beside it, for ARCHS=90 or for all"
 	@echo "make wheel   the same in half the time: untried, for MARCH=x86-64-v3 alone unless given"
 	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/python-venv"
+	@echo "make dds-check   examples/drive: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
 
@@ -131,10 +132,11 @@ docs:
 deb: setup
 	@JOBS=$(JOBS) scripts/deb.sh $(if $(TEST),test)
 
-# Its own Python environment, for one package more than the program needs.
+# Its own Python environment; once it is there, no network.
 site:
-	@[ -x build/site-venv/bin/markdown_py ] || { python3 -m venv build/site-venv && \
-		build/site-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/site.txt; }
+	@cmp -s scripts/site.txt build/site-venv/installed || { python3 -m venv --clear build/site-venv && \
+		build/site-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/site.txt && \
+		cp scripts/site.txt build/site-venv/installed; }
 	@build/site-venv/bin/python scripts/site.py build/site
 	@echo build/site/index.html
 
@@ -155,6 +157,14 @@ python-check: wheel
 	@build/python-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mild-*.whl
 	@build/python-venv/bin/python tests/python/check_learners.py
 	@build/python-venv/bin/python tests/python/check_cuda.py
+
+# The bridges of examples/drive; DDS in a Python environment of its own.
+dds-check: build
+	@cmp -s scripts/dds.txt build/dds-venv/installed || { python3 -m venv --clear build/dds-venv && \
+		build/dds-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/dds.txt && \
+		cp scripts/dds.txt build/dds-venv/installed; }
+	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_unitree.py build/mild
+	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_ros2.py build/mild
 
 clean:
 	rm -rf build

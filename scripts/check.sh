@@ -8,6 +8,7 @@
 #   vectors   the layers with loops over vectors, for AVX2 and for AVX-512 with vectors of 512 bits: their tests (256: make test)
 #   aarch64   the library for another processor, run under qemu
 #   wheel     the Python package with the program: made, looked at, and used where nothing else is
+#   site      the documentation as a site: every link; in Chromium, where there is one, every page and a search
 #   recipes   what CONTRIBUTING.md says, done in a copy of the tree: a reward, a model, a terrain, a controller, a command
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -152,7 +153,14 @@ stage_recipes() {
     tests/install/test_contributing.py . --run --jobs "$jobs"
 }
 
-for stage in ${*:-format sanitize tidy thread vectors aarch64 wheel recipes}; do
+stage_site() {
+    make --no-print-directory site
+    if command -v chromium >/dev/null; then # scripts/setup.sh web
+        tests/install/test_site.py .
+    fi
+}
+
+for stage in ${*:-format sanitize tidy thread vectors aarch64 wheel recipes site}; do
     begin=$SECONDS
     echo "check: $stage"
     "stage_$stage"

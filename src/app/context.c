@@ -26,6 +26,8 @@ MildStatus context_open(Context *c, const CliArgs *args, MildError *error) {
     MildModel model;
     if (!c->policy && !c->without_policy) {
         c->policy = robot_policy(c->robot_name, c->shipped);
+    } else if (c->policy) {
+        c->policy = path_given(c->policy, c->shipped);
     }
     MildStatus status = open_task(c, args, error);
     if (status == MILD_OK && c->controller) {

@@ -42,6 +42,10 @@ const char *path_data(const char *relative, char path[PATH_SIZE]) {
     return path;
 }
 
+const char *path_given(const char *name, char path[PATH_SIZE]) {
+    return *name && *name != '/' && !exists(name) && exists(path_data(name, path)) ? path : name;
+}
+
 MildStatus path_join(const char *folder, const char *name, char path[PATH_SIZE], MildError *error) {
     if (snprintf(path, PATH_SIZE, "%s/%s", folder, name) < PATH_SIZE) {
         return MILD_OK;

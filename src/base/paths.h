@@ -14,6 +14,10 @@ enum { PATH_SIZE = 1024 };
  * the build names (MILD_DATA_DIR: the source tree). */
 const char *path_data(const char *relative, char path[PATH_SIZE]);
 
+/* A file as a user names it: `name` itself where it is there, otherwise the shipped file of that
+ * name, such as "configs/quick.ini" in any folder. */
+const char *path_given(const char *name, char path[PATH_SIZE]);
+
 /* folder + "/" + name; fails when longer than PATH_SIZE. */
 MildStatus path_join(const char *folder, const char *name, char path[PATH_SIZE], MildError *error);
 

@@ -65,6 +65,14 @@ static void test_data(void **state) {
                         MILD_SOURCE_DIR "/configs/default.ini");
     unsetenv("MILD_HOME");
     assert_string_equal(path_data("no/such.file", path), MILD_SOURCE_DIR "/no/such.file");
+    assert_int_equal(chdir("/"), 0); /* a shipped file, from any folder; what is there goes first */
+    assert_string_equal(path_given("configs/quick.ini", path),
+                        MILD_SOURCE_DIR "/configs/quick.ini");
+    assert_string_equal(path_given("no/such.file", path), "no/such.file");
+    assert_string_equal(path_given("/configs/quick.ini", path), "/configs/quick.ini");
+    assert_string_equal(path_given("", path), "");
+    assert_int_equal(chdir(MILD_SOURCE_DIR), 0);
+    assert_string_equal(path_given("configs/quick.ini", path), "configs/quick.ini");
     char itself[PATH_SIZE] = "";
     assert_true(readlink("/proc/self/exe", itself, PATH_SIZE - 1) > 0);
     char *name = strrchr(itself, '/');

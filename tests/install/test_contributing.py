@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Follows the recipes of CONTRIBUTING.md in a copy of the tree, block by block, and compiles what comes out: every file that a recipe
+"""Follows the recipes of CONTRIBUTING.md and of docs/tutorials/add-a-model.md in a copy of the tree, block by block, and compiles what comes out: every file that a recipe
 touches with the compiler of this machine and, when nvcc is found, the reward and the model as a GPU has them. With --run it builds
-the program and runs the commands of the recipes. The blocks of the page are its only source, so the page cannot be wrong for long.
+the program and runs the commands of the recipes. The blocks of the page are its only source, so the pages cannot be wrong for long.
 
 A block of C stands behind the words 'In [FILE](...), before `LINE`:' or 'New file [FILE](...):'; a block of sh has commands.
 Usage: test_contributing.py SOURCE_FOLDER [--run] [--jobs N]"""
@@ -25,11 +25,12 @@ class Wrong(Exception):
     pass
 
 
-def recipes(text):
-    """{recipe: [(what, ...)]} in the order of the page: ("insert", file, line, code), ("file", name, code), ("run", command)."""
+def recipes(text, tutorial=None):
+    """{recipe: [(what, ...)]} in the order of the page: ("insert", file, line, code), ("file", name, code), ("run", command).
+    tutorial: (recipe, text) of a page that is one recipe."""
     found = {}
-    for part in re.split(r"^## ", text, flags=re.M)[1:]:
-        title, _, body = part.partition("\n")
+    parts = [part.partition("\n")[::2] for part in re.split(r"^## ", text, flags=re.M)[1:]]
+    for title, body in parts + ([tutorial] if tutorial else []):
         steps = found.setdefault(title.strip(), [])
         for block in BLOCK.finditer(body):
             if block["kind"] == "sh":
@@ -174,7 +175,8 @@ def main():
         work = pathlib.Path(folder)
         try:
             check_itself(work)
-            found = recipes((source / "CONTRIBUTING.md").read_text(encoding="utf-8"))
+            found = recipes((source / "CONTRIBUTING.md").read_text(encoding="utf-8"),
+                            ("A ground model", (source / "docs/tutorials/add-a-model.md").read_text(encoding="utf-8")))
             tree = work / "tree"
             copy(source, tree)
             steps = [step for name in RECIPES for step in found[name]]

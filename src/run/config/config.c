@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/file.h"
+#include "base/paths.h"
 #include "base/text.h"
 
 enum { SECTIONS_MAX = 16, FILE_MAX = 1 << 20, VALUE_MAX = 512, WHERE_MAX = 160, TEXT_MAX = 150 };
@@ -276,7 +277,8 @@ MildStatus config_read(const ConfigSection *sections, int count, const char *pat
                        MildError *error) {
     MildError cause = {0};
     size_t size;
-    char *text = file_read(path, FILE_MAX, &size, &cause);
+    char found[PATH_SIZE];
+    char *text = file_read(path_given(path, found), FILE_MAX, &size, &cause);
     if (!text) {
         return mild_fail(error, cause.status, "%s", cause.text);
     }
