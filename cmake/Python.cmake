@@ -66,7 +66,7 @@ set(source ${python}/src)
 mild_python_module(_ground . ${source}/ground.cpp ${source}/material.cpp ${source}/terrain.cpp ${source}/press.cpp
   ${source}/fit.cpp ${source}/batch.cpp)
 mild_python_stub(_ground _ground .)
-target_link_libraries(_ground PRIVATE ${kernels} layer_identify layer_batch)
+target_link_libraries(_ground PRIVATE ${kernels} layer_identify layer_soil layer_batch)
 if(kernels)
   set_target_properties(_ground PROPERTIES INSTALL_RPATH "$ORIGIN/lib")
 endif()

@@ -5,7 +5,7 @@ target_link_libraries(web_pack PRIVATE layer_config layer_belief mild_options)
 target_include_directories(web_pack PRIVATE ${CMAKE_SOURCE_DIR})
 add_library(web_core STATIC ${CMAKE_SOURCE_DIR}/web/core.c ${CMAKE_SOURCE_DIR}/web/window.c
   ${CMAKE_SOURCE_DIR}/src/identify/belief/belief.c)
-target_link_libraries(web_core PUBLIC layer_env PRIVATE mild_options)
+target_link_libraries(web_core PUBLIC layer_env layer_soil PRIVATE mild_options)
 target_include_directories(web_core PUBLIC ${CMAKE_SOURCE_DIR} PRIVATE ${CMAKE_BINARY_DIR}/layers/learn
   ${CMAKE_BINARY_DIR}/layers/view PUBLIC ${CMAKE_BINARY_DIR}/layers/belief)
 # as env/batch_host.c; options of the file, which come behind those of mild_options

@@ -3,9 +3,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/text.h"
+#include "ground/soil/soil.h"
 
-#define WORD 128 /* bytes of a name */
+#define WORD 512 /* bytes of a name */
 
 #define FIELD(member, type, count, low, high, help)                                                \
     MILD_FIELD(PluginDef, member, type, count, low, high, help)
@@ -20,8 +20,10 @@ const MildField plugin_fields[] = {
     FIELD(outline, MILD_FIELD_TEXT, PLUGIN_OUTLINE_SIZE, 0, 0,
           "[m] polygon x y x y ... of the sole in the frame of the foot; one for all feet, or one "
           "for each, separated by ;"),
-    FIELD(ground, MILD_FIELD_TEXT, PLUGIN_TEXT_SIZE, 0, 0,
-          "[text] preset; several when terrain.patches is set (default sand_loose)"),
+    FIELD(
+        ground, MILD_FIELD_TEXT, PLUGIN_TEXT_SIZE, 0, 0,
+        "[text] preset, or the file of a soil, which ends in .ini; several when terrain.patches is "
+        "set (default sand_loose)"),
     FIELD(sole_z, MILD_FIELD_DOUBLE, 1, -10, 10, "[m] height of the outline's plane in that frame"),
     FIELD(pitch, MILD_FIELD_DOUBLE, 1, 1e-4, 1, "[m] edge of a ground element"),
     FIELD(body_pitch, MILD_FIELD_DOUBLE, 1, 1e-3, 1, "[m] between the elements of a body"),
@@ -106,21 +108,12 @@ int plugin_word(const char **text, char *word, size_t size) {
 
 /* ---- materials ---- */
 
-static MildStatus find_preset(const char *name, MildMaterial *material, MildError *error) {
-    const char *names[32];
-    int count = 0;
-    if (mild_material_preset(name, material)) {
-        return MILD_OK;
-    }
+static MildStatus find_ground(const char *name, MildMaterial *material, MildError *error) {
     if (strcmp(name, "rigid") == 0) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "ground 'rigid' is MuJoCo's own contact; leave the plugin out");
     }
-    for (; count < mild_material_preset_count() && count < 32; count++) {
-        names[count] = mild_material_preset_name(count);
-    }
-    return mild_fail(error, MILD_ERROR_ARGUMENT, "unknown ground '%.60s'; nearest is '%s'", name,
-                     text_nearest(name, names, count));
+    return soil_find(name, material, error);
 }
 
 MildStatus plugin_def_model(const mjModel *m, int instance, const PluginDef *def, MildModel *model,
@@ -131,7 +124,7 @@ MildStatus plugin_def_model(const mjModel *m, int instance, const PluginDef *def
     if (!plugin_word(&text, word, sizeof word)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "plugin.ground names no ground");
     }
-    MildStatus status = find_preset(word, &material, error);
+    MildStatus status = find_ground(word, &material, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -189,7 +182,7 @@ MildStatus plugin_def_materials(const mjModel *m, int instance, const PluginDef 
             return mild_fail(error, MILD_ERROR_RANGE, "plugin.ground names more than %d grounds",
                              MILD_MATERIALS_MAX);
         }
-        status = find_preset(word, material, error);
+        status = find_ground(word, material, error);
         if (status == MILD_OK) {
             status = finish_material(m, instance, model, sole, load, material, error);
         }

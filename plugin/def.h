@@ -17,7 +17,7 @@ typedef struct {
     char body[PLUGIN_TEXT_SIZE];       /* names of bodies that have elements all over */
     char sole[PLUGIN_TEXT_SIZE];       /* names of geoms */
     char outline[PLUGIN_OUTLINE_SIZE]; /* [m] polygons, one or one for each foot */
-    char ground[PLUGIN_TEXT_SIZE];     /* names of presets, by label of the terrain's pattern */
+    char ground[PLUGIN_TEXT_SIZE];     /* presets and soils' files, by label of the pattern */
     double sole_z;                     /* [m] plane of the outline in the frame of the foot */
     double pitch;                      /* [m] edge of an element */
     double body_pitch;                 /* [m] between the elements of a body */

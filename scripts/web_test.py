@@ -157,6 +157,12 @@ def drive(browser):
     stiff = browser.wait("app.time > app.time0 + 2 && Math.max(...app.core.view().depth)", 20)
     if not stiff or stiff > 0.03:
         wrong.append(f"loose sand four times as stiff carries the robot at {stiff} m")
+    browser.value("app.takeSoil({name: 'mars.ini', text: async () => '[ground]\\npreset = sandy_loam\\nmu = 0.5\\n'})")
+    if not browser.wait("app.ground === 10 && app.time > 1", 10):
+        wrong.append("a soil's file is not the ground")
+    browser.value("app.takeSoil({name: 'mars.ini', text: async () => '[ground]\\nmu = 9\\n'})")
+    if not browser.wait("/^mars.ini/.test(document.getElementById('toast').textContent) && app.ground === 10", 10):
+        wrong.append("a soil that is none is not refused")
     return wrong
 
 

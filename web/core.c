@@ -6,6 +6,7 @@
 
 #include <stdlib.h>
 
+#include "ground/soil/soil.h"
 #include "learn/vector.h"
 #include "web/core.h"
 #include "web/window.h"
@@ -45,6 +46,9 @@ static struct {
     MildMap *map;
     MildTerrain terrain;
     MildMaterial plain[MILD_MATERIALS_MAX]; /* before web_change */
+    char text[WEB_TEXT];                    /* for web_soil */
+    MildMaterial own;                       /* of web_soil */
+    int has_own;                            /* bool */
     double stiffness;                       /* [-] factors of web_change */
     double friction;
     MildContactInput input;
@@ -377,6 +381,9 @@ void web_change(double stiffness, double friction) {
         *material = web.plain[m];
         material->k_pen *= stiffness;
         material->sigma_cone *= stiffness;
+        material->k_c *= stiffness;
+        material->k_phi *= stiffness;
+        material->zeta *= stiffness;
         material->mu *= friction;
     }
     web_env()->variation.rigid_friction = REAL(TASK_RIGID_FRICTION * friction);
@@ -444,6 +451,9 @@ static const char *lay(int ground, int relief) {
     for (int m = 0; m < web.terrain.material_count; m++) {
         const int preset = all ? m : ground < presets ? ground : 0;
         mild_material_preset(mild_material_preset_name(preset), &web.plain[m]);
+        if (ground == WEB_OWN) {
+            web.plain[m] = web.own;
+        }
         web.terrain.materials[m] = web.plain[m];
     }
     mild_terrain_set_map(&web.terrain, map, NULL);
@@ -462,11 +472,34 @@ static void show_hills(void) {
     }
 }
 
+char *web_text(void) {
+    return web.text;
+}
+
+const char *web_soil(void) {
+    static MildError error;
+    MildMaterial own;
+    web.text[WEB_TEXT - 1] = '\0';
+    if (soil_parse(web.text, "soil.ini", &own, &error) != MILD_OK) {
+        return error.text;
+    }
+    if (mild_model_is_concentric((MildModel)own.model)) {
+        return "soil.ini: this page has soles of many elements; a model of one element has no "
+               "place in it";
+    }
+    web.own = own;
+    web.has_own = 1;
+    return NULL;
+}
+
 const char *web_start(int ground, int relief, int prints) {
     if (!web.file) {
         return "web_open comes first";
     }
-    if (ground < 0 || ground > WEB_STRIPES || relief < 0 || relief >= WEB_RELIEFS) {
+    if (ground == WEB_OWN && !web.has_own) {
+        return "web_soil comes first";
+    }
+    if (ground < 0 || ground > WEB_OWN || relief < 0 || relief >= WEB_RELIEFS) {
         return "no such ground";
     }
     const MildSole *const *soles = (const MildSole *const *)web.sole;

@@ -100,13 +100,15 @@ enum {
     WEB_WINDOW = 1024,      /* cells along an edge of the ground drawn */
     WEB_HILLS = 512,        /* the same of a period of its heights */
     WEB_TILES = 32768,      /* of prints: some 3000 */
+    WEB_TEXT = 65536,       /* bytes of a soil's file, with the 0 at its end */
     WEB_DIRTY_MAX = 64
 };
 #define WEB_STRIPE 2.4 /* [m] width of a ground where all are shown */
 
-/* Ground 0 .. mild_material_preset_count() - 1 are the presets; then these two. */
+/* Ground 0 .. mild_material_preset_count() - 1 are the presets; then these three. */
 #define WEB_RIGID mild_material_preset_count()
 #define WEB_STRIPES (mild_material_preset_count() + 1)
+#define WEB_OWN (mild_material_preset_count() + 2) /* that of web_soil */
 
 typedef enum { WEB_LEVEL, WEB_WAVES, WEB_ROUGH, WEB_RELIEFS } WebRelief;
 
@@ -143,6 +145,10 @@ typedef struct {
 /* Takes a file of pack.c, aligned to 16 bytes, which the caller keeps. Returns NULL, or what is
  * wrong with it. */
 const char *web_open(const WebModel *file, size_t bytes);
+/* Where the text of a soil's file goes, ended by a 0: [WEB_TEXT]. web_soil reads it; WEB_OWN is its
+ * ground from the next web_start on. Returns NULL, or what is wrong; then the soil before stays. */
+char *web_text(void);
+const char *web_soil(void);
 /* Stands the robot up at the origin of a ground without prints, facing x. Returns NULL, or what is
  * wrong. prints: bool, they stay from then on. web_again: where it is, on the same ground. */
 const char *web_start(int ground, int relief, int prints);

@@ -19,6 +19,7 @@ const GROUNDS = {
   sand_dense: ['Sand, dense', [0.74, 0.58, 0.43]],
   rigid: ['Rigid floor', [0.69, 0.70, 0.69]],
 };
+const OWN = [0.71, 0.48, 0.36]; // colour of a soil of one's own
 const SHAPES = ['Level', 'Waves', 'Rough'];
 
 const $ = (id) => document.getElementById(id);
@@ -99,6 +100,15 @@ class Core {
     };
     if (at - start !== bytes) throw new Error('mild.wasm and mild.js are of different builds');
     return view;
+  }
+
+  // A soil's file (docs/soil.md), whose name stands in what is wrong with it.
+  soil(name, text) {
+    const bytes = new TextEncoder().encode(text), at = this.c.web_text();
+    if (bytes.length >= 65536 || bytes.includes(0)) throw new Error(`${name}: is no soil's file`);
+    new Uint8Array(this.c.memory.buffer).set([...bytes, 0], at);
+    const message = this.c.web_soil();
+    if (message) throw new Error(this.text(message).replace(/^soil\.ini/, name));
   }
 
   start(ground, shape) { this.check(this.c.web_start(ground, shape, 1)); }
@@ -207,6 +217,9 @@ class Panel {
     this.grounds = names.map((name, i) => add(list, GROUNDS[name][0], rgb(GROUNDS[name][1]), () => app.choose(i, app.shape)));
     this.grounds.push(add(list, 'All in stripes', all, () => app.choose(names.length, app.shape)));
     list.prepend(this.grounds[names.length]);
+    const file = $('soil');
+    file.addEventListener('change', () => { if (file.files[0]) app.takeSoil(file.files[0]); file.value = ''; });
+    this.grounds.push(add(list, 'Your soil …', rgb(OWN), () => file.click()));
     const shapes = document.createElement('div');
     shapes.className = 'shapes';
     this.shapes = SHAPES.map((text, i) => add(shapes, text, null, () => app.choose(app.ground, i)));
@@ -328,6 +341,7 @@ class App {
     this.ground = choice('ground', core.names.length + 1, core.names.length); // all in stripes
     this.shape = choice('shape', SHAPES.length, LEVEL);
     const looks = core.names.map((name) => GROUNDS[name][1]);
+    looks.push(OWN);
     while (looks.length < 10) looks.push([0.5, 0.5, 0.5]);
     picture.setWorld(core.parts, looks, core.view().cell, STRIPE);
     this.driver = new Driver();
@@ -337,11 +351,26 @@ class App {
     this.links = this.before.slice();
     Object.assign(this, { owed: 0, steps: 0, time: 0, pace: 1, fallen: 0, last: null });
     this.choose(this.ground, this.shape);
+    for (const what of ['dragover', 'drop']) addEventListener(what, (e) => {
+      e.preventDefault();
+      if (what === 'drop' && e.dataTransfer.files[0]) this.takeSoil(e.dataTransfer.files[0]);
+    });
     addEventListener('keydown', (e) => {
       const digit = /^Digit(\d)$/.exec(e.code);
       if (e.code === 'KeyR') this.driver.again = true;
       if (digit && !e.repeat) this.choose(digit[1] === '0' ? core.names.length : Number(digit[1]) - 1, this.shape);
     });
+  }
+
+  // The file of a soil: the ground from now on, or a line that says what is wrong with it.
+  async takeSoil(file) {
+    try {
+      this.core.soil(file.name, await file.text());
+      this.choose(this.core.names.length + 1, this.shape);
+      this.panel.say(file.name, 4);
+    } catch (error) {
+      this.panel.say(error.message, 12);
+    }
   }
 
   choose(ground, shape) {
@@ -427,7 +456,8 @@ class App {
     const camera = this.camera.follow(base, view.yaw, base[2] - 0.8, Math.max(seconds, 1e-3), this.driver.touched || this.script ? 0 : 0.05);
     const { names } = this.core, links = this.links.subarray(0, 12 * view.links);
     this.picture.adapt(seconds);
-    this.picture.draw(links, camera, this.ground === names.length ? -1 : this.ground, this.time);
+    const look = this.ground === names.length ? -1 : Math.min(this.ground, names.length);
+    this.picture.draw(links, camera, look, this.time);
     if (this.driver.touched) $('hint').classList.add('gone');
     this.panel.drawSoles(view);
     this.panel.drawKnowledge(view);
@@ -467,6 +497,13 @@ async function main() {
   const picture = new Picture($('picture')); // its programs are compiled meanwhile
   const app = new App(await loading, picture);
   window.app = app;
+  if (options.has('soil')) { // a file beside the page
+    const name = options.get('soil');
+    fetch(name).then((r) => {
+      if (!r.ok) throw new Error(`${name}: ${r.status}`);
+      return app.takeSoil({ name, text: () => r.text() });
+    }).catch((error) => app.panel.say(error.message, 12));
+  }
   setInterval(() => app.physics(performance.now()), TICK);
   requestAnimationFrame((t) => {
     app.frame(t);

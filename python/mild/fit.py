@@ -1,6 +1,7 @@
 """Parameters of a ground from a measured press, in the form of a scikit-learn estimator."""
 import collections.abc
 import math
+import os
 
 import numpy as np
 
@@ -83,6 +84,24 @@ class GroundFit:
         soles, tables = self._soles(), self._records("X", X)
         forces = _ground._fit_forces(soles, self.material_, _rows(tables, [np.zeros(len(table)) for table in tables]))
         return np.split(forces, np.cumsum([len(table) for table in tables])[:-1]) if self._several() else forces
+
+    def save(self, path):
+        """Writes the ground as a soil's file (docs/soil.md), with residual and intervals as remarks. Raises RuntimeError before fit, ValueError
+        where a number is not told: `fill` gives what these data, or any press, leave open."""
+        if not hasattr(self, "material_"):
+            raise RuntimeError("GroundFit.save: nothing is fitted; call fit(X, y) first")
+        open_ = [name for name, number in self.parameters_.items() if math.isnan(number)]
+        if open_ or self.fill is None:
+            raise ValueError(f"GroundFit.save: {', '.join(open_) or 'friction and what else no press tells'}: not known; give it by hold or fill")
+        told = {name: number for name, number in self.parameters_.items() if self.states_[name] in ("held", "fitted")}
+        notes = dict.fromkeys(told, "held")
+        for name in told:
+            if self.states_[name] == "fitted":
+                low, high = self.intervals_[name]
+                notes[name] = f"95 %: {low:.5g} .. {high:.5g} {self.units_[name].strip('-')}".strip()
+        fill = self.fill if isinstance(self.fill, (str, os.PathLike)) else "fill"
+        _ground.Material(self.fill, **{**{k: v for k, v in (self.hold or {}).items() if k == "bed_depth"}, **told}).save(
+            path, head=f"mild.GroundFit, residual {self.residual_:.4g} N (root mean square)\nall without a remark: of {fill}", notes=notes)
 
     def score(self, X, y):
         """Coefficient of determination R^2 of predict(X) against y, in scikit-learn's convention: where all of y are the same, 1 if

@@ -1,4 +1,10 @@
-"""Gymnasium: gymnasium.make_vec("mild/SA01-v0", num_envs=...) and gymnasium.make("mild/SA01-v0")."""
+"""Gymnasium: gymnasium.make_vec("mild/SA01-v0", num_envs=...) and gymnasium.make("mild/SA01-v0"); G1 and Go1 likewise."""
+import collections.abc
+import os
+import pathlib
+import tempfile
+import weakref
+
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -6,18 +12,68 @@ from gymnasium.vector import AutoresetMode
 from .envs import open_envs
 
 OBSERVATIONS = ("history", "frame")
+PERIOD = 0.01  # [s] policy step
+ROBOTS = {"SA01": {}, "G1": {"config": "configs/g1.ini"}, "Go1": {"config": "configs/go1.ini"}}  # what each is opened with
 
 
 def register():
-    """Registers mild/SA01-v0. `import mild` does it."""
-    if "mild/SA01-v0" not in gymnasium.registry:
-        gymnasium.register("mild/SA01-v0", entry_point="mild.gym:Env", vector_entry_point="mild.gym:VectorEnv")
+    """Registers mild/SA01-v0, mild/G1-v0 and mild/Go1-v0. `import mild` does it."""
+    for name, keys in ROBOTS.items():
+        if f"mild/{name}-v0" not in gymnasium.registry:
+            gymnasium.register(f"mild/{name}-v0", entry_point="mild.gym:Env", vector_entry_point="mild.gym:VectorEnv", kwargs=keys)
+
+
+def ground_keys(ground, folder):
+    """The keys of a task on these grounds alone, as they are: "rigid"; a preset, a soil's file or a Material; or a list of these three.
+    folder: where a Material is written."""
+    from . import Material
+
+    if isinstance(ground, str) and ground == "rigid":
+        return {"randomize.rigid_share": 1, "randomize.preset_share": 0, "randomize.patch_share": 0}
+    names, models = [], []
+    for k, one in enumerate(ground if isinstance(ground, (list, tuple)) else [ground]):
+        if not isinstance(one, (str, os.PathLike, Material)):
+            raise TypeError(f"ground: a {type(one).__name__}, but it must be 'rigid', a preset, a soil's file or a Material, or a list of the "
+                            "latter three")
+        if isinstance(one, str) and one == "rigid":
+            raise ValueError("ground: 'rigid' is the engine's own contact; it stands alone")
+        material = Material(one)
+        models.append(material.model)
+        if isinstance(one, Material):
+            one = pathlib.Path(folder) / f"ground{k}.ini"
+            material.save(one)
+        names.append(os.fspath(one))
+        if "," in names[-1]:
+            raise ValueError(f"ground: {names[-1]!r} has a comma, which separates grounds; move the file, or give mild.Material of it")
+    others = sorted(set(models) - {"mild"})
+    if not names or len(others) > 1:
+        raise ValueError(f"ground: {' and '.join(others)} in one task; name grounds of one model" if names else "ground: an empty list")
+    keys = {"randomize.rigid_share": 0, "randomize.preset_share": 1, "randomize.preset_jitter": 0, "randomize.patch_share": 0,
+            "randomize.presets": ",".join(names)}
+    return {**keys, **({"randomize.model": others[0]} if others else {})}
 
 
 class _Task:
-    """What both kinds of environment share: opening, seeding, and steps into new arrays, which C fills."""
+    """What both kinds of environment share: opening, seeding, steps into new arrays, which C fills, and pictures."""
 
-    def _open(self, num_envs, observation, keys):
+    def _open(self, num_envs, observation, render_mode, ground, max_episode_steps, keys):
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"render_mode: {render_mode!r} is none of None, {', '.join(map(repr, self.metadata['render_modes']))}; "
+                             "gymnasium.wrappers.HumanRendering makes a window of 'rgb_array', and so does `mild play`")
+        self.render_mode, self._ground, self._camera, self._folder = render_mode, ground, None, None
+        keys = dict(keys)
+        own = {}
+        if ground is not None:
+            self._folder = tempfile.TemporaryDirectory()  # of Materials, which each seed reads again
+            weakref.finalize(self, self._folder.cleanup)
+            own.update(ground_keys(ground, self._folder.name))
+        if max_episode_steps is not None:
+            own["task.episode"] = PERIOD * int(max_episode_steps)
+        given = keys.get("overrides")
+        if own and isinstance(given, (collections.abc.Mapping, type(None))):
+            for key in set(own) & set(given or {}):
+                raise ValueError(f"overrides: {key} is what {'max_episode_steps' if key == 'task.episode' else 'ground'} sets; leave one out")
+            keys["overrides"] = {**own, **(given or {})}
         if observation not in OBSERVATIONS:
             raise ValueError(f"observation: '{observation}' is none of {', '.join(OBSERVATIONS)}")
         self._envs, self._count, self._observation, self._keys = None, num_envs, observation, keys
@@ -69,10 +125,31 @@ class _Task:
         self._envs.step(action, self._envs.buffers(**arrays))
         return arrays
 
+    def _pictures(self, count):
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() without a render_mode draws nothing; make(..., render_mode='rgb_array')")
+            return None
+        if self._envs is None:
+            raise RuntimeError("render: the environment is closed")
+        poses = [self._envs.pose(i) for i in range(count)]
+        if self._camera is None:
+            from ._camera import Camera
+
+            self._camera = Camera(self._envs.model, os.fspath(self._ground) if isinstance(self._ground, (str, os.PathLike)) else "")
+        return tuple(self._camera.picture(pose) for pose in poses)
+
     def _shut(self):
         if self._envs is not None:
             self._envs.close()
             self._envs = None
+
+    def _end(self):
+        self._shut()
+        if self._camera is not None:
+            self._camera.close()
+            self._camera = None
+        if self._folder is not None:
+            self._folder.cleanup()
 
 
 class VectorEnv(gymnasium.vector.VectorEnv, _Task):
@@ -82,7 +159,9 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
     observation: "history", (num_envs, frames * observation) float32, oldest numbers first, or "frame", the newest only;
     noisy, as the policy sees it. Actions: (num_envs, actions) float32 in units of the action scale; ValueError for one that
     is not finite. config, overrides, robot, device, threads: see mild.envs.open_envs; device: cpu, with train.robots=mujoco.
-    The seed is Gymnasium's, reset(seed=), never the config's train.seed.
+    ground: these grounds alone, as they are, in the place of those that the config draws: "rigid"; a preset, a soil's file
+    (docs/soil.md) or a Material; or a list of these three. max_episode_steps: the longest episode (task.episode, 2000 steps).
+    render_mode: None or "rgb_array" (robots are seen on a level floor, whatever the terrain). The seed is Gymnasium's, reset(seed=), never the config's train.seed.
 
     Every step returns new arrays, into which the library writes without a copy. Environments that ended begin anew in the
     same step (SAME_STEP): the observation is the first of the new episode, info["final_obs"] (num_envs, ...) has the last of
@@ -90,12 +169,10 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
     terms over it, in the order of `reward_names`. The first episodes are shorter than the later ones, so that they do not
     end together. One seed stands for all environments."""
 
-    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
+    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": ["rgb_array"], "render_fps": 100}
 
-    def __init__(self, num_envs=None, *, observation="history", render_mode=None, **keys):
-        if render_mode is not None:
-            raise ValueError("render_mode: there is none; `mild play` shows robots")
-        self._open(num_envs, observation, keys)
+    def __init__(self, num_envs=None, *, observation="history", render_mode=None, ground=None, max_episode_steps=None, **keys):
+        self._open(num_envs, observation, render_mode, ground, max_episode_steps, keys)
         self.num_envs = num_envs = self._count
         self.single_observation_space, self.single_action_space = self._single
         self.observation_space = gymnasium.vector.utils.batch_space(self.single_observation_space, num_envs)
@@ -128,22 +205,23 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
             raise RuntimeError("statistics: the environment is closed")
         return self._envs.statistics()
 
+    def render(self):
+        """A picture of each robot, (height, width, 3) uint8, in a tuple; None without a render_mode."""
+        return self._pictures(self.num_envs)
+
     def close_extras(self, **kwargs):
-        self._shut()
+        self._end()
 
 
 class Env(gymnasium.Env, _Task):
     """One robot; arguments and spaces as those of VectorEnv; one thread, unless `threads` says otherwise.
     info["reward_terms"] of the last step of an episode are the sums of the reward's terms over it."""
 
-    metadata = {"render_modes": []}
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 100}
 
-    def __init__(self, *, observation="history", render_mode=None, **keys):
-        if render_mode is not None:
-            raise ValueError("render_mode: there is none; `mild play` shows robots")
-        self.render_mode = None
+    def __init__(self, *, observation="history", render_mode=None, ground=None, max_episode_steps=None, **keys):
         self._ended = False
-        self._open(1, observation, {"threads": 1, **keys})
+        self._open(1, observation, render_mode, ground, max_episode_steps, {"threads": 1, **keys})
         self.observation_space, self.action_space = self._single
 
     def reset(self, *, seed=None, options=None):
@@ -167,5 +245,11 @@ class Env(gymnasium.Env, _Task):
         seen = self._seen(arrays["last" if self._ended else "history"])[0]
         return seen, float(arrays["reward"][0]), self._ended and not truncated, truncated, info
 
+    def render(self):
+        """The robot on a floor in the ground's colour, (height, width, 3) uint8; None without a render_mode. After the end of an episode
+        it is the beginning of the next."""
+        pictures = self._pictures(1)
+        return None if pictures is None else pictures[0]
+
     def close(self):
-        self._shut()
+        self._end()

@@ -13,6 +13,7 @@ class Env(VecEnv):
 
     def __init__(self, num_envs=None, **keys):
         self.envs = VectorEnv(num_envs, **keys)
+        self.render_mode = self.envs.render_mode
         super().__init__(self.envs.num_envs, self.envs.single_observation_space, self.envs.single_action_space)
 
     def reset(self):
@@ -35,6 +36,10 @@ class Env(VecEnv):
             infos[i] = {"terminal_observation": info["final_obs"][i], "TimeLimit.truncated": bool(truncated[i]),
                         "reward_terms": dict(zip(self.envs.reward_names, terms))}
         return observation, reward, done, infos
+
+    def get_images(self):
+        """A picture of each robot, with render_mode="rgb_array"."""
+        return list(self.envs.render() or ())
 
     def close(self):
         self.envs.close()

@@ -14,8 +14,8 @@ def attach(spec, feet=(), ground="sand_loose", *, body=(), exclude=True, sensor=
     """Puts soft ground under the feet of a mujoco.MjSpec, before spec.compile(); returns the plugin's instance.
 
     feet: names of bodies or sites, z up from the sole. body: names of other bodies, such as shins, a trunk or wheels, whose
-    shapes meet the ground on any side; with the feet 1 .. 16. ground: a preset, a Material, or a list of presets where
-    terrain__patches is given. exclude: feet and bodies no longer touch geoms of the world body, such as a rigid floor; all
+    shapes meet the ground on any side; with the feet 1 .. 16. ground: a preset, a soil's file (docs/soil.md), a
+    Material, or a list of presets and files where terrain__patches is given. exclude: feet and bodies no longer touch geoms of the world body, such as a rigid floor; all
     else touches them as before. sensor: name of a sensor to add, whose data are (feet + bodies, 12) numbers, a row for each
     foot and then for each body: force, torque, centre of pressure, area, largest and mean depth (docs/plugin.md).
     attributes: those of the plugin with __ for the dot: prints=64, ground__mu=0.5, terrain__kind="waves". library: the
@@ -91,16 +91,30 @@ def load_plugin(library=None):
 
 
 def ground_of(ground):
-    """The plugin's attributes of a ground."""
-    if isinstance(ground, str):
-        return {"ground": ground}
-    if isinstance(ground, (list, tuple)) and all(isinstance(one, str) for one in ground):
-        return {"ground": " ".join(ground)}
+    """The plugin's attributes of a ground. The numbers of one soil's file go into the model, so that it needs the file no more."""
     from . import Material
 
+    if isinstance(ground, (str, os.PathLike)):
+        ground = os.fspath(ground)
+        if not ground.endswith(".ini"):
+            return {"ground": ground}
+        ground = Material(ground)
+    if isinstance(ground, (list, tuple)) and all(isinstance(one, (str, os.PathLike)) for one in ground):
+        return {"ground": " ".join(listed(os.fspath(one)) for one in ground)}
+
     if not isinstance(ground, Material):
-        raise TypeError(f"ground: a {type(ground).__name__}, but it must be a preset, a Material, or a list of presets")
+        raise TypeError(f"ground: a {type(ground).__name__}, but it must be a preset, a soil's file, a Material, or a list of presets and files")
     return {"ground." + key: value for key, value in ground.as_dict().items()}
+
+
+def listed(ground):
+    """A ground as a word of the plugin's list: a file by its whole path."""
+    if not ground.endswith(".ini"):
+        return ground
+    path = os.path.abspath(ground)
+    if any(c in path for c in " \t\r\n,"):
+        raise ValueError(f"ground: {path!r}, but in a list a file's path must be without blanks and commas; give it alone, or move it")
+    return path
 
 
 def text_of(value):

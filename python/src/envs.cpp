@@ -188,6 +188,28 @@ static void step(Envs &envs, nb::handle action, Buffers &buffers, uintptr_t stre
     check(status, error);
 }
 
+static std::string model(const Envs &envs) {
+    return mild_envs_model(open_envs(envs));
+}
+
+static std::vector<double> pose(Envs &envs, int index) {
+    Entered entered(envs.busy, "Envs.pose");
+    const MildEnvs *at = open_envs(envs);
+    if (index < 0 || index >= envs.shape.envs) {
+        raise(PyExc_IndexError, "pose: there is no environment " + std::to_string(index));
+    }
+    if (!envs.begun) {
+        raise(PyExc_RuntimeError, "pose: reset() comes first");
+    }
+    std::vector<double> numbers(256);
+    numbers.resize((size_t)mild_envs_pose(at, index, numbers.data(), (int)numbers.size()));
+    if (numbers.empty()) {
+        raise(PyExc_ValueError, "render_mode: the batch engine's robots cannot be drawn; set "
+                                "overrides={'train.robots': 'mujoco'}");
+    }
+    return numbers;
+}
+
 static nb::dict statistics(Envs &envs, uintptr_t stream) {
     Entered entered(envs.busy, "Envs.statistics");
     EnvsStats of = {};
@@ -275,6 +297,8 @@ NB_MODULE(_envs, module) {
              "A policy step. action: (envs, actions) float32 in units of the action scale; on the "
              "CPU\nValueError for one that is not finite. Environments that ended begin anew in "
              "the same step.")
+        .def_prop_ro("model", model, "The robot's MJCF.")
+        .def("pose", pose, nb::arg("index"), "qpos of one robot for an mjData of that file.")
         .def("statistics", statistics, nb::arg("stream") = 0,
              "Means over the episodes that ended since the last call.")
         .def("mirror", mirror,

@@ -8,8 +8,12 @@ extern "C" {
 }
 
 static FitPlate plate_of(const Sole &sole) {
-    return {mild_sole_elements(sole.made), mild_sole_pitch(sole.made), mild_sole_width(sole.made),
-            sole.made};
+    FitPlate plate = {};
+    plate.elements = mild_sole_elements(sole.made);
+    plate.pitch = mild_sole_pitch(sole.made);
+    plate.width = mild_sole_width(sole.made);
+    plate.sole = sole.made;
+    return plate;
 }
 
 /* Fills plates[FIT_PLATES_MAX]; returns their number. */
@@ -43,7 +47,14 @@ static std::vector<FitPoint> points_of(nb::handle rows) {
     std::vector<FitPoint> points;
     for (size_t i = 0; i < numbers.shape(0); i++) {
         const double *row = numbers.data() + 6 * i;
-        points.push_back({row[0], row[1], row[2], row[3], row[4], plate_number(row[5])});
+        FitPoint point = {};
+        point.time = row[0];
+        point.depth = row[1];
+        point.force = row[2];
+        point.speed = row[3];
+        point.acceleration = row[4];
+        point.plate = plate_number(row[5]);
+        points.push_back(point);
     }
     return points;
 }
@@ -72,7 +83,7 @@ static nb::dict value_of(const FitValue &value) {
 
 static void hold(FitDef &def, const std::string &name, double value) {
     const MildField *fields[FIT_PARAMETERS_MAX];
-    const int count = fit_parameters((MildModel)def.material.model, fields);
+    const int count = fit_parameters((MildModel)def.material.model, FIT_PRESS, fields);
     const MildField *field =
         mild_field_find(mild_material_fields, mild_material_field_count, name.c_str(), nullptr);
     bool known = field && name != "plate_width" &&
@@ -177,7 +188,8 @@ static nb::object forces(const nb::sequence &soles, const Material &material, nb
     }
     std::vector<double> force(points.size());
     if (!points.empty()) {
-        fit_forces(plates, &material.numbers, points.data(), (int)points.size(), force.data());
+        fit_forces(FIT_PRESS, plates, &material.numbers, points.data(), (int)points.size(),
+                   force.data());
     }
     return array_of(std::move(force), {points.size()});
 }

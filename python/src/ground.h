@@ -36,7 +36,7 @@ struct Terrain {
 
 struct Ground;
 
-/* A material from a Material or the name of a preset. */
+/* A material from a Material, the name of a preset, or a soil's file. */
 MildMaterial material_of(nb::handle object, const char *name);
 /* The numbers of an argument as an array of doubles in C order; a list is converted. dimensions:
  * -1: any number */

@@ -3,6 +3,10 @@
 
 #include <cmath>
 
+extern "C" {
+#include "ground/soil/soil.h"
+}
+
 double positive(double value, const char *name) {
     if (!(value > 0 && std::isfinite(value))) {
         raise(PyExc_ValueError, std::string(name) + " = " + std::to_string(value) +
@@ -60,15 +64,16 @@ MildMaterial material_of(nb::handle object, const char *name) {
         return made_of<Material>(object, name).numbers;
     }
     MildMaterial material = mild_material_default();
-    if (!nb::isinstance<nb::str>(object)) {
-        raise(PyExc_TypeError, std::string(name) + ": a " + type_text(object) +
-                                   ", but it must be a Material or the name of a preset");
+    const nb::object text = nb::hasattr(object, "__fspath__")
+                                ? nb::module_::import_("os").attr("fspath")(object)
+                                : nb::borrow(object);
+    if (!nb::isinstance<nb::str>(text)) {
+        raise(PyExc_TypeError,
+              std::string(name) + ": a " + type_text(object) +
+                  ", but it must be a Material, the name of a preset, or of a soil's file");
     }
-    const std::string preset = nb::cast<std::string>(object);
-    if (!mild_material_preset(preset.c_str(), &material)) {
-        raise(PyExc_ValueError, std::string(name) + ": there is no preset '" + preset +
-                                    "'; mild.presets() lists them");
-    }
+    MildError error = {};
+    check(soil_find(utf8(text, name).c_str(), &material, &error), error);
     return material;
 }
 
@@ -169,6 +174,30 @@ static Material match(const Material &material, const std::string &model, const 
     return rival;
 }
 
+/* Lines of remarks at the top and one above each field of `notes`. */
+static void save(const Material &material, nb::handle path, nb::handle head, nb::handle notes) {
+    const std::string name = utf8(nb::module_::import_("os").attr("fspath")(path), "path"),
+                      top = head.is_none() ? "" : utf8(head, "head");
+    std::vector<std::string> texts((size_t)mild_material_field_count);
+    std::vector<const char *> lines((size_t)mild_material_field_count, nullptr);
+    if (!notes.is_none()) {
+        for (auto [key, value] : nb::cast<nb::dict>(notes)) {
+            const std::string field = utf8(key, "notes");
+            const MildField *found = mild_field_find(
+                mild_material_fields, mild_material_field_count, field.c_str(), nullptr);
+            if (!found) {
+                raise(PyExc_ValueError, "notes: there is no field '" + field + "'");
+            }
+            const size_t i = (size_t)(found - mild_material_fields);
+            texts[i] = utf8(value, "notes");
+            lines[i] = texts[i].c_str();
+        }
+    }
+    const SoilNotes said = {top.c_str(), lines.data()};
+    MildError error = {};
+    check(soil_write(&material.numbers, &said, name.c_str(), &error), error);
+}
+
 static bool equal(const Material &a, nb::object b) {
     return nb::isinstance<Material>(b) &&
            all_fields(a).equal(all_fields(made_of<Material>(b, "other")));
@@ -178,7 +207,8 @@ void bind_material(nb::module_ &module) {
     nb::class_<Material> type(
         module, "Material",
         "Parameters of the element law (docs/model.md section 10): Material(preset, **fields).\n\n"
-        "preset: a name of mild.presets(), or a Material to start from. Fields are those below.\n"
+        "preset: a name of mild.presets(), a soil's file (docs/soil.md), or a Material to start\n"
+        "from. Fields are those below.\n"
         "Raises ValueError for a number outside its range, TypeError for a name that is none.");
     bind_fields(type);
     type.def("__init__", make, nb::arg("preset") = "sand_loose", nb::arg("fields"))
@@ -186,6 +216,11 @@ void bind_material(nb::module_ &module) {
              "The material of another model under which a level sole sinks to the same depth at\n"
              "`load` [N]; half a robot's weight is a good one. For a concentric model the result\n"
              "belongs to sole.concentric().")
+        .def("save", save, nb::arg("path"), nb::arg("head").none() = nb::none(),
+             nb::arg("notes").none() = nb::none(),
+             "Writes a soil's file (docs/soil.md), which Material(path), `--ground path` and the\n"
+             "plugin read; its name ends in .ini. head: text for remarks at the top. notes:\n"
+             "{field: text} for a remark above a field. Completely or not at all.")
         .def("as_dict", all_fields, "All fields as text that Material(**fields) reads.")
         .def("__repr__", print)
         .def("__eq__", equal, nb::arg("other").none())

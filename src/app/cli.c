@@ -155,7 +155,7 @@ static int set_piece(const CliCommand *command, const CliOption *option, const c
 static int set_list(const CliCommand *command, const CliOption *option, const char *text) {
     int count = 0;
     for (const char *rest = text; rest; count++) {
-        char piece[64];
+        char piece[CLI_NAME_SIZE];
         size_t length = strcspn(rest, ",");
         if (length >= sizeof piece) {
             return cli_fail_text(command->name, "--%s: '%.40s...' is too long", option->name, rest);

@@ -6,7 +6,7 @@
 
 #include "mild/error.h"
 
-enum { CLI_LIST_MAX = 16, CLI_OVERRIDES_MAX = 64, CLI_EXIT_BAD_INPUT = 2 };
+enum { CLI_LIST_MAX = 16, CLI_NAME_SIZE = 256, CLI_OVERRIDES_MAX = 64, CLI_EXIT_BAD_INPUT = 2 };
 
 typedef struct {
     int count;
@@ -15,7 +15,7 @@ typedef struct {
 
 typedef struct {
     int count;
-    char name[CLI_LIST_MAX][64];
+    char name[CLI_LIST_MAX][CLI_NAME_SIZE];
 } CliNames; /* "rubber,foam45" */
 
 typedef struct {

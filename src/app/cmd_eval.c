@@ -158,7 +158,7 @@ static MildStatus sheet_close(Sheet *sheet, const char *path, MildStatus status,
 
 /* Prints a row and counts it. */
 static void take_row(Eval *e, FILE *table) {
-    char line[384];
+    char line[SCENE_NAME_SIZE + 256];
     eval_print_row(&e->rows[e->row_count++], line, sizeof line);
     fprintf(table, "%s\n", line);
     fflush(table);

@@ -10,32 +10,21 @@
 #include "app/commands.h"
 #include "app/figure.h"
 #include "app/fit_walk.h"
+#include "app/fit_work.h"
 #include "app/grounds.h"
 #include "app/report.h"
 #include "base/file.h"
 #include "base/text.h"
+#include "ground/soil/soil.h"
 #include "identify/belief/log.h"
-#include "identify/fit.h"
-#include "identify/fit_csv.h"
 #include "identify/press.h"
 
 typedef struct {
-    const char *model, *from, *json, *figure;
-    CliNumbersEach plate;
+    const char *model, *from, *json, *figure, *soil;
+    CliNumbersEach plate, ring;
     CliNames fit, hold; /* hold: NAME=VALUE */
     int trial;
 } FitOptions;
-
-typedef struct {
-    FitDef def;
-    MildMaterial preset; /* of --hold-from */
-    const char *from;    /* its name; NULL: none */
-    int bed;             /* bool: bed_depth is held */
-    FitPoint *points;
-    int count;
-    int first[CLI_LIST_MAX + 1]; /* of each file, in points */
-    FitResult result;
-} FitWork;
 
 /* grass.png is drawn from grass_fit.csv, because grass.csv may be the record. */
 #define NUMBERS_END "_fit.csv"
@@ -49,7 +38,10 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
     snprintf(model_help, sizeof model_help, "ground model (default mild): one of%s", models);
     const CliOption table[] = {
         {"plate", CLI_NUMBERS_EACH, &options->plate, 0.0195, 1, "L,W",
-         "[m] length and width of the plate; once for all files, or once for each, in their order"},
+         "[m] length and width of the plate, or D, the diameter of a round one; once for all "
+         "presses, or once for each, in their order"},
+        {"ring", CLI_NUMBERS_EACH, &options->ring, 0, 2, "D,d",
+         "[m] outer and inner diameter of a ring that turns; once for all, or once for each"},
         {"model", CLI_TEXT, &options->model, 0, 0, "NAME", model_help},
         {"hold", CLI_NAMES, &options->hold, 0, 0, "NAME=VALUE[,...]",
          "hold parameters at values that are known, e.g. alpha=1.05; also bed_depth, the depth of "
@@ -61,6 +53,9 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
          "fit these only and hold all others at the preset of --hold-from"},
         {"trial", CLI_INT, &options->trial, 0, 1e6, "N",
          "of a log of several walks, as mild eval --actions writes it: which (default 0)"},
+        {"soil", CLI_OUTPUT, &options->soil, 0, 0, "FILE.ini",
+         "write the ground to FILE.ini, which --ground FILE.ini, the plugin and Python read; all "
+         "that the model reads must be fitted, held, or the preset's of --hold-from"},
         {"json", CLI_OUTPUT, &options->json, 0, 0, "FILE",
          "write values and intervals to FILE; - for standard output"},
         {"figure", CLI_OUTPUT, &options->figure, 0, 0, "FILE.png",
@@ -78,19 +73,25 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
             "columns depth_m and force_n, and time_s or speed_m_s where speed matters. "
             "Several files may differ in speed, which c_d and dissipation need; c_g also "
             "needs a record that brakes, such as a drop. They may differ in their plate, "
-            "which k_c of bekker needs (--plate once for each file). Rows that are not deeper than "
-            "all before them (unloading) are ignored. Of a walk's log (mild drive --log, mild play "
+            "which k_c of bekker needs (--plate once for each file). The way up from the greatest "
+            "depth tells recovery. A file with the columns slip_m, shear_pa and pressure_pa, or of "
+            "a ring angle_rad, torque_nm and force_n (--ring), tells cohesion, mu and shear_length "
+            "of bekker. --soil writes what was found as a ground (docs/soil.md). Of a walk's log "
+            "(mild drive --log, mild play "
             "--log) it says what the robot's own sensors tell of the ground, each parameter with "
             "its 90 % interval (docs/identify.md).",
         .options = table,
         .option_count = sizeof table / sizeof *table,
-        .examples = "  mild press --ground grass --depth 0.04 --csv grass.csv\n"
-                    "  mild fit grass.csv --plate 0.2,0.1 --figure grass.png\n"
-                    "  mild fit grass.csv --plate 0.2,0.1 --hold alpha=1.1\n"
-                    "  mild fit slow.csv fast.csv --plate 0.2,0.1 --hold-from sand_loose\n"
-                    "  mild fit small.csv large.csv --plate 0.15,0.1 --plate 0.3,0.2\n"
-                    "  mild fit slow.csv --plate 0.2,0.1 --model bekker --json out.json\n"
-                    "  mild fit walk.csv\n",
+        .examples =
+            "  mild press --ground grass --depth 0.04 --csv grass.csv\n"
+            "  mild fit grass.csv --plate 0.2,0.1 --figure grass.png\n"
+            "  mild fit grass.csv --plate 0.2,0.1 --hold alpha=1.1\n"
+            "  mild fit slow.csv fast.csv --plate 0.2,0.1 --hold-from sand_loose\n"
+            "  mild fit small.csv large.csv --plate 0.15,0.1 --plate 0.3,0.2\n"
+            "  mild fit slow.csv --plate 0.2,0.1 --model bekker --json out.json\n"
+            "  mild fit p5.csv p10.csv ring.csv --model bekker --plate 0.05 --plate 0.1 \\\n"
+            "      --ring 0.2,0.12 --hold-from dry_sand --soil mars.ini\n"
+            "  mild fit walk.csv\n",
         .positional_max = CLI_LIST_MAX,
         .picture = "figure",
         .numbers = NUMBERS_END,
@@ -104,30 +105,45 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
 
 /* ---- what is fitted and what is held ---- */
 
-/* Index of a parameter of the model; -1 and a message for any other name. */
-static int parameter_find(const FitDef *def, const char *option, const char *name,
-                          MildError *error) {
-    const MildField *fields[FIT_PARAMETERS_MAX];
-    const char *names[FIT_PARAMETERS_MAX];
+/* Parameters of the model that some kind of rows tells: fields[FIT_FIELDS_MAX]. */
+static int parameters_of(MildModel model, const MildField **fields) {
+    int count = 0;
+    for (int k = 0; k < FIT_KINDS; k++) {
+        count += fit_parameters(model, (FitKind)k, fields + count);
+    }
+    return count;
+}
+
+/* A parameter of the model, or with `any` any number that it reads; NULL and a message for any
+ * other name. */
+static const MildField *parameter_find(const FitWork *work, int any, const char *option,
+                                       const char *name, MildError *error) {
+    const MildField *fields[FIT_FIELDS_MAX];
+    const char *names[FIT_FIELDS_MAX];
     char list[300] = "";
-    const MildModel model = (MildModel)def->material.model;
-    const int count = fit_parameters(model, fields);
+    const MildModel model = (MildModel)work->material.model;
+    const int count = parameters_of(model, fields);
     for (int i = 0; i < count; i++) {
         names[i] = fields[i]->name;
         if (strcmp(names[i], name) == 0) {
-            return i;
+            return fields[i];
         }
         snprintf(list + strlen(list), sizeof list - strlen(list), i ? ", %s" : "%s", names[i]);
     }
+    const MildField *field =
+        mild_field_find(mild_material_fields, mild_material_field_count, name, NULL);
+    if (any && field && field->type == MILD_FIELD_DOUBLE && soil_reads(&work->material, field)) {
+        return field;
+    }
     mild_fail(error, MILD_ERROR_ARGUMENT,
-              "--%s: '%.40s' is no parameter that a press on %s tells; nearest is '%s' (%s)",
-              option, name, mild_model_names[model], text_nearest(name, names, count), list);
-    return -1;
+              "--%s: '%.40s' is no parameter that a press on %s tells; nearest is '%s' (%s%s)",
+              option, name, mild_model_names[model], text_nearest(name, names, count), list,
+              field && soil_reads(&work->material, field) ? "; with --soil any that it reads" : "");
+    return NULL;
 }
 
-static MildStatus hold_one(const char *text, FitWork *work, MildError *error) {
+static MildStatus hold_one(const char *text, int any, FitWork *work, MildError *error) {
     char name[64];
-    FitDef *def = &work->def;
     const char *equals = strchr(text, '=');
     double value, low, high;
     if (!equals || !text_double(equals + 1, &value)) {
@@ -139,29 +155,26 @@ static MildStatus hold_one(const char *text, FitWork *work, MildError *error) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--hold plate_width: it is the shorter side of --plate; leave it out");
     }
-    const int geometry = fit_is_geometry((MildModel)def->material.model, name);
-    const int index = geometry ? -1 : parameter_find(def, "hold", name, error);
-    if (!geometry && index < 0) {
+    const int geometry = fit_is_geometry((MildModel)work->material.model, name);
+    const MildField *field =
+        geometry ? mild_field_find(mild_material_fields, mild_material_field_count, name, NULL)
+                 : parameter_find(work, any, "hold", name, error);
+    if (!field) {
         return error->status;
     }
-    const MildField *field =
-        mild_field_find(mild_material_fields, mild_material_field_count, name, NULL);
     fit_range(field, &low, &high);
     if (!(value >= low && value <= high)) {
         return mild_fail(error, MILD_ERROR_RANGE, "--hold: %s = %g is outside %g .. %g: %s", name,
                          value, low, high, field->help);
     }
-    *fit_number(&def->material, field) = value;
+    *fit_number(&work->material, field) = value;
     work->bed |= strcmp(name, "bed_depth") == 0;
-    if (index >= 0) {
-        def->held[index] = 1;
-    }
+    work->held[field - mild_material_fields] = 1;
     return MILD_OK;
 }
 
 static MildStatus from_read(const FitOptions *options, FitWork *work, MildError *error) {
-    FitDef *def = &work->def;
-    const int model = def->material.model;
+    const int model = work->material.model;
     MildStatus status = grounds_find(options->from, &work->preset, NULL, error);
     if (status != MILD_OK) {
         return status;
@@ -173,24 +186,25 @@ static MildStatus from_read(const FitOptions *options, FitWork *work, MildError 
                          options->from, mild_model_names[work->preset.model],
                          mild_model_names[model]);
     }
-    def->material = work->preset;
-    def->fill = options->fit.count ? NULL : &work->preset;
+    work->material = work->preset;
     work->from = options->from;
     work->bed = 1;
     return MILD_OK;
 }
 
 /* --fit: everything else is held. */
-static MildStatus fit_names_read(const CliNames *names, FitDef *def, MildError *error) {
-    for (int i = 0; i < FIT_PARAMETERS_MAX; i++) {
-        def->held[i] = 1;
+static MildStatus fit_names_read(const CliNames *names, FitWork *work, MildError *error) {
+    const MildField *fields[FIT_FIELDS_MAX];
+    const int count = parameters_of((MildModel)work->material.model, fields);
+    for (int i = 0; i < count; i++) {
+        work->held[fields[i] - mild_material_fields] = 1;
     }
     for (int i = 0; i < names->count; i++) {
-        const int index = parameter_find(def, "fit", names->name[i], error);
-        if (index < 0) {
+        const MildField *field = parameter_find(work, 0, "fit", names->name[i], error);
+        if (!field) {
             return error->status;
         }
-        def->held[index] = 0;
+        work->held[field - mild_material_fields] = 0;
     }
     return MILD_OK;
 }
@@ -219,8 +233,6 @@ static MildStatus names_check(const FitOptions *options, MildError *error) {
 }
 
 static MildStatus held_read(const FitOptions *options, FitWork *work, MildError *error) {
-    const MildField *fields[FIT_PARAMETERS_MAX];
-    FitDef *def = &work->def;
     MildStatus status = names_check(options, error);
     if (status != MILD_OK) {
         return status;
@@ -234,28 +246,23 @@ static MildStatus held_read(const FitOptions *options, FitWork *work, MildError 
         status = from_read(options, work, error);
     }
     if (status == MILD_OK && options->fit.count) {
-        status = fit_names_read(&options->fit, def, error);
+        status = fit_names_read(&options->fit, work, error);
     }
     for (int i = 0; i < options->hold.count && status == MILD_OK; i++) {
-        status = hold_one(options->hold.name[i], work, error);
-    }
-    const int count = fit_parameters((MildModel)def->material.model, fields);
-    int held = 0;
-    for (int i = 0; i < count; i++) {
-        held += def->held[i];
-    }
-    if (status == MILD_OK && held == count) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--hold: every parameter of %s is held, which leaves nothing to fit",
-                         mild_model_names[def->material.model]);
+        status = hold_one(options->hold.name[i], options->soil != NULL, work, error);
     }
     return status;
 }
 
+/* ---- plates and rings ---- */
+
 /* A plate in the elements of the model, as press lays it out. */
 static MildStatus plate_lay(const CliNumbers *size, int concentric, FitPlate *laid,
                             MildError *error) {
-    MildSole *plate = press_plate_create(size->value[0], size->value[1], error);
+    const double *side = size->value;
+    const int round = size->count == 1;
+    MildSole *plate =
+        round ? press_disc_create(side[0], error) : press_plate_create(side[0], side[1], error);
     MildSole *sole = plate;
     if (plate && concentric) {
         sole = mild_sole_concentric(plate, error);
@@ -264,24 +271,148 @@ static MildStatus plate_lay(const CliNumbers *size, int concentric, FitPlate *la
     if (!sole) {
         return error->status;
     }
-    *laid =
-        (FitPlate){mild_sole_elements(sole), mild_sole_pitch(sole), mild_sole_width(sole), sole};
+    *laid = (FitPlate){.elements = mild_sole_elements(sole),
+                       .pitch = mild_sole_pitch(sole),
+                       .width = round ? 0.5 * side[0] : fmin(side[0], side[1]),
+                       .sole = sole,
+                       .area = round ? press_disc_area(side[0]) : side[0] * side[1]};
     return MILD_OK;
 }
 
-static MildStatus plates_lay(const FitOptions *options, FitDef *def, MildError *error) {
-    const int concentric = mild_model_is_concentric((MildModel)def->material.model);
+/* A plate for each press, or one for all. */
+static MildStatus plates_lay(const FitOptions *options, FitWork *work, MildError *error) {
+    const int concentric = mild_model_is_concentric((MildModel)work->material.model);
+    FitDef *def = &work->set[FIT_PRESS].def;
     MildStatus status = MILD_OK;
-    def->plates = options->plate.count;
-    for (int i = 0; i < def->plates && status == MILD_OK; i++) {
+    for (int i = 0; i < options->plate.count && status == MILD_OK; i++) {
         status = plate_lay(&options->plate.each[i], concentric, &def->plate[i], error);
+        def->plates += status == MILD_OK;
     }
     return status;
 }
 
-static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitWork *work,
-                           MildError *error) {
-    FitDef *def = &work->def;
+static FitPlate ring_of(const CliNumbers *size) {
+    return (FitPlate){.elements = 1,
+                      .pitch = 1,
+                      .width = 1,
+                      .outer = 0.5 * size->value[0],
+                      .inner = size->count > 1 ? 0.5 * size->value[1] : 0};
+}
+
+static int files_of(const FitWork *work, FitFileKind kind) {
+    int count = 0;
+    for (int f = 0; f < work->files; f++) {
+        count += work->file[f].kind == kind;
+    }
+    return count;
+}
+
+/* One for all files, or one for each. */
+static MildStatus sizes_check(const char *option, const CliNumbersEach *sizes, int files,
+                              const char *what, MildError *error) {
+    if (sizes->count && sizes->count != 1 && sizes->count != files) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--%s: %d %ss for %d file%s; give one for all files, or one for each in "
+                         "their order",
+                         option, sizes->count, what, files, files == 1 ? "" : "s");
+    }
+    return MILD_OK;
+}
+
+static MildStatus plates_check(const FitOptions *options, const FitWork *work, MildError *error) {
+    const int presses = files_of(work, FIT_FILE_PRESS), rings = files_of(work, FIT_FILE_RING);
+    for (int i = 0; i < options->plate.count; i++) {
+        if (options->plate.each[i].count > 2) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "--plate: %d numbers; it takes LENGTH,WIDTH in metres, or the "
+                             "DIAMETER of a round plate",
+                             options->plate.each[i].count);
+        }
+    }
+    for (int i = 0; i < options->ring.count; i++) {
+        const CliNumbers *size = &options->ring.each[i];
+        if (size->count > 2 || !(size->value[0] > (size->count > 1 ? size->value[1] : 0))) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "--ring: it takes the OUTER,INNER diameters of a ring in metres, or "
+                             "the one of a full disc");
+        }
+    }
+    if (presses && !options->plate.count) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--plate LENGTH,WIDTH is missing: the size of the plate in metres; a "
+                         "round one is --plate DIAMETER");
+    }
+    if (rings && !options->ring.count) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--ring OUTER,INNER is missing: the diameters of the ring in metres, to "
+                         "which angle_rad and torque_nm belong");
+    }
+    MildStatus status = sizes_check("plate", &options->plate, presses, "plate", error);
+    return status == MILD_OK ? sizes_check("ring", &options->ring, rings, "ring", error) : status;
+}
+
+/* ---- the rows ---- */
+
+/* Appends rows to a set, all of one plate. */
+static int rows_add(FitSet *set, const FitPoint *rows, int count, int plate) {
+    FitPoint *more = realloc(set->points, sizeof *more * (size_t)(set->count + count + 1));
+    if (!more) {
+        return 0;
+    }
+    set->points = more;
+    for (int i = 0; i < count; i++) {
+        more[set->count] = rows[i];
+        more[set->count++].plate = plate;
+    }
+    set->files += count > 0;
+    return 1;
+}
+
+/* Sorts the rows of the files into the sets. What slides without turning is plate 0 of the shear
+ * set, the rings follow it. */
+static MildStatus rows_sort(const FitOptions *options, FitWork *work, MildError *error) {
+    FitDef *shear = &work->set[FIT_SHEAR].def;
+    int presses = 0, rings = 0, whole = 1;
+    shear->plate[0] = (FitPlate){.elements = 1, .pitch = 1, .width = 1};
+    shear->plates = 1;
+    for (int i = 0; i < options->ring.count && shear->plates < FIT_PLATES_MAX; i++) {
+        shear->plate[shear->plates++] = ring_of(&options->ring.each[i]);
+    }
+    for (int f = 0; f < work->files && whole; f++) {
+        FitFile *file = &work->file[f];
+        if (file->kind == FIT_FILE_PRESS) {
+            const int plate = options->plate.count > 1 ? presses : 0;
+            whole = rows_add(&work->set[FIT_PRESS], file->points, file->count, plate) &&
+                    rows_add(&work->set[FIT_UNLOAD], file->back, file->back_count, plate);
+            presses++;
+        } else {
+            const int turns = file->kind == FIT_FILE_RING;
+            const int plate = turns ? 1 + (options->ring.count > 1 ? rings : 0) : 0;
+            if (turns) {
+                fit_file_ring(file, shear->plate[plate].outer, shear->plate[plate].inner);
+            }
+            whole = rows_add(&work->set[FIT_SHEAR], file->points, file->count, plate);
+            rings += turns;
+        }
+    }
+    memcpy(work->set[FIT_UNLOAD].def.plate, work->set[FIT_PRESS].def.plate,
+           sizeof work->set[FIT_UNLOAD].def.plate);
+    work->set[FIT_UNLOAD].def.plates = work->set[FIT_PRESS].def.plates;
+    return whole ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
+}
+
+static MildStatus files_read(const CliArgs *args, FitWork *work, MildError *error) {
+    MildStatus status = MILD_OK;
+    for (; work->files < args->positional_count && status == MILD_OK; work->files++) {
+        status = fit_csv_read(args->positional[work->files], &work->file[work->files], error);
+    }
+    return status;
+}
+
+/* ---- the model, and what is held ---- */
+
+static MildStatus model_choose(const FitOptions *options, const CliArgs *args, FitWork *work,
+                               MildError *error) {
     MildModel model;
     MildStatus status = grounds_model(options->model, args, &model, error);
     if (status != MILD_OK) {
@@ -294,243 +425,77 @@ static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitWo
     }
     const MildField *bed =
         mild_field_find(mild_material_fields, mild_material_field_count, "bed_depth", NULL);
-    def->material = mild_material_default();
-    def->material.model = (int)model;
-    def->material.bed_depth = bed->max;
-    status = plates_lay(options, def, error);
-    return status == MILD_OK ? held_read(options, work, error) : status;
+    work->material = mild_material_default();
+    work->material.model = (int)model;
+    work->material.bed_depth = bed->max;
+    return held_read(options, work, error);
 }
 
-/* ---- the printed result ---- */
-
-static void value_print(const FitValue *value) {
-    char number[TEXT_CELL], low[TEXT_CELL], high[TEXT_CELL];
-    const int held = value->state == FIT_HELD || value->state == FIT_FILLED;
-    printf("%-24s %12s %12s %12s  %s\n", value->name, text_cell("%.5g", value->value, number),
-           held ? "held" : text_cell("%.5g", value->low, low),
-           held ? "" : text_cell("%.5g", value->high, high), value->unit);
+/* Prepares the fit of a kind of rows. Returns how many of its parameters are free. */
+static int set_prepare(const FitOptions *options, FitWork *work, FitKind kind) {
+    const MildField *fields[FIT_PARAMETERS_MAX];
+    FitDef *def = &work->set[kind].def;
+    const int count = fit_parameters((MildModel)work->material.model, kind, fields);
+    int left = 0;
+    def->kind = kind;
+    def->material = work->material;
+    def->fill = work->from && !options->fit.count ? &work->preset : NULL;
+    for (int i = 0; i < count; i++) {
+        def->held[i] = work->held[fields[i] - mild_material_fields];
+        left += !def->held[i];
+    }
+    return left;
 }
 
-/* Prints "name, name" of the parameters in a set of states, after `title`; nothing for none. With
- * `values` "name = value". Returns their number. */
-static int names_print(const FitResult *result, unsigned states, int values, const char *title) {
-    int count = 0;
-    for (int i = 0; i < result->parameters; i++) {
-        const FitValue *value = &result->parameter[i];
-        if (states >> value->state & 1) {
-            printf("%s%s", count++ ? ", " : title, value->name);
-            if (values) {
-                printf(" = %.5g", value->value);
-            }
+/* Fits each kind of rows by itself, because no parameter is told by two of them. */
+static MildStatus sets_fit(const FitOptions *options, FitWork *work, MildError *error) {
+    const char *model = mild_model_names[work->material.model];
+    const MildField *fields[FIT_PARAMETERS_MAX];
+    MildStatus status = MILD_OK;
+    int made = 0;
+    if (work->set[FIT_SHEAR].count &&
+        !fit_parameters((MildModel)work->material.model, FIT_SHEAR, fields)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--model %s has no law of shear, to which slip_m or angle_rad belong; "
+                         "choose bekker, or leave these files out",
+                         model);
+    }
+    for (int k = 0; k < FIT_KINDS && status == MILD_OK; k++) {
+        FitSet *set = &work->set[k];
+        set->done = set->count > 0 && set_prepare(options, work, (FitKind)k) > 0;
+        if (set->done) {
+            status = fit_run(&set->def, set->points, set->count, &set->result, error);
         }
+        made += set->done && k != FIT_UNLOAD;
     }
-    return count;
-}
-
-/* Bool: some ground has numbers for --hold-from. */
-static int has_presets(MildModel model) {
-    return model == MILD_MODEL_MILD || mild_model_info(model)->presets[0];
-}
-
-static unsigned bit(FitState state) {
-    return 1U << state;
-}
-
-/* What the intervals rest on. */
-static void assumptions_print(const FitWork *work) {
-    const FitResult *result = &work->result;
-    double deepest = 0, fastest = 0;
-    for (int i = 0; i < work->count; i++) {
-        deepest = fmax(deepest, work->points[i].depth);
-        fastest = fmax(fastest, work->points[i].speed);
+    if (status == MILD_OK && !made) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--hold: every parameter of %s is held, which leaves nothing to fit",
+                         model);
     }
-    if (names_print(result, bit(FIT_HELD), 1, "the intervals assume ")) {
-        printf("\n");
-    }
-    if (names_print(result, bit(FIT_FILLED), 1, "the intervals assume ")) {
-        printf(" of %s, because the data do not tell\n", work->from);
-    }
-    if (!work->bed) {
-        printf("the intervals assume no firm bed down to %.4g m (--hold bed_depth=D if there is)\n",
-               deepest);
-    } else if (deepest > work->def.material.bed_depth) {
-        printf("the intervals assume bed_depth = %.5g\n", work->def.material.bed_depth);
-    }
-    if (fastest == 0) {
-        printf("the intervals assume a slow press, because the records have neither time_s nor "
-               "speed_m_s\n");
-    }
-    if (result->neighbours > 0) {
-        printf("the residuals of neighbouring rows are alike (correlation %.2f): the law misses "
-               "the curve, or the noise is slow; the %d rows count as %.0f\n",
-               result->neighbours, result->points, result->rows);
-    }
-}
-
-/* Bool: all rows have about the same speed. */
-static int is_one_speed(const FitWork *work) {
-    double slowest = INFINITY, fastest = 0;
-    for (int i = 0; i < work->count; i++) {
-        slowest = fmin(slowest, work->points[i].speed);
-        fastest = fmax(fastest, work->points[i].speed);
-    }
-    return fastest <= 1.3 * slowest;
-}
-
-/* Parameters of the model that no press straight down tells, such as friction. */
-static void never_print(const FitWork *work) {
-    const MildModel model = (MildModel)work->def.material.model;
-    const MildModelInfo *info = mild_model_info(model);
-    int count = 0;
-    for (int i = 0; i < MILD_MODEL_FIELDS && info->fields[i]; i++) {
-        int told =
-            fit_is_geometry(model, info->fields[i]) || strcmp(info->fields[i], "passive") == 0;
-        for (int k = 0; k < work->result.parameters; k++) {
-            told |= strcmp(info->fields[i], work->result.parameter[k].name) == 0;
-        }
-        if (!told) {
-            printf("%s%s", count++ ? ", " : "no press straight down tells ", info->fields[i]);
-        }
-    }
-    printf("%s", count ? "\n" : "");
-}
-
-/* What the data do not tell, and the remedy. */
-static void untold_print(const FitWork *work) {
-    const FitResult *result = &work->result;
-    const MildModel model = (MildModel)work->def.material.model;
-    const unsigned untold = bit(FIT_LIMIT) | bit(FIT_OPEN) | bit(FIT_TIED) | bit(FIT_NO_EFFECT);
-    if (names_print(result, untold, 0, "not determined by these data: ")) {
-        printf("; hold what you know (--hold NAME=VALUE)%s\n",
-               work->from || !has_presets(model) ? ""
-                                                 : ", or what is missing (--hold-from PRESET)");
-    }
-    int rate = 0;
-    for (int i = 0; i < result->parameters && is_one_speed(work); i++) {
-        const FitValue *value = &result->parameter[i];
-        if (untold >> value->state & 1 && fit_is_rate(model, value->field)) {
-            printf("%s%s", rate++ ? ", " : "a press at another speed or a drop tells more of ",
-                   value->name);
-        }
-    }
-    printf("%s", rate ? "\n" : "");
-    never_print(work);
-}
-
-/* "55", or "44, 77" of several plates. */
-static const char *elements_text(const FitDef *def, char text[8 * FIT_PLATES_MAX]) {
-    int length = 0;
-    for (int i = 0; i < def->plates; i++) {
-        length += sprintf(text + length, i ? ", %d" : "%d", def->plate[i].elements);
-    }
-    return text;
-}
-
-static void table_print(const FitWork *work, int files) {
-    const FitResult *result = &work->result;
-    char elements[8 * FIT_PLATES_MAX];
-    printf("%-24s %12s %12s %12s  %s\n", "parameter", "value", "low 95 %", "high 95 %", "unit");
-    for (int i = 0; i < result->parameters; i++) {
-        value_print(&result->parameter[i]);
-    }
-    for (int i = 0; i < result->combinations; i++) {
-        value_print(&result->combination[i]);
-    }
-    printf("residual %.4g N, %.2f %% of the force (root mean square); %d loading rows of %d "
-           "file%s, %s element%s\n",
-           result->residual, 100 * result->residual_share, result->points, files,
-           files == 1 ? "" : "s", elements_text(&work->def, elements),
-           work->def.plates == 1 && work->def.plate[0].elements == 1 ? "" : "s");
-    assumptions_print(work);
-    untold_print(work);
-}
-
-/* Adds a value to the list that its state belongs to. */
-static int json_value(cJSON *root, const char *list, const FitValue *value) {
-    const char *names[] = {"value", "low", "high"};
-    const double numbers[] = {value->value, value->low, value->high};
-    cJSON *item;
-    switch (value->state) {
-    case FIT_HELD:
-    case FIT_FILLED:
-        return cJSON_AddNumberToObject(cJSON_GetObjectItem(root, "held"), value->name,
-                                       value->value) != NULL;
-    case FIT_FITTED:
-    case FIT_LIMIT:
-        item = cJSON_AddObjectToObject(
-            cJSON_GetObjectItem(root, value->state == FIT_FITTED ? list : "limits"), value->name);
-        for (int i = 0; i < 3; i++) {
-            if (isfinite(numbers[i]) && !cJSON_AddNumberToObject(item, names[i], numbers[i])) {
-                return 0;
-            }
-        }
-        return item != NULL;
-    default:
-        item = cJSON_CreateString(value->name);
-        return cJSON_AddItemToArray(cJSON_GetObjectItem(root, "undetermined"), item);
-    }
-}
-
-static MildStatus json_save(const FitWork *work, const char *path, MildError *error) {
-    const FitResult *result = &work->result;
-    cJSON *root = cJSON_CreateObject();
-    int whole =
-        root &&
-        cJSON_AddStringToObject(root, "model", mild_model_names[work->def.material.model]) &&
-        cJSON_AddObjectToObject(root, "parameters") &&
-        cJSON_AddObjectToObject(root, "combinations") && cJSON_AddObjectToObject(root, "held") &&
-        cJSON_AddObjectToObject(root, "limits") && cJSON_AddArrayToObject(root, "undetermined") &&
-        cJSON_AddNumberToObject(root, "residual", result->residual) &&
-        cJSON_AddNumberToObject(root, "independent_rows", result->rows);
-    for (int i = 0; i < result->parameters && whole; i++) {
-        whole = json_value(root, "parameters", &result->parameter[i]);
-    }
-    for (int i = 0; i < result->combinations && whole; i++) {
-        whole = json_value(root, "combinations", &result->combination[i]);
-    }
-    if (!whole) {
-        cJSON_Delete(root);
-        root = NULL;
-    }
-    return report_save(root, path, error);
+    return status;
 }
 
 /* ---- the picture ---- */
 
-static MildStatus data_write(const FitWork *work, const CliArgs *args, const char *path,
-                             MildError *error) {
-    char *text = NULL;
+static MildStatus data_write(const FitWork *work, const char *path, MildError *error) {
     size_t size = 0;
-    FILE *memory = open_memstream(&text, &size);
-    if (!memory) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
-    }
-    const FitResult *result = &work->result;
-    fprintf(memory, "record,depth_m,force_n,speed_m_s,fit_n\n");
-    for (int f = 0; f < args->positional_count; f++) {
-        for (int i = work->first[f]; i < work->first[f + 1]; i++) {
-            const FitPoint *p = &work->points[i];
-            double force;
-            fit_forces(work->def.plate, &result->curve, p, 1, &force);
-            fprintf(memory, "%d,%.9g,%.9g,%.9g,%.9g\n", f + 1, p->depth, p->force, p->speed, force);
-        }
-    }
-    MildStatus status = MILD_OK;
-    if (fclose(memory) != 0) {
-        status = mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
-    } else {
-        status = file_write(path, text, size, error);
-    }
+    char *text = fit_numbers(work, &size);
+    MildStatus status = text ? file_write(path, text, size, error)
+                             : mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
     free(text);
     return status;
 }
 
-static MildStatus figure_save(const FitWork *work, const CliArgs *args, const char *figure,
-                              MildError *error) {
+static MildStatus figure_save(const FitWork *work, const char *figure, MildError *error) {
     char data[PATH_SIZE];
+    if (!work->set[FIT_PRESS].done) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--figure draws presses, and none was fitted; leave it out");
+    }
     MildStatus status = path_beside(figure, NUMBERS_END, data, error);
     if (status == MILD_OK) {
-        status = data_write(work, args, data, error);
+        status = data_write(work, data, error);
     }
     if (status == MILD_OK) {
         status = figure_draw("scripts/fit.py", data, figure, NULL, error);
@@ -540,53 +505,61 @@ static MildStatus figure_save(const FitWork *work, const CliArgs *args, const ch
 
 /* ---- the command ---- */
 
-static MildStatus fit_report(const FitOptions *options, const CliArgs *args, FitWork *work,
-                             MildError *error) {
-    MildStatus status = MILD_OK;
-    for (int f = 0; f < args->positional_count && status == MILD_OK; f++) {
-        status = fit_csv_read(args->positional[f], &work->points, &work->count, error);
-        work->first[f + 1] = work->count;
-        for (int i = work->first[f]; i < work->count && work->def.plates > 1; i++) {
-            work->points[i].plate = f;
-        }
+/* The command line, as the soil's file shows it. */
+static void command_text(int argc, char **argv, char *text, size_t size) {
+    snprintf(text, size, "mild fit");
+    for (int i = 1; i < argc; i++) {
+        const size_t used = strlen(text);
+        snprintf(text + used, size - used, " %s", argv[i]);
+    }
+}
+
+static MildStatus fit_report(const FitOptions *options, const char *command, const CliArgs *args,
+                             FitWork *work, MildError *error) {
+    MildStatus status = model_choose(options, args, work, error);
+    if (status == MILD_OK) {
+        status = files_read(args, work, error);
     }
     if (status == MILD_OK) {
-        status = fit_run(&work->def, work->points, work->count, &work->result, error);
+        status = plates_check(options, work, error);
+    }
+    if (status == MILD_OK) {
+        status = plates_lay(options, work, error);
+    }
+    if (status == MILD_OK) {
+        status = rows_sort(options, work, error);
+    }
+    if (status == MILD_OK) {
+        status = sets_fit(options, work, error);
     }
     if (status != MILD_OK) {
         return status;
     }
     if (!options->json || strcmp(options->json, "-") != 0) {
-        table_print(work, args->positional_count);
+        fit_print(work);
     }
-    if (options->json) {
-        status = json_save(work, options->json, error);
+    if (options->soil) {
+        status = fit_soil_save(work, command, options->soil, error);
+    }
+    if (status == MILD_OK && options->json) {
+        status = fit_json_save(work, options->json, error);
     }
     if (status == MILD_OK && options->figure) {
-        status = figure_save(work, args, options->figure, error);
+        status = figure_save(work, options->figure, error);
     }
     return status;
 }
 
-/* One plate for all files, or one for each. */
-static int plates_check(const CliNumbersEach *plates, int files) {
-    for (int i = 0; i < plates->count; i++) {
-        if (plates->each[i].count != 2) {
-            return cli_fail_text("fit", "--plate: %d number%s; it takes LENGTH,WIDTH in metres",
-                                 plates->each[i].count, plates->each[i].count == 1 ? "" : "s");
-        }
+static void work_close(FitWork *work) {
+    for (int f = 0; f < CLI_LIST_MAX; f++) {
+        fit_file_close(&work->file[f]);
     }
-    if (!plates->count) {
-        return cli_fail_text("fit",
-                             "--plate LENGTH,WIDTH is missing: the size of the plate in metres");
+    for (int k = 0; k < FIT_KINDS; k++) {
+        free(work->set[k].points);
     }
-    if (plates->count != 1 && plates->count != files) {
-        return cli_fail_text("fit",
-                             "--plate: %d plates for %d file%s; give one for all files, or one for "
-                             "each in their order",
-                             plates->count, files, files == 1 ? "" : "s");
+    for (int i = 0; i < work->set[FIT_PRESS].def.plates; i++) {
+        mild_sole_destroy((MildSole *)(uintptr_t)work->set[FIT_PRESS].def.plate[i].sole);
     }
-    return 0;
 }
 
 /* A walk's log alone, without options of a press. Returns the exit code. */
@@ -595,8 +568,8 @@ static int walk_fit(const FitOptions *options, const CliArgs *args) {
     if (args->positional_count > 1) {
         return cli_fail_text("fit", "%s is a walk's log; give it alone", args->positional[0]);
     }
-    if (options->plate.count || options->fit.count || options->hold.count || options->from ||
-        options->model || options->figure) {
+    if (options->plate.count || options->ring.count || options->fit.count || options->hold.count ||
+        options->from || options->model || options->figure || options->soil) {
         return cli_fail_text("fit",
                              "%s is a walk's log, which takes --trial and --json alone; leave the "
                              "options of a press out",
@@ -621,19 +594,20 @@ int cmd_fit(int argc, char **argv) {
     if (belief_log_is(args.positional[0])) {
         return walk_fit(&options, &args);
     }
-    code = plates_check(&options.plate, args.positional_count);
-    if (code) {
-        return code;
+    if (options.soil && !soil_is_file(options.soil)) {
+        return cli_fail_text("fit",
+                             "--soil %s: the name of a soil ends in .ini, by which it is known",
+                             options.soil);
     }
+    char command[1024];
     MildError error;
-    FitWork work = {0};
-    MildStatus status = def_make(&options, &args, &work, &error);
-    if (status == MILD_OK) {
-        status = fit_report(&options, &args, &work, &error);
+    FitWork *work = calloc(1, sizeof *work);
+    if (!work) {
+        return cli_fail_text("fit", "out of memory");
     }
-    free(work.points);
-    for (int i = 0; i < work.def.plates; i++) {
-        mild_sole_destroy((MildSole *)(uintptr_t)work.def.plate[i].sole);
-    }
+    command_text(argc, argv, command, sizeof command);
+    MildStatus status = fit_report(&options, command, &args, work, &error);
+    work_close(work);
+    free(work);
     return status == MILD_OK ? 0 : cli_fail("fit", &error);
 }

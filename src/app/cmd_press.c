@@ -60,25 +60,30 @@ static MildStatus tool_open(Tool *tool, const char *text, MildError *error) {
         return tool_open_sole(tool, error);
     }
     char length_text[32], *comma;
-    double length, width;
+    double length, width = 0;
     snprintf(length_text, sizeof length_text, "%s", text);
     comma = strchr(length_text, ',');
     if (comma) {
         *comma = '\0';
     }
-    if (!comma || strlen(text) >= sizeof length_text || !text_double(length_text, &length) ||
-        !text_double(comma + 1, &width)) {
+    if (strlen(text) >= sizeof length_text || !text_double(length_text, &length) ||
+        (comma && !text_double(comma + 1, &width))) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--plate: '%.40s' is neither LENGTH,WIDTH in metres nor `sole`", text);
+                         "--plate: '%.40s' is neither LENGTH,WIDTH nor DIAMETER in metres, nor "
+                         "`sole`",
+                         text);
     }
+    width = comma ? width : length;
     if (!(length >= 0.0195 && length <= 1 && width >= 0.0195 && width <= 1)) {
         return mild_fail(error, MILD_ERROR_RANGE,
                          "--plate: %g x %g m is outside 0.0195 .. 1 m (one element to a metre)",
                          length, width);
     }
-    tool->plate = press_plate_create(length, width, error);
+    tool->plate =
+        comma ? press_plate_create(length, width, error) : press_disc_create(length, error);
     tool->sole = tool->raster = tool->plate;
-    snprintf(tool->name, sizeof tool->name, "a plate of %g x %g m", length, width);
+    snprintf(tool->name, sizeof tool->name,
+             comma ? "a plate of %g x %g m" : "a round plate of %g m", length, width);
     return tool->plate ? MILD_OK : MILD_ERROR_ARGUMENT;
 }
 
@@ -109,19 +114,19 @@ static MildStatus tool_set_model(Tool *tool, MildModel model, const CliArgs *arg
     return status;
 }
 
-/* Seven columns; four more where the motion is not straight down and up. */
+/* Eight columns; four more where the motion is not straight down and up. */
 static char *csv_text(const PressResult *result, int more, size_t *size) {
     char *text = NULL;
     FILE *memory = open_memstream(&text, size);
     if (!memory) {
         return NULL;
     }
-    fprintf(memory, "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m%s\n",
+    fprintf(memory, "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m,area_m2%s\n",
             more ? ",force_x_n,force_y_n,x_m,tilt_rad" : "");
     for (int i = 0; i < result->count; i++) {
         const PressRow *row = &result->rows[i];
-        fprintf(memory, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", row->time, row->depth, row->force,
-                row->moment_x, row->moment_y, row->zmp_x, row->zmp_y);
+        fprintf(memory, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", row->time, row->depth,
+                row->force, row->moment_x, row->moment_y, row->zmp_x, row->zmp_y, result->area);
         if (more) {
             fprintf(memory, ",%.9g,%.9g,%.9g,%.9g", row->force_x, row->force_y, row->x, row->tilt);
         }
@@ -352,8 +357,9 @@ static int options_read(int argc, char **argv, PressOptions *options, CliArgs *a
         {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},
         {"model", CLI_TEXT, &options->model, 0, 0, "NAME",
          grounds_model_help(model_help, sizeof model_help)},
-        {"plate", CLI_TEXT, &options->plate, 0, 0, "L,W|sole",
-         "[m] length and width of a plate, or `sole` for the robot's sole (default 0.2,0.1)"},
+        {"plate", CLI_TEXT, &options->plate, 0, 0, "L,W|D|sole",
+         "[m] length and width of a plate, D, the diameter of a round one, or `sole` for the "
+         "robot's sole (default 0.2,0.1)"},
         {"robot", CLI_TEXT, &options->robot, 0, 0, "NAME|DIR",
          ROBOTS_HELP "; its sole, and the weight that models are matched under (default sa01)"},
         {"tilt", CLI_NUMBER, &options->tilt_deg, -45, 45, "DEG",

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/text.h"
+#include "ground/soil/soil.h"
 
 int grounds_of(MildModel model, const char *names[GROUNDS_MAX]) {
     const MildModelInfo *info = mild_model_info(model);
@@ -36,21 +37,7 @@ MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, Mi
     if (is_rigid && rigid) {
         return MILD_OK;
     }
-    if (is_rigid) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "ground 'rigid' is the engine's own contact and has no soft-ground law");
-    }
-    if (mild_material_preset(name, material)) {
-        return MILD_OK;
-    }
-    const char *names[GROUNDS_MAX + 1];
-    int count = grounds_all(names);
-    if (rigid) {
-        names[count++] = "rigid";
-    }
-    return mild_fail(error, MILD_ERROR_ARGUMENT,
-                     "unknown ground '%.60s'; nearest is '%s' (mild info grounds lists all)", name,
-                     text_nearest(name, names, count));
+    return soil_find(name, material, error);
 }
 
 MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *model,

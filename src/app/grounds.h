@@ -14,8 +14,8 @@ enum { GROUNDS_MAX = 32 };
 int grounds_of(MildModel model, const char *names[GROUNDS_MAX]);
 int grounds_all(const char *names[GROUNDS_MAX]);
 
-/* The material of a preset. For an unknown name the message names the nearest preset. `rigid` has
- * no material: it sets *rigid, or fails when that is NULL. */
+/* The material of a preset or of a soil's file (soil_find). `rigid` has no material: it sets
+ * *rigid, or fails when that is NULL. */
 MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, MildError *error);
 
 /* The model of --model NAME (NULL: not given) or --ground.model=NAME; mild when neither is

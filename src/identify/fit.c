@@ -97,7 +97,7 @@ static int put_aside(Run *run, const int marks[FIT_PARAMETERS_MAX], FitState sta
  * the others'. The columns of a material in which everything has an effect say so. At the minimum
  * some may have none by chance. */
 static void ties_mark(Run *run, int without[FIT_PARAMETERS_MAX], int tied[FIT_PARAMETERS_MAX]) {
-    const MildMaterial probe = mild_material_default();
+    const MildMaterial probe = fit_probe();
     Fit *fit = &run->fit;
     coordinates_choose(run);
     fit_start(fit, &probe);
@@ -149,7 +149,7 @@ static FitValue *combination_add(FitResult *result, const FitCombination *combin
 
 /* The minimum and all intervals. */
 static void values_find(Run *run) {
-    const MildMaterial start = mild_material_default();
+    const MildMaterial start = fit_probe();
     Fit *fit = &run->fit;
     FitInterval interval[FIT_PARAMETERS_MAX];
     fit_start(fit, &start);
@@ -226,6 +226,9 @@ static MildStatus fit_check(const FitDef *def, const FitPoint *points, int count
         if (plate->elements < 1 || !(plate->pitch > 0) || !(plate->width > 0)) {
             return mild_fail(error, MILD_ERROR_RANGE, "fit: plate %d has no element", i + 1);
         }
+        if (!(plate->inner >= 0) || (plate->outer > 0 && !(plate->inner < plate->outer))) {
+            return mild_fail(error, MILD_ERROR_RANGE, "fit: ring %d has no width", i + 1);
+        }
     }
     for (int i = 0; i < count; i++) {
         if (points[i].plate < 0 || points[i].plate >= def->plates) {
@@ -233,7 +236,8 @@ static MildStatus fit_check(const FitDef *def, const FitPoint *points, int count
                              points[i].plate + 1, def->plates);
         }
         if (isfinite(points[i].depth) && isfinite(points[i].force) && isfinite(points[i].speed) &&
-            isfinite(points[i].acceleration)) {
+            isfinite(points[i].acceleration) && isfinite(points[i].area) &&
+            isfinite(points[i].load)) {
             continue;
         }
         return mild_fail(error, MILD_ERROR_RANGE, "fit: row %d is not finite", i + 1);
@@ -254,13 +258,13 @@ static double plates_width(const FitDef *def) {
 /* Names, units and states before the fit, and the numbers of what is held. */
 static void run_open(Run *run) {
     const FitDef *def = run->def;
-    const MildMaterial probe = mild_material_default();
+    const MildMaterial probe = fit_probe();
     MildMaterial *base = &run->fit.base, held = def->material, unheld = probe;
     FitResult *result = run->result;
     *result = (FitResult){.points = run->fit.count};
     held.plate_width = def->plate[0].width; /* of the combination, which needs one */
     *base = held;
-    result->parameters = fit_parameters((MildModel)held.model, run->field);
+    result->parameters = fit_parameters((MildModel)held.model, def->kind, run->field);
     for (int i = 0; i < result->parameters; i++) {
         const MildField *field = run->field[i];
         FitValue *value = &result->parameter[i];
@@ -308,16 +312,20 @@ static int rows_mean(const FitPoint *points, int count, int group, FitPoint *mea
         FitPoint sum = {.time = NAN, .plate = points[i].plate};
         for (n = 0; n < group && i + n < count; n++) {
             const FitPoint *row = &points[i + n];
-            if (n && (row->depth < row[-1].depth || row->plate != row[-1].plate)) {
+            if (n && (row->depth < row[-1].depth || row->plate != row[-1].plate ||
+                      row->area != row[-1].area)) {
                 break;
             }
             sum.depth += row->depth;
             sum.force += row->force;
+            sum.load += row->load;
+            sum.area = row->area;
             sum.speed += row->speed;
             sum.acceleration += row->acceleration;
         }
         sum.depth /= n;
         sum.force /= n;
+        sum.load /= n;
         sum.speed /= n;
         sum.acceleration /= n;
         means[kept++] = sum;
@@ -329,7 +337,11 @@ static MildStatus run_rows(const FitDef *def, const FitPoint *points, int count,
                            MildError *error) {
     Run run = {.def = def,
                .result = result,
-               .fit = {.plates = def->plate, .points = points, .count = count, .fixed = -1}};
+               .fit = {.kind = def->kind,
+                       .plates = def->plate,
+                       .points = points,
+                       .count = count,
+                       .fixed = -1}};
     run_open(&run);
     if (count <= result->parameters) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,

@@ -1,8 +1,8 @@
 /* Parameters of a ground from measured forces: those that the data determine, each with an
  * interval, and the names of the others.
  *
- * Nothing is held but what the caller holds. All other parameters that a press straight down can
- * sense are fitted together by bounded least squares. Where the data tell a combination of several
+ * Nothing is held but what the caller holds. All other parameters that such rows can sense are
+ * fitted together by bounded least squares. Where the data tell a combination of several
  * and none of them by itself, the combination is the result. An interval (95 %) is where the sum of
  * squares, minimised over all others, stays below a bound that allows rows of unequal noise. A
  * parameter without a bound on both sides within its range has no value. Pure functions: thread
@@ -15,6 +15,7 @@
 enum { FIT_COMBINATIONS_MAX = 4, FIT_PLATES_MAX = 16 };
 
 typedef struct {
+    FitKind kind; /* of the rows */
     FitPlate plate[FIT_PLATES_MAX];
     int plates;                   /* at least 1; each row names one of them */
     MildMaterial material;        /* the model, the numbers that are held, and bed_depth */
@@ -48,14 +49,14 @@ typedef struct {
     int combinations;
     MildMaterial curve;    /* gives the fitted forces; numbers of tied parameters mean nothing;
                               plate_width is 0 where the plates' widths differ */
-    double residual;       /* [N] root mean square */
+    double residual;       /* [N], of FIT_SHEAR [N/m^2]: root mean square */
     double residual_share; /* of the root mean square force */
     double neighbours;     /* correlation of the residuals of neighbouring rows; 0 if by chance */
     double rows;           /* number of independent rows that they count as */
     int points;
 } FitResult;
 
-/* Fits the loading rows of all records together; of more than 20 000 the means of neighbours, which
+/* Fits the rows of all records together; of more than 20 000 the means of neighbours, which
  * is what `residual` is of then. Fails on fewer than FIT_POINTS_MIN points or not
  * more than parameters, on a model without soft ground, and on a material out of range. */
 MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResult *result,

@@ -9,20 +9,103 @@
 #include "base/file.h"
 #include "base/text.h"
 
-typedef enum { CSV_DEPTH, CSV_FORCE, CSV_TIME, CSV_SPEED, CSV_COLUMNS } CsvColumn;
+typedef enum {
+    CSV_DEPTH,
+    CSV_FORCE,
+    CSV_TIME,
+    CSV_SPEED,
+    CSV_AREA,
+    CSV_SLIP,
+    CSV_SHEAR,
+    CSV_PRESSURE,
+    CSV_ANGLE,
+    CSV_TORQUE,
+    CSV_COLUMNS
+} CsvColumn;
 
-static const char *const column_names[CSV_COLUMNS] = {"depth_m", "force_n", "time_s", "speed_m_s"};
+static const char *const column_names[CSV_COLUMNS] = {
+    "depth_m", "force_n",  "time_s",      "speed_m_s", "area_m2",
+    "slip_m",  "shear_pa", "pressure_pa", "angle_rad", "torque_nm"};
 /* Largest size of a number in each column; beyond it the unit is probably wrong. */
-static const double column_limits[CSV_COLUMNS] = {2, 1e7, 1e9, 100};
-static const char *const column_units[CSV_COLUMNS] = {"metres, positive down", "newtons", "seconds",
-                                                      "metres per second, positive down"};
+static const double column_limits[CSV_COLUMNS] = {2, 1e7, 1e9, 100, 10, 2, 1e7, 1e8, 100, 1e5};
+static const char *const column_units[CSV_COLUMNS] = {"metres, positive down",
+                                                      "newtons",
+                                                      "seconds",
+                                                      "metres per second, positive down",
+                                                      "square metres",
+                                                      "metres",
+                                                      "pascals",
+                                                      "pascals",
+                                                      "radians",
+                                                      "newton metres"};
+
+static unsigned bit(CsvColumn c) {
+    return 1U << c;
+}
+
+/* The columns of each kind of file, as bits: those that it must have and those that it may. */
+static unsigned needed(FitFileKind kind) {
+    return kind == FIT_FILE_SHEAR  ? bit(CSV_SLIP) | bit(CSV_SHEAR) | bit(CSV_PRESSURE)
+           : kind == FIT_FILE_RING ? bit(CSV_ANGLE) | bit(CSV_TORQUE) | bit(CSV_FORCE)
+                                   : bit(CSV_DEPTH) | bit(CSV_FORCE);
+}
+
+static unsigned read_of(FitFileKind kind) {
+    return kind == FIT_FILE_PRESS ? needed(kind) | bit(CSV_TIME) | bit(CSV_SPEED) | bit(CSV_AREA)
+                                  : needed(kind);
+}
 
 typedef struct {
     Csv text;
+    FitFileKind kind;
     int columns;             /* in the header */
-    int column[CSV_COLUMNS]; /* place in the line, -1: absent */
+    int column[CSV_COLUMNS]; /* place in the line, -1: absent or not read */
     double time;             /* [s] of the previous row */
 } Record;
+
+/* The places of the columns in the header. */
+static MildStatus columns_find(Record *record, char **cells, MildError *error) {
+    for (int c = 0; c < CSV_COLUMNS; c++) {
+        record->column[c] = -1;
+        for (int i = 0; i < record->columns; i++) {
+            if (strcmp(cells[i], column_names[c]) != 0) {
+                continue;
+            }
+            if (record->column[c] >= 0) {
+                return mild_fail(error, MILD_ERROR_FORMAT,
+                                 "%.200s:%d: two columns are named %s; keep one", record->text.path,
+                                 record->text.number, column_names[c]);
+            }
+            record->column[c] = i;
+        }
+    }
+    return MILD_OK;
+}
+
+/* What the file is: a press, unless it has a column that only another kind has. */
+static MildStatus kind_find(Record *record, MildError *error) {
+    const int *column = record->column;
+    record->kind = column[CSV_SLIP] >= 0 || column[CSV_SHEAR] >= 0     ? FIT_FILE_SHEAR
+                   : column[CSV_ANGLE] >= 0 || column[CSV_TORQUE] >= 0 ? FIT_FILE_RING
+                                                                       : FIT_FILE_PRESS;
+    if (column[CSV_DEPTH] >= 0) {
+        record->kind = FIT_FILE_PRESS;
+    }
+    for (int c = 0; c < CSV_COLUMNS; c++) {
+        if (column[c] < 0 && needed(record->kind) & bit((CsvColumn)c)) {
+            return mild_fail(error, MILD_ERROR_FORMAT,
+                             "%.200s:%d: no column %s; name the columns in the first line: "
+                             "depth_m,force_n and, where speed matters, time_s or speed_m_s; of a "
+                             "shear test slip_m,shear_pa,pressure_pa, or of a ring "
+                             "angle_rad,torque_nm,force_n",
+                             record->text.path, record->text.number, column_names[c]);
+        }
+        if (!(read_of(record->kind) & bit((CsvColumn)c))) {
+            record->column[c] = -1;
+        }
+    }
+    return MILD_OK;
+}
 
 static MildStatus csv_header(Record *record, MildError *error) {
     char *cells[CSV_CELLS_MAX];
@@ -35,30 +118,9 @@ static MildStatus csv_header(Record *record, MildError *error) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "%.200s: empty; a header line and rows are needed", record->text.path);
     }
-    int count = record->columns = csv_split(line, cells);
-    for (int c = 0; c < CSV_COLUMNS; c++) {
-        record->column[c] = -1;
-        for (int i = 0; i < count; i++) {
-            if (strcmp(cells[i], column_names[c]) != 0) {
-                continue;
-            }
-            if (record->column[c] >= 0) {
-                return mild_fail(error, MILD_ERROR_FORMAT,
-                                 "%.200s:%d: two columns are named %s; keep one", record->text.path,
-                                 record->text.number, column_names[c]);
-            }
-            record->column[c] = i;
-        }
-        if (record->column[c] >= 0 || c == CSV_TIME || c == CSV_SPEED) {
-            continue;
-        }
-        return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%.200s:%d: no column %s; name the columns in the first line: "
-                         "depth_m,force_n and, where "
-                         "speed matters, time_s or speed_m_s",
-                         record->text.path, record->text.number, column_names[c]);
-    }
-    return MILD_OK;
+    record->columns = csv_split(line, cells);
+    status = columns_find(record, cells, error);
+    return status == MILD_OK ? kind_find(record, error) : status;
 }
 
 static MildStatus csv_cell(const Record *record, CsvColumn c, char **cells, int count,
@@ -87,12 +149,34 @@ static MildStatus csv_cell(const Record *record, CsvColumn c, char **cells, int 
                      column_limits[c], column_units[c]);
 }
 
+/* A row of the numbers that the file has, NaN for the others. It is of plate 0 until the caller
+ * says otherwise. */
+static FitPoint point_of(const Record *record, const double number[CSV_COLUMNS]) {
+    switch (record->kind) {
+    case FIT_FILE_SHEAR:
+        return (FitPoint){.time = NAN,
+                          .depth = number[CSV_SLIP],
+                          .force = number[CSV_SHEAR],
+                          .load = number[CSV_PRESSURE]};
+    case FIT_FILE_RING:
+        return (FitPoint){.time = NAN,
+                          .depth = number[CSV_ANGLE],
+                          .force = number[CSV_TORQUE],
+                          .load = number[CSV_FORCE]};
+    default:
+        return (FitPoint){.time = number[CSV_TIME],
+                          .depth = number[CSV_DEPTH],
+                          .force = number[CSV_FORCE],
+                          .speed = number[CSV_SPEED],
+                          .area = record->column[CSV_AREA] >= 0 ? number[CSV_AREA] : 0};
+    }
+}
+
 static MildStatus csv_row(Record *record, char *line, FitPoint *point, MildError *error) {
     char *cells[CSV_CELLS_MAX];
-    double *const values[CSV_COLUMNS] = {&point->depth, &point->force, &point->time, &point->speed};
+    double number[CSV_COLUMNS];
     int count = csv_split(line, cells);
     MildStatus status = MILD_OK;
-    *point = (FitPoint){.plate = 0}; /* until the caller says otherwise */
     if (count < 0) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "%.200s:%d: more than %d columns; keep those needed", record->text.path,
@@ -109,7 +193,10 @@ static MildStatus csv_row(Record *record, char *line, FitPoint *point, MildError
             record->text.path, record->text.number, count, record->columns);
     }
     for (int c = 0; c < CSV_COLUMNS && status == MILD_OK; c++) {
-        status = csv_cell(record, (CsvColumn)c, cells, count, values[c], error);
+        status = csv_cell(record, (CsvColumn)c, cells, count, &number[c], error);
+    }
+    if (status == MILD_OK) {
+        *point = point_of(record, number);
     }
     if (status == MILD_OK && point->time <= record->time) {
         return mild_fail(error, MILD_ERROR_FORMAT,
@@ -122,25 +209,25 @@ static MildStatus csv_row(Record *record, char *line, FitPoint *point, MildError
     return status;
 }
 
-static MildStatus csv_rows(Record *record, FitPoint **points, int *count, MildError *error) {
+static MildStatus csv_rows(Record *record, FitFile *file, MildError *error) {
     MildStatus status;
-    int room = *count;
+    int room = 0;
     for (char *line = csv_line(&record->text, &status, error); line;
          line = csv_line(&record->text, &status, error)) {
-        if (*count == room) {
+        if (file->count == room) {
             room = 2 * room + 256;
-            FitPoint *more = realloc(*points, sizeof *more * (size_t)room);
+            FitPoint *more = realloc(file->points, sizeof *more * (size_t)room);
             if (!more) {
                 return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory",
                                  record->text.path);
             }
-            *points = more;
+            file->points = more;
         }
-        status = csv_row(record, line, *points + *count, error);
+        status = csv_row(record, line, file->points + file->count, error);
         if (status != MILD_OK) {
             return status;
         }
-        if (++*count <= FIT_CSV_ROWS_MAX) {
+        if (++file->count <= FIT_CSV_ROWS_MAX) {
             continue;
         }
         return mild_fail(error, MILD_ERROR_RANGE, "%.200s:%d: more than %d rows; take every tenth",
@@ -149,66 +236,113 @@ static MildStatus csv_rows(Record *record, FitPoint **points, int *count, MildEr
     return status;
 }
 
-/* Checks that the loading rows are a press: enough rows, and a force that pushes back. */
-static MildStatus csv_loading(const Record *record, FitPoint *points, int rows, int *kept,
-                              MildError *error) {
+/* What the rows of each kind lack when their mean is not above 0. */
+static const char *const no_push[FIT_FILES] = {
+    "force_n does not push back on the way down; it is positive up, on the plate",
+    "shear_pa does not resist the slip; it is positive where it does",
+    "torque_nm does not resist the turn; it is positive where it does"};
+
+/* Checks that the rows are a press or a slip: enough that go on, and a force that resists. */
+static MildStatus csv_loading(const Record *record, FitFile *file, MildError *error) {
+    const CsvColumn way = file->kind == FIT_FILE_SHEAR  ? CSV_SLIP
+                          : file->kind == FIT_FILE_RING ? CSV_ANGLE
+                                                        : CSV_DEPTH;
+    const int rows = file->count;
     double push = 0;
-    int loading = *kept = fit_loading(points, rows);
-    if (loading < FIT_POINTS_MIN) {
+    file->count = fit_loading(file->points, rows);
+    if (file->count < FIT_POINTS_MIN) {
         return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%.200s:%d: depth_m: %d of %d rows go deeper than all before, at least %d "
-                         "are needed; depth is "
-                         "positive down from the surface",
-                         record->text.path, record->text.number, loading, rows, FIT_POINTS_MIN);
+                         "%.200s:%d: %s: %d of %d rows go %s than all before, at least %d "
+                         "are needed; %s",
+                         record->text.path, record->text.number, column_names[way], file->count,
+                         rows, way == CSV_DEPTH ? "deeper" : "further", FIT_POINTS_MIN,
+                         way == CSV_DEPTH ? "depth is positive down from the surface"
+                                          : "it is positive from where the stress begins");
     }
     // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): fewer are refused above
-    if (points[0].depth == points[loading - 1].depth) {
+    if (file->points[0].depth == file->points[file->count - 1].depth) {
         return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%.200s:%d: depth_m is %g in every row; a press to some depth is needed",
-                         record->text.path, record->text.number, points[0].depth);
+                         "%.200s:%d: %s is %g in every row; a %s is needed", record->text.path,
+                         record->text.number, column_names[way], file->points[0].depth,
+                         way == CSV_DEPTH ? "press to some depth" : "slip over some way");
     }
-    for (int i = 0; i < loading; i++) {
-        push += points[i].force;
+    for (int i = 0; i < file->count; i++) {
+        push += file->points[i].force;
     }
     if (push <= 0) {
-        return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%.200s:%d: force_n does not push back on the way down; it is positive "
-                         "up, on the plate",
-                         record->text.path, record->text.number);
+        return mild_fail(error, MILD_ERROR_FORMAT, "%.200s:%d: %s", record->text.path,
+                         record->text.number, no_push[file->kind]);
     }
-    fit_speeds(points, loading);
+    if (file->kind == FIT_FILE_PRESS) {
+        fit_speeds(file->points, file->count);
+    }
     return MILD_OK;
 }
 
-MildStatus fit_csv_read_file(FILE *file, const char *name, FitPoint **points, int *count,
-                             MildError *error) {
+/* The way up of a press, before its rows make room for the way down. */
+static MildStatus csv_unloading(const Record *record, FitFile *file, MildError *error) {
+    if (file->kind != FIT_FILE_PRESS || !file->count) {
+        return MILD_OK;
+    }
+    file->back = malloc(sizeof *file->back * (size_t)file->count);
+    if (!file->back) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", record->text.path);
+    }
+    file->back_count = fit_unloading(file->points, file->count, file->back);
+    for (int i = 0; i < file->back_count; i++) {
+        file->back[i].speed = file->back[i].acceleration = 0;
+    }
+    return MILD_OK;
+}
+
+MildStatus fit_csv_read_file(FILE *stream, const char *name, FitFile *file, MildError *error) {
     Record record = {.time = -INFINITY};
-    int first = *count, rows = 0;
-    MildStatus status = csv_begin(&record.text, file, name, error);
+    *file = (FitFile){.points = NULL};
+    MildStatus status = csv_begin(&record.text, stream, name, error);
     if (status == MILD_OK) {
         status = csv_header(&record, error);
     }
     if (status == MILD_OK) {
-        status = csv_rows(&record, points, count, error);
+        file->kind = record.kind;
+        status = csv_rows(&record, file, error);
     }
     if (status == MILD_OK) {
-        status =
-            csv_loading(&record, *points ? *points + first : NULL, *count - first, &rows, error);
+        status = csv_unloading(&record, file, error);
     }
-    *count = first + rows;
+    if (status == MILD_OK) {
+        status = csv_loading(&record, file, error);
+    }
     csv_end(&record.text);
     return status;
 }
 
-MildStatus fit_csv_read(const char *path, FitPoint **points, int *count, MildError *error) {
+MildStatus fit_csv_read(const char *path, FitFile *file, MildError *error) {
     MildError cause = {0};
-    FILE *file = file_open(path, &cause);
-    if (!file) {
+    *file = (FitFile){.points = NULL};
+    FILE *stream = file_open(path, &cause);
+    if (!stream) {
         return mild_fail(error, cause.status, "%.300s%s", cause.text,
                          cause.status == MILD_ERROR_IO ? "; `mild press --csv FILE` writes a record"
                                                        : "");
     }
-    MildStatus status = fit_csv_read_file(file, path, points, count, error);
-    fclose(file);
+    MildStatus status = fit_csv_read_file(stream, path, file, error);
+    fclose(stream);
     return status;
+}
+
+void fit_file_close(FitFile *file) {
+    free(file->points);
+    free(file->back);
+    *file = (FitFile){.points = NULL};
+}
+
+/* A stress s gives the torque s 2 pi int r^2 dr, a pressure p the load p pi (R^2 - r^2). */
+void fit_file_ring(FitFile *file, double outer, double inner) {
+    const double pi = 3.141592653589793;
+    const double moment = 2.0 / 3.0 * pi * (pow(outer, 3) - pow(inner, 3));
+    const double area = pi * (outer * outer - inner * inner);
+    for (int i = 0; i < file->count; i++) {
+        file->points[i].force /= moment;
+        file->points[i].load /= area;
+    }
 }

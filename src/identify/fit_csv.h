@@ -1,4 +1,4 @@
-/* Force-depth records as CSV: a header line, then numbers. */
+/* Records of a plate or a ring as CSV: a header line, then numbers. */
 #ifndef LAB_FIT_CSV_H
 #define LAB_FIT_CSV_H
 
@@ -9,13 +9,33 @@
 
 enum { FIT_CSV_ROWS_MAX = 1000000 };
 
-/* Appends the loading part of one record to *points [*count] and enlarges it. The caller frees it,
- * also after an error. Columns are found by name, in any order: depth_m, force_n, and speed_m_s or
- * time_s (without them the speed is 0). Other columns are ignored. The message names file, line,
- * column and remedy. */
-MildStatus fit_csv_read(const char *path, FitPoint **points, int *count, MildError *error);
-/* The same from an open file, which stays open;  `name` is used for it in messages. */
-MildStatus fit_csv_read_file(FILE *file, const char *name, FitPoint **points, int *count,
-                             MildError *error);
+/* What a file is, by its columns. */
+typedef enum {
+    FIT_FILE_PRESS, /* depth_m, force_n; also time_s or speed_m_s, area_m2 */
+    FIT_FILE_SHEAR, /* slip_m, shear_pa, pressure_pa */
+    FIT_FILE_RING,  /* angle_rad, torque_nm, force_n: of a ring, as torque and load */
+    FIT_FILES
+} FitFileKind;
+
+/* A file's rows. */
+typedef struct {
+    FitFileKind kind;
+    FitPoint *points; /* [count] the loading part of a press, or rows of growing slip */
+    int count;
+    FitPoint *back; /* [back_count] the unloading part of a press, see fit_unloading */
+    int back_count;
+} FitFile;
+
+/* Reads one record. Columns are found by name, in any order; others are ignored. Without times and
+ * speeds the speed is 0. A ring's torque and load are its rows' `force` and `load` until
+ * fit_file_ring. The message names file, line, column and remedy. Close the file, also after an
+ * error. */
+MildStatus fit_csv_read(const char *path, FitFile *file, MildError *error);
+/* The same from an open file, which stays open; `name` is used for it in messages. */
+MildStatus fit_csv_read_file(FILE *stream, const char *name, FitFile *file, MildError *error);
+void fit_file_close(FitFile *file);
+
+/* Torques and loads of a ring of these radii [m] become stresses. */
+void fit_file_ring(FitFile *file, double outer, double inner);
 
 #endif

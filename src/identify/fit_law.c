@@ -73,36 +73,55 @@ void fit_range(const MildField *field, double *low, double *high) {
     *high = field->max;
 }
 
-/* Bool: the force at some depth changes with the parameter. */
-static int is_sensed(MildModel model, const MildField *field, double speed, double acceleration) {
-    const FitPlate plate = {1, 0.0195, 0.1, NULL};
-    const FitPoint point = {.depth = 0.005, .speed = speed, .acceleration = acceleration};
-    MildMaterial material = mild_material_default();
-    double before, after;
-    material.model = (int)model;
-    fit_forces(&plate, &material, &point, 1, &before);
-    *fit_number(&material, field) *= 1.01;
-    fit_forces(&plate, &material, &point, 1, &after);
-    return after != before;
-}
-
-int fit_is_geometry(MildModel model, const char *name) {
+/* Bool: the model reads the field. */
+static int reads(MildModel model, const char *name) {
     const MildModelInfo *info = mild_model_info(model);
     int read = 0;
     for (int i = 0; i < MILD_MODEL_FIELDS && info->fields[i]; i++) {
         read |= strcmp(info->fields[i], name) == 0;
     }
-    return read && (strcmp(name, "bed_depth") == 0 || strcmp(name, "plate_width") == 0);
+    return read;
 }
 
-int fit_parameters(MildModel model, const MildField *fields[FIT_PARAMETERS_MAX]) {
+MildMaterial fit_probe(void) {
+    MildMaterial probe = mild_material_default();
+    probe.recovery = 0.5;
+    return probe;
+}
+
+/* Bool: the force in some row changes with the parameter. */
+static int is_sensed(MildModel model, FitKind kind, const MildField *field, double speed,
+                     double acceleration) {
+    const FitPlate plate = {.elements = 1, .pitch = 0.0195, .width = 0.1};
+    const FitPoint points[2] = {
+        {.depth = 0.005, .force = 1, .speed = speed, .acceleration = acceleration, .load = 0.005},
+        {.depth = 0.004,
+         .force = 0.5,
+         .speed = speed,
+         .acceleration = acceleration,
+         .load = 0.005}};
+    MildMaterial material = fit_probe();
+    double before[2], after[2];
+    material.model = (int)model;
+    fit_forces(kind, &plate, &material, points, 2, before);
+    *fit_number(&material, field) *= 1.01;
+    fit_forces(kind, &plate, &material, points, 2, after);
+    return after[0] != before[0] || after[1] != before[1];
+}
+
+int fit_is_geometry(MildModel model, const char *name) {
+    return reads(model, name) &&
+           (strcmp(name, "bed_depth") == 0 || strcmp(name, "plate_width") == 0);
+}
+
+int fit_parameters(MildModel model, FitKind kind, const MildField *fields[FIT_PARAMETERS_MAX]) {
     const MildModelInfo *info = mild_model_info(model);
     int count = 0;
     for (int i = 0; i < MILD_MODEL_FIELDS && info->fields[i]; i++) {
         const MildField *field =
             mild_field_find(mild_material_fields, mild_material_field_count, info->fields[i], NULL);
         if (field->type == MILD_FIELD_DOUBLE && !fit_is_geometry(model, field->name) &&
-            is_sensed(model, field, 1, 1)) {
+            is_sensed(model, kind, field, 1, 1)) {
             fields[count++] = field;
         }
     }
@@ -110,7 +129,7 @@ int fit_parameters(MildModel model, const MildField *fields[FIT_PARAMETERS_MAX])
 }
 
 int fit_is_rate(MildModel model, const MildField *field) {
-    return !is_sensed(model, field, 0, 0);
+    return !is_sensed(model, FIT_PRESS, field, 0, 0);
 }
 
 /* ---- force ---- */
@@ -185,21 +204,82 @@ static void plate_forces(const FitPlate *plate, const MildMaterial *raw, const F
     }
     const Law law = law_of(raw, plate->pitch, plate->width);
     const int curves = law_curves(&law);
+    const double each = plate->pitch * plate->pitch;
+    const int pressure = reads((MildModel)raw->model, "plate_width");
     for (int i = 0; i < count; i++) {
-        force[i] = plate->elements * point_force(&law, curves, &points[i]);
+        const double area = points[i].area > 0 ? points[i].area : plate->area;
+        const double elements = pressure && area > 0 ? area / each : plate->elements;
+        force[i] = elements * point_force(&law, curves, &points[i]);
     }
 }
 
-void fit_forces(const FitPlate *plates, const MildMaterial *material, const FitPoint *points,
-                int count, double *force) {
+/* The same of rows on one way up. The force at its beginning is what fits them best. */
+static void unload_forces(const MildMaterial *raw, const FitPoint *points, int count,
+                          double *force) {
+    double along = 0, square = 0;
+    for (int i = 0; i < count; i++) {
+        const double deepest = points[i].load;
+        const double travel = fmax(raw->recovery * deepest, fmin(ELEMENT_ELASTIC, deepest));
+        force[i] = fmax(1 - (deepest - points[i].depth) / travel, 0);
+        along += force[i] * points[i].force;
+        square += force[i] * force[i];
+    }
+    const double most = square > 0 ? fmax(along / square, 0) : 0;
+    for (int i = 0; i < count; i++) {
+        force[i] *= most;
+    }
+}
+
+/* [-] Share of the shear strength that a slip, or a ring's angle, has built up. Of a ring by
+ * Simpson's rule. */
+static double built_up(const FitPlate *plate, double slip, double length) {
+    enum { PARTS = 32 };
+    if (plate->outer <= 0) {
+        return -expm1(-slip / length);
+    }
+    const double width = (plate->outer - plate->inner) / PARTS;
+    double sum = 0, all = 0;
+    for (int i = 0; i <= PARTS; i++) {
+        const double radius = plate->inner + i * width;
+        const double weight = (i == 0 || i == PARTS ? 1 : i % 2 ? 4 : 2) * radius * radius;
+        sum += weight * -expm1(-slip * radius / length);
+        all += weight;
+    }
+    return sum / all;
+}
+
+/* [N/m^2] The same of rows that slide. */
+static void shear_forces(const FitPlate *plate, const MildMaterial *raw, const FitPoint *points,
+                         int count, double *force) {
+    const int sheared = reads((MildModel)raw->model, "shear_length");
+    for (int i = 0; i < count; i++) {
+        force[i] = sheared ? (raw->cohesion + points[i].load * raw->mu) *
+                                 built_up(plate, points[i].depth, raw->shear_length)
+                           : 0;
+    }
+}
+
+/* Bool: a row belongs with the one before it. */
+static int is_next(FitKind kind, const FitPoint *row) {
+    return row->plate == row[-1].plate && (kind != FIT_UNLOAD || row->depth < row[-1].depth);
+}
+
+void fit_forces(FitKind kind, const FitPlate *plates, const MildMaterial *material,
+                const FitPoint *points, int count, double *force) {
     MildMaterial raw = *material;
     raw.passive = 0;
     raw.plate_width = 0;
     for (int first = 0, end; first < count; first = end) {
-        for (end = first + 1; end < count && points[end].plate == points[first].plate; end++) {
+        const FitPlate *plate = &plates[points[first].plate];
+        for (end = first + 1; end < count && is_next(kind, &points[end]); end++) {
             continue;
         }
-        plate_forces(&plates[points[first].plate], &raw, points + first, end - first,
-                     force + first);
+        if (kind == FIT_UNLOAD) {
+            unload_forces(&raw, points + first, end - first, force + first);
+        } else if (kind == FIT_SHEAR) {
+            shear_forces(plate, &raw, points + first, end - first, force + first);
+        } else {
+            plate_forces(plate, &raw, points + first, end - first, force + first);
+        }
     }
 }

@@ -1,10 +1,19 @@
-/* What a press straight down tells of a model's parameters, and the force that it meets.
+/* What the rows of a record tell of a model's parameters, and the force that they should have.
  *
  * A level plate of n elements that goes down at the speed w into virgin ground meets
  *     F(u, w) = n (F_g(u) + d F_e(u) w + c_d m_a'(u) w^2 + m_a(u) dw/dt)
  * (eqs 4 and 5; F_e, d: hunt_crossley alone). Some parameters act in a combination only: of the
  * developing cone k_pen, sigma_cone/cos(alpha), u_f = R tan(alpha)/nu and the drag's
- * c_g c_d phi rho nu; of bekker exponent and k_c/b + k_phi. Pure functions: thread safe. */
+ * c_g c_d phi rho nu; of bekker exponent and k_c/b + k_phi.
+ *
+ * On its way up from the greatest depth a, where it met F_a, the plate meets
+ *     F(u) = F_a max(1 - (a - u)/e, 0),   e = max(recovery a, 0.1 mm)
+ * F_a is that of the rows themselves, by least squares, so that recovery alone is asked of them.
+ *
+ * Under the pressure p the ground of bekker resists a slip j by the shear stress
+ *     s(j) = (cohesion + p mu) (1 - exp(-j/shear_length))
+ * and a ring that turns by an angle by the mean of s over it, weighted by the radius, which is its
+ * torque over that of a stress of 1. Pure functions: thread safe. */
 #ifndef LAB_FIT_LAW_H
 #define LAB_FIT_LAW_H
 
@@ -13,12 +22,15 @@
 
 enum { FIT_PARAMETERS_MAX = MILD_MODEL_FIELDS };
 
-/* A plate, in the elements of its model. */
+/* A plate, in the elements of its model, or a ring. bekker asks for a pressure on an area, which
+ * the elements of a raster have only about; the other models for the force of each element. */
 typedef struct {
     int elements;
     double pitch;         /* [m] */
-    double width;         /* [m] its shorter side: plate_width of bekker */
+    double width;         /* [m] its shorter side, of a disc the radius: plate_width of bekker */
     const MildSole *sole; /* borrowed, for mild_merged; NULL: every element is a disc by itself */
+    double area;          /* [m^2] 0: that of the elements */
+    double outer, inner;  /* [m] radii of a ring that turns; 0: what slides does not turn */
 } FitPlate;
 
 /* What the data tell where they do not tell a parameter by itself. */
@@ -35,9 +47,11 @@ typedef struct {
 /* The combination that a parameter carries, or NULL. */
 const FitCombination *fit_combination(const char *carrier);
 
-/* The parameters of a model that a press straight down can sense, in the order of its fields.
- * Returns their count; 0 for rigid. */
-int fit_parameters(MildModel model, const MildField *fields[FIT_PARAMETERS_MAX]);
+/* The parameters of a model that such rows can sense, in the order of its fields. Returns their
+ * count; 0 for rigid, and for FIT_SHEAR of a model without a law of shear. */
+int fit_parameters(MildModel model, FitKind kind, const MildField *fields[FIT_PARAMETERS_MAX]);
+/* The default material, with numbers for which everything has an effect. */
+MildMaterial fit_probe(void);
 /* Bool: the force depends on it only through speed or acceleration. */
 int fit_is_rate(MildModel model, const MildField *field);
 /* Bool: a number that is never fitted: bed_depth, which may be held, or bekker's plate_width, which
@@ -49,9 +63,9 @@ void fit_range(const MildField *field, double *low, double *high);
 /* The number of a material. */
 double *fit_number(MildMaterial *material, const MildField *field);
 
-/* [N] The force in every row on its plate: force[count]. plates: those that the rows name. The
- * material's `passive` and plate_width are ignored. */
-void fit_forces(const FitPlate *plates, const MildMaterial *material, const FitPoint *points,
-                int count, double *force);
+/* [N], of FIT_SHEAR [N/m^2]: the force in every row on its plate: force[count]. plates: those that
+ * the rows name. The material's `passive` and plate_width are ignored. */
+void fit_forces(FitKind kind, const FitPlate *plates, const MildMaterial *material,
+                const FitPoint *points, int count, double *force);
 
 #endif

@@ -7,6 +7,10 @@
 
 enum { LOCAL_ROWS = 200, TERMS = 5 };
 
+/* [1/s] A way up faster than this by its depth, such as the rebound of a dropped body, is not the
+ * unloading line: ground follows 5 ms late (docs/model.md section 6). */
+#define UNLOAD_RATE 2.0
+
 int fit_loading(FitPoint *points, int count) {
     int kept = 0;
     double deepest = DBL_MIN; /* at depth 0 the law gives no information */
@@ -18,6 +22,26 @@ int fit_loading(FitPoint *points, int count) {
         points[kept++] = points[i];
     }
     return kept;
+}
+
+int fit_unloading(const FitPoint *points, int count, FitPoint *back) {
+    int top = 0, kept = 0;
+    for (int i = 1; i < count; i++) {
+        top = points[i].depth > points[top].depth ? i : top;
+    }
+    for (int i = top; i < count; i++) {
+        const double depth = points[i].depth;
+        if (depth > 0 && (!kept || depth < back[kept - 1].depth)) {
+            back[kept] = points[i];
+            back[kept++].load = points[top].depth;
+        }
+    }
+    if (kept < FIT_POINTS_MIN) {
+        return 0;
+    }
+    const FitPoint *middle = &back[kept / 2];
+    const double rate = (back->depth - middle->depth) / (middle->time - back->time); /* NaN: slow */
+    return rate > UNLOAD_RATE * back->depth ? 0 : kept;
 }
 
 /* Speed and acceleration of row `i` from a least-squares polynomial through the depths around it.

@@ -76,7 +76,7 @@ static double dot(const double *a, const double *b, int count) {
 
 static void forces(const Fit *fit, double *force) {
     const MildMaterial material = fit_material(fit);
-    fit_forces(fit->plates, &material, fit->points, fit->count, force);
+    fit_forces(fit->kind, fit->plates, &material, fit->points, fit->count, force);
 }
 
 static double fit_miss(Fit *fit) {
@@ -191,8 +191,8 @@ static double fit_descend(Fit *fit) {
 
 /* The coordinate that shapes the curve: the sum of squares may have several minima in it. */
 static int shape_find(const Fit *fit) {
-    static const char *const shapes[] = {"nu", "alpha", "exponent"};
-    for (int s = 0; s < 3; s++) {
+    static const char *const shapes[] = {"nu", "alpha", "exponent", "shear_length", "recovery"};
+    for (size_t s = 0; s < sizeof shapes / sizeof *shapes; s++) {
         for (int p = 0; p < fit->coordinates; p++) {
             if (strcmp(fit->coordinate[p].field->name, shapes[s]) == 0) {
                 return p;
@@ -292,9 +292,11 @@ void fit_minimise(Fit *fit) {
     memcpy(found, start, sizeof found);
     for (int s = 0; s < (shape >= 0 ? FIT_STARTS : 1); s++) {
         memcpy(fit->value, start, sizeof start);
-        if (s) { /* at 1/5 .. 4/5 of its range, in ratios */
+        if (s) { /* at 1/5 .. 4/5 of its range, in ratios where that does not begin at 0 */
             const FitCoordinate *c = &fit->coordinate[shape];
-            fit->value[shape] = c->low * pow(c->high / c->low, (double)s / FIT_STARTS);
+            const double share = (double)s / FIT_STARTS;
+            fit->value[shape] =
+                c->low > 0 ? c->low * pow(c->high / c->low, share) : share * c->high;
         }
         const double sum = fit_descend(fit);
         if (sum < least) {

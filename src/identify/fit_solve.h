@@ -16,6 +16,7 @@ typedef struct {
 } FitCoordinate;
 
 typedef struct {
+    FitKind kind; /* of the points */
     const FitPlate *plates;
     const FitPoint *points;
     int count;

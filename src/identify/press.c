@@ -36,6 +36,22 @@ MildSole *press_plate_create(double length, double width, MildError *error) {
     return mild_sole_create(&def, error);
 }
 
+MildSole *press_disc_create(double diameter, MildError *error) {
+    enum { CORNERS = 96 };
+    double outline[2 * CORNERS];
+    for (int i = 0; i < CORNERS; i++) {
+        const double angle = 2 * 3.141592653589793 * (i + 0.5) / CORNERS;
+        outline[2 * i] = 0.5 * diameter * cos(angle);
+        outline[2 * i + 1] = 0.5 * diameter * sin(angle);
+    }
+    MildSoleDef def = {.outline = outline, .points = CORNERS, .pitch = paper_pitch};
+    return mild_sole_create(&def, error);
+}
+
+double press_disc_area(double diameter) {
+    return 0.25 * 3.141592653589793 * diameter * diameter;
+}
+
 void press_result_close(PressResult *result) {
     free(result->rows);
     result->rows = NULL;

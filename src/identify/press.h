@@ -83,5 +83,8 @@ void press_result_close(PressResult *result);
 
 /* A rectangular sole of length x width at the paper's pitch, centred under its reference point. */
 MildSole *press_plate_create(double length, double width, MildError *error);
+/* A round one, and its area [m^2], which the elements have only about. */
+MildSole *press_disc_create(double diameter, MildError *error);
+double press_disc_area(double diameter);
 
 #endif

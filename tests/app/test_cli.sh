@@ -39,7 +39,7 @@ bad "nearest is 'ground.k_pen'" "$mild" press --ground sand_loose --ground.k_pem
 bad "outside" "$mild" press --ground sand_loose --ground.k_pen=-5
 bad "outside" "$mild" press --ground sand_loose --depth 7
 bad "not a number" "$mild" press --ground sand_loose --speed fast
-bad "neither LENGTH,WIDTH" "$mild" press --ground sand_loose --plate 0.1
+bad "neither LENGTH,WIDTH" "$mild" press --ground sand_loose --plate 0.1x
 bad "engine's own contact" "$mild" press --ground sand_loose --model rigid
 bad "nearest is 'con_cone'" "$mild" press --ground sand_loose --model con_cnoe
 bad "contradict each other" "$mild" press --ground sand_loose --model con_cone --ground.model=mild
@@ -53,13 +53,13 @@ bad "leave out --cycles" "$mild" press --ground sand_loose --drag 0.1 --cycles 2
 bad "pushes with" "$mild" press --ground sand_loose --force 1e6
 bad "No space left" "$mild" press --ground sand_loose --csv /dev/full
 expect 0 'peak .* N' "$mild" press --ground foam45 --plate 0.1,0.1 --csv press.csv
-[ "$(head -1 press.csv)" = "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m" ] || fail "columns of press.csv"
-awk -F, 'NR == 1 { next } NF != 7 || (NR > 2 && $1 <= time) { exit 1 } { time = $1 } $2 > depth { depth = $2 }
+[ "$(head -1 press.csv)" = "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m,area_m2" ] || fail "columns of press.csv"
+awk -F, 'NR == 1 { next } NF != 8 || (NR > 2 && $1 <= time) { exit 1 } { time = $1 } $2 > depth { depth = $2 }
     END { exit !(NR > 100 && depth == 0.03) }' press.csv ||
     fail "rows of press.csv"
 expect 0 'peak .* N' "$mild" press --ground sand_loose --plate sole --tilt 5
 expect 0 'work of the drag' "$mild" press --ground grass --depth 0.01 --drag 0.05 --figure drag.png
-[ -s drag.png ] && [ "$(head -1 drag.csv)" = "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m,force_x_n,force_y_n,x_m,tilt_rad" ] ||
+[ -s drag.png ] && [ "$(head -1 drag.csv)" = "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m,area_m2,force_x_n,force_y_n,x_m,tilt_rad" ] ||
     fail "figure or columns of a drag"
 expect 0 'first stop' "$mild" press --ground sand_dense --drop 0.05 --mass 5
 expect 0 '^ *3 .* 300.000 ' "$mild" press --ground foam45 --force 300,50 --cycles 3

@@ -67,7 +67,7 @@ grep -q '^not determined by these data: sigma_cone, alpha, nu, c_g, c_d, phi, rh
 grep -q '^alpha  *-  *-  *-  rad' table.txt || fail "alpha has a value"
 grep -q '^the intervals assume no firm bed down to 0.04 m' table.txt || fail "the bed"
 grep -q '^a press at another speed or a drop tells more of c_g, c_d' table.txt || fail "one speed"
-grep -q '^no press straight down tells mu, k_drift, b_drift, recovery' table.txt || fail "what no press tells"
+grep -q '^no press straight down tells mu, k_drift, b_drift, slip_length' table.txt || fail "what no press tells"
 "$mild" fit foam45.csv "${plate[@]}" --hold alpha=1.1,c_g=0 >table.txt
 grep -q '^the intervals assume alpha = 1.1, c_g = 0$' table.txt || fail "what is held"
 "$mild" fit foam45.csv "${plate[@]}" --hold-from foam45 >table.txt
@@ -140,8 +140,16 @@ near "two plates: k_c" "$(value clay.json k_c)" 13190 0.5
 near "two plates: k_phi" "$(value clay.json k_phi)" 692150 0.5
 refuse '--plate: 2 plates for 1 file; give one' "$mild" fit small.csv --plate 0.15,0.1 --plate 0.3,0.1
 refuse '--plate: 2 plates for 3 files' "$mild" fit small.csv large.csv small.csv --plate 0.15,0.1 --plate 0.3,0.1
-refuse '--plate: 3 numbers; it takes LENGTH,WIDTH' "$mild" fit small.csv --plate 0.15,0.1,0.1
+refuse '--plate: 3 numbers; it takes LENGTH,WIDTH in metres, or the DIAMETER' "$mild" fit small.csv --plate 0.15,0.1,0.1
 refuse '--hold plate_width: it is the shorter side' "$mild" fit wide.csv --plate 0.3,0.2 --model bekker --hold plate_width=0.1
+
+# the way up tells recovery: of foam at least all but a little, of sand at most a little, of grass a half
+"$mild" fit foam45.csv "${plate[@]}" | grep -q '^recovery  *-  *0.99[0-9]*  *-  -$' || fail "foam springs back"
+"$mild" press --ground grass --depth 0.04 --csv grass.csv >/dev/null
+"$mild" fit grass.csv "${plate[@]}" --json fit.json >table.txt
+near "grass: recovery" "$(value fit.json recovery)" 0.5 2
+"$mild" press --ground clay --plate 0.05 --depth 0.04 --csv round.csv >round.txt
+grep -q 'a round plate of 0.05 m: 5 elements' round.txt || fail "a round plate: $(cat round.txt)"
 
 # the columns may stand in any order, with remarks and Windows line ends
 printf '\xef\xbb\xbf# a remark\r\nforce_n, depth_m\r\n' >order.csv
@@ -158,7 +166,7 @@ edit() { awk -F, -v OFS=, "$1" sand_loose.csv >bad.csv; }
 refuse 'missing.csv: cannot read.*mild press' "${fit[@]}" missing.csv "${plate[@]}"
 refuse 'no record given' "${fit[@]}" "${plate[@]}"
 refuse '--plate' "${fit[@]}" sand_loose.csv
-refuse '--plate' "${fit[@]}" sand_loose.csv --plate 0.2
+refuse '--plate' "${fit[@]}" sand_loose.csv --plate 0.2m
 refuse "'k_pem' is no parameter .* nearest is 'k_pen'" "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pem --hold-from foam45
 refuse '--fit needs --hold-from' "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pen
 refuse "nearest is 'sand_loose'" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold-from sand_lose
@@ -181,7 +189,7 @@ edit 'NR == 9 { $2 = "" } { print }' && refuse 'bad.csv:9: depth_m is missing; f
 edit 'NR == 9 { print $1; next } { print }' && refuse 'bad.csv:9: depth_m is missing' "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR == 9 { $2 = "1 mm" } { print }' && refuse "bad.csv:9: depth_m '1 mm'" "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR == 9 { $3 = "1e999" } { print }' && refuse "bad.csv:9: force_n '1e999' is not a finite" "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $3 = "12,5" } { print }' && refuse 'bad.csv:9: 8 values under 7 columns; a decimal point' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $3 = "12,5" } { print }' && refuse 'bad.csv:9: 9 values under 8 columns; a decimal point' "${fit[@]}" bad.csv "${plate[@]}"
 awk 'BEGIN { print "depth_m,force_n"; for (i = 0; i <= 1000000; i++) print i * 1e-8 "," i }' >bad.csv
 refuse 'bad.csv:1000002: more than 1000000 rows; take every tenth' "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR == 9 { $1 = 0 } { print }' && refuse 'bad.csv:9: time_s 0 does not come after' "${fit[@]}" bad.csv "${plate[@]}"

@@ -27,7 +27,7 @@ static void courses_have_bounds(void **state) {
     (void)state;
     Scene scene;
     MildError error = {0};
-    char name[64], text[400] = "rubber";
+    char name[64], text[SCENE_NAME_SIZE + 80] = "rubber";
     assert_int_not_equal(scene_make(&scene, "sand", 2, &error), MILD_OK);
     assert_non_null(strstr(error.text, "known: rigid, "));
     for (int i = 0; i < mild_material_preset_count(); i++) {

@@ -1,5 +1,5 @@
-/* Any bytes as a force-depth record. Refused with a message, or (a sample: a fit takes a thousand
- * times longer than a file) fitted to finite values inside their bounds. */
+/* Any bytes as a record of a press, a slip or a ring. Refused with a message, or (a sample: a fit
+ * takes a thousand times longer than a file) fitted to finite values inside their bounds. */
 #include <stdio.h>
 
 #include "fuzz.h"
@@ -16,9 +16,10 @@ static void check(const FitValue *value) {
     }
 }
 
-static void fit(const FitPoint *points, int count, int model) {
+static void fit(FitKind kind, const FitPoint *points, int count, int model) {
     const MildMaterial fill = mild_material_default();
-    FitDef def = {.plate = {{55, 0.0195, 0.1, NULL}},
+    FitDef def = {.kind = kind,
+                  .plate = {{.elements = 55, .pitch = 0.0195, .width = 0.1, .outer = 0.05}},
                   .plates = 1,
                   .material = fill,
                   .fill = model % 2 ? &fill : NULL};
@@ -44,23 +45,32 @@ static void fit(const FitPoint *points, int count, int model) {
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    FitPoint *points = NULL;
-    int count = 0;
+    FitFile record;
     MildError error = {0};
     FILE *file = size ? fmemopen((void *)(uintptr_t)data, size, "r") : NULL;
     if (!file) {
         return 0;
     }
-    MildStatus status = fit_csv_read_file(file, "record", &points, &count, &error);
+    MildStatus status = fit_csv_read_file(file, "record", &record, &error);
     fclose(file);
     if (status == MILD_OK) {
-        fuzz_check(count >= FIT_POINTS_MIN);
-        if (count < 24 && fuzz_sample(data, size, 4096)) {
-            fit(points, count, data[size - 1] % (2 * MILD_MODEL_RIGID));
+        const int model = data[size - 1] % (2 * MILD_MODEL_RIGID);
+        const int press = record.kind == FIT_FILE_PRESS;
+        fuzz_check(record.count >= FIT_POINTS_MIN);
+        fuzz_check(record.back_count == 0 || (press && record.back_count >= FIT_POINTS_MIN));
+        if (record.kind == FIT_FILE_RING) {
+            fit_file_ring(&record, 0.05, 0.02);
+        }
+        if (record.count < 24 && fuzz_sample(data, size, press ? 4096 : 64)) {
+            fit(press ? FIT_PRESS : FIT_SHEAR, record.points, record.count,
+                press ? model : 2 * MILD_MODEL_BEKKER + model % 2);
+        }
+        if (record.back_count && record.back_count < 24 && fuzz_sample(data, size, 64)) {
+            fit(FIT_UNLOAD, record.back, record.back_count, model);
         }
     } else {
         fuzz_check(error.status == status && error.text[0]);
     }
-    free(points);
+    fit_file_close(&record);
     return 0;
 }

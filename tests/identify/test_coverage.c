@@ -65,12 +65,14 @@ static void noise_add(FitPoint *rows, Noise noise, Random *random) {
 }
 
 static FitResult press_and_fit(const Case *c, Noise noise, int draw) {
-    FitDef def = {.plate = {{55, 0.0195, 0.1, NULL}}, .plates = 1, .material = c->material};
+    FitDef def = {.plate = {{.elements = 55, .pitch = 0.0195, .width = 0.1}},
+                  .plates = 1,
+                  .material = c->material};
     Random random = random_at((uint64_t)(1000 + draw), (uint32_t)noise, (uint32_t)c->number);
     FitResult result;
     MildError error = {0};
     if (mild_model_is_concentric((MildModel)c->material.model)) {
-        def.plate[0] = (FitPlate){1, sqrt(55) * 0.0195, 0.1, NULL};
+        def.plate[0] = (FitPlate){.elements = 1, .pitch = sqrt(55) * 0.0195, .width = 0.1};
     }
     for (int r = 0; r < c->records; r++) {
         for (int i = 0; i < ROWS; i++) {

@@ -17,7 +17,7 @@ typedef enum {
 static FitPoint points[3 * ROWS], many[50 * ROWS];
 
 static FitDef plate(const char *ground) {
-    FitDef def = {.plate = {{55, 0.0195, 0.1, NULL}}, .plates = 1};
+    FitDef def = {.plate = {{.elements = 55, .pitch = 0.0195, .width = 0.1}}, .plates = 1};
     assert_true(mild_material_preset(ground, &def.material));
     def.material.bed_depth = 10;
     return def;
@@ -41,7 +41,7 @@ static FitValue *value_of(FitResult *result, const char *name) {
 /* Holds "name name ..." at the numbers of the material. */
 static void hold(FitDef *def, const char *names) {
     const MildField *fields[FIT_PARAMETERS_MAX];
-    const int count = fit_parameters((MildModel)def->material.model, fields);
+    const int count = fit_parameters((MildModel)def->material.model, FIT_PRESS, fields);
     char padded[200], name[64];
     snprintf(padded, sizeof padded, " %s ", names);
     for (int i = 0; i < count; i++) {
@@ -251,7 +251,7 @@ static void models(void **state) {
     assert_int_equal(sizeof rows / sizeof *rows, MILD_MODELS);
     for (int r = 0; r < MILD_MODELS; r++) {
         const MildField *fields[FIT_PARAMETERS_MAX];
-        const int count = fit_parameters(rows[r].model, fields);
+        const int count = fit_parameters(rows[r].model, FIT_PRESS, fields);
         char names[200] = "";
         for (int i = 0; i < count; i++) {
             snprintf(names + strlen(names), sizeof names - strlen(names), "%s ", fields[i]->name);
@@ -294,8 +294,8 @@ static void plates(void **state) {
     static const char *const grounds[] = {"foam45", "clay", "sandy_loam"};
     for (size_t g = 0; g < sizeof grounds / sizeof *grounds; g++) {
         FitDef truth = plate(grounds[g]);
-        truth.plate[0] = (FitPlate){40, 0.0195, 0.1, NULL};
-        truth.plate[1] = (FitPlate){160, 0.0195, 0.2, NULL};
+        truth.plate[0] = (FitPlate){.elements = 40, .pitch = 0.0195, .width = 0.1};
+        truth.plate[1] = (FitPlate){.elements = 160, .pitch = 0.0195, .width = 0.2};
         truth.plates = 2;
         for (int i = 0; i < 2 * ROWS; i++) {
             points[i] =
@@ -338,8 +338,10 @@ static void merged_plates(void **state) {
         const MildSoleDef def = {outline, 4, 0.0195, 0, 0};
         soles[i] = mild_sole_create(&def, NULL);
         assert_non_null(soles[i]);
-        truth.plate[i] = (FitPlate){mild_sole_elements(soles[i]), mild_sole_pitch(soles[i]),
-                                    mild_sole_width(soles[i]), soles[i]};
+        truth.plate[i] = (FitPlate){.elements = mild_sole_elements(soles[i]),
+                                    .pitch = mild_sole_pitch(soles[i]),
+                                    .width = mild_sole_width(soles[i]),
+                                    .sole = soles[i]};
     }
     for (int i = 0; i < 2 * ROWS; i++) {
         points[i] =

@@ -1,6 +1,7 @@
 """The ground of the package: numbers compared with formulas, with the program, and with the laws of mechanics."""
 import copy
 import os
+import pathlib
 import pickle
 import subprocess
 import tempfile
@@ -305,6 +306,34 @@ class Material(unittest.TestCase):
         for name in mild.presets():
             mild.Material(name)
 
+    def test_file(self):
+        """A soil's file comes back to the last digit, wherever it is read; what is wrong names file, line and key."""
+        soil = mild.Material("clay", mu=1 / 3, k_c=np.nextafter(13190, 2e4))
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "mars.ini"
+            soil.save(path, head="from my bevameter\nring 12", notes={"mu": "tan of 18.4 degrees"})
+            self.assertEqual(mild.Material(str(path)), soil)
+            self.assertEqual(mild.Material(path, mu=0.5).mu, 0.5)
+            text = path.read_text()
+            self.assertTrue(text.startswith("# from my bevameter\n# ring 12\n[ground]\nmodel = bekker\n"), text)
+            self.assertIn("# tan of 18.4 degrees\nmu = ", text)
+            self.assertEqual(mild.press(path, mild.Sole.plate(0.2, 0.1), depth=0.01).peak_force,
+                             mild.press(soil, mild.Sole.plate(0.2, 0.1), depth=0.01).peak_force)
+            if PROGRAM:
+                out = subprocess.run([PROGRAM, "press", "--ground", path, "--depth", "0.01"], capture_output=True, text=True, check=True)
+                self.assertIn(f"{path} (bekker)", out.stdout)
+            for call, error, words in ((lambda: soil.save(pathlib.Path(folder) / "mars.txt"), ValueError, "ends in .ini"),
+                                       (lambda: soil.save(pathlib.Path(folder) / "no" / "mars.ini"), Exception, "mars.ini"),
+                                       (lambda: soil.save(path, notes={"mv": "x"}), ValueError, "'mv'"),
+                                       (lambda: soil.save(3), TypeError, ""),
+                                       (lambda: mild.Material(folder + "/venus.ini"), Exception, "venus.ini")):
+                with self.assertRaisesRegex(error, words):
+                    call()
+            self.assertEqual(mild.Material(path), soil)
+            path.write_text(text.replace("\nmu =", "\nmv ="))
+            with self.assertRaisesRegex(ValueError, r"mars.ini:\d+: unknown key 'mv'; nearest is 'mu'"):
+                mild.Material(path)
+
     def test_match(self):
         """The same sinkage under the load, by the definition of a match."""
         sole = mild.Sole.plate(0.2, 0.1)
@@ -370,6 +399,30 @@ class Fit(unittest.TestCase):
                 fit.fit(X, y[:1])
         with self.assertRaisesRegex(ValueError, "plate_width"):
             mild.GroundFit(model="bekker", hold={"plate_width": 0.1}).fit(X[0], y[0])
+
+    def test_save(self):
+        """What was fitted becomes a soil's file, the rest is the fill's; numbers that nobody knows are refused."""
+        truth, X = mild.Material("clay", k_c=9000, mu=0.3), [np.linspace(0.001, 0.04, 60)[:, None]] * 2
+        sizes = [(0.1, 0.08), (0.3, 0.2)]
+        y = [mild.Sole.plate(*size).elements * 0.0195**2 * (truth.k_c / min(size) + truth.k_phi) * x[:, 0] ** truth.exponent
+             for size, x in zip(sizes, X)]
+        fit = mild.GroundFit(sizes, model="bekker", fill=truth)
+        with self.assertRaisesRegex(RuntimeError, "nothing is fitted"):
+            fit.save("x.ini")
+        fit.fit(X, y)
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "clay.ini"
+            fit.save(path)
+            found = mild.Material(path)
+            self.assertAlmostEqual(found.k_c, 9000, delta=20)
+            self.assertEqual((found.mu, found.cohesion), (0.3, truth.cohesion))
+            self.assertEqual(found.k_c, fit.parameters_["k_c"])
+            self.assertRegex(path.read_text(), r"# 95 %: [0-9.]+ \.\. [0-9.]+ N/m\^\(n\+1\)\nk_c = ")
+            with self.assertRaisesRegex(ValueError, "friction and what else no press tells"):
+                mild.GroundFit(sizes, model="bekker").fit(X, y).save(path)
+            with self.assertRaisesRegex(ValueError, "k_c, k_phi: not known"):
+                mild.GroundFit(sizes[0], model="bekker").fit(X[0], y[0]).save(path)
+            self.assertEqual(mild.Material(path), found)
 
     def test_merged(self):
         """Cones of one plate merge: a press on it gives its numbers back, and the fit plays the force of the press."""

@@ -198,6 +198,40 @@ class Attach(unittest.TestCase):
             self.assertAlmostEqual(found, wanted, delta=0.01 * wanted)
         self.assertGreater(depths[0], 1.1 * depths[2])
 
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_file(self):
+        """A soil's file under a plate; its numbers are in the model, which outlives the file. In a list the plugin reads it."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "hard rubber.ini"
+            mild.Material("rubber", k_pen=4000).save(path)
+            spec = mujoco.MjSpec.from_string(PLATE)
+            mild.attach(spec, ["plate"], path)
+            path.unlink()
+            model = spec.compile()
+            data = mujoco.MjData(model)
+            mujoco.mj_step(model, data, 1500)
+            wanted = fall(mild.Material("rubber", k_pen=4000))
+            self.assertAlmostEqual(0.01 - data.qpos[2], wanted, delta=0.01 * wanted)
+            path = path.with_name("hard.ini")
+            mild.Material("rubber", k_pen=4000).save(path)
+            for grounds, found in (([path, "grass"], wanted), (["grass", path], fall(mild.Material("grass")))):
+                spec = mujoco.MjSpec.from_string(PLATE)
+                mild.attach(spec, ["plate"], grounds, terrain__patches="stripes", terrain__patch_size=2)
+                model = spec.compile()
+                data = mujoco.MjData(model)
+                data.qpos[0] = 1
+                mujoco.mj_step(model, data, 1500)
+                self.assertAlmostEqual(0.01 - data.qpos[2], found, delta=0.01 * found)
+            path.write_text("[ground]\npreset = rubbr\n")
+            spec = mujoco.MjSpec.from_string(PLATE)
+            with self.assertRaisesRegex(ValueError, "hard.ini:2: preset: unknown ground 'rubbr'; nearest is 'rubber'"):
+                mild.attach(spec, ["plate"], path)
+            mild.attach(spec, ["plate"], [path, "grass"], terrain__patches="stripes")
+            with self.assertRaisesRegex(ValueError, "hard.ini:2: preset: unknown ground 'rubbr'"):
+                spec.compile()
+            with self.assertRaisesRegex(ValueError, "without blanks"):
+                mild.attach(mujoco.MjSpec.from_string(PLATE), ["plate"], [pathlib.Path(folder) / "a b.ini", "grass"])
+
 
 def fall(material):
     """Depth at which the plate of PLATE rests."""

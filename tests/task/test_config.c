@@ -168,7 +168,9 @@ static void nominal(void **unused) {
             k++;
         }
         if (k == sizeof still / sizeof *still) {
-            size_t bytes = field->type == MILD_FIELD_DOUBLE ? sizeof(double) : sizeof(int);
+            size_t bytes = field->type == MILD_FIELD_DOUBLE ? sizeof(double)
+                           : field->type == MILD_FIELD_TEXT ? 1
+                                                            : sizeof(int);
             assert_memory_equal(at, (const char *)&plain.randomize + field->offset,
                                 bytes * (size_t)field->count);
             continue;

@@ -205,10 +205,10 @@ static int attempt_record(MildError *error) {
     }
     FILE *file = fmemopen(text, strlen(text), "r");
     assert_non_null(file);
-    FitPoint *points = NULL;
-    int count = 0, made = fit_csv_read_file(file, "record", &points, &count, error) == MILD_OK;
+    FitFile record;
+    const int made = fit_csv_read_file(file, "record", &record, error) == MILD_OK;
     fclose(file);
-    free(points);
+    fit_file_close(&record);
     return made;
 }
 

@@ -98,7 +98,8 @@ static void test_files(void **state) {
     free(other);
     start(0, WEB_LEVEL, 1);
     assert_non_null(web_start(-1, WEB_LEVEL, 1));
-    assert_non_null(web_start(WEB_STRIPES + 1, WEB_LEVEL, 1));
+    assert_non_null(web_start(WEB_OWN, WEB_LEVEL, 1)); /* no soil yet */
+    assert_non_null(web_start(WEB_OWN + 1, WEB_LEVEL, 1));
     assert_non_null(web_start(0, WEB_RELIEFS, 1));
 }
 
@@ -664,6 +665,47 @@ static void test_again(void **state) {
     assert_true(foam > 0.01 && pressed() == 0);
 }
 
+/* Where the base is after two seconds of walking, and the deepest element on the way. soil: text of
+ * a file, NULL: the ground. */
+static void walk_two_seconds(const char *soil, int ground, float found[3]) {
+    assert_null(web_open(model, model_bytes));
+    if (soil) {
+        strcpy(web_text(), soil);
+        assert_null(web_soil());
+        ground = WEB_OWN;
+    }
+    assert_null(web_start(ground, WEB_LEVEL, 1));
+    found[2] = 0;
+    for (int t = 0; t < 2 * SECOND; t++) {
+        assert_false(web_step(0.5f, 0, 0));
+        found[2] = fmaxf(found[2], fmaxf(web_view()->depth[0], web_view()->depth[1]));
+    }
+    found[0] = web_view()->link[0][3];
+    found[1] = web_view()->link[0][7];
+}
+
+/* A soil's file is the ground that it names: to the last bit the preset's, where it changes nothing
+ * of it. */
+static void test_soil(void **state) {
+    (void)state;
+    float own[3], usual[3];
+    walk_two_seconds("[ground]\npreset = grass\n", 0, own);
+    walk_two_seconds(NULL, preset("grass"), usual);
+    assert_memory_equal(own, usual, sizeof own);
+    walk_two_seconds("[ground]\npreset = grass\nk_pen = 200\nsigma_cone = 1e5\n", 0, own);
+    assert_true(own[2] > 1.2f * usual[2]);
+    walk_two_seconds("[ground]\npreset = sandy_loam\n", 0, usual); /* another model */
+    assert_true(usual[2] > 0 && usual[2] < own[2]);
+    strcpy(web_text(), "[ground]\npreset = gras\n");
+    assert_non_null(strstr(web_soil(), "soil.ini:2: preset: unknown ground 'gras'"));
+    memset(web_text(), '#', WEB_TEXT); /* its end is the core's */
+    assert_non_null(web_soil());
+    strcpy(web_text(), "[ground]\nmodel = con_spring\nk_pen = 2e4\nmu = 1\nk_drift = 1\n"
+                       "b_drift = 1\nrecovery = 1\nbed_depth = 1\n");
+    assert_non_null(strstr(web_soil(), "many elements"));
+    assert_null(web_start(WEB_OWN, WEB_LEVEL, 1)); /* the soil before stays */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_files),
@@ -679,6 +721,7 @@ int main(void) {
         cmocka_unit_test(test_again),
         cmocka_unit_test(test_shells),
         cmocka_unit_test(test_imprints_of_shells),
+        cmocka_unit_test(test_soil),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -168,4 +168,24 @@ Object.assign(app, { picture: { setHills() {} }, camera: {} });
 Object.assign(core, { hills: () => 0 });
 app.choose(1, 2);
 assert.deepEqual(started, [[1, 2]], 'ground, shape');
+
+// A soil's file goes to the core as bytes with a 0; what is wrong is said under the file's name.
+const heap = { buffer: new ArrayBuffer(1 << 17) }, soilBytes = new Uint8Array(heap.buffer), said = [];
+const putText = (text, at) => new TextEncoder().encodeInto(`${text}\0`, soilBytes.subarray(at));
+const soils = Object.assign(Object.create(Core.prototype), { c: { memory: heap, web_text: () => 100, web_soil: () => soils.answer }, answer: 0 });
+soilBytes.fill(1);
+soils.soil('mars.ini', '[ground]');
+assert.deepEqual([...soilBytes.subarray(100, 109)], [...new TextEncoder().encode('[ground]\0')]);
+putText("soil.ini:2: unknown key 'x'", 9e4);
+soils.answer = 9e4;
+assert.throws(() => soils.soil('mars.ini', 'x'), { message: "mars.ini:2: unknown key 'x'" });
+assert.throws(() => soils.soil('mars.ini', ' '.repeat(65536)), /mars.ini: is no soil/);
+assert.throws(() => soils.soil('mars.ini', '\0'), /mars.ini: is no soil/);
+core.soil = (...all) => soils.soil(...all);
+app.panel.say = (text) => said.push(text);
+await app.takeSoil({ name: 'mars.ini', text: async () => 'x' });
+assert.deepEqual([said, started.length], [["mars.ini:2: unknown key 'x'"], 1], 'a soil that is none changes nothing');
+soils.answer = 0;
+await app.takeSoil({ name: 'mars.ini', text: async () => '[ground]' });
+assert.deepEqual([said[1], started[1]], ['mars.ini', [3, 2]], 'the own soil is the ground');
 console.log(`page: keys, stick, gamepad; ${fields.size} fields of WebView; soles and speeds`);

@@ -2,10 +2,12 @@
 #include "env/task/ground.h"
 
 #include <assert.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "env/task/task.h"
+#include "ground/soil/soil.h"
 
 #define DRAW_TRIES 100 /* of a material that the model can match */
 #define RANDOM_USE_GROUNDS 0x47524e44u
@@ -13,16 +15,30 @@
 #define RANDOM_USE_SLIP 0x534c4950u
 #define SLIP_RECOVERY 0.2 /* [-] ground that springs back by more has no grains that flow */
 
-/* A preset with each of its numbers changed a little. */
-static MildMaterial draw_preset(Random *r, const RandomizeDef *def) {
+static double spread_of(Random *r, const RandomizeDef *def) {
+    return 1 + task_spread(r, def->preset_jitter);
+}
+
+/* A preset, or a ground of randomize.presets, with its numbers changed a little. */
+static MildMaterial draw_preset(Random *r, const TaskDef *task) {
+    const RandomizeDef *def = &task->randomize;
+    const TaskSoils *soils = task->soils;
     MildMaterial m = mild_material_default();
-    mild_material_preset(
-        mild_material_preset_name((int)random_index(r, (uint32_t)mild_material_preset_count())),
-        &m);
+    if (soils) {
+        m = soils->soil[random_index(r, (uint32_t)soils->count)];
+    } else {
+        mild_material_preset(
+            mild_material_preset_name((int)random_index(r, (uint32_t)mild_material_preset_count())),
+            &m);
+    }
     double *const jittered[] = {&m.k_pen, &m.sigma_cone, &m.mu,     &m.c_d,
                                 &m.c_g,   &m.k_drift,    &m.b_drift};
     for (size_t i = 0; i < sizeof jittered / sizeof *jittered; i++) {
-        *jittered[i] *= 1 + task_spread(r, def->preset_jitter);
+        *jittered[i] *= spread_of(r, def);
+    }
+    double *const others[] = {&m.k_c, &m.k_phi, &m.cohesion, &m.zeta};
+    for (size_t i = 0; m.model != MILD_MODEL_MILD && i < sizeof others / sizeof *others; i++) {
+        *others[i] *= spread_of(r, def);
     }
     return m;
 }
@@ -80,15 +96,19 @@ static void draw_slip(const Random *start, const RandomizeDef *def, MildMaterial
 
 /* Draws a material for the model. If its match would be out of range (mild_model_match), another
  * one is drawn. */
-static MildMaterial draw_new(Random *r, const RandomizeDef *def, const Robot *robot) {
+static MildMaterial draw_new(Random *r, const TaskDef *task, const Robot *robot) {
+    const RandomizeDef *def = &task->randomize;
     double preset = def->rigid_share < 1 ? def->preset_share / (1 - def->rigid_share) : 0;
     MildMaterial m, rival;
     const Random start = *r;
     for (int tries = 0; tries < DRAW_TRIES; tries++) {
-        m = random_unit(r) < preset ? draw_preset(r, def) : draw_ranges(r, def, robot);
+        m = random_unit(r) < preset ? draw_preset(r, task) : draw_ranges(r, def, robot);
         m.passive = def->passive;
         if (def->model == MILD_MODEL_RIGID) {
             return m; /* the engine's contact does not use it */
+        }
+        if (m.model != MILD_MODEL_MILD) {
+            return m; /* of randomize.model, with numbers of its own */
         }
         if (robot_match_model(robot, (MildModel)def->model, &m, &rival, NULL) == MILD_OK) {
             draw_slip(&start, def, &rival);
@@ -106,7 +126,7 @@ static MildMaterial draw_new(Random *r, const RandomizeDef *def, const Robot *ro
 static MildMaterial draw_material(Random *r, const TaskDef *def, const Robot *robot, int *index) {
     const TaskGrounds *from = def->grounds;
     if (!from) {
-        return draw_new(r, &def->randomize, robot);
+        return draw_new(r, def, robot);
     }
     int at = (int)random_index(r, (uint32_t)from->count);
     if (index) {
@@ -186,6 +206,41 @@ double task_standing_depth(const Robot *robot, const MildMaterial *material) {
     return mild_sole_sinkage(robot_soles(robot)[0], material, robot_foot_load(robot));
 }
 
+static MildStatus soil_open(const TaskDef *def, const char *name, MildMaterial *soil,
+                            MildError *error) {
+    MildError cause = {0};
+    const int model = def->randomize.model;
+    MildStatus status = soil_find(name, soil, &cause);
+    if (status != MILD_OK) {
+        return mild_fail(error, status, "randomize.presets: %s", cause.text);
+    }
+    if (soil->model == MILD_MODEL_MILD || soil->model == model || model == MILD_MODEL_RIGID) {
+        return MILD_OK;
+    }
+    return mild_fail(error, MILD_ERROR_ARGUMENT,
+                     "randomize.presets: %.150s is a ground of %s; set randomize.model = %s", name,
+                     mild_model_names[soil->model], mild_model_names[soil->model]);
+}
+
+MildStatus task_soils_open(TaskDef *def, TaskSoils *soils, MildError *error) {
+    char name[TASK_TEXT_SIZE];
+    const char *rest = def->randomize.presets;
+    MildStatus status = MILD_OK;
+    soils->count = 0;
+    def->soils = *rest ? soils : NULL;
+    while (*rest && status == MILD_OK) {
+        const size_t length = strcspn(rest, ",");
+        snprintf(name, sizeof name, "%.*s", (int)length, rest);
+        if (soils->count == TASK_SOILS_MAX) {
+            return mild_fail(error, MILD_ERROR_RANGE, "randomize.presets: more than %d grounds",
+                             (int)TASK_SOILS_MAX);
+        }
+        status = soil_open(def, name + strspn(name, " "), &soils->soil[soils->count++], error);
+        rest += length + (rest[length] == ',');
+    }
+    return status;
+}
+
 typedef struct {
     const TaskDef *def;
     const Robot *robot;
@@ -198,7 +253,7 @@ static void make_ground(void *context, int piece, int thread) {
     const GroundJob *job = context;
     Random r = random_at(job->seed ^ RANDOM_USE_GROUNDS, (uint32_t)piece, 0);
     TaskGround *ground = &job->grounds->ground[piece];
-    ground->material = draw_new(&r, &job->def->randomize, job->robot);
+    ground->material = draw_new(&r, job->def, job->robot);
     ground->depth = task_standing_depth(job->robot, &ground->material);
 }
 

@@ -11,6 +11,18 @@ typedef struct {
     double depth; /* [m] that the robot stands in it */
 } TaskGround;
 
+/* The grounds of randomize.presets. */
+enum { TASK_SOILS_MAX = 16 };
+typedef struct TaskSoils {
+    int count;
+    MildMaterial soil[TASK_SOILS_MAX];
+} TaskSoils;
+
+/* Reads the presets and files that randomize.presets names, if any, and sets def->soils to them. A
+ * ground of another model than mild must be one of randomize.model, because only mild's are matched
+ * to other models. */
+MildStatus task_soils_open(TaskDef *def, TaskSoils *soils, MildError *error);
+
 struct TaskGrounds {
     int count;
     TaskGround *ground; /* [count] */

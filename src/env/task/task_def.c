@@ -103,6 +103,7 @@ void task_def_choose_ground(TaskDef *def) {
     r->rigid_time[0] = r->rigid_time[1] = 0;
     r->preset_share = 1;
     r->preset_jitter = 0;
+    r->presets[0] = '\0';
     r->patch_share = 0;
     def->assist = 0;
 }
@@ -246,6 +247,9 @@ const MildField randomize_fields[] = {
       "[-] share of episodes on a preset; the others draw their ground from the ranges below"),
     Z(preset_jitter, 1, 0, 0.9,
       "[-] each parameter of a preset is scaled by 1 plus or minus up to this"),
+    MILD_FIELD(RandomizeDef, presets, MILD_FIELD_TEXT, TASK_TEXT_SIZE, 0, 0,
+               "[text] what preset_share draws from: presets and files of soils (docs/soil.md), "
+               "separated by commas; empty: the presets of mild"),
     Z(patch_share, 1, 0, 1, "[-] share of soft episodes whose ground changes in stripes"),
     Z(patch_length, 2, 0.1, 100, "[m] length of a stripe, low and high"),
     Z(k_pen, 2, 0, 1e6, "[N/m] penetration stiffness, low and high (paper)"),
@@ -379,6 +383,11 @@ MildStatus task_gains(const TaskDef *def, const Robot *robot, TaskGains *gains, 
 MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildError *error) {
     TaskGains gains;
     MildStatus status = task_def_check(def, error);
+    if (status == MILD_OK && def->randomize.presets[0] && !def->soils) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "randomize.presets = %.100s: nothing draws grounds here; leave it out",
+                         def->randomize.presets);
+    }
     if (status == MILD_OK && def->actuator[0] && !def->motors) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "task.actuator = %.100s: there is no actuator network here; leave it out",

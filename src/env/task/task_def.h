@@ -83,18 +83,22 @@ typedef struct {
     int acceleration_form;               /* a TaskAcceleration */
 } RewardDef;
 
+enum { TASK_TEXT_SIZE = 152 }; /* characters of a list of grounds, as long as a config's text */
+
 /* Domain randomisation; ranges are uniform. docs/task.md section 11. */
 typedef struct {
     int model; /* MildModel of the soft episodes, matched to mild's draws; rigid: all on the
                   engine's contact */
     /* ground: shares of episodes; what remains after rigid and preset draws from the paper's ranges
      */
-    double rigid_share;     /* [-] engine contact */
-    double rigid_time[2];   /* [s] its time constant; 0 0: the robot's own contact */
-    double preset_share;    /* [-] a named preset, parameters times 1 +- preset_jitter */
-    double preset_jitter;   /* [-] */
-    double patch_share;     /* [-] soft episodes whose ground changes in stripes */
-    double patch_length[2]; /* [m] */
+    double rigid_share;           /* [-] engine contact */
+    double rigid_time[2];         /* [s] its time constant; 0 0: the robot's own contact */
+    double preset_share;          /* [-] a named preset, parameters times 1 +- preset_jitter */
+    double preset_jitter;         /* [-] */
+    char presets[TASK_TEXT_SIZE]; /* presets and files of soils that take the presets' place, see
+                                     task_soils_open; "": the presets of mild */
+    double patch_share;           /* [-] soft episodes whose ground changes in stripes */
+    double patch_length[2];       /* [m] */
     double k_pen[2], sigma_cone[2], alpha[2], nu[2], c_g[2], c_d[2], phi[2], mu[2], rho[2],
         k_drift[2], b_drift[2], recovery[2], bed_depth[2];
     double slip_share;     /* [-] soft grounds that stay dented, on which slip costs support */
@@ -161,6 +165,7 @@ typedef struct {
                            level, one material */
     int imprint_tiles;  /* of imprints, see mild_ground_bytes_imprints */
     const struct TaskActuator *motors; /* borrowed: of the file `actuator`; NULL: the PD */
+    const struct TaskSoils *soils; /* borrowed: of randomize.presets; NULL: the presets of mild */
     const struct TaskGrounds *grounds; /* borrowed: what episodes draw their ground from; NULL: from
                                           the ranges */
 } TaskDef;

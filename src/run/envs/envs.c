@@ -100,6 +100,22 @@ void mild_envs_mirror(const MildEnvs *envs, int *observation_index, float *obser
     memcpy(action_sign, mirror.action_sign, actions * sizeof *action_sign);
 }
 
+const char *mild_envs_model(const MildEnvs *envs) {
+    return robot_model_path(envs->robot);
+}
+
+int mild_envs_pose(const MildEnvs *envs, int index, double *qpos, int size) {
+    double engine[ROBOT_NQ_MAX];
+    const TaskEnv *env = envs_env(envs->envs.envs, index);
+    const int count = 7 + robot_joints(envs->robot);
+    if (!env || size < count) {
+        return 0;
+    }
+    robot_engine_qpos(envs->robot, env->robot.qpos, engine);
+    memcpy(qpos, engine, (size_t)count * sizeof *qpos);
+    return count;
+}
+
 MildStatus mild_envs_reset(MildEnvs *envs, const EnvsView *first, void *stream, MildError *error) {
     return envs_reset(envs->envs.envs, first, stream, error);
 }

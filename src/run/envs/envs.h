@@ -63,6 +63,12 @@ const char *mild_envs_reward_name(int index);
 void mild_envs_mirror(const MildEnvs *envs, int *observation_index, float *observation_sign,
                       int *action_index, float *action_sign);
 
+/* The robot's MJCF, to draw it, and how one robot lies in an mjData of that file: qpos[size] [m, -,
+ * rad]. Returns how many numbers it has; 0 where the batch engine steps the robots. 0 <= index <
+ * MildEnvsShape.envs. */
+const char *mild_envs_model(const MildEnvs *envs);
+int mild_envs_pose(const MildEnvs *envs, int index, double *qpos, int size);
+
 /* New episodes in all environments, and their first observations. */
 MildStatus mild_envs_reset(MildEnvs *envs, const EnvsView *first, void *stream, MildError *error);
 

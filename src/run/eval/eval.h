@@ -49,7 +49,7 @@ typedef struct {
 /* Means over the trials, SI units. NaN: nothing was measured, as the speed of trials that fell at
  * once, the sinkage without a stance, or a deviation of one trial. */
 typedef struct {
-    char ground[160];
+    char ground[SCENE_NAME_SIZE];
     double speed;             /* [m/s] commanded, forward */
     int trials;               /* number of trials */
     int success;              /* trials without termination */

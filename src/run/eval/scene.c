@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "ground/soil/soil.h"
+
 #define SCENE_FAR 1e4 /* [m] */
 
 /* `rigid` inside a course, because the engine's own floor is under both feet or under none: rubber
@@ -17,27 +19,12 @@ static MildMaterial hard_ground(void) {
     return hard;
 }
 
-static MildStatus find_preset(const char *name, MildMaterial *material, MildError *error) {
-    if (mild_material_preset(name, material)) {
-        return MILD_OK;
-    }
+static MildStatus find_ground(const char *name, MildMaterial *material, MildError *error) {
     if (strcmp(name, "rigid") == 0) {
         *material = hard_ground();
         return MILD_OK;
     }
-    char known[256] = "rigid";
-    for (int i = 0; i < mild_material_preset_count(); i++) {
-        size_t used = strlen(known);
-        snprintf(known + used, sizeof known - used, ", %s", mild_material_preset_name(i));
-    }
-    for (int m = 0; m < MILD_MODELS; m++) {
-        const MildModelInfo *info = mild_model_info((MildModel)m);
-        for (int k = 0; k < MILD_MODEL_PRESETS && info->presets[k]; k++) {
-            size_t used = strlen(known);
-            snprintf(known + used, sizeof known - used, ", %s", info->presets[k]);
-        }
-    }
-    return mild_fail(error, MILD_ERROR_ARGUMENT, "unknown ground '%s'; known: %s", name, known);
+    return soil_find(name, material, error);
 }
 
 /* Ground number `count` of a course, from `start` to `end` [m] on the way. */
@@ -45,7 +32,7 @@ static MildStatus add_ground(Scene *scene, const char *name, int count, double s
                              int back, MildError *error) {
     MildTerrain *terrain = &scene->terrain;
     MildMaterial material;
-    MildStatus status = find_preset(name, &material, error);
+    MildStatus status = find_ground(name, &material, error);
     if (status != MILD_OK) {
         return status;
     }

@@ -1,12 +1,15 @@
-/* A ground to walk on, by name: one preset, `rigid`, or a course of them crossed in order
- * ("rubber+foam45+rigid"). In a course `rigid` is a very hard material. */
+/* A ground to walk on, by name: a preset, the file of a soil (ground/soil/soil.h), `rigid`, or a
+ * course of them crossed in order ("rubber+./mars.ini+rigid"). In a course `rigid` is a very hard
+ * material. */
 #ifndef MILD_SCENE_H
 #define MILD_SCENE_H
 
 #include "mild/ground.h"
 
+enum { SCENE_NAME_SIZE = 512 };
+
 typedef struct {
-    char name[160];
+    char name[SCENE_NAME_SIZE];
     MildTerrain terrain;
     int rigid; /* bool: the engine's own contact */
 } Scene;

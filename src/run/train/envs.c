@@ -19,12 +19,15 @@ MildStatus train_envs_open(TrainEnvs *envs, ExperimentDef *def, const Robot *rob
                            int count, int first, MildError *error) {
     const int device = train_device(&def->train);
     int striped = 0;
-    *envs = (TrainEnvs){0};
+    *envs = (TrainEnvs){.envs = NULL};
     if (make_map(def, &envs->map, &striped, error) != MILD_OK) {
         return error->status;
     }
     def->task.map = envs->map;
     def->task.imprint_tiles = terrain_imprint_tiles(&def->terrain);
+    if (task_soils_open(&def->task, &envs->soils, error) != MILD_OK) {
+        return error->status;
+    }
     if (actuator_open(&def->task, robot, &envs->actuator, error) != MILD_OK) {
         return error->status;
     }

@@ -1,0 +1,228 @@
+/* Soil files: every material comes back from its own text bit for bit, what a file may leave out,
+ * and the message for each mistake. tests/fuzz/fuzz_soil.c has any text. */
+#include <unistd.h>
+
+#include "base/random.h"
+#include "ground/soil/soil.h"
+#include "kit.h"
+
+/* A soil of bekker as a plate owner writes it. */
+#define HAND                                                                                       \
+    "# from a bevameter\n[ground]\nmodel = bekker\nexponent = 0.8\nk_c = 5790\nk_phi: 180000\n"    \
+    "cohesion = 150 ; Pa\nmu = 0.62\nshear_length = 0.018\nk_drift = 0\nb_drift = 0\n"             \
+    "recovery = 0.05\nbed_depth = 1\n"
+
+static MildMaterial parsed(const char *text) {
+    MildMaterial material;
+    MildError error = {0};
+    memset(&material, 0, sizeof material);
+    if (soil_parse(text, "mars.ini", &material, &error) != MILD_OK) {
+        fail_msg("%s", error.text);
+    }
+    return material;
+}
+
+/* What a terminal would obey does not get into a file. */
+static void test_remarks(void **state) {
+    (void)state;
+    const MildMaterial m = mild_material_default();
+    const char *notes[64] = {"a\tb", "\x1b[31mred\r"};
+    const SoilNotes remarks = {"mild fit \x1b]0;x\x07.csv", notes};
+    char *text = soil_text(&m, &remarks);
+    assert_non_null(strstr(text, "# mild fit ?]0;x?.csv\n"));
+    for (const char *c = text; *c; c++) {
+        assert_true(*c >= ' ' || *c == '\n');
+    }
+    free(text);
+}
+
+/* The message says `wanted`, and the material is left alone. */
+static void refused(const char *text, MildStatus status, const char *wanted) {
+    MildMaterial material = mild_material_default();
+    const MildMaterial before = material;
+    MildError error = {0};
+    assert_int_equal(soil_parse(text, "mars.ini", &material, &error), status);
+    assert_int_equal(error.status, status);
+    if (!strstr(error.text, wanted)) {
+        fail_msg("'%s' is not in '%s'", wanted, error.text);
+    }
+    assert_memory_equal(&material, &before, sizeof before);
+    assert_int_equal(soil_parse(text, "mars.ini", &material, NULL), status);
+}
+
+/* All that the model reads is the same, bit for bit. */
+static void same(const MildMaterial *a, const MildMaterial *b) {
+    assert_int_equal(a->model, b->model);
+    for (int i = 0; i < mild_material_field_count; i++) {
+        const MildField *field = &mild_material_fields[i];
+        const size_t bytes = field->type == MILD_FIELD_DOUBLE ? sizeof(double) : sizeof(int);
+        if (soil_reads(a, field) &&
+            memcmp((const char *)a + field->offset, (const char *)b + field->offset, bytes) != 0) {
+            fail_msg("%s of %s", field->name, mild_model_names[a->model]);
+        }
+    }
+}
+
+static void test_hand(void **state) {
+    (void)state;
+    const MildMaterial m = parsed(HAND);
+    assert_int_equal(m.model, MILD_MODEL_BEKKER);
+    assert_true(m.exponent == 0.8 && m.k_c == 5790 && m.k_phi == 180000 && m.cohesion == 150);
+    assert_true(m.mu == 0.62 && m.shear_length == 0.018 && m.recovery == 0.05);
+    assert_true(m.plate_width == 0 && m.refill == 0); /* left out: off */
+    const MildMaterial bom = parsed("\xef\xbb\xbf; x\r\n  [ground]\r\n preset = clay \r\n mu=0.3");
+    MildMaterial clay;
+    assert_true(mild_material_preset("clay", &clay));
+    assert_true(bom.mu == 0.3 && bom.k_c == clay.k_c && bom.model == MILD_MODEL_BEKKER);
+    const MildMaterial plain = parsed("[ground]\npreset = foam45");
+    assert_true(mild_material_preset("foam45", &clay));
+    assert_memory_equal(&plain, &clay, sizeof clay);
+    /* the preset may come last, and `model` may repeat it */
+    const MildMaterial last = parsed("[ground]\nmu = 0.3\nmodel = mild\npreset = foam45");
+    assert_true(last.mu == 0.3 && last.k_pen == clay.k_pen);
+}
+
+static void draw(Random *random, MildMaterial *m) {
+    *m = mild_material_default();
+    m->model = (int)random_index(random, MILD_MODEL_RIGID);
+    for (int i = 0; i < mild_material_field_count; i++) {
+        const MildField *field = &mild_material_fields[i];
+        if (field->type == MILD_FIELD_DOUBLE && random_index(random, 4)) {
+            double *number = (double *)((char *)m + field->offset);
+            *number = field->min + (field->max - field->min) * pow(random_unit(random), 5);
+        }
+    }
+    m->passive = (int)random_index(random, 2);
+    m->plate_width = m->plate_width < 0.02 ? 0 : m->plate_width;
+}
+
+static void test_round_trip(void **state) {
+    (void)state;
+    Random random = random_at(1, 2, 3);
+    for (int n = 0; n < 2000; n++) {
+        MildMaterial m;
+        draw(&random, &m);
+        const char *notes[64] = {"95 %: 1 .. 2", NULL, "two\nlines [ground]\nmu = 3"};
+        const SoilNotes remarks = {"mild fit a.csv\n\n[ground]", notes};
+        char *plain = soil_text(&m, NULL), *noted = soil_text(&m, &remarks);
+        const MildMaterial once = parsed(plain), twice = parsed(noted);
+        same(&m, &once);
+        same(&m, &twice);
+        free(plain);
+        free(noted);
+    }
+}
+
+static void test_files(void **state) {
+    (void)state;
+    char folder[] = "/tmp/mild_soil_XXXXXX", path[64], text[] = "x.txt";
+    MildMaterial clay, read;
+    MildError error = {0};
+    assert_non_null(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/a.ini", folder);
+    assert_true(mild_material_preset("clay", &clay));
+    clay.mu = 1.0 / 3;
+    assert_int_equal(soil_write(&clay, NULL, path, &error), MILD_OK);
+    assert_int_equal(soil_find(path, &read, &error), MILD_OK);
+    same(&clay, &read);
+    clay.mu = 4; /* out of range: the file stays */
+    assert_int_equal(soil_write(&clay, NULL, path, &error), MILD_ERROR_RANGE);
+    assert_int_equal(soil_find(path, &read, &error), MILD_OK);
+    assert_true(read.mu == 1.0 / 3);
+    assert_int_equal(soil_write(&read, NULL, text, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "ends in .ini"));
+    FILE *file = fopen(path, "wb");
+    fwrite("[ground]\0", 1, 9, file);
+    fclose(file);
+    assert_int_equal(soil_find(path, &read, &error), MILD_ERROR_FORMAT);
+    assert_non_null(strstr(error.text, "binary"));
+    file = fopen(path, "wb");
+    for (int i = 0; i <= SOIL_BYTES_MAX; i++) {
+        fputc('\n', file);
+    }
+    fclose(file);
+    assert_int_not_equal(soil_find(path, &read, &error), MILD_OK);
+    unlink(path);
+    assert_int_equal(soil_find(path, &read, &error), MILD_ERROR_IO);
+    assert_non_null(strstr(error.text, "a.ini"));
+    assert_int_equal(soil_find(path, &read, NULL), MILD_ERROR_IO);
+    rmdir(folder);
+}
+
+static void test_names(void **state) {
+    (void)state;
+    MildMaterial m;
+    MildError error = {0};
+    assert_true(soil_is_file("a.ini") && soil_is_file("./x/a.ini"));
+    assert_false(soil_is_file("clay") || soil_is_file(".ini") || soil_is_file("a.ini.bak"));
+    assert_int_equal(soil_find("clay", &m, &error), MILD_OK);
+    assert_int_equal(m.model, MILD_MODEL_BEKKER);
+    assert_int_equal(soil_find("cly", &m, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "'clay'"));
+    assert_non_null(strstr(error.text, ".ini"));
+    assert_int_equal(soil_find("rigid", &m, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "no soft-ground law"));
+}
+
+static void test_mistakes(void **state) {
+    (void)state;
+    refused("", MILD_ERROR_FORMAT, "mars.ini: is no soil, because it has no section [ground]");
+    refused("# remark\n\nmu = 1", MILD_ERROR_FORMAT, "mars.ini:3: a key before [ground]");
+    refused("[soil]", MILD_ERROR_FORMAT, "mars.ini:1: '[soil]': a soil has the section [ground]");
+    refused("[ground", MILD_ERROR_FORMAT, "mars.ini:1: '[ground'");
+    refused(HAND "[task]\n", MILD_ERROR_FORMAT, "mars.ini:14: '[task]'");
+    refused("[ground]\nmu 1", MILD_ERROR_FORMAT, "mars.ini:2: neither `key = value`");
+    refused("[ground]\nk_phy = 1", MILD_ERROR_FORMAT,
+            "mars.ini:2: unknown key 'k_phy'; nearest is 'k_phi'");
+    refused("[ground]\npreset = clay\nmu = 1\n\nmu = 1", MILD_ERROR_FORMAT,
+            "mars.ini:5: mu was set on line 3");
+    refused("[ground]\npreset = cley", MILD_ERROR_FORMAT,
+            "mars.ini:2: preset: unknown ground 'cley'; nearest is 'clay'");
+    refused("[ground]\npreset = other.ini", MILD_ERROR_FORMAT, "unknown ground 'other.ini'");
+    refused("[ground]\npreset = clay\nmodel = mild", MILD_ERROR_FORMAT,
+            "mars.ini:3: model = mild, but the preset clay is of bekker");
+    refused("[ground]\npreset = clay\nmodel = bekkr", MILD_ERROR_ARGUMENT, "mars.ini:3:");
+    refused("[ground]\nmodel = rigid", MILD_ERROR_ARGUMENT, "mars.ini: ground.model = rigid");
+    refused("[ground]\npreset = clay\nk_pen = 5", MILD_ERROR_FORMAT,
+            "mars.ini:3: k_pen: the model bekker does not read it; leave it out");
+    refused("[ground]\npreset = clay\nmu = 3.5", MILD_ERROR_RANGE,
+            "mars.ini:3: ground.mu = 3.5 is outside 0 .. 3");
+    refused("[ground]\npreset = clay\nmu = 0,5", MILD_ERROR_ARGUMENT, "mars.ini:3:");
+    refused("[ground]\npreset = clay\nmu = nan", MILD_ERROR_ARGUMENT, "mars.ini:3:");
+    refused("[ground]\npreset = clay\nmu =", MILD_ERROR_ARGUMENT, "mars.ini:3:");
+    refused("[ground]\npreset = clay\nplate_width = 1e-9", MILD_ERROR_RANGE,
+            "mars.ini: ground.plate_width");
+    refused("[ground]\nmodel = bekker\nexponent = 1\n", MILD_ERROR_FORMAT,
+            "mars.ini: mu is missing, which the model bekker reads: [-] friction");
+    refused("[ground]\n\x1b]0;x\x07 = 1", MILD_ERROR_FORMAT, "mars.ini:2: unknown key '?]0;x?'");
+    char line[600];
+    memset(line, 'x', sizeof line);
+    line[sizeof line - 1] = '\0';
+    refused(line, MILD_ERROR_FORMAT, "mars.ini:1: a line longer than 399");
+}
+
+/* Every line of HAND is needed, but for remarks: a file that lost one is refused. */
+static void test_lost_lines(void **state) {
+    (void)state;
+    static const char *const names[] = {"exponent", "k_c",     "k_phi",   "cohesion", "mu =",
+                                        "shear_le", "k_drift", "b_drift", "bed_depth"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        char text[] = HAND, wanted[64];
+        char *at = strstr(text, names[i]);
+        memmove(at, strchr(at, '\n') + 1, strlen(strchr(at, '\n')));
+        snprintf(wanted, sizeof wanted, "mars.ini: %.8s", names[i]);
+        wanted[10 + strcspn(names[i], " ")] = '\0';
+        refused(text, MILD_ERROR_FORMAT, wanted);
+        refused(text, MILD_ERROR_FORMAT, " is missing");
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_hand),     cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_files),    cmocka_unit_test(test_names),
+        cmocka_unit_test(test_mistakes), cmocka_unit_test(test_lost_lines),
+        cmocka_unit_test(test_remarks),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,136 @@
+/* Grounds of randomize.presets: what is read, what is refused, and what is drawn of them. */
+#include <unistd.h>
+
+#include "env/task/ground.h"
+#include "ground/soil/soil.h"
+#include "task_kit.h"
+
+enum { DRAWS = 4000 };
+
+static TaskDef def_of(const char *presets, int model) {
+    TaskDef def = task_def_default();
+    snprintf(def.randomize.presets, sizeof def.randomize.presets, "%s", presets);
+    def.randomize.model = model;
+    def.randomize.rigid_share = def.randomize.patch_share = 0;
+    def.randomize.preset_share = 1;
+    def.randomize.preset_jitter = 0.1;
+    return def;
+}
+
+static void refused(const char *presets, int model, const char *wanted) {
+    TaskDef def = def_of(presets, model);
+    TaskSoils soils;
+    MildError error = {0};
+    assert_int_not_equal(task_soils_open(&def, &soils, &error), MILD_OK);
+    if (!strstr(error.text, wanted)) {
+        fail_msg("'%s' is not in '%s'", wanted, error.text);
+    }
+}
+
+static void what_is_read(void **unused) {
+    (void)unused;
+    TaskDef def = def_of("", MILD_MODEL_MILD);
+    TaskSoils soils;
+    MildError error = {0};
+    assert_int_equal(task_soils_open(&def, &soils, &error), MILD_OK);
+    assert_null(def.soils);
+    def = def_of("clay, snow,foam45", MILD_MODEL_BEKKER);
+    assert_int_not_equal(task_def_check_robot(&def, robot, &error), MILD_OK); /* not read yet */
+    assert_non_null(strstr(error.text, "randomize.presets"));
+    assert_int_equal(task_soils_open(&def, &soils, &error), MILD_OK);
+    assert_int_equal(task_def_check_robot(&def, robot, &error), MILD_OK);
+    assert_ptr_equal(def.soils, &soils);
+    assert_int_equal(soils.count, 3);
+    assert_true(soils.soil[0].k_c == 13190 && soils.soil[1].k_c == 4370);
+    assert_int_equal(soils.soil[2].model, MILD_MODEL_MILD);
+    def = def_of("clay", MILD_MODEL_RIGID);
+    assert_int_equal(task_soils_open(&def, &soils, &error), MILD_OK);
+    def = def_of("clay", MILD_MODEL_BEKKER);
+    task_def_choose_ground(&def); /* an evaluation names its own */
+    assert_int_equal(task_def_check_robot(&def, robot, &error), MILD_OK);
+    refused("clay", MILD_MODEL_MILD,
+            "randomize.presets: clay is a ground of bekker; set "
+            "randomize.model = bekker");
+    refused("foam45,claj", MILD_MODEL_BEKKER, "unknown ground 'claj'; nearest is 'clay'");
+    refused("foam45,,clay", MILD_MODEL_BEKKER, "unknown ground ''");
+    refused("rigid", MILD_MODEL_MILD, "engine's own contact");
+    refused("/no/such.ini", MILD_MODEL_MILD, "randomize.presets: /no/such.ini");
+    refused("clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay",
+            MILD_MODEL_BEKKER, "more than 16 grounds");
+}
+
+/* Draws of a preset and a file of the same model: half each, each number within its jitter. */
+static void what_is_drawn(void **unused) {
+    (void)unused;
+    char folder[] = "/tmp/mild_soils_XXXXXX", path[40];
+    MildMaterial soil[2];
+    TaskSoils soils;
+    MildError error = {0};
+    Pool *pool = pool_create(1);
+    assert_non_null(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/a.ini", folder);
+    assert_true(mild_material_preset("clay", &soil[0]) && mild_material_preset("snow", &soil[1]));
+    soil[1].shear_length = 0.033;
+    assert_int_equal(soil_write(&soil[1], NULL, path, &error), MILD_OK);
+    char names[100];
+    snprintf(names, sizeof names, "clay,%s", path);
+    TaskDef def = def_of(names, MILD_MODEL_BEKKER);
+    assert_int_equal(task_soils_open(&def, &soils, &error), MILD_OK);
+    unlink(path); /* read once */
+    rmdir(folder);
+    TaskGrounds *grounds = task_grounds_create(&def, robot, DRAWS, 3, pool, &error);
+    assert_non_null(grounds);
+    int snow = 0;
+    double least[4] = {2, 2, 2, 2}, most[4] = {0}, sum = 0;
+    for (int i = 0; i < DRAWS; i++) {
+        const MildMaterial *m = &grounds->ground[i].material;
+        const int k = m->shear_length == 0.033;
+        snow += k;
+        assert_true(m->model == MILD_MODEL_BEKKER && m->exponent == soil[k].exponent);
+        assert_true(m->shear_length == soil[k].shear_length && m->bed_depth == 1);
+        const double factor[4] = {m->k_c / soil[k].k_c, m->k_phi / soil[k].k_phi,
+                                  m->mu / soil[k].mu, m->cohesion / soil[k].cohesion};
+        for (int n = 0; n < 4; n++) {
+            least[n] = fmin(least[n], factor[n]);
+            most[n] = fmax(most[n], factor[n]);
+        }
+        sum += (factor[0] - 1) * (factor[1] - 1);
+    }
+    assert_true(snow > 0.46 * DRAWS && snow < 0.54 * DRAWS);
+    for (int n = 0; n < 4; n++) {
+        assert_true(least[n] >= 0.9 - 1e-12 && least[n] < 0.901);
+        assert_true(most[n] <= 1.1 + 1e-12 && most[n] > 1.099);
+    }
+    assert_true(fabs(sum / DRAWS) < 5 * 0.01 / 3 / sqrt(DRAWS)); /* each by itself */
+    task_grounds_destroy(grounds);
+    pool_destroy(pool);
+}
+
+/* A soil of mild is matched to another model, as a preset is. */
+static void what_is_matched(void **unused) {
+    (void)unused;
+    TaskDef def = def_of("grass", MILD_MODEL_BEKKER);
+    TaskSoils soils;
+    MildError error = {0};
+    MildMaterial grass, wanted;
+    Pool *pool = pool_create(1);
+    def.randomize.preset_jitter = 0;
+    assert_int_equal(task_soils_open(&def, &soils, &error), MILD_OK);
+    TaskGrounds *grounds = task_grounds_create(&def, robot, 5, 3, pool, &error);
+    assert_true(mild_material_preset("grass", &grass));
+    assert_int_equal(robot_match_model(robot, MILD_MODEL_BEKKER, &grass, &wanted, NULL), MILD_OK);
+    for (int i = 0; i < 5; i++) {
+        assert_true(grounds->ground[i].material.k_phi == wanted.k_phi);
+    }
+    task_grounds_destroy(grounds);
+    pool_destroy(pool);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_read),
+        cmocka_unit_test(what_is_drawn),
+        cmocka_unit_test(what_is_matched),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
+}
