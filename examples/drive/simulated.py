@@ -17,6 +17,7 @@ import numpy as np
 
 import mild
 
+PATIENCE = 60  # [s] for the first target
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("--robot", default="sa01", help="with flat soles and 12 joints: sa01, g1")
 parser.add_argument("--ground", default="sand_loose")
@@ -43,7 +44,7 @@ data.qpos[7:] = [float(word) for word in ini["joints"]["pose"].split()]
 data.qpos[2] = height = float(ini["robot"]["height"]) + 0.01  # [m]
 client = subprocess.Popen(given.client, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
 target, rows = None, []
-begin, steps = 0.0, 4 if given.lockstep else 1
+begin, steps = time.monotonic(), 4 if given.lockstep else 1
 try:
     while data.time < given.seconds and data.qpos[2] > 0.6 * height:
         client.stdin.write(" ".join(f"{number:.9g}" for number in (*data.qpos[3:7], *data.qvel[3:6], *data.qpos[7:], *data.qvel[6:])) + "\n")
@@ -51,9 +52,14 @@ try:
         if not line:
             break
         if line.strip():
+            if target is None:
+                print("simulated: the first target has come", file=sys.stderr, flush=True)
+                begin = time.monotonic()
             target = np.array(line.split(), float).reshape(4, 12)
         if target is None:  # held by its stand
-            begin = time.monotonic()
+            if time.monotonic() - begin > PATIENCE:
+                print(f"simulated: no target for {PATIENCE} s", file=sys.stderr)
+                break
             time.sleep(model.opt.timestep)
             continue
         angle, kp, kd, limit = target

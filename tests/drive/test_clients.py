@@ -166,7 +166,7 @@ class Packets(unittest.TestCase):
 
 
 class Walks(unittest.TestCase):
-    def walk(self, client, runner_options=(), client_options=(), seconds=4, kill=0.0):
+    def walk(self, client, runner_options=(), client_options=(), seconds=4, kill=False):
         runner = subprocess.Popen([MILD, "drive", "--config", str(ROOT / "configs/walk.ini"), "--command", "0.5,0,0", "--no-keys", "--listen", "127.0.0.1:0",
                                    "--late", "10", "--damp-after", "20", "--stall-after", "20", *runner_options], cwd=WORK.name, stdin=subprocess.DEVNULL,
                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -174,8 +174,11 @@ class Walks(unittest.TestCase):
         how = [] if kill else ["--lockstep"]
         robot = subprocess.Popen([sys.executable, str(EXAMPLES / "simulated.py"), *how, "--seconds", str(seconds), "--", *CLIENTS[client], "127.0.0.1", port,
                                   *how, *client_options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        for process in (robot, runner):
+            self.addCleanup(lambda process=process: process.poll() is None and process.kill())
         if kill:
-            time.sleep(kill)
+            self.assertIn("the first target has come", robot.stderr.readline())
+            time.sleep(0.3)
             runner.send_signal(signal.SIGKILL)
         said, errors = robot.communicate(timeout=120)
         runner_said = runner.communicate(timeout=60)[0]
@@ -198,7 +201,7 @@ class Walks(unittest.TestCase):
     def test_runner_dies(self):
         """In real time: the client damps the robot, which falls in place."""
         for client in CLIENTS:
-            said, errors, _, _ = self.walk(client, seconds=30, kill=4)
+            said, errors, _, _ = self.walk(client, seconds=30, kill=True)
             self.assertIn("fallen", said, errors)
 
 
