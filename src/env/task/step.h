@@ -61,8 +61,8 @@ MILD_HD_FN void task_set_progress(TaskEnv *env, TaskProgress progress) {
 
 /* ---- start of an episode ---- */
 
-/* Quaternion (w x y z) of a turn by `yaw` about z, after one by `pitch` about y, after one by `roll`
- * about x. */
+/* Quaternion (w x y z) of a turn by `yaw` about z, after one by `pitch` about y, after one by
+ * `roll` about x. */
 MILD_HD_FN void task_turn(double yaw, double pitch, double roll, Real *quaternion) {
     const double cy = task_cos(0.5 * yaw), sy = task_sin(0.5 * yaw);
     const double cp = task_cos(0.5 * pitch), sp = task_sin(0.5 * pitch);
