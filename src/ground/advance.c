@@ -243,6 +243,21 @@ static int face_unlisted(const Advance *a, const Memory *memory, int e) {
     return buried;
 }
 
+/* Takes lane i of what blocks_remember and, if it wears, blocks_wear have stored. */
+static void memory_take(const Memory *memory, int e, const Lanes after[ADVANCE_NUMBERS], int i,
+                        int wears) {
+    memory->depth_max[e] = after[0][i];
+    memory->middle[e] = after[1][i];
+    memory->front_speed[e] = after[2][i];
+    memory->drift[e] = after[3][i];
+    memory->pending_x[e] = after[4][i];
+    memory->pending_y[e] = after[5][i];
+    memory->held_x[e] = after[6][i];
+    memory->held_y[e] = after[7][i];
+    memory->held_stiffness[e] = after[8][i];
+    memory->worn[e] = wears ? after[9][i] : memory->worn[e];
+}
+
 /* The general case: some elements are listed, the ground keeps imprints, or the foot is a surface.
  * Returns how many elements remember something. */
 static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
@@ -260,11 +275,6 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
                           .held_y = after[7],
                           .held_stiffness = after[8],
                           .worn = after[9]};
-    double *const to[] = {memory->depth_max, memory->middle,    memory->front_speed,
-                          memory->drift,     memory->pending_x, memory->pending_y,
-                          memory->held_x,    memory->held_y,    memory->held_stiffness,
-                          memory->worn};
-    const int numbers = foot->curves & LAW_HEAP ? ADVANCE_NUMBERS : ADVANCE_NUMBERS - 1;
     int next = 0;
     int touched = 0;
     for (int slot = 0; slot < foot->active; slot++, next++) {
@@ -291,9 +301,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         const double middle = s->depth[i] + a->dt / 2 * v.descent;
         const int lifted = !(stays[0][i] > 0.0);
         const int carried = memory->material[e] >= 0;
-        for (int k = 0; k < numbers; k++) {
-            to[k][e] = after[k][i];
-        }
+        memory_take(memory, e, (const Lanes *)after, i, foot->curves & LAW_HEAP);
         if (!lifted) {
             slot_raise(memory, s, i, e, foot->curves, v.descent, middle);
         }
