@@ -4,6 +4,7 @@
     grains/walk.py fit                      the models' numbers from grains/records, into grains/walk/grounds.json
     grains/walk.py grains --out out/walk    the walks on grains, by build/grains/grains; wants a GPU
     grains/walk.py models --out out/walk    the same walks on the models, some seconds each
+    grains/walk.py lead --out out/walk      leads the feet of the walks on grains through mild_merged: forces after touchdown, side by side
     grains/walk.py figure --out out/walk    OUT/walk.csv with a row for each stance, OUT/walks.json for each walk, and the figure
     grains/walk.py video --out out/walk     a video of each walk on grains
 
@@ -124,6 +125,16 @@ def draw_figure(args):
         print(image)
 
 
+def lead(args):
+    import walk_lead
+    for family in args.families:
+        for speed in args.speeds:
+            folder = args.out / family / speed
+            if not (folder / "grains" / "feet.csv").exists():
+                fail(f"{folder}/grains/feet.csv is not there: grains/walk.py grains")
+            walk_lead.compare(folder, ROOT / "robots" / args.robot / "robot.ini", json.loads(GROUNDS.read_text())[family]["mild_merged"], "mild_merged")
+
+
 def film(args):
     import walk_pictures
     for family in args.families:
@@ -141,7 +152,7 @@ def film(args):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("fit", "grains", "models", "figure", "video"))
+    parser.add_argument("what", choices=("fit", "grains", "models", "lead", "figure", "video"))
     parser.add_argument("--out", default=ROOT / "out" / "walk", type=pathlib.Path)
     parser.add_argument("--mild", default=ROOT / "build" / "mild", type=pathlib.Path)
     parser.add_argument("--program", default=ROOT / "build" / "grains" / "grains", type=pathlib.Path)
@@ -167,7 +178,7 @@ def main():
     args = parser.parse_args()
     args.out = args.out.resolve()
     try:
-        {"fit": fit, "grains": on_grains, "models": on_models, "figure": draw_figure, "video": film}[args.what](args)
+        {"fit": fit, "grains": on_grains, "models": on_models, "lead": lead, "figure": draw_figure, "video": film}[args.what](args)
     except ModuleNotFoundError as error:
         fail(f"{args.what} needs the Python package {error.name}: .venv/bin/python grains/walk.py, after make setup")
 

@@ -1,0 +1,89 @@
+"""Leads the feet of a walk on grains through a fitted ground model, and compares forces, for grains/walk.py."""
+import configparser
+import math
+
+import numpy as np
+
+STEP = 1e-3  # [s]
+WINDOWS = ((0, 0.02), (0.02, 0.05), (0.05, 0.1), (0.1, 0.2))  # [s] after touchdown
+CONTACT, SHORTEST, PAUSE = 30.0, 12, 2  # [N], rows of a stance, rows without load within it
+
+
+def rotation(roll, pitch, yaw):
+    cr, sr, cp, sp, cy, sy = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch), math.cos(yaw), math.sin(yaw)
+    return np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr], [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+                     [-sp, cp * sr, cp * cr]])
+
+
+def material(numbers, model):
+    """Of grains/walk/grounds.json."""
+    import mild
+    given = {name: text == "true" if name == "passive" else float(text) for name, text in numbers.items()}
+    return mild.Material("sand_loose", model=model, **given)
+
+
+def stances(table):
+    """(foot, rows) of each stance: from two rows before the load comes to where it goes."""
+    for foot in (0, 1):
+        rows = table[table["foot"] == foot]
+        on, begin = rows["force_z_n"] > CONTACT, 0
+        while begin < len(on):
+            end = begin
+            while end < len(on) and on[end:end + 1 + PAUSE].any() and on[begin]:
+                end += 1
+            if end - begin > SHORTEST and begin > PAUSE:
+                yield foot, rows[begin - PAUSE:end + 1]
+            begin = max(end, begin + 1)
+
+
+def smooth(time, values, at):
+    """A cubic through the rows, with the slopes of their neighbours."""
+    slope, i = np.gradient(values, time), np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
+    width = time[i + 1] - time[i]
+    s = (at - time[i]) / width
+    return ((1 + 2 * s) * (1 - s)**2 * values[i] + s * (1 - s)**2 * width * slope[i] + s * s * (3 - 2 * s) * values[i + 1] +
+            s * s * (s - 1) * width * slope[i + 1])
+
+
+def lead(sole, height, ground_material, rows):
+    """Columns time since the load came, force up and forward of grains, the same of the model, deepest point, speeds forward and up."""
+    import mild
+    ground = mild.Ground([sole], ground_material, dt=STEP)
+    ground.inverse_inertia[:] = 0
+    at = np.arange(rows["time_s"][0], rows["time_s"][-1], STEP)
+    x, y, z, roll, pitch, yaw = (smooth(rows["time_s"], rows[name], at) for name in
+                                 ("ankle_x_m", "ankle_y_m", "ankle_z_m", "roll_rad", "pitch_rad", "yaw_rad"))
+    up, forward, deep = (np.interp(at, rows["time_s"], rows[name]) for name in ("force_z_n", "force_x_n", "depth_m"))
+    turns, table = [rotation(*angles) for angles in zip(roll, pitch, yaw)], []
+    touched = at[np.argmax(up > CONTACT)]
+    for k in range(len(at) - 1):
+        change = turns[k + 1] @ turns[k].T
+        spin = np.array([change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1]]) / (2 * STEP)
+        speed = np.array([x[k + 1] - x[k], y[k + 1] - y[k], z[k + 1] - z[k]]) / STEP
+        off = turns[k] @ np.array([0, 0, height])
+        ground.position[0], ground.rotation[0] = np.array([x[k], y[k], z[k]]) + off, turns[k]
+        ground.velocity[0] = ground.free_velocity[0] = np.concatenate([speed + np.cross(spin, off), spin])
+        ground.solve()
+        ground.advance()
+        table.append((at[k] - touched, up[k], forward[k], ground.force[0, 2], ground.force[0, 0], deep[k], speed[0], speed[2]))
+    return np.array(table)
+
+
+def compare(folder, robot, numbers, model):
+    """Prints medians over the stances of a walk."""
+    import mild
+    ini = configparser.ConfigParser(inline_comment_prefixes=(";",))
+    ini.read(robot)
+    feet = [ini[section] for section in ini.sections() if section.startswith("foot.")]
+    soles = [mild.Sole(np.array([float(word) for word in foot["outline"].split()]).reshape(-1, 2), 0.0195) for foot in feet]
+    table = np.genfromtxt(folder / "grains" / "feet.csv", delimiter=",", names=True, dtype=None, encoding=None)
+    found = []
+    for foot, rows in stances(table):
+        led = lead(soles[foot], float(feet[foot]["z"]), material(numbers, model), rows)
+        found.append([led[(led[:, 0] >= low) & (led[:, 0] < high), 1:].mean(0) for low, high in WINDOWS])
+    if not found:
+        return
+    print(f"{folder}: {model}, {len(found)} stances, medians\n{'after touchdown':>18}  {'force up: grains':>17} {'model':>6}  {'forward: grains':>16} {'model':>6}"
+          f"  {'deepest [mm]':>12}  forward, up [m/s]")
+    for (low, high), v in zip(WINDOWS, np.nanmedian(found, 0)):
+        print(f"{1e3 * low:10.0f} to {1e3 * high:.0f} ms  {v[0]:17.0f} {v[2]:6.0f}  {v[1]:16.0f} {v[3]:6.0f}  {1e3 * v[4]:12.0f}  {v[5]:.2f}, {v[6]:.2f}")
