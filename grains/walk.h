@@ -537,7 +537,8 @@ inline void walk_meet(Walk *w, const Question &q) {
     }
 }
 
-/* Bool: a sole is upside down in the ground, at the floor, or so far along the way that it meets its start. */
+/* Bool: a sole is upside down in the ground, at the floor, or so far along the way that it meets
+ * its start. */
 inline bool sole_is_lost(const Walk &w, const Question &q) {
     const Bed &bed = w.track.bed;
     const double way = (double)bed.g.size_x - 2 * w.def.reach;
@@ -545,7 +546,8 @@ inline bool sole_is_lost(const Walk &w, const Question &q) {
         const Foot &f = q.foot[b];
         double deep, mean;
         depths(w, f, w.def.sides[b], &deep, &mean);
-        if (!((f.turn[8] > 0 || deep < 0) && deep < (double)bed.surface[b] && fabs(f.place[0]) < way)) {
+        if (!((f.turn[8] > 0 || deep < 0) && deep < (double)bed.surface[b] &&
+              fabs(f.place[0]) < way)) {
             return true;
         }
     }

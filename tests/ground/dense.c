@@ -265,8 +265,7 @@ typedef struct {
     const Kit *kit;
     int f;
     Memory memory;
-    double pitch, width,
-        normal[3]; /* width: [m] shorter side; normal: of the face that looks down */
+    double pitch, width, normal[3]; /* width: shorter side; normal: of the face that looks down */
     int i;
     double p[3], at[3], slope[2]; /* ankle -> element, world point, gradient of the ground */
     double share, area;           /* [-] of a surface: what it presses with, and its area, both
@@ -371,21 +370,18 @@ static void dense_share(double dt, DenseElement *e, const Find *find) {
     const double *g = find->slope, a = e->deep;
     double level = (-find->normal[2] + g[0] * find->normal[0] + g[1] * find->normal[1]) /
                    sqrt(1.0 + g[0] * g[0] + g[1] * g[1]);
-    level = fmin(fmax(level, 0.02), 1.0);
-    double c = find->faces ? 1.0 : 1.0 - law->projected * (1.0 - level),
+    double c = find->faces ? 1.0 : 1.0 - law->projected * (1.0 - fmin(fmax(level, 0.02), 1.0)),
            q = fmin(1.0 - find->memory.worn[find->i], c), soil = virgin_force(law, a),
            bed = law->bed_stiffness * fmax(a - law->bed, 0.0);
     if (law->grip > 0.0) {
-        double held = fmin(law->mu,
-                           fmax(0.1, (3.0 + sqrt(8.0)) * law->grip * (c - q) / (2.0 * c - q))),
+        double t = (3.0 + sqrt(8.0)) * law->grip,
+               held = fmin(law->mu, fmax(0.1, t * (c - q) / (2.0 * c - q))),
                way = fmax(e->u0 + 0.5 * dt * e->w0 - a, 0.0), carried = q * soil + bed,
                struck = fmax(law->drag_rate, 0.0) * cone_flat(law, a) * way * e->w0 / dt;
         law->mu = held + (law->mu - held) * struck / fmax(carried + struck, 1e-300);
     }
-    if (!find->faces) {
-        double side = 1.5 * law->weight * find->pitch * find->pitch / find->width;
-        e->radius += dt * side * e->u0 * fmax(e->u0, 0.0);
-    }
+    double side = find->faces ? 0.0 : 1.5 * law->weight * find->pitch * find->pitch / find->width;
+    e->radius += dt * side * e->u0 * fmax(e->u0, 0.0);
     e->slack = e->line > 0.0 ? a - (q * soil + bed) / e->line : a;
     law->k_pen *= q;
     law->kappa *= q;
