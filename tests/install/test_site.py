@@ -75,7 +75,7 @@ def searched(browser, address, name):
     time.sleep(0.5)
     browser.value(SEARCH)
     found = browser.wait(FOUND, 10)
-    if not found or not re.search("/docs/(model|grains|tutorials)", found):
+    if not found or not re.search("/docs/(model|grains|soil|tutorials)", found):
         faults.append(f"{name}: a search for plates finds {found}")
 
 
