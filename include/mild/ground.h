@@ -127,7 +127,8 @@ typedef struct {
     double regain_length; /* [m] mild, mild_merged: u0, fresh penetration over which the support
                             comes back */
     double grip;          /* [-] mild, mild_merged with a slip_length: t, greatest friction of a
-                            sliding element by its virgin load; 0: mu alone */
+                            sliding element by its virgin load; 0: mu alone. Above 0, ground that is
+                            struck is held by all of mu, and phi rho presses at a sole's sides */
     double refill;        /* [-] share of an imprint's depth that flows back as the foot leaves */
 } MildMaterial;
 

@@ -38,6 +38,7 @@
 #define SHARE_GRIP REAL(0.1)  /* [-] friction that an element at its yield load keeps */
 #define SHARE_YIELD REAL(5.8284271247461903) /* 3 + sqrt 8 */
 #define SHARE_PASSIVE 3.0                    /* [-] K_p of ground with 30 degrees of friction */
+#define SHARE_GRAVITY 9.81                   /* [m/s^2] */
 #define SHARE_FORGET REAL(40)                /* [-] da/u0 beyond which nothing is left */
 #define SHARE_LEAST REAL(1e-6)               /* [-] least share */
 #ifdef MILD_REAL_FLOAT
