@@ -16,7 +16,12 @@ for all of its trainings. Skill: mean over cells of upright share times 1 - |spe
 
 FOLDER/results.jsonl gets a line when a training ends and one when it is judged; started again, the command goes on from there, also after
 it was killed. What was trained with another --minutes, --steps or config is not counted. No training begins that would not end by --seconds,
-and no judge after it. Keys after -- go to the trainings of mlp, flat and ours, as -- --train.envs=8192."""
+and no judge after it. So it may be run in pieces, one after another or on several machines, each with a part of --controllers:
+--take PIECE,PIECE puts the results and policies of other folders into this one first, as in
+
+  scripts/paper/factorial.py runs/factorial --take runs/first,runs/second --report
+
+Keys after -- go to the trainings of mlp, flat and ours, as -- --train.envs=8192."""
 import argparse
 import csv
 import hashlib
@@ -124,11 +129,14 @@ class Factorial:
                 self.lines.append(line)
 
     def known(self, done, task):
-        """The line of this task that was written when it was `done`, trained or judged."""
-        return next((x for x in self.lines if x["done"] == done and x["task"] == task), None)
+        """The last line of this task that was written when it was `done`, trained or judged."""
+        return next((x for x in reversed(self.lines) if x["done"] == done and x["task"] == task), None)
 
     def add(self, done, task, found):
-        line = {"done": done, "task": task, **found, "settings": self.settings}
+        return self.write({"done": done, "task": task, **found, "settings": self.settings})
+
+    def write(self, line):
+        self.folder.mkdir(parents=True, exist_ok=True)
         with self.lock:
             self.lines.append(line)
             torn = self.file.exists() and not self.file.read_bytes().endswith(b"\n") and self.file.stat().st_size > 0
@@ -137,6 +145,18 @@ class Factorial:
                 file.flush()
                 os.fsync(file.fileno())
         return line
+
+    def take(self, folder):
+        """Results and policies of another folder that count here and are not here yet."""
+        other = Factorial(argparse.Namespace(**{**vars(self.given), "folder": folder}))
+        for line in other.lines:
+            if self.known(line["done"], line["task"]):
+                continue
+            if line["done"] == "trained" and other.policy_of(line["task"]).is_file():
+                place = self.policy_of(line["task"])
+                place.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(other.policy_of(line["task"]), place)
+            self.write(line)
 
     # ---- one training ----
 
@@ -214,8 +234,8 @@ class Factorial:
         return time.time() + likely <= self.end
 
     def work(self, task, devices, judges):
-        """Trains on the next free device, if it is not done; its judge starts when it is."""
-        if not self.known("trained", task):
+        """Trains on the next free device, if it is not done or its policy was lost; its judge starts when it is."""
+        if not self.known("judged", task) and not (self.known("trained", task) and self.policy_of(task).is_file()):
             device = devices.get()
             try:
                 if not self.begins(task):
@@ -391,6 +411,7 @@ def parse(words):
     parser.add_argument("--trials", type=int, default=5, help="of each cell (default 5)")
     parser.add_argument("--seconds", type=float, default=1e9, help="[s] no training begins that would not end by then")
     parser.add_argument("--python", default=sys.executable, help="with PyTorch, for clock and ht2 (default: this one)")
+    parser.add_argument("--take", default="", metavar="FOLDER[,FOLDER]", help="other folders of this command, whose results belong to these")
     parser.add_argument("--report", action="store_true", help="train nothing")
     own, more = (words[:words.index("--")], words[words.index("--") + 1:]) if "--" in words else (words, [])
     given = parser.parse_args(own)
@@ -403,6 +424,10 @@ def parse(words):
         fail("--steps: ht2 would take days; leave it out")
     if not given.config.is_file():
         fail(f"{given.config}: no such file")
+    given.take = [pathlib.Path(name) for name in given.take.split(",") if name]
+    missing = [folder for folder in given.take if not (folder / "results.jsonl").is_file()]
+    if missing:
+        fail(f"--take: {missing[0]} has no results.jsonl")
     given.devices = given.devices.split(",")
     given.slots = len(given.devices) * given.jobs
     given.judges = given.judges or max(1, os.cpu_count() // 2)
@@ -412,6 +437,8 @@ def parse(words):
 def main():
     given = parse(sys.argv[1:])
     factorial = Factorial(given)
+    for folder in given.take:
+        factorial.take(folder)
     done = given.report or factorial.run()
     report(factorial)
     for text in factorial.failed:

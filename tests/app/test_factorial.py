@@ -38,6 +38,8 @@ class MadeUp(factorial.Factorial):
             self.busy[device] -= 1
         if self.broken and all(task[key] == value for key, value in self.broken.items()):
             raise RuntimeError("no memory")
+        self.policy_of(task).parent.mkdir(parents=True, exist_ok=True)
+        self.policy_of(task).write_text(f"{self.folder.name} {task}")
         return {"seconds": 2.0, "steps": 3e6, "device": device}
 
     def judge(self, task):
@@ -111,6 +113,13 @@ def all_of_it():
         assert result["chosen"] == BEST and len(result["search"]) == 20 and len(result["rows"]) == 15
         assert abs(result["table2"][-1]["velocity"][3] - 0.7 * 1.2) < 1e-12  # ours, mild
 
+        # a policy that was lost before its judge is trained again
+        kept = [x for x in lines if not (x["task"] == lost[0] and x["done"] == "judged")]
+        third.file.write_text("".join(json.dumps(x) + "\n" for x in kept))
+        third.policy_of(lost[0]).unlink()
+        fourth = made(folder, *words)
+        assert quietly(fourth.run)[0] and fourth.calls == [lost[0]], fourth.calls
+
         other = made(folder, *words, "--minutes", "1")  # another budget: nothing of it counts
         assert not other.lines
 
@@ -140,7 +149,39 @@ def what_stops():
                 assert stopped.code == 2, stopped
 
 
+def in_pieces():
+    """Two machines, each with some controllers; a third puts both together, trains what is left, and reports."""
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        for name, controllers in (("first", "mlp,clock"), ("second", "clock,ht2,flat")):
+            assert quietly(made(folder / name, "--controllers", controllers).run)[0]
+        both = ("--take", f"{folder / 'first'},{folder / 'second'}")
+        whole = made(folder / "whole", *both)
+        for piece in whole.given.take:
+            whole.take(piece)
+        lines = [json.loads(text) for text in whole.file.read_text().splitlines()]
+        assert len(lines) == 2 * 4 * 13 == len({json.dumps([x["done"], x["task"]]) for x in lines})
+        clock = next(x["task"] for x in lines if x["task"]["controller"] == "clock")
+        assert whole.policy_of(clock).read_text().startswith("first ")  # who comes first
+        assert quietly(whole.run)[0] and len(whole.calls) == 13 and {task["controller"] for task in whole.calls} == {"ours"}
+        assert "of the variance of the skill" in quietly(lambda: factorial.report(whole))[1]
+        other = made(folder / "other", "--minutes", "1")  # another budget: nothing of it counts
+        other.take(folder / "first")
+        assert not other.lines and not other.file.exists()
+        _, _, wrong = quietly(lambda: stops(folder / "whole", "--take", str(folder)))
+        assert "has no results.jsonl" in wrong
+
+
+def stops(folder, *words):
+    try:
+        made(folder, *words)
+        raise AssertionError(words)
+    except SystemExit as stopped:
+        assert stopped.code == 2, stopped
+
+
 measures()
 all_of_it()
+in_pieces()
 what_stops()
 print("65 trainings, restarted, stopped and told")
