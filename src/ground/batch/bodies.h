@@ -19,6 +19,7 @@
 #define BODIES_STEEP REAL(0.17364817766693034) /* [-] cosine of 80 degrees, as in faces.c */
 #define BODIES_MARGIN REAL(1e-3)               /* [m] as in locate.c */
 #define BODIES_EXTRA_SPEED REAL(2)             /* [m/s] as in locate.c */
+#define BODIES_GROWTH REAL(8)                  /* [-] as NEWTON_GROWTH in newton_step.c */
 
 /* The elements of a body. */
 typedef struct {

@@ -251,8 +251,35 @@ TEAM_FN void bodies_residual(BodiesWork *work, int rows, const BodiesPoint *poin
         }
     }
     team_sync();
-    *residual = REAL_SQRT(real_max(lane_sum(moved), 0));
+    const Real gap = lane_sum(moved);
+    *residual = gap < 0 ? 0 : REAL_SQRT(gap); /* NaN stays NaN: nothing is solved then */
     *scale = REAL_SQRT(real_max(lane_sum(done), 0));
+}
+
+/* The row to take as the pivot of column k: k, unless a number below it in the rows of its body is
+ * far larger. From body to body 1 + H A stays away from singular, but not from row to row: where
+ * a body's forces turn its origin against them the diagonal passes through 0. */
+MILD_HD int bodies_pivot(const Real *matrix, int stride, int k) {
+    int most = k;
+    for (int r = k + 1; r < k / 6 * 6 + 6; r++) {
+        most = REAL_ABS(matrix[r * stride + k]) > REAL_ABS(matrix[most * stride + k]) ? r : most;
+    }
+    const Real least = BODIES_GROWTH * REAL_ABS(matrix[k * stride + k]);
+    return REAL_ABS(matrix[most * stride + k]) > least ? most : k;
+}
+
+/* What is left of two rows from column k on changes places. */
+TEAM_FN void bodies_swap(Real *matrix, int stride, int k, int other) {
+    team_sync(); /* all lanes have chosen */
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int j = k + TEAM_LANE(l); j < stride; j += TEAM) {
+            const Real kept = matrix[k * stride + j];
+            matrix[k * stride + j] = matrix[other * stride + j];
+            matrix[other * stride + j] = kept;
+        }
+    }
+    team_sync();
 }
 
 /* Gauss and Jordan; the last column becomes the solution. A warp has its share of the columns. */
@@ -260,6 +287,10 @@ TEAM_FN void bodies_eliminate(BodiesWork *work, int rows) {
     const int stride = rows + 1;
     LANE_ROLLED
     for (int k = 0; k < rows; k++) {
+        const int chosen = bodies_pivot(work->matrix, stride, k);
+        if (chosen != k) {
+            bodies_swap(work->matrix, stride, k, chosen);
+        }
         const Real *pivot = work->matrix + k * stride;
         const Real inverse = 1 / pivot[k];
         EACH_LANE(l) {
