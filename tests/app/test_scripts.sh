@@ -66,6 +66,16 @@ mkdir tests && cp long.c tests/
 expect 0 '^$' house main.c tests/long.c
 yes 'int x;' | head -801 >file.c
 expect 1 'file.c:801: 801 lines, 800 are allowed' house file.c
+# a test that compares the sentence of an error, whatever the call
+for call in 'strstr(error.text, "outside")' 'strcmp(error->text, "x")' 'assert_string_equal(f.error.text, "x")' \
+    'assert_memory_equal("x", error.text, 1)' 'strncmp(e.text, "x", 1)'; do
+    printf 'int x;\nint y = %s;\n' "$call" >tests/sentence.c
+    expect 1 "tests/sentence.c:2: ${call%%(*} of an error's text: take assert_error" house tests/sentence.c
+    cp tests/sentence.c sentence.c && cp tests/sentence.c tests/kit.h
+    expect 0 '^$' house sentence.c tests/kit.h
+done
+printf 'assert_error(&error, 1, "x");\nassert_names(error.text, "x");\nstrstr(text, "error");\n' >tests/named.c
+expect 0 '^$' house tests/named.c
 
 # a long command in one line, with a log; of a failure the last lines and the exit code
 quietly() { "$root/scripts/quietly.sh" "$@"; }

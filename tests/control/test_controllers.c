@@ -70,9 +70,9 @@ static void names(void **unused) {
     const ControllerDef def = {0};
     Controller controller = {0};
     assert_int_equal(controller_check("stnad", &error), MILD_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.text, "unknown controller 'stnad'; nearest is 'stand'"));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "controller stnad stand");
     assert_int_equal(controller_make("zeros", &def, &controller, &error), MILD_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.text, "nearest is 'zero'"));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "controller zeros zero");
     assert_null(controller.self);
 }
 

@@ -16,8 +16,7 @@ static void scenes_by_name(void **state) {
     assert_int_equal(scene_make(&scene, "rigid", 2, &error), MILD_OK);
     assert_true(scene.rigid);
     assert_int_equal(scene_make(&scene, "rubber+foam54", 2, &error), MILD_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.text, "foam54"));
-    assert_non_null(strstr(error.text, "foam45"));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "foam54 foam45");
     assert_int_not_equal(scene_make(&scene, "", 2, &error), MILD_OK);
     assert_int_not_equal(scene_make(&scene, "rubber+", 2, &error), MILD_OK);
 }
@@ -29,16 +28,16 @@ static void courses_have_bounds(void **state) {
     MildError error = {0};
     char name[64], text[SCENE_NAME_SIZE + 80] = "rubber";
     assert_int_not_equal(scene_make(&scene, "sand", 2, &error), MILD_OK);
-    assert_non_null(strstr(error.text, "known: rigid, "));
     for (int i = 0; i < mild_material_preset_count(); i++) {
-        assert_non_null(strstr(error.text, mild_material_preset_name(i)));
+        assert_names(error.text, mild_material_preset_name(i));
     }
     for (int m = 0; m < MILD_MODELS; m++) {
         const char *const *presets = mild_model_info((MildModel)m)->presets;
         for (int k = 0; k < MILD_MODEL_PRESETS && presets[k]; k++) {
-            assert_non_null(strstr(error.text, presets[k]));
+            assert_names(error.text, presets[k]);
         }
     }
+    assert_error(&error, MILD_ERROR_ARGUMENT, "sand rigid");
     for (int i = 1; i < MILD_MATERIALS_MAX; i++) {
         strcat(text, "+grass");
     }
@@ -59,14 +58,14 @@ static void courses_have_bounds(void **state) {
     assert_int_equal(mild_terrain_material_at(&scene.terrain, 900, 0), 0);
     strcat(text, "+grass");
     assert_int_equal(scene_make(&scene, text, 2, &error), MILD_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.text, "at most"));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "12");
     memset(text, 'x', sizeof text);
     text[sizeof scene.name] = 0;
     assert_int_equal(scene_make(&scene, text, 2, &error), MILD_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.text, "too long"));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "ground");
     text[sizeof scene.name - 1] = 0;
     assert_int_equal(scene_make(&scene, text, 2, &error), MILD_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.text, "unknown ground"));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "ground rigid");
 }
 
 /* Turns back to world x by 1 rad/s per radian, at most 0.5 rad/s, and not while standing. */
