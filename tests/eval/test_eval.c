@@ -426,6 +426,121 @@ static void rigid_inside_a_course(void **state) {
     assert_true(stamp.penetration < 0.005 && soft.penetration > 0.02);
 }
 
+/* ---- many rows at once ---- */
+
+enum { SCENES = 3, SPEEDS = 2, OF_ROW = 3 };
+
+static void run_rows(const Scene *scenes, int scene_count, const double *speeds, int speed_count,
+                     EvalRow *rows, EvalTrial *each) {
+    MildError error = {0};
+    Zero zero = {0};
+    Controller controller = {&zero, "zero", zero_act, zero_destroy, NULL, NULL};
+    Pool *pool = pool_create(2);
+    const EvalRun run = {.task = &def,
+                         .robot = robot,
+                         .pool = pool,
+                         .controller = &controller,
+                         .device = MILD_BATCH_HOST,
+                         .scenes = scenes,
+                         .scene_count = scene_count,
+                         .speeds = speeds,
+                         .speed_count = speed_count,
+                         .eval = {.trials = OF_ROW, .seconds = 1.5, .push = 1, .seed = 1},
+                         .each = each};
+    assert_int_equal(eval_run(&run, rows, &error), MILD_OK);
+    pool_destroy(pool);
+}
+
+static void same_trial(const EvalTrial *a, const EvalTrial *b) {
+    assert_int_equal(a->end, b->end);
+    assert_true(a->seconds == b->seconds && a->shells == b->shells && a->torque == b->torque);
+    assert_true(a->x == b->x && (a->legs == b->legs || (isnan(a->legs) && isnan(b->legs))));
+}
+
+/* A row alone, and among others, is the same, trial by trial; and a row is its trials. */
+static void rows_and_trials_are_their_own(void **state) {
+    (void)state;
+    static const char *const names[SCENES] = {"foam25", "rigid", "sand_loose"};
+    static const double speeds[SPEEDS] = {0.2, 0.6};
+    static EvalTrial each[SCENES * SPEEDS * OF_ROW];
+    Scene scenes[SCENES];
+    EvalRow rows[SCENES * SPEEDS];
+    MildError error = {0};
+    for (int i = 0; i < SCENES; i++) {
+        assert_int_equal(scene_make(&scenes[i], names[i], 2, &error), MILD_OK);
+    }
+    run_rows(scenes, SCENES, speeds, SPEEDS, rows, each);
+    for (int k = 0; k < SCENES * SPEEDS; k++) {
+        const EvalTrial *of = each + (ptrdiff_t)k * OF_ROW;
+        EvalTrial alone[OF_ROW];
+        EvalRow row;
+        run_rows(&scenes[k / SPEEDS], 1, &speeds[k % SPEEDS], 1, &row, alone);
+        assert_string_equal(rows[k].ground, names[k / SPEEDS]);
+        assert_true(rows[k].speed == speeds[k % SPEEDS]);
+        double seconds = 0, shells = 0, torque = 0, legs = INFINITY;
+        for (int i = 0; i < OF_ROW; i++) {
+            same_trial(&of[i], &alone[i]);
+            assert_true(of[i].torque != of[(i + 1) % OF_ROW].torque); /* each another */
+            seconds += of[i].seconds / OF_ROW;
+            shells += of[i].shells / OF_ROW;
+            torque += of[i].torque / OF_ROW;
+            legs = fmin(legs, of[i].legs);
+        }
+        expect_near("seconds", rows[k].seconds, seconds, 1e-12);
+        expect_near("shells", rows[k].shells, shells, 1e-15);
+        expect_near("torque", rows[k].torque_max, torque, 1e-9);
+        assert_true(rows[k].legs == legs);
+    }
+}
+
+/* What --feet and --track write names the row's ground and speed, and has a line for every step
+ * that a trial lasted. */
+static void files_are_of_the_row(void **state) {
+    (void)state;
+    MildError error = {0};
+    Zero zero = {0};
+    Controller controller = {&zero, "zero", zero_act, zero_destroy, NULL, NULL};
+    Pool *pool = pool_create(1);
+    char *text[2] = {NULL, NULL};
+    size_t size[2];
+    Scene scenes[2]; /* the second is not asked for */
+    static const double speeds[2] = {0.3, 0.7};
+    EvalTrial each[2];
+    EvalRow row;
+    assert_int_equal(scene_make(&scenes[0], "grass", 2, &error), MILD_OK);
+    assert_int_equal(scene_make(&scenes[1], "rubber", 2, &error), MILD_OK);
+    EvalRun run = {.task = &def,
+                   .robot = robot,
+                   .pool = pool,
+                   .controller = &controller,
+                   .device = MILD_BATCH_HOST,
+                   .scenes = scenes,
+                   .scene_count = 1,
+                   .speeds = speeds,
+                   .speed_count = 1,
+                   .eval = {.trials = 2, .seconds = 0.2, .seed = 1},
+                   .each = each};
+    run.eval.feet = open_memstream(&text[0], &size[0]);
+    run.eval.track = open_memstream(&text[1], &size[1]);
+    assert_int_equal(eval_run(&run, &row, &error), MILD_OK);
+    fclose(run.eval.feet);
+    fclose(run.eval.track);
+    for (int file = 0; file < 2; file++) {
+        int lines[2] = {0, 0};
+        char *rest;
+        for (char *line = strtok_r(text[file], "\n", &rest); line;
+             line = strtok_r(NULL, "\n", &rest)) {
+            assert_memory_equal(line, "grass,0.3,", 10);
+            lines[atoi(line + 10)]++;
+        }
+        for (int i = 0; i < 2; i++) { /* a line for each foot */
+            expect_near("lines", lines[i], (file ? 1 : 2) * each[i].seconds / TASK_PERIOD, 1e-9);
+        }
+        free(text[file]);
+    }
+    pool_destroy(pool);
+}
+
 /* ---- the legs ---- */
 
 /* What is drawn, by MuJoCo, at every decision. */
@@ -554,6 +669,8 @@ int main(void) {
         cmocka_unit_test(rigid_inside_a_course),
         cmocka_unit_test(time_is_rounded_to_steps),
         cmocka_unit_test(a_row_is_what_its_trials_did),
+        cmocka_unit_test(rows_and_trials_are_their_own),
+        cmocka_unit_test(files_are_of_the_row),
         cmocka_unit_test(the_shipped_policy_walks),
         cmocka_unit_test(speed_is_measured_until_the_stop),
         cmocka_unit_test(legs_do_not_cross),

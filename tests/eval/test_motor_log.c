@@ -1,5 +1,7 @@
 /* From the made-up motor to a log, to the network, and back under the policy: the robot walks with
  * the network as it does with the motor. */
+#include <limits.h>
+
 #include "eval_kit.h"
 
 #include "env/actuator/fit.h"
@@ -162,6 +164,7 @@ static void columns_are_what_they_name(void **state) {
     }
     assert_int_equal(columns, 1 + 3 * SA01_JOINTS);
     double time = 0, before = 0;
+    int began = 0, shortest = INT_MAX; /* rows of an episode */
     while ((line = strtok_r(NULL, "\n", &rest))) {
         for (int c = 0; c < columns; c++, line++) {
             const double number = strtod(line, &line);
@@ -175,12 +178,16 @@ static void columns_are_what_they_name(void **state) {
             assert_true(fabs(number - wanted[of[c] % 3]) <= 1e-5 * fabs(wanted[of[c] % 3]));
         }
         const int jumped = time - before > 0.5;
+        shortest = jumped && row - began < shortest ? row - began : shortest;
+        began = jumped ? row : began;
         assert_true(row == 0 || fabs(time - before - def.physics_dt - jumped) < 1e-6);
         jumps += jumped;
         before = time;
         row++;
     }
-    print_message("%d rows, %d falls, %d jumps of a second\n", row, falls, jumps);
+    print_message("%d rows, %d falls, %d jumps of a second, the first after %d rows or more\n", row,
+                  falls, jumps, shortest);
+    assert_true(shortest * def.physics_dt > 0.2); /* who fell stands up anew */
     assert_int_equal(row, times_asked);
     assert_int_equal(row, (int)(log.seconds / def.physics_dt + 0.5));
     assert_true(falls >= 2 && jumps >= falls - 1 && jumps <= falls);

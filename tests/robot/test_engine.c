@@ -36,7 +36,7 @@ static MildStatus do_work(void *context, MildError *error) {
     }
     errno = work->number;
     return work->status == MILD_OK ? MILD_OK
-                                   : mild_fail(error, work->status, "the work's own words");
+                                   : mild_fail(error, work->status, "own words");
 }
 
 static int open_descriptors(void) {
@@ -83,9 +83,9 @@ static void test_calls(void **state) {
         expect((Work){.status = MILD_OK}, MILD_OK, "");
         expect((Work){.status = MILD_OK, .number = ENOMEM}, MILD_OK, "");
         expect((Work){.warns = 1}, MILD_OK, "");
-        expect((Work){.status = MILD_ERROR_FORMAT}, MILD_ERROR_FORMAT, "the work's own words");
+        expect((Work){.status = MILD_ERROR_FORMAT}, MILD_ERROR_FORMAT, "own words");
         expect((Work){.status = MILD_ERROR_FORMAT, .number = EINVAL}, MILD_ERROR_FORMAT,
-               "the work's own words");
+               "own words");
         expect((Work){.status = MILD_ERROR_FORMAT, .number = ENOMEM}, MILD_ERROR_MEMORY,
                "model memory");
         expect((Work){.aborts = 1}, MILD_ERROR_MEMORY, "model memory");
