@@ -541,6 +541,58 @@ static void files_are_of_the_row(void **state) {
     pool_destroy(pool);
 }
 
+/* No ground at all, and none that answers from the given physics step on. */
+typedef struct {
+    int left; /* answers; below 0: any number */
+} Failing;
+
+static int fail_to_answer(void *self, const MildContactInput *input, MildContactResult *result) {
+    Failing *failing = self;
+    memset(result->foot, 0, sizeof *result->foot * (size_t)input->feet);
+    return failing->left >= 0 && failing->left-- == 0;
+}
+
+/* A trial whose step cannot be computed has diverged: its time ends there, and it is no success. */
+static void a_diverged_trial_has_not_succeeded(void **state) {
+    (void)state;
+    MildError error = {0};
+    Zero zero = {0};
+    Controller controller = {&zero, "zero", zero_act, zero_destroy, NULL, NULL};
+    Pool *pool = pool_create(1);
+    Failing failing[3] = {{-1}, {10}, {-1}};
+    RobotGround ground[3];
+    TaskDef task = def;
+    Scene scene;
+    EvalTrial each[3];
+    EvalRow row;
+    static const double speed = 0.3;
+    for (int i = 0; i < 3; i++) {
+        ground[i] = (RobotGround){fail_to_answer, &failing[i]};
+    }
+    task.shells_stand = 0;
+    assert_int_equal(scene_make(&scene, "grass", 2, &error), MILD_OK);
+    const EvalRun run = {.task = &task,
+                         .robot = robot,
+                         .pool = pool,
+                         .controller = &controller,
+                         .device = MILD_BATCH_HOST,
+                         .scenes = &scene,
+                         .scene_count = 1,
+                         .speeds = &speed,
+                         .speed_count = 1,
+                         .eval = {.trials = 3, .seconds = 0.1, .seed = 1},
+                         .ground = ground,
+                         .each = each};
+    assert_int_equal(eval_run(&run, &row, &error), MILD_OK);
+    pool_destroy(pool);
+    assert_int_equal(each[0].end, TASK_END_time);
+    assert_int_equal(each[1].end, TASK_END_not_finite);
+    assert_int_equal(each[2].end, TASK_END_time);
+    expect_near("time", each[0].seconds, 0.1, 1e-12);
+    expect_near("time until it diverged", each[1].seconds, 10 * task.physics_dt, 1e-12);
+    assert_true(row.success == 2 && row.ends[TASK_END_not_finite] == 1);
+}
+
 /* ---- the legs ---- */
 
 /* What is drawn, by MuJoCo, at every decision. */
@@ -671,6 +723,7 @@ int main(void) {
         cmocka_unit_test(a_row_is_what_its_trials_did),
         cmocka_unit_test(rows_and_trials_are_their_own),
         cmocka_unit_test(files_are_of_the_row),
+        cmocka_unit_test(a_diverged_trial_has_not_succeeded),
         cmocka_unit_test(the_shipped_policy_walks),
         cmocka_unit_test(speed_is_measured_until_the_stop),
         cmocka_unit_test(legs_do_not_cross),
