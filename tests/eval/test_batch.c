@@ -331,14 +331,14 @@ static void refused(const char *ground, int trials, int histories, const char *n
 
 static void what_is_not_there_is_refused(void **state) {
     (void)state;
-    refused("rubber+grass", 1, 1, "--ground rubber+grass train.robots");
-    refused("grass", EVAL_ROBOTS_MAX + 1, 1, "--trials 65537 train.robots");
-    refused("grass", 1, 0, "--controller zero train.robots");
+    refused("rubber+grass", 1, 1, "--ground rubber+grass --train.robots");
+    refused("grass", EVAL_ROBOTS_MAX + 1, 1, "--trials 65537 --train.robots");
+    refused("grass", 1, 0, "--controller zero --train.robots");
     def.solver = MILD_SOLVER_GAUSS_SEIDEL;
-    refused("grass", 1, 1, "task.solver newton train.robots");
+    refused("grass", 1, 1, "task.solver newton train.robots mujoco");
     def.solver = MILD_SOLVER_NEWTON;
     def.imprint_tiles = 8;
-    refused("grass", 1, 1, "terrain.memory train.robots");
+    refused("grass", 1, 1, "terrain.memory train.robots mujoco");
     def.imprint_tiles = 0;
 }
 
