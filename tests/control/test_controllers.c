@@ -117,7 +117,7 @@ static void stand_acts_as_the_stand(void **unused) {
         scene.controller.act(scene.controller.self, 1, &scene.env, action);
         for (int i = 0; i < joints; i++) {
             double target = robot_default_pose(scene.robot)[i] +
-                            robot_action_scale(scene.robot) * (double)action[i];
+                            robot_table(scene.robot)->action_scale * (double)action[i];
             double torque =
                 task_env_rest(scene.env)->gains.kp[i] * (target - scene.env->robot.qpos[7 + i]) -
                 task_env_rest(scene.env)->gains.kd[i] * scene.env->robot.qvel[6 + i];

@@ -335,7 +335,9 @@ static void motors_and_gait(void **unused) {
         assert_int_equal(robot_joint_foot(robot)[i], i / LEG);
         assert_int_equal(robot_mirror_joint(robot)[i], (i + LEG) % JOINTS);
     }
-    expect_near("shift", fabs(robot_gait_offset(robot, 0) - robot_gait_offset(robot, 1)), 0.5, 0);
+    expect_near("shift",
+                fabs(robot_table(robot)->gait_offset[0] - robot_table(robot)->gait_offset[1]), 0.5,
+                0);
     robot_sim_destroy(sim);
 }
 

@@ -64,9 +64,11 @@ static void efforts_speeds_and_gait(void **unused) {
         assert_int_equal(robot_joint_foot(robot)[i], i / 3);
     }
     /* a trot: diagonal feet together, mirrored feet alternate */
-    assert_true(robot_gait_offset(robot, FL) == robot_gait_offset(robot, RR));
-    assert_true(robot_gait_offset(robot, FR) == robot_gait_offset(robot, RL));
-    expect_near("shift", fabs(robot_gait_offset(robot, FL) - robot_gait_offset(robot, FR)), 0.5, 0);
+    assert_true(robot_table(robot)->gait_offset[FL] == robot_table(robot)->gait_offset[RR]);
+    assert_true(robot_table(robot)->gait_offset[FR] == robot_table(robot)->gait_offset[RL]);
+    expect_near("shift",
+                fabs(robot_table(robot)->gait_offset[FL] - robot_table(robot)->gait_offset[FR]),
+                0.5, 0);
     assert_int_equal(robot_mirror_foot(robot, FL), FR);
     assert_int_equal(robot_mirror_foot(robot, RR), RL);
 }

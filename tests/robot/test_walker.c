@@ -130,7 +130,7 @@ static void test_joints(void **unused) {
         expect_entry("stand_kp", i, robot_stand_kp(robot)[i], i + 1, 0);
         expect_entry("stand_kd", i, robot_stand_kd(robot)[i], 0.1 * (i + 1), 1e-12);
         expect_entry("swing", i, robot_swing(robot)[i], swing[i], 0);
-        expect_entry("still", i, robot_still(robot)[i], still[i], 0);
+        expect_entry("still", i, robot_table(robot)->still[i], still[i], 0);
     }
 }
 
@@ -138,9 +138,9 @@ static void test_feet_and_body(void **unused) {
     (void)unused;
     for (int f = 0; f < FEET; f++) {
         assert_int_equal(robot_mirror_foot(robot, f), 1 - f);
-        expect_entry("offset", f, robot_gait_offset(robot, f), f ? 0.6 : 0.1, 0);
-        expect_entry("feet_range", f, robot_feet_range(robot)[f], f ? 0.3 : 0.1, 0);
-        expect_entry("knee_range", f, robot_knee_range(robot)[f], f ? 0.35 : 0.15, 0);
+        expect_entry("offset", f, robot_table(robot)->gait_offset[f], f ? 0.6 : 0.1, 0);
+        expect_entry("feet_range", f, robot_table(robot)->feet_range[f], f ? 0.3 : 0.1, 0);
+        expect_entry("knee_range", f, robot_table(robot)->knee_range[f], f ? 0.35 : 0.15, 0);
     }
     assert_int_equal(robot_ankle(robot, FLAT), 3);
     assert_int_equal(robot_ankle(robot, ROUND), -1);
@@ -148,12 +148,12 @@ static void test_feet_and_body(void **unused) {
     expect_entry("mass", 0, robot_total_mass(robot), 22.9, 1e-9);
     expect_entry("load of a foot", 0, robot_foot_load(robot), 22.9 * 10 / 2, 1e-9);
     expect_entry("height", 0, robot_nominal_height(robot), 0.6, 0);
-    expect_entry("action_scale", 0, robot_action_scale(robot), 0.3, 0);
-    expect_entry("foot_force", 0, robot_foot_force(robot), 300, 0);
-    expect_entry("least", 0, robot_feet_least(robot), 0.07, 0);
-    expect_entry("least", 1, robot_knee_least(robot), 0.08, 0);
-    expect_entry("assist", 3, robot_assist(robot)[3], 20, 0);
-    expect_entry("assist", 0, robot_assist(robot)[0], 100, 0);
+    expect_entry("action_scale", 0, robot_table(robot)->action_scale, 0.3, 0);
+    expect_entry("foot_force", 0, robot_table(robot)->foot_force, 300, 0);
+    expect_entry("least", 0, robot_table(robot)->feet_least, 0.07, 0);
+    expect_entry("least", 1, robot_table(robot)->knee_least, 0.08, 0);
+    expect_entry("assist", 3, robot_table(robot)->assist[3], 20, 0);
+    expect_entry("assist", 0, robot_table(robot)->assist[0], 100, 0);
 }
 
 /* Base above the lower of the soles in the default pose: the flat one hangs 0.1 + 0.3 cos 0.2 twice
