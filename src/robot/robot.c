@@ -540,10 +540,6 @@ const double *robot_mirror_sign(const Robot *robot) {
     return robot->def.mirror_sign;
 }
 
-int robot_mirror_foot(const Robot *robot, int foot) {
-    return robot->limb[foot].mirror;
-}
-
 double robot_mirror_shift(const Robot *robot) {
     return robot->def.mirror_shift;
 }

@@ -59,7 +59,6 @@ int robot_ankle(const Robot *robot, int foot);     /* joint that pitches a flat 
 /* The robot's mirror image in the x-z plane: q'_i = sign_i q_mirror_i. */
 const int *robot_mirror_joint(const Robot *robot);
 const double *robot_mirror_sign(const Robot *robot);
-int robot_mirror_foot(const Robot *robot, int foot);
 double robot_mirror_shift(const Robot *robot); /* [-] of the gait cycle: 0.5 when sides alternate */
 /* What a task needs, as one block without pointers. */
 const RobotTable *robot_table(const Robot *robot);

@@ -2,7 +2,7 @@
  * message. */
 #include "map_kit.h"
 
-#include "base/float.h"
+#include "round.h"
 
 static MildSole *soles[2]; /* left, right */
 
@@ -60,7 +60,7 @@ static void random_problems(void **state) {
         if (check(&kit, &error) != MILD_OK) {
             fail_msg("draw %d: %s", draw, error.text);
         }
-        float_round_all(kit.input.inverse_inertia, (size_t)(36 * kit.feet * kit.feet));
+        kit_round(kit.input.inverse_inertia, (size_t)(36 * kit.feet * kit.feet));
         if (check(&kit, &error) != MILD_OK) {
             fail_msg("draw %d in float: %s", draw, error.text);
         }

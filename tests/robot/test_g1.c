@@ -364,7 +364,7 @@ static void the_mirror_image(void **unused) {
         }
         robot_sim_load(sim, &image, &nominal);
         for (int f = 0; f < FEET; f++) {
-            const double *other = robot_sim_foot(sim, robot_mirror_foot(robot, f))->sole_center;
+            const double *other = robot_sim_foot(sim, 1 - f)->sole_center;
             for (int k = 0; k < 3; k++) {
                 worst = fmax(worst, fabs(position[f][k] - (k == 1 ? -1 : 1) * other[k]));
             }
