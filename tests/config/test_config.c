@@ -119,8 +119,9 @@ static void test_overrides(void **state) {
                                "sample.=1",       ".count=1",       "sample.count"};
     const MildStatus status[] = {MILD_ERROR_RANGE,  MILD_ERROR_FORMAT, MILD_ERROR_FORMAT,
                                  MILD_ERROR_FORMAT, MILD_ERROR_FORMAT, MILD_ERROR_FORMAT};
-    const char *const names[] = {"sample.count 1 10", "sample.count", "sample",
-                                 "section.key",       "section.key",  "section.key"};
+    const char *const names[] = {
+        "sample.count 1 10",   "sample.count",        "sample",
+        "--section.key=value", "--section.key=value", "--section.key=value"};
     for (int i = 0; i < 6; i++) {
         char wanted[64];
         assert_int_equal(config_override(f.sections, 2, bad[i], &f.error), status[i]);

@@ -697,6 +697,10 @@ static void the_printed_row(void **state) {
     row.ends[TASK_END_joint] = 1;
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "       -  ended by: 2 tilt, 1 joint"));
+    row.ends[TASK_END_base] = 3; /* in the order of TASK_ENDS */
+    row.ends[TASK_END_not_finite] = 4;
+    eval_print_row(&row, text, sizeof text);
+    assert_names(text, "ended 2 tilt 3 base 1 joint 4 not_finite");
     char header[256];
     eval_print_header(header, sizeof header);
     printf("%s\n%s\n", header, text);

@@ -1,6 +1,7 @@
 /* The ground of another program, which this test is itself: with a first word it answers questions
  * in that way. What is asked and answered number by number, signals in between, children that die,
  * leave, come too late, or cannot be started. */
+#include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/socket.h>
@@ -19,6 +20,7 @@ enum { FEET = 4, BODIES = 6, QUESTION = 4 + 24 * FEET + 36 * FEET * FEET, ANSWER
 static Robot *robot;
 static double question[QUESTION];
 static int sockets;           /* until one cannot be made; 0: all can */
+static int sends = -1;        /* calls of send so far; -1: all that is asked for is sent */
 static struct timeval wanted; /* how long an answer may take */
 static int microseconds;      /* in its place; 0: as wanted */
 
@@ -26,6 +28,17 @@ int __real_socketpair(int domain, int type, int protocol, int ends[2]);
 int __wrap_socketpair(int domain, int type, int protocol, int ends[2]);
 int __wrap_socketpair(int domain, int type, int protocol, int ends[2]) {
     return sockets > 0 && --sockets == 0 ? -1 : __real_socketpair(domain, type, protocol, ends);
+}
+
+/* As a full socket that signals interrupt: a few bytes, or none. */
+ssize_t __real_send(int socket, const void *data, size_t size, int flags);
+ssize_t __wrap_send(int socket, const void *data, size_t size, int flags);
+ssize_t __wrap_send(int socket, const void *data, size_t size, int flags) {
+    if (sends >= 0 && sends++ % 3 == 1) {
+        errno = EINTR;
+        return -1;
+    }
+    return __real_send(socket, data, sends >= 0 && size > 1000 ? 1000 : size, flags);
 }
 
 int __real_setsockopt(int socket, int level, int name, const void *value, socklen_t size);
@@ -192,6 +205,10 @@ static void every_number_arrives(void **state) {
     check_dialogue("echo", FEET, 0, 2 * QUESTION / ANSWER + 2);
     check_dialogue("echo", BODIES, 0x12f, QUESTION / ANSWER + 2); /* the feet and two bodies */
     check_dialogue("pieces", FEET, 0xf, 4);
+    sends = 0;
+    check_dialogue("echo", FEET, 0, QUESTION / ANSWER + 2);
+    assert_true(sends > 100);
+    sends = -1;
 }
 
 static void ignore(int number) {
