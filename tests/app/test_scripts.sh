@@ -77,6 +77,12 @@ done
 printf 'assert_error(&error, 1, "x");\nassert_names(error.text, "x");\nstrstr(text, "error");\n' >tests/named.c
 expect 0 '^$' house tests/named.c
 
+# what counts as named in these tests
+named "press: --depth: 7 is outside 0 .. 1.5" "--depth 7 1.5 press" || fail "--depth is not named"
+for word in depth --dept -7 1 5 pres outside.; do
+    ! named "press: --depth: 7 is outside 0 .. 1.5" "$word" || fail "'$word' is named"
+done
+
 # a long command in one line, with a log; of a failure the last lines and the exit code
 quietly() { "$root/scripts/quietly.sh" "$@"; }
 said=$(quietly logs/fine.log "counting" seq 1000 2>&1) || fail "quietly fails"

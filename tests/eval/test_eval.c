@@ -363,6 +363,7 @@ static void walk_pushed(Noting *noting, double push, uint64_t seed) {
 static void pushes_come_every_four_seconds(void **state) {
     (void)state;
     double angle[2 * PUSHED];
+    int from[4] = {0};
     for (int i = 0; i < 2 * PUSHED; i++) {
         const int trial = i % PUSHED, at = trial ? 400 - 97 * trial : 400;
         if (trial == 0) {
@@ -378,7 +379,12 @@ static void pushes_come_every_four_seconds(void **state) {
         for (int j = 0; j < i; j++) {
             assert_true(fabs(angle[i] - angle[j]) > 1e-3);
         }
+        for (int side = 0; side < 4; side++) {
+            from[side] +=
+                fabs(remainder(angle[i] - side * 1.5707963267948966, 6.283185307179586)) < 1.0;
+        }
     }
+    assert_true(from[0] && from[1] && from[2] && from[3]); /* on all sides */
 }
 
 /* ---- rigid ground inside a course ---- */
