@@ -442,17 +442,12 @@ static void run_rows(const Scene *scenes, int scene_count, const double *speeds,
     Zero zero = {0};
     Controller controller = {&zero, "zero", zero_act, zero_destroy, NULL, NULL};
     Pool *pool = pool_create(2);
-    const EvalRun run = {.task = &def,
-                         .robot = robot,
-                         .pool = pool,
-                         .controller = &controller,
-                         .device = MILD_BATCH_HOST,
-                         .scenes = scenes,
-                         .scene_count = scene_count,
-                         .speeds = speeds,
-                         .speed_count = speed_count,
-                         .eval = {.trials = OF_ROW, .seconds = 1.5, .push = 1, .seed = 1},
-                         .each = each};
+    const EvalDef eval = {.trials = OF_ROW, .seconds = 1.5, .push = 1, .seed = 1};
+    EvalRun run = kit_row(&def, pool, &controller, scenes, &eval);
+    run.scene_count = scene_count;
+    run.speeds = speeds;
+    run.speed_count = speed_count;
+    run.each = each;
     assert_int_equal(eval_run(&run, rows, &error), MILD_OK);
     pool_destroy(pool);
 }
@@ -510,22 +505,13 @@ static void files_are_of_the_row(void **state) {
     char *text[2] = {NULL, NULL};
     size_t size[2];
     Scene scenes[2]; /* the second is not asked for */
-    static const double speeds[2] = {0.3, 0.7};
+    const EvalDef eval = {.speed = 0.3, .trials = 2, .seconds = 0.2, .seed = 1};
     EvalTrial each[2];
     EvalRow row;
     assert_int_equal(scene_make(&scenes[0], "grass", 2, &error), MILD_OK);
     assert_int_equal(scene_make(&scenes[1], "rubber", 2, &error), MILD_OK);
-    EvalRun run = {.task = &def,
-                   .robot = robot,
-                   .pool = pool,
-                   .controller = &controller,
-                   .device = MILD_BATCH_HOST,
-                   .scenes = scenes,
-                   .scene_count = 1,
-                   .speeds = speeds,
-                   .speed_count = 1,
-                   .eval = {.trials = 2, .seconds = 0.2, .seed = 1},
-                   .each = each};
+    EvalRun run = kit_row(&def, pool, &controller, scenes, &eval);
+    run.each = each;
     run.eval.feet = open_memstream(&text[0], &size[0]);
     run.eval.track = open_memstream(&text[1], &size[1]);
     assert_int_equal(eval_run(&run, &row, &error), MILD_OK);
@@ -571,24 +557,15 @@ static void a_diverged_trial_has_not_succeeded(void **state) {
     Scene scene;
     EvalTrial each[3];
     EvalRow row;
-    static const double speed = 0.3;
+    const EvalDef eval = {.speed = 0.3, .trials = 3, .seconds = 0.1, .seed = 1};
     for (int i = 0; i < 3; i++) {
         ground[i] = (RobotGround){fail_to_answer, &failing[i]};
     }
     task.shells_stand = 0;
     assert_int_equal(scene_make(&scene, "grass", 2, &error), MILD_OK);
-    const EvalRun run = {.task = &task,
-                         .robot = robot,
-                         .pool = pool,
-                         .controller = &controller,
-                         .device = MILD_BATCH_HOST,
-                         .scenes = &scene,
-                         .scene_count = 1,
-                         .speeds = &speed,
-                         .speed_count = 1,
-                         .eval = {.trials = 3, .seconds = 0.1, .seed = 1},
-                         .ground = ground,
-                         .each = each};
+    EvalRun run = kit_row(&task, pool, &controller, &scene, &eval);
+    run.ground = ground;
+    run.each = each;
     assert_int_equal(eval_run(&run, &row, &error), MILD_OK);
     pool_destroy(pool);
     assert_int_equal(each[0].end, TASK_END_time);
@@ -638,21 +615,12 @@ static void legs_do_not_cross(void **state) {
     Pool *pool = pool_create(1);
     Drawn drawn = {mj_makeData(robot_visual_model(robot)), 1};
     const EvalCallback callback = {see_legs, &drawn};
-    const double speed = 0;
+    const EvalDef eval = {
+        .sideways = 0.3, .trials = 2, .seconds = 6, .seed = 1, .callback = &callback};
     assert_int_equal(controller_learned(POLICY, robot, pool, 2, &controller, &error), MILD_OK);
     assert_int_equal(scene_make(&scene, "foam45", 2, &error), MILD_OK);
-    const EvalRun run = {
-        .task = &def,
-        .robot = robot,
-        .pool = pool,
-        .controller = &controller,
-        .device = MILD_BATCH_HOST,
-        .scenes = &scene,
-        .scene_count = 1,
-        .speeds = &speed,
-        .speed_count = 1,
-        .eval = {.sideways = 0.3, .trials = 2, .seconds = 6, .seed = 1, .callback = &callback},
-        .each = each};
+    EvalRun run = kit_row(&def, pool, &controller, &scene, &eval);
+    run.each = each;
     assert_int_equal(eval_run(&run, &row, &error), MILD_OK);
     printf("sideways at 0.3 m/s: legs %.2f mm apart, drawn at decisions %.2f mm\n", 1e3 * row.legs,
            1e3 * drawn.least);
@@ -675,7 +643,7 @@ static void shells_stand(void **state) {
     Controller controller;
     Scene scene;
     Pool *pool = pool_create(1);
-    const double speed = 0.6;
+    const EvalDef eval = {.speed = 0.6, .trials = 2, .seconds = 12, .seed = 1};
     assert_int_equal(controller_learned(POLICY, robot, pool, 2, &controller, &error), MILD_OK);
     assert_int_equal(scene_make(&scene, "foam25", 2, &error), MILD_OK);
     scene.terrain.materials[0].k_pen = 75;
@@ -687,18 +655,9 @@ static void shells_stand(void **state) {
         TaskDef task = def;
         task.shells_stand = stand;
         robot_set_shells(robot, stand);
-        const EvalRun run = {.task = &task,
-                             .robot = robot,
-                             .pool = pool,
-                             .controller = &controller,
-                             .device = MILD_BATCH_HOST,
-                             .batch = batch,
-                             .scenes = &scene,
-                             .scene_count = 1,
-                             .speeds = &speed,
-                             .speed_count = 1,
-                             .eval = {.trials = 2, .seconds = 12, .seed = 1},
-                             .each = each};
+        EvalRun run = kit_row(&task, pool, &controller, &scene, &eval);
+        run.batch = batch;
+        run.each = each;
         assert_int_equal(eval_run(&run, &row, &error), MILD_OK);
         printf("shells %s%s: %d of 2 upright, shells carry %.1e of the load\n",
                stand ? "stand" : "end a trial", batch ? ", batch engine" : "", row.success,
