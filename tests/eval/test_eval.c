@@ -320,7 +320,9 @@ static void speed_is_measured_until_the_stop(void **state) {
 
 /* ---- pushes ---- */
 
-enum { PUSHED = 5, PUSH_STEPS = 420 };
+enum { PUSHED = 5, PUSH_STEPS = 420, SIDES = 5 };
+
+#define TURN 6.283185307179586
 
 /* A controller that notes the base's speed before it acts. */
 typedef struct {
@@ -358,12 +360,12 @@ static void walk_pushed(Noting *noting, double push, uint64_t seed) {
     pool_destroy(pool);
 }
 
-/* Every 4 s, each trial at another time, by the speed asked for, each in another direction, and so
- * with another seed; until then nothing changes by a bit. */
+/* Every 4 s, each trial at another time, by the speed asked for, each in another direction, on
+ * every side, and so with another seed; until then nothing changes by a bit. */
 static void pushes_come_every_four_seconds(void **state) {
     (void)state;
     double angle[2 * PUSHED];
-    int from[4] = {0};
+    int from[SIDES] = {0};
     for (int i = 0; i < 2 * PUSHED; i++) {
         const int trial = i % PUSHED, at = trial ? 400 - 97 * trial : 400;
         if (trial == 0) {
@@ -379,12 +381,11 @@ static void pushes_come_every_four_seconds(void **state) {
         for (int j = 0; j < i; j++) {
             assert_true(fabs(angle[i] - angle[j]) > 1e-3);
         }
-        for (int side = 0; side < 4; side++) {
-            from[side] +=
-                fabs(remainder(angle[i] - side * 1.5707963267948966, 6.283185307179586)) < 1.0;
-        }
+        from[(int)((angle[i] < 0 ? angle[i] + TURN : angle[i]) * SIDES / TURN)]++;
     }
-    assert_true(from[0] && from[1] && from[2] && from[3]); /* on all sides */
+    for (int side = 0; side < SIDES; side++) {
+        assert_true(from[side] > 0);
+    }
 }
 
 /* ---- rigid ground inside a course ---- */

@@ -83,6 +83,7 @@ static void log_of_the_motor(void **state) {
     Record record = {.robot = robot};
     int falls;
     char *text = log_text(1, &falls), *again = log_text(1, &falls), *other = log_text(2, &falls);
+    assert_int_equal(falls, 0);
     assert_string_equal(text, again);
     assert_string_not_equal(text, other);
     FILE *csv = fmemopen(text, strlen(text), "r");
