@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 """Checks what clang-format 14 does not: no line of C is wider than 100 columns, every body of an if,
 else, for, while and do has braces, no file has more than 800 lines, and no function but main more
-than 60, but for tests; a table in it, that is an initialiser, counts as one line. Usage: scripts/house.py FILE..."""
+than 60, but for tests; a table in it, that is an initialiser, counts as one line. No test compares the sentence of an
+error: assert_error of tests/kit.h holds its status and what it names. Usage: scripts/house.py FILE..."""
 
 import pathlib
+import re
 import sys
 
 from mutate import partners, tokens_of
@@ -94,12 +96,23 @@ def long_files(source):
         yield lines, f"{lines} lines, {FILE_LINES} are allowed"
 
 
+SENTENCE = re.compile(r"\b(strstr|strn?cmp|memcmp|assert_(?:string|memory)_(?:not_)?equal)\s*\(\s*"
+                      r"(?:[^;]*?[^\w;])?e(?:rror)?\s*(?:\.|->)\s*text\b")
+
+
+def sentences(path, source):
+    """Comparisons of an error's text in tests, but for the kit's, the formatter's and the fuzzers' own."""
+    if "tests" in path.parts and "fuzz" not in path.parts and path.name not in ("kit.h", "test_text.c"):
+        for match in SENTENCE.finditer(source):
+            yield source.count("\n", 0, match.start()) + 1, f"{match[1]} of an error's text: take assert_error of kit.h"
+
+
 def main():
     found = 0
     for name in sys.argv[1:]:
         path = pathlib.Path(name)
         source = path.read_text(encoding="utf-8")
-        faults = [*wide_lines(source), *bare_bodies(source), *long_files(source)]
+        faults = [*wide_lines(source), *bare_bodies(source), *long_files(source), *sentences(path, source)]
         if "tests" not in path.parts:
             faults += long_functions(source)
         for number, what in sorted(faults):

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Counts the functions inside of layers that tests call: those which a header of src declares and which no other layer
-names. Tests of a layer's seam, what other layers and the public headers call, leave its inside free to change
-(docs/testing.md). Ends with 1 if there are more than --most. Usage: scripts/seams.py [--list] [--most N]"""
+"""Counts the functions inside of layers that tests call: those which a header of src declares and which no other layer,
+nor the Python package or the plugin, names. Tests of a layer's seam, what these and the public headers call, leave its
+inside free to change (docs/testing.md). Ends with 1 if there are more than --most. Usage: scripts/seams.py [--list] [--most N]"""
 import argparse
 import collections
 import pathlib
@@ -23,7 +23,7 @@ def sources(folder):
 def inside():
     """{layer: {function}} of the functions that only their own layer names, and the headers that declare them."""
     declared, named = {}, collections.defaultdict(set)
-    public = {name for _, text in sources("include") for name in re.findall(r"\w+", text)}
+    public = {name for folder in ("include", "python", "plugin") for _, text in sources(folder) for name in re.findall(r"\w+", text)}
     for path, text in sources("src"):
         layer = str(path.parent)
         for name in set(re.findall(r"\b[a-z_]\w*\b", text)):

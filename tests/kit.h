@@ -1,8 +1,9 @@
-/* What all tests share: cmocka with what it needs, and comparisons that fail with a name and both
- * numbers. */
+/* What all tests share: cmocka with what it needs, comparisons that fail with a name and both
+ * numbers, and errors by their status and by what they name. */
 #ifndef KIT_H
 #define KIT_H
 
+#include <ctype.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,6 +14,8 @@
 #include <string.h>
 
 #include <cmocka.h>
+
+#include "mild/error.h"
 
 /* Fails unless got is within tolerance of wanted; NaN fails. */
 static inline void expect_near(const char *what, double got, double wanted, double tolerance) {
@@ -29,6 +32,75 @@ static inline void expect_entry(const char *what, int i, double got, double want
                  tolerance);
     }
 }
+
+/* Whether c is part of a word. */
+static inline int kit_letter(char c) {
+    return isalnum((unsigned char)c) || c == '_';
+}
+
+/* Whether a word goes on where this text begins: with a letter, or with . or - and a letter. */
+static inline int kit_goes_on(const char *text) {
+    return kit_letter(*text) || ((*text == '.' || *text == '-') && kit_letter(text[1]));
+}
+
+/* Whether each word of `names` (a field, a key, a flag, a file, a value) stands in the text as a
+ * whole: robot.mass does not in "robot.mass_kg", nor does mass, nor 1 in "-1" or "1.5". */
+static inline int kit_named(const char *text, const char *names) {
+    for (names += strspn(names, " "); *names; names += strspn(names, " ")) {
+        const size_t size = strcspn(names, " ");
+        const char *at = text;
+        while (*at && (strncmp(at, names, size) != 0 || kit_goes_on(at + size) ||
+                       (at > text && (kit_letter(at[-1]) || at[-1] == '.' || at[-1] == '-')))) {
+            at++;
+        }
+        if (!*at) {
+            return 0;
+        }
+        names += size;
+    }
+    return 1;
+}
+
+/* What is wrong with an error that must have this status and name what the caller did wrong; NULL:
+ * nothing. Its sentence is free. */
+static inline const char *kit_error_fault(const MildError *error, MildStatus status,
+                                          const char *names) {
+    const size_t size = strlen(error->text);
+    if (status == MILD_OK || error->status != status) {
+        return "another status";
+    }
+    if (size == 0 || strcspn(error->text, "\r\n") != size) {
+        return "not one line";
+    }
+    if (!names[strspn(names, " ")] || !kit_named(error->text, names)) {
+        return "not all is named";
+    }
+    return NULL;
+}
+
+/* Fails unless the error has the status, is one line and names every word of `names`; then forgets
+ * it, so that the next is not taken for this one. */
+#define assert_error(error, status, names)                                                         \
+    kit_assert_error((error), (status), (names), __FILE__, __LINE__)
+
+static inline void kit_assert_error(MildError *error, MildStatus status, const char *names,
+                                    const char *file, int line) {
+    const char *fault = kit_error_fault(error, status, names);
+    if (fault) {
+        print_error("%s: status %d, '%s' instead of status %d, '%s'\n", fault, (int)error->status,
+                    error->text, (int)status, names);
+        _fail(file, line);
+    }
+    memset(error, 0, sizeof *error);
+}
+
+/* The same of a text that is no MildError. */
+#define assert_names(text, names)                                                                  \
+    do {                                                                                           \
+        if (!kit_named((text), (names))) {                                                         \
+            fail_msg("'%s' does not name '%s'", (text), (names));                                  \
+        }                                                                                          \
+    } while (0)
 
 /* Whether walks are only begun: MILD_TEST_SHORT, which scripts/check.sh sets for builds with a
  * sanitizer, for what a walk measures is the same in every build. */

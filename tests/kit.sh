@@ -33,9 +33,17 @@ expect() {
     grep -q -- "$pattern" <<<"$output" || fail "no '$pattern' in the output of: $* -> $output"
 }
 
-# bad PATTERN COMMAND...: exit code 2, one line of error (progress apart) that holds the pattern, no file made or lost.
+# named TEXT NAMES: whether each word of NAMES (a flag, a key, a file, a value) stands in the text as a whole, as in kit.h.
+named() {
+    local word before='(^|[^A-Za-z0-9_.-])' after='($|[^A-Za-z0-9_.-]|[.-]($|[^A-Za-z0-9_]))'
+    for word in $2; do
+        [[ $1 =~ $before"$word"$after ]] || return 1
+    done
+}
+
+# bad NAMES COMMAND...: exit code 2, one line of error (progress apart) that names what is wrong, no file made or lost.
 bad() {
-    local pattern=$1 errors before line kept=()
+    local names=$1 errors before line kept=()
     shift
     before=$(find .)
     errors=$("$@" 2>&1 >/dev/null </dev/null)
@@ -45,6 +53,6 @@ bad() {
     done <<<"$errors"
     [ "$got" = 2 ] || fail "exit $got instead of 2: $* -> $errors"
     [ "${#kept[@]}" = 1 ] || fail "not one line of error: $* -> $errors"
-    grep -q -- "$pattern" <<<"${kept[*]}" || fail "no '$pattern' in the error of: $* -> $errors"
+    named "${kept[*]}" "$names" || fail "not all of '$names' in the error of: $* -> $errors"
     [ "$(find .)" = "$before" ] || fail "files came or went: $*"
 }

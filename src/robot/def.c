@@ -645,7 +645,7 @@ MildStatus robot_def_read(const char *folder, RobotDef *def, MildError *error) {
     }
     char *text = file_read(path, FILE_SIZE_MAX, &size, &cause);
     if (!text) {
-        return mild_fail(error, cause.status, "%.180s (a robot is a folder with robot.ini in it)",
+        return mild_fail(error, cause.status, "%.350s (a robot is a folder with robot.ini in it)",
                          cause.text);
     }
     status = memchr(text, '\0', size)

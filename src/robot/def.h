@@ -58,7 +58,7 @@ typedef struct {
     double feet_least;    /* [m] lateral distance below which mirrored feet collide */
     double knee_least;    /* [m] and knees */
     double foot_force;    /* [N] force on a foot above which a landing is hard */
-    double assist[4];     /* [N m/rad, N m s/rad, N s/m, N] assistance, see robot_assist */
+    double assist[4];     /* [N m/rad, N m s/rad, N s/m, N] assistance, see RobotTable */
     /* section [joints], in the order of observations and actions */
     int joints;
     RobotName joint[ROBOT_JOINTS_MAX];

@@ -380,8 +380,8 @@ static void fill_table(Robot *robot) {
     table->total_mass = robot->total_mass;
     table->stand_height = robot->stand_height;
     table->nominal_height = robot_nominal_height(robot);
-    table->action_scale = robot_action_scale(robot);
-    table->foot_force = robot_foot_force(robot);
+    table->action_scale = def->action_scale;
+    table->foot_force = def->foot_force;
 }
 
 typedef struct {
@@ -476,14 +476,6 @@ double robot_nominal_height(const Robot *robot) {
     return robot->def.height;
 }
 
-double robot_action_scale(const Robot *robot) {
-    return robot->def.action_scale;
-}
-
-double robot_foot_force(const Robot *robot) {
-    return robot->def.foot_force;
-}
-
 const double *robot_default_pose(const Robot *robot) {
     return robot->def.pose;
 }
@@ -524,10 +516,6 @@ const double *robot_swing(const Robot *robot) {
     return robot->def.swing;
 }
 
-const double *robot_still(const Robot *robot) {
-    return robot->def.still;
-}
-
 const int *robot_joint_foot(const Robot *robot) {
     return robot->joint_foot;
 }
@@ -552,36 +540,8 @@ const double *robot_mirror_sign(const Robot *robot) {
     return robot->def.mirror_sign;
 }
 
-int robot_mirror_foot(const Robot *robot, int foot) {
-    return robot->limb[foot].mirror;
-}
-
 double robot_mirror_shift(const Robot *robot) {
     return robot->def.mirror_shift;
-}
-
-double robot_gait_offset(const Robot *robot, int foot) {
-    return robot->def.foot[foot].offset;
-}
-
-const double *robot_feet_range(const Robot *robot) {
-    return robot->def.feet_range;
-}
-
-const double *robot_knee_range(const Robot *robot) {
-    return robot->def.knee_range;
-}
-
-double robot_feet_least(const Robot *robot) {
-    return robot->def.feet_least;
-}
-
-double robot_knee_least(const Robot *robot) {
-    return robot->def.knee_least;
-}
-
-const double *robot_assist(const Robot *robot) {
-    return robot->def.assist;
 }
 
 const RobotTable *robot_table(const Robot *robot) {

@@ -41,8 +41,6 @@ double robot_total_mass(const Robot *robot);     /* [kg] */
 double robot_foot_load(const Robot *robot);      /* [N] weight divided by the number of feet */
 double robot_stand_height(const Robot *robot);   /* [m] base above the soles in the default pose */
 double robot_nominal_height(const Robot *robot); /* [m] wanted base height while walking */
-double robot_action_scale(const Robot *robot);   /* [rad] joint offset per unit of action */
-double robot_foot_force(const Robot *robot);     /* [N] above which a landing is hard */
 /* One number per joint, [robot_joints]. */
 const double *robot_default_pose(const Robot *robot); /* [rad] */
 const double *robot_joint_low(const Robot *robot);    /* [rad] */
@@ -54,7 +52,6 @@ const double *robot_kd(const Robot *robot);           /* [N m s/rad] */
 const double *robot_stand_kp(const Robot *robot);     /* [N m/rad] of the controller `stand` */
 const double *robot_stand_kd(const Robot *robot);     /* [N m s/rad] */
 const double *robot_swing(const Robot *robot);     /* [-] amplitude in the reference swing motion */
-const double *robot_still(const Robot *robot);     /* [-] 1: should stay near the default pose */
 const int *robot_joint_foot(const Robot *robot);   /* the only foot that it moves, or -1 */
 const int *robot_joint_dof(const Robot *robot);    /* in the engine: qvel[dof], qpos[dof + 1] */
 int robot_foot_body(const Robot *robot, int foot); /* of the sims' model */
@@ -62,20 +59,8 @@ int robot_ankle(const Robot *robot, int foot);     /* joint that pitches a flat 
 /* The robot's mirror image in the x-z plane: q'_i = sign_i q_mirror_i. */
 const int *robot_mirror_joint(const Robot *robot);
 const double *robot_mirror_sign(const Robot *robot);
-int robot_mirror_foot(const Robot *robot, int foot);
 double robot_mirror_shift(const Robot *robot); /* [-] of the gait cycle: 0.5 when sides alternate */
-/* [-] Phase of the gait cycle, in [0, 1), at which the foot's stance begins. */
-double robot_gait_offset(const Robot *robot, int foot);
-/* [m] Allowed range [2] of the lateral distance of mirrored feet and knees, and the distance below
- * which they collide. */
-const double *robot_feet_range(const Robot *robot);
-const double *robot_knee_range(const Robot *robot);
-double robot_feet_least(const Robot *robot);
-double robot_knee_least(const Robot *robot);
-/* [4] Assistance early in training: stiffness [N m/rad] and damping [N m s/rad] against tilt, gain
- * [N s/m] towards the commanded velocity, and the limit of that force [N]. */
-const double *robot_assist(const Robot *robot);
-/* All of these that a task needs, as one block without pointers. */
+/* What a task needs, as one block without pointers. */
 const RobotTable *robot_table(const Robot *robot);
 
 /* [robot_bodies] The soles in use, see robot_set_model and robot_set_shells: of the feet, then of

@@ -182,7 +182,3 @@ void gl_destroy(GlContext *context) {
     }
     free(context);
 }
-
-const char *gl_name(const GlContext *context) {
-    return context->osmesa ? "OSMesa" : "EGL";
-}

@@ -11,6 +11,5 @@ typedef struct GlContext GlContext;
 /* Makes the context current on the calling thread. */
 GlContext *gl_create(MildError *error);
 void gl_destroy(GlContext *context);
-const char *gl_name(const GlContext *context); /* "EGL" or "OSMesa" */
 
 #endif

@@ -482,10 +482,6 @@ double relief_low(const Relief *relief) {
     return relief->low;
 }
 
-double relief_high(const Relief *relief) {
-    return relief->high;
-}
-
 double relief_height_at(const Relief *relief, double x, double y) {
     return mild_terrain_height_at(&relief->terrain, x, y);
 }

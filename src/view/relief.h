@@ -39,9 +39,8 @@ int relief_tile_rows(const Relief *relief);    /* along y */
 double relief_tile_edge(const Relief *relief); /* [m] */
 void relief_tile_center(const Relief *relief, int tile, double center[2]);
 int relief_is_uneven(const Relief *relief);
-/* [m] of the undisturbed surface: lowest and highest of the area drawn, and at a point. */
+/* [m] of the undisturbed surface: lowest of the area drawn, and at a point. */
 double relief_low(const Relief *relief);
-double relief_high(const Relief *relief);
 double relief_height_at(const Relief *relief, double x, double y);
 /* The one material of the tile (RELIEF_RIGID where nothing yields), or -2 when several meet in it.
  */

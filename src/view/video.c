@@ -234,7 +234,3 @@ MildStatus video_close(Video *video, MildError *error) {
     free(video);
     return status;
 }
-
-int video_frames(const Video *video) {
-    return video->frames;
-}

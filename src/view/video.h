@@ -14,6 +14,5 @@ MildStatus video_frame(Video *video, const unsigned char *rgb, MildError *error)
 /* Waits for ffmpeg and renames. On any earlier failure the temporary file is removed and the
  * failure is repeated here. Frees the video in every case. */
 MildStatus video_close(Video *video, MildError *error);
-int video_frames(const Video *video);
 
 #endif

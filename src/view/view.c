@@ -285,10 +285,6 @@ MildStatus view_reset(View *view, const MildTerrain *terrain, MildError *error) 
     return MILD_OK;
 }
 
-const char *view_backend(const View *view) {
-    return view->window ? "GLFW" : gl_name(view->gl);
-}
-
 /* ---- ground ---- */
 
 static void press_shells(View *view, const RobotSim *sim) {

@@ -34,7 +34,6 @@ typedef struct View View;
 View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *terrain,
                   MildError *error);
 void view_destroy(View *view);
-const char *view_backend(const View *view); /* "EGL", "OSMesa" or "GLFW" */
 
 /* Presses the feet, and the shells that stand on it, into the visible ground. Call it about once
  * per policy step, so that imprints made between two frames appear. */

@@ -10,7 +10,7 @@ kept() {
     local file=$1 sum
     shift
     sum=$(cksum <"$file")
-    bad 'overwrit\|name the same file' timeout 60 "$@"
+    bad "$file" timeout 60 "$@"
     [ "$(cksum <"$file")" = "$sum" ] || fail "$file was written over: $*"
 }
 
@@ -36,7 +36,7 @@ kept record.csv "$mild" fit record.csv --plate 0.2,0.1 --json record.csv
 kept record.csv "$mild" fit record.csv --plate 0.2,0.1 --figure record.csv
 kept relief.png "$mild" press --ground sand_loose --terrain.kind=image --terrain.image=relief.png --figure relief.png
 kept relief.png "$mild" eval --ground sand_loose --terrain.kind=image --terrain.image relief.png --json sub/../relief.png
-kept record.csv "$mild" press --ground sand_loose --csv new.csv --figure sub/../new.csv
+bad "--csv --figure sub/../new.csv" "$mild" press --ground sand_loose --csv new.csv --figure sub/../new.csv
 mkdir run
 printf '[train]\nenvs = 2 ; mine\n' >run/config.ini
 kept run/config.ini "$mild" train --config run/config.ini --out run
@@ -63,11 +63,11 @@ for file in /dev/zero pipe line.csv; do
 done
 rm line.csv
 for file in /dev/zero pipe sub; do
-    bad "$file: cannot read" timeout 20 "$mild" eval --policy "$file"
-    bad "$file: cannot read" timeout 20 "$mild" eval --config "$file"
-    bad "$file: cannot read" timeout 20 "$mild" train --config "$file" --out run
-    bad "$file: cannot read" timeout 20 "$mild" press --ground grass --terrain.kind=image --terrain.image="$file"
-    bad "$file: cannot read" timeout 20 "$mild" press --ground grass --terrain.patches=image --terrain.labels="$file"
+    bad "$file" timeout 20 "$mild" eval --policy "$file"
+    bad "$file" timeout 20 "$mild" eval --config "$file"
+    bad "$file" timeout 20 "$mild" train --config "$file" --out run
+    bad "$file" timeout 20 "$mild" press --ground grass --terrain.kind=image --terrain.image="$file"
+    bad "$file" timeout 20 "$mild" press --ground grass --terrain.patches=image --terrain.labels="$file"
 done
 
 # a full disk behind standard output
@@ -92,7 +92,7 @@ wait_for() {
 "$mild" train --out shared "${tiny[@]}" --train.checkpoint_every=100000 >/dev/null 2>&1 &
 first=$!
 wait_for shared/log.csv
-bad "in use by process $first" timeout 60 "$mild" train --out shared "${tiny[@]}"
+bad "shared $first --out" timeout 60 "$mild" train --out shared "${tiny[@]}"
 
 # a terminal that closes: saved, as by Ctrl-C
 kill -HUP $first

@@ -19,7 +19,7 @@ near() {
         exit !(v != "" && e < p && e > -p) }' || fail "$1: '$2' is not within $4 % of $3"
 }
 
-# refuse PATTERN COMMAND...: bad, with everything that could be written asked for.
+# refuse NAMES COMMAND...: bad, with everything that could be written asked for.
 refuse() {
     bad "$@" --json out.json --figure out.png
 }
@@ -138,10 +138,10 @@ awk -F, 'NR > 1 && ($3 - $5) ^ 2 > 1 { exit 1 }' plates_fit.csv || fail "the fig
 "$mild" fit narrow.csv wide.csv --plate 0.15,0.1 --plate 0.3,0.2 --model bekker --json clay.json >/dev/null
 near "two plates: k_c" "$(value clay.json k_c)" 13190 0.5
 near "two plates: k_phi" "$(value clay.json k_phi)" 692150 0.5
-refuse '--plate: 2 plates for 1 file; give one' "$mild" fit small.csv --plate 0.15,0.1 --plate 0.3,0.1
-refuse '--plate: 2 plates for 3 files' "$mild" fit small.csv large.csv small.csv --plate 0.15,0.1 --plate 0.3,0.1
-refuse '--plate: 3 numbers; it takes LENGTH,WIDTH in metres, or the DIAMETER' "$mild" fit small.csv --plate 0.15,0.1,0.1
-refuse '--hold plate_width: it is the shorter side' "$mild" fit wide.csv --plate 0.3,0.2 --model bekker --hold plate_width=0.1
+refuse "--plate 2 1" "$mild" fit small.csv --plate 0.15,0.1 --plate 0.3,0.1
+refuse "--plate 2 3" "$mild" fit small.csv large.csv small.csv --plate 0.15,0.1 --plate 0.3,0.1
+refuse "--plate 3" "$mild" fit small.csv --plate 0.15,0.1,0.1
+refuse "--hold plate_width --plate" "$mild" fit wide.csv --plate 0.3,0.2 --model bekker --hold plate_width=0.1
 
 # the way up tells recovery: of foam at least all but a little, of sand at most a little, of grass a half
 "$mild" fit foam45.csv "${plate[@]}" | grep -q '^recovery  *-  *0.99[0-9]*  *-  -$' || fail "foam springs back"
@@ -163,46 +163,46 @@ near "another order: k_pen" "$(value fit.json k_pen)" 380 5
 # bad input
 fit=("$mild" fit)
 edit() { awk -F, -v OFS=, "$1" sand_loose.csv >bad.csv; }
-refuse 'missing.csv: cannot read.*mild press' "${fit[@]}" missing.csv "${plate[@]}"
-refuse 'no record given' "${fit[@]}" "${plate[@]}"
-refuse '--plate' "${fit[@]}" sand_loose.csv
-refuse '--plate' "${fit[@]}" sand_loose.csv --plate 0.2m
-refuse "'k_pem' is no parameter .* nearest is 'k_pen'" "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pem --hold-from foam45
-refuse '--fit needs --hold-from' "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pen
-refuse "nearest is 'sand_loose'" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold-from sand_lose
-refuse 'clay: a ground of bekker has no numbers for mild' "${fit[@]}" sand_loose.csv "${plate[@]}" --hold-from clay
-refuse 'alpha = 2 is outside 0.1 .. 1.5' "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha=2
-refuse 'c_g = -1 is outside 0 .. 10' "${fit[@]}" sand_loose.csv "${plate[@]}" --hold c_g=-1
-refuse 'c_d = 0.1 is outside 0.5 .. 100' "${fit[@]}" sand_loose.csv "${plate[@]}" --hold c_d=0.1
-refuse "'alpha' is not NAME=VALUE" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha
-refuse "'alpha=nan' is not NAME=VALUE" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha=nan
-refuse "'mu' is no parameter that a press on mild tells" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold mu=0.5
-refuse "'zeta' is no parameter that a press on mild tells" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold zeta=1
-refuse 'name the same parameter' "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha=1,alpha=1.1
-refuse 'contradict each other' "${fit[@]}" sand_loose.csv "${plate[@]}" --hold-from foam45 --fit alpha --hold alpha=1
-refuse 'every parameter of con_spring is held' "${fit[@]}" sand_loose.csv "${plate[@]}" --model con_spring --hold k_pen=1
-refuse "unknown ground model 'bekkr'; nearest is 'bekker'" "${fit[@]}" sand_loose.csv "${plate[@]}" --model bekkr
-refuse 'rigid: the engine.s own contact has no parameters' "${fit[@]}" sand_loose.csv "${plate[@]}" --model rigid
-edit '{ print $1, $2 }' && refuse 'bad.csv:1: no column force_n; name' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $3 = "nan" } { print }' && refuse "bad.csv:9: force_n 'nan' is not a finite number; correct" "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $2 = "" } { print }' && refuse 'bad.csv:9: depth_m is missing; fill' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { print $1; next } { print }' && refuse 'bad.csv:9: depth_m is missing' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $2 = "1 mm" } { print }' && refuse "bad.csv:9: depth_m '1 mm'" "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $3 = "1e999" } { print }' && refuse "bad.csv:9: force_n '1e999' is not a finite" "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $3 = "12,5" } { print }' && refuse 'bad.csv:9: 9 values under 8 columns; a decimal point' "${fit[@]}" bad.csv "${plate[@]}"
+refuse "missing.csv" "${fit[@]}" missing.csv "${plate[@]}"
+refuse "--plate" "${fit[@]}" "${plate[@]}"
+refuse "--plate" "${fit[@]}" sand_loose.csv
+refuse "--plate" "${fit[@]}" sand_loose.csv --plate 0.2m
+refuse "k_pem k_pen --fit" "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pem --hold-from foam45
+refuse "--fit --hold-from" "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pen
+refuse "sand_lose sand_loose" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold-from sand_lose
+refuse "--hold-from --hold" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold-from clay
+refuse "--hold 2 0.1 1.5" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha=2
+refuse "--hold c_g -1 0 10" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold c_g=-1
+refuse "--hold c_d 0.1 0.5 100" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold c_d=0.1
+refuse "alpha --hold NAME=VALUE" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha
+refuse "alpha=nan --hold NAME=VALUE" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha=nan
+refuse "mu nu --hold" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold mu=0.5
+refuse "zeta alpha --hold" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold zeta=1
+refuse "--hold alpha=1 alpha=1.1" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha=1,alpha=1.1
+refuse "--hold alpha=1 --fit" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold-from foam45 --fit alpha --hold alpha=1
+refuse "--hold con_spring" "${fit[@]}" sand_loose.csv "${plate[@]}" --model con_spring --hold k_pen=1
+refuse "bekkr bekker" "${fit[@]}" sand_loose.csv "${plate[@]}" --model bekkr
+refuse "--model" "${fit[@]}" sand_loose.csv "${plate[@]}" --model rigid
+edit '{ print $1, $2 }' && refuse "bad.csv:1 force_n" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $3 = "nan" } { print }' && refuse "bad.csv:9 force_n nan" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $2 = "" } { print }' && refuse "bad.csv:9 depth_m" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { print $1; next } { print }' && refuse "bad.csv:9 depth_m" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $2 = "1 mm" } { print }' && refuse "bad.csv:9 depth_m mm" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $3 = "1e999" } { print }' && refuse "bad.csv:9 force_n 1e999" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $3 = "12,5" } { print }' && refuse "bad.csv:9 9 8" "${fit[@]}" bad.csv "${plate[@]}"
 awk 'BEGIN { print "depth_m,force_n"; for (i = 0; i <= 1000000; i++) print i * 1e-8 "," i }' >bad.csv
-refuse 'bad.csv:1000002: more than 1000000 rows; take every tenth' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $1 = 0 } { print }' && refuse 'bad.csv:9: time_s 0 does not come after' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR > 1 { $2 *= 1000 } { print }' && refuse 'depth_m .* is beyond 2; it must be in metres' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR > 1 { $2 = -$2 } { print }' && refuse 'depth_m: 0 of 2001 rows.*positive down' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR > 1 { $3 = -$3 } { print }' && refuse 'force_n does not push back' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR < 11 { print }' && refuse '8 loading rows for 8 parameters; record more rows' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR < 3 { print }' && refuse 'depth_m: 0 of 1 rows' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR < 9 { print }' && refuse 'depth_m: 6 of 7 rows.*at least 8' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 1 { print $0, "depth_m"; next } { print }' && refuse 'two columns are named depth_m' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 1' && refuse 'depth_m: 0 of 0 rows' "${fit[@]}" bad.csv "${plate[@]}"
-: >bad.csv && refuse 'bad.csv: empty' "${fit[@]}" bad.csv "${plate[@]}"
-head -c 3000 "$mild" >bad.csv && refuse 'bad.csv:' "${fit[@]}" bad.csv "${plate[@]}"
+refuse "bad.csv:1000002 1000000" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $1 = 0 } { print }' && refuse "bad.csv:9 time_s 0" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR > 1 { $2 *= 1000 } { print }' && refuse "bad.csv:53 depth_m 2.04 2" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR > 1 { $2 = -$2 } { print }' && refuse "bad.csv:2002 depth_m 0 2001" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR > 1 { $3 = -$3 } { print }' && refuse "force_n" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR < 11 { print }' && refuse "8 rows parameters" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR < 3 { print }' && refuse "depth_m 0 1" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR < 9 { print }' && refuse "bad.csv:8 depth_m 6 7 8" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 1 { print $0, "depth_m"; next } { print }' && refuse "depth_m columns" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 1' && refuse "depth_m 0" "${fit[@]}" bad.csv "${plate[@]}"
+: >bad.csv && refuse "bad.csv" "${fit[@]}" bad.csv "${plate[@]}"
+head -c 3000 "$mild" >bad.csv && refuse "bad.csv:1" "${fit[@]}" bad.csv "${plate[@]}"
 cp sand_loose.csv out_fit.csv
 "${fit[@]}" out_fit.csv "${plate[@]}" --figure out.png >/dev/null 2>&1 && fail "a record was written over"
 cmp -s sand_loose.csv out_fit.csv || fail "a record was changed"

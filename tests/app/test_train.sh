@@ -78,15 +78,15 @@ for word in _hparams_/session_start_info train.checkpoint_every; do
 done
 
 # mistakes
-bad "holds 3 checkpoints" "$mild" train --out whole
-bad "resume with the checkpoint's config" "$mild" train --out whole --resume --train.envs=8
-bad "no checkpoint to resume from" "$mild" train --out nowhere --resume
+bad "3 --out" "$mild" train --out whole
+bad "whole/checkpoint_000000004.safetensors train.envs" "$mild" train --out whole --resume --train.envs=8
+bad "--resume --out" "$mild" train --out nowhere --resume
 [ ! -e nowhere ] || fail "a refused resume left a folder"
 printf 'X' | dd of=torn/policy.safetensors bs=1 seek=20000 conv=notrunc 2>/dev/null
-bad "damaged" "$mild" eval --policy torn/policy.safetensors
-bad "nowhere.safetensors: cannot read" "$mild" eval --policy nowhere.safetensors
-bad "unknown ground 'foam54'" "$mild" eval --policy whole/policy.safetensors --ground rigid,foam54
-bad "unknown ground 'rigidd'" "$mild" eval --policy whole/policy.safetensors --ground rubber+rigidd
+bad "torn/policy.safetensors" "$mild" eval --policy torn/policy.safetensors
+bad "nowhere.safetensors" "$mild" eval --policy nowhere.safetensors
+bad "foam54 foam60" "$mild" eval --policy whole/policy.safetensors --ground rigid,foam54
+bad "rigidd rigid" "$mild" eval --policy whole/policy.safetensors --ground rubber+rigidd
 
 # the evaluation's JSON: its keys, in the contract's order, and numbers as they must be
 good "$mild" eval --policy whole/policy.safetensors --ground rigid,rubber+sand_loose --speed 0,0.6 --trials 2 --seconds 3 \

@@ -3,19 +3,19 @@
 source "$(dirname "$0")/../kit.sh" "$1"
 
 expect 0 'usage: mild web' "$mild" web --help
-bad "unknown option --no-such" "$mild" web --no-such
-bad "has no page; .make web. in the source tree builds it (it installs emscripten)" "$mild" web --folder nowhere
-bad "outside" "$mild" web --port 70000
+bad "--no-such" "$mild" web --no-such
+bad "--folder" "$mild" web --folder nowhere
+bad "--port" "$mild" web --port 70000
 mkdir -p page folder/index.html link
 touch {folder,link}/{mild.wasm,robot.bin}
 ln -s ../page/index.html link/index.html
-bad "no file folder/index.html to read" "$mild" web --folder folder
-bad "no file link/index.html to read" "$mild" web --folder link
+bad "folder/index.html --folder" "$mild" web --folder folder
+bad "link/index.html --folder" "$mild" web --folder link
 for file in index.html style.css mild.js mild.wasm robot.bin; do
     head -c 50000 /dev/urandom >page/$file
 done
-bad "name an --address of this" "$mild" web --folder page --address 192.0.2.1
-bad "not a number such as 127.0.0.1" "$mild" web --folder page --address localhost
+bad "192.0.2.1 --address" "$mild" web --folder page --address 192.0.2.1
+bad "--address 127.0.0.1" "$mild" web --folder page --address localhost
 echo secret >secret.html
 ln -s ../secret.html page/link.html
 mkdir page/folder.html
@@ -30,7 +30,7 @@ done
 port=$(sed -n 's|.*http://127.0.0.1:\([0-9]*\)/.*|\1|p' said)
 [ -n "$port" ] || fail "no address in: $(cat said)"
 (exec 3<>"/dev/tcp/127.0.0.2/$port") 2>/dev/null && fail "it listens at other addresses than 127.0.0.1"
-bad "try --port 0" "$mild" web --folder page --port "$port"
+bad "127.0.0.1 --port 0" "$mild" web --folder page --port "$port"
 
 # ask REQUEST: the answer's head in `head`, the rest in `body`.
 ask() {

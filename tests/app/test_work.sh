@@ -15,12 +15,12 @@ sums() {
     find "$@" -printf '%p %y %l\n' | sort
     find "$@" -type f -exec cksum {} + | sort
 }
-# whole FOLDER PATTERN COMMAND...: refused in one line with the pattern, nothing in the folder (or beside it) changed
+# whole FOLDER NAMES COMMAND...: refused in one line that names these, nothing in the folder (or beside it) changed
 whole() {
-    local folder=$1 pattern=$2 before
+    local folder=$1 names=$2 before
     shift 2
     before=$(sums .)
-    bad "$pattern" timeout 60 "$@"
+    bad "$names" timeout 60 "$@"
     [ "$(sums .)" = "$before" ] || fail "$folder is not as before: $* -> $(diff <(echo "$before") <(sums .))"
 }
 
@@ -32,22 +32,22 @@ for name in policy.safetensors log.csv config.ini version.txt; do
     rm -rf o
     mkdir o
     cp "first/$name" o/
-    whole o "o/$name exists and would be overwritten.*choose another --out" "$mild" train --out o "${tiny[@]}"
+    whole o "o/$name --out" "$mild" train --out o "${tiny[@]}"
     mv o/$name o/elsewhere
     ln -s elsewhere o/$name
-    whole o "o/$name exists" "$mild" train --out o "${tiny[@]}"
+    whole o "o/$name" "$mild" train --out o "${tiny[@]}"
     rm o/$name
     ln -s nowhere o/$name
-    whole o "o/$name exists" "$mild" train --out o "${tiny[@]}"
+    whole o "o/$name" "$mild" train --out o "${tiny[@]}"
     rm o/$name
     mkfifo o/$name
-    whole o "o/$name exists" "$mild" train --out o "${tiny[@]}"
+    whole o "o/$name" "$mild" train --out o "${tiny[@]}"
 done
 rm -rf o
 mkdir o
 cp first/policy.safetensors o/
-whole o "o/policy.safetensors exists" "$mild" train --out o --train.start=o/policy.safetensors "${tiny[@]}"
-whole o "no checkpoint to resume from; start anew.* in another --out" "$mild" train --out o --resume
+whole o "o/policy.safetensors --out" "$mild" train --out o --train.start=o/policy.safetensors "${tiny[@]}"
+whole o "--resume --out" "$mild" train --out o --resume
 
 # ---- links and pipes in a run folder are not followed ----
 
@@ -56,11 +56,11 @@ for name in policy.safetensors log.csv config.ini version.txt; do
     cp -r first o
     mv o/$name outside
     ln -s ../outside o/$name
-    whole o "o/$name: it is a link" "$mild" train --out o --resume --train.iterations=2
+    whole o "o/$name" "$mild" train --out o --resume --train.iterations=2
     rm o/$name
     mkfifo o/$name
-    whole o "o/$name: it is a pipe" "$mild" train --out o --resume --train.iterations=2
-    whole o "o/$name: it is a pipe" "$mild" train --out o --resume --train.iterations=2 --config first/config.ini
+    whole o "o/$name" "$mild" train --out o --resume --train.iterations=2
+    whole o "o/$name" "$mild" train --out o --resume --train.iterations=2 --config first/config.ini
     rm outside
 done
 for number in 1 2; do
@@ -68,16 +68,16 @@ for number in 1 2; do
     cp -r first o
     rm -f o/checkpoint_00000000$number.safetensors
     mkfifo o/checkpoint_00000000$number.safetensors
-    whole o "checkpoint_00000000$number.safetensors: it is a pipe" "$mild" train --out o --resume --train.iterations=2
+    whole o "checkpoint_00000000$number.safetensors" "$mild" train --out o --resume --train.iterations=2
 done
 rm -rf o
 cp -r first o
 echo "iteration,mine" >o/log.csv
-whole o "its columns are not this version" "$mild" train --out o --resume --train.iterations=2
+whole o "o/log.csv" "$mild" train --out o --resume --train.iterations=2
 rm -rf o
 cp -r first o
 ln o/log.csv outside
-whole o "o/log.csv: has a second name" "$mild" train --out o --resume --train.iterations=2
+whole o "o/log.csv" "$mild" train --out o --resume --train.iterations=2
 rm -rf o outside
 cp -rl first o # a copy by hard links: what is replaced by renaming leaves the other whole
 rm o/log.csv
@@ -101,14 +101,14 @@ for text in mine ''; do
     rm -rf o
     mkdir o
     printf '%s' "$text" >o/lock
-    whole o "o/lock: somebody else's file" "$mild" train --out o "${tiny[@]}"
+    whole o "o/lock --out" "$mild" train --out o "${tiny[@]}"
 done
 rm o/lock
 ln -s ../elsewhere o/lock
-whole o "o/lock: " "$mild" train --out o "${tiny[@]}"
+whole o "o/lock" "$mild" train --out o "${tiny[@]}"
 rm o/lock
 mkfifo o/lock
-whole o "o/lock: " "$mild" train --out o "${tiny[@]}"
+whole o "o/lock" "$mild" train --out o "${tiny[@]}"
 
 # ---- no output is an input that the command line does not name ----
 
@@ -123,23 +123,23 @@ sed -i '0,/<worldbody>/s||<include file="parts/more.xml"/>\n  <worldbody>|' "rob
 eval_robot=("$mild" eval --robot ./robot --controller stand --speed 0 --ground rigid --trials 1 --seconds 0.1)
 expect 0 rigid "${eval_robot[@]}"
 for name in robot.ini "$xml" parts/more.xml parts/m.obj; do
-    whole robot "also an input (.*$(basename "$name")) and would be overwritten" "${eval_robot[@]}" --json "robot/$name"
+    whole robot "--json robot/$name" "${eval_robot[@]}" --json "robot/$name"
     ln -sf "$PWD/robot/$name" alias.json
-    whole robot "also an input" "${eval_robot[@]}" --json alias.json
+    whole robot "--json alias.json" "${eval_robot[@]}" --json alias.json
     rm alias.json
     ln "robot/$name" alias.json
-    whole robot "also an input" "${eval_robot[@]}" --track alias.json
+    whole robot "--track alias.json" "${eval_robot[@]}" --track alias.json
     rm alias.json
 done
 "$mild" export --c deploy >/dev/null || fail "no export"
-whole deploy "exists already" "$mild" export --c deploy
+whole deploy "deploy folder" "$mild" export --c deploy
 
 # ---- numbers beside a picture, which nobody named ----
 
 echo mine >lab.csv
-whole lab.csv "lab.csv exists and would be overwritten" "$mild" press --ground grass --depth 0.002 --figure lab.png
-whole lab.csv "lab.csv exists and would be overwritten" "$mild" play --ground grass --seconds 1 --pressure lab.png
-whole lab.csv "name the same file" "$mild" play --ground grass --seconds 1 --video walk.csv --pressure walk.png
+whole lab.csv "lab.csv" "$mild" press --ground grass --depth 0.002 --figure lab.png
+whole lab.csv "lab.csv" "$mild" play --ground grass --seconds 1 --pressure lab.png
+whole lab.csv "--video --pressure walk.csv" "$mild" play --ground grass --seconds 1 --video walk.csv --pressure walk.png
 
 # ---- reports ----
 
@@ -151,23 +151,23 @@ for name in log.csv config.ini version.txt eval.json a.mp4; do
     rm -f o/$name
     echo secret >secret
     ln -s ../secret o/$name
-    whole o "o/$name: it is a link" "${report[@]}"
+    whole o "o/$name" "${report[@]}"
     rm o/$name
     mkfifo o/$name
-    whole o "o/$name: it is a pipe" "${report[@]}"
+    whole o "o/$name" "${report[@]}"
 done
 rm o/a.mp4
 echo mine >o/report.html
-whole o "o/report.html: exists, and is no earlier report" "${report[@]}"
+whole o "o/report.html" "${report[@]}"
 rm o/report.html
 ln -s ../secret o/report.html
-whole o "o/report.html: it is a link" "${report[@]}"
+whole o "o/report.html" "${report[@]}"
 rm o/report.html
 expect 0 report "${report[@]}"
 expect 0 report "${report[@]}"
 head -c 5000000 /dev/zero >o/big.mp4
 for name in log.csv config.ini big.mp4; do
-    whole o "also an input" "${report[@]}" --out o/$name
+    whole o "--out o/$name" "${report[@]}" --out o/$name
 done
 
 # ---- a pipe where MuJoCo would read ----
@@ -175,17 +175,17 @@ done
 for name in "$xml" parts/more.xml parts/m.obj; do
     mv robot/$name kept.file
     mkfifo robot/$name
-    whole robot "$(basename $name): cannot read: it is a pipe" "${eval_robot[@]}"
+    whole robot "$(basename $name)" "${eval_robot[@]}"
     rm robot/$name
     mkdir robot/$name
-    whole robot "$(basename $name): cannot read: it is a folder" "${eval_robot[@]}"
+    whole robot "$(basename $name)" "${eval_robot[@]}"
     rmdir robot/$name
     mv kept.file robot/$name
 done
 mkfifo robot/parts/t.png
 sed -i 's|<asset>|<asset><texture name="t" type="2d" file="parts/t.png"/>|' robot/parts/more.xml
-whole robot "t.png: cannot read: it is a pipe" "${eval_robot[@]}"
-whole robot "t.png: cannot read: it is a pipe" "$mild" play --robot ./robot --controller stand --video film.mp4
+whole robot "t.png" "${eval_robot[@]}"
+whole robot "t.png" "$mild" play --robot ./robot --controller stand --video film.mp4
 
 # ---- very many shapes ----
 
@@ -200,6 +200,6 @@ expect 0 peak "$mild" press --robot ./many --ground grass --plate sole --depth 0
 many 20000 '<geom size=".01" pos="0 0 9" contype="0" conaffinity="0"/>'
 expect 0 peak timeout 100 "$mild" press --robot ./many --ground grass --plate sole --depth 0.002
 many 20000 '<site/>'
-whole many "too many" timeout 100 "$mild" press --robot ./many --ground grass --plate sole --depth 0.002
+whole many "./many/sa01.xml" timeout 100 "$mild" press --robot ./many --ground grass --plate sole --depth 0.002
 
 finish "finished work: kept"

@@ -1,8 +1,8 @@
 /* Rounding to float happens, whatever the compiler makes of neighbouring numbers: results are held
  * against the definition, by the bits of the double. */
-#include "base/float.h"
 #include "base/random.h"
 #include "kit.h"
+#include "round.h"
 
 enum { MOST = 19 };
 
@@ -19,7 +19,7 @@ static double nearest(double x) {
 /* As a caller with few numbers writes it, which compilers unroll: the length is a constant. */
 #define ROUND(count)                                                                               \
     static void round_##count(double *x) {                                                         \
-        float_round_all(x, count);                                                                 \
+        kit_round(x, count);                                                                       \
     }
 ROUND(1)
 ROUND(2)

@@ -1,6 +1,5 @@
 /* The contact step as a warp does it against mild_ground_solve and mild_ground_advance: the same
  * text in double and in float, of one, two and four feet, on level ground and on maps. */
-#include "base/float.h"
 #include "batch_kit.h"
 #include "case_law.h"
 #include "ground/begin.h"
@@ -10,6 +9,7 @@
 #include "ground/scratch.h"
 #include "ground/sole.h"
 #include "points_kit.h"
+#include "round.h"
 
 static MildSole *left, *right, *centers[2], *plate, *small_plate;
 
@@ -257,7 +257,7 @@ static void walk(Kit *kit, uint64_t *random, int steps, double tolerance, int gr
             }
         }
         if (exact) {
-            float_round_all(kit->input.position[0], 3 * (size_t)kit->feet);
+            kit_round(kit->input.position[0], 3 * (size_t)kit->feet);
         }
         kit_inverse_inertia(kit);
         kit_free(kit, (const double(*)[3])force);
@@ -518,9 +518,9 @@ static void stand_above(Kit *kit, const Relief *relief, uint64_t *random) {
         kit->mass[f] = kit_uniform(random, 3.0, 40.0);
         kit->inertia[f] = kit->mass[f] * kit_uniform(random, 0.02, 0.1);
     }
-    float_round_all(&kit->terrain.height, 1);
-    float_round_all(&kit->terrain.map_x, 1);
-    float_round_all(&kit->terrain.map_y, 1);
+    kit_round(&kit->terrain.height, 1);
+    kit_round(&kit->terrain.map_x, 1);
+    kit_round(&kit->terrain.map_y, 1);
 }
 
 static MildMaterial relief_material(const Relief *relief, int label, uint64_t *random) {

@@ -206,6 +206,7 @@ static void test_log(void **state) {
     BeliefLog log;
     MildError error = {0};
     float frame[BELIEF_FRAME];
+    char names[64];
     (void)state;
     const int descriptor = mkstemp(path);
     assert_true(descriptor >= 0);
@@ -225,13 +226,15 @@ static void test_log(void **state) {
     belief_log_print(file, 0.08, frame);
     fclose(file);
     assert_int_equal(belief_log_read(path, 0, &log, &error), MILD_ERROR_FORMAT);
-    assert_non_null(strstr(error.text, ":9: time_s 0.08"));
+    snprintf(names, sizeof names, "%s:9 time_s 0.08", path);
+    assert_error(&error, MILD_ERROR_FORMAT, names);
     file = fopen(path, "w");
     belief_log_print_header(file);
     fprintf(file, "0,1,2,nan\n");
     fclose(file);
     assert_int_equal(belief_log_read(path, 0, &log, &error), MILD_ERROR_FORMAT);
-    assert_non_null(strstr(error.text, ":2: column 4"));
+    snprintf(names, sizeof names, "%s:2 column 4", path);
+    assert_error(&error, MILD_ERROR_FORMAT, names);
     file = fopen(path, "w");
     fprintf(file, "depth_m,force_n\n1,2\n");
     fclose(file);
@@ -244,7 +247,7 @@ static void test_files_that_are_none(void **state) {
     MildError error = {0};
     (void)state;
     assert_null(belief_read(MILD_SOURCE_DIR "/policies/mild.safetensors", &error));
-    assert_non_null(strstr(error.text, "no weights of a belief"));
+    assert_error(&error, MILD_ERROR_FORMAT, MILD_SOURCE_DIR "/policies/mild.safetensors");
     assert_null(belief_read(MILD_SOURCE_DIR "/policies/none.safetensors", &error));
     BeliefNet *none = net;
     assert_int_equal(belief_open("go1", &none, &error), MILD_OK);

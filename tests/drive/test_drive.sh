@@ -233,8 +233,8 @@ holds snippet.json received 'x == 6'
 # both with one key; without it, or with another, they do not find each other
 (umask 077 && head -c 32 /dev/urandom >key && head -c 32 /dev/urandom >other)
 start sealed --command 0.3,0,0 --key key
-bad "no answer from $address" "$mild" drive --simulate --connect "$address" --patience 0.5 --json x.json
-bad "no answer from $address" "$mild" drive --simulate --connect "$address" --patience 0.5 --json x.json --key other
+bad "$address 0.5" "$mild" drive --simulate --connect "$address" --patience 0.5 --json x.json
+bad "$address 0.5" "$mild" drive --simulate --connect "$address" --patience 0.5 --json x.json --key other
 robot sealed --key key --seconds 1 || fail "the robot of sealed"
 ended 0
 holds sealed_robot.json fallen 'x == "false"'
@@ -264,44 +264,44 @@ sed 's/"lost":.*/"lost": 0.5,/' walk.json >bad.json && ! fits bad.json >/dev/nul
 sed 's/"fallen":.*/"fallen": 0,/' walk_robot.json >bad.json && ! fits bad.json >/dev/null || fail "0 is no boolean"
 rm bad.json
 
-bad "no answer from 127.0.0.1:9 for 0.2 s" "$mild" drive --simulate --connect 127.0.0.1:9 --patience 0.2 --json x.json
-bad "is not HOST:PORT" "$mild" drive --listen 9870
-bad "is not HOST:PORT" "$mild" drive --listen 127.0.0.1:99999
-bad "is not HOST:PORT" "$mild" drive --simulate --connect :9870
-bad "no_such.invalid" "$mild" drive --listen no_such.invalid:9870
-bad "192.0.2.1.*; name an address of this machine" "$mild" drive --listen 192.0.2.1:9870
+bad "127.0.0.1:9 0.2" "$mild" drive --simulate --connect 127.0.0.1:9 --patience 0.2 --json x.json
+bad "9870 --listen" "$mild" drive --listen 9870
+bad "127.0.0.1:99999 --listen" "$mild" drive --listen 127.0.0.1:99999
+bad ":9870 --connect" "$mild" drive --simulate --connect :9870
+bad "--listen no_such.invalid" "$mild" drive --listen no_such.invalid:9870
+bad "--listen 192.0.2.1:9870" "$mild" drive --listen 192.0.2.1:9870
 start first
-bad "$address: .* in use; end the program" "$mild" drive --listen "$address"
+bad "--listen $address" "$mild" drive --listen "$address"
 kill -INT "$runner"
 wait "$runner"
 bad "no_such.safetensors" "$mild" drive --policy no_such.safetensors
-bad "is for robot sa01, not for go1" "$mild" drive --robot go1 --policy "$tests/../../policies/mild.safetensors"
+bad "sa01 go1 --robot --policy" "$mild" drive --robot go1 --policy "$tests/../../policies/mild.safetensors"
 head -c 31 key >short
 cp key open && chmod 644 open
-bad "short has 31 bytes, a key has 32 to 64; make one with" "$mild" drive --key short
-bad "chmod 600 open" "$mild" drive --simulate --key open
-bad "no_such: " "$mild" drive --key no_such
-bad "drive: .*: " "$mild" drive --key .
-bad "is not HOST or HOST:PORT" "$mild" drive --peer 127.0.0.1:x
-bad "is no robot's address" "$mild" drive --peer 0.0.0.0
-bad "192.0.2.1:9870 is another machine; .* --bind HOST" "$mild" drive --simulate --connect 192.0.2.1:9870
-bad "192.0.2.1.*; name an address of this machine" "$mild" drive --simulate --bind 192.0.2.1
+bad "--key 31 32 64" "$mild" drive --key short
+bad "--key 600" "$mild" drive --simulate --key open
+bad "no_such" "$mild" drive --key no_such
+bad "drive ." "$mild" drive --key .
+bad "127.0.0.1:x --peer" "$mild" drive --peer 127.0.0.1:x
+bad "--peer" "$mild" drive --peer 0.0.0.0
+bad "--connect 192.0.2.1:9870 --bind" "$mild" drive --simulate --connect 192.0.2.1:9870
+bad "--bind 192.0.2.1" "$mild" drive --simulate --bind 192.0.2.1
 rm key other short open
-bad "/dev/input/none" "$mild" drive --listen 127.0.0.1:0 --gamepad /dev/input/none
-bad "/dev/null is no gamepad" "$mild" drive --listen 127.0.0.1:0 --gamepad /dev/null
-bad "\. is no gamepad" "$mild" drive --listen 127.0.0.1:0 --gamepad .
+bad "--gamepad /dev/input/none" "$mild" drive --listen 127.0.0.1:0 --gamepad /dev/input/none
+bad "--gamepad /dev/null" "$mild" drive --listen 127.0.0.1:0 --gamepad /dev/null
+bad "--gamepad ." "$mild" drive --listen 127.0.0.1:0 --gamepad .
 for given in --policy=x --listen=x --command=0,0,0 --gamepad=x --no-keys --late=0.02 --damp-after=1 --speed-limit=30 --angle-limit=0.2 \
     --torque-share=1 --peer=127.0.0.1 --turn-limit=1 --glitch=0.1 --stall-after=1; do
-    bad "${given%=*} is for the runner" "$mild" drive --simulate $given
+    bad "${given%=*} --simulate" "$mild" drive --simulate $given
 done
 for given in --connect=x --bind=x --ground=foam45 --model=mild --lockstep --patience=1 --drop=0 --delay=0,0 --seed=1; do
-    bad "${given%=*} needs --simulate" "$mild" drive $given
+    bad "${given%=*} --simulate" "$mild" drive $given
 done
-bad "as 0.5,0,0" "$mild" drive --command 0.5
-bad "as 0.05,0.02" "$mild" drive --simulate --delay 0.05
-bad "unknown ground 'foma45'" "$mild" drive --simulate --ground foma45
-bad "nearest is 'task.gait_period'" "$mild" drive --task.gait_perod=0.7
-bad "no_such_folder" "$mild" drive --json no_such_folder/x.json
+bad "--command 0.5,0,0" "$mild" drive --command 0.5
+bad "--delay 0 0.05,0.02" "$mild" drive --simulate --delay 0.05
+bad "foma45 foam45" "$mild" drive --simulate --ground foma45
+bad "task.gait_perod task.gait_period --task.gait_perod=0.7" "$mild" drive --task.gait_perod=0.7
+bad "--json no_such_folder/x.json no_such_folder" "$mild" drive --json no_such_folder/x.json
 for option in late damp-after stall-after glitch turn-limit speed-limit angle-limit torque-share seconds patience drop; do
     bad "--$option" "$mild" drive "--$option" -7
 done

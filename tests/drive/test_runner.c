@@ -315,7 +315,7 @@ static void the_end(void **unused) {
     MildError error = {0};
     const RunnerDef none = {.policy = "no_such.safetensors", .robot = robot, .task = &task};
     assert_null(runner_create(&none, &error));
-    assert_non_null(strstr(error.text, "no_such.safetensors"));
+    assert_error(&error, MILD_ERROR_IO, "no_such.safetensors");
 }
 
 int main(void) {

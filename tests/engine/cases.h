@@ -9,16 +9,16 @@
 
 #include "engine_text.h"
 
-#include "base/float.h"
 #include "base/random.h"
 #include "robot/sim.h"
+#include "round.h"
 
 /* Float takes these numbers as they are, so that its error is that of its arithmetic. */
 static inline void round_case(EngineCase *in) {
-    float_round_all((double *)in, offsetof(EngineCase, variation) / sizeof(double));
-    float_round_all(&in->height, 1);
-    float_round_all(in->slope, 2);
-    float_round_all(in->map_origin, 2);
+    kit_round((double *)in, offsetof(EngineCase, variation) / sizeof(double));
+    kit_round(&in->height, 1);
+    kit_round(in->slope, 2);
+    kit_round(in->map_origin, 2);
 }
 
 static inline void spread(Random *random, double *x, int count, double size) {

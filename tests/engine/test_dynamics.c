@@ -670,7 +670,7 @@ static void test_refusals(void **unused) {
     m->jnt_margin[3] = 3;
     assert_int_equal(engine_model_read(kit->robot, DT, &tree, number, &error), MILD_ERROR_RANGE);
     print_message("%s\n", error.text);
-    assert_non_null(strstr(error.text, "FL_calf_joint"));
+    assert_error(&error, MILD_ERROR_RANGE, "FL_calf_joint margin 3");
     m->jnt_margin[3] = margin;
     const int parent = m->body_parentid[kit->robot->limb[0].body];
     m->body_parentid[kit->robot->limb[0].body] = 0;

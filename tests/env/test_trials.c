@@ -207,7 +207,7 @@ static void courses_are_refused(void **state) {
                         .terrain = &course,
                         .terrains = 1};
     assert_null(envs_create(&of, &error));
-    assert_non_null(strstr(error.text, "a course of several grounds"));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "course grounds");
 }
 
 static int setup(void **state) {

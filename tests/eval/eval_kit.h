@@ -30,20 +30,25 @@ static inline int kit_setup(void **state) {
     return !ready;
 }
 
-/* One row by MuJoCo. */
+/* One row by MuJoCo; *eval must outlive it. */
+static inline EvalRun kit_row(const TaskDef *task, Pool *pool, Controller *controller,
+                              const Scene *scene, const EvalDef *eval) {
+    return (EvalRun){.task = task,
+                     .robot = robot,
+                     .pool = pool,
+                     .controller = controller,
+                     .device = MILD_BATCH_HOST,
+                     .scenes = scene,
+                     .scene_count = 1,
+                     .speeds = &eval->speed,
+                     .speed_count = 1,
+                     .eval = *eval};
+}
+
 static inline MildStatus kit_run(const TaskDef *task, Pool *pool, Controller *controller,
                                  const Scene *scene, const EvalDef *eval, EvalRow *row,
                                  MildError *error) {
-    const EvalRun run = {.task = task,
-                         .robot = robot,
-                         .pool = pool,
-                         .controller = controller,
-                         .device = MILD_BATCH_HOST,
-                         .scenes = scene,
-                         .scene_count = 1,
-                         .speeds = &eval->speed,
-                         .speed_count = 1,
-                         .eval = *eval};
+    const EvalRun run = kit_row(task, pool, controller, scene, eval);
     return eval_run(&run, row, error);
 }
 

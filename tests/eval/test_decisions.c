@@ -9,6 +9,7 @@ enum { TRIALS = 3, FALLS = 1, STEPS = 200, COLUMNS_MAX = 160 };
 enum { BEFORE = 15 }; /* columns before the joints' */
 
 static double shown[TRIALS][STEPS][COLUMNS_MAX]; /* from the column `time_s` on */
+static float given[TRIALS * ROBOT_JOINTS_MAX];   /* actions of the last call of falling_act */
 static int decisions[TRIALS], joints, frame;
 
 static void put(double **at, const double *numbers, int count) {
@@ -23,6 +24,8 @@ static void decided(void *context, const EvalDecision *decision) {
     const float *newest =
         task_env_history(decision->env) + env->shape.history - env->shape.observation;
     (void)context;
+    assert_memory_equal(decision->action, given + decision->trial * joints,
+                        (size_t)joints * sizeof *given);
     put(&at, &decision->time, 1);
     put(&at, env->command_seen, 3);
     put(&at, &env->phase, 1);
@@ -45,6 +48,7 @@ static void falling_act(void *self, int rows, TaskEnv *const *envs, float *actio
     for (int i = 0; i < joints; i++) {
         actions[FALLS * joints + i] = 20;
     }
+    memcpy(given, actions, (size_t)(rows * joints) * sizeof *given);
 }
 
 static void header_names_every_column(char *line) {

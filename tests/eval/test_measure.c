@@ -72,6 +72,10 @@ static void shells_share_the_load(void **state) {
         measure_sample(&m, &s.sample);
     }
     assert_close("share of the shells", measure_shells(&m), 50.0 / 450, 1e-12);
+    measure_start(&m, DT); /* a trial that ended at once: 201 N for a millisecond */
+    s.sample.shell_load = 1;
+    measure_sample(&m, &s.sample);
+    assert_close("share of a step", measure_shells(&m), 1.0 / 201, 1e-12);
 }
 
 static void power_and_speed(void **state) {
@@ -82,6 +86,7 @@ static void power_and_speed(void **state) {
     assert_close("energy", m.energy, 8 * 5, 1e-9);
     assert_close("work", m.work, 32 * 3, 1e-9);
     assert_close("greatest torque", m.torque_max, 45, 0);
+    assert_close("torque of the last step", m.torque, 10, 0);
     assert_close("start of the steady part", m.start[0], -0.5, 1e-12);
     assert_close("end of the steady part", m.end[0], 1.0, 1e-12);
     assert_close("start of the steady part, y", m.start[1], 3.0, 1e-12);
@@ -94,6 +99,22 @@ static void power_and_speed(void **state) {
     assert_close("energy", m.energy, 8 * 5, 1e-9);
     assert_close("work", m.work, 32 * 2, 1e-9);
     assert_close("end of the steady part", m.end[0], 0.5, 1e-12);
+}
+
+/* Joints that hold still with half a newton metre. */
+static void small_torques_are_measured(void **state) {
+    (void)state;
+    Script s;
+    Measure m;
+    script_start(&s);
+    measure_start(&m, DT);
+    s.sample.torque[3] = -0.5;
+    measure_sample(&m, &s.sample);
+    assert_close("torque", m.torque, 0.5, 0);
+    s.sample.torque[3] = 0.25;
+    measure_sample(&m, &s.sample);
+    assert_close("torque of the step", m.torque, 0.25, 0);
+    assert_close("greatest torque", m.torque_max, 0.5, 0);
 }
 
 /* On a circle to the left: 0.5 m/s forward and 0.1 m/s to the left of a heading that turns by 0.8
@@ -277,13 +298,14 @@ static void stances_are_kept(void **state) {
     measure_free(m, 1);
 }
 
-/* A foot comes down every second, at 0.25, 1.25, ... s, first 0.3 m further on, from 5 s on 0.5 m;
- * meanwhile it goes 20 mm forward and back. The other foot stands. Strides count whose both ends
+/* A foot comes down every second, at 0.25, 1.25, ... s, first 0.3 m further on, from 5 s on 0.5 m,
+ * 0.7 rad to the left of x; meanwhile it goes 20 mm forward and back. The other foot stands. Strides count whose both ends
  * are between 2 and 8.5 s: two of 0.3 m, then four of 0.5 m from 4.25 s on. */
 static void strides_and_the_way_of_a_sole(void **state) {
     (void)state;
     const EvalDef eval = {.speed = 0.5, .trials = 1, .seconds = 10, .stop = 8.5};
     const uint8_t walked = TASK_END_time;
+    const double c = cos(0.7), d = sin(0.7);
     Script s;
     Measure m;
     EvalRow row;
@@ -296,7 +318,8 @@ static void strides_and_the_way_of_a_sole(void **state) {
     for (int k = 0; k < 10; k++) {
         x += k < 5 ? 0.3 : 0.5;
         for (int out = 0; out < 3; out++) {
-            set_foot(&s, 1, 100, x + (out == 1 ? 0.02 : 0), 0, 0);
+            set_foot(&s, 1, 100, c * (x + (out == 1 ? 0.02 : 0)), d * (x + (out == 1 ? 0.02 : 0)),
+                     0);
             hold(&m, &s, STEPS(0.125));
         }
         lift(&s, 1, 0.05);
@@ -674,6 +697,10 @@ static void the_printed_row(void **state) {
     row.ends[TASK_END_joint] = 1;
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "       -  ended by: 2 tilt, 1 joint"));
+    row.ends[TASK_END_base] = 3; /* in the order of TASK_ENDS */
+    row.ends[TASK_END_not_finite] = 4;
+    eval_print_row(&row, text, sizeof text);
+    assert_names(text, "ended 2 tilt 3 base 1 joint 4 not_finite");
     char header[256];
     eval_print_header(header, sizeof header);
     printf("%s\n%s\n", header, text);
@@ -762,6 +789,7 @@ static void a_robot_is_read(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(power_and_speed),
+        cmocka_unit_test(small_torques_are_measured),
         cmocka_unit_test(shells_share_the_load),
         cmocka_unit_test(speeds_of_a_turning_robot),
         cmocka_unit_test(yaw_of_an_orientation),

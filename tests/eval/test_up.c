@@ -30,12 +30,28 @@ static Measure script_rise(double up, double dip, int tilts) {
     return m;
 }
 
+/* It stands all the time. */
+static Measure script_standing(double seconds) {
+    EnvsSample sample = {.feet = FEET, .quaternion = {1}, .above = 0.8};
+    Measure m;
+    measure_start(&m, DT);
+    m.nominal_height = 0.8;
+    for (int k = 0; k < STEPS(seconds); k++) {
+        measure_sample(&m, &sample);
+    }
+    return m;
+}
+
 /* Up is who stands for the last two seconds; when it came up is the start of the unbroken time. */
 static void up_at_the_end_and_for_two_seconds(void **state) {
     (void)state;
     Measure m = script_rise(2.5, 0, 0);
     assert_true(fabs(measure_up(&m) - (2 + DT)) < 1e-9);
     m = script_rise(1.9, 0, 0);
+    assert_true(isnan(measure_up(&m)));
+    m = script_standing(2.5); /* from its first step on */
+    assert_true(fabs(measure_up(&m) - DT) < 1e-9);
+    m = script_standing(0);
     assert_true(isnan(measure_up(&m)));
     m = script_rise(5, 4, 0);
     assert_true(fabs(measure_up(&m) - (4 + DT)) < 1e-9);

@@ -72,17 +72,17 @@ if ! short; then # no code of ours runs here: the C that was written, by a compi
     fault "standing" 'fabsf(command[1]) < below' 'fabsf(command[1]) < 0' policy.c
 fi
 
-bad "walk exists already" "$mild" export --c walk
-bad "give --onnx FILE or --c FOLDER" "$mild" export
-bad "--double is for the graph" "$mild" export --c new --double
-bad "no_such" "$mild" export --policy no_such.safetensors --c new
-bad "is for robot sa01, not for go1" "$mild" export --robot go1 --policy "$root/policies/mild.safetensors" --c new
-bad "nearest is 'task.gait_period'" "$mild" export --c new --task.gait_perod=0.7
-bad "unknown section\|nearest is 'task'" "$mild" export --c new --train.envs=7
-bad "outside" "$mild" export --c new --task.gait_period=9
+bad "walk folder" "$mild" export --c walk
+bad "--onnx --c" "$mild" export
+bad "--double" "$mild" export --c new --double
+bad "no_such.safetensors" "$mild" export --policy no_such.safetensors --c new
+bad "sa01 go1 --robot --policy" "$mild" export --robot go1 --policy "$root/policies/mild.safetensors" --c new
+bad "task.gait_perod task.gait_period --task.gait_perod=0.7" "$mild" export --c new --task.gait_perod=0.7
+bad "train task --train.envs=7" "$mild" export --c new --train.envs=7
+bad "--task.gait_period=9 task.gait_period" "$mild" export --c new --task.gait_period=9
 bad "exact.csv" "$mild" export --c exact.csv
-bad "exact.csv" "$mild" export --c exact.csv/new
-bad "overwritten" "$mild" export --policy other.safetensors --onnx other.safetensors
+bad "exact.csv/new" "$mild" export --c exact.csv/new
+bad "--onnx other.safetensors" "$mild" export --policy other.safetensors --onnx other.safetensors
 
 # ---- ONNX ----
 if [ "$onnx" != ON ]; then
@@ -111,7 +111,7 @@ if [ "${RUNTIME:-}" ]; then # make export-check
     "$python" "$tests/test_onnx.py" --runtime "$root" walk.onnx exact.csv noisy.csv || fail "walk.onnx in ONNX Runtime"
     "$python" "$tests/test_onnx.py" --runtime - other.onnx other.csv || fail "other.onnx in ONNX Runtime"
 fi
-bad "onnx: - is no file" "$mild" export --onnx -
-bad "No space left" "$mild" export --onnx /dev/full
-bad "no_such_folder" "$mild" export --onnx no_such_folder/walk.onnx --c new
+bad "--onnx" "$mild" export --onnx -
+bad "/dev/full" "$mild" export --onnx /dev/full
+bad "--onnx no_such_folder/walk.onnx no_such_folder" "$mild" export --onnx no_such_folder/walk.onnx --c new
 finish "what is written does what eval did"

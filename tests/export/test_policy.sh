@@ -22,7 +22,7 @@ awk -F, 'NR > 1 { for (i = 87; i <= 98; i++) { a = $i < 0 ? -$i : $i; if (a > 0.
     END { exit !(n > 10) }' clipped.csv || fail "actions beyond their clip"
 "$mild" eval --ground foam45 --trials 2 --seconds 1 --ablate z --actions ablated.csv >/dev/null || fail "eval --ablate"
 [ "$(wc -l <ablated.csv)" = 201 ] || fail "rows of the trials for the means"
-bad "--actions is not there in the batch engine" "$mild" eval --train.robots=batch --actions x.csv
-bad "name the same file" "$mild" eval --actions x.csv --latent x.csv
-bad "no_such_folder" "$mild" eval --actions no_such_folder/x.csv
+bad "--actions" "$mild" eval --train.robots=batch --actions x.csv
+bad "--latent --actions x.csv" "$mild" eval --actions x.csv --latent x.csv
+bad "--actions no_such_folder/x.csv no_such_folder" "$mild" eval --actions no_such_folder/x.csv
 finish "the policy in numpy walks as here"

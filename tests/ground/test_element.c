@@ -2,9 +2,9 @@
 #include "ground_kit.h"
 
 #define ELEMENT_STEP element_step_double
-#include "base/float.h"
 #include "element_step.inc"
 #include "ground/models.h"
+#include "round.h"
 
 #define ELEMENTS 500
 #define STEPS 20
@@ -38,7 +38,7 @@ static ElementCase random_case(int n, uint64_t *random) {
                      .explicit_impulse = n % 5 == 1 ? float_rounded(-1e-3) : 0.0};
     c.memory[MEMORY(drift)] = n % 5 == 2 ? float_rounded((double)REMEMBER_DRIFT - 1e-3) : 0.0;
     memcpy(c.law, &law, sizeof c.law);
-    float_round_all(c.law, ELEMENT_LAW);
+    kit_round(c.law, ELEMENT_LAW);
     return c;
 }
 
@@ -56,7 +56,7 @@ static void case_push(ElementCase *c, uint64_t *random) {
 static void case_move(ElementCase *c, const ElementResult *result, uint64_t *random) {
     const double shift = kit_index(random, 8) == 0 ? kit_uniform(random, -1e-4, 1e-4) : 0.0;
     memcpy(c->memory, result->memory, sizeof c->memory);
-    float_round_all(c->memory, ELEMENT_MEMORY);
+    kit_round(c->memory, ELEMENT_MEMORY);
     c->now = c->after[2];
     c->depth = float_rounded(c->depth + c->dt * c->now + shift);
 }

@@ -227,7 +227,7 @@ static void test_bad_material(void **state) {
     def.by_force = 1;
     def.turn[0] = 1e6;
     assert_int_equal(press_run(&def, plate, &result, &error), MILD_ERROR_RANGE);
-    assert_non_null(strstr(error.text, "--force"));
+    assert_error(&error, MILD_ERROR_RANGE, "--force");
     mild_sole_destroy(plate);
     press_result_close(&result);
 }

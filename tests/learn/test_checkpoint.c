@@ -59,7 +59,7 @@ static void save(const Run *run) {
     assert_int_equal(ppo_save(run->ppo, PATH, NULL, 0, "toy", &error), MILD_OK);
 }
 
-static void refused(Run *run, MildStatus status, const char *why) {
+static void refused(Run *run, MildStatus status, const char *names) {
     MildError error = {0};
     const size_t bytes = (size_t)policy_parameter_count(run->policy) * sizeof(float);
     float *before = malloc(bytes);
@@ -67,10 +67,8 @@ static void refused(Run *run, MildStatus status, const char *why) {
     memcpy(before, policy_parameters(run->policy), bytes);
     const int64_t iteration = ppo_iteration(run->ppo);
     assert_int_equal(ppo_load(run->ppo, PATH, NULL, 0, &error), status);
-    assert_int_equal(error.status, status);
-    if (!strstr(error.text, why) || !strstr(error.text, PATH)) {
-        fail_msg("'%s' does not say '%s'", error.text, why);
-    }
+    assert_true(kit_named(error.text, PATH));
+    assert_error(&error, status, names);
     assert_memory_equal(before, policy_parameters(run->policy), bytes);
     assert_int_equal(ppo_iteration(run->ppo), iteration);
     free(before);
@@ -109,7 +107,7 @@ static void bad_numbers_are_refused(void **state) {
                               policy_parameters(run.ppo->average) + 5,
                               policy_parameters(run.policy) + 6};
     static const char *const names[] = {"train.first_moment", "train.second_moment",
-                                        "train.average", "weights that are not finite"};
+                                        "train.average", "weights"};
     for (int k = 0; k < 4; k++) {
         const float good = *weights[k];
         *weights[k] = k % 2 ? NAN : INFINITY;
@@ -117,7 +115,7 @@ static void bad_numbers_are_refused(void **state) {
         refused(&other, MILD_ERROR_FORMAT, names[k]);
         *weights[k] = good;
     }
-    const char *const senseless = "counters make no sense";
+    const char *const senseless = "counters";
     static const double rates[] = {-1e-9, 1.0001, NAN};
     const double rate = run.ppo->learning_rate;
     for (int k = 0; k < 3; k++) {
@@ -155,8 +153,7 @@ static void another_network_is_refused(void **state) {
     run_open(&other, &wider, &def);
     run_open(&same, &louder, &def);
     save(&run);
-    refused(&other, MILD_ERROR_ARGUMENT,
-            "policy.actor_hidden is '32 32 0 0', this run's is '32 33");
+    refused(&other, MILD_ERROR_ARGUMENT, "policy.actor_hidden 32 33");
     assert_int_equal(ppo_load(same.ppo, PATH, NULL, 0, &error), MILD_OK);
     assert_memory_equal(policy_parameters(run.policy), policy_parameters(same.policy),
                         (size_t)policy_parameter_count(run.policy) * sizeof(float));
@@ -185,16 +182,16 @@ static void missing_parts_are_refused(void **state) {
     }
     save(&run);
     swap_text("\"log_std\"", "\"log_sdt\"");
-    refused(&run, MILD_ERROR_FORMAT, "log_std is missing");
+    refused(&run, MILD_ERROR_FORMAT, "log_std");
     save(&run);
     swap_text("\"kind\":\"mild checkpoint\"", "\"kind\":\"wild checkpoint\"");
-    refused(&run, MILD_ERROR_FORMAT, "holds no policy of mild");
+    refused(&run, MILD_ERROR_FORMAT, "policy");
     save(&run);
     swap_text("\"version\":\"1\"", "\"version\":\"2\"");
-    refused(&run, MILD_ERROR_FORMAT, "has file version 2");
+    refused(&run, MILD_ERROR_FORMAT, "version 2 1");
     save(&run);
     swap_text("\"policy.actions\":\"2\"", "\"policy.actions\":\"0\"");
-    refused(&run, MILD_ERROR_FORMAT, "policy.actions = 0");
+    refused(&run, MILD_ERROR_FORMAT, "policy.actions 0 1 64");
     unlink(PATH);
     run_close(&run);
 }

@@ -127,7 +127,7 @@ static void test_another_run_is_refused(void **state) {
     run_open(&large, 1, 8, toy_ppo_def());
     assert_int_equal(ppo_save(small.ppo, path, NULL, 0, "", &error), MILD_OK);
     assert_int_equal(ppo_load(large.ppo, path, NULL, 0, &error), MILD_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.text, path));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "build_test_other.safetensors train.history 192 384");
     assert_int_equal(policy_save(small.policy, path, "", &error), MILD_OK);
     assert_int_equal(ppo_load(small.ppo, path, NULL, 0, &error), MILD_ERROR_ARGUMENT);
     unlink(path);
@@ -324,7 +324,9 @@ static void test_decoder_must_fit(void **state) {
             Ppo *ppo = ppo_create(&def, policy, pool, NULL, 4, 11, &error);
             const int fits = ground[shape] == ground[target] && frame[shape] == frame[target];
             assert_true(fits == (ppo != NULL));
-            assert_true(fits || strstr(error.text, "ppo.decoder_target"));
+            if (!fits) {
+                assert_error(&error, MILD_ERROR_ARGUMENT, "ppo.decoder_target");
+            }
             ppo_destroy(ppo);
             policy_destroy(policy);
         }

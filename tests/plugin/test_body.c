@@ -426,7 +426,7 @@ static void the_state_is_complete(void **state) {
     d->plugin_state[depth - d->plugin_state] = NAN;
     mj_step(m, d);
     assert_int_equal(kit_messages, 1);
-    assert_non_null(strstr(kit_said, "state"));
+    assert_names(kit_said, "state");
     mj_resetData(m, d);
     mj_resetData(m, other);
     steps(m, d, 50);
@@ -480,8 +480,8 @@ static void they_are_drawn(void **state) {
 
 /* ---- what a user may get wrong ---- */
 
-static void check_refused(const char *keys, const char *geom, const char *asset, const char *word,
-                          const char *other) {
+static void check_refused(const char *keys, const char *geom, const char *asset,
+                          const char *names) {
     static char text[4000];
     snprintf(text, sizeof text,
              "<mujoco><extension><plugin plugin='mild.ground'><instance name='soft'>%s</instance>"
@@ -495,8 +495,7 @@ static void check_refused(const char *keys, const char *geom, const char *asset,
     print_message("%s\n", kit_said);
     assert_null(m);
     assert_non_null(said);
-    assert_non_null(strstr(said, word));
-    assert_non_null(strstr(said, other));
+    assert_names(said, names);
     assert_null(strstr(said + 1, "mild.ground 'soft': ")); /* said once */
 }
 
@@ -505,20 +504,19 @@ static void check_refused(const char *keys, const char *geom, const char *asset,
 
 static void wrong_bodies_are_refused(void **state) {
     (void)state;
-    check_refused(FOOT CONFIG("body", "shim"), SHIN, "", "no body 'shim'", "nearest is 'shin'");
-    check_refused(FOOT CONFIG("body", "shin shin"), SHIN, "", "'shin'", "named twice");
-    check_refused(FOOT CONFIG("body", "shin foot"), SHIN, "", "'foot'", "a foot already");
+    check_refused(FOOT CONFIG("body", "shim"), SHIN, "", "body shim shin");
+    check_refused(FOOT CONFIG("body", "shin shin"), SHIN, "", "shin");
+    check_refused(FOOT CONFIG("body", "shin foot"), SHIN, "", "foot");
     check_refused(CONFIG("sole", "") CONFIG("feet", "foot") CONFIG("body", "pole"), SHIN, "",
-                  "'pole'", "fixed to the world");
-    check_refused(FOOT CONFIG("body", "shin"), "<site name='s'/>", "", "'shin'", "has no box");
+                  "pole world");
+    check_refused(FOOT CONFIG("body", "shin"), "<site name='s'/>", "", "shin");
     check_refused(FOOT CONFIG("body", "shin"), "<geom type='box' size='20 20 20' " OFF "/>", "",
-                  "'shin'", "at most 10 m");
+                  "shin 10");
     check_refused(FOOT CONFIG("body", "shin") CONFIG("body_pitch", "0.001"),
-                  "<geom type='box' size='1 1 1' " OFF "/>", "", "'shin'", "too many elements");
-    check_refused(FOOT CONFIG("body", "shin") CONFIG("body_pitch", "0"), SHIN, "", "body_pitch",
-                  "outside");
-    check_refused(CONFIG("body", "shin") CONFIG("ground.model", "bekker"), SHIN, "", "bekker",
-                  "name a foot");
+                  "<geom type='box' size='1 1 1' " OFF "/>", "", "shin elements");
+    check_refused(FOOT CONFIG("body", "shin") CONFIG("body_pitch", "0"), SHIN, "",
+                  "plugin.body_pitch 0");
+    check_refused(CONFIG("body", "shin") CONFIG("ground.model", "bekker"), SHIN, "", "bekker foot");
 }
 
 /* Bodies and feet are 16 together. */
@@ -541,7 +539,7 @@ static void seventeen_are_too_many(void **state) {
         mjModel *m = kit_compile(text);
         print_message("%s\n", kit_said);
         assert_int_equal(m == NULL, feet);
-        assert_true(!feet || strstr(kit_said, "more than 16 feet and bodies: 'b16'"));
+        assert_true(!feet || kit_named(kit_said, "16 b16"));
         if (m) {
             mjData *d = mj_makeData(m);
             kit_run(m, d, 1);
@@ -563,8 +561,7 @@ static void a_rigid_floor_is_said(void **state) {
         mjData *d = mj_makeData(m);
         print_message("%s\n", kit_said);
         assert_int_equal(kit_messages, !off);
-        assert_true(off || (strstr(kit_said, "geom 'box' of body 'body'") &&
-                            strstr(kit_said, "geom 'floor'")));
+        assert_true(off || kit_named(kit_said, "geom box body floor"));
         mj_deleteData(d);
         mj_deleteModel(m);
     }
@@ -603,8 +600,7 @@ static void a_folded_mesh_has_no_room(void **state) {
     kit_said[0] = '\0';
     assert_null(kit_compile(text));
     print_message("%s\n", kit_said);
-    assert_non_null(strstr(kit_said, "meshes of 'body'"));
-    assert_non_null(strstr(kit_said, "room for"));
+    assert_names(kit_said, "meshes body");
 }
 
 int main(void) {

@@ -34,21 +34,19 @@ static void test_open(void **unused) {
     robot_destroy(by_folder);
 }
 
-static void refuse(const char *name, const char *message) {
+static void refuse(const char *name, MildStatus status, const char *names) {
     MildError error = {0};
     assert_null(robot_open(name, &error));
-    if (!strstr(error.text, message)) {
-        fail_msg("'%s' instead of '%s'", error.text, message);
-    }
+    assert_error(&error, status, names);
 }
 
 static void test_refused(void **unused) {
     (void)unused;
-    refuse("sa02", "unknown robot 'sa02'; nearest is 'sa01'");
-    refuse("sa0", "nearest is 'sa01'");
-    refuse("", "unknown robot ''");
-    refuse("./no/such", "./no/such/robot.ini: ");
-    refuse(".", "./robot.ini: ");
+    refuse("sa02", MILD_ERROR_ARGUMENT, "sa02 sa01");
+    refuse("sa0", MILD_ERROR_ARGUMENT, "sa0 sa01");
+    refuse("", MILD_ERROR_ARGUMENT, "robot");
+    refuse("./no/such", MILD_ERROR_IO, "./no/such/robot.ini");
+    refuse(".", MILD_ERROR_IO, "./robot.ini");
     robot_destroy(NULL);
 }
 

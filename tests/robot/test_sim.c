@@ -423,8 +423,7 @@ static void test_time_steps(void **unused) {
     for (int i = 0; i < 5; i++) {
         MildError error = {0};
         assert_null(robot_sim_create(robot, bad[i], &error));
-        assert_int_equal(error.status, MILD_ERROR_RANGE);
-        assert_non_null(strstr(error.text, "0.0001 .. 0.01"));
+        assert_error(&error, MILD_ERROR_RANGE, "0.0001 0.01");
     }
     robot_sim_destroy(NULL);
 }

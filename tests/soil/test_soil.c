@@ -36,16 +36,13 @@ static void test_remarks(void **state) {
     free(text);
 }
 
-/* The message says `wanted`, and the material is left alone. */
-static void refused(const char *text, MildStatus status, const char *wanted) {
+/* Refused, and the material is left alone. */
+static void refused(const char *text, MildStatus status, const char *names) {
     MildMaterial material = mild_material_default();
     const MildMaterial before = material;
     MildError error = {0};
     assert_int_equal(soil_parse(text, "mars.ini", &material, &error), status);
-    assert_int_equal(error.status, status);
-    if (!strstr(error.text, wanted)) {
-        fail_msg("'%s' is not in '%s'", wanted, error.text);
-    }
+    assert_error(&error, status, names);
     assert_memory_equal(&material, &before, sizeof before);
     assert_int_equal(soil_parse(text, "mars.ini", &material, NULL), status);
 }
@@ -130,12 +127,12 @@ static void test_files(void **state) {
     assert_int_equal(soil_find(path, &read, &error), MILD_OK);
     assert_true(read.mu == 1.0 / 3);
     assert_int_equal(soil_write(&read, NULL, text, &error), MILD_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.text, "ends in .ini"));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "x.txt .ini");
     FILE *file = fopen(path, "wb");
     fwrite("[ground]\0", 1, 9, file);
     fclose(file);
     assert_int_equal(soil_find(path, &read, &error), MILD_ERROR_FORMAT);
-    assert_non_null(strstr(error.text, "binary"));
+    assert_error(&error, MILD_ERROR_FORMAT, path);
     file = fopen(path, "wb");
     for (int i = 0; i <= SOIL_BYTES_MAX; i++) {
         fputc('\n', file);
@@ -144,7 +141,7 @@ static void test_files(void **state) {
     assert_int_not_equal(soil_find(path, &read, &error), MILD_OK);
     unlink(path);
     assert_int_equal(soil_find(path, &read, &error), MILD_ERROR_IO);
-    assert_non_null(strstr(error.text, "a.ini"));
+    assert_error(&error, MILD_ERROR_IO, path);
     assert_int_equal(soil_find(path, &read, NULL), MILD_ERROR_IO);
     rmdir(folder);
 }
@@ -158,62 +155,55 @@ static void test_names(void **state) {
     assert_int_equal(soil_find("clay", &m, &error), MILD_OK);
     assert_int_equal(m.model, MILD_MODEL_BEKKER);
     assert_int_equal(soil_find("cly", &m, &error), MILD_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.text, "'clay'"));
-    assert_non_null(strstr(error.text, ".ini"));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "cly clay .ini");
     assert_int_equal(soil_find("rigid", &m, &error), MILD_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.text, "no soft-ground law"));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "rigid");
 }
 
 static void test_mistakes(void **state) {
     (void)state;
-    refused("", MILD_ERROR_FORMAT, "mars.ini: is no soil, because it has no section [ground]");
-    refused("# remark\n\nmu = 1", MILD_ERROR_FORMAT, "mars.ini:3: a key before [ground]");
-    refused("[soil]", MILD_ERROR_FORMAT, "mars.ini:1: '[soil]': a soil has the section [ground]");
-    refused("[ground", MILD_ERROR_FORMAT, "mars.ini:1: '[ground'");
-    refused(HAND "[task]\n", MILD_ERROR_FORMAT, "mars.ini:14: '[task]'");
-    refused("[ground]\nmu 1", MILD_ERROR_FORMAT, "mars.ini:2: neither `key = value`");
-    refused("[ground]\nk_phy = 1", MILD_ERROR_FORMAT,
-            "mars.ini:2: unknown key 'k_phy'; nearest is 'k_phi'");
-    refused("[ground]\npreset = clay\nmu = 1\n\nmu = 1", MILD_ERROR_FORMAT,
-            "mars.ini:5: mu was set on line 3");
-    refused("[ground]\npreset = cley", MILD_ERROR_FORMAT,
-            "mars.ini:2: preset: unknown ground 'cley'; nearest is 'clay'");
-    refused("[ground]\npreset = other.ini", MILD_ERROR_FORMAT, "unknown ground 'other.ini'");
+    refused("", MILD_ERROR_FORMAT, "mars.ini [ground]");
+    refused("# remark\n\nmu = 1", MILD_ERROR_FORMAT, "mars.ini:3 [ground]");
+    refused("[soil]", MILD_ERROR_FORMAT, "mars.ini:1 [soil] [ground]");
+    refused("[ground", MILD_ERROR_FORMAT, "mars.ini:1 [ground");
+    refused(HAND "[task]\n", MILD_ERROR_FORMAT, "mars.ini:14 [task]");
+    refused("[ground]\nmu 1", MILD_ERROR_FORMAT, "mars.ini:2");
+    refused("[ground]\nk_phy = 1", MILD_ERROR_FORMAT, "mars.ini:2 k_phy k_phi");
+    refused("[ground]\npreset = clay\nmu = 1\n\nmu = 1", MILD_ERROR_FORMAT, "mars.ini:5 mu 3");
+    refused("[ground]\npreset = cley", MILD_ERROR_FORMAT, "mars.ini:2 preset cley clay");
+    refused("[ground]\npreset = other.ini", MILD_ERROR_FORMAT, "mars.ini:2 preset other.ini");
     refused("[ground]\npreset = clay\nmodel = mild", MILD_ERROR_FORMAT,
-            "mars.ini:3: model = mild, but the preset clay is of bekker");
-    refused("[ground]\npreset = clay\nmodel = bekkr", MILD_ERROR_ARGUMENT, "mars.ini:3:");
-    refused("[ground]\nmodel = rigid", MILD_ERROR_ARGUMENT, "mars.ini: ground.model = rigid");
-    refused("[ground]\npreset = clay\nk_pen = 5", MILD_ERROR_FORMAT,
-            "mars.ini:3: k_pen: the model bekker does not read it; leave it out");
-    refused("[ground]\npreset = clay\nmu = 3.5", MILD_ERROR_RANGE,
-            "mars.ini:3: ground.mu = 3.5 is outside 0 .. 3");
-    refused("[ground]\npreset = clay\nmu = 0,5", MILD_ERROR_ARGUMENT, "mars.ini:3:");
-    refused("[ground]\npreset = clay\nmu = nan", MILD_ERROR_ARGUMENT, "mars.ini:3:");
-    refused("[ground]\npreset = clay\nmu =", MILD_ERROR_ARGUMENT, "mars.ini:3:");
+            "mars.ini:3 model mild preset clay bekker");
+    refused("[ground]\npreset = clay\nmodel = bekkr", MILD_ERROR_ARGUMENT,
+            "mars.ini:3 ground.model bekkr bekker");
+    refused("[ground]\nmodel = rigid", MILD_ERROR_ARGUMENT, "mars.ini ground.model rigid");
+    refused("[ground]\npreset = clay\nk_pen = 5", MILD_ERROR_FORMAT, "mars.ini:3 k_pen bekker");
+    refused("[ground]\npreset = clay\nmu = 3.5", MILD_ERROR_RANGE, "mars.ini:3 ground.mu 3.5 0 3");
+    refused("[ground]\npreset = clay\nmu = 0,5", MILD_ERROR_ARGUMENT, "mars.ini:3 ground.mu");
+    refused("[ground]\npreset = clay\nmu = nan", MILD_ERROR_ARGUMENT, "mars.ini:3 ground.mu nan");
+    refused("[ground]\npreset = clay\nmu =", MILD_ERROR_ARGUMENT, "mars.ini:3 ground.mu");
     refused("[ground]\npreset = clay\nplate_width = 1e-9", MILD_ERROR_RANGE,
-            "mars.ini: ground.plate_width");
-    refused("[ground]\nmodel = bekker\nexponent = 1\n", MILD_ERROR_FORMAT,
-            "mars.ini: mu is missing, which the model bekker reads: [-] friction");
-    refused("[ground]\n\x1b]0;x\x07 = 1", MILD_ERROR_FORMAT, "mars.ini:2: unknown key '?]0;x?'");
+            "mars.ini ground.plate_width");
+    refused("[ground]\nmodel = bekker\nexponent = 1\n", MILD_ERROR_FORMAT, "mars.ini mu bekker");
+    refused("[ground]\n\x1b]0;x\x07 = 1", MILD_ERROR_FORMAT, "mars.ini:2 ?]0;x?");
     char line[600];
     memset(line, 'x', sizeof line);
     line[sizeof line - 1] = '\0';
-    refused(line, MILD_ERROR_FORMAT, "mars.ini:1: a line longer than 399");
+    refused(line, MILD_ERROR_FORMAT, "mars.ini:1 399");
 }
 
 /* Every line of HAND is needed, but for remarks: a file that lost one is refused. */
 static void test_lost_lines(void **state) {
     (void)state;
-    static const char *const names[] = {"exponent", "k_c",     "k_phi",   "cohesion", "mu =",
-                                        "shear_le", "k_drift", "b_drift", "bed_depth"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        char text[] = HAND, wanted[64];
-        char *at = strstr(text, names[i]);
+    static const char *const keys[] = {"exponent",     "k_c",     "k_phi",   "cohesion", "mu",
+                                       "shear_length", "k_drift", "b_drift", "bed_depth"};
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
+        char text[] = HAND, line[64], names[64];
+        snprintf(line, sizeof line, "\n%s", keys[i]);
+        char *at = strstr(text, line) + 1;
         memmove(at, strchr(at, '\n') + 1, strlen(strchr(at, '\n')));
-        snprintf(wanted, sizeof wanted, "mars.ini: %.8s", names[i]);
-        wanted[10 + strcspn(names[i], " ")] = '\0';
-        refused(text, MILD_ERROR_FORMAT, wanted);
-        refused(text, MILD_ERROR_FORMAT, " is missing");
+        snprintf(names, sizeof names, "mars.ini %s bekker", keys[i]);
+        refused(text, MILD_ERROR_FORMAT, names);
     }
 }
 

@@ -260,11 +260,11 @@ static void without_shells_it_is_refused(void **unused) {
     assert_int_equal(task_def_check(&bad, &error), MILD_OK);
     bad.start = TASK_START_BACK;
     assert_int_equal(task_def_check(&bad, &error), MILD_ERROR_RANGE);
-    assert_non_null(strstr(error.text, "task.start"));
+    assert_error(&error, MILD_ERROR_RANGE, "task.start task.shells_stand");
     bad.start = TASK_START_STAND;
     bad.may_lie = 1;
     assert_int_equal(task_def_check(&bad, &error), MILD_ERROR_RANGE);
-    assert_non_null(strstr(error.text, "task.may_lie"));
+    assert_error(&error, MILD_ERROR_RANGE, "task.may_lie task.shells_stand");
 }
 
 /* ---- limp, then not ---- */

@@ -170,7 +170,7 @@ static void test_too_large(void **state) {
         MildError error = {0};
         write_kind(&kinds[i], zeros, 4097);
         assert_int_equal(image_read(path, &image, &error), wanted[i]);
-        assert_non_null(strstr(error.text, path));
+        assert_error(&error, wanted[i], path);
         assert_null(image.grey);
     }
     free(zeros);
@@ -183,12 +183,12 @@ static void test_open_file(void **state) {
     MildError error = {0};
     char nothing[16] = "no picture";
     FILE *file = fmemopen(nothing, sizeof nothing, "rb");
-    assert_int_equal(image_read_file(file, "the name", &image, &error), MILD_ERROR_FORMAT);
-    assert_non_null(strstr(error.text, "the name: is not a PNG"));
+    assert_int_equal(image_read_file(file, "the-name", &image, &error), MILD_ERROR_FORMAT);
+    assert_error(&error, MILD_ERROR_FORMAT, "the-name PNG");
     fclose(file);
     file = fmemopen(nothing, 3, "rb"); /* shorter than a signature */
     assert_int_equal(image_read_file(file, "short", &image, &error), MILD_ERROR_FORMAT);
-    assert_non_null(strstr(error.text, "short"));
+    assert_error(&error, MILD_ERROR_FORMAT, "short PNG");
     fclose(file);
 }
 
@@ -205,12 +205,14 @@ static void test_refused(void **state) {
     (void)state;
     static png_byte grey[ROWS * COLUMNS];
     static char bytes[8192];
+    char names[256];
     Image image;
     MildError error = {0};
     assert_int_equal(image_read("no/such.png", &image, &error), MILD_ERROR_IO);
     write_bytes("height,height\n", 14);
     assert_int_equal(image_read(path, &image, &error), MILD_ERROR_FORMAT);
-    assert_non_null(strstr(error.text, "not a PNG"));
+    snprintf(names, sizeof names, "%s PNG", path);
+    assert_error(&error, MILD_ERROR_FORMAT, names);
     for (int i = 0; i < ROWS * COLUMNS; i++) {
         grey[i] = (png_byte)(i * 31);
     }
@@ -224,7 +226,7 @@ static void test_refused(void **state) {
         MildStatus status = image_read(path, &image, &error);
         refused += status != MILD_OK;
         if (status != MILD_OK) {
-            assert_non_null(strstr(error.text, path));
+            assert_error(&error, MILD_ERROR_FORMAT, path);
         }
         image_close(&image);
     }
@@ -277,17 +279,15 @@ static void test_terrain(void **state) {
     mild_map_destroy(map);
     def.labels[0] = '\0';
     assert_true(terrain_make(&def, 2, &map, &error) != MILD_OK);
-    assert_non_null(strstr(error.text, "terrain.labels"));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "terrain.labels");
     assert_null(map);
 }
 
-static void expect_error(const TerrainDef *def, MildStatus wanted, const char *text) {
+static void refuse_terrain(const TerrainDef *def, MildStatus status, const char *names) {
     MildError error = {0};
     MildMap *map = (MildMap *)(uintptr_t)&error; /* must become NULL */
-    assert_int_equal(terrain_make(def, 2, &map, &error), wanted);
-    if (!strstr(error.text, text)) {
-        fail_msg("'%s' does not say '%s'", error.text, text);
-    }
+    assert_int_equal(terrain_make(def, 2, &map, &error), status);
+    assert_error(&error, status, names);
     assert_null(map);
 }
 
@@ -296,27 +296,25 @@ static void test_terrain_refused(void **state) {
     (void)state;
     TerrainDef plain = terrain_def_default(), def = plain;
     def.map.kind = MILD_MAP_IMAGE;
-    expect_error(&def, MILD_ERROR_ARGUMENT, "terrain.image is empty: name a PNG file");
+    refuse_terrain(&def, MILD_ERROR_ARGUMENT, "terrain.image PNG");
     strcpy(def.image, "no/such.png");
-    expect_error(&def, MILD_ERROR_IO, "terrain.image = no/such.png: cannot read");
+    refuse_terrain(&def, MILD_ERROR_IO, "terrain.image no/such.png");
     def = plain;
     def.map.patches = MILD_PATTERN_IMAGE;
-    expect_error(&def, MILD_ERROR_ARGUMENT, "terrain.labels is empty: name a PNG file");
+    refuse_terrain(&def, MILD_ERROR_ARGUMENT, "terrain.labels PNG");
     strcpy(def.labels, "no/such.png");
-    expect_error(&def, MILD_ERROR_IO, "terrain.labels = no/such.png: cannot read");
+    refuse_terrain(&def, MILD_ERROR_IO, "terrain.labels no/such.png");
     def = plain;
     strcpy(def.image, path);
-    expect_error(&def, MILD_ERROR_ARGUMENT, "terrain.image = ");
-    expect_error(&def, MILD_ERROR_ARGUMENT, "is not used: set terrain.kind = image");
+    refuse_terrain(&def, MILD_ERROR_ARGUMENT, "terrain.image terrain.kind");
     def = plain;
     strcpy(def.labels, path);
     def.map.kind = MILD_MAP_ROUGH;
-    expect_error(&def, MILD_ERROR_ARGUMENT, "terrain.labels = ");
-    expect_error(&def, MILD_ERROR_ARGUMENT, "is not used: set terrain.patches = image");
+    refuse_terrain(&def, MILD_ERROR_ARGUMENT, "terrain.labels terrain.patches");
     def = plain;
     def.map.kind = MILD_MAP_WAVES;
     def.map.wavelength = -1;
-    expect_error(&def, MILD_ERROR_RANGE, "wavelength");
+    refuse_terrain(&def, MILD_ERROR_RANGE, "terrain.wavelength -1");
 }
 
 /* Level ground of one material needs no map; a shape or a pattern does. */

@@ -283,8 +283,7 @@ static void prints_follow_the_map(void **state) {
     terrain.map = map;
     relief_destroy(relief);
     relief = relief_create(&area, &terrain, soles, 1, &error);
-    assert_true(relief_is_uneven(relief) && relief_low(relief) < -0.045 &&
-                relief_high(relief) > 0.045);
+    assert_true(relief_is_uneven(relief) && relief_low(relief) < -0.045);
     static float position[3 * VERTICES], normal[3 * VERTICES];
     double worst = 0;
     press(0.05, 0.0, DEPTH);

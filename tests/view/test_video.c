@@ -75,7 +75,6 @@ static void whole_file_under_its_name(void **state) {
         paint(rgb, i);
         assert_int_equal(video_frame(video, rgb, &error), MILD_OK);
     }
-    assert_int_equal(video_frames(video), FRAMES);
     struct stat info;
     assert_int_not_equal(stat(path, &info), 0); /* not before it is whole */
     assert_int_equal(video_close(video, &error), MILD_OK);
@@ -97,11 +96,9 @@ static void missing_ffmpeg_is_one_line(void **state) {
     setenv("PATH", before, 1);
     free(before);
     assert_null(video);
-    assert_int_equal(error.status, MILD_ERROR_IO);
-    assert_non_null(strstr(error.text, "ffmpeg"));
-    assert_null(strchr(error.text, '\n'));
-    assert_int_equal(files_in_folder(), 0);
     print_message("%s\n", error.text);
+    assert_error(&error, MILD_ERROR_IO, path);
+    assert_int_equal(files_in_folder(), 0);
 }
 
 /* ffmpeg starts and then fails: the walk must survive it (no SIGPIPE) and say why. */
@@ -127,14 +124,13 @@ static void failing_ffmpeg_is_one_line(void **state) {
         status = video_frame(video, rgb, &error);
     }
     assert_int_equal(video_close(video, &error), MILD_ERROR_IO);
-    assert_non_null(strstr(error.text, "a codec is missing"));
-    assert_null(strchr(error.text, '\n'));
     print_message("%s\n", error.text);
+    assert_error(&error, MILD_ERROR_IO, "walk.mp4 ffmpeg codec");
     unlink(program);
     assert_int_equal(files_in_folder(), 0); /* no temporary file is left */
     snprintf(path, sizeof path, "%s/nowhere/walk.mp4", folder);
     assert_null(video_open(path, WIDTH, HEIGHT, 25, &error));
-    assert_non_null(strstr(error.text, "nowhere"));
+    assert_error(&error, MILD_ERROR_IO, path);
 }
 
 static void odd_size_is_refused(void **state) {

@@ -90,12 +90,6 @@ WARP_FN Real engine_body_clearance_on(const EngineModel *model, const EngineWork
     return engine_clearance_on(model, work, ground).body;
 }
 
-/* The same above level ground at `height`. */
-WARP_FN Real engine_body_clearance(const EngineModel *model, const EngineWork *work, Real height) {
-    const EngineGround level = {NULL, NULL, height};
-    return engine_body_clearance_on(model, work, &level);
-}
-
 /* [m] Height of a point of the world below the ground there. */
 MILD_HD Real point_depth(const EngineGround *ground, const EngineWork *work, const MapSpot *spot,
                          const Real *point) {
@@ -122,13 +116,6 @@ WARP_FN Real engine_sole_height_on(const EngineModel *model, const EngineWork *w
         }
     }
     return -lane_max(most);
-}
-
-/* The same above level ground at `height`. */
-WARP_FN Real engine_sole_height(const EngineModel *model, const EngineWork *work, int foot,
-                                Real height) {
-    const EngineGround level = {NULL, NULL, height};
-    return engine_sole_height_on(model, work, foot, &level);
 }
 
 /* [m] Of b beyond a along the base's lateral axis laid level, to the left. */
