@@ -15,8 +15,8 @@ def attach(spec, feet=(), ground="sand_loose", *, body=(), exclude=True, sensor=
 
     feet: names of bodies or sites, z up from the sole. body: names of other bodies, such as shins, a trunk or wheels, whose
     shapes meet the ground on any side; with the feet 1 .. 16. ground: a preset, a soil's file (docs/soil.md), a
-    Material, or a list of presets and files where terrain__patches is given. exclude: feet and bodies no longer touch geoms of the world body, such as a rigid floor; all
-    else touches them as before. sensor: name of a sensor to add, whose data are (feet + bodies, 12) numbers, a row for each
+    Material, or a list of presets and files where terrain__patches is given. exclude: feet and bodies no longer touch geoms of the world body, such as a rigid floor, nor those of a
+    body fixed in it that has a plane or a height field; all else touches them as before. sensor: name of a sensor to add, whose data are (feet + bodies, 12) numbers, a row for each
     foot and then for each body: force, torque, centre of pressure, area, largest and mean depth (docs/plugin.md).
     attributes: those of the plugin with __ for the dot: prints=64, ground__mu=0.5, terrain__kind="waves". library: the
     plugin's file; None: $MILD_PLUGIN, or the package's own. Raises TypeError for what is no MjSpec, ValueError for feet and
@@ -65,13 +65,27 @@ def names_of(given, key):
     return names
 
 
+def floors(spec):
+    """Names of the bodies that are ground: the world's, and those fixed in it that have a plane or a height field."""
+    import mujoco
+
+    flat, names, bodies = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD), {spec.worldbody.name}, list(spec.worldbody.bodies)
+    while bodies:
+        body = bodies.pop()
+        if not body.joints and not body.mocap:
+            bodies += list(body.bodies)
+            names |= {body.name} if body.name and any(geom.type in flat for geom in body.geoms) else set()
+    return names
+
+
 def exclude_world(spec, names):
-    """Excludes the contacts of feet and bodies with the world body. A body without a name cannot be excluded."""
+    """Excludes the contacts of feet and bodies with the world body and other floors. A body without a name cannot be excluded."""
     bodies = {(spec.body(name) or spec.site(name).parent).name for name in names}
-    known = {frozenset((pair.bodyname1, pair.bodyname2)) for pair in spec.excludes}
-    for body in sorted(bodies - {"", spec.worldbody.name}):
-        if frozenset((body, spec.worldbody.name)) not in known:
-            spec.add_exclude(bodyname1=spec.worldbody.name, bodyname2=body)
+    known, grounds = {frozenset((pair.bodyname1, pair.bodyname2)) for pair in spec.excludes}, floors(spec)
+    for body in sorted(bodies - {""} - grounds):
+        for ground in sorted(grounds):
+            if frozenset((body, ground)) not in known:
+                spec.add_exclude(bodyname1=ground, bodyname2=body)
 
 
 def load_plugin(library=None):

@@ -158,6 +158,21 @@ class Attach(unittest.TestCase):
         self.assertAlmostEqual(depths[1], depths[0], delta=0.005 * depths[0])
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_floor_of_its_own(self):
+        """A floor may be a body in the world, as mjlab has it; a box that is fixed there is no floor, and is touched as before."""
+        solid = PLATE.replace('contype="0" conaffinity="0"', "").replace(
+            "<worldbody>", '<worldbody><body name="scene"><body name="terrain"><geom type="plane" size="1 1 1"/></body>'
+            '<body name="curb" pos="9 0 0"><geom type="box" size="1 1 1"/></body></body>')
+        spec = mujoco.MjSpec.from_string(solid)
+        mild.attach(spec, "plate", "foam45")
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 1500)
+        self.assertEqual((model.nexclude, data.ncon), (2, 0))
+        depth = 0.01 - data.qpos[2]
+        self.assertAlmostEqual(depth, fall(mild.Material("foam45")), delta=0.01 * depth)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_exclude_once(self):
         """A pair that the model excludes already is not excluded again."""
         spec = mujoco.MjSpec.from_string(PLATE)
