@@ -52,6 +52,10 @@ static double foot_load(const mjModel *m, const Foot *feet, int count) {
     return mass * fabs(m->opt.gravity[2]) / count;
 }
 
+double soft_load(const Soft *soft, const mjModel *m) {
+    return foot_load(m, soft->foot, soft->feet);
+}
+
 /* The height of a map that is not level, or has a pattern, is added to `height`. */
 static MildStatus lay_map(Soft *soft, MildError *error) {
     MildMapDef *map = &soft->def.map;
@@ -106,7 +110,7 @@ static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *er
     if (status == MILD_OK) {
         status = plugin_def_materials(m, instance, &soft->def,
                                       soft->foot[0].surface ? NULL : soft->foot[0].raster,
-                                      foot_load(m, soft->foot, soft->feet), &soft->terrain, error);
+                                      soft_load(soft, m), &soft->terrain, error);
     }
     if (status == MILD_OK) {
         status = lay_map(soft, error);
@@ -183,6 +187,7 @@ void soft_reset(Soft *soft, void *state, size_t bytes) {
 void soft_copy(Soft *soft, const mjModel *m, const Soft *from) {
     const size_t nv = (size_t)m->nv * sizeof(double);
     const size_t rows = (size_t)from->near_rows;
+    memcpy(soft->terrain.materials, from->terrain.materials, sizeof soft->terrain.materials);
     soft->input = from->input;
     soft->input.inverse_inertia = soft->inverse_inertia;
     memcpy(soft->inverse_inertia, from->inverse_inertia, rows * rows * sizeof(double));

@@ -56,6 +56,8 @@ void soft_destroy(Soft *soft); /* may be NULL */
 size_t soft_room(const mjModel *m, int instance);
 /* Number of its feet and bodies; 0 when it would fail. */
 int soft_feet(const mjModel *m, int instance);
+/* [N] Weight of the robot over its feet. */
+double soft_load(const Soft *soft, const mjModel *m);
 /* Initialises the state, [bytes]: a ground that remembers nothing. */
 void soft_reset(Soft *soft, void *state, size_t bytes);
 /* Takes over what a solve left in `from`, of the same model; the scratch is filled again when it is

@@ -91,7 +91,7 @@ def exclude_world(spec, names):
 def load_plugin(library=None):
     """Loads the engine plugin, for models whose XML names it: `library`, else $MILD_PLUGIN, else the package's own for the
     MuJoCo that is imported. A process that has it may do so again. Raises RuntimeError when there is no such file, or when it
-    is for another MuJoCo."""
+    is for another MuJoCo. Returns the file."""
     import mujoco
 
     named = library or os.environ.get("MILD_PLUGIN")
@@ -102,6 +102,7 @@ def load_plugin(library=None):
         mujoco.mj_loadPluginLibrary(str(path.resolve()))
     except Exception as error:
         raise RuntimeError(f"library: {path} does not go with MuJoCo {mujoco.mj_versionString()}: {error}") from None
+    return path.resolve()
 
 
 def ground_of(ground):

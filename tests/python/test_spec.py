@@ -1,4 +1,5 @@
 """mild.attach: soft ground under an MjSpec. With MILD_PLUGIN, a file, also with the engine plugin."""
+import copy
 import os
 import pathlib
 import re
@@ -171,6 +172,43 @@ class Attach(unittest.TestCase):
         self.assertEqual((model.nexclude, data.ncon), (2, 0))
         depth = 0.01 - data.qpos[2]
         self.assertAlmostEqual(depth, fall(mild.Material("foam45")), delta=0.01 * depth)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_running_ground(self):
+        """mild.ground changes the ground: at the start of a run, a plate falls as on a ground that was so in the model."""
+        models = {}
+        for name in ("rubber", "sand_loose"):
+            spec = mujoco.MjSpec.from_string(PLATE)
+            mild.attach(spec, ["plate"], name)
+            models[name] = spec.compile()
+        model, other = models["rubber"], models["sand_loose"]
+        data, wanted = mujoco.MjData(model), mujoco.MjData(other)
+        ground = mild.ground(model, data)
+        self.assertEqual(ground.material().as_dict(), mild.Material("rubber").as_dict())
+        ground.set("sand_loose")
+        mujoco.mj_step(model, data, 500)
+        mujoco.mj_step(other, wanted, 500)
+        np.testing.assert_array_equal(data.qpos, wanted.qpos)
+        ground.set(mu=0.2)
+        self.assertEqual(ground.material().as_dict(), mild.Material("sand_loose", mu=0.2).as_dict())
+        ground.set(mild.Material("grass"), mu=0.3)
+        self.assertEqual(ground.material().as_dict(), mild.Material("grass", mu=0.3).as_dict())
+        self.assertEqual(mild.ground(model, copy.copy(data), "ground").material().as_dict(), mild.Material("grass", mu=0.3).as_dict())
+        before = ground.material().as_dict()
+        for wrong, error in (({"ground": "mud"}, ValueError), ({"mu": -1}, ValueError), ({"my": 1}, TypeError), ({"label": 1, "mu": 0.1}, ValueError),
+                             ({"ground": "rigid"}, ValueError), ({"ground": mild.Material("dry_sand")}, ValueError)):
+            with self.assertRaises(error, msg=str(wrong)):
+                ground.set(**wrong)
+        self.assertEqual(ground.material().as_dict(), before)
+        with self.assertRaisesRegex(ValueError, "no mild.ground 'other'"):
+            mild.ground(model, data, "other")
+        with self.assertRaisesRegex(ValueError, "not one of this model"):
+            mild.ground(other, data)
+        with self.assertRaisesRegex(TypeError, "mujoco.MjModel"):
+            mild.ground(data, model)
+        bare = mujoco.MjModel.from_xml_string("<mujoco/>")
+        with self.assertRaisesRegex(ValueError, "no mild.ground"):
+            mild.ground(bare, mujoco.MjData(bare))
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_exclude_once(self):
