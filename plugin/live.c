@@ -3,6 +3,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "plugin/visual.h"
+
+#define NAME 64 /* bytes */
+
 static MildStatus check_label(const Soft *soft, int label, MildError *error) {
     if (label < 0 || label >= soft->terrain.material_count) {
         return mild_fail(error, MILD_ERROR_RANGE, "label %d, but the ground has %d materials",
@@ -27,8 +31,9 @@ int live_print(const Soft *soft, int label, char *text, int size) {
     return length;
 }
 
-/* Reads one line into the material and moves *text behind it. */
-static MildStatus read_line(const char **text, MildMaterial *material, MildError *error) {
+/* Reads one line into the material, or into name[NAME], and moves *text behind it. */
+static MildStatus read_line(const char **text, MildMaterial *material, char *name,
+                            MildError *error) {
     char line[128];
     const size_t length = strcspn(*text, "\n");
     char *value;
@@ -44,6 +49,10 @@ static MildStatus read_line(const char **text, MildMaterial *material, MildError
         return mild_fail(error, MILD_ERROR_ARGUMENT, "'%s', but a line must be KEY=VALUE", line);
     }
     *value++ = '\0';
+    if (strcmp(line, "name") == 0) {
+        snprintf(name, NAME, "%s", value);
+        return MILD_OK;
+    }
     const MildField *field =
         mild_field_find(mild_material_fields, mild_material_field_count, line, NULL);
     return field ? mild_field_parse(field, material, value, "ground", error)
@@ -56,10 +65,11 @@ MildStatus live_change(Soft *soft, const mjModel *m, int label, const char *text
     if (status != MILD_OK) {
         return status;
     }
+    char name[NAME] = "";
     MildMaterial material = soft->terrain.materials[label], matched;
     const MildModel model = (MildModel)material.model;
     while (status == MILD_OK && *text) {
-        status = read_line(&text, &material, error);
+        status = read_line(&text, &material, name, error);
     }
     if (status == MILD_OK && material.model == MILD_MODEL_MILD && model != MILD_MODEL_MILD &&
         !soft->foot[0].surface) {
@@ -77,6 +87,9 @@ MildStatus live_change(Soft *soft, const mjModel *m, int label, const char *text
     }
     if (status == MILD_OK) {
         soft->terrain.materials[label] = material;
+        if (name[0]) {
+            visual_colour(name, &material, soft->colour[label]);
+        }
     }
     return status;
 }

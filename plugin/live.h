@@ -9,7 +9,8 @@
  * cut off; -1 without such a material. */
 int live_print(const Soft *soft, int label, char *text, int size);
 /* Puts the material of such lines in its place, from the next step on; what the ground remembers
- * stays. Lines that are missing keep their numbers. One of `mild` is matched to the model of the
+ * stays. Lines that are missing keep their numbers; name=PRESET
+ * chooses the colour. One of `mild` is matched to the model of the
  * ground, which stays. On failure nothing has changed. */
 MildStatus live_change(Soft *soft, const mjModel *m, int label, const char *text, MildError *error);
 

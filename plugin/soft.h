@@ -18,6 +18,7 @@ typedef struct {
     const MildSole *soles[MILD_FEET_MAX];
     MildMap *map; /* NULL: level ground of one material */
     MildTerrain terrain;
+    float colour[MILD_MATERIALS_MAX][3]; /* of its materials */
     MildScratch *scratch;
     Metric metric;
     Rows rows;

@@ -163,7 +163,7 @@ def stand(model, description, ground, attributes, painted=False):
     if ground != "rigid":
         _unpair(spec, feet.names + feet.bodies)
         _undress(spec, feet.bodies)
-        attach(spec, feet.names, ground, body=feet.bodies, sensor="feet_of_trial", name="ground_of_trial",
+        attach(spec, feet.names, ground, body=feet.bodies, surface=False, sensor="feet_of_trial", name="ground_of_trial",
                **{"sole": " ".join(feet.soles), **attributes})
     compiled = spec.compile()
     drive, gear = _drives(compiled, [names[j] for j in order])

@@ -32,6 +32,8 @@ class RunningGround:
         given = {key: spec.text_of(value) for key, value in numbers.items()}
         made = Material(**{**before.as_dict(), **given}) if isinstance(before, Material) else Material(before, **given)
         lines = "".join(f"{key}={value}\n" for key, value in made.as_dict().items())
+        if ground is not None:
+            lines += f"name={ground if isinstance(ground, str) and not ground.endswith('.ini') else 'own'}\n"
         error = ctypes.create_string_buffer(600)
         if self._library.mild_plugin_change(*self._ends, ctypes.c_int(label), lines.encode(), error, ctypes.c_int(600)):
             raise ValueError(f"ground: {error.value.decode()}")
