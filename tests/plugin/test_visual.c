@@ -1,4 +1,5 @@
-/* The ground in the scene: tiles that lie on the surface, beside each other, around the feet, and follow what is pressed. */
+/* The ground in the scene: tiles that lie on the surface, beside each other, around the feet, and
+ * follow what is pressed. */
 #include <math.h>
 
 #include "plugin_kit.h"
@@ -144,8 +145,8 @@ static int is_colour(const mjvGeom *geom, float r, float g, float b) {
            fabsf(geom->rgba[2] - share * b) < 1e-3f;
 }
 
-/* Level ground that is asked for: closed up to the horizon, under the plate as deep as the plate, in
- * the colour of the soil, and without patches. */
+/* Level ground that is asked for: closed up to the horizon, under the plate as deep as the plate,
+ * in the colour of the soil, and without patches. */
 static void level_ground_is_dented(void **state) {
     (void)state;
     Shown shown;
