@@ -225,8 +225,8 @@ static void add_tile(const Soft *soft, mjvScene *scene, double x, double y, doub
     add_plate(scene, mjCAT_STATIC, heights, x, y, edge, 0, TILE_DEPTH, rgba);
 }
 
-/* [m] Depth at a corner of cells: the mean of the four that meet there; at the edge of Dents none, so
- * that it meets the tiles around it. */
+/* [m] Depth at a corner of cells: the mean of the four that meet there; at the edge of Dents none,
+ * so that it meets the tiles around it. */
 static double depth_at(const Dents *dents, int i, int j) {
     double sum = 0;
     for (int k = 0; k < 4 && 0 < i && i < NEAR && 0 < j && j < NEAR; k++) {

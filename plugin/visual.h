@@ -7,8 +7,8 @@
 /* Draws the ground, dented where it is pressed, up to 2.5 m from the feet and, where it is level,
  * as plain plates beyond: if the instance asks for it by `surface`, or it is uneven and no height
  * field of the model stands for it; not while static geoms are hidden. Otherwise flat patches show
- * on the model's own floor where the ground is pressed. Pressed ground is darker, and has the colour
- * of its material. With the viewer's contact forces, an arrow for each foot. All this while the
+ * on the model's own floor where the ground is pressed. Pressed ground is darker, and has the
+ * colour of its material. With the viewer's contact forces, an arrow for each foot. All this while the
  * scene has room. */
 void visual_add(const Soft *soft, const mjModel *m, const mjData *d, const MildGround *ground,
                 const mjvOption *option, mjvScene *scene);
