@@ -8,8 +8,8 @@
  * as plain plates beyond: if the instance asks for it by `surface`, or it is uneven and no height
  * field of the model stands for it; not while static geoms are hidden. Otherwise flat patches show
  * on the model's own floor where the ground is pressed. Pressed ground is darker, and has the
- * colour of its material. With the viewer's contact forces, an arrow for each foot. All this while the
- * scene has room. */
+ * colour of its material. With the viewer's contact forces, an arrow for each foot. All this while
+ * the scene has room. */
 void visual_add(const Soft *soft, const mjModel *m, const mjData *d, const MildGround *ground,
                 const mjvOption *option, mjvScene *scene);
 
