@@ -18,7 +18,7 @@ ARCHS ?=
 VERSION ?=
 TEST ?=
 
-.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check dds-check check export-check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check jax-check dds-check check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -43,6 +43,8 @@ help:
 	@echo "make wheel-cuda  the compiled files for GPUs as a wheel beside it, for ARCHS=90 or for all"
 	@echo "make wheel   the same in half the time: untried, for MARCH=x86-64-v3 alone unless given"
 	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/python-venv"
+	@echo "make mjlab-check   the package under mjlab, on the CPU (5 GB), in build/mjlab-venv"
+	@echo "make jax-check   the batch ground inside jax.jit, in build/jax-venv"
 	@echo "make dds-check   examples/drive: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
@@ -157,6 +159,18 @@ python-check: wheel
 	@build/python-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mild-*.whl
 	@build/python-venv/bin/python tests/python/check_learners.py
 	@build/python-venv/bin/python tests/python/check_cuda.py
+
+mjlab-check: wheel
+	@[ -x build/mjlab-venv/bin/python ] || python3 -m venv build/mjlab-venv
+	@build/mjlab-venv/bin/pip install --quiet --disable-pip-version-check --require-hashes -r scripts/mjlab.txt
+	@build/mjlab-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mild-*.whl
+	@build/mjlab-venv/bin/python -W ignore tests/python/check_mjlab.py
+
+jax-check: build
+	@cmp -s scripts/jax.txt build/jax-venv/installed || { python3 -m venv --clear build/jax-venv && \
+		build/jax-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/jax.txt && \
+		cp scripts/jax.txt build/jax-venv/installed; }
+	@PYTHONPATH=build/python build/jax-venv/bin/python -W ignore tests/python/check_jax.py
 
 # The bridges of examples/drive; DDS in a Python environment of its own.
 dds-check: build

@@ -64,7 +64,7 @@ function(mild_python_stub name module folder)
 endfunction()
 set(source ${python}/src)
 mild_python_module(_ground . ${source}/ground.cpp ${source}/material.cpp ${source}/terrain.cpp ${source}/press.cpp
-  ${source}/fit.cpp ${source}/batch.cpp)
+  ${source}/fit.cpp ${source}/batch.cpp ${source}/xla.cpp)
 mild_python_stub(_ground _ground .)
 target_link_libraries(_ground PRIVATE ${kernels} layer_identify layer_soil layer_batch)
 if(kernels)

@@ -31,6 +31,8 @@ const MildField plugin_fields[] = {
     FIELD(height, MILD_FIELD_DOUBLE, 1, -1e3, 1e3, "[m] of the surface above z = 0"),
     FIELD(prints, MILD_FIELD_INT, 1, 0, MILD_IMPRINT_TILES_MAX,
           "[-] tiles of imprints that stay, about ten a footprint; 0: the ground forgets"),
+    FIELD(surface, MILD_FIELD_INT, 1, 0, 1,
+          "[0 or 1] whether level ground is drawn too, dented, in place of a plane of the model"),
 };
 const int plugin_field_count = (int)(sizeof plugin_fields / sizeof *plugin_fields);
 

@@ -24,6 +24,7 @@ typedef struct {
     int elements;                      /* of a sole; 0: as many as fit */
     double height;                     /* [m] of the surface */
     int prints;                        /* tiles of imprints; 0: none */
+    int surface;                       /* bool: level ground is drawn too */
     MildMapDef map;                    /* terrain.* */
 } PluginDef;
 

@@ -12,3 +12,21 @@ __attribute__((constructor)) static void load(void) {
     }
     plugin_register();
 }
+
+/* For mild.ground of the Python package. */
+#define SHOWN __attribute__((visibility("default")))
+
+SHOWN int mild_plugin_print(const mjModel *m, const mjData *d, const char *name, int label,
+                            char *text, int size);
+SHOWN int mild_plugin_change(const mjModel *m, mjData *d, const char *name, int label,
+                             const char *text, char *error, int size);
+
+int mild_plugin_print(const mjModel *m, const mjData *d, const char *name, int label, char *text,
+                      int size) {
+    return plugin_ground_print(m, d, name, label, text, size);
+}
+
+int mild_plugin_change(const mjModel *m, mjData *d, const char *name, int label, const char *text,
+                       char *error, int size) {
+    return plugin_ground_change(m, d, name, label, text, error, size);
+}

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "plugin/check.h"
+#include "plugin/live.h"
 #include "plugin/plugin.h"
 #include "plugin/sensor.h"
 #include "plugin/visual.h"
@@ -141,14 +142,42 @@ static void visualize(const mjModel *m, mjData *d, const mjvOption *option, mjvS
     }
 }
 
-const Soft *plugin_soft(const mjModel *m, const mjData *d) {
+/* The ground of the instance of this name, or of the only one (NULL); NULL when there is none. */
+static Soft *find_soft(const mjModel *m, const mjData *d, const char *name) {
     for (int i = 0; i < m->nplugin; i++) {
         const mjpPlugin *plugin = mjp_getPluginAtSlot(m->plugin[i]);
-        if (plugin && strcmp(plugin->name, PLUGIN_NAME) == 0) {
+        const char *own = mj_id2name(m, mjOBJ_PLUGIN, i);
+        if (plugin && strcmp(plugin->name, PLUGIN_NAME) == 0 &&
+            (!name || (own && strcmp(own, name) == 0))) {
             return soft_of(d, i);
         }
     }
     return NULL;
+}
+
+const Soft *plugin_soft(const mjModel *m, const mjData *d) {
+    return find_soft(m, d, NULL);
+}
+
+int plugin_ground_print(const mjModel *m, const mjData *d, const char *name, int label, char *text,
+                        int size) {
+    const Soft *soft = find_soft(m, d, name);
+    return soft ? live_print(soft, label, text, size) : -1;
+}
+
+int plugin_ground_change(const mjModel *m, mjData *d, const char *name, int label, const char *text,
+                         char *error, int size) {
+    MildError said = {0};
+    Soft *soft = find_soft(m, d, name);
+    if (!soft) {
+        snprintf(error, (size_t)size, "the model has no " PLUGIN_NAME " of this name");
+        return -1;
+    }
+    if (live_change(soft, m, label, text, &said) != MILD_OK) {
+        snprintf(error, (size_t)size, "%s", said.text);
+        return -1;
+    }
+    return 0;
 }
 
 void plugin_register(void) {

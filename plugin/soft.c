@@ -18,6 +18,7 @@
 #include <string.h>
 
 #include "ground/scratch.h"
+#include "plugin/visual.h"
 
 #define JOINT_ROUNDS 30  /* solves of the ground with the constraints in its response */
 #define JOINT_TRIES 12   /* of them in the same zones */
@@ -52,6 +53,10 @@ static double foot_load(const mjModel *m, const Foot *feet, int count) {
     return mass * fabs(m->opt.gravity[2]) / count;
 }
 
+double soft_load(const Soft *soft, const mjModel *m) {
+    return foot_load(m, soft->foot, soft->feet);
+}
+
 /* The height of a map that is not level, or has a pattern, is added to `height`. */
 static MildStatus lay_map(Soft *soft, MildError *error) {
     MildMapDef *map = &soft->def.map;
@@ -61,6 +66,16 @@ static MildStatus lay_map(Soft *soft, MildError *error) {
     map->patch_count = soft->terrain.material_count;
     soft->map = mild_map_create(map, error);
     return soft->map ? mild_terrain_set_map(&soft->terrain, soft->map, error) : MILD_ERROR_ARGUMENT;
+}
+
+/* Without `ground` the numbers of ground.* are a material of its own. */
+static void choose_colours(Soft *soft, const mjModel *m, int instance) {
+    const char *text = plugin_text(m, instance, "ground") ? soft->def.ground : "";
+    char word[64];
+    for (int i = 0; i < soft->terrain.material_count; i++) {
+        visual_colour(plugin_word(&text, word, sizeof word) ? word : NULL,
+                      &soft->terrain.materials[i], soft->colour[i]);
+    }
 }
 
 static size_t ground_bytes(const Soft *soft) {
@@ -106,7 +121,7 @@ static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *er
     if (status == MILD_OK) {
         status = plugin_def_materials(m, instance, &soft->def,
                                       soft->foot[0].surface ? NULL : soft->foot[0].raster,
-                                      foot_load(m, soft->foot, soft->feet), &soft->terrain, error);
+                                      soft_load(soft, m), &soft->terrain, error);
     }
     if (status == MILD_OK) {
         status = lay_map(soft, error);
@@ -118,6 +133,7 @@ static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *er
     if (!soft->scratch || !alloc_arrays(soft, m)) {
         return mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     }
+    choose_colours(soft, m, instance);
     soft->layout = ground_layout(soft->soles, soft->feet, soft->def.prints);
     soft->fresh = 1;
     return MILD_OK;
@@ -183,6 +199,8 @@ void soft_reset(Soft *soft, void *state, size_t bytes) {
 void soft_copy(Soft *soft, const mjModel *m, const Soft *from) {
     const size_t nv = (size_t)m->nv * sizeof(double);
     const size_t rows = (size_t)from->near_rows;
+    memcpy(soft->terrain.materials, from->terrain.materials, sizeof soft->terrain.materials);
+    memcpy(soft->colour, from->colour, sizeof soft->colour);
     soft->input = from->input;
     soft->input.inverse_inertia = soft->inverse_inertia;
     memcpy(soft->inverse_inertia, from->inverse_inertia, rows * rows * sizeof(double));

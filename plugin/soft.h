@@ -18,6 +18,7 @@ typedef struct {
     const MildSole *soles[MILD_FEET_MAX];
     MildMap *map; /* NULL: level ground of one material */
     MildTerrain terrain;
+    float colour[MILD_MATERIALS_MAX][3]; /* of its materials */
     MildScratch *scratch;
     Metric metric;
     Rows rows;
@@ -56,6 +57,8 @@ void soft_destroy(Soft *soft); /* may be NULL */
 size_t soft_room(const mjModel *m, int instance);
 /* Number of its feet and bodies; 0 when it would fail. */
 int soft_feet(const mjModel *m, int instance);
+/* [N] Weight of the robot over its feet. */
+double soft_load(const Soft *soft, const mjModel *m);
 /* Initialises the state, [bytes]: a ground that remembers nothing. */
 void soft_reset(Soft *soft, void *state, size_t bytes);
 /* Takes over what a solve left in `from`, of the same model; the scratch is filled again when it is

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What contact costs in a step of mjlab's velocity task: rigid, the batch ground of examples/python/mjlab_ground.py, and none.
+"""What contact costs in a step of mjlab's velocity task: rigid, the batch ground of mild.mjlab, and none.
 
 usage: mjlab_time.py [Go1|G1] [--policy MODEL.pt] [--envs 4096] [--steps 100] [--rounds 3]
 
@@ -10,22 +10,16 @@ import argparse
 import contextlib
 import dataclasses
 import io
-import os
 import statistics
-import sys
 import time
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "examples", "python"))
+import torch
+import warp as wp
+from mjlab.envs import ManagerBasedRlEnv
+from mjlab.rl import RslRlVecEnvWrapper
+from mjlab.tasks.registry import load_env_cfg, load_rl_cfg, load_runner_cls
 
-import torch  # noqa: E402
-import warp as wp  # noqa: E402
-from mjlab.envs import ManagerBasedRlEnv  # noqa: E402
-from mjlab.rl import RslRlVecEnvWrapper  # noqa: E402
-from mjlab.tasks.registry import load_rl_cfg, load_runner_cls  # noqa: E402
-from mjlab_ground import SoftGround  # noqa: E402
-from mjlab_soft import config_of  # noqa: E402
-
-GROUNDS = ["rubber", "foam45", "grass", "sand_loose"]
+from mild.mjlab import config_of
 
 
 def clock(function, count, device):
@@ -41,8 +35,11 @@ def clock(function, count, device):
 
 class Case:
     def __init__(self, name, given):
-        self.name, self.env = name, ManagerBasedRlEnv(config_of(given.robot, given.envs, name != "rigid"), given.device)
-        self.soft = SoftGround(self.env, given.robot, GROUNDS) if name == "soft" else None
+        config = load_env_cfg(f"Mjlab-Velocity-Flat-Unitree-{given.robot}") if name == "rigid" else config_of(given.robot)
+        config.scene.num_envs = given.envs
+        if name == "none":
+            del config.events["ground"]
+        self.name, self.env = name, ManagerBasedRlEnv(config, given.device)
         if name == "none":
             wp.to_torch(self.env.sim.wp_model.opt.gravity).zero_()
         self.wrapped = RslRlVecEnvWrapper(self.env)
@@ -76,7 +73,7 @@ if __name__ == "__main__":
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--device", default="cuda:0" if torch.cuda.is_available() else "cpu")
     given = parser.parse_args()
-    task = f"Mjlab-Velocity-Flat-Unitree-{given.robot}"
+    task = f"Mjlab-Velocity-Soft-Unitree-{given.robot}"
     with contextlib.redirect_stdout(io.StringIO()):
         cases = [Case(name, given) for name in ("rigid", "soft", "none")]
     with torch.inference_mode():

@@ -1,6 +1,6 @@
 """A robot to try a client of `mild drive` with: in MuJoCo on soft ground, in a process of its own (docs/drive.md).
 
-    python simulated.py [--robot sa01|g1] [--ground NAME] [--seconds T] [--lockstep] [--log FILE.csv] -- CLIENT ARGUMENTS...
+    python simulated.py [--robot sa01|g1|go1] [--ground NAME] [--seconds T] [--lockstep] [--log FILE.csv] -- CLIENT ARGUMENTS...
 
 It starts the client, writes it a line for each state (quaternion 4, angular velocity 3, angles 12, speeds 12) and reads a line for each
 target (angles 12, kp 12, kd 12, torque limits 12; an empty one: stand). It is as a robot is: it goes on when no target comes, 400
@@ -19,7 +19,7 @@ import mild
 
 PATIENCE = 60  # [s] for the first target
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-parser.add_argument("--robot", default="sa01", help="with flat soles and 12 joints: sa01, g1")
+parser.add_argument("--robot", default="sa01", help="with 12 joints: sa01, g1, go1")
 parser.add_argument("--ground", default="sand_loose")
 parser.add_argument("--seconds", type=float, default=5)
 parser.add_argument("--lockstep", action="store_true")
@@ -32,8 +32,15 @@ ini = configparser.ConfigParser(inline_comment_prefixes=";")
 ini.read(folder / "robot.ini")
 feet = [ini[section] for section in ini.sections() if section.startswith("foot.")]
 spec = mujoco.MjSpec.from_file(str(folder / ini["robot"]["model"]))
-mild.attach(spec, [foot["body"] for foot in feet], given.ground, sole_z=float(feet[0]["z"]), elements=int(feet[0].get("elements", "0")),
-            outline=" ; ".join(" ".join(foot["outline"].split()) for foot in feet))
+if feet[0]["shape"] == "round":
+    for foot in feet:
+        spec.body(foot["body"]).add_geom(name="ball_" + foot["body"], size=[float(foot["radius"]), 0, 0], mass=0, contype=0, conaffinity=0,
+                                         pos=[float(word) for word in foot["center"].split()])
+    soles = {"sole": " ".join("ball_" + foot["body"] for foot in feet)}
+else:
+    soles = {"sole_z": float(feet[0]["z"]), "elements": int(feet[0].get("elements", "0")),
+             "outline": " ; ".join(" ".join(foot["outline"].split()) for foot in feet)}
+mild.attach(spec, [foot["body"] for foot in feet], given.ground, **soles)
 if not spec.actuators:
     for name in ini["joints"]["names"].split():
         spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT).set_to_motor()

@@ -133,27 +133,27 @@ def command(state, target, held, answers):
     return made
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("host")
-    parser.add_argument("port", type=int)
-    parser.add_argument("--interface", default="lo", help="network interface of the robot, such as eth0")
-    parser.add_argument("--lockstep", action="store_true", help="for a simulated robot whose time stands still until each state is answered")
-    given = parser.parse_args()
+def numbers_of(state):
+    imu, motors = state.imu_state, state.motor_state[:LEGS]
+    return [*imu.quaternion, *imu.gyroscope, *(m.q for m in motors), *(m.dq for m in motors)]
+
+
+def bridge(given, joints, kinds, crc, numbers_of, command):
+    """Runs between the messages `kinds` (of states, of commands) and the runner, until one of them ends. crc: of a state. numbers_of: what the
+    runner wants of a state. command: see above."""
     participant = connect(given.interface, 0)
-    states = DataReader(participant, Topic(participant, "rt/lowstate", LowState))
-    commands = DataWriter(participant, Topic(participant, "rt/lowcmd", LowCmd))
-    client, heard, sent, refused = Client(given.host, given.port, JOINTS), time.monotonic() + FIRST - SILENT, 0, 0
+    states = DataReader(participant, Topic(participant, "rt/lowstate", kinds[0]))
+    commands = DataWriter(participant, Topic(participant, "rt/lowcmd", kinds[1]))
+    client, heard, sent, refused = Client(given.host, given.port, joints), time.monotonic() + FIRST - SILENT, 0, 0
     state = held = numbers = None
     while client.mode != END and time.monotonic() - heard < SILENT:
         new = came(states)
-        good = [sample for sample in new if sample.crc == state_crc(sample)]
+        good = [sample for sample in new if sample.crc == crc(sample)]
         refused += len(new) - len(good)
         if good:
             heard, state = time.monotonic(), good[-1]
-            imu, motors = state.imu_state, state.motor_state
-            held = held or [motor.q for motor in motors]
-            numbers = [*imu.quaternion, *imu.gyroscope, *(m.q for m in motors[:LEGS]), *(m.dq for m in motors[:LEGS])]
+            held = held or [motor.q for motor in state.motor_state]
+            numbers = numbers_of(state)
             client.send(numbers)
         else:
             time.sleep(0.0005)
@@ -166,8 +166,17 @@ def main():
         if numbers:
             client.send(numbers, END)
     print(f"unitree: {client.sequence} states, {refused} with a wrong CRC", file=sys.stderr)
-    sys.exit(0 if client.runner and not refused else 2)
+    return 0 if client.runner and not refused else 2
+
+
+def arguments(said):
+    parser = argparse.ArgumentParser(description=said, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("host")
+    parser.add_argument("port", type=int)
+    parser.add_argument("--interface", default="lo", help="network interface of the robot, such as eth0")
+    parser.add_argument("--lockstep", action="store_true", help="for a simulated robot whose time stands still until each state is answered")
+    return parser.parse_args()
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(bridge(arguments(__doc__), JOINTS, (LowState, LowCmd), state_crc, numbers_of, command))

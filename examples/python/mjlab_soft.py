@@ -1,38 +1,29 @@
-"""Soft ground under mjlab's own velocity tasks of Go1 and G1: trains them by mjlab's runner, and walks at the end.
+"""mjlab's velocity tasks of Go1 and G1 on soft ground (mild.mjlab): trains them by mjlab's runner for some minutes, and walks on other grounds.
 python mjlab_soft.py [Go1|G1] --grounds foam45,sand_loose --envs 4096 --minutes 4; --stand 6 needs no training."""
 import argparse
 import dataclasses
 import time
 
-import mjlab.tasks  # noqa: F401 (fills the registry)
 import numpy as np
 import torch
 import warp as wp
 from mjlab.envs import ManagerBasedRlEnv
 from mjlab.rl import RslRlVecEnvWrapper
-from mjlab.tasks.registry import load_env_cfg, load_rl_cfg, load_runner_cls
-from mjlab_ground import FEET, SoftGround
+from mjlab.tasks.registry import load_rl_cfg, load_runner_cls
+
+from mild.mjlab import ROBOTS, config_of
 
 
-def config_of(robot, envs, soft=True, play=False):
-    """mjlab's task on flat ground. Feet and calves, which sink, leave the floor's collisions (its bit is 1), and keep the robot's own."""
-    config = load_env_cfg(f"Mjlab-Velocity-Flat-Unitree-{robot}", play=play)
-    config.scene.num_envs = envs
-    if soft:
-        parts, low = config.scene.entities["robot"], r".*_(foot|calf|shin)\d*_collision\d*"
-        parts.collisions = tuple(dataclasses.replace(c, contype={low: 2, ".*": 1}, conaffinity={low: 2, ".*": 3}) for c in parts.collisions)
-    return config
-
-
-def stand(env, soft, ground, seconds):
+def stand(env, ground, seconds):
     """Lets the robot's weight come slowly, in the default pose, and compares the sinkage with that of its share on a sole. Joints are
     stiffer than mjlab's and a damper slows the trunk, because without a policy the robot tips over."""
     env.reset()
+    soft = env.soft_ground
     action = torch.zeros(env.num_envs, env.action_manager.total_action_dim, device=env.device)
     position, gravity = wp.to_torch(soft.d.qpos), wp.to_torch(soft.m.opt.gravity)
     wp.to_torch(soft.m.actuator_gainprm).mul_(5), wp.to_torch(soft.m.actuator_biasprm).mul_(5)
     wp.to_torch(soft.m.dof_damping)[..., :6] = 1000  # [N s/m, N m s/rad]
-    feet = wp.to_torch(soft.d.site_xpos)[:, [env.sim.mj_model.site(f"robot/{name}").id for name in FEET[soft.robot]], 2]
+    feet = wp.to_torch(soft.d.site_xpos)[:, soft.sites, 2]
     position[:, 2] -= feet.amin(1) - (soft.radius if soft.round else 0)
     for step in range(steps := round(seconds / env.step_dt)):
         gravity[..., 2] = -9.81 * min(1, 2 * step / steps)
@@ -45,13 +36,12 @@ def stand(env, soft, ground, seconds):
 
 def walk(robot, policy, grounds, speed, device, seconds=10):
     """Ten robots on each ground, with another seed and without noise or pushes, are told to walk straight ahead."""
-    config, twist = config_of(robot, 10 * len(grounds), play=True), {"heading": None, "lin_vel_y": (0, 0), "ang_vel_z": (0, 0)}
-    command, config.seed = config.commands["twist"], 2
+    config, twist = config_of(robot, play=True, grounds=grounds), {"heading": None, "lin_vel_y": (0, 0), "ang_vel_z": (0, 0)}
+    command, config.seed, config.scene.num_envs = config.commands["twist"], 2, 10 * len(grounds)
     command.ranges = dataclasses.replace(command.ranges, lin_vel_x=(speed, speed), **twist)
     command.heading_command, command.rel_standing_envs, command.rel_heading_envs, command.rel_forward_envs = False, 0, 0, 0
     command.resampling_time_range = (1e9, 1e9)
     env = ManagerBasedRlEnv(config, device)
-    soft = SoftGround(env, robot, grounds)
     wrapped, fallen, speeds = RslRlVecEnvWrapper(env), 0, []
     with torch.inference_mode():
         for step in range(round(seconds / env.step_dt)):
@@ -60,14 +50,14 @@ def walk(robot, policy, grounds, speed, device, seconds=10):
             speeds.append(env.scene["robot"].data.root_link_lin_vel_b[:, 0].clone())
     mean = torch.stack(speeds[len(speeds) // 5 :]).mean(0)
     for index, ground in enumerate(grounds):
-        here = soft.material == index
+        here = env.soft_ground.material == index
         good = here & ~fallen & (mean > speed / 2)
         print(f"{ground:>12s} {speed:.2f} m/s: {int(good.sum())} of {int(here.sum())} walk, at {mean[here].mean():.3f} m/s", flush=True)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("robot", nargs="?", default="Go1", choices=FEET)
+    parser.add_argument("robot", nargs="?", default="Go1", choices=ROBOTS)
     parser.add_argument("--grounds", default="rubber,foam45,grass,sand_loose", type=lambda text: text.split(","))
     parser.add_argument("--test", default="foam60,foam45,sand_dense,sand_loose", type=lambda text: text.split(","), help="walked on")
     parser.add_argument("--speed", type=float, default=0.6)
@@ -78,13 +68,13 @@ if __name__ == "__main__":
     parser.add_argument("--stand", type=float, default=0, help="seconds")
     parser.add_argument("--device", default="cuda:0" if torch.cuda.is_available() else "cpu")
     given = parser.parse_args()
-    config, task = config_of(given.robot, given.envs), f"Mjlab-Velocity-Flat-Unitree-{given.robot}"
+    config, task = config_of(given.robot, grounds=given.grounds), f"Mjlab-Velocity-Soft-Unitree-{given.robot}"
+    config.scene.num_envs = given.envs
     if given.stand:
         config.events.pop("push_robot"), config.events.pop("base_com"), config.terminations.clear()
     env = ManagerBasedRlEnv(config, given.device)
-    soft = SoftGround(env, given.robot, given.grounds)
     if given.stand:
-        stand(env, soft, given.grounds[0], given.stand)
+        stand(env, given.grounds[0], given.stand)
         raise SystemExit
     agent = dataclasses.asdict(load_rl_cfg(task)) | {"logger": "tensorboard", "save_interval": 10**6}
     runner = load_runner_cls(task)(RslRlVecEnvWrapper(env), agent, given.log, given.device)

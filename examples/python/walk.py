@@ -1,7 +1,7 @@
-"""The shipped policy walks on soft ground in MuJoCo. python walk.py [GROUND] [--view]
+"""The shipped policy walks on soft ground in MuJoCo. python walk.py [GROUND] [--view] [--picture FILE.png]
 
 The robot is an MJCF, the ground comes by mild.attach, the policy is policy.py: nothing here is special to mild's program.
---view opens MuJoCo's viewer (`pip install glfw`)."""
+--view opens MuJoCo's viewer (`pip install glfw`), --picture writes how it looks at the end (`pip install pillow pyopengl`)."""
 import contextlib
 import pathlib
 import sys
@@ -19,8 +19,9 @@ KD = np.array([5, 5, 7, 7, 0.2, 0.2] * 2)  # [N m s/rad]
 LIMIT = 0.85 * np.array([140, 140, 140, 140, 24, 24] * 2)  # [N m]
 SECONDS, COMMAND = 8, [0.6, 0, 0]  # forward, to the left [m/s], turning left [rad/s]
 
-view = "--view" in sys.argv
-ground = next((word for word in sys.argv[1:] if word != "--view"), "sand_loose")
+words = sys.argv[1:]
+view, picture = "--view" in words, words[words.index("--picture") + 1] if "--picture" in words else None
+ground = next((word for word in words if word not in ("--view", "--picture", picture)), "sand_loose")
 
 spec = mujoco.MjSpec.from_file(str(ROOT / "robots/sa01/sa01.xml"))
 mild.attach(spec, ["leg_l6_link", "leg_r6_link"], ground, prints=256)
@@ -49,3 +50,11 @@ with window as viewer:
             viewer.sync()
             time.sleep(max(0, start + data.time - time.monotonic()))
 print(f"{ground}: {data.qpos[0]:.2f} m in {data.time:.1f} s, {'upright' if data.qpos[2] > 0.6 else 'fallen'}")
+if picture:
+    from PIL import Image
+    model.vis.global_.offwidth, model.vis.global_.offheight = 1920, 1080
+    camera = mujoco.MjvCamera()
+    camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = [data.qpos[0] - 0.3, data.qpos[1], 0.35], 2.3, 140, -18
+    renderer = mujoco.Renderer(model, 1080, 1920, max_geom=10000)
+    renderer.update_scene(data, camera)
+    Image.fromarray(renderer.render()).resize((960, 540), Image.LANCZOS).quantize(128).save(picture)

@@ -8,10 +8,11 @@ __path__.insert(0, str(_processor.folder()))  # the compiled files for this proc
 
 from ._ground import Batch, Ground, Map, Material, Press, Sole, Terrain, __version__, models, presets, press
 from .fit import GroundFit, loading
+from .live import RunningGround, ground
 from .spec import attach, load_plugin
 from .trials import layouts, trial
 
-__all__ = ["Batch", "Ground", "GroundFit", "Map", "Material", "Press", "Sole", "Terrain", "attach", "layouts", "load_plugin",
+__all__ = ["Batch", "Ground", "GroundFit", "Map", "Material", "Press", "RunningGround", "Sole", "Terrain", "attach", "ground", "layouts", "load_plugin",
            "loading", "models", "presets", "press", "trial"]
 
 try:

@@ -6,7 +6,7 @@ import re
 import numpy as np
 
 from .describe import by_joint, choose
-from .spec import MOST, attach
+from .spec import MOST, attach, floors
 
 SOLE = 0.01  # [m] shapes within this of the lowest point of a foot are its sole, as in the plugin
 COLORS = {"sandy_loam": (0.55, 0.43, 0.30), "sand": (0.80, 0.68, 0.48), "dry_sand": (0.80, 0.68, 0.48), "grass": (0.42, 0.55, 0.30),
@@ -163,7 +163,7 @@ def stand(model, description, ground, attributes, painted=False):
     if ground != "rigid":
         _unpair(spec, feet.names + feet.bodies)
         _undress(spec, feet.bodies)
-        attach(spec, feet.names, ground, body=feet.bodies, sensor="feet_of_trial", name="ground_of_trial",
+        attach(spec, feet.names, ground, body=feet.bodies, surface=False, sensor="feet_of_trial", name="ground_of_trial",
                **{"sole": " ".join(feet.soles), **attributes})
     compiled = spec.compile()
     drive, gear = _drives(compiled, [names[j] for j in order])
@@ -442,13 +442,13 @@ def area(outline):
 
 
 def _unpair(spec, names):
-    """Deletes pairs of geoms of these bodies with the world: exclusions do not hold for pairs."""
+    """Deletes pairs of geoms of these bodies with floors: exclusions do not hold for pairs."""
     bodies = {(spec.body(name) or spec.site(name).parent).name for name in names}
     owner = {geom.name: geom.parent.name for geom in spec.geoms if geom.name}
-    world = spec.worldbody.name
+    grounds = floors(spec)
     for pair in list(spec.pairs):
         ends = {owner.get(pair.geomname1), owner.get(pair.geomname2)}
-        if world in ends and ends & bodies:
+        if ends & grounds and ends & bodies:
             spec.delete(pair)
 
 

@@ -10,13 +10,14 @@ PLUGIN, FILE = "mild.ground", "libmild_plugin.so"
 MOST = 16  # feet and bodies, MILD_FEET_MAX
 
 
-def attach(spec, feet=(), ground="sand_loose", *, body=(), exclude=True, sensor=None, name="ground", library=None, **attributes):
+def attach(spec, feet=(), ground="sand_loose", *, body=(), exclude=True, surface=True, sensor=None, name="ground", library=None, **attributes):
     """Puts soft ground under the feet of a mujoco.MjSpec, before spec.compile(); returns the plugin's instance.
 
     feet: names of bodies or sites, z up from the sole. body: names of other bodies, such as shins, a trunk or wheels, whose
     shapes meet the ground on any side; with the feet 1 .. 16. ground: a preset, a soil's file (docs/soil.md), a
-    Material, or a list of presets and files where terrain__patches is given. exclude: feet and bodies no longer touch geoms of the world body, such as a rigid floor; all
-    else touches them as before. sensor: name of a sensor to add, whose data are (feet + bodies, 12) numbers, a row for each
+    Material, or a list of presets and files where terrain__patches is given. exclude: feet and bodies no longer touch geoms of the world body, such as a rigid floor, nor those of a
+    body fixed in it that has a plane or a height field; all else touches them as before. surface: the
+    ground is drawn in its own colour, dented, and planes of the floor are not seen; they are touched as before. sensor: name of a sensor to add, whose data are (feet + bodies, 12) numbers, a row for each
     foot and then for each body: force, torque, centre of pressure, area, largest and mean depth (docs/plugin.md).
     attributes: those of the plugin with __ for the dot: prints=64, ground__mu=0.5, terrain__kind="waves". library: the
     plugin's file; None: $MILD_PLUGIN, or the package's own. Raises TypeError for what is no MjSpec, ValueError for feet and
@@ -42,6 +43,8 @@ def attach(spec, feet=(), ground="sand_loose", *, body=(), exclude=True, sensor=
             raise ValueError(f"{'feet' if k < len(feet) else 'body'}: '{names[bodies.index(one)]}' and '{names[k]}' are on one body, "
                              f"'{one.name}', which would stand on the ground twice; name it once")
     config = {**({"feet": " ".join(feet)} if feet else {}), **({"body": " ".join(body)} if body else {}), **ground_of(ground)}
+    if surface:
+        config["surface"] = "1"
     config.update((key.replace("__", "."), text_of(value)) for key, value in attributes.items())
     load_plugin(library)
     spec.activate_plugin(PLUGIN)
@@ -49,6 +52,8 @@ def attach(spec, feet=(), ground="sand_loose", *, body=(), exclude=True, sensor=
     plugin.config = config
     if exclude:
         exclude_world(spec, names)
+    if surface:
+        hide_planes(spec)
     if sensor:
         listener = spec.add_sensor(name=sensor, type=mujoco.mjtSensor.mjSENS_PLUGIN).plugin
         listener.active, listener.name, listener.plugin_name = True, name, PLUGIN
@@ -65,19 +70,43 @@ def names_of(given, key):
     return names
 
 
+def floors(spec):
+    """Names of the bodies that are ground: the world's, and those fixed in it that have a plane or a height field."""
+    import mujoco
+
+    flat, names, bodies = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD), {spec.worldbody.name}, list(spec.worldbody.bodies)
+    while bodies:
+        body = bodies.pop()
+        if not body.joints and not body.mocap:
+            bodies += list(body.bodies)
+            names |= {body.name} if body.name and any(geom.type in flat for geom in body.geoms) else set()
+    return names
+
+
+def hide_planes(spec):
+    """Planes of the ground are not drawn; uneven ground has height fields, which hide nothing."""
+    import mujoco
+
+    for body in [spec.worldbody, *(spec.body(name) for name in floors(spec) - {spec.worldbody.name})]:
+        for geom in body.geoms:
+            if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
+                geom.rgba, geom.material = [0.5, 0.5, 0.5, 0], ""
+
+
 def exclude_world(spec, names):
-    """Excludes the contacts of feet and bodies with the world body. A body without a name cannot be excluded."""
+    """Excludes the contacts of feet and bodies with the world body and other floors. A body without a name cannot be excluded."""
     bodies = {(spec.body(name) or spec.site(name).parent).name for name in names}
-    known = {frozenset((pair.bodyname1, pair.bodyname2)) for pair in spec.excludes}
-    for body in sorted(bodies - {"", spec.worldbody.name}):
-        if frozenset((body, spec.worldbody.name)) not in known:
-            spec.add_exclude(bodyname1=spec.worldbody.name, bodyname2=body)
+    known, grounds = {frozenset((pair.bodyname1, pair.bodyname2)) for pair in spec.excludes}, floors(spec)
+    for body in sorted(bodies - {""} - grounds):
+        for ground in sorted(grounds):
+            if frozenset((body, ground)) not in known:
+                spec.add_exclude(bodyname1=ground, bodyname2=body)
 
 
 def load_plugin(library=None):
     """Loads the engine plugin, for models whose XML names it: `library`, else $MILD_PLUGIN, else the package's own for the
     MuJoCo that is imported. A process that has it may do so again. Raises RuntimeError when there is no such file, or when it
-    is for another MuJoCo."""
+    is for another MuJoCo. Returns the file."""
     import mujoco
 
     named = library or os.environ.get("MILD_PLUGIN")
@@ -88,6 +117,7 @@ def load_plugin(library=None):
         mujoco.mj_loadPluginLibrary(str(path.resolve()))
     except Exception as error:
         raise RuntimeError(f"library: {path} does not go with MuJoCo {mujoco.mj_versionString()}: {error}") from None
+    return path.resolve()
 
 
 def ground_of(ground):

@@ -1,27 +1,12 @@
 /* mild.Batch: the ground under many robots (include/mild/batch.h), on the CPU or a CUDA device. */
-#include "ground.h"
+#include "batch.h"
 
 #include <cstring>
 
-#include "mild/batch.h"
-
-struct Batch {
-    MildBatch *batch = nullptr;
-    int robots = 0;
-    int feet = 0;
-    int device = ON_CPU;
-    int materials = 1;
-    int labels = 1;
-    bool has_map = false;
-    std::vector<int> elements; /* of each sole */
-    std::atomic<bool> busy{false};
-
-    Batch() = default;
-    Batch(const Batch &) = delete;
-    ~Batch() {
-        mild_batch_destroy(batch);
-    }
-};
+Batch::~Batch() {
+    xla_forget(*this);
+    mild_batch_destroy(batch);
+}
 
 static MildBatch *open_batch(const Batch &batch) {
     if (!batch.batch) {

@@ -401,4 +401,5 @@ NB_MODULE(_ground, module) {
     bind_press(module);
     bind_fit(module);
     bind_batch(module);
+    bind_xla(module);
 }

@@ -72,5 +72,6 @@ void bind_ground(nb::module_ &module);
 void bind_press(nb::module_ &module);
 void bind_fit(nb::module_ &module);
 void bind_batch(nb::module_ &module);
+void bind_xla(nb::module_ &module);
 
 #endif

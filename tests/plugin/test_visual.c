@@ -1,4 +1,5 @@
-/* Uneven ground in the scene: tiles that lie on the surface, beside each other, around the feet. */
+/* The ground in the scene: tiles that lie on the surface, beside each other, around the feet, and
+ * follow what is pressed. */
 #include <math.h>
 
 #include "plugin_kit.h"
@@ -131,10 +132,126 @@ static void surface_is_left_out(void **state) {
     hide(&shown);
 }
 
+/* The plate of `show` falls; [m] how deep it then stands in the ground. */
+static double press(Shown *shown) {
+    kit_run(shown->m, shown->d, 2);
+    return 0.01 - shown->d->qpos[2];
+}
+
+static int is_colour(const mjvGeom *geom, float r, float g, float b) {
+    const float least = 0.5f, most = 1.01f; /* checks and depth darken it */
+    const float share = geom->rgba[0] / r;
+    return share > least && share < most && fabsf(geom->rgba[1] - share * g) < 1e-3f &&
+           fabsf(geom->rgba[2] - share * b) < 1e-3f;
+}
+
+/* Level ground that is asked for: closed up to the horizon, under the plate as deep as the plate,
+ * in the colour of the soil, and without patches. */
+static void level_ground_is_dented(void **state) {
+    (void)state;
+    Shown shown;
+    double floor = 0, area = 0, whole = 0, middle[2] = {0, 0};
+    int inside = 0, plates = 0, others = 0;
+    show(&shown, CONFIG("surface", "1"), "", "", 3.1, -7.4);
+    assert_int_equal(count_tiles(&shown), TILES + 4);
+    const double depth = press(&shown);
+    assert_true(depth > 0.003);
+    update(&shown);
+    for (int i = 0; i < shown.scene.ngeom; i++) {
+        const mjvGeom *g = &shown.scene.geoms[i];
+        if (!is_tile(g)) {
+            others++;
+            continue;
+        }
+        assert_true(is_colour(g, 0.70F, 0.58F, 0.40F));
+        const double top = (double)(g->pos[2] + g->mat[8] * g->size[2]);
+        const double x = (double)g->pos[0] - shown.d->qpos[0];
+        const double y = (double)g->pos[1] - shown.d->qpos[1];
+        const double size = 4 * (double)(g->size[0] * g->size[1] * g->mat[8]);
+        plates++;
+        whole += size;
+        middle[0] += size * x;
+        middle[1] += size * y;
+        assert_true(top < 1e-6 && top > -1.02 * depth); /* sand springs back a little */
+        if (fabs(x) < 0.07 && fabs(y) < 0.02) {         /* away from the walls */
+            inside++;
+            area += size;
+            floor += size * top;
+        } else if (fabs(x) > 0.15 || fabs(y) > 0.1) {
+            assert_true(top > -1e-6);
+        }
+    }
+    print_message("a plate %.2f mm deep: the ground under it %.2f mm, %d plates, %d more\n",
+                  1e3 * depth, -1e3 * floor / area, inside, plates - TILES - 4);
+    assert_true(inside >= 12);
+    assert_true(fabs(-floor / area - depth) < 0.02 * depth);
+    assert_true(plates > TILES + 4 + 60);
+    assert_true(fabs(whole - 100.0 * 100.0) < 1);
+    assert_true(fabs(middle[0] / whole) < 0.17 && fabs(middle[1] / whole) < 0.17);
+    assert_int_equal(others, 1); /* the plate itself: no patches */
+
+    char error[300] = ""; /* another ground has another colour */
+    assert_int_equal(plugin_ground_change(shown.m, shown.d, NULL, 0, "name=rubber\nk_pen=900",
+                                          error, sizeof error),
+                     0);
+    update(&shown);
+    for (int i = 0; i < shown.scene.ngeom; i++) {
+        const mjvGeom *g = &shown.scene.geoms[i];
+        assert_true(!is_tile(g) || is_colour(g, 0.35F, 0.35F, 0.38F));
+    }
+    hide(&shown);
+
+    show(&shown, "", "", "", 0, 0); /* on a floor of the model: patches on it */
+    press(&shown);
+    update(&shown);
+    assert_true(shown.scene.ngeom > 30);
+    for (int i = 0; i < shown.scene.ngeom; i++) {
+        const mjvGeom *g = &shown.scene.geoms[i];
+        assert_true(g->category != mjCAT_STATIC);
+        assert_true(g->category != mjCAT_DECOR || (double)(g->pos[2] + g->size[2]) > 0);
+    }
+    hide(&shown);
+}
+
+/* Each label of a pattern has its colour. */
+static void patterns_have_colours(void **state) {
+    (void)state;
+    Shown shown;
+    int sand = 0, grass = 0;
+    char head[1500], text[3000];
+    kit_head(head, sizeof head, 0.002, "Euler", "plate", "sand_loose grass",
+             CONFIG("surface", "1") CONFIG("terrain.patches", "stripes"));
+    snprintf(text, sizeof text,
+             "%s<worldbody><body name='plate' pos='0 0 0.3'><freejoint/><geom type='box' "
+             "size='.1 .05 .01' mass='3' contype='0' conaffinity='0'/></body></worldbody></mujoco>",
+             head);
+    shown.m = kit_model(text);
+    shown.d = mj_makeData(shown.m);
+    mj_forward(shown.m, shown.d);
+    mjv_defaultScene(&shown.scene);
+    mjv_defaultOption(&shown.option);
+    mjv_makeScene(shown.m, &shown.scene, 4000);
+    update(&shown);
+    for (int i = 0; i < shown.scene.ngeom; i++) {
+        const mjvGeom *g = &shown.scene.geoms[i];
+        if (is_tile(g)) {
+            const int label = mild_terrain_material_at(&plugin_soft(shown.m, shown.d)->terrain,
+                                                       (double)g->pos[0], (double)g->pos[1]);
+            assert_true(label ? is_colour(g, 0.36F, 0.52F, 0.26F)
+                              : is_colour(g, 0.70F, 0.58F, 0.40F));
+            *(label ? &grass : &sand) += 1;
+        }
+    }
+    assert_true(sand > 500 && grass > 500);
+    hide(&shown);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(tiles_lie_on_the_surface),
         cmocka_unit_test(surface_is_left_out),
+        cmocka_unit_test(level_ground_is_dented),
+        cmocka_unit_test(patterns_have_colours),
     };
     return cmocka_run_group_tests(tests, kit_setup, NULL);
 }

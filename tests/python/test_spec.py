@@ -1,4 +1,5 @@
 """mild.attach: soft ground under an MjSpec. With MILD_PLUGIN, a file, also with the engine plugin."""
+import copy
 import os
 import pathlib
 import re
@@ -156,6 +157,58 @@ class Attach(unittest.TestCase):
             self.assertAlmostEqual(data.sensor("felt").data.reshape(1, 12)[0, 2], 98.1, delta=0.5)
             depths.append(0.01 - data.qpos[2])
         self.assertAlmostEqual(depths[1], depths[0], delta=0.005 * depths[0])
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_floor_of_its_own(self):
+        """A floor may be a body in the world, as mjlab has it; a box that is fixed there is no floor, and is touched as before."""
+        solid = PLATE.replace('contype="0" conaffinity="0"', "").replace(
+            "<worldbody>", '<worldbody><body name="scene"><body name="terrain"><geom type="plane" size="1 1 1"/></body>'
+            '<body name="curb" pos="9 0 0"><geom type="box" size="1 1 1"/></body></body>')
+        spec = mujoco.MjSpec.from_string(solid)
+        mild.attach(spec, "plate", "foam45")
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 1500)
+        self.assertEqual((model.nexclude, data.ncon), (2, 0))
+        depth = 0.01 - data.qpos[2]
+        self.assertAlmostEqual(depth, fall(mild.Material("foam45")), delta=0.01 * depth)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_running_ground(self):
+        """mild.ground changes the ground: at the start of a run, a plate falls as on a ground that was so in the model."""
+        models = {}
+        for name in ("rubber", "sand_loose"):
+            spec = mujoco.MjSpec.from_string(PLATE)
+            mild.attach(spec, ["plate"], name)
+            models[name] = spec.compile()
+        model, other = models["rubber"], models["sand_loose"]
+        data, wanted = mujoco.MjData(model), mujoco.MjData(other)
+        ground = mild.ground(model, data)
+        self.assertEqual(ground.material().as_dict(), mild.Material("rubber").as_dict())
+        ground.set("sand_loose")
+        mujoco.mj_step(model, data, 500)
+        mujoco.mj_step(other, wanted, 500)
+        np.testing.assert_array_equal(data.qpos, wanted.qpos)
+        ground.set(mu=0.2)
+        self.assertEqual(ground.material().as_dict(), mild.Material("sand_loose", mu=0.2).as_dict())
+        ground.set(mild.Material("grass"), mu=0.3)
+        self.assertEqual(ground.material().as_dict(), mild.Material("grass", mu=0.3).as_dict())
+        self.assertEqual(mild.ground(model, copy.copy(data), "ground").material().as_dict(), mild.Material("grass", mu=0.3).as_dict())
+        before = ground.material().as_dict()
+        for wrong, error in (({"ground": "mud"}, ValueError), ({"mu": -1}, ValueError), ({"my": 1}, TypeError), ({"label": 1, "mu": 0.1}, ValueError),
+                             ({"ground": "rigid"}, ValueError), ({"ground": mild.Material("dry_sand")}, ValueError)):
+            with self.assertRaises(error, msg=str(wrong)):
+                ground.set(**wrong)
+        self.assertEqual(ground.material().as_dict(), before)
+        with self.assertRaisesRegex(ValueError, "no mild.ground 'other'"):
+            mild.ground(model, data, "other")
+        with self.assertRaisesRegex(ValueError, "not one of this model"):
+            mild.ground(other, data)
+        with self.assertRaisesRegex(TypeError, "mujoco.MjModel"):
+            mild.ground(data, model)
+        bare = mujoco.MjModel.from_xml_string("<mujoco/>")
+        with self.assertRaisesRegex(ValueError, "no mild.ground"):
+            mild.ground(bare, mujoco.MjData(bare))
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_exclude_once(self):

@@ -1,4 +1,4 @@
-"""What mild.Batch needs of a step of MuJoCo Warp, as kernels over all worlds; mjlab_ground.py launches them. With J of the feet (rows:
+"""What mild.Batch needs of a step of MuJoCo Warp, as kernels over all worlds; _mjlab_ground.py launches them. With J of the feet (rows:
 linear, angular velocity of each; a round foot transmits no moment and has no angular rows),
 the integrator's metric N = M - h dF/dv and the force f = passive - bias + actuator:
 

@@ -1,4 +1,6 @@
-"""mild.Batch as the ground of an environment of mjlab; mjlab_soft.py uses it."""
+"""mild.Batch as the ground of an environment of mjlab (mild.mjlab)."""
+import re
+
 import mujoco
 import mujoco_warp as mjw
 import numpy as np
@@ -6,26 +8,30 @@ import torch
 import warp as wp
 from mjlab.sensor.contact_sensor import ContactData
 from mjlab.sim.sim import _suspend_gc
-from mjlab_kernels import add_limits, apply, approach, contact_kernel
+from mujoco import mjtGeom
 from scipy.spatial import ConvexHull
 
-import mild
-
-FEET = {"Go1": ("FR", "FL", "RR", "RL"), "G1": ("left_foot", "right_foot")}  # sites, in the order of mjlab's sensor
+from . import Batch, Sole
+from ._mjlab_kernels import add_limits, apply, approach, contact_kernel
 
 
 class SoftGround:
     """The ground under `env`, on its device. It acts once in each physics step, where MuJoCo Warp calls its control callback, when M and
     the bias forces exist: mjlab_kernels.py. On a GPU the callback runs while mjlab's graph of a step is captured, and is part of it."""
 
-    def __init__(self, env, robot, grounds):
-        self.env, self.robot, self.sim, model, n = env, robot, env.sim, env.sim.mj_model, env.num_envs
-        self.m, self.d, self.round, self.on = self.sim.wp_model, self.sim.wp_data, robot == "Go1", False
-        body = [int(model.site_bodyid[model.site(f"robot/{name}").id]) for name in FEET[robot]]
-        geoms = [[g for g in range(model.ngeom) if model.geom_bodyid[g] == b and "_foot" in model.geom(g).name] for b in body]
+    def __init__(self, env, grounds, feet, soles, entity="robot", sensor="feet_ground_contact"):
+        """feet: names of sites, in the order of `sensor`. soles: a regular expression of the geoms that they stand on; a foot has
+        one sphere, or capsules."""
+        self.env, self.sim, model, n = env, env.sim, env.sim.mj_model, env.num_envs
+        self.m, self.d, self.on = self.sim.wp_model, self.sim.wp_data, False
+        self.sites = [site_of(model, f"{entity}/{name}") for name in feet]
+        body = [int(model.site_bodyid[site]) for site in self.sites]
+        geoms = [[g for g in range(model.ngeom) if model.geom_bodyid[g] == b
+                  and re.fullmatch(soles, model.geom(g).name.removeprefix(f"{entity}/"))] for b in body]
+        self.round = is_round(model, feet, geoms, soles)
         self.radius = float(model.geom_size[geoms[0][0], 0])
         self.soles = [sole_of(model, g, self.radius, self.round) for g in geoms]
-        self.batch = mild.Batch(n, self.soles, model.opt.timestep, device=str(env.device), points=self.round)
+        self.batch = Batch(n, self.soles, model.opt.timestep, device=str(env.device), points=self.round)
         self.batch.set_materials(grounds)
         self.material = (torch.arange(n, device=env.device) % len(grounds)).int()
         feet, dofs, rows, self.size = len(body), model.nv, 6 * len(body), 3 if self.round else 6
@@ -51,7 +57,8 @@ class SoftGround:
                        wp.to_torch(self.mobility), wp.to_torch(self.free).view(n, feet, 6)]
         self.m.callback.control, self.step, self.reset, self.capture = self.act, self.sim.step, self.sim.reset, self.sim.create_graph
         self.sim.step, self.sim.reset, self.sim.create_graph = self.step_with, self.reset_with, self.capture_with
-        env.scene["feet_ground_contact"]._extract_sensor_data = self.sense
+        if sensor is not None:
+            env.scene[sensor]._extract_sensor_data = self.sense
         self.step_with(captured=False)  # compiles the kernels
         self.reset_with()
         self.capture_with()
@@ -102,15 +109,35 @@ class SoftGround:
         return ContactData(found=(self.shape[..., 5] > 0).float(), force=-self.wrench[..., :3])
 
 
+def site_of(model, name):
+    try:
+        return model.site(name).id
+    except KeyError:
+        raise ValueError(f"feet: the model has no site '{name}'") from None
+
+
+def is_round(model, feet, geoms, soles):
+    """Whether each foot has one sphere (True) or capsules (False) of one radius."""
+    for name, mine in zip(feet, geoms):
+        if not mine:
+            raise ValueError(f"soles: no geom on the body of '{name}' is named '{soles}'")
+    kinds = {(int(model.geom_type[g]), len(mine) == 1) for mine in geoms for g in mine}
+    if kinds == {(int(mjtGeom.mjGEOM_SPHERE), True)}:
+        return True
+    if {kind for kind, _ in kinds} != {int(mjtGeom.mjGEOM_CAPSULE)} or len({float(model.geom_size[g, 0]) for mine in geoms for g in mine}) > 1:
+        raise ValueError("soles: each foot must have one sphere, or capsules of one radius")
+    return False
+
+
 def sole_of(model, geoms, radius, is_round):
     """Of a sphere, a disc; of capsules, the hull of their ends, in the frame of the body."""
     around = np.arange(32) * np.pi / 16
     circle = radius * np.stack([np.cos(around), np.sin(around)], 1)
     if is_round:
-        return mild.Sole(circle)
+        return Sole(circle)
     axis = np.zeros((len(geoms), 3))
     for i, g in enumerate(geoms):
         mujoco.mju_rotVecQuat(axis[i], np.array([0, 0, model.geom_size[g, 1]]), model.geom_quat[g])
     ends = np.concatenate([model.geom_pos[geoms] + axis, model.geom_pos[geoms] - axis])
     points = (ends[:, None, :2] + circle).reshape(-1, 2)
-    return mild.Sole(points[ConvexHull(points).vertices], sole_z=float(ends[:, 2].min() - radius))
+    return Sole(points[ConvexHull(points).vertices], sole_z=float(ends[:, 2].min() - radius))

@@ -1,0 +1,115 @@
+"""mjlab's velocity tasks on soft ground: `train Mjlab-Velocity-Soft-Unitree-Go1`, after `pip install mild[mjlab]` (docs/python.md).
+
+mjlab imports this module by itself. Robots of one environment stand on GROUNDS in turn; other grounds are a parameter of the event:
+--env.events.ground.params.grounds "('foam45', 'sand_loose')". A task of your own becomes soft by `soften`. What was trained is judged by `mild trial`,
+which wants the robot and a description of what the policy sees and does: python -m mild.mjlab Mjlab-Velocity-Soft-Unitree-Go1 --out go1"""
+import argparse
+import dataclasses
+import pathlib
+import shutil
+
+from mjlab.managers.event_manager import EventTermCfg
+from mjlab.scene import Scene
+from mjlab.tasks.registry import list_tasks, load_env_cfg, register_mjlab_task
+from mjlab.tasks.velocity.config.g1.env_cfgs import unitree_g1_flat_env_cfg
+from mjlab.tasks.velocity.config.g1.rl_cfg import unitree_g1_ppo_runner_cfg
+from mjlab.tasks.velocity.config.go1.env_cfgs import unitree_go1_flat_env_cfg
+from mjlab.tasks.velocity.config.go1.rl_cfg import unitree_go1_ppo_runner_cfg
+from mjlab.tasks.velocity.rl import VelocityOnPolicyRunner
+
+from ._mjlab_ground import SoftGround
+
+GROUNDS = ("rubber", "foam45", "grass", "sand_loose")
+LOW = r".*_(foot|calf|shin)\d*_collision\d*"  # what sinks in and so must not touch mjlab's floor
+ROBOTS = {"Go1": (unitree_go1_flat_env_cfg, unitree_go1_ppo_runner_cfg, ("FR", "FL", "RR", "RL")),
+          "G1": (unitree_g1_flat_env_cfg, unitree_g1_ppo_runner_cfg, ("left_foot", "right_foot"))}
+
+
+def ground(env, env_ids, **keys):
+    """The event: puts a SoftGround under the environment, once, as `env.soft_ground`."""
+    if hasattr(env, "soft_ground"):
+        raise RuntimeError("ground: the environment has soft ground already; the event's mode must be 'startup'")
+    env.soft_ground = SoftGround(env, **keys)
+
+
+def soften(config, feet, grounds=GROUNDS, soles=r".*_foot\d*_collision", low=LOW, entity="robot", sensor="feet_ground_contact"):
+    """Puts soft ground into a ManagerBasedRlEnvCfg on level ground, and returns it.
+
+    feet: sites of the feet, in the order of `sensor`, mjlab's sensor of their contacts, which then has the ground's forces (None: no
+    sensor). grounds: presets or files of soils; the robots take them in turn. soles: regular expression of the geoms on which a foot
+    stands, one sphere or capsules. low: of all geoms that leave the floor's collisions (its bit is 1) and keep the robot's own."""
+    parts = config.scene.entities[entity]
+    parts.collisions = tuple(dataclasses.replace(c, contype={low: 2, ".*": 1}, conaffinity={low: 2, ".*": 3}) for c in parts.collisions)
+    config.events["ground"] = EventTermCfg(func=ground, mode="startup", params={
+        "grounds": tuple(grounds), "feet": tuple(feet), "soles": soles, "entity": entity, "sensor": sensor})
+    return config
+
+
+def config_of(robot, play=False, grounds=GROUNDS):
+    """mjlab's task of "Go1" or "G1" on level ground, softened."""
+    make, _, feet = ROBOTS[robot]
+    return soften(make(play=play), feet, grounds)
+
+
+# mjlab's terms of the actor, and ours (mild trial --keys).
+TERMS = {"base_lin_vel": "linear_velocity", "base_ang_vel": "angular_velocity", "projected_gravity": "gravity", "joint_pos": "joint_position",
+         "joint_vel": "joint_velocity", "actions": "action", "command": "command"}
+
+
+def describe(config, frame):
+    """The text of a description for mild.trial (docs/public-policies.md) of what a policy of this velocity task sees and does.
+    frame: the site of its inertial sensors."""
+    terms, action = config.observations["actor"].terms, config.actions["joint_pos"]
+    for name, term in terms.items():
+        if name not in TERMS:
+            raise ValueError(f"describe: the actor's term '{name}' is none of {', '.join(TERMS)}")
+        if term.history_length or not isinstance(term.scale, (type(None), int, float)):
+            raise ValueError(f"describe: the actor's term '{name}' has a history, or a scale that is not one number")
+    scale = action.scale if isinstance(action.scale, dict) else {".*": action.scale}
+    lines = ["[policy]", "layout = mjlab", f"frame = {frame}", f"step = {config.sim.mujoco.timestep:g}", f"decimation = {config.decimation}",
+             "[observation]", *(f"{TERMS[name]} = {1 if term.scale is None else term.scale:g}" for name, term in terms.items()),
+             "[actuator]", "kind = model", "[scale]", *(f"robot/{name} = {value:.9g}" for name, value in scale.items()),
+             "[default]", ".* = 0", *(f"robot/{name} = {value:.9g}" for name, value in config.scene.entities["robot"].init_state.joint_pos.items())]
+    return "\n".join(lines) + "\n"
+
+
+def export(task, folder):
+    """Writes scene.xml, with the meshes that it needs, and policy.ini of a task into a new folder."""
+    folder = pathlib.Path(folder)
+    if folder.exists():
+        raise ValueError(f"{folder} exists; name another folder")
+    robot = task.rpartition("-")[2]  # the floor of mild.trial is touched by all that touches mjlab's rigid one
+    config = ROBOTS[robot][0]() if task == f"Mjlab-Velocity-Soft-Unitree-{robot}" and robot in ROBOTS else load_env_cfg(task)
+    scene = Scene(config.scene, device="cpu")
+    text = describe(config, scene.spec.sensor("robot/imu_ang_vel").objname)
+    scene.write(folder)
+    robot = scene.entities["robot"].spec  # mjlab 1.6 leaves out the meshes of robots that it reads from files
+    for mesh in robot.meshes:
+        source, target = pathlib.Path(robot.modelfiledir, robot.meshdir, mesh.file), folder / "assets" / mesh.file
+        if source.is_file() and not target.exists():
+            target.parent.mkdir(exist_ok=True)
+            shutil.copyfile(source, target)
+    (folder / "policy.ini").write_text(f"; {task} of mjlab\n{text}")
+
+
+def main():
+    import mjlab.tasks  # noqa: F401 (fills the registry)
+
+    parser = argparse.ArgumentParser(prog="python -m mild.mjlab", description="Writes scene.xml and policy.ini of a velocity task of mjlab, for mild trial.")
+    parser.add_argument("task", choices=list_tasks(), metavar="TASK")
+    parser.add_argument("--out", required=True, help="a new folder")
+    given = parser.parse_args()
+    try:
+        export(given.task, given.out)
+    except ValueError as error:
+        parser.error(str(error))
+    print(f"mild trial {given.out}/scene.xml POLICY.onnx --describe {given.out}/policy.ini")
+
+
+for _robot, (_, _agent, _) in ROBOTS.items() if __name__ != "__main__" else ():
+    register_mjlab_task(task_id=f"Mjlab-Velocity-Soft-Unitree-{_robot}", env_cfg=config_of(_robot), play_env_cfg=config_of(_robot, play=True),
+                        rl_cfg=_agent(), runner_cls=VelocityOnPolicyRunner)
+
+if __name__ == "__main__":
+    from mild import mjlab as _named  # the registered module, not this second copy of it
+    _named.main()

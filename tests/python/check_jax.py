@@ -1,0 +1,161 @@
+"""mild.jax beside mild.Batch; needs jax. On the CPU, and on a GPU where both JAX and this build have one. `make jax-check` runs it."""
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import jax
+import jax.numpy as jnp
+import jaxlib
+import numpy as np
+
+import mild
+import mild.jax
+
+N, DT = 6, 0.005
+SOLE = mild.Sole.plate(0.2, 0.1)
+PLACES = {"cpu": "cpu", "gpu": "cuda"}
+MASS = 5.0
+A = np.diag([1 / MASS] * 3 + [1 / 0.02] * 3).astype(np.float32)
+
+
+def made():
+    batch = mild.Batch(N, [SOLE], DT, device=PLACES[jax.default_backend()])
+    batch.set_materials(["sand_loose", "foam45"])
+    return batch
+
+
+def state():
+    """Plates above and in the ground, moving."""
+    position = np.zeros((N, 1, 3), np.float32)
+    position[:, 0, 2] = np.linspace(-0.02, 0.01, N)
+    velocity = np.zeros((N, 1, 6), np.float32)
+    velocity[:, 0, 2], velocity[:, 0, 0] = -0.2, np.linspace(0, 0.3, N)
+    return position, velocity
+
+
+ROTATION = np.tile(np.eye(3, dtype=np.float32), (N, 1, 1, 1))
+MATERIAL = (np.arange(N) % 2).astype(np.int32)
+
+
+def fall(position, velocity, contact):
+    """A step of bodies that do not turn, by `contact` (position, velocity, free velocity) -> new velocity."""
+    free = velocity.at[..., 2].add(-9.81 * DT) if hasattr(velocity, "at") else velocity - np.array([0, 0, 9.81 * DT, 0, 0, 0], np.float32)
+    new = contact(position, velocity, free)
+    return position + DT * new[..., :3], new
+
+
+class Jit(unittest.TestCase):
+    def test_walk_of_steps(self):
+        """200 steps in one compiled scan are those of Batch.step."""
+        batch, other = made(), mild.Batch(N, [SOLE], DT, device="cpu")
+        other.set_materials(["sand_loose", "foam45"])
+        inertia = np.tile(A, (N, 1, 1))
+
+        def one(carry, _):
+            def contact(position, velocity, free):
+                return mild.jax.step(batch, position, ROTATION, velocity, inertia, free, material=MATERIAL)[1]
+            after = fall(*carry, contact)
+            return after, after[0]
+
+        position, velocity = state()
+        run = jax.jit(lambda p, v: jax.lax.scan(one, (p, v), None, length=200))
+        seen = np.array(run(jnp.asarray(position), jnp.asarray(velocity))[1])
+        wrench, new = np.empty((N, 1, 6), np.float32), np.empty((N, 1, 6), np.float32)
+
+        def contact(position, velocity, free):
+            other.step(position, ROTATION, velocity, inertia, free, wrench=wrench, new_velocity=new, material=MATERIAL)
+            return new.copy()
+
+        for step in range(200):
+            position, velocity = fall(position, velocity, contact)
+            np.testing.assert_allclose(seen[step], position, atol=2e-6)
+        self.assertTrue((seen[-1, :, 0, 2] < 0).all())
+        self.assertFalse(np.allclose(seen[-1, 0], seen[-1, 1], atol=1e-4))
+
+    def test_outputs(self):
+        """Wrench, new velocity and foot of a step, with heights; without `advance` nothing is remembered; `begin` forgets."""
+        batch, other = made(), mild.Batch(N, [SOLE], DT, device="cpu")
+        other.set_materials(["sand_loose", "foam45"])
+        position, velocity = state()
+        inertia, height = np.tile(A, (N, 1, 1)), np.linspace(0, 0.01, N).astype(np.float32)
+        out = [np.empty((N, 1, 6), np.float32) for _ in range(3)]
+
+        def both(advance, begin=None):
+            if begin is not None:
+                other.reset(begin)
+            other.step(position, ROTATION, velocity, inertia, velocity, wrench=out[0], new_velocity=out[1], foot=out[2], material=MATERIAL, height=height,
+                       advance=advance)
+            seen = jax.jit(lambda p: mild.jax.step(batch, p, ROTATION, velocity, inertia, velocity, material=MATERIAL, height=height, begin=begin,
+                                                   advance=advance))(position)
+            for ours, theirs in zip(out, seen):
+                np.testing.assert_allclose(np.array(theirs), ours, rtol=1e-4, atol=1e-4 * np.abs(ours).max())
+            return out[0].copy()
+
+        first = both(False)
+        np.testing.assert_array_equal(both(False), first)
+        both(True)
+        position[..., 2] += 0.004
+        lifted = both(False)
+        some = np.arange(N) < 3
+        fresh = both(False, some)
+        self.assertTrue((np.abs(fresh[some] - lifted[some]).max(axis=(1, 2)) > 1).any())
+        np.testing.assert_array_equal(fresh[~some], lifted[~some])
+
+    def test_misuse(self):
+        batch = made()
+        position, velocity = state()
+        inertia = np.tile(A, (N, 1, 1))
+
+        def step(position=position, inertia=inertia, **keys):
+            return [np.array(x) for x in mild.jax.step(batch, position, ROTATION, velocity, inertia, velocity, **keys)]
+
+        for wrong, said in (({"position": position[:3]}, "position"), ({"inertia": inertia[:, :3]}, "inverse_inertia"),
+                            ({"height": np.zeros(2)}, "height"), ({"begin": np.zeros(2, bool)}, "begin")):
+            with self.assertRaisesRegex(Exception, f"mild: {said} is not what this batch takes"):
+                step(**wrong)
+        if jax.default_backend() == "cpu":
+            with self.assertRaisesRegex(Exception, "material: 2 is outside 0 .. 1"):
+                step(material=MATERIAL + 1)
+        step()
+        batch.close()
+        with self.assertRaisesRegex(Exception, "the batch is closed"):
+            step()
+
+
+class Interface(unittest.TestCase):
+    @unittest.skipUnless(shutil.which("g++"), "there is no g++")
+    def test_layout(self):
+        """python/src/xla_abi.h has every member where jaxlib's header has it."""
+        header = pathlib.Path(jaxlib.__file__).parent / "include"
+        ours = pathlib.Path(__file__).resolve().parents[2] / "python/src"
+        pairs = {"Extension": ("XLA_FFI_Extension_Base", {"size": "struct_size", "type": "type", "next": "next"}),
+                 "Version": ("XLA_FFI_Api_Version", {"major": "major_version", "minor": "minor_version"}),
+                 "Metadata": ("XLA_FFI_Metadata", {"version": "api_version", "traits": "traits"}),
+                 "MetadataExtension": ("XLA_FFI_Metadata_Extension", {"metadata": "metadata"}),
+                 "ErrorArgs": ("XLA_FFI_Error_Create_Args", {"message": "message", "code": "errc"}),
+                 "StreamArgs": ("XLA_FFI_Stream_Get_Args", {"context": "ctx", "stream": "stream"}),
+                 "Buffer": ("XLA_FFI_Buffer", {"type": "dtype", "data": "data", "rank": "rank", "dims": "dims"}),
+                 "Span": ("XLA_FFI_ByteSpan", {"text": "ptr", "length": "len"}),
+                 "Scalar": ("XLA_FFI_Scalar", {"type": "dtype", "value": "value"}),
+                 "List": ("XLA_FFI_Args", {"count": "size", "types": "types", "items": "args"}),
+                 "Attributes": ("XLA_FFI_Attrs", {"count": "size", "types": "types", "names": "names", "values": "attrs"}),
+                 "Api": ("XLA_FFI_Api", {"make_error": "XLA_FFI_Error_Create", "get_stream": "XLA_FFI_Stream_Get"}),
+                 "Frame": ("XLA_FFI_CallFrame", {"api": "api", "context": "ctx", "stage": "stage", "arguments": "args", "results": "rets",
+                                                 "attributes": "attrs"})}
+        lines = ['#include "xla/ffi/api/c_api.h"', '#include "xla_abi.h"']
+        for mine, (theirs, members) in pairs.items():
+            lines += [f"static_assert(offsetof(xla_abi::{mine}, {a}) == offsetof({theirs}, {b}));" for a, b in members.items()]
+        for name, value in (("PRED", "DataType_PRED"), ("S32", "DataType_S32"), ("S64", "DataType_S64"), ("F32", "DataType_F32"),
+                            ("STAGE_EXECUTE", "ExecutionStage_EXECUTE"), ("EXTENSION_METADATA", "Extension_Metadata"), ("MAJOR", "API_MAJOR"),
+                            ("INVALID_ARGUMENT", "Error_Code_INVALID_ARGUMENT")):
+            lines.append(f"static_assert((int)xla_abi::{name} == (int)XLA_FFI_{value});")
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder, "layout.cpp")
+            file.write_text("\n".join(lines) + "\n")
+            subprocess.run(["g++", "-std=c++17", "-fsyntax-only", "-Wno-invalid-offsetof", f"-I{header}", f"-I{ours}", file], check=True)
+
+
+if __name__ == "__main__":
+    unittest.main()

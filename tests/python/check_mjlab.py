@@ -1,0 +1,128 @@
+"""mild.mjlab beside mjlab itself, on the CPU; needs PyTorch and mjlab. `make mjlab-check` runs it, in some minutes: Warp compiles its kernels."""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+os.environ["CUDA_VISIBLE_DEVICES"] = ""
+os.environ["MJLAB_WARP_QUIET"] = "1"
+import mjlab.tasks  # noqa: E402, F401 (fills the registry)
+import mujoco  # noqa: E402
+import numpy as np  # noqa: E402
+import torch  # noqa: E402
+from mjlab.envs import ManagerBasedRlEnv  # noqa: E402
+from mjlab.tasks.registry import list_tasks, load_env_cfg  # noqa: E402
+
+import mild  # noqa: E402
+import mild.mjlab as ours  # noqa: E402
+from mild.describe import Description, Observer, State  # noqa: E402
+
+
+def standing(robot, grounds, steps, change=lambda config: None):
+    """An environment of two robots that nothing pushes, after some steps without an action."""
+    config = load_env_cfg(f"Mjlab-Velocity-Soft-Unitree-{robot}", play=True)
+    config.scene.num_envs, config.seed = 2, 1
+    config.events["ground"].params["grounds"] = grounds
+    change(config)
+    env = ManagerBasedRlEnv(config, "cpu")
+    env.reset()
+    action = torch.zeros(2, env.action_manager.total_action_dim)
+    for _ in range(steps):
+        env.step(action)
+    return env
+
+
+class Tasks(unittest.TestCase):
+    def test_registered(self):
+        """By the entry point of the package: nothing but mjlab was imported in that process."""
+        for robot in ("Go1", "G1"):
+            self.assertIn(f"Mjlab-Velocity-Soft-Unitree-{robot}", list_tasks())
+        said = subprocess.run([sys.executable, "-c", "import mjlab.tasks.registry as r, mjlab.tasks; print(*r.list_tasks())"], capture_output=True, text=True,
+                              cwd=tempfile.gettempdir(), check=True).stdout
+        self.assertIn("Mjlab-Velocity-Soft-Unitree-Go1", said)
+
+    def test_in_turn(self):
+        """Each robot has its own ground, mjlab's sensor of contacts has the ground's forces, and a reset forgets them."""
+        env = standing("Go1", ["foam45", "sand_loose"], 15)
+        soft = env.soft_ground
+        self.assertEqual(soft.material.tolist(), [0, 1])
+        self.assertTrue((soft.wrench[..., 2].sum(1) > 20).all())
+        self.assertGreater(soft.shape[1, :, 4].mean(), 1.1 * soft.shape[0, :, 4].mean())
+        sensed = env.scene["feet_ground_contact"].data
+        torch.testing.assert_close(sensed.force, -soft.wrench[..., :3])
+        env.reset()
+        self.assertEqual(float(soft.wrench.abs().max()), 0)
+        env.close()
+
+    def test_stand(self):
+        """A robot that stands sinks as deep as its weight, on round feet and on soles of capsules."""
+        example = pathlib.Path(__file__).parents[2] / "examples/python/mjlab_soft.py"
+        for robot, depth in (("Go1", 61.0), ("G1", 33.6)):
+            said = subprocess.run([sys.executable, example, robot, "--stand", "6", "--envs", "1", "--grounds", "sand_loose"], capture_output=True, text=True,
+                                  check=True).stdout.splitlines()[-1]
+            carried, load, sunk, wanted = (float(number) for number in re.match(
+                r"feet carry ([\d.]+) N of ([\d.]+); mean sinkage ([\d.]+) mm, of these loads ([\d.]+) mm", said).groups())
+            self.assertAlmostEqual(carried, load, delta=0.02 * load)
+            self.assertAlmostEqual(sunk, wanted, delta=0.02 * wanted)
+            self.assertAlmostEqual(sunk, depth, delta=1)
+            print(robot, said)
+
+    def test_wrong(self):
+        def feet(config):
+            config.events["ground"].params["feet"] = ("FR", "nose")
+
+        def soles(config):
+            config.events["ground"].params["soles"] = "sole"
+
+        def other(config):
+            config.events["ground"].params["soles"] = ".*calf_collision.*|.*_foot_collision"
+
+        for change, said in ((feet, "feet: the model has no site 'robot/nose'"), (soles, "soles: no geom on the body of 'FR' is named 'sole'"),
+                             (other, "one sphere, or capsules")):
+            with self.assertRaisesRegex(ValueError, said):
+                standing("Go1", ["rubber"], 0, change)
+        with self.assertRaisesRegex(ValueError, "mud"):
+            standing("Go1", ["mud"], 0)
+
+
+class Export(unittest.TestCase):
+    def test_observation(self):
+        """In mjlab's own state mild.trial makes mjlab's own observation, of both robots."""
+        for robot, site in (("Go1", "robot/imu"), ("G1", "robot/imu_in_pelvis")):
+            with tempfile.TemporaryDirectory() as folder:
+                subprocess.run([sys.executable, "-m", "mild.mjlab", f"Mjlab-Velocity-Soft-Unitree-{robot}", "--out", folder + "/o"], check=True, capture_output=True)
+                again = subprocess.run([sys.executable, "-m", "mild.mjlab", f"Mjlab-Velocity-Soft-Unitree-{robot}", "--out", folder + "/o"],
+                                       capture_output=True, text=True, check=False)
+                self.assertEqual((again.returncode, f"{folder}/o exists" in again.stderr), (2, True))
+                description = Description(pathlib.Path(folder, "o/policy.ini"))
+                model = mujoco.MjModel.from_xml_path(folder + "/o/scene.xml")
+            config = load_env_cfg(f"Mjlab-Velocity-Flat-Unitree-{robot}", play=True)
+            config.scene.num_envs, config.seed = 1, 3
+            env = ManagerBasedRlEnv(config, "cpu")
+            env.reset()
+            action = 0.3 * torch.sin(torch.arange(float(env.action_manager.total_action_dim)))[None]
+            for _ in range(5):
+                seen = env.step(action)[0]["actor"][0].numpy()
+            data, names = mujoco.MjData(model), [model.joint(j).name for j in range(1, model.njnt)]
+            data.qpos[:], data.qvel[:] = env.sim.data.qpos[0].numpy(), env.sim.data.qvel[0].numpy()
+            bias = env.scene["robot"].data.encoder_bias[0].numpy() if hasattr(env.scene["robot"].data, "encoder_bias") else 0
+            state = State(description, model, data, (mujoco.mjtObj.mjOBJ_SITE, model.site(site).id), (np.arange(7, model.nq), np.arange(6, model.nv)))
+            state.read(lambda amplitude, count: np.zeros(count))
+            state.joint_position = state.joint_position + bias
+            state.default = np.zeros(len(names))
+            for pattern, value in description.default:
+                state.default[[bool(pattern.fullmatch(name)) for name in names]] = value
+            state.command, state.action = env.command_manager.get_command("twist")[0].numpy(), action[0].numpy()
+            np.testing.assert_allclose(Observer(description, len(names), len(names)).observe(state), seen, atol=2e-4)
+            scale = np.zeros(len(names))
+            for pattern, value in description.scale:
+                scale[[bool(pattern.fullmatch(name)) for name in names]] = value
+            np.testing.assert_allclose(scale, env.action_manager.get_term("joint_pos")._scale[0].numpy() * np.ones(len(names)), rtol=1e-6)
+            env.close()
+
+
+if __name__ == "__main__":
+    unittest.main()
