@@ -87,12 +87,14 @@ static int answer_as(const char *how) {
         if (strcmp(how, "slow") == 0) {
             wait_for(0.05);
         }
-        fwrite(answer, 1, 1, stdout);
-        fflush(stdout);
-        if (strcmp(how, "pieces") == 0) {
-            wait_for(0.002);
+        const size_t cut[] = {0, 1, sizeof answer - 1, sizeof answer};
+        for (int piece = 0; piece < 3; piece++) {
+            fwrite((char *)answer + cut[piece], cut[piece + 1] - cut[piece], 1, stdout);
+            if (strcmp(how, "pieces") == 0) {
+                fflush(stdout);
+                wait_for(0.002);
+            }
         }
-        fwrite((char *)answer + 1, sizeof answer - 1, 1, stdout);
         fflush(stdout);
     }
     if (strcmp(how, "slow") == 0) {
