@@ -296,7 +296,7 @@ static void a_child_has_its_own_ends_only(void **state) {
     assert_int_equal(descriptors(), before);
 }
 
-/* When the third cannot be started the first two end, and a child of somebody else is left alone. */
+/* When the third cannot be started the first two end; a child of somebody else is left alone. */
 static void a_start_that_fails_ends_the_others(void **state) {
     (void)state;
     MildError error = {0};
