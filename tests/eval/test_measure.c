@@ -1,5 +1,4 @@
-/* Evaluation's measures on a walk whose numbers are worked out by hand: no simulator, a script of
- * forces, torques and positions. */
+/* Evaluation's measures on a scripted walk, without simulator, with numbers worked out by hand. */
 #include "kit.h"
 #include "run/eval/eval.h"
 #include "sa01.h"
@@ -276,6 +275,7 @@ static void stances_are_kept(void **state) {
                 (39 * forward + m->kept[0].way[0]) / 40, 1e-12);
     expect_near("and across it", row.drift_left, (39 * left - m->kept[0].way[1]) / 40, 1e-12);
     fclose(csv);
+    assert_memory_equal(text, "foam45,0.5,0,1,0.0000,", 22);
     assert_non_null(strstr(text, "foam45,0.5,0,1,0.2930,0.1953,0.012000,0.004550,0.002072,0.050000,"
                                  "0.20000,-0.10000,7.000\n"));
     expect_near("way of the sole", row.drift_path,
