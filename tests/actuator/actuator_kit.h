@@ -24,10 +24,4 @@ static inline int kit_teardown(void **state) {
     return 0;
 }
 
-static inline void expect(const char *what, double got, double wanted, double tolerance) {
-    if (!(fabs(got - wanted) <= tolerance)) {
-        fail_msg("%s: %.9g instead of %.9g", what, got, wanted);
-    }
-}
-
 #endif

@@ -101,8 +101,8 @@ static void torque_is_the_network(void **state) {
             speed[t] = random_uniform(&r, -8, 8);
         }
         const int joint = i % SA01_JOINTS;
-        expect("torque", actuator_torque(actuator, joint, error, speed),
-               wanted_torque(joint, error, speed), 2e-4);
+        expect_near("torque", actuator_torque(actuator, joint, error, speed),
+                    wanted_torque(joint, error, speed), 2e-4);
     }
     actuator_destroy(actuator);
 }
@@ -129,7 +129,7 @@ static void gradient_of_softsign(void **state) {
     }
     const float *out = mlp_forward(&mlp, weights[0], ROWS, x[0], INPUTS, &outputs);
     for (int b = 0; b < ROWS; b++) {
-        expect("forward", (double)out[b], formula(weights[0], at[b]), 1e-5);
+        expect_near("forward", (double)out[b], formula(weights[0], at[b]), 1e-5);
     }
     mlp_backward(&mlp, weights[0], ROWS, x[0], INPUTS, &outputs, slope, areas, gradient, 0, none);
     for (int i = 0; i < NUMBERS; i++) {
@@ -177,7 +177,7 @@ static void history_in_the_task(void **state) {
                 e[t] = errors[then][i];
                 v[t] = speeds[then][i];
             }
-            expect("torque", torque[i], wanted_torque(i, e, v), 2e-4);
+            expect_near("torque", torque[i], wanted_torque(i, e, v), 2e-4);
         }
     }
     for (int i = 0; i < 64; i++) {
@@ -275,7 +275,7 @@ static void made_up_motor(void **state) {
         error[JOINT] = steps[k].error;
         speed[JOINT] = steps[k].speed;
         motor.motors.torque(motor.motors.self, memory, error, speed, torque);
-        expect("motor", torque[JOINT], steps[k].torque, 1e-9);
+        expect_near("motor", torque[JOINT], steps[k].torque, 1e-9);
         assert_true(torque[0] == 0);
     }
     free(memory);

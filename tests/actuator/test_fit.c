@@ -37,8 +37,8 @@ static void log_is_read(void **state) {
                      MILD_OK);
     assert_int_equal(record.files, 2);
     assert_int_equal(record.rows, 6);
-    expect("interval", record.file[0].interval, 0.01, 1e-12); /* of 10, 20 and 10 ms */
-    expect("interval", record.file[1].interval, 0.002, 1e-12);
+    expect_near("interval", record.file[0].interval, 0.01, 1e-12); /* of 10, 20 and 10 ms */
+    expect_near("interval", record.file[1].interval, 0.002, 1e-12);
     assert_int_equal(record.file[1].first, 4);
     assert_int_equal(record.file[1].rows, 2);
     for (int i = 0; i < SA01_JOINTS; i++) {
@@ -107,7 +107,7 @@ static void log_is_written(void **state) {
     }
     fclose(csv);
     assert_int_equal(read_text(&record, text, &failure), MILD_OK);
-    expect("interval", record.file[0].interval, 0.0025, 1e-9);
+    expect_near("interval", record.file[0].interval, 0.0025, 1e-9);
     for (int i = 0; i < SA01_JOINTS; i++) {
         const RecordJoint *joint = &record.joint[SA01_JOINTS + i];
         assert_true(record.file[0].logged[i] && joint->error == (float)(0.01 * i));
@@ -192,11 +192,11 @@ static void log_of_a_pd(void **state) {
     actuator_destroy(fit(&def, &record, 1, score));
     for (int k = 0; k < KINDS; k++) {
         assert_int_equal(score[k].joint, 2 * k);
-        expect("kp", score[k].kp, k == 2 ? 11 : robot_kp(robot)[2 * k], 1e-4);
-        expect("kd", score[k].kd, k == 2 ? 0.7 : robot_kd(robot)[2 * k], 1e-5);
-        expect("linear", score[k].linear, 0, 1e-5);
+        expect_near("kp", score[k].kp, k == 2 ? 11 : robot_kp(robot)[2 * k], 1e-4);
+        expect_near("kd", score[k].kd, k == 2 ? 0.7 : robot_kd(robot)[2 * k], 1e-5);
+        expect_near("linear", score[k].linear, 0, 1e-5);
         if (k < 2) {
-            expect("ideal", score[k].ideal, 0, 1e-5);
+            expect_near("ideal", score[k].ideal, 0, 1e-5);
         } else {
             assert_true(score[k].ideal > 1);
         }
@@ -259,7 +259,7 @@ static void held_out_is_not_seen(void **state) {
         if (sscanf(line, "leg_l1_joint,%lf,%lf,%lf,%lf,%lf", &time, &measured, &predicted[0],
                    &predicted[1], &predicted[2]) == 5) {
             const int row = (int)lround(time / INTERVAL);
-            expect("measured", measured, (double)record.joint[row * SA01_JOINTS].torque, 1e-4);
+            expect_near("measured", measured, (double)record.joint[row * SA01_JOINTS].torque, 1e-4);
             held[row / 200] = 1;
         }
     }

@@ -520,14 +520,21 @@ static void files_are_of_the_row(void **state) {
     fclose(run.eval.track);
     for (int file = 0; file < 2; file++) {
         int lines[2] = {0, 0};
+        double x[2] = {0, 0};
         char *rest;
         for (char *line = strtok_r(text[file], "\n", &rest); line;
              line = strtok_r(NULL, "\n", &rest)) {
             assert_memory_equal(line, "grass,0.3,", 10);
-            lines[atoi(line + 10)]++;
+            const int trial = atoi(line + 10);
+            for (int comma = 0; file && comma < 7; comma++) {
+                line = strchr(line, ',') + 1;
+            }
+            lines[trial]++;
+            x[trial] = atof(line); /* base_x_m */
         }
         for (int i = 0; i < 2; i++) { /* a line for each foot */
             expect_near("lines", lines[i], (file ? 1 : 2) * each[i].seconds / TASK_PERIOD, 1e-9);
+            assert_true(!file || fabs(each[i].x - x[i]) < 6e-6);
         }
         free(text[file]);
     }

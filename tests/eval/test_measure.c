@@ -1,5 +1,4 @@
-/* Evaluation's measures on a walk whose numbers are worked out by hand: no simulator, a script of
- * forces, torques and positions. */
+/* Evaluation's measures on a scripted walk, without simulator, with numbers worked out by hand. */
 #include "kit.h"
 #include "run/eval/eval.h"
 #include "sa01.h"
@@ -7,12 +6,6 @@
 /* A power of two: sums of it are exact, so the script meets every threshold where it should. */
 #define DT (1.0 / 1024)
 #define STEPS(seconds) ((int)((seconds)*1024))
-
-static void assert_close(const char *what, double ours, double expected, double tolerance) {
-    if (!(fabs(ours - expected) <= tolerance)) {
-        fail_msg("%s: %.12g, by hand %.12g", what, ours, expected);
-    }
-}
 
 /* One step; the feet stand still under 100 N unless set. Behind the robot's feet stands what must
  * not count. */
@@ -66,55 +59,48 @@ static void shells_share_the_load(void **state) {
     Measure m;
     script_start(&s);
     measure_start(&m, DT);
-    assert_close("no step", measure_shells(&m), 0, 0);
+    expect_near("no step", measure_shells(&m), 0, 0);
     for (int k = 1; k <= STEPS(2); k++) {
         s.sample.shell_load = k > STEPS(1) ? 50 : 0;
         measure_sample(&m, &s.sample);
     }
-    assert_close("share of the shells", measure_shells(&m), 50.0 / 450, 1e-12);
+    expect_near("share of the shells", measure_shells(&m), 50.0 / 450, 1e-12);
     measure_start(&m, DT); /* a trial that ended at once: 201 N for a millisecond */
     s.sample.shell_load = 1;
     measure_sample(&m, &s.sample);
-    assert_close("share of a step", measure_shells(&m), 1.0 / 201, 1e-12);
+    expect_near("share of a step", measure_shells(&m), 1.0 / 201, 1e-12);
 }
 
 static void power_and_speed(void **state) {
     (void)state;
     Measure m = script_walk(0);
-    assert_close("time", m.time, 5, 0);
-    assert_close("steady time", m.steady_time, 3, 0);
-    assert_close("energy", m.energy, 8 * 5, 1e-9);
-    assert_close("work", m.work, 32 * 3, 1e-9);
-    assert_close("greatest torque", m.torque_max, 45, 0);
-    assert_close("torque of the last step", m.torque, 10, 0);
-    assert_close("start of the steady part", m.start[0], -0.5, 1e-12);
-    assert_close("end of the steady part", m.end[0], 1.0, 1e-12);
-    assert_close("start of the steady part, y", m.start[1], 3.0, 1e-12);
-    assert_close("end of the steady part, y", m.end[1], 3.3, 1e-12);
-    assert_close("lowest base", m.base_low, 0.79, 0);
-    assert_close("highest base", m.base_high, 0.82, 0);
+    expect_near("time", m.time, 5, 0);
+    expect_near("steady time", m.steady_time, 3, 0);
+    expect_near("energy", m.energy, 8 * 5, 1e-9);
+    expect_near("work", m.work, 32 * 3, 1e-9);
+    expect_near("greatest torque", m.torque_max, 45, 0);
+    expect_near("torque of the last step", m.torque, 10, 0);
+    expect_near("start of the steady part", m.start[0], -0.5, 1e-12);
+    expect_near("end of the steady part", m.end[0], 1.0, 1e-12);
+    expect_near("start of the steady part, y", m.start[1], 3.0, 1e-12);
+    expect_near("end of the steady part, y", m.end[1], 3.3, 1e-12);
+    expect_near("lowest base", m.base_low, 0.79, 0);
+    expect_near("highest base", m.base_high, 0.82, 0);
     m = script_walk(4);
-    assert_close("time", m.time, 5, 0);
-    assert_close("steady time", m.steady_time, 2, 0);
-    assert_close("energy", m.energy, 8 * 5, 1e-9);
-    assert_close("work", m.work, 32 * 2, 1e-9);
-    assert_close("end of the steady part", m.end[0], 0.5, 1e-12);
-}
-
-/* Joints that hold still with half a newton metre. */
-static void small_torques_are_measured(void **state) {
-    (void)state;
-    Script s;
-    Measure m;
+    expect_near("time", m.time, 5, 0);
+    expect_near("steady time", m.steady_time, 2, 0);
+    expect_near("energy", m.energy, 8 * 5, 1e-9);
+    expect_near("work", m.work, 32 * 2, 1e-9);
+    expect_near("end of the steady part", m.end[0], 0.5, 1e-12);
+    Script s; /* joints that hold still, with less than a newton metre */
     script_start(&s);
     measure_start(&m, DT);
-    s.sample.torque[3] = -0.5;
-    measure_sample(&m, &s.sample);
-    assert_close("torque", m.torque, 0.5, 0);
-    s.sample.torque[3] = 0.25;
-    measure_sample(&m, &s.sample);
-    assert_close("torque of the step", m.torque, 0.25, 0);
-    assert_close("greatest torque", m.torque_max, 0.5, 0);
+    for (int k = 2; k > 0; k--) {
+        s.sample.torque[3] = -0.25 * k;
+        measure_sample(&m, &s.sample);
+        expect_near("torque of the step", m.torque, 0.25 * k, 0);
+        expect_near("greatest torque", m.torque_max, 0.5, 0);
+    }
 }
 
 /* On a circle to the left: 0.5 m/s forward and 0.1 m/s to the left of a heading that turns by 0.8
@@ -138,17 +124,17 @@ static void speeds_of_a_turning_robot(void **state) {
         s.sample.quaternion[3] = sin(0.5 * yaw);
         measure_sample(&m, &s.sample);
     }
-    assert_close("turned", m.turned, w * 8, 1e-9);
-    assert_close("way forward", m.way[0], v * 8, 1e-2);
-    assert_close("way to the left", m.way[1], left * 8, 1e-2);
+    expect_near("turned", m.turned, w * 8, 1e-9);
+    expect_near("way forward", m.way[0], v * 8, 1e-2);
+    expect_near("way to the left", m.way[1], left * 8, 1e-2);
     eval_summarise(&row, "foam45", &eval, &m, &fallen, 400, NULL);
-    assert_close("speed", row.velocity, v, 1e-3);
-    assert_close("speed to the left", row.velocity_sideways, left, 1e-3);
-    assert_close("turning", row.velocity_turn, w, 1e-9);
+    expect_near("speed", row.velocity, v, 1e-3);
+    expect_near("speed to the left", row.velocity_sideways, left, 1e-3);
+    expect_near("turning", row.velocity_turn, w, 1e-9);
     assert_true(row.turn == 0.7);
     eval.turn = 0; /* along x, however it turns */
     eval_summarise(&row, "foam45", &eval, &m, &fallen, 400, NULL);
-    assert_close("speed along x", row.velocity, (m.end[0] - m.start[0]) / 8, 1e-12);
+    expect_near("speed along x", row.velocity, (m.end[0] - m.start[0]) / 8, 1e-12);
     assert_true(fabs(row.velocity) < 0.1);
 }
 
@@ -158,7 +144,7 @@ static void yaw_of_an_orientation(void **state) {
     for (double yaw = -3; yaw < 3.1; yaw += 0.5) {
         const double cz = cos(0.5 * yaw), sz = sin(0.5 * yaw), cy = cos(0.2), sy = sin(0.2);
         const double q[4] = {cz * cy, -sz * sy, cz * sy, sz * cy};
-        assert_close("yaw", measure_yaw(q), yaw, 1e-12);
+        expect_near("yaw", measure_yaw(q), yaw, 1e-12);
     }
 }
 
@@ -221,21 +207,21 @@ static void one_stance_and_one_swing(void **state) {
         hold(&m, &s, 100);
         assert_int_equal(m.stances, 1);
         assert_int_equal(m.swings, 0); /* it has not landed */
-        assert_close("drift", m.drift_sum, 0.005, 1e-15);
-        assert_close("penetration", m.deepest_sum, 0.012, 0);
+        expect_near("drift", m.drift_sum, 0.005, 1e-15);
+        expect_near("penetration", m.deepest_sum, 0.012, 0);
         set_foot(&s, f, 100, 0.5, -0.1, 0.001);
         hold(&m, &s, 100);
         assert_int_equal(m.swings, 1);
-        assert_close("clearance", m.apex_sum, 0.05, 0);
+        expect_near("clearance", m.apex_sum, 0.05, 0);
         lift(&s, f, 0.03);
         hold(&m, &s, 100); /* the second stance begins anew: no drift, 1 mm deep */
         assert_int_equal(m.stances, 2);
-        assert_close("drift of two", m.drift_sum, 0.005, 1e-15);
-        assert_close("penetration of two", m.deepest_sum, 0.013, 1e-15);
+        expect_near("drift of two", m.drift_sum, 0.005, 1e-15);
+        expect_near("penetration of two", m.deepest_sum, 0.013, 1e-15);
         set_foot(&s, f, 100, 0.6, -0.1, 0);
         hold(&m, &s, 1);
         assert_int_equal(m.swings, 2);
-        assert_close("clearance of two", m.apex_sum, 0.08, 1e-15);
+        expect_near("clearance of two", m.apex_sum, 0.08, 1e-15);
         measure_finish(&m); /* the other foot's open stance does not count */
         assert_int_equal(m.stances, 2);
     }
@@ -276,31 +262,31 @@ static void stances_are_kept(void **state) {
     for (int k = 0; k < 40; k++) {
         const MeasureStance *stance = &m->kept[k];
         assert_int_equal(stance->foot, 1);
-        assert_close("start", stance->start, k ? (50 + 250 * k) * DT : 0, 1e-12);
-        assert_close("duration", stance->duration, (k ? 200 : 250) * DT, 1e-12);
-        assert_close("depth", stance->depth, 0.012, 0);
-        assert_close("forward", stance->way[0], k ? forward : 0.203 * cos(0.5) - 0.096 * sin(0.5),
-                     1e-12);
-        assert_close("left", stance->way[1], k ? left : -0.096 * cos(0.5) - 0.203 * sin(0.5),
-                     1e-12);
-        assert_close("apex", stance->apex, k ? 0.05 : 0, 0);
+        expect_near("start", stance->start, k ? (50 + 250 * k) * DT : 0, 1e-12);
+        expect_near("duration", stance->duration, (k ? 200 : 250) * DT, 1e-12);
+        expect_near("depth", stance->depth, 0.012, 0);
+        expect_near("forward", stance->way[0], k ? forward : 0.203 * cos(0.5) - 0.096 * sin(0.5),
+                    1e-12);
+        expect_near("left", stance->way[1], k ? left : -0.096 * cos(0.5) - 0.203 * sin(0.5), 1e-12);
+        expect_near("apex", stance->apex, k ? 0.05 : 0, 0);
     }
     assert_int_equal(eval_summarise(&row, "foam45", &eval, m, &fallen, 400, NULL), MILD_OK);
-    assert_close("magnitude along the heading", row.drift_forward,
-                 (39 * forward + m->kept[0].way[0]) / 40, 1e-12);
-    assert_close("and across it", row.drift_left, (39 * left - m->kept[0].way[1]) / 40, 1e-12);
+    expect_near("magnitude along the heading", row.drift_forward,
+                (39 * forward + m->kept[0].way[0]) / 40, 1e-12);
+    expect_near("and across it", row.drift_left, (39 * left - m->kept[0].way[1]) / 40, 1e-12);
     fclose(csv);
+    assert_memory_equal(text, "foam45,0.5,0,1,0.0000,", 22);
     assert_non_null(strstr(text, "foam45,0.5,0,1,0.2930,0.1953,0.012000,0.004550,0.002072,0.050000,"
                                  "0.20000,-0.10000,7.000\n"));
-    assert_close("way of the sole", row.drift_path,
-                 (39 * hypot(0.003, 0.004) + hypot(0.2, 0.1) + hypot(0.003, 0.004)) / 40, 1e-12);
+    expect_near("way of the sole", row.drift_path,
+                (39 * hypot(0.003, 0.004) + hypot(0.2, 0.1) + hypot(0.003, 0.004)) / 40, 1e-12);
     free(text);
     measure_free(m, 1);
 }
 
 /* A foot comes down every second, at 0.25, 1.25, ... s, first 0.3 m further on, from 5 s on 0.5 m,
- * 0.7 rad to the left of x; meanwhile it goes 20 mm forward and back. The other foot stands. Strides count whose both ends
- * are between 2 and 8.5 s: two of 0.3 m, then four of 0.5 m from 4.25 s on. */
+ * 0.7 rad to the left of x; meanwhile it goes 20 mm forward and back. The other foot stands.
+ * Strides count whose both ends are between 2 and 8.5 s: two of 0.3 m, then four of 0.5 m. */
 static void strides_and_the_way_of_a_sole(void **state) {
     (void)state;
     const EvalDef eval = {.speed = 0.5, .trials = 1, .seconds = 10, .stop = 8.5};
@@ -318,8 +304,8 @@ static void strides_and_the_way_of_a_sole(void **state) {
     for (int k = 0; k < 10; k++) {
         x += k < 5 ? 0.3 : 0.5;
         for (int out = 0; out < 3; out++) {
-            set_foot(&s, 1, 100, c * (x + (out == 1 ? 0.02 : 0)), d * (x + (out == 1 ? 0.02 : 0)),
-                     0);
+            const double at = x + (out == 1 ? 0.02 : 0);
+            set_foot(&s, 1, 100, c * at, d * at, 0);
             hold(&m, &s, STEPS(0.125));
         }
         lift(&s, 1, 0.05);
@@ -327,10 +313,10 @@ static void strides_and_the_way_of_a_sole(void **state) {
     }
     eval_summarise(&row, "foam45", &eval, &m, &walked, 400, NULL);
     assert_int_equal(m.strides, 6); /* from 2.25 s to 8.25 s */
-    assert_close("stride", row.stride, (2 * 0.3 + 4 * 0.5) / 6, 1e-12);
-    assert_close("cadence", row.cadence, 1, 1e-12);
-    assert_close("drift", row.drift, 0, 1e-15);
-    assert_close("way", row.drift_path, 0.04, 1e-12);
+    expect_near("stride", row.stride, (2 * 0.3 + 4 * 0.5) / 6, 1e-12);
+    expect_near("cadence", row.cadence, 1, 1e-12);
+    expect_near("drift", row.drift, 0, 1e-15);
+    expect_near("way", row.drift_path, 0.04, 1e-12);
 }
 
 /* Contact is more than 5 N. */
@@ -366,14 +352,14 @@ static void chatter_ends_no_stance(void **state) {
     assert_true(m.stances == 0 && m.swings == 0);
     hold(&m, &s, 1);
     assert_int_equal(m.stances, 1);
-    assert_close("drift over pauses", m.drift_sum, 0.004, 1e-15);
-    assert_close("penetration over pauses", m.deepest_sum, 0.004, 0);
+    expect_near("drift over pauses", m.drift_sum, 0.004, 1e-15);
+    expect_near("penetration over pauses", m.deepest_sum, 0.004, 0);
     lift(&s, 1, 0.001);
     hold(&m, &s, 100);
     set_foot(&s, 1, 100, 1, 0, 0);
     hold(&m, &s, 1);
     assert_int_equal(m.swings, 1);
-    assert_close("the apex counts from the last contact on", m.apex_sum, 0.02, 0);
+    expect_near("the apex counts from the last contact on", m.apex_sum, 0.02, 0);
 }
 
 /* A lift up to 5 mm is a stance that ends, but no swing. */
@@ -424,7 +410,7 @@ static void the_apex_before_a_stance(void **state) {
     assert_int_equal(m->stances, 5);
     for (int i = 0; i < 5; i++) {
         assert_int_equal(m->kept[i].foot, foot[i]);
-        assert_close("apex", m->kept[i].apex, apex[i], 0);
+        expect_near("apex", m->kept[i].apex, apex[i], 0);
     }
     measure_free(m, 1);
 }
@@ -460,8 +446,8 @@ static void open_stances_count_when_no_foot_was_lifted(void **state) {
     hold(&m, &s, 10);
     measure_finish(&m);
     assert_int_equal(m.stances, 2);
-    assert_close("drift", m.drift_sum, 0.03, 1e-15);
-    assert_close("penetration", m.deepest_sum, 0.03, 1e-15);
+    expect_near("drift", m.drift_sum, 0.03, 1e-15);
+    expect_near("penetration", m.deepest_sum, 0.03, 1e-15);
     measure_finish(&m);
     assert_int_equal(m.stances, 2);
     measure_start(&m, DT); /* and one foot that never touches the ground has none */
@@ -535,21 +521,21 @@ static void a_row_from_four_trials(void **state) {
     assert_int_equal(row.trials, 4);
     assert_int_equal(row.success, 3);
     assert_int_equal(row.measured, 3);
-    assert_close("velocity", row.velocity, 0.6, 1e-12);
+    expect_near("velocity", row.velocity, 0.6, 1e-12);
     double half = 4.303 * sqrt(0.07 / 3);
-    assert_close("low", row.velocity_low, 0.6 - half, 2e-3 * half);
-    assert_close("high", row.velocity_high, 0.6 + half, 2e-3 * half);
-    assert_close("cost of transport", row.cot, 1, 1e-12);
-    assert_close("deviation of velocity", row.velocity_deviation, sqrt(0.07), 1e-12);
-    assert_close("deviation of cot", row.cot_deviation, sqrt(0.75), 1e-12);
-    assert_close("deviation of torque", row.torque_deviation, sqrt(500.0 / 3), 1e-12);
-    assert_close("oscillation", row.base_oscillation, 0.02, 1e-12);
-    assert_close("energy", row.energy, 250, 1e-12);
-    assert_close("torque", row.torque_max, 35, 1e-12);
-    assert_close("seconds", row.seconds, 21.0 / 4, 1e-12);
-    assert_close("clearance", row.clearance, 0.04 * 14 / 6, 1e-12);
-    assert_close("penetration", row.penetration, 0.08 / 16, 1e-12);
-    assert_close("drift", row.drift, 0.004 * 14 / 16, 1e-12);
+    expect_near("low", row.velocity_low, 0.6 - half, 2e-3 * half);
+    expect_near("high", row.velocity_high, 0.6 + half, 2e-3 * half);
+    expect_near("cost of transport", row.cot, 1, 1e-12);
+    expect_near("deviation of velocity", row.velocity_deviation, sqrt(0.07), 1e-12);
+    expect_near("deviation of cot", row.cot_deviation, sqrt(0.75), 1e-12);
+    expect_near("deviation of torque", row.torque_deviation, sqrt(500.0 / 3), 1e-12);
+    expect_near("oscillation", row.base_oscillation, 0.02, 1e-12);
+    expect_near("energy", row.energy, 250, 1e-12);
+    expect_near("torque", row.torque_max, 35, 1e-12);
+    expect_near("seconds", row.seconds, 21.0 / 4, 1e-12);
+    expect_near("clearance", row.clearance, 0.04 * 14 / 6, 1e-12);
+    expect_near("penetration", row.penetration, 0.08 / 16, 1e-12);
+    expect_near("drift", row.drift, 0.004 * 14 / 16, 1e-12);
 }
 
 /* When no trial stayed up the fallen ones that walked for more than half a steady second count. */
@@ -560,10 +546,10 @@ static void a_row_of_falls(void **state) {
     EvalRow row = summarise(m, fallen, 3);
     assert_int_equal(row.success, 0);
     assert_int_equal(row.measured, 1);
-    assert_close("velocity", row.velocity, 0.5, 1e-12);
+    expect_near("velocity", row.velocity, 0.5, 1e-12);
     assert_true(isnan(row.velocity_low) && isnan(row.velocity_high)); /* one trial has none */
-    assert_close("cost of transport", row.cot, 1, 1e-12);
-    assert_close("oscillation", row.base_oscillation, 0.01, 1e-12);
+    expect_near("cost of transport", row.cot, 1, 1e-12);
+    expect_near("oscillation", row.base_oscillation, 0.01, 1e-12);
     row = summarise(m + 2, fallen, 1); /* too short for any: nothing was measured */
     assert_int_equal(row.measured, 0);
     assert_true(isnan(row.velocity) && isnan(row.cot) && isnan(row.velocity_low));
@@ -577,10 +563,10 @@ static void cost_of_transport_backward_and_at_rest(void **state) {
     Measure back = trial(4, -0.5, 200), rest = trial(4, 0, 200);
     const uint8_t fallen = 0;
     EvalRow row = summarise(&back, &fallen, 1);
-    assert_close("velocity", row.velocity, -0.5, 1e-12);
-    assert_close("cost of transport", row.cot, 0.5, 1e-12);
+    expect_near("velocity", row.velocity, -0.5, 1e-12);
+    expect_near("cost of transport", row.cot, 0.5, 1e-12);
     row = summarise(&rest, &fallen, 1);
-    assert_close("at rest", row.cot, 200 / (400 * 1e-3), 1e-9);
+    expect_near("at rest", row.cot, 200 / (400 * 1e-3), 1e-9);
 }
 
 /* Aside at 0.3 m/s and forward at 0.4 m/s over 2 s: 0.6 m to the left, 0.5 m/s along the way, which
@@ -595,11 +581,11 @@ static void sideways(void **state) {
         const EvalDef eval = {.speed = 0.4, .sideways = asked ? 0.3 : 0, .trials = 2};
         EvalRow row;
         eval_summarise(&row, "foam45", &eval, m, fallen, 400, NULL);
-        assert_close("asked", row.sideways, asked ? 0.3 : 0, 0);
-        assert_close("velocity", row.velocity, 0.4, 1e-12);
-        assert_close("to the left", row.velocity_sideways, 0.3, 1e-12);
+        expect_near("asked", row.sideways, asked ? 0.3 : 0, 0);
+        expect_near("velocity", row.velocity, 0.4, 1e-12);
+        expect_near("to the left", row.velocity_sideways, 0.3, 1e-12);
         double cot = 0.25 * (1 / hypot(0.8, 0.8) + 1 / hypot(0.8, 0.4));
-        assert_close("cost of transport", row.cot, asked ? cot : 0.5 / 0.8, 1e-12);
+        expect_near("cost of transport", row.cot, asked ? cot : 0.5 / 0.8, 1e-12);
     }
 }
 
@@ -612,8 +598,8 @@ static void a_row_finishes_its_measures(void **state) {
     m.deepest[0] = 0.015;
     m.last[0][0] = 0.002;
     EvalRow row = summarise(&m, &fallen, 1);
-    assert_close("penetration", row.penetration, 0.015, 0);
-    assert_close("drift", row.drift, 0.002, 0);
+    expect_near("penetration", row.penetration, 0.015, 0);
+    expect_near("drift", row.drift, 0.002, 0);
 }
 
 /* Half width of the interval for n trials, half of them at 0 and half at 1 m/s, against Student's t
@@ -640,7 +626,7 @@ static void interval_of_the_mean(void **state) {
         EvalRow row = summarise(m, fallen, n);
         double ours = 0.5 * (row.velocity_high - row.velocity_low);
         worst = fmax(worst, fabs(ours / half - 1));
-        assert_close("centre", 0.5 * (row.velocity_high + row.velocity_low), mean, 1e-12);
+        expect_near("centre", 0.5 * (row.velocity_high + row.velocity_low), mean, 1e-12);
     }
     print_message("95 %% interval against printed tables: worst %.2f %%\n", 100 * worst);
     assert_true(worst < 3e-4); /* three decimals of the table */
@@ -697,13 +683,11 @@ static void the_printed_row(void **state) {
     row.ends[TASK_END_joint] = 1;
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "       -  ended by: 2 tilt, 1 joint"));
-    row.ends[TASK_END_base] = 3; /* in the order of TASK_ENDS */
-    row.ends[TASK_END_not_finite] = 4;
+    row.ends[TASK_END_base] = 3;
     eval_print_row(&row, text, sizeof text);
-    assert_names(text, "ended 2 tilt 3 base 1 joint 4 not_finite");
+    assert_names(text, "2 tilt 3 base 1 joint");
     char header[256];
     eval_print_header(header, sizeof header);
-    printf("%s\n%s\n", header, text);
     assert_string_equal(header,
                         "ground                       m/s upright   measured m/s   COT  Nm max"
                         "   clear    sink   drift     J/s");
@@ -745,13 +729,13 @@ static void a_robot_is_read(void **state) {
         measure_step(&m, env, sim, torque);
         const double *q = robot_sim_qpos(sim), *qd = robot_sim_qvel(sim);
         double left = 10 * qd[6], right = -4 * qd[17];
-        assert_close("energy", m.energy, fabs(left + right) * 1e-3, 1e-15);
-        assert_close("work", m.work, (fabs(left) + fabs(right)) * 1e-3, 1e-15);
-        assert_close("torque", m.torque_max, 10, 0);
-        assert_close("x", m.end[0], 1.5, 0.05);
-        assert_close("y", m.end[1], 0.2, 0.05);
+        expect_near("energy", m.energy, fabs(left + right) * 1e-3, 1e-15);
+        expect_near("work", m.work, (fabs(left) + fabs(right)) * 1e-3, 1e-15);
+        expect_near("torque", m.torque_max, 10, 0);
+        expect_near("x", m.end[0], 1.5, 0.05);
+        expect_near("y", m.end[1], 0.2, 0.05);
         assert_true(m.end[0] == q[0] && m.end[1] == q[1] && fabs(q[0] - 1.5) > 1e-9);
-        assert_close("height", m.base_high, q[2] - 0.3, 1e-15);
+        expect_near("height", m.base_high, q[2] - 0.3, 1e-15);
         for (int f = 0; f < SA01_FEET; f++) {
             assert_true(m.in_stance[f]);
             const double *center = robot_sim_foot(sim, f)->sole_center;
@@ -765,8 +749,8 @@ static void a_robot_is_read(void **state) {
         assert_int_equal(
             robot_sim_step(sim, none, NULL, task_env_terrain(env), task_env_ground(env)), 0);
         measure_step(&m, env, sim, torque);
-        assert_close("apex", m.apex[0], 0.1, 1e-4);
-        assert_close("apex", m.apex[1], 0.1, 1e-4);
+        expect_near("apex", m.apex[0], 0.1, 1e-4);
+        expect_near("apex", m.apex[1], 0.1, 1e-4);
     }
     MildMapDef slope = mild_map_def_default(); /* the base is above the ground under it */
     slope.kind = MILD_MAP_SLOPE;
@@ -779,7 +763,7 @@ static void a_robot_is_read(void **state) {
     measure_start(&m, 1e-3);
     m.time = 3;
     measure_step(&m, env, sim, none);
-    assert_close("height on a slope", m.base_high, q[2] - 0.3 - 0.1 * q[0], 1e-12);
+    expect_near("height on a slope", m.base_high, q[2] - 0.3 - 0.1 * q[0], 1e-12);
     mild_map_destroy(map);
     free(env);
     robot_sim_destroy(sim);
@@ -789,7 +773,6 @@ static void a_robot_is_read(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(power_and_speed),
-        cmocka_unit_test(small_torques_are_measured),
         cmocka_unit_test(shells_share_the_load),
         cmocka_unit_test(speeds_of_a_turning_robot),
         cmocka_unit_test(yaw_of_an_orientation),

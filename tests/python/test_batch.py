@@ -129,7 +129,7 @@ class Batch(unittest.TestCase):
                         self.batch.step(**call, advance=False)
                         np.testing.assert_array_equal(call[out], plain[out])
                         continue
-                    with self.assertRaisesRegex(ValueError, rf"^({name}, {out}|{out}, {name}): they share memory"):
+                    with self.assertRaisesRegex(ValueError, rf"^({name}, {out}|{out}, {name}): "):
                         self.batch.step(**call)
                     pairs += 1
         self.assertEqual(pairs, 2 * len(outputs) * (len(plain) - 1) - 2)

@@ -59,7 +59,7 @@ class Descriptions(unittest.TestCase):
         self.assertTrue({"unitree_rl_gym", "legged_gym", "isaac_lab", "mjlab", "rsl_rl", "mujoco_playground"} <= set(mild.layouts()))
         for name in mild.layouts():
             self.assertTrue(Description(name).terms, name)
-        with self.assertRaisesRegex(ValueError, "no file 'nobody'.*isaac_lab"):
+        with self.assertRaisesRegex(ValueError, "'nobody'.*isaac_lab"):
             Description("nobody")
         self.assertEqual([t.name for t in Description("rsl_rl").terms], [t.name for t in Description("isaac_lab").terms])
         self.assertEqual(FOLDER.name, "layouts")
@@ -103,9 +103,9 @@ class Descriptions(unittest.TestCase):
         rows = Description({**stander(), "kp": {".*": 1, ".*knee": 2, "left_knee": 3}}).kp
         self.assertEqual(by_joint(rows, names, 0, "kp").tolist(), [1, 3, 1, 2])
         self.assertEqual(choose(["(left|right)_knee", ".*"], names, "joints"), [1, 3, 0, 2])
-        with self.assertRaisesRegex(ValueError, r"\[kp\] .*knee: no joint has such a name; there are hip"):
+        with self.assertRaisesRegex(ValueError, r"\[kp\] .*knee.*hip"):
             by_joint(rows, ["hip"], 0, "kp")
-        with self.assertRaisesRegex(ValueError, "joints: no joint is left for 'foot'"):
+        with self.assertRaisesRegex(ValueError, "joints: .*'foot'"):
             choose(["foot"], names, "joints")
 
 
@@ -189,7 +189,7 @@ class Observations(unittest.TestCase):
         """One for each number, a clip, and a scale that does not fit."""
         seen = self.observe(stander(observation={"joint_position": "0*2 1*2", "action": 1}, policy={"clip": 2.5}))[0]
         np.testing.assert_allclose(seen, [0, 0, *np.clip(self.data.qpos[9:11] - 0.1, -2.5, 2.5), 1, 2, 2.5, 2.5], atol=1e-6)
-        with self.assertRaisesRegex(ValueError, "2 scales for 4 numbers"):
+        with self.assertRaisesRegex(ValueError, r"\b2 scales .*\b4 numbers"):
             self.observe(stander(observation={"action": "1 2"}))
 
 
@@ -268,7 +268,7 @@ class Standing(unittest.TestCase):
             walker.drive(np.full(4, 0.02))
             mujoco.mj_forward(walker.robot.model, walker.data)
             np.testing.assert_allclose(walker.data.qfrc_actuator[6:], kp * 0.02, atol=1e-9)
-        with self.assertRaisesRegex(ValueError, "no actuator for left_hip"):
+        with self.assertRaisesRegex(ValueError, "left_hip"):
             self.stand(biped(motors=""), actuator={"kind": "model"})
 
     def test_base(self):
@@ -288,7 +288,7 @@ class Standing(unittest.TestCase):
             path.write_text(text)
             self.assertIn("1 meshes whose files are not there are left out", self.stand(path).remark)
             path.write_text(text.replace('contype="0" conaffinity="0" mass="0"', 'density="1000"'))
-            with self.assertRaisesRegex(ValueError, "the mass of left_foot, right_foot is that of meshes"):
+            with self.assertRaisesRegex(ValueError, "left_foot, right_foot"):
                 self.stand(path)
             path.write_text(biped().replace('timestep="0.002"/>', 'timestep="0.002"><flag sensornoise="enable"/></option>'))
             self.assertIn("no longer knows are left out: sensornoise", self.stand(path).remark)
@@ -300,7 +300,7 @@ class Standing(unittest.TestCase):
         robot = self.stand(biped().replace("</mujoco>", '<keyframe><key name="home" qpos="0 0 1 1 0 0 0 0.1 -0.1 0.1 -0.1"/></keyframe></mujoco>'),
                            start={"keyframe": "home"})
         np.testing.assert_allclose(robot.default, [0.1, -0.1, 0.1, -0.1])
-        with self.assertRaisesRegex(ValueError, "no keyframe 'away'"):
+        with self.assertRaisesRegex(ValueError, "'away'"):
             self.stand(biped(), start={"keyframe": "away"})
 
 
@@ -330,7 +330,7 @@ class Networks(unittest.TestCase):
             for _ in range(2):
                 network.reset()
                 self.assertEqual([network.act(np.array([1, 2, 3], np.float32)).tolist() for _ in range(3)], [[1, 2], [11, 12], [21, 22]])
-            with self.assertRaisesRegex(ValueError, "it sees 3 numbers, and the description makes 4"):
+            with self.assertRaisesRegex(ValueError, r"\b3 numbers.*\b4\b"):
                 network.act(np.zeros(4, np.float32))
             for keys, line in (({"input": "x"}, "policy.input: .* no 'x'; there are obs"), ({"output": "y"}, "policy.output"),
                                ({"state": "h_in>nothing"}, "policy.state"), ({"state": ""}, "policy.state")):
@@ -501,7 +501,7 @@ class Trials(unittest.TestCase):
                 walker.walk((0, 0, 0), 1)
                 self.assertEqual([o[4] for o in seen[7:]], [0, *wanted])
                 self.assertEqual(seen[7][0], 0)  # nothing is left of the walk before
-        with self.assertRaisesRegex(ValueError, "it answers 3 numbers, and moves 4 joints"):
+        with self.assertRaisesRegex(ValueError, r"\b3 numbers.*\b4 joints"):
             mild.trial(biped(), lambda o: np.zeros(3), stander(), grounds=["rigid"], trials=1)
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")

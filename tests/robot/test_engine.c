@@ -35,8 +35,7 @@ static MildStatus do_work(void *context, MildError *error) {
         abort();
     }
     errno = work->number;
-    return work->status == MILD_OK ? MILD_OK
-                                   : mild_fail(error, work->status, "own words");
+    return work->status == MILD_OK ? MILD_OK : mild_fail(error, work->status, "own words");
 }
 
 static int open_descriptors(void) {
