@@ -106,9 +106,17 @@ def main():
     print(f"mild trial {given.out}/scene.xml POLICY.onnx --describe {given.out}/policy.ini")
 
 
-for _robot, (_, _agent, _) in ROBOTS.items() if __name__ != "__main__" else ():
+def agent_of(robot):
+    """mjlab's learner for the robot, with a folder of its own and TensorBoard, which needs no account; --agent.logger wandb."""
+    config = ROBOTS[robot][1]()
+    config.logger, config.experiment_name = "tensorboard", config.experiment_name + "_soft"
+    return config
+
+
+for _robot in ROBOTS if __name__ != "__main__" else ():
     register_mjlab_task(task_id=f"Mjlab-Velocity-Soft-Unitree-{_robot}", env_cfg=config_of(_robot), play_env_cfg=config_of(_robot, play=True),
-                        rl_cfg=_agent(), runner_cls=VelocityOnPolicyRunner)
+                        rl_cfg=agent_of(_robot), runner_cls=VelocityOnPolicyRunner)
+
 
 if __name__ == "__main__":
     from mild import mjlab as _named  # the registered module, not this second copy of it

@@ -358,8 +358,22 @@ static int on_print(const mjData *d, const float at[3]) {
     return found;
 }
 
-/* The scene shows what the ground remembers: patches at the depth of the surface, as many as there
- * is room for, and an arrow for each loaded foot. */
+/* Plates of the scene that lie deeper than the ground was. */
+static int count_dents(const mjModel *m, const mjData *d, const mjvScene *scene) {
+    int count = 0;
+    for (int i = 0; i < scene->ngeom; i++) {
+        const mjvGeom *g = &scene->geoms[i];
+        const double top = (double)(g->pos[2] + g->mat[8] * g->size[2]);
+        count += g->category == mjCAT_STATIC && g->type == mjGEOM_BOX &&
+                 top < mild_terrain_height_at(&plugin_soft(m, d)->terrain, (double)g->pos[0],
+                                              (double)g->pos[1]) -
+                           0.003;
+    }
+    return count;
+}
+
+/* The scene shows what the ground remembers: dents of uneven ground, and where that is hidden
+ * patches at its surface, as many as there is room for; and an arrow for each loaded foot. */
 static void prints_are_drawn(void **state) {
     (void)state;
     mjModel *m = hopper(MOTOR);
@@ -375,7 +389,12 @@ static void prints_are_drawn(void **state) {
     mjv_makeScene(m, &small, 10);
     mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &scene);
     assert_int_equal(count_decor(&scene, mjGEOM_BOX), 0);
+    assert_int_equal(count_dents(m, d, &scene), 0);
     steps(m, d, 500);
+    mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &scene);
+    assert_int_equal(count_decor(&scene, mjGEOM_BOX), 0);
+    assert_in_range(count_dents(m, d, &scene), 40, 1500);
+    option.flags[mjVIS_STATIC] = 0;
     mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &scene);
     print_message("%d patches\n", count_decor(&scene, mjGEOM_BOX));
     assert_in_range(count_decor(&scene, mjGEOM_BOX), pressed(m, d) + 20, 1500);

@@ -174,6 +174,26 @@ class Attach(unittest.TestCase):
         self.assertAlmostEqual(depth, fall(mild.Material("foam45")), delta=0.01 * depth)
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_surface(self):
+        """The ground is drawn in place of planes of the floor, which still carry what is not soft; or the planes are."""
+        floor = PLATE.replace("<worldbody>", '<worldbody><geom type="plane" size="1 1 1" rgba="1 0 0 1"/><body name="more"><geom type="plane" size="1 1 1"/>'
+                                             '<geom type="box" size="1 1 1" pos="5 0 0"/></body><body name="ball" pos="0.5 0 0.1"><freejoint/>'
+                                             '<geom type="sphere" size="0.1"/></body>')
+        for surface in (True, False):
+            spec = mujoco.MjSpec.from_string(floor)
+            mild.attach(spec, ["plate"], surface=surface)
+            model = spec.compile()
+            data = mujoco.MjData(model)
+            mujoco.mj_step(model, data, 500)
+            self.assertGreater(data.body("ball").xpos[2], 0.09)
+            scene, planes, plates = mujoco.MjvScene(model, 5000), 0, 0
+            mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, scene)
+            for geom in scene.geoms[:scene.ngeom]:
+                planes += geom.type == mujoco.mjtGeom.mjGEOM_PLANE
+                plates += geom.type == mujoco.mjtGeom.mjGEOM_BOX and geom.category == mujoco.mjtCatBit.mjCAT_STATIC
+            self.assertEqual((planes, plates > 2000), (0, True) if surface else (2, False))
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_running_ground(self):
         """mild.ground changes the ground: at the start of a run, a plate falls as on a ground that was so in the model."""
         models = {}
