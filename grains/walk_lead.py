@@ -1,5 +1,4 @@
 """Leads the feet of a walk on grains through a fitted ground model, and compares forces, for grains/walk.py."""
-import configparser
 import math
 
 import numpy as np
@@ -69,13 +68,15 @@ def lead(sole, height, ground_material, rows):
     return np.array(table)
 
 
-def compare(folder, robot, numbers, model):
-    """Prints medians over the stances of a walk."""
+def sole_of(foot):
+    """Of a foot's section of robot.ini."""
     import mild
-    ini = configparser.ConfigParser(inline_comment_prefixes=(";",))
-    ini.read(robot)
-    feet = [ini[section] for section in ini.sections() if section.startswith("foot.")]
-    soles = [mild.Sole(np.array([float(word) for word in foot["outline"].split()]).reshape(-1, 2), 0.0195) for foot in feet]
+    return mild.Sole(np.array([float(word) for word in foot["outline"].split()]).reshape(-1, 2), float(foot["pitch"]))
+
+
+def compare(folder, feet, numbers, model):
+    """Prints medians over the stances of a walk."""
+    soles = [sole_of(foot) for foot in feet]
     table = np.genfromtxt(folder / "grains" / "feet.csv", delimiter=",", names=True, dtype=None, encoding=None)
     found = []
     for foot, rows in stances(table):

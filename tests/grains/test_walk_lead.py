@@ -1,5 +1,6 @@
 """grains/walk.py lead: the feet of a walk on mild_merged, led through mild_merged, find about the forces of that walk, up and
-forward; through ground of twice its strength they find more. test_walk_lead.py SOURCE MILD"""
+forward; through ground of twice its strength they find more. The sole of the robot on that ground, pressed slowly, carries what it
+carries in grains. test_walk_lead.py SOURCE MILD"""
 import contextlib
 import io
 import json
@@ -7,6 +8,8 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+
+import numpy as np
 
 sys.dont_write_bytecode = True
 SOURCE, MILD = pathlib.Path(sys.argv[1]), sys.argv[2]
@@ -21,9 +24,27 @@ def forces(folder, numbers):
     """Force up of the walk and of the model, and forward of both, in each window."""
     told = io.StringIO()
     with contextlib.redirect_stdout(told):
-        walk_lead.compare(folder, SOURCE / "robots" / "sa01" / "robot.ini", numbers, "mild_merged")
+        walk_lead.compare(folder, walk.feet_of("sa01"), numbers, "mild_merged")
     rows = [line.split("ms", 1)[1].split() for line in told.getvalue().splitlines() if " ms " in line]
     return [[float(word) for word in row[:4]] for row in rows]
+
+
+def pressed(numbers, model, depth, speed=0.05):
+    """Force up under the level sole of the SA01, led down."""
+    import mild
+    ground = mild.Ground([walk_lead.sole_of(walk.feet_of("sa01")[0])], walk_lead.material(numbers, model), dt=walk_lead.STEP)
+    ground.inverse_inertia[:], ground.rotation[0] = 0, np.eye(3)
+    for step in range(round(depth / speed / ground.dt)):
+        ground.position[0] = 0, 0, -speed * ground.dt * step
+        ground.velocity[0] = ground.free_velocity[0] = 0, 0, -speed, 0, 0, 0
+        ground.solve()
+        ground.advance()
+    return ground.force[0, 2]
+
+
+def in_grains(depth):
+    tables = [np.genfromtxt(file, delimiter=",", names=True) for file in sorted((SOURCE / "grains" / "records" / "wide").glob("sa01-[0-9].csv"))]
+    return np.mean([np.interp(depth, table["depth_m"], table["force_z_n"]) for table in tables])
 
 
 with tempfile.TemporaryDirectory() as name:
@@ -37,3 +58,8 @@ with tempfile.TemporaryDirectory() as name:
     assert all(0.75 < led / walked < 1.25 for walked, led, _, _ in same)
     assert same[0][2] < -50 and all(abs(led - walked) < 0.3 * abs(walked) + 15 for _, _, walked, led in same)
     assert all(b[1] > 1.3 * a[1] for a, b in zip(same[1:], stiff[1:]))
+for model, within in (("mild_merged", 0.08), ("mild", 0.12)):  # the sole's raster has 3 % more than its area
+    for depth in (0.01, 0.016):
+        law, grains = pressed(json.loads(walk.GROUNDS.read_text())["sand"][model], model, depth), in_grains(depth)
+        print(f"{model}, {1e3 * depth:.0f} mm: {law:.1f} N, grains {grains:.1f} N")
+        assert abs(law / grains - 1) < within
