@@ -569,8 +569,8 @@ static double first_pivot(const BodiesCase *c) {
     return sum;
 }
 
-/* A pivot that is 0 in float left numbers that are none, one in some 1e5 steps of a Go1 that lies in
- * loose sand. Here float meets it: the inertia at which it is 0 is found in double, and those
+/* A pivot that is 0 in float left numbers that are none, one in some 1e5 steps of a Go1 that lies
+ * in loose sand. Here float meets it: the inertia at which it is 0 is found in double, and those
  * beside it are tried. */
 static void vanishing_pivots_do_no_harm(void **state) {
     (void)state;
