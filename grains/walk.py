@@ -35,8 +35,9 @@ def fail(text):
 
 def feet_of(robot):
     """The sections of robot.ini that are feet."""
-    ini = configparser.ConfigParser(inline_comment_prefixes=(";",))
-    ini.read(ROOT / "robots" / robot / "robot.ini")
+    ini, file = configparser.ConfigParser(inline_comment_prefixes=(";",)), ROOT / "robots" / robot / "robot.ini"
+    if not ini.read(file):
+        fail(f"--robot {robot}: no {file}")
     return [ini[section] for section in ini.sections() if section.startswith("foot.")]
 
 
@@ -46,8 +47,9 @@ def fit(args):
     """As scripts/judge.py fits them, two level plates and a drag, but with elements of the robot's soles: k_pen is that of one element."""
     sys.path.insert(0, str(ROOT / "scripts"))
     import judge
+    import walk_lead
     from judge_entries import GroundEntry
-    pitch = float(feet_of(args.robot)[0]["pitch"])
+    pitch = walk_lead.pitch_of(feet_of(args.robot)[0])
     records, grounds = judge.Records(ROOT / "grains" / "records"), {}
     for family in BEDS:
         keys = [f"{family}/{name}" for name in judge.FITS[family][0]]
@@ -78,11 +80,11 @@ def outline(robot):
     return "polygon:" + ",".join(f"{value:g}" for value in points[0]), feet[0]["z"]
 
 
-def fitted(args):
-    """The robot with as many elements as fit its soles, in a folder of its own: the 77 of the SA01's cover 24 % more than the sole that
-    grains feel."""
-    folder = args.out / "robot" / args.robot
-    shutil.copytree(ROOT / "robots" / args.robot, folder, dirs_exist_ok=True)
+def fitted(out, robot):
+    """The folder of the robot with as many elements as fit its soles: the 77 of the SA01's cover 24 % more than the sole that grains feel."""
+    feet_of(robot)  # it is there
+    folder = out / "robot" / robot
+    shutil.copytree(ROOT / "robots" / robot, folder, dirs_exist_ok=True)
     file = folder / "robot.ini"
     file.write_text(re.sub(r"(?m)^elements *=.*", "elements = 0", file.read_text()))
     return folder
@@ -128,7 +130,7 @@ def on_grains(args):
 
 
 def on_models(args):
-    robot = fitted(args)
+    robot = fitted(args.out, args.robot)
     for family in args.families:
         for speed in args.speeds:
             for model in MODELS:

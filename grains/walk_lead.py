@@ -4,6 +4,7 @@ import math
 import numpy as np
 
 STEP = 1e-3  # [s]
+PITCH = 0.0195  # [m] of robots that do not say (docs/robots.md)
 WINDOWS = ((0, 0.02), (0.02, 0.05), (0.05, 0.1), (0.1, 0.2))  # [s] after touchdown
 CONTACT, SHORTEST, PAUSE = 30.0, 12, 2  # [N], rows of a stance, rows without load within it
 
@@ -68,10 +69,15 @@ def lead(sole, height, ground_material, rows):
     return np.array(table)
 
 
+def pitch_of(foot):
+    """[m] of the ground elements of a foot's section of robot.ini."""
+    return float(foot.get("pitch", PITCH))
+
+
 def sole_of(foot):
-    """Of a foot's section of robot.ini."""
+    """The same foot's sole, with as many elements as fit."""
     import mild
-    return mild.Sole(np.array([float(word) for word in foot["outline"].split()]).reshape(-1, 2), float(foot["pitch"]))
+    return mild.Sole(np.array([float(word) for word in foot["outline"].split()]).reshape(-1, 2), pitch_of(foot))
 
 
 def compare(folder, feet, numbers, model):

@@ -50,12 +50,14 @@ def in_grains(depth):
 with tempfile.TemporaryDirectory() as name:
     folder = pathlib.Path(name)
     (folder / "grains").mkdir()
-    subprocess.run([MILD, "eval", "--policy", SOURCE / "policies" / "sand.safetensors", "--speed", "0.6", "--trials", "1", "--seconds", "3", "--task.physics_dt",
+    robot = walk.fitted(folder, "sa01")
+    subprocess.run([MILD, "eval", "--robot", robot, "--policy", SOURCE / "policies" / "sand.safetensors", "--speed", "0.6", "--trials", "1", "--seconds", "3", "--task.physics_dt",
                     "0.0005", "--feet", folder / "grains" / "feet.csv", *walk.ground_of("sand", "mild_merged")], check=True, stdout=subprocess.DEVNULL)
     same, stiff = forces(folder, NUMBERS), forces(folder, {**NUMBERS, **{key: str(2 * float(NUMBERS[key])) for key in ("k_pen", "sigma_cone")}})
     print("force up of the walk, led, forward of the walk, led; up, led through twice the strength:", [(*a, b[1]) for a, b in zip(same, stiff)])
     assert len(same) == len(walk_lead.WINDOWS)
     assert all(0.75 < led / walked < 1.25 for walked, led, _, _ in same)
+    assert all(0.9 < led / walked < 1.1 for walked, led, _, _ in same[2:])  # 0.84 with the 77 elements of the SA01
     assert same[0][2] < -50 and all(abs(led - walked) < 0.3 * abs(walked) + 15 for _, _, walked, led in same)
     assert all(b[1] > 1.3 * a[1] for a, b in zip(same[1:], stiff[1:]))
 for model, within in (("mild_merged", 0.08), ("mild", 0.12)):  # the sole's raster has 3 % more than its area
