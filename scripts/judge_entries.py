@@ -24,6 +24,7 @@ STEP = 1e-3  # [s] of the ground models
 PITCH = 0.01  # [m] of their soles' elements: at 19.5 mm a plate's raster is up to 6 % off its area, which no law can mend
 REGAIN = 0.136  # [grains] regain_length of mild_merged, from loads that slide on grains of 5 mm
 REFILL = 0.22  # [-] from an imprint pressed again, sand/square100-again
+HEAPS = 9  # [-] by the heap of a sole, the mass that moves with it: momentum of sand/drop10 beyond that of a slow press
 YIELD = 3 + math.sqrt(8)  # of the friction of a sole that slides: share.h
 
 
@@ -86,13 +87,10 @@ class GroundEntry:
                 self.fit_friction(case, rows)
 
     def weigh(self, ground):
-        """The bed's density, which the soil at the sides of a sole presses with, and the grains' friction; the added mass
-        per depth stays."""
-        numbers = self.material.as_dict()
-        mass = float(numbers["c_g"]) * float(numbers["phi"]) * float(numbers["rho"])
-        solid = float(np.mean(ground["solid"]))
-        self.material = mild.Material(self.material, phi=solid, rho=ground["density"], c_g=mass / (solid * ground["density"]),
-                                      mu=ground["friction"])
+        """The bed's density, which the soil at the sides of a sole presses with, the grains' friction, and the mass that moves
+        with a sole."""
+        self.material = mild.Material(self.material, phi=float(np.mean(ground["solid"])), rho=ground["density"],
+                                      c_d=1, c_g=HEAPS / math.tan(self.material.alpha), mu=ground["friction"])
 
     def fit_slip(self, drags):
         """slip_length of F/F0 = 1/(1 + s/j0), and grip of the friction H/F after 5 to 12 mm, where it has built up: slip-sinkage at

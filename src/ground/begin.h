@@ -56,8 +56,7 @@ MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, 
     e->entry_speed = real_max(speed, 0);
     e->added_mass = 0;
     if (curves & LAW_CONE) {
-        e->added_mass =
-            real_max(e->law.mass_rate * law_recruited(&e->law, curves, e->yield_depth), 0);
+        e->added_mass = real_max(e->law.mass_rate * law_moved(&e->law, curves, e->yield_depth), 0);
     }
 
     e->drift_bound = dt * e->k_drift * memory->drift * real_max(e->depth, 0);
@@ -101,22 +100,22 @@ MILD_HD void element_drag(Element *e, int curves, Real dt, Real gain) {
 
     const Real slope = law_bedless_slope(&e->law, curves, a);
     const Real force = law_bedless_force(&e->law, curves, a) + slope / 2 * (u0 - a);
-    const Real drag = extra * law_flat_share(&e->law, curves, a);
+    const Real growth = law_moved(&e->law, curves, u0) - law_moved(&e->law, curves, a);
+    const Real drag = extra * law_moved_share(&e->law, curves, a);
     const Real stop =
         real_min(BEGIN_STOP + REAL_SQRT(force / (drag * h * h + ELEMENT_TINY)), BEGIN_STOP_MOST);
 
     e->entry_speed = h;
     e->stop_drag = drags ? extra * (stop - REAL(0.5)) / (h + ELEMENT_TINY) : 0;
-    e->stop_growth =
-        drags ? law_recruited(&e->law, curves, u0) - law_recruited(&e->law, curves, a) : 0;
+    e->stop_growth = drags ? growth : 0;
 }
 
 /* Impulse of parameters that create energy (passive = false), which are negative added mass and
  * negative drag. It cannot be implicit, so it is computed from the free motion. Called after
  * element_begin. free: downward speed of the free motion [m/s]. */
 MILD_HD Real element_explicit_of(const Element *e, int curves, Real dt, Real free) {
-    const Real mass = e->law.mass_rate * law_recruited(&e->law, curves, e->yield_depth);
-    const Real drag = e->law.drag_rate * law_flat_share(&e->law, curves, e->yield_depth);
+    const Real mass = e->law.mass_rate * law_moved(&e->law, curves, e->yield_depth);
+    const Real drag = e->law.drag_rate * law_moved_share(&e->law, curves, e->yield_depth);
     return real_min(mass, 0) * (free - e->front_speed) +
            real_min(drag, 0) * dt * e->entry_speed * e->entry_speed;
 }

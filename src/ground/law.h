@@ -32,7 +32,11 @@
  * A heap (docs/model.md section 21) is a cone that closes from the depth u_b on:
  *
  *     P(u)   = min(u, u_b) + u_f (t - t^2 + t^3/3),   t = clamp((u - u_b)/u_f, 0, 1)
- * The other formulas stay. With u_b = 0 it is the cone above.
+ * With u_b = 0 it is the cone above. F_g stays, but the ground that moves with a sole is set in
+ * motion more slowly, in proportion to the depth, until it is as much as the whole heap:
+ *
+ *     m_a    = c_g phi rho nu s P_m,              P_m(u) = min(u/LAW_MOVES, u_b + u_f/3)
+ * P_m of a cone is P.
  *
  * The elastic curve is the only one that is not about virgin ground. It acts at every depth, on
  * the way down and up, in a term of its own (impulse.h).
@@ -48,6 +52,8 @@
 #define MILD_GROUND_LAW_H
 
 #include "ground/power.h"
+
+#define LAW_MOVES REAL(5) /* [-] depth per recruited depth of what moves with a heap */
 
 /* The curves that a law has besides line and bed. All elements of a foot use the union of its
  * materials' bits, because a law without a curve has 0 for that curve's numbers. */
@@ -84,7 +90,7 @@ typedef struct {
     Real elastic_force;      /* S [N] of the elastic curve */
     Real elastic_exponent;   /* n [-] */
     Real elastic_damping;    /* d [s/m] relative growth of its force with the downward speed */
-    Real cone_begin;         /* u_b [m] depth from which the cone closes; only with LAW_HEAP */
+    Real cone_begin; /* u_b [m] depth from which a heap closes, only with LAW_HEAP; 0: a cone */
 } Law;
 
 /* The numbers of Law in order, but for cone_begin, which belongs to the place of an element in its
@@ -115,7 +121,8 @@ MILD_HD int law_variant(int curves) {
     return one ? curves : LAW_ANY;
 }
 
-/* The law of an element of a merged sole, from that of a disc. begin, width: [-] as in SoleHeap. */
+/* The law of an element of a merged sole, from that of a disc. begin, width: [-] as in SoleHeap;
+ * begin = 0 leaves a cone. */
 MILD_HD Law law_merged(Law law, Real begin, Real width) {
     law.cone_begin = law.cone_depth * begin;
     law.cone_depth *= width;
@@ -145,6 +152,28 @@ MILD_HD Real law_recruited(const Law *law, int curves, Real depth) {
 MILD_HD Real law_flat_share(const Law *law, int curves, Real depth) {
     const Real open = 1 - law_cone_progress(law, curves, depth);
     return open * open;
+}
+
+/* Bool: the law of an element of a merged sole. */
+MILD_HD int law_is_heap(const Law *law, int curves) {
+    return curves & LAW_HEAP && law->cone_begin > 0;
+}
+
+/* [m] Depth from which on all of a heap's ground moves. */
+MILD_HD Real law_moved_depth(const Law *law) {
+    return LAW_MOVES * law->cone_begin + LAW_MOVES / 3 * law->cone_depth;
+}
+
+/* P_m(u) [m] */
+MILD_HD Real law_moved(const Law *law, int curves, Real depth) {
+    const Real heap = real_min(depth, law_moved_depth(law)) * (1 / LAW_MOVES);
+    return law_is_heap(law, curves) ? heap : law_recruited(law, curves, depth);
+}
+
+/* P_m'(u) [-] */
+MILD_HD Real law_moved_share(const Law *law, int curves, Real depth) {
+    const Real heap = depth < law_moved_depth(law) ? 1 / LAW_MOVES : 0;
+    return law_is_heap(law, curves) ? heap : law_flat_share(law, curves, depth);
 }
 
 /* Force of the firm bed [N]. Any depth is allowed, and so is a bed at infinity. */
@@ -253,7 +282,12 @@ MILD_HD LawWay law_way_of(const Law *law, int curves, Real begin, Real way, cons
         const Real open_end = real_min(end, law->cone_begin);
         over.mean +=
             law->flat_stiffness * ((open_begin + 4 * open_half + open_end) * REAL(1.0 / 6.0));
-        over.recruited += way > 0 ? open_end - open_begin : 0;
+        const Real moved = law_moved_depth(law);
+        const Real moves = (real_min(end, moved) - real_min(begin, moved)) * (1 / LAW_MOVES);
+        const Real moves_slope = end < moved ? 1 / LAW_MOVES : 0;
+        const int heap = law_is_heap(law, curves) && way > 0;
+        over.recruited = heap ? moves : over.recruited;
+        over.recruited_slope = heap ? moves_slope : over.recruited_slope;
     }
     if (curves & LAW_POWER) {
         over.mean += power->mean;

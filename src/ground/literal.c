@@ -6,7 +6,7 @@ double literal_normal(const Slots *s, int i, int curves, double dt, double w) {
     const double u = element.depth;
     double force = law_force(&element.law, curves, u) + law_elastic_force(&element.law, curves, u);
     if (curves & LAW_CONE) {
-        force += element.law.drag_rate * law_flat_share(&element.law, curves, u) * w * w;
+        force += element.law.drag_rate * law_moved_share(&element.law, curves, u) * w * w;
     }
     return u > 0.0 ? dt * fmax(force, 0.0) : 0.0;
 }

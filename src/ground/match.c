@@ -14,8 +14,8 @@ static MildElementLaw law_at(const Law *law, double depth) {
         .force = law_force(law, curves, depth) + elastic,
         .stiffness = law_slope(law, curves, depth) + law_elastic_slope(law, curves, depth),
         .damping = law->elastic_damping * elastic,
-        .added_mass = law->mass_rate * law_recruited(law, curves, depth),
-        .added_mass_per_depth = law->mass_rate * law_flat_share(law, curves, depth),
+        .added_mass = law->mass_rate * law_moved(law, curves, depth),
+        .added_mass_per_depth = law->mass_rate * law_moved_share(law, curves, depth),
     };
 }
 

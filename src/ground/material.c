@@ -12,7 +12,7 @@ const MildField mild_material_fields[] = {
     FIELD(sigma_cone, 0.0, 5e6, "[N/m^3] depth-dependent conical stress"),
     FIELD(alpha, 0.1, 1.5, "[rad] shear band angle"),
     FIELD(nu, 0.1, 10.0, "[-] recruitment rate"),
-    FIELD(c_g, -1.4, 10.0, "[-] surrounding mass scale; below 0 only with passive = false"),
+    FIELD(c_g, -1.4, 50.0, "[-] surrounding mass scale; below 0 only with passive = false"),
     FIELD(c_d, -6.0, 100.0, "[-] inertial drag scale; below 1/2 only with passive = false"),
     FIELD(phi, 0.05, 0.75, "[-] volume fraction"),
     FIELD(rho, 1.0, 5000.0, "[kg/m^3] grain density"),

@@ -46,7 +46,7 @@ MILD_HD Real element_peak(const Element *e, int curves, Real normal, Real speed,
     const Real at = e->virgin_depth + real_max(p - a, 0);
     Real force = law_force(&e->law, curves, at) + law_elastic_force(&e->law, curves, at);
     if (curves & LAW_CONE) {
-        force += real_max(e->law.drag_rate, 0) / 2 * law_flat_share(&e->law, curves, at) * v * v;
+        force += real_max(e->law.drag_rate, 0) / 2 * law_moved_share(&e->law, curves, at) * v * v;
     }
     const Real slope = real_max(law_bedless_slope(&e->law, curves, at), 0) +
                        law_bed_slope(&e->law, at) + law_elastic_slope(&e->law, curves, at);

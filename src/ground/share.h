@@ -78,7 +78,7 @@ MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share
     /* The recruited mass is set in motion by the whole of mu. */
     const Real h = e->entry_speed;
     const Real way = real_max(e->depth + dt / 2 * h - a, 0);
-    const Real drag = real_max(e->law.drag_rate, 0) * law_flat_share(&e->law, LAW_HEAP, a);
+    const Real drag = real_max(e->law.drag_rate, 0) * law_moved_share(&e->law, LAW_HEAP, a);
     const Real strikes = drag * way * h * rate;
     const Real moves = strikes / (strikes + force + ELEMENT_TINY);
     const Real mu = share->grip > 0 ? held + (share->mu - held) * moves : share->mu;

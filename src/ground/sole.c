@@ -390,7 +390,7 @@ SoleHeap sole_heap(const MildSole *sole, int element) {
     /* The flat share (1 - t)^2 says that distances from `begin` on have the density 2 (1 - t): the
      * mean is a third of the width, the variance an 18th of its square. */
     const double width = fmax(fmin(sqrt(18.0) * spread, 3.0 * edge), 1e-6);
-    return (SoleHeap){fmax(edge - width / 3.0, 0.0), width};
+    return (SoleHeap){fmax(edge - width / 3.0, 1e-9), width};
 }
 
 const double *mild_sole_edge(const MildSole *sole) {

@@ -141,8 +141,8 @@ static double point_force(const Law *law, int curves, const FitPoint *point) {
     const double elastic = law_elastic_force(law, curves, depth);
     double sum = law_force(law, curves, depth) + elastic * (1 + law->elastic_damping * speed);
     if (curves & LAW_CONE) {
-        sum += law->drag_rate * law_flat_share(law, curves, depth) * speed * speed;
-        sum += law->mass_rate * law_recruited(law, curves, depth) * point->acceleration;
+        sum += law->drag_rate * law_moved_share(law, curves, depth) * speed * speed;
+        sum += law->mass_rate * law_moved(law, curves, depth) * point->acceleration;
     }
     return sum;
 }

@@ -33,6 +33,19 @@ static double cone_flat(const DenseLaw *law, double u) {
     return left * left;
 }
 
+/* [-], [m] Growth by depth of what moves with an element, and all that moves at the depth u: with a
+ * cone what is recruited, with a heap a part of the depth until that is the whole heap. */
+static double moved_rate(const DenseLaw *law, double u) {
+    if (law->begin == 0.0) {
+        return cone_flat(law, u);
+    }
+    return u / LAW_MOVES < law->begin + law->full / 3.0 ? 1.0 / LAW_MOVES : 0.0;
+}
+
+static double moved(const DenseLaw *law, double u) {
+    return law->begin == 0.0 ? cone_share(law, u) : fmin(u / LAW_MOVES, cone_share(law, 1e3));
+}
+
 /* Virgin ground above the bed. */
 static double virgin_force(const DenseLaw *law, double u) {
     double force = (law->k_pen - law->kappa) * cone_share(law, u) + law->kappa * u;
@@ -104,7 +117,7 @@ static double law_normal(double dt, const DenseElement *e, double w) {
     }
     double impulse = dt * force + e->mass * (fmax(w, e->reach) - e->w_a);
     if (m1 > e->front) {
-        double gained = cone_share(law, e->deep + m1 - e->front) - cone_share(law, e->deep);
+        double gained = moved(law, e->deep + m1 - e->front) - moved(law, e->deep);
         impulse += fmax(gained, fmin(2.0 * gained, e->stopped)) * dense_recruited(e, fmax(w, 0.0));
     }
     double back = fmin(w + e->hit, 0.0), eased = back < -IMPULSE_EASE
@@ -377,7 +390,7 @@ static void dense_share(double dt, DenseElement *e, const Find *find) {
         double t = (3.0 + sqrt(8.0)) * law->grip,
                held = fmin(law->mu, fmax(0.1, t * (c - q) / (2.0 * c - q))),
                way = fmax(e->u0 + 0.5 * dt * e->w0 - a, 0.0), carried = q * soil + bed,
-               struck = fmax(law->drag_rate, 0.0) * cone_flat(law, a) * way * e->w0 / dt;
+               struck = fmax(law->drag_rate, 0.0) * moved_rate(law, a) * way * e->w0 / dt;
         law->mu = held + (law->mu - held) * struck / fmax(carried + struck, 1e-300);
     }
     double side = find->faces ? 0.0 : 1.5 * law->weight * find->pitch * find->pitch / find->width;
@@ -408,11 +421,11 @@ static void dense_drag(double dt, DenseElement *e, double gained) {
         return;
     }
     double force = virgin_force(law, a) + 0.5 * virgin_slope(law, a) * (deep - a),
-           drag = extra * cone_flat(law, a);
+           drag = extra * moved_rate(law, a);
     e->hit = sqrt(e->w0 * e->w0 + 2.0 * fmax(gained, 0.0) / dt * (a - e->m0));
     e->still =
         fmin(BEGIN_STOP + sqrt(force / fmax(drag * e->hit * e->hit, 1e-300)), BEGIN_STOP_MOST);
-    e->stopped = cone_share(law, deep) - cone_share(law, a);
+    e->stopped = moved(law, deep) - moved(law, a);
 }
 
 static void dense_element(Dense *d, const Find *find) {
@@ -449,13 +462,13 @@ static void dense_element(Dense *d, const Find *find) {
     e->front = e->deep = fmax(fmax(e->m0, deepest), 0.0);
     e->reach = fmax(2.0 * (e->front - e->u0) / d->dt, 0.0);
     e->w_a = fmax(memory->front_speed[i], e->reach);
-    e->mass = fmax(e->law.mass_rate, 0.0) * cone_share(&e->law, e->deep);
+    e->mass = fmax(e->law.mass_rate, 0.0) * moved(&e->law, e->deep);
     e->radius = d->dt * e->law.k_drift * memory->drift[i] * fmax(e->u0, 0.0);
     e->damping = e->u0 > 0.0 ? d->dt * e->law.b_drift : 0.0;
     if (e->u0 > 0.0 && e->m0 >= deepest) {
         e->active =
-            fmin(e->law.mass_rate, 0.0) * cone_share(&e->law, e->deep) * (e->free[3] - e->w_a) +
-            fmin(e->law.drag_rate, 0.0) * cone_flat(&e->law, e->deep) * d->dt * e->w0 * e->w0;
+            fmin(e->law.mass_rate, 0.0) * moved(&e->law, e->deep) * (e->free[3] - e->w_a) +
+            fmin(e->law.drag_rate, 0.0) * moved_rate(&e->law, e->deep) * d->dt * e->w0 * e->w0;
     }
     element_line(e);
     dense_share(d->dt, e, find);
