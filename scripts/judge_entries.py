@@ -24,7 +24,7 @@ STEP = 1e-3  # [s] of the ground models
 PITCH = 0.01  # [m] of their soles' elements: at 19.5 mm a plate's raster is up to 6 % off its area, which no law can mend
 REGAIN = 0.136  # [grains] regain_length of mild_merged, from loads that slide on grains of 5 mm
 REFILL = 0.22  # [-] from an imprint pressed again, sand/square100-again
-HEAPS = 9  # [-] by the heap of a sole, the mass that moves with it: momentum of sand/drop10 beyond that of a slow press
+HEAPS = 9  # [-] by the heap of a sole, the mass that moves with it: momentum of sand/square100-drop10 beyond that of a slow press
 YIELD = 3 + math.sqrt(8)  # of the friction of a sole that slides: share.h
 
 
@@ -88,9 +88,12 @@ class GroundEntry:
 
     def weigh(self, ground):
         """The bed's density, which the soil at the sides of a sole presses with, the grains' friction, and the mass that moves
-        with a sole."""
-        self.material = mild.Material(self.material, phi=float(np.mean(ground["solid"])), rho=ground["density"],
-                                      c_d=1, c_g=HEAPS / math.tan(self.material.alpha), mu=ground["friction"])
+        with a sole; without merged cones the added mass per depth stays."""
+        m, solid = self.material, float(np.mean(ground["solid"]))
+        moves = {"c_g": m.c_g * m.phi * m.rho / (solid * ground["density"])}
+        if self.model == "mild_merged":
+            moves = {"c_d": 1, "c_g": HEAPS / math.tan(m.alpha)}
+        self.material = mild.Material(m, phi=solid, rho=ground["density"], mu=ground["friction"], **moves)
 
     def fit_slip(self, drags):
         """slip_length of F/F0 = 1/(1 + s/j0), and grip of the friction H/F after 5 to 12 mm, where it has built up: slip-sinkage at
