@@ -110,4 +110,30 @@ static void law_times(DenseLaw *law, double share) {
     }
 }
 
+/* P(u) = u_f/3 (1 - (1 - t)^3), t = min(u/u_f, 1): the flat area's integral over the depth, by the
+ * element's area. */
+static double cone_share(const DenseLaw *law, double u) {
+    double left = 1.0 - fmin(fmax(u - law->begin, 0.0) / law->full, 1.0);
+    return fmin(u, law->begin) + law->full / 3.0 * (1.0 - left * left * left);
+}
+
+/* Share of the element's area that is still flat. */
+static double cone_flat(const DenseLaw *law, double u) {
+    double left = 1.0 - fmin(fmax(u - law->begin, 0.0) / law->full, 1.0);
+    return left * left;
+}
+
+/* [-], [m] Growth by depth of what moves with an element, and all that moves at the depth u: with a
+ * cone what is recruited, with a heap a part of the depth until that is the whole heap. */
+static double moved_rate(const DenseLaw *law, double u) {
+    if (law->begin == 0.0) {
+        return cone_flat(law, u);
+    }
+    return u / LAW_MOVES < law->begin + law->full / 3.0 ? 1.0 / LAW_MOVES : 0.0;
+}
+
+static double moved(const DenseLaw *law, double u) {
+    return law->begin == 0.0 ? cone_share(law, u) : fmin(u / LAW_MOVES, cone_share(law, 1e3));
+}
+
 #endif

@@ -128,8 +128,8 @@ static void test_heap(void **state) {
     mild_sole_destroy(whole);
 }
 
-/* [kg] What moves with a sole at a depth: c_g phi rho nu times the sum over its elements of s min(u/5,
- * e tan(alpha)/nu), with e the mean distance from the edge. */
+/* [kg] What moves with a sole at a depth: c_g phi rho nu times the sum over its elements of
+ * s min(u/5, e tan(alpha)/nu), with e the mean distance from the edge. */
 static double moved_mass(const MildMaterial *m, const MildSole *sole, double depth) {
     const double area = mild_sole_pitch(sole) * mild_sole_pitch(sole);
     double sum = 0.0;
