@@ -6,12 +6,13 @@
 InsideLaw mild_inside_law(const MildMaterial *material, double pitch, double width) {
     const Law law = law_of(material, pitch, width);
     const Share share = share_of(material, pitch, width);
+    const MildMaterial own = material_at(material, pitch);
     const int slips = share.slip_rate > 0.0; /* then path adds no resistance */
     return (InsideLaw){
         .law = law,
         .share = share,
-        .k_drift = slips ? 0.0 : material->k_drift,
-        .b_drift = slips ? 0.0 : material->b_drift,
+        .k_drift = slips ? 0.0 : own.k_drift,
+        .b_drift = slips ? 0.0 : own.b_drift,
         .recovery = law_recovery(&law, recovery_of(material)),
         .curves = curves_of(material, &law) | model_row(material->model)->motion,
     };

@@ -27,12 +27,13 @@ static __attribute__((cold)) void law_derive(const FootScratch *foot, const Mild
                                              DerivedLaw *derived) {
     const Law law = law_of(material, foot->pitch, foot->width);
     Share share = share_of(material, foot->pitch, foot->faces ? 0.0 : foot->width);
+    const MildMaterial own = material_at(material, foot->pitch);
     share.projects = foot->faces ? 0.0 : share.projects;
     const int slips = share.slip_rate > 0.0;
     *derived =
         (DerivedLaw){.material = *material,
-                     .slot = {law, share, slips ? 0.0 : material->k_drift,
-                              slips ? 0.0 : material->b_drift, recovery_of(material)},
+                     .slot = {law, share, slips ? 0.0 : own.k_drift, slips ? 0.0 : own.b_drift,
+                              recovery_of(material)},
                      .curves = curves_of(material, &law),
                      .known = 1,
                      .nan = law_is_nan(&law) || material_is_nan(material) || share_is_nan(&share)};

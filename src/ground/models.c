@@ -1,6 +1,8 @@
 /* The table of MILD_MODEL_LIST. Each model's file defines its row. */
 #include "ground/models.h"
 
+#include "ground/sole.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -38,8 +40,19 @@ const ModelRow *model_row(int model) {
     return rows[known ? model : MILD_MODEL_MILD];
 }
 
+MildMaterial material_at(const MildMaterial *material, double pitch) {
+    const double r = model_row(material->model)->info.concentric ? 1.0 : pitch / MATERIAL_PITCH;
+    MildMaterial own = *material;
+    own.k_pen *= r * r;
+    own.k_drift *= r * r;
+    own.b_drift *= r * r;
+    own.nu *= r;
+    own.c_g /= r;
+    return own;
+}
+
 Law law_of(const MildMaterial *material, double pitch, double width) {
-    MildMaterial loaded = *material;
+    MildMaterial loaded = material_at(material, pitch);
     if (loaded.plate_width == 0.0) {
         loaded.plate_width = fmax(width, MATERIAL_PLATE_MIN);
     }

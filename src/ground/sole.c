@@ -384,7 +384,7 @@ SoleHeap sole_heap(const MildSole *sole, int element) {
         return (SoleHeap){0.0, 1.0};
     }
     const int n = sole->elements;
-    const double radius = sole->pitch / sqrt(3.14159265358979323846);
+    const double radius = MATERIAL_PITCH / sqrt(3.14159265358979323846);
     const double edge = sole->values[SOLE_EDGE * n + element] / radius;
     const double spread = sole->values[SOLE_SPREAD * n + element] / radius;
     /* The flat share (1 - t)^2 says that distances from `begin` on have the density 2 (1 - t): the

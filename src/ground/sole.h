@@ -21,8 +21,10 @@ struct MildSole {
     double values[]; /* [SOLE_PLANE_ARRAYS or SOLE_ARRAYS][elements] */
 };
 
-/* The merged cone of an element, in radii of the disc of its area: it closes from `begin` on, over
- * `width`, times tan(alpha)/nu. An element of a surface is a disc by itself. */
+#define MATERIAL_PITCH 0.0195 /* [m] edge of the element that a material's numbers belong to */
+
+/* The merged cone of an element, in radii of the disc of an element of MATERIAL_PITCH: it closes from
+ * `begin` on, over `width`, times tan(alpha)/nu. An element of a surface is a disc by itself. */
 typedef struct {
     double begin; /* [-] */
     double width; /* [-] */

@@ -22,41 +22,45 @@ static int is_straight(const MildMaterial *m) {
 
 /* Bekker: (k_c/b + k_phi) z^n on the element's area. Hunt and Crossley: k_pen u at 10 mm, damped by
  * 3/2 d; it springs back whole. */
-static void law_curve(const MildMaterial *m, double area, DenseLaw *law) {
+static void law_curve(const MildMaterial *m, double area, double k_pen, DenseLaw *law) {
     if (m->model == MILD_MODEL_BEKKER) {
         law->sinkage = (m->k_c / m->plate_width + m->k_phi) * pow(DENSE_DEPTH, m->exponent) * area;
         law->sinkage_power = m->exponent;
     } else if (m->model == MILD_MODEL_HUNT_CROSSLEY) {
-        law->elastic = m->k_pen * DENSE_DEPTH;
+        law->elastic = k_pen * DENSE_DEPTH;
         law->elastic_power = m->exponent;
         law->loss = 1.5 * m->dissipation;
         law->recovery = 1.0;
     }
 }
 
-/* heap: where the merged cone of the element begins to close, and its width, by the radius of a
- * disc of the element's area. */
+/* Of an element of that pitch. A material's stiffness and drift are those of the paper's element, by
+ * area, and so is its cone; a concentric model's are those of the whole sole. heap: where the merged
+ * cone of the element begins to close, and its width, by the radius of a disc of the paper's
+ * element. */
 static DenseLaw law_material(const MildMaterial *m, double pitch, const double heap[2]) {
     double area = pitch * pitch, c_g = m->passive ? fmax(m->c_g, 0.0) : m->c_g,
            c_d = m->passive ? fmax(m->c_d, 0.5) : m->c_d;
+    int whole = m->model == MILD_MODEL_CON_CONE || m->model == MILD_MODEL_CON_SPRING;
+    double square = whole ? area : 0.0195 * 0.0195, k_pen = m->k_pen * (area / square);
     DenseLaw law = {.bed = m->bed_depth,
                     .bed_stiffness = LAW_BED_STRESS * area,
                     .recovery = is_resistive(m) ? 0.0 : m->recovery,
                     .mu = m->mu,
-                    .k_drift = m->k_drift,
-                    .b_drift = m->b_drift};
+                    .k_drift = m->k_drift * (area / square),
+                    .b_drift = m->b_drift * (area / square)};
     if (is_straight(m)) {
         int spring = m->model == MILD_MODEL_CON_SPRING || m->model == MILD_MODEL_ECC_SPRING;
         law.k_pen = law.kappa = is_resistive(m) ? m->zeta * LAW_RESIST_STRESS * area
-                                : spring        ? m->k_pen
+                                : spring        ? k_pen
                                                 : 0.0;
         law.full = LAW_LINE_DEPTH;
-        law_curve(m, area, &law);
+        law_curve(m, area, k_pen, &law);
         return law;
     }
-    law.k_pen = m->k_pen;
+    law.k_pen = k_pen;
     law.kappa = m->sigma_cone * area / cos(m->alpha);
-    law.full = sqrt(area / acos(-1.0)) * tan(m->alpha) / m->nu;
+    law.full = sqrt(square / acos(-1.0)) * tan(m->alpha) / m->nu;
     if (m->model == MILD_MODEL_MILD_MERGED) {
         law.begin = law.full * heap[0];
         law.full *= heap[1];

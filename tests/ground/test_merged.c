@@ -37,12 +37,12 @@ static MildSole *rectangle(double length, double width, double pitch) {
 }
 
 /* Numbers of grains: k0 = 1.895 MPa/m, kappa = 0.223 MPa/m; plastic, no bed, no mass. */
-static MildMaterial grains(double pitch, double shape) {
+static MildMaterial grains(double shape) {
     MildMaterial m = mild_material_default();
     m.model = MILD_MODEL_MILD_MERGED;
     m.alpha = 1.047;
     m.nu = tan(m.alpha) / shape;
-    m.k_pen = 1.895e6 * pitch * pitch;
+    m.k_pen = 1.895e6 * KIT_PITCH * KIT_PITCH;
     m.sigma_cone = 0.223e6 * cos(m.alpha);
     m.c_g = 0.0;
     m.k_drift = m.b_drift = 0.0;
@@ -63,10 +63,9 @@ static double level_force(const MildSole *sole, const MildMaterial *m, double de
 }
 
 /* Equations 1 to 4 of the paper for a disc of that radius, integrated by the trapezoidal rule. */
-static double paper_force(const MildMaterial *m, double pitch, double radius, double area,
-                          double depth) {
+static double paper_force(const MildMaterial *m, double radius, double area, double depth) {
     enum { PANELS = 20000 };
-    const double k0 = m->k_pen / (pitch * pitch);
+    const double k0 = m->k_pen / (KIT_PITCH * KIT_PITCH);
     double force = 0.0;
     for (int i = 0; i <= PANELS; i++) {
         const double u = depth * i / PANELS;
@@ -87,11 +86,11 @@ static void test_round(void **state) {
     for (int r = 0; r < 4; r++) {
         for (int p = 0; p < 3; p++) {
             MildSole *sole = disc(radii[r], pitches[p]);
-            const MildMaterial m = grains(pitches[p], 0.312);
+            const MildMaterial m = grains(0.312);
             const double area = mild_sole_elements(sole) * pitches[p] * pitches[p];
             double here = 0.0;
             for (double depth = 0.0005; depth < 0.06; depth *= 1.25) {
-                const double paper = paper_force(&m, pitches[p], radii[r], area, depth);
+                const double paper = paper_force(&m, radii[r], area, depth);
                 here = fmax(here, fabs(level_force(sole, &m, depth) / paper - 1));
             }
             print_message("disc of %3.0f mm, %3d elements of %4.1f mm: within %.2f %%\n",
@@ -147,7 +146,7 @@ static void test_momentum(void **state) {
     (void)state;
     const double length = 0.12, width = 0.06, mass = 3.0, speed = 1.5;
     MildSole *sole = rectangle(length, width, 0.005);
-    MildMaterial m = grains(0.005, 0.3);
+    MildMaterial m = grains(0.3);
     m.k_pen = 1e-3;
     m.sigma_cone = 0.0;
     m.c_g = 20.0;
@@ -206,7 +205,7 @@ static void test_tilt(void **state) {
     (void)state;
     static const double tilts[] = {0, 8, 15, 30};
     MildSole *sole = rectangle(0.12, 0.06, 0.01);
-    const MildMaterial m = grains(0.01, 0.104);
+    const MildMaterial m = grains(0.104);
     for (int t = 0; t < 4; t++) {
         const double tilt = tilts[t] * pi / 180, c = cos(tilt), s = sin(tilt);
         Kit kit;
@@ -239,7 +238,7 @@ static void test_tilt(void **state) {
 /* A strip that is turned about its middle deep in its heap: M/(B V0) is 1/12 of a roof-shaped
  * pressure, and 1/8 of an even one. */
 static double turned_moment(int model) {
-    MildMaterial m = grains(0.005, 0.02);
+    MildMaterial m = grains(0.02);
     m.model = model;
     m.mu = 0.0;
     m.sigma_cone = model == MILD_MODEL_MILD ? 0.223e6 : 0.0; /* nothing but the heap */
@@ -285,7 +284,7 @@ static void test_drag(void **state) {
     double worst = 0.0;
     for (int t = 0; t < 8; t++) {
         MildSole *sole = rectangle(0.12, 0.06, 0.01);
-        MildMaterial m = grains(0.01, 0.104);
+        MildMaterial m = grains(0.104);
         m.model = t < 4 ? MILD_MODEL_MILD_MERGED : MILD_MODEL_MILD;
         m.slip_length = 0.0019;
         Kit kit;
@@ -318,7 +317,7 @@ static void test_drag(void **state) {
 static void test_regain(void **state) {
     (void)state;
     MildSole *sole = rectangle(0.12, 0.06, 0.01);
-    MildMaterial m = grains(0.01, 0.104);
+    MildMaterial m = grains(0.104);
     m.slip_length = 0.0019;
     m.regain_length = 0.00068;
     Kit kit;
@@ -349,7 +348,7 @@ static void test_regain(void **state) {
 static void test_sinks(void **state) {
     (void)state;
     MildSole *sole = rectangle(0.12, 0.06, 0.01);
-    MildMaterial m = grains(0.01, 0.104);
+    MildMaterial m = grains(0.104);
     double depth[2];
     for (int slips = 0; slips < 2; slips++) {
         m.slip_length = slips ? 0.0019 : 0.0;
@@ -499,7 +498,7 @@ static double pumped(int model, double *paid) {
                                        0.8e-3, -0.82e-3, 0.8e-3, -0.82e-3, 0.8e-3, -1e-3,
                                        0,      0,        0.6e-3, 0};
     static const double forward[STEPS] = {[12] = 0.01, [13] = -0.01};
-    MildMaterial m = grains(0.01, 0.104);
+    MildMaterial m = grains(0.104);
     m.model = model;
     m.slip_length = 1e-4;
     m.regain_length = 1e-4;

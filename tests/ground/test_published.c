@@ -132,6 +132,7 @@ static double added_mass_energy(const Durian *p, double c_d, double energy, doub
  * s constant. */
 static MildMaterial durian_material(const Durian *p, double edge, double c_d) {
     MildMaterial m = preset("sand_loose");
+    m.model = MILD_MODEL_CON_CONE; /* one cone under the whole body */
     m.alpha = 1.5;
     m.nu = 0.1;
     m.k_pen = p->k;
@@ -287,6 +288,7 @@ static void exponents(const MildMaterial *m, double edge, int side, double densi
 static void test_uehara(void **state) {
     (void)state;
     MildMaterial cone = preset("sand_loose");
+    cone.model = MILD_MODEL_CON_CONE;
     cone.c_g = 0.0;
     cone.alpha = 1.5;
     cone.nu = 0.1;

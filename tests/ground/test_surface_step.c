@@ -172,12 +172,12 @@ static void pressed_shapes_meet_closed_forms(void **state) {
             expect_near("sphere", got, want, 0.015 * want);
             expect_near("capsule", lies, flat, 0.015 * flat);
         }
-        /* springs: k/pitch^2 times the volume of the cap below the surface */
+        /* springs: stiffness per area times the volume of the cap below the surface */
         if (g == 0) {
             const double cap = pi * 0.04 * 0.04 * (3 * radius - 0.04) / 3;
             expect_near("cap", sphere_force(m, pitch, radius, 0.04),
-                        spring.k_pen / pitch / pitch * cap,
-                        1e-3 * spring.k_pen / pitch / pitch * cap);
+                        spring.k_pen / KIT_PITCH / KIT_PITCH * cap,
+                        1e-3 * spring.k_pen / KIT_PITCH / KIT_PITCH * cap);
         }
     }
     mild_sole_destroy(sphere);
