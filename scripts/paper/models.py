@@ -1,9 +1,13 @@
 """Policies trained on one ground model each: who survives where, how deep they sink, how they walk on foam."""
+import json
+import pathlib
+
 import figures
 from measure import TRAINED, deviation, evaluate, mean, mild, models_of, read, save, together
 from page import Cell, Claim, Section, Table
 
-JUDGES = TRAINED[:-1] + ["bekker", "hunt_crossley", "rigid"]
+JUDGES = TRAINED[:-1] + ["bekker", "hunt_crossley", "mild_merged", "rigid", "grains"]
+GRAINS = pathlib.Path(__file__).parents[2] / "grains" / "walk" / "grounds.json"  # fitted to grains: docs/grains.md
 TESTED = ["foam25", "foam45", "sand_loose"]
 
 
@@ -12,13 +16,22 @@ def policies(given):
     return [(model, seed, policy) for model, files in models_of(given).items() for seed, policy in enumerate(files, 1)]
 
 
+def judged(given, policy, judge):
+    """Rows of a policy on the ground models' grounds; of the judge "grains" on mild_merged as it is fitted to two beds of grains."""
+    if judge != "grains":
+        return evaluate(given, policy, TESTED, [0.6], "--config", given.models_config, "--model", judge)
+    return [{**row, "ground": family} for family, fits in json.loads(GRAINS.read_text()).items()
+            for row in evaluate(given, policy, ["sand_loose"], [0.6], "--config", given.models_config, "--model", "mild_merged",
+                                *(f"--ground.{name}={value}" for name, value in fits["mild_merged"].items()))]
+
+
 def transfer(given):
     """Trained on one model, walked on every other."""
     tasks = [(*who, judge) for who in policies(given) for judge in JUDGES]
 
     def work(task):
         _, _, policy, judge = task
-        return evaluate(given, policy, TESTED, [0.6], "--config", given.models_config, "--model", judge)
+        return judged(given, policy, judge)
 
     rows = []
     for (trained, seed, _, judge), found in zip(tasks, together(given, work, tasks)):
@@ -43,12 +56,15 @@ def transfer(given):
             for name, key in (("clearance", "clearance"), ("penetration", "penetration"), ("slip forward", "slip_forward"))}
     others = {a: mean(u for b, u in zip(JUDGES, row) if b != a) for a, row in zip(trained, upright)}
     outside = {a: mean(u for b, u in zip(JUDGES, row) if b in ("bekker", "hunt_crossley")) for a, row in zip(trained, upright)}
+    grains = {a: row[JUDGES.index("grains")] for a, row in zip(trained, upright)}
+    regret = {a: max(grains.values()) - u for a, u in grains.items()}
     best, best_outside = max(others, key=others.get), max(outside, key=outside.get)
     text = (f"Trained on the model of the row, walked on that of the column: {', '.join(TESTED)} at 0.6 m/s, "
             f"{given.trials} trials of each of {max(len(files) for files in models_of(given).values())} seeds. Speed, cost and feet: of "
             "rows in which anybody stayed up.\n\n"
             "On all models but its own: " + ", ".join(f"{a} {u:.0f} %" for a, u in others.items()) +
             ". On bekker and hunt_crossley, with which nobody was trained: " + ", ".join(f"{a} {u:.0f} %" for a, u in outside.items()) +
+            ".\n\nOn grains, as mild_merged is fitted to them, behind the best: " + ", ".join(f"{a} {u:.0f} %" for a, u in regret.items()) +
             ".\n\nCon-Cone and Con-Spring have one element a foot, which carries no moment: who has learnt to lean on the edge of "
             "a sole falls there, and who has not is slow and dear elsewhere.")
     ours = f"on the models but its own: {best} {others[best]:.0f} %, mild {others.get('mild', 0):.0f} %"
