@@ -24,8 +24,8 @@
  *     solver    4 K residual: the twist solved for is within it, and impulses are at most twice
  *               the free motion
  *     landed    what the line of resistive theory holds after an element's first step in the ground,
- *               which does not put the yield depth ahead: at most F ELEMENT_ELASTIC/2 once a
- *               landing. This one is the ground's own
+ *               which does not put the yield depth ahead, or within its first ELEMENT_ELASTIC: at
+ *               most F ELEMENT_ELASTIC/2 once a landing. This one is the ground's own
  * None of these is fitted. */
 #include <stdio.h>
 
@@ -257,6 +257,11 @@ static double slot_way(const Slots *s, int i, double dt, double descent, double 
     return (s->iz[i] + lag + mass) / dt * fmax(beyond, 0);
 }
 
+/* Bool: the yield depth of a slot is not ahead of it, or within the first elastic travel. */
+static int slot_lands(const Slots *s, int i) {
+    return s->depth_max[i] == s->middle[i] || s->depth_max[i] <= ELEMENT_ELASTIC;
+}
+
 /* Bool: the material of a slot is of resistive theory. */
 static int resists(const MildTerrain *terrain, int32_t material) {
     const int model = terrain->materials[material & 0xff].model;
@@ -294,7 +299,7 @@ static double count_body(const RobotSim *sim, const MildTerrain *terrain, int bo
         account->allowed += slot_way(s, i, dt, v[0].descent, v[1].descent);
         account->stored += stored;
         account->touched += s->depth_max[i] > 0 ? 0 : stored;
-        if (resists(terrain, foot->slot_material[e]) && s->depth_max[i] == s->middle[i]) {
+        if (resists(terrain, foot->slot_material[e]) && slot_lands(s, i)) {
             account->landed += slot_line(s, i);
         }
     }
