@@ -329,7 +329,7 @@ static Account count(const RobotSim *sim, const MildTerrain *terrain, const doub
     const double after = mju_dot(momentum, d->qvel, nv) / 2;
     if (d->nefc == 0) { /* no joint limit: the forces that are counted are those that move it */
         expect_near("kinetic energy of a step", after - account.kinetic, forces,
-                    1e-9 * (after + account.kinetic + fabs(met)));
+                    1e-12 + 1e-9 * (after + account.kinetic + fabs(met)));
     }
     for (int k = 0; k < sim->scratch->listed; k++) {
         expected += count_body(sim, terrain, sim->scratch->list[k], &account);
