@@ -16,7 +16,7 @@
  *
  *     way       the engine moves an element by d beyond h times its mean speed: at most F d, with F
  *               the static force of the step
- *     touch     it puts an element that touched nothing into the ground: what the line then holds
+ *     touch     it puts an element that was above the ground into it: what the line then holds
  *     answer    joint limits answer the ground otherwise than it expected: h F . (V' - V)/2 for the
  *               twists V' that came and V that it expected
  *     friction  opposes the speed after the step, W counts at the mean: 8 % of the energy of the
@@ -217,7 +217,7 @@ static void throw_robot(const Robot *robot, RobotSim *sim, const MildTerrain *te
 typedef struct {
     double work;    /* W */
     double stored;  /* S */
-    double touched; /* of S, what elements hold that touched nothing in the step before */
+    double touched; /* of S, what elements hold that were above the ground in the step before */
     double landed;  /* of S, what elements of resistive theory hold after their first step */
     double allowed; /* but for `touched` and `landed` of the next step */
     double kinetic; /* of the robot */
@@ -298,7 +298,7 @@ static double count_body(const RobotSim *sim, const MildTerrain *terrain, int bo
         turned += fabs(fx * (v[2].x - v[0].x) + fy * (v[2].y - v[0].y)) / 2;
         account->allowed += slot_way(s, i, dt, v[0].descent, v[1].descent);
         account->stored += stored;
-        account->touched += s->depth_max[i] > 0 ? 0 : stored;
+        account->touched += s->last_middle[i] > 0 ? 0 : stored;
         if (resists(terrain, foot->slot_material[e]) && slot_lands(s, i)) {
             account->landed += slot_line(s, i);
         }
