@@ -374,7 +374,7 @@ static void feet_that_move_are_another_matter(void **unused) {
     robot_sim_load(stand.sim, &state, &stand.variation);
     const double first = stand_energy(&stand);
     double most = 0;
-    for (int s = 0; s < 2000; s++) {
+    for (int s = 0; s < 4000; s++) {
         stand_step(&stand);
         most = fmax(most, stand_energy(&stand));
     }
