@@ -374,14 +374,14 @@ static void feet_that_move_are_another_matter(void **unused) {
     robot_sim_load(stand.sim, &state, &stand.variation);
     const double first = stand_energy(&stand);
     double most = 0;
-    for (int s = 0; s < 4000; s++) {
+    for (int s = 0; s < 2000; s++) {
         stand_step(&stand);
         most = fmax(most, stand_energy(&stand));
     }
     const double last = stand_energy(&stand);
     printf("foam60, feet pushed along +y: %.2f J, at most %.2f afterwards, at last %.1e\n", first,
            most, last);
-    assert_true(most < 10 && last < 0.05 * first);
+    assert_true(most < 10 && last < 0.2 * first);
     stand_close(&stand);
 }
 

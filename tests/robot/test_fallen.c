@@ -268,6 +268,23 @@ static int resists(const MildTerrain *terrain, int32_t material) {
     return model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D;
 }
 
+/* Velocity of a slot's element [m/s]; descent: at which its depth grows. */
+typedef struct {
+    double x, y, descent;
+} Moves;
+
+static Moves slot_moves(const FootScratch *foot, const Slots *s, int i, const double *V) {
+    double p[3];
+    for (int k = 0; k < 3; k++) {
+        p[k] = foot->arm[0][k] + foot->arm[1][k] * s->x[i] + foot->arm[2][k] * s->y[i] +
+               foot->arm[3][k] * s->z[i];
+    }
+    const double x = V[0] + V[4] * p[2] - V[5] * p[1];
+    const double y = V[1] + V[5] * p[0] - V[3] * p[2];
+    const double z = V[2] + V[3] * p[1] - V[4] * p[0];
+    return (Moves){x, y, s->slope_x[i] * x + s->slope_y[i] * y - z};
+}
+
 /* Adds what the elements of a body store, and what its motion allows. Returns [J] the work that the
  * ground expects to do on it. */
 static double count_body(const RobotSim *sim, const MildTerrain *terrain, int body,
@@ -277,8 +294,6 @@ static double count_body(const RobotSim *sim, const MildTerrain *terrain, int bo
     const double *V = sim->contact.velocity + 6 * body, dt = sim->dt;
     const double *before = sim->input.velocity[body];
     const double *free_of_it = sim->input.free_velocity + 6 * body;
-    const Motion motions[3] = {foot_motion(foot, before), foot_motion(foot, V),
-                               foot_motion(foot, free_of_it)};
     double work = 0, energy = 0, turned = 0;
     for (int k = 0; k < 6; k++) {
         const double impulse = dt * (k < 3 ? result->force[k] : result->torque[k - 3]);
@@ -288,9 +303,10 @@ static double count_body(const RobotSim *sim, const MildTerrain *terrain, int bo
     for (int e = 0; e < foot->active; e++) {
         const Slots *s = slot_block(foot, e);
         const int i = e % SLOT_LANES;
-        SlotVelocity v[3];
+        const double *const twists[3] = {before, V, free_of_it};
+        Moves v[3];
         for (int k = 0; k < 3; k++) {
-            v[k] = slot_velocity(s, i, &motions[k], SLOT_UNEVEN | SLOT_FACES);
+            v[k] = slot_moves(foot, s, i, twists[k]);
         }
         const double fx = s->ix[i] + s->slope_x[i] * s->iz[i];
         const double fy = s->iy[i] + s->slope_y[i] * s->iz[i];
