@@ -23,9 +23,10 @@
  *               impulses (energy.c) and what gravity and joints turned within the step
  *     solver    4 K residual: the twist solved for is within it, and impulses are at most twice
  *               the free motion
- *     landed    what the line of resistive theory holds after an element's first step in the ground,
- *               which does not put the yield depth ahead, or within its first ELEMENT_ELASTIC: at
- *               most F ELEMENT_ELASTIC/2 once a landing. This one is the ground's own
+ *     landed    what the line of resistive theory holds after an element's first step in the
+ *               ground, which does not put the yield depth ahead, or within its first
+ *               ELEMENT_ELASTIC: at most F ELEMENT_ELASTIC/2 once a landing. This is the ground's
+ *               own
  * None of these is fitted. */
 #include <stdio.h>
 
@@ -363,9 +364,10 @@ typedef struct {
     int over;               /* steps beyond what is allowed */
     double worst;           /* [J] beyond */
     double landed;          /* [J] most in a step */
-    int seed;               /* first + number of the worst */
-    int given;              /* falls in which the ground has at some time given more than it took */
-    double most;            /* [-] of such a fall, of the greatest kinetic energy */
+    double allowed; /* [-] in a fall, of its greatest kinetic energy, summed over the falls */
+    int seed;       /* first + number of the worst */
+    int given;      /* falls in which the ground has at some time given more than it took */
+    double most;    /* [-] of such a fall, of the greatest kinetic energy */
 } Falls;
 
 static void fall(Robot *robot, int model, int number, Falls *all) {
@@ -378,7 +380,7 @@ static void fall(Robot *robot, int model, int number, Falls *all) {
     Place place = draw_place(robot, model, &random);
     throw_robot(robot, sim, &place.terrain, &random);
     const double damping = random_uniform(&random, 0, 0.5); /* [N m s/rad] */
-    double sum = 0, most = 0, kinetic = 0;
+    double sum = 0, most = 0, kinetic = 0, allowed = 0;
     int touch = 0, lost = 0, over = 0;
     Account last = {0};
     for (int s = 0; s < seconds / sim->dt && !lost; s++) {
@@ -406,6 +408,7 @@ static void fall(Robot *robot, int model, int number, Falls *all) {
         all->unsolved += !sim->contact.converged;
         touch |= now.work != 0;
         sum += now.work;
+        allowed += now.allowed + now.touched + now.landed;
         most = fmax(most, sum);
         kinetic = fmax(kinetic, now.kinetic);
         last = now;
@@ -421,6 +424,7 @@ static void fall(Robot *robot, int model, int number, Falls *all) {
     all->lost += lost;
     all->given += most > 1e-9 * kinetic;
     all->most = fmax(all->most, most / kinetic);
+    all->allowed += allowed / kinetic;
     close_place(&place);
     robot_sim_destroy(sim);
 }
@@ -438,11 +442,11 @@ static void the_ground_never_creates_energy(void **unused) {
         print_message(
             "%-13s %d falls, %d touch, %d lost, %d steps in the ground, %d unsolved; "
             "energy rises in %d, beyond what is allowed in %d, by %.1e J at most (fall "
-            "%d); landings give %.1e J at most; %d falls were given energy, %.2g of their "
-            "own at most\n",
+            "%d); allowed in a fall %.3f of its kinetic energy (mean), landings %.1e J in "
+            "a step; %d falls were given energy, %.2g of their own at most\n",
             m == MILD_MODEL_RIGID ? "mixed" : mild_model_names[m], f->falls, f->touch, f->lost,
-            f->steps, f->unsolved, f->rise, f->over, f->worst, f->seed, f->landed, f->given,
-            f->most);
+            f->steps, f->unsolved, f->rise, f->over, f->worst, f->seed,
+            f->allowed / fmax(f->falls, 1), f->landed, f->given, f->most);
         over += f->over;
         touch += f->touch;
         lost += f->lost;
