@@ -258,15 +258,18 @@ static double slot_way(const Slots *s, int i, double dt, double descent, double 
     return (s->iz[i] + lag + mass) / dt * fmax(beyond, 0);
 }
 
-/* Bool: the yield depth of a slot is not ahead of it, or within the first elastic travel. */
+/* Bool: the yield depth of a slot is not ahead of it, or the slot is within the first elastic travel,
+ * where the yield depth is up to that ahead. */
 static int slot_lands(const Slots *s, int i) {
-    return s->depth_max[i] == s->middle[i] || s->depth_max[i] <= ELEMENT_ELASTIC;
+    return s->depth_max[i] == s->middle[i] || s->depth_max[i] <= 2 * ELEMENT_ELASTIC;
 }
 
-/* Bool: the material of a slot is of resistive theory. */
+/* Bool: the material of a slot, or both of a mixture, are of resistive theory. state.h has the code
+ * of a mixture. */
 static int resists(const MildTerrain *terrain, int32_t material) {
     const int model = terrain->materials[material & 0xff].model;
-    return model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D;
+    const int resist = model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D;
+    return resist && (material < 0x10000 || resists(terrain, material >> 8 & 0xff));
 }
 
 /* Velocity of a slot's element [m/s]; descent: at which its depth grows. */
