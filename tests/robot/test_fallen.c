@@ -258,8 +258,8 @@ static double slot_way(const Slots *s, int i, double dt, double descent, double 
     return (s->iz[i] + lag + mass) / dt * fmax(beyond, 0);
 }
 
-/* Bool: the yield depth of a slot is not ahead of it, or the slot is within the first elastic travel,
- * where the yield depth is up to that ahead. */
+/* Bool: the yield depth of a slot is not ahead of it, or the slot is within its first elastic
+ * travel, where the yield depth is up to that ahead. */
 static int slot_lands(const Slots *s, int i) {
     return s->depth_max[i] == s->middle[i] || s->depth_max[i] <= 2 * ELEMENT_ELASTIC;
 }
