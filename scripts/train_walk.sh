@@ -71,7 +71,7 @@ done
     --ppo.anneal="600 1150"
 
 # ---- from one ground onto another: hips and knees bound to 87 N m, stripes of materials, strong pushes, no end by a shank ----
-free=(--config "$config" --task.shells_stand=false --task.shell_depth=0.25 --task.crossing_limit=0)
+free=(--config "$config" --task.shells_stand=false --task.crossing_limit=0)
 # 11: gentle terrain, then walk.ini
 "$mild" train "${free[@]}" --out "$out/gentle_border" --train.start="$out/last/policy.safetensors" "${gentle[@]}" \
     --randomize.push_linear=0.4 --task.vx="-1.4 1.6" --ppo.anneal="9000 9900"

@@ -8,7 +8,7 @@
 Prints, for each pair and speed, how many of the trials stay upright, the error of the mean speed, the cost of transport, and the
 largest torque in any trial; OUT/transitions.json has them, with the causes of the ends, one by one. A trial lasts two seconds and the
 time of two patches at the commanded speed: the robot starts on the first ground, whose end is a patch ahead. What it measures is what
-`mild eval` measures of the course; options after -- go to every `mild eval`, as -- --task.shell_depth=0.1.
+`mild eval` measures of the course; options after -- go to every `mild eval`, as -- --task.shells_stand=false.
 
 --figure walks FIRST>SECOND>FIRST forward and backward and draws every stride over the borders, above an embedding of z~: OUT/transition.png,
 with the strides in OUT/strides.csv. It needs what scripts/paper/requirements.txt names."""

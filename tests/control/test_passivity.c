@@ -200,6 +200,191 @@ static void base_is_turned_back(void **unused) {
     body_destroy(body);
 }
 
+/* ---- energy ---- */
+
+/* A stand whose springs are at rest: both feet down, the centre of mass over their middle. */
+typedef struct {
+    Body *body;
+    RobotSim *sim;
+    MildGround *ground;
+    MildTerrain terrain;
+    RobotVariation variation;
+    WalkTarget target;
+    double b;     /* [s] of the DCM */
+    double mass;  /* [kg] */
+    size_t bytes; /* of the ground */
+} Stand;
+
+static void stand_step(Stand *stand) {
+    WalkState state;
+    double torque[ROBOT_JOINTS_MAX];
+    body_measure(stand->body, stand->sim, stand->b, &state);
+    assert_int_equal(body_torque(stand->body, &stand->target, stand->b, torque), 0);
+    assert_int_equal(robot_sim_step(stand->sim, torque, NULL, &stand->terrain, stand->ground), 0);
+}
+
+/* [J] Kinetic energy of the robot, and what the springs hold that the impedances stand for: K = m
+ * k/b of the centre of mass about p, and of the base about upright, whose torque is its stiffness
+ * times the sine of the angle. From MuJoCo's state, not the controller's. */
+static double stand_energy(const Stand *stand) {
+    const mjModel *m = robot_sim_model(stand->sim);
+    const mjData *d = robot_sim_data(stand->sim);
+    const BodyDef def = body_def_default();
+    const double *rotation = robot_sim_base_rotation(stand->sim);
+    double momentum[NV], square = 0;
+    mj_mulM(m, d, momentum, d->qvel);
+    for (int k = 0; k < 3; k++) {
+        const double off = d->subtree_com[3 + k] - stand->target.point[k];
+        square += off * off;
+    }
+    return mju_dot(momentum, d->qvel, NV) / 2 + stand->mass * def.dcm_gain / stand->b * square / 2 +
+           def.turn_stiffness * (3 - rotation[0] - rotation[4] - rotation[8]) / 2;
+}
+
+/* The velocity, in the engine's order, of a motion of the centre of mass and the base while the
+ * feet rest: J nu = (motion, 0), by least squares on MuJoCo's own Jacobians. */
+static void resting_feet(const Stand *stand, const double motion[6], double nu[NV]) {
+    const mjModel *m = robot_sim_model(stand->sim);
+    mjData *d = robot_sim_data(stand->sim);
+    double j[NV][NV] = {{0}}, normal[NV][NV], right[NV];
+    mj_jacSubtreeCom(m, d, j[0], 1);
+    mj_jacBody(m, d, NULL, j[3], 1);
+    for (int f = 0; f < WALK_FEET; f++) {
+        mj_jacBody(m, d, j[6 + 6 * f], j[9 + 6 * f], robot_foot_body(robot, f));
+    }
+    for (int a = 0; a < NV; a++) {
+        right[a] = 0;
+        for (int t = 0; t < 6; t++) {
+            right[a] += j[t][a] * motion[t];
+        }
+        for (int b = 0; b < NV; b++) {
+            normal[a][b] = a == b ? 1e-9 : 0;
+            for (int t = 0; t < NV; t++) {
+                normal[a][b] += j[t][a] * j[t][b];
+            }
+        }
+    }
+    mju_cholFactor(normal[0], NV, 0);
+    mju_cholSolve(nu, normal[0], right, NV);
+}
+
+/* On both feet on rigid ground or on foam60 until it rests. */
+static void stand_open(Stand *stand, int rigid) {
+    const BodyDef def = body_def_default();
+    MildError error = {0};
+    MildMaterial material;
+    WalkState state;
+    assert_true(mild_material_preset("foam60", &material));
+    *stand = (Stand){.b = 0.254,
+                     .terrain = mild_terrain_uniform(&material),
+                     .variation = robot_variation_nominal(),
+                     .mass = robot_total_mass(robot)};
+    stand->variation.rigid = rigid;
+    stand->body = body_create(robot, &def, robot_effort(robot), &error);
+    stand->sim = robot_sim_create(robot, 0.0025, &error);
+    stand->bytes = mild_ground_bytes(robot_soles(robot), robot_bodies(robot));
+    void *block = aligned_alloc(64, stand->bytes);
+    assert_true(stand->body && stand->sim && block);
+    stand->ground = mild_ground_init(block, robot_soles(robot), robot_bodies(robot));
+    RobotState start = {.qpos = {0, 0, robot_stand_height(robot), 1, 0, 0, 0}};
+    memcpy(start.qpos + 7, robot_default_pose(robot),
+           (size_t)robot_joints(robot) * sizeof *start.qpos);
+    robot_sim_load(stand->sim, &start, &stand->variation);
+    body_measure(stand->body, stand->sim, stand->b, &state);
+    const mjData *d = robot_sim_data(stand->sim);
+    stand->target = (WalkTarget){.stands = {1, 1}, .share = {1, 1}, .swing = -1, .still = 1};
+    for (int k = 0; k < 3; k++) {
+        stand->target.point[k] =
+            k < 2 ? (state.support[0][k] + state.support[1][k]) / 2 : d->subtree_com[5] - 0.01;
+        stand->target.dcm[k] = stand->target.point[k];
+    }
+    for (int s = 0; s < 1600; s++) {
+        stand_step(stand);
+    }
+}
+
+static void stand_close(Stand *stand) {
+    robot_sim_destroy(stand->sim);
+    body_destroy(stand->body);
+    free(stand->ground);
+}
+
+/* While the feet rest and the ground gives the wrench that is asked for, the motors' power is that
+ * of the impedances, so that kinetic energy and springs fall by what the dampers take: they never
+ * exceed what a kick brought. Soft ground lets the feet go, and may give back what it has stored
+ * under them: less than the weight times the sinkage. */
+static void motors_give_no_energy(void **unused) {
+    (void)unused;
+    for (int rigid = 0; rigid < 2; rigid++) {
+        Stand stand;
+        RobotState rest, kicked;
+        stand_open(&stand, rigid);
+        const double weight = GRAVITY * stand.mass;
+        const double sinks = rigid ? 0 : robot_sim_foot(stand.sim, 0)->result.depth_max;
+        void *ground = malloc(stand.bytes);
+        assert_non_null(ground);
+        memcpy(ground, stand.ground, stand.bytes);
+        robot_sim_store(stand.sim, &rest);
+        assert_true(stand_energy(&stand) < 1e-6);
+        for (int n = 0; n < 12; n++) {
+            double motion[6] = {0}, nu[NV], most = 0, rise = 0;
+            motion[n / 2] = (n % 2 ? -1 : 1) * (n / 2 < 3 ? 0.1 : 0.2);
+            kicked = rest;
+            memcpy(stand.ground, ground, stand.bytes);
+            robot_sim_load(stand.sim, &rest, &stand.variation);
+            resting_feet(&stand, motion, nu);
+            for (int k = 0; k < 6; k++) {
+                kicked.qvel[k] += nu[k];
+            }
+            for (int i = 0; i < robot_joints(robot); i++) {
+                kicked.qvel[6 + i] += nu[robot_joint_dof(robot)[i]];
+            }
+            robot_sim_load(stand.sim, &kicked, &stand.variation);
+            const double first = stand_energy(&stand);
+            double last = first;
+            for (int s = 0; s < 800; s++) {
+                stand_step(&stand);
+                const double now = stand_energy(&stand);
+                rise = fmax(rise, now - last);
+                most = fmax(most, now);
+                last = now;
+            }
+            printf("%s, %s %c%c: %.4f J, at most %.4f afterwards, at last %.1e; rises by %.1e in a "
+                   "step\n",
+                   rigid ? "rigid" : "foam60", n / 2 < 3 ? "pushed" : "turned", "+-"[n % 2],
+                   "xyz"[n / 2 % 3], first, most, last, rise);
+            assert_true(most <= first + weight * sinks);
+            assert_true(last < 0.05 * first);
+            assert_true(!rigid || rise < 1e-3 * first); /* contacts of MuJoCo give way a little */
+        }
+        free(ground);
+        stand_close(&stand);
+    }
+}
+
+/* Outside of that condition, feet and all pushed sideways on foam, the motors put energy in before
+ * the robot rests again (docs/controllers.md). */
+static void feet_that_move_are_another_matter(void **unused) {
+    (void)unused;
+    Stand stand;
+    RobotState state;
+    stand_open(&stand, 0);
+    robot_sim_store(stand.sim, &state);
+    state.qvel[1] += 0.2;
+    robot_sim_load(stand.sim, &state, &stand.variation);
+    const double first = stand_energy(&stand);
+    double most = 0;
+    for (int s = 0; s < 2000; s++) {
+        stand_step(&stand);
+        most = fmax(most, stand_energy(&stand));
+    }
+    const double last = stand_energy(&stand);
+    printf("foam60, feet pushed along +y: %.2f J, at most %.2f afterwards, at last %.1e\n", first,
+           most, last);
+    assert_true(most < 10 && last < 0.2 * first);
+    stand_close(&stand);
+}
+
 /* ---- through the environment ---- */
 
 typedef struct {
@@ -299,6 +484,8 @@ int main(void) {
         cmocka_unit_test(torques_give_the_planned_motion),
         cmocka_unit_test(moving_soles_are_damped),
         cmocka_unit_test(base_is_turned_back),
+        cmocka_unit_test(motors_give_no_energy),
+        cmocka_unit_test(feet_that_move_are_another_matter),
         cmocka_unit_test(stands),
         cmocka_unit_test(walks),
         cmocka_unit_test(refuses_a_quadruped),

@@ -174,7 +174,6 @@ static void stand_twice(int device, const MildMapDef *on, int *far, int *same) {
     for (int stand = 0; stand < 2; stand++) {
         TaskDef def = shells_def();
         def.shells_stand = stand;
-        def.shell_depth = 1; /* no end either */
         def.map = map;
         pair_open(SA01, &def, device);
         pair_reset();

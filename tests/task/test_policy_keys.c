@@ -20,7 +20,6 @@ static TaskDef changed(void) {
     def.action_clip = 7;
     strcpy(def.torque_share, SHARES);
     def.torque_hold = 1;
-    def.shell_depth = 0.04;
     strcpy(def.kp, GAINS);
     strcpy(def.kd, "1.5");
     def.physics_dt = 0.001;
@@ -40,10 +39,13 @@ static void printed_and_read(void **state) {
     assert_true(to.history_stride == 3 && to.velocity_scale == 2 && to.height_scale == 5);
     assert_true(to.action_scale == 0.3 && to.action_clip == 7);
     assert_string_equal(to.torque_share, SHARES);
-    assert_true(to.torque_hold == 1 && to.shell_depth == 0.04);
+    assert_true(to.torque_hold == 1);
     assert_string_equal(to.kp, GAINS);
     assert_string_equal(to.kd, "1.5");
     assert_true(to.physics_dt == task_def_default().physics_dt); /* no matter of the policy's */
+    assert_int_equal(task_policy_keys_read(&to, "shell_depth = 0.06; clock = true", &error),
+                     MILD_OK);
+    assert_true(to.clock == 1); /* the key before it has no effect any more */
     to = changed();
     assert_int_equal(task_policy_keys_read(&to, "", &error), MILD_OK); /* an older file */
     assert_true(to.gait_period == 0.7 && to.clock == 0);

@@ -3,13 +3,25 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const keys[] = {"gait_period",    "gait_slowing", "gait_slow_below",
-                                   "standing_below", "clock",        "history_stride",
-                                   "velocity_scale", "height_scale", "action_scale",
-                                   "action_clip",    "torque_share", "torque_hold",
-                                   "shell_depth",    "kp",           "kd"};
+static const char *const keys[] = {"gait_period",
+                                   "gait_slowing",
+                                   "gait_slow_below",
+                                   "standing_below",
+                                   "clock",
+                                   "history_stride",
+                                   "velocity_scale",
+                                   "height_scale",
+                                   "action_scale",
+                                   "action_clip",
+                                   "torque_share",
+                                   "torque_hold",
+                                   "kp",
+                                   "kd"};
 
 enum { KEYS = sizeof keys / sizeof *keys };
+
+/* A key of older files, which has no effect: a shell in soft ground ends no episode. */
+static const char gone[] = "shell_depth";
 
 void task_policy_keys_print(const TaskDef *def, char *text, size_t size) {
     size_t used = 0;
@@ -44,6 +56,9 @@ static MildStatus take_key(TaskDef *def, const char *text, size_t length, MildEr
     }
     if (equals) {
         *equals = '\0';
+    }
+    if (equals && strcmp(line, gone) == 0) {
+        return MILD_OK;
     }
     if (!equals || !is_policy_key(line)) {
         return mild_fail(error, MILD_ERROR_FORMAT,

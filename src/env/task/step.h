@@ -367,16 +367,15 @@ MILD_HD_FN int task_joint_is_broken(const TaskEnv *env, const RobotTable *robot)
  * contact of the legs does not keep a foot from passing before the other to its far side. */
 MILD_HD_FN TaskEnd task_end_cause(const TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                   const RobotReading *reading) {
-    const int stand = def->shells_stand && !env->variation.rigid;
-    const double depth = env->variation.rigid || stand ? 0 : def->shell_depth;
-    const int lies = stand && def->may_lie;
+    const int rigid = env->variation.rigid;
+    const int lies = def->shells_stand && !rigid && def->may_lie;
     if (!lies && reading->rotation[8] < task_cos(def->tilt_limit)) {
         return TASK_END_tilt;
     }
-    if (!lies && reading->base_clearance < -depth) {
+    if (!lies && reading->base_clearance < 0) {
         return TASK_END_base;
     }
-    if (!stand && reading->body_clearance < -depth) {
+    if (rigid && reading->body_clearance < 0) {
         return TASK_END_shell;
     }
     if (def->crossing_limit > -1 && reading->foot_distance < def->crossing_limit) {

@@ -188,12 +188,9 @@ const MildField task_fields[] = {
     T(tilt_limit, D, 1, 0.1, 3.1, "[rad] the episode ends when the base tilts more than this"),
     T(crossing_limit, D, 1, -1, 1,
       "[m] the episode ends when the feet are laterally closer than this; -1: never"),
-    T(shell_depth, D, 1, 0, 1,
-      "[m] without shells_stand: the episode ends when a geom of `shells` of robot.ini is deeper "
-      "than this below the undisturbed surface of soft ground"),
     T(shells_stand, B, 1, 0, 1,
-      "[bool] geoms of `shells` of robot.ini stand on soft ground as soles do; there a shell of "
-      "the base ends the episode when it touches the ground, and no other"),
+      "[bool] geoms of `shells` of robot.ini stand on soft ground as soles do; either way a shell "
+      "of the base ends the episode when it touches the ground, on soft ground no other"),
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
     MILD_FIELD_CHOICE(

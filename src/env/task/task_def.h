@@ -171,7 +171,6 @@ typedef struct {
     double tilt_limit;   /* [rad] */
     double crossing_limit;    /* [m] lateral distance of the feet below which the episode ends */
     int shells_stand;         /* bool: shells stand on soft ground (robot_set_shells) */
-    double shell_depth;       /* [m] of the shells in soft ground, past which the episode ends */
     int assist;               /* bool: helping hand for beginners (assist.h) */
     int solver;               /* MildSolver */
     double contact_tolerance; /* [-] relative residual at which the contact solver stops */

@@ -79,6 +79,25 @@ static const ConfigRename renames[] = {
     {"task", "newton", "0", "solver", "gauss_seidel"},
 };
 
+/* A key that has no effect any more (VERSIONING.md), and what holds instead. */
+typedef struct {
+    const char *section, *key, *instead;
+} ConfigGone;
+static const ConfigGone gone[] = {
+    {"task", "shell_depth", "a shank in soft ground ends no episode, a base that touches it does"},
+};
+
+/* Bool: the key is one of these; a line says so. */
+static int key_is_gone(const char *section, const char *key, const char *where) {
+    for (size_t i = 0; i < sizeof gone / sizeof *gone; i++) {
+        if (strcmp(section, gone[i].section) == 0 && strcmp(key, gone[i].key) == 0) {
+            fprintf(stderr, "%s: %s.%s has no effect: %s\n", where, section, key, gone[i].instead);
+            return 1;
+        }
+    }
+    return 0;
+}
+
 /* Puts the new names in the place of old ones, with a line that says so. */
 static void key_rename(const char *section, const char **key, const char **value,
                        const char *where) {
@@ -95,6 +114,7 @@ static void key_rename(const char *section, const char **key, const char **value
     }
 }
 
+/* field_set: the key's field; NULL for a key that has no effect any more. */
 static MildStatus key_set(const ConfigSection *sections, int count, const char *section_name,
                           const char *key, const char *value, const char *where,
                           const MildField **field_set, MildError *error) {
@@ -102,6 +122,10 @@ static MildStatus key_set(const ConfigSection *sections, int count, const char *
     const ConfigSection *section = section_find(sections, count, section_name, &nearest);
     if (!section) {
         return section_fail(where, section_name, nearest, error);
+    }
+    *field_set = NULL;
+    if (key_is_gone(section->name, key, where)) {
+        return MILD_OK;
     }
     key_rename(section->name, &key, &value, where);
     const MildField *field = mild_field_find(section->fields, section->count, key, &nearest);
@@ -214,8 +238,8 @@ static int reader_key(void *user, const char *section, const char *key, const ch
     const MildField *field = NULL;
     reader->status =
         key_set(reader->sections, reader->count, section, key, value, where, &field, reader->error);
-    if (reader->status != MILD_OK) {
-        return 0;
+    if (reader->status != MILD_OK || !field) {
+        return reader->status == MILD_OK;
     }
     int *seen = reader_seen(reader, section, field);
     if (*seen) {
