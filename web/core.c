@@ -634,7 +634,6 @@ static int open_soles(const WebModel *file) {
     view->bytes = (int32_t)sizeof *view;
     view->feet = web.feet;
     view->knows = file->knows;
-    view->height = (float)file->robot.nominal_height;
     view->pitch = (float)mild_sole_pitch(web.sole[0]);
     web.scratch = mild_scratch_create((const MildSole *const *)web.sole, web.standing, NULL);
     return web.scratch != NULL;

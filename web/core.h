@@ -124,7 +124,6 @@ typedef struct {
     int32_t feet;
     int32_t elements;                /* of each sole */
     int32_t knows;                   /* bool: the robot knows its ground, as `known` says */
-    float height;                    /* [m] of the base of a robot that stands */
     float pitch;                     /* [m] edge of an element */
     float cell;                      /* [m] edge of a cell of the window */
     float period;                    /* [m] of the heights */
