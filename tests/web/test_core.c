@@ -465,8 +465,8 @@ static void test_walks(void **state) {
     }
 }
 
-static void test_hills(void **state) {
-    (void)state;
+static void hills_of(int which) {
+    choose(which);
     for (int relief = WEB_WAVES; relief < WEB_RELIEFS; relief++) {
         start(preset("grass"), relief, 1);
         const double speed = walk(10, 0.6f);
@@ -475,9 +475,16 @@ static void test_hills(void **state) {
             low = fminf(low, web_hills()[n]);
             high = fmaxf(high, web_hills()[n]);
         }
-        printf("  relief %d: %.3f m/s, ground from %.3f to %.3f m\n", relief, speed, (double)low,
-               (double)high);
+        printf("  %s, relief %d: %.3f m/s, ground from %.3f to %.3f m\n", pages[which].name, relief,
+               speed, (double)low, (double)high);
         assert_true(fabs(speed - 0.6) < 0.1 && low < -0.02f && high > 0.02f);
+    }
+}
+
+static void test_hills(void **state) {
+    (void)state;
+    for (int i = ROBOTS - 1; i >= 0; i--) {
+        hills_of(i);
     }
 }
 
