@@ -13,7 +13,6 @@
 #include "view/relief.h"
 #include "view/smooth.h"
 
-#define VIEW_CELL 0.01         /* [m] vertices of the visible ground */
 #define VIEW_OVERLAP 1.0015F   /* [-] scale of a tile, which prevents gaps between tiles */
 #define VIEW_FINE 64           /* most tiles with imprints at once */
 #define VIEW_PLAIN 96          /* most tiles without imprints but of mixed material */
@@ -22,6 +21,14 @@
 #define VIEW_RADIUS_UNEVEN 4.0 /* [m] the same on uneven ground */
 #define VIEW_FLOOR 40.0        /* [m] half the size of the surrounding floor */
 #define VIEW_GEOMS 4000
+#define VIEW_GEOMS_OTHER 128         /* of a robot */
+#define VIEW_CROWD_FAR 400.0F        /* [m] the camera sees that far */
+#define VIEW_CROWD_SHADOW 25.0F      /* [m] shadows reach from the robot in the middle */
+#define VIEW_CROWD_SHADOW_MAP 4096   /* [pixels] edge */
+#define VIEW_CROWD_FINE 224          /* VIEW_FINE of a crowd */
+#define VIEW_CROWD_PRESSING 60       /* others that leave imprints */
+#define VIEW_CROWD_NEAR 12.0         /* [m] from the camera; parts farther away are boxes */
+#define VIEW_CROWD_PIXELS 1.2        /* [pixels] smaller parts are not drawn */
 #define VIEW_CAMERA_TIME 0.45        /* [s] time constant of the camera */
 #define VIEW_LOOK_HEIGHT 0.6         /* [-] the camera looks at this share of the robot's height */
 #define VIEW_CLOSE_TIME 0.25         /* [s] the same for the close-up of the feet */
@@ -40,6 +47,7 @@ typedef struct {
     int step; /* [vertices] between the vertices of the skin */
     int skin, texture, material;
     int drawn_once; /* bool: texture and vertices are those of `tile` */
+    int frame;      /* in which it was lent last */
 } Slot;
 
 struct View {
@@ -63,8 +71,9 @@ struct View {
     double time;           /* [s] of the last frame */
     int jumped;            /* bool: the cameras jump to the robot in the next frame */
     Relief *relief;
-    Facet *facets;                             /* of shells in the ground */
-    Slot slots[VIEW_PLAIN_UNEVEN + VIEW_FINE]; /* first those without imprints */
+    Facet *facets;                                   /* of shells in the ground */
+    Slot slots[VIEW_PLAIN_UNEVEN + VIEW_CROWD_FINE]; /* first those without imprints */
+    int frame;                                       /* number of the present one */
     int plain_count, slot_count;
     int *slot_of;                              /* [tiles] -1: none */
     int flat_material[MILD_MATERIALS_MAX + 1]; /* model material of untouched ground; last: rigid */
@@ -82,6 +91,7 @@ ViewDef view_def_default(void) {
                      .x_max = 8,
                      .y_min = -2,
                      .y_max = 2,
+                     .cell = 0.01,
                      .pressure_max = 40e3,
                      .force_arrow = 0.0012,
                      .closeup = 1,
@@ -105,7 +115,8 @@ static void index_model(View *view) {
                                 mj_name2id(model, mjOBJ_SKIN, name),
                                 mj_name2id(model, mjOBJ_TEXTURE, name),
                                 mj_name2id(model, mjOBJ_MATERIAL, name),
-                                0};
+                                0,
+                                -1};
     }
     for (int m = 0; m <= MILD_MATERIALS_MAX; m++) {
         snprintf(name, sizeof name, "view_flat_%d", m);
@@ -136,10 +147,16 @@ static int open_context(View *view, MildError *error) {
     return (view->gl = gl_create(error)) != NULL;
 }
 
+/* Robots whose feet press the ground. */
+static int pressing(const View *view) {
+    const int others = view->def.others;
+    return 1 + (others < VIEW_CROWD_PRESSING ? others : VIEW_CROWD_PRESSING);
+}
+
 static Relief *make_relief(const View *view, MildError *error) {
     const ViewDef *def = &view->def;
     ReliefDef relief = {def->x_min, def->x_max, def->y_min, def->y_max,
-                        VIEW_CELL,  def->rigid, def->names};
+                        def->cell,  def->rigid, def->names, pressing(view)};
     return relief_create(&relief, &view->terrain, view->rasters, view->feet, error);
 }
 
@@ -175,7 +192,8 @@ static int make_buffers(View *view) {
 
 static void make_scene(View *view) {
     mjv_defaultScene(&view->scene);
-    mjv_makeScene(view->model, &view->scene, VIEW_GEOMS);
+    mjv_makeScene(view->model, &view->scene,
+                  VIEW_GEOMS + view->def.others * (VIEW_GEOMS_OTHER + 1));
     view->scene_made = 1;
     mjv_defaultOption(&view->option);
     view->option.flags[mjVIS_SKIN] = 0; /* the only skins are the tiles, which draw_tile draws */
@@ -192,6 +210,14 @@ static void make_scene(View *view) {
     view->close.elevation = VIEW_CLOSE_ELEVATION;
     view->close.distance = VIEW_CLOSE_DISTANCE;
     view->jumped = 1;
+}
+
+/* What the file says of camera and shadows is meant for one robot. */
+static void widen_view(mjModel *model) {
+    const float extent = (float)model->stat.extent;
+    model->vis.map.zfar = VIEW_CROWD_FAR / extent;
+    model->vis.map.shadowclip = VIEW_CROWD_SHADOW / extent;
+    model->vis.quality.shadowsize = VIEW_CROWD_SHADOW_MAP;
 }
 
 View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *terrain,
@@ -218,12 +244,15 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
     view->relief = make_relief(view, error);
     view->plain_count =
         view->relief && relief_is_uneven(view->relief) ? VIEW_PLAIN_UNEVEN : VIEW_PLAIN;
-    view->slot_count = view->plain_count + VIEW_FINE;
+    view->slot_count = view->plain_count + (def->others > 0 ? VIEW_CROWD_FINE : VIEW_FINE);
     const Surfaces surfaces = {view->plain_count, view->slot_count};
     const int size[2] = {def->width, def->height};
     view->model = view->relief ? view_model(robot_model_path(view->robot), size, view->relief,
                                             &surfaces, error)
                                : NULL;
+    if (view->model && def->others > 0) {
+        widen_view(view->model);
+    }
     if (!view->model || !open_context(view, error)) {
         view_destroy(view);
         return NULL;
@@ -306,8 +335,20 @@ void view_observe(View *view, const RobotSim *sim) {
         memcpy(position[f], foot->position, sizeof position[f]);
         memcpy(rotation[f], foot->rotation, sizeof rotation[f]);
     }
-    relief_press(view->relief, (const double(*)[3])position, (const double(*)[9])rotation);
+    relief_press(view->relief, 0, (const double(*)[3])position, (const double(*)[9])rotation);
     press_shells(view, sim);
+}
+
+static void press_others(View *view, const ViewOther *others) {
+    for (int i = 0; i < pressing(view) - 1; i++) {
+        double position[ROBOT_FEET_MAX][3];
+        memcpy(position, others[i].position, sizeof position);
+        for (int f = 0; f < view->feet; f++) {
+            position[f][0] += others[i].place[0];
+            position[f][1] += others[i].place[1];
+        }
+        relief_press(view->relief, i + 1, (const double(*)[3])position, others[i].rotation);
+    }
 }
 
 static double tile_distance(const View *view, int tile) {
@@ -335,7 +376,7 @@ static Slot *slot_take(View *view, int tile, int fine) {
             best = slot;
             break;
         }
-        if (tile_distance(view, slot->tile) > farthest) {
+        if (slot->frame != view->frame && tile_distance(view, slot->tile) > farthest) {
             best = slot;
             farthest = tile_distance(view, slot->tile);
         }
@@ -412,6 +453,7 @@ static void draw_tile(View *view, int tile) {
     if (shaped || material == -2) {
         slot = slot_for(view, tile, pressed);
         if (slot) {
+            slot->frame = view->frame;
             slot_refresh(view, slot);
         }
     } else if (view->slot_of[tile] >= 0) {
@@ -426,7 +468,8 @@ static void draw_tile(View *view, int tile) {
         }
         return;
     }
-    int look = material == RELIEF_RIGID ? MILD_MATERIALS_MAX : material < 0 ? 0 : material;
+    const int at = mild_terrain_material_at(&view->terrain, center[0], center[1]);
+    int look = material == RELIEF_RIGID ? MILD_MATERIALS_MAX : material < 0 ? at : material;
     add_geom(view, mjGEOM_PLANE, 0.5 * edge, 0.5 * edge, 0.1, position,
              slot ? slot->material : view->flat_material[look]);
 }
@@ -460,10 +503,13 @@ static int clamp_tile(double at, int count) {
 }
 
 static void draw_ground(View *view) {
+    view->frame++;
     const Relief *relief = view->relief;
     int columns = relief_tile_columns(relief), rows = relief_tile_rows(relief);
     double edge = relief_tile_edge(relief), origin[2],
-           radius = relief_is_uneven(relief) ? VIEW_RADIUS_UNEVEN : VIEW_RADIUS;
+           radius = view->def.others > 0       ? VIEW_CROWD_FAR
+                    : relief_is_uneven(relief) ? VIEW_RADIUS_UNEVEN
+                                               : VIEW_RADIUS;
     relief_tile_center(relief, 0, origin);
     origin[0] -= 0.5 * edge, origin[1] -= 0.5 * edge;
     const double *look = view->camera.lookat;
@@ -602,6 +648,9 @@ static void move_lights(View *view) {
         }
         light->pos[0] += (float)view->camera.lookat[0];
         light->pos[1] += (float)view->camera.lookat[1];
+        for (int k = 0; k < 3 && view->def.others > 0; k++) { /* nobody stands behind it */
+            light->pos[k] -= 2 * VIEW_CROWD_SHADOW * light->dir[k];
+        }
     }
 }
 
@@ -666,6 +715,121 @@ static void pose_robot(View *view, const double *qpos) {
     mj_camlight(view->model, view->data);
 }
 
+/* ---- others ---- */
+
+/* Where the camera is, and how many pixels a metre has at a metre from it. */
+typedef struct {
+    double eye[3], ahead[3];
+    double pixels;
+    double wide; /* [-] tangent of half the angle between opposite corners of the picture */
+} Sight;
+
+static Sight sight_of(const View *view) {
+    const mjvGLCamera *left = &view->scene.camera[0], *right = &view->scene.camera[1];
+    const double high = (double)(left->frustum_top / left->frustum_near);
+    Sight sight = {.pixels = 0.5 * view->def.height / high,
+                   .wide = high * hypot(1, (double)view->def.width / view->def.height)};
+    for (int k = 0; k < 3; k++) {
+        sight.eye[k] = 0.5 * (double)(left->pos[k] + right->pos[k]);
+        sight.ahead[k] = (double)left->forward[k];
+    }
+    return sight;
+}
+
+/* [m] From the camera; negative: a robot there is not in the picture. */
+static double seen_at(const Sight *sight, const double place[3]) {
+    double way[3];
+    mju_sub3(way, place, sight->eye);
+    const double along = mju_dot3(way, sight->ahead), all = mju_norm3(way);
+    const double beside = sqrt(fmax(all * all - along * along, 0));
+    return along > -1 && beside < sight->wide * fmax(along, 0) + 1.5 ? all : -1;
+}
+
+/* A box in the place of a round part: a tenth of the triangles. */
+static void make_box(mjvGeom *geom) {
+    const int capsule = geom->type == mjGEOM_CAPSULE;
+    if (capsule || geom->type == mjGEOM_CYLINDER) {
+        geom->size[2] += capsule ? 0.6F * geom->size[0] : 0;
+        geom->size[0] *= 0.88F;
+        geom->size[1] *= 0.88F;
+    } else if (geom->type == mjGEOM_SPHERE || geom->type == mjGEOM_ELLIPSOID) {
+        for (int k = 0; k < 3; k++) {
+            geom->size[k] *= 0.8F;
+        }
+    } else {
+        return;
+    }
+    geom->type = mjGEOM_BOX;
+}
+
+/* Of the geoms from `first` on those that are large enough to be seen, far ones as boxes. shaded:
+ * bool, the shadow map covers them. */
+static void thin_out(View *view, int first, double far, double pixels, int shaded) {
+    mjvScene *scene = &view->scene;
+    int kept = first;
+    for (int g = first; g < scene->ngeom; g++) {
+        mjvGeom *geom = &scene->geoms[g];
+        const float size = fmaxf(geom->size[0], fmaxf(geom->size[1], geom->size[2]));
+        if (geom->type == mjGEOM_PLANE || (double)size * pixels < far * VIEW_CROWD_PIXELS) {
+            continue;
+        }
+        if (far > VIEW_CROWD_NEAR) {
+            make_box(geom);
+        }
+        geom->category = shaded ? geom->category : mjCAT_DECOR;
+        scene->geoms[kept++] = *geom;
+    }
+    scene->ngeom = kept;
+}
+
+/* A shadow where the shadow map does not reach. */
+static void draw_spot(View *view, const double place[3]) {
+    const double size[3] = {0.28, 0.2, 0.001};
+    const double at[3] = {place[0], place[1],
+                          relief_height_at(view->relief, place[0], place[1]) + 0.004};
+    const float dark[4] = {0.05F, 0.05F, 0.07F, 0.4F};
+    if (view->scene.ngeom < view->scene.maxgeom) {
+        mjvGeom *geom = &view->scene.geoms[view->scene.ngeom++];
+        mjv_initGeom(geom, mjGEOM_ELLIPSOID, size, at, NULL, dark);
+        geom->category = mjCAT_DECOR;
+    }
+}
+
+static void draw_others(View *view, const ViewOther *others) {
+    const Sight sight = sight_of(view);
+    mjtNum qpos[ROBOT_NQ_MAX];
+    for (int i = 0; i < view->def.others; i++) {
+        memcpy(qpos, others[i].qpos, sizeof qpos);
+        qpos[0] += others[i].place[0];
+        qpos[1] += others[i].place[1];
+        const double far = seen_at(&sight, qpos), *middle = view->camera.lookat;
+        const int first = view->scene.ngeom;
+        const int shaded =
+            hypot(qpos[0] - middle[0], qpos[1] - middle[1]) < (double)VIEW_CROWD_SHADOW;
+        if (far < 0) {
+            continue;
+        }
+        pose_robot(view, qpos);
+        mjv_addGeoms(view->model, view->data, &view->option, NULL, mjCAT_ALL, &view->scene);
+        thin_out(view, first, far, sight.pixels, shaded);
+        if (!shaded) {
+            draw_spot(view, qpos);
+        }
+    }
+}
+
+/* A crane: slow at both ends, and as many times as far in each second. */
+static void move_away(View *view, double away) {
+    const ViewDef *def = &view->def;
+    const double share = away * away * (3 - 2 * away);
+    view->camera.elevation = def->elevation + share * (def->away_elevation - def->elevation);
+    view->camera.distance = def->distance * pow(def->away_distance / def->distance, share);
+    const double gone = view->camera.distance - def->distance;
+    for (int k = 0; k < 2; k++) {
+        view->camera.lookat[k] += gone / (def->away_distance - def->distance) * def->away_aside[k];
+    }
+}
+
 static void draw_labels(View *view, mjrRect viewport, const RobotSim *sim, const ViewInfo *info) {
     draw_text(view, viewport, sim, info);
     if (info->note) {
@@ -681,6 +845,10 @@ void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     view_observe(view, sim);
     follow_base(view, robot_sim_qpos(sim), info->time);
     follow_feet(view, sim, info->time);
+    press_others(view, info->others);
+    if (info->away > 0) {
+        move_away(view, info->away);
+    }
     view->time = info->time;
     view->jumped = 0;
     mjv_updateScene(view->model, view->data, &view->option, NULL, &view->camera, mjCAT_ALL,
@@ -688,6 +856,7 @@ void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     move_lights(view);
     draw_ground(view);
     draw_arrows(view, sim);
+    draw_others(view, info->others);
 
     mjrRect viewport = {0, 0, view->def.width, view->def.height};
     if (view->window) {

@@ -145,7 +145,7 @@ static void dents_are_where_the_elements_are(void **state) {
             memcpy(position[f], robot_sim_foot(sim, f)->position, sizeof position[f]);
             memcpy(rotation[f], robot_sim_foot(sim, f)->rotation, sizeof rotation[f]);
         }
-        relief_press(relief, (const double(*)[3])position, (const double(*)[9])rotation);
+        relief_press(relief, 0, (const double(*)[3])position, (const double(*)[9])rotation);
         step();
     }
     for (int f = 0; f < SA01_FEET; f++) {
@@ -160,7 +160,7 @@ static void dents_are_where_the_elements_are(void **state) {
                   1e3 * worst);
     assert_true(deepest > 0.02 && worst < 0.002);
     position[0][2] = position[1][2] = 1.0;
-    relief_press(relief, (const double(*)[3])position, (const double(*)[9])rotation);
+    relief_press(relief, 0, (const double(*)[3])position, (const double(*)[9])rotation);
     assert_true(relief_depth_at(relief, position[0][0], position[0][1]) == 0);
     relief_destroy(relief);
     terrain = sand;
