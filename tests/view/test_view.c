@@ -135,7 +135,7 @@ static void dents_are_where_the_elements_are(void **state) {
     assert_true(mild_material_preset("foam25", &foam));
     MildTerrain sand = terrain;
     terrain = mild_terrain_uniform(&foam);
-    ReliefDef area = {-1, 1, -1, 1, 0.01, 0, NULL};
+    ReliefDef area = {-1, 1, -1, 1, 0.01, 0, NULL, 1};
     Relief *relief = relief_create(&area, &terrain, robot_rasters(robot), SA01_FEET, &error);
     assert_non_null(relief);
     load_at(0.0);
