@@ -225,6 +225,17 @@ static void print_table(Command *c) {
     }
 }
 
+/* Where the others are at the end, and how deep. */
+static void print_crowd(const Command *c) {
+    const Play *play = &c->play;
+    printf("%-12s %9s %8s %9s\n", "others", "robots", "upright", "sinkage");
+    for (int i = 0; i < c->grounds.count; i++) {
+        const CrowdRow row = crowd_on(play->crowd, i);
+        printf("%-12s %9d %8d %6.1f mm\n", c->names[i], row.robots, row.upright, 1e3 * row.sinkage);
+    }
+    printf("crowd: %d of %d robots upright\n", !play->fell + crowd_upright(play->crowd), c->robots);
+}
+
 /* What the robot's own sensors say of the ground at the end. */
 static void print_knowledge(const Play *play) {
     char text[400];
@@ -326,8 +337,7 @@ static MildStatus walk(Command *c, MildError *error) {
     print_table(c);
     print_knowledge(play);
     if (play->crowd) {
-        printf("crowd: %d of %d robots upright\n", !play->fell + crowd_upright(play->crowd),
-               c->robots);
+        print_crowd(c);
     }
     if (c->video) {
         printf("video %s: %d frames\n", c->video, play->frames);

@@ -127,6 +127,28 @@ int crowd_upright(const Crowd *crowd) {
     return upright;
 }
 
+CrowdRow crowd_on(const Crowd *crowd, int material) {
+    const MildTerrain *course = &crowd->def.scene->terrain;
+    CrowdRow row = {0};
+    for (int i = 0; i < crowd->def.count; i++) {
+        const EnvsSample *last = &crowd->sample[(size_t)(i + 1) * (size_t)crowd->samples - 1];
+        const ViewOther *other = &crowd->other[i];
+        const double x = other->place[0] + other->qpos[0], y = other->place[1] + other->qpos[1];
+        double deepest = 0;
+        if (mild_terrain_material_at(course, x, y) != material) {
+            continue;
+        }
+        for (int f = 0; f < last->feet; f++) {
+            deepest = fmax(deepest, last->foot[f].depth);
+        }
+        row.robots++;
+        row.upright += !crowd->fallen[i];
+        row.sinkage += deepest;
+    }
+    row.sinkage /= row.robots > 0 ? row.robots : 1;
+    return row;
+}
+
 /* ---- creation ---- */
 
 void crowd_destroy(Crowd *crowd) {

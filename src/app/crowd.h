@@ -36,4 +36,11 @@ const ViewOther *crowd_others(const Crowd *crowd);
 /* How many have not fallen. */
 int crowd_upright(const Crowd *crowd);
 
+/* Those that are on a ground of the course, where they are drawn. */
+typedef struct {
+    int robots, upright;
+    double sinkage; /* [m] mean of their deeper feet in the last step; 0 of none */
+} CrowdRow;
+CrowdRow crowd_on(const Crowd *crowd, int material);
+
 #endif
