@@ -139,6 +139,7 @@ static void others_are_seen(void **state) {
     def.names = names;
     def.closeup = 0, def.force_arrow = 0;
     def.away_distance = 8, def.away_elevation = -40;
+    def.x_max = 0.5; /* no imprint on the other side */
     def.others = 1;
     View *view = view_create(&def, robot, &terrain, &error);
     if (!view) {
