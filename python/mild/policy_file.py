@@ -16,8 +16,9 @@ def write(path, envs, layers, mean=None, scale=None, note=""):
     hidden. mean, scale: of the history, (history - mean) / scale is what the first layer sees; None: the history itself. Raises
     ValueError for a network that does not fit.
 
-    A policy of mild has an encoder and, behind the newest frame and what it estimates, an actor. Here the encoder only normalises, to
-    a latent vector as long as the history, and the actor looks at nothing else: the same sums, so the same actions within rounding."""
+    A policy of mild has an encoder and, behind the newest frame and what it estimates, an actor. Here the encoder only takes the mean
+    away, to a latent vector as long as the history, and the actor, whose first weights have the scale in them, looks at nothing else:
+    the same sums, so the same actions within rounding."""
     history, frame, heads = envs.frames * envs.observation, envs.observation, envs.estimates
     layers = [(np.asarray(weight, np.float32), np.asarray(bias, np.float32)) for weight, bias in layers]
     mean = np.zeros(history) if mean is None else np.asarray(mean, float).reshape(-1)
@@ -25,8 +26,8 @@ def write(path, envs, layers, mean=None, scale=None, note=""):
     check(layers, mean, scale, history, envs.actions)
     moved = 3 * (heads - 3) // 4  # velocities of the feet, behind the base's; then come their heights
     tensors = {
-        "encoder.0.weight": np.vstack([np.zeros((heads, history)), np.diag(1 / scale), np.zeros((history, history))]),
-        "encoder.0.bias": np.concatenate([np.zeros(heads), -mean / scale, np.zeros(history)]),
+        "encoder.0.weight": np.vstack([np.zeros((heads, history)), np.eye(history), np.zeros((history, history))]),
+        "encoder.0.bias": np.concatenate([np.zeros(heads), -mean, np.zeros(history)]),
         "decoder.0.weight": np.zeros((1, heads + history)), "decoder.0.bias": np.zeros(1),  # of training alone, as the critic
         "decoder.2.weight": np.zeros((frame, 1)), "decoder.2.bias": np.zeros(frame),
         "modulation.0.weight": np.zeros((1, moved)), "modulation.0.bias": np.zeros(1),
@@ -34,7 +35,7 @@ def write(path, envs, layers, mean=None, scale=None, note=""):
     }
     for index, (weight, bias) in enumerate(layers):
         if index == 0:
-            weight = np.hstack([np.zeros((len(weight), frame + heads)), weight])
+            weight = np.hstack([np.zeros((len(weight), frame + heads)), weight / scale])
         tensors[f"actor.{2 * index}.weight"], tensors[f"actor.{2 * index}.bias"] = weight, bias
     tensors |= {"critic.0.weight": np.zeros((1, envs.critic)), "critic.0.bias": np.zeros(1),
                 "critic.2.weight": np.zeros((1, 1)), "critic.2.bias": np.zeros(1), "log_std": np.zeros(envs.actions)}

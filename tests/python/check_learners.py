@@ -96,6 +96,7 @@ class RslRl(unittest.TestCase):
 
     def test_policy_file(self):
         """A policy of rsl_rl, with statistics of its observations, is a policy of mild: `mild eval` acts as it does."""
+        torch.manual_seed(1)
         env = rsl_rl.Env(8, config="configs/quick.ini", overrides=SHORT)
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
             runner = OnPolicyRunner(env, {**CONFIG, "logger": "tensorboard"}, log_dir=folder, device="cpu")
