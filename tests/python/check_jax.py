@@ -87,6 +87,7 @@ class Jit(unittest.TestCase):
             one = (np.zeros((count, 1, 3), np.float32), np.tile(np.eye(3, dtype=np.float32), (count, 1, 1, 1)),
                    np.zeros((count, 1, 6), np.float32), np.tile(A, (count, 1, 1)), np.zeros((count, 1, 6), np.float32))
             one[0][:, 0, 2] = -0.02
+            one = [jnp.asarray(array) for array in one]  # the step alone is timed, and no copies
             run = jax.jit(lambda *arrays: mild.jax.step(batch, *arrays)[0])
             run(*one).block_until_ready()
             return lambda: run(*one).block_until_ready()
@@ -99,7 +100,7 @@ class Jit(unittest.TestCase):
             made_of += not done.is_set()
         thread.join()
         print(f"{made_of} steps of the small batch in one of the large")
-        self.assertGreater(made_of, 3)
+        self.assertGreater(made_of, 100)  # under one lock 6 to 10
 
     def test_outputs(self):
         """Wrench, new velocity and foot of a step, with heights; without `advance` nothing is remembered; `begin` forgets."""
