@@ -11,6 +11,7 @@
 #include "view/inset.h"
 #include "view/model.h"
 #include "view/relief.h"
+#include "view/sight.h"
 #include "view/smooth.h"
 
 #define VIEW_OVERLAP 1.0015F   /* [-] scale of a tile, which prevents gaps between tiles */
@@ -22,13 +23,8 @@
 #define VIEW_FLOOR 40.0        /* [m] half the size of the surrounding floor */
 #define VIEW_GEOMS 4000
 #define VIEW_GEOMS_OTHER 128         /* of a robot */
-#define VIEW_CROWD_FAR 400.0F        /* [m] the camera sees that far */
-#define VIEW_CROWD_SHADOW 25.0F      /* [m] shadows reach from the robot in the middle */
-#define VIEW_CROWD_SHADOW_MAP 4096   /* [pixels] edge */
 #define VIEW_CROWD_FINE 224          /* VIEW_FINE of a crowd */
 #define VIEW_CROWD_PRESSING 60       /* others that leave imprints */
-#define VIEW_CROWD_NEAR 12.0         /* [m] from the camera; parts farther away are boxes */
-#define VIEW_CROWD_PIXELS 1.2        /* [pixels] smaller parts are not drawn */
 #define VIEW_CAMERA_TIME 0.45        /* [s] time constant of the camera */
 #define VIEW_LOOK_HEIGHT 0.6         /* [-] the camera looks at this share of the robot's height */
 #define VIEW_CLOSE_TIME 0.25         /* [s] the same for the close-up of the feet */
@@ -212,14 +208,6 @@ static void make_scene(View *view) {
     view->jumped = 1;
 }
 
-/* What the file says of camera and shadows is meant for one robot. */
-static void widen_view(mjModel *model) {
-    const float extent = (float)model->stat.extent;
-    model->vis.map.zfar = VIEW_CROWD_FAR / extent;
-    model->vis.map.shadowclip = VIEW_CROWD_SHADOW / extent;
-    model->vis.quality.shadowsize = VIEW_CROWD_SHADOW_MAP;
-}
-
 View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *terrain,
                   MildError *error) {
     if (def->width < 64 || def->height < 64 || def->width > 7680 || def->height > 4320 ||
@@ -251,7 +239,7 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
                                             &surfaces, error)
                                : NULL;
     if (view->model && def->others > 0) {
-        widen_view(view->model);
+        sight_widen(view->model);
     }
     if (!view->model || !open_context(view, error)) {
         view_destroy(view);
@@ -507,7 +495,7 @@ static void draw_ground(View *view) {
     const Relief *relief = view->relief;
     int columns = relief_tile_columns(relief), rows = relief_tile_rows(relief);
     double edge = relief_tile_edge(relief), origin[2],
-           radius = view->def.others > 0       ? VIEW_CROWD_FAR
+           radius = view->def.others > 0       ? SIGHT_FAR
                     : relief_is_uneven(relief) ? VIEW_RADIUS_UNEVEN
                                                : VIEW_RADIUS;
     relief_tile_center(relief, 0, origin);
@@ -649,7 +637,7 @@ static void move_lights(View *view) {
         light->pos[0] += (float)view->camera.lookat[0];
         light->pos[1] += (float)view->camera.lookat[1];
         for (int k = 0; k < 3 && view->def.others > 0; k++) { /* nobody stands behind it */
-            light->pos[k] -= 2 * VIEW_CROWD_SHADOW * light->dir[k];
+            light->pos[k] -= 2 * (float)SIGHT_SHADOW * light->dir[k];
         }
     }
 }
@@ -669,18 +657,11 @@ static void draw_closeup(View *view, mjrRect viewport) {
     view->scene.flags[mjRND_SHADOW] = 1;
 }
 
-static void flip_rows(const unsigned char *rgb, mjrRect size, unsigned char *flipped) {
-    size_t row = (size_t)size.width * 3, rows = (size_t)size.height;
-    for (size_t r = 0; r < rows; r++) {
-        memcpy(flipped + r * row, rgb + (rows - 1 - r) * row, row);
-    }
-}
-
 /* Reads what was drawn and smooths it, before labels are drawn, whose letters must stay sharp. */
 static void smooth_picture(View *view, mjrRect size) {
     mjr_readPixels(view->scene_pixels, NULL, size, &view->context);
     smooth_edges(view->scene_pixels, size.width, size.height, view->luma, view->labelled);
-    flip_rows(view->labelled, size, view->pixels);
+    smooth_flip(view->labelled, size.width, size.height, view->pixels);
 }
 
 /* What of the part lies in the picture, which may be smaller than the inset. */
@@ -717,103 +698,25 @@ static void pose_robot(View *view, const double *qpos) {
 
 /* ---- others ---- */
 
-/* Where the camera is, and how many pixels a metre has at a metre from it. */
-typedef struct {
-    double eye[3], ahead[3];
-    double pixels;
-    double wide; /* [-] tangent of half the angle between opposite corners of the picture */
-} Sight;
-
-static Sight sight_of(const View *view) {
-    const mjvGLCamera *left = &view->scene.camera[0], *right = &view->scene.camera[1];
-    const double high = (double)(left->frustum_top / left->frustum_near);
-    Sight sight = {.pixels = 0.5 * view->def.height / high,
-                   .wide = high * hypot(1, (double)view->def.width / view->def.height)};
-    for (int k = 0; k < 3; k++) {
-        sight.eye[k] = 0.5 * (double)(left->pos[k] + right->pos[k]);
-        sight.ahead[k] = (double)left->forward[k];
-    }
-    return sight;
-}
-
-/* [m] From the camera; negative: a robot there is not in the picture. */
-static double seen_at(const Sight *sight, const double place[3]) {
-    double way[3];
-    mju_sub3(way, place, sight->eye);
-    const double along = mju_dot3(way, sight->ahead), all = mju_norm3(way);
-    const double beside = sqrt(fmax(all * all - along * along, 0));
-    return along > -1 && beside < sight->wide * fmax(along, 0) + 1.5 ? all : -1;
-}
-
-/* A box in the place of a round part: a tenth of the triangles. */
-static void make_box(mjvGeom *geom) {
-    const int capsule = geom->type == mjGEOM_CAPSULE;
-    if (capsule || geom->type == mjGEOM_CYLINDER) {
-        geom->size[2] += capsule ? 0.6F * geom->size[0] : 0;
-        geom->size[0] *= 0.88F;
-        geom->size[1] *= 0.88F;
-    } else if (geom->type == mjGEOM_SPHERE || geom->type == mjGEOM_ELLIPSOID) {
-        for (int k = 0; k < 3; k++) {
-            geom->size[k] *= 0.8F;
-        }
-    } else {
-        return;
-    }
-    geom->type = mjGEOM_BOX;
-}
-
-/* Of the geoms from `first` on those that are large enough to be seen, far ones as boxes. shaded:
- * bool, the shadow map covers them. */
-static void thin_out(View *view, int first, double far, double pixels, int shaded) {
-    mjvScene *scene = &view->scene;
-    int kept = first;
-    for (int g = first; g < scene->ngeom; g++) {
-        mjvGeom *geom = &scene->geoms[g];
-        const float size = fmaxf(geom->size[0], fmaxf(geom->size[1], geom->size[2]));
-        if (geom->type == mjGEOM_PLANE || (double)size * pixels < far * VIEW_CROWD_PIXELS) {
-            continue;
-        }
-        if (far > VIEW_CROWD_NEAR) {
-            make_box(geom);
-        }
-        geom->category = shaded ? geom->category : mjCAT_DECOR;
-        scene->geoms[kept++] = *geom;
-    }
-    scene->ngeom = kept;
-}
-
-/* A shadow where the shadow map does not reach. */
-static void draw_spot(View *view, const double place[3]) {
-    const double size[3] = {0.28, 0.2, 0.001};
-    const double at[3] = {place[0], place[1],
-                          relief_height_at(view->relief, place[0], place[1]) + 0.004};
-    const float dark[4] = {0.05F, 0.05F, 0.07F, 0.4F};
-    if (view->scene.ngeom < view->scene.maxgeom) {
-        mjvGeom *geom = &view->scene.geoms[view->scene.ngeom++];
-        mjv_initGeom(geom, mjGEOM_ELLIPSOID, size, at, NULL, dark);
-        geom->category = mjCAT_DECOR;
-    }
-}
-
 static void draw_others(View *view, const ViewOther *others) {
-    const Sight sight = sight_of(view);
+    const Sight sight = sight_of(&view->scene, view->def.width, view->def.height);
     mjtNum qpos[ROBOT_NQ_MAX];
     for (int i = 0; i < view->def.others; i++) {
         memcpy(qpos, others[i].qpos, sizeof qpos);
         qpos[0] += others[i].place[0];
         qpos[1] += others[i].place[1];
-        const double far = seen_at(&sight, qpos), *middle = view->camera.lookat;
+        const double far = sight_distance(&sight, qpos), *middle = view->camera.lookat;
         const int first = view->scene.ngeom;
-        const int shaded =
-            hypot(qpos[0] - middle[0], qpos[1] - middle[1]) < (double)VIEW_CROWD_SHADOW;
+        const int shaded = hypot(qpos[0] - middle[0], qpos[1] - middle[1]) < SIGHT_SHADOW;
         if (far < 0) {
             continue;
         }
         pose_robot(view, qpos);
         mjv_addGeoms(view->model, view->data, &view->option, NULL, mjCAT_ALL, &view->scene);
-        thin_out(view, first, far, sight.pixels, shaded);
+        sight_thin_out(&view->scene, first, far, sight.pixels, shaded);
         if (!shaded) {
-            draw_spot(view, qpos);
+            const double under = relief_height_at(view->relief, qpos[0], qpos[1]);
+            sight_draw_spot(&view->scene, qpos, under);
         }
     }
 }
