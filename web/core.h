@@ -145,8 +145,8 @@ typedef struct {
 } WebView;
 
 /* Takes a file of pack.c, aligned to 16 bytes, which the caller keeps, in the place of the robot
- * before; web_start comes next. Returns NULL, or what is wrong; a file that is none leaves the robot
- * before as it was. */
+ * before; web_start comes next. Returns NULL, or what is wrong. A file that is none leaves the
+ * robot before as it was. */
 const char *web_open(const WebModel *file, size_t bytes);
 /* Where the text of a soil's file goes, ended by a 0: [WEB_TEXT]. web_soil reads it; WEB_OWN is its
  * ground from the next web_start on. Returns NULL, or what is wrong; then the soil before stays. */
