@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Draws the figures of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain] [walk]
-# [robots] [rise] [actuator] [motion]; without a name all. The drawings are scripts/drawings.py's.
+# [robots] [rise] [actuator] [motion] [crowd]; without a name all. The drawings are scripts/drawings.py's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mild=build/mild
@@ -103,6 +103,14 @@ terrain() {
     still "$work/terrain.mp4" docs/terrain.png "select='eq(n,125)'"
 }
 
+# 4096 robots on a patchwork of eight soils.
+crowd() {
+    "$mild" play --crowd 4096 --ground rubber,foam60,foam45,foam28,foam25,grass,sand_loose,sand_dense --terrain.patches=checker \
+        --terrain.patch_size=3 --seconds 7 --video "$work/crowd.mp4"
+    ffmpeg -loglevel error -y -i "$work/crowd.mp4" -vf "fps=8,scale=560:-1:flags=area" -c:v libwebp_anim -loop 0 -q:v 30 \
+        -compression_level 6 docs/crowd.webp
+}
+
 # Torques of a held-out second: a made-up motor, the network fitted to it, the best PD.
 actuator() {
     "$mild" actuator log --out "$work/motor.csv"
@@ -113,9 +121,9 @@ actuator() {
 for name in "${@:-all}"; do
     case $name in
     presets | recovery | impact | eccentric) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
-    terrain | walk | robots | rise | actuator | motion) "$name" ;;
+    terrain | walk | robots | rise | actuator | motion | crowd) "$name" ;;
     sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
-    all) for each in presets recovery impact sinkage eccentric terrain walk robots rise actuator motion; do "$0" "$each"; done ;;
-    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots rise actuator motion" >&2 && exit 2 ;;
+    all) for each in presets recovery impact sinkage eccentric terrain walk robots rise actuator motion crowd; do "$0" "$each"; done ;;
+    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots rise actuator motion crowd" >&2 && exit 2 ;;
     esac
 done

@@ -163,6 +163,15 @@ def drive(browser):
     browser.value("app.takeSoil({name: 'mars.ini', text: async () => '[ground]\\nmu = 9\\n'})")
     if not browser.wait("/^mars.ini/.test(document.getElementById('toast').textContent) && app.ground === 10", 10):
         wrong.append("a soil that is none is not refused")
+    fetched = "performance.getEntriesByType('resource').filter((e) => /bin$/.test(e.name)).map((e) => e.name.split('/').pop()).join()"
+    if browser.value(fetched) != "sa01.bin":
+        wrong.append(f"before another robot is chosen {browser.value(fetched)} is fetched")
+    for button, name, feet in [(1, "g1", 2), (2, "go1", 4), (0, "sa01", 2)]:
+        browser.value(f"document.querySelectorAll('#robots button')[{button}].click(); app.script = () => [0.55, 0, 0]")
+        if not browser.wait(f"app.robot === {button} && app.core.view().feet === {feet} && app.core.view().link[3] > 0.6 && !app.fallen", 30):
+            wrong.append(f"{name} does not walk when it is chosen")
+    if browser.value(fetched) != "sa01.bin,g1.bin,go1.bin":
+        wrong.append(f"{browser.value(fetched)} are fetched, and not each robot once")
     return wrong
 
 
@@ -197,7 +206,8 @@ def walk(address, bounds):
 SHOTS = {  # name: width, height, query, seconds of walking
     "stripes": (1280, 800, "", 7), "sand": (1280, 800, "ground=6", 9), "grass": (1280, 800, "ground=5", 7),
     "foam": (1280, 800, "ground=2", 7), "rigid": (1280, 800, "ground=8", 5), "waves": (1280, 800, "ground=7&shape=1", 9),
-    "phone": (390, 844, "ground=6", 7),
+    "phone": (390, 844, "ground=6", 7), "g1": (1280, 800, "robot=g1&ground=6", 9), "go1": (1280, 800, "robot=go1&ground=5", 9),
+    "go1_stripes": (1280, 800, "robot=go1", 12), "g1_phone": (390, 844, "robot=g1", 8), "go1_phone": (390, 844, "robot=go1&ground=6", 7),
 }
 
 

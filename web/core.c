@@ -46,9 +46,6 @@ static struct {
     MildMap *map;
     MildTerrain terrain;
     MildMaterial plain[MILD_MATERIALS_MAX]; /* before web_change */
-    char text[WEB_TEXT];                    /* for web_soil */
-    MildMaterial own;                       /* of web_soil */
-    int has_own;                            /* bool */
     double stiffness;                       /* [-] factors of web_change */
     double friction;
     MildContactInput input;
@@ -63,6 +60,13 @@ static struct {
     WindowScene scene;
     float *hills;
 } web;
+
+/* The soil of web_soil, which stays where another robot comes. */
+static struct {
+    char text[WEB_TEXT];
+    MildMaterial material;
+    int known; /* bool */
+} soil;
 
 static TaskEnv *web_env(void) {
     return env_at(&web.all, 0);
@@ -452,7 +456,7 @@ static const char *lay(int ground, int relief) {
         const int preset = all ? m : ground < presets ? ground : 0;
         mild_material_preset(mild_material_preset_name(preset), &web.plain[m]);
         if (ground == WEB_OWN) {
-            web.plain[m] = web.own;
+            web.plain[m] = soil.material;
         }
         web.terrain.materials[m] = web.plain[m];
     }
@@ -473,22 +477,22 @@ static void show_hills(void) {
 }
 
 char *web_text(void) {
-    return web.text;
+    return soil.text;
 }
 
 const char *web_soil(void) {
     static MildError error;
-    MildMaterial own;
-    web.text[WEB_TEXT - 1] = '\0';
-    if (soil_parse(web.text, "soil.ini", &own, &error) != MILD_OK) {
+    MildMaterial material;
+    soil.text[WEB_TEXT - 1] = '\0';
+    if (soil_parse(soil.text, "soil.ini", &material, &error) != MILD_OK) {
         return error.text;
     }
-    if (mild_model_is_concentric((MildModel)own.model)) {
+    if (mild_model_is_concentric((MildModel)material.model)) {
         return "soil.ini: this page has soles of many elements; a model of one element has no "
                "place in it";
     }
-    web.own = own;
-    web.has_own = 1;
+    soil.material = material;
+    soil.known = 1;
     return NULL;
 }
 
@@ -496,7 +500,7 @@ const char *web_start(int ground, int relief, int prints) {
     if (!web.file) {
         return "web_open comes first";
     }
-    if (ground == WEB_OWN && !web.has_own) {
+    if (ground == WEB_OWN && !soil.known) {
         return "web_soil comes first";
     }
     if (ground < 0 || ground > WEB_OWN || relief < 0 || relief >= WEB_RELIEFS) {
@@ -612,6 +616,10 @@ static int open_soles(const WebModel *file) {
             return 0;
         }
         view->elements = mild_sole_elements(web.sole[f]);
+        if (view->elements > WEB_ELEMENTS_MAX ||
+            view->elements != mild_sole_elements(web.sole[0])) {
+            return 0;
+        }
         for (int e = 0; e < view->elements; e++) {
             view->x[f][e] = (float)mild_sole_x(web.sole[f])[e];
             view->y[f][e] = (float)mild_sole_y(web.sole[f])[e];
@@ -624,6 +632,8 @@ static int open_soles(const WebModel *file) {
         }
     }
     view->bytes = (int32_t)sizeof *view;
+    view->feet = web.feet;
+    view->knows = file->knows;
     view->pitch = (float)mild_sole_pitch(web.sole[0]);
     web.scratch = mild_scratch_create((const MildSole *const *)web.sole, web.standing, NULL);
     return web.scratch != NULL;
@@ -716,7 +726,7 @@ const char *web_open(const WebModel *file, size_t bytes) {
     task->grounds = task->labels = 1;
     web.stiffness = web.friction = 1;
     if (!open_policy(file) || !open_soles(file) || !open_window(file) || !open_arrays()) {
-        return "out of memory, or a sole without elements";
+        return "out of memory, or soles without elements, or with too many";
     }
     web.file = file;
     web.all.task = task;

@@ -121,29 +121,32 @@ typedef struct {
 typedef struct {
     int32_t bytes; /* of this struct */
     int32_t links;
-    int32_t elements;                    /* of each sole */
-    float pitch;                         /* [m] edge of an element */
-    float cell;                          /* [m] edge of a cell of the window */
-    float period;                        /* [m] of the heights */
-    float velocity[3];                   /* [m/s, m/s, rad/s] measured, in the heading frame */
-    float yaw;                           /* [rad] */
-    float load[2];                       /* [N] on each foot */
-    float depth[2];                      /* [m] deepest element */
-    float center[2][2];                  /* [m] of pressure, foot's frame */
-    float shell_load;                    /* [N] on the shells: shanks and body */
-    float footsteps;                     /* on this ground, for `known`, or 0 */
-    float alarms;                        /* changes of ground that the robot felt */
-    float known[15];                     /* of each BeliefParameter 5 %, 50 %, 95 %, in its unit */
-    float x[2][WEB_ELEMENTS_MAX];        /* [m] elements, foot's frame */
-    float y[2][WEB_ELEMENTS_MAX];        /* [m] */
-    float pressure[2][WEB_ELEMENTS_MAX]; /* [Pa] */
-    float link[ENGINE_LINKS_MAX][12];    /* [-, m] link -> world, three rows of four */
-    int32_t dirty_count;                 /* of `dirty`; -1: the whole window */
+    int32_t feet;
+    int32_t elements;                /* of each sole */
+    int32_t knows;                   /* bool: the robot knows its ground, as `known` says */
+    float pitch;                     /* [m] edge of an element */
+    float cell;                      /* [m] edge of a cell of the window */
+    float period;                    /* [m] of the heights */
+    float velocity[3];               /* [m/s, m/s, rad/s] measured, in the heading frame */
+    float yaw;                       /* [rad] */
+    float load[ROBOT_FEET_MAX];      /* [N] on each foot */
+    float depth[ROBOT_FEET_MAX];     /* [m] deepest element */
+    float center[ROBOT_FEET_MAX][2]; /* [m] of pressure, foot's frame */
+    float shell_load;                /* [N] on the shells: legs and body */
+    float footsteps;                 /* on this ground, for `known`, or 0 */
+    float alarms;                    /* changes of ground that the robot felt */
+    float known[15];                 /* of each BeliefParameter 5 %, 50 %, 95 %, in its unit */
+    float x[ROBOT_FEET_MAX][WEB_ELEMENTS_MAX];        /* [m] elements, foot's frame */
+    float y[ROBOT_FEET_MAX][WEB_ELEMENTS_MAX];        /* [m] */
+    float pressure[ROBOT_FEET_MAX][WEB_ELEMENTS_MAX]; /* [Pa] */
+    float link[ENGINE_LINKS_MAX][12];                 /* [-, m] link -> world, three rows of four */
+    int32_t dirty_count;                              /* of `dirty`; -1: the whole window */
     WebDirty dirty[WEB_DIRTY_MAX];
 } WebView;
 
-/* Takes a file of pack.c, aligned to 16 bytes, which the caller keeps. Returns NULL, or what is
- * wrong with it. */
+/* Takes a file of pack.c, aligned to 16 bytes, which the caller keeps, in the place of the robot
+ * before; web_start comes next. Returns NULL, or what is wrong. A file that is none leaves the
+ * robot before as it was. */
 const char *web_open(const WebModel *file, size_t bytes);
 /* Where the text of a soil's file goes, ended by a 0: [WEB_TEXT]. web_soil reads it; WEB_OWN is its
  * ground from the next web_start on. Returns NULL, or what is wrong; then the soil before stays. */

@@ -6,7 +6,8 @@ const SHADOW = 2048; // pixels along an edge of the shadow map
 const SHADOW_REACH = 1.7; // [m] around the robot
 const INNER = 2.5; // [m] half the edge of the fine mesh around the robot
 const FAR = 90; // [m]
-const LINKS = 13;
+const LINKS = 13; // of the largest robot
+const SHADES = 12; // spheres that keep light away
 const BLADES = 46000; // of grass
 const GRASS_REACH = 3.4; // [m]
 export const LOOKS = 10; // of the ground: the presets, rigid
@@ -128,6 +129,21 @@ class Mesh {
       });
     }
   }
+}
+
+// Spheres for the light that the robot keeps from the ground: of each link that has parts, around the middle of their volume, as large as
+// they are; the largest SHADES of them.
+function shadesOf(parts) {
+  const links = new Map();
+  for (const { shape, link, size, position } of parts) {
+    const [a, b, c] = shape === BOX ? size : shape === CYLINDER ? [size[0], size[0], size[1]]
+      : shape === CAPSULE ? [size[0], size[0], size[1] + size[0]] : size;
+    const volume = a * b * c, sum = links.get(link) ?? links.set(link, { link, volume: 0, center: [0, 0, 0] }).get(link);
+    sum.volume += volume;
+    position.forEach((x, k) => { sum.center[k] += volume * x; });
+  }
+  const spheres = [...links.values()].sort((a, b) => b.volume - a.volume).slice(0, SHADES);
+  return spheres.map(({ link, volume, center }) => ({ link, center: center.map((x) => x / volume), radius: 1.1 * Math.cbrt(volume) }));
 }
 
 // ---- meshes of the ground ----
@@ -283,7 +299,7 @@ uniform vec2 hole; // middle of the fine mesh, which the coarse one leaves out
 uniform float coarse;
 uniform int look; // -1: stripes
 uniform vec3 looks[${LOOKS}];
-uniform vec4 blockers[12]; // spheres that keep the sky's light away
+uniform vec4 blockers[${SHADES}]; // spheres that keep the sky's light away
 uniform sampler2D noise;
 uniform float stripe;
 ${LIGHT}
@@ -352,7 +368,7 @@ void main() {
   light = mix(light, 0.75 * light + 0.14, 0.4 * rough);
   float sun = light * shade * sunlit(place, vec3(0.0, 0.0, 1.0));
   float open = exp(-26.0 * max(depth - around, 0.0)) * (1.0 - 0.55 * smoothstep(0.0, 0.05, depth));
-  for (int k = 0; k < 12; k++) {
+  for (int k = 0; k < ${SHADES}; k++) {
     vec3 d = blockers[k].xyz - place;
     float q = dot(d, d), r = blockers[k].w;
     open *= 1.0 - 0.85 * clamp(dot(n, d) * inversesqrt(q), 0.0, 1.0) * min(r * r / q, 1.0);
@@ -524,25 +540,36 @@ export class Picture {
     this.makeTextures();
   }
 
-  // parts: the robot's. looks: [LOOKS] colours of the ground, sRGB in 0 .. 1. cell: [m] of the window; stripe: [m].
-  setWorld(parts, looks, cell, stripe) {
-    Object.assign(this, { looks: looks.flat(), cell, stripe });
-    const mesh = new Mesh();
-    for (const part of parts) mesh.add(part);
-    this.robotMesh = this.upload(new Float32Array(mesh.vertices), new Uint32Array(mesh.indices), [3, 3, 1, 3, 2]);
-    const fine = innerMesh(INNER, 2 * cell), inner = innerMesh(INNER, 5 * cell), outer = outerMesh(INNER * 0.98, FAR);
-    this.fineMesh = this.upload(fine.points, fine.indices, [2]);
-    this.innerMesh = this.upload(inner.points, inner.indices, [2]);
+  // looks: [LOOKS] colours of the ground, sRGB in 0 .. 1. stripe: [m].
+  setWorld(looks, stripe) {
+    Object.assign(this, { looks: looks.flat(), stripe });
+    const outer = outerMesh(INNER * 0.98, FAR);
     this.outerMesh = this.upload(outer.points, outer.indices, [2]);
     for (const program of [this.sky, this.ground, this.robot, this.caster, this.grass]) program.check();
   }
 
+  // The robot and the ground around it, in the place of those before. cell: [m] of the window.
+  setRobot(parts, cell) {
+    const mesh = new Mesh(), fine = innerMesh(INNER, 2 * cell), inner = innerMesh(INNER, 5 * cell);
+    for (const part of parts) mesh.add(part);
+    for (const old of [this.robotMesh, this.fineMesh, this.innerMesh]) if (old) this.release(old);
+    Object.assign(this, { cell, shades: shadesOf(parts) });
+    this.robotMesh = this.upload(new Float32Array(mesh.vertices), new Uint32Array(mesh.indices), [3, 3, 1, 3, 2]);
+    this.fineMesh = this.upload(fine.points, fine.indices, [2]);
+    this.innerMesh = this.upload(inner.points, inner.indices, [2]);
+  }
+
+  release({ array, buffers }) {
+    this.gl.deleteVertexArray(array);
+    for (const buffer of buffers) this.gl.deleteBuffer(buffer);
+  }
+
   upload(vertices, indices, widths) {
-    const { gl } = this, array = gl.createVertexArray(), stride = 4 * widths.reduce((a, b) => a + b);
+    const { gl } = this, array = gl.createVertexArray(), stride = 4 * widths.reduce((a, b) => a + b), buffers = [gl.createBuffer(), gl.createBuffer()];
     gl.bindVertexArray(array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers[0]);
     gl.bufferData(gl.ARRAY_BUFFER, vertices, gl.STATIC_DRAW);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers[1]);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
     let offset = 0;
     widths.forEach((width, i) => {
@@ -550,7 +577,7 @@ export class Picture {
       gl.vertexAttribPointer(i, width, gl.FLOAT, false, stride, offset);
       offset += 4 * width;
     });
-    return { array, count: indices.length };
+    return { array, buffers, count: indices.length };
   }
 
   texture(unit, format, size, filter, wrap) {
@@ -683,22 +710,14 @@ export class Picture {
     gl.depthFunc(gl.LESS);
   }
 
-  // Spheres for the light that the robot keeps from the ground: base, thighs, shanks, feet.
+  // The same in the world: [12] x y z radius.
   blockers(links) {
-    const spheres = [], add = (i, q, r) => {
-      const L = links.subarray(12 * i, 12 * i + 12);
-      for (let k = 0; k < 3; k++) spheres.push(L[4 * k] * q[0] + L[4 * k + 1] * q[1] + L[4 * k + 2] * q[2] + L[4 * k + 3]);
-      spheres.push(r);
-    };
-    add(0, [-0.02, 0, 0.1], 0.13);
-    add(0, [-0.02, 0, 0.25], 0.09);
-    for (const leg of [0, 6]) {
-      add(leg + 3, [0, 0, -0.15], 0.06);
-      add(leg + 4, [0, 0, -0.15], 0.045);
-      add(leg + 6, [0.12, 0, -0.03], 0.042);
-      add(leg + 6, [0.04, 0, -0.03], 0.042);
-      add(leg + 6, [-0.03, 0, -0.03], 0.04);
-    }
-    return new Float32Array(spheres);
+    const spheres = new Float32Array(4 * SHADES);
+    this.shades.forEach(({ link, center: q, radius }, n) => {
+      const L = links.subarray(12 * link, 12 * link + 12);
+      for (let k = 0; k < 3; k++) spheres[4 * n + k] = L[4 * k] * q[0] + L[4 * k + 1] * q[1] + L[4 * k + 2] * q[2] + L[4 * k + 3];
+      spheres[4 * n + 3] = radius;
+    });
+    return spheres;
   }
 }

@@ -1,4 +1,5 @@
-// The page: it loads the core (core.c as mild.wasm) and a robot, steps them in real time, and shows what they do.
+// The page: it loads the core (core.c as mild.wasm) and a robot, steps them in real time, and shows what they do. The other robots come
+// when somebody asks for them.
 import { Picture } from './draw.js';
 
 const PERIOD = 0.01; // [s] policy step
@@ -6,6 +7,14 @@ const BEHIND = 1.5; // [s] the most that is made good after a pause
 const TICK = 20; // [ms] between steps where drawing takes longer
 const STRIPE = 2.4; // [m] WEB_STRIPE
 const LEVEL = 0;
+
+// The robots: the file, the name; what it is asked at most, within what its policy was trained for: forward, backward, aside [m/s], turn
+// [rad/s]; the end of the pressures' scale [Pa]; how far away the camera is, and how far below the base it looks [m].
+const ROBOTS = [
+  { file: 'sa01', name: 'SA01', most: [1.15, 0.9, 0.35, 1.0], pressure: 40e3, away: 3, below: 0.33 },
+  { file: 'g1', name: 'G1', most: [0.9, 0.4, 0.2, 0.8], pressure: 80e3, away: 3.4, below: 0.15 },
+  { file: 'go1', name: 'Go1', most: [1.0, 0.4, 0.2, 0.8], pressure: 120e3, away: 2.2, below: 0.11 },
+];
 
 // What a ground is called, and its colour as drawn.
 const GROUNDS = {
@@ -32,8 +41,10 @@ const choice = (key, count, otherwise) => {
   return Number.isInteger(number) && number >= 0 && number < count ? number : otherwise;
 };
 
+const FIRST = Math.max(0, ROBOTS.findIndex(({ file }) => file === options.get('robot'))); // `?robot=go1`
+
 // Why a trial ends: TaskEnd.
-const ENDS = ['', 'It is no longer finite', 'It leans too far', 'Its body touches the ground', 'A shank touches the ground', 'Its feet cross',
+const ENDS = ['', 'It is no longer finite', 'It leans too far', 'Its body touches the ground', 'A leg touches the ground', 'Its feet cross',
   'A joint broke out'];
 
 // What the robot knows of its ground: BeliefParameter. Low to high: 90 %.
@@ -41,26 +52,44 @@ const KNOWN = [['sinks', ' mm'], ['k_pen', ' N/m'], ['sigma', ' kN/m³'], ['fric
 
 // ---- the core ----
 
+async function bytesOf(file) {
+  const answer = await fetch(file);
+  if (!answer.ok) throw new Error(`${file}: ${answer.status}`);
+  return answer.arrayBuffer();
+}
+
 class Core {
-  static async load() {
+  static async load(robot) {
     const nothing = new Proxy({}, { get: () => () => 0 });
-    const [wasm, robot] = await Promise.all([fetch('mild.wasm'), fetch('robot.bin').then((r) => {
-      if (!r.ok) throw new Error(`robot.bin: ${r.status}`);
-      return r.arrayBuffer();
-    })]);
-    if (!wasm.ok) throw new Error(`mild.wasm: ${wasm.status}`);
-    const { instance } = await WebAssembly.instantiate(await wasm.arrayBuffer(), { env: nothing, wasi_snapshot_preview1: nothing });
-    return new Core(instance.exports, robot);
+    const [wasm, bytes] = await Promise.all([bytesOf('mild.wasm'), bytesOf(`${robot}.bin`)]);
+    const { instance } = await WebAssembly.instantiate(wasm, { env: nothing, wasi_snapshot_preview1: nothing });
+    const core = new Core(instance.exports);
+    core.keep(robot, bytes);
+    core.open(robot);
+    return core;
   }
 
-  constructor(exports, robot) {
+  constructor(exports) {
     this.c = exports;
+    this.robots = new Map(); // what web_open takes
     if (exports._initialize) exports._initialize();
-    const at = (exports.malloc(robot.byteLength + 16) + 15) & ~15;
-    new Uint8Array(exports.memory.buffer).set(new Uint8Array(robot), at);
-    this.check(exports.web_open(at, robot.byteLength));
     const count = exports.mild_material_preset_count();
     this.names = Array.from({ length: count }, (_, i) => this.text(exports.mild_material_preset_name(i))).concat('rigid');
+  }
+
+  keep(robot, bytes) {
+    const at = (this.c.malloc(bytes.byteLength + 16) + 15) & ~15;
+    new Uint8Array(this.c.memory.buffer).set(new Uint8Array(bytes), at);
+    this.robots.set(robot, [at, bytes.byteLength]);
+  }
+
+  // Until a robot's file is here; at once where it is.
+  async need(robot) {
+    if (!this.robots.has(robot)) this.keep(robot, await bytesOf(`${robot}.bin`));
+  }
+
+  open(robot) {
+    this.check(this.c.web_open(...this.robots.get(robot)));
     this.readParts();
   }
 
@@ -93,10 +122,11 @@ class Core {
     let at = start;
     const take = (count) => { at += 4 * count; return this.floats(at - 4 * count, count); };
     const takeInts = (count) => { at += 4 * count; return this.ints(at - 4 * count, count); };
-    const [bytes, links, elements] = takeInts(3), [pitch, cell, period] = take(3);
+    const [bytes, links, feet, elements, knows] = takeInts(5), [pitch, cell, period] = take(3);
     const view = {
-      links, elements, pitch, cell, period, velocity: take(3), yaw: take(1)[0], load: take(2), depth: take(2), center: take(4),
-      shellLoad: take(1)[0], footsteps: take(1)[0], alarms: take(1)[0], known: take(15), x: take(256), y: take(256), pressure: take(256), link: take(12 * 41), dirtyCount: takeInts(1), dirty: takeInts(4 * 64),
+      links, feet, elements, knows, pitch, cell, period, velocity: take(3), yaw: take(1)[0], load: take(4), depth: take(4),
+      center: take(8), shellLoad: take(1)[0], footsteps: take(1)[0], alarms: take(1)[0], known: take(15), x: take(512), y: take(512),
+      pressure: take(512), link: take(12 * 41), dirtyCount: takeInts(1), dirty: takeInts(4 * 64),
     };
     if (at - start !== bytes) throw new Error('mild.wasm and mild.js are of different builds');
     return view;
@@ -125,6 +155,7 @@ class Driver {
     this.wanted = [0, 0, 0];
     this.command = [0, 0, 0];
     this.heading = null;
+    this.most = ROBOTS[0].most;
     this.touched = false; // somebody has driven
     this.again = false; // somebody wants it to stand up
     addEventListener('keydown', (e) => {
@@ -171,7 +202,7 @@ class Driver {
 
   // The command of the next policy step [m/s, m/s, rad/s]: gentle changes, and the heading held where nobody turns.
   next(yaw) {
-    const limits = [this.wanted[0] > 0 ? 1.15 : 0.9, 0.35, 1.0], rate = [1.1, 0.9, 3.0];
+    const [ahead, back, aside, turning] = this.most, limits = [this.wanted[0] > 0 ? ahead : back, aside, turning], rate = [1.1, 0.9, 3.0];
     this.command = this.command.map((now, i) => now + clamp(this.wanted[i] * limits[i] - now, -rate[i] * PERIOD, rate[i] * PERIOD));
     if (this.heading === null || this.command[2] !== 0) this.heading = yaw;
     const moves = this.command.some((x) => Math.abs(x) > 0.1);
@@ -189,8 +220,6 @@ function heat(t) {
   return stops[i].map((a, k) => Math.round(a + (stops[i + 1][k] - a) * (x - i)));
 }
 
-const PRESSURE = 40e3; // [Pa] the end of the scale
-
 class Panel {
   constructor(app) {
     this.app = app;
@@ -198,20 +227,24 @@ class Panel {
     $('scale').firstElementChild.style.background =
       `linear-gradient(90deg, ${Array.from({ length: 13 }, (_, i) => `rgb(${heat(0.08 + (0.92 * i) / 12)})`).join(', ')})`;
     this.makeGrounds();
+    this.robots = ROBOTS.map(({ name }, i) => this.add($('robots'), name, null, () => app.takeRobot(i)));
     for (const id of ['stiffness', 'friction']) $(id).addEventListener('input', () => this.change());
     $('more').addEventListener('click', () => $('side').classList.toggle('on'));
     this.change();
   }
 
+  // A button; color: of its dot, or null.
+  add(to, text, color, act) {
+    const button = document.createElement('button'), dot = document.createElement('i');
+    if (color) { dot.style.background = color; button.append(dot); }
+    button.append(text);
+    button.addEventListener('click', () => { act(); $('picture').focus(); });
+    to.append(button);
+    return button;
+  }
+
   makeGrounds() {
-    const { app } = this, list = $('grounds'), add = (to, text, color, act) => {
-      const button = document.createElement('button'), dot = document.createElement('i');
-      if (color) { dot.style.background = color; button.append(dot); }
-      button.append(text);
-      button.addEventListener('click', () => { act(); $('picture').focus(); });
-      to.append(button);
-      return button;
-    };
+    const { app } = this, list = $('grounds'), add = (...all) => this.add(...all);
     const rgb = (c) => `rgb(${c.map((x) => Math.round(255 * x))})`, { names } = app.core;
     const all = `conic-gradient(${names.map((n, i) => `${rgb(GROUNDS[n][1])} ${i / names.length}turn ${(i + 1) / names.length}turn`)})`;
     this.grounds = names.map((name, i) => add(list, GROUNDS[name][0], rgb(GROUNDS[name][1]), () => app.choose(i, app.shape)));
@@ -231,6 +264,16 @@ class Panel {
     this.shapes.forEach((button, i) => button.setAttribute('aria-pressed', i === this.app.shape));
   }
 
+  // Another robot: as many feet, and pressures of its own.
+  entered() {
+    const { app } = this, { feet } = app.core.view(), end = ROBOTS[app.robot].pressure;
+    this.robots.forEach((button, i) => button.setAttribute('aria-pressed', i === app.robot));
+    this.loads = Array.from({ length: feet }, () => document.createElement('output'));
+    $('loads').replaceChildren(...this.loads);
+    $('middle').textContent = end / 2e3;
+    $('end').textContent = end / 1e3;
+  }
+
   change() {
     const stiffness = 4 ** Number($('stiffness').value), friction = 5 ** Number($('friction').value);
     $('stiffness-value').textContent = `× ${stiffness.toFixed(2)}`;
@@ -238,16 +281,18 @@ class Panel {
     this.app.core.c.web_change(stiffness, friction);
   }
 
+  // Left feet on the left; of four the front ones above.
   drawSoles(view) {
-    const { soles } = this, { width, height } = soles.canvas, size = 0.94 * view.pitch, scale = height / 0.30;
+    const { soles } = this, { width, height } = soles.canvas, size = 0.94 * view.pitch, four = view.feet > 2;
+    const scale = height / (four ? 0.12 : 0.30), end = ROBOTS[this.app.robot].pressure;
     soles.clearRect(0, 0, width, height);
-    for (let f = 0; f < 2; f++) {
-      const middle = width * (f === 0 ? 0.28 : 0.72), foot = height * 0.68;
+    for (let f = 0; f < view.feet; f++) {
+      const middle = width * (f % 2 === 0 ? 0.28 : 0.72), foot = height * (four ? (f < 2 ? 0.27 : 0.73) : 0.68);
       let area = 0;
       for (let e = 0; e < view.elements; e++) {
         const pressure = view.pressure[128 * f + e];
         const x = middle - scale * view.y[128 * f + e], y = foot - scale * view.x[128 * f + e];
-        soles.fillStyle = pressure > 0 ? `rgb(${heat(0.08 + (0.92 * pressure) / PRESSURE)})` : 'rgba(60, 50, 40, 0.07)';
+        soles.fillStyle = pressure > 0 ? `rgb(${heat(0.08 + (0.92 * pressure) / end)})` : 'rgba(60, 50, 40, 0.07)';
         soles.beginPath();
         soles.roundRect(x - (scale * size) / 2, y - (scale * size) / 2, scale * size, scale * size, 5);
         soles.fill();
@@ -261,13 +306,17 @@ class Panel {
         soles.stroke();
       }
       const depth = this.app.core.names[this.app.ground] === 'rigid' ? 'rigid' : `${Math.round(1e3 * view.depth[f])} mm`;
-      $(f === 0 ? 'left' : 'right').textContent = `${Math.round(view.load[f])} N · ${depth}`;
+      this.loads[f].textContent = `${Math.round(view.load[f])} N · ${depth}`;
     }
-    $('shells').textContent = view.shellLoad > 0 ? `shanks and body ${Math.round(view.shellLoad)} N` : '';
+    $('shells').textContent = view.shellLoad > 0 ? `legs and body ${Math.round(view.shellLoad)} N` : '';
   }
 
   drawKnowledge(view) {
     const number = (x) => (x >= 100 ? x.toFixed(0) : x.toPrecision(2));
+    if (!view.knows) {
+      $('knows').textContent = `Nobody has taught the ${ROBOTS[this.app.robot].name} to tell its ground from its sensors. The SA01 can.`;
+      return;
+    }
     $('knows').textContent = view.footsteps === 0 ? 'It has not felt the ground yet.' : KNOWN.map(([name, unit], i) => {
       const [low, middle, high] = view.known.subarray(3 * i, 3 * i + 3);
       return `${name} ${number(middle)}${unit} (${number(low)} to ${number(high)})`;
@@ -321,7 +370,7 @@ class Camera {
   zoom(factor) { this.distance = clamp(this.distance * factor, 0.9, 8); }
 
   follow(base, yaw, height, seconds, drift) {
-    const goal = [base[0], base[1], 0.47 + height];
+    const goal = [base[0], base[1], height];
     if (!this.target || Math.hypot(goal[0] - this.target[0], goal[1] - this.target[1]) > 1.5) { this.target = goal; this.yaw = yaw; }
     const share = [1 - Math.exp(-seconds * 5), 1 - Math.exp(-seconds * 2.5)];
     this.target = this.target.map((x, k) => x + (goal[k] - x) * share[k < 2 ? 0 : 1]);
@@ -343,14 +392,13 @@ class App {
     const looks = core.names.map((name) => GROUNDS[name][1]);
     looks.push(OWN);
     while (looks.length < 10) looks.push([0.5, 0.5, 0.5]);
-    picture.setWorld(core.parts, looks, core.view().cell, STRIPE);
+    picture.setWorld(looks, STRIPE);
     this.driver = new Driver();
     this.camera = new Camera($('picture'));
     this.panel = new Panel(this);
-    this.before = core.view().link.slice();
-    this.links = this.before.slice();
+    this.links = core.view().link.slice();
     Object.assign(this, { owed: 0, steps: 0, time: 0, pace: 1, fallen: 0, last: null });
-    this.choose(this.ground, this.shape);
+    this.enter(FIRST);
     for (const what of ['dragover', 'drop']) addEventListener(what, (e) => {
       e.preventDefault();
       if (what === 'drop' && e.dataTransfer.files[0]) this.takeSoil(e.dataTransfer.files[0]);
@@ -360,6 +408,30 @@ class App {
       if (e.code === 'KeyR') this.driver.again = true;
       if (digit && !e.repeat) this.choose(digit[1] === '0' ? core.names.length : Number(digit[1]) - 1, this.shape);
     });
+  }
+
+  // Somebody asks for a robot. Its file is fetched the first time, and the one before walks on meanwhile.
+  async takeRobot(robot) {
+    const { file, name } = ROBOTS[robot];
+    this.asks = robot;
+    try {
+      this.panel.say(`${name} is on its way`);
+      await this.core.need(file);
+      if (this.asks === robot) this.enter(robot); // and for no other one since
+    } catch (error) {
+      this.panel.say(`${name}: ${error.message}`, 12);
+    }
+  }
+
+  enter(robot) {
+    const { core } = this, { file, most, away } = ROBOTS[robot];
+    this.robot = robot;
+    core.open(file);
+    this.picture.setRobot(core.parts, core.view().cell);
+    this.driver.most = most;
+    this.camera.distance = away;
+    this.panel.entered();
+    this.choose(this.ground, this.shape);
   }
 
   // The file of a soil: the ground from now on, or a line that says what is wrong with it.
@@ -453,7 +525,7 @@ class App {
       view.dirtyCount[0] = 0;
     }
     const base = [this.links[3], this.links[7], this.links[11]];
-    const camera = this.camera.follow(base, view.yaw, base[2] - 0.8, Math.max(seconds, 1e-3), this.driver.touched || this.script ? 0 : 0.05);
+    const camera = this.camera.follow(base, view.yaw, base[2] - ROBOTS[this.robot].below, Math.max(seconds, 1e-3), this.driver.touched || this.script ? 0 : 0.05);
     const { names } = this.core, links = this.links.subarray(0, 12 * view.links);
     this.picture.adapt(seconds);
     const look = this.ground === names.length ? -1 : Math.min(this.ground, names.length);
@@ -471,7 +543,7 @@ class App {
 function runTest(app) {
   const speed = Number(options.get('test') || 0.6), start = performance.now();
   let x = null;
-  app.script = () => [speed / 1.15, 0, 0];
+  app.script = () => [speed / app.driver.most[0], 0, 0];
   app.steps = 0;
   const watch = () => {
     const { link } = app.core.view(), elapsed = (performance.now() - start) / 1e3;
@@ -493,7 +565,7 @@ function runTest(app) {
 }
 
 async function main() {
-  const loading = Core.load();
+  const loading = Core.load(ROBOTS[FIRST].file);
   const picture = new Picture($('picture')); // its programs are compiled meanwhile
   const app = new App(await loading, picture);
   window.app = app;

@@ -31,6 +31,7 @@ runner = OnPolicyRunner(env, config, log_dir=options.log, device=options.device)
 if options.load:
     runner.load(options.load, map_location=options.device)
 runner.learn(options.iterations)
+env.save(runner.alg.save(), f"{options.log}/policy.safetensors")  # for mild eval, play, drive and export
 env.close()
 
 

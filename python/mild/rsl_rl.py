@@ -1,9 +1,16 @@
-"""rsl_rl: environments whose tensors the library writes, on the CPU or a CUDA device."""
+"""rsl_rl: environments whose tensors the library writes, on the CPU or a CUDA device; and its policies as files of mild:
+python -m mild.rsl_rl model_1500.pt --config configs/quick.ini --out walk.safetensors"""
+import argparse
+import itertools
+
 import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
+from . import policy_file
 from .envs import open_envs
+
+EPSILON = 1e-2  # of rsl_rl's EmpiricalNormalization
 
 
 class Env(VecEnv):
@@ -94,6 +101,10 @@ class Env(VecEnv):
             actions = torch.cat([actions, action_sign * actions[:, action_index]])
         return obs, actions
 
+    def save(self, checkpoint, path):
+        """Writes the policy of a checkpoint, a model_N.pt or what is in one, as a policy's file; see policy_of."""
+        policy_of(self._envs, checkpoint, path)
+
     def close(self):
         """Ends the threads; further steps raise RuntimeError."""
         if self.device.type == "cuda":
@@ -104,3 +115,47 @@ class Env(VecEnv):
 def mirror(env, obs=None, actions=None):
     """Env.mirror, in the form that rsl_rl's symmetry_cfg calls."""
     return env.mirror(obs, actions)
+
+
+def policy_of(envs, checkpoint, path):
+    """Writes a policy's file that acts as the actor of a checkpoint of rsl_rl, without its noise: an MLPModel with activation "elu" (a
+    checkpoint does not say which), at most four hidden layers, and normalised observations or none, that sees the group "policy" alone.
+
+    envs: _envs.Envs that it was trained on. checkpoint: a model_N.pt, or what is in one. Raises ValueError for another network."""
+    name = ""
+    if not isinstance(checkpoint, dict):
+        name, checkpoint = str(checkpoint), torch.load(checkpoint, map_location="cpu", weights_only=True)
+    state = {key: value.cpu().numpy() for key, value in checkpoint.get("actor_state_dict", {}).items()}
+    layers = []
+    for index in itertools.count(0, 2):  # activations are between them
+        if f"mlp.{index}.weight" not in state:
+            break
+        layers.append((state.pop(f"mlp.{index}.weight"), state.pop(f"mlp.{index}.bias")))
+    others = [key for key in state if not key.startswith(("obs_normalizer.", "distribution."))]
+    if not layers or others:
+        raise ValueError(f"checkpoint: {name or 'it'} has no actor that is an MLPModel" + (f": {', '.join(others)}" if others else ""))
+    mean, std = (state.get(f"obs_normalizer._{key}") for key in ("mean", "std"))
+    policy_file.write(path, envs, layers, mean, None if std is None else std + EPSILON, note=f"rsl_rl {name}".strip())
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="python -m mild.rsl_rl", description="Writes the policy of a checkpoint of rsl_rl as a file for mild eval, play, "
+                                     "drive and export.", epilog="--SECTION.KEY=VALUE: overrides of the training, e.g. --task.gait_period=0.7")
+    parser.add_argument("checkpoint", help="model_N.pt")
+    parser.add_argument("--out", required=True, help="a file, FILE.safetensors")
+    parser.add_argument("--config", help="that of the training, such as configs/quick.ini")
+    parser.add_argument("--robot", help="a name, or a folder with a slash")
+    given, overrides = parser.parse_known_args()
+    for text in overrides:
+        if not text.startswith("--") or "." not in text or "=" not in text:
+            parser.error(f"unknown option {text}")
+    try:
+        envs = open_envs(1, config=given.config, overrides=dict(text[2:].split("=", 1) for text in overrides), robot=given.robot, device="cpu", threads=1)
+        policy_of(envs, given.checkpoint, given.out)
+    except (ValueError, OSError) as error:
+        parser.error(str(error))
+    print(f"mild eval --policy {given.out}")
+
+
+if __name__ == "__main__":
+    main()

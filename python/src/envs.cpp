@@ -192,6 +192,14 @@ static std::string model(const Envs &envs) {
     return mild_envs_model(open_envs(envs));
 }
 
+static std::string robot(const Envs &envs) {
+    return mild_envs_robot(open_envs(envs));
+}
+
+static std::string task(const Envs &envs) {
+    return mild_envs_task(open_envs(envs));
+}
+
 static std::vector<double> pose(Envs &envs, int index) {
     Entered entered(envs.busy, "Envs.pose");
     const MildEnvs *at = open_envs(envs);
@@ -298,6 +306,8 @@ NB_MODULE(_envs, module) {
              "CPU\nValueError for one that is not finite. Environments that ended begin anew in "
              "the same step.")
         .def_prop_ro("model", model, "The robot's MJCF.")
+        .def_prop_ro("robot", robot, "The robot's name.")
+        .def_prop_ro("task", task, "What a policy's file says of how it walks.")
         .def("pose", pose, nb::arg("index"), "qpos of one robot for an mjData of that file.")
         .def("statistics", statistics, nb::arg("stream") = 0,
              "Means over the episodes that ended since the last call.")

@@ -3,26 +3,46 @@
 
 #include <cstring>
 #include <map>
+#include <memory>
 #include <mutex>
 
 #include "xla_abi.h"
 
 using namespace xla_abi;
 
-static std::mutex lock;
-static std::map<int64_t, Batch *> batches;
+/* A batch that XLA may step. Its own lock holds it against being freed while it is stepped, so that
+ * others are stepped at the same time. */
+struct Known {
+    std::mutex stepped;
+    Batch *batch; /* NULL: freed */
+};
+
+static std::mutex lock; /* of the map */
+static std::map<int64_t, std::shared_ptr<Known>> batches;
 
 int64_t xla_number(Batch &batch) {
     static int64_t last = 0;
     const std::lock_guard<std::mutex> held(lock);
     if (batch.number == 0) {
         batch.number = ++last;
-        batches[batch.number] = &batch;
+        batches[batch.number] = std::make_shared<Known>();
+        batches[batch.number]->batch = &batch;
     }
     return batch.number;
 }
 
+static std::shared_ptr<Known> find(int64_t number) {
+    const std::lock_guard<std::mutex> held(lock);
+    const auto found = batches.find(number);
+    return found == batches.end() ? nullptr : found->second;
+}
+
 void xla_forget(Batch &batch) {
+    const std::shared_ptr<Known> known = find(batch.number);
+    if (known) {
+        const std::lock_guard<std::mutex> waited(known->stepped);
+        known->batch = nullptr;
+    }
     const std::lock_guard<std::mutex> held(lock);
     batches.erase(batch.number);
 }
@@ -144,12 +164,15 @@ static void *call(const Frame *frame, bool on_device) {
             return error;
         }
     }
-    const std::lock_guard<std::mutex> held(lock);
-    const auto found = number ? batches.find(*number) : batches.end();
-    if (found == batches.end() || !advance || !begins) {
+    const std::shared_ptr<Known> known = number ? find(*number) : nullptr;
+    if (!known || !advance || !begins) {
         return fail(frame, "the batch is closed");
     }
-    Batch &batch = *found->second;
+    const std::lock_guard<std::mutex> held(known->stepped);
+    if (!known->batch) {
+        return fail(frame, "the batch is closed");
+    }
+    Batch &batch = *known->batch;
     if ((batch.device >= 0) != on_device) {
         return fail(frame, on_device ? "the batch is on the CPU; make it with device=\"cuda\""
                                      : "the batch is on a device; make it with device=\"cpu\"");

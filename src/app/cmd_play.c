@@ -10,24 +10,35 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/context.h"
+#include "app/crowd.h"
 #include "app/figure.h"
 #include "app/play.h"
 #include "app/progress.h"
 #include "base/text.h"
 #include "identify/belief/file.h"
 #include "identify/belief/log.h"
+#include "view/relief.h"
 
 #define GRAVITY 9.81
 #define AREA_MARGIN 2.0   /* [m] ground drawn beyond the walk */
 #define WINDOW_AREA 12.0  /* [m] ground drawn around the start of a window's walk */
 #define COURSE_EXTRA 3.0  /* [s] a course gets for starting and stopping */
 #define COURSE_LEAST 12.0 /* [s] */
+#define CROWD_MARGIN 8.0  /* [m] ground drawn around a crowd */
+#define CROWD_TILE 1.3    /* [m] edge of a tile of its picture, at most */
+/* The camera goes from near the first robot to where all can be seen. */
+#define CROWD_NEAR 5.0     /* [m] from it */
+#define CROWD_LOW (-16.0)  /* [deg] */
+#define CROWD_AWAY 0.42    /* [-] farther by this share of the square's edge */
+#define CROWD_ASIDE 0.26   /* [-] and looking so much into it, along both edges */
+#define CROWD_HIGH (-33.0) /* [deg] */
 
 typedef struct {
     Context context;
     const char *video, *pressure, *log; /* NULL: not given */
     CliNames grounds;
     double patch;
+    int robots; /* of --crowd; 1: no crowd */
     int width, height;
     int printed; /* bool: neither video nor window */
     Scene scene;
@@ -113,6 +124,46 @@ static MildStatus make_sketch(Command *c, MildError *error) {
     return MILD_OK;
 }
 
+/* [m] Edge of the patches of the course. */
+static double patch_of(const Command *c) {
+    const TerrainDef *terrain = &c->context.terrain;
+    return terrain->map.patches == MILD_PATTERN_NONE ? c->patch : terrain->map.patch_size;
+}
+
+/* From the corner at which the robot walks, with the crowd behind it. */
+static void show_crowd(ViewDef *def, int others, double patch, double reach) {
+    const double side = crowd_side(others), tiles = ceil(patch / CROWD_TILE);
+    def->others = others;
+    def->cell = patch / tiles / RELIEF_TILE_CELLS; /* no tile on two patches */
+    def->x_min = patch * floor((fmin(reach, 0) - side - CROWD_MARGIN) / patch);
+    def->x_max = patch * ceil((fmax(reach, 0) + CROWD_MARGIN) / patch);
+    def->y_min = patch * floor(-CROWD_MARGIN / patch);
+    def->y_max = patch * ceil((side + CROWD_MARGIN) / patch);
+    def->closeup = 0;
+    def->force_arrow = 0;
+    def->distance = CROWD_NEAR;
+    def->elevation = CROWD_LOW;
+    def->away_distance = CROWD_NEAR + CROWD_AWAY * side;
+    def->away_elevation = CROWD_HIGH;
+    def->away_aside[0] = -CROWD_ASIDE * side;
+    def->away_aside[1] = CROWD_ASIDE * side;
+}
+
+static MildStatus make_crowd(Command *c, MildError *error) {
+    Play *play = &c->play;
+    const CrowdDef def = {.count = c->robots - 1,
+                          .task = play->task,
+                          .robot = play->robot,
+                          .scene = play->scene,
+                          .controller = play->controller,
+                          .pool = c->context.pool,
+                          .seconds = play->seconds,
+                          .speed = play->speed,
+                          .seed = play->seed};
+    play->crowd = crowd_create(&def, error);
+    return play->crowd ? MILD_OK : error->status;
+}
+
 static MildStatus make_view(Command *c, MildError *error) {
     ViewDef def = view_def_default();
     Play *play = &c->play;
@@ -125,6 +176,9 @@ static MildStatus make_view(Command *c, MildError *error) {
     def.x_max = play->window ? WINDOW_AREA : fmax(reach, 0) + AREA_MARGIN;
     if (play->window) {
         def.y_min = -WINDOW_AREA, def.y_max = WINDOW_AREA;
+    }
+    if (c->robots > 1) {
+        show_crowd(&def, c->robots - 1, patch_of(c), reach);
     }
     play->rate = def.rate;
     play->view = view_create(&def, play->robot, &c->scene.terrain, error);
@@ -169,6 +223,17 @@ static void print_table(Command *c) {
                millimetres("%.1f", m->deepest_sum, m->stances, sinkage),
                text_cell("%.2f", steady > 0.1 ? m->work / (weight * steady) : NAN, cot));
     }
+}
+
+/* Where the others are at the end, and how deep. */
+static void print_crowd(const Command *c) {
+    const Play *play = &c->play;
+    printf("%-12s %9s %8s %9s\n", "others", "robots", "upright", "sinkage");
+    for (int i = 0; i < c->grounds.count; i++) {
+        const CrowdRow row = crowd_on(play->crowd, i);
+        printf("%-12s %9d %8d %6.1f mm\n", c->names[i], row.robots, row.upright, 1e3 * row.sinkage);
+    }
+    printf("crowd: %d of %d robots upright\n", !play->fell + crowd_upright(play->crowd), c->robots);
 }
 
 /* What the robot's own sensors say of the ground at the end. */
@@ -271,6 +336,9 @@ static MildStatus walk(Command *c, MildError *error) {
     }
     print_table(c);
     print_knowledge(play);
+    if (play->crowd) {
+        print_crowd(c);
+    }
     if (c->video) {
         printf("video %s: %d frames\n", c->video, play->frames);
     }
@@ -284,15 +352,37 @@ static MildStatus walk(Command *c, MildError *error) {
     return status;
 }
 
+static MildStatus check_crowd(const Command *c, MildError *error) {
+    if (!c->video) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--crowd: only for --video FILE.mp4");
+    }
+    return strcmp(c->context.controller, "learned") == 0
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "--crowd: a crowd walks by --controller learned");
+}
+
 static MildStatus prepare(Command *c, MildError *error) {
     Play *play = &c->play;
     MildStatus status = MILD_OK;
     interrupt_install();
+    if (c->robots > 1) {
+        status = check_crowd(c, error);
+        c->context.pool = status == MILD_OK ? pool_create(0) : NULL;
+        if (status == MILD_OK && !c->context.pool) {
+            status = mild_fail(error, MILD_ERROR_MEMORY, "--crowd: no threads");
+        }
+    }
     if (c->pressure && c->scene.rigid) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--pressure: rigid ground has no elements, choose a soft one");
     }
-    status = context_move(&c->context, 1, error);
+    if (status == MILD_OK) {
+        status = context_move(&c->context, c->robots, error);
+    }
+    if (status == MILD_OK && c->robots > 1) {
+        status = make_crowd(c, error);
+    }
     if (status == MILD_OK && c->pressure) {
         play->pressure = pressure_create(play->robot, c->scene.terrain.material_count,
                                          c->context.task.physics_dt, error);
@@ -355,6 +445,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     view_destroy(play->view);
     sketch_destroy(play->sketch);
     pressure_destroy(play->pressure);
+    crowd_destroy(play->crowd);
     context_close(on);
     return status;
 }
@@ -373,6 +464,9 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
         {"video", CLI_OUTPUT, &c->video, 0, 0, "FILE.mp4",
          "write a video; without this and --pressure a window opens, and where there is none the "
          "walk is printed"},
+        {"crowd", CLI_INT, &c->robots, 1, 65536, "N",
+         "so many robots in the video, in a square (default 1); the table and the pressure are the "
+         "first one's"},
         {"pressure", CLI_OUTPUT, &c->pressure, 0, 0, "FILE.png",
          "draw the sole pressure on each ground; the numbers go to FILE.csv beside it"},
         {"log", CLI_OUTPUT, &c->log, 0, 0, "FILE.csv",
@@ -410,7 +504,11 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
                     "pressure.png\n"
                     "  mild play --ground foam28 --speed 0.4\n"
                     "  mild play --ground sand_loose --terrain.kind=waves --terrain.memory=true "
-                    "--video waves.mp4\n",
+                    "--video waves.mp4\n"
+                    "  mild play --crowd 4096 --ground "
+                    "rubber,foam60,foam45,foam28,foam25,grass,sand_loose,sand_dense "
+                    "--terrain.patches=checker --terrain.patch_size=3 --seconds 6 --video "
+                    "crowd.mp4\n",
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
     if (outcome != CLI_RUN) {
@@ -435,6 +533,7 @@ int cmd_play(int argc, char **argv) {
         c->context.controller = "learned";
         c->context.on_ground = 1;
         c->patch = 2;
+        c->robots = 1;
         c->width = 960, c->height = 540;
         c->play.speed = NAN; /* not given */
         c->play.seed = 1;

@@ -15,7 +15,7 @@ static int is_served(const char *path) {
 }
 
 static MildStatus check_built(const char *folder, MildError *error) {
-    static const char *const files[] = {"index.html", "mild.wasm", "robot.bin"};
+    static const char *const files[] = {"index.html", "mild.wasm", "sa01.bin"};
     char path[PATH_SIZE];
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         MildStatus status = path_join(folder, files[i], path, error);

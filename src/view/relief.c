@@ -42,18 +42,20 @@ struct Relief {
     int nx, ny;        /* vertices */
     double x0, y0, cell;
     double low, high; /* [m] of the undisturbed surface drawn */
-    int uneven, rigid, feet;
+    int uneven, rigid;
+    int soles; /* of a robot */
+    int feet;  /* of all robots; foot f has sole f % soles */
     MildTerrain terrain;
     Look look[MILD_MATERIALS_MAX + 1]; /* last: rigid */
     SoleMask mask[MILD_FEET_MAX];
-    Box last[MILD_FEET_MAX];
+    Box *last;           /* [feet] */
     const Facet *facets; /* [facet_count] of other bodies, borrowed */
     int facet_count;
-    Box facet_box; /* vertices that they may press */
-    double position[MILD_FEET_MAX][3], rotation[MILD_FEET_MAX][9];
-    float *peak, *shown; /* [ny][nx] deepest and present depth of the surface */
-    float *base;         /* [ny][nx] [m] undisturbed height */
-    int *pressed;        /* [tiles] vertices that are not at their undisturbed height */
+    Box facet_box;                         /* vertices that they may press */
+    double (*position)[3], (*rotation)[9]; /* [feet] */
+    float *peak, *shown;                   /* [ny][nx] deepest and present depth of the surface */
+    float *base;                           /* [ny][nx] [m] undisturbed height */
+    int *pressed; /* [tiles] vertices that are not at their undisturbed height */
     unsigned char *dirty;
     signed char *material; /* [tiles] */
 };
@@ -197,7 +199,7 @@ static double skirt(double depth, double distance, double recovery) {
  * n.(p - ankle) = z_sole, n the foot's z axis. */
 static float sole_depth(const Relief *relief, int foot, double x, double y, double surface,
                         double recovery) {
-    const SoleMask *mask = &relief->mask[foot];
+    const SoleMask *mask = &relief->mask[foot % relief->soles];
     const double *p = relief->position[foot], *r = relief->rotation[foot];
     double dx = x - p[0], dy = y - p[1];
     if (r[8] < 0.2) { /* the foot lies on its side */
@@ -268,7 +270,9 @@ static void update_vertex(Relief *relief, int i, int j) {
     double recovery = material_at(relief, x, y)->recovery;
     float depth = 0;
     for (int f = 0; f < relief->feet; f++) {
-        depth = fmaxf(depth, sole_depth(relief, f, x, y, (double)relief->base[at], recovery));
+        if (box_has(&relief->last[f], i, j)) {
+            depth = fmaxf(depth, sole_depth(relief, f, x, y, (double)relief->base[at], recovery));
+        }
     }
     if (box_has(&relief->facet_box, i, j)) {
         depth = fmaxf(depth, facets_depth(relief, x, y, (double)relief->base[at], recovery));
@@ -300,7 +304,7 @@ static Box box_between(const Relief *relief, const double low[2], const double h
 
 /* The vertices that a foot may press: none while it swings above the highest ground. */
 static Box foot_box(const Relief *relief, int foot) {
-    const SoleMask *mask = &relief->mask[foot];
+    const SoleMask *mask = &relief->mask[foot % relief->soles];
     const double *p = relief->position[foot], *r = relief->rotation[foot];
     double reach = mask->reach, x = mask->x_min, y = mask->y_min;
     double x_end = x + mask->columns * mask->step, y_end = y + mask->rows * mask->step;
@@ -331,15 +335,18 @@ static void update_box(Relief *relief, Box box) {
     }
 }
 
-void relief_press(Relief *relief, const double (*position)[3], const double (*rotation)[9]) {
+void relief_press(Relief *relief, int robot, const double (*position)[3],
+                  const double (*rotation)[9]) {
+    const int first = robot * relief->soles, behind = first + relief->soles;
     if (relief->rigid) {
         return;
     }
-    memcpy(relief->position, position, (size_t)relief->feet * sizeof *position);
-    memcpy(relief->rotation, rotation, (size_t)relief->feet * sizeof *rotation);
-    for (int f = 0; f < relief->feet; f++) {
-        update_box(relief, relief->last[f]); /* the ground springs back where the foot was */
+    memcpy(relief->position[first], position, (size_t)relief->soles * sizeof *position);
+    memcpy(relief->rotation[first], rotation, (size_t)relief->soles * sizeof *rotation);
+    for (int f = first; f < behind; f++) {
+        const Box before = relief->last[f];
         relief->last[f] = foot_box(relief, f);
+        update_box(relief, before); /* the ground springs back where the foot was */
         update_box(relief, relief->last[f]);
     }
 }
@@ -384,13 +391,17 @@ static int allocate(Relief *relief, const MildSole *const *soles) {
     relief->peak = calloc(3 * vertices, sizeof *relief->peak);
     relief->pressed = calloc(tiles, sizeof *relief->pressed);
     relief->dirty = calloc(2 * tiles, 1);
-    if (!relief->peak || !relief->pressed || !relief->dirty) {
+    relief->last = calloc((size_t)relief->feet, sizeof *relief->last);
+    relief->position = calloc((size_t)relief->feet, sizeof *relief->position);
+    relief->rotation = calloc((size_t)relief->feet, sizeof *relief->rotation);
+    if (!relief->peak || !relief->pressed || !relief->dirty || !relief->last || !relief->position ||
+        !relief->rotation) {
         return 0;
     }
     relief->shown = relief->peak + vertices;
     relief->base = relief->shown + vertices;
     relief->material = (signed char *)(relief->dirty + tiles);
-    for (int f = 0; f < relief->feet; f++) {
+    for (int f = 0; f < relief->soles; f++) {
         if (!mask_create(&relief->mask[f], soles[f])) {
             return 0;
         }
@@ -430,7 +441,8 @@ Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain,
     relief->nx = relief->columns * RELIEF_TILE_CELLS + 1,
     relief->ny = relief->rows * RELIEF_TILE_CELLS + 1;
     relief->x0 = def->x_min, relief->y0 = 0.5 * (def->y_min + def->y_max - rows * edge);
-    relief->cell = def->cell, relief->rigid = def->rigid, relief->feet = feet;
+    relief->cell = def->cell, relief->rigid = def->rigid;
+    relief->soles = feet, relief->feet = feet * def->robots;
     relief->terrain = *terrain;
     relief->uneven = terrain->map && !mild_map_is_level(terrain->map);
     for (int m = 0; m < terrain->material_count; m++) {
@@ -451,9 +463,12 @@ void relief_destroy(Relief *relief) {
     if (!relief) {
         return;
     }
-    for (int f = 0; f < relief->feet; f++) {
+    for (int f = 0; f < relief->soles; f++) {
         free(relief->mask[f].nearest);
     }
+    free(relief->last);
+    free(relief->position);
+    free(relief->rotation);
     free(relief->peak);
     free(relief->pressed);
     free(relief->dirty);

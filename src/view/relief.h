@@ -19,6 +19,7 @@ typedef struct {
     double cell;                       /* [m] distance of vertices */
     int rigid;                         /* bool: nothing yields */
     const char *const *names; /* [materials] preset names, for colours; NULL entries allowed */
+    int robots;               /* that press it, each with all its feet */
 } ReliefDef;
 
 typedef struct Relief Relief;
@@ -27,9 +28,10 @@ typedef struct Relief Relief;
 Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain,
                       const MildSole *const *soles, int feet, MildError *error);
 void relief_destroy(Relief *relief);
-/* Presses the surface to the present pose of the soles. position [feet][3], rotation [feet][9]: of
- * the ankles. */
-void relief_press(Relief *relief, const double (*position)[3], const double (*rotation)[9]);
+/* Presses the surface to the present pose of a robot's soles. position [feet][3], rotation
+ * [feet][9]: of the ankles. */
+void relief_press(Relief *relief, int robot, const double (*position)[3],
+                  const double (*rotation)[9]);
 /* The same of the other bodies in the ground, by their elements [count], which are borrowed until
  * the next call. */
 void relief_press_facets(Relief *relief, const Facet *facets, int count);

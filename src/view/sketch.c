@@ -50,7 +50,7 @@ Sketch *sketch_create(const SketchDef *def, const Robot *robot, const MildTerrai
     sketch->high = calloc(height, sizeof *sketch->high);
     sketch->text = calloc((size_t)def->rows * ((size_t)def->columns * CHARACTER + 1) + 1, 1);
     sketch->data = mj_makeData(robot_visual_model(robot));
-    const ReliefDef ground = {def->x_min, def->x_max, -WIDTH, WIDTH, CELL, def->rigid, NULL};
+    const ReliefDef ground = {def->x_min, def->x_max, -WIDTH, WIDTH, CELL, def->rigid, NULL, 1};
     sketch->relief =
         relief_create(&ground, terrain, robot_rasters(robot), robot_feet(robot), error);
     if (!sketch->dots || !sketch->low || !sketch->high || !sketch->text || !sketch->data) {
@@ -85,7 +85,7 @@ void sketch_observe(Sketch *sketch, const RobotSim *sim) {
         memcpy(position[f], foot->position, sizeof position[f]);
         memcpy(rotation[f], foot->rotation, sizeof rotation[f]);
     }
-    relief_press(sketch->relief, (const double(*)[3])position, (const double(*)[9])rotation);
+    relief_press(sketch->relief, 0, (const double(*)[3])position, (const double(*)[9])rotation);
 }
 
 /* ---- ground ---- */

@@ -122,3 +122,10 @@ void smooth_edges(const unsigned char *from, int width, int height, unsigned cha
         }
     }
 }
+
+void smooth_flip(const unsigned char *rgb, int width, int height, unsigned char *flipped) {
+    const size_t row = (size_t)width * 3, rows = (size_t)height;
+    for (size_t r = 0; r < rows; r++) {
+        memcpy(flipped + r * row, rgb + (rows - 1 - r) * row, row);
+    }
+}

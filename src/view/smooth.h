@@ -8,5 +8,7 @@
  * without an edge beside them, and those of the border, are copied. */
 void smooth_edges(const unsigned char *from, int width, int height, unsigned char *luma,
                   unsigned char *to);
+/* Turns a picture upside down. */
+void smooth_flip(const unsigned char *rgb, int width, int height, unsigned char *flipped);
 
 #endif

@@ -11,9 +11,9 @@
 #include "view/inset.h"
 #include "view/model.h"
 #include "view/relief.h"
+#include "view/sight.h"
 #include "view/smooth.h"
 
-#define VIEW_CELL 0.01         /* [m] vertices of the visible ground */
 #define VIEW_OVERLAP 1.0015F   /* [-] scale of a tile, which prevents gaps between tiles */
 #define VIEW_FINE 64           /* most tiles with imprints at once */
 #define VIEW_PLAIN 96          /* most tiles without imprints but of mixed material */
@@ -22,6 +22,9 @@
 #define VIEW_RADIUS_UNEVEN 4.0 /* [m] the same on uneven ground */
 #define VIEW_FLOOR 40.0        /* [m] half the size of the surrounding floor */
 #define VIEW_GEOMS 4000
+#define VIEW_GEOMS_OTHER 128         /* of a robot */
+#define VIEW_CROWD_FINE 224          /* VIEW_FINE of a crowd */
+#define VIEW_CROWD_PRESSING 60       /* others that leave imprints */
 #define VIEW_CAMERA_TIME 0.45        /* [s] time constant of the camera */
 #define VIEW_LOOK_HEIGHT 0.6         /* [-] the camera looks at this share of the robot's height */
 #define VIEW_CLOSE_TIME 0.25         /* [s] the same for the close-up of the feet */
@@ -40,6 +43,7 @@ typedef struct {
     int step; /* [vertices] between the vertices of the skin */
     int skin, texture, material;
     int drawn_once; /* bool: texture and vertices are those of `tile` */
+    int frame;      /* in which it was lent last */
 } Slot;
 
 struct View {
@@ -63,8 +67,9 @@ struct View {
     double time;           /* [s] of the last frame */
     int jumped;            /* bool: the cameras jump to the robot in the next frame */
     Relief *relief;
-    Facet *facets;                             /* of shells in the ground */
-    Slot slots[VIEW_PLAIN_UNEVEN + VIEW_FINE]; /* first those without imprints */
+    Facet *facets;                                   /* of shells in the ground */
+    Slot slots[VIEW_PLAIN_UNEVEN + VIEW_CROWD_FINE]; /* first those without imprints */
+    int frame;                                       /* number of the present one */
     int plain_count, slot_count;
     int *slot_of;                              /* [tiles] -1: none */
     int flat_material[MILD_MATERIALS_MAX + 1]; /* model material of untouched ground; last: rigid */
@@ -82,6 +87,7 @@ ViewDef view_def_default(void) {
                      .x_max = 8,
                      .y_min = -2,
                      .y_max = 2,
+                     .cell = 0.01,
                      .pressure_max = 40e3,
                      .force_arrow = 0.0012,
                      .closeup = 1,
@@ -105,7 +111,8 @@ static void index_model(View *view) {
                                 mj_name2id(model, mjOBJ_SKIN, name),
                                 mj_name2id(model, mjOBJ_TEXTURE, name),
                                 mj_name2id(model, mjOBJ_MATERIAL, name),
-                                0};
+                                0,
+                                -1};
     }
     for (int m = 0; m <= MILD_MATERIALS_MAX; m++) {
         snprintf(name, sizeof name, "view_flat_%d", m);
@@ -136,10 +143,16 @@ static int open_context(View *view, MildError *error) {
     return (view->gl = gl_create(error)) != NULL;
 }
 
+/* Robots whose feet press the ground. */
+static int pressing(const View *view) {
+    const int others = view->def.others;
+    return 1 + (others < VIEW_CROWD_PRESSING ? others : VIEW_CROWD_PRESSING);
+}
+
 static Relief *make_relief(const View *view, MildError *error) {
     const ViewDef *def = &view->def;
     ReliefDef relief = {def->x_min, def->x_max, def->y_min, def->y_max,
-                        VIEW_CELL,  def->rigid, def->names};
+                        def->cell,  def->rigid, def->names, pressing(view)};
     return relief_create(&relief, &view->terrain, view->rasters, view->feet, error);
 }
 
@@ -175,7 +188,8 @@ static int make_buffers(View *view) {
 
 static void make_scene(View *view) {
     mjv_defaultScene(&view->scene);
-    mjv_makeScene(view->model, &view->scene, VIEW_GEOMS);
+    mjv_makeScene(view->model, &view->scene,
+                  VIEW_GEOMS + view->def.others * (VIEW_GEOMS_OTHER + 1));
     view->scene_made = 1;
     mjv_defaultOption(&view->option);
     view->option.flags[mjVIS_SKIN] = 0; /* the only skins are the tiles, which draw_tile draws */
@@ -218,12 +232,15 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
     view->relief = make_relief(view, error);
     view->plain_count =
         view->relief && relief_is_uneven(view->relief) ? VIEW_PLAIN_UNEVEN : VIEW_PLAIN;
-    view->slot_count = view->plain_count + VIEW_FINE;
+    view->slot_count = view->plain_count + (def->others > 0 ? VIEW_CROWD_FINE : VIEW_FINE);
     const Surfaces surfaces = {view->plain_count, view->slot_count};
     const int size[2] = {def->width, def->height};
     view->model = view->relief ? view_model(robot_model_path(view->robot), size, view->relief,
                                             &surfaces, error)
                                : NULL;
+    if (view->model && def->others > 0) {
+        sight_widen(view->model);
+    }
     if (!view->model || !open_context(view, error)) {
         view_destroy(view);
         return NULL;
@@ -306,8 +323,20 @@ void view_observe(View *view, const RobotSim *sim) {
         memcpy(position[f], foot->position, sizeof position[f]);
         memcpy(rotation[f], foot->rotation, sizeof rotation[f]);
     }
-    relief_press(view->relief, (const double(*)[3])position, (const double(*)[9])rotation);
+    relief_press(view->relief, 0, (const double(*)[3])position, (const double(*)[9])rotation);
     press_shells(view, sim);
+}
+
+static void press_others(View *view, const ViewOther *others) {
+    for (int i = 0; i < pressing(view) - 1; i++) {
+        double position[ROBOT_FEET_MAX][3];
+        memcpy(position, others[i].position, sizeof position);
+        for (int f = 0; f < view->feet; f++) {
+            position[f][0] += others[i].place[0];
+            position[f][1] += others[i].place[1];
+        }
+        relief_press(view->relief, i + 1, (const double(*)[3])position, others[i].rotation);
+    }
 }
 
 static double tile_distance(const View *view, int tile) {
@@ -335,7 +364,7 @@ static Slot *slot_take(View *view, int tile, int fine) {
             best = slot;
             break;
         }
-        if (tile_distance(view, slot->tile) > farthest) {
+        if (slot->frame != view->frame && tile_distance(view, slot->tile) > farthest) {
             best = slot;
             farthest = tile_distance(view, slot->tile);
         }
@@ -412,6 +441,7 @@ static void draw_tile(View *view, int tile) {
     if (shaped || material == -2) {
         slot = slot_for(view, tile, pressed);
         if (slot) {
+            slot->frame = view->frame;
             slot_refresh(view, slot);
         }
     } else if (view->slot_of[tile] >= 0) {
@@ -426,7 +456,8 @@ static void draw_tile(View *view, int tile) {
         }
         return;
     }
-    int look = material == RELIEF_RIGID ? MILD_MATERIALS_MAX : material < 0 ? 0 : material;
+    const int at = mild_terrain_material_at(&view->terrain, center[0], center[1]);
+    int look = material == RELIEF_RIGID ? MILD_MATERIALS_MAX : material < 0 ? at : material;
     add_geom(view, mjGEOM_PLANE, 0.5 * edge, 0.5 * edge, 0.1, position,
              slot ? slot->material : view->flat_material[look]);
 }
@@ -460,10 +491,13 @@ static int clamp_tile(double at, int count) {
 }
 
 static void draw_ground(View *view) {
+    view->frame++;
     const Relief *relief = view->relief;
     int columns = relief_tile_columns(relief), rows = relief_tile_rows(relief);
     double edge = relief_tile_edge(relief), origin[2],
-           radius = relief_is_uneven(relief) ? VIEW_RADIUS_UNEVEN : VIEW_RADIUS;
+           radius = view->def.others > 0       ? SIGHT_FAR
+                    : relief_is_uneven(relief) ? VIEW_RADIUS_UNEVEN
+                                               : VIEW_RADIUS;
     relief_tile_center(relief, 0, origin);
     origin[0] -= 0.5 * edge, origin[1] -= 0.5 * edge;
     const double *look = view->camera.lookat;
@@ -602,6 +636,9 @@ static void move_lights(View *view) {
         }
         light->pos[0] += (float)view->camera.lookat[0];
         light->pos[1] += (float)view->camera.lookat[1];
+        for (int k = 0; k < 3 && view->def.others > 0; k++) { /* nobody stands behind it */
+            light->pos[k] -= 2 * (float)SIGHT_SHADOW * light->dir[k];
+        }
     }
 }
 
@@ -620,18 +657,11 @@ static void draw_closeup(View *view, mjrRect viewport) {
     view->scene.flags[mjRND_SHADOW] = 1;
 }
 
-static void flip_rows(const unsigned char *rgb, mjrRect size, unsigned char *flipped) {
-    size_t row = (size_t)size.width * 3, rows = (size_t)size.height;
-    for (size_t r = 0; r < rows; r++) {
-        memcpy(flipped + r * row, rgb + (rows - 1 - r) * row, row);
-    }
-}
-
 /* Reads what was drawn and smooths it, before labels are drawn, whose letters must stay sharp. */
 static void smooth_picture(View *view, mjrRect size) {
     mjr_readPixels(view->scene_pixels, NULL, size, &view->context);
     smooth_edges(view->scene_pixels, size.width, size.height, view->luma, view->labelled);
-    flip_rows(view->labelled, size, view->pixels);
+    smooth_flip(view->labelled, size.width, size.height, view->pixels);
 }
 
 /* What of the part lies in the picture, which may be smaller than the inset. */
@@ -666,6 +696,43 @@ static void pose_robot(View *view, const double *qpos) {
     mj_camlight(view->model, view->data);
 }
 
+/* ---- others ---- */
+
+static void draw_others(View *view, const ViewOther *others) {
+    const Sight sight = sight_of(&view->scene, view->def.width, view->def.height);
+    mjtNum qpos[ROBOT_NQ_MAX];
+    for (int i = 0; i < view->def.others; i++) {
+        memcpy(qpos, others[i].qpos, sizeof qpos);
+        qpos[0] += others[i].place[0];
+        qpos[1] += others[i].place[1];
+        const double far = sight_distance(&sight, qpos), *middle = view->camera.lookat;
+        const int first = view->scene.ngeom;
+        const int shaded = hypot(qpos[0] - middle[0], qpos[1] - middle[1]) < SIGHT_SHADOW;
+        if (far < 0) {
+            continue;
+        }
+        pose_robot(view, qpos);
+        mjv_addGeoms(view->model, view->data, &view->option, NULL, mjCAT_ALL, &view->scene);
+        sight_thin_out(&view->scene, first, far, sight.pixels, shaded);
+        if (!shaded) {
+            const double under = relief_height_at(view->relief, qpos[0], qpos[1]);
+            sight_draw_spot(&view->scene, qpos, under);
+        }
+    }
+}
+
+/* A crane: slow at both ends, and as many times as far in each second. */
+static void move_away(View *view, double away) {
+    const ViewDef *def = &view->def;
+    const double share = away * away * (3 - 2 * away);
+    view->camera.elevation = def->elevation + share * (def->away_elevation - def->elevation);
+    view->camera.distance = def->distance * pow(def->away_distance / def->distance, share);
+    const double gone = view->camera.distance - def->distance;
+    for (int k = 0; k < 2; k++) {
+        view->camera.lookat[k] += gone / (def->away_distance - def->distance) * def->away_aside[k];
+    }
+}
+
 static void draw_labels(View *view, mjrRect viewport, const RobotSim *sim, const ViewInfo *info) {
     draw_text(view, viewport, sim, info);
     if (info->note) {
@@ -681,6 +748,10 @@ void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     view_observe(view, sim);
     follow_base(view, robot_sim_qpos(sim), info->time);
     follow_feet(view, sim, info->time);
+    press_others(view, info->others);
+    if (info->away > 0) {
+        move_away(view, info->away);
+    }
     view->time = info->time;
     view->jumped = 0;
     mjv_updateScene(view->model, view->data, &view->option, NULL, &view->camera, mjCAT_ALL,
@@ -688,6 +759,7 @@ void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     move_lights(view);
     draw_ground(view);
     draw_arrows(view, sim);
+    draw_others(view, info->others);
 
     mjrRect viewport = {0, 0, view->def.width, view->def.height};
     if (view->window) {

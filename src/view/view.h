@@ -13,21 +13,37 @@ typedef struct {
     int window;                        /* bool: show in a window; otherwise view_pixels */
     int rigid;                         /* bool: the ground never yields */
     double x_min, x_max, y_min, y_max; /* [m] ground drawn as such; a plain floor beyond */
+    double cell;                       /* [m] its vertices are so far apart */
     const char *const *names; /* [materials of the terrain] for colours and text; NULL: unnamed */
     double pressure_max;      /* [Pa] top of the pressure scale */
     double force_arrow;       /* [m/N] length of the ground reaction arrows; 0: none */
     int closeup;              /* bool: the feet from near the ground, in the upper right corner */
     double azimuth, elevation, distance; /* [deg], [deg], [m] of the camera about the robot */
+    /* Where ViewInfo.away takes the camera; `aside` is added to what it looks at. */
+    double away_elevation, away_distance, away_aside[2]; /* [deg], [m], [m] */
+    int others;                                          /* robots beside it, see ViewOther */
 } ViewDef;
 ViewDef view_def_default(void);
 
+/* Another robot of the kind, which is drawn, and whose feet press the ground if it is one of the
+ * first. */
+typedef struct {
+    double place[2];                    /* [m] added to its x and y, in all that follows */
+    double qpos[ROBOT_NQ_MAX];          /* as RobotState */
+    double position[ROBOT_FEET_MAX][3]; /* [m] of its feet, see RobotFoot */
+    double rotation[ROBOT_FEET_MAX][9]; /* [-] */
+} ViewOther;
+#define VIEW_NOWHERE 1e3 /* [m] position[f][2] of a foot that nobody has looked at yet */
+
 /* What the text says. */
 typedef struct {
-    double time;       /* [s] */
-    double command[3]; /* [m/s, m/s, rad/s] */
-    double speed;      /* [m/s] measured, forward */
-    int fell;          /* bool */
-    const char *note;  /* in the lower left corner, below each other; NULL: nothing */
+    double time;             /* [s] */
+    double command[3];       /* [m/s, m/s, rad/s] */
+    double speed;            /* [m/s] measured, forward */
+    int fell;                /* bool */
+    const char *note;        /* in the lower left corner, below each other; NULL: nothing */
+    double away;             /* [-] 0: the camera is where ViewDef says, 1: where `away_` says */
+    const ViewOther *others; /* [ViewDef.others] */
 } ViewInfo;
 
 typedef struct View View;

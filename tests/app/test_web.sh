@@ -7,11 +7,11 @@ bad "--no-such" "$mild" web --no-such
 bad "--folder" "$mild" web --folder nowhere
 bad "--port" "$mild" web --port 70000
 mkdir -p page folder/index.html link
-touch {folder,link}/{mild.wasm,robot.bin}
+touch {folder,link}/{mild.wasm,sa01.bin}
 ln -s ../page/index.html link/index.html
 bad "folder/index.html --folder" "$mild" web --folder folder
 bad "link/index.html --folder" "$mild" web --folder link
-for file in index.html style.css mild.js mild.wasm robot.bin; do
+for file in index.html style.css mild.js mild.wasm sa01.bin; do
     head -c 50000 /dev/urandom >page/$file
 done
 bad "192.0.2.1 --address" "$mild" web --folder page --address 192.0.2.1
@@ -48,7 +48,7 @@ gets() {
     [ "$1" = 200 ] || [ ! -s body ] || fail "something is sent for $2"
 }
 
-for file in index.html style.css mild.js mild.wasm robot.bin; do
+for file in index.html style.css mild.js mild.wasm sa01.bin; do
     gets 200 "GET /$file?query=1 HTTP/1.1\r\nHost: here\r\n\r\n"
     cmp -s body page/$file || fail "$file arrives changed"
 done

@@ -1,8 +1,10 @@
 """mild.jax beside mild.Batch; needs jax. On the CPU, and on a GPU where both JAX and this build have one. `make jax-check` runs it."""
+import os
 import pathlib
 import shutil
 import subprocess
 import tempfile
+import threading
 import unittest
 
 import jax
@@ -73,6 +75,32 @@ class Jit(unittest.TestCase):
             np.testing.assert_allclose(seen[step], position, atol=2e-6)
         self.assertTrue((seen[-1, :, 0, 2] < 0).all())
         self.assertFalse(np.allclose(seen[-1, 0], seen[-1, 1], atol=1e-4))
+
+    @unittest.skipUnless(jax.default_backend() == "cpu" and (os.cpu_count() or 1) > 1, "one step at a time")
+    def test_two_at_once(self):
+        """While a large batch is in its step, a small one makes many."""
+        many = 40000
+        large, small = mild.Batch(many, [SOLE], DT, device="cpu"), made()
+        large.set_materials(["sand_loose"])
+
+        def stepper(batch, count):
+            one = (np.zeros((count, 1, 3), np.float32), np.tile(np.eye(3, dtype=np.float32), (count, 1, 1, 1)),
+                   np.zeros((count, 1, 6), np.float32), np.tile(A, (count, 1, 1)), np.zeros((count, 1, 6), np.float32))
+            one[0][:, 0, 2] = -0.02
+            one = [jnp.asarray(array) for array in one]  # the step alone is timed, and no copies
+            run = jax.jit(lambda *arrays: mild.jax.step(batch, *arrays)[0])
+            run(*one).block_until_ready()
+            return lambda: run(*one).block_until_ready()
+
+        runs, done, made_of = (stepper(large, many), stepper(small, N)), threading.Event(), 0
+        thread = threading.Thread(target=lambda: (runs[0](), done.set()))
+        thread.start()
+        while not done.is_set():
+            runs[1]()
+            made_of += not done.is_set()
+        thread.join()
+        print(f"{made_of} steps of the small batch in one of the large")
+        self.assertGreater(made_of, 100)  # under one lock 6 to 10
 
     def test_outputs(self):
         """Wrench, new velocity and foot of a step, with heights; without `advance` nothing is remembered; `begin` forgets."""

@@ -94,6 +94,41 @@ class RslRl(unittest.TestCase):
         self.assertFalse(torch.equal(moves[4:], actions))
         env.close()
 
+    def test_policy_file(self):
+        """A policy of rsl_rl, with statistics of its observations, is a policy of mild: `mild eval` acts as it does."""
+        torch.manual_seed(1)
+        env = rsl_rl.Env(8, config="configs/quick.ini", overrides=SHORT)
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+            runner = OnPolicyRunner(env, {**CONFIG, "logger": "tensorboard"}, log_dir=folder, device="cpu")
+            runner.learn(2)
+            policy, path, actions = runner.get_inference_policy(device="cpu"), folder + "/p.safetensors", folder + "/a.csv"
+            runner.save(folder + "/model.pt")
+            program = [sys.executable, "-m", "mild"]
+            said = subprocess.run([sys.executable, "-m", "mild.rsl_rl", folder + "/model.pt", "--config", "configs/quick.ini", "--out", path],
+                                  check=True, capture_output=True, text=True).stdout
+            self.assertEqual(said, f"mild eval --policy {path}\n")
+            subprocess.run([*program, "eval", "--policy", path, "--ground", "foam45", "--speed", "0.5", "--trials", "2", "--seconds", "1", "--actions",
+                            actions], check=True, stdout=subprocess.DEVNULL)
+            env.save(folder + "/model.pt", folder + "/q.safetensors")
+            saved = torch.load(folder + "/model.pt", weights_only=True)
+            with self.assertRaisesRegex(ValueError, "no actor"):
+                env.save({"critic_state_dict": saved["critic_state_dict"]}, folder + "/r.safetensors")
+            sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "export"))
+            import recorded
+            worst, seen = 0, 0
+            for trial in recorded.trials(actions):
+                frames = np.tile(trial.observation[0], (40, 1))
+                for frame, action in zip(trial.observation, trial.action):
+                    history = np.concatenate([frames.reshape(5, 8, -1).mean(axis=1).ravel(), frame]).astype(np.float32)
+                    frames = np.vstack([frames[1:], frame])
+                    with torch.inference_mode():
+                        wanted = policy({"policy": torch.from_numpy(history)[None], "critic": torch.zeros(1, 104)})[0].clip(-8, 8).numpy()
+                    worst, seen = max(worst, abs(wanted - action).max()), seen + 1
+        print(f"rsl_rl's policy in mild eval: {seen} actions, apart by at most {worst:.1e}")
+        self.assertGreater(seen, 40)
+        self.assertLess(worst, 1e-5)
+        env.close()
+
     def test_statistics_are_saved(self):
         """A runner that loads a model_N.pt acts as the one that saved it: the statistics of observations are among the weights."""
         env, actions = rsl_rl.Env(8, overrides=SHORT), []

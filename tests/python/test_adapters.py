@@ -1,6 +1,8 @@
 """What the adapters tell a learner about the end of an episode: a time-out where the robot still stands after the episode's time, no
 time-out where it fell. Of PyTorch, rsl_rl and Stable-Baselines3 stand-ins of NumPy are enough; `make python-check` has the real ones."""
+import pathlib
 import sys
+import tempfile
 import types
 import unittest
 
@@ -59,7 +61,7 @@ for package, module in (("rsl_rl", "env"), ("stable_baselines3", "common.vec_env
     for at in range(len(module.split(".")) + 1):
         stand_in(".".join([package, *module.split(".")[:at]]), VecEnv=VecEnv)
 
-from mild import gym, rsl_rl, sb3  # noqa: E402
+from mild import gym, policy_file, rsl_rl, sb3  # noqa: E402
 
 ENVS, LENGTH = 8, 50  # robots, steps of an episode
 KEYS = {"task.episode": 0.5, "task.assist": False, "task.standing_share": 1}
@@ -134,6 +136,34 @@ class Ends(unittest.TestCase):
             return np.asarray(done) == 1, extras["time_outs"]
 
         self.follow(step)
+        env.close()
+
+    def test_rsl_rl_policy(self):
+        """A checkpoint's layers and statistics are those of the policy's file; another actor is refused."""
+        class Values:
+            def __init__(self, array):
+                self.array = array
+
+            def cpu(self):
+                return self
+
+            def numpy(self):
+                return self.array
+
+        env, random = rsl_rl.Env(ENVS, overrides=KEYS), np.random.default_rng(1)
+        layers = [(random.normal(size=(out, into)), random.normal(size=out)) for into, out in ((282, 6), (6, 12))]
+        mean, std = random.normal(size=(1, 282)), random.uniform(0, 2, (1, 282))
+        state = {f"mlp.{2 * i}.{name}": Values(part) for i, layer in enumerate(layers) for name, part in zip(("weight", "bias"), layer)}
+        state |= {"obs_normalizer._mean": Values(mean), "obs_normalizer._std": Values(std), "obs_normalizer.count": Values(np.array(9)),
+                  "distribution.std_param": Values(np.ones(12))}
+        with tempfile.TemporaryDirectory() as folder:
+            ours, wanted = pathlib.Path(folder, "ours"), pathlib.Path(folder, "wanted")
+            env.save({"actor_state_dict": state}, ours)
+            policy_file.write(wanted, env._envs, layers, mean, std + 0.01, note="rsl_rl")
+            self.assertEqual(ours.read_bytes(), wanted.read_bytes())
+            for other in ({}, {"actor_state_dict": {}}, {"actor_state_dict": {**state, "rnn.weight": Values(mean)}}):
+                with self.assertRaisesRegex(ValueError, "no actor"):
+                    env.save(other, ours)
         env.close()
 
     def test_sb3(self):

@@ -22,7 +22,7 @@ static void make(const char *material, int rigid) {
     sole = mild_sole_create(&def, &error);
     assert_non_null(sole);
     const MildSole *soles[1] = {sole};
-    ReliefDef area = {-1, 1, -1, 1, CELL, rigid, &material};
+    ReliefDef area = {-1, 1, -1, 1, CELL, rigid, &material, 1};
     relief = relief_create(&area, &terrain, soles, 1, &error);
     assert_non_null(relief);
 }
@@ -36,13 +36,13 @@ static void press(double x, double y, double depth) {
     const double position[1][3] = {{x, y, 0.055 - depth}};
     double rotation[1][9];
     memcpy(rotation[0], identity, sizeof identity);
-    relief_press(relief, position, (const double(*)[9])rotation);
+    relief_press(relief, 0, position, (const double(*)[9])rotation);
 }
 
 static void press_tilted(const double position[3], double pitch) {
     const double c = cos(pitch), n = sin(pitch);
     const double rotation[1][9] = {{c, 0, n, 0, 1, 0, -n, 0, c}};
-    relief_press(relief, (const double(*)[3])position, rotation);
+    relief_press(relief, 0, (const double(*)[3])position, rotation);
 }
 
 static double depth_at(double x, double y) {
@@ -279,7 +279,7 @@ static void prints_follow_the_map(void **state) {
     make("sand_loose", 0);
     const MildSole *soles[1] = {sole};
     const char *names[1] = {"sand_loose"};
-    ReliefDef area = {-1, 1, -1, 1, CELL, 0, names};
+    ReliefDef area = {-1, 1, -1, 1, CELL, 0, names, 1};
     terrain.map = map;
     relief_destroy(relief);
     relief = relief_create(&area, &terrain, soles, 1, &error);

@@ -126,6 +126,59 @@ static void robot_and_prints_are_seen(void **state) {
     view_destroy(view);
 }
 
+/* Another robot is drawn where its place says, with its imprints, which stay in sand; and not where
+ * it is behind the camera. The robot itself is out of sight. */
+static void others_are_seen(void **state) {
+    (void)state;
+    const size_t bytes = (size_t)240 * 136 * 3;
+    MildError error = {0};
+    ViewDef def = view_def_default();
+    ViewOther other = {.place = {100, -100}};
+    ViewInfo info = {.others = &other};
+    def.width = 240, def.height = 136;
+    def.names = names;
+    def.closeup = 0, def.force_arrow = 0;
+    def.away_distance = 8, def.away_elevation = -40;
+    def.x_max = 0.5; /* no imprint on the other side */
+    def.others = 1;
+    View *view = view_create(&def, robot, &terrain, &error);
+    if (!view) {
+        assert_error(&error, MILD_ERROR_IO, "apt-get");
+        skip();
+    }
+    const RobotState stands = stand_state(stand, 1, 0.0);
+    memcpy(other.qpos, stands.qpos, sizeof other.qpos);
+    for (int f = 0; f < SA01_FEET; f++) {
+        other.position[f][2] = VIEW_NOWHERE;
+        other.rotation[f][0] = other.rotation[f][4] = other.rotation[f][8] = 1;
+    }
+    unsigned char *empty = malloc(bytes);
+    load_at(3.0);
+    step();
+    view_frame(view, sim, &info);
+    memcpy(empty, view_pixels(view), bytes);
+    other.place[0] = -1, other.place[1] = 1.5;
+    view_frame(view, sim, &info);
+    const int robot_pixels = pixels_different(empty, view_pixels(view), bytes);
+    for (int f = 0; f < SA01_FEET; f++) { /* 40 mm deep, and away again */
+        other.position[f][1] = f == SA01_LEFT ? 0.1 : -0.1;
+        other.position[f][2] = 0.015;
+    }
+    view_frame(view, sim, &info);
+    other.place[0] = 100, other.place[1] = -100;
+    view_frame(view, sim, &info);
+    const int prints = pixels_different(empty, view_pixels(view), bytes);
+    print_message("another robot changes %d samples of %zu, its prints %d\n", robot_pixels, bytes,
+                  prints);
+    assert_true(robot_pixels > 600);
+    assert_true(prints > 20 && prints < robot_pixels);
+    info.away = 1; /* the camera goes up and back */
+    view_frame(view, sim, &info);
+    assert_true(pixels_different(empty, view_pixels(view), bytes) > 5000);
+    free(empty);
+    view_destroy(view);
+}
+
 /* The robot stands on foam: the drawn surface is where the ground's elements are, and level again
  * once it is gone. */
 static void dents_are_where_the_elements_are(void **state) {
@@ -135,7 +188,7 @@ static void dents_are_where_the_elements_are(void **state) {
     assert_true(mild_material_preset("foam25", &foam));
     MildTerrain sand = terrain;
     terrain = mild_terrain_uniform(&foam);
-    ReliefDef area = {-1, 1, -1, 1, 0.01, 0, NULL};
+    ReliefDef area = {-1, 1, -1, 1, 0.01, 0, NULL, 1};
     Relief *relief = relief_create(&area, &terrain, robot_rasters(robot), SA01_FEET, &error);
     assert_non_null(relief);
     load_at(0.0);
@@ -145,7 +198,7 @@ static void dents_are_where_the_elements_are(void **state) {
             memcpy(position[f], robot_sim_foot(sim, f)->position, sizeof position[f]);
             memcpy(rotation[f], robot_sim_foot(sim, f)->rotation, sizeof rotation[f]);
         }
-        relief_press(relief, (const double(*)[3])position, (const double(*)[9])rotation);
+        relief_press(relief, 0, (const double(*)[3])position, (const double(*)[9])rotation);
         step();
     }
     for (int f = 0; f < SA01_FEET; f++) {
@@ -160,7 +213,7 @@ static void dents_are_where_the_elements_are(void **state) {
                   1e3 * worst);
     assert_true(deepest > 0.02 && worst < 0.002);
     position[0][2] = position[1][2] = 1.0;
-    relief_press(relief, (const double(*)[3])position, (const double(*)[9])rotation);
+    relief_press(relief, 0, (const double(*)[3])position, (const double(*)[9])rotation);
     assert_true(relief_depth_at(relief, position[0][0], position[0][1]) == 0);
     relief_destroy(relief);
     terrain = sand;
@@ -177,7 +230,8 @@ static void bad_size_is_one_line(void **state) {
 
 static int skies(const char *xml) {
     MildError error = {0};
-    const ReliefDef def = {.cell = 0.02, .x_min = -1, .x_max = 1, .y_min = -1, .y_max = 1};
+    const ReliefDef def = {
+        .cell = 0.02, .x_min = -1, .x_max = 1, .y_min = -1, .y_max = 1, .robots = 1};
     const int size[2] = {320, 240};
     const Surfaces surfaces = {2, 5};
     Relief *relief = relief_create(&def, &terrain, robot_soles(robot), SA01_FEET, &error);
@@ -268,6 +322,7 @@ static void pressure_carries_the_weight(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(robot_and_prints_are_seen),
+        cmocka_unit_test(others_are_seen),
         cmocka_unit_test(dents_are_where_the_elements_are),
         cmocka_unit_test(bad_size_is_one_line),
         cmocka_unit_test(every_robot_has_a_sky),

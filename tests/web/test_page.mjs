@@ -17,6 +17,7 @@ class Element {
   addEventListener(what, act) { this.handlers[what] = act; }
   append(...more) { this.children.push(...more); }
   prepend(first) { this.children.unshift(first); }
+  replaceChildren(...all) { this.children = all; }
   setAttribute() {}
   setPointerCapture() {}
   focus() {}
@@ -42,7 +43,7 @@ Object.assign(globalThis, {
 });
 
 const source = fs.readFileSync(`${root}/web/mild.js`, 'utf8').replace(/^import .*$/m, '').replace(/^main\(\)\.catch[\s\S]*$/m, '');
-const { Core, Driver, Panel, App, ENDS } = await import(`data:text/javascript,${encodeURIComponent(`${source}\nexport { Core, Driver, Panel, App, ENDS };`)}`);
+const { Core, Driver, Panel, App, ENDS, ROBOTS } = await import(`data:text/javascript,${encodeURIComponent(`${source}\nexport { Core, Driver, Panel, App, ENDS, ROBOTS };`)}`);
 
 // ---- what a hand does: [forward, left, turn to the left] ----
 
@@ -90,7 +91,7 @@ near(driver.next(0.3 + 2 * Math.PI - 0.1), [1.15, 0, 0.12], 'and the other way r
 // ---- what is read from the core ----
 
 // The fields of WebView in the order of core.h, in words.
-const header = fs.readFileSync(`${root}/web/core.h`, 'utf8'), sizes = { ENGINE_LINKS_MAX: 41, WEB_ELEMENTS_MAX: 128, WEB_DIRTY_MAX: 64, WebDirty: 4 };
+const header = fs.readFileSync(`${root}/web/core.h`, 'utf8'), sizes = { ENGINE_LINKS_MAX: 41, ROBOT_FEET_MAX: 4, WEB_ELEMENTS_MAX: 128, WEB_DIRTY_MAX: 64, WebDirty: 4 };
 const fields = new Map();
 let words = 0;
 for (const [, type, name, array] of header.match(/typedef struct \{([^}]*)\} WebView;/)[1].matchAll(/(\w+) (\w+)((?:\[\w+\])*);/g)) {
@@ -99,7 +100,7 @@ for (const [, type, name, array] of header.match(/typedef struct \{([^}]*)\} Web
 }
 const memory = new ArrayBuffer(4 * words), numbers = new Float32Array(memory), whole = new Int32Array(memory);
 numbers.forEach((_, i) => { numbers[i] = i; });
-for (const name of ['links', 'elements', 'dirty_count', 'dirty']) whole[fields.get(name)] = fields.get(name);
+for (const name of ['links', 'feet', 'elements', 'knows', 'dirty_count', 'dirty']) whole[fields.get(name)] = fields.get(name);
 whole[0] = 4 * words;
 const core = Object.assign(Object.create(Core.prototype), { c: { memory: { buffer: memory }, web_view: () => 0 } });
 const seen = core.view();
@@ -111,14 +112,14 @@ for (const [name, at] of fields) {
 // A sentence for each end of a trial, in the order of TaskEnd.
 const ends = [...fs.readFileSync(`${root}/src/env/task/state.h`, 'utf8').match(/#define TASK_ENDS[\s\S]*?\n#define/)[0].matchAll(/X\((\w+),/g)].map((end) => end[1]);
 assert.equal(ENDS.length, ends.length, 'ends of a trial');
-for (const [end, word] of [['time', /^$/], ['tilt', /leans/], ['base', /body/], ['shell', /shank/], ['joint', /joint/]]) assert.match(ENDS[ends.indexOf(end)], word);
-near(seen.load, [fields.get('load'), fields.get('load') + 1], 'load');
+for (const [end, word] of [['time', /^$/], ['tilt', /leans/], ['base', /body/], ['shell', /leg/], ['joint', /joint/]]) assert.match(ENDS[ends.indexOf(end)], word);
+near(seen.load, [0, 1, 2, 3].map((f) => fields.get('load') + f), 'load');
 
 // ---- what is shown ----
 
 const changed = [], stepped = [], started = [];
 Object.assign(core, { names: ['sand_loose', 'rigid'], c: { ...core.c, web_change: (...all) => changed.push(all), web_step: (...all) => { stepped.push(all); } } });
-const app = Object.assign(Object.create(App.prototype), { core, ground: 0, shape: 0, driver, before: new Float32Array(12 * 41), steps: 0, time: 0 });
+const app = Object.assign(Object.create(App.prototype), { core, ground: 0, shape: 0, driver, before: new Float32Array(12 * 41), steps: 0, time: 0, robot: 0 });
 const panel = app.panel = new Panel(app);
 assert.deepEqual(changed, [[1, 1]]);
 $('stiffness').value = '0.5';
@@ -128,16 +129,20 @@ assert.deepEqual(changed[1], [2, 0.2], 'the sliders: stiffness, friction');
 assert.deepEqual([$('stiffness-value').textContent, $('friction-value').textContent], ['× 2.00', '× 0.20']);
 
 // Two elements of each foot: one in front and to the left of its middle, one behind and to the right; only the former presses.
-const view = { elements: 2, pitch: 0.02, load: [300, 25], depth: [0.012, 0.003], center: [0.05, 0.01, 0.05, 0.01], x: new Float32Array(256),
-  y: new Float32Array(256), pressure: new Float32Array(256), velocity: [0.5, -0.1, 0.2], yaw: 0, shellLoad: 0 };
-for (const f of [0, 1]) [view.x[128 * f], view.y[128 * f], view.x[128 * f + 1], view.y[128 * f + 1]] = [0.05, 0.01, -0.05, -0.02];
+const view = { feet: 2, knows: 1, cell: 0.01, elements: 2, pitch: 0.02, load: [300, 25, 4, 5], depth: [0.012, 0.003, 0.004, 0.005],
+  center: [0.05, 0.01, 0.05, 0.01, 0.05, 0.01, 0.05, 0.01], x: new Float32Array(512), y: new Float32Array(512), pressure: new Float32Array(512),
+  velocity: [0.5, -0.1, 0.2], yaw: 0, shellLoad: 0, link: new Float32Array(12 * 41) };
+core.view = () => view;
+panel.entered();
+const loads = () => $('loads').children.map((load) => load.textContent);
+for (const f of [0, 1, 2, 3]) [view.x[128 * f], view.y[128 * f], view.x[128 * f + 1], view.y[128 * f + 1]] = [0.05, 0.01, -0.05, -0.02];
 view.pressure[0] = 4e4;
 view.pressure[128] = 1e3;
 panel.drawSoles(view);
-assert.deepEqual([$('left').textContent, $('right').textContent], ['300 N · 12 mm', '25 N · 3 mm']);
+assert.deepEqual(loads(), ['300 N · 12 mm', '25 N · 3 mm']);
 assert.equal($('shells').textContent, '');
 panel.drawSoles({ ...view, shellLoad: 41.6 });
-assert.equal($('shells').textContent, 'shanks and body 42 N');
+assert.equal($('shells').textContent, 'legs and body 42 N');
 const [front, back, center, front2, back2, center2] = $('soles').drawn;
 assert.ok([front, back, center].every((at) => at.x < 220) && [front2, back2, center2].every((at) => at.x > 220), 'the left foot is on the left');
 for (const [a, b, c] of [[front, back, center], [front2, back2, center2]]) {
@@ -152,9 +157,11 @@ assert.deepEqual($('knows').textContent.split('\n'), ['sinks 12 mm (9.0 to 16)',
   'friction 0.60 (0.40 to 0.90)', 'slip length 300 mm (20 to 900)', '4 steps on it; it changed 2 times']);
 panel.drawKnowledge({ ...view, footsteps: 0, alarms: 0, known: new Float32Array(15) });
 assert.match($('knows').textContent, /not felt/);
+panel.drawKnowledge({ ...view, knows: 0, footsteps: 0 });
+assert.match($('knows').textContent, /Nobody has taught the SA01/);
 app.ground = 1;
 panel.drawSoles(view);
-assert.equal($('right').textContent, '25 N · rigid');
+assert.equal(loads()[1], '25 N · rigid');
 panel.drawSpeed(view, [-0.65, 0.1, 0.2], 1, 1e3);
 assert.equal($('numbers').innerHTML, '<b>0.50</b> m/s · -0.65 asked');
 near([parseFloat($('asked').style.left), parseFloat($('measured').style.left), parseFloat($('measured').style.width)], [25, 50, 50 * 0.5 / 1.3], 'speeds on their scale');
@@ -188,4 +195,45 @@ assert.deepEqual([said, started.length], [["mars.ini:2: unknown key 'x'"], 1], '
 soils.answer = 0;
 await app.takeSoil({ name: 'mars.ini', text: async () => '[ground]' });
 assert.deepEqual([said[1], started[1]], ['mars.ini', [3, 2]], 'the own soil is the ground');
-console.log(`page: keys, stick, gamepad; ${fields.size} fields of WebView; soles and speeds`);
+
+// Another robot comes when somebody asks for it: once from the server, and the last one asked for, not the last that arrives.
+const fetched = [], opened = [], arrive = {}, pictures = [];
+globalThis.fetch = (file) => new Promise((done) => { fetched.push(file); arrive[file] = (ok) => done({ ok, status: 404, arrayBuffer: async () => new ArrayBuffer(8) }); });
+const fourFeet = { ...view, feet: 4, knows: 0 };
+const later = () => new Promise((done) => setTimeout(done));
+Object.assign(core, {
+  robots: new Map([['sa01', [16, 8]]]), readParts() {}, check(wrong) { assert.equal(wrong, 0); },
+  c: { ...core.c, memory: { buffer: new ArrayBuffer(1 << 12) }, malloc: () => 100, web_open: (...all) => { opened.push(all); return 0; } },
+});
+Object.assign(app.picture, { setRobot: (...all) => pictures.push(all) });
+app.ground = 0;
+const g1 = app.takeRobot(1);
+core.view = () => fourFeet;
+const go1 = app.takeRobot(2);
+assert.deepEqual([fetched, app.robot, opened.length], [['g1.bin', 'go1.bin'], 0, 0], 'the first walks on until another is here');
+arrive['go1.bin'](true);
+await go1;
+arrive['g1.bin'](true);
+await g1;
+await later();
+assert.deepEqual([app.robot, opened, pictures.length, driver.most], [2, [[112, 8]], 1, ROBOTS[2].most], 'the last one asked for');
+panel.drawSoles(fourFeet);
+const [at, , , right, , , rear] = $('soles').drawn;
+assert.ok(at.x < right.x && at.y === right.y && rear.y > at.y && rear.x === at.x, 'front left, front right, rear left');
+assert.deepEqual([loads(), $('end').textContent], [['300 N · 12 mm', '25 N · 3 mm', '4 N · 4 mm', '5 N · 5 mm'], 120]);
+await app.takeRobot(1);
+assert.deepEqual([app.robot, fetched.length, opened[1]], [1, 2, [112, 8]], 'what is here is not fetched again');
+core.robots.delete('g1');
+const lost = app.takeRobot(1);
+arrive['g1.bin'](false);
+await lost;
+assert.deepEqual([app.robot, said.at(-1)], [1, 'G1: g1.bin: 404']);
+
+// What a robot is asked lies within what its policy was trained for.
+for (const { file, most } of ROBOTS) {
+  const config = fs.readFileSync(`${root}/configs/${file === 'sa01' ? 'walk' : file}.ini`, 'utf8');
+  const range = (name) => (config.match(new RegExp(`^${name} = (\\S+) (\\S+)`, 'm')) ?? [0, 0, 0]).slice(1).map(Number);
+  const [vx, back, vy, wz] = ['vx', 'backward_vx', 'vy', 'wz'].map(range);
+  assert.ok(most[0] <= vx[1] && most[1] <= -Math.min(vx[0], back[0]) && most[2] <= vy[1] && most[3] <= wz[1], `${file}: ${most}`);
+}
+console.log(`page: robots, keys, stick, gamepad; ${fields.size} fields of WebView; soles and speeds`);

@@ -100,6 +100,14 @@ void mild_envs_mirror(const MildEnvs *envs, int *observation_index, float *obser
     memcpy(action_sign, mirror.action_sign, actions * sizeof *action_sign);
 }
 
+const char *mild_envs_robot(const MildEnvs *envs) {
+    return envs->def.policy.robot;
+}
+
+const char *mild_envs_task(const MildEnvs *envs) {
+    return envs->def.policy.task;
+}
+
 const char *mild_envs_model(const MildEnvs *envs) {
     return robot_model_path(envs->robot);
 }

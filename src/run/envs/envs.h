@@ -63,6 +63,11 @@ const char *mild_envs_reward_name(int index);
 void mild_envs_mirror(const MildEnvs *envs, int *observation_index, float *observation_sign,
                       int *action_index, float *action_sign);
 
+/* What a policy's file says of where it walks (docs/policy.md): the robot's name, and the keys of
+ * [task] that decide what it sees and what becomes of its actions, "gait_period = 0.8; ...". */
+const char *mild_envs_robot(const MildEnvs *envs);
+const char *mild_envs_task(const MildEnvs *envs);
+
 /* The robot's MJCF, to draw it, and how one robot lies in an mjData of that file: qpos[size] [m, -,
  * rad]. Returns how many numbers it has; 0 where the batch engine steps the robots. 0 <= index <
  * MildEnvsShape.envs. */

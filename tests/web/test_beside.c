@@ -1,0 +1,207 @@
+/* The core of the page, compiled for this machine, beside what it stands for: the batch engine on
+ * the CPU, MuJoCo's robots on mild_ground_solve, and the policies on oneDNN. */
+#include "page.h"
+
+/* Weights of 16 bits are within 2^-11 of those of the file. */
+static void policy_of(int which) {
+    float worst = 0, largest = 0;
+    choose(which);
+    start(preset("sand_loose"), WEB_LEVEL, 0);
+    for (int t = 0; t < 2 * SECOND; t++) {
+        float mine[SA01_JOINTS], theirs[SA01_JOINTS];
+        web_act(web_history(), mine);
+        policy_act(policy, NULL, 1, web_history(), theirs, NULL, NULL);
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            worst = fmaxf(worst, fabsf(mine[i] - theirs[i]));
+            largest = fmaxf(largest, fabsf(theirs[i]));
+        }
+        assert_false(web_step(0.6f, 0, 0));
+    }
+    printf("  %s: actions up to %.2f, apart by at most %.5f (bound 0.01)\n", pages[which].name,
+           (double)largest, (double)worst);
+    assert_true(worst < 0.01f && worst > 0);
+}
+
+static void test_policy(void **state) {
+    (void)state;
+    for (int i = ROBOTS - 1; i >= 0; i--) {
+        policy_of(i);
+    }
+}
+
+/* With the same actions the two see the same; the grounds' solvers differ by their tolerance, and
+ * what differs grows with the gait. Under the Go1's round feet the batch's Newton steps end early
+ * at some step, as mild/batch.h says; test_same_loads is about it. */
+static void same_steps_of(int which) {
+    static const float walk[3] = {0.6f, 0, 0};
+    const int grounds[] = {preset("sand_loose"), preset("foam45"), preset("grass"), WEB_RIGID};
+    choose(which);
+    for (size_t g = 0; g < sizeof grounds / sizeof *grounds; g++) {
+        Rival rival = {0};
+        double first = 0, worst = 0;
+        start(grounds[g], WEB_LEVEL, 0);
+        rival_start(&rival, grounds[g], 1, 0.6);
+        for (int t = 0; t < 60; t++) {
+            float action[SA01_JOINTS];
+            web_act(rival.history, action);
+            rival_step(&rival, action);
+            assert_false(web_move(action, walk));
+            const double now = apart(web_history(), rival.history);
+            first = t == 0 ? now : first;
+            worst = fmax(worst, now);
+        }
+        printf("  %s, ground %d: after a step %.1e apart (bound 2e-4), in 60 steps %.1e (bound "
+               "0.02)\n",
+               pages[which].name, grounds[g], first, worst);
+        assert_true(first < 2e-4 && worst < 0.02);
+        envs_destroy(rival.envs);
+    }
+}
+
+static void test_same_steps(void **state) {
+    (void)state;
+    same_steps_of(ON_G1);
+    same_steps_of(ON_SA01);
+}
+
+/* The same beside MuJoCo's robot on mild_ground_solve: what feet and shells carry. The Go1's knees
+ * stand in loose sand. */
+static void same_loads_of(int which) {
+    static const float walk[3] = {0.6f, 0, 0};
+    const int grounds[] = {preset("sand_loose"), preset("foam45"), preset("grass"), WEB_RIGID};
+    choose(which);
+    const double weight = 9.81 * robot_total_mass(robot);
+    for (size_t g = 0; g < sizeof grounds / sizeof *grounds; g++) {
+        Rival rival = {0};
+        EnvsSample sample[16];
+        double apart = 0, shells = 0;
+        start(grounds[g], WEB_LEVEL, 0);
+        rival_start_on(&rival, 0, grounds[g], 1, 0.6);
+        envs_set_samples(rival.envs, sample);
+        const EnvsSample *last = &sample[envs_physics_steps(rival.envs) - 1];
+        for (int t = 0; t < 40; t++) {
+            float action[SA01_JOINTS];
+            web_act(rival.history, action);
+            rival_step(&rival, action);
+            assert_false(web_move(action, walk));
+            web_show();
+            for (int f = 0; f < web_view()->feet; f++) {
+                const double load = (double)web_view()->load[f];
+                apart = fmax(apart, fabs(load - last->foot[f].load) / weight);
+            }
+            const double load = (double)web_view()->shell_load;
+            apart = fmax(apart, fabs(load - last->shell_load) / weight);
+            shells = fmax(shells, load / weight);
+        }
+        printf(
+            "  %s, ground %d: in 40 steps loads are %.1e of the weight apart (bound 0.01); shells "
+            "carry up to %.2f of it\n",
+            pages[which].name, grounds[g], apart, shells);
+        assert_true(apart < 0.01);
+        assert_true(shells > 0.1 || which != ON_GO1 || g > 0);
+        envs_destroy(rival.envs);
+    }
+}
+
+static void test_same_loads(void **state) {
+    (void)state;
+    for (int i = ROBOTS - 1; i >= 0; i--) {
+        same_loads_of(i);
+    }
+}
+
+/* ---- shells ---- */
+
+/* Hip pitch, knee and ankle pitch of both legs, held from the start: the robot falls onto shanks or
+ * base. */
+typedef struct {
+    const char *ground;
+    float hip, knee, ankle; /* [-] actions */
+    TaskEnd end;
+} Fall;
+
+/* What came of a fall. */
+typedef struct {
+    int steps;    /* policy steps until the end */
+    int carried;  /* of these, with a load on the shells */
+    double load;  /* [N s] sum of the load over the steps, times their length */
+    double first; /* largest difference of the histories until two steps after the shells first
+                     carried */
+} Fallen;
+
+static void fall(const Fall *def, Fallen *mine, Fallen *theirs) {
+    static const float still[3] = {0, 0, 0};
+    float action[SA01_JOINTS] = {0};
+    Rival rival = {0};
+    EnvsSample sample[16];
+    int end = TASK_END_time;
+    for (int leg = 0; leg < 2; leg++) {
+        action[6 * leg + 2] = def->hip;
+        action[6 * leg + 3] = def->knee;
+        action[6 * leg + 4] = def->ankle;
+    }
+    start(preset(def->ground), WEB_LEVEL, 0);
+    rival_start(&rival, preset(def->ground), 1, 0);
+    envs_set_samples(rival.envs, sample);
+    const int last = envs_physics_steps(rival.envs) - 1;
+    *mine = *theirs = (Fallen){0};
+    while (mine->steps < 3 * SECOND && (!end || !rival.done)) {
+        if (!rival.done) {
+            rival_step(&rival, action);
+            theirs->steps++;
+            theirs->carried += sample[last].shell_load > 0;
+            theirs->load += 0.01 * sample[last].shell_load;
+        }
+        if (!end) {
+            end = web_move(action, still);
+            mine->steps++;
+            mine->carried += web_view()->shell_load > 0;
+            mine->load += 0.01 * (double)web_view()->shell_load;
+        }
+        if (!end && !rival.done && theirs->carried < 3) {
+            mine->first = fmax(mine->first, apart(web_history(), rival.history));
+        }
+    }
+    printf(
+        "  %s: carried %d of %d steps, %.1f N s, ends by %s; the batch engine %d of %d, %.1f N s,"
+        " %s; apart by %.1e where shells touch down (bound 0.1)\n",
+        def->ground, mine->carried, mine->steps, mine->load, task_end_names[end], theirs->carried,
+        theirs->steps, theirs->load, task_end_names[rival.cause], mine->first);
+    assert_int_equal(end, def->end);
+    assert_int_equal(rival.cause, def->end);
+    envs_destroy(rival.envs);
+}
+
+/* The ground carries shanks and base as it does in the batch engine, and ends the trial by the same
+ * rule. On its knees the robot leaves much of its weight to the shanks. */
+static void test_shells(void **state) {
+    static const Fall falls[] = {
+        {"foam28", -0.5f, 4, -2, TASK_END_tilt},
+        {"foam28", -0.5f, 3, -2, TASK_END_base},
+        {"foam45", -1, 4, -1, TASK_END_tilt},
+        {"sand_loose", -0.5f, 3.5f, 0, TASK_END_base},
+    };
+    double most = 0;
+    (void)state;
+    for (size_t i = 0; i < sizeof falls / sizeof *falls; i++) {
+        Fallen mine, theirs;
+        fall(&falls[i], &mine, &theirs);
+        assert_true(theirs.carried > 5 && mine.carried > 5 && mine.first < 0.1);
+        assert_true(abs(mine.steps - theirs.steps) <= 3);
+        assert_true(fabs(mine.load / theirs.load - 1) < 0.05);
+        most = fmax(most, mine.load / (0.01 * mine.carried));
+    }
+    const double weight = 9.81 * robot_total_mass(robot);
+    printf("  shells carry up to %.0f N of %.0f N, mean of a fall\n", most, weight);
+    assert_true(most > 0.5 * weight);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_policy),
+        cmocka_unit_test(test_same_steps),
+        cmocka_unit_test(test_same_loads),
+        cmocka_unit_test(test_shells),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
