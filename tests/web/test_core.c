@@ -306,10 +306,9 @@ static void soles_of(int which) {
             }
         }
     }
-    printf(
-        "  %s: the centre of pressure is apart by at most %.1f mm; %d feet carry %.1f N of %.1f "
-        "N\n",
-        pages[which].name, 1e3 * worst, view->feet, load, weight);
+    printf("  %s: the centre of pressure is apart by at most %.1f mm; %d feet carry %.1f N of %.1f "
+           "N\n",
+           pages[which].name, 1e3 * worst, view->feet, load, weight);
     printf("  each foot's load is apart from that of its elements by at most %.2f N\n", apart);
     assert_int_equal(view->feet, which == ON_GO1 ? 4 : 2);
     assert_true(seen > SECOND && worst < 5e-4 && apart < 0.1);
