@@ -89,7 +89,7 @@ static int body_facets(int b, Facet *facets) {
 static void dents_are_where_the_shells_are(void **state) {
     (void)state;
     MildError error = {0};
-    const ReliefDef area = {-1.5, 1.5, -1, 1, 0.01, 0, NULL};
+    const ReliefDef area = {-1.5, 1.5, -1, 1, 0.01, 0, NULL, 1};
     lay_ground("foam25");
     Relief *relief = relief_create(&area, &terrain, robot_rasters(robot), SA01_FEET, &error);
     assert_non_null(relief);
