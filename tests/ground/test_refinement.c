@@ -203,8 +203,9 @@ static void test_definition(void **state) {
         m.nu *= KIT_PITCH / pitches[k];
         press(&m, pitches[k], 0.0, 0.01, &force[k], &none);
     }
-    print_message("cones of the grid, 10 mm deep: %.1f %.1f %.1f %.1f N; complete cones alone %.1f N\n",
-                  force[0], force[1], force[2], force[3], cone);
+    print_message(
+        "cones of the grid, 10 mm deep: %.1f %.1f %.1f %.1f N; complete cones alone %.1f N\n",
+        force[0], force[1], force[2], force[3], cone);
     assert_true(force[0] > force[1] && force[1] > force[2] && force[2] > force[3] &&
                 force[3] > cone);
 }
