@@ -172,7 +172,7 @@ refuse "--fit --hold-from" "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pen
 refuse "sand_lose sand_loose" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold-from sand_lose
 refuse "--hold-from --hold" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold-from clay
 refuse "--hold 2 0.1 1.5" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha=2
-refuse "--hold c_g -1 0 10" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold c_g=-1
+refuse "--hold c_g -1 0 50" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold c_g=-1
 refuse "--hold c_d 0.1 0.5 100" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold c_d=0.1
 refuse "alpha --hold NAME=VALUE" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha
 refuse "alpha=nan --hold NAME=VALUE" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha=nan
