@@ -230,6 +230,12 @@ static double slot_line(const Slots *s, int i) {
     return s->unload_stiffness[i] * x * x / 2;
 }
 
+/* [N] Of the elastic curve at a depth (power.h). */
+static double slot_elastic(const Slots *s, int i, double depth) {
+    const double x = fmax(depth, 0) / POWER_DEPTH;
+    return s->elastic_force[i] * x * pow(x * x + POWER_ROUND, (s->elastic_exponent[i] - 1) / 2);
+}
+
 /* [J] In a slot. */
 static double slot_stored(const Slots *s, int i) {
     const double held = s->hold_x[i] * s->hold_x[i] + s->hold_y[i] * s->hold_y[i];
@@ -247,15 +253,17 @@ static double slot_stored(const Slots *s, int i) {
 }
 
 /* [J] What the engine's way may put into an element. The ground never pulls, so the static impulse
- * is at most the whole, less its terms that pull: the lag and the added mass. descent, after:
- * downward speeds before and after the step. */
+ * is at most the whole, less its terms that pull: the lag, the added mass, the damping of elastic
+ * ground on the way up. descent, after: downward speeds before and after the step. */
 static double slot_way(const Slots *s, int i, double dt, double descent, double after) {
     const double beyond = s->depth[i] - s->middle[i] - dt / 2 * descent;
     const double lag =
         dt * ELEMENT_LAG * s->unload_stiffness[i] * fmax(-(after + s->entry_speed[i]), 0);
     const double mass =
         s->added_mass[i] * fmax(s->front_speed[i] - fmax(after, s->yield_speed[i]), 0);
-    return (s->iz[i] + lag + mass) / dt * fmax(beyond, 0);
+    const double rises = fmax(s->middle[i] - s->depth[i] - dt / 2 * after, 0);
+    const double damped = s->elastic_damping[i] * rises * slot_elastic(s, i, s->middle[i]);
+    return (s->iz[i] + lag + mass + damped) / dt * fmax(beyond, 0);
 }
 
 /* Bool: the yield depth of a slot is not ahead of it, or the slot is within its first elastic
