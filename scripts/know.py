@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 """Learns the weights by which a robot knows its ground (docs/identify.md), from walks that `mild know --walks` writes.
 
-  scripts/know.py walk --out out/know       # 18 000 walks of 12 s for learning, 192 of 60 s for the alarm; an hour of two cores
+  scripts/know.py walk --out out/know       # 18 000 walks for the posterior; 12 000 over borders and 28 h without for the alarm
   scripts/know.py train out/know --out policies/knows.safetensors
+  scripts/know.py alarm out/know --weights policies/knows.safetensors    # the alarm of these weights alone
   scripts/know.py bound out/know            # R2 of the sensors beside that of the true states, by the same networks
+  scripts/know.py limit out/know            # borders flagged by the sensors and by the true states, by the same alarm
 
 Needs NumPy alone. One network embeds each footstep, the mean of the embeddings over the footsteps is all that is remembered, and
 another reads from it the mean and the variance of each parameter, in standard deviations of its prior. The loss is the likelihood.
-Every fifth walk is held out; on these the standard deviations are calibrated and the alarm is set."""
+Every fifth walk is held out; on these the standard deviations are calibrated. The alarm is set on walks of its own."""
 import argparse
 import csv
 import json
@@ -23,17 +25,21 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 NAMES = ("sinkage", "k_pen", "sigma_cone", "mu", "slip_length")
 COUNT = len(NAMES)
 FRAME, BINS, EMBED, HIDDEN, KNOTS, MEMORY = 47, 8, 96, 64, 31, 24
-ODDS = 3 * EMBED + 8, 48, 16  # widths of the alarm: input, hidden
+TRACE, SEEN = 64, 48  # numbers of a footstep that the alarm compares, and by which it knows the walk
+ODDS = 4 * TRACE + SEEN + 2, 96, 32  # widths of the alarm: input, hidden
+PAUSE, REFERENCE = 2, 12  # footsteps after a sudden change of the command; of the same side in a mean, of more the oldest fade
+SUDDEN = np.array([0.2, 0.2, 0.25])  # change of the command from one footstep to the next, as in the frames
 START, SHORTEST, LONGEST = 2, 20, 80  # footsteps that are not looked at; frames of a footstep
-SHARE, STEP_PER_10_MIN = 0.9, 0.3  # nominal coverage; false alarms in 10 minutes that the threshold is set to
-COMMAND = slice(BINS * 42, BINS * 42 + 3)  # among the features
+SHARE, PER_10_MIN = 0.9, 0.7  # nominal coverage; false alarms in 10 minutes that the threshold is set to
 LEGS = np.array([6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5])
 SIGNS = np.array([-1, -1, 1, 1, 1, -1] * 2)
 LEARN = ("--seconds", 12, "--changes", 0.35, "--quiet", 0.2)
 WALKS = {"learn1": ("--grounds", 6000, "--seed", 1, *LEARN),
          "learn2": ("--grounds", 6000, "--seed", 2, *LEARN),
          "learn3": ("--grounds", 6000, "--seed", 3, *LEARN),
-         "long": ("--grounds", 192, "--seconds", 60, "--changes", 0, "--quiet", 0.2, "--seed", 5)}
+         **{f"border{seed}": ("--grounds", 3000, "--seed", seed, "--changes", 1, "--quiet", 0.2) for seed in (11, 12, 13, 14)},
+         "calm21": ("--grounds", 2400, "--seconds", 30, "--changes", 0, "--quiet", 0.2, "--seed", 21),
+         "long22": ("--grounds", 480, "--seconds", 60, "--changes", 0, "--quiet", 0.2, "--seed", 22)}
 
 
 # ---- footsteps ----
@@ -278,34 +284,110 @@ def calibrated(network, walks):
 
 # ---- the alarm ----
 
-def windows(network, walks, of):
-    """Inputs of the alarm at each footstep but the first two of these walks, and labels: 0 old ground, 1 new, -1 neither."""
-    inputs, labels, walk = [], [], []
-    h, command = network.embedded(walks.features), walks.features[:, COMMAND]
-    cut = np.flatnonzero(np.diff(walks.walk)) + 1
-    for begin, end in zip(np.r_[0, cut], np.r_[cut, len(h)]):
-        if not of(walks.walk[begin]):
-            continue
-        mean, asked, before, second = np.zeros(EMBED, np.float32), np.zeros(3, np.float32), 0.0, walks.second[begin:end]
-        for j in range(begin + 2, end):
-            before = min(before + 1, MEMORY)
-            mean = mean + (h[j - 2] - mean) / np.float32(before)
-            asked = asked + (command[j - 2] - asked) / np.float32(before)
-            now, earlier = second[j - begin - 1 : j - begin + 1], second[: j - begin - 1]
-            same = (earlier < 0.5).all() if now.max() < 0.5 else (earlier > 0.5).all()
-            new = now.min() > 0.5 and (earlier < 0.5).any() and (earlier > 0.5).sum() <= 2
-            inputs.append(np.concatenate([h[j] - mean, h[j - 1] - mean, mean, command[j] - asked, command[j - 1] - asked,
-                                          [1 / before, math.log(before) / 3]]).astype(np.float32))
-            labels.append(1 if new else 0 if same and (now.max() < 0.5 or now.min() > 0.5) else -1)
-            walk.append(walks.walk[begin])
-    return np.array(inputs), np.array(labels), np.array(walk)
+class Crossings:
+    """Footsteps of walks for the alarm: [n] features, walk, bool right, bool calm (before the first contact with other ground), crossed
+    (footsteps on it so far, as the program's judge counts them), minutes of calm walking."""
+
+    def __init__(self, paths, true_states=False, read=None):
+        parts = [(read or self.read)(path, true_states) for path in paths]
+        first = np.cumsum([0] + [part[-1] for part in parts])
+        self.features, self.right, self.calm, self.crossed = (np.concatenate([part[k] for part in parts]) for k in (0, 2, 3, 4))
+        self.walk = np.concatenate([part[1] + at for part, at in zip(parts, first)])
+        self.minutes = sum(part[5] for part in parts)
+
+    @staticmethod
+    def read(path, true_states):
+        walks = np.load(path, mmap_mode="r")
+        with open(path.with_suffix(".csv"), newline="", encoding="utf-8") as file:
+            lasted = [int(row["lasted"]) for row in csv.DictReader(file)]
+        kept, number, frames = [], [], []
+        touched = np.zeros(len(walks), int)
+        for i, last in enumerate(lasted):
+            walk = np.asarray(walks[i, :last])
+            on_new = np.flatnonzero((walk[:, 107:109] == 1).any(1))
+            touched[i] = on_new[0] if len(on_new) else 0
+            for values, begin, end in footsteps(walk[:, :FRAME], walk[:, FRAME:107] if true_states else None):
+                kept.append(values.astype(np.float32))
+                number.append(i)
+                frames.append((begin, end, np.arctan2(walk[begin, 45], walk[begin, 46]) < 0))
+        return Crossings.counted(np.array(kept), np.array(number), np.array(frames), touched, np.array(lasted), walks.shape[1])
+
+    @staticmethod
+    def counted(features, number, frames, touched, lasted, steps):
+        """frames: [n] first frame, frame behind the last, bool right."""
+        keep = frames[:, 1] < np.where(lasted < steps, lasted - 50, steps + 1)[number]  # a fall is not walking
+        features, number, frames = features[keep], number[keep], frames[keep]
+        begin, end, at = frames[:, 0], frames[:, 1], touched[number]
+        calm = (at == 0) | (end < at)
+        first = np.r_[True, np.diff(number) != 0]
+        began = np.where(first, 0, np.r_[0, end[:-1]])
+        new = (at > 0) & (end >= at) & (2 * (end - at) >= end - began)
+        sums = np.cumsum(new)
+        crossed = sums - np.repeat((sums - new)[first], np.diff(np.r_[np.flatnonzero(first), len(new)]))
+        return features, number, frames[:, 2] > 0, calm, crossed, (end - begin)[calm].sum() * 0.01 / 60, len(lasted)
+
+
+class Differences:
+    """The last two footsteps less the mean of those before of the same side, since the command last changed or the walk began: [n, features] newer and
+    older, mean of both sides, [n, 2] numbers of footsteps in the means."""
+
+    def __init__(self, steps):
+        channels = (steps.features.shape[1] - 4) // (BINS + 1)
+        command = steps.features[:, BINS * channels : BINS * channels + 3].copy()
+        command[steps.right, 1:] *= -1
+        rows, newer, older, mean, count = [], [], [], [], []
+        for j, side in enumerate(steps.right.astype(int)):
+            if j == 0 or steps.walk[j] != steps.walk[j - 1]:
+                n, sums, last, pause = [0, 0], [None, None], [], PAUSE
+            elif (abs(command[j] - command[j - 1]) > SUDDEN).any():
+                n, last, pause = [0, 0], [], PAUSE
+            if pause:
+                pause -= 1
+                continue
+            if len(last) == 2:
+                k = last.pop(0)
+                at = int(steps.right[k])
+                n[at] = min(n[at] + 1, REFERENCE)
+                sums[at] = steps.features[k].copy() if n[at] == 1 else sums[at] + (steps.features[k] - sums[at]) / np.float32(n[at])
+            last.append(j)
+            if len(last) == 2 and min(n) > 0 and steps.right[last[0]] != steps.right[j]:
+                rows.append(j)
+                newer.append(steps.features[j] - sums[side])
+                older.append(steps.features[last[0]] - sums[1 - side])
+                mean.append((sums[0] + sums[1]) / 2)
+                count.append((n[side], n[1 - side]))
+        self.newer, self.older, self.mean = (np.array(x, np.float32) for x in (newer, older, mean))
+        self.count, self.minutes = np.array(count), steps.minutes
+        self.walk, self.calm, self.crossed = steps.walk[rows], steps.calm[rows], steps.crossed[rows]
+
+    def take(self, chosen):
+        part = object.__new__(Differences)
+        part.__dict__ = {k: v if np.ndim(v) == 0 else v[chosen] for k, v in self.__dict__.items()}
+        return part
 
 
 class Alarm:
-    """Log odds that the last two footsteps are on other ground."""
+    """Log odds that the last two footsteps are on other ground. Of a footstep it sees TRACE numbers, the directions in which a change of
+    ground stands out most from the scatter of walking (Fisher's), and of the means before these two SEEN more, their largest components."""
 
-    def __init__(self, rng):
+    def __init__(self, walks, rng):
+        old, new = walks.calm, walks.crossed == 2
+        own = walks.newer[old] / np.sqrt(1 + 1 / walks.count[old, :1]).astype(np.float32)
+        scale = own.std(0) + 1e-6
+        within = np.linalg.inv(np.linalg.cholesky(np.cov((own[::3] / scale).T) + 0.02 * np.eye(len(scale))))
+        other = np.concatenate([walks.newer[new], walks.older[new]]) / scale
+        vectors = np.linalg.eigh(within @ (other.T @ other / len(other)) @ within.T)[1][:, ::-1]
+        mean, spread = walks.mean.mean(0), walks.mean.std(0) + 1e-6
+        seen = np.linalg.eigh(np.cov(((walks.mean - mean) / spread).T))[1][:, ::-1][:, :SEEN] / spread[:, None]
+        seen /= (walks.mean @ seen).std(0)
+        self.trace = halves(np.concatenate([(within.T @ vectors)[:, :TRACE] / scale[:, None], seen], 1))
+        self.bias = (-mean @ self.trace).astype(np.float32)
         self.layers = [layer(rng, inputs, outputs) for inputs, outputs in zip(ODDS, (*ODDS[1:], 1))]
+
+    def see(self, walks):
+        compared = [x @ self.trace[:, :TRACE] / np.sqrt(1 + 1 / walks.count[:, k, None]) for k, x in enumerate((walks.newer, walks.older))]
+        return np.concatenate([*compared, *map(abs, compared), walks.mean @ self.trace[:, TRACE:] + self.bias[TRACE:],
+                               1 / walks.count], 1).astype(np.float32)
 
     def read(self, x, rng=None, drop=0.15):
         """rng: for training, whose inputs of layers and dropouts are kept."""
@@ -319,34 +401,71 @@ class Alarm:
                 x = x * self.kept[-1][1]
         return x[:, 0]
 
-    def train(self, x, new, rng, steps=8000, rate=1e-3, batch=512):
-        adam = Adam([p for pair in self.layers for p in pair], 0.3)
-        old, late = np.flatnonzero(~new), np.flatnonzero(new)
+    def train(self, walks, rng, steps, rate=1.5e-3):
+        """A batch has 768 calm footsteps, 256 second ones on other ground and 96 first, third and fourth ones."""
+        adam = Adam([p for pair in self.layers for p in pair], 0.1)
+        kinds = [(np.flatnonzero(chosen), n) for chosen, n in ((walks.calm, 768), (walks.crossed == 2, 256),
+                                                              (np.isin(walks.crossed, (1, 3, 4)) & ~walks.calm, 96))]
+        x = self.see(walks)
+        new = np.r_[np.zeros(768), np.ones(352)].astype(np.float32)
         for k in range(steps):
-            own = np.r_[rng.choice(old, batch * 3 // 4), rng.choice(late, batch // 4)]
+            own = np.concatenate([rng.choice(rows, n) for rows, n in kinds])
             share = 1 / (1 + np.exp(-np.clip(self.read(x[own], rng), -30, 30)))
-            g, gradients = ((share - new[own]) / batch).astype(np.float32)[:, None], []
+            g, gradients = ((share - new) / len(own)).astype(np.float32)[:, None], []
             for i in range(len(self.layers) - 1, -1, -1):
                 gradients = [self.inputs[i].T @ g, g.sum(0), *gradients]
                 if i:
                     out, keep = self.kept[i - 1]
                     g = g @ self.layers[i][0].T * keep * np.where(out > 0, 1, out + 1)
             adam.step(gradients, rate * 0.5 * (1 + math.cos(math.pi * k / steps)))
+        self.layers = [(halves(weight), bias) for weight, bias in self.layers]
         return self
+
+    def threshold(self, walks, per_10_min):
+        """So that alarms in calm walks are so many; within four footsteps of another one of the same walk it is the same."""
+        odds, calm = self.read(self.see(walks)), np.flatnonzero(walks.calm)
+        allowed, best = per_10_min * walks.minutes / 10, math.inf
+        for bar in np.sort(odds[calm])[::-1][: int(20 * allowed) + 2]:
+            rows = calm[odds[calm] >= bar]
+            again = (np.diff(rows) <= 4) & (np.diff(walks.walk[rows]) == 0)
+            if len(rows) - again.sum() > allowed:
+                break
+            best = bar
+        return float(best)
+
+    def flagged(self, walks, bar):
+        """Shares of the borders with four footsteps behind them, of which the first two or four are flagged."""
+        odds, whole = self.read(self.see(walks)), np.unique(walks.walk[walks.crossed >= 4])
+        return [len(np.intersect1d(whole, walks.walk[(odds > bar) & ~walks.calm & (walks.crossed >= 1) & (walks.crossed <= n)])) / len(whole)
+                for n in (2, 4)]
 
 
 # ---- commands ----
 
+HALVES = ("embed", "hidden", "trace", "odds", "odds_second", "odds_out")  # are in half precision in the file
+
+
+def load(path):
+    """Tensors of a safetensors file by name; its note."""
+    raw = pathlib.Path(path).read_bytes()
+    end = 8 + int.from_bytes(raw[:8], "little")
+    header = json.loads(raw[8:end])
+    note = header.pop("__metadata__")["note"]
+    return {name: np.frombuffer(raw[end + at["data_offsets"][0] : end + at["data_offsets"][1]], {"F32": "<f4", "F16": "<f2"}[at["dtype"]])
+            .reshape(at["shape"]) for name, at in header.items()}, note
+
+
 def save(path, tensors, note):
     """A safetensors file with the checksum that the program asks for (src/learn/safetensors.h)."""
     header, at = {"__metadata__": {"crc32": "00000000", "note": note}}, 0
-    for name, (kind, array) in tensors.items():
-        header[name] = {"dtype": {"f4": "F32", "f2": "F16"}[kind], "shape": list(array.shape),
-                        "data_offsets": [at, at + array.size * int(kind[1])]}
-        at += array.size * int(kind[1])
+    kinds = {name: "f2" if name in HALVES else "f4" for name in sorted(tensors, key=lambda name: name not in HALVES)}
+    for name, kind in kinds.items():
+        size = tensors[name].size * int(kind[1])
+        header[name] = {"dtype": {"f4": "F32", "f2": "F16"}[kind], "shape": list(tensors[name].shape), "data_offsets": [at, at + size]}
+        at += size
     text = json.dumps(header, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 8)
-    whole = len(text).to_bytes(8, "little") + text + b"".join(a.astype("<" + kind).tobytes() for kind, a in tensors.values())
+    whole = len(text).to_bytes(8, "little") + text + b"".join(tensors[name].astype("<" + kind).tobytes() for name, kind in kinds.items())
     pathlib.Path(path).write_bytes(whole.replace(b'"crc32":"00000000"', f'"crc32":"{zlib.crc32(whole):08x}"'.encode(), 1))
 
 
@@ -381,24 +500,48 @@ def train(given):
     network.mean, network.scale = np.zeros_like(network.mean), np.ones_like(network.scale)
     network.hidden = halves(network.hidden)
     widen = calibrated(network, walks)
-    x, label, own = windows(network, walks, lambda i: i % 5 != 0)
-    alarm = Alarm(rng).train(x[label >= 0], label[label >= 0] == 1, rng)
-    alarm.layers = [(halves(weight), bias) for weight, bias in alarm.layers]
-    long = Walks([given.walks / "long.npy"], knots=walks.knots)
-    calm = alarm.read(windows(network, long, lambda i: True)[0])
-    x, label, own = windows(network, walks, lambda i: i % 5 == 0)
-    calm = np.sort(np.r_[calm, alarm.read(x[label == 0])])
-    minutes = len(calm) * 0.5 / 60
-    threshold = calm[-1 - int(STEP_PER_10_MIN * minutes / 10)]
-    print(f"alarm at log odds of {threshold:.2f}, {minutes:.0f} min of held-out footsteps; flags "
-          f"{(alarm.read(x[label == 1]) > threshold).mean():.2f} of held-out footsteps after a border")
-    flat = {"embed_bias": network.embed_bias, "hidden_bias": network.hidden_bias, "out": network.out, "out_bias": network.out_bias,
-            "prior": walks.knots, "widen": widen, "alarm": np.array([threshold])}
-    big = {"embed": network.embed, "hidden": network.hidden}
+    tensors = {"embed": network.embed, "embed_bias": network.embed_bias, "hidden": network.hidden, "hidden_bias": network.hidden_bias,
+               "out": network.out, "out_bias": network.out_bias, "prior": walks.knots, "widen": widen}
+    save(given.out, {**tensors, **learn_alarm(given)}, f"scripts/know.py train --seed {given.seed}")
+
+
+def alarm_walks(given, true_states=False, kinds=("border", "calm")):
+    return Differences(Crossings([path for kind in kinds for path in sorted(given.walks.glob(f"{kind}*.npy"))], true_states))
+
+
+def learn_alarm(given):
+    """Tensors of the alarm."""
+    rng = np.random.default_rng(given.seed)
+    walks = alarm_walks(given)
+    alarm = Alarm(walks, rng).train(walks, rng, given.steps)
+    del walks
+    long = alarm_walks(given, kinds=("long",))
+    bar = alarm.threshold(long, PER_10_MIN)
+    print(f"alarm at log odds of {bar:.2f}, by {long.minutes:.0f} min of calm walks", flush=True)
+    tensors = {"trace": alarm.trace, "trace_bias": alarm.bias, "alarm": np.array([bar])}
     for name, (weight, bias) in zip(("odds", "odds_second", "odds_out"), alarm.layers):
-        big[name], flat[f"{name}_bias"] = weight, bias
-    save(given.out, {**{name: ("f2", array) for name, array in big.items()},
-                     **{name: ("f4", np.asarray(array)) for name, array in flat.items()}}, f"scripts/know.py train --seed {given.seed}")
+        tensors[name], tensors[f"{name}_bias"] = weight, bias
+    return tensors
+
+
+def alarm_alone(given):
+    tensors, note = load(given.weights)
+    tensors = {name: array for name, array in tensors.items() if not name.startswith(("odds", "alarm", "trace"))}
+    note = note.split("; ")[0] + f"; scripts/know.py alarm --seed {given.seed}"
+    save(given.weights, {**tensors, **learn_alarm(given)}, note)
+
+
+def limit(given):
+    for kind, true_states in (("the sensors", False), ("the true states", True)):
+        rng = np.random.default_rng(given.seed)
+        walks = alarm_walks(given, true_states)
+        held = walks.walk % 5 == 0
+        alarm = Alarm(walks.take(~held), rng).train(walks.take(~held), rng, given.steps)
+        rest = walks.take(held)
+        rest.minutes /= 5
+        for rate in (0.3, 0.6, 0.9):
+            two, four = alarm.flagged(rest, alarm.threshold(rest, rate))
+            print(f"{kind}, {rate} false alarms in 10 min: {two:.3f} of the borders within two footsteps, {four:.3f} within four", flush=True)
 
 
 def main():
@@ -408,14 +551,19 @@ def main():
     one.add_argument("--out", type=pathlib.Path, required=True)
     one.add_argument("--threads", type=int, default=0)
     one.set_defaults(run=walk)
-    for name, run, epochs in (("train", train, 60), ("bound", bound, 60)):
+    for name, run in (("train", train), ("bound", bound), ("alarm", alarm_alone), ("limit", limit)):
         one = parts.add_parser(name)
         one.add_argument("walks", type=pathlib.Path)
         one.add_argument("--seed", type=int, default=1)
-        one.add_argument("--epochs", type=int, default=epochs)
         one.set_defaults(run=run)
+        if run in (train, bound):
+            one.add_argument("--epochs", type=int, default=60)
+        if run is not bound:
+            one.add_argument("--steps", type=int, default=6000, help="of the alarm's training")
         if run is train:
             one.add_argument("--out", type=pathlib.Path, required=True)
+        if run is alarm_alone:
+            one.add_argument("--weights", type=pathlib.Path, required=True, help="read, and written again")
     given = parser.parse_args()
     given.run(given)
 
