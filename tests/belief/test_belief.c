@@ -172,8 +172,8 @@ static void test_alarm_forgets(void **state) {
     net->alarm = INFINITY;
 }
 
-/* After a sudden change of the command the alarm waits for two footsteps, and then for two to look at
- * and one of each foot to compare them with. The posterior goes on. */
+/* After a sudden change of the command the alarm waits for two footsteps, and then for two to look
+ * at and one of each foot to compare them with. The posterior goes on. */
 static void test_sudden_command(void **state) {
     Belief belief;
     (void)state;

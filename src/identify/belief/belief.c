@@ -219,8 +219,8 @@ static int is_sudden(Belief *belief, const double *command) {
     return other;
 }
 
-/* The same of the traces, and the odds that these two differ from those before. -INFINITY: these are
- * too few, since the command changed. */
+/* The same of the traces, and the odds that these two differ from those before. -INFINITY: these
+ * are too few, since the command changed. */
 static float compare(Belief *belief, const BeliefNet *net, const double *features) {
     if (is_sudden(belief, features + BELIEF_BINS * BELIEF_CHANNELS)) {
         forget_traces(belief, 0);

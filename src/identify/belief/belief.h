@@ -97,7 +97,7 @@ typedef struct {
     float mean[BELIEF_EMBED];
     int32_t lasts; /* 0 .. 2 */
     float before;  /* footsteps in the mean */
-    /* the alarm's: traces of the last two, the newer one first, and means of those before by foot */
+    /* of the alarm: traces of the last two, the newer one first; by foot, means of those before */
     float trace[2][BELIEF_TRACE];
     int32_t trace_right[2]; /* bool */
     int32_t traces;         /* 0 .. 2 */
