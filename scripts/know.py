@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
 """Learns the weights by which a robot knows its ground (docs/identify.md), from walks that `mild know --walks` writes.
 
-  scripts/know.py walk --out out/know       # 18 000 walks for the posterior; 12 000 over borders and 28 h without for the alarm
+  scripts/know.py walk --out out/know       # 18 000 walks for the posterior, 12 000 over borders and 28 h without for the alarm
   scripts/know.py train out/know --out policies/knows.safetensors
   scripts/know.py alarm out/know --weights policies/knows.safetensors    # the alarm of these weights alone
   scripts/know.py bound out/know            # R2 of the sensors beside that of the true states, by the same networks
-  scripts/know.py limit out/know            # borders flagged by the sensors and by the true states, by the same alarm
 
 Needs NumPy alone. One network embeds each footstep, the mean of the embeddings over the footsteps is all that is remembered, and
 another reads from it the mean and the variance of each parameter, in standard deviations of its prior. The loss is the likelihood.
@@ -25,12 +24,10 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 NAMES = ("sinkage", "k_pen", "sigma_cone", "mu", "slip_length")
 COUNT = len(NAMES)
 FRAME, BINS, EMBED, HIDDEN, KNOTS, MEMORY = 47, 8, 96, 64, 31, 24
-TRACE, SEEN = 64, 48  # numbers of a footstep that the alarm compares, and by which it knows the walk
-ODDS = 4 * TRACE + SEEN + 2, 96, 32  # widths of the alarm: input, hidden
-PAUSE, REFERENCE = 2, 12  # footsteps after a sudden change of the command; of the same side in a mean, of more the oldest fade
-SUDDEN = np.array([0.2, 0.2, 0.25])  # change of the command from one footstep to the next, as in the frames
+ODDS = 3 * EMBED + 8, 48, 16  # widths of the alarm: input, hidden
 START, SHORTEST, LONGEST = 2, 20, 80  # footsteps that are not looked at; frames of a footstep
-SHARE, PER_10_MIN = 0.9, 0.6  # nominal coverage; false alarms in 10 minutes that the threshold is set to
+SHARE, PER_10_MIN = 0.9, 0.4  # nominal coverage; false alarms in 10 minutes that the threshold is set to
+COMMAND = slice(BINS * 42, BINS * 42 + 3)  # among the features
 LEGS = np.array([6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5])
 SIGNS = np.array([-1, -1, 1, 1, 1, -1] * 2)
 LEARN = ("--seconds", 12, "--changes", 0.35, "--quiet", 0.2)
@@ -39,7 +36,7 @@ WALKS = {"learn1": ("--grounds", 6000, "--seed", 1, *LEARN),
          "learn3": ("--grounds", 6000, "--seed", 3, *LEARN),
          **{f"border{seed}": ("--grounds", 3000, "--seed", seed, "--changes", 1, "--quiet", 0.2) for seed in (11, 12, 13, 14)},
          "calm21": ("--grounds", 2400, "--seconds", 30, "--changes", 0, "--quiet", 0.2, "--seed", 21),
-         "long22": ("--grounds", 864, "--seconds", 20, "--changes", 0, "--quiet", 0.2, "--seed", 22)}
+         "long22": ("--grounds", 480, "--seconds", 60, "--changes", 0, "--quiet", 0.2, "--seed", 22)}
 
 
 # ---- footsteps ----
@@ -288,8 +285,8 @@ class Crossings:
     """Footsteps of walks for the alarm: [n] features, walk, bool right, bool calm (before the first contact with other ground), crossed
     (footsteps on it so far, as the program's judge counts them), minutes of calm walking."""
 
-    def __init__(self, paths, true_states=False, read=None):
-        parts = [(read or self.read)(path, true_states) for path in paths]
+    def __init__(self, paths, true_states=False):
+        parts = [self.read(path, true_states) for path in paths]
         first = np.cumsum([0] + [part[-1] for part in parts])
         self.features, self.right, self.calm, self.crossed = (np.concatenate([part[k] for part in parts]) for k in (0, 2, 3, 4))
         self.walk = np.concatenate([part[1] + at for part, at in zip(parts, first)])
@@ -327,67 +324,46 @@ class Crossings:
         return features, number, frames[:, 2] > 0, calm, crossed, (end - begin)[calm].sum() * 0.01 / 60, len(lasted)
 
 
-class Differences:
-    """The last two footsteps less the mean of those before of the same side, since the command last changed or the walk began: [n, features] newer and
-    older, mean of both sides, [n, 2] numbers of footsteps in the means."""
+def walks_of(steps):
+    begin = np.flatnonzero(np.r_[True, np.diff(steps.walk) != 0])
+    return [np.arange(a, b) for a, b in zip(begin, np.r_[begin[1:], len(steps.walk)])]
 
-    def __init__(self, steps):
-        channels = (steps.features.shape[1] - 4) // (BINS + 1)
-        command = steps.features[:, BINS * channels : BINS * channels + 3].copy()
-        command[steps.right, 1:] *= -1
-        rows, newer, older, mean, count = [], [], [], [], []
-        for j, side in enumerate(steps.right.astype(int)):
-            if j == 0 or steps.walk[j] != steps.walk[j - 1]:
-                n, sums, last, pause = [0, 0], [None, None], [], PAUSE
-            elif (abs(command[j] - command[j - 1]) > SUDDEN).any():
-                n, last, pause = [0, 0], [], PAUSE
-            if pause:
-                pause -= 1
-                continue
-            if len(last) == 2:
-                k = last.pop(0)
-                at = int(steps.right[k])
-                n[at] = min(n[at] + 1, REFERENCE)
-                sums[at] = steps.features[k].copy() if n[at] == 1 else sums[at] + (steps.features[k] - sums[at]) / np.float32(n[at])
-            last.append(j)
-            if len(last) == 2 and min(n) > 0 and steps.right[last[0]] != steps.right[j]:
-                rows.append(j)
-                newer.append(steps.features[j] - sums[side])
-                older.append(steps.features[last[0]] - sums[1 - side])
-                mean.append((sums[0] + sums[1]) / 2)
-                count.append((n[side], n[1 - side]))
-        self.newer, self.older, self.mean = (np.array(x, np.float32) for x in (newer, older, mean))
-        self.count, self.minutes = np.array(count), steps.minutes
-        self.walk, self.calm, self.crossed = steps.walk[rows], steps.calm[rows], steps.crossed[rows]
 
-    def take(self, chosen):
-        part = object.__new__(Differences)
-        part.__dict__ = {k: v if np.ndim(v) == 0 else v[chosen] for k, v in self.__dict__.items()}
-        return part
+def compared(h, command, rows, bar=math.inf, odds=None):
+    """Inputs of the alarm at the footsteps `rows` of a walk but the first two, as the program has them; `odds` of them, where an alarm (odds
+    above `bar`) begins anew."""
+    mean, asked, before, last, inputs, said = np.zeros(EMBED, np.float32), np.zeros(3, np.float32), 0, [], [], []
+    for j in rows:
+        if len(last) == 2:
+            before = min(before + 1, MEMORY)
+            mean = mean + (h[last[0]] - mean) / np.float32(before)
+            asked = asked + (command[last[0]] - asked) / np.float32(before)
+        last = [*last, j][-2:]
+        said.append(-math.inf)
+        if before:
+            inputs.append(np.concatenate([h[j] - mean, h[last[0]] - mean, mean, command[j] - asked, command[last[0]] - asked,
+                                          [1 / before, math.log(before) / 3]]).astype(np.float32))
+            if odds:
+                said[-1] = odds(inputs[-1][None])[0]
+                before, mean, asked = (0, 0 * mean, 0 * asked) if said[-1] > bar else (before, mean, asked)
+    return np.array(said) if odds else inputs
+
+
+def windows(embedded, steps):
+    """Inputs of the alarm at each footstep but the first two of each walk; bool: on other ground, for one to four footsteps."""
+    h, command, inputs, new = embedded(steps.features), steps.features[:, COMMAND], [], []
+    for rows in walks_of(steps):
+        chosen = steps.calm[rows[2:]] | ((steps.crossed[rows[2:]] >= 1) & (steps.crossed[rows[2:]] <= 4))
+        inputs += [x for x, ok in zip(compared(h, command, rows), chosen) if ok]
+        new.append(~steps.calm[rows[2:]][chosen])
+    return np.array(inputs), np.concatenate(new)
 
 
 class Alarm:
-    """Log odds that the last two footsteps are on other ground. Of a footstep it sees TRACE numbers, the directions in which a change of
-    ground stands out most from the scatter of walking (Fisher's), and of the means before these two SEEN more, their largest components."""
+    """Log odds that the last two footsteps are on other ground."""
 
-    def __init__(self, walks, rng):
-        old, new = walks.calm, walks.crossed == 2
-        own = walks.newer[old] / np.sqrt(1 + 1 / walks.count[old, :1]).astype(np.float32)
-        scale = own.std(0) + 1e-6
-        within = np.linalg.inv(np.linalg.cholesky(np.cov((own[::3] / scale).T) + 0.02 * np.eye(len(scale))))
-        other = np.concatenate([walks.newer[new], walks.older[new]]) / scale
-        vectors = np.linalg.eigh(within @ (other.T @ other / len(other)) @ within.T)[1][:, ::-1]
-        mean, spread = walks.mean.mean(0), walks.mean.std(0) + 1e-6
-        seen = np.linalg.eigh(np.cov(((walks.mean - mean) / spread).T))[1][:, ::-1][:, :SEEN] / spread[:, None]
-        seen /= (walks.mean @ seen).std(0)
-        self.trace = halves(np.concatenate([(within.T @ vectors)[:, :TRACE] / scale[:, None], seen], 1))
-        self.bias = (-mean @ self.trace).astype(np.float32)
+    def __init__(self, rng):
         self.layers = [layer(rng, inputs, outputs) for inputs, outputs in zip(ODDS, (*ODDS[1:], 1))]
-
-    def see(self, walks):
-        compared = [x @ self.trace[:, :TRACE] / np.sqrt(1 + 1 / walks.count[:, k, None]) for k, x in enumerate((walks.newer, walks.older))]
-        return np.concatenate([*compared, *map(abs, compared), walks.mean @ self.trace[:, TRACE:] + self.bias[TRACE:],
-                               1 / walks.count], 1).astype(np.float32)
 
     def read(self, x, rng=None, drop=0.15):
         """rng: for training, whose inputs of layers and dropouts are kept."""
@@ -401,86 +377,37 @@ class Alarm:
                 x = x * self.kept[-1][1]
         return x[:, 0]
 
-    def train(self, walks, rng, steps, rate=1.5e-3):
-        """A batch has 768 calm footsteps, 256 second ones on other ground and 96 first, third and fourth ones."""
-        adam = Adam([p for pair in self.layers for p in pair], 0.1)
-        kinds = [(np.flatnonzero(chosen), n) for chosen, n in ((walks.calm, 768), (walks.crossed == 2, 256),
-                                                              (np.isin(walks.crossed, (1, 3, 4)) & ~walks.calm, 96))]
-        x = self.see(walks)
-        new = np.r_[np.zeros(768), np.ones(352)].astype(np.float32)
+    def train(self, x, new, rng, steps=10000, rate=1e-3, batch=512):
+        adam = Adam([p for pair in self.layers for p in pair], 0.3)
+        old, late = np.flatnonzero(~new), np.flatnonzero(new)
         for k in range(steps):
-            own = np.concatenate([rng.choice(rows, n) for rows, n in kinds])
+            own = np.r_[rng.choice(old, batch * 3 // 4), rng.choice(late, batch // 4)]
             share = 1 / (1 + np.exp(-np.clip(self.read(x[own], rng), -30, 30)))
-            g, gradients = ((share - new) / len(own)).astype(np.float32)[:, None], []
+            g, gradients = ((share - new[own]) / batch).astype(np.float32)[:, None], []
             for i in range(len(self.layers) - 1, -1, -1):
                 gradients = [self.inputs[i].T @ g, g.sum(0), *gradients]
                 if i:
                     out, keep = self.kept[i - 1]
                     g = g @ self.layers[i][0].T * keep * np.where(out > 0, 1, out + 1)
             adam.step(gradients, rate * 0.5 * (1 + math.cos(math.pi * k / steps)))
-        self.layers = [(halves(weight), bias) for weight, bias in self.layers]
         return self
 
-    def threshold(self, walks, per_10_min):
-        """So that alarms in calm walks are so many; within four footsteps of another one of the same walk it is the same."""
-        odds, calm = self.read(self.see(walks)), np.flatnonzero(walks.calm)
-        allowed, best = per_10_min * walks.minutes / 10, math.inf
-        for bar in np.sort(odds[calm])[::-1][: int(20 * allowed) + 2]:
-            rows = calm[odds[calm] >= bar]
-            again = (np.diff(rows) <= 4) & (np.diff(walks.walk[rows]) == 0)
-            if len(rows) - again.sum() > allowed:
+
+    def set_bar(self, embedded, steps, per_10_min):
+        """The lowest threshold with at most so many alarms in these walks without a border."""
+        h, command, walks = embedded(steps.features), steps.features[:, COMMAND], walks_of(steps)
+        most, best = [compared(h, command, rows, odds=self.read).max() for rows in walks], math.inf
+        for bar in np.arange(80, 0, -1) / 10:
+            if sum((compared(h, command, rows, bar, self.read) > bar).sum() for rows, odds in zip(walks, most) if odds > bar) > \
+                    per_10_min * steps.minutes / 10:
                 break
             best = bar
         return float(best)
-
-    def follow(self, steps, rows, bar):
-        """Log odds at each footstep of a walk, as the program says them: an alarm begins anew."""
-        command = steps.features[rows][:, BINS * 42 : BINS * 42 + 3].copy()
-        command[steps.right[rows], 1:] *= -1
-        traces, feet, said = steps.features[rows] @ self.trace + self.bias, steps.right[rows].astype(int), np.full(len(rows), -np.inf)
-        n, means, last, pause, asked = [0, 0], [0, 0], [], 0, np.zeros(3)
-        for j, foot in enumerate(feet):
-            if (abs(command[j] - asked) > SUDDEN).any():
-                n, last, pause = [0, 0], [], PAUSE
-            asked = command[j]
-            if pause:
-                pause -= 1
-                continue
-            if len(last) == 2:
-                k = last.pop(0)
-                n[feet[k]] = min(n[feet[k]] + 1, REFERENCE)
-                means[feet[k]] = traces[k] if n[feet[k]] == 1 else means[feet[k]] + (traces[k] - means[feet[k]]) / n[feet[k]]
-            last.append(j)
-            if len(last) == 2 and min(n) > 0 and feet[last[0]] != foot:
-                compared = [(traces[k] - means[feet[k]])[:TRACE] / math.sqrt(1 + 1 / n[feet[k]]) for k in (j, last[0])]
-                x = np.concatenate([*compared, *map(abs, compared), (means[0] + means[1])[TRACE:] / 2, [1 / n[foot], 1 / n[1 - foot]]])
-                said[j] = self.read(x[None].astype(np.float32))[0]
-                n = [0, 0] if said[j] > bar else n
-        return said
-
-    def set_bar(self, steps, per_10_min):
-        """The lowest threshold with so many false alarms in these calm walks."""
-        begin = np.flatnonzero(np.r_[True, np.diff(steps.walk) != 0])
-        walks = [np.arange(a, b) for a, b in zip(begin, np.r_[begin[1:], len(steps.walk)])]
-        free = [self.follow(steps, rows, math.inf).max() for rows in walks]
-        best = math.inf
-        for bar in np.arange(12, 0, -0.1):
-            alarms = sum((self.follow(steps, rows, bar) > bar).sum() for rows, most in zip(walks, free) if most > bar)
-            if alarms > per_10_min * steps.minutes / 10:
-                break
-            best = bar
-        return float(best)
-
-    def flagged(self, walks, bar):
-        """Shares of the borders with four footsteps behind them, of which the first two or four are flagged."""
-        odds, whole = self.read(self.see(walks)), np.unique(walks.walk[walks.crossed >= 4])
-        return [len(np.intersect1d(whole, walks.walk[(odds > bar) & ~walks.calm & (walks.crossed >= 1) & (walks.crossed <= n)])) / len(whole)
-                for n in (2, 4)]
 
 
 # ---- commands ----
 
-HALVES = ("embed", "hidden", "trace", "odds", "odds_second", "odds_out")  # are in half precision in the file
+HALVES = ("embed", "hidden", "odds", "odds_second", "odds_out")  # are in half precision in the file
 
 
 def load(path):
@@ -538,25 +465,24 @@ def train(given):
     network.mean, network.scale = np.zeros_like(network.mean), np.ones_like(network.scale)
     network.hidden = halves(network.hidden)
     widen = calibrated(network, walks)
-    tensors = {"embed": network.embed, "embed_bias": network.embed_bias, "hidden": network.hidden, "hidden_bias": network.hidden_bias,
-               "out": network.out, "out_bias": network.out_bias, "prior": walks.knots, "widen": widen}
-    save(given.out, {**tensors, **learn_alarm(given)}, f"scripts/know.py train --seed {given.seed}")
+    save(given.out, {"embed": network.embed, "embed_bias": network.embed_bias, "hidden": network.hidden, "hidden_bias": network.hidden_bias,
+                     "out": network.out, "out_bias": network.out_bias, "prior": walks.knots, "widen": widen,
+                     **learn_alarm(given, network.embedded)}, f"scripts/know.py train --seed {given.seed}")
 
 
-def crossings(given, true_states=False, kinds=("border", "calm")):
-    return Crossings([path for kind in kinds for path in sorted(given.walks.glob(f"{kind}*.npy"))], true_states)
+def crossings(given, *kinds):
+    return Crossings([path for kind in kinds for path in sorted(given.walks.glob(f"{kind}*.npy"))])
 
 
-def learn_alarm(given):
+def learn_alarm(given, embedded):
     """Tensors of the alarm."""
     rng = np.random.default_rng(given.seed)
-    walks = Differences(crossings(given))
-    alarm = Alarm(walks, rng).train(walks, rng, given.steps)
-    del walks
-    long = crossings(given, kinds=("long",))
-    bar = alarm.set_bar(long, PER_10_MIN)
-    print(f"alarm at log odds of {bar:.2f}, by {long.minutes:.0f} min of calm walks", flush=True)
-    tensors = {"trace": alarm.trace, "trace_bias": alarm.bias, "alarm": np.array([bar])}
+    alarm = Alarm(rng).train(*windows(embedded, crossings(given, "border", "calm")), rng)
+    alarm.layers = [(halves(weight), bias) for weight, bias in alarm.layers]
+    long = crossings(given, "long")
+    bar = alarm.set_bar(embedded, long, PER_10_MIN)
+    print(f"alarm at log odds of {bar:.1f}, by {long.minutes:.0f} min of calm walks")
+    tensors = {"alarm": np.array([bar])}
     for name, (weight, bias) in zip(("odds", "odds_second", "odds_out"), alarm.layers):
         tensors[name], tensors[f"{name}_bias"] = weight, bias
     return tensors
@@ -564,22 +490,9 @@ def learn_alarm(given):
 
 def alarm_alone(given):
     tensors, note = load(given.weights)
-    tensors = {name: array for name, array in tensors.items() if not name.startswith(("odds", "alarm", "trace"))}
-    note = note.split("; ")[0] + f"; scripts/know.py alarm --seed {given.seed}"
-    save(given.weights, {**tensors, **learn_alarm(given)}, note)
-
-
-def limit(given):
-    for kind, true_states in (("the sensors", False), ("the true states", True)):
-        rng = np.random.default_rng(given.seed)
-        walks = Differences(crossings(given, true_states))
-        held = walks.walk % 5 == 0
-        alarm = Alarm(walks.take(~held), rng).train(walks.take(~held), rng, given.steps)
-        rest = walks.take(held)
-        rest.minutes /= 5
-        for rate in (0.3, 0.6, 0.9):
-            two, four = alarm.flagged(rest, alarm.threshold(rest, rate))
-            print(f"{kind}, {rate} false alarms in 10 min: {two:.3f} of the borders within two footsteps, {four:.3f} within four", flush=True)
+    embed, bias = (tensors[name].astype(np.float32) for name in ("embed", "embed_bias"))
+    learned = learn_alarm(given, lambda features: elu(features @ embed + bias))
+    save(given.weights, {**tensors, **learned}, note.split("; ")[0] + f"; scripts/know.py alarm --seed {given.seed}")
 
 
 def main():
@@ -589,19 +502,19 @@ def main():
     one.add_argument("--out", type=pathlib.Path, required=True)
     one.add_argument("--threads", type=int, default=0)
     one.set_defaults(run=walk)
-    for name, run in (("train", train), ("bound", bound), ("alarm", alarm_alone), ("limit", limit)):
+    for name, run, epochs in (("train", train, 60), ("bound", bound, 60)):
         one = parts.add_parser(name)
         one.add_argument("walks", type=pathlib.Path)
         one.add_argument("--seed", type=int, default=1)
+        one.add_argument("--epochs", type=int, default=epochs)
         one.set_defaults(run=run)
-        if run in (train, bound):
-            one.add_argument("--epochs", type=int, default=60)
-        if run is not bound:
-            one.add_argument("--steps", type=int, default=6000, help="of the alarm's training")
         if run is train:
             one.add_argument("--out", type=pathlib.Path, required=True)
-        if run is alarm_alone:
-            one.add_argument("--weights", type=pathlib.Path, required=True, help="read, and written again")
+    one = parts.add_parser("alarm")
+    one.add_argument("walks", type=pathlib.Path)
+    one.add_argument("--weights", type=pathlib.Path, required=True, help="read, and written again")
+    one.add_argument("--seed", type=int, default=1)
+    one.set_defaults(run=alarm_alone)
     given = parser.parse_args()
     given.run(given)
 

@@ -23,58 +23,39 @@ def run(*arguments):
     return subprocess.run([mild, *map(str, arguments)], check=True, capture_output=True, text=True, cwd=root).stdout
 
 
+def read(path):
+    raw = path.read_bytes()
+    end = 8 + int.from_bytes(raw[:8], "little")
+    header = json.loads(raw[8:end])
+    header.pop("__metadata__")
+    return {k: np.frombuffer(raw[end + v["data_offsets"][0] : end + v["data_offsets"][1]], {"F32": "<f4", "F16": "<f2"}[v["dtype"]])
+            .reshape(v["shape"]).astype(float) for k, v in header.items()}
+
+
 def elu(x):
     return np.where(x > 0, x, np.expm1(np.minimum(x, 0)))
 
 
-class Trace:
-    """What the alarm remembers, of all footsteps: their numbers by foot, of those before the last two."""
-
-    def __init__(self):
-        self.means, self.counts, self.last, self.asked, self.pause = [0, 0], [0, 0], [], np.zeros(3), 0
-
-    def odds(self, values, right, w):
-        asked = values[8 * 42 : 8 * 42 + 3] * ([1, -1, -1] if right else [1, 1, 1])
-        if (abs(asked - self.asked) > know.SUDDEN).any():
-            self.counts, self.last, self.pause = [0, 0], [], know.PAUSE
-        self.asked = asked
-        if self.pause:
-            self.pause -= 1
-            return None
-        if len(self.last) == 2:
-            old, foot = self.last.pop(0)
-            self.counts[foot] = min(self.counts[foot] + 1, know.REFERENCE)
-            self.means[foot] = self.means[foot] * (self.counts[foot] > 1)
-            self.means[foot] = self.means[foot] + (old - self.means[foot]) / self.counts[foot]
-        self.last.append((values @ w["trace"] + w["trace_bias"], right))
-        if len(self.last) < 2 or not all(self.counts) or self.last[0][1] == right:
-            return None
-        differ = [(trace - self.means[foot])[: know.TRACE] / math.sqrt(1 + 1 / self.counts[foot]) for trace, foot in self.last[::-1]]
-        x = np.concatenate([*differ, *map(abs, differ), (self.means[0] + self.means[1])[know.TRACE :] / 2,
-                            [1 / self.counts[right], 1 / self.counts[1 - right]]])
-        x = elu(elu(x @ w["odds"] + w["odds_bias"]) @ w["odds_second"] + w["odds_second_bias"])
-        return float((x @ w["odds_out"] + w["odds_out_bias"]).sum())
-
-    def alarmed(self):
-        self.counts = [0, 0]
-
-
 def follow(frames, w):
     """[(frame, alarm, log odds, centers, spreads)]: the recursion in 64 bits, all footsteps kept."""
-    said, memory, before, newest, trace = [], np.zeros(know.EMBED), 0, [], Trace()
-    for values, begin, end in know.footsteps(frames):
+    said, steps, memory, asked, before, newest = [], know.footsteps(frames), np.zeros(know.EMBED), np.zeros(3), 0, []
+    for values, _, end in steps:
         h = elu(values @ w["embed"] + w["embed_bias"])
         if len(newest) == 2:
             before = min(before + 1, know.MEMORY)
-            memory = memory + (newest[0] - memory) / before
-        newest = [*newest, h][-2:]
-        odds = trace.odds(values, int(frames[begin, 45] < 0), w)
+            memory = memory + (newest[0][0] - memory) / before
+            asked = asked + (newest[0][1] - asked) / before
+        newest = [*newest, (h, values[know.COMMAND])][-2:]
+        odds = None
+        if before:
+            x = np.r_[h - memory, newest[0][0] - memory, memory, newest[1][1] - asked, newest[0][1] - asked, 1 / before, math.log(before) / 3]
+            x = elu(elu(x @ w["odds"] + w["odds_bias"]) @ w["odds_second"] + w["odds_second_bias"])
+            odds = float((x @ w["odds_out"] + w["odds_out_bias"]).sum())
         alarm = odds is not None and odds > w["alarm"].sum()
         if alarm:
-            before, memory = 0, np.zeros(know.EMBED)
-            trace.alarmed()
+            before, memory, asked = 0, np.zeros(know.EMBED), np.zeros(3)
         n = min(before + len(newest), know.MEMORY)
-        mean = (before * memory + sum(newest)) / (before + len(newest))
+        mean = (before * memory + sum(h for h, _ in newest)) / (before + len(newest))
         out = elu(np.r_[mean, 1 / n, math.log(n) / 3] @ w["hidden"] + w["hidden_bias"]) @ w["out"] + w["out_bias"]
         widen = [np.interp(math.log2(n), np.arange(6), row) for row in w["widen"]]
         said.append((end, alarm, odds, out[: know.COUNT], np.exp(0.5 * np.clip(out[know.COUNT :], -6, 3)) * widen))
@@ -84,7 +65,7 @@ def follow(frames, w):
 def same_as_numpy(folder):
     """Walks with borders, so that there are alarms; all is said at the frame behind a footstep."""
     run("know", "--grounds", 6, "--changes", 1, "--robots", 0, "--seed", 3, "--walks", folder / "walks.npy", "--threads", 2)
-    walks, weights = np.load(folder / "walks.npy"), {name: array.astype(float) for name, array in know.load(WEIGHTS)[0].items()}
+    walks, weights = np.load(folder / "walks.npy"), read(WEIGHTS)
     worst, doubt, alarms, count = 0.0, 0.0, 0, 0
     for walk in walks:
         lasted = int((walk[:, :know.FRAME] != 0).any(1).sum())

@@ -8,8 +8,6 @@ enum { JOINTS = 12, LEG = 6, FOOTSTEP_MIN = 20, FOOTSTEP_MAX = 80 };
 #define KNOT_LAST 3.0
 #define TWO_PI 6.283185307179586
 #define VARIANCE_LEAST 1e-8
-/* Change of the command from one footstep to the next that begins the alarm anew, as in frames. */
-static const double sudden[3] = {0.2, 0.2, 0.25};
 
 #define BELIEF_ROW(name, unit, scale, help) {#name, unit, help, scale},
 const BeliefName belief_names[BELIEF_PARAMETERS] = {BELIEF_LIST(BELIEF_ROW)};
@@ -141,26 +139,23 @@ static void find_posterior(Belief *belief, const BeliefNet *net, const float *me
     }
 }
 
-/* Log odds that the last two footsteps are on other ground than those of the references. */
+/* Log odds that the last two footsteps are on other ground than those of the mean. */
 static float find_odds(const Belief *belief, const BeliefNet *net) {
-    float in[BELIEF_ODDS_IN], hidden[BELIEF_ODDS], second[BELIEF_ODDS_SECOND];
-    float *seen = in + 4 * BELIEF_COMPARED, out = net->odds_out_bias;
-    for (int k = 0; k < 2; k++) {
-        const int foot = belief->trace_right[k];
-        const float factor = 1 / sqrtf(1 + 1 / belief->references[foot]);
-        float *differ = in + k * BELIEF_COMPARED;
-        for (int i = 0; i < BELIEF_COMPARED; i++) {
-            differ[i] = (belief->trace[k][i] - belief->reference[foot][i]) * factor;
-            differ[2 * BELIEF_COMPARED + i] = fabsf(differ[i]);
-        }
-        seen[BELIEF_SEEN + k] = 1 / belief->references[foot];
+    float in[3 * BELIEF_EMBED + 8], hidden[BELIEF_ODDS], second[BELIEF_ODDS_SECOND];
+    float *commands = in + 3 * BELIEF_EMBED, out = net->odds_out_bias;
+    for (int i = 0; i < BELIEF_EMBED; i++) {
+        in[i] = belief->last[0][i] - belief->mean[i];
+        in[BELIEF_EMBED + i] = belief->last[1][i] - belief->mean[i];
+        in[2 * BELIEF_EMBED + i] = belief->mean[i];
     }
-    for (int i = 0; i < BELIEF_SEEN; i++) {
-        const int at = BELIEF_COMPARED + i;
-        seen[i] = 0.5f * (belief->reference[0][at] + belief->reference[1][at]);
+    for (int i = 0; i < 3; i++) {
+        commands[i] = belief->last_command[0][i] - belief->mean_command[i];
+        commands[3 + i] = belief->last_command[1][i] - belief->mean_command[i];
     }
+    commands[6] = 1 / belief->before;
+    commands[7] = logf(belief->before) / 3;
     memcpy(hidden, net->odds_bias, sizeof hidden);
-    add_product(BELIEF_ODDS_IN, BELIEF_ODDS, net->odds[0], in, hidden);
+    add_product(3 * BELIEF_EMBED + 8, BELIEF_ODDS, net->odds[0], in, hidden);
     elu(hidden, BELIEF_ODDS);
     memcpy(second, net->odds_second_bias, sizeof second);
     add_product(BELIEF_ODDS, BELIEF_ODDS_SECOND, net->odds_second[0], hidden, second);
@@ -172,82 +167,43 @@ static float find_odds(const Belief *belief, const BeliefNet *net) {
 }
 
 /* In double, because a reading that hardly varies has large weights. */
-static void weigh(int out, const float *weight, const float *bias, const double *features,
-                  float *result) {
-    double wide[BELIEF_TRACE > BELIEF_EMBED ? BELIEF_TRACE : BELIEF_EMBED];
-    for (int j = 0; j < out; j++) {
-        wide[j] = (double)bias[j];
+static void embed(const BeliefNet *net, const double *features, float embedded[BELIEF_EMBED]) {
+    double wide[BELIEF_EMBED];
+    for (int j = 0; j < BELIEF_EMBED; j++) {
+        wide[j] = (double)net->embed_bias[j];
     }
     for (int i = 0; i < BELIEF_FEATURES; i++) {
-        for (int j = 0; j < out; j++) {
-            wide[j] += features[i] * (double)weight[i * out + j];
+        for (int j = 0; j < BELIEF_EMBED; j++) {
+            wide[j] += features[i] * (double)net->embed[i][j];
         }
     }
-    for (int j = 0; j < out; j++) {
-        result[j] = (float)wide[j];
+    for (int j = 0; j < BELIEF_EMBED; j++) {
+        embedded[j] = (float)wide[j];
     }
+    elu(embedded, BELIEF_EMBED);
 }
 
 /* ---- recursion ---- */
 
 /* Moves the older of the last two footsteps into the mean. */
-static void shift(Belief *belief, const float *embedded) {
+static void shift(Belief *belief, const float *embedded, const double *command) {
     if (belief->lasts == 2) {
         belief->before = fminf(belief->before + 1, BELIEF_MEMORY);
         for (int i = 0; i < BELIEF_EMBED; i++) {
             belief->mean[i] += (belief->last[1][i] - belief->mean[i]) / belief->before;
         }
+        for (int i = 0; i < 3; i++) {
+            belief->mean_command[i] +=
+                (belief->last_command[1][i] - belief->mean_command[i]) / belief->before;
+        }
     }
     memcpy(belief->last[1], belief->last[0], sizeof belief->last[1]);
     memcpy(belief->last[0], embedded, sizeof belief->last[0]);
-    belief->lasts += belief->lasts < 2;
-}
-
-static void forget_traces(Belief *belief, int left) {
-    belief->traces = left;
-    belief->references[0] = belief->references[1] = 0;
-}
-
-/* bool: the command of this footstep is another one than that of the footstep before. */
-static int is_sudden(Belief *belief, const double *command) {
-    int other = 0;
+    memcpy(belief->last_command[1], belief->last_command[0], sizeof belief->last_command[1]);
     for (int i = 0; i < 3; i++) {
-        const float asked = (float)(belief->right && i > 0 ? -command[i] : command[i]);
-        other |= fabs((double)asked - (double)belief->asked[i]) > sudden[i];
-        belief->asked[i] = asked;
+        belief->last_command[0][i] = (float)command[i];
     }
-    return other;
-}
-
-/* The same of the traces, and the odds that these two differ from those before. -INFINITY: these
- * are too few, since the command changed. */
-static float compare(Belief *belief, const BeliefNet *net, const double *features) {
-    if (is_sudden(belief, features + BELIEF_BINS * BELIEF_CHANNELS)) {
-        forget_traces(belief, 0);
-        belief->pause = BELIEF_PAUSE;
-    }
-    if (belief->pause > 0) {
-        belief->pause--;
-        return -INFINITY;
-    }
-    if (belief->traces == 2) {
-        const int foot = belief->trace_right[1];
-        float *reference = belief->reference[foot], *count = &belief->references[foot];
-        *count = fminf(*count + 1, BELIEF_REFERENCE);
-        for (int i = 0; i < BELIEF_TRACE; i++) {
-            const float from = *count > 1 ? reference[i] : 0;
-            reference[i] = from + (belief->trace[1][i] - from) / *count;
-        }
-    }
-    memcpy(belief->trace[1], belief->trace[0], sizeof belief->trace[1]);
-    belief->trace_right[1] = belief->trace_right[0];
-    weigh(BELIEF_TRACE, net->trace[0], net->trace_bias, features, belief->trace[0]);
-    belief->trace_right[0] = belief->right;
-    belief->traces += belief->traces < 2;
-    return belief->references[0] > 0 && belief->references[1] > 0 &&
-                   belief->trace_right[0] != belief->trace_right[1]
-               ? find_odds(belief, net)
-               : -INFINITY;
+    belief->lasts += belief->lasts < 2;
 }
 
 /* The mean of all footsteps, and their number. */
@@ -274,15 +230,14 @@ static int take_footstep(Belief *belief, const BeliefNet *net) {
         return 0;
     }
     int event = BELIEF_FOOTSTEP;
-    weigh(BELIEF_EMBED, net->embed[0], net->embed_bias, features, embedded);
-    elu(embedded, BELIEF_EMBED);
-    shift(belief, embedded);
+    embed(net, features, embedded);
+    shift(belief, embedded, features + BELIEF_BINS * BELIEF_CHANNELS);
     belief->footsteps++;
-    belief->log_odds = compare(belief, net, features);
+    belief->log_odds = belief->before > 0 ? find_odds(belief, net) : -INFINITY;
     if (belief->log_odds > net->alarm) {
         belief->before = 0; /* the last two footsteps are all that is known of the new ground */
         memset(belief->mean, 0, sizeof belief->mean);
-        forget_traces(belief, belief->traces);
+        memset(belief->mean_command, 0, sizeof belief->mean_command);
         belief->footsteps = belief->lasts;
         belief->alarms++;
         event |= BELIEF_ALARM;

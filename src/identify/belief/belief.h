@@ -11,10 +11,9 @@
  * A footstep is half a period of the gait clock. Each gives BELIEF_FEATURES numbers: means of the
  * readings over eighths of it, in the mirror image where the right foot stands. A layer of weights
  * embeds them; the mean of the embedding over the footsteps so far is all that is remembered. A
- * network reads the posterior off the mean. For the alarm another layer, of products alone, leaves
- * a trace of each footstep. A second network reads off the last two traces, less the means of those
- * before of the same foot, the odds that these two are on other ground. Nothing here allocates, or
- * knows of files; both structs are plain numbers. For a robot of 12 joints in two legs (SA01). */
+ * network reads the posterior off the mean, another the odds that the last two footsteps are on
+ * other ground than those before. Nothing here allocates, or knows of files; both structs are plain
+ * numbers. For a robot of 12 joints in two legs (SA01). */
 #ifndef IDENTIFY_BELIEF_H
 #define IDENTIFY_BELIEF_H
 
@@ -44,18 +43,12 @@ enum {
     BELIEF_FEATURES = (BELIEF_BINS + 1) * BELIEF_CHANNELS + 4,
     BELIEF_EMBED = 96,
     BELIEF_HIDDEN = 64,
-    BELIEF_COMPARED = 64, /* of a trace */
-    BELIEF_SEEN = 48,     /* the rest: by which the alarm knows the walk */
-    BELIEF_TRACE = BELIEF_COMPARED + BELIEF_SEEN,
-    BELIEF_ODDS_IN = 4 * BELIEF_COMPARED + BELIEF_SEEN + 2,
-    BELIEF_ODDS = 96, /* hidden widths of the alarm */
-    BELIEF_ODDS_SECOND = 32,
-    BELIEF_KNOTS = 31,    /* of a prior, from -3 to 3 standard deviations */
-    BELIEF_DEPTHS = 6,    /* of evidence: 1, 2, 4, 8, 16, 32 footsteps */
-    BELIEF_MEMORY = 24,   /* footsteps; of more the oldest fade */
-    BELIEF_START = 2,     /* footsteps after standing that are not looked at */
-    BELIEF_PAUSE = 2,     /* the same of the alarm, after a sudden change of the command */
-    BELIEF_REFERENCE = 12 /* traces in a mean; of more the oldest fade */
+    BELIEF_ODDS = 48, /* hidden widths of the alarm */
+    BELIEF_ODDS_SECOND = 16,
+    BELIEF_KNOTS = 31,  /* of a prior, from -3 to 3 standard deviations */
+    BELIEF_DEPTHS = 6,  /* of evidence: 1, 2, 4, 8, 16, 32 footsteps */
+    BELIEF_MEMORY = 24, /* footsteps; of more the oldest fade */
+    BELIEF_START = 2    /* footsteps after standing that are not looked at */
 };
 
 /* Weights, as [in][out]. */
@@ -70,11 +63,8 @@ typedef struct {
     float prior[BELIEF_PARAMETERS][BELIEF_KNOTS];
     /* factors of the standard deviations, by log2 of the footsteps: calibrated */
     float widen[BELIEF_PARAMETERS][BELIEF_DEPTHS];
-    float trace[BELIEF_FEATURES][BELIEF_TRACE];
-    float trace_bias[BELIEF_TRACE];
-    /* what is compared, of the last footstep and of the one before, each less the mean of its foot;
-     * the magnitudes of both; what is seen, mean of both feet; 1/n of both */
-    float odds[BELIEF_ODDS_IN][BELIEF_ODDS];
+    /* last two footsteps less the mean, the mean, the same of their commands, 1/n, log(n)/3 */
+    float odds[3 * BELIEF_EMBED + 8][BELIEF_ODDS];
     float odds_bias[BELIEF_ODDS];
     float odds_second[BELIEF_ODDS][BELIEF_ODDS_SECOND];
     float odds_second_bias[BELIEF_ODDS_SECOND];
@@ -95,19 +85,13 @@ typedef struct {
     /* of the last two footsteps, the newer one first, and the mean of those before */
     float last[2][BELIEF_EMBED];
     float mean[BELIEF_EMBED];
-    int32_t lasts; /* 0 .. 2 */
-    float before;  /* footsteps in the mean */
-    /* of the alarm: traces of the last two, the newer one first; by foot, means of those before */
-    float trace[2][BELIEF_TRACE];
-    int32_t trace_right[2]; /* bool */
-    int32_t traces;         /* 0 .. 2 */
-    float reference[2][BELIEF_TRACE];
-    float references[2]; /* traces in it */
-    float asked[3];      /* command of the newest footstep, as in the frames, unmirrored */
-    int32_t pause;       /* footsteps that the alarm does not look at yet */
-    int32_t footsteps;   /* since the reset or the last alarm */
-    int32_t alarms;      /* since the reset */
-    float log_odds;      /* of a change at the newest footstep */
+    float last_command[2][3]; /* as in the frames */
+    float mean_command[3];
+    int32_t lasts;     /* 0 .. 2 */
+    float before;      /* footsteps in the mean */
+    int32_t footsteps; /* since the reset or the last alarm */
+    int32_t alarms;    /* since the reset */
+    float log_odds;    /* of a change at the newest footstep */
     /* posterior in standard deviations of the prior; that is (0, 1) before the first footstep */
     float center[BELIEF_PARAMETERS];
     float spread[BELIEF_PARAMETERS];

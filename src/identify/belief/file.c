@@ -52,12 +52,11 @@ static MildStatus check_priors(const BeliefNet *net, const char *path, MildError
 
 static MildStatus fill(const Safetensors *file, const char *path, BeliefNet *net,
                        MildError *error) {
-    const Part parts[] = {
-        PART(embed),       PART(embed_bias),       PART(hidden),   PART(hidden_bias),
-        PART(out),         PART(out_bias),         PART(prior),    PART(widen),
-        PART(trace),       PART(trace_bias),       PART(odds),     PART(odds_bias),
-        PART(odds_second), PART(odds_second_bias), PART(odds_out), PART(odds_out_bias),
-        PART(alarm)};
+    const Part parts[] = {PART(embed),       PART(embed_bias),    PART(hidden),
+                          PART(hidden_bias), PART(out),           PART(out_bias),
+                          PART(prior),       PART(widen),         PART(odds),
+                          PART(odds_bias),   PART(odds_second),   PART(odds_second_bias),
+                          PART(odds_out),    PART(odds_out_bias), PART(alarm)};
     MildStatus status = MILD_OK;
     for (size_t i = 0; i < sizeof parts / sizeof *parts && status == MILD_OK; i++) {
         status = take(file, &parts[i], path, error);
