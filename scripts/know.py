@@ -26,7 +26,7 @@ COUNT = len(NAMES)
 FRAME, BINS, EMBED, HIDDEN, KNOTS, MEMORY = 47, 8, 96, 64, 31, 24
 ODDS = 3 * EMBED + 8, 48, 16  # widths of the alarm: input, hidden
 START, SHORTEST, LONGEST = 2, 20, 80  # footsteps that are not looked at; frames of a footstep
-SHARE, PER_10_MIN = 0.9, 0.4  # nominal coverage; false alarms in 10 minutes that the threshold is set to
+SHARE, PER_10_MIN = 0.9, 0.6  # nominal coverage; false alarms in 10 minutes that the threshold is set to
 COMMAND = slice(BINS * 42, BINS * 42 + 3)  # among the features
 LEGS = np.array([6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5])
 SIGNS = np.array([-1, -1, 1, 1, 1, -1] * 2)
@@ -394,10 +394,10 @@ class Alarm:
 
 
     def set_bar(self, embedded, steps, per_10_min):
-        """The lowest threshold with at most so many alarms in these walks without a border."""
+        """The lowest threshold, in halves, with at most so many alarms in these walks without a border."""
         h, command, walks = embedded(steps.features), steps.features[:, COMMAND], walks_of(steps)
         most, best = [compared(h, command, rows, odds=self.read).max() for rows in walks], math.inf
-        for bar in np.arange(80, 0, -1) / 10:
+        for bar in np.arange(16, 0, -1) / 2:
             if sum((compared(h, command, rows, bar, self.read) > bar).sum() for rows, odds in zip(walks, most) if odds > bar) > \
                     per_10_min * steps.minutes / 10:
                 break
@@ -481,7 +481,7 @@ def learn_alarm(given, embedded):
     alarm.layers = [(halves(weight), bias) for weight, bias in alarm.layers]
     long = crossings(given, "long")
     bar = alarm.set_bar(embedded, long, PER_10_MIN)
-    print(f"alarm at log odds of {bar:.1f}, by {long.minutes:.0f} min of calm walks")
+    print(f"alarm at log odds of {bar}, by {long.minutes:.0f} min of calm walks")
     tensors = {"alarm": np.array([bar])}
     for name, (weight, bias) in zip(("odds", "odds_second", "odds_out"), alarm.layers):
         tensors[name], tensors[f"{name}_bias"] = weight, bias
