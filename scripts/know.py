@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """Learns the weights by which a robot knows its ground (docs/identify.md), from walks that `mild know --walks` writes.
 
-  scripts/know.py walk --out out/know       # 18 000 walks of 12 s for learning, 192 of 60 s for the alarm; an hour of two cores
+  scripts/know.py walk --out out/know       # 18 000 walks for the posterior, 12 000 over borders and 28 h without for the alarm
   scripts/know.py train out/know --out policies/knows.safetensors
+  scripts/know.py alarm out/know --weights policies/knows.safetensors    # the alarm of these weights alone
   scripts/know.py bound out/know            # R2 of the sensors beside that of the true states, by the same networks
 
 Needs NumPy alone. One network embeds each footstep, the mean of the embeddings over the footsteps is all that is remembered, and
 another reads from it the mean and the variance of each parameter, in standard deviations of its prior. The loss is the likelihood.
-Every fifth walk is held out; on these the standard deviations are calibrated and the alarm is set."""
+Every fifth walk is held out; on these the standard deviations are calibrated. The alarm is set on walks of its own."""
 import argparse
 import csv
 import json
@@ -25,7 +26,7 @@ COUNT = len(NAMES)
 FRAME, BINS, EMBED, HIDDEN, KNOTS, MEMORY = 47, 8, 96, 64, 31, 24
 ODDS = 3 * EMBED + 8, 48, 16  # widths of the alarm: input, hidden
 START, SHORTEST, LONGEST = 2, 20, 80  # footsteps that are not looked at; frames of a footstep
-SHARE, STEP_PER_10_MIN = 0.9, 0.3  # nominal coverage; false alarms in 10 minutes that the threshold is set to
+SHARE, PER_10_MIN = 0.9, 0.6  # nominal coverage; false alarms in 10 minutes that the threshold is set to
 COMMAND = slice(BINS * 42, BINS * 42 + 3)  # among the features
 LEGS = np.array([6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5])
 SIGNS = np.array([-1, -1, 1, 1, 1, -1] * 2)
@@ -33,7 +34,9 @@ LEARN = ("--seconds", 12, "--changes", 0.35, "--quiet", 0.2)
 WALKS = {"learn1": ("--grounds", 6000, "--seed", 1, *LEARN),
          "learn2": ("--grounds", 6000, "--seed", 2, *LEARN),
          "learn3": ("--grounds", 6000, "--seed", 3, *LEARN),
-         "long": ("--grounds", 192, "--seconds", 60, "--changes", 0, "--quiet", 0.2, "--seed", 5)}
+         **{f"border{seed}": ("--grounds", 3000, "--seed", seed, "--changes", 1, "--quiet", 0.2) for seed in (11, 12, 13, 14)},
+         "calm21": ("--grounds", 2400, "--seconds", 30, "--changes", 0, "--quiet", 0.2, "--seed", 21),
+         "long22": ("--grounds", 480, "--seconds", 60, "--changes", 0, "--quiet", 0.2, "--seed", 22)}
 
 
 # ---- footsteps ----
@@ -278,27 +281,82 @@ def calibrated(network, walks):
 
 # ---- the alarm ----
 
-def windows(network, walks, of):
-    """Inputs of the alarm at each footstep but the first two of these walks, and labels: 0 old ground, 1 new, -1 neither."""
-    inputs, labels, walk = [], [], []
-    h, command = network.embedded(walks.features), walks.features[:, COMMAND]
-    cut = np.flatnonzero(np.diff(walks.walk)) + 1
-    for begin, end in zip(np.r_[0, cut], np.r_[cut, len(h)]):
-        if not of(walks.walk[begin]):
-            continue
-        mean, asked, before, second = np.zeros(EMBED, np.float32), np.zeros(3, np.float32), 0.0, walks.second[begin:end]
-        for j in range(begin + 2, end):
+class Crossings:
+    """Footsteps of walks for the alarm: [n] features, walk, bool right, bool calm (before the first contact with other ground), crossed
+    (footsteps on it so far, as the program's judge counts them), minutes of calm walking."""
+
+    def __init__(self, paths, true_states=False):
+        parts = [self.read(path, true_states) for path in paths]
+        first = np.cumsum([0] + [part[-1] for part in parts])
+        self.features, self.right, self.calm, self.crossed = (np.concatenate([part[k] for part in parts]) for k in (0, 2, 3, 4))
+        self.walk = np.concatenate([part[1] + at for part, at in zip(parts, first)])
+        self.minutes = sum(part[5] for part in parts)
+
+    @staticmethod
+    def read(path, true_states):
+        walks = np.load(path, mmap_mode="r")
+        with open(path.with_suffix(".csv"), newline="", encoding="utf-8") as file:
+            lasted = [int(row["lasted"]) for row in csv.DictReader(file)]
+        kept, number, frames = [], [], []
+        touched = np.zeros(len(walks), int)
+        for i, last in enumerate(lasted):
+            walk = np.asarray(walks[i, :last])
+            on_new = np.flatnonzero((walk[:, 107:109] == 1).any(1))
+            touched[i] = on_new[0] if len(on_new) else 0
+            for values, begin, end in footsteps(walk[:, :FRAME], walk[:, FRAME:107] if true_states else None):
+                kept.append(values.astype(np.float32))
+                number.append(i)
+                frames.append((begin, end, np.arctan2(walk[begin, 45], walk[begin, 46]) < 0))
+        return Crossings.counted(np.array(kept), np.array(number), np.array(frames), touched, np.array(lasted), walks.shape[1])
+
+    @staticmethod
+    def counted(features, number, frames, touched, lasted, steps):
+        """frames: [n] first frame, frame behind the last, bool right."""
+        keep = frames[:, 1] < np.where(lasted < steps, lasted - 50, steps + 1)[number]  # a fall is not walking
+        features, number, frames = features[keep], number[keep], frames[keep]
+        begin, end, at = frames[:, 0], frames[:, 1], touched[number]
+        calm = (at == 0) | (end < at)
+        first = np.r_[True, np.diff(number) != 0]
+        began = np.where(first, 0, np.r_[0, end[:-1]])
+        new = (at > 0) & (end >= at) & (2 * (end - at) >= end - began)
+        sums = np.cumsum(new)
+        crossed = sums - np.repeat((sums - new)[first], np.diff(np.r_[np.flatnonzero(first), len(new)]))
+        return features, number, frames[:, 2] > 0, calm, crossed, (end - begin)[calm].sum() * 0.01 / 60, len(lasted)
+
+
+def walks_of(steps):
+    begin = np.flatnonzero(np.r_[True, np.diff(steps.walk) != 0])
+    return [np.arange(a, b) for a, b in zip(begin, np.r_[begin[1:], len(steps.walk)])]
+
+
+def compared(h, command, rows, bar=math.inf, odds=None):
+    """Inputs of the alarm at the footsteps `rows` of a walk but the first two, as the program has them; `odds` of them, where an alarm (odds
+    above `bar`) begins anew."""
+    mean, asked, before, last, inputs, said = np.zeros(EMBED, np.float32), np.zeros(3, np.float32), 0, [], [], []
+    for j in rows:
+        if len(last) == 2:
             before = min(before + 1, MEMORY)
-            mean = mean + (h[j - 2] - mean) / np.float32(before)
-            asked = asked + (command[j - 2] - asked) / np.float32(before)
-            now, earlier = second[j - begin - 1 : j - begin + 1], second[: j - begin - 1]
-            same = (earlier < 0.5).all() if now.max() < 0.5 else (earlier > 0.5).all()
-            new = now.min() > 0.5 and (earlier < 0.5).any() and (earlier > 0.5).sum() <= 2
-            inputs.append(np.concatenate([h[j] - mean, h[j - 1] - mean, mean, command[j] - asked, command[j - 1] - asked,
+            mean = mean + (h[last[0]] - mean) / np.float32(before)
+            asked = asked + (command[last[0]] - asked) / np.float32(before)
+        last = [*last, j][-2:]
+        said.append(-math.inf)
+        if before:
+            inputs.append(np.concatenate([h[j] - mean, h[last[0]] - mean, mean, command[j] - asked, command[last[0]] - asked,
                                           [1 / before, math.log(before) / 3]]).astype(np.float32))
-            labels.append(1 if new else 0 if same and (now.max() < 0.5 or now.min() > 0.5) else -1)
-            walk.append(walks.walk[begin])
-    return np.array(inputs), np.array(labels), np.array(walk)
+            if odds:
+                said[-1] = odds(inputs[-1][None])[0]
+                before, mean, asked = (0, 0 * mean, 0 * asked) if said[-1] > bar else (before, mean, asked)
+    return np.array(said) if odds else inputs
+
+
+def windows(embedded, steps):
+    """Inputs of the alarm at each footstep but the first two of each walk; bool: on other ground, for one to four footsteps."""
+    h, command, inputs, new = embedded(steps.features), steps.features[:, COMMAND], [], []
+    for rows in walks_of(steps):
+        chosen = steps.calm[rows[2:]] | ((steps.crossed[rows[2:]] >= 1) & (steps.crossed[rows[2:]] <= 4))
+        inputs += [x for x, ok in zip(compared(h, command, rows), chosen) if ok]
+        new.append(~steps.calm[rows[2:]][chosen])
+    return np.array(inputs), np.concatenate(new)
 
 
 class Alarm:
@@ -319,7 +377,7 @@ class Alarm:
                 x = x * self.kept[-1][1]
         return x[:, 0]
 
-    def train(self, x, new, rng, steps=8000, rate=1e-3, batch=512):
+    def train(self, x, new, rng, steps=10000, rate=1e-3, batch=512):
         adam = Adam([p for pair in self.layers for p in pair], 0.3)
         old, late = np.flatnonzero(~new), np.flatnonzero(new)
         for k in range(steps):
@@ -335,18 +393,44 @@ class Alarm:
         return self
 
 
+    def set_bar(self, embedded, steps, per_10_min):
+        """The lowest threshold, in halves, with at most so many alarms in these walks without a border."""
+        h, command, walks = embedded(steps.features), steps.features[:, COMMAND], walks_of(steps)
+        most, best = [compared(h, command, rows, odds=self.read).max() for rows in walks], math.inf
+        for bar in np.arange(16, 0, -1) / 2:
+            if sum((compared(h, command, rows, bar, self.read) > bar).sum() for rows, odds in zip(walks, most) if odds > bar) > \
+                    per_10_min * steps.minutes / 10:
+                break
+            best = bar
+        return float(best)
+
+
 # ---- commands ----
+
+HALVES = ("embed", "hidden", "odds", "odds_second", "odds_out")  # are in half precision in the file
+
+
+def load(path):
+    """Tensors of a safetensors file by name; its note."""
+    raw = pathlib.Path(path).read_bytes()
+    end = 8 + int.from_bytes(raw[:8], "little")
+    header = json.loads(raw[8:end])
+    note = header.pop("__metadata__")["note"]
+    return {name: np.frombuffer(raw[end + at["data_offsets"][0] : end + at["data_offsets"][1]], {"F32": "<f4", "F16": "<f2"}[at["dtype"]])
+            .reshape(at["shape"]) for name, at in header.items()}, note
+
 
 def save(path, tensors, note):
     """A safetensors file with the checksum that the program asks for (src/learn/safetensors.h)."""
     header, at = {"__metadata__": {"crc32": "00000000", "note": note}}, 0
-    for name, (kind, array) in tensors.items():
-        header[name] = {"dtype": {"f4": "F32", "f2": "F16"}[kind], "shape": list(array.shape),
-                        "data_offsets": [at, at + array.size * int(kind[1])]}
-        at += array.size * int(kind[1])
+    kinds = {name: "f2" if name in HALVES else "f4" for name in sorted(tensors, key=lambda name: name not in HALVES)}
+    for name, kind in kinds.items():
+        size = tensors[name].size * int(kind[1])
+        header[name] = {"dtype": {"f4": "F32", "f2": "F16"}[kind], "shape": list(tensors[name].shape), "data_offsets": [at, at + size]}
+        at += size
     text = json.dumps(header, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 8)
-    whole = len(text).to_bytes(8, "little") + text + b"".join(a.astype("<" + kind).tobytes() for kind, a in tensors.values())
+    whole = len(text).to_bytes(8, "little") + text + b"".join(tensors[name].astype("<" + kind).tobytes() for name, kind in kinds.items())
     pathlib.Path(path).write_bytes(whole.replace(b'"crc32":"00000000"', f'"crc32":"{zlib.crc32(whole):08x}"'.encode(), 1))
 
 
@@ -381,24 +465,34 @@ def train(given):
     network.mean, network.scale = np.zeros_like(network.mean), np.ones_like(network.scale)
     network.hidden = halves(network.hidden)
     widen = calibrated(network, walks)
-    x, label, own = windows(network, walks, lambda i: i % 5 != 0)
-    alarm = Alarm(rng).train(x[label >= 0], label[label >= 0] == 1, rng)
+    save(given.out, {"embed": network.embed, "embed_bias": network.embed_bias, "hidden": network.hidden, "hidden_bias": network.hidden_bias,
+                     "out": network.out, "out_bias": network.out_bias, "prior": walks.knots, "widen": widen,
+                     **learn_alarm(given, network.embedded)}, f"scripts/know.py train --seed {given.seed}")
+
+
+def crossings(given, *kinds):
+    return Crossings([path for kind in kinds for path in sorted(given.walks.glob(f"{kind}*.npy"))])
+
+
+def learn_alarm(given, embedded):
+    """Tensors of the alarm."""
+    rng = np.random.default_rng(given.seed)
+    alarm = Alarm(rng).train(*windows(embedded, crossings(given, "border", "calm")), rng)
     alarm.layers = [(halves(weight), bias) for weight, bias in alarm.layers]
-    long = Walks([given.walks / "long.npy"], knots=walks.knots)
-    calm = alarm.read(windows(network, long, lambda i: True)[0])
-    x, label, own = windows(network, walks, lambda i: i % 5 == 0)
-    calm = np.sort(np.r_[calm, alarm.read(x[label == 0])])
-    minutes = len(calm) * 0.5 / 60
-    threshold = calm[-1 - int(STEP_PER_10_MIN * minutes / 10)]
-    print(f"alarm at log odds of {threshold:.2f}, {minutes:.0f} min of held-out footsteps; flags "
-          f"{(alarm.read(x[label == 1]) > threshold).mean():.2f} of held-out footsteps after a border")
-    flat = {"embed_bias": network.embed_bias, "hidden_bias": network.hidden_bias, "out": network.out, "out_bias": network.out_bias,
-            "prior": walks.knots, "widen": widen, "alarm": np.array([threshold])}
-    big = {"embed": network.embed, "hidden": network.hidden}
+    long = crossings(given, "long")
+    bar = alarm.set_bar(embedded, long, PER_10_MIN)
+    print(f"alarm at log odds of {bar}, by {long.minutes:.0f} min of calm walks")
+    tensors = {"alarm": np.array([bar])}
     for name, (weight, bias) in zip(("odds", "odds_second", "odds_out"), alarm.layers):
-        big[name], flat[f"{name}_bias"] = weight, bias
-    save(given.out, {**{name: ("f2", array) for name, array in big.items()},
-                     **{name: ("f4", np.asarray(array)) for name, array in flat.items()}}, f"scripts/know.py train --seed {given.seed}")
+        tensors[name], tensors[f"{name}_bias"] = weight, bias
+    return tensors
+
+
+def alarm_alone(given):
+    tensors, note = load(given.weights)
+    embed, bias = (tensors[name].astype(np.float32) for name in ("embed", "embed_bias"))
+    learned = learn_alarm(given, lambda features: elu(features @ embed + bias))
+    save(given.weights, {**tensors, **learned}, note.split("; ")[0] + f"; scripts/know.py alarm --seed {given.seed}")
 
 
 def main():
@@ -416,6 +510,11 @@ def main():
         one.set_defaults(run=run)
         if run is train:
             one.add_argument("--out", type=pathlib.Path, required=True)
+    one = parts.add_parser("alarm")
+    one.add_argument("walks", type=pathlib.Path)
+    one.add_argument("--weights", type=pathlib.Path, required=True, help="read, and written again")
+    one.add_argument("--seed", type=int, default=1)
+    one.set_defaults(run=alarm_alone)
     given = parser.parse_args()
     given.run(given)
 

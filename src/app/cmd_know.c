@@ -226,15 +226,23 @@ static MildStatus judge(const Know *k, MildError *error) {
 
 /* ---- the command ---- */
 
+static const char *const priors[PRIORS] = {"wide", "paper", "presets"};
+
 static MildStatus choose_ground(Know *k, MildError *error) {
     StudyDef *s = &k->study;
     MildStatus status = MILD_OK;
     MildModel model = MILD_MODEL_MILD;
-    if (k->prior && strcmp(k->prior, "wide") != 0 && strcmp(k->prior, "paper") != 0) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "--prior: '%.40s' is neither wide nor paper",
-                         k->prior);
+    if (k->prior) {
+        int prior = 0;
+        while (prior < PRIORS && strcmp(k->prior, priors[prior]) != 0) {
+            prior++;
+        }
+        if (prior == PRIORS) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "--prior: '%.40s' is neither wide nor paper nor presets", k->prior);
+        }
+        s->prior = (Prior)prior;
     }
-    s->prior = k->prior && strcmp(k->prior, "paper") == 0 ? PRIOR_PAPER : PRIOR_WIDE;
     if (k->ground) {
         status = grounds_find(k->ground, &k->preset, &s->rigid, error);
         s->preset = s->rigid ? NULL : &k->preset;
@@ -320,7 +328,8 @@ static int parse_and_run(Know *k, CliArgs *args, int argc, char **argv) {
         {"changes", CLI_NUMBER, &k->study.change_share, 0, 1, "P",
          "[-] share of the walks that cross a border onto another ground (default 0)"},
         {"prior", CLI_TEXT, &k->prior, 0, 0, "NAME",
-         "what grounds are drawn from: wide, or paper, that of docs/paper.md (default wide)"},
+         "what grounds are drawn from: wide; paper, that of docs/paper.md; or presets, as they are "
+         "(default wide)"},
         {"ground", CLI_TEXT, &k->ground, 0, 0, "NAME", "one ground for all walks, or rigid"},
         {"model", CLI_TEXT, &k->context.model, 0, 0, "NAME",
          "another ground model, matched to the ground that was drawn for mild"},

@@ -135,6 +135,8 @@ static void test_mirror(void **state) {
     follow(&left, 0, 9 * STEP + 1, 0.1, 0);
     follow(&right, 0, 9 * STEP + 1, 0.1, 1);
     assert_int_equal(left.footsteps, right.footsteps);
+    assert_true(isfinite(left.log_odds));
+    expect_near("log odds", (double)right.log_odds, (double)left.log_odds, 1e-4);
     for (int i = 0; i < BELIEF_PARAMETERS; i++) {
         expect_entry("center", i, (double)right.center[i], (double)left.center[i], 1e-6);
         expect_entry("spread", i, (double)right.spread[i], (double)left.spread[i], 1e-6);

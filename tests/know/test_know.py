@@ -110,7 +110,7 @@ def commands(folder):
     assert all(name in text for name in know.NAMES), text
     for arguments, words in ((("fit", folder / "log.csv", "--plate", "0.2,0.1"), "walk's log"),
                              (("fit", folder / "log.csv", "--trial", "3", "--json", "/nowhere/x"), "/nowhere"),
-                             (("know", "--prior", "flat"), "neither wide nor paper"), (("know", "--ground", "mud"), "mud"),
+                             (("know", "--prior", "flat"), "neither wide nor paper nor presets"), (("know", "--ground", "mud"), "mud"),
                              (("know", "--weights", root / "policies/mild.safetensors"), "no weights of a belief")):
         done = subprocess.run([mild, *map(str, arguments)], capture_output=True, text=True, check=False, cwd=root)
         assert done.returncode == 2 and words in done.stderr, (arguments, done.stderr)

@@ -45,7 +45,7 @@ PriorGround prior_draw(Prior prior, Random *r, const MildSole *sole, double load
         mild_material_preset(mild_material_preset_name(preset), material);
         if (prior == PRIOR_PAPER) {
             draw_paper(r, material);
-        } else {
+        } else if (prior == PRIOR_WIDE) {
             draw_wide(r, material);
         }
         ground = prior_ground(material, sole, load);

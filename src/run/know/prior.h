@@ -19,8 +19,9 @@
 #define PRIOR_NO_SLIP 0.1
 
 typedef enum {
-    PRIOR_WIDE,  /* all of PRIOR_LIST, under any preset of mild */
-    PRIOR_PAPER, /* that of scripts/paper/latents.py: k_pen and sigma_cone alone, under three */
+    PRIOR_WIDE,    /* all of PRIOR_LIST, under any preset of mild */
+    PRIOR_PAPER,   /* that of scripts/paper/latents.py: k_pen and sigma_cone alone, under three */
+    PRIOR_PRESETS, /* a preset of mild as it is */
     PRIORS
 } Prior;
 

@@ -57,7 +57,10 @@ static void draw_border(const StudyDef *def, Random *r, StudyWalk *walk) {
     const double speed = walk->walk.command[0][0];
     const double at = speed * random_uniform(r, 0.35, 0.65) * def->seconds;
     const MildPatch patch = {speed > 0 ? at : -FAR, speed > 0 ? FAR : at, -FAR, FAR, 1};
-    walk->ground[1] = draw_ground(def, r, &terrain->materials[1]);
+    do {
+        walk->ground[1] = draw_ground(def, r, &terrain->materials[1]);
+    } while (def->prior == PRIOR_PRESETS && !def->preset &&
+             walk->ground[1].preset == walk->ground[0].preset);
     terrain->material_count = walk->grounds = 2;
     mild_terrain_add_patch(terrain, &patch, NULL);
 }
