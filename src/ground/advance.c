@@ -307,6 +307,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         }
         const int barred = (material[slot] & SLOT_BARRED) != 0;
         memory->material[e] = lifted || barred ? lifted_material : material[slot];
+        memory->front_speed[e] = barred ? 0.0 : memory->front_speed[e]; /* it carries nothing */
         if (faces) {
             memory->share[e] = lifted ? 0.0 : s->share[i];
         }
