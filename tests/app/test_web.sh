@@ -74,12 +74,17 @@ gets 200 'GET / HTTP/1.1\r\n\r\n'
 exec 4>&-
 
 # many who say one byte a second: others are told to come again, and are served when the time of those is over.
-# A loaded machine may open so many more slowly than they are dropped: then once more.
+# A client counts until its thread has ended, so they begin when nobody is left; once more where a loaded machine opened
+# them more slowly than they are dropped.
 trap '' PIPE
 slow=()
 for _ in {1..5}; do
     for one in "${slow[@]}"; do exec {one}>&-; done
     slow=()
+    for _ in {1..100}; do
+        [ "$(ls "/proc/$server/task" | wc -l)" -gt 1 ] || break
+        sleep 0.1
+    done
     for _ in {1..64}; do
         exec {one}<>"/dev/tcp/127.0.0.1/$port" && slow+=("$one")
     done
