@@ -78,7 +78,7 @@ typedef struct {
     MildGround *ground;
 } Place;
 
-/* A preset for feet as small as the stool's: of 3.8 times the stiffness, with cones half as wide. */
+/* A preset for feet as small as the stool: 3.8 times as stiff, with cones half as wide. */
 static MildMaterial firm(const char *name) {
     MildMaterial m = preset(name);
     const double r = 0.0195 / 0.01;
