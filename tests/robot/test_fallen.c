@@ -466,8 +466,8 @@ static void the_ground_never_creates_energy(void **unused) {
     assert_true(touch >= falls - falls / 20 && lost <= falls / 20);
 }
 
-/* Falls of which one was given 123 J: an element in elastic ground that carries nothing until it has
- * come out kept the speed of its front for the added mass of plastic ground beside it. */
+/* One of these falls was given 123 J: an element in elastic ground that carries nothing until it
+ * has come out kept the speed of its front for the added mass of plastic ground beside it. */
 static void a_barred_front_rests(void **unused) {
     falls = 4;
     first = 1111;
