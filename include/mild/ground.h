@@ -94,9 +94,9 @@ int mild_model_is_concentric(MildModel model);
 /* ---- materials: parameters of the element law (paper Table III; docs/model.md section 10) ---- */
 
 /* A plain struct. Start from mild_material_default or a preset, change what differs, and check it
- * with mild_material_check. Numbers of an element (k_pen, k_drift, b_drift, and nu and c_g, which go
- * with the size of its cone) are those of an element of the paper's pitch, 0.0195 m, under any sole:
- * the pitch of a raster does not change the ground (docs/model.md section 16). Those of the
+ * with mild_material_check. Numbers of an element (k_pen, k_drift, b_drift, and nu and c_g, which
+ * go with the size of its cone) are those of an element of the paper's pitch, 0.0195 m, under any
+ * sole: the pitch of a raster does not change the ground (docs/model.md section 16). Those of the
  * concentric models are of the whole sole. */
 typedef struct {
     double k_pen;        /* [N/m] penetration stiffness of one element at the surface; for
@@ -280,9 +280,9 @@ typedef struct {
 } MildSurfaceDef;
 
 /* Makes a sole whose elements cover the outer surface of a body, each with an outward normal and an
- * area near spacing^2. The law is that of an element of area pitch^2; an element here presses with as
- * many of these as its area has. The frame is that of the body; its origin is
- * what other functions call the ankle. Elements inside another shape are left out; for that a mesh
+ * area near spacing^2. The law is that of an element of area pitch^2; an element here presses with
+ * as many of these as its area has. The frame is that of the body; its origin is what other
+ * functions call the ankle. Elements inside another shape are left out; for that a mesh
  * must be closed. The areas sum to that of the surface. An element carries load while its normal
  * points down by more than 10 degrees below the horizontal, with its area projected on the
  * horizontal plane when it touched down. A surface serves wherever a sole does, except in

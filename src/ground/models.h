@@ -11,8 +11,8 @@
 /* The row of a material's model. Returns the row of mild for an unknown model and for one without a
  * law, because the ground must survive unchecked materials. */
 const ModelRow *model_row(int model);
-/* The same ground under elements of that pitch (docs/model.md section 16). Of a concentric model the
- * numbers belong to the whole sole, and stay. */
+/* The same ground under elements of that pitch (docs/model.md section 16). The numbers of a
+ * concentric model belong to the whole sole, and stay. */
 MildMaterial material_at(const MildMaterial *material, double pitch);
 /* Law of one element of area pitch^2 of a sole whose shorter side is `width`. */
 Law law_of(const MildMaterial *material, double pitch, double width);
