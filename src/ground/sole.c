@@ -388,7 +388,8 @@ SoleHeap sole_heap(const MildSole *sole, int element) {
     const double edge = sole->values[SOLE_EDGE * n + element] / radius;
     const double spread = sole->values[SOLE_SPREAD * n + element] / radius;
     /* The flat share (1 - t)^2 says that distances from `begin` on have the density 2 (1 - t): the
-     * mean is a third of the width, the variance an 18th of its square. */
+     * mean is a third of the width, the variance an 18th of its square. A heap begins to close
+     * below the surface, if only by a hair: what begins at 0 is a cone (law_is_heap). */
     const double width = fmax(fmin(sqrt(18.0) * spread, 3.0 * edge), 1e-6);
     return (SoleHeap){fmax(edge - width / 3.0, 1e-9), width};
 }
