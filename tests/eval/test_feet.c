@@ -141,8 +141,7 @@ static void rows_are_printed(void **state) {
     for (size_t i = 0; i < sizeof order / sizeof *order; i++) {
         const int trial = order[i][0], step = order[i][1], f = order[i][2];
         char start[64];
-        snprintf(start, sizeof start, "foam45,0.6,%d,%d,%.5f", trial, f,
-                 0.0025 * (step + 1));
+        snprintf(start, sizeof start, "foam45,0.6,%d,%d,%.5f", trial, f, 0.0025 * (step + 1));
         line = strtok_r(NULL, "\n", &rest);
         assert_non_null(line);
         assert_memory_equal(line, start, strlen(start));

@@ -363,8 +363,7 @@ static MildStatus summarise(Trials *t, EvalRow *rows, MildError *error) {
         track_print(&t->track, t->run->scenes[0].name, speed_of(t, 0), TASK_PERIOD, eval.track);
     }
     if (status == MILD_OK && eval.feet) {
-        feet_print(&t->feet, t->run->scenes[0].name, speed_of(t, 0), t->task.physics_dt,
-                   eval.feet);
+        feet_print(&t->feet, t->run->scenes[0].name, speed_of(t, 0), t->task.physics_dt, eval.feet);
     }
     return status;
 }
