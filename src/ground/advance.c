@@ -179,16 +179,20 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
     }
 }
 
-static __attribute__((noinline)) void blocks_remember(const Advance *a, const Slots *first,
-                                                      const Slots *end, const Memory *memory, int e,
-                                                      Lanes count[2]) {
-    blocks_advance(a, first, end, memory, e, 0, count);
-}
-
 static __attribute__((noinline)) void blocks_wear(const Advance *a, const Slots *first,
                                                   const Slots *end, const Memory *memory, int e,
                                                   Lanes count[2]) {
     blocks_advance(a, first, end, memory, e, 1, count);
+}
+
+static __attribute__((noinline)) void blocks_remember(const Advance *a, const Slots *first,
+                                                      const Slots *end, const Memory *memory, int e,
+                                                      Lanes count[2]) {
+    if (a->foot->curves & LAW_HEAP) {
+        blocks_wear(a, first, end, memory, e, count);
+    } else {
+        blocks_advance(a, first, end, memory, e, 0, count);
+    }
 }
 
 /* A foot with all elements listed, on ground without imprints. Returns how many elements remember
@@ -197,11 +201,7 @@ static int foot_advance_all(const Advance *a, const Memory *memory, const int32_
     const FootScratch *foot = a->foot;
     Lanes count[2] = {{0.0}};
     double sums[2];
-    if (foot->curves & LAW_HEAP) {
-        blocks_wear(a, foot->slot, slots_end(foot), memory, 0, count);
-    } else {
-        blocks_remember(a, foot->slot, slots_end(foot), memory, 0, count);
-    }
+    blocks_remember(a, foot->slot, slots_end(foot), memory, 0, count);
     lanes_sum(count, 2, sums);
     if (foot->uneven) {
         foot_planes(foot, a->height, memory);
@@ -272,11 +272,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         const int e = foot->element[slot];
         if (i == 0) {
             memset(stays, 0, sizeof stays);
-            if (foot->curves & LAW_HEAP) {
-                blocks_wear(a, s, s + 1, &block, 0, stays);
-            } else {
-                blocks_remember(a, s, s + 1, &block, 0, stays);
-            }
+            blocks_remember(a, s, s + 1, &block, 0, stays);
         }
         for (; next < e; next++) {
             touched += faces ? face_unlisted(a, memory, next) : element_unlisted(memory, next);

@@ -22,16 +22,15 @@ void slots_elastic(const FootScratch *foot) {
 static void slots_lean(const FootScratch *foot) {
     const double side = foot->arm[3][2] < 0.0 ? -1.0 : 1.0; /* the face that looks down */
     const double up[3] = {side * foot->arm[3][0], side * foot->arm[3][1], side * foot->arm[3][2]};
+    const double level = real_min(real_max(up[2], SHARE_LEAN), 1.0);
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
         for (int i = 0; i < SLOT_LANES; i++) {
-            s->lean[i] = up[2];
+            s->lean[i] = level;
         }
         for (int i = 0; foot->uneven && i < SLOT_LANES; i++) {
             const double gx = s->slope_x[i], gy = s->slope_y[i];
-            s->lean[i] = (up[2] - gx * up[0] - gy * up[1]) / sqrt(1.0 + gx * gx + gy * gy);
-        }
-        for (int i = 0; i < SLOT_LANES; i++) {
-            s->lean[i] = real_min(real_max(s->lean[i], SHARE_LEAN), 1.0);
+            const double along = up[2] - gx * up[0] - gy * up[1];
+            s->lean[i] = real_min(real_max(along / sqrt(1.0 + gx * gx + gy * gy), SHARE_LEAN), 1.0);
         }
     }
 }
