@@ -17,6 +17,7 @@
 #include "base/text.h"
 #include "ground/soil/soil.h"
 #include "identify/belief/log.h"
+#include "identify/fit_drag.h"
 #include "identify/press.h"
 
 typedef struct {
@@ -383,7 +384,8 @@ static MildStatus rows_sort(const FitOptions *options, FitWork *work, MildError 
         if (file->kind == FIT_FILE_PRESS) {
             const int plate = options->plate.count > 1 ? presses : 0;
             whole = rows_add(&work->set[FIT_PRESS], file->points, file->count, plate) &&
-                    rows_add(&work->set[FIT_UNLOAD], file->back, file->back_count, plate);
+                    rows_add(&work->set[FIT_UNLOAD], file->back, file->back_count, plate) &&
+                    rows_add(&work->set[FIT_DRAG], file->slide, file->slide_count, plate);
             presses++;
         } else {
             const int turns = file->kind == FIT_FILE_RING;
@@ -395,9 +397,13 @@ static MildStatus rows_sort(const FitOptions *options, FitWork *work, MildError 
             rings += turns;
         }
     }
-    memcpy(work->set[FIT_UNLOAD].def.plate, work->set[FIT_PRESS].def.plate,
-           sizeof work->set[FIT_UNLOAD].def.plate);
-    work->set[FIT_UNLOAD].def.plates = work->set[FIT_PRESS].def.plates;
+    for (int k = 0; k < FIT_KINDS; k++) {
+        FitDef *def = &work->set[k].def;
+        if (k == FIT_UNLOAD || k == FIT_DRAG) {
+            memcpy(def->plate, work->set[FIT_PRESS].def.plate, sizeof def->plate);
+            def->plates = work->set[FIT_PRESS].def.plates;
+        }
+    }
     return whole ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
 }
 
@@ -447,6 +453,54 @@ static int set_prepare(const FitOptions *options, FitWork *work, FitKind kind) {
     return left;
 }
 
+/* Makes the rows that slide those of a fit, by what their press met. Returns false when out of
+ * memory. */
+static int slides_prepare(FitWork *work) {
+    const FitSet *press = &work->set[FIT_PRESS], *back = &work->set[FIT_UNLOAD];
+    FitSet *set = &work->set[FIT_DRAG];
+    MildMaterial known = work->material;
+    known.recovery = back->done ? back->result.curve.recovery : known.recovery;
+    known = fit_drag_base(&known, press->done ? &press->result.curve : NULL);
+    FitPoint *rows = malloc(sizeof *rows * (size_t)(2 * set->count + 1));
+    if (!rows) {
+        return 0;
+    }
+    int kept = 0;
+    for (int first = 0, end; first < set->count; first = end) {
+        const FitPoint *slide = set->points + first;
+        for (end = first + 1; end < set->count && fit_drag_is_next(&set->points[end]); end++) {
+            continue;
+        }
+        kept += fit_drag_rows(&set->def.plate[slide->plate], &known, slide, end - first,
+                              rows + kept);
+    }
+    free(set->points);
+    set->points = rows;
+    set->count = kept;
+    set->def.material = known;
+    return 1;
+}
+
+/* Checks that the slides can be fitted, and prepares them. Of a model without slip-sinkage they are
+ * left out. */
+static MildStatus slides_fit(const FitOptions *options, FitWork *work, MildError *error) {
+    FitSet *set = &work->set[FIT_DRAG];
+    const FitSet *press = &work->set[FIT_PRESS];
+    if (!set->count || set_prepare(options, work, FIT_DRAG) == 0) {
+        return MILD_OK;
+    }
+    if (!press->count && !options->hold.count && !options->from) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "no press: what a plate carries without slip is unknown; leave the rows "
+                         "before the slip in the record, or give a press too");
+    }
+    if (!slides_prepare(work)) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
+    }
+    set->done = 1;
+    return fit_run(&set->def, set->points, set->count, &set->result, error);
+}
+
 /* Fits each kind of rows by itself, because no parameter is told by two of them. */
 static MildStatus sets_fit(const FitOptions *options, FitWork *work, MildError *error) {
     const char *model = mild_model_names[work->material.model];
@@ -460,7 +514,7 @@ static MildStatus sets_fit(const FitOptions *options, FitWork *work, MildError *
                          "choose bekker, or leave these files out",
                          model);
     }
-    for (int k = 0; k < FIT_KINDS && status == MILD_OK; k++) {
+    for (int k = 0; k < FIT_DRAG && status == MILD_OK; k++) {
         FitSet *set = &work->set[k];
         set->done = set->count > 0 && set_prepare(options, work, (FitKind)k) > 0;
         if (set->done) {
@@ -468,6 +522,8 @@ static MildStatus sets_fit(const FitOptions *options, FitWork *work, MildError *
         }
         made += set->done && k != FIT_UNLOAD;
     }
+    status = status == MILD_OK ? slides_fit(options, work, error) : status;
+    made += work->set[FIT_DRAG].done;
     if (status == MILD_OK && !made) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--hold: every parameter of %s is held, which leaves nothing to fit",

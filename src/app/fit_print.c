@@ -70,6 +70,7 @@ static void press_assumptions_print(const FitWork *work) {
 static void assumptions_print(const FitWork *work, FitKind kind) {
     static const char *const why[FIT_KINDS] = {"the law misses the curve, or the noise is slow",
                                                "ground springs back along no straight line",
+                                               "the law misses the curve, or the noise is slow",
                                                "the law misses the curve, or the noise is slow"};
     const FitResult *result = &work->set[kind].result;
     if (names_print(result, bit(FIT_HELD), 1, "the intervals assume ")) {
@@ -161,7 +162,8 @@ static const char *elements_text(const FitDef *def, char text[8 * FIT_PLATES_MAX
 }
 
 const char *fit_residual_text(const FitWork *work, FitKind kind, char *text, size_t size) {
-    static const char *const rows[FIT_KINDS] = {"loading rows", "unloading rows", "rows of slip"};
+    static const char *const rows[FIT_KINDS] = {"loading rows", "unloading rows", "rows of slip",
+                                                "rows that slide"};
     const FitSet *set = &work->set[kind];
     const FitResult *result = &set->result;
     char elements[8 * FIT_PLATES_MAX] = "", tail[8 * FIT_PLATES_MAX + 20] = "";

@@ -13,7 +13,7 @@
  * Under the pressure p the ground of bekker resists a slip j by the shear stress
  *     s(j) = (cohesion + p mu) (1 - exp(-j/shear_length))
  * and a ring that turns by an angle by the mean of s over it, weighted by the radius, which is its
- * torque over that of a stress of 1. Pure functions: thread safe. */
+ * torque over that of a stress of 1. A plate that slides where slip costs support: fit_drag.h. Pure functions: thread safe. */
 #ifndef LAB_FIT_LAW_H
 #define LAB_FIT_LAW_H
 
@@ -48,10 +48,13 @@ typedef struct {
 const FitCombination *fit_combination(const char *carrier);
 
 /* The parameters of a model that such rows can sense, in the order of its fields. Returns their
- * count; 0 for rigid, and for FIT_SHEAR of a model without a law of shear. */
+ * count; 0 for rigid, for FIT_SHEAR of a model without a law of shear, and for FIT_DRAG of one
+ * under which slip costs no support. */
 int fit_parameters(MildModel model, FitKind kind, const MildField *fields[FIT_PARAMETERS_MAX]);
-/* The default material, with numbers for which everything has an effect. */
-MildMaterial fit_probe(void);
+enum { FIT_PROBES = 2 };
+/* The default material, with numbers for which everything has an effect in one probe or the other:
+ * in the second the friction of a plate that slides is bounded by mu. */
+MildMaterial fit_probe(int number);
 /* Bool: the force depends on it only through speed or acceleration. */
 int fit_is_rate(MildModel model, const MildField *field);
 /* Bool: a number that is never fitted: bed_depth, which may be held, or bekker's plate_width, which

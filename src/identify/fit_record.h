@@ -8,7 +8,8 @@ enum { FIT_POINTS_MIN = 8 };
 typedef enum {
     FIT_PRESS,  /* a plate on its way down */
     FIT_UNLOAD, /* a plate on its way up */
-    FIT_SHEAR   /* a plate or ring that slides under load */
+    FIT_SHEAR,  /* a plate or ring that slides under load, as stresses */
+    FIT_DRAG    /* a plate that slides where slip costs support, fit_drag.h */
 } FitKind;
 
 /* One row of a record. time and speed may be NaN where unknown; fit_speeds fills speed and
@@ -22,6 +23,14 @@ typedef struct {
     int plate;           /* number of its plate among those of the fit */
     double area;         /* [m^2] that the force acts on; 0: the plate's */
     double load;         /* FIT_UNLOAD: greatest depth before [m]; FIT_SHEAR: pressure [N/m^2] */
+
+    /* of a plate that slides; speed and acceleration are of no use there */
+    double slip;   /* [m] way along; NaN where unknown */
+    double along;  /* [N] along the way, on the plate; of what fit_sliding gives, against it */
+    int holds;     /* bool, FIT_DRAG: the row's force is the one along, else the one up, times .. */
+    double weight; /* [-] by which its error counts */
+    double virgin; /* [N] what the plate would carry there without slip */
+    double near;   /* [N] what it carries: mean of the rows around it */
 } FitPoint;
 
 /* Keeps the loading part, in place: rows below the surface that are at least as deep as all rows
@@ -31,6 +40,11 @@ int fit_loading(FitPoint *points, int count);
  * that are above the bottom, below the surface and no deeper than all since. Returns their count;
  * 0 when they are fewer than FIT_POINTS_MIN, or fast. */
 int fit_unloading(const FitPoint *points, int count, FitPoint *back);
+/* Takes a slide out of a record: copies to `slide` [*count] the rows of growing slip up to the
+ * longest, and before them, with the slip 0, those of the press from 80 % of its depth on; *count
+ * becomes the number of rows before the slip. Returns how many rows slide; 0 where none goes 1 mm.
+ * *slides: the number of rows copied. */
+int fit_sliding(const FitPoint *points, int *count, FitPoint *slide, int *slides);
 /* Fills unknown speeds and all accelerations from the times of one record's loading part. Each
  * comes from a polynomial through the nearest twentieth of the rows. Without times both are 0. */
 void fit_speeds(FitPoint *points, int count);
