@@ -75,7 +75,9 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
             "Several files may differ in speed, which c_d and dissipation need; c_g also "
             "needs a record that brakes, such as a drop. They may differ in their plate, "
             "which k_c of bekker needs (--plate once for each file). The way up from the greatest "
-            "depth tells recovery. A file with the columns slip_m, shear_pa and pressure_pa, or of "
+            "depth tells recovery. Where the plate then slides, slip_m and force_x_n (x_m and "
+            "force_x_n of mild press --drag) tell slip_length, grip and mu of mild and mild_merged, "
+            "and where it sinks under its load meanwhile, regain_length. A file with the columns slip_m, shear_pa and pressure_pa, or of "
             "a ring angle_rad, torque_nm and force_n (--ring), tells cohesion, mu and shear_length "
             "of bekker. --soil writes what was found as a ground (docs/soil.md). Of a walk's log "
             "(mild drive --log, mild play "
@@ -92,6 +94,8 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
             "  mild fit slow.csv --plate 0.2,0.1 --model bekker --json out.json\n"
             "  mild fit p5.csv p10.csv ring.csv --model bekker --plate 0.05 --plate 0.1 \\\n"
             "      --ring 0.2,0.12 --hold-from dry_sand --soil mars.ini\n"
+            "  mild fit d.csv square.csv drag.csv --model mild_merged --plate 0.12 --plate 0.1,0.1 \\\n"
+            "      --plate 0.1,0.1 --hold alpha=0.3,phi=0.59,rho=2500\n"
             "  mild fit walk.csv\n",
         .positional_max = CLI_LIST_MAX,
         .picture = "figure",
@@ -106,11 +110,16 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
 
 /* ---- what is fitted and what is held ---- */
 
-/* Parameters of the model that some kind of rows tells: fields[FIT_FIELDS_MAX]. */
-static int parameters_of(MildModel model, const MildField **fields) {
-    int count = 0;
+/* Parameters of the model that some kind of rows tells, of slides where there are some:
+ * fields[FIT_FIELDS_MAX]. */
+static int parameters_of(const FitWork *work, const MildField **fields) {
+    const MildModel model = (MildModel)work->material.model;
+    int slides = 0, count = 0;
+    for (int f = 0; f < work->files; f++) {
+        slides += work->file[f].slide_count > 0;
+    }
     for (int k = 0; k < FIT_KINDS; k++) {
-        count += fit_parameters(model, (FitKind)k, fields + count);
+        count += k == FIT_DRAG && !slides ? 0 : fit_parameters(model, (FitKind)k, fields + count);
     }
     return count;
 }
@@ -123,7 +132,7 @@ static const MildField *parameter_find(const FitWork *work, int any, const char 
     const char *names[FIT_FIELDS_MAX];
     char list[300] = "";
     const MildModel model = (MildModel)work->material.model;
-    const int count = parameters_of(model, fields);
+    const int count = parameters_of(work, fields);
     for (int i = 0; i < count; i++) {
         names[i] = fields[i]->name;
         if (strcmp(names[i], name) == 0) {
@@ -196,7 +205,7 @@ static MildStatus from_read(const FitOptions *options, FitWork *work, MildError 
 /* --fit: everything else is held. */
 static MildStatus fit_names_read(const CliNames *names, FitWork *work, MildError *error) {
     const MildField *fields[FIT_FIELDS_MAX];
-    const int count = parameters_of((MildModel)work->material.model, fields);
+    const int count = parameters_of(work, fields);
     for (int i = 0; i < count; i++) {
         work->held[fields[i] - mild_material_fields] = 1;
     }
@@ -572,9 +581,9 @@ static void command_text(int argc, char **argv, char *text, size_t size) {
 
 static MildStatus fit_report(const FitOptions *options, const char *command, const CliArgs *args,
                              FitWork *work, MildError *error) {
-    MildStatus status = model_choose(options, args, work, error);
+    MildStatus status = files_read(args, work, error);
     if (status == MILD_OK) {
-        status = files_read(args, work, error);
+        status = model_choose(options, args, work, error);
     }
     if (status == MILD_OK) {
         status = plates_check(options, work, error);

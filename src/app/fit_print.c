@@ -7,6 +7,7 @@
 #include "app/fit_work.h"
 #include "app/report.h"
 #include "base/text.h"
+#include "identify/fit_drag.h"
 
 /* ---- the table ---- */
 
@@ -139,6 +140,16 @@ static void rates_print(const FitWork *work, unsigned untold) {
     printf("%s", rate ? "\n" : "");
 }
 
+/* Bool: the parameter is in one of the states. */
+static int is_untold(const FitResult *result, const char *name, unsigned states) {
+    int found = 0;
+    for (int i = 0; i < result->parameters; i++) {
+        const FitValue *value = &result->parameter[i];
+        found |= strcmp(value->name, name) == 0 && (states >> value->state & 1);
+    }
+    return found;
+}
+
 /* What the data do not tell, and the remedy. */
 static void untold_print(const FitWork *work, FitKind kind) {
     const unsigned untold = bit(FIT_LIMIT) | bit(FIT_OPEN) | bit(FIT_TIED) | bit(FIT_NO_EFFECT);
@@ -146,10 +157,13 @@ static void untold_print(const FitWork *work, FitKind kind) {
     if (kind == FIT_UNLOAD || !names_print(result, untold, 0, "not determined by these data: ")) {
         return;
     }
-    printf("; hold what you know (--hold NAME=VALUE)%s%s\n",
+    printf("; hold what you know (--hold NAME=VALUE)%s%s%s\n",
            work->from || !has_presets(model_of(work)) ? ""
                                                       : ", or what is missing (--hold-from PRESET)",
-           kind == FIT_SHEAR ? "; records at several pressures tell cohesion and mu apart" : "");
+           kind == FIT_SHEAR ? "; records at several pressures tell cohesion and mu apart" : "",
+           kind == FIT_DRAG && is_untold(result, "regain_length", untold)
+               ? "; a plate that sinks as it slides tells regain_length"
+               : "");
 }
 
 /* "55", or "44, 77" of several plates. */
@@ -202,6 +216,12 @@ void fit_print(const FitWork *work) {
         if (work->set[k].done) {
             untold_print(work, (FitKind)k);
         }
+    }
+    const FitSet *slides = &work->set[FIT_DRAG];
+    if (slides->count && !slides->done) {
+        printf("left out: %d rows of slip; %s\n", slides->count,
+               fit_drag_told(model_of(work)) ? "all that they tell is held"
+                                             : "slip costs no support under this model");
     }
     if (work->set[FIT_PRESS].done) {
         rates_print(work, bit(FIT_LIMIT) | bit(FIT_OPEN) | bit(FIT_TIED) | bit(FIT_NO_EFFECT));
