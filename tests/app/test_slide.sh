@@ -63,6 +63,12 @@ ground slick.ini mu=0.3 grip=0.3
 near "mu, where it bounds friction" "$(number slick.json mu value)" 0.3 0.5
 near "slip_length there" "$(number slick.json slip_length value)" 0.0025 0.1
 
+# Coulomb's friction alone: mu is told
+ground coulomb.ini grip=0
+"$mild" press --ground ./coulomb.ini --plate 0.1,0.1 --depth 0.015 --drag 0.03 --csv coulomb.csv >/dev/null
+"$mild" fit disc.csv square.csv coulomb.csv --model mild_merged "${plates[@]}" --hold $known,grip=0 --json coulomb.json >/dev/null
+near "mu without grip" "$(number coulomb.json mu value)" 0.5 0.5
+
 # mild too, and the other way along
 "$mild" press --ground sand_loose --ground.slip_length=0.004 --ground.grip=0.2 --ground.recovery=0 --plate 0.2,0.1 --depth 0.02 --drag 0.02 \
     --csv mild.csv >/dev/null
