@@ -241,7 +241,7 @@ static nb::dict run(const nb::sequence &soles, nb::handle rows, const std::strin
         filled = material_of(fill, "fill");
     }
     const FitDef def = def_of(soles, model, held, fill.is_none() ? nullptr : &filled,
-                             nb::len(drags) > 0 ? &drag : nullptr);
+                              nb::len(drags) > 0 ? &drag : nullptr);
     const std::vector<FitPoint> points = points_of(rows);
     FitResult result = {};
     MildError error = {};

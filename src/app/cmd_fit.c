@@ -77,7 +77,8 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
             "which k_c of bekker needs (--plate once for each file). The way up from the greatest "
             "depth tells recovery. Where the plate then slides, slip_m and force_x_n (x_m and "
             "force_x_n of mild press --drag) tell slip_length, grip and mu of mild and mild_merged, "
-            "and where it sinks under its load meanwhile, regain_length. A file with the columns slip_m, shear_pa and pressure_pa, or of "
+            "and where it sinks under its load meanwhile, regain_length. A file with the columns "
+            "slip_m, shear_pa and pressure_pa, or of "
             "a ring angle_rad, torque_nm and force_n (--ring), tells cohesion, mu and shear_length "
             "of bekker. --soil writes what was found as a ground (docs/soil.md). Of a walk's log "
             "(mild drive --log, mild play "
@@ -94,8 +95,8 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
             "  mild fit slow.csv --plate 0.2,0.1 --model bekker --json out.json\n"
             "  mild fit p5.csv p10.csv ring.csv --model bekker --plate 0.05 --plate 0.1 \\\n"
             "      --ring 0.2,0.12 --hold-from dry_sand --soil mars.ini\n"
-            "  mild fit d.csv square.csv drag.csv --model mild_merged --plate 0.12 --plate 0.1,0.1 \\\n"
-            "      --plate 0.1,0.1 --hold alpha=0.3,phi=0.59,rho=2500\n"
+            "  mild fit disc.csv square.csv drag.csv --model mild_merged --plate 0.12 \\\n"
+            "      --plate 0.1,0.1 --plate 0.1,0.1 --hold alpha=0.3,phi=0.59,rho=2500\n"
             "  mild fit walk.csv\n",
         .positional_max = CLI_LIST_MAX,
         .picture = "figure",
@@ -480,8 +481,8 @@ static int slides_prepare(FitWork *work) {
         for (end = first + 1; end < set->count && fit_drag_is_next(&set->points[end]); end++) {
             continue;
         }
-        kept += fit_drag_rows(&set->def.plate[slide->plate], &known, slide, end - first,
-                              rows + kept);
+        kept +=
+            fit_drag_rows(&set->def.plate[slide->plate], &known, slide, end - first, rows + kept);
     }
     free(set->points);
     set->points = rows;

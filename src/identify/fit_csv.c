@@ -26,11 +26,10 @@ typedef enum {
 } CsvColumn;
 
 static const char *const column_names[CSV_COLUMNS] = {
-    "depth_m", "force_n",  "time_s",      "speed_m_s", "area_m2",
-    "slip_m",  "shear_pa", "pressure_pa", "angle_rad", "torque_nm",
-    "x_m",     "force_x_n"};
+    "depth_m",  "force_n",     "time_s",    "speed_m_s", "area_m2", "slip_m",
+    "shear_pa", "pressure_pa", "angle_rad", "torque_nm", "x_m",     "force_x_n"};
 /* Largest size of a number in each column; beyond it the unit is probably wrong. */
-static const double column_limits[CSV_COLUMNS] = {2,   1e7, 1e9, 100, 10, 2,
+static const double column_limits[CSV_COLUMNS] = {2,   1e7, 1e9, 100, 10,  2,
                                                   1e7, 1e8, 100, 1e5, 1e3, 1e7};
 static const char *const column_units[CSV_COLUMNS] = {"metres, positive down",
                                                       "newtons",

@@ -9,8 +9,8 @@
 #define BUILT 0.005
 #define HEAPED 0.012
 
-#define LEAST 0.01   /* [-] of the largest force: a row counts as if it were that at least */
-#define STRIDE 2e-4  /* [m] slip in a step of the path */
+#define LEAST 0.01  /* [-] of the largest force: a row counts as if it were that at least */
+#define STRIDE 2e-4 /* [m] slip in a step of the path */
 #define STRIDES_MAX 100
 
 int fit_drag_told(MildModel model) {

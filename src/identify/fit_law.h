@@ -13,7 +13,8 @@
  * Under the pressure p the ground of bekker resists a slip j by the shear stress
  *     s(j) = (cohesion + p mu) (1 - exp(-j/shear_length))
  * and a ring that turns by an angle by the mean of s over it, weighted by the radius, which is its
- * torque over that of a stress of 1. A plate that slides where slip costs support: fit_drag.h. Pure functions: thread safe. */
+ * torque over that of a stress of 1. A plate that slides where slip costs support: fit_drag.h. Pure
+ * functions: thread safe. */
 #ifndef LAB_FIT_LAW_H
 #define LAB_FIT_LAW_H
 

@@ -4,6 +4,7 @@ test_judge.py SOURCE MILD"""
 import csv
 import importlib.util
 import json
+import math
 import pathlib
 import re
 import subprocess
@@ -15,6 +16,7 @@ import numpy as np
 SOURCE, MILD = pathlib.Path(sys.argv[1]), sys.argv[2]
 sys.path.insert(0, str(SOURCE / "scripts"))
 import judge as judge_module  # noqa: E402
+import judge_anchors  # noqa: E402
 import mild  # noqa: E402
 from judge_cases import Case, Sole, measures  # noqa: E402
 from judge_entries import GroundEntry  # noqa: E402
@@ -116,6 +118,20 @@ def the_truth_is_found_and_others_are_not(folder):
     assert "figures.html" in run.stdout and (folder / "out" / "figures.html").stat().st_size > 10000
 
 
+def real_numbers():
+    """Poppy seeds by hand; and resistive force theory (ecc_quasi), whose own table is of all their media, is near them."""
+    up, along = judge_anchors.poppy_stress("loose", math.radians(30), math.pi / 2)
+    assert abs(up - (0.134 + 0.5 * 0.120)) < 1e-12 and abs(along - math.sqrt(0.75) * 0.051) < 1e-12
+    assert [round(judge_anchors.poppy_stress(packing, 0, math.pi / 2)[0], 3) for packing in ("loose", "close")] == [0.254, 0.464]
+    entries = [GroundEntry(name) for name in ("ecc_quasi", "mild", "mild_merged")]
+    for degrees in (15, 30):
+        force, _ = judge_anchors.tilted(entries, degrees)
+        print(f"tilted by {degrees} degrees:", {name: round(value, 3) for name, value in force.items()})
+        level, tilted = (judge_anchors.poppy_stress("loose", math.radians(angle), math.pi / 2)[0] for angle in (0, degrees))
+        assert abs(force["ecc_quasi"] / (tilted / level) - 1) < 0.03
+        assert abs(force["mild"] - 1) < 1e-3 and abs(force["mild_merged"] - math.cos(math.radians(degrees))) < 1e-3
+
+
 def mild_fit_says_the_same(folder):
     """The judge's numbers of sand, from the mean of eight beds and elements of 10 mm, are within the intervals that `mild fit` gives
     five beds of the same records and the paper's elements."""
@@ -154,6 +170,7 @@ def mistakes_are_one_line(folder):
 if __name__ == "__main__":
     a_sole_has_its_area()
     measures_by_hand()
+    real_numbers()
     with tempfile.TemporaryDirectory() as name:
         make(pathlib.Path(name))
         the_truth_is_found_and_others_are_not(pathlib.Path(name))
