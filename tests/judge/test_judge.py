@@ -118,6 +118,19 @@ def the_truth_is_found_and_others_are_not(folder):
     assert "figures.html" in run.stdout and (folder / "out" / "figures.html").stat().st_size > 10000
 
 
+def a_command(folder):
+    """`python -m mild judge` from anywhere; where no repository is, one line."""
+    run = subprocess.run([sys.executable, "-m", "mild", "judge", "--records", folder / "none"], capture_output=True, text=True, cwd=folder)
+    assert run.returncode == 2 and run.stderr.startswith("judge.py: ") and "manifest.json" in run.stderr, run.stderr
+    package = folder / "alone"  # as installed: nothing of the repository above it
+    package.mkdir()
+    (package / "judge.py").write_text((SOURCE / "python" / "mild" / "judge.py").read_text())
+    run = subprocess.run([sys.executable, package / "judge.py"], capture_output=True, text=True, cwd=folder)
+    assert run.returncode == 2 and run.stderr.startswith("mild judge: ") and run.stderr.count("\n") == 1, run.stderr
+    run = subprocess.run([MILD, "judge"], capture_output=True, text=True)
+    assert run.returncode == 2 and run.stderr.count("\n") == 1 and "python -m mild judge" in run.stderr, run.stderr
+
+
 def real_numbers():
     """Poppy seeds by hand; and resistive force theory (ecc_quasi), whose own table is of all their media, is near them."""
     up, along = judge_anchors.poppy_stress("loose", math.radians(30), math.pi / 2)
@@ -176,3 +189,4 @@ if __name__ == "__main__":
         the_truth_is_found_and_others_are_not(pathlib.Path(name))
         mistakes_are_one_line(pathlib.Path(name))
         mild_fit_says_the_same(pathlib.Path(name))
+        a_command(pathlib.Path(name))
