@@ -6,6 +6,7 @@
 extern "C" {
 #include "identify/fit.h"
 #include "identify/fit_drag.h"
+#include "identify/fit_slide.h"
 }
 
 static FitPlate plate_of(const Sole &sole) {
@@ -184,7 +185,7 @@ static std::vector<FitPoint> slide_of(const FitPlate &plate, int number, const M
         raise(PyExc_ValueError, "drags: fewer than " + std::to_string((int)FIT_POINTS_MIN) +
                                     " rows slide, or none by 1 mm");
     }
-    rows.resize((size_t)fit_drag_rows(&plate, &curve, slide.data(), copied, rows.data()));
+    rows.resize((size_t)fit_slide_rows(&plate, &curve, slide.data(), copied, rows.data()));
     return rows;
 }
 
@@ -199,7 +200,7 @@ static void run_drags(FitDef &drag, const FitDef &press, const nb::sequence &dra
                                           mild_model_names[press.material.model] +
                                           "; model must be mild or mild_merged");
     }
-    const MildMaterial known = fit_drag_base(&press.material, &pressed.curve);
+    const MildMaterial known = fit_slide_base(&press.material, &pressed.curve);
     std::vector<FitPoint> rows;
     for (size_t i = 0; i < count; i++) {
         const nb::sequence pair = nb::cast<nb::sequence>(drags[i]);

@@ -18,6 +18,7 @@
 #include "ground/soil/soil.h"
 #include "identify/belief/log.h"
 #include "identify/fit_drag.h"
+#include "identify/fit_slide.h"
 #include "identify/press.h"
 
 typedef struct {
@@ -76,12 +77,11 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
             "needs a record that brakes, such as a drop. They may differ in their plate, "
             "which k_c of bekker needs (--plate once for each file). The way up from the greatest "
             "depth tells recovery. Where the plate then slides, slip_m and force_x_n (x_m and "
-            "force_x_n of mild press --drag) tell slip_length, grip and mu of mild and mild_merged, "
-            "and where it sinks under its load meanwhile, regain_length. A file with the columns "
-            "slip_m, shear_pa and pressure_pa, or of "
-            "a ring angle_rad, torque_nm and force_n (--ring), tells cohesion, mu and shear_length "
-            "of bekker. --soil writes what was found as a ground (docs/soil.md). Of a walk's log "
-            "(mild drive --log, mild play "
+            "force_x_n of mild press --drag) tell slip_length, grip and mu of mild and "
+            "mild_merged, and where it sinks under its load meanwhile, regain_length. A file with "
+            "the columns slip_m, shear_pa and pressure_pa, or of a ring angle_rad, torque_nm and "
+            "force_n (--ring), tells cohesion, mu and shear_length of bekker. --soil writes what "
+            "was found as a ground (docs/soil.md). Of a walk's log (mild drive --log, mild play "
             "--log) it says what the robot's own sensors tell of the ground, each parameter with "
             "its 90 % interval (docs/identify.md).",
         .options = table,
@@ -470,7 +470,7 @@ static int slides_prepare(FitWork *work) {
     FitSet *set = &work->set[FIT_DRAG];
     MildMaterial known = work->material;
     known.recovery = back->done ? back->result.curve.recovery : known.recovery;
-    known = fit_drag_base(&known, press->done ? &press->result.curve : NULL);
+    known = fit_slide_base(&known, press->done ? &press->result.curve : NULL);
     FitPoint *rows = malloc(sizeof *rows * (size_t)(2 * set->count + 1));
     if (!rows) {
         return 0;
@@ -482,7 +482,7 @@ static int slides_prepare(FitWork *work) {
             continue;
         }
         kept +=
-            fit_drag_rows(&set->def.plate[slide->plate], &known, slide, end - first, rows + kept);
+            fit_slide_rows(&set->def.plate[slide->plate], &known, slide, end - first, rows + kept);
     }
     free(set->points);
     set->points = rows;

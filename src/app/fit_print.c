@@ -259,7 +259,7 @@ static int json_value(cJSON *root, const char *list, const FitValue *value) {
 
 /* Residual and independent rows: of presses at the root, of others in an object. */
 static int json_residual(cJSON *root, const FitSet *set, FitKind kind) {
-    static const char *const names[FIT_KINDS] = {NULL, "unloading", "shear"};
+    static const char *const names[FIT_KINDS] = {NULL, "unloading", "shear", "slides"};
     cJSON *object = names[kind] ? cJSON_AddObjectToObject(root, names[kind]) : root;
     return cJSON_AddNumberToObject(object, "residual", set->result.residual) &&
            cJSON_AddNumberToObject(object, "independent_rows", set->result.rows);

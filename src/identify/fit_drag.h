@@ -11,24 +11,15 @@
 #ifndef LAB_FIT_DRAG_H
 #define LAB_FIT_DRAG_H
 
-#include "identify/fit_law.h"
+#include "identify/fit_record.h"
 
 /* Bool: slip costs support under the model. */
 int fit_drag_told(MildModel model);
-
-/* The rows of a fit, rows[2 * count], from those that fit_sliding found on a plate. curve: what a
- * press of the ground meets. Returns their number. */
-int fit_drag_rows(const FitPlate *plate, const MildMaterial *curve, const FitPoint *slide,
-                  int count, FitPoint *rows);
 
 /* Bool: a row is of the same record as the one before it. */
 int fit_drag_is_next(const FitPoint *row);
 /* What the rows of one record should have. */
 void fit_drag_forces(const FitPlate *plate, const MildMaterial *material, const FitPoint *points,
                      int count, double *force);
-
-/* The ground that a fit of FIT_DRAG starts from: the press's numbers where the press tells them,
- * else `known`'s. press: NULL: none was fitted. */
-MildMaterial fit_drag_base(const MildMaterial *known, const MildMaterial *press);
 
 #endif

@@ -23,17 +23,6 @@
 
 enum { FIT_PARAMETERS_MAX = MILD_MODEL_FIELDS };
 
-/* A plate, in the elements of its model, or a ring. bekker asks for a pressure on an area, which
- * the elements of a raster have only about; the other models for the force of each element. */
-typedef struct {
-    int elements;
-    double pitch;         /* [m] */
-    double width;         /* [m] its shorter side, of a disc the radius: plate_width of bekker */
-    const MildSole *sole; /* borrowed, for mild_merged; NULL: every element is a disc by itself */
-    double area;          /* [m^2] 0: that of the elements */
-    double outer, inner;  /* [m] radii of a ring that turns; 0: what slides does not turn */
-} FitPlate;
-
 /* What the data tell where they do not tell a parameter by itself. */
 typedef struct {
     const char *name;

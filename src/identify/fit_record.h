@@ -2,7 +2,20 @@
 #ifndef LAB_FIT_RECORD_H
 #define LAB_FIT_RECORD_H
 
+#include "mild/ground.h"
+
 enum { FIT_POINTS_MIN = 8 };
+
+/* A plate, in the elements of its model, or a ring. bekker asks for a pressure on an area, which
+ * the elements of a raster have only about; the other models for the force of each element. */
+typedef struct {
+    int elements;
+    double pitch;         /* [m] */
+    double width;         /* [m] its shorter side, of a disc the radius: plate_width of bekker */
+    const MildSole *sole; /* borrowed, for mild_merged; NULL: every element is a disc by itself */
+    double area;          /* [m^2] 0: that of the elements */
+    double outer, inner;  /* [m] radii of a ring that turns; 0: what slides does not turn */
+} FitPlate;
 
 /* What the rows of a fit are. */
 typedef enum {

@@ -54,6 +54,7 @@ near grip "$(number fit.json grip value)" 0.14 0.5
 awk -v v="$(number fit.json mu low)" 'BEGIN { exit !(v > 0.3 && v < 0.5) }' || fail "mu is not bounded from below"
 grep -q '^not determined by these data: mu, regain_length; .*a plate that sinks as it slides tells regain_length' table.txt ||
     fail "what a level drag does not tell"
+[ "$(grep -c '"residual"' fit.json)" = 3 ] || fail "the JSON has not one residual for each kind"
 grep -q 'rows that slide of 1 file' table.txt || fail "the slide's residual"
 
 # friction that mu bounds: mu is told, and grip from below
