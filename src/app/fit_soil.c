@@ -60,7 +60,7 @@ static int is_contradicted(const FitWork *work, const MildField *field) {
     FitKind kind;
     const FitValue *value = value_find(work, field, &kind);
     MildMaterial preset = work->preset;
-    const double number = *fit_number(&preset, field);
+    const double number = fit_counted(field, *fit_number(&preset, field));
     return value && value->state == FIT_LIMIT && (number < value->low || number > value->high);
 }
 

@@ -200,7 +200,7 @@ static void values_find(Run *run) {
 static int is_fillable(const Run *run, int index) {
     const FitValue *value = &run->result->parameter[index];
     MildMaterial fill = *run->def->fill;
-    const double number = *fit_number(&fill, value->field);
+    const double number = fit_counted(value->field, *fit_number(&fill, value->field));
     const int untold = value->state == FIT_LIMIT || value->state == FIT_OPEN;
     return untold && !(number < value->low) && !(number > value->high);
 }

@@ -74,6 +74,10 @@ void fit_range(const MildField *field, double *low, double *high) {
     *high = field->max;
 }
 
+double fit_counted(const MildField *field, double number) {
+    return number == 0 && strcmp(field->name, "slip_length") == 0 ? field->max : number;
+}
+
 /* Bool: the model reads the field. */
 static int reads(MildModel model, const char *name) {
     const MildModelInfo *info = mild_model_info(model);

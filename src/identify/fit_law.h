@@ -53,6 +53,9 @@ int fit_is_geometry(MildModel model, const char *name);
 /* Range in which a parameter is fitted or held: the material's. Ground that creates no energy has
  * c_d >= 1/2 and c_g >= 0. */
 void fit_range(const MildField *field, double *low, double *high);
+/* A number of the field as a fit counts it: 0 of slip_length, by which slip costs nothing, is its
+ * longest. */
+double fit_counted(const MildField *field, double number);
 /* The number of a material. */
 double *fit_number(MildMaterial *material, const MildField *field);
 

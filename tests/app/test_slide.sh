@@ -80,6 +80,12 @@ awk -F, -v OFS=, 'NR > 1 { $9 = -$9; $11 = 0.4 - $11 } { print }' mild.csv >back
 "$mild" fit back.csv --plate 0.2,0.1 --hold-from sand_loose --json back.json >/dev/null
 near "slip to -x" "$(number back.json slip_length value)" "$(number mild.json slip_length value)" 1e-6
 
+# ground where slip costs nothing: slip_length 0 of the preset is not contradicted
+"$mild" press --ground sand_loose --plate 0.2,0.1 --depth 0.02 --drag 0.02 --csv none.csv >/dev/null
+"$mild" fit none.csv --plate 0.2,0.1 --hold-from sand_loose --soil none.ini >/dev/null || fail "no slip"
+grep -q '^slip_length = 0$' none.ini || fail "no slip: $(cat none.ini)"
+near "mu, of which 3 % is drift resistance" "$(sed -n 's/^mu = //p' none.ini)" 0.6 5
+
 # noise: several records, and intervals that hold the truth; of 24 one should not
 missed=0 draws=12
 short && draws=4
