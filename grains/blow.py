@@ -4,6 +4,7 @@
     grains/blow.py list                    the commands of the runs, minutes of a GPU each; any of them may be left out
     grains/blow.py table out/blow/*        a row for each folder: 5 kg on a square of 100 mm fall
     grains/blow.py sole out/blow/*         a sole that is led down fast, beyond the same led slowly
+    grains/blow.py law                     the same sole on mild_merged, fitted to the records of sand as the judge does
     grains/blow.py table                   of the records in grains/records/sand alone"""
 import argparse
 import pathlib
@@ -78,27 +79,55 @@ def table(folders):
         print(f"{folder.name:24}{len(falls):5}{force:11.0f}{1e3 * when:14.1f}{momentum:13.2f}{deepest[0]:12.1f}{deepest[1]:14.1f}")
 
 
-def soles(folders):
+def print_windows():
     print(f"{'force beyond a slow one [N], depth [mm]':40}" + "".join(f"{f'{low} to {high}':>10}" for low, high in WINDOWS))
+
+
+def print_row(name, pairs):
+    """Of slow and fast rows of each bed; a window without rows has no number."""
+    text = ""
+    for low, high in WINDOWS:
+        there = [beyond(slow, fast)[(1e3 * fast["depth_m"] >= low) & (1e3 * fast["depth_m"] < high)] for slow, fast in pairs]
+        text += f"{np.mean([part.mean() for part in there]):10.0f}" if all(len(part) for part in there) else f"{'-':>10}"
+    print(f"{name:40}{text}")
+
+
+def soles(folders):
+    print_windows()
     for folder in folders:
         for name in ("level", "tilted"):
             pairs = list(zip(records(folder, f"{name}-slow"), records(folder, f"{name}-fast")))
-            row = [np.mean([beyond(slow, fast)[(1e3 * fast["depth_m"] >= low) & (1e3 * fast["depth_m"] < high)].mean() for slow, fast in pairs])
-                   for low, high in WINDOWS] if pairs else []
-            if row:
-                print(f"{folder.name + ' ' + name:40}" + "".join(f"{value:10.0f}" for value in row))
+            if pairs:
+                print_row(f"{folder.name} {name}", pairs)
+
+
+def law():
+    """The row of `sole` that mild_merged has."""
+    sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "grains")]
+    import judge
+    import walk
+    from judge_cases import Case
+    from judge_entries import GroundEntry
+    found, entry = judge.Records(ROOT / "grains" / "records"), GroundEntry("mild_merged")
+    names, (sole, _) = judge.FITS["sand"][0], walk.outline("sa01")
+    entry.fit({name: (found.cases[f"sand/{name}"][0], judge.mean_rows(found.cases[f"sand/{name}"][1])) for name in names}, found.ground("sand"))
+    print_windows()
+    for name, degrees in (("level", 0), ("tilted", 8)):
+        slow, fast = ({"depth_m": rows["depth"], "force_z_n": rows["fz"]} for rows in
+                      (entry.play(Case(f"{name} {sole} {degrees} press:0.05@{speed}")) for speed in (0.2, 0.8)))
+        print_row(f"mild_merged {name}", [(slow, fast)])
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("list", "table", "sole"))
+    parser.add_argument("what", choices=("list", "table", "sole", "law"))
     parser.add_argument("folders", nargs="*", type=pathlib.Path)
     args = parser.parse_args()
     missing = [folder for folder in args.folders if not folder.is_dir()]
     if missing:
         fail(f"{missing[0]} is no folder of records: grains/blow.py list")
-    if args.what == "list":
-        print_list()
+    if args.what in ("list", "law"):
+        {"list": print_list, "law": law}[args.what]()
     else:
         {"table": table, "sole": soles}[args.what](args.folders or [ROOT / "grains" / "records" / "sand"])
 

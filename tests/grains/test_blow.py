@@ -43,6 +43,8 @@ of_records = run("table")
 print(of_records.stdout)
 row = of_records.stdout.split("\n")[1].split()
 assert row[:2] == ["sand", "8"] and 220 < float(row[2]) < 245 and abs(float(row[4]) - 1.44) < 0.1 and abs(float(row[5]) - 54.1) < 1, row
+led = [line.split()[2:] for line in run("law").stdout.split("\n") if line.startswith("mild_merged")]
+assert len(led) == 2 and led[0][0] == "-" and float(led[0][1]) > float(led[1][1]) > 20, led  # a level sole is struck harder
 listed = run("list").stdout
 assert listed.count("build/grains/grains") == 7 and listed.count("--case 'tilted-") == 2
 wrong = run("table", "none")
