@@ -21,6 +21,8 @@ import subprocess
 import sys
 import time
 
+import walk_manifest
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 GROUNDS = ROOT / "grains" / "walk" / "grounds.json"
 # Beds under the robot by the family of records that the models are fitted to: deeper, because it sinks farther than plates.
@@ -102,6 +104,7 @@ def walk(args, folder, speed, ground, trials, robot, program=None):
     if program:
         words += ["--program", shlex.join(str(word) for word in program)]
     words += ["--json", folder / "eval.json"]
+    walk_manifest.write(folder, words, args, on_grains=program is not None)
     begin = time.time()
     done = subprocess.run([str(word) for word in words])
     if done.returncode:

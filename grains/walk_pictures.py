@@ -5,6 +5,8 @@ import subprocess
 
 import numpy as np
 
+import walk_manifest
+
 CONTACT, PAUSE, SHORTEST = 5.0, 0.03, 0.15  # [N] [s] [s] of a stance
 ENDS = 0.05  # [s] at which its pressure centre is told
 COLOURS = {"grains": "#222222", "mild": "#1f77b4", "mild_merged": "#d62728", "bekker": "#2ca02c", "ecc_quasi_3d": "#9467bd"}
@@ -109,7 +111,7 @@ def write_walks(out, families, speeds, file):
                     judged = json.loads((folder / "eval.json").read_text())["rows"][0]
                     row |= {key: judged[key] for key in ("trials", "success", "ends", "seconds", "velocity", "cot", "penetration", "torque_max")}
                 if len(row) > 3:
-                    walks.append(row)
+                    walks.append(row | walk_manifest.read(folder))
     file.write_text(json.dumps(walks, indent=1) + "\n")
 
 

@@ -23,6 +23,7 @@ import time
 import numpy as np
 
 import mild
+from judge_anchors import print_anchors
 from judge_cases import COLUMNS, MEASURES, Case, measures, scale
 from judge_entries import (PITCH, Archimedes, FunctionEntry, GroundEntry, TableEntry, c_function, chrono_scm, rft_stress,
                            wong_sand)
@@ -192,36 +193,6 @@ def judge_family(args, records, fitted, results):
         args.curves.setdefault(key, (beds, played))
 
 
-def strip_ratio(entry):
-    """Pressure under a strip 50 mm wide over that under one of 150 mm, 15 mm deep, both four times as long."""
-    force = []
-    for width in (0.05, 0.15):
-        rows = entry.play(Case(f"strip rect:{4 * width},{width} 0 press:0.015@0.05"))
-        if rows is None:
-            return np.nan
-        force.append(rows["fz"][-1] / (4 * width**2))
-    return force[0] / force[1]
-
-
-def anchors(args, results):
-    """Real numbers: what, number, source, what the grains have or None, {model: value}."""
-    def row(measure, case):
-        found = next((r for r in results if r[3] == measure and r[1] == case), None)
-        return (None, {}) if found is None else (f"{found[4]:.3f} +- {found[5]:.3f}", found[6])
-    yield ("largest H/V0 of a foundation dragged at constant depth", 0.123, "swipe tests of Gottardi, Govoni, Butterfield",
-           *row("grip", "sand/square100-drag15"))
-    yield ("largest M/(B V0) of one that is turned", 0.09, "the same", *row("swipe", "sand/square100-swipe15"))
-    yield ("pressure of a strip 50 mm wide over one of 150 mm, dry sand", (0.99 / 0.05 + 1528.43) / (0.99 / 0.15 + 1528.43),
-           "k_c, k_phi of Wong 2008, Theory of Ground Vehicles, table 2.3", None,
-           {entry.name: strip_ratio(entry) for entry in args.fitted.get("sand", []) if not isinstance(entry, TableEntry)})
-    for text, real, source in (
-            ("stress over depth in loose poppy seeds [MPa/m]", 0.254, "Li, Zhang, Goldman 2013, arXiv 1303.7065: another ground"),
-            ("the same in close ones [MPa/m]", 0.464, "the same"),
-            ("feet of four shapes on three quartz sands", None, "Han 2020, Energies 13:1867: curves, not in numbers here"),
-            ("error of jumps predicted with added mass [%]", 6, "Hubicki 2016: needs a robot")):
-        yield text, real, source, None, {}
-
-
 # ---- what is printed ----
 
 def text_of(value, noise, measure):
@@ -265,16 +236,6 @@ def print_score(results):
         parts = [f"{np.median(part):8.1f}{np.max(part):7.0f}" if part else f"{'-':>8}{'-':>7}" for part in (errors, lengths)]
         if within:
             print(f"  {name:14}{parts[0]}{parts[1]}   {np.mean(within):.2f} of {len(within)}")
-
-
-def print_anchors(args, results):
-    print("\nreal numbers")
-    for text, real, source, grains, values in anchors(args, results):
-        print(f"  {text}: {'-' if real is None else format(real, '.4g')} ({source})")
-        here = [f"grains {grains}"] if grains else []
-        here += [f"{name} {value:.3f}" for name, value in values.items() if np.isfinite(value)]
-        if here:
-            print("    " + ", ".join(here))
 
 
 def write_csv(results, file):
@@ -350,7 +311,7 @@ def main():
         fail("nothing to judge")
     print_results(results)
     print_score(results)
-    print_anchors(args, results)
+    print_anchors(args.fitted.get("sand", []), records, results)
     if args.out:
         args.out.mkdir(parents=True, exist_ok=True)
         write_csv(results, args.out / "judge.csv")

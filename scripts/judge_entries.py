@@ -25,7 +25,6 @@ PITCH = 0.01  # [m] of their soles' elements: at 19.5 mm a plate's raster is up 
 REGAIN = 0.136  # [grains] regain_length of mild_merged, from loads that slide on grains of 5 mm
 REFILL = 0.22  # [-] from an imprint pressed again, sand/square100-again
 HEAPS = 9  # [-] by the heap of a sole, the mass that moves with it: momentum of sand/square100-drop10 beyond that of a slow press
-YIELD = 3 + math.sqrt(8)  # of the friction of a sole that slides: share.h
 
 
 def row_times(case, rows=150):
@@ -79,7 +78,7 @@ class GroundEntry:
             self.material = mild.GroundFit(soles, self.model, hold={"alpha": 0.3}).fit(*data).material_
         if self.slips:
             self.weigh(ground)
-            self.fit_slip(drags)
+            self.fit_slip(soles, data, drags)
         elif self.model.startswith("ecc_quasi"):  # whose coefficients contain friction
             self.material = mild.Material(self.material, mu=0, k_drift=0, b_drift=0)
         else:
@@ -95,20 +94,15 @@ class GroundEntry:
             moves = {"c_d": 1, "c_g": HEAPS / math.tan(m.alpha)}
         self.material = mild.Material(m, phi=solid, rho=ground["density"], mu=ground["friction"], **moves)
 
-    def fit_slip(self, drags):
-        """slip_length of F/F0 = 1/(1 + s/j0), and grip of the friction H/F after 5 to 12 mm, where it has built up: slip-sinkage at
-        constant depth. A level drag does not tell regain_length, and nothing fitted tells refill."""
-        lengths, grips = [], []
-        for _, rows in drags:
-            slides = (rows["stage"] == 1) & (rows["path"] > 1e-3)
-            before = rows["fz"][rows["stage"] == 0][-3:].mean()
-            lost = np.maximum(before / np.maximum(rows["fz"][slides], 1e-3) - 1, 1e-3)
-            lengths.append(np.median(rows["path"][slides] / lost))
-            slid = slides & (rows["path"] > 5e-3) & (rows["path"] < 12e-3)
-            gone = 1 - rows["fz"][slid] / before
-            grips.append(np.median(np.abs(rows["fx"][slid]) / rows["fz"][slid] * (1 + gone) / (YIELD * gone)))
-        self.material = mild.Material(self.material, slip_length=float(np.clip(np.mean(lengths), 1e-4, 1.0)),
-                                      grip=float(np.clip(np.mean(grips), 0.0, 1.0)),
+    def fit_slip(self, soles, data, drags):
+        """slip_length and grip as `mild fit` finds them (src/identify/fit_drag.h). A level drag does not tell regain_length, and
+        nothing fitted tells refill."""
+        hold = {name: getattr(self.material, name) for name in ("alpha", "phi", "rho", "mu")}
+        hold["regain_length"] = REGAIN * self.grain
+        slides = [(mild.Sole(case.sole.outline, self.pitch), np.column_stack([rows[name] for name in ("path", "depth", "fz", "fx")]))
+                  for case, rows in drags]
+        found = mild.GroundFit(soles, self.model, hold=hold).fit(*data, drags=slides).material_
+        self.material = mild.Material(self.material, slip_length=found.slip_length, grip=found.grip,
                                       regain_length=REGAIN * self.grain, refill=REFILL)
 
     def fit_friction(self, case, rows):

@@ -1,4 +1,5 @@
-"""The command `mild`, and `python -m mild`: the program of this package. `mild trial` is the package's own (mild.trials)."""
+"""The command `mild`, and `python -m mild`: the program of this package. `mild trial` and
+`mild judge` are the package's own (mild.trials, mild.judge)."""
 import importlib
 import importlib.util
 import os
@@ -24,6 +25,8 @@ def main(arguments=None):
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     if arguments[:1] == ["trial"]:
         return importlib.import_module("mild.trials").main(arguments[1:])
+    if arguments[:1] == ["judge"]:
+        return importlib.import_module("mild.judge").main(arguments[1:])
     program = _processor.program()
     if program is None:
         print("mild: this installation has no program, because libraries of it were missing where it was built; a wheel has it "

@@ -32,7 +32,8 @@ class GroundFit:
 
     After fit(X, y): parameters_ {name: number, NaN where the data do not tell it}, intervals_ {name: (low, high)} of 95 %,
     states_ {name: held, filled, fitted, limit, open, tied or no_effect}, combinations_ {name: (number, low, high)} of tied
-    parameters, material_ the Material whose curve was fitted, residual_ [N] root mean square, n_features_in_."""
+    parameters, material_ the Material whose curve was fitted, residual_ [N] root mean square, drag_residual_ [N] of
+    drags, n_features_in_."""
 
     _estimator_type = "regressor"
 
@@ -54,9 +55,14 @@ class GroundFit:
             setattr(self, name, value)
         return self
 
-    def fit(self, X, y):
+    def fit(self, X, y, drags=()):
         """X: (n, 1 .. 3) depth [m], speed [m/s] down, acceleration [m/s^2] of loading rows, see `loading`; what is left
-        out is 0. y: (n,) force [N] up on the plate. Raises ValueError when they are not finite, too few, or do not match."""
+        out is 0. y: (n,) force [N] up on the plate. Raises ValueError when they are not finite, too few, or do not match.
+
+        drags: plates that slide, of mild and mild_merged, which tell slip_length, grip and mu, and one that sinks as it slides
+        regain_length: a list of (plate, table), table (n, 4) of slip [m], depth [m], force up [N] and force along on the plate [N]
+        (against the slip; NaN where it was not measured). Rows before the slip, with the slip of the first, tell what the plate
+        carried."""
         soles = self._soles()
         tables = self._records("X", X)
         columns = [_column("y", part) for part in (y if self._several() else [y])]
@@ -65,7 +71,7 @@ class GroundFit:
             raise ValueError(f"y: {lengths} numbers for {', '.join(str(len(table)) for table in tables)} rows of X")
         if not isinstance(self.hold, (collections.abc.Mapping, type(None))):
             raise TypeError(f"hold: a {type(self.hold).__name__}, but it must be a dict of numbers")
-        found = _ground._fit(soles, _rows(tables, columns), self.model, dict(self.hold or {}), self.fill)
+        found = _ground._fit(soles, _rows(tables, columns), self.model, dict(self.hold or {}), self.fill, self._drags(drags))
         values = found["parameters"]
         self.parameters_ = {name: value["value"] for name, value in values.items()}
         self.intervals_ = {name: (value["low"], value["high"]) for name, value in values.items()}
@@ -74,6 +80,7 @@ class GroundFit:
         self.combinations_ = {name: (value["value"], value["low"], value["high"])
                               for name, value in found["combinations"].items()}
         self.material_, self.residual_ = found["curve"], found["residual"]
+        self.drag_residual_ = found["drag_residual"]
         self.n_features_in_ = tables[0].shape[1]
         return self
 
@@ -125,6 +132,12 @@ class GroundFit:
     def _soles(self):
         """The plates in the elements of the model."""
         return [_sole(plate, self.model) for plate in (self.plate if self._several() else [self.plate])]
+
+    def _drags(self, drags):
+        """Soles and tables."""
+        if not all(isinstance(drag, (list, tuple)) and len(drag) == 2 for drag in drags):
+            raise TypeError("drags: it must be a list of (plate, table)")
+        return [(_sole(plate, self.model), np.ascontiguousarray(_numbers("drags", table))) for plate, table in drags]
 
     def _records(self, name, X):
         """A table for each plate."""

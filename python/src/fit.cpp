@@ -5,6 +5,8 @@
 
 extern "C" {
 #include "identify/fit.h"
+#include "identify/fit_drag.h"
+#include "identify/fit_slide.h"
 }
 
 static FitPlate plate_of(const Sole &sole) {
@@ -81,19 +83,28 @@ static nb::dict value_of(const FitValue &value) {
     return all;
 }
 
-static void hold(FitDef &def, const std::string &name, double value) {
+/* Marks the parameter among those that rows of the kind tell; returns whether it is one. */
+static bool mark(FitDef &def, FitKind kind, const std::string &name) {
     const MildField *fields[FIT_PARAMETERS_MAX];
-    const int count = fit_parameters((MildModel)def.material.model, FIT_PRESS, fields);
-    const MildField *field =
-        mild_field_find(mild_material_fields, mild_material_field_count, name.c_str(), nullptr);
-    bool known = field && name != "plate_width" &&
-                 fit_is_geometry((MildModel)def.material.model, name.c_str());
+    const int count = fit_parameters((MildModel)def.material.model, kind, fields);
+    bool known = false;
     for (int i = 0; i < count; i++) {
         if (name == fields[i]->name) {
             def.held[i] = 1;
             known = true;
         }
     }
+    return known;
+}
+
+/* Holds a parameter of presses in `def`, one of slides in `drag`; NULL: nothing slides. */
+static void hold(FitDef &def, FitDef *drag, const std::string &name, double value) {
+    const MildField *field =
+        mild_field_find(mild_material_fields, mild_material_field_count, name.c_str(), nullptr);
+    bool known = field && name != "plate_width" &&
+                 fit_is_geometry((MildModel)def.material.model, name.c_str());
+    known |= mark(def, FIT_PRESS, name);
+    known |= drag && mark(*drag, FIT_DRAG, name);
     if (!known) {
         raise(PyExc_ValueError, "hold: '" + name + "' is no parameter of " +
                                     mild_model_names[def.material.model] +
@@ -109,7 +120,7 @@ static void hold(FitDef &def, const std::string &name, double value) {
 }
 
 static FitDef def_of(const nb::sequence &soles, const std::string &model, const nb::dict &held,
-                     const MildMaterial *fill) {
+                     const MildMaterial *fill, FitDef *drag) {
     FitDef def = {};
     MildModel number;
     if (!mild_model_find(model.c_str(), &number) || number == MILD_MODEL_RIGID) {
@@ -117,6 +128,9 @@ static FitDef def_of(const nb::sequence &soles, const std::string &model, const 
     }
     if (fill && fill->model != (int)number) {
         raise(PyExc_ValueError, "fill: it is a material of another model");
+    }
+    if (drag) {
+        drag->material.model = (int)number;
     }
     def.plates = plates_of(soles, def.plate);
     def.material = fill ? *fill : mild_material_default();
@@ -131,19 +145,104 @@ static FitDef def_of(const nb::sequence &soles, const std::string &model, const 
         if (!nb::try_cast(value, wanted)) {
             raise(PyExc_TypeError, "hold: every value must be a number");
         }
-        hold(def, utf8(key, "hold"), wanted);
+        hold(def, drag, utf8(key, "hold"), wanted);
     }
     def.fill = fill;
     return def;
 }
 
+static void add_values(nb::dict all, const FitResult &result) {
+    nb::dict parameters = nb::cast<nb::dict>(all["parameters"]);
+    nb::dict combinations = nb::cast<nb::dict>(all["combinations"]);
+    for (int i = 0; i < result.parameters; i++) {
+        parameters[result.parameter[i].name] = value_of(result.parameter[i]);
+    }
+    for (int i = 0; i < result.combinations; i++) {
+        combinations[result.combination[i].name] = value_of(result.combination[i]);
+    }
+}
+
+/* table: (n, 4) slip, depth, force up, force along on the plate; NaN where unknown. */
+static std::vector<FitPoint> slide_of(const FitPlate &plate, int number, const MildMaterial &curve,
+                                      nb::handle table) {
+    const auto numbers = numbers_of(table, "drags", 2);
+    const size_t count = numbers.shape(0);
+    if (numbers.shape(1) != 4 || count < 1 || count > 1000000) {
+        raise(PyExc_ValueError, "drags: a table must have the shape (1 .. 1000000, 4)");
+    }
+    std::vector<FitPoint> points(count), slide(count), rows(2 * count);
+    for (size_t i = 0; i < count; i++) {
+        const double *row = numbers.data() + 4 * i;
+        points[i].slip = row[0];
+        points[i].depth = row[1];
+        points[i].force = row[2];
+        points[i].along = row[3];
+        points[i].plate = number;
+    }
+    int before = (int)count;
+    int copied = 0;
+    if (fit_sliding(points.data(), &before, slide.data(), &copied) < FIT_POINTS_MIN) {
+        raise(PyExc_ValueError, "drags: fewer than " + std::to_string((int)FIT_POINTS_MIN) +
+                                    " rows slide, or none by 1 mm");
+    }
+    rows.resize((size_t)fit_slide_rows(&plate, &curve, slide.data(), copied, rows.data()));
+    return rows;
+}
+
+/* Fits what slides, after the presses: a list of (Sole, table). Its numbers join the others'. */
+static void run_drags(FitDef &drag, const FitDef &press, const nb::sequence &drags,
+                      FitResult &pressed, nb::dict all) {
+    const size_t count = nb::len(drags);
+    if (count > FIT_PLATES_MAX || !fit_drag_told((MildModel)press.material.model)) {
+        raise(PyExc_ValueError, count > FIT_PLATES_MAX
+                                    ? "drags: more than " + std::to_string((int)FIT_PLATES_MAX)
+                                    : std::string("drags: slip costs no support under ") +
+                                          mild_model_names[press.material.model] +
+                                          "; model must be mild or mild_merged");
+    }
+    const MildMaterial known = fit_slide_base(&press.material, &pressed.curve);
+    std::vector<FitPoint> rows;
+    for (size_t i = 0; i < count; i++) {
+        const nb::sequence pair = nb::cast<nb::sequence>(drags[i]);
+        drag.plate[i] = plate_of(nb::cast<const Sole &>(pair[0]));
+        const std::vector<FitPoint> part = slide_of(drag.plate[i], (int)i, known, pair[1]);
+        rows.insert(rows.end(), part.begin(), part.end());
+    }
+    drag.kind = FIT_DRAG;
+    drag.plates = (int)count;
+    drag.material = known;
+    drag.fill = press.fill;
+    FitResult result = {};
+    MildError error = {};
+    MildStatus status;
+    {
+        nb::gil_scoped_release released;
+        status = fit_run(&drag, rows.data(), (int)rows.size(), &result, &error);
+    }
+    check(status, error);
+    add_values(all, result);
+    all["drag_residual"] = result.residual;
+    MildMaterial curve = known;
+    for (int i = 0; i < result.parameters; i++) {
+        const FitState state = result.parameter[i].state;
+        if (state != FIT_NO_EFFECT && state != FIT_TIED) {
+            *fit_number(&curve, result.parameter[i].field) =
+                *fit_number(&result.curve, result.parameter[i].field);
+        }
+    }
+    curve.plate_width = pressed.curve.plate_width;
+    pressed.curve = curve;
+}
+
 static nb::dict run(const nb::sequence &soles, nb::handle rows, const std::string &model,
-                    const nb::dict &held, nb::handle fill) {
+                    const nb::dict &held, nb::handle fill, const nb::sequence &drags) {
+    FitDef drag = {};
     MildMaterial filled;
     if (!fill.is_none()) {
         filled = material_of(fill, "fill");
     }
-    const FitDef def = def_of(soles, model, held, fill.is_none() ? nullptr : &filled);
+    const FitDef def = def_of(soles, model, held, fill.is_none() ? nullptr : &filled,
+                              nb::len(drags) > 0 ? &drag : nullptr);
     const std::vector<FitPoint> points = points_of(rows);
     FitResult result = {};
     MildError error = {};
@@ -153,15 +252,14 @@ static nb::dict run(const nb::sequence &soles, nb::handle rows, const std::strin
         status = fit_run(&def, points.data(), (int)points.size(), &result, &error);
     }
     check(status, error);
-    nb::dict all, parameters, combinations;
-    for (int i = 0; i < result.parameters; i++) {
-        parameters[result.parameter[i].name] = value_of(result.parameter[i]);
+    nb::dict all;
+    all["parameters"] = nb::dict();
+    all["combinations"] = nb::dict();
+    add_values(all, result);
+    all["drag_residual"] = std::nan("");
+    if (nb::len(drags) > 0) {
+        run_drags(drag, def, drags, result, all);
     }
-    for (int i = 0; i < result.combinations; i++) {
-        combinations[result.combination[i].name] = value_of(result.combination[i]);
-    }
-    all["parameters"] = parameters;
-    all["combinations"] = combinations;
     all["curve"] = Material{result.curve};
     all["residual"] = result.residual;
     all["residual_share"] = result.residual_share;
@@ -210,7 +308,7 @@ static nb::object loading(nb::handle rows) {
 
 void bind_fit(nb::module_ &module) {
     module.def("_fit", run, nb::arg("soles"), nb::arg("rows"), nb::arg("model"), nb::arg("hold"),
-               nb::arg("fill").none(), "See mild.GroundFit.");
+               nb::arg("fill").none(), nb::arg("drags"), "See mild.GroundFit.");
     module.def("_fit_forces", forces, nb::arg("soles"), nb::arg("material"), nb::arg("rows"),
                "Forces [N] in every row: (n,).");
     module.def("_loading", loading, nb::arg("rows"),

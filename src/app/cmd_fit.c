@@ -17,6 +17,8 @@
 #include "base/text.h"
 #include "ground/soil/soil.h"
 #include "identify/belief/log.h"
+#include "identify/fit_drag.h"
+#include "identify/fit_slide.h"
 #include "identify/press.h"
 
 typedef struct {
@@ -74,10 +76,12 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
             "Several files may differ in speed, which c_d and dissipation need; c_g also "
             "needs a record that brakes, such as a drop. They may differ in their plate, "
             "which k_c of bekker needs (--plate once for each file). The way up from the greatest "
-            "depth tells recovery. A file with the columns slip_m, shear_pa and pressure_pa, or of "
-            "a ring angle_rad, torque_nm and force_n (--ring), tells cohesion, mu and shear_length "
-            "of bekker. --soil writes what was found as a ground (docs/soil.md). Of a walk's log "
-            "(mild drive --log, mild play "
+            "depth tells recovery. Where the plate then slides, slip_m and force_x_n (x_m and "
+            "force_x_n of mild press --drag) tell slip_length, grip and mu of mild and "
+            "mild_merged, and where it sinks under its load meanwhile, regain_length. A file with "
+            "the columns slip_m, shear_pa and pressure_pa, or of a ring angle_rad, torque_nm and "
+            "force_n (--ring), tells cohesion, mu and shear_length of bekker. --soil writes what "
+            "was found as a ground (docs/soil.md). Of a walk's log (mild drive --log, mild play "
             "--log) it says what the robot's own sensors tell of the ground, each parameter with "
             "its 90 % interval (docs/identify.md).",
         .options = table,
@@ -91,6 +95,8 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
             "  mild fit slow.csv --plate 0.2,0.1 --model bekker --json out.json\n"
             "  mild fit p5.csv p10.csv ring.csv --model bekker --plate 0.05 --plate 0.1 \\\n"
             "      --ring 0.2,0.12 --hold-from dry_sand --soil mars.ini\n"
+            "  mild fit disc.csv square.csv drag.csv --model mild_merged --plate 0.12 \\\n"
+            "      --plate 0.1,0.1 --plate 0.1,0.1 --hold alpha=0.3,phi=0.59,rho=2500\n"
             "  mild fit walk.csv\n",
         .positional_max = CLI_LIST_MAX,
         .picture = "figure",
@@ -105,11 +111,16 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
 
 /* ---- what is fitted and what is held ---- */
 
-/* Parameters of the model that some kind of rows tells: fields[FIT_FIELDS_MAX]. */
-static int parameters_of(MildModel model, const MildField **fields) {
-    int count = 0;
+/* Parameters of the model that some kind of rows tells, of slides where there are some:
+ * fields[FIT_FIELDS_MAX]. */
+static int parameters_of(const FitWork *work, const MildField **fields) {
+    const MildModel model = (MildModel)work->material.model;
+    int slides = 0, count = 0;
+    for (int f = 0; f < work->files; f++) {
+        slides += work->file[f].slide_count > 0;
+    }
     for (int k = 0; k < FIT_KINDS; k++) {
-        count += fit_parameters(model, (FitKind)k, fields + count);
+        count += k == FIT_DRAG && !slides ? 0 : fit_parameters(model, (FitKind)k, fields + count);
     }
     return count;
 }
@@ -122,7 +133,7 @@ static const MildField *parameter_find(const FitWork *work, int any, const char 
     const char *names[FIT_FIELDS_MAX];
     char list[300] = "";
     const MildModel model = (MildModel)work->material.model;
-    const int count = parameters_of(model, fields);
+    const int count = parameters_of(work, fields);
     for (int i = 0; i < count; i++) {
         names[i] = fields[i]->name;
         if (strcmp(names[i], name) == 0) {
@@ -195,7 +206,7 @@ static MildStatus from_read(const FitOptions *options, FitWork *work, MildError 
 /* --fit: everything else is held. */
 static MildStatus fit_names_read(const CliNames *names, FitWork *work, MildError *error) {
     const MildField *fields[FIT_FIELDS_MAX];
-    const int count = parameters_of((MildModel)work->material.model, fields);
+    const int count = parameters_of(work, fields);
     for (int i = 0; i < count; i++) {
         work->held[fields[i] - mild_material_fields] = 1;
     }
@@ -383,7 +394,8 @@ static MildStatus rows_sort(const FitOptions *options, FitWork *work, MildError 
         if (file->kind == FIT_FILE_PRESS) {
             const int plate = options->plate.count > 1 ? presses : 0;
             whole = rows_add(&work->set[FIT_PRESS], file->points, file->count, plate) &&
-                    rows_add(&work->set[FIT_UNLOAD], file->back, file->back_count, plate);
+                    rows_add(&work->set[FIT_UNLOAD], file->back, file->back_count, plate) &&
+                    rows_add(&work->set[FIT_DRAG], file->slide, file->slide_count, plate);
             presses++;
         } else {
             const int turns = file->kind == FIT_FILE_RING;
@@ -395,9 +407,13 @@ static MildStatus rows_sort(const FitOptions *options, FitWork *work, MildError 
             rings += turns;
         }
     }
-    memcpy(work->set[FIT_UNLOAD].def.plate, work->set[FIT_PRESS].def.plate,
-           sizeof work->set[FIT_UNLOAD].def.plate);
-    work->set[FIT_UNLOAD].def.plates = work->set[FIT_PRESS].def.plates;
+    for (int k = 0; k < FIT_KINDS; k++) {
+        FitDef *def = &work->set[k].def;
+        if (k == FIT_UNLOAD || k == FIT_DRAG) {
+            memcpy(def->plate, work->set[FIT_PRESS].def.plate, sizeof def->plate);
+            def->plates = work->set[FIT_PRESS].def.plates;
+        }
+    }
     return whole ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
 }
 
@@ -447,6 +463,54 @@ static int set_prepare(const FitOptions *options, FitWork *work, FitKind kind) {
     return left;
 }
 
+/* Makes the rows that slide those of a fit, by what their press met. Returns false when out of
+ * memory. */
+static int slides_prepare(FitWork *work) {
+    const FitSet *press = &work->set[FIT_PRESS], *back = &work->set[FIT_UNLOAD];
+    FitSet *set = &work->set[FIT_DRAG];
+    MildMaterial known = work->material;
+    known.recovery = back->done ? back->result.curve.recovery : known.recovery;
+    known = fit_slide_base(&known, press->done ? &press->result.curve : NULL);
+    FitPoint *rows = malloc(sizeof *rows * (size_t)(2 * set->count + 1));
+    if (!rows) {
+        return 0;
+    }
+    int kept = 0;
+    for (int first = 0, end; first < set->count; first = end) {
+        const FitPoint *slide = set->points + first;
+        for (end = first + 1; end < set->count && fit_drag_is_next(&set->points[end]); end++) {
+            continue;
+        }
+        kept +=
+            fit_slide_rows(&set->def.plate[slide->plate], &known, slide, end - first, rows + kept);
+    }
+    free(set->points);
+    set->points = rows;
+    set->count = kept;
+    set->def.material = known;
+    return 1;
+}
+
+/* Checks that the slides can be fitted, and prepares them. Of a model without slip-sinkage they are
+ * left out. */
+static MildStatus slides_fit(const FitOptions *options, FitWork *work, MildError *error) {
+    FitSet *set = &work->set[FIT_DRAG];
+    const FitSet *press = &work->set[FIT_PRESS];
+    if (!set->count || set_prepare(options, work, FIT_DRAG) == 0) {
+        return MILD_OK;
+    }
+    if (!press->count && !options->hold.count && !options->from) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "no press: what a plate carries without slip is unknown; leave the rows "
+                         "before the slip in the record, or give a press too");
+    }
+    if (!slides_prepare(work)) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
+    }
+    set->done = 1;
+    return fit_run(&set->def, set->points, set->count, &set->result, error);
+}
+
 /* Fits each kind of rows by itself, because no parameter is told by two of them. */
 static MildStatus sets_fit(const FitOptions *options, FitWork *work, MildError *error) {
     const char *model = mild_model_names[work->material.model];
@@ -460,7 +524,7 @@ static MildStatus sets_fit(const FitOptions *options, FitWork *work, MildError *
                          "choose bekker, or leave these files out",
                          model);
     }
-    for (int k = 0; k < FIT_KINDS && status == MILD_OK; k++) {
+    for (int k = 0; k < FIT_DRAG && status == MILD_OK; k++) {
         FitSet *set = &work->set[k];
         set->done = set->count > 0 && set_prepare(options, work, (FitKind)k) > 0;
         if (set->done) {
@@ -468,6 +532,8 @@ static MildStatus sets_fit(const FitOptions *options, FitWork *work, MildError *
         }
         made += set->done && k != FIT_UNLOAD;
     }
+    status = status == MILD_OK ? slides_fit(options, work, error) : status;
+    made += work->set[FIT_DRAG].done;
     if (status == MILD_OK && !made) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--hold: every parameter of %s is held, which leaves nothing to fit",
@@ -516,9 +582,9 @@ static void command_text(int argc, char **argv, char *text, size_t size) {
 
 static MildStatus fit_report(const FitOptions *options, const char *command, const CliArgs *args,
                              FitWork *work, MildError *error) {
-    MildStatus status = model_choose(options, args, work, error);
+    MildStatus status = files_read(args, work, error);
     if (status == MILD_OK) {
-        status = files_read(args, work, error);
+        status = model_choose(options, args, work, error);
     }
     if (status == MILD_OK) {
         status = plates_check(options, work, error);

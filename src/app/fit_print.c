@@ -7,6 +7,7 @@
 #include "app/fit_work.h"
 #include "app/report.h"
 #include "base/text.h"
+#include "identify/fit_drag.h"
 
 /* ---- the table ---- */
 
@@ -70,6 +71,7 @@ static void press_assumptions_print(const FitWork *work) {
 static void assumptions_print(const FitWork *work, FitKind kind) {
     static const char *const why[FIT_KINDS] = {"the law misses the curve, or the noise is slow",
                                                "ground springs back along no straight line",
+                                               "the law misses the curve, or the noise is slow",
                                                "the law misses the curve, or the noise is slow"};
     const FitResult *result = &work->set[kind].result;
     if (names_print(result, bit(FIT_HELD), 1, "the intervals assume ")) {
@@ -138,6 +140,16 @@ static void rates_print(const FitWork *work, unsigned untold) {
     printf("%s", rate ? "\n" : "");
 }
 
+/* Bool: the parameter is in one of the states. */
+static int is_untold(const FitResult *result, const char *name, unsigned states) {
+    int found = 0;
+    for (int i = 0; i < result->parameters; i++) {
+        const FitValue *value = &result->parameter[i];
+        found |= strcmp(value->name, name) == 0 && (states >> value->state & 1);
+    }
+    return found;
+}
+
 /* What the data do not tell, and the remedy. */
 static void untold_print(const FitWork *work, FitKind kind) {
     const unsigned untold = bit(FIT_LIMIT) | bit(FIT_OPEN) | bit(FIT_TIED) | bit(FIT_NO_EFFECT);
@@ -145,10 +157,13 @@ static void untold_print(const FitWork *work, FitKind kind) {
     if (kind == FIT_UNLOAD || !names_print(result, untold, 0, "not determined by these data: ")) {
         return;
     }
-    printf("; hold what you know (--hold NAME=VALUE)%s%s\n",
+    printf("; hold what you know (--hold NAME=VALUE)%s%s%s\n",
            work->from || !has_presets(model_of(work)) ? ""
                                                       : ", or what is missing (--hold-from PRESET)",
-           kind == FIT_SHEAR ? "; records at several pressures tell cohesion and mu apart" : "");
+           kind == FIT_SHEAR ? "; records at several pressures tell cohesion and mu apart" : "",
+           kind == FIT_DRAG && is_untold(result, "regain_length", untold)
+               ? "; a plate that sinks as it slides tells regain_length"
+               : "");
 }
 
 /* "55", or "44, 77" of several plates. */
@@ -161,7 +176,8 @@ static const char *elements_text(const FitDef *def, char text[8 * FIT_PLATES_MAX
 }
 
 const char *fit_residual_text(const FitWork *work, FitKind kind, char *text, size_t size) {
-    static const char *const rows[FIT_KINDS] = {"loading rows", "unloading rows", "rows of slip"};
+    static const char *const rows[FIT_KINDS] = {"loading rows", "unloading rows", "rows of slip",
+                                                "rows that slide"};
     const FitSet *set = &work->set[kind];
     const FitResult *result = &set->result;
     char elements[8 * FIT_PLATES_MAX] = "", tail[8 * FIT_PLATES_MAX + 20] = "";
@@ -201,6 +217,12 @@ void fit_print(const FitWork *work) {
             untold_print(work, (FitKind)k);
         }
     }
+    const FitSet *slides = &work->set[FIT_DRAG];
+    if (slides->count && !slides->done) {
+        printf("left out: %d rows of slip; %s\n", slides->count,
+               fit_drag_told(model_of(work)) ? "all that they tell is held"
+                                             : "slip costs no support under this model");
+    }
     if (work->set[FIT_PRESS].done) {
         rates_print(work, bit(FIT_LIMIT) | bit(FIT_OPEN) | bit(FIT_TIED) | bit(FIT_NO_EFFECT));
         never_print(work);
@@ -237,7 +259,7 @@ static int json_value(cJSON *root, const char *list, const FitValue *value) {
 
 /* Residual and independent rows: of presses at the root, of others in an object. */
 static int json_residual(cJSON *root, const FitSet *set, FitKind kind) {
-    static const char *const names[FIT_KINDS] = {NULL, "unloading", "shear"};
+    static const char *const names[FIT_KINDS] = {NULL, "unloading", "shear", "slides"};
     cJSON *object = names[kind] ? cJSON_AddObjectToObject(root, names[kind]) : root;
     return cJSON_AddNumberToObject(object, "residual", set->result.residual) &&
            cJSON_AddNumberToObject(object, "independent_rows", set->result.rows);

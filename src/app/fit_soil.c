@@ -60,7 +60,7 @@ static int is_contradicted(const FitWork *work, const MildField *field) {
     FitKind kind;
     const FitValue *value = value_find(work, field, &kind);
     MildMaterial preset = work->preset;
-    const double number = *fit_number(&preset, field);
+    const double number = fit_counted(field, *fit_number(&preset, field));
     return value && value->state == FIT_LIMIT && (number < value->low || number > value->high);
 }
 
@@ -131,7 +131,7 @@ static void fields_take(Soil *s) {
 
 MildStatus fit_soil_save(const FitWork *work, const char *command, const char *path,
                          MildError *error) {
-    static const char *const kinds[FIT_KINDS] = {"presses", "unloading", "shear"};
+    static const char *const kinds[FIT_KINDS] = {"presses", "unloading", "shear", "slides"};
     Soil s = {.work = work, .soil = work->from ? work->preset : mild_material_default()};
     char head[HEAD_SIZE], residual[400];
     s.soil.model = work->material.model;

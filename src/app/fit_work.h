@@ -6,7 +6,7 @@
 #include "identify/fit.h"
 #include "identify/fit_csv.h"
 
-enum { FIT_KINDS = 3, FIT_FIELDS_MAX = 64 };
+enum { FIT_KINDS = 4, FIT_FIELDS_MAX = 64 };
 
 /* The rows of a kind, and what they tell. */
 typedef struct {

@@ -75,6 +75,11 @@ int main(int argc, char **argv) {
         }
         names[i] = commands[i].name;
     }
+    if (strcmp(argv[1], "trial") == 0 || strcmp(argv[1], "judge") == 0) {
+        fprintf(stderr, "mild: %s is a command of the Python package: python -m mild %s\n", argv[1],
+                argv[1]);
+        return CLI_EXIT_BAD_INPUT;
+    }
     fprintf(stderr, "mild: unknown command '%s'; nearest is '%s' (mild --help lists all)\n",
             argv[1], text_nearest(argv[1], names, command_count));
     return CLI_EXIT_BAD_INPUT;

@@ -5,10 +5,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "identify/fit_drag.h"
 #include "identify/fit_solve.h"
 
 /* [-] An effect below this share of the force is none. */
 #define FIT_NOTHING 1e-12
+
+/* [m] of slip_length; its 0 is that slip costs nothing, as of the longest. */
+#define FIT_SLIP_LEAST 1e-4
 
 /* Of more rows the mean of neighbours is fitted. */
 enum { FIT_ROWS = 20000 };
@@ -61,6 +65,7 @@ static void coordinates_choose(Run *run) {
         FitCoordinate *c = &fit->coordinate[fit->coordinates++];
         *c = (FitCoordinate){.field = run->field[i]};
         fit_range(c->field, &c->low, &c->high);
+        c->low = strcmp(c->field->name, "slip_length") == 0 ? FIT_SLIP_LEAST : c->low;
         c->combination = run->tied[i] ? fit_combination(c->field->name) : NULL;
         if (c->combination) {
             c->low = c->combination->low;
@@ -93,26 +98,39 @@ static int put_aside(Run *run, const int marks[FIT_PARAMETERS_MAX], FitState sta
     return 1;
 }
 
+/* Bool: the rows change with a coordinate. */
+static int has_effect(const Fit *fit, int coordinate) {
+    const double *column = fit->column + coordinate * fit->count;
+    double force = 0, effect = 0;
+    for (int i = 0; i < fit->count; i++) {
+        const double share = column[i] * fit->value[coordinate];
+        effect += share * share;
+        force += fit->points[i].force * fit->points[i].force;
+    }
+    return effect > FIT_NOTHING * FIT_NOTHING * force;
+}
+
 /* Marks the parameters without any effect on the rows, and those whose effect is a combination of
  * the others'. The columns of a material in which everything has an effect say so. At the minimum
  * some may have none by chance. */
 static void ties_mark(Run *run, int without[FIT_PARAMETERS_MAX], int tied[FIT_PARAMETERS_MAX]) {
-    const MildMaterial probe = fit_probe();
+    const int probes = run->def->kind == FIT_DRAG ? FIT_PROBES : 1;
     Fit *fit = &run->fit;
     coordinates_choose(run);
-    fit_start(fit, &probe);
-    fit_columns(fit);
     for (int p = 0; p < fit->coordinates; p++) {
-        const double *column = fit->column + p * fit->count;
-        double force = 0, effect = 0;
-        for (int i = 0; i < fit->count; i++) {
-            const double share = column[i] * fit->value[p];
-            effect += share * share;
-            force += fit->points[i].force * fit->points[i].force;
+        without[parameter_of(run, p)] = 1;
+    }
+    for (int n = 0; n < probes; n++) {
+        const MildMaterial probe = fit_probe(n);
+        fit_start(fit, &probe);
+        fit_columns(fit);
+        for (int p = 0; p < fit->coordinates; p++) {
+            const int i = parameter_of(run, p);
+            if (without[i] && has_effect(fit, p)) {
+                without[i] = 0;
+                tied[i] = fit_own(fit, p) < FIT_DEPENDENT;
+            }
         }
-        const int i = parameter_of(run, p);
-        without[i] = !(effect > FIT_NOTHING * FIT_NOTHING * force);
-        tied[i] = !without[i] && fit_own(fit, p) < FIT_DEPENDENT;
     }
 }
 
@@ -149,7 +167,7 @@ static FitValue *combination_add(FitResult *result, const FitCombination *combin
 
 /* The minimum and all intervals. */
 static void values_find(Run *run) {
-    const MildMaterial start = fit_probe();
+    const MildMaterial start = fit_probe(0);
     Fit *fit = &run->fit;
     FitInterval interval[FIT_PARAMETERS_MAX];
     fit_start(fit, &start);
@@ -182,7 +200,7 @@ static void values_find(Run *run) {
 static int is_fillable(const Run *run, int index) {
     const FitValue *value = &run->result->parameter[index];
     MildMaterial fill = *run->def->fill;
-    const double number = *fit_number(&fill, value->field);
+    const double number = fit_counted(value->field, *fit_number(&fill, value->field));
     const int untold = value->state == FIT_LIMIT || value->state == FIT_OPEN;
     return untold && !(number < value->low) && !(number > value->high);
 }
@@ -237,7 +255,7 @@ static MildStatus fit_check(const FitDef *def, const FitPoint *points, int count
         }
         if (isfinite(points[i].depth) && isfinite(points[i].force) && isfinite(points[i].speed) &&
             isfinite(points[i].acceleration) && isfinite(points[i].area) &&
-            isfinite(points[i].load)) {
+            isfinite(points[i].load) && (def->kind != FIT_DRAG || isfinite(points[i].slip))) {
             continue;
         }
         return mild_fail(error, MILD_ERROR_RANGE, "fit: row %d is not finite", i + 1);
@@ -258,7 +276,7 @@ static double plates_width(const FitDef *def) {
 /* Names, units and states before the fit, and the numbers of what is held. */
 static void run_open(Run *run) {
     const FitDef *def = run->def;
-    const MildMaterial probe = fit_probe();
+    const MildMaterial probe = fit_probe(0);
     MildMaterial *base = &run->fit.base, held = def->material, unheld = probe;
     FitResult *result = run->result;
     *result = (FitResult){.points = run->fit.count};
@@ -304,18 +322,32 @@ static void run_finish(Run *run) {
     }
 }
 
+/* Bool: a row goes on where the one before it ends, so that their mean is a row. */
+static int is_neighbour(FitKind kind, const FitPoint *row) {
+    if (kind == FIT_DRAG) {
+        return fit_drag_is_next(row) && row->holds == row[-1].holds &&
+               (row->slip > 0) == (row[-1].slip > 0);
+    }
+    return !(row->depth < row[-1].depth) && row->plate == row[-1].plate &&
+           row->area == row[-1].area;
+}
+
 /* Means of `group` neighbouring rows, fewer where a record ends: the next begins less deep. Returns
  * their count. */
-static int rows_mean(const FitPoint *points, int count, int group, FitPoint *means) {
+static int rows_mean(FitKind kind, const FitPoint *points, int count, int group, FitPoint *means) {
     int kept = 0;
     for (int i = 0, n = 0; i < count; i += n) {
         FitPoint sum = {.time = NAN, .plate = points[i].plate};
         for (n = 0; n < group && i + n < count; n++) {
             const FitPoint *row = &points[i + n];
-            if (n && (row->depth < row[-1].depth || row->plate != row[-1].plate ||
-                      row->area != row[-1].area)) {
+            if (n && !is_neighbour(kind, row)) {
                 break;
             }
+            sum.slip += row->slip;
+            sum.weight += row->weight;
+            sum.virgin += row->virgin;
+            sum.near += row->near;
+            sum.holds = row->holds;
             sum.depth += row->depth;
             sum.force += row->force;
             sum.load += row->load;
@@ -328,6 +360,10 @@ static int rows_mean(const FitPoint *points, int count, int group, FitPoint *mea
         sum.load /= n;
         sum.speed /= n;
         sum.acceleration /= n;
+        sum.slip /= n;
+        sum.weight /= n;
+        sum.virgin /= n;
+        sum.near /= n;
         means[kept++] = sum;
     }
     return kept;
@@ -367,7 +403,7 @@ MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResu
     if (!means) {
         return mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
     }
-    const int kept = rows_mean(points, count, (count + FIT_ROWS - 1) / FIT_ROWS, means);
+    const int kept = rows_mean(def->kind, points, count, (count + FIT_ROWS - 1) / FIT_ROWS, means);
     status = run_rows(def, means, kept, result, error);
     free(means);
     if (status == MILD_OK) {

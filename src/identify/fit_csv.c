@@ -20,14 +20,17 @@ typedef enum {
     CSV_PRESSURE,
     CSV_ANGLE,
     CSV_TORQUE,
+    CSV_X,
+    CSV_ALONG,
     CSV_COLUMNS
 } CsvColumn;
 
 static const char *const column_names[CSV_COLUMNS] = {
-    "depth_m", "force_n",  "time_s",      "speed_m_s", "area_m2",
-    "slip_m",  "shear_pa", "pressure_pa", "angle_rad", "torque_nm"};
+    "depth_m",  "force_n",     "time_s",    "speed_m_s", "area_m2", "slip_m",
+    "shear_pa", "pressure_pa", "angle_rad", "torque_nm", "x_m",     "force_x_n"};
 /* Largest size of a number in each column; beyond it the unit is probably wrong. */
-static const double column_limits[CSV_COLUMNS] = {2, 1e7, 1e9, 100, 10, 2, 1e7, 1e8, 100, 1e5};
+static const double column_limits[CSV_COLUMNS] = {2,   1e7, 1e9, 100, 10,  2,
+                                                  1e7, 1e8, 100, 1e5, 1e3, 1e7};
 static const char *const column_units[CSV_COLUMNS] = {"metres, positive down",
                                                       "newtons",
                                                       "seconds",
@@ -37,7 +40,9 @@ static const char *const column_units[CSV_COLUMNS] = {"metres, positive down",
                                                       "pascals",
                                                       "pascals",
                                                       "radians",
-                                                      "newton metres"};
+                                                      "newton metres",
+                                                      "metres",
+                                                      "newtons"};
 
 static unsigned bit(CsvColumn c) {
     return 1U << c;
@@ -51,8 +56,10 @@ static unsigned needed(FitFileKind kind) {
 }
 
 static unsigned read_of(FitFileKind kind) {
-    return kind == FIT_FILE_PRESS ? needed(kind) | bit(CSV_TIME) | bit(CSV_SPEED) | bit(CSV_AREA)
-                                  : needed(kind);
+    const unsigned slides = bit(CSV_SLIP) | bit(CSV_X) | bit(CSV_ALONG);
+    return kind == FIT_FILE_PRESS
+               ? needed(kind) | bit(CSV_TIME) | bit(CSV_SPEED) | bit(CSV_AREA) | slides
+               : needed(kind);
 }
 
 typedef struct {
@@ -96,8 +103,9 @@ static MildStatus kind_find(Record *record, MildError *error) {
             return mild_fail(error, MILD_ERROR_FORMAT,
                              "%.200s:%d: no column %s; name the columns in the first line: "
                              "depth_m,force_n and, where speed matters, time_s or speed_m_s; of a "
-                             "shear test slip_m,shear_pa,pressure_pa, or of a ring "
-                             "angle_rad,torque_nm,force_n",
+                             "plate that is dragged also slip_m,force_x_n; of a shear test "
+                             "slip_m,shear_pa,pressure_pa, or of a ring angle_rad,torque_nm,"
+                             "force_n",
                              record->text.path, record->text.number, column_names[c]);
         }
         if (!(read_of(record->kind) & bit((CsvColumn)c))) {
@@ -168,6 +176,8 @@ static FitPoint point_of(const Record *record, const double number[CSV_COLUMNS])
                           .depth = number[CSV_DEPTH],
                           .force = number[CSV_FORCE],
                           .speed = number[CSV_SPEED],
+                          .slip = number[record->column[CSV_SLIP] >= 0 ? CSV_SLIP : CSV_X],
+                          .along = number[CSV_ALONG],
                           .area = record->column[CSV_AREA] >= 0 ? number[CSV_AREA] : 0};
     }
 }
@@ -236,6 +246,35 @@ static MildStatus csv_rows(Record *record, FitFile *file, MildError *error) {
     return status;
 }
 
+/* Takes the slide out of a press, and checks that it tells something. */
+static MildStatus csv_slide(const Record *record, FitFile *file, MildError *error) {
+    if (file->kind != FIT_FILE_PRESS || !file->count) {
+        return MILD_OK;
+    }
+    file->slide = malloc(sizeof *file->slide * (size_t)file->count);
+    if (!file->slide) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", record->text.path);
+    }
+    const int slid = fit_sliding(file->points, &file->count, file->slide, &file->slide_count);
+    double up = 0, against = 0, top = 0;
+    for (int i = 0; i < file->slide_count; i++) {
+        const FitPoint *row = &file->slide[i];
+        up += row->force;
+        top = fmax(top, row->depth);
+        against += row->slip > 0 && isfinite(row->along) ? row->along : 0;
+    }
+    const int pulls = record->column[CSV_ALONG] >= 0 && !(against > 0);
+    const char *wrong = !file->slide_count      ? NULL
+                        : slid < FIT_POINTS_MIN ? "too few rows slide, at least 8 are needed"
+                        : !(up > 0 && top > 0)  ? "the plate slides, and force_n carries nothing"
+                        : pulls ? "force_x_n does not resist the slip; it is the force on the "
+                                  "plate, negative where it moves to +x"
+                                : NULL;
+    return wrong ? mild_fail(error, MILD_ERROR_FORMAT, "%.200s:%d: %s", record->text.path,
+                             record->text.number, wrong)
+                 : MILD_OK;
+}
+
 /* What the rows of each kind lack when their mean is not above 0. */
 static const char *const no_push[FIT_FILES] = {
     "force_n does not push back on the way down; it is positive up, on the plate",
@@ -250,6 +289,10 @@ static MildStatus csv_loading(const Record *record, FitFile *file, MildError *er
     const int rows = file->count;
     double push = 0;
     file->count = fit_loading(file->points, rows);
+    if (file->count < FIT_POINTS_MIN && file->slide_count) {
+        file->count = 0; /* the record begins with the slide */
+        return MILD_OK;
+    }
     if (file->count < FIT_POINTS_MIN) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "%.200s:%d: %s: %d of %d rows go %s than all before, at least %d "
@@ -281,7 +324,7 @@ static MildStatus csv_loading(const Record *record, FitFile *file, MildError *er
 
 /* The way up of a press, before its rows make room for the way down. */
 static MildStatus csv_unloading(const Record *record, FitFile *file, MildError *error) {
-    if (file->kind != FIT_FILE_PRESS || !file->count) {
+    if (file->kind != FIT_FILE_PRESS || file->slide_count || !file->count) {
         return MILD_OK;
     }
     file->back = malloc(sizeof *file->back * (size_t)file->count);
@@ -305,6 +348,9 @@ MildStatus fit_csv_read_file(FILE *stream, const char *name, FitFile *file, Mild
     if (status == MILD_OK) {
         file->kind = record.kind;
         status = csv_rows(&record, file, error);
+    }
+    if (status == MILD_OK) {
+        status = csv_slide(&record, file, error);
     }
     if (status == MILD_OK) {
         status = csv_unloading(&record, file, error);
@@ -333,6 +379,7 @@ MildStatus fit_csv_read(const char *path, FitFile *file, MildError *error) {
 void fit_file_close(FitFile *file) {
     free(file->points);
     free(file->back);
+    free(file->slide);
     *file = (FitFile){.points = NULL};
 }
 

@@ -11,7 +11,8 @@ enum { FIT_CSV_ROWS_MAX = 1000000 };
 
 /* What a file is, by its columns. */
 typedef enum {
-    FIT_FILE_PRESS, /* depth_m, force_n; also time_s or speed_m_s, area_m2 */
+    FIT_FILE_PRESS, /* depth_m, force_n; also time_s or speed_m_s, area_m2; where the plate slides
+                       after it slip_m (or x_m, of `mild press`) and force_x_n */
     FIT_FILE_SHEAR, /* slip_m, shear_pa, pressure_pa */
     FIT_FILE_RING,  /* angle_rad, torque_nm, force_n: of a ring, as torque and load */
     FIT_FILES
@@ -24,6 +25,8 @@ typedef struct {
     int count;
     FitPoint *back; /* [back_count] the unloading part of a press, see fit_unloading */
     int back_count;
+    FitPoint *slide; /* [slide_count] where the plate slides, see fit_sliding */
+    int slide_count;
 } FitFile;
 
 /* Reads one record. Columns are found by name, in any order; others are ignored. Without times and

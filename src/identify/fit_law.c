@@ -6,6 +6,7 @@
 
 #include "ground/models.h"
 #include "ground/sole.h"
+#include "identify/fit_drag.h"
 
 /* ---- combinations ---- */
 
@@ -73,6 +74,10 @@ void fit_range(const MildField *field, double *low, double *high) {
     *high = field->max;
 }
 
+double fit_counted(const MildField *field, double number) {
+    return number == 0 && strcmp(field->name, "slip_length") == 0 ? field->max : number;
+}
+
 /* Bool: the model reads the field. */
 static int reads(MildModel model, const char *name) {
     const MildModelInfo *info = mild_model_info(model);
@@ -83,9 +88,12 @@ static int reads(MildModel model, const char *name) {
     return read;
 }
 
-MildMaterial fit_probe(void) {
+MildMaterial fit_probe(int number) {
     MildMaterial probe = mild_material_default();
     probe.recovery = 0.5;
+    probe.slip_length = 0.003;
+    probe.mu = number ? 0.15 : probe.mu;
+    probe.grip = number ? 0.3 : 0.1;
     return probe;
 }
 
@@ -100,7 +108,7 @@ static int is_sensed(MildModel model, FitKind kind, const MildField *field, doub
          .speed = speed,
          .acceleration = acceleration,
          .load = 0.005}};
-    MildMaterial material = fit_probe();
+    MildMaterial material = fit_probe(0);
     double before[2], after[2];
     material.model = (int)model;
     fit_forces(kind, &plate, &material, points, 2, before);
@@ -114,14 +122,27 @@ int fit_is_geometry(MildModel model, const char *name) {
            (strcmp(name, "bed_depth") == 0 || strcmp(name, "plate_width") == 0);
 }
 
+/* Bool: the parameter is one that a plate tells that slides where slip costs support. */
+static int is_dragged(const char *name) {
+    static const char *const names[] = {"mu", "slip_length", "regain_length", "grip"};
+    int found = 0;
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        found |= strcmp(name, names[i]) == 0;
+    }
+    return found;
+}
+
 int fit_parameters(MildModel model, FitKind kind, const MildField *fields[FIT_PARAMETERS_MAX]) {
     const MildModelInfo *info = mild_model_info(model);
     int count = 0;
+    if (kind == FIT_DRAG && !fit_drag_told(model)) {
+        return 0;
+    }
     for (int i = 0; i < MILD_MODEL_FIELDS && info->fields[i]; i++) {
         const MildField *field =
             mild_field_find(mild_material_fields, mild_material_field_count, info->fields[i], NULL);
         if (field->type == MILD_FIELD_DOUBLE && !fit_is_geometry(model, field->name) &&
-            is_sensed(model, kind, field, 1, 1)) {
+            (kind == FIT_DRAG ? is_dragged(field->name) : is_sensed(model, kind, field, 1, 1))) {
             fields[count++] = field;
         }
     }
@@ -261,6 +282,9 @@ static void shear_forces(const FitPlate *plate, const MildMaterial *raw, const F
 
 /* Bool: a row belongs with the one before it. */
 static int is_next(FitKind kind, const FitPoint *row) {
+    if (kind == FIT_DRAG) {
+        return fit_drag_is_next(row);
+    }
     return row->plate == row[-1].plate && (kind != FIT_UNLOAD || row->depth < row[-1].depth);
 }
 
@@ -278,6 +302,8 @@ void fit_forces(FitKind kind, const FitPlate *plates, const MildMaterial *materi
             unload_forces(&raw, points + first, end - first, force + first);
         } else if (kind == FIT_SHEAR) {
             shear_forces(plate, &raw, points + first, end - first, force + first);
+        } else if (kind == FIT_DRAG) {
+            fit_drag_forces(plate, &raw, points + first, end - first, force + first);
         } else {
             plate_forces(plate, &raw, points + first, end - first, force + first);
         }

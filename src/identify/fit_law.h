@@ -13,7 +13,8 @@
  * Under the pressure p the ground of bekker resists a slip j by the shear stress
  *     s(j) = (cohesion + p mu) (1 - exp(-j/shear_length))
  * and a ring that turns by an angle by the mean of s over it, weighted by the radius, which is its
- * torque over that of a stress of 1. Pure functions: thread safe. */
+ * torque over that of a stress of 1. A plate that slides where slip costs support: fit_drag.h. Pure
+ * functions: thread safe. */
 #ifndef LAB_FIT_LAW_H
 #define LAB_FIT_LAW_H
 
@@ -21,17 +22,6 @@
 #include "mild/ground.h"
 
 enum { FIT_PARAMETERS_MAX = MILD_MODEL_FIELDS };
-
-/* A plate, in the elements of its model, or a ring. bekker asks for a pressure on an area, which
- * the elements of a raster have only about; the other models for the force of each element. */
-typedef struct {
-    int elements;
-    double pitch;         /* [m] */
-    double width;         /* [m] its shorter side, of a disc the radius: plate_width of bekker */
-    const MildSole *sole; /* borrowed, for mild_merged; NULL: every element is a disc by itself */
-    double area;          /* [m^2] 0: that of the elements */
-    double outer, inner;  /* [m] radii of a ring that turns; 0: what slides does not turn */
-} FitPlate;
 
 /* What the data tell where they do not tell a parameter by itself. */
 typedef struct {
@@ -48,10 +38,13 @@ typedef struct {
 const FitCombination *fit_combination(const char *carrier);
 
 /* The parameters of a model that such rows can sense, in the order of its fields. Returns their
- * count; 0 for rigid, and for FIT_SHEAR of a model without a law of shear. */
+ * count; 0 for rigid, for FIT_SHEAR of a model without a law of shear, and for FIT_DRAG of one
+ * under which slip costs no support. */
 int fit_parameters(MildModel model, FitKind kind, const MildField *fields[FIT_PARAMETERS_MAX]);
-/* The default material, with numbers for which everything has an effect. */
-MildMaterial fit_probe(void);
+enum { FIT_PROBES = 2 };
+/* The default material, with numbers for which everything has an effect in one probe or the other:
+ * in the second the friction of a plate that slides is bounded by mu. */
+MildMaterial fit_probe(int number);
 /* Bool: the force depends on it only through speed or acceleration. */
 int fit_is_rate(MildModel model, const MildField *field);
 /* Bool: a number that is never fitted: bed_depth, which may be held, or bekker's plate_width, which
@@ -60,6 +53,9 @@ int fit_is_geometry(MildModel model, const char *name);
 /* Range in which a parameter is fitted or held: the material's. Ground that creates no energy has
  * c_d >= 1/2 and c_g >= 0. */
 void fit_range(const MildField *field, double *low, double *high);
+/* A number of the field as a fit counts it: 0 of slip_length, by which slip costs nothing, is its
+ * longest. */
+double fit_counted(const MildField *field, double number);
 /* The number of a material. */
 double *fit_number(MildMaterial *material, const MildField *field);
 

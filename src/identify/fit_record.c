@@ -44,6 +44,42 @@ int fit_unloading(const FitPoint *points, int count, FitPoint *back) {
     return rate > UNLOAD_RATE * back->depth ? 0 : kept;
 }
 
+#define SLIDE_LEAST 1e-3  /* [m] a shorter way along is none */
+#define SLIDE_BEGIN 1e-6  /* [m] */
+#define SLIDE_PRESSED 0.8 /* [-] of the depth, from where the press belongs to the slide */
+
+int fit_sliding(const FitPoint *points, int *count, FitPoint *slide, int *slides) {
+    int far = 0, begin = 0;
+    *slides = 0;
+    for (int i = 1; i < *count; i++) {
+        const double way = fabs(points[i].slip - points[0].slip); /* NaN: none */
+        far = way > fabs(points[far].slip - points[0].slip) ? i : far;
+    }
+    const double length = points[far].slip - points[0].slip;
+    if (!(fabs(length) >= SLIDE_LEAST)) {
+        return 0;
+    }
+    for (int i = 0; i < far; i++) {
+        begin = fabs(points[i].slip - points[0].slip) <= SLIDE_BEGIN ? i : begin;
+    }
+    int first = begin;
+    while (first > 0 && points[first - 1].depth >= SLIDE_PRESSED * points[begin].depth) {
+        first--;
+    }
+    for (int i = first; i <= far; i++) {
+        const double slip = i > begin ? fabs(points[i].slip - points[0].slip) : 0;
+        if (i > begin && slip <= slide[*slides - 1].slip) {
+            continue;
+        }
+        FitPoint *row = &slide[(*slides)++];
+        *row = points[i];
+        row->slip = slip;
+        row->along = length > 0 ? -points[i].along : points[i].along;
+    }
+    *count = begin + 1;
+    return *slides - (begin - first + 1);
+}
+
 /* Speed and acceleration of row `i` from a least-squares polynomial through the depths around it.
  * It is a quartic through a twentieth of the rows, because a decelerating plate needs its small
  * bias, or a parabola when there are few rows. Both are 0 when the times are missing. At most

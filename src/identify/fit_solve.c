@@ -15,6 +15,8 @@
 /* [-] The end of an interval is found within this share of its half width. */
 #define FIT_END 2e-3
 
+#define FIT_BOUND 0.1 /* [-] */
+
 enum { FIT_ITERATIONS = 100, FIT_STARTS = 5, FIT_END_STEPS = 60 };
 
 _Static_assert((int)FIT_PARAMETERS_MAX <= (int)INVERSE_MAX, "the normal equations fit");
@@ -189,14 +191,23 @@ static double fit_descend(Fit *fit) {
     return best;
 }
 
+static int coordinate_find(const Fit *fit, const char *name) {
+    for (int p = 0; p < fit->coordinates; p++) {
+        if (strcmp(fit->coordinate[p].field->name, name) == 0) {
+            return p;
+        }
+    }
+    return -1;
+}
+
 /* The coordinate that shapes the curve: the sum of squares may have several minima in it. */
 static int shape_find(const Fit *fit) {
-    static const char *const shapes[] = {"nu", "alpha", "exponent", "shear_length", "recovery"};
+    static const char *const shapes[] = {"nu",           "alpha",    "exponent",
+                                         "shear_length", "recovery", "slip_length"};
     for (size_t s = 0; s < sizeof shapes / sizeof *shapes; s++) {
-        for (int p = 0; p < fit->coordinates; p++) {
-            if (strcmp(fit->coordinate[p].field->name, shapes[s]) == 0) {
-                return p;
-            }
+        const int p = coordinate_find(fit, shapes[s]);
+        if (p >= 0) {
+            return p;
         }
     }
     return -1;
@@ -287,6 +298,8 @@ static void noise_find(Fit *fit) {
 
 void fit_minimise(Fit *fit) {
     const int shape = shape_find(fit);
+    /* of a slide: either mu or grip bounds friction at first */
+    const int bound = coordinate_find(fit, "grip") >= 0 ? coordinate_find(fit, "mu") : -1;
     double start[FIT_PARAMETERS_MAX], found[FIT_PARAMETERS_MAX], least = INFINITY;
     memcpy(start, fit->value, sizeof start);
     memcpy(found, start, sizeof found);
@@ -297,6 +310,9 @@ void fit_minimise(Fit *fit) {
             const double share = (double)s / FIT_STARTS;
             fit->value[shape] =
                 c->low > 0 ? c->low * pow(c->high / c->low, share) : share * c->high;
+        }
+        if (bound >= 0 && s % 2) {
+            fit->value[bound] = FIT_BOUND;
         }
         const double sum = fit_descend(fit);
         if (sum < least) {

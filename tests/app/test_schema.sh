@@ -36,7 +36,10 @@ fit bench bench.json
 "$mild" fit foam.csv --plate 0.2,0.1 --json foam.json >/dev/null || fail "fit"
 "$mild" fit sand.csv --plate 0.1,0.1 --hold alpha=1.05 --json sand.json >/dev/null || fail "fit --hold"
 "$mild" fit sand.csv --plate 0.1,0.1 --model bekker --json bekker.json >/dev/null || fail "fit --model"
-fit fit foam.json sand.json bekker.json
+"$mild" press --ground sand_loose --ground.slip_length=0.004 --ground.grip=0.2 --plate 0.1,0.1 --depth 0.02 --drag 0.02 --csv drag.csv >/dev/null
+"$mild" fit drag.csv --plate 0.1,0.1 --hold-from sand_loose --json drag.json >/dev/null || fail "fit of a slide"
+grep -q '"slides"' drag.json || fail "no slides in the JSON"
+fit fit foam.json sand.json bekker.json drag.json
 
 "$mild" eval --ground grass --trials 1 --seconds 6 --actions walk.csv >/dev/null || fail "eval --actions"
 "$mild" fit walk.csv --json fit_walk.json >/dev/null || fail "fit of a walk"

@@ -5,6 +5,7 @@
 #include "fuzz.h"
 #include "identify/fit.h"
 #include "identify/fit_csv.h"
+#include "identify/fit_slide.h"
 
 static void check(const FitValue *value) {
     if (value->state == FIT_FITTED) {
@@ -44,6 +45,17 @@ static void fit(FitKind kind, const FitPoint *points, int count, int model) {
     fuzz_check(isfinite(result.residual) && result.rows > 0 && result.rows <= count);
 }
 
+/* A record in which the plate slides after its press. */
+static void slide(const FitFile *record, int model) {
+    const FitPlate plate = {.elements = 55, .pitch = 0.0195, .width = 0.1};
+    MildMaterial curve = mild_material_default();
+    FitPoint rows[48];
+    curve.model = model / 2 % 2 ? MILD_MODEL_MILD_MERGED : MILD_MODEL_MILD;
+    const int count = fit_slide_rows(&plate, &curve, record->slide, record->slide_count, rows);
+    fuzz_check(count >= record->slide_count && count <= 2 * record->slide_count);
+    fit(FIT_DRAG, rows, count, 2 * curve.model + model % 2);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     FitFile record;
     MildError error = {0};
@@ -56,12 +68,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (status == MILD_OK) {
         const int model = data[size - 1] % (2 * MILD_MODEL_RIGID);
         const int press = record.kind == FIT_FILE_PRESS;
-        fuzz_check(record.count >= FIT_POINTS_MIN);
+        fuzz_check(record.count >= FIT_POINTS_MIN || (!record.count && record.slide_count));
+        fuzz_check(record.slide_count == 0 || (press && record.slide_count >= FIT_POINTS_MIN));
         fuzz_check(record.back_count == 0 || (press && record.back_count >= FIT_POINTS_MIN));
         if (record.kind == FIT_FILE_RING) {
             fit_file_ring(&record, 0.05, 0.02);
         }
-        if (record.count < 24 && fuzz_sample(data, size, press ? 4096 : 64)) {
+        if (record.slide_count && record.slide_count < 24 && fuzz_sample(data, size, 64)) {
+            slide(&record, model);
+        }
+        if (record.count && record.count < 24 && fuzz_sample(data, size, press ? 4096 : 64)) {
             fit(press ? FIT_PRESS : FIT_SHEAR, record.points, record.count,
                 press ? model : 2 * MILD_MODEL_BEKKER + model % 2);
         }

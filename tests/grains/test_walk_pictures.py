@@ -1,11 +1,16 @@
-"""The rows of grains/walk.py: a walk's stances and what became of it, from files made by hand. test_walk_pictures.py SOURCE"""
+"""The rows of grains/walk.py: a walk's stances and what became of it, from files made by hand, and what
+it was made by. test_walk_pictures.py SOURCE"""
+import hashlib
 import json
 import pathlib
 import sys
 import tempfile
+import types
 
+SOURCE = pathlib.Path(sys.argv[1]).resolve()
 sys.dont_write_bytecode = True
-sys.path.insert(0, str(pathlib.Path(sys.argv[1]) / "grains"))
+sys.path.insert(0, str(SOURCE / "grains"))
+import walk  # noqa: E402
 import walk_pictures  # noqa: E402
 
 COLUMNS = "trial,foot,time_s,ankle_x_m,ankle_y_m,pitch_rad,force_x_n,force_y_n,force_z_n,center_x_m,depth_m"
@@ -45,4 +50,30 @@ with tempfile.TemporaryDirectory() as name:
     kept = {key: value for key, value in ROW.items() if key != "clearance"}
     where = {"family": "sand", "speed_m_s": 0.6}
     assert walks == [{**where, "ground": "grains", "grains": told}, {**where, "ground": "mild", **kept}], walks
+
+    # what a walk was made by, from a program that stands in for mild
+    stub = out / "mild"
+    stub.write_text("#!/bin/sh\nfor last; do :; done\necho '%s' >$last\n" % json.dumps({"rows": [{**ROW, "ends": {}}]}))
+    stub.chmod(0o755)
+    policy = SOURCE / "policies" / "sand.safetensors"
+    args = types.SimpleNamespace(mild=stub, policy=policy, seconds=1, seed=7, bed_seed=11, dt=0.0005, threads=1, robot="sa01")
+    for ground, program in (("mild", None), ("grains", ["grains", "--seeds", 11])):
+        folder = out / "rolling" / "0.6" / ground
+        walk.walk(args, folder, "0.6", ["--ground", "grass"], 1, "sa01", program)
+    walk_pictures.write_walks(out, ["rolling"], ["0.6"], out / "walks.json")
+    on_grains, on_mild = (row["made"] for row in json.loads((out / "walks.json").read_text()))
+    assert on_grains["bed_seed"] == 11 and on_mild["bed_seed"] is None and on_mild["seed"] == 7
+    assert on_mild["policy"] == "policies/sand.safetensors" and on_mild["policy_sha256"] == hashlib.sha256(policy.read_bytes()).hexdigest()
+    assert on_mild["command"][1:6] == ["eval", "--robot", "sa01", "--policy", "policies/sand.safetensors"], on_mild["command"]
+    assert "grains --seeds 11" in on_grains["command"]
+
+# the walks of the repository, which were made before: the manifest names each
+manifest = json.loads((SOURCE / "grains" / "walk" / "manifest.json").read_text())
+for file in sorted((SOURCE / "grains" / "walk").glob("walks-*.json")):
+    told = manifest[file.name]
+    where = {(row["family"], row["speed_m_s"], row["ground"]) for row in told["walks"]}
+    walks = [row for row in json.loads(file.read_text()) if "made" not in row]
+    assert {(row["family"], row["speed_m_s"], row["ground"]) for row in walks} <= where, file
+    assert all(row["command"] or "command" in row["not_recorded"] for row in told["walks"])
+    assert len(told["policy_sha256"]) == 64  # of a file that may be another one by now
 print("one stance, two walks")

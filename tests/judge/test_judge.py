@@ -1,9 +1,10 @@
 """judge.py on made-up records: cases of grains/run.py played by `mild` with a known material, with noise from bed to bed. The
 judge must then find mild right in everything, and others wrong where they are known to differ.
-test_judge.py SOURCE"""
+test_judge.py SOURCE MILD"""
 import csv
 import importlib.util
 import json
+import math
 import pathlib
 import re
 import subprocess
@@ -12,8 +13,10 @@ import tempfile
 
 import numpy as np
 
-SOURCE = pathlib.Path(sys.argv[1])
+SOURCE, MILD = pathlib.Path(sys.argv[1]), sys.argv[2]
 sys.path.insert(0, str(SOURCE / "scripts"))
+import judge as judge_module  # noqa: E402
+import judge_anchors  # noqa: E402
 import mild  # noqa: E402
 from judge_cases import Case, Sole, measures  # noqa: E402
 from judge_entries import GroundEntry  # noqa: E402
@@ -115,6 +118,57 @@ def the_truth_is_found_and_others_are_not(folder):
     assert "figures.html" in run.stdout and (folder / "out" / "figures.html").stat().st_size > 10000
 
 
+def a_command(folder):
+    """`python -m mild judge` from anywhere; where no repository is, one line."""
+    run = subprocess.run([sys.executable, "-m", "mild", "judge", "--records", folder / "none"], capture_output=True, text=True, cwd=folder)
+    assert run.returncode == 2 and run.stderr.startswith("judge.py: ") and "manifest.json" in run.stderr, run.stderr
+    package = folder / "alone"  # as installed: nothing of the repository above it
+    package.mkdir()
+    (package / "judge.py").write_text((SOURCE / "python" / "mild" / "judge.py").read_text())
+    run = subprocess.run([sys.executable, package / "judge.py"], capture_output=True, text=True, cwd=folder)
+    assert run.returncode == 2 and run.stderr.startswith("mild judge: ") and run.stderr.count("\n") == 1, run.stderr
+    run = subprocess.run([MILD, "judge"], capture_output=True, text=True)
+    assert run.returncode == 2 and run.stderr.count("\n") == 1 and "python -m mild judge" in run.stderr, run.stderr
+
+
+def real_numbers():
+    """Poppy seeds by hand; and resistive force theory (ecc_quasi), whose own table is of all their media, is near them."""
+    up, along = judge_anchors.poppy_stress("loose", math.radians(30), math.pi / 2)
+    assert abs(up - (0.134 + 0.5 * 0.120)) < 1e-12 and abs(along - math.sqrt(0.75) * 0.051) < 1e-12
+    assert [round(judge_anchors.poppy_stress(packing, 0, math.pi / 2)[0], 3) for packing in ("loose", "close")] == [0.254, 0.464]
+    entries = [GroundEntry(name) for name in ("ecc_quasi", "mild", "mild_merged")]
+    for degrees in (15, 30):
+        force, _ = judge_anchors.tilted(entries, degrees)
+        print(f"tilted by {degrees} degrees:", {name: round(value, 3) for name, value in force.items()})
+        level, tilted = (judge_anchors.poppy_stress("loose", math.radians(angle), math.pi / 2)[0] for angle in (0, degrees))
+        assert abs(force["ecc_quasi"] / (tilted / level) - 1) < 0.03
+        assert abs(force["mild"] - 1) < 1e-3 and abs(force["mild_merged"] - math.cos(math.radians(degrees))) < 1e-3
+
+
+def mild_fit_says_the_same(folder):
+    """The judge's numbers of sand, from the mean of eight beds and elements of 10 mm, are within the intervals that `mild fit` gives
+    five beds of the same records and the paper's elements."""
+    records = judge_module.Records(SOURCE / "grains" / "records")
+    names, ground = judge_module.FITS["sand"][0], records.ground("sand")
+    entry = GroundEntry("mild_merged")
+    entry.fit({f"sand/{name}": (records.cases[f"sand/{name}"][0], judge_module.mean_rows(records.cases[f"sand/{name}"][1])) for name in names}, ground)
+    words = []
+    for name, plate in zip(names, ("0.12", "0.1,0.1", "0.1,0.1")):
+        for bed, rows in enumerate(records.cases[f"sand/{name}"][1][:5]):
+            file = folder / f"{name}-{bed}.csv"
+            columns = np.column_stack([rows[column] for column in ("time", "depth", "fz", "path", "fx")])
+            np.savetxt(file, columns, delimiter=",", header="time_s,depth_m,force_n,slip_m,force_x_n", comments="")
+            words += [str(file), "--plate", plate]
+    hold = {"alpha": 0.3, "phi": np.mean(ground["solid"]), "rho": ground["density"], "mu": ground["friction"]}
+    subprocess.run([MILD, "fit", *words, "--model", "mild_merged", "--hold", ",".join(f"{key}={value}" for key, value in hold.items()),
+                    "--json", folder / "fit.json"], check=True, capture_output=True)
+    found = json.loads((folder / "fit.json").read_text())["parameters"]
+    for name in ("slip_length", "grip"):
+        number, interval = getattr(entry.material, name), found[name]
+        print(f"{name}: the judge {number:.4g}, mild fit {interval['value']:.4g} ({interval['low']:.4g} to {interval['high']:.4g})")
+        assert interval["low"] < number < interval["high"] and abs(number / interval["value"] - 1) < 0.1
+
+
 def mistakes_are_one_line(folder):
     for args in (("--records", folder / "none"), ("--records", folder, "--families", "mud"),
                  ("--records", folder, "--entry", "none.py"),
@@ -129,7 +183,10 @@ def mistakes_are_one_line(folder):
 if __name__ == "__main__":
     a_sole_has_its_area()
     measures_by_hand()
+    real_numbers()
     with tempfile.TemporaryDirectory() as name:
         make(pathlib.Path(name))
         the_truth_is_found_and_others_are_not(pathlib.Path(name))
         mistakes_are_one_line(pathlib.Path(name))
+        mild_fit_says_the_same(pathlib.Path(name))
+        a_command(pathlib.Path(name))

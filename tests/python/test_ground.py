@@ -1,5 +1,6 @@
 """The ground of the package: numbers compared with formulas, with the program, and with the laws of mechanics."""
 import copy
+import math
 import os
 import pathlib
 import pickle
@@ -438,6 +439,62 @@ class Fit(unittest.TestCase):
         for own, alone, force in zip(fit.predict(X), other.predict(X), y):
             np.testing.assert_allclose(own, force, atol=0.01 * force.max())
             self.assertGreater(np.abs(alone - force).max(), 0.01 * force.max())
+
+    def slide(self, material, depth, load):
+        """A square of 0.1 m is pressed to a depth and slides 30 mm, led or under the load that it has: slip, depth, up, along."""
+        ground, table = mild.Ground([mild.Sole.plate(0.1, 0.1)], material, dt=1e-3), []
+        at, speed, mass = np.zeros(2), np.array([0.0, -0.05]), 0.0  # along and up
+        ground.inverse_inertia[:] = 0.0
+        for step in range(round(depth / 5e-5) + 600):
+            if step == round(depth / 5e-5):
+                mass = ground.force[0, 2] / 9.81 if load else 0.0
+                speed = np.array([0.05, 0.0])
+            ground.inverse_inertia[2, 2] = 1 / mass if mass else 0.0
+            ground.position[0] = at[0], 0, at[1]
+            ground.rotation[0] = np.eye(3)
+            ground.velocity[0] = speed[0], 0, speed[1], 0, 0, 0
+            ground.free_velocity[0] = speed[0], 0, speed[1] - (9.81e-3 if mass else 0.0), 0, 0, 0
+            ground.solve()
+            ground.advance()
+            speed[1] = ground.new_velocity[0, 2] if mass else speed[1]
+            at += 1e-3 * speed
+            table.append((at[0], -at[1], ground.force[0, 2], ground.force[0, 0]))
+        return np.array(table)
+
+    def test_drags(self):
+        """Plates that slide give slip_length, grip and, where they sink meanwhile, regain_length back."""
+        truth = mild.Material("sand_loose", slip_length=0.003, regain_length=0.0012, grip=0.13, recovery=0, phi=0.6, rho=2500)
+        truth.model = "mild_merged"
+        sizes, plate = [(0.1, 0.1), (0.2, 0.12)], (0.1, 0.1)
+        records = [mild.press(truth, mild.Sole.plate(*size), depth=0.03) for size in sizes]
+        X, y = zip(*(mild.loading(press.time, press.depth, press.force) for press in records))
+        hold = {name: getattr(truth, name) for name in ("alpha", "c_g", "c_d", "phi", "rho")}
+        drags = [(plate, self.slide(truth, 0.015, load)) for load in (False, True)]
+        self.assertGreater(drags[1][1][-1, 1], 0.022)  # it has sunk
+        level = mild.GroundFit(sizes, "mild_merged", hold={**hold, "mu": 0.5}).fit(X, y, drags=drags[:1])
+        self.assertAlmostEqual(level.parameters_["slip_length"], 0.003, delta=3e-5)
+        self.assertAlmostEqual(level.parameters_["grip"], 0.13, delta=1.3e-3)
+        self.assertEqual(level.states_["regain_length"], "no_effect")
+        both = mild.GroundFit(sizes, "mild_merged", hold={**hold, "mu": 0.5}).fit(X, y, drags=drags)
+        self.assertAlmostEqual(both.parameters_["slip_length"], 0.003, delta=6e-5)
+        self.assertAlmostEqual(both.parameters_["regain_length"], 0.0012, delta=1e-4)
+        self.assertLess(both.drag_residual_, 0.02 * drags[0][1][:, 2].max())
+        self.assertEqual(both.material_.slip_length, both.parameters_["slip_length"])
+        none = drags[0][1].copy()
+        none[:, 3] = np.nan  # friction was not measured
+        self.assertTrue(math.isnan(mild.GroundFit(sizes, "mild_merged", hold=hold).fit(X, y, drags=[(plate, none)]).parameters_["grip"]))
+        rng, missed = np.random.default_rng(1), 0
+        for _ in range(20):
+            noisy = drags[0][1][::5] * (1 + 0.04 * rng.normal(size=drags[0][1][::5].shape) * [0, 0, 1, 1])
+            found = mild.GroundFit(sizes, "mild_merged", hold={**hold, "mu": 0.5}).fit(X, y, drags=[(plate, noisy)]).intervals_
+            missed += sum(not low <= true <= high for (low, high), true in ((found["slip_length"], 0.003), (found["grip"], 0.13)))
+        self.assertLessEqual(missed, 6)  # of 40
+        for wrong, name in (([(plate, none[:, :3])], "shape"), ([(plate, none[:5])], "slide"), ([1], "plate"), ([(3, none)], "plate"),
+                            ([(plate, none)] * 17, "16")):
+            with self.assertRaisesRegex((ValueError, TypeError), name):
+                mild.GroundFit(sizes, "mild_merged", hold=hold).fit(X, y, drags=wrong)
+        with self.assertRaisesRegex(ValueError, "bekker"):
+            mild.GroundFit(sizes, "bekker").fit(X, y, drags=drags)
 
     def test_estimator(self):
         fit = mild.GroundFit(model="bekker")
