@@ -22,7 +22,8 @@ from judge_cases import COLUMNS
 
 STEP = 1e-3  # [s] of the ground models
 PITCH = 0.01  # [m] of their soles' elements: at 19.5 mm a plate's raster is up to 6 % off its area, which no law can mend
-REGAIN = 0.136  # [grains] regain_length of mild_merged, from loads that slide on grains of 5 mm
+REGAIN = 0.28  # [-] regain_length of mild_merged by its slip_length, from loads that slide on grains of 5 mm
+GROWTH = 0.08  # [-] slip_growth, from squares dragged 40 and 80 mm deep
 REFILL = 0.22  # [-] from an imprint pressed again, sand/square100-again
 HEAPS = 9  # [-] by the heap of a sole, the mass that moves with it: momentum of sand/square100-drop10 beyond that of a slow press
 
@@ -98,12 +99,12 @@ class GroundEntry:
         """slip_length and grip as `mild fit` finds them (src/identify/fit_drag.h). A level drag does not tell regain_length, and
         nothing fitted tells refill."""
         hold = {name: getattr(self.material, name) for name in ("alpha", "phi", "rho", "mu")}
-        hold["regain_length"] = REGAIN * self.grain
+        hold["slip_growth"] = GROWTH
         slides = [(mild.Sole(case.sole.outline, self.pitch), np.column_stack([rows[name] for name in ("path", "depth", "fz", "fx")]))
                   for case, rows in drags]
         found = mild.GroundFit(soles, self.model, hold=hold).fit(*data, drags=slides).material_
-        self.material = mild.Material(self.material, slip_length=found.slip_length, grip=found.grip,
-                                      regain_length=REGAIN * self.grain, refill=REFILL)
+        self.material = mild.Material(self.material, slip_length=found.slip_length, slip_growth=GROWTH, grip=found.grip,
+                                      regain_length=max(REGAIN * found.slip_length, 1e-4), refill=REFILL)
 
     def fit_friction(self, case, rows):
         """The friction with which the drag's horizontal force is the grains' share of the load."""

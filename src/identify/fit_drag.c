@@ -28,9 +28,10 @@ static void path_go(Path *path, const FitPoint *row, const Share *share, int gro
     const double way = row->slip - path->slip;
     const double fresh = fmax(row->depth - path->deepest, 0);
     const int strides = (int)fmin(1 + way / STRIDE, STRIDES_MAX);
+    const double longer = strides * (1 + (double)share->growth * fmax(row->depth, 0));
     for (int i = 0; i < strides; i++) {
-        const double left = grows ? exp(-fresh / strides * (double)share->regain_rate) : 1;
-        path->share /= 1 + path->share * way / strides * (double)share->slip_rate;
+        const double left = grows ? exp(-fresh / longer * (double)share->regain_rate) : 1;
+        path->share /= 1 + path->share * way / longer * (double)share->slip_rate;
         path->share = 1 - (1 - path->share) * left;
     }
     path->slip = row->slip;

@@ -119,7 +119,8 @@ static int is_sensed(MildModel model, FitKind kind, const MildField *field, doub
 
 int fit_is_geometry(MildModel model, const char *name) {
     return reads(model, name) &&
-           (strcmp(name, "bed_depth") == 0 || strcmp(name, "plate_width") == 0);
+           (strcmp(name, "bed_depth") == 0 || strcmp(name, "plate_width") == 0 ||
+            strcmp(name, "slip_growth") == 0);
 }
 
 /* Bool: the parameter is one that a plate tells that slides where slip costs support. */

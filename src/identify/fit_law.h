@@ -47,8 +47,8 @@ enum { FIT_PROBES = 2 };
 MildMaterial fit_probe(int number);
 /* Bool: the force depends on it only through speed or acceleration. */
 int fit_is_rate(MildModel model, const MildField *field);
-/* Bool: a number that is never fitted: bed_depth, which may be held, or bekker's plate_width, which
- * is the plate's. */
+/* Bool: a number that is never fitted: bed_depth or slip_growth, which may be held, or bekker's
+ * plate_width, which is the plate's. */
 int fit_is_geometry(MildModel model, const char *name);
 /* Range in which a parameter is fitted or held: the material's. Ground that creates no energy has
  * c_d >= 1/2 and c_g >= 0. */

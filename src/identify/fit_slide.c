@@ -18,6 +18,7 @@ MildMaterial fit_slide_base(const MildMaterial *known, const MildMaterial *press
     base.slip_length = known->slip_length;
     base.regain_length = known->regain_length;
     base.grip = known->grip;
+    base.slip_growth = known->slip_growth;
     return base;
 }
 
