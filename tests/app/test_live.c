@@ -37,14 +37,12 @@ static void check_presets(int patches) {
     assert_true(episode.height == 0.25);
 }
 
-static void presets_lie_everywhere(void **state) {
-    (void)state;
+TEST(presets_lie_everywhere) {
     check_presets(0);
     check_presets(1);
 }
 
-static void keys_scale(void **state) {
-    (void)state;
+TEST(keys_scale) {
     const MildTerrain terrain = course();
     const MildMaterial *was = &terrain.materials[0], *is;
     Live live = live_begin(&terrain, 2);
@@ -77,8 +75,7 @@ static void keys_scale(void **state) {
     assert_memory_equal(&live.terrain.materials[2], &terrain.materials[2], sizeof *was);
 }
 
-static void other_models_scale(void **state) {
-    (void)state;
+TEST(other_models_scale) {
     MildMaterial clay;
     assert_true(mild_material_preset("clay", &clay));
     const MildTerrain terrain = mild_terrain_uniform(&clay);
@@ -109,8 +106,7 @@ static double sinkage_after(const Robot *robot, RobotSim *sim, const Stand *stan
 
 /* The robot stands on rubber, which becomes softer and softer under it: it sinks to the rest depth
  * of the law. Another preset does not reach it while it stands. */
-static void a_standing_robot_sinks(void **state) {
-    (void)state;
+TEST(a_standing_robot_sinks) {
     MildError error = {0};
     Robot *robot = robot_create(SA01, &error);
     assert_non_null(robot);
@@ -149,12 +145,4 @@ static void a_standing_robot_sinks(void **state) {
     robot_destroy(robot);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(presets_lie_everywhere),
-        cmocka_unit_test(keys_scale),
-        cmocka_unit_test(other_models_scale),
-        cmocka_unit_test(a_standing_robot_sinks),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -34,8 +34,7 @@ static void assert_holds(const char *path, const char *text) {
     free(bytes);
 }
 
-static void test_only_regular_files_are_read(void **state) {
-    (void)state;
+TEST(test_only_regular_files_are_read) {
     size_t size;
     assert_int_equal(mkfifo("pipe", 0600), 0);
     alarm(20); /* a reader that waits at the pipe ends the test */
@@ -55,8 +54,7 @@ static void test_only_regular_files_are_read(void **state) {
     assert_int_equal(error.status, MILD_ERROR_FORMAT);
 }
 
-static void test_write_whole_or_not(void **state) {
-    (void)state;
+TEST(test_write_whole_or_not) {
     MildError error = {0};
     assert_int_equal(file_write("file", "old", 3, &error), MILD_OK);
     assert_int_equal(file_write("file", "newer", 5, &error), MILD_OK);
@@ -70,8 +68,7 @@ static void test_write_whole_or_not(void **state) {
 }
 
 /* Temporary files never take a name that is in use. */
-static void test_temporaries(void **state) {
-    (void)state;
+TEST(test_temporaries) {
     MildError error = {0};
     char first[PATH_SIZE], second[PATH_SIZE];
     assert_int_equal(file_write("out.tmp", "mine", 4, &error), MILD_OK);
@@ -94,8 +91,7 @@ static void test_temporaries(void **state) {
     assert_holds(first, "taken");
 }
 
-static void test_same_file(void **state) {
-    (void)state;
+TEST(test_same_file) {
     MildError error = {0};
     assert_int_equal(file_write("one", "1", 1, &error), MILD_OK);
     assert_int_equal(file_write("two", "1", 1, &error), MILD_OK);
@@ -110,8 +106,7 @@ static void test_same_file(void **state) {
 }
 
 /* What is claimed as an output cannot be read, by whatever name, nor be claimed twice. */
-static void test_claims(void **state) {
-    (void)state;
+TEST(test_claims) {
     MildError error = {0};
     size_t size;
     assert_int_equal(file_write("claimed", "1", 1, &error), MILD_OK);
@@ -136,8 +131,7 @@ static void test_claims(void **state) {
 }
 
 /* Files that the program writes by itself are written in no other place. */
-static void test_own(void **state) {
-    (void)state;
+TEST(test_own) {
     MildError error = {0};
     assert_int_equal(file_write("own", "1", 1, &error), MILD_OK);
     assert_int_equal(symlink("own", "own_soft"), 0);
@@ -151,8 +145,7 @@ static void test_own(void **state) {
     }
 }
 
-static void test_beside(void **state) {
-    (void)state;
+TEST(test_beside) {
     char path[PATH_SIZE];
     assert_int_equal(path_beside("runs/a.png", "_fit.csv", path, NULL), MILD_OK);
     assert_string_equal(path, "runs/a_fit.csv");
@@ -175,8 +168,7 @@ static int other_gets_lock(void) {
     return WEXITSTATUS(code) == 0;
 }
 
-static void test_lock(void **state) {
-    (void)state;
+TEST(test_lock) {
     FileLock lock;
     MildError error = {0};
     assert_true(other_gets_lock());
@@ -191,8 +183,7 @@ static void test_lock(void **state) {
 }
 
 /* Somebody else's file of that name stays. */
-static void test_foreign_lock(void **state) {
-    (void)state;
+TEST(test_foreign_lock) {
     static const char *const texts[] = {"", "mine", "A lock of mild."};
     FileLock lock;
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
@@ -211,8 +202,7 @@ static void test_foreign_lock(void **state) {
     assert_int_equal(access("elsewhere", F_OK), -1);
 }
 
-static void test_text(void **state) {
-    (void)state;
+TEST(test_text) {
     char text[32];
     assert_int_equal(text_distance("kitten", "sitting"), 3);
     assert_int_equal(text_distance("", "abc"), 3);
@@ -224,18 +214,4 @@ static void test_text(void **state) {
                  text_double("nan", &number));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_only_regular_files_are_read),
-        cmocka_unit_test(test_write_whole_or_not),
-        cmocka_unit_test(test_temporaries),
-        cmocka_unit_test(test_same_file),
-        cmocka_unit_test(test_claims),
-        cmocka_unit_test(test_own),
-        cmocka_unit_test(test_beside),
-        cmocka_unit_test(test_lock),
-        cmocka_unit_test(test_foreign_lock),
-        cmocka_unit_test(test_text),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -5,8 +5,7 @@
 #include "kit.h"
 #include "mild/error.h"
 
-static void test_distance(void **state) {
-    (void)state;
+TEST(test_distance) {
     static const struct {
         const char *a, *b;
         int distance;
@@ -41,8 +40,7 @@ static void test_distance(void **state) {
     assert_int_equal(text_distance(longer, ""), 63);
 }
 
-static void test_nearest(void **state) {
-    (void)state;
+TEST(test_nearest) {
     static const char *const names[] = {"rubber", "foam60", "foam45", "sand_loose"};
     assert_string_equal(text_nearest("foam44", names, 4), "foam45");
     assert_string_equal(text_nearest("foam", names, 4), "foam60");     /* the first of two alike */
@@ -54,8 +52,7 @@ static void test_nearest(void **state) {
     assert_null(text_nearest("foam", names, 0));
 }
 
-static void test_numbers(void **state) {
-    (void)state;
+TEST(test_numbers) {
     double number = 7;
     assert_true(text_double("-1.5e-3", &number) && number == -1.5e-3);
     assert_true(text_double("0", &number) && number == 0);
@@ -87,8 +84,7 @@ static void test_numbers(void **state) {
     assert_true(large == 9);
 }
 
-static void test_bytes(void **state) {
-    (void)state;
+TEST(test_bytes) {
     char text[32];
     assert_string_equal(text_bytes(0, text, sizeof text), "0 B");
     assert_string_equal(text_bytes(1023, text, sizeof text), "1023 B");
@@ -99,8 +95,7 @@ static void test_bytes(void **state) {
     assert_string_equal(text_bytes(2048 * 1099511627776.0, text, sizeof text), "2048.00 TiB");
 }
 
-static void test_duration(void **state) {
-    (void)state;
+TEST(test_duration) {
     static const struct {
         double seconds;
         const char *text;
@@ -125,8 +120,7 @@ static void test_duration(void **state) {
 }
 
 /* What a terminal obeys, or what is no UTF-8, becomes '?', byte by byte. */
-static void test_plain(void **state) {
-    (void)state;
+TEST(test_plain) {
     static const struct {
         const char *text, *keep, *plain;
         size_t torn;
@@ -169,11 +163,4 @@ static void test_plain(void **state) {
     assert_string_equal(error.text, "no file '?[31mred?'");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_distance), cmocka_unit_test(test_nearest),
-        cmocka_unit_test(test_numbers),  cmocka_unit_test(test_bytes),
-        cmocka_unit_test(test_duration), cmocka_unit_test(test_plain),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -385,8 +385,7 @@ static int same_steps(int points, const Worst *worst) {
                         0.04 * scale * worst->iterations_ground;
 }
 
-static void double_text_is_the_ground(void **state) {
-    (void)state;
+TEST(double_text_is_the_ground) {
     for (int i = 0; i < SHAPES; i++) {
         static Worst worst;
         worst = (Worst){0};
@@ -398,8 +397,7 @@ static void double_text_is_the_ground(void **state) {
     }
 }
 
-static void float_text_is_near_it(void **state) {
-    (void)state;
+TEST(float_text_is_near_it) {
     for (int i = 0; i < SHAPES; i++) {
         static Worst worst;
         worst = (Worst){0};
@@ -562,8 +560,7 @@ static void run_relief(const Relief *relief, int walks, double tolerance,
     }
 }
 
-static void double_text_is_the_ground_on_maps(void **state) {
-    (void)state;
+TEST(double_text_is_the_ground_on_maps) {
     for (int i = 0; i < RELIEFS; i++) {
         static Worst worst;
         worst = (Worst){0};
@@ -575,8 +572,7 @@ static void double_text_is_the_ground_on_maps(void **state) {
     }
 }
 
-static void float_text_is_near_it_on_maps(void **state) {
-    (void)state;
+TEST(float_text_is_near_it_on_maps) {
     for (int i = 0; i < RELIEFS; i++) {
         static Worst worst;
         worst = (Worst){0};
@@ -589,12 +585,4 @@ static void float_text_is_near_it_on_maps(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(double_text_is_the_ground),
-        cmocka_unit_test(float_text_is_near_it),
-        cmocka_unit_test(double_text_is_the_ground_on_maps),
-        cmocka_unit_test(float_text_is_near_it_on_maps),
-    };
-    return cmocka_run_group_tests(tests, open_soles, close_soles);
-}
+TEST_MAIN(open_soles, close_soles)

@@ -61,8 +61,7 @@ static char *text_of(ExperimentDef *def) {
 }
 
 /* The defaults with the paper's numbers are the file, and the file has them all. */
-static void the_file_is_the_paper(void **unused) {
-    (void)unused;
+TEST(the_file_is_the_paper) {
     MildError error = {0};
     ExperimentDef file = read_paper(), paper = experiment_def_default();
     if (experiment_read(&paper, NULL, printed, PRINTED, &error) != MILD_OK) {
@@ -85,8 +84,7 @@ static void the_file_is_the_paper(void **unused) {
 }
 
 /* Every key that the paper prints is named in the file, not left to a default. */
-static void the_file_names_them(void **unused) {
-    (void)unused;
+TEST(the_file_names_them) {
     for (int i = 0; i < PRINTED; i++) {
         const char *key = strchr(printed[i], '.') + 1;
         char name[64], line[512];
@@ -105,8 +103,7 @@ static void the_file_names_them(void **unused) {
 }
 
 /* 154 elements of 0.0195 m; gains for the six joints of each leg. */
-static void the_robot_is_the_papers(void **unused) {
-    (void)unused;
+TEST(the_robot_is_the_papers) {
     MildError error = {0};
     const double kp[6] = {50, 50, 70, 70, 20, 20}, kd[6] = {5, 5, 7, 7, 0.2, 0.2};
     TaskGains own;
@@ -128,8 +125,7 @@ static void the_robot_is_the_papers(void **unused) {
 }
 
 /* Two iterations, with both kinds of robots. */
-static void it_trains(void **unused) {
-    (void)unused;
+TEST(it_trains) {
     const TrainRobots kinds[] = {TRAIN_ROBOTS_MUJOCO, TRAIN_ROBOTS_BATCH};
     for (int k = 0; k < 2; k++) {
         MildError error = {0};
@@ -151,12 +147,4 @@ static void it_trains(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_file_is_the_paper),
-        cmocka_unit_test(the_file_names_them),
-        cmocka_unit_test(the_robot_is_the_papers),
-        cmocka_unit_test(it_trains),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

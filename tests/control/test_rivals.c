@@ -115,8 +115,7 @@ static double run(Controller *controller, const Reference *r) {
 }
 
 /* Also a second time, after the first has filled every context. */
-static void as_pytorch(void **state) {
-    (void)state;
+TEST(as_pytorch) {
     static Reference r;
     for (int k = 0; k < 2; k++) {
         char path[256];
@@ -193,8 +192,7 @@ static void rewrite(const Change *change) {
     safetensors_destroy(file);
 }
 
-static void one_clear_line(void **state) {
-    (void)state;
+TEST(one_clear_line) {
     static const Change changes[] = {
         {"clock", "kind", "mild policy", .names = PATH " --policy"},
         {"ht2", "kind", NULL, .names = PATH " ht2 --policy"},
@@ -233,10 +231,4 @@ static void one_clear_line(void **state) {
     unlink(PATH);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(as_pytorch),
-        cmocka_unit_test(one_clear_line),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

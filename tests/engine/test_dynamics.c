@@ -316,8 +316,7 @@ static void run_case(const Kit *kit, const EngineCase *in, Worst at_double, doub
     *newton = result.newton > *newton ? result.newton : *newton;
 }
 
-static void test_random_states(void **unused) {
-    (void)unused;
+TEST(test_random_states) {
     static const int all[KITS] = {10000, 10000, 3000, 10000, 600};
     for (int k = 0; k < KITS; k++) {
         const int cases = some(all[k]);
@@ -341,8 +340,7 @@ static void test_random_states(void **unused) {
 
 /* ---- rigid ground ---- */
 
-static void test_rigid_ground(void **unused) {
-    (void)unused;
+TEST(test_rigid_ground) {
     static const int all[KITS] = {10000, 10000, 3000, 10000, 600};
     for (int k = 0; k < KITS; k++) {
         const int cases = some(all[k]);
@@ -361,8 +359,7 @@ static void test_rigid_ground(void **unused) {
 }
 
 /* A time constant below two steps is two steps. Rows so stiff are rough in float. */
-static void test_shortest_time(void **unused) {
-    (void)unused;
+TEST(test_shortest_time) {
     Worst at_double = {0};
     int touching = 0, newton = 0;
     for (uint32_t draw = 0; draw < 100; draw++) {
@@ -466,8 +463,7 @@ static void run_relief(const Relief *relief, int k, const MildMap *map) {
 }
 
 /* Rigid ground of a map, and what is measured above it, as RobotSim has them. */
-static void test_maps(void **unused) {
-    (void)unused;
+TEST(test_maps) {
     for (int r = 0; r < RELIEFS; r++) {
         MildMap *map = relief_map(&reliefs[r]);
         for (int k = 0; k < KITS; k++) {
@@ -478,8 +474,7 @@ static void test_maps(void **unused) {
 }
 
 /* No lane of a block needs what another one does there: on a GPU they run at once. */
-static void test_order_of_lanes(void **unused) {
-    (void)unused;
+TEST(test_order_of_lanes) {
     static EngineResult reverse;
     for (int k = 0; k < KITS; k++) {
         for (uint32_t draw = 0; draw < 200; draw++) {
@@ -613,8 +608,7 @@ static double march(March kind, const EngineCase *start, Follower followers[2]) 
     return load;
 }
 
-static void test_march(void **unused) {
-    (void)unused;
+TEST(test_march) {
     const Robot *robot = kits[SA01_KIT].robot;
     EngineCase start = {.qpos = {0, 0, robot->stand_height + 0.002, 1}};
     memcpy(start.qpos + 7, robot->def.pose, sizeof robot->def.pose);
@@ -645,8 +639,7 @@ static void test_march(void **unused) {
 
 /* ---- the model ---- */
 
-static void test_sizes(void **unused) {
-    (void)unused;
+TEST(test_sizes) {
     char text[200];
     engine_model_sizes(&kits[SA01_KIT].tree, text, sizeof text);
     print_message("sa01: %s\n", text);
@@ -659,8 +652,7 @@ static void test_sizes(void **unused) {
 }
 
 /* What the engine does not compute is refused by name. */
-static void test_refusals(void **unused) {
-    (void)unused;
+TEST(test_refusals) {
     Kit *kit = &kits[GO1_KIT];
     mjModel *m = kit->robot->model;
     EngineTree tree;
@@ -681,8 +673,7 @@ static void test_refusals(void **unused) {
 }
 
 /* A velocity that is not a number, or beyond any robot's, is said. */
-static void test_bad_numbers(void **unused) {
-    (void)unused;
+TEST(test_bad_numbers) {
     const Kit *kit = &kits[SA01_KIT];
     EngineCase in = random_case(kit->robot, 1);
     static const double torques[] = {NAN, 1e9, 1};
@@ -696,13 +687,4 @@ static void test_bad_numbers(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random_states),  cmocka_unit_test(test_rigid_ground),
-        cmocka_unit_test(test_shortest_time),  cmocka_unit_test(test_maps),
-        cmocka_unit_test(test_order_of_lanes), cmocka_unit_test(test_march),
-        cmocka_unit_test(test_sizes),          cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_bad_numbers),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

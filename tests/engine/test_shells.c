@@ -175,8 +175,7 @@ static EngineModel *read_model(const Robot *robot) {
     return model;
 }
 
-static void bodies_are_those_of_mujoco(void **unused) {
-    (void)unused;
+TEST(bodies_are_those_of_mujoco) {
     for (int r = 0; r < ROBOTS; r++) {
         MildError error = {0};
         Robot *robot = robot_open(names[r], &error);
@@ -210,8 +209,7 @@ static void bodies_are_those_of_mujoco(void **unused) {
 }
 
 /* Without them the engine knows of none. */
-static void shells_that_do_not_stand_have_no_bodies(void **unused) {
-    (void)unused;
+TEST(shells_that_do_not_stand_have_no_bodies) {
     Robot *robot = robot_open("sa01", NULL);
     assert_non_null(robot);
     EngineModel *model = read_model(robot);
@@ -220,10 +218,4 @@ static void shells_that_do_not_stand_have_no_bodies(void **unused) {
     robot_destroy(robot);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bodies_are_those_of_mujoco),
-        cmocka_unit_test(shells_that_do_not_stand_have_no_bodies),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

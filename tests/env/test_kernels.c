@@ -41,8 +41,7 @@ static void is_slow(const char *folder, int wanted) {
     robot_destroy(robot);
 }
 
-static void robots_of_another_size_are_slow(void **unused) {
-    (void)unused;
+TEST(robots_of_another_size_are_slow) {
     any_fits = 1;
     is_slow(MILD_SOURCE_DIR "/robots/go1", 0);
     is_slow(MILD_SOURCE_DIR "/robots/sa01", 1);
@@ -50,9 +49,4 @@ static void robots_of_another_size_are_slow(void **unused) {
     is_slow(MILD_SOURCE_DIR "/robots/sa01", 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(robots_of_another_size_are_slow),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -40,8 +40,7 @@ static size_t measure(const MildMapDef *on) {
 }
 
 /* With a share of 16 B of what all these robots have in common. */
-static void sizes(void **unused) {
-    (void)unused;
+TEST(sizes) {
     MildMapDef waves = mild_map_def_default();
     waves.kind = MILD_MAP_WAVES;
     const size_t level = measure(NULL), map = measure(&waves);
@@ -49,9 +48,4 @@ static void sizes(void **unused) {
     assert_int_equal(map - level, (4 * 160 + 32) * sizeof(float)); /* the ground's */
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sizes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

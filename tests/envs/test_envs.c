@@ -69,8 +69,7 @@ static MildEnvs *open_envs(const char *const *overrides, int count) {
     return envs;
 }
 
-static void numbers_of_the_environments(void **state) {
-    (void)state;
+TEST(numbers_of_the_environments) {
     static Plain plain;
     static Rows a, b;
     MildEnvs *envs = open_envs(keys, KEYS);
@@ -126,8 +125,7 @@ static void numbers_of_the_environments(void **state) {
 }
 
 /* The batch engine on the CPU sees what MuJoCo sees, within the rounding of float. */
-static void batch_engine(void **state) {
-    (void)state;
+TEST(batch_engine) {
     static Rows a, b;
     const char *batch[KEYS];
     memcpy(batch, keys, sizeof batch);
@@ -166,8 +164,7 @@ static int play_alone(Plain *plain, int e, float history[SA01_HISTORY], TaskStep
 }
 
 /* The end of an episode is told without changing what follows. */
-static void ends(void **state) {
-    (void)state;
+TEST(ends) {
     static Plain plain;
     static Rows a, b, last;
     static float terms[ENVS][TASK_REWARD_COUNT];
@@ -223,8 +220,7 @@ static void ends(void **state) {
 }
 
 /* The batch engine does not tell it, and says so. */
-static void no_ends(void **state) {
-    (void)state;
+TEST(no_ends) {
     static Rows rows, last;
     const char *batch[KEYS];
     memcpy(batch, keys, sizeof batch);
@@ -245,8 +241,7 @@ static void no_ends(void **state) {
     mild_envs_close(envs);
 }
 
-static void mirror(void **state) {
-    (void)state;
+TEST(mirror) {
     MildEnvs *envs = open_envs(keys, KEYS);
     MildError error = {0};
     Robot *robot = robot_create(SA01, &error);
@@ -262,8 +257,7 @@ static void mirror(void **state) {
     mild_envs_close(envs);
 }
 
-static void one_clear_line(void **state) {
-    (void)state;
+TEST(one_clear_line) {
     static const struct {
         const char *config, *key;
         MildStatus status;
@@ -288,14 +282,4 @@ static void one_clear_line(void **state) {
     mild_envs_close(NULL);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(numbers_of_the_environments),
-        cmocka_unit_test(batch_engine),
-        cmocka_unit_test(ends),
-        cmocka_unit_test(no_ends),
-        cmocka_unit_test(mirror),
-        cmocka_unit_test(one_clear_line),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -84,8 +84,7 @@ static void see_trunk(void *context, const EvalDecision *decision) {
 }
 
 /* Anywhere within the ranges of its joints, and at their ends, a leg is clear of the trunk. */
-static void legs_cannot_reach_the_trunk(void **unused) {
-    (void)unused;
+TEST(legs_cannot_reach_the_trunk) {
     double least = 1;
     for (int n = 0; n < 4000; n++) {
         Random random = random_at(17, (uint32_t)n, 0);
@@ -146,8 +145,7 @@ static EvalRow lie(const char *file, const char *ground, Trunk *trunk, EvalTrial
 
 /* It needs a second to come to rest, and comes up after that. Standing it carries itself on its
  * feet, so that its shells had little to do. */
-static void it_rights_itself(void **unused) {
-    (void)unused;
+TEST(it_rights_itself) {
     static const char *const grounds[] = {"rigid", "foam45", "sand_dense"};
     EvalTrial each[TRIALS];
     Trunk trunk = {.least = 1};
@@ -166,8 +164,7 @@ static void it_rights_itself(void **unused) {
 }
 
 /* It stays on the ground, where its shells carry it, and that ends no trial. */
-static void the_walking_policy_does_not(void **unused) {
-    (void)unused;
+TEST(the_walking_policy_does_not) {
     EvalTrial each[TRIALS];
     Trunk trunk = {.least = 1};
     const EvalRow row = lie(WALKS, "foam45", &trunk, each);
@@ -177,11 +174,4 @@ static void the_walking_policy_does_not(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(legs_cannot_reach_the_trunk),
-        cmocka_unit_test(it_rights_itself),
-        cmocka_unit_test(the_walking_policy_does_not),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -9,8 +9,7 @@
 #include "sa01.h"
 
 /* Turned by 0.7 rad about z, then pitched by 0.3 and rolled by -0.2 rad, knees bent. */
-static void a_point_of_a_turned_robot(void **state) {
-    (void)state;
+TEST(a_point_of_a_turned_robot) {
     MildError error = {0};
     Robot *robot = robot_create(SA01, &error);
     assert_non_null(robot);
@@ -74,7 +73,4 @@ static void a_point_of_a_turned_robot(void **state) {
     robot_destroy(robot);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_point_of_a_turned_robot)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -94,8 +94,7 @@ static const char *const grounds[5] = {"sand_loose", "sand_dense", "grass", "foa
 
 /* A body of 20 kg takes many steps to stop. One of 1 kg stops within a step of 5 ms on sand: see
  * test_drops in test_step.c. */
-static void test_drop(void **state) {
-    (void)state;
+TEST(test_drop) {
     static const double mass[3] = {20.0, 3.0, 1.0}, height[4] = {2e-3, 5.3e-3, 13.7e-3, 50e-3},
                         bar[3] = {0.02, 0.02, 0.1};
     MildSole *plate = kit_plate(11, 7);
@@ -135,8 +134,7 @@ static void hold(const MildMaterial *m, double mass, double t, double force[3]) 
     force[0] = 0.4 * m->mu * mass * KIT_GRAVITY;
 }
 
-static void test_load(void **state) {
-    (void)state;
+TEST(test_load) {
     MildSole *sole = kit_sole(0, 77);
     double worst = 0.0;
     for (int g = 0; g < 5; g++) {
@@ -159,7 +157,4 @@ static void test_load(void **state) {
     mild_sole_destroy(sole);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_drop), cmocka_unit_test(test_load)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

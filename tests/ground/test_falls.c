@@ -357,8 +357,7 @@ static void falls_print(const char *name, const Falls *all) {
         all->spun_least);
 }
 
-static void falls_gain_nothing(void **state) {
-    (void)state;
+TEST(falls_gain_nothing) {
     static const char *const names[KINDS] = {"robots", "anything"};
     for (int kind = 0; kind < KINDS; kind++) {
         Falls all = {.spun_least = INFINITY};
@@ -374,8 +373,7 @@ static void falls_gain_nothing(void **state) {
 
 /* They bounce within one step. docs/model.md section 17 derives that friction gives at most 32 % of
  * the kinetic energy there. */
-static void a_bounce_within_a_step_gains_little(void **state) {
-    (void)state;
+TEST(a_bounce_within_a_step_gains_little) {
     Falls all = {.spun_least = INFINITY};
     for (size_t i = 0; i < sizeof gained / sizeof *gained; i++) {
         fall_once(gained[i], ANY, &all);
@@ -391,7 +389,5 @@ int main(int argc, char **argv) {
     if (argc > 2) {
         first = strtoull(argv[2], NULL, 10);
     }
-    const struct CMUnitTest tests[] = {cmocka_unit_test(falls_gain_nothing),
-                                       cmocka_unit_test(a_bounce_within_a_step_gains_little)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_cases(NULL, NULL);
 }

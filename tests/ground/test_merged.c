@@ -78,8 +78,7 @@ static double paper_force(const MildMaterial *m, double radius, double area, dou
     return force * depth / PANELS;
 }
 
-static void test_round(void **state) {
-    (void)state;
+TEST(test_round) {
     static const double radii[] = {0.02, 0.04, 0.06, 0.12};
     static const double pitches[] = {0.0195, 0.01, 0.005};
     double worst = 0.0;
@@ -106,8 +105,7 @@ static void test_round(void **state) {
 }
 
 /* The heap on a rectangle a x b has the volume a^2 (3 b - a)/12 times the slope. */
-static void test_heap(void **state) {
-    (void)state;
+TEST(test_heap) {
     static const double sides[][2] = {{0.039, 0.039}, {0.078, 0.0585}, {0.12, 0.06}, {0.2, 0.1}};
     for (int k = 0; k < 4; k++) {
         const double b = sides[k][0], a = sides[k][1], pitch = a / 3;
@@ -142,8 +140,7 @@ static double moved_mass(const MildMaterial *m, const MildSole *sole, double dep
  * in motion, in the end all of its heap, have the momentum that it came with, until the heap over
  * its edge is whole. What that goes on with is lost where the plate is slowed by the rest, for soil
  * never pulls. */
-static void test_momentum(void **state) {
-    (void)state;
+TEST(test_momentum) {
     const double length = 0.12, width = 0.06, mass = 3.0, speed = 1.5;
     MildSole *sole = rectangle(length, width, 0.005);
     MildMaterial m = grains(0.3);
@@ -201,8 +198,7 @@ static void press_to(Kit *kit, double depth, int steps) {
 }
 
 /* A tilted plate: F = sum of s cos(theta) p(u). */
-static void test_tilt(void **state) {
-    (void)state;
+TEST(test_tilt) {
     static const double tilts[] = {0, 8, 15, 30};
     MildSole *sole = rectangle(0.12, 0.06, 0.01);
     const MildMaterial m = grains(0.104);
@@ -265,8 +261,7 @@ static double turned_moment(int model) {
     return fabs(moment) / (0.1 * load);
 }
 
-static void test_swipe(void **state) {
-    (void)state;
+TEST(test_swipe) {
     const double merged = turned_moment(MILD_MODEL_MILD_MERGED),
                  mild = turned_moment(MILD_MODEL_MILD);
     print_message("rotational swipe of a strip: merged %.4f (1/12 %.4f), mild %.4f (1/8)\n", merged,
@@ -278,8 +273,7 @@ static void test_swipe(void **state) {
 /* ---- slip ---- */
 
 /* A plate dragged at constant depth: F/F0 = 1/(1 + s/j0), at any step, for both models. */
-static void test_drag(void **state) {
-    (void)state;
+TEST(test_drag) {
     static const double steps[] = {0.25e-3, 1e-3, 2.5e-3, 5e-3};
     double worst = 0.0;
     for (int t = 0; t < 8; t++) {
@@ -314,8 +308,7 @@ static void test_drag(void **state) {
 
 /* Fresh penetration gives the support back: 1 - lambda falls as exp(-a/u0). Small steps: the share
  * is held in each. */
-static void test_regain(void **state) {
-    (void)state;
+TEST(test_regain) {
     MildSole *sole = rectangle(0.12, 0.06, 0.01);
     MildMaterial m = grains(0.104);
     m.slip_length = 0.0019;
@@ -345,8 +338,7 @@ static void test_regain(void **state) {
 
 /* A foot that slips under load sinks; the force of a sliding sole and its drag keep to grip's
  * bound. */
-static void test_sinks(void **state) {
-    (void)state;
+TEST(test_sinks) {
     MildSole *sole = rectangle(0.12, 0.06, 0.01);
     MildMaterial m = grains(0.104);
     double depth[2];
@@ -451,8 +443,7 @@ static double closed_motion(int number, double *scale) {
     return given;
 }
 
-static void test_closed(void **state) {
-    (void)state;
+TEST(test_closed) {
     double worst = -INFINITY, share = -INFINITY;
     int at = 0, gained = 0;
     for (int n = closed_first; n < closed_first + closed_count; n++) {
@@ -525,8 +516,7 @@ static double pumped(int model, double *paid) {
     return given;
 }
 
-static void test_pumped(void **state) {
-    (void)state;
+TEST(test_pumped) {
     static const int models[] = {MILD_MODEL_MILD, MILD_MODEL_MILD_MERGED};
     for (int i = 0; i < 2; i++) {
         double work;
@@ -538,18 +528,11 @@ static void test_pumped(void **state) {
 }
 
 int main(int count, char **arguments) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_round),    cmocka_unit_test(test_heap),
-        cmocka_unit_test(test_momentum), cmocka_unit_test(test_tilt),
-        cmocka_unit_test(test_swipe),    cmocka_unit_test(test_drag),
-        cmocka_unit_test(test_regain),   cmocka_unit_test(test_sinks),
-        cmocka_unit_test(test_closed),   cmocka_unit_test(test_pumped)};
-    const struct CMUnitTest closed[] = {cmocka_unit_test(test_closed)};
     if (count > 1) { /* ground_test_merged COUNT FIRST */
         closed_count = atoi(arguments[1]);
         closed_first = count > 2 ? atoi(arguments[2]) : 0;
         closed_plain = count > 3; /* of mild, for comparison */
-        return cmocka_run_group_tests(closed, NULL, NULL);
+        cmocka_set_test_filter("test_closed");
     }
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_cases(NULL, NULL);
 }

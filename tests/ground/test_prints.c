@@ -27,8 +27,7 @@ static double move_to(Kit *kit, double u) {
 /* Pressed to 20 mm, lifted out, pressed again at the same place: nothing until the print is met,
  * then the unloading line up to the old depth less what flowed back, then virgin ground. Elsewhere,
  * and on elastic ground, the first curve again. */
-static void test_second_step(void **state) {
-    (void)state;
+TEST(test_second_step) {
     MildSole *sole = kit_plate(4, 4);
     static const double recovery[6] = {0.0, 0.3, 0.7, 1.0, 0.0, 0.3};
     static const double refill[6] = {0.0, 0.0, 0.0, 0.0, 0.4, 0.2};
@@ -88,8 +87,7 @@ static int has_neighbours(const MildSole *sole, int e) {
 
 /* A foot pressed down turned by any angle leaves no hole under its sole; a step beside the print
  * finds virgin ground. */
-static void test_no_holes(void **state) {
-    (void)state;
+TEST(test_no_holes) {
     uint64_t random = 51;
     MildSole *sole = kit_sole(0, 77);
     MildMaterial sand = mild_material_default();
@@ -139,8 +137,7 @@ static void test_no_holes(void **state) {
 }
 
 /* Loaded and dragged aside, a foot leaves a trail. */
-static void test_trail(void **state) {
-    (void)state;
+TEST(test_trail) {
     MildSole *sole = kit_plate(2, 2);
     MildMaterial sand = mild_material_default();
     Kit kit;
@@ -167,8 +164,7 @@ static void test_trail(void **state) {
 /* Random feet on random, level and uneven, ground that remembers: pressed, lifted in their prints,
  * moved aside and turned there, pressed again. Whenever nothing is loaded, the ground has not given
  * energy since the last time. */
-static void test_passive(void **state) {
-    (void)state;
+TEST(test_passive) {
     uint64_t random = 52;
     MildSole *sole = kit_sole(0, 77);
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
@@ -242,8 +238,7 @@ static void test_passive(void **state) {
 
 /* When the tiles are used up the oldest prints go; the block keeps its size and nothing is
  * allocated. */
-static void test_bounded(void **state) {
-    (void)state;
+TEST(test_bounded) {
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
     MildMaterial sand = mild_material_default();
     const MildSole *soles[2] = {left, right};
@@ -283,8 +278,7 @@ static void test_bounded(void **state) {
 
 /* A block with prints on uneven ground is bytes: copied half way, both go on alike; another scratch
  * changes nothing. */
-static void test_copy_continues(void **state) {
-    (void)state;
+TEST(test_copy_continues) {
     uint64_t random = 53;
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
     MildMapDef def = mild_map_def_default();
@@ -323,8 +317,7 @@ static void test_copy_continues(void **state) {
 }
 
 /* Standing on ground that remembers neither creeps nor sinks with time. */
-static void test_no_creep(void **state) {
-    (void)state;
+TEST(test_no_creep) {
     static const double steps[2] = {1e-3, 5e-3};
     const double wait = kit_seconds(10.0);
     MildSole *sole = kit_sole(0, 77);
@@ -359,8 +352,7 @@ static void test_no_creep(void **state) {
 /* The material under a standing foot becomes another one. The foot sinks, or is thrown up; the
  * ground then gives back no more than the new material's unloading line holds at the depth where
  * the foot stood. */
-static void test_changed_material(void **state) {
-    (void)state;
+TEST(test_changed_material) {
     MildSole *sole = kit_sole(0, 77);
     double highest = 0.0, worst = -INFINITY;
     for (int from = 0; from < mild_material_preset_count(); from++) {
@@ -414,11 +406,4 @@ static void test_changed_material(void **state) {
     mild_sole_destroy(sole);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_second_step),    cmocka_unit_test(test_no_holes),
-        cmocka_unit_test(test_trail),          cmocka_unit_test(test_bounded),
-        cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_changed_material),
-        cmocka_unit_test(test_no_creep),       cmocka_unit_test(test_passive)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -85,8 +85,7 @@ static double exact_stop(const MildMaterial *m, int elements, double mass, doubl
     }
 }
 
-static void test_exact_impact(void **state) {
-    (void)state;
+TEST(test_exact_impact) {
     static const double mass[3] = {1.0, 3.0, 20.0}, published[3] = {1.221, 3.384, 38.98};
     MildMaterial choi = preset("sand_loose");
     choi.k_pen = 1e6 * KIT_PITCH * KIT_PITCH;
@@ -145,8 +144,7 @@ static MildMaterial durian_material(const Durian *p, double edge, double c_d) {
     return m;
 }
 
-static void test_durian(void **state) {
-    (void)state;
+TEST(test_durian) {
     static const double drag[2] = {100.0, 17.2}, speed[3] = {0.7, 2.0, 4.0};
     const double edge = 1.0; /* u_f is 80 m: the flat area stays */
     Durian p = {.d1 = 0.1, .k = 4000.0, .mass = 20.0};
@@ -229,8 +227,7 @@ static void durian_fit(const char *ground, double speed, double *free_share, dou
     mild_sole_destroy(sole);
 }
 
-static void test_durian_sand(void **state) {
-    (void)state;
+TEST(test_durian_sand) {
     static const double speed[4] = {0.5, 1.0, 2.0, 4.0};
     static const char *const sand[2] = {"sand_loose", "sand_dense"};
     double worst[2] = {0};
@@ -285,8 +282,7 @@ static void exponents(const MildMaterial *m, double edge, int side, double densi
 /* Force of the cone alone while it opens, u << u_f: F = kappa u^2/u_f, work kappa u^3/(3 u_f) = M g
  * H. With M ~ rho D^3, kappa ~ D^2 and u_f ~ D (one cone under the body) the depth goes as
  * rho^(1/3) D^(2/3) H^(1/3). */
-static void test_uehara(void **state) {
-    (void)state;
+TEST(test_uehara) {
     MildMaterial cone = preset("sand_loose");
     cone.model = MILD_MODEL_CON_CONE;
     cone.c_g = 0.0;
@@ -374,8 +370,7 @@ static double pressed_sinkage(const MildMaterial *m, MildSole *sole, double newt
     }
 }
 
-static void test_bekker(void **state) {
-    (void)state;
+TEST(test_bekker) {
     MildSole *sole = kit_sole(0, 77);
     const double weight = 40.0 * KIT_GRAVITY, area = 77 * KIT_PITCH * KIT_PITCH, width = 0.1;
     double two[SOILS], one[SOILS], worst = 0.0;
@@ -420,8 +415,7 @@ static void test_bekker(void **state) {
 
 /* ---- resistive force theory ---- */
 
-static void test_rft(void **state) {
-    (void)state;
+TEST(test_rft) {
     static const double poppy_loose = 0.254e6, poppy_close = 0.464e6; /* [N/m^3] */
     MildSole *sole = kit_plate(11, 7);
     double stress[2]; /* of a level plate that goes straight down: along x, and up */
@@ -463,10 +457,4 @@ static void test_rft(void **state) {
     mild_sole_destroy(sole);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_exact_impact), cmocka_unit_test(test_durian),
-        cmocka_unit_test(test_durian_sand),  cmocka_unit_test(test_uehara),
-        cmocka_unit_test(test_bekker),       cmocka_unit_test(test_rft)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -73,8 +73,7 @@ static void limit(const MildMaterial *m, double angle, double depth, double *for
     }
 }
 
-static void test_level(void **state) {
-    (void)state;
+TEST(test_level) {
     double worst = 0.0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
         MildMaterial base;
@@ -96,8 +95,7 @@ static void test_level(void **state) {
 
 /* Every model but the concentric ones: the plate carries and moves the same at any pitch, and drift
  * costs as much. The heap of a merged sole is a mean over cells. */
-static void test_models(void **state) {
-    (void)state;
+TEST(test_models) {
     const double load = 300.0, depth = 0.012;
     MildMaterial sand;
     mild_material_preset("sand_loose", &sand);
@@ -127,8 +125,7 @@ static void test_models(void **state) {
     }
 }
 
-static void test_tilted(void **state) {
-    (void)state;
+TEST(test_tilted) {
     static const char *const grounds[3] = {"sand_loose", "foam45", "rubber"};
     static const double angle = 5.0 * 3.14159265358979 / 180.0, depths[3] = {-0.004, 0.002, 0.010};
     print_message("tilted 5 deg, error of force and of moment about the centre [%%] at pitch 39, "
@@ -160,8 +157,7 @@ static void test_tilted(void **state) {
 }
 
 /* A tilted plate of 10 kg falls at 0.5 m/s, slides and comes to rest: where and how. */
-static void test_drop(void **state) {
-    (void)state;
+TEST(test_drop) {
     MildMaterial base = mild_material_default();
     double found[LEVELS][3];
     for (int k = 0; k < LEVELS; k++) {
@@ -196,8 +192,7 @@ static void test_drop(void **state) {
 
 /* What a finer grid would do with cones as large as its elements: u_f shrinks with the pitch, and
  * the limit is the complete cone from the surface on. */
-static void test_definition(void **state) {
-    (void)state;
+TEST(test_definition) {
     MildMaterial base = mild_material_default();
     double cone = base.sigma_cone / cos(base.alpha) * length * width * 0.01, force[LEVELS], none;
     for (int k = 0; k < LEVELS; k++) {
@@ -213,8 +208,7 @@ static void test_definition(void **state) {
 }
 
 /* The sole's outline on grids: natural counts and their area. */
-static void test_outline(void **state) {
-    (void)state;
+TEST(test_outline) {
     double outline[2 * 38], exact = 0.0;
     for (int i = 0; i < 19; i++) {
         outline[2 * i] = outline[2 * (37 - i)] = kit_outline[i][0];
@@ -241,10 +235,4 @@ static void test_outline(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_level),      cmocka_unit_test(test_models),
-        cmocka_unit_test(test_tilted),     cmocka_unit_test(test_drop),
-        cmocka_unit_test(test_definition), cmocka_unit_test(test_outline)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

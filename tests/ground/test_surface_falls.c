@@ -206,8 +206,7 @@ static void fall_once(uint64_t seed, Falls *all) {
     body_close(&body);
 }
 
-static void falls_gain_nothing(void **state) {
-    (void)state;
+TEST(falls_gain_nothing) {
     Falls all = {.terrain = ""};
     for (int i = 0; i < falls; i++) {
         fall_once((first + (uint64_t)i) * 1000003u + 7919u, &all);
@@ -226,6 +225,5 @@ int main(int argc, char **argv) {
     if (argc > 2) {
         first = strtoull(argv[2], NULL, 10);
     }
-    const struct CMUnitTest tests[] = {cmocka_unit_test(falls_gain_nothing)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_cases(NULL, NULL);
 }

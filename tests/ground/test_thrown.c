@@ -183,16 +183,14 @@ static void assert_effort(const Thrown *thrown, int effort) {
     }
 }
 
-static void test_bodies(void **state) {
-    (void)state;
+TEST(test_bodies) {
     const Thrown thrown = throw_all("bodies of 1 to 60 kg", draw_body, 0.2, draws);
     assert_true(thrown.unsolved <= thrown.steps / 50000);
     assert_int_equal(thrown.falling, 0);
     assert_effort(&thrown, 48936);
 }
 
-static void test_sticks(void **state) {
-    (void)state;
+TEST(test_sticks) {
     const Thrown thrown = throw_all("point masses on sticks", draw_stick, 1.0, draws / 2);
     assert_true(thrown.unsolved <= thrown.steps / 20000);
     assert_int_equal(thrown.falling, 0);
@@ -206,8 +204,7 @@ static void test_sticks(void **state) {
 }
 
 /* A step that is given too little work still feels the ground. */
-static void test_little_work(void **state) {
-    (void)state;
+TEST(test_little_work) {
     static const int limits[] = {1, 2, 5, 20};
     for (int l = 0; l < 4; l++) {
         int steps = 0, unsolved = 0, missing = 0;
@@ -235,8 +232,7 @@ static void test_little_work(void **state) {
 
 /* A level sole whose depth is exactly 0, with a twist that is next to nothing: the impulses are
  * below the rounding of anything that acts. */
-static void test_surface(void **state) {
-    (void)state;
+TEST(test_surface) {
     uint64_t random = 5;
     int most = 0, unsolved = 0, count = 0;
     for (int draw = 0; draw < 6000; draw++) {
@@ -272,8 +268,7 @@ static void test_surface(void **state) {
 
 /* What friction opposes instead of v takes energy at v and at the mean of it and the velocity
  * before, and friction_turned's derivatives are those of its impulse. */
-static void test_turned(void **state) {
-    (void)state;
+TEST(test_turned) {
     uint64_t random = 9;
     double least = INFINITY, worst = 0.0;
     for (int draw = 0; draw < 20000; draw++) {
@@ -310,9 +305,5 @@ int main(int argc, char **argv) {
     if (argc > 2) {
         first = atoi(argv[2]);
     }
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bodies), cmocka_unit_test(test_sticks),
-                                       cmocka_unit_test(test_little_work),
-                                       cmocka_unit_test(test_surface),
-                                       cmocka_unit_test(test_turned)};
-    return cmocka_run_group_tests(tests, open_soles, close_soles);
+    return run_cases(open_soles, close_soles);
 }

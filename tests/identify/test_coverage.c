@@ -167,8 +167,7 @@ static void cover_preset(const char *name, int records) {
     cover(&c);
 }
 
-static void coverage(void **state) {
-    (void)state;
+TEST(coverage) {
     printf("%-13s %s  %-23s %14s %14s %14s\n", "ground", "n", "", "of the peak", "of the row",
            "slow");
     for (int p = 0; p < mild_material_preset_count(); p++) {
@@ -196,8 +195,7 @@ static void coverage(void **state) {
 }
 
 int main(int argc, char **argv) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(coverage)};
     draws = argc > 1 ? atoi(argv[1]) : draws;
     only = argc > 2 ? argv[2] : NULL;
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_cases(NULL, NULL);
 }

@@ -236,8 +236,7 @@ static void check_stand(const char *name, const char *ground, double dt, const c
     robot_destroy(robot);
 }
 
-static void robots_stand(void **state) {
-    (void)state;
+TEST(robots_stand) {
     static const char *const grounds[] = {"rubber", "foam45", "sand_loose"};
     static const char *const integrators[] = {"Euler", "implicitfast", "discrete"};
     static const double steps[] = {0.001, 0.002, 0.005};
@@ -320,8 +319,7 @@ static void check_walk(const Walker *walker, const Robot *robot, const char *gro
 /* Trials of each walk on each ground at each step. 0: two, ten on sand, each ground at one step. */
 static int thorough;
 
-static void policies_walk(void **state) {
-    (void)state;
+TEST(policies_walk) {
     static const Walker walkers[] = {{"sa01", "mild", NULL},
                                      {"go1", "go1", MILD_SOURCE_DIR "/configs/go1.ini"},
                                      {"g1", "g1", MILD_SOURCE_DIR "/configs/g1.ini"}};
@@ -349,10 +347,6 @@ static void policies_walk(void **state) {
 }
 
 int main(int argc, char **argv) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(robots_stand),
-        cmocka_unit_test(policies_walk),
-    };
     thorough = argc > 1 ? atoi(argv[1]) : 0;
-    return cmocka_run_group_tests(tests, kit_setup, NULL);
+    return run_cases(kit_setup, NULL);
 }

@@ -21,8 +21,7 @@ static void assert_refused(double *number, double bad, const char *what) {
     assert_error(&error, MILD_ERROR_RANGE, what);
 }
 
-static void test_every_number(void **state) {
-    (void)state;
+TEST(test_every_number) {
     mjModel *m = robot->model;
     const int body = robot_foot_body(robot, 1), dof = 6 + 4, joint = 1 + 3;
     const struct {
@@ -64,8 +63,7 @@ static void test_every_number(void **state) {
 
 /* Each element of each array: refused, with the name of its joint, body or geom where it has
  * one. */
-static void test_every_element(void **state) {
-    (void)state;
+TEST(test_every_element) {
     mjModel *m = robot->model;
     const int bodies = (int)m->nbody, joints = (int)m->njnt, geoms = (int)m->ngeom;
     const struct {
@@ -117,8 +115,7 @@ static void test_every_element(void **state) {
 }
 
 /* The limits themselves: 0 is fine where a negative number is not, an empty range is none. */
-static void test_limits(void **state) {
-    (void)state;
+TEST(test_limits) {
     mjModel *m = robot->model;
     const int joint = 1 + 3, dof = 6 + 3, body = robot_foot_body(robot, 0);
     double armature = m->dof_armature[dof], low = m->jnt_range[2 * joint];
@@ -143,8 +140,7 @@ static void test_limits(void **state) {
 }
 
 /* The same from a file; and a file that would never end. */
-static void test_files(void **state) {
-    (void)state;
+TEST(test_files) {
     static const char *const bad[] = {"  nan", "  inf", "-0.04"}; /* as long as what they replace */
     char folder[] = "/tmp/mild_test_check_XXXXXX", path[64], ini[64];
     static char text[65536];
@@ -181,12 +177,4 @@ static void test_files(void **state) {
     rmdir(folder);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_number),
-        cmocka_unit_test(test_every_element),
-        cmocka_unit_test(test_limits),
-        cmocka_unit_test(test_files),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

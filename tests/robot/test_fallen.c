@@ -440,8 +440,7 @@ static void fall(Robot *robot, int model, int number, Falls *all) {
     robot_sim_destroy(sim);
 }
 
-static void the_ground_never_creates_energy(void **unused) {
-    (void)unused;
+static void expect_no_energy(void) {
     Falls all[MILD_MODELS] = {{0}};
     int over = 0, touch = 0, lost = 0;
     for (int n = 0; n < falls; n++) {
@@ -466,18 +465,20 @@ static void the_ground_never_creates_energy(void **unused) {
     assert_true(touch >= falls - falls / 20 && lost <= falls / 20);
 }
 
+TEST(the_ground_never_creates_energy) {
+    expect_no_energy();
+}
+
 /* One of these falls was given 123 J: an element in elastic ground that carries nothing until it
  * has come out kept the speed of its front for the added mass of plastic ground beside it. */
-static void a_barred_front_rests(void **unused) {
+TEST(a_barred_front_rests) {
     falls = 4;
     first = 1111;
-    the_ground_never_creates_energy(unused);
+    expect_no_energy();
 }
 
 int main(int argc, char **argv) {
     falls = argc > 1 ? atoi(argv[1]) : kit_short() ? falls / 5 : falls;
     first = argc > 2 ? (uint32_t)atoi(argv[2]) : first;
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_ground_never_creates_energy),
-                                       cmocka_unit_test(a_barred_front_rests)};
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return run_cases(setup, teardown);
 }

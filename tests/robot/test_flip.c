@@ -150,8 +150,7 @@ static double largest_step(const char *name) {
     return 0.0;
 }
 
-static void test_explicit_soil_flips(void **unused) {
-    (void)unused;
+TEST(test_explicit_soil_flips) {
     int fallen = 0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
         const char *name = mild_material_preset_name(p);
@@ -172,7 +171,4 @@ static void test_explicit_soil_flips(void **unused) {
                   mild_material_preset_count());
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_explicit_soil_flips)};
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -24,8 +24,7 @@ enum { FEET = 4, JOINTS = 12, NV = 18, FL = 0, FR = 1, RL = 2, RR = 3 };
 /* ---- the folder ---- */
 
 /* Where the feet are in the default pose: hip roll a = -0.1 (left), thigh 0.9, knee -1.8. */
-static void the_pose_by_hand(void **unused) {
-    (void)unused;
+TEST(the_pose_by_hand) {
     const double a = 0.1, length = 2 * LEG * cos(0.9);
     const double height = length * cos(a) + ROLL_OFFSET * sin(a) + FOOT_RADIUS;
     const double y = HIP_OFFSET + ROLL_OFFSET * cos(a) - length * sin(a), x = 0.1881;
@@ -55,8 +54,7 @@ static void the_pose_by_hand(void **unused) {
     robot_sim_destroy(sim);
 }
 
-static void efforts_speeds_and_gait(void **unused) {
-    (void)unused;
+TEST(efforts_speeds_and_gait) {
     for (int i = 0; i < JOINTS; i++) {
         int knee = i % 3 == 2;
         expect_near("effort", robot_effort(robot)[i], knee ? 35.55 : 23.7, 1e-9);
@@ -96,8 +94,7 @@ static Robot *changed_robot(const char *from, const char *to, MildError *error) 
     return made;
 }
 
-static void what_may_be_left_out(void **unused) {
-    (void)unused;
+TEST(what_may_be_left_out) {
     MildError error = {0};
     Robot *changed = changed_robot("stand_kp    =", "# a remark\n; stand_kp    =", &error);
     if (!changed) {
@@ -167,8 +164,7 @@ static void lowest_point(RobotSim *sim, int foot, double point[3], double jacobi
 
 /* Place and speed of the foot, and after a step: acceleration = M^-1 (tau - b + J^T F), with no
  * moment. */
-static void a_round_foot_is_a_point(void **unused) {
-    (void)unused;
+TEST(a_round_foot_is_a_point) {
     RobotSim *sim = new_sim(0.0005);
     MildGround *ground = new_ground();
     MildMaterial sand = mild_material_default();
@@ -341,8 +337,7 @@ static void check(const char *name, const MildMaterial *material, double dt, con
     }
 }
 
-static void stands_and_is_pushed_everywhere(void **unused) {
-    (void)unused;
+TEST(stands_and_is_pushed_everywhere) {
     static const double pushes[3][6] = {{0}, {40, 0}, {0, 25}};
     for (int p = 0; p < 3; p++) {
         check("rigid", NULL, 0.001, pushes[p]);
@@ -354,13 +349,4 @@ static void stands_and_is_pushed_everywhere(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_pose_by_hand),
-        cmocka_unit_test(efforts_speeds_and_gait),
-        cmocka_unit_test(what_may_be_left_out),
-        cmocka_unit_test(a_round_foot_is_a_point),
-        cmocka_unit_test(stands_and_is_pushed_everywhere),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -69,8 +69,7 @@ static double geom_distance(const Robot *robot, const RobotState *state, mjData 
     return least;
 }
 
-static void distance_is_mujocos(void **unused) {
-    (void)unused;
+TEST(distance_is_mujocos) {
     const RobotVariation nominal = robot_variation_nominal();
     for (int r = 0; r < ROBOTS; r++) {
         mjData *d = mj_makeData(robots[r]->visual);
@@ -146,8 +145,7 @@ static int throw_legs(RobotSim *with, RobotSim *bare, RobotState state, MildGrou
     return met;
 }
 
-static void contact_takes_energy(void **unused) {
-    (void)unused;
+TEST(contact_takes_energy) {
     static const double steps[] = {0.001, 0.0025, 0.005};
     for (int r = 0; r < ROBOTS; r++) {
         for (int s = 0; s < 3; s++) {
@@ -186,19 +184,11 @@ static void contact_takes_energy(void **unused) {
 
 /* 2 kg on 1/A: approaching at 0.4 m/s from 0.5 mm in 2.5 ms, 0.2 m/s are too fast. In overlap of
  * 1 mm at rest half of it is taken back in a step, at 0.2 m/s. */
-static void force_by_hand(void **unused) {
-    (void)unused;
+TEST(force_by_hand) {
     expect_near("force", legs_force(0.0025, 0.0005, -0.4, 0.5), 0.2 / (0.0025 * 0.5), 1e-9);
     expect_near("force", legs_force(0.0025, -0.001, 0, 0.5), 0.2 / (0.0025 * 0.5), 1e-9);
     assert_true(legs_force(0.0025, 0.0005, -0.199, 0.5) == 0);
     assert_true(legs_force(0.0025, -0.001, 0.201, 0.5) == 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(distance_is_mujocos),
-        cmocka_unit_test(contact_takes_energy),
-        cmocka_unit_test(force_by_hand),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -136,8 +136,7 @@ static double stool_depth(const Robot *stool, const char *material, double dt) {
 /* Gravity spreads the legs until their limits hold them, because the feet slip. How deep they are
  * then does not depend on the time step. On rubber, which slipping digs into the least, it is what
  * the weight alone makes. */
-static void test_load(void **unused) {
-    (void)unused;
+TEST(test_load) {
     Robot *stool = make_stool("1 0 0", "-1 0 0", "0.4", "-0.2");
     const MildMaterial rubber = firm("rubber");
     const double wanted = mild_sole_sinkage(robot_soles(stool)[0], &rubber, robot_foot_load(stool));
@@ -180,8 +179,7 @@ static double pressed(const Robot *stool, const char *material, double dt) {
 
 /* Its motors press all legs backward against their limits. They do no work then, so the friction
  * under the feet may not move it. */
-static void test_pressed(void **unused) {
-    (void)unused;
+TEST(test_pressed) {
     Robot *stool = make_stool("0 1 0", "0 1 0", "0.1", "-0.4");
     for (int m = 0; m < MATERIALS; m++) {
         for (int s = 0; s < STEPS; s++) {
@@ -191,10 +189,4 @@ static void test_pressed(void **unused) {
     robot_destroy(stool);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_load),
-        cmocka_unit_test(test_pressed),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -246,8 +246,7 @@ static int teardown(void **unused) {
     return 0;
 }
 
-static void test_limits_and_masses(void **unused) {
-    (void)unused;
+TEST(test_limits_and_masses) {
     expect_near("total mass", robot_total_mass(robot), number(numbers, "total_mass_kg"), 1e-9);
     const mjModel *m = robot_sim_model(sim);
     const cJSON *joints = cJSON_GetObjectItem(numbers, "joints");
@@ -270,8 +269,7 @@ static void test_limits_and_masses(void **unused) {
 }
 
 /* JSON's derived_standing.training_default was computed by its authors from the same links. */
-static void test_standing(void **unused) {
-    (void)unused;
+TEST(test_standing) {
     const cJSON *expected =
         cJSON_GetObjectItem(cJSON_GetObjectItem(numbers, "derived_standing"), "training_default");
     double ankle[3], com[3], inertia[9] = {0}, position[LINKS][3], turn[LINKS][9];
@@ -318,8 +316,7 @@ static void test_standing(void **unused) {
     }
 }
 
-static void test_mass_matrix(void **unused) {
-    (void)unused;
+TEST(test_mass_matrix) {
     double worst = 0.0;
     for (uint32_t draw = 0; draw < 50; draw++) {
         RobotState state = random_state(draw);
@@ -339,8 +336,7 @@ static void test_mass_matrix(void **unused) {
     assert_true(worst < 1e-7); /* MuJoCo's diagonalisation of an inertia stops at 1e-6 rad */
 }
 
-static void test_variation(void **unused) {
-    (void)unused;
+TEST(test_variation) {
     RobotVariation varied = robot_variation_nominal(), nominal = varied;
     varied.base_mass_add = 2.5;
     varied.com_offset[0] = 0.01;
@@ -398,8 +394,7 @@ static void refuse(const char *name, const char *from, const char *to, MildStatu
     assert_error(&error, status, names);
 }
 
-static void test_refusals(void **unused) {
-    (void)unused;
+TEST(test_refusals) {
     refuse("sa01.xml", "leg_r6_link", "xeg_r6_link", MILD_ERROR_FORMAT,
            "sa01.xml leg_r6_link [foot.right]");
     refuse("sa01.xml", "leg_l4_joint", "xeg_l4_joint", MILD_ERROR_FORMAT,
@@ -464,8 +459,7 @@ static void test_refusals(void **unused) {
 
 /* A hinge's numbers tell the unit only together: one that turns by 5 degrees is no mistake where
  * another turns by 130, nor one without an end among radians. */
-static void test_angles(void **unused) {
-    (void)unused;
+TEST(test_angles) {
     static const struct {
         const char *unit, *one, *other, *names; /* names: NULL where the file is taken */
     } cases[] = {
@@ -518,11 +512,4 @@ static void test_angles(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_limits_and_masses), cmocka_unit_test(test_standing),
-        cmocka_unit_test(test_mass_matrix),       cmocka_unit_test(test_variation),
-        cmocka_unit_test(test_refusals),          cmocka_unit_test(test_angles),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -109,20 +109,12 @@ static void push_is_the_engines(int rigid) {
     robot_sim_destroy(sim);
 }
 
-static void test_soft(void **unused) {
-    (void)unused;
+TEST(test_soft) {
     push_is_the_engines(0);
 }
 
-static void test_rigid(void **unused) {
-    (void)unused;
+TEST(test_rigid) {
     push_is_the_engines(1);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_soft),
-        cmocka_unit_test(test_rigid),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

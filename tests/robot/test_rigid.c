@@ -41,8 +41,7 @@ static RobotState random_state(uint32_t draw) {
 }
 
 /* A map that happens to be level is the level floor, to the last bit. */
-static void test_level(void **unused) {
-    (void)unused;
+TEST(test_level) {
     const double heights[4] = {0.5, 0.5, 0.5, 0.5};
     MildMapDef def = mild_map_def_default();
     def.kind = MILD_MAP_IMAGE;
@@ -80,8 +79,7 @@ static void test_level(void **unused) {
 }
 
 /* A slope is the engine's own floor, tilted. */
-static void test_slope_is_the_engine(void **unused) {
-    (void)unused;
+TEST(test_slope_is_the_engine) {
     static const double slopes[3] = {-0.3, 0.1, 0.5};
     double worst = 0.0;
     for (uint32_t draw = 0; draw < 12; draw++) {
@@ -138,8 +136,7 @@ static MildMap *plane_map(double along_x, double along_y) {
 
 /* The same for slopes along y, and so steep that the engine takes other tangents: robots dropped
  * onto the plane, limp. */
-static void test_any_plane_is_the_engine(void **unused) {
-    (void)unused;
+TEST(test_any_plane_is_the_engine) {
     static const double planes[][2] = {{0, 0.25}, {0.25, -0.5}, {0, 0.75}, {-0.25, -1}, {0, 1.5}};
     double worst = 0.0;
     int contacts = 0;
@@ -212,8 +209,7 @@ static void slide(double slope, double friction, double *fallen, double *crept) 
 
 /* Above the angle of friction it slides as a block does, (sin - mu cos) g t^2/2 and the sway of its
  * joints; below it stays, but for the creep of the engine's friction. */
-static void test_friction(void **unused) {
-    (void)unused;
+TEST(test_friction) {
     const double slope = 0.03, angle = atan(slope);
     double fallen, crept;
     slide(slope, 0.01, &fallen, &crept);
@@ -228,8 +224,7 @@ static void test_friction(void **unused) {
 
 /* Wherever it stands on waves, the lowest corner of either foot is neither 2 mm in the ground nor
  * above it. */
-static void test_waves(void **unused) {
-    (void)unused;
+TEST(test_waves) {
     MildMapDef def = mild_map_def_default();
     def.kind = MILD_MAP_WAVES;
     MildMap *map = make_map(&def);
@@ -275,13 +270,4 @@ static void test_waves(void **unused) {
     assert_true(deepest > -0.002 && highest < 0.002);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_level),
-        cmocka_unit_test(test_slope_is_the_engine),
-        cmocka_unit_test(test_any_plane_is_the_engine),
-        cmocka_unit_test(test_friction),
-        cmocka_unit_test(test_waves),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

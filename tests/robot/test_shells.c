@@ -79,8 +79,7 @@ static void stand_still(Robot *robot, int shells, double qpos[ROBOT_NQ_MAX], dou
     robot_sim_destroy(sim);
 }
 
-static void in_the_air_they_change_nothing(void **unused) {
-    (void)unused;
+TEST(in_the_air_they_change_nothing) {
     for (int r = 0; r < ROBOTS; r++) {
         double without[ROBOT_NQ_MAX], with[ROBOT_NQ_MAX], load;
         stand_still(robots[r], 0, without, &load);
@@ -91,8 +90,7 @@ static void in_the_air_they_change_nothing(void **unused) {
 }
 
 /* A concentric model has one element for a sole, and none for a shell. */
-static void concentric_models_have_none(void **unused) {
-    (void)unused;
+TEST(concentric_models_have_none) {
     robot_set_shells(robots[0], 1);
     robot_set_model(robots[0], MILD_MODEL_CON_CONE);
     assert_int_equal(robot_bodies(robots[0]), robot_feet(robots[0]));
@@ -102,8 +100,7 @@ static void concentric_models_have_none(void **unused) {
 
 /* The law under a shell is that of the feet's elements, whatever the distance of its own; its area
  * is that of the geoms: the two boxes of SA01's shanks, 5 x 5 x 28 cm. */
-static void they_have_the_law_of_the_feet(void **unused) {
-    (void)unused;
+TEST(they_have_the_law_of_the_feet) {
     for (int r = 0; r < ROBOTS; r++) {
         robot_set_shells(robots[r], 1);
         const MildSole *const *soles = robot_soles(robots[r]);
@@ -123,8 +120,7 @@ static void they_have_the_law_of_the_feet(void **unused) {
 /* ---- lying ---- */
 
 /* Dropped on its back or side it comes to rest, and feet and shells carry its weight. */
-static void they_carry_a_robot_that_lies(void **unused) {
-    (void)unused;
+TEST(they_carry_a_robot_that_lies) {
     static const char *const grounds[] = {"foam45", "sand_loose"};
     for (int n = 0; n < 2 * ROBOTS; n++) {
         Robot *robot = robots[n / 2];
@@ -229,8 +225,7 @@ static double fall(Robot *robot, RobotSim *sim, MildGround *ground, const MildTe
     return worst / size;
 }
 
-static void falls_take_energy(void **unused) {
-    (void)unused;
+TEST(falls_take_energy) {
     static const char *const grounds[] = {"foam45", "sand_loose", "rubber", "foam25"};
     for (int r = 0; r < ROBOTS; r++) {
         Robot *robot = robots[r];
@@ -262,12 +257,5 @@ static void falls_take_energy(void **unused) {
 int main(int argc, char **argv) {
     falls = argc > 1 ? atoi(argv[1]) : kit_short() ? 1 + falls / 5 : falls;
     first = argc > 2 ? (uint32_t)atoi(argv[2]) : first;
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(in_the_air_they_change_nothing),
-        cmocka_unit_test(concentric_models_have_none),
-        cmocka_unit_test(they_have_the_law_of_the_feet),
-        cmocka_unit_test(they_carry_a_robot_that_lies),
-        cmocka_unit_test(falls_take_energy),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return run_cases(setup, teardown);
 }

@@ -105,8 +105,7 @@ static void check_foot(const RobotSim *sim, const mjModel *m, const mjData *d, i
     }
 }
 
-static void test_feet(void **unused) {
-    (void)unused;
+TEST(test_feet) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     MildMap *map = waves();
@@ -141,8 +140,7 @@ static void test_feet(void **unused) {
 }
 
 /* After a step: the pose's quantities are those of its end, heights those above its ground. */
-static void test_feet_after_a_step(void **unused) {
-    (void)unused;
+TEST(test_feet_after_a_step) {
     RobotSim *sim = new_sim(0.0025);
     RobotVariation nominal = robot_variation_nominal();
     MildMap *map = waves();
@@ -188,8 +186,7 @@ static double box_clearance(const mjModel *m, const mjData *d, int s, const Mild
     return low - mild_terrain_height_at(terrain, at[0], at[1]);
 }
 
-static void test_clearance_of_the_shells(void **unused) {
-    (void)unused;
+TEST(test_clearance_of_the_shells) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     MildMap *map = waves();
@@ -224,8 +221,7 @@ static void test_clearance_of_the_shells(void **unused) {
 }
 
 /* Left less right along the base's left, laid level; 0 when the base points straight up. */
-static void test_lateral_distances(void **unused) {
-    (void)unused;
+TEST(test_lateral_distances) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     for (uint32_t draw = 0; draw < 30; draw++) {
@@ -264,8 +260,7 @@ static void test_lateral_distances(void **unused) {
 /* ---- steps ---- */
 
 /* In the air our soft step is the engine's, joints beyond their limits included. */
-static void test_soft_step_in_the_air(void **unused) {
-    (void)unused;
+TEST(test_soft_step_in_the_air) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     MildTerrain terrain = preset_terrain("sand_loose");
@@ -308,8 +303,7 @@ static void test_soft_step_in_the_air(void **unused) {
 
 /* A step moves the ground's memory on, once, with its own input and result: so a second foot fall
  * finds the imprint of the first. */
-static void test_step_moves_the_ground(void **unused) {
-    (void)unused;
+TEST(test_step_moves_the_ground) {
     RobotSim *sim = new_sim(0.0025);
     RobotVariation nominal = robot_variation_nominal();
     MildTerrain terrain = preset_terrain("sand_loose");
@@ -339,8 +333,7 @@ static void test_step_moves_the_ground(void **unused) {
 }
 
 /* Speeds up to 1000 are numbers, beyond they went bad. */
-static void test_fastest(void **unused) {
-    (void)unused;
+TEST(test_fastest) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     MildTerrain terrain = preset_terrain("sand_loose");
@@ -359,8 +352,7 @@ static void test_fastest(void **unused) {
 }
 
 /* Loaded and stored is the same; a load leaves nothing of the last step. */
-static void test_load_and_store(void **unused) {
-    (void)unused;
+TEST(test_load_and_store) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     MildTerrain terrain = preset_terrain("sand_loose");
@@ -393,8 +385,7 @@ static void test_load_and_store(void **unused) {
 }
 
 /* A new workspace stands in the default pose. */
-static void test_new_workspace(void **unused) {
-    (void)unused;
+TEST(test_new_workspace) {
     RobotSim *sim = new_sim(0.002);
     assert_true(robot_sim_dt(sim) == 0.002);
     const double *q = robot_sim_qpos(sim);
@@ -414,8 +405,7 @@ static void test_new_workspace(void **unused) {
     robot_sim_destroy(sim);
 }
 
-static void test_time_steps(void **unused) {
-    (void)unused;
+TEST(test_time_steps) {
     const double good[] = {0.0001, 0.01}, bad[] = {0.000099, 0.0101, 0, -0.001, NAN};
     for (int i = 0; i < 2; i++) {
         robot_sim_destroy(new_sim(good[i]));
@@ -429,8 +419,7 @@ static void test_time_steps(void **unused) {
 }
 
 /* Every part takes some time, steps are counted, NULL stops it. */
-static void test_phases(void **unused) {
-    (void)unused;
+TEST(test_phases) {
     RobotVariation variation = robot_variation_nominal();
     MildTerrain terrain = preset_terrain("sand_loose");
     MildGround *ground = new_ground();
@@ -591,8 +580,7 @@ static int check_rigid_step(RobotSim *sim, const MildTerrain *terrain, int loade
 }
 
 /* Standing shakily on slopes, contacts coming and going. */
-static void test_rigid_contact(void **unused) {
-    (void)unused;
+TEST(test_rigid_contact) {
     RobotSim *sim = new_sim(0.0025);
     RobotVariation rigid = robot_variation_nominal();
     rigid.rigid = 1;
@@ -619,20 +607,4 @@ static void test_rigid_contact(void **unused) {
     robot_sim_destroy(sim);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_new_workspace),
-        cmocka_unit_test(test_time_steps),
-        cmocka_unit_test(test_load_and_store),
-        cmocka_unit_test(test_fastest),
-        cmocka_unit_test(test_step_moves_the_ground),
-        cmocka_unit_test(test_phases),
-        cmocka_unit_test(test_feet),
-        cmocka_unit_test(test_feet_after_a_step),
-        cmocka_unit_test(test_clearance_of_the_shells),
-        cmocka_unit_test(test_lateral_distances),
-        cmocka_unit_test(test_soft_step_in_the_air),
-        cmocka_unit_test(test_rigid_contact),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

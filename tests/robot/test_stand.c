@@ -98,8 +98,7 @@ static void check_balanced(const char *name, const MildMaterial *material, doubl
     }
 }
 
-static void test_stands_everywhere(void **unused) {
-    (void)unused;
+TEST(test_stands_everywhere) {
     static const double steps[] = {0.0005, 0.001, 0.0025, 0.005};
     for (int s = kit_short() ? 2 : 0; s < 4; s++) {
         check_balanced("rigid", NULL, steps[s]);
@@ -111,8 +110,7 @@ static void test_stands_everywhere(void **unused) {
 }
 
 /* The paper's sweeps take a step to where Newton's method takes it (few steps: sweeps are slow). */
-static void test_papers_solver(void **unused) {
-    (void)unused;
+TEST(test_papers_solver) {
     for (int p = 0; p < mild_material_preset_count(); p++) {
         MildMaterial material = preset(mild_material_preset_name(p));
         double height[2];
@@ -130,8 +128,7 @@ static void test_papers_solver(void **unused) {
 
 /* Joints held at the default pose without balance: rigid ground carries that, soft foam cannot (see
  * stand.c). */
-static void test_plain_gains(void **unused) {
-    (void)unused;
+TEST(test_plain_gains) {
     Standing rigid = stand_still(NULL, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);
     assert_true(rigid.stands);
     for (int p = 0; p < mild_material_preset_count(); p++) {
@@ -145,11 +142,4 @@ static void test_plain_gains(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stands_everywhere),
-        cmocka_unit_test(test_papers_solver),
-        cmocka_unit_test(test_plain_gains),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

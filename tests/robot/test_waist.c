@@ -64,8 +64,7 @@ static int teardown(void **unused) {
 }
 
 /* The order is that of robot.ini, not of the file; the waist is nobody's leg. */
-static void joints_and_feet(void **unused) {
-    (void)unused;
+TEST(joints_and_feet) {
     static const int foot[JOINTS] = {0, -1, 1}, dof[JOINTS] = {7, 6, 8}, mirror[JOINTS] = {2, 1, 0};
     assert_int_equal(robot_joints(robot), JOINTS);
     for (int i = 0; i < JOINTS; i++) {
@@ -77,8 +76,7 @@ static void joints_and_feet(void **unused) {
 
 /* The feet's velocities after a step are those that the solver promised, at the pose before it:
  * both chains hold the waist. */
-static void twist_is_the_solvers(void **unused) {
-    (void)unused;
+TEST(twist_is_the_solvers) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
     MildGround *ground = mild_ground_init(calloc(1, mild_ground_bytes(robot_soles(robot), FEET)),
@@ -113,10 +111,4 @@ static void twist_is_the_solvers(void **unused) {
     robot_sim_destroy(sim);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(joints_and_feet),
-        cmocka_unit_test(twist_is_the_solvers),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

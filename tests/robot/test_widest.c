@@ -46,8 +46,7 @@ static RobotState draw_state(uint32_t draw) {
     return state;
 }
 
-static void test_numbers(void **unused) {
-    (void)unused;
+TEST(test_numbers) {
     assert_int_equal(robot_joints(robot), JOINTS);
     assert_int_equal(robot_feet(robot), LEGS);
     for (int i = 0; i < JOINTS; i++) {
@@ -70,8 +69,7 @@ static void test_numbers(void **unused) {
 }
 
 /* Least of both mirrored pairs: feet, then knees, left less right along the base's left. */
-static void test_distances(void **unused) {
-    (void)unused;
+TEST(test_distances) {
     RobotVariation nominal = robot_variation_nominal();
     const mjData *d = robot_sim_data(sim);
     const mjModel *m = robot_sim_model(sim);
@@ -106,8 +104,7 @@ static void test_distances(void **unused) {
 }
 
 /* A = J M^-1 J^T of four balls on four chains, and the chains' common base. */
-static void test_map(void **unused) {
-    (void)unused;
+TEST(test_map) {
     RobotVariation nominal = robot_variation_nominal();
     const mjModel *m = robot_sim_model(sim);
     mjData *d = robot_sim_data(sim);
@@ -135,8 +132,7 @@ static void test_map(void **unused) {
     assert_true(worst < 1e-10);
 }
 
-static void test_step(void **unused) {
-    (void)unused;
+TEST(test_step) {
     RobotVariation nominal = robot_variation_nominal();
     MildTerrain terrain = preset_terrain("grass");
     void *block = calloc(1, mild_ground_bytes(robot_soles(robot), LEGS));
@@ -168,12 +164,4 @@ static void test_step(void **unused) {
     free(block);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_numbers),
-        cmocka_unit_test(test_distances),
-        cmocka_unit_test(test_map),
-        cmocka_unit_test(test_step),
-    };
-    return cmocka_run_group_tests(tests, open_widest, close_widest);
-}
+TEST_MAIN(open_widest, close_widest)

@@ -23,8 +23,7 @@ static MildMaterial parsed(const char *text) {
 }
 
 /* What a terminal would obey does not get into a file. */
-static void test_remarks(void **state) {
-    (void)state;
+TEST(test_remarks) {
     const MildMaterial m = mild_material_default();
     const char *notes[64] = {"a\tb", "\x1b[31mred\r"};
     const SoilNotes remarks = {"mild fit \x1b]0;x\x07.csv", notes};
@@ -60,8 +59,7 @@ static void same(const MildMaterial *a, const MildMaterial *b) {
     }
 }
 
-static void test_hand(void **state) {
-    (void)state;
+TEST(test_hand) {
     const MildMaterial m = parsed(HAND);
     assert_int_equal(m.model, MILD_MODEL_BEKKER);
     assert_true(m.exponent == 0.8 && m.k_c == 5790 && m.k_phi == 180000 && m.cohesion == 150);
@@ -93,8 +91,7 @@ static void draw(Random *random, MildMaterial *m) {
     m->plate_width = m->plate_width < 0.02 ? 0 : m->plate_width;
 }
 
-static void test_round_trip(void **state) {
-    (void)state;
+TEST(test_round_trip) {
     Random random = random_at(1, 2, 3);
     for (int n = 0; n < 2000; n++) {
         MildMaterial m;
@@ -110,8 +107,7 @@ static void test_round_trip(void **state) {
     }
 }
 
-static void test_files(void **state) {
-    (void)state;
+TEST(test_files) {
     char folder[] = "/tmp/mild_soil_XXXXXX", path[64], text[] = "x.txt";
     MildMaterial clay, read;
     MildError error = {0};
@@ -146,8 +142,7 @@ static void test_files(void **state) {
     rmdir(folder);
 }
 
-static void test_names(void **state) {
-    (void)state;
+TEST(test_names) {
     MildMaterial m;
     MildError error = {0};
     assert_true(soil_is_file("a.ini") && soil_is_file("./x/a.ini"));
@@ -160,8 +155,7 @@ static void test_names(void **state) {
     assert_error(&error, MILD_ERROR_ARGUMENT, "rigid");
 }
 
-static void test_mistakes(void **state) {
-    (void)state;
+TEST(test_mistakes) {
     refused("", MILD_ERROR_FORMAT, "mars.ini [ground]");
     refused("# remark\n\nmu = 1", MILD_ERROR_FORMAT, "mars.ini:3 [ground]");
     refused("[soil]", MILD_ERROR_FORMAT, "mars.ini:1 [soil] [ground]");
@@ -193,8 +187,7 @@ static void test_mistakes(void **state) {
 }
 
 /* Every line of HAND is needed, but for remarks: a file that lost one is refused. */
-static void test_lost_lines(void **state) {
-    (void)state;
+TEST(test_lost_lines) {
     static const char *const keys[] = {"exponent",     "k_c",     "k_phi",   "cohesion", "mu",
                                        "shear_length", "k_drift", "b_drift", "bed_depth"};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
@@ -207,12 +200,4 @@ static void test_lost_lines(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_hand),     cmocka_unit_test(test_round_trip),
-        cmocka_unit_test(test_files),    cmocka_unit_test(test_names),
-        cmocka_unit_test(test_mistakes), cmocka_unit_test(test_lost_lines),
-        cmocka_unit_test(test_remarks),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -89,8 +89,7 @@ static void expect_frame(const char *what, const float *frame, const double omeg
 static const double clock_at_03[2] = {0.9510565163, -0.3090169944}, no_clock[2] = {0, 0};
 
 /* The actor sees the readings, the critic the truth. */
-static void frame(void **unused) {
-    (void)unused;
+TEST(frame) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     for (uint32_t draw = 0; draw < 10; draw++) {
@@ -105,8 +104,7 @@ static void frame(void **unused) {
     rig_close(&rig);
 }
 
-static void readings(void **unused) {
-    (void)unused;
+TEST(readings) {
     rig_open_quiet(&rig, 0.5);
     Oracle o = place(11);
     TaskSensors reading;
@@ -122,8 +120,7 @@ static void readings(void **unused) {
 }
 
 /* Off by key, and (0, 0) while the command that the policy sees stands. */
-static void the_clock(void **unused) {
-    (void)unused;
+TEST(the_clock) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     Oracle o = place(1);
@@ -148,8 +145,7 @@ static void the_clock(void **unused) {
 }
 
 /* Base velocity times 4, sole velocities, heights above the ground times 10; or as the keys say. */
-static void estimates(void **unused) {
-    (void)unused;
+TEST(estimates) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     double velocity_scale = 4, height_scale = 10;
@@ -179,8 +175,7 @@ static void estimates(void **unused) {
 
 /* Force in the base frame over 300 N, within +-5; contact; scheduled stance; mean depth times 10.
  */
-static void feet_of_the_critic(void **unused) {
-    (void)unused;
+TEST(feet_of_the_critic) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     for (uint32_t draw = 0; draw < 10; draw++) {
@@ -207,8 +202,7 @@ static void feet_of_the_critic(void **unused) {
     rig_close(&rig);
 }
 
-static void limits_of_the_critic(void **unused) {
-    (void)unused;
+TEST(limits_of_the_critic) {
     rig_open_quiet(&rig, 0.5);
     RobotState state = kit_state(1.2);
     kit_load(rig.sim, &state, rig.env);
@@ -255,8 +249,7 @@ static MildTerrain two_materials(double x, double y) {
     return terrain;
 }
 
-static void episode_of_the_critic(void **unused) {
-    (void)unused;
+TEST(episode_of_the_critic) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     place(12);
@@ -292,8 +285,7 @@ static void episode_of_the_critic(void **unused) {
 }
 
 /* The one element of a concentric sole is shown as one of the raster's 77 cells. */
-static void concentric_ground(void **unused) {
-    (void)unused;
+TEST(concentric_ground) {
     robot_set_model(robot, MILD_MODEL_CON_CONE);
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
@@ -314,8 +306,7 @@ static void concentric_ground(void **unused) {
 }
 
 /* After a step on the ground: the forces and the depth are those of the step's contact. */
-static void contact_reaches_the_critic(void **unused) {
-    (void)unused;
+TEST(contact_reaches_the_critic) {
     rig_open_quiet(&rig, 0.5);
     for (int t = 0; t < 20; t++) {
         rig_step(&rig, NULL);
@@ -346,8 +337,7 @@ static double noise_limit(int i) {
 }
 
 /* Uniform: both ends nearly reached, mean 0, variance limit^2/3, no entry follows another. */
-static void noise(void **unused) {
-    (void)unused;
+TEST(noise) {
     enum { DRAWS = 20000 };
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
@@ -400,8 +390,7 @@ static void noise(void **unused) {
 }
 
 /* Another environment, tick or seed draws other noise. */
-static void noise_is_a_stream(void **unused) {
-    (void)unused;
+TEST(noise_is_a_stream) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     rig.def.observe_noise = 1;
@@ -442,8 +431,7 @@ static void expect_history(int stride, int frames) {
 }
 
 /* More frames than the largest ring of 81 holds, twice over. */
-static void history(void **unused) {
-    (void)unused;
+TEST(history) {
     const int strides[] = {1, 3, 8, 16};
     for (int s = 0; s < 4; s++) {
         TaskDef def = kit_quiet_def();
@@ -467,8 +455,7 @@ static void history(void **unused) {
 }
 
 /* Step by step the newest frame is added to those before it. */
-static void history_of_steps(void **unused) {
-    (void)unused;
+TEST(history_of_steps) {
     TaskDef def = kit_quiet_def();
     def.history_stride = 1;
     rig_open(&rig, &def, 3, 0);
@@ -486,8 +473,7 @@ static void history_of_steps(void **unused) {
 }
 
 /* Any pointer of the view may be missing. */
-static void views(void **unused) {
-    (void)unused;
+TEST(views) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     const TaskView none = {0};
@@ -530,8 +516,7 @@ static void look_at(const RobotState *state, const double command[3], double pha
 }
 
 /* The frame of the mirrored robot is the mirrored frame. */
-static void mirror_image(void **unused) {
-    (void)unused;
+TEST(mirror_image) {
     rig_open_quiet(&rig, 0.5);
     const int sign[LEG_JOINTS] = {-1, -1, 1, 1, 1, -1};
     double worst = 0;
@@ -562,23 +547,4 @@ static void mirror_image(void **unused) {
     rig_close(&rig);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(frame),
-        cmocka_unit_test(readings),
-        cmocka_unit_test(the_clock),
-        cmocka_unit_test(estimates),
-        cmocka_unit_test(feet_of_the_critic),
-        cmocka_unit_test(limits_of_the_critic),
-        cmocka_unit_test(episode_of_the_critic),
-        cmocka_unit_test(concentric_ground),
-        cmocka_unit_test(contact_reaches_the_critic),
-        cmocka_unit_test(mirror_image),
-        cmocka_unit_test(views),
-        cmocka_unit_test(history),
-        cmocka_unit_test(history_of_steps),
-        cmocka_unit_test(noise_is_a_stream),
-        cmocka_unit_test(noise),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

@@ -32,8 +32,7 @@ static void write_png(const void *pixels, png_uint_32 format, int columns, int r
 }
 
 /* 8 and 16 bits, grey and colour: what was written comes back. */
-static void test_round_trip(void **state) {
-    (void)state;
+TEST(test_round_trip) {
     static png_byte grey[ROWS * COLUMNS], color[ROWS * COLUMNS * 4];
     static png_uint_16 wide[ROWS * COLUMNS];
     double worst[3] = {0};
@@ -123,8 +122,7 @@ static void expect_picture(const char *what, int columns, int rows, const double
     assert_int_equal(image.rows + image.columns, 0);
 }
 
-static void test_kinds(void **state) {
-    (void)state;
+TEST(test_kinds) {
     const Kind bits = {1, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, 10, 1};
     const png_byte one[2] = {0xa5, 0x80};
     const double ten[10] = {1, 0, 1, 0, 0, 1, 0, 1, 1, 0};
@@ -158,8 +156,7 @@ static void test_kinds(void **state) {
 }
 
 /* More pixels than a map may have points; an edge longer than 32768. */
-static void test_too_large(void **state) {
-    (void)state;
+TEST(test_too_large) {
     const Kind kinds[2] = {{1, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, 32768, 2049},
                            {1, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, 32769, 1}};
     const MildStatus wanted[2] = {MILD_ERROR_RANGE, MILD_ERROR_FORMAT};
@@ -177,8 +174,7 @@ static void test_too_large(void **state) {
 }
 
 /* An open file, which stands under another name in messages. */
-static void test_open_file(void **state) {
-    (void)state;
+TEST(test_open_file) {
     Image image;
     MildError error = {0};
     char nothing[16] = "no picture";
@@ -201,8 +197,7 @@ static void write_bytes(const void *bytes, size_t size) {
 
 /* No picture, a picture cut anywhere, a picture with any byte changed: an error with the file's
  * name, or a picture. */
-static void test_refused(void **state) {
-    (void)state;
+TEST(test_refused) {
     static png_byte grey[ROWS * COLUMNS];
     static char bytes[8192];
     char names[256];
@@ -242,8 +237,7 @@ static void test_refused(void **state) {
 }
 
 /* A ramp of heights and a picture of two materials become the ground they show. */
-static void test_terrain(void **state) {
-    (void)state;
+TEST(test_terrain) {
     static png_byte ramp[ROWS * COLUMNS];
     for (int i = 0; i < ROWS * COLUMNS; i++) {
         ramp[i] = (png_byte)(5 * (i % COLUMNS));
@@ -292,8 +286,7 @@ static void refuse_terrain(const TerrainDef *def, MildStatus status, const char 
 }
 
 /* Pictures missing, unreadable, or given for nothing. */
-static void test_terrain_refused(void **state) {
-    (void)state;
+TEST(test_terrain_refused) {
     TerrainDef plain = terrain_def_default(), def = plain;
     def.map.kind = MILD_MAP_IMAGE;
     refuse_terrain(&def, MILD_ERROR_ARGUMENT, "terrain.image PNG");
@@ -318,8 +311,7 @@ static void test_terrain_refused(void **state) {
 }
 
 /* Level ground of one material needs no map; a shape or a pattern does. */
-static void test_when_a_map(void **state) {
-    (void)state;
+TEST(test_when_a_map) {
     MildError error = {0};
     MildMap *map;
     TerrainDef def = terrain_def_default();
@@ -340,8 +332,7 @@ static void test_when_a_map(void **state) {
     mild_map_destroy(map);
 }
 
-static void test_prints(void **state) {
-    (void)state;
+TEST(test_prints) {
     TerrainDef def = terrain_def_default();
     assert_int_equal(terrain_imprint_tiles(&def), 0);
     def.memory = 1;
@@ -351,8 +342,7 @@ static void test_prints(void **state) {
 }
 
 /* Three materials: black, grey, white; a grey between two counts to the nearer. */
-static void test_labels(void **state) {
-    (void)state;
+TEST(test_labels) {
     static const png_byte grey[6] = {0, 63, 64, 191, 192, 255};
     static const int label[6] = {0, 0, 1, 1, 2, 2};
     write_png(grey, PNG_FORMAT_GRAY, 6, 1);
@@ -376,12 +366,4 @@ static void test_labels(void **state) {
     mild_map_destroy(map);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_round_trip), cmocka_unit_test(test_kinds),
-        cmocka_unit_test(test_too_large),  cmocka_unit_test(test_open_file),
-        cmocka_unit_test(test_refused),    cmocka_unit_test(test_terrain),
-        cmocka_unit_test(test_labels),     cmocka_unit_test(test_terrain_refused),
-        cmocka_unit_test(test_when_a_map), cmocka_unit_test(test_prints)};
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -86,8 +86,7 @@ static int body_facets(int b, Facet *facets) {
 
 /* On foam: the drawn surface is where the elements of shanks and base are, and level again
  * once they are gone. A shank leans, and a cell is 10 mm wide. */
-static void dents_are_where_the_shells_are(void **state) {
-    (void)state;
+TEST(dents_are_where_the_shells_are) {
     MildError error = {0};
     const ReliefDef area = {-1.5, 1.5, -1, 1, 0.01, 0, NULL, 1};
     lay_ground("foam25");
@@ -129,8 +128,7 @@ static int pixels_different(const unsigned char *a, const unsigned char *b, size
 }
 
 /* The robot lies in sand and is taken away: its imprint is seen. The feet press nothing. */
-static void imprints_are_seen(void **state) {
-    (void)state;
+TEST(imprints_are_seen) {
     const size_t bytes = (size_t)3 * WIDTH * HEIGHT;
     const char *names[] = {"sand_loose"};
     MildError error = {0};
@@ -162,10 +160,4 @@ static void imprints_are_seen(void **state) {
     view_destroy(view);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(dents_are_where_the_shells_are),
-        cmocka_unit_test(imprints_are_seen),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)
