@@ -1,5 +1,5 @@
-/* What all tests share: cmocka with what it needs, cases that list themselves, comparisons that fail
- * with a name and both numbers, and errors by their status and by what they name. */
+/* What all tests share: cmocka with what it needs, cases that list themselves, comparisons that
+ * fail with a name and both numbers, and errors by their status and by what they name. */
 #ifndef KIT_H
 #define KIT_H
 
@@ -70,6 +70,13 @@ static inline void expect_entry(const char *what, int i, double got, double want
     if (!(fabs(got - wanted) <= tolerance)) {
         fail_msg("%s[%d]: %.12g instead of %.12g (tolerance %.1g)", what, i, got, wanted,
                  tolerance);
+    }
+}
+
+/* Fails with the error's text unless something is good. */
+static inline void expect_good(int good, const MildError *error) {
+    if (!good) {
+        fail_msg("%s", error->text);
     }
 }
 

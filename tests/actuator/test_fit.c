@@ -173,9 +173,7 @@ static Actuator *fit(const ActuatorFitDef *def, const Record *record, int thread
     Pool *pool = pool_create(threads);
     Actuator *actuator = actuator_fit(def, record, pool, score, &error);
     pool_destroy(pool);
-    if (!actuator) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(actuator != NULL, &error);
     return actuator;
 }
 

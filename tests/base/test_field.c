@@ -49,9 +49,7 @@ static Def taken(int field, const char *text, const char *printed) {
     Def def;
     MildError error;
     char out[64];
-    if (parse(field, text, &def, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(parse(field, text, &def, &error) == MILD_OK, &error);
     assert_int_equal(mild_field_print(&fields[field], &def, out, sizeof out), strlen(printed));
     assert_string_equal(out, printed);
     assert_true(def.before == start.before && def.after == start.after);

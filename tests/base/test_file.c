@@ -26,9 +26,7 @@ static void assert_holds(const char *path, const char *text) {
     size_t size;
     MildError error = {0};
     char *bytes = file_read(path, 1000, &size, &error);
-    if (!bytes) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(bytes != NULL, &error);
     assert_string_equal(bytes, text);
     assert_int_equal(size, strlen(text));
     free(bytes);

@@ -271,9 +271,8 @@ static void side_step(Side *side, Arrays *a, int advance) {
     const MildBatchInput input = input_of(d);
     const MildBatchOutput output = {d->wrench,   d->after,    d->foot,
                                     d->elements, d->residual, d->iterations};
-    if (mild_batch_step(side->batch, &input, &output, advance, NULL, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(mild_batch_step(side->batch, &input, &output, advance, NULL, &error) == MILD_OK,
+                &error);
     side_copy(side, a, side->arrays, sizeof *a);
 }
 

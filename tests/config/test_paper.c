@@ -48,9 +48,7 @@ enum { PRINTED = sizeof printed / sizeof *printed };
 static ExperimentDef read_paper(void) {
     MildError error = {0};
     ExperimentDef def = experiment_def_default();
-    if (experiment_read(&def, PAPER, NULL, 0, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(experiment_read(&def, PAPER, NULL, 0, &error) == MILD_OK, &error);
     return def;
 }
 
@@ -64,9 +62,7 @@ static char *text_of(ExperimentDef *def) {
 TEST(the_file_is_the_paper) {
     MildError error = {0};
     ExperimentDef file = read_paper(), paper = experiment_def_default();
-    if (experiment_read(&paper, NULL, printed, PRINTED, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(experiment_read(&paper, NULL, printed, PRINTED, &error) == MILD_OK, &error);
     char *ours = text_of(&file), *theirs = text_of(&paper);
     char *ours_rest, *theirs_rest;
     const char *a = strtok_r(ours, "\n", &ours_rest), *b = strtok_r(theirs, "\n", &theirs_rest);
@@ -135,9 +131,7 @@ TEST(it_trains) {
         def.train.grounds = 32;
         def.train.robots = (int)kinds[k];
         Trainer *trainer = train_create(&def, &error);
-        if (!trainer) {
-            fail_msg("%s", error.text);
-        }
+        expect_good(trainer != NULL, &error);
         for (int i = 0; i < 2; i++) {
             TrainReport report;
             assert_int_equal(train_iterate(trainer, &report, &error), MILD_OK);

@@ -16,9 +16,7 @@ static void scene_open(Scene *scene, const char *robot, const char *controller) 
     MildError error = {0};
     memset(scene, 0, sizeof *scene);
     scene->robot = robot_open(robot, &error);
-    if (!scene->robot) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(scene->robot != NULL, &error);
     scene->def = task_def_default();
     task_def_make_nominal(&scene->def);
     scene->def.randomize.latency[0] = scene->def.randomize.latency[1] = 0;

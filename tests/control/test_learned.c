@@ -20,9 +20,7 @@ static int setup(void **state) {
     MildError error = {0};
     TaskDef def = task_def_default();
     robot = robot_create(SA01, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot != NULL, &error);
     for (int e = 0; e < ENVS; e++) {
         made[e] = aligned_alloc(64, task_env_bytes(&def, robot));
         assert_non_null(made[e]);

@@ -22,9 +22,7 @@ static int setup(void **state) {
     MildError error = {0};
     def = task_def_default();
     robot = robot_create(SA01, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot != NULL, &error);
     for (int e = 0; e < ROWS; e++) {
         made[e] = aligned_alloc(64, task_env_bytes(&def, robot));
         assert_non_null(made[e]);
@@ -63,9 +61,7 @@ typedef struct {
 static void read_reference(const char *path, Reference *to) {
     MildError error = {0};
     Safetensors *file = safetensors_read(path, &error);
-    if (!file) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(file != NULL, &error);
     const Safetensor *frames = safetensors_find(file, "train.frames"),
                      *actions = safetensors_find(file, "train.actions");
     assert_true(frames && frames->bytes == sizeof to->frames);
@@ -124,9 +120,7 @@ TEST(as_pytorch) {
             MildError error = {0};
             Pool *pool = threads ? pool_create(threads) : NULL;
             Controller controller = {0};
-            if (make(kinds[k], path, pool, &controller, &error) != MILD_OK) {
-                fail_msg("%s", error.text);
-            }
+            expect_good(make(kinds[k], path, pool, &controller, &error) == MILD_OK, &error);
             assert_string_equal(controller.name, kinds[k]);
             for (int again = 0; again < 2; again++) {
                 const double worst = run(&controller, &r);

@@ -168,10 +168,9 @@ static EngineModel *read_model(const Robot *robot) {
     MildError error = {0};
     EngineModel *model = calloc(1, sizeof *model);
     assert_non_null(model);
-    if (engine_model_read(robot, dt, &model->tree, (double *)(void *)&model->number, &error) !=
-        MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(engine_model_read(robot, dt, &model->tree, (double *)(void *)&model->number,
+                                  &error) == MILD_OK,
+                &error);
     return model;
 }
 
@@ -179,9 +178,7 @@ TEST(bodies_are_those_of_mujoco) {
     for (int r = 0; r < ROBOTS; r++) {
         MildError error = {0};
         Robot *robot = robot_open(names[r], &error);
-        if (!robot) {
-            fail_msg("%s", error.text);
-        }
+        expect_good(robot != NULL, &error);
         robot_set_shells(robot, 1);
         EngineModel *model = read_model(robot);
         assert_int_equal(model->tree.bodies, robot_bodies(robot) - robot_feet(robot));

@@ -82,9 +82,7 @@ static void pair_open(const char *robot, const TaskDef *def, int device) {
     of.grounds = GROUNDS;
     pair.batch = envs_create(&of, &error);
     pair.on_side = pair.batch ? device_alloc(device, sizeof(Rows), &error) : NULL;
-    if (!pair.on_side) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(pair.on_side != NULL, &error);
 }
 
 static void pair_close(void) {
@@ -112,9 +110,7 @@ static void pair_reset(void) {
     MildError error = {0};
     const EnvsView a = view_of(&pair.a), b = view_of(pair.on_side);
     envs_reset(pair.mujoco, &a, NULL, &error);
-    if (envs_reset(pair.batch, &b, NULL, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(envs_reset(pair.batch, &b, NULL, &error) == MILD_OK, &error);
     fetch();
 }
 
@@ -135,9 +131,7 @@ static void pair_step(void) {
     envs_step(pair.mujoco, &a, NULL, &error);
     assert_int_equal(
         device_copy(pair.device, s->action, pair.a.action, sizeof pair.a.action, &error), MILD_OK);
-    if (envs_step(pair.batch, &b, NULL, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(envs_step(pair.batch, &b, NULL, &error) == MILD_OK, &error);
     fetch();
 }
 

@@ -130,9 +130,7 @@ TEST(trials_are_chosen) {
                            .timeout = flags[1],
                            .valid = flags[2],
                            .next = view};
-    if (!map) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(map != NULL, &error);
     def.map = map;
     const MildMaterial any = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&any);
@@ -161,9 +159,7 @@ TEST(trials_are_chosen) {
                         .terrain = ground,
                         .terrains = 3};
     Envs *envs = envs_create(&of, &error);
-    if (!envs) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(envs != NULL, &error);
     assert_int_equal(envs_physics_steps(envs), 2);
     envs_set_samples(envs, sample[0]);
     assert_int_equal(envs_set_commands(envs, command[0], &error), MILD_OK);

@@ -34,9 +34,7 @@ const EnvsKernels *const envs_kernels[] = {&none, &go1, &any, NULL};
 static void is_slow(const char *folder, int wanted) {
     MildError error = {0};
     Robot *robot = robot_create(folder, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot != NULL, &error);
     assert_int_equal(envs_are_slow(robot), wanted);
     robot_destroy(robot);
 }

@@ -25,9 +25,7 @@ static size_t measure(const MildMapDef *on) {
                         .grounds = GROUNDS,
                         .seed = 7};
     Envs *envs = envs_create(&of, &error);
-    if (!envs) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(envs != NULL, &error);
     const EnvsMemory memory = envs_memory(envs);
     const size_t bytes = envs_robot_bytes(envs);
     printf("%s: %zu B: task %zu, engine %zu, ground %zu, rest %zu\n", on ? "map" : "level", bytes,

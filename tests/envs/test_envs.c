@@ -63,9 +63,7 @@ static void draw_actions(int step, float action[ENVS][SA01_JOINTS]) {
 static MildEnvs *open_envs(const char *const *overrides, int count) {
     MildError error = {0};
     MildEnvs *envs = mild_envs_open(NULL, overrides, count, &error);
-    if (!envs) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(envs != NULL, &error);
     return envs;
 }
 

@@ -111,17 +111,13 @@ static OtherGround *start(const char *how, int trials) {
     path[length] = '\0';
     snprintf(command, sizeof command, "exec '%s' %s", path, how);
     OtherGround *other = other_ground_start(command, robot, trials, &error);
-    if (!other) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(other != NULL, &error);
     return other;
 }
 
 static void stop_well(OtherGround *other) {
     MildError error = {0};
-    if (other_ground_stop(other, MILD_OK, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(other_ground_stop(other, MILD_OK, &error) == MILD_OK, &error);
 }
 
 /* ---- questions ---- */

@@ -37,9 +37,7 @@ static int setup(void **unused) {
     model->geom_rbound[box] = mju_norm3(makers);
     data = mj_makeData(model);
     robot = robot_create(MILD_SOURCE_DIR "/robots/go1", &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot != NULL, &error);
     robot_set_shells(robot, 1);
     return 0;
 }

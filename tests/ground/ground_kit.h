@@ -63,9 +63,7 @@ static inline MildSole *kit_sole(int right, int target) {
     MildSoleDef def = {outline, 38, KIT_PITCH, KIT_SOLE_Z, target};
     MildError error = {0};
     MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(sole != NULL, &error);
     return sole;
 }
 
@@ -76,9 +74,7 @@ static inline MildSole *kit_plate(int columns, int rows) {
     MildSoleDef def = {outline, 4, KIT_PITCH, KIT_SOLE_Z, columns * rows};
     MildError error = {0};
     MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(sole != NULL, &error);
     return sole;
 }
 
@@ -127,9 +123,7 @@ static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right,
     }
     MildError error = {0};
     kit->scratch = mild_scratch_create(kit->soles, feet, &error);
-    if (!kit->scratch) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(kit->scratch != NULL, &error);
     kit->bytes = mild_ground_bytes(kit->soles, feet);
     kit->ground = mild_ground_init(aligned_alloc(64, kit->bytes), kit->soles, feet);
     kit->terrain = mild_terrain_uniform(material);

@@ -66,9 +66,7 @@ TEST(test_labels) {
             def.patches = patterns[k];
             def.patch_count = count;
             MildMap *map = mild_map_create(&def, &error);
-            if (!map) {
-                fail_msg("%s", error.text);
-            }
+            expect_good(map != NULL, &error);
             assert_int_equal(mild_map_label_count(map), k ? count : 1);
             mild_map_destroy(map);
         }

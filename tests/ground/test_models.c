@@ -84,9 +84,7 @@ TEST(test_matched) {
         for (int model = 0; model < SOFT_MODELS; model++) {
             MildMaterial rival = rival_of(model, &mild);
             MildError error = {0};
-            if (mild_material_check(&rival, &error) != MILD_OK) {
-                fail_msg("%s", error.text);
-            }
+            expect_good(mild_material_check(&rival, &error) == MILD_OK, &error);
             double sinks = mild_sole_sinkage(sole_of(model, 0), &rival, LOAD);
             worst_depth = fmax(worst_depth, fabs(sinks - depth));
             double off = pressed_force(model, &rival, depth) / LOAD - 1.0;

@@ -26,9 +26,7 @@ static MildSole *one_element(double edge) {
     MildSoleDef def = {outline, 4, edge, KIT_SOLE_Z, 1};
     MildError error = {0};
     MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(sole != NULL, &error);
     return sole;
 }
 

@@ -14,9 +14,7 @@ static MildSole *plate(double length, double width, double pitch) {
     MildSoleDef def = {outline, 4, pitch, KIT_SOLE_Z, 0};
     MildError error = {0};
     MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(sole != NULL, &error);
     return sole;
 }
 

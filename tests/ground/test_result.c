@@ -9,9 +9,7 @@ static MildSole *element_at(double x, double y) {
     MildSoleDef def = {outline, 4, KIT_PITCH, KIT_SOLE_Z, 1};
     MildError error = {0};
     MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(sole != NULL, &error);
     return sole;
 }
 

@@ -30,9 +30,7 @@ static MildMap *any_map(uint64_t *random) {
     def.border = kit_index(random, 2) ? 0.05 : 0.0;
     MildError error = {0};
     MildMap *map = mild_map_create(&def, &error);
-    if (!map) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(map != NULL, &error);
     return map;
 }
 

@@ -82,9 +82,7 @@ static FitResult press_and_fit(const Case *c, Noise noise, int draw) {
         }
         noise_add(points + r * ROWS, noise, &random);
     }
-    if (fit_run(&def, points, c->records * ROWS, &result, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(fit_run(&def, points, c->records * ROWS, &result, &error) == MILD_OK, &error);
     return result;
 }
 

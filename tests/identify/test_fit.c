@@ -92,9 +92,7 @@ static void press(const FitDef *truth, FitPoint *out, int rows, double depth, do
 static FitResult run(const FitDef *def, int count) {
     FitResult result;
     MildError error = {0};
-    if (fit_run(def, points, count, &result, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(fit_run(def, points, count, &result, &error) == MILD_OK, &error);
     return result;
 }
 

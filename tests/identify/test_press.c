@@ -16,9 +16,7 @@ static void press(const PressDef *def) {
     MildSole *plate = press_plate_create(0.2, 0.1, &error);
     assert_non_null(plate);
     press_result_close(&result);
-    if (press_run(def, plate, &result, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(press_run(def, plate, &result, &error) == MILD_OK, &error);
     mild_sole_destroy(plate);
 }
 

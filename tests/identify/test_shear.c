@@ -59,9 +59,7 @@ static FitValue *value_of(FitResult *result, const char *name) {
 static FitResult run(const FitDef *def, int count) {
     FitResult result;
     MildError error = {0};
-    if (fit_run(def, points, count, &result, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(fit_run(def, points, count, &result, &error) == MILD_OK, &error);
     return result;
 }
 
@@ -237,9 +235,7 @@ static FitFile read_text(const char *text) {
     FitFile file;
     MildError error = {0};
     FILE *stream = fmemopen((void *)(uintptr_t)text, strlen(text), "r");
-    if (fit_csv_read_file(stream, "record", &file, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(fit_csv_read_file(stream, "record", &file, &error) == MILD_OK, &error);
     fclose(stream);
     return file;
 }

@@ -263,16 +263,13 @@ static EvalRow walk(const Walker *walker, const Robot *robot, const char *ground
     char file[300], name[TRAIN_ROBOT_SIZE];
     MildError error = {0};
     TaskDef def;
-    if (experiment_task(&def, 0, name, walker->config, NULL, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(experiment_task(&def, 0, name, walker->config, NULL, &error) == MILD_OK, &error);
     def.physics_dt = dt;
     Pool *pool = pool_create(1);
     Controller controller;
     snprintf(file, sizeof file, MILD_SOURCE_DIR "/policies/%s.safetensors", walker->policy);
-    if (controller_learned(file, robot, pool, trials, &controller, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(controller_learned(file, robot, pool, trials, &controller, &error) == MILD_OK,
+                &error);
     Scene scene;
     assert_int_equal(scene_make(&scene, ground, 3, &error), MILD_OK);
     EvalDef eval = {.speed = 0.5, .trials = trials, .seconds = kit_short() ? 1 : 10, .seed = 1};
@@ -287,9 +284,7 @@ static EvalRow walk(const Walker *walker, const Robot *robot, const char *ground
                          .speeds = &eval.speed,
                          .speed_count = 1,
                          .eval = eval};
-    if (eval_run(&run, &row, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(eval_run(&run, &row, &error) == MILD_OK, &error);
     controller_destroy(&controller);
     pool_destroy(pool);
     return row;

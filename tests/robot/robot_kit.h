@@ -21,9 +21,7 @@ static inline int setup(void **unused) {
     (void)unused;
     MildError error = {0};
     robot = robot_create(MODEL, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot != NULL, &error);
     robot->leg_pairs = 0; /* random poses are held to MuJoCo's own step; test_legs.c has the legs */
     stand = stand_create(robot, &error);
     assert_non_null(stand);

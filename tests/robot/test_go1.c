@@ -97,18 +97,14 @@ static Robot *changed_robot(const char *from, const char *to, MildError *error) 
 TEST(what_may_be_left_out) {
     MildError error = {0};
     Robot *changed = changed_robot("stand_kp    =", "# a remark\n; stand_kp    =", &error);
-    if (!changed) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(changed != NULL, &error);
     for (int i = 0; i < JOINTS; i++) {
         expect_near("stand_kp without a list", robot_stand_kp(changed)[i], robot_kp(robot)[i], 0);
         expect_near("stand_kd", robot_stand_kd(changed)[i], robot_stand_kd(robot)[i], 0);
     }
     robot_destroy(changed);
     changed = changed_robot("height = 0.28            ;", "height = 0.28            #", &error);
-    if (!changed) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(changed != NULL, &error);
     expect_near("height", robot_nominal_height(changed), 0.28, 0);
     robot_destroy(changed);
     static const struct {

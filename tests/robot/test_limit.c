@@ -67,9 +67,7 @@ static Robot *make_stool(const char *left, const char *right, const char *out, c
     unlink(xml_path);
     unlink(ini_path);
     rmdir(folder);
-    if (!stool) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(stool != NULL, &error);
     return stool;
 }
 

@@ -224,9 +224,7 @@ static int setup(void **unused) {
     (void)unused;
     MildError error = {0};
     robot = robot_create(MODEL, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot != NULL, &error);
     sim = robot_sim_create(robot, 0.001, &error);
     char *text = read_file(NUMBERS);
     numbers = cJSON_Parse(text);

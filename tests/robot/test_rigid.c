@@ -12,9 +12,7 @@
 static MildMap *make_map(const MildMapDef *def) {
     MildError error = {0};
     MildMap *map = mild_map_create(def, &error);
-    if (!map) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(map != NULL, &error);
     return map;
 }
 

@@ -51,9 +51,7 @@ static int setup(void **unused) {
     remove(path[0]);
     remove(path[1]);
     rmdir(folder);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot != NULL, &error);
     return 0;
 }
 

@@ -19,9 +19,7 @@ static int open_widest(void **unused) {
     MildError error = {0};
     robot = widest_open(&error);
     sim = robot ? robot_sim_create(robot, 0.001, &error) : NULL;
-    if (!sim) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(sim != NULL, &error);
     return 0;
 }
 

@@ -16,9 +16,7 @@ static MildMaterial parsed(const char *text) {
     MildMaterial material;
     MildError error = {0};
     memset(&material, 0, sizeof material);
-    if (soil_parse(text, "mars.ini", &material, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(soil_parse(text, "mars.ini", &material, &error) == MILD_OK, &error);
     return material;
 }
 

@@ -29,9 +29,7 @@ static int setup(void **unused) {
     (void)unused;
     MildError error = {0};
     robot = robot_create(GO1, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot != NULL, &error);
     def = task_def_default();
     task_def_make_nominal(&def);
     def.observe_noise = 0;

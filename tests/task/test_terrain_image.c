@@ -53,9 +53,7 @@ TEST(test_round_trip) {
                               : PNG_FORMAT_RGBA,
                   COLUMNS, ROWS);
         MildStatus status = image_read(path, &image, &error);
-        if (status != MILD_OK) {
-            fail_msg("%s", error.text);
-        }
+        expect_good(status == MILD_OK, &error);
         assert_int_equal(image.columns, COLUMNS);
         assert_int_equal(image.rows, ROWS);
         for (int i = 0; i < ROWS * COLUMNS; i++) {
@@ -253,9 +251,7 @@ TEST(test_terrain) {
     MildError error = {0};
     MildMap *map;
     MildStatus status = terrain_make(&def, 2, &map, &error);
-    if (status != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(status == MILD_OK, &error);
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
     assert_int_equal(mild_terrain_set_map(&terrain, map, &error),
@@ -352,9 +348,7 @@ TEST(test_labels) {
     strcpy(def.labels, path);
     MildError error = {0};
     MildMap *map;
-    if (terrain_make(&def, 3, &map, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(terrain_make(&def, 3, &map, &error) == MILD_OK, &error);
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
     terrain.materials[1] = terrain.materials[2] = sand;

@@ -9,9 +9,7 @@ static int widest_setup(void **unused) {
     (void)unused;
     MildError error = {0};
     robot = widest_open(&error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot != NULL, &error);
     mirror = task_mirror(robot);
     return 0;
 }

@@ -21,9 +21,7 @@ static Trainer *trainer_of(TrainRobots robots) {
     def.ppo.steps = 8;
     def.task.physics_dt = 0.005;
     Trainer *trainer = train_create(&def, &error);
-    if (!trainer) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(trainer != NULL, &error);
     return trainer;
 }
 

@@ -21,9 +21,7 @@ static Trainer *trainer_of(const char *robot) {
     MildError error = {0};
     const ExperimentDef def = small_def(robot);
     Trainer *trainer = train_create(&def, &error);
-    if (!trainer) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(trainer != NULL, &error);
     return trainer;
 }
 

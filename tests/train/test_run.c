@@ -69,9 +69,7 @@ static void run(const ExperimentDef *def) {
                             .note = "test"};
     const TrainCallbacks callbacks = {.iterated = keep};
     TrainRun *run = train_run_open(&of, &callbacks, &error);
-    if (!run) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(run != NULL, &error);
     assert_int_equal(train_run_loop(run, &error), MILD_OK);
     train_run_close(run);
 }

@@ -67,9 +67,7 @@ TEST_WITH(whole_file_under_its_name, make_folder, remove_folder) {
     char path[96];
     snprintf(path, sizeof path, "%s/walk.mp4", folder);
     Video *video = video_open(path, WIDTH, HEIGHT, 25, &error);
-    if (!video) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(video != NULL, &error);
     for (int i = 0; i < FRAMES; i++) {
         paint(rgb, i);
         assert_int_equal(video_frame(video, rgb, &error), MILD_OK);

@@ -26,9 +26,7 @@ static int setup(void **state) {
     assert_true(mild_material_preset("sand_loose", &sand));
     terrain = mild_terrain_uniform(&sand);
     robot = robot_create(MODEL, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot != NULL, &error);
     stand = stand_create(robot, &error);
     sim = robot_sim_create(robot, DT, &error);
     assert_non_null(sim);
