@@ -8,6 +8,7 @@
 #include "env/actuator/actuator.h"
 #include "env/actuator/motor.h"
 #include "learn/safetensors.h"
+#include "robots.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
 #define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
@@ -39,10 +40,8 @@ static Actuator *make(double spacing) {
 
 /* Hip roll and yaw, hip pitch and knee, both ankles; of the quadruped, thighs and calves. */
 TEST(kinds_of_motors) {
-    MildError error = {0};
     int kind[ROBOT_JOINTS_MAX];
-    Robot *go1 = robot_create(GO1, &error);
-    assert_non_null(go1);
+    Robot *go1 = kit_robot(GO1);
     assert_int_equal(actuator_kinds(robot, kind), KINDS);
     for (int i = 0; i < SA01_JOINTS; i++) {
         assert_int_equal(kind[i], i % 6 / 2);
@@ -225,8 +224,7 @@ TEST(file_and_task) {
     refused(&wrong, MILD_ERROR_FORMAT, "task.actuator " POLICY);
     strcpy(wrong.actuator, "/tmp/there/is/none");
     refused(&wrong, MILD_ERROR_IO, "task.actuator /tmp/there/is/none");
-    Robot *go1 = robot_create(GO1, &error);
-    assert_non_null(go1);
+    Robot *go1 = kit_robot(GO1);
     assert_null(actuator_load(path, go1, &error));
     assert_error(&error, MILD_ERROR_ARGUMENT, "sa01 go1");
     robot_destroy(go1);

@@ -2,7 +2,7 @@
  * to the depth of the law of the changed material. */
 #include "app/live.h"
 #include "control/stand.h"
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 
 #define DT 0.002
@@ -76,8 +76,7 @@ TEST(keys_scale) {
 }
 
 TEST(other_models_scale) {
-    MildMaterial clay;
-    assert_true(mild_material_preset("clay", &clay));
+    MildMaterial clay = kit_preset("clay");
     const MildTerrain terrain = mild_terrain_uniform(&clay);
     Live live = live_begin(&terrain, 0);
     live_take(&live, 0, &(WindowInput){.stiffness = 1});
@@ -108,13 +107,10 @@ static double sinkage_after(const Robot *robot, RobotSim *sim, const Stand *stan
  * of the law. Another preset does not reach it while it stands. */
 TEST(a_standing_robot_sinks) {
     MildError error = {0};
-    Robot *robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    Robot *robot = kit_robot(SA01);
     Stand *stand = stand_create(robot, &error);
     RobotSim *sim = robot_sim_create(robot, DT, &error);
-    MildGround *ground =
-        mild_ground_init(aligned_alloc(64, mild_ground_bytes(robot_soles(robot), SA01_FEET)),
-                         robot_soles(robot), SA01_FEET);
+    MildGround *ground = kit_ground(robot);
     const RobotVariation nominal = robot_variation_nominal();
     MildTerrain terrain = course();
     terrain.materials[0] = terrain.materials[2]; /* rubber */

@@ -3,7 +3,7 @@
  */
 #include "app/play.h"
 #include "base/clock.h"
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 
 #define RATE 50.0 /* [1/s] frames: two policy steps each */
@@ -64,8 +64,7 @@ static void play(int count) {
     TaskDef task = task_def_default();
     Scene scene;
     task_def_make_nominal(&task);
-    Robot *robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    Robot *robot = kit_robot(SA01);
     int joints = robot_joints(robot);
     Controller controller = {.self = &joints, .name = "hold", .act = hold};
     assert_int_equal(scene_make(&scene, "grass", 2, &error), MILD_OK);

@@ -1,6 +1,6 @@
 /* configs/paper.ini against the paper: every number of its tables of rewards and of randomised
  * parameters, its implementation details, and nothing else but what is off. It trains, too. */
-#include "kit.h"
+#include "robots.h"
 #include "run/config/experiment_keys.h"
 #include "run/train/trainer.h"
 #include "sa01.h"
@@ -104,8 +104,7 @@ TEST(the_robot_is_the_papers) {
     const double kp[6] = {50, 50, 70, 70, 20, 20}, kd[6] = {5, 5, 7, 7, 0.2, 0.2};
     TaskGains own;
     ExperimentDef def = read_paper();
-    Robot *robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    Robot *robot = kit_robot(SA01);
     int elements = 0;
     for (int f = 0; f < robot_feet(robot); f++) {
         elements += mild_sole_elements(robot_rasters(robot)[f]);

@@ -1,7 +1,7 @@
 /* The table of controllers, and those that need no policy, on the biped and on the quadruped. */
 #include "control/controller.h"
 #include "control/stand.h"
-#include "kit.h"
+#include "robots.h"
 
 /* A robot in an environment of its own, on loose sand. */
 typedef struct {
@@ -15,8 +15,7 @@ typedef struct {
 static void scene_open(Scene *scene, const char *robot, const char *controller) {
     MildError error = {0};
     memset(scene, 0, sizeof *scene);
-    scene->robot = robot_open(robot, &error);
-    expect_good(scene->robot != NULL, &error);
+    scene->robot = kit_robot_named(robot);
     scene->def = task_def_default();
     task_def_make_nominal(&scene->def);
     scene->def.randomize.latency[0] = scene->def.randomize.latency[1] = 0;

@@ -3,40 +3,14 @@
 
 #include "base/random.h"
 #include "control/learned.h"
-#include "kit.h"
 #include "learn/policy.h"
 #include "learn/policy_private.h"
-#include "sa01.h"
-
-#define PATH "build_test_controller.safetensors"
 
 enum { ENVS = 7 };
 
-static Robot *robot;
-static TaskEnv *made[ENVS];
+#include "control_kit.h"
 
-static int setup(void **state) {
-    (void)state;
-    MildError error = {0};
-    TaskDef def = task_def_default();
-    robot = robot_create(SA01, &error);
-    expect_good(robot != NULL, &error);
-    for (int e = 0; e < ENVS; e++) {
-        made[e] = aligned_alloc(64, task_env_bytes(&def, robot));
-        assert_non_null(made[e]);
-        task_env_init(made[e], &def, robot, 1, (uint32_t)e);
-    }
-    return 0;
-}
-
-static int teardown(void **state) {
-    (void)state;
-    for (int e = 0; e < ENVS; e++) {
-        free(made[e]);
-    }
-    robot_destroy(robot);
-    return 0;
-}
+#define PATH "build_test_controller.safetensors"
 
 /* A policy of the task's shape with weights everywhere, its layers small. */
 static PolicyDef task_policy_def(void) {

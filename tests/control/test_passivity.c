@@ -4,7 +4,7 @@
 
 #include "control/body.h"
 #include "control/controller.h"
-#include "kit.h"
+#include "robots.h"
 
 #define GRAVITY 9.81
 enum { NV = 18 };
@@ -269,20 +269,17 @@ static void resting_feet(const Stand *stand, const double motion[6], double nu[N
 static void stand_open(Stand *stand, int rigid) {
     const BodyDef def = body_def_default();
     MildError error = {0};
-    MildMaterial material;
     WalkState state;
-    assert_true(mild_material_preset("foam60", &material));
     *stand = (Stand){.b = 0.254,
-                     .terrain = mild_terrain_uniform(&material),
+                     .terrain = kit_terrain("foam60"),
                      .variation = robot_variation_nominal(),
                      .mass = robot_total_mass(robot)};
     stand->variation.rigid = rigid;
     stand->body = body_create(robot, &def, robot_effort(robot), &error);
     stand->sim = robot_sim_create(robot, 0.0025, &error);
     stand->bytes = mild_ground_bytes(robot_soles(robot), robot_bodies(robot));
-    void *block = aligned_alloc(64, stand->bytes);
-    assert_true(stand->body && stand->sim && block);
-    stand->ground = mild_ground_init(block, robot_soles(robot), robot_bodies(robot));
+    assert_true(stand->body && stand->sim);
+    stand->ground = kit_ground(robot);
     RobotState start = {.qpos = {0, 0, robot_stand_height(robot), 1, 0, 0, 0}};
     memcpy(start.qpos + 7, robot_default_pose(robot),
            (size_t)robot_joints(robot) * sizeof *start.qpos);
@@ -459,8 +456,7 @@ TEST(walks) {
 
 TEST(refuses_a_quadruped) {
     MildError error = {0};
-    Robot *go1 = robot_open("go1", &error);
-    assert_non_null(go1);
+    Robot *go1 = kit_robot_named("go1");
     TaskDef def = task_def_default();
     Controller controller = {0};
     const ControllerDef wanted = {NULL, &def, go1, NULL, 1};

@@ -3,42 +3,16 @@
 #include <unistd.h>
 
 #include "control/controller.h"
-#include "kit.h"
 #include "learn/safetensors.h"
-#include "sa01.h"
+
+enum { ENVS = 3, STEPS = 13, SECOND = 8, TENSORS_MAX = 64 };
+
+#include "control_kit.h"
 
 #define FOLDER MILD_SOURCE_DIR "/tests/control/"
 #define PATH "build_test_rivals.safetensors"
 
-enum { ROWS = 3, STEPS = 13, SECOND = 8, TENSORS_MAX = 64 };
-
 static const char *const kinds[2] = {"clock", "ht2"};
-static Robot *robot;
-static TaskDef def;
-static TaskEnv *made[ROWS];
-
-static int setup(void **state) {
-    (void)state;
-    MildError error = {0};
-    def = task_def_default();
-    robot = robot_create(SA01, &error);
-    expect_good(robot != NULL, &error);
-    for (int e = 0; e < ROWS; e++) {
-        made[e] = aligned_alloc(64, task_env_bytes(&def, robot));
-        assert_non_null(made[e]);
-        task_env_init(made[e], &def, robot, 1, (uint32_t)e);
-    }
-    return 0;
-}
-
-static int teardown(void **state) {
-    (void)state;
-    for (int e = 0; e < ROWS; e++) {
-        free(made[e]);
-    }
-    robot_destroy(robot);
-    return 0;
-}
 
 static const char *reference(const char *kind, char path[256]) {
     snprintf(path, 256, FOLDER "%s.safetensors", kind);
@@ -47,7 +21,7 @@ static const char *reference(const char *kind, char path[256]) {
 
 static MildStatus make(const char *kind, const char *path, Pool *pool, Controller *controller,
                        MildError *error) {
-    const ControllerDef wanted = {path, &def, robot, pool, ROWS};
+    const ControllerDef wanted = {path, &task, robot, pool, ENVS};
     return controller_make(kind, &wanted, controller, error);
 }
 
@@ -88,16 +62,16 @@ static void show(TaskEnv *env, const Reference *r, int t) {
 /* Rows begin one step after each other, so that their contexts differ. */
 static double run(Controller *controller, const Reference *r) {
     double worst = 0;
-    for (int now = 0; now < STEPS + ROWS - 1; now++) {
-        float actions[ROWS * SA01_JOINTS + 1];
-        actions[ROWS * SA01_JOINTS] = 42;
-        for (int e = 0; e < ROWS; e++) {
+    for (int now = 0; now < STEPS + ENVS - 1; now++) {
+        float actions[ENVS * SA01_JOINTS + 1];
+        actions[ENVS * SA01_JOINTS] = 42;
+        for (int e = 0; e < ENVS; e++) {
             const int t = now < e ? 0 : now - e;
             show(made[e], r, t < STEPS ? t : STEPS - 1);
         }
-        controller->act(controller->self, ROWS, made, actions);
-        assert_true(actions[ROWS * SA01_JOINTS] == 42);
-        for (int e = 0; e < ROWS; e++) {
+        controller->act(controller->self, ENVS, made, actions);
+        assert_true(actions[ENVS * SA01_JOINTS] == 42);
+        for (int e = 0; e < ENVS; e++) {
             const int t = now < e ? 0 : now - e;
             const float *action = actions + e * SA01_JOINTS;
             for (int j = 0; t < STEPS && j < SA01_JOINTS; j++) {

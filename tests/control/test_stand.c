@@ -4,7 +4,7 @@
 
 #include "base/random.h"
 #include "control/stand.h"
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 
 #define SWAY 0.15 /* [s] of stand.c */
@@ -342,14 +342,12 @@ TEST(test_stands) {
     static const char *const grounds[] = {"foam60", "grass", "foam25"};
     const Robot *robot = robots[0];
     for (int g = 0; g < 3; g++) {
-        MildMaterial m;
-        assert_true(mild_material_preset(grounds[g], &m));
+        MildMaterial m = kit_preset(grounds[g]);
         MildTerrain terrain = mild_terrain_uniform(&m);
         double sinkage = mild_sole_sinkage(robot_soles(robot)[0], &m, robot_foot_load(robot));
         RobotState rest = stand_state(stands[0], 1, sinkage);
         RobotSim *sim = sim_at(robot, &rest);
-        MildGround *ground = mild_ground_init(
-            aligned_alloc(64, mild_ground_bytes(robot_soles(robot), 2)), robot_soles(robot), 2);
+        MildGround *ground = kit_ground(robot);
         for (int s = 0; s < 1500; s++) {
             double torque[ROBOT_JOINTS_MAX];
             stand_torque(stands[0], sim, 1, torque);

@@ -6,8 +6,8 @@
  * sqrt(M_ii f^T M^-1 f) and twists with sqrt(A_rr v^T M v); entries of M and A relate to the
  * diagonal, M_ij to sqrt(M_ii M_jj). So a light ankle is not hidden behind a heavy trunk. */
 #include "cases.h"
-#include "kit.h"
 #include "oracle.h"
+#include "robots.h"
 
 #include "control/stand.h"
 #include "ground/grid.h"
@@ -519,13 +519,6 @@ typedef struct {
     double drift[3]; /* [m, -, rad] worst: base, its quaternion, joints */
 } Follower;
 
-static MildGround *new_ground(const Kit *kit) {
-    const MildSole *const *soles = robot_soles(kit->robot);
-    void *block = calloc(1, mild_ground_bytes(soles, kit->tree.feet));
-    assert_non_null(block);
-    return mild_ground_init(block, soles, kit->tree.feet);
-}
-
 /* What passes between engine and ground: poses, twists, A and V_free one way, wrenches the
  * other. */
 static void stand_on(const Kit *kit, Follower *follower, const MildTerrain *terrain) {
@@ -574,10 +567,8 @@ static void follow(const Kit *kit, Follower *follower, const RobotSim *sim,
 static double march(March kind, const EngineCase *start, Follower followers[2]) {
     const Kit *kit = &kits[SA01_KIT];
     RobotSim *sim = kit->sim;
-    MildGround *ground = new_ground(kit);
-    MildMaterial sand;
-    assert_true(mild_material_preset("sand_loose", &sand));
-    MildTerrain terrain = mild_terrain_uniform(&sand);
+    MildGround *ground = kit_ground(kit->robot);
+    MildTerrain terrain = kit_terrain("sand_loose");
     terrain.map = start->map;
     RobotState state = {.qpos = {0}};
     double load = 0;
@@ -587,7 +578,7 @@ static double march(March kind, const EngineCase *start, Follower followers[2]) 
     for (int f = 0; f < 2; f++) {
         MildError error = {0};
         followers[f].state = *start;
-        followers[f].ground = kind == SOFT || kind == SOFT_WAVES ? new_ground(kit) : NULL;
+        followers[f].ground = kind == SOFT || kind == SOFT_WAVES ? kit_ground(kit->robot) : NULL;
         followers[f].scratch = mild_scratch_create(robot_soles(kit->robot), 2, &error);
     }
     const int steps = kit_short() ? SECOND / 4 : SECOND;

@@ -4,11 +4,11 @@
 #include <stdio.h>
 
 #include "base/random.h"
-#include "kit.h"
 #include "robot/engine/read.h"
 #include "robot/engine/shells.h"
 #include "robot/engine/step.h"
 #include "robot/sim.h"
+#include "robots.h"
 
 enum { ROBOTS = 3, FALLS = 12, FALL_STEPS = 300, ROWS_MOST = 6 * (ROBOT_FEET_MAX + 8) };
 static const char *const names[ROBOTS] = {"sa01", "go1", "g1"};
@@ -139,9 +139,7 @@ static void fall(const Robot *robot, const EngineModel *model, RobotSim *sim, Mi
                  uint32_t number, Worst *worst) {
     static Engine engine;
     Random random = random_at(5, number, 0);
-    MildMaterial material;
-    assert_true(mild_material_preset(number % 2 ? "foam45" : "sand_loose", &material));
-    const MildTerrain terrain = mild_terrain_uniform(&material);
+    const MildTerrain terrain = kit_terrain(number % 2 ? "foam45" : "sand_loose");
     const RobotVariation nominal = robot_variation_nominal();
     RobotState state = random_state(robot, &random);
     mild_ground_reset(ground);
@@ -176,17 +174,13 @@ static EngineModel *read_model(const Robot *robot) {
 
 TEST(bodies_are_those_of_mujoco) {
     for (int r = 0; r < ROBOTS; r++) {
-        MildError error = {0};
-        Robot *robot = robot_open(names[r], &error);
-        expect_good(robot != NULL, &error);
+        Robot *robot = kit_robot_named(names[r]);
         robot_set_shells(robot, 1);
         EngineModel *model = read_model(robot);
         assert_int_equal(model->tree.bodies, robot_bodies(robot) - robot_feet(robot));
         RobotSim *sim = robot_sim_create(robot, dt, NULL);
         sim->model->opt.tolerance = 1e-15;
-        const MildSole *const *soles = robot_soles(robot);
-        void *block = calloc(1, mild_ground_bytes(soles, robot_bodies(robot)));
-        MildGround *ground = mild_ground_init(block, soles, robot_bodies(robot));
+        MildGround *ground = kit_ground(robot);
         Worst worst = {0};
         for (uint32_t n = 0; n < FALLS; n++) {
             fall(robot, model, sim, ground, n, &worst);
@@ -198,7 +192,7 @@ TEST(bodies_are_those_of_mujoco) {
         assert_true(worst.steps > 500 && worst.bodies > worst.steps);
         assert_true(worst.pose < 1e-12 && worst.twist < 1e-10 && worst.inertia < 1e-10);
         assert_true(worst.rate < 1e-10);
-        free(block);
+        free(ground);
         robot_sim_destroy(sim);
         free(model);
         robot_destroy(robot);

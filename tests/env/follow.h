@@ -8,7 +8,7 @@
 #include "env/task/task.h"
 #include "episode.h"
 #include "ground/batch/batch.h"
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
@@ -63,8 +63,7 @@ static void pair_open(const char *robot, const TaskDef *def, int device) {
     memset(&pair, 0, sizeof pair);
     pair.device = device;
     pair.def = *def;
-    pair.robot = robot_create(robot, &error);
-    assert_non_null(pair.robot);
+    pair.robot = kit_robot(robot);
     pair.shape = task_shape(pair.robot);
     robot_set_model(pair.robot, (MildModel)def->randomize.model);
     robot_set_shells(pair.robot, def->shells_stand);

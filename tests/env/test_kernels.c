@@ -1,6 +1,6 @@
 /* Which kernels of a build a robot takes: the first that fit, and envs_are_slow says when those are
  * for any robot. The table of the build is not linked here, this one stands in its place. */
-#include "kit.h"
+#include "robots.h"
 
 #define MILD_REAL_FLOAT
 #include "env/backend.h"
@@ -32,9 +32,7 @@ static const EnvsKernels any = {.fixed = 0, .fits = fits_any};
 const EnvsKernels *const envs_kernels[] = {&none, &go1, &any, NULL};
 
 static void is_slow(const char *folder, int wanted) {
-    MildError error = {0};
-    Robot *robot = robot_create(folder, &error);
-    expect_good(robot != NULL, &error);
+    Robot *robot = kit_robot(folder);
     assert_int_equal(envs_are_slow(robot), wanted);
     robot_destroy(robot);
 }

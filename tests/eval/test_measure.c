@@ -1,5 +1,5 @@
 /* Evaluation's measures on a scripted walk, without simulator, with numbers worked out by hand. */
-#include "kit.h"
+#include "robots.h"
 #include "run/eval/eval.h"
 #include "sa01.h"
 
@@ -676,8 +676,7 @@ TEST(the_printed_row) {
 /* The same numbers read from a robot: what is put into its state is what the measure must see. */
 TEST(a_robot_is_read) {
     MildError error = {0};
-    Robot *robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    Robot *robot = kit_robot(SA01);
     TaskDef def = task_def_default();
     RobotSim *sim = robot_sim_create(robot, 1e-3, &error);
     TaskEnv *env = aligned_alloc(64, task_env_bytes(&def, robot));

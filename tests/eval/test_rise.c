@@ -5,9 +5,9 @@
 
 #include "base/random.h"
 #include "env/task/policy_keys.h"
-#include "kit.h"
 #include "learn/policy.h"
 #include "mild/batch.h"
+#include "robots.h"
 #include "run/eval/eval.h"
 
 #define RISES MILD_SOURCE_DIR "/policies/go1_rise.safetensors"
@@ -26,7 +26,6 @@ static mjData *data;
 
 static int setup(void **unused) {
     (void)unused;
-    MildError error = {0};
     char text[256] = "";
     model = mj_loadXML(MILD_SOURCE_DIR "/robots/go1/go1.xml", NULL, text, sizeof text);
     if (!model) {
@@ -36,8 +35,7 @@ static int setup(void **unused) {
     mju_copy3(model->geom_size + 3 * box, makers);
     model->geom_rbound[box] = mju_norm3(makers);
     data = mj_makeData(model);
-    robot = robot_create(MILD_SOURCE_DIR "/robots/go1", &error);
-    expect_good(robot != NULL, &error);
+    robot = kit_robot(MILD_SOURCE_DIR "/robots/go1");
     robot_set_shells(robot, 1);
     return 0;
 }

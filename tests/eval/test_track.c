@@ -4,15 +4,14 @@
 
 #include "env/envs.h"
 #include "env/task/task.h"
-#include "kit.h"
+#include "robots.h"
 #include "run/eval/track.h"
 #include "sa01.h"
 
 /* Turned by 0.7 rad about z, then pitched by 0.3 and rolled by -0.2 rad, knees bent. */
 TEST(a_point_of_a_turned_robot) {
     MildError error = {0};
-    Robot *robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    Robot *robot = kit_robot(SA01);
     RobotSim *sim = robot_sim_create(robot, 0.005, &error);
     assert_non_null(sim);
     const RobotVariation nominal = robot_variation_nominal();

@@ -3,8 +3,7 @@
 #ifndef GROUND_KIT_H
 #define GROUND_KIT_H
 
-#include "kit.h"
-#include "mild/ground.h"
+#include "materials.h"
 
 #define KIT_PITCH 0.0195
 #define KIT_SOLE_Z (-0.055)

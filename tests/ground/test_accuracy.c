@@ -84,12 +84,6 @@ static double compare(const char *name, const Experiment *e, double bar) {
     return worst;
 }
 
-static MildMaterial preset(const char *name) {
-    MildMaterial m;
-    assert_true(mild_material_preset(name, &m));
-    return m;
-}
-
 static const char *const grounds[5] = {"sand_loose", "sand_dense", "grass", "foam45", "foam28"};
 
 /* A body of 20 kg takes many steps to stop. One of 1 kg stops within a step of 5 ms on sand: see
@@ -103,7 +97,7 @@ TEST(test_drop) {
         for (int g = 0; g < 5; g++) {
             for (int h = 0; h < 4; h++) {
                 Experiment e = {.sole = plate,
-                                .material = preset(grounds[g]),
+                                .material = kit_preset(grounds[g]),
                                 .mass = mass[m],
                                 .height = height[h],
                                 .duration = 0.25};
@@ -138,7 +132,7 @@ TEST(test_load) {
     MildSole *sole = kit_sole(0, 77);
     double worst = 0.0;
     for (int g = 0; g < 5; g++) {
-        Experiment e = {.sole = sole, .material = preset(grounds[g]), .mass = 16.5};
+        Experiment e = {.sole = sole, .material = kit_preset(grounds[g]), .mass = 16.5};
         char name[64];
         e.settle = 1.0, e.duration = 0.6, e.force = push_down;
         snprintf(name, sizeof name, "press %s", grounds[g]);

@@ -26,8 +26,7 @@ static double lead(Kit *kit, double x, double z, int steps) {
  * comes at 25 mm is carried by virgin ground all the way. */
 TEST(test_slide_into_imprint) {
     MildSole *sole = kit_plate(3, 3);
-    MildMaterial m;
-    mild_material_preset("grass", &m);
+    MildMaterial m = kit_preset("grass");
     m.recovery = 0.0;
     m.c_g = 0.0;
     for (int deep = 0; deep < 2; deep++) {

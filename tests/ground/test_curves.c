@@ -148,8 +148,7 @@ static MildSole *rectangle(double length, double width) {
 TEST(test_width) {
     static const double sides[][2] = {{0.3, 0.2}, {0.2, 0.3}, {0.15, 0.1}, {0.1, 0.1}};
     MildError error = {0};
-    MildMaterial clay;
-    assert_true(mild_material_preset("clay", &clay));
+    MildMaterial clay = kit_preset("clay");
     for (size_t i = 0; i < sizeof sides / sizeof *sides; i++) {
         const double b = fmin(sides[i][0], sides[i][1]), load = 3000.0;
         MildSole *sole = rectangle(sides[i][0], sides[i][1]);
@@ -185,8 +184,7 @@ TEST(test_shear) {
     const double area = 12.0 * KIT_PITCH * KIT_PITCH;
     double worst = 0.0;
     for (int g = 0; g < 3; g++) {
-        MildMaterial m;
-        assert_true(mild_material_preset(names[g], &m));
+        MildMaterial m = kit_preset(names[g]);
         Kit kit;
         kit_open(&kit, 1, plate, NULL, &m, dt);
         kit.input.velocity[0][2] = kit.input.free_velocity[2] = -0.02;

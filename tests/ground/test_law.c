@@ -105,8 +105,7 @@ TEST(test_preset_numbers) {
                  {"sand_loose", 380, 0.15e6, 1.047, 2.0, 2.7, 17.2, 0.57, 0},
                  {"sand_dense", 700, 0.24e6, 1.047, 1.6, 2.7, 17.2, 0.62, 0}};
     for (int i = 0; i < 8; i++) {
-        MildMaterial m;
-        assert_true(mild_material_preset(table[i].name, &m));
+        MildMaterial m = kit_preset(table[i].name);
         assert_true(m.k_pen == table[i].k_pen && m.sigma_cone == table[i].sigma_cone);
         assert_true(m.alpha == table[i].alpha && m.nu == table[i].nu);
         assert_true(m.c_g == table[i].c_g && m.c_d == table[i].c_d && m.phi == table[i].phi);

@@ -186,8 +186,7 @@ TEST(test_state_bytes) {
  * byte. */
 TEST(test_taken_away) {
     MildSole *sole = kit_plate(3, 3);
-    MildMaterial m;
-    assert_true(mild_material_preset("sand_loose", &m));
+    MildMaterial m = kit_preset("sand_loose");
     Kit kit, fresh;
     kit_open(&kit, 1, sole, NULL, &m, 1e-3);
     kit_open(&fresh, 1, sole, NULL, &m, 1e-3);

@@ -44,12 +44,6 @@ static MildMaterial rival_of(int model, const MildMaterial *mild) {
     return rival;
 }
 
-static MildMaterial preset(const char *name) {
-    MildMaterial m;
-    assert_true(mild_material_preset(name, &m));
-    return m;
-}
-
 /* ---- matching ---- */
 
 /* [m] by how much resistive force theory yields deeper than the element is, going straight down:
@@ -79,7 +73,7 @@ static double pressed_force(int model, const MildMaterial *material, double dept
 TEST(test_matched) {
     double worst_depth = 0.0, worst_force = 0.0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        MildMaterial mild = preset(mild_material_preset_name(p));
+        MildMaterial mild = kit_preset(mild_material_preset_name(p));
         double depth = mild_sole_sinkage(raster[0], &mild, LOAD);
         for (int model = 0; model < SOFT_MODELS; model++) {
             MildMaterial rival = rival_of(model, &mild);
@@ -110,7 +104,7 @@ TEST(test_con_cone_is_scaled) {
     const double pitch = mild_sole_pitch(raster[0]);
     const double area = mild_sole_elements(raster[0]) * pitch * pitch;
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        const MildMaterial mild = preset(mild_material_preset_name(p));
+        const MildMaterial mild = kit_preset(mild_material_preset_name(p));
         const MildMaterial rival = rival_of(MILD_MODEL_CON_CONE, &mild);
         assert_true(fabs(rival.k_pen / rival.sigma_cone * 0.15e6 / (1e6 * area) - 1.0) < 1e-9);
     }
@@ -120,9 +114,9 @@ TEST(test_con_cone_is_scaled) {
  * of resistive force theory is generic, and at 1 m/s hunt_crossley bounces back at 0.7 m/s. Drift
  * settles within a physics step of 1 ms. */
 TEST(test_presets_serve_every_model) {
-    const MildMaterial sand = preset("dry_sand");
+    const MildMaterial sand = kit_preset("dry_sand");
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        const MildMaterial m = preset(mild_material_preset_name(p));
+        const MildMaterial m = kit_preset(mild_material_preset_name(p));
         assert_true(m.k_c == sand.k_c && m.k_phi == sand.k_phi && m.exponent == sand.exponent);
         assert_true(m.cohesion == sand.cohesion && m.shear_length == sand.shear_length);
         assert_true(m.zeta == 1.0 && fabs(1.0 - m.dissipation - 0.7) < 1e-12);
@@ -180,17 +174,17 @@ TEST(test_concentration) {
     assert_true(fabs(mild_sole_y(center[0])[0] - y) < 1e-15);
     assert_true(mild_sole_z(center[0]) == KIT_SOLE_Z);
     for (int model = 0; model < SOFT_MODELS; model++) {
-        const MildMaterial mild = preset("sand_loose"), rival = rival_of(model, &mild);
+        const MildMaterial mild = kit_preset("sand_loose"), rival = rival_of(model, &mild);
         const double all = mild_model_is_concentric((MildModel)model) ? cells : 1;
         const double share = rival.mu / mild.mu; /* 0: friction is part of resistive force theory */
         assert_true(share == 0.0 || share == 1.0);
         assert_true(rival.k_drift == share * all * mild.k_drift);
         assert_true(rival.b_drift == share * all * mild.b_drift);
     }
-    const MildMaterial grass = preset("grass"), cone = rival_of(MILD_MODEL_CON_CONE, &grass);
+    const MildMaterial grass = kit_preset("grass"), cone = rival_of(MILD_MODEL_CON_CONE, &grass);
     assert_true(cone.nu == 2.0 && fabs(cone.alpha - acos(0.5)) < 1e-12); /* Choi's set */
     assert_true(cone.c_g == 2.7 && cone.c_d == 17.2 && cone.phi == 0.57 && cone.rho == 1000.0);
-    const MildMaterial foam = preset("foam45"); /* springs yield, on foam too */
+    const MildMaterial foam = kit_preset("foam45"); /* springs yield, on foam too */
     assert_true(foam.recovery == 1.0 && rival_of(MILD_MODEL_ECC_SPRING, &foam).recovery == 0.0 &&
                 rival_of(MILD_MODEL_CON_SPRING, &foam).recovery == 0.0);
 }
@@ -262,7 +256,7 @@ TEST(test_equilibrium) {
     for (int model = 0; model < SOFT_MODELS; model++) {
         for (int p = 0; p < mild_material_preset_count(); p++) {
             for (int d = kit_finest(); d < 2; d++) {
-                MildMaterial mild = preset(mild_material_preset_name(p)),
+                MildMaterial mild = kit_preset(mild_material_preset_name(p)),
                              rival = rival_of(model, &mild);
                 double wanted = mild_sole_sinkage(raster[0], &mild, LOAD);
                 Kit kit;
@@ -291,7 +285,7 @@ TEST(test_no_creep) {
     for (int model = 0; model < SOFT_MODELS; model++) {
         for (int g = 0; g < 2; g++) {
             for (int d = kit_finest(); d < 3; d++) {
-                MildMaterial mild = preset(grounds[g]), rival = rival_of(model, &mild);
+                MildMaterial mild = kit_preset(grounds[g]), rival = rival_of(model, &mild);
                 Kit kit;
                 settle(&kit, model, &rival, steps[d]);
                 /* resistive force theory carries 0.13 (2D) and 0.05 (3D) of the weight sideways,
@@ -591,7 +585,7 @@ TEST(test_solvers_agree) {
 TEST(test_copy_continues) {
     uint64_t random = 31;
     for (int model = 0; model < SOFT_MODELS; model++) {
-        MildMaterial mild = preset("sand_loose"), rival = rival_of(model, &mild);
+        MildMaterial mild = kit_preset("sand_loose"), rival = rival_of(model, &mild);
         Kit kit, copy;
         kit_open(&kit, 1, sole_of(model, 0), NULL, &rival, 1e-3);
         kit_random_state(&kit, &random);
@@ -619,7 +613,7 @@ TEST(test_copy_continues) {
 /* A concentric model carries no moment about its element, however the foot stands; the others do.
  */
 TEST(test_moment) {
-    MildMaterial mild = preset("sand_loose");
+    MildMaterial mild = kit_preset("sand_loose");
     for (int model = 0; model < SOFT_MODELS; model++) {
         MildMaterial rival = rival_of(model, &mild);
         Kit kit;

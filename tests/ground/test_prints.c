@@ -32,8 +32,7 @@ TEST(test_second_step) {
     static const double recovery[6] = {0.0, 0.3, 0.7, 1.0, 0.0, 0.3};
     static const double refill[6] = {0.0, 0.0, 0.0, 0.0, 0.4, 0.2};
     for (int r = 0; r < 6; r++) {
-        MildMaterial m;
-        mild_material_preset("grass", &m);
+        MildMaterial m = kit_preset("grass");
         m.recovery = recovery[r];
         m.refill = refill[r];
         m.c_g = 0.0;
@@ -324,8 +323,7 @@ TEST(test_no_creep) {
     double worst = 0.0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
         for (int d = 0; d < 2; d++) {
-            MildMaterial m;
-            mild_material_preset(mild_material_preset_name(p), &m);
+            MildMaterial m = kit_preset(mild_material_preset_name(p));
             Kit kit;
             prints_open(&kit, 1, sole, NULL, &m, steps[d], TILES);
             kit.center[0][0] = 0.0622, kit.center[0][1] = 0.0035,
@@ -357,8 +355,7 @@ TEST(test_changed_material) {
     double highest = 0.0, worst = -INFINITY;
     for (int from = 0; from < mild_material_preset_count(); from++) {
         for (int to = 0; to < mild_material_preset_count(); to++) {
-            MildMaterial m;
-            mild_material_preset(mild_material_preset_name(from), &m);
+            MildMaterial m = kit_preset(mild_material_preset_name(from));
             Kit kit;
             prints_open(&kit, 1, sole, NULL, &m, 1e-3, from % 2 ? TILES : 0);
             kit.center[0][0] = 0.0622, kit.center[0][1] = 0.0035,

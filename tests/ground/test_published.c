@@ -14,12 +14,6 @@ static double square(double x) {
     return x * x;
 }
 
-static MildMaterial preset(const char *name) {
-    MildMaterial m;
-    assert_true(mild_material_preset(name, &m));
-    return m;
-}
-
 /* One square element: the concentric cone, its edge is the body's width. */
 static MildSole *one_element(double edge) {
     double h = 0.5 * edge, outline[8] = {-h, -h, h, -h, h, h, -h, h};
@@ -85,7 +79,7 @@ static double exact_stop(const MildMaterial *m, int elements, double mass, doubl
 
 TEST(test_exact_impact) {
     static const double mass[3] = {1.0, 3.0, 20.0}, published[3] = {1.221, 3.384, 38.98};
-    MildMaterial choi = preset("sand_loose");
+    MildMaterial choi = kit_preset("sand_loose");
     choi.k_pen = 1e6 * KIT_PITCH * KIT_PITCH;
     choi.alpha = acos(-1.0) / 3.0;
     MildSole *sole = kit_plate(11, 7);
@@ -128,7 +122,7 @@ static double added_mass_energy(const Durian *p, double c_d, double energy, doub
 /* kappa = k_pen makes F_g = k_pen z; a flat cone (nu/tan(alpha) small) keeps m_a' = c_g phi rho nu
  * s constant. */
 static MildMaterial durian_material(const Durian *p, double edge, double c_d) {
-    MildMaterial m = preset("sand_loose");
+    MildMaterial m = kit_preset("sand_loose");
     m.model = MILD_MODEL_CON_CONE; /* one cone under the whole body */
     m.alpha = 1.5;
     m.nu = 0.1;
@@ -198,7 +192,7 @@ static double durian_miss(double d1, double mass, int tied, double *k) {
 }
 
 static void durian_fit(const char *ground, double speed, double *free_share, double *tied_share) {
-    MildMaterial m = preset(ground);
+    MildMaterial m = kit_preset(ground);
     m.bed_depth = 10.0;
     MildSole *sole = kit_plate(11, 7);
     const double mass = 20.0;
@@ -281,7 +275,7 @@ static void exponents(const MildMaterial *m, double edge, int side, double densi
  * H. With M ~ rho D^3, kappa ~ D^2 and u_f ~ D (one cone under the body) the depth goes as
  * rho^(1/3) D^(2/3) H^(1/3). */
 TEST(test_uehara) {
-    MildMaterial cone = preset("sand_loose");
+    MildMaterial cone = kit_preset("sand_loose");
     cone.model = MILD_MODEL_CON_CONE;
     cone.c_g = 0.0;
     cone.alpha = 1.5;
@@ -315,7 +309,7 @@ TEST(test_uehara) {
     static const char *const sand[2] = {"sand_loose", "sand_dense"};
     for (int g = 0; g < 2; g++) {
         for (int mass = 0; mass < 2; mass++) {
-            MildMaterial m = preset(sand[g]);
+            MildMaterial m = kit_preset(sand[g]);
             m.bed_depth = 10.0;
             if (!mass) {
                 m.c_g = 0.0;
@@ -381,7 +375,7 @@ TEST(test_bekker) {
                       soils[s].n);
     }
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        MildMaterial m = preset(mild_material_preset_name(p));
+        MildMaterial m = kit_preset(mild_material_preset_name(p));
         double a = 1e3 * pressed_sinkage(&m, sole, 0.5 * weight),
                b = 1e3 * pressed_sinkage(&m, sole, weight), apart = INFINITY;
         int nearest = 0;
@@ -423,7 +417,7 @@ TEST(test_rft) {
                   "seeds loose %.3g, close %.3g\n",
                   generic, poppy_loose, poppy_close);
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        MildMaterial m = preset(mild_material_preset_name(p));
+        MildMaterial m = kit_preset(mild_material_preset_name(p));
         double full = KIT_PITCH / sqrt(acos(-1.0)) * tan(m.alpha) / m.nu, force[2];
         for (int i = 0; i < 2;
              i++) { /* complete cones, 10 mm deeper, held still until the added mass rests */

@@ -74,8 +74,7 @@ static void limit(const MildMaterial *m, double angle, double depth, double *for
 TEST(test_level) {
     double worst = 0.0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        MildMaterial base;
-        mild_material_preset(mild_material_preset_name(p), &base);
+        MildMaterial base = kit_preset(mild_material_preset_name(p));
         for (double depth = 0.005; depth < 0.03; depth *= 2.0) {
             for (int k = 0; k < LEVELS; k++) {
                 double force, moment, wanted, none;
@@ -95,8 +94,7 @@ TEST(test_level) {
  * costs as much. The heap of a merged sole is a mean over cells. */
 TEST(test_models) {
     const double load = 300.0, depth = 0.012;
-    MildMaterial sand;
-    mild_material_preset("sand_loose", &sand);
+    MildMaterial sand = kit_preset("sand_loose");
     for (int model = 0; model < MILD_MODELS; model++) {
         if (mild_model_is_concentric((MildModel)model) || model == MILD_MODEL_RIGID) {
             continue;
@@ -131,8 +129,7 @@ TEST(test_tilted) {
     double worst[LEVELS] = {0};
     for (int g = 0; g < 3; g++) {
         for (int d = 0; d < 3; d++) {
-            MildMaterial base;
-            mild_material_preset(grounds[g], &base);
+            MildMaterial base = kit_preset(grounds[g]);
             double wanted, turn, force[LEVELS], moment[LEVELS];
             limit(&base, angle, depths[d], &wanted, &turn);
             for (int k = 0; k < LEVELS; k++) {

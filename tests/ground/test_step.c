@@ -118,8 +118,7 @@ TEST(test_drops) {
         for (int g = 0; g < GROUNDS; g++) {
             for (int s = 0; s < SPEEDS; s++) {
                 for (int p = 0; p < PHASES; p++) {
-                    MildMaterial m;
-                    assert_true(mild_material_preset(grounds[g], &m));
+                    MildMaterial m = kit_preset(grounds[g]);
                     double height =
                         0.5 * speed[s] * speed[s] / KIT_GRAVITY + speed[s] * dt * p / PHASES;
                     double error = drop_depth(sole, &m, mass[i], dt, height) /
@@ -189,8 +188,7 @@ TEST(test_no_creep) {
     for (int p = 0; p < mild_material_preset_count(); p++) {
         for (int d = kit_finest(); d < 3; d++) {
             for (int side = 0; side < 2; side++) {
-                MildMaterial m;
-                mild_material_preset(mild_material_preset_name(p), &m);
+                MildMaterial m = kit_preset(mild_material_preset_name(p));
                 Kit kit;
                 kit_open(&kit, 1, sole, NULL, &m, steps[d]);
                 kit.center[0][0] = 0.0622;

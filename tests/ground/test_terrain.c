@@ -86,8 +86,7 @@ TEST(test_depths) {
  */
 TEST(test_slope_friction) {
     MildSole *sole = kit_plate(6, 6);
-    MildMaterial m;
-    mild_material_preset("rubber", &m);
+    MildMaterial m = kit_preset("rubber");
     m.k_drift = m.b_drift = 0.0;
     double worst = 0.0, creep = 0.0;
     for (int t = 0; t < 8; t++) {

@@ -236,8 +236,7 @@ TEST(test_surface) {
     uint64_t random = 5;
     int most = 0, unsolved = 0, count = 0;
     for (int draw = 0; draw < 6000; draw++) {
-        MildMaterial m;
-        mild_material_preset(mild_material_preset_name(kit_index(&random, 8)), &m);
+        MildMaterial m = kit_preset(mild_material_preset_name(kit_index(&random, 8)));
         static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
         Kit kit;
         kit_open(&kit, 1, soles[kit_index(&random, SOLES)], NULL, &m, steps[kit_index(&random, 3)]);

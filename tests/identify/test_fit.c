@@ -6,7 +6,7 @@
 #include "base/random.h"
 #include "base/student.h"
 #include "identify/fit.h"
-#include "kit.h"
+#include "materials.h"
 
 enum { ROWS = 1000, SEEDS = 5 };
 typedef enum {
@@ -539,8 +539,7 @@ TEST(filled) {
 /* A limit that contradicts the filling stays a limit: foam is not given the mass of sand. */
 TEST(not_filled) {
     FitDef def = plate("foam45");
-    MildMaterial sand;
-    assert_true(mild_material_preset("sand_loose", &sand));
+    MildMaterial sand = kit_preset("sand_loose");
     def.fill = &sand;
     press_exactly(&def, points, ROWS, 0.04, 0.01, 0);
     press_exactly(&def, points + ROWS, ROWS, 0.04, 1, 0);

@@ -1,6 +1,7 @@
 /* What a user may get wrong in the MJCF: one message that names it, and no ground or no model. */
 #include <math.h>
 
+#include "materials.h"
 #include "plugin_kit.h"
 
 #define BODY                                                                                       \
@@ -326,8 +327,7 @@ static void free_both(mjModel *m, mjData *d) {
 TEST(keys_reach_the_ground) {
     mjModel *m;
     mjData *d;
-    MildMaterial grass;
-    assert_true(mild_material_preset("grass", &grass));
+    MildMaterial grass = kit_preset("grass");
     const Soft *soft = soft_of_keys(FOOT CONFIG("ground", "grass") CONFIG("ground.k_pen", "800")
                                         CONFIG("ground.mu", "0.25") CONFIG("height", "0.5"),
                                     &m, &d);
@@ -363,8 +363,7 @@ static void check_match(const Soft *soft, const MildMaterial *material, double l
 TEST(models_are_matched) {
     mjModel *m;
     mjData *d;
-    MildMaterial grass;
-    assert_true(mild_material_preset("grass", &grass));
+    MildMaterial grass = kit_preset("grass");
     const Soft *soft =
         soft_of_keys(FOOT CONFIG("ground", "grass") CONFIG("ground.model", "bekker"), &m, &d);
     check_match(soft, &grass, 9.81);

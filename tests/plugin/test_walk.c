@@ -8,6 +8,7 @@
 #include "control/stand.h"
 #include "mild/batch.h"
 #include "robot/sim.h"
+#include "robots.h"
 #include "run/config/experiment_keys.h"
 #include "run/eval/eval.h"
 
@@ -193,8 +194,7 @@ static Standing stand_for(const Robot *robot, const MildMaterial *material, doub
     assert_non_null(stand);
     assert_non_null(sim);
     const int feet = robot_feet(robot);
-    MildGround *ground = calloc(1, mild_ground_bytes(robot_soles(robot), feet));
-    mild_ground_init(ground, robot_soles(robot), feet);
+    MildGround *ground = kit_ground(robot);
     MildTerrain terrain = mild_terrain_uniform(material);
     RobotVariation variation = robot_variation_nominal();
     RobotState state = stand_state(
@@ -219,11 +219,9 @@ static Standing stand_for(const Robot *robot, const MildMaterial *material, doub
 
 static void check_stand(const char *name, const char *ground, double dt, const char *integrator) {
     char folder[200];
-    MildError error = {0};
     MildMaterial material;
     snprintf(folder, sizeof folder, MILD_SOURCE_DIR "/robots/%s", name);
-    Robot *robot = robot_create(folder, &error);
-    assert_non_null(robot);
+    Robot *robot = kit_robot(folder);
     assert_true(mild_material_preset(ground, &material));
     const Standing own = stand_for(robot, &material, dt, 4);
     use_plugin(robot, &material, dt, integrator);
@@ -292,8 +290,7 @@ static EvalRow walk(const Walker *walker, const Robot *robot, const char *ground
 
 static void check_walk(const Walker *walker, const Robot *robot, const char *ground, double dt,
                        const char *integrator, int trials) {
-    MildMaterial material;
-    assert_true(mild_material_preset(ground, &material));
+    MildMaterial material = kit_preset(ground);
     const EvalRow own = walk(walker, robot, ground, dt, trials);
     use_plugin(robot, &material, dt, integrator);
     const EvalRow mujoco = walk(walker, robot, ground, dt, trials);
@@ -323,10 +320,8 @@ TEST(policies_walk) {
     static const double steps[] = {0.001, 0.005, 0.002};
     for (int w = 0; w < 3; w++) {
         char folder[200];
-        MildError error = {0};
         snprintf(folder, sizeof folder, MILD_SOURCE_DIR "/robots/%s", walkers[w].robot);
-        Robot *robot = robot_create(folder, &error);
-        assert_non_null(robot);
+        Robot *robot = kit_robot(folder);
         robot->leg_pairs = 0; /* the MJCF's legs do not touch each other */
         for (int n = 0; n < 12; n++) {
             const int g = n / 3, k = n % 3;

@@ -99,7 +99,7 @@ static void explicit_step(const Case *one, const double *torque) {
 
 static void case_open(Case *one, const char *name, double dt, int explicit_soil) {
     const MildSole *const *soles = robot_soles(robot);
-    *one = (Case){preset(name), preset_terrain(name), explicit_soil ? NULL : new_ground(),
+    *one = (Case){kit_preset(name), kit_terrain(name), explicit_soil ? NULL : kit_ground(robot),
                   new_sim(dt)};
     double sinkage = mild_sole_sinkage(soles[0], &one->material, robot_foot_load(robot));
     RobotState state = stand_state(stand, 1, sinkage);

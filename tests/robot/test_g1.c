@@ -376,7 +376,7 @@ TEST(the_mirror_image) {
 /* Four seconds. material: NULL for rigid ground. */
 static void stand_on(const char *name, const MildMaterial *material) {
     RobotSim *sim = new_sim(0.0025);
-    MildGround *ground = new_ground();
+    MildGround *ground = kit_ground(robot);
     MildMaterial any = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
     RobotVariation variation = robot_variation_nominal();
@@ -412,8 +412,7 @@ static void stand_on(const char *name, const MildMaterial *material) {
 TEST(stands_everywhere) {
     stand_on("rigid", NULL);
     for (int g = 0; g < mild_material_preset_count(); g++) {
-        MildMaterial material;
-        assert_true(mild_material_preset(mild_material_preset_name(g), &material));
+        MildMaterial material = kit_preset(mild_material_preset_name(g));
         stand_on(mild_material_preset_name(g), &material);
     }
 }

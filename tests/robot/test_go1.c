@@ -162,7 +162,7 @@ static void lowest_point(RobotSim *sim, int foot, double point[3], double jacobi
  * moment. */
 TEST(a_round_foot_is_a_point) {
     RobotSim *sim = new_sim(0.0005);
-    MildGround *ground = new_ground();
+    MildGround *ground = kit_ground(robot);
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
     MildMapDef rough = mild_map_def_default(); /* the disc is not loaded evenly */
@@ -271,7 +271,7 @@ static void weigh(const RobotSim *sim, const MildMaterial *material, int steps, 
 /* Four seconds; a push [N] for 0.1 s after the first. material: NULL for rigid ground. */
 static Standing stand_and_push(const MildMaterial *material, double dt, const double push[6]) {
     RobotSim *sim = new_sim(dt);
-    MildGround *ground = new_ground();
+    MildGround *ground = kit_ground(robot);
     MildMaterial any = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
     RobotVariation variation = robot_variation_nominal();
@@ -338,8 +338,7 @@ TEST(stands_and_is_pushed_everywhere) {
     for (int p = 0; p < 3; p++) {
         check("rigid", NULL, 0.001, pushes[p]);
         for (int g = 0; g < mild_material_preset_count(); g++) {
-            MildMaterial material;
-            assert_true(mild_material_preset(mild_material_preset_name(g), &material));
+            MildMaterial material = kit_preset(mild_material_preset_name(g));
             check(mild_material_preset_name(g), &material, p == 0 ? 0.0025 : 0.001, pushes[p]);
         }
     }

@@ -78,7 +78,7 @@ typedef struct {
 
 /* A preset for feet as small as the stool: 3.8 times as stiff, with cones half as wide. */
 static MildMaterial firm(const char *name) {
-    MildMaterial m = preset(name);
+    MildMaterial m = kit_preset(name);
     const double r = 0.0195 / 0.01;
     m.k_pen *= r * r;
     m.k_drift *= r * r;
@@ -89,17 +89,16 @@ static MildMaterial firm(const char *name) {
 }
 
 static MildTerrain firm_terrain(const char *name) {
-    MildTerrain terrain = preset_terrain(name);
+    MildTerrain terrain = kit_terrain(name);
     terrain.materials[0] = firm(name);
     return terrain;
 }
 
 static Place stand_on(const Robot *stool, double dt) {
     MildError error = {0};
-    void *block = calloc(1, mild_ground_bytes(robot_soles(stool), LEGS));
     Place on = {robot_sim_create(stool, dt, &error), NULL};
-    assert_true(on.sim && block);
-    on.ground = mild_ground_init(block, robot_soles(stool), LEGS);
+    assert_non_null(on.sim);
+    on.ground = kit_ground(stool);
     return on;
 }
 

@@ -6,8 +6,7 @@
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"
-#include "kit.h"
-#include "robot/robot.h"
+#include "robots.h"
 #include "sa01.h"
 
 #define MODEL SA01
@@ -223,8 +222,7 @@ static RobotState stand_state(void) {
 static int setup(void **unused) {
     (void)unused;
     MildError error = {0};
-    robot = robot_create(MODEL, &error);
-    expect_good(robot != NULL, &error);
+    robot = kit_robot(MODEL);
     sim = robot_sim_create(robot, 0.001, &error);
     char *text = read_file(NUMBERS);
     numbers = cJSON_Parse(text);

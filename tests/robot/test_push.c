@@ -65,8 +65,8 @@ static double effect(const RobotState *pushed, const RobotState *left_alone) {
 
 static void push_is_the_engines(int rigid) {
     RobotSim *sim = new_sim(0.0025);
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     RobotVariation variation = robot_variation_nominal();
     variation.rigid = rigid;
     variation.base_mass_add = 3;

@@ -50,7 +50,7 @@ TEST(test_level) {
     assert_false(mild_map_is_level(map));
     RobotSim *sim = new_sim(0.001), *other = new_sim(0.001);
     RobotVariation rigid = rigid_variation(0.8);
-    MildTerrain flat = preset_terrain("sand_loose"), mapped = flat;
+    MildTerrain flat = kit_terrain("sand_loose"), mapped = flat;
     flat.height = 0.25;
     mapped.map = map;
     int contacts = 0;
@@ -83,7 +83,7 @@ TEST(test_slope_is_the_engine) {
     for (uint32_t draw = 0; draw < 12; draw++) {
         double slope = slopes[draw % 3], tilt = -atan(slope);
         MildMap *map = slope_map(slope);
-        MildTerrain terrain = preset_terrain("sand_loose");
+        MildTerrain terrain = kit_terrain("sand_loose");
         terrain.map = map;
         RobotSim *sim = new_sim(0.001);
         mjModel *m = robot_sim_model(sim);
@@ -143,7 +143,7 @@ TEST(test_any_plane_is_the_engine) {
         double length = sqrt(1 + rise[0] * rise[0] + rise[1] * rise[1]);
         const double normal[3] = {-rise[0] / length, -rise[1] / length, 1 / length};
         MildMap *map = plane_map(rise[0], rise[1]);
-        MildTerrain terrain = preset_terrain("sand_loose");
+        MildTerrain terrain = kit_terrain("sand_loose");
         terrain.map = map;
         RobotSim *sim = new_sim(0.001);
         mjModel *m = robot_sim_model(sim);
@@ -180,7 +180,7 @@ TEST(test_any_plane_is_the_engine) {
  * slope: how far its centre of mass has come, and how far a foot has gone in the second second. */
 static void slide(double slope, double friction, double *fallen, double *crept) {
     MildMap *map = slope_map(-slope);
-    MildTerrain terrain = preset_terrain("sand_loose");
+    MildTerrain terrain = kit_terrain("sand_loose");
     terrain.map = map;
     RobotSim *sim = new_sim(0.001);
     RobotVariation rigid = rigid_variation(friction);
@@ -233,7 +233,7 @@ TEST(test_waves) {
     double deepest = 0.0, highest = 0.0;
     int stood = 0;
     for (uint32_t place = 0; place < 16; place++) {
-        MildTerrain terrain = preset_terrain("sand_loose");
+        MildTerrain terrain = kit_terrain("sand_loose");
         Random random = random_at(7, place, 0);
         terrain.map = map;
         terrain.map_x = random_uniform(&random, -1.0, 1.0);

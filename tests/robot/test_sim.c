@@ -109,7 +109,7 @@ TEST(test_feet) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     MildMap *map = waves();
-    MildTerrain level = preset_terrain("grass"), wavy = level;
+    MildTerrain level = kit_terrain("grass"), wavy = level;
     level.height = -0.3;
     wavy.map = map, wavy.height = -0.2;
     for (uint32_t draw = 0; draw < 30; draw++) {
@@ -144,9 +144,9 @@ TEST(test_feet_after_a_step) {
     RobotSim *sim = new_sim(0.0025);
     RobotVariation nominal = robot_variation_nominal();
     MildMap *map = waves();
-    MildTerrain wavy = preset_terrain("grass");
+    MildTerrain wavy = kit_terrain("grass");
     wavy.map = map, wavy.height = -0.2;
-    MildGround *ground = new_ground();
+    MildGround *ground = kit_ground(robot);
     const mjModel *m = robot_sim_model(sim);
     for (uint32_t draw = 0; draw < 5; draw++) {
         RobotState state = draw_state(draw, 1.5, 0.2);
@@ -190,7 +190,7 @@ TEST(test_clearance_of_the_shells) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     MildMap *map = waves();
-    MildTerrain level = preset_terrain("grass"), wavy = level;
+    MildTerrain level = kit_terrain("grass"), wavy = level;
     level.height = 0.2;
     wavy.map = map;
     const mjModel *m = robot_visual_model(robot);
@@ -263,8 +263,8 @@ TEST(test_lateral_distances) {
 TEST(test_soft_step_in_the_air) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     mjModel *m = robot_sim_model(sim);
     double worst = 0;
     for (int joint = -1; joint < 2 * SA01_JOINTS; joint++) {
@@ -306,8 +306,8 @@ TEST(test_soft_step_in_the_air) {
 TEST(test_step_moves_the_ground) {
     RobotSim *sim = new_sim(0.0025);
     RobotVariation nominal = robot_variation_nominal();
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground(), *other = new_ground(), *virgin = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot), *other = kit_ground(robot), *virgin = kit_ground(robot);
     size_t bytes = mild_ground_size(ground);
     RobotState state = draw_state(2, 1, 0.05);
     double torque[SA01_JOINTS] = {0};
@@ -336,8 +336,8 @@ TEST(test_step_moves_the_ground) {
 TEST(test_fastest) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     const double speeds[4] = {999, -999, 1001, -1001};
     for (int i = 0; i < 4; i++) {
         RobotState state = draw_state(3, 50, 0);
@@ -355,8 +355,8 @@ TEST(test_fastest) {
 TEST(test_load_and_store) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     RobotState state = draw_state(2, 1, 0.1), back;
     double torque[SA01_JOINTS] = {0};
     robot_sim_load(sim, &state, &nominal);
@@ -421,8 +421,8 @@ TEST(test_time_steps) {
 /* Every part takes some time, steps are counted, NULL stops it. */
 TEST(test_phases) {
     RobotVariation variation = robot_variation_nominal();
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     for (int rigid = 0; rigid < 2; rigid++) {
         RobotSim *sim = new_sim(0.001);
         RobotPhases phases = {0};
@@ -585,7 +585,7 @@ TEST(test_rigid_contact) {
     RobotVariation rigid = robot_variation_nominal();
     rigid.rigid = 1;
     MildMap *map = waves();
-    MildTerrain level = preset_terrain("grass"), wavy = level;
+    MildTerrain level = kit_terrain("grass"), wavy = level;
     level.height = -0.1;
     wavy.map = map;
     int loaded[SA01_FEET] = {0}, partly = 0;

@@ -34,7 +34,7 @@ TEST(test_rigid_is_the_engine) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation rigid = robot_variation_nominal();
     rigid.rigid = 1;
-    MildTerrain terrain = preset_terrain("sand_loose");
+    MildTerrain terrain = kit_terrain("sand_loose");
     mjModel *m = robot_sim_model(sim);
     mjData *engine = mj_makeData(m);
     double worst = 0.0;
@@ -159,8 +159,8 @@ TEST(test_map_against_dense) {
  * same A and V_free. */
 TEST(test_twist_is_the_solvers) {
     RobotSim *sim = new_sim(0.001);
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     RobotVariation nominal = robot_variation_nominal();
     double worst = 0.0;
     for (uint32_t draw = 0; draw < 40; draw++) {
@@ -219,8 +219,8 @@ static void add_wrench(double wrench[6], const double *force, const double *torq
  * the step's start and from rest: a step from there has no other terms. */
 TEST(test_momentum) {
     RobotSim *sim = new_sim(0.0005);
-    MildTerrain terrain = preset_terrain("foam60");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("foam60");
+    MildGround *ground = kit_ground(robot);
     RobotVariation nominal = robot_variation_nominal();
     const double push[6] = {30, -20, 10, 4, -5, 6}, at_rest[SA01_NV] = {0};
     double worst[6] = {0}, largest[6] = {0};
@@ -287,11 +287,11 @@ TEST(test_determinism) {
     RobotSim *sim = new_sim(0.001);
     for (int i = 0; i < 4; i++) {
         shared[i] = (Case){random_state((uint32_t)i), robot_variation_nominal(),
-                           preset_terrain(names[i]), new_ground()};
+                           kit_terrain(names[i]), kit_ground(robot)};
         shared[i].variation.rigid = i == 2;
         shared[i].variation.base_mass_add = i;
         alone[i] = shared[i];
-        alone[i].ground = new_ground();
+        alone[i].ground = kit_ground(robot);
     }
     for (int step = 0; step < 300; step++) {
         for (int i = 0; i < 4; i++) {
@@ -321,8 +321,8 @@ TEST(test_determinism) {
 
 TEST(test_bad_numbers) {
     RobotSim *sim = new_sim(0.001);
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     RobotVariation nominal = robot_variation_nominal();
     RobotState state = stand_state(stand, 0, 0.0);
     double torque[SA01_JOINTS] = {0};
@@ -343,7 +343,7 @@ TEST(test_bad_numbers) {
 
 TEST(test_clearance_and_distances) {
     RobotSim *sim = new_sim(0.001);
-    MildTerrain terrain = preset_terrain("sand_loose");
+    MildTerrain terrain = kit_terrain("sand_loose");
     RobotVariation nominal = robot_variation_nominal();
     RobotState state = stand_state(stand, 0, 0.0);
     robot_sim_load(sim, &state, &nominal);

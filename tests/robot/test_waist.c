@@ -3,8 +3,7 @@
 
 #include <mujoco/mujoco.h>
 
-#include "kit.h"
-#include "robot/robot.h"
+#include "robots.h"
 
 enum { FEET = 2, JOINTS = 3, NV = 9 };
 
@@ -77,8 +76,7 @@ TEST(joints_and_feet) {
 TEST(twist_is_the_solvers) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
-    MildGround *ground = mild_ground_init(calloc(1, mild_ground_bytes(robot_soles(robot), FEET)),
-                                          robot_soles(robot), FEET);
+    MildGround *ground = kit_ground(robot);
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
     RobotVariation nominal = robot_variation_nominal();

@@ -7,8 +7,8 @@
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"
-#include "kit.h"
 #include "robot/sim.h"
+#include "robots.h"
 
 enum { JOINTS = 7, NQ = 14, NV = 13, FEET = 2, FLAT = 0, ROUND = 1, ROWS = 12 };
 
@@ -426,8 +426,7 @@ static void step_is_the_engines(int rigid, double height, int steps) {
     variation.rigid = rigid;
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), FEET));
-    MildGround *ground = mild_ground_init(block, robot_soles(robot), FEET);
+    MildGround *ground = kit_ground(robot);
     const mjModel *m = robot_sim_model(sim);
     double worst = 0;
     int contacts[FEET] = {0};
@@ -462,7 +461,7 @@ static void step_is_the_engines(int rigid, double height, int steps) {
                   rigid ? "rigid" : "soft, in the air", worst, contacts[0], contacts[1]);
     assert_true(worst < 1e-9);
     assert_true(rigid ? contacts[0] > 20 && contacts[1] > 20 : contacts[0] + contacts[1] == 0);
-    free(block);
+    free(ground);
     robot_sim_destroy(sim);
 }
 
@@ -478,8 +477,7 @@ TEST(test_soft_landing) {
     RobotVariation nominal = robot_variation_nominal();
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), FEET));
-    MildGround *ground = mild_ground_init(block, robot_soles(robot), FEET);
+    MildGround *ground = kit_ground(robot);
     const mjModel *m = robot_sim_model(sim);
     int loaded[FEET] = {0};
     for (uint32_t draw = 0; draw < 12; draw++) {
@@ -518,7 +516,7 @@ TEST(test_soft_landing) {
     }
     print_message("soft: feet loaded in %d and %d of 12 landings\n", loaded[0], loaded[1]);
     assert_true(loaded[0] > 2 && loaded[1] > 2);
-    free(block);
+    free(ground);
     robot_sim_destroy(sim);
 }
 

@@ -132,9 +132,8 @@ TEST(test_map) {
 
 TEST(test_step) {
     RobotVariation nominal = robot_variation_nominal();
-    MildTerrain terrain = preset_terrain("grass");
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), LEGS));
-    MildGround *ground = mild_ground_init(block, robot_soles(robot), LEGS);
+    MildTerrain terrain = kit_terrain("grass");
+    MildGround *ground = kit_ground(robot);
     const mjModel *m = robot_sim_model(sim);
     double worst = 0;
     for (uint32_t draw = 0; draw < 5; draw++) {
@@ -159,7 +158,7 @@ TEST(test_step) {
     }
     print_message("twenty steps in the air against mj_step: worst %.1e\n", worst);
     assert_true(worst < 1e-9);
-    free(block);
+    free(ground);
 }
 
 TEST_MAIN(open_widest, close_widest)

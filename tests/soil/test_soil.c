@@ -4,7 +4,7 @@
 
 #include "base/random.h"
 #include "ground/soil/soil.h"
-#include "kit.h"
+#include "materials.h"
 
 /* A soil of bekker as a plate owner writes it. */
 #define HAND                                                                                       \
@@ -64,8 +64,7 @@ TEST(test_hand) {
     assert_true(m.mu == 0.62 && m.shear_length == 0.018 && m.recovery == 0.05);
     assert_true(m.plate_width == 0 && m.refill == 0); /* left out: off */
     const MildMaterial bom = parsed("\xef\xbb\xbf; x\r\n  [ground]\r\n preset = clay \r\n mu=0.3");
-    MildMaterial clay;
-    assert_true(mild_material_preset("clay", &clay));
+    MildMaterial clay = kit_preset("clay");
     assert_true(bom.mu == 0.3 && bom.k_c == clay.k_c && bom.model == MILD_MODEL_BEKKER);
     const MildMaterial plain = parsed("[ground]\npreset = foam45");
     assert_true(mild_material_preset("foam45", &clay));

@@ -1,7 +1,7 @@
 /* The task on a robot with four round feet: widths, and the mirror image. */
 #include "base/random.h"
 #include "env/task/task.h"
-#include "kit.h"
+#include "robots.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
 
@@ -28,8 +28,7 @@ static const double joint_sign[3] = {-1, 1, 1};
 static int setup(void **unused) {
     (void)unused;
     MildError error = {0};
-    robot = robot_create(GO1, &error);
-    expect_good(robot != NULL, &error);
+    robot = kit_robot(GO1);
     def = task_def_default();
     task_def_make_nominal(&def);
     def.observe_noise = 0;

@@ -4,7 +4,7 @@
 #include <mujoco/mujoco.h>
 
 #include "env/task/task.h"
-#include "kit.h"
+#include "materials.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
 
@@ -63,9 +63,7 @@ static void close_env(void) {
 
 /* Draw `draw` of an episode on foam, or on a slope of it. */
 static void begin(uint32_t draw, int rigid) {
-    MildMaterial foam;
-    assert_true(mild_material_preset("foam45", &foam));
-    MildTerrain terrain = mild_terrain_uniform(&foam);
+    MildTerrain terrain = kit_terrain("foam45");
     terrain.height = 0.2;
     env->tick = draw;
     task_env_reset_on(env, &def, robot, sim, &terrain, rigid, &view);

@@ -1,5 +1,5 @@
 /* The visible ground: prints where the sole was, as deep as it was, and recovery by material. */
-#include "kit.h"
+#include "materials.h"
 #include "view/relief.h"
 
 #define CELL 0.01
@@ -15,9 +15,7 @@ static MildTerrain terrain;
 
 static void make(const char *material, int rigid) {
     MildError error = {0};
-    MildMaterial m;
-    assert_true(mild_material_preset(material, &m));
-    terrain = mild_terrain_uniform(&m);
+    terrain = kit_terrain(material);
     MildSoleDef def = {.outline = outline, .points = 4, .pitch = 0.0195, .sole_z = -0.055};
     sole = mild_sole_create(&def, &error);
     assert_non_null(sole);

@@ -1,5 +1,5 @@
 /* Shells that stand on the ground press what is drawn of it. */
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 #include "view/relief.h"
 #include "view/view.h"
@@ -16,14 +16,11 @@ static MildGround *ground;
 static int setup(void **state) {
     (void)state;
     MildError error = {0};
-    robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    robot = kit_robot(SA01);
     robot_set_shells(robot, 1);
     sim = robot_sim_create(robot, DT, &error);
     assert_non_null(sim);
-    const MildSole *const *soles = robot_soles(robot);
-    const size_t bytes = mild_ground_bytes(soles, robot_bodies(robot));
-    ground = mild_ground_init(aligned_alloc(64, bytes), soles, robot_bodies(robot));
+    ground = kit_ground(robot);
     return 0;
 }
 
@@ -36,9 +33,7 @@ static int teardown(void **state) {
 }
 
 static void lay_ground(const char *name) {
-    MildMaterial material;
-    assert_true(mild_material_preset(name, &material));
-    terrain = mild_terrain_uniform(&material);
+    terrain = kit_terrain(name);
 }
 
 /* [rad] The knees are bent, so that the shanks' upper ends press. */

@@ -1,5 +1,5 @@
 /* The picture in characters: where the surface, an imprint and the robot are, by the dots. */
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 #include "view/sketch.h"
 
@@ -27,8 +27,7 @@ static int setup(void **state) {
     (void)state;
     MildError error = {0};
     MildMaterial sand;
-    robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    robot = kit_robot(SA01);
     sim = robot_sim_create(robot, 0.002, &error);
     assert_non_null(sim);
     assert_true(mild_material_preset("sand_loose", &sand));

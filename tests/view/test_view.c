@@ -2,7 +2,7 @@
 #include <unistd.h>
 
 #include "control/stand.h"
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 #include "view/model.h"
 #include "view/pressure.h"
@@ -22,16 +22,12 @@ static MildGround *ground;
 static int setup(void **state) {
     (void)state;
     MildError error = {0};
-    MildMaterial sand;
-    assert_true(mild_material_preset("sand_loose", &sand));
-    terrain = mild_terrain_uniform(&sand);
-    robot = robot_create(MODEL, &error);
-    expect_good(robot != NULL, &error);
+    terrain = kit_terrain("sand_loose");
+    robot = kit_robot(MODEL);
     stand = stand_create(robot, &error);
     sim = robot_sim_create(robot, DT, &error);
     assert_non_null(sim);
-    ground = mild_ground_init(aligned_alloc(64, mild_ground_bytes(robot_soles(robot), SA01_FEET)),
-                              robot_soles(robot), SA01_FEET);
+    ground = kit_ground(robot);
     return 0;
 }
 
@@ -179,10 +175,8 @@ TEST(others_are_seen) {
  * once it is gone. */
 TEST(dents_are_where_the_elements_are) {
     MildError error = {0};
-    MildMaterial foam;
-    assert_true(mild_material_preset("foam25", &foam));
     MildTerrain sand = terrain;
-    terrain = mild_terrain_uniform(&foam);
+    terrain = kit_terrain("foam25");
     ReliefDef area = {-1, 1, -1, 1, 0.01, 0, NULL, 1};
     Relief *relief = relief_create(&area, &terrain, robot_rasters(robot), SA01_FEET, &error);
     assert_non_null(relief);
