@@ -8,7 +8,7 @@
 #include "deploy/drive/input.h"
 #include "deploy/drive/packet.h"
 #include "deploy/drive/times.h"
-#include "kit.h"
+#include "files.h"
 
 #define SA01_CRC 0x974b2030u
 #define SA01_TEXT "974b2030"
@@ -248,10 +248,7 @@ TEST(a_key) {
 static MildStatus read_key(const char *path, size_t size, mode_t mode, MildError *error) {
     static const uint8_t zeros[100];
     Key key;
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    assert_int_equal(fwrite(zeros, 1, size, file), size);
-    fclose(file);
+    kit_write(path, zeros, size);
     assert_int_equal(chmod(path, mode), 0);
     const MildStatus status = key_read(path, &key, error);
     assert_true(status != MILD_OK || key.size == size);

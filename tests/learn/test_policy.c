@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "files.h"
 #include "learn/policy_file.h"
 #include "learn/policy_private.h"
 #include "learn/ppo.h"
@@ -319,26 +320,6 @@ TEST(test_decoder_of_the_ground) {
     }
 }
 
-static unsigned char *read_bytes(const char *path, size_t *size) {
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    fseek(file, 0, SEEK_END);
-    *size = (size_t)ftell(file);
-    rewind(file);
-    unsigned char *bytes = malloc(*size);
-    assert_non_null(bytes);
-    assert_int_equal(fread(bytes, 1, *size, file), *size);
-    fclose(file);
-    return bytes;
-}
-
-static void write_bytes(const char *path, const unsigned char *bytes, size_t size) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, size, file), size);
-    fclose(file);
-}
-
 static void assert_refused(const char *path, MildStatus status) {
     MildError error = {0};
     Policy *policy = policy_load(path, NULL, 0, &error);
@@ -351,19 +332,19 @@ TEST(test_damaged_files) {
     Policy *policy = small_policy(4);
     assert_int_equal(policy_save(policy, PATH, "damage", &error), MILD_OK);
     size_t size;
-    unsigned char *bytes = read_bytes(PATH, &size);
+    unsigned char *bytes = (unsigned char *)kit_read(PATH, &size);
     for (size_t cut = 0; cut < 50; cut++) {
-        write_bytes(PATH, bytes, size * cut / 50);
+        kit_write(PATH, bytes, size * cut / 50);
         assert_refused(PATH, MILD_ERROR_FORMAT);
     }
-    write_bytes(PATH, bytes, size - 1);
+    kit_write(PATH, bytes, size - 1);
     assert_refused(PATH, MILD_ERROR_FORMAT);
     Random random = random_at(12, 0, 0);
     for (int flip = 0; flip < 600; flip++) { /* every bit of the first bytes, then anywhere */
         size_t at = flip < 200 ? (size_t)flip / 8 : random_index(&random, (uint32_t)size);
         unsigned char mask = (unsigned char)(1u << (flip % 8));
         bytes[at] ^= mask;
-        write_bytes(PATH, bytes, size);
+        kit_write(PATH, bytes, size);
         assert_refused(PATH, MILD_ERROR_FORMAT);
         bytes[at] ^= mask;
     }
@@ -407,7 +388,7 @@ TEST(test_lying_headers) {
     Policy *policy = small_policy(4);
     assert_int_equal(policy_save(policy, PATH, "lies", &error), MILD_OK);
     size_t size;
-    unsigned char *bytes = read_bytes(PATH, &size), *lie = malloc(size);
+    unsigned char *bytes = (unsigned char *)kit_read(PATH, &size), *lie = malloc(size);
     assert_non_null(lie);
     for (size_t i = 0; i < sizeof swaps / sizeof *swaps; i++) {
         memcpy(lie, bytes, size);
@@ -421,14 +402,14 @@ TEST(test_lying_headers) {
         memset(lie + at, ' ', length);
         memcpy(lie + at, to, kept);
         assert_true(safetensors_seal(lie, size));
-        write_bytes(PATH, lie, size);
+        kit_write(PATH, lie, size);
         assert_refused(PATH, MILD_ERROR_FORMAT);
     }
     memcpy(lie, bytes, size);
     const float bad = NAN;
     memcpy(lie + size - sizeof bad, &bad, sizeof bad);
     assert_true(safetensors_seal(lie, size));
-    write_bytes(PATH, lie, size);
+    kit_write(PATH, lie, size);
     assert_refused(PATH, MILD_ERROR_FORMAT);
     free(lie);
     free(bytes);
@@ -445,13 +426,13 @@ TEST(test_padding_is_blank) {
         assert_int_equal(policy_save(policy, PATH, &"12345678"[8 - n], &error), MILD_OK);
         policy_destroy(policy);
         size_t size;
-        unsigned char *bytes = read_bytes(PATH, &size);
+        unsigned char *bytes = (unsigned char *)kit_read(PATH, &size);
         const size_t end = 8 + bytes[0] + 256u * bytes[1] + 65536u * bytes[2];
         if (bytes[end - 1] == ' ') {
             padded++;
             bytes[end - 1] = '}';
             assert_true(safetensors_seal(bytes, size));
-            write_bytes(PATH, bytes, size);
+            kit_write(PATH, bytes, size);
             assert_refused(PATH, MILD_ERROR_FORMAT);
         }
         free(bytes);
@@ -467,17 +448,17 @@ TEST(test_unreadable_header) {
     assert_int_equal(policy_save(policy, PATH, NULL, &error), MILD_OK);
     policy_destroy(policy);
     size_t size;
-    unsigned char *bytes = read_bytes(PATH, &size);
+    unsigned char *bytes = (unsigned char *)kit_read(PATH, &size);
     bytes[9] = 'x'; /* in the place of a quote */
     assert_true(safetensors_seal(bytes, size));
-    write_bytes(PATH, bytes, size);
+    kit_write(PATH, bytes, size);
     errno = ENOMEM; /* of something before */
     assert_null(policy_load(PATH, NULL, 0, &error));
     assert_error(&error, MILD_ERROR_FORMAT, PATH " header");
-    write_bytes(PATH, bytes, size / 2); /* in the middle of the data, or of the header */
+    kit_write(PATH, bytes, size / 2); /* in the middle of the data, or of the header */
     assert_null(policy_load(PATH, NULL, 0, &error));
     assert_error(&error, MILD_ERROR_FORMAT, PATH);
-    write_bytes(PATH, bytes, 100);
+    kit_write(PATH, bytes, 100);
     assert_null(policy_load(PATH, NULL, 0, &error));
     assert_error(&error, MILD_ERROR_FORMAT, PATH " header");
     free(bytes);

@@ -143,28 +143,22 @@ TEST(test_limits) {
 TEST(test_files) {
     static const char *const bad[] = {"  nan", "  inf", "-0.04"}; /* as long as what they replace */
     char folder[] = "/tmp/mild_test_check_XXXXXX", path[64], ini[64];
-    static char text[65536];
     assert_non_null(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/sa01.xml", folder);
     snprintf(ini, sizeof ini, "%s/robot.ini", folder);
     assert_int_equal(symlink(SA01 "/robot.ini", ini), 0);
-    FILE *file = fopen(SA01 "/sa01.xml", "r");
-    assert_non_null(file);
-    text[fread(text, 1, sizeof text - 1, file)] = '\0';
-    fclose(file);
+    char *text = kit_read(SA01 "/sa01.xml", NULL);
     char *armature = strstr(text, "armature=\"0.042\"");
     assert_non_null(armature);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         MildError error = {0};
         memcpy(armature + strlen("armature=\""), bad[i], 5);
-        file = fopen(path, "w");
-        assert_non_null(file);
-        fputs(text, file);
-        fclose(file);
+        kit_write_text(path, text);
         assert_null(robot_create(folder, &error));
         print_message("%s\n", error.text);
         assert_error(&error, MILD_ERROR_RANGE, "leg_l1_joint armature");
     }
+    free(text);
     MildError error = {0};
     unlink(path);
     assert_int_equal(mkfifo(path, 0600), 0);

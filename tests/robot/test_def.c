@@ -3,7 +3,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "kit.h"
+#include "files.h"
 #include "robot/def.h"
 
 /* Two flat feet that alternate; numbers all different. Keys with defaults are left out of it. */
@@ -495,13 +495,6 @@ TEST(test_lists_that_fit) {
 
 /* ---- files ---- */
 
-static void write_file(const char *path, const char *text, size_t size) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(text, 1, size, file), size);
-    assert_int_equal(fclose(file), 0);
-}
-
 static void refuse_folder(const char *folder, MildStatus status, const char *names) {
     static RobotDef def;
     MildError error = {0};
@@ -514,20 +507,20 @@ TEST(test_files) {
     assert_non_null(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/robot.ini", folder);
     refuse_folder(folder, MILD_ERROR_IO, path);
-    write_file(path, plain, sizeof plain - 1);
+    kit_write(path, plain, sizeof plain - 1);
     static RobotDef def;
     assert_int_equal(robot_def_read(folder, &def, NULL), MILD_OK);
     assert_string_equal(def.name, "walker");
-    write_file(path, plain, sizeof plain); /* with its final zero byte */
+    kit_write(path, plain, sizeof plain); /* with its final zero byte */
     refuse_folder(folder, MILD_ERROR_FORMAT, path);
     size_t size = (1 << 20) + 1;
     char *large = malloc(size);
     assert_non_null(large);
     memset(large, '\n', size);
     memcpy(large, plain, sizeof plain - 1);
-    write_file(path, large, size);
+    kit_write(path, large, size);
     refuse_folder(folder, MILD_ERROR_FORMAT, path);
-    write_file(path, large, size - 1);
+    kit_write(path, large, size - 1);
     assert_int_equal(robot_def_read(folder, &def, NULL), MILD_OK);
     free(large);
     unlink(path);

@@ -69,29 +69,9 @@ TEST(efforts_speeds_and_gait) {
                 0.5, 0);
 }
 
-/* A folder with `from` written as `to` in robot.ini. */
+/* With `from` written as `to` in robot.ini. */
 static Robot *changed_robot(const char *from, const char *to, MildError *error) {
-    static char text[16384];
-    char folder[] = "robot_changed_XXXXXX", ini[64], model[64];
-    FILE *file = fopen(MODEL "/robot.ini", "rb");
-    assert_non_null(file);
-    text[fread(text, 1, sizeof text - 1, file)] = '\0';
-    fclose(file);
-    const char *at = strstr(text, from);
-    assert_non_null(at);
-    assert_non_null(mkdtemp(folder));
-    snprintf(ini, sizeof ini, "%s/robot.ini", folder);
-    snprintf(model, sizeof model, "%s/go1.xml", folder);
-    file = fopen(ini, "wb");
-    assert_non_null(file);
-    fprintf(file, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from));
-    fclose(file);
-    assert_int_equal(symlink(MODEL "/go1.xml", model), 0);
-    Robot *made = robot_create(folder, error);
-    remove(ini);
-    remove(model);
-    rmdir(folder);
-    return made;
+    return kit_robot_changed(MODEL, "go1.xml", "robot.ini", from, to, error);
 }
 
 TEST(what_may_be_left_out) {

@@ -37,18 +37,10 @@ static const char ini[] =
     "still = 0 0 0 0\n" FOOT("fl", "fr", "0") FOOT("fr", "fl", "0.5") FOOT("rl", "rr", "0.5")
         FOOT("rr", "rl", "0");
 
-static void write_text(const char *path, const char *text) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    fputs(text, file);
-    assert_int_equal(fclose(file), 0);
-}
-
 /* left, right: axes of the hinges; out, down: [m] from a hinge to its foot. */
 static Robot *make_stool(const char *left, const char *right, const char *out, const char *down) {
     static const char *const name[LEGS] = {"fl", "fr", "rl", "rr"};
     static const char *const place[LEGS] = {"0.25 0.1", "0.25 -0.1", "-0.25 0.1", "-0.25 -0.1"};
-    char folder[] = "/tmp/mild_stool_XXXXXX", xml_path[64], ini_path[64];
     char legs[2000] = "", mjcf[3000], side[16];
     MildError error = {0};
     for (int f = 0; f < LEGS; f++) {
@@ -58,15 +50,7 @@ static Robot *make_stool(const char *left, const char *right, const char *out, c
                  f % 2 ? right : left, side, down, name[f], side, down);
     }
     snprintf(mjcf, sizeof mjcf, frame, legs);
-    assert_non_null(mkdtemp(folder));
-    snprintf(xml_path, sizeof xml_path, "%s/stool.xml", folder);
-    snprintf(ini_path, sizeof ini_path, "%s/robot.ini", folder);
-    write_text(xml_path, mjcf);
-    write_text(ini_path, ini);
-    Robot *stool = robot_create(folder, &error);
-    unlink(xml_path);
-    unlink(ini_path);
-    rmdir(folder);
+    Robot *stool = kit_robot_of("stool.xml", mjcf, ini, &error);
     expect_good(stool != NULL, &error);
     return stool;
 }

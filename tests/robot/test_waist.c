@@ -30,26 +30,10 @@ static const char ini[] =
 
 static Robot *robot;
 
-static void write_text(const char *path, const char *text) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    fputs(text, file);
-    fclose(file);
-}
-
 static int setup(void **unused) {
     (void)unused;
     MildError error = {0};
-    char folder[] = "robot_waist_XXXXXX", path[2][64];
-    assert_non_null(mkdtemp(folder));
-    snprintf(path[0], sizeof path[0], "%s/robot.ini", folder);
-    snprintf(path[1], sizeof path[1], "%s/waist.xml", folder);
-    write_text(path[0], ini);
-    write_text(path[1], model);
-    robot = robot_create(folder, &error);
-    remove(path[0]);
-    remove(path[1]);
-    rmdir(folder);
+    robot = kit_robot_of("waist.xml", model, ini, &error);
     expect_good(robot != NULL, &error);
     return 0;
 }

@@ -62,13 +62,6 @@ static char folder[] = "/tmp/mild_walker_XXXXXX";
 static char xml_path[64], ini_path[64];
 static Robot *robot;
 
-static void write_text(const char *path, const char *text) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    fputs(text, file);
-    assert_int_equal(fclose(file), 0);
-}
-
 static int setup(void **unused) {
     (void)unused;
     MildError error = {0};
@@ -77,12 +70,10 @@ static int setup(void **unused) {
     }
     snprintf(xml_path, sizeof xml_path, "%s/walker.xml", folder);
     snprintf(ini_path, sizeof ini_path, "%s/robot.ini", folder);
-    write_text(xml_path, mjcf);
-    write_text(ini_path, ini);
+    kit_write_text(xml_path, mjcf);
+    kit_write_text(ini_path, ini);
     robot = robot_create(folder, &error);
-    if (!robot || error.text[0]) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot && !error.text[0], &error);
     return 0;
 }
 
@@ -607,11 +598,11 @@ static void write_edited(const char *path, const char *text, const char *from, c
     char edited[8192];
     const char *at = from ? strstr(text, from) : NULL;
     if (!at) {
-        write_text(path, text);
+        kit_write_text(path, text);
         return;
     }
     snprintf(edited, sizeof edited, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from));
-    write_text(path, edited);
+    kit_write_text(path, edited);
 }
 
 /* With `from` written as `to` in one of the two texts: an error of that status; MILD_OK:

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "base/random.h"
+#include "files.h"
 #include "ground/soil/soil.h"
 #include "materials.h"
 
@@ -121,16 +122,12 @@ TEST(test_files) {
     assert_true(read.mu == 1.0 / 3);
     assert_int_equal(soil_write(&read, NULL, text, &error), MILD_ERROR_ARGUMENT);
     assert_error(&error, MILD_ERROR_ARGUMENT, "x.txt .ini");
-    FILE *file = fopen(path, "wb");
-    fwrite("[ground]\0", 1, 9, file);
-    fclose(file);
+    kit_write(path, "[ground]", 9); /* with its zero */
     assert_int_equal(soil_find(path, &read, &error), MILD_ERROR_FORMAT);
     assert_error(&error, MILD_ERROR_FORMAT, path);
-    file = fopen(path, "wb");
-    for (int i = 0; i <= SOIL_BYTES_MAX; i++) {
-        fputc('\n', file);
-    }
-    fclose(file);
+    static char long_file[SOIL_BYTES_MAX + 1];
+    memset(long_file, '\n', sizeof long_file);
+    kit_write(path, long_file, sizeof long_file);
     assert_int_not_equal(soil_find(path, &read, &error), MILD_OK);
     unlink(path);
     assert_int_equal(soil_find(path, &read, &error), MILD_ERROR_IO);

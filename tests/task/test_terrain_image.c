@@ -5,7 +5,7 @@
 
 #include "env/task/image.h"
 #include "env/task/terrain.h"
-#include "kit.h"
+#include "files.h"
 #include "mild/ground.h"
 
 enum { COLUMNS = 37, ROWS = 23 };
@@ -186,23 +186,15 @@ TEST(test_open_file) {
     fclose(file);
 }
 
-static void write_bytes(const void *bytes, size_t size) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, size, file), size);
-    fclose(file);
-}
-
 /* No picture, a picture cut anywhere, a picture with any byte changed: an error with the file's
  * name, or a picture. */
 TEST(test_refused) {
     static png_byte grey[ROWS * COLUMNS];
-    static char bytes[8192];
     char names[256];
     Image image;
     MildError error = {0};
     assert_int_equal(image_read("no/such.png", &image, &error), MILD_ERROR_IO);
-    write_bytes("height,height\n", 14);
+    kit_write(path, "height,height\n", 14);
     assert_int_equal(image_read(path, &image, &error), MILD_ERROR_FORMAT);
     snprintf(names, sizeof names, "%s PNG", path);
     assert_error(&error, MILD_ERROR_FORMAT, names);
@@ -210,12 +202,11 @@ TEST(test_refused) {
         grey[i] = (png_byte)(i * 31);
     }
     write_png(grey, PNG_FORMAT_GRAY, COLUMNS, ROWS);
-    FILE *file = fopen(path, "rb");
-    size_t size = fread(bytes, 1, sizeof bytes, file);
-    fclose(file);
+    size_t size;
+    char *bytes = kit_read(path, &size);
     int refused = 0;
     for (size_t cut = 0; cut < size; cut += 7) {
-        write_bytes(bytes, cut);
+        kit_write(path, bytes, cut);
         MildStatus status = image_read(path, &image, &error);
         refused += status != MILD_OK;
         if (status != MILD_OK) {
@@ -225,11 +216,12 @@ TEST(test_refused) {
     }
     for (size_t at = 0; at < size; at += 3) {
         bytes[at] ^= 0x55;
-        write_bytes(bytes, size);
+        kit_write(path, bytes, size);
         refused += image_read(path, &image, &error) != MILD_OK;
         image_close(&image);
         bytes[at] ^= 0x55;
     }
+    free(bytes);
     print_message("%zu bytes of picture: %d damaged ones refused\n", size, refused);
     assert_true(refused > (int)size / 7);
 }

@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include "base/paths.h"
-#include "kit.h"
+#include "files.h"
 #include "run/train/events.h"
 #include "run/train/history.h"
 #include "run/train/log.h"
@@ -311,9 +311,7 @@ TEST_WITH(test_scalars, make_folder, remove_folder) {
 static MildStatus read_log(const char *text, size_t size, History *history, MildError *error) {
     char path[PATH_SIZE];
     path_join(folder, "log.csv", path, NULL);
-    FILE *file = fopen(path, "wb");
-    assert_int_equal(fwrite(text, 1, size, file), size);
-    fclose(file);
+    kit_write(path, text, size);
     return history_read(path, history, error);
 }
 
