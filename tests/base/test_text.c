@@ -5,6 +5,18 @@
 #include "kit.h"
 #include "mild/error.h"
 
+/* Edits from a name to another, by which of the other and a name of so many edits is nearer. */
+static int distance(const char *name, const char *other) {
+    char rival[80] = "";
+    for (int edits = 1; edits < 10; edits++) {
+        snprintf(rival, sizeof rival, "%.*s%s", edits, "//////////", name);
+        if (text_nearest(name, (const char *[]){rival, other}, 2) == other) {
+            return edits - 1;
+        }
+    }
+    return -1;
+}
+
 TEST(test_distance) {
     static const struct {
         const char *a, *b;
@@ -24,20 +36,23 @@ TEST(test_distance) {
         {"intention", "execution", 5},
     };
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
-        assert_int_equal(text_distance(pairs[i].a, pairs[i].b), pairs[i].distance);
-        assert_int_equal(text_distance(pairs[i].b, pairs[i].a), pairs[i].distance);
+        assert_int_equal(distance(pairs[i].a, pairs[i].b), pairs[i].distance);
+        assert_int_equal(distance(pairs[i].b, pairs[i].a), pairs[i].distance);
     }
-    char longer[80], other[80]; /* names count as cut at 63 characters */
+    char longer[80], other[80], cut[64]; /* names count as cut at 63 characters */
     memset(longer, 'a', sizeof longer - 1);
     longer[sizeof longer - 1] = '\0';
     memcpy(other, longer, sizeof other);
     other[62] = 'b';
-    assert_int_equal(text_distance(longer, other), 1);
+    const char *const last[] = {other, longer};
+    assert_ptr_equal(text_nearest(longer, last, 2), longer);
     other[62] = 'a';
     other[63] = 'b';
-    assert_int_equal(text_distance(longer, other), 0);
-    assert_int_equal(text_distance("", longer), 63);
-    assert_int_equal(text_distance(longer, ""), 63);
+    assert_ptr_equal(text_nearest(longer, last, 2), other);
+    memset(cut, 0, sizeof cut);
+    memcpy(cut, longer, sizeof cut - 1);
+    assert_ptr_equal(text_nearest("", (const char *[]){cut, other}, 2), cut);
+    assert_ptr_equal(text_nearest("", (const char *[]){other, cut}, 2), other);
 }
 
 TEST(test_nearest) {
@@ -136,6 +151,8 @@ TEST(test_plain) {
         {"\xe2\x80\xae"
          "reversed \xe2\x81\xa6",
          "", "???reversed ???", 0},
+        {"beside those: \xc2\xa0 \xe2\x80\xaf \xe2\x81\xa5 \xe2\x81\xaa", "", NULL, 0},
+        {"first of their length: \xe0\xa0\x80 \xf0\x90\x80\x80", "", NULL, 0},
         {"overlong \xc0\x9b \xe0\x80\x9b \xf8\x80", "", "overlong ?? ??? ??", 0},
         {"\xf4\x90\x80\x80 \xff\xfe", "", "???? ??", 0},
         {"torn \xe2\x82", "", NULL, 2},

@@ -119,7 +119,7 @@ TEST(test_overrides) {
         "--section.key=value", "--section.key=value", "--section.key=value"};
     for (int i = 0; i < 6; i++) {
         char wanted[64];
-        assert_int_equal(config_override(f.sections, 2, bad[i], &f.error), status[i]);
+        assert_int_equal(config_overrides(f.sections, 2, &bad[i], 1, &f.error), status[i]);
         snprintf(wanted, sizeof wanted, "--%s %s", bad[i], names[i]);
         assert_error(&f.error, status[i], wanted);
     }

@@ -71,10 +71,14 @@ TEST(test_threads_change_nothing) {
         run_open(&more, threads, 64, toy_ppo_def());
         PpoReport other = run_iterations(&more, 2);
         assert_same_parameters(&one, &more);
+        assert_true(ppo_hash(more.ppo) == ppo_hash(one.ppo));
         assert_memory_equal(&report, &other, sizeof report);
         assert_memory_equal(&one.toy, &more.toy, sizeof one.toy);
         run_close(&more);
     }
+    const uint64_t hash = ppo_hash(one.ppo);
+    run_iterations(&one, 1);
+    assert_true(ppo_hash(one.ppo) != hash);
     run_close(&one);
 }
 
