@@ -25,6 +25,16 @@ static EnvsView view_of(Rows *rows) {
     return (EnvsView){rows->history[0], rows->critic[0], rows->estimate[0], rows->frame[0]};
 }
 
+/* A step into the rows. */
+static EnvsStep step_of(const float *action, Rows *rows) {
+    return (EnvsStep){.action = action,
+                      .reward = rows->reward,
+                      .done = rows->done,
+                      .timeout = rows->timeout,
+                      .valid = rows->valid,
+                      .next = view_of(rows)};
+}
+
 /* The same environments without the interface. */
 typedef struct {
     ExperimentDef def;
@@ -78,7 +88,7 @@ TEST(numbers_of_the_environments) {
     assert_true(shape.critic == SA01_CRITIC && shape.estimates == SA01_ESTIMATES);
     assert_true(shape.period == 0.01 && shape.rewards == TASK_REWARD_COUNT);
     const EnvsView view = view_of(&a);
-    const EnvsView plain_view = {b.history[0], b.critic[0], b.estimate[0], b.frame[0]};
+    const EnvsView plain_view = view_of(&b);
     assert_int_equal(mild_envs_reset(envs, &view, NULL, NULL), MILD_OK);
     envs_reset(plain.envs, &plain_view, NULL, NULL);
     double paid = 0;
@@ -86,19 +96,9 @@ TEST(numbers_of_the_environments) {
     for (int t = 0; t < STEPS; t++) {
         float action[ENVS][SA01_JOINTS];
         draw_actions(t, action);
-        const EnvsStep step = {.action = action[0],
-                               .reward = a.reward,
-                               .done = a.done,
-                               .timeout = a.timeout,
-                               .valid = a.valid,
-                               .next = view};
+        const EnvsStep step = step_of(action[0], &a);
         assert_int_equal(mild_envs_step(envs, &step, NULL, NULL), MILD_OK);
-        const EnvsStep plain_step = {.action = action[0],
-                                     .reward = b.reward,
-                                     .done = b.done,
-                                     .timeout = b.timeout,
-                                     .valid = b.valid,
-                                     .next = plain_view};
+        const EnvsStep plain_step = step_of(action[0], &b);
         envs_step(plain.envs, &plain_step, NULL, NULL);
         assert_memory_equal(&a, &b, sizeof a);
         for (int e = 0; e < ENVS; e++) {
@@ -167,7 +167,7 @@ TEST(ends) {
     static Rows a, b, last;
     static float terms[ENVS][TASK_REWARD_COUNT];
     MildEnvs *told = open_envs(keys, KEYS), *untold = open_envs(keys, KEYS);
-    const EnvsView first = view_of(&a), second = view_of(&b), end = view_of(&last);
+    const EnvsView first = view_of(&a), second = view_of(&b);
     assert_int_equal(mild_envs_reset(told, &first, NULL, NULL), MILD_OK);
     assert_int_equal(mild_envs_reset(untold, &second, NULL, NULL), MILD_OK);
     open_plain(&plain);
@@ -175,22 +175,10 @@ TEST(ends) {
     for (int t = 0; t < 24 * STEPS && compared < ENVS; t++) {
         float action[ENVS][SA01_JOINTS];
         draw_actions(t, action);
-        const EnvsStep step = {.action = action[0],
-                               .reward = a.reward,
-                               .done = a.done,
-                               .timeout = a.timeout,
-                               .valid = a.valid,
-                               .next = first,
-                               .last = end,
-                               .terms = terms[0]};
-        EnvsStep plainly = step;
-        plainly.reward = b.reward;
-        plainly.done = b.done;
-        plainly.timeout = b.timeout;
-        plainly.valid = b.valid;
-        plainly.next = second;
-        plainly.last = (EnvsView){0};
-        plainly.terms = NULL;
+        EnvsStep step = step_of(action[0], &a);
+        const EnvsStep plainly = step_of(action[0], &b);
+        step.last = view_of(&last);
+        step.terms = terms[0];
         memset(&last, 0xff, sizeof last);
         assert_int_equal(mild_envs_step(told, &step, NULL, NULL), MILD_OK);
         assert_int_equal(mild_envs_step(untold, &plainly, NULL, NULL), MILD_OK);
@@ -225,13 +213,8 @@ TEST(no_ends) {
     batch[KEYS - 1] = "train.robots=batch";
     MildEnvs *envs = open_envs(batch, KEYS);
     float action[ENVS][SA01_JOINTS] = {{0}};
-    const EnvsStep step = {.action = action[0],
-                           .reward = rows.reward,
-                           .done = rows.done,
-                           .timeout = rows.timeout,
-                           .valid = rows.valid,
-                           .next = view_of(&rows),
-                           .last = view_of(&last)};
+    EnvsStep step = step_of(action[0], &rows);
+    step.last = view_of(&last);
     MildError error = {0};
     assert_int_equal(mild_envs_reset(envs, &step.next, NULL, NULL), MILD_OK);
     assert_int_equal(mild_envs_step(envs, &step, NULL, &error), MILD_ERROR_ARGUMENT);

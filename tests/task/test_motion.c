@@ -7,16 +7,6 @@
 
 static Rig rig;
 
-/* In the air, turned, bent and moving, above ground at z = 0.05. */
-static Oracle place(uint32_t draw) {
-    RobotState state = kit_moving_state(1.2, draw);
-    task_env_set_state(rig.env, &state);
-    task_env_rest(rig.env)->terrain.height = 0.05;
-    kit_load(rig.sim, &state, rig.env);
-    robot_sim_sole_clearance(rig.sim, task_env_terrain(rig.env));
-    return oracle_of(rig.sim);
-}
-
 static TaskMotion describe_step(const double *torque) {
     RobotReading reading;
     task_env_read(rig.env, rig.sim, &reading);
@@ -31,7 +21,7 @@ static TaskMotion describe(void) {
 TEST(base_and_joints) {
     rig_open_quiet(&rig, 0.5);
     for (uint32_t draw = 0; draw < 20; draw++) {
-        Oracle o = place(draw);
+        Oracle o = rig_place(&rig, draw);
         double torque[SA01_JOINTS];
         for (int i = 0; i < SA01_JOINTS; i++) {
             rig.env->joint_speed[i] = 0.1 * i;
@@ -62,7 +52,7 @@ TEST(change_of_twist) {
     rig_open_quiet(&rig, 0.5);
     const double step[6] = {0.1, -0.2, 0.2, 0, -0.4, 0};
     for (int k = -1; k < 6; k++) {
-        place(3);
+        rig_place(&rig, 3);
         double wanted = k < 0 ? 0.5 : 0.3;
         for (int i = 0; i < 6; i++) {
             double change = k < 0 ? step[i] : i == k ? 0.3 : 0;
@@ -82,7 +72,7 @@ TEST(change_of_velocity) {
     rig_open_quiet(&rig, 0.5);
     rig.def.reward.acceleration_form = TASK_ACCELERATION_LINEAR;
     const double step[6] = {0.1, -0.2, 0.2, 3, -0.4, 1};
-    place(3);
+    rig_place(&rig, 3);
     for (int i = 0; i < 6; i++) {
         rig.env->base_twist[i] = rig.env->robot.qvel[i] - step[i];
     }
@@ -96,7 +86,7 @@ TEST(change_of_velocity) {
 /* One step of 0.01 s moves a mean over 0.4 s by a fortieth of the way. */
 TEST(smoothed_velocity) {
     rig_open_quiet(&rig, 0.5);
-    Oracle o = place(4);
+    Oracle o = rig_place(&rig, 4);
     const double before[3] = {0.3, -0.2, 0.7}, now[3] = {o.heading[0], o.heading[1], o.omega[2]};
     memcpy(rig.env->smooth_velocity, before, sizeof before);
     describe();
@@ -115,7 +105,7 @@ TEST(smoothed_velocity) {
 TEST(feet_and_knees) {
     rig_open_quiet(&rig, 0.5);
     for (uint32_t draw = 0; draw < 20; draw++) {
-        Oracle o = place(draw);
+        Oracle o = rig_place(&rig, draw);
         oracle_set_force(rig.sim, 0, 3, -4, 12);
         oracle_set_force(rig.sim, 1, 30, -60, -20);
         TaskMotion m = describe();
@@ -135,7 +125,7 @@ TEST(feet_and_knees) {
 /* Above the soles that stand by the clock: left at phase 1/4, right at 3/4, both when standing. */
 TEST(schedule) {
     rig_open_quiet(&rig, 0.5);
-    Oracle o = place(5);
+    Oracle o = rig_place(&rig, 5);
     double z = rig.env->robot.qpos[2];
     rig.env->phase = 0.25;
     TaskMotion m = describe();
@@ -160,7 +150,7 @@ TEST(schedule) {
 /* abs(sin) < 0.1 up to a phase of 0.01594. */
 TEST(double_support) {
     rig_open_quiet(&rig, 0.5);
-    place(6);
+    rig_place(&rig, 6);
     const double phase[] = {0, 0.0159, 0.0160, 0.4840, 0.4841, 0.5159, 0.5160, 0.9840, 0.9841};
     const int either[] = {1, 1, 0, 0, 1, 1, 0, 0, 1};
     for (int i = 0; i < 9; i++) {
@@ -177,7 +167,7 @@ TEST(double_support) {
 /* Contact is a vertical force above 5 N; sideways forces are none. */
 TEST(contact_and_air_time) {
     rig_open_quiet(&rig, 0.5);
-    place(7);
+    rig_place(&rig, 7);
     rig.env->air_time[0] = 0.30;
     rig.env->air_time[1] = 0.10;
     oracle_set_force(rig.sim, 0, 100, 0, 4.99);

@@ -52,16 +52,6 @@ static void fill_env(TaskEnv *env) {
     env->assist_draw = 0.8;
 }
 
-/* In the air, above ground at 0.05 m. */
-static Oracle place(uint32_t draw) {
-    RobotState state = kit_moving_state(1.2, draw);
-    task_env_set_state(rig.env, &state);
-    task_env_rest(rig.env)->terrain.height = 0.05;
-    kit_load(rig.sim, &state, rig.env);
-    robot_sim_sole_clearance(rig.sim, task_env_terrain(rig.env));
-    return oracle_of(rig.sim);
-}
-
 static void look(const TaskSensors *reading) {
     task_env_observe(rig.env, &rig.def, robot, rig.sim, reading, 0, &rig.view);
 }
@@ -93,7 +83,7 @@ TEST(frame) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     for (uint32_t draw = 0; draw < 10; draw++) {
-        Oracle o = place(draw);
+        Oracle o = rig_place(&rig, draw);
         fill_env(rig.env);
         look(&reading);
         expect_frame("frame", rig.frame, reading.omega, reading.gravity, reading.q, reading.qd,
@@ -106,7 +96,7 @@ TEST(frame) {
 
 TEST(readings) {
     rig_open_quiet(&rig, 0.5);
-    Oracle o = place(11);
+    Oracle o = rig_place(&rig, 11);
     TaskSensors reading;
     task_read_imu(robot_sim_base_rotation(rig.sim), robot_sim_qvel(rig.sim), &reading);
     task_read_motors(robot_sim_qpos(rig.sim) + 7, robot_sim_qvel(rig.sim) + 6, &reading);
@@ -123,7 +113,7 @@ TEST(readings) {
 TEST(the_clock) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
-    Oracle o = place(1);
+    Oracle o = rig_place(&rig, 1);
     fill_env(rig.env);
     memset(rig.env->command, 0, sizeof rig.env->command); /* not seen yet */
     look(&reading);
@@ -154,7 +144,7 @@ TEST(estimates) {
             rig.def.velocity_scale = velocity_scale = 1;
             rig.def.height_scale = height_scale = 2;
         }
-        Oracle o = place(draw);
+        Oracle o = rig_place(&rig, draw);
         look(&reading);
         double wanted[SA01_ESTIMATES];
         for (int i = 0; i < 3; i++) {
@@ -179,7 +169,7 @@ TEST(feet_of_the_critic) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     for (uint32_t draw = 0; draw < 10; draw++) {
-        Oracle o = place(draw);
+        Oracle o = rig_place(&rig, draw);
         fill_env(rig.env);
         const double force[SA01_FEET][3] = {{60, -90, 240}, {30, 15, -60}};
         for (int f = 0; f < SA01_FEET; f++) {
@@ -252,7 +242,7 @@ static MildTerrain two_materials(double x, double y) {
 TEST(episode_of_the_critic) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
-    place(12);
+    rig_place(&rig, 12);
     fill_env(rig.env);
     const double *qpos = robot_sim_qpos(rig.sim);
     task_env_rest(rig.env)->terrain = two_materials(qpos[0], qpos[1]);
@@ -289,7 +279,7 @@ TEST(concentric_ground) {
     robot_set_model(robot, MILD_MODEL_CON_CONE);
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
-    place(12);
+    rig_place(&rig, 12);
     const double *qpos = robot_sim_qpos(rig.sim);
     task_env_rest(rig.env)->terrain = two_materials(qpos[0], qpos[1]);
     MildMaterial *m = &task_env_rest(rig.env)->terrain.materials[1];
@@ -341,7 +331,7 @@ TEST(noise) {
     enum { DRAWS = 20000 };
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
-    place(13);
+    rig_place(&rig, 13);
     fill_env(rig.env);
     look(&reading);
     float quiet[SA01_OBSERVATION];
