@@ -10,14 +10,6 @@ static const double pi = 3.14159265358979323846;
 
 /* ---- soles ---- */
 
-static MildSole *sole_of(const double *outline, int points, double pitch) {
-    MildSoleDef def = {outline, points, pitch, KIT_SOLE_Z, 0};
-    MildError error = {0};
-    MildSole *sole = mild_sole_create(&def, &error);
-    expect_good(sole != NULL, &error);
-    return sole;
-}
-
 static MildSole *disc(double radius, double pitch) {
     enum { POINTS = 128 };
     double outline[2 * POINTS];
@@ -25,13 +17,7 @@ static MildSole *disc(double radius, double pitch) {
         outline[2 * i] = radius * cos(2 * pi * i / POINTS);
         outline[2 * i + 1] = radius * sin(2 * pi * i / POINTS);
     }
-    return sole_of(outline, POINTS, pitch);
-}
-
-static MildSole *rectangle(double length, double width, double pitch) {
-    const double x = length / 2, y = width / 2;
-    const double outline[] = {-x, -y, x, -y, x, y, -x, y};
-    return sole_of(outline, 4, pitch);
+    return kit_sole_of(outline, POINTS, pitch, 0);
 }
 
 /* Numbers of grains: k0 = 1.895 MPa/m, kappa = 0.223 MPa/m; plastic, no bed, no mass. */
@@ -107,7 +93,7 @@ TEST(test_heap) {
     static const double sides[][2] = {{0.039, 0.039}, {0.078, 0.0585}, {0.12, 0.06}, {0.2, 0.1}};
     for (int k = 0; k < 4; k++) {
         const double b = sides[k][0], a = sides[k][1], pitch = a / 3;
-        MildSole *sole = rectangle(b, a, pitch);
+        MildSole *sole = kit_rectangle(b, a, pitch, 0);
         double sum = 0.0;
         for (int i = 0; i < mild_sole_elements(sole); i++) {
             sum += mild_sole_edge(sole)[i] * pitch * pitch;
@@ -140,7 +126,7 @@ static double moved_mass(const MildMaterial *m, const MildSole *sole, double dep
  * never pulls. */
 TEST(test_momentum) {
     const double length = 0.12, width = 0.06, mass = 3.0, speed = 1.5;
-    MildSole *sole = rectangle(length, width, 0.005);
+    MildSole *sole = kit_rectangle(length, width, 0.005, 0);
     MildMaterial m = grains(0.3);
     m.k_pen = 1e-3;
     m.sigma_cone = 0.0;
@@ -198,7 +184,7 @@ static void press_to(Kit *kit, double depth, int steps) {
 /* A tilted plate: F = sum of s cos(theta) p(u). */
 TEST(test_tilt) {
     static const double tilts[] = {0, 8, 15, 30};
-    MildSole *sole = rectangle(0.12, 0.06, 0.01);
+    MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
     const MildMaterial m = grains(0.104);
     for (int t = 0; t < 4; t++) {
         const double tilt = tilts[t] * pi / 180, c = cos(tilt), s = sin(tilt);
@@ -237,7 +223,7 @@ static double turned_moment(int model) {
     m.mu = 0.0;
     m.sigma_cone = model == MILD_MODEL_MILD ? 0.223e6 : 0.0; /* nothing but the heap */
     m.bed_depth = 10.0;
-    MildSole *sole = rectangle(1.0, 0.1, 0.005);
+    MildSole *sole = kit_rectangle(1.0, 0.1, 0.005, 0);
     Kit kit;
     kit_open(&kit, 1, sole, NULL, &m, 1e-3);
     press_to(&kit, 1.0, 500);
@@ -275,7 +261,7 @@ TEST(test_drag) {
     static const double steps[] = {0.25e-3, 1e-3, 2.5e-3, 5e-3};
     double worst = 0.0;
     for (int t = 0; t < 8; t++) {
-        MildSole *sole = rectangle(0.12, 0.06, 0.01);
+        MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
         MildMaterial m = grains(0.104);
         m.model = t < 4 ? MILD_MODEL_MILD_MERGED : MILD_MODEL_MILD;
         m.slip_length = 0.0019;
@@ -307,7 +293,7 @@ TEST(test_drag) {
 /* Fresh penetration gives the support back: 1 - lambda falls as exp(-a/u0). Small steps: the share
  * is held in each. */
 TEST(test_regain) {
-    MildSole *sole = rectangle(0.12, 0.06, 0.01);
+    MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
     MildMaterial m = grains(0.104);
     m.slip_length = 0.0019;
     m.regain_length = 0.00068;
@@ -337,7 +323,7 @@ TEST(test_regain) {
 /* A foot that slips under load sinks; the force of a sliding sole and its drag keep to grip's
  * bound. */
 TEST(test_sinks) {
-    MildSole *sole = rectangle(0.12, 0.06, 0.01);
+    MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
     MildMaterial m = grains(0.104);
     double depth[2];
     for (int slips = 0; slips < 2; slips++) {
@@ -492,7 +478,7 @@ static double pumped(int model, double *paid) {
     m.slip_length = 1e-4;
     m.regain_length = 1e-4;
     m.mu = 0.0;
-    MildSole *sole = rectangle(0.12, 0.06, 0.01);
+    MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
     Kit kit;
     kit_open(&kit, 1, sole, NULL, &m, 5e-3);
     double given = 0.0;

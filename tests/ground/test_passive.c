@@ -11,15 +11,6 @@ static uint64_t draw_seed(uint64_t seed, int draw, int numbers) {
     return seed + (uint64_t)draw * (uint64_t)numbers * 0x9e3779b97f4a7c15u;
 }
 
-/* No element is in the ground or remembers it. */
-static int lifted(const Kit *kit) {
-    int touched = kit->result.foot[0].contacts;
-    for (int e = 0; e < 77 && touched == 0; e++) {
-        touched += mild_ground_depth_max(kit->ground, 0)[e] > 0.0;
-    }
-    return touched == 0;
-}
-
 typedef struct {
     int cycles, missed, draw; /* missed: steps that did not converge; draw: the worst */
     double worst,
@@ -55,7 +46,7 @@ static void throw_foot(int draw, MildSole *sole, Thrown *thrown) {
         missed += !kit.result.converged;
         work += w;
         taken += fabs(w);
-        if (!lifted(&kit) || taken == 0.0) {
+        if (!kit_lifted(&kit) || taken == 0.0) {
             continue;
         }
         thrown->cycles++; /* closed */

@@ -135,28 +135,34 @@ TEST(test_no_holes) {
     mild_sole_destroy(sole);
 }
 
-/* Loaded and dragged aside, a foot leaves a trail. */
+/* Loaded and dragged along x or y, a foot leaves a trail. */
 TEST(test_trail) {
     MildSole *sole = kit_plate(2, 2);
     MildMaterial sand = mild_material_default();
-    Kit kit;
-    prints_open(&kit, 1, sole, NULL, &sand, 1e-3, TILES);
-    for (int s = 0; s <= 100; s++) {
-        move_to(&kit, 1e-4 * s);
+    for (int axis = 0; axis < 4; axis++) { /* the last two: backward */
+        const double side = axis < 2 ? 1 : -1;
+        Kit kit;
+        prints_open(&kit, 1, sole, NULL, &sand, 1e-3, TILES);
+        for (int s = 0; s <= 100; s++) {
+            move_to(&kit, 1e-4 * s);
+        }
+        const double *at = kit.input.position[0], begin[2] = {at[0], at[1]};
+        kit.input.velocity[0][2] = kit.input.free_velocity[2] = 0.0;
+        kit.input.velocity[0][axis % 2] = kit.input.free_velocity[axis % 2] = 0.5 * side;
+        for (int s = 0; s < 400; s++) {
+            kit_solve(&kit);
+            kit_advance(&kit);
+        }
+        double least = 1.0;
+        for (double way = 0.0; way < 0.17; way += 0.002) {
+            double place[2] = {begin[0], begin[1]};
+            place[axis % 2] += side * way;
+            least = fmin(least, mild_ground_imprint_at(kit.ground, place[0], place[1]));
+        }
+        print_message("dragged 0.2 m: the trail is at least %.2f mm deep\n", 1e3 * least);
+        assert_true(least > 0.0099);
+        kit_close(&kit);
     }
-    kit.input.velocity[0][2] = kit.input.free_velocity[2] = 0.0;
-    kit.input.velocity[0][0] = kit.input.free_velocity[0] = 0.5;
-    for (int s = 0; s < 400; s++) {
-        kit_solve(&kit);
-        kit_advance(&kit);
-    }
-    double least = 1.0;
-    for (double x = 0.0; x < 0.17; x += 0.002) {
-        least = fmin(least, mild_ground_imprint_at(kit.ground, x, kit.input.position[0][1]));
-    }
-    print_message("dragged 0.2 m: the trail is at least %.2f mm deep\n", 1e3 * least);
-    assert_true(least > 0.0099);
-    kit_close(&kit);
     mild_sole_destroy(sole);
 }
 
@@ -187,8 +193,7 @@ TEST(test_passive) {
                spin = kit_uniform(&random, 3.0, 12.0), swing = kit_uniform(&random, 0.2, 1.5);
         double weight = kit.mass[0] * KIT_GRAVITY;
         for (int s = 0; s < (int)(1.2 / dt); s++) {
-            double t = s * dt, before[6], w = 0.0,
-                   lift = kit.input.position[0][2] + KIT_SOLE_Z + 0.01;
+            double t = s * dt, before[6], lift = kit.input.position[0][2] + KIT_SOLE_Z + 0.01;
             /* carried by a weak spring that hangs near the surface and moves up and down, aside and
              * around */
             force[0][2] =
@@ -197,27 +202,19 @@ TEST(test_passive) {
             force[0][1] = weight * (swing * cos(3.0 * t) - 0.5 * kit.input.velocity[0][1]);
             memcpy(before, kit.input.velocity[0], sizeof before);
             kit_step(&kit, (const double(*)[3])force);
-            const MildFootResult *result = &kit.result.foot[0];
-            for (int k = 0; k < 3; k++) {
-                w += 0.5 * dt *
-                     (result->force[k] * (before[k] + kit.result.velocity[k]) +
-                      result->torque[k] * (before[3 + k] + kit.result.velocity[3 + k]));
-            }
+            const double w = kit_work(&kit, 0, before);
             work += w;
             total += w;
             taken += fabs(w);
             whole = fmax(whole, total);
-            if (result->contacts > 0) {
+            if (!kit_lifted(&kit)) {
                 continue;
             }
-            int loaded = 0, deep = 0;
-            for (int e = 0; e < 77; e++) {
-                loaded += mild_ground_depth_max(kit.ground, 0)[e] > 0.0;
-            }
+            int deep = 0;
             for (int e = 0; e < 77; e++) {
                 deep += mild_scratch_elements(kit.scratch, 0).depth[e] > 0.0;
             }
-            if (loaded == 0 && taken > 0.0) {
+            if (taken > 0.0) {
                 cycles++;
                 inside += deep > 0;
                 worst = fmax(worst, work);

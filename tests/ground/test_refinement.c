@@ -9,15 +9,6 @@
 enum { LEVELS = 4 };
 static const double pitches[LEVELS] = {0.039, 0.0195, 0.00975, 0.004875};
 
-static MildSole *plate(double length, double width, double pitch) {
-    double x = 0.5 * length, y = 0.5 * width, outline[8] = {-x, -y, x, -y, x, y, -x, y};
-    MildSoleDef def = {outline, 4, pitch, KIT_SOLE_Z, 0};
-    MildError error = {0};
-    MildSole *sole = mild_sole_create(&def, &error);
-    expect_good(sole != NULL, &error);
-    return sole;
-}
-
 static const double length = 0.234, width = 0.156; /* [m] whole elements at every pitch */
 
 static void tilt(Kit *kit, double angle) {
@@ -32,7 +23,7 @@ static void tilt(Kit *kit, double angle) {
  * speed and stopped. */
 static void press(const MildMaterial *m, double pitch, double angle, double depth, double *force,
                   double *moment) {
-    MildSole *sole = plate(length, width, pitch);
+    MildSole *sole = kit_rectangle(length, width, pitch, 0);
     Kit kit;
     kit_open(&kit, 1, sole, NULL, m, 1e-3);
     tilt(&kit, angle);
@@ -101,8 +92,8 @@ TEST(test_models) {
         }
         double force[LEVELS], drift[LEVELS], worst = 0.0;
         for (int k = 0; k < LEVELS; k++) {
-            MildSole *sole = plate(length, width, pitches[k]),
-                     *usual = plate(length, width, KIT_PITCH);
+            MildSole *sole = kit_rectangle(length, width, pitches[k], 0),
+                     *usual = kit_rectangle(length, width, KIT_PITCH, 0);
             MildMaterial own;
             MildError error = {0};
             assert_int_equal(mild_model_match((MildModel)model, &sand, usual, load, &own, &error),
@@ -156,7 +147,7 @@ TEST(test_drop) {
     MildMaterial base = mild_material_default();
     double found[LEVELS][3];
     for (int k = 0; k < LEVELS; k++) {
-        MildSole *sole = plate(length, width, pitches[k]);
+        MildSole *sole = kit_rectangle(length, width, pitches[k], 0);
         Kit kit;
         kit_open(&kit, 1, sole, NULL, &base, 0.25e-3);
         kit.mass[0] = 10.0;
@@ -206,9 +197,9 @@ TEST(test_definition) {
 TEST(test_outline) {
     double outline[2 * 38], exact = 0.0;
     for (int i = 0; i < 19; i++) {
-        outline[2 * i] = outline[2 * (37 - i)] = kit_outline[i][0];
-        outline[2 * i + 1] = kit_outline[i][1];
-        outline[2 * (37 - i) + 1] = kit_outline[i][2];
+        outline[2 * i] = outline[2 * (37 - i)] = sa01_outline[i][0];
+        outline[2 * i + 1] = sa01_outline[i][1];
+        outline[2 * (37 - i) + 1] = sa01_outline[i][2];
     }
     for (int i = 0; i < 38; i++) {
         int j = (i + 1) % 38;

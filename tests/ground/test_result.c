@@ -6,11 +6,7 @@
 static MildSole *element_at(double x, double y) {
     double h = 0.5 * KIT_PITCH,
            outline[8] = {x - h, y - h, x + h, y - h, x + h, y + h, x - h, y + h};
-    MildSoleDef def = {outline, 4, KIT_PITCH, KIT_SOLE_Z, 1};
-    MildError error = {0};
-    MildSole *sole = mild_sole_create(&def, &error);
-    expect_good(sole != NULL, &error);
-    return sole;
+    return kit_sole_of(outline, 4, KIT_PITCH, 1);
 }
 
 static double gap(const double *ours, const double *expected, int count) {

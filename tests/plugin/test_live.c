@@ -74,7 +74,7 @@ TEST(model_stays) {
     assert_string_equal(now, text);
     plugin_ground_change(mild, plain, NULL, 0, "mu=0.25", error, sizeof error);
     assert_int_equal(plugin_ground_change(mild, plain, NULL, 0, text, error, sizeof error), -1);
-    assert_non_null(strstr(error, "bekker"));
+    assert_names(error, "bekker");
     mj_deleteData(d);
     mj_deleteData(wanted);
     mj_deleteData(plain);
