@@ -1,5 +1,5 @@
 /* The step of a robot whose shells are near the ground (bodies.h) against mild_ground_solve and
- * mild_ground_advance: the same text in double and in float, of soles and surfaces, on level ground
+ * mild_ground_advance: the same code in double and in float, of soles and surfaces, on level ground
  * and on maps. */
 #include "batch_kit.h"
 #include "bodies_case.h"

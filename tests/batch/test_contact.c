@@ -1,5 +1,5 @@
 /* The contact step as a warp does it against mild_ground_solve and mild_ground_advance: the same
- * text in double and in float, of one, two and four feet, on level ground and on maps. */
+ * code in double and in float, of one, two and four feet, on level ground and on maps. */
 #include "batch_kit.h"
 #include "case_law.h"
 #include "ground/begin.h"

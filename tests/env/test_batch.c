@@ -1,5 +1,5 @@
 /* The environments of a device against those of the CPU, which MuJoCo steps: the same episodes, the
- * same observations and rewards. By the same text on the CPU; with MILD_CUDA on the device too. */
+ * same observations and rewards. By the same code on the CPU; with MILD_CUDA on the device too. */
 #include "follow.h"
 
 #include "device/device.h"

@@ -1,6 +1,6 @@
 /* The learner on the GPU against the same learner on the CPU. With MILD_CUDA on the device, skipped
  * (77) where there is none; else with small networks on a stand-in for CUDA (emulated/), which runs
- * the same text of the layer. */
+ * the same code of the layer. */
 #include "gpu_check.h"
 
 #include <unistd.h>

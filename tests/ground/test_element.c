@@ -1,4 +1,4 @@
-/* The element's step in float, as a GPU runs it, against the same text in double. */
+/* The element's step in float, as a GPU runs it, against the same code in double. */
 #include "ground_kit.h"
 
 #define ELEMENT_STEP element_step_double

@@ -1,5 +1,5 @@
 /* Shells that stand on soft ground: in the air they change no bit of a step, and under load they
- * carry the robot. That the ground under all of its bodies only takes energy is in test_fallen.c. */
+ * carry the robot. That the ground under all bodies only takes energy is in test_fallen.c. */
 #include "all_robots.h"
 
 enum { STAND_STEPS = 400 };
