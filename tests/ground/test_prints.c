@@ -135,32 +135,65 @@ TEST(test_no_holes) {
     mild_sole_destroy(sole);
 }
 
-/* Loaded and dragged along x or y, a foot leaves a trail. */
+/* Loaded and dragged aside, a foot leaves a trail. */
 TEST(test_trail) {
     MildSole *sole = kit_plate(2, 2);
     MildMaterial sand = mild_material_default();
-    for (int axis = 0; axis < 4; axis++) { /* the last two: backward */
+    Kit kit;
+    prints_open(&kit, 1, sole, NULL, &sand, 1e-3, TILES);
+    for (int s = 0; s <= 100; s++) {
+        move_to(&kit, 1e-4 * s);
+    }
+    kit.input.velocity[0][2] = kit.input.free_velocity[2] = 0.0;
+    kit.input.velocity[0][0] = kit.input.free_velocity[0] = 0.5;
+    for (int s = 0; s < 400; s++) {
+        kit_solve(&kit);
+        kit_advance(&kit);
+    }
+    double least = 1.0;
+    for (double x = 0.0; x < 0.17; x += 0.002) {
+        least = fmin(least, mild_ground_imprint_at(kit.ground, x, kit.input.position[0][1]));
+    }
+    print_message("dragged 0.2 m: the trail is at least %.2f mm deep\n", 1e3 * least);
+    assert_true(least > 0.0099);
+    kit_close(&kit);
+    mild_sole_destroy(sole);
+}
+
+/* Dragged at 5 mm into its imprint of 20 mm, a foot is carried by what is not over the imprint yet,
+ * along x as along y, forward and backward, step by step. */
+TEST(test_into_a_print) {
+    enum { DRAG = 240 };
+    static double force[4][DRAG];
+    MildSole *sole = kit_plate(2, 2);
+    MildMaterial sand = mild_material_default();
+    for (int axis = 0; axis < 4; axis++) {
         const double side = axis < 2 ? 1 : -1;
         Kit kit;
         prints_open(&kit, 1, sole, NULL, &sand, 1e-3, TILES);
-        for (int s = 0; s <= 100; s++) {
+        double *at = kit.input.position[0];
+        at[0] = at[1] = 0.0;
+        for (int s = 0; s <= 40; s++) {
+            move_to(&kit, s <= 20 ? 1e-3 * s : 1e-3 * (40 - s));
+        }
+        move_to(&kit, -0.02);
+        at[axis % 2] = -0.08 * side;
+        for (int s = 0; s <= 50; s++) {
             move_to(&kit, 1e-4 * s);
         }
-        const double *at = kit.input.position[0], begin[2] = {at[0], at[1]};
         kit.input.velocity[0][2] = kit.input.free_velocity[2] = 0.0;
         kit.input.velocity[0][axis % 2] = kit.input.free_velocity[axis % 2] = 0.5 * side;
-        for (int s = 0; s < 400; s++) {
+        for (int s = 0; s < DRAG; s++) {
             kit_solve(&kit);
+            force[axis][s] = kit.result.foot[0].force[2];
+            expect_entry("force of the same drag along another axis", s, force[axis][s],
+                         force[0][s], 1e-9);
             kit_advance(&kit);
+            assert_true(s != 160 || force[axis][s] < 1e-9); /* wholly over the imprint */
         }
-        double least = 1.0;
-        for (double way = 0.0; way < 0.17; way += 0.002) {
-            double place[2] = {begin[0], begin[1]};
-            place[axis % 2] += side * way;
-            least = fmin(least, mild_ground_imprint_at(kit.ground, place[0], place[1]));
-        }
-        print_message("dragged 0.2 m: the trail is at least %.2f mm deep\n", 1e3 * least);
-        assert_true(least > 0.0099);
+        print_message("dragged into an imprint: %.2f N, half way %.2f N\n", force[axis][0],
+                      force[axis][120]);
+        assert_true(force[axis][0] > 3.0 && force[axis][120] > 1.0);
         kit_close(&kit);
     }
     mild_sole_destroy(sole);
