@@ -16,7 +16,7 @@ def cases():
     found = collections.Counter()
     for path in (ROOT / "tests").rglob("*"):
         if path.suffix in {".c", ".cpp", ".cu", ".h", ".inc"}:
-            found.update(re.findall(r"\bcmocka_unit_test\w*\(\s*(\w+)", path.read_text(errors="replace")))
+            found.update(re.findall(r"^TEST(?:_WITH)?\((\w+)", path.read_text(errors="replace"), re.M))
     return found
 
 

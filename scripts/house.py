@@ -2,7 +2,7 @@
 """Checks what clang-format 14 does not: no line of C is wider than 100 columns, every body of an if,
 else, for, while and do has braces, no file has more than 800 lines, and no function but main more
 than 60, but for tests; a table in it, that is an initialiser, counts as one line. No test compares the sentence of an
-error: assert_error of tests/kit.h holds its status and what it names. Usage: scripts/house.py FILE..."""
+error: assert_error of tests/kit.h holds its status and what it names. A case of a test is TEST(name). Usage: scripts/house.py FILE..."""
 
 import pathlib
 import re
@@ -107,12 +107,19 @@ def sentences(path, source):
             yield source.count("\n", 0, match.start()) + 1, f"{match[1]} of an error's text: take assert_error of kit.h"
 
 
+def lists(path, source):
+    """Cases that stand in a list."""
+    if "tests" in path.parts:
+        for match in re.finditer(r"\bcmocka_unit_test", source):
+            yield source.count("\n", 0, match.start()) + 1, "a case is TEST(name) of kit.h"
+
+
 def main():
     found = 0
     for name in sys.argv[1:]:
         path = pathlib.Path(name)
         source = path.read_text(encoding="utf-8")
-        faults = [*wide_lines(source), *bare_bodies(source), *long_files(source), *sentences(path, source)]
+        faults = [*wide_lines(source), *bare_bodies(source), *long_files(source), *sentences(path, source), *lists(path, source)]
         if "tests" not in path.parts:
             faults += long_functions(source)
         for number, what in sorted(faults):

@@ -11,6 +11,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 CODE = {".c", ".h", ".cu", ".cpp", ".inc"}
 DECLARED = re.compile(r"^(?:\w[\w]*[\s*]+)+([a-z_]\w*)\s*\(", re.M)  # at the beginning of a line
+OWN = re.compile(r"^static [^=;{}()]*\b([a-z_]\w*)\s*\(", re.M)
 
 
 def sources(folder):
@@ -42,8 +43,9 @@ def main():
     private = inside()
     calls = collections.defaultdict(set)
     for path, text in sources("tests"):
+        own = set(OWN.findall(text))
         for name in re.findall(r"\b([a-z_]\w*)\s*\(", text):
-            if name in private:
+            if name in private and name not in own:
                 calls[name].add(path.parts[0])
     layers = collections.Counter(private[name] for name in calls)
     if options.list:

@@ -1,5 +1,5 @@
-/* What all tests share: cmocka with what it needs, comparisons that fail with a name and both
- * numbers, and errors by their status and by what they name. */
+/* What all tests share: cmocka with what it needs, cases that list themselves, comparisons that
+ * fail with a name and both numbers, and errors by their status and by what they name. */
 #ifndef KIT_H
 #define KIT_H
 
@@ -17,6 +17,46 @@
 
 #include "mild/error.h"
 
+/* A case: TEST(name) { ... }. A program runs its cases in the order of its text. */
+#define TEST(name) TEST_WITH(name, NULL, NULL)
+
+/* A case with what is called before and after it. */
+#define TEST_WITH(name, before, after)                                                             \
+    static void name(void);                                                                        \
+    static void name##_case(void **state) {                                                        \
+        (void)state;                                                                               \
+        name();                                                                                    \
+    }                                                                                              \
+    __attribute__((constructor)) static void name##_add(void) {                                    \
+        kit_add(#name, name##_case, before, after);                                                \
+    }                                                                                              \
+    static void name(void)
+
+/* The main function of a program of cases, with what is called before the first and after the last,
+ * or NULL. */
+#define TEST_MAIN(before, after)                                                                   \
+    int main(void) {                                                                               \
+        return run_cases(before, after);                                                           \
+    }
+
+enum { KIT_CASES = 64 };
+static struct CMUnitTest kit_cases[KIT_CASES];
+static size_t kit_case_count;
+
+static inline void kit_add(const char *name, CMUnitTestFunction run, CMFixtureFunction before,
+                           CMFixtureFunction after) {
+    if (kit_case_count == KIT_CASES) {
+        abort();
+    }
+    const struct CMUnitTest added = {name, run, before, after, NULL};
+    kit_cases[kit_case_count++] = added;
+}
+
+/* Runs the cases; the exit status. */
+static inline int run_cases(CMFixtureFunction before, CMFixtureFunction after) {
+    return _cmocka_run_group_tests("tests", kit_cases, kit_case_count, before, after);
+}
+
 /* Fails unless got is within tolerance of wanted; NaN fails. */
 static inline void expect_near(const char *what, double got, double wanted, double tolerance) {
     if (!(fabs(got - wanted) <= tolerance)) {
@@ -30,6 +70,13 @@ static inline void expect_entry(const char *what, int i, double got, double want
     if (!(fabs(got - wanted) <= tolerance)) {
         fail_msg("%s[%d]: %.12g instead of %.12g (tolerance %.1g)", what, i, got, wanted,
                  tolerance);
+    }
+}
+
+/* Fails with the error's text unless something is good. */
+static inline void expect_good(int good, const MildError *error) {
+    if (!good) {
+        fail_msg("%s", error->text);
     }
 }
 

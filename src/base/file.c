@@ -23,6 +23,13 @@ static const char *base_of(const char *path) {
     return slash ? slash + 1 : path;
 }
 
+static const char *folder_of(const char *path, char folder[PATH_SIZE]) {
+    const char *slash = strrchr(path, '/');
+    int length = !slash ? 1 : slash == path ? 1 : (int)(slash - path);
+    snprintf(folder, PATH_SIZE, "%.*s", length, slash ? path : ".");
+    return folder;
+}
+
 static int same_inode(const struct stat *a, const struct stat *b) {
     return a->st_dev == b->st_dev && a->st_ino == b->st_ino;
 }
@@ -35,9 +42,24 @@ static struct {
 } claims[CLAIMS_MAX];
 static int claim_count;
 
+/* Whether two paths name the same file. If both exist, they must be the same file on disk (links
+ * are followed). If neither exists, they must have the same name in the same folder. Never true for
+ * devices and pipes. */
+static int same_file(const char *a, const char *b) {
+    struct stat about_a, about_b;
+    int has_a = stat(a, &about_a) == 0, has_b = stat(b, &about_b) == 0;
+    if (has_a && has_b) {
+        return S_ISREG(about_a.st_mode) && same_inode(&about_a, &about_b);
+    }
+    char folder[PATH_SIZE];
+    return !has_a && !has_b && strcmp(base_of(a), base_of(b)) == 0 &&
+           stat(folder_of(a, folder), &about_a) == 0 && stat(folder_of(b, folder), &about_b) == 0 &&
+           same_inode(&about_a, &about_b);
+}
+
 MildStatus file_claim(const char *path, const char *what, MildError *error) {
     for (int i = 0; i < claim_count; i++) {
-        if (file_same(path, claims[i].path)) {
+        if (same_file(path, claims[i].path)) {
             return mild_fail(error, MILD_ERROR_ARGUMENT, "%s and %s name the same file, %.200s",
                              claims[i].what, what, path);
         }
@@ -274,13 +296,6 @@ static int write_and_close(int file, const char *data, size_t size, int sync) {
     return failed;
 }
 
-static const char *folder_of(const char *path, char folder[PATH_SIZE]) {
-    const char *slash = strrchr(path, '/');
-    int length = !slash ? 1 : slash == path ? 1 : (int)(slash - path);
-    snprintf(folder, PATH_SIZE, "%.*s", length, slash ? path : ".");
-    return folder;
-}
-
 /* A rename is safe on disk only after its folder has been synced. Errors are ignored, because some
  * file systems cannot sync folders. */
 static void sync_folder(const char *path) {
@@ -318,20 +333,6 @@ MildStatus file_write(const char *path, const void *data, size_t size, MildError
     }
     sync_folder(path);
     return MILD_OK;
-}
-
-/* ---- telling files apart ---- */
-
-int file_same(const char *a, const char *b) {
-    struct stat about_a, about_b;
-    int has_a = stat(a, &about_a) == 0, has_b = stat(b, &about_b) == 0;
-    if (has_a && has_b) {
-        return S_ISREG(about_a.st_mode) && same_inode(&about_a, &about_b);
-    }
-    char folder[PATH_SIZE];
-    return !has_a && !has_b && strcmp(base_of(a), base_of(b)) == 0 &&
-           stat(folder_of(a, folder), &about_a) == 0 && stat(folder_of(b, folder), &about_b) == 0 &&
-           same_inode(&about_a, &about_b);
 }
 
 /* ---- locks ---- */

@@ -41,11 +41,6 @@ MildStatus file_temporary(const char *path, char temporary[PATH_SIZE], MildError
  * behind. SUM is a checksum of the rest, so that no file of a user has such a name by chance. */
 int file_is_temporary(const char *name);
 
-/* Whether two paths name the same file. If both exist, they must be the same file on disk (links
- * are followed). If neither exists, they must have the same name in the same folder. Never true for
- * devices and pipes. */
-int file_same(const char *a, const char *b);
-
 /* A process's lock on a file made for this purpose. The system releases it when the process ends,
  * for whatever reason. Another process can then take it although the file still exists. */
 typedef struct {

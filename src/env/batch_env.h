@@ -1,4 +1,4 @@
-/* An environment of the batch engine, in the sizes of the robot that the text is compiled for
+/* An environment of the batch engine, in the sizes of the robot that the code is compiled for
  * (robot/engine/model.h). */
 #ifndef ENVS_BATCH_ENV_H
 #define ENVS_BATCH_ENV_H

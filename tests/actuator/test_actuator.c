@@ -8,6 +8,7 @@
 #include "env/actuator/actuator.h"
 #include "env/actuator/motor.h"
 #include "learn/safetensors.h"
+#include "robots.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
 #define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
@@ -38,12 +39,9 @@ static Actuator *make(double spacing) {
 }
 
 /* Hip roll and yaw, hip pitch and knee, both ankles; of the quadruped, thighs and calves. */
-static void kinds_of_motors(void **state) {
-    (void)state;
-    MildError error = {0};
+TEST(kinds_of_motors) {
     int kind[ROBOT_JOINTS_MAX];
-    Robot *go1 = robot_create(GO1, &error);
-    assert_non_null(go1);
+    Robot *go1 = kit_robot(GO1);
     assert_int_equal(actuator_kinds(robot, kind), KINDS);
     for (int i = 0; i < SA01_JOINTS; i++) {
         assert_int_equal(kind[i], i % 6 / 2);
@@ -89,8 +87,7 @@ static double wanted_torque(int joint, const double *error, const double *speed)
     return scales[k].torque * formula(weights[k], x);
 }
 
-static void torque_is_the_network(void **state) {
-    (void)state;
+TEST(torque_is_the_network) {
     Actuator *actuator = make(0.01);
     Random r = random_at(6, 0, 0);
     assert_int_equal(actuator_parameters(), NUMBERS);
@@ -109,8 +106,7 @@ static void torque_is_the_network(void **state) {
 
 /* The learner's own forward pass gives the formula, and its gradient the differences of the
  * formula. */
-static void gradient_of_softsign(void **state) {
-    (void)state;
+TEST(gradient_of_softsign) {
     enum { ROWS = 3 };
     const Mlp mlp = actuator_mlp();
     float x[ROWS][INPUTS], y[3][ROWS * WIDTH], slope[ROWS], work[2][ROWS * WIDTH];
@@ -150,8 +146,7 @@ static void gradient_of_softsign(void **state) {
 
 /* Steps of 2.5 ms: the network sees t, t - 4 steps and t - 8 steps; what came before the first step
  * is taken to be as in it. */
-static void history_in_the_task(void **state) {
-    (void)state;
+TEST(history_in_the_task) {
     enum { STEPS = 40, LAG = 4 };
     MildError error = {0};
     TaskDef task = task_def_default();
@@ -196,8 +191,7 @@ static void refused(const TaskDef *task, MildStatus status, const char *names) {
     actuator_destroy(actuator);
 }
 
-static void file_and_task(void **state) {
-    (void)state;
+TEST(file_and_task) {
     char path[] = "/tmp/mild_actuator_XXXXXX";
     const int made = mkstemp(path);
     assert_true(made >= 0);
@@ -230,8 +224,7 @@ static void file_and_task(void **state) {
     refused(&wrong, MILD_ERROR_FORMAT, "task.actuator " POLICY);
     strcpy(wrong.actuator, "/tmp/there/is/none");
     refused(&wrong, MILD_ERROR_IO, "task.actuator /tmp/there/is/none");
-    Robot *go1 = robot_create(GO1, &error);
-    assert_non_null(go1);
+    Robot *go1 = kit_robot(GO1);
     assert_null(actuator_load(path, go1, &error));
     assert_error(&error, MILD_ERROR_ARGUMENT, "sa01 go1");
     robot_destroy(go1);
@@ -249,8 +242,7 @@ static void file_and_task(void **state) {
 }
 
 /* Numbers of the hip pitch: kp 70, kd 7, effort 140 N m, 25 rad/s. */
-static void made_up_motor(void **state) {
-    (void)state;
+TEST(made_up_motor) {
     enum { JOINT = 2 };
     Motor motor;
     const MotorDef def = {.delay = 0.005, .coulomb = 0.02, .viscous = 0.1, .peak = 0.5};
@@ -281,11 +273,4 @@ static void made_up_motor(void **state) {
     free(memory);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(kinds_of_motors),      cmocka_unit_test(torque_is_the_network),
-        cmocka_unit_test(gradient_of_softsign), cmocka_unit_test(history_in_the_task),
-        cmocka_unit_test(file_and_task),        cmocka_unit_test(made_up_motor),
-    };
-    return cmocka_run_group_tests(tests, setup, kit_teardown);
-}
+TEST_MAIN(setup, kit_teardown)

@@ -18,8 +18,7 @@ static MildStatus read_text(Record *record, const char *text, MildError *error) 
     return status;
 }
 
-static void log_is_read(void **state) {
-    (void)state;
+TEST(log_is_read) {
     MildError error = {0};
     Record record = {.robot = robot};
     assert_int_equal(read_text(&record,
@@ -53,8 +52,7 @@ static void log_is_read(void **state) {
     record_free(&record);
 }
 
-static void wrong_logs(void **state) {
-    (void)state;
+TEST(wrong_logs) {
     static const char header[] = "time_s,leg_l1_joint.error_rad,leg_l1_joint.speed_rad_s,"
                                  "leg_l1_joint.torque_nm\n";
     const struct {
@@ -89,8 +87,7 @@ static void wrong_logs(void **state) {
 }
 
 /* What is written is read back, to six digits. */
-static void log_is_written(void **state) {
-    (void)state;
+TEST(log_is_written) {
     double error[SA01_JOINTS], speed[SA01_JOINTS], torque[SA01_JOINTS];
     char *text = NULL;
     size_t size;
@@ -176,16 +173,13 @@ static Actuator *fit(const ActuatorFitDef *def, const Record *record, int thread
     Pool *pool = pool_create(threads);
     Actuator *actuator = actuator_fit(def, record, pool, score, &error);
     pool_destroy(pool);
-    if (!actuator) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(actuator != NULL, &error);
     return actuator;
 }
 
 /* A log of a PD: the fitted one is found again, and the ideal one has no error where it is that of
  * robot.ini. The deviation is that of the same rows by a sum of its own. */
-static void log_of_a_pd(void **state) {
-    (void)state;
+TEST(log_of_a_pd) {
     const ActuatorFitDef def = short_fit(10);
     Record record = made_record(pd);
     ActuatorScore score[KINDS];
@@ -210,8 +204,7 @@ static void log_of_a_pd(void **state) {
 
 /* A late motor with friction and saturation: the PD fitted to it is left with 5 N m of 17, the
  * network with a tenth of that. */
-static void log_of_a_motor(void **state) {
-    (void)state;
+TEST(log_of_a_motor) {
     const ActuatorFitDef def = short_fit(2000);
     Record record = made_record(motor);
     ActuatorScore score[KINDS];
@@ -239,8 +232,7 @@ static double answer(const Actuator *actuator) {
 
 /* The rows that the CSV names as held out are one second in five; torques changed there change the
  * scores and leave the network as it is. Nor do threads change it, but the seed does. */
-static void held_out_is_not_seen(void **state) {
-    (void)state;
+TEST(held_out_is_not_seen) {
     ActuatorFitDef def = short_fit(50);
     Record record = made_record(motor);
     ActuatorScore score[KINDS], other[KINDS];
@@ -301,8 +293,7 @@ static void refused(const ActuatorFitDef *def, const Record *record, const char 
 }
 
 /* A kind that is not logged, a history between rows, gaps everywhere, a log that is too short. */
-static void logs_that_do_not_do(void **state) {
-    (void)state;
+TEST(logs_that_do_not_do) {
     ActuatorFitDef def = short_fit(5);
     Record record = made_record(pd);
     for (int i = 0; i < SA01_JOINTS; i++) {
@@ -325,12 +316,4 @@ static void logs_that_do_not_do(void **state) {
     record_free(&record);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(log_is_read),         cmocka_unit_test(wrong_logs),
-        cmocka_unit_test(log_is_written),      cmocka_unit_test(log_of_a_pd),
-        cmocka_unit_test(log_of_a_motor),      cmocka_unit_test(held_out_is_not_seen),
-        cmocka_unit_test(logs_that_do_not_do),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

@@ -2,7 +2,7 @@
  * to the depth of the law of the changed material. */
 #include "app/live.h"
 #include "control/stand.h"
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 
 #define DT 0.002
@@ -37,14 +37,12 @@ static void check_presets(int patches) {
     assert_true(episode.height == 0.25);
 }
 
-static void presets_lie_everywhere(void **state) {
-    (void)state;
+TEST(presets_lie_everywhere) {
     check_presets(0);
     check_presets(1);
 }
 
-static void keys_scale(void **state) {
-    (void)state;
+TEST(keys_scale) {
     const MildTerrain terrain = course();
     const MildMaterial *was = &terrain.materials[0], *is;
     Live live = live_begin(&terrain, 2);
@@ -77,10 +75,8 @@ static void keys_scale(void **state) {
     assert_memory_equal(&live.terrain.materials[2], &terrain.materials[2], sizeof *was);
 }
 
-static void other_models_scale(void **state) {
-    (void)state;
-    MildMaterial clay;
-    assert_true(mild_material_preset("clay", &clay));
+TEST(other_models_scale) {
+    MildMaterial clay = kit_preset("clay");
     const MildTerrain terrain = mild_terrain_uniform(&clay);
     Live live = live_begin(&terrain, 0);
     live_take(&live, 0, &(WindowInput){.stiffness = 1});
@@ -109,16 +105,12 @@ static double sinkage_after(const Robot *robot, RobotSim *sim, const Stand *stan
 
 /* The robot stands on rubber, which becomes softer and softer under it: it sinks to the rest depth
  * of the law. Another preset does not reach it while it stands. */
-static void a_standing_robot_sinks(void **state) {
-    (void)state;
+TEST(a_standing_robot_sinks) {
     MildError error = {0};
-    Robot *robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    Robot *robot = kit_robot(SA01);
     Stand *stand = stand_create(robot, &error);
     RobotSim *sim = robot_sim_create(robot, DT, &error);
-    MildGround *ground =
-        mild_ground_init(aligned_alloc(64, mild_ground_bytes(robot_soles(robot), SA01_FEET)),
-                         robot_soles(robot), SA01_FEET);
+    MildGround *ground = kit_ground(robot);
     const RobotVariation nominal = robot_variation_nominal();
     MildTerrain terrain = course();
     terrain.materials[0] = terrain.materials[2]; /* rubber */
@@ -149,12 +141,4 @@ static void a_standing_robot_sinks(void **state) {
     robot_destroy(robot);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(presets_lie_everywhere),
-        cmocka_unit_test(keys_scale),
-        cmocka_unit_test(other_models_scale),
-        cmocka_unit_test(a_standing_robot_sinks),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

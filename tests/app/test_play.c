@@ -3,7 +3,7 @@
  */
 #include "app/play.h"
 #include "base/clock.h"
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 
 #define RATE 50.0 /* [1/s] frames: two policy steps each */
@@ -64,8 +64,7 @@ static void play(int count) {
     TaskDef task = task_def_default();
     Scene scene;
     task_def_make_nominal(&task);
-    Robot *robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    Robot *robot = kit_robot(SA01);
     int joints = robot_joints(robot);
     Controller controller = {.self = &joints, .name = "hold", .act = hold};
     assert_int_equal(scene_make(&scene, "grass", 2, &error), MILD_OK);
@@ -103,8 +102,7 @@ static void expect_command(int frame, double forward, double left, double turn) 
 
 /* Each part of the command by itself, both ways; what was asked stays, and what is asked adds up.
  * A command that came after a frame is seen by the second of its steps, so a frame later. */
-static void keys_command(void **state) {
-    (void)state;
+TEST(keys_command) {
     clear();
     script[0].command[0] = 0.4;
     script[3].command[1] = 0.2;
@@ -122,8 +120,7 @@ static void keys_command(void **state) {
 }
 
 /* Until somebody steers, the task holds the heading, also where a key goes forward. */
-static void the_heading_is_held_until_somebody_steers(void **state) {
-    (void)state;
+TEST(the_heading_is_held_until_somebody_steers) {
     clear();
     script[0].command[0] = 0.2;
     script[10].command[2] = 0.1;
@@ -140,8 +137,7 @@ static void the_heading_is_held_until_somebody_steers(void **state) {
 }
 
 /* S stops; the bounds are the ranges that the policy was trained on. */
-static void bounds_and_halt(void **state) {
-    (void)state;
+TEST(bounds_and_halt) {
     clear();
     for (int f = 0; f < 20; f++) {
         script[f].command[0] = 0.1, script[f].command[1] = 0.1, script[f].command[2] = 0.1;
@@ -157,8 +153,7 @@ static void bounds_and_halt(void **state) {
 }
 
 /* Space holds the time, = doubles it, R begins anew. */
-static void time_of_the_walk(void **state) {
-    (void)state;
+TEST(time_of_the_walk) {
     clear();
     for (int f = 0; f < 30; f++) {
         script[f].paused = f >= 5 && f < 10;
@@ -175,12 +170,4 @@ static void time_of_the_walk(void **state) {
     assert_true(fabs(walked[29] - 4 * frame) < 0.011);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(keys_command),
-        cmocka_unit_test(the_heading_is_held_until_somebody_steers),
-        cmocka_unit_test(bounds_and_halt),
-        cmocka_unit_test(time_of_the_walk),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

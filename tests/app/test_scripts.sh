@@ -76,6 +76,8 @@ for call in 'strstr(error.text, "outside")' 'strcmp(error->text, "x")' 'assert_s
 done
 printf 'assert_error(&error, 1, "x");\nassert_names(error.text, "x");\nstrstr(text, "error");\n' >tests/named.c
 expect 0 '^$' house tests/named.c
+printf 'x[] = {\n    cmocka_unit_test(a)};\n' >tests/list.c
+expect 1 'tests/list.c:2: a case is TEST(name) of kit.h' house tests/list.c
 
 # what counts as named in these tests
 named "press: --depth: 7 is outside 0 .. 1.5" "--depth 7 1.5 press" || fail "--depth is not named"

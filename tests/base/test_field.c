@@ -49,17 +49,14 @@ static Def taken(int field, const char *text, const char *printed) {
     Def def;
     MildError error;
     char out[64];
-    if (parse(field, text, &def, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(parse(field, text, &def, &error) == MILD_OK, &error);
     assert_int_equal(mild_field_print(&fields[field], &def, out, sizeof out), strlen(printed));
     assert_string_equal(out, printed);
     assert_true(def.before == start.before && def.after == start.after);
     return def;
 }
 
-static void test_numbers(void **state) {
-    (void)state;
+TEST(test_numbers) {
     assert_true(taken(MASS, "-1.5e-1", "-0.15").mass == -0.15);
     assert_true(taken(MASS, " 5 ", "5").mass == 5); /* the bounds belong to the range */
     assert_true(taken(MASS, "-2", "-2").mass == -2);
@@ -84,8 +81,7 @@ static void test_numbers(void **state) {
     refused(MASS, word, MILD_ERROR_ARGUMENT, names);
 }
 
-static void test_integers(void **state) {
-    (void)state;
+TEST(test_integers) {
     static const int wanted[3] = {9, 0, 7};
     Def def = taken(COUNT, "9,0 \t7\n", "9 0 7");
     assert_memory_equal(def.count, wanted, sizeof wanted);
@@ -106,8 +102,7 @@ static void test_integers(void **state) {
     refused(SEED, "18446744073709551616", MILD_ERROR_ARGUMENT, "robot.seed 18446744073709551616");
 }
 
-static void test_switches(void **state) {
-    (void)state;
+TEST(test_switches) {
     static const char *const yes[] = {"1", "true", "YES", "On"}, *const no[] = {"0", "False", "no",
                                                                                 "OFF"};
     for (int i = 0; i < 4; i++) {
@@ -122,15 +117,13 @@ static void test_switches(void **state) {
     }
 }
 
-static void test_texts(void **state) {
-    (void)state;
+TEST(test_texts) {
     assert_string_equal(taken(NOTE, "a b,c", "a b,c").note, "a b,c");
     assert_string_equal(taken(NOTE, "", "").note, "");
     refused(NOTE, "abcdef", MILD_ERROR_RANGE, "robot.note 6 5");
 }
 
-static void test_names(void **state) {
-    (void)state;
+TEST(test_names) {
     for (int i = 0; i < 3; i++) {
         assert_int_equal(taken(KIND, kinds[i], kinds[i]).kind, i);
     }
@@ -141,8 +134,7 @@ static void test_names(void **state) {
 }
 
 /* What does not fit is cut, and the whole length told, as snprintf does. */
-static void test_cut(void **state) {
-    (void)state;
+TEST(test_cut) {
     char text[16];
     for (size_t size = 0; size <= 8; size++) {
         memset(text, '?', sizeof text);
@@ -154,8 +146,7 @@ static void test_cut(void **state) {
     }
 }
 
-static void test_check(void **state) {
-    (void)state;
+TEST(test_check) {
     MildError error = {0};
     assert_int_equal(mild_fields_check(fields, FIELDS, &start, "robot", &error), MILD_OK);
     Def def = start;
@@ -186,8 +177,7 @@ static void test_check(void **state) {
     assert_error(&error, MILD_ERROR_RANGE, "x.note 6");
 }
 
-static void test_find(void **state) {
-    (void)state;
+TEST(test_find) {
     const char *nearest = "?";
     assert_ptr_equal(mild_field_find(fields, FIELDS, "seed", &nearest), &fields[SEED]);
     assert_string_equal(nearest, "seed");
@@ -209,12 +199,4 @@ static void test_find(void **state) {
     assert_string_equal(nearest, "mass");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_numbers),  cmocka_unit_test(test_integers),
-        cmocka_unit_test(test_switches), cmocka_unit_test(test_texts),
-        cmocka_unit_test(test_names),    cmocka_unit_test(test_cut),
-        cmocka_unit_test(test_check),    cmocka_unit_test(test_find),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include "base/file.h"
-#include "base/text.h"
 #include "kit.h"
 
 static char folder[] = "/tmp/mild_test_file_XXXXXX";
@@ -26,16 +25,13 @@ static void assert_holds(const char *path, const char *text) {
     size_t size;
     MildError error = {0};
     char *bytes = file_read(path, 1000, &size, &error);
-    if (!bytes) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(bytes != NULL, &error);
     assert_string_equal(bytes, text);
     assert_int_equal(size, strlen(text));
     free(bytes);
 }
 
-static void test_only_regular_files_are_read(void **state) {
-    (void)state;
+TEST(test_only_regular_files_are_read) {
     size_t size;
     assert_int_equal(mkfifo("pipe", 0600), 0);
     alarm(20); /* a reader that waits at the pipe ends the test */
@@ -55,8 +51,7 @@ static void test_only_regular_files_are_read(void **state) {
     assert_int_equal(error.status, MILD_ERROR_FORMAT);
 }
 
-static void test_write_whole_or_not(void **state) {
-    (void)state;
+TEST(test_write_whole_or_not) {
     MildError error = {0};
     assert_int_equal(file_write("file", "old", 3, &error), MILD_OK);
     assert_int_equal(file_write("file", "newer", 5, &error), MILD_OK);
@@ -70,8 +65,7 @@ static void test_write_whole_or_not(void **state) {
 }
 
 /* Temporary files never take a name that is in use. */
-static void test_temporaries(void **state) {
-    (void)state;
+TEST(test_temporaries) {
     MildError error = {0};
     char first[PATH_SIZE], second[PATH_SIZE];
     assert_int_equal(file_write("out.tmp", "mine", 4, &error), MILD_OK);
@@ -94,24 +88,32 @@ static void test_temporaries(void **state) {
     assert_holds(first, "taken");
 }
 
-static void test_same_file(void **state) {
-    (void)state;
+/* Whether both cannot be outputs of one command. */
+static int same(const char *a, const char *b) {
+    MildError error = {0};
+    file_claims_drop();
+    assert_int_equal(file_claim(a, "--a", &error), MILD_OK);
+    const int refused = file_claim(b, "--b", &error) != MILD_OK;
+    file_claims_drop();
+    return refused;
+}
+
+TEST(test_same_file) {
     MildError error = {0};
     assert_int_equal(file_write("one", "1", 1, &error), MILD_OK);
     assert_int_equal(file_write("two", "1", 1, &error), MILD_OK);
     assert_int_equal(mkdir("sub", 0777), 0);
     assert_int_equal(symlink("../one", "sub/soft"), 0);
     assert_int_equal(link("one", "hard"), 0);
-    assert_true(file_same("one", "one") && file_same("one", "./sub/../one"));
-    assert_true(file_same("one", "sub/soft") && file_same("hard", "one"));
-    assert_true(file_same("new", "./new") && file_same("sub/new", "sub/../sub/new"));
-    assert_false(file_same("one", "two") || file_same("new", "sub/new") || file_same("new", "one"));
-    assert_false(file_same("/dev/null", "/dev/null") || file_same("sub", "sub"));
+    assert_true(same("one", "one") && same("one", "./sub/../one"));
+    assert_true(same("one", "sub/soft") && same("hard", "one"));
+    assert_true(same("new", "./new") && same("sub/new", "sub/../sub/new"));
+    assert_false(same("one", "two") || same("new", "sub/new") || same("new", "one"));
+    assert_false(same("/dev/null", "/dev/null") || same("sub", "sub"));
 }
 
 /* What is claimed as an output cannot be read, by whatever name, nor be claimed twice. */
-static void test_claims(void **state) {
-    (void)state;
+TEST(test_claims) {
     MildError error = {0};
     size_t size;
     assert_int_equal(file_write("claimed", "1", 1, &error), MILD_OK);
@@ -136,8 +138,7 @@ static void test_claims(void **state) {
 }
 
 /* Files that the program writes by itself are written in no other place. */
-static void test_own(void **state) {
-    (void)state;
+TEST(test_own) {
     MildError error = {0};
     assert_int_equal(file_write("own", "1", 1, &error), MILD_OK);
     assert_int_equal(symlink("own", "own_soft"), 0);
@@ -151,8 +152,7 @@ static void test_own(void **state) {
     }
 }
 
-static void test_beside(void **state) {
-    (void)state;
+TEST(test_beside) {
     char path[PATH_SIZE];
     assert_int_equal(path_beside("runs/a.png", "_fit.csv", path, NULL), MILD_OK);
     assert_string_equal(path, "runs/a_fit.csv");
@@ -175,8 +175,7 @@ static int other_gets_lock(void) {
     return WEXITSTATUS(code) == 0;
 }
 
-static void test_lock(void **state) {
-    (void)state;
+TEST(test_lock) {
     FileLock lock;
     MildError error = {0};
     assert_true(other_gets_lock());
@@ -191,8 +190,7 @@ static void test_lock(void **state) {
 }
 
 /* Somebody else's file of that name stays. */
-static void test_foreign_lock(void **state) {
-    (void)state;
+TEST(test_foreign_lock) {
     static const char *const texts[] = {"", "mine", "A lock of mild."};
     FileLock lock;
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
@@ -211,31 +209,4 @@ static void test_foreign_lock(void **state) {
     assert_int_equal(access("elsewhere", F_OK), -1);
 }
 
-static void test_text(void **state) {
-    (void)state;
-    char text[32];
-    assert_int_equal(text_distance("kitten", "sitting"), 3);
-    assert_int_equal(text_distance("", "abc"), 3);
-    assert_string_equal(text_bytes(1536, text, sizeof text), "1.50 KiB");
-    assert_string_equal(text_duration(3725, text, sizeof text), "1 h 02 min");
-    assert_string_equal(text_duration(65, text, sizeof text), "1 min 05 s");
-    double number;
-    assert_false(text_double("", &number) || text_double("1x", &number) ||
-                 text_double("nan", &number));
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_only_regular_files_are_read),
-        cmocka_unit_test(test_write_whole_or_not),
-        cmocka_unit_test(test_temporaries),
-        cmocka_unit_test(test_same_file),
-        cmocka_unit_test(test_claims),
-        cmocka_unit_test(test_own),
-        cmocka_unit_test(test_beside),
-        cmocka_unit_test(test_lock),
-        cmocka_unit_test(test_foreign_lock),
-        cmocka_unit_test(test_text),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -38,8 +38,7 @@ static void round_structure(double *x) {
     memcpy(x, &four, sizeof four);
 }
 
-static void each_length_is_rounded(void **state) {
-    (void)state;
+TEST(each_length_is_rounded) {
     static const struct {
         int count;
         void (*round)(double *x);
@@ -65,7 +64,4 @@ static void each_length_is_rounded(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(each_length_is_rounded)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -1,8 +1,7 @@
 /* The comparisons of kit.h themselves: what counts as named, and what is wrong with an error. */
 #include "kit.h"
 
-static void whole_words_are_named(void **state) {
-    (void)state;
+TEST(whole_words_are_named) {
     const struct {
         const char *text, *names;
         int named;
@@ -37,8 +36,7 @@ static void whole_words_are_named(void **state) {
     }
 }
 
-static void errors_have_faults(void **state) {
-    (void)state;
+TEST(errors_have_faults) {
     const struct {
         MildError error;
         MildStatus status;
@@ -65,8 +63,7 @@ static void errors_have_faults(void **state) {
     assert_non_null(kit_error_fault(&error, MILD_ERROR_IO, "  "));
 }
 
-static void an_error_is_taken_once(void **state) {
-    (void)state;
+TEST(an_error_is_taken_once) {
     MildError error = {0};
     mild_fail(&error, MILD_ERROR_IO, "no file %s", "a.ini");
     assert_error(&error, MILD_ERROR_IO, "a.ini");
@@ -74,11 +71,4 @@ static void an_error_is_taken_once(void **state) {
     assert_non_null(kit_error_fault(&error, MILD_ERROR_IO, "a.ini"));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(whole_words_are_named),
-        cmocka_unit_test(errors_have_faults),
-        cmocka_unit_test(an_error_is_taken_once),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

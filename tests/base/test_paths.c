@@ -38,8 +38,7 @@ static void expect_file(const char *path, const char *content) {
     assert_string_equal(read, content);
 }
 
-static void test_join(void **state) {
-    (void)state;
+TEST(test_join) {
     char path[PATH_SIZE], name[PATH_SIZE];
     MildError error = {0};
     assert_int_equal(path_join("a", "b.csv", path, &error), MILD_OK);
@@ -55,8 +54,7 @@ static void test_join(void **state) {
 }
 
 /* $MILD_HOME decides; without it what lies beside the executable's folder, else the source tree. */
-static void test_data(void **state) {
-    (void)state;
+TEST(test_data) {
     char path[PATH_SIZE];
     setenv("MILD_HOME", "/somewhere", 1);
     assert_string_equal(path_data("models/x.xml", path), "/somewhere/models/x.xml");
@@ -93,8 +91,7 @@ static void test_data(void **state) {
     }
 }
 
-static void test_make_folder(void **state) {
-    (void)state;
+TEST(test_make_folder) {
     MildError error = {0};
     const char *deep = in_folder("a/b/c");
     struct stat info;
@@ -120,8 +117,7 @@ static void test_make_folder(void **state) {
     rmdir(in_folder("a"));
 }
 
-static void test_write(void **state) {
-    (void)state;
+TEST(test_write) {
     MildError error = {0};
     const char *path = in_folder("file");
     assert_int_equal(file_write(path, "first", 5, &error), MILD_OK);
@@ -142,8 +138,7 @@ static void test_write(void **state) {
 }
 
 /* A pipe is written to and stays one. */
-static void test_pipe(void **state) {
-    (void)state;
+TEST(test_pipe) {
     MildError error = {0};
     const char *path = in_folder("pipe");
     char read_back[8] = "";
@@ -160,8 +155,7 @@ static void test_pipe(void **state) {
     remove(path);
 }
 
-static void test_check_write(void **state) {
-    (void)state;
+TEST(test_check_write) {
     MildError error = {0};
     const char *path = in_folder("file");
     assert_int_equal(file_check_write(path, &error), MILD_OK);
@@ -183,11 +177,4 @@ static void test_check_write(void **state) {
     assert_int_equal(file_write(name, "x", 1, &error), MILD_ERROR_ARGUMENT);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_join),  cmocka_unit_test(test_data),
-        cmocka_unit_test(test_write), cmocka_unit_test(test_make_folder),
-        cmocka_unit_test(test_pipe),  cmocka_unit_test(test_check_write),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
-}
+TEST_MAIN(make_folder, remove_folder)

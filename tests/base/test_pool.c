@@ -48,8 +48,7 @@ static void check_team(int threads, int pieces) {
     pool_destroy(pool);
 }
 
-static void test_every_piece_once(void **state) {
-    (void)state;
+TEST(test_every_piece_once) {
     const int pieces[] = {0, 1, 2, 7, PIECES};
     for (int threads = 1; threads <= 5; threads++) {
         for (size_t i = 0; i < sizeof pieces / sizeof *pieces; i++) {
@@ -83,8 +82,7 @@ static void wait_for_all(void *context, int piece, int thread) {
 }
 
 /* All threads at once; signals are the caller's alone. */
-static void test_whole_team(void **state) {
-    (void)state;
+TEST(test_whole_team) {
     for (int threads = 2; threads <= 4; threads++) {
         Pool *pool = pool_create(threads);
         assert_non_null(pool);
@@ -106,8 +104,7 @@ static void slow_piece(void *context, int piece, int thread) {
     done[piece] = 1;
 }
 
-static void test_waits_for_all(void **state) {
-    (void)state;
+TEST(test_waits_for_all) {
     Pool *pool = pool_create(4);
     assert_non_null(pool);
     for (int run = 0; run < 20; run++) {
@@ -120,8 +117,7 @@ static void test_waits_for_all(void **state) {
     pool_destroy(pool);
 }
 
-static void test_create_and_destroy(void **state) {
-    (void)state;
+TEST(test_create_and_destroy) {
     for (int i = 0; i < 100; i++) {
         Pool *pool = pool_create(3);
         assert_non_null(pool);
@@ -135,8 +131,7 @@ static void test_create_and_destroy(void **state) {
 }
 
 /* The wall clock counts a pause in seconds, a thread's processor time does not. */
-static void test_clocks(void **state) {
-    (void)state;
+TEST(test_clocks) {
     const struct timespec pause = {.tv_nsec = 50000000};
     const double wall = clock_seconds(), busy = clock_thread_seconds();
     nanosleep(&pause, NULL);
@@ -152,8 +147,7 @@ static void test_clocks(void **state) {
     assert_true(clock_thread_seconds() - busy > 1e-4);
 }
 
-static void test_clock_moves_forward(void **state) {
-    (void)state;
+TEST(test_clock_moves_forward) {
     double last = clock_seconds();
     for (int i = 0; i < 1000; i++) {
         double now = clock_seconds();
@@ -162,11 +156,4 @@ static void test_clock_moves_forward(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_piece_once), cmocka_unit_test(test_whole_team),
-        cmocka_unit_test(test_waits_for_all),    cmocka_unit_test(test_create_and_destroy),
-        cmocka_unit_test(test_clocks),           cmocka_unit_test(test_clock_moves_forward),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -31,8 +31,7 @@ static uint64_t unmix(uint64_t x) {
 
 /* Philox 2x32-10 of the published known answers (Random123, kat_vectors): counter, key, result.
  * Seeds are chosen so that our key schedule ends at that key. */
-static void test_known_answers(void **state) {
-    (void)state;
+TEST(test_known_answers) {
     static const uint32_t kat[3][5] = {
         {0, 0, 0, 0xff1dae59, 0x6cd10df2},
         {0xffffffff, 0xffffffff, 0xffffffff, 0x2c3f628b, 0xab4fd7ad},
@@ -55,8 +54,7 @@ static void test_known_answers(void **state) {
     }
 }
 
-static void test_same_place_same_number(void **state) {
-    (void)state;
+TEST(test_same_place_same_number) {
     Random a = random_at(5, 6, 7);
     assert_true(a.seed == 5 && a.stream == 6 && a.step == 7 && a.use == 0);
     Random b = a;
@@ -86,8 +84,7 @@ static void check_moments(const char *what, double (*draw)(Random *), const doub
 
 /* Moment k of U(0,1) is 1/(k+1); of N(0,1) 0, 1, 0, 3. Spread: square root of moment 2k less the
  * square of moment k. */
-static void test_moments(void **state) {
-    (void)state;
+TEST(test_moments) {
     static const double unit[4] = {1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 5};
     static const double normal[4] = {0, 1, 0, 3};
     double unit_spread[4], normal_spread[4] = {1, sqrt(2), sqrt(15), sqrt(105 - 9)};
@@ -99,8 +96,7 @@ static void test_moments(void **state) {
 }
 
 /* The number from the bits, by hand. */
-static void test_conversions(void **state) {
-    (void)state;
+TEST(test_conversions) {
     for (uint32_t step = 0; step < 1000; step++) {
         Random bits = random_at(3, 4, step), r = bits;
         uint64_t first = random_bits(&bits), second = random_bits(&bits);
@@ -117,8 +113,7 @@ static void test_conversions(void **state) {
 
 /* Every face of a die of 7 as often as any other: chi squared of 6 degrees of freedom is above 22.5
  * once in a thousand. */
-static void test_index(void **state) {
-    (void)state;
+TEST(test_index) {
     Random r = random_at(8, 0, 0);
     int count[7] = {0};
     for (int i = 0; i < 70000; i++) {
@@ -137,8 +132,7 @@ static void test_index(void **state) {
 
 /* A number and its neighbour in seed, stream, step or use do not know of each other: correlation of
  * the values, and half of the bits differ. */
-static void test_neighbours(void **state) {
-    (void)state;
+TEST(test_neighbours) {
     static const char *const names[] = {"seed", "stream", "step", "use"};
     for (int kind = 0; kind < 4; kind++) {
         double product = 0, bits = 0;
@@ -166,8 +160,7 @@ static int compare(const void *a, const void *b) {
 }
 
 /* No two of 32 seeds x 32 streams x 32 steps x 4 uses give the same 64 bits. */
-static void test_no_repeats(void **state) {
-    (void)state;
+TEST(test_no_repeats) {
     const size_t count = 32 * 32 * 32 * 4;
     uint64_t *all = malloc(count * sizeof *all);
     assert_non_null(all);
@@ -182,12 +175,4 @@ static void test_no_repeats(void **state) {
     free(all);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_known_answers), cmocka_unit_test(test_same_place_same_number),
-        cmocka_unit_test(test_moments),       cmocka_unit_test(test_conversions),
-        cmocka_unit_test(test_index),         cmocka_unit_test(test_neighbours),
-        cmocka_unit_test(test_no_repeats),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -3,8 +3,7 @@
 #include "kit.h"
 
 /* Two sided, 95 % (e.g. Abramowitz and Stegun, table 26.10). */
-static void printed_tables(void **state) {
-    (void)state;
+TEST(printed_tables) {
     static const struct {
         int freedom;
         double t;
@@ -33,8 +32,7 @@ static double power_integral(int power, double end) {
     return sum * end / (3 * STEPS);
 }
 
-static void share_of_the_density(void **state) {
-    (void)state;
+TEST(share_of_the_density) {
     double worst = 0;
     for (int n = 1; n <= 200; n += n < 20 ? 1 : 17) {
         double angle = atan(student_95(n) / sqrt(n));
@@ -45,17 +43,9 @@ static void share_of_the_density(void **state) {
     assert_true(worst < 1e-12);
 }
 
-static void no_freedom(void **state) {
-    (void)state;
+TEST(no_freedom) {
     assert_true(isnan(student_95(0)));
     assert_true(isnan(student_95(-3)));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(printed_tables),
-        cmocka_unit_test(share_of_the_density),
-        cmocka_unit_test(no_freedom),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

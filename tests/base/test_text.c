@@ -5,8 +5,19 @@
 #include "kit.h"
 #include "mild/error.h"
 
-static void test_distance(void **state) {
-    (void)state;
+/* Edits from a name to another, by which of the other and a name of so many edits is nearer. */
+static int distance(const char *name, const char *other) {
+    char rival[80] = "";
+    for (int edits = 1; edits < 10; edits++) {
+        snprintf(rival, sizeof rival, "%.*s%s", edits, "//////////", name);
+        if (text_nearest(name, (const char *[]){rival, other}, 2) == other) {
+            return edits - 1;
+        }
+    }
+    return -1;
+}
+
+TEST(test_distance) {
     static const struct {
         const char *a, *b;
         int distance;
@@ -25,24 +36,26 @@ static void test_distance(void **state) {
         {"intention", "execution", 5},
     };
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
-        assert_int_equal(text_distance(pairs[i].a, pairs[i].b), pairs[i].distance);
-        assert_int_equal(text_distance(pairs[i].b, pairs[i].a), pairs[i].distance);
+        assert_int_equal(distance(pairs[i].a, pairs[i].b), pairs[i].distance);
+        assert_int_equal(distance(pairs[i].b, pairs[i].a), pairs[i].distance);
     }
-    char longer[80], other[80]; /* names count as cut at 63 characters */
+    char longer[80], other[80], cut[64]; /* names count as cut at 63 characters */
     memset(longer, 'a', sizeof longer - 1);
     longer[sizeof longer - 1] = '\0';
     memcpy(other, longer, sizeof other);
     other[62] = 'b';
-    assert_int_equal(text_distance(longer, other), 1);
+    const char *const last[] = {other, longer};
+    assert_ptr_equal(text_nearest(longer, last, 2), longer);
     other[62] = 'a';
     other[63] = 'b';
-    assert_int_equal(text_distance(longer, other), 0);
-    assert_int_equal(text_distance("", longer), 63);
-    assert_int_equal(text_distance(longer, ""), 63);
+    assert_ptr_equal(text_nearest(longer, last, 2), other);
+    memset(cut, 0, sizeof cut);
+    memcpy(cut, longer, sizeof cut - 1);
+    assert_ptr_equal(text_nearest("", (const char *[]){cut, other}, 2), cut);
+    assert_ptr_equal(text_nearest("", (const char *[]){other, cut}, 2), other);
 }
 
-static void test_nearest(void **state) {
-    (void)state;
+TEST(test_nearest) {
     static const char *const names[] = {"rubber", "foam60", "foam45", "sand_loose"};
     assert_string_equal(text_nearest("foam44", names, 4), "foam45");
     assert_string_equal(text_nearest("foam", names, 4), "foam60");     /* the first of two alike */
@@ -54,8 +67,7 @@ static void test_nearest(void **state) {
     assert_null(text_nearest("foam", names, 0));
 }
 
-static void test_numbers(void **state) {
-    (void)state;
+TEST(test_numbers) {
     double number = 7;
     assert_true(text_double("-1.5e-3", &number) && number == -1.5e-3);
     assert_true(text_double("0", &number) && number == 0);
@@ -87,8 +99,7 @@ static void test_numbers(void **state) {
     assert_true(large == 9);
 }
 
-static void test_bytes(void **state) {
-    (void)state;
+TEST(test_bytes) {
     char text[32];
     assert_string_equal(text_bytes(0, text, sizeof text), "0 B");
     assert_string_equal(text_bytes(1023, text, sizeof text), "1023 B");
@@ -99,8 +110,7 @@ static void test_bytes(void **state) {
     assert_string_equal(text_bytes(2048 * 1099511627776.0, text, sizeof text), "2048.00 TiB");
 }
 
-static void test_duration(void **state) {
-    (void)state;
+TEST(test_duration) {
     static const struct {
         double seconds;
         const char *text;
@@ -125,8 +135,7 @@ static void test_duration(void **state) {
 }
 
 /* What a terminal obeys, or what is no UTF-8, becomes '?', byte by byte. */
-static void test_plain(void **state) {
-    (void)state;
+TEST(test_plain) {
     static const struct {
         const char *text, *keep, *plain;
         size_t torn;
@@ -142,6 +151,8 @@ static void test_plain(void **state) {
         {"\xe2\x80\xae"
          "reversed \xe2\x81\xa6",
          "", "???reversed ???", 0},
+        {"beside those: \xc2\xa0 \xe2\x80\xaf \xe2\x81\xa5 \xe2\x81\xaa", "", NULL, 0},
+        {"first of their length: \xe0\xa0\x80 \xf0\x90\x80\x80", "", NULL, 0},
         {"overlong \xc0\x9b \xe0\x80\x9b \xf8\x80", "", "overlong ?? ??? ??", 0},
         {"\xf4\x90\x80\x80 \xff\xfe", "", "???? ??", 0},
         {"torn \xe2\x82", "", NULL, 2},
@@ -169,11 +180,4 @@ static void test_plain(void **state) {
     assert_string_equal(error.text, "no file '?[31mred?'");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_distance), cmocka_unit_test(test_nearest),
-        cmocka_unit_test(test_numbers),  cmocka_unit_test(test_bytes),
-        cmocka_unit_test(test_duration), cmocka_unit_test(test_plain),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

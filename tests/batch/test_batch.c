@@ -272,9 +272,8 @@ static void side_step(Side *side, Arrays *a, int advance) {
     const MildBatchInput input = input_of(d);
     const MildBatchOutput output = {d->wrench,   d->after,    d->foot,
                                     d->elements, d->residual, d->iterations};
-    if (mild_batch_step(side->batch, &input, &output, advance, NULL, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(mild_batch_step(side->batch, &input, &output, advance, NULL, &error) == MILD_OK,
+                &error);
     side_copy(side, a, side->arrays, sizeof *a);
 }
 
@@ -336,8 +335,7 @@ static void against_other(Errors *errors, int feet, const Arrays *a, const Array
 static Herd herd;
 static Arrays arrays, other;
 
-static void steps_are_those_of_the_ground(void **state) {
-    (void)state;
+TEST(steps_are_those_of_the_ground) {
     for (int device = MILD_BATCH_HOST; device <= 0; device++) {
         if (device >= 0 && !has_device()) {
             continue;
@@ -364,8 +362,7 @@ static void steps_are_those_of_the_ground(void **state) {
     }
 }
 
-static void device_and_host_agree(void **state) {
-    (void)state;
+TEST(device_and_host_agree) {
     if (!has_device()) {
         skip();
     }
@@ -549,8 +546,7 @@ static void store_on(const Shape *shape, int device) {
     herd_close(&herd);
 }
 
-static void reset_load_and_store(void **state) {
-    (void)state;
+TEST(reset_load_and_store) {
     for (int device = MILD_BATCH_HOST; device <= 0; device++) {
         if (device >= 0 && !has_device()) {
             continue;
@@ -592,8 +588,7 @@ static void unknown_on(const Shape *shape, int device) {
     herd_close(&herd);
 }
 
-static void unknown_material(void **state) {
-    (void)state;
+TEST(unknown_material) {
     for (int device = MILD_BATCH_HOST; device <= 0; device++) {
         if (device >= 0 && !has_device()) {
             continue;
@@ -605,8 +600,7 @@ static void unknown_material(void **state) {
 
 #ifdef MILD_CUDA
 /* A step neither allocates nor waits, so a graph captures it, and gives the same bits. */
-static void step_is_captured(void **state) {
-    (void)state;
+TEST(step_is_captured) {
     if (!has_device()) {
         skip();
     }
@@ -651,8 +645,7 @@ static void refuse(const MildBatchDef *def, MildStatus status, const char *names
     assert_error(&error, status, names);
 }
 
-static void bad_input_is_refused(void **state) {
-    (void)state;
+TEST(bad_input_is_refused) {
     const MildSole *soles[2] = {left, right};
     const MildBatchDef good = {
         .robots = 3, .feet = 2, .soles = soles, .dt = 5e-3, .device = MILD_BATCH_HOST};
@@ -714,8 +707,7 @@ static void says(MildStatus status, MildStatus wanted, MildError *error, const c
 }
 
 /* What a ground remembers and a batch cannot, and maps that it does not know. */
-static void strange_ground_is_refused(void **state) {
-    (void)state;
+TEST(strange_ground_is_refused) {
     const MildSole *soles[2] = {left, right};
     const MildMaterial sand = mild_material_default();
     const MildBatchDef def = {
@@ -781,17 +773,4 @@ static void strange_ground_is_refused(void **state) {
     kit_close(&fits);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(steps_are_those_of_the_ground),
-        cmocka_unit_test(device_and_host_agree),
-        cmocka_unit_test(reset_load_and_store),
-        cmocka_unit_test(unknown_material),
-#ifdef MILD_CUDA
-        cmocka_unit_test(step_is_captured),
-#endif
-        cmocka_unit_test(bad_input_is_refused),
-        cmocka_unit_test(strange_ground_is_refused),
-    };
-    return cmocka_run_group_tests(tests, open_soles, close_soles);
-}
+TEST_MAIN(open_soles, close_soles)

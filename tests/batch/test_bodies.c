@@ -1,5 +1,5 @@
 /* The step of a robot whose shells are near the ground (bodies.h) against mild_ground_solve and
- * mild_ground_advance: the same text in double and in float, of soles and surfaces, on level ground
+ * mild_ground_advance: the same code in double and in float, of soles and surfaces, on level ground
  * and on maps. */
 #include "batch_kit.h"
 #include "bodies_case.h"
@@ -408,8 +408,7 @@ static void worst_print(const char *name, Worst *w) {
         (double)w->iterations_ground / w->steps);
 }
 
-static void double_text_is_the_ground(void **state) {
-    (void)state;
+TEST(double_text_is_the_ground) {
     for (int i = 0; i < PLACES; i++) {
         static Worst worst;
         memset(&worst, 0, sizeof worst);
@@ -421,8 +420,7 @@ static void double_text_is_the_ground(void **state) {
     }
 }
 
-static void float_text_is_near_it(void **state) {
-    (void)state;
+TEST(float_text_is_near_it) {
     for (int i = 0; i < PLACES; i++) {
         static Worst worst;
         memset(&worst, 0, sizeof worst);
@@ -516,8 +514,7 @@ static void falls_gain(int falls, void (*run)(BodiesCase *), double tolerance, d
     assert_true(gained == 0 && left <= falls / 4);
 }
 
-static void falls_gain_nothing(void **state) {
-    (void)state;
+TEST(falls_gain_nothing) {
     falls_gain(kit_draws(26), bodies_double, 1e-11, 1e-9);
     falls_gain(kit_draws(26), bodies_float, 1e-4, 1e-3);
 }
@@ -574,8 +571,7 @@ static double first_pivot(const BodiesCase *c) {
 /* A pivot that is 0 in float left numbers that are none, one in some 1e5 steps of a Go1 that lies
  * in loose sand. Here float meets it: the inertia at which it is 0 is found in double, and those
  * beside it are tried. */
-static void vanishing_pivots_do_no_harm(void **state) {
-    (void)state;
+TEST(vanishing_pivots_do_no_harm) {
     static Kit kit;
     static BodiesCase c, exact;
     double low = 1e-3, high = 1;
@@ -602,12 +598,4 @@ static void vanishing_pivots_do_no_harm(void **state) {
     assert_true(worst < 1e-3);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(vanishing_pivots_do_no_harm),
-        cmocka_unit_test(double_text_is_the_ground),
-        cmocka_unit_test(float_text_is_near_it),
-        cmocka_unit_test(falls_gain_nothing),
-    };
-    return cmocka_run_group_tests(tests, open_soles, close_soles);
-}
+TEST_MAIN(open_soles, close_soles)

@@ -1,5 +1,5 @@
 /* The contact step as a warp does it against mild_ground_solve and mild_ground_advance: the same
- * text in double and in float, of one, two and four feet, on level ground and on maps. */
+ * code in double and in float, of one, two and four feet, on level ground and on maps. */
 #include "batch_kit.h"
 #include "case_law.h"
 #include "ground/begin.h"
@@ -387,8 +387,7 @@ static int same_steps(int points, const Worst *worst) {
                         0.04 * scale * worst->iterations_ground;
 }
 
-static void double_text_is_the_ground(void **state) {
-    (void)state;
+TEST(double_text_is_the_ground) {
     for (int i = 0; i < SHAPES; i++) {
         static Worst worst;
         worst = (Worst){0};
@@ -400,8 +399,7 @@ static void double_text_is_the_ground(void **state) {
     }
 }
 
-static void float_text_is_near_it(void **state) {
-    (void)state;
+TEST(float_text_is_near_it) {
     for (int i = 0; i < SHAPES; i++) {
         static Worst worst;
         worst = (Worst){0};
@@ -564,8 +562,7 @@ static void run_relief(const Relief *relief, int walks, double tolerance,
     }
 }
 
-static void double_text_is_the_ground_on_maps(void **state) {
-    (void)state;
+TEST(double_text_is_the_ground_on_maps) {
     for (int i = 0; i < RELIEFS; i++) {
         static Worst worst;
         worst = (Worst){0};
@@ -577,8 +574,7 @@ static void double_text_is_the_ground_on_maps(void **state) {
     }
 }
 
-static void float_text_is_near_it_on_maps(void **state) {
-    (void)state;
+TEST(float_text_is_near_it_on_maps) {
     for (int i = 0; i < RELIEFS; i++) {
         static Worst worst;
         worst = (Worst){0};
@@ -591,12 +587,4 @@ static void float_text_is_near_it_on_maps(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(double_text_is_the_ground),
-        cmocka_unit_test(float_text_is_near_it),
-        cmocka_unit_test(double_text_is_the_ground_on_maps),
-        cmocka_unit_test(float_text_is_near_it_on_maps),
-    };
-    return cmocka_run_group_tests(tests, open_soles, close_soles);
-}
+TEST_MAIN(open_soles, close_soles)

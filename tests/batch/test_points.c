@@ -324,8 +324,7 @@ static void walk_on(const Walk *walk, int device) {
     mild_sole_destroy(sole);
 }
 
-static void results_are_the_same(void **state) {
-    (void)state;
+TEST(results_are_the_same) {
     for (int device = MILD_BATCH_HOST; device <= 0; device++) {
         if (device >= 0 && !has_device()) {
             continue;
@@ -336,7 +335,4 @@ static void results_are_the_same(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(results_are_the_same)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

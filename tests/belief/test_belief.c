@@ -85,9 +85,8 @@ static int follow(Belief *belief, int from, int frames, double loud, int mirrore
 
 /* The first footstep's beginning is not seen, the next two are not looked at. A footstep is known
  * when the next one begins. */
-static void test_footsteps_that_count(void **state) {
+TEST(test_footsteps_that_count) {
     Belief belief;
-    (void)state;
     net->alarm = INFINITY;
     belief_reset(&belief);
     assert_int_equal(follow(&belief, 10, 4 * STEP - 10, 0.1, 0), 0);
@@ -98,10 +97,9 @@ static void test_footsteps_that_count(void **state) {
     assert_int_equal(follow(&belief, 4 * STEP + 1, 5 * STEP, 0.1, 0), 5);
 }
 
-static void test_standing_begins_anew(void **state) {
+TEST(test_standing_begins_anew) {
     Belief belief;
     float still[BELIEF_FRAME] = {0};
-    (void)state;
     belief_reset(&belief);
     follow(&belief, 0, 6 * STEP + 1, 0.1, 0);
     const int before = belief.footsteps;
@@ -112,10 +110,9 @@ static void test_standing_begins_anew(void **state) {
 }
 
 /* A footstep of another length than a robot makes, as after a lost second, does not count. */
-static void test_long_footsteps_do_not_count(void **state) {
+TEST(test_long_footsteps_do_not_count) {
     Belief belief;
     float frame[BELIEF_FRAME];
-    (void)state;
     belief_reset(&belief);
     follow(&belief, 0, 5 * STEP + 1, 0.1, 0);
     const int before = belief.footsteps;
@@ -127,9 +124,8 @@ static void test_long_footsteps_do_not_count(void **state) {
     assert_int_equal(belief.footsteps, before);
 }
 
-static void test_mirror(void **state) {
+TEST(test_mirror) {
     Belief left, right;
-    (void)state;
     belief_reset(&left);
     belief_reset(&right);
     follow(&left, 0, 9 * STEP + 1, 0.1, 0);
@@ -144,11 +140,10 @@ static void test_mirror(void **state) {
 }
 
 /* Two footsteps are left after an alarm, and what was before has no part in the posterior. */
-static void test_alarm_forgets(void **state) {
+TEST(test_alarm_forgets) {
     Belief belief, other;
     float frame[BELIEF_FRAME];
     int event = 0;
-    (void)state;
     net->alarm = INFINITY;
     belief_reset(&belief);
     belief_reset(&other);
@@ -168,9 +163,8 @@ static void test_alarm_forgets(void **state) {
     net->alarm = INFINITY;
 }
 
-static void test_quantiles(void **state) {
+TEST(test_quantiles) {
     Belief belief;
-    (void)state;
     belief_reset(&belief);
     for (int i = 0; i < BELIEF_PARAMETERS; i++) {
         const BeliefParameter p = (BeliefParameter)i;
@@ -193,9 +187,8 @@ static void test_quantiles(void **state) {
     }
 }
 
-static void test_no_allocation(void **state) {
+TEST(test_no_allocation) {
     Belief belief;
-    (void)state;
     belief_reset(&belief);
     const int before = allocations;
     assert_true(follow(&belief, 0, 40 * STEP, 0.1, 0) > 30);
@@ -203,13 +196,12 @@ static void test_no_allocation(void **state) {
 }
 
 /* What a log cannot be says its line; a log that was written is read back. */
-static void test_log(void **state) {
+TEST(test_log) {
     char path[] = "/tmp/belief_XXXXXX";
     BeliefLog log;
     MildError error = {0};
     float frame[BELIEF_FRAME];
     char names[64];
-    (void)state;
     const int descriptor = mkstemp(path);
     assert_true(descriptor >= 0);
     FILE *file = fdopen(descriptor, "w");
@@ -245,9 +237,8 @@ static void test_log(void **state) {
     remove(path);
 }
 
-static void test_files_that_are_none(void **state) {
+TEST(test_files_that_are_none) {
     MildError error = {0};
-    (void)state;
     assert_null(belief_read(MILD_SOURCE_DIR "/policies/mild.safetensors", &error));
     assert_error(&error, MILD_ERROR_FORMAT, MILD_SOURCE_DIR "/policies/mild.safetensors");
     assert_null(belief_read(MILD_SOURCE_DIR "/policies/none.safetensors", &error));
@@ -256,17 +247,4 @@ static void test_files_that_are_none(void **state) {
     assert_null(none);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_footsteps_that_count),
-        cmocka_unit_test(test_standing_begins_anew),
-        cmocka_unit_test(test_long_footsteps_do_not_count),
-        cmocka_unit_test(test_mirror),
-        cmocka_unit_test(test_alarm_forgets),
-        cmocka_unit_test(test_quantiles),
-        cmocka_unit_test(test_no_allocation),
-        cmocka_unit_test(test_log),
-        cmocka_unit_test(test_files_that_are_none),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -68,8 +68,7 @@ static void expect_row(const BenchReport *report, const char *name, double wante
     fail_msg("no row %s", name);
 }
 
-static void a_row_measures_what_it_names(void **state) {
-    (void)state;
+TEST(a_row_measures_what_it_names) {
     static BenchReport report;
     MildError error = {0};
     const ExperimentDef def = experiment_def_default();
@@ -93,8 +92,7 @@ static void a_row_measures_what_it_names(void **state) {
 }
 
 /* Per element of both plates. */
-static void time_per_element(void **state) {
-    (void)state;
+TEST(time_per_element) {
     static BenchReport report;
     MildError error = {0};
     const ExperimentDef def = experiment_def_default();
@@ -111,8 +109,4 @@ static void time_per_element(void **state) {
     expect_row(&report, "slip_2000", (NEWTON + ADVANCE + SLIPS) / 2000.0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_row_measures_what_it_names),
-                                       cmocka_unit_test(time_per_element)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

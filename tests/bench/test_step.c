@@ -48,8 +48,7 @@ int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *pus
 }
 
 /* The time of a step is that of all steps by their number, none left out and none twice. */
-static void test_whole_time(void **unused) {
-    (void)unused;
+TEST(test_whole_time) {
     RobotBench bench = {0};
     MildError error = {0};
     const ExperimentDef def = experiment_def_default();
@@ -67,8 +66,7 @@ static void test_whole_time(void **unused) {
 }
 
 /* The same along a walk, where the engine's floor lies as deep as the soles on foam. */
-static void test_whole_walk(void **unused) {
-    (void)unused;
+TEST(test_whole_walk) {
     ReplayTimes times = {0};
     MildError error = {0};
     const ExperimentDef def = experiment_def_default();
@@ -90,8 +88,7 @@ static void test_whole_walk(void **unused) {
 }
 
 /* Each row has the time of the case that it names; the phases are the step of the soft ground. */
-static void test_rows(void **unused) {
-    (void)unused;
+TEST(test_rows) {
     static BenchReport report;
     MildError error = {0};
     const ExperimentDef def = experiment_def_default();
@@ -116,8 +113,7 @@ static void test_rows(void **unused) {
 }
 
 /* The benchmark runs and reports positive times; how long they are is not a test's business. */
-static void test_bench(void **unused) {
-    (void)unused;
+TEST(test_bench) {
     RobotBench bench = {0};
     MildError error = {0};
     const ExperimentDef def = experiment_def_default();
@@ -133,9 +129,4 @@ static void test_bench(void **unused) {
     robot_destroy(robot);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_whole_time),
-                                       cmocka_unit_test(test_whole_walk),
-                                       cmocka_unit_test(test_rows), cmocka_unit_test(test_bench)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

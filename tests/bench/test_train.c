@@ -89,13 +89,9 @@ static void check_parts(int threads) {
     assert_true(value_of(&report, "threads") == threads);
 }
 
-static void the_parts_are_the_whole(void **state) {
-    (void)state;
+TEST(the_parts_are_the_whole) {
     check_parts(1);
     check_parts(2);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_parts_are_the_whole)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -1,6 +1,6 @@
 /* configs/paper.ini against the paper: every number of its tables of rewards and of randomised
  * parameters, its implementation details, and nothing else but what is off. It trains, too. */
-#include "kit.h"
+#include "robots.h"
 #include "run/config/experiment_keys.h"
 #include "run/train/trainer.h"
 #include "sa01.h"
@@ -48,9 +48,7 @@ enum { PRINTED = sizeof printed / sizeof *printed };
 static ExperimentDef read_paper(void) {
     MildError error = {0};
     ExperimentDef def = experiment_def_default();
-    if (experiment_read(&def, PAPER, NULL, 0, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(experiment_read(&def, PAPER, NULL, 0, &error) == MILD_OK, &error);
     return def;
 }
 
@@ -61,13 +59,10 @@ static char *text_of(ExperimentDef *def) {
 }
 
 /* The defaults with the paper's numbers are the file, and the file has them all. */
-static void the_file_is_the_paper(void **unused) {
-    (void)unused;
+TEST(the_file_is_the_paper) {
     MildError error = {0};
     ExperimentDef file = read_paper(), paper = experiment_def_default();
-    if (experiment_read(&paper, NULL, printed, PRINTED, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(experiment_read(&paper, NULL, printed, PRINTED, &error) == MILD_OK, &error);
     char *ours = text_of(&file), *theirs = text_of(&paper);
     char *ours_rest, *theirs_rest;
     const char *a = strtok_r(ours, "\n", &ours_rest), *b = strtok_r(theirs, "\n", &theirs_rest);
@@ -85,8 +80,7 @@ static void the_file_is_the_paper(void **unused) {
 }
 
 /* Every key that the paper prints is named in the file, not left to a default. */
-static void the_file_names_them(void **unused) {
-    (void)unused;
+TEST(the_file_names_them) {
     for (int i = 0; i < PRINTED; i++) {
         const char *key = strchr(printed[i], '.') + 1;
         char name[64], line[512];
@@ -105,14 +99,12 @@ static void the_file_names_them(void **unused) {
 }
 
 /* 154 elements of 0.0195 m; gains for the six joints of each leg. */
-static void the_robot_is_the_papers(void **unused) {
-    (void)unused;
+TEST(the_robot_is_the_papers) {
     MildError error = {0};
     const double kp[6] = {50, 50, 70, 70, 20, 20}, kd[6] = {5, 5, 7, 7, 0.2, 0.2};
     TaskGains own;
     ExperimentDef def = read_paper();
-    Robot *robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    Robot *robot = kit_robot(SA01);
     int elements = 0;
     for (int f = 0; f < robot_feet(robot); f++) {
         elements += mild_sole_elements(robot_rasters(robot)[f]);
@@ -128,8 +120,7 @@ static void the_robot_is_the_papers(void **unused) {
 }
 
 /* Two iterations, with both kinds of robots. */
-static void it_trains(void **unused) {
-    (void)unused;
+TEST(it_trains) {
     const TrainRobots kinds[] = {TRAIN_ROBOTS_MUJOCO, TRAIN_ROBOTS_BATCH};
     for (int k = 0; k < 2; k++) {
         MildError error = {0};
@@ -139,9 +130,7 @@ static void it_trains(void **unused) {
         def.train.grounds = 32;
         def.train.robots = (int)kinds[k];
         Trainer *trainer = train_create(&def, &error);
-        if (!trainer) {
-            fail_msg("%s", error.text);
-        }
+        expect_good(trainer != NULL, &error);
         for (int i = 0; i < 2; i++) {
             TrainReport report;
             assert_int_equal(train_iterate(trainer, &report, &error), MILD_OK);
@@ -151,12 +140,4 @@ static void it_trains(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_file_is_the_paper),
-        cmocka_unit_test(the_file_names_them),
-        cmocka_unit_test(the_robot_is_the_papers),
-        cmocka_unit_test(it_trains),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

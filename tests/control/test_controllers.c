@@ -1,7 +1,7 @@
 /* The table of controllers, and those that need no policy, on the biped and on the quadruped. */
 #include "control/controller.h"
 #include "control/stand.h"
-#include "kit.h"
+#include "robots.h"
 
 /* A robot in an environment of its own, on loose sand. */
 typedef struct {
@@ -15,10 +15,7 @@ typedef struct {
 static void scene_open(Scene *scene, const char *robot, const char *controller) {
     MildError error = {0};
     memset(scene, 0, sizeof *scene);
-    scene->robot = robot_open(robot, &error);
-    if (!scene->robot) {
-        fail_msg("%s", error.text);
-    }
+    scene->robot = kit_robot_named(robot);
     scene->def = task_def_default();
     task_def_make_nominal(&scene->def);
     scene->def.randomize.latency[0] = scene->def.randomize.latency[1] = 0;
@@ -47,8 +44,7 @@ static void scene_close(Scene *scene) {
     robot_destroy(scene->robot);
 }
 
-static void names(void **unused) {
-    (void)unused;
+TEST(names) {
     static const char *const wanted[] = {"clock", "ht2", "learned", "passivity", "stand", "zero"};
     for (int i = 0; i < 6; i++) {
         MildError error = {0};
@@ -77,8 +73,7 @@ static void names(void **unused) {
 }
 
 /* No action, for every row and no further. */
-static void zero_does_nothing(void **unused) {
-    (void)unused;
+TEST(zero_does_nothing) {
     Scene scene;
     scene_open(&scene, "go1", "zero");
     float actions[2 * 12 + 1];
@@ -95,8 +90,7 @@ static void zero_does_nothing(void **unused) {
 }
 
 /* The joints' PD on the actions of `stand` is the balanced stand's torque. */
-static void stand_acts_as_the_stand(void **unused) {
-    (void)unused;
+TEST(stand_acts_as_the_stand) {
     static const char *const robots[] = {"sa01", "go1", "g1"};
     for (int r = 0; r < 3; r++) {
         Scene scene;
@@ -134,8 +128,7 @@ static void stand_acts_as_the_stand(void **unused) {
 }
 
 /* Five seconds through the whole environment. */
-static void stand_stands(void **unused) {
-    (void)unused;
+TEST(stand_stands) {
     static const char *const robots[] = {"sa01", "go1", "g1"};
     for (int r = 0; r < 3; r++) {
         Scene scene;
@@ -163,12 +156,4 @@ static void stand_stands(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(names),
-        cmocka_unit_test(zero_does_nothing),
-        cmocka_unit_test(stand_acts_as_the_stand),
-        cmocka_unit_test(stand_stands),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -25,8 +25,7 @@ static double integrate(const DcmSegment *s, int k, double b, double xi) {
 
 /* From where the plan says, xi arrives at rest at the end of the last segment. Errors grow with
  * exp(t / b), here 2e4. */
-static void plan_ends_at_rest(void **unused) {
-    (void)unused;
+TEST(plan_ends_at_rest) {
     const double b = 0.24;
     double worst = 0;
     for (uint32_t draw = 0; draw < 20; draw++) {
@@ -62,8 +61,7 @@ static void plan_ends_at_rest(void **unused) {
 }
 
 /* Where p rests, so does xi; after a step of p it was there before by exp(-T / b). */
-static void rest_and_step(void **unused) {
-    (void)unused;
+TEST(rest_and_step) {
     const double b = 0.25, step = 0.1, wait = 0.4;
     DcmSegment segments[2] = {{.duration = wait}, {.from = {step}, .to = {step}, .duration = 1}};
     double xi[3];
@@ -73,10 +71,4 @@ static void rest_and_step(void **unused) {
     assert_true(fabs(xi[0] - step * exp(-wait / b)) < 1e-15);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(plan_ends_at_rest),
-        cmocka_unit_test(rest_and_step),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -3,42 +3,14 @@
 
 #include "base/random.h"
 #include "control/learned.h"
-#include "kit.h"
 #include "learn/policy.h"
 #include "learn/policy_private.h"
-#include "sa01.h"
-
-#define PATH "build_test_controller.safetensors"
 
 enum { ENVS = 7 };
 
-static Robot *robot;
-static TaskEnv *made[ENVS];
+#include "control_kit.h"
 
-static int setup(void **state) {
-    (void)state;
-    MildError error = {0};
-    TaskDef def = task_def_default();
-    robot = robot_create(SA01, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
-    for (int e = 0; e < ENVS; e++) {
-        made[e] = aligned_alloc(64, task_env_bytes(&def, robot));
-        assert_non_null(made[e]);
-        task_env_init(made[e], &def, robot, 1, (uint32_t)e);
-    }
-    return 0;
-}
-
-static int teardown(void **state) {
-    (void)state;
-    for (int e = 0; e < ENVS; e++) {
-        free(made[e]);
-    }
-    robot_destroy(robot);
-    return 0;
-}
+#define PATH "build_test_controller.safetensors"
 
 /* A policy of the task's shape with weights everywhere, its layers small. */
 static PolicyDef task_policy_def(void) {
@@ -78,8 +50,7 @@ static void fill_histories(TaskEnv **envs, uint32_t draw) {
 
 /* Every environment gets the mean action of its own history, with and without threads, whatever the
  * controller was asked before: it remembers nothing, so an episode's reset needs no call. */
-static void acts_as_its_policy(void **state) {
-    (void)state;
+TEST(acts_as_its_policy) {
     MildError error = {0};
     PolicyDef def = task_policy_def();
     Policy *policy = save_policy(&def);
@@ -121,8 +92,7 @@ static void acts_as_its_policy(void **state) {
 }
 
 /* The same history gives the same action after anything else: bit for bit. */
-static void remembers_nothing(void **state) {
-    (void)state;
+TEST(remembers_nothing) {
     MildError error = {0};
     PolicyDef def = task_policy_def();
     policy_destroy(save_policy(&def));
@@ -203,8 +173,7 @@ static void means_take_the_place(Controller *controller, Ablation part, const fl
     assert_true(part == ABLATION_estimates ? changed == 0 : changed > 1e-2);
 }
 
-static void parts_are_taken_out(void **state) {
-    (void)state;
+TEST(parts_are_taken_out) {
     MildError error = {0};
     PolicyDef def = task_policy_def();
     Policy *policy = save_policy(&def);
@@ -247,8 +216,7 @@ static void parts_are_taken_out(void **state) {
     unlink(PATH);
 }
 
-static void parts_have_names(void **state) {
-    (void)state;
+TEST(parts_have_names) {
     MildError error = {0};
     Ablation part = ABLATION_none;
     const LearnedInside *inside;
@@ -263,8 +231,7 @@ static void parts_have_names(void **state) {
 }
 
 /* Whose shape is not the task's is refused with both shapes named, and nothing is made. */
-static void another_shape_is_refused(void **state) {
-    (void)state;
+TEST(another_shape_is_refused) {
     static const char *const names[3] = {PATH " 46 6 sa01 47 12", PATH " 47 5 sa01 6 12",
                                          PATH " 47 6 11 sa01 12"};
     for (int wrong = 0; wrong < 3; wrong++) {
@@ -288,8 +255,7 @@ static void count(void *self) {
     ++*(int *)self;
 }
 
-static void destroy_is_called_once(void **state) {
-    (void)state;
+TEST(destroy_is_called_once) {
     int calls = 0;
     Controller controller = {.self = &calls, .destroy = count};
     controller_destroy(&controller);
@@ -298,8 +264,7 @@ static void destroy_is_called_once(void **state) {
     assert_int_equal(calls, 1);
 }
 
-static void a_missing_file_is_named(void **state) {
-    (void)state;
+TEST(a_missing_file_is_named) {
     MildError error = {0};
     Controller controller = {0};
     assert_int_equal(
@@ -311,12 +276,4 @@ static void a_missing_file_is_named(void **state) {
     assert_null(controller.self);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(acts_as_its_policy),       cmocka_unit_test(remembers_nothing),
-        cmocka_unit_test(another_shape_is_refused), cmocka_unit_test(destroy_is_called_once),
-        cmocka_unit_test(a_missing_file_is_named),  cmocka_unit_test(parts_are_taken_out),
-        cmocka_unit_test(parts_have_names),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -4,7 +4,7 @@
 
 #include "control/body.h"
 #include "control/controller.h"
-#include "kit.h"
+#include "robots.h"
 
 #define GRAVITY 9.81
 enum { NV = 18 };
@@ -75,8 +75,7 @@ static void foot_acceleration(RobotSim *sim, int f, const double point[3], const
 /* Standing on both feet at rest, the base where it should be, the DCM off its plan: the feet do not
  * accelerate, and the centre of mass does as the plan wants. With velocities, too, once the
  * impedances that answer them are off. */
-static void torques_give_the_planned_motion(void **unused) {
-    (void)unused;
+TEST(torques_give_the_planned_motion) {
     for (int moving = 0; moving < 2; moving++) {
         MildError error = {0};
         const double b = 0.24, k = 3;
@@ -131,8 +130,7 @@ static void torques_give_the_planned_motion(void **unused) {
 
 /* The damping of a foot that stands is a force and a torque on that foot against its twist, through
  * the joints of its leg. */
-static void moving_soles_are_damped(void **unused) {
-    (void)unused;
+TEST(moving_soles_are_damped) {
     MildError error = {0};
     double torque[2][ROBOT_JOINTS_MAX], worst = 0, largest = 0;
     BodyDef def = body_def_default();
@@ -170,8 +168,7 @@ static void moving_soles_are_damped(void **unused) {
 }
 
 /* A base turned about an axis is turned back about it; one that turns is braked. */
-static void base_is_turned_back(void **unused) {
-    (void)unused;
+TEST(base_is_turned_back) {
     MildError error = {0};
     BodyDef def = body_def_default();
     Body *body = body_create(robot, &def, robot_effort(robot), &error);
@@ -272,20 +269,17 @@ static void resting_feet(const Stand *stand, const double motion[6], double nu[N
 static void stand_open(Stand *stand, int rigid) {
     const BodyDef def = body_def_default();
     MildError error = {0};
-    MildMaterial material;
     WalkState state;
-    assert_true(mild_material_preset("foam60", &material));
     *stand = (Stand){.b = 0.254,
-                     .terrain = mild_terrain_uniform(&material),
+                     .terrain = kit_terrain("foam60"),
                      .variation = robot_variation_nominal(),
                      .mass = robot_total_mass(robot)};
     stand->variation.rigid = rigid;
     stand->body = body_create(robot, &def, robot_effort(robot), &error);
     stand->sim = robot_sim_create(robot, 0.0025, &error);
     stand->bytes = mild_ground_bytes(robot_soles(robot), robot_bodies(robot));
-    void *block = aligned_alloc(64, stand->bytes);
-    assert_true(stand->body && stand->sim && block);
-    stand->ground = mild_ground_init(block, robot_soles(robot), robot_bodies(robot));
+    assert_true(stand->body && stand->sim);
+    stand->ground = kit_ground(robot);
     RobotState start = {.qpos = {0, 0, robot_stand_height(robot), 1, 0, 0, 0}};
     memcpy(start.qpos + 7, robot_default_pose(robot),
            (size_t)robot_joints(robot) * sizeof *start.qpos);
@@ -313,8 +307,7 @@ static void stand_close(Stand *stand) {
  * of the impedances, so that kinetic energy and springs fall by what the dampers take: they never
  * exceed what a kick brought. Soft ground lets the feet go, and may give back what it has stored
  * under them: less than the weight times the sinkage. */
-static void motors_give_no_energy(void **unused) {
-    (void)unused;
+TEST(motors_give_no_energy) {
     for (int rigid = 0; rigid < 2; rigid++) {
         Stand stand;
         RobotState rest, kicked;
@@ -364,8 +357,7 @@ static void motors_give_no_energy(void **unused) {
 
 /* Outside of that condition, feet and all pushed sideways on foam, the motors put energy in before
  * the robot rests again (docs/controllers.md). */
-static void feet_that_move_are_another_matter(void **unused) {
-    (void)unused;
+TEST(feet_that_move_are_another_matter) {
     Stand stand;
     RobotState state;
     stand_open(&stand, 0);
@@ -442,8 +434,7 @@ static Run run(const char *ground, double speed, double seconds) {
     return out;
 }
 
-static void stands(void **unused) {
-    (void)unused;
+TEST(stands) {
     static const char *const grounds[] = {"rigid", "foam60"};
     for (int g = 0; g < 2; g++) {
         Run out = run(grounds[g], 0, 10);
@@ -456,19 +447,16 @@ static void stands(void **unused) {
 
 /* The command rises by 0.3 m/s^2 after the first double support of 0.8 s: in 5 s the robot comes
  * about 0.4 (5 - 0.8 - 0.67) m far. */
-static void walks(void **unused) {
-    (void)unused;
+TEST(walks) {
     Run out = run("rigid", 0.4, 5);
     assert_int_equal(out.fell, 0);
     assert_true(out.x > 1.3 && out.x < 1.8);
     assert_true(out.z_low > 0.6 && out.tilt < 0.05);
 }
 
-static void refuses_a_quadruped(void **unused) {
-    (void)unused;
+TEST(refuses_a_quadruped) {
     MildError error = {0};
-    Robot *go1 = robot_open("go1", &error);
-    assert_non_null(go1);
+    Robot *go1 = kit_robot_named("go1");
     TaskDef def = task_def_default();
     Controller controller = {0};
     const ControllerDef wanted = {NULL, &def, go1, NULL, 1};
@@ -479,16 +467,4 @@ static void refuses_a_quadruped(void **unused) {
     robot_destroy(go1);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(torques_give_the_planned_motion),
-        cmocka_unit_test(moving_soles_are_damped),
-        cmocka_unit_test(base_is_turned_back),
-        cmocka_unit_test(motors_give_no_energy),
-        cmocka_unit_test(feet_that_move_are_another_matter),
-        cmocka_unit_test(stands),
-        cmocka_unit_test(walks),
-        cmocka_unit_test(refuses_a_quadruped),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -3,44 +3,16 @@
 #include <unistd.h>
 
 #include "control/controller.h"
-#include "kit.h"
 #include "learn/safetensors.h"
-#include "sa01.h"
+
+enum { ENVS = 3, STEPS = 13, SECOND = 8, TENSORS_MAX = 64 };
+
+#include "control_kit.h"
 
 #define FOLDER MILD_SOURCE_DIR "/tests/control/"
 #define PATH "build_test_rivals.safetensors"
 
-enum { ROWS = 3, STEPS = 13, SECOND = 8, TENSORS_MAX = 64 };
-
 static const char *const kinds[2] = {"clock", "ht2"};
-static Robot *robot;
-static TaskDef def;
-static TaskEnv *made[ROWS];
-
-static int setup(void **state) {
-    (void)state;
-    MildError error = {0};
-    def = task_def_default();
-    robot = robot_create(SA01, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
-    for (int e = 0; e < ROWS; e++) {
-        made[e] = aligned_alloc(64, task_env_bytes(&def, robot));
-        assert_non_null(made[e]);
-        task_env_init(made[e], &def, robot, 1, (uint32_t)e);
-    }
-    return 0;
-}
-
-static int teardown(void **state) {
-    (void)state;
-    for (int e = 0; e < ROWS; e++) {
-        free(made[e]);
-    }
-    robot_destroy(robot);
-    return 0;
-}
 
 static const char *reference(const char *kind, char path[256]) {
     snprintf(path, 256, FOLDER "%s.safetensors", kind);
@@ -49,7 +21,7 @@ static const char *reference(const char *kind, char path[256]) {
 
 static MildStatus make(const char *kind, const char *path, Pool *pool, Controller *controller,
                        MildError *error) {
-    const ControllerDef wanted = {path, &def, robot, pool, ROWS};
+    const ControllerDef wanted = {path, &task, robot, pool, ENVS};
     return controller_make(kind, &wanted, controller, error);
 }
 
@@ -63,9 +35,7 @@ typedef struct {
 static void read_reference(const char *path, Reference *to) {
     MildError error = {0};
     Safetensors *file = safetensors_read(path, &error);
-    if (!file) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(file != NULL, &error);
     const Safetensor *frames = safetensors_find(file, "train.frames"),
                      *actions = safetensors_find(file, "train.actions");
     assert_true(frames && frames->bytes == sizeof to->frames);
@@ -92,16 +62,16 @@ static void show(TaskEnv *env, const Reference *r, int t) {
 /* Rows begin one step after each other, so that their contexts differ. */
 static double run(Controller *controller, const Reference *r) {
     double worst = 0;
-    for (int now = 0; now < STEPS + ROWS - 1; now++) {
-        float actions[ROWS * SA01_JOINTS + 1];
-        actions[ROWS * SA01_JOINTS] = 42;
-        for (int e = 0; e < ROWS; e++) {
+    for (int now = 0; now < STEPS + ENVS - 1; now++) {
+        float actions[ENVS * SA01_JOINTS + 1];
+        actions[ENVS * SA01_JOINTS] = 42;
+        for (int e = 0; e < ENVS; e++) {
             const int t = now < e ? 0 : now - e;
             show(made[e], r, t < STEPS ? t : STEPS - 1);
         }
-        controller->act(controller->self, ROWS, made, actions);
-        assert_true(actions[ROWS * SA01_JOINTS] == 42);
-        for (int e = 0; e < ROWS; e++) {
+        controller->act(controller->self, ENVS, made, actions);
+        assert_true(actions[ENVS * SA01_JOINTS] == 42);
+        for (int e = 0; e < ENVS; e++) {
             const int t = now < e ? 0 : now - e;
             const float *action = actions + e * SA01_JOINTS;
             for (int j = 0; t < STEPS && j < SA01_JOINTS; j++) {
@@ -115,8 +85,7 @@ static double run(Controller *controller, const Reference *r) {
 }
 
 /* Also a second time, after the first has filled every context. */
-static void as_pytorch(void **state) {
-    (void)state;
+TEST(as_pytorch) {
     static Reference r;
     for (int k = 0; k < 2; k++) {
         char path[256];
@@ -125,9 +94,7 @@ static void as_pytorch(void **state) {
             MildError error = {0};
             Pool *pool = threads ? pool_create(threads) : NULL;
             Controller controller = {0};
-            if (make(kinds[k], path, pool, &controller, &error) != MILD_OK) {
-                fail_msg("%s", error.text);
-            }
+            expect_good(make(kinds[k], path, pool, &controller, &error) == MILD_OK, &error);
             assert_string_equal(controller.name, kinds[k]);
             for (int again = 0; again < 2; again++) {
                 const double worst = run(&controller, &r);
@@ -193,8 +160,7 @@ static void rewrite(const Change *change) {
     safetensors_destroy(file);
 }
 
-static void one_clear_line(void **state) {
-    (void)state;
+TEST(one_clear_line) {
     static const Change changes[] = {
         {"clock", "kind", "mild policy", .names = PATH " --policy"},
         {"ht2", "kind", NULL, .names = PATH " ht2 --policy"},
@@ -233,10 +199,4 @@ static void one_clear_line(void **state) {
     unlink(PATH);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(as_pytorch),
-        cmocka_unit_test(one_clear_line),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

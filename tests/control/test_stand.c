@@ -4,7 +4,7 @@
 
 #include "base/random.h"
 #include "control/stand.h"
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 
 #define SWAY 0.15 /* [s] of stand.c */
@@ -69,8 +69,7 @@ static double owed(int r, int joint, double q, double qd, double lean, double fo
 
 /* The state's centre of mass is over the middle of the soles, the lowest sole at z = -sinkage, the
  * middle of the feet at x = 0; unbalanced it is the default pose, upright. */
-static void test_pose(void **state) {
-    (void)state;
+TEST(test_pose) {
     for (int r = 0; r < ROBOTS; r++) {
         const Robot *robot = robots[r];
         RobotState plain = stand_state(stands[r], 0, 0.02), leant = stand_state(stands[r], 1, 0.02);
@@ -106,8 +105,7 @@ static void test_pose(void **state) {
 
 /* Vertical forces at the middles of the soles and the joints' torques hold the whole robot at rest:
  * they balance gravity in every coordinate. The forces come from the base's rows alone. */
-static void test_torque_at_rest(void **state) {
-    (void)state;
+TEST(test_torque_at_rest) {
     for (int r = 0; r < ROBOTS; r++) {
         const Robot *robot = robots[r];
         const int feet = robot_feet(robot), joints = robot_joints(robot);
@@ -151,8 +149,7 @@ static void test_torque_at_rest(void **state) {
     }
 }
 
-static void test_spring(void **state) {
-    (void)state;
+TEST(test_spring) {
     for (int r = 0; r < ROBOTS; r++) {
         const Robot *robot = robots[r];
         const int joints = robot_joints(robot);
@@ -246,8 +243,7 @@ static void rises(int r, const double *offset, double *rise) {
 
 /* A small tilt: the legs' lengths follow the plane through the feet, so that the base is level
  * again; ankles follow the sole. The base's speed counts as SWAY times its angle about the feet. */
-static void test_answer_to_tilt(void **state) {
-    (void)state;
+TEST(test_answer_to_tilt) {
     static const double cases[][4] = {/* pitch, roll [rad], forward, left [m/s] */
                                       {0.02, 0, 0, 0},   {-0.015, 0, 0.1, 0},
                                       {0, 0.02, 0, 0},   {0, -0.01, 0, 0.1},
@@ -293,8 +289,7 @@ static void test_answer_to_tilt(void **state) {
 }
 
 /* A large tilt is answered as one of 0.3 rad. */
-static void test_answer_is_bounded(void **state) {
-    (void)state;
+TEST(test_answer_is_bounded) {
     for (int r = 0; r < ROBOTS; r++) {
         const Robot *robot = robots[r];
         const int ankle = robot_ankle(robot, 0);
@@ -323,8 +318,7 @@ static void test_answer_is_bounded(void **state) {
 }
 
 /* Whichever way it looks, the torques are the same. */
-static void test_heading(void **state) {
-    (void)state;
+TEST(test_heading) {
     for (int r = 0; r < ROBOTS; r++) {
         double worst = 0, first[ROBOT_JOINTS_MAX], turned[ROBOT_JOINTS_MAX];
         RobotState at = tilted(r, 0, 0.02, -0.03, 0.1, 0.05);
@@ -344,19 +338,16 @@ static void test_heading(void **state) {
 }
 
 /* Lets go on soft ground: after a second the base is upright and where it was. */
-static void test_stands(void **state) {
-    (void)state;
+TEST(test_stands) {
     static const char *const grounds[] = {"foam60", "grass", "foam25"};
     const Robot *robot = robots[0];
     for (int g = 0; g < 3; g++) {
-        MildMaterial m;
-        assert_true(mild_material_preset(grounds[g], &m));
+        MildMaterial m = kit_preset(grounds[g]);
         MildTerrain terrain = mild_terrain_uniform(&m);
         double sinkage = mild_sole_sinkage(robot_soles(robot)[0], &m, robot_foot_load(robot));
         RobotState rest = stand_state(stands[0], 1, sinkage);
         RobotSim *sim = sim_at(robot, &rest);
-        MildGround *ground = mild_ground_init(
-            aligned_alloc(64, mild_ground_bytes(robot_soles(robot), 2)), robot_soles(robot), 2);
+        MildGround *ground = kit_ground(robot);
         for (int s = 0; s < 1500; s++) {
             double torque[ROBOT_JOINTS_MAX];
             stand_torque(stands[0], sim, 1, torque);
@@ -373,15 +364,4 @@ static void test_stands(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_pose),
-        cmocka_unit_test(test_torque_at_rest),
-        cmocka_unit_test(test_spring),
-        cmocka_unit_test(test_answer_to_tilt),
-        cmocka_unit_test(test_answer_is_bounded),
-        cmocka_unit_test(test_heading),
-        cmocka_unit_test(test_stands),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -79,8 +79,7 @@ static void middle(const Ideal *ideal, double point[2]) {
 }
 
 /* Ten steps at the full command move the middle of the feet by ten steps. */
-static void speeds(void **unused) {
-    (void)unused;
+TEST(speeds) {
     static const double commands[][2] = {{0.6, 0}, {-0.4, 0}, {0, 0.2}, {0.3, -0.3}};
     for (int c = 0; c < 4; c++) {
         for (int left = 0; left < 2; left++) {
@@ -107,8 +106,7 @@ static void speeds(void **unused) {
 }
 
 /* Feet and base turn with the command. */
-static void turns(void **unused) {
-    (void)unused;
+TEST(turns) {
     Ideal ideal = ideal_start(0);
     ideal_run(&ideal, 0.2, 0, 0.5, 20, 10);
     const double from = ideal.walk.heading;
@@ -122,8 +120,7 @@ static void turns(void **unused) {
 }
 
 /* Out of a stand and back: the last steps bring the feet side by side, and p goes between them. */
-static void stops(void **unused) {
-    (void)unused;
+TEST(stops) {
     Ideal ideal = ideal_start(0);
     double point[2];
     ideal_run(&ideal, 0, 0, 0, 2, 99);
@@ -140,8 +137,7 @@ static void stops(void **unused) {
 }
 
 /* The targets of a swing are each other's derivatives, to the order of the differences. */
-static void rates(void **unused) {
-    (void)unused;
+TEST(rates) {
     Ideal ideal = ideal_start(0);
     ideal.def.acceleration = 1e9; /* a command that changes moves the foothold */
     ideal_run(&ideal, 0.6, 0.1, 0, 4, 99);
@@ -149,12 +145,4 @@ static void rates(void **unused) {
     assert_true(ideal.slip < 0.05);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(speeds),
-        cmocka_unit_test(turns),
-        cmocka_unit_test(stops),
-        cmocka_unit_test(rates),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -114,8 +114,7 @@ static double stationarity(const WrenchProgram *p, const double *x, int *active)
     return norm;
 }
 
-static void solution_is_the_minimum(void **unused) {
-    (void)unused;
+TEST(solution_is_the_minimum) {
     WrenchSolver *solver = wrench_solver_create();
     assert_non_null(solver);
     double worst_gradient = 0, worst_limit = 0;
@@ -154,8 +153,7 @@ static void solution_is_the_minimum(void **unused) {
 }
 
 /* Two level feet get what is wanted, to the small price of their own wrenches, when it is easy. */
-static void easy_wrench_is_given(void **unused) {
-    (void)unused;
+TEST(easy_wrench_is_given) {
     WrenchSolver *solver = wrench_solver_create();
     WrenchFoot foot[WRENCH_FEET] = {0};
     for (int f = 0; f < WRENCH_FEET; f++) {
@@ -190,8 +188,7 @@ static void easy_wrench_is_given(void **unused) {
 }
 
 /* What was solved before leaves no trace: the same to the last bit. */
-static void no_memory(void **unused) {
-    (void)unused;
+TEST(no_memory) {
     WrenchSolver *solver = wrench_solver_create();
     Random r = random_at(9, 1, 0);
     static WrenchProgram program[2];
@@ -210,8 +207,7 @@ static void no_memory(void **unused) {
 }
 
 /* A foot that may carry nothing gets nothing. */
-static void unloaded_foot_is_free(void **unused) {
-    (void)unused;
+TEST(unloaded_foot_is_free) {
     WrenchSolver *solver = wrench_solver_create();
     Random r = random_at(5, 1, 0);
     WrenchFoot foot[WRENCH_FEET] = {draw_foot(&r, 0), draw_foot(&r, 1)};
@@ -233,12 +229,4 @@ static void unloaded_foot_is_free(void **unused) {
     wrench_solver_destroy(solver);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(solution_is_the_minimum),
-        cmocka_unit_test(easy_wrench_is_given),
-        cmocka_unit_test(no_memory),
-        cmocka_unit_test(unloaded_foot_is_free),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

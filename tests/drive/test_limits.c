@@ -50,8 +50,7 @@ static StatePacket with_fault(const Fault *fault, uint32_t sequence, double time
 
 /* One impossible state is a hold, and leaves no trace: all targets after it are those of a runner
  * that never got it. */
-static void a_glitch(void **unused) {
-    (void)unused;
+TEST(a_glitch) {
     for (int f = 0; f < FAULTS; f++) {
         Runner *hit = make_runner(), *missed = make_runner();
         const RunnerReport *report = runner_report(hit);
@@ -88,8 +87,7 @@ static void a_glitch(void **unused) {
 }
 
 /* Impossible states for longer than `glitch` damp, and the reason names the number. */
-static void impossible_states(void **unused) {
-    (void)unused;
+TEST(impossible_states) {
     for (int f = 0; f < FAULTS; f++) {
         Runner *runner = make_runner();
         StatePacket state = standing(1, 0);
@@ -117,8 +115,7 @@ static void impossible_states(void **unused) {
 
 /* Every second state is impossible: the others walk. Then none is possible, and the newest gets too
  * old, because a limit of `glitch` allows it. */
-static void many_glitches(void **unused) {
-    (void)unused;
+TEST(many_glitches) {
     RunnerDef def = usual();
     def.glitch = 10;
     def.damp_after = 0.105;
@@ -138,8 +135,7 @@ static void many_glitches(void **unused) {
 }
 
 /* Without limits any number passes, and the policy is shown the nearest that training knows. */
-static void what_the_policy_is_shown(void **unused) {
-    (void)unused;
+TEST(what_the_policy_is_shown) {
     enum { GIVEN = 8 };
     const Fault given[GIVEN] = {{.omega = 1e5f}, {.omega = 5},  {.omega = -77}, {.omega = -5},
                                 {.speed = 9000}, {.speed = 50}, {.speed = 0},   {.speed = 0}};
@@ -166,8 +162,7 @@ static void what_the_policy_is_shown(void **unused) {
 }
 
 /* A robot that tips over, as fast as it can fall, damps at once. */
-static void a_tilt(void **unused) {
-    (void)unused;
+TEST(a_tilt) {
     for (int sign = -1; sign <= 1; sign += 2) {
         Runner *runner = make_runner();
         double pitch = 0.02;
@@ -186,8 +181,7 @@ static void a_tilt(void **unused) {
 }
 
 /* A tenth of the torque: 11.9 N m at the knee, which is 1.5 rad off and moves. */
-static void a_share_of_the_torque(void **unused) {
-    (void)unused;
+TEST(a_share_of_the_torque) {
     RunnerDef def = usual();
     def.torque_share = 0.1;
     Runner *runner = make_runner_of(&def);
@@ -202,11 +196,4 @@ static void a_share_of_the_torque(void **unused) {
     runner_destroy(runner);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_glitch),      cmocka_unit_test(impossible_states),
-        cmocka_unit_test(many_glitches), cmocka_unit_test(what_the_policy_is_shown),
-        cmocka_unit_test(a_tilt),        cmocka_unit_test(a_share_of_the_torque),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

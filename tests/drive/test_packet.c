@@ -8,7 +8,7 @@
 #include "deploy/drive/input.h"
 #include "deploy/drive/packet.h"
 #include "deploy/drive/times.h"
-#include "kit.h"
+#include "files.h"
 
 #define SA01_CRC 0x974b2030u
 #define SA01_TEXT "974b2030"
@@ -58,8 +58,7 @@ static double number(const uint8_t *bytes) {
     return (double)value;
 }
 
-static void the_bytes(void **unused) {
-    (void)unused;
+TEST(the_bytes) {
     uint8_t bytes[PACKET_MAX];
     const StatePacket state = any_state();
     assert_int_equal(packet_write_state(&state, &format, bytes), STATE_SIZE);
@@ -84,8 +83,7 @@ static void the_bytes(void **unused) {
     assert_int_equal(word(bytes + TARGET_SIZE - 4), crc(bytes, TARGET_SIZE - 4));
 }
 
-static void there_and_back(void **unused) {
-    (void)unused;
+TEST(there_and_back) {
     uint8_t bytes[PACKET_MAX];
     StatePacket state = any_state(), read = {0};
     size_t size = packet_write_state(&state, &format, bytes);
@@ -132,8 +130,7 @@ static PacketFault with_numbers(float quaternion, float speed) {
     return packet_read_state(bytes, size, &format, &state);
 }
 
-static void what_is_refused(void **unused) {
-    (void)unused;
+TEST(what_is_refused) {
     uint8_t bytes[PACKET_MAX + 1];
     StatePacket state = any_state();
     TargetPacket target;
@@ -164,8 +161,7 @@ static void what_is_refused(void **unused) {
 }
 
 /* A target asks for no negative stiffness, damping or limit: such a joint would drive itself. */
-static void negative_gains(void **unused) {
-    (void)unused;
+TEST(negative_gains) {
     uint8_t bytes[PACKET_MAX];
     for (int part = 0; part < 4; part++) {
         TargetPacket target = {.mode = PACKET_walk}, read;
@@ -179,8 +175,7 @@ static void negative_gains(void **unused) {
 
 /* A packet of another robot, version or number of joints is refused with what is wrong and what to
  * do. The numbers are zlib.crc32(b"leg_l1_joint\nleg_l2_joint..."), by Python's zlib. */
-static void another_robot(void **unused) {
-    (void)unused;
+TEST(another_robot) {
     char text[160];
     uint8_t bytes[PACKET_MAX];
     MildError error = {0};
@@ -212,8 +207,7 @@ static void another_robot(void **unused) {
 
 /* The seal of a key is BLAKE2b (RFC 7693) of 16 bytes. These are of Python's
  * hashlib.blake2b(b"abc", key=bytes(range(32)), digest_size=16). */
-static void a_key(void **unused) {
-    (void)unused;
+TEST(a_key) {
     static const uint8_t of_abc[SEAL_SIZE] = {0x1a, 0x64, 0xbe, 0x47, 0xe4, 0x72, 0x9d, 0x95,
                                               0x1c, 0x30, 0x2e, 0xe5, 0x43, 0xf9, 0x7c, 0xf3};
     uint8_t bytes[PACKET_MAX];
@@ -254,18 +248,14 @@ static void a_key(void **unused) {
 static MildStatus read_key(const char *path, size_t size, mode_t mode, MildError *error) {
     static const uint8_t zeros[100];
     Key key;
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    assert_int_equal(fwrite(zeros, 1, size, file), size);
-    fclose(file);
+    kit_write(path, zeros, size);
     assert_int_equal(chmod(path, mode), 0);
     const MildStatus status = key_read(path, &key, error);
     assert_true(status != MILD_OK || key.size == size);
     return status;
 }
 
-static void key_files(void **unused) {
-    (void)unused;
+TEST(key_files) {
     char path[] = "/tmp/mild_key_XXXXXX", names[64];
     MildError error = {0};
     uint64_t one, two;
@@ -288,8 +278,7 @@ static void key_files(void **unused) {
     assert_true(one != 0 && one != two);
 }
 
-static void the_histogram(void **unused) {
-    (void)unused;
+TEST(the_histogram) {
     Times times = {0};
     assert_true(times_quantile(&times, 0.5) == 0);
     for (int i = 1; i <= 10000; i++) {
@@ -311,8 +300,7 @@ static int play(Input *input, int file, uint8_t type, uint8_t index, int16_t val
 }
 
 /* A pipe in the place of the device. */
-static void the_gamepad(void **unused) {
-    (void)unused;
+TEST(the_gamepad) {
     const double start[3] = {0.3, 0, 0}, range[3] = {1.2, 0.4, 1.5};
     MildError error = {0};
     Input input;
@@ -357,13 +345,4 @@ static void the_gamepad(void **unused) {
     assert_error(&error, MILD_ERROR_ARGUMENT, "--gamepad /dev/null");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_bytes),       cmocka_unit_test(there_and_back),
-        cmocka_unit_test(what_is_refused), cmocka_unit_test(negative_gains),
-        cmocka_unit_test(another_robot),   cmocka_unit_test(a_key),
-        cmocka_unit_test(key_files),       cmocka_unit_test(the_histogram),
-        cmocka_unit_test(the_gamepad),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

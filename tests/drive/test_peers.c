@@ -5,8 +5,7 @@
 
 /* Nothing is sent before five good states in a row, and until the robot has answered no more
  * packets than it sent, which have no stiffness. */
-static void a_greeting(void **unused) {
-    (void)unused;
+TEST(a_greeting) {
     Runner *runner = make_runner();
     TargetPacket target;
     for (uint32_t k = 0; k < 30; k++) {
@@ -31,8 +30,7 @@ static void a_greeting(void **unused) {
 }
 
 /* A series that is broken begins anew: by an impossible state, a pause, another session. */
-static void a_broken_greeting(void **unused) {
-    (void)unused;
+TEST(a_broken_greeting) {
     for (int how = 0; how < 3; how++) {
         Runner *runner = make_runner();
         TargetPacket target;
@@ -60,8 +58,7 @@ static void a_broken_greeting(void **unused) {
 
 /* A stranger who is first is forgotten when he falls silent, or does not answer. The robot is then
  * heard, and nobody else. */
-static void a_stranger(void **unused) {
-    (void)unused;
+TEST(a_stranger) {
     for (int states = 1; states <= 120; states += 119) {
         Runner *runner = make_runner();
         const RunnerReport *report = runner_report(runner);
@@ -93,8 +90,7 @@ static void a_stranger(void **unused) {
 }
 
 /* --peer: of this port, or of any port of this host. */
-static void the_peer(void **unused) {
-    (void)unused;
+TEST(the_peer) {
     const struct {
         uint64_t peer, sender;
         int heard;
@@ -112,8 +108,7 @@ static void the_peer(void **unused) {
 }
 
 /* States of another session, of the robot's or of the runner's, are refused, also such as greet. */
-static void other_sessions(void **unused) {
-    (void)unused;
+TEST(other_sessions) {
     Runner *runner = make_runner();
     const RunnerReport *report = runner_report(runner);
     StatePacket state = standing(1, 0);
@@ -142,8 +137,7 @@ static void other_sessions(void **unused) {
 }
 
 /* Garbage of any size, and states with a few bits changed: refused, and nothing changes. */
-static void garbage(void **unused) {
-    (void)unused;
+TEST(garbage) {
     Runner *runner = make_runner();
     const RunnerReport *report = runner_report(runner);
     uint8_t bytes[PACKET_MAX];
@@ -178,11 +172,4 @@ static void garbage(void **unused) {
     runner_destroy(runner);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_greeting),     cmocka_unit_test(a_broken_greeting),
-        cmocka_unit_test(a_stranger),     cmocka_unit_test(the_peer),
-        cmocka_unit_test(other_sessions), cmocka_unit_test(garbage),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -58,8 +58,7 @@ static StatePacket state_of(const World *w, uint32_t sequence, double time) {
 
 /* Two seconds of a walk that turns and then stands: every target is what the task's motor would
  * get, but for the torque limit. */
-static void the_same_as_the_task(void **unused) {
-    (void)unused;
+TEST(the_same_as_the_task) {
     const TaskView none = {0};
     World w = make_world();
     Runner *runner = make_runner();
@@ -108,8 +107,7 @@ static void the_same_as_the_task(void **unused) {
 /* ---- packets on bad ways ---- */
 
 /* Nothing before the first state; then a state for every tick but some. */
-static void lost_states(void **unused) {
-    (void)unused;
+TEST(lost_states) {
     uint8_t bytes[PACKET_MAX];
     Runner *runner = make_runner();
     const RunnerReport *report = runner_report(runner);
@@ -136,8 +134,7 @@ static void lost_states(void **unused) {
 }
 
 /* States of 400 Hz: the newest counts. An old one that comes behind it does not. */
-static void old_states(void **unused) {
-    (void)unused;
+TEST(old_states) {
     Runner *runner = make_runner();
     const RunnerReport *report = runner_report(runner);
     StatePacket state = standing(10, 0);
@@ -167,8 +164,7 @@ static void old_states(void **unused) {
 }
 
 /* Ways of 3 ms; then some of 35 ms, in order; then all of them. */
-static void late_states(void **unused) {
-    (void)unused;
+TEST(late_states) {
     Runner *runner = make_runner();
     const RunnerReport *report = runner_report(runner);
     double now = 0;
@@ -196,8 +192,7 @@ static void late_states(void **unused) {
 }
 
 /* A clock that runs slow by 0.05 % is 30 ms behind after a minute: nothing is late. */
-static void a_slow_clock(void **unused) {
-    (void)unused;
+TEST(a_slow_clock) {
     Runner *runner = make_runner();
     for (uint32_t k = 0; k < 6000; k++) {
         const StatePacket state = standing(k + 1, 0.01 * k * (1 - 5e-4));
@@ -209,8 +204,7 @@ static void a_slow_clock(void **unused) {
 }
 
 /* Holds for 0.1 s, then damps, also when the robot comes back. */
-static void a_dead_robot(void **unused) {
-    (void)unused;
+TEST(a_dead_robot) {
     Runner *runner = make_runner();
     const RunnerReport *report = runner_report(runner);
     for (uint32_t k = 0; k < 10; k++) {
@@ -233,8 +227,7 @@ static void a_dead_robot(void **unused) {
 }
 
 /* The runner itself stood still, though the robot's states are young. */
-static void a_stall(void **unused) {
-    (void)unused;
+TEST(a_stall) {
     for (int late = 0; late < 2; late++) {
         Runner *runner = make_runner();
         StatePacket state = standing(1, 0);
@@ -252,8 +245,7 @@ static void a_stall(void **unused) {
 }
 
 /* Commands end at the task's ranges, and what is no number is 0: by the action that comes out. */
-static void commands(void **unused) {
-    (void)unused;
+TEST(commands) {
     enum { GIVEN = 10 };
     const double given[GIVEN][3] = {{9, 0, 0},      {1.2, 0, 0},   {0.5, 0, NAN}, {0.5, 0, 0},
                                     {-9, 0, 0},     {-0.6, 0, 0},  {0.5, 0.9, 0}, {0.5, 0.3, 0},
@@ -276,8 +268,7 @@ static void commands(void **unused) {
 }
 
 /* A robot ends the run once it walks, by a packet that is new and in time. Others are counted. */
-static void the_end(void **unused) {
-    (void)unused;
+TEST(the_end) {
     uint8_t bytes[PACKET_MAX];
     const PacketFormat format = {JOINTS, packet_robot(robot), NULL};
     Runner *runner = make_runner();
@@ -318,17 +309,4 @@ static void the_end(void **unused) {
     assert_error(&error, MILD_ERROR_IO, "no_such.safetensors");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_same_as_the_task),
-        cmocka_unit_test(lost_states),
-        cmocka_unit_test(old_states),
-        cmocka_unit_test(late_states),
-        cmocka_unit_test(a_slow_clock),
-        cmocka_unit_test(a_dead_robot),
-        cmocka_unit_test(a_stall),
-        cmocka_unit_test(commands),
-        cmocka_unit_test(the_end),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

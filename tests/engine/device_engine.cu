@@ -1,4 +1,4 @@
-/* The batch engine on a GPU: one step of random states against the text in double and in float on
+/* The batch engine on a GPU: one step of random states against the code in double and in float on
  * the processor, on level ground and on a map, then its speed. Usage: engine_device_engine
  * FOLDER_OF_ROBOT [STATES]; with STATES it compares so many and times nothing, as compute-sanitizer
  * wants it.

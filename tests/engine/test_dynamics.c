@@ -6,8 +6,8 @@
  * sqrt(M_ii f^T M^-1 f) and twists with sqrt(A_rr v^T M v); entries of M and A relate to the
  * diagonal, M_ij to sqrt(M_ii M_jj). So a light ankle is not hidden behind a heavy trunk. */
 #include "cases.h"
-#include "kit.h"
 #include "oracle.h"
+#include "robots.h"
 
 #include "control/stand.h"
 #include "ground/grid.h"
@@ -316,8 +316,7 @@ static void run_case(const Kit *kit, const EngineCase *in, Worst at_double, doub
     *newton = result.newton > *newton ? result.newton : *newton;
 }
 
-static void test_random_states(void **unused) {
-    (void)unused;
+TEST(test_random_states) {
     static const int all[KITS] = {10000, 10000, 3000, 10000, 600};
     for (int k = 0; k < KITS; k++) {
         const int cases = some(all[k]);
@@ -341,8 +340,7 @@ static void test_random_states(void **unused) {
 
 /* ---- rigid ground ---- */
 
-static void test_rigid_ground(void **unused) {
-    (void)unused;
+TEST(test_rigid_ground) {
     static const int all[KITS] = {10000, 10000, 3000, 10000, 600};
     for (int k = 0; k < KITS; k++) {
         const int cases = some(all[k]);
@@ -361,8 +359,7 @@ static void test_rigid_ground(void **unused) {
 }
 
 /* A time constant below two steps is two steps. Rows so stiff are rough in float. */
-static void test_shortest_time(void **unused) {
-    (void)unused;
+TEST(test_shortest_time) {
     Worst at_double = {0};
     int touching = 0, newton = 0;
     for (uint32_t draw = 0; draw < 100; draw++) {
@@ -466,8 +463,7 @@ static void run_relief(const Relief *relief, int k, const MildMap *map) {
 }
 
 /* Rigid ground of a map, and what is measured above it, as RobotSim has them. */
-static void test_maps(void **unused) {
-    (void)unused;
+TEST(test_maps) {
     for (int r = 0; r < RELIEFS; r++) {
         MildMap *map = relief_map(&reliefs[r]);
         for (int k = 0; k < KITS; k++) {
@@ -478,8 +474,7 @@ static void test_maps(void **unused) {
 }
 
 /* No lane of a block needs what another one does there: on a GPU they run at once. */
-static void test_order_of_lanes(void **unused) {
-    (void)unused;
+TEST(test_order_of_lanes) {
     static EngineResult reverse;
     for (int k = 0; k < KITS; k++) {
         for (uint32_t draw = 0; draw < 200; draw++) {
@@ -523,13 +518,6 @@ typedef struct {
     MildScratch *scratch;
     double drift[3]; /* [m, -, rad] worst: base, its quaternion, joints */
 } Follower;
-
-static MildGround *new_ground(const Kit *kit) {
-    const MildSole *const *soles = robot_soles(kit->robot);
-    void *block = calloc(1, mild_ground_bytes(soles, kit->tree.feet));
-    assert_non_null(block);
-    return mild_ground_init(block, soles, kit->tree.feet);
-}
 
 /* What passes between engine and ground: poses, twists, A and V_free one way, wrenches the
  * other. */
@@ -579,10 +567,8 @@ static void follow(const Kit *kit, Follower *follower, const RobotSim *sim,
 static double march(March kind, const EngineCase *start, Follower followers[2]) {
     const Kit *kit = &kits[SA01_KIT];
     RobotSim *sim = kit->sim;
-    MildGround *ground = new_ground(kit);
-    MildMaterial sand;
-    assert_true(mild_material_preset("sand_loose", &sand));
-    MildTerrain terrain = mild_terrain_uniform(&sand);
+    MildGround *ground = kit_ground(kit->robot);
+    MildTerrain terrain = kit_terrain("sand_loose");
     terrain.map = start->map;
     RobotState state = {.qpos = {0}};
     double load = 0;
@@ -592,7 +578,7 @@ static double march(March kind, const EngineCase *start, Follower followers[2]) 
     for (int f = 0; f < 2; f++) {
         MildError error = {0};
         followers[f].state = *start;
-        followers[f].ground = kind == SOFT || kind == SOFT_WAVES ? new_ground(kit) : NULL;
+        followers[f].ground = kind == SOFT || kind == SOFT_WAVES ? kit_ground(kit->robot) : NULL;
         followers[f].scratch = mild_scratch_create(robot_soles(kit->robot), 2, &error);
     }
     const int steps = kit_short() ? SECOND / 4 : SECOND;
@@ -613,8 +599,7 @@ static double march(March kind, const EngineCase *start, Follower followers[2]) 
     return load;
 }
 
-static void test_march(void **unused) {
-    (void)unused;
+TEST(test_march) {
     const Robot *robot = kits[SA01_KIT].robot;
     EngineCase start = {.qpos = {0, 0, robot->stand_height + 0.002, 1}};
     memcpy(start.qpos + 7, robot->def.pose, sizeof robot->def.pose);
@@ -645,8 +630,7 @@ static void test_march(void **unused) {
 
 /* ---- the model ---- */
 
-static void test_sizes(void **unused) {
-    (void)unused;
+TEST(test_sizes) {
     char text[200];
     engine_model_sizes(&kits[SA01_KIT].tree, text, sizeof text);
     print_message("sa01: %s\n", text);
@@ -659,8 +643,7 @@ static void test_sizes(void **unused) {
 }
 
 /* What the engine does not compute is refused by name. */
-static void test_refusals(void **unused) {
-    (void)unused;
+TEST(test_refusals) {
     Kit *kit = &kits[GO1_KIT];
     mjModel *m = kit->robot->model;
     EngineTree tree;
@@ -681,8 +664,7 @@ static void test_refusals(void **unused) {
 }
 
 /* A velocity that is not a number, or beyond any robot's, is said. */
-static void test_bad_numbers(void **unused) {
-    (void)unused;
+TEST(test_bad_numbers) {
     const Kit *kit = &kits[SA01_KIT];
     EngineCase in = random_case(kit->robot, 1);
     static const double torques[] = {NAN, 1e9, 1};
@@ -696,13 +678,4 @@ static void test_bad_numbers(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random_states),  cmocka_unit_test(test_rigid_ground),
-        cmocka_unit_test(test_shortest_time),  cmocka_unit_test(test_maps),
-        cmocka_unit_test(test_order_of_lanes), cmocka_unit_test(test_march),
-        cmocka_unit_test(test_sizes),          cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_bad_numbers),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

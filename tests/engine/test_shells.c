@@ -4,11 +4,11 @@
 #include <stdio.h>
 
 #include "base/random.h"
-#include "kit.h"
 #include "robot/engine/read.h"
 #include "robot/engine/shells.h"
 #include "robot/engine/step.h"
 #include "robot/sim.h"
+#include "robots.h"
 
 enum { ROBOTS = 3, FALLS = 12, FALL_STEPS = 300, ROWS_MOST = 6 * (ROBOT_FEET_MAX + 8) };
 static const char *const names[ROBOTS] = {"sa01", "go1", "g1"};
@@ -139,9 +139,7 @@ static void fall(const Robot *robot, const EngineModel *model, RobotSim *sim, Mi
                  uint32_t number, Worst *worst) {
     static Engine engine;
     Random random = random_at(5, number, 0);
-    MildMaterial material;
-    assert_true(mild_material_preset(number % 2 ? "foam45" : "sand_loose", &material));
-    const MildTerrain terrain = mild_terrain_uniform(&material);
+    const MildTerrain terrain = kit_terrain(number % 2 ? "foam45" : "sand_loose");
     const RobotVariation nominal = robot_variation_nominal();
     RobotState state = random_state(robot, &random);
     mild_ground_reset(ground);
@@ -168,29 +166,21 @@ static EngineModel *read_model(const Robot *robot) {
     MildError error = {0};
     EngineModel *model = calloc(1, sizeof *model);
     assert_non_null(model);
-    if (engine_model_read(robot, dt, &model->tree, (double *)(void *)&model->number, &error) !=
-        MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(engine_model_read(robot, dt, &model->tree, (double *)(void *)&model->number,
+                                  &error) == MILD_OK,
+                &error);
     return model;
 }
 
-static void bodies_are_those_of_mujoco(void **unused) {
-    (void)unused;
+TEST(bodies_are_those_of_mujoco) {
     for (int r = 0; r < ROBOTS; r++) {
-        MildError error = {0};
-        Robot *robot = robot_open(names[r], &error);
-        if (!robot) {
-            fail_msg("%s", error.text);
-        }
+        Robot *robot = kit_robot_named(names[r]);
         robot_set_shells(robot, 1);
         EngineModel *model = read_model(robot);
         assert_int_equal(model->tree.bodies, robot_bodies(robot) - robot_feet(robot));
         RobotSim *sim = robot_sim_create(robot, dt, NULL);
         sim->model->opt.tolerance = 1e-15;
-        const MildSole *const *soles = robot_soles(robot);
-        void *block = calloc(1, mild_ground_bytes(soles, robot_bodies(robot)));
-        MildGround *ground = mild_ground_init(block, soles, robot_bodies(robot));
+        MildGround *ground = kit_ground(robot);
         Worst worst = {0};
         for (uint32_t n = 0; n < FALLS; n++) {
             fall(robot, model, sim, ground, n, &worst);
@@ -202,7 +192,7 @@ static void bodies_are_those_of_mujoco(void **unused) {
         assert_true(worst.steps > 500 && worst.bodies > worst.steps);
         assert_true(worst.pose < 1e-12 && worst.twist < 1e-10 && worst.inertia < 1e-10);
         assert_true(worst.rate < 1e-10);
-        free(block);
+        free(ground);
         robot_sim_destroy(sim);
         free(model);
         robot_destroy(robot);
@@ -210,8 +200,7 @@ static void bodies_are_those_of_mujoco(void **unused) {
 }
 
 /* Without them the engine knows of none. */
-static void shells_that_do_not_stand_have_no_bodies(void **unused) {
-    (void)unused;
+TEST(shells_that_do_not_stand_have_no_bodies) {
     Robot *robot = robot_open("sa01", NULL);
     assert_non_null(robot);
     EngineModel *model = read_model(robot);
@@ -220,10 +209,4 @@ static void shells_that_do_not_stand_have_no_bodies(void **unused) {
     robot_destroy(robot);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bodies_are_those_of_mujoco),
-        cmocka_unit_test(shells_that_do_not_stand_have_no_bodies),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -8,7 +8,7 @@
 #include "env/task/task.h"
 #include "episode.h"
 #include "ground/batch/batch.h"
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
@@ -63,8 +63,7 @@ static void pair_open(const char *robot, const TaskDef *def, int device) {
     memset(&pair, 0, sizeof pair);
     pair.device = device;
     pair.def = *def;
-    pair.robot = robot_create(robot, &error);
-    assert_non_null(pair.robot);
+    pair.robot = kit_robot(robot);
     pair.shape = task_shape(pair.robot);
     robot_set_model(pair.robot, (MildModel)def->randomize.model);
     robot_set_shells(pair.robot, def->shells_stand);
@@ -82,9 +81,7 @@ static void pair_open(const char *robot, const TaskDef *def, int device) {
     of.grounds = GROUNDS;
     pair.batch = envs_create(&of, &error);
     pair.on_side = pair.batch ? device_alloc(device, sizeof(Rows), &error) : NULL;
-    if (!pair.on_side) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(pair.on_side != NULL, &error);
 }
 
 static void pair_close(void) {
@@ -112,9 +109,7 @@ static void pair_reset(void) {
     MildError error = {0};
     const EnvsView a = view_of(&pair.a), b = view_of(pair.on_side);
     envs_reset(pair.mujoco, &a, NULL, &error);
-    if (envs_reset(pair.batch, &b, NULL, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(envs_reset(pair.batch, &b, NULL, &error) == MILD_OK, &error);
     fetch();
 }
 
@@ -135,9 +130,7 @@ static void pair_step(void) {
     envs_step(pair.mujoco, &a, NULL, &error);
     assert_int_equal(
         device_copy(pair.device, s->action, pair.a.action, sizeof pair.a.action, &error), MILD_OK);
-    if (envs_step(pair.batch, &b, NULL, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(envs_step(pair.batch, &b, NULL, &error) == MILD_OK, &error);
     fetch();
 }
 

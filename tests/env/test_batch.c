@@ -1,5 +1,5 @@
 /* The environments of a device against those of the CPU, which MuJoCo steps: the same episodes, the
- * same observations and rewards. By the same text on the CPU; with MILD_CUDA on the device too. */
+ * same observations and rewards. By the same code on the CPU; with MILD_CUDA on the device too. */
 #include "follow.h"
 
 #include "device/device.h"
@@ -10,13 +10,11 @@ static int has_device(int device) {
     return device_open(device, &error) == MILD_OK;
 }
 
-static void follows_mujoco(void **unused) {
-    (void)unused;
+TEST(follows_mujoco) {
     follow(SA01, some_def(), MILD_BATCH_HOST, NULL, 0.85);
 }
 
-static void follows_mujoco_on_a_map(void **unused) {
-    (void)unused;
+TEST(follows_mujoco_on_a_map) {
     const MildMapDef map = some_map();
     follow(SA01, some_def(), MILD_BATCH_HOST, &map, 0.85);
 }
@@ -41,8 +39,7 @@ static TaskDef printed_def(void) {
     return def;
 }
 
-static void follows_mujoco_as_printed(void **unused) {
-    (void)unused;
+TEST(follows_mujoco_as_printed) {
     follow(SA01, printed_def(), MILD_BATCH_HOST, NULL, 0.65);
 }
 
@@ -52,8 +49,7 @@ static TaskDef model_def(MildModel model) {
     return def;
 }
 
-static void follows_mujoco_on_other_models(void **unused) {
-    (void)unused;
+TEST(follows_mujoco_on_other_models) {
     const MildMapDef map = some_map();
     follow(SA01, model_def(MILD_MODEL_ECC_QUASI), MILD_BATCH_HOST, NULL, 0.85);
     follow(SA01, model_def(MILD_MODEL_ECC_QUASI_3D), MILD_BATCH_HOST, NULL, 0.6);
@@ -62,14 +58,12 @@ static void follows_mujoco_on_other_models(void **unused) {
 }
 
 /* Four round feet; on a map in test_go1.c. */
-static void go1_follows_mujoco(void **unused) {
-    (void)unused;
+TEST(go1_follows_mujoco) {
     follow(GO1, some_def(), MILD_BATCH_HOST, NULL, 0.85);
 }
 
 /* A robot that is thrown diverges, and alone begins a new episode. */
-static void one_diverges(void **unused) {
-    (void)unused;
+TEST(one_diverges) {
     const TaskDef def = some_def();
     pair_open(SA01, &def, MILD_BATCH_HOST);
     pair_reset();
@@ -84,8 +78,7 @@ static void one_diverges(void **unused) {
     pair_close();
 }
 
-static void device_follows_mujoco(void **unused) {
-    (void)unused;
+TEST(device_follows_mujoco) {
     if (!has_device(0)) {
         skip();
     }
@@ -101,8 +94,7 @@ static void device_follows_mujoco(void **unused) {
 }
 
 /* Whatever device is the caller's current one. */
-static void second_device_follows_mujoco(void **unused) {
-    (void)unused;
+TEST(second_device_follows_mujoco) {
     if (!has_device(1)) {
         skip();
     }
@@ -118,8 +110,7 @@ static void check_sample(const EnvsSample *sample, const MildTerrain *terrain) {
 
 /* Trials have what was chosen for them in every episode, and no more: ground, the map's origin,
  * random numbers by their stream, a command that stays, a start along x. */
-static void trials_are_chosen(void **unused) {
-    (void)unused;
+TEST(trials_are_chosen) {
     MildError error = {0};
     enum { TRIALS = 6 };
     MildMapDef waves = mild_map_def_default();
@@ -139,9 +130,7 @@ static void trials_are_chosen(void **unused) {
                            .timeout = flags[1],
                            .valid = flags[2],
                            .next = view};
-    if (!map) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(map != NULL, &error);
     def.map = map;
     const MildMaterial any = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&any);
@@ -170,9 +159,7 @@ static void trials_are_chosen(void **unused) {
                         .terrain = ground,
                         .terrains = 3};
     Envs *envs = envs_create(&of, &error);
-    if (!envs) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(envs != NULL, &error);
     assert_int_equal(envs_physics_steps(envs), 2);
     envs_set_samples(envs, sample[0]);
     assert_int_equal(envs_set_commands(envs, command[0], &error), MILD_OK);
@@ -210,17 +197,4 @@ static void trials_are_chosen(void **unused) {
     mild_map_destroy(map);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(follows_mujoco),
-        cmocka_unit_test(follows_mujoco_on_a_map),
-        cmocka_unit_test(follows_mujoco_on_other_models),
-        cmocka_unit_test(follows_mujoco_as_printed),
-        cmocka_unit_test(trials_are_chosen),
-        cmocka_unit_test(one_diverges),
-        cmocka_unit_test(go1_follows_mujoco),
-        cmocka_unit_test(device_follows_mujoco),
-        cmocka_unit_test(second_device_follows_mujoco),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -5,7 +5,7 @@
 #include "env/task/lanes.h"
 
 /* Numbers and their bits by the tables of IEEE 754-2008 binary16; ties go to even. */
-static void known_numbers(void **unused) {
+TEST(known_numbers) {
     static const struct {
         float number;
         uint16_t bits;
@@ -14,14 +14,12 @@ static void known_numbers(void **unused) {
                  {-1e6f, 0xfbff},      {0x1p-14f, 0x0400},   {0x1p-24f, 0x0001},
                  {-0x1p-15f, 0x8200},  {0x1.002p0f, 0x3c00}, {0x1.006p0f, 0x3c02},
                  {0x1.ffep0f, 0x4000}, {1e-9f, 0x0000}};
-    (void)unused;
     for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
         assert_int_equal(frame_pack(known[i].number), known[i].bits);
     }
 }
 
-static void rounding(void **unused) {
-    (void)unused;
+TEST(rounding) {
     for (float x = 1e-4f; x < 6e4f; x *= 1.0007f) {
         for (int sign = -1; sign <= 1; sign += 2) {
             const float y = (float)sign * x;
@@ -33,7 +31,4 @@ static void rounding(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(known_numbers), cmocka_unit_test(rounding)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -1,6 +1,6 @@
 /* Which kernels of a build a robot takes: the first that fit, and envs_are_slow says when those are
  * for any robot. The table of the build is not linked here, this one stands in its place. */
-#include "kit.h"
+#include "robots.h"
 
 #define MILD_REAL_FLOAT
 #include "env/backend.h"
@@ -32,17 +32,12 @@ static const EnvsKernels any = {.fixed = 0, .fits = fits_any};
 const EnvsKernels *const envs_kernels[] = {&none, &go1, &any, NULL};
 
 static void is_slow(const char *folder, int wanted) {
-    MildError error = {0};
-    Robot *robot = robot_create(folder, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    Robot *robot = kit_robot(folder);
     assert_int_equal(envs_are_slow(robot), wanted);
     robot_destroy(robot);
 }
 
-static void robots_of_another_size_are_slow(void **unused) {
-    (void)unused;
+TEST(robots_of_another_size_are_slow) {
     any_fits = 1;
     is_slow(MILD_SOURCE_DIR "/robots/go1", 0);
     is_slow(MILD_SOURCE_DIR "/robots/sa01", 1);
@@ -50,9 +45,4 @@ static void robots_of_another_size_are_slow(void **unused) {
     is_slow(MILD_SOURCE_DIR "/robots/sa01", 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(robots_of_another_size_are_slow),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

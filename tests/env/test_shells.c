@@ -111,8 +111,7 @@ static void check(Falls falls, double least) {
     assert_true(falls.together > least * falls.steps);
 }
 
-static void falls_are_those_of_mujoco(void **unused) {
-    (void)unused;
+TEST(falls_are_those_of_mujoco) {
     const MildMapDef map = some_map();
     const Falls level = fall(SA01, shells_def(), MILD_BATCH_HOST, NULL, 2);
     check(level, 0.5);
@@ -135,8 +134,7 @@ static TaskDef drop_def(TaskStart start) {
 }
 
 /* From the first pose on: same_episode compares it. No tilt and no base ends one on soft ground. */
-static void drops_are_those_of_mujoco(void **unused) {
-    (void)unused;
+TEST(drops_are_those_of_mujoco) {
     const MildMapDef map = some_map();
     TaskDef def = drop_def(TASK_START_ANY);
     for (int on_map = 0; on_map < 2; on_map++) {
@@ -213,8 +211,7 @@ static MildMapDef steep_map(void) {
 }
 
 /* In the air they change no bit. */
-static void far_shells_change_no_bit(void **unused) {
-    (void)unused;
+TEST(far_shells_change_no_bit) {
     const MildMapDef map = steep_map();
     int far, same;
     stand_twice(MILD_BATCH_HOST, NULL, &far, &same);
@@ -225,14 +222,12 @@ static void far_shells_change_no_bit(void **unused) {
 }
 
 /* Robots that stagger, whose shells may come near. */
-static void standing_robots_follow_mujoco(void **unused) {
-    (void)unused;
+TEST(standing_robots_follow_mujoco) {
     follow(SA01, shells_def(), MILD_BATCH_HOST, NULL, 0.85);
 }
 
 /* A model of one element has none for shells. */
-static void models_of_one_element_have_no_shells(void **unused) {
-    (void)unused;
+TEST(models_of_one_element_have_no_shells) {
     TaskDef def = shells_def();
     def.randomize.model = MILD_MODEL_CON_CONE;
     pair_open(SA01, &def, MILD_BATCH_HOST);
@@ -240,8 +235,7 @@ static void models_of_one_element_have_no_shells(void **unused) {
     pair_close();
 }
 
-static void device_falls_are_those_of_mujoco(void **unused) {
-    (void)unused;
+TEST(device_falls_are_those_of_mujoco) {
     if (!has_device()) {
         skip();
     }
@@ -258,14 +252,4 @@ static void device_falls_are_those_of_mujoco(void **unused) {
     assert_true(far > ENVS * some_steps() / 2);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(falls_are_those_of_mujoco),
-        cmocka_unit_test(drops_are_those_of_mujoco),
-        cmocka_unit_test(far_shells_change_no_bit),
-        cmocka_unit_test(standing_robots_follow_mujoco),
-        cmocka_unit_test(models_of_one_element_have_no_shells),
-        cmocka_unit_test(device_falls_are_those_of_mujoco),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

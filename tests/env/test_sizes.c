@@ -25,9 +25,7 @@ static size_t measure(const MildMapDef *on) {
                         .grounds = GROUNDS,
                         .seed = 7};
     Envs *envs = envs_create(&of, &error);
-    if (!envs) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(envs != NULL, &error);
     const EnvsMemory memory = envs_memory(envs);
     const size_t bytes = envs_robot_bytes(envs);
     printf("%s: %zu B: task %zu, engine %zu, ground %zu, rest %zu\n", on ? "map" : "level", bytes,
@@ -40,8 +38,7 @@ static size_t measure(const MildMapDef *on) {
 }
 
 /* With a share of 16 B of what all these robots have in common. */
-static void sizes(void **unused) {
-    (void)unused;
+TEST(sizes) {
     MildMapDef waves = mild_map_def_default();
     waves.kind = MILD_MAP_WAVES;
     const size_t level = measure(NULL), map = measure(&waves);
@@ -49,9 +46,4 @@ static void sizes(void **unused) {
     assert_int_equal(map - level, (4 * 160 + 32) * sizeof(float)); /* the ground's */
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sizes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -66,8 +66,7 @@ static void step(Envs *envs) {
 }
 
 /* The last sample is the robot's state, and the frame in the history shows the command. */
-static void mujoco_does_what_was_chosen(void **state) {
-    (void)state;
+TEST(mujoco_does_what_was_chosen) {
     Envs *envs = start(0, (EnvsDrive){0});
     const double stiffness[GROUNDS] = {terrain[0].materials[0].k_pen,
                                        terrain[1].materials[0].k_pen};
@@ -98,8 +97,7 @@ static void mujoco_does_what_was_chosen(void **state) {
 
 /* The paper's gains do not balance: a policy of zeros falls. A robot that fell is reported once and
  * left as it is, the others go on. */
-static void mujoco_leaves_the_fallen(void **state) {
-    (void)state;
+TEST(mujoco_leaves_the_fallen) {
     Envs *envs = start(0, (EnvsDrive){0});
     double fallen[TRIALS][7];
     int ended[TRIALS] = {0}, steps = 0;
@@ -130,8 +128,7 @@ static void mujoco_leaves_the_fallen(void **state) {
 
 /* Both begin alike, and move alike until rounding shows: the batch engine's samples are floats, and
  * it draws other latencies. */
-static void samples_of_both_are_alike(void **state) {
-    (void)state;
+TEST(samples_of_both_are_alike) {
     static EnvsSample mujoco[TRIALS][PHYSICS_STEPS];
     double worst = 0, load = 0;
     Envs *envs = start(0, (EnvsDrive){0});
@@ -179,8 +176,7 @@ static void push_joint(void *self, int i, const TaskEnv *env, RobotSim *sim, dou
     torque[2] = 3 + i;
 }
 
-static void mujoco_is_driven(void **state) {
-    (void)state;
+TEST(mujoco_is_driven) {
     Envs *envs = start(0, (EnvsDrive){push_joint, &def});
     step(envs);
     for (int i = 0; i < TRIALS; i++) {
@@ -192,8 +188,7 @@ static void mujoco_is_driven(void **state) {
 }
 
 /* The batch engine has one ground for a trial. */
-static void courses_are_refused(void **state) {
-    (void)state;
+TEST(courses_are_refused) {
     MildError error = {0};
     MildTerrain course = terrain[0];
     course.materials[course.material_count++] = terrain[1].materials[0];
@@ -232,11 +227,4 @@ static int teardown(void **state) {
     return 0;
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mujoco_does_what_was_chosen), cmocka_unit_test(mujoco_leaves_the_fallen),
-        cmocka_unit_test(samples_of_both_are_alike),   cmocka_unit_test(mujoco_is_driven),
-        cmocka_unit_test(courses_are_refused),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

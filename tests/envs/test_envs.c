@@ -25,6 +25,16 @@ static EnvsView view_of(Rows *rows) {
     return (EnvsView){rows->history[0], rows->critic[0], rows->estimate[0], rows->frame[0]};
 }
 
+/* A step into the rows. */
+static EnvsStep step_of(const float *action, Rows *rows) {
+    return (EnvsStep){.action = action,
+                      .reward = rows->reward,
+                      .done = rows->done,
+                      .timeout = rows->timeout,
+                      .valid = rows->valid,
+                      .next = view_of(rows)};
+}
+
 /* The same environments without the interface. */
 typedef struct {
     ExperimentDef def;
@@ -63,14 +73,11 @@ static void draw_actions(int step, float action[ENVS][SA01_JOINTS]) {
 static MildEnvs *open_envs(const char *const *overrides, int count) {
     MildError error = {0};
     MildEnvs *envs = mild_envs_open(NULL, overrides, count, &error);
-    if (!envs) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(envs != NULL, &error);
     return envs;
 }
 
-static void numbers_of_the_environments(void **state) {
-    (void)state;
+TEST(numbers_of_the_environments) {
     static Plain plain;
     static Rows a, b;
     MildEnvs *envs = open_envs(keys, KEYS);
@@ -81,7 +88,7 @@ static void numbers_of_the_environments(void **state) {
     assert_true(shape.critic == SA01_CRITIC && shape.estimates == SA01_ESTIMATES);
     assert_true(shape.period == 0.01 && shape.rewards == TASK_REWARD_COUNT);
     const EnvsView view = view_of(&a);
-    const EnvsView plain_view = {b.history[0], b.critic[0], b.estimate[0], b.frame[0]};
+    const EnvsView plain_view = view_of(&b);
     assert_int_equal(mild_envs_reset(envs, &view, NULL, NULL), MILD_OK);
     envs_reset(plain.envs, &plain_view, NULL, NULL);
     double paid = 0;
@@ -89,19 +96,9 @@ static void numbers_of_the_environments(void **state) {
     for (int t = 0; t < STEPS; t++) {
         float action[ENVS][SA01_JOINTS];
         draw_actions(t, action);
-        const EnvsStep step = {.action = action[0],
-                               .reward = a.reward,
-                               .done = a.done,
-                               .timeout = a.timeout,
-                               .valid = a.valid,
-                               .next = view};
+        const EnvsStep step = step_of(action[0], &a);
         assert_int_equal(mild_envs_step(envs, &step, NULL, NULL), MILD_OK);
-        const EnvsStep plain_step = {.action = action[0],
-                                     .reward = b.reward,
-                                     .done = b.done,
-                                     .timeout = b.timeout,
-                                     .valid = b.valid,
-                                     .next = plain_view};
+        const EnvsStep plain_step = step_of(action[0], &b);
         envs_step(plain.envs, &plain_step, NULL, NULL);
         assert_memory_equal(&a, &b, sizeof a);
         for (int e = 0; e < ENVS; e++) {
@@ -126,8 +123,7 @@ static void numbers_of_the_environments(void **state) {
 }
 
 /* The batch engine on the CPU sees what MuJoCo sees, within the rounding of float. */
-static void batch_engine(void **state) {
-    (void)state;
+TEST(batch_engine) {
     static Rows a, b;
     const char *batch[KEYS];
     memcpy(batch, keys, sizeof batch);
@@ -166,13 +162,12 @@ static int play_alone(Plain *plain, int e, float history[SA01_HISTORY], TaskStep
 }
 
 /* The end of an episode is told without changing what follows. */
-static void ends(void **state) {
-    (void)state;
+TEST(ends) {
     static Plain plain;
     static Rows a, b, last;
     static float terms[ENVS][TASK_REWARD_COUNT];
     MildEnvs *told = open_envs(keys, KEYS), *untold = open_envs(keys, KEYS);
-    const EnvsView first = view_of(&a), second = view_of(&b), end = view_of(&last);
+    const EnvsView first = view_of(&a), second = view_of(&b);
     assert_int_equal(mild_envs_reset(told, &first, NULL, NULL), MILD_OK);
     assert_int_equal(mild_envs_reset(untold, &second, NULL, NULL), MILD_OK);
     open_plain(&plain);
@@ -180,22 +175,10 @@ static void ends(void **state) {
     for (int t = 0; t < 24 * STEPS && compared < ENVS; t++) {
         float action[ENVS][SA01_JOINTS];
         draw_actions(t, action);
-        const EnvsStep step = {.action = action[0],
-                               .reward = a.reward,
-                               .done = a.done,
-                               .timeout = a.timeout,
-                               .valid = a.valid,
-                               .next = first,
-                               .last = end,
-                               .terms = terms[0]};
-        EnvsStep plainly = step;
-        plainly.reward = b.reward;
-        plainly.done = b.done;
-        plainly.timeout = b.timeout;
-        plainly.valid = b.valid;
-        plainly.next = second;
-        plainly.last = (EnvsView){0};
-        plainly.terms = NULL;
+        EnvsStep step = step_of(action[0], &a);
+        const EnvsStep plainly = step_of(action[0], &b);
+        step.last = view_of(&last);
+        step.terms = terms[0];
         memset(&last, 0xff, sizeof last);
         assert_int_equal(mild_envs_step(told, &step, NULL, NULL), MILD_OK);
         assert_int_equal(mild_envs_step(untold, &plainly, NULL, NULL), MILD_OK);
@@ -223,21 +206,15 @@ static void ends(void **state) {
 }
 
 /* The batch engine does not tell it, and says so. */
-static void no_ends(void **state) {
-    (void)state;
+TEST(no_ends) {
     static Rows rows, last;
     const char *batch[KEYS];
     memcpy(batch, keys, sizeof batch);
     batch[KEYS - 1] = "train.robots=batch";
     MildEnvs *envs = open_envs(batch, KEYS);
     float action[ENVS][SA01_JOINTS] = {{0}};
-    const EnvsStep step = {.action = action[0],
-                           .reward = rows.reward,
-                           .done = rows.done,
-                           .timeout = rows.timeout,
-                           .valid = rows.valid,
-                           .next = view_of(&rows),
-                           .last = view_of(&last)};
+    EnvsStep step = step_of(action[0], &rows);
+    step.last = view_of(&last);
     MildError error = {0};
     assert_int_equal(mild_envs_reset(envs, &step.next, NULL, NULL), MILD_OK);
     assert_int_equal(mild_envs_step(envs, &step, NULL, &error), MILD_ERROR_ARGUMENT);
@@ -245,8 +222,7 @@ static void no_ends(void **state) {
     mild_envs_close(envs);
 }
 
-static void mirror(void **state) {
-    (void)state;
+TEST(mirror) {
     MildEnvs *envs = open_envs(keys, KEYS);
     MildError error = {0};
     Robot *robot = robot_create(SA01, &error);
@@ -262,8 +238,7 @@ static void mirror(void **state) {
     mild_envs_close(envs);
 }
 
-static void one_clear_line(void **state) {
-    (void)state;
+TEST(one_clear_line) {
     static const struct {
         const char *config, *key;
         MildStatus status;
@@ -288,14 +263,4 @@ static void one_clear_line(void **state) {
     mild_envs_close(NULL);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(numbers_of_the_environments),
-        cmocka_unit_test(batch_engine),
-        cmocka_unit_test(ends),
-        cmocka_unit_test(no_ends),
-        cmocka_unit_test(mirror),
-        cmocka_unit_test(one_clear_line),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -140,16 +140,14 @@ static void compare_rows(const char *const *names, const double *speeds, int spe
     pool_destroy(pool);
 }
 
-static void rows_agree_with_mujoco(void **state) {
-    (void)state;
+TEST(rows_agree_with_mujoco) {
     static const char *const names[] = {"rigid", "foam45", "sand_loose", NULL};
     static const double speed = 0.6;
     compare_rows(names, &speed, 1, 0, MILD_BATCH_HOST);
 }
 
 /* The same rows at two speeds, on waves. */
-static void rows_agree_on_a_map(void **state) {
-    (void)state;
+TEST(rows_agree_on_a_map) {
     static const char *const names[] = {"rigid", "grass", NULL};
     static const double speeds[2] = {0.3, -0.4};
     MildMapDef waves = mild_map_def_default();
@@ -164,8 +162,7 @@ static void rows_agree_on_a_map(void **state) {
 }
 
 /* A soil of bekker, and grounds matched to another model. */
-static void rows_agree_on_other_models(void **state) {
-    (void)state;
+TEST(rows_agree_on_other_models) {
     static const char *const names[] = {"dry_sand", "grass", NULL};
     static const double speed = 0.5;
     model = MILD_MODEL_ECC_QUASI_3D;
@@ -173,16 +170,14 @@ static void rows_agree_on_other_models(void **state) {
     model = MILD_MODEL_MILD;
 }
 
-static void turning_rows_agree(void **state) {
-    (void)state;
+TEST(turning_rows_agree) {
     static const char *const names[] = {"foam60", NULL};
     static const double speed = 0.4;
     compare_rows(names, &speed, 1, 0.5, MILD_BATCH_HOST);
 }
 
 /* By a GPU, where there is one. */
-static void rows_of_a_device_agree(void **state) {
-    (void)state;
+TEST(rows_of_a_device_agree) {
     static const char *const names[] = {"rigid", "foam45", "sand_loose", NULL};
     static const double speed = 0.6;
     MildError error = {0};
@@ -197,8 +192,7 @@ static void rows_of_a_device_agree(void **state) {
 }
 
 /* The bits of a row depend neither on threads nor on the rows beside it. */
-static void rows_repeat(void **state) {
-    (void)state;
+TEST(rows_repeat) {
     static const char *const all[] = {"rigid", "sand_loose", NULL}, *const one[] = {"sand_loose",
                                                                                     NULL};
     static const double speeds[2] = {0.3, 0.6};
@@ -225,8 +219,7 @@ static void rows_repeat(void **state) {
 }
 
 /* A policy of zeros falls, is counted as fallen when MuJoCo's is, and its trials are over then. */
-static void falls_are_counted(void **state) {
-    (void)state;
+TEST(falls_are_counted) {
     static const char *const names[] = {"foam28", NULL};
     static const double speed = 0.3;
     const EvalDef eval = {.speed = 0.3, .trials = 8, .seconds = 4, .seed = 1};
@@ -250,8 +243,7 @@ static void falls_are_counted(void **state) {
 
 /* The Go1, held in its pose by a policy of zeros and stiff joints, on four round feet. It has as
  * many joints as SA01, and so an observation of the same width. */
-static void four_feet_are_measured(void **state) {
-    (void)state;
+TEST(four_feet_are_measured) {
     static const char *const names[] = {"rigid", "rubber", "sand_loose", NULL};
     static const double speed = 0.3;
     const EvalDef eval = {.speed = speed, .trials = 3, .seconds = 3, .seed = 1};
@@ -293,8 +285,7 @@ static void four_feet_are_measured(void **state) {
 }
 
 /* What the policy sees: its own speed, sideways too, turned towards world x, until the stop. */
-static void commands_arrive(void **state) {
-    (void)state;
+TEST(commands_arrive) {
     static const char *const names[] = {"rubber", NULL};
     static const double speeds[2] = {0.4, 0.1};
     EvalDef eval = {.sideways = 0.1, .trials = 1, .seconds = 0.3, .seed = 1};
@@ -329,8 +320,7 @@ static void refused(const char *ground, int trials, int histories, const char *n
     pool_destroy(pool);
 }
 
-static void what_is_not_there_is_refused(void **state) {
-    (void)state;
+TEST(what_is_not_there_is_refused) {
     refused("rubber+grass", 1, 1, "--ground rubber+grass --train.robots");
     refused("grass", EVAL_ROBOTS_MAX + 1, 1, "--trials 65537 --train.robots");
     refused("grass", 1, 0, "--controller zero --train.robots");
@@ -342,18 +332,4 @@ static void what_is_not_there_is_refused(void **state) {
     def.imprint_tiles = 0;
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rows_agree_with_mujoco),
-        cmocka_unit_test(rows_agree_on_a_map),
-        cmocka_unit_test(rows_agree_on_other_models),
-        cmocka_unit_test(turning_rows_agree),
-        cmocka_unit_test(rows_of_a_device_agree),
-        cmocka_unit_test(rows_repeat),
-        cmocka_unit_test(falls_are_counted),
-        cmocka_unit_test(four_feet_are_measured),
-        cmocka_unit_test(commands_arrive),
-        cmocka_unit_test(what_is_not_there_is_refused),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

@@ -111,8 +111,7 @@ static void check_track(char *text) {
     }
 }
 
-static void a_fall_ends_one_trial(void **state) {
-    (void)state;
+TEST(a_fall_ends_one_trial) {
     char *actions = NULL, *track = NULL;
     size_t size[2];
     MildError error = {0};
@@ -150,7 +149,4 @@ static void a_fall_ends_one_trial(void **state) {
     pool_destroy(pool);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_fall_ends_one_trial)};
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

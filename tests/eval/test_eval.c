@@ -3,8 +3,7 @@
 
 #include <mujoco/mujoco.h>
 
-static void scenes_by_name(void **state) {
-    (void)state;
+TEST(scenes_by_name) {
     Scene scene;
     MildError error = {0};
     char name[64];
@@ -22,8 +21,7 @@ static void scenes_by_name(void **state) {
 }
 
 /* Errors say what is known, and a course has its bounds. */
-static void courses_have_bounds(void **state) {
-    (void)state;
+TEST(courses_have_bounds) {
     Scene scene;
     MildError error = {0};
     char name[64], text[SCENE_NAME_SIZE + 80] = "rubber";
@@ -69,8 +67,7 @@ static void courses_have_bounds(void **state) {
 }
 
 /* Turns back to world x by 1 rad/s per radian, at most 0.5 rad/s, and not while standing. */
-static void heading_is_held(void **state) {
-    (void)state;
+TEST(heading_is_held) {
     static const double yaw[5] = {0, 0.2, -0.3, 1, -3}, wz[5] = {0, -0.2, 0.3, -0.5, 0.5};
     static TaskEnv env;
     for (int i = 0; i < 5; i++) {
@@ -133,8 +130,7 @@ static EvalRow run(Zero *zero, const char *ground, EvalDef eval, int threads) {
     return row;
 }
 
-static void zero_action_falls_and_is_counted(void **state) {
-    (void)state;
+TEST(zero_action_falls_and_is_counted) {
     Zero zero;
     EvalDef eval = {.speed = 0.3, .trials = 4, .seconds = 6, .seed = 1};
     EvalRow first = run(&zero, "foam28", eval, 1), again = run(&zero, "foam28", eval, 2);
@@ -155,8 +151,7 @@ static void zero_action_falls_and_is_counted(void **state) {
 
 /* Nobody falls within 0.3 s: all trials succeed and last as long as asked; another seed, another
  * ground and one trial less give other numbers. */
-static void short_trials_succeed(void **state) {
-    (void)state;
+TEST(short_trials_succeed) {
     Zero zero;
     EvalDef eval = {.speed = 0, .trials = 2, .seconds = 0.3, .seed = 1}, other = eval, one = eval;
     EvalRow row = run(&zero, "rubber", eval, 1);
@@ -185,8 +180,7 @@ static void short_trials_succeed(void **state) {
 }
 
 /* From `stop` on nothing is commanded. */
-static void stopped_trials_are_told_to_stand(void **state) {
-    (void)state;
+TEST(stopped_trials_are_told_to_stand) {
     Zero zero;
     EvalDef eval = {.speed = 0.3, .sideways = 0.1, .trials = 1, .seconds = 0.3, .seed = 1};
     run(&zero, "rubber", eval, 1);
@@ -198,8 +192,7 @@ static void stopped_trials_are_told_to_stand(void **state) {
 }
 
 /* Told to turn, a robot is neither held on its heading nor asked to stand. */
-static void turning_is_asked_for(void **state) {
-    (void)state;
+TEST(turning_is_asked_for) {
     Zero zero;
     EvalDef eval = {.speed = 0.3, .turn = 0.4, .trials = 3, .seconds = 0.3, .seed = 1};
     EvalRow row = run(&zero, "rubber", eval, 1);
@@ -214,8 +207,7 @@ static void turning_is_asked_for(void **state) {
 }
 
 /* As many steps as come nearest to the time. */
-static void time_is_rounded_to_steps(void **state) {
-    (void)state;
+TEST(time_is_rounded_to_steps) {
     static const double seconds[4] = {0.29, 0.2949, 0.2955, 0.3}; /* 0.29/0.01 is below 29 */
     static const int steps[4] = {29, 29, 30, 30};
     for (int i = 0; i < 4; i++) {
@@ -245,8 +237,7 @@ static EvalRow walk(double seconds, double stop) {
 }
 
 /* The shipped policy walks: every measure has a value that a biped of 33 kg can have. */
-static void the_shipped_policy_walks(void **state) {
-    (void)state;
+TEST(the_shipped_policy_walks) {
     EvalRow row = walk(4, 0);
     assert_true(row.success == 2 && fabs(row.seconds - 4) < 1e-9);
     assert_true(row.velocity > 0.35 && row.velocity < 0.65);
@@ -258,8 +249,7 @@ static void the_shipped_policy_walks(void **state) {
 
 /* A trial stepped here, with every number of the row: the second one, its command from the first
  * step on, in one episode however short the task's is, weighed at 9.81 m/s^2. */
-static void a_row_is_what_its_trials_did(void **state) {
-    (void)state;
+TEST(a_row_is_what_its_trials_did) {
     MildError error = {0};
     TaskDef shorter = def, longer = def;
     shorter.episode = 1;
@@ -309,8 +299,7 @@ static void a_row_is_what_its_trials_did(void **state) {
 
 /* Told to stop after 3 s and watched for one more second: speed and cost are those of the first 3
  * s, but for a physics step at the end; the rest goes on. */
-static void speed_is_measured_until_the_stop(void **state) {
-    (void)state;
+TEST(speed_is_measured_until_the_stop) {
     EvalRow before = walk(3, 0), stopped = walk(4, 3);
     assert_true(fabs(stopped.velocity - before.velocity) < 2e-3);
     assert_true(fabs(stopped.cot / before.cot - 1) < 0.01);
@@ -362,8 +351,7 @@ static void walk_pushed(Noting *noting, double push, uint64_t seed) {
 
 /* Every 4 s, each trial at another time, by the speed asked for, each in another direction, on
  * every side, and so with another seed; until then nothing changes by a bit. */
-static void pushes_come_every_four_seconds(void **state) {
-    (void)state;
+TEST(pushes_come_every_four_seconds) {
     double angle[2 * PUSHED];
     int from[SIDES] = {0};
     for (int i = 0; i < 2 * PUSHED; i++) {
@@ -410,8 +398,7 @@ static EvalRow walk_on(const char *policy, const char *ground) {
 }
 
 /* A course whose first 50 m are rigid is walked as the engine's own floor is, and not as foam. */
-static void rigid_inside_a_course(void **state) {
-    (void)state;
+TEST(rigid_inside_a_course) {
     Scene scene;
     MildError error = {0};
     char name[64];
@@ -460,8 +447,7 @@ static void same_trial(const EvalTrial *a, const EvalTrial *b) {
 }
 
 /* A row alone, and among others, is the same, trial by trial; and a row is its trials. */
-static void rows_and_trials_are_their_own(void **state) {
-    (void)state;
+TEST(rows_and_trials_are_their_own) {
     static const char *const names[SCENES] = {"foam25", "rigid", "sand_loose"};
     static const double speeds[SPEEDS] = {0.2, 0.6};
     static EvalTrial each[SCENES * SPEEDS * OF_ROW];
@@ -497,8 +483,7 @@ static void rows_and_trials_are_their_own(void **state) {
 
 /* What --feet and --track write names the row's ground and speed, and has a line for every physics
  * or policy step that a trial lasted. */
-static void files_are_of_the_row(void **state) {
-    (void)state;
+TEST(files_are_of_the_row) {
     MildError error = {0};
     Zero zero = {0};
     Controller controller = {&zero, "zero", zero_act, zero_destroy, NULL, NULL};
@@ -554,8 +539,7 @@ static int fail_to_answer(void *self, const MildContactInput *input, MildContact
 }
 
 /* A trial whose step cannot be computed has diverged: its time ends there, and it is no success. */
-static void a_diverged_trial_has_not_succeeded(void **state) {
-    (void)state;
+TEST(a_diverged_trial_has_not_succeeded) {
     MildError error = {0};
     Zero zero = {0};
     Controller controller = {&zero, "zero", zero_act, zero_destroy, NULL, NULL};
@@ -614,8 +598,7 @@ static void see_legs(void *context, const EvalDecision *decision) {
 
 /* Sideways the shipped policy's feet meet. They went 20 mm into each other when nothing held them;
  * now they touch, and what is reported is what MuJoCo says of the same geoms. */
-static void legs_do_not_cross(void **state) {
-    (void)state;
+TEST(legs_do_not_cross) {
     MildError error = {0};
     Controller controller;
     EvalTrial each[2];
@@ -645,8 +628,7 @@ static void legs_do_not_cross(void **state) {
 
 /* Foam half as stiff as the softest, into which shanks sink: none falls. Where shells stand the
  * shanks' share of the load is small and reported. By MuJoCo and by the batch engine. */
-static void shells_stand(void **state) {
-    (void)state;
+TEST(shells_stand) {
     MildError error = {0};
     Controller controller;
     Scene scene;
@@ -679,26 +661,4 @@ static void shells_stand(void **state) {
     pool_destroy(pool);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(shells_stand),
-        cmocka_unit_test(scenes_by_name),
-        cmocka_unit_test(courses_have_bounds),
-        cmocka_unit_test(heading_is_held),
-        cmocka_unit_test(zero_action_falls_and_is_counted),
-        cmocka_unit_test(short_trials_succeed),
-        cmocka_unit_test(stopped_trials_are_told_to_stand),
-        cmocka_unit_test(turning_is_asked_for),
-        cmocka_unit_test(pushes_come_every_four_seconds),
-        cmocka_unit_test(rigid_inside_a_course),
-        cmocka_unit_test(time_is_rounded_to_steps),
-        cmocka_unit_test(a_row_is_what_its_trials_did),
-        cmocka_unit_test(rows_and_trials_are_their_own),
-        cmocka_unit_test(files_are_of_the_row),
-        cmocka_unit_test(a_diverged_trial_has_not_succeeded),
-        cmocka_unit_test(the_shipped_policy_walks),
-        cmocka_unit_test(speed_is_measured_until_the_stop),
-        cmocka_unit_test(legs_do_not_cross),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

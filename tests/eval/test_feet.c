@@ -57,8 +57,7 @@ static Feet made(void) {
     return feet;
 }
 
-static void steps_are_taken(void **state) {
-    (void)state;
+TEST(steps_are_taken) {
     EnvsSample sample[STEPS];
     Feet feet = made();
     make_samples(sample);
@@ -93,8 +92,7 @@ static void steps_are_taken(void **state) {
 }
 
 /* A foot in the air has none; with a newton there is one. */
-static void a_centre_needs_a_force(void **state) {
-    (void)state;
+TEST(a_centre_needs_a_force) {
     Feet feet = made();
     EnvsSample sample = {.feet = SA01_FEET};
     static const double force[] = {0.99, 1.01};
@@ -112,8 +110,7 @@ static void a_centre_needs_a_force(void **state) {
 }
 
 /* Trial after trial, step after step, foot after foot, as far as each trial went. */
-static void rows_are_printed(void **state) {
-    (void)state;
+TEST(rows_are_printed) {
     static const int order[][3] = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0},
                                    {1, 0, 1}, {1, 1, 0}, {1, 1, 1}};
     Feet feet = made();
@@ -158,8 +155,7 @@ static void rows_are_printed(void **state) {
     feet_free(&feet);
 }
 
-static void memory_that_is_missing_is_told(void **state) {
-    (void)state;
+TEST(memory_that_is_missing_is_told) {
     for (int fail = 1; fail <= 2; fail++) {
         Feet feet;
         MildError error = {0};
@@ -183,12 +179,4 @@ static int teardown(void **state) {
     return 0;
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(steps_are_taken),
-        cmocka_unit_test(a_centre_needs_a_force),
-        cmocka_unit_test(rows_are_printed),
-        cmocka_unit_test(memory_that_is_missing_is_told),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

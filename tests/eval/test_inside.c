@@ -65,8 +65,7 @@ static Line read_line(char **text) {
 
 /* A row per trial and decision; theta, z and z~ belong together; the grounds are those under the
  * base; estimates are in SI units, near what the robot does. */
-static void the_columns(void **state) {
-    (void)state;
+TEST(the_columns) {
     InsideLog log = {0};
     Controller controller = learned();
     const double slowing = def.gait_slowing;
@@ -124,8 +123,7 @@ static void keeping_act(void *self, int rows, TaskEnv *const *envs, float *actio
     keeping->inner.act(keeping->inner.self, rows, envs, actions);
 }
 
-static void the_numbers_are_the_policys(void **state) {
-    (void)state;
+TEST(the_numbers_are_the_policys) {
     MildError error = {0};
     Keeping keeping = {.inner = learned()};
     TaskDef scaled = def; /* as if it had been trained with other scales */
@@ -184,10 +182,4 @@ static void the_numbers_are_the_policys(void **state) {
     controller_destroy(&keeping.inner);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_columns),
-        cmocka_unit_test(the_numbers_are_the_policys),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

@@ -1,5 +1,5 @@
 /* Evaluation's measures on a scripted walk, without simulator, with numbers worked out by hand. */
-#include "kit.h"
+#include "robots.h"
 #include "run/eval/eval.h"
 #include "sa01.h"
 
@@ -53,8 +53,7 @@ static Measure script_walk(double steady_end) {
 }
 
 /* Two feet carry 100 N each for a second, and then shells 50 N more for a second. */
-static void shells_share_the_load(void **state) {
-    (void)state;
+TEST(shells_share_the_load) {
     Script s;
     Measure m;
     script_start(&s);
@@ -71,8 +70,7 @@ static void shells_share_the_load(void **state) {
     expect_near("share of a step", measure_shells(&m), 1.0 / 201, 1e-12);
 }
 
-static void power_and_speed(void **state) {
-    (void)state;
+TEST(power_and_speed) {
     Measure m = script_walk(0);
     expect_near("time", m.time, 5, 0);
     expect_near("steady time", m.steady_time, 3, 0);
@@ -106,8 +104,7 @@ static void power_and_speed(void **state) {
 /* On a circle to the left: 0.5 m/s forward and 0.1 m/s to the left of a heading that turns by 0.8
  * rad/s, 10 s, so that the heading passes pi and the robot comes back to where it was. The steady
  * part lasts 8 s. */
-static void speeds_of_a_turning_robot(void **state) {
-    (void)state;
+TEST(speeds_of_a_turning_robot) {
     const double v = 0.5, left = 0.1, w = 0.8;
     const uint8_t fallen = 0;
     EvalDef eval = {.speed = 0.5, .turn = 0.7, .trials = 1, .seconds = 10};
@@ -139,8 +136,7 @@ static void speeds_of_a_turning_robot(void **state) {
 }
 
 /* The heading of a base that is turned about z, then pitched and rolled. */
-static void yaw_of_an_orientation(void **state) {
-    (void)state;
+TEST(yaw_of_an_orientation) {
     for (double yaw = -3; yaw < 3.1; yaw += 0.5) {
         const double cz = cos(0.5 * yaw), sz = sin(0.5 * yaw), cy = cos(0.2), sy = sin(0.2);
         const double q[4] = {cz * cy, -sz * sy, cz * sy, sz * cy};
@@ -148,8 +144,7 @@ static void yaw_of_an_orientation(void **state) {
     }
 }
 
-static void nothing_is_steady_before_two_seconds(void **state) {
-    (void)state;
+TEST(nothing_is_steady_before_two_seconds) {
     Script s;
     Measure m;
     script_start(&s);
@@ -185,8 +180,7 @@ static void lift(Script *s, int f, double height) {
 
 /* A stance that creeps 3 mm forward and 4 mm aside and is 12 mm deep in its middle, then a swing of
  * 50 mm: drift 5 mm, penetration 12 mm, clearance 50 mm. The other foot stands all the time. */
-static void one_stance_and_one_swing(void **state) {
-    (void)state;
+TEST(one_stance_and_one_swing) {
     for (int f = 0; f < SA01_FEET; f++) {
         Script s;
         Measure m;
@@ -229,8 +223,7 @@ static void one_stance_and_one_swing(void **state) {
 
 /* The same stances one by one, of a robot that looks 0.5 rad to the left: of 3 mm along x and 4 mm
  * along y. */
-static void stances_are_kept(void **state) {
-    (void)state;
+TEST(stances_are_kept) {
     char *text = NULL;
     size_t size = 0;
     FILE *csv = open_memstream(&text, &size);
@@ -287,8 +280,7 @@ static void stances_are_kept(void **state) {
 /* A foot comes down every second, at 0.25, 1.25, ... s, first 0.3 m further on, from 5 s on 0.5 m,
  * 0.7 rad to the left of x; meanwhile it goes 20 mm forward and back. The other foot stands.
  * Strides count whose both ends are between 2 and 8.5 s: two of 0.3 m, then four of 0.5 m. */
-static void strides_and_the_way_of_a_sole(void **state) {
-    (void)state;
+TEST(strides_and_the_way_of_a_sole) {
     const EvalDef eval = {.speed = 0.5, .trials = 1, .seconds = 10, .stop = 8.5};
     const uint8_t walked = TASK_END_time;
     const double c = cos(0.7), d = sin(0.7);
@@ -320,8 +312,7 @@ static void strides_and_the_way_of_a_sole(void **state) {
 }
 
 /* Contact is more than 5 N. */
-static void contact_is_a_load_above_five_newton(void **state) {
-    (void)state;
+TEST(contact_is_a_load_above_five_newton) {
     for (int loaded = 0; loaded < 2; loaded++) {
         Script s;
         Measure m;
@@ -337,8 +328,7 @@ static void contact_is_a_load_above_five_newton(void **state) {
 
 /* A loss of contact of less than 30 ms (30 steps here are 29.3 ms) neither ends a stance nor makes
  * a swing, and what is lost twice is not added up; 31 steps end it. */
-static void chatter_ends_no_stance(void **state) {
-    (void)state;
+TEST(chatter_ends_no_stance) {
     Script s;
     Measure m;
     script_start(&s);
@@ -363,8 +353,7 @@ static void chatter_ends_no_stance(void **state) {
 }
 
 /* A lift up to 5 mm is a stance that ends, but no swing. */
-static void low_lifts_are_no_swings(void **state) {
-    (void)state;
+TEST(low_lifts_are_no_swings) {
     static const double height[3] = {0.0049, 0.005, 0.0051};
     for (int i = 0; i < 3; i++) {
         Script s;
@@ -382,8 +371,7 @@ static void low_lifts_are_no_swings(void **state) {
 }
 
 /* A kept stance has the apex of its own foot's swing before it, and 0 after a low lift. */
-static void the_apex_before_a_stance(void **state) {
-    (void)state;
+TEST(the_apex_before_a_stance) {
     static const double apex[5] = {0, 0, 0.05, 0.04, 0};
     static const int foot[5] = {0, 1, 1, 0, 1};
     Script s;
@@ -416,8 +404,7 @@ static void the_apex_before_a_stance(void **state) {
 }
 
 /* Who starts in the air has no stance to end; the first landing may end a swing. */
-static void a_foot_that_starts_in_the_air(void **state) {
-    (void)state;
+TEST(a_foot_that_starts_in_the_air) {
     Script s;
     Measure m;
     script_start(&s);
@@ -432,8 +419,7 @@ static void a_foot_that_starts_in_the_air(void **state) {
 }
 
 /* Never lifted: both stances count as they are at the end, once. */
-static void open_stances_count_when_no_foot_was_lifted(void **state) {
-    (void)state;
+TEST(open_stances_count_when_no_foot_was_lifted) {
     Script s;
     Measure m;
     script_start(&s);
@@ -458,8 +444,7 @@ static void open_stances_count_when_no_foot_was_lifted(void **state) {
 }
 
 /* One stance that ended, however many are open, and none of those counts. */
-static void one_lift_is_enough(void **state) {
-    (void)state;
+TEST(one_lift_is_enough) {
     Script s;
     Measure m;
     script_start(&s);
@@ -503,8 +488,7 @@ static EvalRow summarise(Measure *m, const uint8_t *fallen, int trials) {
  * 0.14/2 = 0.07, t = 4.303 at 2 degrees of freedom. Weight 400 N: cost of transport 320/(400 x 1.6)
  * = 0.5, 400/(400 x 2) = 0.5, 2880/(400 x 3.6) = 2, mean 1. The fourth falls at 3 s and counts
  * where all trials do: success, energy, torque, seconds, feet. */
-static void a_row_from_four_trials(void **state) {
-    (void)state;
+TEST(a_row_from_four_trials) {
     Measure m[4] = {trial(6, 0.4, 320), trial(6, 0.5, 400), trial(6, 0.9, 2880), trial(3, 2, 50)};
     const uint8_t fallen[4] = {0, 0, 0, 1};
     for (int i = 0; i < 4; i++) {
@@ -539,8 +523,7 @@ static void a_row_from_four_trials(void **state) {
 }
 
 /* When no trial stayed up the fallen ones that walked for more than half a steady second count. */
-static void a_row_of_falls(void **state) {
-    (void)state;
+TEST(a_row_of_falls) {
     Measure m[3] = {trial(3, 0.5, 200), trial(2.5, 5, 1e6), trial(1.5, 7, 1e6)};
     const uint8_t fallen[3] = {1, 1, 1};
     EvalRow row = summarise(m, fallen, 3);
@@ -558,8 +541,7 @@ static void a_row_of_falls(void **state) {
 }
 
 /* Backward is a distance too; one that does not move is divided by a millimetre, not by zero. */
-static void cost_of_transport_backward_and_at_rest(void **state) {
-    (void)state;
+TEST(cost_of_transport_backward_and_at_rest) {
     Measure back = trial(4, -0.5, 200), rest = trial(4, 0, 200);
     const uint8_t fallen = 0;
     EvalRow row = summarise(&back, &fallen, 1);
@@ -571,8 +553,7 @@ static void cost_of_transport_backward_and_at_rest(void **state) {
 
 /* Aside at 0.3 m/s and forward at 0.4 m/s over 2 s: 0.6 m to the left, 0.5 m/s along the way, which
  * counts for the cost of transport when it was asked for, else only the way forward. */
-static void sideways(void **state) {
-    (void)state;
+TEST(sideways) {
     const uint8_t fallen[2] = {0};
     for (int asked = 0; asked < 2; asked++) {
         Measure m[2] = {trial(4, 0.4, 200), trial(4, 0.4, 200)};
@@ -590,8 +571,7 @@ static void sideways(void **state) {
 }
 
 /* An open stance of a trial that never lifted a foot is in the row. */
-static void a_row_finishes_its_measures(void **state) {
-    (void)state;
+TEST(a_row_finishes_its_measures) {
     Measure m = trial(4, 0, 0);
     const uint8_t fallen = 0;
     m.in_stance[0] = 1;
@@ -604,8 +584,7 @@ static void a_row_finishes_its_measures(void **state) {
 
 /* Half width of the interval for n trials, half of them at 0 and half at 1 m/s, against Student's t
  * as printed in tables (two sided, 95 %). */
-static void interval_of_the_mean(void **state) {
-    (void)state;
+TEST(interval_of_the_mean) {
     enum { MOST = 122 };
     static const struct {
         int trials;
@@ -632,8 +611,7 @@ static void interval_of_the_mean(void **state) {
     assert_true(worst < 3e-4); /* three decimals of the table */
 }
 
-static void the_printed_row(void **state) {
-    (void)state;
+TEST(the_printed_row) {
     EvalRow row = {.ground = "sand_loose",
                    .speed = 0.5,
                    .trials = 20,
@@ -696,11 +674,9 @@ static void the_printed_row(void **state) {
 /* ---- from a robot ---- */
 
 /* The same numbers read from a robot: what is put into its state is what the measure must see. */
-static void a_robot_is_read(void **state) {
-    (void)state;
+TEST(a_robot_is_read) {
     MildError error = {0};
-    Robot *robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    Robot *robot = kit_robot(SA01);
     TaskDef def = task_def_default();
     RobotSim *sim = robot_sim_create(robot, 1e-3, &error);
     TaskEnv *env = aligned_alloc(64, task_env_bytes(&def, robot));
@@ -770,31 +746,4 @@ static void a_robot_is_read(void **state) {
     robot_destroy(robot);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(power_and_speed),
-        cmocka_unit_test(shells_share_the_load),
-        cmocka_unit_test(speeds_of_a_turning_robot),
-        cmocka_unit_test(yaw_of_an_orientation),
-        cmocka_unit_test(nothing_is_steady_before_two_seconds),
-        cmocka_unit_test(stances_are_kept),
-        cmocka_unit_test(strides_and_the_way_of_a_sole),
-        cmocka_unit_test(one_stance_and_one_swing),
-        cmocka_unit_test(contact_is_a_load_above_five_newton),
-        cmocka_unit_test(chatter_ends_no_stance),
-        cmocka_unit_test(low_lifts_are_no_swings),
-        cmocka_unit_test(the_apex_before_a_stance),
-        cmocka_unit_test(a_foot_that_starts_in_the_air),
-        cmocka_unit_test(open_stances_count_when_no_foot_was_lifted),
-        cmocka_unit_test(one_lift_is_enough),
-        cmocka_unit_test(a_row_from_four_trials),
-        cmocka_unit_test(a_row_of_falls),
-        cmocka_unit_test(cost_of_transport_backward_and_at_rest),
-        cmocka_unit_test(sideways),
-        cmocka_unit_test(a_row_finishes_its_measures),
-        cmocka_unit_test(interval_of_the_mean),
-        cmocka_unit_test(the_printed_row),
-        cmocka_unit_test(a_robot_is_read),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

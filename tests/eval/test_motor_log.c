@@ -77,8 +77,7 @@ static int teardown(void **state) {
 }
 
 /* The log has a row per physics step, of the motor's torque; the same seed gives the same log. */
-static void log_of_the_motor(void **state) {
-    (void)state;
+TEST(log_of_the_motor) {
     MildError error = {0};
     Record record = {.robot = robot};
     int falls;
@@ -133,8 +132,7 @@ static void torque_of_number(const void *self, void *state, const double *error,
 }
 
 /* Every number under the name of its joint and quantity, at its time. */
-static void columns_are_what_they_name(void **state) {
-    (void)state;
+TEST(columns_are_what_they_name) {
     static const char *const quantities[3] = {"error_rad", "speed_rad_s", "torque_nm"};
     const TaskActuator numbered = {NULL, 0, torque_of_number};
     char *text = NULL, *line, *rest, name[128];
@@ -257,8 +255,7 @@ static double frequency(int draw, int joint, double *largest) {
 
 /* A sine for each joint and two seconds, of 0.5 to 8 Hz, each octave as likely, and of up to
  * `shake` in radians; of a robot that stands at the start; of another seed others. */
-static void shakes_are_sines(void **state) {
-    (void)state;
+TEST(shakes_are_sines) {
     const double scale = task_action_scale(&def, robot_table(robot));
     double low = 1e9, high = 0, octaves = 0, largest, most = 0, mean = 0, first[SA01_JOINTS];
     log_shaken(1);
@@ -284,8 +281,7 @@ static void shakes_are_sines(void **state) {
 }
 
 /* What the simulation says is not taken for memory that ran out. */
-static void failure_keeps_its_reason(void **state) {
-    (void)state;
+TEST(failure_keeps_its_reason) {
     MildError error = {0};
     TaskDef slow = def;
     slow.physics_dt = 0.05;
@@ -296,8 +292,7 @@ static void failure_keeps_its_reason(void **state) {
 }
 
 /* On held-out seconds the network is eight times better than the best PD, and more. */
-static void network_beats_the_pd(void **state) {
-    (void)state;
+TEST(network_beats_the_pd) {
     for (int k = 0; k < KINDS; k++) {
         printf("%s: std %.2f, PD %.2f, best PD %.2f, network %.3f N m, best PD / network %.1f\n",
                robot_joint_name(robot, score[k].joint), score[k].deviation, score[k].ideal,
@@ -324,8 +319,7 @@ static void walk(const TaskActuator *motors, EvalRow row[GROUNDS]) {
 
 /* The shipped policy, which has never met such a motor, stays up on all grounds; its speed and cost
  * with the network are those with the motor, and with the PD they are others. */
-static void walks_as_with_the_motor(void **state) {
-    (void)state;
+TEST(walks_as_with_the_motor) {
     MildError error = {0};
     TaskDef opened = def;
     EvalRow row[DRIVES][GROUNDS];
@@ -355,11 +349,4 @@ static void walks_as_with_the_motor(void **state) {
     assert_true(apart[0] < apart[1] / 4 && cost[0] < cost[1] / 4);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(log_of_the_motor),     cmocka_unit_test(columns_are_what_they_name),
-        cmocka_unit_test(shakes_are_sines),     cmocka_unit_test(failure_keeps_its_reason),
-        cmocka_unit_test(network_beats_the_pd), cmocka_unit_test(walks_as_with_the_motor),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

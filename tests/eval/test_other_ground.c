@@ -111,17 +111,13 @@ static OtherGround *start(const char *how, int trials) {
     path[length] = '\0';
     snprintf(command, sizeof command, "exec '%s' %s", path, how);
     OtherGround *other = other_ground_start(command, robot, trials, &error);
-    if (!other) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(other != NULL, &error);
     return other;
 }
 
 static void stop_well(OtherGround *other) {
     MildError error = {0};
-    if (other_ground_stop(other, MILD_OK, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(other_ground_stop(other, MILD_OK, &error) == MILD_OK, &error);
 }
 
 /* ---- questions ---- */
@@ -202,8 +198,7 @@ static void check_dialogue(const char *how, int bodies, uint32_t rows, int quest
     stop_well(other);
 }
 
-static void every_number_arrives(void **state) {
-    (void)state;
+TEST(every_number_arrives) {
     check_dialogue("echo", FEET, 0, 2 * QUESTION / ANSWER + 2);
     check_dialogue("echo", BODIES, 0x12f, QUESTION / ANSWER + 2); /* the feet and two bodies */
     check_dialogue("pieces", FEET, 0xf, 4);
@@ -218,8 +213,7 @@ static void ignore(int number) {
 }
 
 /* Signals that interrupt the wait for an answer, and for the end, change nothing. */
-static void signals_interrupt(void **state) {
-    (void)state;
+TEST(signals_interrupt) {
     const struct sigaction action = {.sa_handler = ignore};
     const struct itimerval often = {{0, 3000}, {0, 3000}}, never = {{0, 0}, {0, 0}};
     struct sigaction before;
@@ -260,8 +254,7 @@ static void check_end(const char *how, const char *names) {
     assert_error(&error, MILD_ERROR_IO, names);
 }
 
-static void ends_are_told(void **state) {
-    (void)state;
+TEST(ends_are_told) {
     check_end("die", "--program trial 1 failed");
     check_end("leave", "--program trial 1 ended");
     microseconds = 100000;
@@ -280,8 +273,7 @@ static void ends_are_told(void **state) {
 
 /* A child has its standard files and what this program leaves open for anyone, not another's ends.
  */
-static void a_child_has_its_own_ends_only(void **state) {
-    (void)state;
+TEST(a_child_has_its_own_ends_only) {
     static double inertia[36 * FEET * FEET];
     const int before = descriptors();
     OtherGround *other = start("descriptors", 3);
@@ -297,8 +289,7 @@ static void a_child_has_its_own_ends_only(void **state) {
 }
 
 /* When the third cannot be started the first two end; a child of somebody else is left alone. */
-static void a_start_that_fails_ends_the_others(void **state) {
-    (void)state;
+TEST(a_start_that_fails_ends_the_others) {
     MildError error = {0};
     const int before = descriptors();
     const pid_t mine = fork();
@@ -329,12 +320,5 @@ static int teardown(void **state) {
 }
 
 int main(int count, char **word) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_number_arrives),
-        cmocka_unit_test(signals_interrupt),
-        cmocka_unit_test(ends_are_told),
-        cmocka_unit_test(a_child_has_its_own_ends_only),
-        cmocka_unit_test(a_start_that_fails_ends_the_others),
-    };
-    return count > 1 ? answer_as(word[1]) : cmocka_run_group_tests(tests, setup, teardown);
+    return count > 1 ? answer_as(word[1]) : run_cases(setup, teardown);
 }

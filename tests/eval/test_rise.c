@@ -5,9 +5,9 @@
 
 #include "base/random.h"
 #include "env/task/policy_keys.h"
-#include "kit.h"
 #include "learn/policy.h"
 #include "mild/batch.h"
+#include "robots.h"
 #include "run/eval/eval.h"
 
 #define RISES MILD_SOURCE_DIR "/policies/go1_rise.safetensors"
@@ -26,7 +26,6 @@ static mjData *data;
 
 static int setup(void **unused) {
     (void)unused;
-    MildError error = {0};
     char text[256] = "";
     model = mj_loadXML(MILD_SOURCE_DIR "/robots/go1/go1.xml", NULL, text, sizeof text);
     if (!model) {
@@ -36,10 +35,7 @@ static int setup(void **unused) {
     mju_copy3(model->geom_size + 3 * box, makers);
     model->geom_rbound[box] = mju_norm3(makers);
     data = mj_makeData(model);
-    robot = robot_create(MILD_SOURCE_DIR "/robots/go1", &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    robot = kit_robot(MILD_SOURCE_DIR "/robots/go1");
     robot_set_shells(robot, 1);
     return 0;
 }
@@ -84,8 +80,7 @@ static void see_trunk(void *context, const EvalDecision *decision) {
 }
 
 /* Anywhere within the ranges of its joints, and at their ends, a leg is clear of the trunk. */
-static void legs_cannot_reach_the_trunk(void **unused) {
-    (void)unused;
+TEST(legs_cannot_reach_the_trunk) {
     double least = 1;
     for (int n = 0; n < 4000; n++) {
         Random random = random_at(17, (uint32_t)n, 0);
@@ -146,8 +141,7 @@ static EvalRow lie(const char *file, const char *ground, Trunk *trunk, EvalTrial
 
 /* It needs a second to come to rest, and comes up after that. Standing it carries itself on its
  * feet, so that its shells had little to do. */
-static void it_rights_itself(void **unused) {
-    (void)unused;
+TEST(it_rights_itself) {
     static const char *const grounds[] = {"rigid", "foam45", "sand_dense"};
     EvalTrial each[TRIALS];
     Trunk trunk = {.least = 1};
@@ -166,8 +160,7 @@ static void it_rights_itself(void **unused) {
 }
 
 /* It stays on the ground, where its shells carry it, and that ends no trial. */
-static void the_walking_policy_does_not(void **unused) {
-    (void)unused;
+TEST(the_walking_policy_does_not) {
     EvalTrial each[TRIALS];
     Trunk trunk = {.least = 1};
     const EvalRow row = lie(WALKS, "foam45", &trunk, each);
@@ -177,11 +170,4 @@ static void the_walking_policy_does_not(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(legs_cannot_reach_the_trunk),
-        cmocka_unit_test(it_rights_itself),
-        cmocka_unit_test(the_walking_policy_does_not),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -4,16 +4,14 @@
 
 #include "env/envs.h"
 #include "env/task/task.h"
-#include "kit.h"
+#include "robots.h"
 #include "run/eval/track.h"
 #include "sa01.h"
 
 /* Turned by 0.7 rad about z, then pitched by 0.3 and rolled by -0.2 rad, knees bent. */
-static void a_point_of_a_turned_robot(void **state) {
-    (void)state;
+TEST(a_point_of_a_turned_robot) {
     MildError error = {0};
-    Robot *robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    Robot *robot = kit_robot(SA01);
     RobotSim *sim = robot_sim_create(robot, 0.005, &error);
     assert_non_null(sim);
     const RobotVariation nominal = robot_variation_nominal();
@@ -74,7 +72,4 @@ static void a_point_of_a_turned_robot(void **state) {
     robot_destroy(robot);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_point_of_a_turned_robot)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -43,8 +43,7 @@ static Measure script_standing(double seconds) {
 }
 
 /* Up is who stands for the last two seconds; when it came up is the start of the unbroken time. */
-static void up_at_the_end_and_for_two_seconds(void **state) {
-    (void)state;
+TEST(up_at_the_end_and_for_two_seconds) {
     Measure m = script_rise(2.5, 0, 0);
     assert_true(fabs(measure_up(&m) - (2 + DT)) < 1e-9);
     m = script_rise(1.9, 0, 0);
@@ -65,8 +64,7 @@ static void up_at_the_end_and_for_two_seconds(void **state) {
 
 /* Three of four were up; one of them ended by a joint, so that two were righted, after 2.01 and
  * 4.01 s. */
-static void a_row_counts_who_was_righted(void **state) {
-    (void)state;
+TEST(a_row_counts_who_was_righted) {
     Measure m[4] = {script_rise(3, 0, 0), script_rise(5, 4, 0), script_rise(1, 0, 0),
                     script_rise(3, 0, 0)};
     const uint8_t ends[4] = {TASK_END_time, TASK_END_time, TASK_END_time, TASK_END_joint};
@@ -88,10 +86,4 @@ static void a_row_counts_who_was_righted(void **state) {
     assert_null(strstr(line, "up after"));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(up_at_the_end_and_for_two_seconds),
-        cmocka_unit_test(a_row_counts_who_was_righted),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

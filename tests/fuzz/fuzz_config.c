@@ -47,7 +47,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         check_round_trip(&first, size % 2 == 0);
     }
     target_init(&first);
-    status = config_override(first.sections, SECTIONS, text, &error);
+    status = config_overrides(first.sections, SECTIONS, (const char *const[]){text}, 1, &error);
     if (status == MILD_OK && fuzz_sample(data, size, 64)) {
         check_round_trip(&first, 0);
     }

@@ -1,6 +1,6 @@
 /* The learner on the GPU against the same learner on the CPU. With MILD_CUDA on the device, skipped
  * (77) where there is none; else with small networks on a stand-in for CUDA (emulated/), which runs
- * the same text of the layer. */
+ * the same code of the layer. */
 #include "gpu_check.h"
 
 #include <unistd.h>
@@ -13,8 +13,7 @@ extern size_t emulated_memory;
 /* ---- parameters ---- */
 
 /* Every parameter keeps its value through the padded form, which holds nothing else but zeros. */
-static void padding_is_zero_and_reversible(void **state) {
-    (void)state;
+TEST(padding_is_zero_and_reversible) {
     PolicyDef def = small_def();
     Network tight, wide;
     assert_int_equal(network_layout(&tight, &def, NULL), MILD_OK);
@@ -222,8 +221,7 @@ static void compare_learner(const PolicyDef *policy, const PpoDef *def, int envs
     learner_close(&gpu);
 }
 
-static void gradients_are_those_of_the_cpu(void **state) {
-    (void)state;
+TEST(gradients_are_those_of_the_cpu) {
     double worst[3] = {0.0};
     PpoDef def = ppo_def_default();
     PolicyDef small = small_def();
@@ -308,8 +306,7 @@ static void compare_returns(double valid) {
     learner_close(&gpu);
 }
 
-static void returns_are_those_of_the_cpu(void **state) {
-    (void)state;
+TEST(returns_are_those_of_the_cpu) {
     static const double shares[] = {1.0, 0.9, 0.3, 0.01, 0.0};
     for (size_t i = 0; i < sizeof shares / sizeof *shares; i++) {
         compare_returns(shares[i]);
@@ -398,8 +395,7 @@ static double compare_update(const PolicyDef *policy, const PpoDef *def, int env
  * is smooth in the gradient, whose rounding is 1e-5 of its size. Every step begins where the last
  * one ended, so the differences add up; 1e-3 of the way is far above that and far below any step
  * that is missing or wrong. */
-static void updates_are_those_of_the_cpu(void **state) {
-    (void)state;
+TEST(updates_are_those_of_the_cpu) {
     PpoDef def = ppo_def_default();
     PolicyDef policy = small_def();
     double worst = 0.0;
@@ -438,8 +434,7 @@ static void updates_are_those_of_the_cpu(void **state) {
 }
 
 /* Two runs on the device, bit for bit, and a third with the rollout on the CPU. */
-static void runs_repeat(void **state) {
-    (void)state;
+TEST(runs_repeat) {
     PpoDef def = ppo_def_default();
     def.average = 0.9;
 #ifdef EMULATED
@@ -513,8 +508,7 @@ static uint64_t device_seed(const Learner *l) {
 }
 
 /* A checkpoint of one device goes on with the other as it was, and learning works on both. */
-static void learns_and_changes_device(void **state) {
-    (void)state;
+TEST(learns_and_changes_device) {
     const char *path = "build_test_gpu.safetensors";
     static Toy toy;
     PolicyDef policy = toy_policy_def();
@@ -564,8 +558,7 @@ static void learns_and_changes_device(void **state) {
 
 #ifdef EMULATED
 /* A device that stops answering stops the learning, and says so. */
-static void a_failure_stops_learning(void **state) {
-    (void)state;
+TEST(a_failure_stops_learning) {
     PpoDef def = ppo_def_default();
     PolicyDef policy = small_def();
     for (int where = MIXED; where <= RESIDENT; where++) {
@@ -601,8 +594,7 @@ static MildStatus attach(int envs, MildError *error) {
 }
 
 /* Too little memory: the line tells how many robots fit, and so many do, but not one more. */
-static void memory_that_is_missing_is_told(void **state) {
-    (void)state;
+TEST(memory_that_is_missing_is_told) {
     MildError error = {0};
     emulated_memory = (size_t)40 << 20;
     assert_int_equal(attach(5000, &error), MILD_ERROR_MEMORY);
@@ -626,8 +618,7 @@ static void memory_that_is_missing_is_told(void **state) {
 #else
 
 /* A rollout of acts, captured once, is right in every iteration. */
-static void acts_are_captured(void **state) {
-    (void)state;
+TEST(acts_are_captured) {
     PpoDef def = ppo_def_default();
     PolicyDef policy = policy_def_default();
     Learner l[2];
@@ -668,8 +659,7 @@ static void acts_are_captured(void **state) {
 }
 
 /* Products with rounded factors: near the CPU's, as far as 11 or 8 bits go. */
-static void rounded_products_are_near(void **state) {
-    (void)state;
+TEST(rounded_products_are_near) {
     static const double bounds[PPO_MATMULS] = {1e-5, 5e-3, 5e-2};
     PolicyDef policy = policy_def_default();
     for (int matmul = 0; matmul < PPO_MATMULS; matmul++) {
@@ -692,20 +682,5 @@ int main(void) {
         return 77;
     }
     printf("%s\n", device);
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(padding_is_zero_and_reversible),
-        cmocka_unit_test(gradients_are_those_of_the_cpu),
-        cmocka_unit_test(returns_are_those_of_the_cpu),
-        cmocka_unit_test(updates_are_those_of_the_cpu),
-        cmocka_unit_test(runs_repeat),
-        cmocka_unit_test(learns_and_changes_device),
-#ifdef EMULATED
-        cmocka_unit_test(a_failure_stops_learning),
-        cmocka_unit_test(memory_that_is_missing_is_told),
-#else
-        cmocka_unit_test(acts_are_captured),
-        cmocka_unit_test(rounded_products_are_near),
-#endif
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_cases(NULL, NULL);
 }

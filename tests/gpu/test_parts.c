@@ -164,8 +164,7 @@ static double compare_update(int where, const PolicyDef *policy, const PpoDef *d
     return moved;
 }
 
-static void updates_are_those_of_the_whole(void **state) {
-    (void)state;
+TEST(updates_are_those_of_the_whole) {
     PpoDef def = ppo_def_default();
     PolicyDef policy = small_def();
     double worst = 0.0;
@@ -205,10 +204,7 @@ int main(void) {
         fprintf(stderr, "%s\n", error.text);
         return 2;
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(updates_are_those_of_the_whole),
-    };
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    const int failed = run_cases(NULL, NULL);
     if (failed) { /* the others may wait for this one */
         ranks_abort(&(MildError){.text = "a test of the learner in parts failed"});
     }

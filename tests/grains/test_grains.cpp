@@ -64,7 +64,7 @@ static double parted(bool hertz, float restitution, float speed) {
     return after / (double)speed;
 }
 
-static void grains_part_with_the_restitution(void **) {
+TEST(grains_part_with_the_restitution) {
     for (const bool hertz : {false, true}) {
         for (const float e : {0.2f, 0.5f, 0.9f, 1.0f}) {
             const double got = parted(hertz, e, 0.3f);
@@ -81,7 +81,7 @@ static long some(long steps) {
 }
 
 /* Oblique and spinning, with friction: the two never leave with more than they had. */
-static void a_collision_gives_no_energy(void **) {
+TEST(a_collision_gives_no_energy) {
     double worst = -1;
     srand(1);
     const auto uniform = [] { return (float)rand() / (float)RAND_MAX - 0.5f; };
@@ -112,7 +112,7 @@ static void a_collision_gives_no_energy(void **) {
 
 /* ---- a grain on the floor ---- */
 
-static void a_grain_slides_then_rolls(void **) {
+TEST(a_grain_slides_then_rolls) {
     BedDef def;
     def.friction = 0.3f;
     const float radius = 0.0025f, speed = 0.2f;
@@ -129,7 +129,7 @@ static void a_grain_slides_then_rolls(void **) {
     bed_close(&bed);
 }
 
-static void rolling_is_resisted(void **) {
+TEST(rolling_is_resisted) {
     BedDef def;
     def.rolling = 0.05f;
     const float radius = 0.0025f, speed = 0.2f;
@@ -156,7 +156,7 @@ static BedDef small_bed(void) {
 }
 
 /* The floor carries the grains' weight, told by the overlaps on it. */
-static void the_floor_carries_the_weight(void **) {
+TEST(the_floor_carries_the_weight) {
     if (kit_short()) {
         skip(); /* a_resting_plate settles, too */
     }
@@ -186,7 +186,7 @@ static void the_floor_carries_the_weight(void **) {
 
 /* A cloud of grains without weight flies against a tilted plate: what the grains lose in momentum
  * and angular momentum the plate has got, about its origin. */
-static void the_plate_gets_what_the_grains_lose(void **) {
+TEST(the_plate_gets_what_the_grains_lose) {
     std::vector<Vec> grains;
     for (int k = 0; k < 60; k++) {
         grains.push_back(
@@ -236,7 +236,7 @@ static void the_plate_gets_what_the_grains_lose(void **) {
 }
 
 /* A plate that lies on the bed pushes with its weight. */
-static void a_resting_plate_pushes_with_its_weight(void **) {
+TEST(a_resting_plate_pushes_with_its_weight) {
     Bed bed;
     bed_open(&bed, small_bed());
     bed_settle(&bed);
@@ -266,7 +266,7 @@ static void a_resting_plate_pushes_with_its_weight(void **) {
 }
 
 /* A bed is its seed's, whichever beds are made beside it and whenever lists were made. */
-static void a_seed_gives_the_same_bits(void **) {
+TEST(a_seed_gives_the_same_bits) {
     BedDef def = small_bed();
     def.settle = 0.05f;
     Bed alone, beside;
@@ -314,7 +314,7 @@ static int pairs_missed(const Grains &g) {
     return missed;
 }
 
-static void no_contact_is_missed(void **) {
+TEST(no_contact_is_missed) {
     Bed bed;
     bed_open(&bed, small_bed());
     int missed = 0;
@@ -329,7 +329,7 @@ static void no_contact_is_missed(void **) {
 }
 
 /* What is restored goes on as it did, before the first list too. */
-static void a_restored_bed_goes_on(void **) {
+TEST(a_restored_bed_goes_on) {
     for (const long before : {0L, some(3000)}) {
         Bed bed;
         bed_open(&bed, small_bed());
@@ -348,7 +348,7 @@ static void a_restored_bed_goes_on(void **) {
 }
 
 /* The nearest point of a block, against that of an axis-aligned box; the way out of it. */
-static void a_block_is_nearest_where_a_box_is(void **) {
+TEST(a_block_is_nearest_where_a_box_is) {
     const Shape s = shape_read("rect:0.06,0.12");
     srand(2);
     const auto uniform = [] { return (float)rand() / (float)RAND_MAX - 0.5f; };
@@ -382,7 +382,7 @@ static void a_block_is_nearest_where_a_box_is(void **) {
 /* A free block of mass m with moments of inertia, tilted, with spin, hits a cloud of grains without
  * weight: what the grains gain in momentum and angular momentum about a fixed point the block has
  * lost, and its kinetic energy and theirs do not grow. */
-static void a_free_sole_keeps_momentum(void **) {
+TEST(a_free_sole_keeps_momentum) {
     std::vector<Vec> grains;
     for (int k = 0; k < 90; k++) {
         grains.push_back(
@@ -448,7 +448,7 @@ static void a_free_sole_keeps_momentum(void **) {
 
 /* Twists and inertia at the sole's origin: the wrench that comes back does the same work there as
  * about the ankle. */
-static void wrenches_move_with_their_twists(void **) {
+TEST(wrenches_move_with_their_twists) {
     const double arm[3] = {0.02, -0.01, -0.055}, v[6] = {1, 2, -3, 4, -5, 6},
                  w[6] = {3, -1, 40, 2, 5, -7};
     double moved[6], about[3], work[2] = {0, 0};
@@ -484,7 +484,7 @@ static int moved_since(const Grains &g, const std::vector<Place> &start) {
 /* A settled bed, put behind itself four times: windows that open, close and open again make no
  * grain faster than the last ones that still roll in the settled bed, move no larger share of them
  * than move there, and miss no contact across the ends of the pieces. */
-static void a_long_bed_stays_at_rest(void **) {
+TEST(a_long_bed_stays_at_rest) {
     BedDef def = small_bed();
     def.seeds = {1, 2};
     def.length = 0.08f;
@@ -531,22 +531,4 @@ static void a_long_bed_stays_at_rest(void **) {
     bed_close(&t.bed);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(grains_part_with_the_restitution),
-        cmocka_unit_test(a_collision_gives_no_energy),
-        cmocka_unit_test(a_grain_slides_then_rolls),
-        cmocka_unit_test(rolling_is_resisted),
-        cmocka_unit_test(the_floor_carries_the_weight),
-        cmocka_unit_test(the_plate_gets_what_the_grains_lose),
-        cmocka_unit_test(a_resting_plate_pushes_with_its_weight),
-        cmocka_unit_test(a_seed_gives_the_same_bits),
-        cmocka_unit_test(no_contact_is_missed),
-        cmocka_unit_test(a_restored_bed_goes_on),
-        cmocka_unit_test(a_block_is_nearest_where_a_box_is),
-        cmocka_unit_test(a_free_sole_keeps_momentum),
-        cmocka_unit_test(wrenches_move_with_their_twists),
-        cmocka_unit_test(a_long_bed_stays_at_rest),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

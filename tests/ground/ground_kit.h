@@ -3,8 +3,8 @@
 #ifndef GROUND_KIT_H
 #define GROUND_KIT_H
 
-#include "kit.h"
-#include "mild/ground.h"
+#include "materials.h"
+#include "sa01_sole.h"
 
 #define KIT_PITCH 0.0195
 #define KIT_SOLE_Z (-0.055)
@@ -43,43 +43,46 @@ static inline int kit_finest(void) {
     return getenv("MILD_TEST_DRAWS") != NULL;
 }
 
-/* Left sole of the reference robot, y range at x [m]; the right one is its mirror image. */
-static const double kit_outline[19][3] = {
-    {-0.075, -0.013, 0.013}, {-0.06, -0.044, 0.044},  {-0.045, -0.045, 0.047},
-    {-0.03, -0.046, 0.049},  {-0.015, -0.046, 0.051}, {0.0, -0.041, 0.041},
-    {0.015, -0.041, 0.041},  {0.03, -0.041, 0.041},   {0.045, -0.041, 0.041},
-    {0.06, -0.046, 0.057},   {0.075, -0.046, 0.057},  {0.09, -0.046, 0.057},
-    {0.105, -0.046, 0.057},  {0.12, -0.046, 0.057},   {0.135, -0.046, 0.057},
-    {0.15, -0.046, 0.057},   {0.165, -0.045, 0.049},  {0.18, -0.038, 0.039},
-    {0.195, -0.016, 0.015}};
+/* Log-uniform. */
+static inline double kit_spread(uint64_t *random, double low, double high) {
+    return exp(kit_uniform(random, log(low), log(high)));
+}
 
-static inline MildSole *kit_sole(int right, int target) {
-    double outline[2 * 38], sign = right ? -1.0 : 1.0;
-    for (int i = 0; i < 19; i++) {
-        outline[2 * i] = outline[2 * (37 - i)] = kit_outline[i][0];
-        outline[2 * i + 1] = sign * kit_outline[i][1];
-        outline[2 * (37 - i) + 1] = sign * kit_outline[i][2];
+static inline void kit_vector(uint64_t *random, double size, double *x) {
+    for (int k = 0; k < 3; k++) {
+        x[k] = kit_uniform(random, -size, size);
     }
-    MildSoleDef def = {outline, 38, KIT_PITCH, KIT_SOLE_Z, target};
+}
+
+/* target: elements that it must have; 0: any. */
+static inline MildSole *kit_sole_of(const double *outline, int points, double pitch, int target) {
+    const MildSoleDef def = {outline, points, pitch, KIT_SOLE_Z, target};
     MildError error = {0};
     MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(sole != NULL, &error);
     return sole;
+}
+
+/* A level rectangle [m] under the reference point. */
+static inline MildSole *kit_rectangle(double length, double width, double pitch, int target) {
+    const double x = 0.5 * length, y = 0.5 * width;
+    const double outline[8] = {-x, -y, x, -y, x, y, -x, y};
+    return kit_sole_of(outline, 4, pitch, target);
 }
 
 /* A level plate of columns x rows elements under the reference point. */
 static inline MildSole *kit_plate(int columns, int rows) {
-    double x = 0.5 * columns * KIT_PITCH, y = 0.5 * rows * KIT_PITCH;
-    double outline[8] = {-x, -y, x, -y, x, y, -x, y};
-    MildSoleDef def = {outline, 4, KIT_PITCH, KIT_SOLE_Z, columns * rows};
-    MildError error = {0};
-    MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) {
-        fail_msg("%s", error.text);
+    return kit_rectangle(columns * KIT_PITCH, rows * KIT_PITCH, KIT_PITCH, columns * rows);
+}
+
+static inline MildSole *kit_sole(int right, int target) {
+    double outline[2 * 38], sign = right ? -1.0 : 1.0;
+    for (int i = 0; i < 19; i++) {
+        outline[2 * i] = outline[2 * (37 - i)] = sa01_outline[i][0];
+        outline[2 * i + 1] = sign * sa01_outline[i][1];
+        outline[2 * (37 - i) + 1] = sign * sa01_outline[i][2];
     }
-    return sole;
+    return kit_sole_of(outline, 38, KIT_PITCH, target);
 }
 
 /* Uniform in the paper's Table III. */
@@ -127,9 +130,7 @@ static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right,
     }
     MildError error = {0};
     kit->scratch = mild_scratch_create(kit->soles, feet, &error);
-    if (!kit->scratch) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(kit->scratch != NULL, &error);
     kit->bytes = mild_ground_bytes(kit->soles, feet);
     kit->ground = mild_ground_init(aligned_alloc(64, kit->bytes), kit->soles, feet);
     kit->terrain = mild_terrain_uniform(material);
@@ -268,6 +269,27 @@ static inline double kit_work(const Kit *kit, int f, const double *before) {
                foot->torque[k] * (before[3 + k] + after[3 + k]);
     }
     return 0.5 * kit->input.dt * sum;
+}
+
+/* [J] Of the body on the first foot at the foot's twist. */
+static inline double kit_kinetic(const Kit *kit, const double *V) {
+    double r[3], swing[3], sum = 0.0;
+    kit_center(kit, 0, r);
+    kit_cross(V + 3, r, swing);
+    for (int k = 0; k < 3; k++) {
+        const double v = V[k] + swing[k];
+        sum += kit->mass[0] * v * v + kit->inertia[0] * V[3 + k] * V[3 + k];
+    }
+    return 0.5 * sum;
+}
+
+/* Bool: no element of the first foot is in the ground or remembers it. */
+static inline int kit_lifted(const Kit *kit) {
+    int touched = kit->result.foot[0].contacts;
+    for (int e = 0; e < mild_sole_elements(kit->soles[0]) && touched == 0; e++) {
+        touched += mild_ground_depth_max(kit->ground, 0)[e] > 0.0;
+    }
+    return touched == 0;
 }
 
 /* Semi-implicit, as engines do. */

@@ -7,9 +7,7 @@
 static inline MildMap *make_map(const MildMapDef *def) {
     MildError error = {0};
     MildMap *map = mild_map_create(def, &error);
-    if (!map) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(map != NULL, &error);
     return map;
 }
 
@@ -29,9 +27,7 @@ static inline MildTerrain terrain_on(const MildMap *map, double height) {
         terrain.materials[terrain.material_count] = m;
     }
     MildError error = {0};
-    if (mild_terrain_set_map(&terrain, map, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(mild_terrain_set_map(&terrain, map, &error) == MILD_OK, &error);
     return terrain;
 }
 

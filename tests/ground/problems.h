@@ -214,9 +214,7 @@ static void problem_match(Kit *kit, uint64_t *random) {
     double load = kit_uniform(random, 5.0, 20.0) * mild_sole_elements(soles[0]);
     MildError error;
     MildModel model = kit_index(random, 2) ? MILD_MODEL_CON_CONE : MILD_MODEL_CON_SPRING;
-    if (mild_model_match(model, &mild, soles[0], load, m, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(mild_model_match(model, &mild, soles[0], load, m, &error) == MILD_OK, &error);
     m->recovery = mild.recovery;
 }
 

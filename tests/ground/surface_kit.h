@@ -10,9 +10,7 @@ static inline MildSole *surface_make(const MildShape *shapes, int count, double 
     const MildSurfaceDef def = {.shapes = shapes, .count = count, .pitch = pitch};
     MildError error = {0};
     MildSole *sole = mild_sole_surface(&def, &error);
-    if (!sole) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(sole != NULL, &error);
     return sole;
 }
 

@@ -84,18 +84,11 @@ static double compare(const char *name, const Experiment *e, double bar) {
     return worst;
 }
 
-static MildMaterial preset(const char *name) {
-    MildMaterial m;
-    assert_true(mild_material_preset(name, &m));
-    return m;
-}
-
 static const char *const grounds[5] = {"sand_loose", "sand_dense", "grass", "foam45", "foam28"};
 
 /* A body of 20 kg takes many steps to stop. One of 1 kg stops within a step of 5 ms on sand: see
  * test_drops in test_step.c. */
-static void test_drop(void **state) {
-    (void)state;
+TEST(test_drop) {
     static const double mass[3] = {20.0, 3.0, 1.0}, height[4] = {2e-3, 5.3e-3, 13.7e-3, 50e-3},
                         bar[3] = {0.02, 0.02, 0.1};
     MildSole *plate = kit_plate(11, 7);
@@ -104,7 +97,7 @@ static void test_drop(void **state) {
         for (int g = 0; g < 5; g++) {
             for (int h = 0; h < 4; h++) {
                 Experiment e = {.sole = plate,
-                                .material = preset(grounds[g]),
+                                .material = kit_preset(grounds[g]),
                                 .mass = mass[m],
                                 .height = height[h],
                                 .duration = 0.25};
@@ -135,12 +128,11 @@ static void hold(const MildMaterial *m, double mass, double t, double force[3]) 
     force[0] = 0.4 * m->mu * mass * KIT_GRAVITY;
 }
 
-static void test_load(void **state) {
-    (void)state;
+TEST(test_load) {
     MildSole *sole = kit_sole(0, 77);
     double worst = 0.0;
     for (int g = 0; g < 5; g++) {
-        Experiment e = {.sole = sole, .material = preset(grounds[g]), .mass = 16.5};
+        Experiment e = {.sole = sole, .material = kit_preset(grounds[g]), .mass = 16.5};
         char name[64];
         e.settle = 1.0, e.duration = 0.6, e.force = push_down;
         snprintf(name, sizeof name, "press %s", grounds[g]);
@@ -159,7 +151,4 @@ static void test_load(void **state) {
     mild_sole_destroy(sole);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_drop), cmocka_unit_test(test_load)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -45,8 +45,7 @@ static void turn_negative(Kit *kit, uint64_t *random) {
     }
 }
 
-static void random_problems(void **state) {
-    (void)state;
+TEST(random_problems) {
     uint64_t random = 9;
     for (int draw = 0; draw < kit_draws(1000); draw++) {
         Kit kit;
@@ -72,8 +71,7 @@ static void random_problems(void **state) {
 }
 
 /* Each fault as a change of one number of a good problem of two feet. */
-static void faults(void **state) {
-    (void)state;
+TEST(faults) {
     static Kit kit;
     uint64_t random = 4;
     const MildMaterial foam = kit_material(&random);
@@ -134,8 +132,7 @@ static void faults(void **state) {
 }
 
 /* Patches and a map, in places where the functions that set them do not look again. */
-static void places(void **state) {
-    (void)state;
+TEST(places) {
     static Kit kit;
     uint64_t random = 4;
     const MildMaterial foam = kit_material(&random);
@@ -171,8 +168,7 @@ static void places(void **state) {
 }
 
 /* A scratch for other soles than the ground's: nothing is computed, and nothing written. */
-static void another_scratch(void **state) {
-    (void)state;
+TEST(another_scratch) {
     static Kit kit;
     uint64_t random = 4;
     const MildMaterial foam = kit_material(&random);
@@ -203,8 +199,7 @@ static void another_scratch(void **state) {
 }
 
 /* A ground that walked over waves and was reset is that of the first day, byte by byte. */
-static void reset_is_new(void **state) {
-    (void)state;
+TEST(reset_is_new) {
     static Kit kit, fresh;
     const MildMaterial sand = mild_material_default();
     const MildMapDef def = shape(MILD_MAP_WAVES, 0.03, 0.5);
@@ -224,8 +219,7 @@ static void reset_is_new(void **state) {
 }
 
 /* A foot that a rail guides: rows of 0, which nothing may be coupled to. */
-static void rows_of_zero(void **state) {
-    (void)state;
+TEST(rows_of_zero) {
     static Kit kit;
     uint64_t random = 4;
     const MildMaterial foam = kit_material(&random);
@@ -240,8 +234,7 @@ static void rows_of_zero(void **state) {
     kit_close(&kit);
 }
 
-static void too_many_feet(void **state) {
-    (void)state;
+TEST(too_many_feet) {
     const MildSole *many[MILD_FEET_MAX + 1];
     double block[16] = {1};
     for (int f = 0; f <= MILD_FEET_MAX; f++) {
@@ -253,12 +246,4 @@ static void too_many_feet(void **state) {
     assert_true(block[0] == 1);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(random_problems), cmocka_unit_test(faults),
-        cmocka_unit_test(rows_of_zero),    cmocka_unit_test(too_many_feet),
-        cmocka_unit_test(places),          cmocka_unit_test(another_scratch),
-        cmocka_unit_test(reset_is_new),
-    };
-    return cmocka_run_group_tests(tests, open_soles, close_soles);
-}
+TEST_MAIN(open_soles, close_soles)

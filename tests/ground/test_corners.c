@@ -24,11 +24,9 @@ static double lead(Kit *kit, double x, double z, int steps) {
 /* A print of 20 mm at x = 0. A foot 5 mm deep slides there from x = 0.3 m: on the way virgin ground
  * carries it, over the print nothing does, and what it leaves there is the old print. One that
  * comes at 25 mm is carried by virgin ground all the way. */
-static void test_slide_into_imprint(void **state) {
-    (void)state;
+TEST(test_slide_into_imprint) {
     MildSole *sole = kit_plate(3, 3);
-    MildMaterial m;
-    mild_material_preset("grass", &m);
+    MildMaterial m = kit_preset("grass");
     m.recovery = 0.0;
     m.c_g = 0.0;
     for (int deep = 0; deep < 2; deep++) {
@@ -58,8 +56,7 @@ static void test_slide_into_imprint(void **state) {
     mild_sole_destroy(sole);
 }
 
-static void test_labels(void **state) {
-    (void)state;
+TEST(test_labels) {
     static const int patterns[] = {MILD_PATTERN_NONE, MILD_PATTERN_STRIPES, MILD_PATTERN_CHECKER};
     for (int k = 0; k < 3; k++) {
         for (int count = 1; count <= 4; count++) {
@@ -68,9 +65,7 @@ static void test_labels(void **state) {
             def.patches = patterns[k];
             def.patch_count = count;
             MildMap *map = mild_map_create(&def, &error);
-            if (!map) {
-                fail_msg("%s", error.text);
-            }
+            expect_good(map != NULL, &error);
             assert_int_equal(mild_map_label_count(map), k ? count : 1);
             mild_map_destroy(map);
         }
@@ -79,8 +74,7 @@ static void test_labels(void **state) {
 
 /* Stripes look along x only, so they may blend over a border that is too much work for a
  * checker. */
-static void test_work_of_borders(void **state) {
-    (void)state;
+TEST(test_work_of_borders) {
     for (int checker = 0; checker < 2; checker++) {
         MildError error = {0};
         MildMapDef def = mild_map_def_default();
@@ -98,11 +92,4 @@ static void test_work_of_borders(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_slide_into_imprint),
-        cmocka_unit_test(test_labels),
-        cmocka_unit_test(test_work_of_borders),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -8,8 +8,7 @@ static double uniform(uint64_t *random, double low, double high) {
     return kit_uniform(random, low, high);
 }
 
-static void test_pow(void **state) {
-    (void)state;
+TEST(test_pow) {
     uint64_t random = 3;
     double worst = 0.0;
     for (int i = 0; i < 200000; i++) {
@@ -34,8 +33,7 @@ static double quadrature(double n, double begin, double way) {
     return sum / (3.0 * PARTS);
 }
 
-static void test_way(void **state) {
-    (void)state;
+TEST(test_way) {
     uint64_t random = 5;
     double worst[3] = {0.0, 0.0, 0.0};
     for (int i = 0; i < 3000; i++) {
@@ -86,8 +84,7 @@ static double pressure(const MildMaterial *m, double depth) {
 
 /* Wong 2008, table 2.3, and the Lunar Sourcebook: friction angle and cohesion. Friction is held by
  * shear alone, over a bed that is out of reach. */
-static void test_soils(void **state) {
-    (void)state;
+TEST(test_soils) {
     static const struct {
         const char *name;
         double angle, cohesion; /* [degrees], [N/m^2] */
@@ -107,8 +104,7 @@ static void test_soils(void **state) {
 }
 
 /* (k_c/b + k_phi) z^n with a calculator, b = 0.1 m. */
-static void test_published(void **state) {
-    (void)state;
+TEST(test_published) {
     static const struct {
         const char *name;
         double depth;    /* [m] */
@@ -149,12 +145,10 @@ static MildSole *rectangle(double length, double width) {
 
 /* Bekker's b is the shorter side of the sole, whichever way it lies, and of the one element in its
  * place, unless the material names another. */
-static void test_width(void **state) {
-    (void)state;
+TEST(test_width) {
     static const double sides[][2] = {{0.3, 0.2}, {0.2, 0.3}, {0.15, 0.1}, {0.1, 0.1}};
     MildError error = {0};
-    MildMaterial clay;
-    assert_true(mild_material_preset("clay", &clay));
+    MildMaterial clay = kit_preset("clay");
     for (size_t i = 0; i < sizeof sides / sizeof *sides; i++) {
         const double b = fmin(sides[i][0], sides[i][1]), load = 3000.0;
         MildSole *sole = rectangle(sides[i][0], sides[i][1]);
@@ -183,16 +177,14 @@ static void test_width(void **state) {
 
 /* A level plate 20 mm deep, dragged along x at a constant speed: friction by load against
  * (c A + mu N)(1 - exp(-j/K)). */
-static void test_shear(void **state) {
-    (void)state;
+TEST(test_shear) {
     static const char *const names[3] = {"dry_sand", "snow", "lunar_soil"};
     const double speed = 0.05, dt = 1e-3;
     MildSole *plate = kit_plate(4, 3);
     const double area = 12.0 * KIT_PITCH * KIT_PITCH;
     double worst = 0.0;
     for (int g = 0; g < 3; g++) {
-        MildMaterial m;
-        assert_true(mild_material_preset(names[g], &m));
+        MildMaterial m = kit_preset(names[g]);
         Kit kit;
         kit_open(&kit, 1, plate, NULL, &m, dt);
         kit.input.velocity[0][2] = kit.input.free_velocity[2] = -0.02;
@@ -238,8 +230,7 @@ static double restitution(double d, double speed) {
     return low / speed;
 }
 
-static void test_restitution(void **state) {
-    (void)state;
+TEST(test_restitution) {
     static const double speeds[3] = {0.02, 0.1, 0.5};
     MildSole *plate = kit_plate(4, 3);
     MildMaterial m = mild_material_default();
@@ -275,8 +266,7 @@ static void test_restitution(void **state) {
 }
 
 /* The same force at the same depth and speed, whatever happened before; and none that pulls. */
-static void test_no_memory(void **state) {
-    (void)state;
+TEST(test_no_memory) {
     MildSole *plate = kit_plate(4, 3);
     MildMaterial m = mild_material_default(); /* whose sand is plastic */
     m.model = MILD_MODEL_HUNT_CROSSLEY;
@@ -320,8 +310,7 @@ static void test_no_memory(void **state) {
 
 /* A foot on a patch of one model, on terrain of all five, moves as on that model alone: the loop
  * that has every curve against the one that has only its own. */
-static void test_together(void **state) {
-    (void)state;
+TEST(test_together) {
     static const MildModel models[5] = {MILD_MODEL_MILD, MILD_MODEL_BEKKER,
                                         MILD_MODEL_HUNT_CROSSLEY, MILD_MODEL_ECC_QUASI,
                                         MILD_MODEL_ECC_QUASI_3D};
@@ -359,12 +348,4 @@ static void test_together(void **state) {
     assert_true(worst < 1e-9);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_pow),         cmocka_unit_test(test_way),
-        cmocka_unit_test(test_published),   cmocka_unit_test(test_width),
-        cmocka_unit_test(test_soils),       cmocka_unit_test(test_shear),
-        cmocka_unit_test(test_restitution), cmocka_unit_test(test_no_memory),
-        cmocka_unit_test(test_together)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

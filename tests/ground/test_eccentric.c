@@ -117,8 +117,7 @@ static void pressed(const MildMaterial *m, const MildSole *sole, double depth, d
     kit_close(&kit);
 }
 
-static void test_tilted_plate(void **state) {
-    (void)state;
+TEST(test_tilted_plate) {
     static const char *const grounds[3] = {"sand_loose", "foam45", "rubber"};
     MildSole *plate = kit_plate(LENGTH, WIDTH);
     MildError error = {0};
@@ -162,7 +161,4 @@ static void test_tilted_plate(void **state) {
                 0.02); /* the raster: 11 cells along the tilt, some of them cut by the surface */
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_tilted_plate)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -1,4 +1,4 @@
-/* The element's step in float, as a GPU runs it, against the same text in double. */
+/* The element's step in float, as a GPU runs it, against the same code in double. */
 #include "ground_kit.h"
 
 #define ELEMENT_STEP element_step_double
@@ -87,8 +87,7 @@ static void worst_of_step(double *worst, const ElementCase *c, const ElementResu
     }
 }
 
-static void test_float(void **state) {
-    (void)state;
+TEST(test_float) {
     static const char *const names[4] = {"normal", "tangent", "derivatives", "memory"};
     double worst[4] = {0.0};
     int loaded = 0, total = 0;
@@ -117,7 +116,4 @@ static void test_float(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_float)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -45,8 +45,7 @@ static double printed_force(const MildMaterial *m, double pitch, double u, doubl
 
 /* The force of the state before the step, on the way up too and in an imprint, whatever the step
  * does. */
-static void normals_are_printed(void **state) {
-    (void)state;
+TEST(normals_are_printed) {
     const double speeds[] = {0.0, 0.3, -0.3};
     for (int i = 0; i < 9; i++) {
         const double depth = 0.004 + 0.01 * (i / 3), w = speeds[i % 3];
@@ -82,8 +81,7 @@ static void slid(const Kit *kit, int k, double v[2]) {
 }
 
 /* Eq 13 at its fixed point: an element is at rest, or at its bound against its motion. */
-static void friction_is_a_cone(void **state) {
-    (void)state;
+TEST(friction_is_a_cone) {
     int stuck = 0, sliding = 0;
     for (int i = 0; i < 12; i++) {
         Kit kit;
@@ -117,8 +115,7 @@ static void friction_is_a_cone(void **state) {
 }
 
 /* Eq 14 against the velocity before the step: without friction it is all that is left. */
-static void drift_is_printed(void **state) {
-    (void)state;
+TEST(drift_is_printed) {
     Kit kit;
     open_kit(&kit, 0.02, 1e-3);
     MildMaterial *m = &kit.terrain.materials[0];
@@ -174,8 +171,7 @@ static double kept(MildSolver solver) {
 
 /* Sand keeps the work of a footprint; the printed force gives it back, and by a step's delay more
  * than it took. */
-static void work_comes_back(void **state) {
-    (void)state;
+TEST(work_comes_back) {
     const double newton = kept(MILD_SOLVER_NEWTON), literal = kept(MILD_SOLVER_EXPLICIT);
     print_message("of the work of an imprint the ground keeps: newton %.3f, explicit %.3f\n",
                   newton, literal);
@@ -183,9 +179,4 @@ static void work_comes_back(void **state) {
     assert_true(literal < 0.0 && literal > -0.2);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(normals_are_printed), cmocka_unit_test(friction_is_a_cone),
-        cmocka_unit_test(drift_is_printed), cmocka_unit_test(work_comes_back)};
-    return cmocka_run_group_tests(tests, open_plate, close_plate);
-}
+TEST_MAIN(open_plate, close_plate)

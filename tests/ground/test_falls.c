@@ -37,11 +37,6 @@ static int choose(uint64_t *random, int count) {
     return (int)((x ^ (x >> 31)) % (uint64_t)count);
 }
 
-/* Log-uniform. */
-static double spread(uint64_t *random, double low, double high) {
-    return exp(kit_uniform(random, log(low), log(high)));
-}
-
 /* A third of the numbers: an end of the range or anything in it. */
 static void draw_fields(uint64_t *random, MildMaterial *m) {
     for (int i = 0; i < mild_material_field_count - 5; i++) {
@@ -54,7 +49,7 @@ static void draw_fields(uint64_t *random, MildMaterial *m) {
         if (how == 2 || (how == 3 && field->min < 0)) {
             value = kit_uniform(random, field->min, field->max);
         } else if (how == 3) {
-            value = spread(random, fmax(field->min, field->max * 1e-9), field->max);
+            value = kit_spread(random, fmax(field->min, field->max * 1e-9), field->max);
         }
         *(double *)(void *)((char *)m + field->offset) = value;
     }
@@ -64,8 +59,8 @@ static MildMaterial draw_material(uint64_t *random, int kind) {
     MildMaterial m;
     mild_material_preset(mild_material_preset_name(choose(random, mild_material_preset_count())),
                          &m);
-    m.k_pen = spread(random, 8, 1400);
-    m.sigma_cone = spread(random, 1e4, 2.4e5);
+    m.k_pen = kit_spread(random, 8, 1400);
+    m.sigma_cone = kit_spread(random, 1e4, 2.4e5);
     m.alpha = kit_uniform(random, 0.698, 1.31);
     m.nu = kit_uniform(random, 0.8, 2.4);
     m.c_g = kit_uniform(random, -1.4, 4.6);
@@ -78,8 +73,8 @@ static MildMaterial draw_material(uint64_t *random, int kind) {
         draw_fields(random, &m);
     }
     uint64_t own = *random; /* of slip: the seeds in `gained` keep their bodies */
-    m.slip_length = kind == ANY && choose(&own, 2) ? spread(&own, 1e-4, 1) : 0;
-    m.regain_length = spread(&own, 1e-4, 1);
+    m.slip_length = kind == ANY && choose(&own, 2) ? kit_spread(&own, 1e-4, 1) : 0;
+    m.regain_length = kit_spread(&own, 1e-4, 1);
     m.grip = choose(&own, 2) ? kit_uniform(&own, 0, 1) : 0;
     m.refill = choose(&own, 2) ? kit_uniform(&own, 0, 1) : 0;
     m.slip_growth = choose(&own, 2) ? kit_uniform(&own, 0, 1) : 0;
@@ -88,9 +83,9 @@ static MildMaterial draw_material(uint64_t *random, int kind) {
 }
 
 static MildSole *draw_sole(uint64_t *random) {
-    const double length = spread(random, 0.02, 0.3), width = spread(random, 0.02, 0.15);
+    const double length = kit_spread(random, 0.02, 0.3), width = kit_spread(random, 0.02, 0.15);
     const double x = length / 2, y = width / 2;
-    double pitch = choose(random, 4) ? KIT_PITCH : spread(random, 0.004, 0.06);
+    double pitch = choose(random, 4) ? KIT_PITCH : kit_spread(random, 0.004, 0.06);
     pitch = fmax(pitch, sqrt(length * width / 3000));
     const double outline[8] = {-x, -y, x, -y, x, y, -x, y};
     const MildSoleDef def = {
@@ -121,12 +116,6 @@ static int draw_ground(uint64_t *random, int kind, MildMaterial *m, MildSole **s
         mild_sole_destroy(raster);
     }
     return good;
-}
-
-static void draw_vector(uint64_t *random, double low, double high, double *x) {
-    for (int k = 0; k < 3; k++) {
-        x[k] = kit_uniform(random, low, high);
-    }
 }
 
 /* World vector from the centre of mass to a point of the body. */
@@ -171,10 +160,10 @@ static void draw_motion(Body *b, uint64_t *random) {
     for (int k = 0; k < 3; k++) {
         b->velocity[k] = kit_uniform(random, k == 2 ? -3 : -2, k == 2 ? 0 : 2);
     }
-    draw_vector(random, -1, 1, b->spin);
+    kit_vector(random, 1, b->spin);
     if (!choose(random, 5)) {
         double turn[3];
-        draw_vector(random, -3, 3, turn);
+        kit_vector(random, 3, turn);
         kit_rotate(b->rotation, turn);
     }
     if (!choose(random, 8)) {
@@ -193,12 +182,12 @@ static int body_draw(Body *b, uint64_t *random, int kind) {
     b->feet = 1 + choose(random, 2);
     const int tiles = choose(random, 2) ? 0 : 8 * (1 + choose(random, 4));
     const double height = kit_uniform(random, -1, 1);
-    b->mass = spread(random, 0.3, 60);
-    b->inertia = b->mass * spread(random, 4e-4, 0.04);
-    const double dt = spread(random, 5e-4, 5e-3);
+    b->mass = kit_spread(random, 0.3, 60);
+    b->inertia = b->mass * kit_spread(random, 4e-4, 0.04);
+    const double dt = kit_spread(random, 5e-4, 5e-3);
     if (kind == ANY) {
-        b->mass = spread(random, 1e-3, 1e5);
-        b->inertia = b->mass * spread(random, 1e-6, 1);
+        b->mass = kit_spread(random, 1e-3, 1e5);
+        b->inertia = b->mass * kit_spread(random, 1e-6, 1);
     }
     kit_open(&b->kit, b->feet, b->sole, b->sole, &m, dt);
     kit_prints(&b->kit, tiles);
@@ -209,7 +198,7 @@ static int body_draw(Body *b, uint64_t *random, int kind) {
     draw_levers(b, random);
     kit_uniform(random, 0, 0.3); /* keeps the numbers of the seeds above */
     draw_motion(b, random);
-    b->center[2] = height - lowest(b) + spread(random, 1e-4, 0.5);
+    b->center[2] = height - lowest(b) + kit_spread(random, 1e-4, 0.5);
     return 1;
 }
 
@@ -358,8 +347,7 @@ static void falls_print(const char *name, const Falls *all) {
         all->spun_least);
 }
 
-static void falls_gain_nothing(void **state) {
-    (void)state;
+TEST(falls_gain_nothing) {
     static const char *const names[KINDS] = {"robots", "anything"};
     for (int kind = 0; kind < KINDS; kind++) {
         Falls all = {.spun_least = INFINITY};
@@ -375,8 +363,7 @@ static void falls_gain_nothing(void **state) {
 
 /* They bounce within one step. docs/model.md section 17 derives that friction gives at most 32 % of
  * the kinetic energy there. */
-static void a_bounce_within_a_step_gains_little(void **state) {
-    (void)state;
+TEST(a_bounce_within_a_step_gains_little) {
     Falls all = {.spun_least = INFINITY};
     for (size_t i = 0; i < sizeof gained / sizeof *gained; i++) {
         fall_once(gained[i], ANY, &all);
@@ -392,7 +379,5 @@ int main(int argc, char **argv) {
     if (argc > 2) {
         first = strtoull(argv[2], NULL, 10);
     }
-    const struct CMUnitTest tests[] = {cmocka_unit_test(falls_gain_nothing),
-                                       cmocka_unit_test(a_bounce_within_a_step_gains_little)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_cases(NULL, NULL);
 }

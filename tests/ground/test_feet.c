@@ -67,8 +67,7 @@ static double together_and_alone(int feet, MildSolver solver, const MildMaterial
     return worst;
 }
 
-static void test_together_as_alone(void **state) {
-    (void)state;
+TEST(test_together_as_alone) {
     static const char *const names[] = {"newton", "sweeps"};
     static const MildSolver solvers[] = {MILD_SOLVER_NEWTON, MILD_SOLVER_GAUSS_SEIDEL};
     MildMaterial sand = mild_material_default();
@@ -175,8 +174,7 @@ static void near_as_all(MildSolver solver, const MildMap *map) {
     mild_sole_destroy(sole[1]);
 }
 
-static void test_near_as_all(void **state) {
-    (void)state;
+TEST(test_near_as_all) {
     MildMapDef def = mild_map_def_default();
     def.kind = MILD_MAP_ROUGH;
     def.size = 20.0;
@@ -191,8 +189,7 @@ static void test_near_as_all(void **state) {
 
 /* Rough ground, then level ground, on which nothing may be left of the slopes: the same steps with
  * and without the question which feet are near. */
-static void test_near_forgets_slopes(void **state) {
-    (void)state;
+TEST(test_near_forgets_slopes) {
     MildSole *sole[2] = {kit_sole(0, 77), kit_sole(1, 77)};
     MildMaterial sand = mild_material_default();
     MildMapDef def = mild_map_def_default();
@@ -227,8 +224,7 @@ static void test_near_forgets_slopes(void **state) {
 }
 
 /* No rows at all, rows of feet that do not exist, and no matrix. */
-static void test_refused_rows(void **state) {
-    (void)state;
+TEST(test_refused_rows) {
     MildSole *sole[2] = {kit_sole(0, 77), kit_sole(1, 77)};
     MildMaterial sand = mild_material_default();
     MildError error;
@@ -253,9 +249,4 @@ static void test_refused_rows(void **state) {
     mild_sole_destroy(sole[1]);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_together_as_alone), cmocka_unit_test(test_near_as_all),
-        cmocka_unit_test(test_near_forgets_slopes), cmocka_unit_test(test_refused_rows)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

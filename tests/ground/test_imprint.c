@@ -89,8 +89,7 @@ static double *sample(double x, double y, double angle, int k) {
 /* Random presses, turned any way, over 2 x 4 tiles about the origin, which one set can hold. An
  * element that comes down finds the mean of the cells below its 9 points, and does nothing above
  * that. Deeper, it makes each of these cells as deep as itself. Cells are rounded to 10 um. */
-static void test_against_an_array(void **state) {
-    (void)state;
+TEST(test_against_an_array) {
     Stamp stamp;
     stamp_open(&stamp, 8);
     const size_t bytes = mild_ground_size(stamp.ground);
@@ -143,8 +142,7 @@ static void test_against_an_array(void **state) {
 
 /* Eight tiles are a set. A ninth takes the place of the one that was changed longest ago, of which
  * nothing is left. */
-static void test_the_oldest_goes(void **state) {
-    (void)state;
+TEST(test_the_oldest_goes) {
     static const double kept[8] = {1.5e-3, 0.0, 3e-3, 4e-3, 5e-3, 6e-3, 7e-3, 8e-3};
     Stamp stamp;
     stamp_open(&stamp, 8);
@@ -163,8 +161,7 @@ static void test_the_oldest_goes(void **state) {
 }
 
 /* Several sets hold more: of 40 tiles in 128 none is lost when no set gets more than eight. */
-static void test_sets(void **state) {
-    (void)state;
+TEST(test_sets) {
     Stamp stamp;
     stamp_open(&stamp, 128);
     int kept = 0;
@@ -180,8 +177,7 @@ static void test_sets(void **state) {
     stamp_close(&stamp);
 }
 
-static void test_ends_of_the_range(void **state) {
-    (void)state;
+TEST(test_ends_of_the_range) {
     Stamp stamp;
     stamp_open(&stamp, 8);
     static const double depth[5] = {4e-6, 6e-6, 0.0123456, 0.65535, 0.7},
@@ -214,8 +210,7 @@ static void test_ends_of_the_range(void **state) {
 }
 
 /* Where the ground flows back an imprint may become shallower, up to the surface. */
-static void test_fill(void **state) {
-    (void)state;
+TEST(test_fill) {
     static const double share[4] = {0.5, 0.5, 0.9, 1.0}, depth[4] = {0.04, 0.03, 0.05, 0.01};
     Stamp stamp;
     stamp_open(&stamp, 8);
@@ -229,8 +224,7 @@ static void test_fill(void **state) {
 
 /* An element that slides leaves an imprint in each cell that it slides out of, and none while it
  * stays in one. */
-static void test_slides(void **state) {
-    (void)state;
+TEST(test_slides) {
     static const double way[4][2] = {{0.004, 0.004}, {0.006, 0.0}, {0.0, 0.006}, {0.0, -0.007}};
     Stamp stamp;
     stamp_open(&stamp, 8);
@@ -244,8 +238,7 @@ static void test_slides(void **state) {
 }
 
 /* Tiles come in sets of eight, of 8 bytes for place and time and 64 cells of 2 bytes. */
-static void test_sizes(void **state) {
-    (void)state;
+TEST(test_sizes) {
     static const int tiles[5] = {-1, 0, 1, 8, 9}, whole[5] = {0, 0, 8, 8, 16};
     Stamp stamp;
     stamp_open(&stamp, 0);
@@ -263,13 +256,4 @@ static void test_sizes(void **state) {
     stamp_close(&stamp);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_against_an_array),
-                                       cmocka_unit_test(test_the_oldest_goes),
-                                       cmocka_unit_test(test_sets),
-                                       cmocka_unit_test(test_ends_of_the_range),
-                                       cmocka_unit_test(test_fill),
-                                       cmocka_unit_test(test_slides),
-                                       cmocka_unit_test(test_sizes)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -17,8 +17,7 @@ static const MildField sample_fields[] = {
 };
 #define SAMPLE_FIELDS 5
 
-static void test_field_parse(void **state) {
-    (void)state;
+TEST(test_field_parse) {
     static const char *const good[SAMPLE_FIELDS] = {" 0.1, -0.25", "7", "yes",
                                                     "18446744073709551615", "abc def"};
     static const struct {
@@ -58,8 +57,7 @@ static void test_field_parse(void **state) {
     }
 }
 
-static void test_field_print(void **state) {
-    (void)state;
+TEST(test_field_print) {
     uint64_t random = 3;
     MildError error;
     char text[64], small[4];
@@ -83,8 +81,7 @@ static void test_field_print(void **state) {
     }
 }
 
-static void test_field_find(void **state) {
-    (void)state;
+TEST(test_field_find) {
     const char *nearest;
     assert_null(mild_field_find(mild_material_fields, mild_material_field_count, "kpen", &nearest));
     assert_string_equal(nearest, "k_pen");
@@ -95,8 +92,7 @@ static void test_field_find(void **state) {
         mild_field_find(mild_material_fields, mild_material_field_count, "mu", &nearest));
 }
 
-static void test_material_refused(void **state) {
-    (void)state;
+TEST(test_material_refused) {
     for (int f = 0; f < mild_material_field_count; f++) {
         const MildField *field = &mild_material_fields[f];
         if (field->type != MILD_FIELD_DOUBLE) {
@@ -115,8 +111,7 @@ static void test_material_refused(void **state) {
     }
 }
 
-static void test_terrain(void **state) {
-    (void)state;
+TEST(test_terrain) {
     MildMaterial m = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&m);
     MildError error = {0};
@@ -152,8 +147,7 @@ static void test_terrain(void **state) {
     assert_error(&error, MILD_ERROR_ARGUMENT, "terrain.patch_count 16");
 }
 
-static void test_sole_counts(void **state) {
-    (void)state;
+TEST(test_sole_counts) {
     for (int target = 0; target <= 77; target += 77) {
         MildSole *left = kit_sole(0, target), *right = kit_sole(1, target);
         int n = mild_sole_elements(left);
@@ -188,8 +182,7 @@ static void test_sole_counts(void **state) {
 }
 
 /* An L of four whole cells, wherever it lies: each is one element, column by column. */
-static void test_sole_places(void **state) {
-    (void)state;
+TEST(test_sole_places) {
     static const double corner[12] = {0, 0, 3, 0, 3, 1, 1, 1, 1, 2, 0, 2};
     static const double place[4][2] = {{0.5, 0.5}, {0.5, 1.5}, {1.5, 0.5}, {2.5, 0.5}};
     for (int target = 0; target <= 4; target += 4) {
@@ -211,8 +204,7 @@ static void test_sole_places(void **state) {
 }
 
 /* The raster may have 65536 cells, a border of one around the outline's box included. */
-static void test_sole_sizes(void **state) {
-    (void)state;
+TEST(test_sole_sizes) {
     for (int more = 0; more < 2; more++) {
         const double edge = 0.254 + 0.0001 * more;
         double box[8] = {0, 0, edge, 0, edge, 0.25399, 0, 0.25399};
@@ -229,8 +221,7 @@ static void test_sole_sizes(void **state) {
     }
 }
 
-static void test_sole_refused(void **state) {
-    (void)state;
+TEST(test_sole_refused) {
     double square[8] = {0, 0, 0.1, 0, 0.1, 0.1, 0, 0.1}, bow[8] = {0, 0, 0.1, 0.1, 0.1, 0, 0, 0.12};
     static double many[2 * 5000];
     double line[8] = {0, 0, 0.1, 0, 0.2, 0, 0.3, 0}, nan[8] = {0, 0, NAN, 0, 0.1, 0.1, 0, 0.1};
@@ -259,8 +250,7 @@ static void test_sole_refused(void **state) {
 /* Every number of a standing foot's input in turn becomes NaN, infinite or huge: the step comes
  * back, and what it calls converged is finite. The fuzz target tests/fuzz/fuzz_solve.c goes
  * further. */
-static void test_hostile_numbers(void **state) {
-    (void)state;
+TEST(test_hostile_numbers) {
     static const double hostile[] = {NAN, INFINITY, -INFINITY, 1e300, -1e300};
     int refused = 0, tried = 0;
     for (int test = 0; test < 2 * 5 * 60; test++) {
@@ -301,8 +291,7 @@ static void test_hostile_numbers(void **state) {
 
 /* A material that nobody checked: a step on NaN is not called converged, the next one on sound
  * ground is. */
-static void test_hostile_material(void **state) {
-    (void)state;
+TEST(test_hostile_material) {
     static const char *const used[] = {"k_pen",   "sigma_cone", "alpha",    "nu",
                                        "phi",     "rho",        "mu",       "k_drift",
                                        "b_drift", "recovery",   "bed_depth"};
@@ -333,13 +322,4 @@ static void test_hostile_material(void **state) {
     mild_sole_destroy(sole);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_field_parse),     cmocka_unit_test(test_field_print),
-        cmocka_unit_test(test_field_find),      cmocka_unit_test(test_material_refused),
-        cmocka_unit_test(test_terrain),         cmocka_unit_test(test_sole_counts),
-        cmocka_unit_test(test_sole_places),     cmocka_unit_test(test_sole_sizes),
-        cmocka_unit_test(test_sole_refused),    cmocka_unit_test(test_hostile_numbers),
-        cmocka_unit_test(test_hostile_material)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -6,8 +6,7 @@
 
 /* Waves and steps at random points: at grid points the formula, between them within the error of
  * bilinear interpolation, (2 pi/wavelength)^2 amplitude cell^2/8. */
-static void test_shapes(void **state) {
-    (void)state;
+TEST(test_shapes) {
     uint64_t random = 41;
     const double k = 2.0 * acos(-1.0) / 0.7, amplitude = 0.03;
     MildMapDef def = shape(MILD_MAP_WAVES, amplitude, 0.7);
@@ -58,8 +57,7 @@ static void test_shapes(void **state) {
     mild_map_destroy(map);
 }
 
-static void test_rough(void **state) {
-    (void)state;
+TEST(test_rough) {
     uint64_t random = 42;
     MildMapDef def = shape(MILD_MAP_ROUGH, 0.04, 0.25);
     def.size = 4.0;
@@ -86,8 +84,7 @@ static void test_rough(void **state) {
 
 /* Rough ground is random at points a wavelength apart, and between them follows 3 t^2 - 2 t^3:
  * 5/32 a quarter on, 1/2 in the middle, along both axes. */
-static void test_rough_between(void **state) {
-    (void)state;
+TEST(test_rough_between) {
     static const double share[4] = {0.0, 5.0 / 32.0, 0.5, 27.0 / 32.0};
     MildMapDef def = shape(MILD_MAP_ROUGH, 0.04, 0.25);
     def.size = 2.0;
@@ -122,8 +119,7 @@ static void assert_range(const MildMap *map, double low, double high) {
 }
 
 /* Lowest and highest point, the length after which it repeats, and the number of labels. */
-static void test_measures(void **state) {
-    (void)state;
+TEST(test_measures) {
     MildMapDef def = shape(MILD_MAP_WAVES, 0.03, 0.8); /* 40 cells: the crests are grid points */
     double x, y;
     MildMap *map = make_map(&def);
@@ -163,8 +159,7 @@ static void test_measures(void **state) {
 }
 
 /* What only becomes visible with a kind is usable as it is: uneven by some mm to some dm. */
-static void test_defaults(void **state) {
-    (void)state;
+TEST(test_defaults) {
     for (int kind = MILD_MAP_SLOPE; kind <= MILD_MAP_MIXED; kind++) {
         for (int patches = MILD_PATTERN_NONE; patches <= MILD_PATTERN_CHECKER; patches++) {
             MildMapDef def = mild_map_def_default();
@@ -192,8 +187,7 @@ static void test_defaults(void **state) {
 
 /* A tilted plane as an image: bilinear interpolation gives it exactly (float heights: a relative
  * 6e-8), slopes too; beyond the border its last height goes on. */
-static void test_plane(void **state) {
-    (void)state;
+TEST(test_plane) {
     enum { COLUMNS = 33, ROWS = 17 };
     uint64_t random = 43;
     static double heights[ROWS * COLUMNS];
@@ -227,8 +221,7 @@ static void test_plane(void **state) {
     mild_map_destroy(map);
 }
 
-static void test_patterns(void **state) {
-    (void)state;
+TEST(test_patterns) {
     MildMapDef def = mild_map_def_default();
     def.patches = MILD_PATTERN_STRIPES;
     def.patch_count = 3;
@@ -281,8 +274,7 @@ static void test_patterns(void **state) {
     mild_map_destroy(map);
 }
 
-static void test_refused(void **state) {
-    (void)state;
+TEST(test_refused) {
     static const double bad_heights[4] = {0, 0, NAN, 0};
     static const unsigned char labels[1] = {1};
     struct {
@@ -332,8 +324,7 @@ static void assert_number(MapNumber found, double number) {
 }
 
 /* A GPU's view of a map has the lengths of the map. */
-static void test_view(void **state) {
-    (void)state;
+TEST(test_view) {
     uint64_t random = 3;
     for (int draw = 0; draw < 500; draw++) {
         MildMapDef def = shape(MILD_MAP_WAVES, 0.03, kit_uniform(&random, 0.3, 2.0));
@@ -354,8 +345,7 @@ static void test_view(void **state) {
     }
 }
 
-static void test_bytes(void **state) {
-    (void)state;
+TEST(test_bytes) {
     MildMapDef waves = shape(MILD_MAP_WAVES, 0.03, 0.8), rough = shape(MILD_MAP_ROUGH, 0.03, 0.4);
     rough.patches = MILD_PATTERN_CHECKER;
     rough.border = 0.1;
@@ -369,12 +359,4 @@ static void test_bytes(void **state) {
     mild_map_destroy(large);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_shapes),        cmocka_unit_test(test_rough),
-        cmocka_unit_test(test_rough_between), cmocka_unit_test(test_measures),
-        cmocka_unit_test(test_defaults),      cmocka_unit_test(test_plane),
-        cmocka_unit_test(test_patterns),      cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_bytes),         cmocka_unit_test(test_view)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -43,8 +43,7 @@ void *aligned_alloc(size_t alignment, size_t size) {
 }
 #endif
 
-static void test_no_allocation(void **state) {
-    (void)state;
+TEST(test_no_allocation) {
     uint64_t random = 31;
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
     MildMaterial m = mild_material_default();
@@ -69,8 +68,7 @@ static void test_no_allocation(void **state) {
     mild_sole_destroy(right);
 }
 
-static void test_failing_allocation(void **state) {
-    (void)state;
+TEST(test_failing_allocation) {
     if (!COUNTING) {
         skip();
     }
@@ -103,8 +101,7 @@ static void test_failing_allocation(void **state) {
 }
 
 /* A surface grows its list, a mesh its pieces too; a step on it allocates nothing. */
-static void test_failing_surface(void **state) {
-    (void)state;
+TEST(test_failing_surface) {
     if (!COUNTING) {
         skip();
     }
@@ -139,8 +136,7 @@ static void test_failing_surface(void **state) {
     mild_sole_destroy(sole);
 }
 
-static void test_bad_numbers(void **state) {
-    (void)state;
+TEST(test_bad_numbers) {
     uint64_t random = 32;
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
     MildMaterial m = mild_material_default();
@@ -176,8 +172,7 @@ static void test_bad_numbers(void **state) {
 }
 
 /* A robot's ground is small enough for thousands of robots. */
-static void test_state_bytes(void **state) {
-    (void)state;
+TEST(test_state_bytes) {
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
     const MildSole *soles[2] = {left, right};
     size_t bytes = mild_ground_bytes(soles, 2);
@@ -189,11 +184,9 @@ static void test_state_bytes(void **state) {
 
 /* A foot that is taken away in the middle of an impact leaves a ground as it was before, byte for
  * byte. */
-static void test_taken_away(void **state) {
-    (void)state;
+TEST(test_taken_away) {
     MildSole *sole = kit_plate(3, 3);
-    MildMaterial m;
-    assert_true(mild_material_preset("sand_loose", &m));
+    MildMaterial m = kit_preset("sand_loose");
     Kit kit, fresh;
     kit_open(&kit, 1, sole, NULL, &m, 1e-3);
     kit_open(&fresh, 1, sole, NULL, &m, 1e-3);
@@ -220,8 +213,7 @@ static void test_taken_away(void **state) {
     mild_sole_destroy(sole);
 }
 
-static void test_copy_continues(void **state) {
-    (void)state;
+TEST(test_copy_continues) {
     uint64_t random = 33;
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
     MildMaterial m = mild_material_default();
@@ -251,8 +243,7 @@ static void test_copy_continues(void **state) {
 }
 
 /* A saved block is taken back; one that no ground wrote is refused, and nothing changes. */
-static void test_restore(void **state) {
-    (void)state;
+TEST(test_restore) {
     uint64_t random = 35;
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
     MildMaterial m = mild_material_default();
@@ -292,14 +283,4 @@ static void test_restore(void **state) {
     mild_sole_destroy(right);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_restore),
-                                       cmocka_unit_test(test_no_allocation),
-                                       cmocka_unit_test(test_failing_allocation),
-                                       cmocka_unit_test(test_failing_surface),
-                                       cmocka_unit_test(test_bad_numbers),
-                                       cmocka_unit_test(test_taken_away),
-                                       cmocka_unit_test(test_copy_continues),
-                                       cmocka_unit_test(test_state_bytes)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -10,16 +10,6 @@ static const double pi = 3.14159265358979323846;
 
 /* ---- soles ---- */
 
-static MildSole *sole_of(const double *outline, int points, double pitch) {
-    MildSoleDef def = {outline, points, pitch, KIT_SOLE_Z, 0};
-    MildError error = {0};
-    MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) {
-        fail_msg("%s", error.text);
-    }
-    return sole;
-}
-
 static MildSole *disc(double radius, double pitch) {
     enum { POINTS = 128 };
     double outline[2 * POINTS];
@@ -27,13 +17,7 @@ static MildSole *disc(double radius, double pitch) {
         outline[2 * i] = radius * cos(2 * pi * i / POINTS);
         outline[2 * i + 1] = radius * sin(2 * pi * i / POINTS);
     }
-    return sole_of(outline, POINTS, pitch);
-}
-
-static MildSole *rectangle(double length, double width, double pitch) {
-    const double x = length / 2, y = width / 2;
-    const double outline[] = {-x, -y, x, -y, x, y, -x, y};
-    return sole_of(outline, 4, pitch);
+    return kit_sole_of(outline, POINTS, pitch, 0);
 }
 
 /* Numbers of grains: k0 = 1.895 MPa/m, kappa = 0.223 MPa/m; plastic, no bed, no mass. */
@@ -78,8 +62,7 @@ static double paper_force(const MildMaterial *m, double radius, double area, dou
     return force * depth / PANELS;
 }
 
-static void test_round(void **state) {
-    (void)state;
+TEST(test_round) {
     static const double radii[] = {0.02, 0.04, 0.06, 0.12};
     static const double pitches[] = {0.0195, 0.01, 0.005};
     double worst = 0.0;
@@ -106,12 +89,11 @@ static void test_round(void **state) {
 }
 
 /* The heap on a rectangle a x b has the volume a^2 (3 b - a)/12 times the slope. */
-static void test_heap(void **state) {
-    (void)state;
+TEST(test_heap) {
     static const double sides[][2] = {{0.039, 0.039}, {0.078, 0.0585}, {0.12, 0.06}, {0.2, 0.1}};
     for (int k = 0; k < 4; k++) {
         const double b = sides[k][0], a = sides[k][1], pitch = a / 3;
-        MildSole *sole = rectangle(b, a, pitch);
+        MildSole *sole = kit_rectangle(b, a, pitch, 0);
         double sum = 0.0;
         for (int i = 0; i < mild_sole_elements(sole); i++) {
             sum += mild_sole_edge(sole)[i] * pitch * pitch;
@@ -142,10 +124,9 @@ static double moved_mass(const MildMaterial *m, const MildSole *sole, double dep
  * in motion, in the end all of its heap, have the momentum that it came with, until the heap over
  * its edge is whole. What that goes on with is lost where the plate is slowed by the rest, for soil
  * never pulls. */
-static void test_momentum(void **state) {
-    (void)state;
+TEST(test_momentum) {
     const double length = 0.12, width = 0.06, mass = 3.0, speed = 1.5;
-    MildSole *sole = rectangle(length, width, 0.005);
+    MildSole *sole = kit_rectangle(length, width, 0.005, 0);
     MildMaterial m = grains(0.3);
     m.k_pen = 1e-3;
     m.sigma_cone = 0.0;
@@ -201,10 +182,9 @@ static void press_to(Kit *kit, double depth, int steps) {
 }
 
 /* A tilted plate: F = sum of s cos(theta) p(u). */
-static void test_tilt(void **state) {
-    (void)state;
+TEST(test_tilt) {
     static const double tilts[] = {0, 8, 15, 30};
-    MildSole *sole = rectangle(0.12, 0.06, 0.01);
+    MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
     const MildMaterial m = grains(0.104);
     for (int t = 0; t < 4; t++) {
         const double tilt = tilts[t] * pi / 180, c = cos(tilt), s = sin(tilt);
@@ -243,7 +223,7 @@ static double turned_moment(int model) {
     m.mu = 0.0;
     m.sigma_cone = model == MILD_MODEL_MILD ? 0.223e6 : 0.0; /* nothing but the heap */
     m.bed_depth = 10.0;
-    MildSole *sole = rectangle(1.0, 0.1, 0.005);
+    MildSole *sole = kit_rectangle(1.0, 0.1, 0.005, 0);
     Kit kit;
     kit_open(&kit, 1, sole, NULL, &m, 1e-3);
     press_to(&kit, 1.0, 500);
@@ -265,8 +245,7 @@ static double turned_moment(int model) {
     return fabs(moment) / (0.1 * load);
 }
 
-static void test_swipe(void **state) {
-    (void)state;
+TEST(test_swipe) {
     const double merged = turned_moment(MILD_MODEL_MILD_MERGED),
                  mild = turned_moment(MILD_MODEL_MILD);
     print_message("rotational swipe of a strip: merged %.4f (1/12 %.4f), mild %.4f (1/8)\n", merged,
@@ -278,12 +257,11 @@ static void test_swipe(void **state) {
 /* ---- slip ---- */
 
 /* A plate dragged at constant depth: F/F0 = 1/(1 + s/j0), at any step, for both models. */
-static void test_drag(void **state) {
-    (void)state;
+TEST(test_drag) {
     static const double steps[] = {0.25e-3, 1e-3, 2.5e-3, 5e-3};
     double worst = 0.0;
     for (int t = 0; t < 16; t++) {
-        MildSole *sole = rectangle(0.12, 0.06, 0.01);
+        MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
         MildMaterial m = grains(0.104);
         m.model = t / 4 % 2 ? MILD_MODEL_MILD : MILD_MODEL_MILD_MERGED;
         m.slip_length = 0.0019;
@@ -315,10 +293,9 @@ static void test_drag(void **state) {
 
 /* Fresh penetration gives the support back: 1 - lambda falls as exp(-da/u0), where u0 grows with the
  * depth as j0 does. Small steps: the share is held in each. */
-static void test_regain(void **state) {
-    (void)state;
+TEST(test_regain) {
     for (int grows = 0; grows < 2; grows++) {
-        MildSole *sole = rectangle(0.12, 0.06, 0.01);
+        MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
         MildMaterial m = grains(0.104);
         m.slip_length = 0.0019;
         m.regain_length = 0.00068;
@@ -350,9 +327,8 @@ static void test_regain(void **state) {
 
 /* A foot that slips under load sinks; the force of a sliding sole and its drag keep to grip's
  * bound. */
-static void test_sinks(void **state) {
-    (void)state;
-    MildSole *sole = rectangle(0.12, 0.06, 0.01);
+TEST(test_sinks) {
+    MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
     MildMaterial m = grains(0.104);
     double depth[2];
     for (int slips = 0; slips < 2; slips++) {
@@ -458,8 +434,7 @@ static double closed_motion(int number, double *scale) {
     return given;
 }
 
-static void test_closed(void **state) {
-    (void)state;
+TEST(test_closed) {
     double worst = -INFINITY, share = -INFINITY;
     int at = 0, gained = 0;
     for (int n = closed_first; n < closed_first + closed_count; n++) {
@@ -510,7 +485,7 @@ static double pumped(int model, double *paid) {
     m.slip_length = 1e-4;
     m.regain_length = 1e-4;
     m.mu = 0.0;
-    MildSole *sole = rectangle(0.12, 0.06, 0.01);
+    MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
     Kit kit;
     kit_open(&kit, 1, sole, NULL, &m, 5e-3);
     double given = 0.0;
@@ -532,8 +507,7 @@ static double pumped(int model, double *paid) {
     return given;
 }
 
-static void test_pumped(void **state) {
-    (void)state;
+TEST(test_pumped) {
     static const int models[] = {MILD_MODEL_MILD, MILD_MODEL_MILD_MERGED};
     for (int i = 0; i < 2; i++) {
         double work;
@@ -545,18 +519,11 @@ static void test_pumped(void **state) {
 }
 
 int main(int count, char **arguments) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_round),    cmocka_unit_test(test_heap),
-        cmocka_unit_test(test_momentum), cmocka_unit_test(test_tilt),
-        cmocka_unit_test(test_swipe),    cmocka_unit_test(test_drag),
-        cmocka_unit_test(test_regain),   cmocka_unit_test(test_sinks),
-        cmocka_unit_test(test_closed),   cmocka_unit_test(test_pumped)};
-    const struct CMUnitTest closed[] = {cmocka_unit_test(test_closed)};
     if (count > 1) { /* ground_test_merged COUNT FIRST */
         closed_count = atoi(arguments[1]);
         closed_first = count > 2 ? atoi(arguments[2]) : 0;
         closed_plain = count > 3; /* of mild, for comparison */
-        return cmocka_run_group_tests(closed, NULL, NULL);
+        cmocka_set_test_filter("test_closed");
     }
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_cases(NULL, NULL);
 }

@@ -91,8 +91,7 @@ static Relief relief_of(const MildTerrain *terrain, const MildTerrain *rough,
  * 3/16 each of the others, within three standard deviations (22 and 20); half of the pyramids
  * go up. Shares are uniform in [1/4, 1]: 225 have a mean of 0.625 within three times 0.0144. With
  * the next seed 81 % of the tiles have another relief, and all another share. */
-static void test_tiles(void **state) {
-    (void)state;
+TEST(test_tiles) {
     int count[RELIEFS] = {0};
     Relief last[TILES * TILES] = {LEVEL};
     double last_share[TILES * TILES] = {0};
@@ -136,8 +135,7 @@ static void test_tiles(void **state) {
 
 /* The height is 0 along all edges of tiles, and does not jump across them: beside an edge it is at
  * most that of a pyramid or of what fades. */
-static void test_edges(void **state) {
-    (void)state;
+TEST(test_edges) {
     uint64_t random = 44;
     double on = 0.0, beside = 0.0, repeat = 0.0;
     for (uint64_t seed = 1; seed <= SEEDS; seed++) {
@@ -165,8 +163,7 @@ static void test_edges(void **state) {
 }
 
 /* Bounds of height and gradient, the period, and that the map's plane is level. */
-static void test_bounds(void **state) {
-    (void)state;
+TEST(test_bounds) {
     uint64_t random = 45;
     for (uint64_t seed = 1; seed <= SEEDS; seed++) {
         MildMapDef def = mixed(seed);
@@ -211,8 +208,7 @@ static double difference(const MildMapDef *first, const MildMapDef *second) {
     return worst;
 }
 
-static void test_seeds(void **state) {
-    (void)state;
+TEST(test_seeds) {
     const MildMapDef one = mixed(1), again = mixed(1), two = mixed(2);
     assert_true(difference(&one, &again) == 0.0);
     assert_true(difference(&one, &two) > amplitude / 4);
@@ -220,8 +216,7 @@ static void test_seeds(void **state) {
 
 /* Where no whole number of cells fits in a tile they are made smaller, and edges stay at 0. Tiles
  * of 2 m are the smallest. */
-static void test_odd_sizes(void **state) {
-    (void)state;
+TEST(test_odd_sizes) {
     static const double sizes[4] = {10.0, 11.0, 17.3, 40.0}, cells[4] = {0.07, 0.3, 0.11, 0.04};
     uint64_t random = 46;
     for (int n = 0; n < 4; n++) {
@@ -245,9 +240,4 @@ static void test_odd_sizes(void **state) {
     assert_error(&error, MILD_ERROR_RANGE, "terrain.size 9.99 10");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_tiles), cmocka_unit_test(test_edges),
-                                       cmocka_unit_test(test_bounds), cmocka_unit_test(test_seeds),
-                                       cmocka_unit_test(test_odd_sizes)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -44,12 +44,6 @@ static MildMaterial rival_of(int model, const MildMaterial *mild) {
     return rival;
 }
 
-static MildMaterial preset(const char *name) {
-    MildMaterial m;
-    assert_true(mild_material_preset(name, &m));
-    return m;
-}
-
 /* ---- matching ---- */
 
 /* [m] by how much resistive force theory yields deeper than the element is, going straight down:
@@ -76,18 +70,15 @@ static double pressed_force(int model, const MildMaterial *material, double dept
     return force;
 }
 
-static void test_matched(void **state) {
-    (void)state;
+TEST(test_matched) {
     double worst_depth = 0.0, worst_force = 0.0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        MildMaterial mild = preset(mild_material_preset_name(p));
+        MildMaterial mild = kit_preset(mild_material_preset_name(p));
         double depth = mild_sole_sinkage(raster[0], &mild, LOAD);
         for (int model = 0; model < SOFT_MODELS; model++) {
             MildMaterial rival = rival_of(model, &mild);
             MildError error = {0};
-            if (mild_material_check(&rival, &error) != MILD_OK) {
-                fail_msg("%s", error.text);
-            }
+            expect_good(mild_material_check(&rival, &error) == MILD_OK, &error);
             double sinks = mild_sole_sinkage(sole_of(model, 0), &rival, LOAD);
             worst_depth = fmax(worst_depth, fabs(sinks - depth));
             double off = pressed_force(model, &rival, depth) / LOAD - 1.0;
@@ -109,12 +100,11 @@ static void test_matched(void **state) {
 
 /* con_cone is Choi's ground scaled: his k = 1e6 N/m^3 times the area of the foot beside his
  * sigma_cone = 0.15e6 N/m^3, whatever it is matched to. */
-static void test_con_cone_is_scaled(void **state) {
-    (void)state;
+TEST(test_con_cone_is_scaled) {
     const double pitch = mild_sole_pitch(raster[0]);
     const double area = mild_sole_elements(raster[0]) * pitch * pitch;
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        const MildMaterial mild = preset(mild_material_preset_name(p));
+        const MildMaterial mild = kit_preset(mild_material_preset_name(p));
         const MildMaterial rival = rival_of(MILD_MODEL_CON_CONE, &mild);
         assert_true(fabs(rival.k_pen / rival.sigma_cone * 0.15e6 / (1e6 * area) - 1.0) < 1e-9);
     }
@@ -123,11 +113,10 @@ static void test_con_cone_is_scaled(void **state) {
 /* A preset of mild has numbers for the other models, too: bekker's are those of dry sand, the plate
  * of resistive force theory is generic, and at 1 m/s hunt_crossley bounces back at 0.7 m/s. Drift
  * settles within a physics step of 1 ms. */
-static void test_presets_serve_every_model(void **state) {
-    (void)state;
-    const MildMaterial sand = preset("dry_sand");
+TEST(test_presets_serve_every_model) {
+    const MildMaterial sand = kit_preset("dry_sand");
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        const MildMaterial m = preset(mild_material_preset_name(p));
+        const MildMaterial m = kit_preset(mild_material_preset_name(p));
         assert_true(m.k_c == sand.k_c && m.k_phi == sand.k_phi && m.exponent == sand.exponent);
         assert_true(m.cohesion == sand.cohesion && m.shear_length == sand.shear_length);
         assert_true(m.zeta == 1.0 && fabs(1.0 - m.dissipation - 0.7) < 1e-12);
@@ -137,8 +126,7 @@ static void test_presets_serve_every_model(void **state) {
 
 /* Materials from all of the accepted ranges: what a match returns can be used, or it fails, says
  * why and returns nothing. */
-static void test_match_is_accepted(void **state) {
-    (void)state;
+TEST(test_match_is_accepted) {
     uint64_t random = 41;
     int matched = 0, refused = 0;
     for (int draw = 0; draw < 20000; draw++) {
@@ -173,8 +161,7 @@ static void test_match_is_accepted(void **state) {
 
 /* A concentric model has the sole in one element: the area of all in its middle, and drift as stiff
  * and damped as that of all. */
-static void test_concentration(void **state) {
-    (void)state;
+TEST(test_concentration) {
     const int cells = mild_sole_elements(raster[0]);
     double x = 0.0, y = 0.0;
     for (int e = 0; e < cells; e++) {
@@ -187,23 +174,22 @@ static void test_concentration(void **state) {
     assert_true(fabs(mild_sole_y(center[0])[0] - y) < 1e-15);
     assert_true(mild_sole_z(center[0]) == KIT_SOLE_Z);
     for (int model = 0; model < SOFT_MODELS; model++) {
-        const MildMaterial mild = preset("sand_loose"), rival = rival_of(model, &mild);
+        const MildMaterial mild = kit_preset("sand_loose"), rival = rival_of(model, &mild);
         const double all = mild_model_is_concentric((MildModel)model) ? cells : 1;
         const double share = rival.mu / mild.mu; /* 0: friction is part of resistive force theory */
         assert_true(share == 0.0 || share == 1.0);
         assert_true(rival.k_drift == share * all * mild.k_drift);
         assert_true(rival.b_drift == share * all * mild.b_drift);
     }
-    const MildMaterial grass = preset("grass"), cone = rival_of(MILD_MODEL_CON_CONE, &grass);
+    const MildMaterial grass = kit_preset("grass"), cone = rival_of(MILD_MODEL_CON_CONE, &grass);
     assert_true(cone.nu == 2.0 && fabs(cone.alpha - acos(0.5)) < 1e-12); /* Choi's set */
     assert_true(cone.c_g == 2.7 && cone.c_d == 17.2 && cone.phi == 0.57 && cone.rho == 1000.0);
-    const MildMaterial foam = preset("foam45"); /* springs yield, on foam too */
+    const MildMaterial foam = kit_preset("foam45"); /* springs yield, on foam too */
     assert_true(foam.recovery == 1.0 && rival_of(MILD_MODEL_ECC_SPRING, &foam).recovery == 0.0 &&
                 rival_of(MILD_MODEL_CON_SPRING, &foam).recovery == 0.0);
 }
 
-static void test_refusals(void **state) {
-    (void)state;
+TEST(test_refusals) {
     MildMaterial mild = mild_material_default(), rival = mild,
                  spring = rival_of(MILD_MODEL_ECC_SPRING, &mild);
     MildError error = {0};
@@ -264,14 +250,13 @@ static double depth_of(const Kit *kit) {
     return -KIT_SOLE_Z - kit->input.position[0][2];
 }
 
-static void test_equilibrium(void **state) {
-    (void)state;
+TEST(test_equilibrium) {
     static const double steps[2] = {1e-3, 5e-3};
     double worst = 0.0;
     for (int model = 0; model < SOFT_MODELS; model++) {
         for (int p = 0; p < mild_material_preset_count(); p++) {
             for (int d = kit_finest(); d < 2; d++) {
-                MildMaterial mild = preset(mild_material_preset_name(p)),
+                MildMaterial mild = kit_preset(mild_material_preset_name(p)),
                              rival = rival_of(model, &mild);
                 double wanted = mild_sole_sinkage(raster[0], &mild, LOAD);
                 Kit kit;
@@ -292,8 +277,7 @@ static void test_equilibrium(void **state) {
     print_message("at rest: within %.4f mm of the closed form\n", 1e3 * worst);
 }
 
-static void test_no_creep(void **state) {
-    (void)state;
+TEST(test_no_creep) {
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     static const char *const grounds[2] = {"sand_loose", "foam28"};
     const double wait = kit_seconds(10.0);
@@ -301,7 +285,7 @@ static void test_no_creep(void **state) {
     for (int model = 0; model < SOFT_MODELS; model++) {
         for (int g = 0; g < 2; g++) {
             for (int d = kit_finest(); d < 3; d++) {
-                MildMaterial mild = preset(grounds[g]), rival = rival_of(model, &mild);
+                MildMaterial mild = kit_preset(grounds[g]), rival = rival_of(model, &mild);
                 Kit kit;
                 settle(&kit, model, &rival, steps[d]);
                 /* resistive force theory carries 0.13 (2D) and 0.05 (3D) of the weight sideways,
@@ -396,8 +380,7 @@ static double worst_stop(const MildMaterial *m, double mass, double dt) {
     return worst;
 }
 
-static void test_impact(void **state) {
-    (void)state;
+TEST(test_impact) {
     static const double masses[3] = {1.0, 3.0, 20.0}, steps[3] = {0.25e-3, 1e-3, 5e-3};
     static const double allowed[3][3] = {{0.01, 0.01, 0.15},
                                          {0.005, 0.005, 0.02},
@@ -469,8 +452,7 @@ static int thrown(int model, uint64_t *random, double *worst) {
     return cycles;
 }
 
-static void test_passive(void **state) {
-    (void)state;
+TEST(test_passive) {
     for (int model = 0; model < SOFT_MODELS; model++) {
         uint64_t random = 11;
         double worst = -INFINITY;
@@ -509,8 +491,7 @@ static void turn_state(const Kit *from, Kit *to, double angle, int mirror) {
     to->center[0][1] *= m;
 }
 
-static void test_symmetry(void **state) {
-    (void)state;
+TEST(test_symmetry) {
     double worst = 0.0;
     uint64_t random = 5;
     for (int draw = 0; draw < kit_draws(400); draw++) {
@@ -573,8 +554,7 @@ static double solve_twice(int model, uint64_t *random, MildContactResult *newton
     return miss / scale;
 }
 
-static void test_solvers_agree(void **state) {
-    (void)state;
+TEST(test_solvers_agree) {
     enum { DRAWS = 40 };
     for (int model = 0; model < SOFT_MODELS; model++) {
         uint64_t random = 21;
@@ -602,11 +582,10 @@ static void test_solvers_agree(void **state) {
     }
 }
 
-static void test_copy_continues(void **state) {
-    (void)state;
+TEST(test_copy_continues) {
     uint64_t random = 31;
     for (int model = 0; model < SOFT_MODELS; model++) {
-        MildMaterial mild = preset("sand_loose"), rival = rival_of(model, &mild);
+        MildMaterial mild = kit_preset("sand_loose"), rival = rival_of(model, &mild);
         Kit kit, copy;
         kit_open(&kit, 1, sole_of(model, 0), NULL, &rival, 1e-3);
         kit_random_state(&kit, &random);
@@ -633,9 +612,8 @@ static void test_copy_continues(void **state) {
 
 /* A concentric model carries no moment about its element, however the foot stands; the others do.
  */
-static void test_moment(void **state) {
-    (void)state;
-    MildMaterial mild = preset("sand_loose");
+TEST(test_moment) {
+    MildMaterial mild = kit_preset("sand_loose");
     for (int model = 0; model < SOFT_MODELS; model++) {
         MildMaterial rival = rival_of(model, &mild);
         Kit kit;
@@ -667,8 +645,7 @@ static void test_moment(void **state) {
 
 /* A material that the foot does not stand on takes other loops and must change nothing: slopes and
  * level ground, every model alone and beside all others. */
-static void test_bystanders(void **state) {
-    (void)state;
+TEST(test_bystanders) {
     MildMapDef def = mild_map_def_default();
     MildError error = {0};
     def.kind = MILD_MAP_WAVES;
@@ -711,21 +688,4 @@ static void test_bystanders(void **state) {
     mild_map_destroy(map);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_con_cone_is_scaled),
-                                       cmocka_unit_test(test_presets_serve_every_model),
-                                       cmocka_unit_test(test_matched),
-                                       cmocka_unit_test(test_match_is_accepted),
-                                       cmocka_unit_test(test_refusals),
-                                       cmocka_unit_test(test_concentration),
-                                       cmocka_unit_test(test_equilibrium),
-                                       cmocka_unit_test(test_no_creep),
-                                       cmocka_unit_test(test_impact),
-                                       cmocka_unit_test(test_passive),
-                                       cmocka_unit_test(test_symmetry),
-                                       cmocka_unit_test(test_solvers_agree),
-                                       cmocka_unit_test(test_copy_continues),
-                                       cmocka_unit_test(test_moment),
-                                       cmocka_unit_test(test_bystanders)};
-    return cmocka_run_group_tests(tests, make_soles, drop_soles);
-}
+TEST_MAIN(make_soles, drop_soles)

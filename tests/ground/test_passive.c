@@ -11,15 +11,6 @@ static uint64_t draw_seed(uint64_t seed, int draw, int numbers) {
     return seed + (uint64_t)draw * (uint64_t)numbers * 0x9e3779b97f4a7c15u;
 }
 
-/* No element is in the ground or remembers it. */
-static int lifted(const Kit *kit) {
-    int touched = kit->result.foot[0].contacts;
-    for (int e = 0; e < 77 && touched == 0; e++) {
-        touched += mild_ground_depth_max(kit->ground, 0)[e] > 0.0;
-    }
-    return touched == 0;
-}
-
 typedef struct {
     int cycles, missed, draw; /* missed: steps that did not converge; draw: the worst */
     double worst,
@@ -55,7 +46,7 @@ static void throw_foot(int draw, MildSole *sole, Thrown *thrown) {
         missed += !kit.result.converged;
         work += w;
         taken += fabs(w);
-        if (!lifted(&kit) || taken == 0.0) {
+        if (!kit_lifted(&kit) || taken == 0.0) {
             continue;
         }
         thrown->cycles++; /* closed */
@@ -80,8 +71,7 @@ static void thrown_print(const char *name, int count, const Thrown *thrown) {
                   thrown->missed);
 }
 
-static void test_passive(void **state) {
-    (void)state;
+TEST(test_passive) {
     Thrown thrown = {.worst = -INFINITY, .share = -INFINITY};
     MildSole *sole = kit_sole(0, 77);
     for (int draw = first; draw < first + draws; draw++) {
@@ -96,8 +86,7 @@ static void test_passive(void **state) {
 /* Draws of the first 100 000 in which an earlier Newton left steps unsolved, which created up to 1
  * kJ: light bodies whose weight stands 0.4 m above the sole, slipping at mu around 1, 5 ms. Every
  * step must be solved. */
-static void test_hard_draws(void **state) {
-    (void)state;
+TEST(test_hard_draws) {
     static const int hard[] = {6808,  8426,  11042, 14138, 25711, 38501, 45813, 48178, 48274,
                                54556, 58123, 65792, 73707, 75306, 84820, 85364, 89614, 99430};
     enum { HARD = sizeof hard / sizeof *hard };
@@ -115,8 +104,7 @@ static void test_hard_draws(void **state) {
 /* A foot moved up and down by hand (A = 0). Two accounts of the work: impulse times mean speed,
  * what the kinetic energy of a body changes by, which must never be a gain; and impulse times the
  * step's way, dt times the new speed, half a step later. */
-static void test_passive_by_hand(void **state) {
-    (void)state;
+TEST(test_passive_by_hand) {
     MildSole *sole = kit_plate(2, 1);
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     double worst = -INFINITY, worst_way = -INFINITY;
@@ -180,8 +168,7 @@ static double loop_step(Kit *kit, const double size[3], const double phase[3], d
 
 /* A foot led by hand (A = 0) around a closed loop of height, place and tilt, over and over. The
  * first time the ground yields; from then on each round must cost work, or none. */
-static void test_loops(void **state) {
-    (void)state;
+TEST(test_loops) {
     MildSole *sole = kit_sole(0, 77);
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     double worst = -INFINITY, worst_share = -INFINITY;
@@ -227,8 +214,5 @@ int main(int argc, char **argv) {
     if (argc > 2) {
         first = atoi(argv[2]);
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_passive), cmocka_unit_test(test_hard_draws),
-        cmocka_unit_test(test_passive_by_hand), cmocka_unit_test(test_loops)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_cases(NULL, NULL);
 }

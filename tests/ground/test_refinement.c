@@ -9,17 +9,6 @@
 enum { LEVELS = 4 };
 static const double pitches[LEVELS] = {0.039, 0.0195, 0.00975, 0.004875};
 
-static MildSole *plate(double length, double width, double pitch) {
-    double x = 0.5 * length, y = 0.5 * width, outline[8] = {-x, -y, x, -y, x, y, -x, y};
-    MildSoleDef def = {outline, 4, pitch, KIT_SOLE_Z, 0};
-    MildError error = {0};
-    MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) {
-        fail_msg("%s", error.text);
-    }
-    return sole;
-}
-
 static const double length = 0.234, width = 0.156; /* [m] whole elements at every pitch */
 
 static void tilt(Kit *kit, double angle) {
@@ -34,7 +23,7 @@ static void tilt(Kit *kit, double angle) {
  * speed and stopped. */
 static void press(const MildMaterial *m, double pitch, double angle, double depth, double *force,
                   double *moment) {
-    MildSole *sole = plate(length, width, pitch);
+    MildSole *sole = kit_rectangle(length, width, pitch, 0);
     Kit kit;
     kit_open(&kit, 1, sole, NULL, m, 1e-3);
     tilt(&kit, angle);
@@ -73,12 +62,10 @@ static void limit(const MildMaterial *m, double angle, double depth, double *for
     }
 }
 
-static void test_level(void **state) {
-    (void)state;
+TEST(test_level) {
     double worst = 0.0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        MildMaterial base;
-        mild_material_preset(mild_material_preset_name(p), &base);
+        MildMaterial base = kit_preset(mild_material_preset_name(p));
         for (double depth = 0.005; depth < 0.03; depth *= 2.0) {
             for (int k = 0; k < LEVELS; k++) {
                 double force, moment, wanted, none;
@@ -96,19 +83,17 @@ static void test_level(void **state) {
 
 /* Every model but the concentric ones: the plate carries and moves the same at any pitch, and drift
  * costs as much. The heap of a merged sole is a mean over cells. */
-static void test_models(void **state) {
-    (void)state;
+TEST(test_models) {
     const double load = 300.0, depth = 0.012;
-    MildMaterial sand;
-    mild_material_preset("sand_loose", &sand);
+    MildMaterial sand = kit_preset("sand_loose");
     for (int model = 0; model < MILD_MODELS; model++) {
         if (mild_model_is_concentric((MildModel)model) || model == MILD_MODEL_RIGID) {
             continue;
         }
         double force[LEVELS], drift[LEVELS], worst = 0.0;
         for (int k = 0; k < LEVELS; k++) {
-            MildSole *sole = plate(length, width, pitches[k]),
-                     *usual = plate(length, width, KIT_PITCH);
+            MildSole *sole = kit_rectangle(length, width, pitches[k], 0),
+                     *usual = kit_rectangle(length, width, KIT_PITCH, 0);
             MildMaterial own;
             MildError error = {0};
             assert_int_equal(mild_model_match((MildModel)model, &sand, usual, load, &own, &error),
@@ -127,8 +112,7 @@ static void test_models(void **state) {
     }
 }
 
-static void test_tilted(void **state) {
-    (void)state;
+TEST(test_tilted) {
     static const char *const grounds[3] = {"sand_loose", "foam45", "rubber"};
     static const double angle = 5.0 * 3.14159265358979 / 180.0, depths[3] = {-0.004, 0.002, 0.010};
     print_message("tilted 5 deg, error of force and of moment about the centre [%%] at pitch 39, "
@@ -136,8 +120,7 @@ static void test_tilted(void **state) {
     double worst[LEVELS] = {0};
     for (int g = 0; g < 3; g++) {
         for (int d = 0; d < 3; d++) {
-            MildMaterial base;
-            mild_material_preset(grounds[g], &base);
+            MildMaterial base = kit_preset(grounds[g]);
             double wanted, turn, force[LEVELS], moment[LEVELS];
             limit(&base, angle, depths[d], &wanted, &turn);
             for (int k = 0; k < LEVELS; k++) {
@@ -160,12 +143,11 @@ static void test_tilted(void **state) {
 }
 
 /* A tilted plate of 10 kg falls at 0.5 m/s, slides and comes to rest: where and how. */
-static void test_drop(void **state) {
-    (void)state;
+TEST(test_drop) {
     MildMaterial base = mild_material_default();
     double found[LEVELS][3];
     for (int k = 0; k < LEVELS; k++) {
-        MildSole *sole = plate(length, width, pitches[k]);
+        MildSole *sole = kit_rectangle(length, width, pitches[k], 0);
         Kit kit;
         kit_open(&kit, 1, sole, NULL, &base, 0.25e-3);
         kit.mass[0] = 10.0;
@@ -196,8 +178,7 @@ static void test_drop(void **state) {
 
 /* What a finer grid would do with cones as large as its elements: u_f shrinks with the pitch, and
  * the limit is the complete cone from the surface on. */
-static void test_definition(void **state) {
-    (void)state;
+TEST(test_definition) {
     MildMaterial base = mild_material_default();
     double cone = base.sigma_cone / cos(base.alpha) * length * width * 0.01, force[LEVELS], none;
     for (int k = 0; k < LEVELS; k++) {
@@ -213,13 +194,12 @@ static void test_definition(void **state) {
 }
 
 /* The sole's outline on grids: natural counts and their area. */
-static void test_outline(void **state) {
-    (void)state;
+TEST(test_outline) {
     double outline[2 * 38], exact = 0.0;
     for (int i = 0; i < 19; i++) {
-        outline[2 * i] = outline[2 * (37 - i)] = kit_outline[i][0];
-        outline[2 * i + 1] = kit_outline[i][1];
-        outline[2 * (37 - i) + 1] = kit_outline[i][2];
+        outline[2 * i] = outline[2 * (37 - i)] = sa01_outline[i][0];
+        outline[2 * i + 1] = sa01_outline[i][1];
+        outline[2 * (37 - i) + 1] = sa01_outline[i][2];
     }
     for (int i = 0; i < 38; i++) {
         int j = (i + 1) % 38;
@@ -241,10 +221,4 @@ static void test_outline(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_level),      cmocka_unit_test(test_models),
-        cmocka_unit_test(test_tilted),     cmocka_unit_test(test_drop),
-        cmocka_unit_test(test_definition), cmocka_unit_test(test_outline)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -21,8 +21,7 @@ static void moving(double gamma, double heading, double *v) {
 }
 
 /* Numbers that follow from the printed coefficients at angles where few terms are left. */
-static void test_published(void **state) {
-    (void)state;
+TEST(test_published) {
     double alpha[2], space[3], n[3], v[3];
     mild_resist_plane(0.0, PI / 2.0, alpha);
     assert_true(fabs(alpha[1] - 1.000) < 1e-12 && fabs(alpha[0] - 0.007) < 1e-12);
@@ -39,8 +38,7 @@ static void test_published(void **state) {
 
 /* alpha_z is greatest for a level plate going straight down; a leading plate is resisted; the
  * ground never drives it. */
-static void test_signs(void **state) {
-    (void)state;
+TEST(test_signs) {
     double greatest = 0.0, least_power = INFINITY, least_forward = INFINITY;
     for (int i = -90; i <= 90; i++) {
         for (int j = 0; j <= 90; j++) {
@@ -75,8 +73,7 @@ static void test_signs(void **state) {
     assert_true(most < 0.0 && peak < RESIST_PEAK);
 }
 
-static void test_symmetry(void **state) {
-    (void)state;
+TEST(test_symmetry) {
     uint64_t random = 4;
     double worst = 0.0;
     for (int draw = 0; draw < 2000; draw++) {
@@ -139,8 +136,7 @@ static void plate_force(int model, double beta, double gamma, double *force, dou
     mild_sole_destroy(sole);
 }
 
-static void test_contact_step(void **state) {
-    (void)state;
+TEST(test_contact_step) {
     static const double betas[4] = {0.0, 0.2, 0.4, -0.2},
                         gammas[5] = {0.0, 0.3, 0.8, 1.2, PI / 2.0};
     double worst = 0.0;
@@ -212,8 +208,7 @@ static double shaken(Kit *kit, int cunning, double size, uint64_t *random) {
     return most;
 }
 
-static void test_shaken(void **state) {
-    (void)state;
+TEST(test_shaken) {
     MildSole *sole = kit_plate(5, 3);
     const double load = 50.0,
                  stored = 0.5 * load * ELEMENT_ELASTIC *
@@ -247,8 +242,7 @@ static void test_shaken(void **state) {
 
 /* No element remembers 3 mm more than it has been deep and can go in a step: not where its face
  * trails, so that nothing but rounding stops it, nor on ground without strength. */
-static void test_remembered_depth(void **state) {
-    (void)state;
+TEST(test_remembered_depth) {
     static const double zeta[] = {100, 0}; /* stiff and deep: there rounding is felt most */
     const double dt = 5e-3;
     MildSole *sole = kit_plate(5, 3);
@@ -302,8 +296,7 @@ static void test_remembered_depth(void **state) {
 }
 
 /* Ground without strength has no line to unload on: it is of no length, at the depth reached. */
-static void test_no_strength(void **state) {
-    (void)state;
+TEST(test_no_strength) {
     const double dt = 5e-3, rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     const Plate plate = plate_of(rotation);
     for (int bed = 0; bed < 2; bed++) {
@@ -318,11 +311,4 @@ static void test_no_strength(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_published),  cmocka_unit_test(test_signs),
-        cmocka_unit_test(test_symmetry),   cmocka_unit_test(test_contact_step),
-        cmocka_unit_test(test_shaken),     cmocka_unit_test(test_remembered_depth),
-        cmocka_unit_test(test_no_strength)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

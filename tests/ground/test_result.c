@@ -6,13 +6,7 @@
 static MildSole *element_at(double x, double y) {
     double h = 0.5 * KIT_PITCH,
            outline[8] = {x - h, y - h, x + h, y - h, x + h, y + h, x - h, y + h};
-    MildSoleDef def = {outline, 4, KIT_PITCH, KIT_SOLE_Z, 1};
-    MildError error = {0};
-    MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) {
-        fail_msg("%s", error.text);
-    }
-    return sole;
+    return kit_sole_of(outline, 4, KIT_PITCH, 1);
 }
 
 static double gap(const double *ours, const double *expected, int count) {
@@ -23,8 +17,7 @@ static double gap(const double *ours, const double *expected, int count) {
     return worst;
 }
 
-static void test_one_element_carries_all(void **state) {
-    (void)state;
+TEST(test_one_element_carries_all) {
     static const double place[4][2] = {{0.08, 0.03}, {-0.05, 0.04}, {0.07, -0.05}, {-0.06, -0.02}};
     static const double turn[3][3] = {{0, 0, 0}, {0, 0, 2.0}, {0.1, -0.15, 0.7}};
     MildMaterial sand = mild_material_default();
@@ -74,8 +67,7 @@ static void test_one_element_carries_all(void **state) {
 
 /* Many elements, tilted so that some are loaded: about zmp_sole, which lies in the height of the
  * sole's centre, the wrench has no horizontal torque; about zmp_axis only one along the force. */
-static void test_zmp_takes_the_horizontal_torque(void **state) {
-    (void)state;
+TEST(test_zmp_takes_the_horizontal_torque) {
     uint64_t random = 31;
     MildSole *sole = kit_sole(0, 77);
     double worst = 0.0, center[3] = {0.0, 0.0, KIT_SOLE_Z};
@@ -120,8 +112,7 @@ static void test_zmp_takes_the_horizontal_torque(void **state) {
 }
 
 /* Depths, area and count are those of the loaded elements. */
-static void test_depths_of_the_loaded_elements(void **state) {
-    (void)state;
+TEST(test_depths_of_the_loaded_elements) {
     MildSole *sole = kit_plate(4, 1);
     MildMaterial sand = mild_material_default();
     Kit kit;
@@ -152,8 +143,7 @@ static void test_depths_of_the_loaded_elements(void **state) {
 
 /* A set of eight tiles keeps eight places: the ninth takes the oldest one's, and no other's.
  * Each is pressed to 10 mm in steps of 1 mm, and a step remembers its middle: 9.5 mm. */
-static void test_prints_keep_what_they_were_given(void **state) {
-    (void)state;
+TEST(test_prints_keep_what_they_were_given) {
     MildSole *sole = kit_plate(1, 1);
     const MildSole *soles[1] = {sole};
     MildMaterial sand = mild_material_default();
@@ -195,8 +185,7 @@ static void test_prints_keep_what_they_were_given(void **state) {
 }
 
 /* Forces whose square is 0 or infinite, and torques beside next to no force, have a finite axis. */
-static void test_axis_is_finite(void **state) {
-    (void)state;
+TEST(test_axis_is_finite) {
     MildSole *sole = kit_sole(0, 77);
     uint64_t random = 3;
     int loaded = 0, tiny = 0;
@@ -227,13 +216,4 @@ static void test_axis_is_finite(void **state) {
     assert_true(loaded > 300);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_one_element_carries_all),
-        cmocka_unit_test(test_zmp_takes_the_horizontal_torque),
-        cmocka_unit_test(test_axis_is_finite),
-        cmocka_unit_test(test_depths_of_the_loaded_elements),
-        cmocka_unit_test(test_prints_keep_what_they_were_given),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -30,9 +30,7 @@ static MildMap *any_map(uint64_t *random) {
     def.border = kit_index(random, 2) ? 0.05 : 0.0;
     MildError error = {0};
     MildMap *map = mild_map_create(&def, &error);
-    if (!map) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(map != NULL, &error);
     return map;
 }
 
@@ -144,8 +142,7 @@ static int flies(const Kit *kit) {
 
 /* Rounds of robots on all kinds of ground that take turns, with materials that change and feet that
  * are lifted. */
-static void test_shared(void **state) {
-    (void)state;
+TEST(test_shared) {
     int steps = 0, patient = 0;
     for (int round = 0; round < 12; round++) {
         uint64_t random = 900u + (unsigned)round;
@@ -242,8 +239,7 @@ static double path_difference(int prints, int draws) {
     return worst;
 }
 
-static void test_paths(void **state) {
-    (void)state;
+TEST(test_paths) {
     double prints = path_difference(1, 100), heights = path_difference(0, 100);
     print_message(
         "one step, listed and gathered: %.1e m/s or rad/s; level and with heights of 0: %.1e\n",
@@ -254,8 +250,7 @@ static void test_paths(void **state) {
 
 /* A step at numbers that are none was kept; lifted and put down again, the foot stands as if
  * nothing had been. */
-static void test_bad_step_forgotten(void **state) {
-    (void)state;
+TEST(test_bad_step_forgotten) {
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
     MildMaterial m = mild_material_default();
     for (int t = 0; t < 36; t++) {
@@ -297,8 +292,4 @@ static void test_bad_step_forgotten(void **state) {
     mild_sole_destroy(right);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_shared), cmocka_unit_test(test_paths),
-                                       cmocka_unit_test(test_bad_step_forgotten)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

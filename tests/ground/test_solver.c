@@ -17,8 +17,7 @@ static double twist_difference(const Kit *kit, const double *a, const double *b)
     return difference / size;
 }
 
-static void test_newton_converges(void **state) {
-    (void)state;
+TEST(test_newton_converges) {
     uint64_t random = 21;
     int problems = 0, failed = 0, most = 0;
     double total = 0.0, pull = 0.0, excess = 0.0;
@@ -51,8 +50,7 @@ static void test_newton_converges(void **state) {
     assert_true(excess < 1e-6);
 }
 
-static void test_solvers_agree(void **state) {
-    (void)state;
+TEST(test_solvers_agree) {
     uint64_t random = 22;
     int compared = 0, slow = 0;
     double worst = 0.0;
@@ -130,8 +128,7 @@ static void print_compared(const char *what, const Compared *seen) {
 }
 
 /* Sweeps get 500 each; where they need more they are left out. */
-static void test_dense_reference(void **state) {
-    (void)state;
+TEST(test_dense_reference) {
     static Dense dense;
     Compared newton = {0}, sweeps = {0};
     int touching = 0, unsolved = 0, unsettled = 0, long_way = 0, singular = 0;
@@ -172,8 +169,7 @@ static void test_dense_reference(void **state) {
 
 /* The same on every other kind of ground; a line for each. Where friction has two solutions the
  * reference starts again from Newton's and must stay there. */
-static void test_dense_kinds(void **state) {
-    (void)state;
+TEST(test_dense_kinds) {
     static Dense dense;
     int wrong = 0;
     for (Kind kind = 0; kind < KINDS; kind++) {
@@ -235,8 +231,7 @@ static void test_dense_kinds(void **state) {
 /* Two whole feet, mu > 1: what an earlier Newton needed more than 100 steps for among 42 750
  * problems. And a foot that stops on sand blended with bekker's ground: its drag depends on both
  * curves. */
-static void test_hard_problems(void **state) {
-    (void)state;
+TEST(test_hard_problems) {
     static const int numbers[4] = {12229, 15949, 17844, 27024};
     static Dense dense;
     Compared newton = {0};
@@ -264,8 +259,7 @@ static void test_hard_problems(void **state) {
 
 /* How hard the solvers work: a wrong diagonal, derivative or start finds the same answer later. The
  * numbers are what the solvers needed when they were last right, and a fiftieth. */
-static void test_effort(void **state) {
-    (void)state;
+TEST(test_effort) {
     enum { PROBLEMS = 150, SWEEPS_MAX = 500 };
     static const double newton_most[2] = {4.333, 4.519}, sweeps_most[2] = {102.3, 93.4};
     for (int uneven = 0; uneven < 2; uneven++) {
@@ -301,8 +295,7 @@ static void turn_vector(double *v, double c, double s) {
 }
 
 /* The same problem seen from axes turned about z (or mirrored in y) must give the turned answer. */
-static void test_symmetry(void **state) {
-    (void)state;
+TEST(test_symmetry) {
     uint64_t random = 24;
     double worst_turn = 0.0, worst_mirror = 0.0;
     for (int t = 0; t < kit_draws(300); t++) {
@@ -381,8 +374,7 @@ static void test_symmetry(void **state) {
 /* The outline drawn the other way round and mirrored columns change the order of the elements, not
  * the answer: a plate turned by half a turn in its own frame is the same plate with its elements in
  * reverse order. */
-static void test_element_order(void **state) {
-    (void)state;
+TEST(test_element_order) {
     uint64_t random = 25;
     double worst = 0.0;
     MildSole *plate = kit_plate(11, 7);
@@ -414,8 +406,7 @@ static void test_element_order(void **state) {
 
 /* solve reads the memory and may be repeated; scratch carries nothing from one problem to the next.
  */
-static void test_pure(void **state) {
-    (void)state;
+TEST(test_pure) {
     uint64_t random = 26;
     for (int t = 0; t < 200; t++) {
         Kit kit;
@@ -488,8 +479,7 @@ static int check_states(const Kit *kit, int f, const MildElements *e) {
 }
 
 /* Wrench, zero moment points, pressure centre and element arrays fit together. */
-static void test_outputs(void **state) {
-    (void)state;
+TEST(test_outputs) {
     uint64_t random = 27;
     double worst = 0.0, worst_zmp = 0.0;
     for (int t = 0; t < kit_draws(500); t++) {
@@ -550,26 +540,13 @@ static void test_outputs(void **state) {
 }
 
 int main(int count, char **arguments) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_dense_reference),
-                                       cmocka_unit_test(test_dense_kinds),
-                                       cmocka_unit_test(test_hard_problems),
-                                       cmocka_unit_test(test_effort),
-                                       cmocka_unit_test(test_newton_converges),
-                                       cmocka_unit_test(test_solvers_agree),
-                                       cmocka_unit_test(test_symmetry),
-                                       cmocka_unit_test(test_element_order),
-                                       cmocka_unit_test(test_pure),
-                                       cmocka_unit_test(test_outputs)};
-    const struct CMUnitTest reference[] = {cmocka_unit_test(test_dense_reference),
-                                           cmocka_unit_test(test_dense_kinds)};
     if (count < 2) {
         problem_count = kit_draws(problem_count);
         kind_count = kit_draws(kind_count);
-        return cmocka_run_group_tests(tests, open_soles, close_soles);
+    } else { /* ground_test_solver COUNT FIRST */
+        problem_count = kind_count = atoi(arguments[1]);
+        first_problem = count > 2 ? atoi(arguments[2]) : first_problem;
+        cmocka_set_test_filter("test_dense*");
     }
-    problem_count = kind_count = atoi(arguments[1]);
-    if (count > 2) {
-        first_problem = atoi(arguments[2]);
-    }
-    return cmocka_run_group_tests(reference, open_soles, close_soles);
+    return run_cases(open_soles, close_soles);
 }

@@ -55,8 +55,7 @@ static double stop_depth(const MildMaterial *m, double mass, double dt, double h
 
 /* Choi 2023 set, dropped from rest from 12.74 mm (0.5 m/s): 1.221 / 3.384 / 38.98 mm. A light foot
  * stops within a step of 5 ms. */
-static void test_exact_impact(void **state) {
-    (void)state;
+TEST(test_exact_impact) {
     static const double mass[3] = {1.0, 3.0, 20.0}, published[3] = {1.221e-3, 3.384e-3, 38.98e-3},
                         dt[4] = {0.25e-3, 1e-3, 2.5e-3, 5e-3};
     static const double allowed[4][3] = {
@@ -105,8 +104,7 @@ static double drop_depth(MildSole *sole, const MildMaterial *m, double mass, dou
 /* Drops at 5 ms against the exact impact: every mass, speed, ground, and moment of a step at which
  * the ground is met. Half a step's way at 1 m/s is 2.5 mm, and an engine has gone it before the
  * ground can answer; 1 kg stops on dense sand after 1.5. */
-static void test_drops(void **state) {
-    (void)state;
+TEST(test_drops) {
     enum { MASSES = 8, SPEEDS = 5, PHASES = 8, GROUNDS = 5 };
     static const char *const grounds[GROUNDS] = {"sand_loose", "sand_dense", "grass", "foam45",
                                                  "rubber"};
@@ -120,8 +118,7 @@ static void test_drops(void **state) {
         for (int g = 0; g < GROUNDS; g++) {
             for (int s = 0; s < SPEEDS; s++) {
                 for (int p = 0; p < PHASES; p++) {
-                    MildMaterial m;
-                    assert_true(mild_material_preset(grounds[g], &m));
+                    MildMaterial m = kit_preset(grounds[g]);
                     double height =
                         0.5 * speed[s] * speed[s] / KIT_GRAVITY + speed[s] * dt * p / PHASES;
                     double error = drop_depth(sole, &m, mass[i], dt, height) /
@@ -145,8 +142,7 @@ static void test_drops(void **state) {
 
 /* An element led by hand (A = 0) into some state: its impulse must never fall with the speed of
  * descent. */
-static void test_rises(void **state) {
-    (void)state;
+TEST(test_rises) {
     enum { DRAWS = 3000, SPEEDS = 400 };
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     MildSole *sole = kit_plate(1, 1);
@@ -184,8 +180,7 @@ static void test_rises(void **state) {
     assert_true(worst < 1e-9);
 }
 
-static void test_no_creep(void **state) {
-    (void)state;
+TEST(test_no_creep) {
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     MildSole *sole = kit_sole(0, 77);
     const double wait = kit_seconds(10.0);
@@ -193,8 +188,7 @@ static void test_no_creep(void **state) {
     for (int p = 0; p < mild_material_preset_count(); p++) {
         for (int d = kit_finest(); d < 3; d++) {
             for (int side = 0; side < 2; side++) {
-                MildMaterial m;
-                mild_material_preset(mild_material_preset_name(p), &m);
+                MildMaterial m = kit_preset(mild_material_preset_name(p));
                 Kit kit;
                 kit_open(&kit, 1, sole, NULL, &m, steps[d]);
                 kit.center[0][0] = 0.0622;
@@ -235,8 +229,7 @@ static void test_no_creep(void **state) {
     assert_true(worst_down < 1e-4 && worst_side < 1e-4);
 }
 
-static void test_memory(void **state) {
-    (void)state;
+TEST(test_memory) {
     MildMaterial sand = mild_material_default(), foam;
     mild_material_preset("foam28", &foam);
     MildSole *sole = kit_plate(3, 3);
@@ -271,8 +264,7 @@ static void test_memory(void **state) {
 }
 
 /* A foot that slides from one material onto another keeps the law it touched down on. */
-static void test_border(void **state) {
-    (void)state;
+TEST(test_border) {
     MildMaterial foam, rubber;
     mild_material_preset("foam28", &foam);
     mild_material_preset("rubber", &rubber);
@@ -317,10 +309,4 @@ static void test_border(void **state) {
     mild_sole_destroy(sole);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_exact_impact), cmocka_unit_test(test_drops),
-        cmocka_unit_test(test_rises),        cmocka_unit_test(test_memory),
-        cmocka_unit_test(test_border),       cmocka_unit_test(test_no_creep)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -22,8 +22,7 @@ typedef struct {
 } Solid;
 
 /* A third of the shapes is turned about x + y + z, which exchanges the axes. */
-static void shapes_have_their_area(void **state) {
-    (void)state;
+TEST(shapes_have_their_area) {
     static double wedge[18];
     const double r = 0.05, h = 0.11, slant = hypot(0.2, 0.12);
     const Solid solids[] = {
@@ -64,8 +63,7 @@ static void shapes_have_their_area(void **state) {
 }
 
 /* Whatever its triangles: a box of twelve, and of twelve times 400. */
-static void mesh_does_not_depend_on_its_triangles(void **state) {
-    (void)state;
+TEST(mesh_does_not_depend_on_its_triangles) {
     enum { CUT = 20, SIDE = (CUT + 1) * (CUT + 1) };
     static double vertices[6 * SIDE][3];
     static int triangles[12 * CUT * CUT][3];
@@ -116,8 +114,7 @@ static void mesh_does_not_depend_on_its_triangles(void **state) {
 }
 
 /* Parts of a body hide what lies inside them. */
-static void parts_that_overlap(void **state) {
-    (void)state;
+TEST(parts_that_overlap) {
     MildShape two[2] = {surface_box(0.1, 0.1, 0.1), surface_box(0.1, 0.1, 0.1)};
     two[1].pos[0] = 0.2; /* side by side: the common face goes */
     MildSole *sole = surface_make(two, 2, 0.02);
@@ -147,8 +144,7 @@ static void parts_that_overlap(void **state) {
     mild_sole_destroy(sole);
 }
 
-static void numbers_of_a_surface(void **state) {
-    (void)state;
+TEST(numbers_of_a_surface) {
     const MildShape box = surface_box(0.1, 0.05, 0.03);
     MildSole *sole = surface_make(&box, 1, 0.02), *plane = kit_plate(3, 2);
     expect_near("pitch", mild_sole_pitch(sole), 0.02, 0.0);
@@ -171,8 +167,7 @@ static void numbers_of_a_surface(void **state) {
     mild_sole_destroy(plane);
 }
 
-static void bad_numbers_are_refused(void **state) {
-    (void)state;
+TEST(bad_numbers_are_refused) {
     double good[18], flat[18], far[18];
     const MildShape wedge = surface_wedge(0.1, 0.1, 0.1, good), box = surface_box(0.1, 0.1, 0.1);
     static const int inward[24] = {0, 2, 1, 3, 4, 5, 0, 1, 4, 0, 4, 3,
@@ -245,13 +240,4 @@ static void bad_numbers_are_refused(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(shapes_have_their_area),
-        cmocka_unit_test(mesh_does_not_depend_on_its_triangles),
-        cmocka_unit_test(parts_that_overlap),
-        cmocka_unit_test(numbers_of_a_surface),
-        cmocka_unit_test(bad_numbers_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -18,17 +18,6 @@ typedef struct {
     const char *terrain;
 } Body;
 
-/* Log-uniform. */
-static double spread(uint64_t *random, double low, double high) {
-    return exp(kit_uniform(random, log(low), log(high)));
-}
-
-static void draw_vector(uint64_t *random, double size, double *x) {
-    for (int k = 0; k < 3; k++) {
-        x[k] = kit_uniform(random, -size, size);
-    }
-}
-
 static MildMaterial draw_material(uint64_t *random) {
     static const MildModel models[] = {
         MILD_MODEL_MILD,         MILD_MODEL_MILD,   MILD_MODEL_ECC_SPRING,   MILD_MODEL_ECC_QUASI,
@@ -58,7 +47,7 @@ static MildSole *draw_sole(uint64_t *random) {
     for (int i = 0; i < count; i++) {
         double size[3];
         for (int k = 0; k < 3; k++) {
-            size[k] = spread(random, 0.02, 0.15);
+            size[k] = kit_spread(random, 0.02, 0.15);
         }
         switch (kit_index(random, 4)) {
         case 0: shapes[i] = surface_box(size[0], size[1], size[2]); break;
@@ -66,11 +55,11 @@ static MildSole *draw_sole(uint64_t *random) {
         case 2: shapes[i] = surface_sphere(size[0]); break;
         default: shapes[i] = surface_wedge(size[0], size[1], size[2], vertices); break;
         }
-        draw_vector(random, 0.1, shapes[i].pos);
-        draw_vector(random, 1.0, shapes[i].quat + 1);
+        kit_vector(random, 0.1, shapes[i].pos);
+        kit_vector(random, 1.0, shapes[i].quat + 1);
         shapes[i].quat[0] = kit_uniform(random, -1.0, 1.0);
     }
-    return surface_make(shapes, count, spread(random, 0.015, 0.05));
+    return surface_make(shapes, count, kit_spread(random, 0.015, 0.05));
 }
 
 /* Level, uneven, in patches, or both. */
@@ -128,39 +117,27 @@ static void body_draw(Body *b, uint64_t *random) {
     memset(b, 0, sizeof *b);
     b->sole = draw_sole(random);
     const MildMaterial m = draw_material(random);
-    kit_open(&b->kit, 1, b->sole, NULL, &m, spread(random, 5e-4, 2e-3));
+    kit_open(&b->kit, 1, b->sole, NULL, &m, kit_spread(random, 5e-4, 2e-3));
     kit_prints(&b->kit, kit_index(random, 2) ? 0 : 8 * (1 + kit_index(random, 8)));
     draw_terrain(b, random);
     Kit *kit = &b->kit;
-    kit->mass[0] = spread(random, 0.3, 40.0);
-    kit->inertia[0] = kit->mass[0] * spread(random, 1e-3, 0.02);
-    draw_vector(random, 0.05, kit->center[0]);
+    kit->mass[0] = kit_spread(random, 0.3, 40.0);
+    kit->inertia[0] = kit->mass[0] * kit_spread(random, 1e-3, 0.02);
+    kit_vector(random, 0.05, kit->center[0]);
     double turn[3];
-    draw_vector(random, 3.0, turn);
+    kit_vector(random, 3.0, turn);
     kit_rotate(kit->input.rotation[0], turn);
-    draw_vector(random, 1.0, kit->input.position[0]);
-    kit->input.position[0][2] += spread(random, 1e-4, 0.2) - clearance(b);
-    draw_vector(random, 1.5, kit->input.velocity[0]);
+    kit_vector(random, 1.0, kit->input.position[0]);
+    kit->input.position[0][2] += kit_spread(random, 1e-4, 0.2) - clearance(b);
+    kit_vector(random, 1.5, kit->input.velocity[0]);
     kit->input.velocity[0][2] -= 1.5;
-    draw_vector(random, 8.0, kit->input.velocity[0] + 3);
+    kit_vector(random, 8.0, kit->input.velocity[0] + 3);
 }
 
 static void body_close(Body *b) {
     kit_close(&b->kit);
     mild_sole_destroy(b->sole);
     mild_map_destroy(b->map);
-}
-
-/* [J] of the twist at the body's origin. */
-static double body_energy(const Kit *kit, const double *V) {
-    double r[3], swing[3], sum = 0.0;
-    kit_center(kit, 0, r);
-    kit_cross(V + 3, r, swing);
-    for (int k = 0; k < 3; k++) {
-        const double v = V[k] + swing[k];
-        sum += kit->mass[0] * v * v + kit->inertia[0] * V[3 + k] * V[3 + k];
-    }
-    return 0.5 * sum;
 }
 
 typedef struct {
@@ -177,7 +154,7 @@ static void fall_once(uint64_t seed, Falls *all) {
     body_draw(&body, &random);
     Kit *kit = &body.kit;
     const int steps = 100 + kit_index(&random, 200);
-    double work = 0.0, energy = body_energy(kit, kit->input.velocity[0]), gain = 0.0, most = 0.0;
+    double work = 0.0, energy = kit_kinetic(kit, kit->input.velocity[0]), gain = 0.0, most = 0.0;
     int unsolved = 0, touched = 0;
     for (int s = 0; s < steps; s++) {
         kit_inverse_inertia(kit);
@@ -189,7 +166,7 @@ static void fall_once(uint64_t seed, Falls *all) {
         kit_advance(kit);
         const double *V = kit->input.velocity[0];
         most = fmax(most, kit->input.dt * sqrt(V[3] * V[3] + V[4] * V[4] + V[5] * V[5]));
-        energy = fmax(energy, body_energy(kit, V));
+        energy = fmax(energy, kit_kinetic(kit, V));
         gain = fmax(gain, work / energy);
     }
     all->falls++;
@@ -206,8 +183,7 @@ static void fall_once(uint64_t seed, Falls *all) {
     body_close(&body);
 }
 
-static void falls_gain_nothing(void **state) {
-    (void)state;
+TEST(falls_gain_nothing) {
     Falls all = {.terrain = ""};
     for (int i = 0; i < falls; i++) {
         fall_once((first + (uint64_t)i) * 1000003u + 7919u, &all);
@@ -226,6 +202,5 @@ int main(int argc, char **argv) {
     if (argc > 2) {
         first = strtoull(argv[2], NULL, 10);
     }
-    const struct CMUnitTest tests[] = {cmocka_unit_test(falls_gain_nothing)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_cases(NULL, NULL);
 }

@@ -33,8 +33,7 @@ static double difference(const double *a, const double *b, int count) {
 
 /* A face that looks down, against a plane sole of the same raster: level when it touches down, so
  * that every share is 1, and tilting afterwards. */
-static void a_face_is_a_sole(void **state) {
-    (void)state;
+TEST(a_face_is_a_sole) {
     double worst = 0.0;
     Plate36 plate;
     const MildShape shape = surface_plate(5, 3, KIT_SOLE_Z, &plate);
@@ -143,8 +142,7 @@ static double cylinder_force(const MildMaterial *m, double pitch, double radius,
     return sum;
 }
 
-static void pressed_shapes_meet_closed_forms(void **state) {
-    (void)state;
+TEST(pressed_shapes_meet_closed_forms) {
     const double radius = 0.1, half = 0.15, pitch = 0.006;
     const MildShape ball = surface_sphere(radius), rod = surface_capsule(radius, half);
     MildSole *sphere = surface_make(&ball, 1, pitch), *capsule = surface_make(&rod, 1, pitch);
@@ -209,8 +207,7 @@ static void random_pose(Kit *kit, uint64_t *random) {
 }
 
 /* The derivatives of the wrench, away from kinks: those where two differences agree. */
-static void hessian_is_the_derivative(void **state) {
-    (void)state;
+TEST(hessian_is_the_derivative) {
     MildSole *body = block();
     uint64_t random = 8;
     double worst = 0.0;
@@ -298,8 +295,7 @@ static double led_round(Kit *kit, int rounds, int steps, double angle, const dou
 }
 
 /* Closed motions: a buried block that turns fully about any axis, and a capsule that rolls on. */
-static void closed_motions_give_nothing(void **state) {
-    (void)state;
+TEST(closed_motions_give_nothing) {
     const MildShape rod = surface_capsule(0.05, 0.1);
     MildSole *bodies[2] = {block(), surface_make(&rod, 1, 0.012)};
     uint64_t random = 17;
@@ -353,8 +349,7 @@ static void closed_motions_give_nothing(void **state) {
 
 /* A box lies on elastic or plastic ground, turns over without being moved, and turns back: what
  * comes to face down under the surface carries nothing. */
-static void a_buried_face_begins_without_force(void **state) {
-    (void)state;
+TEST(a_buried_face_begins_without_force) {
     const MildShape shape = surface_box(0.1, 0.1, 0.02);
     MildSole *box = surface_make(&shape, 1, 0.02);
     const double turn[3] = {pi, 0.0, 0.0};
@@ -448,16 +443,14 @@ static void beside_an_imprint(MildSole *box) {
     mild_sole_destroy(box);
 }
 
-static void elastic_ground_beside_an_imprint_carries_nothing(void **state) {
-    (void)state;
+TEST(elastic_ground_beside_an_imprint_carries_nothing) {
     const MildShape shape = surface_box(0.1, 0.1, 0.05);
     beside_an_imprint(surface_make(&shape, 1, 0.02));
     beside_an_imprint(kit_plate(10, 10)); /* a plane sole */
 }
 
 /* A level face sinks as deep as a sole of its area, whatever the distance of its elements. */
-static void spacing_is_not_in_the_law(void **state) {
-    (void)state;
+TEST(spacing_is_not_in_the_law) {
     MildSole *plate = kit_plate(12, 12);
     const double half = 6 * KIT_PITCH;
     const MildShape box = surface_box(half, half, 0.05);
@@ -485,8 +478,7 @@ static void spacing_is_not_in_the_law(void **state) {
 
 /* A face that leans after touchdown: the share stays that of the touchdown, and another touchdown
  * finds another. */
-static void a_share_is_kept(void **state) {
-    (void)state;
+TEST(a_share_is_kept) {
     Plate36 plate;
     const MildShape shape = surface_plate(4, 4, 0.0, &plate);
     MildSole *face = surface_make(&shape, 1, KIT_PITCH);
@@ -518,8 +510,7 @@ static void a_share_is_kept(void **state) {
 
 /* A copy of the state continues alike; a state of other soles, or with numbers that no step leaves,
  * is refused. */
-static void states_are_copied(void **state) {
-    (void)state;
+TEST(states_are_copied) {
     MildSole *body = block(), *plate = kit_plate(3, 2);
     uint64_t random = 5;
     const MildMaterial m = mild_material_default();
@@ -562,8 +553,7 @@ static void states_are_copied(void **state) {
 }
 
 /* A scratch of a plane sole with as many elements does not fit the ground of a surface. */
-static void a_scratch_of_soles_does_not_fit(void **state) {
-    (void)state;
+TEST(a_scratch_of_soles_does_not_fit) {
     Plate36 plate;
     const MildShape shape = surface_plate(3, 2, 0.0, &plate);
     MildSole *face = surface_make(&shape, 1, KIT_PITCH), *sole = kit_plate(3, 2);
@@ -582,8 +572,7 @@ static void a_scratch_of_soles_does_not_fit(void **state) {
 }
 
 /* Far above the ground nothing is listed, and the elements say so. */
-static void in_the_air(void **state) {
-    (void)state;
+TEST(in_the_air) {
     MildSole *body = block();
     const MildMaterial m = mild_material_default();
     Kit kit;
@@ -607,19 +596,4 @@ static void in_the_air(void **state) {
     mild_sole_destroy(body);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_face_is_a_sole),
-        cmocka_unit_test(pressed_shapes_meet_closed_forms),
-        cmocka_unit_test(hessian_is_the_derivative),
-        cmocka_unit_test(closed_motions_give_nothing),
-        cmocka_unit_test(a_buried_face_begins_without_force),
-        cmocka_unit_test(elastic_ground_beside_an_imprint_carries_nothing),
-        cmocka_unit_test(spacing_is_not_in_the_law),
-        cmocka_unit_test(a_share_is_kept),
-        cmocka_unit_test(states_are_copied),
-        cmocka_unit_test(a_scratch_of_soles_does_not_fit),
-        cmocka_unit_test(in_the_air),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

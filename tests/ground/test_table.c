@@ -20,8 +20,7 @@ static int listed(const char *const *keys, int most, const char *key) {
     return 0;
 }
 
-static void test_rows(void **state) {
-    (void)state;
+TEST(test_rows) {
     for (int m = 0; m < MILD_MODELS; m++) {
         const MildModelInfo *info = mild_model_info((MildModel)m);
         MildModel found = MILD_MODEL_RIGID;
@@ -96,8 +95,7 @@ static void change(MildMaterial *m, const MildField *field) {
     memcpy(at, &value, sizeof value);
 }
 
-static void test_fields(void **state) {
-    (void)state;
+TEST(test_fields) {
     MildError error = {0};
     MildSole *plate = kit_plate(4, 3);
     MildSole *one = mild_sole_concentric(plate, &error);
@@ -137,7 +135,4 @@ static void test_fields(void **state) {
     mild_sole_destroy(plate);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_rows), cmocka_unit_test(test_fields)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -71,8 +71,7 @@ static int slope_fits(double slope, double before, double here, double after, do
     return miss < 1e-3 * scale;
 }
 
-static void test_slope_of_the_impulse(void **state) {
-    (void)state;
+TEST(test_slope_of_the_impulse) {
     uint64_t random = 1;
     double worst = 0.0;
     int loaded = 0;
@@ -101,8 +100,7 @@ static void test_slope_of_the_impulse(void **state) {
 }
 
 /* Friction's derivatives by the velocity and, through the bound, by the normal impulse. */
-static void test_slopes_of_friction(void **state) {
-    (void)state;
+TEST(test_slopes_of_friction) {
     uint64_t random = 2;
     double worst = 0.0;
     int slides = 0;
@@ -156,8 +154,7 @@ static double mean_force(const Law *law, int curves, double begin, double way) {
 
 /* The means over a way against quadrature, their slopes against differences; bed: the force at the
  * end. No way: the force there, and nothing is recruited. */
-static void test_way(void **state) {
-    (void)state;
+TEST(test_way) {
     uint64_t random = 3;
     double worst[2] = {0.0, 0.0}, slope = 0.0;
     for (int n = 0; n < 500; n++) {
@@ -205,8 +202,7 @@ static void test_way(void **state) {
 
 /* A quarter of the way from one law to another; a curve that only one has keeps its shape and fades
  * out. */
-static void test_law_between(void **state) {
-    (void)state;
+TEST(test_law_between) {
     const Law a = {.flat_stiffness = 100,
                    .line_stiffness = 200,
                    .cone_depth = 0.02,
@@ -264,8 +260,7 @@ static void test_law_between(void **state) {
 /* ---- terms ---- */
 
 /* What the path's impulse does at the mean speed is what the static force does on the way. */
-static void test_path_keeps_the_work(void **state) {
-    (void)state;
+TEST(test_path_keeps_the_work) {
     uint64_t random = 4;
     double worst = 0.0;
     for (int n = 0; n < 300; n++) {
@@ -293,8 +288,7 @@ static void test_path_keeps_the_work(void **state) {
     assert_true(worst < 1e-3);
 }
 
-static void test_added_mass(void **state) {
-    (void)state;
+TEST(test_added_mass) {
     const Element e = {.added_mass = 2.0, .front_speed = 0.05, .yield_speed = 0.1};
     const Impulse joins = mass_impulse(&e, 0.3), waits = mass_impulse(&e, 0.02);
     assert_close("joins", joins.value, 2.0 * 0.25, 1e-15);
@@ -305,8 +299,7 @@ static void test_added_mass(void **state) {
 
 /* 1 mm recruited, half a mm of it per mm of depth; 3 kg/m by the new speed, 2 kg/m by that of
  * entry. */
-static void test_growth(void **state) {
-    (void)state;
+TEST(test_growth) {
     const LawWay way = {.recruited = 1e-3, .recruited_slope = 0.5};
     Element e = {.exit_drag = 3.0, .entry_drag = 2.0, .entry_speed = 0.4};
     const double dt = 1e-3;
@@ -340,8 +333,7 @@ static void test_growth(void **state) {
 }
 
 /* dt T k = 1e-3 x 5e-3 x 4e4 = 0.2 kg, by the speed at which the ground is left. */
-static void test_lag(void **state) {
-    (void)state;
+TEST(test_lag) {
     const Element e = {.unload_stiffness = 4e4, .entry_speed = 0.1};
     const double dt = 1e-3, mass = 0.2;
     assert_true(lag_impulse(&e, dt, -0.09).value == 0.0 && lag_impulse(&e, dt, 0.3).slope == 0.0);
@@ -354,8 +346,7 @@ static void test_lag(void **state) {
 
 /* Down by 2 mm in 2 ms on F = 500 N/m u: mean 3 N and 1 N damping more at 0.25 s/m and 1 m/s; the
  * way through the air carries nothing. */
-static void test_elastic(void **state) {
-    (void)state;
+TEST(test_elastic) {
     const double dt = 2e-3;
     Element e = {
         .middle = 0.005,
@@ -376,8 +367,7 @@ static void test_elastic(void **state) {
 
 /* Springs of 1000 N/m: 10 mm deep 10 N. recovery 0.5 springs back over 5 mm, so at 2000 N/m; 0 over
  * the least elastic travel of 0.1 mm; 1 along the law itself. */
-static void test_unloading_line(void **state) {
-    (void)state;
+TEST(test_unloading_line) {
     static const double recovery[3] = {0.5, 0.0, 1.0}, stiffness[3] = {2e3, 1e5, 1e3},
                         zero[3] = {0.005, 0.0099, 0.0};
     for (int i = 0; i < 3; i++) {
@@ -406,8 +396,7 @@ static Element begun(const ElementMemory *memory, double depth, double speed) {
 }
 
 /* 10 mm deep at 0.2 m/s after steps of 1 ms. */
-static void test_begin(void **state) {
-    (void)state;
+TEST(test_begin) {
     ElementMemory memory = {0};
     Element e = begun(&memory, 0.01, 0.2); /* touched down on its way: 9.9 mm by the speed */
     assert_close("middle", e.middle, 0.0099, 1e-17);
@@ -435,8 +424,7 @@ static void test_begin(void **state) {
 }
 
 /* Where k falls to a half, the force held falls with it; where it grows, it stays. */
-static void test_hold(void **state) {
-    (void)state;
+TEST(test_hold) {
     ElementMemory memory = {.held_x = 0.3, .held_y = -0.4, .held_stiffness = 1e5};
     Element e = {.mu = 0.5};
     friction_hold(&e, &memory, 1e-3, 1e3, 2.0); /* 1 N over 20 um: 5e4 N/m */
@@ -450,8 +438,7 @@ static void test_hold(void **state) {
 
 /* r = 0.01 N s, 0.02 kg of damping, nothing held: c = r 250 = 2.5 kg. At 2 mm/s along (0.6, 0.8)
  * 0.005 N s, half of the bound; at 40 mm/s it slides. */
-static void test_friction(void **state) {
-    (void)state;
+TEST(test_friction) {
     const Element e = {.damping = 0.02};
     const Friction slow = friction_impulse(&e, 0.01, 0.5, 0.0012, 0.0016);
     assert_close("x", slow.x, -0.0012 * 2.52, 1e-15);
@@ -468,8 +455,7 @@ static void test_friction(void **state) {
 
 /* Weak ground, drag alone: V goes to 0.3 h where the foot stops; F = 0.01 of the drag at h: to 0.4
  * h; much F: to 0.75 h, a uniform stop. V(w) is (h + w)/2 + (stop - 1/2) (h - w)^2/h. */
-static void test_drag(void **state) {
-    (void)state;
+TEST(test_drag) {
     static const double force[3] = {0.0, 0.01, 5.0}, stop[3] = {0.3, 0.4, 0.75};
     for (int i = 0; i < 3; i++) {
         const double rate = 40.0, h = 0.5; /* (c_d - 1) m_a' 40 kg/m: 10 N at 0.5 m/s */
@@ -500,8 +486,7 @@ static void test_drag(void **state) {
 
 /* Negative added mass and drag, half open cone at 10 mm: what joins at 0.3 m/s beyond the front,
  * and drag at 0.2 m/s over the step. */
-static void test_explicit(void **state) {
-    (void)state;
+TEST(test_explicit) {
     Element e = {.law = cone(), .yield_depth = 0.01, .front_speed = 0.1, .entry_speed = 0.2};
     e.law.mass_rate = -60.0;
     assert_close("mass", element_explicit(&e, 1e-3, 0.4), -60.0 * HALF_RECRUITED * 0.3, 1e-15);
@@ -517,8 +502,7 @@ static void test_explicit(void **state) {
 /* An element goes down at 0.4 m/s and up at 0.1 m/s after: the impulse 0.05 N s moves the mass 0.1
  * kg, 8 mJ at the entry. On 1000 N/m springs, 1 mm deep, the rest of the way x is that of 8 mJ =
  * 1 N x + 500 N/m x^2. */
-static void test_peak(void **state) {
-    (void)state;
+TEST(test_peak) {
     Element e = {.law = {.line_stiffness = 1e3, .bed_depth = INFINITY},
                  .recovery = 1.0,
                  .middle = 0.001,
@@ -554,8 +538,7 @@ static void test_peak(void **state) {
 
 /* Nothing but drag, at its mean on the way, half of c v^2 with a quarter of the area still flat:
  * M v^2/2 = c/4 v^2/2 x, so x = 4 M/c = 4 x 0.1/80. */
-static void test_peak_of_drag(void **state) {
-    (void)state;
+TEST(test_peak_of_drag) {
     Element e = {.law = cone(),
                  .recovery = 1.0,
                  .middle = 0.01,
@@ -576,8 +559,7 @@ static ElementMemory remembered(const Element *e, const ElementMemory *memory, d
     return element_remember(e, memory, 1e-3, 1e3, normal, vx, 0.0, speed, stays);
 }
 
-static void test_remember(void **state) {
-    (void)state;
+TEST(test_remember) {
     Element e = {.depth = 0.01, .yield_depth = 0.0105, .virgin_depth = 0.0105, .yield_speed = 1.0};
     ElementMemory memory = {.depth_max = 0.0105, .drift = 0.02, .pending_x = 6e-6};
     ElementMemory after =
@@ -603,8 +585,7 @@ static void test_remember(void **state) {
 }
 
 /* 2 mN s held less 1 kg x 0.5 mm/s: 1.5 N, within 0.5 x 4 mN s; a bound of 1 mN s leaves 1 N. */
-static void test_remember_friction(void **state) {
-    (void)state;
+TEST(test_remember_friction) {
     const Element e = {.depth = 0.01, .mu = 0.5, .hold_x = 2e-3, .hold_stiffness = 1.0};
     const ElementMemory memory = {0};
     ElementMemory after = remembered(&e, &memory, 4e-3, 0.5e-3, 0.0, 1);
@@ -615,25 +596,4 @@ static void test_remember_friction(void **state) {
     assert_true(after.held_y == 0.0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_slope_of_the_impulse),
-                                       cmocka_unit_test(test_slopes_of_friction),
-                                       cmocka_unit_test(test_way),
-                                       cmocka_unit_test(test_path_keeps_the_work),
-                                       cmocka_unit_test(test_law_between),
-                                       cmocka_unit_test(test_added_mass),
-                                       cmocka_unit_test(test_growth),
-                                       cmocka_unit_test(test_lag),
-                                       cmocka_unit_test(test_elastic),
-                                       cmocka_unit_test(test_unloading_line),
-                                       cmocka_unit_test(test_begin),
-                                       cmocka_unit_test(test_hold),
-                                       cmocka_unit_test(test_friction),
-                                       cmocka_unit_test(test_drag),
-                                       cmocka_unit_test(test_explicit),
-                                       cmocka_unit_test(test_peak),
-                                       cmocka_unit_test(test_peak_of_drag),
-                                       cmocka_unit_test(test_remember),
-                                       cmocka_unit_test(test_remember_friction)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

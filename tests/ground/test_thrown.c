@@ -31,17 +31,6 @@ static int close_soles(void **state) {
     return 0;
 }
 
-/* Log-uniform. */
-static double spread(uint64_t *random, double low, double high) {
-    return exp(kit_uniform(random, log(low), log(high)));
-}
-
-static void draw_vector(uint64_t *random, double size, double *x) {
-    for (int k = 0; k < 3; k++) {
-        x[k] = kit_uniform(random, -size, size);
-    }
-}
-
 static void draw_open(Kit *kit, uint64_t *random) {
     static const double steps[4] = {0.25e-3, 1e-3, 2.5e-3, 5e-3};
     MildMaterial m = kit_material(random);
@@ -53,37 +42,25 @@ static void draw_open(Kit *kit, uint64_t *random) {
 /* Half of them begin up to 0.3 m deep, the bed being at 0.1 to 0.15 m. */
 static void draw_body(Kit *kit, uint64_t *random) {
     draw_open(kit, random);
-    kit->mass[0] = spread(random, 1.0, 60.0);
-    kit->inertia[0] = kit->mass[0] * spread(random, 1e-4, 0.3);
-    draw_vector(random, 0.5, kit->center[0]);
+    kit->mass[0] = kit_spread(random, 1.0, 60.0);
+    kit->inertia[0] = kit->mass[0] * kit_spread(random, 1e-4, 0.3);
+    kit_vector(random, 0.5, kit->center[0]);
     const double deep = kit_uniform(random, -0.05, 0.3), shallow = kit_uniform(random, -0.05, 0.01);
     kit->input.position[0][2] = -KIT_SOLE_Z - (kit_index(random, 2) ? deep : shallow);
-    draw_vector(random, 3.0, kit->input.velocity[0]);
-    draw_vector(random, 10.0, kit->input.velocity[0] + 3);
+    kit_vector(random, 3.0, kit->input.velocity[0]);
+    kit_vector(random, 10.0, kit->input.velocity[0] + 3);
 }
 
 /* Gyration radius 3 to 100 mm, up to 1 m from the ankle. */
 static void draw_stick(Kit *kit, uint64_t *random) {
     draw_open(kit, random);
-    kit->mass[0] = spread(random, 0.02, 5.0);
-    kit->inertia[0] = kit->mass[0] * spread(random, 1e-5, 1e-2);
-    draw_vector(random, 0.3, kit->center[0]);
+    kit->mass[0] = kit_spread(random, 0.02, 5.0);
+    kit->inertia[0] = kit->mass[0] * kit_spread(random, 1e-5, 1e-2);
+    kit_vector(random, 0.3, kit->center[0]);
     kit->center[0][2] = kit_uniform(random, 0.0, 1.0);
     kit->input.position[0][2] = -KIT_SOLE_Z + kit_uniform(random, 0.1, 0.2);
-    draw_vector(random, 2.0, kit->input.velocity[0]);
-    draw_vector(random, 5.0, kit->input.velocity[0] + 3);
-}
-
-/* [J] */
-static double kinetic_energy(const Kit *kit, const double *V) {
-    double r[3], swing[3], sum = 0.0;
-    kit_center(kit, 0, r);
-    kit_cross(V + 3, r, swing);
-    for (int k = 0; k < 3; k++) {
-        const double v = V[k] + swing[k];
-        sum += kit->mass[0] * v * v + kit->inertia[0] * V[3 + k] * V[3 + k];
-    }
-    return 0.5 * sum;
+    kit_vector(random, 2.0, kit->input.velocity[0]);
+    kit_vector(random, 5.0, kit->input.velocity[0] + 3);
 }
 
 /* Bool: the foot goes on into the firm bed, deeper than ever, and feels no normal force. */
@@ -102,14 +79,6 @@ static int sinks_freely(const Kit *kit) {
     return count > 0 && !(kit->result.foot[0].force[2] > 0.0);
 }
 
-static int lifted(const Kit *kit) {
-    int touched = kit->result.foot[0].contacts;
-    for (int e = 0; e < mild_sole_elements(kit->soles[0]); e++) {
-        touched += mild_ground_depth_max(kit->ground, 0)[e] > 0.0;
-    }
-    return touched == 0;
-}
-
 #define HARD 10
 
 typedef struct {
@@ -126,7 +95,7 @@ static void throw_body(Kit *kit, Thrown *thrown, int draw, double seconds) {
         double before[6];
         memcpy(before, kit->input.velocity[0], sizeof before);
         if (!touched) {
-            energy = kinetic_energy(kit, before);
+            energy = kit_kinetic(kit, before);
         }
         kit_inverse_inertia(kit);
         kit_free(kit, NULL);
@@ -143,7 +112,7 @@ static void throw_body(Kit *kit, Thrown *thrown, int draw, double seconds) {
         work += kit_work(kit, 0, before);
         kit_advance(kit);
         touched |= work != 0.0;
-        if (!touched || !lifted(kit)) {
+        if (!touched || !kit_lifted(kit)) {
             continue;
         }
         thrown->cycles++; /* closed */
@@ -183,16 +152,14 @@ static void assert_effort(const Thrown *thrown, int effort) {
     }
 }
 
-static void test_bodies(void **state) {
-    (void)state;
+TEST(test_bodies) {
     const Thrown thrown = throw_all("bodies of 1 to 60 kg", draw_body, 0.2, draws);
     assert_true(thrown.unsolved <= thrown.steps / 50000);
     assert_int_equal(thrown.falling, 0);
     assert_effort(&thrown, 48936);
 }
 
-static void test_sticks(void **state) {
-    (void)state;
+TEST(test_sticks) {
     const Thrown thrown = throw_all("point masses on sticks", draw_stick, 1.0, draws / 2);
     assert_true(thrown.unsolved <= thrown.steps / 20000);
     assert_int_equal(thrown.falling, 0);
@@ -206,8 +173,7 @@ static void test_sticks(void **state) {
 }
 
 /* A step that is given too little work still feels the ground. */
-static void test_little_work(void **state) {
-    (void)state;
+TEST(test_little_work) {
     static const int limits[] = {1, 2, 5, 20};
     for (int l = 0; l < 4; l++) {
         int steps = 0, unsolved = 0, missing = 0;
@@ -235,13 +201,11 @@ static void test_little_work(void **state) {
 
 /* A level sole whose depth is exactly 0, with a twist that is next to nothing: the impulses are
  * below the rounding of anything that acts. */
-static void test_surface(void **state) {
-    (void)state;
+TEST(test_surface) {
     uint64_t random = 5;
     int most = 0, unsolved = 0, count = 0;
     for (int draw = 0; draw < 6000; draw++) {
-        MildMaterial m;
-        mild_material_preset(mild_material_preset_name(kit_index(&random, 8)), &m);
+        MildMaterial m = kit_preset(mild_material_preset_name(kit_index(&random, 8)));
         static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
         Kit kit;
         kit_open(&kit, 1, soles[kit_index(&random, SOLES)], NULL, &m, steps[kit_index(&random, 3)]);
@@ -272,8 +236,7 @@ static void test_surface(void **state) {
 
 /* What friction opposes instead of v takes energy at v and at the mean of it and the velocity
  * before, and friction_turned's derivatives are those of its impulse. */
-static void test_turned(void **state) {
-    (void)state;
+TEST(test_turned) {
     uint64_t random = 9;
     double least = INFINITY, worst = 0.0;
     for (int draw = 0; draw < 20000; draw++) {
@@ -310,9 +273,5 @@ int main(int argc, char **argv) {
     if (argc > 2) {
         first = atoi(argv[2]);
     }
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bodies), cmocka_unit_test(test_sticks),
-                                       cmocka_unit_test(test_little_work),
-                                       cmocka_unit_test(test_surface),
-                                       cmocka_unit_test(test_turned)};
-    return cmocka_run_group_tests(tests, open_soles, close_soles);
+    return run_cases(open_soles, close_soles);
 }

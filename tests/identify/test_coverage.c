@@ -82,9 +82,7 @@ static FitResult press_and_fit(const Case *c, Noise noise, int draw) {
         }
         noise_add(points + r * ROWS, noise, &random);
     }
-    if (fit_run(&def, points, c->records * ROWS, &result, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(fit_run(&def, points, c->records * ROWS, &result, &error) == MILD_OK, &error);
     return result;
 }
 
@@ -167,8 +165,7 @@ static void cover_preset(const char *name, int records) {
     cover(&c);
 }
 
-static void coverage(void **state) {
-    (void)state;
+TEST(coverage) {
     printf("%-13s %s  %-23s %14s %14s %14s\n", "ground", "n", "", "of the peak", "of the row",
            "slow");
     for (int p = 0; p < mild_material_preset_count(); p++) {
@@ -196,8 +193,7 @@ static void coverage(void **state) {
 }
 
 int main(int argc, char **argv) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(coverage)};
     draws = argc > 1 ? atoi(argv[1]) : draws;
     only = argc > 2 ? argv[2] : NULL;
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_cases(NULL, NULL);
 }

@@ -6,7 +6,7 @@
 #include "base/random.h"
 #include "base/student.h"
 #include "identify/fit.h"
-#include "kit.h"
+#include "materials.h"
 
 enum { ROWS = 1000, SEEDS = 5 };
 typedef enum {
@@ -92,9 +92,7 @@ static void press(const FitDef *truth, FitPoint *out, int rows, double depth, do
 static FitResult run(const FitDef *def, int count) {
     FitResult result;
     MildError error = {0};
-    if (fit_run(def, points, count, &result, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(fit_run(def, points, count, &result, &error) == MILD_OK, &error);
     return result;
 }
 
@@ -102,8 +100,7 @@ static FitResult run(const FitDef *def, int count) {
 
 #define SHAPE_AND_MASS "alpha nu c_g c_d phi rho"
 
-static void recovery(void **state) {
-    (void)state;
+TEST(recovery) {
     double worst[2] = {0, 0};
     for (int g = 0; g < mild_material_preset_count(); g++) {
         for (int run_index = 0; run_index < 2 * SEEDS; run_index++) {
@@ -142,9 +139,8 @@ static double is_near(FitResult *result, const char *name, double truth) {
 
 /* Without noise and with nothing held, the truth comes back as far as a slow press tells it: the
  * two combinations of the cone, and no value for its parts. */
-static void exact(void **state) {
+TEST(exact) {
     static const char *const untold[] = {"sigma_cone", "alpha", "nu", "c_g", "c_d", "phi", "rho"};
-    (void)state;
     double worst = 0;
     for (int g = 0; g < mild_material_preset_count(); g++) {
         const FitDef truth = plate(mild_material_preset_name(g));
@@ -168,9 +164,8 @@ static void exact(void **state) {
 
 /* Far from the start: cones that are complete at 0.5 mm to 0.1 m, stiffer or softer than their
  * surroundings. Of the first, ten rows tell k_pen. */
-static void shapes(void **state) {
+TEST(shapes) {
     static const double alphas[] = {0.1, 0.7, 1.047, 1.4, 1.45}, nus[] = {2, 3, 0.5, 1, 0.9};
-    (void)state;
     for (int i = 0; i < 10; i++) {
         FitDef truth = plate("grass");
         MildMaterial *m = &truth.material;
@@ -188,8 +183,7 @@ static void shapes(void **state) {
 
 /* What is held turns the combinations into parameters: with alpha both parts of the cone, with phi
  * and rho the mass, of which a record that brakes tells c_d. */
-static void held(void **state) {
-    (void)state;
+TEST(held) {
     const FitDef truth = plate("sand_loose");
     const MildMaterial *m = &truth.material;
     press_exactly(&truth, points, ROWS, 0.04, 0.01, 0);
@@ -231,7 +225,7 @@ static void held(void **state) {
 }
 
 /* Every model in its own parameters. */
-static void models(void **state) {
+TEST(models) {
     static const struct {
         MildModel model;
         const char *names;
@@ -247,7 +241,6 @@ static void models(void **state) {
         {MILD_MODEL_MILD_MERGED, "k_pen sigma_cone alpha nu c_g c_d phi rho "},
         {MILD_MODEL_RIGID, ""},
     };
-    (void)state;
     assert_int_equal(sizeof rows / sizeof *rows, MILD_MODELS);
     for (int r = 0; r < MILD_MODELS; r++) {
         const MildField *fields[FIT_PARAMETERS_MAX];
@@ -289,8 +282,7 @@ static void models(void **state) {
 /* A record on each of two plates, one twice as long and wide as the other: the second's rows stand
  * behind the first's. Every number comes back, and of bekker k_c and k_phi each by itself, because
  * b differs. With one plate for both nothing fits. */
-static void plates(void **state) {
-    (void)state;
+TEST(plates) {
     static const char *const grounds[] = {"foam45", "clay", "sandy_loam"};
     for (size_t g = 0; g < sizeof grounds / sizeof *grounds; g++) {
         FitDef truth = plate(grounds[g]);
@@ -326,8 +318,7 @@ static void plates(void **state) {
 
 /* Cones of one sole merge: records that the ground itself wrote on two plates come back, and the
  * wider plate bears more than the same number of discs. */
-static void merged_plates(void **state) {
-    (void)state;
+TEST(merged_plates) {
     FitDef truth = plate("grass");
     MildSole *soles[2];
     truth.material.model = MILD_MODEL_MILD_MERGED;
@@ -368,8 +359,7 @@ static void merged_plates(void **state) {
 
 /* A spring is linear: F = n k u. Its interval is that of a regression through the origin with the
  * variance HC3, b -+ t sqrt(sum (x r/(1 - h))^2)/sum x^2, h = x^2/sum x^2. */
-static void interval_linear(void **state) {
-    (void)state;
+TEST(interval_linear) {
     for (int noise = 0; noise < 2; noise++) {
         FitDef truth = plate("grass");
         double xx = 0, xy = 0, spread = 0;
@@ -398,8 +388,7 @@ static void interval_linear(void **state) {
 
 /* Of 50 000 rows the means of three are fitted, to the same end: the interval of a spring is that
  * of the formula for all rows. Two records, of which the first ends within a group. */
-static void interval_many(void **state) {
-    (void)state;
+TEST(interval_many) {
     enum { FIRST = 20 * ROWS + 1, COUNT = 50 * ROWS };
     FitDef truth = plate("grass");
     FitResult result;
@@ -454,8 +443,7 @@ static double sum_at(double u_f, int count) {
 /* The interval of tan(alpha)/nu = u_f/R, against a search over u_f with the rest solved exactly.
  * The noise is the same on all rows, so that the variance is S/(n - 3). Shallow enough to be far
  * from linear: the interval reaches further up than down. */
-static void interval_profile(void **state) {
-    (void)state;
+TEST(interval_profile) {
     const double R = 0.0195 / sqrt(acos(-1.0));
     FitDef truth = plate("foam60");
     double best = 0, least = INFINITY, end[2];
@@ -486,8 +474,7 @@ static void interval_profile(void **state) {
 
 /* ---- what the data do not tell ---- */
 
-static void untold(void **state) {
-    (void)state;
+TEST(untold) {
     /* a ground without added mass: the drag has a limit and no value */
     FitDef def = plate("foam45");
     press(&def, points, ROWS, 0.04, 0.01, NOISE_OF_ROW, 7);
@@ -521,8 +508,7 @@ static void untold(void **state) {
 }
 
 /* Filled are those that the data do not tell, and only those. */
-static void filled(void **state) {
-    (void)state;
+TEST(filled) {
     FitDef def = plate("sand_loose");
     const MildMaterial fill = def.material;
     def.fill = &fill;
@@ -551,11 +537,9 @@ static void filled(void **state) {
 }
 
 /* A limit that contradicts the filling stays a limit: foam is not given the mass of sand. */
-static void not_filled(void **state) {
-    (void)state;
+TEST(not_filled) {
     FitDef def = plate("foam45");
-    MildMaterial sand;
-    assert_true(mild_material_preset("sand_loose", &sand));
+    MildMaterial sand = kit_preset("sand_loose");
     def.fill = &sand;
     press_exactly(&def, points, ROWS, 0.04, 0.01, 0);
     press_exactly(&def, points + ROWS, ROWS, 0.04, 1, 0);
@@ -569,8 +553,7 @@ static void not_filled(void **state) {
 
 /* Noise with a correlation of 0.8 between neighbours, and a law that misses the curve: the rows
  * count for less, and the interval is wider. */
-static void neighbours(void **state) {
-    (void)state;
+TEST(neighbours) {
     Random random = random_at(5, 0, 0);
     FitDef def = plate("grass");
     double drift = random_normal(&random);
@@ -594,8 +577,7 @@ static void neighbours(void **state) {
 
 /* Down, up, down deeper: what counts is the way down on virgin ground; the speed comes from the
  * times. */
-static void loading(void **state) {
-    (void)state;
+TEST(loading) {
     static const double depths[] = {-0.001, 0,     0.001, 0.002, 0.003, 0.002,
                                     0.001,  0.002, 0.003, 0.004, 0.005, 0.004};
     enum { COUNT = sizeof depths / sizeof *depths };
@@ -617,8 +599,7 @@ static void loading(void **state) {
     assert_true(points[0].speed == 0);
 }
 
-static void refused(void **state) {
-    (void)state;
+TEST(refused) {
     FitDef def = plate("grass");
     FitResult result;
     MildError error = {0};
@@ -658,16 +639,4 @@ static void refused(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(recovery),         cmocka_unit_test(exact),
-        cmocka_unit_test(shapes),           cmocka_unit_test(held),
-        cmocka_unit_test(models),           cmocka_unit_test(plates),
-        cmocka_unit_test(merged_plates),    cmocka_unit_test(interval_linear),
-        cmocka_unit_test(interval_profile), cmocka_unit_test(interval_many),
-        cmocka_unit_test(untold),           cmocka_unit_test(filled),
-        cmocka_unit_test(not_filled),       cmocka_unit_test(neighbours),
-        cmocka_unit_test(loading),          cmocka_unit_test(refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -16,9 +16,7 @@ static void press(const PressDef *def) {
     MildSole *plate = press_plate_create(0.2, 0.1, &error);
     assert_non_null(plate);
     press_result_close(&result);
-    if (press_run(def, plate, &result, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(press_run(def, plate, &result, &error) == MILD_OK, &error);
     mild_sole_destroy(plate);
 }
 
@@ -40,8 +38,7 @@ static double law(const MildMaterial *material, double depth, double speed) {
 }
 
 /* Force and depth of a row belong together, at any speed. */
-static void test_law(void **state) {
-    (void)state;
+TEST(test_law) {
     static const double speeds[] = {1e-4, 1e-2, 1};
     for (int v = 0; v < 3; v++) {
         double worst = 0;
@@ -61,8 +58,7 @@ static void test_law(void **state) {
     }
 }
 
-static void test_energy(void **state) {
-    (void)state;
+TEST(test_energy) {
     PressDef def = definition("foam45");
     press(&def);
     printf("foam45 gives back %.4f of %.4f J\n", result.work_out, result.work_in);
@@ -78,8 +74,7 @@ static void test_energy(void **state) {
 
 /* A level plate has no moment and its zero moment point in the middle; the front edge down moves
  * both forward. */
-static void test_moments(void **state) {
-    (void)state;
+TEST(test_moments) {
     PressDef def = definition("sand_loose");
     press(&def);
     const PressRow *level = turn_of(0);
@@ -97,8 +92,7 @@ static void test_moments(void **state) {
 }
 
 /* Down again past the old turn, the force goes on along the law. */
-static void test_reload(void **state) {
-    (void)state;
+TEST(test_reload) {
     double worst = 0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
         PressDef def = definition(mild_material_preset_name(p));
@@ -120,8 +114,7 @@ static void test_reload(void **state) {
 
 /* Cycles between two depths give back what the line holds; between two forces they turn at those
  * forces. */
-static void test_cycles(void **state) {
-    (void)state;
+TEST(test_cycles) {
     PressDef def = definition("foam45");
     def.cycles = 4;
     def.turns = 2;
@@ -151,8 +144,7 @@ static void test_cycles(void **state) {
 
 /* Sideways at constant depth u over the way d: friction mu F, drift k_D d u and damping b_D v of
  * every element (eq 14). */
-static void test_drag(void **state) {
-    (void)state;
+TEST(test_drag) {
     double worst = 0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
         PressDef def = definition(mild_material_preset_name(p));
@@ -174,8 +166,7 @@ static void test_drag(void **state) {
 
 /* What falls comes to rest: the ground takes the weight times the whole height; a tilted plate
  * lands flat. */
-static void test_drop(void **state) {
-    (void)state;
+TEST(test_drop) {
     PressDef def = {.mass = 5, .height = 0.1, .seconds = 1};
     mild_material_preset("sand_dense", &def.material);
     press(&def);
@@ -194,8 +185,7 @@ static void test_drop(void **state) {
 }
 
 /* (k_c/b + k_phi) u^n of the area, b the plate's shorter side: through the ground's step. */
-static void test_width(void **state) {
-    (void)state;
+TEST(test_width) {
     static const double sides[][2] = {{0.3, 0.2}, {0.2, 0.1}, {0.06, 0.15}};
     double worst = 0;
     for (int i = 0; i < 3; i++) {
@@ -215,8 +205,7 @@ static void test_width(void **state) {
     press_result_close(&result);
 }
 
-static void test_bad_material(void **state) {
-    (void)state;
+TEST(test_bad_material) {
     MildError error = {0};
     PressDef def = {.material = mild_material_default(), .turns = 1, .turn = {0.03}, .speed = 0.01};
     def.material.k_pen = NAN;
@@ -232,13 +221,4 @@ static void test_bad_material(void **state) {
     press_result_close(&result);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_law),          cmocka_unit_test(test_energy),
-        cmocka_unit_test(test_moments),      cmocka_unit_test(test_reload),
-        cmocka_unit_test(test_cycles),       cmocka_unit_test(test_drag),
-        cmocka_unit_test(test_drop),         cmocka_unit_test(test_width),
-        cmocka_unit_test(test_bad_material),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

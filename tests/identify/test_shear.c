@@ -59,9 +59,7 @@ static FitValue *value_of(FitResult *result, const char *name) {
 static FitResult run(const FitDef *def, int count) {
     FitResult result;
     MildError error = {0};
-    if (fit_run(def, points, count, &result, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(fit_run(def, points, count, &result, &error) == MILD_OK, &error);
     return result;
 }
 
@@ -87,8 +85,7 @@ static int slips(Random *random, double share) {
     return count;
 }
 
-static void slips_come_back(void **state) {
-    (void)state;
+TEST(slips_come_back) {
     Random random = random_at(1, 1, 0);
     const FitDef def = shear_def();
     FitResult result = run(&def, slips(&random, 0));
@@ -98,8 +95,7 @@ static void slips_come_back(void **state) {
 }
 
 /* A ring of any width, down to a full disc, whose torque this test sums up by itself. */
-static void rings_come_back(void **state) {
-    (void)state;
+TEST(rings_come_back) {
     static const double inner[] = {0.09, 0.06, 0.0};
     for (int n = 0; n < 3; n++) {
         FitDef def = shear_def();
@@ -127,8 +123,7 @@ static void rings_come_back(void **state) {
 
 /* Of DRAWS noisy data sets the 95 % intervals hold the truth in about that share; 91 of 100 is four
  * standard deviations away for none of three parameters, 0.89 of 300 five. */
-static void intervals_hold_the_truth(void **state) {
-    (void)state;
+TEST(intervals_hold_the_truth) {
     static const double truth[] = {C, MU, K};
     static const char *const names[] = {"cohesion", "mu", "shear_length"};
     const FitDef def = shear_def();
@@ -148,8 +143,7 @@ static void intervals_hold_the_truth(void **state) {
 }
 
 /* One pressure tells a strength, not cohesion and friction; with one held it tells the other. */
-static void one_pressure(void **state) {
-    (void)state;
+TEST(one_pressure) {
     Random random = random_at(1, 1, 0);
     FitDef def = shear_def();
     const MildField *fields[FIT_PARAMETERS_MAX];
@@ -172,8 +166,7 @@ static void one_pressure(void **state) {
     expect_fitted(&result, "mu", MU, 1e-4);
 }
 
-static void only_bekker_shears(void **state) {
-    (void)state;
+TEST(only_bekker_shears) {
     const MildField *fields[FIT_PARAMETERS_MAX];
     for (int m = 0; m < MILD_MODEL_RIGID; m++) {
         assert_int_equal(fit_parameters((MildModel)m, FIT_SHEAR, fields),
@@ -205,8 +198,7 @@ static FitDef unload_def(int model) {
     return def;
 }
 
-static void recovery_comes_back(void **state) {
-    (void)state;
+TEST(recovery_comes_back) {
     static const double truth[] = {0.02, 0.1, 0.5, 0.8};
     int held = 0, draws = 0;
     for (int t = 0; t < 4; t++) {
@@ -226,8 +218,7 @@ static void recovery_comes_back(void **state) {
 }
 
 /* Plastic and elastic ground lie at the ends of the range: there the fit says a limit. */
-static void recovery_at_its_ends(void **state) {
-    (void)state;
+TEST(recovery_at_its_ends) {
     Random random = random_at(3, 1, 0);
     const FitDef def = unload_def(MILD_MODEL_MILD);
     FitResult result = run(&def, way_up(points, 0.04, 900, 0, 0.01, &random));
@@ -244,15 +235,12 @@ static FitFile read_text(const char *text) {
     FitFile file;
     MildError error = {0};
     FILE *stream = fmemopen((void *)(uintptr_t)text, strlen(text), "r");
-    if (fit_csv_read_file(stream, "record", &file, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(fit_csv_read_file(stream, "record", &file, &error) == MILD_OK, &error);
     fclose(stream);
     return file;
 }
 
-static void kinds_of_files(void **state) {
-    (void)state;
+TEST(kinds_of_files) {
     char text[2000] = "depth_m,force_n,area_m2\n";
     for (int i = 0; i < 30; i++) { /* down to 15 mm, up, and down again less deep */
         const double depth = 1e-3 * (i < 15 ? i + 1 : i < 25 ? 30 - i : i - 15);
@@ -293,8 +281,7 @@ static void kinds_of_files(void **state) {
 }
 
 /* bekker asks for a pressure on the plate's own area: elements of a raster have another. */
-static void pressure_on_an_area(void **state) {
-    (void)state;
+TEST(pressure_on_an_area) {
     FitDef def = {
         .plate = {{.elements = 5, .pitch = 0.0195, .width = 0.025, .area = PI * 0.025 * 0.025}},
         .plates = 1,
@@ -320,13 +307,4 @@ static void pressure_on_an_area(void **state) {
     assert_true(measured == whole);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(slips_come_back),          cmocka_unit_test(rings_come_back),
-        cmocka_unit_test(intervals_hold_the_truth), cmocka_unit_test(one_pressure),
-        cmocka_unit_test(only_bekker_shears),       cmocka_unit_test(recovery_comes_back),
-        cmocka_unit_test(recovery_at_its_ends),     cmocka_unit_test(kinds_of_files),
-        cmocka_unit_test(pressure_on_an_area),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

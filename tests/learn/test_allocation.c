@@ -149,8 +149,7 @@ static int attempt_load(void) {
     return ppo_load(shared_ppo, PATH, state, sizeof state, &error) == MILD_OK;
 }
 
-static void test_every_allocation_may_fail(void **state) {
-    (void)state;
+TEST(test_every_allocation_may_fail) {
     if (!COUNTS) {
         skip();
     }
@@ -175,8 +174,7 @@ static void test_every_allocation_may_fail(void **state) {
 
 /* oneDNN's packing buffers are its own; whatever it takes it gives back, and a product that finds
  * no memory only costs its minibatch. */
-static void test_learning_survives_without_memory(void **state) {
-    (void)state;
+TEST(test_learning_survives_without_memory) {
     if (!COUNTS) {
         skip();
     }
@@ -207,10 +205,4 @@ static void test_learning_survives_without_memory(void **state) {
     pool_destroy(shared_pool);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_allocation_may_fail),
-        cmocka_unit_test(test_learning_survives_without_memory),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -94,8 +94,7 @@ static void swap_text(const char *from, const char *to) {
 }
 
 /* Numbers that would spoil the run at its first update. */
-static void bad_numbers_are_refused(void **state) {
-    (void)state;
+TEST(bad_numbers_are_refused) {
     PolicyDef policy_def = toy_policy_def();
     PpoDef def = ppo_def();
     def.average = 0.9;
@@ -141,8 +140,7 @@ static void bad_numbers_are_refused(void **state) {
 }
 
 /* A network of another shape is refused with both shapes; another note or first noise is none. */
-static void another_network_is_refused(void **state) {
-    (void)state;
+TEST(another_network_is_refused) {
     MildError error = {0};
     PolicyDef wider = toy_policy_def(), louder = toy_policy_def();
     PpoDef def = ppo_def();
@@ -164,8 +162,7 @@ static void another_network_is_refused(void **state) {
 }
 
 /* What resuming needs must be there, of its size, under its name. */
-static void missing_parts_are_refused(void **state) {
-    (void)state;
+TEST(missing_parts_are_refused) {
     static const char *const parts[] = {
         "train.counters", "train.learning_rate", "train.first_moment", "train.second_moment",
         "train.history",  "train.critic",        "train.target",       "train.frame",
@@ -197,8 +194,7 @@ static void missing_parts_are_refused(void **state) {
 }
 
 /* A run without averages goes on as one with averages, which start from its weights, and back. */
-static void averages_come_and_go(void **state) {
-    (void)state;
+TEST(averages_come_and_go) {
     MildError error = {0};
     PolicyDef policy_def = toy_policy_def();
     PpoDef def = ppo_def();
@@ -233,8 +229,7 @@ static void averages_come_and_go(void **state) {
 
 /* With more minibatches than samples in a stratum most shards are empty: what the minibatch before
  * left in them must not count. A run that resumed here has nothing left there. */
-static void empty_shards_are_empty(void **state) {
-    (void)state;
+TEST(empty_shards_are_empty) {
     MildError error = {0};
     Run run, fresh;
     PolicyDef policy_def = toy_policy_def();
@@ -262,8 +257,7 @@ static void empty_shards_are_empty(void **state) {
 }
 
 /* A note that has no room is cut, not left out; with no room at all nothing is written. */
-static void notes_are_cut(void **state) {
-    (void)state;
+TEST(notes_are_cut) {
     MildError error = {0};
     Run run;
     run_open_toy(&run);
@@ -281,11 +275,4 @@ static void notes_are_cut(void **state) {
     run_close(&run);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bad_numbers_are_refused),   cmocka_unit_test(another_network_is_refused),
-        cmocka_unit_test(missing_parts_are_refused), cmocka_unit_test(averages_come_and_go),
-        cmocka_unit_test(empty_shards_are_empty),    cmocka_unit_test(notes_are_cut),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

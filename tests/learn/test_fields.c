@@ -47,15 +47,11 @@ static void check_section(const char *section, const MildField *fields, int coun
     fclose(file);
 }
 
-static void test_defaults_are_the_files(void **state) {
-    (void)state;
+TEST(test_defaults_are_the_files) {
     PpoDef ppo = ppo_def_default();
     PolicyDef policy = policy_def_default();
     check_section("ppo", ppo_fields, ppo_field_count, &ppo);
     check_section("policy", policy_fields, policy_field_count, &policy);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_defaults_are_the_files)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -167,8 +167,7 @@ static void check_minibatch(Case *c, int count, uint32_t draw, double share) {
 }
 
 /* Several chunks a shard; fewer samples than shards, where an empty shard must leave nothing. */
-static void minibatch_is_the_sum_of_its_samples(void **state) {
-    (void)state;
+TEST(minibatch_is_the_sum_of_its_samples) {
     Case c;
     case_open(&c, 0.5, PPO_TARGET_NEXT);
     check_minibatch(&c, SAMPLES, 0, 0.5);
@@ -185,8 +184,7 @@ static void minibatch_is_the_sum_of_its_samples(void **state) {
 
 /* No two samples of a minibatch share a latent's random numbers, and every other draw, iteration
  * and seed has its own. */
-static void latents_are_drawn_apart(void **state) {
-    (void)state;
+TEST(latents_are_drawn_apart) {
     static int row[8000], used[16000 + 512];
     static const int counts[] = {1, 7, 8, 100, 2048, 2049, 8000};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
@@ -204,10 +202,4 @@ static void latents_are_drawn_apart(void **state) {
     assert_true(key != step_latent_key(6, 0, 0));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(minibatch_is_the_sum_of_its_samples),
-        cmocka_unit_test(latents_are_drawn_apart),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

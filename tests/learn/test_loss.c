@@ -121,8 +121,7 @@ static void take_inputs(const Safetensors *file, Case *c) {
     take_input(file, "old_std", c->context.old_std);
 }
 
-static void test_matches_pytorch(void **state) {
-    (void)state;
+TEST(test_matches_pytorch) {
     MildError error = {0};
     const char *path = MILD_SOURCE_DIR "/tests/learn/reference.safetensors";
     Safetensors *file = safetensors_read(path, &error);
@@ -346,8 +345,7 @@ static void check_differences(PolicyDef policy_def, int clip_value, double free_
     case_close(&c);
 }
 
-static void test_matches_differences(void **state) {
-    (void)state;
+TEST(test_matches_differences) {
     PolicyDef def = small_def();
     check_differences(def, 1, 0.0, 0, 1);
     def.modulation_per_dimension = 1;
@@ -358,8 +356,7 @@ static void test_matches_differences(void **state) {
 }
 
 /* What the decoder rebuilds, each part with the mean of its own; and free bits. */
-static void test_awareness_matches_differences(void **state) {
-    (void)state;
+TEST(test_awareness_matches_differences) {
     PolicyDef def = small_def();
     def.ground_offset = 3;
     def.ground_count = 2;
@@ -401,15 +398,13 @@ static void parts_weigh_the_same(int ground) {
     case_close(&c);
 }
 
-static void test_parts_of_the_decoder_weigh_the_same(void **state) {
-    (void)state;
+TEST(test_parts_of_the_decoder_weigh_the_same) {
     parts_weigh_the_same(2);
     parts_weigh_the_same(1);
 }
 
 /* Chunks add up: the gradient with beta 1 on top of another is their sum. */
-static void test_chunks_add(void **state) {
-    (void)state;
+TEST(test_chunks_add) {
     Case c;
     Random random = random_at(4, 0, 0);
     case_open(&c, small_def());
@@ -441,8 +436,7 @@ static void claim(const float *block, size_t floats, char *taken, const float *a
 }
 
 /* Every array of a chunk has the rows and columns that loss.h gives it, for itself alone. */
-static void test_areas_are_apart(void **state) {
-    (void)state;
+TEST(test_areas_are_apart) {
     Case c;
     PolicyDef def = small_def();
     def.ground_count = 3;
@@ -504,8 +498,7 @@ static void test_areas_are_apart(void **state) {
 /* Every latent gets the log-variance b: it counts as held within -12 and 6. Without noise only the
  * KL term e^b - 1 - b pulls, back inside from anywhere; without the KL term what would lead farther
  * out is dropped. */
-static void test_logvar_is_held(void **state) {
-    (void)state;
+TEST(test_logvar_is_held) {
     static const double logvar[] = {-40, -12.5, -11.5, 0.3, 5.5, 6.5, 50};
     enum { COUNT = sizeof logvar / sizeof *logvar };
     Case c;
@@ -554,8 +547,7 @@ static void test_logvar_is_held(void **state) {
 
 /* The log-variance at -20, -12, 0, 6 and 20, with the gradient pushing down and up: used within its
  * bounds, and no gradient that would push it further out. */
-static void test_logvar_bounds(void **state) {
-    (void)state;
+TEST(test_logvar_bounds) {
     static const struct {
         float logvar, used;
         int feels_down, feels_up; /* bool: descent may lower it, raise it */
@@ -577,16 +569,4 @@ static void test_logvar_bounds(void **state) {
     print_message("log-variance bounds: worst %.1e\n", worst);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_logvar_is_held),
-        cmocka_unit_test(test_matches_pytorch),
-        cmocka_unit_test(test_matches_differences),
-        cmocka_unit_test(test_chunks_add),
-        cmocka_unit_test(test_logvar_bounds),
-        cmocka_unit_test(test_areas_are_apart),
-        cmocka_unit_test(test_awareness_matches_differences),
-        cmocka_unit_test(test_parts_of_the_decoder_weigh_the_same),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

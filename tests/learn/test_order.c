@@ -7,8 +7,7 @@
 
 #include "learn/order.h"
 
-static void orders_are_permutations(void **state) {
-    (void)state;
+TEST(orders_are_permutations) {
     static char seen[5000];
     for (int count = 1; count <= 5000; count += count < 300 ? 1 : 1175) {
         const Order order = order_make(count, 7, count, 3, 5);
@@ -46,8 +45,7 @@ static double pairs(int count, int a, int b, int argument) {
     return excess(cells, count * (count - 1), total);
 }
 
-static void pairs_are_uniform(void **state) {
-    (void)state;
+TEST(pairs_are_uniform) {
     static const int counts[] = {3, 4, 5, 6, 8, 13, 16, 17, 31, 64};
     double worst = 0.0;
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
@@ -64,8 +62,7 @@ static void pairs_are_uniform(void **state) {
 
 /* One order of many samples: places of 32 equal runs fill 32 equal runs of samples evenly, and
  * neighbours of places are not neighbours among the samples. */
-static void one_order_is_mixed(void **state) {
-    (void)state;
+TEST(one_order_is_mixed) {
     enum { COUNT = 49152, RUNS = 32 };
     static double cells[RUNS * RUNS], near_cells[RUNS];
     double worst = 0.0;
@@ -87,8 +84,7 @@ static void one_order_is_mixed(void **state) {
 }
 
 /* Strata hold every sample once; the minibatches' cuts add up to them. */
-static void strata_and_cuts_cover_everything(void **state) {
-    (void)state;
+TEST(strata_and_cuts_cover_everything) {
     static const int sizes[][3] = {{24, 64, 4}, {6, 5, 4}, {1, 1, 3}, {7, 37, 5}, {3, 8, 1}};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         const int steps = sizes[i][0], envs = sizes[i][1], minibatches = sizes[i][2];
@@ -119,8 +115,7 @@ static void strata_and_cuts_cover_everything(void **state) {
 
 /* The parts of 1, 2, 4 and 8 processes hold every environment once, and the strata of a part name
  * its samples by their places in its own arrays. */
-static void parts_are_whole_strata(void **state) {
-    (void)state;
+TEST(parts_are_whole_strata) {
     enum { STEPS = 3, ENVS = 37 };
     for (int ranks = 1; ranks <= PPO_SHARDS; ranks *= 2) {
         int next = 0;
@@ -152,13 +147,4 @@ static void parts_are_whole_strata(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(orders_are_permutations),
-        cmocka_unit_test(pairs_are_uniform),
-        cmocka_unit_test(one_order_is_mixed),
-        cmocka_unit_test(strata_and_cuts_cover_everything),
-        cmocka_unit_test(parts_are_whole_strata),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

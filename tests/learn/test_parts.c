@@ -16,8 +16,7 @@
 
 extern int omp_get_max_threads(void); /* clang comes without omp.h */
 
-static void test_elementwise_functions(void **state) {
-    (void)state;
+TEST(test_elementwise_functions) {
     double worst_exp = 0.0, worst_log = 0.0, worst_elu = 0.0;
     for (double x = -87.0; x < 88.0; x += 1e-3) {
         float at = (float)x;
@@ -40,8 +39,7 @@ static void test_elementwise_functions(void **state) {
 }
 
 /* A network with softsign, rows of it, from its equations. */
-static void test_softsign_network(void **state) {
-    (void)state;
+TEST(test_softsign_network) {
     enum { ROWS = 5, IN = 3, HIDDEN = 4 };
     Mlp mlp = {0};
     const int hidden[POLICY_LAYERS_MAX] = {HIDDEN};
@@ -68,8 +66,7 @@ static void test_softsign_network(void **state) {
 }
 
 /* The noise's angle: sine and cosine of pi a over its whole range. */
-static void test_half_turn(void **state) {
-    (void)state;
+TEST(test_half_turn) {
     double worst = 0.0;
     for (int i = -5000; i < 5000; i++) {
         float a = (float)i / 10000.0f;
@@ -83,8 +80,7 @@ static void test_half_turn(void **state) {
 
 /* A product that the library refuses is not a number everywhere, so that the update is dropped; and
  * within a product every thread works alone. */
-static void test_refused_product(void **state) {
-    (void)state;
+TEST(test_refused_product) {
     float a[6] = {1, 2, 3, 4, 5, 6}, b[6] = {1, 0, 0, 1, 1, 1}, c[8];
     for (int i = 0; i < 8; i++) {
         c[i] = 7.0f;
@@ -104,8 +100,7 @@ static void test_refused_product(void **state) {
     product_leave(before);
 }
 
-static void test_noise_is_normal(void **state) {
-    (void)state;
+TEST(test_noise_is_normal) {
     enum { COUNT = 1 << 20 };
     float *x = malloc(COUNT * sizeof *x);
     assert_non_null(x);
@@ -130,8 +125,7 @@ static void test_noise_is_normal(void **state) {
     free(x);
 }
 
-static void test_noise_depends_on_key_and_place_only(void **state) {
-    (void)state;
+TEST(test_noise_depends_on_key_and_place_only) {
     float whole[1000], part[1000], other[1000];
     noise_normal(77, 0, 1000, whole);
     for (int first = 0; first < 1000; first += 33) { /* from either number of a pair */
@@ -147,8 +141,7 @@ static void test_noise_depends_on_key_and_place_only(void **state) {
     assert_true(same < 3);
 }
 
-static void test_adam(void **state) {
-    (void)state;
+TEST(test_adam) {
     enum { COUNT = 37 };
     float p[COUNT], m[COUNT] = {0}, v[COUNT] = {0}, g[COUNT];
     double pd[COUNT], md[COUNT] = {0}, vd[COUNT] = {0}, worst = 0.0;
@@ -193,8 +186,7 @@ static double advantage_by_sum(const PpoDef *def, const PpoBatch *b, int t, int 
     return sum;
 }
 
-static void test_advantages(void **state) {
-    (void)state;
+TEST(test_advantages) {
     MildError error = {0};
     PolicyDef policy_def = small_def();
     PpoDef def = ppo_def_default();
@@ -243,16 +235,4 @@ static void test_advantages(void **state) {
     pool_destroy(pool);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_elementwise_functions),
-        cmocka_unit_test(test_softsign_network),
-        cmocka_unit_test(test_half_turn),
-        cmocka_unit_test(test_refused_product),
-        cmocka_unit_test(test_noise_is_normal),
-        cmocka_unit_test(test_noise_depends_on_key_and_place_only),
-        cmocka_unit_test(test_adam),
-        cmocka_unit_test(test_advantages),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "files.h"
 #include "learn/policy_file.h"
 #include "learn/policy_private.h"
 #include "learn/ppo.h"
@@ -48,8 +49,7 @@ static size_t parameter_bytes(const Policy *policy) {
 
 /* Whole networks of the default size, rows beyond one chunk: with and without a pool the same bits;
  * estimates and latent are the parts of the actor's input. */
-static void test_act_and_value(void **state) {
-    (void)state;
+TEST(test_act_and_value) {
     enum { ROWS = 300 };
     MildError error = {0};
     PolicyDef def = policy_def_default();
@@ -90,8 +90,7 @@ static void test_act_and_value(void **state) {
 
 /* Rows in blocks and runs, as the learner has them: each row once, and the same bits whether a
  * process has both runs of a block or one of them. */
-static void test_rows_in_runs(void **state) {
-    (void)state;
+TEST(test_rows_in_runs) {
     enum { BLOCKS = 3, FIRST = 150, SECOND = 31, WIDTH = FIRST + SECOND, ROWS = BLOCKS * WIDTH };
     PolicyDef def = policy_def_default();
     def.critic_input = 98;
@@ -154,8 +153,7 @@ static void forward(const Mlp *mlp, const float *parameters, const double *x, do
 /* What the policy answers, from its equations: the encoder's first heads are the estimates, the
  * next mu; latent = theta1 mu + theta2 with theta from the feet velocities; the actor reads the
  * newest frame, the estimates, the latent. Three chunks of rows, the last not full. */
-static void test_answers(void **state) {
-    (void)state;
+TEST(test_answers) {
     enum { ROWS = 300 };
     static float history[ROWS * 15], actions[ROWS * 2], estimates[ROWS * 6], latent[ROWS * 4],
         critic[ROWS * 7], values[ROWS];
@@ -201,8 +199,7 @@ static void test_answers(void **state) {
 }
 
 /* The spread of a new policy's weights is 1/sqrt(inputs), in each network's last layer less. */
-static void test_initial_spread(void **state) {
-    (void)state;
+TEST(test_initial_spread) {
     static const double last_scale[NETWORK_MLPS] = {0.5, 1.0, 0.0, 0.02, 1.0};
     PolicyDef def = policy_def_default();
     def.critic_input = 98;
@@ -228,8 +225,7 @@ static void test_initial_spread(void **state) {
 }
 
 /* theta1 = 1, theta2 = 0 at the start: the modulated latent is the encoder's mu. */
-static void test_modulation_starts_at_identity(void **state) {
-    (void)state;
+TEST(test_modulation_starts_at_identity) {
     for (int per_dimension = 0; per_dimension < 2; per_dimension++) {
         MildError error = {0};
         PolicyDef def = small_def();
@@ -254,8 +250,7 @@ static void test_modulation_starts_at_identity(void **state) {
     }
 }
 
-static void test_round_trip(void **state) {
-    (void)state;
+TEST(test_round_trip) {
     MildError error = {0};
     Policy *policy = small_policy(4);
     const char *note = "say \"crc32\":\"00000000\", tab\t, \xc3\xa9";
@@ -274,8 +269,7 @@ static void test_round_trip(void **state) {
 }
 
 /* The robot's name, of any length that fits, is kept; without one there is no key. */
-static void test_name_of_the_robot(void **state) {
-    (void)state;
+TEST(test_name_of_the_robot) {
     const char *const names[] = {"", "r", "quadruped"};
     for (int i = 0; i < 3; i++) {
         MildError error = {0};
@@ -299,8 +293,7 @@ static void test_name_of_the_robot(void **state) {
 
 /* A decoder of the ground is written with its place in the critic's input; one of a frame alone
  * without, as in every file from before there was another. */
-static void test_decoder_of_the_ground(void **state) {
-    (void)state;
+TEST(test_decoder_of_the_ground) {
     for (int count = 0; count < 3; count++) {
         MildError error = {0};
         PolicyDef def = small_def();
@@ -327,26 +320,6 @@ static void test_decoder_of_the_ground(void **state) {
     }
 }
 
-static unsigned char *read_bytes(const char *path, size_t *size) {
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    fseek(file, 0, SEEK_END);
-    *size = (size_t)ftell(file);
-    rewind(file);
-    unsigned char *bytes = malloc(*size);
-    assert_non_null(bytes);
-    assert_int_equal(fread(bytes, 1, *size, file), *size);
-    fclose(file);
-    return bytes;
-}
-
-static void write_bytes(const char *path, const unsigned char *bytes, size_t size) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, size, file), size);
-    fclose(file);
-}
-
 static void assert_refused(const char *path, MildStatus status) {
     MildError error = {0};
     Policy *policy = policy_load(path, NULL, 0, &error);
@@ -354,25 +327,24 @@ static void assert_refused(const char *path, MildStatus status) {
     assert_error(&error, status, path);
 }
 
-static void test_damaged_files(void **state) {
-    (void)state;
+TEST(test_damaged_files) {
     MildError error = {0};
     Policy *policy = small_policy(4);
     assert_int_equal(policy_save(policy, PATH, "damage", &error), MILD_OK);
     size_t size;
-    unsigned char *bytes = read_bytes(PATH, &size);
+    unsigned char *bytes = (unsigned char *)kit_read(PATH, &size);
     for (size_t cut = 0; cut < 50; cut++) {
-        write_bytes(PATH, bytes, size * cut / 50);
+        kit_write(PATH, bytes, size * cut / 50);
         assert_refused(PATH, MILD_ERROR_FORMAT);
     }
-    write_bytes(PATH, bytes, size - 1);
+    kit_write(PATH, bytes, size - 1);
     assert_refused(PATH, MILD_ERROR_FORMAT);
     Random random = random_at(12, 0, 0);
     for (int flip = 0; flip < 600; flip++) { /* every bit of the first bytes, then anywhere */
         size_t at = flip < 200 ? (size_t)flip / 8 : random_index(&random, (uint32_t)size);
         unsigned char mask = (unsigned char)(1u << (flip % 8));
         bytes[at] ^= mask;
-        write_bytes(PATH, bytes, size);
+        kit_write(PATH, bytes, size);
         assert_refused(PATH, MILD_ERROR_FORMAT);
         bytes[at] ^= mask;
     }
@@ -385,8 +357,7 @@ static void test_damaged_files(void **state) {
 }
 
 /* Files with a right checksum whose header lies. */
-static void test_lying_headers(void **state) {
-    (void)state;
+TEST(test_lying_headers) {
     static const char *const swaps[][2] = {
         {"\"shape\":[12,15]", "\"shape\":[15,12]"},
         {"\"shape\":[12,15]", "\"shape\":[12,16]"},
@@ -417,7 +388,7 @@ static void test_lying_headers(void **state) {
     Policy *policy = small_policy(4);
     assert_int_equal(policy_save(policy, PATH, "lies", &error), MILD_OK);
     size_t size;
-    unsigned char *bytes = read_bytes(PATH, &size), *lie = malloc(size);
+    unsigned char *bytes = (unsigned char *)kit_read(PATH, &size), *lie = malloc(size);
     assert_non_null(lie);
     for (size_t i = 0; i < sizeof swaps / sizeof *swaps; i++) {
         memcpy(lie, bytes, size);
@@ -431,14 +402,14 @@ static void test_lying_headers(void **state) {
         memset(lie + at, ' ', length);
         memcpy(lie + at, to, kept);
         assert_true(safetensors_seal(lie, size));
-        write_bytes(PATH, lie, size);
+        kit_write(PATH, lie, size);
         assert_refused(PATH, MILD_ERROR_FORMAT);
     }
     memcpy(lie, bytes, size);
     const float bad = NAN;
     memcpy(lie + size - sizeof bad, &bad, sizeof bad);
     assert_true(safetensors_seal(lie, size));
-    write_bytes(PATH, lie, size);
+    kit_write(PATH, lie, size);
     assert_refused(PATH, MILD_ERROR_FORMAT);
     free(lie);
     free(bytes);
@@ -447,8 +418,7 @@ static void test_lying_headers(void **state) {
 }
 
 /* Behind the header's last brace there are blanks only. */
-static void test_padding_is_blank(void **state) {
-    (void)state;
+TEST(test_padding_is_blank) {
     int padded = 0;
     for (int n = 1; n <= 8; n++) { /* notes of any length modulo 8: some leave padding */
         MildError error = {0};
@@ -456,13 +426,13 @@ static void test_padding_is_blank(void **state) {
         assert_int_equal(policy_save(policy, PATH, &"12345678"[8 - n], &error), MILD_OK);
         policy_destroy(policy);
         size_t size;
-        unsigned char *bytes = read_bytes(PATH, &size);
+        unsigned char *bytes = (unsigned char *)kit_read(PATH, &size);
         const size_t end = 8 + bytes[0] + 256u * bytes[1] + 65536u * bytes[2];
         if (bytes[end - 1] == ' ') {
             padded++;
             bytes[end - 1] = '}';
             assert_true(safetensors_seal(bytes, size));
-            write_bytes(PATH, bytes, size);
+            kit_write(PATH, bytes, size);
             assert_refused(PATH, MILD_ERROR_FORMAT);
         }
         free(bytes);
@@ -472,24 +442,23 @@ static void test_padding_is_blank(void **state) {
 }
 
 /* A header that is no JSON is called unreadable; memory is another matter. */
-static void test_unreadable_header(void **state) {
-    (void)state;
+TEST(test_unreadable_header) {
     MildError error = {0};
     Policy *policy = small_policy(4);
     assert_int_equal(policy_save(policy, PATH, NULL, &error), MILD_OK);
     policy_destroy(policy);
     size_t size;
-    unsigned char *bytes = read_bytes(PATH, &size);
+    unsigned char *bytes = (unsigned char *)kit_read(PATH, &size);
     bytes[9] = 'x'; /* in the place of a quote */
     assert_true(safetensors_seal(bytes, size));
-    write_bytes(PATH, bytes, size);
+    kit_write(PATH, bytes, size);
     errno = ENOMEM; /* of something before */
     assert_null(policy_load(PATH, NULL, 0, &error));
     assert_error(&error, MILD_ERROR_FORMAT, PATH " header");
-    write_bytes(PATH, bytes, size / 2); /* in the middle of the data, or of the header */
+    kit_write(PATH, bytes, size / 2); /* in the middle of the data, or of the header */
     assert_null(policy_load(PATH, NULL, 0, &error));
     assert_error(&error, MILD_ERROR_FORMAT, PATH);
-    write_bytes(PATH, bytes, 100);
+    kit_write(PATH, bytes, 100);
     assert_null(policy_load(PATH, NULL, 0, &error));
     assert_error(&error, MILD_ERROR_FORMAT, PATH " header");
     free(bytes);
@@ -497,8 +466,7 @@ static void test_unreadable_header(void **state) {
 }
 
 /* The smallest network, and one with as many actions as there may be: made, saved, loaded. */
-static void test_extreme_shapes(void **state) {
-    (void)state;
+TEST(test_extreme_shapes) {
     PolicyDef def[2] = {small_def(), small_def()};
     def[0].observation = def[0].frames = def[0].critic_input = def[0].actions = 1;
     def[0].estimates = def[0].feet_velocity_count = 1;
@@ -521,8 +489,7 @@ static void test_extreme_shapes(void **state) {
 
 /* Each text of the metadata left out of a file that is right otherwise: named, and called
  * missing. */
-static void test_missing_keys(void **state) {
-    (void)state;
+TEST(test_missing_keys) {
     static const char *const keys[] = {"kind", "version", "policy.latent", "policy.frames",
                                        "policy.actor_hidden"};
     MildError error = {0};
@@ -556,8 +523,7 @@ static void test_missing_keys(void **state) {
 
 /* Every number that half precision has, by the definition of binary16, between tensors that stay as
  * they are. */
-static void test_half_precision(void **state) {
-    (void)state;
+TEST(test_half_precision) {
     enum { COUNT = 1 << 16 };
     static uint16_t half[COUNT];
     const float before[3] = {1, 2, 3};
@@ -593,8 +559,7 @@ static void test_half_precision(void **state) {
 }
 
 /* Files of other programs may have more tensors than ours; 2000 are refused in words. */
-static void test_a_thousand_tensors(void **state) {
-    (void)state;
+TEST(test_a_thousand_tensors) {
     enum { COUNT = 1000 };
     static char names[2 * COUNT][8];
     static Safetensor tensors[2 * COUNT];
@@ -617,8 +582,7 @@ static void test_a_thousand_tensors(void **state) {
 }
 
 /* A disk that fills up half way: the old file stays, no temporary one is left. */
-static void test_full_disk(void **state) {
-    (void)state;
+TEST(test_full_disk) {
     MildError error = {0};
     Policy *old = small_policy(1), *fresh = small_policy(2);
     assert_int_equal(policy_save(old, PATH, "old", &error), MILD_OK);
@@ -650,8 +614,7 @@ static void test_full_disk(void **state) {
     policy_destroy(fresh);
 }
 
-static void test_unusable_defs(void **state) {
-    (void)state;
+TEST(test_unusable_defs) {
     MildError error = {0};
     PolicyDef def = small_def();
     def.encoder_hidden[0] = 0;
@@ -698,26 +661,4 @@ static void test_unusable_defs(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_answers),
-        cmocka_unit_test(test_act_and_value),
-        cmocka_unit_test(test_rows_in_runs),
-        cmocka_unit_test(test_initial_spread),
-        cmocka_unit_test(test_modulation_starts_at_identity),
-        cmocka_unit_test(test_round_trip),
-        cmocka_unit_test(test_name_of_the_robot),
-        cmocka_unit_test(test_decoder_of_the_ground),
-        cmocka_unit_test(test_damaged_files),
-        cmocka_unit_test(test_lying_headers),
-        cmocka_unit_test(test_missing_keys),
-        cmocka_unit_test(test_padding_is_blank),
-        cmocka_unit_test(test_unreadable_header),
-        cmocka_unit_test(test_extreme_shapes),
-        cmocka_unit_test(test_half_precision),
-        cmocka_unit_test(test_a_thousand_tensors),
-        cmocka_unit_test(test_full_disk),
-        cmocka_unit_test(test_unusable_defs),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

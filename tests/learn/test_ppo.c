@@ -62,8 +62,7 @@ static PpoDef toy_ppo_def(void) {
 
 /* Shards, chunks and their order are fixed by the batch alone. 64 environments x 40 steps: several
  * chunks per shard. */
-static void test_threads_change_nothing(void **state) {
-    (void)state;
+TEST(test_threads_change_nothing) {
     Run one;
     run_open(&one, 1, 64, toy_ppo_def());
     PpoReport report = run_iterations(&one, 2);
@@ -72,15 +71,18 @@ static void test_threads_change_nothing(void **state) {
         run_open(&more, threads, 64, toy_ppo_def());
         PpoReport other = run_iterations(&more, 2);
         assert_same_parameters(&one, &more);
+        assert_true(ppo_hash(more.ppo) == ppo_hash(one.ppo));
         assert_memory_equal(&report, &other, sizeof report);
         assert_memory_equal(&one.toy, &more.toy, sizeof one.toy);
         run_close(&more);
     }
+    const uint64_t hash = ppo_hash(one.ppo);
+    run_iterations(&one, 1);
+    assert_true(ppo_hash(one.ppo) != hash);
     run_close(&one);
 }
 
-static void test_resume_is_as_if_never_stopped(void **state) {
-    (void)state;
+TEST(test_resume_is_as_if_never_stopped) {
     const char *path = "build_test_resume.safetensors";
     MildError error = {0};
     Run whole, first, second;
@@ -118,8 +120,7 @@ static void test_resume_is_as_if_never_stopped(void **state) {
     run_close(&whole);
 }
 
-static void test_another_run_is_refused(void **state) {
-    (void)state;
+TEST(test_another_run_is_refused) {
     const char *path = "build_test_other.safetensors";
     MildError error = {0};
     Run small, large;
@@ -137,8 +138,7 @@ static void test_another_run_is_refused(void **state) {
 }
 
 /* A number that is not finite costs its minibatch and nothing else. */
-static void test_bad_numbers_are_dropped(void **state) {
-    (void)state;
+TEST(test_bad_numbers_are_dropped) {
     Run run;
     run_open(&run, 2, 16, toy_ppo_def());
     toy_rollout(&run.toy, run.ppo);
@@ -156,8 +156,7 @@ static void test_bad_numbers_are_dropped(void **state) {
 }
 
 /* Samples marked invalid may hold anything: the result is the same. */
-static void test_invalid_samples_have_no_weight(void **state) {
-    (void)state;
+TEST(test_invalid_samples_have_no_weight) {
     Run a, b;
     Run *runs[2] = {&a, &b};
     const float junk[2] = {0.0f, NAN};
@@ -219,8 +218,7 @@ static void check_frames(int target, int noise) {
     run_close(&run);
 }
 
-static void test_frames_of_the_decoder(void **state) {
-    (void)state;
+TEST(test_frames_of_the_decoder) {
     for (int target = 0; target < PPO_TARGETS; target++) {
         check_frames(target, 1);
         check_frames(target, 0);
@@ -230,8 +228,7 @@ static void test_frames_of_the_decoder(void **state) {
 /* The latent that an action was drawn with is the one of its probability in the update: before the
  * first step both policies are the same, so their divergence is rounding. Robots that see the same
  * have latents of their own, at every time. */
-static void test_sampled_latent(void **state) {
-    (void)state;
+TEST(test_sampled_latent) {
     enum { ENVS = 16 };
     for (int sampled = 0; sampled < 2; sampled++) {
         Run run;
@@ -269,8 +266,7 @@ static void test_sampled_latent(void **state) {
 
 /* A modulation that does not learn stays bit for bit where it started, while what is around it
  * learns; one that learns does not. */
-static void test_modulation_that_does_not_learn(void **state) {
-    (void)state;
+TEST(test_modulation_that_does_not_learn) {
     for (int learns = 0; learns < 2; learns++) {
         for (int per_dimension = 0; per_dimension < 2; per_dimension++) {
             Run run;
@@ -300,8 +296,7 @@ static void test_modulation_that_does_not_learn(void **state) {
 }
 
 /* A decoder of another shape than its target needs. */
-static void test_decoder_must_fit(void **state) {
-    (void)state;
+TEST(test_decoder_must_fit) {
     static const int ground[PPO_TARGETS] = {0, 0, 2, 2}, frame[PPO_TARGETS] = {1, 1, 0, 1};
     Pool *pool = pool_create(0);
     for (int target = 0; target < PPO_TARGETS; target++) {
@@ -334,8 +329,7 @@ static void test_decoder_must_fit(void **state) {
     pool_destroy(pool);
 }
 
-static void test_nothing_valid_changes_nothing(void **state) {
-    (void)state;
+TEST(test_nothing_valid_changes_nothing) {
     Run a, b;
     run_open(&a, 2, 4, toy_ppo_def());
     run_open(&b, 2, 4, toy_ppo_def());
@@ -352,8 +346,7 @@ static void test_nothing_valid_changes_nothing(void **state) {
 /* Resting anywhere in [-1, 1] earns 0.44 /s on average; the goal, reached at once, about 0.93. What
  * was learned must stay: with returns ten times as large the critic could not follow, and the
  * policy fell back to 0.2 by iteration 60. */
-static void test_learns_the_toy_task(void **state) {
-    (void)state;
+TEST(test_learns_the_toy_task) {
     Run run;
     run_open(&run, 1, 64, toy_ppo_def());
     double begin = clock_seconds(), first = 0.0, reward = 0.0;
@@ -383,8 +376,7 @@ static void test_learns_the_toy_task(void **state) {
     run_close(&run);
 }
 
-static void test_create_refuses(void **state) {
-    (void)state;
+TEST(test_create_refuses) {
     MildError error = {0};
     PolicyDef policy_def = toy_policy_def();
     PpoDef def = toy_ppo_def();
@@ -408,20 +400,4 @@ static void test_create_refuses(void **state) {
     pool_destroy(pool);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_threads_change_nothing),
-        cmocka_unit_test(test_resume_is_as_if_never_stopped),
-        cmocka_unit_test(test_another_run_is_refused),
-        cmocka_unit_test(test_bad_numbers_are_dropped),
-        cmocka_unit_test(test_frames_of_the_decoder),
-        cmocka_unit_test(test_decoder_must_fit),
-        cmocka_unit_test(test_sampled_latent),
-        cmocka_unit_test(test_modulation_that_does_not_learn),
-        cmocka_unit_test(test_invalid_samples_have_no_weight),
-        cmocka_unit_test(test_nothing_valid_changes_nothing),
-        cmocka_unit_test(test_learns_the_toy_task),
-        cmocka_unit_test(test_create_refuses),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

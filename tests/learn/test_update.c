@@ -140,8 +140,7 @@ static double rate_after(double kl, double rate, PpoDef def, int64_t iteration) 
 
 /* Above twice the target the rate is divided by 1.5, below half of it multiplied, between them it
  * stays; a divergence that is rounding says nothing. */
-static void rate_follows_the_divergence(void **state) {
-    (void)state;
+TEST(rate_follows_the_divergence) {
     const PpoDef def = plain_def();
     assert_close("far above", rate_after(1.0, 9e-4, def, 0), 6e-4, 1e-12);
     assert_close("just above twice", rate_after(0.0201, 9e-4, def, 0), 6e-4, 1e-12);
@@ -163,8 +162,7 @@ static void rate_follows_the_divergence(void **state) {
 
 /* Every minibatch adapts, and its own step already takes the new rate: Adam's first step moves each
  * parameter by the rate against the gradient's sign. */
-static void rate_is_adapted_before_the_step(void **state) {
-    (void)state;
+TEST(rate_is_adapted_before_the_step) {
     Run run;
     PpoDef def = plain_def();
     run_open(&run, def, NULL);
@@ -185,8 +183,7 @@ static void rate_is_adapted_before_the_step(void **state) {
 
 /* Between iterations 10 and 20 the target and the greatest rate fall by the factor 0.01: half way
  * by 0.1, so that 0.0021 is above twice 0.001 and 2e-4 is the greatest rate. */
-static void anneal_lowers_target_and_greatest_rate(void **state) {
-    (void)state;
+TEST(anneal_lowers_target_and_greatest_rate) {
     PpoDef def = plain_def();
     def.anneal[0] = 10, def.anneal[1] = 20;
     def.anneal_factor = 0.01;
@@ -213,8 +210,7 @@ static void anneal_lowers_target_and_greatest_rate(void **state) {
 
 /* A gradient longer than the greatest norm is shortened to it; a shorter one is taken as it is.
  * Adam's first moment after one step is a tenth of what it was given. */
-static void gradient_is_shortened_to_the_greatest_norm(void **state) {
-    (void)state;
+TEST(gradient_is_shortened_to_the_greatest_norm) {
     for (int longer = 0; longer < 2; longer++) {
         Run run;
         PpoDef def = plain_def();
@@ -233,8 +229,7 @@ static void gradient_is_shortened_to_the_greatest_norm(void **state) {
 }
 
 /* Every sum that is not a number costs its minibatch and nothing else; so does a norm. */
-static void bad_sums_cost_their_minibatch(void **state) {
-    (void)state;
+TEST(bad_sums_cost_their_minibatch) {
     for (int bad = 0; bad < 10; bad++) {
         Run run;
         run_open(&run, plain_def(), NULL);
@@ -268,8 +263,7 @@ static MildStatus update_once(void *self, PpoReport *report, MildError *error) {
     return (*calls)++ > 0 ? mild_fail(error, MILD_ERROR_IO, "the device is gone") : MILD_OK;
 }
 
-static void a_backend_that_fails_is_reported(void **state) {
-    (void)state;
+TEST(a_backend_that_fails_is_reported) {
     Run run;
     MildError error = {0};
     int calls = 0;
@@ -288,8 +282,7 @@ static void a_backend_that_fails_is_reported(void **state) {
 /* ---- the report ---- */
 
 /* Means over the minibatches that were taken, each a mean over its samples. */
-static void report_has_means(void **state) {
-    (void)state;
+TEST(report_has_means) {
     Run run;
     PpoDef def = plain_def();
     def.epochs = 2;
@@ -326,8 +319,7 @@ static const float sign_o[] = {-1, 1, 1, -1, -1}, sign_a[] = {-1, -1};
 static const PpoMirror mirror = {mirror_o, sign_o, mirror_a, sign_a};
 
 /* Half of each shard's samples have an image: five shards of 6 samples, three without any. */
-static void mirror_is_averaged_over_the_images(void **state) {
-    (void)state;
+TEST(mirror_is_averaged_over_the_images) {
     Run run;
     PpoDef def = plain_def();
     run_open(&run, def, &mirror);
@@ -355,8 +347,7 @@ static void mirror_is_averaged_over_the_images(void **state) {
 
 /* Rewards 1, 2, 3, ... and values of 0.5 without a future: the advantage is r - 0.5, the return r.
  */
-static void values_and_explained_variance(void **state) {
-    (void)state;
+TEST(values_and_explained_variance) {
     Run run;
     PpoDef def = plain_def();
     def.gamma = 0.0;
@@ -380,8 +371,7 @@ static void values_and_explained_variance(void **state) {
 }
 
 /* With values that carry half of the return the other half remains: 1 - (1/2)^2. */
-static void explained_variance_of_half(void **state) {
-    (void)state;
+TEST(explained_variance_of_half) {
     Run run;
     PpoDef def = plain_def();
     def.gamma = 0.0;
@@ -403,8 +393,7 @@ static void explained_variance_of_half(void **state) {
 
 /* Each of 30 samples once an epoch, and the two that are not valid replaced by the next step of
  * their environment, which is a stratum of its own here. */
-static void every_sample_once_an_epoch(void **state) {
-    (void)state;
+TEST(every_sample_once_an_epoch) {
     Run run;
     PpoDef def = plain_def();
     def.epochs = 3;
@@ -444,8 +433,7 @@ static void every_sample_once_an_epoch(void **state) {
 }
 
 /* A stratum without any usable sample stops the steps of its update. */
-static void nothing_usable_takes_no_step(void **state) {
-    (void)state;
+TEST(nothing_usable_takes_no_step) {
     Run run;
     run_open(&run, plain_def(), NULL);
     PpoBatch *b = ppo_batch(run.ppo);
@@ -464,8 +452,7 @@ static void nothing_usable_takes_no_step(void **state) {
 
 /* The noise's floor holds after every step, its ceiling after the update; the anneal moves the
  * ceiling geometrically. */
-static void noise_stays_within_its_bounds(void **state) {
-    (void)state;
+TEST(noise_stays_within_its_bounds) {
     PpoDef def = plain_def();
     def.anneal[0] = 10, def.anneal[1] = 20;
     def.std_min = 0.2;
@@ -495,8 +482,7 @@ static void noise_stays_within_its_bounds(void **state) {
 
 /* The running mean starts at the policy, forgets by (1 + n)/(10 + n) while young and by the def's
  * decay later. */
-static void average_of_the_weights(void **state) {
-    (void)state;
+TEST(average_of_the_weights) {
     PpoDef def = plain_def();
     def.average = 0.9;
     static const struct {
@@ -531,8 +517,7 @@ static void average_of_the_weights(void **state) {
 }
 
 /* What the last step saw is the first of the next rollout, for every array and environment. */
-static void the_last_observation_is_carried_over(void **state) {
-    (void)state;
+TEST(the_last_observation_is_carried_over) {
     Run run;
     run_open(&run, plain_def(), NULL);
     PpoBatch *b = ppo_batch(run.ppo);
@@ -560,8 +545,7 @@ static void the_last_observation_is_carried_over(void **state) {
 
 /* Actions scatter around the means with the policy's deviations, which the log probability is of;
  * every time and iteration has its own noise. */
-static void actions_scatter_around_the_mean(void **state) {
-    (void)state;
+TEST(actions_scatter_around_the_mean) {
     enum { MANY = 4001 };
     MildError error = {0};
     PolicyDef policy_def = small_def();
@@ -615,24 +599,4 @@ static void actions_scatter_around_the_mean(void **state) {
     pool_destroy(pool);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rate_follows_the_divergence),
-        cmocka_unit_test(rate_is_adapted_before_the_step),
-        cmocka_unit_test(anneal_lowers_target_and_greatest_rate),
-        cmocka_unit_test(gradient_is_shortened_to_the_greatest_norm),
-        cmocka_unit_test(bad_sums_cost_their_minibatch),
-        cmocka_unit_test(a_backend_that_fails_is_reported),
-        cmocka_unit_test(report_has_means),
-        cmocka_unit_test(mirror_is_averaged_over_the_images),
-        cmocka_unit_test(values_and_explained_variance),
-        cmocka_unit_test(explained_variance_of_half),
-        cmocka_unit_test(every_sample_once_an_epoch),
-        cmocka_unit_test(nothing_usable_takes_no_step),
-        cmocka_unit_test(noise_stays_within_its_bounds),
-        cmocka_unit_test(average_of_the_weights),
-        cmocka_unit_test(the_last_observation_is_carried_over),
-        cmocka_unit_test(actions_scatter_around_the_mean),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -41,8 +41,7 @@ static void pin_press(const char *kind, const char *ground, const PressDef *def)
 }
 
 /* Down twice with the front edge lower, dragged, out; and dropped. */
-static void presses(void **unused) {
-    (void)unused;
+TEST(presses) {
     for (int p = 0; p < mild_material_preset_count(); p++) {
         const char *ground = mild_material_preset_name(p);
         PressDef def = {.turns = 3, .turn = {0.01, 0.004, 0.02}, .speed = 0.05, .tilt = 0.05};
@@ -128,8 +127,7 @@ static void pin_short_walk(const char *ground, const TaskDef *like) {
     rig_close(&rig);
 }
 
-static void rollouts_on_every_model(void **unused) {
-    (void)unused;
+TEST(rollouts_on_every_model) {
     for (int model = 0; model < MILD_MODELS; model++) {
         TaskDef def = task_def_default();
         char name[96];
@@ -143,8 +141,7 @@ static void rollouts_on_every_model(void **unused) {
 }
 
 /* Uneven, of several materials, with prints that stay. */
-static void rollout_on_a_map(void **unused) {
-    (void)unused;
+TEST(rollout_on_a_map) {
     MildError error = {0};
     MildMapDef map_def = mild_map_def_default();
     map_def.kind = MILD_MAP_ROUGH;
@@ -177,8 +174,7 @@ static void pin_policy(const char *what, unsigned depends_on, Policy *policy, do
     pin_near(name, sqrt(squares), tolerance);
 }
 
-static void training_of_the_toy(void **unused) {
-    (void)unused;
+TEST(training_of_the_toy) {
     MildError error = {0};
     Toy toy;
     PolicyDef policy_def = toy_policy_def();
@@ -205,8 +201,7 @@ static void training_of_the_toy(void **unused) {
     pool_destroy(pool);
 }
 
-static void training_of_the_robot(void **unused) {
-    (void)unused;
+TEST(training_of_the_robot) {
     MildError error = {0};
     ExperimentDef def = experiment_def_default();
     def.train.envs = 4;
@@ -221,19 +216,8 @@ static void training_of_the_robot(void **unused) {
     train_destroy(trainer);
 }
 
-static void all_pins_hold(void **unused) {
-    (void)unused;
+TEST(all_pins_hold) {
     assert_int_equal(pin_finish(), 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(presses),
-        cmocka_unit_test(rollouts_on_every_model),
-        cmocka_unit_test(rollout_on_a_map),
-        cmocka_unit_test(training_of_the_toy),
-        cmocka_unit_test(training_of_the_robot),
-        cmocka_unit_test(all_pins_hold),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

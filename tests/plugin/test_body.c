@@ -82,8 +82,7 @@ static const mjtNum *felt(const mjModel *m, const mjData *d, int foot) {
 
 /* ---- in the air ---- */
 
-static void in_the_air_they_change_no_bit(void **state) {
-    (void)state;
+TEST(in_the_air_they_change_no_bit) {
     static const char *const integrators[] = {"Euler", "implicitfast", "implicit", "discrete"};
     for (int k = 0; k < 4; k++) {
         mjModel *bare = quadruped(integrators[k], CONFIG("prints", "64"));
@@ -126,8 +125,7 @@ static double cost(const mjModel *m, mjData *d, int steps) {
 }
 
 /* Turn about, the least of many: what other programs add is left out. */
-static void in_the_air_they_cost_nothing(void **state) {
-    (void)state;
+TEST(in_the_air_they_cost_nothing) {
     if (kit_short()) {
         skip(); /* a sanitizer has times of its own */
     }
@@ -223,8 +221,7 @@ static void lie_down(int axis, double angle, const char *ground, const char *int
     mj_deleteModel(m);
 }
 
-static void it_comes_to_rest_on_its_shells(void **state) {
-    (void)state;
+TEST(it_comes_to_rest_on_its_shells) {
     static const char *const grounds[] = {"foam45", "sand_loose"};
     static const char *const integrators[] = {"implicitfast", "discrete", "Euler"};
     for (int n = 0; n < 6; n++) {
@@ -238,8 +235,7 @@ static void it_comes_to_rest_on_its_shells(void **state) {
 
 /* A plate that is a foot sinks as deep as one that is a body, however far apart its elements are.
  * */
-static void a_body_sinks_as_a_foot_does(void **state) {
-    (void)state;
+TEST(a_body_sinks_as_a_foot_does) {
     static const char *const grounds[] = {"rubber", "foam45", "sand_loose", "grass", "clay"};
     static const char *const keys[] = {"", CONFIG("body_pitch", "0.012")};
     for (int n = 0; n < 10; n++) {
@@ -269,8 +265,7 @@ static void a_body_sinks_as_a_foot_does(void **state) {
 }
 
 /* A wheel rolls, and drives itself. */
-static void a_wheel_rolls(void **state) {
-    (void)state;
+TEST(a_wheel_rolls) {
     mjModel *m = kit_model(
         "<mujoco><option timestep='.002'/><extension><plugin plugin='mild.ground'><instance "
         "name='soft'>" CONFIG("body", "wheel") CONFIG("ground", "rubber")
@@ -342,8 +337,7 @@ static double surface_of(const char *geom, const char *keys, const char *asset) 
     "-.1 -.06 -.02 .1 -.06 -.02 -.1 .06 -.02 .1 .06 -.02 -.1 -.06 .02 .1 -.06 .02 -.1 .06 .02 "    \
     ".1 .06 .02"
 
-static void shapes_are_covered(void **state) {
-    (void)state;
+TEST(shapes_are_covered) {
     const double box = 8 * (.1 * .06 + .06 * .02 + .1 * .02), r = .04, h = .1;
     const double cylinder = 2 * mjPI * r * (r + 2 * h), capsule = 4 * mjPI * r * (r + h);
     assert_true(fabs(surface_of("<geom type='box' size='.1 .06 .02'/>", "", "") / box - 1) < 1e-9);
@@ -389,8 +383,7 @@ static void check_same(const mjModel *m, const mjData *a, const mjData *b) {
 
 /* Thrashing on its side: a copy, a restored state, another order of stages and a second evaluation
  * go on bit by bit; other bytes in the state of a body are noticed. */
-static void the_state_is_complete(void **state) {
-    (void)state;
+TEST(the_state_is_complete) {
     mjModel *m = quadruped("implicitfast", CONFIG("body", BODIES) CONFIG("prints", "64"));
     mjData *d = mj_makeData(m), *other = mj_makeData(m);
     const int size = mj_stateSize(m, mjSTATE_INTEGRATION);
@@ -440,8 +433,7 @@ static void the_state_is_complete(void **state) {
 }
 
 /* Patches under the bodies, and an arrow for each that is loaded. */
-static void they_are_drawn(void **state) {
-    (void)state;
+TEST(they_are_drawn) {
     mjModel *m = humanoid(0.002, "implicitfast", "sand_loose");
     mjData *d = mj_makeData(m);
     mjvScene scene;
@@ -502,8 +494,7 @@ static void check_refused(const char *keys, const char *geom, const char *asset,
 #define SHIN "<geom type='box' size='.1 .1 .1' " OFF "/>"
 #define FOOT CONFIG("feet", "foot")
 
-static void wrong_bodies_are_refused(void **state) {
-    (void)state;
+TEST(wrong_bodies_are_refused) {
     check_refused(FOOT CONFIG("body", "shim"), SHIN, "", "body shim shin");
     check_refused(FOOT CONFIG("body", "shin shin"), SHIN, "", "shin");
     check_refused(FOOT CONFIG("body", "shin foot"), SHIN, "", "foot");
@@ -520,8 +511,7 @@ static void wrong_bodies_are_refused(void **state) {
 }
 
 /* Bodies and feet are 16 together. */
-static void seventeen_are_too_many(void **state) {
-    (void)state;
+TEST(seventeen_are_too_many) {
     static char names[300], world[4000], text[6000];
     names[0] = world[0] = '\0';
     for (int b = 1; b <= 16; b++) {
@@ -551,8 +541,7 @@ static void seventeen_are_too_many(void **state) {
 }
 
 /* A body that MuJoCo lets lie on its own floor too is warned about. */
-static void a_rigid_floor_is_said(void **state) {
-    (void)state;
+TEST(a_rigid_floor_is_said) {
     for (int off = 0; off < 2; off++) {
         mjModel *m = body_of(off ? "<geom name='box' type='box' size='.1 .1 .1' " OFF "/>"
                                  : "<geom name='box' type='box' size='.1 .1 .1' pos='0 0 .3'/>",
@@ -568,8 +557,7 @@ static void a_rigid_floor_is_said(void **state) {
 }
 
 /* A mesh of crossed sheets has more elements than its bounding box was given room for. */
-static void a_folded_mesh_has_no_room(void **state) {
-    (void)state;
+TEST(a_folded_mesh_has_no_room) {
     static const int side[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6},
                                     {0, 1, 4}, {1, 5, 4}, {2, 6, 3}, {3, 6, 7},
                                     {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
@@ -603,20 +591,4 @@ static void a_folded_mesh_has_no_room(void **state) {
     assert_names(kit_said, "meshes body");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(in_the_air_they_change_no_bit),
-        cmocka_unit_test(in_the_air_they_cost_nothing),
-        cmocka_unit_test(it_comes_to_rest_on_its_shells),
-        cmocka_unit_test(a_body_sinks_as_a_foot_does),
-        cmocka_unit_test(a_wheel_rolls),
-        cmocka_unit_test(shapes_are_covered),
-        cmocka_unit_test(the_state_is_complete),
-        cmocka_unit_test(they_are_drawn),
-        cmocka_unit_test(wrong_bodies_are_refused),
-        cmocka_unit_test(seventeen_are_too_many),
-        cmocka_unit_test(a_rigid_floor_is_said),
-        cmocka_unit_test(a_folded_mesh_has_no_room),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, NULL);
-}
+TEST_MAIN(kit_setup, NULL)

@@ -278,8 +278,7 @@ static void fall_once(uint64_t seed, int kind, const char *integrator, Falls *al
     mj_deleteModel(bare);
 }
 
-static void the_ground_never_gives_energy(void **state) {
-    (void)state;
+TEST(the_ground_never_gives_energy) {
     static const char *const names[KINDS] = {"robots", "anything", "shells"};
     for (int n = 0; n < 4 * KINDS; n++) {
         const char *integrator = integrators[n % 4];
@@ -304,8 +303,7 @@ static void the_ground_never_gives_energy(void **state) {
 
 /* The only fall of 4800 that turns little and gains: a light body that bounces within one step, as
  * those of tests/ground/test_falls.c. With a tenth of the step it gains nothing. */
-static void a_bounce_within_a_step_gains_little(void **state) {
-    (void)state;
+TEST(a_bounce_within_a_step_gains_little) {
     Falls all = {0};
     fall_once(100323, ANY, "implicitfast", &all);
     print_message("light body: gains %.1e, twists apart by %.1e\n", all.worst, all.surprise);
@@ -319,7 +317,5 @@ int main(int argc, char **argv) {
     first = argc > 2 ? strtoull(argv[2], NULL, 10) : first;
     chosen = argc > 3 ? argv[3] : NULL;
     step = argc > 4 ? atof(argv[4]) : step;
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_ground_never_gives_energy),
-                                       cmocka_unit_test(a_bounce_within_a_step_gains_little)};
-    return cmocka_run_group_tests(tests, kit_setup, NULL);
+    return run_cases(kit_setup, NULL);
 }

@@ -1,6 +1,7 @@
 /* What a user may get wrong in the MJCF: one message that names it, and no ground or no model. */
 #include <math.h>
 
+#include "materials.h"
 #include "plugin_kit.h"
 
 #define BODY                                                                                       \
@@ -44,8 +45,7 @@ static void check_refused(const char *option, const char *configs, const char *n
     assert_true(!first || !strstr(first + 1, "mild.ground 'soft': "));
 }
 
-static void refuses_what_is_wrong(void **state) {
-    (void)state;
+TEST(refuses_what_is_wrong) {
     check_refused("", "", "feet");
     check_refused("", CONFIG("feet", "fool"), "fool foot");
     check_refused("", CONFIG("feet", "foot " MANY), "16 b16");
@@ -80,8 +80,7 @@ static void refuses_what_is_wrong(void **state) {
 }
 
 /* A sensor of a ground that cannot be made does not hide why. */
-static void a_sensor_hides_no_reason(void **state) {
-    (void)state;
+TEST(a_sensor_hides_no_reason) {
     assert_null(compile("", CONFIG("feet", "fool"), OFF, "", BOX OFF,
                         "<sensor><plugin plugin='mild.ground' instance='soft'/></sensor>"));
     print_message("%s\n", kit_said);
@@ -89,8 +88,7 @@ static void a_sensor_hides_no_reason(void **state) {
 }
 
 /* Without passive forces MuJoCo leaves out a stage. */
-static void disabled_flags(void **state) {
-    (void)state;
+TEST(disabled_flags) {
     const char *const off = "<option><flag spring='disable' damper='disable'/></option>";
     const char *const motor = "<option><flag spring='disable' damper='disable'/></option>"
                               "<actuator><motor site='sole' gear='0 0 0 0 0 1'/></actuator>";
@@ -115,8 +113,7 @@ static void disabled_flags(void **state) {
     mj_deleteModel(m);
 }
 
-static void refuses_a_second_instance(void **state) {
-    (void)state;
+TEST(refuses_a_second_instance) {
     kit_messages = 0;
     mjModel *m = kit_compile(
         "<mujoco><extension><plugin plugin='mild.ground'><instance name='a'>" FOOT
@@ -128,8 +125,7 @@ static void refuses_a_second_instance(void **state) {
 }
 
 /* A foot that MuJoCo also lets stand on its own floor is warned about, whatever the way. */
-static void warns_of_a_rigid_floor(void **state) {
-    (void)state;
+TEST(warns_of_a_rigid_floor) {
     const struct {
         const char *floor;
         const char *geom;
@@ -162,8 +158,7 @@ static void warns_of_a_rigid_floor(void **state) {
     }
 }
 
-static void warns_of_a_foot_that_lies_on_its_side(void **state) {
-    (void)state;
+TEST(warns_of_a_foot_that_lies_on_its_side) {
     mjModel *m = compile("", FOOT, OFF, "euler='90 0 0'", BOX OFF, "");
     assert_non_null(m);
     mjData *d = mj_makeData(m);
@@ -181,8 +176,7 @@ static void warns_of_a_foot_that_lies_on_its_side(void **state) {
 
 /* A sole that turns with a wheel is soon on top: refused with foot, and joint or geom. What only
  * looks like one is not. */
-static void wheels_are_refused(void **state) {
-    (void)state;
+TEST(wheels_are_refused) {
     static const struct {
         const char *joint, *geom, *names;
     } cases[] = {
@@ -230,8 +224,7 @@ static void wheels_are_refused(void **state) {
 }
 
 /* A foot that falls over is said by name, once. */
-static void warns_of_a_tilted_sole(void **state) {
-    (void)state;
+TEST(warns_of_a_tilted_sole) {
     mjModel *m = compile("", FOOT, OFF, "", BOX OFF, "");
     mjData *d = mj_makeData(m);
     for (int run = 1; run <= 2; run++) {
@@ -252,8 +245,7 @@ static void warns_of_a_tilted_sole(void **state) {
 }
 
 /* The integrator may be changed after compilation. */
-static void rk4_at_run_time(void **state) {
-    (void)state;
+TEST(rk4_at_run_time) {
     mjModel *m = compile("", FOOT, OFF, "", BOX OFF, "");
     mjData *d = mj_makeData(m);
     m->opt.integrator = mjINT_RK4;
@@ -283,8 +275,7 @@ static int elements_of(const char *configs, const char *geom) {
 }
 
 /* Area of the sole over that of an element, for outlines from shapes, sites and numbers. */
-static void soles_follow_the_shapes(void **state) {
-    (void)state;
+TEST(soles_follow_the_shapes) {
     const double element = 0.0195 * 0.0195;
     assert_in_range(elements_of(FOOT, BOX OFF), 0.94 * 0.02 / element, 1.06 * 0.02 / element);
     assert_in_range(elements_of(CONFIG("feet", "sole"), BOX OFF), 0.94 * 0.02 / element,
@@ -333,12 +324,10 @@ static void free_both(mjModel *m, mjData *d) {
 }
 
 /* Each key does what the program's key of the same name does. */
-static void keys_reach_the_ground(void **state) {
-    (void)state;
+TEST(keys_reach_the_ground) {
     mjModel *m;
     mjData *d;
-    MildMaterial grass;
-    assert_true(mild_material_preset("grass", &grass));
+    MildMaterial grass = kit_preset("grass");
     const Soft *soft = soft_of_keys(FOOT CONFIG("ground", "grass") CONFIG("ground.k_pen", "800")
                                         CONFIG("ground.mu", "0.25") CONFIG("height", "0.5"),
                                     &m, &d);
@@ -371,12 +360,10 @@ static void check_match(const Soft *soft, const MildMaterial *material, double l
 
 /* Another model sinks as deep under the weight that a foot carries, and a concentric one has a
  * single element. */
-static void models_are_matched(void **state) {
-    (void)state;
+TEST(models_are_matched) {
     mjModel *m;
     mjData *d;
-    MildMaterial grass;
-    assert_true(mild_material_preset("grass", &grass));
+    MildMaterial grass = kit_preset("grass");
     const Soft *soft =
         soft_of_keys(FOOT CONFIG("ground", "grass") CONFIG("ground.model", "bekker"), &m, &d);
     check_match(soft, &grass, 9.81);
@@ -397,20 +384,4 @@ static void models_are_matched(void **state) {
     free_both(m, d);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(refuses_what_is_wrong),
-        cmocka_unit_test(a_sensor_hides_no_reason),
-        cmocka_unit_test(disabled_flags),
-        cmocka_unit_test(refuses_a_second_instance),
-        cmocka_unit_test(warns_of_a_rigid_floor),
-        cmocka_unit_test(warns_of_a_foot_that_lies_on_its_side),
-        cmocka_unit_test(wheels_are_refused),
-        cmocka_unit_test(warns_of_a_tilted_sole),
-        cmocka_unit_test(rk4_at_run_time),
-        cmocka_unit_test(soles_follow_the_shapes),
-        cmocka_unit_test(keys_reach_the_ground),
-        cmocka_unit_test(models_are_matched),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, NULL);
-}
+TEST_MAIN(kit_setup, NULL)

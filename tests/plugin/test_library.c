@@ -2,8 +2,7 @@
 #include <mujoco/mujoco.h>
 
 #include "kit.h"
-static void example_stands(void **state) {
-    (void)state;
+TEST(example_stands) {
     char error[500] = "";
     assert_null(mjp_getPlugin("mild.ground", NULL));
     mj_loadPluginLibrary(PLUGIN_FILE);
@@ -28,7 +27,4 @@ static void example_stands(void **state) {
     mj_deleteModel(m);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(example_stands)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

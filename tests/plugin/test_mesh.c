@@ -70,8 +70,7 @@ static mjModel *plain(const char *keys, const char *more) {
     return foot("", geom, keys, more);
 }
 
-static void a_box_mesh_is_a_box(void **state) {
-    (void)state;
+TEST(a_box_mesh_is_a_box) {
     compare("inline", foot(ASSET, MESH, "", ""), plain("", ""), 1e-12);
     compare("scaled",
             foot("<mesh name='m' scale='.25 .125 .03125' vertex='-.5 -.5 -.5 .5 -.5 -.5 -.5 .5 -.5 "
@@ -102,8 +101,7 @@ static void a_box_mesh_is_a_box(void **state) {
 }
 
 /* Halves of the box, and what lies 80 mm above the sole, as in a maker's file. */
-static void several_meshes_are_one_sole(void **state) {
-    (void)state;
+TEST(several_meshes_are_one_sole) {
     static const char half[] =
         "<mesh name='m' scale='.5 1 1' vertex='" VERTICES "'/><mesh name='shin' scale='2 2 2' "
         "vertex='" VERTICES "'/>";
@@ -115,8 +113,7 @@ static void several_meshes_are_one_sole(void **state) {
 }
 
 /* Beside a shape, a mesh is for pictures, unless `sole` names it. */
-static void meshes_beside_shapes(void **state) {
-    (void)state;
+TEST(meshes_beside_shapes) {
     static const char both[] = "<geom name='post' size='.01' mass='1e-9' " OFF "/>"
                                "<geom name='plate' type='mesh' mesh='m' mass='4' " OFF "/>";
     char geoms[600];
@@ -156,8 +153,7 @@ static void random_meshes(char *asset, size_t size, char *geoms, size_t room, un
 }
 
 /* The room that the compiler gave is enough for every sole, and little more than that. */
-static void the_room_is_enough(void **state) {
-    (void)state;
+TEST(the_room_is_enough) {
     static char asset[8000], geoms[2000], text[12000];
     double most = 0, least = 1e9;
     int feet = 0;
@@ -186,12 +182,4 @@ static void the_room_is_enough(void **state) {
     assert_true(feet > 200 && least >= 1);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_box_mesh_is_a_box),
-        cmocka_unit_test(several_meshes_are_one_sole),
-        cmocka_unit_test(meshes_beside_shapes),
-        cmocka_unit_test(the_room_is_enough),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, NULL);
-}
+TEST_MAIN(kit_setup, NULL)

@@ -114,8 +114,7 @@ static int is_mild(const Case *c) {
     return !strstr(c->rest, "kv=") && !strstr(c->rest, "biasprm");
 }
 
-static void step_is_as_expected(void **state) {
-    (void)state;
+TEST(step_is_as_expected) {
     static const char *const integrators[] = {"Euler", "implicitfast", "implicit", "discrete"};
     for (int k = 0; k < 4; k++) {
         for (int c = 0; c < CASES; c++) {
@@ -145,8 +144,7 @@ static const Case *find_case(const char *name) {
 
 /* Joint limits that the ground's force closes and opens in turn: two sets of constraints, each of
  * which follows from the other. */
-static void cycles_end(void **state) {
-    (void)state;
+TEST(cycles_end) {
     static const struct {
         const char *name, *integrator, *ground;
         double dt;
@@ -168,8 +166,7 @@ static void cycles_end(void **state) {
 
 /* Cones of friction of other contacts are solved in turn with the ground. A constraint solver of
  * one iteration does not come to rest, and this is said once, and once more after a reset. */
-static void disagreement_is_said(void **state) {
-    (void)state;
+TEST(disagreement_is_said) {
     const Case table = {"",
                         {"", "", ""},
                         "<worldbody><geom name='table' type='plane' size='1 1 1' pos='0 0 .52'/>"
@@ -250,8 +247,7 @@ static double ground_apart(const mjModel *m, const mjData *d, const double *twis
 /* Joints with friction from the first step on: what the ground gives and what MuJoCo alone makes of
  * it are a fixed point, found in a single round. Dry friction as makers publish it, strong, and on
  * tendons. */
-static void friction_is_solved_with_the_ground(void **state) {
-    (void)state;
+TEST(friction_is_solved_with_the_ground) {
     static const Case rubbing[] = {
         {"0.1 N m", {"frictionloss='.1'", "frictionloss='.1'", "frictionloss='.1'"}, PD("90", "4")},
         {"20 N m", {"frictionloss='20'", "frictionloss='20'", "frictionloss='20'"}, ""},
@@ -309,8 +305,7 @@ static void friction_is_solved_with_the_ground(void **state) {
 }
 
 /* In the air a model moves as it does without the plugin. */
-static void air_is_as_without(void **state) {
-    (void)state;
+TEST(air_is_as_without) {
     static const int integrators[] = {mjINT_EULER, mjINT_IMPLICITFAST, mjINT_IMPLICIT,
                                       mjINT_DISCRETE};
     for (int c = 0; c < CASES; c++) {
@@ -348,8 +343,7 @@ static void air_is_as_without(void **state) {
 }
 
 /* A leg with strong feedback stands still at all steps. */
-static void strong_feedback_is_stable(void **state) {
-    (void)state;
+TEST(strong_feedback_is_stable) {
     static const char *const grounds[] = {"rubber", "foam45", "sand_loose"};
     static const double steps[] = {0.001, 0.002, 0.005};
     static const char *const integrators[] = {"implicitfast", "discrete"};
@@ -376,14 +370,4 @@ static void strong_feedback_is_stable(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(step_is_as_expected),
-        cmocka_unit_test(cycles_end),
-        cmocka_unit_test(disagreement_is_said),
-        cmocka_unit_test(friction_is_solved_with_the_ground),
-        cmocka_unit_test(air_is_as_without),
-        cmocka_unit_test(strong_feedback_is_stable),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, NULL);
-}
+TEST_MAIN(kit_setup, NULL)

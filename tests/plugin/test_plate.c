@@ -83,8 +83,7 @@ static void step_by_hand(const char *ground, double mass, double dt, int steps, 
     free(block);
 }
 
-static void plate_falls_as_by_hand(void **state) {
-    (void)state;
+TEST(plate_falls_as_by_hand) {
     enum { STEPS = 600 };
     static double z[STEPS];
     for (int k = 0; k < 4; k++) {
@@ -155,8 +154,7 @@ static void check_limit(const char *ground, const char *integrator, const char *
     }
 }
 
-static void plate_on_a_limit_sinks_as_deep(void **state) {
-    (void)state;
+TEST(plate_on_a_limit_sinks_as_deep) {
     static const char *const joints[] = {"", "damping='40'"};
     static const char *const solvers[] = {"", "<option solver='PGS' iterations='300'/>",
                                           "<option solver='CG' iterations='300'/>"};
@@ -170,8 +168,7 @@ static void plate_on_a_limit_sinks_as_deep(void **state) {
 
 /* A load that is a hundred times the plate: taken in turn, ground and limit would need hundreds of
  * rounds. */
-static void light_plate_under_a_load(void **state) {
-    (void)state;
+TEST(light_plate_under_a_load) {
     for (int k = 0; k < 4; k++) {
         mjModel *m = limited_plate(0.005, integrators[k], "sand_loose", 8, 0.08, "", "");
         mjData *d = mj_makeData(m);
@@ -192,8 +189,7 @@ static void light_plate_under_a_load(void **state) {
 /* ---- other contacts ---- */
 
 /* A ball lies on the plate by MuJoCo's own contact: together they sink as their weight does. */
-static void ball_on_a_plate(void **state) {
-    (void)state;
+TEST(ball_on_a_plate) {
     static const char *const cones[] = {"pyramidal", "elliptic"};
     for (int c = 0; c < 2; c++) {
         for (int k = 0; k < 4; k++) {
@@ -221,12 +217,4 @@ static void ball_on_a_plate(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(plate_falls_as_by_hand),
-        cmocka_unit_test(plate_on_a_limit_sinks_as_deep),
-        cmocka_unit_test(light_plate_under_a_load),
-        cmocka_unit_test(ball_on_a_plate),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, NULL);
-}
+TEST_MAIN(kit_setup, NULL)

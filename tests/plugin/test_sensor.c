@@ -33,8 +33,7 @@ static const mjtNum *reading(const mjModel *m, const mjData *d, int foot) {
 }
 
 /* A free joint's generalised force is force and, in the body's axes, torque about its origin. */
-static void readings_are_the_forces(void **state) {
-    (void)state;
+TEST(readings_are_the_forces) {
     for (int motor = 0; motor < 2; motor++) {
         mjModel *m = plates("light heavy", motor ? SENSOR MOTOR : SENSOR);
         mjData *d = mj_makeData(m);
@@ -67,8 +66,7 @@ static void readings_are_the_forces(void **state) {
 }
 
 /* Plates at rest, named in the other order. */
-static void at_rest_it_is_the_weight(void **state) {
-    (void)state;
+TEST(at_rest_it_is_the_weight) {
     mjModel *m = plates("heavy light", SENSOR MOTOR);
     mjData *d = mj_makeData(m);
     kit_run(m, d, 6);
@@ -108,8 +106,7 @@ static mjModel *twins(const double turn[4], const double shift[3]) {
 
 /* Dropped alike, 1 m apart, they read the same: where the body's origin is shifted, too, for the
  * steps in which MuJoCo integrates the two alike. */
-static void a_site_may_be_turned(void **state) {
-    (void)state;
+TEST(a_site_may_be_turned) {
     const double turn[4] = {0.5, 0.1, -0.7, 0.5}, shifts[2][3] = {{0}, {0.04, -0.03, 0.02}};
     for (int shifted = 0; shifted < 2; shifted++) {
         mjModel *m = twins(turn, shifts[shifted]);
@@ -135,8 +132,7 @@ static void a_site_may_be_turned(void **state) {
     }
 }
 
-static void without_a_sensor_there_is_no_data(void **state) {
-    (void)state;
+TEST(without_a_sensor_there_is_no_data) {
     mjModel *m = plates("heavy light", "");
     mjData *d = mj_makeData(m);
     assert_int_equal(m->nsensordata, 0);
@@ -146,12 +142,4 @@ static void without_a_sensor_there_is_no_data(void **state) {
     mj_deleteModel(m);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(readings_are_the_forces),
-        cmocka_unit_test(at_rest_it_is_the_weight),
-        cmocka_unit_test(a_site_may_be_turned),
-        cmocka_unit_test(without_a_sensor_there_is_no_data),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, NULL);
-}
+TEST_MAIN(kit_setup, NULL)

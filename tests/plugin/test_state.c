@@ -57,8 +57,7 @@ static int remembers(const mjModel *m, const mjData *d) {
     return pressed(m, d) > 0;
 }
 
-static void restores_bit_by_bit(void **state) {
-    (void)state;
+TEST(restores_bit_by_bit) {
     mjModel *m = hopper(MOTOR);
     mjData *d = mj_makeData(m), *other = mj_makeData(m);
     const int size = mj_stateSize(m, mjSTATE_INTEGRATION);
@@ -89,8 +88,7 @@ static void restores_bit_by_bit(void **state) {
 }
 
 /* The memory matters: the plates where they were, on ground that has forgotten, go elsewhere. */
-static void memory_matters(void **state) {
-    (void)state;
+TEST(memory_matters) {
     mjModel *m = hopper(MOTOR);
     mjData *d = mj_makeData(m), *other = mj_makeData(m);
     const int size = mj_stateSize(m, mjSTATE_PHYSICS);
@@ -108,8 +106,7 @@ static void memory_matters(void **state) {
     mj_deleteModel(m);
 }
 
-static void copies_go_on_alike(void **state) {
-    (void)state;
+TEST(copies_go_on_alike) {
     mjModel *m = hopper(MOTOR);
     mjData *d = mj_makeData(m);
     steps(m, d, 237);
@@ -129,8 +126,7 @@ static void copies_go_on_alike(void **state) {
 
 /* Evaluating a step again changes nothing, neither as a whole nor from a later stage on, and
  * mj_step1 with mj_step2 is mj_step. */
-static void evaluates_again(void **state) {
-    (void)state;
+TEST(evaluates_again) {
     mjModel *m = hopper(MOTOR);
     mjData *d = mj_makeData(m), *other = mj_makeData(m);
     for (int i = 0; i < 300; i++) {
@@ -156,8 +152,7 @@ static void evaluates_again(void **state) {
 
 /* A model without actuators, or with actuation disabled, takes another way through MuJoCo and must
  * end at the same place. */
-static void ways_through_the_stages_agree(void **state) {
-    (void)state;
+TEST(ways_through_the_stages_agree) {
     static const int integrators[] = {mjINT_EULER, mjINT_IMPLICITFAST, mjINT_IMPLICIT,
                                       mjINT_DISCRETE};
     for (int k = 0; k < 4; k++) {
@@ -195,8 +190,7 @@ static void *work(void *context) {
     return NULL;
 }
 
-static void threads_agree(void **state) {
-    (void)state;
+TEST(threads_agree) {
     enum { THREADS = 6 };
     mjModel *m = hopper(MOTOR);
     pthread_t thread[THREADS];
@@ -216,8 +210,7 @@ static void threads_agree(void **state) {
 }
 
 /* Any bytes in the place of the state are noticed, said and replaced. */
-static void foreign_state_is_reset(void **state) {
-    (void)state;
+TEST(foreign_state_is_reset) {
     mjModel *m = hopper(MOTOR);
     mjData *d = mj_makeData(m), *fresh = mj_makeData(m);
     for (int round = 0; round < 4; round++) {
@@ -295,8 +288,7 @@ static void step_changed(const mjModel *m, mjData *d, const mjData *past, const 
 }
 
 /* MILD_TEST_CHANGES: number of changes, MILD_TEST_SEED: first seed. */
-static void changed_states_are_survived(void **state) {
-    (void)state;
+TEST(changed_states_are_survived) {
     const char *count = getenv("MILD_TEST_CHANGES"), *first = getenv("MILD_TEST_SEED");
     const int changes = count ? atoi(count) : 2000;
     uint64_t seed = first ? (uint64_t)strtoull(first, NULL, 10) : 1;
@@ -374,8 +366,7 @@ static int count_dents(const mjModel *m, const mjData *d, const mjvScene *scene)
 
 /* The scene shows what the ground remembers: dents of uneven ground, and where that is hidden
  * patches at its surface, as many as there is room for; and an arrow for each loaded foot. */
-static void prints_are_drawn(void **state) {
-    (void)state;
+TEST(prints_are_drawn) {
     mjModel *m = hopper(MOTOR);
     mjData *d = mj_makeData(m);
     mjvScene scene, small;
@@ -426,17 +417,4 @@ static void prints_are_drawn(void **state) {
     mj_deleteModel(m);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(restores_bit_by_bit),
-        cmocka_unit_test(memory_matters),
-        cmocka_unit_test(copies_go_on_alike),
-        cmocka_unit_test(evaluates_again),
-        cmocka_unit_test(ways_through_the_stages_agree),
-        cmocka_unit_test(threads_agree),
-        cmocka_unit_test(foreign_state_is_reset),
-        cmocka_unit_test(changed_states_are_survived),
-        cmocka_unit_test(prints_are_drawn),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, NULL);
-}
+TEST_MAIN(kit_setup, NULL)

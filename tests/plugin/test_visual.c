@@ -86,8 +86,7 @@ static void check_tile(const mjvGeom *tile) {
     }
 }
 
-static void tiles_lie_on_the_surface(void **state) {
-    (void)state;
+TEST(tiles_lie_on_the_surface) {
     Shown shown;
     double area = 0, low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
     show(&shown, WAVES, "", "", 3.1, -7.4);
@@ -112,8 +111,7 @@ static void tiles_lie_on_the_surface(void **state) {
 }
 
 /* Level ground, ground that the model shows by itself, hidden ground, and a scene without room. */
-static void surface_is_left_out(void **state) {
-    (void)state;
+TEST(surface_is_left_out) {
     Shown shown;
     show(&shown, "", "", "", 0, 0);
     assert_int_equal(count_tiles(&shown), 0);
@@ -147,8 +145,7 @@ static int is_colour(const mjvGeom *geom, float r, float g, float b) {
 
 /* Level ground that is asked for: closed up to the horizon, under the plate as deep as the plate,
  * in the colour of the soil, and without patches. */
-static void level_ground_is_dented(void **state) {
-    (void)state;
+TEST(level_ground_is_dented) {
     Shown shown;
     double floor = 0, area = 0, whole = 0, middle[2] = {0, 0};
     int inside = 0, plates = 0, others = 0;
@@ -214,8 +211,7 @@ static void level_ground_is_dented(void **state) {
 }
 
 /* Each label of a pattern has its colour. */
-static void patterns_have_colours(void **state) {
-    (void)state;
+TEST(patterns_have_colours) {
     Shown shown;
     int sand = 0, grass = 0;
     char head[1500], text[3000];
@@ -246,12 +242,4 @@ static void patterns_have_colours(void **state) {
     hide(&shown);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(tiles_lie_on_the_surface),
-        cmocka_unit_test(surface_is_left_out),
-        cmocka_unit_test(level_ground_is_dented),
-        cmocka_unit_test(patterns_have_colours),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, NULL);
-}
+TEST_MAIN(kit_setup, NULL)

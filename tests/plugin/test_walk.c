@@ -8,6 +8,7 @@
 #include "control/stand.h"
 #include "mild/batch.h"
 #include "robot/sim.h"
+#include "robots.h"
 #include "run/config/experiment_keys.h"
 #include "run/eval/eval.h"
 
@@ -193,8 +194,7 @@ static Standing stand_for(const Robot *robot, const MildMaterial *material, doub
     assert_non_null(stand);
     assert_non_null(sim);
     const int feet = robot_feet(robot);
-    MildGround *ground = calloc(1, mild_ground_bytes(robot_soles(robot), feet));
-    mild_ground_init(ground, robot_soles(robot), feet);
+    MildGround *ground = kit_ground(robot);
     MildTerrain terrain = mild_terrain_uniform(material);
     RobotVariation variation = robot_variation_nominal();
     RobotState state = stand_state(
@@ -219,11 +219,9 @@ static Standing stand_for(const Robot *robot, const MildMaterial *material, doub
 
 static void check_stand(const char *name, const char *ground, double dt, const char *integrator) {
     char folder[200];
-    MildError error = {0};
     MildMaterial material;
     snprintf(folder, sizeof folder, MILD_SOURCE_DIR "/robots/%s", name);
-    Robot *robot = robot_create(folder, &error);
-    assert_non_null(robot);
+    Robot *robot = kit_robot(folder);
     assert_true(mild_material_preset(ground, &material));
     const Standing own = stand_for(robot, &material, dt, 4);
     use_plugin(robot, &material, dt, integrator);
@@ -236,8 +234,7 @@ static void check_stand(const char *name, const char *ground, double dt, const c
     robot_destroy(robot);
 }
 
-static void robots_stand(void **state) {
-    (void)state;
+TEST(robots_stand) {
     static const char *const grounds[] = {"rubber", "foam45", "sand_loose"};
     static const char *const integrators[] = {"Euler", "implicitfast", "discrete"};
     static const double steps[] = {0.001, 0.002, 0.005};
@@ -264,16 +261,13 @@ static EvalRow walk(const Walker *walker, const Robot *robot, const char *ground
     char file[300], name[TRAIN_ROBOT_SIZE];
     MildError error = {0};
     TaskDef def;
-    if (experiment_task(&def, 0, name, walker->config, NULL, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(experiment_task(&def, 0, name, walker->config, NULL, &error) == MILD_OK, &error);
     def.physics_dt = dt;
     Pool *pool = pool_create(1);
     Controller controller;
     snprintf(file, sizeof file, MILD_SOURCE_DIR "/policies/%s.safetensors", walker->policy);
-    if (controller_learned(file, robot, pool, trials, &controller, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(controller_learned(file, robot, pool, trials, &controller, &error) == MILD_OK,
+                &error);
     Scene scene;
     assert_int_equal(scene_make(&scene, ground, 3, &error), MILD_OK);
     EvalDef eval = {.speed = 0.5, .trials = trials, .seconds = kit_short() ? 1 : 10, .seed = 1};
@@ -288,9 +282,7 @@ static EvalRow walk(const Walker *walker, const Robot *robot, const char *ground
                          .speeds = &eval.speed,
                          .speed_count = 1,
                          .eval = eval};
-    if (eval_run(&run, &row, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(eval_run(&run, &row, &error) == MILD_OK, &error);
     controller_destroy(&controller);
     pool_destroy(pool);
     return row;
@@ -298,8 +290,7 @@ static EvalRow walk(const Walker *walker, const Robot *robot, const char *ground
 
 static void check_walk(const Walker *walker, const Robot *robot, const char *ground, double dt,
                        const char *integrator, int trials) {
-    MildMaterial material;
-    assert_true(mild_material_preset(ground, &material));
+    MildMaterial material = kit_preset(ground);
     const EvalRow own = walk(walker, robot, ground, dt, trials);
     use_plugin(robot, &material, dt, integrator);
     const EvalRow mujoco = walk(walker, robot, ground, dt, trials);
@@ -320,8 +311,7 @@ static void check_walk(const Walker *walker, const Robot *robot, const char *gro
 /* Trials of each walk on each ground at each step. 0: two, ten on sand, each ground at one step. */
 static int thorough;
 
-static void policies_walk(void **state) {
-    (void)state;
+TEST(policies_walk) {
     static const Walker walkers[] = {{"sa01", "mild", NULL},
                                      {"go1", "go1", MILD_SOURCE_DIR "/configs/go1.ini"},
                                      {"g1", "g1", MILD_SOURCE_DIR "/configs/g1.ini"}};
@@ -330,10 +320,8 @@ static void policies_walk(void **state) {
     static const double steps[] = {0.001, 0.005, 0.002};
     for (int w = 0; w < 3; w++) {
         char folder[200];
-        MildError error = {0};
         snprintf(folder, sizeof folder, MILD_SOURCE_DIR "/robots/%s", walkers[w].robot);
-        Robot *robot = robot_create(folder, &error);
-        assert_non_null(robot);
+        Robot *robot = kit_robot(folder);
         robot->leg_pairs = 0; /* the MJCF's legs do not touch each other */
         for (int n = 0; n < 12; n++) {
             const int g = n / 3, k = n % 3;
@@ -349,10 +337,6 @@ static void policies_walk(void **state) {
 }
 
 int main(int argc, char **argv) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(robots_stand),
-        cmocka_unit_test(policies_walk),
-    };
     thorough = argc > 1 ? atoi(argv[1]) : 0;
-    return cmocka_run_group_tests(tests, kit_setup, NULL);
+    return run_cases(kit_setup, NULL);
 }

@@ -26,8 +26,7 @@ static double tree_double(int first, int count, int i) {
                : tree_double(first, count / 2, i) + tree_double(first + count / 2, count / 2, i);
 }
 
-static void sums_are_one_tree(void **unused) {
-    (void)unused;
+TEST(sums_are_one_tree) {
     const int own = SHARDS / ranks_count(ranks), first = own * ranks_number(ranks);
     static float x[COUNT];
     static double y[COUNT];
@@ -52,8 +51,7 @@ static void sums_are_one_tree(void **unused) {
     ranks_sum_double(ranks, y, 0);
 }
 
-static void bytes_arrive(void **unused) {
-    (void)unused;
+TEST(bytes_arrive) {
     const int me = ranks_number(ranks), count = ranks_count(ranks);
     char data[1000], part[SHARDS], whole[SHARDS * SHARDS] = {0};
     memset(data, me == 0 ? 'x' : 'y', sizeof data);
@@ -74,8 +72,7 @@ static void bytes_arrive(void **unused) {
     ranks_wait(ranks);
 }
 
-static void all_agree(void **unused) {
-    (void)unused;
+TEST(all_agree) {
     const int me = ranks_number(ranks), count = ranks_count(ranks);
     assert_int_equal(ranks_any(ranks, 0), 0);
     MildError error = {0};
@@ -173,8 +170,7 @@ static void compare_with_trees(void) {
 #endif
 
 /* The same bits on GPUs, where each process has one. Otherwise a reason. */
-static void sums_on_devices(void **unused) {
-    (void)unused;
+TEST(sums_on_devices) {
     MildError error = {0};
     if (ranks_count(ranks) == 1) {
         assert_int_equal(ranks_open_device(ranks, 8, &error), MILD_OK);
@@ -196,13 +192,7 @@ int main(void) {
         fprintf(stderr, "%s\n", error.text);
         return 2;
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sums_are_one_tree),
-        cmocka_unit_test(bytes_arrive),
-        cmocka_unit_test(all_agree),
-        cmocka_unit_test(sums_on_devices),
-    };
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    const int failed = run_cases(NULL, NULL);
     ranks_close(ranks);
     return failed;
 }

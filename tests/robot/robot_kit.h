@@ -5,9 +5,8 @@
 
 #include "base/random.h"
 #include "control/stand.h"
-#include "kit.h"
 #include "robot/description.h"
-#include "robot/robot.h"
+#include "robots.h"
 #include "sa01.h"
 
 #ifndef MODEL
@@ -20,10 +19,7 @@ static Stand *stand;
 static inline int setup(void **unused) {
     (void)unused;
     MildError error = {0};
-    robot = robot_create(MODEL, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    robot = kit_robot(MODEL);
     robot->leg_pairs = 0; /* random poses are held to MuJoCo's own step; test_legs.c has the legs */
     stand = stand_create(robot, &error);
     assert_non_null(stand);
@@ -42,24 +38,6 @@ static inline RobotSim *new_sim(double dt) {
     RobotSim *sim = robot_sim_create(robot, dt, &error);
     assert_non_null(sim);
     return sim;
-}
-
-/* To be freed by the caller. */
-static inline MildGround *new_ground(void) {
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), robot_feet(robot)));
-    assert_non_null(block);
-    return mild_ground_init(block, robot_soles(robot), robot_feet(robot));
-}
-
-static inline MildMaterial preset(const char *name) {
-    MildMaterial material;
-    assert_true(mild_material_preset(name, &material));
-    return material;
-}
-
-static inline MildTerrain preset_terrain(const char *name) {
-    MildMaterial material = preset(name);
-    return mild_terrain_uniform(&material);
 }
 
 /* Joints a little off their places, all of it in motion. */

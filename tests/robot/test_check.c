@@ -21,8 +21,7 @@ static void assert_refused(double *number, double bad, const char *what) {
     assert_error(&error, MILD_ERROR_RANGE, what);
 }
 
-static void test_every_number(void **state) {
-    (void)state;
+TEST(test_every_number) {
     mjModel *m = robot->model;
     const int body = robot_foot_body(robot, 1), dof = 6 + 4, joint = 1 + 3;
     const struct {
@@ -64,8 +63,7 @@ static void test_every_number(void **state) {
 
 /* Each element of each array: refused, with the name of its joint, body or geom where it has
  * one. */
-static void test_every_element(void **state) {
-    (void)state;
+TEST(test_every_element) {
     mjModel *m = robot->model;
     const int bodies = (int)m->nbody, joints = (int)m->njnt, geoms = (int)m->ngeom;
     const struct {
@@ -117,8 +115,7 @@ static void test_every_element(void **state) {
 }
 
 /* The limits themselves: 0 is fine where a negative number is not, an empty range is none. */
-static void test_limits(void **state) {
-    (void)state;
+TEST(test_limits) {
     mjModel *m = robot->model;
     const int joint = 1 + 3, dof = 6 + 3, body = robot_foot_body(robot, 0);
     double armature = m->dof_armature[dof], low = m->jnt_range[2 * joint];
@@ -143,32 +140,25 @@ static void test_limits(void **state) {
 }
 
 /* The same from a file; and a file that would never end. */
-static void test_files(void **state) {
-    (void)state;
+TEST(test_files) {
     static const char *const bad[] = {"  nan", "  inf", "-0.04"}; /* as long as what they replace */
     char folder[] = "/tmp/mild_test_check_XXXXXX", path[64], ini[64];
-    static char text[65536];
     assert_non_null(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/sa01.xml", folder);
     snprintf(ini, sizeof ini, "%s/robot.ini", folder);
     assert_int_equal(symlink(SA01 "/robot.ini", ini), 0);
-    FILE *file = fopen(SA01 "/sa01.xml", "r");
-    assert_non_null(file);
-    text[fread(text, 1, sizeof text - 1, file)] = '\0';
-    fclose(file);
+    char *text = kit_read(SA01 "/sa01.xml", NULL);
     char *armature = strstr(text, "armature=\"0.042\"");
     assert_non_null(armature);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         MildError error = {0};
         memcpy(armature + strlen("armature=\""), bad[i], 5);
-        file = fopen(path, "w");
-        assert_non_null(file);
-        fputs(text, file);
-        fclose(file);
+        kit_write_text(path, text);
         assert_null(robot_create(folder, &error));
         print_message("%s\n", error.text);
         assert_error(&error, MILD_ERROR_RANGE, "leg_l1_joint armature");
     }
+    free(text);
     MildError error = {0};
     unlink(path);
     assert_int_equal(mkfifo(path, 0600), 0);
@@ -181,12 +171,4 @@ static void test_files(void **state) {
     rmdir(folder);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_number),
-        cmocka_unit_test(test_every_element),
-        cmocka_unit_test(test_limits),
-        cmocka_unit_test(test_files),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

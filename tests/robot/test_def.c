@@ -3,7 +3,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "kit.h"
+#include "files.h"
 #include "robot/def.h"
 
 /* Two flat feet that alternate; numbers all different. Keys with defaults are left out of it. */
@@ -93,8 +93,7 @@ static void expect_numbers(const char *what, const double *got, int count, const
     }
 }
 
-static void test_robot_keys(void **state) {
-    (void)state;
+TEST(test_robot_keys) {
     RobotDef def = accept(plain);
     assert_string_equal(def.name, "walker");
     assert_string_equal(def.model, "walker.xml");
@@ -116,8 +115,7 @@ static void test_robot_keys(void **state) {
     assert_string_equal(def.source, "somebody, CC0");
 }
 
-static void test_joint_keys(void **state) {
-    (void)state;
+TEST(test_joint_keys) {
     RobotDef def = accept(plain);
     const char *const names[] = {"a", "b", "c", "d"}, *const mirrors[] = {"b", "a", "d", "c"};
     const double sign[] = {-1, -1, 1, 1}, pose[] = {0.1, 0.2, -0.3, 0.4}, zero[4] = {0};
@@ -150,8 +148,7 @@ static void test_joint_keys(void **state) {
     expect_numbers("kd", def.kd, 4, kd);
 }
 
-static void test_foot_keys(void **state) {
-    (void)state;
+TEST(test_foot_keys) {
     RobotDef def = accept(plain);
     const RobotFootDef *l = &def.foot[0], *r = &def.foot[1];
     assert_string_equal(l->name, "l");
@@ -184,8 +181,7 @@ static void test_foot_keys(void **state) {
 }
 
 /* A foot may be its own mirror image: a hopper. */
-static void test_one_foot(void **state) {
-    (void)state;
+TEST(test_one_foot) {
     const char *at = strstr(plain, "[foot.r]");
     snprintf(edited, sizeof edited, "%.*s", (int)(at - plain), plain);
     char *mirror = strstr(edited, "mirror = r\n");
@@ -195,8 +191,7 @@ static void test_one_foot(void **state) {
     assert_true(def.mirror_shift == 0);
 }
 
-static void test_reading(void **state) {
-    (void)state;
+TEST(test_reading) {
     accept(edit("height = 0.7 ; [m]\n", "height = 0.7\t# [m]\r\n\n   \n"));
     accept(edit("[joints]\n", "[joints] ; of all\n"));
     refuse("[robot]", "[robots]", "dir/robot.ini:3 [robots] [robot] [joints]");
@@ -234,8 +229,7 @@ static void expect_range(const char *from, const char *key, double least, double
     }
 }
 
-static void test_ranges(void **state) {
-    (void)state;
+TEST(test_ranges) {
     expect_range("height = 0.7 ; [m]\n", "height", 0.01, 5, "robot.height");
     expect_range("action_scale = 0.25\n", "action_scale", 0.01, 2, "robot.action_scale");
     expect_range("feet_least = 0.09\n", "feet_least", 0, 5, "robot.feet_least");
@@ -277,8 +271,7 @@ static void test_ranges(void **state) {
 }
 
 /* Each key of [robot] but `source` is needed. */
-static void test_missing(void **state) {
-    (void)state;
+TEST(test_missing) {
     static const char *const robot[] = {"name",       "model",        "base",       "shells",
                                         "height",     "action_scale", "feet_range", "knee_range",
                                         "feet_least", "knee_least",   "foot_force", "assist"};
@@ -303,8 +296,7 @@ static void test_missing(void **state) {
     refuse_text(edited, "foot [foot.NAME]");
 }
 
-static void test_joints_refused(void **state) {
-    (void)state;
+TEST(test_joints_refused) {
     refuse("names = a\n  b\tc, d\n", "", "[joints] names");
     refuse("  b\tc, d\n", "  b c a\n", "[joints] names a");
     refuse("\td c\n", "\td\n", "[joints] mirror");
@@ -335,8 +327,7 @@ static void test_joints_refused(void **state) {
     accept(edit("feet_range = 0.11 0.31", "feet_range = 0.31 0.31"));
 }
 
-static void test_feet_refused(void **state) {
-    (void)state;
+TEST(test_feet_refused) {
     refuse("offset = 0.75", "offset = 1", "[foot.r] offset 1");
     refuse("offset = 0.75", "offset = 0.7", "[foot.l] offset 0.5 0");
     refuse("z = -0.05", "z = -0.05\nankle = e", "[foot.l] ankle [joints]");
@@ -373,8 +364,7 @@ static void test_feet_refused(void **state) {
 
 /* The longest name of a foot comes back whole; one more character is refused, not cut: two feet
  * that differ at its end would be one. */
-static void test_long_names(void **state) {
-    (void)state;
+TEST(test_long_names) {
     const char *const name = "a23456789_123456789_123456789_123456789_1234";
     char section[64];
     snprintf(section, sizeof section, "[foot.%s]\n", name);
@@ -390,8 +380,7 @@ static void test_long_names(void **state) {
 }
 
 /* All feet must agree whether the mirror image of the gait is half a cycle later. */
-static void test_gaits_that_disagree(void **state) {
-    (void)state;
+TEST(test_gaits_that_disagree) {
     const char *one = strstr(plain, "[foot.l]");
     char head[4096];
     snprintf(head, sizeof head, "%.*s", (int)(one - plain), plain);
@@ -437,8 +426,7 @@ static void list_numbers(char *text, size_t size, int count, const char *number)
 }
 
 /* A robot of `joints` joints, each its own mirror image. */
-static void test_joints_that_fit(void **state) {
-    (void)state;
+TEST(test_joints_that_fit) {
     const char *from = strstr(plain, "[joints]"), *to = strstr(plain, "[foot.l]");
     char names[4000], ones[1000];
     static const int counts[] = {1, 40, 41};
@@ -465,8 +453,7 @@ static void test_joints_that_fit(void **state) {
     refuse("kp = 11 12 13 14\n", line, "[joints] kp 40");
 }
 
-static void test_lists_that_fit(void **state) {
-    (void)state;
+TEST(test_lists_that_fit) {
     char text[8000], list[7000];
     list_names(list, sizeof list, 32, 3);
     snprintf(text, sizeof text, "shells = %s\n", list);
@@ -508,13 +495,6 @@ static void test_lists_that_fit(void **state) {
 
 /* ---- files ---- */
 
-static void write_file(const char *path, const char *text, size_t size) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(text, 1, size, file), size);
-    assert_int_equal(fclose(file), 0);
-}
-
 static void refuse_folder(const char *folder, MildStatus status, const char *names) {
     static RobotDef def;
     MildError error = {0};
@@ -522,26 +502,25 @@ static void refuse_folder(const char *folder, MildStatus status, const char *nam
     assert_error(&error, status, names);
 }
 
-static void test_files(void **state) {
-    (void)state;
+TEST(test_files) {
     char folder[] = "/tmp/mild_robot_XXXXXX", path[64];
     assert_non_null(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/robot.ini", folder);
     refuse_folder(folder, MILD_ERROR_IO, path);
-    write_file(path, plain, sizeof plain - 1);
+    kit_write(path, plain, sizeof plain - 1);
     static RobotDef def;
     assert_int_equal(robot_def_read(folder, &def, NULL), MILD_OK);
     assert_string_equal(def.name, "walker");
-    write_file(path, plain, sizeof plain); /* with its final zero byte */
+    kit_write(path, plain, sizeof plain); /* with its final zero byte */
     refuse_folder(folder, MILD_ERROR_FORMAT, path);
     size_t size = (1 << 20) + 1;
     char *large = malloc(size);
     assert_non_null(large);
     memset(large, '\n', size);
     memcpy(large, plain, sizeof plain - 1);
-    write_file(path, large, size);
+    kit_write(path, large, size);
     refuse_folder(folder, MILD_ERROR_FORMAT, path);
-    write_file(path, large, size - 1);
+    kit_write(path, large, size - 1);
     assert_int_equal(robot_def_read(folder, &def, NULL), MILD_OK);
     free(large);
     unlink(path);
@@ -560,15 +539,4 @@ static void test_files(void **state) {
     refuse_folder(deep, MILD_ERROR_ARGUMENT, "path robot.ini");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_robot_keys),      cmocka_unit_test(test_joint_keys),
-        cmocka_unit_test(test_foot_keys),       cmocka_unit_test(test_one_foot),
-        cmocka_unit_test(test_reading),         cmocka_unit_test(test_ranges),
-        cmocka_unit_test(test_missing),         cmocka_unit_test(test_joints_refused),
-        cmocka_unit_test(test_feet_refused),    cmocka_unit_test(test_gaits_that_disagree),
-        cmocka_unit_test(test_joints_that_fit), cmocka_unit_test(test_lists_that_fit),
-        cmocka_unit_test(test_files),           cmocka_unit_test(test_long_names),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -75,8 +75,7 @@ static void expect(Work work, MildStatus wanted, const char *names) {
     }
 }
 
-static void test_calls(void **state) {
-    (void)state;
+TEST(test_calls) {
     signal(SIGABRT, SIG_DFL);                 /* not cmocka's */
     for (int round = 0; round < 2; round++) { /* a failure does not spoil the next call */
         expect((Work){.status = MILD_OK}, MILD_OK, "");
@@ -92,8 +91,7 @@ static void test_calls(void **state) {
     }
 }
 
-static void test_long_message(void **state) {
-    (void)state;
+TEST(test_long_message) {
     Work work = {.status = MILD_OK};
     char wanted[400] = "model ";
     memset(work.text, 'x', 300);
@@ -112,8 +110,7 @@ static void take_line(const char *text) {
     longjmp(back, 1);
 }
 
-static void test_on_error(void **state) {
-    (void)state;
+TEST(test_on_error) {
     engine_on_error(take_line);
     heard[0] = '\0';
     mju_warning("a warning");
@@ -131,11 +128,4 @@ static void test_on_error(void **state) {
     assert_string_equal(heard, "out of"); /* the call's errors are the call's */
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_calls),
-        cmocka_unit_test(test_long_message),
-        cmocka_unit_test(test_on_error),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -30,38 +30,12 @@
  * None of these is fitted. */
 #include <stdio.h>
 
-#include "base/random.h"
+#include "all_robots.h"
 #include "ground/scratch.h"
-#include "kit.h"
-#include "robot/robot.h"
-#include "robot/sim.h"
 
-enum { ROBOTS = 3 };
-static const char *const names[ROBOTS] = {"sa01", "go1", "g1"};
 static const double seconds = 0.6; /* of a fall */
 static int falls = 270;
 static uint32_t first = 1;
-static Robot *robots[ROBOTS]; /* without contact between the legs, which robot/test_legs has */
-
-static int setup(void **unused) {
-    (void)unused;
-    for (int r = 0; r < ROBOTS; r++) {
-        MildError error = {0};
-        robots[r] = robot_open(names[r], &error);
-        print_message("%s", error.text);
-        assert_non_null(robots[r]);
-        robots[r]->leg_pairs = 0;
-    }
-    return 0;
-}
-
-static int teardown(void **unused) {
-    (void)unused;
-    for (int r = 0; r < ROBOTS; r++) {
-        robot_destroy(robots[r]);
-    }
-    return 0;
-}
 
 /* ---- the ground ---- */
 
@@ -194,14 +168,7 @@ static void close_place(Place *place) {
 static void throw_robot(const Robot *robot, RobotSim *sim, const MildTerrain *terrain,
                         Random *random) {
     const RobotVariation nominal = robot_variation_nominal();
-    RobotState state = {.qpos = {0, 0, 2}};
-    for (int k = 3; k < 7; k++) {
-        state.qpos[k] = random_normal(random);
-    }
-    mju_normalize4(state.qpos + 3);
-    for (int j = 0; j < robot->def.joints; j++) {
-        state.qpos[7 + j] = random_uniform(random, robot->low[j], robot->high[j]);
-    }
+    RobotState state = random_pose(robot, 2, random);
     for (int d = 0; d < robot->nv; d++) {
         const double most = d < 3 ? 2 : 4;
         state.qvel[d] = random_uniform(random, -most, most);
@@ -442,8 +409,7 @@ static void fall(Robot *robot, int model, int number, Falls *all) {
     robot_sim_destroy(sim);
 }
 
-static void the_ground_never_creates_energy(void **unused) {
-    (void)unused;
+static void expect_no_energy(void) {
     Falls all[MILD_MODELS] = {{0}};
     int over = 0, touch = 0, lost = 0;
     for (int n = 0; n < falls; n++) {
@@ -468,18 +434,20 @@ static void the_ground_never_creates_energy(void **unused) {
     assert_true(touch >= falls - falls / 20 && lost <= falls / 20);
 }
 
+TEST(the_ground_never_creates_energy) {
+    expect_no_energy();
+}
+
 /* One of these falls was given 123 J: an element in elastic ground that carries nothing until it
  * has come out kept the speed of its front for the added mass of plastic ground beside it. */
-static void a_barred_front_rests(void **unused) {
+TEST(a_barred_front_rests) {
     falls = 4;
     first = 1111;
-    the_ground_never_creates_energy(unused);
+    expect_no_energy();
 }
 
 int main(int argc, char **argv) {
     falls = argc > 1 ? atoi(argv[1]) : kit_short() ? falls / 5 : falls;
     first = argc > 2 ? (uint32_t)atoi(argv[2]) : first;
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_ground_never_creates_energy),
-                                       cmocka_unit_test(a_barred_front_rests)};
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return run_cases(open_robots, close_robots);
 }

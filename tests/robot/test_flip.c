@@ -99,7 +99,7 @@ static void explicit_step(const Case *one, const double *torque) {
 
 static void case_open(Case *one, const char *name, double dt, int explicit_soil) {
     const MildSole *const *soles = robot_soles(robot);
-    *one = (Case){preset(name), preset_terrain(name), explicit_soil ? NULL : new_ground(),
+    *one = (Case){kit_preset(name), kit_terrain(name), explicit_soil ? NULL : kit_ground(robot),
                   new_sim(dt)};
     double sinkage = mild_sole_sinkage(soles[0], &one->material, robot_foot_load(robot));
     RobotState state = stand_state(stand, 1, sinkage);
@@ -150,8 +150,7 @@ static double largest_step(const char *name) {
     return 0.0;
 }
 
-static void test_explicit_soil_flips(void **unused) {
-    (void)unused;
+TEST(test_explicit_soil_flips) {
     int fallen = 0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
         const char *name = mild_material_preset_name(p);
@@ -172,7 +171,4 @@ static void test_explicit_soil_flips(void **unused) {
                   mild_material_preset_count());
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_explicit_soil_flips)};
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

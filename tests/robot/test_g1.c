@@ -245,8 +245,7 @@ static void add_inertia(double tensor[9], const double turn[4], const double ine
 }
 
 /* Mass, centre and inertia of the base against the sums over the published bodies. */
-static void the_upper_body_by_hand(void **unused) {
-    (void)unused;
+TEST(the_upper_body_by_hand) {
     double position[PARTS][3], quaternion[PARTS][4], mass = 0, center[3] = {0}, sum[9] = {0};
     parts_places(position, quaternion);
     double at[PARTS][3];
@@ -290,8 +289,7 @@ static void the_upper_body_by_hand(void **unused) {
 
 /* Where the feet are in the default pose: hip pitch -0.312, knee 0.669; the hip's body is tilted by
  * 0.1749 rad, and the knee's back. */
-static void the_pose_by_hand(void **unused) {
-    (void)unused;
+TEST(the_pose_by_hand) {
     const double pitch = -0.312, knee = 0.669, tilt = 2 * atan2(0.0873386, 0.996179);
     const double thigh = pitch - tilt, shank = pitch + knee;
     const double x = -0.030465 * sin(pitch) + (0.025001 - 0.078273) * cos(thigh) -
@@ -319,8 +317,7 @@ static void the_pose_by_hand(void **unused) {
 }
 
 /* Efforts, speeds, and gains of a 10 Hz oscillator, twice critically damped, on the armature. */
-static void motors_and_gait(void **unused) {
-    (void)unused;
+TEST(motors_and_gait) {
     static const double effort[LEG] = {88, 139, 88, 139, 50, 50};
     static const double speed[LEG] = {32, 20, 32, 20, 37, 37};
     const double rate = 2 * 3.14159265358979 * 10;
@@ -342,8 +339,7 @@ static void motors_and_gait(void **unused) {
 }
 
 /* Mirrored angles put the other foot at the mirrored place. */
-static void the_mirror_image(void **unused) {
-    (void)unused;
+TEST(the_mirror_image) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     double worst = 0;
@@ -380,7 +376,7 @@ static void the_mirror_image(void **unused) {
 /* Four seconds. material: NULL for rigid ground. */
 static void stand_on(const char *name, const MildMaterial *material) {
     RobotSim *sim = new_sim(0.0025);
-    MildGround *ground = new_ground();
+    MildGround *ground = kit_ground(robot);
     MildMaterial any = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
     RobotVariation variation = robot_variation_nominal();
@@ -413,21 +409,12 @@ static void stand_on(const char *name, const MildMaterial *material) {
     robot_sim_destroy(sim);
 }
 
-static void stands_everywhere(void **unused) {
-    (void)unused;
+TEST(stands_everywhere) {
     stand_on("rigid", NULL);
     for (int g = 0; g < mild_material_preset_count(); g++) {
-        MildMaterial material;
-        assert_true(mild_material_preset(mild_material_preset_name(g), &material));
+        MildMaterial material = kit_preset(mild_material_preset_name(g));
         stand_on(mild_material_preset_name(g), &material);
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_upper_body_by_hand), cmocka_unit_test(the_pose_by_hand),
-        cmocka_unit_test(motors_and_gait),        cmocka_unit_test(the_mirror_image),
-        cmocka_unit_test(stands_everywhere),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -24,8 +24,7 @@ enum { FEET = 4, JOINTS = 12, NV = 18, FL = 0, FR = 1, RL = 2, RR = 3 };
 /* ---- the folder ---- */
 
 /* Where the feet are in the default pose: hip roll a = -0.1 (left), thigh 0.9, knee -1.8. */
-static void the_pose_by_hand(void **unused) {
-    (void)unused;
+TEST(the_pose_by_hand) {
     const double a = 0.1, length = 2 * LEG * cos(0.9);
     const double height = length * cos(a) + ROLL_OFFSET * sin(a) + FOOT_RADIUS;
     const double y = HIP_OFFSET + ROLL_OFFSET * cos(a) - length * sin(a), x = 0.1881;
@@ -55,8 +54,7 @@ static void the_pose_by_hand(void **unused) {
     robot_sim_destroy(sim);
 }
 
-static void efforts_speeds_and_gait(void **unused) {
-    (void)unused;
+TEST(efforts_speeds_and_gait) {
     for (int i = 0; i < JOINTS; i++) {
         int knee = i % 3 == 2;
         expect_near("effort", robot_effort(robot)[i], knee ? 35.55 : 23.7, 1e-9);
@@ -71,47 +69,22 @@ static void efforts_speeds_and_gait(void **unused) {
                 0.5, 0);
 }
 
-/* A folder with `from` written as `to` in robot.ini. */
+/* With `from` written as `to` in robot.ini. */
 static Robot *changed_robot(const char *from, const char *to, MildError *error) {
-    static char text[16384];
-    char folder[] = "robot_changed_XXXXXX", ini[64], model[64];
-    FILE *file = fopen(MODEL "/robot.ini", "rb");
-    assert_non_null(file);
-    text[fread(text, 1, sizeof text - 1, file)] = '\0';
-    fclose(file);
-    const char *at = strstr(text, from);
-    assert_non_null(at);
-    assert_non_null(mkdtemp(folder));
-    snprintf(ini, sizeof ini, "%s/robot.ini", folder);
-    snprintf(model, sizeof model, "%s/go1.xml", folder);
-    file = fopen(ini, "wb");
-    assert_non_null(file);
-    fprintf(file, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from));
-    fclose(file);
-    assert_int_equal(symlink(MODEL "/go1.xml", model), 0);
-    Robot *made = robot_create(folder, error);
-    remove(ini);
-    remove(model);
-    rmdir(folder);
-    return made;
+    return kit_robot_changed(MODEL, "go1.xml", "robot.ini", from, to, error);
 }
 
-static void what_may_be_left_out(void **unused) {
-    (void)unused;
+TEST(what_may_be_left_out) {
     MildError error = {0};
     Robot *changed = changed_robot("stand_kp    =", "# a remark\n; stand_kp    =", &error);
-    if (!changed) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(changed != NULL, &error);
     for (int i = 0; i < JOINTS; i++) {
         expect_near("stand_kp without a list", robot_stand_kp(changed)[i], robot_kp(robot)[i], 0);
         expect_near("stand_kd", robot_stand_kd(changed)[i], robot_stand_kd(robot)[i], 0);
     }
     robot_destroy(changed);
     changed = changed_robot("height = 0.28            ;", "height = 0.28            #", &error);
-    if (!changed) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(changed != NULL, &error);
     expect_near("height", robot_nominal_height(changed), 0.28, 0);
     robot_destroy(changed);
     static const struct {
@@ -167,10 +140,9 @@ static void lowest_point(RobotSim *sim, int foot, double point[3], double jacobi
 
 /* Place and speed of the foot, and after a step: acceleration = M^-1 (tau - b + J^T F), with no
  * moment. */
-static void a_round_foot_is_a_point(void **unused) {
-    (void)unused;
+TEST(a_round_foot_is_a_point) {
     RobotSim *sim = new_sim(0.0005);
-    MildGround *ground = new_ground();
+    MildGround *ground = kit_ground(robot);
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
     MildMapDef rough = mild_map_def_default(); /* the disc is not loaded evenly */
@@ -279,7 +251,7 @@ static void weigh(const RobotSim *sim, const MildMaterial *material, int steps, 
 /* Four seconds; a push [N] for 0.1 s after the first. material: NULL for rigid ground. */
 static Standing stand_and_push(const MildMaterial *material, double dt, const double push[6]) {
     RobotSim *sim = new_sim(dt);
-    MildGround *ground = new_ground();
+    MildGround *ground = kit_ground(robot);
     MildMaterial any = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
     RobotVariation variation = robot_variation_nominal();
@@ -341,26 +313,15 @@ static void check(const char *name, const MildMaterial *material, double dt, con
     }
 }
 
-static void stands_and_is_pushed_everywhere(void **unused) {
-    (void)unused;
+TEST(stands_and_is_pushed_everywhere) {
     static const double pushes[3][6] = {{0}, {40, 0}, {0, 25}};
     for (int p = 0; p < 3; p++) {
         check("rigid", NULL, 0.001, pushes[p]);
         for (int g = 0; g < mild_material_preset_count(); g++) {
-            MildMaterial material;
-            assert_true(mild_material_preset(mild_material_preset_name(g), &material));
+            MildMaterial material = kit_preset(mild_material_preset_name(g));
             check(mild_material_preset_name(g), &material, p == 0 ? 0.0025 : 0.001, pushes[p]);
         }
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_pose_by_hand),
-        cmocka_unit_test(efforts_speeds_and_gait),
-        cmocka_unit_test(what_may_be_left_out),
-        cmocka_unit_test(a_round_foot_is_a_point),
-        cmocka_unit_test(stands_and_is_pushed_everywhere),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

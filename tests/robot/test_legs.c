@@ -1,51 +1,24 @@
 /* Contact between the legs: the distance against MuJoCo's of the same geoms, and that it only takes
  * energy. */
-#include <stdio.h>
-
-#include "kit.h"
+#include "all_robots.h"
 #include "robot/legs.h"
-#include "robot/robot.h"
-#include "robot/sim.h"
 
-#include "base/random.h"
-
-enum { ROBOTS = 3, POSES = 3000, THROWS = 200, THROW_STEPS = 80 };
-static const char *const names[ROBOTS] = {"sa01", "go1", "g1"};
-static Robot *robots[ROBOTS], *without[ROBOTS]; /* the latter's legs do not touch */
+enum { POSES = 3000, THROWS = 200, THROW_STEPS = 80 };
+static Robot *legged[ROBOTS]; /* the same robots, whose legs touch */
 
 static int setup(void **unused) {
-    (void)unused;
     for (int r = 0; r < ROBOTS; r++) {
-        MildError error = {0};
-        robots[r] = robot_open(names[r], &error);
-        without[r] = robot_open(names[r], &error);
-        print_message("%s", error.text);
-        assert_true(robots[r] && without[r] && robots[r]->leg_pairs > 0);
-        without[r]->leg_pairs = 0;
+        legged[r] = kit_robot_named(names[r]);
+        assert_true(legged[r]->leg_pairs > 0);
     }
-    return 0;
+    return open_robots(unused);
 }
 
 static int teardown(void **unused) {
-    (void)unused;
     for (int r = 0; r < ROBOTS; r++) {
-        robot_destroy(robots[r]);
-        robot_destroy(without[r]);
+        robot_destroy(legged[r]);
     }
-    return 0;
-}
-
-/* Anywhere, within the joints' ranges. */
-static RobotState random_pose(const Robot *robot, Random *random) {
-    RobotState state = {.qpos = {0, 0, 2}}; /* far from the ground */
-    for (int k = 3; k < 7; k++) {
-        state.qpos[k] = random_normal(random);
-    }
-    mju_normalize4(state.qpos + 3);
-    for (int j = 0; j < robot->def.joints; j++) {
-        state.qpos[7 + j] = random_uniform(random, robot->low[j], robot->high[j]);
-    }
-    return state;
+    return close_robots(unused);
 }
 
 /* [m] Of the geoms by MuJoCo; which leg a geom is of by the foot whose name it begins with, but for
@@ -69,20 +42,19 @@ static double geom_distance(const Robot *robot, const RobotState *state, mjData 
     return least;
 }
 
-static void distance_is_mujocos(void **unused) {
-    (void)unused;
+TEST(distance_is_mujocos) {
     const RobotVariation nominal = robot_variation_nominal();
     for (int r = 0; r < ROBOTS; r++) {
-        mjData *d = mj_makeData(robots[r]->visual);
-        RobotSim *sim = robot_sim_create(robots[r], 0.0025, NULL);
+        mjData *d = mj_makeData(legged[r]->visual);
+        RobotSim *sim = robot_sim_create(legged[r], 0.0025, NULL);
         Random random = random_at(61, (uint32_t)r, 0);
         double worst = 0;
         int overlaps = 0;
         for (int n = 0; n < POSES; n++) {
-            const RobotState state = random_pose(robots[r], &random);
+            const RobotState state = random_pose(legged[r], 2, &random);
             robot_sim_load(sim, &state, &nominal);
             const double own = robot_sim_leg_distance(sim);
-            const double distance = geom_distance(robots[r], &state, d);
+            const double distance = geom_distance(legged[r], &state, d);
             worst = fmax(worst, fabs(own - distance));
             overlaps += distance < 0;
         }
@@ -109,7 +81,7 @@ static RobotState random_throw(const Robot *robot, RobotSim *sim, Random *random
     const RobotVariation nominal = robot_variation_nominal();
     RobotState state;
     do {
-        state = random_pose(robot, random);
+        state = random_pose(robot, 2, random);
         for (int d = 0; d < robot->nv; d++) {
             state.qvel[d] = random_uniform(random, -4, 4);
         }
@@ -146,25 +118,22 @@ static int throw_legs(RobotSim *with, RobotSim *bare, RobotState state, MildGrou
     return met;
 }
 
-static void contact_takes_energy(void **unused) {
-    (void)unused;
+TEST(contact_takes_energy) {
     static const double steps[] = {0.001, 0.0025, 0.005};
     for (int r = 0; r < ROBOTS; r++) {
         for (int s = 0; s < 3; s++) {
             MildError error = {0};
-            RobotSim *with = robot_sim_create(robots[r], steps[s], &error);
-            RobotSim *bare = robot_sim_create(without[r], steps[s], &error);
+            RobotSim *with = robot_sim_create(legged[r], steps[s], &error);
+            RobotSim *bare = robot_sim_create(robots[r], steps[s], &error);
             Random random = random_at(62, (uint32_t)(3 * r + s), 0);
-            const size_t bytes = mild_ground_bytes(robot_soles(robots[r]), robots[r]->def.feet);
-            MildGround *ground = aligned_alloc(64, (bytes + 63) / 64 * 64);
+            MildGround *ground = kit_ground(legged[r]);
             double most = -1e9, least = 0, deepest = 1;
             int met = 0;
-            mild_ground_init(ground, robot_soles(robots[r]), robots[r]->def.feet);
             mju_zero3(with->model->opt.gravity);
             mju_zero3(bare->model->opt.gravity);
             for (int n = 0; n < THROWS; n++) {
                 double work, distance;
-                const RobotState state = random_throw(robots[r], with, &random);
+                const RobotState state = random_throw(legged[r], with, &random);
                 if (throw_legs(with, bare, state, ground, &work, &distance)) {
                     most = fmax(most, work);
                     least = fmin(least, work);
@@ -186,19 +155,11 @@ static void contact_takes_energy(void **unused) {
 
 /* 2 kg on 1/A: approaching at 0.4 m/s from 0.5 mm in 2.5 ms, 0.2 m/s are too fast. In overlap of
  * 1 mm at rest half of it is taken back in a step, at 0.2 m/s. */
-static void force_by_hand(void **unused) {
-    (void)unused;
+TEST(force_by_hand) {
     expect_near("force", legs_force(0.0025, 0.0005, -0.4, 0.5), 0.2 / (0.0025 * 0.5), 1e-9);
     expect_near("force", legs_force(0.0025, -0.001, 0, 0.5), 0.2 / (0.0025 * 0.5), 1e-9);
     assert_true(legs_force(0.0025, 0.0005, -0.199, 0.5) == 0);
     assert_true(legs_force(0.0025, -0.001, 0.201, 0.5) == 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(distance_is_mujocos),
-        cmocka_unit_test(contact_takes_energy),
-        cmocka_unit_test(force_by_hand),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -37,18 +37,10 @@ static const char ini[] =
     "still = 0 0 0 0\n" FOOT("fl", "fr", "0") FOOT("fr", "fl", "0.5") FOOT("rl", "rr", "0.5")
         FOOT("rr", "rl", "0");
 
-static void write_text(const char *path, const char *text) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    fputs(text, file);
-    assert_int_equal(fclose(file), 0);
-}
-
 /* left, right: axes of the hinges; out, down: [m] from a hinge to its foot. */
 static Robot *make_stool(const char *left, const char *right, const char *out, const char *down) {
     static const char *const name[LEGS] = {"fl", "fr", "rl", "rr"};
     static const char *const place[LEGS] = {"0.25 0.1", "0.25 -0.1", "-0.25 0.1", "-0.25 -0.1"};
-    char folder[] = "/tmp/mild_stool_XXXXXX", xml_path[64], ini_path[64];
     char legs[2000] = "", mjcf[3000], side[16];
     MildError error = {0};
     for (int f = 0; f < LEGS; f++) {
@@ -58,18 +50,8 @@ static Robot *make_stool(const char *left, const char *right, const char *out, c
                  f % 2 ? right : left, side, down, name[f], side, down);
     }
     snprintf(mjcf, sizeof mjcf, frame, legs);
-    assert_non_null(mkdtemp(folder));
-    snprintf(xml_path, sizeof xml_path, "%s/stool.xml", folder);
-    snprintf(ini_path, sizeof ini_path, "%s/robot.ini", folder);
-    write_text(xml_path, mjcf);
-    write_text(ini_path, ini);
-    Robot *stool = robot_create(folder, &error);
-    unlink(xml_path);
-    unlink(ini_path);
-    rmdir(folder);
-    if (!stool) {
-        fail_msg("%s", error.text);
-    }
+    Robot *stool = kit_robot_of("stool.xml", mjcf, ini, &error);
+    expect_good(stool != NULL, &error);
     return stool;
 }
 
@@ -80,7 +62,7 @@ typedef struct {
 
 /* A preset for feet as small as the stool: 3.8 times as stiff, with cones half as wide. */
 static MildMaterial firm(const char *name) {
-    MildMaterial m = preset(name);
+    MildMaterial m = kit_preset(name);
     const double r = 0.0195 / 0.01;
     m.k_pen *= r * r;
     m.k_drift *= r * r;
@@ -91,17 +73,16 @@ static MildMaterial firm(const char *name) {
 }
 
 static MildTerrain firm_terrain(const char *name) {
-    MildTerrain terrain = preset_terrain(name);
+    MildTerrain terrain = kit_terrain(name);
     terrain.materials[0] = firm(name);
     return terrain;
 }
 
 static Place stand_on(const Robot *stool, double dt) {
     MildError error = {0};
-    void *block = calloc(1, mild_ground_bytes(robot_soles(stool), LEGS));
     Place on = {robot_sim_create(stool, dt, &error), NULL};
-    assert_true(on.sim && block);
-    on.ground = mild_ground_init(block, robot_soles(stool), LEGS);
+    assert_non_null(on.sim);
+    on.ground = kit_ground(stool);
     return on;
 }
 
@@ -136,8 +117,7 @@ static double stool_depth(const Robot *stool, const char *material, double dt) {
 /* Gravity spreads the legs until their limits hold them, because the feet slip. How deep they are
  * then does not depend on the time step. On rubber, which slipping digs into the least, it is what
  * the weight alone makes. */
-static void test_load(void **unused) {
-    (void)unused;
+TEST(test_load) {
     Robot *stool = make_stool("1 0 0", "-1 0 0", "0.4", "-0.2");
     const MildMaterial rubber = firm("rubber");
     const double wanted = mild_sole_sinkage(robot_soles(stool)[0], &rubber, robot_foot_load(stool));
@@ -180,8 +160,7 @@ static double pressed(const Robot *stool, const char *material, double dt) {
 
 /* Its motors press all legs backward against their limits. They do no work then, so the friction
  * under the feet may not move it. */
-static void test_pressed(void **unused) {
-    (void)unused;
+TEST(test_pressed) {
     Robot *stool = make_stool("0 1 0", "0 1 0", "0.1", "-0.4");
     for (int m = 0; m < MATERIALS; m++) {
         for (int s = 0; s < STEPS; s++) {
@@ -191,10 +170,4 @@ static void test_pressed(void **unused) {
     robot_destroy(stool);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_load),
-        cmocka_unit_test(test_pressed),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -6,8 +6,7 @@
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"
-#include "kit.h"
-#include "robot/robot.h"
+#include "robots.h"
 #include "sa01.h"
 
 #define MODEL SA01
@@ -26,19 +25,6 @@ static Robot *robot;
 static RobotSim *sim;
 static cJSON *numbers;
 static Tree tree;
-
-static char *read_file(const char *path) {
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    fseek(file, 0, SEEK_END);
-    long size = ftell(file);
-    rewind(file);
-    char *text = calloc(1, (size_t)size + 1);
-    assert_non_null(text);
-    assert_int_equal(fread(text, 1, (size_t)size, file), size);
-    fclose(file);
-    return text;
-}
 
 static double number(const cJSON *object, const char *name) {
     const cJSON *item = cJSON_GetObjectItem(object, name);
@@ -223,12 +209,9 @@ static RobotState stand_state(void) {
 static int setup(void **unused) {
     (void)unused;
     MildError error = {0};
-    robot = robot_create(MODEL, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    robot = kit_robot(MODEL);
     sim = robot_sim_create(robot, 0.001, &error);
-    char *text = read_file(NUMBERS);
+    char *text = kit_read(NUMBERS, NULL);
     numbers = cJSON_Parse(text);
     free(text);
     if (!sim || !numbers) {
@@ -246,8 +229,7 @@ static int teardown(void **unused) {
     return 0;
 }
 
-static void test_limits_and_masses(void **unused) {
-    (void)unused;
+TEST(test_limits_and_masses) {
     expect_near("total mass", robot_total_mass(robot), number(numbers, "total_mass_kg"), 1e-9);
     const mjModel *m = robot_sim_model(sim);
     const cJSON *joints = cJSON_GetObjectItem(numbers, "joints");
@@ -270,8 +252,7 @@ static void test_limits_and_masses(void **unused) {
 }
 
 /* JSON's derived_standing.training_default was computed by its authors from the same links. */
-static void test_standing(void **unused) {
-    (void)unused;
+TEST(test_standing) {
     const cJSON *expected =
         cJSON_GetObjectItem(cJSON_GetObjectItem(numbers, "derived_standing"), "training_default");
     double ankle[3], com[3], inertia[9] = {0}, position[LINKS][3], turn[LINKS][9];
@@ -318,8 +299,7 @@ static void test_standing(void **unused) {
     }
 }
 
-static void test_mass_matrix(void **unused) {
-    (void)unused;
+TEST(test_mass_matrix) {
     double worst = 0.0;
     for (uint32_t draw = 0; draw < 50; draw++) {
         RobotState state = random_state(draw);
@@ -339,8 +319,7 @@ static void test_mass_matrix(void **unused) {
     assert_true(worst < 1e-7); /* MuJoCo's diagonalisation of an inertia stops at 1e-6 rad */
 }
 
-static void test_variation(void **unused) {
-    (void)unused;
+TEST(test_variation) {
     RobotVariation varied = robot_variation_nominal(), nominal = varied;
     varied.base_mass_add = 2.5;
     varied.com_offset[0] = 0.01;
@@ -360,46 +339,17 @@ static void test_variation(void **unused) {
     expect_near("friction back", m->pair_friction[0], 0.8, 1e-12);
 }
 
-/* Writes `text` with `from` as `to` into a file. */
-static void write_changed(const char *path, const char *text, const char *from, const char *to) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    const char *at = from ? strstr(text, from) : NULL;
-    assert_true(!from || at);
-    for (; at; text = at + strlen(from), at = strstr(text, from)) {
-        fprintf(file, "%.*s%s", (int)(at - text), text, to);
-    }
-    fputs(text, file);
-    fclose(file);
-}
-
 /* The robot with `from` written as `to` in one of its files must be refused. */
 static void refuse(const char *name, const char *from, const char *to, MildStatus status,
                    const char *names) {
-    static const char *const files[] = {"sa01.xml", "robot.ini"};
-    char folder[] = "robot_refused_XXXXXX", path[2][64];
-    assert_non_null(mkdtemp(folder));
-    for (int k = 0; k < 2; k++) {
-        char source[256];
-        snprintf(source, sizeof source, "%s/%s", SA01, files[k]);
-        snprintf(path[k], sizeof path[k], "%s/%s", folder, files[k]);
-        char *text = read_file(source);
-        write_changed(path[k], text, strcmp(name, files[k]) == 0 ? from : NULL, to);
-        free(text);
-    }
     MildError error = {0};
-    Robot *accepted = robot_create(folder, &error);
+    Robot *accepted = kit_robot_changed(SA01, "sa01.xml", name, from, to, &error);
     print_message("%s\n", error.text);
-    for (int k = 0; k < 2; k++) {
-        remove(path[k]);
-    }
-    rmdir(folder);
     assert_null(accepted);
     assert_error(&error, status, names);
 }
 
-static void test_refusals(void **unused) {
-    (void)unused;
+TEST(test_refusals) {
     refuse("sa01.xml", "leg_r6_link", "xeg_r6_link", MILD_ERROR_FORMAT,
            "sa01.xml leg_r6_link [foot.right]");
     refuse("sa01.xml", "leg_l4_joint", "xeg_l4_joint", MILD_ERROR_FORMAT,
@@ -414,45 +364,14 @@ static void test_refusals(void **unused) {
     refuse("sa01.xml", "range=\"-0.15 2.268\"", "range=\"0.5 2.268\"", MILD_ERROR_RANGE,
            "[joints] pose leg_l4_joint");
     refuse("sa01.xml", "angle=\"radian\" ", "", MILD_ERROR_RANGE, "sa01.xml angle");
-    refuse("robot.ini", "elements = 77", "elements = -7", MILD_ERROR_RANGE,
-           "robot.ini foot.left.elements -7");
+    /* what robot.ini alone is refused for is in test_def.c */
+    refuse("robot.ini", "height =", "heigth =", MILD_ERROR_FORMAT,
+           "robot.ini [robot] heigth height");
     refuse("robot.ini", "elements = 77", "elements = 5000", MILD_ERROR_RANGE,
            "robot.ini [foot.left] sole.target_elements 5000");
     refuse("robot.ini", "sa01.xml", "none.xml", MILD_ERROR_FORMAT, "none.xml");
     refuse("robot.ini", "base = base_link", "base = torso", MILD_ERROR_FORMAT,
            "sa01.xml torso [robot] base");
-    refuse("robot.ini", "height =", "heigth =", MILD_ERROR_FORMAT,
-           "robot.ini [robot] heigth height");
-    refuse("robot.ini", "[joints]", "[joint]", MILD_ERROR_FORMAT, "robot.ini [joint] [joints]");
-    refuse("robot.ini", "kp          =  50", "kp          = ", MILD_ERROR_FORMAT,
-           "robot.ini [joints] kp 11 12");
-    refuse("robot.ini", "kp          =  50", "kp          = x", MILD_ERROR_FORMAT,
-           "robot.ini [joints] kp x");
-    refuse("robot.ini", "kp          =  50", "kp          = -1", MILD_ERROR_FORMAT,
-           "robot.ini [joints] kp -1 leg_l1_joint");
-    refuse("robot.ini", "mirror_sign =  -1", "mirror_sign =  1", MILD_ERROR_FORMAT,
-           "robot.ini [joints] mirror_sign");
-    refuse("robot.ini", "mirror = leg_r1_joint leg_r2_joint", "mirror = leg_r2_joint leg_r1_joint",
-           MILD_ERROR_FORMAT, "robot.ini [joints] mirror");
-    refuse("robot.ini", "mirror = right", "mirror = both", MILD_ERROR_FORMAT,
-           "robot.ini [foot.left] mirror");
-    refuse("robot.ini", "offset = 0.5", "offset = 0.25", MILD_ERROR_FORMAT,
-           "robot.ini [foot.left] offset");
-    refuse("robot.ini", "shape = outline", "shape = round", MILD_ERROR_FORMAT,
-           "robot.ini [foot.left] ankle");
-    refuse("robot.ini", "z = -0.055\n", "", MILD_ERROR_FORMAT, "robot.ini [foot.left] z");
-    refuse("robot.ini", "\n[foot.right]", "\n[foot.a]\n[foot.b]\n[foot.c]\n[foot.right]",
-           MILD_ERROR_FORMAT, "[foot.right] 4");
-    refuse("robot.ini", "pitch = 0.0195", "pitch = 0.0195\npitch = 0.02", MILD_ERROR_FORMAT,
-           "[foot.left] pitch 50");
-    refuse("robot.ini", "feet_least = 0.10        ; [m]", "feet_least = 0.10\n  1 2",
-           MILD_ERROR_FORMAT, "robot.ini:15");
-    refuse("robot.ini", "kp          =  50", "kp          =  50 50", MILD_ERROR_FORMAT,
-           "robot.ini [joints] kp 13 12");
-    refuse("robot.ini", "offset = 0.5", "offset = 1", MILD_ERROR_FORMAT,
-           "robot.ini [foot.right] offset 1");
-    refuse("robot.ini", "mirror = right", "mirror = left", MILD_ERROR_FORMAT,
-           "robot.ini [foot.right] mirror");
     MildError error = {0};
     assert_null(robot_create("no_such_robot", &error));
     print_message("%s\n", error.text);
@@ -464,8 +383,7 @@ static void test_refusals(void **unused) {
 
 /* A hinge's numbers tell the unit only together: one that turns by 5 degrees is no mistake where
  * another turns by 130, nor one without an end among radians. */
-static void test_angles(void **unused) {
-    (void)unused;
+TEST(test_angles) {
     static const struct {
         const char *unit, *one, *other, *names; /* names: NULL where the file is taken */
     } cases[] = {
@@ -478,36 +396,24 @@ static void test_angles(void **unused) {
         {"radian", "-0.1 0.1", "0 0.1", NULL},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        char folder[] = "robot_angles_XXXXXX", path[64], ini[64];
         MildError error = {0};
-        assert_non_null(mkdtemp(folder));
-        snprintf(path, sizeof path, "%s/two.xml", folder);
-        snprintf(ini, sizeof ini, "%s/robot.ini", folder);
-        FILE *file = fopen(path, "w");
-        assert_non_null(file);
-        fprintf(file,
-                "<mujoco><compiler angle='%s' autolimits='true'/><worldbody><body name='base'>"
-                "<freejoint/><geom size='0.1'/><body name='leg' pos='0 0 -0.3'><joint name='hip' "
-                "axis='0 1 0' range='%s' armature='0.01'/><geom size='0.05'/><body name='foot' "
-                "pos='0 0 -0.3'><joint name='knee' axis='0 1 0' range='%s' armature='0.01'/>"
-                "<geom size='0.05'/></body></body></body></worldbody></mujoco>",
-                cases[i].unit, cases[i].one, cases[i].other);
-        fclose(file);
-        file = fopen(ini, "w");
-        assert_non_null(file);
-        fputs(
+        char mjcf[1000];
+        snprintf(mjcf, sizeof mjcf,
+                 "<mujoco><compiler angle='%s' autolimits='true'/><worldbody><body name='base'>"
+                 "<freejoint/><geom size='0.1'/><body name='leg' pos='0 0 -0.3'><joint name='hip' "
+                 "axis='0 1 0' range='%s' armature='0.01'/><geom size='0.05'/><body name='foot' "
+                 "pos='0 0 -0.3'><joint name='knee' axis='0 1 0' range='%s' armature='0.01'/>"
+                 "<geom size='0.05'/></body></body></body></worldbody></mujoco>",
+                 cases[i].unit, cases[i].one, cases[i].other);
+        Robot *two = kit_robot_of(
+            "two.xml", mjcf,
             "[robot]\nname = two\nmodel = two.xml\nbase = base\nheight = 0.6\naction_scale = 0.2\n"
             "feet_range = 0 1\nknee_range = 0 1\nfeet_least = 0\nknee_least = 0\nfoot_force = 50\n"
             "assist = 10 1 1 1\nshells =\n[joints]\nnames = hip knee\nmirror = hip knee\n"
             "mirror_sign = 1 1\npose = 0 0\nkp = 10 10\nkd = 1 1\neffort = 5 5\n[foot.one]\n"
             "body = foot\nknee = leg\nmirror = one\noffset = 0\nshape = round\n"
             "center = 0 0 -0.05\nradius = 0.02\n",
-            file);
-        fclose(file);
-        Robot *two = robot_create(folder, &error);
-        remove(path);
-        remove(ini);
-        rmdir(folder);
+            &error);
         print_message("%s, %s and %s: %s\n", cases[i].unit, cases[i].one, cases[i].other,
                       two ? "taken" : error.text);
         assert_int_equal(!two, cases[i].names != NULL);
@@ -518,11 +424,4 @@ static void test_angles(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_limits_and_masses), cmocka_unit_test(test_standing),
-        cmocka_unit_test(test_mass_matrix),       cmocka_unit_test(test_variation),
-        cmocka_unit_test(test_refusals),          cmocka_unit_test(test_angles),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

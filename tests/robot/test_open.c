@@ -5,8 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-static void test_list(void **unused) {
-    (void)unused;
+TEST(test_list) {
     char names[ROBOT_LISTED_MAX][ROBOT_LISTED_SIZE];
     int count = robot_list(names, ROBOT_LISTED_MAX), found = 0;
     assert_true(count >= 1 && count < ROBOT_LISTED_MAX);
@@ -22,8 +21,7 @@ static void test_list(void **unused) {
     assert_int_equal(robot_list(names, 1), 1);
 }
 
-static void test_open(void **unused) {
-    (void)unused;
+TEST(test_open) {
     MildError error = {0};
     Robot *by_name = robot_open("sa01", &error), *by_folder = robot_open(SA01, &error);
     assert_non_null(by_name);
@@ -40,8 +38,7 @@ static void refuse(const char *name, MildStatus status, const char *names) {
     assert_error(&error, status, names);
 }
 
-static void test_refused(void **unused) {
-    (void)unused;
+TEST(test_refused) {
     refuse("sa02", MILD_ERROR_ARGUMENT, "sa02 sa01");
     refuse("sa0", MILD_ERROR_ARGUMENT, "sa0 sa01");
     refuse("", MILD_ERROR_ARGUMENT, "robot");
@@ -50,11 +47,4 @@ static void test_refused(void **unused) {
     robot_destroy(NULL);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_list),
-        cmocka_unit_test(test_open),
-        cmocka_unit_test(test_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -65,8 +65,8 @@ static double effect(const RobotState *pushed, const RobotState *left_alone) {
 
 static void push_is_the_engines(int rigid) {
     RobotSim *sim = new_sim(0.0025);
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     RobotVariation variation = robot_variation_nominal();
     variation.rigid = rigid;
     variation.base_mass_add = 3;
@@ -109,20 +109,12 @@ static void push_is_the_engines(int rigid) {
     robot_sim_destroy(sim);
 }
 
-static void test_soft(void **unused) {
-    (void)unused;
+TEST(test_soft) {
     push_is_the_engines(0);
 }
 
-static void test_rigid(void **unused) {
-    (void)unused;
+TEST(test_rigid) {
     push_is_the_engines(1);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_soft),
-        cmocka_unit_test(test_rigid),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -12,9 +12,7 @@
 static MildMap *make_map(const MildMapDef *def) {
     MildError error = {0};
     MildMap *map = mild_map_create(def, &error);
-    if (!map) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(map != NULL, &error);
     return map;
 }
 
@@ -41,8 +39,7 @@ static RobotState random_state(uint32_t draw) {
 }
 
 /* A map that happens to be level is the level floor, to the last bit. */
-static void test_level(void **unused) {
-    (void)unused;
+TEST(test_level) {
     const double heights[4] = {0.5, 0.5, 0.5, 0.5};
     MildMapDef def = mild_map_def_default();
     def.kind = MILD_MAP_IMAGE;
@@ -53,7 +50,7 @@ static void test_level(void **unused) {
     assert_false(mild_map_is_level(map));
     RobotSim *sim = new_sim(0.001), *other = new_sim(0.001);
     RobotVariation rigid = rigid_variation(0.8);
-    MildTerrain flat = preset_terrain("sand_loose"), mapped = flat;
+    MildTerrain flat = kit_terrain("sand_loose"), mapped = flat;
     flat.height = 0.25;
     mapped.map = map;
     int contacts = 0;
@@ -80,14 +77,13 @@ static void test_level(void **unused) {
 }
 
 /* A slope is the engine's own floor, tilted. */
-static void test_slope_is_the_engine(void **unused) {
-    (void)unused;
+TEST(test_slope_is_the_engine) {
     static const double slopes[3] = {-0.3, 0.1, 0.5};
     double worst = 0.0;
     for (uint32_t draw = 0; draw < 12; draw++) {
         double slope = slopes[draw % 3], tilt = -atan(slope);
         MildMap *map = slope_map(slope);
-        MildTerrain terrain = preset_terrain("sand_loose");
+        MildTerrain terrain = kit_terrain("sand_loose");
         terrain.map = map;
         RobotSim *sim = new_sim(0.001);
         mjModel *m = robot_sim_model(sim);
@@ -138,8 +134,7 @@ static MildMap *plane_map(double along_x, double along_y) {
 
 /* The same for slopes along y, and so steep that the engine takes other tangents: robots dropped
  * onto the plane, limp. */
-static void test_any_plane_is_the_engine(void **unused) {
-    (void)unused;
+TEST(test_any_plane_is_the_engine) {
     static const double planes[][2] = {{0, 0.25}, {0.25, -0.5}, {0, 0.75}, {-0.25, -1}, {0, 1.5}};
     double worst = 0.0;
     int contacts = 0;
@@ -148,7 +143,7 @@ static void test_any_plane_is_the_engine(void **unused) {
         double length = sqrt(1 + rise[0] * rise[0] + rise[1] * rise[1]);
         const double normal[3] = {-rise[0] / length, -rise[1] / length, 1 / length};
         MildMap *map = plane_map(rise[0], rise[1]);
-        MildTerrain terrain = preset_terrain("sand_loose");
+        MildTerrain terrain = kit_terrain("sand_loose");
         terrain.map = map;
         RobotSim *sim = new_sim(0.001);
         mjModel *m = robot_sim_model(sim);
@@ -185,7 +180,7 @@ static void test_any_plane_is_the_engine(void **unused) {
  * slope: how far its centre of mass has come, and how far a foot has gone in the second second. */
 static void slide(double slope, double friction, double *fallen, double *crept) {
     MildMap *map = slope_map(-slope);
-    MildTerrain terrain = preset_terrain("sand_loose");
+    MildTerrain terrain = kit_terrain("sand_loose");
     terrain.map = map;
     RobotSim *sim = new_sim(0.001);
     RobotVariation rigid = rigid_variation(friction);
@@ -212,8 +207,7 @@ static void slide(double slope, double friction, double *fallen, double *crept) 
 
 /* Above the angle of friction it slides as a block does, (sin - mu cos) g t^2/2 and the sway of its
  * joints; below it stays, but for the creep of the engine's friction. */
-static void test_friction(void **unused) {
-    (void)unused;
+TEST(test_friction) {
     const double slope = 0.03, angle = atan(slope);
     double fallen, crept;
     slide(slope, 0.01, &fallen, &crept);
@@ -228,8 +222,7 @@ static void test_friction(void **unused) {
 
 /* Wherever it stands on waves, the lowest corner of either foot is neither 2 mm in the ground nor
  * above it. */
-static void test_waves(void **unused) {
-    (void)unused;
+TEST(test_waves) {
     MildMapDef def = mild_map_def_default();
     def.kind = MILD_MAP_WAVES;
     MildMap *map = make_map(&def);
@@ -240,7 +233,7 @@ static void test_waves(void **unused) {
     double deepest = 0.0, highest = 0.0;
     int stood = 0;
     for (uint32_t place = 0; place < 16; place++) {
-        MildTerrain terrain = preset_terrain("sand_loose");
+        MildTerrain terrain = kit_terrain("sand_loose");
         Random random = random_at(7, place, 0);
         terrain.map = map;
         terrain.map_x = random_uniform(&random, -1.0, 1.0);
@@ -275,13 +268,4 @@ static void test_waves(void **unused) {
     assert_true(deepest > -0.002 && highest < 0.002);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_level),
-        cmocka_unit_test(test_slope_is_the_engine),
-        cmocka_unit_test(test_any_plane_is_the_engine),
-        cmocka_unit_test(test_friction),
-        cmocka_unit_test(test_waves),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

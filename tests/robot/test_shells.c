@@ -1,52 +1,8 @@
-/* Shells that stand on soft ground: in the air they change no bit of a step, under load they carry
- * the robot, and the ground under all of its bodies only takes energy. Arguments: number of falls
- * of each robot (default 40) and the first seed (default 1). */
-#include <stdio.h>
+/* Shells that stand on soft ground: in the air they change no bit of a step, and under load they
+ * carry the robot. That the ground under all bodies only takes energy is in test_fallen.c. */
+#include "all_robots.h"
 
-#include "base/random.h"
-#include "kit.h"
-#include "robot/robot.h"
-#include "robot/sim.h"
-
-enum { ROBOTS = 3, STAND_STEPS = 400, FALL_SECONDS = 1 };
-static const char *const names[ROBOTS] = {"sa01", "go1", "g1"};
-static Robot *robots[ROBOTS]; /* without contact between the legs */
-static int falls = 40;
-static uint32_t first = 1;
-
-static int setup(void **unused) {
-    (void)unused;
-    for (int r = 0; r < ROBOTS; r++) {
-        MildError error = {0};
-        robots[r] = robot_open(names[r], &error);
-        print_message("%s", error.text);
-        assert_non_null(robots[r]);
-        robots[r]->leg_pairs = 0;
-    }
-    return 0;
-}
-
-static int teardown(void **unused) {
-    (void)unused;
-    for (int r = 0; r < ROBOTS; r++) {
-        robot_destroy(robots[r]);
-    }
-    return 0;
-}
-
-/* To be freed by the caller. */
-static MildGround *new_ground(const Robot *robot) {
-    const int bodies = robot_bodies(robot);
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), bodies));
-    assert_non_null(block);
-    return mild_ground_init(block, robot_soles(robot), bodies);
-}
-
-static MildTerrain preset_terrain(const char *name) {
-    MildMaterial material;
-    assert_true(mild_material_preset(name, &material));
-    return mild_terrain_uniform(&material);
-}
+enum { STAND_STEPS = 400 };
 
 /* Torques that hold the default pose. */
 static void hold_pose(const Robot *robot, const RobotSim *sim, double stiffness, double *torque) {
@@ -65,8 +21,8 @@ static void stand_still(Robot *robot, int shells, double qpos[ROBOT_NQ_MAX], dou
     robot_set_shells(robot, shells);
     assert_true(robot_bodies(robot) > robot_feet(robot) || !shells);
     RobotSim *sim = robot_sim_create(robot, 0.0025, NULL);
-    MildGround *ground = new_ground(robot);
-    MildTerrain terrain = preset_terrain("rubber");
+    MildGround *ground = kit_ground(robot);
+    MildTerrain terrain = kit_terrain("rubber");
     double torque[ROBOT_JOINTS_MAX];
     *load = 0;
     for (int s = 0; s < STAND_STEPS / 8; s++) {
@@ -79,8 +35,7 @@ static void stand_still(Robot *robot, int shells, double qpos[ROBOT_NQ_MAX], dou
     robot_sim_destroy(sim);
 }
 
-static void in_the_air_they_change_nothing(void **unused) {
-    (void)unused;
+TEST(in_the_air_they_change_nothing) {
     for (int r = 0; r < ROBOTS; r++) {
         double without[ROBOT_NQ_MAX], with[ROBOT_NQ_MAX], load;
         stand_still(robots[r], 0, without, &load);
@@ -91,8 +46,7 @@ static void in_the_air_they_change_nothing(void **unused) {
 }
 
 /* A concentric model has one element for a sole, and none for a shell. */
-static void concentric_models_have_none(void **unused) {
-    (void)unused;
+TEST(concentric_models_have_none) {
     robot_set_shells(robots[0], 1);
     robot_set_model(robots[0], MILD_MODEL_CON_CONE);
     assert_int_equal(robot_bodies(robots[0]), robot_feet(robots[0]));
@@ -102,8 +56,7 @@ static void concentric_models_have_none(void **unused) {
 
 /* The law under a shell is that of the feet's elements, whatever the distance of its own; its area
  * is that of the geoms: the two boxes of SA01's shanks, 5 x 5 x 28 cm. */
-static void they_have_the_law_of_the_feet(void **unused) {
-    (void)unused;
+TEST(they_have_the_law_of_the_feet) {
     for (int r = 0; r < ROBOTS; r++) {
         robot_set_shells(robots[r], 1);
         const MildSole *const *soles = robot_soles(robots[r]);
@@ -123,15 +76,14 @@ static void they_have_the_law_of_the_feet(void **unused) {
 /* ---- lying ---- */
 
 /* Dropped on its back or side it comes to rest, and feet and shells carry its weight. */
-static void they_carry_a_robot_that_lies(void **unused) {
-    (void)unused;
+TEST(they_carry_a_robot_that_lies) {
     static const char *const grounds[] = {"foam45", "sand_loose"};
     for (int n = 0; n < 2 * ROBOTS; n++) {
         Robot *robot = robots[n / 2];
         robot_set_shells(robot, 1);
         RobotSim *sim = robot_sim_create(robot, 0.0025, NULL);
-        MildGround *ground = new_ground(robot);
-        MildTerrain terrain = preset_terrain(grounds[n % 2]);
+        MildGround *ground = kit_ground(robot);
+        MildTerrain terrain = kit_terrain(grounds[n % 2]);
         const RobotVariation nominal = robot_variation_nominal();
         RobotState state;
         robot_sim_store(sim, &state);
@@ -160,114 +112,4 @@ static void they_carry_a_robot_that_lies(void **unused) {
     }
 }
 
-/* ---- energy ---- */
-
-/* Anywhere within the joints' ranges, above the ground, in motion. */
-static RobotState random_throw(const Robot *robot, RobotSim *sim, const MildTerrain *terrain,
-                               Random *random) {
-    const RobotVariation nominal = robot_variation_nominal();
-    RobotState state = {.qpos = {0, 0, 2}};
-    for (int k = 3; k < 7; k++) {
-        state.qpos[k] = random_normal(random);
-    }
-    mju_normalize4(state.qpos + 3);
-    for (int j = 0; j < robot->def.joints; j++) {
-        state.qpos[7 + j] = random_uniform(random, robot->low[j], robot->high[j]);
-    }
-    for (int d = 0; d < robot->nv; d++) {
-        state.qvel[d] = random_uniform(random, -2, 2);
-    }
-    robot_sim_load(sim, &state, &nominal);
-    const double low =
-        fmin(robot_sim_body_clearance(sim, terrain), robot_sim_sole_clearance(sim, terrain));
-    state.qpos[2] += 0.02 - low;
-    return state;
-}
-
-/* [J] Work of the ground on all bodies over the last step, at the mean of their twists before and
- * after it. most: the same, absolute. */
-static double ground_work(const RobotSim *sim, double *size) {
-    double sum = 0;
-    for (int i = 0; i < sim->rows; i++) {
-        const int b = sim->row[i];
-        const MildFootResult *body = &sim->contact.foot[b];
-        const double *before = sim->input.velocity[b], *after = sim->contact.velocity + 6 * b;
-        for (int k = 0; k < 3; k++) {
-            const double work = 0.5 * sim->dt *
-                                (body->force[k] * (before[k] + after[k]) +
-                                 body->torque[k] * (before[3 + k] + after[3 + k]));
-            sum += work;
-            *size += fabs(work);
-        }
-    }
-    return sum;
-}
-
-/* Largest rise of the energy that the ground has given in a fall, over all that it moved; -1: the
- * robot turned by more than 0.1 rad in a step, or diverged. */
-static double fall(Robot *robot, RobotSim *sim, MildGround *ground, const MildTerrain *terrain,
-                   Random *random, int *most) {
-    const RobotVariation nominal = robot_variation_nominal();
-    const double torque[ROBOT_JOINTS_MAX] = {0};
-    RobotState state = random_throw(robot, sim, terrain, random);
-    double given = 0, size = 1e-9, worst = 0;
-    robot_sim_load(sim, &state, &nominal);
-    mild_ground_reset(ground);
-    for (int s = 0; s < FALL_SECONDS / sim->dt; s++) {
-        if (robot_sim_step(sim, torque, NULL, terrain, ground)) {
-            return -1;
-        }
-        for (int i = 0; i < sim->rows; i++) {
-            if (mju_norm3(sim->contact.velocity + 6 * sim->row[i] + 3) * sim->dt > 0.1) {
-                return -1;
-            }
-        }
-        given += ground_work(sim, &size);
-        worst = fmax(worst, given);
-        *most = sim->rows > *most ? sim->rows : *most;
-    }
-    return worst / size;
-}
-
-static void falls_take_energy(void **unused) {
-    (void)unused;
-    static const char *const grounds[] = {"foam45", "sand_loose", "rubber", "foam25"};
-    for (int r = 0; r < ROBOTS; r++) {
-        Robot *robot = robots[r];
-        double low[ROBOT_JOINTS_MAX], high[ROBOT_JOINTS_MAX];
-        memcpy(low, robot->low, sizeof low);
-        memcpy(high, robot->high, sizeof high);
-        robot_set_shells(robot, 1);
-        RobotSim *sim = robot_sim_create(robot, 0.001, NULL);
-        MildGround *ground = new_ground(robot);
-        double worst = 0;
-        int left = 0, gained = 0, most = 0;
-        for (int n = 0; n < falls; n++) {
-            Random random = random_at(first, (uint32_t)(falls * r + n), 0);
-            const MildTerrain terrain = preset_terrain(grounds[n % 4]);
-            const double gain = fall(robot, sim, ground, &terrain, &random, &most);
-            left += gain < 0;
-            gained += gain > 1e-9;
-            worst = fmax(worst, gain);
-        }
-        print_message("%s: %d of %d falls give energy, %.1e of what was moved at most; %d left "
-                      "out; up to %d bodies near the ground\n",
-                      names[r], gained, falls, worst, left, most);
-        assert_true(gained == 0 && left <= falls / 20 && most > robot_feet(robot) + 1);
-        free(ground);
-        robot_sim_destroy(sim);
-    }
-}
-
-int main(int argc, char **argv) {
-    falls = argc > 1 ? atoi(argv[1]) : kit_short() ? 1 + falls / 5 : falls;
-    first = argc > 2 ? (uint32_t)atoi(argv[2]) : first;
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(in_the_air_they_change_nothing),
-        cmocka_unit_test(concentric_models_have_none),
-        cmocka_unit_test(they_have_the_law_of_the_feet),
-        cmocka_unit_test(they_carry_a_robot_that_lies),
-        cmocka_unit_test(falls_take_energy),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(open_robots, close_robots)

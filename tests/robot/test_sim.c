@@ -105,12 +105,11 @@ static void check_foot(const RobotSim *sim, const mjModel *m, const mjData *d, i
     }
 }
 
-static void test_feet(void **unused) {
-    (void)unused;
+TEST(test_feet) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     MildMap *map = waves();
-    MildTerrain level = preset_terrain("grass"), wavy = level;
+    MildTerrain level = kit_terrain("grass"), wavy = level;
     level.height = -0.3;
     wavy.map = map, wavy.height = -0.2;
     for (uint32_t draw = 0; draw < 30; draw++) {
@@ -141,14 +140,13 @@ static void test_feet(void **unused) {
 }
 
 /* After a step: the pose's quantities are those of its end, heights those above its ground. */
-static void test_feet_after_a_step(void **unused) {
-    (void)unused;
+TEST(test_feet_after_a_step) {
     RobotSim *sim = new_sim(0.0025);
     RobotVariation nominal = robot_variation_nominal();
     MildMap *map = waves();
-    MildTerrain wavy = preset_terrain("grass");
+    MildTerrain wavy = kit_terrain("grass");
     wavy.map = map, wavy.height = -0.2;
-    MildGround *ground = new_ground();
+    MildGround *ground = kit_ground(robot);
     const mjModel *m = robot_sim_model(sim);
     for (uint32_t draw = 0; draw < 5; draw++) {
         RobotState state = draw_state(draw, 1.5, 0.2);
@@ -188,12 +186,11 @@ static double box_clearance(const mjModel *m, const mjData *d, int s, const Mild
     return low - mild_terrain_height_at(terrain, at[0], at[1]);
 }
 
-static void test_clearance_of_the_shells(void **unused) {
-    (void)unused;
+TEST(test_clearance_of_the_shells) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     MildMap *map = waves();
-    MildTerrain level = preset_terrain("grass"), wavy = level;
+    MildTerrain level = kit_terrain("grass"), wavy = level;
     level.height = 0.2;
     wavy.map = map;
     const mjModel *m = robot_visual_model(robot);
@@ -224,8 +221,7 @@ static void test_clearance_of_the_shells(void **unused) {
 }
 
 /* Left less right along the base's left, laid level; 0 when the base points straight up. */
-static void test_lateral_distances(void **unused) {
-    (void)unused;
+TEST(test_lateral_distances) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     for (uint32_t draw = 0; draw < 30; draw++) {
@@ -264,12 +260,11 @@ static void test_lateral_distances(void **unused) {
 /* ---- steps ---- */
 
 /* In the air our soft step is the engine's, joints beyond their limits included. */
-static void test_soft_step_in_the_air(void **unused) {
-    (void)unused;
+TEST(test_soft_step_in_the_air) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     mjModel *m = robot_sim_model(sim);
     double worst = 0;
     for (int joint = -1; joint < 2 * SA01_JOINTS; joint++) {
@@ -308,12 +303,11 @@ static void test_soft_step_in_the_air(void **unused) {
 
 /* A step moves the ground's memory on, once, with its own input and result: so a second foot fall
  * finds the imprint of the first. */
-static void test_step_moves_the_ground(void **unused) {
-    (void)unused;
+TEST(test_step_moves_the_ground) {
     RobotSim *sim = new_sim(0.0025);
     RobotVariation nominal = robot_variation_nominal();
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground(), *other = new_ground(), *virgin = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot), *other = kit_ground(robot), *virgin = kit_ground(robot);
     size_t bytes = mild_ground_size(ground);
     RobotState state = draw_state(2, 1, 0.05);
     double torque[SA01_JOINTS] = {0};
@@ -339,12 +333,11 @@ static void test_step_moves_the_ground(void **unused) {
 }
 
 /* Speeds up to 1000 are numbers, beyond they went bad. */
-static void test_fastest(void **unused) {
-    (void)unused;
+TEST(test_fastest) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     const double speeds[4] = {999, -999, 1001, -1001};
     for (int i = 0; i < 4; i++) {
         RobotState state = draw_state(3, 50, 0);
@@ -359,12 +352,11 @@ static void test_fastest(void **unused) {
 }
 
 /* Loaded and stored is the same; a load leaves nothing of the last step. */
-static void test_load_and_store(void **unused) {
-    (void)unused;
+TEST(test_load_and_store) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     RobotState state = draw_state(2, 1, 0.1), back;
     double torque[SA01_JOINTS] = {0};
     robot_sim_load(sim, &state, &nominal);
@@ -393,8 +385,7 @@ static void test_load_and_store(void **unused) {
 }
 
 /* A new workspace stands in the default pose. */
-static void test_new_workspace(void **unused) {
-    (void)unused;
+TEST(test_new_workspace) {
     RobotSim *sim = new_sim(0.002);
     assert_true(robot_sim_dt(sim) == 0.002);
     const double *q = robot_sim_qpos(sim);
@@ -414,8 +405,7 @@ static void test_new_workspace(void **unused) {
     robot_sim_destroy(sim);
 }
 
-static void test_time_steps(void **unused) {
-    (void)unused;
+TEST(test_time_steps) {
     const double good[] = {0.0001, 0.01}, bad[] = {0.000099, 0.0101, 0, -0.001, NAN};
     for (int i = 0; i < 2; i++) {
         robot_sim_destroy(new_sim(good[i]));
@@ -429,11 +419,10 @@ static void test_time_steps(void **unused) {
 }
 
 /* Every part takes some time, steps are counted, NULL stops it. */
-static void test_phases(void **unused) {
-    (void)unused;
+TEST(test_phases) {
     RobotVariation variation = robot_variation_nominal();
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     for (int rigid = 0; rigid < 2; rigid++) {
         RobotSim *sim = new_sim(0.001);
         RobotPhases phases = {0};
@@ -591,13 +580,12 @@ static int check_rigid_step(RobotSim *sim, const MildTerrain *terrain, int loade
 }
 
 /* Standing shakily on slopes, contacts coming and going. */
-static void test_rigid_contact(void **unused) {
-    (void)unused;
+TEST(test_rigid_contact) {
     RobotSim *sim = new_sim(0.0025);
     RobotVariation rigid = robot_variation_nominal();
     rigid.rigid = 1;
     MildMap *map = waves();
-    MildTerrain level = preset_terrain("grass"), wavy = level;
+    MildTerrain level = kit_terrain("grass"), wavy = level;
     level.height = -0.1;
     wavy.map = map;
     int loaded[SA01_FEET] = {0}, partly = 0;
@@ -619,20 +607,4 @@ static void test_rigid_contact(void **unused) {
     robot_sim_destroy(sim);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_new_workspace),
-        cmocka_unit_test(test_time_steps),
-        cmocka_unit_test(test_load_and_store),
-        cmocka_unit_test(test_fastest),
-        cmocka_unit_test(test_step_moves_the_ground),
-        cmocka_unit_test(test_phases),
-        cmocka_unit_test(test_feet),
-        cmocka_unit_test(test_feet_after_a_step),
-        cmocka_unit_test(test_clearance_of_the_shells),
-        cmocka_unit_test(test_lateral_distances),
-        cmocka_unit_test(test_soft_step_in_the_air),
-        cmocka_unit_test(test_rigid_contact),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

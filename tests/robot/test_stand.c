@@ -44,7 +44,7 @@ static Standing stand_still(const MildMaterial *material, double dt, double seco
                             MildSolver solver) {
     RobotSim *sim = new_sim(dt);
     robot_sim_set_solver(sim, solver, 0, 0);
-    MildGround *ground = new_ground();
+    MildGround *ground = kit_ground(robot);
     MildMaterial any = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
     RobotVariation variation = robot_variation_nominal();
@@ -98,23 +98,21 @@ static void check_balanced(const char *name, const MildMaterial *material, doubl
     }
 }
 
-static void test_stands_everywhere(void **unused) {
-    (void)unused;
+TEST(test_stands_everywhere) {
     static const double steps[] = {0.0005, 0.001, 0.0025, 0.005};
     for (int s = kit_short() ? 2 : 0; s < 4; s++) {
         check_balanced("rigid", NULL, steps[s]);
         for (int p = 0; p < mild_material_preset_count(); p++) {
-            MildMaterial material = preset(mild_material_preset_name(p));
+            MildMaterial material = kit_preset(mild_material_preset_name(p));
             check_balanced(mild_material_preset_name(p), &material, steps[s]);
         }
     }
 }
 
 /* The paper's sweeps take a step to where Newton's method takes it (few steps: sweeps are slow). */
-static void test_papers_solver(void **unused) {
-    (void)unused;
+TEST(test_papers_solver) {
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        MildMaterial material = preset(mild_material_preset_name(p));
+        MildMaterial material = kit_preset(mild_material_preset_name(p));
         double height[2];
         for (int s = 0; s < 2; s++) {
             Standing result = stand_still(&material, 0.0025, 0.0075, 1,
@@ -130,12 +128,11 @@ static void test_papers_solver(void **unused) {
 
 /* Joints held at the default pose without balance: rigid ground carries that, soft foam cannot (see
  * stand.c). */
-static void test_plain_gains(void **unused) {
-    (void)unused;
+TEST(test_plain_gains) {
     Standing rigid = stand_still(NULL, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);
     assert_true(rigid.stands);
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        MildMaterial material = preset(mild_material_preset_name(p));
+        MildMaterial material = kit_preset(mild_material_preset_name(p));
         Standing result = stand_still(&material, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);
         print_message("plain gains on %-11s %s after %.2f s\n", mild_material_preset_name(p),
                       result.stands ? "stand" : "fall", result.seconds);
@@ -145,11 +142,4 @@ static void test_plain_gains(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stands_everywhere),
-        cmocka_unit_test(test_papers_solver),
-        cmocka_unit_test(test_plain_gains),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

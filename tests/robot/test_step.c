@@ -30,12 +30,11 @@ static RobotState random_state(uint32_t index) {
 }
 
 /* Our rigid step is the engine's step, joint limits and contacts included. */
-static void test_rigid_is_the_engine(void **unused) {
-    (void)unused;
+TEST(test_rigid_is_the_engine) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation rigid = robot_variation_nominal();
     rigid.rigid = 1;
-    MildTerrain terrain = preset_terrain("sand_loose");
+    MildTerrain terrain = kit_terrain("sand_loose");
     mjModel *m = robot_sim_model(sim);
     mjData *engine = mj_makeData(m);
     double worst = 0.0;
@@ -100,8 +99,7 @@ static void dense_solve(const double *mass, double *x) {
     }
 }
 
-static void test_map_against_dense(void **unused) {
-    (void)unused;
+TEST(test_map_against_dense) {
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     double worst_a = 0.0, worst_wrench = 0.0, worst_twist = 0.0;
@@ -159,11 +157,10 @@ static void test_map_against_dense(void **unused) {
 
 /* Foot twist after a soft step = what the contact solver promised: the robot and the solver see the
  * same A and V_free. */
-static void test_twist_is_the_solvers(void **unused) {
-    (void)unused;
+TEST(test_twist_is_the_solvers) {
     RobotSim *sim = new_sim(0.001);
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     RobotVariation nominal = robot_variation_nominal();
     double worst = 0.0;
     for (uint32_t draw = 0; draw < 40; draw++) {
@@ -220,11 +217,10 @@ static void add_wrench(double wrench[6], const double *force, const double *torq
 
 /* Change of both momenta = dt (weight, push, feet), in contact and in the air. Exact at the pose of
  * the step's start and from rest: a step from there has no other terms. */
-static void test_momentum(void **unused) {
-    (void)unused;
+TEST(test_momentum) {
     RobotSim *sim = new_sim(0.0005);
-    MildTerrain terrain = preset_terrain("foam60");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("foam60");
+    MildGround *ground = kit_ground(robot);
     RobotVariation nominal = robot_variation_nominal();
     const double push[6] = {30, -20, 10, 4, -5, 6}, at_rest[SA01_NV] = {0};
     double worst[6] = {0}, largest[6] = {0};
@@ -285,18 +281,17 @@ static void advance_case(RobotSim *sim, Case *one) {
 
 /* A step depends on (state, variation, terrain, ground) only, not on what the workspace did before.
  */
-static void test_determinism(void **unused) {
-    (void)unused;
+TEST(test_determinism) {
     static const char *const names[4] = {"sand_loose", "foam45", "grass", "rubber"};
     Case shared[4], alone[4];
     RobotSim *sim = new_sim(0.001);
     for (int i = 0; i < 4; i++) {
         shared[i] = (Case){random_state((uint32_t)i), robot_variation_nominal(),
-                           preset_terrain(names[i]), new_ground()};
+                           kit_terrain(names[i]), kit_ground(robot)};
         shared[i].variation.rigid = i == 2;
         shared[i].variation.base_mass_add = i;
         alone[i] = shared[i];
-        alone[i].ground = new_ground();
+        alone[i].ground = kit_ground(robot);
     }
     for (int step = 0; step < 300; step++) {
         for (int i = 0; i < 4; i++) {
@@ -324,11 +319,10 @@ static void test_determinism(void **unused) {
     robot_sim_destroy(sim);
 }
 
-static void test_bad_numbers(void **unused) {
-    (void)unused;
+TEST(test_bad_numbers) {
     RobotSim *sim = new_sim(0.001);
-    MildTerrain terrain = preset_terrain("sand_loose");
-    MildGround *ground = new_ground();
+    MildTerrain terrain = kit_terrain("sand_loose");
+    MildGround *ground = kit_ground(robot);
     RobotVariation nominal = robot_variation_nominal();
     RobotState state = stand_state(stand, 0, 0.0);
     double torque[SA01_JOINTS] = {0};
@@ -347,10 +341,9 @@ static void test_bad_numbers(void **unused) {
     robot_sim_destroy(sim);
 }
 
-static void test_clearance_and_distances(void **unused) {
-    (void)unused;
+TEST(test_clearance_and_distances) {
     RobotSim *sim = new_sim(0.001);
-    MildTerrain terrain = preset_terrain("sand_loose");
+    MildTerrain terrain = kit_terrain("sand_loose");
     RobotVariation nominal = robot_variation_nominal();
     RobotState state = stand_state(stand, 0, 0.0);
     robot_sim_load(sim, &state, &nominal);
@@ -370,15 +363,4 @@ static void test_clearance_and_distances(void **unused) {
     robot_sim_destroy(sim);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rigid_is_the_engine),
-        cmocka_unit_test(test_map_against_dense),
-        cmocka_unit_test(test_twist_is_the_solvers),
-        cmocka_unit_test(test_momentum),
-        cmocka_unit_test(test_determinism),
-        cmocka_unit_test(test_bad_numbers),
-        cmocka_unit_test(test_clearance_and_distances),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

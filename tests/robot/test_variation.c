@@ -65,8 +65,7 @@ static void check_subtrees(const mjModel *m, const double *mass) {
     expect_entry("mass of the world", 0, m->body_subtreemass[0], total, 1e-12);
 }
 
-static void test_numbers(void **unused) {
-    (void)unused;
+TEST(test_numbers) {
     RobotSim *sim = new_sim(0.001);
     RobotSim *fresh = new_sim(0.001); /* is never varied */
     const mjModel *m = robot_sim_model(sim);
@@ -104,8 +103,7 @@ static void test_numbers(void **unused) {
 }
 
 /* The nominal variation is the file's robot: 1, 1, 0.8, nothing added, soft ground. */
-static void test_nominal(void **unused) {
-    (void)unused;
+TEST(test_nominal) {
     RobotVariation v = robot_variation_nominal();
     assert_true(v.base_mass_add == 0 && v.armature_scale == 1 && v.rigid_friction == 0.8);
     assert_true(v.rigid_time == 0);
@@ -118,10 +116,4 @@ static void test_nominal(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_nominal),
-        cmocka_unit_test(test_numbers),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -3,8 +3,7 @@
 
 #include <mujoco/mujoco.h>
 
-#include "kit.h"
-#include "robot/robot.h"
+#include "robots.h"
 
 enum { FEET = 2, JOINTS = 3, NV = 9 };
 
@@ -31,29 +30,11 @@ static const char ini[] =
 
 static Robot *robot;
 
-static void write_text(const char *path, const char *text) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    fputs(text, file);
-    fclose(file);
-}
-
 static int setup(void **unused) {
     (void)unused;
     MildError error = {0};
-    char folder[] = "robot_waist_XXXXXX", path[2][64];
-    assert_non_null(mkdtemp(folder));
-    snprintf(path[0], sizeof path[0], "%s/robot.ini", folder);
-    snprintf(path[1], sizeof path[1], "%s/waist.xml", folder);
-    write_text(path[0], ini);
-    write_text(path[1], model);
-    robot = robot_create(folder, &error);
-    remove(path[0]);
-    remove(path[1]);
-    rmdir(folder);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    robot = kit_robot_of("waist.xml", model, ini, &error);
+    expect_good(robot != NULL, &error);
     return 0;
 }
 
@@ -64,8 +45,7 @@ static int teardown(void **unused) {
 }
 
 /* The order is that of robot.ini, not of the file; the waist is nobody's leg. */
-static void joints_and_feet(void **unused) {
-    (void)unused;
+TEST(joints_and_feet) {
     static const int foot[JOINTS] = {0, -1, 1}, dof[JOINTS] = {7, 6, 8}, mirror[JOINTS] = {2, 1, 0};
     assert_int_equal(robot_joints(robot), JOINTS);
     for (int i = 0; i < JOINTS; i++) {
@@ -77,12 +57,10 @@ static void joints_and_feet(void **unused) {
 
 /* The feet's velocities after a step are those that the solver promised, at the pose before it:
  * both chains hold the waist. */
-static void twist_is_the_solvers(void **unused) {
-    (void)unused;
+TEST(twist_is_the_solvers) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
-    MildGround *ground = mild_ground_init(calloc(1, mild_ground_bytes(robot_soles(robot), FEET)),
-                                          robot_soles(robot), FEET);
+    MildGround *ground = kit_ground(robot);
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
     RobotVariation nominal = robot_variation_nominal();
@@ -113,10 +91,4 @@ static void twist_is_the_solvers(void **unused) {
     robot_sim_destroy(sim);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(joints_and_feet),
-        cmocka_unit_test(twist_is_the_solvers),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

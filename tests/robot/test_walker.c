@@ -7,8 +7,8 @@
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"
-#include "kit.h"
 #include "robot/sim.h"
+#include "robots.h"
 
 enum { JOINTS = 7, NQ = 14, NV = 13, FEET = 2, FLAT = 0, ROUND = 1, ROWS = 12 };
 
@@ -62,13 +62,6 @@ static char folder[] = "/tmp/mild_walker_XXXXXX";
 static char xml_path[64], ini_path[64];
 static Robot *robot;
 
-static void write_text(const char *path, const char *text) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    fputs(text, file);
-    assert_int_equal(fclose(file), 0);
-}
-
 static int setup(void **unused) {
     (void)unused;
     MildError error = {0};
@@ -77,12 +70,10 @@ static int setup(void **unused) {
     }
     snprintf(xml_path, sizeof xml_path, "%s/walker.xml", folder);
     snprintf(ini_path, sizeof ini_path, "%s/robot.ini", folder);
-    write_text(xml_path, mjcf);
-    write_text(ini_path, ini);
+    kit_write_text(xml_path, mjcf);
+    kit_write_text(ini_path, ini);
     robot = robot_create(folder, &error);
-    if (!robot || error.text[0]) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot && !error.text[0], &error);
     return 0;
 }
 
@@ -96,8 +87,7 @@ static int teardown(void **unused) {
 
 /* ---- what is known of it ---- */
 
-static void test_names(void **unused) {
-    (void)unused;
+TEST(test_names) {
     assert_string_equal(robot_name(robot), "walker");
     assert_string_equal(robot_source(robot), "");
     assert_string_equal(robot_model_path(robot), xml_path);
@@ -107,8 +97,7 @@ static void test_names(void **unused) {
     assert_string_equal(robot_foot_name(robot, ROUND), "ball");
 }
 
-static void test_joints(void **unused) {
-    (void)unused;
+TEST(test_joints) {
     const int foot[JOINTS] = {-1, ROUND, ROUND, FLAT, FLAT, FLAT, -1};
     const int image[JOINTS] = {0, 4, 5, 3, 1, 2, 6};
     const double sign[JOINTS] = {-1, 1, 1, 1, 1, 1, -1};
@@ -134,8 +123,7 @@ static void test_joints(void **unused) {
     }
 }
 
-static void test_feet_and_body(void **unused) {
-    (void)unused;
+TEST(test_feet_and_body) {
     for (int f = 0; f < FEET; f++) {
         expect_entry("offset", f, robot_table(robot)->gait_offset[f], f ? 0.6 : 0.1, 0);
         expect_entry("feet_range", f, robot_table(robot)->feet_range[f], f ? 0.3 : 0.1, 0);
@@ -157,8 +145,7 @@ static void test_feet_and_body(void **unused) {
 
 /* Base above the lower of the soles in the default pose: the flat one hangs 0.1 + 0.3 cos 0.2 twice
  * + 0.05 below; the ball's leg is bent by 0.25 each way, its centre off the shank's line. */
-static void test_stand_height(void **unused) {
-    (void)unused;
+TEST(test_stand_height) {
     double flat = 0.1 + 0.6 * cos(0.2) + 0.05;
     double ball = 0.1 + 0.6 * cos(0.25) + 0.03 * cos(0.25) + 0.01 * sin(0.25) + 0.04;
     expect_entry("stand height", 0, robot_stand_height(robot), fmax(flat, ball), 1e-12);
@@ -176,8 +163,7 @@ static void test_stand_height(void **unused) {
 }
 
 /* A round foot is a disc of the sphere's cross section; rasters whatever the model. */
-static void test_soles(void **unused) {
-    (void)unused;
+TEST(test_soles) {
     const MildSole *const *soles = robot_soles(robot), *const *rasters = robot_rasters(robot);
     assert_ptr_equal(soles[0], rasters[0]);
     assert_true(mild_sole_elements(soles[FLAT]) > 30);
@@ -224,8 +210,7 @@ static void check_rigid_ground(const mjModel *m) {
 }
 
 /* What a step does not need is not in its model: one plane and the feet's corners remain. */
-static void test_models(void **unused) {
-    (void)unused;
+TEST(test_models) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
     const mjModel *m = robot_sim_model(sim), *whole = robot_visual_model(robot);
@@ -324,8 +309,7 @@ static double measure_flat(const mjData *d, const double point[3], double middle
     return lowest;
 }
 
-static void test_feet(void **unused) {
-    (void)unused;
+TEST(test_feet) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
     RobotVariation nominal = robot_variation_nominal();
@@ -399,8 +383,7 @@ static void check_wrench(const RobotSim *sim, const mjData *d, const double *j,
     }
 }
 
-static void test_map(void **unused) {
-    (void)unused;
+TEST(test_map) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
     RobotVariation nominal = robot_variation_nominal();
@@ -434,8 +417,7 @@ static void step_is_the_engines(int rigid, double height, int steps) {
     variation.rigid = rigid;
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), FEET));
-    MildGround *ground = mild_ground_init(block, robot_soles(robot), FEET);
+    MildGround *ground = kit_ground(robot);
     const mjModel *m = robot_sim_model(sim);
     double worst = 0;
     int contacts[FEET] = {0};
@@ -470,26 +452,23 @@ static void step_is_the_engines(int rigid, double height, int steps) {
                   rigid ? "rigid" : "soft, in the air", worst, contacts[0], contacts[1]);
     assert_true(worst < 1e-9);
     assert_true(rigid ? contacts[0] > 20 && contacts[1] > 20 : contacts[0] + contacts[1] == 0);
-    free(block);
+    free(ground);
     robot_sim_destroy(sim);
 }
 
-static void test_steps(void **unused) {
-    (void)unused;
+TEST(test_steps) {
     step_is_the_engines(0, 0.5, 100);
     step_is_the_engines(1, 0.01, 300);
 }
 
 /* From rest on soft ground: the joints take what the feet report, dt M^-1 (J^T w - b). */
-static void test_soft_landing(void **unused) {
-    (void)unused;
+TEST(test_soft_landing) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.0005, &error);
     RobotVariation nominal = robot_variation_nominal();
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), FEET));
-    MildGround *ground = mild_ground_init(block, robot_soles(robot), FEET);
+    MildGround *ground = kit_ground(robot);
     const mjModel *m = robot_sim_model(sim);
     int loaded[FEET] = {0};
     for (uint32_t draw = 0; draw < 12; draw++) {
@@ -528,7 +507,7 @@ static void test_soft_landing(void **unused) {
     }
     print_message("soft: feet loaded in %d and %d of 12 landings\n", loaded[0], loaded[1]);
     assert_true(loaded[0] > 2 && loaded[1] > 2);
-    free(block);
+    free(ground);
     robot_sim_destroy(sim);
 }
 
@@ -548,8 +527,7 @@ static double lowest_of(const mjModel *m, const mjData *d, const char *name, dou
     return at[2] - fabs(turn[6]) * size[0] - fabs(turn[7]) * size[1] - fabs(turn[8]) * size[2];
 }
 
-static void test_shells(void **unused) {
-    (void)unused;
+TEST(test_shells) {
     static const char *const names[3] = {"chest", "belt", "bone"};
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
@@ -603,8 +581,7 @@ static void expect_spoilt(double *number, const char *names) {
 }
 
 /* Numbers of the file that no body or joint has. */
-static void test_other_numbers(void **unused) {
-    (void)unused;
+TEST(test_other_numbers) {
     mjModel *m = robot->visual;
     assert_true(m->nnumeric == 2 && m->nkey == 2);
     assert_int_equal(robot_check_model(m, "x.xml", NULL), MILD_OK);
@@ -621,11 +598,11 @@ static void write_edited(const char *path, const char *text, const char *from, c
     char edited[8192];
     const char *at = from ? strstr(text, from) : NULL;
     if (!at) {
-        write_text(path, text);
+        kit_write_text(path, text);
         return;
     }
     snprintf(edited, sizeof edited, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from));
-    write_text(path, edited);
+    kit_write_text(path, edited);
 }
 
 /* With `from` written as `to` in one of the two texts: an error of that status; MILD_OK:
@@ -646,8 +623,7 @@ static void try_robot(const char *from, const char *to, MildStatus status, const
     robot_destroy(made);
 }
 
-static void test_refused(void **unused) {
-    (void)unused;
+TEST(test_refused) {
     try_robot("<freejoint/>", "<joint axis='0 0 1'/>", MILD_ERROR_FORMAT, "walker.xml torso");
     try_robot("base = torso", "base = pelvis", MILD_ERROR_FORMAT, "walker.xml pelvis");
     try_robot("base = torso", "base = chest", MILD_ERROR_FORMAT, "walker.xml chest [robot] base");
@@ -679,8 +655,7 @@ static void test_refused(void **unused) {
               MILD_ERROR_FORMAT, "walker.xml neck [joints] names");
 }
 
-static void test_numbers_refused(void **unused) {
-    (void)unused;
+TEST(test_numbers_refused) {
     try_robot("range='-2 2' ", "", MILD_ERROR_FORMAT,
               "walker.xml range actuatorfrcrange [joints] effort");
     try_robot("<default><joint actuatorfrcrange='-50 50'", "<default><joint", MILD_ERROR_FORMAT,
@@ -700,8 +675,7 @@ static void test_numbers_refused(void **unused) {
     try_robot("pitch = 0.02", "pitch = 0.5", MILD_ERROR_RANGE, "robot.ini [foot.flat] sole.pitch");
 }
 
-static void test_unsupported(void **unused) {
-    (void)unused;
+TEST(test_unsupported) {
     try_robot("</worldbody>",
               "</worldbody><equality><joint joint1='hip_l' joint2='hip_r'/></equality>",
               MILD_ERROR_FORMAT, "walker.xml equality");
@@ -723,16 +697,4 @@ static void test_unsupported(void **unused) {
     try_robot("axis='1 0 0'", "axis='0 0 0'", MILD_ERROR_FORMAT, "walker.xml neck");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_names),         cmocka_unit_test(test_joints),
-        cmocka_unit_test(test_feet_and_body), cmocka_unit_test(test_stand_height),
-        cmocka_unit_test(test_soles),         cmocka_unit_test(test_models),
-        cmocka_unit_test(test_feet),          cmocka_unit_test(test_map),
-        cmocka_unit_test(test_steps),         cmocka_unit_test(test_soft_landing),
-        cmocka_unit_test(test_shells),        cmocka_unit_test(test_other_numbers),
-        cmocka_unit_test(test_refused),       cmocka_unit_test(test_numbers_refused),
-        cmocka_unit_test(test_unsupported),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

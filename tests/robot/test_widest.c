@@ -19,9 +19,7 @@ static int open_widest(void **unused) {
     MildError error = {0};
     robot = widest_open(&error);
     sim = robot ? robot_sim_create(robot, 0.001, &error) : NULL;
-    if (!sim) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(sim != NULL, &error);
     return 0;
 }
 
@@ -46,8 +44,7 @@ static RobotState draw_state(uint32_t draw) {
     return state;
 }
 
-static void test_numbers(void **unused) {
-    (void)unused;
+TEST(test_numbers) {
     assert_int_equal(robot_joints(robot), JOINTS);
     assert_int_equal(robot_feet(robot), LEGS);
     for (int i = 0; i < JOINTS; i++) {
@@ -70,8 +67,7 @@ static void test_numbers(void **unused) {
 }
 
 /* Least of both mirrored pairs: feet, then knees, left less right along the base's left. */
-static void test_distances(void **unused) {
-    (void)unused;
+TEST(test_distances) {
     RobotVariation nominal = robot_variation_nominal();
     const mjData *d = robot_sim_data(sim);
     const mjModel *m = robot_sim_model(sim);
@@ -106,8 +102,7 @@ static void test_distances(void **unused) {
 }
 
 /* A = J M^-1 J^T of four balls on four chains, and the chains' common base. */
-static void test_map(void **unused) {
-    (void)unused;
+TEST(test_map) {
     RobotVariation nominal = robot_variation_nominal();
     const mjModel *m = robot_sim_model(sim);
     mjData *d = robot_sim_data(sim);
@@ -135,12 +130,10 @@ static void test_map(void **unused) {
     assert_true(worst < 1e-10);
 }
 
-static void test_step(void **unused) {
-    (void)unused;
+TEST(test_step) {
     RobotVariation nominal = robot_variation_nominal();
-    MildTerrain terrain = preset_terrain("grass");
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), LEGS));
-    MildGround *ground = mild_ground_init(block, robot_soles(robot), LEGS);
+    MildTerrain terrain = kit_terrain("grass");
+    MildGround *ground = kit_ground(robot);
     const mjModel *m = robot_sim_model(sim);
     double worst = 0;
     for (uint32_t draw = 0; draw < 5; draw++) {
@@ -165,15 +158,7 @@ static void test_step(void **unused) {
     }
     print_message("twenty steps in the air against mj_step: worst %.1e\n", worst);
     assert_true(worst < 1e-9);
-    free(block);
+    free(ground);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_numbers),
-        cmocka_unit_test(test_distances),
-        cmocka_unit_test(test_map),
-        cmocka_unit_test(test_step),
-    };
-    return cmocka_run_group_tests(tests, open_widest, close_widest);
-}
+TEST_MAIN(open_widest, close_widest)

@@ -3,8 +3,9 @@
 #include <unistd.h>
 
 #include "base/random.h"
+#include "files.h"
 #include "ground/soil/soil.h"
-#include "kit.h"
+#include "materials.h"
 
 /* A soil of bekker as a plate owner writes it. */
 #define HAND                                                                                       \
@@ -16,15 +17,12 @@ static MildMaterial parsed(const char *text) {
     MildMaterial material;
     MildError error = {0};
     memset(&material, 0, sizeof material);
-    if (soil_parse(text, "mars.ini", &material, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(soil_parse(text, "mars.ini", &material, &error) == MILD_OK, &error);
     return material;
 }
 
 /* What a terminal would obey does not get into a file. */
-static void test_remarks(void **state) {
-    (void)state;
+TEST(test_remarks) {
     const MildMaterial m = mild_material_default();
     const char *notes[64] = {"a\tb", "\x1b[31mred\r"};
     const SoilNotes remarks = {"mild fit \x1b]0;x\x07.csv", notes};
@@ -60,16 +58,14 @@ static void same(const MildMaterial *a, const MildMaterial *b) {
     }
 }
 
-static void test_hand(void **state) {
-    (void)state;
+TEST(test_hand) {
     const MildMaterial m = parsed(HAND);
     assert_int_equal(m.model, MILD_MODEL_BEKKER);
     assert_true(m.exponent == 0.8 && m.k_c == 5790 && m.k_phi == 180000 && m.cohesion == 150);
     assert_true(m.mu == 0.62 && m.shear_length == 0.018 && m.recovery == 0.05);
     assert_true(m.plate_width == 0 && m.refill == 0); /* left out: off */
     const MildMaterial bom = parsed("\xef\xbb\xbf; x\r\n  [ground]\r\n preset = clay \r\n mu=0.3");
-    MildMaterial clay;
-    assert_true(mild_material_preset("clay", &clay));
+    MildMaterial clay = kit_preset("clay");
     assert_true(bom.mu == 0.3 && bom.k_c == clay.k_c && bom.model == MILD_MODEL_BEKKER);
     const MildMaterial plain = parsed("[ground]\npreset = foam45");
     assert_true(mild_material_preset("foam45", &clay));
@@ -93,8 +89,7 @@ static void draw(Random *random, MildMaterial *m) {
     m->plate_width = m->plate_width < 0.02 ? 0 : m->plate_width;
 }
 
-static void test_round_trip(void **state) {
-    (void)state;
+TEST(test_round_trip) {
     Random random = random_at(1, 2, 3);
     for (int n = 0; n < 2000; n++) {
         MildMaterial m;
@@ -110,8 +105,7 @@ static void test_round_trip(void **state) {
     }
 }
 
-static void test_files(void **state) {
-    (void)state;
+TEST(test_files) {
     char folder[] = "/tmp/mild_soil_XXXXXX", path[64], text[] = "x.txt";
     MildMaterial clay, read;
     MildError error = {0};
@@ -128,16 +122,12 @@ static void test_files(void **state) {
     assert_true(read.mu == 1.0 / 3);
     assert_int_equal(soil_write(&read, NULL, text, &error), MILD_ERROR_ARGUMENT);
     assert_error(&error, MILD_ERROR_ARGUMENT, "x.txt .ini");
-    FILE *file = fopen(path, "wb");
-    fwrite("[ground]\0", 1, 9, file);
-    fclose(file);
+    kit_write(path, "[ground]", 9); /* with its zero */
     assert_int_equal(soil_find(path, &read, &error), MILD_ERROR_FORMAT);
     assert_error(&error, MILD_ERROR_FORMAT, path);
-    file = fopen(path, "wb");
-    for (int i = 0; i <= SOIL_BYTES_MAX; i++) {
-        fputc('\n', file);
-    }
-    fclose(file);
+    static char long_file[SOIL_BYTES_MAX + 1];
+    memset(long_file, '\n', sizeof long_file);
+    kit_write(path, long_file, sizeof long_file);
     assert_int_not_equal(soil_find(path, &read, &error), MILD_OK);
     unlink(path);
     assert_int_equal(soil_find(path, &read, &error), MILD_ERROR_IO);
@@ -146,8 +136,7 @@ static void test_files(void **state) {
     rmdir(folder);
 }
 
-static void test_names(void **state) {
-    (void)state;
+TEST(test_names) {
     MildMaterial m;
     MildError error = {0};
     assert_true(soil_is_file("a.ini") && soil_is_file("./x/a.ini"));
@@ -160,8 +149,7 @@ static void test_names(void **state) {
     assert_error(&error, MILD_ERROR_ARGUMENT, "rigid");
 }
 
-static void test_mistakes(void **state) {
-    (void)state;
+TEST(test_mistakes) {
     refused("", MILD_ERROR_FORMAT, "mars.ini [ground]");
     refused("# remark\n\nmu = 1", MILD_ERROR_FORMAT, "mars.ini:3 [ground]");
     refused("[soil]", MILD_ERROR_FORMAT, "mars.ini:1 [soil] [ground]");
@@ -193,8 +181,7 @@ static void test_mistakes(void **state) {
 }
 
 /* Every line of HAND is needed, but for remarks: a file that lost one is refused. */
-static void test_lost_lines(void **state) {
-    (void)state;
+TEST(test_lost_lines) {
     static const char *const keys[] = {"exponent",     "k_c",     "k_phi",   "cohesion", "mu",
                                        "shear_length", "k_drift", "b_drift", "bed_depth"};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
@@ -207,12 +194,4 @@ static void test_lost_lines(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_hand),     cmocka_unit_test(test_round_trip),
-        cmocka_unit_test(test_files),    cmocka_unit_test(test_names),
-        cmocka_unit_test(test_mistakes), cmocka_unit_test(test_lost_lines),
-        cmocka_unit_test(test_remarks),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -103,4 +103,14 @@ static inline RobotFoot *oracle_set_force(RobotSim *sim, int foot, double x, dou
     return feet;
 }
 
+/* In the air, turned, bent and moving, above ground at z = 0.05. */
+static inline Oracle rig_place(Rig *rig, uint32_t draw) {
+    RobotState state = kit_moving_state(1.2, draw);
+    task_env_set_state(rig->env, &state);
+    task_env_rest(rig->env)->terrain.height = 0.05;
+    kit_load(rig->sim, &state, rig->env);
+    robot_sim_sole_clearance(rig->sim, task_env_terrain(rig->env));
+    return oracle_of(rig->sim);
+}
+
 #endif

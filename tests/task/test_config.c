@@ -101,8 +101,7 @@ static void check_section(const char *section, const MildField *fields, int coun
     assert_true(ranges >= count / 2);
 }
 
-static void defaults(void **unused) {
-    (void)unused;
+TEST(defaults) {
     ini = fopen(MILD_SOURCE_DIR "/configs/default.ini", "r");
     assert_non_null(ini);
     TaskDef def = task_def_default();
@@ -117,8 +116,7 @@ static void defaults(void **unused) {
 }
 
 /* A path fits as long as the struct has room; a longer one is refused. */
-static void paths_of_pictures(void **unused) {
-    (void)unused;
+TEST(paths_of_pictures) {
     int count;
     const MildField *fields = terrain_fields(&count);
     TerrainDef def = terrain_def_default();
@@ -153,8 +151,7 @@ static const struct {
 
 /* Those keys have no effect, all others their defaults: noise, latencies and the start are
  * drawn. */
-static void nominal(void **unused) {
-    (void)unused;
+TEST(nominal) {
     TaskDef plain = task_def_default();
     TaskDef def = plain;
     task_def_make_nominal(&def);
@@ -194,8 +191,7 @@ static void expect_refused(const TaskDef *def, const char *names) {
     assert_error(&error, MILD_ERROR_RANGE, names);
 }
 
-static void refused(void **unused) {
-    (void)unused;
+TEST(refused) {
     MildError error = {0};
     TaskDef def = task_def_default();
     assert_int_equal(task_def_check(&def, &error), MILD_OK);
@@ -223,8 +219,7 @@ static void refused(void **unused) {
 }
 
 /* The robot's gains; one for all; one leg's for both; a joint's each. */
-static void gains(void **unused) {
-    (void)unused;
+TEST(gains) {
     static const struct {
         const char *text;
         double first, knee, right_knee, last;
@@ -259,8 +254,7 @@ static void gains(void **unused) {
 }
 
 /* A share of the effort: the same for all joints, or a leg's. */
-static void torque_limits(void **unused) {
-    (void)unused;
+TEST(torque_limits) {
     TaskDef def = task_def_default();
     TaskGains own;
     assert_int_equal(task_gains(&def, robot, &own, NULL), MILD_OK);
@@ -281,8 +275,7 @@ static void torque_limits(void **unused) {
 }
 
 /* 0 takes the robot's; another number is the task's. */
-static void robot_or_task(void **unused) {
-    (void)unused;
+TEST(robot_or_task) {
     TaskDef def = task_def_default();
     expect_near("action scale", task_action_scale(&def, robot_table(robot)), 0.5, 0);
     expect_near("height", task_nominal_height(&def, robot_table(robot)), 0.83, 0);
@@ -293,8 +286,7 @@ static void robot_or_task(void **unused) {
 }
 
 /* Half, a quarter, a tenth and a twentieth of the policy step fit; nothing between. */
-static void physics_steps(void **unused) {
-    (void)unused;
+TEST(physics_steps) {
     const double fits[] = {0.005, 0.0025, 0.002, 0.001, 0.0005}, no[] = {0.004, 0.0015, 0.0024};
     TaskDef def = task_def_default();
     for (int i = 0; i < 5; i++) {
@@ -307,12 +299,4 @@ static void physics_steps(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(defaults),      cmocka_unit_test(paths_of_pictures),
-        cmocka_unit_test(nominal),       cmocka_unit_test(refused),
-        cmocka_unit_test(gains),         cmocka_unit_test(physics_steps),
-        cmocka_unit_test(robot_or_task), cmocka_unit_test(torque_limits),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

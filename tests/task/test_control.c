@@ -84,8 +84,7 @@ static double wanted_torque(int i, const double *pose, double action, int k) {
 }
 
 /* The torques of a drive take the place of the PD's at every physics step, within the limits. */
-static void drive(void **unused) {
-    (void)unused;
+TEST(drive) {
     open_with_dt(0.0025);
     int calls = 0;
     const TaskDrive asked = {ask_torque, &calls};
@@ -105,8 +104,7 @@ static void drive(void **unused) {
 
 /* Gains, strengths and offsets of every joint apart; some torques at their limits of 119 and 20.4
  * N m. */
-static void torque(void **unused) {
-    (void)unused;
+TEST(torque) {
     open_with_dt(0.0025);
     int clipped = 0;
     for (uint32_t draw = 0; draw < 10; draw++) {
@@ -151,8 +149,7 @@ static void ask_for_error(const void *self, void *state, const double *error, co
 
 /* The motors of the task take the place of the PD: times the strength, within the limits, with the
  * command's latency; held they are asked all the same; a new episode begins with a state of 0. */
-static void motors(void **unused) {
-    (void)unused;
+TEST(motors) {
     const TaskActuator asked = {&rig, 64, ask_for_error};
     TaskDef def = kit_quiet_def();
     def.motors = &asked;
@@ -190,8 +187,7 @@ static void motors(void **unused) {
 }
 
 /* +-8; what is no number becomes -8. The two actions before are kept. */
-static void action_is_clipped(void **unused) {
-    (void)unused;
+TEST(action_is_clipped) {
     open_with_dt(0.0025);
     float action[SA01_JOINTS] = {9, -9, NAN, 7.5f, -7.5f, INFINITY};
     const float wanted[6] = {8, -8, -8, 7.5f, -7.5f, 8};
@@ -274,8 +270,7 @@ static void held_torque(double dt, int steps) {
     }
 }
 
-static void torque_is_held(void **unused) {
-    (void)unused;
+TEST(torque_is_held) {
     held_torque(0.005, 2);
     held_torque(0.0025, 4);
     held_torque(0.001, 10);
@@ -321,8 +316,7 @@ static void reading_latencies(double dt, int steps) {
     rig_close(&rig);
 }
 
-static void latencies(void **unused) {
-    (void)unused;
+TEST(latencies) {
     command_latency(0.0025, 4);
     command_latency(0.001, 10);
     command_latency(0.0005, 20);
@@ -332,8 +326,7 @@ static void latencies(void **unused) {
 }
 
 /* Redrawn every 8 s; the policy sees it one policy step after it is in force. */
-static void command_is_seen_late(void **unused) {
-    (void)unused;
+TEST(command_is_seen_late) {
     open_with_dt(0.0025);
     rig.env->command_frozen = 0;
     rig.def.command_interval = 0.05;
@@ -355,8 +348,7 @@ static void command_is_seen_late(void **unused) {
 }
 
 /* 0.125 s are 12.5 policy steps: 13, for the command, the push and the end of an episode. */
-static void intervals_are_rounded(void **unused) {
-    (void)unused;
+TEST(intervals_are_rounded) {
     TaskDef def = kit_quiet_def();
     def.episode = 0.125;
     rig_open(&rig, &def, 3, 0);
@@ -381,8 +373,7 @@ static void intervals_are_rounded(void **unused) {
 }
 
 /* A command that eval and play have set stays. */
-static void frozen_command(void **unused) {
-    (void)unused;
+TEST(frozen_command) {
     open_with_dt(0.0025);
     rig.def.command_interval = 0.02;
     for (int t = 0; t < 6; t++) {
@@ -393,8 +384,7 @@ static void frozen_command(void **unused) {
 }
 
 /* 0.01 s of a period of 0.8 s is 1/80. */
-static void clock_runs(void **unused) {
-    (void)unused;
+TEST(clock_runs) {
     open_with_dt(0.0025);
     rig.env->phase = 0.503;
     for (int t = 1; t <= 100; t++) {
@@ -423,8 +413,7 @@ static void clock_runs(void **unused) {
 }
 
 /* A phase and a state of the step's end: the reward's clock is that of the action. */
-static void reward_follows_the_clock_of_the_action(void **unused) {
-    (void)unused;
+TEST(reward_follows_the_clock_of_the_action) {
     open_with_dt(0.0025);
     RobotState state = kit_state(2);
     put(&state); /* in the air: no contact; left scheduled to stand, right to swing */
@@ -440,8 +429,7 @@ static void reward_follows_the_clock_of_the_action(void **unused) {
 }
 
 /* The torque of the last physics step is the one that the reward sees. */
-static void reward_sees_the_torque(void **unused) {
-    (void)unused;
+TEST(reward_sees_the_torque) {
     open_with_dt(0.0025);
     RobotState state = kit_moving_state(2, 5);
     put(&state);
@@ -458,8 +446,7 @@ static void reward_sees_the_torque(void **unused) {
 }
 
 /* The sweeps and the fast solver are the user's choice, with the task's tolerance. */
-static void solver_follows_the_keys(void **unused) {
-    (void)unused;
+TEST(solver_follows_the_keys) {
     open_with_dt(0.0025);
     for (int newton = 0; newton < 2; newton++) {
         rig.def.solver = newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL;
@@ -474,21 +461,4 @@ static void solver_follows_the_keys(void **unused) {
     rig_close(&rig);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(torque),
-        cmocka_unit_test(drive),
-        cmocka_unit_test(motors),
-        cmocka_unit_test(action_is_clipped),
-        cmocka_unit_test(torque_is_held),
-        cmocka_unit_test(latencies),
-        cmocka_unit_test(command_is_seen_late),
-        cmocka_unit_test(intervals_are_rounded),
-        cmocka_unit_test(frozen_command),
-        cmocka_unit_test(clock_runs),
-        cmocka_unit_test(reward_follows_the_clock_of_the_action),
-        cmocka_unit_test(reward_sees_the_torque),
-        cmocka_unit_test(solver_follows_the_keys),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

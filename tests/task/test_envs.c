@@ -90,8 +90,7 @@ static void expect_row(int e, const Rig *alone) {
     }
 }
 
-static void each_is_as_alone(void **unused) {
-    (void)unused;
+TEST(each_is_as_alone) {
     TaskDef def = task_def_default();
     def.episode = 0.1; /* ends while we look: the next episode begins by itself */
     open_many(&def, 2);
@@ -127,8 +126,7 @@ static void each_is_as_alone(void **unused) {
 }
 
 /* Any pointer of the view may be missing. */
-static void views_may_be_missing(void **unused) {
-    (void)unused;
+TEST(views_may_be_missing) {
     TaskDef def = task_def_default();
     for (int missing = 0; missing <= 4; missing++) {
         open_many(&def, 1);
@@ -193,8 +191,7 @@ static void account_alone(const TaskDef *def, int e, int steps, Account *sum) {
     rig_close(&alone);
 }
 
-static void statistics(void **unused) {
-    (void)unused;
+TEST(statistics) {
     enum { STEPS = 25 };
     TaskDef def = task_def_default();
     def.episode = 0.1;
@@ -242,8 +239,7 @@ static void statistics(void **unused) {
 
 /* An episode that ends at its first step of all lives 10 ms, one that never lived divides
  * nothing. */
-static void an_episode_of_one_step(void **unused) {
-    (void)unused;
+TEST(an_episode_of_one_step) {
     TaskDef def = kit_quiet_def();
     open_many(&def, 1);
     TaskEnv *env = env_of(4);
@@ -266,8 +262,7 @@ static void an_episode_of_one_step(void **unused) {
 /* ---- times, bytes, hash ---- */
 
 /* The ground is a part of physics, physics a part of what two threads worked; taken once. */
-static void times(void **unused) {
-    (void)unused;
+TEST(times) {
     TaskDef def = kit_quiet_def();
     open_many(&def, 2);
     double physics, ground;
@@ -284,8 +279,7 @@ static void times(void **unused) {
     close_many();
 }
 
-static void bytes(void **unused) {
-    (void)unused;
+TEST(bytes) {
     TaskDef def = kit_quiet_def();
     open_many(&def, 1);
     size_t size;
@@ -304,8 +298,7 @@ static uint64_t fnv(uint64_t hash, const void *data, size_t size) {
     return hash;
 }
 
-static void hash(void **unused) {
-    (void)unused;
+TEST(hash) {
     assert_true(fnv(14695981039346656037u, "foobar", 6) == 0x85944171f73967e8u); /* its authors' */
     TaskDef def = kit_quiet_def();
     open_many(&def, 1);
@@ -327,8 +320,7 @@ static void hash(void **unused) {
 }
 
 /* What is opened and closed again leaves the heap as it was. */
-static void nothing_is_lost(void **unused) {
-    (void)unused;
+TEST(nothing_is_lost) {
     TaskDef def = kit_quiet_def();
     size_t used[4];
     for (int i = 0; i < 4; i++) {
@@ -344,8 +336,7 @@ static void nothing_is_lost(void **unused) {
 
 /* ---- refusals ---- */
 
-static void refused(void **unused) {
-    (void)unused;
+TEST(refused) {
     MildError error = {0};
     Pool *pool = pool_create(1);
     TaskDef def = task_def_default();
@@ -357,8 +348,7 @@ static void refused(void **unused) {
 }
 
 /* Environments that are a part of more: the number selects the random numbers. */
-static void numbered_from(void **unused) {
-    (void)unused;
+TEST(numbered_from) {
     const TaskDef def = task_def_default();
     open_from(&def, 2, 70);
     for (int e = 0; e < ENVS; e++) {
@@ -372,8 +362,7 @@ static void numbered_from(void **unused) {
 }
 
 /* The means of two groups of robots together. */
-static void statistics_of_two(void **unused) {
-    (void)unused;
+TEST(statistics_of_two) {
     EnvsStats stats = {.episodes = 3 + 1, .falls = 2, .steps = 50, .assist = 1.5 + 0.5};
     stats.length = 6 + 2;
     stats.reward = 30 + 10;
@@ -390,19 +379,4 @@ static void statistics_of_two(void **unused) {
     expect_near("term", stats.terms[1], 0.5, 1e-15);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(refused),
-        cmocka_unit_test(bytes),
-        cmocka_unit_test(hash),
-        cmocka_unit_test(an_episode_of_one_step),
-        cmocka_unit_test(times),
-        cmocka_unit_test(nothing_is_lost),
-        cmocka_unit_test(views_may_be_missing),
-        cmocka_unit_test(statistics),
-        cmocka_unit_test(each_is_as_alone),
-        cmocka_unit_test(numbered_from),
-        cmocka_unit_test(statistics_of_two),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

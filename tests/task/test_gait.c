@@ -2,8 +2,7 @@
 #include "sa01.h"
 #include "task_kit.h"
 
-static void standing_commands(void **unused) {
-    (void)unused;
+TEST(standing_commands) {
     TaskDef def = task_def_default();
     const double none[3] = {0}, small[3] = {0.0999, -0.0999, 0.0999};
     assert_true(task_is_standing(&def, none));
@@ -23,8 +22,7 @@ static void standing_commands(void **unused) {
 }
 
 /* T = 0.8 (1 + 0.5 (1 - v/1.2)) s by hand, below 1.2 m/s and above. */
-static void slow_clock(void **unused) {
-    (void)unused;
+TEST(slow_clock) {
     const struct {
         double command[3], period;
     } rows[] = {{{0, 0, 0}, 1.2},        {{0.3, 0, 0}, 1.1},  {{-0.6, 0, 0}, 1.0},
@@ -45,8 +43,7 @@ static void slow_clock(void **unused) {
 }
 
 /* Left stands in the first half of the period, right in the second. */
-static void schedule(void **unused) {
-    (void)unused;
+TEST(schedule) {
     const double first[] = {0, 0.01, 0.25, 0.4999}, second[] = {0.5, 0.51, 0.75, 0.9999};
     for (int i = 0; i < 4; i++) {
         assert_true(task_gait_stance(robot_table(robot), first[i], 0, SA01_LEFT));
@@ -61,8 +58,7 @@ static void schedule(void **unused) {
 }
 
 /* 0.1 sin(pi s): s = 0.1, 0.2, 0.5 of the swing. */
-static void wanted_height(void **unused) {
-    (void)unused;
+TEST(wanted_height) {
     TaskDef def = task_def_default();
     const double s[] = {0.1, 0.2, 0.5, 0.9},
                  wanted[] = {0.0309016994, 0.0587785252, 0.1, 0.0309016994};
@@ -103,8 +99,7 @@ static void expect_reference(const TaskDef *def, double phase, int standing, int
     }
 }
 
-static void reference(void **unused) {
-    (void)unused;
+TEST(reference) {
     TaskDef def = task_def_default();
     expect_reference(&def, 0.25, 0, 1, 0.4);
     expect_reference(&def, 0.75, 0, 0, 0.4);
@@ -121,11 +116,4 @@ static void reference(void **unused) {
     expect_reference(&def, 1.0 / 12, 0, 1, 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(standing_commands), cmocka_unit_test(slow_clock),
-        cmocka_unit_test(schedule),          cmocka_unit_test(wanted_height),
-        cmocka_unit_test(reference),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

@@ -1,7 +1,7 @@
 /* The task on a robot with four round feet: widths, and the mirror image. */
 #include "base/random.h"
 #include "env/task/task.h"
-#include "kit.h"
+#include "robots.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
 
@@ -28,10 +28,7 @@ static const double joint_sign[3] = {-1, 1, 1};
 static int setup(void **unused) {
     (void)unused;
     MildError error = {0};
-    robot = robot_create(GO1, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    robot = kit_robot(GO1);
     def = task_def_default();
     task_def_make_nominal(&def);
     def.observe_noise = 0;
@@ -57,8 +54,7 @@ static int teardown(void **unused) {
     return 0;
 }
 
-static void widths(void **unused) {
-    (void)unused;
+TEST(widths) {
     TaskShape shape = task_shape(robot);
     assert_int_equal(shape.observation, OBSERVATION);
     assert_int_equal(shape.estimates, ESTIMATES);
@@ -116,8 +112,7 @@ static void look_at(const RobotState *state, double side, double phase, const fl
 }
 
 /* The frame of the mirrored robot is the mirrored frame, and the estimates' feet change sides. */
-static void mirror_image(void **unused) {
-    (void)unused;
+TEST(mirror_image) {
     const TaskMirror mirror = task_mirror(robot);
     static const int other_foot[FEET] = {1, 0, 3, 2};
     for (uint32_t draw = 0; draw < 10; draw++) {
@@ -153,8 +148,7 @@ static void mirror_image(void **unused) {
 }
 
 /* A trot: in each half of the gait one diagonal stands. */
-static void diagonals_stand_together(void **unused) {
-    (void)unused;
+TEST(diagonals_stand_together) {
     for (int half = 0; half < 2; half++) {
         for (int f = 0; f < FEET; f++) {
             int diagonal = f == 0 || f == 3; /* front left and rear right */
@@ -166,8 +160,7 @@ static void diagonals_stand_together(void **unused) {
 }
 
 /* The reference motion shortens the swinging legs: both rear the foot towards the base. */
-static void the_swing_lifts(void **unused) {
-    (void)unused;
+TEST(the_swing_lifts) {
     RobotState state = {.qpos = {0, 0, 1, 1, 0, 0, 0}};
     for (int i = 0; i < robot_joints(robot); i++) {
         state.qpos[7 + i] = task_gait_reference(&def, robot_table(robot), 0.25, 0, i);
@@ -184,12 +177,4 @@ static void the_swing_lifts(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(widths),
-        cmocka_unit_test(mirror_image),
-        cmocka_unit_test(diagonals_stand_together),
-        cmocka_unit_test(the_swing_lifts),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -45,8 +45,7 @@ static int find_pushes(uint32_t index, uint32_t first, int steps, int found[8]) 
 }
 
 /* Every 8 s, robots 0.97 s apart; none before the first step. */
-static void schedule(void **unused) {
-    (void)unused;
+TEST(schedule) {
     int found[8];
     assert_int_equal(find_pushes(0, 0, 810, found), 1);
     assert_int_equal(found[0], 800);
@@ -65,8 +64,7 @@ static void schedule(void **unused) {
 }
 
 /* A jump of the base's velocity: x and y +-0.4 m/s, about each axis +-0.6 rad/s, z none. */
-static void size_and_independence(void **unused) {
-    (void)unused;
+TEST(size_and_independence) {
     enum { PUSHES = 2000 };
     open_in_the_air(0);
     rig.def.randomize.push_interval = 0.01;
@@ -103,8 +101,7 @@ static void size_and_independence(void **unused) {
 
 /* The push is added to the base's velocity before the step, then fades in the critic's view
  * only. */
-static void push_is_a_velocity_jump(void **unused) {
-    (void)unused;
+TEST(push_is_a_velocity_jump) {
     open_in_the_air(0);
     RobotState state = kit_moving_state(3, 4), pushed;
     rig.def.randomize.push_interval = 0.01;
@@ -158,8 +155,7 @@ static void expect_wrench(const char *what, const double *got, double fx, double
 /* With a share of 0.4: half of 33.113 kg is 64.97 N; 100 N s/m up to 30 N; 300 N m/rad, 30 N m
  * s/rad.
  */
-static void wrench_by_hand(void **unused) {
-    (void)unused;
+TEST(wrench_by_hand) {
     open_in_the_air(0);
     help(0.5, 0.8);
     double weight = 0.4 * 0.5 * 9.81 * robot_total_mass(robot), w[6];
@@ -210,8 +206,7 @@ static void wrench_by_hand(void **unused) {
 }
 
 /* Tilted any way, turning any way: 300 u x e_z - 30 omega in the world, u the base's axis. */
-static void wrench_in_space(void **unused) {
-    (void)unused;
+TEST(wrench_in_space) {
     open_in_the_air(0);
     help(1, 0.5);
     for (uint32_t draw = 0; draw < 20; draw++) {
@@ -234,8 +229,7 @@ static void wrench_in_space(void **unused) {
 }
 
 /* In the air the whole robot falls with half of gravity, and with all of it alone. */
-static void hand_acts_in_the_step(void **unused) {
-    (void)unused;
+TEST(hand_acts_in_the_step) {
     open_in_the_air(0);
     rig.env->command[0] = 0;
     for (int helped = 0; helped < 2; helped++) {
@@ -256,8 +250,7 @@ static void hand_acts_in_the_step(void **unused) {
 }
 
 /* 1.3 times the share of the way from the default pose to the reference. */
-static void led_pose(void **unused) {
-    (void)unused;
+TEST(led_pose) {
     open_in_the_air(0);
     const double *rest = robot_default_pose(robot);
     double pose[SA01_JOINTS];
@@ -285,8 +278,7 @@ static void led_pose(void **unused) {
 }
 
 /* Actions are added to the led pose. */
-static void torque_follows_the_led_pose(void **unused) {
-    (void)unused;
+TEST(torque_follows_the_led_pose) {
     open_in_the_air(0);
     task_env_rest(rig.env)->gains.kp[KNEE] = task_env_rest(rig.env)->gains.kp[LEG_JOINTS + KNEE] =
         10;
@@ -306,8 +298,7 @@ static void torque_follows_the_led_pose(void **unused) {
 
 /* After 2 s on its feet a step takes 1/800 of the level; a fall makes it 1.3 times as much and 0.01
  * more, at most 1. */
-static void level_of_help(void **unused) {
-    (void)unused;
+TEST(level_of_help) {
     open_in_the_air(0);
     TaskEnv *env = rig.env;
     env->assist_level = 0.5;
@@ -337,8 +328,7 @@ static void level_of_help(void **unused) {
 }
 
 /* The step adapts it: at a fall, with time on its feet, at a time-out not as at a fall. */
-static void level_follows_the_episode(void **unused) {
-    (void)unused;
+TEST(level_follows_the_episode) {
     open_in_the_air(0);
     TaskEnv *env = rig.env;
     assert_true(env->assist_level == 1);
@@ -360,18 +350,4 @@ static void level_follows_the_episode(void **unused) {
     rig_close(&rig);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(wrench_by_hand),
-        cmocka_unit_test(wrench_in_space),
-        cmocka_unit_test(hand_acts_in_the_step),
-        cmocka_unit_test(led_pose),
-        cmocka_unit_test(torque_follows_the_led_pose),
-        cmocka_unit_test(level_of_help),
-        cmocka_unit_test(level_follows_the_episode),
-        cmocka_unit_test(push_is_a_velocity_jump),
-        cmocka_unit_test(schedule),
-        cmocka_unit_test(size_and_independence),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

@@ -7,16 +7,6 @@
 
 static Rig rig;
 
-/* In the air, turned, bent and moving, above ground at z = 0.05. */
-static Oracle place(uint32_t draw) {
-    RobotState state = kit_moving_state(1.2, draw);
-    task_env_set_state(rig.env, &state);
-    task_env_rest(rig.env)->terrain.height = 0.05;
-    kit_load(rig.sim, &state, rig.env);
-    robot_sim_sole_clearance(rig.sim, task_env_terrain(rig.env));
-    return oracle_of(rig.sim);
-}
-
 static TaskMotion describe_step(const double *torque) {
     RobotReading reading;
     task_env_read(rig.env, rig.sim, &reading);
@@ -28,11 +18,10 @@ static TaskMotion describe(void) {
     return describe_step(torque);
 }
 
-static void base_and_joints(void **unused) {
-    (void)unused;
+TEST(base_and_joints) {
     rig_open_quiet(&rig, 0.5);
     for (uint32_t draw = 0; draw < 20; draw++) {
-        Oracle o = place(draw);
+        Oracle o = rig_place(&rig, draw);
         double torque[SA01_JOINTS];
         for (int i = 0; i < SA01_JOINTS; i++) {
             rig.env->joint_speed[i] = 0.1 * i;
@@ -59,12 +48,11 @@ static void base_and_joints(void **unused) {
 }
 
 /* Differences of 0.1, 0.2, 0.2 m/s and 0.4 rad/s: norm 0.5; each component counts. */
-static void change_of_twist(void **unused) {
-    (void)unused;
+TEST(change_of_twist) {
     rig_open_quiet(&rig, 0.5);
     const double step[6] = {0.1, -0.2, 0.2, 0, -0.4, 0};
     for (int k = -1; k < 6; k++) {
-        place(3);
+        rig_place(&rig, 3);
         double wanted = k < 0 ? 0.5 : 0.3;
         for (int i = 0; i < 6; i++) {
             double change = k < 0 ? step[i] : i == k ? 0.3 : 0;
@@ -80,12 +68,11 @@ static void change_of_twist(void **unused) {
 }
 
 /* The linear part alone: 0.1, 0.2, 0.2 m/s have the norm 0.3, whatever the base turns. */
-static void change_of_velocity(void **unused) {
-    (void)unused;
+TEST(change_of_velocity) {
     rig_open_quiet(&rig, 0.5);
     rig.def.reward.acceleration_form = TASK_ACCELERATION_LINEAR;
     const double step[6] = {0.1, -0.2, 0.2, 3, -0.4, 1};
-    place(3);
+    rig_place(&rig, 3);
     for (int i = 0; i < 6; i++) {
         rig.env->base_twist[i] = rig.env->robot.qvel[i] - step[i];
     }
@@ -97,10 +84,9 @@ static void change_of_velocity(void **unused) {
 }
 
 /* One step of 0.01 s moves a mean over 0.4 s by a fortieth of the way. */
-static void smoothed_velocity(void **unused) {
-    (void)unused;
+TEST(smoothed_velocity) {
     rig_open_quiet(&rig, 0.5);
-    Oracle o = place(4);
+    Oracle o = rig_place(&rig, 4);
     const double before[3] = {0.3, -0.2, 0.7}, now[3] = {o.heading[0], o.heading[1], o.omega[2]};
     memcpy(rig.env->smooth_velocity, before, sizeof before);
     describe();
@@ -116,11 +102,10 @@ static void smoothed_velocity(void **unused) {
     rig_close(&rig);
 }
 
-static void feet_and_knees(void **unused) {
-    (void)unused;
+TEST(feet_and_knees) {
     rig_open_quiet(&rig, 0.5);
     for (uint32_t draw = 0; draw < 20; draw++) {
-        Oracle o = place(draw);
+        Oracle o = rig_place(&rig, draw);
         oracle_set_force(rig.sim, 0, 3, -4, 12);
         oracle_set_force(rig.sim, 1, 30, -60, -20);
         TaskMotion m = describe();
@@ -138,10 +123,9 @@ static void feet_and_knees(void **unused) {
 }
 
 /* Above the soles that stand by the clock: left at phase 1/4, right at 3/4, both when standing. */
-static void schedule(void **unused) {
-    (void)unused;
+TEST(schedule) {
     rig_open_quiet(&rig, 0.5);
-    Oracle o = place(5);
+    Oracle o = rig_place(&rig, 5);
     double z = rig.env->robot.qpos[2];
     rig.env->phase = 0.25;
     TaskMotion m = describe();
@@ -164,10 +148,9 @@ static void schedule(void **unused) {
 }
 
 /* abs(sin) < 0.1 up to a phase of 0.01594. */
-static void double_support(void **unused) {
-    (void)unused;
+TEST(double_support) {
     rig_open_quiet(&rig, 0.5);
-    place(6);
+    rig_place(&rig, 6);
     const double phase[] = {0, 0.0159, 0.0160, 0.4840, 0.4841, 0.5159, 0.5160, 0.9840, 0.9841};
     const int either[] = {1, 1, 0, 0, 1, 1, 0, 0, 1};
     for (int i = 0; i < 9; i++) {
@@ -182,10 +165,9 @@ static void double_support(void **unused) {
 }
 
 /* Contact is a vertical force above 5 N; sideways forces are none. */
-static void contact_and_air_time(void **unused) {
-    (void)unused;
+TEST(contact_and_air_time) {
     rig_open_quiet(&rig, 0.5);
-    place(7);
+    rig_place(&rig, 7);
     rig.env->air_time[0] = 0.30;
     rig.env->air_time[1] = 0.10;
     oracle_set_force(rig.sim, 0, 100, 0, 4.99);
@@ -215,12 +197,4 @@ static void contact_and_air_time(void **unused) {
     rig_close(&rig);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(base_and_joints),    cmocka_unit_test(change_of_twist),
-        cmocka_unit_test(change_of_velocity), cmocka_unit_test(smoothed_velocity),
-        cmocka_unit_test(feet_and_knees),     cmocka_unit_test(schedule),
-        cmocka_unit_test(double_support),     cmocka_unit_test(contact_and_air_time),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

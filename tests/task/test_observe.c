@@ -52,16 +52,6 @@ static void fill_env(TaskEnv *env) {
     env->assist_draw = 0.8;
 }
 
-/* In the air, above ground at 0.05 m. */
-static Oracle place(uint32_t draw) {
-    RobotState state = kit_moving_state(1.2, draw);
-    task_env_set_state(rig.env, &state);
-    task_env_rest(rig.env)->terrain.height = 0.05;
-    kit_load(rig.sim, &state, rig.env);
-    robot_sim_sole_clearance(rig.sim, task_env_terrain(rig.env));
-    return oracle_of(rig.sim);
-}
-
 static void look(const TaskSensors *reading) {
     task_env_observe(rig.env, &rig.def, robot, rig.sim, reading, 0, &rig.view);
 }
@@ -89,12 +79,11 @@ static void expect_frame(const char *what, const float *frame, const double omeg
 static const double clock_at_03[2] = {0.9510565163, -0.3090169944}, no_clock[2] = {0, 0};
 
 /* The actor sees the readings, the critic the truth. */
-static void frame(void **unused) {
-    (void)unused;
+TEST(frame) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     for (uint32_t draw = 0; draw < 10; draw++) {
-        Oracle o = place(draw);
+        Oracle o = rig_place(&rig, draw);
         fill_env(rig.env);
         look(&reading);
         expect_frame("frame", rig.frame, reading.omega, reading.gravity, reading.q, reading.qd,
@@ -105,10 +94,9 @@ static void frame(void **unused) {
     rig_close(&rig);
 }
 
-static void readings(void **unused) {
-    (void)unused;
+TEST(readings) {
     rig_open_quiet(&rig, 0.5);
-    Oracle o = place(11);
+    Oracle o = rig_place(&rig, 11);
     TaskSensors reading;
     task_read_imu(robot_sim_base_rotation(rig.sim), robot_sim_qvel(rig.sim), &reading);
     task_read_motors(robot_sim_qpos(rig.sim) + 7, robot_sim_qvel(rig.sim) + 6, &reading);
@@ -122,11 +110,10 @@ static void readings(void **unused) {
 }
 
 /* Off by key, and (0, 0) while the command that the policy sees stands. */
-static void the_clock(void **unused) {
-    (void)unused;
+TEST(the_clock) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
-    Oracle o = place(1);
+    Oracle o = rig_place(&rig, 1);
     fill_env(rig.env);
     memset(rig.env->command, 0, sizeof rig.env->command); /* not seen yet */
     look(&reading);
@@ -148,8 +135,7 @@ static void the_clock(void **unused) {
 }
 
 /* Base velocity times 4, sole velocities, heights above the ground times 10; or as the keys say. */
-static void estimates(void **unused) {
-    (void)unused;
+TEST(estimates) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     double velocity_scale = 4, height_scale = 10;
@@ -158,7 +144,7 @@ static void estimates(void **unused) {
             rig.def.velocity_scale = velocity_scale = 1;
             rig.def.height_scale = height_scale = 2;
         }
-        Oracle o = place(draw);
+        Oracle o = rig_place(&rig, draw);
         look(&reading);
         double wanted[SA01_ESTIMATES];
         for (int i = 0; i < 3; i++) {
@@ -179,12 +165,11 @@ static void estimates(void **unused) {
 
 /* Force in the base frame over 300 N, within +-5; contact; scheduled stance; mean depth times 10.
  */
-static void feet_of_the_critic(void **unused) {
-    (void)unused;
+TEST(feet_of_the_critic) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     for (uint32_t draw = 0; draw < 10; draw++) {
-        Oracle o = place(draw);
+        Oracle o = rig_place(&rig, draw);
         fill_env(rig.env);
         const double force[SA01_FEET][3] = {{60, -90, 240}, {30, 15, -60}};
         for (int f = 0; f < SA01_FEET; f++) {
@@ -207,8 +192,7 @@ static void feet_of_the_critic(void **unused) {
     rig_close(&rig);
 }
 
-static void limits_of_the_critic(void **unused) {
-    (void)unused;
+TEST(limits_of_the_critic) {
     rig_open_quiet(&rig, 0.5);
     RobotState state = kit_state(1.2);
     kit_load(rig.sim, &state, rig.env);
@@ -255,11 +239,10 @@ static MildTerrain two_materials(double x, double y) {
     return terrain;
 }
 
-static void episode_of_the_critic(void **unused) {
-    (void)unused;
+TEST(episode_of_the_critic) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
-    place(12);
+    rig_place(&rig, 12);
     fill_env(rig.env);
     const double *qpos = robot_sim_qpos(rig.sim);
     task_env_rest(rig.env)->terrain = two_materials(qpos[0], qpos[1]);
@@ -292,12 +275,11 @@ static void episode_of_the_critic(void **unused) {
 }
 
 /* The one element of a concentric sole is shown as one of the raster's 77 cells. */
-static void concentric_ground(void **unused) {
-    (void)unused;
+TEST(concentric_ground) {
     robot_set_model(robot, MILD_MODEL_CON_CONE);
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
-    place(12);
+    rig_place(&rig, 12);
     const double *qpos = robot_sim_qpos(rig.sim);
     task_env_rest(rig.env)->terrain = two_materials(qpos[0], qpos[1]);
     MildMaterial *m = &task_env_rest(rig.env)->terrain.materials[1];
@@ -314,8 +296,7 @@ static void concentric_ground(void **unused) {
 }
 
 /* After a step on the ground: the forces and the depth are those of the step's contact. */
-static void contact_reaches_the_critic(void **unused) {
-    (void)unused;
+TEST(contact_reaches_the_critic) {
     rig_open_quiet(&rig, 0.5);
     for (int t = 0; t < 20; t++) {
         rig_step(&rig, NULL);
@@ -346,12 +327,11 @@ static double noise_limit(int i) {
 }
 
 /* Uniform: both ends nearly reached, mean 0, variance limit^2/3, no entry follows another. */
-static void noise(void **unused) {
-    (void)unused;
+TEST(noise) {
     enum { DRAWS = 20000 };
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
-    place(13);
+    rig_place(&rig, 13);
     fill_env(rig.env);
     look(&reading);
     float quiet[SA01_OBSERVATION];
@@ -400,8 +380,7 @@ static void noise(void **unused) {
 }
 
 /* Another environment, tick or seed draws other noise. */
-static void noise_is_a_stream(void **unused) {
-    (void)unused;
+TEST(noise_is_a_stream) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     rig.def.observe_noise = 1;
@@ -442,8 +421,7 @@ static void expect_history(int stride, int frames) {
 }
 
 /* More frames than the largest ring of 81 holds, twice over. */
-static void history(void **unused) {
-    (void)unused;
+TEST(history) {
     const int strides[] = {1, 3, 8, 16};
     for (int s = 0; s < 4; s++) {
         TaskDef def = kit_quiet_def();
@@ -467,8 +445,7 @@ static void history(void **unused) {
 }
 
 /* Step by step the newest frame is added to those before it. */
-static void history_of_steps(void **unused) {
-    (void)unused;
+TEST(history_of_steps) {
     TaskDef def = kit_quiet_def();
     def.history_stride = 1;
     rig_open(&rig, &def, 3, 0);
@@ -486,8 +463,7 @@ static void history_of_steps(void **unused) {
 }
 
 /* Any pointer of the view may be missing. */
-static void views(void **unused) {
-    (void)unused;
+TEST(views) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     const TaskView none = {0};
@@ -530,8 +506,7 @@ static void look_at(const RobotState *state, const double command[3], double pha
 }
 
 /* The frame of the mirrored robot is the mirrored frame. */
-static void mirror_image(void **unused) {
-    (void)unused;
+TEST(mirror_image) {
     rig_open_quiet(&rig, 0.5);
     const int sign[LEG_JOINTS] = {-1, -1, 1, 1, 1, -1};
     double worst = 0;
@@ -562,23 +537,4 @@ static void mirror_image(void **unused) {
     rig_close(&rig);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(frame),
-        cmocka_unit_test(readings),
-        cmocka_unit_test(the_clock),
-        cmocka_unit_test(estimates),
-        cmocka_unit_test(feet_of_the_critic),
-        cmocka_unit_test(limits_of_the_critic),
-        cmocka_unit_test(episode_of_the_critic),
-        cmocka_unit_test(concentric_ground),
-        cmocka_unit_test(contact_reaches_the_critic),
-        cmocka_unit_test(mirror_image),
-        cmocka_unit_test(views),
-        cmocka_unit_test(history),
-        cmocka_unit_test(history_of_steps),
-        cmocka_unit_test(noise_is_a_stream),
-        cmocka_unit_test(noise),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

@@ -26,8 +26,7 @@ static TaskDef changed(void) {
     return def;
 }
 
-static void printed_and_read(void **state) {
-    (void)state;
+TEST(printed_and_read) {
     char text[1024];
     MildError error = {0};
     TaskDef from = changed(), to = task_def_default();
@@ -52,8 +51,7 @@ static void printed_and_read(void **state) {
 }
 
 /* The longest values have room in a policy's file; where they have not, nothing is printed. */
-static void lengths(void **state) {
-    (void)state;
+TEST(lengths) {
     char text[1024];
     TaskDef def = changed();
     memset(def.kp, '1', sizeof def.kp - 1);
@@ -69,8 +67,7 @@ static void lengths(void **state) {
     }
 }
 
-static void refused(void **state) {
-    (void)state;
+TEST(refused) {
     static const struct {
         const char *text;
         MildStatus status;
@@ -102,11 +99,4 @@ static void refused(void **state) {
     assert_int_not_equal(task_policy_keys_read(&def, text, &error), MILD_OK);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(printed_and_read),
-        cmocka_unit_test(lengths),
-        cmocka_unit_test(refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -117,8 +117,7 @@ static void expect_share(const char *what, int hits, int of, double share) {
 
 /* ---- robot and sensors ---- */
 
-static void robot_and_sensors(void **unused) {
-    (void)unused;
+TEST(robot_and_sensors) {
     open_env();
     clear_columns();
     draw_next();
@@ -167,8 +166,7 @@ static void robot_and_sensors(void **unused) {
 }
 
 /* The three latencies are drawn apart: each pair differs as often as independent ones. */
-static void latencies_are_independent(void **unused) {
-    (void)unused;
+TEST(latencies_are_independent) {
     open_env();
     int same[3] = {0};
     double chance = (0.25 * 0.25 + 3 * 2.5 * 2.5 + 1.25 * 1.25) / 81;
@@ -185,8 +183,7 @@ static void latencies_are_independent(void **unused) {
 }
 
 /* A key turned off is off, and the nominal task is the nominal robot. */
-static void nominal(void **unused) {
-    (void)unused;
+TEST(nominal) {
     open_env();
     task_def_make_nominal(&def);
     const RobotVariation still = robot_variation_nominal();
@@ -218,8 +215,7 @@ static void nominal(void **unused) {
 }
 
 /* Same (seed, environment, tick): same episode; another of any of them: another. */
-static void draws_are_a_function(void **unused) {
-    (void)unused;
+TEST(draws_are_a_function) {
     open_env();
     task_env_draw(env, &def, robot);
     double first = env->motor_offset[3], command;
@@ -241,8 +237,7 @@ static void draws_are_a_function(void **unused) {
 }
 
 /* Each bit of the seed counts: for the episode, the command, the place on a map. */
-static void every_bit_of_the_seed(void **unused) {
-    (void)unused;
+TEST(every_bit_of_the_seed) {
     MildError error = {0};
     MildMapDef shape = mild_map_def_default();
     shape.kind = MILD_MAP_ROUGH;
@@ -301,8 +296,7 @@ static int preset_of(const MildMaterial *m, double factor[7]) {
 
 /* 10 % rigid, 50 % presets, stripes on 30 %. At a jitter of 2 % no preset can be taken for
  * another. */
-static void shares_of_grounds(void **unused) {
-    (void)unused;
+TEST(shares_of_grounds) {
     open_env();
     clear_columns();
     def.randomize.preset_jitter = 0.02;
@@ -350,8 +344,7 @@ static void shares_of_grounds(void **unused) {
 }
 
 /* The ranges themselves, without the limit of sinkage. */
-static void ranges_of_grounds(void **unused) {
-    (void)unused;
+TEST(ranges_of_grounds) {
     open_env();
     clear_columns();
     def.randomize.rigid_share = def.randomize.preset_share = 0;
@@ -382,8 +375,7 @@ static void ranges_of_grounds(void **unused) {
 
 /* k_D and b_D from ranges move no other draw; passive = false leaves c_g and c_d as drawn, those of
  * presets too. */
-static void drift_and_energy(void **unused) {
-    (void)unused;
+TEST(drift_and_energy) {
     open_env();
     clear_columns();
     def.randomize.rigid_share = 0;
@@ -420,8 +412,7 @@ static void drift_and_energy(void **unused) {
 
 /* Slip costs support on the share that was asked for of the grounds that stay dented, and moves no
  * other draw. */
-static void slip_on_a_share(void **unused) {
-    (void)unused;
+TEST(slip_on_a_share) {
     open_env();
     clear_columns();
     def.randomize.rigid_share = 0;
@@ -458,8 +449,7 @@ static void slip_on_a_share(void **unused) {
 
 /* Whatever is drawn, one foot under the whole weight rests no deeper than 0.07 m; what rests higher
  * is left alone; what was stiffened rests at 0.07 m. k_pen and sigma_cone grow by one factor. */
-static void limit_of_sinkage(void **unused) {
-    (void)unused;
+TEST(limit_of_sinkage) {
     open_env();
     def.randomize.rigid_share = def.randomize.preset_share = def.randomize.patch_share = 0;
     const MildSole *sole = robot_rasters(robot)[0];
@@ -492,8 +482,7 @@ static void limit_of_sinkage(void **unused) {
 }
 
 /* Three materials, 16 stripes across x of 1 to 3 m without a gap, the start in the middle. */
-static void stripes(void **unused) {
-    (void)unused;
+TEST(stripes) {
     open_env();
     clear_columns();
     def.randomize.patch_share = 1;
@@ -526,8 +515,7 @@ static void stripes(void **unused) {
 }
 
 /* A rival's material is the match of mild's draw: one foot under half the weight sinks as deep. */
-static void models_are_matched(void **unused) {
-    (void)unused;
+TEST(models_are_matched) {
     open_env();
     def.randomize.rigid_share = def.randomize.patch_share = 0;
     double load = robot_foot_load(robot), worst = 0;
@@ -562,8 +550,7 @@ static void models_are_matched(void **unused) {
 }
 
 /* Somewhere on the map, uniformly; the patterns' materials are drawn apart. */
-static void placed_on_a_map(void **unused) {
-    (void)unused;
+TEST(placed_on_a_map) {
     MildError error = {0};
     MildMapDef shape = mild_map_def_default();
     shape.kind = MILD_MAP_ROUGH;
@@ -592,8 +579,7 @@ static void placed_on_a_map(void **unused) {
 
 /* ---- commands ---- */
 
-static void commands(void **unused) {
-    (void)unused;
+TEST(commands) {
     open_env();
     clear_columns();
     int standing = 0, backward = 0, straight = 0, walking = 0;
@@ -628,8 +614,7 @@ static void commands(void **unused) {
 
 /* Yaw anywhere, joints +-0.05 rad, base velocities +-0.1, joints at rest, clock at 0 or 0.5, first
  * episodes anywhere in the first 0.9 of their time, later ones at its start. */
-static void start(void **unused) {
-    (void)unused;
+TEST(start) {
     enum { STARTS = 3000 };
     TaskDef start_def = task_def_default();
     start_def.randomize.patch_share = 0;
@@ -677,8 +662,7 @@ static void start(void **unused) {
 }
 
 /* What the last episode left is gone. */
-static void nothing_is_left(void **unused) {
-    (void)unused;
+TEST(nothing_is_left) {
     Rig rig;
     TaskDef start_def = task_def_default();
     rig_open(&rig, &start_def, 11, 0);
@@ -718,8 +702,7 @@ static void nothing_is_left(void **unused) {
 }
 
 /* eval and play: yaw 0, the command stays, the episode begins at its start. */
-static void start_of_a_trial(void **unused) {
-    (void)unused;
+TEST(start_of_a_trial) {
     Rig rig;
     TaskDef start_def = task_def_default();
     start_def.randomize.rigid_time[0] = start_def.randomize.rigid_time[1] = 0.1;
@@ -741,25 +724,4 @@ static void start_of_a_trial(void **unused) {
     rig_close(&rig);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(draws_are_a_function),
-        cmocka_unit_test(every_bit_of_the_seed),
-        cmocka_unit_test(nominal),
-        cmocka_unit_test(start_of_a_trial),
-        cmocka_unit_test(nothing_is_left),
-        cmocka_unit_test(models_are_matched),
-        cmocka_unit_test(limit_of_sinkage),
-        cmocka_unit_test(commands),
-        cmocka_unit_test(placed_on_a_map),
-        cmocka_unit_test(stripes),
-        cmocka_unit_test(shares_of_grounds),
-        cmocka_unit_test(latencies_are_independent),
-        cmocka_unit_test(ranges_of_grounds),
-        cmocka_unit_test(drift_and_energy),
-        cmocka_unit_test(slip_on_a_share),
-        cmocka_unit_test(start),
-        cmocka_unit_test(robot_and_sensors),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

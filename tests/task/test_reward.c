@@ -57,8 +57,7 @@ static void set_command(double vx, double vy, double wz) {
 }
 
 /* f(0.2) = (e^-0.2 + e^-2)/2 = 0.47703302, f(0.1) = (e^-0.05 + e^-1)/2 = 0.65955443. */
-static void linear_velocity(void **unused) {
-    (void)unused;
+TEST(linear_velocity) {
     new_scene();
     set_command(0.6, 0.1, 0);
     set_velocity(0.6, 0.1, 0);
@@ -81,8 +80,7 @@ static void linear_velocity(void **unused) {
 
 /* n = 0 is the paper's exp(-5 |v - command|^2): e^-0.2 at 0.2 m/s, e^-0.25 at (0.2, 0.1) m/s. With
  * n = 1/4, f(0.2) = 0.75 e^-0.2 + 0.25 e^-2. */
-static void tracking_as_printed(void **unused) {
-    (void)unused;
+TEST(tracking_as_printed) {
     new_scene();
     scene.def.reward.tracking_narrow = 0;
     set_command(0.6, 0.1, -0.3);
@@ -99,8 +97,7 @@ static void tracking_as_printed(void **unused) {
 
 /* Tilted by 60 degrees g_z = -1/2: upright (1 + 1/2)/2 = 3/4, on its back 0. The gate's third power
  * is 27/64, of all that is paid but of upright and of no price. */
-static void upright_rise_and_gate(void **unused) {
-    (void)unused;
+TEST(upright_rise_and_gate) {
     TaskMotion *m = new_scene();
     double *weight = scene.def.reward.weight;
     weight[REWARD_upright] = 4;
@@ -135,8 +132,7 @@ static void upright_rise_and_gate(void **unused) {
 }
 
 /* f(0.4) = (e^-0.8 + e^-4)/2 = 0.23382230. */
-static void yaw_rate(void **unused) {
-    (void)unused;
+TEST(yaw_rate) {
     new_scene();
     set_command(0, 0, -0.3);
     set_velocity(0, 0, -0.3);
@@ -150,8 +146,7 @@ static void yaw_rate(void **unused) {
 }
 
 /* (pi/2) 0.08/0.10 = 1.25663706 at the wanted height, times 2.4. */
-static void feet_clearance(void **unused) {
-    (void)unused;
+TEST(feet_clearance) {
     TaskMotion *m = new_scene();
     m->foot_height[0] = 0.3; /* the standing foot's height does not matter */
     m->foot_height[1] = 0.08;
@@ -178,8 +173,7 @@ static void feet_clearance(void **unused) {
 
 /* The standing foot is 0.06 m deep: (pi/2) clip(h + 0.06, 0, 0.14)/0.16, times 2.4; a foot at the
  * surface has come out of its print and gets 0.06/0.16. */
-static void clearance_from_the_print(void **unused) {
-    (void)unused;
+TEST(clearance_from_the_print) {
     TaskMotion *m = new_scene();
     scene.def.reward.clearance_form = TASK_CLEARANCE_RISE;
     m->foot_height[0] = -0.06;
@@ -202,8 +196,7 @@ static void clearance_from_the_print(void **unused) {
 }
 
 /* The paper's formula, 2.4 |h_des - h| of the feet that swing: an error is paid for. */
-static void clearance_as_printed(void **unused) {
-    (void)unused;
+TEST(clearance_as_printed) {
     TaskMotion *m = new_scene();
     scene.def.reward.clearance_form = TASK_CLEARANCE_ERROR;
     m->foot_height[0] = 0.3; /* stands */
@@ -223,8 +216,7 @@ static void clearance_as_printed(void **unused) {
 }
 
 /* The paper's formula, 1.4 (1.3 (feet that match) - 0.3): 2.3, 1 and -0.3 times 1.4. */
-static void gait_as_printed(void **unused) {
-    (void)unused;
+TEST(gait_as_printed) {
     TaskMotion *m = new_scene();
     scene.def.reward.gait_form = TASK_GAIT_SUM;
     expect_term(REWARD_gait, "both as scheduled", 3.22);
@@ -236,8 +228,7 @@ static void gait_as_printed(void **unused) {
     expect_term(REWARD_gait, "left in double support", 1.4);
 }
 
-static void gait(void **unused) {
-    (void)unused;
+TEST(gait) {
     TaskMotion *m = new_scene();
     expect_term(REWARD_gait, "both as scheduled", 1.4);
     m->contact[1] = 1;
@@ -250,8 +241,7 @@ static void gait(void **unused) {
     expect_term(REWARD_gait, "double support", 1.4);
 }
 
-static void slip(void **unused) {
-    (void)unused;
+TEST(slip) {
     TaskMotion *m = new_scene();
     m->foot_speed[1] = 0.7;
     expect_term(REWARD_slip, "only the foot in the air moves", 0);
@@ -261,8 +251,7 @@ static void slip(void **unused) {
     expect_term(REWARD_slip, "both slip", -0.1);
 }
 
-static void base_acceleration(void **unused) {
-    (void)unused;
+TEST(base_acceleration) {
     TaskMotion *m = new_scene();
     expect_term(REWARD_base_acceleration, "steady", 0.2);
     m->twist_change = 0.5;
@@ -271,8 +260,7 @@ static void base_acceleration(void **unused) {
 
 /* joint 0: 0.5^2 + (1 - 1 - 0.25)^2 = 0.3125; joint 11: 0.75^2 + (-0.25 - 1 + 0.125)^2 = 1.828125.
  */
-static void action_smoothness(void **unused) {
-    (void)unused;
+TEST(action_smoothness) {
     new_scene();
     for (int age = 0; age < 3; age++) {
         scene.env.action[age][5] = 2;
@@ -298,8 +286,7 @@ static void bend(int leg, double angle) {
 
 /* In the middle of the swing the leg bends by 0.4 (1, 2, 1) rad: 0.4 sqrt(6) = 0.97979590 apart
  * from the default pose. */
-static void reference_motion(void **unused) {
-    (void)unused;
+TEST(reference_motion) {
     TaskMotion *m = new_scene();
     expect_term(REWARD_reference_motion, "stiff leg", 0.0900150501);
     bend(1, 0.4);
@@ -319,8 +306,7 @@ static void reference_motion(void **unused) {
 }
 
 /* y = 0.05 + 0.10: (e^-5 + e^-0.45)/2 - 0.01 sqrt(0.0125). */
-static void default_pose(void **unused) {
-    (void)unused;
+TEST(default_pose) {
     TaskMotion *m = new_scene();
     expect_term(REWARD_default_pose, "default pose", 1.2);
     m->q[HIP_ROLL] += 0.03;
@@ -334,8 +320,7 @@ static void default_pose(void **unused) {
     expect_term(REWARD_default_pose, "bent knee", 1.194);
 }
 
-static void base_height(void **unused) {
-    (void)unused;
+TEST(base_height) {
     TaskMotion *m = new_scene();
     expect_term(REWARD_base_height, "nominal", 0.2);
     m->base_height = 0.84;
@@ -346,8 +331,7 @@ static void base_height(void **unused) {
     expect_term(REWARD_base_height, "another nominal height", 0.2);
 }
 
-static void distances(void **unused) {
-    (void)unused;
+TEST(distances) {
     TaskMotion *m = new_scene();
     expect_term(REWARD_feet_distance, "within", 0.2);
     expect_term(REWARD_knee_distance, "within", 0.2);
@@ -376,8 +360,7 @@ static void distances(void **unused) {
 }
 
 /* abs sum 0.07, norm 0.05: 1.5 (e^-0.7 + e^-0.2)/2. */
-static void orientation(void **unused) {
-    (void)unused;
+TEST(orientation) {
     TaskMotion *m = new_scene();
     expect_term(REWARD_orientation, "upright", 1.5);
     m->gravity[0] = 0.03;
@@ -388,8 +371,7 @@ static void orientation(void **unused) {
     expect_term(REWARD_orientation, "tilted the other way", 0.9864870427);
 }
 
-static void air_time(void **unused) {
-    (void)unused;
+TEST(air_time) {
     TaskMotion *m = new_scene();
     expect_term(REWARD_air_time, "no touchdown", 0);
     m->landed_air_time = 0.3;
@@ -399,8 +381,7 @@ static void air_time(void **unused) {
 }
 
 /* 0.25 (e^(-10 0.04) + e^(-5 0.5)). */
-static void base_motion(void **unused) {
-    (void)unused;
+TEST(base_motion) {
     TaskMotion *m = new_scene();
     m->velocity[0] = 2;
     m->velocity[1] = -2;
@@ -412,8 +393,7 @@ static void base_motion(void **unused) {
     expect_term(REWARD_base_motion, "bobbing and rocking", 0.1881012612);
 }
 
-static void contact_force(void **unused) {
-    (void)unused;
+TEST(contact_force) {
     TaskMotion *m = new_scene();
     m->foot_force[0] = 500;
     m->foot_force[1] = 20;
@@ -424,8 +404,7 @@ static void contact_force(void **unused) {
     expect_term(REWARD_contact_force, "700 and 1000 N: 200 and 400 count", -12);
 }
 
-static void efforts(void **unused) {
-    (void)unused;
+TEST(efforts) {
     TaskMotion *m = new_scene();
     m->torque[0] = 30;
     m->torque[11] = -40;
@@ -445,8 +424,7 @@ static void efforts(void **unused) {
     expect_term(REWARD_power, "90 and 160 W", -2.5);
 }
 
-static void collision(void **unused) {
-    (void)unused;
+TEST(collision) {
     TaskMotion *m = new_scene();
     expect_term(REWARD_collision, "apart", 0);
     m->foot_distance = 0.101;
@@ -462,8 +440,7 @@ static void collision(void **unused) {
 
 /* Of the scene: f(0) f(0) 2 + 1.1 + 0 + 1.4 - 0 + 0.2 - 0 + 0.09001505 (stiff leg) + 1.2 + 3 times
  * 0.2 + 1.5 + 0 + 0.5 = 8.59001505 per second. */
-static void sum_is_clipped(void **unused) {
-    (void)unused;
+TEST(sum_is_clipped) {
     TaskMotion *m = new_scene();
     double terms[TASK_REWARD_COUNT];
     expect_near("reward of a step", task_reward(m, terms), 0.0859001505, 1e-10);
@@ -480,39 +457,10 @@ static void sum_is_clipped(void **unused) {
 }
 
 /* The order of enum, names and functions is one. */
-static void names_follow_the_enum(void **unused) {
-    (void)unused;
+TEST(names_follow_the_enum) {
     assert_string_equal(task_reward_names[REWARD_linear_velocity], "linear_velocity");
     assert_string_equal(task_reward_names[REWARD_reference_motion], "reference_motion");
     assert_string_equal(task_reward_names[REWARD_collision], "collision");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(names_follow_the_enum),
-        cmocka_unit_test(linear_velocity),
-        cmocka_unit_test(tracking_as_printed),
-        cmocka_unit_test(upright_rise_and_gate),
-        cmocka_unit_test(yaw_rate),
-        cmocka_unit_test(feet_clearance),
-        cmocka_unit_test(clearance_from_the_print),
-        cmocka_unit_test(clearance_as_printed),
-        cmocka_unit_test(gait),
-        cmocka_unit_test(gait_as_printed),
-        cmocka_unit_test(slip),
-        cmocka_unit_test(base_acceleration),
-        cmocka_unit_test(action_smoothness),
-        cmocka_unit_test(reference_motion),
-        cmocka_unit_test(default_pose),
-        cmocka_unit_test(base_height),
-        cmocka_unit_test(distances),
-        cmocka_unit_test(orientation),
-        cmocka_unit_test(air_time),
-        cmocka_unit_test(base_motion),
-        cmocka_unit_test(contact_force),
-        cmocka_unit_test(efforts),
-        cmocka_unit_test(collision),
-        cmocka_unit_test(sum_is_clipped),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

@@ -25,8 +25,7 @@ static void refused(const char *presets, int model, MildStatus status, const cha
     assert_error(&error, status, names);
 }
 
-static void what_is_read(void **unused) {
-    (void)unused;
+TEST(what_is_read) {
     TaskDef def = def_of("", MILD_MODEL_MILD);
     TaskSoils soils;
     MildError error = {0};
@@ -57,8 +56,7 @@ static void what_is_read(void **unused) {
 }
 
 /* Draws of a preset and a file of the same model: half each, each number within its jitter. */
-static void what_is_drawn(void **unused) {
-    (void)unused;
+TEST(what_is_drawn) {
     char folder[] = "/tmp/mild_soils_XXXXXX", path[40];
     MildMaterial soil[2];
     TaskSoils soils;
@@ -104,8 +102,7 @@ static void what_is_drawn(void **unused) {
 }
 
 /* A soil of mild is matched to another model, as a preset is. */
-static void what_is_matched(void **unused) {
-    (void)unused;
+TEST(what_is_matched) {
     TaskDef def = def_of("grass", MILD_MODEL_BEKKER);
     TaskSoils soils;
     MildError error = {0};
@@ -123,11 +120,4 @@ static void what_is_matched(void **unused) {
     pool_destroy(pool);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_read),
-        cmocka_unit_test(what_is_drawn),
-        cmocka_unit_test(what_is_matched),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

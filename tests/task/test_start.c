@@ -4,7 +4,7 @@
 #include <mujoco/mujoco.h>
 
 #include "env/task/task.h"
-#include "kit.h"
+#include "materials.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
 
@@ -63,9 +63,7 @@ static void close_env(void) {
 
 /* Draw `draw` of an episode on foam, or on a slope of it. */
 static void begin(uint32_t draw, int rigid) {
-    MildMaterial foam;
-    assert_true(mild_material_preset("foam45", &foam));
-    MildTerrain terrain = mild_terrain_uniform(&foam);
+    MildTerrain terrain = kit_terrain("foam45");
     terrain.height = 0.2;
     env->tick = draw;
     task_env_reset_on(env, &def, robot, sim, &terrain, rigid, &view);
@@ -108,8 +106,7 @@ static double lowest(void) {
 }
 
 /* Its lowest point is within 0.1 m of the ground and not below it; its quaternion has length 1. */
-static void nothing_begins_below_the_ground(void **unused) {
-    (void)unused;
+TEST(nothing_begins_below_the_ground) {
     for (int start = TASK_START_BACK; start < TASK_STARTS; start++) {
         double least = 1e9, most = -1e9;
         open_env((TaskStart)start);
@@ -130,8 +127,7 @@ static void nothing_begins_below_the_ground(void **unused) {
 }
 
 /* On a slope the lowest sole or shell, each above the ground under it, is that high. */
-static void on_a_slope_too(void **unused) {
-    (void)unused;
+TEST(on_a_slope_too) {
     MildMapDef slope = mild_map_def_default();
     slope.kind = MILD_MAP_SLOPE;
     slope.slope = 0.2;
@@ -162,8 +158,7 @@ static double up_of(int axis) {
 }
 
 /* Leans of at most 0.3 rad in roll and pitch: the cosine of both is cos(0.3)^2 = 0.91267. */
-static void back_and_side(void **unused) {
-    (void)unused;
+TEST(back_and_side) {
     int left = 0;
     open_env(TASK_START_BACK);
     for (uint32_t k = 0; k < DRAWS; k++) {
@@ -183,8 +178,7 @@ static void back_and_side(void **unused) {
 /* Each axis of the base is as likely to point anywhere: the vertical component of an axis is
  * uniform in [-1, 1], mean 0 and mean square 1/3; 4 standard deviations of 400 draws are 0.115 and
  * 0.06. */
-static void any_attitude_is_as_likely(void **unused) {
-    (void)unused;
+TEST(any_attitude_is_as_likely) {
     double sum[3] = {0}, square[3] = {0};
     open_env(TASK_START_ANY);
     for (uint32_t k = 0; k < DRAWS; k++) {
@@ -201,8 +195,7 @@ static void any_attitude_is_as_likely(void **unused) {
 }
 
 /* Joints are within their ranges and reach both ends. */
-static void joints_are_anywhere(void **unused) {
-    (void)unused;
+TEST(joints_are_anywhere) {
     const double *low = robot_joint_low(robot), *high = robot_joint_high(robot);
     double least[JOINTS], most[JOINTS];
     open_env(TASK_START_BACK);
@@ -228,8 +221,7 @@ static void joints_are_anywhere(void **unused) {
 
 /* As many as asked for; none on rigid ground, which shells do not touch; the others stand as if
  * nobody had asked. */
-static void the_share_is_kept(void **unused) {
-    (void)unused;
+TEST(the_share_is_kept) {
     int dropped = 0;
     open_env(TASK_START_ANY);
     def.start_share = 0.3;
@@ -252,8 +244,7 @@ static void the_share_is_kept(void **unused) {
 }
 
 /* A lying robot needs shells that stand. */
-static void without_shells_it_is_refused(void **unused) {
-    (void)unused;
+TEST(without_shells_it_is_refused) {
     MildError error = {0};
     TaskDef bad = task_def_default();
     bad.shells_stand = 0;
@@ -293,8 +284,7 @@ static void compare_damping(void *context, const TaskEnv *at, const RobotSim *wi
 }
 
 /* For `settle` the torques are those of damping, whatever the action; then no longer. */
-static void motors_only_damp_at_first(void **unused) {
-    (void)unused;
+TEST(motors_only_damp_at_first) {
     float action[JOINTS];
     for (int i = 0; i < JOINTS; i++) {
         action[i] = i % 2 ? 1 : -1;
@@ -321,8 +311,7 @@ static void motors_only_damp_at_first(void **unused) {
 
 /* Dropped on its back it lies there until its time is over; without may_lie its tilt, or its base
  * on the ground, ends the episode at once, and on rigid ground in either case. */
-static void a_robot_that_may_lie_is_not_ended(void **unused) {
-    (void)unused;
+TEST(a_robot_that_may_lie_is_not_ended) {
     const float none[JOINTS] = {0};
     open_env(TASK_START_BACK);
     begin(1, 0);
@@ -355,17 +344,4 @@ static void a_robot_that_may_lie_is_not_ended(void **unused) {
     close_env();
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nothing_begins_below_the_ground),
-        cmocka_unit_test(on_a_slope_too),
-        cmocka_unit_test(back_and_side),
-        cmocka_unit_test(any_attitude_is_as_likely),
-        cmocka_unit_test(joints_are_anywhere),
-        cmocka_unit_test(the_share_is_kept),
-        cmocka_unit_test(without_shells_it_is_refused),
-        cmocka_unit_test(motors_only_damp_at_first),
-        cmocka_unit_test(a_robot_that_may_lie_is_not_ended),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

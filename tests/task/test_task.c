@@ -56,8 +56,7 @@ static uint64_t rollout(int threads, int envs, int steps, MildModel model, EnvsS
 }
 
 /* What the numbers are is pinned by tests/pins. */
-static void same_numbers_whatever_the_thread_count(void **state) {
-    (void)state;
+TEST(same_numbers_whatever_the_thread_count) {
     EnvsStats stats;
     uint64_t one = rollout(1, ENVS, STEPS, MILD_MODEL_MILD, &stats);
     printf("hash of %d robots x %d steps: %016llx; %d episodes, %d falls, %d diverged\n", ENVS,
@@ -72,8 +71,7 @@ static void same_numbers_whatever_the_thread_count(void **state) {
 
 /* Matched to one draw, every model carries the robot at about the same depth: after 0.3 s of
  * standing with stiff joints the feet bear the weight. */
-static void every_ground_model_carries(void **state) {
-    (void)state;
+TEST(every_ground_model_carries) {
     for (int model = 0; model < MILD_MODELS; model++) {
         int rigid = model == MILD_MODEL_RIGID;
         TaskDef def = kit_quiet_def();
@@ -110,8 +108,7 @@ static void every_ground_model_carries(void **state) {
     robot_set_model(robot, MILD_MODEL_MILD);
 }
 
-static void mirror_is_an_involution(void **state) {
-    (void)state;
+TEST(mirror_is_an_involution) {
     for (int i = 0; i < SA01_OBSERVATION; i++) {
         int j = mirror.observation_index[i];
         assert_int_equal(mirror.observation_index[j], i);
@@ -126,8 +123,7 @@ static void mirror_is_an_involution(void **state) {
 
 /* Mirrored start and mirrored actions give the mirrored observation: mirror table and robot agree.
  */
-static void mirrored_motion_is_the_mirror_image(void **state) {
-    (void)state;
+TEST(mirrored_motion_is_the_mirror_image) {
     Rig a, b;
     rig_open_quiet(&a, 0.5);
     rig_open_quiet(&b, 0.5);
@@ -153,12 +149,4 @@ static void mirrored_motion_is_the_mirror_image(void **state) {
     rig_close(&b);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mirror_is_an_involution),
-        cmocka_unit_test(mirrored_motion_is_the_mirror_image),
-        cmocka_unit_test(same_numbers_whatever_the_thread_count),
-        cmocka_unit_test(every_ground_model_carries),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

@@ -44,8 +44,7 @@ static void expect_fall(const char *what, TaskStep step) {
 }
 
 /* Past the limit in every direction it is the end, short of it in none; heading does not matter. */
-static void tilt(void **unused) {
-    (void)unused;
+TEST(tilt) {
     open_limp();
     rig.def.crossing_limit = -1; /* upside down the left foot is on the right */
     const double limits[] = {1.0, 0.4, 2.0};
@@ -65,8 +64,7 @@ static void tilt(void **unused) {
     rig_close(&rig);
 }
 
-static void upright_in_the_air(void **unused) {
-    (void)unused;
+TEST(upright_in_the_air) {
     open_limp();
     for (int k = 0; k < 8; k++) {
         RobotState state = kit_state(1.5);
@@ -123,8 +121,7 @@ static RobotState folded(void) {
     return state;
 }
 
-static void base_touches(void **unused) {
-    (void)unused;
+TEST(base_touches) {
     open_limp();
     rig.def.tilt_limit = 3.1;
     RobotState state = folded();
@@ -174,15 +171,13 @@ static void shank_touches(int leg, const char *box) {
     rig_close(&rig);
 }
 
-static void shanks_touch(void **unused) {
-    (void)unused;
+TEST(shanks_touch) {
     shank_touches(0, "leg_l4_link_box");
     shank_touches(1, "leg_r4_link_box");
 }
 
 /* Feet on the wrong side of each other, or nearer than asked; knees do not count. */
-static void crossing(void **unused) {
-    (void)unused;
+TEST(crossing) {
     open_limp();
     RobotState state = kit_state(2);
     kit_turn(state.qpos, 2.2, 0, 0);
@@ -206,8 +201,7 @@ static void crossing(void **unused) {
 }
 
 /* Beyond either end of its range by more than the margin, each joint alone. */
-static void broken_joint(void **unused) {
-    (void)unused;
+TEST(broken_joint) {
     open_limp();
     rig.def.crossing_limit = -1;
     for (int k = 0; k < 4 * SA01_JOINTS; k++) {
@@ -230,8 +224,7 @@ static void broken_joint(void **unused) {
 }
 
 /* 24 s are 2400 steps. A fall at the last step is a fall. */
-static void timeout(void **unused) {
-    (void)unused;
+TEST(timeout) {
     open_limp();
     RobotState state = kit_state(2);
     assert_int_equal(rig.env->step_limit, 2400);
@@ -259,8 +252,7 @@ static void timeout(void **unused) {
 
 /* What the learner must not learn from: no reward, no weight, not a time-out. The next observation
  * is that of a new episode. */
-static void bad_numbers(void **unused) {
-    (void)unused;
+TEST(bad_numbers) {
     const double bad[] = {NAN, INFINITY, 2000};
     for (int i = 0; i < 3; i++) {
         rig_open_quiet(&rig, 0.5);
@@ -285,8 +277,7 @@ static void bad_numbers(void **unused) {
 }
 
 /* Numbers that only the reward sees. */
-static void bad_reward(void **unused) {
-    (void)unused;
+TEST(bad_reward) {
     rig_open_quiet(&rig, 0.5);
     rig.env->smooth_velocity[0] = NAN;
     TaskStep step = rig_step(&rig, NULL);
@@ -296,8 +287,7 @@ static void bad_reward(void **unused) {
 }
 
 /* Sums of the episode that ended, and a new one begun. */
-static void report_of_an_episode(void **unused) {
-    (void)unused;
+TEST(report_of_an_episode) {
     rig_open_quiet(&rig, 0.5);
     rig.env->command_frozen = 0;
     const float action[SA01_JOINTS] = {0};
@@ -340,18 +330,4 @@ static void report_of_an_episode(void **unused) {
     rig_close(&rig);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(upright_in_the_air),
-        cmocka_unit_test(tilt),
-        cmocka_unit_test(base_touches),
-        cmocka_unit_test(shanks_touch),
-        cmocka_unit_test(crossing),
-        cmocka_unit_test(broken_joint),
-        cmocka_unit_test(timeout),
-        cmocka_unit_test(bad_numbers),
-        cmocka_unit_test(bad_reward),
-        cmocka_unit_test(report_of_an_episode),
-    };
-    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
-}
+TEST_MAIN(kit_setup, kit_teardown)

@@ -82,8 +82,7 @@ static void run_close(Run *run) {
     free(run->flags);
 }
 
-static void test_threads(void **state) {
-    (void)state;
+TEST(test_threads) {
     uint64_t hash[3];
     for (int i = 0; i < 3; i++) {
         Run run;
@@ -98,8 +97,7 @@ static void test_threads(void **state) {
 
 /* Saved half way, loaded into robots of another history: the rest is the same. No address is among
  * the bytes. */
-static void test_save(void **state) {
-    (void)state;
+TEST(test_save) {
     Run a, b;
     size_t bytes;
     run_open(&a, 2);
@@ -126,8 +124,7 @@ static void test_save(void **state) {
 
 /* Wherever a robot starts, its lowest sole point begins as deep as on level ground; nobody stands
  * in the air or falls through. */
-static void test_start(void **state) {
-    (void)state;
+TEST(test_start) {
     TaskDef def = task_on_map();
     def.randomize.rigid_share = 0;
     MildError error = {0};
@@ -158,8 +155,7 @@ static void test_start(void **state) {
 
 /* On rigid ground too: 2 mm above the map's highest point under a sole, and half a second later the
  * feet are on it. */
-static void test_rigid(void **state) {
-    (void)state;
+TEST(test_rigid) {
     TaskDef def = task_on_map();
     def.randomize.rigid_share = 1;
     MildError error = {0};
@@ -190,8 +186,4 @@ static void test_rigid(void **state) {
     robot_sim_destroy(sim);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_threads), cmocka_unit_test(test_save),
-                                       cmocka_unit_test(test_start), cmocka_unit_test(test_rigid)};
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

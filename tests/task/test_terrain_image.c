@@ -5,7 +5,7 @@
 
 #include "env/task/image.h"
 #include "env/task/terrain.h"
-#include "kit.h"
+#include "files.h"
 #include "mild/ground.h"
 
 enum { COLUMNS = 37, ROWS = 23 };
@@ -32,8 +32,7 @@ static void write_png(const void *pixels, png_uint_32 format, int columns, int r
 }
 
 /* 8 and 16 bits, grey and colour: what was written comes back. */
-static void test_round_trip(void **state) {
-    (void)state;
+TEST(test_round_trip) {
     static png_byte grey[ROWS * COLUMNS], color[ROWS * COLUMNS * 4];
     static png_uint_16 wide[ROWS * COLUMNS];
     double worst[3] = {0};
@@ -54,9 +53,7 @@ static void test_round_trip(void **state) {
                               : PNG_FORMAT_RGBA,
                   COLUMNS, ROWS);
         MildStatus status = image_read(path, &image, &error);
-        if (status != MILD_OK) {
-            fail_msg("%s", error.text);
-        }
+        expect_good(status == MILD_OK, &error);
         assert_int_equal(image.columns, COLUMNS);
         assert_int_equal(image.rows, ROWS);
         for (int i = 0; i < ROWS * COLUMNS; i++) {
@@ -123,8 +120,7 @@ static void expect_picture(const char *what, int columns, int rows, const double
     assert_int_equal(image.rows + image.columns, 0);
 }
 
-static void test_kinds(void **state) {
-    (void)state;
+TEST(test_kinds) {
     const Kind bits = {1, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, 10, 1};
     const png_byte one[2] = {0xa5, 0x80};
     const double ten[10] = {1, 0, 1, 0, 0, 1, 0, 1, 1, 0};
@@ -158,8 +154,7 @@ static void test_kinds(void **state) {
 }
 
 /* More pixels than a map may have points; an edge longer than 32768. */
-static void test_too_large(void **state) {
-    (void)state;
+TEST(test_too_large) {
     const Kind kinds[2] = {{1, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, 32768, 2049},
                            {1, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, 32769, 1}};
     const MildStatus wanted[2] = {MILD_ERROR_RANGE, MILD_ERROR_FORMAT};
@@ -177,8 +172,7 @@ static void test_too_large(void **state) {
 }
 
 /* An open file, which stands under another name in messages. */
-static void test_open_file(void **state) {
-    (void)state;
+TEST(test_open_file) {
     Image image;
     MildError error = {0};
     char nothing[16] = "no picture";
@@ -192,24 +186,15 @@ static void test_open_file(void **state) {
     fclose(file);
 }
 
-static void write_bytes(const void *bytes, size_t size) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, size, file), size);
-    fclose(file);
-}
-
 /* No picture, a picture cut anywhere, a picture with any byte changed: an error with the file's
  * name, or a picture. */
-static void test_refused(void **state) {
-    (void)state;
+TEST(test_refused) {
     static png_byte grey[ROWS * COLUMNS];
-    static char bytes[8192];
     char names[256];
     Image image;
     MildError error = {0};
     assert_int_equal(image_read("no/such.png", &image, &error), MILD_ERROR_IO);
-    write_bytes("height,height\n", 14);
+    kit_write(path, "height,height\n", 14);
     assert_int_equal(image_read(path, &image, &error), MILD_ERROR_FORMAT);
     snprintf(names, sizeof names, "%s PNG", path);
     assert_error(&error, MILD_ERROR_FORMAT, names);
@@ -217,12 +202,11 @@ static void test_refused(void **state) {
         grey[i] = (png_byte)(i * 31);
     }
     write_png(grey, PNG_FORMAT_GRAY, COLUMNS, ROWS);
-    FILE *file = fopen(path, "rb");
-    size_t size = fread(bytes, 1, sizeof bytes, file);
-    fclose(file);
+    size_t size;
+    char *bytes = kit_read(path, &size);
     int refused = 0;
     for (size_t cut = 0; cut < size; cut += 7) {
-        write_bytes(bytes, cut);
+        kit_write(path, bytes, cut);
         MildStatus status = image_read(path, &image, &error);
         refused += status != MILD_OK;
         if (status != MILD_OK) {
@@ -232,18 +216,18 @@ static void test_refused(void **state) {
     }
     for (size_t at = 0; at < size; at += 3) {
         bytes[at] ^= 0x55;
-        write_bytes(bytes, size);
+        kit_write(path, bytes, size);
         refused += image_read(path, &image, &error) != MILD_OK;
         image_close(&image);
         bytes[at] ^= 0x55;
     }
+    free(bytes);
     print_message("%zu bytes of picture: %d damaged ones refused\n", size, refused);
     assert_true(refused > (int)size / 7);
 }
 
 /* A ramp of heights and a picture of two materials become the ground they show. */
-static void test_terrain(void **state) {
-    (void)state;
+TEST(test_terrain) {
     static png_byte ramp[ROWS * COLUMNS];
     for (int i = 0; i < ROWS * COLUMNS; i++) {
         ramp[i] = (png_byte)(5 * (i % COLUMNS));
@@ -259,9 +243,7 @@ static void test_terrain(void **state) {
     MildError error = {0};
     MildMap *map;
     MildStatus status = terrain_make(&def, 2, &map, &error);
-    if (status != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(status == MILD_OK, &error);
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
     assert_int_equal(mild_terrain_set_map(&terrain, map, &error),
@@ -292,8 +274,7 @@ static void refuse_terrain(const TerrainDef *def, MildStatus status, const char 
 }
 
 /* Pictures missing, unreadable, or given for nothing. */
-static void test_terrain_refused(void **state) {
-    (void)state;
+TEST(test_terrain_refused) {
     TerrainDef plain = terrain_def_default(), def = plain;
     def.map.kind = MILD_MAP_IMAGE;
     refuse_terrain(&def, MILD_ERROR_ARGUMENT, "terrain.image PNG");
@@ -318,8 +299,7 @@ static void test_terrain_refused(void **state) {
 }
 
 /* Level ground of one material needs no map; a shape or a pattern does. */
-static void test_when_a_map(void **state) {
-    (void)state;
+TEST(test_when_a_map) {
     MildError error = {0};
     MildMap *map;
     TerrainDef def = terrain_def_default();
@@ -340,8 +320,7 @@ static void test_when_a_map(void **state) {
     mild_map_destroy(map);
 }
 
-static void test_prints(void **state) {
-    (void)state;
+TEST(test_prints) {
     TerrainDef def = terrain_def_default();
     assert_int_equal(terrain_imprint_tiles(&def), 0);
     def.memory = 1;
@@ -351,8 +330,7 @@ static void test_prints(void **state) {
 }
 
 /* Three materials: black, grey, white; a grey between two counts to the nearer. */
-static void test_labels(void **state) {
-    (void)state;
+TEST(test_labels) {
     static const png_byte grey[6] = {0, 63, 64, 191, 192, 255};
     static const int label[6] = {0, 0, 1, 1, 2, 2};
     write_png(grey, PNG_FORMAT_GRAY, 6, 1);
@@ -362,9 +340,7 @@ static void test_labels(void **state) {
     strcpy(def.labels, path);
     MildError error = {0};
     MildMap *map;
-    if (terrain_make(&def, 3, &map, &error) != MILD_OK) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(terrain_make(&def, 3, &map, &error) == MILD_OK, &error);
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
     terrain.materials[1] = terrain.materials[2] = sand;
@@ -376,12 +352,4 @@ static void test_labels(void **state) {
     mild_map_destroy(map);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_round_trip), cmocka_unit_test(test_kinds),
-        cmocka_unit_test(test_too_large),  cmocka_unit_test(test_open_file),
-        cmocka_unit_test(test_refused),    cmocka_unit_test(test_terrain),
-        cmocka_unit_test(test_labels),     cmocka_unit_test(test_terrain_refused),
-        cmocka_unit_test(test_when_a_map), cmocka_unit_test(test_prints)};
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

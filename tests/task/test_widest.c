@@ -9,9 +9,7 @@ static int widest_setup(void **unused) {
     (void)unused;
     MildError error = {0};
     robot = widest_open(&error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(robot != NULL, &error);
     mirror = task_mirror(robot);
     return 0;
 }
@@ -21,8 +19,7 @@ static int widest_teardown(void **unused) {
     return widest_close(robot);
 }
 
-static void widths(void **unused) {
-    (void)unused;
+TEST(widths) {
     TaskShape shape = task_shape(robot);
     assert_int_equal(shape.joints, ROBOT_JOINTS_MAX);
     assert_int_equal(shape.feet, ROBOT_FEET_MAX);
@@ -34,8 +31,7 @@ static void widths(void **unused) {
 }
 
 /* Twice mirrored is the same, in every entry. */
-static void mirror_twice(void **unused) {
-    (void)unused;
+TEST(mirror_twice) {
     for (int i = 0; i < TASK_OBSERVATION_MAX; i++) {
         int j = mirror.observation_index[i];
         assert_int_equal(mirror.observation_index[j], i);
@@ -49,8 +45,7 @@ static void mirror_twice(void **unused) {
 
 /* Stance in the half of the cycle after the foot's offset, swing in the other: h = apex sin(pi s);
  * all joints of a swinging leg bend by amplitude |sin| times `swing`. */
-static void gait_of_any_offset(void **unused) {
-    (void)unused;
+TEST(gait_of_any_offset) {
     TaskDef def = task_def_default();
     int swings = 0;
     for (double phase = 0.003; phase < 1; phase += 0.0137) {
@@ -83,8 +78,7 @@ static void gait_of_any_offset(void **unused) {
 }
 
 /* Rows written end where they should: what lies behind them stays. */
-static void steps(void **unused) {
-    (void)unused;
+TEST(steps) {
     TaskDef def = kit_quiet_def();
     MildError error = {0};
     TaskEnv *env = aligned_alloc(64, task_env_bytes(&def, robot));
@@ -123,12 +117,4 @@ static void steps(void **unused) {
     free(env);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(widths),
-        cmocka_unit_test(mirror_twice),
-        cmocka_unit_test(gait_of_any_offset),
-        cmocka_unit_test(steps),
-    };
-    return cmocka_run_group_tests(tests, widest_setup, widest_teardown);
-}
+TEST_MAIN(widest_setup, widest_teardown)

@@ -250,8 +250,7 @@ static void fail_each(const char *name, Attempt attempt) {
     print_message("%-10s %3d allocations, each failed once\n", name, n - 1);
 }
 
-static void test_every_allocation_may_fail(void **state) {
-    (void)state;
+TEST(test_every_allocation_may_fail) {
     fail_each("sole", attempt_sole);
     fail_each("scratch", attempt_scratch);
     fail_each("map", attempt_map);
@@ -263,7 +262,4 @@ static void test_every_allocation_may_fail(void **state) {
     fail_each("trainer", attempt_trainer);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_every_allocation_may_fail)};
-    return cmocka_run_group_tests(tests, make_walker, drop_walker);
-}
+TEST_MAIN(make_walker, drop_walker)

@@ -21,9 +21,7 @@ static Trainer *trainer_of(TrainRobots robots) {
     def.ppo.steps = 8;
     def.task.physics_dt = 0.005;
     Trainer *trainer = train_create(&def, &error);
-    if (!trainer) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(trainer != NULL, &error);
     return trainer;
 }
 
@@ -51,8 +49,7 @@ static void expect_same(Trainer *a, Trainer *b) {
     assert_memory_equal(weights(a, &bytes), other, bytes);
 }
 
-static void runs_repeat(void **unused) {
-    (void)unused;
+TEST(runs_repeat) {
     Trainer *a = trainer_of(TRAIN_ROBOTS_BATCH), *b = trainer_of(TRAIN_ROBOTS_BATCH);
     iterate(a, ITERATIONS);
     iterate(b, ITERATIONS);
@@ -61,8 +58,7 @@ static void runs_repeat(void **unused) {
     train_destroy(b);
 }
 
-static void checkpoints_change_robots(void **unused) {
-    (void)unused;
+TEST(checkpoints_change_robots) {
     MildError error = {0};
     const TrainRobots way[] = {TRAIN_ROBOTS_BATCH, TRAIN_ROBOTS_BATCH, TRAIN_ROBOTS_MUJOCO,
                                TRAIN_ROBOTS_BATCH};
@@ -85,10 +81,4 @@ static void checkpoints_change_robots(void **unused) {
     unlink(CHECKPOINT);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(runs_repeat),
-        cmocka_unit_test(checkpoints_change_robots),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

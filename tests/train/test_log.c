@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include "base/paths.h"
-#include "kit.h"
+#include "files.h"
 #include "run/train/events.h"
 #include "run/train/history.h"
 #include "run/train/log.h"
@@ -43,16 +43,14 @@ static size_t read_file(const char *path, char *data, size_t size) {
     return length;
 }
 
-static void test_crc32c(void **state) {
-    (void)state;
+TEST(test_crc32c) {
     static const unsigned char zeros[32] = {0};
     assert_int_equal(events_crc32c("123456789", 9),
                      0xe3069283u); /* the check value of the CRC catalogue */
     assert_int_equal(events_crc32c(zeros, 32), 0x8a9136aau); /* RFC 3720, appendix B.4 */
 }
 
-static void test_csv_resume(void **state) {
-    (void)state;
+TEST_WITH(test_csv_resume, make_folder, remove_folder) {
     static const char *const columns[] = {"reward/gait", "rate"};
     char path[PATH_SIZE], text[1024];
     MildError error = {0};
@@ -86,8 +84,7 @@ static uint32_t masked(uint32_t crc) {
     return ((crc >> 15) | (crc << 17)) + 0xa282ead8u;
 }
 
-static void test_records(void **state) {
-    (void)state;
+TEST_WITH(test_records, make_folder, remove_folder) {
     enum { TAGS = 300 };
     static char names[TAGS][32], data[200000];
     static const char *tags[TAGS];
@@ -220,8 +217,7 @@ static void find_events(char path[PATH_SIZE]) {
 
 /* Field numbers of TensorBoard's event.proto, summary.proto, tensor.proto and hparams' plugin_data
  * .proto: an event's summary (5), its value (1): tag 1, tensor 8, metadata 9. */
-static void test_config(void **state) {
-    (void)state;
+TEST_WITH(test_config, make_folder, remove_folder) {
     static const char *const columns[] = {"rate"};
     static char data[4096];
     MildError error = {0};
@@ -268,8 +264,7 @@ static void assert_same(Part summary, int n, const char *name, double number) {
 /* TensorBoard shows the numbers of log.csv under their names, at their iterations: as many as make
  * several events of each row. Of an event: wall time 1, step 2, summary 5; of its value: tag 1,
  * simple_value 2. */
-static void test_scalars(void **state) {
-    (void)state;
+TEST_WITH(test_scalars, make_folder, remove_folder) {
     enum { COLUMNS = 300, ROWS = 3 };
     static char names[COLUMNS][120], data[400000];
     static const char *columns[COLUMNS];
@@ -316,14 +311,11 @@ static void test_scalars(void **state) {
 static MildStatus read_log(const char *text, size_t size, History *history, MildError *error) {
     char path[PATH_SIZE];
     path_join(folder, "log.csv", path, NULL);
-    FILE *file = fopen(path, "wb");
-    assert_int_equal(fwrite(text, 1, size, file), size);
-    fclose(file);
+    kit_write(path, text, size);
     return history_read(path, history, error);
 }
 
-static void test_history(void **state) {
-    (void)state;
+TEST_WITH(test_history, make_folder, remove_folder) {
     static const char *const columns[] = {"reward/gait", "rate"};
     char path[PATH_SIZE];
     MildError error = {0};
@@ -388,8 +380,7 @@ static void test_history(void **state) {
     history_free(&history);
 }
 
-static void test_settings(void **state) {
-    (void)state;
+TEST(test_settings) {
     MildError error = {0};
     Settings settings;
     assert_int_equal(settings_read("[train]\nenvs = 4\n; a remark\n[ppo]\nenvs = a b\n", "it",
@@ -404,15 +395,4 @@ static void test_settings(void **state) {
     assert_error(&error, MILD_ERROR_FORMAT, "it:2");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_crc32c),
-        cmocka_unit_test_setup_teardown(test_csv_resume, make_folder, remove_folder),
-        cmocka_unit_test_setup_teardown(test_records, make_folder, remove_folder),
-        cmocka_unit_test_setup_teardown(test_config, make_folder, remove_folder),
-        cmocka_unit_test_setup_teardown(test_scalars, make_folder, remove_folder),
-        cmocka_unit_test_setup_teardown(test_history, make_folder, remove_folder),
-        cmocka_unit_test(test_settings),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -93,8 +93,7 @@ static double train_on(int model) {
     return report.reward_per_step;
 }
 
-static void every_model_is_trained_on(void **state) {
-    (void)state;
+TEST(every_model_is_trained_on) {
     double reward[MILD_MODELS];
     for (int model = 0; model < MILD_MODELS; model++) {
         reward[model] = train_on(model);
@@ -104,7 +103,4 @@ static void every_model_is_trained_on(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(every_model_is_trained_on)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -21,15 +21,12 @@ static Trainer *trainer_of(const char *robot) {
     MildError error = {0};
     const ExperimentDef def = small_def(robot);
     Trainer *trainer = train_create(&def, &error);
-    if (!trainer) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(trainer != NULL, &error);
     return trainer;
 }
 
 /* Two iterations of the quadruped: every loss finite, the weights moved. */
-static void a_quadruped_trains(void **unused) {
-    (void)unused;
+TEST(a_quadruped_trains) {
     MildError error = {0};
     Trainer *trainer = trainer_of("go1");
     assert_string_equal(policy_def(train_policy(trainer))->robot, "go1");
@@ -57,8 +54,7 @@ static void a_quadruped_trains(void **unused) {
 }
 
 /* A policy and a checkpoint of one robot are refused on another, in one line with both names. */
-static void another_robots_policy_is_refused(void **unused) {
-    (void)unused;
+TEST(another_robots_policy_is_refused) {
     MildError error = {0};
     Trainer *go1 = trainer_of("go1"), *sa01 = trainer_of("sa01");
     Robot *robot[2] = {robot_open("go1", &error), robot_open("sa01", &error)};
@@ -85,8 +81,7 @@ static void another_robots_policy_is_refused(void **unused) {
 }
 
 /* Files from before policies named their robot are those of any robot of their shape. */
-static void a_policy_without_a_name_loads(void **unused) {
-    (void)unused;
+TEST(a_policy_without_a_name_loads) {
     MildError error = {0};
     Robot *go1 = robot_open("go1", &error), *sa01 = robot_open("sa01", &error);
     ExperimentDef def = small_def("sa01");
@@ -108,8 +103,7 @@ static void a_policy_without_a_name_loads(void **unused) {
 
 /* Where the decoder of the ground finds its 13 numbers: behind the frame, the estimates, six of
  * each foot, the push and four masses. */
-static void the_decoder_is_that_of_the_target(void **unused) {
-    (void)unused;
+TEST(the_decoder_is_that_of_the_target) {
     static const char *const names[] = {"sa01", "go1"};
     static const int first[] = {47 + 11 + 12 + 10, 47 + 19 + 24 + 10};
     MildError error = {0};
@@ -128,8 +122,7 @@ static void the_decoder_is_that_of_the_target(void **unused) {
     }
 }
 
-static void an_unknown_robot_is_named(void **unused) {
-    (void)unused;
+TEST(an_unknown_robot_is_named) {
     MildError error = {0};
     const ExperimentDef def = small_def("sa02");
     assert_null(train_create(&def, &error));
@@ -158,8 +151,7 @@ static void check_all_but_decoder(Policy *a, Policy *b) {
 
 /* train.start: the networks of a file in the place of those that the seed draws. A decoder of
  * something else is left out; those of another robot, or of another width, are refused. */
-static void a_run_begins_with_a_policy(void **unused) {
-    (void)unused;
+TEST(a_run_begins_with_a_policy) {
     MildError error = {0};
     ExperimentDef def = small_def("sa01");
     Trainer *first = train_create(&def, &error);
@@ -196,14 +188,4 @@ static void a_run_begins_with_a_policy(void **unused) {
     unlink(POLICY);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_quadruped_trains),
-        cmocka_unit_test(another_robots_policy_is_refused),
-        cmocka_unit_test(a_run_begins_with_a_policy),
-        cmocka_unit_test(a_policy_without_a_name_loads),
-        cmocka_unit_test(the_decoder_is_that_of_the_target),
-        cmocka_unit_test(an_unknown_robot_is_named),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

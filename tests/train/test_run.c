@@ -69,15 +69,12 @@ static void run(const ExperimentDef *def) {
                             .note = "test"};
     const TrainCallbacks callbacks = {.iterated = keep};
     TrainRun *run = train_run_open(&of, &callbacks, &error);
-    if (!run) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(run != NULL, &error);
     assert_int_equal(train_run_loop(run, &error), MILD_OK);
     train_run_close(run);
 }
 
-static void a_column_is_what_it_names(void **state) {
-    (void)state;
+TEST(a_column_is_what_it_names) {
     char header[4096], line[4096], *names[COLUMNS_MAX], *more;
     ExperimentDef def = experiment_def_default();
     int columns = 0, rows = 0, ended = 0;
@@ -120,8 +117,4 @@ static int remove_folder(void **state) {
     return system("rm -rf " FOLDER);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(a_column_is_what_it_names, remove_folder, remove_folder)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(remove_folder, remove_folder)

@@ -23,8 +23,7 @@ static double followed(double seconds, double rate) {
 /* The response of (1 + 2 T s)/(1 + T s)^2 to the ramp v t: v t (1 - exp(-t/T)), by hand. Five
  * frames a second give what hundred give, up to the path within a frame of the filter's own output.
  */
-static void same_at_any_frame_rate(void **state) {
-    (void)state;
+TEST(same_at_any_frame_rate) {
     double worst = 0, seconds[] = {0.4, 1, 2, 5};
     for (int k = 0; k < 4; k++) {
         double t = seconds[k], wanted = SPEED * t * (1 - exp(-t / LAG));
@@ -35,14 +34,12 @@ static void same_at_any_frame_rate(void **state) {
     assert_true(worst < 1e-3);
 }
 
-static void nothing_stays_behind(void **state) {
-    (void)state;
+TEST(nothing_stays_behind) {
     assert_true(fabs(followed(8, 25) - SPEED * 8) < 1e-4);
     assert_true(fabs(followed(8, 7) - SPEED * 8) < 1e-4);
 }
 
-static void no_time_no_motion(void **state) {
-    (void)state;
+TEST(no_time_no_motion) {
     Follow follow;
     double look[3];
     follow_jump(&follow, (const double[3]){1, 1, 1});
@@ -51,11 +48,4 @@ static void no_time_no_motion(void **state) {
     assert_true(look[0] == 1 && look[1] == 1 && look[2] == 1);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(same_at_any_frame_rate),
-        cmocka_unit_test(nothing_stays_behind),
-        cmocka_unit_test(no_time_no_motion),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -1,5 +1,5 @@
 /* The visible ground: prints where the sole was, as deep as it was, and recovery by material. */
-#include "kit.h"
+#include "materials.h"
 #include "view/relief.h"
 
 #define CELL 0.01
@@ -15,9 +15,7 @@ static MildTerrain terrain;
 
 static void make(const char *material, int rigid) {
     MildError error = {0};
-    MildMaterial m;
-    assert_true(mild_material_preset(material, &m));
-    terrain = mild_terrain_uniform(&m);
+    terrain = kit_terrain(material);
     MildSoleDef def = {.outline = outline, .points = 4, .pitch = 0.0195, .sole_z = -0.055};
     sole = mild_sole_create(&def, &error);
     assert_non_null(sole);
@@ -61,8 +59,7 @@ static double print_after_lift(const char *material) {
     return left;
 }
 
-static void recovery_by_material(void **state) {
-    (void)state;
+TEST(recovery_by_material) {
     double foam = print_after_lift("foam45"), sand = print_after_lift("sand_loose"),
            grass = print_after_lift("grass");
     print_message("print left of %.0f mm: foam45 %.1f, grass %.1f, sand_loose %.1f mm\n",
@@ -73,8 +70,7 @@ static void recovery_by_material(void **state) {
 }
 
 /* Under every element of a pressed, tilted sole the surface is as deep as the element's centre. */
-static void dent_is_as_deep_as_the_elements(void **state) {
-    (void)state;
+TEST(dent_is_as_deep_as_the_elements) {
     const char *grounds[] = {"foam25", "rubber", "sand_loose"};
     double worst = 0;
     for (int g = 0; g < 3; g++) {
@@ -118,8 +114,7 @@ static double skirt_width(const char *material) {
     return width;
 }
 
-static void surface_rises_smoothly_beside_the_sole(void **state) {
-    (void)state;
+TEST(surface_rises_smoothly_beside_the_sole) {
     /* 31.5 mm deep, recovery 0, 0.5, 1; a vertex of the grid farther at most */
     assert_true(fabs(skirt_width("sand_loose") - 0.0246) < 1.1 * CELL);
     assert_true(fabs(skirt_width("grass") - 0.0462) < 1.1 * CELL);
@@ -128,8 +123,7 @@ static void surface_rises_smoothly_beside_the_sole(void **state) {
 
 /* The dent follows a foot that is lifted slowly: foam back to the sole at every height, sand not.
  */
-static void dent_follows_the_lifted_foot(void **state) {
-    (void)state;
+TEST(dent_follows_the_lifted_foot) {
     make("foam25", 0);
     for (double depth = DEPTH; depth > 0; depth -= 0.005) {
         press(0.1, 0.05, depth);
@@ -151,8 +145,7 @@ static void dent_follows_the_lifted_foot(void **state) {
 
 /* Normals against differences of the drawn depth; unit length; upright where nothing was pressed.
  */
-static void normals_are_those_of_the_surface(void **state) {
-    (void)state;
+TEST(normals_are_those_of_the_surface) {
     static float position[3 * VERTICES], normal[3 * VERTICES];
     make("foam28", 0);
     press(0.1, 0.05, DEPTH);
@@ -179,8 +172,7 @@ static void normals_are_those_of_the_surface(void **state) {
     destroy();
 }
 
-static void print_stays_when_the_foot_walks_on(void **state) {
-    (void)state;
+TEST(print_stays_when_the_foot_walks_on) {
     make("sand_loose", 0);
     press(-0.3, 0, DEPTH);
     press(0.3, 0, 0.5 * DEPTH);
@@ -190,8 +182,7 @@ static void print_stays_when_the_foot_walks_on(void **state) {
 }
 
 /* Neighbouring tiles share their edge: both must be refreshed and agree. */
-static void tiles_agree_on_their_edge(void **state) {
-    (void)state;
+TEST(tiles_agree_on_their_edge) {
     make("sand_loose", 0);
     double edge = relief_tile_edge(relief), first[2];
     relief_tile_center(relief, 0, first);
@@ -216,8 +207,7 @@ static void tiles_agree_on_their_edge(void **state) {
 }
 
 /* A vertex beside a tile turns the normals of its edge: that tile must be drawn again, too. */
-static void neighbours_are_refreshed(void **state) {
-    (void)state;
+TEST(neighbours_are_refreshed) {
     int beside = 0;
     for (int k = 0; k < 40; k++) {
         make("sand_loose", 0);
@@ -241,8 +231,7 @@ static void neighbours_are_refreshed(void **state) {
     assert_true(beside > 4);
 }
 
-static void pressed_ground_is_darker(void **state) {
-    (void)state;
+TEST(pressed_ground_is_darker) {
     make("sand_loose", 0);
     static unsigned char before[RELIEF_TILE_PIXELS * RELIEF_TILE_PIXELS * 3], after[sizeof before];
     double center[2];
@@ -258,8 +247,7 @@ static void pressed_ground_is_darker(void **state) {
     destroy();
 }
 
-static void rigid_ground_never_yields(void **state) {
-    (void)state;
+TEST(rigid_ground_never_yields) {
     make("sand_loose", 1);
     press(0, 0, DEPTH);
     assert_true(depth_at(0.05, 0) == 0.0);
@@ -269,8 +257,7 @@ static void rigid_ground_never_yields(void **state) {
 
 /* On uneven ground heights are those of the map, and a print lies as deep below it as on level
  * ground. */
-static void prints_follow_the_map(void **state) {
-    (void)state;
+TEST(prints_follow_the_map) {
     MildError error = {0};
     MildMapDef def = mild_map_def_default();
     def.kind = MILD_MAP_WAVES;
@@ -307,19 +294,4 @@ static void prints_follow_the_map(void **state) {
     mild_map_destroy(map);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(recovery_by_material),
-        cmocka_unit_test(dent_is_as_deep_as_the_elements),
-        cmocka_unit_test(surface_rises_smoothly_beside_the_sole),
-        cmocka_unit_test(dent_follows_the_lifted_foot),
-        cmocka_unit_test(normals_are_those_of_the_surface),
-        cmocka_unit_test(print_stays_when_the_foot_walks_on),
-        cmocka_unit_test(tiles_agree_on_their_edge),
-        cmocka_unit_test(neighbours_are_refreshed),
-        cmocka_unit_test(pressed_ground_is_darker),
-        cmocka_unit_test(rigid_ground_never_yields),
-        cmocka_unit_test(prints_follow_the_map),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

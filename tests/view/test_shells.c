@@ -1,5 +1,5 @@
 /* Shells that stand on the ground press what is drawn of it. */
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 #include "view/relief.h"
 #include "view/view.h"
@@ -16,14 +16,11 @@ static MildGround *ground;
 static int setup(void **state) {
     (void)state;
     MildError error = {0};
-    robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    robot = kit_robot(SA01);
     robot_set_shells(robot, 1);
     sim = robot_sim_create(robot, DT, &error);
     assert_non_null(sim);
-    const MildSole *const *soles = robot_soles(robot);
-    const size_t bytes = mild_ground_bytes(soles, robot_bodies(robot));
-    ground = mild_ground_init(aligned_alloc(64, bytes), soles, robot_bodies(robot));
+    ground = kit_ground(robot);
     return 0;
 }
 
@@ -36,9 +33,7 @@ static int teardown(void **state) {
 }
 
 static void lay_ground(const char *name) {
-    MildMaterial material;
-    assert_true(mild_material_preset(name, &material));
-    terrain = mild_terrain_uniform(&material);
+    terrain = kit_terrain(name);
 }
 
 /* [rad] The knees are bent, so that the shanks' upper ends press. */
@@ -86,8 +81,7 @@ static int body_facets(int b, Facet *facets) {
 
 /* On foam: the drawn surface is where the elements of shanks and base are, and level again
  * once they are gone. A shank leans, and a cell is 10 mm wide. */
-static void dents_are_where_the_shells_are(void **state) {
-    (void)state;
+TEST(dents_are_where_the_shells_are) {
     MildError error = {0};
     const ReliefDef area = {-1.5, 1.5, -1, 1, 0.01, 0, NULL, 1};
     lay_ground("foam25");
@@ -129,8 +123,7 @@ static int pixels_different(const unsigned char *a, const unsigned char *b, size
 }
 
 /* The robot lies in sand and is taken away: its imprint is seen. The feet press nothing. */
-static void imprints_are_seen(void **state) {
-    (void)state;
+TEST(imprints_are_seen) {
     const size_t bytes = (size_t)3 * WIDTH * HEIGHT;
     const char *names[] = {"sand_loose"};
     MildError error = {0};
@@ -162,10 +155,4 @@ static void imprints_are_seen(void **state) {
     view_destroy(view);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(dents_are_where_the_shells_are),
-        cmocka_unit_test(imprints_are_seen),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -1,5 +1,5 @@
 /* The picture in characters: where the surface, an imprint and the robot are, by the dots. */
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 #include "view/sketch.h"
 
@@ -27,8 +27,7 @@ static int setup(void **state) {
     (void)state;
     MildError error = {0};
     MildMaterial sand;
-    robot = robot_create(SA01, &error);
-    assert_non_null(robot);
+    robot = kit_robot(SA01);
     sim = robot_sim_create(robot, 0.002, &error);
     assert_non_null(sim);
     assert_true(mild_material_preset("sand_loose", &sand));
@@ -86,8 +85,7 @@ static int top_of(int column) {
     return row;
 }
 
-static void surface_and_robot(void **state) {
-    (void)state;
+TEST_WITH(surface_and_robot, setup, teardown) {
     put(0, HEIGHT);
     draw();
     const int surface = row_of(0);
@@ -117,8 +115,7 @@ static void surface_and_robot(void **state) {
 }
 
 /* A foot presses, the robot goes away: the surface stays down there, as deep as the sole was. */
-static void imprint(void **state) {
-    (void)state;
+TEST_WITH(imprint, setup, teardown) {
     const double depth = 0.1;
     put(0, HEIGHT);
     put(0, HEIGHT - sole_height() - depth);
@@ -133,10 +130,4 @@ static void imprint(void **state) {
     assert_true(abs(top_of(column - (int)(0.25 * DOTS)) - row_of(-depth)) <= 1);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(surface_and_robot, setup, teardown),
-        cmocka_unit_test_setup_teardown(imprint, setup, teardown),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -49,8 +49,7 @@ static double error_of(unsigned char picture[HEIGHT][WIDTH][3], double slope) {
 /* Steps are longest where an edge is close to a row or a column: there the error halves. The sixth
  * is mixed along its own direction, not along its mirror image, which would leave more. Elsewhere
  * it does not grow. */
-static void slanted_edges_come_closer_to_the_truth(void **state) {
-    (void)state;
+TEST(slanted_edges_come_closer_to_the_truth) {
     const double slopes[] = {0.06, -0.12, 0.2, 8, -16, 0.9, -0.3, 0.45, -1.0, 3};
     for (int k = 0; k < 10; k++) {
         draw(slopes[k]);
@@ -62,8 +61,7 @@ static void slanted_edges_come_closer_to_the_truth(void **state) {
 }
 
 /* A level edge has no steps, and grain is no edge. */
-static void the_rest_stays(void **state) {
-    (void)state;
+TEST(the_rest_stays) {
     draw(0);
     smooth_edges(&from[0][0][0], WIDTH, HEIGHT, luma, &to[0][0][0]);
     assert_memory_equal(from, to, sizeof from);
@@ -80,8 +78,7 @@ static void the_rest_stays(void **state) {
 }
 
 /* A slanted line two pixels wide keeps its brightness: colours are mixed along it, not across. */
-static void lines_stay(void **state) {
-    (void)state;
+TEST(lines_stay) {
     for (int side = 0; side < 2; side++) {
         memset(from, 30, sizeof from);
         for (int j = 1; j < HEIGHT; j++) {
@@ -96,11 +93,4 @@ static void lines_stay(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(slanted_edges_come_closer_to_the_truth),
-        cmocka_unit_test(the_rest_stays),
-        cmocka_unit_test(lines_stay),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -61,16 +61,13 @@ static int files_in_folder(void) {
     return count;
 }
 
-static void whole_file_under_its_name(void **state) {
-    (void)state;
+TEST_WITH(whole_file_under_its_name, make_folder, remove_folder) {
     MildError error = {0};
     static unsigned char rgb[WIDTH * HEIGHT * 3];
     char path[96];
     snprintf(path, sizeof path, "%s/walk.mp4", folder);
     Video *video = video_open(path, WIDTH, HEIGHT, 25, &error);
-    if (!video) {
-        fail_msg("%s", error.text);
-    }
+    expect_good(video != NULL, &error);
     for (int i = 0; i < FRAMES; i++) {
         paint(rgb, i);
         assert_int_equal(video_frame(video, rgb, &error), MILD_OK);
@@ -86,8 +83,7 @@ static void whole_file_under_its_name(void **state) {
     unlink(path);
 }
 
-static void missing_ffmpeg_is_one_line(void **state) {
-    (void)state;
+TEST_WITH(missing_ffmpeg_is_one_line, make_folder, remove_folder) {
     MildError error = {0};
     char path[96], *before = strdup(getenv("PATH"));
     snprintf(path, sizeof path, "%s/walk.mp4", folder);
@@ -102,8 +98,7 @@ static void missing_ffmpeg_is_one_line(void **state) {
 }
 
 /* ffmpeg starts and then fails: the walk must survive it (no SIGPIPE) and say why. */
-static void failing_ffmpeg_is_one_line(void **state) {
-    (void)state;
+TEST_WITH(failing_ffmpeg_is_one_line, make_folder, remove_folder) {
     MildError error = {0};
     static unsigned char rgb[WIDTH * HEIGHT * 3];
     char path[96], program[96], *before = strdup(getenv("PATH"));
@@ -133,20 +128,11 @@ static void failing_ffmpeg_is_one_line(void **state) {
     assert_error(&error, MILD_ERROR_IO, path);
 }
 
-static void odd_size_is_refused(void **state) {
-    (void)state;
+TEST(odd_size_is_refused) {
     MildError error = {0};
     assert_null(video_open("x.mp4", 95, 64, 25, &error));
     assert_int_equal(error.status, MILD_ERROR_ARGUMENT);
     assert_null(video_open("x.mp4", 96, 64, 0, &error));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(whole_file_under_its_name, make_folder, remove_folder),
-        cmocka_unit_test_setup_teardown(missing_ffmpeg_is_one_line, make_folder, remove_folder),
-        cmocka_unit_test_setup_teardown(failing_ffmpeg_is_one_line, make_folder, remove_folder),
-        cmocka_unit_test(odd_size_is_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

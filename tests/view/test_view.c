@@ -2,7 +2,7 @@
 #include <unistd.h>
 
 #include "control/stand.h"
-#include "kit.h"
+#include "robots.h"
 #include "sa01.h"
 #include "view/model.h"
 #include "view/pressure.h"
@@ -22,18 +22,12 @@ static MildGround *ground;
 static int setup(void **state) {
     (void)state;
     MildError error = {0};
-    MildMaterial sand;
-    assert_true(mild_material_preset("sand_loose", &sand));
-    terrain = mild_terrain_uniform(&sand);
-    robot = robot_create(MODEL, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
+    terrain = kit_terrain("sand_loose");
+    robot = kit_robot(MODEL);
     stand = stand_create(robot, &error);
     sim = robot_sim_create(robot, DT, &error);
     assert_non_null(sim);
-    ground = mild_ground_init(aligned_alloc(64, mild_ground_bytes(robot_soles(robot), SA01_FEET)),
-                              robot_soles(robot), SA01_FEET);
+    ground = kit_ground(robot);
     return 0;
 }
 
@@ -78,8 +72,7 @@ static int pixels_different(const unsigned char *a, const unsigned char *b, size
 
 /* The robot lands in sand and is taken away: the picture must show it, and then the prints that it
  * left. */
-static void robot_and_prints_are_seen(void **state) {
-    (void)state;
+TEST(robot_and_prints_are_seen) {
     const size_t bytes = (size_t)240 * 136 * 3;
     MildError error = {0};
     View *view = small_view(&error);
@@ -128,8 +121,7 @@ static void robot_and_prints_are_seen(void **state) {
 
 /* Another robot is drawn where its place says, with its imprints, which stay in sand; and not where
  * it is behind the camera. The robot itself is out of sight. */
-static void others_are_seen(void **state) {
-    (void)state;
+TEST(others_are_seen) {
     const size_t bytes = (size_t)240 * 136 * 3;
     MildError error = {0};
     ViewDef def = view_def_default();
@@ -181,13 +173,10 @@ static void others_are_seen(void **state) {
 
 /* The robot stands on foam: the drawn surface is where the ground's elements are, and level again
  * once it is gone. */
-static void dents_are_where_the_elements_are(void **state) {
-    (void)state;
+TEST(dents_are_where_the_elements_are) {
     MildError error = {0};
-    MildMaterial foam;
-    assert_true(mild_material_preset("foam25", &foam));
     MildTerrain sand = terrain;
-    terrain = mild_terrain_uniform(&foam);
+    terrain = kit_terrain("foam25");
     ReliefDef area = {-1, 1, -1, 1, 0.01, 0, NULL, 1};
     Relief *relief = relief_create(&area, &terrain, robot_rasters(robot), SA01_FEET, &error);
     assert_non_null(relief);
@@ -219,8 +208,7 @@ static void dents_are_where_the_elements_are(void **state) {
     terrain = sand;
 }
 
-static void bad_size_is_one_line(void **state) {
-    (void)state;
+TEST(bad_size_is_one_line) {
     MildError error = {0};
     ViewDef def = view_def_default();
     def.width = 8;
@@ -251,8 +239,7 @@ static int skies(const char *xml) {
 }
 
 /* One, of the file or ours. */
-static void every_robot_has_a_sky(void **state) {
-    (void)state;
+TEST(every_robot_has_a_sky) {
     char path[] = "/tmp/mild_sky_XXXXXX";
     FILE *file = fdopen(mkstemp(path), "w");
     assert_non_null(file);
@@ -264,8 +251,7 @@ static void every_robot_has_a_sky(void **state) {
 }
 
 /* Mean pressure times area over a stance is the mean force of that stance. */
-static void pressure_carries_the_weight(void **state) {
-    (void)state;
+TEST(pressure_carries_the_weight) {
     MildError error = {0};
     Pressure *pressure = pressure_create(robot, 1, DT, &error);
     assert_non_null(pressure);
@@ -319,14 +305,4 @@ static void pressure_carries_the_weight(void **state) {
     pressure_destroy(pressure);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(robot_and_prints_are_seen),
-        cmocka_unit_test(others_are_seen),
-        cmocka_unit_test(dents_are_where_the_elements_are),
-        cmocka_unit_test(bad_size_is_one_line),
-        cmocka_unit_test(every_robot_has_a_sky),
-        cmocka_unit_test(pressure_carries_the_weight),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

@@ -3,8 +3,7 @@
 #include "kit.h"
 #include "view/window.h"
 
-static void nothing_without_windows(void **state) {
-    (void)state;
+TEST(nothing_without_windows) {
     MildError error = {0};
     assert_false(window_available());
     assert_null(window_create(64, 64, "test", &error));
@@ -130,8 +129,7 @@ static WindowInput after(Window *window, int key, int twice) {
 
 /* x forward, y left, z turning left: the up arrow goes forward, Q left, the left arrow turns left.
  * The letters of `mild play --help`. */
-static void keys(void **state) {
-    (void)state;
+TEST(keys) {
     static const struct {
         int key;
         WindowInput asks;
@@ -172,8 +170,7 @@ static void keys(void **state) {
     window_destroy(window);
 }
 
-static void keys_that_stay(void **state) {
-    (void)state;
+TEST(keys_that_stay) {
     Window *window = open_window();
     assert_true(after(window, GLFW_KEY_SPACE, 0).paused);
     assert_true(after(window, GLFW_KEY_X, 0).paused);
@@ -193,8 +190,7 @@ static void keys_that_stay(void **state) {
 
 /* A picture that is dragged goes with the hand: to the right turns the camera to the right, which
  * is negative, down lowers it. Without the button nothing moves. */
-static void mouse_drags(void **state) {
-    (void)state;
+TEST(mouse_drags) {
     WindowInput input;
     Window *window = open_window();
     move(NULL, 10, 10);
@@ -216,14 +212,4 @@ static void mouse_drags(void **state) {
 
 #endif
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nothing_without_windows),
-#ifdef MILD_GLFW
-        cmocka_unit_test(keys),
-        cmocka_unit_test(keys_that_stay),
-        cmocka_unit_test(mouse_drags),
-#endif
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -22,8 +22,7 @@ static void policy_of(int which) {
     assert_true(worst < 0.01f && worst > 0);
 }
 
-static void test_policy(void **state) {
-    (void)state;
+TEST(test_policy) {
     for (int i = ROBOTS - 1; i >= 0; i--) {
         policy_of(i);
     }
@@ -58,8 +57,7 @@ static void same_steps_of(int which) {
     }
 }
 
-static void test_same_steps(void **state) {
-    (void)state;
+TEST(test_same_steps) {
     same_steps_of(ON_G1);
     same_steps_of(ON_SA01);
 }
@@ -103,8 +101,7 @@ static void same_loads_of(int which) {
     }
 }
 
-static void test_same_loads(void **state) {
-    (void)state;
+TEST(test_same_loads) {
     for (int i = ROBOTS - 1; i >= 0; i--) {
         same_loads_of(i);
     }
@@ -174,7 +171,7 @@ static void fall(const Fall *def, Fallen *mine, Fallen *theirs) {
 
 /* The ground carries shanks and base as it does in the batch engine, and ends the trial by the same
  * rule. On its knees the robot leaves much of its weight to the shanks. */
-static void test_shells(void **state) {
+TEST(test_shells) {
     static const Fall falls[] = {
         {"foam28", -0.5f, 4, -2, TASK_END_tilt},
         {"foam28", -0.5f, 3, -2, TASK_END_base},
@@ -182,7 +179,6 @@ static void test_shells(void **state) {
         {"sand_loose", -0.5f, 3.5f, 0, TASK_END_base},
     };
     double most = 0;
-    (void)state;
     for (size_t i = 0; i < sizeof falls / sizeof *falls; i++) {
         Fallen mine, theirs;
         fall(&falls[i], &mine, &theirs);
@@ -196,12 +192,4 @@ static void test_shells(void **state) {
     assert_true(most > 0.5 * weight);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_policy),
-        cmocka_unit_test(test_same_steps),
-        cmocka_unit_test(test_same_loads),
-        cmocka_unit_test(test_shells),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

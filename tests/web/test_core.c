@@ -2,8 +2,7 @@
 #include "page.h"
 
 /* What a file says that is not one. */
-static void test_files(void **state) {
-    (void)state;
+TEST(test_files) {
     WebModel *other = aligned_alloc(64, 1 << 20);
     assert_non_null(web_open(model, 20));
     assert_non_null(web_open(model, sizeof *model - 1));
@@ -95,8 +94,7 @@ static void walks_of(int which) {
     assert_true(fabs(mine / theirs - 1) < beside);
 }
 
-static void test_walks(void **state) {
-    (void)state;
+TEST(test_walks) {
     for (int i = ROBOTS - 1; i >= 0; i--) {
         walks_of(i);
     }
@@ -118,8 +116,7 @@ static void hills_of(int which) {
     }
 }
 
-static void test_hills(void **state) {
-    (void)state;
+TEST(test_hills) {
     for (int i = ROBOTS - 1; i >= 0; i--) {
         hills_of(i);
     }
@@ -138,8 +135,7 @@ static double pressed(void) {
 }
 
 /* Prints stay on sand, 0.6 m/s in steps of 0.4 s; foam springs back. */
-static void test_prints(void **state) {
-    (void)state;
+TEST(test_prints) {
     start(preset("sand_loose"), WEB_LEVEL, 1);
     walk(5, 0.6f);
     const double sand = pressed();
@@ -189,10 +185,9 @@ static void lowest_corner(int s, double lowest[3]) {
 
 /* Shanks in the ground press what is drawn of it, as deep as they are: an imprint that stays in
  * sand and springs back in foam. A corner of their boxes on end is narrower than a cell. */
-static void test_imprints_of_shells(void **state) {
+TEST(test_imprints_of_shells) {
     static const float still[3] = {0, 0, 0};
     static const float kneel[6] = {0, 0, -0.5f, 4, -2, 0};
-    (void)state;
     for (int sand = 0; sand < 2; sand++) {
         float action[SA01_JOINTS];
         double deepest[3] = {0, 0, 0}, above = 0, shown = 0;
@@ -240,8 +235,7 @@ static double pressed_between(double low, double high, float depth) {
 /* The window follows the robot: what left it and comes back is what the ground remembers, which
  * standing up again leaves as it is. The slope around a print, which is drawn first, is no part of
  * that: so what lies deeper than 30 mm. */
-static void test_window(void **state) {
-    (void)state;
+TEST(test_window) {
     start(preset("sand_loose"), WEB_LEVEL, 1);
     walk(5, 0.6f);
     const double before = pressed_between(0.2, 1.2, 0.03f);
@@ -315,8 +309,7 @@ static void soles_of(int which) {
     assert_true(fabs(load / weight - 1) < 0.1);
 }
 
-static void test_soles(void **state) {
-    (void)state;
+TEST(test_soles) {
     for (int i = ROBOTS - 1; i >= 0; i--) {
         soles_of(i);
     }
@@ -330,8 +323,7 @@ static void walk_to(double x) {
 }
 
 /* In stripes of WEB_STRIPE, as the page draws them: prints stay in sand, and not in foam. */
-static void test_stripes(void **state) {
-    (void)state;
+TEST(test_stripes) {
     const double foam = preset("foam28") * WEB_STRIPE, sand = preset("sand_loose") * WEB_STRIPE;
     start(WEB_STRIPES, WEB_LEVEL, 1);
     walk_to(foam + 2 * WEB_STRIPE);
@@ -361,8 +353,7 @@ static double rival_depth(double stiffness) {
     return sum / (6 * SECOND);
 }
 
-static void test_sliders(void **state) {
-    (void)state;
+TEST(test_sliders) {
     double load = 0;
     start(preset("foam45"), WEB_LEVEL, 1);
     const double stiffness[3] = {3, 1, 0.7};
@@ -403,8 +394,7 @@ static double facing(void) {
 }
 
 /* It stands up where it fell, as it faced, and the prints are there still. */
-static void test_again(void **state) {
-    (void)state;
+TEST(test_again) {
     start(preset("sand_loose"), WEB_LEVEL, 1);
     walk(4, 0.6f);
     const double before = pressed(), x = (double)web_view()->link[0][3];
@@ -452,8 +442,7 @@ static void walk_two_seconds(const char *soil, int ground, float found[3]) {
 
 /* A soil's file is the ground that it names: to the last bit the preset's, where it changes nothing
  * of it. */
-static void test_soil(void **state) {
-    (void)state;
+TEST(test_soil) {
     float own[3], usual[3];
     walk_two_seconds("[ground]\npreset = grass\n", 0, own);
     walk_two_seconds(NULL, preset("grass"), usual);
@@ -476,14 +465,4 @@ static void test_soil(void **state) {
     choose(ON_SA01);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_files),  cmocka_unit_test(test_walks),
-        cmocka_unit_test(test_hills),  cmocka_unit_test(test_prints),
-        cmocka_unit_test(test_window), cmocka_unit_test(test_sliders),
-        cmocka_unit_test(test_soles),  cmocka_unit_test(test_stripes),
-        cmocka_unit_test(test_again),  cmocka_unit_test(test_imprints_of_shells),
-        cmocka_unit_test(test_soil),
-    };
-    return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_MAIN(setup, teardown)

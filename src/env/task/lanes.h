@@ -1,4 +1,4 @@
-/* Numbers and lanes of the task's functions, which are the same text on the CPU and on a GPU:
+/* Numbers and lanes of the task's functions, which are the same code on the CPU and on a GPU:
  * step.h, gait.h, assist.h, observe.h, reward.h, randomize.h. They are compiled twice, as the
  * ground's law is: for robots that MuJoCo steps (task.h) with Real = double, and for those of the
  * batch engine (env/batch_step.h) with Real = float. */

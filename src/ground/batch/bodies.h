@@ -640,7 +640,7 @@ WARP_FN void bodies_leave(const BodiesMemory *memory, int elements) {
 }
 
 /* A whole step. advance: bool, the memory moves to its end. heap: bool, materials may have
- * LAW_HEAP; a constant, for the text is shorter without. */
+ * LAW_HEAP; a constant, because the code is shorter without. */
 TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance, int heap) {
     const int rows = 6 * work->count;
     EACH_LANE(l) {

@@ -316,8 +316,8 @@ MildStatus config_read(const ConfigSection *sections, int count, const char *pat
     return status;
 }
 
-MildStatus config_override(const ConfigSection *sections, int count, const char *text,
-                           MildError *error) {
+static MildStatus set_override(const ConfigSection *sections, int count, const char *text,
+                               MildError *error) {
     char section[64], key[64], where[WHERE_MAX];
     if (strpbrk(text, "\r\n")) {
         return mild_fail(error, MILD_ERROR_FORMAT, "--%.*s: an override must be a single line",
@@ -339,7 +339,7 @@ MildStatus config_override(const ConfigSection *sections, int count, const char 
 MildStatus config_overrides(const ConfigSection *sections, int count, const char *const *texts,
                             int text_count, MildError *error) {
     for (int i = 0; i < text_count; i++) {
-        MildStatus status = config_override(sections, count, texts[i], error);
+        MildStatus status = set_override(sections, count, texts[i], error);
         if (status != MILD_OK) {
             return status;
         }

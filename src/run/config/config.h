@@ -26,9 +26,7 @@ MildStatus config_read_text(const ConfigSection *sections, int count, const char
 MildStatus config_read(const ConfigSection *sections, int count, const char *path, int complete,
                        MildError *error);
 
-/* One override: "section.key=value" (without the leading dashes). */
-MildStatus config_override(const ConfigSection *sections, int count, const char *text,
-                           MildError *error);
+/* Overrides: "section.key=value" (without the leading dashes). */
 MildStatus config_overrides(const ConfigSection *sections, int count, const char *const *texts,
                             int text_count, MildError *error);
 
