@@ -156,7 +156,7 @@ class Plugin(unittest.TestCase):
 
 
 class Newton(unittest.TestCase):
-    DT = 0.002
+    DT, STEPS = 0.002, 12
 
     def made(self, folder, **options):
         """Newton's solver of three worlds, and the same model as MJCF."""
@@ -184,15 +184,15 @@ class Newton(unittest.TestCase):
         force = np.zeros((len(SOILS), 3, 6), np.float32)
         force[:, 0] = PUSH
         seen = []
-        for _ in range(25):
+        for _ in range(self.STEPS):
             here.body_f.assign(force.reshape(-1, 6))
             solver.step(here, there, control, None, self.DT)
             here, there = there, here
             seen.append(ground.wrench.numpy().copy())
         for world, soil in enumerate(SOILS):
-            worst = [np.abs(seen[k][world] - wanted[world][k]).max() / np.abs(wanted[world]).max() for k in range(25)]
+            worst = [np.abs(seen[k][world] - wanted[world][k]).max() / np.abs(wanted[world]).max() for k in range(self.STEPS)]
             apart = np.abs(here.joint_q.numpy().reshape(len(SOILS), -1)[world][:3] - data[world].qpos[:3]).max()
-            print(f"Newton, {soil}: forces of a first step differ by {worst[0]:.1e}, in 25 steps by {max(worst):.1e}; then {apart:.1e} m apart")
+            print(f"Newton, {soil}: forces of a first step differ by {worst[0]:.1e}, in {self.STEPS} steps by {max(worst):.1e}; then {apart:.1e} m apart")
             self.assertLess(worst[0], 1e-3)
             self.assertLess(max(worst), 0.02)
             self.assertLess(apart, 2e-5)
@@ -207,7 +207,7 @@ class Newton(unittest.TestCase):
         solver.reset(here)
         self.assertEqual(float(np.abs(ground.wrench.numpy()).max()), 0)
 
-    def reference(self, spec, soil, steps=25, at=None):
+    def reference(self, spec, soil, steps=STEPS, at=None):
         feet = [body.name for body in spec.bodies if body.name.endswith(("_left", "_right"))]
         mild.attach(spec, feet=feet, ground=soil, sensor="feet", surface=False)
         model = spec.compile()
