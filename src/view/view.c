@@ -235,12 +235,10 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
     view->slot_count = view->plain_count + (def->others > 0 ? VIEW_CROWD_FINE : VIEW_FINE);
     const Surfaces surfaces = {view->plain_count, view->slot_count};
     const int size[2] = {def->width, def->height};
-    char path
-        [PATH_SIZE]; /* a crowd is drawn by its shapes: a robot has 60 000 triangles of meshes */
-    const char *look = def->others > 0 ? NULL : look_path(robot_model_path(robot), path);
-    view->model = view->relief ? view_model(robot_model_path(robot), look, size, view->relief,
-                                            &surfaces, error)
-                               : NULL;
+    char path[PATH_SIZE];
+    const char *xml = robot_model_path(robot),
+               *look = def->others > 0 ? NULL : look_path(xml, path);
+    view->model = view->relief ? view_model(xml, look, size, view->relief, &surfaces, error) : NULL;
     if (view->model && def->others > 0) {
         sight_widen(view->model);
     }

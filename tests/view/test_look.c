@@ -1,5 +1,5 @@
 #define _DEFAULT_SOURCE /* mkstemps */
-/* Meshes of look.xml in pictures: whole robots of the makers' size whose step knows nothing of it. */
+/* Meshes of look.xml in pictures: of the makers' size, and without a part in the step. */
 #include <unistd.h>
 
 #include "base/paths.h"
@@ -102,7 +102,7 @@ static void feet_end_at_the_soles(void **state) {
     for (int f = 0; f < 4; f++) {
         expect_near(calves[f], reach(go1, calves[f], 2, -1), 0.213 + 0.023, 0.004);
     }
-    /* what is mirrored or turned lies on its side: a hip's motor outside of it, in front or behind */
+    /* what is mirrored or turned lies on its side: motors outside of hips, in front or behind */
     const double out = reach(g1, "left_hip_pitch_link", 1, 1);
     assert_true(out > reach(g1, "left_hip_pitch_link", 1, -1) + 0.02);
     expect_near("G1, right hip", reach(g1, "right_hip_pitch_link", 1, -1), out, 1e-5);
