@@ -18,7 +18,7 @@ ARCHS ?=
 VERSION ?=
 TEST ?=
 
-.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check jax-check dds-check check export-check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check newton-check jax-check dds-check check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -44,6 +44,7 @@ help:
 	@echo "make wheel   the same in half the time: untried, for MARCH=x86-64-v3 alone unless given"
 	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/python-venv"
 	@echo "make mjlab-check   the package under mjlab, on the CPU (5 GB), in build/mjlab-venv"
+	@echo "make newton-check  the ground in MuJoCo Warp and Newton beside the engine plugin, on the CPU, in build/newton-venv"
 	@echo "make jax-check   the batch ground inside jax.jit, in build/jax-venv"
 	@echo "make dds-check   examples/drive: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
@@ -73,7 +74,7 @@ check:
 
 plugin-check: build
 	@if [ -n "$(VERSION)" ]; then tests/plugin/test_version.sh "$(VERSION)" build; else $(MAKE) --no-print-directory wheel && \
-		scripts/headers.py --check && tests/plugin/test_wheel.sh build/dist/mild-*.whl build; fi
+		scripts/headers.py --check && tests/plugin/test_wheel.sh build/dist/mildground-*.whl build; fi
 
 export-check: build
 	@.venv/bin/python -m venv build/onnxruntime
@@ -156,15 +157,22 @@ wheels: setup
 python-check: wheel
 	@[ -x build/python-venv/bin/python ] || python3 -m venv build/python-venv
 	@build/python-venv/bin/pip install --quiet --disable-pip-version-check --require-hashes -r scripts/learners.txt
-	@build/python-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mild-*.whl
+	@build/python-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mildground-*.whl
 	@build/python-venv/bin/python tests/python/check_learners.py
 	@build/python-venv/bin/python tests/python/check_cuda.py
 
 mjlab-check: wheel
 	@[ -x build/mjlab-venv/bin/python ] || python3 -m venv build/mjlab-venv
 	@build/mjlab-venv/bin/pip install --quiet --disable-pip-version-check --require-hashes -r scripts/mjlab.txt
-	@build/mjlab-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mild-*.whl
+	@build/mjlab-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mildground-*.whl
 	@build/mjlab-venv/bin/python -W ignore tests/python/check_mjlab.py
+
+newton-check: wheel
+	@cmp -s scripts/newton.txt build/newton-venv/installed || { python3 -m venv --clear build/newton-venv && \
+		build/newton-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/newton.txt && \
+		cp scripts/newton.txt build/newton-venv/installed; }
+	@build/newton-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mildground-*.whl
+	@build/newton-venv/bin/python -W ignore tests/python/check_newton.py
 
 jax-check: build
 	@cmp -s scripts/jax.txt build/jax-venv/installed || { python3 -m venv --clear build/jax-venv && \

@@ -1,7 +1,8 @@
 # A wheel (pyproject.toml, docs/install.md): the Python package for every supported MuJoCo and, where their libraries are, the
 # environments and the program. Compiled for MILD_MARCH and, when it is given, for MILD_SECOND_MARCH too; what is imported
 # or run is what the processor can (python/mild/_processor.py).
-string(REPLACE "-" "_" mild_package ${SKBUILD_PROJECT_NAME}) # mild, or mild_cuda (python/cuda)
+string(REPLACE "mildground" "mild" mild_package ${SKBUILD_PROJECT_NAME}) # the name on the package index is no module's
+string(REPLACE "-" "_" mild_package ${mild_package}) # mild, or mild_cuda (python/cuda)
 set(MILD_SECOND_MARCH "" CACHE STRING "x86-64-v4: the wheel has a second copy for such processors; empty: it has not")
 find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
 if(NOT EXISTS "${MUJOCO_ROOT}") # the wheel that pip installed for this build

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Makes the wheel mild_cuda, build/dist/mild_cuda-*.whl, with the compiler and libraries of NVIDIA's packages for Python: no toolkit
-# and no GPU is needed. Tries it beside build/dist/mild-*.whl (scripts/wheels.sh), on a GPU if there is one. An architecture takes 20
+# Makes the wheel mildground-cuda, the package mild_cuda, build/dist/mildground_cuda-*.whl, with the compiler and libraries of NVIDIA's packages for Python: no toolkit
+# and no GPU is needed. Tries it beside build/dist/mildground-*.whl (scripts/wheels.sh), on a GPU if there is one. An architecture takes 20
 # minutes of two busy cores. Usage: [ARCHS="90"] scripts/wheel_cuda.sh
 set -euo pipefail
 cd "$(dirname "$0")/.."
-root=$PWD/build/dist archs=${ARCHS:-80-real 90-real 100-real 120} # of 80 also 86 and 89
+root=$PWD/build/dist archs=${ARCHS:-80 90-real 100-real 120} # 80: also 86 and 89, and as PTX whatever has no code of its own
 tools=$root/tools cuda=$root/cuda
 mkdir -p "$root"
 # install FOLDER FILE.txt: an environment with these packages.
@@ -28,16 +28,16 @@ if command -v ccache >/dev/null; then
 fi
 export PATH=$tools/bin:$PATH CUDACXX=$toolkit/bin/nvcc
 begin=$SECONDS
-rm -rf "$root"/raw-cuda "$root"/mild_cuda-*.whl
+rm -rf "$root"/raw-cuda "$root"/mildground_cuda-*.whl
 .venv/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w "$root/raw-cuda" python/cuda \
     --config-settings=cmake.define.CUDAToolkit_ROOT="$toolkit" --config-settings=cmake.define.CMAKE_CUDA_ARCHITECTURES="${archs// /;}"
-auditwheel repair --exclude 'libmujoco.so.*' --exclude 'libcublas*.so.*' --wheel-dir "$root" "$root"/raw-cuda/mild_cuda-*.whl >/dev/null 2>&1
-wheel=$(echo "$root"/mild_cuda-*.whl)
+auditwheel repair --exclude 'libmujoco.so.*' --exclude 'libcublas*.so.*' --wheel-dir "$root" "$root"/raw-cuda/mildground_cuda-*.whl >/dev/null 2>&1
+wheel=$(echo "$root"/mildground_cuda-*.whl)
 echo "wheel_cuda: $(basename "$wheel") for $archs, $(($(stat -c %s "$wheel") / 1000000)) MB, made in $((SECONDS - begin)) s"
 abi3audit --strict "$wheel" >/dev/null
 
-plain=$(echo "$root"/mild-*.whl) try=$root/try-cuda
-[ -e "$plain" ] || { echo "wheel_cuda: not tried, because scripts/wheels.sh has made no build/dist/mild-*.whl" >&2; exit 1; }
+plain=$(echo "$root"/mildground-*.whl) try=$root/try-cuda
+[ -e "$plain" ] || { echo "wheel_cuda: not tried, because scripts/wheels.sh has made no build/dist/mildground-*.whl" >&2; exit 1; }
 rm -rf "$try"
 .venv/bin/python -m venv "$try"
 "$try/bin/pip" install --quiet --disable-pip-version-check --require-hashes -r scripts/wheel.txt

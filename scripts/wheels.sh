@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the wheel, build/dist/mild-VERSION-cp311-abi3-manylinux_*.whl, and tries it in bare environments, one for each CPython
+# Makes the wheel, build/dist/mildground-VERSION-cp311-abi3-manylinux_*.whl, and tries it in bare environments, one for each CPython
 # 3.11 or newer that is found. Usage: [MARCH=x86-64-v3] scripts/wheels.sh [--plain | WHEEL] [--untried | PYTHON ...]
 # --plain     without the second copy for AVX-512: half the time to compile. WHEEL: not made, but this one looked at and tried.
 # --untried   made and looked at alone. PYTHON: tried with these interpreters instead.
@@ -26,12 +26,12 @@ make_wheel() {
     if command -v ccache >/dev/null; then
         export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
     fi
-    rm -rf "$root"/raw "$root"/mild-*.whl
+    rm -rf "$root"/raw "$root"/mildground-*.whl
     quiet .venv/bin/python -m pip wheel --disable-pip-version-check --no-deps --no-build-isolation -w "$root/raw" . \
         --config-settings=cmake.define.MILD_MARCH="$march" --config-settings=cmake.define.MILD_SECOND_MARCH=$second
-    # Libraries that not every Linux has come along, in mild.libs. MuJoCo is a neighbour, or the program's own.
-    quiet auditwheel repair --exclude 'libmujoco.so.*' --wheel-dir "$root" "$root"/raw/mild-*.whl
-    wheel=$(echo "$root"/mild-*.whl)
+    # Libraries that not every Linux has come along, in mildground.libs. MuJoCo is a neighbour, or the program's own.
+    quiet auditwheel repair --exclude 'libmujoco.so.*' --wheel-dir "$root" "$root"/raw/mildground-*.whl
+    wheel=$(echo "$root"/mildground-*.whl)
     said "$(basename "$wheel") for $march${second:+ and $second}, made in $((SECONDS - begin)) s"
 }
 
@@ -44,14 +44,14 @@ look_at_wheel() {
     platform=$(tr '\n' ' ' <"$root/log" | sed -n 's/.*constrains the platform tag to "\([a-z0-9_]*\)".*/\1/p') # MuJoCo apart
     [[ $wheel = *-abi3-"${platform:-?}".whl ]] || fail "$(basename "$wheel") is of the platform $platform"
     quiet abi3audit --strict "$wheel"
-    # What each file links is in mild.libs, MuJoCo's, or on every Linux (PEP 600); of the library of windows, X11.
+    # What each file links is in mildground.libs, MuJoCo's, or on every Linux (PEP 600); of the library of windows, X11.
     rm -rf "$inside"
     .venv/bin/python -m zipfile -e "$wheel" "$inside"
     for library in $(find "$inside" -type f -exec readelf -d {} \; 2>/dev/null | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p' | sort -u); do
         case $library in
         lib[cm].so.6 | lib@(dl|rt|pthread).so.[0-9] | ld-linux-x86-64.so.2 | libgcc_s.so.1 | libstdc++.so.6 | libz.so.1 | libX11.so.6) ;;
         libmujoco.so.*) ;;
-        *) [ -e "$inside/mild.libs/$library" ] || fail "$library is neither in the wheel nor on every Linux" ;;
+        *) [ -e "$inside/mildground.libs/$library" ] || fail "$library is neither in the wheel nor on every Linux" ;;
         esac
     done
     ! grep -rlF "$PWD" "$inside" || fail "these name a folder of this machine"

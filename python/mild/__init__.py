@@ -17,7 +17,7 @@ __all__ = ["Batch", "Ground", "GroundFit", "Map", "Material", "Press", "RunningG
 
 try:
     import gymnasium as _gymnasium
-except ImportError:  # `pip install mild[gym]` for the environments
+except ImportError:  # `pip install mildground[gym]` for the environments
     pass
 else:
     from .gym import register as _register

@@ -1,4 +1,4 @@
-"""mjlab's velocity tasks on soft ground: `train Mjlab-Velocity-Soft-Unitree-Go1`, after `pip install mild[mjlab]` (docs/python.md).
+"""mjlab's velocity tasks on soft ground: `train Mjlab-Velocity-Soft-Unitree-Go1`, after `pip install mildground[mjlab]` (docs/python.md).
 
 mjlab imports this module by itself. Robots of one environment stand on GROUNDS in turn; other grounds are a parameter of the event:
 --env.events.ground.params.grounds "('foam45', 'sand_loose')". A task of your own becomes soft by `soften`. What was trained is judged by `mild trial`,

@@ -65,7 +65,7 @@ class Onnx:
         try:
             import onnxruntime
         except ImportError:
-            raise RuntimeError("policy: ONNX needs onnxruntime; `pip install mild[trial]`") from None
+            raise RuntimeError("policy: ONNX needs onnxruntime; `pip install mildground[trial]`") from None
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         self.session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "robot/files.h"
+#include "view/look.h"
 
 #define VIEW_SHADOW 768       /* [pixels] edge of the shadow map */
 #define VIEW_SHADOW_CLIP 1.3F /* [-] half of what it covers, in extents of the robot */
@@ -90,7 +91,7 @@ static void add_sky(mjSpec *spec) {
     memcpy(sky->rgb2, below, sizeof below);
 }
 
-mjModel *view_model(const char *xml, const int size[2], const Relief *relief,
+mjModel *view_model(const char *xml, const char *look, const int size[2], const Relief *relief,
                     const Surfaces *surfaces, MildError *error) {
     RobotFiles files;
     mjSpec *spec = robot_files_parse(&files, xml, error);
@@ -109,7 +110,8 @@ mjModel *view_model(const char *xml, const int size[2], const Relief *relief,
     spec->visual.quality.numquads = 1;
     add_sky(spec);
     add_ground(spec, relief, surfaces);
-    mjModel *model = robot_files_compile(&files, spec, xml, error);
+    const int good = !look || look_add(spec, look, error) == MILD_OK;
+    mjModel *model = good ? robot_files_compile(&files, spec, xml, error) : NULL;
     mj_deleteSpec(spec);
     robot_files_end(&files);
     return model;

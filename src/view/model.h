@@ -18,9 +18,10 @@ typedef struct {
  * surface i: a skin, a texture and a material named view_tile_i;
  * material m, and the rigid ground behind the last one: a texture and a material named view_flat_m;
  * the floor around: view_floor.
+ * look: path of the file with the meshes that are drawn (look.h); NULL: the file's own shapes.
  * size: [pixels] width and height of the picture.
  * Returns NULL on error. Free it with mj_deleteModel. */
-mjModel *view_model(const char *xml, const int size[2], const Relief *relief,
+mjModel *view_model(const char *xml, const char *look, const int size[2], const Relief *relief,
                     const Surfaces *surfaces, MildError *error);
 
 #endif

@@ -9,6 +9,7 @@
 #include "view/follow.h"
 #include "view/gl.h"
 #include "view/inset.h"
+#include "view/look.h"
 #include "view/model.h"
 #include "view/relief.h"
 #include "view/sight.h"
@@ -33,8 +34,7 @@
 #define VIEW_CLOSE_ELEVATION (-22.0) /* [deg] */
 #define VIEW_CLOSE_DISTANCE 0.80     /* [m] */
 #define VIEW_LABEL 24                /* [pixels] height of a label */
-#define VIEW_HIDDEN_GROUP 5
-#define VIEW_FORCE_SEEN 15.0 /* [N] smaller contact forces get no arrow */
+#define VIEW_FORCE_SEEN 15.0         /* [N] smaller contact forces get no arrow */
 
 /* A surface of the model, lent to a tile that is not plain: a skin, because a skin has smooth
  * normals and goes to the graphics card without a new display list. */
@@ -128,7 +128,7 @@ static void index_model(View *view) {
                        texture_pixels(model, mj_name2id(model, mjOBJ_TEXTURE, "view_floor")));
     for (int g = 0; g < model->ngeom; g++) {
         if (model->geom_type[g] == mjGEOM_PLANE || model->geom_type[g] == mjGEOM_HFIELD) {
-            model->geom_group[g] = VIEW_HIDDEN_GROUP;
+            model->geom_group[g] = LOOK_HIDDEN_GROUP;
         }
     }
 }
@@ -235,9 +235,10 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
     view->slot_count = view->plain_count + (def->others > 0 ? VIEW_CROWD_FINE : VIEW_FINE);
     const Surfaces surfaces = {view->plain_count, view->slot_count};
     const int size[2] = {def->width, def->height};
-    view->model = view->relief ? view_model(robot_model_path(view->robot), size, view->relief,
-                                            &surfaces, error)
-                               : NULL;
+    char path[PATH_SIZE];
+    const char *xml = robot_model_path(robot),
+               *look = def->others > 0 ? NULL : look_path(xml, path);
+    view->model = view->relief ? view_model(xml, look, size, view->relief, &surfaces, error) : NULL;
     if (view->model && def->others > 0) {
         sight_widen(view->model);
     }

@@ -18,6 +18,13 @@ table = tomllib.loads((source / "pyproject.toml").read_text())
 assert "version" not in table["project"] and table["project"]["dynamic"] == ["version"], "a version of its own"
 said = table["tool"]["scikit-build"]["metadata"]["version"]
 print(re.search(said["regex"], (source / said["input"]).read_text())["value"])
+# One name on the package index, which is not `mild`, another project's.
+name = table["project"]["name"]
+cuda = tomllib.loads((source / "python/cuda/pyproject.toml").read_text())["project"]
+assert cuda["name"] == name + "-cuda" and cuda["dependencies"][0] == name, cuda
+for file in [*source.glob("docs/**/*.md"), *source.glob("python/mild/*.py"), *source.glob("examples/**/*.py"), source / "README.md"]:
+    wrong = re.search(r"(pip install |dist/)'?mild(_cuda)?(-|\[| *$)", file.read_text(), re.MULTILINE)
+    assert not wrong, f"{file} names a package '{wrong[0]}', but it is {name}"
 END
 [ "$(cat package)" = "$version" ] || fail "pyproject.toml finds $(cat package), not $version"
 

@@ -337,7 +337,7 @@ class Networks(unittest.TestCase):
                 with self.assertRaisesRegex(ValueError, line):
                     networks.load(file.name, Description(stander(policy=keys)))
         with tempfile.NamedTemporaryFile(suffix=".onnx") as file, unittest.mock.patch.dict(sys.modules, onnxruntime=None):
-            with self.assertRaisesRegex(RuntimeError, r"pip install mild\[trial\]"):
+            with self.assertRaisesRegex(RuntimeError, r"pip install mildground\[trial\]"):
                 networks.load(file.name, Description(stander()))
 
     def test_real_onnx(self):

@@ -224,7 +224,7 @@ static int skies(const char *xml) {
     const Surfaces surfaces = {2, 5};
     Relief *relief = relief_create(&def, &terrain, robot_soles(robot), SA01_FEET, &error);
     assert_non_null(relief);
-    mjModel *model = view_model(xml, size, relief, &surfaces, &error);
+    mjModel *model = view_model(xml, NULL, size, relief, &surfaces, &error);
     assert_non_null(model);
     int count = 0;
     for (int i = 0; i < model->ntex; i++) {

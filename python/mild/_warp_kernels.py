@@ -1,10 +1,10 @@
-"""What mild.Batch needs of a step of MuJoCo Warp, as kernels over all worlds; _mjlab_ground.py launches them. With J of the feet (rows:
-linear, angular velocity of each; a round foot transmits no moment and has no angular rows),
-the integrator's metric N = M - h dF/dv and the force f = passive - bias + actuator:
+"""What mild.Batch needs of a step of MuJoCo Warp, as kernels over all worlds; warp.py launches them. With J of the feet (rows:
+linear, angular velocity of each; a round foot transmits no moment, and where all are round there are no angular rows), the
+integrator's metric N (M - h dF/dv of implicitfast, M + h damping of Euler) and the force f = passive - bias + actuator + applied:
 
     N += D e e^T, f += s D a_ref e            joint limits that pushed at the last acceleration (row s e, weight D, reference a_ref)
     V = J v, A = J N^-1 J^T, V_free = V + h J N^-1 f
-    mild.Batch.step, then qfrc_applied = J^T wrench
+    mild.Batch.step, then qfrc_applied += J^T wrench
 
 Joint limits are so solved beside the ground, exactly where dF/dv = 0, nearly with dampers; other contacts are solved after it."""
 import warp as wp
@@ -14,31 +14,35 @@ LIMIT = wp.constant(int(mjtConstraint.mjCNSTR_LIMIT_JOINT))
 
 
 @wp.kernel(enable_backward=False)
-def approach(body: wp.array[int], root: wp.array[int], center: wp.array[wp.vec3], moves: wp.array2d[int], is_round: bool, radius: float,
-             xpos: wp.array2d[wp.vec3], xmat: wp.array2d[wp.mat33], com: wp.array2d[wp.vec3], cdof: wp.array2d[wp.spatial_vector],
-             passive: wp.array2d[float], bias: wp.array2d[float], actuator: wp.array2d[float],
+def approach(body: wp.array[int], root: wp.array[int], center: wp.array[wp.vec3], axes: wp.array[wp.mat33], moves: wp.array2d[int],
+             radius: wp.array[float], size: int, xpos: wp.array2d[wp.vec3], xmat: wp.array2d[wp.mat33], com: wp.array2d[wp.vec3],
+             cdof: wp.array2d[wp.spatial_vector], passive: wp.array2d[float], bias: wp.array2d[float], actuator: wp.array2d[float],
+             applied: wp.array2d[float],
              place: wp.array2d[wp.vec3], turn: wp.array2d[wp.mat33], jacobian: wp.array3d[float]):
-    """Poses of the soles, and J^T, `size` columns a foot, with f in its last column. The sole of a sphere is a disc that stays level
-    below its center."""
+    """Poses of the soles, and J^T, `size` columns a foot, with f in its last column. A foot with a radius is round: its sole is a disc
+    that stays level below its center."""
     w, f, i = wp.tid()
-    at = xpos[w, body[f]]
-    if is_round:
-        at = at + xmat[w, body[f]] * center[f] - wp.vec3(0.0, 0.0, radius)
+    at = xpos[w, body[f]] + xmat[w, body[f]] * center[f] - wp.vec3(0.0, 0.0, radius[f])
     if i == 0:
         place[w, f] = at
-        if not is_round:
-            turn[w, f] = xmat[w, body[f]]
+        if radius[f] == 0.0:
+            turn[w, f] = xmat[w, body[f]] * axes[f]
     linear, angular = wp.vec3(), wp.vec3()
     if moves[f, i] == 1:  # motions are about the robot's center of mass
         angular = wp.spatial_top(cdof[w, i])
         linear = wp.spatial_bottom(cdof[w, i]) + wp.cross(angular, at - com[w, root[body[f]]])
-    size = wp.where(is_round, 3, 6)
     for k in range(3):
         jacobian[w, i, size * f + k] = linear[k]
-        if not is_round:
-            jacobian[w, i, size * f + 3 + k] = angular[k]
+        if size == 6:
+            jacobian[w, i, size * f + 3 + k] = wp.where(radius[f] == 0.0, angular[k], 0.0)
     if f == 0:
-        jacobian[w, i, jacobian.shape[2] - 1] = passive[w, i] - bias[w, i] + actuator[w, i]
+        jacobian[w, i, jacobian.shape[2] - 1] = passive[w, i] - bias[w, i] + actuator[w, i] + applied[w, i]
+
+
+@wp.kernel(enable_backward=False)
+def add_damping(timestep: float, diagonal: wp.array[int], damping: wp.array2d[float], metric: wp.array2d[float]):
+    w, i = wp.tid()
+    metric[w, diagonal[i]] += timestep * damping[w % damping.shape[0], i]
 
 
 @wp.kernel(enable_backward=False)
@@ -89,10 +93,18 @@ def contact_kernel(dofs, feet, size):
 
 
 @wp.kernel(enable_backward=False)
-def apply(size: int, jacobian: wp.array3d[float], wrench: wp.array2d[float], force: wp.array2d[float]):
+def apply(size: int, jacobian: wp.array3d[float], wrench: wp.array3d[float], force: wp.array2d[float]):
     """A wrench has six numbers a foot, J `size` rows."""
     w, i = wp.tid()
     total = float(0.0)
     for row in range(jacobian.shape[2] - 1):
-        total += jacobian[w, i, row] * wrench[w, 6 * (row // size) + row % size]
-    force[w, i] = total
+        total += jacobian[w, i, row] * wrench[w, row // size, row % size]
+    force[w, i] += total
+
+
+@wp.kernel(enable_backward=False)
+def forget(which: wp.array[wp.uint8], wrench: wp.array3d[float], foot: wp.array3d[float]):
+    w, f, k = wp.tid()
+    if which[w] != wp.uint8(0):
+        wrench[w, f, k] = 0.0
+        foot[w, f, k] = 0.0
