@@ -131,6 +131,17 @@ class Window:
 
 # ---- the ground in newton ----
 
+def load_newton():
+    """Without what warp says of itself."""
+    try:
+        import warp
+    except ImportError as error:
+        judge_mpm.fail(f"{error}: pip install newton")
+    warp.config.quiet = True
+    import warp.sparse  # noqa: F401
+    return judge_mpm.load_newton()
+
+
 def coupling(newton, wp):
     """Newton's solver with the robot's inertia. Its own finite-mass colliders are bodies that know nothing of each other, with one mass
     in all directions. The operator is made of two sparse matrices, J from the bodies' twists to nodes and M J^T back; here M is A."""
@@ -212,9 +223,7 @@ class Ground:
     """The window in newton, with floor, four walls that have no friction and go with the window, and the soles."""
 
     def __init__(self, args, soles):
-        newton, wp = judge_mpm.load_newton()
-        wp.config.quiet = True
-        import warp.sparse  # noqa: F401
+        newton, wp = load_newton()
         self.wp, self.soles, self.args = wp, soles, args
         size = np.array(args.window)
         per_block = max(1, round(args.block / args.voxel))
