@@ -110,6 +110,8 @@ BLOCKS = [
     ("deep", [deep("square100-load120", SQUARE, 0.12), deep("square100-load40", SQUARE, 0.04),
               deep("square100-load20-fast", SQUARE, 0.02, "load:0.05@0.5"), deep("disc120-load80", DISC, 0.08),
               deep("strip-load80", STRIP, 0.08)]),
+    ("deep", [deep("square100-drag40", SQUARE, 0.04, "drag:0.03@0.05"), deep("strip-drag40", STRIP, 0.04, "drag:0.03@0.05"),
+              deep("strip-drag80", STRIP, 0.08, "drag:0.03@0.05")]),
 ]
 
 

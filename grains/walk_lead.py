@@ -6,7 +6,7 @@ import numpy as np
 STEP = 1e-3  # [s]
 PITCH = 0.0195  # [m] of robots that do not say (docs/robots.md)
 WINDOWS = ((0, 0.02), (0.02, 0.05), (0.05, 0.1), (0.1, 0.2))  # [s] after touchdown
-CONTACT, SHORTEST, PAUSE = 30.0, 12, 2  # [N], rows of a stance, rows without load within it
+CONTACT, SHORTEST, PAUSE = 30.0, 0.12, 0.02  # [N], [s] of a stance, [s] without load within it and led before it
 
 
 def rotation(roll, pitch, yaw):
@@ -23,17 +23,13 @@ def material(numbers, model):
 
 
 def stances(table):
-    """(foot, rows) of each stance: from two rows before the load comes to where it goes."""
+    """(foot, rows) of each stance: from PAUSE before the load comes to where it goes."""
     for foot in (0, 1):
         rows = table[table["foot"] == foot]
-        on, begin = rows["force_z_n"] > CONTACT, 0
-        while begin < len(on):
-            end = begin
-            while end < len(on) and on[end:end + 1 + PAUSE].any() and on[begin]:
-                end += 1
-            if end - begin > SHORTEST and begin > PAUSE:
-                yield foot, rows[begin - PAUSE:end + 1]
-            begin = max(end, begin + 1)
+        time, loaded = rows["time_s"], np.flatnonzero(rows["force_z_n"] > CONTACT)
+        for own in np.split(loaded, np.flatnonzero(np.diff(time[loaded]) > PAUSE + 0.011) + 1):  # a row lasts 10 ms at most
+            if len(own) and time[own[-1]] - time[own[0]] > SHORTEST and time[own[0]] - time[0] > PAUSE:
+                yield foot, rows[np.searchsorted(time, time[own[0]] - PAUSE - 1e-9):own[-1] + 2]
 
 
 def smooth(time, values, at):

@@ -6,6 +6,7 @@ import subprocess
 import numpy as np
 
 CONTACT, PAUSE, SHORTEST = 5.0, 0.03, 0.15  # [N] [s] [s] of a stance
+ENDS = 0.05  # [s] at which its pressure centre is told
 COLOURS = {"grains": "#222222", "mild": "#1f77b4", "mild_merged": "#d62728", "bekker": "#2ca02c", "ecc_quasi_3d": "#9467bd", "newton_mpm": "#ff7f0e"}
 # What walk-0.json of a ground by another program says of its walk.
 TOLD = {"grains": ("time_s", "lost_sole_s", "seconds", "steps", "late_lists", "full_lists", "surface_m"),
@@ -39,12 +40,13 @@ class Stance:
         return np.interp(SHARE, share, values)
 
     def row(self):
-        load = np.maximum(self.force, 0)
+        load, step = np.maximum(self.force, 0), np.median(np.diff(self.time))  # of the robot's physics
+        ends = [self.center[part].mean() for part in (self.time < self.time[0] + ENDS - 1e-6, self.time > self.time[-1] - ENDS + 1e-6)]
         return {"trial": self.trial, "foot": self.foot, "start_s": f"{self.time[0]:.2f}",
-                "duration_s": f"{self.time[-1] - self.time[0] + 0.01:.2f}", "force_max_n": f"{self.force.max():.1f}",
+                "duration_s": f"{self.time[-1] - self.time[0] + step:.2f}", "force_max_n": f"{self.force.max():.1f}",
                 "force_mean_n": f"{self.force.mean():.1f}", "horizontal_max_n": f"{self.slide.max():.1f}",
                 "depth_max_m": f"{self.depth.max():.4f}", "center_x_m": f"{(load * self.center).sum() / load.sum():.4f}",
-                "center_x_first_m": f"{self.center[:5].mean():.4f}", "center_x_last_m": f"{self.center[-5:].mean():.4f}",
+                "center_x_first_m": f"{ends[0]:.4f}", "center_x_last_m": f"{ends[1]:.4f}",
                 "ankle_way_m": f"{self.way:.4f}", "pitch_min_rad": f"{self.pitch.min():.3f}", "pitch_max_rad": f"{self.pitch.max():.3f}"}
 
 

@@ -132,6 +132,8 @@ typedef struct {
     double grip;          /* [-] mild, mild_merged with a slip_length: t, greatest friction of a
                             sliding element by its virgin load; 0: mu alone. Above 0, ground that is
                             struck is held by all of mu, and phi rho presses at a sole's sides */
+    double slip_growth;   /* [-] mild, mild_merged with a slip_length: at a depth u the path is j0 +
+                            slip_growth u, and regain_length is longer by the same factor */
     double refill;        /* [-] share of an imprint's depth that flows back as the foot leaves */
 } MildMaterial;
 

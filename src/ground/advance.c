@@ -141,10 +141,10 @@ static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory
 
 /* Stores what the elements of some blocks remember, from number e of `memory` on. Adds to the lanes
  * of `count` 1 for each element that stays in the ground, and 1 for each of these that reversed. On
- * level ground the slopes are 0, and without faces the heights. */
-static __attribute__((noinline)) void blocks_remember(const Advance *a, const Slots *first,
-                                                      const Slots *end, const Memory *memory, int e,
-                                                      Lanes count[2]) {
+ * level ground the slopes are 0, and without faces the heights. wears: bool constant, shares wear.
+ */
+MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *end,
+                            const Memory *memory, int e, int wears, Lanes count[2]) {
     const Memory to = *memory; /* copies keep the addresses in registers */
     const Motion motion = a->motion;
     const double dt = a->dt;
@@ -157,8 +157,13 @@ static __attribute__((noinline)) void blocks_remember(const Advance *a, const Sl
             const Element element = slot_element(s, i);
             const ElementMemory before = slot_memory(s, i);
             const int stays = slot_stays(s, i, s->depth[i] + dt / 2 * v.descent, prints);
-            const ElementMemory after =
+            ElementMemory after =
                 element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
+            if (wears) {
+                const Share share = slot_share(s, i);
+                to.worn[e + i] = element_wear(&element, &share, &before, &after, dt, s->iz[i], v.x,
+                                              v.y, v.descent, stays);
+            }
             to.depth_max[e + i] = after.depth_max;
             to.middle[e + i] = after.middle;
             to.front_speed[e + i] = after.front_speed;
@@ -174,32 +179,19 @@ static __attribute__((noinline)) void blocks_remember(const Advance *a, const Sl
     }
 }
 
-/* Shares wear: adds to what blocks_remember has stored. */
 static __attribute__((noinline)) void blocks_wear(const Advance *a, const Slots *first,
-                                                  const Slots *end, const Memory *memory, int e) {
-    const Memory to = *memory;
-    const Motion motion = a->motion;
-    const double dt = a->dt;
-    const int prints = a->imprints != NULL;
-    for (const Slots *s = first; s < end; s++, e += SLOT_LANES) {
-#pragma omp simd
-        for (int i = 0; i < SLOT_LANES; i++) {
-            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
-            const Element element = slot_element(s, i);
-            const ElementMemory before = slot_memory(s, i);
-            const Share share = slot_share(s, i);
-            const int stays = slot_stays(s, i, s->depth[i] + dt / 2 * v.descent, prints);
-            ElementMemory after = before;
-            after.depth_max = to.depth_max[e + i];
-            after.front_speed = to.front_speed[e + i];
-            to.worn[e + i] = element_wear(&element, &share, &before, &after, dt, s->iz[i], v.x, v.y,
-                                          v.descent, stays);
-            to.depth_max[e + i] = after.depth_max;
-            to.front_speed[e + i] = after.front_speed;
-            to.drift[e + i] = after.drift;
-            to.pending_x[e + i] = after.pending_x;
-            to.pending_y[e + i] = after.pending_y;
-        }
+                                                  const Slots *end, const Memory *memory, int e,
+                                                  Lanes count[2]) {
+    blocks_advance(a, first, end, memory, e, 1, count);
+}
+
+static __attribute__((noinline)) void blocks_remember(const Advance *a, const Slots *first,
+                                                      const Slots *end, const Memory *memory, int e,
+                                                      Lanes count[2]) {
+    if (a->foot->curves & LAW_HEAP) {
+        blocks_wear(a, first, end, memory, e, count);
+    } else {
+        blocks_advance(a, first, end, memory, e, 0, count);
     }
 }
 
@@ -211,9 +203,6 @@ static int foot_advance_all(const Advance *a, const Memory *memory, const int32_
     double sums[2];
     blocks_remember(a, foot->slot, slots_end(foot), memory, 0, count);
     lanes_sum(count, 2, sums);
-    if (foot->curves & LAW_HEAP) {
-        blocks_wear(a, foot->slot, slots_end(foot), memory, 0);
-    }
     if (foot->uneven) {
         foot_planes(foot, a->height, memory);
     }
@@ -284,9 +273,6 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         if (i == 0) {
             memset(stays, 0, sizeof stays);
             blocks_remember(a, s, s + 1, &block, 0, stays);
-            if (foot->curves & LAW_HEAP) {
-                blocks_wear(a, s, s + 1, &block, 0);
-            }
         }
         for (; next < e; next++) {
             touched += faces ? face_unlisted(a, memory, next) : element_unlisted(memory, next);

@@ -6,26 +6,31 @@
 /* This loop is not in vectors, for which a power is long: few feet stand on ground without memory
  * beside other ground. */
 void slots_elastic(const FootScratch *foot) {
-    for (int i = 0; i < foot_end(foot); i++) {
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+        memset(s->fx, 0, sizeof s->fx);
+    }
+    for (int i = 0; foot->curves & LAW_ELASTIC && i < foot->active; i++) {
         Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;
         const Element element = slot_element(s, l);
-        const int elastic = foot->curves & LAW_ELASTIC && i < foot->active;
-        s->fx[l] = elastic ? law_elastic_force(&element.law, LAW_ELASTIC, element.middle) : 0.0;
+        s->fx[l] = law_elastic_force(&element.law, LAW_ELASTIC, element.middle);
     }
 }
 
-/* Cosine between the sole and the ground under each slot, into `lean`. */
+/* Cosine between the sole and the ground under each slot, into `lean`. Level ground has one for
+ * all, without a root for each. */
 static void slots_lean(const FootScratch *foot) {
     const double side = foot->arm[3][2] < 0.0 ? -1.0 : 1.0; /* the face that looks down */
     const double up[3] = {side * foot->arm[3][0], side * foot->arm[3][1], side * foot->arm[3][2]};
     const double level = real_min(real_max(up[2], SHARE_LEAN), 1.0);
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
         for (int i = 0; i < SLOT_LANES; i++) {
+            s->lean[i] = level;
+        }
+        for (int i = 0; foot->uneven && i < SLOT_LANES; i++) {
             const double gx = s->slope_x[i], gy = s->slope_y[i];
             const double along = up[2] - gx * up[0] - gy * up[1];
-            const double lean = along / sqrt(1.0 + gx * gx + gy * gy);
-            s->lean[i] = foot->uneven ? real_min(real_max(lean, SHARE_LEAN), 1.0) : level;
+            s->lean[i] = real_min(real_max(along / sqrt(1.0 + gx * gx + gy * gy), SHARE_LEAN), 1.0);
         }
     }
 }

@@ -41,6 +41,8 @@ const MildField mild_material_fields[] = {
           "[m] mild, mild_merged: fresh penetration over which the support comes back"),
     FIELD(grip, 0.0, 1.0,
           "[-] with slip_length: greatest friction of a sliding sole by its virgin load; 0: mu"),
+    FIELD(slip_growth, 0.0, 1.0,
+          "[-] growth of both lengths with the depth"),
     FIELD(refill, 0.0, 1.0, "[-] share of an imprint's depth that flows back as the foot leaves"),
 };
 const int mild_material_field_count =

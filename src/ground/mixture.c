@@ -18,7 +18,7 @@ static int material_is_nan(const MildMaterial *m) {
 }
 
 static int share_is_nan(const Share *share) {
-    return isnan(share->slip_rate + share->regain_rate + share->grip + share->side);
+    return isnan(share->slip_rate + share->regain_rate + share->grip + share->growth + share->side);
 }
 
 /* Derives what a material gives a slot. Surfaces are projected when they touch down (faces.c).
@@ -69,6 +69,7 @@ static void slot_set_law(Slots *s, int i, const SlotLaw *from) {
     s->slip_rate[i] = share->slip_rate;
     s->regain_rate[i] = share->regain_rate;
     s->grip[i] = share->grip;
+    s->growth[i] = share->growth;
     s->side[i] = share->side;
     s->whole_mu[i] = share->mu;
     s->carry[i] = 1.0;
@@ -103,6 +104,7 @@ static void slot_law_mix(SlotLaw *a, const SlotLaw *b, double t) {
     share->slip_rate = between(share->slip_rate, b->share.slip_rate, t);
     share->regain_rate = between(share->regain_rate, b->share.regain_rate, t);
     share->grip = between(share->grip, b->share.grip, t);
+    share->growth = between(share->growth, b->share.growth, t);
     share->side = between(share->side, b->share.side, t);
     share->mu = between(share->mu, b->share.mu, t);
     a->k_drift = between(a->k_drift, b->k_drift, t);

@@ -5,7 +5,7 @@ const ModelRow model_mild_merged = {
              .source = "docs/model.md, section 21; Nadai 1931 for the heap",
              .fields = {"k_pen", "sigma_cone", "alpha", "nu", "c_g", "c_d", "phi", "rho", "mu",
                         "k_drift", "b_drift", "recovery", "bed_depth", "passive", "slip_length",
-                        "regain_length", "grip", "refill"},
+                        "regain_length", "grip", "slip_growth", "refill"},
              .scaled = {"k_pen", "sigma_cone"}},
     .law = law_cone,
     .merged = 1,

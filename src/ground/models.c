@@ -70,6 +70,7 @@ Share share_of(const MildMaterial *material, double pitch, double width) {
                                       ? 1.0 / fmax(material->regain_length, REGAIN_LEAST)
                                       : 0.0,
                    .grip = slips ? material->grip : 0.0,
+                   .growth = slips ? material->slip_growth / material->slip_length : 0.0,
                    .side = sides ? SHARE_PASSIVE / 2.0 * weight * pitch * pitch / width : 0.0,
                    .mu = material->mu};
 }

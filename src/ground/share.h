@@ -6,7 +6,9 @@
  *     q <= c                             c: cosine between sole and ground; 1 unless projected
  *     1/q <- 1/q + ds/(j0 c)             ds: horizontal path in the ground
  *     c - q <- (c - q) exp(-da/u0)       da: fresh penetration, beyond the yield depth
- * The element remembers 1 - q, its wear.
+ * The element remembers 1 - q, its wear. Both lengths grow with the depth u by the same factor
+ * 1 + g u, so a load that slides sinks the same way: in grains j0 = a quarter of a grain + u/12, for
+ * soles of any width (docs/grains.md).
  *
  * A sliding element at the share lambda = q/c of its yield load is held by at most
  *     H = (3 + sqrt 8) t lambda (1 - lambda)/(2 - lambda) F_g,
@@ -53,6 +55,7 @@ typedef struct {
     Real slip_rate;   /* [1/m] 1/j0; 0: slip costs nothing */
     Real regain_rate; /* [1/m] 1/u0 */
     Real grip;        /* [-] t, the greatest friction by the virgin load; 0: mu alone */
+    Real growth;      /* [1/m] growth of j0 and u0 with the depth, relative */
     Real side;        /* [N/m^2] K_p phi rho g s/(2 W) */
     Real mu;          /* [-] of the material */
     Real worn;        /* [-] memory: 1 - q */
@@ -141,8 +144,10 @@ MILD_HD Real share_left(Real x) {
 MILD_HD Real share_after(const Element *e, const Share *share, Real slid, Real fresh) {
     const Real c = share->lean;
     const Real q = share->carry;
-    const Real slipped = q * (c / (c + q * slid * share->slip_rate));
-    const Real spent = real_min(fresh * share->regain_rate, SHARE_FORGET);
+    const Real grows = 1 + share->growth * real_max(e->depth, 0);
+    const Real whole = c * grows;
+    const Real slipped = q * (whole / (whole + q * slid * share->slip_rate));
+    const Real spent = real_min(fresh * share->regain_rate / grows, SHARE_FORGET);
     const Real left = share_left(spent);
     const Real grown = slipped + (c - slipped) * (1 - left);
     return real_max(share_grows(e, share) ? grown : slipped, SHARE_LEAST);

@@ -68,6 +68,7 @@ typedef struct {
     Lanes slip_rate;   /* [1/m] */
     Lanes regain_rate; /* [1/m] */
     Lanes grip;        /* [-] */
+    Lanes growth;      /* [1/m] */
     Lanes side;        /* [N/m^2] */
     Lanes whole_mu;    /* [-] Share.mu, of which `mu` is what is left in this step */
 
@@ -178,6 +179,7 @@ MILD_HD Share slot_share(const Slots *s, int i) {
         .slip_rate = s->slip_rate[i],
         .regain_rate = s->regain_rate[i],
         .grip = s->grip[i],
+        .growth = s->growth[i],
         .side = s->side[i],
         .mu = s->whole_mu[i],
         .worn = s->worn[i],

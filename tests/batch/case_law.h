@@ -21,6 +21,7 @@ static void case_law(CaseMaterial *c, const MildMaterial *m, const MildSole *sol
     c->slip_rate = share.slip_rate;
     c->regain_rate = share.regain_rate;
     c->grip = share.grip;
+    c->growth = share.growth;
     c->side = share.side;
     c->exit_drag = law_exit_drag(&law);
     c->entry_drag = law_entry_drag(&law);

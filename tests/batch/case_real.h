@@ -35,6 +35,7 @@ static ContactMaterial case_material(const CaseMaterial *from) {
     m.slip_rate = (Real)from->slip_rate;
     m.regain_rate = (Real)from->regain_rate;
     m.grip = (Real)from->grip;
+    m.growth = (Real)from->growth;
     m.side = (Real)from->side;
     m.curves = from->curves;
     return m;

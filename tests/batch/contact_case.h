@@ -8,7 +8,7 @@ enum { CASE_FEET = 4, CASE_ELEMENTS = 256, CASE_MEMORY = 10, CASE_LAW = 14, CASE
 
 typedef struct {
     double law[CASE_LAW], recovery, mu, k_drift, b_drift, exit_drag, entry_drag;
-    double cohesion, shear_length, projects, slip_rate, regain_rate, grip, side;
+    double cohesion, shear_length, projects, slip_rate, regain_rate, grip, growth, side;
     int curves;
 } CaseMaterial;
 

@@ -160,6 +160,7 @@ static void herd_open(Herd *herd, const Shape *shape) {
         if (shape->model == MILD_MODEL_MILD_MERGED && m % 2) { /* slip costs support */
             herd->material[m].slip_length = 1e-3 * (1 + m);
             herd->material[m].grip = m % 4 > 1 ? 0.2 : 0.0;
+            herd->material[m].slip_growth = m % 8 > 3 ? 0.08 : 0.0;
         }
     }
     for (int r = 0; r < ROBOTS; r++) {

@@ -330,6 +330,8 @@ static void wears(MildMaterial *m, uint64_t *random) {
     m->slip_length = kit_index(random, 4) ? kit_uniform(random, 1e-3, 5e-3) : 0.0;
     m->regain_length = kit_uniform(random, 2e-3, 2e-2);
     m->grip = kit_index(random, 2) ? kit_uniform(random, 0.05, 0.5) : 0.0;
+    uint64_t own = *random;
+    m->slip_growth = kit_index(&own, 2) ? kit_uniform(&own, 0.0, 0.1) : 0.0;
 }
 
 static MildSole *shape_sole(const Shape *shape, int side) {

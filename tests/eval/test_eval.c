@@ -495,8 +495,8 @@ static void rows_and_trials_are_their_own(void **state) {
     }
 }
 
-/* What --feet and --track write names the row's ground and speed, and has a line for every step
- * that a trial lasted. */
+/* What --feet and --track write names the row's ground and speed, and has a line for every physics
+ * or policy step that a trial lasted. */
 static void files_are_of_the_row(void **state) {
     (void)state;
     MildError error = {0};
@@ -533,7 +533,8 @@ static void files_are_of_the_row(void **state) {
             x[trial] = atof(line); /* base_x_m */
         }
         for (int i = 0; i < 2; i++) { /* a line for each foot */
-            expect_near("lines", lines[i], (file ? 1 : 2) * each[i].seconds / TASK_PERIOD, 1e-9);
+            const double step = file ? TASK_PERIOD : run.task->physics_dt / 2;
+            expect_near("lines", lines[i], each[i].seconds / step, 1e-9);
             assert_true(!file || fabs(each[i].x - x[i]) < 6e-6);
         }
         free(text[file]);

@@ -1,4 +1,4 @@
-/* What --feet writes: means and last values of made-up samples, angles of a turned foot, the
+/* What --feet writes: the values of made-up samples, angles of a turned foot, the
  * pressure centre by its definition, and the order of the rows. */
 #include <mujoco/mujoco.h>
 
@@ -6,7 +6,7 @@
 #include "run/eval/feet.h"
 #include "sa01.h"
 
-enum { TRIALS = 2, STEPS = 3, SAMPLES = 4 };
+enum { TRIALS = 2, STEPS = 3 };
 
 static Robot *robot;
 static int callocs; /* until one fails; 0: none does */
@@ -31,19 +31,19 @@ static void turn(double roll, double pitch, double yaw, double rotation[9]) {
     mju_quat2Mat(rotation, all);
 }
 
-/* Of a policy step of three: numbers of their own everywhere. The fourth does not belong to it. */
-static void make_samples(EnvsSample sample[SAMPLES]) {
-    for (int i = 0; i < SAMPLES; i++) {
+/* Numbers of their own everywhere. */
+static void make_samples(EnvsSample sample[STEPS]) {
+    for (int i = 0; i < STEPS; i++) {
         sample[i] = (EnvsSample){.feet = SA01_FEET};
         for (int f = 0; f < SA01_FEET; f++) {
             EnvsFoot *foot = &sample[i].foot[f];
             for (int k = 0; k < 3; k++) {
-                foot->force[k] = i < 3 ? 10.0 * (f + 1) * (k + 1) + 3.0 * i * i : NAN;
-                foot->torque[k] = i < 3 ? (f - 2.0) * (k + 2) + i : NAN;
-                foot->position[k] = i < 3 ? f + 0.1 * k + 0.01 * i : NAN;
+                foot->force[k] = 10.0 * (f + 1) * (k + 1) + 3.0 * i * i;
+                foot->torque[k] = (f - 2.0) * (k + 2) + i;
+                foot->position[k] = f + 0.1 * k + 0.01 * i;
             }
-            foot->depth = i < 3 ? 0.01 * (f + 1) + 0.001 * (i == 1) : 9;
-            foot->height = i < 3 ? -0.02 * (f + 1) - 0.001 * i : NAN;
+            foot->depth = 0.01 * (f + 1) + 0.001 * (i == 1);
+            foot->height = -0.02 * (f + 1) - 0.001 * i;
             turn(0.2 * f - 0.1 + 0.3 * i, 0.15 - 0.2 * f - 0.1 * i, 2.5 * f - 1 + 0.2 * i,
                  foot->rotation);
         }
@@ -57,31 +57,33 @@ static Feet made(void) {
     return feet;
 }
 
-static void a_step_is_taken(void **state) {
+static void steps_are_taken(void **state) {
     (void)state;
-    EnvsSample sample[SAMPLES];
+    EnvsSample sample[STEPS];
     Feet feet = made();
     make_samples(sample);
-    feet_take(&feet, 1, sample, 0); /* a trial that diverged at once */
-    assert_int_equal(feet.count[1], 0);
-    feet_take(&feet, 1, sample, 3);
-    assert_true(feet.count[0] == 0 && feet.count[1] == 1);
-    for (int f = 0; f < SA01_FEET; f++) {
-        const FeetRow *row = &feet.row[STEPS * SA01_FEET + f];
-        const double angle[3] = {0.2 * f - 0.1 + 0.6, 0.15 - 0.2 * f - 0.2, 2.5 * f - 1 + 0.4};
+    for (int i = 0; i < STEPS; i++) {
+        feet_take(&feet, 1, &sample[i]);
+    }
+    assert_true(feet.count[0] == 0 && feet.count[1] == STEPS);
+    for (int n = 0; n < STEPS * SA01_FEET; n++) {
+        const FeetRow *row = &feet.row[STEPS * SA01_FEET + n];
+        const int i = n / SA01_FEET, f = n % SA01_FEET;
+        const double angle[3] = {0.2 * f - 0.1 + 0.3 * i, 0.15 - 0.2 * f - 0.1 * i,
+                                 2.5 * f - 1 + 0.2 * i};
         for (int k = 0; k < 3; k++) {
-            expect_entry("ankle", k, row->ankle[k], f + 0.1 * k + 0.02, 1e-12);
+            expect_entry("ankle", k, row->ankle[k], f + 0.1 * k + 0.01 * i, 1e-12);
             expect_entry("rotation", k, row->rotation[k], angle[k], 1e-12);
-            expect_entry("force", k, row->force[k], 10 * (f + 1) * (k + 1) + 5, 1e-12);
-            expect_entry("torque", k, row->torque[k], (f - 2) * (k + 2) + 1, 1e-12);
+            expect_entry("force", k, row->force[k], 10 * (f + 1) * (k + 1) + 3 * i * i, 1e-12);
+            expect_entry("torque", k, row->torque[k], (f - 2) * (k + 2) + i, 1e-12);
         }
-        expect_near("depth", row->depth, 0.01 * (f + 1) + 0.001, 1e-15);
-        expect_near("height", row->height, -0.02 * (f + 1) - 0.002, 1e-15);
+        expect_near("depth", row->depth, 0.01 * (f + 1) + 0.001 * (i == 1), 1e-15);
+        expect_near("height", row->height, -0.02 * (f + 1) - 0.001 * i, 1e-15);
         /* at the centre the force alone has the torque about the sole's two axes */
         double force[3], torque[3], moment[3];
         const double at[3] = {row->center[0], row->center[1], mild_sole_z(robot_rasters(robot)[f])};
-        mju_mulMatTVec3(force, sample[2].foot[f].rotation, row->force);
-        mju_mulMatTVec3(torque, sample[2].foot[f].rotation, row->torque);
+        mju_mulMatTVec3(force, sample[i].foot[f].rotation, row->force);
+        mju_mulMatTVec3(torque, sample[i].foot[f].rotation, row->torque);
         mju_cross(moment, at, force);
         assert_true(force[2] > 1 && at[2] < 0);
         expect_near("moment about x", moment[0], torque[0], 1e-12);
@@ -102,7 +104,7 @@ static void a_centre_needs_a_force(void **state) {
         sample.foot[f].torque[0] = 0.3;
         sample.foot[f].torque[1] = -0.2;
     }
-    feet_take(&feet, 0, &sample, 1);
+    feet_take(&feet, 0, &sample);
     assert_true(feet.row[0].center[0] == 0 && feet.row[0].center[1] == 0);
     expect_near("x", feet.row[1].center[0], 0.2 / 1.01, 1e-12);
     expect_near("y", feet.row[1].center[1], 0.3 / 1.01, 1e-12);
@@ -117,7 +119,7 @@ static void rows_are_printed(void **state) {
     Feet feet = made();
     EnvsSample sample = {.feet = SA01_FEET};
     for (int i = 0; i < 3; i++) {
-        feet_take(&feet, i > 0, &sample, 1);
+        feet_take(&feet, i > 0, &sample);
     }
     for (int i = 0; i < TRIALS * STEPS * SA01_FEET; i++) {
         double *number = (double *)(void *)&feet.row[i];
@@ -129,7 +131,7 @@ static void rows_are_printed(void **state) {
     size_t size = 0;
     FILE *csv = open_memstream(&text, &size);
     feet_print_header(csv);
-    feet_print(&feet, "foam45", 0.6, 0.02, csv);
+    feet_print(&feet, "foam45", 0.6, 0.0025, csv);
     fclose(csv);
     char *rest, *line = strtok_r(text, "\n", &rest);
     assert_string_equal(line,
@@ -139,7 +141,7 @@ static void rows_are_printed(void **state) {
     for (size_t i = 0; i < sizeof order / sizeof *order; i++) {
         const int trial = order[i][0], step = order[i][1], f = order[i][2];
         char start[64];
-        snprintf(start, sizeof start, "foam45,0.6,%d,%d,%.2f", trial, f, 0.02 * (step + 1));
+        snprintf(start, sizeof start, "foam45,0.6,%d,%d,%.5f", trial, f, 0.0025 * (step + 1));
         line = strtok_r(NULL, "\n", &rest);
         assert_non_null(line);
         assert_memory_equal(line, start, strlen(start));
@@ -183,7 +185,7 @@ static int teardown(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_step_is_taken),
+        cmocka_unit_test(steps_are_taken),
         cmocka_unit_test(a_centre_needs_a_force),
         cmocka_unit_test(rows_are_printed),
         cmocka_unit_test(memory_that_is_missing_is_told),

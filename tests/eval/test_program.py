@@ -54,7 +54,7 @@ with tempfile.TemporaryDirectory() as name:
     assert len(walked) == 2 * steps
     load = sum(row["force_z_n"] for row in walked) / steps
     weight = MASS * 9.81
-    print(f"{steps} policy steps of 2 trials; mean load of both feet {load:.2f} N, weight {weight:.2f} N (2 %)")
+    print(f"{steps} physics steps of 2 trials; mean load of both feet {load:.2f} N, weight {weight:.2f} N (2 %)")
     assert abs(load / weight - 1) < 0.02
     loaded = [row for row in walked if row["force_z_n"] > 100]
     assert loaded and all(abs(row["center_x_m"]) < 0.2 and abs(row["center_y_m"]) < 0.12 for row in loaded)

@@ -56,12 +56,8 @@ with tempfile.TemporaryDirectory() as name:
     same, stiff = forces(folder, NUMBERS), forces(folder, {**NUMBERS, **{key: str(2 * float(NUMBERS[key])) for key in ("k_pen", "sigma_cone")}})
     print("force up of the walk, led, forward of the walk, led; up, led through twice the strength:", [(*a, b[1]) for a, b in zip(same, stiff)])
     assert len(same) == len(walk_lead.WINDOWS)
-    # a walk has a row every 10 ms, which shows the stop of a foot that strikes too late: the sum over the first two windows holds
-    blow = [sum((end - begin) * row[i] for (begin, end), row in zip(walk_lead.WINDOWS[:2], same)) for i in (0, 1)]
-    print(f"the first 50 ms: {blow[0]:.1f} N s, led {blow[1]:.1f} N s")
-    assert 0.75 < blow[1] / blow[0] < 1.25 and all(0.88 < led / walked < 1.12 for walked, led, _, _ in same[1:])
-    assert all(0.9 < led / walked < 1.1 for walked, led, _, _ in same[2:])  # 0.84 with the 77 elements of the SA01
-    assert same[0][2] < -50 and all(abs(led - walked) < 0.3 * abs(walked) + 15 for _, _, walked, led in same)
+    assert all(abs(led / walked - 1) < 0.06 for walked, led, _, _ in same)  # 0.84 with the 77 elements of the SA01
+    assert same[0][2] < -50 and all(abs(led - walked) < 0.05 * abs(walked) + 3 for _, _, walked, led in same)
     assert all(b[1] > 1.3 * a[1] for a, b in zip(same[1:], stiff[1:]))
 for model, within in (("mild_merged", 0.08), ("mild", 0.12)):  # the sole's raster has 3 % more than its area
     for depth in (0.01, 0.016):

@@ -157,6 +157,8 @@ static MildMaterial material_of(uint64_t *random, MildModel model) {
         m.slip_length = kit_index(random, 2) ? kit_uniform(random, 0.0005, 0.01) : 0.0;
         m.regain_length = kit_uniform(random, 0.0001, 0.005);
         m.grip = kit_index(random, 2) ? kit_uniform(random, 0.05, 0.3) : 0.0;
+        uint64_t own = *random;
+        m.slip_growth = kit_index(&own, 2) ? kit_uniform(&own, 0.0, 0.2) : 0.0;
     }
     if (model == MILD_MODEL_MILD || model == MILD_MODEL_ECC_SPRING ||
         model == MILD_MODEL_MILD_MERGED) {

@@ -44,7 +44,7 @@ static double spread(uint64_t *random, double low, double high) {
 
 /* A third of the numbers: an end of the range or anything in it. */
 static void draw_fields(uint64_t *random, MildMaterial *m) {
-    for (int i = 0; i < mild_material_field_count - 4; i++) {
+    for (int i = 0; i < mild_material_field_count - 5; i++) {
         const MildField *field = &mild_material_fields[i];
         if (field->type != MILD_FIELD_DOUBLE || choose(random, 3)) {
             continue;
@@ -82,6 +82,7 @@ static MildMaterial draw_material(uint64_t *random, int kind) {
     m.regain_length = spread(&own, 1e-4, 1);
     m.grip = choose(&own, 2) ? kit_uniform(&own, 0, 1) : 0;
     m.refill = choose(&own, 2) ? kit_uniform(&own, 0, 1) : 0;
+    m.slip_growth = choose(&own, 2) ? kit_uniform(&own, 0, 1) : 0;
     m.passive = 1;
     return m;
 }

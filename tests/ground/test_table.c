@@ -113,7 +113,8 @@ static void test_fields(void **state) {
             base.recovery = 0.3;
             base.bed_depth = 0.017;
             const int regains = strcmp(field->name, "regain_length") == 0;
-            if (regains || strcmp(field->name, "grip") == 0) { /* of ground that slip weakens */
+            if (regains || strcmp(field->name, "grip") == 0 ||
+                strcmp(field->name, "slip_growth") == 0) { /* of ground that slip weakens */
                 base.slip_length = 0.002;
                 base.recovery = 0.0;
                 base.regain_length = 0.05;

@@ -105,6 +105,8 @@ static void draw_slip(MildMaterial *m, Random *random) {
         m->regain_length = spread(random, 1e-4, 0.02);
         m->grip = choose(random, 2) ? random_uniform(random, 0, 0.6) : 0;
         m->recovery = choose(random, 2) ? m->recovery : 0;
+        Random own = *random; /* the other draws stay */
+        m->slip_growth = choose(&own, 2) ? random_uniform(&own, 0, 0.5) : 0;
     }
 }
 

@@ -29,10 +29,11 @@ typedef struct {
     Real entry_drag;   /* [kg/m] */
     Real cohesion;     /* [N/m^2] as in Shear */
     Real shear_length; /* [m] */
-    Real projects;     /* [-] as in Share; the next four too */
+    Real projects;     /* [-] as in Share; the next five too */
     Real slip_rate;    /* [1/m] */
     Real regain_rate;  /* [1/m] */
     Real grip;         /* [-] */
+    Real growth;       /* [1/m] */
     Real side;         /* [N/m^2] */
     int curves;        /* LawCurve and LawMotion bits of the law */
 } ContactMaterial;
@@ -131,6 +132,7 @@ MILD_HD Share contact_share(const ContactMaterial *material, int plane, Real wor
                          material->slip_rate,
                          material->regain_rate,
                          material->grip,
+                         material->growth,
                          plane ? material->side : 0,
                          material->mu,
                          worn,

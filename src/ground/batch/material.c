@@ -31,6 +31,7 @@ MildStatus material_numbers(const MildMaterial *material, double pitch, double w
     numbers->slip_rate = (float)inside.share.slip_rate;
     numbers->regain_rate = (float)inside.share.regain_rate;
     numbers->grip = (float)inside.share.grip;
+    numbers->growth = (float)inside.share.growth;
     numbers->side = (float)inside.share.side;
     numbers->curves = inside.curves;
     return MILD_OK;

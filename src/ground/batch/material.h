@@ -11,7 +11,7 @@ typedef struct {
     float law[MATERIAL_LAW_NUMBERS];                             /* in the order of Law */
     float recovery, mu, k_drift, b_drift, exit_drag, entry_drag; /* as in ContactMaterial */
     float cohesion, shear_length;
-    float projects, slip_rate, regain_rate, grip, side;
+    float projects, slip_rate, regain_rate, grip, growth, side;
     int curves;
 } MaterialNumbers;
 

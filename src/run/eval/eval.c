@@ -258,6 +258,9 @@ static void take_trial(void *context, int trial, int thread) {
         return;
     }
     while (at < first + t->samples && at->valid) {
+        if (eval->feet) {
+            feet_take(&t->feet, trial, at);
+        }
         measure_sample(&t->measure[trial], at++);
     }
     t->end[trial] = t->host.done[trial] ? t->host.cause[trial] : TASK_END_time;
@@ -266,9 +269,6 @@ static void take_trial(void *context, int trial, int thread) {
     }
     if (eval->track) {
         track_take(&t->track, trial, at - 1);
-    }
-    if (eval->feet) {
-        feet_take(&t->feet, trial, first, (int)(at - first));
     }
     direct(eval, speed_of(t, trial), t->measure[trial].time, (at - 1)->quaternion,
            t->command + 3 * (size_t)trial);
@@ -363,7 +363,7 @@ static MildStatus summarise(Trials *t, EvalRow *rows, MildError *error) {
         track_print(&t->track, t->run->scenes[0].name, speed_of(t, 0), TASK_PERIOD, eval.track);
     }
     if (status == MILD_OK && eval.feet) {
-        feet_print(&t->feet, t->run->scenes[0].name, speed_of(t, 0), TASK_PERIOD, eval.feet);
+        feet_print(&t->feet, t->run->scenes[0].name, speed_of(t, 0), t->task.physics_dt, eval.feet);
     }
     return status;
 }
@@ -383,7 +383,7 @@ MildStatus eval_run(const EvalRun *run, EvalRow *rows, MildError *error) {
         status = track_make(&t.track, t.trials, steps, error);
     }
     if (status == MILD_OK && run->eval.feet) {
-        status = feet_make(&t.feet, run->robot, t.trials, steps, error);
+        status = feet_make(&t.feet, run->robot, t.trials, steps * t.samples, error);
     }
     status = status == MILD_OK ? start(&t, error) : status;
     for (int k = 0; status == MILD_OK && k < steps; k++) {

@@ -42,33 +42,22 @@ static void find_center(FeetRow *row, const double rotation[9], double sole) {
     }
 }
 
-static void take_foot(FeetRow *row, const EnvsSample *sample, int count, int f, double sole) {
-    const EnvsFoot *last = &sample[count - 1].foot[f];
-    const double *turn = last->rotation;
-    memset(row, 0, sizeof *row);
-    for (int i = 0; i < count; i++) {
-        const EnvsFoot *foot = &sample[i].foot[f];
-        for (int k = 0; k < 3; k++) {
-            row->force[k] += foot->force[k] / count;
-            row->torque[k] += foot->torque[k] / count;
-        }
-        row->depth = fmax(row->depth, foot->depth);
-    }
-    memcpy(row->ankle, last->position, sizeof row->ankle);
+static void take_foot(FeetRow *row, const EnvsFoot *foot, double sole) {
+    const double *turn = foot->rotation;
+    *row = (FeetRow){.depth = foot->depth, .height = foot->height};
+    memcpy(row->ankle, foot->position, sizeof row->ankle);
+    memcpy(row->force, foot->force, sizeof row->force);
+    memcpy(row->torque, foot->torque, sizeof row->torque);
     row->rotation[0] = atan2(turn[7], turn[8]);
     row->rotation[1] = atan2(-turn[6], hypot(turn[7], turn[8]));
     row->rotation[2] = atan2(turn[3], turn[0]);
-    row->height = last->height;
     find_center(row, turn, sole);
 }
 
-void feet_take(Feet *feet, int trial, const EnvsSample *sample, int count) {
-    if (count == 0) {
-        return;
-    }
+void feet_take(Feet *feet, int trial, const EnvsSample *sample) {
     const int at = trial * feet->steps + feet->count[trial]++;
     for (int f = 0; f < feet->feet; f++) {
-        take_foot(&feet->row[at * feet->feet + f], sample, count, f, feet->sole[f]);
+        take_foot(&feet->row[at * feet->feet + f], &sample->foot[f], feet->sole[f]);
     }
 }
 
@@ -82,10 +71,10 @@ static void print_row(const FeetRow *row, FILE *csv) {
     const double *parts[] = {row->ankle, row->rotation, row->force, row->torque};
     for (int p = 0; p < 4; p++) {
         for (int k = 0; k < 3; k++) {
-            fprintf(csv, p < 2 ? ",%.5f" : ",%.3f", parts[p][k]);
+            fprintf(csv, p < 2 ? ",%.7f" : ",%.3f", parts[p][k]);
         }
     }
-    fprintf(csv, ",%.4f,%.4f,%.5f,%.5f\n", row->center[0], row->center[1], row->depth, row->height);
+    fprintf(csv, ",%.4f,%.4f,%.6f,%.6f\n", row->center[0], row->center[1], row->depth, row->height);
 }
 
 void feet_print(const Feet *feet, const char *ground, double speed, double period, FILE *csv) {
@@ -93,7 +82,7 @@ void feet_print(const Feet *feet, const char *ground, double speed, double perio
         const int f = i % feet->feet, step = i / feet->feet % feet->steps;
         const int trial = i / feet->feet / feet->steps;
         if (step < feet->count[trial]) {
-            fprintf(csv, "%s,%g,%d,%d,%.2f", ground, speed, trial, f, (step + 1) * period);
+            fprintf(csv, "%s,%g,%d,%d,%.5f", ground, speed, trial, f, (step + 1) * period);
             print_row(&feet->row[i], csv);
         }
     }
