@@ -1,6 +1,7 @@
-"""walk_mpm.py without newton: what is said, the window, the soles, and the SA01 on springs by `mild eval --program`. With newton, on the CPU:
-a free sole comes to rest where a led one has its load, and two feet that are one body move as one.
-test_walk_mpm.py MILD, or as the program: test_walk_mpm.py springs FOLDER OUTLINE HEIGHT"""
+"""walk_mpm.py without newton: what is said, the window, the soles, and the SA01 on springs by `mild eval --program`. Where newton is there, on
+the CPU: the operator of its solver is the robot's, new ground, a light foot at rest, two feet of one body. With `newton`, ten minutes more: the
+numbers of docs/grains.md.
+test_walk_mpm.py MILD [newton], or as the program: test_walk_mpm.py springs FOLDER OUTLINE HEIGHT"""
 import io
 import json
 import math
@@ -189,6 +190,62 @@ def go(one, place, force, response, seconds, dt=0.005, falls=0.0):
     return out
 
 
+def the_solver_has_the_robots_inertia():
+    """J says the velocity of each node on a sole, and what is after it is A J^T, both against cross products; all blocks of A are random."""
+    random, one = np.random.default_rng(3), ground([SQUARE, SQUARE])
+    root, had = random.normal(size=(12, 12)), []
+    response, place = root @ root.T, np.array([[0.01, 0.1, -0.01], [-0.02, -0.1, -0.02]])
+    solver, turns = one.ground.solver, np.stack([turned((1, 2, 3), 0.1), turned((1, -1, 0), 0.05)])
+    built = solver._build_collider_rigidity_operator
+
+    def build(state, scratch, volume):
+        had.append((*built(state, scratch, volume), scratch.collider_position_field.dof_values.numpy().copy(),
+                    solver.collider_body_index.numpy(), scratch.collider_ids.numpy().copy(), volume))
+        return had[-1][:2]
+    solver._build_collider_rigidity_operator = build
+    one.ground.follow((0.0, 0.0))
+    one.ground.step(place, turns, np.zeros((2, 6)), response, 0.005)
+    velocity_of, back, nodes, bodies, colliders, volume = had[0]
+    foot = np.where(colliders >= 0, bodies[np.maximum(colliders, 0)], -1)
+    feet = [np.flatnonzero(foot == f) for f in (0, 1)]
+
+    def times(matrix, vector):
+        wp = one.ground.wp
+        out = wp.zeros(matrix.nrow, dtype=wp.vec3, device="cpu")
+        wp.sparse.bsr_mv(matrix, wp.array(vector.astype(np.float32), dtype=wp.vec3, device="cpu"), out)
+        return out.numpy()
+    twist, impulse = random.normal(size=(4, 3)), random.normal(size=(len(nodes), 3))
+    speed, wrench = np.zeros((len(nodes), 3)), np.zeros(12)
+    for f, own in enumerate(feet):
+        lever = nodes[own] - place[f]
+        speed[own] = twist[2 * f] + np.cross(twist[2 * f + 1], lever)
+        wrench[6 * f:6 * f + 6] = [*impulse[own].sum(0), *np.cross(lever, impulse[own]).sum(0)]
+    changed = volume * (response @ wrench).reshape(4, 3)
+    off = np.abs(times(velocity_of, twist) - speed).max() / np.abs(speed).max(), np.abs(times(back, impulse) - changed).max() / np.abs(changed).max()
+    print(f"{[len(own) for own in feet]} nodes on two soles: J is off by {off[0]:.1e}, A J^T by {off[1]:.1e}")
+    assert min(len(own) for own in feet) >= 4 and max(off) < 1e-5
+
+
+def new_ground_is_laid_ahead():
+    """A print is left behind, and where the window comes again the ground is as at first."""
+    one = ground([SQUARE])
+    down = np.array([[0, 0, -0.5, 0, 0, 0]])
+    one.ground.follow((0.0, 0.0))
+    first = one.ground.state.particle_q.numpy().copy()
+    for k in range(16):
+        one.ground.step(np.array([[0, 0, -0.0025 * k]]), np.eye(3)[None], down, None, 0.005)
+    pressed = one.ground.state.particle_q.numpy().copy()
+    assert np.abs(pressed - first).max() > 0.01
+    assert one.ground.follow((0.12, 0.0))
+    moved, size = one.ground.state.particle_q.numpy().copy(), one.ground.window.size()
+    anew = (moved != pressed).any(1)
+    assert np.isclose(anew.mean(), 2 / 8, atol=0.01) and np.allclose(moved[anew], first[anew] + [size[0], 0, 0], atol=1e-6)
+    assert not one.ground.state.particle_qd.numpy()[anew].any()
+    one.ground.follow((2.0, 0.0))
+    afar = one.ground.state.particle_q.numpy().copy()
+    assert np.allclose((afar - first)[:, 1:], 0, atol=1e-6) and (afar[:, 0] > 2.0 - 0.6 * size[0]).all()
+
+
 def a_light_foot_comes_to_rest_at_its_load():
     """Plates of 0.3 kg with 49 N on them, which forces that come a step late throw off (below), stay and carry it."""
     one, response = ground([SQUARE, SQUARE]), np.diag([1 / 0.3] * 3 + [1 / 0.001] * 3 + [1 / 0.3] * 3 + [1 / 0.001] * 3)
@@ -257,8 +314,12 @@ def main():
     except ImportError:
         print("newton is not there: its part is left out")
         return
+    the_solver_has_the_robots_inertia()
+    new_ground_is_laid_ahead()
     a_light_foot_comes_to_rest_at_its_load()
     two_feet_of_one_body_move_as_one()
+    if sys.argv[2:] != ["newton"]:
+        return
     forces_from_step_to_step_throw_it_off()
     a_fall_is_less_deep_with_shorter_steps()
 
