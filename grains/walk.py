@@ -4,6 +4,7 @@
     grains/walk.py fit                      the models' numbers from grains/records, into grains/walk/grounds.json
     grains/walk.py grains --out out/walk    the walks on grains, by build/grains/grains; wants a GPU
     grains/walk.py models --out out/walk    the same walks on the models, some seconds each
+    grains/walk.py mpm --out out/walk       the same walks on Newton's implicit MPM, by walk_mpm.py; wants a GPU
     grains/walk.py lead --out out/walk      leads the feet of the walks on grains through mild_merged: forces after touchdown, side by side
     grains/walk.py figure --out out/walk    OUT/walk.csv with a row for each stance, OUT/walks.json for each walk, and the figure
     grains/walk.py video --out out/walk     a video of each walk on grains
@@ -140,6 +141,32 @@ def on_models(args):
                 walk(args, folder_of(args, family, speed, model), speed, ground_of(family, model), args.trials, robot)
 
 
+def mpm_friction(args):
+    """That which fits the level press of the same grains, with the same numbers of the solver (grains/newton/manifest.json)."""
+    if args.friction:
+        return args.friction
+    rows = json.loads((ROOT / "grains" / "newton" / "manifest.json").read_text())
+    had, wanted = rows["newton"]["parameters"], {"voxel": args.voxel, "iterations": args.iterations, "basis": "S2", "particles": 2}
+    other = [name for name, value in wanted.items() if had[name] != value]
+    if other:
+        fail(f"grains/newton was fitted with --{other[0]} {had[other[0]]}: give --friction")
+    fit = rows["fits"]["sand/disc120"]
+    return min(fit["tried"], key=lambda pair: abs(pair[1] - fit["grains"]))[0]
+
+
+def on_mpm(args):
+    """Only sand: its press has a friction."""
+    (sole, height), friction = outline(args.robot), mpm_friction(args)
+    solid = json.loads((ROOT / "grains" / "records" / "manifest.json").read_text())["sand"]["solid"]
+    for speed in args.speeds:
+        folder = folder_of(args, "sand", speed, "newton_mpm")
+        ground = {"friction": friction, "plate-friction": BEDS["sand"]["friction"], "solid": sum(solid) / len(solid), "window": args.window,
+                  "voxel": args.voxel, "iterations": args.iterations, "seed": args.bed_seed, "sole-height": args.sole_height}
+        options = [word for name, value in ground.items() for word in (f"--{name}", value)]
+        walk(args, folder, speed, ground_of("sand", "mild"), 1, args.robot,
+             [args.python, ROOT / "grains" / "walk_mpm.py", "--sole", sole, "--sole-z", height, "--out", folder, *options])
+
+
 def draw_figure(args):
     import walk_pictures
     walk_pictures.write_stances(args.out, args.families, args.speeds, args.out / "walk.csv")
@@ -177,7 +204,7 @@ def film(args):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("fit", "grains", "models", "lead", "figure", "video"))
+    parser.add_argument("what", choices=("fit", "grains", "models", "mpm", "lead", "figure", "video"))
     parser.add_argument("--out", default=ROOT / "out" / "walk", type=pathlib.Path)
     parser.add_argument("--mild", default=ROOT / "build" / "mild", type=pathlib.Path)
     parser.add_argument("--program", default=ROOT / "build" / "grains" / "grains", type=pathlib.Path)
@@ -190,7 +217,7 @@ def main():
     parser.add_argument("--seconds", default=10, type=float)
     parser.add_argument("--seed", default=1, type=int, help="of the trials")
     parser.add_argument("--trials", default=10, type=int, help="on models; the first is that on grains")
-    parser.add_argument("--dt", default=0.0005, type=float, help="[s] physics step of the robot")
+    parser.add_argument("--dt", type=float, help="[s] physics step of the robot; default: 0.0005, on MPM 0.0025")
     parser.add_argument("--threads", default=0, type=int)
     parser.add_argument("--grain", default=0.005, type=float, help="[m]")
     parser.add_argument("--box", default="0.72,0.44,0.2", help="[m] of a settled bed, many of which make the way")
@@ -200,11 +227,17 @@ def main():
     parser.add_argument("--reach", default=0.3, type=float, help="[m] grains nearer to the middle of a sole move")
     parser.add_argument("--sole-height", default=0.06, type=float, help="[m] of the block that a foot is")
     parser.add_argument("--frames", default=25, type=float, help="[1/s] pictures of the grains")
+    parser.add_argument("--python", default=sys.executable, help="of MPM: an interpreter that has newton")
+    parser.add_argument("--voxel", default=0.01, type=float, help="[m] of MPM")
+    parser.add_argument("--iterations", default=250, type=int, help="of MPM, in a step at most")
+    parser.add_argument("--window", default="0.88,0.56,0.2", help="[m] of MPM: length, width and depth of the ground under the robot")
+    parser.add_argument("--friction", type=float, help="of MPM; default: that of grains/newton")
     parser.add_argument("--image", default=ROOT / "docs" / "walk-on-grains.png", type=pathlib.Path)
     args = parser.parse_args()
     args.out = args.out.resolve()
+    args.dt = args.dt or (0.0025 if args.what == "mpm" else 0.0005)
     try:
-        {"fit": fit, "grains": on_grains, "models": on_models, "lead": lead, "figure": draw_figure, "video": film}[args.what](args)
+        {"fit": fit, "grains": on_grains, "models": on_models, "mpm": on_mpm, "lead": lead, "figure": draw_figure, "video": film}[args.what](args)
     except ModuleNotFoundError as error:
         fail(f"{args.what} needs the Python package {error.name}: .venv/bin/python grains/walk.py, after make setup")
 
