@@ -9,6 +9,7 @@ import walk_manifest
 
 CONTACT, PAUSE, SHORTEST = 5.0, 0.03, 0.15  # [N] [s] [s] of a stance
 ENDS = 0.05  # [s] at which its pressure centre is told
+MEAN = 0.01  # [s] of the largest forces: records of before 2026-11-23 have a row for each policy step
 COLOURS = {"grains": "#222222", "mild": "#1f77b4", "mild_merged": "#d62728", "bekker": "#2ca02c", "ecc_quasi_3d": "#9467bd", "newton_mpm": "#ff7f0e"}
 # What walk-0.json of a ground by another program says of its walk.
 TOLD = {"grains": ("time_s", "lost_sole_s", "seconds", "steps", "late_lists", "full_lists", "surface_m"),
@@ -33,9 +34,14 @@ class Stance:
         self.trial, self.foot = int(at["trial"][0]), int(at["foot"][0])
         self.time, self.force = at["time_s"], at["force_z_n"]
         self.depth, self.center = at["depth_m"], at["center_x_m"]
-        self.slide = np.hypot(at["force_x_n"], at["force_y_n"])
+        self.slide = np.hypot(self.means(at["force_x_n"]), self.means(at["force_y_n"]))
         self.way = float(np.hypot(np.ptp(at["ankle_x_m"]), np.ptp(at["ankle_y_m"])))
         self.pitch = at["pitch_rad"]
+
+    def means(self, values):
+        """Moving, over MEAN."""
+        count = min(max(1, round(MEAN / np.median(np.diff(self.time)))), len(values))
+        return np.convolve(values, np.full(count, 1 / count), mode="same")
 
     def curve(self, values):
         share = (self.time - self.time[0]) / max(self.time[-1] - self.time[0], 1e-9)
@@ -45,7 +51,7 @@ class Stance:
         load, step = np.maximum(self.force, 0), np.median(np.diff(self.time))  # of the robot's physics
         ends = [self.center[part].mean() for part in (self.time < self.time[0] + ENDS - 1e-6, self.time > self.time[-1] - ENDS + 1e-6)]
         return {"trial": self.trial, "foot": self.foot, "start_s": f"{self.time[0]:.2f}",
-                "duration_s": f"{self.time[-1] - self.time[0] + step:.2f}", "force_max_n": f"{self.force.max():.1f}",
+                "duration_s": f"{self.time[-1] - self.time[0] + step:.2f}", "force_max_n": f"{self.means(self.force).max():.1f}",
                 "force_mean_n": f"{self.force.mean():.1f}", "horizontal_max_n": f"{self.slide.max():.1f}",
                 "depth_max_m": f"{self.depth.max():.4f}", "center_x_m": f"{(load * self.center).sum() / load.sum():.4f}",
                 "center_x_first_m": f"{ends[0]:.4f}", "center_x_last_m": f"{ends[1]:.4f}",

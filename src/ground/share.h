@@ -7,8 +7,8 @@
  *     1/q <- 1/q + ds/(j0 c)             ds: horizontal path in the ground
  *     c - q <- (c - q) exp(-da/u0)       da: fresh penetration, beyond the yield depth
  * The element remembers 1 - q, its wear. Both lengths grow with the depth u by the same factor
- * 1 + g u, so a load that slides sinks the same way: in grains j0 = a quarter of a grain + u/12, for
- * soles of any width (docs/grains.md).
+ * 1 + g u, so a load that slides sinks the same way. In grains j0 is some 1 mm and 7 to 9 % of the
+ * depth, for soles of any width (docs/grains.md).
  *
  * A sliding element at the share lambda = q/c of its yield load is held by at most
  *     H = (3 + sqrt 8) t lambda (1 - lambda)/(2 - lambda) F_g,

@@ -2,7 +2,8 @@
  *
  * Ground that carries F_v(u) without slip carries, after the slip s and the fresh penetration a,
  *     F = q F_v(u),   dq/ds = -q^2/slip_length,   dq/da = (1 - q)/regain_length
- * with both lengths times 1 + slip_growth u/slip_length (slip_growth is not fitted), and holds the plate back by
+ * with both lengths times 1 + slip_growth u/slip_length (slip_growth is not fitted), and holds the
+ * plate back by
  *     H = min(mu, max(0.1, (3 + sqrt 8) grip (1 - q)/(2 - q))) F + side(u)
  * (docs/model.md section 22; without grip by mu F). The shape of F_v is that of the fitted press.
  * Its size is each record's own, by least squares, because a bed differs from the next by more than

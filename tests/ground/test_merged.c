@@ -291,8 +291,8 @@ TEST(test_drag) {
     assert_true(worst < 1e-9);
 }
 
-/* Fresh penetration gives the support back: 1 - lambda falls as exp(-da/u0), where u0 grows with the
- * depth as j0 does. Small steps: the share is held in each. */
+/* Fresh penetration gives the support back: 1 - lambda falls as exp(-da/u0), where u0 grows with
+ * the depth as j0 does. Small steps: the share is held in each. */
 TEST(test_regain) {
     for (int grows = 0; grows < 2; grows++) {
         MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
