@@ -23,7 +23,7 @@ from judge_cases import COLUMNS
 STEP = 1e-3  # [s] of the ground models
 PITCH = 0.01  # [m] of their soles' elements: at 19.5 mm a plate's raster is up to 6 % off its area, which no law can mend
 REGAIN = 0.28  # [-] regain_length of mild_merged by its slip_length, from loads that slide on grains of 5 mm
-GROWTH = 0.07  # [-] slip_growth, from squares dragged 40 and 80 mm deep; the grains of 2.5 mm allow no more
+GROWTH = 0.07  # [-] slip_growth: squares dragged 40 and 80 mm deep say 0.085 to 0.09, but then a load on small grains sinks too far (docs/grains.md)
 REFILL = 0.22  # [-] from an imprint pressed again, sand/square100-again
 HEAPS = 9  # [-] by the heap of a sole, the mass that moves with it: momentum of sand/square100-drop10 beyond that of a slow press
 

@@ -232,7 +232,7 @@ static int face_unlisted(const Advance *a, const Memory *memory, int e) {
     return buried;
 }
 
-/* Takes lane i of what blocks_remember and, if it wears, blocks_wear have stored. */
+/* Takes lane i of what blocks_remember has stored. wears: bool, shares do. */
 static void memory_take(const Memory *memory, int e, const Lanes after[ADVANCE_NUMBERS], int i,
                         int wears) {
     memory->depth_max[e] = after[0][i];

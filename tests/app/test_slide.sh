@@ -8,7 +8,7 @@ ground() {
     local name=$1
     shift
     printf '[ground]\nmodel = mild_merged\nk_pen = 230\nsigma_cone = 60000\nalpha = 0.3\nnu = 0.9\nc_g = 29\nc_d = 1\nphi = 0.59\nrho = 2500\nmu = 0.5
-k_drift = 0\nb_drift = 0\nrecovery = 0\nbed_depth = 1\nslip_length = 0.0025\nregain_length = 0.0007\ngrip = 0.14\n' >"$name"
+k_drift = 0\nb_drift = 0\nrecovery = 0\nbed_depth = 1\nslip_length = 0.0025\nregain_length = 0.0007\ngrip = 0.14\nslip_growth = 0\n' >"$name"
     for pair in "$@"; do
         sed -i "s/^${pair%%=*} = .*/${pair%%=*} = ${pair#*=}/" "$name"
     done
@@ -63,6 +63,15 @@ ground slick.ini mu=0.3 grip=0.3
 "$mild" fit disc.csv square.csv slick.csv --model mild_merged "${plates[@]}" --hold $known --json slick.json >/dev/null
 near "mu, where it bounds friction" "$(number slick.json mu value)" 0.3 0.5
 near "slip_length there" "$(number slick.json slip_length value)" 0.0025 0.1
+
+# lengths that grow with the depth: known, they do not hide slip_length; taken for none, it is that of the depth
+ground deep.ini slip_growth=0.08
+for depth in 0.015 0.03; do "$mild" press --ground ./deep.ini --plate 0.1,0.1 --depth $depth --drag 0.03 --csv deep$depth.csv >/dev/null; done
+"$mild" fit disc.csv square.csv deep0.015.csv deep0.03.csv --model mild_merged "${plates[@]}" --plate 0.1,0.1 --hold $known,slip_growth=0.08 \
+    --json deep.json >/dev/null || fail "slip_growth"
+near "slip_length that grows with the depth" "$(number deep.json slip_length value)" 0.0025 0.1
+"$mild" fit disc.csv square.csv deep0.015.csv --model mild_merged "${plates[@]}" --hold $known --json deep.json >/dev/null
+near "taken for one that does not, 15 mm deep" "$(number deep.json slip_length value)" 0.0037 1
 
 # Coulomb's friction alone: mu is told
 ground coulomb.ini grip=0
