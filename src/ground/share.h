@@ -63,6 +63,11 @@ typedef struct {
     Real carry;       /* [-] q */
 } Share;
 
+/* [-] c where the cosine between sole and ground is `level`. */
+MILD_HD Real share_lean(const Share *share, Real level) {
+    return 1 - share->projects * (1 - level);
+}
+
 /* Sets lean and carry, and with them the unloading line and friction, after element_begin: the
  * line says the whole force at the yield depth. elastic: [N] force of ground without memory. level:
  * cosine between sole and ground. */
@@ -70,7 +75,7 @@ MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share
                            Real dt, Real rate, Real level) {
     const Real a = e->yield_depth;
     const Real k = e->unload_stiffness;
-    const Real c = 1 - share->projects * (1 - level);
+    const Real c = share_lean(share, level);
     const Real q = real_min(1 - share->worn, c);
     const Real bed = law_bed_force(&e->law, a);
     const Real force = q * (k * (a - e->zero_depth) - bed) + bed;

@@ -101,6 +101,11 @@ MILD_HD int contact_memory_numbers(int elements, int map) {
     return map ? elements * CONTACT_MAP_MEMORY + CONTACT_FOOT_MEMORY : elements * CONTACT_MEMORY;
 }
 
+/* Four numbers, which a lane reads and writes at once. */
+typedef struct {
+    Real a, b, c, d;
+} __attribute__((aligned(4 * sizeof(Real)))) ContactQuad;
+
 /* Velocity of an element, along the world's axes. descent: speed at which its depth grows. */
 typedef struct {
     Real x, y;    /* [m/s] */

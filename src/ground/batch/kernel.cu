@@ -30,7 +30,10 @@ extern "C" {
 static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
 static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
 
-enum { WARPS = 4, THREADS = WARPS * LANES }; /* robots of a block */
+#ifndef KERNEL_WARPS
+#define KERNEL_WARPS 2
+#endif
+enum { WARPS = KERNEL_WARPS, THREADS = WARPS * LANES }; /* robots of a block */
 
 #define CONTACT_TURN(version)                                                                      \
     static __global__ void __launch_bounds__(THREADS, KERNEL_BLOCKS) contact_##version(            \
