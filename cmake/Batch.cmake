@@ -2,42 +2,41 @@
 
 # Kernels of a robot's contact step, one unit each: groups of lanes, at least as many as feet; elements of a lane; feet,
 # `flat` for any or `points` for those that transmit no moment; curves of the ground, `all` or the only ones, which is less
-# text and fewer registers, or `heap` for cones that merge or wear, `any` for all of these; blocks of a multiprocessor. A
+# text and fewer registers, or `heap` for cones that merge or wear, `any` for all of these; robots of a multiprocessor. A
 # batch takes the first that fits. The rows `flat all` are the sizes that a batch can have, smallest first. On the CPU the same sizes are numbers of one step.
 #
-# Two blocks fit a multiprocessor; three would be 1 % faster at 65 536 robots, and 12 % slower at 4096, for they spill
-# registers. Of points three fit, four on cones. Of one element a lane only points have kernels for cones: there is little to
-# gain otherwise. Resistive force theory has those for the feet of most robots.
+# Of one element a lane only points have kernels for cones: there is little to gain otherwise. Resistive force theory has
+# those for the feet of most robots.
 set(batch_kernels
-  "4 1 points cone   4"
-  "4 1 points all    3"
-  "1 3 flat   cone   2"
-  "1 8 flat   cone   2"
-  "2 5 flat   cone   2"
-  "2 8 flat   cone   2"
-  "4 4 flat   cone   2"
-  "4 8 flat   cone   2"
-  "2 5 flat   resist 2"
-  "4 4 flat   resist 2"
-  "1 1 flat   all    2"
-  "1 3 flat   all    2"
-  "1 8 flat   all    2"
-  "2 1 flat   all    2"
-  "2 5 flat   all    2"
-  "2 8 flat   all    2"
-  "4 1 flat   all    2"
-  "4 4 flat   all    2"
-  "4 8 flat   all    2"
-  "2 5 flat   heap   2"
-  "1 1 flat   any    2"
-  "1 3 flat   any    2"
-  "1 8 flat   any    2"
-  "2 1 flat   any    2"
-  "2 5 flat   any    2"
-  "2 8 flat   any    2"
-  "4 1 flat   any    2"
-  "4 4 flat   any    2"
-  "4 8 flat   any    2")
+  "4 1 points cone   16"
+  "4 1 points all    12"
+  "1 3 flat   cone   12"
+  "1 8 flat   cone   12"
+  "2 5 flat   cone   12"
+  "2 8 flat   cone   12"
+  "4 4 flat   cone   12"
+  "4 8 flat   cone   12"
+  "2 5 flat   resist 8"
+  "4 4 flat   resist 8"
+  "1 1 flat   all    8"
+  "1 3 flat   all    8"
+  "1 8 flat   all    8"
+  "2 1 flat   all    8"
+  "2 5 flat   all    8"
+  "2 8 flat   all    8"
+  "4 1 flat   all    8"
+  "4 4 flat   all    8"
+  "4 8 flat   all    8"
+  "2 5 flat   heap   12"
+  "1 1 flat   any    8"
+  "1 3 flat   any    8"
+  "1 8 flat   any    8"
+  "2 1 flat   any    8"
+  "2 5 flat   any    8"
+  "2 8 flat   any    8"
+  "4 1 flat   any    8"
+  "4 4 flat   any    8"
+  "4 8 flat   any    8")
 set(generated ${CMAKE_BINARY_DIR}/generated/batch)
 mild_layer(ground/batch layer_ground layer_device)
 target_include_directories(layer_batch PUBLIC ${generated})
@@ -55,7 +54,7 @@ foreach(row ${batch_kernels})
   list(GET row 1 per)
   list(GET row 2 feet)
   list(GET row 3 curves)
-  list(GET row 4 blocks)
+  list(GET row 4 robots)
   set(points 0)
   set(name ${groups}_${per})
   if(feet STREQUAL "points")
@@ -86,7 +85,7 @@ foreach(row ${batch_kernels})
 #define KERNEL_POINTS @points@
 #define KERNEL_CURVES @curves@
 #define KERNEL_HEAP @heap@
-#define KERNEL_BLOCKS @blocks@
+#define KERNEL_ROBOTS @robots@
 #include "ground/batch/kernel.cu"
 ]=] @ONLY)
   list(APPEND units ${unit})

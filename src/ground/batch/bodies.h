@@ -20,6 +20,7 @@
 #define BODIES_MARGIN REAL(1e-3)               /* [m] as in locate.c */
 #define BODIES_EXTRA_SPEED REAL(2)             /* [m/s] as in locate.c */
 #define BODIES_GROWTH REAL(8)                  /* [-] as NEWTON_GROWTH in newton_step.c */
+#define BODIES_FEW 4                           /* rows of a warp that are eliminated at once */
 
 /* The elements of a body. */
 typedef struct {

@@ -13,9 +13,12 @@ MILD_HD MapSpot bodies_spot(const BodiesSetup *setup, const BodiesWork *work, in
 MILD_HD Real bodies_times(const BodiesWork *work, int rows, int r, const Real *x) {
     Real sum = 0;
     LANE_ROLLED
-    for (int n = 0; n < work->active; n++) {
-        const int j = work->active_row[n];
-        sum += work->inverse_inertia[j * rows + r] * x[j];
+    for (int n = 0; n < work->active; n += 6) { /* a body, whose rows follow each other */
+        const int first = work->active_row[n];
+        LANE_UNROLL
+        for (int j = first; j < first + 6; j++) {
+            sum += work->inverse_inertia[j * rows + r] * x[j];
+        }
     }
     return sum;
 }
@@ -260,12 +263,21 @@ TEAM_FN void bodies_residual(BodiesWork *work, int rows, const BodiesPoint *poin
  * far larger. From body to body 1 + H A stays away from singular, but not from row to row: where
  * a body's forces turn its origin against them the diagonal passes through 0. */
 MILD_HD int bodies_pivot(const Real *matrix, int stride, int k) {
-    int most = k;
-    for (int r = k + 1; r < k / 6 * 6 + 6; r++) {
-        most = REAL_ABS(matrix[r * stride + k]) > REAL_ABS(matrix[most * stride + k]) ? r : most;
+    const int first = k - k % 6;
+    Real size[6], most = 0;
+    int chosen = k;
+    LANE_UNROLL
+    for (int i = 0; i < 6; i++) {
+        size[i] = first + i < k ? 0 : REAL_ABS(matrix[(first + i) * stride + k]);
+        most = real_max(most, size[i]);
     }
-    const Real least = BODIES_GROWTH * REAL_ABS(matrix[k * stride + k]);
-    return REAL_ABS(matrix[most * stride + k]) > least ? most : k;
+    if (most > BODIES_GROWTH * REAL_ABS(matrix[k * stride + k])) {
+        LANE_UNROLL
+        for (int i = 5; i >= 0; i--) {
+            chosen = size[i] == most ? first + i : chosen;
+        }
+    }
+    return chosen;
 }
 
 /* What is left of two rows from column k on changes places. */
@@ -282,7 +294,32 @@ TEAM_FN void bodies_swap(Real *matrix, int stride, int k, int other) {
     team_sync();
 }
 
-/* Gauss and Jordan; the last column becomes the solution. A warp has its share of the columns. */
+/* Column j of a warp's rows, BODIES_FEW at a time, less their factors times the pivot's row. The
+ * reads are before the writes, so that they do not wait for each other. */
+MILD_HD void bodies_subtract(Real *matrix, int rows, int k, int j, Real inverse) {
+    const int stride = rows + 1;
+    const Real pivot = matrix[k * stride + j] * inverse;
+    LANE_ROLLED
+    for (int from = TEAM_WARP; from < rows; from += BODIES_FEW * TEAM_WARPS) {
+        Real factor[BODIES_FEW], entry[BODIES_FEW];
+        LANE_UNROLL
+        for (int i = 0; i < BODIES_FEW; i++) {
+            const int r = from + i * TEAM_WARPS;
+            const int in = r < rows && r != k;
+            factor[i] = in ? matrix[r * stride + k] : 0;
+            entry[i] = in ? matrix[r * stride + j] : 0;
+        }
+        LANE_UNROLL
+        for (int i = 0; i < BODIES_FEW; i++) {
+            const int r = from + i * TEAM_WARPS;
+            if (r < rows && r != k) {
+                matrix[r * stride + j] = entry[i] - factor[i] * pivot;
+            }
+        }
+    }
+}
+
+/* Gauss and Jordan; the last column becomes the solution. A warp has its share of the rows. */
 TEAM_FN void bodies_eliminate(BodiesWork *work, int rows) {
     const int stride = rows + 1;
     LANE_ROLLED
@@ -291,18 +328,11 @@ TEAM_FN void bodies_eliminate(BodiesWork *work, int rows) {
         if (chosen != k) {
             bodies_swap(work->matrix, stride, k, chosen);
         }
-        const Real *pivot = work->matrix + k * stride;
-        const Real inverse = 1 / pivot[k];
+        const Real inverse = 1 / work->matrix[k * stride + k];
         EACH_LANE(l) {
             LANE_ROLLED
-            for (int n = TEAM_LANE(l); n < rows * TEAM_WARPS; n += TEAM) {
-                const int r = n / TEAM_WARPS;
-                Real *row = work->matrix + r * stride;
-                const Real factor = row[k] * inverse;
-                LANE_ROLLED
-                for (int j = k + 1 + n % TEAM_WARPS; j < stride && r != k; j += TEAM_WARPS) {
-                    row[j] -= factor * pivot[j];
-                }
+            for (int j = k + 1 + LANE(l); j < stride; j += LANES) {
+                bodies_subtract(work->matrix, rows, k, j, inverse);
             }
         }
         team_sync();
@@ -320,21 +350,25 @@ TEAM_FN void bodies_eliminate(BodiesWork *work, int rows) {
 TEAM_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, BodiesPoint *next) {
     const int active = work->active;
     const int stride = active + 1;
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int n = TEAM_LANE(l); n < active * stride; n += TEAM) {
-            const int right = n % stride == active; /* the right side */
-            const int r = work->active_row[n / stride];
-            const int j = work->active_row[right ? 0 : n % stride];
-            const int first = r / 6 * 6;
-            const Real *H = work->hessian[r / 6] + 6 * (r % 6);
-            const Real *A = work->inverse_inertia + first * rows;
-            Real sum = right ? at->wrench[r] : r == j ? 1 : 0;
-            for (int k = 0; k < 6; k++) {
-                sum += H[k] * (right ? at->twist[first + k] - work->free_velocity[first + k]
-                                     : A[k * rows + j]);
+    LANE_ROLLED
+    for (int n = TEAM_WARP; n < active; n += TEAM_WARPS) {
+        const int r = work->active_row[n];
+        const int first = r - r % 6;
+        const Real *H = work->hessian[r / 6] + 6 * (r % 6);
+        const Real *A = work->inverse_inertia + first * rows;
+        EACH_LANE(l) {
+            LANE_ROLLED
+            for (int m = LANE(l); m < stride; m += LANES) {
+                const int right = m == active; /* the right side */
+                const int j = work->active_row[right ? 0 : m];
+                Real sum = right ? at->wrench[r] : r == j ? 1 : 0;
+                LANE_UNROLL
+                for (int k = 0; k < 6; k++) {
+                    sum += H[k] * (right ? at->twist[first + k] - work->free_velocity[first + k]
+                                         : A[k * rows + j]);
+                }
+                work->matrix[n * stride + m] = sum;
             }
-            work->matrix[n] = sum;
         }
     }
     team_sync();

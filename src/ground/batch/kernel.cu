@@ -1,6 +1,6 @@
 /* The contact step of a batch on a GPU: a warp a robot. cmake/Batch.cmake makes a unit of each
  * size. Before the inclusion: KERNEL, the name of what it gives; KERNEL_GROUPS, KERNEL_PER,
- * KERNEL_POINTS, KERNEL_CURVES and KERNEL_HEAP, what they are for (contact.inc); KERNEL_BLOCKS of
+ * KERNEL_POINTS, KERNEL_CURVES and KERNEL_HEAP, what they are for (contact.inc); KERNEL_ROBOTS of
  * a multiprocessor. */
 #define MILD_REAL_FLOAT
 
@@ -30,13 +30,15 @@ extern "C" {
 static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
 static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
 
-#ifndef KERNEL_WARPS
-#define KERNEL_WARPS 2
-#endif
-enum { WARPS = KERNEL_WARPS, THREADS = WARPS * LANES }; /* robots of a block */
+/* Robots of a block: two where their elements have room. */
+enum {
+    SHARED_MOST = 48 * 1024, /* [B] of a block */
+    WARPS = 2 * sizeof(map_Shared) <= SHARED_MOST ? 2 : 1,
+    THREADS = WARPS * LANES
+};
 
 #define CONTACT_TURN(version)                                                                      \
-    static __global__ void __launch_bounds__(THREADS, KERNEL_BLOCKS) contact_##version(            \
+    static __global__ void __launch_bounds__(THREADS, KERNEL_ROBOTS / WARPS) contact_##version(            \
         const __grid_constant__ ContactSetup setup, const __grid_constant__ BatchShape shape,      \
         const __grid_constant__ BatchArrays arrays, const __grid_constant__ MildBatchInput input,  \
         const __grid_constant__ MildBatchOutput output, int advance) {                             \
