@@ -12,7 +12,7 @@ set(batch_kernels
   "4 1 points all    12"
   "1 3 flat   cone   12"
   "1 8 flat   cone   12"
-  "2 5 flat   cone   12"
+  "2 5 flat   cone   16"
   "2 8 flat   cone   12"
   "4 4 flat   cone   12"
   "4 8 flat   cone   12"

@@ -17,6 +17,7 @@
 #define CONTACT_FEET_MAX 4
 #define CONTACT_PADDING REAL(-1e3) /* [m] depth of elements that a foot does not have */
 #define CONTACT_HALVINGS 6         /* of one Newton step */
+#define CONTACT_ROUNDS 10          /* [-] residual over the tolerance that may be rounding */
 
 /* What a step needs of a material under one element of a foot. */
 typedef struct {

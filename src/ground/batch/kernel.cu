@@ -38,7 +38,7 @@ enum {
 };
 
 #define CONTACT_TURN(version)                                                                      \
-    static __global__ void __launch_bounds__(THREADS, KERNEL_ROBOTS / WARPS) contact_##version(            \
+    static __global__ void __launch_bounds__(THREADS, KERNEL_ROBOTS / WARPS) contact_##version(    \
         const __grid_constant__ ContactSetup setup, const __grid_constant__ BatchShape shape,      \
         const __grid_constant__ BatchArrays arrays, const __grid_constant__ MildBatchInput input,  \
         const __grid_constant__ MildBatchOutput output, int advance) {                             \
