@@ -70,8 +70,9 @@ class Ground:
         self.inputs = [Shared(a) for a in (self.place, self.turn, self.twist.reshape((worlds, feet, 6)), self.mobility,
                                            self.free.reshape((worlds, feet, 6)))]
         self.outputs = {"material": Shared(self.material), "wrench": Shared(self.wrench), "new_velocity": Shared(self.after), "foot": Shared(self.foot)}
+        self.low, self.floor = geoms_of(model, bodies + [frame_of(model, name)[0] for name in through])
         if exclude:
-            leave_floor(model, m, bodies + [frame_of(model, name)[0] for name in through])
+            leave_floor(m, self.low, self.floor)
         m.callback.control = self.act
 
     @property
@@ -250,11 +251,14 @@ def layout(model, m, bodies):
     return dense, moves
 
 
-def leave_floor(model, m, bodies):
-    """Takes the pairs of these bodies' geoms and the floor's out of MuJoCo Warp's collisions."""
+def geoms_of(model, bodies):
+    """Which geoms are these bodies', and which the floor's."""
     of = model.geom_bodyid
-    floor = (of == 0) | ((model.body_weldid[of] == 0) & np.isin(model.geom_type, (PLANE, HFIELD)))
-    low = np.isin(of, bodies)
+    return np.isin(of, bodies), (of == 0) | ((model.body_weldid[of] == 0) & np.isin(model.geom_type, (PLANE, HFIELD)))
+
+
+def leave_floor(m, low, floor):
+    """Takes the pairs of low geoms and the floor's out of MuJoCo Warp's collisions."""
     pairs, state = m.nxn_geom_pair.numpy(), m.nxn_pairid.numpy()
     a, b = pairs.T
     state[(low[a] & floor[b]) | (low[b] & floor[a]), 0] = -2  # MuJoCo Warp's mark of a pair that makes no contacts
