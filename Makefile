@@ -16,9 +16,10 @@ MUJOCO_ROOT ?=
 QUICK ?=
 ARCHS ?=
 VERSION ?=
+PYTHON312 ?= python3.12
 TEST ?=
 
-.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check newton-check jax-check dds-check check export-check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check newton-check isaaclab-check jax-check dds-check check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -45,6 +46,7 @@ help:
 	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/python-venv"
 	@echo "make mjlab-check   the package under mjlab, on the CPU (5 GB), in build/mjlab-venv"
 	@echo "make newton-check  the ground in MuJoCo Warp and Newton beside the engine plugin, on the CPU, in build/newton-venv"
+	@echo "make isaaclab-check  the ground in Isaac Lab 3's own G1 task without its simulator, on the CPU (8 GB), for PYTHON312=python3.12"
 	@echo "make jax-check   the batch ground inside jax.jit, in build/jax-venv"
 	@echo "make dds-check   examples/drive: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
@@ -173,6 +175,14 @@ newton-check: wheel
 		cp scripts/newton.txt build/newton-venv/installed; }
 	@build/newton-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mildground-*.whl
 	@build/newton-venv/bin/python -W ignore tests/python/check_newton.py
+
+isaaclab-check: wheel
+	@cmp -s scripts/isaaclab.txt build/isaaclab-venv/installed || { $(PYTHON312) -m venv --clear build/isaaclab-venv && \
+		build/isaaclab-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/uv.txt && \
+		build/isaaclab-venv/bin/uv pip install -q --python build/isaaclab-venv/bin/python --require-hashes -r scripts/isaaclab.txt && \
+		cp scripts/isaaclab.txt build/isaaclab-venv/installed; }
+	@build/isaaclab-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mildground-*.whl
+	@build/isaaclab-venv/bin/python -W ignore tests/python/check_isaaclab.py
 
 jax-check: build
 	@cmp -s scripts/jax.txt build/jax-venv/installed || { python3 -m venv --clear build/jax-venv && \

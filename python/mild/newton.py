@@ -48,6 +48,15 @@ def attach(solver, feet, ground="sand_loose", *, dt, soles=None, through=()):
     return made
 
 
+def isaaclab(env, env_ids, feet, ground="sand_loose", soles=None, through=()):
+    """An event of Isaac Lab 3 for a task whose physics is newton_mjwarp; the rest is attach's. The forces: NewtonManager._solver.soft_ground.
+
+    cfg.events.ground = EventTermCfg(func=mild.newton.isaaclab, mode="startup", params={"feet": [...], "ground": ["sand_loose", "foam45"]})"""
+    from isaaclab_newton.physics import NewtonManager
+    attach(NewtonManager._solver, feet, ground, dt=NewtonManager.get_solver_dt(), soles=soles, through=through)
+    NewtonManager._invalidate_graph()  # one that was captured before would have no ground
+
+
 def kinds_of(solver, ground):
     """For each of Newton's shapes whether it is a foot's or passes the floor too (LOW), or the floor's (FLOOR)."""
     shapes, kinds = solver.mjc_geom_to_newton_shape.numpy(), np.zeros(solver.model.shape_count, np.int32)
