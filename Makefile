@@ -47,7 +47,7 @@ help:
 	@echo "make mjlab-check   the package under mjlab, on the CPU (5 GB), in build/mjlab-venv"
 	@echo "make newton-check  the ground in MuJoCo Warp and Newton beside the engine plugin, on the CPU, in build/newton-venv"
 	@echo "make isaaclab-check  the ground in Isaac Lab 3's own G1 task without its simulator, on the CPU (8 GB), for PYTHON312=python3.12"
-	@echo "make jax-check   the batch ground inside jax.jit, in build/jax-venv"
+	@echo "make jax-check   the batch ground inside jax.jit, and under MJX's robots, in build/jax-venv"
 	@echo "make dds-check   examples/drive: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
@@ -181,9 +181,9 @@ isaaclab-check: wheel
 	@$(call with_wheel,isaaclab,$(PYTHON312))
 	@build/isaaclab-venv/bin/python -W ignore tests/python/check_isaaclab.py
 
-jax-check: build
-	@$(call environment,jax)
-	@PYTHONPATH=build/python build/jax-venv/bin/python -W ignore tests/python/check_jax.py
+jax-check: wheel
+	@$(call with_wheel,jax)
+	@build/jax-venv/bin/python -W ignore tests/python/check_jax.py
 
 # The bridges of examples/drive.
 dds-check: build
