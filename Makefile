@@ -16,9 +16,10 @@ MUJOCO_ROOT ?=
 QUICK ?=
 ARCHS ?=
 VERSION ?=
+PYTHON312 ?= python3.12
 TEST ?=
 
-.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check newton-check jax-check dds-check check export-check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check newton-check isaaclab-check jax-check dds-check check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -42,10 +43,11 @@ help:
 	@echo "make wheels  the Python package with the program as one wheel, build/dist, tried in bare environments (docs/install.md)"
 	@echo "make wheel-cuda  the compiled files for GPUs as a wheel beside it, for ARCHS=90 or for all"
 	@echo "make wheel   the same in half the time: untried, for MARCH=x86-64-v3 alone unless given"
-	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/python-venv"
+	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/learners-venv"
 	@echo "make mjlab-check   the package under mjlab, on the CPU (5 GB), in build/mjlab-venv"
 	@echo "make newton-check  the ground in MuJoCo Warp and Newton beside the engine plugin, on the CPU, in build/newton-venv"
-	@echo "make jax-check   the batch ground inside jax.jit, in build/jax-venv"
+	@echo "make isaaclab-check  the ground in Isaac Lab 3's own G1 task without its simulator, on the CPU (8 GB), for PYTHON312=python3.12"
+	@echo "make jax-check   the batch ground inside jax.jit, and under MJX's robots, in build/jax-venv"
 	@echo "make dds-check   examples/drive: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
@@ -135,7 +137,16 @@ docs:
 deb: setup
 	@JOBS=$(JOBS) scripts/deb.sh $(if $(TEST),test)
 
-# Its own Python environment; once it is there, no network.
+# $(call environment,NAME,PYTHON): build/NAME-venv with what scripts/NAME.txt lists, by uv, which is faster than pip by minutes.
+environment = cmp -s scripts/$(1).txt build/$(1)-venv/installed || { $(or $(2),python3) -m venv --clear build/$(1)-venv && \
+	build/$(1)-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/uv.txt && \
+	build/$(1)-venv/bin/uv pip install -q --python build/$(1)-venv/bin/python --require-hashes -r scripts/$(1).txt && \
+	cp scripts/$(1).txt build/$(1)-venv/installed; }
+# $(call with_wheel,NAME,PYTHON): the same with the wheel, as a user has it.
+with_wheel = $(call environment,$(1),$(2)) && \
+	build/$(1)-venv/bin/pip install -q --disable-pip-version-check --no-deps --force-reinstall build/dist/mildground-*.whl
+
+# By pip, as `make setup`: a part of `make check`.
 site:
 	@cmp -s scripts/site.txt build/site-venv/installed || { python3 -m venv --clear build/site-venv && \
 		build/site-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/site.txt && \
@@ -153,38 +164,30 @@ wheel-cuda: setup
 wheels: setup
 	@MARCH=$(MARCH) scripts/wheels.sh
 
-# Learners are large: an environment of its own, with the wheel as a user has it.
 python-check: wheel
-	@[ -x build/python-venv/bin/python ] || python3 -m venv build/python-venv
-	@build/python-venv/bin/pip install --quiet --disable-pip-version-check --require-hashes -r scripts/learners.txt
-	@build/python-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mildground-*.whl
-	@build/python-venv/bin/python tests/python/check_learners.py
-	@build/python-venv/bin/python tests/python/check_cuda.py
+	@$(call with_wheel,learners)
+	@build/learners-venv/bin/python tests/python/check_learners.py
+	@build/learners-venv/bin/python tests/python/check_cuda.py
 
 mjlab-check: wheel
-	@[ -x build/mjlab-venv/bin/python ] || python3 -m venv build/mjlab-venv
-	@build/mjlab-venv/bin/pip install --quiet --disable-pip-version-check --require-hashes -r scripts/mjlab.txt
-	@build/mjlab-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mildground-*.whl
+	@$(call with_wheel,mjlab)
 	@build/mjlab-venv/bin/python -W ignore tests/python/check_mjlab.py
 
 newton-check: wheel
-	@cmp -s scripts/newton.txt build/newton-venv/installed || { python3 -m venv --clear build/newton-venv && \
-		build/newton-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/newton.txt && \
-		cp scripts/newton.txt build/newton-venv/installed; }
-	@build/newton-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mildground-*.whl
+	@$(call with_wheel,newton)
 	@build/newton-venv/bin/python -W ignore tests/python/check_newton.py
 
-jax-check: build
-	@cmp -s scripts/jax.txt build/jax-venv/installed || { python3 -m venv --clear build/jax-venv && \
-		build/jax-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/jax.txt && \
-		cp scripts/jax.txt build/jax-venv/installed; }
-	@PYTHONPATH=build/python build/jax-venv/bin/python -W ignore tests/python/check_jax.py
+isaaclab-check: wheel
+	@$(call with_wheel,isaaclab,$(PYTHON312))
+	@build/isaaclab-venv/bin/python -W ignore tests/python/check_isaaclab.py
 
-# The bridges of examples/drive; DDS in a Python environment of its own.
+jax-check: wheel
+	@$(call with_wheel,jax)
+	@build/jax-venv/bin/python -W ignore tests/python/check_jax.py
+
+# The bridges of examples/drive.
 dds-check: build
-	@cmp -s scripts/dds.txt build/dds-venv/installed || { python3 -m venv --clear build/dds-venv && \
-		build/dds-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/dds.txt && \
-		cp scripts/dds.txt build/dds-venv/installed; }
+	@$(call environment,dds)
 	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_unitree.py build/mild
 	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_ros2.py build/mild
 

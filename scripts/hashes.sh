@@ -9,9 +9,11 @@ if ! [ -x build/uv/bin/uv ]; then
     python3 -m venv build/uv
     build/uv/bin/pip install --quiet --disable-pip-version-check --require-hashes -r scripts/uv.txt
 fi
-[ $# -gt 0 ] || set -- scripts/{requirements,uv,site,dds,wheel,wheels,cuda,learners,mjlab,newton,jax}.in scripts/paper/requirements.in tests/export/requirements.in
+[ $# -gt 0 ] || set -- scripts/{requirements,uv,site,dds,wheel,wheels,cuda,learners,mjlab,newton,isaaclab,jax}.in scripts/paper/requirements.in tests/export/requirements.in
 for file; do
-    build/uv/bin/uv pip compile --quiet --generate-hashes --python-version 3.11 --no-emit-index-url --no-emit-find-links \
+    version=3.11
+    [[ $file != *isaaclab.in ]] || version=3.12 # the only one that it is for
+    build/uv/bin/uv pip compile --quiet --generate-hashes --python-version $version --no-emit-index-url --no-emit-find-links \
         --custom-compile-command "scripts/hashes.sh $file" "${upgrade[@]}" --output-file "${file%.in}.txt" "$file"
     echo "hashes: ${file%.in}.txt"
 done

@@ -11,6 +11,7 @@ import warp as wp
 from mujoco import mjtConstraint
 
 LIMIT = wp.constant(int(mjtConstraint.mjCNSTR_LIMIT_JOINT))
+LOW, FLOOR = wp.constant(1), wp.constant(2)  # kinds of Newton's shapes; 0: any other
 
 
 @wp.kernel(enable_backward=False)
@@ -108,3 +109,13 @@ def forget(which: wp.array[wp.uint8], wrench: wp.array3d[float], foot: wp.array3
     if which[w] != wp.uint8(0):
         wrench[w, f, k] = 0.0
         foot[w, f, k] = 0.0
+
+
+@wp.kernel(enable_backward=False)
+def leave_contacts(count: wp.array[int], kinds: wp.array[int], first: wp.array[int], second: wp.array[int]):
+    """Newton's contacts of what is low with the floor get a shape that is none, which its solver passes over."""
+    i = wp.tid()
+    if i < count[0]:
+        a, b = first[i], second[i]
+        if a >= 0 and b >= 0 and kinds[a] + kinds[b] == LOW + FLOOR and kinds[a] != 0 and kinds[b] != 0:
+            first[i] = -1

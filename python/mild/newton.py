@@ -5,8 +5,10 @@
     solver.step(state_0, state_1, control, contacts, 0.005)          # the ground acts in it; solver.reset puts worlds on fresh ground
 
 Attach before a graph of the solver's step is captured."""
+import numpy as np
 import warp as wp
 
+from ._warp_kernels import FLOOR, LOW, leave_contacts
 from .warp import Ground
 
 
@@ -20,19 +22,22 @@ def attach(solver, feet, ground="sand_loose", *, dt, soles=None, through=()):
         raise TypeError(f"solver: a {type(solver).__name__}, but it must be a newton.solvers.SolverMuJoCo")
     if solver.use_mujoco_cpu:
         raise ValueError("solver: it runs MuJoCo on the CPU; make it with use_mujoco_cpu=False, or use mild.attach in MuJoCo")
-    if not solver.mjw_model.opt.run_collision_detection:
-        raise ValueError("solver: it takes Newton's contacts, among them those of the feet with the floor; make it with use_mujoco_contacts=True")
     if hasattr(solver, "soft_ground"):
         raise ValueError("solver: it has soft ground already")
     model = solver.mj_model
     made = Ground(model, solver.mjw_model, solver.mjw_data, [named(solver, name) for name in feet], ground, soles=soles,
                   through=[named(solver, name) for name in through], timestep=dt)
-    step, reset, worlds = solver.step, solver.reset, made.d.nworld
+    step, reset, worlds, kinds = solver.step, solver.reset, made.d.nworld, None
+    if not solver.mjw_model.opt.run_collision_detection:  # contacts are Newton's, made before the step
+        kinds = kinds_of(solver, made)
 
     def step_with(state_in, state_out, control, contacts, dt, **keys):
         if abs(dt - made.timestep) > 1e-9:
             raise ValueError(f"dt: {dt:g} s, but the ground was attached with {made.timestep:g} s")
         with wp.ScopedDevice(made.device), made.acting():
+            if kinds is not None and contacts is not None:
+                wp.launch(leave_contacts, dim=contacts.rigid_contact_max, inputs=[contacts.rigid_contact_count, kinds],
+                          outputs=[contacts.rigid_contact_shape0, contacts.rigid_contact_shape1])
             step(state_in, state_out, control, contacts, dt, **keys)
 
     def reset_with(state, world_mask=None, *given, **keys):
@@ -41,6 +46,24 @@ def attach(solver, feet, ground="sand_loose", *, dt, soles=None, through=()):
 
     solver.step, solver.reset, solver.soft_ground = step_with, reset_with, made
     return made
+
+
+def isaaclab(env, env_ids, feet, ground="sand_loose", soles=None, through=()):
+    """An event of Isaac Lab 3 for a task whose physics is newton_mjwarp; the rest is attach's. The forces: NewtonManager._solver.soft_ground.
+
+    cfg.events.ground = EventTermCfg(func=mild.newton.isaaclab, mode="startup", params={"feet": [...], "ground": ["sand_loose", "foam45"]})"""
+    from isaaclab_newton.physics import NewtonManager
+    attach(NewtonManager._solver, feet, ground, dt=NewtonManager.get_solver_dt(), soles=soles, through=through)
+    NewtonManager._invalidate_graph()  # one that was captured before would have no ground
+
+
+def kinds_of(solver, ground):
+    """For each of Newton's shapes whether it is a foot's or passes the floor too (LOW), or the floor's (FLOOR)."""
+    shapes, kinds = solver.mjc_geom_to_newton_shape.numpy(), np.zeros(solver.model.shape_count, np.int32)
+    for mask, kind in ((ground.low, LOW), (ground.floor, FLOOR)):
+        found = shapes[:, mask]
+        kinds[found[found >= 0]] = kind
+    return wp.array(kinds, dtype=int, device=ground.device)
 
 
 def flags_of(mask, worlds):

@@ -5,21 +5,17 @@
 
 mild.mjlab and mild.newton stand on it."""
 import contextlib
-import re
 
 import mujoco
 import mujoco_warp as mjw
 import numpy as np
 import warp as wp
 
-from . import Batch, Sole
+from . import Batch
+from ._soles import feet_of, frame_of, geoms_of
 from ._warp_kernels import add_damping, add_limits, apply, approach, contact_kernel, forget
 
-CIRCLE = (np.arange(32) + 0.5) * np.pi / 16  # corners of a round outline
-BAND = 0.01  # [m] what lies higher above the lowest point is not the sole
 EULER, IMPLICIT = int(mujoco.mjtIntegrator.mjINT_EULER), int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
-PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = (
-    int(getattr(mujoco.mjtGeom, "mjGEOM_" + name)) for name in ("PLANE", "HFIELD", "SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH"))
 
 
 class Ground:
@@ -39,14 +35,7 @@ class Ground:
         check_options(m)
         self.model, self.m, self.d, self.on = model, m, d, False
         self.timestep = float(timestep or model.opt.timestep)
-        frames = [frame_of(model, name) for name in feet]
-        bodies = [body for body, _, _ in frames]
-        made = list(soles) if soles is not None and not isinstance(soles, str) else [
-            sole_of(model, name, frame, soles, site=find(model.site, name) is not None) for name, frame in zip(feet, frames)]
-        made = [one if isinstance(one, tuple) else (one, 0, frame[1]) for one, frame in zip(made, frames)]
-        self.soles, self.radius, center = ([one[k] for one in made] for k in range(3))
-        if len(made) != len(feet):
-            raise ValueError(f"soles: {len(made)} for {len(feet)} feet")
+        bodies, axes, self.soles, self.radius, center = feet_of(model, feet, soles)
         worlds, dofs, feet = d.nworld, model.nv, len(feet)
         self.round, self.device = all(self.radius), m.opt.timestep.device
         self.size = 3 if self.round else 6
@@ -58,7 +47,7 @@ class Ground:
             self.body, self.dense, self.moves = (wp.array(a, dtype=int) for a in (bodies, dense.ravel(), moves))
             self.diagonal = wp.array(dense.diagonal(), dtype=int)
             self.center, self.lift = wp.array(center, dtype=wp.vec3), wp.array(self.radius, dtype=float)
-            self.axes = wp.array([axes for _, _, axes in frames], dtype=wp.mat33)
+            self.axes = wp.array(axes, dtype=wp.mat33)
             self.place, self.turn = wp.zeros((worlds, feet), dtype=wp.vec3), wp.full((worlds, feet), wp.mat33(np.eye(3)), dtype=wp.mat33)
             self.metric, self.jacobian = wp.zeros((worlds, m.nC), dtype=float), wp.zeros((worlds, dofs, feet * self.size + 1), dtype=float)
             self.twist, self.free = (wp.zeros((worlds, 6 * feet), dtype=float) for _ in range(2))
@@ -70,8 +59,9 @@ class Ground:
         self.inputs = [Shared(a) for a in (self.place, self.turn, self.twist.reshape((worlds, feet, 6)), self.mobility,
                                            self.free.reshape((worlds, feet, 6)))]
         self.outputs = {"material": Shared(self.material), "wrench": Shared(self.wrench), "new_velocity": Shared(self.after), "foot": Shared(self.foot)}
+        self.low, self.floor = geoms_of(model, [*bodies, *(frame_of(model, name)[0] for name in through)])
         if exclude:
-            leave_floor(model, m, bodies + [frame_of(model, name)[0] for name in through])
+            leave_floor(m, self.low, self.floor)
         m.callback.control = self.act
 
     @property
@@ -142,13 +132,6 @@ class Shared:
         return self.array.__dlpack_device__()
 
 
-def find(table, name):
-    try:
-        return table(name)
-    except KeyError:
-        return None
-
-
 def check_options(m):
     if int(m.opt.integrator) not in (EULER, IMPLICIT):
         raise ValueError("integrator: the ground's step is part of Euler's and implicitfast's; set opt.integrator to one of these")
@@ -156,85 +139,6 @@ def check_options(m):
         raise ValueError("actuation: it is disabled, and the ground acts where MuJoCo Warp calls the control; enable it")
     if m.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
         raise ValueError("sleep: soft ground moves robots that rest; disable it")
-
-
-def frame_of(model, name):
-    """Body, origin and axes of a foot in the frame of its body."""
-    body, site = find(model.body, name), find(model.site, name)
-    if body is not None:
-        if model.body_weldid[body.id] == 0:
-            raise ValueError(f"feet: body '{name}' is fixed to the world; it must move")
-        return body.id, np.zeros(3), np.eye(3)
-    if site is None:
-        raise ValueError(f"feet: the model has no body or site '{name}'")
-    axes = np.zeros(9)
-    mujoco.mju_quat2Mat(axes, site.quat)
-    return int(model.site_bodyid[site.id]), np.array(site.pos), axes.reshape(3, 3)
-
-
-def sole_of(model, name, frame, soles, site):
-    """Sole, radius and centre of a foot: of a single sphere, a disc; else the hull of what lies lowest, as in the engine plugin."""
-    body, origin, axes = frame
-    mine = [g for g in range(model.ngeom) if model.geom_bodyid[g] == body]
-    if soles is not None:
-        mine = [g for g in mine if re.fullmatch(soles, model.geom(g).name)]
-        if not mine:
-            raise ValueError(f"soles: no geom on the body of '{name}' is named '{soles}'")
-    elif any(model.geom_type[g] != MESH for g in mine):
-        mine = [g for g in mine if model.geom_type[g] != MESH]
-    if len(mine) == 1 and model.geom_type[mine[0]] == SPHERE and not site:
-        radius = float(model.geom_size[mine[0], 0])
-        reach = radius * np.sqrt(np.pi / (16 * np.sin(np.pi / 16)))  # a polygon of the disc's area
-        return Sole(reach * np.stack([np.cos(CIRCLE), np.sin(CIRCLE)], 1)), radius, model.geom_pos[mine[0]]
-    cloud = np.concatenate([points_of(model, g, origin, axes) for g in mine] + [np.zeros((0, 3))])
-    lowest = cloud[:, 2].min(initial=np.inf)
-    outline = hull(cloud[cloud[:, 2] <= lowest + BAND, :2])
-    if len(outline) < 3:
-        raise ValueError(f"feet: the body of '{name}' has no geom with a flat outline; give soles=[mild.Sole(...), ...]")
-    return Sole(outline, sole_z=float(lowest)), 0, origin
-
-
-def points_of(model, geom, origin, axes):
-    """Points on the surface of a geom, in the frame of the foot."""
-    kind, size, turn = model.geom_type[geom], model.geom_size[geom], np.zeros(9)
-    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-
-    def placed(local):
-        return ((np.reshape(local, (-1, 3)) @ turn.reshape(3, 3).T + model.geom_pos[geom]) - origin) @ axes
-
-    if kind in (SPHERE, CAPSULE):  # a ball's widest circle, at the height of its lowest point
-        ends = placed([[0, 0, z] for z in ((size[1], -size[1]) if kind == CAPSULE else (0,))])
-        around = np.stack([np.cos(CIRCLE), np.sin(CIRCLE), -np.ones(32)], 1) * size[0]
-        return (ends[:, None] + around).reshape(-1, 3)
-    if kind == BOX:
-        return placed([[x * size[0], y * size[1], z * size[2]] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    if kind == CYLINDER:
-        return placed([[size[0] * np.cos(a), size[0] * np.sin(a), z] for z in (-size[1], size[1]) for a in CIRCLE])
-    if kind == ELLIPSOID:
-        up = np.cos(CIRCLE[:, None] / 2)
-        rings = np.sqrt(1 - up * up)
-        return placed(np.stack([rings * np.cos(CIRCLE) * size[0], rings * np.sin(CIRCLE) * size[1], up * size[2] + 0 * CIRCLE], -1))
-    if kind == MESH:
-        mesh = model.geom_dataid[geom]
-        return placed(model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]])
-    return np.zeros((0, 3))
-
-
-def hull(points):
-    """Corners of the convex hull (monotone chain)."""
-    points, corners = sorted(set(map(tuple, points))), []
-    for some in (points, points[::-1]):
-        start = len(corners)
-        for p in some:
-            while len(corners) >= start + 2 and cross(corners[-2], corners[-1], p) <= 0:
-                corners.pop()
-            corners.append(p)
-        corners.pop() if corners else None
-    return np.array(corners)
-
-
-def cross(a, b, c):
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def layout(model, m, bodies):
@@ -250,11 +154,8 @@ def layout(model, m, bodies):
     return dense, moves
 
 
-def leave_floor(model, m, bodies):
-    """Takes the pairs of these bodies' geoms and the floor's out of MuJoCo Warp's collisions."""
-    of = model.geom_bodyid
-    floor = (of == 0) | ((model.body_weldid[of] == 0) & np.isin(model.geom_type, (PLANE, HFIELD)))
-    low = np.isin(of, bodies)
+def leave_floor(m, low, floor):
+    """Takes the pairs of low geoms and the floor's out of MuJoCo Warp's collisions."""
     pairs, state = m.nxn_geom_pair.numpy(), m.nxn_pairid.numpy()
     a, b = pairs.T
     state[(low[a] & floor[b]) | (low[b] & floor[a]), 0] = -2  # MuJoCo Warp's mark of a pair that makes no contacts

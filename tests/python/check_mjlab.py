@@ -40,8 +40,9 @@ class Tasks(unittest.TestCase):
         """By the entry point of the package: nothing but mjlab was imported in that process."""
         for robot in ("Go1", "G1"):
             self.assertIn(f"Mjlab-Velocity-Soft-Unitree-{robot}", list_tasks())
-        said = subprocess.run([sys.executable, "-c", "import mjlab.tasks.registry as r, mjlab.tasks; print(*r.list_tasks())"], capture_output=True, text=True,
-                              cwd=tempfile.gettempdir(), check=True).stdout
+        with tempfile.TemporaryDirectory() as empty:
+            said = subprocess.run([sys.executable, "-c", "import mjlab.tasks.registry as r, mjlab.tasks; print(*r.list_tasks())"], capture_output=True,
+                                  text=True, cwd=empty, check=True).stdout
         self.assertIn("Mjlab-Velocity-Soft-Unitree-Go1", said)
 
     def test_in_turn(self):
