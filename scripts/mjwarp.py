@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
 """MuJoCo Warp's step on a robot of ours with rigid ground: the peer of `mild bench robots`.
 
-usage: mjwarp.py [ROBOT_FOLDER] [--worlds 4096,16384,65536] [--dt 0.0025,0.005]
+usage: mjwarp.py [ROBOT_FOLDER] [--worlds 4096,16384,65536] [--dt 0.0025,0.005] [--json FILE]
 
 Needs mujoco, mujoco-warp, warp-lang, numpy and an NVIDIA GPU. The model is that of the engine: the robot of the folder
 without visual geoms, the corners of robot.ini as spheres on a plane, a motor a joint. From the default pose, standing,
 each world steps 40 times under its own random torques of 5 N m in a captured graph; best of five.
---check needs no GPU: it steps the same on the CPU and prints the contacts."""
+--processor needs no GPU: MuJoCo steps the same worlds on the CPU by mujoco.rollout, on one thread and on one a core.
+--check needs neither: it steps one world and prints the contacts."""
 import argparse
 import configparser
+import json
 import os
 import time
 
@@ -83,7 +85,13 @@ def check(model, qpos, dt):
     print(f"dt {dt}: contacts {contacts[0]} at first, {np.mean(contacts):.1f} on the mean")
 
 
+def row(case, value, unit="1/s"):
+    """As `mild bench --json` has them."""
+    return {"bench": "mjwarp", "case": case, "value": value, "unit": unit}
+
+
 def bench(model, qpos, dt, worlds):
+    """(versions, rows)"""
     import mujoco_warp as mjw
     import warp as wp
     data = start(model, qpos, dt)
@@ -110,6 +118,28 @@ def bench(model, qpos, dt, worlds):
     print(f"mujoco {mujoco.__version__}, warp {wp.config.version}, rigid, dt {dt}, {worlds} worlds: "
           f"{max(rates):.2f} M physics steps/s; contacts of a world {contacts[0]:.1f} at first, "
           f"{np.mean(contacts):.1f} on the mean", flush=True)
+    name = f"rigid_{1e3 * dt:g}ms_{worlds}"
+    return ({"mujoco": mujoco.__version__, "warp": wp.config.version, "mujoco_warp": getattr(mjw, "__version__", "unknown")},
+            [row(name, 1e6 * max(rates)), row(name + "_contacts", float(np.mean(contacts)), "-")])
+
+
+def processor(model, qpos, dt, worlds):
+    """(versions, rows)"""
+    from mujoco import rollout
+    data, rows = start(model, qpos, dt), []
+    state = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+    mujoco.mj_getState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    controls = np.repeat(torques(model, worlds)[:, None, :], STEPS, axis=1).astype(float)
+    for threads in sorted({1, os.cpu_count()}):
+        datas, rates = [mujoco.MjData(model) for _ in range(threads)], []
+        for _ in range(6):
+            begin = time.perf_counter()
+            rollout.rollout(model, datas, np.tile(state, (worlds, 1)), controls)
+            rates.append(STEPS * worlds / (time.perf_counter() - begin))
+        print(f"mujoco {mujoco.__version__}, rigid, dt {dt}, {worlds} worlds on {threads} threads: {max(rates[1:]):.4g} physics steps/s",
+              flush=True)
+        rows.append(row(f"rigid_{1e3 * dt:g}ms_{threads}_threads", max(rates[1:])))
+    return {"mujoco": mujoco.__version__}, rows
 
 
 def main():
@@ -117,15 +147,23 @@ def main():
     parser.add_argument("robot", nargs="?", default="robots/sa01")
     parser.add_argument("--worlds", default="4096,16384,65536")
     parser.add_argument("--dt", default="0.0025,0.005")
+    parser.add_argument("--processor", action="store_true")
     parser.add_argument("--check", action="store_true")
+    parser.add_argument("--json", metavar="FILE", help="write {versions, rows: [{bench, case, value, unit}]} to FILE")
     given = parser.parse_args()
     model, qpos = model_of(given.robot)
+    found = {"versions": {}, "rows": []}
     for dt in (float(x) for x in given.dt.split(",")):
         if given.check:
             check(model, qpos, dt)
             continue
         for worlds in (int(x) for x in given.worlds.split(",")):
-            bench(model, qpos, dt, worlds)
+            versions, rows = (processor if given.processor else bench)(model, qpos, dt, worlds)
+            found["versions"].update(versions)
+            found["rows"] += rows
+    if given.json:
+        with open(given.json, "w", encoding="utf-8") as file:
+            json.dump(found, file, indent=1)
 
 
 if __name__ == "__main__":

@@ -7,10 +7,12 @@ mild=${MILD:-build/mild}
 config=$here/../../configs/models.ini
 declare -A change
 
-# train_changes FOLDER SEEDS RESULT [NAME ...]: FOLDER/NAME-SEED.RESULT of each, of all without a NAME. What is there is kept.
+# train_changes FOLDER SEEDS RESULT [NAME ...]: FOLDER/NAME-SEED.RESULT of each, of all without a NAME. What is there is kept. SEEDS: how
+# many, or FIRST-LAST.
 train_changes() {
     local out=$1 seeds=$2 result=$3 seed name run
     shift 3
+    [[ $seeds == *-* ]] || seeds=1-$seeds
     local names=("$@")
     [ $# -gt 0 ] || mapfile -t names < <(printf '%s\n' "${!change[@]}" | sort)
     for name in "${names[@]}"; do
@@ -19,7 +21,7 @@ train_changes() {
     runs=$(mktemp -d)
     trap 'wait; rm -rf "$runs"' EXIT
     mkdir -p "$out"
-    for seed in $(seq "$seeds"); do
+    for seed in $(seq "${seeds%-*}" "${seeds#*-}"); do
         for name in "${names[@]}"; do
             [ -e "$out/$name-$seed.$result" ] && continue
             run=$runs/$name-$seed
@@ -28,6 +30,7 @@ train_changes() {
                 { cat "$runs/log" >&2; exit 1; }
             echo "$name-$seed $(tail -1 "$runs/log")"
             cp "$run/log.csv" "$out/$name-$seed.csv"
+            cp "$run/config.ini" "$out/$name-$seed.ini"
             measure "$run" "$out/$name-$seed" &
         done
     done

@@ -14,17 +14,18 @@ def fail(text):
 
 
 def measures(path):
-    """Upright trials, trials, and means over the rows in which at least half of the trials stayed up."""
+    """Upright trials, trials, and means over the rows in which at least half of the trials stayed up and there is a number."""
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
     except (ValueError, KeyError, TypeError):
         fail(f"{path}: not a table of mild eval --json")
     walked = [row for row in rows if 2 * row["success"] >= row["trials"]]
 
-    def mean(values):
-        return sum(values) / len(walked) if walked else float("nan")
-    return (sum(row["success"] for row in rows), sum(row["trials"] for row in rows), mean([abs(row["velocity"] - row["speed"]) for row in walked]),
-            mean([row["cot"] for row in walked]), mean([1e3 * row["clearance"] for row in walked]),
+    def mean(key, function):
+        values = [function(row) for row in walked if row[key] is not None]
+        return sum(values) / len(values) if values else float("nan")
+    return (sum(row["success"] for row in rows), sum(row["trials"] for row in rows), mean("velocity", lambda row: abs(row["velocity"] - row["speed"])),
+            mean("cot", lambda row: row["cot"]), mean("clearance", lambda row: 1e3 * row["clearance"]),
             max((row["torque_max"] for row in walked), default=float("nan")))
 
 

@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Trains one policy per ground model and seed, by configs/models.ini, on one GPU: FOLDER/MODEL-SEED.safetensors. What is there is kept.
-# Usage: scripts/paper/train.sh FOLDER [SEEDS [MODEL ...]]
+# SEEDS: how many, or FIRST-LAST. Usage: scripts/paper/train.sh FOLDER [SEEDS [MODEL ...]]
 set -euo pipefail
 out=${1:?usage: scripts/paper/train.sh FOLDER [SEEDS [MODEL ...]]}
 seeds=${2:-3}
+[[ $seeds == *-* ]] || seeds=1-$seeds
 shift $(($# < 2 ? $# : 2))
 models=("$@")
 [ $# -gt 0 ] || models=(mild con_cone con_spring ecc_spring ecc_quasi ecc_quasi_3d rigid)
@@ -12,7 +13,7 @@ config="$(dirname "$0")/../../configs/models.ini"
 runs=$(mktemp -d)
 trap 'rm -rf "$runs"' EXIT
 mkdir -p "$out"
-for seed in $(seq "$seeds"); do
+for seed in $(seq "${seeds%-*}" "${seeds#*-}"); do
     for model in "${models[@]}"; do
         policy=$out/$model-$seed.safetensors
         [ -e "$policy" ] && continue
@@ -20,6 +21,7 @@ for seed in $(seq "$seeds"); do
             { cat "$runs/log" >&2; exit 1; }
         tail -1 "$runs/log"
         cp "$runs/run/log.csv" "$out/$model-$seed.csv"
+        cp "$runs/run/config.ini" "$out/$model-$seed.ini"
         mv "$runs/run/policy.safetensors" "$policy"
         rm -rf "$runs/run"
     done

@@ -1,7 +1,7 @@
 /* Order of the samples in an epoch: a pure function of (seed, iteration, epoch), the same on CPU
  * and GPU and for any number of threads, devices and processes.
  *
- * The environments are cut into PPO_SHARDS runs of equal length, the strata. Sample k of a stratum
+ * The environments are cut into ppo.shards runs of equal length, the strata. Sample k of a stratum
  * is step k / width of environment first + k % width. Every epoch permutes the n samples of each
  * stratum; shard s of minibatch m of M holds places n m / M .. n (m + 1) / M - 1 of stratum s. So a
  * process that has all environments of a stratum has all samples of its shards.
@@ -17,7 +17,8 @@
 #include "base/random.h"
 #include "learn/noise.h"
 
-#define PPO_SHARDS 8 /* of a minibatch; also the number of strata */
+/* Of a minibatch, at most; also of strata. Their number is ppo.shards, a power of two. */
+#define PPO_SHARDS_MAX 64
 
 /* Few rounds leave pairs of places correlated: with 8 of them, chi-square over the pairs of 40
  * places is that of chance, and with 16 over those of 3. */
@@ -34,10 +35,10 @@ typedef struct {
     int count; /* samples: steps * width */
 } OrderStratum;
 
-MILD_HD_FN OrderStratum order_stratum(int steps, int envs, int stratum) {
+MILD_HD_FN OrderStratum order_stratum(int shards, int steps, int envs, int stratum) {
     OrderStratum s;
-    s.first = order_begin(envs, stratum, PPO_SHARDS);
-    s.width = order_begin(envs, stratum + 1, PPO_SHARDS) - s.first;
+    s.first = order_begin(envs, stratum, shards);
+    s.width = order_begin(envs, stratum + 1, shards) - s.first;
     s.count = steps * s.width;
     return s;
 }
@@ -47,40 +48,41 @@ MILD_HD_FN int order_sample(OrderStratum s, int envs, int k) {
     return k / s.width * envs + s.first + k % s.width;
 }
 
-/* Cuts of minibatch m of `minibatches`: shard s is cut[s] .. cut[s + 1] - 1 of its samples. Returns
- * cut[PPO_SHARDS], the number of samples. */
-MILD_HD_FN int order_cuts(int steps, int envs, int m, int minibatches, int *cut) {
+/* Cuts [PPO_SHARDS_MAX + 1] of minibatch m of `minibatches`: shard s is cut[s] .. cut[s + 1] - 1 of
+ * its samples; those beyond `shards` are empty. Returns the number of samples, the last cut. */
+MILD_HD_FN int order_cuts(int shards, int steps, int envs, int m, int minibatches, int *cut) {
     cut[0] = 0;
-    for (int s = 0; s < PPO_SHARDS; s++) {
-        const int count = order_stratum(steps, envs, s).count;
+    for (int s = 0; s < PPO_SHARDS_MAX; s++) {
+        const int count = s < shards ? order_stratum(shards, steps, envs, s).count : 0;
         cut[s + 1] =
             cut[s] + order_begin(count, m + 1, minibatches) - order_begin(count, m, minibatches);
     }
-    return cut[PPO_SHARDS];
+    return cut[PPO_SHARDS_MAX];
 }
 
 /* The part of the rollout that one of several processes has: a run of whole strata. Its arrays are
  * [steps][width]. */
 typedef struct {
-    int envs;          /* of the whole */
+    int all, envs;     /* strata and environments of the whole */
     int first, width;  /* first environment of the part; environments of the part */
     int shard, shards; /* first stratum and shard; strata of the part */
 } OrderPart;
 
-/* ranks divides PPO_SHARDS. */
-MILD_HD_FN OrderPart order_part(int envs, int rank, int ranks) {
+/* ranks divides all. */
+MILD_HD_FN OrderPart order_part(int all, int envs, int rank, int ranks) {
     OrderPart part;
+    part.all = all;
     part.envs = envs;
-    part.shards = PPO_SHARDS / ranks;
+    part.shards = all / ranks;
     part.shard = rank * part.shards;
-    part.first = order_begin(envs, part.shard, PPO_SHARDS);
-    part.width = order_begin(envs, part.shard + part.shards, PPO_SHARDS) - part.first;
+    part.first = order_begin(envs, part.shard, all);
+    part.width = order_begin(envs, part.shard + part.shards, all) - part.first;
     return part;
 }
 
 /* The stratum in the arrays of the part; one of another process is empty. */
 MILD_HD_FN OrderStratum order_part_stratum(int steps, OrderPart part, int stratum) {
-    OrderStratum s = order_stratum(steps, part.envs, stratum);
+    OrderStratum s = order_stratum(part.all, steps, part.envs, stratum);
     if (stratum < part.shard || stratum >= part.shard + part.shards) {
         s.width = s.count = 0;
     }
@@ -89,22 +91,22 @@ MILD_HD_FN OrderStratum order_part_stratum(int steps, OrderPart part, int stratu
 }
 
 /* The part's own of these cuts of a minibatch: counted from its first sample; shards of other
- * processes are empty. Returns own[PPO_SHARDS], the number of its samples. */
+ * processes are empty. Returns the number of its samples, own's last. */
 static inline int order_own_cuts(OrderPart part, const int *cut, int *own) {
     const int begin = cut[part.shard], end = cut[part.shard + part.shards];
-    for (int s = 0; s <= PPO_SHARDS; s++) {
+    for (int s = 0; s <= PPO_SHARDS_MAX; s++) {
         const int place = cut[s] < begin ? begin : cut[s];
         own[s] = (place > end ? end : place) - begin;
     }
-    return own[PPO_SHARDS];
+    return own[PPO_SHARDS_MAX];
 }
 
 /* Samples of the part's shards in its largest minibatch. */
 static inline int order_largest(int steps, OrderPart part, int minibatches) {
     int largest = 0;
     for (int m = 0; m < minibatches; m++) {
-        int cut[PPO_SHARDS + 1];
-        order_cuts(steps, part.envs, m, minibatches, cut);
+        int cut[PPO_SHARDS_MAX + 1];
+        order_cuts(part.all, steps, part.envs, m, minibatches, cut);
         const int count = cut[part.shard + part.shards] - cut[part.shard];
         largest = count > largest ? count : largest;
     }

@@ -18,7 +18,7 @@ struct Policy {
  * the networks reaches over a cut. */
 typedef struct {
     int blocks, runs;
-    int cut[PPO_SHARDS + 1]; /* run r of a block is rows cut[r] .. cut[r + 1] - 1; cut[0] = 0 */
+    int cut[PPO_SHARDS_MAX + 1]; /* run r of a block is rows cut[r] .. cut[r + 1] - 1; cut[0] = 0 */
 } PolicyRows;
 
 /* policy_act and policy_value. Pool may be NULL. noise: [rows][latent] of z, or NULL. */

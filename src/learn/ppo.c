@@ -166,6 +166,10 @@ static MildStatus check_def(const PpoDef *def, int envs, MildError *error) {
                          "%d environments of %d steps: between 1 and 2^28 samples can be held",
                          envs, def->steps);
     }
+    if ((def->shards & (def->shards - 1)) != 0) {
+        return mild_fail(error, MILD_ERROR_RANGE, "ppo.shards = %d is no power of two",
+                         def->shards);
+    }
     if (def->learning_rate_min > def->learning_rate_max) {
         return mild_fail(error, MILD_ERROR_RANGE,
                          "ppo.learning_rate_min = %g is above ppo.learning_rate_max = %g",
@@ -181,9 +185,15 @@ Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *
 
 Ppo *ppo_create_part(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror,
                      int envs, uint64_t seed, Ranks *ranks, MildError *error) {
-    _Static_assert(PPO_SHARDS % RANKS_MAX == 0, "a process has whole shards");
+    _Static_assert(PPO_SHARDS_MAX % RANKS_MAX == 0, "a process has whole shards");
     if (check_def(def, envs, error) || check_decoder(def, policy_def(policy), error) ||
         check_mirror(policy_def(policy), mirror, error)) {
+        return NULL;
+    }
+    if (def->shards < ranks_count(ranks)) {
+        mild_fail(error, MILD_ERROR_RANGE,
+                  "ppo.shards = %d is too few for %d processes; set it to %d", def->shards,
+                  ranks_count(ranks), ranks_count(ranks));
         return NULL;
     }
     if (envs < ranks_count(ranks)) {
@@ -200,7 +210,7 @@ Ppo *ppo_create_part(const PpoDef *def, Policy *policy, Pool *pool, const PpoMir
         ppo->learning_rate = def->learning_rate;
         ppo->batch.steps = def->steps;
         ppo->ranks = ranks;
-        ppo->part = order_part(envs, ranks_number(ranks), ranks_count(ranks));
+        ppo->part = order_part(def->shards, envs, ranks_number(ranks), ranks_count(ranks));
         ppo->batch.envs = ppo->part.width;
     }
     if (!ppo || !take_all(ppo, mirror)) {
@@ -406,7 +416,7 @@ static void order_shard(void *context, int piece, int thread) {
 static PpoMinibatch draw_minibatch(Ppo *ppo, int epoch, int m) {
     const int minibatches = ppo->def.minibatches;
     PpoMinibatch minibatch = {.samples = ppo->order, .draw = (uint32_t)(epoch * minibatches + m)};
-    order_cuts(ppo->batch.steps, ppo->part.envs, m, minibatches, minibatch.cut);
+    order_cuts(ppo->part.all, ppo->batch.steps, ppo->part.envs, m, minibatches, minibatch.cut);
     OrderJob job = {ppo, epoch, m, minibatch.cut};
     pool_run(ppo->pool, ppo->part.shards, order_shard, &job);
     return minibatch;
@@ -432,7 +442,7 @@ static void average_weights(Ppo *ppo) {
 /* Returns whether a step was taken. */
 static int update_minibatch(Ppo *ppo, LossContext *context, const PpoMinibatch *minibatch,
                             PpoReport *report) {
-    const int count = minibatch->cut[PPO_SHARDS],
+    const int count = minibatch->cut[PPO_SHARDS_MAX],
               mirrored = ppo_mirrored(ppo, minibatch->cut, NULL);
     if (count == 0 || ppo->starved) {
         report->skipped += count > 0;

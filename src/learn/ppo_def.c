@@ -1,10 +1,13 @@
 #include "learn/ppo_def.h"
 
+#include "learn/order.h"
+
 PpoDef ppo_def_default(void) {
     return (PpoDef){
         .steps = 24,
         .epochs = 4,
         .minibatches = 4,
+        .shards = 8,
         .gamma = 0.994,
         .lambda = 0.9,
         .clip = 0.2,
@@ -45,6 +48,9 @@ const MildField ppo_fields[] = {
     MILD_FIELD(PpoDef, epochs, MILD_FIELD_INT, 1, 1, 64, "[-] passes over a rollout per update"),
     MILD_FIELD(PpoDef, minibatches, MILD_FIELD_INT, 1, 1, 1024,
                "[-] minibatches, and so optimiser steps, per pass"),
+    MILD_FIELD(PpoDef, shards, MILD_FIELD_INT, 1, 1, PPO_SHARDS_MAX,
+               "[-] parts of a minibatch with a gradient each, a power of two: as many processes "
+               "can train together. Another number is another order of samples and sums"),
     MILD_FIELD(PpoDef, gamma, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] discount per policy step"),
     MILD_FIELD(PpoDef, lambda, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
                "[-] decay of generalised advantage estimation"),

@@ -29,6 +29,7 @@ typedef struct {
     int steps;       /* rollout length per environment, 24 */
     int epochs;      /* 4 */
     int minibatches; /* 4 */
+    int shards;      /* 8, of a minibatch: a power of two, and at most as many processes */
     double gamma;    /* [-] discount per policy step */
     double lambda;   /* [-] decay of generalised advantage estimation */
     double clip;     /* [-] of the probability ratio and of the change of the value */

@@ -12,7 +12,7 @@ typedef struct {
     Ppo *ppo;
     const LossContext *loss;
     const PpoMinibatch *minibatch;
-    LossSums sums[2 * PPO_SHARDS];
+    LossSums sums[2 * PPO_SHARDS_MAX]; /* of all shards' halves: the actor's, then the critic's */
     double squares[PPO_RANGES];
 } GradientJob;
 
@@ -22,7 +22,7 @@ static int chunk_mirrored(const Ppo *ppo, int rows) {
 
 int ppo_mirrored(const Ppo *ppo, const int *cut, int *which) {
     int total = 0;
-    for (int s = 0; s < PPO_SHARDS; s++) {
+    for (int s = 0; s < PPO_SHARDS_MAX; s++) {
         const int end = cut[s + 1];
         for (int at = cut[s]; at < end; at += PPO_CHUNK) {
             int images = chunk_mirrored(ppo, end - at < PPO_CHUNK ? end - at : PPO_CHUNK);
@@ -38,7 +38,7 @@ int ppo_mirrored(const Ppo *ppo, const int *cut, int *which) {
 /* A chunk that begins at sample `at` of the minibatch takes its numbers from 2 at latent onward
  * (gather_actor). */
 void ppo_latent_rows(const int *cut, int first, int *row) {
-    for (int s = 0; s < PPO_SHARDS; s++) {
+    for (int s = 0; s < PPO_SHARDS_MAX; s++) {
         for (int p = cut[s]; p < cut[s + 1]; p++) {
             row[p] = 2 * first + p + cut[s] + (p - cut[s]) / PPO_CHUNK * PPO_CHUNK;
         }
@@ -135,7 +135,7 @@ static void gradient_piece(void *context, int piece, int thread) {
     const int critic = piece >= ppo->part.shards, own = piece % ppo->part.shards;
     const int shard = ppo->part.shard + own;
     float *gradient = ppo->gradient + (size_t)own * ppo->stride;
-    LossSums *sums = &job->sums[critic * PPO_SHARDS + shard];
+    LossSums *sums = &job->sums[critic * ppo->part.all + shard];
     LossChunk chunk;
     loss_carve(n, PPO_CHUNK, ppo->mirror_rows, ppo->scratch + (size_t)thread * ppo->scratch_floats,
                &chunk);
@@ -170,8 +170,8 @@ static void add_range(float *restrict sum, const float *restrict more, int64_t c
     }
 }
 
-/* Sum of this process's shards into its first over a range, ((0+1)+(2+3))+((4+5)+(6+7)). Together
- * with ranks_sum that is the sum of all eight in this order, for any number of processes. */
+/* Sum of this process's shards into its first over a range, ((0+1)+(2+3))+((4+5)+(6+7)) and so on.
+ * Together with ranks_sum that is the sum of all in this order, for any number of processes. */
 static void reduce_piece(void *context, int range, int thread) {
     (void)thread;
     GradientJob *job = context;
@@ -219,7 +219,8 @@ static void add_sums(LossSums *to, const LossSums *from) {
 static void sum_over_ranks(GradientJob *job) {
     const Ppo *ppo = job->ppo;
     ranks_sum(ppo->ranks, ppo->gradient, ppo->policy->network.count);
-    ranks_sum_double(ppo->ranks, (double *)(void *)job->sums, sizeof job->sums / (sizeof(double)));
+    ranks_sum_double(ppo->ranks, (double *)(void *)job->sums,
+                     2 * ppo->part.all * (int64_t)(sizeof(LossSums) / sizeof(double)));
 }
 
 void ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
@@ -229,7 +230,7 @@ void ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *mini
     pool_run(ppo->pool, 2 * ppo->part.shards, gradient_piece, &job);
     pool_run(ppo->pool, PPO_RANGES, reduce_piece, &job);
     sum_over_ranks(&job);
-    for (int piece = 0; piece < 2 * PPO_SHARDS; piece++) {
+    for (int piece = 0; piece < 2 * ppo->part.all; piece++) {
         add_sums(sums, &job.sums[piece]);
     }
     pool_run(ppo->pool, PPO_RANGES, square_piece, &job);

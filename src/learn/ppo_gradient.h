@@ -8,10 +8,11 @@
 
 /* Samples of the rollout in runs, one for each shard (learn/order.h). Shards may be empty. */
 typedef struct {
-    const int *samples;      /* [cut[PPO_SHARDS]] places in the rollout; with several processes
+    const int *samples; /* [cut[PPO_SHARDS_MAX]] places in the rollout; with several processes
                                 (ranks/ranks.h) the shards of this one alone, without the others' */
-    int cut[PPO_SHARDS + 1]; /* shard s is samples[cut[s]] .. samples[cut[s + 1] - 1]; cut[0] = 0 */
-    uint32_t draw;           /* number in this update, which picks the random numbers */
+    int cut[PPO_SHARDS_MAX +
+            1];    /* shard s is samples[cut[s]] .. samples[cut[s + 1] - 1]; cut[0] = 0 */
+    uint32_t draw; /* number in this update, which picks the random numbers */
 } PpoMinibatch;
 
 /* Gradient of the loss over a minibatch into ppo->gradient (the first shard's), its norm, and the

@@ -11,7 +11,7 @@
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
 
-/* A minibatch consists of PPO_SHARDS runs of samples, each with its own gradient, and a shard is
+/* A minibatch consists of ppo.shards runs of samples, each with its own gradient, and a shard is
  * cut into chunks. Sums are taken in the order of the shards. So no result depends on the number of
  * threads or processes. */
 #define PPO_CHUNK 256

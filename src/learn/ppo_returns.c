@@ -36,10 +36,10 @@ typedef struct {
     Ppo *ppo;
     double about[NUMBERS]; /* gaps are the distances from these */
     struct {
-        double count[PPO_SHARDS];
-        double gaps[NUMBERS][PPO_SHARDS];
-        double squares[NUMBERS][PPO_SHARDS]; /* of the gaps */
-    } sums;                                  /* of each stratum */
+        double count[PPO_SHARDS_MAX];
+        double gaps[NUMBERS][PPO_SHARDS_MAX];
+        double squares[NUMBERS][PPO_SHARDS_MAX]; /* of the gaps */
+    } sums;                                      /* of each stratum */
     double mean[NUMBERS], std[NUMBERS];
 } MomentsJob;
 
@@ -68,9 +68,9 @@ static void add_stratum(void *context, int index, int thread) {
     }
 }
 
-static double total(const double x[PPO_SHARDS]) {
+static double total(const double x[PPO_SHARDS_MAX]) {
     double sum = 0.0;
-    for (int s = 0; s < PPO_SHARDS; s++) {
+    for (int s = 0; s < PPO_SHARDS_MAX; s++) {
         sum += x[s];
     }
     return sum;
@@ -78,7 +78,7 @@ static double total(const double x[PPO_SHARDS]) {
 
 /* A stratum is empty but in the one process that has it, so the sum over the ranks is exact. */
 static void add_strata(MomentsJob *job) {
-    pool_run(job->ppo->pool, PPO_SHARDS, add_stratum, job);
+    pool_run(job->ppo->pool, job->ppo->part.all, add_stratum, job);
     ranks_sum_double(job->ppo->ranks, (double *)(void *)&job->sums,
                      sizeof job->sums / sizeof(double));
 }
@@ -111,12 +111,13 @@ static void normalise_piece(void *context, int piece, int thread) {
 
 void ppo_returns(Ppo *ppo, PpoReport *report) {
     pool_run(ppo->pool, PPO_PIECES, returns_piece, ppo);
-    pool_run(ppo->pool, PPO_SHARDS, substitute_stratum, ppo);
+    pool_run(ppo->pool, ppo->part.all, substitute_stratum, ppo);
     MomentsJob job = {.ppo = ppo};
     find_moments(&job);
     ppo->starved = 0;
-    for (int s = 0; s < PPO_SHARDS; s++) {
-        const OrderStratum stratum = order_stratum(ppo->batch.steps, ppo->part.envs, s);
+    for (int s = 0; s < ppo->part.all; s++) {
+        const OrderStratum stratum =
+            order_stratum(ppo->part.all, ppo->batch.steps, ppo->part.envs, s);
         ppo->starved |= stratum.count > 0 && job.sums.count[s] == 0.0;
     }
     pool_run(ppo->pool, PPO_PIECES, normalise_piece, &job);

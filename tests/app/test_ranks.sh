@@ -45,8 +45,8 @@ reward() {
     grep -o 'reward [-0-9.]*/s' <<<"$output" | tail -1
 }
 
-# the calls of ranks.h, and the learner on GPUs (a stand-in for them) by parts: the fewest and the most
-for n in 2 8; do
+# the calls of ranks.h, and the learner on GPUs (a stand-in for them) by parts
+for n in 2 8 16; do
     for test in "${for_mpirun[@]}"; do
         good mpirun -n $n "$test"
     done
@@ -66,6 +66,20 @@ for n in 1 2 8; do
     [ "$(ls alone | sed 's/tfevents.*/tfevents/')" = "$(ls by$n | sed 's/tfevents.*/tfevents/')" ] ||
         fail "files of $n processes: $(ls by$n)"
 done
+
+# more than eight, with as many shards: the bits of one process with these shards, which are not those of eight
+many=("${tiny[@]}" --train.envs=40 --ppo.shards=32 --train.iterations=3)
+good "$mild" train --out many "${many[@]}"
+for n in 16 32; do
+    good mpirun -n $n "$mild" train --out many$n "${many[@]}"
+    same_numbers many/checkpoint_000000003.safetensors many$n/checkpoint_000000003.safetensors
+    [ "$(log_numbers many)" = "$(log_numbers many$n)" ] || fail "the logs of 1 and $n processes differ"
+done
+good "$mild" train --out eight "${tiny[@]}" --train.envs=40 --train.iterations=3
+numbers many/policy.safetensors >one.numbers
+numbers eight/policy.safetensors >other.numbers
+cmp -s one.numbers other.numbers && fail "ppo.shards changes nothing"
+bad "ppo.shards 8 16" "$ranks_py" -n 16 "$mild" train --out wrong "${tiny[@]}"
 
 # on with another number: 2, alone, 4
 good "$ranks_py" -n 2 "$mild" train --out on "${tiny[@]}" --train.iterations=1
@@ -104,8 +118,8 @@ bad "train.device cuda:1 2" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@
 bad "/dev/null/wrong" "$ranks_py" -n 2 "$mild" train --out /dev/null/wrong "${tiny[@]}"
 bad "3 --out" "$ranks_py" -n 2 "$mild" train --out on
 # 20000 robots need 300 MB, and the second process may not have them
-many=("$mild" train --out wrong "${tiny[@]}" --train.envs=20000 --train.iterations=1)
-bad "2 train.envs ppo.steps" "$ranks_py" -n 1 "${many[@]}" : -n 1 bash -c 'ulimit -v 400000; exec "$@"' - "${many[@]}"
+large=("$mild" train --out wrong "${tiny[@]}" --train.envs=20000 --train.iterations=1)
+bad "2 train.envs ppo.steps" "$ranks_py" -n 1 "${large[@]}" : -n 1 bash -c 'ulimit -v 400000; exec "$@"' - "${large[@]}"
 expect 0 'usage: mild train' "$ranks_py" -n 2 "$mild" train --help
 
 # a torn checkpoint is passed over, with one word about it

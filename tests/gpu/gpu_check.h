@@ -233,7 +233,7 @@ static inline void spoil(PpoBatch *b, const Network *n, int fault) {
             b->reward[i] = b->history[(int64_t)i * n->history] = NAN;
             b->frame[(int64_t)i * n->def.observation] = b->target[i * n->def.estimates] = NAN;
         }
-        if (fault == STARVED && i % b->envs < b->envs / PPO_SHARDS) {
+        if (fault == STARVED && i % b->envs < b->envs / 8) {
             b->valid[i] = 0;
         }
     }

@@ -87,7 +87,7 @@ static void gradient_on_device(Learner *l, const LossContext *context,
     const cudaStream_t stream = g->queue.stream;
     const Network *n = &g->network;
     const size_t samples = (size_t)g->batch.steps * (size_t)g->envs,
-                 indices = (size_t)minibatch->cut[PPO_SHARDS] * sizeof(int);
+                 indices = (size_t)minibatch->cut[PPO_SHARDS_MAX] * sizeof(int);
     const float *log_std = g->parameters + n->log_std;
     ppo_latent_rows(minibatch->cut, 0, g->host_rows);
     ppo_mirrored(l->ppo, minibatch->cut, g->host_rows + samples);
@@ -98,7 +98,7 @@ static void gradient_on_device(Learner *l, const LossContext *context,
     cudaMemcpyAsync(g->progress->old_std, context->old_std, sizeof context->old_std,
                     cudaMemcpyHostToDevice, stream);
     gpu_begin_minibatch(stream, minibatch->draw, n->def.actions, log_std, g->progress);
-    GpuMinibatch whole = {.samples = minibatch->cut[PPO_SHARDS],
+    GpuMinibatch whole = {.samples = minibatch->cut[PPO_SHARDS_MAX],
                           .images = ppo_mirrored(l->ppo, minibatch->cut, NULL)};
     memcpy(whole.cut, minibatch->cut, sizeof whole.cut);
     gpu_enqueue_gradient(g, &whole);
@@ -122,8 +122,9 @@ static void compare_gradient(Learner *cpu, Learner *gpu, const int *order, int c
                              double worst[2]) {
     Ppo *ppo = cpu->ppo;
     PpoMinibatch minibatch = {.samples = order, .draw = draw};
-    for (int s = 0; s <= PPO_SHARDS; s++) { /* shards of other sizes than those of an update */
-        minibatch.cut[s] = (int)((int64_t)count * s * s / (PPO_SHARDS * PPO_SHARDS));
+    for (int s = 0; s <= PPO_SHARDS_MAX; s++) { /* shards of other sizes than those of an update */
+        const int all = ppo->part.all, cut = s < all ? s : all;
+        minibatch.cut[s] = (int)((int64_t)count * cut * cut / (all * all));
     }
     const int images = ppo_mirrored(ppo, minibatch.cut, NULL);
     LossContext context = {.def = &ppo->def,
@@ -210,7 +211,8 @@ static void compare_learner(const PolicyDef *policy, const PpoDef *def, int envs
     memcpy(b->advantage, a->advantage, (size_t)samples * sizeof(float));
     learner_write(&gpu);
     int *order = some_order(samples);
-    const int minibatch = order_largest(a->steps, order_part(a->envs, 0, 1), def->minibatches),
+    const int minibatch =
+                  order_largest(a->steps, order_part(def->shards, a->envs, 0, 1), def->minibatches),
               counts[] = {minibatch, minibatch - 1, 300, 5};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
         compare_gradient(&cpu, &gpu, order, counts[i] < minibatch ? counts[i] : minibatch,
@@ -358,8 +360,9 @@ static double compare_update(const PolicyDef *policy, const PpoDef *def, int env
                         cudaMemcpyDeviceToHost, gpu.gpu->queue.stream);
         assert_int_equal(cudaStreamSynchronize(gpu.gpu->queue.stream), cudaSuccess);
         assert_memory_equal(order, cpu.ppo->substitute, (size_t)samples * sizeof *order);
-        int cut[PPO_SHARDS + 1];
-        const int last = order_cuts(def->steps, envs, def->minibatches - 1, def->minibatches, cut);
+        int cut[PPO_SHARDS_MAX + 1];
+        const int last =
+            order_cuts(def->shards, def->steps, envs, def->minibatches - 1, def->minibatches, cut);
         cudaMemcpyAsync(order, gpu.gpu->order, (size_t)last * sizeof *order, cudaMemcpyDeviceToHost,
                         gpu.gpu->queue.stream);
         assert_int_equal(cudaStreamSynchronize(gpu.gpu->queue.stream), cudaSuccess);
@@ -411,6 +414,9 @@ TEST(updates_are_those_of_the_cpu) {
     def.std_min = 0.99; /* the noise meets its floor at a step and its ceiling at the end */
     def.std_max[0] = def.std_max[1] = 0.7;
     worse(&worst, compare_update(&policy, &def, 5, 0, NOTHING));
+    def = ppo_def_default();
+    def.shards = PPO_SHARDS_MAX; /* some of no environment */
+    worse(&worst, compare_update(&policy, &def, 37, 0, INVALID));
     def = ppo_def_default();
     for (int target = 0; target < PPO_TARGETS; target++) {
         for (int noise = 0; noise < 2; noise++) {

@@ -68,10 +68,10 @@ static void act(Learner *whole, Learner *own, OrderPart part) {
 static void check_order(Learner *whole, Learner *own, OrderPart part) {
     const PpoDef *def = &whole->ppo->def;
     const int samples = def->steps * part.width;
-    int cut[PPO_SHARDS + 1], own_cut[PPO_SHARDS + 1];
+    int cut[PPO_SHARDS_MAX + 1], own_cut[PPO_SHARDS_MAX + 1];
     int *order = malloc((size_t)samples * sizeof *order);
     assert_non_null(order);
-    order_cuts(def->steps, part.envs, def->minibatches - 1, def->minibatches, cut);
+    order_cuts(part.all, def->steps, part.envs, def->minibatches - 1, def->minibatches, cut);
     const int count = order_own_cuts(part, cut, own_cut), begin = cut[part.shard];
     cudaMemcpyAsync(order, own->gpu->order, (size_t)count * sizeof *order, cudaMemcpyDeviceToHost,
                     own->gpu->queue.stream);
@@ -164,8 +164,16 @@ static double compare_update(int where, const PolicyDef *policy, const PpoDef *d
     return moved;
 }
 
-TEST(updates_are_those_of_the_whole) {
+/* A shard for each process at least. */
+static PpoDef def_of(void) {
     PpoDef def = ppo_def_default();
+    const int count = ranks_count(ranks);
+    def.shards = count > def.shards ? count : def.shards;
+    return def;
+}
+
+TEST(updates_are_those_of_the_whole) {
+    PpoDef def = def_of();
     PolicyDef policy = small_def();
     double worst = 0.0;
     def.average = 0.9;
@@ -176,10 +184,10 @@ TEST(updates_are_those_of_the_whole) {
     worse(&worst, compare_update(MIXED, &policy, &def, 37, 0, INVALID));
     def.steps = 10; /* minibatches in which some processes have no sample */
     def.minibatches = 16;
-    worse(&worst, compare_update(RESIDENT, &policy, &def, 9, 0, NOTHING));
+    worse(&worst, compare_update(RESIDENT, &policy, &def, def.shards + 1, 0, NOTHING));
 #ifndef EMULATED
     policy = policy_def_default();
-    def = ppo_def_default();
+    def = def_of();
     worse(&worst, compare_update(RESIDENT, &policy, &def, 256, 0, NOTHING));
     def.minibatches = 2;
     worse(&worst, compare_update(RESIDENT, &policy, &def, 520, 0, INVALID));

@@ -70,11 +70,14 @@ static void case_close(Case *c) {
     pool_destroy(c->pool);
 }
 
+enum { SHARDS = 8 }; /* of ppo_def_default */
+
 /* Shards of unequal sizes, one of them empty. */
 static PpoMinibatch minibatch_of(const int *samples, int count, uint32_t draw) {
     PpoMinibatch minibatch = {.samples = samples, .draw = draw};
-    for (int s = 0; s <= PPO_SHARDS; s++) {
-        minibatch.cut[s] = (int)((int64_t)count * s * s / (PPO_SHARDS * PPO_SHARDS));
+    for (int s = 0; s <= PPO_SHARDS_MAX; s++) {
+        const int cut = s < SHARDS ? s : SHARDS;
+        minibatch.cut[s] = (int)((int64_t)count * cut * cut / (SHARDS * SHARDS));
     }
     minibatch.cut[4] = minibatch.cut[3];
     return minibatch;
@@ -131,7 +134,7 @@ static void check_minibatch(Case *c, int count, uint32_t draw, double share) {
     c->context.mirror_weight = images ? 1.0f / (float)images : 0.0f;
     LossSums sums, expected = {0};
     double norm, squares = 0.0, worst = 0.0;
-    memset(c->ppo->gradient, 0xff, PPO_SHARDS * c->ppo->stride * sizeof(float)); /* NaN */
+    memset(c->ppo->gradient, 0xff, SHARDS * c->ppo->stride * sizeof(float)); /* NaN */
     ppo_gradient(c->ppo, &c->context, &minibatch, &sums, &norm);
     int entered = product_enter();
     for (int p = 0, next = 0; p < count; p++) {

@@ -85,50 +85,59 @@ TEST(one_order_is_mixed) {
 
 /* Strata hold every sample once; the minibatches' cuts add up to them. */
 TEST(strata_and_cuts_cover_everything) {
-    static const int sizes[][3] = {{24, 64, 4}, {6, 5, 4}, {1, 1, 3}, {7, 37, 5}, {3, 8, 1}};
+    static const int sizes[][4] = {{8, 24, 64, 4}, {8, 6, 5, 4},   {8, 1, 1, 3},   {8, 7, 37, 5},
+                                   {8, 3, 8, 1},   {16, 7, 37, 5}, {64, 6, 64, 4}, {1, 3, 5, 2}};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
-        const int steps = sizes[i][0], envs = sizes[i][1], minibatches = sizes[i][2];
+        const int shards = sizes[i][0], steps = sizes[i][1], envs = sizes[i][2],
+                  minibatches = sizes[i][3];
         char seen[24 * 64] = {0};
-        int shard[PPO_SHARDS] = {0}, total = 0;
+        int shard[PPO_SHARDS_MAX] = {0}, total = 0;
         for (int m = 0; m < minibatches; m++) {
-            int cut[PPO_SHARDS + 1];
-            total += order_cuts(steps, envs, m, minibatches, cut);
-            for (int s = 0; s < PPO_SHARDS; s++) {
+            int cut[PPO_SHARDS_MAX + 1];
+            const int count = order_cuts(shards, steps, envs, m, minibatches, cut);
+            total += count;
+            for (int s = 0; s < PPO_SHARDS_MAX; s++) {
                 shard[s] += cut[s + 1] - cut[s];
+                if (s >= shards) {
+                    assert_int_equal(cut[s + 1], count);
+                    continue;
+                }
                 /* a fair share, up to rounding */
-                const double fair = (double)order_stratum(steps, envs, s).count / minibatches;
+                const double fair =
+                    (double)order_stratum(shards, steps, envs, s).count / minibatches;
                 assert_true(fabs(cut[s + 1] - cut[s] - fair) < 1.0);
             }
         }
         assert_int_equal(total, steps * envs);
-        for (int s = 0; s < PPO_SHARDS; s++) {
-            const OrderStratum stratum = order_stratum(steps, envs, s);
+        for (int s = 0; s < shards; s++) {
+            const OrderStratum stratum = order_stratum(shards, steps, envs, s);
             assert_int_equal(shard[s], stratum.count);
             for (int k = 0; k < stratum.count; k++) {
                 const int sample = order_sample(stratum, envs, k), env = sample % envs;
-                assert_true(env >= envs * s / PPO_SHARDS && env < envs * (s + 1) / PPO_SHARDS);
+                assert_true(env >= envs * s / shards && env < envs * (s + 1) / shards);
                 assert_int_equal(seen[sample]++, 0);
             }
         }
     }
 }
 
-/* The parts of 1, 2, 4 and 8 processes hold every environment once, and the strata of a part name
- * its samples by their places in its own arrays. */
-TEST(parts_are_whole_strata) {
-    enum { STEPS = 3, ENVS = 37 };
-    for (int ranks = 1; ranks <= PPO_SHARDS; ranks *= 2) {
+/* The parts of 1, 2, 4 .. `shards` processes hold every environment once, and the strata of a part
+ * name its samples by their places in its own arrays. */
+static void check_parts(int shards) {
+    enum { STEPS = 3, ENVS = 67 };
+    for (int ranks = 1; ranks <= shards; ranks *= 2) {
         int next = 0;
         for (int rank = 0; rank < ranks; rank++) {
-            const OrderPart part = order_part(ENVS, rank, ranks);
+            const OrderPart part = order_part(shards, ENVS, rank, ranks);
             assert_int_equal(part.envs, ENVS);
+            assert_int_equal(part.all, shards);
             assert_int_equal(part.first, next);
             next += part.width;
             int strata = 0;
-            for (int s = 0; s < PPO_SHARDS; s++) {
-                const OrderStratum whole = order_stratum(STEPS, ENVS, s),
+            for (int s = 0; s < shards; s++) {
+                const OrderStratum whole = order_stratum(shards, STEPS, ENVS, s),
                                    own = order_part_stratum(STEPS, part, s);
-                if (s * ranks / PPO_SHARDS != rank) {
+                if (s * ranks / shards != rank) {
                     assert_int_equal(own.count, 0);
                     continue;
                 }
@@ -145,6 +154,12 @@ TEST(parts_are_whole_strata) {
         }
         assert_int_equal(next, ENVS);
     }
+}
+
+TEST(parts_are_whole_strata) {
+    check_parts(8);
+    check_parts(32);
+    check_parts(PPO_SHARDS_MAX);
 }
 
 TEST_MAIN(NULL, NULL)

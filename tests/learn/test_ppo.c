@@ -392,6 +392,9 @@ TEST(test_create_refuses) {
     def.learning_rate_min = 0.1;
     assert_null(ppo_create(&def, policy, pool, NULL, 4, 1, &error));
     def = toy_ppo_def();
+    def.shards = 12; /* sums would be no tree */
+    assert_null(ppo_create(&def, policy, pool, NULL, 4, 1, &error));
+    def = toy_ppo_def();
     const int index[TOY_OBSERVATION] = {0, 1, 2, 3, 4, 6};
     PpoMirror mirror = toy_mirror();
     mirror.observation_index = index;

@@ -53,7 +53,7 @@ void __wrap_policy_value_rows(Policy *policy, Pool *pool, const PolicyRows *rows
 void __wrap_ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
                          LossSums *sums, double *norm) {
     Script *s = script;
-    const int call = s->calls++, count = minibatch->cut[PPO_SHARDS];
+    const int call = s->calls++, count = minibatch->cut[PPO_SHARDS_MAX];
     if (call < CALLS) {
         s->count[call] = count;
         s->key[call] = step_latent_key(ppo->seed, ppo->iteration, minibatch->draw);
@@ -326,8 +326,8 @@ TEST(mirror_is_averaged_over_the_images) {
     run.script.sums.mirror = 0.8; /* times 30 samples: a sum of 24 */
     PpoReport report = update(&run);
     int which[SAMPLES];
-    int cut[PPO_SHARDS + 1];
-    assert_int_equal(order_cuts(STEPS, ENVS, 0, 1, cut), SAMPLES);
+    int cut[PPO_SHARDS_MAX + 1];
+    assert_int_equal(order_cuts(def.shards, STEPS, ENVS, 0, 1, cut), SAMPLES);
     const int images = ppo_mirrored(run.ppo, cut, which);
     assert_int_equal(images, 15);
     for (int r = 1; r < images; r++) {

@@ -1,11 +1,11 @@
-/* Every call of ranks.h, alone and, started by mpirun (app/test_ranks.sh), among 2, 4 and 8
+/* Every call of ranks.h, alone and, started by mpirun (app/test_ranks.sh), among 2, 4, 8 and 32
  * processes: each computes what all should get by itself, and compares. */
 #include "base/random.h"
 #include "device/ranks/device.h"
 #include "device/ranks/ranks.h"
 #include "kit.h"
 
-enum { SHARDS = 8, COUNT = 40001 }; /* more than one block, and no multiple of one */
+enum { SHARDS = 32, COUNT = 40001 }; /* more than one block, and no multiple of one */
 
 static Ranks *ranks;
 

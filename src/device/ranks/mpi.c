@@ -21,7 +21,8 @@ static int message(size_t bytes) {
 static MildStatus check_count(const Ranks *ranks, MildError *error) {
     if (ranks->count > RANKS_MAX || (ranks->count & (ranks->count - 1)) != 0) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "%d processes: 1, 2, 4 or 8 can train together; change mpirun -n",
+                         "%d processes: 1, 2, 4, 8, 16, 32 or 64 can train together; change "
+                         "mpirun -n",
                          ranks->count);
     }
     return MILD_OK;

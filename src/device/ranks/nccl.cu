@@ -128,6 +128,9 @@ static MildStatus sum(Ranks *ranks, Number *x, int64_t count, ncclDataType_t typ
     switch (ranks->count) {
     case 2: add_ranks<Number, 2><<<blocks, threads, 0, stream>>>(x, gathered, count); break;
     case 4: add_ranks<Number, 4><<<blocks, threads, 0, stream>>>(x, gathered, count); break;
+    case 8: add_ranks<Number, 8><<<blocks, threads, 0, stream>>>(x, gathered, count); break;
+    case 16: add_ranks<Number, 16><<<blocks, threads, 0, stream>>>(x, gathered, count); break;
+    case 32: add_ranks<Number, 32><<<blocks, threads, 0, stream>>>(x, gathered, count); break;
     default: add_ranks<Number, RANKS_MAX><<<blocks, threads, 0, stream>>>(x, gathered, count);
     }
     const cudaError_t launched = cudaGetLastError();

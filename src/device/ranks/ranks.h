@@ -11,7 +11,7 @@
 
 #include "mild/error.h"
 
-#define RANKS_MAX 8 /* their number is a power of two up to this */
+#define RANKS_MAX 64 /* their number is a power of two up to this */
 
 typedef struct Ranks Ranks;
 
@@ -28,7 +28,7 @@ int ranks_local(const Ranks *ranks);  /* number among the ranks of its machine *
  * to. 0 for a process alone. */
 int ranks_threads(const Ranks *ranks);
 
-/* Sum over all ranks into x [count] of each. The order is fixed, ((0+1)+(2+3))+((4+5)+(6+7)):
+/* Sum over all ranks into x [count] of each. The order is fixed, ((0+1)+(2+3))+((4+5)+(6+7)) for 8:
  * numbers that each rank has summed over its run of them as such a tree give the same bits for any
  * number of ranks. */
 void ranks_sum(Ranks *ranks, float *x, int64_t count);

@@ -273,7 +273,7 @@ static int images_before(const int *which, int from, int images, int end) {
 }
 
 void gpu_enqueue_gradient(GpuLearner *g, const GpuMinibatch *minibatch) {
-    const int count = minibatch->cut[PPO_SHARDS], first = minibatch->first,
+    const int count = minibatch->cut[PPO_SHARDS_MAX], first = minibatch->first,
               images = ppo_mirrored(g->ppo, minibatch->cut, NULL);
     const int *which = g->host_rows + (size_t)g->batch.steps * (size_t)g->envs + first;
     if (count == 0) { /* all samples are other processes' */

@@ -35,9 +35,10 @@ static int widest_layer(const Network *network) {
 /* Most images that a run of this many samples of a minibatch can have: it meets at most so many
  * chunks of the CPU's, each with as many images as a full one. */
 static int most_images(const Ppo *ppo, int rows) {
-    const int64_t images = ppo->mirror.observation_index
-                               ? (int64_t)(rows / PPO_CHUNK + 2 + PPO_SHARDS) * ppo->mirror_rows
-                               : 0;
+    const int64_t images =
+        ppo->mirror.observation_index
+            ? (int64_t)(rows / PPO_CHUNK + 2 + ppo->def.shards) * ppo->mirror_rows
+            : 0;
     return images < rows ? (int)images : rows;
 }
 
@@ -49,7 +50,7 @@ static void set_sizes(GpuLearner *g, int envs) {
     /* the elementwise passes count the numbers of a chunk with 32 bits */
     const int64_t most = (int64_t)INT32_MAX / (2 * widest_layer(&g->network)),
                   wanted = g->wanted_rows > 0 ? g->wanted_rows : ROWS_MAX;
-    g->part = order_part(envs, ranks_number(ppo->ranks), ranks_count(ppo->ranks));
+    g->part = order_part(ppo->def.shards, envs, ranks_number(ppo->ranks), ranks_count(ppo->ranks));
     g->envs = g->part.width;
     g->minibatch = order_largest(steps, g->part, ppo->def.minibatches);
     int rows = g->minibatch > g->envs ? g->minibatch : g->envs;
@@ -381,8 +382,9 @@ static void enqueue_epoch(GpuLearner *g, int epoch) {
         .steps = g->batch.steps, .minibatches = minibatches, .epoch = epoch, .part = g->part};
     GpuMinibatch minibatch = {.first = 0};
     for (; order.m < minibatches; order.m++) {
-        int cut[PPO_SHARDS + 1];
-        minibatch.samples = order_cuts(order.steps, g->part.envs, order.m, minibatches, cut);
+        int cut[PPO_SHARDS_MAX + 1];
+        minibatch.samples =
+            order_cuts(g->part.all, order.steps, g->part.envs, order.m, minibatches, cut);
         minibatch.images = ppo_mirrored(g->ppo, cut, NULL);
         const int own = order_own_cuts(g->part, cut, order.cut);
         memcpy(minibatch.cut, order.cut, sizeof order.cut);
@@ -575,8 +577,8 @@ static void fill_rows(GpuLearner *g) {
     const int minibatches = g->ppo->def.minibatches;
     const size_t samples = (size_t)g->batch.steps * (size_t)g->envs;
     for (int m = 0, first = 0; m < minibatches; m++) {
-        int cut[PPO_SHARDS + 1], own[PPO_SHARDS + 1];
-        order_cuts(g->batch.steps, g->part.envs, m, minibatches, cut);
+        int cut[PPO_SHARDS_MAX + 1], own[PPO_SHARDS_MAX + 1];
+        order_cuts(g->part.all, g->batch.steps, g->part.envs, m, minibatches, cut);
         const int count = order_own_cuts(g->part, cut, own);
         ppo_latent_rows(own, cut[g->part.shard], g->host_rows + first);
         ppo_mirrored(g->ppo, own, g->host_rows + samples + first);

@@ -75,9 +75,9 @@ typedef struct {
 
 /* A minibatch as this process sees it. */
 typedef struct {
-    int cut[PPO_SHARDS + 1]; /* order_own_cuts */
-    int first;               /* number of its first entry in latent_row and which */
-    int samples, images;     /* of all processes */
+    int cut[PPO_SHARDS_MAX + 1]; /* order_own_cuts */
+    int first;                   /* number of its first entry in latent_row and which */
+    int samples, images;         /* of all processes */
 } GpuMinibatch;
 
 /* Places a chunk of at most `rows` samples and `mirrored` images in the block and returns its

@@ -146,7 +146,7 @@ static __global__ void substitute_samples(PpoBatch b, OrderPart part, int *subst
 
 void gpu_returns(cudaStream_t stream, PpoDef def, PpoBatch batch, OrderPart part, int *substitute,
                  GpuProgress *progress) {
-    const dim3 strata = {PPO_SHARDS, 1, 1};
+    const dim3 strata = {(unsigned)part.all, 1, 1};
     LAUNCH(environments, blocks_of(batch.envs), line, stream, def.gamma, def.lambda, batch);
     LAUNCH(substitute_samples, strata, line, stream, batch, part, substitute, progress);
 }
@@ -276,7 +276,7 @@ void gpu_hash(cudaStream_t stream, int64_t count, const float *parameters, doubl
 static __global__ void order_samples(GpuOrder o, const int *substitute, const GpuProgress *progress,
                                      int *order) {
     const int64_t p = item();
-    if (p >= o.cut[PPO_SHARDS]) {
+    if (p >= o.cut[PPO_SHARDS_MAX]) {
         return;
     }
     int shard = 0;
@@ -292,7 +292,7 @@ static __global__ void order_samples(GpuOrder o, const int *substitute, const Gp
 
 void gpu_order(cudaStream_t stream, GpuOrder o, const int *substitute, const GpuProgress *progress,
                int *order) {
-    LAUNCH(order_samples, blocks_of(o.cut[PPO_SHARDS]), line, stream, o, substitute, progress,
+    LAUNCH(order_samples, blocks_of(o.cut[PPO_SHARDS_MAX]), line, stream, o, substitute, progress,
            order);
 }
 

@@ -96,7 +96,7 @@ void gpu_hash(cudaStream_t stream, int64_t count, const float *parameters, doubl
 typedef struct {
     int steps, minibatches, m, epoch;
     OrderPart part;
-    int cut[PPO_SHARDS + 1]; /* order_own_cuts */
+    int cut[PPO_SHARDS_MAX + 1]; /* order_own_cuts */
 } GpuOrder;
 void gpu_order(cudaStream_t stream, GpuOrder o, const int *substitute, const GpuProgress *progress,
                int *order);
