@@ -26,15 +26,10 @@ static void slots_lean(const FootScratch *foot) {
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
         for (int i = 0; i < SLOT_LANES; i++) {
             s->lean[i] = level;
-            s->pull_x[i] = s->projects[i] * up[0] / (1 + up[2]);
-            s->pull_y[i] = s->projects[i] * up[1] / (1 + up[2]);
         }
         for (int i = 0; foot->uneven && i < SLOT_LANES; i++) {
             const double gx = s->slope_x[i], gy = s->slope_y[i];
             const double along = up[2] - gx * up[0] - gy * up[1];
-            const double norm = 1 / sqrt(1.0 + gx * gx + gy * gy);
-            s->pull_x[i] = s->projects[i] * (up[0] + gx * norm) / (1 + along * norm);
-            s->pull_y[i] = s->projects[i] * (up[1] + gy * norm) / (1 + along * norm);
             s->lean[i] = real_min(real_max(along / sqrt(1.0 + gx * gx + gy * gy), SHARE_LEAN), 1.0);
         }
     }
@@ -47,8 +42,6 @@ MILD_HD void slot_carry(Slots *s, int i, double dt, double rate) {
     Share share = slot_share(s, i);
     element_share(&element, &memory, &share, s->fx[i], dt, rate, share.lean);
     s->mu[i] = element.mu;
-    s->pull_x[i] = element.pull_x;
-    s->pull_y[i] = element.pull_y;
     s->drift_bound[i] = element.drift_bound;
     s->lean[i] = share.lean;
     s->carry[i] = share.carry;

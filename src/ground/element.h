@@ -73,8 +73,6 @@ typedef struct {
     Real hold_x;         /* dt f [N s] spring force at the start of the step */
     Real hold_y;         /* [N s] */
     Real hold_stiffness; /* dt^2 k [kg] */
-    Real pull_x;         /* [-] centre of the disc of friction, by its radius */
-    Real pull_y;         /* [-] */
     Real turn_x;         /* [m/s] reversal velocity: friction starts at minus this (energy.c) */
     Real turn_y;         /* [m/s] */
 } Element;

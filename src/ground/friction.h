@@ -56,8 +56,8 @@ typedef struct {
  * when the solver holds the bound fixed. */
 MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, Real vx, Real vy) {
     const Real stiffness = e->hold_stiffness + FRICTION_LAG * r;
-    const Real tx = e->hold_x - stiffness * vx - r * e->pull_x;
-    const Real ty = e->hold_y - stiffness * vy - r * e->pull_y;
+    const Real tx = e->hold_x - stiffness * vx;
+    const Real ty = e->hold_y - stiffness * vy;
 
     /* Projection onto the disc of radius r. n is the unit vector of t if the element slides, else
      * 0. */
@@ -72,18 +72,18 @@ MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, Real vx, Re
 
     /* The bound acts on the length of I and, through c, on t. */
     const Real yields = share * stiffness;
-    const Real lag_x = -share * (FRICTION_LAG * vx + e->pull_x);
-    const Real lag_y = -share * (FRICTION_LAG * vy + e->pull_y);
+    const Real lag_x = -share * FRICTION_LAG * vx;
+    const Real lag_y = -share * FRICTION_LAG * vy;
     const Real lag_n = 1 - (nx * lag_x + ny * lag_y);
 
     Friction result;
-    result.x = share * tx + r * e->pull_x - e->damping * vx;
-    result.y = share * ty + r * e->pull_y - e->damping * vy;
+    result.x = share * tx - e->damping * vx;
+    result.y = share * ty - e->damping * vy;
     result.fall_xx = e->damping + yields * (1 - nx * nx);
     result.fall_xy = -yields * nx * ny;
     result.fall_yy = e->damping + yields * (1 - ny * ny);
-    result.rise_x = mu * (lag_x + nx * lag_n + e->pull_x);
-    result.rise_y = mu * (lag_y + ny * lag_n + e->pull_y);
+    result.rise_x = mu * (lag_x + nx * lag_n);
+    result.rise_y = mu * (lag_y + ny * lag_n);
     return result;
 }
 
@@ -118,8 +118,8 @@ MILD_HD int friction_slides(const Element *e, Real normal, Real vx, Real vy) {
     friction_turn(e, &vx, &vy);
     const Real r = friction_bound(e, normal);
     const Real stiffness = e->hold_stiffness + FRICTION_LAG * r;
-    const Real tx = e->hold_x - stiffness * vx - r * e->pull_x;
-    const Real ty = e->hold_y - stiffness * vy - r * e->pull_y;
+    const Real tx = e->hold_x - stiffness * vx;
+    const Real ty = e->hold_y - stiffness * vy;
     return tx * tx + ty * ty > r * r;
 }
 

@@ -90,13 +90,13 @@ MILD_HD ElementMemory element_remember(const Element *e, const ElementMemory *me
     after.pending_y = stays && !counts ? y : 0;
 
     /* Spring force of friction (friction.h). */
-    const Real bound = friction_bound(e, normal);
-    const Real held_x = e->hold_x - e->hold_stiffness * vx - bound * e->pull_x;
-    const Real held_y = e->hold_y - e->hold_stiffness * vy - bound * e->pull_y;
+    const Real held_x = e->hold_x - e->hold_stiffness * vx;
+    const Real held_y = e->hold_y - e->hold_stiffness * vy;
     const Real held = REAL_SQRT(held_x * held_x + held_y * held_y);
-    const Real share = held > bound ? bound / held : 1;
-    after.held_x = stays ? rate * (share * held_x + bound * e->pull_x) : 0;
-    after.held_y = stays ? rate * (share * held_y + bound * e->pull_y) : 0;
+    const Real bound = friction_bound(e, normal);
+    const Real share = rate * (held > bound ? bound / held : 1);
+    after.held_x = stays ? share * held_x : 0;
+    after.held_y = stays ? share * held_y : 0;
     after.held_stiffness = stays ? rate * rate * e->hold_stiffness : 0;
     return after;
 }

@@ -97,10 +97,6 @@ MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share
     e->hold_y = changes ? still.hold_y : e->hold_y;
     e->hold_stiffness = changes ? still.hold_stiffness : e->hold_stiffness;
     e->mu = mu;
-    const Real size = REAL_SQRT(e->pull_x * e->pull_x + e->pull_y * e->pull_y);
-    const Real by = 1 / real_max(mu, size + ELEMENT_TINY);
-    e->pull_x *= by;
-    e->pull_y *= by;
 }
 
 /* Virgin ground as the element feels it. Called wherever an element with LAW_HEAP is loaded for
@@ -165,9 +161,9 @@ MILD_HD Real element_wear(const Element *e, const Share *share, const ElementMem
     const Real x = memory->pending_x + dt * vx;
     const Real y = memory->pending_y + dt * vy;
     const Real square = x * x + y * y;
+    const Real held_x = e->hold_x - e->hold_stiffness * vx;
+    const Real held_y = e->hold_y - e->hold_stiffness * vy;
     const Real bound = friction_bound(e, normal);
-    const Real held_x = e->hold_x - e->hold_stiffness * vx - bound * e->pull_x;
-    const Real held_y = e->hold_y - e->hold_stiffness * vy - bound * e->pull_y;
     const int slides = held_x * held_x + held_y * held_y >= bound * bound;
     const Real least = share->slip_rate > 0 ? REAL(-1) : REMEMBER_BAND * REMEMBER_BAND;
     const int counts = square > (slides ? least : REMEMBER_BAND * REMEMBER_BAND);
@@ -178,9 +174,6 @@ MILD_HD Real element_wear(const Element *e, const Share *share, const ElementMem
     /* The added mass grows with the lead; it keeps its momentum. P is concave. */
     after->front_speed *= after->depth_max / (after->depth_max + lead + ELEMENT_TINY);
     after->depth_max = stays ? after->depth_max + lead : 0;
-    const Real draws = 1 - share_left(real_min(fresh * share->regain_rate / (1 + share->growth * real_max(e->depth, 0)), SHARE_FORGET));
-    after->held_x += stays ? draws * (bound / dt * e->pull_x - after->held_x) : 0;
-    after->held_y += stays ? draws * (bound / dt * e->pull_y - after->held_y) : 0;
     after->drift = stays ? real_min(memory->drift + slid, REMEMBER_DRIFT) : 0;
     after->pending_x = stays && !counts ? x : 0;
     after->pending_y = stays && !counts ? y : 0;

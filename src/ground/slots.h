@@ -75,8 +75,6 @@ typedef struct {
     /* Share of this step: foot_share; without LAW_HEAP carry is 1. */
     Lanes lean;  /* [-] */
     Lanes carry; /* [-] */
-    Lanes pull_x;
-    Lanes pull_y;
 
     /* Law of this step: slots_begin, changed by slots_resist. */
     Lanes middle;           /* [m] */
@@ -169,8 +167,6 @@ MILD_HD Element slot_element(const Slots *s, int i) {
         .hold_x = s->hold_x[i],
         .hold_y = s->hold_y[i],
         .hold_stiffness = s->hold_stiffness[i],
-        .pull_x = s->pull_x[i],
-        .pull_y = s->pull_y[i],
         .turn_x = s->turn_x[i],
         .turn_y = s->turn_y[i],
     };
