@@ -137,7 +137,9 @@ MILD_HD Share contact_share(const ContactMaterial *material, int plane, Real wor
                          material->mu,
                          worn,
                          1,
-                         1};
+                         1,
+                         0,
+                         0};
     return share;
 }
 
