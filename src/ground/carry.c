@@ -26,15 +26,10 @@ static void slots_lean(const FootScratch *foot) {
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
         for (int i = 0; i < SLOT_LANES; i++) {
             s->lean[i] = level;
-            s->pull_x[i] = s->projects[i] * up[0] / (1 + up[2]);
-            s->pull_y[i] = s->projects[i] * up[1] / (1 + up[2]);
         }
         for (int i = 0; foot->uneven && i < SLOT_LANES; i++) {
             const double gx = s->slope_x[i], gy = s->slope_y[i];
             const double along = up[2] - gx * up[0] - gy * up[1];
-            const double norm = 1 / sqrt(1.0 + gx * gx + gy * gy);
-            s->pull_x[i] = s->projects[i] * (up[0] + gx * norm) / (1 + along * norm);
-            s->pull_y[i] = s->projects[i] * (up[1] + gy * norm) / (1 + along * norm);
             s->lean[i] = real_min(real_max(along / sqrt(1.0 + gx * gx + gy * gy), SHARE_LEAN), 1.0);
         }
     }

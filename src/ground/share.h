@@ -61,8 +61,6 @@ typedef struct {
     Real worn;        /* [-] memory: 1 - q */
     Real lean;        /* [-] c */
     Real carry;       /* [-] q */
-    Real pull_x;      /* [-] traction of fresh ground by the load */
-    Real pull_y;      /* [-] */
 } Share;
 
 /* Sets lean and carry, and with them the unloading line and friction, after element_begin: the
@@ -176,11 +174,6 @@ MILD_HD Real element_wear(const Element *e, const Share *share, const ElementMem
     /* The added mass grows with the lead; it keeps its momentum. P is concave. */
     after->front_speed *= after->depth_max / (after->depth_max + lead + ELEMENT_TINY);
     after->depth_max = stays ? after->depth_max + lead : 0;
-    const Real draws = 1 - share_left(real_min(fresh * share->regain_rate / (1 + share->growth * real_max(e->depth, 0)), SHARE_FORGET));
-    const Real size = REAL_SQRT(share->pull_x * share->pull_x + share->pull_y * share->pull_y);
-    const Real by = e->mu / real_max(e->mu, size + ELEMENT_TINY) * normal / dt;
-    after->held_x += stays ? draws * (by * share->pull_x - after->held_x) : 0;
-    after->held_y += stays ? draws * (by * share->pull_y - after->held_y) : 0;
     after->drift = stays ? real_min(memory->drift + slid, REMEMBER_DRIFT) : 0;
     after->pending_x = stays && !counts ? x : 0;
     after->pending_y = stays && !counts ? y : 0;

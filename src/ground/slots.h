@@ -75,8 +75,6 @@ typedef struct {
     /* Share of this step: foot_share; without LAW_HEAP carry is 1. */
     Lanes lean;  /* [-] */
     Lanes carry; /* [-] */
-    Lanes pull_x;
-    Lanes pull_y;
 
     /* Law of this step: slots_begin, changed by slots_resist. */
     Lanes middle;           /* [m] */
@@ -187,8 +185,6 @@ MILD_HD Share slot_share(const Slots *s, int i) {
         .worn = s->worn[i],
         .lean = s->lean[i],
         .carry = s->carry[i],
-        .pull_x = s->pull_x[i],
-        .pull_y = s->pull_y[i],
     };
 }
 

@@ -137,9 +137,7 @@ MILD_HD Share contact_share(const ContactMaterial *material, int plane, Real wor
                          material->mu,
                          worn,
                          1,
-                         1,
-                         0,
-                         0};
+                         1};
     return share;
 }
 
