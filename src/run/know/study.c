@@ -117,9 +117,9 @@ static void count_on(void *context, const WalkStep *step) {
     numbered->watcher->stepped(numbered->watcher->context, &same);
 }
 
-static double limit_on(void *context, int walk) {
+static WalkCare care_on(void *context, int walk) {
     const Numbered *numbered = context;
-    return numbered->watcher->limit(numbered->watcher->context, walk + numbered->first);
+    return numbered->watcher->care(numbered->watcher->context, walk + numbered->first);
 }
 
 MildStatus study_run(const StudyDef *def, StudyWalk *walk, int count, const StudyWatcher *watcher,
@@ -147,7 +147,7 @@ MildStatus study_run(const StudyDef *def, StudyWalk *walk, int count, const Stud
                               .first = (uint32_t)first,
                               .stepped = count_on,
                               .context = &numbered,
-                              .limit = watcher->limit ? limit_on : NULL};
+                              .care = watcher->care ? care_on : NULL};
         status = walks_run(&run, lasted, error);
         for (int i = 0; i < batch && status == MILD_OK; i++) {
             walk[first + i].lasted = lasted[i];

@@ -41,7 +41,7 @@ typedef struct {
 /* Who looks at the walks; as WalksDef has it, with the number of the walk in the study. */
 typedef struct {
     void (*stepped)(void *context, const WalkStep *step);
-    double (*limit)(void *context, int walk); /* NULL: none */
+    WalkCare (*care)(void *context, int walk); /* NULL: none */
     void *context;
 } StudyWatcher;
 
