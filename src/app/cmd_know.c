@@ -188,6 +188,10 @@ static cJSON *walks_json(const JudgeWalk *each, int count) {
     cJSON *rows = cJSON_CreateArray();
     for (int i = 0; i < count; i++) {
         cJSON *row = cJSON_CreateObject();
+        const PriorGround *ground = &each[i].ground;
+        cJSON_AddNumberToObject(row, "sinkage", ground->sinkage);
+        cJSON_AddNumberToObject(row, "mu", ground->mu);
+        cJSON_AddNumberToObject(row, "slip_length", ground->slip_length);
         cJSON_AddBoolToObject(row, "fell", each[i].fell);
         cJSON_AddNumberToObject(row, "asked", each[i].asked);
         cJSON_AddNumberToObject(row, "speed", each[i].speed);
@@ -388,6 +392,9 @@ static int parse_and_run(Know *k, CliArgs *args, int argc, char **argv) {
          "ones)"},
         {"slick", CLI_NUMBERS, &k->slick, 0.05, 2, "LOW,HIGH",
          "[-] friction of each walk's ground, or of that behind its border (default: as drawn)"},
+        {"grip", CLI_NUMBER, &k->study.grip, 0, 2, "T",
+         "[-] greatest friction of a sliding sole by its virgin load, on grounds with a slip "
+         "length (default 0: that of the ground)"},
         {"care", CLI_NUMBERS, &k->care, 0, 2, "MU,V",
          "[-, m/s] the robot walks no faster than V while it believes friction to be below MU "
          "(default: it does nothing)"},

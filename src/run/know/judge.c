@@ -203,13 +203,14 @@ static JudgeWalk judge_walk(const Judge *j, int i, double weight) {
     const Judged *judged = &j->judged[i];
     const StudyWalk *walk = &j->walk[i];
     const double seconds = judged->steps * TASK_PERIOD, way = judged->end - judged->begin;
-    return (JudgeWalk){
-        .fell = walk->lasted * TASK_PERIOD<walk->seconds - 0.5 * TASK_PERIOD,
-                                           .asked = walk->walk.command[0][0], .speed = seconds> 0
-                    ? way / seconds
-                    : NAN,
-        .cost = seconds > 0 ? judged->work / (weight * fabs(way)) : NAN,
-        .seconds = seconds};
+    const int measured = judged->steps > 0;
+    JudgeWalk found = {.ground = walk->ground[0],
+                       .asked = walk->walk.command[0][0],
+                       .speed = measured ? way / seconds : NAN,
+                       .cost = measured ? judged->work / (weight * fabs(way)) : NAN,
+                       .seconds = seconds};
+    found.fell = walk->lasted * TASK_PERIOD < walk->seconds - 0.5 * TASK_PERIOD;
+    return found;
 }
 
 static void judge_all(Judge *j, int count, double *factor) {

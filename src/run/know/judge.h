@@ -59,11 +59,12 @@ typedef struct {
 
 /* How a walk went, after its first two seconds. */
 typedef struct {
-    int fell;       /* bool */
-    double asked;   /* [m/s] forward, before any care; mean */
-    double speed;   /* [m/s] forward, world; mean */
-    double cost;    /* [-] of transport */
-    double seconds; /* [s] that this is of */
+    PriorGround ground; /* on which it began */
+    int fell;           /* bool */
+    double asked;       /* [m/s] forward, before any care; mean */
+    double speed;       /* [m/s] forward, world; mean */
+    double cost;        /* [-] of transport */
+    double seconds;     /* [s] that this is of */
 } JudgeWalk;
 
 /* count: walks. each: [count]. */

@@ -80,6 +80,10 @@ static void draw_walk(const StudyDef *def, uint32_t number, StudyWalk *walk) {
     if (changes) {
         draw_border(def, &r, walk);
     }
+    for (int g = 0; g < walk->grounds; g++) {
+        MildMaterial *under = &walk->walk.terrain.materials[g];
+        under->grip = under->slip_length > 0 ? def->grip : under->grip;
+    }
     if (def->slick[1] > 0) {
         const int last = walk->grounds - 1;
         const double mu = def->slick[0] * pow(def->slick[1] / def->slick[0], random_unit(&r));

@@ -20,6 +20,7 @@ typedef struct {
     double speed[2];     /* [m/s] of straight walks alone; 0 0: any command */
     double slick[2];     /* [-] friction of the last ground of each walk, evenly in its logarithm;
                             0 0: as drawn */
+    double grip;         /* [-] of grounds where slip costs support */
     double robots;       /* [-] share of the batches with randomised robots */
     double quiet;        /* [-] share of the batches with less noise than in training */
     int rigid;           /* bool: on the engine's own contact */
