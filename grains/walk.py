@@ -6,6 +6,7 @@
     grains/walk.py models --out out/walk    the same walks on the models, some seconds each
     grains/walk.py mpm --out out/walk       the same walks on Newton's implicit MPM, by walk_mpm.py; wants a GPU
     grains/walk.py lead --out out/walk      leads the feet of the walks on grains through mild_merged: forces after touchdown, side by side
+    grains/walk.py tilt --out out/walk      how the horizontal force of feet on grains grows with their tilt
     grains/walk.py figure --out out/walk    OUT/walk.csv with a row for each stance, OUT/walks.json for each walk, and the figure
     grains/walk.py video --out out/walk     a video of each walk on grains
 
@@ -187,6 +188,14 @@ def lead(args):
             walk_lead.compare(folder, feet_of(args.robot), json.loads(GROUNDS.read_text())[family]["mild_merged"], "mild_merged")
 
 
+def tilt(args):
+    import walk_lead
+    for family in args.families:
+        for speed in args.speeds:
+            if (args.out / family / speed / "grains" / "feet.csv").exists():
+                walk_lead.tilt_slopes(args.out / family / speed, float(feet_of(args.robot)[0]["z"]))
+
+
 def film(args):
     import walk_pictures
     for family in args.families:
@@ -204,7 +213,7 @@ def film(args):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("fit", "grains", "models", "mpm", "lead", "figure", "video"))
+    parser.add_argument("what", choices=("fit", "grains", "models", "mpm", "lead", "tilt", "figure", "video"))
     parser.add_argument("--out", default=ROOT / "out" / "walk", type=pathlib.Path)
     parser.add_argument("--mild", default=ROOT / "build" / "mild", type=pathlib.Path)
     parser.add_argument("--program", default=ROOT / "build" / "grains" / "grains", type=pathlib.Path)
@@ -237,7 +246,7 @@ def main():
     args.out = args.out.resolve()
     args.dt = args.dt or (0.0025 if args.what == "mpm" else 0.0005)
     try:
-        {"fit": fit, "grains": on_grains, "models": on_models, "mpm": on_mpm, "lead": lead, "figure": draw_figure, "video": film}[args.what](args)
+        {"fit": fit, "grains": on_grains, "models": on_models, "mpm": on_mpm, "lead": lead, "tilt": tilt, "figure": draw_figure, "video": film}[args.what](args)
     except ModuleNotFoundError as error:
         fail(f"{args.what} needs the Python package {error.name}: .venv/bin/python grains/walk.py, after make setup")
 

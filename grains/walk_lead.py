@@ -90,3 +90,25 @@ def compare(folder, feet, numbers, model):
           f"  {'deepest [mm]':>12}  forward, up [m/s]")
     for (low, high), v in zip(WINDOWS, np.nanmedian(found, 0)):
         print(f"{1e3 * low:10.0f} to {1e3 * high:.0f} ms  {v[0]:17.0f} {v[2]:6.0f}  {v[1]:16.0f} {v[3]:6.0f}  {1e3 * v[4]:12.0f}  {v[5]:.2f}, {v[6]:.2f}")
+
+
+def tilt_slopes(folder, height):
+    """Prints for soles that slide back and sink, and for soles that rest, by how much the share of horizontal force grows with the tangent of half
+    the tilt, over the means of the stances: 1 would be traction at half the tilt."""
+    table = np.genfromtxt(folder / "grains" / "feet.csv", delimiter=",", names=True, dtype=None, encoding=None)
+    means = {"slides back and sinks": [], "rests": []}
+    for _, rows in stances(table):
+        time, half = rows["time_s"], np.tan(rows["pitch_rad"] / 2)
+        along = np.gradient(rows["ankle_x_m"], time) + height * np.gradient(rows["pitch_rad"], time)
+        up, share = np.gradient(rows["ankle_z_m"], time), rows["force_x_n"] / np.maximum(rows["force_z_n"], 1)
+        landed = (rows["force_z_n"] > 2 * CONTACT) & (time > time[np.argmax(rows["force_z_n"] > CONTACT)] + WINDOWS[1][0])
+        for name, here in (("slides back and sinks", (along < -0.05) & (up < -0.08)), ("rests", (np.abs(along) < 0.04) & (np.abs(up) < 0.03))):
+            if (here & landed).any():
+                means[name].append((half[here & landed].mean(), share[here & landed].mean()))
+    for name, rows in means.items():
+        if len(rows) < 5:
+            continue
+        x, y = np.array(rows).T
+        slope, begin = np.polyfit(x, y, 1)
+        error = np.sqrt(np.sum((y - begin - slope * x)**2) / (len(x) - 2) / np.sum((x - x.mean())**2))
+        print(f"{folder}: {name}, {len(x)} stances: share {y.mean():+.3f}, tangent of half the tilt {x.mean():+.3f}, slope {slope:+.2f} +- {error:.2f}")

@@ -212,10 +212,10 @@ def print_results(results):
               "errors [%; % of the force before; mm], one bed's noise in the same unit")
         print(f"{'':41}{'grains':>8}{'noise':>6}" + "".join(f"{name[:12]:>13}" for name in names))
         for _, key, used, measure, value, noise, values in rows:
-            by = scale(measure, value)
+            by, size = scale(measure, value), abs(scale(measure, value))
             unit = 1 if MEASURES[measure][1] == "mm" else 100
-            errors = [text_of((values.get(name, np.nan) - value) / by, noise / by, measure) for name in names]
-            print(f"{key + ' fit' * used:29.29}{measure:12.12}{value:8.3g}{unit * noise / by:6.1f}" +
+            errors = [text_of((values.get(name, np.nan) - value) / by, noise / size, measure) for name in names]
+            print(f"{key + ' fit' * used:29.29}{measure:12.12}{value:8.3g}{unit * noise / size:6.1f}" +
                   "".join(f"{error:>13}" for error in errors))
 
 
@@ -232,7 +232,7 @@ def print_score(results):
             if MEASURES[measure][1] == "mm":
                 lengths.append(abs(got - value))
             else:
-                errors.append(100 * abs(got - value) / scale(measure, value))
+                errors.append(100 * abs((got - value) / scale(measure, value)))
             within.append(abs(got - value) <= 2 * noise)
         parts = [f"{np.median(part):8.1f}{np.max(part):7.0f}" if part else f"{'-':>8}{'-':>7}" for part in (errors, lengths)]
         if within:

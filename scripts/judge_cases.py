@@ -81,6 +81,7 @@ MEASURES = {
     "force": ("mean force, deepest 40 % of the way", "rel"),
     "moment": ("mean true moment, the same rows", "rel"),
     "pressure_center": ("centre of pressure, the same rows", "mm"),
+    "traction": ("horizontal force over the force up, the same rows, tilted", "F0"),
     "load_10mm": ("force after 10 mm of drag over that before", "F0"),
     "load_end": ("force at the end of the drag over that before", "F0"),
     "grip": ("largest horizontal force over F0; under load, its mean over the load", "F0"),
@@ -104,6 +105,7 @@ def measure_press(case, rows):
     out = {"force": force}
     if case.tilt:  # of a level plate it is noise, or says only where the outline's middle is
         out["moment"] = moment
+        out["traction"] = rows["fx"][deep].mean() / force if force else math.nan
     if case.tilt or case.sole.kind == "polygon":
         out["pressure_center"] = -1e3 * moment / normal if normal else math.nan
     return out
@@ -145,5 +147,5 @@ def measures(case, rows):
 
 
 def scale(name, value):
-    """What an error of this measure is divided by."""
-    return abs(value) if MEASURES[name][1] == "rel" else 1.0
+    """What an error of this measure is divided by; with the sign of the grains' number, so that an error is a ratio less 1."""
+    return value if MEASURES[name][1] == "rel" else 1.0

@@ -16,11 +16,13 @@
 #include "run/config/experiment_keys.h"
 #include "run/know/judge.h"
 
+#define CLOCK_LEAST 0.2 /* [s] as of task.gait_period */
+
 typedef struct {
     Context context;
     const char *walks, *weights, *prior, *ground, *json;
-    CliNumbers speed, slick, care;
-    int grounds, threads;
+    CliNumbers speed, slick, care, clock;
+    int grounds, threads, told;
     StudyDef study;
     TaskDef drawn; /* the randomised robots' */
     MildMaterial preset;
@@ -165,6 +167,41 @@ static void print_changes(const JudgeResult *result) {
            result->fell, result->before_falls, 1e6 * result->step);
 }
 
+/* Of the walks that did not fall. */
+static void print_walks(const JudgeWalk *each, int count) {
+    double error = 0, cost = 0;
+    int stood = 0;
+    for (int i = 0; i < count; i++) {
+        if (!each[i].fell) {
+            error += fabs(each[i].speed - each[i].asked);
+            cost += each[i].cost;
+            stood++;
+        }
+    }
+    if (stood) {
+        printf("the other %d: speed off by %.3f m/s, cost of transport %.3f, means\n", stood,
+               error / stood, cost / stood);
+    }
+}
+
+static cJSON *walks_json(const JudgeWalk *each, int count) {
+    cJSON *rows = cJSON_CreateArray();
+    for (int i = 0; i < count; i++) {
+        cJSON *row = cJSON_CreateObject();
+        const PriorGround *ground = &each[i].ground;
+        cJSON_AddNumberToObject(row, "sinkage", ground->sinkage);
+        cJSON_AddNumberToObject(row, "mu", ground->mu);
+        cJSON_AddNumberToObject(row, "slip_length", ground->slip_length);
+        cJSON_AddBoolToObject(row, "fell", each[i].fell);
+        cJSON_AddNumberToObject(row, "asked", each[i].asked);
+        cJSON_AddNumberToObject(row, "speed", each[i].speed);
+        cJSON_AddNumberToObject(row, "cost", each[i].cost);
+        cJSON_AddNumberToObject(row, "seconds", each[i].seconds);
+        cJSON_AddItemToArray(rows, row);
+    }
+    return rows;
+}
+
 static cJSON *result_json(const Know *k, const JudgeResult *result) {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "version", build_version());
@@ -211,17 +248,28 @@ static MildStatus judge(const Know *k, MildError *error) {
     if (!net) {
         return error->status;
     }
-    const JudgeCare care = {k->care.value[0], k->care.value[1]};
-    MildStatus status = judge_run(&k->study, net, &care, k->grounds, &result, error);
+    const JudgeCare care = {.mu = k->care.value[0],
+                            .speed = k->care.value[1],
+                            .slip = k->clock.value[0],
+                            .slow = k->clock.value[1],
+                            .fast = k->clock.value[2],
+                            .told = k->told};
+    JudgeWalk *each = calloc((size_t)k->grounds, sizeof *each);
+    MildStatus status = each ? judge_run(&k->study, net, &care, k->grounds, &result, each, error)
+                             : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     free(net);
-    if (status != MILD_OK) {
-        return status;
-    }
-    if (!k->json || strcmp(k->json, "-") != 0) {
+    if (status == MILD_OK && (!k->json || strcmp(k->json, "-") != 0)) {
         print_cells(&result);
         print_changes(&result);
+        print_walks(each, k->grounds);
     }
-    return k->json ? report_save(result_json(k, &result), k->json, error) : MILD_OK;
+    if (status == MILD_OK && k->json) {
+        cJSON *root = result_json(k, &result);
+        cJSON_AddItemToObject(root, "walks", walks_json(each, k->grounds));
+        status = report_save(root, k->json, error);
+    }
+    free(each);
+    return status;
 }
 
 /* ---- the command ---- */
@@ -265,6 +313,12 @@ static MildStatus check_pairs(const Know *k, MildError *error) {
     }
     if (k->care.count && k->care.count != 2) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "--care: friction and speed, as 0.3,0.4");
+    }
+    if (k->clock.count && (k->clock.count != 3 || k->clock.value[1] < CLOCK_LEAST ||
+                           k->clock.value[2] < CLOCK_LEAST)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--clock: slip length and two periods of at least %g s, as 0.02,1,0.6",
+                         CLOCK_LEAST);
     }
     return MILD_OK;
 }
@@ -338,9 +392,18 @@ static int parse_and_run(Know *k, CliArgs *args, int argc, char **argv) {
          "ones)"},
         {"slick", CLI_NUMBERS, &k->slick, 0.05, 2, "LOW,HIGH",
          "[-] friction of each walk's ground, or of that behind its border (default: as drawn)"},
+        {"grip", CLI_NUMBER, &k->study.grip, 0, 2, "T",
+         "[-] greatest friction of a sliding sole by its virgin load, on grounds with a slip "
+         "length (default 0: that of the ground)"},
         {"care", CLI_NUMBERS, &k->care, 0, 2, "MU,V",
          "[-, m/s] the robot walks no faster than V while it believes friction to be below MU "
          "(default: it does nothing)"},
+        {"clock", CLI_NUMBERS, &k->clock, 0, 10, "SLIP,SLOW,FAST",
+         "[m, s, s] while the robot believes the slip length to be below SLIP, its gait clock has "
+         "the period SLOW below 0.75 m/s and FAST above (default: that of the policy)"},
+        {"told", CLI_FLAG, &k->told, 0, 0, NULL,
+         "--care and --clock go by the true numbers of the ground, in the place of what the robot "
+         "believes"},
         {"robots", CLI_NUMBER, &k->study.robots, 0, 1, "P",
          "[-] share of the walks with robots drawn and pushed as in training (default 0.5)"},
         {"quiet", CLI_NUMBER, &k->study.quiet, 0, 1, "P",

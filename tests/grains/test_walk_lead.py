@@ -47,6 +47,26 @@ def in_grains(depth):
     return np.mean([np.interp(depth, table["depth_m"], table["force_z_n"]) for table in tables])
 
 
+def tilts(folder, slope):
+    """What `grains/walk.py tilt` says of feet that slide back and sink, each stance with a tilt of its own and a share of `slope` times the tangent of half of it."""
+    rows, start, time, names = [], 0.0, 5e-3 * np.arange(80), "foot,time_s,ankle_x_m,ankle_z_m,roll_rad,pitch_rad,yaw_rad,force_x_n,force_z_n,depth_m"
+    for tilt in np.linspace(-0.3, 0.1, 9):
+        up = np.where(time > 0.05, 300.0, 0.0)
+        rows += [(0, start + t, -0.2 * t, -0.15 * t, 0, tilt, 0, force * (0.02 + slope * np.tan(tilt / 2)), force, 0.05) for t, force in zip(time, up)]
+        start += 1.0
+    np.savetxt(folder / "grains" / "feet.csv", rows, delimiter=",", header=names, comments="", fmt="%.9g")
+    told = io.StringIO()
+    with contextlib.redirect_stdout(told):
+        walk_lead.tilt_slopes(folder, -0.05)
+    return told.getvalue()
+
+
+with tempfile.TemporaryDirectory() as name:
+    (pathlib.Path(name) / "grains").mkdir()
+    for slope in (1.0, -0.5):
+        said = tilts(pathlib.Path(name), slope)
+        print(said)
+        assert "slides back and sinks, 9 stances" in said and f"slope {slope:+.2f} +- 0.0" in said and "rests" not in said
 with tempfile.TemporaryDirectory() as name:
     folder = pathlib.Path(name)
     (folder / "grains").mkdir()

@@ -103,6 +103,29 @@ def judged():
     return "48 walks: R2 " + ", ".join(f"{name} {row['r2']:.2f} ({100 * row['coverage']:.0f} %)" for name, row in cells.items())
 
 
+def cared(folder):
+    """What a robot does by its belief: nothing by a belief that nobody has, a slower clock by one that all have; and a walk's measures beside `mild eval`."""
+    def walk(name, *arguments):
+        run("know", "--grounds", 6, "--robots", 0, "--speed", 0.6, "--seed", 5, "--threads", 2, "--json", folder / f"{name}.json", *arguments)
+        return json.loads((folder / f"{name}.json").read_text())
+
+    def deep(found):
+        return sum(row["walks"] for row in found["rows"] if row["footsteps"] == 16)
+
+    told = walk("told", "--clock", "10,1.6,1.6", "--told")  # 12 s have 15 footsteps of it
+    plain, never = walk("plain"), walk("never", "--clock", "1e-9,1.6,1.6")
+    assert plain["walks"] == never["walks"] and plain["rows"] == never["rows"] and deep(plain) > 0 and deep(told) == 0
+    said = subprocess.run([sys.executable, root / "scripts/know_pair.py", folder / "plain.json", folder / "never.json"], check=True, capture_output=True, text=True).stdout
+    assert "6 walks" in said and "0 saved, 0 lost" in said and said.count("+0.0000 +- 0.0000") == 2, said
+    found = walk("rubber", "--ground", "rubber")["walks"]
+    run("eval", "--ground", "rubber", "--speed", 0.6, "--trials", 6, "--seconds", 12, "--json", folder / "eval.json")
+    row = json.loads((folder / "eval.json").read_text())["rows"][0]
+    speed, cost = (np.mean([walk[name] for walk in found]) for name in ("speed", "cost"))
+    assert abs(speed / row["velocity"] - 1) < 0.03 and abs(cost / row["cot"] - 1) < 0.1, (speed, cost, row["velocity"], row["cot"])
+    assert all(walk["asked"] == 0.6 and not walk["fell"] and abs(walk["seconds"] - 10) < 0.011 for walk in found), found
+    return f"rubber: {speed:.3f} m/s at {cost:.3f}, mild eval {row['velocity']:.3f} at {row['cot']:.3f}"
+
+
 def commands(folder):
     """A walk's log from play, and refusals."""
     run("play", "--ground", "sand_loose", "--seconds", 6, "--pressure", folder / "p.csv", "--log", folder / "log.csv")
@@ -110,7 +133,7 @@ def commands(folder):
     assert all(name in text for name in know.NAMES), text
     for arguments, words in ((("fit", folder / "log.csv", "--plate", "0.2,0.1"), "walk's log"),
                              (("fit", folder / "log.csv", "--trial", "3", "--json", "/nowhere/x"), "/nowhere"),
-                             (("know", "--prior", "flat"), "neither wide nor paper nor presets"), (("know", "--ground", "mud"), "mud"),
+                             (("know", "--clock", "0.02,1"), "slip length and two periods"), (("know", "--clock", "0.02,1,0.1"), "at least 0.2 s"), (("know", "--prior", "flat"), "neither wide nor paper nor presets"), (("know", "--ground", "mud"), "mud"),
                              (("know", "--weights", root / "policies/mild.safetensors"), "no weights of a belief")):
         done = subprocess.run([mild, *map(str, arguments)], capture_output=True, text=True, check=False, cwd=root)
         assert done.returncode == 2 and words in done.stderr, (arguments, done.stderr)
@@ -122,6 +145,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         print(same_as_numpy(pathlib.Path(folder)))
         print(commands(pathlib.Path(folder)))
+        print(cared(pathlib.Path(folder)))
     print(judged())
 
 

@@ -22,8 +22,15 @@ typedef struct {
     int crossed;             /* footsteps on the second ground */
     int flagged;             /* the same, when the alarm came; 0: it has not */
     int false_alarms;
-    int latest; /* policy step of the latest of them */
+    int latest;   /* policy step of the latest of them */
+    int steps;    /* policy steps that are measured */
+    double begin; /* [m] where it was before them */
+    double end;   /* [m] where it is */
+    double work;  /* [J] in them */
 } Judged;
+
+#define GRAVITY 9.81 /* [m/s^2] */
+#define SETTLES 2.0  /* [s] of a walk that are not measured */
 
 typedef struct {
     const BeliefNet *net;
@@ -71,9 +78,20 @@ static void count_footstep(Judged *judged, int step, int event) {
     }
 }
 
+static void measure(Judged *judged, const WalkStep *step) {
+    if (step->step * TASK_PERIOD < SETTLES) {
+        judged->begin = step->forward;
+        return;
+    }
+    judged->end = step->forward;
+    judged->work += step->work;
+    judged->steps++;
+}
+
 static void judge_step(void *context, const WalkStep *step) {
     Judge *j = context;
     Judged *judged = &j->judged[step->walk];
+    measure(judged, step);
     const double start = clock_seconds();
     const int event = belief_step(&judged->belief, j->net, step->frame);
     j->spent += clock_seconds() - start;
@@ -92,18 +110,33 @@ static void judge_step(void *context, const WalkStep *step) {
     }
 }
 
-static double limit_speed(void *context, int walk) {
-    const Judge *j = context;
-    const Belief *belief = &j->judged[walk].belief;
-    return belief->footsteps > 0 && belief_quantile(belief, j->net, BELIEF_mu, 0.5) < j->care->mu
-               ? j->care->speed
-               : INFINITY;
-}
-
 static double truth_of(const PriorGround *ground, int parameter) {
     const double values[BELIEF_PARAMETERS] = {ground->sinkage, ground->k_pen, ground->sigma_cone,
                                               ground->mu, ground->slip_length};
     return values[parameter];
+}
+
+/* Whether a parameter is thought to be below a value, or is. */
+static int is_below(const Judge *j, int walk, BeliefParameter p, double value) {
+    const Judged *judged = &j->judged[walk];
+    if (j->care->told) {
+        return truth_of(&j->walk[walk].ground[judged->touched > 0], (int)p) < value;
+    }
+    return judged->belief.footsteps > 0 && belief_quantile(&judged->belief, j->net, p, 0.5) < value;
+}
+
+static WalkCare take_care(void *context, int walk) {
+    const Judge *j = context;
+    const JudgeCare *care = j->care;
+    const int fast = fabs(j->walk[walk].walk.command[0][0]) >= JUDGE_FAST;
+    WalkCare takes = {.speed = INFINITY};
+    if (care->mu > 0 && is_below(j, walk, BELIEF_mu, care->mu)) {
+        takes.speed = care->speed;
+    }
+    if (care->slip > 0 && is_below(j, walk, BELIEF_slip_length, care->slip)) {
+        takes.period = fast ? care->fast : care->slow;
+    }
+    return takes;
 }
 
 static int compare(const void *a, const void *b) {
@@ -166,6 +199,20 @@ static void judge_borders(const Judge *j, int count) {
     }
 }
 
+static JudgeWalk judge_walk(const Judge *j, int i, double weight) {
+    const Judged *judged = &j->judged[i];
+    const StudyWalk *walk = &j->walk[i];
+    const double seconds = judged->steps * TASK_PERIOD, way = judged->end - judged->begin;
+    const int measured = judged->steps > 0;
+    JudgeWalk found = {.ground = walk->ground[0],
+                       .asked = walk->walk.command[0][0],
+                       .speed = measured ? way / seconds : NAN,
+                       .cost = measured ? judged->work / (weight * fabs(way)) : NAN,
+                       .seconds = seconds};
+    found.fell = walk->lasted * TASK_PERIOD < walk->seconds - 0.5 * TASK_PERIOD;
+    return found;
+}
+
 static void judge_all(Judge *j, int count, double *factor) {
     for (int i = 0; i < count; i++) {
         Judged *judged = &j->judged[i];
@@ -191,7 +238,7 @@ static void judge_all(Judge *j, int count, double *factor) {
 }
 
 MildStatus judge_run(const StudyDef *study, const BeliefNet *net, const JudgeCare *care, int count,
-                     JudgeResult *result, MildError *error) {
+                     JudgeResult *result, JudgeWalk *each, MildError *error) {
     StudyWalk *walk = calloc((size_t)count, sizeof *walk);
     Judged *judged = calloc((size_t)count, sizeof *judged);
     double *factor = calloc((size_t)count, sizeof *factor);
@@ -204,10 +251,15 @@ MildStatus judge_run(const StudyDef *study, const BeliefNet *net, const JudgeCar
         for (int i = 0; i < count; i++) {
             belief_reset(&judged[i].belief);
         }
-        const StudyWatcher watcher = {judge_step, care->mu > 0 ? limit_speed : NULL, &j};
+        const int cares = care->mu > 0 || care->slip > 0;
+        const StudyWatcher watcher = {judge_step, cares ? take_care : NULL, &j};
         status = study_run(study, walk, count, &watcher, error);
         if (status == MILD_OK) {
             judge_all(&j, count, factor);
+            const double weight = GRAVITY * robot_total_mass(study->robot);
+            for (int i = 0; i < count; i++) {
+                each[i] = judge_walk(&j, i, weight);
+            }
         }
     }
     free(walk);

@@ -43,15 +43,32 @@ typedef struct {
     double step;      /* [s] of belief_step, mean */
 } JudgeResult;
 
+#define JUDGE_FAST 0.75 /* [m/s] from which a walk is fast */
+
 /* What the robot does with what it knows: it walks no faster than `speed` [m/s] while the median
- * of its friction is below `mu`. */
+ * of its friction is below `mu`, and its gait clock has a period of `slow` or `fast` while the
+ * median of its slip length is below `slip`. */
 typedef struct {
     double mu; /* [-] 0: nothing */
     double speed;
+    double slip; /* [m] 0: nothing */
+    double slow; /* [s] of walks below JUDGE_FAST */
+    double fast; /* [s] of others */
+    int told;    /* bool: by the true numbers of the ground under it, in the place of medians */
 } JudgeCare;
 
-/* count: walks. */
+/* How a walk went, after its first two seconds. */
+typedef struct {
+    PriorGround ground; /* on which it began */
+    int fell;           /* bool */
+    double asked;       /* [m/s] forward, before any care; mean */
+    double speed;       /* [m/s] forward, world; mean */
+    double cost;        /* [-] of transport */
+    double seconds;     /* [s] that this is of */
+} JudgeWalk;
+
+/* count: walks. each: [count]. */
 MildStatus judge_run(const StudyDef *study, const BeliefNet *net, const JudgeCare *care, int count,
-                     JudgeResult *result, MildError *error);
+                     JudgeResult *result, JudgeWalk *each, MildError *error);
 
 #endif

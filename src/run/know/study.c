@@ -80,6 +80,10 @@ static void draw_walk(const StudyDef *def, uint32_t number, StudyWalk *walk) {
     if (changes) {
         draw_border(def, &r, walk);
     }
+    for (int g = 0; g < walk->grounds; g++) {
+        MildMaterial *under = &walk->walk.terrain.materials[g];
+        under->grip = under->slip_length > 0 ? def->grip : under->grip;
+    }
     if (def->slick[1] > 0) {
         const int last = walk->grounds - 1;
         const double mu = def->slick[0] * pow(def->slick[1] / def->slick[0], random_unit(&r));
@@ -117,9 +121,9 @@ static void count_on(void *context, const WalkStep *step) {
     numbered->watcher->stepped(numbered->watcher->context, &same);
 }
 
-static double limit_on(void *context, int walk) {
+static WalkCare care_on(void *context, int walk) {
     const Numbered *numbered = context;
-    return numbered->watcher->limit(numbered->watcher->context, walk + numbered->first);
+    return numbered->watcher->care(numbered->watcher->context, walk + numbered->first);
 }
 
 MildStatus study_run(const StudyDef *def, StudyWalk *walk, int count, const StudyWatcher *watcher,
@@ -147,7 +151,7 @@ MildStatus study_run(const StudyDef *def, StudyWalk *walk, int count, const Stud
                               .first = (uint32_t)first,
                               .stepped = count_on,
                               .context = &numbered,
-                              .limit = watcher->limit ? limit_on : NULL};
+                              .care = watcher->care ? care_on : NULL};
         status = walks_run(&run, lasted, error);
         for (int i = 0; i < batch && status == MILD_OK; i++) {
             walk[first + i].lasted = lasted[i];

@@ -20,6 +20,7 @@ typedef struct {
     double speed[2];     /* [m/s] of straight walks alone; 0 0: any command */
     double slick[2];     /* [-] friction of the last ground of each walk, evenly in its logarithm;
                             0 0: as drawn */
+    double grip;         /* [-] of grounds where slip costs support */
     double robots;       /* [-] share of the batches with randomised robots */
     double quiet;        /* [-] share of the batches with less noise than in training */
     int rigid;           /* bool: on the engine's own contact */
@@ -41,7 +42,7 @@ typedef struct {
 /* Who looks at the walks; as WalksDef has it, with the number of the walk in the study. */
 typedef struct {
     void (*stepped)(void *context, const WalkStep *step);
-    double (*limit)(void *context, int walk); /* NULL: none */
+    WalkCare (*care)(void *context, int walk); /* NULL: none */
     void *context;
 } StudyWatcher;
 

@@ -27,16 +27,29 @@ static double yaw_of(const double q[4]) {
     return atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]));
 }
 
+/* Puts the phase where a clock of the period would be. */
+static void turn_clock(Walks *w, int i, double period) {
+    TaskEnv *env = w->env[i];
+    if (period > 0 && !task_is_standing(&w->task, env->command_seen)) {
+        const double turned =
+            TASK_PERIOD / period - TASK_PERIOD / task_gait_period(&w->task, env->command_seen);
+        env->phase += turned + (env->phase + turned < 0);
+        env->phase -= floor(env->phase);
+    }
+}
+
 static void direct(Walks *w, int i, int step) {
     const Walk *walk = &w->def->walk[i];
     const double *asked = walk->command[step * walk->commands / w->steps];
     double *command = w->command + 3 * (size_t)i;
     memcpy(command, asked, 3 * sizeof *command);
-    if (w->def->limit) {
+    if (w->def->care) {
+        const WalkCare care = w->def->care(w->def->context, i);
         const double speed = hypot(asked[0], asked[1]);
-        const double share = fmin(1, w->def->limit(w->def->context, i) / fmax(speed, 1e-9));
+        const double share = fmin(1, care.speed / fmax(speed, 1e-9));
         command[0] *= share;
         command[1] *= share;
+        turn_clock(w, i, care.period);
     }
     if (asked[2] == 0 && (asked[0] != 0 || asked[1] != 0)) {
         const double turn = -HEADING_GAIN * yaw_of(w->env[i]->robot.qpos + 3);
@@ -50,7 +63,14 @@ static void show(const Walks *w, int i, int step) {
                     .step = step,
                     .frame = w->frame + (size_t)i * (size_t)w->shape.observation,
                     .critic = w->critic + (size_t)i * (size_t)w->shape.critic,
-                    .command = w->command + 3 * (size_t)i};
+                    .command = w->command + 3 * (size_t)i,
+                    .forward = w->env[i]->robot.qpos[0]};
+    for (int s = 0; step > 0 && s < w->samples; s++) {
+        const EnvsSample *sample = last - s;
+        for (int joint = 0; joint < sample->joints; joint++) {
+            now.work += fabs(sample->torque[joint] * sample->speed[joint]) * w->task.physics_dt;
+        }
+    }
     for (int f = 0; f < w->shape.feet; f++) {
         const EnvsFoot *foot = &last->foot[f];
         now.material[f] =

@@ -26,7 +26,15 @@ typedef struct {
     const float *critic;          /* [TaskShape.critic] the same without noise, and the truth */
     const double *command;        /* [3] */
     int material[ROBOT_FEET_MAX]; /* of the terrain, under the foot; -1: the foot is free */
+    double forward;               /* [m] of the base, world x */
+    double work;                  /* [J] of the joints in the step before, by size */
 } WalkStep;
+
+/* What the robot allows itself. */
+typedef struct {
+    double speed;  /* [m/s] largest */
+    double period; /* [s] of its gait clock; 0: that of its task */
+} WalkCare;
 
 typedef struct {
     const TaskDef *task;
@@ -41,8 +49,8 @@ typedef struct {
     /* In the order of steps, then of walks. */
     void (*stepped)(void *context, const WalkStep *step);
     void *context;
-    /* [m/s] Largest speed that the robot allows itself in this walk; NULL: any. */
-    double (*limit)(void *context, int walk);
+    /* In this walk, from the next step on; NULL: it walks as it is told. */
+    WalkCare (*care)(void *context, int walk);
 } WalksDef;
 
 /* lasted: [count] policy steps until a fall or the end. */
