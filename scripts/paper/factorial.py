@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """The net or the ground? Trains five controllers on three grounds, with several seeds, one task (configs/factorial.ini), and judges them all.
 
-  scripts/paper/factorial.py runs/factorial --minutes 3 --jobs 2                       # on one GPU; 65 trainings
-  scripts/paper/factorial.py runs/factorial --minutes 3 --devices cuda:0,cuda:1 --seconds 1500
+  scripts/paper/factorial.py runs/factorial                                            # on one GPU; 65 trainings, two hours and a half
+  scripts/paper/factorial.py runs/factorial --devices cuda:0,cuda:1 --seconds 1500
+  scripts/paper/factorial.py runs/factorial --judge                                    # what is trained, without a GPU
   scripts/paper/factorial.py runs/factorial --report                                   # table and figure of what is there
 
 Controllers: mlp (the layers of ours, with no target but the reward, and no modulation), clock, ht2 (docs/rivals.md), flat (ours whose
@@ -11,17 +12,24 @@ modulation does not learn), ours. Grounds: rigid, ecc_spring, mild (randomize.mo
 They are judged on nine grounds at four speeds, nine transitions at 0.6 and 1.2 m/s, and grounds that none of them met.
 
 One tuning budget: before that each controller is trained on `mild`, seed 1, a quarter of the time, with each of the four choices of
-SEARCH (KL target that leads the learning rate, weight of the entropy); the one with the greatest skill on nine grounds is taken
-for all of its trainings. Skill: mean over cells of upright share times 1 - |speed error| / speed, not below 0.
+SEARCH (KL target that leads the learning rate, robots that are simulated at the same time); the one with the highest score is taken for
+all of its trainings. With fewer robots an iteration has fewer samples, and there are more of them: the KL target bounds how far a policy
+moves in one. All have the same weight of the entropy. Score: the mean of the skill on nine grounds and of the share of their time that the
+trials last, so that controllers of which nobody stays up are told apart, too. Skill: mean over cells of upright share times
+1 - |speed error| / speed, not below 0.
+
+Equal wall time: of a training alone on its GPU. With --jobs 2 each has half of one, which does not count with those that had all of it.
 
 FOLDER/results.jsonl gets a line when a training ends and one when it is judged; started again, the command goes on from there, also after
-it was killed. What was trained with another --minutes, --steps or config is not counted. No training begins that would not end by --seconds,
-and no judge after it. So it may be run in pieces, one after another or on several machines, each with a part of --controllers:
---take PIECE,PIECE puts the results and policies of other folders into this one first, as in
+it was killed. What was trained with another --minutes, --jobs, --steps or config is not counted. No training begins that would not end by
+--seconds, and no judge after it. So it may be run in pieces, one after another or on several machines: --take PIECE,PIECE puts the results
+and policies of other folders into this one first. FOLDER/policies has those of the trainings, in half precision, and those of the search
+until they are judged. As in
 
-  scripts/paper/factorial.py runs/factorial --take runs/first,runs/second --report
+  scripts/paper/factorial.py runs/third --take runs/first,runs/second --seconds 570    # what they have not done
+  scripts/paper/factorial.py runs/factorial --take runs/first,runs/second,runs/third --report
 
-Keys after -- go to the trainings of mlp, flat and ours, as -- --train.envs=8192."""
+Keys after -- go to the trainings of mlp, flat and ours, as -- --ppo.epochs=3."""
 import argparse
 import csv
 import hashlib
@@ -39,17 +47,21 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import transitions
+from half import halve
 from measure import MILD, NINE, ROOT, UNSEEN, mean, mild
 
 CONTROLLERS = {"mlp": "MLP", "clock": "Clock", "ht2": "HT-2", "flat": "ours, no modulation", "ours": "ours"}
 GROUNDS = ["rigid", "ecc_spring", "mild"]
-SEARCH = [(kl_target, entropy) for kl_target in (0.01, 0.02) for entropy in (0.001, 0.004)]
+SEARCH = [(kl_target, robots) for kl_target in (0.01, 0.02) for robots in (1024, 4096)]
+ENTROPY = 0.004  # its weight; docs/training-log.md says why it is not searched for
 TUNING = 0.25  # share of the time
-STARTING = 20  # [s] beside the time of a training, until one has been seen
+STARTING = 8  # [s] beside the time of a training, until one has been seen
+IMITATION = 0.2  # share of the time in which HT-2 imitates
 SETTLED = 0.7  # share of the time at which the annealing begins
 OURS = {"mlp": ["--ppo.epsilon=0", "--ppo.modulation=false"], "flat": ["--ppo.modulation=false"], "ours": []}
 TEACHER = ROOT / "policies/paper/rigid-1.safetensors"
 SPEEDS = [0.3, 0.6, 0.9, 1.2]
+TRIAL = 20  # [s]
 PAIRS = [f"{ground}>{NINE[(i + 4) % len(NINE)]}" for i, ground in enumerate(NINE)]  # each ground is left once and entered once
 PARTS = ("nine grounds", "transitions", "unseen grounds")
 DEFAULT = ROOT / "configs/default.ini"
@@ -67,10 +79,16 @@ def skill(cells):
     return mean(c["upright"] / c["trials"] * max(0.0, 1 - abs(c["error"]) / abs(c["speed"])) if c["error"] is not None else 0.0 for c in cells)
 
 
+def score(cells):
+    """By which the search chooses."""
+    return (skill(cells) + mean(c["lasted"] for c in cells)) / 2
+
+
 def cell_of(row):
-    """Of a row of mild eval."""
+    """Of a row of mild eval whose trials last TRIAL."""
     return {"ground": row["ground"], "speed": row["speed"], "trials": row["trials"], "upright": row["success"], "cot": row["cot"],
-            "error": None if row["velocity"] is None else row["velocity"] - row["speed"], "torque": row["torque_max"]}
+            "error": None if row["velocity"] is None else row["velocity"] - row["speed"], "torque": row["torque_max"],
+            "lasted": mean(min(1.0, t["seconds"] / TRIAL) for t in row["each"])}
 
 
 def who_of(controller, policy, config):
@@ -78,17 +96,18 @@ def who_of(controller, policy, config):
     return ["--policy", policy, "--config", config, "--controller", controller if controller in ("clock", "ht2") else "learned"]
 
 
-def walked(who, grounds, speeds, trials, *more):
-    told = mild("eval", *who, "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)), "--trials", trials, "--threads", 1,
-                "--json", "-", *more)
+def walked(given, who, grounds, speeds, *more):
+    told = mild("eval", *who, "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)), "--trials", given.trials, "--seconds", TRIAL,
+                "--threads", given.threads, "--json", "-", *more)
     return [cell_of(row) for row in json.loads(told)["rows"]]
 
 
-def judged(who, trials):
+def judged(given, who):
     """{part: cells}"""
     unseen = [{**cell, "kind": kind} for kind, grounds, more in UNSEEN if kind not in GROUNDS
-              for cell in walked(who, grounds, [0.6], trials, *more)]
-    return {PARTS[0]: walked(who, NINE, SPEEDS, trials), PARTS[1]: transitions.judge(who, PAIRS, [0.6, 1.2], trials), PARTS[2]: unseen}
+              for cell in walked(given, who, grounds, [0.6], *more)]
+    return {PARTS[0]: walked(given, who, NINE, SPEEDS),
+            PARTS[1]: transitions.judge(who, PAIRS, [0.6, 1.2], given.trials, jobs=given.threads), PARTS[2]: unseen}
 
 
 # ---- trainings ----
@@ -116,8 +135,8 @@ class Factorial:
         self.given, self.folder = given, given.folder.resolve()
         self.file = self.folder / "results.jsonl"
         self.end = time.time() + given.seconds
-        self.lock, self.failed, self.longest = threading.Lock(), [], {}
-        told = [given.minutes, given.steps, given.config.read_text(encoding="utf-8"), SEARCH, OURS, given.options]
+        self.lock, self.failed = threading.Lock(), []
+        told = [given.minutes, given.jobs, given.steps, given.config.read_text(encoding="utf-8"), SEARCH, ENTROPY, IMITATION, OURS, given.options]
         self.settings = hashlib.sha256(json.dumps(told).encode()).hexdigest()[:16]
         self.lines = []
         for text in self.file.read_text(encoding="utf-8").splitlines() if self.file.exists() else []:
@@ -169,14 +188,14 @@ class Factorial:
         return 60 * self.given.minutes * (TUNING if task["kind"] == "tune" else 1)
 
     def train_ours(self, task, folder, device):
-        kl_target, entropy = SEARCH[task["choice"]]
+        kl_target, robots = SEARCH[task["choice"]]
         minutes, log, words = self.seconds_of(task) / 60, folder / "run/log.csv", [*MILD, "train", "--out", folder / "run"]
         first = ["--config", self.given.config.resolve(), f"--train.device={device}", f"--randomize.model={task['ground']}",
-                 f"--train.seed={task['seed']}", f"--ppo.kl_target={kl_target}", f"--ppo.entropy={entropy}",
+                 f"--train.seed={task['seed']}", f"--train.envs={robots}", f"--ppo.kl_target={kl_target}", f"--ppo.entropy={ENTROPY}",
                  f"--train.threads={max(1, os.cpu_count() // self.given.slots)}", *OURS[task["controller"]],
                  *(["--train.robots=batch"] if device == "cpu" else []), *self.given.options]
         if self.given.steps:
-            count = round(self.given.steps * (TUNING if task["kind"] == "tune" else 1) / self.steps_each())
+            count = round(self.given.steps * (TUNING if task["kind"] == "tune" else 1) / (robots * self.rollout()))
             run([*words, *first, f"--train.iterations={count}", f"--ppo.anneal={round(SETTLED * count)},{count}"], folder / "log")
         else:  # how many iterations fit is known when most of them are done; those left anneal
             run([*words, *first, f"--train.minutes={SETTLED * minutes}"], folder / "log")
@@ -186,26 +205,25 @@ class Factorial:
                 folder / "log")
         return {"steps": last_of(log, "rate/steps"), "file": folder / "run/policy.safetensors"}
 
-    def steps_each(self):
-        """Policy steps of an iteration of mild train."""
-        def key(name):
-            for path in (self.given.config, DEFAULT):
-                found = [line.split("=")[1].split(";")[0] for line in path.read_text(encoding="utf-8").splitlines() if line.startswith(f"{name} =")]
-                if found:
-                    return int(found[0])
-        return key("envs") * key("steps")
+    def rollout(self):
+        """Policy steps of each robot in an iteration of mild train."""
+        for path in (self.given.config, DEFAULT):
+            found = [line.split("=")[1].split(";")[0] for line in path.read_text(encoding="utf-8").splitlines() if line.startswith("steps =")]
+            if found:
+                return int(found[0])
+        raise RuntimeError(f"{DEFAULT}: ppo.steps is missing")
 
     def train_rival(self, task, folder, device):
-        kl_target, entropy = SEARCH[task["choice"]]
+        kl_target, robots = SEARCH[task["choice"]]
         name, minutes, more = task["controller"], self.seconds_of(task) / 60, []
         if self.given.steps:
-            minutes, more = 1e6, ["--iterations", round(self.given.steps * (TUNING if task["kind"] == "tune" else 1) / (8192 * 60))]
-        if name == "ht2":  # of its own 8 minutes, 3000 steps of imitation and 20 iterations of the critic alone
-            share = min(1.0, minutes / 8)
-            more += ["--teacher", TEACHER, "--pretrain", max(50, round(3000 * share)), "--warm", max(1, round(20 * share))]
+            minutes, more = 1e6, ["--iterations", round(self.given.steps * (TUNING if task["kind"] == "tune" else 1) / (robots * 60))]
+        if name == "ht2":  # of its own 8 minutes, 20 iterations of 4096 robots train the critic alone
+            warm = max(1, round(20 * min(1.0, minutes / 8) * 4096 / robots))
+            more += ["--teacher", TEACHER, "--imitation", IMITATION, "--warm", warm]
         run([self.given.python, ROOT / f"scripts/rivals/train_{name}.py", "--out", folder / "run", "--config", self.given.config.resolve(),
-             "--model", task["ground"], "--seed", task["seed"], "--kl-target", kl_target, "--entropy", entropy, "--device", device,
-             "--minutes", minutes, *more], folder / "log")
+             "--model", task["ground"], "--seed", task["seed"], "--envs", robots, "--kl-target", kl_target, "--entropy", ENTROPY,
+             "--device", device, "--minutes", minutes, *more], folder / "log")
         return {"steps": last_of(folder / "run/log.csv", "policy_steps"), "file": folder / f"run/{name}.safetensors"}
 
     def train(self, task, device):
@@ -215,7 +233,7 @@ class Factorial:
             found = (self.train_ours if task["controller"] in OURS else self.train_rival)(task, pathlib.Path(work), device)
             place = self.policy_of(task)
             place.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(found["file"], place.with_suffix(".part"))
+            place.with_suffix(".part").write_bytes(halve(pathlib.Path(found["file"]).read_bytes()))
             place.with_suffix(".part").replace(place)
         return {"seconds": time.time() - begin, "steps": found["steps"], "device": device}
 
@@ -223,15 +241,15 @@ class Factorial:
         """{part: cells}"""
         who = who_of(task["controller"], self.policy_of(task), self.given.config.resolve())
         if task["kind"] == "tune":
-            return {"tuning": walked(who, NINE, SPEEDS, self.given.trials)}
-        return judged(who, self.given.trials)
+            return {"tuning": walked(self.given, who, NINE, SPEEDS)}
+        return judged(self.given, who)
 
     # ---- many ----
 
     def begins(self, task):
         """Bool: it would end in time."""
-        likely = self.longest.get((task["kind"], task["controller"]), self.seconds_of(task) + STARTING)
-        return time.time() + likely <= self.end
+        like = [x["seconds"] for x in self.lines if x["done"] == "trained" and all(x["task"][key] == task[key] for key in ("kind", "controller"))]
+        return not self.given.judge and time.time() + max(like, default=self.seconds_of(task) + STARTING) <= self.end
 
     def work(self, task, devices, judges):
         """Trains on the next free device, if it is not done or its policy was lost; its judge starts when it is."""
@@ -240,9 +258,7 @@ class Factorial:
             try:
                 if not self.begins(task):
                     return None
-                begin = time.time()
                 self.add("trained", task, self.train(task, device))
-                self.longest[task["kind"], task["controller"]] = time.time() - begin
             finally:
                 devices.put(device)
         return None if self.known("judged", task) else judges.submit(self.conclude, task)
@@ -251,12 +267,17 @@ class Factorial:
         if time.time() > self.end:  # judged when it goes on
             return
         parts = self.judge(task)
-        line = self.add("judged", task, {"skill": {part: skill(cells) for part, cells in parts.items()}, "cells": parts})
-        kl_target, entropy = SEARCH[task["choice"]]
+        told = {"skill": {part: skill(cells) for part, cells in parts.items()}, "cells": parts}
+        if task["kind"] == "tune":
+            told["score"] = score(parts["tuning"])
+            self.policy_of(task).unlink(missing_ok=True)
+        line = self.add("judged", task, told)
+        kl_target, robots = SEARCH[task["choice"]]
         trained = self.known("trained", task)
-        print(f"{task['kind']} {task['controller']} on {task['ground']}, seed {task['seed']}, kl {kl_target:g}, entropy {entropy:g}: "
+        print(f"{task['kind']} {task['controller']} on {task['ground']}, seed {task['seed']}, kl {kl_target:g}, {robots} robots: "
               f"{trained['steps'] / 1e6:.1f} M steps in {trained['seconds']:.0f} s; skill "
-              + ", ".join(f"{part} {value:.3f}" for part, value in line["skill"].items()), flush=True)
+              + ", ".join(f"{part} {value:.3f}" for part, value in line["skill"].items())
+              + (f"; score {line['score']:.3f}" if "score" in line else ""), flush=True)
 
     def all_of(self, tasks):
         """Bool: all are trained and judged."""
@@ -281,7 +302,7 @@ class Factorial:
         for name in self.given.controllers:
             lines = [self.known("judged", tuning(name, i)) for i in range(len(SEARCH))]
             if all(lines):
-                found[name] = max(range(len(SEARCH)), key=lambda i: lines[i]["skill"]["tuning"])
+                found[name] = max(range(len(SEARCH)), key=lambda i: lines[i]["score"])
         return found
 
     def run(self):
@@ -290,7 +311,7 @@ class Factorial:
         done = self.all_of([tuning(name, i) for name in self.given.controllers for i in range(len(SEARCH))])
         chosen = self.choices()
         done &= self.all_of([{"kind": "train", "controller": name, "ground": ground, "seed": seed, "choice": chosen[name]}
-                             for seed in range(1, self.given.seeds + 1) for ground in GROUNDS for name in chosen])
+                             for seed in range(1, self.given.seeds + 1) for name in chosen for ground in GROUNDS])
         return done
 
 
@@ -383,7 +404,7 @@ def report(factorial):
                             f"{s['both']:.0%}, the seed {s['seed']:.0%}" for part, s in answer.items())
                   if whole else "the net or the ground: not before each net has all grounds and seeds"))
     search = [{**{k: t["task"][k] for k in ("controller", "choice")}, "kl_target": SEARCH[t["task"]["choice"]][0],
-               "entropy": SEARCH[t["task"]["choice"]][1], "skill": t["skill"]["tuning"]}
+               "robots": SEARCH[t["task"]["choice"]][1], "skill": t["skill"]["tuning"], "score": t["score"]}
               for t in factorial.lines if t["done"] == "judged" and t["task"]["kind"] == "tune"]
     told = {"minutes": factorial.given.minutes, "steps": factorial.given.steps, "settings": factorial.settings, "search": search,
             "chosen": factorial.choices(), "rows": rows, "table2": second, "shares": answer}
@@ -406,13 +427,14 @@ def parse(words):
     parser.add_argument("--controllers", default=None, help="some of " + ",".join(CONTROLLERS) + " (default: all)")
     parser.add_argument("--config", type=pathlib.Path, default=ROOT / "configs/factorial.ini", help="the task")
     parser.add_argument("--devices", default="cuda", help="of the trainings: cuda:0,cuda:1 (default cuda)")
-    parser.add_argument("--jobs", type=int, default=1, help="trainings at a time on each device (default 1)")
-    parser.add_argument("--judges", type=int, default=0, help="judges at a time, a core each (default: half of the cores)")
+    parser.add_argument("--jobs", type=int, default=1, help="trainings at a time on each device, which share it (default 1)")
+    parser.add_argument("--judges", type=int, default=2, help="judges at a time, which share half of the cores (default 2)")
     parser.add_argument("--trials", type=int, default=5, help="of each cell (default 5)")
     parser.add_argument("--seconds", type=float, default=1e9, help="[s] no training begins that would not end by then")
     parser.add_argument("--python", default=sys.executable, help="with PyTorch, for clock and ht2 (default: this one)")
     parser.add_argument("--take", default="", metavar="FOLDER[,FOLDER]", help="other folders of this command, whose results belong to these")
-    parser.add_argument("--report", action="store_true", help="train nothing")
+    parser.add_argument("--judge", action="store_true", help="train nothing, judge what is trained")
+    parser.add_argument("--report", action="store_true", help="train and judge nothing")
     own, more = (words[:words.index("--")], words[words.index("--") + 1:]) if "--" in words else (words, [])
     given = parser.parse_args(own)
     given.options = more
@@ -430,7 +452,7 @@ def parse(words):
         fail(f"--take: {missing[0]} has no results.jsonl")
     given.devices = given.devices.split(",")
     given.slots = len(given.devices) * given.jobs
-    given.judges = given.judges or max(1, os.cpu_count() // 2)
+    given.threads = max(1, os.cpu_count() // (2 * given.judges))
     return given
 
 

@@ -1,4 +1,6 @@
 """The network of the rival "HT-2" (src/control/controller_ht2.c says how it computes) and what acts on its contexts."""
+import math
+
 import torch
 from torch import nn
 
@@ -19,8 +21,21 @@ class Layer(nn.Module):
         rows, tokens, width = x.shape
         q, k, v = self.qkv(self.norm1(x)).view(rows, tokens, 3, self.heads, width // self.heads).permute(2, 0, 3, 1, 4)
         mixed = nn.functional.scaled_dot_product_attention(q, k, v, is_causal=True)
-        x = x + self.out(mixed.transpose(1, 2).reshape(rows, tokens, width))
+        return self.finish(x, mixed.transpose(1, 2).reshape(rows, tokens, width))
+
+    def finish(self, x, mixed):
+        x = x + self.out(mixed)
         return x + self.down(nn.functional.gelu(self.up(self.norm2(x))))
+
+    def newest(self, x, place):
+        """Row `place` of each context alone, of which forward computes all."""
+        rows, tokens, width = x.shape
+        every = torch.arange(rows, device=x.device)
+        q, k, v = self.qkv(self.norm1(x)).view(rows, tokens, 3, self.heads, width // self.heads).unbind(2)
+        weight = (q[every, place][:, None] * k).sum(-1) / math.sqrt(width // self.heads)
+        later = torch.arange(tokens, device=x.device) > place[:, None]
+        weight = weight.masked_fill(later[..., None], -math.inf).softmax(1)
+        return self.finish(x[every, place], (weight[..., None] * v).sum(1).flatten(1))
 
 
 class Ht2(nn.Module):
@@ -41,11 +56,14 @@ class Ht2(nn.Module):
         last = frames[..., self.place : self.place + self.actions]
         return torch.cat([frames[..., : self.place], frames[..., self.place + self.actions :]], -1), last
 
-    def forward(self, frames, missing):
-        """frames: [rows][tokens][observation], oldest first; missing: [rows][tokens] bool, the action before is not known."""
+    def embed(self, frames, missing):
         rest, last = self.split(frames)
         action = torch.where(missing[..., None], self.mask, self.embed_action(last))
-        x = self.embed_observation(rest) + action + self.position[: frames.shape[1]]
+        return self.embed_observation(rest) + action + self.position[: frames.shape[1]]
+
+    def forward(self, frames, missing):
+        """frames: [rows][tokens][observation], oldest first; missing: [rows][tokens] bool, the action before is not known."""
+        x = self.embed(frames, missing)
         for layer in self.layers:
             x = layer(x)
         return self.norm(x)
@@ -54,9 +72,10 @@ class Ht2(nn.Module):
         """Mean actions of contexts whose newest frame is number `seen` (from 1) of its episode; frames behind it do not matter."""
         tokens = torch.arange(frames.shape[1], device=frames.device)
         missing = (tokens == 0) & (seen <= self.context)[:, None]
-        x = self(frames, missing)
-        newest = seen.clamp(max=self.context) - 1
-        return self.action(x[torch.arange(len(x), device=x.device), newest])
+        x = self.embed(frames, missing)
+        for layer in self.layers[:-1]:
+            x = layer(x)
+        return self.action(self.norm(self.layers[-1].newest(x, seen.clamp(max=self.context) - 1)))
 
 
 def save(path, state, heads, layers, note):

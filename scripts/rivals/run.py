@@ -23,7 +23,7 @@ def options(text, minutes):
     parser.add_argument("--out", required=True, type=pathlib.Path, help="folder to write to")
     parser.add_argument("--minutes", type=float, default=minutes, help=f"[min] of training (default {minutes:g})")
     parser.add_argument("--iterations", type=int, default=0, help="stop after so many; 0: no limit")
-    parser.add_argument("--envs", type=int, default=8192, help="environments (default 8192)")
+    parser.add_argument("--envs", type=int, default=8192, help="environments (default 2048 for clock, 4096 for ht2)")
     parser.add_argument("--device", default="cuda", help="cuda, cuda:N or cpu (default cuda)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--go-on", type=pathlib.Path, help="state.pt of an earlier run: only the last phase is trained, from there")

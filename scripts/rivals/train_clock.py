@@ -19,17 +19,17 @@ import run
 HOLD = (2, 3)  # policy periods of 10 ms that decisions last in turn: 40 Hz
 SMOOTHING = 0.5  # share of the new action
 MIRROR_WEIGHT, MIRROR_SHARE = 1.0, 0.25
-FORWARD = {"task__vx": [0, 1.3], "task__vy": [0, 0]}  # commands
+FORWARD = {"task__vx": [0, 1.5], "task__vy": [0, 0]}  # commands
 # [s] solref of the rigid contact, which sinks by up to 80 mm under the robot at 0.4
 STIFFER, COMPLIANT = {"randomize__rigid_time": [0.02, 0.1]}, {"randomize__rigid_time": [0.02, 0.4]}
 # (share of the run at which it ends, keys): a gait, softer and softer ground, then the whole task on uneven ground
 PHASES = (
-    (0.40, {**FORWARD, **run.GAIT, "reward__tracking_sharpness": 3}),
-    (0.60, {**FORWARD, **run.GAIT, **STIFFER}),
-    (0.80, {**FORWARD, **run.GAIT, **COMPLIANT}),
+    (0.25, {**FORWARD, **run.GAIT, "reward__tracking_sharpness": 3}),
+    (0.35, {**FORWARD, **run.GAIT, **STIFFER}),
+    (0.50, {**FORWARD, **run.GAIT, **COMPLIANT}),
     (1.00, {**FORWARD, **COMPLIANT, "task__assist": 0}),
 )
-SETTINGS = ppo.Settings(steps=24, gamma=0.99, decay=0.95, std=0.6, std_min=0.25, kl_target=0.015)
+SETTINGS = ppo.Settings(steps=24, gamma=0.99, decay=0.95, std=0.6, std_min=0.25, rate_max=2e-3, kl_target=0.015)
 
 
 def make_actor(observation, actions):
@@ -125,4 +125,6 @@ def train(arguments):
 
 
 if __name__ == "__main__":
-    train(run.options(__doc__, 8).parse_args())
+    parser = run.options(__doc__, 8)
+    parser.set_defaults(envs=2048)
+    train(parser.parse_args())

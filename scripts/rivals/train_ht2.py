@@ -94,7 +94,8 @@ def regression(net, memory, actions, scale, rows):
     return loss, (following * error**2).sum() / (following.sum() * rest.shape[-1])
 
 
-def pretrain(arguments, device, autocast):
+def pretrain(arguments, progress, device, autocast):
+    """Of --pretrain steps, or as many as --imitation has time for."""
     envs = run.open_envs(arguments, FLAT)
     start = time.time()
     memory, actions = record(envs, arguments.record, arguments.teacher)
@@ -104,20 +105,25 @@ def pretrain(arguments, device, autocast):
     net = ht2.Ht2(shape.observation, shape.actions).to(device)
     print(f"{sum(p.numel() for p in net.parameters())} parameters", flush=True)
     scale = net.split(memory.frame[ht2.CONTEXT :])[0].flatten(0, 1).std(0) + 0.01
-    steps = arguments.pretrain
     optimizer = torch.optim.AdamW(net.parameters(), lr=RATE, weight_decay=0.01, fused=device.type == "cuda")
     rows = min(BATCH, 64 * memory.envs)
-    for step in range(steps):
+    step, begun, shown = 0, progress.share(), 0.0
+    while True:
+        done = (progress.share() - begun) / max(arguments.imitation - begun, 1e-6) if arguments.imitation else step / arguments.pretrain
+        if done >= 1:
+            break
         for group in optimizer.param_groups:
-            group["lr"] = RATE * min(1, (step + 1) / 100) * 0.5 * (1 + math.cos(math.pi * step / steps))
+            group["lr"] = RATE * min(1, (step + 1) / 100) * 0.5 * (1 + math.cos(math.pi * done))
         with autocast():
             action, frame = regression(net, memory, actions, scale, rows)
         optimizer.zero_grad(set_to_none=True)
         (action + 0.1 * frame).backward()
         nn.utils.clip_grad_norm_(net.parameters(), 1.0)
         optimizer.step()
-        if step % (steps // 10 or 1) == 0 or step == steps - 1:
+        if done >= shown:
             print(f"{time.time() - start:6.0f} s  step {step:5d}  action {action.item():.5f}  frame {frame.item():.4f}", flush=True)
+            shown += 0.1
+        step += 1
     return net
 
 
@@ -170,7 +176,7 @@ def train(arguments):
     if arguments.go_on:
         net = ht2.Ht2(envs.shape.observation, envs.shape.actions).to(device)
     else:
-        net = pretrain(arguments, device, autocast)
+        net = pretrain(arguments, progress, device, autocast)
         ht2.save(arguments.out / "ht2_first_stage.safetensors", net.state_dict(), ht2.HEADS, ht2.LAYERS,
                  "stage 1 of scripts/rivals/train_ht2.py")
     learner = Learner(net, envs, device, autocast, run.tuned(arguments, SETTINGS))
@@ -199,4 +205,5 @@ if __name__ == "__main__":
     parser.add_argument("--teacher", type=pathlib.Path, default=run.ROOT / "policies/mild.safetensors",
                         help="the earlier policy (default: the shipped one)")
     parser.add_argument("--pretrain", type=int, default=3000, help="gradient steps of stage 1 (default 3000)")
+    parser.add_argument("--imitation", type=float, default=0.0, help="share of --minutes after which stage 1 ends, in the place of --pretrain")
     train(parser.parse_args())
