@@ -148,9 +148,9 @@ static __global__ void __launch_bounds__(THREADS, ENGINE_BLOCKS)
                 const __grid_constant__ BatchShape shape,
                 const __grid_constant__ BatchArrays arrays, int steps) {
     extern __shared__ __align__(16) Real shared[];
-    __shared__ ground_Shared contact[SOFT ? ENGINE_WARPS : 1];
     const int warp = threadIdx.x / LANES;
-    Workplace *place = (Workplace *)shared + warp;
+    ground_Shared_map *contact = (ground_Shared_map *)shared; /* the larger one; on soft ground */
+    Workplace *place = (Workplace *)(contact + (SOFT ? ENGINE_WARPS : 0)) + warp;
     const long robot = (long)blockIdx.x * ENGINE_WARPS + warp;
     const EngineTree *tree = &model->tree;
     if (robot >= robots.count) {
@@ -167,7 +167,8 @@ static __global__ void __launch_bounds__(THREADS, ENGINE_BLOCKS)
     for (int k = 0; k < steps && !bad; k++) {
         if (SOFT) {
             bad = step_soft<MAP>(model, &robots, &setup, problem, robot,
-                                 batch_memory(&shape, &arrays, robot), &contact[warp], place);
+                                 batch_memory(&shape, &arrays, robot),
+                                 (ground_Shared *)(contact + warp), place);
         } else {
             bad = step(model, &robots, MAP ? &setup.map : NULL, robot, place);
         }
@@ -183,7 +184,9 @@ size_t engine_shared_bytes(void) {
     return sizeof(Workplace);
 }
 
-static const size_t block_bytes = ENGINE_WARPS * sizeof(Workplace);
+static size_t block_bytes(int soft) {
+    return ENGINE_WARPS * (sizeof(Workplace) + (soft ? sizeof(ground_Shared_map) : 0));
+}
 
 typedef void (*Kernel)(const EngineModel *model, EngineRobots robots, ContactSetup setup,
                        BatchShape shape, BatchArrays arrays, int steps);
@@ -194,7 +197,7 @@ static cudaError_t kernel_of(int soft, int map, Kernel *kernel) {
                                          {step_robots<1, 0>, step_robots<1, 1>}};
     *kernel = kernels[soft != 0][map != 0];
     return cudaFuncSetAttribute(*kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                                (int)block_bytes);
+                                (int)block_bytes(soft));
 }
 
 cudaError_t engine_kernel_facts(int soft, int map, cudaFuncAttributes *facts, int *robots_at_once) {
@@ -202,8 +205,8 @@ cudaError_t engine_kernel_facts(int soft, int map, cudaFuncAttributes *facts, in
     int blocks = 0;
     cudaError_t status = kernel_of(soft, map, &kernel);
     if (status == cudaSuccess) {
-        status =
-            cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, THREADS, block_bytes);
+        status = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, THREADS,
+                                                               block_bytes(soft));
     }
     *robots_at_once = blocks * ENGINE_WARPS;
     return status == cudaSuccess ? cudaFuncGetAttributes(facts, kernel) : status;
@@ -231,6 +234,7 @@ cudaError_t engine_step_robots(const EngineModel *model, const EngineRobots *rob
     if (status != cudaSuccess) {
         return status;
     }
-    kernel<<<blocks, THREADS, block_bytes, stream>>>(model, *robots, setup, shape, arrays, steps);
+    kernel<<<blocks, THREADS, block_bytes(robots->ground != NULL), stream>>>(model, *robots, setup,
+                                                                             shape, arrays, steps);
     return cudaGetLastError();
 }
