@@ -33,9 +33,13 @@ def clock(function, count, device):
     return 1e3 * (time.perf_counter() - begin) / count
 
 
+def task_of(robot):
+    return f"Mjlab-Velocity-Flat-Unitree-{robot}"
+
+
 class Case:
     def __init__(self, name, given):
-        config = load_env_cfg(f"Mjlab-Velocity-Flat-Unitree-{given.robot}") if name == "rigid" else config_of(given.robot)
+        config = load_env_cfg(task_of(given.robot)) if name == "rigid" else config_of(given.robot)
         config.scene.num_envs = given.envs
         if name == "none":
             del config.events["ground"]
@@ -43,8 +47,8 @@ class Case:
         if name == "none":
             wp.to_torch(self.env.sim.wp_model.opt.gravity).zero_()
         self.wrapped = RslRlVecEnvWrapper(self.env)
-        agent = dataclasses.asdict(load_rl_cfg(task)) | {"logger": "tensorboard"}
-        runner = load_runner_cls(task)(self.wrapped, agent, None, given.device)
+        agent = dataclasses.asdict(load_rl_cfg(task_of(given.robot))) | {"logger": "tensorboard"}
+        runner = load_runner_cls(task_of(given.robot))(self.wrapped, agent, None, given.device)
         if given.policy:
             runner.load(given.policy)
         self.policy, self.observations = runner.get_inference_policy(given.device), self.wrapped.get_observations()

@@ -458,12 +458,10 @@ TEAM_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work, int heap)
             halved++;
             continue;
         }
-        const int vain = steps > 1 && !(residual < wanted);
         halved = 0;
         way = 1;
         at_residual = residual;
-        const int rounds = vain && residual <= CONTACT_ROUNDS * setup->tolerance * scale;
-        const int solved = rounds || (steps > 0 && residual <= setup->tolerance * scale);
+        const int solved = steps > 0 && residual <= setup->tolerance * scale;
         if (steps > 0 && (least < 0 || residual < least)) {
             least = residual;
             relative = scale > 0 ? residual / scale : residual;

@@ -17,7 +17,6 @@
 #define CONTACT_FEET_MAX 4
 #define CONTACT_PADDING REAL(-1e3) /* [m] depth of elements that a foot does not have */
 #define CONTACT_HALVINGS 6         /* of one Newton step */
-#define CONTACT_ROUNDS 10          /* [-] residual over the tolerance that may be rounding */
 
 /* What a step needs of a material under one element of a foot. */
 typedef struct {
@@ -102,10 +101,29 @@ MILD_HD int contact_memory_numbers(int elements, int map) {
     return map ? elements * CONTACT_MAP_MEMORY + CONTACT_FOOT_MEMORY : elements * CONTACT_MEMORY;
 }
 
-/* Four numbers, which a lane reads and writes at once. */
+/* What a step knows of an element besides its material, in parts of four numbers, each of which a
+ * lane reads at once. The numbers are those of Element. */
+#define CONTACT_PART __attribute__((aligned(4 * sizeof(Real))))
 typedef struct {
-    Real a, b, c, d;
-} __attribute__((aligned(4 * sizeof(Real)))) ContactQuad;
+    Real depth, middle, yield_depth, zero_depth;
+} CONTACT_PART ContactPath;
+typedef struct {
+    Real unload_stiffness, added_mass, front_speed, yield_speed;
+} CONTACT_PART ContactFront;
+typedef struct {
+    Real entry_speed, stop_drag, stop_growth, explicit_impulse;
+} CONTACT_PART ContactStop;
+typedef struct {
+    Real hold_x, hold_y, hold_stiffness, drift_bound;
+} CONTACT_PART ContactHold;
+typedef struct {
+    Real slope_x, slope_y; /* [-] gradient of the ground under the element */
+    Real material, label;  /* whole numbers */
+} CONTACT_PART ContactSurface;
+typedef struct {
+    Real mu, line_stiffness, virgin_depth; /* as its motion so far has made them */
+    Real carry;                            /* [-] of Share */
+} CONTACT_PART ContactOwnLaw;
 
 /* Velocity of an element, along the world's axes. descent: speed at which its depth grows. */
 typedef struct {
