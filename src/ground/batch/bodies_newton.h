@@ -263,19 +263,14 @@ TEAM_FN void bodies_residual(BodiesWork *work, int rows, const BodiesPoint *poin
  * far larger. From body to body 1 + H A stays away from singular, but not from row to row: where
  * a body's forces turn its origin against them the diagonal passes through 0. */
 MILD_HD int bodies_pivot(const Real *matrix, int stride, int k) {
-    const int first = k - k % 6;
-    Real size[6], most = 0;
+    const int end = k - k % 6 + 6;
+    Real most = BODIES_GROWTH * REAL_ABS(matrix[k * stride + k]);
     int chosen = k;
     LANE_UNROLL
-    for (int i = 0; i < 6; i++) {
-        size[i] = first + i < k ? 0 : REAL_ABS(matrix[(first + i) * stride + k]);
-        most = real_max(most, size[i]);
-    }
-    if (most > BODIES_GROWTH * REAL_ABS(matrix[k * stride + k])) {
-        LANE_UNROLL
-        for (int i = 5; i >= 0; i--) {
-            chosen = size[i] == most ? first + i : chosen;
-        }
+    for (int r = k + 1; r < k + 6; r++) { /* as many for every k, so that no read waits */
+        const Real size = r < end ? REAL_ABS(matrix[r * stride + k]) : 0;
+        chosen = size > most ? r : chosen;
+        most = real_max(size, most);
     }
     return chosen;
 }
