@@ -10,6 +10,8 @@ import subprocess
 import sys
 import tempfile
 
+from stand_in import program
+
 mild, root = (pathlib.Path(name).resolve() for name in sys.argv[1:3])
 record = root / "scripts/record.py"
 
@@ -57,14 +59,6 @@ esac
 work = pathlib.Path(tempfile.mkdtemp())
 
 
-def program(name, text):
-    path = work / name
-    path.parent.mkdir(exist_ok=True)
-    path.write_text(text)
-    path.chmod(0o755)
-    return path
-
-
 def run(*words, code=0, **variables):
     done = subprocess.run([sys.executable, record, *map(str, words)], capture_output=True, text=True, check=False,
                           env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **variables})
@@ -107,8 +101,8 @@ def fits(out):
     assert told.returncode == 0 and not told.stdout, told.stdout
 
 
-made, peers = program("mild", MILD), program("python", PYTHON)
-program("bin/nvidia-smi", SMI)
+made, peers = program(work, "mild", MILD), program(work, "python", PYTHON)
+program(work, "bin/nvidia-smi", SMI)
 with_gpu = {"PATH": f"{work / 'bin'}:{os.environ['PATH']}"}
 no_gpu = {"PATH": os.environ["PATH"]}
 

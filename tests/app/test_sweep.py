@@ -12,6 +12,8 @@ import subprocess
 import sys
 import tempfile
 
+from stand_in import program
+
 root = pathlib.Path(sys.argv[1]).resolve()
 sweep = root / "scripts/paper/sweep.py"
 work = pathlib.Path(tempfile.mkdtemp())
@@ -64,18 +66,10 @@ for i in range(last + 1):
 '''
 
 
-def program(name, text):
-    path = work / name
-    path.parent.mkdir(exist_ok=True)
-    path.write_text(text)
-    path.chmod(0o755)
-    return path
-
-
-program("mild", MILD)
-program("bin/sbatch", SBATCH)
+program(work, "mild", MILD)
+program(work, "bin/sbatch", SBATCH)
 if not shutil.which("parallel"):
-    program("bin/parallel", PARALLEL)
+    program(work, "bin/parallel", PARALLEL)
 calls = work / "calls"
 common = {**os.environ, "MILD": str(work / "mild"), "CALLS": str(calls), "PYTHONDONTWRITEBYTECODE": "1", "SUBMITTED": str(work / "submitted"),
           "PATH": f"{work / 'bin'}:{os.environ['PATH']}"}
