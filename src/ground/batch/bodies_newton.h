@@ -290,10 +290,13 @@ TEAM_FN void bodies_swap(Real *matrix, int stride, int k, int other) {
 }
 
 /* Column j of a warp's rows, BODIES_FEW at a time, less their factors times the pivot's row. The
- * reads are before the writes, so that they do not wait for each other. */
+ * reads are before the writes, so that they do not wait for each other. A factor is rounded once
+ * for its whole row, which is then still a row of the same equations: with the pivot's row divided
+ * in its place the error of each number grows with that row over its pivot, and Newton's method
+ * ends at half of the residual on a Go1 that comes down in loose sand. */
 MILD_HD void bodies_subtract(Real *matrix, int rows, int k, int j, Real inverse) {
     const int stride = rows + 1;
-    const Real pivot = matrix[k * stride + j] * inverse;
+    const Real pivot = matrix[k * stride + j];
     LANE_ROLLED
     for (int from = TEAM_WARP; from < rows; from += BODIES_FEW * TEAM_WARPS) {
         Real factor[BODIES_FEW], entry[BODIES_FEW];
@@ -301,7 +304,7 @@ MILD_HD void bodies_subtract(Real *matrix, int rows, int k, int j, Real inverse)
         for (int i = 0; i < BODIES_FEW; i++) {
             const int r = from + i * TEAM_WARPS;
             const int in = r < rows && r != k;
-            factor[i] = in ? matrix[r * stride + k] : 0;
+            factor[i] = in ? matrix[r * stride + k] * inverse : 0;
             entry[i] = in ? matrix[r * stride + j] : 0;
         }
         LANE_UNROLL
