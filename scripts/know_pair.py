@@ -12,8 +12,16 @@ import sys
 import numpy as np
 
 
+def rows_of(file):
+    try:
+        with open(file, encoding="utf-8") as text:
+            return json.load(text)["walks"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        return sys.exit(f"know_pair.py: {file} is no file of mild know --json: {error!r}")
+
+
 def walks(files):
-    rows = [row for file in files for row in json.load(open(file, encoding="utf-8"))["walks"]]
+    rows = [row for file in files for row in rows_of(file)]
     number = {name: np.array([np.nan if row[name] is None else row[name] for row in rows], float) for name in ("fell", "asked", "speed", "cost")}
     return {**number, "error": np.abs(number["speed"] - number["asked"])}
 

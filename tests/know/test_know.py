@@ -122,6 +122,7 @@ def cared(folder):
     row = json.loads((folder / "eval.json").read_text())["rows"][0]
     speed, cost = (np.mean([walk[name] for walk in found]) for name in ("speed", "cost"))
     assert abs(speed / row["velocity"] - 1) < 0.03 and abs(cost / row["cot"] - 1) < 0.1, (speed, cost, row["velocity"], row["cot"])
+    assert len({walk["speed"] for walk in found} | {0.6}) == len(found) + 1, found  # each its own, and none what was asked
     assert all(walk["asked"] == 0.6 and not walk["fell"] and abs(walk["seconds"] - 10) < 0.011 for walk in found), found
     return f"rubber: {speed:.3f} m/s at {cost:.3f}, mild eval {row['velocity']:.3f} at {row['cot']:.3f}"
 
