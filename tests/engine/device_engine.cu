@@ -221,8 +221,8 @@ static int compare(const DeviceRobot &robot, const EngineModel *model, int rigid
                        : "in the air,",
                count, name[k], worst[k].qacc, worst[k].A, worst[k].qvel, worst[k].qpos);
     }
-    printf("              %d beyond 1e-4 of double, %d bad, %d with legs in each other left out\n", off,
-           bad, deep);
+    printf("              %d beyond 1e-4 of double, %d bad, %d with legs in each other left out\n",
+           off, bad, deep);
     free_robots(&robots);
     batch_map_close(&view, 0);
     return bad == 0 && (map ? off <= count / 100 : worst[0].qacc < (rigid ? 1e-3 : 1e-4));
