@@ -198,7 +198,25 @@ def stops(folder, *words):
         assert stopped.code == 2, stopped
 
 
+def shipped():
+    """docs/factorial: of the budget and config that docs/paper.md names, and each skill is that of its cells."""
+    found = factorial.Factorial(factorial.parse([str(root / "docs/factorial"), "--minutes", "3", "--jobs", "2"]))
+    texts = found.file.read_text(encoding="utf-8").splitlines()
+    assert texts and len(found.lines) == len(texts), "docs/factorial/results.jsonl: lines of other settings than configs/factorial.ini and --jobs 2"
+    judged = [line for line in found.lines if line["done"] == "judged"]
+    assert len({json.dumps(line["task"]) for line in judged}) == len(judged) == len(texts) / 2
+    for line in judged:
+        where = f"docs/factorial/results.jsonl: {line['task']}"
+        assert found.known("trained", line["task"]), where
+        assert line["skill"].keys() == line["cells"].keys(), where
+        assert all(abs(factorial.skill(cells) - line["skill"][part]) < 1e-12 for part, cells in line["cells"].items()), where
+        assert "score" not in line or abs(line["score"] - factorial.score(line["cells"]["tuning"])) < 1e-12, where
+    chosen = found.choices()
+    assert all(x["task"]["choice"] == chosen[x["task"]["controller"]] for x in judged if x["task"]["kind"] == "train")
+
+
 measures()
+shipped()
 all_of_it()
 in_pieces()
 what_stops()

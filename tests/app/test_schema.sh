@@ -65,6 +65,6 @@ side=("$mild" eval --ground grass --speed 0.5 --sideways 0.1 --seconds 5)
 "${side[@]}" --trials 2 --json two.json --stances stances.csv --track track.csv >two.txt || fail "eval of two trials"
 "${side[@]}" --trials 1 --json first.json >/dev/null || fail "eval of one trial"
 "$mild" eval --ground grass --turn 0.3 --trials 1 --seconds 4 --json turn.json >turn.txt || fail "eval --turn"
-python3 "$source/tests/app/numbers.py" two.txt two.json stances.csv track.csv first.json turn.txt turn.json || fail "numbers of eval --json"
+python3 "$source/tests/app/eval_numbers.py" two.txt two.json stances.csv track.csv first.json turn.txt turn.json || fail "numbers of eval --json"
 
 finish "every JSON fits its schema"

@@ -91,7 +91,7 @@ EngineCase device_case(int rigid, const MildMap *map, uint32_t draw) {
     if (!rigid) {
         in = random_case(robot, draw);
         memset(in.wrench, 0, sizeof in.wrench);
-        memset(in.qacc, 0, sizeof in.qacc); /* as engine_load has it */
+        memset(in.qacc, 0, sizeof in.qacc); /* engine_load begins without one */
         return in;
     }
     in = rigid_case(sim, map, draw % 4 < 2 ? draw : draw - 2); /* others are on a slope */

@@ -6,6 +6,8 @@
  * Compiled for one robot (the definitions of engine_model_sizes) or for any. Errors of qacc are
  * relative to the largest acceleration of their kind (base, joints) of that state. Exit 1 when one
  * is above 1e-4 in the air or 1e-3 on rigid ground, where a state may lie on the edge of a contact.
+ * In the air it may also be twice what float on the processor is off: where random poses put legs
+ * deep into each other that is up to 3.2e-4. Errors of A are relative to its largest entry, 2e-5.
  */
 #define MILD_REAL_FLOAT
 #include <cmath>
@@ -155,14 +157,17 @@ static Answers answers_of(const DeviceRobot &robot, const EngineRobots &robots) 
     return all;
 }
 
+static double qacc_error(const DeviceRobot &robot, const float *got, const EngineResult &want) {
+    const double *a = want.acceleration;
+    const double base = fmax(relative(got, a, 0, 3), relative(got, a, 3, 6));
+    return fmax(base, relative(got, a, 6, 6 + robot.tree.joints));
+}
+
 /* Robot i against the host. Returns the error of qacc. */
 static double note_robot(const DeviceRobot &robot, const Answers &got, const EngineResult &want,
                          int i, Errors *worst) {
     const int dofs = 6 + robot.tree.joints, rows = 36 * robot.tree.feet * robot.tree.feet;
-    const float *a = &got.qacc[(size_t)i * dofs];
-    const double base =
-        fmax(relative(a, want.acceleration, 0, 3), relative(a, want.acceleration, 3, 6));
-    const double error = fmax(base, relative(a, want.acceleration, 6, dofs));
+    const double error = qacc_error(robot, &got.qacc[(size_t)i * dofs], want);
     note(&worst->qacc, error);
     note(&worst->qvel, relative(&got.qvel[(size_t)i * dofs], want.qvel, 0, dofs));
     note(&worst->qpos, relative(&got.qpos[(size_t)i * (1 + dofs)], want.qpos, 0, 1 + dofs));
@@ -200,18 +205,20 @@ static int compare(const DeviceRobot &robot, const EngineModel *model, int rigid
     check(cudaDeviceSynchronize(), "step");
     const Answers got = answers_of(robot, robots);
     Errors worst[2] = {};
-    int bad = 0, off = 0, deep = 0;
+    double excess = 0; /* of qacc against double over what it may be */
+    int bad = 0, off = 0;
     for (int i = 0; i < count; i++) {
+        static EngineResult want[2];
+        double error[2];
         bad += got.bad[i];
         for (int k = 0; k < 2; k++) {
-            static EngineResult want;
-            text[k](&robot.tree, robot.number, &cases[i], &want);
-            if (want.leg_distance < -LEGS_DEEP) {
-                deep += k == 0;
-                continue;
-            }
-            off += !(note_robot(robot, got, want, i, &worst[k]) < 1e-4) && k == 0;
+            text[k](&robot.tree, robot.number, &cases[i], &want[k]);
+            error[k] = note_robot(robot, got, want[k], i, &worst[k]);
         }
+        const std::vector<float> host(want[1].acceleration,
+                                      want[1].acceleration + 6 + robot.tree.joints);
+        off += !(error[0] < 1e-4);
+        note(&excess, error[0] / fmax(1e-4, 2 * qacc_error(robot, host.data(), want[0])));
     }
     for (int k = 0; k < 2; k++) {
         printf("%-13s %d states, device against %-6s: worst qacc %.1e  A %.1e  qvel after %.1e  "
@@ -221,11 +228,13 @@ static int compare(const DeviceRobot &robot, const EngineModel *model, int rigid
                        : "in the air,",
                count, name[k], worst[k].qacc, worst[k].A, worst[k].qvel, worst[k].qpos);
     }
-    printf("              %d beyond 1e-4 of double, %d bad, %d with legs in each other left out\n",
-           off, bad, deep);
+    printf("              %d beyond 1e-4 of double, %d bad\n", off, bad);
     free_robots(&robots);
     batch_map_close(&view, 0);
-    return bad == 0 && (map ? off <= count / 100 : worst[0].qacc < (rigid ? 1e-3 : 1e-4));
+    return bad == 0 && worst[0].A < 2e-5 &&
+           (map     ? off <= count / 100
+            : rigid ? worst[0].qacc < 1e-3
+                    : excess < 1);
 }
 
 /* ---- soft ground ---- */

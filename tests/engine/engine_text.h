@@ -5,10 +5,6 @@
 
 #include "robot/engine/read.h"
 
-/* [m] Random poses put legs into each other, which no motion does. Where axes nearly meet, float
- * does not have their normal. */
-#define LEGS_DEEP 0.01
-
 /* State and everything that acts on it in one step. Joints in the order of robot.ini. */
 typedef struct {
     double qpos[ROBOT_NQ_MAX];

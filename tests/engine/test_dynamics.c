@@ -22,6 +22,10 @@
 #define LIMIT_HELD 1e-3   /* of N in float: 1/R of a limit that is exceeded by a ten thousandth */
 #define LIMIT_WRENCH 1e-3 /* of rigid ground in float: small differences of stiff rows */
 
+/* [m] Random poses put legs into each other, which no motion does. Where axes nearly meet, float
+ * does not have their normal. */
+#define LEGS_DEEP 0.01
+
 /* ---- robots ---- */
 
 typedef struct {

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds the numbers of `mild eval --json` to what the program says elsewhere: numbers.py TABLE JSON STANCES TRACK FIRST TURN TURN_JSON.
+"""Holds the numbers of `mild eval --json` to what the program says elsewhere: eval_numbers.py TABLE JSON STANCES TRACK FIRST TURN TURN_JSON.
 Table and JSON of two trials, their stances and track as CSV, JSON of the first trial alone, table and JSON of a walk that turns."""
 import csv
 import json
