@@ -2,8 +2,28 @@
 #include "learn/cuda/learner_private.h"
 #include "learn/ppo_gradient.h"
 
-size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int rows, int mirrored, float *block,
-                       GpuChunk *c) {
+static void *carve(char *block, size_t *used, size_t bytes) {
+    void *at = block ? block + *used : NULL;
+    *used += (bytes + 255) / 256 * 256;
+    return at;
+}
+
+static GpuArray carve_array(int bf16, int rows, size_t width, char *block, size_t *used) {
+    const size_t bytes = gpu_array_bytes(bf16, (size_t)rows * width);
+    const GpuArray array = {carve(block, used, bytes), bf16};
+    return array;
+}
+
+static void carve_outputs(const Mlp *mlp, int bf16, int rows, char *block, size_t *used,
+                          GpuOutputs *outputs) {
+    for (int l = 0; l < mlp->layers; l++) {
+        outputs->y[l] =
+            carve_array(bf16 && l < mlp->layers - 1, rows, (size_t)mlp->layer[l].out, block, used);
+    }
+}
+
+size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int bf16, int rows, int mirrored,
+                       char *block, GpuChunk *c) {
     size_t used = 0, widest = 0;
     const int all = rows + mirrored;
     for (int i = 0; i < NETWORK_MLPS; i++) {
@@ -12,16 +32,24 @@ size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int rows, int mirro
         widest = width > widest ? width : widest;
     }
     const struct {
-        float **at;
+        GpuArray *at;
         int rows;
         size_t width;
-    } areas[] = {
+    } arrays[] = {
         {&c->history, all, (size_t)w->history},
         {&c->critic, rows, (size_t)n->critic.layer[0].in},
-        {&c->noise, all, (size_t)w->latent},
         {&c->feet, all, (size_t)w->feet},
         {&c->actor_input, all, (size_t)w->actor_input},
         {&c->decoder_input, rows, (size_t)w->decoder_input},
+        {&c->work[0], all, widest},
+        {&c->work[1], all, widest},
+    };
+    const struct {
+        float **at;
+        int rows;
+        size_t width;
+    } floats[] = {
+        {&c->noise, all, (size_t)w->latent},
         {&c->spread, rows, (size_t)w->latent},
         {&c->d_mean, all, (size_t)w->action},
         {&c->d_log_std, rows, (size_t)w->action},
@@ -32,24 +60,31 @@ size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int rows, int mirro
         {&c->d_decoded, rows, (size_t)w->decoded},
         {&c->d_decoder_input, rows, (size_t)w->decoder_input},
         {&c->d_value, rows, (size_t)w->value},
-        {&c->work[0], all, widest},
-        {&c->work[1], all, widest},
     };
-    for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
-        *areas[i].at = mlp_carve(block, &used, (size_t)areas[i].rows * areas[i].width);
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
+        *arrays[i].at = carve_array(bf16, arrays[i].rows, arrays[i].width, block, &used);
     }
-    mlp_carve_outputs(&n->encoder, all, block, &used, &c->encoder);
-    mlp_carve_outputs(&n->modulation, all, block, &used, &c->modulation);
-    mlp_carve_outputs(&n->actor, all, block, &used, &c->actor);
-    mlp_carve_outputs(&n->decoder, rows, block, &used, &c->decoder);
-    mlp_carve_outputs(&n->critic, rows, block, &used, &c->value);
+    for (size_t i = 0; i < sizeof floats / sizeof *floats; i++) {
+        *floats[i].at = carve_array(0, floats[i].rows, floats[i].width, block, &used).at;
+    }
+    carve_outputs(&n->encoder, bf16, all, block, &used, &c->encoder);
+    carve_outputs(&n->modulation, bf16, all, block, &used, &c->modulation);
+    carve_outputs(&n->actor, bf16, all, block, &used, &c->actor);
+    carve_outputs(&n->decoder, bf16, rows, block, &used, &c->decoder);
+    carve_outputs(&n->critic, bf16, rows, block, &used, &c->value);
     return used;
+}
+
+void gpu_enqueue_weights(GpuLearner *g) {
+    if (g->queue.weights.bf16) {
+        gpu_round(g->queue.stream, g->network.count, g->parameters, g->queue.weights);
+    }
 }
 
 /* ---- forward ---- */
 
-static float *last_of(const Mlp *mlp, const MlpOutputs *outputs) {
-    return outputs->y[mlp->layers - 1];
+static float *last_of(const Mlp *mlp, const GpuOutputs *outputs) {
+    return outputs->y[mlp->layers - 1].at;
 }
 
 /* Of the actor's z; NULL: z = mu. */
@@ -138,7 +173,7 @@ static void gather(GpuLearner *g, const ChunkJob *job) {
                                   n->history,  job->at,         job->order,
                                   job->which,  g->mirror_index, g->mirror_sign};
         gpu_mirror_history(stream, images, g->batch.history,
-                           c->history + (size_t)c->rows * (size_t)n->history);
+                           gpu_array_from(c->history, (size_t)c->rows * (size_t)n->history));
     }
     if (g->ppo->def.sample_latent) {
         const GpuSampled sampled = {.rows = c->rows,
@@ -177,8 +212,9 @@ static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean)
                             .d_mean = c->d_mean,
                             .d_log_std = c->d_log_std};
     gpu_surrogate(g->queue.stream, s, c->rows, g->sums);
-    gpu_bias_backward(g->queue.stream, c->rows, pitch, NULL, s.d_log_std, g->queue.partial,
-                      job->beta, g->gradient + g->network.log_std);
+    const GpuArray none = {0};
+    gpu_bias_backward(g->queue.stream, c->rows, pitch, none, gpu_array_float(s.d_log_std), none,
+                      g->queue.partial, job->beta, g->gradient + g->network.log_std);
     if (c->mirrored > 0) {
         const size_t images = (size_t)c->rows * (size_t)pitch;
         const int observation = g->network.def.observation;
@@ -217,14 +253,14 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
     gpu_reconstruction(q->stream, w, rows, 2.0f * epsilon, job->order, g->batch.frame,
                        g->batch.critic, decoded, c->d_decoded, g->sums);
 
-    gpu_mlp_backward(q, &n->decoder, g->parameters, rows, c->decoder_input, &c->decoder,
-                     c->d_decoded, c->work, g->gradient, beta, c->d_decoder_input);
-    gpu_mlp_backward(q, &n->actor, g->parameters, all, c->actor_input, &c->actor, c->d_mean,
-                     c->work, g->gradient, beta, c->d_actor_input);
+    gpu_mlp_backward(q, &n->decoder, rows, c->decoder_input, &c->decoder, c->d_decoded, c->work,
+                     g->gradient, beta, c->d_decoder_input);
+    gpu_mlp_backward(q, &n->actor, all, c->actor_input, &c->actor, c->d_mean, c->work, g->gradient,
+                     beta, c->d_actor_input);
     gpu_modulation_backward(q->stream, w, all, heads, actor_noise(g), theta, c->d_actor_input,
                             c->d_heads, c->d_theta);
-    gpu_mlp_backward(q, &n->modulation, g->parameters, all, c->feet, &c->modulation, c->d_theta,
-                     c->work, g->gradient, beta, c->d_feet);
+    gpu_mlp_backward(q, &n->modulation, all, c->feet, &c->modulation, c->d_theta, c->work,
+                     g->gradient, beta, c->d_feet);
     const GpuHeads h = {.estimate_weight = 2.0f * epsilon,
                         .latent_weight = epsilon * (float)def->kl_weight,
                         .free_bits = (float)def->free_bits,
@@ -238,8 +274,8 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
                         .d_decoder_input = c->d_decoder_input,
                         .d_heads = c->d_heads};
     gpu_heads_backward(q->stream, w, h, rows, all, g->sums);
-    gpu_mlp_backward(q, &n->encoder, g->parameters, all, c->history, &c->encoder, c->d_heads,
-                     c->work, g->gradient, beta, NULL);
+    gpu_mlp_backward(q, &n->encoder, all, c->history, &c->encoder, c->d_heads, c->work, g->gradient,
+                     beta, NULL);
 }
 
 /* As loss_critic. */
@@ -259,8 +295,8 @@ static void critic_half(GpuLearner *g, const ChunkJob *job) {
             gpu_mlp_forward(&g->queue, &n->critic, g->parameters, c->rows, c->critic, &c->value),
         .d = c->d_value};
     gpu_value_loss(g->queue.stream, v, c->rows, g->sums);
-    gpu_mlp_backward(&g->queue, &n->critic, g->parameters, c->rows, c->critic, &c->value,
-                     c->d_value, c->work, g->gradient, job->beta, NULL);
+    gpu_mlp_backward(&g->queue, &n->critic, c->rows, c->critic, &c->value, c->d_value, c->work,
+                     g->gradient, job->beta, NULL);
 }
 
 /* Number of images from `from` on whose sample comes before `end`; `which` ascends. */

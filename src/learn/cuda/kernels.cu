@@ -4,9 +4,49 @@
 #include "learn/loss_sample.h"
 #include "learn/noise.h"
 
-#define COLUMNS 32 /* of a block in the column sums */
-#define LANES (THREADS / COLUMNS)
-#define SLICE_ROWS (8 * LANES) /* of a slice, at least */
+#define FOURS 16 /* of columns, of a block in the column sums */
+#define LANES (THREADS / FOURS)
+#define SLICE_ROWS (4 * LANES) /* of a slice, at least */
+
+/* ---- numbers of an array ---- */
+
+struct Bf16 {
+    uint16_t bits;
+};
+
+/* Four neighbours, which a thread reads at once. */
+template <class T> struct alignas(4 * sizeof(T)) Four { T at[4]; };
+
+static __device__ float number_read(float x) {
+    return x;
+}
+
+static __device__ float number_read(Bf16 x) {
+    const uint32_t bits = (uint32_t)x.bits << 16;
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+static __device__ void number_write(float *to, float x) {
+    *to = x;
+}
+
+/* To the nearest, ties to even; NaN stays one. */
+static __device__ void number_write(Bf16 *to, float x) {
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits += 0x7fffu + (bits >> 16 & 1u);
+    to->bits = x == x ? (uint16_t)(bits >> 16) : (uint16_t)0x7fc0u;
+}
+
+/* The kernel, a template of one type of numbers, for those of an array. */
+#define LAUNCH_FOR(array, kernel, grid, block, stream, ...)                                        \
+    if ((array).bf16) {                                                                            \
+        LAUNCH(kernel<Bf16>, grid, block, stream, __VA_ARGS__);                                    \
+    } else {                                                                                       \
+        LAUNCH(kernel<float>, grid, block, stream, __VA_ARGS__);                                   \
+    }
 
 int gpu_blocks(int rows) {
     return (int)blocks_of(rows).x;
@@ -26,24 +66,28 @@ static __device__ int row_of(const int *index, int64_t r) {
 
 /* ---- rows ---- */
 
+template <class T>
 static __global__ void gather(uint32_t count, int width, uint32_t pitch,
                               const int *__restrict__ index, const float *__restrict__ from,
-                              float *__restrict__ to) {
+                              void *__restrict__ to) {
     const uint32_t i = (uint32_t)item();
     if (i < count) {
         const int column = (int)(i % pitch);
-        to[i] = column < width ? from[(int64_t)row_of(index, i / pitch) * width + column] : 0.0f;
+        const float x =
+            column < width ? from[(int64_t)row_of(index, i / pitch) * width + column] : 0.0f;
+        number_write((T *)to + i, x);
     }
 }
 
 void gpu_gather(cudaStream_t stream, int rows, int width, int pitch, const int *index,
-                const float *from, float *to) {
+                const float *from, GpuArray to) {
     const int64_t count = (int64_t)rows * pitch;
-    LAUNCH(gather, blocks_of(count), line, stream, (uint32_t)count, width, (uint32_t)pitch, index,
-           from, to);
+    LAUNCH_FOR(to, gather, blocks_of(count), line, stream, (uint32_t)count, width, (uint32_t)pitch,
+               index, from, to.at)
 }
 
-static __global__ void mirror_history(GpuImages m, const float *history, float *to) {
+template <class T>
+static __global__ void mirror_history(GpuImages m, const float *history, void *to) {
     const uint32_t i = (uint32_t)item(), pitch = (uint32_t)m.pitch;
     const int width = m.frames * m.observation;
     if (i >= (uint32_t)m.images * pitch) {
@@ -52,11 +96,13 @@ static __global__ void mirror_history(GpuImages m, const float *history, float *
     const int column = (int)(i % pitch), k = column % m.observation;
     const int sample = m.order[m.which[i / pitch] - m.first];
     const float *row = history + (int64_t)sample * width;
-    to[i] = column < width ? m.sign[k] * row[column - k + m.index[k]] : 0.0f;
+    const float x = column < width ? m.sign[k] * row[column - k + m.index[k]] : 0.0f;
+    number_write((T *)to + i, x);
 }
 
-void gpu_mirror_history(cudaStream_t stream, GpuImages m, const float *history, float *to) {
-    LAUNCH(mirror_history, blocks_of((int64_t)m.images * m.pitch), line, stream, m, history, to);
+void gpu_mirror_history(cudaStream_t stream, GpuImages m, const float *history, GpuArray to) {
+    LAUNCH_FOR(to, mirror_history, blocks_of((int64_t)m.images * m.pitch), line, stream, m, history,
+               to.at)
 }
 
 static __global__ void latent_noise(int64_t count, int latent, const uint64_t *key, const int *row,
@@ -79,48 +125,69 @@ void gpu_latent_noise(cudaStream_t stream, int rows, int latent, const uint64_t 
 
 /* ---- layers ---- */
 
-static __device__ float activate(int elu, float x) {
-    return elu ? vector_elu(x) : x;
+/* Of a number that is kept as a float, and of one that is kept in 8 bits. */
+static __device__ float elu(float x, float) {
+    return vector_elu(x);
+}
+
+static __device__ float elu(float x, Bf16) {
+#ifdef __CUDA_ARCH__
+    return x > 0.0f ? x : __expf(x) - 1.0f;
+#else
+    return vector_elu(x);
+#endif
 }
 
 /* A thread has four columns of a row. width: in fours. */
-static __global__ void add_bias(uint32_t count, uint32_t width, int elu,
-                                const float4 *__restrict__ bias, float4 *__restrict__ y) {
+template <class T>
+static __global__ void add_bias(uint32_t count, uint32_t width, int is_hidden,
+                                const Four<float> *__restrict__ bias, void *__restrict__ y) {
     const uint32_t i = (uint32_t)item();
     if (i >= count) {
         return;
     }
-    const float4 b = bias[i % width];
-    float4 x = y[i];
-    x.x = activate(elu, x.x + b.x);
-    x.y = activate(elu, x.y + b.y);
-    x.z = activate(elu, x.z + b.z);
-    x.w = activate(elu, x.w + b.w);
-    y[i] = x;
+    const Four<float> b = bias[i % width];
+    Four<T> four = ((Four<T> *)y)[i];
+    for (int k = 0; k < 4; k++) {
+        const float x = number_read(four.at[k]) + b.at[k];
+        number_write(&four.at[k], is_hidden ? elu(x, four.at[k]) : x);
+    }
+    ((Four<T> *)y)[i] = four;
 }
 
-void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float *bias, float *y) {
+void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float *bias,
+                  GpuArray y) {
     const int64_t count = (int64_t)rows * (width / 4);
-    LAUNCH(add_bias, blocks_of(count), line, stream, (uint32_t)count, (uint32_t)(width / 4), elu,
-           (const float4 *)bias, (float4 *)y);
+    LAUNCH_FOR(y, add_bias, blocks_of(count), line, stream, (uint32_t)count, (uint32_t)(width / 4),
+               elu, (const Four<float> *)bias, y.at)
 }
 
-/* Block (column group, slice of rows): LANES partial sums a column, added in order. */
-static __global__ void bias_backward(int rows, int width, const float *__restrict__ y,
-                                     float *__restrict__ d, float *__restrict__ partial) {
-    __shared__ float part[LANES][COLUMNS];
-    const int column = (int)(blockIdx.x * COLUMNS + threadIdx.x), slice = (int)blockIdx.y;
+/* Block (group of columns, slice of rows): LANES partial sums a column, added in order. A thread
+ * has four columns. width: in fours. */
+template <class D, class T>
+static __global__ void bias_backward(int rows, int width, const Four<T> *y, const Four<D> *d,
+                                     Four<T> *to, Four<float> *partial) {
+    __shared__ Four<float> part[LANES][FOURS];
+    const int column = (int)(blockIdx.x * FOURS + threadIdx.x), slice = (int)blockIdx.y;
     const int slices = (int)gridDim.y, end = (int)((int64_t)rows * (slice + 1) / slices);
-    float sum = 0.0f;
+    Four<float> sum = {{0.0f, 0.0f, 0.0f, 0.0f}};
     for (int r = (int)((int64_t)rows * slice / slices) + (int)threadIdx.y;
          column < width && r < end; r += LANES) {
         const int64_t i = (int64_t)r * width + column;
-        float x = d[i];
+        const Four<D> own = d[i];
+        Four<T> four;
         if (y) {
-            x *= vector_elu_slope(y[i]);
-            d[i] = x;
+            four = y[i];
         }
-        sum += x;
+        for (int k = 0; k < 4; k++) {
+            float x = number_read(own.at[k]);
+            x *= y ? vector_elu_slope(number_read(four.at[k])) : 1.0f;
+            number_write(&four.at[k], x);
+            sum.at[k] += x;
+        }
+        if (to) {
+            to[i] = four;
+        }
     }
     part[threadIdx.y][threadIdx.x] = sum;
     __syncthreads();
@@ -128,7 +195,9 @@ static __global__ void bias_backward(int rows, int width, const float *__restric
         return;
     }
     for (int lane = 1; lane < LANES; lane++) {
-        sum += part[lane][threadIdx.x];
+        for (int k = 0; k < 4; k++) {
+            sum.at[k] += part[lane][threadIdx.x].at[k];
+        }
     }
     partial[slice * width + column] = sum;
 }
@@ -146,36 +215,63 @@ static __global__ void add_slices(int slices, int width, const float *partial, f
     sum[column] = beta == 0.0f ? total : sum[column] + total;
 }
 
-void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y, float *d,
-                       float *partial, float beta, float *d_bias) {
-    const int wanted = (rows + SLICE_ROWS - 1) / SLICE_ROWS,
+template <class D, class T>
+static void launch_bias_backward(cudaStream_t stream, dim3 grid, int rows, int width, GpuArray y,
+                                 GpuArray d, GpuArray to, float *partial) {
+    const auto kernel = bias_backward<D, T>;
+    const dim3 block = {FOURS, LANES, 1};
+    LAUNCH(kernel, grid, block, stream, rows, width, (const Four<T> *)y.at, (const Four<D> *)d.at,
+           (Four<T> *)to.at, (Four<float> *)partial);
+}
+
+void gpu_bias_backward(cudaStream_t stream, int rows, int width, GpuArray y, GpuArray d,
+                       GpuArray to, float *partial, float beta, float *d_bias) {
+    const int wanted = (rows + SLICE_ROWS - 1) / SLICE_ROWS, fours = width / 4,
               slices = wanted < GPU_SUM_SLICES ? wanted : GPU_SUM_SLICES;
-    const dim3 grid = {(unsigned)((width + COLUMNS - 1) / COLUMNS), (unsigned)slices, 1},
-               block = {COLUMNS, LANES, 1};
-    LAUNCH(bias_backward, grid, block, stream, rows, width, y, d, partial);
+    const dim3 grid = {(unsigned)((fours + FOURS - 1) / FOURS), (unsigned)slices, 1};
+    if (d.bf16) {
+        launch_bias_backward<Bf16, Bf16>(stream, grid, rows, fours, y, d, to, partial);
+    } else if (to.bf16) {
+        launch_bias_backward<float, Bf16>(stream, grid, rows, fours, y, d, to, partial);
+    } else {
+        launch_bias_backward<float, float>(stream, grid, rows, fours, y, d, to, partial);
+    }
     LAUNCH(add_slices, blocks_of(width), line, stream, slices, width, partial, beta, d_bias);
+}
+
+static __global__ void round_numbers(int64_t count, const float *from, Bf16 *to) {
+    const int64_t i = item();
+    if (i < count) {
+        number_write(to + i, from[i]);
+    }
+}
+
+void gpu_round(cudaStream_t stream, int64_t count, const float *from, GpuArray to) {
+    LAUNCH(round_numbers, blocks_of(count), line, stream, count, from, (Bf16 *)to.at);
 }
 
 /* ---- rows between the networks ---- */
 
-static __global__ void feet_input(GpuWidths w, uint32_t count, const float *heads, float *feet) {
+template <class T>
+static __global__ void feet_input(GpuWidths w, uint32_t count, const float *heads, void *feet) {
     const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.feet;
     if (i < count) {
         const int column = (int)(i % pitch);
         const float *h = heads + (int64_t)(i / pitch) * w.heads + w.feet_offset;
-        feet[i] = column < w.feet_count ? h[column] : 0.0f;
+        number_write((T *)feet + i, column < w.feet_count ? h[column] : 0.0f);
     }
 }
 
-void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, const float *heads, float *feet) {
+void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, const float *heads, GpuArray feet) {
     const int64_t count = (int64_t)rows * w.feet;
-    LAUNCH(feet_input, blocks_of(count), line, stream, w, (uint32_t)count, heads, feet);
+    LAUNCH_FOR(feet, feet_input, blocks_of(count), line, stream, w, (uint32_t)count, heads, feet.at)
 }
 
 /* One thread a number of the input [newest frame | estimates | theta1 z + theta2]. */
-static __global__ void actor_input(GpuWidths w, uint32_t count, int newest, const float *history,
+template <class T>
+static __global__ void actor_input(GpuWidths w, uint32_t count, int newest, const void *history,
                                    const float *heads, const float *noise, const float *theta,
-                                   float *input) {
+                                   void *input) {
     const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.actor_input;
     if (i >= count) {
         return;
@@ -185,7 +281,7 @@ static __global__ void actor_input(GpuWidths w, uint32_t count, int newest, cons
     const float *h = heads + r * w.heads;
     float x = 0.0f;
     if (head < 0) {
-        x = history[r * w.history + newest + column];
+        x = number_read(((const T *)history)[r * w.history + newest + column]);
     } else if (j < 0) {
         x = h[head];
     } else if (j < w.latent) {
@@ -194,19 +290,21 @@ static __global__ void actor_input(GpuWidths w, uint32_t count, int newest, cons
         const float z = loss_latent(mu, mu + w.latent, noise ? noise + r * w.latent : NULL, j);
         x = t[w.per_dimension ? j : 0] * z + t[w.per_dimension ? w.latent + j : 1];
     }
-    input[i] = x;
+    number_write((T *)input + i, x);
 }
 
-void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, const float *history,
-                     const float *heads, const float *noise, const float *theta, float *input) {
+void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, GpuArray history,
+                     const float *heads, const float *noise, const float *theta, GpuArray input) {
     const int64_t count = (int64_t)rows * w.actor_input;
-    LAUNCH(actor_input, blocks_of(count), line, stream, w, (uint32_t)count, newest, history, heads,
-           noise, theta, input);
+    LAUNCH_FOR(input, actor_input, blocks_of(count), line, stream, w, (uint32_t)count, newest,
+               history.at, heads, noise, theta, input.at)
 }
 
 /* One thread a number of the decoder's input [z | estimates]. */
+template <class T>
 static __global__ void sample_latent(GpuWidths w, uint32_t count, const float *heads,
-                                     const float *noise, float *spread, float *input) {
+                                     const float *noise, float *spread, void *to) {
+    T *input = (T *)to;
     const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.decoder_input;
     if (i >= count) {
         return;
@@ -215,20 +313,20 @@ static __global__ void sample_latent(GpuWidths w, uint32_t count, const float *h
     const int j = (int)(i % pitch);
     const float *h = heads + r * w.heads;
     if (j >= w.latent) {
-        input[i] = j < w.latent + w.estimates ? h[j - w.latent] : 0.0f;
+        number_write(input + i, j < w.latent + w.estimates ? h[j - w.latent] : 0.0f);
         return;
     }
     const float *mu = h + w.estimates;
     const float s = loss_spread(mu[w.latent + j]);
     spread[r * w.latent + j] = s;
-    input[i] = mu[j] + s * noise[r * w.latent + j];
+    number_write(input + i, mu[j] + s * noise[r * w.latent + j]);
 }
 
 void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
-                       const float *noise, float *spread, float *input) {
+                       const float *noise, float *spread, GpuArray input) {
     const int64_t count = (int64_t)rows * w.decoder_input;
-    LAUNCH(sample_latent, blocks_of(count), line, stream, w, (uint32_t)count, heads, noise, spread,
-           input);
+    LAUNCH_FOR(input, sample_latent, blocks_of(count), line, stream, w, (uint32_t)count, heads,
+               noise, spread, input.at)
 }
 
 /* ---- losses: one thread a sample ---- */

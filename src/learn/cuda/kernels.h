@@ -9,8 +9,10 @@
 #include <cuda_runtime_api.h>
 #include <stdint.h>
 
+#include "learn/cuda/array.h"
+
 #define GPU_ACTIONS_MAX 64
-#define GPU_SUM_SLICES 128 /* a column sum adds up at most this many partial sums */
+#define GPU_SUM_SLICES 256 /* a column sum adds up at most this many partial sums */
 
 /* Sums over samples: the members of LossSums. Every block of a pass adds to its own row of sums
  * [blocks][GPU_SUMS]. */
@@ -37,7 +39,7 @@ int gpu_blocks(int rows); /* rows of `sums` that passes over this many rows need
 /* Row r of `to` is row index[r] of `from`, or row r with index NULL. width: floats from row to row
  * of `from`. The columns of `to` from width on become 0. */
 void gpu_gather(cudaStream_t stream, int rows, int width, int pitch, const int *index,
-                const float *from, float *to);
+                const float *from, GpuArray to);
 /* Row m of `to` is the mirror image of row order[which[m] - first] of the rollout's history, frame
  * by frame. */
 typedef struct {
@@ -46,18 +48,20 @@ typedef struct {
     const int *which, *index; /* [images], [observation] */
     const float *sign;        /* [observation] */
 } GpuImages;
-void gpu_mirror_history(cudaStream_t stream, GpuImages images, const float *history, float *to);
+void gpu_mirror_history(cudaStream_t stream, GpuImages images, const float *history, GpuArray to);
 /* noise [rows][latent]: numbers row[r] * latent .. of the stream *key (noise.h). */
 void gpu_latent_noise(cudaStream_t stream, int rows, int latent, const uint64_t *key,
                       const int *row, float *noise);
 
-/* ---- layers; widths are pitches, multiples of 4 ---- */
+/* ---- layers; widths are pitches, multiples of 8 ---- */
 
-void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float *bias, float *y);
-/* d *= slope(y) unless y is NULL; d_bias = beta d_bias + column sums of d. partial:
- * [GPU_SUM_SLICES][width]. */
-void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y, float *d,
-                       float *partial, float beta, float *d_bias);
+void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float *bias, GpuArray y);
+/* to = d slope(y), of a layer without ELU (y.at NULL) to = d; d_bias = beta d_bias + column sums of
+ * to. to.at NULL: only the sums. `to` may be d. partial: [GPU_SUM_SLICES][width]. */
+void gpu_bias_backward(cudaStream_t stream, int rows, int width, GpuArray y, GpuArray d,
+                       GpuArray to, float *partial, float beta, float *d_bias);
+/* Rounds to bfloat16. */
+void gpu_round(cudaStream_t stream, int64_t count, const float *from, GpuArray to);
 
 /* ---- rows between the networks ---- */
 
@@ -71,12 +75,12 @@ typedef struct {
 } GpuWidths;
 
 /* feet [rows][feet]: the estimated feet velocities, the modulation's input. */
-void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, const float *heads, float *feet);
+void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, const float *heads, GpuArray feet);
 /* newest: first column of the newest frame in history. noise: [rows][latent] of z; NULL: z = mu. */
-void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, const float *history,
-                     const float *heads, const float *noise, const float *theta, float *input);
+void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, GpuArray history,
+                     const float *heads, const float *noise, const float *theta, GpuArray input);
 void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
-                       const float *noise, float *spread, float *input);
+                       const float *noise, float *spread, GpuArray input);
 
 /* ---- losses. order: [rows] samples, whose numbers are read from the rollout ---- */
 

@@ -117,9 +117,13 @@ static size_t layout(GpuLearner *g, char *block) {
     const Network *tight = &g->ppo->policy->network;
     g->rollout = carve(block, &used, ppo_carve_batch(&g->batch, tight, NULL));
     ppo_carve_batch(&g->batch, tight, g->rollout);
-    const size_t floats = gpu_chunk_carve(n, &g->widths, g->rows, g->images, NULL, &g->chunk);
-    float *chunk = carve(block, &used, floats * sizeof(float));
-    gpu_chunk_carve(n, &g->widths, g->rows, g->images, chunk, &g->chunk);
+    const int bf16 = g->ppo->def.matmul == PPO_MATMUL_BF16;
+    const size_t rounded = gpu_array_bytes(bf16, (size_t)n->count);
+    g->queue.weights.bf16 = bf16;
+    g->queue.weights.at = bf16 ? carve(block, &used, rounded) : g->parameters;
+    const size_t bytes = gpu_chunk_carve(n, &g->widths, bf16, g->rows, g->images, NULL, &g->chunk);
+    char *chunk = carve(block, &used, bytes);
+    gpu_chunk_carve(n, &g->widths, bf16, g->rows, g->images, chunk, &g->chunk);
     return used;
 }
 
@@ -258,6 +262,7 @@ static MildStatus push(GpuLearner *g, MildError *error) {
                                   .adam_steps = ppo->adam_steps,
                                   .learning_rate = ppo->learning_rate};
     upload(g, g->progress, &progress, sizeof progress);
+    gpu_enqueue_weights(g);
     if (ppo->resident) {
         float *from[CARRIED], *to[CARRIED];
         size_t sizes[CARRIED];
@@ -374,6 +379,7 @@ static void enqueue_minibatch(GpuLearner *g, const GpuOrder *order, const GpuMin
                                   .gradient = g->gradient};
     gpu_decide(stream, decision, g->partial, g->progress);
     gpu_optimise(stream, optimiser(g), g->progress);
+    gpu_enqueue_weights(g);
 }
 
 static void enqueue_epoch(GpuLearner *g, int epoch) {
@@ -551,7 +557,7 @@ static MildStatus open_memory(GpuLearner *g, const char *device, MildError *erro
 
 static MildStatus open_device(GpuLearner *g, MildError *error) {
     static const cublasComputeType_t arithmetic[PPO_MATMULS] = {
-        CUBLAS_COMPUTE_32F, CUBLAS_COMPUTE_32F_FAST_TF32, CUBLAS_COMPUTE_32F_FAST_16BF};
+        CUBLAS_COMPUTE_32F, CUBLAS_COMPUTE_32F_FAST_TF32, CUBLAS_COMPUTE_32F};
     char device[512];
     if (!describe(g->device, device, sizeof device)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "%s; train.device = cpu needs none", device);

@@ -11,14 +11,14 @@
  * `mirrored` images. Rows are as wide as the padded network's. */
 typedef struct {
     int rows, mirrored;
-    float *history; /* [rows + mirrored] */
-    float *critic;  /* [rows] the critic's input */
-    float *noise;   /* [rows + mirrored][latent] standard normal, for the sampled z */
-    MlpOutputs encoder, modulation, actor, decoder, value;
-    float *feet;          /* [rows + mirrored] the modulation's input */
-    float *actor_input;   /* [rows + mirrored] */
-    float *decoder_input; /* [rows] */
-    float *spread;        /* [rows][latent] exp(logvar / 2) */
+    GpuArray history; /* [rows + mirrored] */
+    GpuArray critic;  /* [rows] the critic's input */
+    float *noise;     /* [rows + mirrored][latent] standard normal, for the sampled z */
+    GpuOutputs encoder, modulation, actor, decoder, value;
+    GpuArray feet;          /* [rows + mirrored] the modulation's input */
+    GpuArray actor_input;   /* [rows + mirrored] */
+    GpuArray decoder_input; /* [rows] */
+    float *spread;          /* [rows][latent] exp(logvar / 2) */
     /* gradients with respect to the array named after d_ */
     float *d_mean;          /* [rows + mirrored] */
     float *d_log_std;       /* [rows] */
@@ -29,7 +29,7 @@ typedef struct {
     float *d_decoded;       /* [rows] */
     float *d_decoder_input; /* [rows] */
     float *d_value;         /* [rows] */
-    float *work[2];         /* [rows + mirrored][widest layer] each */
+    GpuArray work[2];       /* [rows + mirrored][widest layer] each */
 } GpuChunk;
 
 typedef struct {
@@ -81,12 +81,14 @@ typedef struct {
 } GpuMinibatch;
 
 /* Places a chunk of at most `rows` samples and `mirrored` images in the block and returns its
- * floats. NULL: only counts them. */
-size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int rows, int mirrored, float *block,
-                       GpuChunk *c);
+ * bytes. NULL: only counts them. bf16: the kind of its arrays. */
+size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int bf16, int rows, int mirrored,
+                       char *block, GpuChunk *c);
 
 /* All of the following only enqueue. */
 
+/* The weights as products read them, after the parameters have changed. */
+void gpu_enqueue_weights(GpuLearner *g);
 /* Actions of time t. */
 void gpu_enqueue_act(GpuLearner *g, int t);
 /* batch.value from batch.critic. */

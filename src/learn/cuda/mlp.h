@@ -5,6 +5,7 @@
 
 #include <cublas_v2.h>
 
+#include "learn/cuda/array.h"
 #include "learn/mlp.h"
 
 typedef struct {
@@ -12,17 +13,24 @@ typedef struct {
     cublasHandle_t blas;
     cublasComputeType_t arithmetic; /* of the products */
     cublasStatus_t status;          /* the first failure of a product */
+    GpuArray weights;               /* as products read them: parameters, or their rounded copy */
     float *partial;                 /* [GPU_SUM_SLICES][widest layer] of the column sums */
 } GpuQueue;
 
+/* As MlpOutputs. The last layer's are floats, which the losses read. */
+typedef struct {
+    GpuArray y[MLP_LAYERS_MAX];
+} GpuOutputs;
+
 /* As mlp_forward and mlp_backward, with rows of the first layer's width in x. They only enqueue.
  * Failures show in status and when the stream is waited for. The outputs' arrays are aligned to 16
- * bytes. */
+ * bytes. Biases are read from the parameters. */
 float *gpu_mlp_forward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows,
-                       const float *x, const MlpOutputs *outputs);
-/* d_x: gradient with respect to the input; NULL: not computed. */
-void gpu_mlp_backward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows,
-                      const float *x, const MlpOutputs *outputs, float *d_last,
-                      float *const work[2], float *gradient, float beta, float *d_x);
+                       GpuArray x, const GpuOutputs *outputs);
+/* d_x: gradient with respect to the input; NULL: not computed. work: as wide as the widest layer, of
+ * the type of x. */
+void gpu_mlp_backward(GpuQueue *queue, const Mlp *mlp, int rows, GpuArray x,
+                      const GpuOutputs *outputs, float *d_last, const GpuArray work[2],
+                      float *gradient, float beta, float *d_x);
 
 #endif
