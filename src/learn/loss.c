@@ -203,13 +203,24 @@ static void latent_row(const LossContext *c, const float *mu, const float *logva
 static void modulation_backward(const LossContext *c, LossChunk *chunk, int all,
                                 const float *heads) {
     const Network *n = c->network;
+    const int estimates = n->def.estimates, latent = n->def.latent,
+              per_dimension = n->def.modulation_per_dimension;
     const float *theta = network_theta(n, &chunk->outputs), *noise = chunk->outputs.noise;
     for (int64_t r = 0; r < all; r++) {
-        loss_modulation(n->def.estimates, n->def.latent, n->def.modulation_per_dimension,
-                        c->def->modulation, heads + r * n->heads,
-                        noise ? noise + r * n->def.latent : NULL, theta + r * n->theta,
-                        chunk->d_actor_input + r * (n->def.estimates + n->def.latent),
-                        chunk->d_heads + r * n->heads, chunk->d_theta + r * n->theta);
+        const float *d_input = chunk->d_actor_input + r * (estimates + latent);
+        for (int i = 0; i < n->heads; i++) {
+            chunk->d_heads[r * n->heads + i] = loss_modulation_head(
+                estimates, latent, per_dimension, heads, noise, theta, d_input, i);
+        }
+        for (int i = 0; i < n->theta; i++) {
+            chunk->d_theta[r * n->theta + i] =
+                c->def->modulation ? loss_modulation_theta(estimates, latent, per_dimension, heads,
+                                                           noise, d_input, i)
+                                   : 0.0f;
+        }
+        heads += n->heads;
+        theta += n->theta;
+        noise = noise ? noise + latent : NULL;
     }
 }
 

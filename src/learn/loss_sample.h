@@ -133,6 +133,13 @@ MILD_HD_FN float loss_mirror(int actions, const int *index, const float *sign, f
 
 /* ---- regression of the estimates ---- */
 
+/* The square of an estimate's gap; adds to its d. weight: twice that of the square. */
+MILD_HD_FN float loss_estimate(float weight, float estimate, float target, float *d) {
+    const float gap = estimate - target;
+    *d += weight * gap;
+    return gap * gap;
+}
+
 /* Mean square of the estimates begin .. end-1; adds to d. weight: twice that of the mean. An empty
  * group costs nothing. */
 MILD_HD_FN double loss_estimates(int begin, int end, float weight, const float *estimate,
@@ -143,9 +150,7 @@ MILD_HD_FN double loss_estimates(int begin, int end, float weight, const float *
     const float weight_each = weight / (float)(end - begin);
     float sum = 0.0f;
     for (int j = begin; j < end; j++) {
-        const float gap = estimate[j] - target[j];
-        sum += gap * gap;
-        d[j] += weight_each * gap;
+        sum += loss_estimate(weight_each, estimate[j], target[j], &d[j]);
     }
     return (double)sum / (end - begin);
 }
@@ -202,37 +207,37 @@ MILD_HD_FN float loss_logvar_gradient(float weight, float logvar, float spread, 
 
 /* Back through z~ = theta1 z + theta2, z: loss_latent. heads and d_heads are [estimates | mu |
  * logvar], d_input is [estimates | z~]; theta has two numbers, or two for each latent dimension.
- * Overwrites d_heads and d_theta, the latter with 0 unless the modulation learns. noise: NULL, z =
- * mu. */
-MILD_HD_FN void loss_modulation(int estimates, int latent, int per_dimension, int learns,
-                                const float *heads, const float *noise, const float *theta,
-                                const float *d_input, float *d_heads, float *d_theta) {
-    const float *mu = heads + estimates, *logvar = mu + latent;
-    float d_scale = 0.0f;
-    float d_shift = 0.0f;
-    for (int j = 0; j < estimates; j++) {
-        d_heads[j] = d_input[j];
+ * noise: NULL, z = mu. */
+
+/* Number i of d_heads. */
+MILD_HD_FN float loss_modulation_head(int estimates, int latent, int per_dimension,
+                                      const float *heads, const float *noise, const float *theta,
+                                      const float *d_input, int i) {
+    const int is_logvar = i >= estimates + latent, j = i - estimates - (is_logvar ? latent : 0);
+    if (j < 0) {
+        return d_input[i];
     }
-    for (int j = 0; j < latent; j++) {
-        const float d = d_input[estimates + j];
-        const float d_shifted = learns ? d : 0.0f;
-        const float d_times_z = d_shifted * loss_latent(mu, logvar, noise, j);
-        const float d_z = d * theta[per_dimension ? j : 0];
-        d_heads[estimates + j] = d_z;
-        d_heads[estimates + latent + j] =
-            noise ? loss_logvar_gradient(0.0f, logvar[j], loss_spread(logvar[j]), noise[j], d_z)
-                  : 0.0f;
-        if (per_dimension) {
-            d_theta[j] = d_times_z;
-            d_theta[latent + j] = d_shifted;
-        }
-        d_scale += d_times_z;
-        d_shift += d_shifted;
+    const float d_z = d_input[estimates + j] * theta[per_dimension ? j : 0];
+    if (!is_logvar) {
+        return d_z;
     }
-    if (!per_dimension) {
-        d_theta[0] = d_scale;
-        d_theta[1] = d_shift;
+    return noise ? loss_logvar_gradient(0.0f, heads[i], loss_spread(heads[i]), noise[j], d_z)
+                 : 0.0f;
+}
+
+/* Number i of d_theta, of a modulation that learns. */
+MILD_HD_FN float loss_modulation_theta(int estimates, int latent, int per_dimension,
+                                       const float *heads, const float *noise, const float *d_input,
+                                       int i) {
+    const float *mu = heads + estimates, *d = d_input + estimates;
+    const int is_shift = i >= (per_dimension ? latent : 1),
+              begin = per_dimension ? i - (is_shift ? latent : 0) : 0,
+              end = per_dimension ? begin + 1 : latent;
+    float sum = 0.0f;
+    for (int j = begin; j < end; j++) {
+        sum += is_shift ? d[j] : d[j] * loss_latent(mu, mu + latent, noise, j);
     }
+    return sum;
 }
 
 /* ---- value: max((V - R)^2, (V_old + clip(V - V_old) - R)^2) ---- */

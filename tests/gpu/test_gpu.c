@@ -258,8 +258,7 @@ TEST(gradients_are_those_of_the_cpu) {
 
 /* Products with rounded factors, and with bf16 rounded numbers between the layers too: near the
  * CPU's, as far as 11 or 8 bits go. The stand-in has no tf32. */
-TEST(rounded_products_are_near) {
-    static const double bounds[PPO_MATMULS] = {1e-5, 5e-3, 5e-2};
+static void compare_rounded(int matmul, double bound) {
 #ifdef EMULATED
     PolicyDef policy = small_def();
     const int envs = 37;
@@ -267,17 +266,20 @@ TEST(rounded_products_are_near) {
     PolicyDef policy = policy_def_default();
     const int envs = 256;
 #endif
-    for (int matmul = 0; matmul < PPO_MATMULS; matmul++) {
-        PpoDef def = ppo_def_default();
-        def.matmul = matmul;
-        double worst[3] = {0.0};
-        compare_learner(&policy, &def, envs, 0, worst);
-        print_message("%s: gradient %.1e, sums %.1e, actions %.1e (relative, bound %.0e)\n",
-                      ppo_fields[ppo_field_count - 1].names[matmul], worst[0], worst[1], worst[2],
-                      bounds[matmul]);
-        assert_true(worst[0] < 2.0 * bounds[matmul]);
-        assert_true(worst[1] < bounds[matmul] && worst[2] < bounds[matmul]);
-    }
+    PpoDef def = ppo_def_default();
+    def.matmul = matmul;
+    double worst[3] = {0.0};
+    compare_learner(&policy, &def, envs, 0, worst);
+    print_message("%s: gradient %.1e, sums %.1e, actions %.1e (relative, bound %.0e)\n",
+                  ppo_fields[ppo_field_count - 1].names[matmul], worst[0], worst[1], worst[2],
+                  bound);
+    assert_true(worst[0] < 2.0 * bound && worst[1] < bound && worst[2] < bound);
+}
+
+TEST(rounded_products_are_near) {
+    compare_rounded(PPO_MATMUL_FP32, 1e-5);
+    compare_rounded(PPO_MATMUL_TF32, 5e-3);
+    compare_rounded(PPO_MATMUL_BF16, 5e-2);
 }
 
 /* ---- update ---- */

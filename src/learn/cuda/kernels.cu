@@ -6,6 +6,7 @@
 
 #define FOURS 16 /* of columns, of a block in the column sums */
 #define LANES (THREADS / FOURS)
+#define COLUMNS 32             /* of a block that adds up their slices */
 #define SLICE_ROWS (4 * LANES) /* of a slice, at least */
 
 /* ---- numbers of an array ---- */
@@ -66,43 +67,52 @@ static __device__ int row_of(const int *index, int64_t r) {
 
 /* ---- rows ---- */
 
+/* A thread has four columns of a row. pitch: in fours. */
 template <class T>
 static __global__ void gather(uint32_t count, int width, uint32_t pitch,
                               const int *__restrict__ index, const float *__restrict__ from,
                               void *__restrict__ to) {
     const uint32_t i = (uint32_t)item();
-    if (i < count) {
-        const int column = (int)(i % pitch);
-        const float x =
-            column < width ? from[(int64_t)row_of(index, i / pitch) * width + column] : 0.0f;
-        number_write((T *)to + i, x);
+    if (i >= count) {
+        return;
     }
+    const int column = 4 * (int)(i % pitch);
+    const float *row = from + (int64_t)row_of(index, i / pitch) * width;
+    Four<T> four;
+    for (int k = 0; k < 4; k++) {
+        number_write(&four.at[k], column + k < width ? row[column + k] : 0.0f);
+    }
+    ((Four<T> *)to)[i] = four;
 }
 
 void gpu_gather(cudaStream_t stream, int rows, int width, int pitch, const int *index,
                 const float *from, GpuArray to) {
-    const int64_t count = (int64_t)rows * pitch;
-    LAUNCH_FOR(to, gather, blocks_of(count), line, stream, (uint32_t)count, width, (uint32_t)pitch,
-               index, from, to.at)
+    const int64_t count = (int64_t)rows * (pitch / 4);
+    LAUNCH_FOR(to, gather, blocks_of(count), line, stream, (uint32_t)count, width,
+               (uint32_t)(pitch / 4), index, from, to.at)
 }
 
+/* As gather. */
 template <class T>
 static __global__ void mirror_history(GpuImages m, const float *history, void *to) {
-    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)m.pitch;
+    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)m.pitch / 4;
     const int width = m.frames * m.observation;
     if (i >= (uint32_t)m.images * pitch) {
         return;
     }
-    const int column = (int)(i % pitch), k = column % m.observation;
-    const int sample = m.order[m.which[i / pitch] - m.first];
-    const float *row = history + (int64_t)sample * width;
-    const float x = column < width ? m.sign[k] * row[column - k + m.index[k]] : 0.0f;
-    number_write((T *)to + i, x);
+    const float *row = history + (int64_t)m.order[m.which[i / pitch] - m.first] * width;
+    Four<T> four;
+    for (int k = 0; k < 4; k++) {
+        const int column = 4 * (int)(i % pitch) + k, own = column % m.observation;
+        number_write(&four.at[k],
+                     column < width ? m.sign[own] * row[column - own + m.index[own]] : 0.0f);
+    }
+    ((Four<T> *)to)[i] = four;
 }
 
 void gpu_mirror_history(cudaStream_t stream, GpuImages m, const float *history, GpuArray to) {
-    LAUNCH_FOR(to, mirror_history, blocks_of((int64_t)m.images * m.pitch), line, stream, m, history,
-               to.at)
+    LAUNCH_FOR(to, mirror_history, blocks_of((int64_t)m.images * (m.pitch / 4)), line, stream, m,
+               history, to.at)
 }
 
 static __global__ void latent_noise(int64_t count, int latent, const uint64_t *key, const int *row,
@@ -202,15 +212,22 @@ static __global__ void bias_backward(int rows, int width, const Four<T> *y, cons
     partial[slice * width + column] = sum;
 }
 
+/* A block has COLUMNS columns; its rows of threads add up a share of the slices each. */
 static __global__ void add_slices(int slices, int width, const float *partial, float beta,
                                   float *sum) {
-    const int column = (int)item();
-    if (column >= width) {
+    __shared__ float part[THREADS / COLUMNS][COLUMNS];
+    const int column = (int)(blockIdx.x * COLUMNS + threadIdx.x), shares = THREADS / COLUMNS;
+    float total = 0.0f;
+    for (int slice = (int)threadIdx.y; column < width && slice < slices; slice += shares) {
+        total += partial[slice * width + column];
+    }
+    part[threadIdx.y][threadIdx.x] = total;
+    __syncthreads();
+    if (threadIdx.y > 0 || column >= width) {
         return;
     }
-    float total = 0.0f;
-    for (int slice = 0; slice < slices; slice++) {
-        total += partial[slice * width + column];
+    for (int share = 1; share < shares; share++) {
+        total += part[share][threadIdx.x];
     }
     sum[column] = beta == 0.0f ? total : sum[column] + total;
 }
@@ -236,7 +253,9 @@ void gpu_bias_backward(cudaStream_t stream, int rows, int width, GpuArray y, Gpu
     } else {
         launch_bias_backward<float, float>(stream, grid, rows, fours, y, d, to, partial);
     }
-    LAUNCH(add_slices, blocks_of(width), line, stream, slices, width, partial, beta, d_bias);
+    const dim3 columns = {(unsigned)((width + COLUMNS - 1) / COLUMNS), 1, 1},
+               block = {COLUMNS, THREADS / COLUMNS, 1};
+    LAUNCH(add_slices, columns, block, stream, slices, width, partial, beta, d_bias);
 }
 
 static __global__ void round_numbers(int64_t count, const float *from, Bf16 *to) {
@@ -267,35 +286,47 @@ void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, const float *hea
     LAUNCH_FOR(feet, feet_input, blocks_of(count), line, stream, w, (uint32_t)count, heads, feet.at)
 }
 
-/* One thread a number of the input [newest frame | estimates | theta1 z + theta2]. */
+/* A number of the input [newest frame | estimates | theta1 z + theta2]. */
+template <class T>
+static __device__ float actor_number(const GpuWidths &w, const T *newest, const float *heads,
+                                     const float *noise, const float *theta, int column) {
+    const int head = column - w.observation, j = head - w.estimates;
+    if (head < 0) {
+        return number_read(newest[column]);
+    }
+    if (j < 0) {
+        return heads[head];
+    }
+    const float *mu = heads + w.estimates;
+    return j < w.latent
+               ? theta[w.per_dimension ? j : 0] * loss_latent(mu, mu + w.latent, noise, j) +
+                     theta[w.per_dimension ? w.latent + j : 1]
+               : 0.0f;
+}
+
+/* A thread has four columns of a row. */
 template <class T>
 static __global__ void actor_input(GpuWidths w, uint32_t count, int newest, const void *history,
                                    const float *heads, const float *noise, const float *theta,
                                    void *input) {
-    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.actor_input;
+    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.actor_input / 4;
     if (i >= count) {
         return;
     }
     const int64_t r = i / pitch;
-    const int column = (int)(i % pitch), head = column - w.observation, j = head - w.estimates;
-    const float *h = heads + r * w.heads;
-    float x = 0.0f;
-    if (head < 0) {
-        x = number_read(((const T *)history)[r * w.history + newest + column]);
-    } else if (j < 0) {
-        x = h[head];
-    } else if (j < w.latent) {
-        const float *t = theta + r * w.theta;
-        const float *mu = h + w.estimates;
-        const float z = loss_latent(mu, mu + w.latent, noise ? noise + r * w.latent : NULL, j);
-        x = t[w.per_dimension ? j : 0] * z + t[w.per_dimension ? w.latent + j : 1];
+    Four<T> four;
+    for (int k = 0; k < 4; k++) {
+        number_write(&four.at[k],
+                     actor_number(w, (const T *)history + r * w.history + newest,
+                                  heads + r * w.heads, noise ? noise + r * w.latent : NULL,
+                                  theta + r * w.theta, 4 * (int)(i % pitch) + k));
     }
-    number_write((T *)input + i, x);
+    ((Four<T> *)input)[i] = four;
 }
 
 void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, GpuArray history,
                      const float *heads, const float *noise, const float *theta, GpuArray input) {
-    const int64_t count = (int64_t)rows * w.actor_input;
+    const int64_t count = (int64_t)rows * (w.actor_input / 4);
     LAUNCH_FOR(input, actor_input, blocks_of(count), line, stream, w, (uint32_t)count, newest,
                history.at, heads, noise, theta, input.at)
 }
@@ -417,68 +448,99 @@ void gpu_reconstruction(cudaStream_t stream, GpuWidths w, int rows, float weight
            decoded, d, sums);
 }
 
-static __global__ void modulation_backward(GpuWidths w, int rows, const float *heads,
-                                           const float *noise, const float *theta,
-                                           const float *d_input, float *d_heads, float *d_theta) {
-    const int64_t r = item();
-    if (r < rows) {
-        loss_modulation(w.estimates, w.latent, w.per_dimension, w.modulation, heads + r * w.heads,
-                        noise ? noise + r * w.latent : NULL, theta + r * w.theta,
-                        d_input + r * w.actor_input + w.observation, d_heads + r * w.heads,
-                        d_theta + r * w.theta);
+/* One thread a number of d_heads. */
+static __global__ void modulation_heads(GpuWidths w, uint32_t count, const float *heads,
+                                        const float *noise, const float *theta,
+                                        const float *d_input, float *d_heads) {
+    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.heads;
+    const int64_t r = i / pitch;
+    const int column = (int)(i % pitch);
+    if (i < count && column < w.estimates + 2 * w.latent) {
+        d_heads[i] =
+            loss_modulation_head(w.estimates, w.latent, w.per_dimension, heads + r * w.heads,
+                                 noise ? noise + r * w.latent : NULL, theta + r * w.theta,
+                                 d_input + r * w.actor_input + w.observation, column);
+    }
+}
+
+/* One thread a number of d_theta. */
+static __global__ void modulation_theta(GpuWidths w, uint32_t count, const float *heads,
+                                        const float *noise, const float *d_input, float *d_theta) {
+    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.theta;
+    const int64_t r = i / pitch;
+    const int column = (int)(i % pitch);
+    if (i < count && column < (w.per_dimension ? 2 * w.latent : 2)) {
+        d_theta[i] =
+            w.modulation
+                ? loss_modulation_theta(w.estimates, w.latent, w.per_dimension, heads + r * w.heads,
+                                        noise ? noise + r * w.latent : NULL,
+                                        d_input + r * w.actor_input + w.observation, column)
+                : 0.0f;
     }
 }
 
 void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
                              const float *noise, const float *theta, const float *d_input,
                              float *d_heads, float *d_theta) {
-    LAUNCH(modulation_backward, blocks_of(rows), line, stream, w, rows, heads, noise, theta,
-           d_input, d_heads, d_theta);
+    const int64_t numbers = (int64_t)rows * w.heads, thetas = (int64_t)rows * w.theta;
+    LAUNCH(modulation_heads, blocks_of(numbers), line, stream, w, (uint32_t)numbers, heads, noise,
+           theta, d_input, d_heads);
+    LAUNCH(modulation_theta, blocks_of(thetas), line, stream, w, (uint32_t)thetas, heads, noise,
+           d_input, d_theta);
 }
 
-static __device__ double latent_row(int latent, float weight, float free_bits, int sampled,
-                                    const float *mu, const float *spread, const float *noise,
-                                    const float *d_z, float *d_mu) {
-    const float *logvar = mu + latent;
-    float *d_logvar = d_mu + latent, twice = 0.0f;
-    for (int j = 0; j < latent; j++) {
-        const float own = loss_latent_twice(mu[j], logvar[j], spread[j]);
-        const float w = loss_kl_weight(weight, free_bits, own);
-        twice += own;
-        const float d_draw = loss_draw_gradient(sampled, d_z[j], d_mu[j]);
-        d_mu[j] += loss_mu_gradient(w, mu[j], d_z[j]);
-        d_logvar[j] = loss_logvar_gradient(w, logvar[j], spread[j], noise[j], d_draw);
-    }
-    return 0.5 * (double)twice;
+/* Dimension j of a sample's latent: twice its KL term. */
+static __device__ float latent_backward(const GpuWidths &w, const GpuHeads &h, int64_t r, int j) {
+    const float *mu = h.heads + r * w.heads + w.estimates;
+    float *d_mu = h.d_heads + r * w.heads + w.estimates;
+    const float logvar = mu[w.latent + j], spread = h.spread[r * w.latent + j],
+                d_z = h.d_decoder_input[r * w.decoder_input + j];
+    const float twice = loss_latent_twice(mu[j], logvar, spread);
+    const float weight = loss_kl_weight(h.latent_weight, h.free_bits, twice);
+    const float d_draw = loss_draw_gradient(h.sampled, d_z, d_mu[j]);
+    d_mu[j] += loss_mu_gradient(weight, mu[j], d_z);
+    d_mu[w.latent + j] =
+        loss_logvar_gradient(weight, logvar, spread, h.noise[r * w.latent + j], d_draw);
+    return twice;
 }
 
+/* A block has THREADS rows and takes their numbers in order, so that neighbours read neighbours. A
+ * number of mu does what its logvar needs, too. */
 static __global__ void heads_backward(GpuWidths w, GpuHeads h, int rows, int all, double *sums) {
-    const int64_t r = item();
-    const int feet_end = w.feet_offset + w.feet_count;
-    double group[3] = {0.0, 0.0, 0.0}, divergence = 0.0;
-    float *d = h.d_heads + r * w.heads;
-    for (int j = 0; r < all && j < w.feet_count; j++) {
-        d[w.feet_offset + j] += h.d_feet[r * w.feet + j];
-    }
-    if (r < rows) {
-        const float *heads = h.heads + r * w.heads;
-        const float *target = h.target + (int64_t)h.order[r] * w.estimates;
-        const float *d_input = h.d_decoder_input + r * w.decoder_input;
-        for (int j = 0; j < w.estimates; j++) {
-            d[j] += d_input[w.latent + j];
+    const int ends[] = {w.feet_offset, w.feet_offset + w.feet_count, w.estimates};
+    const int64_t first = (int64_t)blockIdx.x * THREADS;
+    double group[3] = {0.0, 0.0, 0.0}, twice = 0.0;
+    for (int k = 0; k < w.heads; k++) {
+        const uint32_t within = (uint32_t)(k * THREADS) + threadIdx.x;
+        const int64_t r = first + within / (uint32_t)w.heads;
+        const int column = (int)(within % (uint32_t)w.heads), foot = column - ends[0];
+        float *d = h.d_heads + r * w.heads + column;
+        if (r < all && foot >= 0 && column < ends[1]) {
+            *d += h.d_feet[r * w.feet + foot];
         }
-        group[0] = loss_estimates(0, w.feet_offset, h.estimate_weight, heads, target, d);
-        group[1] = loss_estimates(w.feet_offset, feet_end, h.estimate_weight, heads, target, d);
-        group[2] = loss_estimates(feet_end, w.estimates, h.estimate_weight, heads, target, d);
-        divergence =
-            latent_row(w.latent, h.latent_weight, h.free_bits, h.sampled, heads + w.estimates,
-                       h.spread + r * w.latent, h.noise + r * w.latent, d_input, d + w.estimates);
+        if (r >= rows || column >= w.estimates + w.latent) {
+            continue;
+        }
+        if (column >= w.estimates) {
+            twice += latent_backward(w, h, r, column - w.estimates);
+            continue;
+        }
+        *d += h.d_decoder_input[r * w.decoder_input + w.latent + column];
+        for (int g = 0, begin = 0; g < 3; begin = ends[g++]) {
+            if (column >= begin && column < ends[g]) {
+                const int width = ends[g] - begin;
+                group[g] += (double)loss_estimate(
+                                h.estimate_weight / (float)width, h.heads[r * w.heads + column],
+                                h.target[(int64_t)h.order[r] * w.estimates + column], d) /
+                            width;
+            }
+        }
     }
     double *own = sums + (int64_t)blockIdx.x * GPU_SUMS;
     for (int g = 0; g < 3; g++) {
         add_block_sum(group[g], own + GPU_SUM_ESTIMATE + g);
     }
-    add_block_sum(divergence, own + GPU_SUM_VAE_KL);
+    add_block_sum(0.5 * twice, own + GPU_SUM_VAE_KL);
 }
 
 void gpu_heads_backward(cudaStream_t stream, GpuWidths w, GpuHeads h, int rows, int all,
