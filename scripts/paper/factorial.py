@@ -337,6 +337,12 @@ def shares(values):
     return {name: value / whole if whole else 0.0 for name, value in found.items()}
 
 
+def whole_seeds(values):
+    """Seeds that all nets have on all grounds, of {(net, ground, seed): value}."""
+    nets, grounds, seeds = (sorted({key[i] for key in values}) for i in range(3))
+    return [s for s in seeds if all((n, g, s) in values for n in nets for g in grounds)]
+
+
 def table(lines):
     """Rows of the table: a controller and a ground, over its seeds."""
     rows = []
@@ -397,17 +403,19 @@ def report(factorial):
         cells = (", ".join(text_of(v, form) for v in row[key]) for key, form in (("velocity", ".2f"), ("cot", ".2f"), ("torque", ".0f")))
         print(f"| {CONTROLLERS[row['controller']]} | {row['ground']} | " + " | ".join(cells) + " |")
     values = {part: {(x["task"]["controller"], x["task"]["ground"], x["task"]["seed"]): x["skill"][part] for x in lines} for part in PARTS}
-    sizes = [len({key[i] for key in values[PARTS[0]]}) for i in range(3)]
-    whole = len(values[PARTS[0]]) == sizes[0] * sizes[1] * sizes[2]
-    answer = {part: shares(own) for part, own in values.items()} if whole else None
+    seeds = whole_seeds(values[PARTS[0]])
+    answer = {part: shares({key: v for key, v in own.items() if key[2] in seeds}) for part, own in values.items()} if seeds else None
+    if len(seeds) == 1:  # it cannot be told from the rest
+        answer = {part: {name: v for name, v in own.items() if name != "seed"} for part, own in answer.items()}
     print("\n" + ("\n".join(f"{part}: of the variance of the skill the net makes {s['net']:.0%}, the ground {s['ground']:.0%}, both together "
-                            f"{s['both']:.0%}, the seed {s['seed']:.0%}" for part, s in answer.items())
-                  if whole else "the net or the ground: not before each net has all grounds and seeds"))
+                            f"{s['both']:.0%}" + (f", the seed {s['seed']:.0%}" if "seed" in s else "") + f" (seeds {seeds})"
+                            for part, s in answer.items())
+                  if seeds else "the net or the ground: not before each net has all grounds with a seed"))
     search = [{**{k: t["task"][k] for k in ("controller", "choice")}, "kl_target": SEARCH[t["task"]["choice"]][0],
                "robots": SEARCH[t["task"]["choice"]][1], "skill": t["skill"]["tuning"], "score": t["score"]}
               for t in factorial.lines if t["done"] == "judged" and t["task"]["kind"] == "tune"]
     told = {"minutes": factorial.given.minutes, "steps": factorial.given.steps, "settings": factorial.settings, "search": search,
-            "chosen": factorial.choices(), "rows": rows, "table2": second, "shares": answer}
+            "chosen": factorial.choices(), "rows": rows, "table2": second, "shares": answer, "seeds": seeds}
     (factorial.folder / "factorial.json").write_text(json.dumps(told, indent=1) + "\n")
     try:
         import figures

@@ -80,6 +80,9 @@ def measures():
     assert abs(crossed["both"] - 1) < 1e-12
     seeds = factorial.shares({(n, g, s): float(s) for n in range(2) for g in range(2) for s in range(2)})
     assert abs(seeds["seed"] - 1) < 1e-12
+    assert factorial.whole_seeds(values) == [0, 1, 2]
+    del values[1, 0, 1]
+    assert factorial.whole_seeds(values) == [0, 2]
     assert len(factorial.PAIRS) == 9 and all(len({p.split(">")[i] for p in factorial.PAIRS}) == 9 for i in range(2))
     assert all(p in factorial.transitions.PAIRS for p in factorial.PAIRS)
 
