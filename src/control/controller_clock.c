@@ -48,7 +48,7 @@ static void clock_decide(const Clock *clock, const float *frame, const float *la
 
 static void clock_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
     const Clock *clock = self;
-    const int entered = product_enter();
+    const int entered = product_enter(0);
     for (int r = 0; r < rows; r++) {
         float *action = actions + r * clock->joints;
         const float *last = envs[r]->action[0];

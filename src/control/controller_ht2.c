@@ -212,7 +212,7 @@ static void act_piece(void *context, int row, int thread) {
     const Ht2 *ht2 = call->ht2;
     float *frames = ht2->frames + (long)row * ht2->context * ht2->observation;
     const int tokens = remember(ht2, row, call->envs[row], frames);
-    const int entered = product_enter();
+    const int entered = product_enter(0);
     infer(ht2, &ht2->scratch[thread], frames, tokens, ht2->seen[row] <= ht2->context,
           call->actions + (long)row * ht2->joints);
     product_leave(entered);

@@ -178,7 +178,7 @@ static void run_slot(void *context, int slot, int thread) {
     MlpOutputs critic;
     carve_slot(&job->policy->network,
                job->policy->scratch + (size_t)slot * job->policy->slot_floats, &outputs, &critic);
-    int entered = product_enter();
+    int entered = product_enter(job->rows->bf16);
     for (int chunk = slot; chunk < job->chunks; chunk += job->slots) {
         int rows;
         const int first = chunk_rows(job, chunk, &rows);

@@ -17,6 +17,7 @@ struct Policy {
 /* Rows in blocks of equal length. A block is cut into runs, and no chunk of rows that goes through
  * the networks reaches over a cut. */
 typedef struct {
+    int bf16; /* bool: factors of products are rounded (product_enter) */
     int blocks, runs;
     int cut[PPO_SHARDS_MAX + 1]; /* run r of a block is rows cut[r] .. cut[r + 1] - 1; cut[0] = 0 */
 } PolicyRows;

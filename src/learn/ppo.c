@@ -362,7 +362,8 @@ static void act_piece(void *context, int piece, int thread) {
 /* Rows of `times` time steps, cut between the strata, so that a row is multiplied among the same
  * neighbours whichever process has it: oneDNN's products can depend on them in the last bit. */
 static PolicyRows rows_of(const Ppo *ppo, int times) {
-    PolicyRows rows = {.blocks = times, .runs = ppo->part.shards};
+    PolicyRows rows = {
+        .bf16 = ppo->def.matmul == PPO_MATMUL_BF16, .blocks = times, .runs = ppo->part.shards};
     for (int s = 0; s < ppo->part.shards; s++) {
         const OrderStratum stratum = order_part_stratum(1, ppo->part, ppo->part.shard + s);
         rows.cut[s + 1] = stratum.first + stratum.width;

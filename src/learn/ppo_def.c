@@ -109,7 +109,8 @@ const MildField ppo_fields[] = {
         "policy; 0: no mean"),
     MILD_FIELD_CHOICE(
         PpoDef, matmul, matmul_names, PPO_MATMULS,
-        "[-] arithmetic of the matrix products with train.device = cuda; tf32 rounds the "
-        "factors, bf16 all numbers between the layers (docs/gpu.md)"),
+        "[-] arithmetic of the matrix products: tf32 rounds their factors on a GPU; bf16 all "
+        "numbers between the layers there, and factors on a CPU with AVX512_BF16 or AMX "
+        "(docs/gpu.md)"),
 };
 const int ppo_field_count = (int)(sizeof ppo_fields / sizeof *ppo_fields);

@@ -140,7 +140,7 @@ static void gradient_piece(void *context, int piece, int thread) {
     loss_carve(n, PPO_CHUNK, ppo->mirror_rows, ppo->scratch + (size_t)thread * ppo->scratch_floats,
                &chunk);
     const int begin = job->minibatch->cut[shard], end = job->minibatch->cut[shard + 1];
-    const int entered = product_enter();
+    const int entered = product_enter(ppo->def.matmul == PPO_MATMUL_BF16);
     if (begin == end) {
         clear_half(n, critic, gradient);
     }

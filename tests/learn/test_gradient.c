@@ -136,7 +136,7 @@ static void check_minibatch(Case *c, int count, uint32_t draw, double share) {
     double norm, squares = 0.0, worst = 0.0;
     memset(c->ppo->gradient, 0xff, SHARDS * c->ppo->stride * sizeof(float)); /* NaN */
     ppo_gradient(c->ppo, &c->context, &minibatch, &sums, &norm);
-    int entered = product_enter();
+    int entered = product_enter(0);
     for (int p = 0, next = 0; p < count; p++) {
         int image = next < images && which[next] == p;
         next += image;

@@ -69,7 +69,7 @@ static void case_close(Case *c) {
 
 /* Gradient left by an earlier minibatch must not show: it starts as NaN. */
 static void case_run(Case *c) {
-    const int entered = product_enter();
+    const int entered = product_enter(0);
     for (int r = 0; r < MIRRORED; r++) {
         loss_mirror_row(&c->context, &c->chunk, r, ROWS + r);
     }

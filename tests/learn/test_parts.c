@@ -92,7 +92,7 @@ TEST(test_refused_product) {
     for (int i = 0; i < 8; i++) {
         assert_true(i < 5 && i != 2 ? isnan(c[i]) : c[i] == 7.0f);
     }
-    const int before = omp_get_max_threads(), entered = product_enter();
+    const int before = omp_get_max_threads(), entered = product_enter(0);
     assert_int_equal(entered, before);
     assert_int_equal(omp_get_max_threads(), 1);
     product_leave(3);

@@ -102,7 +102,8 @@ TEST(test_rows_in_runs) {
     static float actions[3][ROWS * 12], values[3][ROWS];
     fill_normal(history, ROWS * 282, 1.0, &random);
     fill_normal(critic, ROWS * 98, 1.0, &random);
-    const PolicyRows both = {BLOCKS, 2, {0, FIRST, WIDTH}}, second = {BLOCKS, 1, {0, SECOND}};
+    const PolicyRows both = {.blocks = BLOCKS, .runs = 2, .cut = {0, FIRST, WIDTH}},
+                     second = {.blocks = BLOCKS, .runs = 1, .cut = {0, SECOND}};
     memset(actions[1], 0xff, sizeof actions[1]);
     memset(values[1], 0xff, sizeof values[1]);
     policy_act(policy, NULL, ROWS, history, actions[0], NULL, NULL);

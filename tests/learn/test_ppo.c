@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "learn/network.h"
+#include "learn/product_bf16.h"
 
 typedef struct {
     Policy *policy;
@@ -62,13 +63,13 @@ static PpoDef toy_ppo_def(void) {
 
 /* Shards, chunks and their order are fixed by the batch alone. 64 environments x 40 steps: several
  * chunks per shard. */
-TEST(test_threads_change_nothing) {
+static uint64_t check_threads(PpoDef def) {
     Run one;
-    run_open(&one, 1, 64, toy_ppo_def());
+    run_open(&one, 1, 64, def);
     PpoReport report = run_iterations(&one, 2);
     for (int threads = 2; threads <= 3; threads++) {
         Run more;
-        run_open(&more, threads, 64, toy_ppo_def());
+        run_open(&more, threads, 64, def);
         PpoReport other = run_iterations(&more, 2);
         assert_same_parameters(&one, &more);
         assert_true(ppo_hash(more.ppo) == ppo_hash(one.ppo));
@@ -80,6 +81,14 @@ TEST(test_threads_change_nothing) {
     run_iterations(&one, 1);
     assert_true(ppo_hash(one.ppo) != hash);
     run_close(&one);
+    return hash;
+}
+
+TEST(test_threads_change_nothing) {
+    PpoDef def = toy_ppo_def();
+    const uint64_t whole = check_threads(def);
+    def.matmul = PPO_MATMUL_BF16;
+    assert_true((check_threads(def) != whole) == product_has_bf16());
 }
 
 TEST(test_resume_is_as_if_never_stopped) {
@@ -346,9 +355,11 @@ TEST(test_nothing_valid_changes_nothing) {
 /* Resting anywhere in [-1, 1] earns 0.44 /s on average; the goal, reached at once, about 0.93. What
  * was learned must stay: with returns ten times as large the critic could not follow, and the
  * policy fell back to 0.2 by iteration 60. */
-TEST(test_learns_the_toy_task) {
+static void check_toy(int matmul) {
+    PpoDef def = toy_ppo_def();
+    def.matmul = matmul;
     Run run;
-    run_open(&run, 1, 64, toy_ppo_def());
+    run_open(&run, 1, 64, def);
     double begin = clock_seconds(), first = 0.0, reward = 0.0;
     PpoReport report = {0};
     int iteration = 0;
@@ -374,6 +385,14 @@ TEST(test_learns_the_toy_task) {
     print_message("toy: at least %.3f in 60 more iterations\n", least);
     assert_true(least >= 0.88);
     run_close(&run);
+}
+
+TEST(test_learns_the_toy_task) {
+    check_toy(PPO_MATMUL_FP32);
+}
+
+TEST(test_learns_with_rounded_products) {
+    check_toy(PPO_MATMUL_BF16);
 }
 
 TEST(test_create_refuses) {

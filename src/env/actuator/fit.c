@@ -289,7 +289,7 @@ static void fit_kind(void *context, int piece, int thread) {
         return;
     }
     const ActuatorScale scale = find_scale(work);
-    const int entered = product_enter();
+    const int entered = product_enter(0);
     train(work, scale, &mlp, &training);
     product_leave(entered);
     actuator_set(work->actuator, work->kind, scale, training.parameters);
