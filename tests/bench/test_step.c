@@ -11,11 +11,22 @@
 
 static double now, lowest_floor;
 static int is_false; /* bool: this clock */
+/* Of bench walk: what the steps of ours took on each ground, with each of both tolerances. */
+enum { GROUNDS = 3 };
+static struct { double steps, iterations, unconverged; } ours[GROUNDS][2];
+static int recorded;   /* walks; the ground of the last one is replayed */
+static int is_walking; /* bool: the walk is recorded */
+static int is_loose;   /* bool: the tolerance that is set is a walk's, not the solver's own */
+static double walks;   /* [s] that a step takes longer by the engine, in the walk now timed */
 static int
     by_case; /* bool: the engine 0.5 s more in contact, ours 1 s by Newton and 4 s by sweeps */
 
+static int reads =
+    -1; /* of the clock in a step, each by as many seconds as before it; -1: outside */
+
 double clock_seconds(void) {
     struct timespec time;
+    now += reads < 0 ? 0 : reads++;
     clock_gettime(CLOCK_MONOTONIC, &time);
     return is_false ? now : (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
@@ -32,6 +43,17 @@ void __wrap_mj_step(const mjModel *m, mjData *d) {
     lowest_floor = fmin(lowest_floor, name < 0 ? 0 : m->geom_pos[3 * name + 2]);
     now += 2;
     now += by_case && d->ncon > 0 ? 0.5 : 0;
+    now += walks;
+}
+
+void __real_robot_sim_set_solver(RobotSim *sim, MildSolver solver, double tolerance,
+                                 int iterations);
+void __wrap_robot_sim_set_solver(RobotSim *sim, MildSolver solver, double tolerance,
+                                 int iterations);
+void __wrap_robot_sim_set_solver(RobotSim *sim, MildSolver solver, double tolerance,
+                                 int iterations) {
+    is_loose = tolerance > 0;
+    __real_robot_sim_set_solver(sim, solver, tolerance, iterations);
 }
 
 int __real_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
@@ -40,11 +62,32 @@ int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *pus
                           const MildTerrain *terrain, MildGround *ground);
 int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
                           const MildTerrain *terrain, MildGround *ground) {
+    reads = 0;
     const int bad = __real_robot_sim_step(sim, torque, push, terrain, ground);
+    reads = -1;
     const int iterations = robot_sim_contact(sim)->iterations;
     now += 3;
     now += !by_case || iterations == 0 ? 0 : iterations < 20 ? 1 : 4;
+    now += walks * iterations;
+    if (!is_walking && recorded > 0 && recorded <= GROUNDS) {
+        ours[recorded - 1][is_loose].steps++;
+        ours[recorded - 1][is_loose].iterations += iterations;
+        ours[recorded - 1][is_loose].unconverged += !robot_sim_contact(sim)->converged;
+    }
     return bad;
+}
+
+Replay *__real_bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
+                                 MildModel model, int periods, MildError *error);
+Replay *__wrap_bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
+                                 MildModel model, int periods, MildError *error);
+Replay *__wrap_bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
+                                 MildModel model, int periods, MildError *error) {
+    is_walking = 1;
+    Replay *replay = __real_bench_record_walk(def, robot, ground, model, periods, error);
+    is_walking = 0;
+    recorded++;
+    return replay;
 }
 
 /* The time of a step is that of all steps by their number, none left out and none twice. */
@@ -98,11 +141,9 @@ TEST(test_rows) {
     static const struct {
         const char *name;
         double wanted;
-    } rows[] = {{"engine_free", 2e6},
-                {"engine_rigid", 2.5e6},
-                {"newton", 4e6},
-                {"gauss_seidel", 7e6},
-                {"ratio_to_rigid", 1.6}};
+    } rows[] = {{"engine_free", 2e6},  {"engine_rigid", 2.5e6}, {"newton", 4e6},
+                {"gauss_seidel", 7e6}, {"ratio_to_rigid", 1.6}, {"newton_smooth", 1e6},
+                {"newton_map", 2e6},   {"newton_ground", 3e6},  {"newton_finish", 4e6}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         print_message("%-16s %g\n", rows[i].name, value_of(&report, rows[i].name));
         assert_true(fabs(value_of(&report, rows[i].name) / rows[i].wanted - 1) < 1e-6);
@@ -110,6 +151,57 @@ TEST(test_rows) {
     assert_true(value_of(&report, "rigid") >= 3e6 && value_of(&report, "rigid") < 3.5e6);
     const double iterations = value_of(&report, "newton_iterations");
     assert_true(iterations >= 1 && iterations < 20);
+}
+
+static double walk_value(const BenchReport *report, const char *ground, const char *what) {
+    char name[64];
+    snprintf(name, sizeof name, "%s_%s", ground, what);
+    return value_of(report, name);
+}
+
+static void check_walk(const BenchReport *report, const char *ground, int g) {
+    static const char *const rows[2][3] = {{"iterations_tight", "newton_tight", "ratio_tight"},
+                                           {"iterations", "newton", "ratio_to_rigid"}};
+    double iterations[2];
+    for (int loose = 0; loose < 2; loose++) {
+        iterations[loose] = ours[g][loose].iterations / ours[g][loose].steps;
+        const double seconds = 3 + walks * iterations[loose];
+        print_message("%s: %g iterations, %g s\n", ground, iterations[loose], seconds);
+        expect_near("iterations", walk_value(report, ground, rows[loose][0]), iterations[loose],
+                    1e-9);
+        expect_near("time", 1e-6 * walk_value(report, ground, rows[loose][1]), seconds, 1e-9);
+        expect_near("ratio", walk_value(report, ground, rows[loose][2]), seconds / (2 + walks),
+                    1e-9);
+    }
+    expect_near("engine", 1e-6 * walk_value(report, ground, "engine_rigid"), 2 + walks, 1e-9);
+    const double unconverged = ours[g][1].unconverged / ours[g][1].steps;
+    expect_near("unconverged", walk_value(report, ground, "unconverged"), unconverged, 1e-9);
+    assert_true(unconverged > 0 && fabs(iterations[1] - iterations[0]) > 0.01);
+}
+
+/* Each ground's rows are those of its own walk: iterations and times, by a clock that a step of ours
+ * moves by its iterations, further on each ground, and the engine's by the ground alone. */
+TEST(test_walk_rows) {
+    static const char *const grounds[GROUNDS] = {"sand_loose", "foam45", "grass"};
+    BenchReport report = {.count = 0};
+    MildError error = {0};
+    ExperimentDef def = experiment_def_default();
+    if (kit_short()) {
+        return;
+    }
+    def.task.contact_iterations = 2; /* so that some do not converge */
+    is_false = 1;
+    recorded = 0;
+    walks = 0.125;
+    memset(ours, 0, sizeof ours);
+    expect_good(bench_walk(&def, &report, &error) == MILD_OK, &error);
+    for (int g = 0; g < GROUNDS; g++) {
+        check_walk(&report, grounds[g], g);
+    }
+    expect_near("rigid", 1e-6 * value_of(&report, "rigid_engine_rigid"), 2 + walks, 1e-9);
+    assert_int_equal(report.count, GROUNDS * 8 + 1);
+    is_false = 0;
+    walks = 0;
 }
 
 /* The benchmark runs and reports positive times; how long they are is not a test's business. */
