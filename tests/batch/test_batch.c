@@ -706,6 +706,28 @@ static void says(MildStatus status, MildStatus wanted, MildError *error, const c
     assert_error(error, wanted, names);
 }
 
+/* Maps that a batch does not know, and what one adds to a robot's memory. */
+static void check_maps(MildBatch *batch, const MildGround *good) {
+    MildError e = {0};
+    MildMapDef of = mild_map_def_default();
+    of.patches = MILD_PATTERN_STRIPES;
+    MildMap *sharp = make_map(&of);
+    of.border = 0.2;
+    MildMap *blended = make_map(&of);
+    of.patches = MILD_PATTERN_NONE;
+    MildMap *plain = make_map(&of);
+    says(mild_batch_set_map(batch, blended, &e), MILD_ERROR_ARGUMENT, &e, "terrain.border");
+    assert_int_equal(mild_batch_robot_bytes(batch), 10 * 160 * sizeof(float));
+    assert_int_equal(mild_batch_set_map(batch, sharp, &e), MILD_OK);
+    assert_int_equal(mild_batch_robot_bytes(batch), (14 * 160 + 32) * sizeof(float));
+    assert_int_equal(mild_batch_load(batch, 0, good, &e), MILD_OK);
+    assert_int_equal(mild_batch_set_map(batch, plain, &e), MILD_OK);
+    assert_int_equal(mild_batch_robot_bytes(batch), 10 * 160 * sizeof(float));
+    mild_map_destroy(sharp);
+    mild_map_destroy(blended);
+    mild_map_destroy(plain);
+}
+
 /* What a ground remembers and a batch cannot, and maps that it does not know. */
 TEST(strange_ground_is_refused) {
     const MildSole *soles[2] = {left, right};
@@ -750,24 +772,8 @@ TEST(strange_ground_is_refused) {
     says(mild_batch_load(batch, 0, good, &e), MILD_ERROR_ARGUMENT, &e, "robot 0 mixture");
     memory.material[4] = 1;
 
-    MildMapDef of = mild_map_def_default();
-    of.patches = MILD_PATTERN_STRIPES;
-    MildMap *sharp = make_map(&of);
-    of.border = 0.2;
-    MildMap *blended = make_map(&of);
-    of.patches = MILD_PATTERN_NONE;
-    MildMap *plain = make_map(&of);
-    says(mild_batch_set_map(batch, blended, &e), MILD_ERROR_ARGUMENT, &e, "terrain.border");
-    assert_int_equal(mild_batch_robot_bytes(batch), 10 * 160 * sizeof(float));
-    assert_int_equal(mild_batch_set_map(batch, sharp, &e), MILD_OK);
-    assert_int_equal(mild_batch_robot_bytes(batch), (14 * 160 + 32) * sizeof(float));
-    assert_int_equal(mild_batch_load(batch, 0, good, &e), MILD_OK);
-    assert_int_equal(mild_batch_set_map(batch, plain, &e), MILD_OK);
-    assert_int_equal(mild_batch_robot_bytes(batch), 10 * 160 * sizeof(float));
+    check_maps(batch, good);
     mild_batch_destroy(batch);
-    mild_map_destroy(sharp);
-    mild_map_destroy(blended);
-    mild_map_destroy(plain);
     kit_close(&one);
     kit_close(&prints);
     kit_close(&fits);

@@ -179,8 +179,8 @@ static void check_walk(const BenchReport *report, const char *ground, int g) {
     assert_true(unconverged > 0 && fabs(iterations[1] - iterations[0]) > 0.01);
 }
 
-/* Each ground's rows are those of its own walk: iterations and times, by a clock that a step of ours
- * moves by its iterations, further on each ground, and the engine's by the ground alone. */
+/* Each ground's rows are those of its own walk: iterations and times, by a clock that a step of
+ * ours moves by its iterations, and the engine's by a share. */
 TEST(test_walk_rows) {
     static const char *const grounds[GROUNDS] = {"sand_loose", "foam45", "grass"};
     BenchReport report = {.count = 0};
