@@ -190,8 +190,8 @@ TEST(test_walk_rows) {
     walks = 0;
 }
 
-/* Where a walk's steps all take the same, so does their mean; the engine's floor lies as deep as the
- * soles on soft ground. */
+/* Where a walk's steps all take the same, so does their mean; the engine's floor lies as deep as
+ * the soles on soft ground. */
 TEST(test_whole_walk) {
     BenchReport report = {.count = 0};
     MildError error = {0};

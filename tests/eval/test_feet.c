@@ -1,5 +1,5 @@
-/* What --feet writes of trials whose samples are made up: their values, angles of a turned foot, the
- * pressure centre by its definition, and the order of the rows. */
+/* What --feet writes of trials whose samples are made up: their values, angles of a turned foot,
+ * the pressure centre by its definition, and the order of the rows. */
 #include <mujoco/mujoco.h>
 
 #include "env/envs.h"
