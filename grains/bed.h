@@ -67,7 +67,7 @@ inline Law bed_law(const BedDef &def) {
 }
 
 /* A loose lattice with grains off their sites by chance; its sizes and places are the seed's. */
-inline std::vector<Vec> bed_fill(const BedDef &def, uint64_t seed) {
+inline std::vector<Vec3> bed_fill(const BedDef &def, uint64_t seed) {
     std::mt19937_64 random(seed);
     const auto uniform = [&random] { return (float)(random() >> 40) / (float)(1 << 24); };
     const float widest = def.grain * (1 + def.spread), pitch = 1.12f * widest;
@@ -75,10 +75,10 @@ inline std::vector<Vec> bed_fill(const BedDef &def, uint64_t seed) {
     const float solid = 0.58f, volume = 0.5235988f * def.grain * def.grain * def.grain;
     const double wanted = 1.06 * (double)(solid * def.length * def.width * def.depth / volume);
     const int nz = (int)(wanted / (nx * ny)) + 1;
-    std::vector<Vec> grains; /* unused: the radius */
+    std::vector<Vec3> grains; /* unused: the radius */
     for (int k = 0; k < nx * ny * nz; k++) {
         const float off = pitch - widest;
-        Vec p =
+        Vec3 p =
             vec(((float)(k % nx) + 0.5f) * def.length / (float)nx + off * (uniform() - 0.5f),
                 ((float)(k / nx % ny) + 0.5f) * def.width / (float)ny + off * (uniform() - 0.5f),
                 ((float)(k / nx / ny) + 0.5f) * pitch + off * (uniform() - 0.5f));
@@ -88,13 +88,13 @@ inline std::vector<Vec> bed_fill(const BedDef &def, uint64_t seed) {
     return grains;
 }
 
-inline std::vector<Vec> bed_read(const std::string &file) {
+inline std::vector<Vec3> bed_read(const std::string &file) {
     FILE *in = fopen(file.c_str(), "r");
     if (!in) {
         stop("cannot read ", file.c_str());
     }
-    std::vector<Vec> grains;
-    Vec p = {};
+    std::vector<Vec3> grains;
+    Vec3 p = {};
     while (fscanf(in, "%f %f %f %f", &p.x, &p.y, &p.z, &p.unused) == 4) {
         grains.push_back(p);
     }
@@ -112,8 +112,8 @@ inline void bed_allocate(Grains *g) {
     g->place = allocate<Place>(n);
     g->next_place = allocate<Place>(n);
     g->listed = allocate<Place>(n);
-    for (Vec **v : {&g->velocity, &g->next_velocity, &g->spin, &g->next_spin}) {
-        *v = allocate<Vec>(n);
+    for (Vec3 **v : {&g->velocity, &g->next_velocity, &g->spin, &g->next_spin}) {
+        *v = allocate<Vec3>(n);
     }
     for (int **list : {&g->neighbour, &g->next_neighbour}) {
         *list = allocate<int>(n * NEIGHBOURS);
@@ -121,11 +121,11 @@ inline void bed_allocate(Grains *g) {
     for (uint32_t **bits : {&g->touching, &g->next_touching}) {
         *bits = allocate<uint32_t>(n);
     }
-    for (Vec **v : {&g->slip, &g->next_slip}) {
-        *v = allocate<Vec>(n * SLOTS);
+    for (Vec3 **v : {&g->slip, &g->next_slip}) {
+        *v = allocate<Vec3>(n * SLOTS);
     }
-    for (Vec **v : {&g->roll, &g->next_roll}) {
-        *v = g->law.mu_roll > 0 ? allocate<Vec>(n * SLOTS) : nullptr;
+    for (Vec3 **v : {&g->roll, &g->next_roll}) {
+        *v = g->law.mu_roll > 0 ? allocate<Vec3>(n * SLOTS) : nullptr;
     }
     g->cell_count = allocate<int>(cells);
     g->cell = allocate<int>(cells * CELL_GRAINS);
@@ -146,11 +146,11 @@ inline void bed_close(Bed *bed) {
     bed->g = {};
 }
 
-inline void bed_put(Bed *bed, int b, const std::vector<Vec> &grains) {
+inline void bed_put(Bed *bed, int b, const std::vector<Vec3> &grains) {
     const Grains &g = bed->g;
     std::vector<Place> place((size_t)g.per);
     for (size_t i = 0; i < grains.size(); i++) {
-        const Vec p = grains[i];
+        const Vec3 p = grains[i];
         place[i] = {shifted(0, fmodf(p.x, g.size_x), g.unit.x),
                     shifted(0, fmodf(p.y, g.size_y), g.unit.y), shifted(0, p.z, g.unit.z),
                     p.unused};
@@ -168,7 +168,7 @@ inline void bed_cells(Grains *g, const BedDef &def) {
 
 /* The grains where they are put at first. Nothing moves before bed_go. */
 inline void bed_open(Bed *bed, const BedDef &def) {
-    std::vector<std::vector<Vec>> grains;
+    std::vector<std::vector<Vec3>> grains;
     Grains &g = bed->g;
     float top = 0;
     bed->def = def;
@@ -176,7 +176,7 @@ inline void bed_open(Bed *bed, const BedDef &def) {
     for (uint64_t seed : def.seeds) {
         grains.push_back(def.file.empty() ? bed_fill(def, seed) : bed_read(def.file));
         g.per = std::max(g.per, (int)grains.back().size());
-        for (const Vec &p : grains.back()) {
+        for (const Vec3 &p : grains.back()) {
             top = fmaxf(top, p.z + p.unused);
         }
     }
@@ -339,7 +339,7 @@ inline void bed_level(Bed *bed) {
                          [&key](const Place &a, const Place &c) { return key(a) < key(c); });
     }
     copy(g.place, place.data(), place.size());
-    for (Vec *v : {g.velocity, g.next_velocity, g.spin, g.next_spin}) {
+    for (Vec3 *v : {g.velocity, g.next_velocity, g.spin, g.next_spin}) {
         clear(v, (size_t)g.count);
     }
     clear(g.touching, (size_t)g.count);
@@ -362,13 +362,13 @@ inline std::vector<std::pair<char *, size_t>> bed_parts(const Grains &g) {
     const size_t n = (size_t)g.count;
     std::vector<std::pair<char *, size_t>> parts = {
         {(char *)g.place, n * sizeof(Place)},
-        {(char *)g.velocity, n * sizeof(Vec)},
-        {(char *)g.spin, n * sizeof(Vec)},
+        {(char *)g.velocity, n * sizeof(Vec3)},
+        {(char *)g.spin, n * sizeof(Vec3)},
         {(char *)g.touching, n * sizeof(uint32_t)},
         {(char *)g.neighbour, n * NEIGHBOURS * sizeof(int)},
-        {(char *)g.slip, n * SLOTS * sizeof(Vec)}};
+        {(char *)g.slip, n * SLOTS * sizeof(Vec3)}};
     if (g.roll) {
-        parts.push_back({(char *)g.roll, n * SLOTS * sizeof(Vec)});
+        parts.push_back({(char *)g.roll, n * SLOTS * sizeof(Vec3)});
     }
     return parts;
 }

@@ -54,41 +54,41 @@ inline float contact_damping(float restitution, bool hertz) {
 
 /* What one of the two, body a, sees. */
 struct Contact {
-    Vec normal;    /* from b to a, 1 */
+    Vec3 normal;   /* from b to a, 1 */
     float overlap; /* [m] */
     float mass;    /* m_a m_b/(m_a + m_b) [kg] */
     float radius;  /* r_a r_b/(r_a + r_b) [m] */
-    Vec velocity;  /* of a's surface over b's at the contact [m/s] */
-    Vec turning;   /* angular velocity of a over b [rad/s] */
+    Vec3 velocity; /* of a's surface over b's at the contact [m/s] */
+    Vec3 turning;  /* angular velocity of a over b [rad/s] */
 };
 
 /* What a contact remembers: the paths slid and rolled [m]. */
 struct Memory {
-    Vec slip, roll;
+    Vec3 slip, roll;
 };
 
 /* The vector in the plane across the normal, as long as before: the plane has turned. */
-DEVICE Vec turned(Vec path, Vec normal) {
-    const Vec flat = path - dot(path, normal) * normal;
+DEVICE Vec3 turned(Vec3 path, Vec3 normal) {
+    const Vec3 flat = path - dot(path, normal) * normal;
     const float before = length(path), now = length(flat);
     return now > 0.0f ? (before / now) * flat : flat;
 }
 
 /* Force of a spring and dashpot on `path`, which slips so that it stays below `most`. */
-DEVICE Vec held(Vec *path, Vec velocity, float stiffness, float damping, float most) {
-    const Vec push = damping * velocity;
-    const Vec force = vec(0, 0, 0) - stiffness * *path - push;
+DEVICE Vec3 held(Vec3 *path, Vec3 velocity, float stiffness, float damping, float most) {
+    const Vec3 push = damping * velocity;
+    const Vec3 force = vec(0, 0, 0) - stiffness * *path - push;
     const float size = length(force);
     if (size <= most) {
         return force;
     }
-    const Vec least = (most / size) * force;
+    const Vec3 least = (most / size) * force;
     *path = (-1.0f / stiffness) * (least + push);
     return least;
 }
 
 /* Force on a [N]; *torque is that of rolling resistance alone [N m]. */
-DEVICE Vec contact_force(const Law &law, const Contact &c, Memory *memory, Vec *torque) {
+DEVICE Vec3 contact_force(const Law &law, const Contact &c, Memory *memory, Vec3 *torque) {
     const float pressed = law.hertz ? sqrtf(c.radius * c.overlap) : 1.0f;
     const float slope = law.stiffness * pressed; /* dF/d overlap [N/m] */
     const float elastic = (law.hertz ? 2.0f / 3.0f : 1.0f) * slope * c.overlap;
@@ -97,15 +97,15 @@ DEVICE Vec contact_force(const Law &law, const Contact &c, Memory *memory, Vec *
     const float closing = dot(c.velocity, c.normal);
     const float normal = fmaxf(elastic - damping * closing, 0.0f);
 
-    const Vec sliding = c.velocity - closing * c.normal;
+    const Vec3 sliding = c.velocity - closing * c.normal;
     const float stiff = law.shear * slope, damp = SHEAR_DAMPING * damping;
     memory->slip = turned(memory->slip, c.normal) + law.dt * sliding;
-    const Vec shear = held(&memory->slip, sliding, stiff, damp, law.mu * normal);
+    const Vec3 shear = held(&memory->slip, sliding, stiff, damp, law.mu * normal);
 
     if (law.mu_roll > 0.0f) {
-        const Vec rolling = c.radius * cross(c.turning, c.normal);
+        const Vec3 rolling = c.radius * cross(c.turning, c.normal);
         memory->roll = turned(memory->roll, c.normal) + law.dt * rolling;
-        const Vec force = held(&memory->roll, rolling, stiff, damp, law.mu_roll * normal);
+        const Vec3 force = held(&memory->roll, rolling, stiff, damp, law.mu_roll * normal);
         *torque = *torque + c.radius * cross(c.normal, force);
     }
     return normal * c.normal + shear;

@@ -117,35 +117,35 @@ DEVICE void add_to(long long *sum, long long value) {
 #endif
 
 /* Three numbers; the fourth only makes it one load of 16 bytes. */
-struct alignas(16) Vec {
+struct alignas(16) Vec3 {
     float x, y, z, unused;
 };
 
-BOTH Vec vec(float x, float y, float z) {
-    return Vec{x, y, z, 0.0f};
+BOTH Vec3 vec(float x, float y, float z) {
+    return Vec3{x, y, z, 0.0f};
 }
 
-BOTH Vec operator+(Vec a, Vec b) {
+BOTH Vec3 operator+(Vec3 a, Vec3 b) {
     return vec(a.x + b.x, a.y + b.y, a.z + b.z);
 }
 
-BOTH Vec operator-(Vec a, Vec b) {
+BOTH Vec3 operator-(Vec3 a, Vec3 b) {
     return vec(a.x - b.x, a.y - b.y, a.z - b.z);
 }
 
-BOTH Vec operator*(float s, Vec a) {
+BOTH Vec3 operator*(float s, Vec3 a) {
     return vec(s * a.x, s * a.y, s * a.z);
 }
 
-BOTH float dot(Vec a, Vec b) {
+BOTH float dot(Vec3 a, Vec3 b) {
     return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
-BOTH Vec cross(Vec a, Vec b) {
+BOTH Vec3 cross(Vec3 a, Vec3 b) {
     return vec(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
 }
 
-BOTH float length(Vec a) {
+BOTH float length(Vec3 a) {
     return sqrtf(dot(a, a));
 }
 

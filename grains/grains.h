@@ -43,18 +43,18 @@ struct Grains {
     Range moving;                 /* the others stand still */
     Range near;                   /* the others are far from those that move */
     float size_x, size_y, size_z; /* of the box [m] */
-    Vec unit;                     /* of positions [m] */
+    Vec3 unit;                    /* of positions [m] */
     float leeway, most_leeway;    /* [m] that a grain may move before lists are due; a fast one */
     int cells_x, cells_y, cells_z;
     Law law;
     Shape shape;
 
     Place *place, *next_place; /* after a step they change places */
-    Vec *velocity, *next_velocity, *spin, *next_spin;
+    Vec3 *velocity, *next_velocity, *spin, *next_spin;
     Place *listed; /* places when the lists were made; its radius has the grain's leeway in it */
     int *neighbour, *next_neighbour;
     uint32_t *touching, *next_touching; /* bits of the slots that remember something */
-    Vec *slip, *next_slip, *roll, *next_roll;
+    Vec3 *slip, *next_slip, *roll, *next_roll;
     int *cell_count, *cell;
     int *flags;
     Plate *plate;
@@ -74,7 +74,7 @@ BOTH int range_grain(const Grains &g, const Range &range, int k) {
     return at < range.count[bed] ? bed * g.per + (range.first[bed] + at) % g.per : -1;
 }
 
-BOTH Vec from_to(const Grains &g, const Place &a, const Place &b) {
+BOTH Vec3 from_to(const Grains &g, const Place &a, const Place &b) {
     return vec((float)(int32_t)(b.x - a.x) * g.unit.x, (float)(int32_t)(b.y - a.y) * g.unit.y,
                (float)(int32_t)(b.z - a.z) * g.unit.z);
 }
@@ -136,7 +136,7 @@ DEVICE int list_cell(const Grains &g, int i, const Place &a, int c, int *list, i
     for (int k = 0; k < grains; k++) {
         const int j = g.cell[c * CELL_GRAINS + k];
         const Place b = g.listed[j];
-        const Vec d = from_to(g, b, a);
+        const Vec3 d = from_to(g, b, a);
         const float near = a.radius + b.radius;
         if (j == i || dot(d, d) >= near * near) {
             continue;
@@ -211,7 +211,7 @@ DEVICE void grain_watch(int k, const Grains &g) {
     if (i < 0) {
         return;
     }
-    const Vec d = from_to(g, g.listed[i], g.place[i]);
+    const Vec3 d = from_to(g, g.listed[i], g.place[i]);
     const float moved = length(d), leeway = g.listed[i].radius - g.place[i].radius;
     const float next = 2.0f * (float)CHECK_STEPS * g.law.dt * length(g.velocity[i]);
     if (moved + next > leeway) {
@@ -223,9 +223,9 @@ DEVICE void grain_watch(int k, const Grains &g) {
 
 struct Body {
     Place place;
-    Vec velocity, spin;
+    Vec3 velocity, spin;
     float mass;
-    Vec force, torque;
+    Vec3 force, torque;
 };
 
 BOTH float grain_mass(const Law &law, float radius) {
@@ -245,10 +245,10 @@ DEVICE Memory recall(const Grains &g, int i, int s, uint32_t touching) {
 }
 
 /* Adds the force of a contact to grain `i`, and returns it. `arm` is from its centre. */
-DEVICE Vec grain_touch(const Grains &g, int i, int s, uint32_t touching, const Contact &c,
-                       float arm, Body *a) {
+DEVICE Vec3 grain_touch(const Grains &g, int i, int s, uint32_t touching, const Contact &c,
+                        float arm, Body *a) {
     Memory memory = recall(g, i, s, touching);
-    const Vec force = contact_force(g.law, c, &memory, &a->torque);
+    const Vec3 force = contact_force(g.law, c, &memory, &a->torque);
     g.slip[slot(g, s, i)] = memory.slip;
     if (g.roll) {
         g.roll[slot(g, s, i)] = memory.roll;
@@ -261,13 +261,13 @@ DEVICE Vec grain_touch(const Grains &g, int i, int s, uint32_t touching, const C
 DEVICE bool grain_touch_grain(const Grains &g, int i, int s, uint32_t touching, Body *a) {
     const int j = g.neighbour[slot(g, s, i)];
     const Place b = g.place[j];
-    const Vec d = from_to(g, b, a->place);
+    const Vec3 d = from_to(g, b, a->place);
     const float reach = a->place.radius + b.radius, square = dot(d, d);
     if (square >= reach * reach) {
         return false;
     }
     const float apart = fmaxf(sqrtf(square), 1e-9f), mass = grain_mass(g.law, b.radius);
-    const Vec spin = g.spin[j];
+    const Vec3 spin = g.spin[j];
     Contact c;
     c.normal = (1.0f / apart) * d;
     c.overlap = reach - apart;
@@ -281,8 +281,8 @@ DEVICE bool grain_touch_grain(const Grains &g, int i, int s, uint32_t touching, 
 }
 
 /* A wall that moves with `velocity` and turns with `turning`, at `overlap`. */
-DEVICE Vec grain_touch_wall(const Grains &g, int i, int s, uint32_t touching, Vec normal,
-                            float overlap, Vec velocity, Vec turning, Body *a) {
+DEVICE Vec3 grain_touch_wall(const Grains &g, int i, int s, uint32_t touching, Vec3 normal,
+                             float overlap, Vec3 velocity, Vec3 turning, Body *a) {
     Contact c;
     c.normal = normal;
     c.overlap = overlap;
@@ -299,7 +299,7 @@ DEVICE bool grain_touch_floor(const Grains &g, int i, uint32_t touching, Body *a
     if (overlap <= 0.0f) {
         return false;
     }
-    const Vec still = vec(0, 0, 0);
+    const Vec3 still = vec(0, 0, 0);
     grain_touch_wall(g, i, FLOOR, touching, vec(0, 0, 1), overlap, still, still, a);
     return true;
 }
@@ -310,25 +310,25 @@ DEVICE bool grain_touch_plate(const Grains &g, int i, uint32_t touching, Body *a
     }
     Plate *plate = &g.plate[i / g.per];
     const Place origin = {plate->cell_x, plate->cell_y, plate->cell_z, 0};
-    const Vec d = from_to(g, origin, a->place);
+    const Vec3 d = from_to(g, origin, a->place);
     const float radius = a->place.radius, far = g.shape.reach + radius;
-    const Vec p = plate_from_world(*plate, d);
+    const Vec3 p = plate_from_world(*plate, d);
     if (dot(d, d) >= far * far || p.z < -radius) {
         return false;
     }
-    Vec normal;
+    Vec3 normal;
     const float gap = shape_nearest(g.shape, p, &normal) - radius;
     if (gap >= 0.0f) {
         return false;
     }
     normal = plate_to_world(*plate, normal);
-    const Vec at = d - (radius + 0.5f * gap) * normal; /* of the contact, from the origin */
-    const Vec velocity = plate->velocity + cross(plate->spin, at), turning = plate->spin;
-    const Vec before = a->torque;
-    const Vec force = grain_touch_wall(g, i, PLATE, touching, normal, -gap, velocity, turning, a);
+    const Vec3 at = d - (radius + 0.5f * gap) * normal; /* of the contact, from the origin */
+    const Vec3 velocity = plate->velocity + cross(plate->spin, at), turning = plate->spin;
+    const Vec3 before = a->torque;
+    const Vec3 force = grain_touch_wall(g, i, PLATE, touching, normal, -gap, velocity, turning, a);
     const float arm = radius + 0.5f * gap;
-    const Vec rolling = a->torque - before + arm * cross(normal, force);
-    const Vec back = vec(-force.x, -force.y, -force.z);
+    const Vec3 rolling = a->torque - before + arm * cross(normal, force);
+    const Vec3 back = vec(-force.x, -force.y, -force.z);
     plate_add(plate, back, cross(at, back) - rolling);
     return true;
 }
@@ -336,8 +336,8 @@ DEVICE bool grain_touch_plate(const Grains &g, int i, uint32_t touching, Body *a
 /* Leapfrog: velocities half a step before the places. */
 DEVICE void grain_move(const Grains &g, int i, const Body &a) {
     const float h = g.law.dt / a.mass, r = a.place.radius;
-    const Vec velocity = a.velocity + h * a.force;
-    const Vec spin = a.spin + (2.5f * h / (r * r)) * a.torque;
+    const Vec3 velocity = a.velocity + h * a.force;
+    const Vec3 spin = a.spin + (2.5f * h / (r * r)) * a.torque;
     Place place = a.place;
     place.x = shifted(place.x, g.law.dt * velocity.x, g.unit.x);
     place.y = shifted(place.y, g.law.dt * velocity.y, g.unit.y);

@@ -30,7 +30,7 @@ struct Plate {
     uint32_t cell_x, cell_y, cell_z; /* its place in the units of the grains */
     float turn[9];                   /* its frame to the world, row major */
     float side;                      /* -1: the shape's mirror image in its x-z plane, else 1 */
-    Vec velocity, spin;              /* of its origin [m/s], [rad/s] */
+    Vec3 velocity, spin;             /* of its origin [m/s], [rad/s] */
 };
 
 /* The point of the shape that is nearest to `p`, in the plate's frame, and the normal from it to p.
@@ -55,9 +55,9 @@ DEVICE float outline_nearest(const Shape &s, float px, float py, float *qx, floa
     return inside ? -sqrtf(best) : sqrtf(best);
 }
 
-DEVICE float shape_nearest(const Shape &s, Vec p, Vec *normal) {
+DEVICE float shape_nearest(const Shape &s, Vec3 p, Vec3 *normal) {
     if (s.points == 0) { /* a sphere that rests on the origin */
-        const Vec d = p - vec(0, 0, s.radius);
+        const Vec3 d = p - vec(0, 0, s.radius);
         const float far = length(d);
         *normal = (1.0f / fmaxf(far, 1e-12f)) * d;
         return far - s.radius;
@@ -70,32 +70,32 @@ DEVICE float shape_nearest(const Shape &s, Vec p, Vec *normal) {
         return -fminf(p.z, over);
     }
     if (side < 0.0f && p.z > 0.0f && over > 0.0f) {
-        const Vec out = vec(qx - p.x, qy - p.y, 0);
+        const Vec3 out = vec(qx - p.x, qy - p.y, 0);
         *normal = (1.0f / fmaxf(length(out), 1e-12f)) * out;
         return side;
     }
     const float z = fminf(fmaxf(p.z, 0.0f), s.height);
-    const Vec d = side < 0.0f ? vec(0, 0, p.z - z) : vec(p.x - qx, p.y - qy, p.z - z);
+    const Vec3 d = side < 0.0f ? vec(0, 0, p.z - z) : vec(p.x - qx, p.y - qy, p.z - z);
     const float far = length(d);
     *normal = (1.0f / fmaxf(far, 1e-12f)) * d;
     return far;
 }
 
 /* From the shape's frame to the world's, and back. */
-DEVICE Vec plate_to_world(const Plate &plate, Vec p) {
+DEVICE Vec3 plate_to_world(const Plate &plate, Vec3 p) {
     const float *t = plate.turn, y = plate.side * p.y;
     return vec(t[0] * p.x + t[1] * y + t[2] * p.z, t[3] * p.x + t[4] * y + t[5] * p.z,
                t[6] * p.x + t[7] * y + t[8] * p.z);
 }
 
-DEVICE Vec plate_from_world(const Plate &plate, Vec p) {
+DEVICE Vec3 plate_from_world(const Plate &plate, Vec3 p) {
     const float *t = plate.turn;
     return vec(t[0] * p.x + t[3] * p.y + t[6] * p.z,
                plate.side * (t[1] * p.x + t[4] * p.y + t[7] * p.z),
                t[2] * p.x + t[5] * p.y + t[8] * p.z);
 }
 
-DEVICE void plate_add(Plate *plate, Vec force, Vec moment) {
+DEVICE void plate_add(Plate *plate, Vec3 force, Vec3 moment) {
     const float part[6] = {force.x, force.y, force.z, moment.x, moment.y, moment.z};
     for (int k = 0; k < 6; k++) {
         add_to(&plate->sum[k], (long long)((double)part[k] * (double)(1 << SUM_BITS)));

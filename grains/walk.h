@@ -127,7 +127,7 @@ inline void track_contacts(Track *t, const Bed &tile, int b, const std::vector<i
     std::vector<uint32_t> touching(n);
     copy(touching.data(), old.touching + first, n);
     track_spread(*t, b, order, touching.data(), g.touching, g.next_touching);
-    std::vector<Vec> path(n);
+    std::vector<Vec3> path(n);
     for (int s = 0; s < SLOTS; s++) {
         const size_t from = slot(old, s, (int)first), to = slot(g, s, 0);
         copy(path.data(), old.slip + from, n);
@@ -254,7 +254,7 @@ DEVICE void grain_rest(int k, const Grains &g) {
     if (i < 0) {
         return;
     }
-    const Vec still = vec(0, 0, 0);
+    const Vec3 still = vec(0, 0, 0);
     g.velocity[i] = g.next_velocity[i] = g.spin[i] = g.next_spin[i] = still;
     g.next_place[i] = g.place[i];
     g.next_touching[i] = g.touching[i];
@@ -508,7 +508,7 @@ inline void walk_press(Walk *w, const Question &q) {
 }
 
 /* What the robot says of its soles, against where they are. */
-inline void walk_meet(Walk *w, const Question &q) {
+inline void walk_move_soles(Walk *w, const Question &q) {
     const size_t rows = q.free.size();
     Ride &r = w->ride;
     for (size_t b = 0; b < q.foot.size(); b++) {
@@ -576,7 +576,7 @@ inline bool walk_step(Walk *w, const Question &q) {
     for (size_t b = 0; b < q.foot.size(); b++) {
         track_follow(&w->track, (int)b, q.foot[b].place[0] + q.foot[b].turn[0] * w->middle);
     }
-    walk_meet(w, q);
+    walk_move_soles(w, q);
     ride_write(w);
     bed_go(&bed, steps);
     copy(&w->ride, bed.g.ride, 1);

@@ -142,9 +142,8 @@ def load_newton():
     return judge_mpm.load_newton()
 
 
-def coupling(newton, wp):
-    """Newton's solver with the robot's inertia. Its own finite-mass colliders are bodies that know nothing of each other, with one mass
-    in all directions. The operator is made of two sparse matrices, J from the bodies' twists to nodes and M J^T back; here M is A."""
+def coupling_kernels(wp):
+    """fill: both sparse matrices of the coupling; gather: the impulses on each foot about its ankle."""
     mat33 = wp.mat33
 
     @wp.kernel
@@ -183,10 +182,19 @@ def coupling(newton, wp):
                 wp.atomic_add(out, foot, k, wp.float64(impulse[i][k]))
                 wp.atomic_add(out, foot, k + 3, wp.float64(turn[k]))
 
+    return fill, gather
+
+
+def coupling(newton, wp):
+    """Newton's solver with the robot's inertia. Its own finite-mass colliders are bodies that know nothing of each other, with one mass
+    in all directions. The operator is made of two sparse matrices, J from the bodies' twists to nodes and M J^T back; here M is A."""
+    mat33 = wp.mat33
+    fill, gather = coupling_kernels(wp)
+
     class Coupled(newton.solvers.SolverImplicitMPM):
         feet = 0
 
-        def meet(self, ankles, response):
+        def set_robot(self, ankles, response):
             """The robot of the next step. response: A, or None: the soles are led."""
             self.feet, device = len(ankles), self.model.device
             rows = 2 * self.feet
@@ -297,7 +305,7 @@ class Ground:
         poses = [[*place, *quaternion(turn)] for place, turn in zip(places, turns)] + [[*corner, 0, 0, 0, 0, 1]]
         self.state.body_q.assign(np.array(poses, np.float32))
         self.state.body_qd.assign(np.array([*twists, still], np.float32))
-        self.solver.meet(places, response)
+        self.solver.set_robot(places, response)
         self.solver.step(self.state, self.state, control=None, contacts=None, dt=dt)
         return self.solver.impulses(self.state) / dt
 

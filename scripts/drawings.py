@@ -3,7 +3,7 @@
 
     drawings.py [NAME...]    draws house, architecture, element, step, frames, badges, or all (needs graphviz and matplotlib)
     drawings.py --check      exit 1 when docs/house.svg is not the house (folders of src, includes, sentences) or a name in step.svg is not in src
-    drawings.py --arrows     folders of src and arrows between them"""
+    drawings.py --arrows [TREE ...]     folders of src and arrows between them, here or in other trees"""
 import html
 import math
 import pathlib
@@ -19,9 +19,9 @@ PAPER, INK, FILL, LINE, WARM, COOL = "#fcfcfa", "#222222", "#eef2f6", "#8795a3",
 
 # ---- the house
 
-def rooms():
+def rooms(tree=ROOT):
     """{folder of src: the folders whose headers it includes}."""
-    source = ROOT / "src"
+    source = tree / "src"
     names = {path.name for path in source.iterdir() if path.is_dir()}
     found = {name: set() for name in names}
     for name in names:
@@ -274,9 +274,11 @@ DRAWINGS = {"house": house, "architecture": architecture, "element": element, "s
 def main(names):
     if names == ["--check"]:
         return check()
-    if names == ["--arrows"]:
-        graph = rooms()
-        print(f"{len(graph)} folders, {sum(map(len, graph.values()))} arrows, {len(direct(graph))} drawn")
+    if names[:1] == ["--arrows"]:
+        for tree in names[1:] or [ROOT]:
+            graph = rooms(pathlib.Path(tree))
+            upward = sum(a in reach(graph, b) for a in graph for b in graph[a])
+            print(f"{tree}: {len(graph)} folders, {sum(map(len, graph.values()))} arrows, {len(direct(graph))} drawn, {upward} in a circle")
         return None
     for name in names or DRAWINGS:
         if name not in DRAWINGS:

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Draws the figures of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain] [walk]
-# [robots] [rise] [actuator] [motion] [crowd]; without a name all. The drawings are scripts/drawings.py's.
+# [robots] [rise] [actuator] [motion] [patchwork]; without a name all. The drawings are scripts/drawings.py's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mild=build/mild
@@ -104,11 +104,11 @@ terrain() {
 }
 
 # 4096 robots on a patchwork of eight soils.
-crowd() {
-    "$mild" play --crowd 4096 --ground rubber,foam60,foam45,foam28,foam25,grass,sand_loose,sand_dense --terrain.patches=checker \
-        --terrain.patch_size=3 --seconds 7 --video "$work/crowd.mp4"
-    ffmpeg -loglevel error -y -i "$work/crowd.mp4" -vf "fps=8,scale=560:-1:flags=area" -c:v libwebp_anim -loop 0 -q:v 30 \
-        -compression_level 6 docs/crowd.webp
+patchwork() {
+    "$mild" play --envs 4096 --ground rubber,foam60,foam45,foam28,foam25,grass,sand_loose,sand_dense --terrain.patches=checker \
+        --terrain.patch_size=3 --seconds 7 --video "$work/patchwork.mp4"
+    ffmpeg -loglevel error -y -i "$work/patchwork.mp4" -vf "fps=8,scale=560:-1:flags=area" -c:v libwebp_anim -loop 0 -q:v 30 \
+        -compression_level 6 docs/patchwork.webp
 }
 
 # Torques of a held-out second: a made-up motor, the network fitted to it, the best PD.
@@ -121,9 +121,9 @@ actuator() {
 for name in "${@:-all}"; do
     case $name in
     presets | recovery | impact | eccentric) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
-    terrain | walk | robots | rise | actuator | motion | crowd) "$name" ;;
+    terrain | walk | robots | rise | actuator | motion | patchwork) "$name" ;;
     sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
-    all) for each in presets recovery impact sinkage eccentric terrain walk robots rise actuator motion crowd; do "$0" "$each"; done ;;
-    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots rise actuator motion crowd" >&2 && exit 2 ;;
+    all) for each in presets recovery impact sinkage eccentric terrain walk robots rise actuator motion patchwork; do "$0" "$each"; done ;;
+    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots rise actuator motion patchwork" >&2 && exit 2 ;;
     esac
 done

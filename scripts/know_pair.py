@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The same walks with and without what a robot does by its belief (docs/identify.md, "What it is worth"): falls that one of the two
+"""The same walks with and without what a robot does by its belief (docs/identify.md, "Effect on walking"): falls that one of the two
 alone has, and of walks that stood in both the difference of the speed's error and of the cost of transport, with 95 % intervals.
 
     mild know --changes 1 --speed 0.7,1.2 --slick 0.2,0.25 --seed 41 --json without.json

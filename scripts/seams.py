@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Counts the functions inside of layers that tests call: those which a header of src declares and which no other layer,
-nor the Python package or the plugin, names. Tests of a layer's seam, what these and the public headers call, leave its
+nor the Python package, the plugin or exported C, names. Tests of a layer's seam, what these and the public headers call, leave its
 inside free to change (docs/testing.md). Ends with 1 if there are more than --most. Usage: scripts/seams.py [--list] [--most N]"""
 import argparse
 import collections
@@ -9,6 +9,7 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+PUBLIC = ("include", "python", "plugin", "src/deploy/export/c")  # the last is the C that mild export writes, which others call
 CODE = {".c", ".h", ".cu", ".cpp", ".inc"}
 DECLARED = re.compile(r"^(?:\w[\w]*[\s*]+)+([a-z_]\w*)\s*\(", re.M)  # at the beginning of a line
 OWN = re.compile(r"^static [^=;{}()]*\b([a-z_]\w*)\s*\(", re.M)
@@ -24,7 +25,7 @@ def sources(folder):
 def inside():
     """{layer: {function}} of the functions that only their own layer names, and the headers that declare them."""
     declared, named = {}, collections.defaultdict(set)
-    public = {name for folder in ("include", "python", "plugin") for _, text in sources(folder) for name in re.findall(r"\w+", text)}
+    public = {name for folder in PUBLIC for _, text in sources(folder) for name in re.findall(r"\w+", text)}
     for path, text in sources("src"):
         layer = str(path.parent)
         for name in set(re.findall(r"\b[a-z_]\w*\b", text)):

@@ -141,6 +141,19 @@ static inline void kit_assert_error(MildError *error, MildStatus status, const c
     memset(error, 0, sizeof *error);
 }
 
+/* Fails unless a call came back with the status and such an error. */
+#define assert_refused(got, status, error, names)                                                  \
+    kit_assert_refused((got), (status), (error), (names), __FILE__, __LINE__)
+
+static inline void kit_assert_refused(MildStatus got, MildStatus status, MildError *error,
+                                      const char *names, const char *file, int line) {
+    if (got != status) {
+        print_error("status %d instead of %d: '%s'\n", (int)got, (int)status, error->text);
+        _fail(file, line);
+    }
+    kit_assert_error(error, status, names, file, line);
+}
+
 /* The same of a text that is no MildError. */
 #define assert_names(text, names)                                                                  \
     do {                                                                                           \

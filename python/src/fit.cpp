@@ -193,7 +193,7 @@ static std::vector<FitPoint> slide_of(const FitPlate &plate, int number, const M
 static void run_drags(FitDef &drag, const FitDef &press, const nb::sequence &drags,
                       FitResult &pressed, nb::dict all) {
     const size_t count = nb::len(drags);
-    if (count > FIT_PLATES_MAX || !fit_drag_told((MildModel)press.material.model)) {
+    if (count > FIT_PLATES_MAX || !fit_drag_is_modelled((MildModel)press.material.model)) {
         raise(PyExc_ValueError, count > FIT_PLATES_MAX
                                     ? "drags: more than " + std::to_string((int)FIT_PLATES_MAX)
                                     : std::string("drags: slip costs no support under ") +

@@ -10,8 +10,8 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/context.h"
-#include "app/crowd.h"
 #include "app/figure.h"
+#include "app/others.h"
 #include "app/play.h"
 #include "app/progress.h"
 #include "base/text.h"
@@ -24,21 +24,21 @@
 #define WINDOW_AREA 12.0  /* [m] ground drawn around the start of a window's walk */
 #define COURSE_EXTRA 3.0  /* [s] a course gets for starting and stopping */
 #define COURSE_LEAST 12.0 /* [s] */
-#define CROWD_MARGIN 8.0  /* [m] ground drawn around a crowd */
-#define CROWD_TILE 1.3    /* [m] edge of a tile of its picture, at most */
+#define SQUARE_MARGIN 8.0 /* [m] ground drawn around a square of robots */
+#define SQUARE_TILE 1.3   /* [m] edge of a tile of its picture, at most */
 /* The camera goes from near the first robot to where all can be seen. */
-#define CROWD_NEAR 5.0     /* [m] from it */
-#define CROWD_LOW (-16.0)  /* [deg] */
-#define CROWD_AWAY 0.42    /* [-] farther by this share of the square's edge */
-#define CROWD_ASIDE 0.26   /* [-] and looking so much into it, along both edges */
-#define CROWD_HIGH (-33.0) /* [deg] */
+#define SQUARE_NEAR 5.0     /* [m] from it */
+#define SQUARE_LOW (-16.0)  /* [deg] */
+#define SQUARE_AWAY 0.42    /* [-] farther by this share of the square's edge */
+#define SQUARE_ASIDE 0.26   /* [-] and looking so much into it, along both edges */
+#define SQUARE_HIGH (-33.0) /* [deg] */
 
 typedef struct {
     Context context;
     const char *video, *pressure, *log; /* NULL: not given */
     CliNames grounds;
     double patch;
-    int robots; /* of --crowd; 1: no crowd */
+    int robots; /* of --envs; 1: no others */
     int width, height;
     int printed; /* bool: neither video nor window */
     Scene scene;
@@ -130,38 +130,38 @@ static double patch_of(const Command *c) {
     return terrain->map.patches == MILD_PATTERN_NONE ? c->patch : terrain->map.patch_size;
 }
 
-/* From the corner at which the robot walks, with the crowd behind it. */
-static void show_crowd(ViewDef *def, int others, double patch, double reach) {
-    const double side = crowd_side(others), tiles = ceil(patch / CROWD_TILE);
+/* From the corner at which the robot walks, with the others behind it. */
+static void show_others(ViewDef *def, int others, double patch, double reach) {
+    const double side = others_side(others), tiles = ceil(patch / SQUARE_TILE);
     def->others = others;
     def->cell = patch / tiles / RELIEF_TILE_CELLS; /* no tile on two patches */
-    def->x_min = patch * floor((fmin(reach, 0) - side - CROWD_MARGIN) / patch);
-    def->x_max = patch * ceil((fmax(reach, 0) + CROWD_MARGIN) / patch);
-    def->y_min = patch * floor(-CROWD_MARGIN / patch);
-    def->y_max = patch * ceil((side + CROWD_MARGIN) / patch);
+    def->x_min = patch * floor((fmin(reach, 0) - side - SQUARE_MARGIN) / patch);
+    def->x_max = patch * ceil((fmax(reach, 0) + SQUARE_MARGIN) / patch);
+    def->y_min = patch * floor(-SQUARE_MARGIN / patch);
+    def->y_max = patch * ceil((side + SQUARE_MARGIN) / patch);
     def->closeup = 0;
     def->force_arrow = 0;
-    def->distance = CROWD_NEAR;
-    def->elevation = CROWD_LOW;
-    def->away_distance = CROWD_NEAR + CROWD_AWAY * side;
-    def->away_elevation = CROWD_HIGH;
-    def->away_aside[0] = -CROWD_ASIDE * side;
-    def->away_aside[1] = CROWD_ASIDE * side;
+    def->distance = SQUARE_NEAR;
+    def->elevation = SQUARE_LOW;
+    def->away_distance = SQUARE_NEAR + SQUARE_AWAY * side;
+    def->away_elevation = SQUARE_HIGH;
+    def->away_aside[0] = -SQUARE_ASIDE * side;
+    def->away_aside[1] = SQUARE_ASIDE * side;
 }
 
-static MildStatus make_crowd(Command *c, MildError *error) {
+static MildStatus make_others(Command *c, MildError *error) {
     Play *play = &c->play;
-    const CrowdDef def = {.count = c->robots - 1,
-                          .task = play->task,
-                          .robot = play->robot,
-                          .scene = play->scene,
-                          .controller = play->controller,
-                          .pool = c->context.pool,
-                          .seconds = play->seconds,
-                          .speed = play->speed,
-                          .seed = play->seed};
-    play->crowd = crowd_create(&def, error);
-    return play->crowd ? MILD_OK : error->status;
+    const OthersDef def = {.count = c->robots - 1,
+                           .task = play->task,
+                           .robot = play->robot,
+                           .scene = play->scene,
+                           .controller = play->controller,
+                           .pool = c->context.pool,
+                           .seconds = play->seconds,
+                           .speed = play->speed,
+                           .seed = play->seed};
+    play->others = others_create(&def, error);
+    return play->others ? MILD_OK : error->status;
 }
 
 static MildStatus make_view(Command *c, MildError *error) {
@@ -178,7 +178,7 @@ static MildStatus make_view(Command *c, MildError *error) {
         def.y_min = -WINDOW_AREA, def.y_max = WINDOW_AREA;
     }
     if (c->robots > 1) {
-        show_crowd(&def, c->robots - 1, patch_of(c), reach);
+        show_others(&def, c->robots - 1, patch_of(c), reach);
     }
     play->rate = def.rate;
     play->view = view_create(&def, play->robot, &c->scene.terrain, error);
@@ -226,14 +226,14 @@ static void print_table(Command *c) {
 }
 
 /* Where the others are at the end, and how deep. */
-static void print_crowd(const Command *c) {
+static void print_others(const Command *c) {
     const Play *play = &c->play;
     printf("%-12s %9s %8s %9s\n", "others", "robots", "upright", "sinkage");
     for (int i = 0; i < c->grounds.count; i++) {
-        const CrowdRow row = crowd_on(play->crowd, i);
+        const OthersRow row = others_on(play->others, i);
         printf("%-12s %9d %8d %6.1f mm\n", c->names[i], row.robots, row.upright, 1e3 * row.sinkage);
     }
-    printf("crowd: %d of %d robots upright\n", !play->fell + crowd_upright(play->crowd), c->robots);
+    printf("%d of %d robots upright\n", !play->fell + others_upright(play->others), c->robots);
 }
 
 /* What the robot's own sensors say of the ground at the end. */
@@ -336,8 +336,8 @@ static MildStatus walk(Command *c, MildError *error) {
     }
     print_table(c);
     print_knowledge(play);
-    if (play->crowd) {
-        print_crowd(c);
+    if (play->others) {
+        print_others(c);
     }
     if (c->video) {
         printf("video %s: %d frames\n", c->video, play->frames);
@@ -352,14 +352,14 @@ static MildStatus walk(Command *c, MildError *error) {
     return status;
 }
 
-static MildStatus check_crowd(const Command *c, MildError *error) {
+static MildStatus check_others(const Command *c, MildError *error) {
     if (!c->video) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "--crowd: only for --video FILE.mp4");
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--envs: only for --video FILE.mp4");
     }
     return strcmp(c->context.controller, "learned") == 0
                ? MILD_OK
                : mild_fail(error, MILD_ERROR_ARGUMENT,
-                           "--crowd: a crowd walks by --controller learned");
+                           "--envs: the others walk by --controller learned");
 }
 
 static MildStatus prepare(Command *c, MildError *error) {
@@ -367,10 +367,10 @@ static MildStatus prepare(Command *c, MildError *error) {
     MildStatus status = MILD_OK;
     interrupt_install();
     if (c->robots > 1) {
-        status = check_crowd(c, error);
+        status = check_others(c, error);
         c->context.pool = status == MILD_OK ? pool_create(0) : NULL;
         if (status == MILD_OK && !c->context.pool) {
-            status = mild_fail(error, MILD_ERROR_MEMORY, "--crowd: no threads");
+            status = mild_fail(error, MILD_ERROR_MEMORY, "--envs: no threads");
         }
     }
     if (c->pressure && c->scene.rigid) {
@@ -381,7 +381,7 @@ static MildStatus prepare(Command *c, MildError *error) {
         status = context_move(&c->context, c->robots, error);
     }
     if (status == MILD_OK && c->robots > 1) {
-        status = make_crowd(c, error);
+        status = make_others(c, error);
     }
     if (status == MILD_OK && c->pressure) {
         play->pressure = pressure_create(play->robot, c->scene.terrain.material_count,
@@ -445,7 +445,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     view_destroy(play->view);
     sketch_destroy(play->sketch);
     pressure_destroy(play->pressure);
-    crowd_destroy(play->crowd);
+    others_destroy(play->others);
     context_close(on);
     return status;
 }
@@ -464,7 +464,7 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
         {"video", CLI_OUTPUT, &c->video, 0, 0, "FILE.mp4",
          "write a video; without this and --pressure a window opens, and where there is none the "
          "walk is printed"},
-        {"crowd", CLI_INT, &c->robots, 1, 65536, "N",
+        {"envs", CLI_INT, &c->robots, 1, 65536, "N",
          "so many robots in the video, in a square (default 1); the table and the pressure are the "
          "first one's"},
         {"pressure", CLI_OUTPUT, &c->pressure, 0, 0, "FILE.png",
@@ -505,10 +505,10 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
                     "  mild play --ground foam28 --speed 0.4\n"
                     "  mild play --ground sand_loose --terrain.kind=waves --terrain.memory=true "
                     "--video waves.mp4\n"
-                    "  mild play --crowd 4096 --ground "
+                    "  mild play --envs 4096 --ground "
                     "rubber,foam60,foam45,foam28,foam25,grass,sand_loose,sand_dense "
                     "--terrain.patches=checker --terrain.patch_size=3 --seconds 6 --video "
-                    "crowd.mp4\n",
+                    "patchwork.mp4\n",
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
     if (outcome != CLI_RUN) {

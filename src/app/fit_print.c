@@ -220,8 +220,8 @@ void fit_print(const FitWork *work) {
     const FitSet *slides = &work->set[FIT_DRAG];
     if (slides->count && !slides->done) {
         printf("left out: %d rows of slip; %s\n", slides->count,
-               fit_drag_told(model_of(work)) ? "all that they tell is held"
-                                             : "slip costs no support under this model");
+               fit_drag_is_modelled(model_of(work)) ? "all that they tell is held"
+                                                    : "slip costs no support under this model");
     }
     if (work->set[FIT_PRESS].done) {
         rates_print(work, bit(FIT_LIMIT) | bit(FIT_OPEN) | bit(FIT_TIED) | bit(FIT_NO_EFFECT));

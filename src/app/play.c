@@ -19,7 +19,7 @@
 #define PACE_TIME 0.5   /* [s] over which the real-time factor is measured */
 #define OWED_MAX 0.2    /* [s] delay behind real time that is caught up with at once */
 #define WINDOW_TIME 1e6 /* [s] a window's walk has no end */
-#define NEAR_SHARE 0.35 /* [-] of a crowd's video, before the camera moves away */
+#define NEAR_SHARE 0.35 /* [-] of a video of many robots, before the camera moves away */
 #define SKETCH_RATE 20  /* [1/s] pictures on a terminal */
 
 /* [m/s, m/s, rad/s] Largest command of the keys, which is the range that the shipped policy was
@@ -117,8 +117,8 @@ static void step(Walk *walk) {
                      fmax(hypot(rotation[0], rotation[3]), 1e-6);
     walk->speed += TASK_PERIOD / SPEED_TIME * (forward - walk->speed);
     set_command(walk);
-    if (play->crowd) {
-        crowd_step(play->crowd);
+    if (play->others) {
+        others_step(play->others);
     }
     if (play->view && out.valid) {
         view_observe(play->view, walk->sim);
@@ -144,11 +144,11 @@ static MildStatus frame(Walk *walk, MildError *error) {
     ViewInfo info = {.time = play->time, .speed = walk->speed, .fell = play->fell};
     char ground[96] = "rigid ground", note[700], knows[400] = "";
     memcpy(info.command, walk->env->command, sizeof info.command);
-    if (play->crowd) {
-        info.others = crowd_others(play->crowd);
+    if (play->others) {
+        info.others = others_shown(play->others);
         info.away = fmin(fmax((play->time / walk->end - NEAR_SHARE) / (1 - NEAR_SHARE), 0), 1);
-        snprintf(note, sizeof note, "%d of %d upright", !play->fell + crowd_upright(play->crowd),
-                 1 + crowd_count(play->crowd));
+        snprintf(note, sizeof note, "%d of %d upright", !play->fell + others_upright(play->others),
+                 1 + others_count(play->others));
         info.note = note;
     }
     if (play->window) {

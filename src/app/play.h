@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-#include "app/crowd.h"
+#include "app/others.h"
 #include "control/controller.h"
 #include "identify/belief/belief.h"
 #include "run/eval/measure.h"
@@ -34,7 +34,7 @@ typedef struct {
     Video *video;                /* NULL: none, or a window */
     Sketch *sketch;              /* NULL: not printed; otherwise the walk is, in real time */
     Pressure *pressure;          /* NULL: not measured */
-    Crowd *crowd;                /* in the video; NULL: none */
+    Others *others;              /* in the video; NULL: none */
     double seconds, speed, rate; /* [s], [m/s], [1/s] frames */
     uint64_t seed;
     const BeliefNet *belief; /* what the robot knows of its ground; NULL: it has none */

@@ -7,7 +7,7 @@
 #define STRIDE 2e-4 /* [m] slip in a step of the path */
 #define STRIDES_MAX 100
 
-int fit_drag_told(MildModel model) {
+int fit_drag_is_modelled(MildModel model) {
     return model_row((int)model)->slips;
 }
 

@@ -15,7 +15,7 @@
 #include "identify/fit_record.h"
 
 /* Bool: slip costs support under the model. */
-int fit_drag_told(MildModel model);
+int fit_drag_is_modelled(MildModel model);
 
 /* Bool: a row is of the same record as the one before it. */
 int fit_drag_is_next(const FitPoint *row);

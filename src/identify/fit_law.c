@@ -136,7 +136,7 @@ static int is_dragged(const char *name) {
 int fit_parameters(MildModel model, FitKind kind, const MildField *fields[FIT_PARAMETERS_MAX]) {
     const MildModelInfo *info = mild_model_info(model);
     int count = 0;
-    if (kind == FIT_DRAG && !fit_drag_told(model)) {
+    if (kind == FIT_DRAG && !fit_drag_is_modelled(model)) {
         return 0;
     }
     for (int i = 0; i < MILD_MODEL_FIELDS && info->fields[i]; i++) {

@@ -1,6 +1,6 @@
 /* What pictures show of a robot in the place of its file's shapes: meshes, which a file look.xml
- * beside it names (docs/robots.md). The step never reads them, and a crowd is drawn by its shapes,
- * because a robot has 60 000 triangles of meshes. */
+ * beside it names (docs/robots.md). The step never reads them, and others beside it are drawn by
+ * their shapes, because a robot has 60 000 triangles of meshes. */
 #ifndef MILD_VIEW_LOOK_H
 #define MILD_VIEW_LOOK_H
 

@@ -1,4 +1,4 @@
-/* What of a crowd is drawn: who is in the picture, with as many parts as can be seen. */
+/* What of the other robots is drawn: who is in the picture, with as many parts as can be seen. */
 #ifndef MILD_SIGHT_H
 #define MILD_SIGHT_H
 

@@ -24,8 +24,8 @@
 #define VIEW_FLOOR 40.0        /* [m] half the size of the surrounding floor */
 #define VIEW_GEOMS 4000
 #define VIEW_GEOMS_OTHER 128         /* of a robot */
-#define VIEW_CROWD_FINE 224          /* VIEW_FINE of a crowd */
-#define VIEW_CROWD_PRESSING 60       /* others that leave imprints */
+#define VIEW_OTHERS_FINE 224         /* VIEW_FINE with others */
+#define VIEW_OTHERS_PRESSING 60      /* others that leave imprints */
 #define VIEW_CAMERA_TIME 0.45        /* [s] time constant of the camera */
 #define VIEW_LOOK_HEIGHT 0.6         /* [-] the camera looks at this share of the robot's height */
 #define VIEW_CLOSE_TIME 0.25         /* [s] the same for the close-up of the feet */
@@ -67,9 +67,9 @@ struct View {
     double time;           /* [s] of the last frame */
     int jumped;            /* bool: the cameras jump to the robot in the next frame */
     Relief *relief;
-    Facet *facets;                                   /* of shells in the ground */
-    Slot slots[VIEW_PLAIN_UNEVEN + VIEW_CROWD_FINE]; /* first those without imprints */
-    int frame;                                       /* number of the present one */
+    Facet *facets;                                    /* of shells in the ground */
+    Slot slots[VIEW_PLAIN_UNEVEN + VIEW_OTHERS_FINE]; /* first those without imprints */
+    int frame;                                        /* number of the present one */
     int plain_count, slot_count;
     int *slot_of;                              /* [tiles] -1: none */
     int flat_material[MILD_MATERIALS_MAX + 1]; /* model material of untouched ground; last: rigid */
@@ -146,7 +146,7 @@ static int open_context(View *view, MildError *error) {
 /* Robots whose feet press the ground. */
 static int pressing(const View *view) {
     const int others = view->def.others;
-    return 1 + (others < VIEW_CROWD_PRESSING ? others : VIEW_CROWD_PRESSING);
+    return 1 + (others < VIEW_OTHERS_PRESSING ? others : VIEW_OTHERS_PRESSING);
 }
 
 static Relief *make_relief(const View *view, MildError *error) {
@@ -232,7 +232,7 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
     view->relief = make_relief(view, error);
     view->plain_count =
         view->relief && relief_is_uneven(view->relief) ? VIEW_PLAIN_UNEVEN : VIEW_PLAIN;
-    view->slot_count = view->plain_count + (def->others > 0 ? VIEW_CROWD_FINE : VIEW_FINE);
+    view->slot_count = view->plain_count + (def->others > 0 ? VIEW_OTHERS_FINE : VIEW_FINE);
     const Surfaces surfaces = {view->plain_count, view->slot_count};
     const int size[2] = {def->width, def->height};
     char path[PATH_SIZE];

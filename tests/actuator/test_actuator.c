@@ -182,12 +182,11 @@ TEST(history_in_the_task) {
     actuator_destroy(actuator);
 }
 
-static void refused(const TaskDef *task, MildStatus status, const char *names) {
+static void check_bad_motors(const TaskDef *task, MildStatus status, const char *names) {
     MildError error = {0};
     TaskDef copy = *task;
     Actuator *actuator;
-    assert_int_equal(actuator_open(&copy, robot, &actuator, &error), status);
-    assert_error(&error, status, names);
+    assert_refused(actuator_open(&copy, robot, &actuator, &error), status, &error, names);
     actuator_destroy(actuator);
 }
 
@@ -215,15 +214,15 @@ TEST(file_and_task) {
     /* what does not fit */
     TaskDef wrong = task;
     wrong.physics_dt = 0.004;
-    refused(&wrong, MILD_ERROR_ARGUMENT, "task.actuator task.physics_dt 0.004");
+    check_bad_motors(&wrong, MILD_ERROR_ARGUMENT, "task.actuator task.physics_dt 0.004");
     wrong = task;
     strcpy(wrong.kd, "5");
-    refused(&wrong, MILD_ERROR_ARGUMENT, "task.actuator task.kp task.kd");
+    check_bad_motors(&wrong, MILD_ERROR_ARGUMENT, "task.actuator task.kp task.kd");
     wrong = task;
     snprintf(wrong.actuator, sizeof wrong.actuator, "%s", POLICY);
-    refused(&wrong, MILD_ERROR_FORMAT, "task.actuator " POLICY);
+    check_bad_motors(&wrong, MILD_ERROR_FORMAT, "task.actuator " POLICY);
     strcpy(wrong.actuator, "/tmp/there/is/none");
-    refused(&wrong, MILD_ERROR_IO, "task.actuator /tmp/there/is/none");
+    check_bad_motors(&wrong, MILD_ERROR_IO, "task.actuator /tmp/there/is/none");
     Robot *go1 = kit_robot(GO1);
     assert_null(actuator_load(path, go1, &error));
     assert_error(&error, MILD_ERROR_ARGUMENT, "sa01 go1");
@@ -233,9 +232,9 @@ TEST(file_and_task) {
     assert_non_null(bytes);
     bytes[size / 2] ^= 1;
     assert_int_equal(file_write(path, bytes, size, &error), MILD_OK);
-    refused(&task, MILD_ERROR_FORMAT, path);
+    check_bad_motors(&task, MILD_ERROR_FORMAT, path);
     assert_int_equal(file_write(path, bytes, size / 2, &error), MILD_OK);
-    refused(&task, MILD_ERROR_FORMAT, path);
+    check_bad_motors(&task, MILD_ERROR_FORMAT, path);
     free(bytes);
     unlink(path);
     actuator_destroy(actuator);

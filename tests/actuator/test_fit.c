@@ -283,7 +283,7 @@ TEST(held_out_is_not_seen) {
     record_free(&record);
 }
 
-static void refused(const ActuatorFitDef *def, const Record *record, const char *names) {
+static void check_bad_record(const ActuatorFitDef *def, const Record *record, const char *names) {
     MildError error = {0};
     ActuatorScore score[KINDS];
     Pool *pool = pool_create(1);
@@ -299,20 +299,20 @@ TEST(logs_that_do_not_do) {
     for (int i = 0; i < SA01_JOINTS; i++) {
         record.file[0].logged[i] = i % 6 < 4;
     }
-    refused(&def, &record, "0 leg_l5_joint 100");
+    check_bad_record(&def, &record, "0 leg_l5_joint 100");
     for (int i = 0; i < SA01_JOINTS; i++) {
         record.file[0].logged[i] = 1;
     }
     def.spacing = 0.012;
-    refused(&def, &record, "0.005 0.012 --spacing");
+    check_bad_record(&def, &record, "0.005 0.012 --spacing");
     def.spacing = 0.01;
     record.file[0].rows = 150;
-    refused(&def, &record, "0 584 leg_l1_joint 100");
+    check_bad_record(&def, &record, "0 584 leg_l1_joint 100");
     record.file[0].rows = ROWS;
     for (int row = 0; row < ROWS; row++) { /* after three rows each a gap of 20 ms */
         record.time[row] += 0.02 * (row / 3);
     }
-    refused(&def, &record, "0 leg_l1_joint 100");
+    check_bad_record(&def, &record, "0 leg_l1_joint 100");
     record_free(&record);
 }
 

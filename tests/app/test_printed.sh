@@ -34,16 +34,16 @@ MILD_FFMPEG=$work/coder "$mild" play --seconds 0.1 --width 64 --height 64 --vide
 if ! grep -q 'neither EGL nor OSMesa' video.txt; then
     [ "$(cat film.mp4)" = mine ] || fail "MILD_FFMPEG: $(cat video.txt)"
 fi
-# a crowd, of which each robot stands on the ground of its place
-MILD_FFMPEG=$work/coder "$mild" play --crowd 25 --ground rubber,sand_loose --terrain.patches=checker --terrain.patch_size=4 --seconds 0.3 --width 64 \
-    --height 64 --video crowd.mp4 >crowd.txt 2>video.txt
+# robots, of which each stands on the ground of its place
+MILD_FFMPEG=$work/coder "$mild" play --envs 25 --ground rubber,sand_loose --terrain.patches=checker --terrain.patch_size=4 --seconds 0.3 --width 64 \
+    --height 64 --video square.mp4 >square.txt 2>video.txt
 if ! grep -q 'neither EGL nor OSMesa' video.txt; then
-    grep -qx 'crowd: 25 of 25 robots upright' crowd.txt || fail "--crowd: $(cat video.txt crowd.txt)"
+    grep -qx '25 of 25 robots upright' square.txt || fail "--envs: $(cat video.txt square.txt)"
     awk '/^others/ { on = 1; next } on && $1 == "rubber" && $2 > 5 && $3 == $2 && $4 < 40 { rubber = $2 }
-        on && $1 == "sand_loose" && $2 > 5 && $3 == $2 && $4 > 90 { sand = $2 } END { exit rubber + sand != 24 }' crowd.txt ||
-        fail "--crowd: robots are not on the ground where they are drawn: $(cat crowd.txt)"
+        on && $1 == "sand_loose" && $2 > 5 && $3 == $2 && $4 > 90 { sand = $2 } END { exit rubber + sand != 24 }' square.txt ||
+        fail "--envs: robots are not on the ground where they are drawn: $(cat square.txt)"
 fi
-bad "--crowd --video" "$mild" play --crowd 9
-bad "--crowd --controller learned" "$mild" play --crowd 9 --video crowd.mp4 --controller stand
-bad "--crowd" "$mild" play --crowd 0 --video crowd.mp4
+bad "--envs --video" "$mild" play --envs 9
+bad "--envs --controller learned" "$mild" play --envs 9 --video square.mp4 --controller stand
+bad "--envs" "$mild" play --envs 0 --video square.mp4
 finish "printed: $(wc -l <walk.txt) lines"

@@ -701,9 +701,27 @@ TEST(bad_input_is_refused) {
     mild_batch_destroy(NULL);
 }
 
-static void says(MildStatus status, MildStatus wanted, MildError *error, const char *names) {
-    assert_int_equal(status, wanted);
-    assert_error(error, wanted, names);
+/* Maps that a batch does not know, and what one adds to a robot's memory. */
+static void check_maps(MildBatch *batch, const MildGround *good) {
+    MildError e = {0};
+    MildMapDef of = mild_map_def_default();
+    of.patches = MILD_PATTERN_STRIPES;
+    MildMap *sharp = make_map(&of);
+    of.border = 0.2;
+    MildMap *blended = make_map(&of);
+    of.patches = MILD_PATTERN_NONE;
+    MildMap *plain = make_map(&of);
+    assert_refused(mild_batch_set_map(batch, blended, &e), MILD_ERROR_ARGUMENT, &e,
+                   "terrain.border");
+    assert_int_equal(mild_batch_robot_bytes(batch), 10 * 160 * sizeof(float));
+    assert_int_equal(mild_batch_set_map(batch, sharp, &e), MILD_OK);
+    assert_int_equal(mild_batch_robot_bytes(batch), (14 * 160 + 32) * sizeof(float));
+    assert_int_equal(mild_batch_load(batch, 0, good, &e), MILD_OK);
+    assert_int_equal(mild_batch_set_map(batch, plain, &e), MILD_OK);
+    assert_int_equal(mild_batch_robot_bytes(batch), 10 * 160 * sizeof(float));
+    mild_map_destroy(sharp);
+    mild_map_destroy(blended);
+    mild_map_destroy(plain);
 }
 
 /* What a ground remembers and a batch cannot, and maps that it does not know. */
@@ -720,54 +738,42 @@ TEST(strange_ground_is_refused) {
     kit_open(&fits, 2, left, right, &sand, 5e-3);
     kit_prints(&prints, 8);
     fits.ground->faces = 1; /* as of surfaces with as many elements */
-    says(mild_batch_load(batch, 0, fits.ground, &e), MILD_ERROR_ARGUMENT, &e, "robot 0");
+    assert_refused(mild_batch_load(batch, 0, fits.ground, &e), MILD_ERROR_ARGUMENT, &e, "robot 0");
     fits.ground->faces = 0;
     MildGround *good = fits.ground;
-    says(mild_batch_load(batch, 0, one.ground, &e), MILD_ERROR_ARGUMENT, &e, "robot 0");
-    says(mild_batch_load(batch, 1, prints.ground, &e), MILD_ERROR_ARGUMENT, &e,
-         "robot 1 mild_ground_init");
-    says(mild_batch_load(batch, 3, good, &e), MILD_ERROR_RANGE, &e, "robot 3 0 2");
-    says(mild_batch_store(batch, 0, one.ground, &e), MILD_ERROR_ARGUMENT, &e, "robot 0");
-    says(mild_batch_store(batch, 1, prints.ground, &e), MILD_ERROR_ARGUMENT, &e,
-         "robot 1 mild_ground_init");
-    says(mild_batch_store(batch, -1, good, &e), MILD_ERROR_RANGE, &e, "robot -1 0 2");
+    assert_refused(mild_batch_load(batch, 0, one.ground, &e), MILD_ERROR_ARGUMENT, &e, "robot 0");
+    assert_refused(mild_batch_load(batch, 1, prints.ground, &e), MILD_ERROR_ARGUMENT, &e,
+                   "robot 1 mild_ground_init");
+    assert_refused(mild_batch_load(batch, 3, good, &e), MILD_ERROR_RANGE, &e, "robot 3 0 2");
+    assert_refused(mild_batch_store(batch, 0, one.ground, &e), MILD_ERROR_ARGUMENT, &e, "robot 0");
+    assert_refused(mild_batch_store(batch, 1, prints.ground, &e), MILD_ERROR_ARGUMENT, &e,
+                   "robot 1 mild_ground_init");
+    assert_refused(mild_batch_store(batch, -1, good, &e), MILD_ERROR_RANGE, &e, "robot -1 0 2");
     MildGround *three[3] = {good, good, one.ground};
     const MildGround *const *const grounds = (const MildGround *const *)three;
-    says(mild_batch_load_robots(batch, 1, 3, grounds, &e), MILD_ERROR_RANGE, &e, "robots 3 1");
-    says(mild_batch_store_robots(batch, 1, -1, three, &e), MILD_ERROR_RANGE, &e, "robots -1 1 3");
-    says(mild_batch_load_robots(batch, 0, 3, grounds, &e), MILD_ERROR_ARGUMENT, &e, "robot 2");
+    assert_refused(mild_batch_load_robots(batch, 1, 3, grounds, &e), MILD_ERROR_RANGE, &e,
+                   "robots 3 1");
+    assert_refused(mild_batch_store_robots(batch, 1, -1, three, &e), MILD_ERROR_RANGE, &e,
+                   "robots -1 1 3");
+    assert_refused(mild_batch_load_robots(batch, 0, 3, grounds, &e), MILD_ERROR_ARGUMENT, &e,
+                   "robot 2");
     assert_int_equal(mild_batch_load_robots(batch, 1, 2, grounds, &e), MILD_OK);
     assert_int_equal(mild_batch_store_robots(batch, 3 - 1, 0, three, &e), MILD_OK);
 
     good->uneven[1] = 1;
-    says(mild_batch_load(batch, 0, good, &e), MILD_ERROR_ARGUMENT, &e,
-         "robot 0 mild_batch_set_map");
+    assert_refused(mild_batch_load(batch, 0, good, &e), MILD_ERROR_ARGUMENT, &e,
+                   "robot 0 mild_batch_set_map");
     good->uneven[1] = 0;
     const Memory memory = ground_memory(good, 1);
     memory.material[4] = 1;
-    says(mild_batch_load(batch, 0, good, &e), MILD_ERROR_ARGUMENT, &e, "robot 0 material 1");
+    assert_refused(mild_batch_load(batch, 0, good, &e), MILD_ERROR_ARGUMENT, &e,
+                   "robot 0 material 1");
     memory.material[4] = 1 << 8 | 3 << 16;
-    says(mild_batch_load(batch, 0, good, &e), MILD_ERROR_ARGUMENT, &e, "robot 0 mixture");
+    assert_refused(mild_batch_load(batch, 0, good, &e), MILD_ERROR_ARGUMENT, &e, "robot 0 mixture");
     memory.material[4] = 1;
 
-    MildMapDef of = mild_map_def_default();
-    of.patches = MILD_PATTERN_STRIPES;
-    MildMap *sharp = make_map(&of);
-    of.border = 0.2;
-    MildMap *blended = make_map(&of);
-    of.patches = MILD_PATTERN_NONE;
-    MildMap *plain = make_map(&of);
-    says(mild_batch_set_map(batch, blended, &e), MILD_ERROR_ARGUMENT, &e, "terrain.border");
-    assert_int_equal(mild_batch_robot_bytes(batch), 10 * 160 * sizeof(float));
-    assert_int_equal(mild_batch_set_map(batch, sharp, &e), MILD_OK);
-    assert_int_equal(mild_batch_robot_bytes(batch), (14 * 160 + 32) * sizeof(float));
-    assert_int_equal(mild_batch_load(batch, 0, good, &e), MILD_OK);
-    assert_int_equal(mild_batch_set_map(batch, plain, &e), MILD_OK);
-    assert_int_equal(mild_batch_robot_bytes(batch), 10 * 160 * sizeof(float));
+    check_maps(batch, good);
     mild_batch_destroy(batch);
-    mild_map_destroy(sharp);
-    mild_map_destroy(blended);
-    mild_map_destroy(plain);
     kit_close(&one);
     kit_close(&prints);
     kit_close(&fits);

@@ -35,8 +35,8 @@ typedef struct {
     double number[ENGINE_NUMBERS];
 } Kit;
 
-enum { SA01_KIT, GO1_KIT, G1_KIT, LOPSIDED_KIT, WIDEST_KIT, KITS };
-static const char *const kit_name[KITS] = {"sa01", "go1", "g1", "lopsided", "widest"};
+enum { SA01_KIT, GO1_KIT, G1_KIT, ASYMMETRIC_KIT, WIDEST_KIT, KITS };
+static const char *const kit_name[KITS] = {"sa01", "go1", "g1", "asymmetric", "widest"};
 static Kit kits[KITS];
 static Oracle oracle;
 static EngineResult result;
@@ -46,7 +46,7 @@ static Robot *open_robot(int k, MildError *error) {
     case SA01_KIT: return robot_create(MILD_SOURCE_DIR "/robots/sa01", error);
     case GO1_KIT: return robot_create(MILD_SOURCE_DIR "/robots/go1", error);
     case G1_KIT: return robot_create(MILD_SOURCE_DIR "/robots/g1", error);
-    case LOPSIDED_KIT: return robot_create(MILD_SOURCE_DIR "/tests/engine/lopsided", error);
+    case ASYMMETRIC_KIT: return robot_create(MILD_SOURCE_DIR "/tests/engine/asymmetric", error);
     default: return widest_open(error);
     }
 }
@@ -59,7 +59,7 @@ static int setup(void **unused) {
         kit->robot = open_robot(k, &error);
         print_message("%s", error.text);
         assert_non_null(kit->robot);
-        if (k == LOPSIDED_KIT) { /* robot files may not have it; the engine knows what it is */
+        if (k == ASYMMETRIC_KIT) { /* robot files may not have it; the engine knows what it is */
             for (int d = 6; d < kit->robot->nv; d++) {
                 kit->robot->model->dof_damping[d] = 0.2 * (d % 4);
             }

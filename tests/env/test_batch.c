@@ -108,6 +108,25 @@ static void check_sample(const EnvsSample *sample, const MildTerrain *terrain) {
     assert_true(sample->valid && fabs(sample->above - above) < 1e-5);
 }
 
+static void choose_trial(int i, EnvsTrial *trial, double command[3]) {
+    *trial = (EnvsTrial){.stream = (uint32_t)(i % 2), .ground = i / 2, .rigid = i == 3};
+    command[0] = 0.1 * i;
+    command[1] = -0.2;
+    command[2] = 0.3;
+}
+
+static void check_trial(Envs *envs, int i, int t, const double command[3]) {
+    const Episode is = episode_of(envs, i);
+    assert_true(is.index == (uint32_t)(i % 2) && is.ground[0] == i / 2);
+    assert_true(is.map[0] == 0 && is.map[1] == 0);
+    assert_true(is.rigid == (i == 3));
+    assert_near(is.friction, 0.8, 1e-7);
+    for (int k = 0; k < 3; k++) {
+        assert_near(is.command[k], command[k], 1e-7);
+    }
+    assert_true(t > 0 || (is.step == 0 && is.qpos[6] == 0));
+}
+
 /* Trials have what was chosen for them in every episode, and no more: ground, the map's origin,
  * random numbers by their stream, a command that stays, a start along x. */
 TEST(trials_are_chosen) {
@@ -143,10 +162,7 @@ TEST(trials_are_chosen) {
         ground[i] = mild_terrain_uniform(&material);
     }
     for (int i = 0; i < TRIALS; i++) {
-        trial[i] = (EnvsTrial){.stream = (uint32_t)(i % 2), .ground = i / 2, .rigid = i == 3};
-        command[i][0] = 0.1 * i;
-        command[i][1] = -0.2;
-        command[i][2] = 0.3;
+        choose_trial(i, &trial[i], command[i]);
     }
     const EnvsDef of = {.task = &def,
                         .robot = robot,
@@ -166,15 +182,7 @@ TEST(trials_are_chosen) {
     assert_int_equal(envs_reset(envs, &view, NULL, &error), MILD_OK);
     for (int t = 0; t <= 130; t++) { /* falls and time limits begin further episodes */
         for (int i = 0; i < TRIALS; i++) {
-            const Episode is = episode_of(envs, i);
-            assert_true(is.index == (uint32_t)(i % 2) && is.ground[0] == i / 2);
-            assert_true(is.map[0] == 0 && is.map[1] == 0);
-            assert_true(is.rigid == (i == 3));
-            assert_near(is.friction, 0.8, 1e-7);
-            for (int k = 0; k < 3; k++) {
-                assert_near(is.command[k], command[i][k], 1e-7);
-            }
-            assert_true(t > 0 || (is.step == 0 && is.qpos[6] == 0));
+            check_trial(envs, i, t, command[i]);
         }
         const Episode first = episode_of(envs, 0);
         const Episode fourth = episode_of(envs, 4);

@@ -304,7 +304,7 @@ TEST(commands_arrive) {
     pool_destroy(pool);
 }
 
-static void refused(const char *ground, int trials, int histories, const char *named) {
+static void check_bad_trials(const char *ground, int trials, int histories, const char *named) {
     const char *const names[] = {ground, NULL};
     static const double speed = 0.3;
     const EvalDef eval = {.trials = trials, .seconds = 0.1, .seed = 1};
@@ -314,21 +314,20 @@ static void refused(const char *ground, int trials, int histories, const char *n
     controller.act_on = histories ? zero_act_on : NULL;
     Pool *pool = pool_create(1);
     EvalRow rows[ROWS];
-    assert_int_equal(run_batch(&controller, pool, names, &speed, 1, eval, rows, &error),
-                     MILD_ERROR_ARGUMENT);
-    assert_error(&error, MILD_ERROR_ARGUMENT, named);
+    const MildStatus status = run_batch(&controller, pool, names, &speed, 1, eval, rows, &error);
+    assert_refused(status, MILD_ERROR_ARGUMENT, &error, named);
     pool_destroy(pool);
 }
 
 TEST(what_is_not_there_is_refused) {
-    refused("rubber+grass", 1, 1, "--ground rubber+grass --train.robots");
-    refused("grass", EVAL_ROBOTS_MAX + 1, 1, "--trials 65537 --train.robots");
-    refused("grass", 1, 0, "--controller zero --train.robots");
+    check_bad_trials("rubber+grass", 1, 1, "--ground rubber+grass --train.robots");
+    check_bad_trials("grass", EVAL_ROBOTS_MAX + 1, 1, "--trials 65537 --train.robots");
+    check_bad_trials("grass", 1, 0, "--controller zero --train.robots");
     def.solver = MILD_SOLVER_GAUSS_SEIDEL;
-    refused("grass", 1, 1, "task.solver newton train.robots mujoco");
+    check_bad_trials("grass", 1, 1, "task.solver newton train.robots mujoco");
     def.solver = MILD_SOLVER_NEWTON;
     def.imprint_tiles = 8;
-    refused("grass", 1, 1, "terrain.memory train.robots mujoco");
+    check_bad_trials("grass", 1, 1, "terrain.memory train.robots mujoco");
     def.imprint_tiles = 0;
 }
 

@@ -673,6 +673,34 @@ TEST(the_printed_row) {
 
 /* ---- from a robot ---- */
 
+static void check_stances(const Measure *m, const RobotSim *sim, int rigid) {
+    for (int f = 0; f < SA01_FEET; f++) {
+        assert_true(m->in_stance[f]);
+        const double *center = robot_sim_foot(sim, f)->sole_center;
+        assert_true(m->touchdown[f][0] == center[0] && m->touchdown[f][1] == center[1]);
+        double deepest = robot_sim_foot(sim, f)->result.depth_max;
+        assert_true(m->deepest[f] == (rigid ? 0 : deepest));
+    }
+}
+
+/* The base is above the ground under it. */
+static void check_slope(TaskEnv *env, RobotSim *sim) {
+    MildError error = {0};
+    MildMapDef slope = mild_map_def_default();
+    slope.kind = MILD_MAP_SLOPE;
+    slope.slope = 0.1;
+    MildMap *map = mild_map_create(&slope, &error);
+    assert_non_null(map);
+    task_env_rest(env)->terrain.map = map;
+    Measure m;
+    const double none[SA01_JOINTS] = {0}, *q = robot_sim_qpos(sim);
+    measure_start(&m, 1e-3);
+    m.time = 3;
+    measure_step(&m, env, sim, none);
+    expect_near("height on a slope", m.base_high, q[2] - 0.3 - 0.1 * q[0], 1e-12);
+    mild_map_destroy(map);
+}
+
 /* The same numbers read from a robot: what is put into its state is what the measure must see. */
 TEST(a_robot_is_read) {
     MildError error = {0};
@@ -712,13 +740,7 @@ TEST(a_robot_is_read) {
         expect_near("y", m.end[1], 0.2, 0.05);
         assert_true(m.end[0] == q[0] && m.end[1] == q[1] && fabs(q[0] - 1.5) > 1e-9);
         expect_near("height", m.base_high, q[2] - 0.3, 1e-15);
-        for (int f = 0; f < SA01_FEET; f++) {
-            assert_true(m.in_stance[f]);
-            const double *center = robot_sim_foot(sim, f)->sole_center;
-            assert_true(m.touchdown[f][0] == center[0] && m.touchdown[f][1] == center[1]);
-            double deepest = robot_sim_foot(sim, f)->result.depth_max;
-            assert_true(m.deepest[f] == (rigid ? 0 : deepest));
-        }
+        check_stances(&m, sim, rigid);
         start.qpos[2] += 0.11; /* 100 mm above the ground */
         robot_sim_load(sim, &start, &variation);
         mild_ground_reset(task_env_ground(env));
@@ -728,19 +750,7 @@ TEST(a_robot_is_read) {
         expect_near("apex", m.apex[0], 0.1, 1e-4);
         expect_near("apex", m.apex[1], 0.1, 1e-4);
     }
-    MildMapDef slope = mild_map_def_default(); /* the base is above the ground under it */
-    slope.kind = MILD_MAP_SLOPE;
-    slope.slope = 0.1;
-    MildMap *map = mild_map_create(&slope, &error);
-    assert_non_null(map);
-    task_env_rest(env)->terrain.map = map;
-    Measure m;
-    const double none[SA01_JOINTS] = {0}, *q = robot_sim_qpos(sim);
-    measure_start(&m, 1e-3);
-    m.time = 3;
-    measure_step(&m, env, sim, none);
-    expect_near("height on a slope", m.base_high, q[2] - 0.3 - 0.1 * q[0], 1e-12);
-    mild_map_destroy(map);
+    check_slope(env, sim);
     free(env);
     robot_sim_destroy(sim);
     robot_destroy(robot);

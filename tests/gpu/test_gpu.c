@@ -341,6 +341,32 @@ TEST(returns_are_those_of_the_cpu) {
     }
 }
 
+/* The device and the CPU choose the same samples in the same order. */
+static void compare_order(const Learner *gpu, const Learner *cpu, const PpoDef *def, int envs) {
+    const int samples = def->steps * envs;
+    int *order = malloc((size_t)samples * sizeof *order);
+    assert_non_null(order);
+    cudaMemcpyAsync(order, gpu->gpu->substitute, (size_t)samples * sizeof *order,
+                    cudaMemcpyDeviceToHost, gpu->gpu->queue.stream);
+    assert_int_equal(cudaStreamSynchronize(gpu->gpu->queue.stream), cudaSuccess);
+    assert_memory_equal(order, cpu->ppo->substitute, (size_t)samples * sizeof *order);
+    int cut[PPO_SHARDS_MAX + 1];
+    const int last =
+        order_cuts(def->shards, def->steps, envs, def->minibatches - 1, def->minibatches, cut);
+    cudaMemcpyAsync(order, gpu->gpu->order, (size_t)last * sizeof *order, cudaMemcpyDeviceToHost,
+                    gpu->gpu->queue.stream);
+    assert_int_equal(cudaStreamSynchronize(gpu->gpu->queue.stream), cudaSuccess);
+    assert_memory_equal(order, cpu->ppo->order, (size_t)last * sizeof *order);
+    free(order);
+}
+
+static void compare_samples(const PpoBatch *a, const PpoBatch *b, int samples) {
+    for (int i = 0; i < samples; i++) {
+        assert_true(fabs((double)a->advantage[i] - (double)b->advantage[i]) < 1e-4);
+        assert_true(fabs((double)a->returns[i] - (double)b->returns[i]) < 1e-4);
+    }
+}
+
 /* Two updates from the same rollout: arrays, order, decisions, and how far the parameters move. */
 static double compare_update(const PolicyDef *policy, const PpoDef *def, int envs, int rows,
                              int fault) {
@@ -372,28 +398,10 @@ static double compare_update(const PolicyDef *policy, const PpoDef *def, int env
                 steps[k][i] = both[k]->policy->parameters[i] - before[i];
             }
         }
-        const int samples = def->steps * envs;
         compare_reports(&report[1], &report[0], 1e-4);
         assert_int_equal(report[0].skipped > 0, fault >= NOT_FINITE);
-        for (int i = 0; i < samples; i++) {
-            assert_true(fabs((double)gpu.batch.advantage[i] - (double)cpu.batch.advantage[i]) <
-                        1e-4);
-            assert_true(fabs((double)gpu.batch.returns[i] - (double)cpu.batch.returns[i]) < 1e-4);
-        }
-        int *order = malloc((size_t)samples * sizeof *order);
-        assert_non_null(order);
-        cudaMemcpyAsync(order, gpu.gpu->substitute, (size_t)samples * sizeof *order,
-                        cudaMemcpyDeviceToHost, gpu.gpu->queue.stream);
-        assert_int_equal(cudaStreamSynchronize(gpu.gpu->queue.stream), cudaSuccess);
-        assert_memory_equal(order, cpu.ppo->substitute, (size_t)samples * sizeof *order);
-        int cut[PPO_SHARDS_MAX + 1];
-        const int last =
-            order_cuts(def->shards, def->steps, envs, def->minibatches - 1, def->minibatches, cut);
-        cudaMemcpyAsync(order, gpu.gpu->order, (size_t)last * sizeof *order, cudaMemcpyDeviceToHost,
-                        gpu.gpu->queue.stream);
-        assert_int_equal(cudaStreamSynchronize(gpu.gpu->queue.stream), cudaSuccess);
-        assert_memory_equal(order, cpu.ppo->order, (size_t)last * sizeof *order);
-        free(order);
+        compare_samples(&gpu.batch, &cpu.batch, def->steps * envs);
+        compare_order(&gpu, &cpu, def, envs);
         assert_int_equal(gpu.ppo->adam_steps, cpu.ppo->adam_steps);
         assert_int_equal(gpu.ppo->iteration, cpu.ppo->iteration);
         /* the next rollout begins with the same rows */

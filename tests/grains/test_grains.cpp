@@ -8,7 +8,7 @@ extern "C" { /* cmocka's header has no such words */
 }
 
 /* A box for single grains, which are put one by one. */
-static Bed stage_open(BedDef def, const std::vector<Vec> &grains, float gravity) {
+static Bed stage_open(BedDef def, const std::vector<Vec3> &grains, float gravity) {
     Bed bed;
     def.length = def.width = 0.1f;
     def.depth = 0.001f;
@@ -25,7 +25,7 @@ static double height_of(const Bed &bed, int i) {
     return (double)bed.g.place[i].z * (double)bed.g.unit.z;
 }
 
-static Vec position(const Bed &bed, int i) {
+static Vec3 position(const Bed &bed, int i) {
     return vec((float)bed.g.place[i].x * bed.g.unit.x, (float)bed.g.place[i].y * bed.g.unit.y,
                (float)bed.g.place[i].z * bed.g.unit.z);
 }
@@ -33,12 +33,12 @@ static Vec position(const Bed &bed, int i) {
 static double energy_of(const Bed &bed, int i) {
     const double m = (double)grain_mass(bed.g.law, bed.g.place[i].radius);
     const double r = (double)bed.g.place[i].radius;
-    const Vec v = bed.g.velocity[i], w = bed.g.spin[i];
+    const Vec3 v = bed.g.velocity[i], w = bed.g.spin[i];
     return 0.5 * m * ((double)dot(v, v) + 0.4 * r * r * (double)dot(w, w));
 }
 
-static Vec ball(float x, float y, float z, float radius) {
-    Vec p = vec(x, y, z);
+static Vec3 ball(float x, float y, float z, float radius) {
+    Vec3 p = vec(x, y, z);
     p.unused = radius;
     return p;
 }
@@ -187,7 +187,7 @@ TEST(the_floor_carries_the_weight) {
 /* A cloud of grains without weight flies against a tilted plate: what the grains lose in momentum
  * and angular momentum the plate has got, about its origin. */
 TEST(the_plate_gets_what_the_grains_lose) {
-    std::vector<Vec> grains;
+    std::vector<Vec3> grains;
     for (int k = 0; k < 60; k++) {
         grains.push_back(
             ball(0.04f + 0.0056f * (float)(k % 5), 0.035f + 0.0056f * (float)(k / 5 % 4),
@@ -210,9 +210,9 @@ TEST(the_plate_gets_what_the_grains_lose) {
                 bed.g.spin[i] = vec((float)(i % 5), -20.0f, 7.0f);
             }
             const float m = grain_mass(bed.g.law, bed.g.place[i].radius), r = bed.g.place[i].radius;
-            const Vec p = m * bed.g.velocity[i];
-            const Vec arm = position(bed, i) - vec(0.05f, 0.05f, 0.05f);
-            const Vec turn = cross(arm, p) + 0.4f * m * r * r * bed.g.spin[i];
+            const Vec3 p = m * bed.g.velocity[i];
+            const Vec3 arm = position(bed, i) - vec(0.05f, 0.05f, 0.05f);
+            const Vec3 turn = cross(arm, p) + 0.4f * m * r * r * bed.g.spin[i];
             const float part[6] = {p.x, p.y, p.z, turn.x, turn.y, turn.z};
             for (int k = 0; k < 6; k++) {
                 sum[k] += (double)part[k];
@@ -292,7 +292,7 @@ TEST(a_seed_gives_the_same_bits) {
 static int near_missed(const Grains &g, int i) {
     int missed = 0;
     for (int j = i / g.per * g.per; j < (i / g.per + 1) * g.per; j++) {
-        const Vec d = from_to(g, g.place[i], g.place[j]);
+        const Vec3 d = from_to(g, g.place[i], g.place[j]);
         if (i == j || length(d) >= g.place[i].radius + g.place[j].radius) {
             continue;
         }
@@ -354,10 +354,10 @@ TEST(a_block_is_nearest_where_a_box_is) {
     const auto uniform = [] { return (float)rand() / (float)RAND_MAX - 0.5f; };
     double worst = 0, shift = 0, inside = 0;
     for (int k = 0; k < 20000; k++) {
-        const Vec p = vec(0.2f * uniform(), 0.2f * uniform(), 0.2f * uniform());
-        const Vec q = vec(fminf(fmaxf(p.x, -0.03f), 0.03f), fminf(fmaxf(p.y, -0.06f), 0.06f),
-                          fminf(fmaxf(p.z, 0), s.height));
-        Vec normal = vec(0, 0, 0);
+        const Vec3 p = vec(0.2f * uniform(), 0.2f * uniform(), 0.2f * uniform());
+        const Vec3 q = vec(fminf(fmaxf(p.x, -0.03f), 0.03f), fminf(fmaxf(p.y, -0.06f), 0.06f),
+                           fminf(fmaxf(p.z, 0), s.height));
+        Vec3 normal = vec(0, 0, 0);
         const float far = shape_nearest(s, p, &normal), wanted = length(p - q);
         if (wanted > 0) {
             worst = fmax(worst, (double)fabsf(far - wanted));
@@ -365,7 +365,7 @@ TEST(a_block_is_nearest_where_a_box_is) {
         } else { /* out by the nearest of five faces */
             const float side = fminf(0.03f - fabsf(p.x), 0.06f - fabsf(p.y));
             const float out = fminf(side, fminf(p.z, s.height - p.z));
-            const Vec face = p - far * normal;
+            const Vec3 face = p - far * normal;
             assert_true(far <= 0 && fabsf(far + out) < 1e-7f && fabsf(length(normal) - 1) < 1e-5f);
             inside = fmax(inside, fabs((double)shape_nearest(s, face, &normal)));
         }
@@ -383,7 +383,7 @@ TEST(a_block_is_nearest_where_a_box_is) {
  * weight: what the grains gain in momentum and angular momentum about a fixed point the block has
  * lost, and its kinetic energy and theirs do not grow. */
 TEST(a_free_sole_keeps_momentum) {
-    std::vector<Vec> grains;
+    std::vector<Vec3> grains;
     for (int k = 0; k < 90; k++) {
         grains.push_back(
             ball(0.035f + 0.0056f * (float)(k % 6), 0.035f + 0.0056f * (float)(k / 6 % 5),
@@ -413,9 +413,9 @@ TEST(a_free_sole_keeps_momentum) {
         }
         for (int i = 0; i < (int)grains.size(); i++) {
             const float m = grain_mass(bed.g.law, bed.g.place[i].radius), r = bed.g.place[i].radius;
-            const Vec p = m * bed.g.velocity[i];
-            const Vec arm = position(bed, i) - vec(0.05f, 0.05f, 0.05f);
-            const Vec about = cross(arm, p) + 0.4f * m * r * r * bed.g.spin[i];
+            const Vec3 p = m * bed.g.velocity[i];
+            const Vec3 arm = position(bed, i) - vec(0.05f, 0.05f, 0.05f);
+            const Vec3 about = cross(arm, p) + 0.4f * m * r * r * bed.g.spin[i];
             const float part[6] = {p.x, p.y, p.z, about.x, about.y, about.z};
             for (int k = 0; k < 6; k++) {
                 sum[when][k] += (double)part[k];

@@ -31,6 +31,33 @@ static double difference(const double *a, const double *b, int count) {
     return most / size;
 }
 
+/* Throws a plate at the ground, as a face and as a sole. */
+static void throw_both(Kit *one, Kit *two, int imprints, uint64_t *random) {
+    if (imprints) {
+        kit_prints(one, 32);
+        kit_prints(two, 32);
+    }
+    one->input.position[0][0] = 0.0123; /* off the borders of imprints' cells */
+    one->input.position[0][1] = 0.0045;
+    one->input.position[0][2] -= 0.01;
+    one->mass[0] = 3.0;
+    one->inertia[0] = 0.02;
+    one->center[0][2] = kit_uniform(random, 0.0, 0.3);
+    for (int k = 0; k < 6; k++) {
+        one->input.velocity[0][k] = kit_uniform(random, -0.2, 0.2);
+    }
+    if (imprints) { /* imprints take the elements of a surface for level squares: no tilt */
+        memset(one->center[0], 0, sizeof one->center[0]);
+        memset(one->input.velocity[0] + 3, 0, 3 * sizeof(double));
+        one->inertia[0] = 1e9;
+    }
+    one->input.velocity[0][2] -= 0.3;
+    kit_copy_input(two, one);
+    memcpy(two->center, one->center, sizeof two->center);
+    memcpy(two->mass, one->mass, sizeof two->mass);
+    memcpy(two->inertia, one->inertia, sizeof two->inertia);
+}
+
 /* A face that looks down, against a plane sole of the same raster: level when it touches down, so
  * that every share is 1, and tilting afterwards. */
 TEST(a_face_is_a_sole) {
@@ -45,29 +72,7 @@ TEST(a_face_is_a_sole) {
         Kit one, two;
         kit_open(&one, 1, face, NULL, &m, 1e-3);
         kit_open(&two, 1, sole, NULL, &m, 1e-3);
-        if (draw % 2) {
-            kit_prints(&one, 32);
-            kit_prints(&two, 32);
-        }
-        one.input.position[0][0] = 0.0123; /* off the borders of imprints' cells */
-        one.input.position[0][1] = 0.0045;
-        one.input.position[0][2] -= 0.01;
-        one.mass[0] = 3.0;
-        one.inertia[0] = 0.02;
-        one.center[0][2] = kit_uniform(&random, 0.0, 0.3);
-        for (int k = 0; k < 6; k++) {
-            one.input.velocity[0][k] = kit_uniform(&random, -0.2, 0.2);
-        }
-        if (draw % 2) { /* imprints take the elements of a surface for level squares: no tilt */
-            memset(one.center[0], 0, sizeof one.center[0]);
-            memset(one.input.velocity[0] + 3, 0, 3 * sizeof(double));
-            one.inertia[0] = 1e9;
-        }
-        one.input.velocity[0][2] -= 0.3;
-        kit_copy_input(&two, &one);
-        memcpy(two.center, one.center, sizeof two.center);
-        memcpy(two.mass, one.mass, sizeof two.mass);
-        memcpy(two.inertia, one.inertia, sizeof two.inertia);
+        throw_both(&one, &two, draw % 2, &random);
         for (int s = 0; s < 20; s++, steps++) {
             kit_step(&one, NULL);
             kit_step(&two, NULL);

@@ -151,6 +151,16 @@ static double off_edge(int kind) {
     return kind == MILD_MAP_MIXED ? 1.0 : 0.0;
 }
 
+/* [N] On a foot that is shaken. */
+static void shaking_force(const Kit *kit, const double shake[3], double spring, double t,
+                          double force[3]) {
+    for (int k = 0; k < 3; k++) {
+        force[k] =
+            kit->mass[0] * KIT_GRAVITY *
+            (k == 2 ? 1.5 * sin(spring * t * 6.28) + 0.8 * shake[2] * t : shake[k] * sin(20 * t));
+    }
+}
+
 /* Feet thrown and shaken at random over uneven ground until they leave it: the ground has taken
  * energy. */
 TEST(test_passive) {
@@ -181,13 +191,9 @@ TEST(test_passive) {
             shake[k] = kit_uniform(&random, 0.0, 1.0);
         }
         for (int s = 0; s < (int)(0.7 / dt); s++) {
-            double t = s * dt, before[6];
+            double before[6];
             memcpy(before, kit.input.velocity[0], sizeof before);
-            for (int k = 0; k < 3; k++) {
-                force[0][k] = kit.mass[0] * KIT_GRAVITY *
-                              (k == 2 ? 1.5 * sin(spring * t * 6.28) + 0.8 * shake[2] * t
-                                      : shake[k] * sin(20 * t));
-            }
+            shaking_force(&kit, shake, spring, s * dt, force[0]);
             kit_step(&kit, (const double(*)[3])force);
             const double w = kit_work(&kit, 0, before);
             work += w;

@@ -321,7 +321,7 @@ TEST(test_decoder_of_the_ground) {
     }
 }
 
-static void assert_refused(const char *path, MildStatus status) {
+static void check_bad_file(const char *path, MildStatus status) {
     MildError error = {0};
     Policy *policy = policy_load(path, NULL, 0, &error);
     assert_null(policy);
@@ -336,23 +336,23 @@ TEST(test_damaged_files) {
     unsigned char *bytes = (unsigned char *)kit_read(PATH, &size);
     for (size_t cut = 0; cut < 50; cut++) {
         kit_write(PATH, bytes, size * cut / 50);
-        assert_refused(PATH, MILD_ERROR_FORMAT);
+        check_bad_file(PATH, MILD_ERROR_FORMAT);
     }
     kit_write(PATH, bytes, size - 1);
-    assert_refused(PATH, MILD_ERROR_FORMAT);
+    check_bad_file(PATH, MILD_ERROR_FORMAT);
     Random random = random_at(12, 0, 0);
     for (int flip = 0; flip < 600; flip++) { /* every bit of the first bytes, then anywhere */
         size_t at = flip < 200 ? (size_t)flip / 8 : random_index(&random, (uint32_t)size);
         unsigned char mask = (unsigned char)(1u << (flip % 8));
         bytes[at] ^= mask;
         kit_write(PATH, bytes, size);
-        assert_refused(PATH, MILD_ERROR_FORMAT);
+        check_bad_file(PATH, MILD_ERROR_FORMAT);
         bytes[at] ^= mask;
     }
     unlink(PATH);
-    assert_refused(PATH, MILD_ERROR_IO);
-    assert_refused("/", MILD_ERROR_IO);
-    assert_refused("no/such/folder/policy.safetensors", MILD_ERROR_IO);
+    check_bad_file(PATH, MILD_ERROR_IO);
+    check_bad_file("/", MILD_ERROR_IO);
+    check_bad_file("no/such/folder/policy.safetensors", MILD_ERROR_IO);
     free(bytes);
     policy_destroy(policy);
 }
@@ -404,14 +404,14 @@ TEST(test_lying_headers) {
         memcpy(lie + at, to, kept);
         assert_true(safetensors_seal(lie, size));
         kit_write(PATH, lie, size);
-        assert_refused(PATH, MILD_ERROR_FORMAT);
+        check_bad_file(PATH, MILD_ERROR_FORMAT);
     }
     memcpy(lie, bytes, size);
     const float bad = NAN;
     memcpy(lie + size - sizeof bad, &bad, sizeof bad);
     assert_true(safetensors_seal(lie, size));
     kit_write(PATH, lie, size);
-    assert_refused(PATH, MILD_ERROR_FORMAT);
+    check_bad_file(PATH, MILD_ERROR_FORMAT);
     free(lie);
     free(bytes);
     unlink(PATH);
@@ -434,7 +434,7 @@ TEST(test_padding_is_blank) {
             bytes[end - 1] = '}';
             assert_true(safetensors_seal(bytes, size));
             kit_write(PATH, bytes, size);
-            assert_refused(PATH, MILD_ERROR_FORMAT);
+            check_bad_file(PATH, MILD_ERROR_FORMAT);
         }
         free(bytes);
         unlink(PATH);

@@ -472,8 +472,8 @@ TEST(they_are_drawn) {
 
 /* ---- what a user may get wrong ---- */
 
-static void check_refused(const char *keys, const char *geom, const char *asset,
-                          const char *names) {
+static void check_bad_body(const char *keys, const char *geom, const char *asset,
+                           const char *names) {
     static char text[4000];
     snprintf(text, sizeof text,
              "<mujoco><extension><plugin plugin='mild.ground'><instance name='soft'>%s</instance>"
@@ -495,19 +495,20 @@ static void check_refused(const char *keys, const char *geom, const char *asset,
 #define FOOT CONFIG("feet", "foot")
 
 TEST(wrong_bodies_are_refused) {
-    check_refused(FOOT CONFIG("body", "shim"), SHIN, "", "body shim shin");
-    check_refused(FOOT CONFIG("body", "shin shin"), SHIN, "", "shin");
-    check_refused(FOOT CONFIG("body", "shin foot"), SHIN, "", "foot");
-    check_refused(CONFIG("sole", "") CONFIG("feet", "foot") CONFIG("body", "pole"), SHIN, "",
-                  "pole world");
-    check_refused(FOOT CONFIG("body", "shin"), "<site name='s'/>", "", "shin");
-    check_refused(FOOT CONFIG("body", "shin"), "<geom type='box' size='20 20 20' " OFF "/>", "",
-                  "shin 10");
-    check_refused(FOOT CONFIG("body", "shin") CONFIG("body_pitch", "0.001"),
-                  "<geom type='box' size='1 1 1' " OFF "/>", "", "shin elements");
-    check_refused(FOOT CONFIG("body", "shin") CONFIG("body_pitch", "0"), SHIN, "",
-                  "plugin.body_pitch 0");
-    check_refused(CONFIG("body", "shin") CONFIG("ground.model", "bekker"), SHIN, "", "bekker foot");
+    check_bad_body(FOOT CONFIG("body", "shim"), SHIN, "", "body shim shin");
+    check_bad_body(FOOT CONFIG("body", "shin shin"), SHIN, "", "shin");
+    check_bad_body(FOOT CONFIG("body", "shin foot"), SHIN, "", "foot");
+    check_bad_body(CONFIG("sole", "") CONFIG("feet", "foot") CONFIG("body", "pole"), SHIN, "",
+                   "pole world");
+    check_bad_body(FOOT CONFIG("body", "shin"), "<site name='s'/>", "", "shin");
+    check_bad_body(FOOT CONFIG("body", "shin"), "<geom type='box' size='20 20 20' " OFF "/>", "",
+                   "shin 10");
+    check_bad_body(FOOT CONFIG("body", "shin") CONFIG("body_pitch", "0.001"),
+                   "<geom type='box' size='1 1 1' " OFF "/>", "", "shin elements");
+    check_bad_body(FOOT CONFIG("body", "shin") CONFIG("body_pitch", "0"), SHIN, "",
+                   "plugin.body_pitch 0");
+    check_bad_body(CONFIG("body", "shin") CONFIG("ground.model", "bekker"), SHIN, "",
+                   "bekker foot");
 }
 
 /* Bodies and feet are 16 together. */

@@ -35,7 +35,7 @@ static mjModel *compile(const char *option, const char *configs, const char *flo
 #define LONG_NAME LEG LEG LEG LEG LEG
 
 /* The model must not compile, with a message that names what is wrong. */
-static void check_refused(const char *option, const char *configs, const char *names) {
+static void check_bad_keys(const char *option, const char *configs, const char *names) {
     mjModel *m = compile(option, configs, OFF, "", BOX OFF, "");
     print_message("%s\n",
                   strstr(kit_said, "mild.ground '") ? strstr(kit_said, "mild.ground '") : kit_said);
@@ -46,37 +46,37 @@ static void check_refused(const char *option, const char *configs, const char *n
 }
 
 TEST(refuses_what_is_wrong) {
-    check_refused("", "", "feet");
-    check_refused("", CONFIG("feet", "fool"), "fool foot");
-    check_refused("", CONFIG("feet", "foot " MANY), "16 b16");
-    check_refused("", CONFIG("feet", "pole foot foot"), "foot");
-    check_refused("", CONFIG("feet", "foot sole"), "foot sole");
-    check_refused("", CONFIG("feet", "end pole sole"), "end sole foot");
-    check_refused("", CONFIG("feet", "foot " LONG_NAME), LEG "leg_of_a_robot_with_a_v foot");
-    check_refused("", CONFIG("feet", "pole"), "pole world");
-    check_refused("", CONFIG("feet", "world"), "world");
-    check_refused("", FOOT CONFIG("sole", "bax"), "bax box");
-    check_refused("", FOOT CONFIG("sole", "post"), "sole post feet");
-    check_refused("", FOOT CONFIG("outline", "0 0 1 0"), "outline 4 3");
-    check_refused("", FOOT CONFIG("outline", "0 0 1 0 1 x"), "outline x");
-    check_refused("", FOOT CONFIG("outline", "0 0 1 0 1 1; 0 0 1 0 1 1"), "outline 2 1");
-    check_refused("", FOOT CONFIG("outline", "0 0 1 0 2 0"), "sole.outline");
-    check_refused("", FOOT CONFIG("outline", "-9 -9 9 -9 9 9 -9 9"), "sole.pitch 65536");
-    check_refused("", FOOT CONFIG("ground", "sand_lose"), "sand_lose sand_loose");
-    check_refused("", FOOT CONFIG("ground", "rigid"), "ground rigid");
-    check_refused("", FOOT CONFIG("ground", "grass rubber"), "plugin.ground 2 terrain.patches");
-    check_refused("", FOOT CONFIG("ground.model", "bekkers"), "ground.model bekkers bekker");
-    check_refused("", FOOT CONFIG("ground.model", "rigid"), "ground.model rigid");
-    check_refused("", FOOT CONFIG("ground", "clay") CONFIG("ground.model", "mild"),
-                  "clay bekker ground.model");
-    check_refused("", FOOT CONFIG("ground.k_pen", "-1"), "ground.k_pen -1");
-    check_refused("", FOOT CONFIG("ground.k_pen", "much"), "ground.k_pen much");
-    check_refused("", FOOT CONFIG("ground.k_pan", "1"), "ground.k_pan");
-    check_refused("", FOOT CONFIG("pitch", "0"), "plugin.pitch 0");
-    check_refused("", FOOT CONFIG("prints", "-4"), "plugin.prints -4");
-    check_refused("", FOOT CONFIG("terrain.kind", "hills"), "terrain.kind hills");
-    check_refused("", FOOT CONFIG("terrain.kind", "image"), "terrain.kind image");
-    check_refused("integrator='RK4'", FOOT, "RK4 implicitfast");
+    check_bad_keys("", "", "feet");
+    check_bad_keys("", CONFIG("feet", "fool"), "fool foot");
+    check_bad_keys("", CONFIG("feet", "foot " MANY), "16 b16");
+    check_bad_keys("", CONFIG("feet", "pole foot foot"), "foot");
+    check_bad_keys("", CONFIG("feet", "foot sole"), "foot sole");
+    check_bad_keys("", CONFIG("feet", "end pole sole"), "end sole foot");
+    check_bad_keys("", CONFIG("feet", "foot " LONG_NAME), LEG "leg_of_a_robot_with_a_v foot");
+    check_bad_keys("", CONFIG("feet", "pole"), "pole world");
+    check_bad_keys("", CONFIG("feet", "world"), "world");
+    check_bad_keys("", FOOT CONFIG("sole", "bax"), "bax box");
+    check_bad_keys("", FOOT CONFIG("sole", "post"), "sole post feet");
+    check_bad_keys("", FOOT CONFIG("outline", "0 0 1 0"), "outline 4 3");
+    check_bad_keys("", FOOT CONFIG("outline", "0 0 1 0 1 x"), "outline x");
+    check_bad_keys("", FOOT CONFIG("outline", "0 0 1 0 1 1; 0 0 1 0 1 1"), "outline 2 1");
+    check_bad_keys("", FOOT CONFIG("outline", "0 0 1 0 2 0"), "sole.outline");
+    check_bad_keys("", FOOT CONFIG("outline", "-9 -9 9 -9 9 9 -9 9"), "sole.pitch 65536");
+    check_bad_keys("", FOOT CONFIG("ground", "sand_lose"), "sand_lose sand_loose");
+    check_bad_keys("", FOOT CONFIG("ground", "rigid"), "ground rigid");
+    check_bad_keys("", FOOT CONFIG("ground", "grass rubber"), "plugin.ground 2 terrain.patches");
+    check_bad_keys("", FOOT CONFIG("ground.model", "bekkers"), "ground.model bekkers bekker");
+    check_bad_keys("", FOOT CONFIG("ground.model", "rigid"), "ground.model rigid");
+    check_bad_keys("", FOOT CONFIG("ground", "clay") CONFIG("ground.model", "mild"),
+                   "clay bekker ground.model");
+    check_bad_keys("", FOOT CONFIG("ground.k_pen", "-1"), "ground.k_pen -1");
+    check_bad_keys("", FOOT CONFIG("ground.k_pen", "much"), "ground.k_pen much");
+    check_bad_keys("", FOOT CONFIG("ground.k_pan", "1"), "ground.k_pan");
+    check_bad_keys("", FOOT CONFIG("pitch", "0"), "plugin.pitch 0");
+    check_bad_keys("", FOOT CONFIG("prints", "-4"), "plugin.prints -4");
+    check_bad_keys("", FOOT CONFIG("terrain.kind", "hills"), "terrain.kind hills");
+    check_bad_keys("", FOOT CONFIG("terrain.kind", "image"), "terrain.kind image");
+    check_bad_keys("integrator='RK4'", FOOT, "RK4 implicitfast");
 }
 
 /* A sensor of a ground that cannot be made does not hide why. */

@@ -143,6 +143,19 @@ static int is_colour(const mjvGeom *geom, float r, float g, float b) {
            fabsf(geom->rgba[2] - share * b) < 1e-3f;
 }
 
+/* Another ground has another colour. */
+static void check_other_colour(Shown *shown) {
+    char error[300] = "";
+    assert_int_equal(plugin_ground_change(shown->m, shown->d, NULL, 0, "name=rubber\nk_pen=900",
+                                          error, sizeof error),
+                     0);
+    update(shown);
+    for (int i = 0; i < shown->scene.ngeom; i++) {
+        const mjvGeom *g = &shown->scene.geoms[i];
+        assert_true(!is_tile(g) || is_colour(g, 0.35F, 0.35F, 0.38F));
+    }
+}
+
 /* Level ground that is asked for: closed up to the horizon, under the plate as deep as the plate,
  * in the colour of the soil, and without patches. */
 TEST(level_ground_is_dented) {
@@ -186,19 +199,14 @@ TEST(level_ground_is_dented) {
     assert_true(fabs(whole - 100.0 * 100.0) < 1);
     assert_true(fabs(middle[0] / whole) < 0.17 && fabs(middle[1] / whole) < 0.17);
     assert_int_equal(others, 1); /* the plate itself: no patches */
-
-    char error[300] = ""; /* another ground has another colour */
-    assert_int_equal(plugin_ground_change(shown.m, shown.d, NULL, 0, "name=rubber\nk_pen=900",
-                                          error, sizeof error),
-                     0);
-    update(&shown);
-    for (int i = 0; i < shown.scene.ngeom; i++) {
-        const mjvGeom *g = &shown.scene.geoms[i];
-        assert_true(!is_tile(g) || is_colour(g, 0.35F, 0.35F, 0.38F));
-    }
+    check_other_colour(&shown);
     hide(&shown);
+}
 
-    show(&shown, "", "", "", 0, 0); /* on a floor of the model: patches on it */
+/* On a floor of the model: patches on it. */
+TEST(a_floor_has_patches) {
+    Shown shown;
+    show(&shown, "", "", "", 0, 0);
     press(&shown);
     update(&shown);
     assert_true(shown.scene.ngeom > 30);

@@ -10,15 +10,14 @@
 
 #include "robot/description.h"
 
-static void assert_refused(double *number, double bad, const char *what) {
+static void check_number(double *number, double bad, const char *what) {
     MildError error = {0};
     double kept = *number;
     *number = bad;
     MildStatus status = robot_check_model(robot->model, "robot.xml", &error);
     *number = kept;
-    assert_int_equal(status, MILD_ERROR_RANGE);
     assert_names(error.text, "robot.xml");
-    assert_error(&error, MILD_ERROR_RANGE, what);
+    assert_refused(status, MILD_ERROR_RANGE, &error, what);
 }
 
 TEST(test_every_number) {
@@ -47,17 +46,17 @@ TEST(test_every_number) {
     MildError error = {0};
     assert_int_equal(robot_check_model(robot->model, "robot.xml", &error), MILD_OK);
     for (int i = 0; i < count; i++) {
-        assert_refused(numbers[i].number, NAN, numbers[i].what);
-        assert_refused(numbers[i].number, INFINITY, numbers[i].what);
-        assert_refused(numbers[i].number, -INFINITY, numbers[i].what);
+        check_number(numbers[i].number, NAN, numbers[i].what);
+        check_number(numbers[i].number, INFINITY, numbers[i].what);
+        check_number(numbers[i].number, -INFINITY, numbers[i].what);
         if (!numbers[i].signless) {
-            assert_refused(numbers[i].number, -0.01, numbers[i].what);
+            check_number(numbers[i].number, -0.01, numbers[i].what);
         }
     }
-    assert_refused(m->body_mass + body, 0, "mass");
-    assert_refused(m->body_inertia + 3 * body, 0, "inertia");
-    assert_refused(m->jnt_range + 2 * joint, 9, "range");
-    assert_refused(m->jnt_actfrcrange + 2 * joint + 1, -900, "actuatorfrcrange");
+    check_number(m->body_mass + body, 0, "mass");
+    check_number(m->body_inertia + 3 * body, 0, "inertia");
+    check_number(m->jnt_range + 2 * joint, 9, "range");
+    check_number(m->jnt_actfrcrange + 2 * joint + 1, -900, "actuatorfrcrange");
     print_message("%d kinds of numbers, each spoilt three or four ways\n", count);
 }
 
@@ -124,13 +123,13 @@ TEST(test_limits) {
     assert_int_equal(robot_check_model(m, "robot.xml", NULL), MILD_OK);
     m->dof_armature[dof] = armature;
     for (int k = 0; k < 3; k++) {
-        assert_refused(m->body_inertia + 3 * body + k, 0, "leg_l6_link mass inertia");
+        check_number(m->body_inertia + 3 * body + k, 0, "leg_l6_link mass inertia");
     }
-    assert_refused(m->body_mass + robot->base_body, 0, "base_link mass inertia");
-    assert_refused(m->body_mass + body, 0, "leg_l6_link mass inertia");
-    assert_refused(m->jnt_range + 2 * joint, m->jnt_range[2 * joint + 1], "leg_l4_joint range");
-    assert_refused(m->jnt_actfrcrange + 2 * joint, m->jnt_actfrcrange[2 * joint + 1],
-                   "leg_l4_joint actuatorfrcrange");
+    check_number(m->body_mass + robot->base_body, 0, "base_link mass inertia");
+    check_number(m->body_mass + body, 0, "leg_l6_link mass inertia");
+    check_number(m->jnt_range + 2 * joint, m->jnt_range[2 * joint + 1], "leg_l4_joint range");
+    check_number(m->jnt_actfrcrange + 2 * joint, m->jnt_actfrcrange[2 * joint + 1],
+                 "leg_l4_joint actuatorfrcrange");
     m->jnt_limited[joint] = m->jnt_actfrclimited[joint] = 0; /* then nobody reads the numbers */
     m->jnt_range[2 * joint] = m->jnt_actfrcrange[2 * joint] = 1e3;
     assert_int_equal(robot_check_model(m, "robot.xml", NULL), MILD_OK);

@@ -138,6 +138,35 @@ static void lowest_point(RobotSim *sim, int foot, double point[3], double jacobi
     mj_jac(m, d, jacobian, NULL, point, body);
 }
 
+/* [m] How far heights are off above the rough ground under each foot, which is drawn lower. */
+static double height_error(RobotSim *sim, const MildTerrain *low) {
+    double worst = 0;
+    double clearance = robot_sim_sole_clearance(sim, low), least = 1e9;
+    for (int f = 0; f < FEET; f++) {
+        const double *at = robot_sim_foot(sim, f)->position;
+        const double height = at[2] - mild_terrain_height_at(low, at[0], at[1]);
+        worst = fmax(worst, fabs(robot_sim_foot(sim, f)->sole_height - height));
+        least = fmin(least, height);
+    }
+    return fmax(worst, fabs(clearance - least));
+}
+
+/* How far the lowest points of the feet are off, [m] and [m/s]; their Jacobians. */
+static void place_errors(RobotSim *sim, const RobotState *state, double jacobian[FEET][3 * NV],
+                         double *worst_place, double *worst_speed) {
+    for (int f = 0; f < FEET; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        double point[3], speed[3];
+        lowest_point(sim, f, point, jacobian[f]);
+        mju_mulMatVec(speed, jacobian[f], state->qvel, 3, NV);
+        for (int k = 0; k < 3; k++) {
+            *worst_place = fmax(*worst_place, fabs(point[k] - foot->position[k]));
+            *worst_speed = fmax(*worst_speed, fabs(speed[k] - foot->velocity[k]));
+            *worst_speed = fmax(*worst_speed, fabs(foot->velocity[3 + k]));
+        }
+    }
+}
+
 /* Place and speed of the foot, and after a step: acceleration = M^-1 (tau - b + J^T F), with no
  * moment. */
 TEST(a_round_foot_is_a_point) {
@@ -159,26 +188,8 @@ TEST(a_round_foot_is_a_point) {
         RobotState state = moving_state(draw);
         double torque[JOINTS], jacobian[FEET][3 * NV], force[NV] = {0}, rate[NV];
         robot_sim_load(sim, &state, &nominal);
-        for (int f = 0; f < FEET; f++) {
-            const RobotFoot *foot = robot_sim_foot(sim, f);
-            double point[3], speed[3];
-            lowest_point(sim, f, point, jacobian[f]);
-            mju_mulMatVec(speed, jacobian[f], state.qvel, 3, NV);
-            for (int k = 0; k < 3; k++) {
-                worst_place = fmax(worst_place, fabs(point[k] - foot->position[k]));
-                worst_speed = fmax(worst_speed, fabs(speed[k] - foot->velocity[k]));
-                worst_speed = fmax(worst_speed, fabs(foot->velocity[3 + k]));
-            }
-        }
-        /* above the rough ground under each foot, which is drawn lower */
-        double clearance = robot_sim_sole_clearance(sim, &low), least = 1e9;
-        for (int f = 0; f < FEET; f++) {
-            const double *at = robot_sim_foot(sim, f)->position;
-            const double height = at[2] - mild_terrain_height_at(&low, at[0], at[1]);
-            worst_height = fmax(worst_height, fabs(robot_sim_foot(sim, f)->sole_height - height));
-            least = fmin(least, height);
-        }
-        worst_height = fmax(worst_height, fabs(clearance - least));
+        place_errors(sim, &state, jacobian, &worst_place, &worst_speed);
+        worst_height = fmax(worst_height, height_error(sim, &low));
         const mjModel *m = robot_sim_model(sim);
         mjData *d = mj_makeData(m);
         robot_engine_qpos(robot, state.qpos, d->qpos);

@@ -17,12 +17,11 @@ static TaskDef def_of(const char *presets, int model) {
     return def;
 }
 
-static void refused(const char *presets, int model, MildStatus status, const char *names) {
+static void check_bad_soils(const char *presets, int model, MildStatus status, const char *names) {
     TaskDef def = def_of(presets, model);
     TaskSoils soils;
     MildError error = {0};
-    assert_int_equal(task_soils_open(&def, &soils, &error), status);
-    assert_error(&error, status, names);
+    assert_refused(task_soils_open(&def, &soils, &error), status, &error, names);
 }
 
 TEST(what_is_read) {
@@ -45,14 +44,18 @@ TEST(what_is_read) {
     def = def_of("clay", MILD_MODEL_BEKKER);
     task_def_choose_ground(&def); /* an evaluation names its own */
     assert_int_equal(task_def_check_robot(&def, robot, &error), MILD_OK);
-    refused("clay", MILD_MODEL_MILD, MILD_ERROR_ARGUMENT,
-            "randomize.presets clay randomize.model bekker");
-    refused("foam45,claj", MILD_MODEL_BEKKER, MILD_ERROR_ARGUMENT, "randomize.presets claj clay");
-    refused("foam45,,clay", MILD_MODEL_BEKKER, MILD_ERROR_ARGUMENT, "randomize.presets ground");
-    refused("rigid", MILD_MODEL_MILD, MILD_ERROR_ARGUMENT, "randomize.presets rigid");
-    refused("/no/such.ini", MILD_MODEL_MILD, MILD_ERROR_IO, "randomize.presets /no/such.ini");
-    refused("clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay",
-            MILD_MODEL_BEKKER, MILD_ERROR_RANGE, "randomize.presets 16");
+    check_bad_soils("clay", MILD_MODEL_MILD, MILD_ERROR_ARGUMENT,
+                    "randomize.presets clay randomize.model bekker");
+    check_bad_soils("foam45,claj", MILD_MODEL_BEKKER, MILD_ERROR_ARGUMENT,
+                    "randomize.presets claj clay");
+    check_bad_soils("foam45,,clay", MILD_MODEL_BEKKER, MILD_ERROR_ARGUMENT,
+                    "randomize.presets ground");
+    check_bad_soils("rigid", MILD_MODEL_MILD, MILD_ERROR_ARGUMENT, "randomize.presets rigid");
+    check_bad_soils("/no/such.ini", MILD_MODEL_MILD, MILD_ERROR_IO,
+                    "randomize.presets /no/such.ini");
+    check_bad_soils(
+        "clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay,clay",
+        MILD_MODEL_BEKKER, MILD_ERROR_RANGE, "randomize.presets 16");
 }
 
 /* Draws of a preset and a file of the same model: half each, each number within its jitter. */

@@ -9,10 +9,14 @@
 #include "run/bench/bench.h"
 #include "run/bench/record.h"
 
-enum { SOLVERS = 2, TWIST_MAX = 6 * ROBOT_FEET_MAX, PROBLEMS_MAX = 400 };
+enum {
+    SOLVERS = 2,
+    TOLERANCES = 89 /* 1 .. 1e-11 */,
+    TWIST_MAX = 6 * ROBOT_FEET_MAX,
+    PROBLEMS_MAX = 400
+};
 static const double solver_error = 1e-6;              /* [-] error at which both stop */
-static const double never = 1e-15;                    /* [-] a tolerance too small to stop them */
-static const int solver_limit[SOLVERS] = {100, 2048}; /* most iterations that are tried */
+static const int solver_limit[SOLVERS] = {100, 2048}; /* most iterations */
 static const int solver_repeats[SOLVERS] = {20, 3};   /* repeats; the shortest time counts */
 static const char *const solver_names[SOLVERS] = {"newton", "gauss_seidel"};
 
@@ -27,7 +31,7 @@ typedef struct {
     double times[SOLVERS][PROBLEMS_MAX]; /* [us] */
     int problems;                        /* number of problems */
     int without_exact;                   /* problems left out because Newton did not converge */
-    int short_of[SOLVERS]; /* problems that missed solver_error within the limit, timed there */
+    int short_of[SOLVERS]; /* problems that missed solver_error, timed at the tightest */
 } SolverBench;
 
 static void impulses(const MildContactInput *input, const MildContactResult *result,
@@ -59,12 +63,16 @@ static void solve(SolverBench *bench, int solver, double tolerance, int iteratio
     mild_ground_solve(bench->ground, &bench->terrain, input, bench->scratch, result);
 }
 
-/* [-] Distance from the exact impulses in the metric of kinetic energy, after that many iterations.
- */
-static double error_after(SolverBench *bench, int solver, int iterations) {
+/* [-] Tolerance number k, from 1 on each an eighth of a decade below the one before. */
+static double tolerance_of(int k) {
+    return pow(10, -k / 8.0);
+}
+
+/* [-] Distance from the exact impulses in the metric of kinetic energy, with that tolerance. */
+static double error_with(SolverBench *bench, int solver, int k) {
     MildContactResult result;
     double difference[TWIST_MAX];
-    solve(bench, solver, never, iterations, &result);
+    solve(bench, solver, tolerance_of(k), solver_limit[solver], &result);
     impulses(&bench->input, &result, difference);
     for (int i = 0; i < 6 * bench->input.feet; i++) {
         difference[i] -= bench->exact[i];
@@ -72,21 +80,18 @@ static double error_after(SolverBench *bench, int solver, int iterations) {
     return sqrt(energy(&bench->input, difference) / energy(&bench->input, bench->exact));
 }
 
-/* The fewest iterations that reach solver_error, found by doubling and bisection. Returns the limit
- * when none do. */
-static int fewest_iterations(SolverBench *bench, int solver) {
-    int low = 0, high = 1, limit = solver_limit[solver];
-    while (!(error_after(bench, solver, high) <= solver_error)) {
-        if (high == limit) {
-            bench->short_of[solver]++;
-            return limit;
-        }
-        low = high;
-        high = 2 * high < limit ? 2 * high : limit;
+/* Number of the loosest tolerance that reaches solver_error, by bisection; the tightest when none
+ * does. A tolerance stops both solvers, because Newton's method does more work for a step that it
+ * leaves unsolved at a limit of iterations. */
+static int loosest_tolerance(SolverBench *bench, int solver) {
+    int low = -1, high = TOLERANCES - 1;
+    if (!(error_with(bench, solver, high) <= solver_error)) {
+        bench->short_of[solver]++;
+        return high;
     }
     while (high - low > 1) {
         int middle = (low + high) / 2;
-        *(error_after(bench, solver, middle) <= solver_error ? &high : &low) = middle;
+        *(error_with(bench, solver, middle) <= solver_error ? &high : &low) = middle;
     }
     return high;
 }
@@ -104,11 +109,11 @@ static void solver_problem(SolverBench *bench) {
         return;
     }
     for (int solver = 0; solver < SOLVERS; solver++) {
-        int iterations = fewest_iterations(bench, solver);
+        const double tolerance = tolerance_of(loosest_tolerance(bench, solver));
         double least = INFINITY;
         for (int i = 0; i < solver_repeats[solver]; i++) {
             double start = clock_thread_seconds();
-            solve(bench, solver, never, iterations, &result);
+            solve(bench, solver, tolerance, solver_limit[solver], &result);
             least = fmin(least, clock_thread_seconds() - start);
         }
         bench->times[solver][bench->problems] = 1e6 * least;

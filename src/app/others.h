@@ -2,17 +2,17 @@
  * They stand in a square, of which it is a corner, and walk as it does, each from random numbers of
  * its own. They do not touch each other, and each presses ground of its own: nobody walks in the
  * imprints of another. */
-#ifndef MILD_CROWD_H
-#define MILD_CROWD_H
+#ifndef MILD_OTHERS_H
+#define MILD_OTHERS_H
 
 #include "base/pool.h"
 #include "control/controller.h"
 #include "run/eval/scene.h"
 #include "view/view.h"
 
-typedef struct Crowd Crowd;
+typedef struct Others Others;
 
-/* Borrowed until crowd_destroy. */
+/* Borrowed until others_destroy. */
 typedef struct {
     int count; /* of the others */
     const TaskDef *task;
@@ -22,25 +22,25 @@ typedef struct {
     Pool *pool;
     double seconds, speed; /* [s] of the walk, [m/s] */
     uint64_t seed;
-} CrowdDef;
+} OthersDef;
 
 /* [m] Edge of the square. */
-double crowd_side(int count);
-Crowd *crowd_create(const CrowdDef *def, MildError *error);
-void crowd_destroy(Crowd *crowd); /* may be NULL */
-int crowd_count(const Crowd *crowd);
+double others_side(int count);
+Others *others_create(const OthersDef *def, MildError *error);
+void others_destroy(Others *others); /* may be NULL */
+int others_count(const Others *others);
 /* A policy step of all. */
-void crowd_step(Crowd *crowd);
+void others_step(Others *others);
 /* [count] Where they are, the nearest to the robot at the start first. */
-const ViewOther *crowd_others(const Crowd *crowd);
+const ViewOther *others_shown(const Others *others);
 /* How many have not fallen. */
-int crowd_upright(const Crowd *crowd);
+int others_upright(const Others *others);
 
 /* Those that are on a ground of the course, where they are drawn. */
 typedef struct {
     int robots, upright;
     double sinkage; /* [m] mean of their deeper feet in the last step; 0 of none */
-} CrowdRow;
-CrowdRow crowd_on(const Crowd *crowd, int material);
+} OthersRow;
+OthersRow others_on(const Others *others, int material);
 
 #endif
