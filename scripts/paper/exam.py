@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Walks a policy everywhere that docs/results.md speaks of, and says where it falls.
 
-  scripts/paper/exam.py --out out/exam                       # the shipped policy, 6370 trials: ten minutes on two cores
+  scripts/paper/exam.py --out out/exam                       # the shipped policy, 6450 trials: ten minutes on two cores
   scripts/paper/exam.py --out out/exam --policy runs/mine/policy.safetensors --trials 2 --parts nine,snow
+  scripts/paper/exam.py --out out/g1 --policy policies/g1.safetensors --config configs/g1.ini --parts sideways,turn,push -- --robot g1
 
 Prints a line for each part: the trials that stay upright, what ended the others, the cell whose mean speed is furthest from the command,
 the cost of transport, the largest torque in any trial, and the least distance of the legs. OUT/exam.json has the rows of `mild eval`.
@@ -38,6 +39,7 @@ PARTS = {
     "slippery": ("loose sand of friction 0.12", ["sand_loose"], [0.3, 0.6], ["--ground.mu=0.12"]),
     "quasi": ("ecc_quasi_3d", [g for g in NINE if g != "rigid"], [0.6], ["--model", "ecc_quasi_3d"]),
     "cone": ("con_cone", [g for g in NINE if g != "rigid"], [0.6], ["--model", "con_cone"]),
+    "spring": ("con_spring", [g for g in NINE if g != "rigid"], [0.6], ["--model", "con_spring"]),
 }
 
 

@@ -23,7 +23,9 @@
  * A change of direction must not create energy. The unloading line is therefore that of the peak
  * for every direction. Its upper end b lies ELEMENT_ELASTIC (1 - share) deeper than an element with
  * a smaller share has been. The element yields on that line, at the depth where the line gives its
- * yield force. */
+ * yield force. An element that lands begins on the line of the peak from the surface, whose first
+ * ELEMENT_ELASTIC is the whole of its travel, before it yields: what the line then holds, the
+ * element has pressed into it. */
 #ifndef MILD_GROUND_PLATE_H
 #define MILD_GROUND_PLATE_H
 
@@ -158,19 +160,17 @@ MILD_HD Alpha plate_alpha(const Plate *plate, int in_space, Real lean, Real leve
  * [-]. strength: [N/m] slope for a level plate moving straight down. rate: 1/dt. */
 MILD_HD void element_yield(Element *e, const ElementMemory *memory, Real dt, Real rate,
                            Real strength, Real sideways, Real downward, int curves) {
-    /* The line of the peak starts deeper than the element has been. */
+    /* The line of the peak starts deeper than the element has been, at least its travel deep. */
     const Real peak = RESIST_PEAK * strength;
     const Real share = real_min(real_max(downward / RESIST_PEAK, 0), 1);
     const Real lead = ELEMENT_ELASTIC * (1 - share);
-    const Real led =
-        e->middle > 0 ? real_min(e->middle + lead, e->middle / (share + ELEMENT_TINY)) : 0;
+    const Real led = real_max(e->middle + lead, ELEMENT_ELASTIC);
     const Real b = real_max(led, e->virgin_depth);
 
     const Real bed = law_bed_force(&e->law, b);
     const Real peak_force = peak * b + bed;
     const Real yield_force = share * peak * b + bed;
-    const Real travel = real_min(ELEMENT_ELASTIC, b) + ELEMENT_TINY;
-    const Real line = real_max(peak_force / travel, peak + law_bed_slope(&e->law, b));
+    const Real line = real_max(peak_force / ELEMENT_ELASTIC, peak + law_bed_slope(&e->law, b));
     const Real inverse = 1 / (line + ELEMENT_TINY); /* no strength: a line of no length */
     e->law.line_stiffness = share * peak;
     e->virgin_depth = b;

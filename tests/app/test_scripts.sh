@@ -94,4 +94,16 @@ said=$(quietly logs/bad.log "breaking" bash -c 'seq 1000; echo "error: no such t
 [ "$(wc -l <<<"$said")" = 22 ] && grep -q '^error: no such thing$' <<<"$said" && grep -q 'code 3; the last lines of logs/bad.log' <<<"$said" ||
     fail "quietly hides a failure: $said"
 [ "$(VERBOSE=1 quietly logs/none.log "counting" seq 3 | tr '\n' ' ')" = "1 2 3 " ] && [ ! -e logs/none.log ] || fail "VERBOSE"
+
+# the printed training, very short: what stands in its configuration, and its evaluation; called again it goes on
+bad "printed.sh" "$root/scripts/paper/printed.sh"
+bad "printed.sh" "$root/scripts/paper/printed.sh" --train.envs=4
+printed() { MILD=$mild TRIALS=1 "$root/scripts/paper/printed.sh" printed --train.device=cpu --train.robots=mujoco --train.envs=4 "$@"; }
+printed --train.iterations=1 >table 2>log || fail "printed.sh: $(cat log)"
+for key in "physics_dt = 0.005" "matmul = tf32" "iterations = 1" "modulation_per_dimension = false"; do
+    grep -q "^$key$" printed/config.ini || fail "printed.sh: no '$key' in its configuration"
+done
+[ "$(grep -c '/1' table)" = 36 ] && [ -s printed/eval.json ] || fail "printed.sh: nine grounds at four speeds are $(cat table)"
+printed --train.iterations=2 >table 2>log || fail "printed.sh goes on: $(cat log)"
+grep -q "^resumed" table && [ "$(wc -l <printed/log.csv)" = 3 ] || fail "printed.sh begins again: $(cat log)"
 finish "scripts: bad input"

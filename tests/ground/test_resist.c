@@ -240,6 +240,58 @@ TEST(test_shaken) {
     mild_sole_destroy(sole);
 }
 
+/* Vertical work [J] that the ground gives, at its most, to a plate led by hand from the air through
+ * a few random depths of the first elastic travels and into the air again, while it slides or
+ * stands. It is the impulse times the mean speed, so what a body's kinetic energy gains. */
+static double landed(Kit *kit, uint64_t *random) {
+    const double dt = kit->input.dt;
+    double most = -INFINITY;
+    for (int round = 0; round < 100; round++) {
+        const int steps = 1 + (int)kit_uniform(random, 0.0, 5.0);
+        double z = -5e-4, before = 0.0, work = 0.0;
+        for (int s = 0; s <= steps + 1; s++) { /* the last two in the air */
+            const double next = s < steps ? kit_uniform(random, -1e-4, 4e-4) : -5e-4;
+            const double speed = (next - z) / dt;
+            const int slides = kit_uniform(random, 0.0, 1.0) < 0.5;
+            kit->input.position[0][2] = -KIT_SOLE_Z * kit->input.rotation[0][8] - z;
+            kit->input.velocity[0][0] = kit->input.free_velocity[0] = slides ? 0.2 : 0.0;
+            kit->input.velocity[0][2] = -before;
+            kit->input.free_velocity[2] = -speed;
+            kit_solve(kit);
+            mild_ground_advance(kit->ground, &kit->terrain, &kit->input, kit->scratch,
+                                &kit->result);
+            work -= kit->result.foot[0].force[2] * dt * (before + speed) / 2;
+            z = next;
+            before = speed;
+        }
+        most = fmax(most, work);
+    }
+    return most;
+}
+
+TEST(test_landing) {
+    MildSole *sole = kit_plate(5, 3);
+    uint64_t random = 21;
+    for (int model = MILD_MODEL_ECC_QUASI; model <= MILD_MODEL_ECC_QUASI_3D; model++) {
+        double most = -INFINITY;
+        for (int draw = 0; draw < 60; draw++) {
+            MildMaterial mild = mild_material_default(), m;
+            Kit kit;
+            assert_int_equal(mild_model_match((MildModel)model, &mild, sole, 50.0, &m, NULL),
+                             MILD_OK);
+            kit_open(&kit, 1, sole, NULL, &m, draw % 2 ? 1e-3 : 5e-3);
+            const double turn[3] = {0.0, kit_uniform(&random, -1e-3, 1e-3), 0.0};
+            kit_rotate(kit.input.rotation[0], turn);
+            most = fmax(most, landed(&kit, &random));
+            kit_close(&kit);
+        }
+        print_message("%-12s gives at most %.1e J to a plate that lands and lifts off\n",
+                      mild_model_names[model], most);
+        assert_true(most < 1e-12);
+    }
+    mild_sole_destroy(sole);
+}
+
 /* No element remembers 3 mm more than it has been deep and can go in a step: not where its face
  * trails, so that nothing but rounding stops it, nor on ground without strength. */
 TEST(test_remembered_depth) {

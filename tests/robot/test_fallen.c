@@ -24,10 +24,6 @@
  *               impulses (energy.c) and what gravity and joints turned within the step
  *     solver    4 K residual: the twist solved for is within it, and impulses are at most twice
  *               the free motion
- *     landed    what the line of resistive theory holds after an element's first step in the
- *               ground, which does not put the yield depth ahead, or within its first
- *               ELEMENT_ELASTIC: at most F ELEMENT_ELASTIC/2 once a landing. This is the ground's
- *               own
  * None of these is fitted. */
 #include <stdio.h>
 
@@ -190,8 +186,7 @@ typedef struct {
     double work;    /* W */
     double stored;  /* S */
     double touched; /* of S, what elements hold that were above the ground in the step before */
-    double landed;  /* of S, what elements of resistive theory hold after their first step */
-    double allowed; /* but for `touched` and `landed` of the next step */
+    double allowed; /* but for `touched` of the next step */
     double kinetic; /* of the robot */
 } Account;
 
@@ -237,20 +232,6 @@ static double slot_way(const Slots *s, int i, double dt, double descent, double 
     return (s->iz[i] + lag + mass + damped) / dt * fmax(beyond, 0);
 }
 
-/* Bool: the yield depth of a slot is not ahead of it, or the slot is within its first elastic
- * travel, where the yield depth is up to that ahead. */
-static int slot_lands(const Slots *s, int i) {
-    return s->depth_max[i] == s->middle[i] || s->depth_max[i] <= 2 * ELEMENT_ELASTIC;
-}
-
-/* Bool: the material of a slot, or both of a mixture, are of resistive theory. state.h has the code
- * of a mixture. */
-static int resists(const MildTerrain *terrain, int32_t material) {
-    const int model = terrain->materials[material & 0xff].model;
-    const int resist = model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D;
-    return resist && (material < 0x10000 || resists(terrain, material >> 8 & 0xff));
-}
-
 /* Velocity of a slot's element [m/s]; descent: at which its depth grows. */
 typedef struct {
     double x, y, descent;
@@ -270,8 +251,7 @@ static Moves slot_moves(const FootScratch *foot, const Slots *s, int i, const do
 
 /* Adds what the elements of a body store, and what its motion allows. Returns [J] the work that the
  * ground expects to do on it. */
-static double count_body(const RobotSim *sim, const MildTerrain *terrain, int body,
-                         Account *account) {
+static double count_body(const RobotSim *sim, int body, Account *account) {
     const FootScratch *foot = &sim->scratch->foot[body];
     const MildFootResult *result = &sim->contact.foot[body];
     const double *V = sim->contact.velocity + 6 * body, dt = sim->dt;
@@ -298,9 +278,6 @@ static double count_body(const RobotSim *sim, const MildTerrain *terrain, int bo
         account->allowed += slot_way(s, i, dt, v[0].descent, v[1].descent);
         account->stored += stored;
         account->touched += s->last_middle[i] > 0 ? 0 : stored;
-        if (resists(terrain, foot->slot_material[e]) && slot_lands(s, i)) {
-            account->landed += slot_line(s, i);
-        }
     }
     account->allowed += 0.08 * fmax(energy, 0) + turned;
     return work;
@@ -308,8 +285,7 @@ static double count_body(const RobotSim *sim, const MildTerrain *terrain, int bo
 
 /* Of the step just made. before: velocity before it; torque: of the motors; both in the engine's
  * order. */
-static Account count(const RobotSim *sim, const MildTerrain *terrain, const double *before,
-                     const double *torque) {
+static Account count(const RobotSim *sim, const double *before, const double *torque) {
     const mjData *d = sim->data;
     const int nv = sim->robot->nv;
     double momentum[ROBOT_NV_MAX], moved[ROBOT_NV_MAX], forces = 0, expected = 0;
@@ -331,7 +307,7 @@ static Account count(const RobotSim *sim, const MildTerrain *terrain, const doub
                     1e-12 + 1e-9 * (after + account.kinetic + fabs(met)));
     }
     for (int k = 0; k < sim->scratch->listed; k++) {
-        expected += count_body(sim, terrain, sim->scratch->list[k], &account);
+        expected += count_body(sim, sim->scratch->list[k], &account);
     }
     account.kinetic = fmax(account.kinetic, after);
     account.allowed +=
@@ -345,7 +321,6 @@ typedef struct {
     int unsolved;           /* steps */
     int over;               /* steps beyond what is allowed */
     double worst;           /* [J] beyond */
-    double landed;          /* [J] most in a step */
     double allowed; /* [-] in a fall, of its greatest kinetic energy, summed over the falls */
     int seed;       /* first + number of the worst */
     int given;      /* falls in which the ground has at some time given more than it took */
@@ -380,12 +355,11 @@ static void fall(Robot *robot, int model, int number, Falls *all) {
         if (lost) {
             break;
         }
-        const Account now = count(sim, &place.terrain, before, applied);
+        const Account now = count(sim, before, applied);
         const double rise = last.work + now.stored - last.stored;
-        const double beyond = rise - last.allowed - now.touched - now.landed;
+        const double beyond = rise - last.allowed - now.touched;
         all->steps += last.work != 0;
         all->rise += rise > 0;
-        all->landed = fmax(all->landed, now.landed);
         over += beyond > 0;
         if (beyond > all->worst) {
             all->worst = beyond;
@@ -394,7 +368,7 @@ static void fall(Robot *robot, int model, int number, Falls *all) {
         all->unsolved += !sim->contact.converged;
         touch |= now.work != 0;
         sum += now.work;
-        allowed += now.allowed + now.touched + now.landed;
+        allowed += now.allowed + now.touched;
         most = fmax(most, sum);
         kinetic = fmax(kinetic, now.kinetic);
         last = now;
@@ -431,10 +405,9 @@ static void expect_no_energy(void) {
         print_message(
             "%-13s %d falls, %d touch, %d lost, %d steps in the ground, %d unsolved; "
             "energy rises in %d, beyond what is allowed in %d, by %.1e J at most (fall "
-            "%d); allowed in a fall %.3f of its kinetic energy (mean), landings %.1e J in "
-            "a step; %d falls were given energy, %.2g of their own at most\n",
+            "%d); allowed in a fall %.3f of its kinetic energy (mean); %d falls were given energy, %.2g of their own at most\n",
             model_name(m), f->falls, f->touch, f->lost, f->steps, f->unsolved, f->rise, f->over,
-            f->worst, f->seed, f->allowed / f->falls, f->landed, f->given, f->most);
+            f->worst, f->seed, f->allowed / f->falls, f->given, f->most);
         over += f->over;
         touch += f->touch;
         lost += f->lost;
