@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """The numbers that `mild` prints and writes, each held to another way to know it: a formula, another command, the system.
-Usage: test_numbers.py PATH_TO_MILD [press|info|memory|table|play ...]"""
+Usage: test_numbers.py PATH_TO_MILD [press|info|memory|benches|play ...]"""
 import csv
 import json
 import math
@@ -299,7 +299,7 @@ def memory():
     true("training is within the peak", 0.5 * many_peak < many["training"] < many_peak)
 
 
-def table():
+def benches():
     """The table of mild bench and its file: the same rows in the same order, each with its number and its unit."""
     lines = told("bench", "memory", "robots", "update", "--train.envs=4", "--train.threads=1", "--ppo.steps=4", "--json", "bench.json").splitlines()
     with open("bench.json", encoding="utf-8") as file:
@@ -340,7 +340,7 @@ def play():
 
 with tempfile.TemporaryDirectory() as folder:
     os.chdir(folder)
-    for part in (press, info, memory, table, play):
+    for part in (press, info, memory, benches, play):
         if len(sys.argv) < 3 or part.__name__ in sys.argv[2:]:
             part()
     os.chdir("/")
