@@ -211,7 +211,7 @@ static void dense_resist(double dt, DenseElement *e, int model, const double *n,
     resist_alpha(model, n, heading, level + RESIST_REST, down, x);
     resist_alpha(model, n, heading, level, down + RESIST_REST, z);
     double share = fmin(fmax(z[1] / RESIST_PEAK, 0.0), 1.0), peak = RESIST_PEAK * strength;
-    /* Virgin ground begins a whole elastic travel deep, and ahead of an element that yields early. */
+    /* Virgin ground begins a whole elastic travel deep, ahead of an element that yields early. */
     e->deep = fmax(e->deep, fmax(ELEMENT_ELASTIC, e->m0 + (1.0 - share) * ELEMENT_ELASTIC));
     double bed = law->bed_stiffness * fmax(e->deep - law->bed, 0.0);
     e->line = (peak * e->deep + bed) / ELEMENT_ELASTIC;

@@ -405,7 +405,8 @@ static void expect_no_energy(void) {
         print_message(
             "%-13s %d falls, %d touch, %d lost, %d steps in the ground, %d unsolved; "
             "energy rises in %d, beyond what is allowed in %d, by %.1e J at most (fall "
-            "%d); allowed in a fall %.3f of its kinetic energy (mean); %d falls were given energy, %.2g of their own at most\n",
+            "%d); allowed in a fall %.3f of its kinetic energy (mean); %d falls were given "
+            "energy, %.2g of their own at most\n",
             model_name(m), f->falls, f->touch, f->lost, f->steps, f->unsolved, f->rise, f->over,
             f->worst, f->seed, f->allowed / f->falls, f->given, f->most);
         over += f->over;
