@@ -40,7 +40,7 @@ help:
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make deb     the program and libmild as a Debian package, build/deb/mild_*.deb; TEST=1: tried in a bare chroot"
 	@echo "make site    all documentation as a site with search, build/site/index.html, with its links checked"
-	@echo "make wheels  the Python package with the program as one wheel, build/dist, tried in bare environments (docs/install.md)"
+	@echo "make wheels  the Python package with the program as one wheel, build/dist, tried in bare environments; TEST=1: in a bare chroot too"
 	@echo "make wheel-cuda  the compiled files for GPUs as a wheel beside it, for ARCHS=90 or for all"
 	@echo "make wheel   the same in half the time: untried, for MARCH=x86-64-v3 alone unless given"
 	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/learners-venv"
@@ -163,6 +163,7 @@ wheel-cuda: setup
 
 wheels: setup
 	@MARCH=$(MARCH) scripts/wheels.sh
+	@$(if $(TEST),scripts/wheels.sh build/dist/mildground-*.whl --chroot)
 
 python-check: wheel
 	@$(call with_wheel,learners)
