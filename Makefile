@@ -19,7 +19,7 @@ VERSION ?=
 PYTHON312 ?= python3.12
 TEST ?=
 
-.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check newton-check isaaclab-check jax-check dds-check check export-check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check newton-check isaaclab-check jax-check dds-check notebook-check check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -49,6 +49,7 @@ help:
 	@echo "make isaaclab-check  the ground in Isaac Lab 3's own G1 task without its simulator, on the CPU (8 GB), for PYTHON312=python3.12"
 	@echo "make jax-check   the batch ground inside jax.jit, and under MJX's robots, in build/jax-venv"
 	@echo "make dds-check   examples/drive: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
+	@echo "make notebook-check  the notebook of each tutorial in Jupyter's kernel, in build/notebooks-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
 
@@ -191,6 +192,11 @@ dds-check: build
 	@$(call environment,dds)
 	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_unitree.py build/mild
 	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_ros2.py build/mild
+
+# As a user has them: from the wheel. The notebooks with their pictures stay in build/notebooks.
+notebook-check: wheel
+	@$(call with_wheel,notebooks)
+	@build/notebooks-venv/bin/python tests/install/check_notebooks.py . build/notebooks
 
 clean:
 	rm -rf build
