@@ -19,7 +19,7 @@ VERSION ?=
 PYTHON312 ?= python3.12
 TEST ?=
 
-.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check newton-check isaaclab-check jax-check dds-check check export-check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check newton-check isaaclab-check jax-check dds-check notebook-check check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -40,7 +40,7 @@ help:
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make deb     the program and libmild as a Debian package, build/deb/mild_*.deb; TEST=1: tried in a bare chroot"
 	@echo "make site    all documentation as a site with search, build/site/index.html, with its links checked"
-	@echo "make wheels  the Python package with the program as one wheel, build/dist, tried in bare environments (docs/install.md)"
+	@echo "make wheels  the Python package with the program as one wheel, build/dist, tried in bare environments; TEST=1: in a bare chroot too"
 	@echo "make wheel-cuda  the compiled files for GPUs as a wheel beside it, for ARCHS=90 or for all"
 	@echo "make wheel   the same in half the time: untried, for MARCH=x86-64-v3 alone unless given"
 	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/learners-venv"
@@ -49,6 +49,7 @@ help:
 	@echo "make isaaclab-check  the ground in Isaac Lab 3's own G1 task without its simulator, on the CPU (8 GB), for PYTHON312=python3.12"
 	@echo "make jax-check   the batch ground inside jax.jit, and under MJX's robots, in build/jax-venv"
 	@echo "make dds-check   examples/drive: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
+	@echo "make notebook-check  the notebook of each tutorial in Jupyter's kernel, in build/notebooks-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
 
@@ -163,6 +164,7 @@ wheel-cuda: setup
 
 wheels: setup
 	@MARCH=$(MARCH) scripts/wheels.sh
+	@$(if $(TEST),scripts/wheels.sh build/dist/mildground-*.whl --chroot)
 
 python-check: wheel
 	@$(call with_wheel,learners)
@@ -190,6 +192,11 @@ dds-check: build
 	@$(call environment,dds)
 	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_unitree.py build/mild
 	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_ros2.py build/mild
+
+# As a user has them: from the wheel. The notebooks with their pictures stay in build/notebooks.
+notebook-check: wheel
+	@$(call with_wheel,notebooks)
+	@build/notebooks-venv/bin/python tests/install/check_notebooks.py . build/notebooks
 
 clean:
 	rm -rf build

@@ -4,6 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 jobs=${JOBS:-$(nproc)} root=$PWD/build/deb chroot=$PWD/build/deb/chroot
+source scripts/chroot.sh
 
 make_package() {
     local launcher=()
@@ -20,6 +21,12 @@ make_package() {
     fi
     (cd "$root" && cpack -D CPACK_PACKAGE_VERSION="$(./mild --version | cut -d' ' -f2)" >/dev/null)
     package=$(echo "$root"/mild_*.deb)
+    if [ -e "$root/web" ]; then # the page, as it was made
+        rm -rf "$root/inside"
+        dpkg-deb -x "$package" "$root/inside"
+        diff -r "$root/web" "$root/inside/usr/share/mild/build/web" || { echo "deb: not the page of $root/web" >&2; return 1; }
+        rm -rf "$root/inside"
+    fi
     echo "deb: $package, $(du -h "$package" | cut -f1)"
 }
 
@@ -28,17 +35,8 @@ inside() {
     chroot "$chroot" su -s /bin/bash nobody -c 'cd "$(mktemp -d)" && '"$*"
 }
 
-make_chroot() {
-    local mirror
-    mirror=$(apt-get indextargets --format '$(SITE) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' |
-        awk '$2 == "bookworm" && $3 == "main" { print $1; exit }')
-    command -v debootstrap >/dev/null || apt-get -qq install --no-install-recommends -y debootstrap
-    rm -rf --one-file-system "$chroot" # it has mounts where debootstrap was interrupted
-    debootstrap --variant=minbase bookworm "$chroot" "${mirror:?no Debian 12 in the sources of apt}" >"$root/debootstrap.log"
-}
-
 test_package() {
-    make_chroot
+    make_chroot "$chroot" "$root/debootstrap.log"
     mount -t proc proc "$chroot/proc" # programs find themselves by it
     trap 'umount "$chroot/proc"' EXIT
     cp "$package" "$chroot/tmp/mild.deb"

@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
 # Makes the wheel, build/dist/mildground-VERSION-cp311-abi3-manylinux_*.whl, and tries it in bare environments, one for each CPython
-# 3.11 or newer that is found. Usage: [MARCH=x86-64-v3] scripts/wheels.sh [--plain | WHEEL] [--untried | PYTHON ...]
+# 3.11 or newer that is found. Usage: [MARCH=x86-64-v3] scripts/wheels.sh [--plain | WHEEL] [--untried | --chroot | PYTHON ...]
 # --plain     without the second copy for AVX-512: half the time to compile. WHEEL: not made, but this one looked at and tried.
 # --untried   made and looked at alone. PYTHON: tried with these interpreters instead.
+# --chroot    tried in a bare Debian 12 with its own Python instead: root, debootstrap, 400 MB of disk.
 set -euo pipefail
 shopt -s extglob nullglob
 cd "$(dirname "$0")/.."
 root=$PWD/build/dist march=${MARCH:-x86-64-v3} second=x86-64-v4 most=40 # [MB]
 [ "$march" != native ] || march=x86-64-v3
-wheel=
+wheel='' made=''
 case ${1:-} in
 --plain) second='' && shift ;;
 *.whl) wheel=$(realpath "$1") && shift ;;
@@ -26,12 +27,16 @@ make_wheel() {
     if command -v ccache >/dev/null; then
         export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
     fi
+    if command -v emcc >/dev/null; then # as `make web`; cmake/Wheel.cmake takes build/web
+        quiet cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING
+        quiet scripts/web.sh
+    fi
     rm -rf "$root"/raw "$root"/mildground-*.whl
     quiet .venv/bin/python -m pip wheel --disable-pip-version-check --no-deps --no-build-isolation -w "$root/raw" . \
         --config-settings=cmake.define.MILD_MARCH="$march" --config-settings=cmake.define.MILD_SECOND_MARCH=$second
     # Libraries that not every Linux has come along, in mildground.libs. MuJoCo is a neighbour, or the program's own.
     quiet auditwheel repair --exclude 'libmujoco.so.*' --wheel-dir "$root" "$root"/raw/mildground-*.whl
-    wheel=$(echo "$root"/mildground-*.whl)
+    wheel=$(echo "$root"/mildground-*.whl) made=yes
     said "$(basename "$wheel") for $march${second:+ and $second}, made in $((SECONDS - begin)) s"
 }
 
@@ -55,6 +60,13 @@ look_at_wheel() {
         esac
     done
     ! grep -rlF "$PWD" "$inside" || fail "these name a folder of this machine"
+    # The page of `mild web`: whole where it could be made.
+    if [ -n "$made" ] && [ -d build/web ]; then
+        diff -r build/web "$inside/mild/data/build/web" >"$root/log" 2>&1 || fail "not the page of build/web: $(head -3 "$root/log")"
+        said "has the page of mild web"
+    elif [ ! -e "$inside/mild/data/build/web/index.html" ]; then
+        said "without the page of mild web: emcc was missing; \`scripts/setup.sh web\` installs it"
+    fi
     rm -rf "$inside"
     said "links what every Linux of $platform has; abi3audit finds nothing"
 }
@@ -95,11 +107,37 @@ try_wheel() {
     [ "$(bare "$folder" --version)" = "$(cd "$folder/empty" && env -i "$folder/bin/python" -m mild --version)" ] || fail "python -m mild"
     (cd "$folder/empty" && env -i "$folder/bin/python" "$OLDPWD/tests/python/check_wheel.py")
     MILD_PROCESSOR=x86-64-v3 "$folder/bin/python" "$PWD/tests/python/check_wheel.py" >/dev/null
+    (cd "$folder/empty" && env -i PATH=/usr/bin:/bin "$folder/bin/python" "$OLDPWD/tests/install/check_page.py" "$folder/bin/mild" \
+        "$folder/lib/python${version%.*}/site-packages/mild/data/build/web")
     for example in plate gym_random walk; do
         (cd "$folder/empty" && env -i "$folder/bin/python" "$OLDPWD/examples/python/$example.py" >/dev/null)
     done
     said "Python $version: $((seconds / 1000)).$((seconds % 1000 / 100)) s from pip install to a picture of a walk"
     rm -rf "$folder"
+}
+# In a bare Debian 12, where nothing but its Python is installed, as a user without root. What pip would fetch lies there already.
+try_chroot() {
+    local chroot=$root/chroot fetched=$root/chroot/tmp/fetched begin seconds
+    source scripts/chroot.sh
+    make_chroot "$chroot" "$root/log"
+    mount -t proc proc "$chroot/proc" # programs find themselves by it
+    trap 'umount "$root/chroot/proc"' EXIT
+    quiet chroot "$chroot" env DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends -y python3-venv
+    quiet .venv/bin/python -m pip download --disable-pip-version-check --require-hashes -d "$fetched" -r scripts/wheel.txt
+    cp "$wheel" "$fetched"
+    chmod -R a+rX "$fetched"
+    inside() { chroot "$chroot" su -s /bin/bash nobody -c "cd /var/tmp && export HOME=/var/tmp && $1"; }
+    quiet inside 'python3 -m venv mine'
+    begin=$(date +%s%N)
+    quiet inside 'mine/bin/pip install --no-index --find-links /tmp/fetched mildground && mine/bin/mild play --seconds 1 >walk.txt'
+    seconds=$((($(date +%s%N) - begin) / 1000000))
+    grep -q '0.0 s  x .* m/s' "$chroot/var/tmp/walk.txt" && grep -q '^sand_loose .* yes ' "$chroot/var/tmp/walk.txt" ||
+        fail "play: $(cat "$chroot/var/tmp/walk.txt")"
+    ((seconds < 60000)) || fail "a bare Debian 12: $seconds ms"
+    said "a bare Debian 12, $(inside 'mine/bin/python --version'): $((seconds / 1000)).$((seconds % 1000 / 100)) s from pip install to a picture of a walk"
+    umount "$chroot/proc"
+    trap - EXIT
+    rm -rf --one-file-system "$chroot"
 }
 # bare VENV ARGUMENTS...: its program.
 bare() {
@@ -116,7 +154,13 @@ cmp -s scripts/wheels.txt "$tools/installed" || {
 export PATH=$tools/bin:$PATH
 [ -n "$wheel" ] || make_wheel
 look_at_wheel
-[ "${1:-}" != --untried ] || exit 0
+case ${1:-} in
+--untried) exit 0 ;;
+--chroot)
+    try_chroot
+    exit 0
+    ;;
+esac
 [ $# -gt 0 ] || mapfile -t found < <(interpreters)
 for python in "${@:-${found[@]}}"; do
     try_wheel "$python"

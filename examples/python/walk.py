@@ -29,7 +29,6 @@ model = spec.compile()
 model.opt.timestep = 0.0025
 data = mujoco.MjData(model)
 data.qpos[2], data.qpos[7:] = 0.84, POSE
-
 policy, rotation = Policy(ROOT / "policies/mild.safetensors"), np.zeros(9)
 window = contextlib.nullcontext()
 if view:
@@ -55,6 +54,7 @@ if picture:
     model.vis.global_.offwidth, model.vis.global_.offheight = 1920, 1080
     camera = mujoco.MjvCamera()
     camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = [data.qpos[0] - 0.3, data.qpos[1], 0.35], 2.3, 140, -18
+    data.light("sun").xpos[:2] += data.qpos[:2]  # it casts shadows only near its own place
     renderer = mujoco.Renderer(model, 1080, 1920, max_geom=10000)
     renderer.update_scene(data, camera)
     Image.fromarray(renderer.render()).resize((960, 540), Image.LANCZOS).quantize(128).save(picture)
