@@ -14,9 +14,9 @@ void product_leave(int entered);
  * called then, on the thread that threw; it must not return. */
 void product_on_exception(void (*fatal)(void));
 
-/* c[m][n] = op(a) op(b) + beta c, beta 0 or 1; op transposes where the flag is 'T'. ld*: floats between rows as
- * stored. When oneDNN fails (out of memory), c is filled with NaN, and the learner drops and counts
- * the minibatch. */
+/* c[m][n] = op(a) op(b) + beta c, beta 0 or 1; op transposes where the flag is 'T'. ld*: floats
+ * between rows as stored. When oneDNN fails (out of memory), c is filled with NaN, and the learner
+ * drops and counts the minibatch. */
 void product(char transpose_a, char transpose_b, int m, int n, int k, const float *a, int lda,
              const float *b, int ldb, float beta, float *c, int ldc);
 

@@ -27,8 +27,8 @@ typedef struct {
  * bytes. Biases are read from the parameters. */
 float *gpu_mlp_forward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows,
                        GpuArray x, const GpuOutputs *outputs);
-/* d_x: gradient with respect to the input; NULL: not computed. work: as wide as the widest layer, of
- * the type of x. */
+/* d_x: gradient with respect to the input; NULL: not computed. work: as wide as the widest layer,
+ * of the type of x. */
 void gpu_mlp_backward(GpuQueue *queue, const Mlp *mlp, int rows, GpuArray x,
                       const GpuOutputs *outputs, float *d_last, const GpuArray work[2],
                       float *gradient, float beta, float *d_x);

@@ -1,6 +1,7 @@
 /* The networks as they lie on the device: every width is rounded up to a multiple of 8, because
- * cuBLAS needs rows aligned to 16 bytes to use the tensor cores, of numbers with 16 bits too. Weights, biases and inputs are
- * zero in the columns and rows that were added. So are their gradients, and they stay zero. */
+ * cuBLAS needs rows aligned to 16 bytes to use the tensor cores, of numbers with 16 bits too.
+ * Weights, biases and inputs are zero in the columns and rows that were added. So are their
+ * gradients, and they stay zero. */
 #ifndef MILD_GPU_NETWORK_H
 #define MILD_GPU_NETWORK_H
 
