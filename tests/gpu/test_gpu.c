@@ -257,8 +257,9 @@ TEST(gradients_are_those_of_the_cpu) {
 }
 
 /* Products with rounded factors, and with bf16 rounded numbers between the layers too: near the
- * CPU's, as far as 11 or 8 bits go. The stand-in has no tf32. */
-static void compare_rounded(int matmul, double bound) {
+ * CPU's, as far as 11 or 8 bits go. The gradient of log std is a small difference of large numbers:
+ * 2.6e-2 on an H100 with tf32. The stand-in has no tf32. */
+static void compare_rounded(int matmul, double bound, double gradient) {
 #ifdef EMULATED
     PolicyDef policy = small_def();
     const int envs = 37;
@@ -273,13 +274,13 @@ static void compare_rounded(int matmul, double bound) {
     print_message("%s: gradient %.1e, sums %.1e, actions %.1e (relative, bound %.0e)\n",
                   ppo_fields[ppo_field_count - 1].names[matmul], worst[0], worst[1], worst[2],
                   bound);
-    assert_true(worst[0] < 2.0 * bound && worst[1] < bound && worst[2] < bound);
+    assert_true(worst[0] < gradient && worst[1] < bound && worst[2] < bound);
 }
 
 TEST(rounded_products_are_near) {
-    compare_rounded(PPO_MATMUL_FP32, 1e-5);
-    compare_rounded(PPO_MATMUL_TF32, 5e-3);
-    compare_rounded(PPO_MATMUL_BF16, 5e-2);
+    compare_rounded(PPO_MATMUL_FP32, 1e-5, 1e-5);
+    compare_rounded(PPO_MATMUL_TF32, 5e-3, 5e-2);
+    compare_rounded(PPO_MATMUL_BF16, 5e-2, 4e-1);
 }
 
 /* ---- update ---- */
