@@ -5,7 +5,7 @@
 #include "robot/description.h"
 #include "robot/robot.h"
 
-/* Centroid, and second moments of area about it over the area. The elements are equal and press
+/* Centroid, and second moments of area about it, over the area. The elements are equal and press
  * where their centres are. The moments are the square of a lower triangle:
  *
  *     xx = a^2,  xy = a b,  yy = b^2 + c^2 */
@@ -39,7 +39,7 @@ static Moments moments_of(const MildSole *sole) {
 /* Moves the elements to the centroid and the second moments of `own`, by the map between the two
  * triangles. It mirrors with the sole:
  *
- *     x' = X + (A/a) (x - X1),   y' = Y + (B/a - C b/(c a)) (x - X1) + (C/c) (y - Y1) */
+ *     x' = X + (A/a) (x - x0),   y' = Y + (B/a - C b/(c a)) (x - x0) + (C/c) (y - y0) */
 static void move_elements(MildSole *sole, const Moments *own) {
     const Moments m = moments_of(sole);
     const double along = own->a / m.a, across = own->c / m.c;
