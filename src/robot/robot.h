@@ -77,8 +77,8 @@ void robot_set_model(Robot *robot, MildModel model);
 /* Gives each foot a coarser raster, of that many elements: with the area, the centroid and the
  * second moments of area of its own (docs/model.md section 16). 0: its own (the default). Fails,
  * with the soles unchanged, for more than a foot has, for so few that they lie on a line, for a
- * round foot, and after robot_set_model of a concentric model. Call it before making sims and ground
- * memory. */
+ * round foot, and after robot_set_model of a concentric model. Call it before making sims and
+ * ground memory. */
 MildStatus robot_set_elements(Robot *robot, int elements, MildError *error);
 /* Lets the shells stand on soft ground too (stand: bool; at first they do not). Call it when
  * robot_set_model may be called. */

@@ -84,8 +84,8 @@ TEST(elements_cover_the_sole) {
 
 /* ---- forces ---- */
 
-/* Upward force and moments about the ankle of a sole 10 mm deep, tilted about both axes, on springs:
- * the law that the library gives an element of its pitch. */
+/* Upward force and moments about the ankle of a sole 10 mm deep, tilted about both axes, on
+ * springs: the law that the library gives an element of its pitch. */
 static void press(const MildSole *sole, const MildMaterial *springs, double wrench[3]) {
     memset(wrench, 0, 3 * sizeof *wrench);
     for (int i = 0; i < mild_sole_elements(sole); i++) {
