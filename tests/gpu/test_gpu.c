@@ -480,7 +480,7 @@ TEST(updates_are_those_of_the_cpu) {
 }
 
 /* Muon's steps too. Matrices have more rows than columns or fewer, and widths that are padded on the
- * device. An iteration enlarges the rounding of small singular values, by 500 in all. */
+ * device. */
 TEST(updates_of_muon_are_those_of_the_cpu) {
     PpoDef def = ppo_def_default();
     PolicyDef policy = small_def();
