@@ -9,9 +9,9 @@
  *     W <- W - rate 0.2 sqrt(max(rows, columns)) X
  *
  * An iteration leaves the singular vectors of X and takes each singular value x to
- * a x + b x^3 + c x^5. Five of them take 0.0015 .. 1 to 0.68 .. 1.20. The elements of such a matrix
- * have a root mean square of 1 / sqrt(max(rows, columns)), and Adam's steps one of 0.2 to 0.4 of the
- * rate. So one learning rate, which the divergence adapts, serves both. */
+ * a x + b x^3 + c x^5. Five of them take 0.0015 .. 1 to 0.68 .. 1.20. The root mean square of such
+ * a matrix is 1 / sqrt(max(rows, columns)), and that of Adam's steps 0.2 to 0.4 of the rate. So one
+ * learning rate, which the divergence adapts, serves both. */
 #ifndef MILD_MUON_H
 #define MILD_MUON_H
 

@@ -479,8 +479,8 @@ TEST(updates_are_those_of_the_cpu) {
     assert_true(worst < 1e-3);
 }
 
-/* Muon's steps too. Matrices have more rows than columns or fewer, and widths that are padded on the
- * device. */
+/* Muon's steps too. Matrices have more rows than columns or fewer, and widths that are padded on
+ * the device. */
 TEST(updates_of_muon_are_those_of_the_cpu) {
     PpoDef def = ppo_def_default();
     PolicyDef policy = small_def();

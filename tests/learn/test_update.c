@@ -228,9 +228,9 @@ TEST(gradient_is_shortened_to_the_greatest_norm) {
     }
 }
 
-/* Of equal gradients c a matrix has one direction, of singular value 1 at length 1: its step is the
- * rate times 0.2 sqrt(max(rows, columns)) f(1) / sqrt(rows columns), whatever c. Momentum is c, then
- * c + 0.95 c. All else moves as by Adam. */
+/* Of equal gradients c a matrix has one direction, of singular value 1 at length 1: its step is
+ * the rate times 0.2 sqrt(max(rows, columns)) f(1) / sqrt(rows columns), whatever c. Momentum is c,
+ * then c + 0.95 c. All else moves as by Adam. */
 TEST(muon_moves_what_lies_between_hidden_layers) {
     Run run;
     PpoDef def = plain_def();

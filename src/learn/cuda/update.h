@@ -134,8 +134,8 @@ typedef struct {
 } GpuOptimiser;
 /* Adam's step, and Muon's direction into muon.x. */
 void gpu_optimise(cudaStream_t stream, GpuOptimiser o, const GpuProgress *progress);
-/* The polynomial of muon_polynomial into muon.square, which holds the square. is_first: of the first
- * iteration, which takes X to length 1. */
+/* The polynomial of an iteration in the place of the square. is_first: bool, of the iteration that
+ * takes X to length 1. */
 void gpu_muon_polynomial(cudaStream_t stream, GpuMuon muon, int is_first);
 /* Muon's step, along x. */
 void gpu_muon_apply(cudaStream_t stream, GpuOptimiser o, const float *x,
