@@ -62,8 +62,8 @@ MuonMatrices muon_matrices(const Network *network);
 size_t muon_work_floats(const MuonMatrices *matrices); /* for the largest */
 
 /* Brings the singular values of x [rows][columns] near 1. Returns where the result is: in x or in
- * `work`, which is aligned to 64 bytes. x is overwritten. */
-float *muon_orthogonalise(const MuonMatrix *matrix, float *x, float *work);
+ * `block` [muon_work_floats], which is aligned to 64 bytes. x is overwritten. */
+float *muon_orthogonalise(const MuonMatrix *matrix, float *x, float *block);
 /* One step of a matrix. The arrays are those of all parameters; its part of the gradient is
  * overwritten. */
 void muon_apply(const MuonMatrix *matrix, double rate, float gradient_scale, float *gradient,
