@@ -97,7 +97,9 @@ def has(given, task, end):
 
 
 def rate_of(given, task):
-    """[policy steps/s]"""
+    """[policy steps/s]; 0 of a policy that came without its log."""
+    if not has(given, task, "csv"):
+        return 0.0
     with open(path_of(given, task, "csv"), newline="", encoding="utf-8") as file:
         return statistics.median(float(row["rate/steps_per_s"]) for row in csv.DictReader(file))
 
