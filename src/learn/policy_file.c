@@ -251,7 +251,7 @@ Policy *policy_file_policy(const Safetensors *file, const char *path, MildError 
     return policy;
 }
 
-/* A file that is none of ours, by its name: the network of another program, or a learner's checkpoint. */
+/* For a file that is none of ours, by its name: another program's network or checkpoint. */
 static void say_where_to_go(const char *path, MildError *error) {
     const char *end = strrchr(path, '.');
     if (end && strcmp(end, ".onnx") == 0) {
