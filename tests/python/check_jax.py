@@ -263,7 +263,8 @@ class Interface(unittest.TestCase):
                  "Api": ("XLA_FFI_Api", {"make_error": "XLA_FFI_Error_Create", "get_stream": "XLA_FFI_Stream_Get"}),
                  "Frame": ("XLA_FFI_CallFrame", {"api": "api", "context": "ctx", "stage": "stage", "arguments": "args", "results": "rets",
                                                  "attributes": "attrs"})}
-        lines = ['#include "xla/ffi/api/c_api.h"', '#include "xla_abi.h"']
+        lines = ['#include "xla/ffi/api/c_api.h"', '#include "xla_abi.h"',
+                 "#if XLA_FFI_API_MINOR >= 4", "#define XLA_FFI_Extension_Base XLA_FFI_InternalExtension", "#endif"]  # its name from jaxlib 0.11 on
         for mine, (theirs, members) in pairs.items():
             lines += [f"static_assert(offsetof(xla_abi::{mine}, {a}) == offsetof({theirs}, {b}));" for a, b in members.items()]
         for name, value in (("PRED", "DataType_PRED"), ("S32", "DataType_S32"), ("S64", "DataType_S64"), ("F32", "DataType_F32"),
