@@ -45,10 +45,15 @@ class Ground:
     def step(self, d, *, material=None, begin=None):
         """A step of all worlds with the ground in it: (data, wrench, foot), the latter two (worlds, feet, 6): force and torque of the ground,
         and pressure centre, largest and mean depth, area. material: (worlds,) which of the grounds each has; None: in turn. begin:
-        (worlds,) bool, worlds that begin anew, on fresh ground. For jax.jit, as mild.jax.step, whose memory is the batch's too."""
+        (worlds,) bool, worlds that begin anew, on fresh ground. For jax.jit, as mild.jax.step, whose memory is the batch's too. Products of
+        matrices are in full float32, also on GPUs that round what they multiply to 10 bits unless they are told."""
+        with jax.default_matmul_precision("highest"):
+            return self._step(d, self.material if material is None else material, begin)
+
+    def _step(self, d, material, begin):
         given = d.qfrc_applied
         d, jacobian, *contact = jax.vmap(self.approach)(d)
-        wrench, _, foot = _jax.step(self.batch, *contact, material=self.material if material is None else material, begin=begin)
+        wrench, _, foot = _jax.step(self.batch, *contact, material=material, begin=begin)
         d = d.replace(qfrc_applied=given + jnp.einsum("nri,nr->ni", jacobian, wrench.reshape(len(wrench), -1)))
         return jax.vmap(self.finish)(d).replace(qfrc_applied=given), wrench, foot
 

@@ -251,9 +251,29 @@ Policy *policy_file_policy(const Safetensors *file, const char *path, MildError 
     return policy;
 }
 
+/* For a file that is none of ours, by its name: another program's network or checkpoint. */
+static void say_where_to_go(const char *path, MildError *error) {
+    const char *end = strrchr(path, '.');
+    if (end && strcmp(end, ".onnx") == 0) {
+        mild_fail(error, MILD_ERROR_FORMAT,
+                  "%s: no policy of mild; `mild trial ROBOT.xml %s --describe LAYOUT` judges it, "
+                  "--video shows it (docs/public-policies.md)",
+                  path, path);
+    } else if (end && strcmp(end, ".pt") == 0) {
+        mild_fail(error, MILD_ERROR_FORMAT,
+                  "%s: no policy of mild; `python -m mild.rsl_rl %s --out FILE` makes one of a "
+                  "checkpoint of mild.rsl_rl (docs/python.md), and `mild trial ROBOT.xml %s "
+                  "--describe LAYOUT` judges TorchScript (docs/public-policies.md)",
+                  path, path, path);
+    }
+}
+
 Policy *policy_load(const char *path, char *note, int note_size, MildError *error) {
     Safetensors *file = safetensors_read(path, error);
     if (!file) {
+        if (error && error->status == MILD_ERROR_FORMAT) {
+            say_where_to_go(path, error);
+        }
         return NULL;
     }
     Policy *policy = policy_file_policy(file, path, error);

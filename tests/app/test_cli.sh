@@ -66,6 +66,16 @@ expect 0 '^ *3 .* 300.000 ' "$mild" press --ground foam45 --force 300,50 --cycle
 peak() { "$mild" press --ground sand_loose "$@" | sed -n 's/^peak \([0-9.]*\) N.*/\1/p'; }
 awk "BEGIN { exit !($(peak --ground.k_pen=500) > $(peak) && $(peak --ground.k_pen=380) == $(peak)) }" ||
     fail "--ground.k_pen does not change the force"
+# another maker's network goes to `mild trial`, which the one line of error spells out
+echo "a network of another maker" >walk.onnx
+echo "a checkpoint of a learner" >walk.pt
+for command in eval play drive; do
+    bad walk.onnx "$mild" $command --policy walk.onnx
+    expect 2 "$command: walk.onnx: .*\`mild trial ROBOT.xml walk.onnx --describe LAYOUT\`" "$mild" $command --policy walk.onnx
+done
+bad walk.pt "$mild" eval --policy walk.pt
+expect 2 '`python -m mild.rsl_rl walk.pt --out FILE`.*`mild trial ROBOT.xml walk.pt --describe LAYOUT`' "$mild" eval --policy walk.pt
+bad none.onnx "$mild" eval --policy none.onnx
 # of an option only one counts, so a second is refused; of an override's key the last counts
 bad "--speed" "$mild" press --ground foam45 --speed 0.1 --depth 0.01 --speed=0.2
 bad "--ground" "$mild" eval --ground foam45 --ground rubber

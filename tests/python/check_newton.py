@@ -1,5 +1,6 @@
 """mild.warp and mild.newton beside the engine plugin in MuJoCo; needs Newton with MuJoCo Warp. `make newton-check` runs it on the CPU, in
-some minutes: Warp compiles its kernels. On a GPU: check_newton.py --device cuda:0 (the build must have CUDA)."""
+some minutes: Warp compiles its kernels. On a GPU: check_newton.py --device cuda:0 (the build must have CUDA, or mild_cuda be there).
+--kinds box,sphere: feet of these kinds alone."""
 import argparse
 import pathlib
 import subprocess
@@ -18,7 +19,7 @@ import mild.newton
 import mild.warp
 from soft_robot import APPLIED, KINDS, PUSH, SOILS, reference, robot, start
 
-DEVICE = "cpu"
+DEVICE, WANTED = "cpu", list(KINDS)
 
 
 class Plugin(unittest.TestCase):
@@ -53,7 +54,7 @@ class Plugin(unittest.TestCase):
 
     def test_forces(self):
         for integrator in ("implicitfast", "Euler"):
-            for kind in KINDS:
+            for kind in WANTED:
                 with self.subTest(kind=kind, integrator=integrator):
                     worst, apart = self.compare(kind, integrator, 1)
                     print(f"{kind:>9s} {integrator}: forces of a first step differ by {worst:.1e}", end="")
@@ -222,7 +223,8 @@ class Newton(unittest.TestCase):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--device", default="cpu")
+    parser.add_argument("--kinds", default=",".join(KINDS))
     given, rest = parser.parse_known_args()
-    DEVICE = given.device
+    DEVICE, WANTED = given.device, given.kinds.split(",")
     wp.config.quiet = True
     unittest.main(argv=[sys.argv[0], *rest])
