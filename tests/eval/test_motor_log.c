@@ -288,7 +288,7 @@ TEST(failure_keeps_its_reason) {
     const MotorLogDef log = {.task = &slow, .robot = robot, .motors = &motor.motors};
     int falls;
     assert_int_equal(motor_log(&log, &falls, &error), MILD_ERROR_RANGE);
-    assert_error(&error, MILD_ERROR_RANGE, "0.05 0.0001 0.01");
+    assert_error(&error, MILD_ERROR_RANGE, "task.physics_dt 0.05 0.0005");
 }
 
 /* On held-out seconds the network is eight times better than the best PD, and more. */
