@@ -56,7 +56,7 @@ void envs_times(Envs *envs, double *physics, double *ground) {
     }
 }
 
-void *envs_state(Envs *envs, size_t *bytes) {
+char *envs_state(Envs *envs, size_t *bytes) {
     *bytes = 0;
     return envs->backend->state ? envs->backend->state(envs, bytes) : NULL;
 }

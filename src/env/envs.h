@@ -78,7 +78,7 @@ void envs_times(Envs *envs, double *physics, double *ground);
 
 /* Everything that persists, as one block without pointers, so that saving and loading are copies;
  * NULL for the batch engine. */
-void *envs_state(Envs *envs, size_t *bytes);
+char *envs_state(Envs *envs, size_t *bytes);
 /* What lasts beyond an episode, [count] on the CPU, and back, before envs_reset. Waits for the
  * device. */
 MildStatus envs_save_progress(Envs *envs, TaskProgress *progress, MildError *error);

@@ -332,7 +332,7 @@ static EnvsMemory memory(const Envs *envs) {
 
 /* ---- state ---- */
 
-static void *state(Envs *envs, size_t *bytes) {
+static char *state(Envs *envs, size_t *bytes) {
     Mujoco *m = own(envs);
     *bytes = (size_t)m->base.count * m->stride;
     return m->state;

@@ -574,7 +574,7 @@ MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMate
     return mild_model_match(model, mild, robot->soles[0], robot_foot_load(robot), rival, error);
 }
 
-const void *robot_visual_model(const Robot *robot) {
+const mjModel *robot_visual_model(const Robot *robot) {
     return robot->visual;
 }
 

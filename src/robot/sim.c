@@ -530,10 +530,10 @@ const MildContactInput *robot_sim_contact_input(const RobotSim *sim) {
     return &sim->input;
 }
 
-void *robot_sim_model(RobotSim *sim) {
+mjModel *robot_sim_model(RobotSim *sim) {
     return sim->model;
 }
 
-void *robot_sim_data(RobotSim *sim) {
+mjData *robot_sim_data(RobotSim *sim) {
     return sim->data;
 }
