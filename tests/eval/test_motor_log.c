@@ -1,6 +1,7 @@
 /* From the made-up motor to a log, to the network, and back under the policy: the robot walks with
  * the network as it does with the motor. */
 #include <limits.h>
+#include <unistd.h>
 
 #include "eval_kit.h"
 
@@ -322,9 +323,13 @@ static void walk(const TaskActuator *motors, EvalRow row[GROUNDS]) {
 TEST(walks_as_with_the_motor) {
     MildError error = {0};
     TaskDef opened = def;
+    Actuator *read;
     EvalRow row[DRIVES][GROUNDS];
     double apart[2] = {0, 0}, cost[2] = {0, 0};
-    assert_int_equal(actuator_use(actuator, &opened, &error), MILD_OK);
+    snprintf(opened.actuator, sizeof opened.actuator, "/tmp/mild_motors_%d", getpid());
+    assert_int_equal(actuator_save(actuator, opened.actuator, NULL, &error), MILD_OK);
+    assert_int_equal(actuator_open(&opened, robot, &read, &error), MILD_OK);
+    unlink(opened.actuator);
     const TaskActuator *drives[DRIVES] = {&motor.motors, opened.motors, NULL};
     for (int d = 0; d < DRIVES; d++) {
         walk(drives[d], row[d]);
@@ -347,6 +352,7 @@ TEST(walks_as_with_the_motor) {
     printf("from the motor: network %.4f m/s, COT %.4f; PD %.4f m/s, COT %.4f\n", apart[0], cost[0],
            apart[1], cost[1]);
     assert_true(apart[0] < apart[1] / 4 && cost[0] < cost[1] / 4);
+    actuator_destroy(read);
 }
 
 TEST_MAIN(setup, teardown)
