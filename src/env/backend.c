@@ -97,7 +97,3 @@ TaskEnv *envs_env(Envs *envs, int i) {
 int envs_physics_steps(const Envs *envs) {
     return envs->physics_steps;
 }
-
-uint64_t envs_hash(const Envs *envs) {
-    return envs->backend->hash ? envs->backend->hash(envs) : 0;
-}

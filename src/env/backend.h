@@ -20,7 +20,6 @@ typedef struct {
     /* of MuJoCo, else NULL */
     void (*times)(Envs *envs, double *physics, double *ground);
     char *(*state)(Envs *envs, size_t *bytes);
-    uint64_t (*hash)(const Envs *envs);
     TaskEnv *(*env)(Envs *envs, int i);
 } EnvsBackend;
 
