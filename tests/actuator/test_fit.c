@@ -3,6 +3,7 @@
 
 #include "env/actuator/fit.h"
 #include "files.h"
+#include "unnamed_file.h"
 
 #define INTERVAL 0.005 /* [s] between rows */
 #define TEXT_SIZE 400
@@ -12,11 +13,7 @@ enum { LAG = 2, SECONDS = 40, ROWS = SECONDS * 200 };
 /* ---- logs ---- */
 
 static MildStatus read_text(Record *record, const char *text, MildError *error) {
-    FILE *file = fmemopen((void *)(uintptr_t)text, strlen(text), "r");
-    assert_non_null(file);
-    MildStatus status = record_read_file(record, file, "log", error);
-    fclose(file);
-    return status;
+    return record_read(record, unnamed_file(text, strlen(text)), error);
 }
 
 TEST(log_is_read) {
@@ -77,12 +74,13 @@ TEST(wrong_logs) {
         {1, "0,57,2,3\n", MILD_ERROR_RANGE, "log:2 leg_l1_joint.error_rad 57 20"},
     };
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-        char text[TEXT_SIZE];
+        char text[TEXT_SIZE], names[TEXT_SIZE];
         MildError error = {0};
         Record record = {.robot = robot};
         snprintf(text, sizeof text, "%s%s", wrong[i].with_header ? header : "", wrong[i].text);
         assert_int_equal(read_text(&record, text, &error), wrong[i].status);
-        assert_error(&error, wrong[i].status, wrong[i].names);
+        snprintf(names, sizeof names, "%s%s", unnamed_file("", 0), wrong[i].names + strlen("log"));
+        assert_error(&error, wrong[i].status, names);
         record_free(&record);
     }
 }

@@ -8,6 +8,7 @@
 #include "env/actuator/fit.h"
 #include "env/actuator/motor.h"
 #include "run/eval/motor_log.h"
+#include "unnamed_file.h"
 
 enum { KINDS = 3, SECONDS = 20, TRIALS = 4, GROUNDS = 3, DRIVES = 3 };
 
@@ -57,15 +58,13 @@ static int setup(void **state) {
     }
     motor_init(&motor, &made_up, robot, def.physics_dt);
     char *text = log_text(1, &falls);
-    FILE *csv = fmemopen(text, strlen(text), "r");
     record.robot = robot;
     fit.spacing = 0.005;
     fit.steps = 3000;
-    if (!csv || record_read_file(&record, csv, "log", &error) != MILD_OK) {
+    if (record_read(&record, unnamed_file(text, strlen(text)), &error) != MILD_OK) {
         return 1;
     }
     actuator = actuator_fit(&fit, &record, pool, score, &error);
-    fclose(csv);
     free(text);
     record_free(&record);
     return actuator == NULL;
@@ -86,10 +85,7 @@ TEST(log_of_the_motor) {
     assert_int_equal(falls, 0);
     assert_string_equal(text, again);
     assert_string_not_equal(text, other);
-    FILE *csv = fmemopen(text, strlen(text), "r");
-    assert_non_null(csv);
-    assert_int_equal(record_read_file(&record, csv, "log", &error), MILD_OK);
-    fclose(csv);
+    assert_int_equal(record_read(&record, unnamed_file(text, strlen(text)), &error), MILD_OK);
     assert_int_equal(record.rows, (int)(SECONDS / def.physics_dt + 0.5));
     assert_true(fabs(record.file[0].interval - def.physics_dt) < 1e-9);
     /* the PD of two rows before, less friction, within half of the effort */
