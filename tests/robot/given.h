@@ -3,6 +3,7 @@
 #ifndef TESTS_GIVEN_H
 #define TESTS_GIVEN_H
 
+#include <math.h>
 #include <string.h>
 
 #include "robot/robot.h"
@@ -44,7 +45,7 @@ static inline int given_step(Given *given, RobotSim *sim, const RobotState *stat
 /* Some wrench in every row. */
 static inline void given_some(Given *given, int feet) {
     for (int r = 0; r < 6 * feet; r++) {
-        given->wrench[r / 6][r % 6] = __builtin_sin(1.0 + r);
+        given->wrench[r / 6][r % 6] = sin(1.0 + r);
     }
 }
 
