@@ -36,7 +36,7 @@ WORLDS = (4096, 16384, 65536)
 GPU_KEYS = ("name", "driver_version", "memory.total", "clocks.max.sm", "clocks.max.mem", "power.limit", "mig.mode.current")
 GPU_CLOCKS = ("clocks.sm", "clocks.mem", "power.draw", "temperature.gpu")
 STEPS_5MS = "--task.physics_dt=0.005"
-QUICK = ["train", "--config", "configs/quick.ini", "--train.device=cuda", "--train.minutes=0", "--ppo.matmul=tf32"]
+QUICK = ["train", "--config", "configs/quick.ini", "--train.device=cuda", "--train.minutes=0", "--ppo.matmul=bf16"]
 NANOG1 = "not on PyPI; its own page says 1.28 M trained policy steps/s and 58.9 s to a walk on an H100"
 
 
@@ -95,7 +95,7 @@ def bench(name, *words, **more):
 def commands():
     cuda = ("--train.device=cuda",)
     walk = 'begin=$(date +%s.%N); "$0" train --config configs/quick.ini --out "$1/run" --train.device=cuda --train.envs=4096 ' \
-           '--train.minutes=0 --train.iterations=400 --ppo.anneal="280 400" --ppo.matmul=tf32 && ' \
+           '--train.minutes=0 --train.iterations=400 --ppo.anneal="280 400" --ppo.matmul=bf16 --ppo.optimizer=muon && ' \
            'date +%s.%N | awk -v b="$begin" \'{ print $1 - b }\' >"$1/seconds.txt" && ' \
            '"$0" eval --policy "$1/run/policy.safetensors" --config configs/quick.ini --ground rigid,foam45,sand_loose --speed 0.6 --json "$2"'
     peer = ["PYTHON", "scripts/mjwarp.py", "robots/sa01", "--dt", "0.005", "--json", "FILE"]
@@ -112,7 +112,7 @@ def commands():
                              modules=("mujoco", "mujoco_warp", "warp", "numpy")))
     found += [
         bench("robots_16384_without_shells", "robots", *cuda, "--train.envs=16384", STEPS_5MS, "--task.shells_stand=false", gpu=True),
-        bench("update_cuda", "update", *cuda, "--train.envs=16384", "--ppo.matmul=tf32", "--ppo.mirror_share=0.25", gpu=True),
+        bench("update_cuda", "update", *cuda, "--train.envs=16384", "--ppo.matmul=bf16", "--ppo.mirror_share=0.25", gpu=True),
         *(Command("train_16384" + name, "mild", ["MILD", *QUICK, "--train.envs=16384", "--train.iterations=45", "--out", "FOLDER", *more],
                   rows_of_log, gpu=True) for name, more in (("", []), ("_without_shells", ["--task.shells_stand=false"]))),
         Command("walk_from_nothing", "mild", ["bash", "-c", walk, "MILD", "FOLDER", "FILE"], rows_of_walk, gpu=True, rounds=1),

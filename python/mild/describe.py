@@ -66,6 +66,8 @@ KEYS = {
     },
     "clock": {
         "period": Key(float, 0.8, "[s] of the gait"),
+        "slowing": Key(float, 0.0, "part of the period by which that of a command of no speed is longer"),
+        "slow_below": Key(float, 1.2, "[m/s] commands below this slow the clock: |forward| + 3 |left| + 1 m |turn|"),
         "offsets": Key(numbers, [0.0], "parts of a period by which the clocks are ahead, one for each clock"),
         "standing": Key(float, -1.0, "the clock stands when the command is shorter than this"),
         "standing_phase": Key(float, None, "phase of every clock that stands; without: sine and cosine are 0"),
@@ -340,4 +342,5 @@ class State:
         if np.linalg.norm(self.command) < clock["standing"]:
             phase = clock["standing_phase"]
             return np.zeros(len(offsets)) if phase is None else np.full(len(offsets), function(2 * np.pi * phase))
-        return function(2 * np.pi * (self.data.time / clock["period"] + offsets))
+        slow = max(0.0, 1 - np.abs(self.command) @ [1, 3, 1] / clock["slow_below"])  # a trial has one command
+        return function(2 * np.pi * (self.data.time / (clock["period"] * (1 + clock["slowing"] * slow)) + offsets))

@@ -22,7 +22,7 @@ Equal wall time: of a training alone on its GPU. With --jobs 2 each has half of 
 
 FOLDER/results.jsonl gets a line when a training ends and one when it is judged; started again, the command goes on from there, also after
 it was killed. What was trained with another --minutes, --jobs, --steps or config is not counted. No training begins that would not end by
---seconds, and no judge after it. So it may be run in pieces, one after another or on several machines: --take PIECE,PIECE puts the results
+--seconds, and no judge that takes as long as the longest so far. So it may be run in pieces, one after another or on several machines: --take PIECE,PIECE puts the results
 and policies of other folders into this one first. FOLDER/policies has those of the trainings, in half precision, and those of the search
 until they are judged. As in
 
@@ -135,6 +135,7 @@ class Factorial:
         self.given, self.folder = given, given.folder.resolve()
         self.file = self.folder / "results.jsonl"
         self.end = time.time() + given.seconds
+        self.longest_judge = 0.0  # [s] of those that this call has seen
         self.lock, self.failed = threading.Lock(), []
         settings = [given.minutes, given.jobs, given.steps, given.config.read_text(encoding="utf-8"), SEARCH, ENTROPY, IMITATION, OURS, given.options]
         self.settings = hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:16]
@@ -264,9 +265,11 @@ class Factorial:
         return None if self.known("judged", task) else judges.submit(self.conclude, task)
 
     def conclude(self, task):
-        if time.time() > self.end:  # judged when it goes on
+        begin = time.time()
+        if begin + self.longest_judge > self.end:  # judged when it goes on
             return
         parts = self.judge(task)
+        self.longest_judge = max(self.longest_judge, time.time() - begin)
         judged = {"skill": {part: skill(cells) for part, cells in parts.items()}, "cells": parts}
         if task["kind"] == "tune":
             judged["score"] = score(parts["tuning"])

@@ -89,7 +89,9 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
     const int largest = order_largest(ppo->batch.steps, ppo->part, ppo->def.minibatches);
     LossChunk chunk;
     ppo->stride = (count + 15) / 16 * 16;
-    ppo->scratch_floats = loss_carve(n, PPO_CHUNK, ppo->mirror_rows, NULL, &chunk);
+    const size_t loss = loss_carve(n, PPO_CHUNK, ppo->mirror_rows, NULL, &chunk),
+                 muon = muon_work_floats(&ppo->muon);
+    ppo->scratch_floats = loss > muon ? loss : muon;
     ppo->batch_bytes = ppo_carve_batch(&ppo->batch, n, NULL);
     ppo->batch_block = take(ppo, ppo->batch_bytes);
     ppo->gradient = take(ppo, (size_t)ppo->part.shards * ppo->stride * sizeof(float));
@@ -208,6 +210,9 @@ Ppo *ppo_create_part(const PpoDef *def, Policy *policy, Pool *pool, const PpoMir
         ppo->pool = pool;
         ppo->seed = seed;
         ppo->learning_rate = def->learning_rate;
+        if (def->optimizer == PPO_OPTIMIZER_MUON) {
+            ppo->muon = muon_matrices(&policy->network);
+        }
         ppo->batch.steps = def->steps;
         ppo->ranks = ranks;
         ppo->part = order_part(def->shards, envs, ranks_number(ranks), ranks_count(ranks));

@@ -40,6 +40,7 @@ void ppo_set_decoder(const PpoDef *def, int ground_offset, int ground_count, Pol
     policy->ground_count = ground ? ground_count : 0;
 }
 
+const char *const ppo_optimizer_names[PPO_OPTIMIZERS] = {"adam", "muon"};
 static const char *const target_names[PPO_TARGETS] = {"newest", "next", "ground", "both"};
 static const char *const matmul_names[PPO_MATMULS] = {"fp32", "tf32", "bf16"};
 
@@ -60,6 +61,10 @@ const MildField ppo_fields[] = {
     MILD_FIELD(PpoDef, value_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
                "[-] weight of the value loss"),
     MILD_FIELD(PpoDef, clip_value, MILD_FIELD_BOOL, 1, 0, 1, "[-] clip the value loss"),
+    MILD_FIELD_CHOICE(
+        PpoDef, optimizer, ppo_optimizer_names, PPO_OPTIMIZERS,
+        "[-] muon moves the weights between hidden layers by orthogonal matrices, and "
+        "the other parameters as adam does (docs/gpu.md)"),
     MILD_FIELD(PpoDef, learning_rate, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
                "[-] learning rate at the start"),
     MILD_FIELD(PpoDef, learning_rate_min, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,

@@ -25,6 +25,10 @@ typedef enum {
  * (bfloat16) significant bits, which the tensor cores multiply. Sums have 32 bits always. */
 typedef enum { PPO_MATMUL_FP32, PPO_MATMUL_TF32, PPO_MATMUL_BF16, PPO_MATMULS } PpoMatmul;
 
+/* Who moves the weights between hidden layers: Adam, as all other parameters, or Muon (muon.h). */
+typedef enum { PPO_OPTIMIZER_ADAM, PPO_OPTIMIZER_MUON, PPO_OPTIMIZERS } PpoOptimizer;
+extern const char *const ppo_optimizer_names[PPO_OPTIMIZERS];
+
 typedef struct {
     int steps;       /* rollout length per environment, 24 */
     int epochs;      /* 4 */
@@ -36,6 +40,7 @@ typedef struct {
     double entropy;  /* weight */
     double value_weight;
     int clip_value;       /* bool */
+    int optimizer;        /* a PpoOptimizer */
     double learning_rate; /* at the start */
     double learning_rate_min;
     double learning_rate_max;

@@ -11,6 +11,7 @@
 enum { COUNTER_ITERATION, COUNTER_ADAM_STEPS, COUNTER_SEED, COUNTERS };
 
 #define TRAIN_TENSORS 10
+#define OPTIMIZER_KEY "ppo.optimizer"
 
 static Safetensor tensor_of(const char *name, SafetensorsType type, const void *data,
                             int64_t count) {
@@ -169,6 +170,10 @@ static MildStatus save(const Ppo *ppo, const char *path, const Extra *extra, con
     }
     policy_file_tensors(&ppo->policy->network, ppo->policy->parameters, &policy);
     policy_file_texts(&ppo->policy->network, POLICY_CHECKPOINT_KIND, note, &texts);
+    if (ppo->def.optimizer != PPO_OPTIMIZER_ADAM) {
+        texts.text[texts.count++] =
+            (SafetensorsText){OPTIMIZER_KEY, ppo_optimizer_names[ppo->def.optimizer]};
+    }
     /* the caller's bytes last, so that every number before them stays aligned */
     const int numbers = extra->size > 0 ? count - 1 : count;
     const Safetensor last = all[count - 1];
@@ -213,6 +218,22 @@ static MildStatus check_same_network(const Safetensors *file, const char *path,
                 "%s: its %s is '%.60s', this run's is '%.60s'; resume with the checkpoint's config",
                 path, key, theirs, ours.text[i].value);
         }
+    }
+    return MILD_OK;
+}
+
+/* Momentum means another number to another optimiser, and Adam's second moments are missing after
+ * Muon. Files without the text are Adam's. */
+static MildStatus check_optimizer(const Safetensors *file, const char *path, const Ppo *ppo,
+                                  MildError *error) {
+    const char *text = safetensors_text(file, OPTIMIZER_KEY),
+               *theirs = text ? text : ppo_optimizer_names[PPO_OPTIMIZER_ADAM],
+               *ours = ppo_optimizer_names[ppo->def.optimizer];
+    if (strcmp(theirs, ours) != 0) {
+        return mild_fail(
+            error, MILD_ERROR_ARGUMENT,
+            "%s: its %s is '%.60s', this run's is '%s'; resume with the checkpoint's config", path,
+            OPTIMIZER_KEY, theirs, ours);
     }
     return MILD_OK;
 }
@@ -304,6 +325,9 @@ static MildStatus take_file(Ppo *ppo, const Safetensors *file, const char *path,
     double learning_rate;
     int count = train_tensors(ppo, counters, extra, wanted);
     MildStatus status = check_same_network(file, path, n, error);
+    if (!status) {
+        status = check_optimizer(file, path, ppo, error);
+    }
     if (!status) {
         status = policy_file_parameters(file, path, n, spare, error);
     }

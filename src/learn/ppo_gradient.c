@@ -246,19 +246,52 @@ typedef struct {
     AdamStep step;
 } OptimiseJob;
 
-static void optimise_piece(void *context, int range, int thread) {
-    (void)thread;
-    const OptimiseJob *job = context;
+/* Adam's step of parameters begin .. end - 1. */
+static void adam_range(const OptimiseJob *job, int64_t begin, int64_t end) {
     const Ppo *ppo = job->ppo;
-    int64_t begin = range_begin(ppo->policy->network.count, range),
-            end = range_begin(ppo->policy->network.count, range + 1);
-    adam_apply(job->step, end - begin, ppo->gradient + begin, ppo->policy->parameters + begin,
-               ppo->first + begin, ppo->second + begin);
+    if (begin < end) {
+        adam_apply(job->step, end - begin, ppo->gradient + begin, ppo->policy->parameters + begin,
+                   ppo->first + begin, ppo->second + begin);
+    }
+}
+
+/* Adam's step of a range, but for what Muon moves. */
+static void adam_piece(const OptimiseJob *job, int range) {
+    const MuonMatrices *muon = &job->ppo->muon;
+    const int64_t count = job->ppo->policy->network.count, end = range_begin(count, range + 1);
+    int64_t begin = range_begin(count, range);
+    for (int i = 0; i < muon->count; i++) {
+        const MuonMatrix *m = &muon->matrix[i];
+        const int64_t after = m->at + (int64_t)m->rows * m->columns;
+        adam_range(job, begin, m->at < end ? m->at : end);
+        begin = begin > after ? begin : after;
+    }
+    adam_range(job, begin, end);
+}
+
+static void muon_piece(const OptimiseJob *job, int piece, int thread) {
+    const Ppo *ppo = job->ppo;
+    const int entered = product_enter(ppo->def.matmul == PPO_MATMUL_BF16);
+    muon_apply(&ppo->muon.matrix[piece], ppo->learning_rate, job->step.gradient_scale,
+               ppo->gradient, ppo->policy->parameters, ppo->first,
+               ppo->scratch + (size_t)thread * ppo->scratch_floats);
+    product_leave(entered);
+}
+
+/* The matrices, which take longer, come first. */
+static void optimise_piece(void *context, int piece, int thread) {
+    const OptimiseJob *job = context;
+    const int matrices = job->ppo->muon.count;
+    if (piece < matrices) {
+        muon_piece(job, piece, thread);
+    } else {
+        adam_piece(job, piece - matrices);
+    }
 }
 
 void ppo_optimise(Ppo *ppo, double gradient_scale) {
     OptimiseJob job = {ppo, adam_step(ppo->learning_rate, ++ppo->adam_steps, gradient_scale)};
-    pool_run(ppo->pool, PPO_RANGES, optimise_piece, &job);
+    pool_run(ppo->pool, ppo->muon.count + PPO_RANGES, optimise_piece, &job);
     const Network *n = &ppo->policy->network;
     const float floor = step_noise_floor(&ppo->def);
     for (int64_t i = n->log_std; i < n->count; i++) {

@@ -26,8 +26,8 @@ int ppo_mirrored(const Ppo *ppo, const int *cut, int *which);
  * onward of the stream step_latent_key. first: place of sample 0 in the whole minibatch, which is
  * above 0 for order_own_cuts. row: [samples of the cuts]. */
 void ppo_latent_rows(const int *cut, int first, int *row);
-/* One step of Adam along the gradient times gradient_scale; keeps the action noise above its floor.
- */
+/* One step of the optimiser along the gradient times gradient_scale, which it may overwrite; keeps
+ * the action noise above its floor. */
 void ppo_optimise(Ppo *ppo, double gradient_scale);
 
 #endif

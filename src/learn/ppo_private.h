@@ -5,6 +5,7 @@
 #include "base/pool.h"
 #include "device/ranks/ranks.h"
 #include "learn/backend.h"
+#include "learn/muon.h"
 #include "learn/order.h"
 #include "learn/policy.h"
 #include "learn/policy_private.h"
@@ -40,11 +41,12 @@ typedef struct Ppo {
     Policy *average;   /* NULL: none */
     void *batch_block; /* memory of the arrays of `start`, and of `batch` unless it is resident */
     size_t batch_bytes;
-    float *gradient; /* [part.shards][stride]; the sum ends in the first */
-    size_t stride;   /* [floats] of a shard's gradient */
-    float *first;    /* [parameters] Adam's first moments */
-    float *second;   /* [parameters] Adam's second moments */
-    float *scratch;  /* [threads][scratch_floats] */
+    float *gradient;   /* [part.shards][stride]; the sum ends in the first */
+    size_t stride;     /* [floats] of a shard's gradient */
+    MuonMatrices muon; /* that Muon moves; count 0: Adam moves all */
+    float *first;      /* [parameters] Adam's first moments, and the momentum of these matrices */
+    float *second;     /* [parameters] Adam's second moments; 0 for these matrices */
+    float *scratch;    /* [threads][scratch_floats] of a chunk, then of the optimiser */
     size_t scratch_floats;
     int mirror_rows; /* images per full chunk */
     float *noise;    /* [part.width][latent] of z, ppo.sample_latent; NULL: none */

@@ -52,7 +52,9 @@ typedef struct Robot {
     char path[ROBOT_PATH_SIZE];           /* of the MJCF */
     mjModel *model;                       /* bodies, joints, floor and corners: what a step needs */
     mjModel *visual;                      /* the whole file, for pictures */
-    MildSole *soles[ROBOT_BODIES_MAX];    /* the rasters; then the surfaces of the shells */
+    MildSole *rasters[ROBOT_FEET_MAX];    /* by the pitch and the elements of robot.ini */
+    MildSole *soles[ROBOT_BODIES_MAX];    /* the rasters, or coarser ones (raster.c); then the
+                                             surfaces of the shells */
     MildSole *concentric[ROBOT_FEET_MAX]; /* one element in the middle of each */
     int is_concentric;                    /* bool: the feet use `concentric`, not `soles` */
     int nq;                               /* 7 + joints */
@@ -99,6 +101,9 @@ int robot_geom_body(const Robot *robot, int geom, MildError *error);
 void robot_read_limb(Robot *robot, int limb);
 /* The shells of a limb behind the feet, as mild_sole_surface takes them. Returns how many. */
 int robot_shell_shapes(const Robot *robot, int limb, MildShape shapes[ROBOT_SHELLS_MAX]);
+
+/* Gives the feet their own rasters again. */
+void robot_take_rasters(Robot *robot);
 
 /* ---- parts of robot_create, in the order of their calls; each needs the ones before it ---- */
 /* What robot.ini and the compiled models say: bodies, joints, limbs, shells, legs, soles. */

@@ -232,9 +232,9 @@ static MildStatus read_soles(Robot *robot, MildError *error) {
         MildSoleDef def = {foot->outline, foot->outline_points, foot->pitch, foot->z,
                            foot->elements};
         MildError cause = {0};
-        robot->soles[f] = mild_sole_create(&def, &cause);
+        robot->soles[f] = robot->rasters[f] = mild_sole_create(&def, &cause);
         robot->concentric[f] =
-            robot->soles[f] ? mild_sole_concentric(robot->soles[f], &cause) : NULL;
+            robot->rasters[f] ? mild_sole_concentric(robot->rasters[f], &cause) : NULL;
         if (!robot->concentric[f]) {
             return mild_fail(error, cause.status, "%s: robot.ini, [foot.%s]: %s", robot->path,
                              foot->name, cause.text);
@@ -425,6 +425,7 @@ void robot_destroy(Robot *robot) {
     if (!robot) {
         return;
     }
+    robot_take_rasters(robot);
     for (int b = 0; b < ROBOT_BODIES_MAX; b++) {
         mild_sole_destroy(robot->soles[b]);
     }
@@ -574,7 +575,7 @@ void robot_set_shells(Robot *robot, int stand) {
 }
 
 const MildSole *const *robot_rasters(const Robot *robot) {
-    return (const MildSole *const *)robot->soles;
+    return (const MildSole *const *)robot->rasters;
 }
 
 void robot_set_model(Robot *robot, MildModel model) {
@@ -583,7 +584,7 @@ void robot_set_model(Robot *robot, MildModel model) {
 
 MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *mild,
                              MildMaterial *rival, MildError *error) {
-    return mild_model_match(model, mild, robot->soles[0], robot_foot_load(robot), rival, error);
+    return mild_model_match(model, mild, robot->rasters[0], robot_foot_load(robot), rival, error);
 }
 
 const mjModel *robot_visual_model(const Robot *robot) {

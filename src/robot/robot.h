@@ -65,17 +65,23 @@ double robot_mirror_shift(const Robot *robot); /* [-] of the gait cycle: 0.5 whe
 /* What a task needs, as one block without pointers. */
 const RobotTable *robot_table(const Robot *robot);
 
-/* [robot_bodies] The soles in use, see robot_set_model and robot_set_shells: of the feet, then of
- * the bodies with shells. */
+/* [robot_bodies] The soles in use, see robot_set_model, robot_set_elements and robot_set_shells: of
+ * the feet, then of the bodies with shells. */
 const MildSole *const *robot_soles(const Robot *robot);
 /* Number of bodies that stand on soft ground: the feet, and with robot_set_shells those with
  * shells. A concentric model has none for these. */
 int robot_bodies(const Robot *robot);
-/* [robot_feet] The rasterised outlines, regardless of the model. */
+/* [robot_feet] The rasterised outlines, regardless of robot_set_model and robot_set_elements. */
 const MildSole *const *robot_rasters(const Robot *robot);
 /* Gives the feet the soles of a ground model: a single element for concentric models, otherwise the
  * rasters (the default). Call it before making sims and ground memory. */
 void robot_set_model(Robot *robot, MildModel model);
+/* Gives each foot a coarser raster, of that many elements: with the area, the centroid and the
+ * second moments of area of its own (docs/model.md section 16). 0: its own (the default). Fails,
+ * with the soles unchanged, for more than a foot has, for so few that they lie on a line, for a
+ * round foot, and after robot_set_model of a concentric model. Call it before making sims and
+ * ground memory. */
+MildStatus robot_set_elements(Robot *robot, int elements, MildError *error);
 /* Lets the shells stand on soft ground too (stand: bool; at first they do not). Call it when
  * robot_set_model may be called. */
 void robot_set_shells(Robot *robot, int stand);

@@ -104,6 +104,14 @@ expect 0 '1/1 ' "$mild" eval --ground grass --speed=-1.5,1.5 --sideways=-1.5 --t
 grep -q '"turn":.*1.5' told.json && grep -q '"push":.*0.3' told.json || fail "told.json: $(cat told.json)"
 walk() { "$mild" eval --ground grass --trials 2 --seconds 1 "$@" --json - 2>/dev/null | grep -v randomize; }
 [ "$(walk)" != "$(walk --randomize)" ] || fail "--randomize changes nothing"
+# judged on the robot's own soles, whatever the training had, unless the key is given
+printf '[task]\nsole_elements = 10\n' >coarse.ini
+[ "$(walk)" = "$(walk --config coarse.ini)" ] && [ "$(walk)" != "$(walk --task.sole_elements=10)" ] || fail "sole_elements in eval"
+[ "$(walk)" = "$(walk --task.sole_elements=77)" ] || fail "all elements are not the robot's own"
+bad "task.sole_elements 78 foot.left 77" "$mild" eval --ground grass --trials 1 --seconds 0.1 --task.sole_elements=78
+bad "task.sole_elements 20 foot.FL" "$mild" eval --robot go1 --ground grass --trials 1 --seconds 0.1 --task.sole_elements=20
+bad "task.sole_elements 2 foot.left" "$mild" train --out two --train.envs=2 --train.iterations=1 --task.sole_elements=2
+[ ! -e two ] || fail "a refused training left its folder"
 # lying: rigid is a material then, whoever asks for the engine's own is told; shells must stand
 expect 0 'rigid .* 0/2 .*up after - s' "$mild" eval --robot go1 --start back --ground rigid --trials 2 --seconds 1.5
 expect 0 'foam45 .* 0/2 .*up after - s' "$mild" eval --robot go1 --start side --ground foam45 --trials 2 --seconds 1.5 --train.robots=batch

@@ -153,6 +153,8 @@ def what_stops():
         over.lines.remove(unjudged)
         over.policy_of(late.calls[0]).write_text("trained")
         assert not quietly(over.run)[0] and not over.calls and not over.known("judged", late.calls[0])
+        over.longest_judge, over.end = 60, time.time() + 30  # a judge would take longer than there is
+        assert not quietly(over.run)[0] and not over.known("judged", late.calls[0])
         none = made(folder, "--seconds", "10")
         assert not quietly(none.run)[0] and not none.calls
         assert "nothing is judged yet" in quietly(lambda: factorial.report(none))[1]

@@ -81,6 +81,12 @@ numbers eight/policy.safetensors >other.numbers
 cmp -s one.numbers other.numbers && fail "ppo.shards changes nothing"
 bad "ppo.shards 8 16" "$ranks_py" -n 16 "$mild" train --out wrong "${tiny[@]}"
 
+# Muon, whose matrices lie between two hidden layers
+muon=("${tiny[@]}" --policy.actor_hidden=32,16,0,0 --policy.critic_hidden=16,32,0,0 --ppo.optimizer=muon --train.iterations=2)
+good "$mild" train --out muon "${muon[@]}"
+good "$ranks_py" -n 4 "$mild" train --out muon4 "${muon[@]}"
+same_numbers muon/checkpoint_000000002.safetensors muon4/checkpoint_000000002.safetensors
+
 # on with another number: 2, alone, 4
 good "$ranks_py" -n 2 "$mild" train --out on "${tiny[@]}" --train.iterations=1
 good "$mild" train --out on --resume --train.iterations=2

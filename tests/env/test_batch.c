@@ -57,6 +57,19 @@ TEST(follows_mujoco_on_other_models) {
     follow(SA01, model_def(MILD_MODEL_RIGID), MILD_BATCH_HOST, NULL, 0.85);
 }
 
+/* Soles of few elements, on a map for the rows of its kernels. */
+static TaskDef coarse_def(void) {
+    TaskDef def = some_def();
+    def.sole_elements = 20;
+    return def;
+}
+
+TEST(follows_mujoco_on_coarse_soles) {
+    const MildMapDef map = some_map();
+    follow(SA01, coarse_def(), MILD_BATCH_HOST, NULL, 0.85);
+    follow(SA01, coarse_def(), MILD_BATCH_HOST, &map, 0.85);
+}
+
 /* Four round feet; on a map in test_go1.c. */
 TEST(go1_follows_mujoco) {
     follow(GO1, some_def(), MILD_BATCH_HOST, NULL, 0.85);
@@ -85,6 +98,7 @@ TEST(device_follows_mujoco) {
     const MildMapDef map = some_map();
     follow(SA01, some_def(), 0, NULL, 0.85);
     follow(SA01, some_def(), 0, &map, 0.85);
+    follow(SA01, coarse_def(), 0, NULL, 0.85);
     follow(SA01, printed_def(), 0, NULL, 0.65);
     follow(GO1, some_def(), 0, NULL, 0.85);
     follow(GO1, some_def(), 0, &map, 0.85);

@@ -419,6 +419,7 @@ static double compare_update(const PolicyDef *policy, const PpoDef *def, int env
         } else {
             worse(&moved, distance(steps[1], steps[0], n->count));
         }
+        worse(&apart, distance(gpu.ppo->first, cpu.ppo->first, n->count));
         if (def->average > 0.0) {
             worse(&apart, distance(policy_parameters(gpu.ppo->average),
                                    policy_parameters(cpu.ppo->average), n->count));
@@ -474,6 +475,35 @@ TEST(updates_are_those_of_the_cpu) {
     worse(&worst, compare_update(&full, &def, 256, 0, INVALID));
 #endif
     print_message("way of the parameters in an update, against the CPU's: %.1e (relative)\n",
+                  worst);
+    assert_true(worst < 1e-3);
+}
+
+/* Muon's steps too. Matrices have more rows than columns or fewer, and widths that are padded on
+ * the device. */
+TEST(updates_of_muon_are_those_of_the_cpu) {
+    PpoDef def = ppo_def_default();
+    PolicyDef policy = small_def();
+    double worst = 0.0;
+    def.optimizer = PPO_OPTIMIZER_MUON;
+    def.average = 0.9;
+    for (int fault = 0; fault < FAULTS; fault++) {
+        worse(&worst, compare_update(&policy, &def, 37, fault == NOTHING ? 100 : 0, fault));
+    }
+    def.max_gradient_norm = 0.05;
+    worse(&worst, compare_update(&policy, &def, 5, 0, NOTHING));
+    policy.actor_hidden[1] = policy.critic_hidden[1] = policy.encoder_hidden[1] =
+        policy.decoder_hidden[1] = 0; /* no matrix between hidden layers */
+    policy.actor_hidden[2] = policy.critic_hidden[2] = 0;
+    worse(&worst, compare_update(&policy, &def, 5, 0, NOTHING));
+#ifndef EMULATED
+    PolicyDef full = policy_def_default();
+    def = ppo_def_default();
+    def.optimizer = PPO_OPTIMIZER_MUON;
+    worse(&worst, compare_update(&full, &def, 256, 0, NOTHING));
+#endif
+    print_message("way of the parameters in an update by Muon, against the CPU's: %.1e "
+                  "(relative)\n",
                   worst);
     assert_true(worst < 1e-3);
 }

@@ -182,6 +182,9 @@ TEST(updates_are_those_of_the_whole) {
         worse(&worst, compare_update(RESIDENT, &policy, &def, 37, rows, fault));
     }
     worse(&worst, compare_update(MIXED, &policy, &def, 37, 0, INVALID));
+    def.optimizer = PPO_OPTIMIZER_MUON;
+    worse(&worst, compare_update(RESIDENT, &policy, &def, 37, 0, INVALID));
+    def.optimizer = PPO_OPTIMIZER_ADAM;
     def.steps = 10; /* minibatches in which some processes have no sample */
     def.minibatches = 16;
     worse(&worst, compare_update(RESIDENT, &policy, &def, def.shards + 1, 0, NOTHING));

@@ -174,16 +174,14 @@ TEST(test_every_allocation_may_fail) {
 
 /* oneDNN's packing buffers are its own; whatever it takes it gives back, and a product that finds
  * no memory only costs its minibatch. */
-TEST(test_learning_survives_without_memory) {
-    if (!COUNTS) {
-        skip();
-    }
+static void check_survival(int optimizer) {
     MildError error = {0};
     PolicyDef def = policy_def_default();
     shared_policy = policy_create(&def, 1, &error);
     shared_pool = pool_create(1);
     PpoDef ppo_def = ppo_def_default();
     ppo_def.epochs = 1;
+    ppo_def.optimizer = optimizer;
     Ppo *ppo = ppo_create(&ppo_def, shared_policy, shared_pool, NULL, 4, 1, &error);
     assert_non_null(ppo);
     PpoReport report;
@@ -203,6 +201,14 @@ TEST(test_learning_survives_without_memory) {
     ppo_destroy(ppo);
     policy_destroy(shared_policy);
     pool_destroy(shared_pool);
+}
+
+TEST(test_learning_survives_without_memory) {
+    if (!COUNTS) {
+        skip();
+    }
+    check_survival(PPO_OPTIMIZER_ADAM);
+    check_survival(PPO_OPTIMIZER_MUON);
 }
 
 TEST_MAIN(NULL, NULL)

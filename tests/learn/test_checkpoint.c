@@ -161,6 +161,28 @@ TEST(another_network_is_refused) {
     run_close(&same);
 }
 
+/* The moments of one optimiser are none to the other. */
+TEST(another_optimizer_is_refused) {
+    MildError error = {0};
+    PolicyDef policy_def = toy_policy_def();
+    PpoDef def = ppo_def();
+    Run adam, muon, again;
+    run_open_toy(&adam);
+    def.optimizer = PPO_OPTIMIZER_MUON;
+    run_open(&muon, &policy_def, &def);
+    run_open(&again, &policy_def, &def);
+    run_iterate(&muon);
+    save(&adam);
+    check_bad_checkpoint(&muon, MILD_ERROR_ARGUMENT, "ppo.optimizer adam muon");
+    save(&muon);
+    check_bad_checkpoint(&adam, MILD_ERROR_ARGUMENT, "ppo.optimizer muon adam");
+    assert_int_equal(ppo_load(again.ppo, PATH, NULL, 0, &error), MILD_OK);
+    unlink(PATH);
+    run_close(&adam);
+    run_close(&muon);
+    run_close(&again);
+}
+
 /* What resuming needs must be there, of its size, under its name. */
 TEST(missing_parts_are_refused) {
     static const char *const parts[] = {

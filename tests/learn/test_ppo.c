@@ -87,22 +87,24 @@ TEST(test_threads_change_nothing) {
     check_threads(def);
     def.matmul = PPO_MATMUL_BF16;
     check_threads(def);
+    def.optimizer = PPO_OPTIMIZER_MUON;
+    check_threads(def);
 }
 
-TEST(test_resume_is_as_if_never_stopped) {
+static void check_resume(PpoDef def) {
     const char *path = "build_test_resume.safetensors";
     MildError error = {0};
     Run whole, first, second;
-    run_open(&whole, 2, 16, toy_ppo_def());
+    run_open(&whole, 2, 16, def);
     run_iterations(&whole, 5);
 
-    run_open(&first, 1, 16, toy_ppo_def());
+    run_open(&first, 1, 16, def);
     run_iterations(&first, 2);
     assert_int_equal(ppo_save(first.ppo, path, &first.toy, sizeof first.toy, "toy", &error),
                      MILD_OK);
     run_close(&first);
 
-    run_open(&second, 2, 16, toy_ppo_def());
+    run_open(&second, 2, 16, def);
     run_iterations(&second, 1); /* leaves traces that loading must wipe out */
     assert_int_equal(ppo_load(second.ppo, path, &second.toy, sizeof second.toy, &error), MILD_OK);
     assert_int_equal(ppo_iteration(second.ppo), 2);
@@ -125,6 +127,13 @@ TEST(test_resume_is_as_if_never_stopped) {
     unlink(path);
     run_close(&second);
     run_close(&whole);
+}
+
+TEST(test_resume_is_as_if_never_stopped) {
+    PpoDef def = toy_ppo_def();
+    check_resume(def);
+    def.optimizer = PPO_OPTIMIZER_MUON;
+    check_resume(def);
 }
 
 TEST(test_another_run_is_refused) {
@@ -353,9 +362,7 @@ TEST(test_nothing_valid_changes_nothing) {
 /* Resting anywhere in [-1, 1] earns 0.44 /s on average; the goal, reached at once, about 0.93. What
  * was learned must stay: with returns ten times as large the critic could not follow, and the
  * policy fell back to 0.2 by iteration 60. */
-static void check_toy(int matmul) {
-    PpoDef def = toy_ppo_def();
-    def.matmul = matmul;
+static void check_toy(PpoDef def) {
     Run run;
     run_open(&run, 1, 64, def);
     double begin = clock_seconds(), first = 0.0, reward = 0.0;
@@ -386,11 +393,19 @@ static void check_toy(int matmul) {
 }
 
 TEST(test_learns_the_toy_task) {
-    check_toy(PPO_MATMUL_FP32);
+    check_toy(toy_ppo_def());
 }
 
 TEST(test_learns_with_rounded_products) {
-    check_toy(PPO_MATMUL_BF16);
+    PpoDef def = toy_ppo_def();
+    def.matmul = PPO_MATMUL_BF16;
+    check_toy(def);
+}
+
+TEST(test_learns_with_muon) {
+    PpoDef def = toy_ppo_def();
+    def.optimizer = PPO_OPTIMIZER_MUON;
+    check_toy(def);
 }
 
 TEST(test_create_refuses) {

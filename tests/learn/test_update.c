@@ -228,6 +228,47 @@ TEST(gradient_is_shortened_to_the_greatest_norm) {
     }
 }
 
+/* Of equal gradients c a matrix has one direction, of singular value 1 at length 1: its step is
+ * the rate times 0.2 sqrt(max(rows, columns)) f(1) / sqrt(rows columns), whatever c. Momentum is c,
+ * then c + 0.95 c. All else moves as by Adam. */
+TEST(muon_moves_what_lies_between_hidden_layers) {
+    Run run;
+    PpoDef def = plain_def();
+    double f = 1.0;
+    for (int k = 0; k < 5; k++) {
+        f = 3.4445 * f - 4.7750 * f * f * f + 2.0315 * pow(f, 5);
+    }
+    def.optimizer = PPO_OPTIMIZER_MUON;
+    def.epochs = 2;
+    run_open(&run, def, NULL);
+    run.script.sums.kl = 0.01; /* the rate stays 1e-3 */
+    const int64_t count = policy_parameter_count(run.policy);
+    run.script.gradient = (float)(4.0 / sqrt((double)count)); /* shortened to 1 / sqrt(count) */
+    const double c = 1.0 / sqrt((double)count);
+    float *before = malloc((size_t)count * sizeof *before);
+    assert_non_null(before);
+    memcpy(before, policy_parameters(run.policy), (size_t)count * sizeof *before);
+    update(&run);
+    const MuonMatrices muon = muon_matrices(&run.policy->network);
+    for (int64_t i = 0; i < count; i++) {
+        double step = 1e-3, first = (0.1 + 0.09) * c, second = (0.001 + 0.000999) * c * c;
+        for (int m = 0; m < muon.count; m++) {
+            const double rows = muon.matrix[m].rows, columns = muon.matrix[m].columns;
+            if (i >= muon.matrix[m].at && i < muon.matrix[m].at + (int64_t)(rows * columns)) {
+                step *= 0.2 * sqrt(fmax(rows, columns) / (rows * columns)) * f;
+                first = 1.95 * c;
+                second = 0.0;
+            }
+        }
+        assert_true(fabs((double)(before[i] - policy_parameters(run.policy)[i]) - 2.0 * step) <
+                    1e-6);
+        assert_close("momentum", (double)run.ppo->first[i], first, 1e-4);
+        assert_close("second moment", (double)run.ppo->second[i], second, 1e-4);
+    }
+    free(before);
+    run_close(&run);
+}
+
 /* Every sum that is not a number costs its minibatch and nothing else; so does a norm. */
 TEST(bad_sums_cost_their_minibatch) {
     for (int bad = 0; bad < 10; bad++) {

@@ -185,6 +185,12 @@ class Observations(unittest.TestCase):
             seen = self.observe(stander(observation=terms, clock={"period": 0.5, "offsets": "0 0.5", **clock}))[0]
             np.testing.assert_allclose(seen, wanted, atol=1e-6)
 
+    def test_slow_clock(self):
+        """The command counts 0.5 + 3 0.1 + 0.2 = 1 m/s, four fifths of slow_below: the period is longer by a fifth of slowing."""
+        self.data.time = 0.3
+        seen = self.observe(stander(observation={"phase_sin": 1}, clock={"period": 0.5, "slowing": 0.5, "slow_below": 1.25}))[0]
+        np.testing.assert_allclose(seen, [math.sin(2 * math.pi * 0.3 / (0.5 * 1.1))], atol=1e-6)
+
     def test_scales(self):
         """One for each number, a clip, and a scale that does not fit."""
         seen = self.observe(stander(observation={"joint_position": "0*2 1*2", "action": 1}, policy={"clip": 2.5}))[0]
@@ -557,7 +563,7 @@ class Trials(unittest.TestCase):
         six = lambda values: dict(zip(names, 2 * values))  # noqa: E731
         d = {"policy": {"step": 0.0025, "decimation": 4}, "observation": {"angular_velocity": 1, "command": "2 2 1", "gravity": 1, "joint_position": 1,
                                                                        "joint_velocity": 0.05, "action": 1, "phase_sin": 1, "phase_cos": 1},
-             "clock": {"period": 0.8 * (1 + 0.5 * 0.5)}, "scale": {".*": 0.5}, "kp": six([50, 50, 70, 70, 20, 20]), "kd": six([5, 5, 7, 7, 0.2, 0.2]),
+             "clock": {"period": 0.8, "slowing": 0.5}, "scale": {".*": 0.5}, "kp": six([50, 50, 70, 70, 20, 20]), "kd": six([5, 5, 7, 7, 0.2, 0.2]),
              "default": six(POSE[:6].tolist()), "effort": six([86.8] * 4 + [20.4] * 2), "feet": {"names": "leg_l6_link leg_r6_link", "bodies": "-"}}
         ini = configparser.ConfigParser(inline_comment_prefixes=";")
         ini.read(ROOT / "robots/sa01/robot.ini")

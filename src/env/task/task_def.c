@@ -108,6 +108,7 @@ void task_def_choose_ground(TaskDef *def) {
     r->presets[0] = '\0';
     r->patch_share = 0;
     def->assist = 0;
+    def->sole_elements = 0;
     def->start = TASK_START_STAND;
     def->may_lie = 0;
 }
@@ -191,6 +192,9 @@ const MildField task_fields[] = {
     T(shells_stand, B, 1, 0, 1,
       "[bool] geoms of `shells` of robot.ini stand on soft ground as soles do; either way a shell "
       "of the base ends the episode when it touches the ground, on soft ground no other"),
+    T(sole_elements, MILD_FIELD_INT, 1, 0, 4096,
+      "[-] ground elements of a flat sole, fewer than the robot's: a coarser raster with the same "
+      "area and second moments of area, which does not change the ground; 0: the robot's own"),
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
     MILD_FIELD_CHOICE(
@@ -407,6 +411,14 @@ MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildErro
                          def->actuator);
     }
     return status == MILD_OK ? task_gains(def, robot, &gains, error) : status;
+}
+
+MildStatus task_set_elements(const TaskDef *def, Robot *robot, MildError *error) {
+    MildError cause = {0};
+    const MildStatus status = robot_set_elements(robot, def->sole_elements, &cause);
+    return status == MILD_OK ? MILD_OK
+                             : mild_fail(error, status, "task.sole_elements = %d: %s",
+                                         def->sole_elements, cause.text);
 }
 
 MildStatus task_def_check(const TaskDef *def, MildError *error) {

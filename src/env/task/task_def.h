@@ -171,6 +171,7 @@ typedef struct {
     double tilt_limit;   /* [rad] */
     double crossing_limit;    /* [m] lateral distance of the feet below which the episode ends */
     int shells_stand;         /* bool: shells stand on soft ground (robot_set_shells) */
+    int sole_elements;        /* of a foot (robot_set_elements); 0: the robot's own */
     int assist;               /* bool: helping hand for beginners (assist.h) */
     int solver;               /* MildSolver */
     double contact_tolerance; /* [-] relative residual at which the contact solver stops */
@@ -200,7 +201,8 @@ typedef struct TaskActuator {
 } TaskActuator;
 
 TaskDef task_def_default(void);
-/* For evaluation and play, on grounds that the caller chooses: no draw of them, no assistance. */
+/* For evaluation and play, on grounds that the caller chooses: no draw of them, no assistance, the
+ * robot's own soles. */
 void task_def_choose_ground(TaskDef *def);
 /* The same and the nominal robot, undisturbed; sensor noise, latencies and the start
  * are still drawn. */
@@ -208,6 +210,8 @@ void task_def_make_nominal(TaskDef *def);
 MildStatus task_def_check(const TaskDef *def, MildError *error);
 /* The same, that the lists of gains fit the robot, and that a file of an actuator has been read. */
 MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildError *error);
+/* robot_set_elements by the def. */
+MildStatus task_set_elements(const TaskDef *def, Robot *robot, MildError *error);
 /* Gains of each joint [robot_joints]; 0 beyond the robot's joints. */
 typedef struct {
     double kp[ROBOT_JOINTS_MAX];    /* [N m/rad] task.kp or the robot's */

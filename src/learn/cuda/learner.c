@@ -121,6 +121,8 @@ static size_t layout(GpuLearner *g, char *block) {
     const size_t rounded = gpu_array_bytes(bf16, (size_t)n->count);
     g->queue.weights.bf16 = bf16;
     g->queue.weights.at = bf16 ? carve(block, &used, rounded) : g->parameters;
+    char *muon = carve(block, &used, gpu_muon_carve(NULL, &g->muon));
+    gpu_muon_carve(muon, &g->muon);
     const size_t bytes = gpu_chunk_carve(n, &g->widths, bf16, g->rows, g->images, NULL, &g->chunk);
     char *chunk = carve(block, &used, bytes);
     gpu_chunk_carve(n, &g->widths, bf16, g->rows, g->images, chunk, &g->chunk);
@@ -332,7 +334,8 @@ static GpuOptimiser optimiser(const GpuLearner *g) {
                           .parameters = g->parameters,
                           .first = g->first,
                           .second = g->second,
-                          .mean = g->average};
+                          .mean = g->average,
+                          .muon = g->muon};
 }
 
 static int is_alone(const GpuLearner *g) {
@@ -378,7 +381,11 @@ static void enqueue_minibatch(GpuLearner *g, const GpuOrder *order, const GpuMin
                                   .sums = g->sums,
                                   .gradient = g->gradient};
     gpu_decide(stream, decision, g->partial, g->progress);
-    gpu_optimise(stream, optimiser(g), g->progress);
+    const GpuOptimiser step = optimiser(g);
+    gpu_optimise(stream, step, g->progress);
+    if (g->muon.list.count > 0) {
+        gpu_enqueue_muon(g, &step);
+    }
     gpu_enqueue_weights(g);
 }
 
@@ -611,6 +618,7 @@ static MildStatus open_learner(GpuLearner *g, int resident, MildError *error) {
     const PolicyDef *def = policy_def(ppo->policy);
     const size_t samples = (size_t)ppo->batch.steps * (size_t)ppo->batch.envs;
     g->network = gpu_network(&ppo->policy->network);
+    gpu_muon_list(ppo, &g->network, &g->muon);
     set_sizes(g, ppo->part.envs);
     g->host_rows = calloc(2 * samples, sizeof *g->host_rows);
     g->padded = malloc((size_t)g->network.count * sizeof *g->padded);

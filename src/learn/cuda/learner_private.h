@@ -53,6 +53,7 @@ typedef struct {
     float *parameters, *gradient, *first, *second, *average; /* [network.count]; average: or NULL */
     PpoBatch batch;                                          /* the rollout */
     void *rollout;                                           /* memory of its arrays */
+    GpuMuon muon;
     GpuChunk chunk;
     int *substitute;   /* [steps * envs] */
     int *order;        /* [minibatch] samples of the present minibatch */
@@ -85,6 +86,10 @@ typedef struct {
 size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int bf16, int rows, int mirrored,
                        char *block, GpuChunk *c);
 
+/* The matrices that Muon moves in the padded network, and their arrays, as above. */
+void gpu_muon_list(const Ppo *ppo, const Network *padded, GpuMuon *muon);
+size_t gpu_muon_carve(char *block, GpuMuon *muon);
+
 /* All of the following only enqueue. */
 
 /* The weights as products read them, after the parameters have changed. */
@@ -98,5 +103,7 @@ void gpu_enqueue_returns(GpuLearner *g);
 /* This process's part of the gradient of the loss over a minibatch, whose samples are g->order,
  * into g->gradient and g->sums. */
 void gpu_enqueue_gradient(GpuLearner *g, const GpuMinibatch *minibatch);
+/* Muon's step, after gpu_optimise. */
+void gpu_enqueue_muon(GpuLearner *g, const GpuOptimiser *optimiser);
 
 #endif

@@ -375,9 +375,35 @@ void gpu_decide(cudaStream_t stream, GpuDecision d, double *partial, GpuProgress
     LAUNCH(decide, one_block, line, stream, d, (int)parts.x, partial, progress);
 }
 
+/* Number of the matrix that parameter i belongs to; -1: Adam moves it. */
+static __device__ int muon_find(const MuonMatrices &list, int64_t i) {
+    for (int m = 0; m < list.count; m++) {
+        const MuonMatrix &matrix = list.matrix[m];
+        if (i >= matrix.at && i < matrix.at + (int64_t)matrix.rows * matrix.columns) {
+            return m;
+        }
+    }
+    return -1;
+}
+
+/* Where parameter i, of matrix m, is in muon.x. */
+static __device__ int64_t muon_place(const GpuMuon &muon, int m, int64_t i) {
+    const MuonMatrix &matrix = muon.list.matrix[m];
+    const int k = (int)(i - matrix.at), row = k / matrix.columns, column = k % matrix.columns,
+              is_wide = matrix.rows <= matrix.columns;
+    return ((int64_t)m * muon.side + (is_wide ? row : column)) * muon.width +
+           (is_wide ? column : row);
+}
+
 static __global__ void optimise(GpuOptimiser o, const GpuProgress *progress) {
     const int64_t i = item();
     if (i >= o.count || !progress->go) {
+        return;
+    }
+    const int m = muon_find(o.muon.list, i);
+    if (m >= 0) {
+        o.muon.x[muon_place(o.muon, m, i)] =
+            muon_direction(progress->step.gradient_scale * o.gradient[i], &o.first[i]);
         return;
     }
     adam_element(progress->step, o.gradient[i], &o.parameters[i], &o.first[i], &o.second[i]);
@@ -388,6 +414,42 @@ static __global__ void optimise(GpuOptimiser o, const GpuProgress *progress) {
 
 void gpu_optimise(cudaStream_t stream, GpuOptimiser o, const GpuProgress *progress) {
     LAUNCH(optimise, blocks_of(o.count), line, stream, o, progress);
+}
+
+/* A block belongs to matrix blockIdx.y. */
+static __global__ void muon_polynomials(int side, int is_first, const float *gram, float *square) {
+    const int64_t size = (int64_t)side * side, i = item();
+    double trace = 0.0;
+    gram += blockIdx.y * size;
+    square += blockIdx.y * size;
+    for (int k = (int)threadIdx.x; is_first && k < side; k += THREADS) {
+        trace += gram[k * (int64_t)(side + 1)];
+    }
+    trace = block_sum(trace);
+    if (i < size) {
+        const float s = is_first ? muon_shrink(trace) : 1.0f;
+        square[i] = muon_polynomial(s, i % (side + 1) == 0, gram[i], square[i]);
+    }
+}
+
+void gpu_muon_polynomial(cudaStream_t stream, GpuMuon muon, int is_first) {
+    dim3 blocks = blocks_of((int64_t)muon.side * muon.side);
+    blocks.y = (unsigned)muon.list.count;
+    LAUNCH(muon_polynomials, blocks, line, stream, muon.side, is_first, muon.gram, muon.square);
+}
+
+static __global__ void muon_step(GpuOptimiser o, const float *x, const GpuProgress *progress) {
+    const int64_t i = item();
+    const int m = muon_find(o.muon.list, i);
+    if (m >= 0 && progress->go) {
+        const float step = (float)progress->learning_rate * o.muon.list.matrix[m].scale;
+        o.parameters[i] -= step * x[muon_place(o.muon, m, i)];
+    }
+}
+
+void gpu_muon_apply(cudaStream_t stream, GpuOptimiser o, const float *x,
+                    const GpuProgress *progress) {
+    LAUNCH(muon_step, blocks_of(o.count), line, stream, o, x, progress);
 }
 
 /* ---- after the minibatches ---- */

@@ -9,6 +9,7 @@
 
 #include "learn/adam.h"
 #include "learn/cuda/kernels.h"
+#include "learn/muon.h"
 #include "learn/order.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
@@ -113,7 +114,15 @@ typedef struct {
     const float *gradient;
 } GpuDecision;
 void gpu_decide(cudaStream_t stream, GpuDecision d, double *partial, GpuProgress *progress);
-/* Adam's arrays, [count] each; log std is at log_std .. log_std + actions - 1. */
+/* What Muon moves, in arrays of one shape: [side][width] for each matrix, transposed where it has
+ * more rows than columns, and zero beyond it. */
+typedef struct {
+    MuonMatrices list; /* as padded, but for the scale; count 0: Adam moves all */
+    int side, width;
+    float *x, *next;      /* [count][side][width] */
+    float *gram, *square; /* [count][side][side] X X^T, and its square or the polynomial */
+} GpuMuon;
+/* The optimiser's arrays, [count] each; log std is at log_std .. log_std + actions - 1. */
 typedef struct {
     int64_t count, log_std;
     int actions;
@@ -121,8 +130,16 @@ typedef struct {
     const float *gradient;
     float *parameters, *first, *second;
     float *mean; /* running mean of the parameters; NULL: none */
+    GpuMuon muon;
 } GpuOptimiser;
+/* Adam's step, and Muon's direction into muon.x. */
 void gpu_optimise(cudaStream_t stream, GpuOptimiser o, const GpuProgress *progress);
+/* The polynomial of an iteration in the place of the square. is_first: bool, of the iteration that
+ * takes X to length 1. */
+void gpu_muon_polynomial(cudaStream_t stream, GpuMuon muon, int is_first);
+/* Muon's step, along x. */
+void gpu_muon_apply(cudaStream_t stream, GpuOptimiser o, const float *x,
+                    const GpuProgress *progress);
 
 /* ---- after the minibatches ---- */
 

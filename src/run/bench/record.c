@@ -13,7 +13,12 @@ static const double walk_speed = 0.6,
                     walk_settle = 1.0; /* [m/s] commanded, [s] before the record begins */
 
 Robot *bench_robot(const ExperimentDef *def, MildError *error) {
-    return robot_open(def->train.robot, error);
+    Robot *robot = robot_open(def->train.robot, error);
+    if (robot && task_set_elements(&def->task, robot, error) != MILD_OK) {
+        robot_destroy(robot);
+        return NULL;
+    }
+    return robot;
 }
 
 MildStatus bench_open(BenchContext *c, const ExperimentDef *def, MildError *error) {

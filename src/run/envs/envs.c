@@ -23,6 +23,10 @@ static MildStatus build(MildEnvs *envs, MildError *error) {
     experiment_fit_robot(def, envs->robot);
     robot_set_model(envs->robot, (MildModel)def->task.randomize.model);
     robot_set_shells(envs->robot, def->task.shells_stand);
+    MildStatus status = task_set_elements(&def->task, envs->robot, error);
+    if (status != MILD_OK) {
+        return status;
+    }
     envs->shape = task_shape(envs->robot);
     envs->pool = pool_create(def->train.threads);
     if (!envs->pool) {

@@ -71,6 +71,9 @@ static int make_learner(Trainer *trainer, MildError *error) {
                               sides.action_sign};
     robot_set_model(trainer->robot, (MildModel)def->task.randomize.model);
     robot_set_shells(trainer->robot, def->task.shells_stand);
+    if (task_set_elements(&def->task, trainer->robot, error) != MILD_OK) {
+        return 0;
+    }
     const int threads = def->train.threads ? def->train.threads : ranks_threads(trainer->ranks);
     trainer->pool = pool_create(threads);
     if (!trainer->pool) {

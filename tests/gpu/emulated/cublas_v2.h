@@ -92,4 +92,20 @@ static inline cublasStatus_t cublasGemmEx(cublasHandle_t handle, cublasOperation
     return CUBLAS_STATUS_SUCCESS;
 }
 
+/* Of floats. */
+static inline cublasStatus_t
+cublasGemmStridedBatchedEx(cublasHandle_t handle, cublasOperation_t op_a, cublasOperation_t op_b,
+                           int m, int n, int k, const void *alpha, const void *a,
+                           cudaDataType_t a_type, int lda, long long a_stride, const void *b,
+                           cudaDataType_t b_type, int ldb, long long b_stride, const void *beta,
+                           void *c, cudaDataType_t c_type, int ldc, long long c_stride, int count,
+                           cublasComputeType_t arithmetic, int algorithm) {
+    for (long long i = 0; i < count; i++) {
+        cublasGemmEx(handle, op_a, op_b, m, n, k, alpha, (const float *)a + i * a_stride, a_type,
+                     lda, (const float *)b + i * b_stride, b_type, ldb, beta,
+                     (float *)c + i * c_stride, c_type, ldc, arithmetic, algorithm);
+    }
+    return CUBLAS_STATUS_SUCCESS;
+}
+
 #endif
