@@ -330,26 +330,26 @@ class Ground:
 class Walk:
     """Answers questions. From a lost sole on there is no ground: the robot falls, and those who judge it end the trial by their own rule."""
 
-    def __init__(self, ground, soles, floor, folder=None, told=None):
+    def __init__(self, ground, soles, floor, folder=None, outcome=None):
         self.ground, self.soles, self.floor, self.folder = ground, soles, floor, folder
-        self.told, self.last, self.costs = dict(told or {}), None, []
-        self.told |= {"lost_sole_s": None, "steps": 0, "windows": 0, "speed_off_m_s": 0.0, "pressed_m": 0.0}
+        self.outcome, self.last, self.costs = dict(outcome or {}), None, []
+        self.outcome |= {"lost_sole_s": None, "steps": 0, "windows": 0, "speed_off_m_s": 0.0, "pressed_m": 0.0}
 
     def answer(self, q):
-        if self.told["lost_sole_s"] is None and self.soles.lost(q, self.floor):
-            self.told["lost_sole_s"] = float(q.time)
+        if self.outcome["lost_sole_s"] is None and self.soles.lost(q, self.floor):
+            self.outcome["lost_sole_s"] = float(q.time)
         out = np.zeros((len(q.place), 8))
-        if self.told["lost_sole_s"] is not None:
+        if self.outcome["lost_sole_s"] is not None:
             return out
-        if self.told["steps"] == 0:
-            self.told["pressed_m"] = self.ground.begin(q)
+        if self.outcome["steps"] == 0:
+            self.outcome["pressed_m"] = self.ground.begin(q)
         else:
-            self.told["speed_off_m_s"] = max(self.told["speed_off_m_s"], float(np.abs(q.twist - self.last)[:, :3].max()))
+            self.outcome["speed_off_m_s"] = max(self.outcome["speed_off_m_s"], float(np.abs(q.twist - self.last)[:, :3].max()))
         begin = time.time()
-        self.told["windows"] += self.ground.follow(self.soles.middle(q))
+        self.outcome["windows"] += self.ground.follow(self.soles.middle(q))
         wrench = self.ground.step(q.place, q.turn, q.free, q.response, q.dt)
         self.costs.append(time.time() - begin)
-        self.told["steps"] += 1
+        self.outcome["steps"] += 1
         self.last = q.free + q.dt * (q.response @ wrench.ravel()).reshape(wrench.shape)
         deep, mean = self.soles.depths(q)
         out[:, :6] = wrench
@@ -361,10 +361,10 @@ class Walk:
         if self.folder is None:
             return
         seconds = float(np.median(self.costs)) if self.costs else 0.0
-        self.told |= {"trial": q.trial, "time_s": float(q.time), "dt_s": float(q.dt), "seconds": float(np.sum(self.costs)),
+        self.outcome |= {"trial": q.trial, "time_s": float(q.time), "dt_s": float(q.dt), "seconds": float(np.sum(self.costs)),
                       "step_ms": 1e3 * seconds, "seconds_per_simulated_second": seconds / float(q.dt), "surface_m": [0.0] * len(q.place)}
         part = self.folder / f"walk-{q.trial}.part"
-        part.write_text(json.dumps(self.told, indent=1) + "\n")
+        part.write_text(json.dumps(self.outcome, indent=1) + "\n")
         part.replace(self.folder / f"walk-{q.trial}.json")
 
 
@@ -422,9 +422,9 @@ def main():
     args = arguments()
     soles = Soles(outlines_of(args.sole, (1, -1)), args.sole_z)
     ground = Ground(args, soles)
-    told = {"ground": "newton_mpm", "particles": ground.count, "parameters": {name: value for name, value in vars(args).items()
+    outcome = {"ground": "newton_mpm", "particles": ground.count, "parameters": {name: value for name, value in vars(args).items()
             if name not in ("sole", "out", "device")}, **ground.versions}
-    serve(Walk(ground, soles, ground.depth, args.out, told), sys.stdin.buffer, answers)
+    serve(Walk(ground, soles, ground.depth, args.out, outcome), sys.stdin.buffer, answers)
 
 
 if __name__ == "__main__":

@@ -8,11 +8,11 @@ import numpy as np
 import walk_manifest
 
 CONTACT, PAUSE, SHORTEST = 5.0, 0.03, 0.15  # [N] [s] [s] of a stance
-ENDS = 0.05  # [s] at which its pressure centre is told
+ENDS = 0.05  # [s] at which its pressure centre is reported
 MEAN = 0.01  # [s] of the largest forces: records of before 2026-11-23 have a row for each policy step
 COLOURS = {"grains": "#222222", "mild": "#1f77b4", "mild_merged": "#d62728", "bekker": "#2ca02c", "ecc_quasi_3d": "#9467bd", "newton_mpm": "#ff7f0e"}
 # What walk-0.json of a ground by another program says of its walk.
-TOLD = {"grains": ("time_s", "lost_sole_s", "seconds", "steps", "late_lists", "full_lists", "surface_m"),
+REPORTED = {"grains": ("time_s", "lost_sole_s", "seconds", "steps", "late_lists", "full_lists", "surface_m"),
         "newton_mpm": ("time_s", "lost_sole_s", "seconds", "steps", "dt_s", "particles", "step_ms", "seconds_per_simulated_second",
                        "speed_off_m_s", "parameters", "device")}
 SHARE = np.linspace(0, 1, 41)  # of a stance
@@ -114,9 +114,9 @@ def write_walks(out, families, speeds, file):
             for name in COLOURS:
                 folder = out / family / speed / name
                 row = {"family": family, "speed_m_s": float(speed), "ground": name}
-                if name in TOLD and (folder / "walk-0.json").exists():
-                    told = json.loads((folder / "walk-0.json").read_text())
-                    row[name] = {key: told[key] for key in TOLD[name]}
+                if name in REPORTED and (folder / "walk-0.json").exists():
+                    report = json.loads((folder / "walk-0.json").read_text())
+                    row[name] = {key: report[key] for key in REPORTED[name]}
                 if (folder / "eval.json").exists():
                     judged = json.loads((folder / "eval.json").read_text())["rows"][0]
                     row |= {key: judged[key] for key in ("trials", "success", "ends", "seconds", "velocity", "cot", "penetration", "torque_max")}

@@ -1,4 +1,4 @@
-/* Private to the plugin: bodies that meet the ground on any side, such as shins, a trunk or a wheel
+/* Private to the plugin: bodies that touch the ground with any side, such as shins, trunk or wheels
  * (docs/model.md section 20). */
 #ifndef PLUGIN_BODY_H
 #define PLUGIN_BODY_H

@@ -13,7 +13,7 @@ const MildField plugin_fields[] = {
     FIELD(feet, MILD_FIELD_TEXT, PLUGIN_TEXT_SIZE, 0, 0,
           "[text] bodies or sites that are feet; z points up from the sole"),
     FIELD(body, MILD_FIELD_TEXT, PLUGIN_TEXT_SIZE, 0, 0,
-          "[text] bodies whose shapes meet the ground on any side; with the feet at most 16"),
+          "[text] bodies whose shapes touch the ground with any side; with the feet at most 16"),
     FIELD(sole, MILD_FIELD_TEXT, PLUGIN_TEXT_SIZE, 0, 0,
           "[text] geoms that form the soles (default: the shapes of the foot's body); a single "
           "sphere is a round foot"),

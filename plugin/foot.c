@@ -615,7 +615,7 @@ MildStatus feet_create(const mjModel *m, const PluginDef *def, MildModel model, 
     if (status == MILD_OK && *count == 0) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "no feet: set feet to the names of the bodies that stand on the ground, "
-                         "or body to those that meet it on any side");
+                         "or body to those that touch it with any side");
     }
     return status == MILD_OK ? make_soles(m, def, model, compiling, feet, *count, error) : status;
 }

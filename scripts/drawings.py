@@ -130,7 +130,7 @@ def architecture():
 
 LOOP = [("dynamics", "mass matrix, bias, motors", "robot_sim_step", "part"),
         ("joint limits that push", "taken into the mass matrix", "limits_hold", "part"),
-        ("feet", "A = J M⁻¹ Jᵀ, velocity without ground", "free_feet", "part"),
+        ("feet", "A = J M⁻¹ Jᵀ, velocity without ground", "project_feet", "part"),
         ("ground: solve", "wrench of every foot, by Newton's method", "mild_ground_solve", "ground"),
         ("ground: advance", "yield depths, drift, imprints", "mild_ground_advance", "ground"),
         ("accelerate", "and the joint limits once more", "constrain", "part"),

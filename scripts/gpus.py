@@ -124,18 +124,18 @@ def counts(most):
 
 def sums(programs, arguments, _):
     found, output = programs.good(programs.by(arguments.n, "test_ranks"))
-    told = f"the same sums on {arguments.n} GPUs"
-    if found and told not in output and arguments.device == "cuda":
-        fail(f"no '{told}' in {output}")
-    print(f"sums: {told if told in output else 'on processors'}")
+    found_line = f"the same sums on {arguments.n} GPUs"
+    if found and found_line not in output and arguments.device == "cuda":
+        fail(f"no '{found_line}' in {output}")
+    print(f"sums: {found_line if found_line in output else 'on processors'}")
 
 
 def parts(programs, arguments, _):
     found, output = programs.good(programs.by(arguments.n, "test_parts"))
-    told = re.search(r"\d+ processes: way.*", output)
-    if found and not told:
+    found_line = re.search(r"\d+ processes: way.*", output)
+    if found and not found_line:
         fail(f"test_parts did not run: {output}")
-    print(f"parts: {told.group(0) if told else 'failed'}")
+    print(f"parts: {found_line.group(0) if found_line else 'failed'}")
 
 
 def compare(name, before, one, other):

@@ -37,7 +37,7 @@ FITS = {
     "hertz": (("disc120", "square100", "square100-drag15"), ()),
     "rolling": (("disc120", "square100", "square100-drag15"), ()),
 }
-TOLD = ("sand/square100-again", "sand/square100-drop10", "deep/square100-drag40",
+FITTED_BY_HAND = ("sand/square100-again", "sand/square100-drop10", "deep/square100-drag40",
         "deep/square100-drag80")  # have told constants of mild_merged, so they are no predictions of anybody's
 FRICTION = {0.5: 0.38, 0.3: 0.33}  # internal friction of spheres by that of grains, for 3D-RFT: critical state, [lit]
 CSV_COLUMNS = {"time_s": "time", "stage": "stage", "depth_m": "depth", "path_m": "path", "pitch_rad": "pitch",
@@ -190,7 +190,7 @@ def judge_family(args, records, fitted, results):
         found = {name: measures(case, rows) for name, rows in played.items() if rows is not None}
         for measure, (value, noise) in grain_values(case, beds).items():
             values = {name: numbers.get(measure, np.nan) for name, numbers in found.items()}
-            results.append((fitted, key, key in keys or key in TOLD, measure, value, noise, values))
+            results.append((fitted, key, key in keys or key in FITTED_BY_HAND, measure, value, noise, values))
         args.curves.setdefault(key, (beds, played))
 
 

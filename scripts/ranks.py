@@ -21,11 +21,11 @@ def without_frames(lines):
             if frame is None:
                 frame = []
                 continue
-            told = "\n".join(frame)
-            if told.startswith("mpirun noticed"):
-                yield told.replace("\n", " ") + "\n"
-            elif "non-zero" not in told and "MPI_ABORT" not in told:  # a mistake in its options, say
-                yield told + "\n"
+            message = "\n".join(frame)
+            if message.startswith("mpirun noticed"):
+                yield message.replace("\n", " ") + "\n"
+            elif "non-zero" not in message and "MPI_ABORT" not in message:  # a mistake in its options, say
+                yield message + "\n"
             frame = None
         elif frame is None:
             if "Read -1, expected" not in line:  # shared memory of a process that was killed

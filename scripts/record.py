@@ -401,11 +401,11 @@ def faults(out):
         yield f"{sorted(silent)[0]} was neither run nor named as missing"
     if "nanog1" not in {absent["name"] for absent in whole["missing"]}:
         yield "nanog1 is not named as missing"
-    for key, told in (("rows", rows_from(out, whole["runs"])), ("ratios", ratios_of(whole["rows"])),
+    for key, computed in (("rows", rows_from(out, whole["runs"])), ("ratios", ratios_of(whole["rows"])),
                       ("bars", bars_of(whole["rows"], whole["ratios"]))):
-        if told != whole[key]:
-            other = next((a for a, b in zip(whole[key], told) if a != b), None)
-            yield f"{key} do not follow from the raw output: {json.dumps(other) if other else f'{len(whole[key])} in place of {len(told)}'}"
+        if computed != whole[key]:
+            other = next((a for a, b in zip(whole[key], computed) if a != b), None)
+            yield f"{key} do not follow from the raw output: {json.dumps(other) if other else f'{len(whole[key])} in place of {len(computed)}'}"
     if (out / "record.md").read_text(encoding="utf-8") != page(whole):
         yield "the page has other numbers than record.json"
 
@@ -546,11 +546,11 @@ def main():
         one.add_argument("--file", type=pathlib.Path, default=ROOT / "docs/record.jsonl")
         one.add_argument("--dirty", action="store_true")
         one.set_defaults(work=work)
-    told = words.add_parser("history")
-    told.add_argument("--file", type=pathlib.Path, default=ROOT / "docs/record.jsonl")
-    told.add_argument("--slow", type=float, default=SLOW, help=f"share of a slow-down that ends with exit code 1 (default {SLOW})")
-    told.add_argument("--picture", type=pathlib.Path)
-    told.set_defaults(work=history)
+    past = words.add_parser("history")
+    past.add_argument("--file", type=pathlib.Path, default=ROOT / "docs/record.jsonl")
+    past.add_argument("--slow", type=float, default=SLOW, help=f"share of a slow-down that ends with exit code 1 (default {SLOW})")
+    past.add_argument("--picture", type=pathlib.Path)
+    past.set_defaults(work=history)
     given = parser.parse_args()
     if given.work is None:
         parser.print_help()

@@ -1,5 +1,5 @@
-/* Sizes of robots/sa01, the robot that most tests use: what the code counts from robot.ini must be
- * this. */
+/* Sizes of robots/sa01, the robot that most tests use: written by hand, a second time on purpose:
+ * what the code counts from robot.ini must be this. */
 #ifndef TESTS_SA01_H
 #define TESTS_SA01_H
 

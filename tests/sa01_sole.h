@@ -4,7 +4,8 @@
 #include "sa01.h"
 
 /* Outline of the left sole, robots/sa01/sa01.json: x, lowest y, highest y [m]; the right sole is
- * its mirror image. */
+ * its mirror image. A second copy on purpose: tests of the ground cannot read a robot's folder, and
+ * those of its reader compare with this. */
 static const double sa01_outline[SA01_OUTLINE_ROWS][3] = {
     {-0.075, -0.013, 0.013}, {-0.06, -0.044, 0.044},  {-0.045, -0.045, 0.047},
     {-0.03, -0.046, 0.049},  {-0.015, -0.046, 0.051}, {0.0, -0.041, 0.041},

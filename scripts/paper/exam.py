@@ -68,8 +68,8 @@ def summary(rows):
         for end, n in row["ends"].items():
             if n and end != "time":
                 ends[end] = ends.get(end, 0) + n
-    told = [r for r in rows if r["velocity"] is not None and r["speed"]]
-    worst = max(told, key=lambda r: abs(r["velocity"] / r["speed"] - 1), default=None)
+    measured = [r for r in rows if r["velocity"] is not None and r["speed"]]
+    worst = max(measured, key=lambda r: abs(r["velocity"] / r["speed"] - 1), default=None)
     costs = [r["cot"] for r in rows if r["cot"] is not None]
     legs = [t["legs"] for r in rows for t in r["each"] if t["legs"] is not None]
     return {"upright": sum(r["success"] for r in rows), "trials": sum(r["trials"] for r in rows), "ends": ends,
@@ -90,11 +90,11 @@ def line(what, s):
 def crossing(given):
     """The summary of all 72 transitions, in the words of summary()."""
     cells = transitions.judge(given.who, transitions.PAIRS, transitions.SPEEDS, given.trials, given.seed, given.jobs)
-    told = [c for c in cells if c["error"] is not None]
-    worst = max(told, key=lambda c: abs(c["error"] / c["speed"]))
+    measured = [c for c in cells if c["error"] is not None]
+    worst = max(measured, key=lambda c: abs(c["error"] / c["speed"]))
     total, legs = transitions.total(cells), [c["legs"] for c in cells if isinstance(c["legs"], (int, float))]
     return {"upright": total["upright"], "trials": total["trials"], "ends": total["ends"],
-            "worst": [worst["pair"], worst["speed"], worst["speed"] + worst["error"]], "cot": [min(c["cot"] for c in told), max(c["cot"] for c in told)],
+            "worst": [worst["pair"], worst["speed"], worst["speed"] + worst["error"]], "cot": [min(c["cot"] for c in measured), max(c["cot"] for c in measured)],
             "torque": total["torque"], "legs": min(legs) if legs else None,
             "fell": [[c["pair"], c["speed"], c["trials"] - c["upright"]] for c in cells if c["upright"] < c["trials"]]}, cells
 
@@ -120,18 +120,18 @@ def parse(words):
 
 
 def main():
-    given, begin, told = parse(sys.argv[1:]), time.time(), {}
+    given, begin, parts = parse(sys.argv[1:]), time.time(), {}
     given.out.mkdir(parents=True, exist_ok=True)
     print(f"{'':32} {'upright':>12} {'furthest from the command [m/s]':36} {'cost':14} {'torque':>8} {'legs':>7}", flush=True)
     for name in given.parts:
         what = PARTS[name][0] if name in PARTS else {"random": "60 random grounds of Table II", "transitions": "72 transitions"}[name]
         s, rows = crossing(given) if name == "transitions" else (None, random_cells(given) if name == "random" else cells_of(given, name))
         s = s or summary(rows)
-        told[name] = {"what": what, **s, "rows": rows}
+        parts[name] = {"what": what, **s, "rows": rows}
         print(line(what, s), flush=True)
     (given.out / "exam.json").write_text(json.dumps({"policy": str(given.policy), "options": list(map(str, given.who[2:])), "seed": given.seed,
-                                                     "version": mild("--version").strip(), "parts": told}, indent=1) + "\n")
-    print(f"{sum(t['upright'] for t in told.values())} of {sum(t['trials'] for t in told.values())} trials upright, {time.time() - begin:.0f} s: "
+                                                     "version": mild("--version").strip(), "parts": parts}, indent=1) + "\n")
+    print(f"{sum(t['upright'] for t in parts.values())} of {sum(t['trials'] for t in parts.values())} trials upright, {time.time() - begin:.0f} s: "
           f"{given.out / 'exam.json'}")
 
 

@@ -97,9 +97,9 @@ def who_of(controller, policy, config):
 
 
 def walked(given, who, grounds, speeds, *more):
-    told = mild("eval", *who, "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)), "--trials", given.trials, "--seconds", TRIAL,
+    printed = mild("eval", *who, "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)), "--trials", given.trials, "--seconds", TRIAL,
                 "--threads", given.threads, "--json", "-", *more)
-    return [cell_of(row) for row in json.loads(told)["rows"]]
+    return [cell_of(row) for row in json.loads(printed)["rows"]]
 
 
 def judged(given, who):
@@ -137,8 +137,8 @@ class Factorial:
         self.end = time.time() + given.seconds
         self.longest_judge = 0.0  # [s] of those that this call has seen
         self.lock, self.failed = threading.Lock(), []
-        told = [given.minutes, given.jobs, given.steps, given.config.read_text(encoding="utf-8"), SEARCH, ENTROPY, IMITATION, OURS, given.options]
-        self.settings = hashlib.sha256(json.dumps(told).encode()).hexdigest()[:16]
+        settings = [given.minutes, given.jobs, given.steps, given.config.read_text(encoding="utf-8"), SEARCH, ENTROPY, IMITATION, OURS, given.options]
+        self.settings = hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:16]
         self.lines = []
         for text in self.file.read_text(encoding="utf-8").splitlines() if self.file.exists() else []:
             try:
@@ -270,11 +270,11 @@ class Factorial:
             return
         parts = self.judge(task)
         self.longest_judge = max(self.longest_judge, time.time() - begin)
-        told = {"skill": {part: skill(cells) for part, cells in parts.items()}, "cells": parts}
+        judged = {"skill": {part: skill(cells) for part, cells in parts.items()}, "cells": parts}
         if task["kind"] == "tune":
-            told["score"] = score(parts["tuning"])
+            judged["score"] = score(parts["tuning"])
             self.policy_of(task).unlink(missing_ok=True)
-        line = self.add("judged", task, told)
+        line = self.add("judged", task, judged)
         kl_target, robots = SEARCH[task["choice"]]
         trained = self.known("trained", task)
         print(f"{task['kind']} {task['controller']} on {task['ground']}, seed {task['seed']}, kl {kl_target:g}, {robots} robots: "
@@ -417,9 +417,9 @@ def report(factorial):
     search = [{**{k: t["task"][k] for k in ("controller", "choice")}, "kl_target": SEARCH[t["task"]["choice"]][0],
                "robots": SEARCH[t["task"]["choice"]][1], "skill": t["skill"]["tuning"], "score": t["score"]}
               for t in factorial.lines if t["done"] == "judged" and t["task"]["kind"] == "tune"]
-    told = {"minutes": factorial.given.minutes, "steps": factorial.given.steps, "settings": factorial.settings, "search": search,
+    summary = {"minutes": factorial.given.minutes, "steps": factorial.given.steps, "settings": factorial.settings, "search": search,
             "chosen": factorial.choices(), "rows": rows, "table2": second, "shares": answer, "seeds": seeds}
-    (factorial.folder / "factorial.json").write_text(json.dumps(told, indent=1) + "\n")
+    (factorial.folder / "factorial.json").write_text(json.dumps(summary, indent=1) + "\n")
     try:
         import figures
     except ImportError:

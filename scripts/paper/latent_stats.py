@@ -162,7 +162,7 @@ def walk(latent, actions, stances):
                 np.concatenate([by_phase(state, seen["phase"]), np.mean(steps, 0), np.std(steps, 0)])}
 
 
-def told(values, known, held):
+def determined(values, known, held):
     """The held-out numbers from the values, by that of three regressions which does best among the others (five folds)."""
     best = max((make_pipeline(StandardScaler(), RidgeCV(np.logspace(-3, 4, 15))), make_pipeline(StandardScaler(), SVR(C=10, epsilon=0.05)),
                 ExtraTreesRegressor(100, min_samples_leaf=2, max_features=min(1.0, 60 / values.shape[1]), random_state=0)),
@@ -178,7 +178,7 @@ def regression(seen, known, names):
     with threadpool_limits(1):
         for source in seen[0]:
             values = np.array([one[source] for one in seen])
-            guess = np.column_stack([told(values, known[:, i], held) for i in range(len(names))])
+            guess = np.column_stack([determined(values, known[:, i], held) for i in range(len(names))])
             found.update({(source, name): float(r2_score(known[held][:, i], guess[:, i])) for i, name in enumerate(names)})
             rows = rows or [{**dict(zip(names, map(float, numbers))), **{f"{name} from z~": float(g) for name, g in zip(names, guesses)}}
                             for numbers, guesses in zip(known[held], guess)]

@@ -51,9 +51,9 @@ def judge(who, pairs, speeds, trials, seed=1, jobs=1):
     def work(task):
         speed, own = task
         seconds = START + 2 * PATCH / abs(speed)
-        told = mild("eval", *who, "--ground", ",".join(pair.replace(">", "+") for pair in own), f"--speed={speed}", "--patch", PATCH,
+        report = mild("eval", *who, "--ground", ",".join(pair.replace(">", "+") for pair in own), f"--speed={speed}", "--patch", PATCH,
                     "--trials", trials, "--seed", seed, "--seconds", f"{seconds:.2f}", "--threads", 1, "--json", "-")
-        return [cell_of(pair, row) for pair, row in zip(own, json.loads(told)["rows"])]
+        return [cell_of(pair, row) for pair, row in zip(own, json.loads(report)["rows"])]
 
     found = {(c["pair"], c["speed"]): c for cells in together(SimpleNamespace(jobs=jobs), work, tasks) for c in cells}
     return [found[pair, speed] for pair in pairs for speed in speeds]
@@ -180,7 +180,7 @@ def axis_between(first, second):
 
 
 def crossing(given, pair, speed, name):
-    """{strides, latent} of the course of a pair; z~ is told between the means of walks on either ground alone."""
+    """{strides, latent} of the course of a pair; z~ is measured between the means of walks on either ground alone."""
     alone = [walk(given, ground, speed, f"{name}_{ground}")[1] for ground in pair.split(">")]
     stances, latent = walk(given, course_of(pair), speed, name)
     return {"strides": strides_of(stances, latent, axis_between(*alone), 1 if speed > 0 else -1), "latent": latent}
@@ -250,9 +250,9 @@ def main():
     if given.pairs:
         begin = time.time()
         cells = judge(given.who, given.pairs, given.speeds, given.trials, given.seed, given.jobs)
-        told = {"policy": str(given.policy), "options": list(map(str, given.who[2:])), "version": mild("--version").strip(), "seed": given.seed,
+        report = {"policy": str(given.policy), "options": list(map(str, given.who[2:])), "version": mild("--version").strip(), "seed": given.seed,
                 "patch": PATCH, "totals": totals(cells), "cells": cells}
-        (given.out / "transitions.json").write_text(json.dumps(told, indent=1) + "\n")
+        (given.out / "transitions.json").write_text(json.dumps(report, indent=1) + "\n")
         print_table(cells)
         print_totals(cells)
         print(f"{sum(c['trials'] for c in cells)} trials in {time.time() - begin:.0f} s: {given.out / 'transitions.json'}")

@@ -95,6 +95,6 @@ def repeat(given):
                        "--trials", 4, "--threads", threads, "--stances", path, "--json", "-")
         texts.append(printed + path.read_text())
     same = texts[0] == texts[1] == texts[2]
-    told = "the same bytes" if same else "other bytes"
-    return Section("Repeatable to the bit", f"16 walks, three times: twice on one thread, once on several. Table and every stance: {told}.",
-                   claims=[Claim("the same seed gives the same numbers on this machine", "-", told, same, "-")])
+    compared = "the same bytes" if same else "other bytes"
+    return Section("Repeatable to the bit", f"16 walks, three times: twice on one thread, once on several. Table and every stance: {compared}.",
+                   claims=[Claim("the same seed gives the same numbers on this machine", "-", compared, same, "-")])

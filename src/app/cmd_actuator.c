@@ -21,7 +21,8 @@
 /* ---- fit ---- */
 
 typedef struct {
-    const char *out, *robot, *figure;
+    Context context; /* its robot and threads */
+    const char *out, *figure;
     int threads;
     ActuatorFitDef fit;
 } FitCommand;
@@ -56,13 +57,11 @@ static MildStatus fit_record(FitCommand *command, const Record *record, MildErro
     char *text = NULL, note[96];
     size_t size = 0;
     FILE *held = command->figure ? open_memstream(&text, &size) : NULL;
-    Pool *pool = pool_create(command->threads);
-    if (!pool || (command->figure && !held)) {
-        pool_destroy(pool);
+    if (command->figure && !held) {
         return mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     }
     command->fit.held_out = held;
-    Actuator *actuator = actuator_fit(&command->fit, record, pool, score, error);
+    Actuator *actuator = actuator_fit(&command->fit, record, command->context.pool, score, error);
     const int closed = !held || fclose(held) == 0;
     MildStatus status = !actuator ? error->status
                         : closed  ? MILD_OK
@@ -81,7 +80,24 @@ static MildStatus fit_record(FitCommand *command, const Record *record, MildErro
     }
     free(text);
     actuator_destroy(actuator);
-    pool_destroy(pool);
+    return status;
+}
+
+static MildStatus fit_logs(FitCommand *command, const CliArgs *args, MildError *error) {
+    Record *record = calloc(1, sizeof *record);
+    if (!record) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "actuator: out of memory");
+    }
+    record->robot = command->context.robot;
+    MildStatus status = MILD_OK;
+    for (int i = 0; status == MILD_OK && i < args->positional_count; i++) {
+        status = record_read(record, args->positional[i], error);
+    }
+    if (status == MILD_OK) {
+        status = fit_record(command, record, error);
+    }
+    record_free(record);
+    free(record);
     return status;
 }
 
@@ -93,34 +109,21 @@ static MildStatus run_fit(FitCommand *command, const CliArgs *args, MildError *e
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "no log is given; `mild actuator log --out LOG.csv` makes one");
     }
-    Robot *robot = robots_open(command->robot, "sa01", error);
-    if (!robot) {
-        return error->status;
-    }
-    Record *record = calloc(1, sizeof *record);
-    if (!record) {
-        robot_destroy(robot);
-        return mild_fail(error, MILD_ERROR_MEMORY, "actuator: out of memory");
-    }
-    record->robot = robot;
-    MildStatus status = MILD_OK;
-    for (int i = 0; status == MILD_OK && i < args->positional_count; i++) {
-        status = record_read(record, args->positional[i], error);
-    }
-    if (status == MILD_OK) {
-        status = fit_record(command, record, error);
-    }
-    record_free(record);
-    free(record);
-    robot_destroy(robot);
+    Context *on = &command->context;
+    on->pool = pool_create(command->threads);
+    MildStatus status = on->pool ? context_open(on, args, error)
+                                 : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    status = status == MILD_OK ? fit_logs(command, args, error) : status;
+    context_close(on);
     return status;
 }
 
 static int cmd_fit_actuator(int argc, char **argv) {
-    FitCommand c = {.fit = actuator_fit_default()};
+    FitCommand c = {.context = context_default(), .fit = actuator_fit_default()};
+    c.context.without_policy = 1;
     const CliOption options[] = {
         {"out", CLI_OUTPUT, &c.out, 0, 0, "FILE.safetensors", "where the network is written"},
-        {"robot", CLI_TEXT, &c.robot, 0, 0, "NAME|DIR", ROBOTS_HELP " (default sa01)"},
+        {"robot", CLI_TEXT, &c.context.robot_name, 0, 0, "NAME|DIR", ROBOTS_HELP " (default sa01)"},
         {"spacing", CLI_NUMBER, &c.fit.spacing, ACTUATOR_SPACING_MIN, ACTUATOR_SPACING_MAX, "T",
          "[s] between the three times of the history; a multiple of the log's interval and of "
          "task.physics_dt (default 0.01)"},

@@ -97,6 +97,8 @@ static int wanted(const CliArgs *args, const char *name) {
     return args->positional_count == 0;
 }
 
+/* They read an experiment, as `mild train` does, and not a Context: each opens its robot itself,
+ * because it sets the model and the shells under it. */
 static MildStatus run_benches(const CliArgs *args, const char *robot, FILE *file,
                               BenchReport *report, MildError *error) {
     ExperimentDef def = experiment_def_default();

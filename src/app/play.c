@@ -32,7 +32,9 @@ typedef struct {
     double factor;        /* [-] of the time before */
 } Pace;
 
-/* State of the walk. */
+/* State of the walk. This robot is stepped by task_env_step and not, as the others are, by an Envs:
+ * pictures and pressures are read from its RobotSim, between the steps, too, and keys change the
+ * terrain under it. An Envs steps many robots in one RobotSim and hands none out. */
 typedef struct {
     Play *play;
     TaskDef task; /* the caller's task with an episode as long as the walk */

@@ -56,7 +56,7 @@ void envs_times(Envs *envs, double *physics, double *ground) {
     }
 }
 
-void *envs_state(Envs *envs, size_t *bytes) {
+char *envs_state(Envs *envs, size_t *bytes) {
     *bytes = 0;
     return envs->backend->state ? envs->backend->state(envs, bytes) : NULL;
 }
@@ -96,8 +96,4 @@ TaskEnv *envs_env(Envs *envs, int i) {
 
 int envs_physics_steps(const Envs *envs) {
     return envs->physics_steps;
-}
-
-uint64_t envs_hash(const Envs *envs) {
-    return envs->backend->hash ? envs->backend->hash(envs) : 0;
 }

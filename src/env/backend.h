@@ -19,8 +19,7 @@ typedef struct {
     void (*set_samples)(Envs *envs, EnvsSample *sample);
     /* of MuJoCo, else NULL */
     void (*times)(Envs *envs, double *physics, double *ground);
-    void *(*state)(Envs *envs, size_t *bytes);
-    uint64_t (*hash)(const Envs *envs);
+    char *(*state)(Envs *envs, size_t *bytes);
     TaskEnv *(*env)(Envs *envs, int i);
 } EnvsBackend;
 

@@ -59,11 +59,12 @@ typedef struct {
     MildBatchFoot *foot; /* of which depth_mean is the engine's on rigid ground */
 } EnvsContact;
 /* Bodies with shells that stand on soft ground (ground/batch/bodies.h). */
+struct BodiesSetup;
 typedef struct {
-    const void *setup; /* BodiesSetup; NULL: there are none */
-    int heap;          /* bool: materials with LAW_HEAP are among those of the ground */
-    char *robot;       /* [envs] EnvShells of batch_env.h */
-    float *memory;     /* [envs][numbers] of the ground */
+    const struct BodiesSetup *setup; /* NULL: there are none */
+    int heap;      /* bool: materials with LAW_HEAP are among those of the ground */
+    char *robot;   /* [envs] EnvShells of batch_env.h */
+    float *memory; /* [envs][numbers] of the ground */
     size_t numbers;
     uint8_t *near;      /* [envs] a bit for each body that is near the ground in this step */
     uint8_t *held;      /* [envs] bool: the memory is not all 0 */

@@ -17,10 +17,6 @@ typedef struct {
     BodiesWork ground;
 } EnvShellsWork;
 
-MILD_HD const BodiesSetup *env_bodies(const EnvsArrays *all) {
-    return (const BodiesSetup *)all->shells.setup;
-}
-
 /* No body is near the ground. */
 WARP_FN void env_shells_away(const EnvsArrays *all, long robot) {
     EACH_LANE(l) {
@@ -41,7 +37,7 @@ MILD_HD int env_body_near(const EnvsArrays *all, const EngineGround *ground, con
     for (int k = 0; k < 3; k++) {
         position[k] += work->base[k];
     }
-    return bodies_reach(env_bodies(all), engine_feet(&model->tree) + body, position, rotation,
+    return bodies_reach(all->shells.setup, engine_feet(&model->tree) + body, position, rotation,
                         ground->map_origin, ground->height) > -ENV_SHELLS_FAR;
 }
 
@@ -74,7 +70,7 @@ WARP_FN void env_shells_near(const EnvsArrays *all, long robot, const EngineGrou
  * the bound of mild_ground_near. */
 WARP_FN int env_body_touches(const EnvsArrays *all, long robot, int at, const Real *position,
                              const Real *rotation, const Real *twist) {
-    const BodiesSetup *setup = env_bodies(all);
+    const BodiesSetup *setup = all->shells.setup;
     const Real *origin = all->map_origin + 2 * robot;
     const Real height = all->contact.height[robot];
     const Real reach = bodies_reach(setup, at, position, rotation, origin, height);
@@ -85,7 +81,7 @@ WARP_FN int env_body_touches(const EnvsArrays *all, long robot, int at, const Re
 /* Of the bits in `near`, those of bodies with an element that may touch the ground in this step. */
 WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, int near) {
     const EngineModel *model = all->model;
-    const BodiesSetup *setup = env_bodies(all);
+    const BodiesSetup *setup = all->shells.setup;
     const EngineSaved *saved = &env_robot_at(all, robot)->saved;
     const EngineLinks links = engine_links_saved(&env_shells_at(all, robot)->links);
     int touch = 0;
@@ -125,14 +121,14 @@ MILD_HD BodiesMemory env_foot_memory(const EnvsShells *shells, long robot, int f
 }
 
 MILD_HD BodiesMemory env_body_memory(const EnvsArrays *all, long robot, int body) {
-    const BodiesSole *sole = &env_bodies(all)->sole[body];
+    const BodiesSole *sole = &all->shells.setup->sole[body];
     return bodies_memory(all->shells.memory + robot * (long)all->shells.numbers + sole->memory,
                          sole->elements);
 }
 
 /* Bodies other than those of the bits in `near` forget. */
 WARP_FN void env_shells_leave(const EnvsArrays *all, long robot, int near) {
-    const BodiesSetup *setup = env_bodies(all);
+    const BodiesSetup *setup = all->shells.setup;
     LANE_ROLLED
     for (int b = setup->feet; b < setup->bodies; b++) {
         if (!(near >> (b - setup->feet) & 1)) {
@@ -166,7 +162,7 @@ WARP_FN int env_shells_find(const EnvsArrays *all, long robot, int k) {
 
 /* Feet, then the bodies of the bits in `near`. */
 TEAM_FN void env_shells_list(const EnvsArrays *all, long robot, int near, EnvShellsWork *work) {
-    const BodiesSetup *setup = env_bodies(all);
+    const BodiesSetup *setup = all->shells.setup;
     const int feet = setup->feet;
     EACH_LANE(l) {
         if (TEAM_LANE(l) == 0) {
@@ -203,7 +199,7 @@ TEAM_FN void env_shells_copy(const Real *from, int count, Real *to) {
 
 /* What the ground asks of the feet, from env_export. */
 TEAM_FN void env_shells_feet(const EnvsArrays *all, long robot, BodiesWork *to) {
-    const int feet = env_bodies(all)->feet;
+    const int feet = all->shells.setup->feet;
     const EnvsContact *at = &all->contact;
     const Real *A = at->inverse_inertia + robot * 36 * feet * feet;
     const int rows = 6 * to->count;
@@ -222,7 +218,7 @@ TEAM_FN void env_shells_feet(const EnvsArrays *all, long robot, BodiesWork *to) 
 
 /* Wrenches of the feet for env_import and of the bodies for engine_end; the measures. */
 TEAM_FN void env_shells_results(const EnvsArrays *all, long robot, const EnvShellsWork *work) {
-    const int feet = env_bodies(all)->feet;
+    const int feet = all->shells.setup->feet;
     const BodiesWork *from = &work->ground;
     env_shells_copy(from->wrench, 6 * feet, all->contact.velocity + robot * 6 * feet);
     EACH_LANE(l) {
@@ -251,7 +247,7 @@ TEAM_FN void env_shells_results(const EnvsArrays *all, long robot, const EnvShel
 /* The step of a robot with bodies near the ground. heap: of bodies_step. */
 TEAM_FN void env_shells_step(const EnvsArrays *all, long robot, EnvShellsWork *work, int heap) {
     const int near = all->shells.near[robot];
-    const int feet = env_bodies(all)->feet;
+    const int feet = all->shells.setup->feet;
     BodiesWork *ground = &work->ground;
     env_shells_list(all, robot, near, work);
     env_shells_feet(all, robot, ground);
@@ -260,7 +256,7 @@ TEAM_FN void env_shells_step(const EnvsArrays *all, long robot, EnvShellsWork *w
                                        ground->inverse_inertia};
     engine_shells_begin(all->model, &env_robot_at(all, robot)->saved,
                         &env_shells_at(all, robot)->links, &work->engine, &bodies);
-    bodies_step(env_bodies(all), ground, 1, heap);
+    bodies_step(all->shells.setup, ground, 1, heap);
     env_shells_results(all, robot, work);
 }
 

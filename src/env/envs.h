@@ -78,7 +78,7 @@ void envs_times(Envs *envs, double *physics, double *ground);
 
 /* Everything that persists, as one block without pointers, so that saving and loading are copies;
  * NULL for the batch engine. */
-void *envs_state(Envs *envs, size_t *bytes);
+char *envs_state(Envs *envs, size_t *bytes);
 /* What lasts beyond an episode, [count] on the CPU, and back, before envs_reset. Waits for the
  * device. */
 MildStatus envs_save_progress(Envs *envs, TaskProgress *progress, MildError *error);
@@ -112,11 +112,6 @@ void envs_read_sample(const TaskEnv *env, const RobotSim *sim, const double *tor
 /* One environment of MuJoCo; NULL for the batch engine. */
 TaskEnv *envs_env(Envs *envs, int i);
 
-/* ---- tests ---- */
-
-/* FNV-1a of everything that moves: robots, histories, commands, reward sums, ground memory; 0 for
- * the batch engine. */
-uint64_t envs_hash(const Envs *envs);
 /* Bool: on a GPU this build has no kernels of the robot's own size, and those for any robot,
  * several times slower, step it. */
 int envs_are_slow(const Robot *robot);

@@ -332,7 +332,7 @@ static EnvsMemory memory(const Envs *envs) {
 
 /* ---- state ---- */
 
-static void *state(Envs *envs, size_t *bytes) {
+static char *state(Envs *envs, size_t *bytes) {
     Mujoco *m = own(envs);
     *bytes = (size_t)m->base.count * m->stride;
     return m->state;
@@ -356,34 +356,6 @@ static MildStatus load_progress(Envs *envs, const TaskProgress *progress, MildEr
     return MILD_OK;
 }
 
-static uint64_t hash_bytes(uint64_t hash, const void *data, size_t size) {
-    const unsigned char *bytes = data;
-    for (size_t i = 0; i < size; i++) {
-        hash = (hash ^ bytes[i]) * 0x100000001b3u;
-    }
-    return hash;
-}
-
-/* Hashes member by member, because padding and entries beyond the robot's joints are not part of
- * the state. */
-static uint64_t hash(const Envs *envs) {
-    const Mujoco *m = own_const(envs);
-    uint64_t sum = 0xcbf29ce484222325u;
-    for (int i = 0; i < m->base.count; i++) {
-        TaskEnv *env = env_at(m, i);
-        size_t joints = (size_t)m->shape.joints, speeds = (6 + joints) * sizeof(double);
-        sum = hash_bytes(sum, env->robot.qpos, (7 + joints) * sizeof(double));
-        sum = hash_bytes(sum, env->robot.qvel, speeds);
-        sum = hash_bytes(sum, task_env_rest(env)->qacc, speeds);
-        sum = hash_bytes(sum, task_env_history(env), (size_t)m->shape.history * sizeof(float));
-        sum = hash_bytes(sum, env->command, sizeof env->command);
-        sum = hash_bytes(sum, &env->reward_sum, sizeof env->reward_sum);
-        sum = hash_bytes(sum, task_env_ground(env), mild_ground_size(task_env_ground(env)));
-        sum = hash_bytes(sum, task_env_motors(env), m->def.motors ? m->def.motors->bytes : 0);
-    }
-    return sum;
-}
-
 static const EnvsBackend backend = {.destroy = destroy,
                                     .reset = reset,
                                     .step = step,
@@ -396,7 +368,6 @@ static const EnvsBackend backend = {.destroy = destroy,
                                     .set_samples = set_samples,
                                     .times = times,
                                     .state = state,
-                                    .hash = hash,
                                     .env = env_of};
 
 Envs *envs_create_mujoco(const EnvsDef *def, MildError *error) {

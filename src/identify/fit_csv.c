@@ -338,7 +338,7 @@ static MildStatus csv_unloading(const Record *record, FitFile *file, MildError *
     return MILD_OK;
 }
 
-MildStatus fit_csv_read_file(FILE *stream, const char *name, FitFile *file, MildError *error) {
+static MildStatus read_file(FILE *stream, const char *name, FitFile *file, MildError *error) {
     Record record = {.time = -INFINITY};
     *file = (FitFile){.points = NULL};
     MildStatus status = csv_begin(&record.text, stream, name, error);
@@ -371,7 +371,7 @@ MildStatus fit_csv_read(const char *path, FitFile *file, MildError *error) {
                          cause.status == MILD_ERROR_IO ? "; `mild press --csv FILE` writes a record"
                                                        : "");
     }
-    MildStatus status = fit_csv_read_file(stream, path, file, error);
+    MildStatus status = read_file(stream, path, file, error);
     fclose(stream);
     return status;
 }

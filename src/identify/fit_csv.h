@@ -34,8 +34,6 @@ typedef struct {
  * fit_file_ring. The message names file, line, column and remedy. Close the file, also after an
  * error. */
 MildStatus fit_csv_read(const char *path, FitFile *file, MildError *error);
-/* The same from an open file, which stays open; `name` is used for it in messages. */
-MildStatus fit_csv_read_file(FILE *stream, const char *name, FitFile *file, MildError *error);
 void fit_file_close(FitFile *file);
 
 /* Torques and loads of a ring of these radii [m] become stresses. */

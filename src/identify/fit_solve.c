@@ -350,8 +350,8 @@ static double profile(Fit *fit, double value) {
         sum += change * change * miss * miss;
         weight += change * change;
     }
-    const double told = fit->rows - fit->coordinates;
-    const double each = fit->rows < fit->count ? fit->count / fmax(told, 1) : 1;
+    const double freedom = fit->rows - fit->coordinates;
+    const double each = fit->rows < fit->count ? fit->count / fmax(freedom, 1) : 1;
     return excess / (each * sum / weight + floor_variance(fit) + DBL_MIN);
 }
 

@@ -181,10 +181,10 @@ static void fill_actor_input(const Network *network, int rows, const float *hist
     const float *noise = outputs->noise;
     float *input = outputs->actor_input;
     for (int r = 0; r < rows; r++) {
-        const float *told = instead && instead->estimates ? instead->estimates : heads;
+        const float *estimated = instead && instead->estimates ? instead->estimates : heads;
         memcpy(input, history + network->history - observation,
                (size_t)observation * sizeof *input);
-        memcpy(input + observation, told, (size_t)estimates * sizeof *input);
+        memcpy(input + observation, estimated, (size_t)estimates * sizeof *input);
         modulate(network, heads + estimates, noise, theta, instead,
                  input + observation + estimates);
         noise = noise ? noise + network->def.latent : NULL;

@@ -106,13 +106,10 @@ int robot_shell_shapes(const Robot *robot, int limb, MildShape shapes[ROBOT_SHEL
 void robot_take_rasters(Robot *robot);
 
 /* ---- parts of robot_create, in the order of their calls; each needs the ones before it ---- */
-MildStatus robot_read_bodies(Robot *robot, MildError *error);
-MildStatus robot_read_joints(Robot *robot, MildError *error);
-MildStatus robot_read_limbs(Robot *robot, MildError *error);
+/* What robot.ini and the compiled models say: bodies, joints, limbs, shells, legs, soles. */
+MildStatus robot_read_models(Robot *robot, MildError *error);
 MildStatus robot_read_shells(Robot *robot, MildError *error);
 MildStatus robot_read_legs(Robot *robot, MildError *error);
-MildStatus robot_read_soles(Robot *robot, MildError *error);
 MildStatus robot_read_surfaces(Robot *robot, MildError *error);
-MildStatus robot_read_stand(Robot *robot, MildError *error);
 
 #endif

@@ -39,7 +39,7 @@ int robot_geom_body(const Robot *robot, int geom, MildError *error) {
     return body;
 }
 
-MildStatus robot_read_bodies(Robot *robot, MildError *error) {
+static MildStatus read_bodies(Robot *robot, MildError *error) {
     const mjModel *m = robot->model;
     const RobotDef *def = &robot->def;
     robot->floor_geom = mj_name2id(m, mjOBJ_GEOM, "floor");
@@ -102,7 +102,7 @@ static MildStatus read_joint(Robot *robot, int i, MildError *error) {
 
 /* The step requires that the base's six degrees of freedom come first and that all others are
  * hinges with one coordinate each. */
-MildStatus robot_read_joints(Robot *robot, MildError *error) {
+static MildStatus read_joints(Robot *robot, MildError *error) {
     const mjModel *m = robot->model;
     int joints = robot->def.joints;
     if (m->njnt < 1 || m->jnt_type[0] != mjJNT_FREE || m->jnt_bodyid[0] != robot->base_body) {
@@ -167,7 +167,7 @@ void robot_read_limb(Robot *robot, int b) {
     }
 }
 
-MildStatus robot_read_limbs(Robot *robot, MildError *error) {
+static MildStatus read_limbs(Robot *robot, MildError *error) {
     const RobotDef *def = &robot->def;
     for (int f = 0; f < def->feet; f++) {
         RobotLimb *limb = &robot->limb[f];
@@ -220,7 +220,7 @@ static void outline_center(const RobotFootDef *foot, double center[3]) {
     center[2] = foot->z;
 }
 
-MildStatus robot_read_soles(Robot *robot, MildError *error) {
+static MildStatus read_soles(Robot *robot, MildError *error) {
     for (int f = 0; f < robot->def.feet; f++) {
         RobotFootDef *foot = &robot->def.foot[f];
         RobotLimb *limb = &robot->limb[f];
@@ -303,7 +303,7 @@ static MildStatus measure_stand(Robot *robot, const mjData *data, MildError *err
     return MILD_OK;
 }
 
-MildStatus robot_read_stand(Robot *robot, MildError *error) {
+static MildStatus read_stand(Robot *robot, MildError *error) {
     const mjModel *m = robot->model;
     mjData *data = mj_makeData(m);
     if (!data) {
@@ -334,6 +334,23 @@ static MildStatus check_models(Robot *robot, MildError *error) {
     return status == MILD_OK ? robot_check_model(robot->model, robot->path, error) : status;
 }
 
+typedef MildStatus (*Reader)(Robot *robot, MildError *error);
+
+/* The readers one after the other, until one fails. readers: ends with NULL. */
+static MildStatus read_all(const Reader *readers, Robot *robot, MildError *error) {
+    MildStatus status = MILD_OK;
+    for (; status == MILD_OK && *readers; readers++) {
+        status = (*readers)(robot, error);
+    }
+    return status;
+}
+
+MildStatus robot_read_models(Robot *robot, MildError *error) {
+    static const Reader parts[] = {read_bodies,     read_joints, read_limbs, robot_read_shells,
+                                   robot_read_legs, read_soles,  NULL};
+    return read_all(parts, robot, error);
+}
+
 static MildStatus read_robot(Robot *robot, const char *folder, MildError *error) {
     MildStatus status = robot_def_read(folder, &robot->def, error);
     if (status != MILD_OK) {
@@ -343,14 +360,9 @@ static MildStatus read_robot(Robot *robot, const char *folder, MildError *error)
         (int)sizeof robot->path) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", folder);
     }
-    static MildStatus (*const parts[])(Robot *, MildError *) = {
-        robot_load_models,   check_models,      robot_read_bodies, robot_read_joints,
-        robot_read_limbs,    robot_read_shells, robot_read_legs,   robot_read_soles,
-        robot_read_surfaces, robot_read_stand};
-    for (size_t i = 0; status == MILD_OK && i < sizeof parts / sizeof *parts; i++) {
-        status = parts[i](robot, error);
-    }
-    return status;
+    static const Reader parts[] = {robot_load_models,   check_models, robot_read_models,
+                                   robot_read_surfaces, read_stand,   NULL};
+    return read_all(parts, robot, error);
 }
 
 /* Once the rest is known. */
@@ -575,7 +587,7 @@ MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMate
     return mild_model_match(model, mild, robot->rasters[0], robot_foot_load(robot), rival, error);
 }
 
-const void *robot_visual_model(const Robot *robot) {
+const mjModel *robot_visual_model(const Robot *robot) {
     return robot->visual;
 }
 

@@ -11,6 +11,8 @@
 
 typedef struct Robot Robot;
 typedef struct RobotSim RobotSim;
+struct mjModel_; /* MuJoCo's mjModel and mjData, for who includes mujoco.h */
+struct mjData_;
 
 RobotVariation robot_variation_nominal(void);
 
@@ -86,9 +88,9 @@ void robot_set_shells(Robot *robot, int stand);
 /* mild_model_match for this robot: the first foot's raster under robot_foot_load. */
 MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *mild,
                              MildMaterial *rival, MildError *error);
-/* const mjModel * of the whole file with its shapes, cameras and lights, for pictures. The sims'
- * own model has only what a step needs. */
-const void *robot_visual_model(const Robot *robot);
+/* The whole file with its shapes, cameras and lights, for pictures. The sims' own model has only
+ * what a step needs. */
+const struct mjModel_ *robot_visual_model(const Robot *robot);
 /* Converts the qpos of a state to the engine's order, for the mjData of either model. */
 void robot_engine_qpos(const Robot *robot, const double *qpos, double *engine);
 /* The same of its qvel or qacc. */
@@ -149,9 +151,8 @@ const MildScratch *robot_sim_scratch(const RobotSim *sim);
 const MildContactResult *robot_sim_contact(const RobotSim *sim);
 /* Input of the last step on soft ground. */
 const MildContactInput *robot_sim_contact_input(const RobotSim *sim);
-/* The engine's objects of this workspace, for tests (mjModel *, mjData *); pictures use
- * robot_visual_model. */
-void *robot_sim_model(RobotSim *sim);
-void *robot_sim_data(RobotSim *sim);
+/* The engine's objects of this workspace; pictures use robot_visual_model. */
+struct mjModel_ *robot_sim_model(RobotSim *sim);
+struct mjData_ *robot_sim_data(RobotSim *sim);
 
 #endif

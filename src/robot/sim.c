@@ -232,15 +232,15 @@ static void smooth_dynamics(RobotSim *sim, const double *torque, const double *p
     }
 }
 
-/* The factor of M, and qacc_smooth = M^-1 f. */
-static void accelerate(RobotSim *sim) {
+/* The factor of M, or of N with limits that are held, and qacc_smooth = M^-1 f. */
+static void smooth_acceleration(RobotSim *sim) {
     mj_factorM(sim->model, sim->data);
     mj_solveM(sim->model, sim->data, sim->data->qacc_smooth, sim->data->qfrc_smooth, 1);
 }
 
 /* Fixes the pose of the feet before the step, because forces refer to the pose in which they were
  * computed. */
-static void update_feet(RobotSim *sim) {
+static void feet_pose(RobotSim *sim) {
     MildContactInput *input = &sim->input;
     for (int f = 0; f < sim->robot->def.feet; f++) {
         memcpy(input->position[f], sim->feet[f].position, sizeof input->position[f]);
@@ -289,7 +289,7 @@ static void choose_rows(RobotSim *sim, const MildTerrain *terrain) {
 }
 
 /* Inverse inertia and free motion of the rows: A = J M^-1 J^T and V_free = J (qvel + dt a). */
-static void free_feet(RobotSim *sim) {
+static void project_feet(RobotSim *sim) {
     foot_map_inverse_inertia(sim);
     for (int i = 0; i < sim->rows; i++) {
         const int b = sim->row[i];
@@ -298,7 +298,8 @@ static void free_feet(RobotSim *sim) {
     }
 }
 
-static void add_ground_wrench(RobotSim *sim) {
+/* qacc_smooth with the wrenches of soft ground, and without the limits that were held. */
+static void accelerate(RobotSim *sim, int held) {
     mjData *d = sim->data;
     double wrench[ROBOT_BODIES_MAX][6], force[ROBOT_NV_MAX], acceleration[ROBOT_NV_MAX];
     for (int i = 0; i < sim->rows; i++) {
@@ -306,10 +307,14 @@ static void add_ground_wrench(RobotSim *sim) {
         memcpy(wrench[i], body->force, 3 * sizeof(double));
         memcpy(wrench[i] + 3, body->torque, 3 * sizeof(double));
     }
+    limits_release(sim, held);
     foot_map_wrench(sim, wrench, force, acceleration);
     for (int i = 0; i < sim->robot->nv; i++) {
         d->qfrc_smooth[i] += force[i];
         d->qacc_smooth[i] += acceleration[i];
+    }
+    if (held) {
+        smooth_acceleration(sim);
     }
 }
 
@@ -377,10 +382,10 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
     int rigid = sim->variation.rigid, bad = 0;
 
     smooth_dynamics(sim, torque, push);
-    update_feet(sim);
+    feet_pose(sim);
     sim->data->ncon = 0;
     if (rigid) {
-        accelerate(sim);
+        smooth_acceleration(sim);
         legs_push(sim, 0);
         t = split(sim, &phases->smooth, t);
         rigid_collide(sim, terrain);
@@ -389,19 +394,15 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
         rigid_contact_result(sim);
     } else {
         const int rows = limits_make(sim), held = limits_hold(sim);
-        accelerate(sim);
+        smooth_acceleration(sim);
         legs_push(sim, held);
         t = split(sim, &phases->smooth, t);
         choose_rows(sim, terrain);
-        free_feet(sim);
+        project_feet(sim);
         t = split(sim, &phases->map, t);
         bad = stand(sim, terrain, ground);
         t = split(sim, &phases->ground, t);
-        limits_release(sim, held);
-        add_ground_wrench(sim);
-        if (held) {
-            accelerate(sim);
-        }
+        accelerate(sim, held);
         constrain(sim, rows);
     }
     bad = bad || integrate(sim);
@@ -530,10 +531,10 @@ const MildContactInput *robot_sim_contact_input(const RobotSim *sim) {
     return &sim->input;
 }
 
-void *robot_sim_model(RobotSim *sim) {
+mjModel *robot_sim_model(RobotSim *sim) {
     return sim->model;
 }
 
-void *robot_sim_data(RobotSim *sim) {
+mjData *robot_sim_data(RobotSim *sim) {
     return sim->data;
 }

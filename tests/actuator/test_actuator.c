@@ -7,6 +7,7 @@
 #include "base/file.h"
 #include "env/actuator/actuator.h"
 #include "env/actuator/motor.h"
+#include "learn/mlp.h"
 #include "learn/safetensors.h"
 #include "robots.h"
 
@@ -28,14 +29,86 @@ static int setup(void **state) {
     return kit_setup(state);
 }
 
-static Actuator *make(double spacing) {
+static void new_path(char *path) {
+    strcpy(path, "/tmp/mild_actuator_XXXXXX");
+    const int made = mkstemp(path);
+    assert_true(made >= 0);
+    close(made);
+}
+
+/* Writes the file of these weights as docs/actuator.md says. spacing: [s]. */
+static void write_file(const char *path, const char *spacing) {
+    static const int in[3] = {INPUTS, WIDTH, WIDTH}, out[3] = {WIDTH, WIDTH, 1};
+    static const int64_t kind[SA01_JOINTS] = {0, 0, 1, 1, 2, 2, 0, 0, 1, 1, 2, 2};
+    char name[KINDS][3][2][40], joints[512] = "";
+    double scale[KINDS][3];
+    Safetensor tensor[6 * KINDS + 2];
     MildError error = {0};
-    Actuator *actuator = actuator_create(robot, spacing, &error);
-    assert_non_null(actuator);
+    int count = 0;
     for (int k = 0; k < KINDS; k++) {
-        actuator_set(actuator, k, scales[k], weights[k]);
+        const float *at = weights[k];
+        for (int l = 0; l < 3; l++) {
+            snprintf(name[k][l][0], sizeof name[k][l][0], "motors.%d.%d.weight", k, 2 * l);
+            tensor[count++] =
+                (Safetensor){name[k][l][0], SAFETENSORS_F32, 2, {out[l], in[l]}, at, 0};
+            at += out[l] * in[l];
+            snprintf(name[k][l][1], sizeof name[k][l][1], "motors.%d.%d.bias", k, 2 * l);
+            tensor[count++] = (Safetensor){name[k][l][1], SAFETENSORS_F32, 1, {out[l]}, at, 0};
+            at += out[l];
+        }
+        scale[k][0] = scales[k].error, scale[k][1] = scales[k].speed,
+        scale[k][2] = scales[k].torque;
     }
-    return actuator;
+    tensor[count++] = (Safetensor){"scale", SAFETENSORS_F64, 2, {KINDS, 3}, scale, 0};
+    tensor[count++] = (Safetensor){"kind", SAFETENSORS_I64, 1, {SA01_JOINTS}, kind, 0};
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        strcat(strcat(joints, i ? " " : ""), robot_joint_name(robot, i));
+    }
+    const SafetensorsText texts[] = {{"kind", "mild actuator"},
+                                     {"version", "1"},
+                                     {"robot", "sa01"},
+                                     {"joints", joints},
+                                     {"spacing", spacing}};
+    assert_int_equal(safetensors_write(path, tensor, count, texts, 5, &error), MILD_OK);
+}
+
+/* A task with the actuator of a file. */
+typedef struct {
+    TaskDef task;
+    Actuator *actuator;
+    void *memory; /* of an environment */
+} Opened;
+
+static Opened open_file(const char *path) {
+    MildError error = {0};
+    Opened o = {.task = task_def_default()};
+    snprintf(o.task.actuator, sizeof o.task.actuator, "%s", path);
+    assert_int_equal(actuator_open(&o.task, robot, &o.actuator, &error), MILD_OK);
+    assert_true(o.actuator && o.task.motors && o.task.motors->bytes % 64 == 0);
+    o.memory = aligned_alloc(64, o.task.motors->bytes + 64);
+    assert_non_null(o.memory);
+    memset(o.memory, 0, o.task.motors->bytes);
+    memset((char *)o.memory + o.task.motors->bytes, 77, 64);
+    return o;
+}
+
+static Opened open_weights(const char *spacing) {
+    char path[40];
+    new_path(path);
+    write_file(path, spacing);
+    const Opened o = open_file(path);
+    unlink(path);
+    return o;
+}
+
+static void close_actuator(Opened *o) {
+    free(o->memory);
+    actuator_destroy(o->actuator);
+}
+
+/* The torques of all joints after a physics step with these errors and speeds. */
+static void step(Opened *o, const double *error, const double *speed, double *torque) {
+    o->task.motors->torque(o->task.motors->self, o->memory, error, speed, torque);
 }
 
 /* Hip roll and yaw, hip pitch and knee, both ankles; of the quadruped, thighs and calves. */
@@ -87,28 +160,34 @@ static double wanted_torque(int joint, const double *error, const double *speed)
     return scales[k].torque * formula(weights[k], x);
 }
 
+/* With a spacing of one physics step; of steps that are equal, the network sees one three times. */
 TEST(torque_is_the_network) {
-    Actuator *actuator = make(0.01);
     Random r = random_at(6, 0, 0);
-    assert_int_equal(actuator_parameters(), NUMBERS);
-    for (int i = 0; i < 100; i++) {
-        double error[3], speed[3];
-        for (int t = 0; t < 3; t++) {
-            error[t] = random_uniform(&r, -0.5, 0.5);
-            speed[t] = random_uniform(&r, -8, 8);
+    for (int i = 0; i < 20; i++) {
+        Opened o = open_weights("0.0025");
+        double error[3][SA01_JOINTS], speed[3][SA01_JOINTS], torque[SA01_JOINTS];
+        for (int t = 2; t >= 0; t--) { /* the newest step is the last one */
+            for (int j = 0; j < SA01_JOINTS; j++) {
+                error[t][j] = random_uniform(&r, -0.5, 0.5);
+                speed[t][j] = random_uniform(&r, -8, 8);
+            }
+            step(&o, error[t], speed[t], torque);
         }
-        const int joint = i % SA01_JOINTS;
-        expect_near("torque", actuator_torque(actuator, joint, error, speed),
-                    wanted_torque(joint, error, speed), 2e-4);
+        for (int j = 0; j < SA01_JOINTS; j++) {
+            const double e[3] = {error[0][j], error[1][j], error[2][j]};
+            const double v[3] = {speed[0][j], speed[1][j], speed[2][j]};
+            expect_near("torque", torque[j], wanted_torque(j, e, v), 2e-4);
+        }
+        close_actuator(&o);
     }
-    actuator_destroy(actuator);
 }
 
 /* The learner's own forward pass gives the formula, and its gradient the differences of the
  * formula. */
 TEST(gradient_of_softsign) {
     enum { ROWS = 3 };
-    const Mlp mlp = actuator_mlp();
+    static const int hidden[POLICY_LAYERS_MAX] = {WIDTH, WIDTH};
+    Mlp mlp;
     float x[ROWS][INPUTS], y[3][ROWS * WIDTH], slope[ROWS], work[2][ROWS * WIDTH];
     float gradient[NUMBERS];
     double at[ROWS][INPUTS], worst = 0;
@@ -116,6 +195,8 @@ TEST(gradient_of_softsign) {
     const MlpOutputs outputs = {{y[0], y[1], y[2]}};
     const MlpInputGradient none = {NULL, 0, 0};
     float *const areas[2] = {work[0], work[1]};
+    assert_int_equal(mlp_layout(&mlp, INPUTS, hidden, 1, 0), NUMBERS);
+    mlp.activation = MLP_SOFTSIGN;
     for (int b = 0; b < ROWS; b++) {
         slope[b] = (float)(b + 1) / 2;
         for (int i = 0; i < INPUTS; i++) {
@@ -148,23 +229,15 @@ TEST(gradient_of_softsign) {
  * is taken to be as in it. */
 TEST(history_in_the_task) {
     enum { STEPS = 40, LAG = 4 };
-    MildError error = {0};
-    TaskDef task = task_def_default();
-    Actuator *actuator = make(0.01);
+    Opened o = open_weights("0.01");
     double errors[STEPS][SA01_JOINTS], speeds[STEPS][SA01_JOINTS], torque[SA01_JOINTS];
     Random r = random_at(8, 0, 0);
-    assert_int_equal(actuator_use(actuator, &task, &error), MILD_OK);
-    assert_int_equal(task.motors->bytes % 64, 0);
-    void *memory = aligned_alloc(64, task.motors->bytes + 64);
-    assert_non_null(memory);
-    memset(memory, 0, task.motors->bytes);
-    memset((char *)memory + task.motors->bytes, 77, 64);
     for (int k = 0; k < STEPS; k++) {
         for (int i = 0; i < SA01_JOINTS; i++) {
             errors[k][i] = random_uniform(&r, -0.5, 0.5);
             speeds[k][i] = random_uniform(&r, -8, 8);
         }
-        task.motors->torque(task.motors->self, memory, errors[k], speeds[k], torque);
+        step(&o, errors[k], speeds[k], torque);
         for (int i = 0; i < SA01_JOINTS; i++) {
             double e[3], v[3];
             for (int t = 0; t < 3; t++) {
@@ -176,41 +249,48 @@ TEST(history_in_the_task) {
         }
     }
     for (int i = 0; i < 64; i++) {
-        assert_int_equal(((char *)memory)[task.motors->bytes + (size_t)i], 77);
+        assert_int_equal(((char *)o.memory)[o.task.motors->bytes + (size_t)i], 77);
     }
-    free(memory);
+    close_actuator(&o);
+}
+
+static void check_bad(const TaskDef *task, const Robot *of, MildStatus status, const char *names) {
+    MildError error = {0};
+    TaskDef copy = *task;
+    Actuator *actuator;
+    assert_refused(actuator_open(&copy, of, &actuator, &error), status, &error, names);
     actuator_destroy(actuator);
 }
 
 static void check_bad_motors(const TaskDef *task, MildStatus status, const char *names) {
-    MildError error = {0};
-    TaskDef copy = *task;
-    Actuator *actuator;
-    assert_refused(actuator_open(&copy, robot, &actuator, &error), status, &error, names);
-    actuator_destroy(actuator);
+    check_bad(task, robot, status, names);
 }
 
 TEST(file_and_task) {
-    char path[] = "/tmp/mild_actuator_XXXXXX";
-    const int made = mkstemp(path);
-    assert_true(made >= 0);
-    close(made);
+    char path[40];
+    new_path(path);
     MildError error = {0};
     TaskDef task = task_def_default();
-    Actuator *actuator = make(0.01), *read;
+    Actuator *read;
     assert_int_equal(actuator_open(&task, robot, &read, &error), MILD_OK); /* no file: the PD */
     assert_null(read);
     assert_null(task.motors);
-    assert_int_equal(actuator_save(actuator, path, "a note", &error), MILD_OK);
-    snprintf(task.actuator, sizeof task.actuator, "%s", path);
-    TaskDef opened = task;
-    assert_int_equal(actuator_open(&opened, robot, &read, &error), MILD_OK);
-    assert_non_null(opened.motors);
-    for (int i = 0; i < SA01_JOINTS; i++) {
-        const double e[3] = {0.1, -0.2, 0.05 * i}, v[3] = {1, -3, 2};
-        assert_true(actuator_torque(read, i, e, v) == actuator_torque(actuator, i, e, v));
+    Opened o = open_weights("0.01");
+    assert_int_equal(actuator_save(o.actuator, path, "a note", &error), MILD_OK);
+    Opened again = open_file(path);
+    for (int k = 0; k < 9; k++) {
+        double e[SA01_JOINTS], v[SA01_JOINTS], torque[SA01_JOINTS], same[SA01_JOINTS];
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            e[i] = 0.05 * i - 0.1 * k;
+            v[i] = 2 * sin(k + i);
+        }
+        step(&o, e, v, torque);
+        step(&again, e, v, same);
+        assert_memory_equal(torque, same, sizeof torque);
     }
-    actuator_destroy(read);
+    close_actuator(&o);
+    close_actuator(&again);
+    snprintf(task.actuator, sizeof task.actuator, "%s", path);
     /* what does not fit */
     TaskDef wrong = task;
     wrong.physics_dt = 0.004;
@@ -224,8 +304,7 @@ TEST(file_and_task) {
     strcpy(wrong.actuator, "/tmp/there/is/none");
     check_bad_motors(&wrong, MILD_ERROR_IO, "task.actuator /tmp/there/is/none");
     Robot *go1 = kit_robot(GO1);
-    assert_null(actuator_load(path, go1, &error));
-    assert_error(&error, MILD_ERROR_ARGUMENT, "sa01 go1");
+    check_bad(&task, go1, MILD_ERROR_ARGUMENT, "sa01 go1");
     robot_destroy(go1);
     size_t size;
     char *bytes = file_read(path, 1 << 20, &size, &error);
@@ -237,7 +316,6 @@ TEST(file_and_task) {
     check_bad_motors(&task, MILD_ERROR_FORMAT, path);
     free(bytes);
     unlink(path);
-    actuator_destroy(actuator);
 }
 
 /* Numbers of the hip pitch: kp 70, kd 7, effort 140 N m, 25 rad/s. */

@@ -13,7 +13,7 @@ failures = 0
 def near(what, is_, wanted, within):
     global failures
     if not abs(is_ - wanted) <= within:
-        print(f"{what}: {is_}, but {wanted} +- {within} is told elsewhere")
+        print(f"{what}: {is_}, but {wanted} +- {within} is printed elsewhere")
         failures += 1
 
 
@@ -92,14 +92,14 @@ near("velocity_sideways of the track", r["velocity_sideways"], mean(rate(own, "b
 near("base_oscillation", r["base_oscillation"], mean(max(own) - min(own) for own in height), 2e-3)
 
 # of two trials the first is known by itself; so the deviation is known: |x0 - mean| times the root of 2
-# (by itself its network works on one row instead of two, whose sums are rounded otherwise; the torques of both are told)
+# (by itself its network works on one row instead of two, whose sums are rounded otherwise; the torques of both are printed)
 first = {"velocity": one["velocity"], "cot": one["cot"], "torque_max": r["each"][0]["torque_max"]}
 for name, key in (("velocity_deviation", "velocity"), ("cot_deviation", "cot"), ("torque_deviation", "torque_max")):
     near(name, r[name], math.sqrt(2) * abs(first[key] - r[key]), 1e-5 * r[name])
     if one[name] is not None:
         near(f"{name} of one trial", 1, 0, 0)
 
-told, asked = cells(turn_table)[-2:]
-near("velocity_turn", row(turning)["velocity_turn"], told, 5e-4)
+turned, asked = cells(turn_table)[-2:]
+near("velocity_turn", row(turning)["velocity_turn"], turned, 5e-4)
 near("turn", row(turning)["turn"], asked, 0.005)
 sys.exit(failures > 0)

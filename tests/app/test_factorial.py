@@ -59,9 +59,9 @@ def made(folder, *words, kind=MadeUp):
 
 
 def quietly(work):
-    with redirect_stdout(io.StringIO()) as told, redirect_stderr(io.StringIO()) as wrong:
+    with redirect_stdout(io.StringIO()) as printed, redirect_stderr(io.StringIO()) as wrong:
         found = work()
-    return found, told.getvalue(), wrong.getvalue()
+    return found, printed.getvalue(), wrong.getvalue()
 
 
 def measures():
@@ -92,13 +92,13 @@ def all_of_it():
         words = ("--devices", "cuda:0,cuda:1", "--jobs", "2", "--seeds", "3")
         search = made(folder, *words)
         search.pause = 0.01
-        done, told, wrong = quietly(search.run)
+        done, printed, wrong = quietly(search.run)
         assert done and not wrong and len(search.calls) == 5 * 4 + 5 * 3 * 3
         assert all(task["kind"] == "tune" for task in search.calls[:17])
         assert set(search.most) <= {"cuda:0", "cuda:1"} and max(search.most.values()) <= 2, search.most
         assert search.choices() == BEST
         assert all(task["choice"] == BEST[task["controller"]] for task in search.calls if task["kind"] == "train")
-        assert told.count("3.0 M steps in 2 s") == 65 and told.count("; score 0.150") == 2 and told.count("; score 0.950") == 3
+        assert printed.count("3.0 M steps in 2 s") == 65 and printed.count("; score 0.150") == 2 and printed.count("; score 0.950") == 3
         left = {path.name for path in (pathlib.Path(folder) / "policies").iterdir()}  # of the search none
         assert left == {search.policy_of(task).name for task in search.calls if task["kind"] == "train"} and len(left) == 45
         lines = [json.loads(text) for text in search.file.read_text().splitlines()]
@@ -116,11 +116,11 @@ def all_of_it():
         lines = [json.loads(text) for text in third.file.read_text().splitlines() if text != torn]
         assert [x["done"] for x in lines].count("judged") == 65
 
-        _, told, _ = quietly(lambda: factorial.report(third))
-        assert "| ours | mild | 3 | 3.0 | 2 | 0.700 (0.700 to 0.700) |" in told, told
+        _, printed, _ = quietly(lambda: factorial.report(third))
+        assert "| ours | mild | 3 | 3.0 | 2 | 0.700 (0.700 to 0.700) |" in printed, printed
         whole = 3 * 3 * sum((v - 0.3) ** 2 for v in NETS.values())
         share = whole / (whole + 5 * 3 * 2 * 0.01)
-        assert f"nine grounds: of the variance of the skill the net makes {share:.0%}" in told and "the seed 0%" in told, told
+        assert f"nine grounds: of the variance of the skill the net makes {share:.0%}" in printed and "the seed 0%" in printed, printed
         result = json.loads((pathlib.Path(folder) / "factorial.json").read_text())
         assert result["chosen"] == BEST and len(result["search"]) == 20 and len(result["rows"]) == 15
         assert abs(result["table2"][-1]["velocity"][3] - 0.7 * 1.2) < 1e-12  # ours, mild
@@ -139,8 +139,8 @@ def all_of_it():
         kept = [x for x in lines if x["task"] not in lost[:2] or (x["task"] == lost[1] and x["done"] == "trained")]
         third.file.write_text("".join(json.dumps(x) + "\n" for x in kept))
         fifth = made(folder, *words, "--judge")
-        done, told, _ = quietly(fifth.run)
-        assert not done and not fifth.calls and told.count("M steps") == 1 and fifth.known("judged", lost[1]) and not fifth.known("judged", lost[0])
+        done, printed, _ = quietly(fifth.run)
+        assert not done and not fifth.calls and printed.count("M steps") == 1 and fifth.known("judged", lost[1]) and not fifth.known("judged", lost[0])
 
 
 def what_stops():
@@ -225,4 +225,4 @@ shipped()
 all_of_it()
 in_pieces()
 what_stops()
-print("65 trainings, restarted, stopped and told")
+print("65 trainings, restarted, stopped and printed")

@@ -30,7 +30,7 @@ def true(what, holds):
     near(what, int(bool(holds)), 1, 0)
 
 
-def told(*arguments, code=0):
+def printed_by(*arguments, code=0):
     """Standard output, or with another code the error."""
     done = subprocess.run([mild, *map(str, arguments)], capture_output=True, text=True, check=False)
     true(f"exit code {code} of mild {' '.join(map(str, arguments))}: {done.stderr[-300:]}", done.returncode == code)
@@ -39,7 +39,7 @@ def told(*arguments, code=0):
 
 def pressed(*arguments):
     """Rows of the CSV, the same by column, and what is printed beside the file."""
-    printed = told("press", *arguments, "--csv", "press.csv")
+    printed = printed_by("press", *arguments, "--csv", "press.csv")
     with open("press.csv", newline="", encoding="utf-8") as file:
         rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
     return rows, {k: [row[k] for row in rows] for k in rows[0]}, printed
@@ -84,15 +84,15 @@ def press_straight():
     near("work returned", outward, -integral(c["depth_m"][turn:], c["force_n"][turn:]), 1e-2 * outward + 6e-4)
     near("imprint", imprint, next(1e3 * r["depth_m"] for r in rows[turn:] if r["force_n"] == 0), 0.1)
     true("work comes back in part", 0.02 * inward < outward < inward / 2)
-    for depth, down, up in table(told("press", *options)):
+    for depth, down, up in table(printed_by("press", *options)):
         near("table, down", down, min(rows[:turn + 1], key=lambda r: abs(r["depth_m"] - 1e-3 * depth))["force_n"], 0.5)
         near("table, up", up, min(rows[turn:], key=lambda r: abs(r["depth_m"] - 1e-3 * depth))["force_n"], 0.01 * (up + 50))
 
 
 def press_turns():
     """The table of turns: where it turned, with which force."""
-    lines = table(told("press", "--ground", "grass", "--depth", "0.01,0.008,0.02"))
-    forces = [told("press", "--ground", "grass", "--depth", d) for d in (0.01, 0.02)]
+    lines = table(printed_by("press", "--ground", "grass", "--depth", "0.01,0.008,0.02"))
+    forces = [printed_by("press", "--ground", "grass", "--depth", d) for d in (0.01, 0.02)]
     peaks = [found(r"peak ([\d.]+) N", text)[0] for text in forces]
     near("pairs of turns", len(lines), 2, 0)
     for line, (number, down, up, peak) in zip(lines, ((1, 10, 8, peaks[0]), (2, 20, 0, peaks[1]))):
@@ -135,7 +135,7 @@ def press_dragged():
     way, speed = found(r"dragged ([\d.]+) mm at ([\d.]+) m/s", printed)
     near("way of the drag", way, 50, 0)
     near("its speed", speed, 0.1, 0)
-    for moved, forward, up in table(told("press", "--ground", "grass", "--depth", 0.01, "--drag", 0.05, "--drag-speed", 0.1,
+    for moved, forward, up in table(printed_by("press", "--ground", "grass", "--depth", 0.01, "--drag", 0.05, "--drag-speed", 0.1,
                                          "--tilt", 4).split("moved")[1]):
         row = min(moving, key=lambda r: abs(r["x_m"] - 1e-3 * moved))
         if 1 < moved < 49:
@@ -168,7 +168,7 @@ def press_dropped():
             ("first stop", depth, 1e3 * c["depth_m"][stop], 0.02), ("its time", after, 1e3 * c["time_s"][stop], 0.25),
             ("speed at the end", speed, 0, 1e-3)):
         near(what, value, wanted, within)
-    for time, deep, force, tilt in table(told("press", *options)):
+    for time, deep, force, tilt in table(printed_by("press", *options)):
         row = min(rows, key=lambda r: abs(r["time_s"] - 1e-3 * time))
         near("table of the drop, depth", deep, 1e3 * row["depth_m"], 0.1)
         near("table of the drop, force", force, row["force_n"], 0.02 * peak)
@@ -188,7 +188,7 @@ def press():
 
 def sinks(force, *options):
     """[mm] where a slow press on the paper's sole turns at a force."""
-    printed = told("press", "--plate", PAPER, "--speed", SLOW, "--force", force, *options)
+    printed = printed_by("press", "--plate", PAPER, "--speed", SLOW, "--force", force, *options)
     return found(r"m\^2, to ([\d.]+) mm", printed)[0]
 
 
@@ -236,14 +236,14 @@ def info_ranges(text):
     ranges = re.findall(r"^  (\w+) +(\S+) \.\. (\S+) ", text, re.M)
     true("ranges", len(ranges) > 18)
     for name, low, high in ranges:
-        error = told("press", "--ground", "sand_loose", f"--ground.{name}=1e300", code=2)
+        error = printed_by("press", "--ground", "sand_loose", f"--ground.{name}=1e300", code=2)
         told_low, told_high = found(r"outside (\S+) \.\. ([^\s:]+)", error)
         true(f"{name}: {low} .. {high} in: {error}", told_low == float(low) and told_high == float(high))
 
 
 def info_robots():
     """Joints and feet of robot.ini, the sum of the MJCF's masses, the height at which it stands."""
-    text = told("info", "robots")
+    text = printed_by("info", "robots")
     robots = re.findall(r"^(\w+): (\d+) joints, (\d+) feet, ([\d.]+) kg, base ([\d.]+) m high\n((?:  .*\n)+)", text, re.M)
     true("robots", len(robots) >= 3)
     for name, joints, feet, mass, height, more in robots:
@@ -252,13 +252,13 @@ def info_robots():
         near(f"{name}: feet", len(words["feet"].split()), int(feet), 0)
         with open(words["model"].strip(), encoding="utf-8") as file:
             near(f"{name}: mass", float(mass), sum(float(m) for m in re.findall(r'<inertial[^>]*?mass="([\d.e+-]+)"', file.read())), 0.051)
-        told("eval", "--robot", name, "--controller", "stand", "--ground", "rigid", "--trials", 1, "--seconds", 0.5, "--track", "track.csv")
+        printed_by("eval", "--robot", name, "--controller", "stand", "--ground", "rigid", "--trials", 1, "--seconds", 0.5, "--track", "track.csv")
         with open("track.csv", newline="", encoding="utf-8") as file:
             near(f"{name}: height", float(height), float(list(csv.DictReader(file))[-1]["base_z_m"]), 0.02)
 
 
 def info():
-    whole = told("info", "grounds")
+    whole = printed_by("info", "grounds")
     mild_part, rest = whole.split("grounds of bekker (--ground NAME)")
     mild_part = mild_part.split("(--ground NAME)\n")[1]
     bekker_part = rest.split("ground models")[0]
@@ -267,10 +267,10 @@ def info():
     info_matched(rest.split("Parameters of the other models")[1], columns(mild_part, ["two", "feet"]), mild_part.split("\n")[1].split())
     info_ranges(rest.split("\nparameters\n")[1])
     info_robots()
-    size, unit = re.search(r"memory +([\d.]+) (\w+)", told("info", "devices")).groups()
+    size, unit = re.search(r"memory +([\d.]+) (\w+)", printed_by("info", "devices")).groups()
     near("memory of this machine", float(size), os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") /
          {"MiB": 2**20, "GiB": 2**30, "TiB": 2**40}[unit], 0.006)
-    true("the version", told("--version").split()[1] == re.search(r"^mild +(\S+)", told("info", "build"), re.M).group(1))
+    true("the version", printed_by("--version").split()[1] == re.search(r"^mild +(\S+)", printed_by("info", "build"), re.M).group(1))
 
 
 # ---- mild bench ----
@@ -301,7 +301,7 @@ def memory():
 
 def benches():
     """The table of mild bench and its file: the same rows in the same order, each with its number and its unit."""
-    lines = told("bench", "memory", "robots", "update", "--train.envs=4", "--train.threads=1", "--ppo.steps=4", "--json", "bench.json").splitlines()
+    lines = printed_by("bench", "memory", "robots", "update", "--train.envs=4", "--train.threads=1", "--ppo.steps=4", "--json", "bench.json").splitlines()
     with open("bench.json", encoding="utf-8") as file:
         report = json.load(file)
     true("machine and version", lines[0] == f"{report['machine']}, mild {report['version']}")
@@ -323,11 +323,11 @@ def benches():
 
 def play():
     """The table's row is what eval measures of the same walk, within what another start and another length change."""
-    header, row = told("play", "--ground", "sand_loose", "--speed", 0.5, "--seconds", 9, "--pressure", "play.csv").splitlines()[:2]
+    header, row = printed_by("play", "--ground", "sand_loose", "--speed", 0.5, "--seconds", 9, "--pressure", "play.csv").splitlines()[:2]
     true("columns", header.split() == ["ground", "distance", "time", "speed", "upright", "clearance", "sinkage", "COT"])
     way, time, speed, clearance, sinkage, cot = found(
         r"sand_loose +([\d.-]+) m +([\d.]+) s +([\d.-]+) m/s +yes +([\d.]+) mm +([\d.]+) mm +([\d.]+)", row)
-    told("eval", "--ground", "sand_loose", "--speed", 0.5, "--seconds", 9, "--trials", 2, "--json", "eval.json")
+    printed_by("eval", "--ground", "sand_loose", "--speed", 0.5, "--seconds", 9, "--trials", 2, "--json", "eval.json")
     with open("eval.json", encoding="utf-8") as file:
         measured = json.load(file)["rows"][0]
     near("time after the start", time, 8, 0.06)

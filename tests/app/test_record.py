@@ -67,8 +67,8 @@ def run(*words, code=0, **variables):
 
 
 def one_line(pattern, *words, **variables):
-    told = run(*words, code=2, **variables)
-    assert pattern in told and told.count("\n") == 1, told
+    printed = run(*words, code=2, **variables)
+    assert pattern in printed and printed.count("\n") == 1, printed
 
 
 def read(out):
@@ -81,8 +81,8 @@ def changed(out, change, pattern):
     shutil.rmtree(copy, ignore_errors=True)
     shutil.copytree(out, copy)
     change(copy)
-    told = run("check", copy, code=1)
-    assert pattern in told, (pattern, told)
+    printed = run("check", copy, code=1)
+    assert pattern in printed, (pattern, printed)
 
 
 def edit(**parts):
@@ -96,9 +96,9 @@ def edit(**parts):
 
 
 def fits(out):
-    told = subprocess.run([sys.executable, root / "tests/app/schema.py", root / "docs/schema/record.json", out / "record.json"],
+    printed = subprocess.run([sys.executable, root / "tests/app/schema.py", root / "docs/schema/record.json", out / "record.json"],
                           capture_output=True, text=True, check=False)
-    assert told.returncode == 0 and not told.stdout, told.stdout
+    assert printed.returncode == 0 and not printed.stdout, printed.stdout
 
 
 made, peers = program(work, "mild", MILD), program(work, "python", PYTHON)
@@ -186,9 +186,9 @@ run("add", fast, "--file", lines)
 one_line("has this record", "add", fast, "--file", lines)
 assert "slow" not in run("history", "--file", lines)
 run("add", slow, "--file", lines)
-told = run("history", "--file", lines, code=1)  # 8 us in the place of 6
-assert "step/newton" in told and "+33.3 % **slow**" in told and "walk/sand_loose_newton" in told, told
-assert "+100.0 % **slow**" in told and told.count("**slow**") == 3, told  # half the rate, and the ratio of the step
+printed = run("history", "--file", lines, code=1)  # 8 us in the place of 6
+assert "step/newton" in printed and "+33.3 % **slow**" in printed and "walk/sand_loose_newton" in printed, printed
+assert "+100.0 % **slow**" in printed and printed.count("**slow**") == 3, printed  # half the rate, and the ratio of the step
 assert "**slow**" not in run("history", "--file", lines, "--slow", 1.1)
 assert len(lines.read_text().splitlines()) == 2 and json.loads(lines.read_text().splitlines()[0])["values"]["step/newton"] == 6
 dirty = work / "dirty"

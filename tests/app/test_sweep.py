@@ -103,7 +103,7 @@ assert run("list", "factorial", "--seeds", 2).split() == [f"factorial.{name}-2" 
 
 # ---- by GNU parallel, on GPUs 2 and 5: each once ----
 out = work / "runs"
-told = run("run", out, "models", "deviations", "--seeds", 1, "--gpus", "2,5")
+printed = run("run", out, "models", "deviations", "--seeds", 1, "--gpus", "2,5")
 tasks = run("list", "models", "deviations", "--seeds", 1).split()
 lines = made()
 trained = [line for line in lines if line.startswith("train")]
@@ -111,7 +111,7 @@ assert len(trained) == len(tasks) == lines.count("eval"), (len(trained), len(tas
 assert {line.split()[1] for line in trained} == {"2", "5"}
 assert sum("--randomize.model=bekker" in line for line in trained) == 0 and sum("--randomize.model=rigid" in line for line in trained) == 1
 rows = rows_of(out)
-assert set(rows) == {(*task.split(".")[:1], *task.split(".")[1].rsplit("-", 1)) for task in tasks} and "0 tasks left" in told
+assert set(rows) == {(*task.split(".")[:1], *task.split(".")[1].rsplit("-", 1)) for task in tasks} and "0 tasks left" in printed
 assert rows["models", "mild", "1"] == {"experiment": "models", "name": "mild", "seed": "1", "policy_steps": "2000", "reward": "19.5", "upright": "12",
                                        "trials": "20", "speed_error": "0.1", "cost_of_transport": "0.4", "clearance_mm": "100", "torque_max": "51"}
 fell = rows["deviations", "clip_sum", "1"]
@@ -132,8 +132,8 @@ assert len(lines) == 14 and all("--train.seed=2" in line for line in lines if li
 assert rows_of(out)["models", "mild", "2"]["upright"] == "14"
 
 # ---- a training that fails is named, the others go on, and the next start makes it ----
-told = run("run", out, "models", "--seeds", 3, code=1, BROKEN="--randomize.model=ecc_quasi")
-assert "models.ecc_quasi-3: no memory" in told and (out / "models/rigid-3.json").exists() and not (out / "models/ecc_quasi-3.json").exists(), told
+printed = run("run", out, "models", "--seeds", 3, code=1, BROKEN="--randomize.model=ecc_quasi")
+assert "models.ecc_quasi-3: no memory" in printed and (out / "models/rigid-3.json").exists() and not (out / "models/ecc_quasi-3.json").exists(), printed
 made()
 run("run", out, "models", "--seeds", 3)
 assert len(made()) == 2
@@ -176,7 +176,7 @@ assert rows_of(out)["factorial", "ours on mild", "3"]["upright"] == "90"
 # ---- mistakes ----
 for pattern, words in (("nosuch", ("run", out, "nosuch")), ("models.nosuch-1", ("task", out, "models.nosuch-1")),
                        ("has no results", ("table", work / "none"))):
-    told = run(*words, code=2)
-    assert pattern in told and told.count("\n") == 1, told
+    printed = run(*words, code=2)
+    assert pattern in printed and printed.count("\n") == 1, printed
 shutil.rmtree(work)
 print("a sweep of trainings: all as expected")

@@ -60,9 +60,9 @@ def one_pair():
         words = ["--out", folder, "--pairs", "rubber>grass", "--speeds=-1.2,1.2", "--trials", "1", "--jobs", "1"]
         done = subprocess.run([sys.executable, "-B", COMMAND, *words], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
-        told = json.loads((pathlib.Path(folder) / "transitions.json").read_text())
-        assert [c["speed"] for c in told["cells"]] == [-1.2, 1.2] and told["totals"]["all"]["crossed"] == 2, told
-        assert all(abs(c["error"]) < 0.1 for c in told["cells"]), told
+        report = json.loads((pathlib.Path(folder) / "transitions.json").read_text())
+        assert [c["speed"] for c in report["cells"]] == [-1.2, 1.2] and report["totals"]["all"]["crossed"] == 2, report
+        assert all(abs(c["error"]) < 0.1 for c in report["cells"]), report
         assert "crossed 2" in done.stdout and "rubber>grass" in done.stdout
         stopped = subprocess.run([sys.executable, "-B", COMMAND, *words, "--", "--task.torque_share=0.1"], capture_output=True, text=True)
         assert "upright 0 of 2" in stopped.stdout and "ended by" in stopped.stdout, stopped  # what comes after -- reaches eval

@@ -82,6 +82,20 @@ static inline void oracle_hold(RobotSim *sim, const EngineCase *in, Oracle *o) {
     }
 }
 
+/* [m] World point that the twist of a foot refers to: where a flat foot's body is, or the lowest
+ * point of a ball. */
+static inline void oracle_reference(const RobotSim *sim, int f, double point[3]) {
+    const RobotFootDef *foot = &sim->robot->def.foot[f];
+    const RobotLimb *limb = &sim->robot->limb[f];
+    mju_copy3(point, sim->data->xpos + 3 * limb->body);
+    if (limb->round) {
+        double center[3];
+        mju_mulMatVec3(center, sim->data->xmat + 9 * limb->body, foot->center);
+        mju_addTo3(point, center);
+        point[2] -= foot->radius;
+    }
+}
+
 /* N = M with dt damping on the diagonal and the held limits, N^-1, and J of the feet. */
 static inline void oracle_matrices(RobotSim *sim, Oracle *o) {
     const mjModel *m = sim->model;
@@ -105,7 +119,7 @@ static inline void oracle_matrices(RobotSim *sim, Oracle *o) {
         static const double level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
         double turn[3 * ROBOT_NV_MAX];
         double move[3 * ROBOT_NV_MAX];
-        foot_map_reference(sim, f, o->position[f]);
+        oracle_reference(sim, f, o->position[f]);
         memcpy(o->rotation[f], limb->round ? level : d->xmat + 9 * limb->body, sizeof level);
         mj_jac(m, d, move, turn, o->position[f], limb->body);
         for (int k = 0; k < 3; k++) {
@@ -279,7 +293,7 @@ static inline void oracle_finish(RobotSim *sim, Oracle *o) {
     mj_integratePos(m, d->qpos, d->qvel, sim->dt);
     mj_kinematics(m, d);
     for (int f = 0; f < sim->robot->def.feet; f++) {
-        foot_map_reference(sim, f, o->next_position[f]);
+        oracle_reference(sim, f, o->next_position[f]);
     }
     memcpy(o->qpos, d->qpos, 7 * sizeof(double));
     memcpy(o->qvel, d->qvel, 6 * sizeof(double));

@@ -1,7 +1,9 @@
 /* Any bytes as the file of an actuator network, with the checksum put right so that the fuzzer gets
  * past it. Refused with a message, or a network that gives torques. */
-#include "env/actuator/file.h"
+#include "env/actuator/actuator.h"
 #include "fuzz.h"
+#include "learn/safetensors.h"
+#include "unnamed_file.h"
 
 static Robot *robot;
 
@@ -15,14 +17,20 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     fuzz_check(bytes != NULL);
     memcpy(bytes, data, size);
     safetensors_seal(bytes, size);
-    Safetensors *file = safetensors_parse(bytes, size, "fuzz", &error);
-    Actuator *actuator = file ? actuator_file_read(file, "fuzz", robot, &error) : NULL;
-    fuzz_check(actuator || (error.status != MILD_OK && error.text[0]));
-    for (int i = 0; actuator && i < robot_joints(robot); i++) {
-        const double error_of[3] = {0.1, -0.2, 0.3}, speed[3] = {1, 2, -3};
-        (void)actuator_torque(actuator, i, error_of, speed);
+    TaskDef task = task_def_default();
+    strcpy(task.actuator, unnamed_file(bytes, size));
+    free(bytes);
+    Actuator *actuator;
+    const MildStatus status = actuator_open(&task, robot, &actuator, &error);
+    fuzz_check(status == MILD_OK || (error.status == status && error.text[0]));
+    if (status == MILD_OK) {
+        double error_of[ROBOT_JOINTS_MAX] = {0.1, -0.2, 0.3}, speed[ROBOT_JOINTS_MAX] = {1, 2, -3};
+        double torque[ROBOT_JOINTS_MAX];
+        void *memory = calloc(1, task.motors->bytes);
+        fuzz_check(memory != NULL);
+        task.motors->torque(task.motors->self, memory, error_of, speed, torque);
+        free(memory);
     }
     actuator_destroy(actuator);
-    safetensors_destroy(file);
     return 0;
 }

@@ -1,11 +1,10 @@
 /* Any bytes as a record of a press, a slip or a ring. Refused with a message, or (a sample: a fit
  * takes a thousand times longer than a file) fitted to finite values inside their bounds. */
-#include <stdio.h>
-
 #include "fuzz.h"
 #include "identify/fit.h"
 #include "identify/fit_csv.h"
 #include "identify/fit_slide.h"
+#include "unnamed_file.h"
 
 static void check(const FitValue *value) {
     if (value->state == FIT_FITTED) {
@@ -59,12 +58,7 @@ static void slide(const FitFile *record, int model) {
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     FitFile record;
     MildError error = {0};
-    FILE *file = size ? fmemopen((void *)(uintptr_t)data, size, "r") : NULL;
-    if (!file) {
-        return 0;
-    }
-    MildStatus status = fit_csv_read_file(file, "record", &record, &error);
-    fclose(file);
+    const MildStatus status = fit_csv_read(unnamed_file(data, size), &record, &error);
     if (status == MILD_OK) {
         const int model = data[size - 1] % (2 * MILD_MODEL_RIGID);
         const int press = record.kind == FIT_FILE_PRESS;

@@ -3,6 +3,7 @@
 #include "fuzz.h"
 #include "run/train/history.h"
 #include "run/train/settings.h"
+#include "unnamed_file.h"
 
 enum { POINTS = 7 };
 
@@ -32,7 +33,7 @@ static void check_column(const History *history, int column) {
 static void read_history(const uint8_t *data, size_t size) {
     History history;
     MildError error = {0};
-    const MildStatus status = history_parse(text_of(data, size), size, "log.csv", &history, &error);
+    const MildStatus status = history_read(unnamed_file(data, size), &history, &error);
     if (status != MILD_OK) {
         fuzz_check(error.status == status && error.text[0] && !history.text);
         return;

@@ -79,11 +79,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     while (bytes.at < bytes.end) {
         edit(&bytes, edited, &robot->def);
     }
-    MildStatus status = robot_read_bodies(robot, &error);
-    status = status == MILD_OK ? robot_read_joints(robot, &error) : status;
-    status = status == MILD_OK ? robot_read_limbs(robot, &error) : status;
-    status = status == MILD_OK ? robot_read_shells(robot, &error) : status;
-    status = status == MILD_OK ? robot_read_soles(robot, &error) : status;
+    const MildStatus status = robot_read_models(robot, &error);
     fuzz_check(status == MILD_OK || (error.status != MILD_OK && error.text[0]));
     fuzz_check(status != MILD_OK || (robot->soles[0] && robot->soles[1]));
     robot->visual = robot->model = NULL;

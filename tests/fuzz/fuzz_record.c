@@ -1,9 +1,8 @@
 /* Any bytes as a log of joints. Refused with a message, or rows in order and finite, and a fit that
  * refuses so few of them or gives finite errors. */
-#include <stdio.h>
-
 #include "env/actuator/fit.h"
 #include "fuzz.h"
+#include "unnamed_file.h"
 
 static Robot *robot;
 static Pool *pool;
@@ -35,13 +34,8 @@ static void check_rows(const Record *record) {
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     MildError error = {0};
     open_once();
-    FILE *csv = size ? fmemopen((void *)(uintptr_t)data, size, "r") : NULL;
-    if (!csv) {
-        return 0;
-    }
     Record record = {.robot = robot};
-    MildStatus status = record_read_file(&record, csv, "log", &error);
-    fclose(csv);
+    const MildStatus status = record_read(&record, unnamed_file(data, size), &error);
     if (status == MILD_OK) {
         ActuatorScore score[ROBOT_JOINTS_MAX];
         const ActuatorFitDef def = {.spacing = 0.01, .steps = 1, .seed = data[0]};

@@ -39,21 +39,21 @@ def stand(folder, seconds, box, settle, *more):
 
 
 def a_robot_stands(folder):
-    row, told, load = stand(folder, "0.8", "0.45,0.24,0.15", "0.3")
+    row, report, load = stand(folder, "0.8", "0.45,0.24,0.15", "0.3")
     late = [value for time, value in load.items() if time > 0.6]
     carried, weight = sum(late) / len(late), MASS * 9.81
-    print(f"{told['beds']} beds of {told['grains_of_tile']} grains, {told['seconds']:.0f} s; the feet carry {carried:.1f} N, weight "
-          f"{weight:.1f} N (3 %); poses apart by {1e3 * told['pose_off_m']:.3f} mm, {told['pose_off_rad']:.4f} rad")
-    assert row["success"] == 1 and told["lost_sole_s"] is None and told["pictures"] >= 8
+    print(f"{report['beds']} beds of {report['grains_of_tile']} grains, {report['seconds']:.0f} s; the feet carry {carried:.1f} N, weight "
+          f"{weight:.1f} N (3 %); poses apart by {1e3 * report['pose_off_m']:.3f} mm, {report['pose_off_rad']:.4f} rad")
+    assert row["success"] == 1 and report["lost_sole_s"] is None and report["pictures"] >= 8
     assert abs(carried / weight - 1) < 0.03
-    assert told["pose_off_m"] < 1e-4 and told["pose_off_rad"] < 2e-3  # the grains' soles are the robot's
+    assert report["pose_off_m"] < 1e-4 and report["pose_off_rad"] < 2e-3  # the grains' soles are the robot's
 
 
 def a_robot_without_ground_falls(folder):
-    row, told, load = stand(folder, "2", "0.45,0.24,0.05", "0.02", "--sole-z", "-0.3")  # below the floor
+    row, report, load = stand(folder, "2", "0.45,0.24,0.05", "0.02", "--sole-z", "-0.3")  # below the floor
     ends = {end for end, count in row["ends"].items() if count}
-    print(f"a sole is lost after {told['lost_sole_s']} s, and the robot falls: {ends} after {told['time_s']} s")
-    assert told["lost_sole_s"] == 0.001 and row["success"] == 0 and ends <= {"base", "tilt"} and told["time_s"] < 1
+    print(f"a sole is lost after {report['lost_sole_s']} s, and the robot falls: {ends} after {report['time_s']} s")
+    assert report["lost_sole_s"] == 0.001 and row["success"] == 0 and ends <= {"base", "tilt"} and report["time_s"] < 1
     assert load and not any(load.values())
 
 
@@ -107,8 +107,8 @@ def a_sole_may_turn_over(folder):
     assert one.end()["lost_sole_s"] is None
     one = Program(folder)
     answers = [one.ask(still(turn, 0.06 if turn == turned(0) else -0.06)) for turn in turns]
-    told = one.end()
-    assert told["lost_sole_s"] == 0.004 and told["robot_steps"] == 3, told
+    report = one.end()
+    assert report["lost_sole_s"] == 0.004 and report["robot_steps"] == 3, report
     assert all(value == 0 for answer in answers[3:] for value in answer) and all(map(math.isfinite, sum(answers, ())))
     one = Program(folder)
     one.ask(still([-1, 0, 0, 0, -1, 0, 0, 0, 1]))  # a robot that walks back is not upside down
@@ -119,13 +119,13 @@ def a_walk_that_is_killed_leaves_its_pictures(folder):
     one = Program(folder)
     for _ in range(105):
         one.ask(still(turned(0)))
-    told, frames = one.end(killed=True), (folder / "frames-0.bin").read_bytes()
+    report, frames = one.end(killed=True), (folder / "frames-0.bin").read_bytes()
     pictures, at = 0, 0
     while at < len(frames):  # of two beds; each moved grain has its number, and three ways
         for _ in range(2):
             at += 4 + struct.unpack_from("I", frames, at)[0] * 10
         pictures += 1
-    assert at == len(frames) and pictures == told["pictures"] == 2, (pictures, told)
+    assert at == len(frames) and pictures == report["pictures"] == 2, (pictures, report)
 
 
 def two_free_feet_go_where_the_grains_say(folder):
@@ -154,12 +154,12 @@ sole in a step, w^2 r dt."""
             y = [v / math.hypot(*y) for v in y]
             z = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
             turn[:] = [x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]]
-    told = one.end()
+    report = one.end()
     bound = 1.2 * fastest**2 * 0.055 * dt
-    print(f"moments up to {felt:.1f} N m; speeds apart by {told['speed_off_m_s']:.1e} m/s (bound {bound:.1e}), poses by {told['pose_off_m']:.1e} m, "
-          f"{told['pose_off_rad']:.1e} rad in a step")
-    assert felt > 1 and told["lost_sole_s"] is None and told["full_lists"] == 0  # no contact is left out
-    assert told["speed_off_m_s"] < bound
+    print(f"moments up to {felt:.1f} N m; speeds apart by {report['speed_off_m_s']:.1e} m/s (bound {bound:.1e}), poses by {report['pose_off_m']:.1e} m, "
+          f"{report['pose_off_rad']:.1e} rad in a step")
+    assert felt > 1 and report["lost_sole_s"] is None and report["full_lists"] == 0  # no contact is left out
+    assert report["speed_off_m_s"] < bound
 
 
 for test in (two_free_feet_go_where_the_grains_say, a_sole_may_turn_over, a_walk_that_is_killed_leaves_its_pictures, a_robot_without_ground_falls, a_robot_stands):

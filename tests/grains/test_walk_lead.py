@@ -22,10 +22,10 @@ NUMBERS = json.loads(walk.GROUNDS.read_text())["sand"]["mild_merged"]
 
 def forces(folder, numbers):
     """Force up of the walk and of the model, and forward of both, in each window."""
-    told = io.StringIO()
-    with contextlib.redirect_stdout(told):
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
         walk_lead.compare(folder, walk.feet_of("sa01"), numbers, "mild_merged")
-    rows = [line.split("ms", 1)[1].split() for line in told.getvalue().splitlines() if " ms " in line]
+    rows = [line.split("ms", 1)[1].split() for line in printed.getvalue().splitlines() if " ms " in line]
     return [[float(word) for word in row[:4]] for row in rows]
 
 
@@ -55,10 +55,10 @@ def tilts(folder, slope):
         rows += [(0, start + t, -0.2 * t, -0.15 * t, 0, tilt, 0, force * (0.02 + slope * np.tan(tilt / 2)), force, 0.05) for t, force in zip(time, up)]
         start += 1.0
     np.savetxt(folder / "grains" / "feet.csv", rows, delimiter=",", header=names, comments="", fmt="%.9g")
-    told = io.StringIO()
-    with contextlib.redirect_stdout(told):
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
         walk_lead.tilt_slopes(folder, -0.05)
-    return told.getvalue()
+    return printed.getvalue()
 
 
 with tempfile.TemporaryDirectory() as name:

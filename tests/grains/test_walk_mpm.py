@@ -140,8 +140,8 @@ def a_lost_sole_ends_the_ground():
     one = walk_mpm.Walk(Springs(soles), soles, 0.2)
     answers = [one.answer(question(0.001 * k, 0.001, [[0, 0, height]] * 2, [np.eye(3)] * 2, np.zeros((2, 6)), np.zeros((2, 6)), np.eye(12)))
                for k, height in enumerate((0.055, 0.05, -0.2, 0.05), 1)]
-    assert (answers[1][:, 2] > 1).all() and (answers[1][:, 6] > 0).all() and one.told["lost_sole_s"] == 0.003
-    assert not answers[2].any() and not answers[3].any() and one.told["steps"] == 2
+    assert (answers[1][:, 2] > 1).all() and (answers[1][:, 6] > 0).all() and one.outcome["lost_sole_s"] == 0.003
+    assert not answers[2].any() and not answers[3].any() and one.outcome["steps"] == 2
 
 
 def the_robot_stands_on_springs(mild, folder):
@@ -158,11 +158,11 @@ def the_robot_stands_on_springs(mild, folder):
     late = [float(row[force]) for row in rows[1:] if float(row[time]) > 0.7]
     info = subprocess.run([mild, "info", "robots"], capture_output=True, text=True).stdout
     weight = 9.81 * float(re.search(r"sa01: .* ([\d.]+) kg", info).group(1))
-    told = json.loads((folder / "walk-0.json").read_text())
-    print(f"on springs the feet carry {2 * np.mean(late):.1f} N, weight {weight:.1f} N; speeds apart by {told['speed_off_m_s']:.4f} m/s")
+    outcome = json.loads((folder / "walk-0.json").read_text())
+    print(f"on springs the feet carry {2 * np.mean(late):.1f} N, weight {weight:.1f} N; speeds apart by {outcome['speed_off_m_s']:.4f} m/s")
     assert json.loads((folder / "eval.json").read_text())["rows"][0]["success"] == 1
-    assert abs(2 * np.mean(late) / weight - 1) < 0.03 and told["steps"] == 1000 and told["lost_sole_s"] is None
-    assert told["speed_off_m_s"] < 0.01
+    assert abs(2 * np.mean(late) / weight - 1) < 0.03 and outcome["steps"] == 1000 and outcome["lost_sole_s"] is None
+    assert outcome["speed_off_m_s"] < 0.01
 
 
 # ---- with newton ----

@@ -41,15 +41,15 @@ with tempfile.TemporaryDirectory() as name:
                    "horizontal_max_n": "5.0", "depth_max_m": "0.0800", "center_x_m": "0.0500", "center_x_first_m": "0.0500",
                    "center_x_last_m": "0.0500", "ankle_way_m": "0.0490", "pitch_min_rad": "0.000", "pitch_max_rad": "0.100"}, row
 
-    told = {"time_s": 7.0, "lost_sole_s": 1.8, "seconds": 190.0, "steps": 5, "late_lists": 3, "full_lists": 0, "surface_m": [0.2], "trial": 0}
-    (grains / "walk-0.json").write_text(json.dumps(told))  # was killed: no eval.json
+    report = {"time_s": 7.0, "lost_sole_s": 1.8, "seconds": 190.0, "steps": 5, "late_lists": 3, "full_lists": 0, "surface_m": [0.2], "trial": 0}
+    (grains / "walk-0.json").write_text(json.dumps(report))  # was killed: no eval.json
     (model / "eval.json").write_text(json.dumps({"rows": [ROW]}))
     walk_pictures.write_walks(out, ["sand"], ["0.6"], out / "walks.json")
     walks = json.loads((out / "walks.json").read_text())
-    told.pop("trial")
+    report.pop("trial")
     kept = {key: value for key, value in ROW.items() if key != "clearance"}
     where = {"family": "sand", "speed_m_s": 0.6}
-    assert walks == [{**where, "ground": "grains", "grains": told}, {**where, "ground": "mild", **kept}], walks
+    assert walks == [{**where, "ground": "grains", "grains": report}, {**where, "ground": "mild", **kept}], walks
 
     # what a walk was made by, from a program that stands in for mild
     stub = out / "mild"
@@ -70,10 +70,10 @@ with tempfile.TemporaryDirectory() as name:
 # the walks of the repository, which were made before: the manifest names each
 manifest = json.loads((SOURCE / "grains" / "walk" / "manifest.json").read_text())
 for file in sorted((SOURCE / "grains" / "walk").glob("walks-*.json")):
-    told = manifest[file.name]
-    where = {(row["family"], row["speed_m_s"], row["ground"]) for row in told["walks"]}
+    report = manifest[file.name]
+    where = {(row["family"], row["speed_m_s"], row["ground"]) for row in report["walks"]}
     walks = [row for row in json.loads(file.read_text()) if "made" not in row]
     assert {(row["family"], row["speed_m_s"], row["ground"]) for row in walks} <= where, file
-    assert all(row["command"] or "command" in row["not_recorded"] for row in told["walks"])
-    assert len(told["policy_sha256"]) == 64  # of a file that may be another one by now
+    assert all(row["command"] or "command" in row["not_recorded"] for row in report["walks"])
+    assert len(report["policy_sha256"]) == 64  # of a file that may be another one by now
 print("one stance, two walks")

@@ -86,17 +86,26 @@ static FitResult press_and_fit(const Case *c, Noise noise, int draw) {
     return result;
 }
 
+/* Combinations by their names. */
 static double truth_of(const Case *c, const FitValue *value) {
-    static const char *const carriers[] = {"nu", "sigma_cone", "c_g", "k_phi"};
-    MildMaterial material = c->material;
-    material.plate_width = 0.1; /* of the plate of press_and_fit */
+    const MildMaterial *m = &c->material;
+    const double width = 0.1; /* [m] of the plate of press_and_fit */
+    const struct {
+        const char *name;
+        double truth;
+    } combinations[] = {
+        {"tan(alpha)/nu", tan(m->alpha) / m->nu},
+        {"sigma_cone/cos(alpha)", m->sigma_cone / cos(m->alpha)},
+        {"c_g c_d phi rho nu", m->c_g * m->c_d * m->phi * m->rho * m->nu},
+        {"k_c/plate_width + k_phi", m->k_c / width + m->k_phi},
+    };
     if (value->field) {
+        MildMaterial material = *m;
         return *fit_number(&material, value->field);
     }
-    for (int i = 0; i < 4; i++) {
-        const FitCombination *combination = fit_combination(carriers[i]);
-        if (strcmp(combination->name, value->name) == 0) {
-            return combination->get(&material);
+    for (size_t i = 0; i < sizeof combinations / sizeof *combinations; i++) {
+        if (strcmp(combinations[i].name, value->name) == 0) {
+            return combinations[i].truth;
         }
     }
     return NAN;

@@ -5,6 +5,7 @@
 #include "identify/fit.h"
 #include "identify/fit_csv.h"
 #include "kit.h"
+#include "unnamed_file.h"
 
 enum { ROWS = 200, DRAWS = 100 };
 #define C 1720.0
@@ -234,9 +235,7 @@ TEST(recovery_at_its_ends) {
 static FitFile read_text(const char *text) {
     FitFile file;
     MildError error = {0};
-    FILE *stream = fmemopen((void *)(uintptr_t)text, strlen(text), "r");
-    expect_good(fit_csv_read_file(stream, "record", &file, &error) == MILD_OK, &error);
-    fclose(stream);
+    expect_good(fit_csv_read(unnamed_file(text, strlen(text)), &file, &error) == MILD_OK, &error);
     return file;
 }
 

@@ -108,10 +108,10 @@ def the_truth_is_found_and_others_are_not(folder):
             assert abs(value) < (0.5 if measure in ("pressure_center", "sinkage") else noise), (case, measure, value)
     assert abs(error["sand/square100-tilt15", "moment", "con_spring"] + 1) < 0.1, "one spring in the middle rights nothing: a moment of 0, an error of -1"
     assert error["sand/square100-again", "again", "hunt_crossley"] > 0.8, "a spring without memory gives all of the work again"
-    told = {row["case"] for row in rows if row["used_in_fit"] == "1"}
-    assert told == {"sand/disc120", "sand/square100", "sand/square100-drag15", "sand/square100-again"}, told
+    used = {row["case"] for row in rows if row["used_in_fit"] == "1"}
+    assert used == {"sand/disc120", "sand/square100", "sand/square100-drag15", "sand/square100-again"}, used
     share = re.search(r"^  mild .* of (\d+)$", run.stdout, re.M)
-    assert int(share[1]) == sum(row["model"] == "mild" and row["case"] not in told for row in rows), "what was told is scored"
+    assert int(share[1]) == sum(row["model"] == "mild" and row["case"] not in used for row in rows), "what was used is scored"
     forces = [{row["model"]: float(row["value"]) for row in rows if row["case"] == "sand/disc100" and row["measure"] == "force"}]
     assert abs(forces[0]["twice"] / forces[0]["half"] - 2) < 1e-4
     same = {key: value for key, value in error.items() if key[2] == "same"}

@@ -7,7 +7,8 @@
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"
-#include "robot/sim.h"
+#include "given.h"
+#include "robot/description.h"
 #include "robots.h"
 
 enum { JOINTS = 7, NQ = 14, NV = 13, FEET = 2, FLAT = 0, ROUND = 1, ROWS = 12 };
@@ -355,55 +356,49 @@ TEST(test_feet) {
     robot_sim_destroy(sim);
 }
 
-/* j: J of both feet, solved: its rows times M^-1. */
-static void check_wrench(const RobotSim *sim, const mjData *d, const double *j,
+/* What wrenches of the ground do, after a step without. j: J of both feet, solved: its rows times
+ * M^-1. */
+static void check_wrench(RobotSim *sim, const RobotState *state, const double *j,
                          const double *solved) {
-    double wrench[ROBOT_FEET_MAX][6], force[ROBOT_NV_MAX], change[ROBOT_NV_MAX];
-    double column[ROWS], by_force[NV], by_change[NV];
-    for (int r = 0; r < ROWS; r++) {
-        column[r] = wrench[r / 6][r % 6] = sin(1.0 + r);
-    }
-    foot_map_wrench(sim, wrench, force, change);
-    mju_mulMatTVec(by_force, j, column, ROWS, NV);
-    mju_mulMatTVec(by_change, solved, column, ROWS, NV);
-    for (int i = 0; i < NV; i++) {
-        expect_entry("force", i, force[i], by_force[i], 1e-11);
-        expect_entry("acceleration", i, change[i], by_change[i], 1e-9 * (1 + fabs(by_change[i])));
-    }
-    double twist[6], sum[ROWS], rate[NV];
-    for (int i = 0; i < NV; i++) {
-        rate[i] = d->qvel[i] + 0.001 * change[i];
-    }
+    Given given = {.feet = 0};
+    const mjData *d = robot_sim_data(sim);
+    double by_force[NV], by_change[NV], force[NV], rate[NV], sum[ROWS];
+    assert_int_equal(given_step(&given, sim, state), 0);
+    memcpy(force, d->qfrc_smooth, sizeof force);
+    memcpy(rate, d->qvel, sizeof rate);
     mju_mulMatVec(sum, j, rate, ROWS, NV);
-    for (int f = 0; f < FEET; f++) {
-        foot_map_twist(sim, f, d->qvel, change, twist);
-        for (int k = 0; k < 6; k++) {
-            expect_entry("twist to come", k, twist[k], sum[6 * f + k], 1e-11);
-        }
+    for (int r = 0; r < ROWS; r++) {
+        expect_entry("twist to come", r, given.free_velocity[r], sum[r], 1e-11);
+    }
+    given_some(&given, FEET);
+    assert_int_equal(given_step(&given, sim, state), 0);
+    mju_mulMatTVec(by_force, j, given.wrench[0], ROWS, NV);
+    mju_mulMatTVec(by_change, solved, given.wrench[0], ROWS, NV);
+    for (int i = 0; i < NV; i++) {
+        expect_entry("force", i, d->qfrc_smooth[i] - force[i], by_force[i], 1e-11);
+        expect_entry("acceleration", i, (d->qvel[i] - rate[i]) / 0.001, by_change[i],
+                     1e-9 * (1 + fabs(by_change[i])));
     }
 }
 
 TEST(test_map) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
-    RobotVariation nominal = robot_variation_nominal();
     const mjModel *m = robot_sim_model(sim);
+    Given given = {.feet = 0};
     for (uint32_t draw = 0; draw < 20; draw++) {
         RobotState state = draw_state(draw, 1);
-        robot_sim_load(sim, &state, &nominal);
         mjData *d = engine_at(m, &state);
-        mj_makeM(m, robot_sim_data(sim));
-        mj_factorM(m, robot_sim_data(sim));
-        foot_map_inverse_inertia(sim);
+        assert_int_equal(given_step(&given, sim, &state), 0);
         double j[ROWS * NV], solved[ROWS * NV], wanted[ROWS * ROWS];
         dense_jacobian(m, d, j);
         mj_solveM(m, d, solved, j, ROWS);
         mju_mulMatMatT(wanted, j, solved, ROWS, NV, ROWS);
         for (int i = 0; i < ROWS * ROWS; i++) {
-            expect_entry("inverse inertia", i, sim->input.inverse_inertia[i], wanted[i],
+            expect_entry("inverse inertia", i, given.inverse_inertia[i], wanted[i],
                          1e-10 * (1 + fabs(wanted[i])));
         }
-        check_wrench(sim, d, j, solved);
+        check_wrench(sim, &state, j, solved);
         mj_deleteData(d);
     }
     robot_sim_destroy(sim);

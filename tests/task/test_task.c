@@ -36,7 +36,7 @@ static uint64_t rollout(int threads, int envs, int steps, MildModel model, EnvsS
         random_actions(action, envs, t, 0.6);
         envs_step(all, &step, NULL, &error);
     }
-    uint64_t hash = envs_hash(all);
+    uint64_t hash = kit_hash(all, envs);
     for (size_t i = 0; i < (size_t)envs * SA01_HISTORY; i++) {
         assert_true(isfinite(history[i]));
     }

@@ -12,6 +12,7 @@
 #include "mild/map.h"
 #include "run/train/trainer.h"
 #include "sa01.h"
+#include "unnamed_file.h"
 
 #define MODEL SA01
 #define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
@@ -177,8 +178,7 @@ static int attempt_actuator(MildError *error) {
         record_print_row(SA01_JOINTS, 0.01 * row, zero, zero, zero, csv);
     }
     fclose(csv);
-    FILE *file = fmemopen(text, size, "r");
-    assert_non_null(file);
+    const char *log = unnamed_file(text, size);
     Record record = {.robot = walker};
     const ActuatorFitDef def = {.spacing = 0.01, .steps = 1};
     ActuatorScore score[SA01_JOINTS];
@@ -186,14 +186,13 @@ static int attempt_actuator(MildError *error) {
     Actuator *actuator = NULL;
     if (!pool) {
         mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
-    } else if (record_read_file(&record, file, "log", error) == MILD_OK) {
+    } else if (record_read(&record, log, error) == MILD_OK) {
         actuator = actuator_fit(&def, &record, pool, score, error);
     }
     int made = actuator != NULL;
     actuator_destroy(actuator);
     pool_destroy(pool);
     record_free(&record);
-    fclose(file);
     free(text);
     return made;
 }
@@ -203,11 +202,8 @@ static int attempt_record(MildError *error) {
     for (int i = 0; i < 40; i++) {
         snprintf(text + strlen(text), 30, "%g,%g\n", 1e-3 * i, 5.0 * i);
     }
-    FILE *file = fmemopen(text, strlen(text), "r");
-    assert_non_null(file);
     FitFile record;
-    const int made = fit_csv_read_file(file, "record", &record, error) == MILD_OK;
-    fclose(file);
+    const int made = fit_csv_read(unnamed_file(text, strlen(text)), &record, error) == MILD_OK;
     fit_file_close(&record);
     return made;
 }

@@ -7,9 +7,9 @@
 
 #include "base/paths.h"
 #include "files.h"
-#include "run/train/events.h"
 #include "run/train/history.h"
 #include "run/train/log.h"
+#include "run/train/settings.h"
 
 static char folder[64];
 
@@ -43,11 +43,92 @@ static size_t read_file(const char *path, char *data, size_t size) {
     return length;
 }
 
-TEST(test_crc32c) {
+static uint32_t little_endian(const unsigned char *bytes) {
+    return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 |
+           (uint32_t)bytes[3] << 24;
+}
+
+static uint32_t masked(uint32_t crc) {
+    return ((crc >> 15) | (crc << 17)) + 0xa282ead8u;
+}
+
+/* Castagnoli's CRC, bit by bit. */
+static uint32_t crc32c(const void *data, size_t size) {
+    const unsigned char *byte = data;
+    uint32_t crc = ~0u;
+    for (size_t bit = 0; bit < 8 * size; bit++) {
+        const uint32_t out = (crc ^ byte[bit / 8] >> bit % 8) & 1;
+        crc = crc >> 1 ^ (out ? 0x82f63b78u : 0);
+    }
+    return ~crc;
+}
+
+/* The path of the folder's event file. */
+static void find_events(char path[PATH_SIZE]) {
+    DIR *dir = opendir(folder);
+    path[0] = '\0';
+    for (struct dirent *entry; (entry = readdir(dir));) {
+        if (strncmp(entry->d_name, "events.", 7) == 0) {
+            path_join(folder, entry->d_name, path, NULL);
+        }
+    }
+    closedir(dir);
+}
+
+/* Checks the frame of every record of the folder's event file: length, CRC of the length, data, CRC
+ * of the data. Returns how many records there are; texts: how many of them and places in them hold
+ * `text`, or NULL. */
+static int check_frames(const char *text, int *texts) {
+    static char data[400000];
+    char path[PATH_SIZE];
+    int records = 0;
+    find_events(path);
+    const size_t length = read_file(path, data, sizeof data);
+    size_t at = 0;
+    for (; at < length; records++) {
+        const unsigned char *record = (const unsigned char *)data + at;
+        const uint32_t size = little_endian(record);
+        assert_int_equal(little_endian(record + 4), 0);
+        assert_int_equal(little_endian(record + 8), masked(crc32c(record, 8)));
+        assert_int_equal(little_endian(record + 12 + size), masked(crc32c(record + 12, size)));
+        for (uint32_t i = 12; text && i + strlen(text) <= 12 + size; i++) {
+            *texts += memcmp(record + i, text, strlen(text)) == 0;
+        }
+        at += 16 + size;
+    }
+    assert_int_equal(at, length);
+    return records;
+}
+
+/* The records of a log are framed by the CRC whose known values are these. */
+TEST_WITH(test_crc32c, make_folder, remove_folder) {
     static const unsigned char zeros[32] = {0};
-    assert_int_equal(events_crc32c("123456789", 9),
-                     0xe3069283u); /* the check value of the CRC catalogue */
-    assert_int_equal(events_crc32c(zeros, 32), 0x8a9136aau); /* RFC 3720, appendix B.4 */
+    static const char *const columns[] = {"rate"};
+    MildError error = {0};
+    assert_int_equal(crc32c("123456789", 9), 0xe3069283u); /* of the CRC catalogue */
+    assert_int_equal(crc32c(zeros, 32), 0x8a9136aau);      /* RFC 3720, appendix B.4 */
+    log_close(log_open(folder, columns, 1, -1, &error));
+    assert_int_equal(check_frames(NULL, NULL), 1); /* the version */
+}
+
+TEST_WITH(test_records, make_folder, remove_folder) {
+    enum { TAGS = 2000 };
+    static char names[TAGS][32];
+    static const char *tags[TAGS];
+    static double values[TAGS];
+    int scalars = 0;
+    MildError error = {0};
+    for (int i = 0; i < TAGS; i++) {
+        snprintf(names[i], sizeof names[i], "group/%d", i);
+        tags[i] = names[i];
+        values[i] = i;
+    }
+    Log *log = log_open(folder, tags, TAGS, -1, &error);
+    assert_non_null(log);
+    assert_int_equal(log_row(log, 1LL << 40, values, &error), MILD_OK);
+    log_close(log);
+    assert_true(check_frames("group/", &scalars) >= 3);
+    assert_int_equal(scalars, TAGS);
 }
 
 TEST_WITH(test_csv_resume, make_folder, remove_folder) {
@@ -73,50 +154,6 @@ TEST_WITH(test_csv_resume, make_folder, remove_folder) {
     static const char *const other[] = {"reward/gait", "speed"};
     assert_null(log_open(folder, other, 2, 2, &error));
     assert_error(&error, MILD_ERROR_FORMAT, path);
-}
-
-static uint32_t little_endian(const unsigned char *bytes) {
-    return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 |
-           (uint32_t)bytes[3] << 24;
-}
-
-static uint32_t masked(uint32_t crc) {
-    return ((crc >> 15) | (crc << 17)) + 0xa282ead8u;
-}
-
-TEST_WITH(test_records, make_folder, remove_folder) {
-    enum { TAGS = 300 };
-    static char names[TAGS][32], data[200000];
-    static const char *tags[TAGS];
-    static double values[TAGS];
-    for (int i = 0; i < TAGS; i++) {
-        snprintf(names[i], sizeof names[i], "group/%d", i);
-        tags[i] = names[i];
-        values[i] = i;
-    }
-    char path[PATH_SIZE];
-    path_join(folder, "events", path, NULL);
-    FILE *file = fopen(path, "wb");
-    assert_int_equal(events_write_version(file, 1e9), 0);
-    assert_int_equal(events_write_start(file, 1e9, 77), 0);
-    assert_int_equal(events_write_scalars(file, 1e9, 1LL << 40, tags, values, TAGS), 0);
-    fclose(file);
-    size_t length = read_file(path, data, sizeof data), at = 0;
-    int records = 0, scalars = 0;
-    for (; at < length; records++) {
-        const unsigned char *record = (const unsigned char *)data + at;
-        uint32_t size = little_endian(record);
-        assert_int_equal(little_endian(record + 8), masked(events_crc32c(record, 8)));
-        assert_int_equal(little_endian(record + 12 + size),
-                         masked(events_crc32c(record + 12, size)));
-        for (uint32_t i = 12; i + 6 < 12 + size; i++) {
-            scalars += memcmp(record + i, "group/", 6) == 0;
-        }
-        at += 16 + size;
-    }
-    assert_int_equal(at, length);
-    assert_int_equal(scalars, TAGS);
-    assert_true(records >= 3);
 }
 
 /* The bytes of a protobuf field, by its number: of the first, or of the one after `previous`. */
@@ -203,18 +240,6 @@ static Part record(const char *data, int n) {
     return (Part){(const unsigned char *)data + 12, little_endian((const unsigned char *)data), 0};
 }
 
-/* The path of the folder's event file. */
-static void find_events(char path[PATH_SIZE]) {
-    DIR *dir = opendir(folder);
-    path[0] = '\0';
-    for (struct dirent *entry; (entry = readdir(dir));) {
-        if (strncmp(entry->d_name, "events.", 7) == 0) {
-            path_join(folder, entry->d_name, path, NULL);
-        }
-    }
-    closedir(dir);
-}
-
 /* Field numbers of TensorBoard's event.proto, summary.proto, tensor.proto and hparams' plugin_data
  * .proto: an event's summary (5), its value (1): tag 1, tensor 8, metadata 9. */
 TEST_WITH(test_config, make_folder, remove_folder) {
@@ -249,6 +274,25 @@ TEST_WITH(test_config, make_folder, remove_folder) {
     assert_text(FOLLOW(part(start, 1, 1), 2, 3), "0 1.2");
     assert_text(FOLLOW(part(start, 1, 2), 1), "ppo.mirror");
     assert_int_equal(FOLLOW(part(start, 1, 2), 2, 4).number, 1);
+}
+
+/* A log that goes on after iteration 76: readers drop what earlier files have from 77 on. Of an
+ * event: step 2, session_log 7, in which status 1 is START. */
+TEST_WITH(test_resumed, make_folder, remove_folder) {
+    static const char *const columns[] = {"rate"};
+    static char data[4096];
+    char path[PATH_SIZE];
+    MildError error = {0};
+    log_close(log_open(folder, columns, 1, -1, &error));
+    find_events(path);
+    remove(path);
+    log_close(log_open(folder, columns, 1, 76, &error));
+    assert_int_equal(check_frames(NULL, NULL), 2);
+    find_events(path);
+    read_file(path, data, sizeof data);
+    assert_text(FOLLOW(record(data, 0), 3), "brain.Event:2");
+    assert_int_equal(FOLLOW(record(data, 1), 2).number, 77);
+    assert_int_equal(FOLLOW(record(data, 1), 7, 1).number, 1);
 }
 
 /* A number as the log's CSV has it, and as TensorBoard does: in 32 bits. */

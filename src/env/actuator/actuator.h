@@ -6,7 +6,6 @@
 #define ACTUATOR_ACTUATOR_H
 
 #include "env/task/task_def.h"
-#include "learn/mlp.h"
 #include "mild/error.h"
 #include "robot/robot.h"
 
@@ -33,29 +32,14 @@ typedef struct Actuator Actuator;
  * the kind of each joint [robot_joints], numbered in the order of the joints; returns their
  * number. */
 int actuator_kinds(const Robot *robot, int *kind);
-/* The network that all kinds have. */
-Mlp actuator_mlp(void);
-int actuator_parameters(void); /* their number, of one kind */
-
-/* Parameters are 0, scales 1. NULL when out of memory. */
-Actuator *actuator_create(const Robot *robot, double spacing, MildError *error);
 void actuator_destroy(Actuator *actuator); /* may be NULL */
-/* Takes the network of a kind: parameters laid out as actuator_mlp. */
-void actuator_set(Actuator *actuator, int kind, ActuatorScale scale, const float *parameters);
-/* [N m] Torque of a joint. error [rad], speed [rad/s]: [ACTUATOR_TIMES] newest first. */
-double actuator_torque(const Actuator *actuator, int joint, const double *error,
-                       const double *speed);
 
 /* A safetensors file, written completely or not at all; note: free text. */
 MildStatus actuator_save(const Actuator *actuator, const char *path, const char *note,
                          MildError *error);
-/* Fails when the file is of another robot. */
-Actuator *actuator_load(const char *path, const Robot *robot, MildError *error);
 
 /* Reads the file that the task names, if any, and sets task->motors. The caller destroys *actuator
  * (NULL: none) after the environments. Fails when it does not fit robot, physics step or gains. */
 MildStatus actuator_open(TaskDef *task, const Robot *robot, Actuator **actuator, MildError *error);
-/* The same of an actuator in memory, which task->motors then borrows. */
-MildStatus actuator_use(Actuator *actuator, TaskDef *task, MildError *error);
 
 #endif

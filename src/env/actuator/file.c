@@ -7,8 +7,8 @@
 #include <string.h>
 
 #include "base/text.h"
-#include "env/actuator/file.h"
 #include "env/actuator/private.h"
+#include "learn/safetensors.h"
 
 #define FILE_KIND "mild actuator"
 #define FILE_VERSION "1"
@@ -189,8 +189,8 @@ static MildStatus take_networks(const Safetensors *file, const char *path, Actua
     return status;
 }
 
-Actuator *actuator_file_read(const Safetensors *file, const char *path, const Robot *robot,
-                             MildError *error) {
+static Actuator *read_file(const Safetensors *file, const char *path, const Robot *robot,
+                           MildError *error) {
     Actuator *actuator = actuator_create(robot, 0, error);
     if (!actuator) {
         return NULL;
@@ -216,7 +216,7 @@ Actuator *actuator_file_read(const Safetensors *file, const char *path, const Ro
 
 Actuator *actuator_load(const char *path, const Robot *robot, MildError *error) {
     Safetensors *file = safetensors_read(path, error);
-    Actuator *actuator = file ? actuator_file_read(file, path, robot, error) : NULL;
+    Actuator *actuator = file ? read_file(file, path, robot, error) : NULL;
     safetensors_destroy(file);
     return actuator;
 }

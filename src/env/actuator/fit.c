@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/random.h"
+#include "env/actuator/private.h"
 #include "learn/adam.h"
 #include "learn/product.h"
 

@@ -185,7 +185,8 @@ static void torque_of_joints(const void *self, void *state, const double *error,
     }
 }
 
-MildStatus actuator_use(Actuator *actuator, TaskDef *task, MildError *error) {
+/* Sets task->motors, which borrow the actuator. */
+static MildStatus use(Actuator *actuator, TaskDef *task, MildError *error) {
     const double lag = actuator->spacing / task->physics_dt;
     const int rows = (ACTUATOR_TIMES - 1) * (int)lround(lag) + 1;
     if (!(fabs(lag - round(lag)) < 1e-6 && lag > 0.5)) {
@@ -216,6 +217,6 @@ MildStatus actuator_open(TaskDef *task, const Robot *robot, Actuator **actuator,
         return MILD_OK;
     }
     *actuator = actuator_load(task->actuator, robot, &cause);
-    return *actuator ? actuator_use(*actuator, task, error)
+    return *actuator ? use(*actuator, task, error)
                      : mild_fail(error, cause.status, "task.actuator: %s", cause.text);
 }

@@ -213,7 +213,7 @@ static MildStatus find_interval(const Reader *reader, MildError *error) {
     return MILD_OK;
 }
 
-MildStatus record_read_file(Record *record, FILE *file, const char *name, MildError *error) {
+static MildStatus read_file(Record *record, FILE *file, const char *name, MildError *error) {
     if (record->files == RECORD_FILES_MAX) {
         return mild_fail(error, MILD_ERROR_RANGE, "%.200s: more than %d files", name,
                          RECORD_FILES_MAX);
@@ -246,7 +246,7 @@ MildStatus record_read(Record *record, const char *path, MildError *error) {
     if (!file) {
         return error->status;
     }
-    MildStatus status = record_read_file(record, file, path, error);
+    MildStatus status = read_file(record, file, path, error);
     fclose(file);
     return status;
 }

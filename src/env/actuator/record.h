@@ -37,8 +37,6 @@ typedef struct {
 /* Appends a file. Columns are found by name, in any order; others are ignored. The message names
  * file, line, column and remedy. Destroy the record also after an error. */
 MildStatus record_read(Record *record, const char *path, MildError *error);
-/* The same from an open file, which stays open; `name` is used for it in messages. */
-MildStatus record_read_file(Record *record, FILE *file, const char *name, MildError *error);
 void record_free(Record *record);
 
 /* Writes the header, and a row: [joints] each. */

@@ -46,7 +46,8 @@ MildGround *task_env_ground(TaskEnv *env) {
     return (MildGround *)(void *)((char *)env + front_bytes(&env->shape, env->held));
 }
 
-void *task_env_motors(TaskEnv *env) {
+/* State of TaskDef.motors. */
+static void *motors_of(TaskEnv *env) {
     MildGround *ground = task_env_ground(env);
     return (char *)ground + mild_ground_size(ground);
 }
@@ -193,7 +194,7 @@ static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, 
                           const TaskView *view) {
     mild_ground_reset(task_env_ground(env));
     if (def->motors) {
-        memset(task_env_motors(env), 0, def->motors->bytes);
+        memset(motors_of(env), 0, def->motors->bytes);
     }
     lend_map(env, def);
     const MildTerrain *terrain = task_env_terrain(env);
@@ -256,7 +257,7 @@ static void joint_torque(TaskEnv *env, const TaskDef *def, const TaskMotor *moto
         for (int i = 0; i < env->shape.joints; i++) {
             error[i] = task_is_limp(env, def) ? 0 : motor[i].target[late] - q[i];
         }
-        def->motors->torque(def->motors->self, task_env_motors(env), error, qd, asked);
+        def->motors->torque(def->motors->self, motors_of(env), error, qd, asked);
     }
     for (int i = 0; act && i < env->shape.joints; i++) {
         env->torque[i] = def->motors ? limited(&motor[i], env->strength[i] * asked[i], qd[i])

@@ -50,7 +50,6 @@ const MildTerrain *task_env_terrain(const TaskEnv *env); /* of TaskRest */
 /* [shape.history] What the policy sees: five means of older frames, then the newest frame. */
 float *task_env_history(TaskEnv *env);
 MildGround *task_env_ground(TaskEnv *env);
-void *task_env_motors(TaskEnv *env); /* state of TaskDef.motors */
 
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
                    uint32_t index);

@@ -42,7 +42,7 @@ typedef struct {
 } BodiesSole;
 
 /* The same for all robots and steps: feet first. */
-typedef struct {
+typedef struct BodiesSetup {
     BodiesSole sole[BODIES_MAX];
     int feet;
     int bodies;

@@ -5,11 +5,13 @@
 
 #include "ground/batch/batch.h"
 
+struct BodiesSetup; /* of bodies.h */
+
 typedef struct {
-    void *setup;    /* BodiesSetup in float; NULL: no robot has such bodies */
-    float *memory;  /* [robots][numbers] of the surfaces */
-    size_t numbers; /* of a robot */
-    size_t bytes;   /* of the device, without memory */
+    struct BodiesSetup *setup; /* in float; NULL: no robot has such bodies */
+    float *memory;             /* [robots][numbers] of the surfaces */
+    size_t numbers;            /* of a robot */
+    size_t bytes;              /* of the device, without memory */
     /* what the setup points to */
     float *places;
     MaterialNumbers *materials; /* [count + 1][bodies] */

@@ -55,7 +55,7 @@ MILD_HD void limit_row(const EngineLink *link, EngineWork *work, int i, Real sid
 }
 
 /* Limits that are reached. Returns whether there are any. */
-WARP_FN int engine_limits(const EngineModel *model, EngineWork *work) {
+WARP_FN int engine_limits_make(const EngineModel *model, EngineWork *work) {
     Real any[LANE_COPIES];
     EACH_LANE(l) {
         any[l] = 0;
@@ -96,9 +96,9 @@ MILD_HD int limit_pushes(const EngineWork *work, int i) {
  *
  * with the side s, reference r and weight 1/R of a row, and the ground that is solved with N and f'
  * agrees with the limits. none: bool, hold none. Before the forces. */
-WARP_FN void engine_choose_held(const EngineModel *model, EngineWork *work, int none) {
+WARP_FN void engine_limits_predict(const EngineModel *model, EngineWork *work, int none) {
     const int links = engine_links(&model->tree);
-    const int beyond = engine_limits(model, work);
+    const int beyond = engine_limits_make(model, work);
     EACH_LANE(l) {
         LANE_ROLLED
         for (int n = LANE(l); n * ENGINE_HELD_BITS < links; n += LANES) {
@@ -120,7 +120,7 @@ MILD_HD int limit_held(const EngineWork *work, int i) {
 }
 
 /* M <- N and f <- f'. */
-WARP_FN void engine_hold(const EngineTree *tree, EngineWork *work) {
+WARP_FN void engine_limits_hold(const EngineTree *tree, EngineWork *work) {
     EACH_LANE(l) {
         LANE_ROLLED
         for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {

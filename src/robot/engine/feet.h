@@ -195,6 +195,12 @@ WARP_FN void engine_foot_inertia(const EngineTree *tree, EngineWork *work) {
     lanes_sync();
 }
 
+/* A and V_free: the robot as the feet see it. */
+WARP_FN void engine_project_feet(const EngineModel *model, EngineWork *work) {
+    engine_half_solve(model, work);
+    engine_foot_inertia(&model->tree, work);
+}
+
 /* bool: a link moves with degree of freedom d. */
 MILD_HD int link_moves(const EngineTree *tree, int link, int d) {
     const int hinge = 5 + link;

@@ -109,7 +109,7 @@ WARP_FN void engine_push_pair(const EngineModel *model, int n, EngineWork *work)
 
 /* Forces of the pairs that meet, one after the other, in work->acceleration. After M's factor,
  * between engine_solve_transposed and engine_feet_pose. */
-WARP_FN void engine_push_legs(const EngineModel *model, EngineWork *work) {
+WARP_FN void engine_legs_push(const EngineModel *model, EngineWork *work) {
     const int pairs = model->tree.leg_pairs;
     Real *depth = work->now.support.jacobian[0][0]; /* [pairs], which is not filled yet */
     Real deepest[LANE_COPIES];

@@ -92,20 +92,21 @@ typedef struct {
     int rigid;          /* bool: on rigid ground */
 } EngineAction;
 
-/* N (constraint.h: M with the joint limits that are held) and its factor, and half of the way to
- * the acceleration, which engine_accelerate goes on with: L^-T force. After engine_kinematics. */
-WARP_FN void engine_smooth(const EngineModel *model, const EngineAction *action, EngineWork *work) {
-    const EngineTree *tree = &model->tree;
+/* M, and the forces without ground and constraints f in work->acceleration. After
+ * engine_kinematics. */
+WARP_FN void engine_smooth_dynamics(const EngineModel *model, const EngineAction *action,
+                                    EngineWork *work) {
     engine_link_forces(model, action->variation, work);
-    engine_gather(tree, work);
+    engine_gather(&model->tree, work);
     engine_smooth_force(model, action->variation, action->torque, action->push, work);
     engine_mass_matrix(model, action->variation, work);
-    if (limit_held(work, 0)) {
-        engine_hold(tree, work);
-    }
+}
+
+/* The factor of M, or of N with limits that are held, and half of the way to the acceleration,
+ * which engine_accelerate goes on with: L^-T f. */
+WARP_FN void engine_smooth_acceleration(const EngineTree *tree, EngineWork *work) {
     engine_factorise(tree, work->mass[0], work->factor[0], work->inverse);
     engine_solve_transposed(tree, work->factor[0], work->inverse, work->acceleration);
-    engine_push_legs(model, work);
 }
 
 /* Poses and twists of links and feet; with an action also what engine_end needs, and what soft
@@ -113,13 +114,17 @@ WARP_FN void engine_smooth(const EngineModel *model, const EngineAction *action,
 WARP_FN void engine_begin(const EngineModel *model, const EngineAction *action, EngineWork *work) {
     engine_kinematics(model, work);
     if (action) {
-        engine_choose_held(model, work, action->rigid);
-        engine_smooth(model, action, work);
+        engine_limits_predict(model, work, action->rigid);
+        engine_smooth_dynamics(model, action, work);
+        if (limit_held(work, 0)) {
+            engine_limits_hold(&model->tree, work);
+        }
+        engine_smooth_acceleration(&model->tree, work);
+        engine_legs_push(model, work);
     }
     engine_feet_pose(model, work);
     if (action && !action->rigid) {
-        engine_half_solve(model, work);
-        engine_foot_inertia(&model->tree, work);
+        engine_project_feet(model, work);
     }
 }
 
@@ -180,7 +185,7 @@ WARP_FN int engine_end(const EngineModel *model, int rigid, EngineWork *work) {
     engine_accelerate(&model->tree, work, !rigid);
     int newton = 0;
     if (rigid || limit_held(work, 0)) {
-        engine_limits(model, work); /* anew: engine_save leaves them out */
+        engine_limits_make(model, work); /* anew: engine_save leaves them out */
         newton = rigid || !engine_held_push(&model->tree, work)
                      ? engine_constrain(&model->tree, work, rigid)
                      : 0;

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/paths.h"
+#include "env/envs.h"
 #include "env/task/policy_keys.h"
 #include "learn/policy.h"
 #include "run/eval/eval.h"
@@ -44,38 +45,32 @@ typedef struct {
     const Robot *robot;
     Pool *pool;
     Controller controller;
-    RobotSim *sim;
-    TaskEnv *env;
-    ReplayPeriod *period; /* where the torques go; NULL: nowhere */
-    int step;             /* of the period */
+    EnvsTrial trial;
+    Envs *envs;         /* one */
+    TaskEnv *env;       /* of envs */
+    EnvsSample *sample; /* [physics steps] of the last policy step */
 } Walk;
 
-static void record_torque(void *context, const TaskEnv *env, const RobotSim *sim,
-                          const double *torque) {
-    Walk *walk = context;
-    (void)env;
-    (void)sim;
-    if (walk->period) {
-        memcpy(walk->period->torque[walk->step++], torque, sizeof walk->period->torque[0]);
-    }
-}
-
-static int walk_step(Walk *walk, ReplayPeriod *period) {
-    float action[ROBOT_JOINTS_MAX];
-    TaskView none = {0};
-    TaskCallback callback = {record_torque, walk, NULL};
+/* period: the state before the step, and its torques; NULL: not recorded. */
+static MildStatus walk_step(const Walk *walk, ReplayPeriod *period, int *upright,
+                            MildError *error) {
+    float action[ROBOT_JOINTS_MAX], reward;
+    uint8_t done = 0, timeout, valid;
+    const EnvsStep step = {
+        .action = action, .reward = &reward, .done = &done, .timeout = &timeout, .valid = &valid};
     if (period) {
         MildGround *ground = task_env_ground(walk->env);
         period->state = task_env_state(walk->env);
         memcpy(period->ground, ground, mild_ground_size(ground));
     }
-    walk->period = period;
-    walk->step = 0;
     walk->controller.act(walk->controller.self, 1, &walk->env, action);
-    TaskStep step =
-        task_env_step(walk->env, &walk->def, walk->robot, walk->sim, action, 0, &none, &callback);
+    const MildStatus status = envs_step(walk->envs, &step, NULL, error);
+    for (int k = 0; period && k < envs_physics_steps(walk->envs); k++) {
+        memcpy(period->torque[k], walk->sample[k].torque, sizeof period->torque[k]);
+    }
     eval_command(walk->env, walk_speed, 0);
-    return !step.done;
+    *upright = !done;
+    return status;
 }
 
 MildStatus bench_walker(const Robot *robot, Pool *pool, int envs, TaskDef *task,
@@ -90,38 +85,53 @@ MildStatus bench_walker(const Robot *robot, Pool *pool, int envs, TaskDef *task,
                              : status;
 }
 
-static MildStatus walk_open(Walk *walk, MildError *error) {
+static MildStatus walk_open(Walk *walk, const Scene *scene, MildError *error) {
     walk->pool = pool_create(1);
-    walk->sim = robot_sim_create(walk->robot, walk->def.physics_dt, error);
-    walk->env = aligned_alloc(64, task_env_bytes(&walk->def, walk->robot));
-    if (!walk->pool || !walk->sim || !walk->env) {
+    if (!walk->pool) {
         return mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
     }
-    return bench_walker(walk->robot, walk->pool, 1, &walk->def, &walk->controller, error);
+    MildStatus status =
+        bench_walker(walk->robot, walk->pool, 1, &walk->def, &walk->controller, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    walk->trial = (EnvsTrial){.rigid = scene->rigid};
+    const EnvsDef of = {.task = &walk->def,
+                        .robot = walk->robot,
+                        .pool = walk->pool,
+                        .count = 1,
+                        .seed = 1,
+                        .trial = &walk->trial,
+                        .terrain = &scene->terrain,
+                        .terrains = 1};
+    walk->envs = envs_create(&of, error);
+    if (!walk->envs) {
+        return error->status;
+    }
+    walk->env = envs_env(walk->envs, 0);
+    walk->sample = calloc((size_t)envs_physics_steps(walk->envs), sizeof *walk->sample);
+    return walk->sample ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
 }
 
 static void walk_close(Walk *walk) {
     controller_destroy(&walk->controller);
-    robot_sim_destroy(walk->sim);
-    free(walk->env);
+    envs_destroy(walk->envs);
+    free(walk->sample);
     pool_destroy(walk->pool);
 }
 
 static MildStatus walk_record(Walk *walk, const Scene *scene, Replay *replay, MildError *error) {
-    const uint64_t seed = 1;
-    TaskView none = {0};
-    task_env_init(walk->env, &walk->def, walk->robot, seed, 0);
+    const int settle = (int)(walk_settle / TASK_PERIOD);
+    int upright = 1;
     eval_command(walk->env, walk_speed, 0);
-    // NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage): error->status is no success
-    task_env_reset_on(walk->env, &walk->def, walk->robot, walk->sim, &scene->terrain, scene->rigid,
-                      &none);
+    envs_set_samples(walk->envs, walk->sample);
+    MildStatus status = envs_reset(walk->envs, &(EnvsView){0}, NULL, error);
     replay->variation = task_env_variation(walk->env);
     replay->terrain = *task_env_terrain(walk->env);
-    int settle = (int)(walk_settle / TASK_PERIOD), upright = 1;
-    for (int i = -settle; i < replay->periods && upright; i++) {
-        upright = walk_step(walk, i < 0 ? NULL : &replay->period[i]);
+    for (int i = -settle; status == MILD_OK && upright && i < replay->periods; i++) {
+        status = walk_step(walk, i < 0 ? NULL : &replay->period[i], &upright, error);
     }
-    return upright ? MILD_OK
+    return upright ? status
                    : mild_fail(error, MILD_ERROR_RANGE, "bench: the shipped policy fell on %s",
                                scene->name);
 }
@@ -146,7 +156,7 @@ Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const ch
         status = robot_match_model(robot, model, &mild, &scene.terrain.materials[0], error);
     }
     if (status == MILD_OK) {
-        status = walk_open(&walk, error);
+        status = walk_open(&walk, &scene, error);
     }
     if (status == MILD_OK) {
         status = walk_record(&walk, &scene, replay, error);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "env/actuator/record.h"
+#include "env/envs.h"
 
 #define SHAKE_TIME 2.0 /* [s] after which amplitudes and frequencies are drawn anew */
 #define SHAKE_SLOWEST 0.5
@@ -41,6 +42,25 @@ static void shake(const MotorLogDef *def, int step, float *action) {
     }
 }
 
+/* The controller's steps of one environment. falls: counted. */
+static MildStatus walk(const MotorLogDef *def, Envs *envs, Recorder *recorder, int *falls,
+                       MildError *error) {
+    float action[ROBOT_JOINTS_MAX], reward;
+    uint8_t done = 0, timeout = 0, valid;
+    const EnvsStep step = {
+        .action = action, .reward = &reward, .done = &done, .timeout = &timeout, .valid = &valid};
+    TaskEnv *env = envs_env(envs, 0);
+    MildStatus status = envs_reset(envs, &(EnvsView){0}, NULL, error);
+    for (int k = 0; status == MILD_OK && k < (int)(def->seconds / TASK_PERIOD + 0.5); k++) {
+        def->controller->act(def->controller->self, 1, &env, action);
+        shake(def, k, action);
+        status = envs_step(envs, &step, NULL, error);
+        *falls += done && !timeout;
+        recorder->time += done ? EPISODE_GAP : 0;
+    }
+    return status;
+}
+
 MildStatus motor_log(const MotorLogDef *def, int *falls, MildError *error) {
     Recorder recorder = {.motors = def->motors,
                          .joints = robot_joints(def->robot),
@@ -48,31 +68,22 @@ MildStatus motor_log(const MotorLogDef *def, int *falls, MildError *error) {
                          .csv = def->csv};
     Recorder *const self = &recorder;
     const TaskActuator recorded = {&self, def->motors->bytes, torque_recorded};
-    const TaskView none = {0};
     TaskDef task = *def->task;
-    float action[ROBOT_JOINTS_MAX];
     task.motors = &recorded;
     *falls = 0;
-    TaskEnv *env = aligned_alloc(64, task_env_bytes(&task, def->robot));
-    if (!env) {
+    Pool *pool = pool_create(1);
+    if (!pool) {
         return mild_fail(error, MILD_ERROR_MEMORY, "log: out of memory");
     }
-    RobotSim *sim = robot_sim_create(def->robot, task.physics_dt, error);
-    if (!sim) {
-        free(env);
-        return error->status;
+    const EnvsDef of = {
+        .task = &task, .robot = def->robot, .pool = pool, .count = 1, .seed = def->seed};
+    Envs *envs = envs_create(&of, error);
+    MildStatus status = envs ? MILD_OK : error->status;
+    if (status == MILD_OK) {
+        record_print_header(def->robot, def->csv);
+        status = walk(def, envs, &recorder, falls, error);
     }
-    record_print_header(def->robot, def->csv);
-    task_env_init(env, &task, def->robot, def->seed, 0);
-    task_env_reset(env, &task, def->robot, sim, &none);
-    for (int step = 0; step < (int)(def->seconds / TASK_PERIOD + 0.5); step++) {
-        def->controller->act(def->controller->self, 1, &env, action);
-        shake(def, step, action);
-        const TaskStep out = task_env_step(env, &task, def->robot, sim, action, 1, &none, NULL);
-        *falls += out.done && !out.timeout;
-        recorder.time += out.done ? EPISODE_GAP : 0;
-    }
-    robot_sim_destroy(sim);
-    free(env);
-    return MILD_OK;
+    envs_destroy(envs);
+    pool_destroy(pool);
+    return status;
 }

@@ -111,8 +111,9 @@ static MildStatus read_text(History *history, const char *path, MildError *error
                : mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory for the log", path);
 }
 
-MildStatus history_parse(char *text, size_t size, const char *path, History *history,
-                         MildError *error) {
+/* text: from malloc, of `size` bytes and a '\0'; the history's from now on. */
+static MildStatus parse(char *text, size_t size, const char *path, History *history,
+                        MildError *error) {
     const size_t length = strlen(text);
     *history = (History){.text = text};
     MildStatus status =
@@ -130,7 +131,7 @@ MildStatus history_read(const char *path, History *history, MildError *error) {
     size_t size;
     char *text = file_read(path, LOG_MAX, &size, error);
     *history = (History){0};
-    return text ? history_parse(text, size, path, history, error) : error->status;
+    return text ? parse(text, size, path, history, error) : error->status;
 }
 
 void history_free(History *history) {

@@ -18,10 +18,6 @@ typedef struct {
  * numbers are from 0 to 1e15 and rise. Fails with "PATH:LINE: reason"; there is then nothing to
  * free. */
 MildStatus history_read(const char *path, History *history, MildError *error);
-/* The same from a text of `size` bytes and a '\0', which comes from malloc and is owned from now
- * on. path: its name in messages. */
-MildStatus history_parse(char *text, size_t size, const char *path, History *history,
-                         MildError *error);
 void history_free(History *history);
 
 /* Index of the column, or -1. */

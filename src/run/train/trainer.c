@@ -291,7 +291,7 @@ int train_threads(const Trainer *trainer) {
 
 MildStatus train_save(Trainer *trainer, const char *path, const char *note, MildError *error) {
     size_t bytes;
-    void *state = envs_state(trainer->envs.envs, &bytes);
+    char *state = envs_state(trainer->envs.envs, &bytes);
     if (state) {
         return ppo_save(trainer->ppo, path, state, bytes, note, error);
     }
@@ -330,7 +330,7 @@ static MildStatus load_learner(Trainer *trainer, const char *path, MildError *er
 
 MildStatus train_load(Trainer *trainer, const char *path, MildError *error) {
     size_t bytes;
-    void *state = envs_state(trainer->envs.envs, &bytes);
+    char *state = envs_state(trainer->envs.envs, &bytes);
     const int leads = ranks_number(trainer->ranks) == 0,
               whole = ranks_any(trainer->ranks, leads && state && ppo_file_is_whole(path));
     return whole ? ppo_load(trainer->ppo, path, state, bytes, error)
