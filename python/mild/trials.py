@@ -23,7 +23,7 @@ if typing.TYPE_CHECKING:
 
 GROUNDS = ("rigid", "rubber", "foam60", "foam45", "foam28", "foam25", "grass", "sand_loose", "sand_dense")
 TILT = 1.0  # [rad] a base that leans more has fallen
-LOW = 0.4  # a base below this part of its height at the start has fallen
+LOW = 0.4  # a base that is less than this part of its height at the start above the ground and above its lowest sole has fallen
 SETTLE, LEAST = 2.0, 2.5  # [s] speed and cost count after the first, of walks longer than the second; as in mild eval
 
 
@@ -318,7 +318,8 @@ class Walker:
         x, y = d.qpos[r.place + 4 : r.place + 6]
         if 1 - 2 * (x * x + y * y) < math.cos(TILT):
             return "tilt"
-        return "base" if r.zero + d.qpos[r.place + 2] < LOW * self.height else ""
+        base, low = d.qpos[r.place + 2], LOW * self.height
+        return "base" if r.zero + base < low and base - self.lowest() < low else ""  # who has sunk on its feet stands
 
 
 class Measure:

@@ -461,6 +461,19 @@ class Trials(unittest.TestCase):
         self.assertTrue(0.05 < fold.rows[0].falls[0] <= fold.rows[0].falls[1] < 2)
         self.assertIn("0 of 2", str(fold))
 
+    def test_sunk_is_not_fallen(self):
+        """A base 0.3 of its height above the ground stands on soles deep in it, and lies when they are as high as it."""
+        d = Description(stander())
+        walker = trials.Walker(biped(), networks.Callable(still), d, "rigid", {"noise": 0.0, "attributes": {}, "seconds": 1})
+        walker.begin([0, 0, 0], 1)
+        base, place = walker.robot.place + 2, walker.data.qpos
+        place[base] -= 0.7 * walker.height
+        self.assertLess(walker.lowest(), -0.6 * walker.height)
+        self.assertEqual(walker.fallen(), "")
+        soles = walker.lowest()
+        with unittest.mock.patch.object(walker, "lowest", return_value=soles + 0.7 * walker.height):  # legs drawn up
+            self.assertEqual(walker.fallen(), "base")
+
     def test_starts(self):
         """Starts differ in heading, place and joints, by as much as the description says; the soles just touch the floor."""
         d = Description(stander(noise={"start_place": 0.3, "start_joint": 0.1}))
