@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Trains the shipped policies of the Go1 and the G1 from nothing on one GPU, some fifteen minutes: a gait, then pushes, a clock that slows
-# with the command and a price on power. (The shipped ones had the gait before legs touched and shells stood.) docs/training-log.md
-# says why. Usage: scripts/train_robots.sh FOLDER
+# Trains the Go1 and the G1 from nothing on one GPU as the shipped policies were, by its parts some fifteen minutes: a gait, then pushes,
+# a clock that slows with the command and a price on power. (The shipped ones had the gait before legs touched and shells stood; nobody
+# has run the whole since.) docs/training-log.md says why. Usage: scripts/train_robots.sh FOLDER
 set -euo pipefail
 if [ $# -ne 1 ]; then
     echo 'train_robots: usage: scripts/train_robots.sh FOLDER' >&2

@@ -22,8 +22,8 @@ Equal wall time: of a training alone on its GPU. With --jobs 2 each has half of 
 
 FOLDER/results.jsonl gets a line when a training ends and one when it is judged; started again, the command goes on from there, also after
 it was killed. What was trained with another --minutes, --jobs, --steps or config is not counted. No training begins that would not end by
---seconds, and no judge that takes as long as the longest so far. So it may be run in pieces, one after another or on several machines: --take PIECE,PIECE puts the results
-and policies of other folders into this one first. FOLDER/policies has those of the trainings, in half precision, and those of the search
+--seconds, and no judge that would not if it took as long as the longest so far. So it may be run in pieces, one after another or on
+several machines: --take PIECE,PIECE puts the results and policies of other folders into this one first. FOLDER/policies has those of the trainings, in half precision, and those of the search
 until they are judged. As in
 
   scripts/paper/factorial.py runs/third --take runs/first,runs/second --seconds 570    # what they have not done
@@ -98,7 +98,7 @@ def who_of(controller, policy, config):
 
 def walked(given, who, grounds, speeds, *more):
     printed = mild("eval", *who, "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)), "--trials", given.trials, "--seconds", TRIAL,
-                "--threads", given.threads, "--json", "-", *more)
+                   "--threads", given.threads, "--json", "-", *more)
     return [cell_of(row) for row in json.loads(printed)["rows"]]
 
 
@@ -418,7 +418,7 @@ def report(factorial):
                "robots": SEARCH[t["task"]["choice"]][1], "skill": t["skill"]["tuning"], "score": t["score"]}
               for t in factorial.lines if t["done"] == "judged" and t["task"]["kind"] == "tune"]
     summary = {"minutes": factorial.given.minutes, "steps": factorial.given.steps, "settings": factorial.settings, "search": search,
-            "chosen": factorial.choices(), "rows": rows, "table2": second, "shares": answer, "seeds": seeds}
+               "chosen": factorial.choices(), "rows": rows, "table2": second, "shares": answer, "seeds": seeds}
     (factorial.folder / "factorial.json").write_text(json.dumps(summary, indent=1) + "\n")
     try:
         import figures
