@@ -55,6 +55,22 @@ void __wrap_robot_sim_set_solver(RobotSim *sim, MildSolver solver, double tolera
     __real_robot_sim_set_solver(sim, solver, tolerance, iterations);
 }
 
+/* Torques of the steps of the walk that is recorded. */
+enum { JOINTS = 12, WALKED_MAX = 8192 };
+static double walked_torque[WALKED_MAX][JOINTS];
+static int walked;
+
+/* The record has the torques of the last steps, each once. */
+static void expect_torques(const Replay *replay) {
+    assert_non_null(replay);
+    const int recorded_steps = replay->periods * replay->steps;
+    assert_in_range(walked, recorded_steps, WALKED_MAX - 1);
+    for (int i = 0; i < recorded_steps; i++) {
+        assert_memory_equal(replay->period[i / replay->steps].torque[i % replay->steps],
+                            walked_torque[walked - recorded_steps + i], sizeof walked_torque[0]);
+    }
+}
+
 int __real_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
                           const MildTerrain *terrain, MildGround *ground);
 int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
@@ -62,6 +78,9 @@ int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *pus
 int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
                           const MildTerrain *terrain, MildGround *ground) {
     reads = 0;
+    if (is_walking && walked < WALKED_MAX) {
+        memcpy(walked_torque[walked++], torque, JOINTS * sizeof *torque);
+    }
     const int bad = __real_robot_sim_step(sim, torque, push, terrain, ground);
     reads = -1;
     const int iterations = robot_sim_contact(sim)->iterations;
@@ -83,9 +102,11 @@ Replay *__wrap_bench_record_walk(const ExperimentDef *def, const Robot *robot, c
 Replay *__wrap_bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
                                  MildModel model, int periods, MildError *error) {
     is_walking = 1;
+    walked = 0;
     Replay *replay = __real_bench_record_walk(def, robot, ground, model, periods, error);
     is_walking = 0;
     recorded++;
+    expect_torques(replay);
     return replay;
 }
 
