@@ -70,7 +70,8 @@ class Programs:
     def train(self, count, folder, *options):
         common = ["--train.robots=batch", f"--train.device={self.arguments.device}", "--train.minutes=0",
                   "--train.checkpoint_every=1000000"]
-        start = [] if "--resume" in options else ["--config", str(ROOT / "configs" / "quick.ini")]
+        start = [] if "--resume" in options else [
+            "--config", str(ROOT / "configs" / "quick.ini"), "--ppo.steps=24", "--ppo.optimizer=adam", "--ppo.matmul=fp32"]
         return self.by(count, "mild", "train", "--out", str(folder), *start, *common, *options)
 
     def run(self, command, seconds=300, **variables):

@@ -14,6 +14,7 @@
 #define SEED 1
 #define FOOT_FAR 100.0 /* [m] above the ground: nothing touches */
 #define HEADS_MAX 512  /* numbers that the encoder gives */
+#define CLOCK 2        /* last numbers of a frame */
 /* Feet, then bodies with shells: who stands on the ground. */
 #define STANDING_MAX (ROBOT_FEET_MAX + ENGINE_BODIES_MAX)
 
@@ -127,11 +128,14 @@ static const float *apply(const WebNetwork *network, const float *weight, const 
 void web_act(const float *history, float *action) {
     const WebPolicy *policy = &web.file->policy;
     const int observation = web.file->shape.observation, estimates = policy->estimates;
+    const int feet = estimates - policy->feet_velocity;
+    const float *frame = history + web.file->shape.history - observation;
     float head[HEADS_MAX], theta[HEADS_MAX], input[TASK_OBSERVATION_MAX + HEADS_MAX];
     const float *weight = apply(&policy->encoder, web.weight, history, head);
-    weight = apply(&policy->modulation, weight, head + policy->feet_velocity, theta);
-    memcpy(input, history + web.file->shape.history - observation,
-           (size_t)observation * sizeof *input);
+    memcpy(input, head + policy->feet_velocity, (size_t)feet * sizeof *input);
+    memcpy(input + feet, frame + observation - CLOCK, CLOCK * sizeof *input);
+    weight = apply(&policy->modulation, weight, input, theta);
+    memcpy(input, frame, (size_t)observation * sizeof *input);
     memcpy(input + observation, head, (size_t)estimates * sizeof *input);
     for (int j = 0; j < policy->latent; j++) {
         const int at = policy->per_dimension ? j : 0;
@@ -540,7 +544,9 @@ static int policy_fits(const WebModel *file) {
            policy->encoder.width[0] == file->shape.history &&
            file->shape.history <= TASK_HISTORY_MAX &&
            file->shape.observation <= TASK_OBSERVATION_MAX && policy->feet_velocity >= 0 &&
-           policy->feet_velocity + policy->modulation.width[0] <= estimates &&
+           policy->feet_velocity <= estimates &&
+           (policy->modulation.width[0] <= estimates - policy->feet_velocity ||
+            policy->modulation.width[0] == estimates - policy->feet_velocity + CLOCK) &&
            output_of(&policy->modulation) == (policy->per_dimension ? 2 * latent : 2) &&
            policy->actor.width[0] == file->shape.observation + estimates + latent &&
            output_of(&policy->actor) == file->shape.actions;

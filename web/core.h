@@ -62,7 +62,8 @@ typedef struct {
     WebNetwork actor;
     int32_t estimates;
     int32_t latent;
-    int32_t feet_velocity; /* first of the estimates that drive the modulation */
+    int32_t feet_velocity; /* first of the estimates that drive the modulation; it reads these, or
+                              all that follow and then the clock of the frame */
     int32_t per_dimension; /* bool */
 } WebPolicy;
 

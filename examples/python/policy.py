@@ -49,7 +49,8 @@ class Policy:
         heads = self.network("encoder", np.concatenate([means.ravel(), frame]))
         n = 2 * (self.tensors["actor.0.weight"].shape[1] - len(frame)) - len(heads)
         estimates, mu = heads[:n], heads[n : (n + len(heads)) // 2]  # the rest: log variance, unused
-        theta = self.network("modulation", estimates[3 : 3 + self.tensors["modulation.0.weight"].shape[1]])
+        seen = np.concatenate([estimates[3:], frame[-2:]])  # feet's velocities, heights and the clock: the first or all
+        theta = self.network("modulation", seen[: self.tensors["modulation.0.weight"].shape[1]])
         half = len(theta) // 2
         z = theta[:half] * mu + theta[half:]
         action = self.network("actor", np.concatenate([frame, estimates, z]))

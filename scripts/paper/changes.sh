@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Sourced by latent.sh and deviations.sh: trainings by configs/models.ini on one GPU, half a minute each, with one change at a time.
+# Sourced by latent.sh, modulation.sh and deviations.sh: trainings by configs/models.ini on one GPU, half a minute each, with one change at a time.
 # The script that sources it has change[NAME], options of a training, and measure RUN STEM, which writes STEM.RESULT of a finished
 # run; it measures on the processor while the next one trains.
 here=$(dirname "$0")

@@ -25,7 +25,8 @@ from deviations import measures, spread
 from measure import MILD, NINE, ROOT, mild
 
 CONFIG = ROOT / "configs/quick.ini"
-TRAIN = ["--train.envs=4096", "--train.minutes=0", "--train.iterations=400", "--ppo.anneal=280 400"]
+TRAIN = ["--train.envs=4096", "--train.minutes=0", "--train.iterations=400", "--ppo.anneal=280 400", "--ppo.steps=24", "--ppo.optimizer=adam",
+         "--reward.linear_velocity=5"]
 GPU = ["--ppo.matmul=bf16"]
 SPEEDS = "0.3,0.6"
 

@@ -37,8 +37,7 @@ class Teacher:
         tensors, texts = files.read(path)
         self.weights = {name: tensor.to(device) for name, tensor in tensors.items()}
         self.estimates, self.latent = (int(texts["policy." + key]) for key in ("estimates", "latent"))
-        first = int(texts["policy.feet_velocity_offset"])
-        self.feet = slice(first, first + int(texts["policy.feet_velocity_count"]))
+        self.feet, self.seen = int(texts["policy.feet_velocity_offset"]), tensors["modulation.0.weight"].shape[1]
 
     def net(self, name, x):
         layers = sorted(int(key.split(".")[1]) for key in self.weights if key.startswith(name + ".") and key.endswith("weight"))
@@ -50,7 +49,7 @@ class Teacher:
     def act(self, history):
         """history: [rows][frames][observation]"""
         estimates, latent, _ = self.net("encoder", history.flatten(1)).split([self.estimates, self.latent, self.latent], 1)
-        theta = self.net("modulation", estimates[:, self.feet])
+        theta = self.net("modulation", torch.cat([estimates[:, self.feet :], history[:, -1, -2:]], 1)[:, : self.seen])
         return self.net("actor", torch.cat([history[:, -1], estimates, theta[:, :1] * latent + theta[:, 1:]], 1))
 
 

@@ -33,7 +33,7 @@ size_t loss_carve(const Network *network, int rows, int mirrored, float *block, 
         {&chunk->d_heads, all * (size_t)network->heads},
         {&chunk->d_theta, all * (size_t)network->theta},
         {&chunk->d_actor_input, all * (size_t)(def->estimates + def->latent)},
-        {&chunk->d_feet, all * (size_t)def->feet_velocity_count},
+        {&chunk->d_feet, all * (size_t)network->feet},
         {&chunk->d_decoded, n * (size_t)network->decoded},
         {&chunk->d_decoder_input, n * (size_t)network->decoder_input},
         {&chunk->d_value, n},
@@ -224,13 +224,12 @@ static void modulation_backward(const LossContext *c, LossChunk *chunk, int all,
     }
 }
 
-/* Regression part of the heads' gradient, and the modulation's through the estimated feet
- * velocities. */
+/* Regression part of the heads' gradient, and the modulation's through the estimates of the feet.
+ */
 static void heads_backward(const LossContext *c, LossChunk *chunk, int all, const float *heads,
                            LossSums *sums) {
     const Network *n = c->network;
-    const int estimates = n->def.estimates, latent = n->def.latent,
-              feet = n->def.feet_velocity_count;
+    const int estimates = n->def.estimates, latent = n->def.latent, feet = n->feet;
     for (int r = 0; r < all; r++) {
         float *d = chunk->d_heads + (int64_t)r * n->heads;
         for (int j = 0; j < feet; j++) {
@@ -277,12 +276,13 @@ void loss_actor(const LossContext *c, LossChunk *chunk, float *gradient, float b
         chunk->work, gradient, beta,
         (MlpInputGradient){chunk->d_actor_input, def->observation, def->estimates + def->latent});
     modulation_backward(c, chunk, all, heads);
-    mlp_backward(&n->modulation, c->parameters, all, heads + def->feet_velocity_offset, n->heads,
+    mlp_backward(&n->modulation, c->parameters, all, out->modulation_input, n->feet + n->clock,
                  &out->modulation, chunk->d_theta, chunk->work, gradient, beta,
-                 (MlpInputGradient){chunk->d_feet, 0, def->feet_velocity_count});
+                 (MlpInputGradient){chunk->d_feet, 0, n->feet});
     heads_backward(c, chunk, all, heads, sums);
     mlp_backward(&n->encoder, c->parameters, all, chunk->history, n->history, &out->encoder,
                  chunk->d_heads, chunk->work, gradient, beta, (MlpInputGradient){0});
+    network_hide_clock(n, gradient);
 }
 
 void loss_critic(const LossContext *c, LossChunk *chunk, float *gradient, float beta,

@@ -56,7 +56,7 @@ typedef struct {
     float *d_heads;         /* [rows + mirrored][heads] */
     float *d_theta;         /* [rows + mirrored][theta] */
     float *d_actor_input;   /* [rows + mirrored][estimates + latent] the part after the frame */
-    float *d_feet;          /* [rows + mirrored][feet velocities] */
+    float *d_feet;          /* [rows + mirrored][feet] of the modulation's estimates */
     float *d_decoded;       /* [rows][decoded] */
     float *d_decoder_input; /* [rows][decoder_input] */
     float *d_value;         /* [rows] */

@@ -53,9 +53,21 @@ static MildStatus check_widths(const PolicyDef *def, MildError *error) {
     return status;
 }
 
+static MildStatus check_clock(const PolicyDef *def, MildError *error) {
+    const int wanted = def->modulation_input == POLICY_INPUT_FEET_PHASE || !def->actor_phase;
+    if (wanted && def->observation < NETWORK_CLOCK) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "policy: a frame of %d numbers has no gait clock for modulation_input = "
+                         "feet_phase or actor_phase = false",
+                         def->observation);
+    }
+    return MILD_OK;
+}
+
 static MildStatus check_def(const PolicyDef *def, MildError *error) {
     MildStatus status = mild_fields_check(policy_fields, policy_field_count, def, "policy", error);
     status = status ? status : check_widths(def, error);
+    status = status ? status : check_clock(def, error);
     if (status) {
         return status;
     }
@@ -91,12 +103,15 @@ MildStatus network_layout(Network *network, const PolicyDef *def, MildError *err
     if (status) {
         return status;
     }
-    const int modulation_hidden[POLICY_LAYERS_MAX] = {def->modulation_hidden};
+    const int modulation_hidden[POLICY_LAYERS_MAX] = {def->modulation_hidden},
+              phase = def->modulation_input == POLICY_INPUT_FEET_PHASE;
     memset(network, 0, sizeof *network);
     network->def = *def;
     network->history = def->frames * def->observation;
     network->heads = def->estimates + 2 * def->latent;
     network->theta = def->modulation_per_dimension ? 2 * def->latent : 2;
+    network->feet = phase ? def->estimates - def->feet_velocity_offset : def->feet_velocity_count;
+    network->clock = phase ? NETWORK_CLOCK : 0;
     network->actor_input = def->observation + def->estimates + def->latent;
     network->decoder_input = def->latent + def->estimates;
     network->decoded_frame = def->decoder_frame ? def->observation : 0;
@@ -105,13 +120,53 @@ MildStatus network_layout(Network *network, const PolicyDef *def, MildError *err
         mlp_layout(&network->encoder, network->history, def->encoder_hidden, network->heads, 0);
     at = mlp_layout(&network->decoder, network->decoder_input, def->decoder_hidden,
                     network->decoded, at);
-    at = mlp_layout(&network->modulation, def->feet_velocity_count, modulation_hidden,
+    at = mlp_layout(&network->modulation, network->feet + network->clock, modulation_hidden,
                     network->theta, at);
     at = mlp_layout(&network->actor, network->actor_input, def->actor_hidden, def->actions, at);
     network->critic_first = at;
     network->log_std = mlp_layout(&network->critic, def->critic_input, def->critic_hidden, 1, at);
     network->count = network->log_std + def->actions;
     return MILD_OK;
+}
+
+/* The clock in frame f of the inputs of a layer, whose first `frames` frames it reads. */
+static int64_t clock_weights(const Network *network, const MlpLayer *layer, int row, int f) {
+    return layer->weight + (int64_t)row * layer->in + (f + 1) * network->def.observation -
+           NETWORK_CLOCK;
+}
+
+static void hide_in(const Network *network, const MlpLayer *layer, int frames, float *parameters) {
+    for (int row = 0; row < layer->out; row++) {
+        for (int f = 0; f < frames; f++) {
+            memset(parameters + clock_weights(network, layer, row, f), 0,
+                   NETWORK_CLOCK * sizeof *parameters);
+        }
+    }
+}
+
+static int sees_in(const Network *network, const MlpLayer *layer, int frames,
+                   const float *parameters) {
+    int sees = 0;
+    for (int row = 0; row < layer->out; row++) {
+        for (int f = 0; f < frames; f++) {
+            const float *w = parameters + clock_weights(network, layer, row, f);
+            sees |= w[0] != 0.0f || w[1] != 0.0f;
+        }
+    }
+    return sees;
+}
+
+void network_hide_clock(const Network *network, float *parameters) {
+    if (!network->def.actor_phase) {
+        hide_in(network, &network->encoder.layer[0], network->def.frames, parameters);
+        hide_in(network, &network->actor.layer[0], 1, parameters);
+    }
+}
+
+int network_sees_clock(const Network *network, const float *parameters) {
+    return !network->def.actor_phase &&
+           (sees_in(network, &network->encoder.layer[0], network->def.frames, parameters) ||
+            sees_in(network, &network->actor.layer[0], 1, parameters));
 }
 
 const Mlp *network_mlp(const Network *network, int index, const char **name) {
@@ -139,6 +194,7 @@ void network_initialise(const Network *network, float *parameters, uint64_t seed
     for (int i = 0; i < network->def.actions; i++) {
         parameters[network->log_std + i] = (float)log(network->def.init_std);
     }
+    network_hide_clock(network, parameters);
 }
 
 void network_carve(const Network *network, int rows, float *block, size_t *used,
@@ -147,6 +203,8 @@ void network_carve(const Network *network, int rows, float *block, size_t *used,
     mlp_carve_outputs(&network->modulation, rows, block, used, &outputs->modulation);
     mlp_carve_outputs(&network->actor, rows, block, used, &outputs->actor);
     outputs->noise = NULL;
+    outputs->modulation_input =
+        mlp_carve(block, used, (size_t)rows * (size_t)(network->feet + network->clock));
     outputs->actor_input = mlp_carve(block, used, (size_t)rows * (size_t)network->actor_input);
 }
 
@@ -156,6 +214,19 @@ float *network_heads(const Network *network, const NetworkOutputs *outputs) {
 
 float *network_theta(const Network *network, const NetworkOutputs *outputs) {
     return outputs->modulation.y[network->modulation.layers - 1];
+}
+
+/* [feet's estimates | clock of the newest frame]. */
+static void fill_modulation_input(const Network *network, int rows, const float *history,
+                                  const float *heads, float *input) {
+    const int feet = network->feet, clock = network->clock;
+    for (int r = 0; r < rows; r++) {
+        memcpy(input, heads + network->def.feet_velocity_offset, (size_t)feet * sizeof *input);
+        memcpy(input + feet, history + network->history - clock, (size_t)clock * sizeof *input);
+        history += network->history;
+        heads += network->heads;
+        input += feet + clock;
+    }
 }
 
 /* z~ = theta1 z + theta2 of one row, z: mu, a draw around it, or what there is instead. */
@@ -200,8 +271,9 @@ float *network_forward_instead(const Network *network, const float *parameters, 
                                const NetworkOutputs *outputs) {
     const float *heads = mlp_forward(&network->encoder, parameters, rows, history, network->history,
                                      &outputs->encoder);
-    mlp_forward(&network->modulation, parameters, rows, heads + network->def.feet_velocity_offset,
-                network->heads, &outputs->modulation);
+    fill_modulation_input(network, rows, history, heads, outputs->modulation_input);
+    mlp_forward(&network->modulation, parameters, rows, outputs->modulation_input,
+                network->feet + network->clock, &outputs->modulation);
     fill_actor_input(network, rows, history, instead, outputs);
     return mlp_forward(&network->actor, parameters, rows, outputs->actor_input,
                        network->actor_input, &outputs->actor);

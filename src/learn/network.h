@@ -1,11 +1,15 @@
 /* The five networks in one flat parameter array, and the forward pass of rollout, play and loss.
  *
  *   heads   = encoder(history), [estimates | mu | logvar]
- *   theta   = modulation(estimated feet velocities), [theta1 | theta2]
+ *   theta   = modulation(estimated feet velocities), [theta1 | theta2]; with
+ *             policy.modulation_input = feet_phase of [velocities | heights | clock]
  *   z~      = theta1 * z + theta2 (FiLM), z = mu; with ppo.sample_latent a draw, in training
  *   mean    = actor([newest frame | estimates | z~])
  *   decoded = decoder([z | estimates]) = [frame | ground], in the loss only, with a sampled z
- *   value   = critic(critic input) */
+ *   value   = critic(critic input)
+ *
+ * With policy.actor_phase = false the weights of the clock in the first layers of encoder and actor
+ * are 0 and stay 0, so that z, estimates and actor know nothing of it. */
 #ifndef MILD_NETWORK_H
 #define MILD_NETWORK_H
 
@@ -19,6 +23,7 @@
 
 #define NETWORK_ACTIONS_MAX 64
 #define NETWORK_MLPS 5
+#define NETWORK_CLOCK 2 /* last numbers of a frame: sin and cos of the gait's phase */
 
 typedef struct {
     PolicyDef def;
@@ -29,6 +34,8 @@ typedef struct {
     int history;          /* width: frames * observation */
     int heads;            /* width: estimates + 2 latent */
     int theta;            /* width: 2, or 2 latent */
+    int feet;             /* estimates that the modulation reads, from feet_velocity_offset on */
+    int clock;            /* numbers of the clock that it reads behind them: 0, NETWORK_CLOCK */
     int actor_input;      /* width: observation + estimates + latent */
     int decoder_input;    /* width: latent + estimates */
     int decoded_frame;    /* width of the frame in the decoder's output: observation, or 0 */
@@ -38,13 +45,18 @@ typedef struct {
 /* Checks the def and sets the offsets of the parameters. */
 MildStatus network_layout(Network *network, const PolicyDef *def, MildError *error);
 void network_initialise(const Network *network, float *parameters, uint64_t seed);
+/* Of a network with actor_phase = false: sets the weights of the clock to 0 in an array laid out as
+ * the parameters; bool, one of them is not 0. */
+void network_hide_clock(const Network *network, float *parameters);
+int network_sees_clock(const Network *network, const float *parameters);
 /* index < NETWORK_MLPS. */
 const Mlp *network_mlp(const Network *network, int index, const char **name);
 
 typedef struct {
     MlpOutputs encoder, modulation, actor;
-    float *actor_input; /* [rows][actor_input] */
-    const float *noise; /* [rows][latent] input: z = mu + e^(logvar/2) noise; NULL: z = mu */
+    float *modulation_input; /* [rows][feet + clock] */
+    float *actor_input;      /* [rows][actor_input] */
+    const float *noise;      /* [rows][latent] input: z = mu + e^(logvar/2) noise; NULL: z = mu */
 } NetworkOutputs;
 
 void network_carve(const Network *network, int rows, float *block, size_t *used,

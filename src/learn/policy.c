@@ -101,6 +101,7 @@ int policy_take_networks(Policy *policy, const Policy *from) {
     }
     memcpy(policy->parameters + own->log_std, from->parameters + other->log_std,
            (size_t)own->def.actions * sizeof(float));
+    network_hide_clock(own, policy->parameters);
     return 1;
 }
 

@@ -37,6 +37,20 @@ static const MildField *file_field(int index) {
     return index < SHAPE_FIELDS ? &shape_fields[index] : &policy_fields[index - SHAPE_FIELDS];
 }
 
+/* Keys that came after the first files. A file without them has their defaults, which are not
+ * written. */
+static int is_later(const MildField *field) {
+    return strcmp(field->name, "modulation_input") == 0 || strcmp(field->name, "actor_phase") == 0;
+}
+
+static int is_written(const MildField *field, const PolicyDef *def) {
+    const PolicyDef usual = policy_def_default();
+    char text[2][48];
+    mild_field_print(field, def, text[0], sizeof text[0]);
+    mild_field_print(field, &usual, text[1], sizeof text[1]);
+    return !is_later(field) || strcmp(text[0], text[1]) != 0;
+}
+
 static void add_tensor(PolicyTensors *tensors, const char *net, int index, const char *what,
                        const float *data, int rows, int columns) {
     char *name = tensors->name[tensors->count];
@@ -98,7 +112,9 @@ void policy_file_texts(const Network *network, const char *kind, const char *not
         add_text(texts, "task", network->def.task);
     }
     for (int f = 0; f < SHAPE_FIELDS + policy_field_count; f++) {
-        add_field(texts, file_field(f), &network->def);
+        if (is_written(file_field(f), &network->def)) {
+            add_field(texts, file_field(f), &network->def);
+        }
     }
     for (int f = 0; network->def.ground_count > 0 && f < DECODER_FIELDS; f++) {
         add_field(texts, &decoder_fields[f], &network->def);
@@ -157,7 +173,8 @@ MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef 
     }
     MildStatus status = MILD_OK;
     for (int f = 0; !status && f < SHAPE_FIELDS + policy_field_count; f++) {
-        status = take_field(file, path, file_field(f), 1, def, error);
+        const MildField *field = file_field(f);
+        status = take_field(file, path, field, !is_later(field), def, error);
     }
     for (int f = 0; !status && f < DECODER_FIELDS; f++) {
         status = take_field(file, path, &decoder_fields[f], 0, def, error);
@@ -209,6 +226,13 @@ MildStatus policy_file_parameters(const Safetensors *file, const char *path, con
                              "%s: holds weights that are not finite; take an older checkpoint",
                              path);
         }
+    }
+    if (network_sees_clock(network, parameters)) {
+        return mild_fail(
+            error, MILD_ERROR_FORMAT,
+            "%s: says policy.actor_phase = false, but its actor or encoder has weights "
+            "of the gait clock; give a file that `mild train` wrote",
+            path);
     }
     return check_strangers(file, path, &wanted, error);
 }

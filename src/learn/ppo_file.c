@@ -200,6 +200,24 @@ MildStatus ppo_save_learner(const Ppo *ppo, const char *path, const void *kept, 
     return save(ppo, path, &some, note, error);
 }
 
+/* Of [policy]; the first action noise may be another. */
+static MildStatus check_same_keys(const char *path, const PolicyDef *theirs, const PolicyDef *ours,
+                                  MildError *error) {
+    for (int f = 0; f < policy_field_count; f++) {
+        const MildField *field = &policy_fields[f];
+        char text[2][96];
+        mild_field_print(field, theirs, text[0], sizeof text[0]);
+        mild_field_print(field, ours, text[1], sizeof text[1]);
+        if (strcmp(text[0], text[1]) != 0 && strcmp(field->name, "init_std") != 0) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "%s: its policy.%s is '%.60s', this run's is '%.60s'; resume with the "
+                             "checkpoint's config",
+                             path, field->name, text[0], text[1]);
+        }
+    }
+    return MILD_OK;
+}
+
 static MildStatus check_same_network(const Safetensors *file, const char *path,
                                      const Network *network, MildError *error) {
     PolicyDef def;
@@ -219,7 +237,7 @@ static MildStatus check_same_network(const Safetensors *file, const char *path,
                 path, key, theirs, ours.text[i].value);
         }
     }
-    return MILD_OK;
+    return check_same_keys(path, &def, &network->def, error);
 }
 
 /* Momentum means another number to another optimiser, and Adam's second moments are missing after

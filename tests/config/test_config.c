@@ -211,6 +211,11 @@ TEST(test_layers) {
     const char *const crossed[] = {"ppo.learning_rate_min=0.1", "ppo.learning_rate_max=0.01"};
     assert_int_not_equal(experiment_read(&def, path, crossed, 2, &error), MILD_OK);
     assert_error(&error, MILD_ERROR_RANGE, "ppo.learning_rate_min");
+    const char *const no_clock[] = {"policy.modulation_input=feet_phase", "task.clock=false"};
+    assert_int_equal(experiment_read(&def, path, no_clock, 2, &error), MILD_ERROR_ARGUMENT);
+    assert_error(&error, MILD_ERROR_ARGUMENT, "policy.modulation_input task.clock");
+    assert_int_equal(experiment_read(&def, path, no_clock, 1, &error), MILD_OK);
+    assert_int_equal(def.policy.modulation_input, POLICY_INPUT_FEET_PHASE);
     remove(path);
 }
 

@@ -12,7 +12,8 @@ printf '[task]\nphysics_dt = 0.005\nobserve_noise = false\n[randomize]\nlatency 
     --actions exact.csv >/dev/null || fail "eval without noise"
 "$mild" eval --ground foam45 --trials 2 --seconds 1 --actions noisy.csv --latent latent.csv >/dev/null || fail "eval with noise"
 
-# another policy: other widths, one theta for each dimension of z, another task; every tensor random, so that nothing is 0 or 1
+# another policy: other widths, one theta for each dimension of z, which sees the clock in the place of the actor, another task; every
+# tensor random, so that nothing else is 0 or 1
 "$python" "$tests/make_policy.py" "$root/policies/mild.safetensors" other.safetensors || fail "make_policy.py"
 other=(--task.history_stride=3 --task.gait_period=0.7 --task.action_clip=0.6 --task.action_scale=0.3 --task.standing_below=0.5 --task.gait_slowing=0.4
     --task.gait_slow_below=0.9)
@@ -60,6 +61,8 @@ if ! short; then # no code of ours runs here: the C that was written, by a compi
     }
     fault "order of the heads" '*mu = heads + POLICY_ESTIMATES' '*mu = heads + POLICY_LATENT' policy.c
     fault "no modulation" 'theta[one] * mu[j] + theta[POLICY_THETA / 2 + one]' 'mu[j]' policy.c
+    fault "other estimates" 'heads + POLICY_FEET_VELOCITIES' 'heads' policy.c
+    fault "no clock" 'frame + POLICY_OBSERVATION - POLICY_CLOCK_INPUT' 'frame' policy.c
     fault "ReLU" 'expf(x) - 1' '0' policy.c
     fault "no last action" 'last[i] = state->action[i]' 'last[i] = 0' policy.c
     fault "no clip" 'a > clip ? clip : a;' 'a;' policy.c

@@ -1,5 +1,6 @@
 """The policy in numpy (examples/python/policy.py) against what `mild eval` saw and did, and against faults that it must not
-survive. Usage: test_policy.py SOURCE_FOLDER POLICY EXACT.csv NOISY.csv, of eval --actions without and with noise and delay."""
+survive. Usage: test_policy.py SOURCE_FOLDER POLICY EXACT.csv NOISY.csv OTHER OTHER.csv, of eval --actions without and with noise and
+delay, and of another policy, whose modulation sees the clock in the place of its actor."""
 
 import pathlib
 import sys
@@ -7,7 +8,7 @@ import sys
 import recorded
 
 TOLERANCE = 1e-5
-source, policy, exact, noisy = pathlib.Path(sys.argv[1]), *sys.argv[2:]
+source, policy, exact, noisy, other, moved = pathlib.Path(sys.argv[1]), *sys.argv[2:]
 text = (source / "examples/python/policy.py").read_text(encoding="utf-8")
 page = (source / "docs/policy.md").read_text(encoding="utf-8")
 
@@ -17,7 +18,7 @@ FAULTS = [
     ("heads[n : (n + len(heads)) // 2]", "heads[(n + len(heads)) // 2 :]", "action"),
     ("theta[:half] * mu + theta[half:]", "mu", "action"),  # no modulation
     ("theta[:half] * mu + theta[half:]", "theta[half:] * mu + theta[:half]", "action"),
-    ("estimates[3 : 3 + ", "estimates[:", "action"),
+    ("[estimates[3:], frame[-2:]]", "[estimates, frame[-2:]]", "action"),
     ('.weight"] @ x', '.weight"].T.reshape(self.tensors[f"{name}.{i}.weight"].shape) @ x', "action"),  # transposed weights
     ("np.expm1(np.minimum(x, 0))", "0", "action"),  # ReLU
     ("np.expm1(np.minimum(x, 0))", "0.01 * x", "action"),
@@ -42,13 +43,13 @@ FAULTS = [
 ]
 
 
-def worst(program, trials, own):
+def worst(program, trials, own, path=policy):
     """Largest error of the actions, and of the observations where the program makes its own (bool own)."""
     names = {}
     exec(compile(program, "policy.py", "exec"), names)  # the program under test, or one with a fault
     action = observation = 0.0
     for trial in trials:
-        runner = names["Policy"](policy)
+        runner = names["Policy"](path)
         runner.phase = trial.phase[0]
         for k in range(len(trial.action)):
             frame = trial.observation[k]
@@ -85,6 +86,11 @@ def main():
         error = worst(text.replace(old, new), walked[:1], True)[what]
         assert error > 100 * TOLERANCE, f"a fault is not noticed: '{new}' for '{old}': {error:.1e}"
         least[what] = min(least[what], error)
+    modulated = recorded.trials(moved)
+    error = worst(text, modulated, True, other)["action"]
+    unseen = worst(text.replace("frame[-2:]", "0 * frame[-2:]"), modulated, True, other)["action"]
+    print(f"a modulation with the clock: {error:.1e}, without it {unseen:.1e}")
+    assert error < TOLERANCE < 0.01 * unseen
     print(f"{len(FAULTS)} faults noticed, the least by {least['action']:.1e} and {least['observation']:.1e}")
 
 

@@ -9,7 +9,10 @@ printf '[task]\nphysics_dt = 0.005\nobserve_noise = false\n[randomize]\nlatency 
 "$mild" eval --config exact.ini --ground sand_loose --trials 2 --seconds 2 --stop 1.2 --sideways 0.1 --seed 3 \
     --actions exact.csv >/dev/null || fail "eval without noise"
 "$mild" eval --ground foam45 --trials 2 --seconds 1 --actions noisy.csv >/dev/null || fail "eval with noise"
-"$python" "$tests/test_policy.py" "$root" "$root/policies/mild.safetensors" exact.csv noisy.csv || fail "examples/python/policy.py"
+"$python" "$tests/make_policy.py" "$root/policies/mild.safetensors" other.safetensors || fail "make_policy.py"
+"$mild" eval --policy other.safetensors --config exact.ini --ground foam45 --trials 2 --seconds 1 --actions other.csv >/dev/null ||
+    fail "eval of another policy"
+"$python" "$tests/test_policy.py" "$root" "$root/policies/mild.safetensors" exact.csv noisy.csv other.safetensors other.csv || fail "examples/python/policy.py"
 
 # the CSV: every step of both trials, columns that docs/policy.md names; the same beside other outputs; a clip that holds
 [ "$(wc -l <noisy.csv)" = 201 ] || fail "$(wc -l <noisy.csv) lines for 200 steps"

@@ -243,10 +243,21 @@ TEST(gradients_are_those_of_the_cpu) {
     }
     def.modulation = 0;
     compare_learner(&small, &def, 37, 100, worst);
+    def.modulation = 1;
+    small.modulation_input = POLICY_INPUT_FEET_PHASE;
+    compare_learner(&small, &def, 37, 100, worst);
+    small.actor_phase = 0;
+    compare_learner(&small, &def, 37, 0, worst);
+    small.modulation_input = POLICY_INPUT_FEET;
+    compare_learner(&small, &def, 37, 100, worst);
 #ifndef EMULATED
     def = ppo_def_default();
     PolicyDef full = policy_def_default();
     compare_learner(&full, &def, 256, 0, worst);
+    full.modulation_input = POLICY_INPUT_FEET_PHASE;
+    full.actor_phase = 0;
+    compare_learner(&full, &def, 256, 0, worst);
+    full = policy_def_default();
     def.minibatches = 1;
     compare_learner(&full, &def, 1500, 0, worst);
     compare_learner(&full, &def, 1500, 10000, worst);

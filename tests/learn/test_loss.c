@@ -231,14 +231,32 @@ static void mlp_double(const Mlp *mlp, const double *p, const double *x, double 
     memcpy(y, out, (size_t)mlp->layer[mlp->layers - 1].out * sizeof *y);
 }
 
+/* Numbers that encoder and actor see: of frames that end with the clock, with 0 in its place if
+ * they are not to see it. */
+static void seen_double(const PolicyDef *d, const double *frames, int count, double *seen) {
+    for (int i = 0; i < count; i++) {
+        const int is_clock = i % d->observation >= d->observation - 2;
+        seen[i] = is_clock && !d->actor_phase ? 0.0 : frames[i];
+    }
+}
+
 /* noise: of the actor's z; NULL: z = mu. */
 static void act_double(const Network *n, const double *p, const double *history, const float *noise,
                        double *heads, double *mean) {
     const PolicyDef *d = &n->def;
-    double theta[64], input[64];
-    mlp_double(&n->encoder, p, history, heads);
-    mlp_double(&n->modulation, p, heads + d->feet_velocity_offset, theta);
-    memcpy(input, history + n->history - d->observation, (size_t)d->observation * sizeof *input);
+    const double *frame = history + n->history - d->observation;
+    const int from = d->feet_velocity_offset;
+    double theta[64], input[64], feet[64];
+    seen_double(d, history, n->history, input);
+    mlp_double(&n->encoder, p, input, heads);
+    if (d->modulation_input == POLICY_INPUT_FEET_PHASE) { /* all estimates behind the base's */
+        memcpy(feet, heads + from, (size_t)(d->estimates - from) * sizeof *feet);
+        memcpy(feet + d->estimates - from, frame + d->observation - 2, 2 * sizeof *feet);
+    } else {
+        memcpy(feet, heads + from, (size_t)d->feet_velocity_count * sizeof *feet);
+    }
+    mlp_double(&n->modulation, p, feet, theta);
+    seen_double(d, frame, d->observation, input);
     memcpy(input + d->observation, heads, (size_t)d->estimates * sizeof *input);
     for (int j = 0; j < d->latent; j++) {
         int a = d->modulation_per_dimension ? j : 0,
@@ -331,10 +349,27 @@ static double loss_double(const Case *c, const double *p) {
     return loss;
 }
 
+/* The weights of the clock as a network without it has them. */
+static void clear_clock(Case *c) {
+    const int observation = c->network.def.observation, actor = c->network.actor_input;
+    float *encoder = c->parameters + c->network.encoder.layer[0].weight;
+    float *first = c->parameters + c->network.actor.layer[0].weight;
+    for (int i = 0; !c->network.def.actor_phase && i < c->network.encoder.layer[0].out; i++) {
+        for (int k = 0; k < c->network.history; k++) {
+            const int is_clock = k % observation >= observation - 2;
+            encoder[i * c->network.history + k] *= is_clock ? 0.0f : 1.0f;
+        }
+    }
+    for (int i = 0; !c->network.def.actor_phase && i < c->network.actor.layer[0].out; i++) {
+        first[i * actor + observation - 2] = first[i * actor + observation - 1] = 0.0f;
+    }
+}
+
 static void fill_inputs(Case *c, Random *random) {
     LossChunk *k = &c->chunk;
     const PolicyDef *d = &c->network.def;
     fill_normal(c->parameters, c->network.count, 0.35, random);
+    clear_clock(c);
     fill_normal(k->history, ROWS * c->network.history, 1.0, random);
     fill_normal(k->estimate, ROWS * d->estimates, 1.0, random);
     fill_normal(k->decoder_target, ROWS * c->network.decoded, 1.0, random);
@@ -397,6 +432,21 @@ TEST(test_matches_differences) {
     def.feet_velocity_offset = 0; /* no first group of estimates */
     def.actor_hidden[0] = 0, def.actor_hidden[1] = 0, def.actor_hidden[2] = 0; /* a linear actor */
     check_differences(def, 1, 0.0, 0, 3);
+}
+
+/* Theta from the feet's estimates and the clock, and an actor that does not see the clock: each
+ * alone and both. */
+TEST(test_phase_matches_differences) {
+    PolicyDef def = small_def();
+    def.modulation_input = POLICY_INPUT_FEET_PHASE;
+    check_differences(def, 1, 0.0, 0, 21);
+    def.actor_phase = 0;
+    check_differences(def, 1, 0.0, 0, 22);
+    def.modulation_per_dimension = 1;
+    check_differences(def, 0, 0.0, 1, 23);
+    def.modulation_input = POLICY_INPUT_FEET;
+    def.actor_hidden[0] = 0, def.actor_hidden[1] = 0, def.actor_hidden[2] = 0;
+    check_differences(def, 1, 0.0, 0, 24);
 }
 
 /* What the decoder rebuilds, each part with the mean of its own; and free bits. */
@@ -480,10 +530,11 @@ static void claim(const float *block, size_t floats, char *taken, const float *a
 }
 
 /* Every array of a chunk has the rows and columns that loss.h gives it, for itself alone. */
-TEST(test_areas_are_apart) {
+static void areas_are_apart(int modulation_input, int feet, int input) {
     Case c;
     PolicyDef def = small_def();
     def.ground_count = 3;
+    def.modulation_input = modulation_input;
     case_open(&c, def);
     const Network *n = &c.network;
     const PolicyDef *d = &n->def;
@@ -519,6 +570,7 @@ TEST(test_areas_are_apart) {
                  {k->critic, ROWS, d->critic_input},
                  {k->old_value, ROWS, 1},
                  {k->returns, ROWS, 1},
+                 {k->outputs.modulation_input, all, input},
                  {k->outputs.actor_input, all, n->actor_input},
                  {k->decoder_input, ROWS, n->decoder_input},
                  {k->spread, ROWS, d->latent},
@@ -526,7 +578,7 @@ TEST(test_areas_are_apart) {
                  {k->d_heads, all, n->heads},
                  {k->d_theta, all, n->theta},
                  {k->d_actor_input, all, d->estimates + d->latent},
-                 {k->d_feet, all, d->feet_velocity_count},
+                 {k->d_feet, all, feet},
                  {k->d_decoded, ROWS, n->decoded},
                  {k->d_decoder_input, ROWS, n->decoder_input},
                  {k->d_value, ROWS, 1},
@@ -537,6 +589,11 @@ TEST(test_areas_are_apart) {
     }
     free(taken);
     case_close(&c);
+}
+
+TEST(test_areas_are_apart) {
+    areas_are_apart(POLICY_INPUT_FEET, 3, 3);
+    areas_are_apart(POLICY_INPUT_FEET_PHASE, 5, 7);
 }
 
 /* Every latent gets the log-variance b: it counts as held within -12 and 6. Without noise only the

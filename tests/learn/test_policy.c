@@ -198,6 +198,117 @@ TEST(test_answers) {
     policy_destroy(policy);
 }
 
+/* Acts on the same numbers but for the clock of the frames, which ends each: bool, what changed. */
+typedef struct {
+    int actions, estimates, latent, theta;
+} Changed;
+
+static Changed change_clock(Policy *policy, const PolicyInstead *instead) {
+    enum { ROWS = 3 };
+    float history[2][ROWS * 15], actions[2][ROWS * 2], estimates[2][ROWS * 6], latent[2][ROWS * 4],
+        theta[2][ROWS * 2];
+    Random random = random_at(13, 0, 0);
+    fill_normal(history[0], ROWS * 15, 1.0, &random);
+    fill_normal(history[1], ROWS * 15, 1.0, &random);
+    for (int k = 0; k < 2; k++) {
+        const PolicyInside inside = {
+            .estimates = estimates[k], .latent = latent[k], .theta = theta[k]};
+        for (int i = 0; i < ROWS * 15; i++) {
+            history[k][i] = i % 5 < 3 ? history[0][i] : history[k][i];
+        }
+        policy_act_inside(policy, NULL, ROWS, history[k], instead, actions[k], &inside);
+    }
+    return (Changed){memcmp(actions[0], actions[1], sizeof actions[0]) != 0,
+                     memcmp(estimates[0], estimates[1], sizeof estimates[0]) != 0,
+                     memcmp(latent[0], latent[1], sizeof latent[0]) != 0,
+                     memcmp(theta[0], theta[1], sizeof theta[0]) != 0};
+}
+
+/* A policy with weights in the place of those that start as 0, so that theta and the actions depend
+ * on all that they may. */
+static Policy *clock_policy(int input, int sees) {
+    MildError error = {0};
+    PolicyDef def = small_def();
+    def.modulation_input = input;
+    def.actor_phase = sees;
+    Policy *policy = policy_create(&def, 9, &error);
+    assert_non_null(policy);
+    const Mlp *mlp = &policy->network.modulation;
+    const MlpLayer *last = &mlp->layer[mlp->layers - 1];
+    Random random = random_at(14, 0, 0);
+    fill_normal(policy->parameters + last->weight, last->bias - last->weight, 0.5, &random);
+    return policy;
+}
+
+/* With actor_phase = false the clock changes the actions through theta or not at all, from the
+ * first weights on. */
+TEST(test_actor_without_the_clock) {
+    static const float theta[2] = {0.7f, -0.2f};
+    const PolicyInstead instead = {.theta = theta};
+    for (int input = 0; input < POLICY_INPUTS; input++) {
+        Policy *seeing = clock_policy(input, 1), *blind = clock_policy(input, 0);
+        const Changed own = change_clock(blind, NULL), held = change_clock(blind, &instead),
+                      usual = change_clock(seeing, &instead);
+        assert_int_equal(own.theta, input == POLICY_INPUT_FEET_PHASE);
+        assert_int_equal(own.actions, input == POLICY_INPUT_FEET_PHASE);
+        assert_false(own.estimates || own.latent);
+        assert_false(held.actions);
+        assert_true(usual.actions && usual.estimates && usual.latent && usual.theta);
+        assert_true(policy_take_networks(blind, seeing)); /* which must not bring the clock */
+        assert_false(change_clock(blind, &instead).actions || change_clock(blind, NULL).latent);
+        policy_destroy(seeing);
+        policy_destroy(blind);
+    }
+    Policy *velocities = clock_policy(POLICY_INPUT_FEET, 1),
+           *clock = clock_policy(POLICY_INPUT_FEET_PHASE, 1);
+    assert_false(policy_take_networks(clock, velocities));
+    policy_destroy(velocities);
+    policy_destroy(clock);
+}
+
+static char *file_of(const Policy *policy, size_t *size) {
+    MildError error = {0};
+    assert_int_equal(policy_save(policy, PATH, "", &error), MILD_OK);
+    return kit_read(PATH, size);
+}
+
+/* What theta reads and what the actor sees are in the file, unless they are as they always were. A
+ * file whose weights see the clock that it denies is refused. */
+TEST(test_clock_in_the_file) {
+    MildError error = {0};
+    size_t size;
+    for (int which = 0; which < 4; which++) {
+        const int input = which / 2, sees = which % 2;
+        Policy *policy = clock_policy(input, sees);
+        char *bytes = file_of(policy, &size);
+        assert_int_equal(strstr(bytes + 8, "\"policy.modulation_input\":\"feet_phase\"") != NULL,
+                         input);
+        assert_int_equal(strstr(bytes + 8, "modulation_input") != NULL, input);
+        assert_int_equal(strstr(bytes + 8, "\"policy.actor_phase\":\"false\"") != NULL, !sees);
+        assert_int_equal(strstr(bytes + 8, "actor_phase") != NULL, !sees);
+        Policy *loaded = policy_load(PATH, NULL, 0, &error);
+        assert_non_null(loaded);
+        assert_memory_equal(policy_def(loaded), policy_def(policy), sizeof(PolicyDef));
+        assert_int_equal(change_clock(loaded, NULL).latent, sees);
+        policy_destroy(loaded);
+        free(bytes);
+        policy_destroy(policy);
+    }
+    static const int places[][2] = {{0, 3}, {0, 14}, {5, 8}}; /* row, column of the encoder */
+    for (int k = 0; k < 4; k++) {
+        Policy *policy = clock_policy(POLICY_INPUT_FEET, 0);
+        const Network *n = &policy->network;
+        const int64_t place = k < 3 ? n->encoder.layer[0].weight + places[k][0] * 15 + places[k][1]
+                                    : n->actor.layer[0].weight + 7 * n->actor_input + 4;
+        policy->parameters[place] = 1e-3f;
+        free(file_of(policy, &size));
+        assert_null(policy_load(PATH, NULL, 0, &error));
+        assert_error(&error, MILD_ERROR_FORMAT, PATH " policy.actor_phase");
+        policy_destroy(policy);
+    }
+    unlink(PATH);
+}
+
 /* The spread of a new policy's weights is 1/sqrt(inputs), in each network's last layer less. */
 TEST(test_initial_spread) {
     static const double last_scale[NETWORK_MLPS] = {0.5, 1.0, 0.0, 0.02, 1.0};
@@ -613,6 +724,14 @@ TEST(test_unusable_defs) {
     def = small_def();
     def.feet_velocity_count = 6;
     assert_null(policy_create(&def, 1, &error));
+    for (int k = 0; k < 2; k++) {
+        def = small_def();
+        def.observation = 1;
+        def.modulation_input = k ? POLICY_INPUT_FEET_PHASE : POLICY_INPUT_FEET;
+        def.actor_phase = k;
+        assert_null(policy_create(&def, 1, &error));
+        assert_error(&error, MILD_ERROR_RANGE, "clock actor_phase feet_phase");
+    }
     static const int grounds[][3] = {{0, 8, 1}, {4, 4, 1}, {-1, 2, 1}, {3, -1, 1}, {3, 0, 0}};
     for (size_t i = 0; i < sizeof grounds / sizeof *grounds; i++) { /* of 7 numbers */
         def = small_def();

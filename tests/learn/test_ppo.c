@@ -311,6 +311,50 @@ TEST(test_modulation_that_does_not_learn) {
     }
 }
 
+/* Bool: the weight of an input of a network's first layer is 0 in every row. */
+static int is_blind(const Mlp *mlp, const float *parameters, int column) {
+    const MlpLayer *layer = &mlp->layer[0];
+    int blind = 1;
+    for (int row = 0; row < layer->out; row++) {
+        blind &= parameters[layer->weight + row * layer->in + column] == 0.0f;
+    }
+    return blind;
+}
+
+/* The weights of a clock that the actor does not see stay 0 while the others learn, whoever moves
+ * them, and in the mean of the weights. */
+TEST(test_clock_stays_unseen) {
+    for (int optimizer = 0; optimizer < PPO_OPTIMIZERS; optimizer++) {
+        Run run;
+        PpoDef def = toy_ppo_def();
+        def.optimizer = optimizer;
+        def.average = 0.5;
+        PolicyDef asked = toy_policy_def();
+        asked.modulation_input = POLICY_INPUT_FEET_PHASE;
+        asked.actor_phase = 0;
+        run_open_policy(&run, 2, 16, def, asked);
+        Network n;
+        assert_int_equal(network_layout(&n, policy_def(run.policy), NULL), MILD_OK);
+        run_iterations(&run, 3);
+        const float *const both[] = {policy_parameters(run.policy),
+                                     policy_parameters(ppo_average(run.ppo))};
+        for (int k = 0; k < 2; k++) {
+            for (int i = 0; i < n.history; i++) {
+                assert_int_equal(is_blind(&n.encoder, both[k], i),
+                                 i % TOY_OBSERVATION >= TOY_OBSERVATION - 2);
+            }
+            for (int i = 0; i < n.actor_input; i++) {
+                assert_int_equal(is_blind(&n.actor, both[k], i),
+                                 i == TOY_OBSERVATION - 2 || i == TOY_OBSERVATION - 1);
+            }
+            for (int i = 0; i < n.modulation.layer[0].in; i++) {
+                assert_false(is_blind(&n.modulation, both[k], i));
+            }
+        }
+        run_close(&run);
+    }
+}
+
 /* A decoder of another shape than its target needs. */
 TEST(test_decoder_must_fit) {
     static const int ground[PPO_TARGETS] = {0, 0, 2, 2}, frame[PPO_TARGETS] = {1, 1, 0, 1};

@@ -2,6 +2,8 @@
  * the CPU, MuJoCo's robots on mild_ground_solve, and the policies on oneDNN. */
 #include "page.h"
 
+#include "learn/network.h"
+
 /* Weights of 16 bits are within 2^-11 of those of the file. */
 static void policy_of(int which) {
     float worst = 0, largest = 0;
@@ -26,6 +28,79 @@ TEST(test_policy) {
     for (int i = ROBOTS - 1; i >= 0; i--) {
         policy_of(i);
     }
+}
+
+/* Twins of the policy and of its file whose modulation reads the feet's heights and the clock too,
+ * with this weight. */
+static const float phase_weight = 1;
+static const uint16_t phase_half = 0x3c00;
+
+static Policy *phase_policy(const MlpLayer *narrow, const MlpLayer *wide, int64_t count,
+                            const PolicyDef *def) {
+    Policy *other = policy_create(def, 1, NULL);
+    assert_non_null(other);
+    const float *from = policy_parameters(policy);
+    float *to = policy_parameters(other);
+    memcpy(to, from, (size_t)narrow->weight * sizeof *to);
+    memcpy(to + wide->bias, from + narrow->bias, (size_t)(count - narrow->bias) * sizeof *to);
+    for (int j = 0; j < wide->out; j++) {
+        for (int i = 0; i < wide->in; i++) {
+            to[wide->weight + j * wide->in + i] =
+                i < narrow->in ? from[narrow->weight + j * narrow->in + i] : phase_weight;
+        }
+    }
+    return other;
+}
+
+static size_t phase_file(const Mlp *encoder, const MlpLayer *narrow, int in, WebModel *file) {
+    const int more = (in - narrow->in) * narrow->out;
+    const MlpLayer *last = &encoder->layer[encoder->layers - 1];
+    const int64_t before = last->bias + last->out + (int64_t)narrow->in * narrow->out;
+    const uint16_t *from = (const uint16_t *)(const void *)(model + 1);
+    uint16_t *to = (uint16_t *)(void *)(file + 1);
+    *file = *model;
+    file->policy.modulation.width[0] = in;
+    file->weights += more;
+    memcpy(to, from, (size_t)before * sizeof *to);
+    for (int i = 0; i < more; i++) {
+        to[before + i] = phase_half;
+    }
+    memcpy(to + before + more, from + before, (size_t)(model->weights - before) * sizeof *to);
+    return sizeof *file + (size_t)file->weights * sizeof *to;
+}
+
+TEST(test_policy_with_the_phase) {
+    Network tight, phase;
+    PolicyDef def = *policy_def(policy);
+    WebModel *file = aligned_alloc(64, 2 << 20);
+    float worst = 0, matters = 0;
+    assert_non_null(file);
+    assert_int_equal(network_layout(&tight, &def, NULL), MILD_OK);
+    def.modulation_input = POLICY_INPUT_FEET_PHASE;
+    assert_int_equal(network_layout(&phase, &def, NULL), MILD_OK);
+    const MlpLayer *narrow = &tight.modulation.layer[0], *wide = &phase.modulation.layer[0];
+    assert_int_equal(wide->in, 8 + 2);
+    Policy *other = phase_policy(narrow, wide, tight.count, &def);
+    assert_non_null(web_open(file, phase_file(&tight.encoder, narrow, 9, file)));
+    assert_null(web_open(file, phase_file(&tight.encoder, narrow, wide->in, file)));
+    assert_null(web_start(preset("sand_loose"), WEB_LEVEL, 0));
+    for (int t = 0; t < SECOND / 4; t++) {
+        float mine[SA01_JOINTS], theirs[SA01_JOINTS], usual[SA01_JOINTS];
+        web_act(web_history(), mine);
+        policy_act(other, NULL, 1, web_history(), theirs, NULL, NULL);
+        policy_act(policy, NULL, 1, web_history(), usual, NULL, NULL);
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            worst = fmaxf(worst, fabsf(mine[i] - theirs[i]));
+            matters = fmaxf(matters, fabsf(usual[i] - theirs[i]));
+        }
+        web_step(0.6f, 0, 0);
+    }
+    printf(
+        "  with heights and clock: actions apart by at most %.1e (bound 1e-4), by %.2f without\n",
+        (double)worst, (double)matters);
+    assert_true(worst < 1e-4f && worst > 0 && matters > 0.1f);
+    policy_destroy(other);
+    free(file);
 }
 
 /* With the same actions the two see the same; the grounds' solvers differ by their tolerance, and

@@ -137,6 +137,8 @@ static void print_numbers(FILE *file, const Export *export) {
     print_int(file, "HELD", means * stride, "[-] older frames that are kept");
     print_int(file, "ESTIMATES", def->estimates, "[-] of velocities and heights");
     print_int(file, "FEET_VELOCITIES", def->feet_velocity_offset, "[-] their first estimate");
+    print_int(file, "FEET_INPUT", export->network->feet, "[-] estimates in the modulation's input");
+    print_int(file, "CLOCK_INPUT", export->network->clock, "[-] numbers of the clock behind them");
     print_int(file, "LATENT", def->latent, "[-] width of z");
     print_int(file, "THETA", export->network->theta, "[-] width of the modulation");
     print_int(file, "CLOCK", task->clock, "bool: the frame has the gait clock, else 0, 0");

@@ -249,6 +249,20 @@ static char *add_history(Graph *g, char *obs) {
     return "history";
 }
 
+/* The modulation's input: estimates of the feet, and the clock at the end of the frame where it is
+ * among them. */
+static char *add_feet(Graph *g, char *obs) {
+    const Network *network = g->export->network;
+    const int first = network->def.feet_velocity_offset, end = network->def.observation;
+    if (network->clock == 0) {
+        return add_slice(g, "feet_velocities", "heads", first, first + network->feet);
+    }
+    add_slice(g, "feet", "heads", first, first + network->feet);
+    add_slice(g, "clock", obs, end - network->clock, end);
+    set_int(add_node(g, "Concat", "feet_clock", 2, "feet", "clock"), "axis", 1);
+    return "feet_clock";
+}
+
 static void add_nodes(Graph *g) {
     const Network *network = g->export->network;
     const PolicyDef *def = &network->def;
@@ -264,9 +278,7 @@ static void add_nodes(Graph *g) {
     add_mlp(g, &network->encoder, "encoder", add_history(g, obs), "heads");
     add_slice(g, own, "heads", 0, estimates);
     add_slice(g, "mu", "heads", estimates, estimates + def->latent);
-    add_slice(g, "feet_velocities", "heads", def->feet_velocity_offset,
-              def->feet_velocity_offset + def->feet_velocity_count);
-    add_mlp(g, &network->modulation, "modulation", "feet_velocities", "theta");
+    add_mlp(g, &network->modulation, "modulation", add_feet(g, obs), "theta");
     add_slice(g, "theta1", "theta", 0, half);
     add_slice(g, "theta2", "theta", half, 2 * half);
     add_node(g, "Mul", "scaled", 2, "theta1", "mu");

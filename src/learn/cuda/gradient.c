@@ -99,10 +99,10 @@ static const float *forward(GpuLearner *g, int rows) {
     GpuQueue *q = &g->queue;
     const float *heads =
         gpu_mlp_forward(q, &n->encoder, g->parameters, rows, c->history, &c->encoder);
-    gpu_feet_input(q->stream, g->widths, rows, heads, c->feet);
+    const int newest = (n->def.frames - 1) * n->def.observation;
+    gpu_feet_input(q->stream, g->widths, rows, newest, c->history, heads, c->feet);
     const float *theta =
         gpu_mlp_forward(q, &n->modulation, g->parameters, rows, c->feet, &c->modulation);
-    const int newest = (n->def.frames - 1) * n->def.observation;
     gpu_actor_input(q->stream, g->widths, rows, newest, c->history, heads, actor_noise(g), theta,
                     c->actor_input);
     return gpu_mlp_forward(q, &n->actor, g->parameters, rows, c->actor_input, &c->actor);
@@ -308,6 +308,18 @@ static int images_before(const int *which, int from, int images, int end) {
     return next - from;
 }
 
+/* As network_hide_clock, in the gradient. */
+static void hide_clock(GpuLearner *g) {
+    const Network *n = &g->network;
+    const MlpLayer *encoder = &n->encoder.layer[0], *actor = &n->actor.layer[0];
+    if (!n->def.actor_phase) {
+        gpu_hide_clock(g->queue.stream, encoder->out, encoder->in, n->def.frames,
+                       n->def.observation, g->gradient + encoder->weight);
+        gpu_hide_clock(g->queue.stream, actor->out, actor->in, 1, n->def.observation,
+                       g->gradient + actor->weight);
+    }
+}
+
 void gpu_enqueue_gradient(GpuLearner *g, const GpuMinibatch *minibatch) {
     const int count = minibatch->cut[PPO_SHARDS_MAX], first = minibatch->first,
               images = ppo_mirrored(g->ppo, minibatch->cut, NULL);
@@ -334,4 +346,5 @@ void gpu_enqueue_gradient(GpuLearner *g, const GpuMinibatch *minibatch) {
         critic_half(g, &job);
         image += g->chunk.mirrored;
     }
+    hide_clock(g);
 }

@@ -271,19 +271,46 @@ void gpu_round(cudaStream_t stream, int64_t count, const float *from, GpuArray t
 
 /* ---- rows between the networks ---- */
 
-template <class T>
-static __global__ void feet_input(GpuWidths w, uint32_t count, const float *heads, void *feet) {
-    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.feet;
+static __global__ void hide_clock(int64_t count, int pitch, int frames, int observation,
+                                  float *weight) {
+    const int64_t i = item();
     if (i < count) {
-        const int column = (int)(i % pitch);
-        const float *h = heads + (int64_t)(i / pitch) * w.heads + w.feet_offset;
-        number_write((T *)feet + i, column < w.feet_count ? h[column] : 0.0f);
+        float *clock = weight + i / frames * pitch + (i % frames + 1) * observation;
+        clock[-2] = 0.0f;
+        clock[-1] = 0.0f;
     }
 }
 
-void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, const float *heads, GpuArray feet) {
+void gpu_hide_clock(cudaStream_t stream, int rows, int pitch, int frames, int observation,
+                    float *weight) {
+    const int64_t count = (int64_t)rows * frames;
+    LAUNCH(hide_clock, blocks_of(count), line, stream, count, pitch, frames, observation, weight);
+}
+
+template <class T>
+static __global__ void feet_input(GpuWidths w, uint32_t count, int newest, const void *history,
+                                  const float *heads, void *feet) {
+    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.feet;
+    if (i >= count) {
+        return;
+    }
+    const int64_t r = i / pitch;
+    const int column = (int)(i % pitch), clock = column - w.feet_input;
+    const T *end = (const T *)history + r * w.history + newest + w.observation;
+    float x = 0.0f;
+    if (clock < 0) {
+        x = heads[r * w.heads + w.feet_offset + column];
+    } else if (clock < w.clock_input) {
+        x = number_read(end[clock - w.clock_input]);
+    }
+    number_write((T *)feet + i, x);
+}
+
+void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, int newest, GpuArray history,
+                    const float *heads, GpuArray feet) {
     const int64_t count = (int64_t)rows * w.feet;
-    LAUNCH_FOR(feet, feet_input, blocks_of(count), line, stream, w, (uint32_t)count, heads, feet.at)
+    LAUNCH_FOR(feet, feet_input, blocks_of(count), line, stream, w, (uint32_t)count, newest,
+               history.at, heads, feet.at)
 }
 
 /* A number of the input [newest frame | estimates | theta1 z + theta2]. */
@@ -515,7 +542,7 @@ static __global__ void heads_backward(GpuWidths w, GpuHeads h, int rows, int all
         const int64_t r = first + within / (uint32_t)w.heads;
         const int column = (int)(within % (uint32_t)w.heads), foot = column - ends[0];
         float *d = h.d_heads + r * w.heads + column;
-        if (r < all && foot >= 0 && column < ends[1]) {
+        if (r < all && foot >= 0 && foot < w.feet_input) {
             *d += h.d_feet[r * w.feet + foot];
         }
         if (r >= rows || column >= w.estimates + w.latent) {

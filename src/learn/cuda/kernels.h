@@ -68,15 +68,22 @@ void gpu_round(cudaStream_t stream, int64_t count, const float *from, GpuArray t
 typedef struct {
     int modulation; /* bool: it learns */
     int observation, estimates, latent, per_dimension, feet_offset, feet_count, actions;
+    int feet_input, clock_input; /* numbers of both kinds in the modulation's input */
     int decoded_frame, ground_offset, ground_count; /* of the decoder's target */
     int critic_input;                               /* from row to row in the rollout */
     /* pitches */
     int history, heads, feet, theta, actor_input, action, decoder_input, decoded, value;
 } GpuWidths;
 
-/* feet [rows][feet]: the estimated feet velocities, the modulation's input. */
-void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, const float *heads, GpuArray feet);
-/* newest: first column of the newest frame in history. noise: [rows][latent] of z; NULL: z = mu. */
+/* Sets the columns of the gait clock in `frames` frames to 0: the last two numbers of each. weight
+ * [rows][pitch]. */
+void gpu_hide_clock(cudaStream_t stream, int rows, int pitch, int frames, int observation,
+                    float *weight);
+/* feet [rows][feet]: the modulation's input, estimates of the feet and then the clock. newest:
+ * first column of the newest frame in history. */
+void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, int newest, GpuArray history,
+                    const float *heads, GpuArray feet);
+/* newest: as above. noise: [rows][latent] of z; NULL: z = mu. */
 void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, GpuArray history,
                      const float *heads, const float *noise, const float *theta, GpuArray input);
 void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
@@ -115,7 +122,7 @@ void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const f
                              float *d_heads, float *d_theta);
 
 /* Adds the gradient of the regression for the first `rows` of `all`, and that of the modulation
- * through the feet velocities for all. */
+ * through the feet's estimates for all. */
 typedef struct {
     float estimate_weight, latent_weight; /* of a sample */
     float free_bits;

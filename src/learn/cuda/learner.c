@@ -66,6 +66,8 @@ static void set_sizes(GpuLearner *g, int envs) {
                             .per_dimension = def->modulation_per_dimension,
                             .feet_offset = def->feet_velocity_offset,
                             .feet_count = def->feet_velocity_count,
+                            .feet_input = n->feet,
+                            .clock_input = n->clock,
                             .actions = def->actions,
                             .decoded_frame = n->decoded_frame,
                             .ground_offset = def->ground_offset,

@@ -57,6 +57,11 @@ MildStatus experiment_check(const ExperimentDef *def, MildError *error) {
                          "ppo.learning_rate_min %g is above ppo.learning_rate_max %g",
                          def->ppo.learning_rate_min, def->ppo.learning_rate_max);
     }
+    if (def->policy.modulation_input == POLICY_INPUT_FEET_PHASE && !def->task.clock) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "policy.modulation_input = feet_phase reads the gait clock of the "
+                         "observation; give task.clock = true");
+    }
     if (train_device(&def->train) < -1) {
         return mild_fail(error, MILD_ERROR_RANGE, "train.device = %s: neither cpu, cuda nor cuda:N",
                          def->train.device);

@@ -65,17 +65,21 @@ static void run_network(const Layer *layer, int layers, const float *x, float *y
 #define COUNT(array) ((int)(sizeof(array) / sizeof *(array)))
 #define WHOLE(width) (((width) + LANES - 1) / LANES * LANES)
 
-/* [estimates | mu | log variance] = encoder(history), z = theta1 mu + theta2, and the action of
- * [frame | estimates | z]. */
+/* [estimates | mu | log variance] = encoder(history), theta of the feet's estimates and, as the
+ * policy has it, the clock, z = theta1 mu + theta2, and the action of [frame | estimates | z]. */
 static void run_policy(PolicyState *state, const float *history, float *action) {
     const float *frame = history + POLICY_MEANS * POLICY_OBSERVATION;
     float heads[WHOLE(POLICY_ESTIMATES + 2 * POLICY_LATENT)], theta[WHOLE(POLICY_THETA)];
+    float feet[POLICY_FEET_INPUT + POLICY_CLOCK_INPUT];
     float input[POLICY_OBSERVATION + POLICY_ESTIMATES + POLICY_LATENT];
     float raw[WHOLE(POLICY_JOINTS)];
     float *z = input + POLICY_OBSERVATION + POLICY_ESTIMATES;
     const float *mu = heads + POLICY_ESTIMATES;
     run_network(encoder, COUNT(encoder), history, heads);
-    run_network(modulation, COUNT(modulation), heads + POLICY_FEET_VELOCITIES, theta);
+    memcpy(feet, heads + POLICY_FEET_VELOCITIES, POLICY_FEET_INPUT * sizeof *feet);
+    memcpy(feet + POLICY_FEET_INPUT, frame + POLICY_OBSERVATION - POLICY_CLOCK_INPUT,
+           POLICY_CLOCK_INPUT * sizeof *feet);
+    run_network(modulation, COUNT(modulation), feet, theta);
     memcpy(input, frame, POLICY_OBSERVATION * sizeof *input);
     memcpy(input + POLICY_OBSERVATION, heads, POLICY_ESTIMATES * sizeof *input);
     for (int j = 0; j < POLICY_LATENT; j++) {
