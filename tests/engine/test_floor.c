@@ -90,7 +90,7 @@ static void compare(const EngineModel *model, const RobotSim *sim, Worst *worst)
     worst->steps++;
     worst->points += engine.floor.points;
     worst->bodies += sim->rows - sim->robot->def.feet;
-    worst->limited += limit_held(work, 0);
+    worst->limited += (int)work->held[0] & 1; /* a joint is beyond its limit */
     worst->newton = work->newton > worst->newton ? work->newton : worst->newton;
 }
 
