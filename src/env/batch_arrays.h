@@ -58,7 +58,8 @@ typedef struct {
     float *position, *rotation, *velocity, *inverse_inertia, *free_velocity, *height;
     MildBatchFoot *foot; /* of which depth_mean is the engine's on rigid ground */
 } EnvsContact;
-/* Bodies with shells that stand on soft ground (ground/batch/bodies.h). */
+/* Bodies with shells that stand: on soft ground by ground/batch/bodies.h, on rigid ground by
+ * robot/engine/floor.h. */
 struct BodiesSetup;
 typedef struct {
     const struct BodiesSetup *setup; /* NULL: there are none */

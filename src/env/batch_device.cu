@@ -28,6 +28,9 @@ enum {
 };
 
 static const size_t work_bytes = ENVS_WARPS * sizeof(EnvWork);
+static const size_t shells_bytes = sizeof(EnvShellsWork) > sizeof(EnvFloorWork)
+                                       ? sizeof(EnvShellsWork)
+                                       : sizeof(EnvFloorWork);
 
 static __device__ long warp_robot(void) {
     return (long)blockIdx.x * ENVS_WARPS + threadIdx.x / LANES;
@@ -87,7 +90,12 @@ static __global__ void __launch_bounds__(LANES *SHELLS_WARPS, SHELLS_BLOCKS)
         if (own >= count) {
             return;
         }
-        env_shells_step(&all, all.shells.list[own], (EnvShellsWork *)shared, HEAP);
+        const long robot = all.shells.list[own];
+        if (!all.rigid[robot]) {
+            env_shells_step(&all, robot, (EnvShellsWork *)shared, HEAP);
+        } else if (TEAM_WARP == 0) {
+            env_floor_step(&all, robot, (EnvFloorWork *)shared);
+        }
         __syncthreads();
     }
 }
@@ -222,8 +230,8 @@ static const char *kernels_open(int device) {
     cudaFuncSetAttribute(part<0, 1>, most, (int)work_bytes);
     cudaFuncSetAttribute(part<1, 1>, most, (int)work_bytes);
     cudaFuncSetAttribute(pose, most, (int)work_bytes);
-    cudaFuncSetAttribute(shells<0>, most, (int)sizeof(EnvShellsWork));
-    cudaFuncSetAttribute(shells<1>, most, (int)sizeof(EnvShellsWork));
+    cudaFuncSetAttribute(shells<0>, most, (int)shells_bytes);
+    cudaFuncSetAttribute(shells<1>, most, (int)shells_bytes);
     return launched();
 }
 
@@ -253,7 +261,7 @@ static const char *kernels_shells(const EnvsArrays *all, int k, void *stream) {
     const int steps = all->envs < SHELLS_ROBOTS ? all->envs : SHELLS_ROBOTS;
     find<<<looked, LANES * FIND_WARPS, 0, (cudaStream_t)stream>>>(*all, k);
     const auto run = all->shells.heap ? shells<1> : shells<0>;
-    run<<<steps, LANES * SHELLS_WARPS, sizeof(EnvShellsWork), (cudaStream_t)stream>>>(*all);
+    run<<<steps, LANES * SHELLS_WARPS, shells_bytes, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 

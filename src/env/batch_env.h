@@ -22,7 +22,7 @@ typedef struct {
     int diverged; /* bool: in this policy step */
 } EnvRobot;
 
-/* Besides, where shells stand. */
+/* Besides, where shells stand, on either ground. */
 typedef struct {
     alignas(16) EngineSavedLinks links; /* of a robot with shells near the ground */
     Real load;                          /* [N] on the shells, vertical, in the last step */

@@ -29,8 +29,15 @@ void envs_host_part(const EnvsArrays *all, const EnvsStep *call, int k, long rob
 
 void envs_host_shells(const EnvsArrays *all, int k, long robot) {
     EnvShellsWork work;
+    EnvFloorWork floor;
     work.engine.count = work.ground.count = 0; /* gcc does not see that a lane sets them */
-    if (env_shells_wait(all, robot) && env_shells_find(all, robot, k)) {
+    floor.floor.count = floor.floor.points = 0;
+    if (!env_shells_wait(all, robot) || !env_shells_find(all, robot, k)) {
+        return;
+    }
+    if (all->rigid[robot]) {
+        env_floor_step(all, robot, &floor);
+    } else {
         env_shells_step(all, robot, &work, 1);
     }
 }

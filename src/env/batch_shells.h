@@ -1,9 +1,9 @@
-/* Soft ground under the shells of a robot, where these stand: a step of their own for robots that
- * have one near the ground. All others are stepped as without shells. */
+/* The ground under the shells of a robot, where these stand: a step of their own for robots that have
+ * one near the ground. All others are stepped as without shells. Rigid ground: batch_floor.h. */
 #ifndef ENVS_BATCH_SHELLS_H
 #define ENVS_BATCH_SHELLS_H
 
-#include "env/batch_env.h"
+#include "env/batch_floor.h"
 #include "ground/batch/bodies.h"
 #include "robot/engine/ground.h"
 #include "robot/engine/shells.h"
@@ -45,14 +45,20 @@ MILD_HD int env_body_near(const EnvsArrays *all, const EngineGround *ground, con
 WARP_FN void env_shells_near(const EnvsArrays *all, long robot, const EngineGround *ground,
                              const EngineWork *work) {
     const EngineTree *tree = &all->model->tree;
-    Real bit[LANE_COPIES];
-    EACH_LANE(l) {
-        bit[l] = 0;
-        if (LANE(l) < tree->bodies && env_body_near(all, ground, work, LANE(l))) {
-            bit[l] = (Real)(1 << LANE(l));
+    const BodiesSetup *setup = all->shells.setup;
+    int near;
+    if (all->rigid[robot]) {
+        near = engine_floor_near(all->model, work, ground, setup->steepest);
+    } else {
+        Real bit[LANE_COPIES];
+        EACH_LANE(l) {
+            bit[l] = 0;
+            if (LANE(l) < tree->bodies && env_body_near(all, ground, work, LANE(l))) {
+                bit[l] = (Real)(1 << LANE(l));
+            }
         }
+        near = (int)lane_sum(bit);
     }
-    const int near = (int)lane_sum(bit);
     if (!near) {
         return;
     }
@@ -78,7 +84,7 @@ WARP_FN int env_body_touches(const EnvsArrays *all, long robot, int at, const Re
            bodies_touch(setup, at, position, rotation, twist, origin, height);
 }
 
-/* Of the bits in `near`, those of bodies with an element that may touch the ground in this step. */
+/* Of the bits in `near`, those of bodies with an element that may touch soft ground in this step. */
 WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, int near) {
     const EngineModel *model = all->model;
     const BodiesSetup *setup = all->shells.setup;
@@ -139,18 +145,24 @@ WARP_FN void env_shells_leave(const EnvsArrays *all, long robot, int near) {
 }
 
 /* After part k of a policy step: which bodies may touch the ground, in `near`. The others forget,
- * and in a new episode all do. Bool: env_shells_step is to follow. */
+ * and in a new episode all do; on rigid ground there is nothing to remember. Bool: env_shells_step
+ * is to follow, or env_floor_step. */
 WARP_FN int env_shells_find(const EnvsArrays *all, long robot, int k) {
     const int listed = all->shells.near[robot];
-    const int near = listed ? env_shells_touch(all, robot, listed) : 0;
+    const int rigid = all->rigid[robot];
     const int held = all->shells.held[robot];
-    if (held) {
-        env_shells_leave(all, robot, k == 0 && all->reset[robot] ? 0 : near);
+    int near = 0;
+    if (listed) {
+        near = rigid ? env_floor_touch(all, robot, listed) : env_shells_touch(all, robot, listed);
     }
+    if (held) {
+        env_shells_leave(all, robot, rigid || (k == 0 && all->reset[robot]) ? 0 : near);
+    }
+    lanes_sync(); /* all have read what lane 0 writes */
     EACH_LANE(l) {
         if (LANE(l) == 0) {
             all->shells.near[robot] = (uint8_t)near;
-            all->shells.held[robot] = near != 0;
+            all->shells.held[robot] = near != 0 && !rigid;
             if (!near) {
                 env_shells_at(all, robot)->load = 0;
             }

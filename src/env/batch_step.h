@@ -2,7 +2,8 @@
  * for a GPU by batch_device.cu, for any robot or for one size alone.
  *
  *     env_part(0)      a warp: action, and the first physics step up to the ground
- *     env_shells(0)    a warp: the ground under robots with shells near it, where shells stand
+ *     env_shells(0)    a warp: the ground under robots with shells near it, where shells stand; on
+ *                      rigid ground what env_part(1) would do of it
  *     mild_batch_step    the ground under the others
  *     env_part(1)      a warp: the rest of that physics step, the next one up to the ground
  *     ...
@@ -22,13 +23,6 @@
 #include "env/task/step.h"
 #include "robot/engine/measure.h"
 #include "robot/engine/step.h"
-
-/* What is under a robot. */
-MILD_HD EngineGround env_surface(const EnvsArrays *all, long robot) {
-    const EngineGround ground = {all->task->has_map ? &all->task->map : NULL,
-                                 all->map_origin + 2 * robot, 0};
-    return ground;
-}
 
 /* [B] Of a TaskEnv and its frames. */
 MILD_HD size_t env_stride(const TaskDef *def, const TaskShape *shape) {
@@ -168,63 +162,7 @@ WARP_FN void env_motors(const EnvsArrays *all, const TaskEnv *env, int late, int
     lanes_sync();
 }
 
-/* [m] Mean depth of the corners of a foot that pushed in the last step. */
-MILD_HD Real env_corner_depth(const EngineModel *model, const EnvWork *scratch, int foot) {
-    const EngineTree *tree = &model->tree;
-    const EngineContact *contact = &scratch->work.now.support.ground.contact;
-    Real sum = 0;
-    Real pushing = 0;
-    LANE_ROLLED
-    for (int c = tree->corner_begin[foot]; c < tree->corner_begin[foot + 1]; c++) {
-        int pushes = 0;
-        LANE_ROLLED
-        for (int e = 4 * c; e < 4 * c + 4; e++) {
-            pushes |= contact->weight[e] > 0 && contact->residual[e] < 0;
-        }
-        sum += pushes ? scratch->corner[c] : 0;
-        pushing += (Real)pushes;
-    }
-    return pushing > 0 ? sum / pushing : 0;
-}
-
-MILD_HD EngineRigid env_contact(const TaskVariation *variation) {
-    const EngineRigid rigid = {(Real)variation->rigid_friction, (Real)variation->rigid_time};
-    return rigid;
-}
-
-/* Rigid ground, after engine_begin. */
-WARP_FN void env_rigid(const EngineModel *model, EngineRigid rigid, const EngineGround *ground,
-                       EnvWork *scratch) {
-    EngineWork *work = &scratch->work;
-    const MapSpot spot = engine_spot(ground, work);
-    engine_collide_on(model, rigid, ground, work);
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int c = LANE(l); c < engine_corners(&model->tree); c += LANES) {
-            Real center[3];
-            corner_center(model, work, c, center);
-            const EngineSurface under = engine_surface(ground, work, &spot, center[0], center[1]);
-            const Real square =
-                1 + under.slope[0] * under.slope[0] + under.slope[1] * under.slope[1];
-            scratch->corner[c] =
-                (under.height - work->base[2] - center[2]) * REAL_INVERSE_SQRT(square) +
-                model->number.foot[model->tree.corner_foot[c]].corner_radius;
-        }
-    }
-    lanes_sync();
-}
-
-/* Copies as many lanes as there are. */
-WARP_FN void env_copy(const Real *from, int count, Real *to) {
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int i = LANE(l); i < count; i += LANES) {
-            to[i] = from[i];
-        }
-    }
-}
-
-/* The same of a multiple of four, from and to multiples of 16 bytes. */
+/* env_copy of a multiple of four, from and to multiples of 16 bytes. */
 WARP_FN void env_copy4(const Real *from, int count, Real *to) {
     EACH_LANE(l) {
         ENGINE_LOOP
@@ -330,22 +268,22 @@ WARP_FN void env_act(const EnvsArrays *all, const EnvsStep *call, long robot, Ta
     lanes_sync();
 }
 
-/* From the ground's forces to the next state. */
-WARP_FN int env_finish_step(const EnvsArrays *all, long robot, const TaskEnv *env,
+/* From the ground's forces to the next state. solved: bool, by env_floor_step. */
+WARP_FN int env_finish_step(const EnvsArrays *all, long robot, const TaskEnv *env, int solved,
                             EnvWork *scratch) {
     const EngineModel *model = all->model;
     EngineWork *work = &scratch->work;
     const int rigid = env->variation.rigid;
     const int feet = engine_feet(&model->tree);
-    if (rigid) {
+    if (rigid && !solved) {
         const EngineGround ground = env_surface(all, robot);
         env_rigid(model, env_contact(&env->variation), &ground, scratch);
     } else {
         env_import(all, robot, work);
     }
-    const int bad = engine_end(model, rigid, work);
+    const int bad = solved ? engine_integrate(model, work) : engine_end(model, rigid, work);
     EACH_LANE(l) {
-        if (rigid && LANE(l) < feet) {
+        if (rigid && !solved && LANE(l) < feet) {
             all->contact.foot[robot * feet + LANE(l)].depth_mean =
                 env_corner_depth(model, scratch, LANE(l));
         }
@@ -403,7 +341,10 @@ WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, i
     EnvRobot *own = env_robot_at(all, robot);
     const EngineTree *tree = &all->model->tree;
     const int steps = env_physics_steps(all->task);
+    int solved = 0;
     if (shells) {
+        solved = env->variation.rigid && all->shells.near[robot];
+        lanes_sync(); /* before lane 0 writes there */
         env_shells_away(all, robot);
     }
     if (k == 0) {
@@ -415,7 +356,7 @@ WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, i
             return;
         }
         engine_restore(tree, env->variation.rigid, &own->saved, &scratch->work);
-        if (env_finish_step(all, robot, env, scratch)) {
+        if (env_finish_step(all, robot, env, solved, scratch)) {
             return;
         }
     }
@@ -434,10 +375,10 @@ WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, i
         }
         if (!env->variation.rigid) {
             env_export(all, robot, &scratch->work);
-            if (shells) {
-                const EngineGround ground = env_surface(all, robot);
-                env_shells_near(all, robot, &ground, &scratch->work);
-            }
+        }
+        if (shells) {
+            const EngineGround ground = env_surface(all, robot);
+            env_shells_near(all, robot, &ground, &scratch->work);
         }
     } else {
         env_store(all->model, scratch, env);

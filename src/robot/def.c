@@ -55,7 +55,7 @@ static const MildField robot_fields[] = {
     RT(model, "[text] MJCF file in the folder"),
     RT(source, "[text] source of the numbers, and their licence"),
     RT(base, "[text] body with the free joint"),
-    TEXT(RobotText, shells, "[text] geoms of the MJCF that must not touch the ground"),
+    TEXT(RobotText, shells, "[text] geoms of the MJCF that stand as soles do"),
     R(shell_spacing, 1, 1e-3, 1, "[m] distance of the ground elements of the shells"),
     TEXT(RobotText, legs, "[text] geoms of the MJCF by which the legs touch each other"),
     R(height, 1, 0.01, 5, "[m] wanted height of the base above the stance soles"),

@@ -5,7 +5,9 @@
 #include "robot/limits.h"
 
 #define ROBOT_NAME_SIZE 64
-#define ROBOT_SHELLS_MAX 32   /* geoms that must not touch the ground */
+#define ROBOT_SHELLS_MAX 32   /* geoms beside soles that meet the ground */
+#define ROBOT_SHELL_CORNERS 8 /* of a box */
+#define ROBOT_FLOOR_POINTS 64 /* of shells that touch rigid ground at once, at most */
 #define ROBOT_CAPSULES_MAX 16 /* geoms by which legs touch each other */
 #define ROBOT_LEG_PAIRS_MAX 64
 #define ROBOT_OUTLINE_MAX 128 /* points of a sole's outline */

@@ -26,11 +26,12 @@ typedef struct {
     int shared[ROBOT_BODIES_MAX]; /* how many of the leading ones also move the other body */
 } RobotLimb;
 
-/* A part of a body that must not touch the ground: a box inflated by a radius. Spheres and capsules
- * are inflated boxes of zero width. */
+/* A part of a body that meets the ground: a box inflated by a radius. Spheres and capsules are
+ * inflated boxes of zero width. */
 typedef struct {
     int body;
     int limb;           /* number of the body in Robot.limb */
+    int floor_geom;     /* of the body in Robot.model, for contacts with rigid ground */
     int on_base;        /* bool: of the base, or of a body welded to it */
     double center[3];   /* [m] body frame */
     double rotation[9]; /* [-] box -> body, row major */
@@ -63,7 +64,7 @@ typedef struct Robot {
     int floor_geom;
     RobotLimb limb[ROBOT_BODIES_MAX];
     int shell_bodies;                /* limbs behind the feet */
-    int shells_stand;                /* bool: they stand on soft ground */
+    int shells_stand;                /* bool: they stand */
     int pairs;                       /* of mirrored feet */
     int pair[ROBOT_FEET_MAX / 2][2]; /* left foot, right foot */
     int dof[ROBOT_JOINTS_MAX];       /* of joint i in the engine: qvel[dof], qpos[dof + 1] */
@@ -99,6 +100,8 @@ int robot_geom_body(const Robot *robot, int geom, MildError *error);
 /* Sets the degrees of freedom of a limb from its body, and those that it shares with the limbs
  * before it. */
 void robot_read_limb(Robot *robot, int limb);
+/* Centre of corner c < ROBOT_SHELL_CORNERS of a shell's box, body frame. Bool: it has one. */
+int robot_shell_corner(const RobotShell *shell, int c, double center[3]);
 /* The shells of a limb behind the feet, as mild_sole_surface takes them. Returns how many. */
 int robot_shell_shapes(const Robot *robot, int limb, MildShape shapes[ROBOT_SHELLS_MAX]);
 

@@ -10,6 +10,8 @@
  * many degrees is not plausible. */
 #define FULL_TURN 6.3
 
+#define NEVER 1e9 /* [m] a geom so far in the floor touches it */
+
 #define COPIES_MAX 2e6 /* elements that mjs_delete may copy in all: one or two seconds */
 
 /* Refuses features that our step does not compute. Ignoring them silently would simulate a
@@ -157,6 +159,35 @@ static mjsGeom *add_geom(mjsBody *body, const char *name, mjtGeom type) {
     return geom;
 }
 
+/* A pair of the floor and a geom. */
+static mjsPair *add_pair(mjSpec *spec, const char *geom) {
+    static const double friction[5] = {0.8, 0.8, 0.005, 0.0001, 0.0001};
+    mjsPair *pair = mjs_addPair(spec, NULL);
+    mjs_setString(pair->geomname1, "floor");
+    mjs_setString(pair->geomname2, geom);
+    pair->condim = 3;
+    memcpy(pair->friction, friction, sizeof friction);
+    return pair;
+}
+
+/* Gives each body with shells a geom, which MuJoCo never finds in contact: rigid_collide adds the
+ * contacts of shells that stand, and each needs a geom of its body. */
+static void add_shells(const RobotDef *def, const mjModel *visual, mjSpec *spec) {
+    for (int s = 0; s < def->shells; s++) {
+        const int geom = mj_name2id(visual, mjOBJ_GEOM, def->shell[s]);
+        const char *of =
+            geom < 0 ? NULL : mj_id2name(visual, mjOBJ_BODY, visual->geom_bodyid[geom]);
+        mjsBody *body = of ? mjs_findBody(spec, of) : NULL;
+        char name[32];
+        snprintf(name, sizeof name, "shell_%d", body ? visual->geom_bodyid[geom] : 0);
+        if (!body || mjs_findElement(spec, mjOBJ_GEOM, name)) {
+            continue; /* robot_read_shells has the message; or the body has one already */
+        }
+        add_geom(body, name, mjGEOM_SPHERE)->size[0] = 1e-3;
+        add_pair(spec, name)->margin = -NEVER;
+    }
+}
+
 /* Adds the engine's rigid ground: a floor, and the spheres that each foot stands on. */
 static MildStatus add_rigid_ground(const RobotDef *def, const char *path, mjSpec *spec,
                                    MildError *error) {
@@ -175,12 +206,7 @@ static MildStatus add_rigid_ground(const RobotDef *def, const char *path, mjSpec
             mjsGeom *corner = add_geom(body, name, mjGEOM_SPHERE);
             corner->size[0] = foot->corner_radius;
             memcpy(corner->pos, foot->corners + 3 * c, sizeof corner->pos);
-            mjsPair *pair = mjs_addPair(spec, NULL);
-            static const double friction[5] = {0.8, 0.8, 0.005, 0.0001, 0.0001};
-            mjs_setString(pair->geomname1, "floor");
-            mjs_setString(pair->geomname2, name);
-            pair->condim = 3;
-            memcpy(pair->friction, friction, sizeof friction);
+            add_pair(spec, name);
         }
     }
     return MILD_OK;
@@ -202,6 +228,7 @@ static MildStatus compile(Robot *robot, RobotFiles *files, mjSpec *spec, MildErr
     status = strip(spec, robot->path, error);
     if (status == MILD_OK) {
         status = add_rigid_ground(&robot->def, robot->path, spec, error);
+        add_shells(&robot->def, robot->visual, spec);
     }
     if (status != MILD_OK) {
         return status;

@@ -1,5 +1,5 @@
-/* The engine's own contact under the feet's corners: collision with uneven ground, and results in
- * the same terms as those of the soft ground. */
+/* The engine's own contact under the feet's corners and under shells that stand: collision with
+ * uneven ground, and results in the same terms as those of the soft ground. */
 #include <math.h>
 #include <string.h>
 
@@ -11,7 +11,7 @@ static void cross(const double a[3], const double b[3], double out[3]) {
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* ---- uneven ground ---- */
+/* ---- spheres ---- */
 
 /* Contact frame. Rows: the unit normal, then the tangents that the engine would choose. */
 static void tangent_frame(const double slope[2], double frame[9]) {
@@ -29,18 +29,16 @@ static void tangent_frame(const double slope[2], double frame[9]) {
 /* Plane-sphere contact as the engine computes it, with the tangent plane under the centre of the
  * sphere. It is exact on a slope. Elsewhere the error is the curvature of the ground times
  * radius^2/2. */
-static void collide_corner(RobotSim *sim, const MildTerrain *terrain, int pair) {
+static int collide_sphere(RobotSim *sim, const MildTerrain *terrain, int pair, int geom,
+                          const double center[3], double radius) {
     const mjModel *m = sim->model;
     int floor = sim->robot->floor_geom;
-    int corner = m->pair_geom1[pair] == floor ? m->pair_geom2[pair] : m->pair_geom1[pair];
-    const double *center = sim->data->geom_xpos + 3 * corner;
-    double radius = m->geom_size[3 * corner];
     double slope[2];
     mjContact contact = {.includemargin = m->pair_margin[pair] - m->pair_gap[pair],
                          .dim = m->pair_dim[pair],
                          .geom1 = floor,
-                         .geom2 = corner,
-                         .geom = {floor, corner},
+                         .geom2 = geom,
+                         .geom = {floor, geom},
                          .flex = {-1, -1},
                          .elem = {-1, -1},
                          .vert = {-1, -1},
@@ -51,7 +49,7 @@ static void collide_corner(RobotSim *sim, const MildTerrain *terrain, int pair) 
         (center[2] - mild_terrain_height_at(terrain, center[0], center[1])) * contact.frame[2] -
         radius;
     if (!(contact.dist < m->pair_margin[pair])) {
-        return;
+        return 0;
     }
     for (int k = 0; k < 3; k++) {
         contact.pos[k] = center[k] - (0.5 * contact.dist + radius) * contact.frame[k];
@@ -63,34 +61,97 @@ static void collide_corner(RobotSim *sim, const MildTerrain *terrain, int pair) 
            sizeof contact.solreffriction);
     memcpy(contact.solimp, m->pair_solimp + mjNIMP * pair, sizeof contact.solimp);
     mj_addContact(m, sim->data, &contact);
+    return 1;
+}
+
+/* ---- feet and shells ---- */
+
+static void collide_corner(RobotSim *sim, const MildTerrain *terrain, int pair) {
+    const mjModel *m = sim->model;
+    int first = m->pair_geom1[pair] != sim->robot->floor_geom;
+    int corner = first ? m->pair_geom1[pair] : m->pair_geom2[pair];
+    collide_sphere(sim, terrain, pair, corner, sim->data->geom_xpos + 3 * corner,
+                   m->geom_size[3 * corner]);
+}
+
+/* The points of a shell, of which `most` at most may touch, with the numbers of a pair. Returns how
+ * many touch. */
+static int collide_shell(RobotSim *sim, const MildTerrain *terrain, const RobotShell *shell,
+                         int pair, int most) {
+    const double *p = sim->data->xpos + 3 * shell->body, *turn = sim->data->xmat + 9 * shell->body;
+    int points = 0;
+    for (int c = 0; c < ROBOT_SHELL_CORNERS && points < most; c++) {
+        double local[3], center[3];
+        if (robot_shell_corner(shell, c, local)) {
+            mju_mulMatVec3(center, turn, local);
+            mju_addTo3(center, p);
+            points += collide_sphere(sim, terrain, pair, shell->floor_geom, center, shell->radius);
+        }
+    }
+    return points;
+}
+
+/* Shells that stand, with the contacts of the feet's corners, whose pairs all have the same numbers.
+ * Their bodies get rows, for robot_sim_shell_load. */
+static void collide_shells(RobotSim *sim, const MildTerrain *terrain) {
+    const Robot *robot = sim->robot;
+    int pair = 0, points = 0, touching[ROBOT_BODIES_MAX] = {0};
+    while (sim->model->pair_margin[pair] < 0) { /* that of a shell: add_shells */
+        pair++;
+    }
+    for (int s = 0; s < robot->shells; s++) {
+        const RobotShell *shell = &robot->shell[s];
+        if (shell->limb >= robot->def.feet && robot_sim_shell_may_touch(sim, shell, terrain)) {
+            const int now = collide_shell(sim, terrain, shell, pair, ROBOT_FLOOR_POINTS - points);
+            points += now;
+            touching[shell->limb] |= now > 0;
+        }
+    }
+    sim->rows = robot->def.feet;
+    for (int b = robot->def.feet; b < sim->input.feet; b++) {
+        if (touching[b]) {
+            sim->row[sim->rows++] = b;
+        }
+    }
 }
 
 void rigid_collide(RobotSim *sim, const MildTerrain *terrain) {
     if (!terrain->map || mild_map_is_level(terrain->map)) {
         sim->data->geom_xpos[3 * sim->robot->floor_geom + 2] = terrain->height;
         mj_collision(sim->model, sim->data);
-        return;
+    } else {
+        sim->data->ncon = 0;
+        for (int pair = 0; pair < sim->model->npair; pair++) {
+            collide_corner(sim, terrain, pair);
+        }
     }
-    sim->data->ncon = 0;
-    for (int pair = 0; pair < sim->model->npair; pair++) {
-        collide_corner(sim, terrain, pair);
+    if (sim->input.feet > sim->robot->def.feet) {
+        collide_shells(sim, terrain);
     }
 }
 
 /* ---- results ---- */
 
-/* Adds contact c to its foot, and the vertical part of its normal force to the load of that foot.
- * The first axis of the contact frame points from geom 0 to geom 1. */
+/* Number of the foot or body with shells that a contact is of. */
+static int limb_of(const RobotSim *sim, const mjContact *contact) {
+    int floor_first = contact->geom[0] == sim->robot->floor_geom;
+    int body = sim->model->geom_bodyid[contact->geom[floor_first]];
+    int limb = sim->robot->def.feet + sim->robot->shell_bodies - 1;
+    while (limb > 0 && sim->robot->limb[limb].body != body) {
+        limb--;
+    }
+    return limb;
+}
+
+/* Adds contact c to its foot, and the vertical part of its normal force to the load of that foot;
+ * or its force alone to its body with shells. The first axis of the contact frame points from geom
+ * 0 to geom 1. */
 static void add_contact(RobotSim *sim, int c, double load[ROBOT_FEET_MAX]) {
     const mjData *d = sim->data;
     const mjContact *contact = d->contact + c;
     int floor_first = contact->geom[0] == sim->robot->floor_geom;
-    int body = sim->model->geom_bodyid[contact->geom[floor_first]];
-    int foot = sim->robot->def.feet - 1;
-    while (foot > 0 && sim->robot->limb[foot].body != body) {
-        foot--;
-    }
-    MildFootResult *result = &sim->contact.foot[foot];
+    int limb = limb_of(sim, contact);
+    MildFootResult *result = &sim->contact.foot[limb];
     double local[6], force[3], torque[3], arm[3];
     mj_contactForce(sim->model, d, c, local);
     if (local[0] <= 0.0) {
@@ -103,15 +164,19 @@ static void add_contact(RobotSim *sim, int c, double load[ROBOT_FEET_MAX]) {
             sum += contact->frame[3 * r + k] * local[r];
         }
         force[k] = floor_first ? sum : -sum;
-        arm[k] = contact->pos[k] - sim->input.position[foot][k];
     }
+    if (limb >= sim->robot->def.feet) {
+        mju_addTo3(result->force, force);
+        return;
+    }
+    mju_sub3(arm, contact->pos, sim->input.position[limb]);
     cross(arm, force, torque);
     for (int k = 0; k < 3; k++) {
         result->force[k] += force[k];
         result->torque[k] += torque[k];
         result->pressure_center[k] += contact->pos[k] * normal;
     }
-    load[foot] += normal;
+    load[limb] += normal;
     result->depth_max = fmax(result->depth_max, -contact->dist);
     result->depth_mean += -contact->dist;
     result->contacts++;

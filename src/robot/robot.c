@@ -572,6 +572,7 @@ int robot_bodies(const Robot *robot) {
 
 void robot_set_shells(Robot *robot, int stand) {
     robot->shells_stand = stand;
+    robot->table.shells_stand = robot_bodies(robot) > robot->def.feet;
 }
 
 const MildSole *const *robot_rasters(const Robot *robot) {
@@ -580,6 +581,7 @@ const MildSole *const *robot_rasters(const Robot *robot) {
 
 void robot_set_model(Robot *robot, MildModel model) {
     robot->is_concentric = mild_model_is_concentric(model);
+    robot->table.shells_stand = robot_bodies(robot) > robot->def.feet;
 }
 
 MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *mild,

@@ -68,8 +68,8 @@ const RobotTable *robot_table(const Robot *robot);
 /* [robot_bodies] The soles in use, see robot_set_model, robot_set_elements and robot_set_shells: of
  * the feet, then of the bodies with shells. */
 const MildSole *const *robot_soles(const Robot *robot);
-/* Number of bodies that stand on soft ground: the feet, and with robot_set_shells those with
- * shells. A concentric model has none for these. */
+/* Number of bodies that stand: the feet, and with robot_set_shells those with shells. A concentric
+ * model has none for these. */
 int robot_bodies(const Robot *robot);
 /* [robot_feet] The rasterised outlines, regardless of robot_set_model and robot_set_elements. */
 const MildSole *const *robot_rasters(const Robot *robot);
@@ -82,7 +82,7 @@ void robot_set_model(Robot *robot, MildModel model);
  * round foot, and after robot_set_model of a concentric model. Call it before making sims and
  * ground memory. */
 MildStatus robot_set_elements(Robot *robot, int elements, MildError *error);
-/* Lets the shells stand on soft ground too (stand: bool; at first they do not). Call it when
+/* Lets the shells stand too (stand: bool; at first they do not). Call it when
  * robot_set_model may be called. */
 void robot_set_shells(Robot *robot, int stand);
 /* mild_model_match for this robot: the first foot's raster under robot_foot_load. */
@@ -145,7 +145,7 @@ double robot_sim_foot_distance(const RobotSim *sim);
 /* [m] Least distance of two legs, between the capsules of [robot] legs; negative: overlap. 1e9
  * without two legs. */
 double robot_sim_leg_distance(const RobotSim *sim);
-/* [N] Vertical force of soft ground on the shells, mean over the last step. */
+/* [N] Vertical force of the ground on the shells, mean over the last step. */
 double robot_sim_shell_load(const RobotSim *sim);
 const MildScratch *robot_sim_scratch(const RobotSim *sim);
 const MildContactResult *robot_sim_contact(const RobotSim *sim);

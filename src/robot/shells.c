@@ -1,5 +1,5 @@
 /* The shells of a robot: parts of its bodies, from geoms of the MJCF, whose height above the ground
- * is measured, and which may stand on soft ground as its soles do. */
+ * is measured, and which may stand as its soles do. */
 #include <string.h>
 
 #include "robot/description.h"
@@ -54,12 +54,27 @@ MildStatus robot_read_shells(Robot *robot, MildError *error) {
         if (shell->limb < 0) {
             return MILD_ERROR_RANGE;
         }
+        shell->floor_geom = robot->model->body_geomadr[shell->body];
         shell->on_base = robot->model->body_weldid[shell->body] == robot->base_body;
         memcpy(shell->center, m->geom_pos + 3 * id, sizeof shell->center);
         mju_quat2Mat(shell->rotation, m->geom_quat + 4 * id);
     }
     robot->shells = robot->def.shells;
     return MILD_OK;
+}
+
+int robot_shell_corner(const RobotShell *shell, int c, double center[3]) {
+    memcpy(center, shell->center, 3 * sizeof *center);
+    for (int k = 0; k < 3; k++) {
+        const int other = c >> k & 1;
+        if (other && !(shell->half[k] > 0)) {
+            return 0;
+        }
+        for (int r = 0; r < 3; r++) {
+            center[r] += (other ? -shell->half[k] : shell->half[k]) * shell->rotation[3 * r + k];
+        }
+    }
+    return 1;
 }
 
 /* What mild_sole_surface takes of a shell. */

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "ground/grid.h"
 
 #define QVEL_MAX 1e3 /* [m/s, rad/s] a larger velocity means divergence */
 
@@ -453,6 +454,14 @@ static double shell_lowest(const RobotSim *sim, const RobotShell *shell, double 
         under[1] += turn[3 + k] * c[k];
     }
     return low;
+}
+
+int robot_sim_shell_may_touch(const RobotSim *sim, const RobotShell *shell,
+                              const MildTerrain *terrain) {
+    double under[2], low = shell_lowest(sim, shell, under);
+    const double height = mild_terrain_height_at(terrain, under[0], under[1]);
+    const double reach = shell->half[0] + shell->half[1] + shell->half[2] + shell->radius;
+    return low < height + (terrain->map ? terrain->map->steepest * reach : 0);
 }
 
 /* on_base: bool, of these shells alone. */

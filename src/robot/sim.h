@@ -29,7 +29,8 @@ struct RobotSim {
     double qpos[ROBOT_NQ_MAX]; /* as in RobotState */
     double qvel[ROBOT_NV_MAX];
     FootMap map[ROBOT_BODIES_MAX];
-    int rows;                  /* bodies that A has rows of: the feet, and shells near the ground */
+    int rows;                  /* bodies that A has rows of: the feet, and shells near the ground;
+                                  on rigid ground the shells that touch it */
     int row[ROBOT_BODIES_MAX]; /* [rows] their numbers, ascending */
     Unheld without[ROBOT_JOINTS_MAX];
     MildContactInput input;
@@ -72,7 +73,11 @@ void limits_release(RobotSim *sim, int held);
  * mass matrix and qacc_smooth; held: of limits_hold. */
 void legs_push(RobotSim *sim, int held);
 
-/* The engine's own contact: finds the contacts of the feet's corners with the ground. */
+/* Bool: a shell's lowest point may be in the ground; exact where it is level. */
+int robot_sim_shell_may_touch(const RobotSim *sim, const RobotShell *shell,
+                              const MildTerrain *terrain);
+/* The engine's own contact: finds the contacts of the feet's corners with the ground, and those of
+ * shells that stand. */
 void rigid_collide(RobotSim *sim, const MildTerrain *terrain);
 /* Once they are solved: writes the mean wrench on each foot over the step to sim->contact. */
 void rigid_contact_result(RobotSim *sim);

@@ -8,6 +8,7 @@
 typedef struct {
     int joints;
     int feet;
+    int shells_stand; /* bool: robot_bodies counts those with shells */
     int joint_foot[ROBOT_JOINTS_MAX];
     double default_pose[ROBOT_JOINTS_MAX];
     double joint_low[ROBOT_JOINTS_MAX];

@@ -85,7 +85,7 @@ TEST(test_numbers) {
             double scale = i < 6 ? 1 : v.armature_scale;
             expect_entry("armature", i, m->dof_armature[i], scale * plain->dof_armature[i], 1e-15);
         }
-        assert_int_equal(m->npair, 8);
+        assert_int_equal(m->npair, 8 + 3); /* corners, and the bodies with shells */
         for (int p = 0; p < m->npair; p++) {
             const double *solref = m->pair_solref + mjNREF * p;
             const double *own = plain->pair_solref + mjNREF * p;

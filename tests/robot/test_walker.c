@@ -193,32 +193,39 @@ static void check_rigid_ground(const mjModel *m) {
     const double friction[5] = {0.8, 0.8, 0.005, 0.0001, 0.0001};
     int floor = mj_name2id(m, mjOBJ_GEOM, "floor");
     assert_int_equal(m->geom_type[floor], mjGEOM_PLANE);
-    for (int p = 0; p < 4; p++) {
+    int c = 0;
+    for (int p = 0; p < m->npair; p++) {
         int geom = m->pair_geom2[p];
+        if (m->pair_margin[p] < 0) {
+            continue; /* of a shell */
+        }
         assert_int_equal(m->pair_geom1[p], floor);
         assert_int_equal(m->pair_dim[p], 3);
-        assert_int_equal(m->geom_bodyid[geom], robot_foot_body(robot, p == 3));
+        assert_int_equal(m->geom_bodyid[geom], robot_foot_body(robot, c == 3));
         assert_int_equal(m->geom_contype[geom] + m->geom_conaffinity[geom], 0);
         assert_int_equal(m->geom_type[geom], mjGEOM_SPHERE);
-        expect_entry("radius", p, m->geom_size[3 * geom], corner[p][3], 0);
+        expect_entry("radius", c, m->geom_size[3 * geom], corner[c][3], 0);
         for (int k = 0; k < 3; k++) {
-            expect_entry("corner", p, m->geom_pos[3 * geom + k], corner[p][k], 1e-12);
+            expect_entry("corner", c, m->geom_pos[3 * geom + k], corner[c][k], 1e-12);
         }
         for (int k = 0; k < 5; k++) {
             expect_entry("friction", k, m->pair_friction[5 * p + k], friction[k], 1e-15);
         }
+        c++;
     }
+    assert_int_equal(c, 4);
 }
 
-/* What a step does not need is not in its model: one plane and the feet's corners remain. */
+/* What a step does not need is not in its model: one plane, the feet's corners and one geom of each
+ * body with shells remain. */
 TEST(test_models) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
     const mjModel *m = robot_sim_model(sim), *whole = robot_visual_model(robot);
     assert_int_equal(whole->ngeom, 9);
     assert_int_equal(whole->nu, 1);
-    assert_int_equal(m->ngeom, 5);
-    assert_int_equal(m->npair, 4);
+    assert_int_equal(m->ngeom, 5 + 3);
+    assert_int_equal(m->npair, 4 + 3);
     assert_int_equal(m->nu, 0);
     assert_int_equal(m->nlight, 0);
     assert_int_equal(m->nv, NV);

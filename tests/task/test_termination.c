@@ -158,6 +158,19 @@ static void shank_touches(int leg, const char *box) {
     rig.env->variation.rigid = 1;
     touch(&state, box, 0, box, TASK_END_shell);
     touch(&state, box, -0.2, box, TASK_END_shell);
+    robot_set_shells(robot, 1);
+    for (int depth = 0; depth < 2; depth++) { /* one that stands goes on, but the base does not */
+        RobotState down = state;
+        down.qvel[2] = -0.1;
+        down.qpos[2] += FALL - 0.02 * depth - 1e-3 - lowest_of_box(&down, box);
+        task_env_rest(rig.env)->terrain.height = 0;
+        expect_cause("a shank that stands on rigid ground", step_from(&down, 10), 0,
+                     TASK_END_shell);
+    }
+    robot_set_model(robot, MILD_MODEL_CON_CONE); /* has no shells that stand */
+    touch(&state, box, 0, box, TASK_END_shell);
+    robot_set_model(robot, MILD_MODEL_MILD);
+    robot_set_shells(robot, 0);
     rig.env->variation.rigid = 0;
     for (int stand = 0; stand < 2;
          stand++) { /* soft ground it may be in, whether it stands or not */

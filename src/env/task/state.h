@@ -16,7 +16,7 @@
     X(not_finite, "a number was not finite, or a speed above 1e3")                                 \
     X(tilt, "the base tilted more than task.tilt_limit")                                           \
     X(base, "a shell of the base, or of what is welded to it, touched the ground")                 \
-    X(shell, "another shell touched rigid ground")                                                 \
+    X(shell, "another shell that does not stand touched rigid ground")                             \
     X(crossing, "the feet were laterally closer than task.crossing_limit")                         \
     X(joint, "a joint was beyond its range by more than TASK_JOINT_BROKEN")
 #define TASK_END_ENUM(name, help) TASK_END_##name,

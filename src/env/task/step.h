@@ -375,7 +375,7 @@ MILD_HD_FN TaskEnd task_end_cause(const TaskEnv *env, const TaskDef *def, const 
     if (!lies && reading->base_clearance < 0) {
         return TASK_END_base;
     }
-    if (rigid && reading->body_clearance < 0) {
+    if (rigid && !robot->shells_stand && reading->body_clearance < 0) {
         return TASK_END_shell;
     }
     if (def->crossing_limit > -1 && reading->foot_distance < def->crossing_limit) {

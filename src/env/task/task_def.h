@@ -170,7 +170,7 @@ typedef struct {
                               in m/s */
     double tilt_limit;   /* [rad] */
     double crossing_limit;    /* [m] lateral distance of the feet below which the episode ends */
-    int shells_stand;         /* bool: shells stand on soft ground (robot_set_shells) */
+    int shells_stand;         /* bool: shells stand (robot_set_shells) */
     int sole_elements;        /* of a foot (robot_set_elements); 0: the robot's own */
     int assist;               /* bool: helping hand for beginners (assist.h) */
     int solver;               /* MildSolver */

@@ -13,35 +13,12 @@
 #define MILD_ENGINE_CONSTRAINT_H
 
 #include "robot/engine/feet.h"
+#include "robot/engine/floor.h"
 #include "robot/engine/ground.h"
+#include "robot/engine/rows.h"
 
 #define CONSTRAINT_STEPS 30      /* of Newton's method; walks take 1 to 5 */
 #define CONSTRAINT_LINE_STEPS 10 /* of the line search */
-#define REGULARIZER_LEAST REAL(1e-15)
-
-/* x^power; 2 is MuJoCo's default. */
-MILD_HD Real soft_power(Real x, Real power) {
-    return power == 2 ? x * x : REAL_POW(x, power);
-}
-
-/* d(r) of a violation r < 0. */
-MILD_HD Real soft_impedance(const EngineSoft *soft, Real violation) {
-    const Real x = soft->width > 0 ? -violation / soft->width : 0;
-    const Real middle = soft->midpoint;
-    Real rise;
-    if (!(soft->width > 0)) {
-        rise = REAL(0.5);
-    } else if (x >= 1) {
-        rise = 1;
-    } else if (soft->power <= 1) {
-        rise = x;
-    } else if (x <= middle) {
-        rise = soft_power(x / middle, soft->power) * middle;
-    } else {
-        rise = 1 - soft_power((1 - x) / (1 - middle), soft->power) * (1 - middle);
-    }
-    return soft->nearest + rise * (soft->farthest - soft->nearest);
-}
 
 /* ---- the rows ---- */
 
@@ -170,72 +147,23 @@ MILD_HD void foot_point(const EngineModel *model, const EngineWork *work, int fo
     point[2] -= model->number.foot[foot].radius;
 }
 
-/* Unit normal of the surface, and the tangents that MuJoCo's mju_makeFrame takes. */
-MILD_HD void surface_frame(const Real *slope, Real frame[3][3]) {
-    const Real scale = REAL_INVERSE_SQRT(1 + slope[0] * slope[0] + slope[1] * slope[1]);
-    frame[0][0] = -slope[0] * scale;
-    frame[0][1] = -slope[1] * scale;
-    frame[0][2] = scale;
-    const int steep = !(REAL_ABS(frame[0][1]) < REAL(0.5));
-    const Real along = steep ? frame[0][2] : frame[0][1];
-    const Real length = REAL_SQRT(1 - along * along);
-    for (int k = 0; k < 3; k++) {
-        const Real unit = k == (steep ? 2 : 1);
-        frame[1][k] = (unit - along * frame[0][k]) / length;
-    }
-    cross3(frame[0], frame[1], frame[2]);
-}
-
-/* The model's contact, with the robot's own time constant T instead of the model's: MuJoCo's solref
- * (T, 1), stiffness 1/(d T)^2 and damping 2/(d T) with d beyond the width, T at least two steps. */
-MILD_HD EngineSoft corner_soft(const EngineModel *model, EngineRigid rigid) {
-    EngineSoft soft = model->number.contact;
-    if (rigid.time > 0) {
-        const Real rate = 1 / (soft.farthest * real_max(rigid.time, 2 * model->number.dt));
-        soft.stiffness = rate * rate;
-        soft.damping = 2 * rate;
-    }
-    return soft;
-}
-
-/* The four edges of a corner's pyramid: normal plus and minus friction times each tangent.
- * contact.twist is that of the foot's motion, all six numbers. */
+/* The four edges of a corner's pyramid. contact.twist is that of the foot's motion, all six
+ * numbers. */
 MILD_HD void corner_edges(const EngineModel *model, EngineRigid rigid, const EngineSurface *surface,
                           EngineWork *work, int corner) {
     EngineContact *contact = &work->now.support.ground.contact;
-    const EngineTree *tree = &model->tree;
-    const EngineSoft soft = corner_soft(model, rigid);
-    const Real friction = rigid.friction;
-    const int f = tree->corner_foot[corner];
+    const int f = model->tree.corner_foot[corner];
     const EngineFoot *foot = &model->number.foot[f];
-    const Real *twist = contact->twist[f];
-    Real frame[3][3];
-    Real arm[3];
+    const EngineSoft soft = corner_soft(model, rigid);
+    const EngineSphere sphere = {foot->corner_radius, foot->inverse_inertia};
+    const EngineEdges edges = {contact->edge + 4 * corner, contact->reference + 4 * corner,
+                               contact->weight + 4 * corner};
+    Real center[3];
     Real point[3];
-    corner_center(model, work, corner, arm);
+    corner_center(model, work, corner, center);
     foot_point(model, work, f, point);
-    surface_frame(surface->slope, frame);
-    const Real distance =
-        (arm[2] + work->base[2] - surface->height) * frame[0][2] - foot->corner_radius;
-    const Real d = soft_impedance(&soft, distance);
-    const Real regularizer =
-        2 * friction * friction * (1 - d) / d * (1 + friction * friction) * foot->inverse_inertia;
-    for (int k = 0; k < 3; k++) { /* halfway between the surfaces */
-        arm[k] -= (distance / 2 + foot->corner_radius) * frame[0][k] + point[k];
-    }
-    for (int e = 0; e < 4; e++) {
-        const int row = 4 * corner + e;
-        const Real lean = e % 2 ? -friction : friction;
-        Real *edge = contact->edge[row];
-        for (int k = 0; k < 3; k++) {
-            edge[k] = frame[0][k] + lean * frame[1 + e / 2][k];
-        }
-        cross3(arm, edge, edge + 3);
-        const Real speed = dot3(edge, twist) + dot3(edge + 3, twist + 3);
-        contact->reference[row] = -soft.damping * speed - soft.stiffness * d * distance;
-        contact->weight[row] =
-            distance < 0 ? 1 / real_max(regularizer, REGULARIZER_LEAST) : REAL(0);
-    }
+    sphere_edges(&soft, rigid.friction, surface, work->base[2], &sphere, center, point,
+                 contact->twist[f], &edges);
 }
 
 /* J x of all feet. */
@@ -284,22 +212,22 @@ WARP_FN void engine_collide_on(const EngineModel *model, EngineRigid rigid,
 
 /* ---- one Newton step ---- */
 
-MILD_HD Real edge_along(const EngineContact *contact, int row, const Real *twist) {
-    return dot3(contact->edge[row], twist) + dot3(contact->edge[row] + 3, twist + 3);
-}
-
-/* x of all edges at the acceleration. */
-WARP_FN void engine_residuals(const EngineTree *tree, EngineWork *work) {
+/* x of all edges at the acceleration. floor: here and below, NULL without shells on the floor. */
+WARP_FN void engine_residuals(const EngineTree *tree, EngineWork *work, EngineFloor *floor) {
     EngineContact *contact = &work->now.support.ground.contact;
     engine_twists(tree, &work->now.support, work->acceleration, contact->twist);
     EACH_LANE(l) {
         LANE_ROLLED
         for (int row = LANE(l); row < 4 * engine_corners(tree); row += LANES) {
             const Real *twist = contact->twist[tree->corner_foot[row / 4]];
-            contact->residual[row] = edge_along(contact, row, twist) - contact->reference[row];
+            contact->residual[row] =
+                edge_along(contact->edge[row], twist) - contact->reference[row];
         }
     }
     lanes_sync();
+    if (floor) {
+        floor_residuals(tree, work->acceleration, floor);
+    }
 }
 
 /* Number n of the sums over a foot's pushing edges: six of the wrench of their forces, also the
@@ -329,7 +257,8 @@ MILD_HD void engine_push_number(const EngineTree *tree, EngineWork *work, int f,
 }
 
 /* For each foot, the wrench of its pushing edges, and their stiffness if that is wanted. */
-WARP_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work, int stiffness) {
+WARP_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work, EngineFloor *floor,
+                                  int stiffness) {
     const int feet = engine_feet(tree);
     const int count = feet * (stiffness ? 6 + ENGINE_BASE_ENTRIES : 6);
     EACH_LANE(l) {
@@ -339,16 +268,9 @@ WARP_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work, int 
         }
     }
     lanes_sync();
-}
-
-/* Row r of a foot's stiffness times x [6]. */
-MILD_HD Real stiffness_times(const Real *stiffness, int r, const Real *x) {
-    Real sum = 0;
-    ENGINE_LOOP
-    for (int c = 0; c < 6; c++) {
-        sum += stiffness[c < r ? r * (r + 1) / 2 + c : c * (c + 1) / 2 + r] * x[c];
+    if (floor) {
+        floor_push(tree, stiffness, floor);
     }
-    return sum;
 }
 
 /* half <- stiffness J^T of the feet. */
@@ -383,7 +305,8 @@ MILD_HD Real stiffened_entry(const EngineTree *tree, const EngineSupport *suppor
 
 /* factor <- L of M + J^T weight J over the pushing rows; change <- the residue and what is left of
  * the rows, which is the descent of the cost. After engine_push_of_edges. */
-WARP_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int edges) {
+WARP_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, EngineFloor *floor,
+                                  int edges) {
     EngineSupport *support = &work->now.support;
     if (edges) {
         engine_stiffen_rows(tree, support);
@@ -397,6 +320,9 @@ WARP_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int 
             if (edges) {
                 sum += stiffened_entry(tree, support, d, place);
             }
+            if (floor) {
+                sum += floor_entry(tree, floor, d, place);
+            }
             if (d >= 6 && place == tree->above[d] && limit_pushes(work, d - 5)) {
                 sum += work->limit_weight[d - 5];
             }
@@ -407,6 +333,9 @@ WARP_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int 
             Real sum = support->residue[d];
             if (edges) {
                 sum += wrench_along(tree, work, support->jacobian[0], d);
+            }
+            if (floor) {
+                sum += floor_along(tree, floor, d);
             }
             if (d >= 6 && limit_pushes(work, d - 5)) {
                 sum -= work->limit_side[d - 5] * work->limit_weight[d - 5] *
@@ -421,24 +350,9 @@ WARP_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int 
 
 /* ---- the line search ---- */
 
-/* Slope and curvature along the step at the length t, and how many rows begin or cease to push
- * between 0 and t. */
-typedef struct {
-    Real slope;
-    Real curvature;
-    Real changed;
-} LinePoint;
-
-/* Adds a row of residual x that changes by `change` over the whole step. */
-MILD_HD void line_row(LinePoint *point, Real weight, Real x, Real change, Real t) {
-    const Real now = x + t * change;
-    point->slope += now < 0 ? weight * now * change : 0;
-    point->curvature += now < 0 ? weight * change * change : 0;
-    point->changed += (x < 0) != (now < 0);
-}
-
 /* The rows' part of a point of the line. */
-WARP_FN LinePoint engine_line_rows(const EngineTree *tree, EngineWork *work, int edges, Real t) {
+WARP_FN LinePoint engine_line_rows(const EngineTree *tree, EngineWork *work,
+                                   const EngineFloor *floor, int edges, Real t) {
     EngineSupport *support = &work->now.support;
     EngineContact *contact = &support->ground.contact;
     Real slope[LANE_COPIES];
@@ -458,8 +372,11 @@ WARP_FN LinePoint engine_line_rows(const EngineTree *tree, EngineWork *work, int
             if (contact->weight[row] > 0) {
                 const Real *change = contact->twist_change[tree->corner_foot[row / 4]];
                 line_row(&sum, contact->weight[row], contact->residual[row],
-                         edge_along(contact, row, change), t);
+                         edge_along(contact->edge[row], change), t);
             }
+        }
+        if (floor) {
+            floor_line(floor, LANE(l), t, &sum);
         }
         slope[l] = sum.slope;
         curvature[l] = sum.curvature;
@@ -491,14 +408,15 @@ WARP_FN LinePoint engine_line_smooth(const EngineTree *tree, EngineWork *work) {
 
 /* Length of the step at which the cost is least: the zero of an increasing, piecewise linear slope,
  * by Newton's method between bounds. */
-WARP_FN Real engine_line_search(const EngineTree *tree, EngineWork *work, int edges) {
+WARP_FN Real engine_line_search(const EngineTree *tree, EngineWork *work, const EngineFloor *floor,
+                                int edges) {
     const LinePoint smooth = engine_line_smooth(tree, work);
     Real low = 0;
     Real high = REAL(1e30);
     Real t = 1;
     LANE_ROLLED
     for (int i = 0; i < CONSTRAINT_LINE_STEPS; i++) {
-        const LinePoint rows = engine_line_rows(tree, work, edges, t);
+        const LinePoint rows = engine_line_rows(tree, work, floor, edges, t);
         const Real slope = smooth.slope + t * smooth.curvature + rows.slope;
         const Real next = t - slope / (smooth.curvature + rows.curvature + REAL_LEAST);
         if (REAL_ABS(next - t) <= REAL_ROUNDING * t) {
@@ -554,13 +472,14 @@ WARP_FN void engine_start(const EngineTree *tree, EngineWork *work) {
 }
 
 /* From the acceleration with the held limits to that with all rows; `edges`: engine_collide was
- * called. The last step leaves the same rows pushing. It has a rounding error in proportion to its
+ * called, and engine_floor_collide with a floor. The last step leaves the same rows pushing. It has a rounding error in proportion to its
  * length, so one that comes back a long way from where those before it went is followed by
  * another.
  *
  * Needs the factor of N, limits and J; overwrites it, mass, half and, with edges, the wrench.
  * Returns Newton steps. */
-WARP_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges) {
+WARP_FN int engine_constrain(const EngineTree *tree, EngineWork *work, EngineFloor *floor,
+                             int edges) {
     EngineSupport *support = &work->now.support;
     EngineContact *contact = &support->ground.contact;
     int step = 0;
@@ -569,22 +488,26 @@ WARP_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges
     for (;;) {
         const int last = !going || step == CONSTRAINT_STEPS;
         if (edges) {
-            engine_residuals(tree, work);
-            engine_push_of_edges(tree, work, !last);
+            engine_residuals(tree, work, floor);
+            engine_push_of_edges(tree, work, floor, !last);
         }
         if (last) {
             return step;
         }
         step++;
-        engine_newton_system(tree, work, edges);
+        engine_newton_system(tree, work, floor, edges);
         engine_solve_transposed(tree, work->factor[0], work->inverse, support->change);
         engine_solve(tree, work->factor[0], work->inverse, support->change);
         if (edges) {
             engine_twists(tree, support, support->change, contact->twist_change);
         }
-        const int others = engine_line_rows(tree, work, edges, 1).changed > 0; /* push then */
+        if (floor) {
+            floor_twists(tree, floor, support->change, floor->twist_change);
+        }
+        const int others =
+            engine_line_rows(tree, work, floor, edges, 1).changed > 0; /* push then */
         const int again = others || step > 1;
-        const Real length = again ? engine_line_search(tree, work, edges) : 1;
+        const Real length = again ? engine_line_search(tree, work, floor, edges) : 1;
         const Real moved = engine_move(tree, work, length, again);
         going = again && moved > (others ? REAL_ROUNDING : 1);
     }

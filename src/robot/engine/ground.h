@@ -18,21 +18,30 @@ typedef struct {
     Real slope[2]; /* [-] along world x and y */
 } EngineSurface;
 
-/* The base on the map, to be handed to engine_surface. */
-MILD_HD MapSpot engine_spot(const EngineGround *ground, const EngineWork *work) {
+/* A base [m] on the map, to be handed to surface_under. */
+MILD_HD MapSpot base_spot(const EngineGround *ground, const Real *base) {
     MapSpot none = {{0, 0}, {0, 0}, {0, 0}, {0, 0}, 0};
-    return ground->map ? map_spot(ground->map, work->base, ground->map_origin, ground->height)
-                       : none;
+    return ground->map ? map_spot(ground->map, base, ground->map_origin, ground->height) : none;
 }
 
-/* x, y: [m] from the base's origin, world axes. */
-MILD_HD EngineSurface engine_surface(const EngineGround *ground, const EngineWork *work,
-                                     const MapSpot *spot, Real x, Real y) {
+/* x, y: [m] from the base, world axes. */
+MILD_HD EngineSurface surface_under(const EngineGround *ground, const Real *base,
+                                    const MapSpot *spot, Real x, Real y) {
     EngineSurface surface = {ground->height, {0, 0}};
     if (ground->map) {
-        surface.height = work->base[2] + map_surface_near(ground->map, spot, x, y, surface.slope);
+        surface.height = base[2] + map_surface_near(ground->map, spot, x, y, surface.slope);
     }
     return surface;
+}
+
+/* The same of the base's origin. */
+MILD_HD MapSpot engine_spot(const EngineGround *ground, const EngineWork *work) {
+    return base_spot(ground, work->base);
+}
+
+MILD_HD EngineSurface engine_surface(const EngineGround *ground, const EngineWork *work,
+                                     const MapSpot *spot, Real x, Real y) {
+    return surface_under(ground, work->base, spot, x, y);
 }
 
 #endif

@@ -58,7 +58,7 @@ typedef struct {
     Real outline[2 * ROBOT_OUTLINE_MAX]; /* [points][2] [m] of a flat sole, foot's body frame */
 } EngineFoot;
 
-/* A body part that must not touch the ground; see RobotShell. */
+/* See RobotShell. */
 typedef struct {
     Real center[3];   /* [m] link's frame */
     Real rotation[9]; /* [-] box -> link */
@@ -66,10 +66,11 @@ typedef struct {
     Real radius;      /* [m] */
 } EngineShell;
 
-/* A body with shells that stand on soft ground. */
+/* A body with shells that stand. */
 typedef struct {
-    Real position[3]; /* [m] of its frame, in the link's */
-    Real turn[9];     /* [-] body -> link */
+    Real position[3];     /* [m] of its frame, in the link's */
+    Real turn[9];         /* [-] body -> link */
+    Real inverse_inertia; /* [1/kg] of a contact with rigid ground: body_invweight0 */
 } EngineBody;
 
 /* Real numbers only, so that it may be filled from doubles number by number. */

@@ -329,7 +329,7 @@ static MildStatus read_shell(Reading *r, int s) {
     return MILD_OK;
 }
 
-/* Bodies whose shells stand on soft ground. */
+/* Bodies whose shells stand. */
 static MildStatus read_bodies_of_shells(Reading *r) {
     const Robot *robot = r->robot;
     const int feet = robot->def.feet;
@@ -337,16 +337,22 @@ static MildStatus read_bodies_of_shells(Reading *r) {
     if (bodies > ENGINE_BODIES_MAX) {
         return mild_fail(r->error, MILD_ERROR_RANGE,
                          "%.200s: the geoms of [robot] shells are on %d bodies; the batch engine "
-                         "lets those of %d stand on soft ground",
+                         "lets those of %d stand",
                          robot->path, bodies, ENGINE_BODIES_MAX);
     }
     r->tree->bodies = bodies;
+    for (int s = 0; s < robot->shells; s++) {
+        const int body = robot->shell[s].limb - feet;
+        const int stands = body >= 0 && body < bodies;
+        r->tree->shell_body[s] = (EngineIndex)(stands ? body : ENGINE_BODIES_MAX);
+    }
     for (int b = 0; b < bodies; b++) {
         const RobotLimb *limb = &robot->limb[feet + b];
         const Mount *mount = &r->mount[limb->body];
         r->tree->body_link[b] = (EngineIndex)mount->link;
         mju_copy3(r->number->body[b].position, mount->position);
         memcpy(r->number->body[b].turn, mount->rotation, sizeof mount->rotation);
+        r->number->body[b].inverse_inertia = r->model->body_invweight0[2 * limb->body];
         for (int other = 0; other <= feet + b; other++) {
             const int same = other == feet + b;
             const EngineIndex shared = (EngineIndex)(same ? limb->dofs : limb->shared[other]);

@@ -105,6 +105,16 @@ WARP_FN void engine_save_links(const EngineTree *tree, const EngineWork *work,
     lanes_sync();
 }
 
+/* And back. */
+WARP_FN void engine_restore_links(const EngineTree *tree, const EngineSavedLinks *saved,
+                                  EngineWork *work) {
+    const int links = engine_links(tree);
+    links_copy(saved->rotation[0], 9 * links, work->rotation[0]);
+    links_copy(saved->position[0], 3 * links, work->position[0]);
+    links_copy(saved->axis[0], 3 * links, work->axis[0]);
+    lanes_sync();
+}
+
 /* The factor from its list. */
 TEAM_FN void shells_factor(const EngineTree *tree, const EngineSaved *saved, EngineShells *shells) {
     EACH_LANE(l) {

@@ -179,6 +179,20 @@ WARP_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
     return 0;
 }
 
+/* qacc on rigid ground with shells in it, and the wrenches of feet and bodies, after
+ * engine_collide_on and engine_floor_collide: engine_end without the next state. */
+WARP_FN void engine_floor_solve(const EngineModel *model, EngineFloor *floor, EngineWork *work) {
+    engine_accelerate(&model->tree, work, 0);
+    engine_limits_make(model, work);
+    const int newton = engine_constrain(&model->tree, work, floor, 1);
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            work->newton = newton;
+        }
+    }
+    lanes_sync();
+}
+
 /* The wrenches of soft ground, or rigid ground where engine_collide was called; limits; the next
  * state. Returns 1 when a velocity went bad. */
 WARP_FN int engine_end(const EngineModel *model, int rigid, EngineWork *work) {
@@ -187,7 +201,7 @@ WARP_FN int engine_end(const EngineModel *model, int rigid, EngineWork *work) {
     if (rigid || limit_held(work, 0)) {
         engine_limits_make(model, work); /* anew: engine_save leaves them out */
         newton = rigid || !engine_held_push(&model->tree, work)
-                     ? engine_constrain(&model->tree, work, rigid)
+                     ? engine_constrain(&model->tree, work, NULL, rigid)
                      : 0;
     }
     EACH_LANE(l) {

@@ -20,7 +20,7 @@
 #define ENGINE_ENTRIES_MAX (ENGINE_DOFS_MAX * (ENGINE_DOFS_MAX + 1) / 2) /* of a single chain */
 #define ENGINE_CORNERS_MAX 64 /* spheres under the feet on rigid ground */
 #define ENGINE_BASE_ENTRIES 21
-#define ENGINE_BODIES_MAX 8 /* with shells that stand on soft ground: bits of a byte */
+#define ENGINE_BODIES_MAX 8 /* with shells that stand: bits of a byte */
 
 typedef unsigned char EngineIndex;
 typedef unsigned long long EnginePath; /* a bit for each degree of freedom */
@@ -69,10 +69,11 @@ typedef struct {
     EngineIndex pair[ROBOT_FEET_MAX / 2][2]; /* left foot, right foot */
     EngineIndex corner_foot[ENGINE_CORNERS_MAX];
     EngineIndex corner_begin[ROBOT_FEET_MAX + 1]; /* corners of a foot: from its own to the next */
-    /* ---- parts that must not touch the ground ---- */
+    /* ---- shells ---- */
     int shells;
     EngineIndex shell_link[ROBOT_SHELLS_MAX];
-    /* ---- bodies with shells, where these stand on soft ground ---- */
+    EngineIndex shell_body[ROBOT_SHELLS_MAX]; /* ENGINE_BODIES_MAX: does not stand */
+    /* ---- bodies with shells, where these stand ---- */
     int bodies;
     EngineIndex body_link[ENGINE_BODIES_MAX];
     /* Degrees of freedom that move a body and a foot, or another body: they follow the feet. */
