@@ -1,5 +1,6 @@
-/* The ground under the shells of a robot, where these stand: a step of their own for robots that have
- * one near the ground. All others are stepped as without shells. Rigid ground: batch_floor.h. */
+/* The ground under the shells of a robot, where these stand: a step of their own for robots that
+ * have one near the ground. All others are stepped as without shells. Rigid ground:
+ * batch_floor.h. */
 #ifndef ENVS_BATCH_SHELLS_H
 #define ENVS_BATCH_SHELLS_H
 
@@ -84,7 +85,7 @@ WARP_FN int env_body_touches(const EnvsArrays *all, long robot, int at, const Re
            bodies_touch(setup, at, position, rotation, twist, origin, height);
 }
 
-/* Of the bits in `near`, those of bodies with an element that may touch soft ground in this step. */
+/* Of the bits in `near`, those of bodies with an element that may touch soft ground this step. */
 WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, int near) {
     const EngineModel *model = all->model;
     const BodiesSetup *setup = all->shells.setup;

@@ -91,7 +91,7 @@ static int collide_shell(RobotSim *sim, const MildTerrain *terrain, const RobotS
     return points;
 }
 
-/* Shells that stand, with the contacts of the feet's corners, whose pairs all have the same numbers.
+/* Shells that stand, with the contacts of the feet's corners: all pairs have the same numbers.
  * Their bodies get rows, for robot_sim_shell_load. */
 static void collide_shells(RobotSim *sim, const MildTerrain *terrain) {
     const Robot *robot = sim->robot;

@@ -1,6 +1,6 @@
-/* Environments of the batch engine whose robots fall on rigid ground with shells that stand, against
- * those of the CPU, which MuJoCo steps: the same robots, the same load on the shells, the same ends.
- * With MILD_CUDA on the device too. */
+/* Environments of the batch engine whose robots fall on rigid ground with shells that stand,
+ * against those of the CPU, which MuJoCo steps: the same robots, the same load on the shells, the
+ * same ends. With MILD_CUDA on the device too. */
 #include "follow.h"
 
 enum { PHYSICS_STEPS = 2 };

@@ -1,6 +1,6 @@
 /* Shells that stand on rigid ground, by MuJoCo: against mj_step with the geoms of the robot's file
- * on a plane, against statics, mirrored, and the energy of falls. That in the air they change no bit
- * of a step is in test_shells.c, the batch engine's step is held to this one in
+ * on a plane, against statics, mirrored, and the energy of falls. That in the air they change no
+ * bit of a step is in test_shells.c, the batch engine's step is held to this one in
  * engine/test_floor.c. */
 #include <math.h>
 #include <stdio.h>

@@ -190,9 +190,9 @@ const MildField task_fields[] = {
     T(crossing_limit, D, 1, -1, 1,
       "[m] the episode ends when the feet are laterally closer than this; -1: never"),
     T(shells_stand, B, 1, 0, 1,
-      "[bool] geoms of `shells` of robot.ini stand on the ground as soles do; either way a shell of "
-      "the base ends the episode when it touches the ground; another one only on rigid ground, and "
-      "only if it does not stand"),
+      "[bool] geoms of `shells` of robot.ini stand on the ground as soles do; either way a shell "
+      "of the base ends the episode when it touches the ground; another one only on rigid ground, "
+      "and only if it does not stand"),
     T(sole_elements, MILD_FIELD_INT, 1, 0, 4096,
       "[-] ground elements of a flat sole, fewer than the robot's: a coarser raster with the same "
       "area and second moments of area, which does not change the ground; 0: the robot's own"),

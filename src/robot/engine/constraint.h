@@ -472,9 +472,9 @@ WARP_FN void engine_start(const EngineTree *tree, EngineWork *work) {
 }
 
 /* From the acceleration with the held limits to that with all rows; `edges`: engine_collide was
- * called, and engine_floor_collide with a floor. The last step leaves the same rows pushing. It has a rounding error in proportion to its
- * length, so one that comes back a long way from where those before it went is followed by
- * another.
+ * called, and engine_floor_collide with a floor. The last step leaves the same rows pushing. It has
+ * a rounding error in proportion to its length, so one that comes back a long way from where those
+ * before it went is followed by another.
  *
  * Needs the factor of N, limits and J; overwrites it, mass, half and, with edges, the wrench.
  * Returns Newton steps. */

@@ -209,8 +209,8 @@ MILD_HD void floor_edges(const FloorPose *at, EngineRigid rigid, int n, int p, c
                  floor->twist[i], &edges);
 }
 
-/* The bodies of the bits in `near`, and their points that touch: the first ROBOT_FLOOR_POINTS. After
- * engine_restore, with the poses of the links. */
+/* The bodies of the bits in `near`, and their points that touch: the first ROBOT_FLOOR_POINTS.
+ * After engine_restore, with the poses of the links. */
 WARP_FN void engine_floor_collide(const FloorPose *at, EngineRigid rigid, const EngineWork *work,
                                   EngineFloor *floor) {
     const int all = ROBOT_SHELL_CORNERS * at->model->tree.shells;
