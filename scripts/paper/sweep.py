@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The trainings of the paper's experiments as one command, on a list of GPUs or under Slurm.
 
-  scripts/paper/sweep.py run runs/sweep --gpus 0,1 --jobs 2            # GNU parallel: 144 trainings, two at a time on each GPU
+  scripts/paper/sweep.py run runs/sweep --gpus 0,1 --jobs 2            # GNU parallel: 147 trainings, two at a time on each GPU
   scripts/paper/sweep.py run runs/sweep models latent --seeds 1        # some experiments, GPU 0
   scripts/paper/sweep.py slurm runs/sweep --sbatch "--gres=gpu:1 --time=30 --partition=gpu"    # a job array; --most 16: so many at a time
   scripts/paper/sweep.py table runs/sweep                              # what is there, as one table: runs/sweep/table.csv

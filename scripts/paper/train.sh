@@ -1,13 +1,17 @@
 #!/usr/bin/env bash
-# Trains one policy per ground model and seed, by configs/models.ini, on one GPU: FOLDER/MODEL-SEED.safetensors. What is there is kept.
-# SEEDS: how many, or FIRST-LAST. Usage: scripts/paper/train.sh FOLDER [SEEDS [MODEL ...]]
+# Trains one policy per ground model and seed, by configs/models.ini with Muon and 250 million steps, on one GPU, two to three minutes
+# each: FOLDER/MODEL-SEED.safetensors. What is there is kept. SEEDS: how many, or FIRST-LAST. ITERATIONS=N for fewer or more.
+# Usage: scripts/paper/train.sh FOLDER [SEEDS [MODEL ...]]
 set -euo pipefail
 out=${1:?usage: scripts/paper/train.sh FOLDER [SEEDS [MODEL ...]]}
 seeds=${2:-3}
 [[ $seeds == *-* ]] || seeds=1-$seeds
 shift $(($# < 2 ? $# : 2))
 models=("$@")
-[ $# -gt 0 ] || models=(mild con_cone con_spring ecc_spring ecc_quasi ecc_quasi_3d rigid)
+[ $# -gt 0 ] || models=(mild con_cone con_spring ecc_spring ecc_quasi ecc_quasi_3d mild_merged rigid)
+iterations=${ITERATIONS:-2544}
+keys=(--ppo.optimizer=muon --ppo.matmul=bf16 --reward.linear_velocity=10 --train.iterations="$iterations"
+    --ppo.anneal="$((iterations * 7 / 10)) $iterations")
 mild=${MILD:-build/mild}
 config="$(dirname "$0")/../../configs/models.ini"
 runs=$(mktemp -d)
@@ -17,7 +21,7 @@ for seed in $(seq "${seeds%-*}" "${seeds#*-}"); do
     for model in "${models[@]}"; do
         policy=$out/$model-$seed.safetensors
         [ -e "$policy" ] && continue
-        "$mild" train --config "$config" --out "$runs/run" --randomize.model="$model" --train.seed="$seed" >"$runs/log" 2>&1 ||
+        "$mild" train --config "$config" --out "$runs/run" "${keys[@]}" --randomize.model="$model" --train.seed="$seed" >"$runs/log" 2>&1 ||
             { cat "$runs/log" >&2; exit 1; }
         tail -1 "$runs/log"
         cp "$runs/run/log.csv" "$out/$model-$seed.csv"

@@ -133,15 +133,7 @@ static MildStatus write_json(const Eval *e, MildError *error) {
 /* speed: of the walk; a course lies where it leads. */
 static MildStatus make_scene(Eval *e, const char *name, double speed, Scene *scene,
                              MildError *error) {
-    MildStatus status =
-        context_scene(&e->context, name, speed < 0 ? -e->patch : e->patch, scene, error);
-    if (status == MILD_OK && e->start && scene->rigid) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--start %s: a robot cannot lie on --model rigid, which its feet alone "
-                         "touch; leave it out",
-                         e->start);
-    }
-    return status;
+    return context_scene(&e->context, name, speed < 0 ? -e->patch : e->patch, scene, error);
 }
 
 /* A CSV in memory, so that its file is written whole or not at all. */
@@ -526,9 +518,8 @@ int cmd_eval(int argc, char **argv) {
          "[m/s] added to the speed of the base every 4 s, in a random direction (default 0)"},
         {"start", CLI_TEXT, &e->start, 0, 0, "HOW",
          "how trials begin: stand; or back, side, any: dropped so, with any angles of the joints "
-         "and motors that only damp for task.settle; then rigid is a very hard material, --speed "
-         "is 0, and a row says how many were up at the end, for 2 s, and when they came up "
-         "(default stand)"},
+         "and motors that only damp for task.settle; then --speed is 0, and a row says how many "
+         "were up at the end, for 2 s, and when they came up (default stand)"},
         {"randomize", CLI_FLAG, &c->randomized, 0, 0, NULL,
          "draw robots as in training, and push them so: section [randomize] of --config, but for "
          "its grounds"},

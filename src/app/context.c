@@ -58,9 +58,6 @@ MildStatus context_scene(Context *c, const char *name, double patch, Scene *scen
     c->map = NULL;
     c->task.map = NULL;
     MildStatus status = scene_make(scene, name, patch, error);
-    if (status == MILD_OK && c->task.start != TASK_START_STAND) {
-        scene_harden(scene);
-    }
     if (status == MILD_OK) {
         status = grounds_finish_scene(&c->grounds, scene, error);
         robot_set_shells(c->robot, c->task.shells_stand);

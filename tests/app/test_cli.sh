@@ -122,12 +122,12 @@ bad "task.sole_elements 78 foot.left 77" "$mild" eval --ground grass --trials 1 
 bad "task.sole_elements 20 foot.FL" "$mild" eval --robot go1 --ground grass --trials 1 --seconds 0.1 --task.sole_elements=20
 bad "task.sole_elements 2 foot.left" "$mild" train --out two --train.envs=2 --train.iterations=1 --task.sole_elements=2
 [ ! -e two ] || fail "a refused training left its folder"
-# lying: rigid is a material then, whoever asks for the engine's own is told; shells must stand
+# lying, on the engine's own floor too; shells must stand
 expect 0 'rigid .* 0/2 .*up after - s' "$mild" eval --robot go1 --start back --ground rigid --trials 2 --seconds 1.5
 expect 0 'foam45 .* 0/2 .*up after - s' "$mild" eval --robot go1 --start side --ground foam45 --trials 2 --seconds 1.5 --train.robots=batch
 expect 0 'grass .*2/2 ' "$mild" eval --start stand --ground grass --trials 2 --seconds 0.2
 bad "bck back task.start" "$mild" eval --start bck
-bad "--start --model" "$mild" eval --start any --model rigid --ground grass --trials 1 --seconds 0.1
+expect 0 'grass .* 0/1 .*up after - s' "$mild" eval --start any --model rigid --ground grass --trials 1 --seconds 0.1
 bad "task.may_lie task.shells_stand" "$mild" eval --start any --task.shells_stand=false --ground grass --trials 1 --seconds 0.1
 bad "--turn" "$mild" eval --turn 1.6
 bad "--push" "$mild" eval --push=-1

@@ -99,8 +99,8 @@ MILD_HD_FN void task_draw_attitude(TaskEnv *env, const TaskDef *def, Random *r) 
 MILD_HD_FN void task_draw_drop(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                double height) {
     Random r = random_at(env->seed ^ TASK_RANDOM_DROP, env->index, env->tick);
-    const int stands = !def->shells_stand || env->variation.rigid;
-    env->dropped = random_unit(&r) < def->start_share && !stands && def->start != TASK_START_STAND;
+    env->dropped = random_unit(&r) < def->start_share && robot->shells_stand &&
+                   def->start != TASK_START_STAND;
     if (!env->dropped) {
         return;
     }
@@ -367,15 +367,14 @@ MILD_HD_FN int task_joint_is_broken(const TaskEnv *env, const RobotTable *robot)
  * contact of the legs does not keep a foot from passing before the other to its far side. */
 MILD_HD_FN TaskEnd task_end_cause(const TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                   const RobotReading *reading) {
-    const int rigid = env->variation.rigid;
-    const int lies = def->shells_stand && !rigid && def->may_lie;
+    const int lies = robot->shells_stand && def->may_lie;
     if (!lies && reading->rotation[8] < task_cos(def->tilt_limit)) {
         return TASK_END_tilt;
     }
     if (!lies && reading->base_clearance < 0) {
         return TASK_END_base;
     }
-    if (rigid && !robot->shells_stand && reading->body_clearance < 0) {
+    if (env->variation.rigid && !robot->shells_stand && reading->body_clearance < 0) {
         return TASK_END_shell;
     }
     if (def->crossing_limit > -1 && reading->foot_distance < def->crossing_limit) {

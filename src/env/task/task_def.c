@@ -153,7 +153,7 @@ const MildField task_fields[] = {
       "[-] share of the episodes on soft ground that begin so; the others stand"),
     T(settle, D, 1, 0, 10, "[s] time after such a start in which the motors only damp"),
     T(may_lie, B, 1, 0, 1,
-      "[bool] on soft ground neither tilt nor a shell of the base ends an episode"),
+      "[bool] neither tilt nor a shell of the base that stands ends an episode"),
     T(episode, D, 1, 0.1, 1000, "[s] longest episode"),
     T(command_interval, D, 1, 0.1, 1000, "[s] time after which a new command is drawn"),
     T(vx, D, 2, -3, 3, "[m/s] forward command, low and high"),

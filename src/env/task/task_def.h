@@ -150,8 +150,8 @@ typedef struct {
     int start;                      /* a TaskStart */
     double start_share; /* [-] of the episodes on soft ground; the others begin on their feet */
     double settle;      /* [s] at the start of those in which the motors only damp */
-    int may_lie;    /* bool: on soft ground neither tilt nor a shell of the base ends an episode */
-    double episode; /* [s] */
+    int may_lie;        /* bool: neither tilt nor a shell of the base that stands ends an episode */
+    double episode;     /* [s] */
     double command_interval; /* [s] */
     double vx[2], vy[2], wz[2];
     double backward_share, backward_vx[2], standing_share, straight_share;

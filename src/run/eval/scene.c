@@ -86,14 +86,6 @@ MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildE
     return lay_course(scene, patch_length, error);
 }
 
-void scene_harden(Scene *scene) {
-    if (scene->rigid) {
-        const MildMaterial hard = hard_ground();
-        scene->terrain = mild_terrain_uniform(&hard);
-        scene->rigid = 0;
-    }
-}
-
 const char *scene_ground_at(const Scene *scene, double x, double y, char *text, int size) {
     int index = mild_terrain_material_at(&scene->terrain, x, y);
     const char *part = scene->name;

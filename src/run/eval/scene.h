@@ -18,9 +18,6 @@ typedef struct {
  * from the start. The first ground also extends to the other side of the start, and the last has no
  * end. */
 MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildError *error);
-/* Puts the very hard material in the place of the engine's own contact, on which a robot cannot
- * lie: only its feet touch it. */
-void scene_harden(Scene *scene);
 /* Name of the ground under x. */
 const char *scene_ground_at(const Scene *scene, double x, double y, char *text, int size);
 
