@@ -7,7 +7,6 @@ python=$root/.venv/bin/python
 
 bad "scripts/train_walk.sh" "$root/scripts/train_walk.sh"
 bad "scripts/train_walk.sh" "$root/scripts/train_walk.sh" a b
-bad "scripts/train_robots.sh" "$root/scripts/train_robots.sh"
 latent() { "$python" "$root/scripts/latent.py" "$@"; }
 bad "latent.py csv" latent
 bad "none.csv" latent none.csv
