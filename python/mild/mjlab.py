@@ -19,7 +19,7 @@ from mjlab.tasks.velocity.rl import VelocityOnPolicyRunner
 
 from ._mjlab_ground import SoftGround
 
-GROUNDS = ("rubber", "foam45", "grass", "sand_loose")
+GROUNDS = ("rubber", "foam45", "grass", "sand_dense", "sand_loose")
 LOW = r".*_(foot|calf|shin)\d*_collision\d*"  # what sinks in and so must not touch mjlab's floor
 ROBOTS = {"Go1": (unitree_go1_flat_env_cfg, unitree_go1_ppo_runner_cfg, ("FR", "FL", "RR", "RL")),
           "G1": (unitree_g1_flat_env_cfg, unitree_g1_ppo_runner_cfg, ("left_foot", "right_foot"))}
