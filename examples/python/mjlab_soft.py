@@ -55,10 +55,18 @@ def walk(robot, policy, grounds, speed, device, seconds=10):
         print(f"{ground:>12s} {speed:.2f} m/s: {int(good.sum())} of {int(here.sum())} walk, at {mean[here].mean():.3f} m/s", flush=True)
 
 
+def progress(env, grounds, iteration):
+    """How far the robots are from the velocity that they are told, by ground, as a share of it: 1 if all stand."""
+    told, has = env.command_manager.get_command("twist")[:, :2], env.scene["robot"].data.root_link_lin_vel_b[:, :2]
+    told_speed, error, on = told.norm(dim=1), (told - has).norm(dim=1), env.soft_ground.material
+    shares = [float(error[here].mean() / told_speed[here].mean()) for here in (((on == k) & (told_speed > 0.3)) for k in range(len(grounds)))]
+    print(f"iteration {iteration}: off by " + ", ".join(f"{100 * share:.0f} % on {ground}" for share, ground in zip(shares, grounds)), flush=True)
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("robot", nargs="?", default="Go1", choices=ROBOTS)
-    parser.add_argument("--grounds", default="rubber,foam45,grass,sand_loose", type=lambda text: text.split(","))
+    parser.add_argument("--grounds", default="rubber,foam45,grass,sand_dense,sand_loose", type=lambda text: text.split(","))
     parser.add_argument("--test", default="foam60,foam45,sand_dense,sand_loose", type=lambda text: text.split(","), help="walked on")
     parser.add_argument("--speed", type=float, default=0.6)
     parser.add_argument("--envs", type=int, default=4096)
@@ -83,4 +91,5 @@ if __name__ == "__main__":
     end = time.time() + 60 * given.minutes
     while time.time() < end:
         runner.learn(50, init_at_random_ep_len=runner.current_learning_iteration == 0)
+        progress(env, given.grounds, runner.current_learning_iteration)
     walk(given.robot, runner.get_inference_policy(given.device), given.test, given.speed, given.device)

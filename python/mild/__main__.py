@@ -13,7 +13,7 @@ def environment():
     """What the program is told of the packages beside it."""
     told = dict(os.environ, MILD_PYTHON=sys.executable)
     if (_processor.HERE / "data/bin").is_dir():  # a wheel's; the program may be that of mild_cuda
-        told.setdefault("MILD_HOME", str(_processor.HERE / "data"))
+        told["MILD_HOME"] = told.get("MILD_HOME") or str(_processor.HERE / "data")  # empty counts as unset, for the program too
     if "MILD_FFMPEG" not in told and not shutil.which("ffmpeg") and importlib.util.find_spec("imageio_ffmpeg"):
         import imageio_ffmpeg
 

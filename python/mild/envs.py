@@ -35,7 +35,7 @@ def open_envs(num_envs=None, *, config=None, overrides=None, robot=None, device=
 
 def load():
     """The module _envs: a build tree's, or in an installed package that for the MuJoCo that is imported."""
-    os.environ.setdefault("MILD_HOME", str(DATA))  # where the library finds configs and robots
+    os.environ["MILD_HOME"] = os.environ.get("MILD_HOME") or str(DATA)  # where the library finds configs and robots
     if importlib.util.find_spec("mild._envs") is None:
         if not _mujoco.versions(FILES):
             raise ImportError("this build of mild has no environments: their libraries were missing (docs/install.md)")

@@ -13,6 +13,7 @@ import mjlab.tasks  # noqa: E402, F401 (fills the registry)
 import mujoco  # noqa: E402
 import numpy as np  # noqa: E402
 import torch  # noqa: E402
+import warp as wp  # noqa: E402
 from mjlab.envs import ManagerBasedRlEnv  # noqa: E402
 from mjlab.tasks.registry import list_tasks, load_env_cfg  # noqa: E402
 
@@ -56,6 +57,21 @@ class Tasks(unittest.TestCase):
         torch.testing.assert_close(sensed.force, -soft.wrench[..., :3])
         env.reset()
         self.assertEqual(float(soft.wrench.abs().max()), 0)
+        self.assertEqual(float(soft.imprint.abs().max()), 0)
+        env.close()
+
+    def test_heights(self):
+        """A foot that stands is half its depth below mjlab's height of a foot on rigid ground; one in the air keeps its imprint's depth."""
+        env = standing("Go1", ["rubber", "sand_loose"], 15)
+        soft, scan, sites = env.soft_ground, env.scene["foot_height_scan"], wp.to_torch(env.sim.wp_data.site_xpos)[:, env.soft_ground.sites, 2]
+        self.assertTrue((soft.shape[..., 5] > 0).all())
+        deep = soft.shape[..., 4].clone()
+        torch.testing.assert_close(scan.data.heights, soft.radius - deep / 2, atol=2e-3, rtol=0)
+        self.assertGreater(deep[1].min(), 0.02)
+        soft.shape[0] = 0  # as of feet that have left the ground
+        scan._invalidate_cache()
+        torch.testing.assert_close(scan.data.heights, sites + deep / 2)
+        self.assertEqual(env.reward_manager.get_term_cfg("track_linear_velocity").weight, 4)
         env.close()
 
     def test_stand(self):

@@ -11,7 +11,7 @@ import types
 import unittest
 import unittest.mock
 
-from mild import _processor
+from mild import _processor, envs
 
 V2 = {"cx16", "lahf_lm", "popcnt", "pni", "sse4_1", "sse4_2", "ssse3"}
 V3 = V2 | {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe"}  # the ABI's list, by Linux's names
@@ -126,8 +126,20 @@ class Program(unittest.TestCase):
             with unittest.mock.patch("shutil.which", lambda name: "/usr/bin/ffmpeg"):
                 self.assertNotIn("MILD_FFMPEG", main.environment())
         self.assertEqual(main.environment()["MILD_PYTHON"], sys.executable)
-        with unittest.mock.patch.dict(os.environ, MILD_HOME="/mine"):
-            self.assertEqual(main.environment()["MILD_HOME"], "/mine")
+
+    def test_home(self):
+        """A wheel's data; where MILD_HOME names another folder, that one. Empty it counts as unset, for the environments as well."""
+        with tempfile.TemporaryDirectory() as name, unittest.mock.patch.object(_processor, "HERE", pathlib.Path(name)):
+            (pathlib.Path(name) / "data/bin").mkdir(parents=True)
+            for given, home in ((None, name + "/data"), ("", name + "/data"), ("/mine", "/mine")):
+                with unittest.mock.patch.dict(os.environ, {} if given is None else {"MILD_HOME": given}):
+                    given is None and os.environ.pop("MILD_HOME", None)
+                    self.assertEqual(main.environment()["MILD_HOME"], home)
+        for given, home in (("", str(envs.DATA)), ("/mine", "/mine")):
+            with unittest.mock.patch.dict(os.environ, MILD_HOME=given), unittest.mock.patch.object(envs.importlib.util, "find_spec", lambda name: None), \
+                    unittest.mock.patch.object(envs._mujoco, "versions", lambda files: []):
+                self.assertRaises(ImportError, envs.load)
+                self.assertEqual(os.environ["MILD_HOME"], home)
 
 
 if __name__ == "__main__":
