@@ -1,9 +1,7 @@
 """The command `mild`, and `python -m mild`: the program of this package. `mild trial` and
 `mild judge` are the package's own (mild.trials, mild.judge)."""
 import importlib
-import importlib.util
 import os
-import shutil
 import sys
 
 from . import _processor
@@ -14,10 +12,7 @@ def environment():
     told = dict(os.environ, MILD_PYTHON=sys.executable)
     if (_processor.HERE / "data/bin").is_dir():  # a wheel's; the program may be that of mild_cuda
         told["MILD_HOME"] = told.get("MILD_HOME") or str(_processor.HERE / "data")  # empty counts as unset, for the program too
-    if "MILD_FFMPEG" not in told and not shutil.which("ffmpeg") and importlib.util.find_spec("imageio_ffmpeg"):
-        import imageio_ffmpeg
-
-        told["MILD_FFMPEG"] = imageio_ffmpeg.get_ffmpeg_exe()
+    told["MILD_FFMPEG"] = _processor.ffmpeg() or "ffmpeg"
     return told
 
 

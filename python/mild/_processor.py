@@ -1,7 +1,9 @@
 """Which copy of the compiled files is taken: a wheel has those of x86-64-v3 in the package's folder, and may have faster ones for newer
 processors in folders beside. The package mild_cuda has them for a GPU. MILD_PROCESSOR=x86-64-v3 takes the plain ones, cuda those."""
+import importlib.util
 import os
 import pathlib
+import shutil
 
 HERE = pathlib.Path(os.path.abspath(__file__)).parent
 DRIVERS = ("/dev/nvidiactl", "/dev/dxg")  # of Linux, and of Linux in Windows
@@ -60,3 +62,14 @@ def folder():
         raise ImportError("this wheel of mild is for processors with AVX2 (x86-64-v3), which this one has not; on it build one from "
                           "the sources: MARCH=x86-64-v2 make wheel")
     return gpu() or next((HERE / name for name in levels() if (HERE / name).is_dir()), HERE)
+
+
+def ffmpeg():
+    """What makes videos: MILD_FFMPEG, else the system's, else that of the package imageio-ffmpeg; None without any."""
+    if os.environ.get("MILD_FFMPEG"):
+        return os.environ["MILD_FFMPEG"]
+    if not shutil.which("ffmpeg") and importlib.util.find_spec("imageio_ffmpeg"):
+        import imageio_ffmpeg
+
+        return imageio_ffmpeg.get_ffmpeg_exe()
+    return shutil.which("ffmpeg")

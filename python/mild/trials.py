@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from . import networks
+from . import _processor, networks
 from ._stand import area, lowest, stand
 from .describe import KEYS, TABLES, TERMS, Description, Observer, State, layouts
 
@@ -386,10 +386,11 @@ class Film:
     def __init__(self, path):
         width, height, rate = FILM
         try:
-            self.ffmpeg = subprocess.Popen(["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
-                                            "-r", str(rate), "-i", "-", "-pix_fmt", "yuv420p", "-crf", "23", str(path)], stdin=subprocess.PIPE)
-        except FileNotFoundError:
-            raise RuntimeError("video: needs ffmpeg; apt-get install ffmpeg") from None
+            self.ffmpeg = subprocess.Popen([_processor.ffmpeg() or "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
+                                            "-s", f"{width}x{height}", "-r", str(rate), "-i", "-", "-pix_fmt", "yuv420p", "-crf", "23", str(path)],
+                                           stdin=subprocess.PIPE)
+        except OSError:
+            raise RuntimeError("video: needs ffmpeg; pip install 'mildground[video]', or apt-get install ffmpeg") from None
         self.renderer = self.of = None
 
     def show(self, walker):

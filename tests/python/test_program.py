@@ -11,7 +11,7 @@ import types
 import unittest
 import unittest.mock
 
-from mild import _processor, envs
+from mild import _processor, envs, trials
 
 V2 = {"cx16", "lahf_lm", "popcnt", "pni", "sse4_1", "sse4_2", "ssse3"}
 V3 = V2 | {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe"}  # the ABI's list, by Linux's names
@@ -124,8 +124,17 @@ class Program(unittest.TestCase):
                 self.assertEqual(main.environment()["MILD_FFMPEG"], "mine")
                 del os.environ["MILD_FFMPEG"]
             with unittest.mock.patch("shutil.which", lambda name: "/usr/bin/ffmpeg"):
-                self.assertNotIn("MILD_FFMPEG", main.environment())
+                self.assertEqual(main.environment()["MILD_FFMPEG"], "/usr/bin/ffmpeg")
         self.assertEqual(main.environment()["MILD_PYTHON"], sys.executable)
+
+    def test_film(self):
+        """mild trial's video by the same ffmpeg; without any it says what to install."""
+        with unittest.mock.patch.dict(os.environ, {"MILD_FFMPEG": "/mine/ffmpeg"}):
+            with unittest.mock.patch("subprocess.Popen") as opened:
+                trials.Film("walk.mp4")
+            self.assertEqual(opened.call_args.args[0][0], "/mine/ffmpeg")
+            with self.assertRaisesRegex(RuntimeError, r"^video: needs ffmpeg; pip install 'mildground\[video\]'"):
+                trials.Film("walk.mp4")
 
     def test_home(self):
         """A wheel's data; where MILD_HOME names another folder, that one. Empty it counts as unset, for the environments as well."""
