@@ -366,14 +366,15 @@ def table(lines):
 
 
 def table2(lines):
-    """Table II again: speed, cost and torque on rigid ground at each command, means over the seeds' cells in which anybody stayed up."""
+    """Table II again: speed, cost and torque on each ground at each command, means over the seeds' cells in which anybody stayed up."""
     rows = []
-    for name, ground in itertools.product(CONTROLLERS, GROUNDS):
+    for name, ground, walked_on in itertools.product(CONTROLLERS, GROUNDS, NINE):
         cells = [c for x in lines if (x["task"]["controller"], x["task"]["ground"]) == (name, ground) for c in x["cells"][PARTS[0]]
-                 if c["ground"] == "rigid"]
+                 if c["ground"] == walked_on]
         if cells:
             by_speed = {v: [c for c in cells if c["speed"] == v and c["upright"] and c["error"] is not None] for v in SPEEDS}
-            rows.append({"controller": name, "ground": ground,
+            rows.append({"controller": name, "ground": ground, "walked": walked_on,
+                         "upright": sum(c["upright"] for c in cells), "trials": sum(c["trials"] for c in cells),
                          "velocity": [mean(v + c["error"] for c in by_speed[v]) if by_speed[v] else None for v in SPEEDS],
                          "cot": [mean(c["cot"] for c in by_speed[v]) if by_speed[v] else None for v in SPEEDS],
                          "torque": [mean(c["torque"] for c in by_speed[v]) if by_speed[v] else None for v in SPEEDS]})
@@ -400,11 +401,11 @@ def report(factorial):
         print(f"| {CONTROLLERS[row['controller']]} | {row['ground']} | {row['seeds']} | {row['steps'] / 1e6:.1f} | {row['seconds']:.0f} |"
               + "".join(f" {p['skill']:.3f} ({p['least']:.3f} to {p['most']:.3f}) | {p['upright']} of {p['trials']} | "
                         f"{text_of(p['error'], '.3f')} | {text_of(p['cot'], '.2f')} |" for p in (row[part] for part in PARTS)))
-    print("\nOn rigid ground:\n\n| controller | trained on | m/s at " + ", ".join(map(str, SPEEDS)) + " | cost of transport | torque [N m] |\n"
-          "|---|---|---|---|---|")
+    print("\n| controller | trained on | walked on | upright | m/s at " + ", ".join(map(str, SPEEDS)) + " | cost of transport | torque [N m] |\n"
+          "|---|---|---|---|---|---|---|")
     for row in second:
         cells = (", ".join(text_of(v, form) for v in row[key]) for key, form in (("velocity", ".2f"), ("cot", ".2f"), ("torque", ".0f")))
-        print(f"| {CONTROLLERS[row['controller']]} | {row['ground']} | " + " | ".join(cells) + " |")
+        print(f"| {CONTROLLERS[row['controller']]} | {row['ground']} | {row['walked']} | {row['upright']} of {row['trials']} | " + " | ".join(cells) + " |")
     values = {part: {(x["task"]["controller"], x["task"]["ground"], x["task"]["seed"]): x["skill"][part] for x in lines} for part in PARTS}
     seeds = whole_seeds(values[PARTS[0]])
     answer = {part: shares({key: v for key, v in own.items() if key[2] in seeds}) for part, own in values.items()} if seeds else None
