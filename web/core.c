@@ -7,6 +7,7 @@
 #include <stdlib.h>
 
 #include "ground/soil/soil.h"
+#include "ground/terrain.h"
 #include "learn/vector.h"
 #include "web/core.h"
 #include "web/window.h"
@@ -54,6 +55,11 @@ static struct {
     MildContactResult result;
     EngineSavedLinks links; /* while shells are near the ground, as `shells` */
     EngineShells shells;
+    /* shells on rigid ground */
+    EnvShells down;
+    EnvFloorWork floor;
+    BodiesSetup setup; /* its gradient alone */
+    uint8_t near, held;
     /* what the robot knows of it */
     Belief belief;
     /* the picture */
@@ -304,6 +310,14 @@ static void stand_on_ground(void) {
     take_wrenches();
 }
 
+/* The same on rigid ground, of shells alone: env_part does the feet. */
+static void stand_on_floor(int k) {
+    if (env_shells_wait(&web.all, 0) && env_shells_find(&web.all, 0, k)) {
+        env_floor_step(&web.all, 0, &web.floor);
+    }
+    web.view.shell_load = (float)web.down.load;
+}
+
 /* Lets the ground forget feet and shells, but not their prints. */
 static void lift_feet(void) {
     static const double level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -321,6 +335,7 @@ static void lift_feet(void) {
     }
     web.shells.count = 0;
     web.view.shell_load = 0;
+    web.near = 0;
     solve_ground();
 }
 
@@ -328,13 +343,16 @@ int web_move(const float *action, const float command[3]) {
     TaskEnv *env = web_env();
     const int steps = env_physics_steps(&web.task);
     const TaskView view = {.history = web.history};
+    const int floor = web.trial.rigid && web.standing > web.feet;
     memcpy(env->command, command, sizeof env->command);
     web.call.action = action;
     for (int k = 0; k <= steps; k++) {
         if (k > 0 && !web.trial.rigid) {
             stand_on_ground();
+        } else if (k > 0 && floor) {
+            stand_on_floor(k - 1);
         }
-        env_part(&web.all, &web.call, 0, k, 0, 0, web.env_scratch);
+        env_part(&web.all, &web.call, 0, k, 0, floor, web.env_scratch);
     }
     const TaskStep step = task_end_step(env, &web.task.task, &web.task.robot, &web.robot->reading,
                                         env->torque, web.robot->diverged);
@@ -468,6 +486,7 @@ static const char *lay(int ground, int relief) {
     web.task.has_map = web.task.uneven = !mild_map_is_level(map);
     web.task.map = map_view(map);
     web.trial.rigid = ground == WEB_RIGID;
+    web.setup.steepest = (Real)terrain_steepest(&web.terrain);
     web.view.period = (float)(relief == WEB_WAVES ? def.wavelength : def.size);
     return NULL;
 }
@@ -687,6 +706,10 @@ static int open_arrays(void) {
     contact->free_velocity = contact->velocity + 6 * feet;
     contact->inverse_inertia = contact->free_velocity + 6 * feet;
     contact->height = contact->inverse_inertia + 36 * feet * feet;
+    all->shells.setup = &web.setup;
+    all->shells.near = &web.near;
+    all->shells.held = &web.held;
+    all->shells.robot = (char *)&web.down;
     return 1;
 }
 

@@ -18,11 +18,14 @@ typedef struct {
     BodiesWork ground;
 } EnvShellsWork;
 
-/* No body is near the ground. */
-WARP_FN void env_shells_away(const EnvsArrays *all, long robot) {
+/* No body is near the ground. up: bool: none was down on rigid ground, so that none carries. */
+WARP_FN void env_shells_away(const EnvsArrays *all, long robot, int up) {
     EACH_LANE(l) {
         if (LANE(l) == 0) {
             all->shells.near[robot] = 0;
+            if (up) {
+                env_shells_at(all, robot)->load = 0;
+            }
         }
     }
     lanes_sync();

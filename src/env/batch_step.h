@@ -345,7 +345,7 @@ WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, i
     if (shells) {
         solved = env->variation.rigid && all->shells.near[robot];
         lanes_sync(); /* before lane 0 writes there */
-        env_shells_away(all, robot);
+        env_shells_away(all, robot, env->variation.rigid && !solved);
     }
     if (k == 0) {
         env_act(all, call, robot, env);

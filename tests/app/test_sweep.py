@@ -128,7 +128,7 @@ lines = made()
 assert len(lines) == 2 and lines[0].startswith("train 7") and "--task.clock=false" in lines[0] and "--train.seed=1" in lines[0], lines
 run("run", out, "models", "--seeds", 2)
 lines = made()
-assert len(lines) == 14 and all("--train.seed=2" in line for line in lines if line != "eval"), lines
+assert len(lines) == 16 and all("--train.seed=2" in line for line in lines if line != "eval"), lines
 assert rows_of(out)["models", "mild", "2"]["upright"] == "14"
 
 # ---- a training that fails is named, the others go on, and the next start makes it ----
