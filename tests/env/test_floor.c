@@ -40,8 +40,20 @@ static double loads_apart(int e, double *load) {
     return most;
 }
 
+/* Bool: MuJoCo's shells carry nothing and the batch engine's something. */
+static int load_stayed(int e) {
+    double load[2] = {0, 0};
+    for (int k = 0; k < PHYSICS_STEPS; k++) {
+        for (int n = 0; n < 2; n++) {
+            load[n] = fmax(load[n], fabs(sample[n][e][k].shell_load));
+        }
+    }
+    return load[0] == 0 && load[1] > 0;
+}
+
 typedef struct {
     int steps, together, loaded, loaded_together;
+    int stayed; /* steps in which no shell is down and one carries */
     int ends[TASK_END_COUNT];
     double load; /* mean where it is more than 0 */
 } Falls;
@@ -83,6 +95,7 @@ static Falls fall(const char *robot, int device, const MildMapDef *on) {
             falls.loaded += load > 0;
             falls.loaded_together += load > 0 && !apart[e] && gap < 0.05;
             falls.load += load > 0 ? load : 0;
+            falls.stayed += !apart[e] && load_stayed(e);
             if (!apart[e]) {
                 assert_int_equal(pair.a.cause[e], pair.b.cause[e]);
                 falls.ends[pair.b.cause[e]] += done;
@@ -92,9 +105,9 @@ static Falls fall(const char *robot, int device, const MildMapDef *on) {
     }
     falls.load /= falls.loaded;
     printf("%s, device %d%s: %d of %d steps together, shells with load (%.2f of the weight) %d of "
-           "%d;",
+           "%d, in %d steps without MuJoCo's;",
            robot_name(pair.robot), device, on ? ", on a map" : "", falls.together, falls.steps,
-           falls.load, falls.loaded_together, falls.loaded);
+           falls.load, falls.loaded_together, falls.loaded, falls.stayed);
     for (int end = 0; end < TASK_END_COUNT; end++) {
         printf(" %s %d%s", task_end_names[end], falls.ends[end],
                end < TASK_END_COUNT - 1 ? "," : "\n");
@@ -109,6 +122,7 @@ static void check(Falls falls) {
     assert_true(falls.loaded > 200 && falls.loaded_together > 0.9 * falls.loaded);
     assert_true(falls.together > 0.95 * falls.steps && falls.load > 0.1 && falls.load < 3);
     assert_true(falls.ends[TASK_END_shell] == 0);
+    assert_true(falls.stayed <= 3); /* touchdowns within a rounding */
 }
 
 TEST(falls_are_those_of_mujoco) {
