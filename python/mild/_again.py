@@ -6,6 +6,10 @@ def plate(length, width):
     return Sole.plate(length, width)
 
 
+def surface(shapes, pitch, spacing):
+    return Sole.surface(shapes, pitch, spacing)
+
+
 def concentric(sole):
     return sole.concentric()
 

@@ -344,7 +344,7 @@ void bind_ground(nb::module_ &module) {
     nb::class_<Ground> type(
         module, "Ground",
         "Ground under the feet of one robot (include/mild/ground.h).\n\n"
-        "soles: a list of 1 .. 4 Sole. terrain: a Terrain, or a material or preset for a uniform "
+        "soles: a list of 1 .. 16 Sole. terrain: a Terrain, or a material or preset for a uniform "
         "one.\ndt [s]. tiles: of the memory of imprints; 0: pressed ground is forgotten at "
         "lift-off.\nsolver: newton or gauss_seidel; tolerance [-] and max_iterations of it, 0: "
         "the defaults.\n\nA step: write position, rotation, velocity, inverse_inertia and "

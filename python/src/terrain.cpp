@@ -1,6 +1,7 @@
 /* mild.Sole, mild.Map, mild.Terrain. */
 #include "ground.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <nanobind/stl/tuple.h>
@@ -61,6 +62,104 @@ static Sole make_concentric(nb::handle self) {
     return Sole(made, nb::make_tuple(again("concentric"), nb::make_tuple(self)));
 }
 
+/* Numbers of a key of a shape, as many as `count`, into `to`. Bool: the key is there. */
+static bool take_numbers(const nb::dict &shape, const std::string &name, const char *key,
+                         size_t count, double *to) {
+    if (!shape.contains(key)) {
+        return false;
+    }
+    const std::string whole = name + "." + key;
+    const auto numbers = numbers_of(shape[key], whole.c_str(), 1);
+    if (numbers.size() != count) {
+        raise(PyExc_ValueError, whole + ": " + std::to_string(numbers.size()) +
+                                    " numbers, but it must have " + std::to_string(count));
+    }
+    std::copy_n(numbers.data(), count, to);
+    return true;
+}
+
+/* Rows of three numbers under a key of a mesh. */
+static std::vector<double> rows_of(const nb::dict &shape, const std::string &name,
+                                   const char *key) {
+    const std::string whole = name + "." + key;
+    if (!shape.contains(key)) {
+        raise(PyExc_ValueError, whole + " is missing");
+    }
+    const auto rows = numbers_of(shape[key], whole.c_str(), 2);
+    if (rows.shape(1) != 3 || rows.shape(0) > 1 << 20) {
+        raise(PyExc_ValueError, whole + ": it must have the shape (rows, 3)");
+    }
+    return std::vector<double>(rows.data(), rows.data() + rows.size());
+}
+
+/* A shape and what it points to. */
+struct Shape {
+    MildShape shape = {};
+    std::vector<double> vertices;
+    std::vector<int> triangles;
+    Shape(nb::handle object, const std::string &name) {
+        static const char *const types[] = {"box", "capsule", "sphere", "mesh"};
+        static const size_t sizes[] = {3, 2, 1, 0};
+        if (!nb::isinstance<nb::dict>(object)) {
+            raise(PyExc_TypeError, name + ": a " + type_text(object) + ", but it must be a dict");
+        }
+        const nb::dict keys = nb::cast<nb::dict>(object);
+        const std::string type = keys.contains("type") ? utf8(keys["type"], name.c_str()) : "";
+        shape.type = (int)(std::find(types, types + 4, type) - types);
+        if (shape.type == 4) {
+            raise(PyExc_ValueError,
+                  name + ".type: '" + type + "' is none of box capsule sphere mesh");
+        }
+        const bool mesh = shape.type == MILD_SHAPE_MESH;
+        if (!mesh && !take_numbers(keys, name, "size", sizes[shape.type], shape.size)) {
+            raise(PyExc_ValueError, name + ".size is missing");
+        }
+        take_numbers(keys, name, "pos", 3, shape.pos);
+        take_numbers(keys, name, "quat", 4, shape.quat);
+        if (mesh) {
+            vertices = rows_of(keys, name, "vertices");
+            for (const double corner : rows_of(keys, name, "triangles")) {
+                const double bound = (double)(vertices.size() / 3);
+                if (!(corner >= 0 && corner < bound) || corner != std::floor(corner)) {
+                    raise(PyExc_ValueError, name + ".triangles: a corner is no vertex");
+                }
+                triangles.push_back((int)corner);
+            }
+        }
+        for (const auto &[key, value] : keys) {
+            const std::string word = utf8(key, name.c_str());
+            const bool own = mesh ? word == "vertices" || word == "triangles" : word == "size";
+            if (!own && word != "type" && word != "pos" && word != "quat") {
+                raise(PyExc_ValueError, name + ": a " + type + " has no '" + word + "'");
+            }
+        }
+    }
+};
+
+static Sole make_surface(nb::handle shapes, double pitch, double spacing) {
+    std::vector<Shape> kept;
+    std::vector<MildShape> all;
+    if (!nb::isinstance<nb::list>(shapes) && !nb::isinstance<nb::tuple>(shapes)) {
+        raise(PyExc_TypeError, "shapes: it must be a list of dicts");
+    }
+    for (nb::handle shape : shapes) {
+        kept.emplace_back(shape, "shapes[" + std::to_string(kept.size()) + "]");
+    }
+    for (const Shape &own : kept) {
+        all.push_back(own.shape);
+        all.back().vertices = own.vertices.data();
+        all.back().vertex_count = (int)(own.vertices.size() / 3);
+        all.back().triangles = own.triangles.data();
+        all.back().triangle_count = (int)(own.triangles.size() / 3);
+    }
+    const MildSurfaceDef def = {all.data(), (int)all.size(), pitch, spacing};
+    MildError error = {};
+    MildSole *made = mild_sole_surface(&def, &error);
+    check(made ? MILD_OK : error.status, error);
+    const nb::object copy = nb::module_::import_("copy").attr("deepcopy")(shapes);
+    return Sole(made, nb::make_tuple(again("surface"), nb::make_tuple(copy, pitch, spacing)));
+}
+
 using Centres = nb::ndarray<nb::numpy, const double, nb::ndim<1>>;
 
 static Centres centres(nb::handle self, const double *at) {
@@ -80,6 +179,17 @@ static void bind_sole(nb::module_ &module) {
              nb::arg("sole_z") = 0.0, nb::arg("target_elements") = 0)
         .def_static("plate", make_plate, nb::arg("length"), nb::arg("width"),
                     "A plate of length x width [m] at the paper's pitch, centred under its foot.")
+        .def_static(
+            "surface", make_surface, nb::arg("shapes"), nb::arg("pitch") = 0.0195,
+            nb::arg("spacing") = 0.0,
+            "The outer surface of a body beside the feet, or of a foot that is no plane: a shin, a "
+            "trunk, a wheel.\n\n"
+            "shapes: a list of dicts: type, 'box' (size: half edges), 'capsule' (size: radius, "
+            "half length along z), 'sphere' (size: radius) or 'mesh' (vertices: (n, 3), "
+            "triangles: (m, 3), counterclockwise from outside); pos [m] and quat (w x y z) in the "
+            "body's frame.\npitch [m]: that of the feet. spacing [m] of the elements; 0: pitch.\n"
+            "Raises ValueError, with the name of the key, where a number is out of range. A Batch "
+            "does not take surfaces. docs/model.md, section 20, has the law.")
         .def("concentric", make_concentric,
              "The sole of one element in the middle, for the concentric models.")
         .def(

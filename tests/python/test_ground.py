@@ -86,6 +86,62 @@ class Press(unittest.TestCase):
                 mild.press("grass", sole, **arguments)
 
 
+class Surface(unittest.TestCase):
+    BOX = {"type": "box", "size": (0.1, 0.05, 0.025), "pos": (0, 0, 0.025)}
+
+    @staticmethod
+    def pressed(sole, soil):
+        """[N, N m] of a heavy body that goes 10 mm deep."""
+        ground = mild.Ground([sole], soil, dt=1e-3)
+        ground.rotation[0], ground.inverse_inertia[:] = np.eye(3), 1e-9 * np.eye(6)
+        for z in np.linspace(0.001, -0.01, 12):
+            ground.position[0] = 0, 0, z
+            ground.velocity[0] = ground.free_velocity[0] = 0, 0, -1, 0, 0, 0
+            ground.solve()
+            ground.advance()
+        return np.concatenate([ground.force[0], ground.torque[0]])
+
+    def test_box(self):
+        """A box, as a shape and as its twelve triangles, stands on its lower face as a plane sole does."""
+        corners = np.array([[x, y, z] for x in (-0.1, 0.1) for y in (-0.05, 0.05) for z in (0, 0.05)])
+        faces = [(0, 2, 6, 4), (1, 5, 7, 3), (0, 4, 5, 1), (2, 3, 7, 6), (0, 1, 3, 2), (4, 6, 7, 5)]
+        triangles = [t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))]
+        plane = mild.Sole([(-0.1, -0.05), (0.1, -0.05), (0.1, 0.05), (-0.1, 0.05)], pitch=0.0125)
+        mesh = {"type": "mesh", "vertices": corners, "triangles": triangles}
+        for shape, bound in ((self.BOX, 1e-9), (mesh, 0.02)):
+            body = mild.Sole.surface([shape], pitch=0.0125)
+            self.assertGreater(body.elements, plane.elements)
+            for soil in ("sand_loose", "rubber"):
+                wanted = self.pressed(plane, soil)
+                self.assertGreater(wanted[2], 50)
+                np.testing.assert_allclose(self.pressed(body, soil), wanted, atol=bound * wanted[2])
+
+    def test_kept(self):
+        """Pickled it is made again, and what it was made from may change."""
+        shapes = [dict(self.BOX), {"type": "capsule", "size": [0.03, 0.2], "quat": [1, 0, 1, 0]}, {"type": "sphere", "size": [0.04]}]
+        made = mild.Sole.surface(shapes, spacing=0.03)
+        self.assertGreater(made.x.max(), 0.2)  # the capsule lies
+        shapes[0]["size"] = (1, 1, 1)
+        again = pickle.loads(pickle.dumps(made))
+        self.assertEqual((again.elements, again.pitch), (made.elements, made.pitch))
+        np.testing.assert_array_equal(again.x, made.x)
+
+    def test_arguments(self):
+        sphere = {"type": "sphere", "size": [0.1]}
+        mesh = {"type": "mesh", "vertices": [[0, 0, 0]] * 3}
+        for shapes, name in (([sphere, {"type": "ball"}], r"shapes\[1\].type"), ([{"type": "box"}], "size"), ([{"type": "box", "size": (1, 2)}], "size"),
+                             ([{**sphere, "radius": 1}], "radius"), ([], "count"), ([mesh], "triangles"), ([{**mesh, "size": [1]}], "triangles"),
+                             ([{**mesh, "triangles": [[0, 1, 3]]}], "triangles"), ([{**mesh, "triangles": [[0, 1, 1.5]]}], "triangles"),
+                             ([{"type": "sphere", "size": [-1]}], r"shapes\[0\].size")):
+            with self.assertRaisesRegex(ValueError, name):
+                mild.Sole.surface(shapes)
+        for shapes, name in ((3, "shapes"), ([3], r"shapes\[0\]")):
+            with self.assertRaisesRegex(TypeError, name):
+                mild.Sole.surface(shapes)
+        with self.assertRaisesRegex(ValueError, "surface"):
+            mild.Batch(2, [mild.Sole.surface([sphere])], dt=0.005)
+
+
 class Step(unittest.TestCase):
     def test_rest(self):
         """A body on damped elastic ground, F = K u^n, comes to rest where that carries its weight."""
