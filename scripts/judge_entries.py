@@ -114,12 +114,15 @@ class GroundEntry:
             self.material = mild.Material(self.material, mu=float(np.clip(self.material.mu * wanted / got, 0.02, 1.5)))
 
     def sole(self, case):
+        radius = case.sole.radius
+        if radius:  # as it comes from below: its frame is at the lowest point, as that of a plate
+            return mild.Sole.surface([{"type": "sphere", "size": [radius], "pos": [0, 0, radius]}], self.pitch, radius / 6)
         sole = mild.Sole(case.sole.outline, self.pitch)
         return sole.concentric() if self.model.startswith("con_") else sole
 
     def play(self, case):
         """Rows of a case, or None for a foot that it has no sole for."""
-        if case.sole.radius:
+        if case.sole.radius and self.model.startswith("con_"):  # one element, which has no surface
             return None
         ground = mild.Ground([self.sole(case)], self.material, dt=STEP, tiles=64 if case.kind == "again" else 0)
         table, pose, time, force = [], np.array([0.0, -case.start, case.tilt]), 0.0, 0.0  # x, z, pitch
