@@ -8,7 +8,7 @@
 #ifndef MILD_BATCH_BODIES_H
 #define MILD_BATCH_BODIES_H
 
-#include "base/team.h"
+#include "base/hd.h"
 #include "ground/batch/contact.h"
 
 #define BODIES_MAX 9 /* feet, and bodies with shells: those of the Go1 */

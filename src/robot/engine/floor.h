@@ -11,7 +11,7 @@
 #ifndef MILD_ENGINE_FLOOR_H
 #define MILD_ENGINE_FLOOR_H
 
-#include "base/team.h"
+#include "base/hd.h"
 #include "robot/engine/measure.h"
 #include "robot/engine/rows.h"
 #include "robot/engine/shells.h"

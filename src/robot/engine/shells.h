@@ -11,7 +11,7 @@
 #ifndef MILD_ENGINE_SHELLS_H
 #define MILD_ENGINE_SHELLS_H
 
-#include "base/team.h"
+#include "base/hd.h"
 #include "robot/engine/feet.h"
 #include "robot/engine/saved.h"
 
