@@ -99,8 +99,8 @@ MILD_HD_FN void task_draw_attitude(TaskEnv *env, const TaskDef *def, Random *r) 
 MILD_HD_FN void task_draw_drop(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                double height) {
     Random r = random_at(env->seed ^ TASK_RANDOM_DROP, env->index, env->tick);
-    env->dropped = random_unit(&r) < def->start_share && robot->shells_stand &&
-                   def->start != TASK_START_STAND;
+    env->dropped =
+        random_unit(&r) < def->start_share && robot->shells_stand && def->start != TASK_START_STAND;
     if (!env->dropped) {
         return;
     }
