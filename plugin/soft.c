@@ -220,7 +220,7 @@ void soft_copy(Soft *soft, const mjModel *m, const Soft *from) {
 /* ---- the feet ---- */
 
 /* Index in the arrays of all feet of a row of the step. */
-static int place_of(const Soft *soft, int r) {
+static int row_of_all(const Soft *soft, int r) {
     return 6 * soft->near[r / 6] + r % 6;
 }
 
@@ -424,7 +424,7 @@ static void forces_without_ground(const mjModel *m, mjData *d, int constrain) {
 static double disagreement(const Soft *soft, const double *twist, double *change) {
     double most = 0;
     for (int r = 0; r < soft->near_rows; r++) {
-        change[r] = twist[r] - soft->contact.velocity[place_of(soft, r)];
+        change[r] = twist[r] - soft->contact.velocity[row_of_all(soft, r)];
         most = fmax(most, fabs(change[r]));
     }
     return most;
@@ -633,7 +633,7 @@ static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *gro
 
 static int finite_state(const Soft *soft) {
     for (int r = 0; r < soft->near_rows; r++) {
-        if (!isfinite(soft->contact.velocity[place_of(soft, r)])) {
+        if (!isfinite(soft->contact.velocity[row_of_all(soft, r)])) {
             return 0;
         }
     }
@@ -720,7 +720,7 @@ void soft_advance(Soft *soft, const mjModel *m, const mjData *d, MildGround *gro
     }
     twists(soft, (int)m->nv, d->qvel, twist);
     for (int r = 0; r < soft->near_rows; r++) {
-        soft->contact.velocity[place_of(soft, r)] = twist[r];
+        soft->contact.velocity[row_of_all(soft, r)] = twist[r];
     }
     if (finite_state(soft)) {
         mild_ground_advance(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);

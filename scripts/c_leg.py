@@ -68,7 +68,7 @@ def turn(leg, soil, pitch=0.003):
 
 
 def compute(model, folder):
-    """{leg: peaks}. A stress is proportional to zeta, so that one turn of the flat leg tells it."""
+    """{leg: peaks}. A stress is proportional to zeta, so that one turn of the flat leg determines it."""
     soil = pathlib.Path(folder) / f"{model}.ini"
 
     def sand(zeta):

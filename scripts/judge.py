@@ -38,7 +38,7 @@ FITS = {
     "rolling": (("disc120", "square100", "square100-drag15"), ()),
 }
 FITTED_BY_HAND = ("sand/square100-again", "sand/square100-drop10", "deep/square100-drag40",
-        "deep/square100-drag80")  # have told constants of mild_merged, so they are no predictions of anybody's
+        "deep/square100-drag80")  # have constants of mild_merged fitted to them, so they are no predictions of anybody's
 FRICTION = {0.5: 0.38, 0.3: 0.33}  # internal friction of spheres by that of grains, for 3D-RFT: critical state, [lit]
 CSV_COLUMNS = {"time_s": "time", "stage": "stage", "depth_m": "depth", "path_m": "path", "pitch_rad": "pitch",
                "force_x_n": "fx", "force_z_n": "fz", "moment_y_nm": "my"}

@@ -73,7 +73,7 @@ class GroundEntry:
         # the best curve, also where its parameters have no interval: a judge needs numbers
         data = [X[:, :1] for X, _ in parts], [y for _, y in parts]
         try:
-            hold = {"alpha": 0.3} if self.slips else {}  # presses tell tan(alpha)/nu; alpha, the added mass in all
+            hold = {"alpha": 0.3} if self.slips else {}  # presses determine tan(alpha)/nu; alpha, the added mass in all
             self.material = mild.Material(mild.GroundFit(soles, self.model, hold=hold).fit(*data).material_, mu=0.5)
         except ValueError:  # a flatter cone keeps nu within its range
             self.material = mild.GroundFit(soles, self.model, hold={"alpha": 0.3}).fit(*data).material_
@@ -96,8 +96,8 @@ class GroundEntry:
         self.material = mild.Material(m, phi=solid, rho=ground["density"], mu=ground["friction"], **moves)
 
     def fit_slip(self, soles, data, drags):
-        """slip_length and grip as `mild fit` finds them (src/identify/fit_drag.h). A level drag does not tell regain_length, and
-        nothing fitted tells refill."""
+        """slip_length and grip as `mild fit` finds them (src/identify/fit_drag.h). A level drag does not determine regain_length, and
+        nothing fitted determines refill."""
         hold = {name: getattr(self.material, name) for name in ("alpha", "phi", "rho", "mu")}
         hold["slip_growth"] = GROWTH
         slides = [(mild.Sole(case.sole.outline, self.pitch), np.column_stack([rows[name] for name in ("path", "depth", "fz", "fx")]))

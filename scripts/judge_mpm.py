@@ -31,7 +31,7 @@ SETTLE = 0.1  # [s] before a case: the bed comes to rest, and kernels are compil
 LEVER = 100.0  # [m] see Bed.collide
 COLUMNS = ("time_s,stage,depth_m,path_m,pitch_rad,sinkage_m,force_x_n,force_y_n,force_z_n,moment_x_nm,moment_y_nm,moment_z_nm,"
            "cop_x_m,cop_y_m")
-# Cases by worth; the others of these families follow.
+# The most important cases first; the others of these families follow.
 ORDER = ("sand/disc120", "sand/square100", "sand/square100-drag15", "sand/square100-tilt15", "sand/square100-tilt30", "sand/strip",
          "sand/square100-load10", "wide/sa01", "sand/square100-again", "sand/square100-swipe15", "sand/square100-drop05")
 # Family: the case whose force fits the friction of the ground.

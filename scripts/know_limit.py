@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How many changes of ground can be told at all (docs/identify.md): borders flagged within two and four footsteps, from the sensors of the
+"""How many changes of ground can be detected at all (docs/identify.md): borders flagged within two and four footsteps, from the sensors of the
 SA01 and from its true states, by the same watch, at equal false alarms.
 
   scripts/know_limit.py walk --out out/limit     # 12 000 walks over borders, 20 h without; half an hour of two quiet cores, 10 GB

@@ -272,7 +272,7 @@ class Worker:
         return made
 
     def affected(self, original):
-        """The small ones first, which tell soonest that the compiler refuses a mutant."""
+        """The small ones first, which show soonest that the compiler refuses a mutant."""
         real = os.path.realpath(original)
         return sorted(((n, o) for n, o in self.objects.items() if real in o.depends),
                       key=lambda entry: entry[0].stat().st_size)

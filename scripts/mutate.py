@@ -209,7 +209,7 @@ class File:
                 same = unique.setdefault(mutant.key(), [])
                 if all(other.begin != mutant.begin for other in same):
                     same.append(mutant)
-        for same in unique.values():  # the second of two alike is told apart by its number
+        for same in unique.values():  # the second of two alike gets a number
             for number, mutant in enumerate(same[1:], 2):
                 mutant.name += f" #{number}"
         return [mutant for same in unique.values() for mutant in same]

@@ -64,7 +64,7 @@ def fit(mild, folder):
     wide = [str(folder / f"plate{WIDTH}.csv")]
     jobs = {
         "bekker": [str(path) for path in sorted(folder.glob("*.csv"))] + plates + ["--hold", "k_drift=0,b_drift=0,bed_depth=1,recovery=0"],
-        # Slow presses tell neither added mass nor, on their own, nu: those of loose sand.
+        # Slow presses determine neither added mass nor, on their own, nu: those of loose sand.
         "mild": wide + plates[2:] + ["--fit", "k_pen,sigma_cone", "--hold-from", "sand_loose"],
         "ecc_quasi": wide + plates[2:] + ["--hold", "bed_depth=1,mu=0,k_drift=0,b_drift=0"],
     }

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# docs/two-g1.webp: Unitree's policy of the G1 and ours on loose sand, side by side, on Unitree's MJCF, told to walk at 0.5 m/s, without noise.
+# docs/two-g1.webp: Unitree's policy of the G1 and ours on loose sand, side by side, on Unitree's MJCF, commanded to walk at 0.5 m/s, without noise.
 # Usage: two_g1.sh CLONES (scripts/public_policies.py --list) OUT.webp; PYTHON has the package mild, torch and pyopengl.
 set -e
 here=$(cd "$(dirname "$0")/.." && pwd)

@@ -369,7 +369,7 @@ void web_show(void) {
     show_ground();
 }
 
-/* The newest frame of the history, and what it tells of the ground. */
+/* The newest frame of the history, and what it says about the ground. */
 static void look_at_ground(void) {
     const WebModel *file = web.file;
     const float *frame = web.history + file->shape.history - file->shape.observation;

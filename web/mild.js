@@ -314,7 +314,7 @@ class Panel {
   drawKnowledge(view) {
     const number = (x) => (x >= 100 ? x.toFixed(0) : x.toPrecision(2));
     if (!view.knows) {
-      $('knows').textContent = `Nobody has taught the ${ROBOTS[this.app.robot].name} to tell its ground from its sensors. The SA01 can.`;
+      $('knows').textContent = `Nobody has taught the ${ROBOTS[this.app.robot].name} to estimate its ground from its sensors. The SA01 can.`;
       return;
     }
     $('knows').textContent = view.footsteps === 0 ? 'It has not felt the ground yet.' : KNOWN.map(([name, unit], i) => {
@@ -538,7 +538,7 @@ class App {
   }
 }
 
-// ---- the test hook: ?test walks ten seconds and tells window.report what came of it ----
+// ---- the test hook: ?test walks ten seconds and reports the result to window.report ----
 
 function runTest(app) {
   const speed = Number(options.get('test') || 0.6), start = performance.now();

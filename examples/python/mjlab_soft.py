@@ -35,7 +35,7 @@ def stand(env, ground, seconds):
 
 
 def walk(robot, policy, grounds, speed, device, seconds=10):
-    """Ten robots on each ground, with another seed and without noise or pushes, are told to walk straight ahead."""
+    """Ten robots on each ground, with another seed and without noise or pushes, with the command to walk straight ahead."""
     config, twist = config_of(robot, play=True, grounds=grounds), {"heading": None, "lin_vel_y": (0, 0), "ang_vel_z": (0, 0)}
     command, config.seed, config.scene.num_envs = config.commands["twist"], 2, 10 * len(grounds)
     command.ranges = dataclasses.replace(command.ranges, lin_vel_x=(speed, speed), **twist)
@@ -56,10 +56,10 @@ def walk(robot, policy, grounds, speed, device, seconds=10):
 
 
 def progress(env, grounds, iteration):
-    """How far the robots are from the velocity that they are told, by ground, as a share of it: 1 if all stand."""
-    told, has = env.command_manager.get_command("twist")[:, :2], env.scene["robot"].data.root_link_lin_vel_b[:, :2]
-    told_speed, error, on = told.norm(dim=1), (told - has).norm(dim=1), env.soft_ground.material
-    shares = [float(error[here].mean() / told_speed[here].mean()) for here in (((on == k) & (told_speed > 0.3)) for k in range(len(grounds)))]
+    """How far the robots are from the commanded velocity, by ground, as a share of it: 1 if all stand."""
+    asked, has = env.command_manager.get_command("twist")[:, :2], env.scene["robot"].data.root_link_lin_vel_b[:, :2]
+    asked_speed, error, on = asked.norm(dim=1), (asked - has).norm(dim=1), env.soft_ground.material
+    shares = [float(error[here].mean() / asked_speed[here].mean()) for here in (((on == k) & (asked_speed > 0.3)) for k in range(len(grounds)))]
     print(f"iteration {iteration}: off by " + ", ".join(f"{100 * share:.0f} % on {ground}" for share, ground in zip(shares, grounds)), flush=True)
 
 

@@ -8,12 +8,12 @@ from . import _processor
 
 
 def environment():
-    """What the program is told of the packages beside it."""
-    told = dict(os.environ, MILD_PYTHON=sys.executable)
+    """The environment of the program: where it finds the packages beside it."""
+    variables = dict(os.environ, MILD_PYTHON=sys.executable)
     if (_processor.HERE / "data/bin").is_dir():  # a wheel's; the program may be that of mild_cuda
-        told["MILD_HOME"] = told.get("MILD_HOME") or str(_processor.HERE / "data")  # empty counts as unset, for the program too
-    told["MILD_FFMPEG"] = _processor.ffmpeg() or "ffmpeg"
-    return told
+        variables["MILD_HOME"] = variables.get("MILD_HOME") or str(_processor.HERE / "data")  # empty counts as unset, for the program too
+    variables["MILD_FFMPEG"] = _processor.ffmpeg() or "ffmpeg"
+    return variables
 
 
 def main(arguments=None):

@@ -28,9 +28,9 @@ class GroundFit:
 
     plate: (length, width) [m] or a Sole; a list of these for records with plates of their own, and then fit, predict and
     score take as many arrays X and y, in a list. model: its name. hold: {parameter: number} that is known. fill: a Material
-    or preset that gives what the data do not tell; None: such parameters get no value.
+    or preset that gives what the data do not determine; None: such parameters get no value.
 
-    After fit(X, y): parameters_ {name: number, NaN where the data do not tell it}, intervals_ {name: (low, high)} of 95 %,
+    After fit(X, y): parameters_ {name: number, NaN where the data do not determine it}, intervals_ {name: (low, high)} of 95 %,
     states_ {name: held, filled, fitted, limit, open, tied or no_effect}, combinations_ {name: (number, low, high)} of tied
     parameters, material_ the Material whose curve was fitted, residual_ [N] root mean square, drag_residual_ [N] of
     drags, n_features_in_."""
@@ -59,9 +59,9 @@ class GroundFit:
         """X: (n, 1 .. 3) depth [m], speed [m/s] down, acceleration [m/s^2] of loading rows, see `loading`; what is left
         out is 0. y: (n,) force [N] up on the plate. Raises ValueError when they are not finite, too few, or do not match.
 
-        drags: plates that slide, of mild and mild_merged, which tell slip_length, grip and mu, and one that sinks as it slides
+        drags: plates that slide, of mild and mild_merged, which determine slip_length, grip and mu, and one that sinks as it slides
         regain_length: a list of (plate, table), table (n, 4) of slip [m], depth [m], force up [N] and force along on the plate [N]
-        (against the slip; NaN where it was not measured). Rows before the slip, with the slip of the first, tell what the plate
+        (against the slip; NaN where it was not measured). Rows before the slip, with the slip of the first, say what the plate
         carried."""
         soles = self._soles()
         tables = self._records("X", X)
@@ -94,20 +94,20 @@ class GroundFit:
 
     def save(self, path):
         """Writes the ground as a soil's file (docs/soil.md), with residual and intervals as remarks. Raises RuntimeError before fit, ValueError
-        where a number is not told: `fill` gives what these data, or any press, leave open."""
+        where a number is not determined: `fill` gives what these data, or any press, leave open."""
         if not hasattr(self, "material_"):
             raise RuntimeError("GroundFit.save: nothing is fitted; call fit(X, y) first")
         open_ = [name for name, number in self.parameters_.items() if math.isnan(number)]
         if open_ or self.fill is None:
-            raise ValueError(f"GroundFit.save: {', '.join(open_) or 'friction and what else no press tells'}: not known; give it by hold or fill")
-        told = {name: number for name, number in self.parameters_.items() if self.states_[name] in ("held", "fitted")}
-        notes = dict.fromkeys(told, "held")
-        for name in told:
+            raise ValueError(f"GroundFit.save: {', '.join(open_) or 'friction and what else no press determines'}: not known; give it by hold or fill")
+        known = {name: number for name, number in self.parameters_.items() if self.states_[name] in ("held", "fitted")}
+        notes = dict.fromkeys(known, "held")
+        for name in known:
             if self.states_[name] == "fitted":
                 low, high = self.intervals_[name]
                 notes[name] = f"95 %: {low:.5g} .. {high:.5g} {self.units_[name].strip('-')}".strip()
         fill = self.fill if isinstance(self.fill, (str, os.PathLike)) else "fill"
-        _ground.Material(self.fill, **{**{k: v for k, v in (self.hold or {}).items() if k == "bed_depth"}, **told}).save(
+        _ground.Material(self.fill, **{**{k: v for k, v in (self.hold or {}).items() if k == "bed_depth"}, **known}).save(
             path, head=f"mild.GroundFit, residual {self.residual_:.4g} N (root mean square)\nall without a remark: of {fill}", notes=notes)
 
     def score(self, X, y):

@@ -155,7 +155,7 @@ class _Task:
 
 class VectorEnv(gymnasium.vector.VectorEnv, _Task):
     """`num_envs` robots on soft ground (docs/task.md); None: as many as the config's train.envs. (Gymnasium's make_vec gives a
-    number, 1 if it was told none.)
+    number, 1 by default.)
 
     observation: "history", (num_envs, frames * observation) float32, oldest numbers first, or "frame", the newest only;
     noisy, as the policy sees it. Actions: (num_envs, actions) float32 in units of the action scale; ValueError for one that

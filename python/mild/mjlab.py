@@ -47,8 +47,8 @@ def soften(config, feet, grounds=GROUNDS, soles=r".*_foot\d*_collision", low=LOW
 
 
 def config_of(robot, play=False, grounds=GROUNDS):
-    """mjlab's task of "Go1" or "G1" on level ground, softened. Its speed is worth twice as much, because steps out of deep imprints cost
-    posture and smoothness: at mjlab's own weight who stands on sand loses nothing."""
+    """mjlab's task of "Go1" or "G1" on level ground, softened. The weight of the speed is doubled, because steps out of deep imprints cost
+    posture and smoothness: at mjlab's own weight a robot that stands on sand loses nothing."""
     make, _, feet = ROBOTS[robot]
     config = soften(make(play=play), feet, grounds)
     config.rewards["track_linear_velocity"].weight *= 2

@@ -46,7 +46,7 @@ class Ground:
         """A step of all worlds with the ground in it: (data, wrench, foot), the latter two (worlds, feet, 6): force and torque of the ground,
         and pressure centre, largest and mean depth, area. material: (worlds,) which of the grounds each has; None: in turn. begin:
         (worlds,) bool, worlds that begin anew, on fresh ground. For jax.jit, as mild.jax.step, whose memory is the batch's too. Products of
-        matrices are in full float32, also on GPUs that round what they multiply to 10 bits unless they are told."""
+        matrices are in full float32, also on GPUs that round what they multiply to 10 bits by default."""
         with jax.default_matmul_precision("highest"):
             return self._step(d, self.material if material is None else material, begin)
 

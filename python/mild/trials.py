@@ -184,7 +184,7 @@ class Walker:
         self.state = State(description, r.model, self.data, r.frame, r.seen)
         self.observer = Observer(description, len(r.seen[0]), len(r.joints))
         self.delay = round(description.policy["delay"] / r.model.opt.timestep)
-        given = options["attributes"]  # soles that the plugin is told
+        given = options["attributes"]  # soles that the plugin is given
         self.outlines = [np.array(text.split(), float).reshape(-1, 2) for text in given["outline"].split(";")] if "outline" in given else []
         self.sole_z = float(given.get("sole_z", 0))
         self.depth = 0.0 if ground == "rigid" else self.standing_depth()

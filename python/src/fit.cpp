@@ -83,7 +83,7 @@ static nb::dict value_of(const FitValue &value) {
     return all;
 }
 
-/* Marks the parameter among those that rows of the kind tell; returns whether it is one. */
+/* Marks the parameter among those that rows of the kind determine; returns whether it is one. */
 static bool mark(FitDef &def, FitKind kind, const std::string &name) {
     const MildField *fields[FIT_PARAMETERS_MAX];
     const int count = fit_parameters((MildModel)def.material.model, kind, fields);
@@ -108,7 +108,7 @@ static void hold(FitDef &def, FitDef *drag, const std::string &name, double valu
     if (!known) {
         raise(PyExc_ValueError, "hold: '" + name + "' is no parameter of " +
                                     mild_model_names[def.material.model] +
-                                    " that a press straight down tells");
+                                    " that a press straight down determines");
     }
     double low, high;
     fit_range(field, &low, &high);

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What each deviation from the paper is worth: configs/models.ini with one choice set back to the paper's, half a minute each on one GPU,
+# The effect of each deviation from the paper: configs/models.ini with one choice set back to the paper's, half a minute each on one GPU,
 # then measured by walks in MuJoCo: FOLDER/NAME-SEED.json. What is there is kept. scripts/paper/deviations.py FOLDER writes the table.
 # Usage: scripts/paper/deviations.sh FOLDER [SEEDS [NAME ...]]
 set -euo pipefail

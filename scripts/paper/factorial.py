@@ -15,7 +15,7 @@ One tuning budget: before that each controller is trained on `mild`, seed 1, a q
 SEARCH (KL target that leads the learning rate, robots that are simulated at the same time); the one with the highest score is taken for
 all of its trainings. With fewer robots an iteration has fewer samples, and there are more of them: the KL target bounds how far a policy
 moves in one. All have the same weight of the entropy. Score: the mean of the skill on nine grounds and of the share of their time that the
-trials last, so that controllers of which nobody stays up are told apart, too. Skill: mean over cells of upright share times
+trials last, so that controllers of which nobody stays up differ, too. Skill: mean over cells of upright share times
 1 - |speed error| / speed, not below 0.
 
 Equal wall time: of a training alone on its GPU. With --jobs 2 each has half of one, which does not count with those that had all of it.
@@ -409,7 +409,7 @@ def report(factorial):
     values = {part: {(x["task"]["controller"], x["task"]["ground"], x["task"]["seed"]): x["skill"][part] for x in lines} for part in PARTS}
     seeds = whole_seeds(values[PARTS[0]])
     answer = {part: shares({key: v for key, v in own.items() if key[2] in seeds}) for part, own in values.items()} if seeds else None
-    if len(seeds) == 1:  # it cannot be told from the rest
+    if len(seeds) == 1:  # it cannot be separated from the rest
         answer = {part: {name: v for name, v in own.items() if name != "seed"} for part, own in answer.items()}
     print("\n" + ("\n".join(f"{part}: of the variance of the skill the net makes {s['net']:.0%}, the ground {s['ground']:.0%}, both together "
                             f"{s['both']:.0%}" + (f", the seed {s['seed']:.0%}" if "seed" in s else "") + f" (seeds {seeds})"

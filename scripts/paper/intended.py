@@ -31,7 +31,7 @@ MILD = os.environ.get("MILD", str(ROOT / "build/mild"))
 # Not searched: the budget, the commands and the step.
 COMMON = ("train.", "task.vx", "task.vy", "task.wz", "task.backward_share", "task.standing_share", "task.straight_share",
           "task.physics_dt", "ppo.matmul", "task.solver", "randomize.patch_share")
-# What belongs together, in the order of what docs/deviations.md says it is worth: the last are likely to go at once. Any other
+# What belongs together, in the order of the effect that docs/deviations.md measures: the last are likely to go at once. Any other
 # key is a sentence of its own.
 SENTENCES = {
     "helping hand": ("task.assist",),

@@ -1,4 +1,4 @@
-"""What the terrain latent knows, and what it is worth."""
+"""What the terrain latent knows, and what the policy gains by it."""
 import math
 import random
 
@@ -93,7 +93,7 @@ the force under a sole is a plateau that k_pen makes plus a slope that sigma_con
     return Section("Ground parameters from the latent", text, [figures.regression(rows, {name: found["z~", name] for name in names})],
                    [Table(["from", *names], table)],
                    [Claim("z~ is a continuous measure of stiffness, also on grounds never seen", "stated",
-                          f"R2 {r2}; of the first two all sensor readings tell {sensors}, the true state and depths {state}",
+                          f"R2 {r2}; of the first two all sensor readings explain {sensors}, the true state and depths {state}",
                           min(found["z~", name] for name in names[:2]) > 0.8, "hardware")],
                    "hardware, in words", ["parameters.csv"])
 
@@ -112,7 +112,7 @@ def course(given):
     save(given, "course", [{"way": way, **r} for way, rows in found.items() for r in rows])
     late = latent_stats.delays(found)
     waits = ", ".join(f"{way} {value:.1f}" for way, value in late.items())
-    text = f"""z~ on the axis that tells rubber from foam28 best (walks on either alone), means over one gait period, along a course of rubber,
+    text = f"""z~ on the axis that separates rubber from foam28 best (walks on either alone), means over one gait period, along a course of rubber,
 foam28 and rubber, 2.5 m each, coloured by the ground under the base. Whole gait periods after a border until z~ is past the middle, mean of all
 borders and trials: {waits}."""
     claim = Claim("the latent follows a change of ground under way, forward and backward", "distinct tracks (figure)",

@@ -55,7 +55,7 @@ def tasks_of(experiments, seeds):
     return found + [f"factorial.{name}-{seeds}" for name in names_of("factorial") if "factorial" in experiments]
 
 
-def place_of(folder, task):
+def parts_of(folder, task):
     """(experiment, name, seed, FOLDER/EXPERIMENT/NAME-SEED)"""
     found = re.fullmatch(r"(\w+)\.(\w+)-(\d+)", task)
     if not found or found[1] not in SCRIPTS or found[2] not in names_of(found[1]):
@@ -64,8 +64,8 @@ def place_of(folder, task):
 
 
 def is_done(folder, task):
-    place = place_of(folder, task)[3]
-    return place.with_name(place.name + ".json").is_file()
+    target = parts_of(folder, task)[3]
+    return target.with_name(target.name + ".json").is_file()
 
 
 def call(words, **more):
@@ -74,18 +74,18 @@ def call(words, **more):
 
 def work(folder, task, options):
     """Trains and measures it; exit code."""
-    experiment, name, seed, place = place_of(folder, task)
-    result, policy = (place.with_name(place.name + end) for end in (".json", ".safetensors"))
+    experiment, name, seed, target = parts_of(folder, task)
+    result, policy = (target.with_name(target.name + end) for end in (".json", ".safetensors"))
     if experiment == "factorial":
         own = folder / "factorial" / f"{name}-{seed}"
         code = call([sys.executable, HERE / "factorial.py", own, "--controllers", name, "--seeds", seed, *options])
         if code == 0:
             shutil.copyfile(own / "factorial.json", result)
         return code
-    code = call([HERE / SCRIPTS[experiment], place.parent, f"{seed}-{seed}", name])
+    code = call([HERE / SCRIPTS[experiment], target.parent, f"{seed}-{seed}", name])
     if code == 0 and not result.is_file() and policy.is_file():
         part = result.with_name(result.name + ".part")
-        code = call([MILD, "eval", "--policy", policy, "--config", place.with_name(place.name + ".ini"), *JUDGE, "--json", part, *options],
+        code = call([MILD, "eval", "--policy", policy, "--config", target.with_name(target.name + ".ini"), *JUDGE, "--json", part, *options],
                     stdout=subprocess.DEVNULL)
         if code == 0:
             part.replace(result)
@@ -141,10 +141,10 @@ def run(given):
     given.folder.mkdir(parents=True, exist_ok=True)
     code = call(["parallel", "--will-cite", "--jobs", slots, "--joblog", given.folder / "joblog", one, ":::", *left],
                 env={**os.environ, "PARALLEL_SHELL": "/bin/bash"}) if left else 0
-    return table(given) if code == 0 else told_failures(given)
+    return table(given) if code == 0 else print_failures(given)
 
 
-def told_failures(given):
+def print_failures(given):
     for task in tasks_of(given.experiments, given.seeds):
         log = given.folder / "log" / task
         if not is_done(given.folder, task) and log.is_file():

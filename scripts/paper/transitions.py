@@ -111,7 +111,7 @@ def course_of(pair):
 
 def strides_of(stances, latent, axis, way):
     """Rows, a stride each, from the touchdown of a foot to its next one: its place along the walk (that of its end), length, duration,
-    clearance, largest torque, and z~ as axis(rows) tells it, from START on. stances, latent: rows of the CSVs of one walk with several
+    clearance, largest torque, and z~ as axis(rows) gives it, from START on. stances, latent: rows of the CSVs of one walk with several
     trials."""
     rows = []
     for trial, foot in sorted({(s["trial"], s["foot"]) for s in stances}):

@@ -399,7 +399,7 @@ static MildStatus check_place(const Eval *e, MildError *error) {
                : MILD_OK;
 }
 
-/* A controller that follows no command is told to stand, so that no speed is shown as asked. */
+/* A controller that follows no command has to stand, so that no speed is shown as asked. */
 static MildStatus check_command(Eval *e, MildError *error) {
     const char *controller = e->context.controller;
     if (!e->speed_given && !controller_has(controller, CONTROLLER_FOLLOWS)) {
@@ -415,7 +415,7 @@ static MildStatus check_command(Eval *e, MildError *error) {
     return status;
 }
 
-/* How trials begin. Where a robot begins lying, it may lie, and is told to stand. */
+/* How trials begin. Where a robot begins lying, it may lie, and the command is to stand. */
 static MildStatus take_start(Eval *e, MildError *error) {
     const MildField *field = mild_field_find(task_fields, task_field_count, "start", NULL);
     TaskDef *task = &e->context.task;

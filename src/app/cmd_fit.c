@@ -49,7 +49,7 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
          "hold parameters at values that are known, e.g. alpha=1.05; also bed_depth, the depth of "
          "a firm bed (default: none within the record)"},
         {"hold-from", CLI_TEXT, &options->from, 0, 0, "PRESET",
-         "where the data do not tell a parameter, hold it at this preset's value (`mild info "
+         "where the data do not determine a parameter, hold it at this preset's value (`mild info "
          "grounds`)"},
         {"fit", CLI_NAMES, &options->fit, 0, 0, "NAME[,NAME]",
          "fit these only and hold all others at the preset of --hold-from"},
@@ -70,19 +70,19 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
             "Finds the parameters of a ground from presses of a level plate: all those that "
             "the data determine, each with its 95 % interval by profile likelihood. Nothing "
             "is held unless --hold or --hold-from says so. A parameter that the data do not "
-            "determine gets no value; where they tell a combination, such as "
+            "determine gets no value; where they determine a combination, such as "
             "sigma_cone/cos(alpha), that is printed. A CSV file has a header line with the "
             "columns depth_m and force_n, and time_s or speed_m_s where speed matters. "
             "Several files may differ in speed, which c_d and dissipation need; c_g also "
             "needs a record that brakes, such as a drop. They may differ in their plate, "
             "which k_c of bekker needs (--plate once for each file). The way up from the greatest "
-            "depth tells recovery. Where the plate then slides, slip_m and force_x_n (x_m and "
-            "force_x_n of mild press --drag) tell slip_length, grip and mu of mild and "
+            "depth determines recovery. Where the plate then slides, slip_m and force_x_n (x_m and "
+            "force_x_n of mild press --drag) determine slip_length, grip and mu of mild and "
             "mild_merged, and where it sinks under its load meanwhile, regain_length. A file with "
             "the columns slip_m, shear_pa and pressure_pa, or of a ring angle_rad, torque_nm and "
-            "force_n (--ring), tells cohesion, mu and shear_length of bekker. --soil writes what "
-            "was found as a ground (docs/soil.md). Of a walk's log (mild drive --log, mild play "
-            "--log) it says what the robot's own sensors tell of the ground, each parameter with "
+            "force_n (--ring), determines cohesion, mu and shear_length of bekker. --soil writes "
+            "what was found as a ground (docs/soil.md). Of a walk's log (mild drive --log, mild "
+            "play --log) it estimates the ground from the robot's own sensors, each parameter with "
             "its 90 % interval (docs/identify.md).",
         .options = table,
         .option_count = sizeof table / sizeof *table,
@@ -111,7 +111,7 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
 
 /* ---- what is fitted and what is held ---- */
 
-/* Parameters of the model that some kind of rows tells, of slides where there are some:
+/* Parameters of the model that some kind of rows determines, of slides where there are some:
  * fields[FIT_FIELDS_MAX]. */
 static int parameters_of(const FitWork *work, const MildField **fields) {
     const MildModel model = (MildModel)work->material.model;
@@ -147,7 +147,7 @@ static const MildField *parameter_find(const FitWork *work, int any, const char 
         return field;
     }
     mild_fail(error, MILD_ERROR_ARGUMENT,
-              "--%s: '%.40s' is no parameter that a press on %s tells; nearest is '%s' (%s%s)",
+              "--%s: '%.40s' is no parameter that a press on %s determines; nearest is '%s' (%s%s)",
               option, name, mild_model_names[model], text_nearest(name, names, count), list,
               field && soil_reads(&work->material, field) ? "; with --soil any that it reads" : "");
     return NULL;
@@ -437,7 +437,7 @@ static MildStatus model_choose(const FitOptions *options, const CliArgs *args, F
     if (model == MILD_MODEL_RIGID) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--model rigid: the engine's own contact has no parameters that a press "
-                         "could tell; choose another model");
+                         "could determine; choose another model");
     }
     const MildField *bed =
         mild_field_find(mild_material_fields, mild_material_field_count, "bed_depth", NULL);
@@ -511,7 +511,7 @@ static MildStatus slides_fit(const FitOptions *options, FitWork *work, MildError
     return fit_run(&set->def, set->points, set->count, &set->result, error);
 }
 
-/* Fits each kind of rows by itself, because no parameter is told by two of them. */
+/* Fits each kind of rows by itself, because no two of them determine the same parameter. */
 static MildStatus sets_fit(const FitOptions *options, FitWork *work, MildError *error) {
     const char *model = mild_model_names[work->material.model];
     const MildField *fields[FIT_PARAMETERS_MAX];

@@ -22,7 +22,7 @@ typedef struct {
     Context context;
     const char *walks, *weights, *prior, *ground, *json;
     CliNumbers speed, slick, care, clock;
-    int grounds, threads, told;
+    int grounds, threads, true_ground;
     StudyDef study;
     TaskDef drawn; /* the randomised robots' */
     MildMaterial preset;
@@ -253,7 +253,7 @@ static MildStatus judge(const Know *k, MildError *error) {
                             .slip = k->clock.value[0],
                             .slow = k->clock.value[1],
                             .fast = k->clock.value[2],
-                            .told = k->told};
+                            .true_ground = k->true_ground};
     JudgeWalk *each = calloc((size_t)k->grounds, sizeof *each);
     MildStatus status = each ? judge_run(&k->study, net, &care, k->grounds, &result, each, error)
                              : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
@@ -401,8 +401,8 @@ static int parse_and_run(Know *k, CliArgs *args, int argc, char **argv) {
         {"clock", CLI_NUMBERS, &k->clock, 0, 10, "SLIP,SLOW,FAST",
          "[m, s, s] while the robot believes the slip length to be below SLIP, its gait clock has "
          "the period SLOW below 0.75 m/s and FAST above (default: that of the policy)"},
-        {"told", CLI_FLAG, &k->told, 0, 0, NULL,
-         "--care and --clock go by the true numbers of the ground, in the place of what the robot "
+        {"true-ground", CLI_FLAG, &k->true_ground, 0, 0, NULL,
+         "--care and --clock go by the true numbers of the ground instead of what the robot "
          "believes"},
         {"robots", CLI_NUMBER, &k->study.robots, 0, 1, "P",
          "[-] share of the walks with robots drawn and pushed as in training (default 0.5)"},

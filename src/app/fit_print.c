@@ -78,7 +78,7 @@ static void assumptions_print(const FitWork *work, FitKind kind) {
         printf("\n");
     }
     if (names_print(result, bit(FIT_FILLED), 1, "the intervals assume ")) {
-        printf(" of %s, because the data do not tell\n", work->from);
+        printf(" of %s, because the data do not determine them\n", work->from);
     }
     if (kind == FIT_PRESS) {
         press_assumptions_print(work);
@@ -113,27 +113,27 @@ static int is_asked(const FitWork *work, const char *name) {
     return 0;
 }
 
-/* Parameters of the model that no record here tells, such as friction. */
+/* Parameters of the model that no record here determines, such as friction. */
 static void never_print(const FitWork *work) {
     const MildModelInfo *info = mild_model_info(model_of(work));
     int count = 0;
     for (int i = 0; i < MILD_MODEL_FIELDS && info->fields[i]; i++) {
         if (!fit_is_geometry(model_of(work), info->fields[i]) &&
             strcmp(info->fields[i], "passive") != 0 && !is_asked(work, info->fields[i])) {
-            printf("%s%s", count++ ? ", " : "no press straight down tells ", info->fields[i]);
+            printf("%s%s", count++ ? ", " : "no press straight down determines ", info->fields[i]);
         }
     }
     printf("%s", count ? "\n" : "");
 }
 
-/* Parameters that only rows at several speeds tell. */
-static void rates_print(const FitWork *work, unsigned untold) {
+/* Parameters that only rows at several speeds determine. */
+static void rates_print(const FitWork *work, unsigned undetermined) {
     const FitSet *press = &work->set[FIT_PRESS];
     int rate = 0;
     for (int i = 0; i < press->result.parameters && is_one_speed(press); i++) {
         const FitValue *value = &press->result.parameter[i];
-        if (untold >> value->state & 1 && fit_is_rate(model_of(work), value->field)) {
-            printf("%s%s", rate++ ? ", " : "a press at another speed or a drop tells more of ",
+        if (undetermined >> value->state & 1 && fit_is_rate(model_of(work), value->field)) {
+            printf("%s%s", rate++ ? ", " : "a press at another speed or a drop says more about ",
                    value->name);
         }
     }
@@ -141,7 +141,7 @@ static void rates_print(const FitWork *work, unsigned untold) {
 }
 
 /* Bool: the parameter is in one of the states. */
-static int is_untold(const FitResult *result, const char *name, unsigned states) {
+static int is_undetermined(const FitResult *result, const char *name, unsigned states) {
     int found = 0;
     for (int i = 0; i < result->parameters; i++) {
         const FitValue *value = &result->parameter[i];
@@ -150,19 +150,21 @@ static int is_untold(const FitResult *result, const char *name, unsigned states)
     return found;
 }
 
-/* What the data do not tell, and the remedy. */
-static void untold_print(const FitWork *work, FitKind kind) {
-    const unsigned untold = bit(FIT_LIMIT) | bit(FIT_OPEN) | bit(FIT_TIED) | bit(FIT_NO_EFFECT);
+/* What the data do not determine, and the remedy. */
+static void undetermined_print(const FitWork *work, FitKind kind) {
+    const unsigned undetermined =
+        bit(FIT_LIMIT) | bit(FIT_OPEN) | bit(FIT_TIED) | bit(FIT_NO_EFFECT);
     const FitResult *result = &work->set[kind].result;
-    if (kind == FIT_UNLOAD || !names_print(result, untold, 0, "not determined by these data: ")) {
+    if (kind == FIT_UNLOAD ||
+        !names_print(result, undetermined, 0, "not determined by these data: ")) {
         return;
     }
     printf("; hold what you know (--hold NAME=VALUE)%s%s%s\n",
            work->from || !has_presets(model_of(work)) ? ""
                                                       : ", or what is missing (--hold-from PRESET)",
-           kind == FIT_SHEAR ? "; records at several pressures tell cohesion and mu apart" : "",
-           kind == FIT_DRAG && is_untold(result, "regain_length", untold)
-               ? "; a plate that sinks as it slides tells regain_length"
+           kind == FIT_SHEAR ? "; records at several pressures separate cohesion from mu" : "",
+           kind == FIT_DRAG && is_undetermined(result, "regain_length", undetermined)
+               ? "; a plate that sinks as it slides determines regain_length"
                : "");
 }
 
@@ -214,13 +216,13 @@ void fit_print(const FitWork *work) {
     }
     for (int k = 0; k < FIT_KINDS; k++) {
         if (work->set[k].done) {
-            untold_print(work, (FitKind)k);
+            undetermined_print(work, (FitKind)k);
         }
     }
     const FitSet *slides = &work->set[FIT_DRAG];
     if (slides->count && !slides->done) {
         printf("left out: %d rows of slip; %s\n", slides->count,
-               fit_drag_is_modelled(model_of(work)) ? "all that they tell is held"
+               fit_drag_is_modelled(model_of(work)) ? "all that they determine is held"
                                                     : "slip costs no support under this model");
     }
     if (work->set[FIT_PRESS].done) {

@@ -139,7 +139,7 @@ MildStatus fit_soil_save(const FitWork *work, const char *command, const char *p
     fields_take(&s);
     if (s.missing[0]) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--soil: the records do not tell %s; say what you know (--hold "
+                         "--soil: the records do not determine %s; say what you know (--hold "
                          "NAME=VALUE), or take what is missing from a preset (--hold-from PRESET)",
                          s.missing);
     }

@@ -8,7 +8,7 @@
 
 enum { FIT_KINDS = 4, FIT_FIELDS_MAX = 64 };
 
-/* The rows of a kind, and what they tell. */
+/* The rows of a kind, and what they determine. */
 typedef struct {
     FitDef def;
     FitPoint *points; /* [count] */

@@ -22,7 +22,7 @@ int robots_print(void);
 
 #define ROBOTS_HELP "robot: a name listed by `mild info robots`, or a folder, written with a slash"
 
-/* Fails when a controller that follows no command is told to move: option: of the command. */
+/* Fails when a controller that follows no command gets one to move. option: of the command. */
 MildStatus robots_check_command(const char *controller, const char *option, double value,
                                 MildError *error);
 

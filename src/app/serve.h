@@ -24,7 +24,7 @@ ServeAnswer serve_read(const char *request, size_t size);
  * Returns the socket, or -1. */
 int serve_listen(const char *address, int *port, MildError *error);
 /* Answers until the process ends, or until the socket fails. A request has some seconds, and so
- * many are answered at once; the others are told to come again (503). */
+ * many are answered at once; the others are answered 503, try again. */
 MildStatus serve_folder(int listening, const char *folder, MildError *error);
 
 #endif

@@ -20,7 +20,7 @@ MildStatus csv_begin(Csv *csv, FILE *file, const char *path, MildError *error);
 void csv_end(Csv *csv);
 
 /* The next line that is neither empty nor a remark (#), trimmed. NULL at the end or after an error,
- * which *status tells. */
+ * which is in *status. */
 char *csv_line(Csv *csv, MildStatus *status, MildError *error);
 
 /* Splits at commas, in place, into trimmed cells; returns the count, or -1 when there are more than

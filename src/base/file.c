@@ -77,7 +77,7 @@ void file_claims_drop(void) {
     claim_count = 0;
 }
 
-/* Fails when the file, of which `info` tells, is an output of the program. */
+/* Fails when the file that `info` describes is an output of the program. */
 static MildStatus check_claims(const char *path, const struct stat *info, MildError *error) {
     for (int i = 0; i < claim_count; i++) {
         struct stat output = {0};

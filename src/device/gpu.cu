@@ -27,7 +27,7 @@ extern "C" void *gpu_alloc(int device, size_t bytes, MildError *error) {
     OnDevice on(device);
     cudaMemGetInfo(&free_bytes, &all);
     if (cudaMalloc(&memory, bytes) != cudaSuccess) {
-        cudaGetLastError(); /* it is told here */
+        cudaGetLastError(); /* it is reported here */
         mild_fail(error, MILD_ERROR_MEMORY,
                   "out of memory on device %d: %zu MiB are needed, %zu MiB are free; take "
                   "fewer robots",

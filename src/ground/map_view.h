@@ -1,6 +1,6 @@
 /* A map for the ground and the engine of many robots, in their scalar type, on a GPU too.
  *
- * Far from the map's origin a float does not tell where in a cell a point is. So a query has two
+ * Far from the map's origin a float cannot say where in a cell a point is. So a query has two
  * parts. A spot, once for a foot, is a whole number of cells and a rest, found without loss. Points
  * near it are a rest and a short way. What remains is the rounding of the numbers that come in: at
  * 50 m the coordinate of a foot is known to 1.9e-6 m. */

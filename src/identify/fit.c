@@ -20,8 +20,8 @@ enum { FIT_ROWS = 20000 };
 /* How often a lower sum of squares, met on the way to an interval's end, starts the fit again. */
 enum { FIT_AGAIN = 4 };
 
-/* The order in which parameters are put aside, or filled, when the data do not tell all of them.
- * Those of a new model come last. */
+/* The order in which parameters are put aside, or filled, when the data do not determine all of
+ * them. Those of a new model come last. */
 static const char *const give_up[] = {"rho", "phi",        "alpha", "c_d",         "c_g",
                                       "nu",  "sigma_cone", "k_c",   "dissipation", "exponent"};
 
@@ -134,7 +134,7 @@ static void ties_mark(Run *run, int without[FIT_PARAMETERS_MAX], int tied[FIT_PA
     }
 }
 
-/* Leaves a set of coordinates that the rows tell apart. */
+/* Leaves a set of coordinates that the rows determine one by one. */
 static void ties_find(Run *run) {
     int found[FIT_PARAMETERS_MAX] = {0}, left = 1;
     memset(run->tied, 0, sizeof run->tied);
@@ -195,28 +195,28 @@ static void values_find(Run *run) {
     }
 }
 
-/* Bool: the parameter may be held at the number of `fill`, because the data neither tell it nor
- * contradict that number. */
+/* Bool: the parameter may be held at the number of `fill`, because the data neither
+ * determine it nor contradict that number. */
 static int is_fillable(const Run *run, int index) {
     const FitValue *value = &run->result->parameter[index];
     MildMaterial fill = *run->def->fill;
     const double number = fit_counted(value->field, *fit_number(&fill, value->field));
-    const int untold = value->state == FIT_LIMIT || value->state == FIT_OPEN;
-    return untold && !(number < value->low) && !(number > value->high);
+    const int undetermined = value->state == FIT_LIMIT || value->state == FIT_OPEN;
+    return undetermined && !(number < value->low) && !(number > value->high);
 }
 
-/* Fits. With something to fill them with, holds the parameters that the data do not tell, one after
- * the other, until they tell the rest. */
+/* Fits. With something to fill them with, holds the parameters that the data do not determine,
+ * one after the other, until they determine the rest. */
 static void values_fill(Run *run) {
     int again = 1;
     while (again) {
-        int untold[FIT_PARAMETERS_MAX] = {0};
+        int undetermined[FIT_PARAMETERS_MAX] = {0};
         ties_find(run);
         values_find(run);
         for (int i = 0; i < run->result->parameters && run->def->fill; i++) {
-            untold[i] = is_fillable(run, i);
+            undetermined[i] = is_fillable(run, i);
         }
-        again = put_aside(run, untold, FIT_OPEN);
+        again = put_aside(run, undetermined, FIT_OPEN);
     }
 }
 

@@ -2,8 +2,8 @@
  * interval, and the names of the others.
  *
  * Nothing is held but what the caller holds. All other parameters that such rows can sense are
- * fitted together by bounded least squares. Where the data tell a combination of several
- * and none of them by itself, the combination is the result. An interval (95 %) is where the sum of
+ * fitted together by bounded least squares. Where the data determine a combination of several and
+ * none of them by itself, the combination is the result. An interval (95 %) is where the sum of
  * squares, minimised over all others, stays below a bound that allows rows of unequal noise. A
  * parameter without a bound on both sides within its range has no value. Pure functions: thread
  * safe, print nothing. */
@@ -20,17 +20,17 @@ typedef struct {
     int plates;                   /* at least 1; each row names one of them */
     MildMaterial material;        /* the model, the numbers that are held, and bed_depth */
     int held[FIT_PARAMETERS_MAX]; /* bool, in the order of fit_parameters */
-    const MildMaterial *fill;     /* where the data neither tell a parameter nor contradict this
-                                 material's number, hold it there; NULL: do not */
+    const MildMaterial *fill;     /* where the data neither determine a parameter nor contradict
+                                 this material's number, hold it there; NULL: do not */
 } FitDef;
 
 typedef enum {
     FIT_HELD,      /* by the caller; value */
-    FIT_FILLED,    /* held at the number of `fill`, because the data do not tell it; value */
+    FIT_FILLED,    /* held at the number of `fill`, because the data leave it open; value */
     FIT_FITTED,    /* value, low, high */
     FIT_LIMIT,     /* the data bound it on one side: low or high is that bound, the other is NaN */
     FIT_OPEN,      /* the data do not bound it within its range */
-    FIT_TIED,      /* the data tell it only together with others */
+    FIT_TIED,      /* the data determine it only together with others */
     FIT_NO_EFFECT, /* the forces in these rows do not depend on it */
 } FitState;
 

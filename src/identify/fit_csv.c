@@ -246,7 +246,7 @@ static MildStatus csv_rows(Record *record, FitFile *file, MildError *error) {
     return status;
 }
 
-/* Takes the slide out of a press, and checks that it tells something. */
+/* Takes the slide out of a press, and checks that it is of use. */
 static MildStatus csv_slide(const Record *record, FitFile *file, MildError *error) {
     if (file->kind != FIT_FILE_PRESS || !file->count) {
         return MILD_OK;

@@ -1,4 +1,4 @@
-/* A plate that slides: what its slip tells of ground where slip costs support (mild, mild_merged).
+/* A plate that slides, on ground where slip costs support (mild, mild_merged).
  *
  * Ground that carries F_v(u) without slip carries, after the slip s and the fresh penetration a,
  *     F = q F_v(u),   dq/ds = -q^2/slip_length,   dq/da = (1 - q)/regain_length

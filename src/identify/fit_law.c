@@ -123,7 +123,7 @@ int fit_is_geometry(MildModel model, const char *name) {
             strcmp(name, "slip_growth") == 0);
 }
 
-/* Bool: the parameter is one that a plate tells that slides where slip costs support. */
+/* Bool: a plate that slides where slip costs support determines the parameter. */
 static int is_dragged(const char *name) {
     static const char *const names[] = {"mu", "slip_length", "regain_length", "grip"};
     int found = 0;

@@ -1,12 +1,12 @@
-/* What the rows of a record tell of a model's parameters, and the force that they should have.
+/* How the force in the rows of a record follows from a model's parameters.
  *
- * A level plate of n elements that goes down at the speed w into virgin ground meets
+ * The force on a level plate of n elements that goes down at the speed w into virgin ground is
  *     F(u, w) = n (F_g(u) + d F_e(u) w + c_d m_a'(u) w^2 + m_a(u) dw/dt)
  * (eqs 4 and 5; F_e, d: hunt_crossley alone). Some parameters act in a combination only: of the
  * developing cone k_pen, sigma_cone/cos(alpha), u_f = R tan(alpha)/nu and the drag's
  * c_g c_d phi rho nu; of bekker exponent and k_c/b + k_phi.
  *
- * On its way up from the greatest depth a, where it met F_a, the plate meets
+ * On its way up from the greatest depth a, where the force was F_a, it is
  *     F(u) = F_a max(1 - (a - u)/e, 0),   e = max(recovery a, 0.1 mm)
  * F_a is that of the rows themselves, by least squares, so that recovery alone is asked of them.
  *
@@ -23,7 +23,7 @@
 
 enum { FIT_PARAMETERS_MAX = MILD_MODEL_FIELDS };
 
-/* What the data tell where they do not tell a parameter by itself. */
+/* What the data determine where they do not determine a parameter by itself. */
 typedef struct {
     const char *name;
     const char *unit;

@@ -2,8 +2,8 @@
 
 #include <math.h>
 
-/* [m] Where rows tell friction: grains need some millimetres of slip to build it up, and later heap
- * up before the plate. */
+/* [m] Where rows determine friction: grains need some millimetres of slip to build it up, and later
+ * heap up before the plate. */
 #define BUILT 0.005
 #define HEAPED 0.012
 

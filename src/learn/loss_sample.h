@@ -178,7 +178,7 @@ MILD_HD_FN float loss_latent_twice(float mu, float logvar, float spread) {
 }
 
 /* Weight of the gradient of a dimension's KL term max(KL, free_bits) [nat] (Kingma et al. 2016,
- * "free bits"): the dimension may tell this much for nothing. twice: 2 KL. */
+ * "free bits"): the dimension may carry this much for nothing. twice: 2 KL. */
 MILD_HD_FN float loss_kl_weight(float weight, float free_bits, float twice) {
     return free_bits > 0.0f && twice < 2.0f * free_bits ? 0.0f : weight;
 }

@@ -7,7 +7,7 @@
 #include <string.h>
 
 /* oneDNN's primitives cost more to make than a small product to compute, and one thread may run one
- * at a time: each thread keeps those of the shapes that it meets. A network's training has some
+ * at a time: each thread keeps those of the shapes that it has had. A network's training has some
  * hundred. */
 #define SHAPES 512
 

@@ -110,8 +110,8 @@ done
 expect 0 'turning .* of 0.40 rad/s' "$mild" eval --ground grass --turn 0.4 --speed 0.3 --trials 1 --seconds 3
 expect 0 'sideways .* of 0.20 m/s' "$mild" eval --ground grass --sideways 0.2 --trials 1 --seconds 0.2
 expect 0 'rubber+rigid .*1/1 ' "$mild" eval --ground rubber+rigid --model con_spring --trials 1 --seconds 0.2
-expect 0 '1/1 ' "$mild" eval --ground grass --speed=-1.5,1.5 --sideways=-1.5 --turn=1.5 --push 0.3 --trials 1 --seconds 0.2 --json told.json
-grep -q '"turn":.*1.5' told.json && grep -q '"push":.*0.3' told.json || fail "told.json: $(cat told.json)"
+expect 0 '1/1 ' "$mild" eval --ground grass --speed=-1.5,1.5 --sideways=-1.5 --turn=1.5 --push 0.3 --trials 1 --seconds 0.2 --json commanded.json
+grep -q '"turn":.*1.5' commanded.json && grep -q '"push":.*0.3' commanded.json || fail "commanded.json: $(cat commanded.json)"
 walk() { "$mild" eval --ground grass --trials 2 --seconds 1 "$@" --json - 2>/dev/null | grep -v randomize; }
 [ "$(walk)" != "$(walk --randomize)" ] || fail "--randomize changes nothing"
 # judged on the robot's own soles, whatever the training had, unless the key is given

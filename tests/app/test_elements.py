@@ -56,10 +56,10 @@ def made():
 
 
 # ---- each once, on two devices; a judge knows no elements ----
-told = run("--seeds", "2", "--devices", "cuda:0,cuda:1", "--train")
+said = run("--seeds", "2", "--devices", "cuda:0,cuda:1", "--train")
 lines = made()
 assert sorted(re.sub(r"cuda:[01]", "cuda", line) for line in lines) == [f"train cuda {n} {seed} 280 400" for n in (10, 77) for seed in (1, 2)], lines
-assert {line.split()[1] for line in lines} == {"cuda:0", "cuda:1"} and "4 of 4 trainings left" in told and "2.0 k policy steps/s" in told
+assert {line.split()[1] for line in lines} == {"cuda:0", "cuda:1"} and "4 of 4 trainings left" in said and "2.0 k policy steps/s" in said
 assert "| **77** | 2 | 2.0 (2.0 to 2.0) | 15 of 20 | 0.015 (0.010 to 0.020) | 0.40 (0.40 to 0.40) |" in run("--seeds", "2", "--judge")
 assert made() == ["eval cpu - - -"] * 4
 
@@ -71,10 +71,10 @@ run("--seeds", "2", "--devices", "cpu", "--", "--ppo.anneal=1 2")
 assert [line.split()[0] for line in made()] == ["train", "eval"]  # the judge of the lost one is not that of the new one
 
 # ---- one that is too slow is given up, one that fails is named; the next start makes them ----
-told = run("--seeds", "3", "--seconds", "0.5", "--train", code=1, SLOW="9")
-assert "77-3: given up" in told and not (out / "77-3.safetensors").exists() and "10-3" not in told, told
-told = run("--seeds", "3", "--train", code=1, BROKEN="10")
-assert "10-3: no memory" in told and (out / "77-3.safetensors").exists(), told
+said = run("--seeds", "3", "--seconds", "0.5", "--train", code=1, SLOW="9")
+assert "77-3: given up" in said and not (out / "77-3.safetensors").exists() and "10-3" not in said, said
+said = run("--seeds", "3", "--train", code=1, BROKEN="10")
+assert "10-3: no memory" in said and (out / "77-3.safetensors").exists(), said
 run("--seeds", "3")
 assert len(json.loads((out / "10-3.json").read_text())["rows"]) == 1
 shutil.rmtree(work)

@@ -60,18 +60,18 @@ GROUNDS
 grep -q 'residual .* N, .* % of the force' table.txt || fail "no residual in the table"
 grep -q '^the intervals assume alpha = 1.047, nu = 1.6, c_g = 2.7' table.txt || fail "what is held is not said"
 
-# what is assumed and what is not told
+# what is assumed and what is not determined
 "$mild" fit foam45.csv "${plate[@]}" >table.txt
 grep -q '^not determined by these data: sigma_cone, alpha, nu, c_g, c_d, phi, rho; hold .*--hold-from' table.txt ||
     fail "what is not determined is not said"
 grep -q '^alpha  *-  *-  *-  rad' table.txt || fail "alpha has a value"
 grep -q '^the intervals assume no firm bed down to 0.04 m' table.txt || fail "the bed"
-grep -q '^a press at another speed or a drop tells more of c_g, c_d' table.txt || fail "one speed"
-grep -q '^no press straight down tells mu, k_drift, b_drift, slip_length' table.txt || fail "what no press tells"
+grep -q '^a press at another speed or a drop says more about c_g, c_d' table.txt || fail "one speed"
+grep -q '^no press straight down determines mu, k_drift, b_drift, slip_length' table.txt || fail "what no press determines"
 "$mild" fit foam45.csv "${plate[@]}" --hold alpha=1.1,c_g=0 >table.txt
 grep -q '^the intervals assume alpha = 1.1, c_g = 0$' table.txt || fail "what is held"
 "$mild" fit foam45.csv "${plate[@]}" --hold-from foam45 >table.txt
-grep -q '^the intervals assume alpha = 1.1, .* of foam45, because the data do not tell' table.txt || fail "what is filled"
+grep -q '^the intervals assume alpha = 1.1, .* of foam45, because the data do not determine them' table.txt || fail "what is filled"
 grep -q '^nu  *1\.[56]' table.txt || fail "nu is not fitted"
 "$mild" fit foam45.csv "${plate[@]}" --model ecc_spring | grep -q 'neighbouring rows are alike' || fail "a wrong law is not said"
 
@@ -84,7 +84,7 @@ near "bed at 30 mm: k_pen" "$(value fit.json k_pen)" 480 0.1
 "$mild" fit deep.csv "${plate[@]}" --json fit.json >/dev/null
 near "no bed to 0.2 m: k_pen" "$(value fit.json k_pen)" 380 0.1
 
-# two speeds tell the drag
+# two speeds determine the drag
 "$mild" press --ground sand_loose --depth 0.04 --speed 1 --csv fast.csv >/dev/null
 "$mild" fit sand_loose.csv fast.csv "${plate[@]}" --hold-from sand_loose --fit k_pen,sigma_cone,alpha,c_d --json fit.json >table.txt
 near "two speeds: c_d" "$(value fit.json c_d)" 17.2 5
@@ -92,7 +92,7 @@ near "two speeds: alpha" "$(value fit.json alpha)" 1.047 5
 "$mild" fit sand_loose.csv "${plate[@]}" --hold-from sand_loose --fit k_pen,c_d --json fit.json >/dev/null
 tr -d ' \t\n' <fit.json | grep -q '"limits":{"c_d":{' || fail "c_d at one speed"
 
-# presses at constant speed tell c_g c_d only; bodies that brake tell c_g too, if loosely
+# presses at constant speed determine c_g c_d only; bodies that brake c_g too, if loosely
 for speed in 1 2; do
     "$mild" press --ground sand_loose --impact $speed --mass 5 --csv drop$speed.csv >/dev/null || fail "drop at $speed m/s"
 done
@@ -143,7 +143,7 @@ refuse "--plate 2 3" "$mild" fit small.csv large.csv small.csv --plate 0.15,0.1 
 refuse "--plate 3" "$mild" fit small.csv --plate 0.15,0.1,0.1
 refuse "--hold plate_width --plate" "$mild" fit wide.csv --plate 0.3,0.2 --model bekker --hold plate_width=0.1
 
-# the way up tells recovery: of foam at least all but a little, of sand at most a little, of grass a half
+# the way up determines recovery: of foam at least all but a little, of sand at most a little, of grass a half
 "$mild" fit foam45.csv "${plate[@]}" | grep -q '^recovery  *-  *0.99[0-9]*  *-  -$' || fail "foam springs back"
 "$mild" press --ground grass --depth 0.04 --csv grass.csv >/dev/null
 "$mild" fit grass.csv "${plate[@]}" --json fit.json >table.txt

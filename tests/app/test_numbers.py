@@ -11,7 +11,7 @@ import sys
 import tempfile
 
 mild = os.path.realpath(sys.argv[1])
-failures, told_of = 0, {}
+failures, count_of = 0, {}
 PITCH, GRAVITY = 0.0195, 9.81  # of the paper's elements [m], [m/s^2]
 PAPER = f"{11 * PITCH},{7 * PITCH}"  # the paper's sole
 SLOW = 5e-4  # [m/s] a press without inertia
@@ -20,8 +20,8 @@ SLOW = 5e-4  # [m/s] a press without inertia
 def near(what, value, wanted, within):
     global failures
     if not abs(value - wanted) <= within:
-        told_of[what] = told_of.get(what, 0) + 1
-        if told_of[what] <= 2:  # a column has thousands of rows
+        count_of[what] = count_of.get(what, 0) + 1
+        if count_of[what] <= 2:  # a column has thousands of rows
             print(f"FAIL: {what}: {value}, not {wanted} +- {within}")
         failures += 1
 
@@ -237,8 +237,8 @@ def info_ranges(text):
     true("ranges", len(ranges) > 18)
     for name, low, high in ranges:
         error = printed_by("press", "--ground", "sand_loose", f"--ground.{name}=1e300", code=2)
-        told_low, told_high = found(r"outside (\S+) \.\. ([^\s:]+)", error)
-        true(f"{name}: {low} .. {high} in: {error}", told_low == float(low) and told_high == float(high))
+        said_low, said_high = found(r"outside (\S+) \.\. ([^\s:]+)", error)
+        true(f"{name}: {low} .. {high} in: {error}", said_low == float(low) and said_high == float(high))
 
 
 def info_robots():

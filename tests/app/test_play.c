@@ -1,5 +1,5 @@
 /* A walk in a window, with a window of the test's own: what the keys ask for is what the policy is
- * commanded and what the picture tells, by sign, size and bounds. The clock goes with the frames.
+ * commanded and what the picture shows, by sign, size and bounds. The clock goes with the frames.
  */
 #include "app/play.h"
 #include "base/clock.h"
@@ -12,9 +12,9 @@ enum { FRAMES_MAX = 60 };
 static WindowInput script[FRAMES_MAX]; /* what the window says after each frame */
 static int frames, resets;
 static double now;                      /* [s] */
-static double shown[FRAMES_MAX + 1][3]; /* commands that the picture tells */
+static double shown[FRAMES_MAX + 1][3]; /* commands that the picture shows */
 static double acted[FRAMES_MAX + 1][3]; /* commands that the policy last saw before a frame */
-static double walked[FRAMES_MAX + 1];   /* [s] that the picture tells */
+static double walked[FRAMES_MAX + 1];   /* [s] that the picture shows */
 static double latest[3];
 static View *const no_view = (View *)(void *)latest; /* never looked into */
 
@@ -94,7 +94,7 @@ static void expect_command(int frame, double forward, double left, double turn) 
         const double off =
             fmax(fabs(shown[frame][c] - wanted[c]), fabs(acted[frame][c] - wanted[c]));
         if (off > 1e-9) {
-            fail_msg("frame %d, part %d: the picture tells %g, the policy saw %g, asked was %g",
+            fail_msg("frame %d, part %d: the picture shows %g, the policy saw %g, asked was %g",
                      frame, c, shown[frame][c], acted[frame][c], wanted[c]);
         }
     }

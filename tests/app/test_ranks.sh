@@ -30,7 +30,7 @@ same_numbers() {
     cmp one.numbers other.numbers || fail "$1 and $2 differ"
 }
 
-# The log without the columns that tell the time it took.
+# The log without the columns with the time it took.
 log_numbers() {
     awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) timed[i] = $i ~ /^rate\// }
         { for (i = 1; i <= NF; i++) if (!timed[i]) printf "%.5g,", $i; print "" }' "$1/log.csv"

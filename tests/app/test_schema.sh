@@ -60,7 +60,7 @@ sed '/"policy":/d' walk.json >bad.json && unfit eval ': not one of'
 printf '{"machine": "m", "version": "0.1.0", "rows": []}' >bad.json && unfit bench '.rows: fewer than 1'
 sed 's/"value":.*/"value": "much",/' foam.json >bad.json && unfit fit '.value: no number'
 
-# its numbers are those that the table, the stances and the track tell, each under its own name
+# its numbers are those that the table, the stances and the track give, each under its own name
 side=("$mild" eval --ground grass --speed 0.5 --sideways 0.1 --seconds 5)
 "${side[@]}" --trials 2 --json two.json --stances stances.csv --track track.csv >two.txt || fail "eval of two trials"
 "${side[@]}" --trials 1 --json first.json >/dev/null || fail "eval of one trial"

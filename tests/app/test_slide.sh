@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Plates that slide: `mild press --drag` to `mild fit` and back to a soil, for ground where slip costs support; what a level drag
-# does not tell; records that tell nothing. Usage: test_slide.sh PATH_TO_MILD
+# does not determine; records that are of no use. Usage: test_slide.sh PATH_TO_MILD
 source "$(dirname "$0")/../kit.sh" "$1"
 
 # ground NAME KEY=VALUE...: a soil whose numbers are the truth, but for these.
@@ -52,12 +52,12 @@ near nu "$(number fit.json nu value)" 0.9 0.1
 near slip_length "$(number fit.json slip_length value)" 0.0025 0.1
 near grip "$(number fit.json grip value)" 0.14 0.5
 awk -v v="$(number fit.json mu low)" 'BEGIN { exit !(v > 0.3 && v < 0.5) }' || fail "mu is not bounded from below"
-grep -q '^not determined by these data: mu, regain_length; .*a plate that sinks as it slides tells regain_length' table.txt ||
-    fail "what a level drag does not tell"
+grep -q '^not determined by these data: mu, regain_length; .*a plate that sinks as it slides determines regain_length' table.txt ||
+    fail "what a level drag does not determine"
 [ "$(grep -c '"residual"' fit.json)" = 3 ] || fail "the JSON has not one residual for each kind"
 grep -q 'rows that slide of 1 file' table.txt || fail "the slide's residual"
 
-# friction that mu bounds: mu is told, and grip from below
+# friction that mu bounds: mu is determined, and grip from below
 ground slick.ini mu=0.3 grip=0.3
 "$mild" press --ground ./slick.ini --plate 0.1,0.1 --depth 0.015 --drag 0.03 --csv slick.csv >/dev/null
 "$mild" fit disc.csv square.csv slick.csv --model mild_merged "${plates[@]}" --hold $known --json slick.json >/dev/null
@@ -73,7 +73,7 @@ near "slip_length that grows with the depth" "$(number deep.json slip_length val
 "$mild" fit disc.csv square.csv deep0.015.csv --model mild_merged "${plates[@]}" --hold $known --json deep.json >/dev/null
 near "taken for one that does not, 15 mm deep" "$(number deep.json slip_length value)" 0.0037 1
 
-# Coulomb's friction alone: mu is told
+# Coulomb's friction alone: mu is determined
 ground coulomb.ini grip=0
 "$mild" press --ground ./coulomb.ini --plate 0.1,0.1 --depth 0.015 --drag 0.03 --csv coulomb.csv >/dev/null
 "$mild" fit disc.csv square.csv coulomb.csv --model mild_merged "${plates[@]}" --hold $known,grip=0 --json coulomb.json >/dev/null

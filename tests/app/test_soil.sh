@@ -57,7 +57,7 @@ tr -d ' \t\n' <fit.json | sed -n 's/.*"cohesion":{"value":[^,]*,"low":\([^,]*\),
     awk '{ ok = $1 <= 150 && 150 <= $2 } END { exit !ok }' || fail "cohesion"
 grep -q '^residual .* N/m^2, .* % of the stress (root mean square); 200 rows of slip of 2 files' table.txt || fail "residual of the shear"
 grep -q '^residual .* N, .* unloading rows of 3 files' table.txt || fail "residual of the unloading"
-grep -q '^no press straight down tells k_drift, b_drift, refill$' table.txt || fail "what nothing tells"
+grep -q '^no press straight down determines k_drift, b_drift, refill$' table.txt || fail "what nothing determines"
 
 # the file: source, intervals, and numbers to the last digit
 head -2 mars.ini | grep -q '^# mild fit d5.csv d15.csv wide.csv r5.csv r20.csv --model bekker --plate 0.05' || fail "no source in: $(cat mars.ini)"
@@ -152,6 +152,6 @@ expect 0 '^cohesion  *-  *-' "$mild" fit r5.csv --model bekker --ring 0.2,0.12
 "${fit[@]}" --hold-from before.ini --soil mars.ini >/dev/null || fail "a soil for --hold-from"
 grep -B1 '^bed_depth' mars.ini | grep -q '^# of before.ini' || fail "what is of a soil"
 "$mild" fit wide.csv --model bekker --plate 0.3,0.1 --hold-from before.ini --soil one.ini >/dev/null || fail "one plate, the rest of a soil"
-grep -B1 '^k_c' one.ini | grep -q '^# of before.ini' || fail "one plate tells k_c"
+grep -B1 '^k_c' one.ini | grep -q '^# of before.ini' || fail "one plate determines k_c"
 
 finish "soil: all as expected"

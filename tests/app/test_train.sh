@@ -23,7 +23,7 @@ numbers() {
     tail -c +$(($(od -An -t u8 -N 8 "$1") + 9)) "$1"
 }
 
-# The log without the two columns that tell the time it took.
+# The log without the two columns with the time it took.
 log_numbers() {
     awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) timed[i] = $i ~ /^rate\// }
         { for (i = 1; i <= NF; i++) if (!timed[i]) printf "%s,", $i; print "" }' "$1/log.csv"

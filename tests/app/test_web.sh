@@ -73,7 +73,7 @@ exec 4<>"/dev/tcp/127.0.0.1/$port"
 gets 200 'GET / HTTP/1.1\r\n\r\n'
 exec 4>&-
 
-# many who say one byte a second: others are told to come again, and are served when the time of those is over.
+# many who say one byte a second: others are answered 503, and are served when the time of those is over.
 # A client counts until its thread has ended, so they begin when nobody is left; once more where a loaded machine opened
 # them more slowly than they are dropped.
 trap '' PIPE
@@ -103,7 +103,7 @@ for one in "${slow[@]}"; do
     read -r -t 1 line <&"$one" && [[ $line = 'HTTP/1.1 408 '* ]] && late=$((late + 1))
     exec {one}>&-
 done 2>/dev/null
-[ $late -ge 60 ] || fail "only $late of 64 are told that their time is over"
+[ $late -ge 60 ] || fail "only $late of 64 are answered that their time is over"
 memory=$(sed -n 's/^VmHWM:[[:space:]]*\([0-9]*\) kB/\1/p' /proc/$server/status) # [KiB]
 [ -n "${ASAN_OPTIONS:-}" ] || [ "$memory" -lt 200000 ] || fail "the server took $memory KiB"
 kill -0 $server || fail "the server has gone"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Finished work: no command writes over what it was not told to. Run folders with and without checkpoints, links, pipes and
+# Finished work: no command writes over what it was not asked to. Run folders with and without checkpoints, links, pipes and
 # other people's files in them; outputs that are read without being named on the command line.
 # Usage: test_work.sh PATH_TO_MILD
 source "$(dirname "$0")/../kit.sh" "$1"

@@ -134,7 +134,7 @@ TEST(test_names) {
     check_bad_text(KIND, "", MILD_ERROR_ARGUMENT, "robot.kind sand");
 }
 
-/* What does not fit is cut, and the whole length told, as snprintf does. */
+/* What does not fit is cut, and the whole length returned, as snprintf does. */
 TEST(test_cut) {
     char text[16];
     for (size_t size = 0; size <= 8; size++) {
@@ -158,7 +158,7 @@ TEST(test_check) {
     for (int i = 0; i < 3; i++) {
         def = start;
         def.count[i] = 10 + i;
-        def.kind = 3; /* the first in the table's order is told */
+        def.kind = 3; /* the first in the table's order is reported */
         assert_int_equal(mild_fields_check(fields, FIELDS, &def, "x", &error), MILD_ERROR_RANGE);
         char names[100];
         snprintf(names, sizeof names, "x.count %d 0 9", 10 + i);
@@ -195,7 +195,7 @@ TEST(test_find) {
     assert_null(nearest);
     char longer[80];
     memset(longer, 'z', sizeof longer);
-    longer[79] = '\0'; /* as far from every name as can be: one is told all the same */
+    longer[79] = '\0'; /* as far from every name as can be: one is named all the same */
     assert_null(mild_field_find(fields, FIELDS, longer, &nearest));
     assert_string_equal(nearest, "mass");
 }

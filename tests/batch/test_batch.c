@@ -484,7 +484,7 @@ static double planes_apart(const MildGround *a, const MildGround *b, int f, int 
 }
 
 /* What a batch stores is what the grounds that walked with it remember, and they step on with it.
- * A float does not always tell the cell of a map, so some planes are those of the next one. */
+ * A float does not always determine the cell of a map, so some planes are those of the next one. */
 static void store_on(const Shape *shape, int device) {
     MildError error = {0};
     Side walked, again;

@@ -244,7 +244,7 @@ static void worst_print(const char *name, Worst *w) {
 enum { MOMENTS, POINTS, POINTS_ALONE };
 
 /* A foot that is pressed, slides and turns on random material for a while. points: one of the
- * above. exact: bool, at places that a float can tell. */
+ * above. exact: bool, at places that a float can resolve. */
 static void walk(Kit *kit, uint64_t *random, int steps, double tolerance, int groups, int per,
                  int points, int exact, void (*run)(ContactCase *), Worst *worst) {
     static ContactCase c;
@@ -419,7 +419,7 @@ typedef struct {
     MildMapKind kind;
     MildPattern pattern;
     double far;      /* [m] of the feet from the origin */
-    int exact;       /* bool: they are where a float can tell */
+    int exact;       /* bool: they are where a float can resolve */
     MildModel other; /* of the material of label 1 */
     int points;      /* as in Shape */
 } Relief;

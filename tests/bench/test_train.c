@@ -1,4 +1,4 @@
-/* The times that the training bench and the log of a training tell, by a clock that ticks once each
+/* The times in the training bench and in the log of a training, by a clock that ticks once each
  * time it is read: nothing is left out and nothing counts twice. */
 #include <pthread.h>
 
@@ -13,7 +13,7 @@ static pthread_mutex_t reading = PTHREAD_MUTEX_INITIALIZER;
 static double now;         /* [s] of the clock */
 static double first_after; /* [s] when the first iteration was over */
 static int iterations;
-static TrainTimes told; /* sums of all iterations but the first */
+static TrainTimes counted; /* sums of all iterations but the first */
 
 double __wrap_clock_seconds(void);
 MildStatus __real_train_iterate(Trainer *trainer, TrainReport *report, MildError *error);
@@ -40,11 +40,11 @@ MildStatus __wrap_train_iterate(Trainer *trainer, TrainReport *report, MildError
     if (iterations++ == 0) {
         first_after = now;
     } else {
-        told.environments += t->environments;
-        told.inference += t->inference;
-        told.update += t->update;
-        told.physics += t->physics;
-        told.ground += t->ground;
+        counted.environments += t->environments;
+        counted.inference += t->inference;
+        counted.update += t->update;
+        counted.physics += t->physics;
+        counted.ground += t->ground;
     }
     return status;
 }
@@ -54,7 +54,7 @@ static void check_parts(int threads) {
     MildError error = {0};
     ExperimentDef def = experiment_def_default();
     iterations = 0;
-    told = (TrainTimes){0};
+    counted = (TrainTimes){0};
     def.train.envs = ENVS;
     def.train.threads = threads;
     def.ppo.steps = STEPS;
@@ -75,17 +75,18 @@ static void check_parts(int threads) {
     assert_true(iterations > 2);
     assert_true(fabs(step - 1e6 * wall / steps) < 1e-6 * step);
     assert_true(fabs(sum - step) < 1e-9 * step);
-    assert_true(fabs(value_of(&report, "inference") - 1e6 * told.inference / steps) < 1e-6 * step);
-    assert_true(fabs(value_of(&report, "update") - 1e6 * told.update / steps) < 1e-6 * step);
+    assert_true(fabs(value_of(&report, "inference") - 1e6 * counted.inference / steps) <
+                1e-6 * step);
+    assert_true(fabs(value_of(&report, "update") - 1e6 * counted.update / steps) < 1e-6 * step);
     const double inside =
         value_of(&report, "physics") + value_of(&report, "ground") + value_of(&report, "task");
-    assert_true(fabs(inside - 1e6 * told.environments / steps) < 1e-6 * step);
+    assert_true(fabs(inside - 1e6 * counted.environments / steps) < 1e-6 * step);
     /* in physics and in the ground, its part, the threads are at once */
-    assert_true(told.ground > 0 && told.physics > told.ground);
-    assert_true(fabs(value_of(&report, "ground") - 1e6 * told.ground / threads / steps) <
+    assert_true(counted.ground > 0 && counted.physics > counted.ground);
+    assert_true(fabs(value_of(&report, "ground") - 1e6 * counted.ground / threads / steps) <
                 1e-6 * step);
     assert_true(fabs(value_of(&report, "physics") -
-                     1e6 * (told.physics - told.ground) / threads / steps) < 1e-6 * step);
+                     1e6 * (counted.physics - counted.ground) / threads / steps) < 1e-6 * step);
     assert_true(value_of(&report, "threads") == threads);
 }
 

@@ -125,7 +125,7 @@ static double worst_gap(const float *a, const float *b, int count) {
     return worst;
 }
 
-/* The same file, but that its modulation says `theta` whatever it is told. */
+/* The same file, but that its modulation gives `theta` whatever its input. */
 static void actions_at(Policy *policy, const float *theta, const float *history, float *actions) {
     const char *name;
     const Mlp *modulation = network_mlp(&policy->network, 2, &name);

@@ -5,7 +5,7 @@
 
 #define DT 0.0025
 
-/* A robot that does what it is told, and what was seen of it. */
+/* A robot that follows its command, and what was seen of it. */
 typedef struct {
     WalkDef def;
     Walk walk;

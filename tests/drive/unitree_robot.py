@@ -87,7 +87,7 @@ def go_state_of(numbers, tick):
 
 
 def legs_of(c):
-    """The commands of the G1's legs; what this robot must be told is looked at."""
+    """The commands of the G1's legs; what they must say is checked."""
     assert c.crc == firmware_crc(command_bytes(c)), "a command with a wrong CRC"
     assert (c.mode_pr, c.mode_machine) == (0, MACHINE)
     assert [m.mode for m in c.motor_cmd] == [1] * 29 + [0] * 6

@@ -303,7 +303,7 @@ static inline void oracle_finish(RobotSim *sim, Oracle *o) {
     }
 }
 
-/* What RobotSim tells a task of the pose. */
+/* What RobotSim gives a task of the pose. */
 static inline void oracle_measure(RobotSim *sim, const EngineCase *in, Oracle *o) {
     const MildTerrain terrain = oracle_terrain(in);
     o->body_clearance = robot_sim_body_clearance(sim, &terrain);

@@ -161,15 +161,15 @@ static int play_alone(Plain *plain, int e, float history[SA01_HISTORY], TaskStep
     return t - 1;
 }
 
-/* The end of an episode is told without changing what follows. */
+/* The end of an episode is reported without changing what follows. */
 TEST(ends) {
     static Plain plain;
     static Rows a, b, last;
     static float terms[ENVS][TASK_REWARD_COUNT];
-    MildEnvs *told = open_envs(keys, KEYS), *untold = open_envs(keys, KEYS);
+    MildEnvs *reporting = open_envs(keys, KEYS), *silent = open_envs(keys, KEYS);
     const EnvsView first = view_of(&a), second = view_of(&b);
-    assert_int_equal(mild_envs_reset(told, &first, NULL, NULL), MILD_OK);
-    assert_int_equal(mild_envs_reset(untold, &second, NULL, NULL), MILD_OK);
+    assert_int_equal(mild_envs_reset(reporting, &first, NULL, NULL), MILD_OK);
+    assert_int_equal(mild_envs_reset(silent, &second, NULL, NULL), MILD_OK);
     open_plain(&plain);
     int seen[ENVS] = {0}, compared = 0;
     for (int t = 0; t < 24 * STEPS && compared < ENVS; t++) {
@@ -180,8 +180,8 @@ TEST(ends) {
         step.last = view_of(&last);
         step.terms = terms[0];
         memset(&last, 0xff, sizeof last);
-        assert_int_equal(mild_envs_step(told, &step, NULL, NULL), MILD_OK);
-        assert_int_equal(mild_envs_step(untold, &plainly, NULL, NULL), MILD_OK);
+        assert_int_equal(mild_envs_step(reporting, &step, NULL, NULL), MILD_OK);
+        assert_int_equal(mild_envs_step(silent, &plainly, NULL, NULL), MILD_OK);
         assert_memory_equal(&a, &b, sizeof a);
         for (int e = 0; e < ENVS; e++) {
             assert_true(a.done[e] || isnan(last.history[e][0])); /* others are left alone */
@@ -201,11 +201,11 @@ TEST(ends) {
     }
     assert_int_equal(compared, ENVS);
     close_plain(&plain);
-    mild_envs_close(told);
-    mild_envs_close(untold);
+    mild_envs_close(reporting);
+    mild_envs_close(silent);
 }
 
-/* The batch engine does not tell it, and says so. */
+/* The batch engine does not report it, and says so. */
 TEST(no_ends) {
     static Rows rows, last;
     const char *batch[KEYS];

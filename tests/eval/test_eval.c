@@ -180,7 +180,7 @@ TEST(short_trials_succeed) {
 }
 
 /* From `stop` on nothing is commanded. */
-TEST(stopped_trials_are_told_to_stand) {
+TEST(stopped_trials_get_the_command_to_stand) {
     Zero zero;
     EvalDef eval = {.speed = 0.3, .sideways = 0.1, .trials = 1, .seconds = 0.3, .seed = 1};
     run(&zero, "rubber", eval, 1);

@@ -196,7 +196,7 @@ TEST(a_centre_needs_a_force) {
 }
 
 /* Memory may run out at any array of the trials; two are those of the feet. */
-TEST(memory_that_is_missing_is_told) {
+TEST(missing_memory_is_reported) {
     int of_feet = 0, fail = 1;
     for (;; fail++) {
         MildError error = {0};

@@ -254,14 +254,14 @@ static void check_end(const char *how, const char *names) {
     assert_error(&error, MILD_ERROR_IO, names);
 }
 
-TEST(ends_are_told) {
+TEST(ends_are_reported) {
     check_end("die", "--program trial 1 failed");
     check_end("leave", "--program trial 1 ended");
     microseconds = 100000;
     check_end("late", "--program trial 1 600");
     microseconds = 0;
     assert_true(wanted.tv_sec == 600 && wanted.tv_usec == 0);
-    MildError error = {0}; /* who failed before has told why */
+    MildError error = {0}; /* the failure before has its own report */
     OtherGround *other = start("echo", 1);
     assert_int_equal(other_ground_stop(other, MILD_ERROR_RANGE, &error), MILD_ERROR_RANGE);
     assert_int_equal(error.status, MILD_OK);

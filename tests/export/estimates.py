@@ -55,6 +55,6 @@ for name, run in [("C", of_c)] + [("ONNX", of_onnx)] * len(graph):
         worst = np.maximum(worst, abs(found - truth).max(axis=0))
         if targets is not None:
             assert abs(targets - pose - float(scale) * trial.action).max() < 1e-5, "targets"
-        assert np.ptp(truth, axis=0).min() > 1e-2, "an estimate that stays the same tells nothing"
+        assert np.ptp(truth, axis=0).min() > 1e-2, "an estimate that stays the same shows nothing"
     print(f"{name}: estimates within {worst.max():.1e}")
     assert worst.max() < 1e-4, worst

@@ -679,8 +679,8 @@ static MildStatus attach(int envs, MildError *error) {
     return status;
 }
 
-/* Too little memory: the line tells how many robots fit, and so many do, but not one more. */
-TEST(memory_that_is_missing_is_told) {
+/* Too little memory: the line says how many robots fit, and so many do, but not one more. */
+TEST(missing_memory_is_reported) {
     MildError error = {0};
     emulated_memory = (size_t)40 << 20;
     assert_int_equal(attach(5000, &error), MILD_ERROR_MEMORY);

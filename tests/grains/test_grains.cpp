@@ -155,7 +155,7 @@ static BedDef small_bed(void) {
     return def;
 }
 
-/* The floor carries the grains' weight, told by the overlaps on it. */
+/* The floor carries the grains' weight, measured by the overlaps on it. */
 TEST(the_floor_carries_the_weight) {
     if (kit_short()) {
         skip(); /* a_resting_plate settles, too */

@@ -147,7 +147,7 @@ static double cylinder_force(const MildMaterial *m, double pitch, double radius,
     return sum;
 }
 
-TEST(pressed_shapes_meet_closed_forms) {
+TEST(pressed_shapes_agree_with_closed_forms) {
     const double radius = 0.1, half = 0.15, pitch = 0.006;
     const MildShape ball = surface_sphere(radius), rod = surface_capsule(radius, half);
     MildSole *sphere = surface_make(&ball, 1, pitch), *capsule = surface_make(&rod, 1, pitch);

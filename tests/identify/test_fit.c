@@ -1,5 +1,5 @@
 /* Parameters from noisy presses: they come back, their intervals are those of formulas and of a
- * search that knows nothing of the fit, and what the data cannot tell has no value. Every noise is
+ * search that knows nothing of the fit, and what the data leave open has no value. Every noise is
  * seeded. test_coverage.c counts how often the intervals hold the truth. */
 #include <float.h>
 
@@ -137,10 +137,11 @@ static double is_near(FitResult *result, const char *name, double truth) {
     return is_within(result, name, truth, 1e-4);
 }
 
-/* Without noise and with nothing held, the truth comes back as far as a slow press tells it: the
- * two combinations of the cone, and no value for its parts. */
+/* Without noise and with nothing held, the truth comes back as far as a slow press determines it:
+ * the two combinations of the cone, and no value for its parts. */
 TEST(exact) {
-    static const char *const untold[] = {"sigma_cone", "alpha", "nu", "c_g", "c_d", "phi", "rho"};
+    static const char *const undetermined[] = {"sigma_cone", "alpha", "nu", "c_g",
+                                               "c_d",        "phi",   "rho"};
     double worst = 0;
     for (int g = 0; g < mild_material_preset_count(); g++) {
         const FitDef truth = plate(mild_material_preset_name(g));
@@ -154,7 +155,7 @@ TEST(exact) {
             fmax(worst, is_near(&result, "sigma_cone/cos(alpha)", m->sigma_cone / cos(m->alpha)));
         worst = fmax(worst, is_near(&result, "tan(alpha)/nu", tan(m->alpha) / m->nu));
         for (int i = 0; i < 7; i++) {
-            const FitValue *value = value_of(&result, untold[i]);
+            const FitValue *value = value_of(&result, undetermined[i]);
             assert_int_equal(value->state, FIT_TIED);
             assert_true(isnan(value->value) && isnan(value->low) && isnan(value->high));
         }
@@ -163,7 +164,7 @@ TEST(exact) {
 }
 
 /* Far from the start: cones that are complete at 0.5 mm to 0.1 m, stiffer or softer than their
- * surroundings. Of the first, ten rows tell k_pen. */
+ * surroundings. Of the first, ten rows determine k_pen. */
 TEST(shapes) {
     static const double alphas[] = {0.1, 0.7, 1.047, 1.4, 1.45}, nus[] = {2, 3, 0.5, 1, 0.9};
     for (int i = 0; i < 10; i++) {
@@ -182,7 +183,7 @@ TEST(shapes) {
 }
 
 /* What is held turns the combinations into parameters: with alpha both parts of the cone, with phi
- * and rho the mass, of which a record that brakes tells c_d. */
+ * and rho the mass, of which a record that brakes determines c_d. */
 TEST(held) {
     const FitDef truth = plate("sand_loose");
     const MildMaterial *m = &truth.material;
@@ -472,9 +473,9 @@ TEST(interval_profile) {
     assert_true(shape->high - shape->value > 1.05 * (shape->value - shape->low));
 }
 
-/* ---- what the data do not tell ---- */
+/* ---- what the data do not determine ---- */
 
-TEST(untold) {
+TEST(undetermined) {
     /* a ground without added mass: the drag has a limit and no value */
     FitDef def = plate("foam45");
     press(&def, points, ROWS, 0.04, 0.01, NOISE_OF_ROW, 7);
@@ -507,7 +508,7 @@ TEST(untold) {
     assert_true(fitted <= 4);
 }
 
-/* Filled are those that the data do not tell, and only those. */
+/* Filled are those that the data do not determine, and only those. */
 TEST(filled) {
     FitDef def = plate("sand_loose");
     const MildMaterial fill = def.material;

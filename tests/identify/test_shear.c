@@ -1,6 +1,6 @@
 /* What slides under load and what comes back up: the law of Janosi and Hanamoto and the unloading
  * line, written here by themselves; a ring's torque by a sum over many thin rings; noisy records
- * whose intervals hold the truth; and what one record alone cannot tell. */
+ * whose intervals hold the truth; and what one record alone cannot determine. */
 #include "base/random.h"
 #include "identify/fit.h"
 #include "identify/fit_csv.h"
@@ -143,7 +143,8 @@ TEST(intervals_hold_the_truth) {
     assert_true(held < 3 * DRAWS); /* nor are they too wide to say anything */
 }
 
-/* One pressure tells a strength, not cohesion and friction; with one held it tells the other. */
+/* One pressure determines a strength, not cohesion and friction; with one held it determines
+ * the other. */
 TEST(one_pressure) {
     Random random = random_at(1, 1, 0);
     FitDef def = shear_def();
@@ -270,7 +271,7 @@ TEST(kinds_of_files) {
     }
     file = read_text(text);
     assert_int_equal(file.kind, FIT_FILE_SHEAR);
-    assert_true(file.count == 19 && file.back_count == 0); /* no slip tells nothing */
+    assert_true(file.count == 19 && file.back_count == 0); /* rows without slip are of no use */
     assert_true(file.points[0].load == 7000 && file.points[0].force == 100);
     fit_file_close(&file);
     memcpy(text, "force_n,angle_rad,torque_nm\n", 28);

@@ -125,10 +125,10 @@ def check_itself():
     """What this test is for is seen."""
     for wanted, printed in [("a 1.00", "a 1.06"), ("a 1", "b 1"), ("a", "a\nb"), ("a\nb", "a"), ("a\n...\nc", "a\nb"), ("1 mm", "1 m"), ("3/3", "2/3")]:
         if compare(wanted, printed) is None:
-            raise Wrong(f"the test does not tell {wanted!r} from {printed!r}")
+            raise Wrong(f"the test does not distinguish {wanted!r} from {printed!r}")
     for wanted, printed in [("a 1.00", "a   1.02"), ("0.01", "0.02"), ("a\n...", "a\nb\nc"), ("...\nc 5e+05", "a\nc 5.1e+05")]:
         if compare(wanted, printed) is not None:
-            raise Wrong(f"the test tells {wanted!r} from {printed!r}")
+            raise Wrong(f"the test distinguishes {wanted!r} from {printed!r}")
 
 
 def main():

@@ -1,5 +1,5 @@
-/* A toy task: two point masses on a line, told to reach 0 and stay there. Mirroring changes every
- * sign. */
+/* A toy task: two point masses on a line that are to reach 0 and stay there. Mirroring changes
+ * every sign. */
 #ifndef MILD_TEST_LEARN_TOY_H
 #define MILD_TEST_LEARN_TOY_H
 

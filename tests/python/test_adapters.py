@@ -1,4 +1,4 @@
-"""What the adapters tell a learner about the end of an episode: a time-out where the robot still stands after the episode's time, no
+"""What the adapters report to a learner about the end of an episode: a time-out where the robot still stands after the episode's time, no
 time-out where it fell. Of PyTorch, rsl_rl and Stable-Baselines3 stand-ins of NumPy are enough; `make python-check` has the real ones."""
 import pathlib
 import sys

@@ -311,7 +311,7 @@ class Misuse(unittest.TestCase):
         [env.close() for env in seen]
 
     def test_batch_engine(self):
-        """Its environments cannot tell the end of an episode, and say so."""
+        """Its environments cannot report the end of an episode, and say so."""
         env = gym.VectorEnv(2, overrides={"train.robots": "batch", "randomize.patch_share": 0, "train.grounds": 4})
         env.reset()
         with self.assertRaisesRegex(ValueError, "train.robots"):

@@ -19,7 +19,7 @@ if DRAWS and not os.environ.get("DISPLAY"):
 
 
 def walk(ground, steps=60, seed=5, name="mild/SA01-v0", **keys):
-    """Observations of two robots whose joints are told random angles."""
+    """Observations of two robots whose joints get random target angles."""
     env = gymnasium.make_vec(name, num_envs=2, ground=ground, threads=1, **keys)
     random = np.random.default_rng(1)
     seen = [env.reset(seed=seed)[0]]

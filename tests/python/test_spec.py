@@ -248,7 +248,7 @@ class Attach(unittest.TestCase):
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_walk(self):
-        """examples/python/walk.py: the shipped policy goes at the speed that it is told, in sand too."""
+        """examples/python/walk.py: the shipped policy goes at the commanded speed, in sand too."""
         for ground in ("rubber", "sand_loose"):
             said = subprocess.run([sys.executable, WALK, ground], check=True, capture_output=True, text=True).stdout
             way, seconds = map(float, re.fullmatch(rf"{ground}: (\S+) m in (\S+) s, upright\n", said).groups())

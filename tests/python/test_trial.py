@@ -445,7 +445,7 @@ class Measures(unittest.TestCase):
 
 class Trials(unittest.TestCase):
     def test_rigid(self):
-        """A robot with stiff joints stands; one that is told to fold falls, at a time; noise moves it and the seed decides."""
+        """A robot with stiff joints stands; one with the command to fold falls, at a time; noise moves it and the seed decides."""
         table = mild.trial(biped(), still, stander(), grounds=["rigid"], speeds=[0, 0.5], trials=3, seconds=3)
         self.assertEqual([row.upright for row in table.rows], [3, 3])
         self.assertLess(abs(table.rows[0].mean("speed")), 0.02)

@@ -152,15 +152,15 @@ static double height_error(RobotSim *sim, const MildTerrain *low) {
 }
 
 /* How far the lowest points of the feet are off, [m] and [m/s]; their Jacobians. */
-static void place_errors(RobotSim *sim, const RobotState *state, double jacobian[FEET][3 * NV],
-                         double *worst_place, double *worst_speed) {
+static void position_errors(RobotSim *sim, const RobotState *state, double jacobian[FEET][3 * NV],
+                            double *worst_position, double *worst_speed) {
     for (int f = 0; f < FEET; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
         double point[3], speed[3];
         lowest_point(sim, f, point, jacobian[f]);
         mju_mulMatVec(speed, jacobian[f], state->qvel, 3, NV);
         for (int k = 0; k < 3; k++) {
-            *worst_place = fmax(*worst_place, fabs(point[k] - foot->position[k]));
+            *worst_position = fmax(*worst_position, fabs(point[k] - foot->position[k]));
             *worst_speed = fmax(*worst_speed, fabs(speed[k] - foot->velocity[k]));
             *worst_speed = fmax(*worst_speed, fabs(foot->velocity[3 + k]));
         }
@@ -183,12 +183,12 @@ TEST(a_round_foot_is_a_point) {
     RobotVariation nominal = robot_variation_nominal();
     MildTerrain low = terrain;
     low.height = -0.3;
-    double worst_place = 0, worst_speed = 0, worst_step = 0, worst_height = 0, largest = 0;
+    double worst_position = 0, worst_speed = 0, worst_step = 0, worst_height = 0, largest = 0;
     for (uint32_t draw = 0; draw < 20; draw++) {
         RobotState state = moving_state(draw);
         double torque[JOINTS], jacobian[FEET][3 * NV], force[NV] = {0}, rate[NV];
         robot_sim_load(sim, &state, &nominal);
-        place_errors(sim, &state, jacobian, &worst_place, &worst_speed);
+        position_errors(sim, &state, jacobian, &worst_position, &worst_speed);
         worst_height = fmax(worst_height, height_error(sim, &low));
         const mjModel *m = robot_sim_model(sim);
         mjData *d = mj_makeData(m);
@@ -222,8 +222,8 @@ TEST(a_round_foot_is_a_point) {
     print_message(
         "lowest points off by %.1e m, %.1e m/s, %.1e m of height; accelerations by %.1e under "
         "%.0f N\n",
-        worst_place, worst_speed, worst_height, worst_step, largest);
-    assert_true(worst_place < 1e-12 && worst_speed < 1e-12 && worst_step < 1e-8);
+        worst_position, worst_speed, worst_height, worst_step, largest);
+    assert_true(worst_position < 1e-12 && worst_speed < 1e-12 && worst_step < 1e-8);
     assert_true(worst_height < 1e-12);
     assert_true(largest > 5);
     mild_map_destroy(map);

@@ -381,7 +381,7 @@ TEST(test_refusals) {
     assert_error(&error, MILD_ERROR_ARGUMENT, "sa02 sa01");
 }
 
-/* A hinge's numbers tell the unit only together: one that turns by 5 degrees is no mistake where
+/* A hinge's numbers show the unit only together: one that turns by 5 degrees is no mistake where
  * another turns by 130, nor one without an end among radians. */
 TEST(test_angles) {
     static const struct {

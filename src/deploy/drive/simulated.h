@@ -30,7 +30,7 @@ typedef struct {
     double way[2];  /* [m] from the start to the end, world x and y */
     double rate;    /* [-] its own time over real time */
     int fallen;     /* bool */
-    double damped;  /* [s] without stiffness, told so or because no target came */
+    double damped;  /* [s] without stiffness, by command or because no target came */
     long sent, dropped, delayed;
     long targets, refused;
     long strangers;  /* packets of others than the peer */

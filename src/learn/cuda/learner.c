@@ -32,7 +32,7 @@ static int widest_layer(const Network *network) {
     return widest > network->history ? widest : network->history;
 }
 
-/* Most images that a run of this many samples of a minibatch can have: it meets at most so many
+/* Most images that a run of this many samples of a minibatch can have: it has at most so many
  * chunks of the CPU's, each with as many images as a full one. */
 static int most_images(const Ppo *ppo, int rows) {
     const int64_t images =

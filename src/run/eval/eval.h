@@ -60,7 +60,7 @@ typedef struct {
     double up;                /* [s] when these came up */
     int measured;             /* trials that velocity and cot are means of; 0: all were too short */
     double velocity;      /* [m/s] forward, after the first 2 s, of trials that lasted longer: along
-                        world x, or along the robot's heading when it is told to turn */
+                        world x, or along the robot's heading when the command is to turn */
     double velocity_low;  /* [m/s] 95 % interval of the mean over trials: lower end */
     double velocity_high; /* [m/s] upper end */
     double sideways;      /* [m/s] commanded, to the left */
@@ -68,7 +68,7 @@ typedef struct {
     double turn;               /* [rad/s] commanded */
     double velocity_turn;      /* [rad/s] measured */
     double push;               /* [m/s] */
-    double cot;                /* [-] sum |tau qd| / (m g v); NaN when told to stand */
+    double cot;                /* [-] sum |tau qd| / (m g v); NaN when the command is to stand */
     double torque_max;         /* [N m] largest over joints and time, mean over trials */
     double velocity_deviation; /* [m/s] standard deviation over the trials of velocity */
     double cot_deviation;      /* [-] of cot */

@@ -119,7 +119,7 @@ static double truth_of(const PriorGround *ground, int parameter) {
 /* Whether a parameter is thought to be below a value, or is. */
 static int is_below(const Judge *j, int walk, BeliefParameter p, double value) {
     const Judged *judged = &j->judged[walk];
-    if (j->care->told) {
+    if (j->care->true_ground) {
         return truth_of(&j->walk[walk].ground[judged->touched > 0], (int)p) < value;
     }
     return judged->belief.footsteps > 0 && belief_quantile(&judged->belief, j->net, p, 0.5) < value;

@@ -51,10 +51,10 @@ typedef struct {
 typedef struct {
     double mu; /* [-] 0: nothing */
     double speed;
-    double slip; /* [m] 0: nothing */
-    double slow; /* [s] of walks below JUDGE_FAST */
-    double fast; /* [s] of others */
-    int told;    /* bool: by the true numbers of the ground under it, in the place of medians */
+    double slip;     /* [m] 0: nothing */
+    double slow;     /* [s] of walks below JUDGE_FAST */
+    double fast;     /* [s] of others */
+    int true_ground; /* bool: by the true numbers of the ground under it instead of medians */
 } JudgeCare;
 
 /* How a walk went, after its first two seconds. */

@@ -1,4 +1,4 @@
-/* A study of walks: what each robot is, walks on, and is told to do, drawn from a seed. */
+/* A study of walks: each robot, its ground and its command, drawn from a seed. */
 #ifndef KNOW_STUDY_H
 #define KNOW_STUDY_H
 

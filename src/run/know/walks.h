@@ -49,7 +49,7 @@ typedef struct {
     /* In the order of steps, then of walks. */
     void (*stepped)(void *context, const WalkStep *step);
     void *context;
-    /* In this walk, from the next step on; NULL: it walks as it is told. */
+    /* In this walk, from the next step on; NULL: it walks as commanded. */
     WalkCare (*care)(void *context, int walk);
 } WalksDef;
 

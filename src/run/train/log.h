@@ -17,7 +17,7 @@ MildStatus log_check(const char *path, MildError *error);
  * slash. They are not copied and must outlive the log. The first column of the CSV is
  * "iteration". resume_after < 0: a new log. Otherwise the log is continued with the same
  * columns. Rows after that iteration come from a run that was killed after its last checkpoint.
- * They are dropped from log.csv, and TensorBoard is told to drop its own. */
+ * They are dropped from log.csv, and TensorBoard drops its own, too. */
 Log *log_open(const char *folder, const char *const *columns, int count, int64_t resume_after,
               MildError *error);
 

@@ -11,7 +11,7 @@
 typedef struct Trainer Trainer;
 
 /* Wall time of one iteration [s], of this process. On a GPU `inference` and
- * `environments` do not tell the two apart: both only enqueue, and the wait for all of it is in
+ * `environments` do not separate the two: both only enqueue, and the wait for all of it is in
  * `environments`. */
 typedef struct {
     double rollout, inference, environments, update;

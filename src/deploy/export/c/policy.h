@@ -26,7 +26,7 @@ extern const float policy_limit[POLICY_JOINTS]; /* [N m] largest torque */
 extern const float policy_low[POLICY_JOINTS];   /* [rad] range of the joint */
 extern const float policy_high[POLICY_JOINTS];  /* [rad] */
 
-/* What the robot measures, and what it is told. Base axes: x forward, y left, z up. */
+/* What the robot measures, and its command. Base axes: x forward, y left, z up. */
 typedef struct {
     float angular_velocity[3];  /* [rad/s] of the base */
     float gravity[3];           /* [-] unit vector along gravity, (0, 0, -1) when upright */
