@@ -27,13 +27,19 @@ static int stop(const char *text) {
 
 /* ---- the robot ---- */
 
-/* The shells that stand, body by body. */
-static void pack_shells(const Robot *robot, WebModel *file) {
+/* The shells that stand, body by body. The page has no meshes. */
+static MildStatus pack_shells(const Robot *robot, WebModel *file, MildError *error) {
     MildShape shapes[ROBOT_SHELLS_MAX];
     for (int b = 0; b < file->model.tree.bodies; b++) {
         const int count = robot_shell_shapes(robot, robot->def.feet + b, shapes);
         for (int s = 0; s < count; s++) {
             WebShell *shell = &file->shell[file->shells++];
+            if (shapes[s].type == MILD_SHAPE_MESH) {
+                return mild_fail(error, MILD_ERROR_FORMAT,
+                                 "%s: a shell is a mesh, which the page "
+                                 "does not have; name a box, a capsule or a sphere",
+                                 robot->path);
+            }
             shell->body = b;
             shell->type = shapes[s].type;
             memcpy(shell->size, shapes[s].size, sizeof shell->size);
@@ -42,6 +48,7 @@ static void pack_shells(const Robot *robot, WebModel *file) {
         }
     }
     file->shell_spacing = robot->def.shell_spacing;
+    return MILD_OK;
 }
 
 static MildStatus pack_model(const Robot *robot, const TaskDef *task, WebModel *file,
@@ -64,7 +71,7 @@ static MildStatus pack_model(const Robot *robot, const TaskDef *task, WebModel *
         memcpy(sole->outline, foot->outline, sizeof sole->outline);
     }
     if (status == MILD_OK) {
-        pack_shells(robot, file);
+        status = pack_shells(robot, file, error);
     }
     return status;
 }

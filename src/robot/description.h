@@ -27,7 +27,7 @@ typedef struct {
 } RobotLimb;
 
 /* A part of a body that meets the ground: a box inflated by a radius. Spheres and capsules are
- * inflated boxes of zero width. */
+ * inflated boxes of zero width; a mesh has the box around it. */
 typedef struct {
     int body;
     int limb;           /* number of the body in Robot.limb */
@@ -37,6 +37,8 @@ typedef struct {
     double rotation[9]; /* [-] box -> body, row major */
     double half[3];     /* [m] */
     double radius;      /* [m] */
+    MildShape mesh;     /* its own vertices, and triangles of Robot.visual; without any no mesh */
+    double *vertices;   /* of the mesh */
 } RobotShell;
 
 /* A part of a leg that touches other legs (robot/legs.h). */

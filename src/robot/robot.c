@@ -432,6 +432,9 @@ void robot_destroy(Robot *robot) {
     for (int f = 0; f < ROBOT_FEET_MAX; f++) {
         mild_sole_destroy(robot->concentric[f]);
     }
+    for (int s = 0; s < ROBOT_SHELLS_MAX; s++) {
+        free(robot->shell[s].vertices);
+    }
     mj_deleteModel(robot->model);
     mj_deleteModel(robot->visual);
     free(robot);

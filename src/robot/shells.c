@@ -1,5 +1,6 @@
 /* The shells of a robot: parts of its bodies, from geoms of the MJCF, whose height above the ground
  * is measured, and which may stand as its soles do. */
+#include <stdlib.h>
 #include <string.h>
 
 #include "robot/description.h"
@@ -24,6 +25,32 @@ static int shell_limb(Robot *robot, int body, MildError *error) {
     return limbs;
 }
 
+/* The shape of a mesh's geom, and the box around it. MuJoCo's vertices are those of the geom's
+ * frame. */
+static MildStatus read_mesh(const mjModel *m, int geom, RobotShell *shell, MildError *error) {
+    const int mesh = m->geom_dataid[geom], count = m->mesh_vertnum[mesh];
+    const float *vertex = m->mesh_vert + 3 * m->mesh_vertadr[mesh];
+    const double *box = m->geom_aabb + 6 * geom;
+    shell->vertices = malloc(3 * (size_t)count * sizeof *shell->vertices);
+    if (!shell->vertices) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    }
+    for (int i = 0; i < 3 * count; i++) {
+        shell->vertices[i] = (double)vertex[i];
+    }
+    shell->mesh = (MildShape){.type = MILD_SHAPE_MESH,
+                              .vertices = shell->vertices,
+                              .vertex_count = count,
+                              .triangles = m->mesh_face + 3 * m->mesh_faceadr[mesh],
+                              .triangle_count = m->mesh_facenum[mesh]};
+    memcpy(shell->mesh.pos, m->geom_pos + 3 * geom, sizeof shell->mesh.pos);
+    memcpy(shell->mesh.quat, m->geom_quat + 4 * geom, sizeof shell->mesh.quat);
+    mju_rotVecQuat(shell->center, box, m->geom_quat + 4 * geom);
+    mju_addTo3(shell->center, m->geom_pos + 3 * geom);
+    memcpy(shell->half, box + 3, sizeof shell->half);
+    return MILD_OK;
+}
+
 MildStatus robot_read_shells(Robot *robot, MildError *error) {
     const mjModel *m = robot->visual;
     for (int s = 0; s < robot->def.shells; s++) {
@@ -34,6 +61,8 @@ MildStatus robot_read_shells(Robot *robot, MildError *error) {
             return MILD_ERROR_FORMAT;
         }
         const double *size = m->geom_size + 3 * id;
+        MildStatus status = MILD_OK;
+        memcpy(shell->center, m->geom_pos + 3 * id, sizeof shell->center);
         switch (m->geom_type[id]) {
         case mjGEOM_BOX: memcpy(shell->half, size, sizeof shell->half); break;
         case mjGEOM_SPHERE: shell->radius = size[0]; break;
@@ -41,10 +70,15 @@ MildStatus robot_read_shells(Robot *robot, MildError *error) {
             shell->radius = size[0];
             shell->half[2] = size[1];
             break;
+        case mjGEOM_MESH: status = read_mesh(m, id, shell, error); break;
         default:
             return mild_fail(error, MILD_ERROR_FORMAT,
-                             "%s: geom '%s' of [robot] shells must be a box, a sphere or a capsule",
+                             "%s: geom '%s' of [robot] shells must be a box, a sphere, a capsule "
+                             "or a mesh",
                              robot->path, name);
+        }
+        if (status != MILD_OK) {
+            return status;
         }
         shell->body = robot_geom_body(robot, id, error);
         if (shell->body < 0) {
@@ -56,7 +90,6 @@ MildStatus robot_read_shells(Robot *robot, MildError *error) {
         }
         shell->floor_geom = robot->model->body_geomadr[shell->body];
         shell->on_base = robot->model->body_weldid[shell->body] == robot->base_body;
-        memcpy(shell->center, m->geom_pos + 3 * id, sizeof shell->center);
         mju_quat2Mat(shell->rotation, m->geom_quat + 4 * id);
     }
     robot->shells = robot->def.shells;
@@ -80,6 +113,9 @@ int robot_shell_corner(const RobotShell *shell, int c, double center[3]) {
 /* What mild_sole_surface takes of a shell. */
 static MildShape shape_of(const RobotShell *shell) {
     MildShape shape = {.type = MILD_SHAPE_BOX};
+    if (shell->vertices) {
+        return shell->mesh;
+    }
     memcpy(shape.pos, shell->center, sizeof shape.pos);
     mju_mat2Quat(shape.quat, shell->rotation);
     memcpy(shape.size, shell->half, sizeof shape.size);

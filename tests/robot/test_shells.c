@@ -2,6 +2,8 @@
  * carry the robot. That the ground under all bodies only takes energy is in test_fallen.c. */
 #include "all_robots.h"
 
+#define FILES MILD_SOURCE_DIR "/robots/sa01"
+
 enum { STAND_STEPS = 400 };
 
 /* Torques that hold the default pose. */
@@ -110,6 +112,98 @@ TEST(they_carry_a_robot_that_lies) {
         free(ground);
         robot_sim_destroy(sim);
     }
+}
+
+/* ---- meshes ---- */
+
+#define SHANK "<geom name=\"leg_l4_link_box\" class=\"body_box\" size=\"0.025 0.025 0.14\""
+
+/* SA01 with the box of its left shank as a mesh, whose vertices are turned and far from the geom's
+ * place. MuJoCo turns and moves them again. NULL: refused. */
+static Robot *with_mesh(const char *faces, MildError *error) {
+    char mesh[1024];
+    snprintf(mesh, sizeof mesh,
+             "<asset><mesh name=\"shank\" vertex=\"0.325 -0.025 -0.14  0.325 0.025 -0.14  "
+             "0.275 0.025 -0.14  0.275 -0.025 -0.14  0.325 -0.025 0.14  0.325 0.025 0.14  "
+             "0.275 0.025 0.14  0.275 -0.025 0.14\" face=\"%s\"/></asset>\n  <asset>",
+             faces);
+    char *ini = kit_read(FILES "/robot.ini", NULL), *plain = kit_read(FILES "/sa01.xml", NULL);
+    char *with = kit_replaced(plain, "<asset>", mesh);
+    char *mjcf = kit_replaced(with, SHANK " pos=\"0 0 -0.18\"",
+                              "<geom name=\"leg_l4_link_box\" class=\"body_box\" type=\"mesh\" "
+                              "mesh=\"shank\" quat=\"1 0 0 1\" pos=\"0 -0.3 -0.18\"");
+    Robot *robot = kit_robot_of("sa01.xml", mjcf, ini, error);
+    free(ini);
+    free(plain);
+    free(with);
+    free(mjcf);
+    return robot;
+}
+
+/* [N] on the shells after a step in some deep pose. */
+static double load_in(Robot *robot, uint32_t draw) {
+    Random random = random_at(1, 0, draw);
+    const RobotVariation nominal = robot_variation_nominal();
+    robot_set_shells(robot, 1);
+    RobotSim *sim = robot_sim_create(robot, 0.0025, NULL);
+    MildGround *ground = kit_ground(robot);
+    MildTerrain terrain = kit_terrain("foam45");
+    double torque[ROBOT_JOINTS_MAX] = {0};
+    const RobotState state = random_pose(robot, 0.25, &random);
+    robot_sim_load(sim, &state, &nominal);
+    assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+    const double load = robot_sim_shell_load(sim);
+    free(ground);
+    robot_sim_destroy(sim);
+    return load;
+}
+
+/* Same corners, same area, same load as the box that it is. */
+TEST(a_mesh_is_a_shell) {
+    MildError error = {0};
+    Robot *mesh = with_mesh("0 2 1  0 3 2  4 5 6  4 6 7  0 1 5  0 5 4  1 2 6  1 6 5  2 3 7  2 7 6  "
+                            "3 0 4  3 4 7",
+                            &error);
+    expect_good(mesh != NULL, &error);
+    const RobotShell *box = &robots[0]->shell[1], *shell = &mesh->shell[1];
+    assert_int_equal(shell->limb, box->limb);
+    for (int c = 0; c < 8; c++) {
+        double at[3], nearest = 1;
+        assert_int_equal(robot_shell_corner(shell, c, at), 1);
+        for (int other = 0; other < 8; other++) {
+            double corner[3];
+            robot_shell_corner(box, other, corner);
+            nearest = fmin(nearest, mju_dist3(at, corner));
+        }
+        assert_true(nearest < 1e-6);
+    }
+    double load = 0, apart = 0;
+    for (uint32_t i = 0; i < 40; i++) {
+        const double a = load_in(robots[0], i);
+        load += a / 40;
+        apart += fabs(a - load_in(mesh, i)) / 40;
+    }
+    const MildSole *surface = robot_soles(mesh)[shell->limb];
+    double area = 0;
+    for (int i = 0; i < mild_sole_elements(surface); i++) {
+        area += mild_sole_surface_area(surface)[i];
+    }
+    area /= 4 * 0.05 * 0.28 + 2 * 0.05 * 0.05;
+    print_message("area off by %.1e, a load of %.0f N by %.2f %%\n", area - 1, load,
+                  100 * apart / load);
+    assert_true(fabs(area - 1) < 1e-5 && load > 100 && apart < 0.05 * load);
+    robot_destroy(mesh);
+}
+
+/* Turned inward it is refused by name. */
+TEST(an_inward_mesh_is_refused) {
+    MildError error = {0};
+    Robot *mesh = with_mesh("0 1 2  0 2 3  4 6 5  4 7 6  0 5 1  0 4 5  1 6 2  1 5 6  2 7 3  2 6 7  "
+                            "3 4 0  3 7 4",
+                            &error);
+    assert_null(mesh);
+    assert_true(error.status != MILD_OK);
+    print_message("%s\n", error.text);
 }
 
 TEST_MAIN(open_robots, close_robots)
