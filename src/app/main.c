@@ -8,6 +8,7 @@
 #include "app/build.h"
 #include "app/cli.h"
 #include "app/commands.h"
+#include "app/package.h"
 #include "app/plain.h"
 #include "base/text.h"
 #include "learn/product.h"
@@ -75,10 +76,8 @@ int main(int argc, char **argv) {
         }
         names[i] = commands[i].name;
     }
-    if (strcmp(argv[1], "trial") == 0 || strcmp(argv[1], "judge") == 0) {
-        fprintf(stderr, "mild: %s is a command of the Python package: python -m mild %s\n", argv[1],
-                argv[1]);
-        return CLI_EXIT_BAD_INPUT;
+    if (package_has(argv[1])) {
+        return package_run(argv + 1);
     }
     fprintf(stderr, "mild: unknown command '%s'; nearest is '%s' (mild --help lists all)\n",
             argv[1], text_nearest(argv[1], names, command_count));

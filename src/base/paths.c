@@ -11,11 +11,11 @@ static int exists(const char *path) {
     return access(path, R_OK) == 0;
 }
 
-/* Folder above the one that holds the executable; empty when unknown. */
-static void executable_home(char home[PATH_SIZE]) {
+/* The folder that many levels above the executable; empty when unknown. */
+static void executable_home(int levels, char home[PATH_SIZE]) {
     ssize_t length = readlink("/proc/self/exe", home, PATH_SIZE - 1);
     home[length > 0 ? length : 0] = '\0';
-    for (int level = 0; level < 2; level++) {
+    for (int level = 0; level < levels; level++) {
         char *slash = strrchr(home, '/');
         if (slash) {
             *slash = '\0';
@@ -31,7 +31,7 @@ const char *path_data(const char *relative, char path[PATH_SIZE]) {
     }
     static const char *const below[] = {"", "/share/mild"};
     char beside[PATH_SIZE];
-    executable_home(beside);
+    executable_home(2, beside);
     for (int i = 0; i < 2 && *beside; i++) {
         if (snprintf(path, PATH_SIZE, "%s%s/%s", beside, below[i], relative) < PATH_SIZE &&
             exists(path)) {
@@ -44,6 +44,15 @@ const char *path_data(const char *relative, char path[PATH_SIZE]) {
 
 const char *path_given(const char *name, char path[PATH_SIZE]) {
     return *name && *name != '/' && !exists(name) && exists(path_data(name, path)) ? path : name;
+}
+
+const char *path_beside_program(const char *name, char path[PATH_SIZE]) {
+    char folder[PATH_SIZE];
+    executable_home(1, folder);
+    if (!*folder || snprintf(path, PATH_SIZE, "%s/%s", folder, name) >= PATH_SIZE) {
+        *path = '\0';
+    }
+    return path;
 }
 
 MildStatus path_join(const char *folder, const char *name, char path[PATH_SIZE], MildError *error) {

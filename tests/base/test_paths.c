@@ -53,6 +53,17 @@ TEST(test_join) {
     assert_error(&error, MILD_ERROR_ARGUMENT, "a");
 }
 
+TEST(test_beside_the_program) {
+    char path[PATH_SIZE], name[PATH_SIZE], own[PATH_SIZE];
+    const ssize_t length = readlink("/proc/self/exe", own, sizeof own - 1);
+    assert_true(length > 0);
+    own[length] = '\0';
+    assert_string_equal(path_beside_program(strrchr(own, '/') + 1, path), own);
+    memset(name, 'n', sizeof name);
+    name[PATH_SIZE - 1] = '\0';
+    assert_string_equal(path_beside_program(name, path), "");
+}
+
 /* $MILD_HOME decides; without it what lies beside the executable's folder, else the source tree. */
 TEST(test_data) {
     char path[PATH_SIZE];

@@ -5,6 +5,7 @@ import csv
 import importlib.util
 import json
 import math
+import os
 import pathlib
 import re
 import subprocess
@@ -122,7 +123,7 @@ def the_truth_is_found_and_others_are_not(folder):
 
 
 def a_command(folder):
-    """`python -m mild judge` from anywhere; where no repository is, one line."""
+    """`python -m mild judge` and `mild judge` from anywhere; where no repository is, one line."""
     run = subprocess.run([sys.executable, "-m", "mild", "judge", "--records", folder / "none"], capture_output=True, text=True, cwd=folder)
     assert run.returncode == 2 and run.stderr.startswith("judge.py: ") and "manifest.json" in run.stderr, run.stderr
     package = folder / "alone"  # as installed: nothing of the repository above it
@@ -130,7 +131,10 @@ def a_command(folder):
     (package / "judge.py").write_text((SOURCE / "python" / "mild" / "judge.py").read_text())
     run = subprocess.run([sys.executable, package / "judge.py"], capture_output=True, text=True, cwd=folder)
     assert run.returncode == 2 and run.stderr.startswith("mild judge: ") and run.stderr.count("\n") == 1, run.stderr
-    run = subprocess.run([MILD, "judge"], capture_output=True, text=True)
+    run = subprocess.run([MILD, "judge", "--records", folder / "none"], capture_output=True, text=True, cwd=folder,
+                         env=dict(os.environ, MILD_PYTHON=sys.executable))  # the program starts it
+    assert run.returncode == 2 and run.stderr.startswith("judge.py: ") and "manifest.json" in run.stderr, run.stderr
+    run = subprocess.run([MILD, "judge"], capture_output=True, text=True, env=dict(os.environ, MILD_PYTHON=str(folder / "none")))
     assert run.returncode == 2 and run.stderr.count("\n") == 1 and "python -m mild judge" in run.stderr, run.stderr
 
 

@@ -115,20 +115,14 @@ typedef struct {
     uint8_t done, timeout, valid, cause;
 } Rival;
 
-/* batch: bool, the batch engine; else MuJoCo on mild_ground_solve. stiffness: factor of the
- * material's. speed: [m/s] forward. */
-static inline void rival_start_on(Rival *rival, int batch, int ground, double stiffness,
-                                  double speed) {
+/* batch: bool, the batch engine; else MuJoCo on mild_ground_solve. material: NULL: rigid ground.
+ * speed: [m/s] forward. */
+static inline void rival_start_material(Rival *rival, int batch, const MildMaterial *material,
+                                        double speed) {
     MildError error = {0};
-    MildMaterial material = mild_material_default();
-    const int rigid = ground == WEB_RIGID;
-    if (!rigid) {
-        mild_material_preset(mild_material_preset_name(ground), &material);
-    }
-    material.k_pen *= stiffness;
-    material.sigma_cone *= stiffness;
-    rival->terrain = mild_terrain_uniform(&material);
-    rival->trial = (EnvsTrial){.rigid = rigid};
+    const MildMaterial unused = mild_material_default();
+    rival->terrain = mild_terrain_uniform(material ? material : &unused);
+    rival->trial = (EnvsTrial){.rigid = !material};
     const EnvsDef def = {.task = &task,
                          .robot = robot,
                          .pool = pool,
@@ -146,6 +140,20 @@ static inline void rival_start_on(Rival *rival, int batch, int ground, double st
     assert_int_equal(envs_set_commands(rival->envs, stand, &error), MILD_OK);
     assert_int_equal(envs_reset(rival->envs, &view, NULL, &error), MILD_OK);
     assert_int_equal(envs_set_commands(rival->envs, walk, &error), MILD_OK);
+}
+
+/* The same on a ground of the page. stiffness: factor of the material's. */
+static inline void rival_start_on(Rival *rival, int batch, int ground, double stiffness,
+                                  double speed) {
+    MildMaterial material;
+    if (ground == WEB_RIGID) {
+        rival_start_material(rival, batch, NULL, speed);
+        return;
+    }
+    mild_material_preset(mild_material_preset_name(ground), &material);
+    material.k_pen *= stiffness;
+    material.sigma_cone *= stiffness;
+    rival_start_material(rival, batch, &material, speed);
 }
 
 static inline void rival_start(Rival *rival, int ground, double stiffness, double speed) {

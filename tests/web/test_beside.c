@@ -2,6 +2,7 @@
  * the CPU, MuJoCo's robots on mild_ground_solve, and the policies on oneDNN. */
 #include "page.h"
 
+#include "ground/soil/soil.h"
 #include "learn/network.h"
 
 /* Weights of 16 bits are within 2^-11 of those of the file. */
@@ -180,6 +181,75 @@ TEST(test_same_loads) {
     for (int i = ROBOTS - 1; i >= 0; i--) {
         same_loads_of(i);
     }
+}
+
+/* ---- a soil of another law ---- */
+
+/* The merged law as grains of 5 mm have it, whose support slip takes away (docs/grains.md). */
+static const char merged_soil[] =
+    "[ground]\nmodel = mild_merged\nk_pen = 525\nsigma_cone = 224e3\nalpha = 0.3\n"
+    "nu = 3.37\nc_g = 29.1\nc_d = 1\nphi = 0.59\nrho = 2500\nmu = 0.5\nk_drift = 400\n"
+    "b_drift = 0.1\nrecovery = 0\nbed_depth = 1\npassive = true\nslip_length = 0.0014\n"
+    "regain_length = 0.00039\ngrip = 0.125\nslip_growth = 0.07\nrefill = 0.22\n";
+
+/* What the page and an engine differ by on a walk with the same actions. */
+typedef struct {
+    double first, worst; /* of the histories, after a step and in 60 */
+    double load;         /* [-] of the feet's loads by the weight, in 40 */
+} Beside;
+
+/* The page on its own soil, an engine on a material. batch: as of rival_start_material. */
+static Beside beside_soil(int batch, const MildMaterial *material) {
+    static const float walk[3] = {0.6f, 0, 0};
+    const double weight = 9.81 * robot_total_mass(robot);
+    Rival rival = {0};
+    EnvsSample sample[16];
+    Beside found = {0};
+    start(WEB_OWN, WEB_LEVEL, 0);
+    rival_start_material(&rival, batch, material, 0.6);
+    envs_set_samples(rival.envs, sample);
+    const EnvsSample *last = &sample[envs_physics_steps(rival.envs) - 1];
+    for (int t = 0; t < 60; t++) {
+        float action[SA01_JOINTS];
+        web_act(rival.history, action);
+        rival_step(&rival, action);
+        assert_false(web_move(action, walk));
+        web_show();
+        const double now = apart(web_history(), rival.history);
+        found.first = t == 0 ? now : found.first;
+        found.worst = fmax(found.worst, now);
+        for (int f = 0; f < web_view()->feet && t < 40; f++) {
+            const double load = (double)web_view()->load[f];
+            found.load = fmax(found.load, fabs(load - last->foot[f].load) / weight);
+        }
+    }
+    envs_destroy(rival.envs);
+    return found;
+}
+
+TEST(test_merged_soil_with_slip) {
+    MildMaterial material;
+    MildError error = {0};
+    assert_int_equal(soil_parse(merged_soil, "soil.ini", &material, &error), MILD_OK);
+    assert_int_equal(material.model, MILD_MODEL_MILD_MERGED);
+    MildMaterial still = material, usual = material;
+    still.slip_length = still.grip = 0;
+    usual.model = MILD_MODEL_MILD;
+    assert_int_equal(mild_material_check(&still, &error), MILD_OK);
+    choose(ON_SA01);
+    strcpy(web_text(), merged_soil);
+    assert_null(web_open(model, model_bytes));
+    assert_null(web_soil());
+    const Beside batch = beside_soil(1, &material), mujoco = beside_soil(0, &material);
+    const Beside slip = beside_soil(1, &still), law = beside_soil(1, &usual);
+    printf("  the batch engine: after a step %.1e apart (bound 2e-4), in 60 steps %.1e (bound "
+           "0.005); without slip %.2f, as mild %.2f\n",
+           batch.first, batch.worst, slip.worst, law.worst);
+    printf("  mild_ground_solve: in 40 steps loads are %.1e of the weight apart (bound 0.005); the "
+           "batch engine without slip %.2f, as mild %.2f\n",
+           mujoco.load, slip.load, law.load);
+    assert_true(batch.first < 2e-4 && batch.worst < 0.005 && mujoco.load < 0.005);
+    assert_true(fmin(slip.worst, law.worst) > 0.1 && fmin(slip.load, law.load) > 0.05);
 }
 
 /* ---- shells ---- */
