@@ -7,7 +7,7 @@
 Both start from the positions of beds that our program settled, without memory of contacts, with the same law, time step and
 plate (a block of 40 x 40 mm, 8 grains). Printed: how closely the forces run beside each other at first; means over
 the last part of the way, their difference, and its standard error from the scatter of the beds. Fails when it is more than
-three of these, or the first forces differ by more than 5 %. Eight beds, 13 minutes of one core; --jobs at once."""
+three of these, or the first forces differ by more than 10 %. Eight beds, 13 minutes of one core; --jobs at once."""
 import argparse
 import json
 import math
@@ -131,8 +131,8 @@ def part(rows, drag):
 
 
 def tracks(ours_rows, their_rows):
-    """Mean difference of force z over its mean in the first 30 ms: later the two part, as any two such systems do."""
-    rows = their_rows[their_rows[:, 0] < 0.03]
+    """Mean difference of force z over its mean in the first 60 ms: later the two part, as any two such systems do."""
+    rows = their_rows[their_rows[:, 0] < 0.06]
     force = np.interp(rows[:, 0], ours_rows[:, 0], ours_rows[:, 2])
     return np.abs(force - rows[:, 2]).mean() / np.abs(force).mean()
 
@@ -163,9 +163,9 @@ def main():
             for name, (a, b, apart) in found.items():
                 means[name][0].append(a)
                 means[name][1].append(b)
-                failed |= bool(apart > 0.05)
-                print(f"seed {seed}, {grains} grains, {name}: ours {a.round(4)}, LAMMPS {b.round(4)}; force z in the first 30 ms "
-                      f"differs by {100 * apart:.1f} % (bound 5)", flush=True)
+                failed |= bool(apart > 0.1)
+                print(f"seed {seed}, {grains} grains, {name}: ours {a.round(4)}, LAMMPS {b.round(4)}; force z in the first 60 ms "
+                      f"differs by {100 * apart:.1f} % (bound 10)", flush=True)
     for name, (a, b) in means.items():
         a, b = np.array(a), np.array(b)
         for k, what in enumerate(("force x [N]", "force z [N]", "moment y [N m]")):
