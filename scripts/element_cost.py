@@ -7,8 +7,10 @@ llvm-mca, cycles for a vector of four beside the operations of their formulas.
 
 A robot stands on loose sand: 154 elements, steps of 2.5 ms, the difference of two runs."""
 import collections
+import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -78,6 +80,11 @@ def main():
     if len(sys.argv) != 2:
         sys.exit("element_cost.py: usage: scripts/element_cost.py v3/mild")
     program = sys.argv[1]
+    if not os.access(program, os.X_OK):
+        sys.exit(f"element_cost.py: {program}: no such program; the head of this file says how it is made")
+    for tool in ("valgrind", "objdump", "llvm-mca"):
+        if not shutil.which(tool):
+            sys.exit(f"element_cost.py: {tool} is missing; apt-get install valgrind binutils llvm")
     with tempfile.TemporaryDirectory() as name:
         short, long = (counted(program, seconds, pathlib.Path(name)) for seconds in (3, 9))
     counts = {a: (n - short.get(a, (0, ""))[0], f) for a, (n, f) in long.items()}

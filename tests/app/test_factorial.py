@@ -123,7 +123,9 @@ def all_of_it():
         assert f"nine grounds: of the variance of the skill the net makes {share:.0%}" in printed and "the seed 0%" in printed, printed
         result = json.loads((pathlib.Path(folder) / "factorial.json").read_text())
         assert result["chosen"] == BEST and len(result["search"]) == 20 and len(result["rows"]) == 15
-        assert abs(result["table2"][-1]["velocity"][3] - 0.7 * 1.2) < 1e-12  # ours, mild
+        last = result["table2"][-1]
+        assert len(result["table2"]) == 15 and (last["controller"], last["ground"], last["walked"]) == ("ours", "mild", "rigid"), last
+        assert abs(last["velocity"][3] - 0.7 * 1.2) < 1e-12 and (last["upright"], last["trials"]) == (120, 120), last
 
         # a policy that was lost before its judge is trained again
         kept = [x for x in lines if not (x["task"] == lost[0] and x["done"] == "judged")]
