@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "ground/rim.h"
+
 /* This loop is not in vectors, for which a power is long: few feet stand on ground without memory
  * beside other ground. */
 void slots_elastic(const FootScratch *foot) {
@@ -35,6 +37,43 @@ static void slots_lean(const FootScratch *foot) {
     }
 }
 
+/* [-] Downward part of the outward normal of an element of a surface. */
+static double face_down(const FootScratch *foot, int e) {
+    return foot->share[e] / foot->area[e];
+}
+
+/* [m] The greatest depth of a slot so far, which its ground remembers. */
+static double slot_deepest(const Slots *s, int l) {
+    return real_max(s->depth_max[l], s->depth[l]);
+}
+
+/* What the rim leaves of the load of each slot of a surface, into `lean`. */
+static void faces_lean(const FootScratch *foot) {
+    const double *x = foot->point_x, *y = foot->point_y;
+    double sums[RIM_SUMS] = {0.0};
+    for (int i = 0; i < foot->active; i++) {
+        const int e = foot->element[i];
+        rim_add(sums, x[e] - foot->origin[0], y[e] - foot->origin[1],
+                slot_deepest(slot_block(foot, i), i % SLOT_LANES), face_down(foot, e),
+                foot->area[e] * foot->pitch * foot->pitch);
+    }
+    const Rim rim = rim_of(sums);
+    for (int i = 0; i < foot_end(foot); i++) {
+        Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
+        const double u = slot_deepest(s, l);
+        s->lean[l] = 1.0;
+        if (i < foot->active && s->projects[l] > 0.0 && u > 0.0) {
+            const int e = foot->element[i];
+            Element element = slot_element(s, l);
+            element.law.cone_begin = s->cone_begin[l];
+            s->lean[l] =
+                rim_level(&rim, &element.law, foot->heap[e].width, s->recovery[l],
+                          x[e] - foot->origin[0], y[e] - foot->origin[1], u, face_down(foot, e));
+        }
+    }
+}
+
 MILD_HD void slot_carry(Slots *s, int i, double dt, double rate) {
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
@@ -53,7 +92,11 @@ MILD_HD void slot_carry(Slots *s, int i, double dt, double rate) {
 
 void foot_carry(const FootScratch *foot, double dt) {
     slots_elastic(foot);
-    slots_lean(foot);
+    if (foot->faces) {
+        faces_lean(foot);
+    } else {
+        slots_lean(foot);
+    }
     const double rate = 1.0 / dt;
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
 #pragma omp simd

@@ -21,14 +21,12 @@ static int share_is_nan(const Share *share) {
     return isnan(share->slip_rate + share->regain_rate + share->grip + share->growth + share->side);
 }
 
-/* Derives what a material gives a slot. Surfaces are projected when they touch down (faces.c).
- * Where path costs support it adds no resistance. */
+/* Derives what a material gives a slot. Where path costs support it adds no resistance. */
 static __attribute__((cold)) void law_derive(const FootScratch *foot, const MildMaterial *material,
                                              DerivedLaw *derived) {
     const Law law = law_of(material, foot->pitch, foot->width);
-    Share share = share_of(material, foot->pitch, foot->faces ? 0.0 : foot->width);
+    const Share share = share_of(material, foot->pitch, foot->faces ? 0.0 : foot->width);
     const MildMaterial own = material_at(material, foot->pitch);
-    share.projects = foot->faces ? 0.0 : share.projects;
     const int slips = share.slip_rate > 0.0;
     *derived =
         (DerivedLaw){.material = *material,

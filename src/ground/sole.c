@@ -380,11 +380,11 @@ double mild_sole_z(const MildSole *sole) {
 }
 
 SoleHeap sole_heap(const MildSole *sole, int element) {
-    if (sole->faces) {
-        return (SoleHeap){0.0, 1.0};
-    }
     const int n = sole->elements;
     const double radius = MATERIAL_PITCH / sqrt(3.14159265358979323846);
+    if (sole->faces) {
+        return (SoleHeap){1e-9, fmax(0.5 * sole->width / radius, 1.0)};
+    }
     const double edge = sole->values[SOLE_EDGE * n + element] / radius;
     const double spread = sole->values[SOLE_SPREAD * n + element] / radius;
     /* The flat share (1 - t)^2 says that distances from `begin` on have the density 2 (1 - t): the

@@ -1,0 +1,97 @@
+/* What the rim of a rounded body leaves of its load (docs/model.md section 23).
+ *
+ * Under a merged sole (law.h) the pressure at the distance e from the edge is that of the ground
+ * beside the edge, at the edge's depth d, and what the heap adds on the way in:
+ *
+ *     p = kappa d + (k0 - kappa) T e          once the cone is complete; T = tan(alpha)/nu
+ * Below a plane sole d is the depth u of the element, and this is its law. A rounded body is deeper
+ * inside than at its rim, and ground there bears no more for it. So with u for d an element of a
+ * surface carries the share
+ *
+ *     c = (kappa d + (k0 - kappa) T e)/(kappa u + (k0 - kappa) P(u)),  at most 1
+ * of its load (share.h). The rim is found from moments of the elements in the ground, weighted by
+ * projected area. The plane of least squares through the depths, u ~ mean + g (x - mean), says how
+ * the body leans, and what is left of them, v, how round it is: over a paraboloid v is uniform
+ * between 0 at the rim and H, so H^2 = 12 var(v), and
+ *
+ *     d = mean u - H/2 + g (x - mean x)       [m] depth of the rim's plane under the element
+ *     b = 2 sqrt(least eigenvalue of cov x)   [m] half the breadth: the radius of a disc
+ *     e = b (1 - sqrt(1 - v/H))               [m] distance to the rim
+ * Elements steeper than 60 degrees are walls, which grains pass (the angle of SHARE_PASSIVE): they
+ * carry nothing and are outside the rim. */
+#ifndef MILD_GROUND_RIM_H
+#define MILD_GROUND_RIM_H
+
+#include "ground/share.h"
+
+#define RIM_STEEP REAL(0.5)          /* [-] least cosine of an element that is no wall */
+#define RIM_FLAT REAL(1e-4)          /* [m] H of a surface that counts as half round */
+#define RIM_MEAN REAL(5.0 / 9.0)     /* [-] v/H where e is b/3, the mean under a disc */
+#define RIM_RADIUS REAL(0.0110016969) /* [m] of the disc of an element of MATERIAL_PITCH */
+#define RIM_DISC REAL(0.07957747155) /* 1/(4 pi): second moment of a disc over its area squared */
+
+/* Sums over the elements in the ground: the weight, and times the weight x, y, u, x^2, x y, y^2,
+ * x u, y u, u^2. */
+enum { RIM_W, RIM_X, RIM_Y, RIM_U, RIM_XX, RIM_XY, RIM_YY, RIM_XU, RIM_YU, RIM_UU, RIM_SUMS };
+
+typedef struct {
+    Real x, y;     /* [m] middle of the elements, as their places */
+    Real depth;    /* [m] of the rim's plane there */
+    Real slope[2]; /* [-] g */
+    Real height;   /* [m] H */
+    Real breadth;  /* [m] b */
+} Rim;
+
+/* Adds an element at (x, y) [m] at the depth u [m]. down: [-] downward part of its outward normal.
+ * area: [m^2] of the element. */
+MILD_HD void rim_add(Real *sums, Real x, Real y, Real u, Real down, Real area) {
+    const Real w = u > 0 && down >= RIM_STEEP ? down * area : 0;
+    const Real own = area * RIM_DISC;
+    sums[RIM_W] += w;
+    sums[RIM_X] += w * x;
+    sums[RIM_Y] += w * y;
+    sums[RIM_U] += w * u;
+    sums[RIM_XX] += w * (x * x + own);
+    sums[RIM_XY] += w * x * y;
+    sums[RIM_YY] += w * (y * y + own);
+    sums[RIM_XU] += w * x * u;
+    sums[RIM_YU] += w * y * u;
+    sums[RIM_UU] += w * u * u;
+}
+
+MILD_HD Rim rim_of(const Real *sums) {
+    const Real scale = 1 / real_max(sums[RIM_W], REAL(1e-12));
+    const Real x = sums[RIM_X] * scale, y = sums[RIM_Y] * scale, u = sums[RIM_U] * scale;
+    const Real xx = sums[RIM_XX] * scale - x * x;
+    const Real xy = sums[RIM_XY] * scale - x * y;
+    const Real yy = sums[RIM_YY] * scale - y * y;
+    const Real xu = sums[RIM_XU] * scale - x * u;
+    const Real yu = sums[RIM_YU] * scale - y * u;
+    const Real uu = sums[RIM_UU] * scale - u * u;
+    const Real mean = (xx + yy) / 2, half = (xx - yy) / 2;
+    const Real least = mean - REAL_SQRT(half * half + xy * xy);
+    const Real inverse = 1 / real_max(xx * yy - xy * xy, REAL(1e-20));
+    const Real gx = (yy * xu - xy * yu) * inverse;
+    const Real gy = (xx * yu - xy * xu) * inverse;
+    const Real height = REAL_SQRT(12 * real_max(uu - gx * xu - gy * yu, 0));
+    const Rim rim = {x, y, u - height / 2, {gx, gy}, height, 2 * REAL_SQRT(real_max(least, 0))};
+    return rim;
+}
+
+/* [-] c of an element, for element_share. law: its own, without a share. width: [-] as in
+ * SoleHeap. u: [m] its depth, above 0. */
+MILD_HD Real rim_level(const Rim *rim, const Law *law, Real width, Real recovery, Real x, Real y,
+                       Real u, Real down) {
+    const Real d = rim->depth + rim->slope[0] * (x - rim->x) + rim->slope[1] * (y - rim->y);
+    const Real v = (u - d + RIM_MEAN * RIM_FLAT) / (rim->height + RIM_FLAT);
+    const Real inside = 1 - REAL_SQRT(1 - real_min(real_max(v, 0), 1));
+    const Real heap = law->cone_depth * (inside * rim->breadth / (RIM_RADIUS * width));
+    const Real whole = law_bedless_force(law, LAW_CONE | LAW_HEAP, u);
+    const Real bears = law->line_stiffness * real_max(d, 0) + law->flat_stiffness * heap;
+    const Real level = down >= RIM_STEEP ? bears / (whole + ELEMENT_TINY) : 0;
+    /* Ground that springs back is no grains. */
+    const Real blend = level + (1 - level) * recovery;
+    return law->flat_stiffness > 0 ? real_min(real_max(blend, SHARE_LEAN), 1) : 1;
+}
+
+#endif
