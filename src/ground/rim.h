@@ -26,13 +26,27 @@
 
 #define RIM_STEEP REAL(0.5)          /* [-] least cosine of an element that is no wall */
 #define RIM_FLAT REAL(1e-4)          /* [m] H of a surface that counts as half round */
+#define RIM_RIDGE REAL(1e-3)         /* [-] of an element's own moment: a row has no slope across */
 #define RIM_MEAN REAL(5.0 / 9.0)     /* [-] v/H where e is b/3, the mean under a disc */
 #define RIM_RADIUS REAL(0.0110016969) /* [m] of the disc of an element of MATERIAL_PITCH */
 #define RIM_DISC REAL(0.07957747155) /* 1/(4 pi): second moment of a disc over its area squared */
 
 /* Sums over the elements in the ground: the weight, and times the weight x, y, u, x^2, x y, y^2,
- * x u, y u, u^2. */
-enum { RIM_W, RIM_X, RIM_Y, RIM_U, RIM_XX, RIM_XY, RIM_YY, RIM_XU, RIM_YU, RIM_UU, RIM_SUMS };
+ * x u, y u, u^2 and the second moment of an element's own disc. */
+enum {
+    RIM_W,
+    RIM_X,
+    RIM_Y,
+    RIM_U,
+    RIM_XX,
+    RIM_XY,
+    RIM_YY,
+    RIM_XU,
+    RIM_YU,
+    RIM_UU,
+    RIM_OWN,
+    RIM_SUMS
+};
 
 typedef struct {
     Real x, y;     /* [m] middle of the elements, as their places */
@@ -46,17 +60,17 @@ typedef struct {
  * area: [m^2] of the element. */
 MILD_HD void rim_add(Real *sums, Real x, Real y, Real u, Real down, Real area) {
     const Real w = u > 0 && down >= RIM_STEEP ? down * area : 0;
-    const Real own = area * RIM_DISC;
     sums[RIM_W] += w;
     sums[RIM_X] += w * x;
     sums[RIM_Y] += w * y;
     sums[RIM_U] += w * u;
-    sums[RIM_XX] += w * (x * x + own);
+    sums[RIM_XX] += w * x * x;
     sums[RIM_XY] += w * x * y;
-    sums[RIM_YY] += w * (y * y + own);
+    sums[RIM_YY] += w * y * y;
     sums[RIM_XU] += w * x * u;
     sums[RIM_YU] += w * y * u;
     sums[RIM_UU] += w * u * u;
+    sums[RIM_OWN] += w * area * RIM_DISC;
 }
 
 MILD_HD Rim rim_of(const Real *sums) {
@@ -68,11 +82,13 @@ MILD_HD Rim rim_of(const Real *sums) {
     const Real xu = sums[RIM_XU] * scale - x * u;
     const Real yu = sums[RIM_YU] * scale - y * u;
     const Real uu = sums[RIM_UU] * scale - u * u;
-    const Real mean = (xx + yy) / 2, half = (xx - yy) / 2;
-    const Real least = mean - REAL_SQRT(half * half + xy * xy);
-    const Real inverse = 1 / real_max(xx * yy - xy * xy, REAL(1e-20));
-    const Real gx = (yy * xu - xy * yu) * inverse;
-    const Real gy = (xx * yu - xy * xu) * inverse;
+    const Real own = sums[RIM_OWN] * scale;
+    const Real half = (xx - yy) / 2;
+    const Real least = (xx + yy) / 2 - REAL_SQRT(half * half + xy * xy) + own;
+    const Real a = xx + RIM_RIDGE * own, b = yy + RIM_RIDGE * own;
+    const Real inverse = 1 / real_max(a * b - xy * xy, REAL(1e-20));
+    const Real gx = (b * xu - xy * yu) * inverse;
+    const Real gy = (a * yu - xy * xu) * inverse;
     const Real height = REAL_SQRT(12 * real_max(uu - gx * xu - gy * yu, 0));
     const Rim rim = {x, y, u - height / 2, {gx, gy}, height, 2 * REAL_SQRT(real_max(least, 0))};
     return rim;

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "ground/law.h"
 #include "ground/sole.h"
 #include "ground/sole_edge.h"
 
@@ -383,7 +384,7 @@ SoleHeap sole_heap(const MildSole *sole, int element) {
     const int n = sole->elements;
     const double radius = MATERIAL_PITCH / sqrt(3.14159265358979323846);
     if (sole->faces) {
-        return (SoleHeap){1e-9, fmax(0.5 * sole->width / radius, 1.0)};
+        return (SoleHeap){LAW_HEAP_LEAST, fmax(0.5 * sole->width / radius, 1.0)};
     }
     const double edge = sole->values[SOLE_EDGE * n + element] / radius;
     const double spread = sole->values[SOLE_SPREAD * n + element] / radius;
@@ -391,7 +392,7 @@ SoleHeap sole_heap(const MildSole *sole, int element) {
      * mean is a third of the width, the variance an 18th of its square. A heap begins to close
      * below the surface, if only by a hair: what begins at 0 is a cone (law_is_heap). */
     const double width = fmax(fmin(sqrt(18.0) * spread, 3.0 * edge), 1e-6);
-    return (SoleHeap){fmax(edge - width / 3.0, 1e-9), width};
+    return (SoleHeap){fmax(edge - width / 3.0, LAW_HEAP_LEAST), width};
 }
 
 const double *mild_sole_edge(const MildSole *sole) {

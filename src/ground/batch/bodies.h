@@ -10,6 +10,7 @@
 
 #include "base/hd.h"
 #include "ground/batch/contact.h"
+#include "ground/rim.h"
 
 #define BODIES_MAX 9 /* feet, and bodies with shells: those of the Go1 */
 #define BODIES_ROWS (6 * BODIES_MAX)
@@ -31,6 +32,7 @@ typedef struct {
     const Real *face;  /* a sole: NULL; a surface: [5][elements] z [m], outward normal, area over
                          `square` */
     Real z;            /* [m] of a sole's plane */
+    Real breadth;      /* [-] of a surface: width of SoleHeap */
     Real square;       /* [m^2] area of an element in the law */
     Real middle[3];    /* [m] of the bounding box, body's frame */
     Real half[3];      /* [m] */
@@ -122,6 +124,7 @@ typedef struct {
     int first[BODIES_MAX + 1];      /* round of a place; those of a place follow each other */
     uint8_t place[BODIES_ROUNDS];   /* of a round */
     uint16_t list[BODIES_ELEMENTS]; /* numbers of elements */
+    Rim rim[BODIES_MAX];            /* of surfaces with listed elements, on ground with LAW_HEAP */
     int active; /* rows of bodies with listed elements; P and W of others are 0 */
     uint8_t active_row[BODIES_ROWS];
     Real part[BODIES_ROUNDS][BODIES_SUMS];
@@ -139,6 +142,7 @@ typedef struct {
     Real share;     /* [-] 1 for a sole; 0: carries nothing */
     int state;      /* before the step, of bodies_state */
     int label;      /* that it stands on */
+    Real down;      /* [-] of a surface: downward part of its normal */
     int faces_down; /* bool: of a surface; 1 for a sole */
     int listed;     /* bool: may touch in this step */
     ElementMemory before;
@@ -353,12 +357,34 @@ MILD_HD void bodies_share(const BodiesSetup *setup, const BodiesWork *work, int 
     bodies_scale(e, directed && own->share > 0 ? whole : own->share);
 }
 
-/* The merged cone of element s, on ground with LAW_HEAP. A surface's is a disc by itself. */
+/* The merged cone of element s, on ground with LAW_HEAP; sole_heap. */
 MILD_HD void bodies_merge(const BodiesSole *sole, int s, const ContactMaterial *material,
                           Element *e) {
-    if (!sole->face && material->projects > 0) {
-        e->law = law_merged(e->law, sole->begin[s], sole->width[s]);
+    if (material->projects > 0) {
+        e->law = sole->face ? law_merged(e->law, LAW_HEAP_LEAST, sole->breadth)
+                            : law_merged(e->law, sole->begin[s], sole->width[s]);
     }
+}
+
+/* [m] Its greatest depth so far, which its ground remembers. */
+MILD_HD Real bodies_deepest(const BodiesMemory *memory, int s, const BodiesElement *own) {
+    return real_max(memory->element[s], own->depth);
+}
+
+/* What is left of its load; slots_lean, and faces_lean of a surface. */
+MILD_HD Real bodies_lean(const BodiesWork *work, const BodiesSole *sole, int i, int s,
+                         const ContactMaterial *material, const BodiesElement *own) {
+    const Real *R = work->rotation[i];
+    const Real normal[3] = {R[2], R[5], R[8]};
+    if (!sole->face) {
+        return contact_lean(normal, own->slope[0], own->slope[1]);
+    }
+    const Real u = bodies_deepest(&work->memory[i], s, own);
+    if (!(material->projects > 0 && u > 0)) {
+        return 1;
+    }
+    return rim_level(&work->rim[i], &own->element.law, sole->breadth, own->element.recovery,
+                     own->p[0], own->p[1], u, own->down);
 }
 
 /* Its share of the load, there too. */
@@ -366,9 +392,7 @@ MILD_HD void bodies_carry(const BodiesSetup *setup, const BodiesWork *work, int 
                           const ContactMaterial *material, BodiesElement *own) {
     const BodiesSole *sole = &setup->sole[work->body[i]];
     const BodiesMemory *memory = &work->memory[i];
-    const Real *R = work->rotation[i];
-    const Real normal[3] = {R[2], R[5], R[8]};
-    const Real lean = contact_lean(normal, own->slope[0], own->slope[1]);
+    const Real lean = bodies_lean(work, sole, i, s, material, own);
     const Real worn = memory->element[CONTACT_WORN * memory->next + s];
     const Real elastic = law_elastic_force(&own->element.law, own->curves, own->element.middle);
     own->carried = contact_share(material, !sole->face, worn);
@@ -448,12 +472,13 @@ MILD_HD void bodies_locate(const BodiesSetup *setup, const BodiesWork *work, int
     own->slope[0] = own->slope[1] = 0;
     own->label = 0;
     own->share = 1;
+    own->down = 1;
     bodies_point(sole, R, s, own->p);
     if (sole->face) {
         Real normal[3];
         bodies_normal(sole, R, s, normal);
-        own->share =
-            -normal[2] > BODIES_STEEP ? -normal[2] * sole->face[4 * sole->elements + s] : 0;
+        own->down = -normal[2];
+        own->share = own->down > BODIES_STEEP ? own->down * sole->face[4 * sole->elements + s] : 0;
     }
     own->faces_down = own->share > 0;
     if (setup->has_map) {

@@ -7,6 +7,7 @@
 
 #include "device/device.h"
 #include "ground/batch/bodies.h"
+#include "ground/inside.h"
 
 _Static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
 
@@ -78,6 +79,7 @@ static void set_surface(BodiesSole *to, const MildSole *sole, float *values, con
     to->x = places;
     to->y = places + n;
     to->face = places + 2 * n;
+    to->breadth = (float)mild_inside_heap(sole, 0).width;
 }
 
 /* [numbers] of the places of all surfaces. */

@@ -76,9 +76,29 @@ MILD_HD void bodies_pass(const BodiesSetup *setup, const BodiesElement *own, con
 #define BODIES_KEPT 8
 #endif
 
+/* The rim of the body at place i, from each lane's sums. */
+WARP_FN void bodies_set_rim(BodiesWork *work, int i, Real (*sums)[RIM_SUMS]) {
+    Real whole[RIM_SUMS];
+    for (int k = 0; k < RIM_SUMS; k++) {
+        Real part[LANE_COPIES];
+        EACH_LANE(l) {
+            part[l] = sums[l][k];
+        }
+        whole[k] = lane_sum(part);
+    }
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            work->rim[i] = rim_of(whole);
+        }
+    }
+}
+
 /* Lists those of the body at place i that may touch; by a warp. */
-WARP_FN void bodies_list_body(const BodiesSetup *setup, BodiesWork *work, int i) {
-    const int elements = setup->sole[work->body[i]].elements;
+WARP_FN void bodies_list_body(const BodiesSetup *setup, BodiesWork *work, int i, int heap) {
+    const BodiesSole *sole = &setup->sole[work->body[i]];
+    const int elements = sole->elements;
+    const int rounded = heap && sole->face;
+    Real sums[LANE_COPIES][RIM_SUMS] = {{0}};
     const MapSpot spot = bodies_spot(setup, work, i);
     uint16_t *list = work->list + work->begin[i];
     int count = 0;
@@ -91,6 +111,11 @@ WARP_FN void bodies_list_body(const BodiesSetup *setup, BodiesWork *work, int i)
                 BodiesElement own;
                 bodies_locate(setup, work, i, from + LANE(l), &spot, &own);
                 flag[l] = own.listed;
+                if (rounded && own.listed) {
+                    const int s = from + LANE(l);
+                    rim_add(sums[l], own.p[0], own.p[1], bodies_deepest(&work->memory[i], s, &own),
+                            own.down, sole->face[4 * elements + s] * sole->square);
+                }
             }
         }
         const int found = lanes_rank(flag, rank);
@@ -101,6 +126,9 @@ WARP_FN void bodies_list_body(const BodiesSetup *setup, BodiesWork *work, int i)
         }
         count += found;
     }
+    if (rounded) {
+        bodies_set_rim(work, i, sums);
+    }
     EACH_LANE(l) {
         if (LANE(l) == 0) {
             work->listed[i] = count;
@@ -109,7 +137,7 @@ WARP_FN void bodies_list_body(const BodiesSetup *setup, BodiesWork *work, int i)
 }
 
 /* The list, and its rounds. */
-TEAM_FN void bodies_list(const BodiesSetup *setup, BodiesWork *work) {
+TEAM_FN void bodies_list(const BodiesSetup *setup, BodiesWork *work, int heap) {
     EACH_LANE(l) {
         if (TEAM_LANE(l) == 0) {
             int begin = 0;
@@ -122,7 +150,7 @@ TEAM_FN void bodies_list(const BodiesSetup *setup, BodiesWork *work) {
     team_sync();
     LANE_ROLLED
     for (int i = TEAM_WARP; i < work->count; i += TEAM_WARPS) {
-        bodies_list_body(setup, work, i);
+        bodies_list_body(setup, work, i, heap);
     }
     team_sync();
     EACH_LANE(l) {
@@ -438,7 +466,7 @@ TEAM_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work, int heap)
     Real least = -1, at_residual = 0, way = 1, relative = 0;
     int steps = 0, halved = 0;
     BodiesElement kept[BODIES_KEPT][LANE_COPIES];
-    bodies_list(setup, work);
+    bodies_list(setup, work, heap);
     bodies_keep(setup, work, kept, heap);
     bodies_start(work, rows, &work->next);
     bodies_copy(rows, &work->next, &work->best);
