@@ -24,12 +24,12 @@
 
 #include "ground/share.h"
 
-#define RIM_STEEP REAL(0.5)          /* [-] least cosine of an element that is no wall */
-#define RIM_FLAT REAL(1e-4)          /* [m] H of a surface that counts as half round */
-#define RIM_RIDGE REAL(1e-3)         /* [-] of an element's own moment: a row has no slope across */
-#define RIM_MEAN REAL(5.0 / 9.0)     /* [-] v/H where e is b/3, the mean under a disc */
+#define RIM_STEEP REAL(0.5)      /* [-] least cosine of an element that is no wall */
+#define RIM_FLAT REAL(2e-4)      /* [m] H of a surface that counts as half round */
+#define RIM_RIDGE REAL(1e-4)     /* [-] of an element's own moment: a row has no slope across */
+#define RIM_MEAN REAL(5.0 / 9.0) /* [-] v/H where e is b/3, the mean under a disc */
 #define RIM_RADIUS REAL(0.0110016969) /* [m] of the disc of an element of MATERIAL_PITCH */
-#define RIM_DISC REAL(0.07957747155) /* 1/(4 pi): second moment of a disc over its area squared */
+#define RIM_DISC REAL(0.07957747155)  /* 1/(4 pi): second moment of a disc over its area squared */
 
 /* Sums over the elements in the ground: the weight, and times the weight x, y, u, x^2, x y, y^2,
  * x u, y u, u^2 and the second moment of an element's own disc. */

@@ -121,7 +121,8 @@ TEST(test_sphere) {
     double worst = 0.0;
     for (int k = 1; k <= 5; k++) {
         const double depth = 0.006 * k;
-        const MildSurfaceDef def = {.shapes = &ball, .count = 1, .pitch = KIT_PITCH, .spacing = 0.002};
+        const MildSurfaceDef def = {
+            .shapes = &ball, .count = 1, .pitch = KIT_PITCH, .spacing = 0.002};
         MildError error = {0};
         MildSole *sole = mild_sole_surface(&def, &error);
         expect_good(sole != NULL, &error);
