@@ -15,7 +15,7 @@ suffix=$("$other" -c 'import sysconfig; print(sysconfig.get_config_var("EXT_SUFF
 
 # Archives of the build that the bundle is made of, with its kernels where it has some.
 build=${BUILD:-build/x86-64-v3}/src
-archives=("$build"/liblayer_{lab,batch,ground,device,base}.a)
+archives=("$build"/liblayer_{identify,soil,batch,ground,device,base}.a)
 cuda=()
 if [ -e "$build/libbatch_device.a" ]; then
     archives+=("$build"/lib{batch_device,device_gpu}.a)
@@ -24,14 +24,14 @@ fi
 
 rm -rf "$bundle/python"
 mkdir -p "$package"
-cp python/mild/*.py python/mild/py.typed "$package/"
+cp -r python/mild/{*.py,py.typed,layouts} "$package/"
 ln -s ../.. "$package/data"
-flags=(-O2 -std=c++17 -fPIC -shared -fvisibility=hidden -march=x86-64-v3 -Iinclude -I"$include" -I"$nanobind/include"
+flags=(-O2 -std=c++17 -fPIC -shared -fvisibility=hidden -march=x86-64-v3 -Iinclude -Isrc -I"$include" -I"$nanobind/include"
     -I"$nanobind/ext/robin_map/include" "$nanobind/src/nb_combined.cpp"
     -DMILD_VERSION="\"$(sed -n 's/^project(mild VERSION \([0-9.]*\) .*/\1/p' CMakeLists.txt)\"")
-g++ "${flags[@]}" -Isrc python/src/run/envs.cpp -o "$package/_envs$suffix" -L"$bundle/lib" -lmild_envs -Wl,-rpath,'$ORIGIN/../../lib' \
+g++ "${flags[@]}" python/src/envs.cpp -o "$package/_envs$suffix" -L"$bundle/lib" -lmild_envs -Wl,-rpath,'$ORIGIN/../../lib' \
     -Wl,--allow-shlib-undefined &
-g++ "${flags[@]}" -Isrc python/src/{ground,material,terrain,press,fit,batch}.cpp -o "$package/_ground$suffix" \
+g++ "${flags[@]}" python/src/{ground,material,terrain,press,fit,batch,xla}.cpp -o "$package/_ground$suffix" \
     -Wl,--start-group "${archives[@]}" -Wl,--end-group "${cuda[@]}" -Wl,--exclude-libs,ALL
 wait $!
 strip "$package"/*.so

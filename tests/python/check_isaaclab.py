@@ -1,8 +1,11 @@
-"""mild.newton.isaaclab in Isaac Lab's own G1 task, stepped by its manager on the CPU; `make isaaclab-check` installs Isaac Lab without its simulator
-and runs it. Isaac Lab's files of robots and floors lie on its maker's server; a floor and robots/g1 as USD stand in their place."""
+"""mild.newton.isaaclab in Isaac Lab's own G1 task, stepped by its manager; `make isaaclab-check` installs Isaac Lab without its simulator
+and runs it on the CPU. On a GPU, where the manager captures its steps in a graph: check_isaaclab.py --device cuda:0 (mild's build must have CUDA, or
+mild_cuda be there). Isaac Lab's files of robots and floors lie on its maker's server; a floor and robots/g1 as USD stand in their place."""
+import argparse
 import importlib.metadata
 import os
 import pathlib
+import sys
 import tempfile
 import unittest
 
@@ -24,7 +27,7 @@ from pxr import Gf, Usd, UsdGeom, UsdPhysics  # noqa: E402
 import mild  # noqa: E402
 import mild.newton  # noqa: E402
 
-SOILS, WORLDS = ["sand_loose", "foam45"], 4
+DEVICE, SOILS, WORLDS = "cpu", ["sand_loose", "foam45"], 4
 FEET = ["left_ankle_roll_link", "right_ankle_roll_link"]
 ASSETS = pathlib.Path(FOLDER.name) / "Isaac/IsaacLab"
 
@@ -104,7 +107,7 @@ def write_g1(path):
 def task():
     """Isaac-Velocity-Flat-G1 as it is, less what its robot has and ours has not: arms, fingers, a waist; and less pictures from the server."""
     cfg = G1FlatEnvCfg()
-    cfg.sim.physics, cfg.sim.device, cfg.scene.num_envs = cfg.sim.physics.newton_mjwarp, "cpu", WORLDS
+    cfg.sim.physics, cfg.sim.device, cfg.scene.num_envs = cfg.sim.physics.newton_mjwarp, DEVICE, WORLDS
     cfg.scene.sky_light = cfg.scene.terrain.visual_material = None
     cfg.commands.base_velocity.debug_vis = False
     cfg.rewards.joint_deviation_fingers = cfg.rewards.joint_deviation_arms = cfg.rewards.joint_deviation_torso = None
@@ -129,10 +132,11 @@ class IsaacLab(unittest.TestCase):
         env = gymnasium.make("Isaac-Velocity-Flat-G1", cfg=task())
         inside, ground = env.unwrapped, NewtonManager._solver.soft_ground
         self.assertFalse(NewtonManager._solver.mjw_model.opt.run_collision_detection)  # its contacts are Newton's
-        still = torch.zeros(WORLDS, env.action_space.shape[-1])
+        still = torch.zeros(WORLDS, env.action_space.shape[-1], device=DEVICE)
         env.reset()
         env.step(still)
         first = ground.foot.numpy().copy()
+        self.assertEqual(NewtonManager._graph is not None, DEVICE != "cpu")  # on a GPU these steps are launches of a graph
         for _ in range(20):
             env.step(still)
         weight = 9.81 * ground.m.body_mass.numpy().sum(1)
@@ -145,12 +149,12 @@ class IsaacLab(unittest.TestCase):
         self.assertGreater(depth[::2].min(), 1.2 * depth[1::2].max())
         sensor = inside.scene["contact_forces"]
         self.assertEqual(float(sensor.data.net_forces_w.torch[:, sensor.find_sensors(FEET)[0]].abs().max()), 0)  # of the floor, which they have left
-        inside.reset(env_ids=torch.tensor([0]))
+        inside.reset(env_ids=torch.tensor([0], device=DEVICE))
         env.step(still)
         fresh = ground.foot.numpy()
         np.testing.assert_allclose(fresh[0, :, 4], first[0, :, 4], rtol=0.01)
         self.assertGreater(fresh[2, :, 4].min(), 1.2 * fresh[0, :, 4].max())  # a world that went on
-        agent = handle_deprecated_rsl_rl_cfg(G1FlatPPORunnerCfg(device="cpu"), importlib.metadata.version("rsl-rl-lib"))
+        agent = handle_deprecated_rsl_rl_cfg(G1FlatPPORunnerCfg(device=DEVICE), importlib.metadata.version("rsl-rl-lib"))
         runner = create_rsl_rl_runner(RslRlVecEnvWrapper(env), agent, log_dir=None)
         runner.learn(2)
         actor = runner.alg.save()["actor_state_dict"]
@@ -160,4 +164,8 @@ class IsaacLab(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--device", default="cpu")
+    given, rest = parser.parse_known_args()
+    DEVICE = given.device
+    unittest.main(argv=[sys.argv[0], *rest])
