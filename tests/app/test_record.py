@@ -157,7 +157,7 @@ changed(out, without("runs", "mjwarp_16384"), "mjwarp_16384 was neither run")
 
 # ---- without a GPU, and with a bench that fails or has no number ----
 slow = work / "slow"
-run("run", slow, "--rounds", 1, "--mild", made, "--python", peers, NEWTON="8", RATE="6500", **no_gpu)
+run(slow, "--rounds", 1, "--mild", made, "--python", peers, NEWTON="8", RATE="6500", **no_gpu)
 fits(slow)
 absent = {x["name"]: x["why"] for x in read(slow)["missing"]}
 if not shutil.which("nvidia-smi"):
@@ -182,6 +182,7 @@ assert [read(median)["ratios"][0][key] for key in ("value", "least", "most")] ==
 lines = work / "history.jsonl"
 fast = work / "fast"
 run("run", fast, "--rounds", 1, "--mild", made, "--python", peers, **no_gpu)
+assert not lines.exists()
 run("add", fast, "--file", lines)
 one_line("has this record", "add", fast, "--file", lines)
 assert "slow" not in run("history", "--file", lines)
@@ -201,11 +202,22 @@ one_line("nosuch", "run", work / "new", "--only", "nosuch", "--mild", made)
 one_line("nosuch", "run", work / "new", "--mild", work / "nosuch")
 one_line("no record.json", "check", work / "new")
 one_line("has no record", "history", "--file", work / "none")
-run(code=2)
+one_line("mild bench record out/record")  # no folder
+one_line("mild bench record out/record", "run")
+one_line("--rounds 0", work / "new", "--rounds", 0)
+one_line("--wrong", work / "new", "--wrong")
+one_line("No such file", "add", fast, "--file", work / "none/history.jsonl")
+for torn in ("{", "7", '{"values": {}}'):
+    (work / "torn.jsonl").write_text(lines.read_text() + torn + "\n")
+    one_line("torn.jsonl, line 3", "history", "--file", work / "torn.jsonl")
+    one_line("torn.jsonl, line 3", "add", dirty, "--dirty", "--file", work / "torn.jsonl")
+if (root / "docs/record.jsonl").exists():  # ours can be read
+    history = subprocess.run([sys.executable, record, "history"], capture_output=True, text=True, check=False)
+    assert history.returncode in (0, 1) and not history.stderr and "| step/newton |" in history.stdout, history
 
 # ---- the real program ----
 real = work / "real"
-run("run", real, "--rounds", 1, "--only", "step,walk,batch", "--mild", mild)
+run(real, "--rounds", 1, "--only", "step,walk,batch", MILD=str(mild))  # as `mild bench record` sets it
 fits(real)
 run("check", real)
 values = {row["id"]: row["value"] for row in read(real)["rows"]}
