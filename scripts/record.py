@@ -50,7 +50,8 @@ def fail(text):
 # ---- what is measured ----
 
 class Command:
-    """words: MILD, PYTHON and FILE stand for the program, the peers' interpreter and the file for its rows. read: (folder, file, seconds)
+    """words: MILD, PYTHON, PLUGIN and FILE stand for the program, the peers' interpreter, the plugin beside the program and the file for its
+    rows. read: (folder, file, seconds)
     -> [(case, value, unit)]. modules: what the interpreter must have."""
 
     def __init__(self, name, who, words, read=None, gpu=False, modules=(), before="", rounds=0):
@@ -99,9 +100,12 @@ def commands():
     walk = 'begin=$(date +%s.%N); "$0" train --config configs/quick.ini --out "$1/run" --train.device=cuda && ' \
            'date +%s.%N | awk -v b="$begin" \'{ print $1 - b }\' >"$1/seconds.txt" && ' \
            '"$0" eval --policy "$1/run/policy.safetensors" --config configs/quick.ini --ground rigid,foam45,sand_loose --speed 0.6 --json "$2"'
+    plugin = ["PYTHON", "scripts/plugin_walk.py", "sa01", "--ground", "sand_loose", "--step", "0.0025", "--integrator", "Euler", "--speed", "0.6",
+              "--time", "--plugin", "PLUGIN", "--json", "FILE"]
     peer = ["PYTHON", "scripts/mjwarp.py", "robots/sa01", "--dt", "0.005", "--json", "FILE"]
     found = [
         bench("step", "step"), bench("walk", "walk"),
+        Command("plugin", "MuJoCo with the plugin", plugin, modules=("mujoco", "numpy")),
         Command("mujoco", "MuJoCo", [*peer, "--processor", "--worlds", "512"], modules=("mujoco", "numpy")),
         bench("ground", "ground"), bench("elements", "elements"), bench("batch", "batch"),
         bench("robots", "robots", "--train.envs=64", STEPS_5MS), bench("train", "train", "memory", rounds=1),
@@ -131,6 +135,8 @@ RATIOS = {
     "a step standing on sand over MuJoCo's own on a rigid floor": ("step/newton", "step/engine_rigid", 1),
     **{f"a step walking on {ground} over MuJoCo's own on a rigid floor": (f"walk/{ground}_newton", f"walk/{ground}_engine_rigid", 1)
        for ground in ("sand_loose", "foam45", "grass")},
+    "a step of MuJoCo with the plugin walking on sand_loose over ours": ("plugin/sand_loose", "walk/sand_loose_newton_tight", 1),  # both to 1e-9
+    "a step of MuJoCo with the plugin walking on sand_loose over MuJoCo's own on a rigid floor": ("plugin/sand_loose", "plugin/rigid", 1),
     **{f"physics steps/s of {n} walking robots on soft ground over MuJoCo Warp's on a rigid floor":
        (f"robots_{n}/walking_policy_steps_per_s", f"mjwarp_{n}/rigid_5ms_{n}", 2) for n in WORLDS},
 }
@@ -147,7 +153,7 @@ BARS = {
 }
 # Rows of the history, and whether more is better. Ratios are in it too.
 KEPT = {
-    "step/newton": False, "walk/sand_loose_newton": False, "walk/sand_loose_iterations": False, "ground/newton_stick_advance": False,
+    "step/newton": False, "walk/sand_loose_newton": False, "plugin/sand_loose": False, "walk/sand_loose_iterations": False, "ground/newton_stick_advance": False,
     "elements/stick_154": False, "elements/stick_2000": False, "train/policy_steps_per_s": True, "train/total": False,
     "batch_cuda/advance_16384": True, "batch_cuda/advance_65536": True, "robots_16384/walking_policy_steps_per_s": True,
     "robots_16384/memory_per_robot": False, "train_16384/policy_steps_per_s": True, "walk_from_nothing/seconds": False,
@@ -231,11 +237,17 @@ def imports(python, module):
     return output_of(python, "-c", f"import {module}; print(1)").endswith("1")
 
 
-def missing_of(command, python, gpus):
+def plugin_of(mild):
+    return pathlib.Path(mild).parent / "mujoco_plugin/libmild_plugin.so"
+
+
+def missing_of(command, given, gpus):
     """Why it cannot run here, or None."""
-    absent = [module for module in command.modules if not imports(python, module)]
+    absent = [module for module in command.modules if not imports(given.python, module)]
     if absent:
-        return f"{', '.join(absent)} not installed for {pathlib.Path(python).name}"
+        return f"{', '.join(absent)} not installed for {pathlib.Path(given.python).name}"
+    if "PLUGIN" in command.words and not plugin_of(given.mild).is_file():
+        return f"no mujoco_plugin/{plugin_of('').name} beside the program"
     return "no NVIDIA GPU" if command.gpu and not gpus else None
 
 
@@ -254,7 +266,7 @@ def raw_files(folder):
 def play(command, folder, given):
     """Runs it once. {seconds, exit, clocks, files} and what it said last."""
     folder.mkdir(parents=True, exist_ok=True)
-    stand = {"MILD": given.mild, "PYTHON": given.python, "FILE": str(folder / "rows.json"), "FOLDER": str(folder)}
+    stand = {"MILD": given.mild, "PYTHON": given.python, "PLUGIN": str(plugin_of(given.mild)), "FILE": str(folder / "rows.json"), "FOLDER": str(folder)}
     words = [stand.get(word, word.replace("FOLDER/", f"{folder}/")) for word in command.words]
     clocks, begin = Clocks(), time.time()
     clocks.start()
@@ -335,7 +347,7 @@ def measure(given):
              "only": [c.name for c in chosen], "missing": [], "runs": []}
     ready = []
     for command in chosen:
-        why = missing_of(command, given.python, whole["machine"]["gpus"])
+        why = missing_of(command, given, whole["machine"]["gpus"])
         whole["missing"] += [{"name": command.name, "by": command.who, "why": why}] if why else []
         ready += [] if why else [command]
     whole["missing"].append({"name": "nanog1", "by": "nanoG1", "why": NANOG1})
@@ -387,7 +399,7 @@ def page(whole):
             "## Rows\n", table(["row", "by", "median", "unit", "least", "most", "rounds"],
                                [[r["id"], r["by"], number(r["value"]), r["unit"], number(min(r["rounds"].values())),
                                  number(max(r["rounds"].values())), len(r["rounds"])] for r in whole["rows"]]),
-            "## Commands\n\nIn this order. MILD is `build/mild`, PYTHON the interpreter of the peers. Clocks: least, median and largest reading.\n",
+            "## Commands\n\nIn this order. MILD is `build/mild`, PYTHON the interpreter of the peers, PLUGIN the plugin beside MILD. Clocks: least, median and largest reading.\n",
             table(["round", "name", "s", "clocks", "command"],
                   [[r["round"], r["name"], f"{r['seconds']:.1f}", spread(r), f"`{r['command']}`"] for r in whole["runs"]]),
             "## Versions\n", table(["", ""], list(whole["versions"].items()))]
@@ -582,7 +594,7 @@ def main():
     if given.work is measure and given.list:
         gpus = machine()["gpus"]
         for command in commands():
-            print(f"{command.name:28} {command.who:14} {missing_of(command, given.python, gpus) or 'ready'}")
+            print(f"{command.name:28} {command.who:14} {missing_of(command, given, gpus) or 'ready'}")
         sys.exit(0)
     sys.exit(given.work(given))
 
