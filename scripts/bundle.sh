@@ -55,7 +55,7 @@ export OPAL_PREFIX="$here" PMIX_PKGLIBDIR="$here/lib/pmix" LD_LIBRARY_PATH="$her
 exec "$here/libexec/mpirun" "$@"
 MPIRUN
     chmod +x "$bundle/bin/mpirun"
-    cp scripts/gpus.py scripts/ranks.py "$bundle/"
+    cp scripts/gpus.py scripts/ranks.py scripts/ranks_model.py "$bundle/"
 fi
 
 # the libraries that ldd lists, without libc, the loader, CUDA and NCCL

@@ -4,13 +4,14 @@
   scripts/gpus.py -n 2                    with the programs of build/
   build/bundle/gpus.py -n 8 --only speed  with those of a bundle (scripts/bundle.sh ranks)
 
-sums    sums over the GPUs have the bits of one tree
+sums    sums over the GPUs have the bits of one tree; how long they take, by 2, 4 .. n
 parts   the learner on the GPUs against one on the processor
 split   the first iteration by 1, 2 .. n GPUs: log and parameters; by n twice: the same bits
 resume  a checkpoint of all goes on with 1, and with all
 killed  a process that dies ends all with one line, and training goes on from the last checkpoint
 few     more processes than GPUs: one line, exit code 2
 speed   policy steps/s by 1, 2 .. n GPUs, --robots of each
+model   what 1 .. 256 GPUs should cost, by sums and speed (scripts/ranks_model.py)
 
 Exits with 1 when something is not as it should be."""
 import argparse
@@ -29,12 +30,16 @@ import sys
 import tempfile
 import time
 
+import ranks_model
+
 HERE = pathlib.Path(__file__).resolve().parent
 BUNDLE = HERE if (HERE / "run").exists() else None
 ROOT = BUNDLE or HERE.parent
-STEPS = ("sums", "parts", "split", "resume", "killed", "few", "speed")
+STEPS = ("sums", "parts", "split", "resume", "killed", "few", "speed", "model")
 BARS = {2: 1.9, 8: 7.0}  # times the steps/s of one GPU, at least
 failures = []
+took = {}  # [s] a sum, by (GPUs, bytes)
+iterations = {}  # [s] an iteration, by GPUs
 
 
 def fail(text):
@@ -124,11 +129,15 @@ def counts(most):
 
 
 def sums(programs, arguments, _):
-    found, output = programs.good(programs.by(arguments.n, "test_ranks"))
-    found_line = f"the same sums on {arguments.n} GPUs"
-    if found and found_line not in output and arguments.device == "cuda":
-        fail(f"no '{found_line}' in {output}")
-    print(f"sums: {found_line if found_line in output else 'on processors'}")
+    for count in counts(arguments.n)[1:]:
+        found, output = programs.good(programs.by(count, "test_ranks"))
+        found_line = f"the same sums on {count} GPUs"
+        if found and found_line not in output and arguments.device == "cuda":
+            fail(f"no '{found_line}' in {output}")
+        print(f"sums: {found_line if found_line in output else 'on processors'}")
+        for size, us in re.findall(rf"a sum of (\d+) B by {count} GPUs takes ([\d.]+) us", output):
+            took[count, int(size)] = 1e-6 * float(us)
+            print(f"sums: {size} B by {count} GPUs: {us} us")
 
 
 def parts(programs, arguments, _):
@@ -250,10 +259,20 @@ def speed(programs, arguments, work):
         rates = [float(row["rate/steps_per_s"]) for row in log(folder)][arguments.iterations // 3 :]
         rate = statistics.median(rates)
         alone = alone or rate
+        steps = [float(row["rate/steps"]) for row in log(folder)[-2:]]
+        iterations[count] = (steps[1] - steps[0]) / rate
         print(f"speed: {count} GPUs, {arguments.robots * count} robots: {rate:.4g} policy steps/s ({min(rates):.3g} .. "
               f"{max(rates):.3g}), {rate / alone:.2f} times one", flush=True)
         if rate / alone < BARS.get(count, 0) and arguments.device == "cuda":
             fail(f"{count} GPUs: {rate / alone:.2f} times one, the bar is {BARS[count]}")
+
+
+def model(_, arguments, __):
+    if not took or 1 not in iterations:
+        print("model: it needs sums and speed of the same call, on GPUs")
+        return
+    print(f"iterations: {' '.join(f'{count}:{seconds:.5g}' for count, seconds in iterations.items())} s, {arguments.robots} robots a GPU\n"
+          f"{ranks_model.Model(iterations, took).table()}")
 
 
 def main():

@@ -1,19 +1,20 @@
 #!/usr/bin/env python3
 """A record of speed that others can check: ours and the peers in one call, with versions, clocks, command lines and raw output.
 
-  scripts/record.py run out/record                    # all that this machine can measure, ten minutes on two cores; --list: what that is
-  scripts/record.py run out/record --rounds 1 --only step,walk,mujoco
-  scripts/record.py check out/record                  # raw output, rows, ratios and page belong together
-  scripts/record.py add out/record                    # a line of docs/record.jsonl: our numbers by commit
-  scripts/record.py history                           # that file as tables; exit code 1 if the last record of a machine is slow
-  scripts/record.py history --picture docs/record.png
+  mild bench record out/record                    # all that this machine can measure, ten minutes on two cores; --list: what that is
+  mild bench record out/record --rounds 1 --only step,walk,mujoco
+  mild bench record check out/record              # raw output, rows, ratios and page belong together
+  mild bench record add out/record                # a line of docs/record.jsonl: our numbers by commit
+  mild bench record history                       # that file as tables; exit code 1 if the last record of a machine is slow
+  mild bench record history --picture docs/record.png
 
-`run` measures in turns: each round has every command once, ours and the peers', and a ratio is of one round. OUT/record.json (schema:
+scripts/record.py is the same. The first measures, in turns: each round has every command once, ours and the peers', and a ratio is of one round. OUT/record.json (schema:
 docs/schema/record.json) has medians and every round's number, OUT/raw what the commands wrote, OUT/record.md is the page, made from
 record.json alone. A peer that is not installed, or has no GPU to run on, is named with the reason. --python is the interpreter that
 has them: `pip install -r scripts/newton.txt` brings MuJoCo, MuJoCo Warp and Newton, scripts/mjlab.txt mjlab."""
 import argparse
 import csv
+import functools
 import hashlib
 import json
 import math
@@ -37,7 +38,8 @@ GPU_KEYS = ("name", "driver_version", "memory.total", "clocks.max.sm", "clocks.m
 GPU_CLOCKS = ("clocks.sm", "clocks.mem", "power.draw", "temperature.gpu")
 STEPS_5MS = "--task.physics_dt=0.005"
 QUICK = ["train", "--config", "configs/quick.ini", "--train.device=cuda", "--ppo.steps=24", "--ppo.optimizer=adam"]
-NANOG1 = "not on PyPI; its own page says 1.28 M trained policy steps/s and 58.9 s to a walk on an H100"
+NANOG1 = "its engine is a fork of PufferLib in no registry, which its scripts build on Modal; its page says 1.28 M samples/s and 58.9 s to a " \
+         "walk on an RTX PRO 6000"
 
 
 def fail(text):
@@ -48,7 +50,8 @@ def fail(text):
 # ---- what is measured ----
 
 class Command:
-    """words: MILD, PYTHON and FILE stand for the program, the peers' interpreter and the file for its rows. read: (folder, file, seconds)
+    """words: MILD, PYTHON, PLUGIN and FILE stand for the program, the peers' interpreter, the plugin beside the program and the file for its
+    rows. read: (folder, file, seconds)
     -> [(case, value, unit)]. modules: what the interpreter must have."""
 
     def __init__(self, name, who, words, read=None, gpu=False, modules=(), before="", rounds=0):
@@ -97,9 +100,12 @@ def commands():
     walk = 'begin=$(date +%s.%N); "$0" train --config configs/quick.ini --out "$1/run" --train.device=cuda && ' \
            'date +%s.%N | awk -v b="$begin" \'{ print $1 - b }\' >"$1/seconds.txt" && ' \
            '"$0" eval --policy "$1/run/policy.safetensors" --config configs/quick.ini --ground rigid,foam45,sand_loose --speed 0.6 --json "$2"'
+    plugin = ["PYTHON", "scripts/plugin_walk.py", "sa01", "--ground", "sand_loose", "--step", "0.0025", "--integrator", "Euler", "--speed", "0.6",
+              "--time", "--plugin", "PLUGIN", "--json", "FILE"]
     peer = ["PYTHON", "scripts/mjwarp.py", "robots/sa01", "--dt", "0.005", "--json", "FILE"]
     found = [
         bench("step", "step"), bench("walk", "walk"),
+        Command("plugin", "MuJoCo with the plugin", plugin, modules=("mujoco", "numpy")),
         Command("mujoco", "MuJoCo", [*peer, "--processor", "--worlds", "512"], modules=("mujoco", "numpy")),
         bench("ground", "ground"), bench("elements", "elements"), bench("batch", "batch"),
         bench("robots", "robots", "--train.envs=64", STEPS_5MS), bench("train", "train", "memory", rounds=1),
@@ -129,6 +135,8 @@ RATIOS = {
     "a step standing on sand over MuJoCo's own on a rigid floor": ("step/newton", "step/engine_rigid", 1),
     **{f"a step walking on {ground} over MuJoCo's own on a rigid floor": (f"walk/{ground}_newton", f"walk/{ground}_engine_rigid", 1)
        for ground in ("sand_loose", "foam45", "grass")},
+    "a step of MuJoCo with the plugin walking on sand_loose over ours": ("plugin/sand_loose", "walk/sand_loose_newton_tight", 1),  # both to 1e-9
+    "a step of MuJoCo with the plugin walking on sand_loose over MuJoCo's own on a rigid floor": ("plugin/sand_loose", "plugin/rigid", 1),
     **{f"physics steps/s of {n} walking robots on soft ground over MuJoCo Warp's on a rigid floor":
        (f"robots_{n}/walking_policy_steps_per_s", f"mjwarp_{n}/rigid_5ms_{n}", 2) for n in WORLDS},
 }
@@ -145,7 +153,7 @@ BARS = {
 }
 # Rows of the history, and whether more is better. Ratios are in it too.
 KEPT = {
-    "step/newton": False, "walk/sand_loose_newton": False, "walk/sand_loose_iterations": False, "ground/newton_stick_advance": False,
+    "step/newton": False, "walk/sand_loose_newton": False, "plugin/sand_loose": False, "walk/sand_loose_iterations": False, "ground/newton_stick_advance": False,
     "elements/stick_154": False, "elements/stick_2000": False, "train/policy_steps_per_s": True, "train/total": False,
     "batch_cuda/advance_16384": True, "batch_cuda/advance_65536": True, "robots_16384/walking_policy_steps_per_s": True,
     "robots_16384/memory_per_robot": False, "train_16384/policy_steps_per_s": True, "walk_from_nothing/seconds": False,
@@ -224,11 +232,22 @@ def versions(mild, python):
     return found
 
 
-def missing_of(command, python, gpus):
+@functools.cache
+def imports(python, module):
+    return output_of(python, "-c", f"import {module}; print(1)").endswith("1")
+
+
+def plugin_of(mild):
+    return pathlib.Path(mild).parent / "mujoco_plugin/libmild_plugin.so"
+
+
+def missing_of(command, given, gpus):
     """Why it cannot run here, or None."""
-    absent = [m for m in command.modules if not output_of(python, "-c", f"import {m}; print(1)").endswith("1")]
+    absent = [module for module in command.modules if not imports(given.python, module)]
     if absent:
-        return f"{', '.join(absent)} not installed for {pathlib.Path(python).name}"
+        return f"{', '.join(absent)} not installed for {pathlib.Path(given.python).name}"
+    if "PLUGIN" in command.words and not plugin_of(given.mild).is_file():
+        return f"no mujoco_plugin/{plugin_of('').name} beside the program"
     return "no NVIDIA GPU" if command.gpu and not gpus else None
 
 
@@ -247,7 +266,7 @@ def raw_files(folder):
 def play(command, folder, given):
     """Runs it once. {seconds, exit, clocks, files} and what it said last."""
     folder.mkdir(parents=True, exist_ok=True)
-    stand = {"MILD": given.mild, "PYTHON": given.python, "FILE": str(folder / "rows.json"), "FOLDER": str(folder)}
+    stand = {"MILD": given.mild, "PYTHON": given.python, "PLUGIN": str(plugin_of(given.mild)), "FILE": str(folder / "rows.json"), "FOLDER": str(folder)}
     words = [stand.get(word, word.replace("FOLDER/", f"{folder}/")) for word in command.words]
     clocks, begin = Clocks(), time.time()
     clocks.start()
@@ -309,6 +328,13 @@ def bars_of(rows, ratios):
 
 
 def measure(given):
+    if not given.out:
+        fail("run: which folder? For example `mild bench record out/record`")
+    if given.rounds < 1:
+        fail(f"--rounds {given.rounds}: at least 1")
+    given.mild = os.path.abspath(given.mild)
+    if "/" in given.python:
+        given.python = os.path.abspath(given.python)
     out, chosen = given.out.resolve(), [c for c in commands() if not given.only or c.name in given.only.split(",")]
     unknown = set(given.only.split(",") if given.only else ()) - {c.name for c in commands()}
     if unknown:
@@ -321,7 +347,7 @@ def measure(given):
              "only": [c.name for c in chosen], "missing": [], "runs": []}
     ready = []
     for command in chosen:
-        why = missing_of(command, given.python, whole["machine"]["gpus"])
+        why = missing_of(command, given, whole["machine"]["gpus"])
         whole["missing"] += [{"name": command.name, "by": command.who, "why": why}] if why else []
         ready += [] if why else [command]
     whole["missing"].append({"name": "nanog1", "by": "nanoG1", "why": NANOG1})
@@ -373,7 +399,7 @@ def page(whole):
             "## Rows\n", table(["row", "by", "median", "unit", "least", "most", "rounds"],
                                [[r["id"], r["by"], number(r["value"]), r["unit"], number(min(r["rounds"].values())),
                                  number(max(r["rounds"].values())), len(r["rounds"])] for r in whole["rows"]]),
-            "## Commands\n\nIn this order. MILD is `build/mild`, PYTHON the interpreter of the peers. Clocks: least, median and largest reading.\n",
+            "## Commands\n\nIn this order. MILD is `build/mild`, PYTHON the interpreter of the peers, PLUGIN the plugin beside MILD. Clocks: least, median and largest reading.\n",
             table(["round", "name", "s", "clocks", "command"],
                   [[r["round"], r["name"], f"{r['seconds']:.1f}", spread(r), f"`{r['command']}`"] for r in whole["runs"]]),
             "## Versions\n", table(["", ""], list(whole["versions"].items()))]
@@ -449,8 +475,11 @@ def add(given):
             "record": digest(given.out / "record.json")[:16], "values": {k: float(f"{v:.5g}") for k, v in values.items()}}
     if any(known["record"] == line["record"] for known in history_lines(given.file)):
         fail(f"{given.file} has this record")
-    with open(given.file, "a", encoding="utf-8") as file:
-        file.write(json.dumps(line) + "\n")
+    try:
+        with open(given.file, "a", encoding="utf-8") as file:
+            file.write(json.dumps(line) + "\n")
+    except OSError as error:
+        fail(f"{given.file}: {error.strerror}; --file names another")
     print(f"{given.file}: {version}, {len(values)} numbers")
     return 0
 
@@ -458,10 +487,16 @@ def add(given):
 def history_lines(path):
     if not path.is_file():
         return []
-    try:
-        return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line]
-    except ValueError as error:
-        return fail(f"{path}: {error}")
+    found = []
+    for n, text in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        try:
+            line = json.loads(text)
+            if not {"machine", "version", "record", "values"} <= set(line):
+                raise ValueError
+        except (ValueError, TypeError):
+            fail(f"{path}, line {n}: no record of `mild bench record add`; take the line out")
+        found.append(line)
+    return found
 
 
 def more_is_better(name):
@@ -488,7 +523,7 @@ def slower(name, values):
 def history(given):
     found, late = series(history_lines(given.file)), 0
     if not found:
-        fail(f"{given.file} has no record; scripts/record.py add OUT")
+        fail(f"{given.file} has no record; `mild bench record add OUT` adds one")
     for box, numbers in found.items():
         rows = []
         for name, points in numbers.items():
@@ -527,10 +562,14 @@ def draw(found, path):
     print(path)
 
 
+class Parser(argparse.ArgumentParser):
+    def error(self, message):
+        fail(f"{message}; --help lists all")
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.set_defaults(work=None)
-    words = parser.add_subparsers(metavar="run | check | add | history")
+    parser = Parser(prog="mild bench record", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words = parser.add_subparsers(metavar="[run] | check | add | history")
     run = words.add_parser("run")
     run.add_argument("out", type=pathlib.Path, nargs="?")
     run.add_argument("--rounds", type=int, default=3)
@@ -550,17 +589,13 @@ def main():
     past.add_argument("--slow", type=float, default=SLOW, help=f"share of a slow-down that ends with exit code 1 (default {SLOW})")
     past.add_argument("--picture", type=pathlib.Path)
     past.set_defaults(work=history)
-    given = parser.parse_args()
-    if given.work is None:
-        parser.print_help()
-        sys.exit(2)
+    line = sys.argv[1:]
+    given = parser.parse_args(line if line[:1] and line[0] in (*words.choices, "-h", "--help") else ["run", *line])
     if given.work is measure and given.list:
         gpus = machine()["gpus"]
         for command in commands():
-            print(f"{command.name:28} {command.who:14} {missing_of(command, given.python, gpus) or 'ready'}")
+            print(f"{command.name:28} {command.who:14} {missing_of(command, given, gpus) or 'ready'}")
         sys.exit(0)
-    if given.work is measure and not given.out:
-        parser.error("run: which folder?")
     sys.exit(given.work(given))
 
 

@@ -1,10 +1,10 @@
-"""The command `mild`, and `python -m mild`: the program of this package. `mild trial` and
-`mild judge` are the package's own (mild.trials, mild.judge)."""
+"""The command `mild`, and `python -m mild`: the program of this package. `mild trial`, `mild judge` and
+`mild bench record` are the package's own (mild.trials, mild.repository)."""
 import importlib
 import os
 import sys
 
-from . import _processor
+from . import _processor, repository
 
 
 def environment():
@@ -20,8 +20,8 @@ def main(arguments=None):
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     if arguments[:1] == ["trial"]:
         return importlib.import_module("mild.trials").main(arguments[1:])
-    if arguments[:1] == ["judge"]:
-        return importlib.import_module("mild.judge").main(arguments[1:])
+    if repository.command_of(arguments):
+        return repository.main(arguments)
     program = _processor.program()
     if program is None:
         print("mild: this installation has no program, because libraries of it were missing where it was built; a wheel has it "

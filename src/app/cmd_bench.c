@@ -5,6 +5,7 @@
 #include "app/build.h"
 #include "app/cli.h"
 #include "app/commands.h"
+#include "app/package.h"
 #include "app/report.h"
 #include "app/robots.h"
 #include "base/text.h"
@@ -37,7 +38,12 @@ static const struct {
      "the learner alone: actions of a rollout and update, on train.device, from random numbers"},
     {"train", bench_train, "policy steps per second in training, and how the time is spent"},
 };
-enum { BENCHES = sizeof benches / sizeof *benches };
+enum { BENCHES = sizeof benches / sizeof *benches, WORDS };
+
+/* No bench, but a script that runs them and the peers; it has the rest of the line. */
+static const CliWord record = {
+    "record", "first word: benches and peers in turns, as JSON and a page, and their history "
+              "(docs/record.md; mild bench record --help)"};
 
 static MildStatus save_json(const BenchReport *report, const char *path, MildError *error) {
     char machine[256];
@@ -74,12 +80,16 @@ static void print_rows(const BenchReport *report, int first, FILE *file) {
 
 /* Checks all names before the first bench runs. */
 static int check_names(const CliArgs *args) {
-    const char *names[BENCHES];
+    const char *names[WORDS];
     for (int i = 0; i < BENCHES; i++) {
         names[i] = benches[i].name;
     }
+    names[BENCHES] = record.name;
     for (int a = 0; a < args->positional_count; a++) {
-        const char *nearest = text_nearest(args->positional[a], names, BENCHES);
+        const char *nearest = text_nearest(args->positional[a], names, WORDS);
+        if (strcmp(args->positional[a], record.name) == 0) {
+            return cli_fail_text("bench", "record must be the first word: mild bench record OUT");
+        }
         if (strcmp(nearest, args->positional[a]) != 0) {
             return cli_fail_text("bench", "unknown bench '%s'; nearest is '%s'",
                                  args->positional[a], nearest);
@@ -126,6 +136,9 @@ static MildStatus run_benches(const CliArgs *args, const char *robot, FILE *file
 }
 
 int cmd_bench(int argc, char **argv) {
+    if (argc > 1 && strcmp(argv[1], record.name) == 0) {
+        return package_run(argv);
+    }
     const char *json = NULL, *robot = NULL;
     const CliOption options[] = {
         {"json", CLI_OUTPUT, &json, 0, 0, "FILE",
@@ -134,23 +147,25 @@ int cmd_bench(int argc, char **argv) {
         {"robot", CLI_TEXT, &robot, 0, 0, "NAME|DIR",
          ROBOTS_HELP "; walk and solver need sa01, the shipped policy's (default sa01)"},
     };
-    CliWord words[BENCHES];
+    CliWord words[WORDS];
     for (int i = 0; i < BENCHES; i++) {
         words[i] = (CliWord){benches[i].name, benches[i].help};
     }
+    words[BENCHES] = record;
     const CliCommand command = {
         .name = "bench",
         .usage = "[NAME ...] [--json FILE]",
         .summary = "Measures speed and memory on this machine. Without a name it runs every bench, "
-                   "which takes a few minutes.",
+                   "which takes a few minutes, but not record.",
         .words_title = "benches",
         .words = words,
-        .word_count = BENCHES,
+        .word_count = WORDS,
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .overrides = "any key of configs/default.ini, e.g. --train.envs=256 --train.threads=1 "
                      "--task.physics_dt=0.001",
-        .examples = "  mild bench step\n  mild bench train memory --json bench.json\n",
+        .examples = "  mild bench step\n  mild bench train memory --json bench.json\n"
+                    "  mild bench record out/record\n",
         .positional_max = BENCHES,
     };
     CliArgs args;

@@ -53,6 +53,7 @@ static void become_python(char *said, char **arguments) {
     if (!words) {
         return;
     }
+    setenv("MILD", path_program(folder), 1);
     find_python(python);
     if (access(path_beside_program("python/mild/__main__.py", folder), R_OK) == 0) {
         path_beside_program("python", folder);
@@ -68,10 +69,11 @@ static void become_python(char *said, char **arguments) {
 }
 
 int package_run(char **arguments) {
+    const char *name = strcmp(arguments[0], "bench") == 0 ? "bench record" : arguments[0];
     char said[128];
     snprintf(said, sizeof said, "mild: %s is a command of the Python package: python -m mild %s",
-             arguments[0], arguments[0]);
-    if (strcmp(arguments[0], "judge") == 0) {
+             name, name);
+    if (strcmp(name, "trial") != 0) {
         become_python(said, arguments);
     }
     fprintf(stderr, "%s\n", said);

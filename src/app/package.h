@@ -1,14 +1,14 @@
-/* Commands of the Python package, which the program has not: `trial` and `judge`. */
+/* Commands of the Python package, which the program has not: `trial`, `judge`, `bench record`. */
 #ifndef MILD_PACKAGE_H
 #define MILD_PACKAGE_H
 
-/* Bool: it is one of them. */
+/* Bool: it is one of them, of a word. */
 int package_has(const char *command);
 
-/* Says in a line how a command of the package is run; `judge` becomes that run where it can, by
- * MILD_PYTHON, the Python of .venv or else the system's, with the package beside the program
- * (build/python) or an installed one. arguments: the command, its own, NULL. Returns an exit
- * code. */
+/* Says in a line how a command of the package is run; all but `trial` become that run where they
+ * can, by MILD_PYTHON, the Python of .venv or else the system's, with the package beside the
+ * program (build/python) or an installed one. The variable MILD is this program there. arguments:
+ * the command, its own, NULL. Returns an exit code. */
 int package_run(char **arguments);
 
 #endif

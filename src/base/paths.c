@@ -46,6 +46,11 @@ const char *path_given(const char *name, char path[PATH_SIZE]) {
     return *name && *name != '/' && !exists(name) && exists(path_data(name, path)) ? path : name;
 }
 
+const char *path_program(char path[PATH_SIZE]) {
+    executable_home(0, path);
+    return path;
+}
+
 const char *path_beside_program(const char *name, char path[PATH_SIZE]) {
     char folder[PATH_SIZE];
     executable_home(1, folder);

@@ -18,6 +18,9 @@ const char *path_data(const char *relative, char path[PATH_SIZE]);
  * name, such as "configs/quick.ini" in any folder. */
 const char *path_given(const char *name, char path[PATH_SIZE]);
 
+/* The executable; empty when unknown. */
+const char *path_program(char path[PATH_SIZE]);
+
 /* A file in the folder that holds the executable; empty when unknown or too long. */
 const char *path_beside_program(const char *name, char path[PATH_SIZE]);
 

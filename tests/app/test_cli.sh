@@ -272,6 +272,8 @@ bad "--out" "$mild" train --config complete.ini # the printed config is read bac
 
 # bench
 bad "stepp step" "$mild" bench stepp
+bad "recor record" "$mild" bench recor
+bad "record first mild bench record OUT" "$mild" bench step record
 short || expect 0 'newton_stick' "$mild" bench ground --json bench.json
 short || grep -q '"case":.*"newton_stick"' bench.json || fail "bench.json"
 # in float, along a walk, forces are those of the step in double

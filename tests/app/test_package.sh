@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# Commands of the Python package: `mild judge` becomes the Python that MILD_PYTHON names, with the arguments as they are, and says
-# how it is run where there is none. Usage: test_package.sh PATH_TO_MILD
-source "$(dirname "$0")/../kit.sh" "$1"
+# Commands of the Python package: `mild judge` and `mild bench record` become the Python that MILD_PYTHON names, with the arguments as
+# they are, and say how they are run where there is none. Usage: test_package.sh PATH_TO_MILD
+root=$(cd "$(dirname "$0")/../.." && pwd)
+source "$root/tests/kit.sh" "$1"
 
 # a Python that says what it got, one argument a line, and has an exit code of its own
-printf '#!/bin/sh\nprintf "<%%s>\\n" "$@" >got.txt\nexit 7\n' >python
+printf '#!/bin/sh\nprintf "<%%s>\\n" "$@" >got.txt\necho "$MILD" >program.txt\nexit 7\n' >python
 chmod +x python
 MILD_PYTHON=$work/python "$mild" judge --out 'a b' '$(touch shell)' "'" '' -- '*'
 [ $? = 7 ] || fail "not the exit code of Python"
@@ -12,10 +13,15 @@ MILD_PYTHON=$work/python "$mild" judge --out 'a b' '$(touch shell)' "'" '' -- '*
 grep -qx '<judge>' got.txt || fail "no command: $(cat got.txt)"
 [ ! -e shell ] || fail "a shell read the arguments"
 [ "$(head -n 1 got.txt)" = '<-c>' ] || fail "not by -c: $(cat got.txt)"
+MILD=other MILD_PYTHON=$work/python "$mild" bench record 'a b' --list
+[ $? = 7 ] || fail "bench record: not the exit code of Python"
+[ "$(tail -n 4 got.txt)" = "$(printf '<%s>\n' bench record 'a b' --list)" ] || fail "arguments of bench record: $(cat got.txt)"
+[ "$(cat program.txt)" = "$mild" ] || fail "bench record measures $(cat program.txt)"
 
 # no Python, or none with the package: one line, as for the command that is not started
 for none in "$work/none" "$work" /dev/null; do
     bad "python -m mild judge" env "MILD_PYTHON=$none" "$mild" judge --out out
+    bad "python -m mild bench record" env "MILD_PYTHON=$none" "$mild" bench record out
 done
 bad "python -m mild trial" env MILD_PYTHON=$work/python "$mild" trial robot.xml walk.onnx
 cp "$mild" alone # without the package beside it
@@ -31,4 +37,20 @@ echo 'open("ran", "w")' | tee mild/__main__.py numpy.py >json.py
 bad "python -m mild judge" env MILD_PYTHON=$work/bare ./alone judge
 MILD_PYTHON=$work/bare "$mild" judge --help >/dev/null 2>&1 # whatever it finds
 [ ! -e ran ] || fail "a file of the working directory was run"
-finish "package: judge is started with its arguments, or its line is said"
+
+# the package as installed, with no repository around it
+mkdir -p installed/mild
+touch installed/mild/__init__.py
+cp "$root"/python/mild/{__main__,_processor,repository}.py installed/mild
+cd installed
+export PYTHONDONTWRITEBYTECODE=1 MILD_HOME=
+bad "mild judge: scripts/judge.py MILD_HOME" python3 -m mild judge --out out
+bad "mild bench record: scripts/record.py MILD_HOME" python3 -m mild bench record out
+bad "this installation has no program" python3 -m mild bench step # a command of the program
+
+# and with one: the script has the rest of the line
+export MILD_HOME=$root
+expect 0 '^walk  *mild  *ready$' python3 -m mild bench record --list
+bad "record.py: --wrong --help" python3 -m mild bench record out --wrong
+bad "record.py: --rounds none" python3 -m mild bench record out --rounds none
+finish "package: judge and bench record are started with their arguments, or their line is said"

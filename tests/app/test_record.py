@@ -31,7 +31,7 @@ row() { printf '{"bench": "%s", "case": "%s", "value": %s, "unit": "us"}%s' "$na
 { printf '{"machine": "m", "version": "0.9.0", "rows": ['
 case "$name" in
 step) row newton "${NEWTON:-6}" ,; row engine_rigid 8 ;;
-walk) row sand_loose_newton 5 ,; row sand_loose_engine_rigid 10 ;;
+walk) row sand_loose_newton 5 ,; row sand_loose_newton_tight 7.5 ,; row sand_loose_engine_rigid 10 ;;
 train) row policy_steps_per_s "${RATE:-13000}" ;;
 robots) row walking_policy_steps_per_s 5000000 ,; row memory_per_robot 13000 ;;
 *) row anything 1 ;;
@@ -45,6 +45,9 @@ case "$1 $2" in
 "-c import mujoco_warp"*|"-c import mujoco;"*|"-c import warp"*|"-c import numpy"*|"-c import newton"*) echo 1; exit ;;
 "-c import importlib"*) echo mujoco 9.9.9; exit ;;
 "-c "*) exit 1 ;;
+*plugin_walk*) for last; do :; done
+    case "$*" in *--plugin*/mujoco_plugin/libmild_plugin.so*) ;; *) exit 1 ;; esac
+    echo '{"rows": [{"bench": "plugin", "case": "sand_loose", "value": 15, "unit": "us"}, {"bench": "plugin", "case": "rigid", "value": 12, "unit": "us"}]}' >"$last"; exit ;;
 *judge_mpm*) mkdir -p "$3"; echo '{"sand/disc120": {"beds": {"1": {"seconds_per_simulated_second": 9.5, "step_ms": 34}}}}' >"$3/manifest.json"; exit ;;
 esac
 while [ "$1" != --json ]; do shift; done
@@ -103,6 +106,7 @@ def fits(out):
 
 made, peers = program(work, "mild", MILD), program(work, "python", PYTHON)
 program(work, "bin/nvidia-smi", SMI)
+program(work, "mujoco_plugin/libmild_plugin.so", "")
 with_gpu = {"PATH": f"{work / 'bin'}:{os.environ['PATH']}"}
 no_gpu = {"PATH": os.environ["PATH"]}
 
@@ -120,6 +124,8 @@ assert values["walk_from_nothing/upright"]["value"] == 17 and values["walk_from_
 assert list(values["train/policy_steps_per_s"]["rounds"]) == ["1"] and values["newton_mpm/plate_seconds_per_simulated_second"]["value"] == 9.5
 ratios = {ratio["over"]: ratio["value"] for ratio in whole["ratios"]}
 assert ratios["step/newton"] == 0.75 and ratios["walk/sand_loose_newton"] == 0.5
+by_under = {ratio["under"]: ratio["value"] for ratio in whole["ratios"] if ratio["over"] == "plugin/sand_loose"}
+assert by_under == {"walk/sand_loose_newton_tight": 2, "plugin/rigid": 1.25}
 assert ratios["robots_16384/walking_policy_steps_per_s"] == 2.5  # 2 physics steps a policy step
 bars = {bar["name"]: bar["reached"] for bar in whole["bars"]}
 assert bars["train/policy_steps_per_s"] and not bars["robots_16384/memory_per_robot"] and not bars["train_16384/policy_steps_per_s"]
@@ -157,11 +163,16 @@ changed(out, without("runs", "mjwarp_16384"), "mjwarp_16384 was neither run")
 
 # ---- without a GPU, and with a bench that fails or has no number ----
 slow = work / "slow"
-run("run", slow, "--rounds", 1, "--mild", made, "--python", peers, NEWTON="8", RATE="6500", **no_gpu)
+run(slow, "--rounds", 1, "--mild", made, "--python", peers, NEWTON="8", RATE="6500", **no_gpu)
 fits(slow)
 absent = {x["name"]: x["why"] for x in read(slow)["missing"]}
 if not shutil.which("nvidia-smi"):
     assert absent["mjwarp_16384"] == "no NVIDIA GPU" and absent["train_16384"] == "no NVIDIA GPU" and "robots_16384" in absent, absent
+(work / "mujoco_plugin/libmild_plugin.so").rename(work / "plugin")
+without_plugin = work / "without_plugin"
+run(without_plugin, "--rounds", 1, "--only", "walk,plugin", "--mild", made, "--python", peers, **no_gpu)
+assert "no mujoco_plugin" in next(x["why"] for x in read(without_plugin)["missing"] if x["name"] == "plugin")
+(work / "plugin").rename(work / "mujoco_plugin/libmild_plugin.so")
 broken = work / "broken"
 run("run", broken, "--rounds", 1, "--only", "step,walk", "--mild", made, "--python", peers, code=1, BROKEN="walk", **no_gpu)
 assert {x["name"] for x in read(broken)["missing"]} == {"walk", "nanog1"} and {r["id"] for r in read(broken)["rows"]} == {"step/newton", "step/engine_rigid"}
@@ -182,6 +193,7 @@ assert [read(median)["ratios"][0][key] for key in ("value", "least", "most")] ==
 lines = work / "history.jsonl"
 fast = work / "fast"
 run("run", fast, "--rounds", 1, "--mild", made, "--python", peers, **no_gpu)
+assert not lines.exists()
 run("add", fast, "--file", lines)
 one_line("has this record", "add", fast, "--file", lines)
 assert "slow" not in run("history", "--file", lines)
@@ -201,11 +213,22 @@ one_line("nosuch", "run", work / "new", "--only", "nosuch", "--mild", made)
 one_line("nosuch", "run", work / "new", "--mild", work / "nosuch")
 one_line("no record.json", "check", work / "new")
 one_line("has no record", "history", "--file", work / "none")
-run(code=2)
+one_line("mild bench record out/record")  # no folder
+one_line("mild bench record out/record", "run")
+one_line("--rounds 0", work / "new", "--rounds", 0)
+one_line("--wrong", work / "new", "--wrong")
+one_line("No such file", "add", fast, "--file", work / "none/history.jsonl")
+for torn in ("{", "7", '{"values": {}}'):
+    (work / "torn.jsonl").write_text(lines.read_text() + torn + "\n")
+    one_line("torn.jsonl, line 3", "history", "--file", work / "torn.jsonl")
+    one_line("torn.jsonl, line 3", "add", dirty, "--dirty", "--file", work / "torn.jsonl")
+if (root / "docs/record.jsonl").exists():  # ours can be read
+    history = subprocess.run([sys.executable, record, "history"], capture_output=True, text=True, check=False)
+    assert history.returncode in (0, 1) and not history.stderr and "| step/newton |" in history.stdout, history
 
 # ---- the real program ----
 real = work / "real"
-run("run", real, "--rounds", 1, "--only", "step,walk,batch", "--mild", mild)
+run(real, "--rounds", 1, "--only", "step,walk,batch", MILD=str(mild))  # as `mild bench record` sets it
 fits(real)
 run("check", real)
 values = {row["id"]: row["value"] for row in read(real)["rows"]}

@@ -58,6 +58,7 @@ TEST(test_beside_the_program) {
     const ssize_t length = readlink("/proc/self/exe", own, sizeof own - 1);
     assert_true(length > 0);
     own[length] = '\0';
+    assert_string_equal(path_program(path), own);
     assert_string_equal(path_beside_program(strrchr(own, '/') + 1, path), own);
     memset(name, 'n', sizeof name);
     name[PATH_SIZE - 1] = '\0';

@@ -123,14 +123,9 @@ def the_truth_is_found_and_others_are_not(folder):
 
 
 def a_command(folder):
-    """`python -m mild judge` and `mild judge` from anywhere; where no repository is, one line."""
+    """`python -m mild judge` and `mild judge` from anywhere (app/package: where no repository is, one line)."""
     run = subprocess.run([sys.executable, "-m", "mild", "judge", "--records", folder / "none"], capture_output=True, text=True, cwd=folder)
     assert run.returncode == 2 and run.stderr.startswith("judge.py: ") and "manifest.json" in run.stderr, run.stderr
-    package = folder / "alone"  # as installed: nothing of the repository above it
-    package.mkdir()
-    (package / "judge.py").write_text((SOURCE / "python" / "mild" / "judge.py").read_text())
-    run = subprocess.run([sys.executable, package / "judge.py"], capture_output=True, text=True, cwd=folder)
-    assert run.returncode == 2 and run.stderr.startswith("mild judge: ") and run.stderr.count("\n") == 1, run.stderr
     run = subprocess.run([MILD, "judge", "--records", folder / "none"], capture_output=True, text=True, cwd=folder,
                          env=dict(os.environ, MILD_PYTHON=sys.executable))  # the program starts it
     assert run.returncode == 2 and run.stderr.startswith("judge.py: ") and "manifest.json" in run.stderr, run.stderr
