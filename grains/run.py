@@ -59,6 +59,7 @@ def outline(robot, section):
 
 
 DISC, SQUARE, STRIP = "disc:0.12", "rect:0.1,0.1", "rect:0.12,0.06"
+BALL60, BALL100, BALL160 = "sphere:0.03", "sphere:0.05", "sphere:0.08"
 SA01, G1, GO1 = outline("sa01", "foot.left"), outline("g1", "foot.left"), "sphere:0.023"
 
 
@@ -110,6 +111,10 @@ BLOCKS = [
     ("deep", [deep("square100-load120", SQUARE, 0.12), deep("square100-load40", SQUARE, 0.04),
               deep("square100-load20-fast", SQUARE, 0.02, "load:0.05@0.5"), deep("disc120-load80", DISC, 0.08),
               deep("strip-load80", STRIP, 0.08)]),
+    ("sand", [f"ball100 {BALL100} 0 {press(0.04)}", f"ball100-load15 {BALL100} 0 {press(0.015)} {drag(0.03, 'load')}"]),
+    ("slick", [f"ball100 {BALL100} 0 {press(0.04)}"]),
+    ("wide", [f"ball160 {BALL160} 0 {press(0.03)}"]),
+    ("fine", [f"ball60 {BALL60} 0 {press(0.03)}"]),
     ("deep", [deep("square100-drag40", SQUARE, 0.04, "drag:0.03@0.05"), deep("strip-drag40", STRIP, 0.04, "drag:0.03@0.05"),
               deep("strip-drag80", STRIP, 0.08, "drag:0.03@0.05")]),
 ]
