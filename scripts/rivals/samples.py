@@ -95,11 +95,9 @@ def words_of(given, task, place, device):
 
 
 def train(given, results, task, device):
-    """Trains, and again without CUDA graphs where they fail."""
-    script, place = ARMS[task[0]][0], results.place(task)
-    for again in ([], ["--eager"] if script == OFF and device != "cpu" else None):
-        if again is None:
-            break
+    """Trains, and again without CUDA graphs where they fail; then all later ones without."""
+    place, graphs = results.place(task), ARMS[task[0]][0] == OFF and device != "cpu"
+    for again in [[], ["--eager"]][given.eager and graphs : 1 + graphs]:
         shutil.rmtree(place, ignore_errors=True)  # what a killed one left
         place.mkdir(parents=True)
         with open(place / "output", "w", encoding="utf-8") as file:
@@ -110,6 +108,7 @@ def train(given, results, task, device):
             except subprocess.TimeoutExpired:
                 code = "too slow"
         if code == 0:
+            given.eager = given.eager or bool(again)
             results.add({"done": "trained", "task": task, "saved": json.loads((place / "saved.json").read_text()), "device": device, "jobs": given.jobs,
                          "eager": bool(again)})
             return
@@ -235,7 +234,7 @@ def parse(words):
     parser.add_argument("--report", action="store_true", help="train and judge nothing")
     own, more = (words[: words.index("--")], words[words.index("--") + 1 :]) if "--" in words else (words, [])
     given = parser.parse_args(own)
-    given.options = more  # after --: of every training
+    given.eager, given.options = False, more  # after --: of every training
     given.only = given.only.split(",") if given.only else list(ARMS)
     unknown = [name for name in given.only if name not in ARMS]
     if unknown:
