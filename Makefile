@@ -169,6 +169,7 @@ wheels: setup
 python-check: wheel
 	@$(call with_wheel,learners)
 	@build/learners-venv/bin/python tests/python/check_learners.py
+	@build/learners-venv/bin/python tests/envs/test_learners.py .
 	@build/learners-venv/bin/python tests/python/check_cuda.py
 
 mjlab-check: wheel

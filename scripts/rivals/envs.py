@@ -36,16 +36,18 @@ class Statistics(ctypes.Structure):
 
 
 def load_library(path=None):
-    """path: of libmild_envs.so; else that of the build, or of a bundle (scripts/bundle.sh)."""
+    """path: of libmild_envs.so; else $MILD_ENVS, that of the build, or of a bundle (scripts/bundle.sh)."""
     os.environ.setdefault("MILD_HOME", str(ROOT))
     built = ROOT / "build" / "libmild_envs.so"
-    library = ctypes.CDLL(str(path or (built if built.exists() else ROOT / "lib" / "libmild_envs.so")))
+    library = ctypes.CDLL(str(path or os.environ.get("MILD_ENVS") or (built if built.exists() else ROOT / "lib" / "libmild_envs.so")))
     library.mild_envs_open.restype = c_void_p
     library.mild_envs_open.argtypes = [c_char_p, POINTER(c_char_p), c_int, POINTER(Error)]
     library.mild_envs_close.argtypes = [c_void_p]
     library.mild_envs_shape.restype = Shape
     library.mild_envs_shape.argtypes = [c_void_p]
     library.mild_envs_reward_name.restype = c_char_p
+    for text in (library.mild_envs_robot, library.mild_envs_task):
+        text.restype, text.argtypes = c_char_p, [c_void_p]
     library.mild_envs_mirror.argtypes = [c_void_p, POINTER(c_int), POINTER(c_float), POINTER(c_int), POINTER(c_float)]
     library.mild_envs_reset.argtypes = [c_void_p, POINTER(View), c_void_p, POINTER(Error)]
     library.mild_envs_step.argtypes = [c_void_p, POINTER(Step), c_void_p, POINTER(Error)]
