@@ -42,9 +42,8 @@ static double face_down(const FootScratch *foot, int e) {
     return foot->share[e] / foot->area[e];
 }
 
-/* [m] The greatest depth of a slot so far, which its ground remembers. */
-static double slot_deepest(const Slots *s, int l) {
-    return real_max(s->depth_max[l], s->depth[l]);
+static double slot_rim_depth(const Slots *s, int l) {
+    return rim_depth(s->depth[l], s->depth_max[l]);
 }
 
 /* What the rim leaves of the load of each slot of a surface, into `lean`. */
@@ -54,14 +53,14 @@ static void faces_lean(const FootScratch *foot) {
     for (int i = 0; i < foot->active; i++) {
         const int e = foot->element[i];
         rim_add(sums, x[e] - foot->origin[0], y[e] - foot->origin[1],
-                slot_deepest(slot_block(foot, i), i % SLOT_LANES), face_down(foot, e),
+                slot_rim_depth(slot_block(foot, i), i % SLOT_LANES), face_down(foot, e),
                 foot->area[e] * foot->pitch * foot->pitch);
     }
     const Rim rim = rim_of(sums);
     for (int i = 0; i < foot_end(foot); i++) {
         Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;
-        const double u = slot_deepest(s, l);
+        const double u = slot_rim_depth(s, l);
         s->lean[l] = 1.0;
         if (i < foot->active && s->projects[l] > 0.0 && u > 0.0) {
             const int e = foot->element[i];

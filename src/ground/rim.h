@@ -26,6 +26,7 @@
 
 #define RIM_STEEP REAL(0.5)      /* [-] least cosine of an element that is no wall */
 #define RIM_FLAT REAL(2e-4)      /* [m] H of a surface that counts as half round */
+#define RIM_HAIR REAL(2e-5)      /* [m] rounds off the root of H^2, which is a difference */
 #define RIM_RIDGE REAL(1e-4)     /* [-] of an element's own moment: a row has no slope across */
 #define RIM_MEAN REAL(5.0 / 9.0) /* [-] v/H where e is b/3, the mean under a disc */
 #define RIM_RADIUS REAL(0.0110016969) /* [m] of the disc of an element of MATERIAL_PITCH */
@@ -56,8 +57,13 @@ typedef struct {
     Real breadth;  /* [m] b */
 } Rim;
 
-/* Adds an element at (x, y) [m] at the depth u [m]. down: [-] downward part of its outward normal.
- * area: [m^2] of the element. */
+/* [m] The depth u that counts: the greatest that the element's ground remembers; 0 in the air. */
+MILD_HD Real rim_depth(Real depth, Real deepest) {
+    return depth > 0 ? real_max(depth, deepest) : 0;
+}
+
+/* Adds an element at (x, y) [m], with u of rim_depth [m]. down: [-] downward part of its outward
+ * normal. area: [m^2] of the element. */
 MILD_HD void rim_add(Real *sums, Real x, Real y, Real u, Real down, Real area) {
     const Real w = u > 0 && down >= RIM_STEEP ? down * area : 0;
     sums[RIM_W] += w;
@@ -89,7 +95,8 @@ MILD_HD Rim rim_of(const Real *sums) {
     const Real inverse = 1 / real_max(a * b - xy * xy, REAL(1e-20));
     const Real gx = (b * xu - xy * yu) * inverse;
     const Real gy = (a * yu - xy * xu) * inverse;
-    const Real height = REAL_SQRT(12 * real_max(uu - gx * xu - gy * yu, 0));
+    const Real rest = 12 * real_max(uu - gx * xu - gy * yu, 0);
+    const Real height = REAL_SQRT(rest + RIM_HAIR * RIM_HAIR) - RIM_HAIR;
     const Rim rim = {x, y, u - height / 2, {gx, gy}, height, 2 * REAL_SQRT(real_max(least, 0))};
     return rim;
 }

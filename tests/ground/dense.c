@@ -253,6 +253,8 @@ typedef struct {
                                      over those of a square of the raster; else 1 */
     int faces;                    /* bool: a surface */
     double heap[2];               /* [-] of the element, see dense_law.h */
+    double plane[3], round, half; /* of a surface, dense_rim: least squares through its depths less
+                                     half of what is round, [m] and [-]; that height; half breadth */
 } Find;
 
 /* Depth under the ground as it is here or, if that is less, under the plane that the last step took
@@ -344,6 +346,24 @@ static void element_shear(double dt, DenseElement *e, const MildMaterial *m, dou
     e->radius += e->u0 > 0.0 ? dt * share * m->cohesion * area : 0.0;
 }
 
+/* What the rim of a surface leaves of the load of an element at the depth u: the pressure that the
+ * rim's depth and the distance to it give, over its own. */
+static double rim_share(const DenseElement *e, const Find *find) {
+    const DenseLaw *law = &e->law;
+    const double radius = 0.0195 / sqrt(acos(-1.0)), u = fmax(e->u0, e->seen);
+    if (!(e->u0 > 0.0) || !(law->k_pen > law->kappa)) {
+        return 1.0;
+    }
+    double rim = find->plane[0] + find->plane[1] * find->p[0] + find->plane[2] * find->p[1];
+    double high = (u - rim + 5.0 / 9.0 * 2e-4) / (find->round + 2e-4);
+    double edge = find->half * (1.0 - sqrt(1.0 - fmin(fmax(high, 0.0), 1.0)));
+    double bears = law->kappa * fmax(rim, 0.0) +
+                   (law->k_pen - law->kappa) * law->full * edge / (radius * find->heap[1]);
+    double own = law->kappa * u + (law->k_pen - law->kappa) * cone_share(law, u);
+    double left = -find->normal[2] >= 0.5 ? bears / own : 0.0;
+    return left + (1.0 - left) * law->recovery;
+}
+
 /* The share of virgin ground that it carries: the line keeps its slope and ends deeper. up: normal
  * of the sole's upper face. */
 static void dense_share(double dt, DenseElement *e, const Find *find) {
@@ -351,7 +371,10 @@ static void dense_share(double dt, DenseElement *e, const Find *find) {
     const double *g = find->slope, a = e->deep;
     double level = (-find->normal[2] + g[0] * find->normal[0] + g[1] * find->normal[1]) /
                    sqrt(1.0 + g[0] * g[0] + g[1] * g[1]);
-    double c = find->faces ? 1.0 : 1.0 - law->projected * (1.0 - fmin(fmax(level, 0.02), 1.0)),
+    if (find->faces) {
+        level = rim_share(e, find);
+    }
+    double c = 1.0 - law->projected * (1.0 - fmin(fmax(level, 0.02), 1.0)),
            q = fmin(1.0 - find->memory.worn[find->i], c), soil = virgin_force(law, a),
            bed = law->bed_stiffness * fmax(a - law->bed, 0.0);
     if (law->grip > 0.0) {
@@ -428,6 +451,7 @@ static void dense_element(Dense *d, const Find *find) {
     e->w0 = fmax(now[3], 0.0);
     e->m0 = memory->middle[i] > 0.0 ? memory->middle[i] : e->u0 - 0.5 * d->dt * now[3];
     e->front = e->deep = fmax(fmax(e->m0, deepest), 0.0);
+    e->seen = deepest;
     e->reach = fmax(2.0 * (e->front - e->u0) / d->dt, 0.0);
     e->w_a = fmax(memory->front_speed[i], e->reach);
     e->mass = fmax(e->law.mass_rate, 0.0) * moved(&e->law, e->deep);
@@ -450,6 +474,94 @@ static void dense_element(Dense *d, const Find *find) {
     element_hold(d->dt, e, memory->held_x[i], memory->held_y[i], memory->held_stiffness[i]);
 }
 
+/* An element in the ground, for dense_rim. */
+typedef struct {
+    double x, y, u, weight, own;
+} RimPoint;
+
+/* The plane of least squares through the depths, about their middle; the residual's standard
+ * deviation is H/sqrt(12). The breadth is from the smaller principal moment of the points and their
+ * discs. */
+static void dense_rim(Find *find, const RimPoint *at, int count) {
+    double w = 0, x = 0, y = 0, u = 0, m[5] = {0}, own = 0, rest = 0;
+    for (int i = 0; i < count; i++) {
+        w += at[i].weight;
+        x += at[i].weight * at[i].x;
+        y += at[i].weight * at[i].y;
+        u += at[i].weight * at[i].u;
+        own += at[i].weight * at[i].own;
+    }
+    memset(find->plane, 0, sizeof find->plane);
+    find->round = find->half = 0.0;
+    if (count == 0) {
+        return;
+    }
+    x /= w, y /= w, u /= w, own /= w;
+    for (int i = 0; i < count; i++) {
+        double dx = at[i].x - x, dy = at[i].y - y, du = at[i].u - u, part = at[i].weight / w;
+        m[0] += part * dx * dx;
+        m[1] += part * dx * dy;
+        m[2] += part * dy * dy;
+        m[3] += part * dx * du;
+        m[4] += part * dy * du;
+    }
+    double a = m[0] + 1e-4 * own, b = m[2] + 1e-4 * own, det = fmax(a * b - m[1] * m[1], 1e-20);
+    double gx = (b * m[3] - m[1] * m[4]) / det, gy = (a * m[4] - m[1] * m[3]) / det;
+    for (int i = 0; i < count; i++) {
+        double du = at[i].u - u, flat = gx * (at[i].x - x) + gy * (at[i].y - y);
+        rest += at[i].weight / w * du * (du - flat);
+    }
+    find->round = sqrt(12.0 * fmax(rest, 0.0) + 4e-10) - 2e-5;
+    find->plane[1] = gx;
+    find->plane[2] = gy;
+    find->plane[0] = u - 0.5 * find->round - gx * x - gy * y;
+    double angle = 0.5 * atan2(2.0 * m[1], m[0] - m[2]), c = cos(angle), s = sin(angle);
+    double across = s * s * m[0] - 2.0 * s * c * m[1] + c * c * m[2]; /* the smaller one */
+    find->half = 2.0 * sqrt(fmax(across + own, 0.0));
+}
+
+/* The place, the shape and the ground of element find->i; false: it faces up. */
+static int find_element(Find *find, const MildSole *sole) {
+    const double *R = find->kit->input.rotation[find->f];
+    double x = mild_sole_x(sole)[find->i], y = mild_sole_y(sole)[find->i], z = mild_sole_z(sole);
+    if (find->faces) {
+        z = mild_sole_surface_z(sole)[find->i];
+        find->area = mild_sole_surface_area(sole)[find->i] / (find->pitch * find->pitch);
+        for (int k = 0; k < 3; k++) {
+            find->normal[k] = 0.0;
+            for (int j = 0; j < 3; j++) {
+                find->normal[k] += R[3 * k + j] * mild_sole_surface_normal(sole, j)[find->i];
+            }
+        }
+        find->share = find->memory.material[find->i] >= 0 ? find->memory.share[find->i]
+                                                          : -find->normal[2] * find->area;
+        if (!(-find->normal[2] > cos(80.0 / 180.0 * acos(-1.0)))) {
+            return 0;
+        }
+    }
+    const SoleHeap heap = sole_heap(sole, find->i);
+    find->heap[0] = heap.begin;
+    find->heap[1] = heap.width;
+    for (int k = 0; k < 3; k++) {
+        find->p[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * z;
+        find->at[k] = find->kit->input.position[find->f][k] + find->p[k];
+    }
+    mild_terrain_slope_at(&find->kit->terrain, find->at[0], find->at[1], find->slope);
+    return 1;
+}
+
+/* [m] The greatest depth that the ground of find->i remembers. */
+static double find_seen(const Find *find, double dt) {
+    double now[4], deepest;
+    int directed;
+    DenseLaw law;
+    find_law(find, &law, &directed);
+    deepest = find_deepest(find, law.recovery);
+    point_velocity(find, find->kit->input.velocity[find->f], now);
+    find_share(find, &law, directed, find_depth(find) - 0.5 * dt * now[3], &deepest);
+    return deepest;
+}
+
 static void dense_foot(Dense *d, const Kit *kit, int f) {
     const MildSole *sole = kit->soles[f];
     const double *R = kit->input.rotation[f], side = R[8] > 0.0 ? -1.0 : 1.0;
@@ -462,32 +574,25 @@ static void dense_foot(Dense *d, const Kit *kit, int f) {
                  .share = 1.0,
                  .area = 1.0,
                  .faces = mild_sole_surface_z(sole) != NULL};
-    for (find.i = 0; find.i < mild_sole_elements(sole); find.i++) {
-        double x = mild_sole_x(sole)[find.i], y = mild_sole_y(sole)[find.i], z = mild_sole_z(sole);
-        if (find.faces) {
-            z = mild_sole_surface_z(sole)[find.i];
-            find.area = mild_sole_surface_area(sole)[find.i] / (find.pitch * find.pitch);
-            for (int k = 0; k < 3; k++) {
-                find.normal[k] = 0.0;
-                for (int j = 0; j < 3; j++) {
-                    find.normal[k] += R[3 * k + j] * mild_sole_surface_normal(sole, j)[find.i];
-                }
-            }
-            find.share = find.memory.material[find.i] >= 0 ? find.memory.share[find.i]
-                                                           : -find.normal[2] * find.area;
-            if (!(-find.normal[2] > cos(80.0 / 180.0 * acos(-1.0)))) {
-                continue;
+    const int n = mild_sole_elements(sole);
+    if (find.faces) {
+        RimPoint *point = calloc((size_t)n, sizeof *point);
+        int count = 0;
+        for (find.i = 0; point && find.i < n; find.i++) {
+            if (find_element(&find, sole) && find_depth(&find) > 0.0 && -find.normal[2] >= 0.5) {
+                const double area = find.area * find.pitch * find.pitch;
+                point[count++] = (RimPoint){find.p[0], find.p[1],
+                                            fmax(find_depth(&find), find_seen(&find, d->dt)),
+                                            -find.normal[2] * area, area / (4.0 * acos(-1.0))};
             }
         }
-        const SoleHeap heap = sole_heap(sole, find.i);
-        find.heap[0] = heap.begin;
-        find.heap[1] = heap.width;
-        for (int k = 0; k < 3; k++) {
-            find.p[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * z;
-            find.at[k] = kit->input.position[f][k] + find.p[k];
+        dense_rim(&find, point, count);
+        free(point);
+    }
+    for (find.i = 0; find.i < n; find.i++) {
+        if (find_element(&find, sole)) {
+            dense_element(d, &find);
         }
-        mild_terrain_slope_at(&kit->terrain, find.at[0], find.at[1], find.slope);
-        dense_element(d, &find);
     }
 }
 

@@ -36,6 +36,7 @@ typedef struct {
 typedef struct {
     DenseLaw law;
     double u0, m0, front, deep, w0, reach, w_a; /* [m], [m/s], as in docs/model.md section 6 */
+    double seen;                                /* [m] greatest depth that its ground remembers */
     double line, slack;                         /* [N/m], [m] */
     double hit, still,
         stopped; /* [m/s], [-], [m] of the drag, see src/ground/begin.h; the last without m_a' */

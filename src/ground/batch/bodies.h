@@ -366,9 +366,8 @@ MILD_HD void bodies_merge(const BodiesSole *sole, int s, const ContactMaterial *
     }
 }
 
-/* [m] Its greatest depth so far, which its ground remembers. */
-MILD_HD Real bodies_deepest(const BodiesMemory *memory, int s, const BodiesElement *own) {
-    return real_max(memory->element[s], own->depth);
+MILD_HD Real bodies_rim_depth(const BodiesMemory *memory, int s, const BodiesElement *own) {
+    return rim_depth(own->depth, memory->element[s]);
 }
 
 /* What is left of its load; slots_lean, and faces_lean of a surface. */
@@ -379,7 +378,7 @@ MILD_HD Real bodies_lean(const BodiesWork *work, const BodiesSole *sole, int i, 
     if (!sole->face) {
         return contact_lean(normal, own->slope[0], own->slope[1]);
     }
-    const Real u = bodies_deepest(&work->memory[i], s, own);
+    const Real u = bodies_rim_depth(&work->memory[i], s, own);
     if (!(material->projects > 0 && u > 0)) {
         return 1;
     }
