@@ -20,10 +20,17 @@ typedef struct {
 
 static MildMaterial draw_material(uint64_t *random) {
     static const MildModel models[] = {
-        MILD_MODEL_MILD,         MILD_MODEL_MILD,   MILD_MODEL_ECC_SPRING,   MILD_MODEL_ECC_QUASI,
-        MILD_MODEL_ECC_QUASI_3D, MILD_MODEL_BEKKER, MILD_MODEL_HUNT_CROSSLEY};
+        MILD_MODEL_MILD,          MILD_MODEL_MILD,         MILD_MODEL_ECC_SPRING,
+        MILD_MODEL_ECC_QUASI,     MILD_MODEL_ECC_QUASI_3D, MILD_MODEL_BEKKER,
+        MILD_MODEL_HUNT_CROSSLEY, MILD_MODEL_MILD_MERGED,  MILD_MODEL_MILD_MERGED};
     MildMaterial m = kit_material(random);
-    m.model = (int)models[kit_index(random, 7)];
+    m.model = (int)models[kit_index(random, 9)];
+    if (m.model == MILD_MODEL_MILD_MERGED) {
+        m.recovery = kit_index(random, 2) ? 0.0 : m.recovery;
+        m.slip_length = kit_index(random, 2) ? pow(10.0, kit_uniform(random, -3.5, -1.0)) : 0.0;
+        m.regain_length = pow(10.0, kit_uniform(random, -4.0, -2.0));
+        m.grip = kit_index(random, 2) ? kit_uniform(random, 0.0, 0.3) : 0.0;
+    }
     m.zeta = kit_uniform(random, 0.05, 1.5);
     if (m.model == MILD_MODEL_BEKKER || m.model == MILD_MODEL_HUNT_CROSSLEY) {
         m.exponent = kit_uniform(random, 0.4, 2.0);
