@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "ground/rim.h"
+#include "ground/faces_lean.h"
 
 /* This loop is not in vectors, for which a power is long: few feet stand on ground without memory
  * beside other ground. */
@@ -33,42 +33,6 @@ static void slots_lean(const FootScratch *foot) {
             const double gx = s->slope_x[i], gy = s->slope_y[i];
             const double along = up[2] - gx * up[0] - gy * up[1];
             s->lean[i] = real_min(real_max(along / sqrt(1.0 + gx * gx + gy * gy), SHARE_LEAN), 1.0);
-        }
-    }
-}
-
-/* [-] Downward part of the outward normal of an element of a surface. */
-static double face_down(const FootScratch *foot, int e) {
-    return foot->share[e] / foot->area[e];
-}
-
-static double slot_rim_depth(const Slots *s, int l) {
-    return rim_depth(s->depth[l], s->depth_max[l]);
-}
-
-/* What the rim leaves of the load of each slot of a surface, into `lean`. */
-static void faces_lean(const FootScratch *foot) {
-    const double *x = foot->point_x, *y = foot->point_y;
-    double sums[RIM_SUMS] = {0.0};
-    for (int i = 0; i < foot->active; i++) {
-        const int e = foot->element[i];
-        rim_add(sums, x[e] - foot->origin[0], y[e] - foot->origin[1],
-                slot_rim_depth(slot_block(foot, i), i % SLOT_LANES), face_down(foot, e),
-                foot->area[e] * foot->pitch * foot->pitch);
-    }
-    const Rim rim = rim_of(sums);
-    for (int i = 0; i < foot_end(foot); i++) {
-        Slots *s = slot_block(foot, i);
-        const int l = i % SLOT_LANES;
-        const double u = slot_rim_depth(s, l);
-        s->lean[l] = 1.0;
-        if (i < foot->active && s->projects[l] > 0.0 && u > 0.0) {
-            const int e = foot->element[i];
-            Element element = slot_element(s, l);
-            element.law.cone_begin = s->cone_begin[l];
-            s->lean[l] =
-                rim_level(&rim, &element.law, foot->heap[e].width, s->recovery[l],
-                          x[e] - foot->origin[0], y[e] - foot->origin[1], u, face_down(foot, e));
         }
     }
 }

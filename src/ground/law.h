@@ -54,7 +54,7 @@
 #include "ground/power.h"
 
 #define LAW_HEAP_LEAST REAL(1e-9) /* [-] least `begin` of a heap: what begins at 0 is a cone */
-#define LAW_MOVES REAL(5) /* [-] depth per recruited depth of what moves with a heap */
+#define LAW_MOVES REAL(5)         /* [-] depth per recruited depth of what moves with a heap */
 
 /* The curves that a law has besides line and bed. All elements of a foot use the union of its
  * materials' bits, because a law without a curve has 0 for that curve's numbers. */

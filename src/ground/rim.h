@@ -32,16 +32,16 @@
 #define RIM_RADIUS REAL(0.0110016969) /* [m] of the disc of an element of MATERIAL_PITCH */
 #define RIM_DISC REAL(0.07957747155)  /* 1/(4 pi): second moment of a disc over its area squared */
 
-/* Sums over the elements in the ground: the weight, and times the weight x, y, u, x^2, x y, y^2,
- * x u, y u, u^2 and the second moment of an element's own disc. */
+/* Sums over the elements in the ground of the weight times z_i z_j, j <= i, where z = (1, x, y, u),
+ * row by row; and of the weight times the second moment of an element's own disc. */
 enum {
     RIM_W,
     RIM_X,
-    RIM_Y,
-    RIM_U,
     RIM_XX,
+    RIM_Y,
     RIM_XY,
     RIM_YY,
+    RIM_U,
     RIM_XU,
     RIM_YU,
     RIM_UU,
@@ -66,28 +66,26 @@ MILD_HD Real rim_depth(Real depth, Real deepest) {
  * normal. area: [m^2] of the element. */
 MILD_HD void rim_add(Real *sums, Real x, Real y, Real u, Real down, Real area) {
     const Real w = u > 0 && down >= RIM_STEEP ? down * area : 0;
-    sums[RIM_W] += w;
-    sums[RIM_X] += w * x;
-    sums[RIM_Y] += w * y;
-    sums[RIM_U] += w * u;
-    sums[RIM_XX] += w * x * x;
-    sums[RIM_XY] += w * x * y;
-    sums[RIM_YY] += w * y * y;
-    sums[RIM_XU] += w * x * u;
-    sums[RIM_YU] += w * y * u;
-    sums[RIM_UU] += w * u * u;
+    const Real z[4] = {1, x, y, u};
+    for (int i = 0, k = 0; i < 4; i++) {
+        for (int j = 0; j <= i; j++) {
+            sums[k++] += w * z[i] * z[j];
+        }
+    }
     sums[RIM_OWN] += w * area * RIM_DISC;
 }
 
 MILD_HD Rim rim_of(const Real *sums) {
     const Real scale = 1 / real_max(sums[RIM_W], REAL(1e-12));
-    const Real x = sums[RIM_X] * scale, y = sums[RIM_Y] * scale, u = sums[RIM_U] * scale;
-    const Real xx = sums[RIM_XX] * scale - x * x;
-    const Real xy = sums[RIM_XY] * scale - x * y;
-    const Real yy = sums[RIM_YY] * scale - y * y;
-    const Real xu = sums[RIM_XU] * scale - x * u;
-    const Real yu = sums[RIM_YU] * scale - y * u;
-    const Real uu = sums[RIM_UU] * scale - u * u;
+    const Real middle[4] = {1, sums[RIM_X] * scale, sums[RIM_Y] * scale, sums[RIM_U] * scale};
+    Real moment[RIM_OWN];
+    for (int i = 0, k = 0; i < 4; i++) {
+        for (int j = 0; j <= i; j++, k++) {
+            moment[k] = sums[k] * scale - middle[i] * middle[j];
+        }
+    }
+    const Real xx = moment[RIM_XX], xy = moment[RIM_XY], yy = moment[RIM_YY];
+    const Real xu = moment[RIM_XU], yu = moment[RIM_YU];
     const Real own = sums[RIM_OWN] * scale;
     const Real half = (xx - yy) / 2;
     const Real least = (xx + yy) / 2 - REAL_SQRT(half * half + xy * xy) + own;
@@ -95,9 +93,10 @@ MILD_HD Rim rim_of(const Real *sums) {
     const Real inverse = 1 / real_max(a * b - xy * xy, REAL(1e-20));
     const Real gx = (b * xu - xy * yu) * inverse;
     const Real gy = (a * yu - xy * xu) * inverse;
-    const Real rest = 12 * real_max(uu - gx * xu - gy * yu, 0);
+    const Real rest = 12 * real_max(moment[RIM_UU] - gx * xu - gy * yu, 0);
     const Real height = REAL_SQRT(rest + RIM_HAIR * RIM_HAIR) - RIM_HAIR;
-    const Rim rim = {x, y, u - height / 2, {gx, gy}, height, 2 * REAL_SQRT(real_max(least, 0))};
+    const Rim rim = {middle[1], middle[2], middle[3] - height / 2,
+                     {gx, gy},  height,    2 * REAL_SQRT(real_max(least, 0))};
     return rim;
 }
 

@@ -113,8 +113,9 @@ WARP_FN void bodies_list_body(const BodiesSetup *setup, BodiesWork *work, int i,
                 flag[l] = own.listed;
                 if (rounded && own.listed) {
                     const int s = from + LANE(l);
-                    rim_add(sums[l], own.p[0], own.p[1], bodies_rim_depth(&work->memory[i], s, &own),
-                            own.down, sole->face[4 * elements + s] * sole->square);
+                    rim_add(sums[l], own.p[0], own.p[1],
+                            bodies_rim_depth(&work->memory[i], s, &own), own.down,
+                            sole->face[4 * elements + s] * sole->square);
                 }
             }
         }

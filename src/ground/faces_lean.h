@@ -1,0 +1,11 @@
+/* The rim of a surface (rim.h). */
+#ifndef MILD_GROUND_FACES_LEAN_H
+#define MILD_GROUND_FACES_LEAN_H
+
+#include "ground/scratch.h"
+
+/* What the rim leaves of the load of each slot of a surface, into `lean`. On ground with
+ * LAW_HEAP. */
+void faces_lean(const FootScratch *foot);
+
+#endif
