@@ -36,7 +36,7 @@ class Camera:
         try:
             self.renderer = mujoco.Renderer(self.model, size[1], size[0])
         except (ImportError, RuntimeError, AttributeError) as error:
-            raise RuntimeError(f"render_mode: MuJoCo cannot draw: {error}; set MUJOCO_GL=egl or osmesa before Python starts, "
+            raise RuntimeError(f"render_mode: MuJoCo cannot draw: {error}; set MUJOCO_GL=egl before Python starts, "
                                "and `pip install pyopengl`") from None
         self.view = mujoco.MjvCamera()
         self.view.azimuth, self.view.elevation = 130, -15

@@ -406,7 +406,7 @@ class Film:
             try:
                 self.renderer, self.of, self.next = mujoco.Renderer(r.model, height, width), r.model, 0.0
             except (ImportError, RuntimeError, AttributeError) as error:
-                raise RuntimeError(f"video: MuJoCo cannot draw: {error}; set MUJOCO_GL=egl or osmesa before Python starts, "
+                raise RuntimeError(f"video: MuJoCo cannot draw: {error}; set MUJOCO_GL=egl before Python starts, "
                                    "and `pip install pyopengl`") from None
             self.camera = mujoco.MjvCamera()
             self.camera.type, self.camera.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, r.base
