@@ -287,7 +287,9 @@ typedef struct {
  * functions call the ankle. Elements inside another shape are left out; for that a mesh
  * must be closed. The areas sum to that of the surface. An element carries load while its normal
  * points down by more than 10 degrees below the horizontal, with its area projected on the
- * horizontal plane when it touched down. A surface serves wherever a sole does, except in
+ * horizontal plane when it touched down. On ground of mild_merged that keeps its imprint a rounded
+ * surface is carried from its rim, and elements steeper than 60 degrees carry next to nothing
+ * (docs/model.md, section 23). A surface serves wherever a sole does, except in
  * mild_sole_concentric, mild_model_match and a MildBatch, which refuse it, and mild_sole_sinkage,
  * which takes it for a level sole. Returns NULL, with the name of the field in *error, when a
  * number is out of range, when a closed mesh has its triangles turned inward, when nothing is left
