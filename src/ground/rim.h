@@ -18,7 +18,7 @@
  *     b = 2 sqrt(least eigenvalue of cov x)   [m] half the breadth: the radius of a disc
  *     e = b (1 - sqrt(1 - v/H))               [m] distance to the rim
  * Elements steeper than 60 degrees are walls, which grains pass (the angle of SHARE_PASSIVE): they
- * carry nothing and are outside the rim. */
+ * are outside the rim and keep SHARE_LEAN of their load. */
 #ifndef MILD_GROUND_RIM_H
 #define MILD_GROUND_RIM_H
 

@@ -24,8 +24,9 @@ struct MildSole {
 #define MATERIAL_PITCH 0.0195 /* [m] edge of the element that a material's numbers belong to */
 
 /* The merged cone of an element, in radii of the disc of an element of MATERIAL_PITCH: it closes
- * from `begin` on, over `width`, times tan(alpha)/nu. Those of a
- * surface have that of a disc as wide as the surface, which its rim lowers (rim.h). */
+ * from `begin` on, over `width`, times tan(alpha)/nu. The
+ * elements of a surface have the cone of a disc as wide as the surface; its rim lowers their load
+ * (rim.h). */
 typedef struct {
     double begin; /* [-] */
     double width; /* [-] */
