@@ -271,6 +271,18 @@ static inline double kit_work(const Kit *kit, int f, const double *before) {
     return 0.5 * kit->input.dt * sum;
 }
 
+/* Leads the one foot of a kit from the twist `last` to another in a step; the pose stays. Returns
+ * the ground's work on it [J], and puts the twist into `last`. */
+static inline double kit_led(Kit *kit, double last[6], const double twist[6]) {
+    memcpy(kit->input.free_velocity, twist, 6 * sizeof *twist);
+    memcpy(kit->input.velocity[0], last, 6 * sizeof *last);
+    kit_solve(kit);
+    const double work = kit_work(kit, 0, last);
+    mild_ground_advance(kit->ground, &kit->terrain, &kit->input, kit->scratch, &kit->result);
+    memcpy(last, twist, 6 * sizeof *last);
+    return work;
+}
+
 /* [J] Of the body on the first foot at the foot's twist. */
 static inline double kit_kinetic(const Kit *kit, const double *V) {
     double r[3], swing[3], sum = 0.0;

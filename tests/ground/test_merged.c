@@ -473,14 +473,9 @@ static double closed_motion(int number, double *scale) {
             const double twist[6] = {(next[1] - at[1]) / dt,  0,
                                      -(next[0] - at[0]) / dt, (next[3] - at[3]) / dt * cy,
                                      (next[2] - at[2]) / dt,  -(next[3] - at[3]) / dt * sy};
-            memcpy(kit.input.free_velocity, twist, sizeof twist);
-            memcpy(kit.input.velocity[0], last, sizeof last);
-            kit_solve(&kit);
-            const double w = kit_work(&kit, 0, last);
+            const double w = kit_led(&kit, last, twist);
             given += w;
             work += fabs(w);
-            mild_ground_advance(kit.ground, &kit.terrain, &kit.input, kit.scratch, &kit.result);
-            memcpy(last, twist, sizeof last);
         }
     }
     kit_close(&kit);
