@@ -8,7 +8,7 @@
 
 Controllers: mlp (the layers of ours, with no target but the reward, and no modulation), clock, ht2 (docs/rivals.md), flat (ours whose
 modulation does not learn), ours. Grounds: rigid, ecc_spring, mild (randomize.model). Each training has the same wall time, --minutes;
---steps N trains to N policy steps instead, for all but ht2, into another folder. HT-2 imitates policies/paper/rigid-1 first, within its time.
+--steps N trains to N policy steps instead, for all but ht2, all with 4096 robots, into another folder. HT-2 imitates policies/paper/rigid-1 first, within its time.
 They are judged on nine grounds at four speeds, nine transitions at 0.6 and 1.2 m/s, and grounds that none of them met.
 
 One tuning budget: before that each controller is trained on `mild`, seed 1, a quarter of the time, with each of the four choices of
@@ -54,6 +54,7 @@ CONTROLLERS = {"mlp": "MLP", "clock": "Clock", "ht2": "HT-2", "flat": "ours, no 
 GROUNDS = ["rigid", "ecc_spring", "mild"]
 SEARCH = [(kl_target, robots) for kl_target in (0.01, 0.02) for robots in (1024, 4096)]
 ENTROPY = 0.004  # its weight; docs/training-log.md says why it is not searched for
+EQUAL = 4096  # robots of every training with --steps: 250 M steps of 1024 take ten minutes of a GPU
 TUNING = 0.25  # share of the time
 STARTING = 8  # [s] beside the time of a training, until one has been seen
 IMITATION = 0.2  # share of the time in which HT-2 imitates
@@ -129,7 +130,7 @@ def run(words, log):
 
 
 class Factorial:
-    """Trainings and their results. A task: {kind, controller, ground, seed, choice}; kind tune or train, choice: a place in SEARCH."""
+    """Trainings and their results. A task: {kind, controller, ground, seed, choice}; kind tune or train, choice: a place in given.search."""
 
     def __init__(self, given):
         self.given, self.folder = given, given.folder.resolve()
@@ -137,7 +138,7 @@ class Factorial:
         self.end = time.time() + given.seconds
         self.longest_judge = 0.0  # [s] of those that this call has seen
         self.lock, self.failed = threading.Lock(), []
-        settings = [given.minutes, given.jobs, given.steps, given.config.read_text(encoding="utf-8"), SEARCH, ENTROPY, IMITATION, OURS, given.options]
+        settings = [given.minutes, given.jobs, given.steps, given.config.read_text(encoding="utf-8"), given.search, ENTROPY, IMITATION, OURS, given.options]
         self.settings = hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:16]
         self.lines = []
         for text in self.file.read_text(encoding="utf-8").splitlines() if self.file.exists() else []:
@@ -189,7 +190,7 @@ class Factorial:
         return 60 * self.given.minutes * (TUNING if task["kind"] == "tune" else 1)
 
     def train_ours(self, task, folder, device):
-        kl_target, robots = SEARCH[task["choice"]]
+        kl_target, robots = self.given.search[task["choice"]]
         minutes, log, words = self.seconds_of(task) / 60, folder / "run/log.csv", [*MILD, "train", "--out", folder / "run"]
         first = ["--config", self.given.config.resolve(), f"--train.device={device}", f"--randomize.model={task['ground']}",
                  f"--train.seed={task['seed']}", f"--train.envs={robots}", f"--ppo.kl_target={kl_target}", f"--ppo.entropy={ENTROPY}",
@@ -215,7 +216,7 @@ class Factorial:
         raise RuntimeError(f"{DEFAULT}: ppo.steps is missing")
 
     def train_rival(self, task, folder, device):
-        kl_target, robots = SEARCH[task["choice"]]
+        kl_target, robots = self.given.search[task["choice"]]
         name, minutes, more = task["controller"], self.seconds_of(task) / 60, []
         if self.given.steps:
             minutes, more = 1e6, ["--iterations", round(self.given.steps * (TUNING if task["kind"] == "tune" else 1) / (robots * 60))]
@@ -275,7 +276,7 @@ class Factorial:
             judged["score"] = score(parts["tuning"])
             self.policy_of(task).unlink(missing_ok=True)
         line = self.add("judged", task, judged)
-        kl_target, robots = SEARCH[task["choice"]]
+        kl_target, robots = self.given.search[task["choice"]]
         trained = self.known("trained", task)
         print(f"{task['kind']} {task['controller']} on {task['ground']}, seed {task['seed']}, kl {kl_target:g}, {robots} robots: "
               f"{trained['steps'] / 1e6:.1f} M steps in {trained['seconds']:.0f} s; skill "
@@ -300,18 +301,18 @@ class Factorial:
         return all(self.known("judged", task) for task in tasks)
 
     def choices(self):
-        """{controller: place in SEARCH} of those whose search is done."""
+        """{controller: place in given.search} of those whose search is done."""
         found = {}
         for name in self.given.controllers:
-            lines = [self.known("judged", tuning(name, i)) for i in range(len(SEARCH))]
+            lines = [self.known("judged", tuning(name, i)) for i in range(len(self.given.search))]
             if all(lines):
-                found[name] = max(range(len(SEARCH)), key=lambda i: lines[i]["score"])
+                found[name] = max(range(len(self.given.search)), key=lambda i: lines[i]["score"])
         return found
 
     def run(self):
         """Bool: everything is done."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        done = self.all_of([tuning(name, i) for name in self.given.controllers for i in range(len(SEARCH))])
+        done = self.all_of([tuning(name, i) for name in self.given.controllers for i in range(len(self.given.search))])
         chosen = self.choices()
         done &= self.all_of([{"kind": "train", "controller": name, "ground": ground, "seed": seed, "choice": chosen[name]}
                              for seed in range(1, self.given.seeds + 1) for name in chosen for ground in GROUNDS])
@@ -415,8 +416,8 @@ def report(factorial):
                             f"{s['both']:.0%}" + (f", the seed {s['seed']:.0%}" if "seed" in s else "") + f" (seeds {seeds})"
                             for part, s in answer.items())
                   if seeds else "the net or the ground: not before each net has all grounds with a seed"))
-    search = [{**{k: t["task"][k] for k in ("controller", "choice")}, "kl_target": SEARCH[t["task"]["choice"]][0],
-               "robots": SEARCH[t["task"]["choice"]][1], "skill": t["skill"]["tuning"], "score": t["score"]}
+    search = [{**{k: t["task"][k] for k in ("controller", "choice")}, "kl_target": factorial.given.search[t["task"]["choice"]][0],
+               "robots": factorial.given.search[t["task"]["choice"]][1], "skill": t["skill"]["tuning"], "score": t["score"]}
               for t in factorial.lines if t["done"] == "judged" and t["task"]["kind"] == "tune"]
     summary = {"minutes": factorial.given.minutes, "steps": factorial.given.steps, "settings": factorial.settings, "search": search,
                "chosen": factorial.choices(), "rows": rows, "table2": second, "shares": answer, "seeds": seeds}
@@ -463,6 +464,7 @@ def parse(words):
     if missing:
         fail(f"--take: {missing[0]} has no results.jsonl")
     given.devices = given.devices.split(",")
+    given.search = [choice for choice in SEARCH if choice[1] == EQUAL or not given.steps]
     given.slots = len(given.devices) * given.jobs
     given.threads = max(1, os.cpu_count() // (2 * given.judges))
     return given

@@ -173,6 +173,18 @@ def what_stops():
                 assert stopped.code == 2, stopped
 
 
+def equal_steps():
+    """Without HT-2, and with one number of robots for all: two choices each in the search."""
+    with tempfile.TemporaryDirectory() as folder:
+        whole = made(folder, "--steps", "1e8", "--seeds", "1")
+        assert {robots for _, robots in whole.given.search} == {4096} and len(whole.given.search) == 2
+        done, printed, wrong = quietly(whole.run)
+        assert done and not wrong and len(whole.calls) == 4 * 2 + 4 * 3 and printed.count("4096 robots") == 20, printed
+        assert not any(task["controller"] == "ht2" for task in whole.calls)
+        timed = made(folder, "--seeds", "1")
+        assert timed.given.search == factorial.SEARCH and not timed.lines  # of another budget nothing counts
+
+
 def in_pieces():
     """Two machines, each with some controllers; a third puts both together, trains what is left, and reports."""
     with tempfile.TemporaryDirectory() as folder:
@@ -225,6 +237,7 @@ def shipped():
 measures()
 shipped()
 all_of_it()
+equal_steps()
 in_pieces()
 what_stops()
 print("65 trainings, restarted, stopped and printed")
