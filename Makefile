@@ -18,6 +18,7 @@ ARCHS ?=
 VERSION ?=
 PYTHON312 ?= python3.12
 TEST ?=
+PYTHONS ?=
 
 .PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check newton-check isaaclab-check jax-check dds-check notebook-check check export-check fuzz mutants clean help
 
@@ -40,7 +41,8 @@ help:
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make deb     the program and libmild as a Debian package, build/deb/mild_*.deb; TEST=1: tried in a bare chroot"
 	@echo "make site    all documentation as a site with search, build/site/index.html, with its links checked"
-	@echo "make wheels  the Python package with the program as one wheel, build/dist, tried in bare environments; TEST=1: in a bare chroot too"
+	@echo "make wheels  the Python package with the program as one wheel, build/dist, tried in bare environments (PYTHONS=FILES: of these interpreters);"
+	@echo "             TEST=1: in a bare Debian 12 too; TEST=\"trixie forky\": in others"
 	@echo "make wheel-cuda  the compiled files for GPUs as a wheel beside it, for ARCHS=90 or for all"
 	@echo "make wheel   the same in half the time: untried, for MARCH=x86-64-v3 alone unless given"
 	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/learners-venv"
@@ -163,8 +165,8 @@ wheel-cuda: setup
 	@ARCHS="$(ARCHS)" scripts/wheel_cuda.sh
 
 wheels: setup
-	@MARCH=$(MARCH) scripts/wheels.sh
-	@$(if $(TEST),scripts/wheels.sh build/dist/mildground-*.whl --chroot)
+	@MARCH=$(MARCH) scripts/wheels.sh $(PYTHONS)
+	@$(if $(TEST),scripts/wheels.sh build/dist/mildground-*.whl --chroot $(patsubst 1,bookworm,$(TEST)))
 
 python-check: wheel
 	@$(call with_wheel,learners)

@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Makes the wheel, build/dist/mildground-VERSION-cp311-abi3-manylinux_*.whl, and tries it in bare environments, one for each CPython
-# 3.11 or newer that is found. Usage: [MARCH=x86-64-v3] scripts/wheels.sh [--plain | WHEEL] [--untried | --chroot | PYTHON ...]
+# 3.11 or newer that is found. Usage: [MARCH=x86-64-v3] scripts/wheels.sh [--plain | WHEEL] [--untried | --chroot [SUITE ...] | PYTHON ...]
 # --plain     without the second copy for AVX-512: half the time to compile. WHEEL: not made, but this one looked at and tried.
 # --untried   made and looked at alone. PYTHON: tried with these interpreters instead.
-# --chroot    tried in a bare Debian 12 with its own Python instead: root, debootstrap, 400 MB of disk.
+# --chroot    tried in bare Debians with their own Python instead (bookworm has 3.11, trixie 3.13, forky 3.14): root, debootstrap, 400 MB
+#             of disk.
 set -euo pipefail
 shopt -s extglob nullglob
 cd "$(dirname "$0")/.."
@@ -43,7 +44,7 @@ make_wheel() {
 look_at_wheel() {
     local size platform library inside=$root/inside
     size=$(stat -c %s "$wheel")
-    said "$((size / 1000000)) MB, at most $most"
+    said "$(((size + 500000) / 1000000)) MB, at most $most"
     ((size <= most * 1000000)) || fail "larger than $most MB"
     quiet auditwheel show "$wheel"
     platform=$(tr '\n' ' ' <"$root/log" | sed -n 's/.*constrains the platform tag to "\([a-z0-9_]*\)".*/\1/p') # MuJoCo apart
@@ -86,7 +87,7 @@ interpreters() {
 
 # try_wheel PYTHON: as a user who has nothing: no display, no tree beside, nothing on the PATH but the system's.
 try_wheel() {
-    local begin python=$1 version folder example
+    local begin python=$1 version folder tree=$PWD
     version=$("$python" -c 'import sys; print("%d.%d.%d" % sys.version_info[:3])')
     folder=$root/try-$version
     rm -rf "$folder"
@@ -99,33 +100,29 @@ try_wheel() {
     grep -q '0.0 s  x .* m/s' "$folder/walk.txt" && grep -q '^sand_loose .* yes ' "$folder/walk.txt" || fail "play: $(cat "$folder/walk.txt")"
     local seconds=$((($(date +%s%N) - begin) / 1000000))
     quiet "$folder/bin/pip" check # scripts/wheel.txt has all that the wheel asks for
-    bare "$folder" eval --robot sa01 --ground rubber --speed 0.5 --trials 1 --seconds 2 >"$folder/eval.txt"
-    grep -q '^rubber .* 1/1 ' "$folder/eval.txt" || fail "eval: $(cat "$folder/eval.txt")"
-    bare "$folder" press --ground foam45 --plate 0.1,0.1 --csv press.csv >/dev/null
-    bare "$folder" train --out run --train.envs=16 --train.minutes=0 --train.iterations=2 --ppo.steps=4 --ppo.minibatches=2 >/dev/null 2>&1 ||
-        fail "train"
-    [ "$(bare "$folder" --version)" = "$(cd "$folder/empty" && env -i "$folder/bin/python" -m mild --version)" ] || fail "python -m mild"
-    (cd "$folder/empty" && env -i "$folder/bin/python" "$OLDPWD/tests/python/check_wheel.py")
-    MILD_PROCESSOR=x86-64-v3 "$folder/bin/python" "$PWD/tests/python/check_wheel.py" >/dev/null
-    (cd "$folder/empty" && env -i PATH=/usr/bin:/bin "$folder/bin/python" "$OLDPWD/tests/install/check_page.py" "$folder/bin/mild" \
-        "$folder/lib/python${version%.*}/site-packages/mild/data/build/web")
-    for example in plate gym_random walk; do
-        (cd "$folder/empty" && env -i "$folder/bin/python" "$OLDPWD/examples/python/$example.py" >/dev/null)
-    done
+    (cd "$folder/empty" && "$tree/tests/install/use_wheel.sh" "$folder/bin")
     said "Python $version: $((seconds / 1000)).$((seconds % 1000 / 100)) s from pip install to a picture of a walk"
     rm -rf "$folder"
 }
-# In a bare Debian 12, where nothing but its Python is installed, as a user without root. What pip would fetch lies there already.
+# The tutorials' set-up, word for word; the wheel is made.
+try_setup() {
+    [[ $wheel = "$root"/* ]] || return 0 # it is a wheel from elsewhere
+    .venv/bin/python tests/install/check_setup.py .
+}
+# try_chroot SUITE: in a bare Debian, where nothing but its Python is installed, as a user without root. What pip would fetch lies there already.
 try_chroot() {
-    local chroot=$root/chroot fetched=$root/chroot/tmp/fetched begin seconds
+    local chroot=$root/chroot fetched=$root/chroot/tmp/fetched begin seconds version
     source scripts/chroot.sh
-    make_chroot "$chroot" "$root/log"
+    make_chroot "$chroot" "$root/log" "$1"
     mount -t proc proc "$chroot/proc" # programs find themselves by it
     trap 'umount "$root/chroot/proc"' EXIT
     quiet chroot "$chroot" env DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends -y python3-venv
-    quiet .venv/bin/python -m pip download --disable-pip-version-check --require-hashes -d "$fetched" -r scripts/wheel.txt
+    version=$(chroot "$chroot" python3 -c 'import sys; print("%d.%d.%d" % sys.version_info[:3])')
+    quiet .venv/bin/python -m pip download --disable-pip-version-check --require-hashes --only-binary=:all: --python-version "$version" \
+        -d "$fetched" -r scripts/wheel.txt
     cp "$wheel" "$fetched"
-    chmod -R a+rX "$fetched"
+    cp --parents -rt "$chroot/tmp" tests/install tests/python/check_wheel.py examples/python robots policies # what use_wheel.sh runs
+    chmod -R a+rX "$chroot/tmp"/*
     inside() { chroot "$chroot" su -s /bin/bash nobody -c "cd /var/tmp && export HOME=/var/tmp && $1"; }
     quiet inside 'python3 -m venv mine'
     begin=$(date +%s%N)
@@ -133,8 +130,10 @@ try_chroot() {
     seconds=$((($(date +%s%N) - begin) / 1000000))
     grep -q '0.0 s  x .* m/s' "$chroot/var/tmp/walk.txt" && grep -q '^sand_loose .* yes ' "$chroot/var/tmp/walk.txt" ||
         fail "play: $(cat "$chroot/var/tmp/walk.txt")"
-    ((seconds < 60000)) || fail "a bare Debian 12: $seconds ms"
-    said "a bare Debian 12, $(inside 'mine/bin/python --version'): $((seconds / 1000)).$((seconds % 1000 / 100)) s from pip install to a picture of a walk"
+    ((seconds < 60000)) || fail "a bare Debian $1: $seconds ms"
+    quiet inside 'mine/bin/pip install --no-index --find-links /tmp/fetched gymnasium'
+    inside 'mkdir empty && cd empty && /tmp/tests/install/use_wheel.sh /var/tmp/mine/bin'
+    said "a bare Debian $1, Python $version: $((seconds / 1000)).$((seconds % 1000 / 100)) s from pip install to a picture of a walk"
     umount "$chroot/proc"
     trap - EXIT
     rm -rf --one-file-system "$chroot"
@@ -157,11 +156,15 @@ look_at_wheel
 case ${1:-} in
 --untried) exit 0 ;;
 --chroot)
-    try_chroot
+    shift
+    for suite in "${@:-bookworm}"; do
+        try_chroot "$suite"
+    done
     exit 0
     ;;
 esac
 [ $# -gt 0 ] || mapfile -t found < <(interpreters)
+try_setup
 for python in "${@:-${found[@]}}"; do
     try_wheel "$python"
 done

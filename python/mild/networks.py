@@ -3,6 +3,7 @@ import importlib.util
 import io
 import pathlib
 import warnings
+import zipfile
 
 import numpy as np
 
@@ -107,6 +108,8 @@ class TorchScript:
     """A module of one argument. State that it keeps in buffers is that of the file again at each reset."""
 
     def __init__(self, path):
+        if zipfile.is_zipfile(path) and not any(name.endswith("/constants.pkl") for name in zipfile.ZipFile(path).namelist()):
+            raise ValueError(f"policy: {path} has weights alone, as a learner's checkpoint; give what was exported of it (mjlab writes an .onnx beside it)")
         try:
             import torch
         except ImportError:

@@ -286,9 +286,10 @@ static void say_where_to_go(const char *path, MildError *error) {
     } else if (end && strcmp(end, ".pt") == 0) {
         mild_fail(error, MILD_ERROR_FORMAT,
                   "%s: no policy of mild; `python -m mild.rsl_rl %s --out FILE` makes one of a "
-                  "checkpoint of mild.rsl_rl (docs/python.md), and `mild trial ROBOT.xml %s "
-                  "--describe LAYOUT` judges TorchScript (docs/public-policies.md)",
-                  path, path, path);
+                  "checkpoint of mild.rsl_rl (docs/python.md); `mild trial ROBOT.xml FILE "
+                  "--describe LAYOUT` judges TorchScript, or the .onnx that mjlab writes beside a "
+                  "checkpoint (docs/public-policies.md)",
+                  path, path);
     }
 }
 

@@ -74,7 +74,7 @@ for command in eval play drive; do
     expect 2 "$command: walk.onnx: .*\`mild trial ROBOT.xml walk.onnx --describe LAYOUT\`" "$mild" $command --policy walk.onnx
 done
 bad walk.pt "$mild" eval --policy walk.pt
-expect 2 '`python -m mild.rsl_rl walk.pt --out FILE`.*`mild trial ROBOT.xml walk.pt --describe LAYOUT`' "$mild" eval --policy walk.pt
+expect 2 '`python -m mild.rsl_rl walk.pt --out FILE`.*`mild trial ROBOT.xml FILE --describe LAYOUT`.*the .onnx that mjlab writes' "$mild" eval --policy walk.pt
 bad none.onnx "$mild" eval --policy none.onnx
 # of an option only one counts, so a second is refused; of an override's key the last counts
 bad "--speed" "$mild" press --ground foam45 --speed 0.1 --depth 0.01 --speed=0.2

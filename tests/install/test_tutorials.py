@@ -20,6 +20,7 @@ NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 LINES = 80
 # What a reader waits for longer than a test may: (page, words of the page, words that are run).
 SHORT = [
+    ("README", "make wheel ", "make --dry-run wheel "),
     ("your-robot", "--train.minutes=5 --train.envs=512 --train.iterations=0", "--train.minutes=0 --train.envs=32 --train.iterations=2"),
     ("train-on-a-gpu", "--train.device=cuda", "--train.device=cpu --train.robots=batch --train.envs=32 --train.iterations=2"),
 ]
@@ -115,10 +116,14 @@ def follow(source, page, work, environment):
             missed = compare(step[1], printed)
             if missed is not None:
                 raise Wrong(f"this is not printed: {missed}\nbut:\n{printed}")
+    return count
+
+
+def look_for_picture(source, page, work):
+    text = (source / f"docs/tutorials/{page}.md").read_text(encoding="utf-8")
     picture = re.findall(r"!\[[^\]]+\]\(([\w-]+)\.\w+\)", text)[-1:]
     if not picture or not any((work / f"{picture[0]}.{ending}").is_file() for ending in ("png", "mp4")):
         raise Wrong(f"no picture {''.join(picture)} was made")
-    return count
 
 
 def check_itself():
@@ -151,6 +156,7 @@ def main():
         try:
             check_itself()
             count = follow(args.source.resolve(), args.page, work, environment)
+            look_for_picture(args.source.resolve(), args.page, work)
         except Wrong as wrong:
             sys.exit(f"FAIL: docs/tutorials/{args.page}.md: {wrong}")
     print(f"{args.page}: {count} blocks")

@@ -12,6 +12,7 @@ import tempfile
 import types
 import unittest
 import unittest.mock
+import zipfile
 
 import mujoco
 import numpy as np
@@ -404,6 +405,15 @@ class Networks(unittest.TestCase):
             for _ in range(2):
                 network.reset()
                 self.assertEqual([network.act(np.zeros(3, np.float32)).tolist() for _ in range(2)], [[1, 1], [2, 2]])
+
+    def test_checkpoint(self):
+        """A learner's checkpoint is no policy; seen without torch."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "model_1.pt"
+            with zipfile.ZipFile(path, "w") as archive:
+                archive.writestr("model_1/data.pkl", b"")
+            with self.assertRaisesRegex(ValueError, "model_1.pt has weights alone.*onnx"):
+                networks.load(path, Description(stander()))
 
     def test_named(self):
         """FILE.py:NAME, a function or a class; what is none."""
