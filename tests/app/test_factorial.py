@@ -217,15 +217,15 @@ def stops(folder, *words):
         assert stopped.code == 2, stopped
 
 
-def shipped():
-    """docs/factorial: of the budget and config that docs/paper.md names, and each skill is that of its cells."""
-    found = factorial.Factorial(factorial.parse([str(root / "docs/factorial"), "--minutes", "3", "--jobs", "2"]))
+def shipped(folder, *words):
+    """Of the budget and config that docs/paper.md names, and each skill is that of its cells."""
+    found, name = factorial.Factorial(factorial.parse([str(root / folder), *words])), f"{folder}/results.jsonl"
     texts = found.file.read_text(encoding="utf-8").splitlines()
-    assert texts and len(found.lines) == len(texts), "docs/factorial/results.jsonl: lines of other settings than configs/factorial.ini and --jobs 2"
+    assert texts and len(found.lines) == len(texts), f"{name}: lines of other settings than configs/factorial.ini and {words}"
     judged = [line for line in found.lines if line["done"] == "judged"]
     assert len({json.dumps(line["task"]) for line in judged}) == len(judged) == len(texts) / 2
     for line in judged:
-        where = f"docs/factorial/results.jsonl: {line['task']}"
+        where = f"{name}: {line['task']}"
         assert found.known("trained", line["task"]), where
         assert line["skill"].keys() == line["cells"].keys(), where
         assert all(abs(factorial.skill(cells) - line["skill"][part]) < 1e-12 for part, cells in line["cells"].items()), where
@@ -235,7 +235,8 @@ def shipped():
 
 
 measures()
-shipped()
+shipped("docs/factorial", "--minutes", "3", "--jobs", "2")
+shipped("docs/factorial/equal", "--steps", "250e6", "--jobs", "2", "--", "--ppo.matmul=bf16")
 all_of_it()
 equal_steps()
 in_pieces()
