@@ -1,13 +1,16 @@
 """mjlab's velocity tasks of Go1 and G1 on soft ground (mild.mjlab): trains them by mjlab's runner for some minutes, and walks on other grounds.
-python mjlab_soft.py [Go1|G1] --grounds foam45,sand_loose --envs 4096 --minutes 4; --stand 6 needs no training."""
+python mjlab_soft.py [Go1|G1] --grounds foam45,sand_loose --envs 4096 --minutes 4; --stand 6 needs no training.
+Several GPUs, a process and --envs robots each: torchrun --standalone --nproc_per_node 4 mjlab_soft.py G1 --levels"""
 import argparse
 import dataclasses
+import os
 import time
 
 import numpy as np
 import torch
 import warp as wp
 from mjlab.envs import ManagerBasedRlEnv
+from mjlab.managers.curriculum_manager import CurriculumTermCfg
 from mjlab.rl import RslRlVecEnvWrapper
 from mjlab.tasks.registry import load_rl_cfg, load_runner_cls
 
@@ -55,6 +58,22 @@ def walk(robot, policy, grounds, speed, device, seconds=10):
         print(f"{ground:>12s} {speed:.2f} m/s: {int(good.sum())} of {int(here.sum())} walk, at {mean[here].mean():.3f} m/s", flush=True)
 
 
+def ground_levels(env, env_ids, count, pushes):
+    """A curriculum as mjlab's of terrains. A robot begins on the first of `count` grounds; 8 s on its feet bring it to the next one, a fall within
+    1.5 s back, and beyond the last one it stands on any. Pushes grow from nothing to `pushes` until the mean level is 1. Returns that mean."""
+    soft, now, ids = env.soft_ground, env.common_step_counter, slice(None) if env_ids is None else env_ids
+    if not hasattr(soft, "level"):
+        soft.level, soft.began = torch.zeros_like(soft.material), torch.zeros(env.num_envs, dtype=torch.long, device=env.device)
+    lasted = (now - soft.began[ids]) * env.step_dt
+    level = (soft.level[ids] + (lasted > 8).int() - (lasted < 1.5).int()).clamp(0, count)
+    soft.level[ids], soft.began[ids] = level, now
+    soft.material[ids] = torch.where(level < count, level, torch.randint_like(level, count))
+    mean = soft.level.float().mean()
+    share, push = float(mean.clamp(max=1)), env.event_manager.get_term_cfg("push_robot").params["velocity_range"]
+    push.update({axis: (share * low, share * high) for axis, (low, high) in pushes.items()})
+    return mean
+
+
 def progress(env, grounds, iteration):
     """How far the robots are from the commanded velocity, by ground, as a share of it: 1 if all stand."""
     asked, has = env.command_manager.get_command("twist")[:, :2], env.scene["robot"].data.root_link_lin_vel_b[:, :2]
@@ -74,10 +93,14 @@ if __name__ == "__main__":
     parser.add_argument("--load", help="a model_N.pt to go on with")
     parser.add_argument("--log", default="runs/mjlab")
     parser.add_argument("--stand", type=float, default=0, help="seconds")
-    parser.add_argument("--device", default="cuda:0" if torch.cuda.is_available() else "cpu")
+    parser.add_argument("--levels", action="store_true", help="begin on the first ground without pushes, the next one after 8 s on one's feet")
+    parser.add_argument("--device", default=f"cuda:{os.environ.get('LOCAL_RANK', 0)}" if torch.cuda.is_available() else "cpu")
     given = parser.parse_args()
     config, task = config_of(given.robot, grounds=given.grounds), f"Mjlab-Velocity-Soft-Unitree-{given.robot}"
-    config.scene.num_envs = given.envs
+    config.scene.num_envs, config.seed = given.envs, 1 + int(os.environ.get("RANK", 0))
+    if given.levels:
+        levels = {"count": len(given.grounds), "pushes": dict(config.events["push_robot"].params["velocity_range"])}
+        config.curriculum["ground_levels"] = CurriculumTermCfg(func=ground_levels, params=levels)
     if given.stand:
         config.events.pop("push_robot"), config.events.pop("base_com"), config.terminations.clear()
     env = ManagerBasedRlEnv(config, given.device)
@@ -92,4 +115,5 @@ if __name__ == "__main__":
     while time.time() < end:
         runner.learn(50, init_at_random_ep_len=runner.current_learning_iteration == 0)
         progress(env, given.grounds, runner.current_learning_iteration)
-    walk(given.robot, runner.get_inference_policy(given.device), given.test, given.speed, given.device)
+    if int(os.environ.get("RANK", 0)) == 0:
+        walk(given.robot, runner.get_inference_policy(given.device), given.test, given.speed, given.device)

@@ -2,6 +2,7 @@
 import os
 import pathlib
 import re
+import runpy
 import subprocess
 import sys
 import tempfile
@@ -15,11 +16,14 @@ import numpy as np  # noqa: E402
 import torch  # noqa: E402
 import warp as wp  # noqa: E402
 from mjlab.envs import ManagerBasedRlEnv  # noqa: E402
+from mjlab.managers.curriculum_manager import CurriculumTermCfg  # noqa: E402
 from mjlab.tasks.registry import list_tasks, load_env_cfg  # noqa: E402
 
 import mild  # noqa: E402
 import mild.mjlab as ours  # noqa: E402
 from mild.describe import Description, Observer, State  # noqa: E402
+
+EXAMPLE = pathlib.Path(__file__).parents[2] / "examples/python/mjlab_soft.py"
 
 
 def standing(robot, grounds, steps, change=lambda config: None):
@@ -74,11 +78,30 @@ class Tasks(unittest.TestCase):
         self.assertEqual(env.reward_manager.get_term_cfg("track_linear_velocity").weight, 4)
         env.close()
 
+    def test_levels(self):
+        """The example's curriculum: all begin on the first ground, unpushed; who stays up goes on, who falls at once goes back."""
+        def change(config):
+            config.events["push_robot"] = load_env_cfg("Mjlab-Velocity-Soft-Unitree-Go1").events["push_robot"]
+            config.curriculum["ground_levels"] = CurriculumTermCfg(func=runpy.run_path(str(EXAMPLE))["ground_levels"],
+                                                                   params={"count": 2, "pushes": {"x": (-0.5, 0.5)}})
+
+        env = standing("Go1", ["rubber", "sand_loose"], 2, change)
+        soft, push, second = env.soft_ground, env.event_manager.get_term_cfg("push_robot").params["velocity_range"], torch.tensor([1])
+        self.assertEqual((soft.material.tolist(), push["x"]), ([0, 0], (0, 0)))
+        for level in (1, 2, 2):
+            env.common_step_counter += round(8.1 / env.step_dt)
+            env.curriculum_manager.compute(env_ids=second)
+            self.assertEqual(soft.level.tolist(), [0, level])
+            self.assertEqual((soft.material[0], push["x"]), (0, (-0.25 * level, 0.25 * level)))
+        self.assertIn(soft.material[1], (0, 1))
+        env.curriculum_manager.compute(env_ids=second)
+        self.assertEqual((soft.level.tolist(), soft.material.tolist()), ([0, 1], [0, 1]))
+        env.close()
+
     def test_stand(self):
         """A robot that stands sinks as deep as its weight, on round feet and on soles of capsules."""
-        example = pathlib.Path(__file__).parents[2] / "examples/python/mjlab_soft.py"
         for robot, depth in (("Go1", 61.0), ("G1", 33.6)):
-            said = subprocess.run([sys.executable, example, robot, "--stand", "6", "--envs", "1", "--grounds", "sand_loose"], capture_output=True, text=True,
+            said = subprocess.run([sys.executable, EXAMPLE, robot, "--stand", "6", "--envs", "1", "--grounds", "sand_loose"], capture_output=True, text=True,
                                   check=True).stdout.splitlines()[-1]
             carried, load, sunk, wanted = (float(number) for number in re.match(
                 r"feet carry ([\d.]+) N of ([\d.]+); mean sinkage ([\d.]+) mm, of these loads ([\d.]+) mm", said).groups())
