@@ -4,6 +4,7 @@ spinning there, measured by Pavlov and Johnson. Nothing here was measured by us.
 
     PYTHONPATH=build/python .venv/bin/python scripts/real_sand.py                       # discs and the pressed wheel, 20 s
     PYTHONPATH=build/python .venv/bin/python scripts/real_sand.py --roll                # and the driven wheel, in MuJoCo; minutes
+    PYTHONPATH=build/python .venv/bin/python scripts/real_sand.py --figure docs/real-sand.png
     .venv/bin/python scripts/real_sand.py --extract CLONE                               # the records again, from a clone of theirs
 
 Records: grains/real/press.csv and wheel.csv. --extract needs rosbags, scipy and git; CLONE is github.com/robomechanics/3d-terramechanics."""
@@ -11,9 +12,9 @@ import argparse
 import csv
 import io
 import math
+import os
 import pathlib
 import subprocess
-import sys
 import tempfile
 
 import numpy as np
@@ -121,7 +122,7 @@ def wheels(angle=0):
 
 # ---- the models ----
 
-def rim(sides=120):
+def rim(sides=60):
     """Vertices and triangles of the wheel, its lowest point at the origin, its axis along y."""
     angle = 2 * math.pi * np.arange(sides) / sides
     ring = np.stack([RADIUS * np.sin(angle), np.zeros(sides), RADIUS * (1 - np.cos(angle))], axis=1)
@@ -129,7 +130,7 @@ def rim(sides=120):
     left, right, faces = 2 * sides, 2 * sides + 1, []
     for a in range(sides):
         b = (a + 1) % sides
-        faces += [(a, b, sides + b), (a, sides + b, sides + a), (left, b, a), (right, sides + a, sides + b)]
+        faces += [(a, sides + b, b), (a, sides + a, sides + b), (left, a, b), (right, sides + b, sides + a)]
     return points, np.array(faces)
 
 
@@ -193,34 +194,144 @@ def deepest(trials):
     return np.arange(0.6 * end, end, BIN), np.array([force[k].mean() for (_, force), k in zip(trials, keep)])
 
 
-def judge_presses(data, fitted):
-    """Prints errors of the mean force at the deepest 40 % of the way."""
+def judge_presses(data, fitted, models=()):
+    """Prints errors of the mean force at the deepest 40 % of the way. models: of all, or those."""
     print(f"\nfitted to {' and '.join(fitted)}: error of the mean force over the deepest 40 % of the way [%]\n"
           f"{'':14s}" + "".join(f"{shape + ' fit' * (shape in fitted):>14s}" for shape in data))
     places = {shape: deepest(trials) for shape, trials in data.items()}
     print(f"{'measured [N]':14s}" + "".join(f"{forces.mean():14.1f}" for _, forces in places.values()))
     print(f"{'spread [%]':14s}" + "".join(f"{100 * forces.std(ddof=1) / forces.mean():14.1f}" for _, forces in places.values()))
-    materials = {}
-    for name, push, material in entries(fitted, data):
+    for name, push, _ in entries(fitted, data):
+        if models and name not in models:
+            continue
         cells = []
         for shape, (depths, forces) in places.items():
             got = push(shape, depths)
             cells.append(f"{'-':>14s}" if got is None else f"{100 * (got.mean() / forces.mean() - 1):+14.0f}")
         print(f"{name:14s}" + "".join(cells), flush=True)
-        materials[name] = material
-    return materials
+
+
+# ---- the driven wheel ----
+
+SLIPS = {"slip_length": 0.0024, "regain_length": 0.00067, "slip_growth": 0.07, "grip": 0.12}  # of grains of 5 mm (docs/grains.md)
+
+
+def rig(ground, load, pitch=0.006):
+    """A hub of that weight on a vertical slide, on a carriage too heavy for the wheel to slow; so is the wheel's inertia."""
+    points, _ = rim()
+    vertices = " ".join(f"{x:.9g}" for x in (points[:-2] - (0, 0, RADIUS)).ravel())
+    return f"""<mujoco><compiler balanceinertia="true"/><option timestep="0.002" integrator="Euler"/>
+<extension><plugin plugin="mild.ground"><instance name="ground"><config key="body" value="wheel"/><config key="ground" value="{ground}"/>
+<config key="body_pitch" value="{pitch}"/></instance></plugin></extension>
+<asset><mesh name="rim" vertex="{vertices}"/></asset>
+<worldbody><body><joint type="slide" axis="1 0 0"/><inertial pos="0 0 0" mass="1e7" diaginertia="1 1 1"/>
+<body pos="0 0 {RADIUS + 1e-4}"><joint type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="{load / 9.81 / 2}" diaginertia="1 1 1"/>
+<body name="wheel"><joint type="hinge" axis="0 1 0" armature="1e7"/><inertial pos="0 0 0" mass="{load / 9.81 / 2}" diaginertia="1 1 1"/>
+<geom type="mesh" mesh="rim" contype="0" conaffinity="0" mass="0"/></body></body></body></worldbody>
+<sensor><plugin name="feel" plugin="mild.ground" instance="ground"/></sensor></mujoco>"""
+
+
+def roll(ground, speed, load, seconds):
+    """Drag [N] and sinkage [mm], means over the last fifteenth of the time, as measured (70 to 75 s)."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(rig(ground, load))
+    data, rows = mujoco.MjData(model), []
+    data.qvel[:] = SPEED, 0, speed / RADIUS
+    while data.time < seconds:
+        mujoco.mj_step(model, data)
+        if data.time > 14 / 15 * seconds:
+            rows.append((-data.sensor("feel").data[0], -1e3 * (data.qpos[1] + 1e-4)))
+    return np.mean(rows, axis=0)
+
+
+def judge_roll(data, fitted, seconds, models):
+    """Prints drag and sinkage of the wheel beside those of the models, fitted to discs, with the friction of the angle of repose."""
+    import mild
+    import mujoco
+
+    mujoco.mj_loadPluginLibrary(os.environ.get("MILD_PLUGIN") or str(ROOT / "build/mujoco_plugin/libmild_plugin.so"))
+    found = {name: material for name, _, material in entries(fitted, data) if material is not None}
+    found |= {"mild_slips": mild.Material(found["mild"], **SLIPS), "mild_merged": mild.Material(found["mild_merged"], phi=0.5, rho=2 * DENSITY, **SLIPS)}
+    measured = wheels()
+    print(f"\nfitted to {' and '.join(fitted)}: drag [N] and sinkage [mm] of the wheel after {seconds:g} s at 10 mm/s\n"
+          f"{'rim [mm/s]':14s}" + "".join(f"{speed:14g}" for speed in measured))
+    print(f"{'load [N]':14s}" + "".join(f"{mean[1]:14.1f}" for mean, _ in measured.values()))
+    print(f"{'measured':14s}" + "".join(f"{mean[0]:8.1f}{mean[2]:6.1f}" for mean, _ in measured.values()))
+    print(f"{'spread':14s}" + "".join(f"{spread[0]:8.1f}{spread[2]:6.1f}" for _, spread in measured.values()))
+    rolled = [["model", "rim_mm_s", "drag_n", "sinkage_mm"]]
+    with tempfile.TemporaryDirectory() as folder:
+        for name in models:
+            file = pathlib.Path(folder) / f"{name}.ini"
+            found[name].save(file)
+            cells = [roll(file, 1e-3 * speed, mean[1], seconds) for speed, (mean, _) in measured.items()]
+            print(f"{name:14s}" + "".join(f"{drag:8.1f}{sunk:6.1f}" for drag, sunk in cells), flush=True)
+            rolled += [[name, speed, f"{drag:.1f}", f"{sunk:.1f}"] for speed, (drag, sunk) in zip(measured, cells)]
+    if seconds == 75:
+        with open(REAL / "rolled.csv", "w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows(rolled)
+
+
+# ---- the picture ----
+
+COLOURS = {"mild": "tab:blue", "mild_slips": "tab:green", "mild_merged": "tab:red", "bekker": "tab:purple", "ecc_quasi": "tab:orange"}
+
+
+def draw(data, path):
+    """Pressure under the discs, sinkage and drag of the wheel: measured, and models fitted to the middle disc."""
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4.2))
+    pushes = {name: push for name, push, _ in entries(["disc80"], data) if name in COLOURS}
+    for shade, (shape, size) in zip(("0.65", "0.35", "0.0"), DISCS.items()):
+        area, depths = math.pi * size**2 / 4, np.arange(5e-4, max(d[-1] for d, _ in data[shape]), 5e-4)
+        for trial, (depth, force) in enumerate(data[shape]):
+            left.plot(1e3 * depth, 1e-3 * force / area, color=shade, lw=1, label=None if trial else f"measured, {1e3 * size:.0f} mm")
+        for name, push in pushes.items():
+            left.plot(1e3 * depths, 1e-3 * push(shape, depths) / area, "--", color=COLOURS[name], lw=1, label=name if shape == "disc80" else None)
+    left.set(xlabel="depth [mm]", ylabel="mean pressure [kPa]", xlim=(0, 32), ylim=(0, 60), title="three discs, models fitted to 80 mm")
+    measured, rolled = wheels(), {}
+    with open(REAL / "rolled.csv", newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            rolled.setdefault(row["model"], []).append([float(row[name]) for name in ("rim_mm_s", "drag_n", "sinkage_mm")])
+    place = {speed: k for k, speed in enumerate(measured)}
+    for axes, column, name in ((middle, 2, "sinkage [mm]"), (right, 0, "drag [N]")):
+        axes.errorbar(range(len(place)), [mean[column] for mean, _ in measured.values()], [spread[column] for _, spread in measured.values()], fmt="ks",
+                      ms=4, label="measured")
+        for model, rows in rolled.items():
+            if model in COLOURS:
+                axes.plot([place[row[0]] for row in rows], [row[2 if column == 2 else 1] for row in rows], ".-", lw=1, color=COLOURS[model], label=model)
+        axes.set(xlabel="speed of the rim [mm/s], hub at 10", ylabel=name)
+        axes.set_xticks(range(len(place)), [f"{speed:g}" for speed in place])
+    middle.set_title("a wheel under 20 to 26 N: sinkage")
+    right.set_title("its drag")
+    for axes in (left, middle):
+        axes.legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--extract", metavar="CLONE", help="writes the records")
+    parser.add_argument("--roll", action="store_true", help="the driven wheel, too")
+    parser.add_argument("--seconds", type=float, default=75, help="of its way (default 75, as measured)")
+    parser.add_argument("--models", default="mild,mild_slips,mild_merged,bekker,ecc_quasi,ecc_quasi_3d,ecc_spring", help="that drive it")
+    parser.add_argument("--figure", metavar="FILE", help="draws it and judges nothing; needs matplotlib")
     given = parser.parse_args()
     if given.extract:
         extract(given.extract)
         return
     data = presses()
+    if given.figure:
+        draw(data, given.figure)
+        return
     for fitted in (["disc80"], ["disc60", "disc100"]):
         judge_presses(data, fitted)
+    if given.roll:
+        judge_roll(data, ["disc80"], given.seconds, given.models.split(","))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,78 @@
+"""scripts/real_sand.py: the records are whole, the wheel is a wheel, and docs/real-sand.md says what the models say. Usage: test_real.py
+SOURCE_FOLDER, with the mild package in PYTHONPATH."""
+import contextlib
+import io
+import math
+import pathlib
+import re
+import sys
+
+import numpy as np
+
+root = pathlib.Path(sys.argv[1]).resolve()
+sys.path.insert(0, str(root / "scripts"))
+import mild  # noqa: E402
+import real_sand  # noqa: E402
+
+
+def records():
+    data = real_sand.presses()
+    assert list(data) == ["disc60", "disc80", "disc100", "wheel"] and all(len(trials) == 3 for trials in data.values())
+    for name, trials in data.items():
+        depths, forces = real_sand.deepest(trials)
+        assert forces.std(ddof=1) < 0.05 * forces.mean() and 0.01 < depths[0] < depths[-1] < 0.045, name
+    at = {name: np.mean([np.interp(0.01, depth, force) for depth, force in trials]) for name, trials in data.items()}
+    pressure = {name: at[name] / (math.pi * size**2 / 4) for name, size in real_sand.DISCS.items()}
+    assert [round(value / 1e3, 1) for value in pressure.values()] == [7.7, 10.4, 13.7], pressure  # docs/real-sand.md
+    assert math.log(pressure["disc100"] / pressure["disc60"]) / math.log(100 / 60) > 1.0
+    assert len((root / "grains/real/wheel.csv").read_text().splitlines()) == 190
+    measured = real_sand.wheels()
+    assert list(measured) == [0, 3, 5, 8, 10, 12, 20, 40, 100] and all(19 < mean[1] < 26 for mean, _ in measured.values())
+    assert measured[0][0][0] > 38 and measured[100][0][0] < 0  # locked it is dragged, spinning it pulls
+    assert not real_sand.wheels(7)
+
+
+def wheel():
+    """On springs a pressed wheel is carried by its volume under the surface."""
+    points, faces = real_sand.rim()
+    edges = np.sort(np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 2], [2, 0])]), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()  # closed
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    volume = (a * np.cross(b, c)).sum() / 6
+    assert abs(volume / (math.pi * real_sand.RADIUS**2 * real_sand.WIDTH) - 1) < 0.003, volume  # counterclockwise from outside
+    sole = mild.Sole.surface([{"type": "mesh", "vertices": points, "triangles": faces}], 0.005, 0.005)
+    soft = mild.Material("sand_loose", model="ecc_spring", k_pen=100.0, mu=0, k_drift=0, b_drift=0)
+    ground, depth = mild.Ground([sole], soft, dt=1e-3), 0.02
+    for z in np.arange(0, depth + 1e-9, 2e-5):
+        real_sand_step(ground, -z)
+    angle = math.acos(1 - depth / real_sand.RADIUS)
+    under = real_sand.RADIUS**2 * (angle - math.sin(angle) * math.cos(angle)) * real_sand.WIDTH
+    square = 0.05 * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    flat = mild.Ground([mild.Sole(square, 0.005)], soft, dt=1e-3)
+    for z in np.arange(0, depth + 1e-9, 2e-5):
+        real_sand_step(flat, -z)
+    assert abs(ground.force[0, 2] / under / (flat.force[0, 2] / (0.01 * depth)) - 1) < 0.02, (ground.force[0, 2], under, flat.force[0, 2])
+
+
+def real_sand_step(ground, z):
+    import judge_entries
+
+    judge_entries.ground_step(ground, (np.array([0.0, z, 0.0]), np.array([0.0, -0.02, 0.0])), 0.0, 1e-3)
+
+
+def page():
+    """Of docs/real-sand.md: the rows of mild, mild_merged and 3D-RFT fitted to one disc."""
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        real_sand.judge_presses(real_sand.presses(), ["disc80"], ("mild", "mild_merged", "3d_rft"))
+    found = {line.split()[0]: [int(x) for x in line.split()[1:]] for line in said.getvalue().splitlines() if line.startswith(("mild", "3d_rft"))}
+    text = (root / "docs/real-sand.md").read_text(encoding="utf-8")
+    for name, row in (("mild", r"\| `mild`, `bekker`[^|]*\|"), ("mild_merged", r"\| `mild_merged` \|"), ("3d_rft", r"\| 3D-RFT[^|]*\|")):
+        cells = re.search(row + r"([^|]*)\|([^|]*)\|([^|]*)\|", text).groups()
+        says = [int(re.search(r"[-+]?\d+", cell).group()) for cell in cells]
+        assert says == [found[name][0], found[name][2], found[name][3]], (name, says, found[name])
+
+
+records()
+wheel()
+page()
+print("real sand: records, wheel and page")
