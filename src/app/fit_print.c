@@ -90,6 +90,38 @@ static void assumptions_print(const FitWork *work, FitKind kind) {
     }
 }
 
+/* [-] Force of the curve over that of the record, in the sum over the rows of a press, less 1. *row:
+ * its first one, then that of the next file. */
+static double press_excess(const FitWork *work, int file, const FitPoint **row) {
+    const FitSet *press = &work->set[FIT_PRESS];
+    const FitPoint *end = *row + work->file[file].count;
+    double fitted = 0, measured = 0;
+    for (; *row < end; ++*row) {
+        double force;
+        fit_forces(FIT_PRESS, press->def.plate, &press->result.curve, *row, 1, &force);
+        fitted += force;
+        measured += (*row)->force;
+    }
+    return fitted / measured - 1;
+}
+
+/* Of several presses, what the curve has in each: plates of several sizes tell whether the law has
+ * the size. */
+static void files_print(const FitWork *work) {
+    const FitPoint *row = work->set[FIT_PRESS].points;
+    if (work->set[FIT_PRESS].files < 2) {
+        return;
+    }
+    for (int f = 0, count = 0; f < work->files; f++) {
+        if (work->file[f].kind == FIT_FILE_PRESS && work->file[f].count) {
+            const double excess = press_excess(work, f, &row);
+            printf("%s%s %+.1f %%", count++ ? ", " : "force of the curve, summed over a file: ",
+                   work->file[f].path, 100 * excess);
+        }
+    }
+    printf("\n");
+}
+
 /* Bool: all rows have about the same speed. */
 static int is_one_speed(const FitSet *press) {
     double slowest = INFINITY, fastest = 0;
@@ -211,6 +243,9 @@ void fit_print(const FitWork *work) {
     for (int k = 0; k < FIT_KINDS; k++) {
         if (work->set[k].done) {
             printf("%s\n", fit_residual_text(work, (FitKind)k, text, sizeof text));
+            if (k == FIT_PRESS) {
+                files_print(work);
+            }
             assumptions_print(work, (FitKind)k);
         }
     }
@@ -279,6 +314,21 @@ static int json_set(cJSON *root, const FitSet *set, FitKind kind) {
     return whole;
 }
 
+/* Of several presses, the excess of each by its file. */
+static int json_files(cJSON *root, const FitWork *work) {
+    const FitPoint *row = work->set[FIT_PRESS].points;
+    cJSON *object = cJSON_AddObjectToObject(root, "excess");
+    int whole = object != NULL;
+    for (int f = 0; f < work->files && whole; f++) {
+        if (work->file[f].kind == FIT_FILE_PRESS && work->file[f].count) {
+            const double excess = press_excess(work, f, &row);
+            whole = !isfinite(excess) ||
+                    cJSON_AddNumberToObject(object, work->file[f].path, excess) != NULL;
+        }
+    }
+    return whole;
+}
+
 MildStatus fit_json_save(const FitWork *work, const char *path, MildError *error) {
     cJSON *root = cJSON_CreateObject();
     int whole = root && cJSON_AddStringToObject(root, "model", mild_model_names[model_of(work)]) &&
@@ -288,6 +338,9 @@ MildStatus fit_json_save(const FitWork *work, const char *path, MildError *error
                 cJSON_AddArrayToObject(root, "undetermined");
     for (int k = 0; k < FIT_KINDS && whole; k++) {
         whole = !work->set[k].done || json_set(root, &work->set[k], (FitKind)k);
+    }
+    if (whole && work->set[FIT_PRESS].done && work->set[FIT_PRESS].files > 1) {
+        whole = json_files(root, work);
     }
     if (!whole) {
         cJSON_Delete(root);

@@ -340,7 +340,7 @@ static MildStatus csv_unloading(const Record *record, FitFile *file, MildError *
 
 static MildStatus read_file(FILE *stream, const char *name, FitFile *file, MildError *error) {
     Record record = {.time = -INFINITY};
-    *file = (FitFile){.points = NULL};
+    *file = (FitFile){.path = name};
     MildStatus status = csv_begin(&record.text, stream, name, error);
     if (status == MILD_OK) {
         status = csv_header(&record, error);

@@ -20,6 +20,7 @@ typedef enum {
 
 /* A file's rows. */
 typedef struct {
+    const char *path; /* as it was given */
     FitFileKind kind;
     FitPoint *points; /* [count] the loading part of a press, or rows of growing slip */
     int count;
