@@ -115,8 +115,9 @@ static void files_print(const FitWork *work) {
     for (int f = 0, count = 0; f < work->files; f++) {
         if (work->file[f].kind == FIT_FILE_PRESS && work->file[f].count) {
             const double excess = press_excess(work, f, &row);
-            printf("%s%s %+.1f %%", count++ ? ", " : "force of the curve, summed over a file: ",
-                   work->file[f].path, 100 * excess);
+            printf("%s%s %+.1f %%",
+                   count++ ? ", " : "force of the curve, summed over a file: ", work->file[f].path,
+                   100 * excess);
         }
     }
     printf("\n");
