@@ -90,8 +90,8 @@ static void assumptions_print(const FitWork *work, FitKind kind) {
     }
 }
 
-/* [-] Force of the curve over that of the record, in the sum over the rows of a press, less 1. *row:
- * its first one, then that of the next file. */
+/* [-] Force of the curve over that of the record, in the sum over the rows of a press, less 1.
+ * *row: its first one, then that of the next file. */
 static double press_excess(const FitWork *work, int file, const FitPoint **row) {
     const FitSet *press = &work->set[FIT_PRESS];
     const FitPoint *end = *row + work->file[file].count;
