@@ -19,7 +19,7 @@ char *file_read(const char *path, size_t limit, size_t *size, MildError *error);
  * program writes or publishes by itself, where nobody named the file that a link leads to. */
 MildStatus file_check_own(const char *path, MildError *error);
 
-/* Tells that the program will write `path`, before it reads anything. From then on a file that is
+/* Announces that the program will write `path`, before it reads anything. From then on a file that is
  * the same on disk cannot be opened for reading by file_open or file_read: an output never replaces
  * what it was made from, whoever named that. what: the output in messages, "--json". Fails when
  * another output has the file. For one thread, at the start of a program. */

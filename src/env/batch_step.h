@@ -2,8 +2,8 @@
  * for a GPU by batch_device.cu, for any robot or for one size alone.
  *
  *     env_part(0)      a warp: action, and the first physics step up to the ground
- *     env_shells(0)    a warp: the ground under robots with shells near it, where shells stand; on
- *                      rigid ground what env_part(1) would do of it
+ *     env_shells_step  a team: the ground under robots with shells near it, where shells stand; on
+ *                      rigid ground env_floor_step, a warp, as env_part(1) would do it
  *     mild_batch_step    the ground under the others
  *     env_part(1)      a warp: the rest of that physics step, the next one up to the ground
  *     ...

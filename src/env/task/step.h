@@ -95,7 +95,7 @@ MILD_HD_FN void task_draw_attitude(TaskEnv *env, const TaskDef *def, Random *r) 
 
 /* Whether the episode begins lying, and how: attitude and joints, and in the place of the height of
  * the base that of a robot whose lowest point is above the ground by the height of the drop.
- * task_place puts it there. */
+ * place of env.c and env_pose put it there. */
 MILD_HD_FN void task_draw_drop(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                double height) {
     Random r = random_at(env->seed ^ TASK_RANDOM_DROP, env->index, env->tick);
