@@ -1,7 +1,7 @@
 /* How often a 95 % interval holds the truth: noisy presses of every preset of every model, with
- * everything fitted that they determine. Usage: identify_test_coverage [DRAWS [GROUND]]; 200 draws take
- * 90 s and have a standard deviation of 1.5 %. Prints a table: for each kind of noise
- * the share of intervals that hold the truth and, in brackets, that are bounded on both sides. */
+ * everything fitted that they determine. Usage: identify_test_coverage [DRAWS [GROUND]]; 200 draws
+ * take 90 s and have a standard deviation of 1.5 %. Prints a table: for each kind of noise the
+ * share of intervals that hold the truth and, in brackets, that are bounded on both sides. */
 #include "base/random.h"
 #include "identify/fit.h"
 #include "kit.h"
