@@ -350,29 +350,18 @@ typedef struct {
     void *stream;
 } Share;
 
-static float *row_from(float *rows, size_t first, int width) {
-    return rows ? rows + first * (size_t)width : NULL;
-}
-
 static uint8_t *flag_from(uint8_t *flags, size_t first) {
     return flags ? flags + first : NULL;
 }
 
-static EnvsView view_from(const EnvsView *view, const TaskShape *shape, size_t first) {
-    return (EnvsView){.history = row_from(view->history, first, shape->history),
-                      .critic = row_from(view->critic, first, shape->critic),
-                      .estimate = row_from(view->estimate, first, shape->estimates),
-                      .frame = row_from(view->frame, first, shape->observation)};
-}
-
 static EnvsStep step_from(const EnvsStep *step, const TaskShape *shape, size_t first) {
     return (EnvsStep){.action = step->action ? step->action + first * (size_t)shape->actions : NULL,
-                      .reward = row_from(step->reward, first, 1),
+                      .reward = task_row(step->reward, (long)first, 1),
                       .done = flag_from(step->done, first),
                       .timeout = flag_from(step->timeout, first),
                       .valid = flag_from(step->valid, first),
                       .cause = flag_from(step->cause, first),
-                      .next = view_from(&step->next, shape, first)};
+                      .next = task_view_from(&step->next, shape, (long)first)};
 }
 
 static EnvsContact contact_from(const EnvsContact *c, size_t first, size_t feet) {

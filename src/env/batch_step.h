@@ -524,17 +524,9 @@ MILD_HD void env_end(const EnvsArrays *all, const EnvsStep *call, long robot) {
     }
 }
 
-MILD_HD float *env_row(float *rows, long robot, int width) {
-    return rows ? rows + robot * width : NULL;
-}
-
 MILD_HD void env_observe(const EnvsArrays *all, const EnvsStep *call, long robot) {
     TaskEnv *env = env_at(all, robot);
-    const TaskShape *shape = &env->shape;
-    const TaskView view = {call->next.history + robot * shape->history,
-                           env_row(call->next.critic, robot, shape->critic),
-                           env_row(call->next.estimate, robot, shape->estimates),
-                           env_row(call->next.frame, robot, shape->observation)};
+    const EnvsView view = task_view_from(&call->next, &env->shape, robot);
     const int reset = all->reset[robot];
     EnvRobot *own = env_robot_at(all, robot);
     if (reset && task_lane() == 0) {

@@ -404,7 +404,7 @@ static Run run(const char *ground, double speed, double seconds) {
     const int rigid = strcmp(ground, "rigid") == 0;
     assert_true(rigid || mild_material_preset(ground, &material));
     MildTerrain terrain = mild_terrain_uniform(&material);
-    TaskView none = {0};
+    EnvsView none = {0};
     ControllerRow row = {&controller, 0};
     TaskDrive drive = {controller_row_torque, &row};
     TaskCallback callback = {see_nothing, NULL, &drive};

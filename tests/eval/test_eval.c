@@ -269,7 +269,7 @@ TEST(a_row_is_what_its_trials_did) {
     RobotSim *sim = robot_sim_create(robot, def.physics_dt, &error);
     assert_non_null(sim);
     for (uint32_t i = 0; i < 2; i++) {
-        const TaskView none = {0};
+        const EnvsView none = {0};
         TaskEnv *env = aligned_alloc(64, task_env_bytes(&longer, robot));
         assert_non_null(env);
         task_env_init(env, &longer, robot, 7, i);

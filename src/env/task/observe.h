@@ -198,7 +198,7 @@ MILD_HD_FN void observe_history(TaskEnv *env, const TaskDef *def, int first, flo
  * [TASK_GROUND_NUMBERS] under the base. */
 MILD_HD_FN void task_observe(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                              const RobotReading *reading, const float *ground,
-                             const TaskSensors *sensors, int first, const TaskView *view) {
+                             const TaskSensors *sensors, int first, const EnvsView *view) {
     const double *pose = robot->default_pose;
     const int width = env->shape.observation;
     float *frame = view->history + (TASK_FRAMES - 1) * width;
