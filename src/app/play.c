@@ -108,7 +108,7 @@ static void step(Walk *walk) {
     float action[ROBOT_JOINTS_MAX];
     EnvsView none = {0};
     ControllerRow row = {play->controller, 0};
-    TaskDrive drive = {controller_row_torque, &row};
+    TaskDrive drive = controller_drive(&row);
     TaskCallback callback = {watch, walk, play->controller->torque ? &drive : NULL};
     look_at_ground(walk);
     play->controller->act(play->controller->self, 1, &walk->env, action);

@@ -406,7 +406,7 @@ static Run run(const char *ground, double speed, double seconds) {
     MildTerrain terrain = mild_terrain_uniform(&material);
     EnvsView none = {0};
     ControllerRow row = {&controller, 0};
-    TaskDrive drive = {controller_row_torque, &row};
+    TaskDrive drive = controller_drive(&row);
     TaskCallback callback = {see_nothing, NULL, &drive};
     Run out = {.z_low = 1e9};
     task_env_init(env, &def, robot, 1, 0);
