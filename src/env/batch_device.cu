@@ -17,12 +17,12 @@
 enum {
     WARP_THREADS = LANES * ENVS_WARPS,
     TASK_THREADS = 128,
-    TASK_ROBOTS = TASK_THREADS / TASK_LANES, /* of a block */
-    TASK_BLOCKS = 8,                         /* blocks of a multiprocessor, at least */
-    SHELLS_WARPS = 4,                        /* of a robot with shells near the ground */
-    SHELLS_BLOCKS = 3,                       /* such robots of a multiprocessor, at least */
-    SHELLS_ROBOTS = 1024,                    /* stepped at once, at most */
-    FIND_WARPS = 4,                          /* robots of a block that are looked at */
+    TASK_ROBOTS = TASK_THREADS / TILE, /* of a block */
+    TASK_BLOCKS = 8,                   /* blocks of a multiprocessor, at least */
+    SHELLS_WARPS = 4,                  /* of a robot with shells near the ground */
+    SHELLS_BLOCKS = 3,                 /* such robots of a multiprocessor, at least */
+    SHELLS_ROBOTS = 1024,              /* stepped at once, at most */
+    FIND_WARPS = 4,                    /* robots of a block that are looked at */
     TALLY_THREADS = 256,
     ORDER_THREADS = 1024
 };
@@ -36,9 +36,9 @@ static __device__ long warp_robot(void) {
     return (long)blockIdx.x * ENVS_WARPS + threadIdx.x / LANES;
 }
 
-/* TASK_LANES threads have a robot. */
+/* TILE threads have a robot. */
 static __device__ long lanes_robot(void) {
-    return (long)blockIdx.x * TASK_ROBOTS + threadIdx.x / TASK_LANES;
+    return (long)blockIdx.x * TASK_ROBOTS + threadIdx.x / TILE;
 }
 
 static int warp_blocks(int envs) {

@@ -1,5 +1,5 @@
 /* What an environment is made of: plain structs without pointers that the CPU and a GPU share (see
- * lanes.h). Who steps the robot reads what it needs from a TaskEnv and answers with a
+ * numbers.h). Who steps the robot reads what it needs from a TaskEnv and answers with a
  * RobotReading. */
 #ifndef TASK_STATE_H
 #define TASK_STATE_H
@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "env/task/lanes.h"
+#include "env/task/numbers.h"
 #include "env/task/task_def.h"
 #include "env/task/view.h"
 #include "robot/table.h"
