@@ -347,7 +347,7 @@ typedef struct {
     EnvsArrays arrays;
     EnvsStep step;
     MildBatch ground;
-    void *stream;
+    MildStream stream;
 } Share;
 
 static uint8_t *flag_from(uint8_t *flags, size_t first) {
@@ -401,7 +401,7 @@ static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
     return all;
 }
 
-static Share share_of(const Batch *b, const EnvsStep *step, int i, void *stream) {
+static Share share_of(const Batch *b, const EnvsStep *step, int i, MildStream stream) {
     const long envs = b->arrays.envs;
     const long first = envs * i / b->shares, end = envs * (i + 1) / b->shares;
     const int count = (int)(end - first);
@@ -540,7 +540,7 @@ static MildStatus see_share(const Batch *b, Share *share, MildError *error) {
     return status;
 }
 
-static MildStatus each_share(const Batch *b, const EnvsStep *step, void *stream,
+static MildStatus each_share(const Batch *b, const EnvsStep *step, MildStream stream,
                              MildStatus (*work)(const Batch *, Share *, MildError *),
                              MildError *error) {
     MildStatus status = b->fork ? device_fork(b->fork, stream, error) : MILD_OK;
@@ -552,12 +552,12 @@ static MildStatus each_share(const Batch *b, const EnvsStep *step, void *stream,
     return status == MILD_OK && b->fork ? device_join(b->fork, stream, error) : status;
 }
 
-static MildStatus reset(Envs *envs, const EnvsView *first, void *stream, MildError *error) {
+static MildStatus reset(Envs *envs, const EnvsView *first, MildStream stream, MildError *error) {
     const EnvsStep none = {.next = *first};
     return each_share(own(envs), &none, stream, begin_share, error);
 }
 
-static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+static MildStatus step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error) {
     return step->last.history || step->terms
                ? mild_fail(error, MILD_ERROR_ARGUMENT,
                            "the batch engine does not keep the end of an episode; train.robots = "
@@ -570,7 +570,7 @@ static MildStatus wait(Envs *envs, MildError *error) {
     return b->device == MILD_BATCH_HOST ? MILD_OK : device_wait(b->device, error);
 }
 
-static MildStatus sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error) {
+static MildStatus sums(Envs *envs, EnvsStats *sums, MildStream stream, MildError *error) {
     const Batch *b = own(envs);
     const EnvsArrays *all = &b->arrays;
     double sum[TALLY_NUMBERS];

@@ -107,7 +107,7 @@ static void reset_piece(void *context, int piece, int thread) {
     }
 }
 
-static MildStatus reset(Envs *envs, const EnvsView *first, void *stream, MildError *error) {
+static MildStatus reset(Envs *envs, const EnvsView *first, MildStream stream, MildError *error) {
     Mujoco *m = own(envs);
     (void)stream;
     (void)error;
@@ -204,7 +204,7 @@ static void add_episode(EnvsStats *stats, const TaskStep *result) {
     }
 }
 
-static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+static MildStatus step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error) {
     Mujoco *m = own(envs);
     EnvsStats *stats = &m->stats;
     (void)stream;
@@ -289,7 +289,7 @@ void envs_read_sample(const TaskEnv *env, const RobotSim *sim, const double *tor
 
 /* ---- statistics ---- */
 
-static MildStatus sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error) {
+static MildStatus sums(Envs *envs, EnvsStats *sums, MildStream stream, MildError *error) {
     Mujoco *m = own(envs);
     (void)stream;
     (void)error;

@@ -51,13 +51,13 @@ int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *pus
 
 /* All but the second step of a case are disturbed. */
 MildStatus __real_mild_batch_step(MildBatch *batch, const MildBatchInput *input,
-                                  const MildBatchOutput *output, int advance, void *stream,
+                                  const MildBatchOutput *output, int advance, MildStream stream,
                                   MildError *error);
 MildStatus __wrap_mild_batch_step(MildBatch *batch, const MildBatchInput *input,
-                                  const MildBatchOutput *output, int advance, void *stream,
+                                  const MildBatchOutput *output, int advance, MildStream stream,
                                   MildError *error);
 MildStatus __wrap_mild_batch_step(MildBatch *batch, const MildBatchInput *input,
-                                  const MildBatchOutput *output, int advance, void *stream,
+                                  const MildBatchOutput *output, int advance, MildStream stream,
                                   MildError *error) {
     const MildStatus status = __real_mild_batch_step(batch, input, output, advance, stream, error);
     now += (advance ? advance_time : solve_time) + (steps++ % 3 == 1 ? 0 : 50);

@@ -30,9 +30,9 @@ Envs *__wrap_envs_create(const EnvsDef *def, MildError *error) {
 }
 
 /* After its first episode an environment goes on, and says other things. */
-MildStatus __real_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
-MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
-MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+MildStatus __real_envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error);
+MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error);
+MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error) {
     const MildStatus status = __real_envs_step(envs, step, stream, error);
     const int t = ++step_of[side];
     assert_true(t <= LAST); /* all have ended then */

@@ -55,16 +55,19 @@ Envs *__wrap_envs_create(const EnvsDef *def, MildError *error) {
     return envs;
 }
 
-MildStatus __real_envs_reset(Envs *envs, const EnvsView *first, void *stream, MildError *error);
-MildStatus __wrap_envs_reset(Envs *envs, const EnvsView *first, void *stream, MildError *error);
-MildStatus __wrap_envs_reset(Envs *envs, const EnvsView *first, void *stream, MildError *error) {
+MildStatus __real_envs_reset(Envs *envs, const EnvsView *first, MildStream stream,
+                             MildError *error);
+MildStatus __wrap_envs_reset(Envs *envs, const EnvsView *first, MildStream stream,
+                             MildError *error);
+MildStatus __wrap_envs_reset(Envs *envs, const EnvsView *first, MildStream stream,
+                             MildError *error) {
     now += reset_time;
     return __real_envs_reset(envs, first, stream, error);
 }
 
-MildStatus __real_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
-MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
-MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+MildStatus __real_envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error);
+MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error);
+MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error) {
     const MildStatus status = __real_envs_step(envs, step, stream, error);
     now += created == 1 ? step_time : walk_time;
     for (int i = 0; i < ENVS; i++) {
@@ -75,9 +78,9 @@ MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, Mild
 }
 
 /* The march diverges in 7 steps, it says. */
-MildStatus __real_envs_sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error);
-MildStatus __wrap_envs_sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error);
-MildStatus __wrap_envs_sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error) {
+MildStatus __real_envs_sums(Envs *envs, EnvsStats *sums, MildStream stream, MildError *error);
+MildStatus __wrap_envs_sums(Envs *envs, EnvsStats *sums, MildStream stream, MildError *error);
+MildStatus __wrap_envs_sums(Envs *envs, EnvsStats *sums, MildStream stream, MildError *error) {
     const MildStatus status = __real_envs_sums(envs, sums, stream, error);
     sums->diverged = created == 1 ? 7 : 0;
     return status;

@@ -59,9 +59,9 @@ void __wrap_envs_set_samples(Envs *envs, EnvsSample *to) {
     __real_envs_set_samples(envs, to);
 }
 
-MildStatus __real_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
-MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
-MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+MildStatus __real_envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error);
+MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error);
+MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error) {
     const MildStatus status = __real_envs_step(envs, step, stream, error);
     for (int n = 0; n < TRIALS * OF_PERIOD; n++) {
         for (int f = 0; f < SA01_FEET; f++) {
