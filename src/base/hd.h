@@ -18,7 +18,9 @@
 #include <string.h>
 
 #ifdef __CUDACC__
+extern "C++" { /* kernel.cu includes this under "C" */
 #include <cuda_fp16.h>
+}
 #endif
 
 #ifdef MILD_REAL_FLOAT
