@@ -374,4 +374,23 @@ static inline void kit_random_state(Kit *kit, uint64_t *random) {
     }
 }
 
+/* Asserts that motions first .. first + count - 1, from the air to the air, give no energy. motion:
+ * [J] what the ground gave; *work: the sum of its works' sizes, for a scale. */
+static inline void kit_closed(int first, int count, double (*motion)(int number, double *work)) {
+    double worst = -INFINITY, share = -INFINITY;
+    int at = 0, gained = 0;
+    for (int n = first; n < first + count; n++) {
+        double work;
+        const double given = motion(n, &work);
+        gained += given > 1e-12 * work;
+        at = given > worst ? n : at;
+        worst = fmax(worst, given);
+        share = fmax(share, given / fmax(work, 1e-12));
+    }
+    print_message(
+        "%d closed motions: %d gave energy, at most %.2e J (number %d), %.1e of the work\n", count,
+        gained, worst, at, share);
+    assert_int_equal(gained, 0);
+}
+
 #endif
