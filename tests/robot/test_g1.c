@@ -6,7 +6,7 @@
 
 #define MODEL MILD_SOURCE_DIR "/robots/g1"
 #include "numbers.h"
-#include "robot_kit.h"
+#include "stand_kit.h"
 
 #include <mujoco/mujoco.h>
 
@@ -254,38 +254,16 @@ TEST(the_mirror_image) {
 
 /* Four seconds. material: NULL for rigid ground. */
 static void stand_on(const char *name, const MildMaterial *material) {
-    RobotSim *sim = new_sim(0.0025);
-    MildGround *ground = kit_ground(robot);
-    MildMaterial any = mild_material_default();
-    MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
-    RobotVariation variation = robot_variation_nominal();
-    variation.rigid = material == NULL;
-    const double rest =
-        material ? mild_sole_sinkage(robot_soles(robot)[0], material, robot_foot_load(robot)) : 0;
-    RobotState state = stand_state(stand, 1, rest);
-    robot_sim_load(sim, &state, &variation);
-    double load = 0, depth = 0, speed = 0;
-    for (int i = 0; i < 1600; i++) {
-        double torque[JOINTS];
-        stand_torque(stand, sim, 1, torque);
-        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
-        for (int f = 0; f < FEET && i >= 1200; f++) {
-            const RobotFoot *foot = robot_sim_foot(sim, f);
-            load += foot->force[2] / (9.81 * robot_total_mass(robot)) / 400;
-            depth += material ? foot->result.depth_mean / FEET / 400 : 0;
-        }
-    }
-    for (int k = 0; k < 6; k++) {
-        speed = fmax(speed, fabs(robot_sim_qvel(sim)[k]));
-    }
-    print_message("%-11s load %.5f, depth %5.1f of %5.1f mm, still %.1e\n", name, load, 1e3 * depth,
-                  1e3 * rest, speed);
-    expect_near("load", load, 1, 0.01);
-    expect_near("upright", robot_sim_base_rotation(sim)[8], 1, 0.005);
+    const KitStand how = {.material = material, .dt = 0.0025, .seconds = 4, .tail = 1};
+    const Standing r = kit_stand(&how);
+    const double rest = kit_sinkage(material), depth = material ? r.depth : 0;
+    print_message("%-11s load %.5f, depth %5.1f of %5.1f mm, still %.1e\n", name, r.load,
+                  1e3 * depth, 1e3 * rest, r.speed);
+    assert_true(r.stands);
+    expect_near("load", r.load, 1, 0.01);
+    expect_near("upright", cos(r.tilt), 1, 0.005);
     expect_near("depth", depth, rest, 0.15 * rest);
-    assert_true(speed < 0.02);
-    free(ground);
-    robot_sim_destroy(sim);
+    assert_true(r.speed < 0.02);
 }
 
 TEST(stands_everywhere) {

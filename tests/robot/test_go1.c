@@ -7,7 +7,7 @@
 
 #define MODEL MILD_SOURCE_DIR "/robots/go1"
 #include "numbers.h"
-#include "robot_kit.h"
+#include "stand_kit.h"
 
 #include <mujoco/mujoco.h>
 
@@ -264,94 +264,31 @@ TEST(a_round_foot_is_a_point) {
 
 /* ---- standing ---- */
 
-typedef struct {
-    int stands;
-    double height; /* [m] of the base at the end, above z = 0 */
-    double load;   /* [-] of the weight, mean over the last second */
-    double share;  /* [-] least load of a foot over a quarter of the weight, then too */
-    double depth;  /* [m] mean of the feet, then too */
-    double rest;   /* [m] mean over the feet of a disc's sinkage under the foot's load */
-    double moved;  /* [m] the base during the push */
-    double tilt;   /* [rad] at the end */
-    double speed;  /* [m/s, rad/s] of the base at the end, the largest component */
-} Standing;
-
-static double tilt_of(const RobotSim *sim) {
-    return acos(fmin(1.0, robot_sim_base_rotation(sim)[8]));
-}
-
-static void weigh(const RobotSim *sim, const MildMaterial *material, int steps, Standing *result,
-                  double loads[FEET]) {
-    for (int f = 0; f < FEET; f++) {
-        const RobotFoot *foot = robot_sim_foot(sim, f);
-        result->load += foot->force[2] / weight / steps;
-        result->depth += material ? foot->result.depth_mean / FEET / steps : 0;
-        loads[f] += foot->force[2] / steps;
-    }
+static int is_up(const RobotSim *sim, const MildTerrain *terrain) {
+    return kit_tilt(robot_sim_base_rotation(sim)) < 0.5 &&
+           robot_sim_body_clearance(sim, terrain) > 0;
 }
 
 /* Four seconds; a push [N] for 0.1 s after the first. material: NULL for rigid ground. */
-static Standing stand_and_push(const MildMaterial *material, double dt, const double push[6]) {
-    RobotSim *sim = new_sim(dt);
-    MildGround *ground = kit_ground(robot);
-    MildMaterial any = mild_material_default();
-    MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
-    RobotVariation variation = robot_variation_nominal();
-    variation.rigid = material == NULL;
-    double depth = material ? mild_sole_sinkage(robot_soles(robot)[0], material, weight / FEET) : 0;
-    RobotState state = stand_state(stand, 1, depth);
-    robot_sim_load(sim, &state, &variation);
-    Standing result = {.stands = 1, .share = 1e9};
-    double loads[FEET] = {0}, start[2] = {0};
-    int second = (int)(1.0 / dt + 0.5);
-    for (int i = 0; i < 4 * second && result.stands; i++) {
-        double torque[JOINTS];
-        const double *at = robot_sim_qpos(sim);
-        stand_torque(stand, sim, 1, torque);
-        int pushed = i >= second && i < second + second / 10;
-        if (i == second) {
-            memcpy(start, at, sizeof start);
-        }
-        if (pushed) {
-            result.moved = hypot(at[0] - start[0], at[1] - start[1]);
-        }
-        int bad = robot_sim_step(sim, torque, pushed ? push : NULL, &terrain, ground);
-        result.stands = !bad && tilt_of(sim) < 0.5 && robot_sim_body_clearance(sim, &terrain) > 0;
-        if (i >= 3 * second) {
-            weigh(sim, material, second, &result, loads);
-        }
-    }
-    for (int f = 0; f < FEET; f++) {
-        result.share = fmin(result.share, loads[f] / (weight / FEET));
-        result.rest +=
-            material ? mild_sole_sinkage(robot_soles(robot)[f], material, loads[f]) / FEET : 0;
-    }
-    for (int k = 0; k < 6; k++) {
-        result.speed = fmax(result.speed, fabs(robot_sim_qvel(sim)[k]));
-    }
-    result.tilt = tilt_of(sim);
-    result.height = robot_sim_qpos(sim)[2];
-    free(ground);
-    robot_sim_destroy(sim);
-    return result;
-}
-
 static void check(const char *name, const MildMaterial *material, double dt, const double push[6]) {
-    Standing r = stand_and_push(material, dt, push);
+    KitStand how = {.material = material, .dt = dt, .seconds = 4, .tail = 1, .up = is_up};
+    memcpy(how.push, push, sizeof how.push);
+    const Standing r = kit_stand(&how);
+    const double depth = material ? r.depth : 0;
     print_message("%-11s %.1f ms push %3.0f %3.0f N %s load %.5f, least foot %.2f, depth %5.1f of "
                   "%5.1f mm, moved %4.1f mm, tilt %.4f rad, still %.4f\n",
                   name, 1e3 * dt, push[0], push[1], r.stands ? "stands" : "FELL  ", r.load, r.share,
-                  1e3 * r.depth, 1e3 * r.rest, 1e3 * r.moved, r.tilt, r.speed);
+                  1e3 * depth, 1e3 * r.rest, 1e3 * r.moved, r.tilt, r.speed);
     assert_true(r.stands);
     expect_near("load", r.load, 1, 0.01);
     assert_true(r.share > 0.5);
     assert_true(r.tilt < 0.1);
     assert_true(r.speed < 0.3); /* still swaying after the push */
-    expect_near("height", r.height + r.depth, robot_stand_height(robot), 0.01);
+    expect_near("height", r.height + depth, robot_stand_height(robot), 0.01);
     if (push[0] != 0 || push[1] != 0) {
         assert_true(r.moved > 2e-3);
     } else if (material) {
-        assert_true(fabs(r.depth - r.rest) < 0.15 * r.rest);
+        assert_true(fabs(depth - r.rest) < 0.15 * r.rest);
     }
 }
 
