@@ -526,7 +526,9 @@ MILD_HD void env_end(const EnvsArrays *all, const EnvsStep *call, long robot) {
 
 MILD_HD void env_observe(const EnvsArrays *all, const EnvsStep *call, long robot) {
     TaskEnv *env = env_at(all, robot);
-    const EnvsView view = task_view_from(&call->next, &env->shape, robot);
+    const TaskShape *shape = &env->shape;
+    EnvsView view = task_view_from(&call->next, shape, robot);
+    view.history = call->next.history + robot * shape->history; /* never NULL */
     const int reset = all->reset[robot];
     EnvRobot *own = env_robot_at(all, robot);
     if (reset && tile_lane() == 0) {
