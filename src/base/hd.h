@@ -194,6 +194,7 @@ WARP_FN void lane_swap(const Real *x, int step, Real *y) {
 
 #define WARP_FN static inline
 #define LANE_COPIES LANES
+/* NOLINTNEXTLINE(bugprone-macro-parentheses): l is a name */
 #define EACH_LANE(l) for (int l = 0; l < LANES; l++)
 #define LANE(l) (l)
 #define LANE_UNROLL
