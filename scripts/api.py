@@ -103,7 +103,7 @@ def read(path):
                 items.append(Item("constant", match.group(1), code, clean("/*" + remark) if remark else doc, line))
         elif kind == "code":
             body = re.match(r"typedef (struct|enum)(?: \w+)? \{(.*)\}\s*(\w+);", piece, re.S)
-            opaque = re.match(r"typedef struct (\w+) \1;", piece)
+            opaque = re.match(r"typedef struct \w+ \*?(\w+);", piece)
             function = re.search(r"(\w+)\s*\(", piece)
             data = re.match(r"extern .*?(\w+)(?:\[\w*\])?;", piece)
             if body:

@@ -16,9 +16,9 @@ jobs=${JOBS:-$(nproc)} root=$PWD/build/check
 
 sources() {
     if git rev-parse --is-inside-work-tree >/dev/null 2>&1; then
-        git ls-files -co --exclude-standard '*.c' '*.h' '*.cu' '*.cpp'
+        git ls-files -co --exclude-standard '*.c' '*.h' '*.inc' '*.cu' '*.cpp'
     else # an archive without git
-        find include src tests examples -name '*.[ch]' -o -name '*.cu' -o -name '*.cpp'
+        find include src tests examples -name '*.[ch]' -o -name '*.inc' -o -name '*.cu' -o -name '*.cpp'
     fi
 }
 

@@ -32,6 +32,10 @@
     }                                                                                              \
     static void name(void)
 
+/* Declares a function that the linker puts before another (-Wl,--wrap in tests/CMakeLists.txt),
+ * and that other one, as it is declared: __wrap_NAME and __real_NAME. */
+#define WRAPS(name) __typeof__(name) __real_##name, __wrap_##name
+
 /* The main function of a program of cases, with what is called before the first and after the last,
  * or NULL. */
 #define TEST_MAIN(before, after)                                                                   \

@@ -342,7 +342,7 @@ static void lift_feet(void) {
 int web_move(const float *action, const float command[3]) {
     TaskEnv *env = web_env();
     const int steps = env_physics_steps(&web.task);
-    const TaskView view = {.history = web.history};
+    const EnvsView view = {.history = web.history};
     const int floor = web.trial.rigid && web.standing > web.feet;
     memcpy(env->command, command, sizeof env->command);
     web.call.action = action;

@@ -119,10 +119,10 @@ MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *e
 
 /* Solves a contact step of every robot and, with `advance`, moves the memory of the ground to its
  * end: do that once for each step that the engine keeps. On a GPU it only puts the work into
- * `stream` (a cudaStream_t; NULL: the default one), allocates nothing and waits for nothing, so it
- * may be captured in a graph. Fails when the device does. */
+ * `stream`, allocates nothing and waits for nothing, so it may be captured in a graph. Fails when
+ * the device does. */
 MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
-                           const MildBatchOutput *output, int advance, void *stream,
+                           const MildBatchOutput *output, int advance, MildStream stream,
                            MildError *error);
 /* Sets what the ground under robot 0 .. robots - 1 remembers to what `ground`, of the same soles,
  * remembers, to go on with a simulation that began on the CPU; materials of that ground are labels
@@ -141,7 +141,8 @@ MildStatus mild_batch_store_robots(const MildBatch *batch, int first, int count,
                                    MildGround *const *grounds, MildError *error);
 /* Robots whose flag is not 0 forget everything, as after they were moved to another place. which:
  * [robots] in the memory of the device; NULL: all. In `stream`, as mild_batch_step. */
-MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, void *stream, MildError *error);
+MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, MildStream stream,
+                            MildError *error);
 
 MILD_API_END
 

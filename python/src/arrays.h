@@ -33,6 +33,11 @@ inline void check(MildStatus status, const MildError &error) {
     }
 }
 
+/* A cudaStream_t, which Python has as a number. */
+inline MildStream stream_of(uintptr_t number) {
+    return (MildStream)number;
+}
+
 [[noreturn]] inline void raise(PyObject *type, const std::string &text) {
     PyErr_SetString(type, text.c_str());
     throw nb::python_error();

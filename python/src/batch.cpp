@@ -155,7 +155,7 @@ static void step(Batch &batch, nb::handle position, nb::handle rotation, nb::han
     MildStatus status;
     {
         nb::gil_scoped_release released;
-        status = mild_batch_step(at, &input, &output, advance, (void *)stream, &error);
+        status = mild_batch_step(at, &input, &output, advance, stream_of(stream), &error);
     }
     check(status, error);
 }
@@ -166,7 +166,7 @@ static void reset(Batch &batch, nb::handle which, uintptr_t stream) {
     const Array flags =
         take_optional(which, {"which", nb::dtype<uint8_t>(), {batch.robots}, batch.device});
     MildError error = {};
-    check(mild_batch_reset(at, pointer<uint8_t>(flags), (void *)stream, &error), error);
+    check(mild_batch_reset(at, pointer<uint8_t>(flags), stream_of(stream), &error), error);
 }
 
 /* ---- between grounds of the CPU and robots ---- */

@@ -142,7 +142,7 @@ static void reset(Envs &envs, Buffers &buffers, uintptr_t stream) {
     MildStatus status;
     {
         nb::gil_scoped_release released;
-        status = mild_envs_reset(at, &buffers.step.next, (void *)stream, &error);
+        status = mild_envs_reset(at, &buffers.step.next, stream_of(stream), &error);
     }
     check(status, error);
     envs.begun = true;
@@ -183,7 +183,7 @@ static void step(Envs &envs, nb::handle action, Buffers &buffers, uintptr_t stre
     MildStatus status;
     {
         nb::gil_scoped_release released;
-        status = mild_envs_step(at, &call, (void *)stream, &error);
+        status = mild_envs_step(at, &call, stream_of(stream), &error);
     }
     check(status, error);
 }
@@ -222,7 +222,7 @@ static nb::dict statistics(Envs &envs, uintptr_t stream) {
     Entered entered(envs.busy, "Envs.statistics");
     EnvsStats of = {};
     MildError error = {};
-    check(mild_envs_stats(open_envs(envs), &of, (void *)stream, &error), error);
+    check(mild_envs_stats(open_envs(envs), &of, stream_of(stream), &error), error);
     nb::dict all;
     all["episodes"] = of.episodes;
     all["falls"] = of.falls;

@@ -99,7 +99,7 @@ static void *data(const List &list, int64_t i) {
 }
 
 /* A step on a batch that nobody else is in. */
-static void *step(const Frame *frame, Batch &batch, bool advance, bool begins, void *stream) {
+static void *step(const Frame *frame, Batch &batch, bool advance, bool begins, MildStream stream) {
     const int64_t n = batch.robots, feet = batch.feet, labels = batch.labels;
     const List &in = frame->arguments, &out = frame->results;
     std::string wrong;
@@ -180,7 +180,7 @@ static void *call(const Frame *frame, bool on_device) {
     if (batch.busy.exchange(true)) {
         return fail(frame, "another thread is inside of the batch");
     }
-    void *error = batch.batch ? step(frame, batch, *advance, *begins, stream.stream)
+    void *error = batch.batch ? step(frame, batch, *advance, *begins, (MildStream)stream.stream)
                               : fail(frame, "the batch is closed");
     batch.busy = false;
     return error;

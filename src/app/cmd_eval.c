@@ -254,7 +254,7 @@ static MildStatus ablate(Eval *e, InsideLog *log, MildError *error) {
 /* With --latent or --ablate: rows whose controller is looked into. */
 static MildStatus evaluate_inside(Eval *e, FILE *table, MildError *error) {
     InsideLog log = {.feet = robot_feet(e->context.robot)};
-    const EvalCallback callback = {inside_decided, &log};
+    const EvalCallback callback = inside_callback(&log);
     Sheet sheet = {0};
     MildStatus status = learned_watch(&e->context.mover, &log.inside, error);
     if (status != MILD_OK) {

@@ -81,7 +81,7 @@ static void set_command(Walk *walk) {
 
 static void start(Walk *walk) {
     Play *play = walk->play;
-    TaskView none = {0};
+    EnvsView none = {0};
     belief_reset(&play->knows);
     set_command(walk);
     task_env_reset_on(walk->env, &walk->task, play->robot, walk->sim, &walk->live.terrain,
@@ -106,9 +106,9 @@ static void look_at_ground(Walk *walk) {
 static void step(Walk *walk) {
     Play *play = walk->play;
     float action[ROBOT_JOINTS_MAX];
-    TaskView none = {0};
+    EnvsView none = {0};
     ControllerRow row = {play->controller, 0};
-    TaskDrive drive = {controller_row_torque, &row};
+    TaskDrive drive = controller_drive(&row);
     TaskCallback callback = {watch, walk, play->controller->torque ? &drive : NULL};
     look_at_ground(walk);
     play->controller->act(play->controller->self, 1, &walk->env, action);

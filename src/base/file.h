@@ -19,10 +19,10 @@ char *file_read(const char *path, size_t limit, size_t *size, MildError *error);
  * program writes or publishes by itself, where nobody named the file that a link leads to. */
 MildStatus file_check_own(const char *path, MildError *error);
 
-/* Tells that the program will write `path`, before it reads anything. From then on a file that is
- * the same on disk cannot be opened for reading by file_open or file_read: an output never replaces
- * what it was made from, whoever named that. what: the output in messages, "--json". Fails when
- * another output has the file. For one thread, at the start of a program. */
+/* Announces that the program will write `path`, before it reads anything. From then on a file that
+ * is the same on disk cannot be opened for reading by file_open or file_read: an output never
+ * replaces what it was made from, whoever named that. what: the output in messages, "--json".
+ * Fails when another output has the file. For one thread, at the start of a program. */
 MildStatus file_claim(const char *path, const char *what, MildError *error);
 void file_claims_drop(void); /* for tests */
 

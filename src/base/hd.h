@@ -1,8 +1,9 @@
 /* The dialect of functions that a CPU and a GPU run: the common subset of C17 and CUDA C++. They
- * are functions of small structs, allocate nothing, and need only what CUDA has of libm.
+ * are functions of small structs, allocate nothing, and need only what CUDA has of libm. What
+ * depends on the compiler depends on it here and nowhere else.
  *
  *     MILD_HD     one thread has it to itself; always inlined
- *     MILD_HD_FN  the same, where the compiler decides about inlining
+ *     MILD_HD_FN  the same, where the compiler decides about inlining; or a tile has it (below)
  *     WARP_FN     the lanes of a warp work on it together (below)
  *     TEAM_FN     the warps of a block do (at the end)
  *
@@ -12,17 +13,28 @@
 #define MILD_HD_H
 
 #include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifdef __CUDACC__
+extern "C++" { /* kernel.cu includes this under "C" */
+#include <cuda_fp16.h>
+}
+#endif
 
 #ifdef MILD_REAL_FLOAT
 typedef float Real;
 #define REAL_SQRT sqrtf
 #define REAL_ABS fabsf
-#define REAL_LEAST 1e-30f /* added to a divisor so that 0/0 becomes 0 */
+#define REAL_LEAST 1e-30f   /* added to a divisor so that 0/0 becomes 0 */
+#define REAL_ROUNDING 1e-6f /* a relative change that is rounding */
 #else
 typedef double Real;
 #define REAL_SQRT sqrt
 #define REAL_ABS fabs
 #define REAL_LEAST 1e-300
+#define REAL_ROUNDING 1e-13
 #endif
 
 /* A constant in the scalar type. Integers need no conversion: write x / 2 or 2 * x. */
@@ -37,12 +49,94 @@ typedef double Real;
 #endif
 #define MILD_HD_FN static inline MILD_BOTH
 
+/* One of two texts: where a GPU runs, else. */
+#ifdef __CUDA_ARCH__
+#define ON_GPU(gpu, cpu) gpu
+#else
+#define ON_GPU(gpu, cpu) cpu
+#endif
+
 MILD_HD Real real_max(Real a, Real b) {
     return a > b ? a : b;
 }
 
 MILD_HD Real real_min(Real a, Real b) {
     return a < b ? a : b;
+}
+
+/* ---- numbers that a GPU computes in its own way ---- */
+
+/* __powf: powf has hundreds of instructions. rsqrtf: one instruction, right to 2 units in the last
+ * place. */
+#ifdef MILD_REAL_FLOAT
+#define REAL_POW ON_GPU(__powf, powf)
+#define REAL_INVERSE_SQRT(x) ON_GPU(rsqrtf(x), (1 / REAL_SQRT(x)))
+#else
+#define REAL_POW pow
+#define REAL_INVERSE_SQRT(x) (1 / REAL_SQRT(x))
+#endif
+
+/* [-] Sine and cosine of x [rad], a few turns at most. */
+MILD_HD void real_sine_cosine(Real x, Real *sine, Real *cosine) {
+#if defined(__CUDA_ARCH__) && defined(MILD_REAL_FLOAT)
+    /* sincosf has a path for large x that keeps its work in local memory */
+    sincospif(x * REAL(0.31830988618379067), sine, cosine);
+#elif defined(MILD_REAL_FLOAT)
+    *sine = sinf(x);
+    *cosine = cosf(x);
+#else
+    *sine = sin(x);
+    *cosine = cos(x);
+#endif
+}
+
+/* Four numbers from and to memory, at multiples of 16 bytes: a GPU takes one instruction. */
+MILD_HD void load4(const Real *memory, Real *x) {
+#if defined(__CUDA_ARCH__) && defined(MILD_REAL_FLOAT)
+    const float4 four = *(const float4 *)memory;
+    x[0] = four.x;
+    x[1] = four.y;
+    x[2] = four.z;
+    x[3] = four.w;
+#else
+    for (int k = 0; k < 4; k++) {
+        x[k] = memory[k];
+    }
+#endif
+}
+
+MILD_HD void store4(const Real *x, Real *memory) {
+#if defined(__CUDA_ARCH__) && defined(MILD_REAL_FLOAT)
+    *(float4 *)memory = make_float4(x[0], x[1], x[2], x[3]);
+#else
+    for (int k = 0; k < 4; k++) {
+        memory[k] = x[k];
+    }
+#endif
+}
+
+/* A number of 16 bits, as in IEEE 754, at most 65504. Scaled by 2^-112 a float has the exponent of
+ * the short one. */
+MILD_HD_FN uint16_t half_pack(float x) {
+#ifdef __CUDA_ARCH__
+    return __half_as_ushort(__float2half_rn(fminf(fmaxf(x, -65504.0f), 65504.0f)));
+#else
+    const float size = fminf(fabsf(x), 65504) * 0x1p-112f;
+    uint32_t bits;
+    memcpy(&bits, &size, sizeof bits);
+    return (uint16_t)(((bits + 0xfff + (bits >> 13 & 1)) >> 13) | (x < 0 ? 0x8000 : 0));
+#endif
+}
+
+MILD_HD_FN float half_unpack(uint16_t half) {
+#ifdef __CUDA_ARCH__
+    return __half2float(__ushort_as_half(half));
+#else
+    const uint32_t bits = (uint32_t)(half & 0x7fff) << 13 | (uint32_t)(half & 0x8000) << 16;
+    float size;
+    memcpy(&size, &bits, sizeof size);
+    return size * 0x1p112f;
+#endif
 }
 
 /* ---- lanes ---- */
@@ -100,6 +194,7 @@ WARP_FN void lane_swap(const Real *x, int step, Real *y) {
 
 #define WARP_FN static inline
 #define LANE_COPIES LANES
+/* NOLINTNEXTLINE(bugprone-macro-parentheses): l is a name */
 #define EACH_LANE(l) for (int l = 0; l < LANES; l++)
 #define LANE(l) (l)
 #define LANE_UNROLL
@@ -244,6 +339,62 @@ TEAM_FN void team_sync(void) {
 #ifdef __CUDACC__
     __syncthreads();
 #endif
+}
+
+/* ---- tiles ---- */
+
+/* A tile: on a GPU TILE threads of a warp, which call a function together and take the same way
+ * through it; on the CPU one. Each has its share of a loop
+ *
+ *     for (int i = tile_lane(); i < count; i += TILE)
+ *
+ * and lane 0 adds to what is not in such a loop; what all write is the same number. What one lane
+ * writes another reads after tile_sync. */
+#ifdef __CUDACC__
+enum { TILE = 8 };
+#define TILE_UNROLL _Pragma("unroll 8") /* lets a GPU wait for several numbers at once */
+#else
+enum { TILE = 1 };
+#define TILE_UNROLL
+#endif
+
+MILD_HD_FN int tile_lane(void) {
+    return ON_GPU((int)(threadIdx.x % TILE), 0);
+}
+
+#ifdef __CUDA_ARCH__
+static inline __device__ unsigned tile_mask(void) {
+    return ((1u << TILE) - 1) << (threadIdx.x % 32 / TILE * TILE);
+}
+#endif
+
+/* Makes what each lane wrote visible to the others. */
+MILD_HD_FN void tile_sync(void) {
+#ifdef __CUDA_ARCH__
+    __syncwarp(tile_mask());
+#endif
+}
+
+/* Sets numbers to 0. */
+MILD_HD_FN void tile_clear(void *numbers, size_t bytes) {
+#ifdef __CUDA_ARCH__
+    float *number = (float *)numbers;
+    for (size_t i = (size_t)tile_lane(); i < bytes / sizeof *number; i += TILE) {
+        number[i] = 0;
+    }
+#else
+    memset(numbers, 0, bytes);
+#endif
+}
+
+/* The sum over the lanes. */
+MILD_HD_FN Real tile_sum(Real x) {
+#ifdef __CUDA_ARCH__
+    for (int step = TILE / 2; step > 0; step /= 2) {
+        x += __shfl_xor_sync(tile_mask(), x, step);
+    }
+#endif
+    return x;
 }
 
 #endif

@@ -21,12 +21,12 @@ typedef struct {
     void (*torque)(void *self, int row, const TaskEnv *env, RobotSim *sim, double *torque);
 } Controller;
 
-/* The context of a TaskDrive: one row of a controller that commands torques. */
+/* One row of a controller that commands torques. */
 typedef struct {
     const Controller *controller;
     int row;
 } ControllerRow;
-void controller_row_torque(void *row, const TaskEnv *env, RobotSim *sim, double *torque);
+TaskDrive controller_drive(ControllerRow *row);
 
 /* Properties of a controller, as bits. */
 enum {

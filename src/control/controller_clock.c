@@ -12,7 +12,7 @@
 #include "control/weights.h"
 #include "learn/product.h"
 
-enum { CLOCK_LAYERS = 3, CLOCK_PERIODS = 5, CLOCK_WIDTH_MAX = 4096 };
+enum { CLOCK_LAYERS = 3, CLOCK_PERIODS = 5 };
 #define CLOCK_SMOOTHING 0.5F /* [-] share of the new action */
 
 typedef struct {

@@ -62,9 +62,13 @@ MildStatus controller_make(const char *name, const ControllerDef *def, Controlle
     return controller_check(name, error);
 }
 
-void controller_row_torque(void *row, const TaskEnv *env, RobotSim *sim, double *torque) {
+static void row_torque(void *row, const TaskEnv *env, RobotSim *sim, double *torque) {
     const ControllerRow *r = row;
     r->controller->torque(r->controller->self, r->row, env, sim, torque);
+}
+
+TaskDrive controller_drive(ControllerRow *row) {
+    return (TaskDrive){row_torque, row};
 }
 
 void controller_destroy(Controller *controller) {

@@ -23,10 +23,10 @@ MildStatus device_wait(int device, MildError *error);
 typedef struct DeviceFork DeviceFork;
 DeviceFork *device_fork_create(int device, int streams, MildError *error);
 void device_fork_destroy(DeviceFork *fork); /* may be NULL */
-void *device_fork_stream(const DeviceFork *fork, int i);
+MildStream device_fork_stream(const DeviceFork *fork, int i);
 /* Work put into the streams from now on waits for what is in the caller's; after device_join the
  * caller's waits for what is in them. A graph may capture both. */
-MildStatus device_fork(DeviceFork *fork, void *stream, MildError *error);
-MildStatus device_join(DeviceFork *fork, void *stream, MildError *error);
+MildStatus device_fork(DeviceFork *fork, MildStream stream, MildError *error);
+MildStatus device_join(DeviceFork *fork, MildStream stream, MildError *error);
 
 #endif

@@ -105,26 +105,26 @@ extern "C" DeviceFork *device_fork_create(int device, int streams, MildError *er
     return fork;
 }
 
-extern "C" void *device_fork_stream(const DeviceFork *fork, int i) {
+extern "C" MildStream device_fork_stream(const DeviceFork *fork, int i) {
     return fork->stream[i];
 }
 
-extern "C" MildStatus device_fork(DeviceFork *fork, void *stream, MildError *error) {
+extern "C" MildStatus device_fork(DeviceFork *fork, MildStream stream, MildError *error) {
     OnDevice on(fork->device);
-    cudaError_t status = cudaEventRecord(fork->forked, (cudaStream_t)stream);
+    cudaError_t status = cudaEventRecord(fork->forked, stream);
     for (int i = 0; status == cudaSuccess && i < fork->streams; i++) {
         status = cudaStreamWaitEvent(fork->stream[i], fork->forked, 0);
     }
     return checked(status, "streams", error);
 }
 
-extern "C" MildStatus device_join(DeviceFork *fork, void *stream, MildError *error) {
+extern "C" MildStatus device_join(DeviceFork *fork, MildStream stream, MildError *error) {
     OnDevice on(fork->device);
     cudaError_t status = cudaSuccess;
     for (int i = 0; status == cudaSuccess && i < fork->streams; i++) {
         status = cudaEventRecord(fork->joined[i], fork->stream[i]);
         if (status == cudaSuccess) {
-            status = cudaStreamWaitEvent((cudaStream_t)stream, fork->joined[i], 0);
+            status = cudaStreamWaitEvent(stream, fork->joined[i], 0);
         }
     }
     return checked(status, "streams", error);

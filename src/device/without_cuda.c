@@ -41,19 +41,19 @@ void device_fork_destroy(DeviceFork *fork) {
     (void)fork;
 }
 
-void *device_fork_stream(const DeviceFork *fork, int i) {
+MildStream device_fork_stream(const DeviceFork *fork, int i) {
     (void)fork;
     (void)i;
     return NULL;
 }
 
-MildStatus device_fork(DeviceFork *fork, void *stream, MildError *error) {
+MildStatus device_fork(DeviceFork *fork, MildStream stream, MildError *error) {
     (void)fork;
     (void)stream;
     return gpu_open(0, error);
 }
 
-MildStatus device_join(DeviceFork *fork, void *stream, MildError *error) {
+MildStatus device_join(DeviceFork *fork, MildStream stream, MildError *error) {
     (void)fork;
     (void)stream;
     return gpu_open(0, error);

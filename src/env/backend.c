@@ -19,11 +19,11 @@ void envs_destroy(Envs *envs) {
     }
 }
 
-MildStatus envs_reset(Envs *envs, const EnvsView *first, void *stream, MildError *error) {
+MildStatus envs_reset(Envs *envs, const EnvsView *first, MildStream stream, MildError *error) {
     return envs->backend->reset(envs, first, stream, error);
 }
 
-MildStatus envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+MildStatus envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error) {
     return envs->backend->step(envs, step, stream, error);
 }
 
@@ -31,7 +31,7 @@ MildStatus envs_wait(Envs *envs, MildError *error) {
     return envs->backend->wait(envs, error);
 }
 
-MildStatus envs_sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error) {
+MildStatus envs_sums(Envs *envs, EnvsStats *sums, MildStream stream, MildError *error) {
     return envs->backend->sums(envs, sums, stream, error);
 }
 

@@ -8,10 +8,10 @@
 /* See the functions of envs.h of these names. */
 typedef struct {
     void (*destroy)(Envs *envs);
-    MildStatus (*reset)(Envs *envs, const EnvsView *first, void *stream, MildError *error);
-    MildStatus (*step)(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
+    MildStatus (*reset)(Envs *envs, const EnvsView *first, MildStream stream, MildError *error);
+    MildStatus (*step)(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error);
     MildStatus (*wait)(Envs *envs, MildError *error);
-    MildStatus (*sums)(Envs *envs, EnvsStats *sums, void *stream, MildError *error);
+    MildStatus (*sums)(Envs *envs, EnvsStats *sums, MildStream stream, MildError *error);
     MildStatus (*save_progress)(Envs *envs, TaskProgress *progress, MildError *error);
     MildStatus (*load_progress)(Envs *envs, const TaskProgress *progress, MildError *error);
     EnvsMemory (*memory)(const Envs *envs);

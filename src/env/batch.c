@@ -347,32 +347,21 @@ typedef struct {
     EnvsArrays arrays;
     EnvsStep step;
     MildBatch ground;
-    void *stream;
+    MildStream stream;
 } Share;
-
-static float *row_from(float *rows, size_t first, int width) {
-    return rows ? rows + first * (size_t)width : NULL;
-}
 
 static uint8_t *flag_from(uint8_t *flags, size_t first) {
     return flags ? flags + first : NULL;
 }
 
-static EnvsView view_from(const EnvsView *view, const TaskShape *shape, size_t first) {
-    return (EnvsView){.history = row_from(view->history, first, shape->history),
-                      .critic = row_from(view->critic, first, shape->critic),
-                      .estimate = row_from(view->estimate, first, shape->estimates),
-                      .frame = row_from(view->frame, first, shape->observation)};
-}
-
 static EnvsStep step_from(const EnvsStep *step, const TaskShape *shape, size_t first) {
     return (EnvsStep){.action = step->action ? step->action + first * (size_t)shape->actions : NULL,
-                      .reward = row_from(step->reward, first, 1),
+                      .reward = task_row(step->reward, (long)first, 1),
                       .done = flag_from(step->done, first),
                       .timeout = flag_from(step->timeout, first),
                       .valid = flag_from(step->valid, first),
                       .cause = flag_from(step->cause, first),
-                      .next = view_from(&step->next, shape, first)};
+                      .next = task_view_from(&step->next, shape, (long)first)};
 }
 
 static EnvsContact contact_from(const EnvsContact *c, size_t first, size_t feet) {
@@ -412,7 +401,7 @@ static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
     return all;
 }
 
-static Share share_of(const Batch *b, const EnvsStep *step, int i, void *stream) {
+static Share share_of(const Batch *b, const EnvsStep *step, int i, MildStream stream) {
     const long envs = b->arrays.envs;
     const long first = envs * i / b->shares, end = envs * (i + 1) / b->shares;
     const int count = (int)(end - first);
@@ -551,7 +540,7 @@ static MildStatus see_share(const Batch *b, Share *share, MildError *error) {
     return status;
 }
 
-static MildStatus each_share(const Batch *b, const EnvsStep *step, void *stream,
+static MildStatus each_share(const Batch *b, const EnvsStep *step, MildStream stream,
                              MildStatus (*work)(const Batch *, Share *, MildError *),
                              MildError *error) {
     MildStatus status = b->fork ? device_fork(b->fork, stream, error) : MILD_OK;
@@ -563,12 +552,12 @@ static MildStatus each_share(const Batch *b, const EnvsStep *step, void *stream,
     return status == MILD_OK && b->fork ? device_join(b->fork, stream, error) : status;
 }
 
-static MildStatus reset(Envs *envs, const EnvsView *first, void *stream, MildError *error) {
+static MildStatus reset(Envs *envs, const EnvsView *first, MildStream stream, MildError *error) {
     const EnvsStep none = {.next = *first};
     return each_share(own(envs), &none, stream, begin_share, error);
 }
 
-static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+static MildStatus step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error) {
     return step->last.history || step->terms
                ? mild_fail(error, MILD_ERROR_ARGUMENT,
                            "the batch engine does not keep the end of an episode; train.robots = "
@@ -581,7 +570,7 @@ static MildStatus wait(Envs *envs, MildError *error) {
     return b->device == MILD_BATCH_HOST ? MILD_OK : device_wait(b->device, error);
 }
 
-static MildStatus sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error) {
+static MildStatus sums(Envs *envs, EnvsStats *sums, MildStream stream, MildError *error) {
     const Batch *b = own(envs);
     const EnvsArrays *all = &b->arrays;
     double sum[TALLY_NUMBERS];

@@ -17,12 +17,12 @@
 enum {
     WARP_THREADS = LANES * ENVS_WARPS,
     TASK_THREADS = 128,
-    TASK_ROBOTS = TASK_THREADS / TASK_LANES, /* of a block */
-    TASK_BLOCKS = 8,                         /* blocks of a multiprocessor, at least */
-    SHELLS_WARPS = 4,                        /* of a robot with shells near the ground */
-    SHELLS_BLOCKS = 3,                       /* such robots of a multiprocessor, at least */
-    SHELLS_ROBOTS = 1024,                    /* stepped at once, at most */
-    FIND_WARPS = 4,                          /* robots of a block that are looked at */
+    TASK_ROBOTS = TASK_THREADS / TILE, /* of a block */
+    TASK_BLOCKS = 8,                   /* blocks of a multiprocessor, at least */
+    SHELLS_WARPS = 4,                  /* of a robot with shells near the ground */
+    SHELLS_BLOCKS = 3,                 /* such robots of a multiprocessor, at least */
+    SHELLS_ROBOTS = 1024,              /* stepped at once, at most */
+    FIND_WARPS = 4,                    /* robots of a block that are looked at */
     TALLY_THREADS = 256,
     ORDER_THREADS = 1024
 };
@@ -36,9 +36,9 @@ static __device__ long warp_robot(void) {
     return (long)blockIdx.x * ENVS_WARPS + threadIdx.x / LANES;
 }
 
-/* TASK_LANES threads have a robot. */
+/* TILE threads have a robot. */
 static __device__ long lanes_robot(void) {
-    return (long)blockIdx.x * TASK_ROBOTS + threadIdx.x / TASK_LANES;
+    return (long)blockIdx.x * TASK_ROBOTS + threadIdx.x / TILE;
 }
 
 static int warp_blocks(int envs) {
@@ -235,65 +235,66 @@ static const char *kernels_open(int device) {
     return launched();
 }
 
-static const char *kernels_create(const EnvsArrays *all, void *stream) {
+static const char *kernels_create(const EnvsArrays *all, MildStream stream) {
     OnDevice on(all->device);
-    create<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    create<<<lanes_blocks(all->envs), TASK_THREADS, 0, stream>>>(*all);
     return launched();
 }
 
-static const char *kernels_begin(const EnvsArrays *all, void *stream) {
+static const char *kernels_begin(const EnvsArrays *all, MildStream stream) {
     OnDevice on(all->device);
-    begin<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    begin<<<lanes_blocks(all->envs), TASK_THREADS, 0, stream>>>(*all);
     return launched();
 }
 
-static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int k, void *stream) {
+static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int k,
+                                MildStream stream) {
     OnDevice on(all->device);
     const auto run = all->shells.setup ? (all->sample ? part<1, 1> : part<0, 1>)
                                        : (all->sample ? part<1, 0> : part<0, 0>);
-    run<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, (cudaStream_t)stream>>>(*all, *call, k);
+    run<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, stream>>>(*all, *call, k);
     return launched();
 }
 
-static const char *kernels_shells(const EnvsArrays *all, int k, void *stream) {
+static const char *kernels_shells(const EnvsArrays *all, int k, MildStream stream) {
     OnDevice on(all->device);
     const int looked = (all->envs + FIND_WARPS - 1) / FIND_WARPS;
     const int steps = all->envs < SHELLS_ROBOTS ? all->envs : SHELLS_ROBOTS;
-    find<<<looked, LANES * FIND_WARPS, 0, (cudaStream_t)stream>>>(*all, k);
+    find<<<looked, LANES * FIND_WARPS, 0, stream>>>(*all, k);
     const auto run = all->shells.heap ? shells<1> : shells<0>;
-    run<<<steps, LANES * SHELLS_WARPS, shells_bytes, (cudaStream_t)stream>>>(*all);
+    run<<<steps, LANES * SHELLS_WARPS, shells_bytes, stream>>>(*all);
     return launched();
 }
 
-static const char *kernels_end(const EnvsArrays *all, const EnvsStep *call, void *stream) {
+static const char *kernels_end(const EnvsArrays *all, const EnvsStep *call, MildStream stream) {
     OnDevice on(all->device);
-    end<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
+    end<<<lanes_blocks(all->envs), TASK_THREADS, 0, stream>>>(*all, *call);
     return launched();
 }
 
-static const char *kernels_first(const EnvsArrays *all, const EnvsStep *call, void *stream) {
+static const char *kernels_first(const EnvsArrays *all, const EnvsStep *call, MildStream stream) {
     OnDevice on(all->device);
-    pose<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, (cudaStream_t)stream>>>(*all);
-    observe<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
-    arrange<<<1, ORDER_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    pose<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, stream>>>(*all);
+    observe<<<lanes_blocks(all->envs), TASK_THREADS, 0, stream>>>(*all, *call);
+    arrange<<<1, ORDER_THREADS, 0, stream>>>(*all);
     return launched();
 }
 
-static const char *kernels_move_progress(const EnvsArrays *all, int back, void *stream) {
+static const char *kernels_move_progress(const EnvsArrays *all, int back, MildStream stream) {
     OnDevice on(all->device);
-    move_progress<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
+    move_progress<<<lanes_blocks(all->envs), TASK_THREADS, 0, stream>>>(*all, back);
     return launched();
 }
 
-static const char *kernels_set_command(const EnvsArrays *all, void *stream) {
+static const char *kernels_set_command(const EnvsArrays *all, MildStream stream) {
     OnDevice on(all->device);
-    set_command<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    set_command<<<lanes_blocks(all->envs), TASK_THREADS, 0, stream>>>(*all);
     return launched();
 }
 
-static const char *kernels_tally(const EnvsArrays *all, void *stream) {
+static const char *kernels_tally(const EnvsArrays *all, MildStream stream) {
     OnDevice on(all->device);
-    tally<<<TALLY_NUMBERS, TALLY_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    tally<<<TALLY_NUMBERS, TALLY_THREADS, 0, stream>>>(*all);
     return launched();
 }
 

@@ -2,8 +2,8 @@
  * for a GPU by batch_device.cu, for any robot or for one size alone.
  *
  *     env_part(0)      a warp: action, and the first physics step up to the ground
- *     env_shells(0)    a warp: the ground under robots with shells near it, where shells stand; on
- *                      rigid ground what env_part(1) would do of it
+ *     env_shells_step  a team: the ground under robots with shells near it, where shells stand; on
+ *                      rigid ground env_floor_step, a warp, as env_part(1) would do it
  *     mild_batch_step    the ground under the others
  *     env_part(1)      a warp: the rest of that physics step, the next one up to the ground
  *     ...
@@ -68,7 +68,7 @@ MILD_HD_FN void env_draw(const EnvsArrays *all, long robot, TaskEnv *env) {
     if (task->task.map) {
         env_draw_on_map(task, env, origin);
     }
-    task_lanes_sync();
+    tile_sync();
 }
 
 /* ---- from and to TaskEnv ---- */
@@ -258,7 +258,7 @@ WARP_FN void env_measure(const EnvsArrays *all, long robot, int contact, EnvWork
 /* The part of a policy step before physics: the action counts. */
 WARP_FN void env_act(const EnvsArrays *all, const EnvsStep *call, long robot, TaskEnv *env) {
     EACH_LANE(l) {
-        if (LANE(l) < TASK_LANES) {
+        if (LANE(l) < TILE) {
             task_begin_step(env, &all->task->task, call->action + robot * env->shape.actions);
         }
         if (LANE(l) == 0) {
@@ -422,12 +422,12 @@ WARP_FN void env_pose(const EnvsArrays *all, long robot, EnvWork *scratch) {
     env_measure(all, robot, 0, scratch);
 }
 
-/* ---- the task, by TASK_LANES threads ---- */
+/* ---- the task, by TILE threads ---- */
 
 /* A new environment. */
 MILD_HD void env_create(const EnvsArrays *all, long robot) {
     const EnvsTask *task = all->task;
-    if (task_lane() == 0) {
+    if (tile_lane() == 0) {
         memset(env_robot_at(all, robot), 0, sizeof(EnvRobot));
         task_env_init_head(env_at(all, robot), &task->task, task->shape, task->seed,
                            all->trial ? all->trial[robot].stream : task->first + (uint32_t)robot);
@@ -468,7 +468,7 @@ MILD_HD void env_begin(const EnvsArrays *all, long robot) {
     const int ground = env->ground[env_first_label(all, robot)];
     task_begin_episode(env, &task->task, &task->robot, 0,
                        env->variation.rigid ? 0 : task->ground[ground].depth);
-    task_clear(env_robot_at(all, robot)->saved.state + ENGINE_ACCELERATION,
+    tile_clear(env_robot_at(all, robot)->saved.state + ENGINE_ACCELERATION,
                (size_t)engine_dofs(&all->model->tree) * sizeof(Real));
     all->reset[robot] = 1;
     all->rigid[robot] = env->variation.rigid != 0;
@@ -508,7 +508,7 @@ MILD_HD void env_end(const EnvsArrays *all, const EnvsStep *call, long robot) {
     TaskEnv *env = env_at(all, robot);
     const TaskStep step = task_end_step(env, &all->task->task, &all->task->robot, &own->reading,
                                         env->torque, own->diverged);
-    if (task_lane() == 0) {
+    if (tile_lane() == 0) {
         call->reward[robot] = step.reward;
         call->done[robot] = step.done;
         call->timeout[robot] = step.timeout;
@@ -524,23 +524,17 @@ MILD_HD void env_end(const EnvsArrays *all, const EnvsStep *call, long robot) {
     }
 }
 
-MILD_HD float *env_row(float *rows, long robot, int width) {
-    return rows ? rows + robot * width : NULL;
-}
-
 MILD_HD void env_observe(const EnvsArrays *all, const EnvsStep *call, long robot) {
     TaskEnv *env = env_at(all, robot);
     const TaskShape *shape = &env->shape;
-    const TaskView view = {call->next.history + robot * shape->history,
-                           env_row(call->next.critic, robot, shape->critic),
-                           env_row(call->next.estimate, robot, shape->estimates),
-                           env_row(call->next.frame, robot, shape->observation)};
+    EnvsView view = task_view_from(&call->next, shape, robot);
+    view.history = call->next.history + robot * shape->history; /* never NULL */
     const int reset = all->reset[robot];
     EnvRobot *own = env_robot_at(all, robot);
-    if (reset && task_lane() == 0) {
+    if (reset && tile_lane() == 0) {
         task_first_sensors(env, &own->reading, &own->sensors);
     }
-    task_lanes_sync();
+    tile_sync();
     task_observe(env, &all->task->task, &all->task->robot, &own->reading,
                  all->task->ground[env->ground[own->label]].numbers, &own->sensors, reset, &view);
 }

@@ -61,16 +61,16 @@ Envs *envs_create(const EnvsDef *def, MildError *error);
 void envs_destroy(Envs *envs); /* may be NULL */
 
 /* New episodes in all environments, and their first observations. */
-MildStatus envs_reset(Envs *envs, const EnvsView *first, void *stream, MildError *error);
+MildStatus envs_reset(Envs *envs, const EnvsView *first, MildStream stream, MildError *error);
 /* A policy step of all environments. */
-MildStatus envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
+MildStatus envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error);
 /* Until the steps are done. */
 MildStatus envs_wait(Envs *envs, MildError *error);
 
 /* Sums over the episodes that ended since the last call (`assist`: over the robots), which may be
  * added to those of other Envs, and the means from them. Waits for the device. count: environments
  * of all. */
-MildStatus envs_sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error);
+MildStatus envs_sums(Envs *envs, EnvsStats *sums, MildStream stream, MildError *error);
 EnvsStats envs_means(EnvsStats sums, int count);
 /* [s] Thread time in physics since the last call, and the ground's part of it; 0 for the batch
  * engine. */

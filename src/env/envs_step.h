@@ -5,14 +5,7 @@
 
 #include <stdint.h>
 
-/* Where to write an observation; one row for each environment. Pointers may be NULL, but the batch
- * engine needs the history. Widths: TaskShape. */
-typedef struct {
-    float *history;  /* [envs][frames][observation] with sensor noise, the newest frame last */
-    float *critic;   /* [envs][critic] without noise */
-    float *estimate; /* [envs][estimates] true velocities and heights */
-    float *frame;    /* [envs][observation] the newest frame of the history */
-} EnvsView;
+#include "env/task/view.h"
 
 /* A policy step. Environments that ended begin a new episode in the same step, whose first
  * observation is the one written to `next`. */

@@ -46,15 +46,15 @@ typedef struct {
     int (*fits)(const EngineTree *tree); /* bool: for such a robot */
     const char *(*open)(int device);     /* before all that follow; waits */
     EnvsBytes (*bytes)(const TaskDef *def, const TaskShape *shape);
-    const char *(*create)(const EnvsArrays *all, void *stream);
-    const char *(*begin)(const EnvsArrays *all, void *stream);
-    const char *(*first)(const EnvsArrays *all, const EnvsStep *call, void *stream);
-    const char *(*part)(const EnvsArrays *all, const EnvsStep *call, int k, void *stream);
-    const char *(*shells)(const EnvsArrays *all, int k, void *stream);
-    const char *(*end)(const EnvsArrays *all, const EnvsStep *call, void *stream);
-    const char *(*move_progress)(const EnvsArrays *all, int back, void *stream);
-    const char *(*set_command)(const EnvsArrays *all, void *stream);
-    const char *(*tally)(const EnvsArrays *all, void *stream);
+    const char *(*create)(const EnvsArrays *all, MildStream stream);
+    const char *(*begin)(const EnvsArrays *all, MildStream stream);
+    const char *(*first)(const EnvsArrays *all, const EnvsStep *call, MildStream stream);
+    const char *(*part)(const EnvsArrays *all, const EnvsStep *call, int k, MildStream stream);
+    const char *(*shells)(const EnvsArrays *all, int k, MildStream stream);
+    const char *(*end)(const EnvsArrays *all, const EnvsStep *call, MildStream stream);
+    const char *(*move_progress)(const EnvsArrays *all, int back, MildStream stream);
+    const char *(*set_command)(const EnvsArrays *all, MildStream stream);
+    const char *(*tally)(const EnvsArrays *all, MildStream stream);
 } EnvsKernels;
 
 /* Those of this build, NULL behind them: cmake/Env.cmake, or batch_without_cuda.c. A robot takes

@@ -44,20 +44,6 @@ static TaskEnv *env_at(const Mujoco *m, int i) {
     return (TaskEnv *)(void *)(m->state + (size_t)i * m->stride);
 }
 
-static float *row_at(float *rows, int i, int width) {
-    return rows ? rows + (size_t)i * (size_t)width : NULL;
-}
-
-static TaskView view_at(const Mujoco *m, const EnvsView *view, int i) {
-    const TaskShape *shape = &m->shape;
-    return (TaskView){
-        .history = row_at(view->history, i, shape->history),
-        .critic = row_at(view->critic, i, shape->critic),
-        .estimate = row_at(view->estimate, i, shape->estimates),
-        .frame = row_at(view->frame, i, shape->observation),
-    };
-}
-
 /* ---- creation ---- */
 
 static void destroy(Envs *envs) {
@@ -108,7 +94,7 @@ static void init_envs(Mujoco *m, const EnvsDef *def) {
 
 static void reset_piece(void *context, int piece, int thread) {
     Mujoco *m = context;
-    TaskView view = view_at(m, m->view, piece);
+    EnvsView view = task_view_from(m->view, &m->shape, piece);
     TaskEnv *env = env_at(m, piece);
     RobotSim *sim = m->sim[thread];
     if (m->trial) {
@@ -121,7 +107,7 @@ static void reset_piece(void *context, int piece, int thread) {
     }
 }
 
-static MildStatus reset(Envs *envs, const EnvsView *first, void *stream, MildError *error) {
+static MildStatus reset(Envs *envs, const EnvsView *first, MildStream stream, MildError *error) {
     Mujoco *m = own(envs);
     (void)stream;
     (void)error;
@@ -138,9 +124,9 @@ static void copy_row(const float *from, int width, int valid, float *to) {
 }
 
 /* The end of an episode is seen where the next observation will be, and copied from there. */
-static void copy_last(const Mujoco *m, int piece, const TaskView *view) {
+static void copy_last(const Mujoco *m, int piece, const EnvsView *view) {
     const TaskShape *shape = &m->shape;
-    const TaskView last = view_at(m, &m->step->last, piece);
+    const EnvsView last = task_view_from(&m->step->last, &m->shape, piece);
     const int valid = m->result[piece].valid;
     copy_row(view->history, shape->history, valid, last.history);
     copy_row(view->critic, shape->critic, valid, last.critic);
@@ -169,7 +155,7 @@ static void drive(void *context, const TaskEnv *env, RobotSim *sim, double *torq
 }
 
 /* The policy step of an environment; again: bool, a new episode follows where it ends. */
-static TaskStep step_env(const Mujoco *m, int i, RobotSim *sim, int again, const TaskView *view) {
+static TaskStep step_env(const Mujoco *m, int i, RobotSim *sim, int again, const EnvsView *view) {
     const size_t steps = (size_t)m->base.physics_steps;
     const float *action = m->step->action + (size_t)i * (size_t)m->shape.actions;
     Sampling sampling = {m, i, m->sample ? m->sample + (size_t)i * steps : NULL};
@@ -186,7 +172,7 @@ static TaskStep step_env(const Mujoco *m, int i, RobotSim *sim, int again, const
 static void step_piece(void *context, int piece, int thread) {
     Mujoco *m = context;
     const EnvsStep *step = m->step;
-    TaskView view = view_at(m, &step->next, piece);
+    EnvsView view = task_view_from(&step->next, &m->shape, piece);
     TaskEnv *env = env_at(m, piece);
     TaskStep *result = &m->result[piece];
     const int last = step->last.history != NULL;
@@ -218,7 +204,7 @@ static void add_episode(EnvsStats *stats, const TaskStep *result) {
     }
 }
 
-static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+static MildStatus step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error) {
     Mujoco *m = own(envs);
     EnvsStats *stats = &m->stats;
     (void)stream;
@@ -303,7 +289,7 @@ void envs_read_sample(const TaskEnv *env, const RobotSim *sim, const double *tor
 
 /* ---- statistics ---- */
 
-static MildStatus sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error) {
+static MildStatus sums(Envs *envs, EnvsStats *sums, MildStream stream, MildError *error) {
     Mujoco *m = own(envs);
     (void)stream;
     (void)error;

@@ -113,16 +113,11 @@ MILD_HD void element_drag(Element *e, int curves, Real dt, Real gain) {
 /* Impulse of parameters that create energy (passive = false), which are negative added mass and
  * negative drag. It cannot be implicit, so it is computed from the free motion. Called after
  * element_begin. free: downward speed of the free motion [m/s]. */
-MILD_HD Real element_explicit_of(const Element *e, int curves, Real dt, Real free) {
+MILD_HD Real element_explicit(const Element *e, int curves, Real dt, Real free) {
     const Real mass = e->law.mass_rate * law_moved(&e->law, curves, e->yield_depth);
     const Real drag = e->law.drag_rate * law_moved_share(&e->law, curves, e->yield_depth);
     return real_min(mass, 0) * (free - e->front_speed) +
            real_min(drag, 0) * dt * e->entry_speed * e->entry_speed;
-}
-
-/* The same of the paper's cone. */
-MILD_HD Real element_explicit(const Element *e, Real dt, Real free) {
-    return element_explicit_of(e, LAW_CONE, dt, free);
 }
 
 #endif

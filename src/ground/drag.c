@@ -23,7 +23,7 @@ int slots_explicit(const FootScratch *foot, int materials, double dt, const Moti
             continue; /* above the ground or on the unloading line */
         }
         const Element element = slot_loaded(s, l, LAW_ANY);
-        s->explicit_impulse[l] = element_explicit_of(
+        s->explicit_impulse[l] = element_explicit(
             &element, LAW_ANY, dt, slot_velocity(s, l, free, SLOT_UNEVEN | foot->faces).descent);
     }
     return any;

@@ -6,25 +6,25 @@
 typedef struct {
     double x, y, u; /* [m] its place, world axes, and rim_depth */
     double down;    /* [-] downward part of its outward normal */
-} RimPlace;
+} RimPoint;
 
-static RimPlace place_of(const FootScratch *foot, int i) {
+static RimPoint point_of(const FootScratch *foot, int i) {
     const Slots *s = slot_block(foot, i);
     const int e = foot->element[i], l = i % SLOT_LANES;
-    return (RimPlace){foot->point_x[e] - foot->origin[0], foot->point_y[e] - foot->origin[1],
+    return (RimPoint){foot->point_x[e] - foot->origin[0], foot->point_y[e] - foot->origin[1],
                       rim_depth(s->depth[l], s->depth_max[l]), foot->share[e] / foot->area[e]};
 }
 
 void faces_lean(const FootScratch *foot) {
     double sums[RIM_SUMS] = {0.0};
     for (int i = 0; i < foot->active; i++) {
-        const RimPlace at = place_of(foot, i);
+        const RimPoint at = point_of(foot, i);
         const double area = foot->area[foot->element[i]] * foot->pitch * foot->pitch;
         rim_add(sums, at.x, at.y, at.u, at.down, area);
     }
     const Rim rim = rim_of(sums);
     for (int i = 0; i < foot->active; i++) {
-        const RimPlace at = place_of(foot, i);
+        const RimPoint at = point_of(foot, i);
         Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;
         Element element = slot_element(s, l);

@@ -111,7 +111,7 @@ MILD_HD Impulse lag_impulse(const Element *e, Real dt, Real speed) {
  *     dt mean F + d (E(m1) - E(m0))
  * The part of the way through the air has no force. Both terms increase with m1, so the step stays
  * convex. The damping term has the sign of the motion, so it takes energy. */
-MILD_HD Impulse elastic_impulse_of(const Element *e, Real dt, Real middle, const PowerWay *power) {
+MILD_HD Impulse elastic_impulse(const Element *e, Real dt, Real middle, const PowerWay *power) {
     const Real x0 = real_max(e->middle, 0);
     const Real x1 = real_max(middle, 0);
     const PowerWay over = *power;
@@ -146,11 +146,6 @@ MILD_HD PowerWay elastic_way(const Element *e, Real middle) {
     return power_way(e->law.elastic_force, e->law.elastic_exponent, x0, x1 - x0);
 }
 
-MILD_HD Impulse elastic_impulse(const Element *e, Real dt, Real middle) {
-    const PowerWay power = elastic_way(e, middle);
-    return elastic_impulse_of(e, dt, middle, &power);
-}
-
 MILD_HD ImpulsePowers element_powers(const Element *e, int curves, Real dt, Real speed) {
     const Real middle = e->depth + dt / 2 * speed;
     const Real virgin_way = real_max(middle - e->yield_depth, 0);
@@ -169,7 +164,7 @@ MILD_HD Impulse element_impulse_of(const Element *e, int curves, int stops, Real
                                    const ImpulsePowers *powers) {
     const Real middle = e->depth + dt / 2 * speed;
     const Real virgin_way = real_max(middle - e->yield_depth, 0);
-    const LawWay virgin = law_way_of(&e->law, curves, e->virgin_depth, virgin_way, &powers->virgin);
+    const LawWay virgin = law_way(&e->law, curves, e->virgin_depth, virgin_way, &powers->virgin);
 
     Impulse sum = path_impulse(e, dt, middle, virgin_way, &virgin);
     const Impulse lag = lag_impulse(e, dt, speed);
@@ -180,7 +175,7 @@ MILD_HD Impulse element_impulse_of(const Element *e, int curves, int stops, Real
         sum.slope += mass.slope + growth.slope;
     }
     if (curves & LAW_ELASTIC) {
-        const Impulse elastic = elastic_impulse_of(e, dt, middle, &powers->elastic);
+        const Impulse elastic = elastic_impulse(e, dt, middle, &powers->elastic);
         sum.value += elastic.value;
         sum.slope += elastic.slope;
     }

@@ -256,7 +256,7 @@ typedef struct {
  * with its force at the end of the way, because it is so stiff that a mean would make no
  * difference. On a way of length 0 the recruited depth is set to 0, because a fused multiply-add
  * may leave a rounding error in the difference. */
-MILD_HD LawWay law_way_of(const Law *law, int curves, Real begin, Real way, const PowerWay *power) {
+MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way, const PowerWay *power) {
     const Real half = begin + way / 2;
     const Real end = begin + way;
     LawWay over;
@@ -297,18 +297,13 @@ MILD_HD LawWay law_way_of(const Law *law, int curves, Real begin, Real way, cons
     return over;
 }
 
-/* The power over that way, for law_way_of; 0 where the law has none. */
+/* The power over that way, for law_way; 0 where the law has none. */
 MILD_HD PowerWay law_power_way(const Law *law, int curves, Real begin, Real way) {
     PowerWay power = {0, 0};
     if (curves & LAW_POWER) {
         power = power_way(law->power_force, law->power_exponent, begin, way);
     }
     return power;
-}
-
-MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way) {
-    const PowerWay power = law_power_way(law, curves, begin, way);
-    return law_way_of(law, curves, begin, way, &power);
 }
 
 #endif

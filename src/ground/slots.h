@@ -72,7 +72,7 @@ typedef struct {
     Lanes side;        /* [N/m^2] */
     Lanes whole_mu;    /* [-] Share.mu, of which `mu` is what is left in this step */
 
-    /* Share of this step: foot_share; without LAW_HEAP carry is 1. */
+    /* Share of this step: foot_carry; without LAW_HEAP carry is 1. */
     Lanes lean;  /* [-] */
     Lanes carry; /* [-] */
 

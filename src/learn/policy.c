@@ -240,11 +240,6 @@ void policy_act_rows(Policy *policy, Pool *pool, const PolicyRows *rows, const f
     run_job(&job, pool);
 }
 
-void policy_value(Policy *policy, Pool *pool, int rows, const float *critic, float *values) {
-    const PolicyRows all = {.blocks = 1, .runs = 1, .cut = {0, rows}};
-    policy_value_rows(policy, pool, &all, critic, values);
-}
-
 void policy_value_rows(Policy *policy, Pool *pool, const PolicyRows *rows, const float *critic,
                        float *values) {
     PolicyJob job = {.policy = policy, .rows = rows, .input = critic, .values = values};

@@ -32,8 +32,6 @@ void policy_act(Policy *policy, Pool *pool, int rows, const float *history, floa
 void policy_act_inside(Policy *policy, Pool *pool, int rows, const float *history,
                        const PolicyInstead *instead, float *actions, const PolicyInside *inside);
 int policy_theta(const Policy *policy);
-/* Critic values [rows] for critic inputs [rows][critic_input]. */
-void policy_value(Policy *policy, Pool *pool, int rows, const float *critic, float *values);
 const float *policy_std(const Policy *policy); /* [actions] current standard deviation */
 
 /* A safetensors file with metadata: the def, a version line, a free text `note`, and a CRC-32 of

@@ -22,7 +22,8 @@ typedef struct {
     int cut[PPO_SHARDS_MAX + 1]; /* run r of a block is rows cut[r] .. cut[r + 1] - 1; cut[0] = 0 */
 } PolicyRows;
 
-/* policy_act and policy_value. Pool may be NULL. noise: [rows][latent] of z, or NULL. */
+/* policy_act, and critic values [rows] for critic inputs [rows][critic_input]. Pool may be NULL.
+ * noise: [rows][latent] of z, or NULL. */
 void policy_act_rows(struct Policy *policy, Pool *pool, const PolicyRows *rows,
                      const float *history, const float *noise, float *actions);
 void policy_value_rows(struct Policy *policy, Pool *pool, const PolicyRows *rows,

@@ -620,7 +620,3 @@ void relief_flat_pixels(const Relief *relief, int material, unsigned char *rgb) 
         }
     }
 }
-
-void relief_material_color(const Relief *relief, int material, float rgb[3]) {
-    memcpy(rgb, look_at(relief, material)->rgb, 3 * sizeof *rgb);
-}

@@ -62,7 +62,5 @@ double relief_depth_at(const Relief *relief, double x, double y);
 void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb);
 /* The same for untouched ground of one material, seamless between tiles. */
 void relief_flat_pixels(const Relief *relief, int material, unsigned char *rgb);
-/* Base colour of a material as drawn, 0..1. */
-void relief_material_color(const Relief *relief, int material, float rgb[3]);
 
 #endif

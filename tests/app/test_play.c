@@ -18,17 +18,17 @@ static double walked[FRAMES_MAX + 1];   /* [s] that the picture shows */
 static double latest[3];
 static View *const no_view = (View *)(void *)latest; /* never looked into */
 
-double __wrap_clock_seconds(void);
+WRAPS(clock_seconds);
 double __wrap_clock_seconds(void) {
     return now;
 }
 
-void __wrap_view_observe(View *view, const RobotSim *sim);
+WRAPS(view_observe);
 void __wrap_view_observe(View *view, const RobotSim *sim) {
     assert_true(view == no_view && sim);
 }
 
-MildStatus __wrap_view_reset(View *view, const MildTerrain *terrain, MildError *error);
+WRAPS(view_reset);
 MildStatus __wrap_view_reset(View *view, const MildTerrain *terrain, MildError *error) {
     (void)error;
     assert_true(view == no_view && terrain);
@@ -36,7 +36,7 @@ MildStatus __wrap_view_reset(View *view, const MildTerrain *terrain, MildError *
     return MILD_OK;
 }
 
-void __wrap_view_frame(View *view, const RobotSim *sim, const ViewInfo *info);
+WRAPS(view_frame);
 void __wrap_view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     assert_true(view == no_view && sim && frames <= FRAMES_MAX);
     memcpy(shown[frames], info->command, sizeof shown[0]);
@@ -44,7 +44,7 @@ void __wrap_view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     walked[frames] = info->time;
 }
 
-void __wrap_view_show(View *view, WindowInput *input);
+WRAPS(view_show);
 void __wrap_view_show(View *view, WindowInput *input) {
     assert_true(view == no_view);
     *input = script[frames++];

@@ -13,12 +13,9 @@
 enum { STEP = 50 /* frames */ };
 
 static int allocations; /* the linker wraps the allocator (tests/CMakeLists.txt) */
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__real_realloc(void *block, size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t count, size_t size);
-void *__wrap_realloc(void *block, size_t size);
+WRAPS(malloc);
+WRAPS(calloc);
+WRAPS(realloc);
 
 void *__wrap_malloc(size_t size) {
     allocations++;

@@ -16,15 +16,12 @@ static float wrench[ROBOTS][6 * FEET]; /* of the batch's last step */
 static int32_t iterations[ROBOTS];
 static size_t bytes;
 
-double __wrap_clock_seconds(void);
+WRAPS(clock_seconds);
 double __wrap_clock_seconds(void) {
     return now;
 }
 
-Replay *__real_bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
-                                 MildModel model, int periods, MildError *error);
-Replay *__wrap_bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
-                                 MildModel model, int periods, MildError *error);
+WRAPS(bench_record_walk);
 Replay *__wrap_bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
                                  MildModel model, int periods, MildError *error) {
     is_walking = 1;
@@ -33,10 +30,7 @@ Replay *__wrap_bench_record_walk(const ExperimentDef *def, const Robot *robot, c
     return replay;
 }
 
-int __real_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
-                          const MildTerrain *terrain, MildGround *ground);
-int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
-                          const MildTerrain *terrain, MildGround *ground);
+WRAPS(robot_sim_step);
 int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
                           const MildTerrain *terrain, MildGround *ground) {
     const int bad = __real_robot_sim_step(sim, torque, push, terrain, ground);
@@ -50,14 +44,9 @@ int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *pus
 }
 
 /* All but the second step of a case are disturbed. */
-MildStatus __real_mild_batch_step(MildBatch *batch, const MildBatchInput *input,
-                                  const MildBatchOutput *output, int advance, void *stream,
-                                  MildError *error);
+WRAPS(mild_batch_step);
 MildStatus __wrap_mild_batch_step(MildBatch *batch, const MildBatchInput *input,
-                                  const MildBatchOutput *output, int advance, void *stream,
-                                  MildError *error);
-MildStatus __wrap_mild_batch_step(MildBatch *batch, const MildBatchInput *input,
-                                  const MildBatchOutput *output, int advance, void *stream,
+                                  const MildBatchOutput *output, int advance, MildStream stream,
                                   MildError *error) {
     const MildStatus status = __real_mild_batch_step(batch, input, output, advance, stream, error);
     now += (advance ? advance_time : solve_time) + (steps++ % 3 == 1 ? 0 : 50);

@@ -21,8 +21,7 @@ static double reward_of(int of, int i) {
     return (of == 1 ? 1.0 : 1.25) + 0.25 * (i % 8);
 }
 
-Envs *__real_envs_create(const EnvsDef *def, MildError *error);
-Envs *__wrap_envs_create(const EnvsDef *def, MildError *error);
+WRAPS(envs_create);
 Envs *__wrap_envs_create(const EnvsDef *def, MildError *error) {
     assert_true(def->count == EPISODES && def->task->assist == 0);
     side = def->batch ? 2 : 1;
@@ -30,9 +29,8 @@ Envs *__wrap_envs_create(const EnvsDef *def, MildError *error) {
 }
 
 /* After its first episode an environment goes on, and says other things. */
-MildStatus __real_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
-MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
-MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+WRAPS(envs_step);
+MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error) {
     const MildStatus status = __real_envs_step(envs, step, stream, error);
     const int t = ++step_of[side];
     assert_true(t <= LAST); /* all have ended then */

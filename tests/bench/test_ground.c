@@ -18,40 +18,30 @@ enum {
 static double now;         /* [s] of the clock */
 static size_t plain_bytes; /* of a ground without imprints; 0: not known yet */
 
-double __wrap_clock_thread_seconds(void);
+WRAPS(clock_thread_seconds);
 double __wrap_clock_thread_seconds(void) {
     return now;
 }
 
-MildStatus __real_mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
-                                    const MildContactInput *input, MildScratch *scratch,
-                                    MildContactResult *result);
-MildStatus __wrap_mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
-                                    const MildContactInput *input, MildScratch *scratch,
-                                    MildContactResult *result);
-MildStatus __wrap_mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
-                                    const MildContactInput *input, MildScratch *scratch,
-                                    MildContactResult *result) {
+WRAPS(mild_ground_solve);
+void __wrap_mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
+                              const MildContactInput *input, MildScratch *scratch,
+                              MildContactResult *result) {
     plain_bytes = plain_bytes ? plain_bytes : mild_ground_size(ground);
     now += input->solver == MILD_SOLVER_NEWTON ? NEWTON : SWEEPS;
     now += input->velocity[0][0] > 0.1 && input->velocity[1][0] > 0.1 ? SLIPS : 0;
     now += terrain->map ? UNEVEN : 0;
     now += 2 * mild_ground_size(ground) > 3 * plain_bytes ? IMPRINTS : 0;
     now += OF_MODEL * (double)terrain->materials[0].model;
-    return __real_mild_ground_solve(ground, terrain, input, scratch, result);
+    __real_mild_ground_solve(ground, terrain, input, scratch, result);
 }
 
-MildStatus __real_mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
-                                      const MildContactInput *input, MildScratch *scratch,
-                                      const MildContactResult *result);
-MildStatus __wrap_mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
-                                      const MildContactInput *input, MildScratch *scratch,
-                                      const MildContactResult *result);
-MildStatus __wrap_mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
-                                      const MildContactInput *input, MildScratch *scratch,
-                                      const MildContactResult *result) {
+WRAPS(mild_ground_advance);
+void __wrap_mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
+                                const MildContactInput *input, const MildScratch *scratch,
+                                const MildContactResult *result) {
     now += ADVANCE;
-    return __real_mild_ground_advance(ground, terrain, input, scratch, result);
+    __real_mild_ground_advance(ground, terrain, input, scratch, result);
 }
 
 /* The row in seconds where its unit is ns. */

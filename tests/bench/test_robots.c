@@ -16,7 +16,7 @@ static int stepped[4];    /* [robots' steps] */
 static double held, said; /* [B] of more robots: what the program holds, what they say */
 static EnvsMemory memory; /* [B] of one robot */
 
-double __wrap_clock_seconds(void);
+WRAPS(clock_seconds);
 double __wrap_clock_seconds(void) {
     return now;
 }
@@ -27,8 +27,7 @@ static size_t held_bytes(void) {
     return info.uordblks + info.hblkhd;
 }
 
-Envs *__real_envs_create(const EnvsDef *def, MildError *error);
-Envs *__wrap_envs_create(const EnvsDef *def, MildError *error);
+WRAPS(envs_create);
 
 /* [B] What more robots take, as they say and as the program holds more, by creating them. */
 static void measure_more(const EnvsDef *def, int count, double sign) {
@@ -55,16 +54,15 @@ Envs *__wrap_envs_create(const EnvsDef *def, MildError *error) {
     return envs;
 }
 
-MildStatus __real_envs_reset(Envs *envs, const EnvsView *first, void *stream, MildError *error);
-MildStatus __wrap_envs_reset(Envs *envs, const EnvsView *first, void *stream, MildError *error);
-MildStatus __wrap_envs_reset(Envs *envs, const EnvsView *first, void *stream, MildError *error) {
+WRAPS(envs_reset);
+MildStatus __wrap_envs_reset(Envs *envs, const EnvsView *first, MildStream stream,
+                             MildError *error) {
     now += reset_time;
     return __real_envs_reset(envs, first, stream, error);
 }
 
-MildStatus __real_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
-MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
-MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+WRAPS(envs_step);
+MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error) {
     const MildStatus status = __real_envs_step(envs, step, stream, error);
     now += created == 1 ? step_time : walk_time;
     for (int i = 0; i < ENVS; i++) {
@@ -75,9 +73,8 @@ MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, Mild
 }
 
 /* The march diverges in 7 steps, it says. */
-MildStatus __real_envs_sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error);
-MildStatus __wrap_envs_sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error);
-MildStatus __wrap_envs_sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error) {
+WRAPS(envs_sums);
+MildStatus __wrap_envs_sums(Envs *envs, EnvsStats *sums, MildStream stream, MildError *error) {
     const MildStatus status = __real_envs_sums(envs, sums, stream, error);
     sums->diverged = created == 1 ? 7 : 0;
     return status;

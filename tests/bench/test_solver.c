@@ -24,7 +24,7 @@ static Problem problem[SETS][PROBLEMS];
 static int set, number; /* of the problem now; number counts from 1 */
 static int calls;       /* of the solvers, to disturb all but every third */
 
-double __wrap_clock_thread_seconds(void);
+WRAPS(clock_thread_seconds);
 double __wrap_clock_thread_seconds(void) {
     return now;
 }
@@ -49,12 +49,7 @@ static int is_sweeps(const MildContactInput *input) {
     return input->solver == MILD_SOLVER_GAUSS_SEIDEL;
 }
 
-void __real_mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
-                              const MildContactInput *input, MildScratch *scratch,
-                              MildContactResult *result);
-void __wrap_mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
-                              const MildContactInput *input, MildScratch *scratch,
-                              MildContactResult *result);
+WRAPS(mild_ground_solve);
 void __wrap_mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
                               const MildContactInput *input, MildScratch *scratch,
                               MildContactResult *result) {

@@ -34,8 +34,7 @@ double clock_thread_seconds(void) {
     return clock_seconds();
 }
 
-void __real_mj_step(const mjModel *m, mjData *d);
-void __wrap_mj_step(const mjModel *m, mjData *d);
+WRAPS(mj_step);
 void __wrap_mj_step(const mjModel *m, mjData *d) {
     __real_mj_step(m, d);
     const int name = mj_name2id(m, mjOBJ_GEOM, "floor");
@@ -45,10 +44,7 @@ void __wrap_mj_step(const mjModel *m, mjData *d) {
     now += walks;
 }
 
-void __real_robot_sim_set_solver(RobotSim *sim, MildSolver solver, double tolerance,
-                                 int iterations);
-void __wrap_robot_sim_set_solver(RobotSim *sim, MildSolver solver, double tolerance,
-                                 int iterations);
+WRAPS(robot_sim_set_solver);
 void __wrap_robot_sim_set_solver(RobotSim *sim, MildSolver solver, double tolerance,
                                  int iterations) {
     is_loose = tolerance > 0;
@@ -71,10 +67,7 @@ static void expect_torques(const Replay *replay) {
     }
 }
 
-int __real_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
-                          const MildTerrain *terrain, MildGround *ground);
-int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
-                          const MildTerrain *terrain, MildGround *ground);
+WRAPS(robot_sim_step);
 int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
                           const MildTerrain *terrain, MildGround *ground) {
     reads = 0;
@@ -95,10 +88,7 @@ int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *pus
     return bad;
 }
 
-Replay *__real_bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
-                                 MildModel model, int periods, MildError *error);
-Replay *__wrap_bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
-                                 MildModel model, int periods, MildError *error);
+WRAPS(bench_record_walk);
 Replay *__wrap_bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
                                  MildModel model, int periods, MildError *error) {
     is_walking = 1;

@@ -15,9 +15,8 @@ static double first_after; /* [s] when the first iteration was over */
 static int iterations;
 static TrainTimes counted; /* sums of all iterations but the first */
 
-double __wrap_clock_seconds(void);
-MildStatus __real_train_iterate(Trainer *trainer, TrainReport *report, MildError *error);
-MildStatus __wrap_train_iterate(Trainer *trainer, TrainReport *report, MildError *error);
+WRAPS(clock_seconds);
+WRAPS(train_iterate);
 
 double __wrap_clock_seconds(void) {
     pthread_mutex_lock(&reading);

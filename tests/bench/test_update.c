@@ -12,13 +12,12 @@ static double now;        /* [s] of the clock */
 static int acts, updates; /* calls */
 static double flops;      /* of the first act and the first update of a rollout */
 
-double __wrap_clock_seconds(void);
+WRAPS(clock_seconds);
 double __wrap_clock_seconds(void) {
     return now;
 }
 
-void __real_ppo_act(Ppo *ppo, int t);
-void __wrap_ppo_act(Ppo *ppo, int t);
+WRAPS(ppo_act);
 void __wrap_ppo_act(Ppo *ppo, int t) {
     now += act_time;
     assert_int_equal(t, acts % STEPS);
@@ -27,8 +26,7 @@ void __wrap_ppo_act(Ppo *ppo, int t) {
     }
 }
 
-void __real_ppo_update(Ppo *ppo, PpoReport *report);
-void __wrap_ppo_update(Ppo *ppo, PpoReport *report);
+WRAPS(ppo_update);
 void __wrap_ppo_update(Ppo *ppo, PpoReport *report) {
     now += update_time;
     if (updates++ == 0) {
@@ -36,10 +34,7 @@ void __wrap_ppo_update(Ppo *ppo, PpoReport *report) {
     }
 }
 
-void __real_product(char transpose_a, char transpose_b, int m, int n, int k, const float *a,
-                    int lda, const float *b, int ldb, float beta, float *c, int ldc);
-void __wrap_product(char transpose_a, char transpose_b, int m, int n, int k, const float *a,
-                    int lda, const float *b, int ldb, float beta, float *c, int ldc);
+WRAPS(product);
 void __wrap_product(char transpose_a, char transpose_b, int m, int n, int k, const float *a,
                     int lda, const float *b, int ldb, float beta, float *c, int ldc) {
     flops += 2.0 * m * n * k;

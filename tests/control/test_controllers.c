@@ -29,7 +29,7 @@ static void scene_open(Scene *scene, const char *robot, const char *controller) 
     assert_string_equal(scene->controller.name, controller);
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
-    TaskView none = {0};
+    EnvsView none = {0};
     task_env_init(scene->env, &scene->def, scene->robot, 1, 0);
     scene->env->command_frozen = 1;
     memset(scene->env->command, 0, sizeof scene->env->command);
@@ -132,7 +132,7 @@ TEST(stand_stands) {
     static const char *const robots[] = {"sa01", "go1", "g1"};
     for (int r = 0; r < 3; r++) {
         Scene scene;
-        TaskView none = {0};
+        EnvsView none = {0};
         float action[ROBOT_JOINTS_MAX];
         scene_open(&scene, robots[r], "stand");
         for (int t = 0; t < 500; t++) {

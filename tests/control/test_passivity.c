@@ -404,9 +404,9 @@ static Run run(const char *ground, double speed, double seconds) {
     const int rigid = strcmp(ground, "rigid") == 0;
     assert_true(rigid || mild_material_preset(ground, &material));
     MildTerrain terrain = mild_terrain_uniform(&material);
-    TaskView none = {0};
+    EnvsView none = {0};
     ControllerRow row = {&controller, 0};
-    TaskDrive drive = {controller_row_torque, &row};
+    TaskDrive drive = controller_drive(&row);
     TaskCallback callback = {see_nothing, NULL, &drive};
     Run out = {.z_low = 1e9};
     task_env_init(env, &def, robot, 1, 0);

@@ -15,7 +15,7 @@ typedef struct {
 
 static World make_world(void) {
     MildError error = {0};
-    const TaskView none = {0};
+    const EnvsView none = {0};
     Scene scene;
     World w = {.env = aligned_alloc(64, task_env_bytes(&task, robot)),
                .sim = robot_sim_create(robot, task.physics_dt, &error)};
@@ -59,7 +59,7 @@ static StatePacket state_of(const World *w, uint32_t sequence, double time) {
 /* Two seconds of a walk that turns and then stands: every target is what the task's motor would
  * get, but for the torque limit. */
 TEST(the_same_as_the_task) {
-    const TaskView none = {0};
+    const EnvsView none = {0};
     World w = make_world();
     Runner *runner = make_runner();
     double worst = 0, farthest = 0;

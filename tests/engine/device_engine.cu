@@ -21,7 +21,7 @@ extern "C" {
 #include "ground/batch/batch.h"
 }
 
-#include "robot/engine/robots.h"
+#include "device_robots.h"
 
 static const double dt = 0.0025; /* [s] */
 

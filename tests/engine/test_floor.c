@@ -4,16 +4,11 @@
  * double. */
 #include <stdio.h>
 
-#include "base/random.h"
-#include "ground/grid.h"
-#include "robot/engine/read.h"
-#include "robot/engine/step.h"
-#include "robot/sim.h"
-#include "robots.h"
+#include "falls.h"
 
-enum { ROBOTS = 3, FALLS = 24, FALL_STEPS = 300 };
-static const char *const names[ROBOTS] = {"sa01", "go1", "g1"};
-static const double dt = 0.0025;
+#include "ground/grid.h"
+
+enum { FALLS = 24 };
 
 typedef struct {
     EngineWork work;
@@ -28,10 +23,6 @@ typedef struct {
 } Worst;
 
 static Engine engine;
-
-static double worse(double a, double b) {
-    return !(a > b) && a == a ? b : a; /* NaN where one is */
-}
 
 /* A step of the engine from MuJoCo's state. Returns whether a shell touches. */
 static int engine_step(const EngineModel *model, const RobotState *state,
@@ -94,21 +85,6 @@ static void compare(const EngineModel *model, const RobotSim *sim, Worst *worst)
     worst->newton = work->newton > worst->newton ? work->newton : worst->newton;
 }
 
-static RobotState random_state(const Robot *robot, Random *random) {
-    RobotState state = {.qpos = {random_uniform(random, -1, 1), 0, 0.5}};
-    for (int k = 3; k < 7; k++) {
-        state.qpos[k] = random_normal(random);
-    }
-    mju_normalize4(state.qpos + 3);
-    for (int j = 0; j < robot->def.joints; j++) {
-        state.qpos[7 + j] = random_uniform(random, robot->low[j], robot->high[j]);
-    }
-    for (int d = 0; d < robot->nv; d++) {
-        state.qvel[d] = random_uniform(random, -1, 1);
-    }
-    return state;
-}
-
 static void fall(const Robot *robot, const EngineModel *model, RobotSim *sim, const MildMap *map,
                  uint32_t number, Worst *worst) {
     Random random = random_at(5, number, 0);
@@ -125,9 +101,7 @@ static void fall(const Robot *robot, const EngineModel *model, RobotSim *sim, co
     robot_sim_load(sim, &state, &rigid);
     for (int s = 0; s < FALL_STEPS; s++) {
         double torque[ROBOT_JOINTS_MAX];
-        for (int j = 0; j < robot->def.joints; j++) {
-            torque[j] = 0.1 * robot->effort[j] * random_uniform(&random, -1, 1);
-        }
+        random_torque(robot, &random, torque);
         robot_sim_store(sim, &state);
         assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
         const int touches =
@@ -138,16 +112,6 @@ static void fall(const Robot *robot, const EngineModel *model, RobotSim *sim, co
             compare(model, sim, worst);
         }
     }
-}
-
-static EngineModel *read_model(const Robot *robot) {
-    MildError error = {0};
-    EngineModel *model = calloc(1, sizeof *model);
-    assert_non_null(model);
-    expect_good(engine_model_read(robot, dt, &model->tree, (double *)(void *)&model->number,
-                                  &error) == MILD_OK,
-                &error);
-    return model;
 }
 
 static MildMap *waves(void) {

@@ -3,16 +3,11 @@
  * feet and bodies are the same, and so is the next velocity under the same wrenches. In double. */
 #include <stdio.h>
 
-#include "base/random.h"
-#include "robot/engine/read.h"
-#include "robot/engine/shells.h"
-#include "robot/engine/step.h"
-#include "robot/sim.h"
-#include "robots.h"
+#include "falls.h"
 
-enum { ROBOTS = 3, FALLS = 12, FALL_STEPS = 300, ROWS_MOST = 6 * (ROBOT_FEET_MAX + 8) };
-static const char *const names[ROBOTS] = {"sa01", "go1", "g1"};
-static const double dt = 0.0025;
+#include "robot/engine/shells.h"
+
+enum { FALLS = 12, ROWS_MOST = 6 * (ROBOT_FEET_MAX + 8) };
 
 /* What the engine gives and takes. */
 typedef struct {
@@ -29,10 +24,6 @@ typedef struct {
     double pose, twist, inertia, rate;
     int steps, bodies, limited;
 } Worst;
-
-static double worse(double a, double b) {
-    return !(a > b) && a == a ? b : a; /* NaN where one is */
-}
 
 static double apart(const double *a, const double *b, int count) {
     double most = 0, size = 1e-3;
@@ -120,21 +111,6 @@ static void compare(const EngineModel *model, const RobotSim *sim, const Engine 
     worst->limited += e->work.newton > 0;
 }
 
-static RobotState random_state(const Robot *robot, Random *random) {
-    RobotState state = {.qpos = {random_uniform(random, -1, 1), 0, 0.5}};
-    for (int k = 3; k < 7; k++) {
-        state.qpos[k] = random_normal(random);
-    }
-    mju_normalize4(state.qpos + 3);
-    for (int j = 0; j < robot->def.joints; j++) {
-        state.qpos[7 + j] = random_uniform(random, robot->low[j], robot->high[j]);
-    }
-    for (int d = 0; d < robot->nv; d++) {
-        state.qvel[d] = random_uniform(random, -1, 1);
-    }
-    return state;
-}
-
 static void fall(const Robot *robot, const EngineModel *model, RobotSim *sim, MildGround *ground,
                  uint32_t number, Worst *worst) {
     static Engine engine;
@@ -146,9 +122,7 @@ static void fall(const Robot *robot, const EngineModel *model, RobotSim *sim, Mi
     robot_sim_load(sim, &state, &nominal);
     for (int s = 0; s < FALL_STEPS; s++) {
         double torque[ROBOT_JOINTS_MAX];
-        for (int j = 0; j < robot->def.joints; j++) {
-            torque[j] = 0.1 * robot->effort[j] * random_uniform(&random, -1, 1);
-        }
+        random_torque(robot, &random, torque);
         robot_sim_store(sim, &state);
         if (robot_sim_step(sim, torque, NULL, &terrain, ground)) {
             return;
@@ -160,16 +134,6 @@ static void fall(const Robot *robot, const EngineModel *model, RobotSim *sim, Mi
             compare(model, sim, &engine, worst);
         }
     }
-}
-
-static EngineModel *read_model(const Robot *robot) {
-    MildError error = {0};
-    EngineModel *model = calloc(1, sizeof *model);
-    assert_non_null(model);
-    expect_good(engine_model_read(robot, dt, &model->tree, (double *)(void *)&model->number,
-                                  &error) == MILD_OK,
-                &error);
-    return model;
 }
 
 TEST(bodies_are_those_of_mujoco) {

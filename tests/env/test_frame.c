@@ -2,7 +2,7 @@
 #include "kit.h"
 
 #define MILD_REAL_FLOAT
-#include "env/task/lanes.h"
+#include "env/task/numbers.h"
 
 /* Numbers and their bits by the tables of IEEE 754-2008 binary16; ties go to even. */
 TEST(known_numbers) {

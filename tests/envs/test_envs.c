@@ -147,7 +147,7 @@ static int play_alone(Plain *plain, int e, float history[SA01_HISTORY], TaskStep
     RobotSim *sim = robot_sim_create(plain->robot, def->physics_dt, NULL);
     TaskEnv *env = aligned_alloc(64, (task_env_bytes(def, plain->robot) + 63) / 64 * 64);
     assert_true(sim && env);
-    const TaskView view = {.history = history};
+    const EnvsView view = {.history = history};
     task_env_init(env, def, plain->robot, 7, (uint32_t)e);
     task_env_reset(env, def, plain->robot, sim, &view);
     int t = 0;

@@ -6,7 +6,7 @@ import re
 import sys
 
 root = pathlib.Path(sys.argv[1])
-header = (root / "src/env/envs_step.h").read_text() + (root / "src/run/envs/envs.h").read_text()
+header = "".join((root / "src" / path).read_text() for path in ("env/task/view.h", "env/envs_step.h", "run/envs/envs.h"))
 script = (root / "scripts/rivals/envs.py").read_text()
 
 

@@ -247,6 +247,11 @@ TEST(the_shipped_policy_walks) {
     assert_true(row.base_oscillation > 1e-3 && row.base_oscillation < 0.1);
 }
 
+static void measure_one(void *measure, const TaskEnv *env, const RobotSim *sim,
+                        const double *torque) {
+    measure_step(measure, env, sim, torque);
+}
+
 /* A trial stepped here, with every number of the row: the second one, its command from the first
  * step on, in one episode however short the task's is, weighed at 9.81 m/s^2. */
 TEST(a_row_is_what_its_trials_did) {
@@ -269,7 +274,7 @@ TEST(a_row_is_what_its_trials_did) {
     RobotSim *sim = robot_sim_create(robot, def.physics_dt, &error);
     assert_non_null(sim);
     for (uint32_t i = 0; i < 2; i++) {
-        const TaskView none = {0};
+        const EnvsView none = {0};
         TaskEnv *env = aligned_alloc(64, task_env_bytes(&longer, robot));
         assert_non_null(env);
         task_env_init(env, &longer, robot, 7, i);
@@ -278,7 +283,7 @@ TEST(a_row_is_what_its_trials_did) {
         measure_start(&measure[i], longer.physics_dt);
         for (int k = 0; k < 300; k++) {
             float action[SA01_JOINTS];
-            const TaskCallback callback = {measure_step, &measure[i], NULL};
+            const TaskCallback callback = {measure_one, &measure[i], NULL};
             controller.act(controller.self, 1, &env, action);
             const TaskStep step =
                 task_env_step(env, &longer, robot, sim, action, 0, &none, &callback);

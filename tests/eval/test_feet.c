@@ -10,8 +10,7 @@ enum { TRIALS = 2, PERIODS = 10, OF_PERIOD = 4, STEPS = PERIODS * OF_PERIOD, COL
 
 static int callocs; /* until one fails; 0: none does */
 
-void *__real_calloc(size_t count, size_t size);
-void *__wrap_calloc(size_t count, size_t size);
+WRAPS(calloc);
 void *__wrap_calloc(size_t count, size_t size) {
     return callocs > 0 && --callocs == 0 ? NULL : __real_calloc(count, size);
 }
@@ -52,16 +51,14 @@ static EnvsFoot made_foot(int trial, int i, int f) {
 static int steps;          /* policy steps of all trials */
 static EnvsSample *sample; /* [TRIALS][OF_PERIOD] where a policy step's go */
 
-void __real_envs_set_samples(Envs *envs, EnvsSample *to);
-void __wrap_envs_set_samples(Envs *envs, EnvsSample *to);
+WRAPS(envs_set_samples);
 void __wrap_envs_set_samples(Envs *envs, EnvsSample *to) {
     sample = to ? to : sample;
     __real_envs_set_samples(envs, to);
 }
 
-MildStatus __real_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
-MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
-MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+WRAPS(envs_step);
+MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error) {
     const MildStatus status = __real_envs_step(envs, step, stream, error);
     for (int n = 0; n < TRIALS * OF_PERIOD; n++) {
         for (int f = 0; f < SA01_FEET; f++) {

@@ -12,7 +12,7 @@ enum { ESTIMATES = THETA + 2 };
 /* A walk over a border at x = 0.2, whose decisions are logged. */
 static char *log_walk(InsideLog *log, Controller *controller) {
     MildError error = {0};
-    const EvalCallback callback = {inside_decided, log};
+    const EvalCallback callback = inside_callback(log);
     const EvalDef eval = {
         .speed = 0.5, .trials = TRIALS, .seconds = STEPS * 0.01, .seed = 1, .callback = &callback};
     Scene scene;
@@ -130,7 +130,7 @@ TEST(the_numbers_are_the_policys) {
     scaled.velocity_scale = 2;
     scaled.height_scale = 5;
     InsideLog log = {.feet = SA01_FEET};
-    const EvalCallback callback = {inside_decided, &log};
+    const EvalCallback callback = inside_callback(&log);
     const EvalDef eval = {.speed = 0.5, .trials = TRIALS, .seconds = 0.2, .callback = &callback};
     Controller controller = {&keeping, "keeping", keeping_act, NULL, NULL, NULL};
     double sum[LATENT + SA01_ESTIMATES + 2] = {0}; /* theta1, theta2 */

@@ -24,15 +24,13 @@ static int sends = -1;        /* calls of send so far; -1: all that is asked for
 static struct timeval wanted; /* how long an answer may take */
 static int microseconds;      /* in its place; 0: as wanted */
 
-int __real_socketpair(int domain, int type, int protocol, int ends[2]);
-int __wrap_socketpair(int domain, int type, int protocol, int ends[2]);
+WRAPS(socketpair);
 int __wrap_socketpair(int domain, int type, int protocol, int ends[2]) {
     return sockets > 0 && --sockets == 0 ? -1 : __real_socketpair(domain, type, protocol, ends);
 }
 
 /* As a full socket that signals interrupt: a few bytes, or none. */
-ssize_t __real_send(int socket, const void *data, size_t size, int flags);
-ssize_t __wrap_send(int socket, const void *data, size_t size, int flags);
+WRAPS(send);
 ssize_t __wrap_send(int socket, const void *data, size_t size, int flags) {
     if (sends >= 0 && sends++ % 3 == 1) {
         errno = EINTR;
@@ -41,8 +39,7 @@ ssize_t __wrap_send(int socket, const void *data, size_t size, int flags) {
     return __real_send(socket, data, sends >= 0 && size > 1000 ? 1000 : size, flags);
 }
 
-int __real_setsockopt(int socket, int level, int name, const void *value, socklen_t size);
-int __wrap_setsockopt(int socket, int level, int name, const void *value, socklen_t size);
+WRAPS(setsockopt);
 int __wrap_setsockopt(int socket, int level, int name, const void *value, socklen_t size) {
     const struct timeval shorter = {0, microseconds};
     assert_true(level == SOL_SOCKET && name == SO_RCVTIMEO && size == sizeof wanted);

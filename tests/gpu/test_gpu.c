@@ -560,13 +560,6 @@ TEST(runs_repeat) {
 
 /* ---- learning ---- */
 
-static PpoDef toy_ppo_def(void) {
-    PpoDef def = ppo_def_default();
-    def.steps = 40;
-    def.minibatches = 2;
-    return def;
-}
-
 static void assert_same_state(const Learner *a, const Learner *b) {
     const Network *n = &a->policy->network;
     const size_t bytes = (size_t)n->count * sizeof(float), envs = (size_t)a->batch.envs;

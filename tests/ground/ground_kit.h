@@ -3,25 +3,13 @@
 #ifndef GROUND_KIT_H
 #define GROUND_KIT_H
 
+#include "draws.h"
 #include "materials.h"
 #include "sa01_sole.h"
 
 #define KIT_PITCH 0.0195
 #define KIT_SOLE_Z (-0.055)
 #define KIT_GRAVITY 9.81
-
-/* SplitMix64: the ground layer stands below base, so its tests carry their own numbers. */
-static inline double kit_uniform(uint64_t *state, double low, double high) {
-    uint64_t x = *state += 0x9e3779b97f4a7c15u;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    x ^= x >> 31;
-    return low + (high - low) * ((double)(x >> 11) * 0x1.0p-53);
-}
-
-static inline int kit_index(uint64_t *state, int count) {
-    return (int)kit_uniform(state, 0.0, (double)count);
-}
 
 /* Draws of a random test: `count`, or the share of it in MILD_TEST_DRAWS, which scripts/mutants.py
  * sets: a fault that random states show at all, few of them show. */
@@ -41,11 +29,6 @@ static inline double kit_seconds(double time) {
  * left out where MILD_TEST_DRAWS is set. */
 static inline int kit_finest(void) {
     return getenv("MILD_TEST_DRAWS") != NULL;
-}
-
-/* Log-uniform. */
-static inline double kit_spread(uint64_t *random, double low, double high) {
-    return exp(kit_uniform(random, log(low), log(high)));
 }
 
 static inline void kit_vector(uint64_t *random, double size, double *x) {
@@ -372,6 +355,25 @@ static inline void kit_random_state(Kit *kit, uint64_t *random) {
             kit->input.velocity[f][3 + k] = fast * kit_uniform(random, -2.0, 2.0);
         }
     }
+}
+
+/* Asserts that motions first .. first + count - 1, from the air to the air, give no energy. motion:
+ * [J] what the ground gave; *work: the sum of its works' sizes, for a scale. */
+static inline void kit_closed(int first, int count, double (*motion)(int number, double *work)) {
+    double worst = -INFINITY, share = -INFINITY;
+    int at = 0, gained = 0;
+    for (int n = first; n < first + count; n++) {
+        double work;
+        const double given = motion(n, &work);
+        gained += given > 1e-12 * work;
+        at = given > worst ? n : at;
+        worst = fmax(worst, given);
+        share = fmax(share, given / fmax(work, 1e-12));
+    }
+    print_message(
+        "%d closed motions: %d gave energy, at most %.2e J (number %d), %.1e of the work\n", count,
+        gained, worst, at, share);
+    assert_int_equal(gained, 0);
 }
 
 #endif

@@ -4,18 +4,14 @@
 
 #include "ground/models.h"
 
-static double uniform(uint64_t *random, double low, double high) {
-    return kit_uniform(random, low, high);
-}
-
 TEST(test_pow) {
     uint64_t random = 3;
     double worst = 0.0;
     for (int i = 0; i < 200000; i++) {
-        const double x = exp(uniform(&random, -9.3, 25.0));
-        const double y = uniform(&random, -0.5, 0.5);
+        const double x = exp(kit_uniform(&random, -9.3, 25.0));
+        const double y = kit_uniform(&random, -0.5, 0.5);
         worst = fmax(worst, fabs(real_pow(x, y) / pow(x, y) - 1.0));
-        const double z = uniform(&random, -200.0, 1.0);
+        const double z = kit_uniform(&random, -200.0, 1.0);
         worst = fmax(worst, fabs(real_exp2(z) / exp2(z) - 1.0));
     }
     print_message("x^y and 2^x against libm: within %.1e\n", worst);
@@ -37,10 +33,10 @@ TEST(test_way) {
     uint64_t random = 5;
     double worst[3] = {0.0, 0.0, 0.0};
     for (int i = 0; i < 3000; i++) {
-        const double n = uniform(&random, 0.1, 2.0);
-        const double begin = exp(uniform(&random, log(1e-5), log(0.1)));
-        const double end = kit_index(&random, 2) ? exp(uniform(&random, log(1e-5), log(0.1)))
-                                                 : begin * uniform(&random, 0.8, 1.2);
+        const double n = kit_uniform(&random, 0.1, 2.0);
+        const double begin = exp(kit_uniform(&random, log(1e-5), log(0.1)));
+        const double end = kit_index(&random, 2) ? exp(kit_uniform(&random, log(1e-5), log(0.1)))
+                                                 : begin * kit_uniform(&random, 0.8, 1.2);
         const double way = end - begin;
         const double step = 1e-5 * end;
         const PowerWay over = power_way(2.0, n, begin, way);
@@ -60,7 +56,7 @@ TEST(test_way) {
     /* the series and the closed form meet */
     double apart = 0.0;
     for (int i = 0; i < 3000; i++) {
-        const double n = uniform(&random, 0.1, 2.0);
+        const double n = kit_uniform(&random, 0.1, 2.0);
         double low = 0.01, high = 0.02;
         for (int k = 0; k < 200; k++) { /* where rho is POWER_SERIES, from 10 mm on */
             const double u = (low + high) / 2;

@@ -1,10 +1,9 @@
 /* How often a 95 % interval holds the truth: noisy presses of every preset of every model, with
- * everything fitted that they determine. Usage: lab_test_coverage [DRAWS [GROUND]]; 200 draws take
- * 90 s and have a standard deviation of 1.5 %. Prints a table: for each kind of noise
- * the share of intervals that hold the truth and, in brackets, that are bounded on both sides. */
+ * everything fitted that they determine. Usage: identify_test_coverage [DRAWS [GROUND]]; 200 draws
+ * take 90 s and have a standard deviation of 1.5 %. Prints a table: for each kind of noise the
+ * share of intervals that hold the truth and, in brackets, that are bounded on both sides. */
 #include "base/random.h"
-#include "identify/fit.h"
-#include "kit.h"
+#include "eq5.h"
 
 enum { ROWS = 300, RECORDS = 3, NOISES = 3 };
 typedef enum { NOISE_PEAK, NOISE_ROW, NOISE_SLOW } Noise;
@@ -36,17 +35,6 @@ static FitPoint row_at(int record, double depth) {
     row.speed = record == 2 ? sqrt(1 - depth / 0.05) : speeds[record];
     row.acceleration = record == 2 ? -0.5 / 0.05 : 0;
     return row;
-}
-
-/* eq 5, by the library's public law. */
-static double force_of(const FitDef *def, const FitPoint *row) {
-    const FitPlate *plate = &def->plate[row->plate];
-    MildMaterial m = def->material;
-    m.plate_width = plate->width;
-    const MildElementLaw law = mild_element_law(&m, plate->pitch, row->depth);
-    const double drag = fmax(m.c_d, 0.5) * law.added_mass_per_depth * row->speed * row->speed;
-    return plate->elements *
-           (law.force + law.damping * row->speed + drag + law.added_mass * row->acceleration);
 }
 
 /* 2 %: of the largest force on every row, of each row's own force, or of the largest force with a

@@ -5,7 +5,7 @@
 
 #include "base/random.h"
 #include "base/student.h"
-#include "identify/fit.h"
+#include "eq5.h"
 #include "materials.h"
 
 enum { ROWS = 1000, SEEDS = 5 };
@@ -48,17 +48,6 @@ static void hold(FitDef *def, const char *names) {
         snprintf(name, sizeof name, " %s ", fields[i]->name);
         def->held[i] = strstr(padded, name) != NULL;
     }
-}
-
-/* eq 5, by the library's public law. */
-static double force_of(const FitDef *def, const FitPoint *row) {
-    const FitPlate *plate = &def->plate[row->plate];
-    MildMaterial m = def->material;
-    m.plate_width = plate->width;
-    const MildElementLaw law = mild_element_law(&m, plate->pitch, row->depth);
-    const double drag = fmax(m.c_d, 0.5) * law.added_mass_per_depth * row->speed * row->speed;
-    return plate->elements *
-           (law.force + law.damping * row->speed + drag + law.added_mass * row->acceleration);
 }
 
 /* A press of the true ground to `depth` at constant speed; with `brakes` it slows down from

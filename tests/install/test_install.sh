@@ -135,6 +135,11 @@ int main(void) {
         return 1;
     }
     printf("%zu B a robot\n", mild_batch_robot_bytes(batch));
+    void *older = NULL;                /* as programs for 0.2.0 have it */
+    struct CUstream_st *theirs = NULL; /* CUDA's cudaStream_t */
+    if (mild_batch_reset(batch, NULL, older, &error) || mild_batch_reset(batch, NULL, theirs, &error)) {
+        return 1;
+    }
     mild_batch_destroy(batch);
     mild_sole_destroy(sole);
     return 0;

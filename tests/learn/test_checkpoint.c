@@ -18,13 +18,6 @@ typedef struct {
     Toy toy;
 } Run;
 
-static PpoDef ppo_def(void) {
-    PpoDef def = ppo_def_default();
-    def.steps = 40;
-    def.minibatches = 2;
-    return def;
-}
-
 static void run_open(Run *run, const PolicyDef *policy_def, const PpoDef *def) {
     MildError error = {0};
     PpoMirror mirror = toy_mirror();
@@ -38,7 +31,7 @@ static void run_open(Run *run, const PolicyDef *policy_def, const PpoDef *def) {
 
 static void run_open_toy(Run *run) {
     PolicyDef policy_def = toy_policy_def();
-    PpoDef def = ppo_def();
+    PpoDef def = toy_ppo_def();
     run_open(run, &policy_def, &def);
 }
 
@@ -96,7 +89,7 @@ static void swap_text(const char *from, const char *to) {
 /* Numbers that would spoil the run at its first update. */
 TEST(bad_numbers_are_refused) {
     PolicyDef policy_def = toy_policy_def();
-    PpoDef def = ppo_def();
+    PpoDef def = toy_ppo_def();
     def.average = 0.9;
     Run run, other;
     run_open(&run, &policy_def, &def);
@@ -143,7 +136,7 @@ TEST(bad_numbers_are_refused) {
 TEST(another_network_is_refused) {
     MildError error = {0};
     PolicyDef wider = toy_policy_def(), louder = toy_policy_def();
-    PpoDef def = ppo_def();
+    PpoDef def = toy_ppo_def();
     wider.actor_hidden[1] = 33;
     louder.init_std *= 0.5;
     Run run, other, same;
@@ -164,7 +157,7 @@ TEST(another_network_is_refused) {
 /* An actor that has learned without the clock goes on without it, and one with it with it. */
 TEST(another_view_of_the_clock_is_refused) {
     PolicyDef blind = toy_policy_def();
-    PpoDef def = ppo_def();
+    PpoDef def = toy_ppo_def();
     blind.actor_phase = 0;
     Run run, other;
     run_open_toy(&run);
@@ -182,7 +175,7 @@ TEST(another_view_of_the_clock_is_refused) {
 TEST(another_optimizer_is_refused) {
     MildError error = {0};
     PolicyDef policy_def = toy_policy_def();
-    PpoDef def = ppo_def();
+    PpoDef def = toy_ppo_def();
     Run adam, muon, again;
     run_open_toy(&adam);
     def.optimizer = PPO_OPTIMIZER_MUON;
@@ -236,7 +229,7 @@ TEST(missing_parts_are_refused) {
 TEST(averages_come_and_go) {
     MildError error = {0};
     PolicyDef policy_def = toy_policy_def();
-    PpoDef def = ppo_def();
+    PpoDef def = toy_ppo_def();
     Run plain, averaged, again;
     run_open(&plain, &policy_def, &def);
     def.average = 0.9;
@@ -272,7 +265,7 @@ TEST(empty_shards_are_empty) {
     MildError error = {0};
     Run run, fresh;
     PolicyDef policy_def = toy_policy_def();
-    PpoDef def = ppo_def();
+    PpoDef def = toy_ppo_def();
     def.minibatches = 7; /* the first of them has no sample of 5 steps */
     def.steps = 5;
     run_open(&run, &policy_def, &def);

@@ -18,6 +18,7 @@
 #include "learn/policy_private.h"
 #include "learn/ppo.h"
 #include "learn/safetensors.h"
+#include "learn/values.h"
 
 #define PATH "build_test_policy.safetensors"
 
@@ -64,8 +65,8 @@ TEST(test_act_and_value) {
     fill_normal(critic, ROWS * 98, 1.0, &random);
     policy_act(policy, NULL, ROWS, history, actions[0], estimates[0], latent[0]);
     policy_act(policy, pool, ROWS, history, actions[1], estimates[1], latent[1]);
-    policy_value(policy, NULL, ROWS, critic, values[0]);
-    policy_value(policy, pool, ROWS, critic, values[1]);
+    kit_values(policy, NULL, ROWS, critic, values[0]);
+    kit_values(policy, pool, ROWS, critic, values[1]);
     assert_memory_equal(actions[0], actions[1], sizeof actions[0]);
     assert_memory_equal(estimates[0], estimates[1], sizeof estimates[0]);
     assert_memory_equal(latent[0], latent[1], sizeof latent[0]);
@@ -106,7 +107,7 @@ TEST(test_rows_in_runs) {
     memset(actions[1], 0xff, sizeof actions[1]);
     memset(values[1], 0xff, sizeof values[1]);
     policy_act(policy, NULL, ROWS, history, actions[0], NULL, NULL);
-    policy_value(policy, NULL, ROWS, critic, values[0]);
+    kit_values(policy, NULL, ROWS, critic, values[0]);
     policy_act_rows(policy, pool, &both, history, NULL, actions[1]);
     policy_value_rows(policy, pool, &both, critic, values[1]);
     for (int i = 0; i < ROWS * 12; i++) {
@@ -165,7 +166,7 @@ TEST(test_answers) {
     fill_normal(history, ROWS * 15, 1.0, &random);
     fill_normal(critic, ROWS * 7, 1.0, &random);
     policy_act(policy, NULL, ROWS, history, actions, estimates, latent);
-    policy_value(policy, NULL, ROWS, critic, values);
+    kit_values(policy, NULL, ROWS, critic, values);
     for (int r = 0; r < ROWS; r++) {
         double x[64], heads[64], theta[64], input[64], mean[64], value[64];
         for (int i = 0; i < 15; i++) {

@@ -53,13 +53,6 @@ static void assert_same_parameters(Run *a, Run *b) {
                         (size_t)policy_parameter_count(a->policy) * sizeof(float));
 }
 
-static PpoDef toy_ppo_def(void) {
-    PpoDef def = ppo_def_default();
-    def.steps = 40;
-    def.minibatches = 2;
-    return def;
-}
-
 /* Shards, chunks and their order are fixed by the batch alone. 64 environments x 40 steps: several
  * chunks per shard. */
 static void check_threads(PpoDef def) {

@@ -30,10 +30,8 @@ typedef struct {
 
 static Script *script; /* of the run that is open */
 
-void __wrap_policy_value_rows(Policy *policy, Pool *pool, const PolicyRows *rows,
-                              const float *critic, float *values);
-void __wrap_ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
-                         LossSums *sums, double *norm);
+WRAPS(policy_value_rows);
+WRAPS(ppo_gradient);
 
 void __wrap_policy_value_rows(Policy *policy, Pool *pool, const PolicyRows *rows,
                               const float *critic, float *values) {

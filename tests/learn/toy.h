@@ -44,6 +44,13 @@ static inline PolicyDef toy_policy_def(void) {
     return def;
 }
 
+static inline PpoDef toy_ppo_def(void) {
+    PpoDef def = ppo_def_default();
+    def.steps = 40;
+    def.minibatches = 2;
+    return def;
+}
+
 static inline PpoMirror toy_mirror(void) {
     static const int index[TOY_OBSERVATION] = {0, 1, 2, 3, 4, 5};
     static const float sign[TOY_OBSERVATION] = {-1, -1, -1, -1, -1, -1};

@@ -6,6 +6,7 @@
  * (default: each in turn) and the step [s] (default 0.005). docs/plugin.md says how many ran. */
 #include <math.h>
 
+#include "draws.h"
 #include "plugin_kit.h"
 
 #define TURN_MOST 0.1 /* [rad] in a step; beyond it the way of a foot is not its twist */
@@ -22,22 +23,6 @@ enum { ROBOT, ANY, SHELL, KINDS };
 
 /* ---- drawing a body ---- */
 
-static double uniform(uint64_t *random, double low, double high) {
-    uint64_t x = *random += 0x9e3779b97f4a7c15u;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return low + (high - low) * (double)((x ^ (x >> 31)) >> 11) * 0x1p-53;
-}
-
-static int choose(uint64_t *random, int count) {
-    return (int)uniform(random, 0, count);
-}
-
-/* Log-uniform. */
-static double spread(uint64_t *random, double low, double high) {
-    return exp(uniform(random, log(low), log(high)));
-}
-
 static void add(char *text, size_t size, const char *format, ...) {
     va_list arguments;
     const size_t length = strlen(text);
@@ -48,39 +33,41 @@ static void add(char *text, size_t size, const char *format, ...) {
 }
 
 static void add_ground(uint64_t *random, char *text, size_t size) {
-    const char *preset = mild_material_preset_name(choose(random, mild_material_preset_count()));
-    const double recovery = choose(random, 3) ? uniform(random, 0, 1) : choose(random, 2);
+    const char *preset = mild_material_preset_name(kit_index(random, mild_material_preset_count()));
+    const double recovery = kit_index(random, 3) ? kit_uniform(random, 0, 1) : kit_index(random, 2);
     add(text, size, "<config key='ground' value='%s'/>", preset);
-    add(text, size, "<config key='ground.k_pen' value='%.17g'/>", spread(random, 8, 1400));
-    add(text, size, "<config key='ground.sigma_cone' value='%.17g'/>", spread(random, 1e4, 2.4e5));
-    add(text, size, "<config key='ground.alpha' value='%.17g'/>", uniform(random, 0.698, 1.31));
-    add(text, size, "<config key='ground.nu' value='%.17g'/>", uniform(random, 0.8, 2.4));
-    add(text, size, "<config key='ground.c_g' value='%.17g'/>", uniform(random, -1.4, 4.6));
-    add(text, size, "<config key='ground.c_d' value='%.17g'/>", uniform(random, -6, 28));
-    add(text, size, "<config key='ground.phi' value='%.17g'/>", uniform(random, 0.5, 0.64));
-    add(text, size, "<config key='ground.mu' value='%.17g'/>", uniform(random, 0.2, 1.3));
+    add(text, size, "<config key='ground.k_pen' value='%.17g'/>", kit_spread(random, 8, 1400));
+    add(text, size, "<config key='ground.sigma_cone' value='%.17g'/>",
+        kit_spread(random, 1e4, 2.4e5));
+    add(text, size, "<config key='ground.alpha' value='%.17g'/>", kit_uniform(random, 0.698, 1.31));
+    add(text, size, "<config key='ground.nu' value='%.17g'/>", kit_uniform(random, 0.8, 2.4));
+    add(text, size, "<config key='ground.c_g' value='%.17g'/>", kit_uniform(random, -1.4, 4.6));
+    add(text, size, "<config key='ground.c_d' value='%.17g'/>", kit_uniform(random, -6, 28));
+    add(text, size, "<config key='ground.phi' value='%.17g'/>", kit_uniform(random, 0.5, 0.64));
+    add(text, size, "<config key='ground.mu' value='%.17g'/>", kit_uniform(random, 0.2, 1.3));
     add(text, size, "<config key='ground.recovery' value='%.17g'/>", recovery);
-    add(text, size, "<config key='ground.bed_depth' value='%.17g'/>", uniform(random, 0.1, 0.15));
+    add(text, size, "<config key='ground.bed_depth' value='%.17g'/>",
+        kit_uniform(random, 0.1, 0.15));
     add(text, size, "<config key='ground.passive' value='true'/>");
 }
 
 /* The body's inertia: that of a box, of any proportions. */
 static void add_inertia(uint64_t *random, int kind, char *text, size_t size) {
-    const double mass = kind == ANY ? spread(random, 1e-3, 1e5) : spread(random, 0.3, 60);
-    const double share = kind == ANY ? spread(random, 1e-6, 1) : spread(random, 4e-4, 0.04);
-    const double x = uniform(random, 0.05, 1), y = uniform(random, 0.05, 1);
-    const double z = uniform(random, 0.05, 1);
+    const double mass = kind == ANY ? kit_spread(random, 1e-3, 1e5) : kit_spread(random, 0.3, 60);
+    const double share = kind == ANY ? kit_spread(random, 1e-6, 1) : kit_spread(random, 4e-4, 0.04);
+    const double x = kit_uniform(random, 0.05, 1), y = kit_uniform(random, 0.05, 1);
+    const double z = kit_uniform(random, 0.05, 1);
     add(text, size, "<inertial pos='0 0 0' mass='%.17g' diaginertia='%.17g %.17g %.17g'/>", mass,
         mass * share * (y * y + z * z), mass * share * (x * x + z * z),
         mass * share * (x * x + y * y));
 }
 
 static void add_feet(uint64_t *random, int feet, char *text, size_t size) {
-    const double x = spread(random, 0.02, 0.3), y = spread(random, 0.02, 0.15);
-    const int central = !choose(random, 3);
+    const double x = kit_spread(random, 0.02, 0.3), y = kit_spread(random, 0.02, 0.15);
+    const int central = !kit_index(random, 3);
     for (int f = 0; f < feet; f++) {
-        const double levers[3] = {uniform(random, -0.4, 0.4), uniform(random, -0.4, 0.4),
-                                  uniform(random, -0.8, 0)};
+        const double levers[3] = {kit_uniform(random, -0.4, 0.4), kit_uniform(random, -0.4, 0.4),
+                                  kit_uniform(random, -0.8, 0)};
         add(text, size, "<body name='foot%d' pos='%.17g %.17g %.17g'>", f, central ? 0 : levers[0],
             central ? 0 : levers[1], central ? 0 : levers[2]);
         add(text, size,
@@ -95,12 +82,14 @@ static void add_shells(uint64_t *random, int shells, char *text, size_t size) {
     static const char *const types[] = {"box", "capsule", "sphere", "cylinder"};
     for (int b = 0; b < shells; b++) {
         add(text, size, "<body name='foot%d' pos='%.17g %.17g %.17g'>", b,
-            uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3));
+            kit_uniform(random, -0.3, 0.3), kit_uniform(random, -0.3, 0.3),
+            kit_uniform(random, -0.3, 0.3));
         add(text, size,
             "<geom type='%s' size='%.17g %.17g %.17g' euler='%.17g %.17g 0' mass='0' "
             "contype='0' conaffinity='0'/></body>",
-            types[choose(random, 4)], spread(random, 0.02, 0.15), spread(random, 0.02, 0.15),
-            spread(random, 0.02, 0.15), uniform(random, -180, 180), uniform(random, -90, 90));
+            types[kit_index(random, 4)], kit_spread(random, 0.02, 0.15),
+            kit_spread(random, 0.02, 0.15), kit_spread(random, 0.02, 0.15),
+            kit_uniform(random, -180, 180), kit_uniform(random, -90, 90));
     }
 }
 
@@ -108,7 +97,7 @@ static void add_shells(uint64_t *random, int shells, char *text, size_t size) {
 static void draw_models(uint64_t *random, int kind, const char *integrator, mjModel **soft,
                         mjModel **bare) {
     static char text[6000], body[2000], option[200];
-    const int feet = kind == SHELL ? 1 + choose(random, 4) : 1 + choose(random, 2);
+    const int feet = kind == SHELL ? 1 + kit_index(random, 4) : 1 + kit_index(random, 2);
     body[0] = '\0';
     snprintf(option, sizeof option, "<mujoco><option timestep='%.17g' integrator='%s'/>", step,
              integrator);
@@ -154,24 +143,24 @@ static double lowest(const mjModel *m, const mjData *d) {
 /* Steep, fast, or both; above the ground. */
 static void draw_motion(uint64_t *random, const mjModel *m, mjData *d) {
     for (int k = 0; k < 6; k++) {
-        d->qvel[k] = k < 2   ? uniform(random, -2, 2)
-                     : k < 3 ? uniform(random, -3, 0)
-                             : uniform(random, -1, 1);
+        d->qvel[k] = k < 2   ? kit_uniform(random, -2, 2)
+                     : k < 3 ? kit_uniform(random, -3, 0)
+                             : kit_uniform(random, -1, 1);
     }
-    if (!choose(random, 5)) {
+    if (!kit_index(random, 5)) {
         double turn[3];
         for (int k = 0; k < 3; k++) {
-            turn[k] = uniform(random, -3, 3);
+            turn[k] = kit_uniform(random, -3, 3);
         }
         mju_quatIntegrate(d->qpos + 3, turn, 1);
     }
-    if (!choose(random, 8)) {
+    if (!kit_index(random, 8)) {
         d->qvel[0] *= 50;
         d->qvel[2] *= 7;
     }
     d->qpos[2] = 0;
     mj_kinematics(m, d);
-    d->qpos[2] = spread(random, 1e-4, 0.5) - lowest(m, d);
+    d->qpos[2] = kit_spread(random, 1e-4, 0.5) - lowest(m, d);
 }
 
 /* ---- falling ---- */

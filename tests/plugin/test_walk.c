@@ -16,10 +16,7 @@
 static mjModel *model;
 static mjData *data;
 
-int __real_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
-                          const MildTerrain *terrain, MildGround *ground);
-int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
-                          const MildTerrain *terrain, MildGround *ground);
+WRAPS(robot_sim_step);
 
 /* ---- the model: MJCF, a motor for each joint, soles of robot.ini as attributes ---- */
 

@@ -1,11 +1,12 @@
-/* The biped robots/g1: its fixed upper body by hand, its geometry, its mirror image, and the stand
- * controller on every ground. */
+/* The biped robots/g1 against the published numbers of g1.json: its fixed upper body by hand, its
+ * geometry, its mirror image, and the stand controller on every ground. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #define MODEL MILD_SOURCE_DIR "/robots/g1"
-#include "robot_kit.h"
+#include "numbers.h"
+#include "stand_kit.h"
 
 #include <mujoco/mujoco.h>
 
@@ -26,189 +27,62 @@ typedef struct {
     double inertia[3];                 /* [kg m^2] */
 } Part;
 
-static const Part parts[] = {
-    /* pelvis */
-    {-1,
-     {0},
-     {1, 0, 0, 0},
-     Z,
-     0,
-     3.813,
-     {0, 0, -0.07605},
-     {1, 0, -0.000399148, 0},
-     {0.010549, 0.0093089, 0.0079184}},
-    /* waist_yaw_link */
-    {0,
-     {0, 0, 0},
-     {1, 0, 0, 0},
-     Z,
-     0,
-     0.214,
-     {0.003494, 0.000233, 0.018034},
-     {0.289697, 0.591001, -0.337795, 0.672821},
-     {0.000163531, 0.000107714, 0.000102205}},
-    /* waist_roll_link */
-    {1,
-     {-0.0039635, 0, 0.044},
-     {1, 0, 0, 0},
-     X,
-     0,
-     0.086,
-     {0, 2.3e-05, 0},
-     {0.5, 0.5, -0.5, 0.5},
-     {8.245e-06, 7.079e-06, 6.339e-06}},
-    /* torso_link */
-    {2,
-     {0, 0, 0},
-     {1, 0, 0, 0},
-     Y,
-     0,
-     7.818,
-     {0.00203158, 0.000339683, 0.184568},
-     {0.999803, -6.03319e-05, 0.0198256, 0.00131986},
-     {0.121847, 0.109825, 0.0273735}},
-    /* left_shoulder_pitch_link */
-    {3,
-     {0.0039563, 0.10022, 0.24778},
-     {0.990264, 0.139201, 1.38722e-05, -9.86868e-05},
-     Y,
-     0.2,
-     0.718,
-     {0, 0.035892, -0.011628},
-     {0.654152, 0.0130458, -0.326267, 0.68225},
-     {0.000465864, 0.000432842, 0.000406394}},
-    /* left_shoulder_roll_link */
-    {4,
-     {0, 0.038, -0.013831},
-     {0.990268, -0.139172, 0, 0},
-     X,
-     0.2,
-     0.643,
-     {-0.000227, 0.00727, -0.063243},
-     {0.701256, -0.0196223, -0.00710317, 0.712604},
-     {0.000691311, 0.000618011, 0.000388977}},
-    /* left_shoulder_yaw_link */
-    {5,
-     {0, 0.00624, -0.1032},
-     {1, 0, 0, 0},
-     Z,
-     0,
-     0.734,
-     {0.010773, -0.002949, -0.072009},
-     {0.716879, -0.0964829, -0.0679942, 0.687134},
-     {0.00106187, 0.00103217, 0.000400661}},
-    /* left_elbow_link */
-    {6,
-     {0.015783, 0, -0.080518},
-     {1, 0, 0, 0},
-     Y,
-     0.6,
-     0.6,
-     {0.064956, 0.004454, -0.010062},
-     {0.541765, 0.636132, 0.388821, 0.388129},
-     {0.000443035, 0.000421612, 0.000259353}},
-    /* left_wrist_roll_link */
-    {7,
-     {0.1, 0.00188791, -0.01},
-     {1, 0, 0, 0},
-     X,
-     0,
-     0.085445,
-     {0.0171394, 0.000537591, 4.8864e-07},
-     {0.575338, 0.411667, -0.574906, 0.411094},
-     {5.48211e-05, 4.96646e-05, 3.57798e-05}},
-    /* left_wrist_pitch_link */
-    {8,
-     {0.038, 0, 0},
-     {1, 0, 0, 0},
-     Y,
-     0,
-     0.48405,
-     {0.0229999, -0.00111685, -0.00111658},
-     {0.249998, 0.661363, 0.293036, 0.643608},
-     {0.000430353, 0.000429873, 0.000164648}},
-    /* left_wrist_yaw_link */
-    {9,
-     {0.046, 0, 0},
-     {1, 0, 0, 0},
-     Z,
-     0,
-     0.254576,
-     {0.0708244, 0.000191745, 0.00161742},
-     {0.510571, 0.526295, 0.468078, 0.493188},
-     {0.000646113, 0.000559993, 0.000147566}},
-    /* right_shoulder_pitch_link */
-    {3,
-     {0.0039563, -0.10021, 0.24778},
-     {0.990264, -0.139201, 1.38722e-05, 9.86868e-05},
-     Y,
-     0.2,
-     0.718,
-     {0, -0.035892, -0.011628},
-     {0.68225, -0.326267, 0.0130458, 0.654152},
-     {0.000465864, 0.000432842, 0.000406394}},
-    /* right_shoulder_roll_link */
-    {11,
-     {0, -0.038, -0.013831},
-     {0.990268, 0.139172, 0, 0},
-     X,
-     -0.2,
-     0.643,
-     {-0.000227, -0.00727, -0.063243},
-     {0.712604, -0.00710317, -0.0196223, 0.701256},
-     {0.000691311, 0.000618011, 0.000388977}},
-    /* right_shoulder_yaw_link */
-    {12,
-     {0, -0.00624, -0.1032},
-     {1, 0, 0, 0},
-     Z,
-     0,
-     0.734,
-     {0.010773, 0.002949, -0.072009},
-     {0.687134, -0.0679942, -0.0964829, 0.716879},
-     {0.00106187, 0.00103217, 0.000400661}},
-    /* right_elbow_link */
-    {13,
-     {0.015783, 0, -0.080518},
-     {1, 0, 0, 0},
-     Y,
-     0.6,
-     0.6,
-     {0.064956, -0.004454, -0.010062},
-     {0.388129, 0.388821, 0.636132, 0.541765},
-     {0.000443035, 0.000421612, 0.000259353}},
-    /* right_wrist_roll_link */
-    {14,
-     {0.1, -0.00188791, -0.01},
-     {1, 0, 0, 0},
-     X,
-     0,
-     0.085445,
-     {0.0171394, -0.000537591, 4.8864e-07},
-     {0.411667, 0.575338, -0.411094, 0.574906},
-     {5.48211e-05, 4.96646e-05, 3.57798e-05}},
-    /* right_wrist_pitch_link */
-    {15,
-     {0.038, 0, 0},
-     {1, 0, 0, 0},
-     Y,
-     0,
-     0.48405,
-     {0.0229999, 0.00111685, -0.00111658},
-     {0.643608, 0.293036, 0.661363, 0.249998},
-     {0.000430353, 0.000429873, 0.000164648}},
-    /* right_wrist_yaw_link */
-    {16,
-     {0.046, 0, 0},
-     {1, 0, 0, 0},
-     Z,
-     0,
-     0.254576,
-     {0.0708244, -0.000191745, 0.00161742},
-     {0.493188, 0.468078, 0.526295, 0.510571},
-     {0.000646113, 0.000559993, 0.000147566}},
-};
-enum { PARTS = sizeof parts / sizeof *parts };
+enum { PARTS = 18 };
+static Part parts[PARTS];
+
+/* A link of the left leg. */
+typedef struct {
+    double position[3], mass, effort, speed;
+} Link;
+static Link links[LEG];
+
+/* Which of the first `count` parts has the name; -1: none. */
+static int part_named(const cJSON *name, int count) {
+    const cJSON *rows = item(numbers, "parts");
+    for (int p = 0; p < count; p++) {
+        if (cJSON_Compare(item(cJSON_GetArrayItem(rows, p), "name"), name, 1)) {
+            return p;
+        }
+    }
+    assert_true(cJSON_IsNull(name));
+    return -1;
+}
+
+static void read_part(int p, const cJSON *row) {
+    Part *part = &parts[p];
+    part->parent = part_named(item(row, "parent"), p);
+    part->axis = word(row, "axis")[0] - 'x';
+    part->angle = number(row, "angle");
+    part->mass = number(row, "mass");
+    vector(row, "position", 3, part->position);
+    vector(row, "quaternion", 4, part->quaternion);
+    vector(row, "center", 3, part->center);
+    vector(row, "turn", 4, part->turn);
+    vector(row, "inertia", 3, part->inertia);
+}
+
+static int open_numbers(void **state) {
+    numbers_open(MODEL "/g1.json");
+    const cJSON *rows = item(numbers, "parts"), *leg = item(numbers, "links");
+    assert_int_equal(cJSON_GetArraySize(rows), PARTS);
+    assert_int_equal(cJSON_GetArraySize(leg), LEG);
+    for (int p = 0; p < PARTS; p++) {
+        read_part(p, cJSON_GetArrayItem(rows, p));
+    }
+    for (int i = 0; i < LEG; i++) {
+        const cJSON *link = cJSON_GetArrayItem(leg, i);
+        vector(link, "position", 3, links[i].position);
+        links[i].mass = number(link, "mass");
+        links[i].effort = number(link, "effort");
+        links[i].speed = number(link, "speed");
+    }
+    return setup(state);
+}
+
+static int close_numbers(void **state) {
+    numbers_close();
+    return teardown(state);
+}
 
 /* Frames of the parts in the pelvis. */
 static void parts_places(double position[PARTS][3], double quaternion[PARTS][4]) {
@@ -270,7 +144,6 @@ TEST(the_upper_body_by_hand) {
     double got[9] = {0};
     const double none[3] = {0};
     add_inertia(got, m->body_iquat + 4 * base, m->body_inertia + 3 * base, 0, none);
-    assert_int_equal(PARTS, 18);
     assert_int_equal(m->nbody, 2 + JOINTS); /* the world, the base, the links */
     expect_near("mass of the base", m->body_mass[base], mass, 1e-9);
     for (int k = 0; k < 3; k++) {
@@ -279,8 +152,11 @@ TEST(the_upper_body_by_hand) {
     for (int e = 0; e < 9; e++) {
         expect_near("its inertia", got[e], sum[e], 1e-7);
     }
-    expect_near("mass", robot_total_mass(robot), mass + 2 * (1.35 + 1.52 + 1.702 + 1.932 + 0.682),
-                1e-9);
+    double total = mass;
+    for (int i = 0; i < JOINTS; i++) {
+        total += links[i % LEG].mass;
+    }
+    expect_near("mass", robot_total_mass(robot), total, 1e-9);
     print_message("base %.3f kg, centre %.4f %.4f %.4f m\n", mass, center[0], center[1], center[2]);
     robot_sim_destroy(sim);
 }
@@ -290,13 +166,18 @@ TEST(the_upper_body_by_hand) {
 /* Where the feet are in the default pose: hip pitch -0.312, knee 0.669; the hip's body is tilted by
  * 0.1749 rad, and the knee's back. */
 TEST(the_pose_by_hand) {
-    const double pitch = -0.312, knee = 0.669, tilt = 2 * atan2(0.0873386, 0.996179);
+    double turn[4];
+    vector(cJSON_GetArrayItem(item(numbers, "links"), 1), "quaternion", 4, turn);
+    const double pitch = -0.312, knee = 0.669, tilt = 2 * atan2(-turn[2], turn[0]);
     const double thigh = pitch - tilt, shank = pitch + knee;
-    const double x = -0.030465 * sin(pitch) + (0.025001 - 0.078273) * cos(thigh) -
-                     (0.12412 + 0.17734) * sin(thigh) - 0.30001 * sin(shank);
-    const double drop = 0.1027 + 0.030465 * cos(pitch) + (0.025001 - 0.078273) * sin(thigh) +
-                        (0.12412 + 0.17734) * cos(thigh) + 0.30001 * cos(shank) + 0.017558 + 0.035;
-    const double y = 0.064452 + 0.052 + 0.0021489 - 9.4445e-5;
+    const double *roll = links[1].position, *yaw = links[2].position, *shin = links[3].position;
+    const double *ankle = links[4].position, length = -(yaw[2] + shin[2]), off = yaw[0] + shin[0];
+    const double x =
+        roll[2] * sin(pitch) + off * cos(thigh) - length * sin(thigh) + ankle[2] * sin(shank);
+    const double drop = -links[0].position[2] - roll[2] * cos(pitch) + off * sin(thigh) +
+                        length * cos(thigh) - ankle[2] * cos(shank) - links[5].position[2] +
+                        number(numbers, "sole");
+    const double y = links[0].position[1] + roll[1] + shin[1] + ankle[1];
     assert_int_equal(robot_joints(robot), JOINTS);
     assert_int_equal(robot_feet(robot), FEET);
     assert_int_equal(robot_points(robot), 0);
@@ -318,15 +199,13 @@ TEST(the_pose_by_hand) {
 
 /* Efforts, speeds, and gains of a 10 Hz oscillator, twice critically damped, on the armature. */
 TEST(motors_and_gait) {
-    static const double effort[LEG] = {88, 139, 88, 139, 50, 50};
-    static const double speed[LEG] = {32, 20, 32, 20, 37, 37};
     const double rate = 2 * 3.14159265358979 * 10;
     RobotSim *sim = new_sim(0.001);
     const mjModel *m = robot_sim_model(sim);
     for (int i = 0; i < JOINTS; i++) {
         const double armature = m->dof_armature[robot_joint_dof(robot)[i]];
-        expect_near("effort", robot_effort(robot)[i], effort[i % LEG], 1e-9);
-        expect_near("speed", robot_speed(robot)[i], speed[i % LEG], 1e-9);
+        expect_near("effort", robot_effort(robot)[i], links[i % LEG].effort, 1e-9);
+        expect_near("speed", robot_speed(robot)[i], links[i % LEG].speed, 1e-9);
         expect_near("kp", robot_kp(robot)[i], armature * rate * rate, 0.05);
         expect_near("kd", robot_kd(robot)[i], 4 * armature * rate, 0.01);
         assert_int_equal(robot_joint_foot(robot)[i], i / LEG);
@@ -375,38 +254,16 @@ TEST(the_mirror_image) {
 
 /* Four seconds. material: NULL for rigid ground. */
 static void stand_on(const char *name, const MildMaterial *material) {
-    RobotSim *sim = new_sim(0.0025);
-    MildGround *ground = kit_ground(robot);
-    MildMaterial any = mild_material_default();
-    MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
-    RobotVariation variation = robot_variation_nominal();
-    variation.rigid = material == NULL;
-    const double rest =
-        material ? mild_sole_sinkage(robot_soles(robot)[0], material, robot_foot_load(robot)) : 0;
-    RobotState state = stand_state(stand, 1, rest);
-    robot_sim_load(sim, &state, &variation);
-    double load = 0, depth = 0, speed = 0;
-    for (int i = 0; i < 1600; i++) {
-        double torque[JOINTS];
-        stand_torque(stand, sim, 1, torque);
-        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
-        for (int f = 0; f < FEET && i >= 1200; f++) {
-            const RobotFoot *foot = robot_sim_foot(sim, f);
-            load += foot->force[2] / (9.81 * robot_total_mass(robot)) / 400;
-            depth += material ? foot->result.depth_mean / FEET / 400 : 0;
-        }
-    }
-    for (int k = 0; k < 6; k++) {
-        speed = fmax(speed, fabs(robot_sim_qvel(sim)[k]));
-    }
-    print_message("%-11s load %.5f, depth %5.1f of %5.1f mm, still %.1e\n", name, load, 1e3 * depth,
-                  1e3 * rest, speed);
-    expect_near("load", load, 1, 0.01);
-    expect_near("upright", robot_sim_base_rotation(sim)[8], 1, 0.005);
+    const KitStand how = {.material = material, .dt = 0.0025, .seconds = 4, .tail = 1};
+    const Standing r = kit_stand(&how);
+    const double rest = kit_sinkage(material), depth = material ? r.depth : 0;
+    print_message("%-11s load %.5f, depth %5.1f of %5.1f mm, still %.1e\n", name, r.load,
+                  1e3 * depth, 1e3 * rest, r.speed);
+    assert_true(r.stands);
+    expect_near("load", r.load, 1, 0.01);
+    expect_near("upright", cos(r.tilt), 1, 0.005);
     expect_near("depth", depth, rest, 0.15 * rest);
-    assert_true(speed < 0.02);
-    free(ground);
-    robot_sim_destroy(sim);
+    assert_true(r.speed < 0.02);
 }
 
 TEST(stands_everywhere) {
@@ -417,4 +274,4 @@ TEST(stands_everywhere) {
     }
 }
 
-TEST_MAIN(setup, teardown)
+TEST_MAIN(open_numbers, close_numbers)

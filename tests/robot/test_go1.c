@@ -1,39 +1,70 @@
-/* The quadruped robots/go1: its geometry by hand, four round feet, and the stand controller on
- * every ground. */
+/* The quadruped robots/go1 against the published numbers of go1.json: its geometry by hand, four
+ * round feet, and the stand controller on every ground. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
 #define MODEL MILD_SOURCE_DIR "/robots/go1"
-#include "robot_kit.h"
+#include "numbers.h"
+#include "stand_kit.h"
 
 #include <mujoco/mujoco.h>
 
 #include "mild/map.h"
 
-#define HIP_OFFSET 0.04675                           /* [m] hip roll axis from the middle plane */
-#define ROLL_OFFSET 0.08                             /* [m] thigh from the hip roll axis */
-#define LEG 0.213                                    /* [m] thigh, and knee to the foot's centre */
-#define FOOT_RADIUS 0.023                            /* [m] */
-#define MASS (5.204 + 4 * (0.68 + 1.009 + 0.195862)) /* [kg] trunk, four hips, thighs, calves */
-#define WEIGHT (9.81 * MASS)                         /* [N] */
-
 enum { FEET = 4, JOINTS = 12, NV = 18, FL = 0, FR = 1, RL = 2, RR = 3 };
+
+/* The published numbers. */
+static double hip_x, hip_y;           /* [m] hip roll axis from the trunk's centre */
+static double roll_offset;            /* [m] thigh from the hip roll axis */
+static double leg;                    /* [m] thigh, and knee to the foot's centre */
+static double foot_radius;            /* [m] */
+static double mass, weight;           /* [kg] trunk, four hips, thighs, calves; [N] */
+static double effort[3], speed_of[3]; /* [N m] [rad/s] hip, thigh, knee */
+
+static int open_numbers(void **state) {
+    numbers_open(MODEL "/go1.json");
+    const cJSON *links = item(numbers, "links");
+    assert_int_equal(cJSON_GetArraySize(links), 3);
+    double at[3][3], foot[3];
+    mass = number(item(numbers, "trunk"), "mass");
+    for (int i = 0; i < 3; i++) {
+        const cJSON *link = cJSON_GetArrayItem(links, i);
+        vector(link, "position", 3, at[i]);
+        mass += FEET * number(link, "mass");
+        effort[i] = number(link, "effort");
+        speed_of[i] = number(link, "speed");
+    }
+    vector(item(numbers, "foot"), "position", 3, foot);
+    assert_true(foot[2] == at[2][2]); /* thigh and shank are of one length */
+    hip_x = at[0][0];
+    hip_y = at[0][1];
+    roll_offset = at[1][1];
+    leg = -at[2][2];
+    foot_radius = number(item(numbers, "foot"), "radius");
+    weight = 9.81 * mass;
+    return setup(state);
+}
+
+static int close_numbers(void **state) {
+    numbers_close();
+    return teardown(state);
+}
 
 /* ---- the folder ---- */
 
 /* Where the feet are in the default pose: hip roll a = -0.1 (left), thigh 0.9, knee -1.8. */
 TEST(the_pose_by_hand) {
-    const double a = 0.1, length = 2 * LEG * cos(0.9);
-    const double height = length * cos(a) + ROLL_OFFSET * sin(a) + FOOT_RADIUS;
-    const double y = HIP_OFFSET + ROLL_OFFSET * cos(a) - length * sin(a), x = 0.1881;
+    const double a = 0.1, length = 2 * leg * cos(0.9);
+    const double height = length * cos(a) + roll_offset * sin(a) + foot_radius;
+    const double y = hip_y + roll_offset * cos(a) - length * sin(a), x = hip_x;
     const double side[FEET] = {1, -1, 1, -1}, front[FEET] = {1, 1, -1, -1};
     assert_int_equal(robot_joints(robot), JOINTS);
     assert_int_equal(robot_feet(robot), FEET);
     assert_int_equal(robot_points(robot), 1);
-    expect_near("mass", robot_total_mass(robot), MASS, 1e-9);
-    expect_near("load of a foot", robot_foot_load(robot), WEIGHT / FEET, 1e-6);
+    expect_near("mass", robot_total_mass(robot), mass, 1e-9);
+    expect_near("load of a foot", robot_foot_load(robot), weight / FEET, 1e-6);
     expect_near("height", robot_stand_height(robot), height, 1e-9);
     RobotSim *sim = new_sim(0.001);
     RobotState state = stand_state(stand, 0, 0.0);
@@ -47,7 +78,8 @@ TEST(the_pose_by_hand) {
     }
     expect_near("feet apart", robot_sim_foot_distance(sim), 2 * y, 1e-9);
     /* the knees' spheres are the lowest shells */
-    const double knee = LEG * cos(0.9) * cos(a) + ROLL_OFFSET * sin(a) + 0.02;
+    const double knee =
+        leg * cos(0.9) * cos(a) + roll_offset * sin(a) + number(item(numbers, "knee"), "radius");
     MildMaterial any = mild_material_default();
     MildTerrain level = mild_terrain_uniform(&any);
     expect_near("clearance", robot_sim_body_clearance(sim, &level), height - knee, 1e-9);
@@ -56,9 +88,8 @@ TEST(the_pose_by_hand) {
 
 TEST(efforts_speeds_and_gait) {
     for (int i = 0; i < JOINTS; i++) {
-        int knee = i % 3 == 2;
-        expect_near("effort", robot_effort(robot)[i], knee ? 35.55 : 23.7, 1e-9);
-        expect_near("speed", robot_speed(robot)[i], knee ? 20.06 : 30.1, 1e-9);
+        expect_near("effort", robot_effort(robot)[i], effort[i % 3], 1e-9);
+        expect_near("speed", robot_speed(robot)[i], speed_of[i % 3], 1e-9);
         assert_int_equal(robot_joint_foot(robot)[i], i / 3);
     }
     /* a trot: diagonal feet together, mirrored feet alternate */
@@ -132,9 +163,9 @@ static void lowest_point(RobotSim *sim, int foot, double point[3], double jacobi
     int body = mj_name2id(m, mjOBJ_BODY, calves[foot]);
     const double *turn = d->xmat + 9 * body;
     for (int k = 0; k < 3; k++) {
-        point[k] = d->xpos[3 * body + k] - LEG * turn[3 * k + 2];
+        point[k] = d->xpos[3 * body + k] - leg * turn[3 * k + 2];
     }
-    point[2] -= FOOT_RADIUS;
+    point[2] -= foot_radius;
     mj_jac(m, d, jacobian, NULL, point, body);
 }
 
@@ -233,94 +264,31 @@ TEST(a_round_foot_is_a_point) {
 
 /* ---- standing ---- */
 
-typedef struct {
-    int stands;
-    double height; /* [m] of the base at the end, above z = 0 */
-    double load;   /* [-] of the weight, mean over the last second */
-    double share;  /* [-] least load of a foot over a quarter of the weight, then too */
-    double depth;  /* [m] mean of the feet, then too */
-    double rest;   /* [m] mean over the feet of a disc's sinkage under the foot's load */
-    double moved;  /* [m] the base during the push */
-    double tilt;   /* [rad] at the end */
-    double speed;  /* [m/s, rad/s] of the base at the end, the largest component */
-} Standing;
-
-static double tilt_of(const RobotSim *sim) {
-    return acos(fmin(1.0, robot_sim_base_rotation(sim)[8]));
-}
-
-static void weigh(const RobotSim *sim, const MildMaterial *material, int steps, Standing *result,
-                  double loads[FEET]) {
-    for (int f = 0; f < FEET; f++) {
-        const RobotFoot *foot = robot_sim_foot(sim, f);
-        result->load += foot->force[2] / WEIGHT / steps;
-        result->depth += material ? foot->result.depth_mean / FEET / steps : 0;
-        loads[f] += foot->force[2] / steps;
-    }
+static int is_up(const RobotSim *sim, const MildTerrain *terrain) {
+    return kit_tilt(robot_sim_base_rotation(sim)) < 0.5 &&
+           robot_sim_body_clearance(sim, terrain) > 0;
 }
 
 /* Four seconds; a push [N] for 0.1 s after the first. material: NULL for rigid ground. */
-static Standing stand_and_push(const MildMaterial *material, double dt, const double push[6]) {
-    RobotSim *sim = new_sim(dt);
-    MildGround *ground = kit_ground(robot);
-    MildMaterial any = mild_material_default();
-    MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
-    RobotVariation variation = robot_variation_nominal();
-    variation.rigid = material == NULL;
-    double depth = material ? mild_sole_sinkage(robot_soles(robot)[0], material, WEIGHT / FEET) : 0;
-    RobotState state = stand_state(stand, 1, depth);
-    robot_sim_load(sim, &state, &variation);
-    Standing result = {.stands = 1, .share = 1e9};
-    double loads[FEET] = {0}, start[2] = {0};
-    int second = (int)(1.0 / dt + 0.5);
-    for (int i = 0; i < 4 * second && result.stands; i++) {
-        double torque[JOINTS];
-        const double *at = robot_sim_qpos(sim);
-        stand_torque(stand, sim, 1, torque);
-        int pushed = i >= second && i < second + second / 10;
-        if (i == second) {
-            memcpy(start, at, sizeof start);
-        }
-        if (pushed) {
-            result.moved = hypot(at[0] - start[0], at[1] - start[1]);
-        }
-        int bad = robot_sim_step(sim, torque, pushed ? push : NULL, &terrain, ground);
-        result.stands = !bad && tilt_of(sim) < 0.5 && robot_sim_body_clearance(sim, &terrain) > 0;
-        if (i >= 3 * second) {
-            weigh(sim, material, second, &result, loads);
-        }
-    }
-    for (int f = 0; f < FEET; f++) {
-        result.share = fmin(result.share, loads[f] / (WEIGHT / FEET));
-        result.rest +=
-            material ? mild_sole_sinkage(robot_soles(robot)[f], material, loads[f]) / FEET : 0;
-    }
-    for (int k = 0; k < 6; k++) {
-        result.speed = fmax(result.speed, fabs(robot_sim_qvel(sim)[k]));
-    }
-    result.tilt = tilt_of(sim);
-    result.height = robot_sim_qpos(sim)[2];
-    free(ground);
-    robot_sim_destroy(sim);
-    return result;
-}
-
 static void check(const char *name, const MildMaterial *material, double dt, const double push[6]) {
-    Standing r = stand_and_push(material, dt, push);
+    KitStand how = {.material = material, .dt = dt, .seconds = 4, .tail = 1, .up = is_up};
+    memcpy(how.push, push, sizeof how.push);
+    const Standing r = kit_stand(&how);
+    const double depth = material ? r.depth : 0;
     print_message("%-11s %.1f ms push %3.0f %3.0f N %s load %.5f, least foot %.2f, depth %5.1f of "
                   "%5.1f mm, moved %4.1f mm, tilt %.4f rad, still %.4f\n",
                   name, 1e3 * dt, push[0], push[1], r.stands ? "stands" : "FELL  ", r.load, r.share,
-                  1e3 * r.depth, 1e3 * r.rest, 1e3 * r.moved, r.tilt, r.speed);
+                  1e3 * depth, 1e3 * r.rest, 1e3 * r.moved, r.tilt, r.speed);
     assert_true(r.stands);
     expect_near("load", r.load, 1, 0.01);
     assert_true(r.share > 0.5);
     assert_true(r.tilt < 0.1);
     assert_true(r.speed < 0.3); /* still swaying after the push */
-    expect_near("height", r.height + r.depth, robot_stand_height(robot), 0.01);
+    expect_near("height", r.height + depth, robot_stand_height(robot), 0.01);
     if (push[0] != 0 || push[1] != 0) {
         assert_true(r.moved > 2e-3);
     } else if (material) {
-        assert_true(fabs(r.depth - r.rest) < 0.15 * r.rest);
+        assert_true(fabs(depth - r.rest) < 0.15 * r.rest);
     }
 }
 
@@ -335,4 +303,4 @@ TEST(stands_and_is_pushed_everywhere) {
     }
 }
 
-TEST_MAIN(setup, teardown)
+TEST_MAIN(open_numbers, close_numbers)

@@ -1,11 +1,10 @@
-/* The model file against the published numbers: robots/sa01/sa01.json, read here independently of
- * MuJoCo. */
+/* The model file against the published numbers: robots/sa01/sa01.json. */
 #include <unistd.h>
 
-#include <cjson/cJSON.h>
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"
+#include "numbers.h"
 #include "robots.h"
 #include "sa01.h"
 
@@ -23,20 +22,7 @@ typedef struct {
 
 static Robot *robot;
 static RobotSim *sim;
-static cJSON *numbers;
 static Tree tree;
-
-static double number(const cJSON *object, const char *name) {
-    const cJSON *item = cJSON_GetObjectItem(object, name);
-    assert_non_null(item);
-    return item->valuedouble;
-}
-
-static void vector(const cJSON *object, const char *name, double *out) {
-    for (int k = 0; k < 3; k++) {
-        out[k] = cJSON_GetArrayItem(cJSON_GetObjectItem(object, name), k)->valuedouble;
-    }
-}
 
 static int link_index(const char *name) {
     for (int i = 0; i < LINKS; i++) {
@@ -57,7 +43,7 @@ static void read_tree(void) {
         snprintf(tree.name[i], sizeof tree.name[i], "%s",
                  cJSON_GetObjectItem(link, "name")->valuestring);
         tree.mass[i] = number(link, "mass");
-        vector(link, "com_xyz", tree.com[i]);
+        vector(link, "com_xyz", 3, tree.com[i]);
         double xx = number(about, "ixx"), yy = number(about, "iyy"), zz = number(about, "izz");
         double xy = number(about, "ixy"), xz = number(about, "ixz"), yz = number(about, "iyz");
         double full[9] = {xx, xy, xz, xy, yy, yz, xz, yz, zz};
@@ -68,8 +54,8 @@ static void read_tree(void) {
         int child = link_index(cJSON_GetObjectItem(joint, "child")->valuestring);
         assert_int_equal(child, j + 1);
         tree.parent[child] = link_index(cJSON_GetObjectItem(joint, "parent")->valuestring);
-        vector(joint, "origin_xyz", tree.origin[child]);
-        vector(joint, "axis", tree.axis[child]);
+        vector(joint, "origin_xyz", 3, tree.origin[child]);
+        vector(joint, "axis", 3, tree.axis[child]);
         tree.armature[child] = number(joint, "mjcf_armature");
     }
 }
@@ -211,12 +197,8 @@ static int setup(void **unused) {
     MildError error = {0};
     robot = kit_robot(MODEL);
     sim = robot_sim_create(robot, 0.001, &error);
-    char *text = kit_read(NUMBERS, NULL);
-    numbers = cJSON_Parse(text);
-    free(text);
-    if (!sim || !numbers) {
-        return 1;
-    }
+    numbers_open(NUMBERS);
+    assert_non_null(sim);
     read_tree();
     return 0;
 }
@@ -225,7 +207,7 @@ static int teardown(void **unused) {
     (void)unused;
     robot_sim_destroy(sim);
     robot_destroy(robot);
-    cJSON_Delete(numbers);
+    numbers_close();
     return 0;
 }
 
@@ -256,8 +238,8 @@ TEST(test_standing) {
     const cJSON *expected =
         cJSON_GetObjectItem(cJSON_GetObjectItem(numbers, "derived_standing"), "training_default");
     double ankle[3], com[3], inertia[9] = {0}, position[LINKS][3], turn[LINKS][9];
-    vector(expected, "ankle_xyz_left", ankle);
-    vector(expected, "com_in_base", com);
+    vector(expected, "ankle_xyz_left", 3, ankle);
+    vector(expected, "com_in_base", 3, com);
     RobotState state = stand_state();
     RobotVariation nominal = robot_variation_nominal();
     robot_sim_load(sim, &state, &nominal);

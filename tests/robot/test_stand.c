@@ -3,93 +3,39 @@
 #include <math.h>
 #include <string.h>
 
-#include "robot_kit.h"
+#include "stand_kit.h"
 
 #include "sa01.h"
 
 #define SECONDS 10.0
 #define FALLEN 0.7 /* [m] base height */
 
-typedef struct {
-    int stands;
-    double seconds; /* [s] until it fell, or all */
-    double depth;   /* [m] mean over feet and the last two seconds */
-    double creep;   /* [m] change of the mean depth in the last two seconds */
-    double drift;   /* [m] of the soles' centres from where they first rested, horizontal */
-    double tilt;    /* [rad] of the soles at the end, the larger */
-    double height;  /* [m] of the base at the end */
-    double torque;  /* [N m] largest in the last two seconds */
-} Standing;
-
-static double mean_depth(const RobotSim *sim) {
-    return 0.5 *
-           (robot_sim_foot(sim, 0)->result.depth_mean + robot_sim_foot(sim, 1)->result.depth_mean);
-}
-
-static double sole_drift(const RobotSim *sim, double start[SA01_FEET][3]) {
-    double worst = 0.0;
-    for (int f = 0; f < SA01_FEET; f++) {
-        const double *now = robot_sim_foot(sim, f)->sole_center;
-        worst = fmax(worst, hypot(now[0] - start[f][0], now[1] - start[f][1]));
-    }
-    return worst;
-}
-
-static double static_sinkage(const MildMaterial *material) {
-    return mild_sole_sinkage(robot_soles(robot)[0], material, robot_foot_load(robot));
+static int is_up(const RobotSim *sim, const MildTerrain *terrain) {
+    (void)terrain;
+    return robot_sim_qpos(sim)[2] > FALLEN;
 }
 
 /* material: NULL for rigid ground. */
 static Standing stand_still(const MildMaterial *material, double dt, double seconds, int balance,
                             MildSolver solver) {
-    RobotSim *sim = new_sim(dt);
-    robot_sim_set_solver(sim, solver, 0, 0);
-    MildGround *ground = kit_ground(robot);
-    MildMaterial any = mild_material_default();
-    MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
-    RobotVariation variation = robot_variation_nominal();
-    variation.rigid = material == NULL;
-    RobotState state = stand_state(stand, balance, material ? static_sinkage(material) : 0.0);
-    robot_sim_load(sim, &state, &variation);
-    double start[SA01_FEET][3], late = 0.0;
-    for (int f = 0; f < SA01_FEET; f++) {
-        memcpy(start[f], robot_sim_foot(sim, f)->sole_center, sizeof start[f]);
-    }
-    Standing result = {.stands = 1};
-    int steps = (int)(seconds / dt + 0.5), tail = (int)(0.2 * seconds / dt + 0.5);
-    for (int i = 0; i < steps && result.stands; i++) {
-        double torque[SA01_JOINTS];
-        stand_torque(stand, sim, balance, torque);
-        int bad = robot_sim_step(sim, torque, NULL, &terrain, ground);
-        result.stands = !bad && robot_sim_qpos(sim)[2] > FALLEN;
-        result.seconds = (i + 1) * dt;
-        late = i == steps - tail ? mean_depth(sim) : late;
-        if (i >= steps - tail) {
-            result.depth += mean_depth(sim) / tail;
-            for (int k = 0; k < SA01_JOINTS; k++) {
-                result.torque = fmax(result.torque, fabs(torque[k]));
-            }
-        }
-    }
-    result.height = robot_sim_qpos(sim)[2];
-    result.creep = mean_depth(sim) - late;
-    result.drift = sole_drift(sim, start);
-    for (int f = 0; f < SA01_FEET; f++) {
-        result.tilt = fmax(result.tilt, acos(fmin(1.0, robot_sim_foot(sim, f)->rotation[8])));
-    }
-    free(ground);
-    robot_sim_destroy(sim);
-    return result;
+    const KitStand how = {.material = material,
+                          .dt = dt,
+                          .seconds = seconds,
+                          .tail = 0.2 * seconds,
+                          .plain = !balance,
+                          .solver = solver,
+                          .up = is_up};
+    return kit_stand(&how);
 }
 
 static void check_balanced(const char *name, const MildMaterial *material, double dt) {
     Standing result = stand_still(material, dt, SECONDS, 1, MILD_SOLVER_NEWTON);
-    double expected = material ? static_sinkage(material) : 0.0;
+    double expected = kit_sinkage(material);
     print_message("%-11s %.1f ms %s %5.2f s depth %6.3f of %6.3f mm, creep %8.5f, drift %.4f mm, "
                   "tilt %.4f rad, %.1f N m\n",
                   name, 1e3 * dt, result.stands ? "stands" : "FELL  ", result.seconds,
                   1e3 * result.depth, 1e3 * expected, 1e3 * result.creep, 1e3 * result.drift,
-                  result.tilt, result.torque);
+                  result.leaning, result.torque);
     assert_true(result.stands);
     assert_true(fabs(result.creep) < 1e-4);
     assert_true(result.drift < 3e-3);

@@ -46,7 +46,7 @@ typedef struct {
     float critic[SA01_CRITIC];
     float estimate[SA01_ESTIMATES];
     float frame[SA01_OBSERVATION];
-    TaskView view;
+    EnvsView view;
 } Rig;
 
 /* Nominal robot, no noise, no latency, no push, no help, starts at rest in the default pose. */
@@ -66,7 +66,7 @@ static inline void rig_open(Rig *rig, const TaskDef *def, uint64_t seed, uint32_
     rig->sim = robot_sim_create(robot, def->physics_dt, &error);
     assert_non_null(rig->env);
     assert_non_null(rig->sim);
-    rig->view = (TaskView){rig->history, rig->critic, rig->estimate, rig->frame};
+    rig->view = (EnvsView){rig->history, rig->critic, rig->estimate, rig->frame};
     task_env_init(rig->env, &rig->def, robot, seed, index);
 }
 

@@ -19,7 +19,7 @@ static TaskEnv *env;
 static RobotSim *sim;
 static float history[TASK_FRAMES * OBSERVATION], critic[CRITIC], estimate[ESTIMATES],
     frame[OBSERVATION];
-static const TaskView view = {history, critic, estimate, frame};
+static const EnvsView view = {history, critic, estimate, frame};
 
 /* Joints and feet change sides; hip roll turns the other way. */
 static const int other_joint[JOINTS] = {3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8};

@@ -339,7 +339,7 @@ TEST(noise) {
     rig.def.observe_noise = 1;
     static double low[SA01_OBSERVATION], high[SA01_OBSERVATION], sum[SA01_OBSERVATION],
         square[SA01_OBSERVATION], product[SA01_OBSERVATION][SA01_OBSERVATION];
-    TaskView view = {.frame = rig.frame};
+    EnvsView view = {.frame = rig.frame};
     for (int t = 0; t < DRAWS; t++) {
         rig.env->tick = (uint32_t)t;
         task_env_observe(rig.env, &rig.def, robot, rig.sim, &reading, 0, &view);
@@ -466,7 +466,7 @@ TEST(history_of_steps) {
 TEST(views) {
     rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
-    const TaskView none = {0};
+    const EnvsView none = {0};
     task_env_observe(rig.env, &rig.def, robot, rig.sim, &reading, 0, &none);
     assert_true(task_env_history(rig.env)[SA01_HISTORY - SA01_OBSERVATION] == 0.5f);
     rig_close(&rig);

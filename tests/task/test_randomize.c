@@ -621,7 +621,7 @@ TEST(start) {
     Rig rig;
     rig_open(&rig, &start_def, 11, 0);
     clear_columns();
-    const TaskView none = {0};
+    const EnvsView none = {0};
     const double *pose = robot_default_pose(robot);
     int half = 0;
     for (int t = 0; t < STARTS; t++) {

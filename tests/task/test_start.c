@@ -16,7 +16,7 @@ static mjData *data;
 static TaskDef def;
 static TaskEnv *env;
 static RobotSim *sim;
-static const TaskView view;
+static const EnvsView view;
 static const MildTerrain *ground;
 
 static int setup(void **unused) {

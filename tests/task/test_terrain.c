@@ -130,7 +130,7 @@ TEST(test_start) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, def.physics_dt, &error);
     TaskEnv *env = aligned_alloc(64, task_env_bytes(&def, robot));
-    TaskView none = {0};
+    EnvsView none = {0};
     double deepest = 0, shallowest = 1, apart = 0;
     for (int i = 0; i < 40; i++) {
         task_env_init(env, &def, robot, 3, (uint32_t)i);
@@ -161,7 +161,7 @@ TEST(test_rigid) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, def.physics_dt, &error);
     TaskEnv *env = aligned_alloc(64, task_env_bytes(&def, robot));
-    TaskView none = {0};
+    EnvsView none = {0};
     double off = 0, deepest = 0, highest = -1;
     for (int i = 0; i < 20; i++) {
         task_env_init(env, &def, robot, 4, (uint32_t)i);

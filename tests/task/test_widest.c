@@ -93,7 +93,7 @@ TEST(steps) {
             rows[k][i] = NAN;
         }
     }
-    TaskView view = {rows[0], rows[1], rows[2], rows[3]};
+    EnvsView view = {rows[0], rows[1], rows[2], rows[3]};
     task_env_init(env, &def, robot, 1, 0);
     task_env_reset(env, &def, robot, sim, &view);
     double load = 0;

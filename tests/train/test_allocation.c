@@ -23,16 +23,11 @@ static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static void *live[LIVE_MAX];         /* blocks that our code allocated and has not freed */
 static int live_count, fail_at = -1; /* allocations until the one that fails; negative: none */
 
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__real_realloc(void *block, size_t size);
-void *__real_aligned_alloc(size_t alignment, size_t size);
-void __real_free(void *block);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t count, size_t size);
-void *__wrap_realloc(void *block, size_t size);
-void *__wrap_aligned_alloc(size_t alignment, size_t size);
-void __wrap_free(void *block);
+WRAPS(malloc);
+WRAPS(calloc);
+WRAPS(realloc);
+WRAPS(aligned_alloc);
+WRAPS(free);
 
 static int fails(void) {
     pthread_mutex_lock(&lock);

@@ -3,6 +3,7 @@
 
 #include "control/controller.h"
 #include "kit.h"
+#include "learn/values.h"
 #include "run/train/trainer.h"
 
 #define POLICY "build_test_robot.safetensors"
@@ -142,7 +143,7 @@ static void check_all_but_decoder(Policy *a, Policy *b) {
     }
     for (int k = 0; k < 2; k++) {
         policy_act(of[k], NULL, ROWS, input, out[k], NULL, NULL);
-        policy_value(of[k], NULL, ROWS, input, out[k] + ROWS * 20);
+        kit_values(of[k], NULL, ROWS, input, out[k] + ROWS * 20);
         memcpy(out[k] + ROWS * 22, policy_std(of[k]), (size_t)def->actions * sizeof(float));
     }
     assert_memory_equal(out[0], out[1], sizeof out[0]);

@@ -26,8 +26,7 @@ static double mouse[2];
 
 /* ---- GLFW, as far as window.c calls it: in the place of the library ---- */
 
-void *__real_dlopen(const char *name, int flags);
-void *__wrap_dlopen(const char *name, int flags);
+WRAPS(dlopen);
 void *__wrap_dlopen(const char *name, int flags) {
     return __real_dlopen(strcmp(name, "libglfw.so.3") == 0 ? NULL : name, flags);
 }

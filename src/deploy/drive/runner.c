@@ -353,7 +353,7 @@ static void look_at_ground(Runner *r) {
 /* One step of the policy: as an environment's, but for its physics. A frame has the command of the
  * tick before it. */
 static void step_policy(Runner *r, const TaskSensors *reading, const double command[3]) {
-    const TaskView none = {0};
+    const EnvsView none = {0};
     TaskSensors shown = *reading;
     sensor_clip(r->def.robot, &shown);
     if (r->report.steps == 0) {

@@ -252,7 +252,7 @@ static void say_end(Simulated *s) {
 }
 
 MildStatus simulated_run(const SimulatedDef *def, SimulatedReport *report, MildError *error) {
-    const TaskView none = {0};
+    const EnvsView none = {0};
     Simulated *s = calloc(1, sizeof *s);
     TaskEnv *env = aligned_alloc(64, task_env_bytes(def->task, def->robot));
     RobotSim *sim = robot_sim_create(def->robot, def->task->physics_dt, error);

@@ -105,8 +105,8 @@ __global__ void add_ranks(Number *sum, const Number *gathered, int64_t count) {
 }
 
 template <typename Number>
-static MildStatus sum(Ranks *ranks, Number *x, int64_t count, ncclDataType_t type, void *on,
-                      MildError *error) {
+static MildStatus sum(Ranks *ranks, Number *x, int64_t count, ncclDataType_t type,
+                      MildStream stream, MildError *error) {
     if (ranks_count(ranks) == 1) {
         return MILD_OK;
     }
@@ -115,7 +115,6 @@ static MildStatus sum(Ranks *ranks, Number *x, int64_t count, ncclDataType_t typ
         return mild_fail(error, MILD_ERROR_RANGE, "a sum of %lld numbers over the GPUs has no room",
                          (long long)count);
     }
-    const cudaStream_t stream = (cudaStream_t)on;
     Number *gathered = (Number *)device->gathered;
     const ncclResult_t result =
         ncclAllGather(x, gathered, (size_t)count, type, device->comm, stream);
@@ -137,12 +136,12 @@ static MildStatus sum(Ranks *ranks, Number *x, int64_t count, ncclDataType_t typ
     return launched == cudaSuccess ? MILD_OK : cuda_fail("sums over the GPUs", launched, error);
 }
 
-extern "C" MildStatus ranks_sum_device(Ranks *ranks, float *x, int64_t count, void *stream,
+extern "C" MildStatus ranks_sum_device(Ranks *ranks, float *x, int64_t count, MildStream stream,
                                        MildError *error) {
     return sum(ranks, x, count, ncclFloat, stream, error);
 }
 
-extern "C" MildStatus ranks_sum_device_double(Ranks *ranks, double *x, int64_t count, void *stream,
-                                              MildError *error) {
+extern "C" MildStatus ranks_sum_device_double(Ranks *ranks, double *x, int64_t count,
+                                              MildStream stream, MildError *error) {
     return sum(ranks, x, count, ncclDouble, stream, error);
 }

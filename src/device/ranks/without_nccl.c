@@ -15,12 +15,13 @@ MildStatus ranks_open_device(Ranks *ranks, size_t bytes, MildError *error) {
     return refuse(ranks, error);
 }
 
-MildStatus ranks_sum_device(Ranks *ranks, float *x, int64_t count, void *stream, MildError *error) {
+MildStatus ranks_sum_device(Ranks *ranks, float *x, int64_t count, MildStream stream,
+                            MildError *error) {
     (void)x, (void)count, (void)stream;
     return refuse(ranks, error);
 }
 
-MildStatus ranks_sum_device_double(Ranks *ranks, double *x, int64_t count, void *stream,
+MildStatus ranks_sum_device_double(Ranks *ranks, double *x, int64_t count, MildStream stream,
                                    MildError *error) {
     (void)x, (void)count, (void)stream;
     return refuse(ranks, error);

@@ -155,11 +155,11 @@ static void place(TaskEnv *env, const Robot *robot, RobotSim *sim) {
 /* Into the block's history, of which the view has a copy. */
 static void observe(TaskEnv *env, const TaskDef *def, const Robot *robot,
                     const RobotReading *reading, const TaskSensors *sensors, int first,
-                    const TaskView *view) {
+                    const EnvsView *view) {
     const MildTerrain *terrain = task_env_terrain(env);
     const double *at = env->robot.qpos;
     float ground[TASK_GROUND_NUMBERS];
-    TaskView own = *view;
+    EnvsView own = *view;
     own.history = task_env_history(env);
     if (view->critic) {
         const int material = mild_terrain_material_at(terrain, at[0], at[1]);
@@ -172,7 +172,7 @@ static void observe(TaskEnv *env, const TaskDef *def, const Robot *robot,
 }
 
 void task_env_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
-                      const TaskSensors *sensors, int first, const TaskView *view) {
+                      const TaskSensors *sensors, int first, const EnvsView *view) {
     RobotReading reading = {.above = 0};
     if (sim) {
         task_env_read(env, sim, &reading);
@@ -191,7 +191,7 @@ void task_env_draw(TaskEnv *env, const TaskDef *def, const Robot *robot) {
 }
 
 static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                          const TaskView *view) {
+                          const EnvsView *view) {
     mild_ground_reset(task_env_ground(env));
     if (def->motors) {
         memset(motors_of(env), 0, def->motors->bytes);
@@ -216,13 +216,13 @@ static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, 
 }
 
 void task_env_reset(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                    const TaskView *view) {
+                    const EnvsView *view) {
     task_env_draw(env, def, robot);
     start_episode(env, def, robot, sim, view);
 }
 
 void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                       const MildTerrain *terrain, int rigid, const TaskView *view) {
+                       const MildTerrain *terrain, int rigid, const EnvsView *view) {
     task_env_draw(env, def, robot);
     task_env_rest(env)->terrain = *terrain;
     env->variation.rigid = rigid;
@@ -307,7 +307,7 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
 }
 
 TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                       const float *action, int auto_reset, const TaskView *view,
+                       const float *action, int auto_reset, const EnvsView *view,
                        const TaskCallback *callback) {
     TaskSensors sensors = {0};
     RobotReading reading = {.above = 0};

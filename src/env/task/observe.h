@@ -45,18 +45,18 @@ MILD_HD_FN void observe_frame(const TaskEnv *env, const TaskDef *def, const doub
                               const Real *omega, const Real *gravity, const Real *joint,
                               const Real *speed, float *frame) {
     int joints = env->shape.joints;
-    for (int i = task_lane(); i < 3; i += TASK_LANES) {
+    for (int i = tile_lane(); i < 3; i += TILE) {
         frame[i] = (float)omega[i];
         frame[3 + i] = (float)(env->command_seen[i] * (i < 2 ? 2 : 1));
         frame[6 + i] = (float)gravity[i];
     }
     float *q = frame + 9, *qd = q + joints, *action = qd + joints, *clock = action + joints;
-    for (int i = task_lane(); i < joints; i += TASK_LANES) {
+    for (int i = tile_lane(); i < joints; i += TILE) {
         q[i] = (float)(joint[i] - pose[i]);
         qd[i] = (float)(0.05 * speed[i]);
         action[i] = env->action[0][i];
     }
-    if (task_lane() == 0) {
+    if (tile_lane() == 0) {
         int still = !def->clock || task_is_standing(def, env->command_seen);
         clock[0] = still ? 0 : (float)task_sin(TASK_TWO_PI * env->phase);
         clock[1] = still ? 0 : (float)task_cos(TASK_TWO_PI * env->phase);
@@ -73,7 +73,7 @@ MILD_HD_FN void observe_draw_noise(const TaskEnv *env, int pair, double noise[2]
 
 MILD_HD_FN void observe_add_noise(const TaskEnv *env, const TaskDef *def, float *frame) {
     float *q = frame + 9, *qd = q + env->shape.joints;
-    for (int pair = task_lane(); pair < 3 + env->shape.joints; pair += TASK_LANES) {
+    for (int pair = tile_lane(); pair < 3 + env->shape.joints; pair += TILE) {
         double noise[2];
         observe_draw_noise(env, pair, noise);
         if (pair < 3) {
@@ -97,7 +97,7 @@ MILD_HD_FN void observe_to_base(const Real *rotation, const Real *v, float *out)
 MILD_HD_FN void observe_estimates(const TaskEnv *env, const TaskDef *def,
                                   const RobotReading *reading, float *estimate) {
     int feet = env->shape.feet;
-    for (int n = task_lane(); n <= feet; n += TASK_LANES) {
+    for (int n = tile_lane(); n <= feet; n += TILE) {
         const int f = n > 0 ? n - 1 : 0;
         float *velocity = estimate + 3 * n;
         observe_to_base(reading->rotation,
@@ -117,7 +117,7 @@ MILD_HD_FN void observe_feet(const TaskEnv *env, const TaskDef *def, const Robot
                              const RobotReading *reading, float *out) {
     int standing = task_is_standing(def, env->command);
     const float force_scale = (float)(0.6 * robot->foot_force); /* [N] */
-    for (int f = task_lane(); f < env->shape.feet; f += TASK_LANES) {
+    for (int f = tile_lane(); f < env->shape.feet; f += TILE) {
         const Real *force = reading->foot[f].force;
         float *own = out + 6 * f;
         observe_to_base(reading->rotation, force, own);
@@ -136,17 +136,17 @@ MILD_HD_FN void observe_episode(const TaskEnv *env, const TaskDef *def, const Ro
                                 const float *ground, float *out) {
     const TaskVariation *variation = &env->variation;
     float *const rest = out + 10 + TASK_GROUND_NUMBERS;
-    for (int i = task_lane(); i < 6; i += TASK_LANES) {
+    for (int i = tile_lane(); i < 6; i += TILE) {
         out[i] = (float)env->push[i];
     }
-    for (int i = task_lane(); i < 3; i += TASK_LANES) {
+    for (int i = tile_lane(); i < 3; i += TILE) {
         out[7 + i] = (float)(variation->com_offset[i] * 100);
         rest[9 + i] = (float)env->smooth_velocity[i];
     }
-    for (int i = task_lane(); i < TASK_GROUND_NUMBERS; i += TASK_LANES) {
+    for (int i = tile_lane(); i < TASK_GROUND_NUMBERS; i += TILE) {
         out[10 + i] = variation->rigid ? 0 : ground[i];
     }
-    if (task_lane() == 0) {
+    if (tile_lane() == 0) {
         const double step = def->physics_dt / TASK_PERIOD;
         out[6] = (float)(variation->base_mass_add / 4);
         rest[0] = (float)variation->rigid;
@@ -163,7 +163,7 @@ MILD_HD_FN void observe_episode(const TaskEnv *env, const TaskDef *def, const Ro
 
 /* By the lanes together. */
 MILD_HD_FN void observe_copy(const float *from, int width, float *to) {
-    for (int j = task_lane(); j < width; j += TASK_LANES) {
+    for (int j = tile_lane(); j < width; j += TILE) {
         to[j] = from[j];
     }
 }
@@ -174,7 +174,7 @@ MILD_HD_FN void observe_history(TaskEnv *env, const TaskDef *def, int first, flo
     const int width = env->shape.observation, stride = def->history_stride;
     const uint32_t held = env->held;
     const float *frame = history + (TASK_FRAMES - 1) * width;
-    for (int j = task_lane(); j < width; j += TASK_LANES) {
+    for (int j = tile_lane(); j < width; j += TILE) {
         TaskFrame *column = task_env_frames(env) + j;
         uint32_t place = env->oldest;
         for (uint32_t k = 0; first && k < held; k++) {
@@ -182,7 +182,7 @@ MILD_HD_FN void observe_history(TaskEnv *env, const TaskDef *def, int first, flo
         }
         for (int i = 0; i < TASK_FRAMES - 1; i++) {
             float sum = 0;
-            TASK_UNROLL
+            TILE_UNROLL
             for (int k = 0; k < stride; k++) {
                 sum += frame_unpack(column[place * (uint32_t)width]);
                 place = place + 1 < held ? place + 1 : 0;
@@ -198,19 +198,19 @@ MILD_HD_FN void observe_history(TaskEnv *env, const TaskDef *def, int first, flo
  * [TASK_GROUND_NUMBERS] under the base. */
 MILD_HD_FN void task_observe(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                              const RobotReading *reading, const float *ground,
-                             const TaskSensors *sensors, int first, const TaskView *view) {
+                             const TaskSensors *sensors, int first, const EnvsView *view) {
     const double *pose = robot->default_pose;
     const int width = env->shape.observation;
     float *frame = view->history + (TASK_FRAMES - 1) * width;
     observe_frame(env, def, pose, sensors->omega, sensors->gravity, sensors->q, sensors->qd, frame);
-    task_lanes_sync();
+    tile_sync();
     if (def->observe_noise) {
         observe_add_noise(env, def, frame);
-        task_lanes_sync();
+        tile_sync();
     }
     observe_history(env, def, first, view->history);
-    task_lanes_sync();
-    if (task_lane() == 0) {
+    tile_sync();
+    if (tile_lane() == 0) {
         env->oldest = (env->oldest + 1) % env->held;
     }
     if (view->frame) {

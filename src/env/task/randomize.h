@@ -55,14 +55,14 @@ MILD_HD_FN void task_draw_robot(TaskEnv *env, const TaskDef *def, Random r) {
     for (int i = 0; i < 3; i++) {
         env->variation.com_offset[i] = task_spread(&r, z->com_offset);
     }
-    for (int i = task_lane(); i <= TASK_JOINTS; i += TASK_LANES) {
+    for (int i = tile_lane(); i <= TASK_JOINTS; i += TILE) {
         Random own = random_after(r, i);
         env->variation.link_mass_scale[i] =
             i <= env->shape.joints ? (Real)task_draw(&own, z->link_mass) : 1;
     }
     r = random_after(r, env->shape.joints + 1);
     double strength = task_draw(&r, z->strength);
-    for (int i = task_lane(); i < env->shape.joints; i += TASK_LANES) {
+    for (int i = tile_lane(); i < env->shape.joints; i += TILE) {
         Random own = random_after(r, 3 * i);
         env->kp_scale[i] = task_draw(&own, z->gain);
         env->kd_scale[i] = task_draw(&own, z->gain);
@@ -74,7 +74,7 @@ MILD_HD_FN void task_draw_robot(TaskEnv *env, const TaskDef *def, Random r) {
     env->lag_command = task_draw_lag(&r, def);
     env->lag_motor = task_draw_lag(&r, def);
     env->lag_imu = task_draw_lag(&r, def);
-    task_lanes_sync();
+    tile_sync();
 }
 
 /* Draws the command that the policy is to follow. */

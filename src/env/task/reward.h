@@ -95,20 +95,20 @@ MILD_HD_FN Real reward_base_acceleration(const TaskMotion *m) {
 
 MILD_HD_FN Real reward_action_smoothness(const TaskMotion *m) {
     Real sum = 0;
-    for (int i = task_lane(); i < m->env->shape.actions; i += TASK_LANES) {
+    for (int i = tile_lane(); i < m->env->shape.actions; i += TILE) {
         Real a = m->env->action[0][i], a1 = m->env->action[1][i], a2 = m->env->action[2][i];
         sum += task_square(a - a1) + task_square(a - 2 * a1 + a2);
     }
-    return task_lanes_sum(sum);
+    return tile_sum(sum);
 }
 
 MILD_HD_FN Real reward_reference_motion(const TaskMotion *m) {
     Real sum = 0;
-    for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
+    for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
         sum += task_square(m->q[i] -
                            task_gait_reference(m->def, m->robot, m->env->phase, m->standing, i));
     }
-    Real d = task_sqrt(task_lanes_sum(sum));
+    Real d = task_sqrt(tile_sum(sum));
     return task_exp(-2 * d) - REAL(0.2) * task_clamp(d, 0, 0.5);
 }
 
@@ -119,18 +119,18 @@ MILD_HD_FN Real reward_default_pose(const TaskMotion *m) {
     Real away = 0, all = 0;
     for (int f = -1; f < m->env->shape.feet; f++) { /* -1: the trunk's joints */
         Real leg = 0;
-        for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
+        for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
             int same = m->robot->joint_foot[i] == f;
             leg += same ? task_square(still[i] * (m->q[i] - pose[i])) : 0;
         }
-        away += task_sqrt(task_lanes_sum(leg));
+        away += task_sqrt(tile_sum(leg));
     }
-    for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
+    for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
         all += task_square(m->q[i] - pose[i]);
     }
     return REAL(0.5) *
                (task_exp(-100 * task_clamp(away - REAL(0.1), 0, 50)) + task_exp(-3 * away)) -
-           REAL(0.01) * task_sqrt(task_lanes_sum(all));
+           REAL(0.01) * task_sqrt(tile_sum(all));
 }
 
 MILD_HD_FN Real reward_base_height(const TaskMotion *m) {
@@ -181,35 +181,35 @@ MILD_HD_FN Real reward_contact_force(const TaskMotion *m) {
 
 MILD_HD_FN Real reward_torque(const TaskMotion *m) {
     Real sum = 0;
-    for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
+    for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
         sum += task_square(m->torque[i]);
     }
-    return task_lanes_sum(sum);
+    return tile_sum(sum);
 }
 
 MILD_HD_FN Real reward_joint_speed(const TaskMotion *m) {
     Real sum = 0;
-    for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
+    for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
         sum += task_square(m->qd[i]);
     }
-    return task_lanes_sum(sum);
+    return tile_sum(sum);
 }
 
 MILD_HD_FN Real reward_joint_acceleration(const TaskMotion *m) {
     Real sum = 0;
-    for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
+    for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
         sum += task_square((m->qd[i] - m->qd_before[i]) / REAL(TASK_PERIOD));
     }
-    return task_lanes_sum(sum);
+    return tile_sum(sum);
 }
 
 /* What the cost of transport counts. */
 MILD_HD_FN Real reward_power(const TaskMotion *m) {
     Real sum = 0;
-    for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
+    for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
         sum += REAL(fabs(m->torque[i] * m->qd[i]));
     }
-    return task_lanes_sum(sum);
+    return tile_sum(sum);
 }
 
 MILD_HD_FN Real reward_upright(const TaskMotion *m) {

@@ -1,13 +1,15 @@
 /* What an environment is made of: plain structs without pointers that the CPU and a GPU share (see
- * lanes.h). Who steps the robot reads what it needs from a TaskEnv and answers with a
+ * numbers.h). Who steps the robot reads what it needs from a TaskEnv and answers with a
  * RobotReading. */
 #ifndef TASK_STATE_H
 #define TASK_STATE_H
 
+#include <stddef.h>
 #include <stdint.h>
 
-#include "env/task/lanes.h"
+#include "env/task/numbers.h"
 #include "env/task/task_def.h"
+#include "env/task/view.h"
 #include "robot/table.h"
 
 /* Why an episode ended; where several are true, task_end_cause names the first that follows. */
@@ -50,6 +52,17 @@ enum { /* of a robot with ROBOT_JOINTS_MAX joints and ROBOT_FEET_MAX feet */
        TASK_CRITIC_MAX = TASK_OBSERVATION_MAX + TASK_ESTIMATES_MAX + 6 * ROBOT_FEET_MAX + 34
 };
 TaskShape task_shape(const Robot *robot);
+MILD_HD_FN float *task_row(float *rows, long i, int width) {
+    return rows ? rows + i * width : NULL;
+}
+/* The rows from those of environment i on. */
+MILD_HD_FN EnvsView task_view_from(const EnvsView *view, const TaskShape *shape, long i) {
+    const EnvsView from = {task_row(view->history, i, shape->history),
+                           task_row(view->critic, i, shape->critic),
+                           task_row(view->estimate, i, shape->estimates),
+                           task_row(view->frame, i, shape->observation)};
+    return from;
+}
 /* First of the ground's numbers in the critic's input: TASK_GROUND_NUMBERS, then whether it is
  * rigid, where the numbers are 0. */
 int task_critic_ground(const TaskShape *shape);
@@ -165,14 +178,6 @@ typedef struct {
     uint32_t length;
     float episode_reward, episode_terms[TASK_REWARD_COUNT], episode_speed_error;
 } TaskStep;
-
-/* Where to write the next observation, with the widths of TaskShape. Any pointer may be NULL. */
-typedef struct {
-    float *history;  /* [history] noisy, newest frame last */
-    float *critic;   /* [critic] */
-    float *estimate; /* [estimates] true values, the regression targets */
-    float *frame;    /* [observation] newest noisy frame: the decoder's target */
-} TaskView;
 
 /* A motor during a policy step. */
 typedef struct {

@@ -95,7 +95,7 @@ MILD_HD_FN void task_draw_attitude(TaskEnv *env, const TaskDef *def, Random *r) 
 
 /* Whether the episode begins lying, and how: attitude and joints, and in the place of the height of
  * the base that of a robot whose lowest point is above the ground by the height of the drop.
- * task_place puts it there. */
+ * place of env.c and env_pose put it there. */
 MILD_HD_FN void task_draw_drop(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                double height) {
     Random r = random_at(env->seed ^ TASK_RANDOM_DROP, env->index, env->tick);
@@ -106,7 +106,7 @@ MILD_HD_FN void task_draw_drop(TaskEnv *env, const TaskDef *def, const RobotTabl
     }
     task_draw_attitude(env, def, &r);
     env->robot.qpos[2] = (Real)(height + robot->stand_height + TASK_DROP * random_unit(&r));
-    for (int i = task_lane(); i < env->shape.joints; i += TASK_LANES) {
+    for (int i = tile_lane(); i < env->shape.joints; i += TILE) {
         Random own = random_after(r, i);
         env->robot.qpos[7 + i] =
             (Real)random_uniform(&own, robot->joint_low[i], robot->joint_high[i]);
@@ -127,13 +127,13 @@ MILD_HD_FN void task_draw_start(TaskEnv *env, const TaskDef *def, const RobotTab
     env->robot.qpos[2] = height + robot->stand_height - depth + 0.002;
     env->robot.qpos[3] = task_cos(0.5 * yaw);
     env->robot.qpos[6] = task_sin(0.5 * yaw);
-    for (int i = task_lane(); i < env->shape.joints; i += TASK_LANES) {
+    for (int i = tile_lane(); i < env->shape.joints; i += TILE) {
         Random own = random_after(r, i);
         double q = pose[i] + z->initial_joint * (2 * random_unit(&own) - 1);
         env->robot.qpos[7 + i] = fmin(fmax(q, robot->joint_low[i]), robot->joint_high[i]);
     }
     r = random_after(r, env->shape.joints);
-    for (int i = task_lane(); i < 6; i += TASK_LANES) {
+    for (int i = tile_lane(); i < 6; i += TILE) {
         Random own = random_after(r, i);
         env->robot.qvel[i] = z->initial_velocity * (2 * random_unit(&own) - 1);
     }
@@ -145,7 +145,7 @@ MILD_HD_FN void task_draw_start(TaskEnv *env, const TaskDef *def, const RobotTab
                     ? (uint32_t)(random_unit(&r) * 0.9 * env->step_limit)
                     : 0;
     env->step_first = env->step;
-    task_lanes_sync();
+    tile_sync();
     task_draw_drop(env, def, robot, height);
 }
 
@@ -157,18 +157,18 @@ MILD_HD_FN void task_see_command(TaskEnv *env) {
 
 /* What an episode knows of the one before, and its command. */
 MILD_HD_FN void task_clear_episode(TaskEnv *env, const TaskDef *def) {
-    task_clear(&env->robot, sizeof env->robot);
-    task_clear(env->action, sizeof env->action);
-    task_clear(env->air_time, sizeof env->air_time);
-    task_clear(env->joint_speed, sizeof env->joint_speed);
-    task_clear(env->smooth_velocity, sizeof env->smooth_velocity);
-    task_clear(env->push, sizeof env->push);
-    task_clear(env->term_sum, sizeof env->term_sum);
+    tile_clear(&env->robot, sizeof env->robot);
+    tile_clear(env->action, sizeof env->action);
+    tile_clear(env->air_time, sizeof env->air_time);
+    tile_clear(env->joint_speed, sizeof env->joint_speed);
+    tile_clear(env->smooth_velocity, sizeof env->smooth_velocity);
+    tile_clear(env->push, sizeof env->push);
+    tile_clear(env->term_sum, sizeof env->term_sum);
     env->reward_sum = env->speed_error_sum = 0;
-    if (task_lane() == 0 && !env->command_frozen) {
+    if (tile_lane() == 0 && !env->command_frozen) {
         task_draw_command(env, def);
     }
-    task_lanes_sync();
+    tile_sync();
     task_see_command(env);
 }
 
@@ -177,9 +177,9 @@ MILD_HD_FN void task_clear_episode(TaskEnv *env, const TaskDef *def) {
 MILD_HD_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                    double height, double depth) {
     task_clear_episode(env, def);
-    task_lanes_sync();
+    tile_sync();
     task_draw_start(env, def, robot, height, depth);
-    task_lanes_sync();
+    tile_sync();
 }
 
 /* What the sensors say in the first pose of an episode. */
@@ -196,7 +196,7 @@ MILD_HD_FN void task_first_sensors(TaskEnv *env, const RobotReading *reading,
 
 MILD_HD_FN void task_accept_action(TaskEnv *env, const TaskDef *def, const float *action) {
     float limit = (float)def->action_clip;
-    for (int i = task_lane(); i < env->shape.actions; i += TASK_LANES) {
+    for (int i = tile_lane(); i < env->shape.actions; i += TILE) {
         float a = action[i];
         env->action[2][i] = env->action[1][i];
         env->action[1][i] = env->action[0][i];
@@ -206,7 +206,7 @@ MILD_HD_FN void task_accept_action(TaskEnv *env, const TaskDef *def, const float
 
 MILD_HD_FN void task_push_base(TaskEnv *env, const TaskDef *def) {
     const RandomizeDef *z = &def->randomize;
-    for (int i = task_lane(); i < 6; i += TASK_LANES) {
+    for (int i = tile_lane(); i < 6; i += TILE) {
         env->push[i] *= 0.95;
     }
     uint32_t interval = (uint32_t)(z->push_interval / TASK_PERIOD + 0.5);
@@ -214,7 +214,7 @@ MILD_HD_FN void task_push_base(TaskEnv *env, const TaskDef *def) {
         return;
     }
     Random r = random_at(env->seed ^ TASK_RANDOM_PUSH, env->index, env->tick);
-    for (int i = task_lane(); i < 6; i += TASK_LANES) {
+    for (int i = tile_lane(); i < 6; i += TILE) {
         Random own = random_after(r, i);
         double size = i == 2 ? 0 : i < 3 ? z->push_linear : z->push_angular;
         env->push[i] = size * (2 * random_unit(&own) - 1);
@@ -293,8 +293,8 @@ MILD_HD_FN void task_feet_motion(TaskEnv *env, const TaskDef *def, const RobotTa
         }
     }
     m->base_height = env->robot.qpos[2] - stance_height / (Real)(stances ? stances : 1);
-    task_lanes_sync();
-    for (int f = task_lane(); f < env->shape.feet; f += TASK_LANES) {
+    tile_sync();
+    for (int f = tile_lane(); f < env->shape.feet; f += TILE) {
         env->air_time[f] = m->contact[f] ? 0 : env->air_time[f] + REAL(TASK_PERIOD);
     }
 }
@@ -328,17 +328,17 @@ MILD_HD_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def,
         change += (twist[i] - env->base_twist[i]) * (twist[i] - env->base_twist[i]);
     }
     m.twist_change = task_sqrt(change);
-    task_lanes_sync();
-    for (int i = task_lane(); i < 3; i += TASK_LANES) {
+    tile_sync();
+    for (int i = tile_lane(); i < 3; i += TILE) {
         const Real now = i < 2 ? m.velocity[i] : m.omega[2];
         env->smooth_velocity[i] +=
             REAL(TASK_PERIOD) / REAL(def->reward.tracking_time) * (now - env->smooth_velocity[i]);
     }
-    for (int i = task_lane(); i < 6; i += TASK_LANES) {
+    for (int i = tile_lane(); i < 6; i += TILE) {
         env->base_twist[i] = twist[i];
     }
     const Real *q = env->robot.qpos + 7;
-    for (int i = task_lane(); i < env->shape.joints; i += TASK_LANES) {
+    for (int i = tile_lane(); i < env->shape.joints; i += TILE) {
         m.q[i] = q[i];
         m.qd[i] = qvel[6 + i];
         m.qd_before[i] = env->joint_speed[i];
@@ -348,7 +348,7 @@ MILD_HD_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def,
     m.foot_distance = reading->foot_distance;
     m.knee_distance = reading->knee_distance;
     task_feet_motion(env, def, robot, reading, &m);
-    task_lanes_sync();
+    tile_sync();
     return m;
 }
 
@@ -416,12 +416,12 @@ MILD_HD_FN int task_take_reward(TaskEnv *env, const TaskDef *def, const RobotTab
     if (!isfinite(*reward)) {
         return 0;
     }
-    if (task_lane() == 0) {
+    if (tile_lane() == 0) {
         env->speed_error_sum += hypot(env->smooth_velocity[0] - env->command[0],
                                       env->smooth_velocity[1] - env->command[1]);
         env->reward_sum += (Real)*reward;
     }
-    for (int i = task_lane(); i < TASK_REWARD_COUNT; i += TASK_LANES) {
+    for (int i = tile_lane(); i < TASK_REWARD_COUNT; i += TILE) {
         env->term_sum[i] += terms[i] * REAL(TASK_PERIOD);
     }
     return 1;
@@ -440,12 +440,12 @@ MILD_HD_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const RobotT
     out.valid = !bad;
     const TaskEnd cause = bad ? TASK_END_not_finite : task_end_cause(env, def, robot, reading);
     const int fallen = cause != TASK_END_time;
-    task_lanes_sync();
-    if (task_lane() == 0) {
+    tile_sync();
+    if (tile_lane() == 0) {
         task_advance_clock(env, def);
         task_assist_adapt(env, fallen);
     }
-    task_lanes_sync();
+    tile_sync();
     out.timeout = !fallen && env->step >= env->step_limit;
     out.done = fallen || out.timeout;
     out.cause = (uint8_t)cause;

@@ -68,15 +68,15 @@ void task_env_read(const TaskEnv *env, const RobotSim *sim, RobotReading *readin
 
 /* Draws a new episode and writes its first observation. */
 void task_env_reset(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                    const TaskView *view);
+                    const EnvsView *view);
 /* The same, but the caller has chosen the terrain, except for its map, and whether to use the
  * engine's rigid ground, with the friction TASK_RIGID_FRICTION. The map is that of the TaskDef. */
 void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                       const MildTerrain *terrain, int rigid, const TaskView *view);
+                       const MildTerrain *terrain, int rigid, const EnvsView *view);
 /* One policy step. When the episode ends, with auto_reset a new one is drawn and its first
  * observation is written. */
 TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                       const float *action, int auto_reset, const TaskView *view,
+                       const float *action, int auto_reset, const EnvsView *view,
                        const TaskCallback *callback);
 
 /* ---- parts of the step on the CPU ---- */
@@ -85,7 +85,7 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
 void task_env_draw(TaskEnv *env, const TaskDef *def, const Robot *robot);
 /* task_observe of a sim, which may be NULL for a view without critic and estimate. */
 void task_env_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
-                      const TaskSensors *sensors, int first, const TaskView *view);
+                      const TaskSensors *sensors, int first, const EnvsView *view);
 
 /* Draws the ground of an episode: one material, or stripes of three (ground.c). */
 void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r);

@@ -230,7 +230,7 @@ MildBatch batch_share(const MildBatch *batch, int first, int count) {
 }
 
 static MildStatus batch_gpu_step(const MildBatch *batch, const MildBatchInput *input,
-                                 const MildBatchOutput *output, int advance, void *stream,
+                                 const MildBatchOutput *output, int advance, MildStream stream,
                                  MildError *error) {
     const BatchShape *shape = &batch->shape;
     for (int i = 0; batch_kernels[i]; i++) {
@@ -244,7 +244,7 @@ static MildStatus batch_gpu_step(const MildBatch *batch, const MildBatchInput *i
 }
 
 MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
-                           const MildBatchOutput *output, int advance, void *stream,
+                           const MildBatchOutput *output, int advance, MildStream stream,
                            MildError *error) {
     if (batch->device != MILD_BATCH_HOST) {
         return batch_gpu_step(batch, input, output, advance, stream, error);
@@ -253,7 +253,7 @@ MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
     return MILD_OK;
 }
 
-MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, void *stream,
+MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, MildStream stream,
                             MildError *error) {
     if (batch->device != MILD_BATCH_HOST) {
         return batch_gpu_reset(batch, which, stream, error);

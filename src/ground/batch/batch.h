@@ -63,7 +63,7 @@ void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBat
 /* ---- a GPU: kernel.cu and reset.cu, or without_cuda.c ---- */
 /* A step in `stream`. */
 typedef MildStatus (*BatchStep)(const MildBatch *batch, const MildBatchInput *input,
-                                const MildBatchOutput *output, int advance, void *stream,
+                                const MildBatchOutput *output, int advance, MildStream stream,
                                 MildError *error);
 /* The step compiled for one size of a batch. */
 typedef struct {
@@ -75,7 +75,7 @@ typedef struct {
 } BatchKernel;
 /* Those of this build, NULL behind them. A batch takes the first that fits (cmake/Batch.cmake). */
 extern const BatchKernel *const batch_kernels[];
-MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which, void *stream,
+MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which, MildStream stream,
                            MildError *error);
 
 #endif

@@ -455,7 +455,7 @@ MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int 
         const int cone = own->curves & (LAW_CONE | LAW_HEAP);
         const int created = e->law.mass_rate < 0 || e->law.drag_rate < 0;
         if (created && own->depth > 0 && e->middle >= own->before.depth_max) {
-            e->explicit_impulse = element_explicit_of(e, cone, dt, free);
+            e->explicit_impulse = element_explicit(e, cone, dt, free);
         }
         element_drag(e, cone, dt, real_max(free - now.descent, 0));
     }

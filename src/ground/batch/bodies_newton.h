@@ -70,11 +70,7 @@ MILD_HD void bodies_pass(const BodiesSetup *setup, const BodiesElement *own, con
 /* ---- which elements ---- */
 
 /* Rounds of elements that a warp keeps. On a GPU these are in registers. */
-#ifdef __CUDACC__
-#define BODIES_KEPT 1
-#else
-#define BODIES_KEPT 8
-#endif
+#define BODIES_KEPT (LANE_COPIES == 1 ? 1 : 8)
 
 /* The rim of the body at place i, from each lane's sums. */
 WARP_FN void bodies_set_rim(BodiesWork *work, int i, Real (*sums)[RIM_SUMS]) {

@@ -92,7 +92,6 @@ enum {
     CONTACT_MAP_MEMORY = CONTACT_MEMORY + 4,
     CONTACT_FOOT_MEMORY = LANES /* numbers that [5][foot] have room in */
 };
-#define CONTACT_LABELS 256 /* a map has at most as many */
 #define CONTACT_NO_PLANE                                                                           \
     REAL(1e6) /* [m] `plane` of an element that was not there in the last step */
 

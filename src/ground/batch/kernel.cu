@@ -59,13 +59,14 @@ CONTACT_TURN(level)
 CONTACT_TURN(map)
 
 static MildStatus step(const MildBatch *batch, const MildBatchInput *input,
-                       const MildBatchOutput *output, int advance, void *stream, MildError *error) {
+                       const MildBatchOutput *output, int advance, MildStream stream,
+                       MildError *error) {
     const BatchShape *shape = &batch->shape;
     const int blocks = (shape->robots + WARPS - 1) / WARPS;
     ContactSetup setup;
     OnDevice on(batch->device);
     batch_setup(shape, &batch->arrays, &setup);
-    (shape->map ? contact_map : contact_level)<<<blocks, THREADS, 0, (cudaStream_t)stream>>>(
+    (shape->map ? contact_map : contact_level)<<<blocks, THREADS, 0, stream>>>(
         setup, *shape, batch->arrays, *input, *output, advance);
     return checked(cudaGetLastError(), "step", error);
 }

@@ -21,10 +21,9 @@ static __global__ void forget(BatchShape shape, BatchArrays arrays, const uint8_
     }
 }
 
-extern "C" MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which, void *stream,
-                                      MildError *error) {
+extern "C" MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which,
+                                      MildStream stream, MildError *error) {
     OnDevice on(batch->device);
-    forget<<<batch->shape.robots, 256, 0, (cudaStream_t)stream>>>(batch->shape, batch->arrays,
-                                                                  which);
+    forget<<<batch->shape.robots, 256, 0, stream>>>(batch->shape, batch->arrays, which);
     return checked(cudaGetLastError(), "reset", error);
 }

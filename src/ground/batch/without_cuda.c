@@ -4,7 +4,7 @@
 
 const BatchKernel *const batch_kernels[] = {NULL};
 
-MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which, void *stream,
+MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which, MildStream stream,
                            MildError *error) {
     (void)which;
     (void)stream;

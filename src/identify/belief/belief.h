@@ -5,7 +5,7 @@
  *     belief_reset(&belief);
  *     for (;;) {
  *         const int event = belief_step(&belief, net, frame);
- *         belief_say(&belief, net, BELIEF_k_pen, 0.9, range);
+ *         const double low = belief_quantile(&belief, net, BELIEF_k_pen, 0.05);
  *     }
  *
  * A footstep is half a period of the gait clock. Each gives BELIEF_FEATURES numbers: means of the

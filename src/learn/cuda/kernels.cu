@@ -141,11 +141,7 @@ static __device__ float elu(float x, float) {
 }
 
 static __device__ float elu(float x, Bf16) {
-#ifdef __CUDA_ARCH__
-    return x > 0.0f ? x : __expf(x) - 1.0f;
-#else
-    return vector_elu(x);
-#endif
+    return ON_GPU(x > 0.0f ? x : __expf(x) - 1.0f, vector_elu(x));
 }
 
 /* A thread has four columns of a row. width: in fours. */

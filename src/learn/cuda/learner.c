@@ -674,7 +674,7 @@ static GpuLearner *learner_of(const Ppo *ppo) {
     return ppo->backend.destroy == learner_destroy ? ppo->backend.self : NULL;
 }
 
-void *gpu_learner_stream(const Ppo *ppo) {
+MildStream gpu_learner_stream(const Ppo *ppo) {
     const GpuLearner *g = learner_of(ppo);
     return g ? g->queue.stream : NULL;
 }

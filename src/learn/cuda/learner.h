@@ -23,7 +23,7 @@ MildStatus gpu_learner_attach(Ppo *ppo, const GpuLearnerDef *def, MildError *err
 /* The cudaStream_t on which act and update are enqueued; NULL without a device. With a resident
  * rollout ppo_act only launches kernels, whose arguments depend on t alone. So it may be captured
  * in a CUDA graph on this stream, which stays right as the iterations go on. */
-void *gpu_learner_stream(const Ppo *ppo);
+MildStream gpu_learner_stream(const Ppo *ppo);
 size_t gpu_learner_bytes(const Ppo *ppo); /* memory held on the device; 0 without one */
 /* Copies the device's whole rollout from a block on the CPU, or to it, whose arrays are those of
  * ppo_batch_like. For tests and benches, which need a device. */

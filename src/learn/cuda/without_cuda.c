@@ -11,7 +11,7 @@ MildStatus gpu_learner_attach(Ppo *ppo, const GpuLearnerDef *def, MildError *err
     return mild_fail(error, MILD_ERROR_ARGUMENT, "%s", reason);
 }
 
-void *gpu_learner_stream(const Ppo *ppo) {
+MildStream gpu_learner_stream(const Ppo *ppo) {
     (void)ppo;
     return NULL;
 }

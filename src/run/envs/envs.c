@@ -128,15 +128,17 @@ int mild_envs_pose(const MildEnvs *envs, int index, double *qpos, int size) {
     return count;
 }
 
-MildStatus mild_envs_reset(MildEnvs *envs, const EnvsView *first, void *stream, MildError *error) {
+MildStatus mild_envs_reset(MildEnvs *envs, const EnvsView *first, MildStream stream,
+                           MildError *error) {
     return envs_reset(envs->envs.envs, first, stream, error);
 }
 
-MildStatus mild_envs_step(MildEnvs *envs, const EnvsStep *step, void *stream, MildError *error) {
+MildStatus mild_envs_step(MildEnvs *envs, const EnvsStep *step, MildStream stream,
+                          MildError *error) {
     return envs_step(envs->envs.envs, step, stream, error);
 }
 
-MildStatus mild_envs_stats(MildEnvs *envs, EnvsStats *stats, void *stream, MildError *error) {
+MildStatus mild_envs_stats(MildEnvs *envs, EnvsStats *stats, MildStream stream, MildError *error) {
     EnvsStats sums;
     MildStatus status = envs_sums(envs->envs.envs, &sums, stream, error);
     if (status == MILD_OK) {

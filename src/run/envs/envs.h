@@ -75,13 +75,15 @@ const char *mild_envs_model(const MildEnvs *envs);
 int mild_envs_pose(const MildEnvs *envs, int index, double *qpos, int size);
 
 /* New episodes in all environments, and their first observations. */
-MildStatus mild_envs_reset(MildEnvs *envs, const EnvsView *first, void *stream, MildError *error);
+MildStatus mild_envs_reset(MildEnvs *envs, const EnvsView *first, MildStream stream,
+                           MildError *error);
 
 /* A policy step of all environments. */
-MildStatus mild_envs_step(MildEnvs *envs, const EnvsStep *step, void *stream, MildError *error);
+MildStatus mild_envs_step(MildEnvs *envs, const EnvsStep *step, MildStream stream,
+                          MildError *error);
 
 /* Means over the episodes that ended since the last call. Waits for the device. */
-MildStatus mild_envs_stats(MildEnvs *envs, EnvsStats *stats, void *stream, MildError *error);
+MildStatus mild_envs_stats(MildEnvs *envs, EnvsStats *stats, MildStream stream, MildError *error);
 
 MILD_API_END
 

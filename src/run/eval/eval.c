@@ -277,7 +277,7 @@ static void take_trial(void *context, int trial, int thread) {
     }
 }
 
-/* Tells who watches what the controller has decided. */
+/* Shows to who watches what the controller has decided. */
 static void show_decisions(const Trials *t, int step) {
     const EvalDef *eval = &t->run->eval;
     for (int i = 0; t->env && i < t->trials; i++) {

@@ -60,7 +60,7 @@ static void add_numbers(double *sum, const float *numbers, int count) {
     }
 }
 
-void inside_decided(void *context, const EvalDecision *decision) {
+static void decided(void *context, const EvalDecision *decision) {
     InsideLog *log = context;
     const LearnedInside *in = log->inside;
     const size_t trial = (size_t)decision->trial;
@@ -76,6 +76,10 @@ void inside_decided(void *context, const EvalDecision *decision) {
     if (log->csv) {
         print_row(log, decision);
     }
+}
+
+EvalCallback inside_callback(InsideLog *log) {
+    return (EvalCallback){decided, log};
 }
 
 void inside_means(const InsideLog *log, float *means) {

@@ -15,8 +15,8 @@ typedef struct {
     long decisions;
 } InsideLog;
 
-/* An EvalCallback.decided; context: an InsideLog. */
-void inside_decided(void *context, const EvalDecision *decision);
+/* Adds each decision to the log. */
+EvalCallback inside_callback(InsideLog *log);
 /* The names of the columns. SI units, but for the phase and for what the networks alone know. */
 void inside_print_header(const InsideLog *log);
 /* [latent + estimates + theta] */

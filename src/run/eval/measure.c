@@ -176,7 +176,7 @@ void measure_sample(Measure *m, const EnvsSample *sample) {
     }
 }
 
-void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const double *torque) {
+void measure_step(Measure *measure, const TaskEnv *env, const RobotSim *sim, const double *torque) {
     EnvsSample sample;
     envs_read_sample(env, sim, torque, &sample);
     measure_sample(measure, &sample);

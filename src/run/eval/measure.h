@@ -75,8 +75,8 @@ double measure_yaw(const double quaternion[4]);
 void measure_start(Measure *measure, double dt);
 /* One physics step. */
 void measure_sample(Measure *measure, const EnvsSample *sample);
-/* The same of a robot of MuJoCo: a TaskCallback. */
-void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const double *torque);
+/* The same of a robot of MuJoCo, from a TaskCallback. */
+void measure_step(Measure *measure, const TaskEnv *env, const RobotSim *sim, const double *torque);
 /* Ends the trial. If no foot was ever lifted, the open stances count, so that sinkage and drift are
  * still measured. */
 void measure_finish(Measure *measure);

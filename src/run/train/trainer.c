@@ -18,7 +18,7 @@ struct Trainer {
     Policy *policy;
     Ppo *ppo;
     TrainEnvs envs;
-    void *stream; /* of the learner's device; NULL: none */
+    MildStream stream; /* of the learner's device; NULL: none */
 };
 
 void train_destroy(Trainer *trainer) {

@@ -15,7 +15,7 @@ typedef uint3 dim3;
 typedef struct {
     float x, y, z, w;
 } float4;
-typedef struct EmulatedStream *cudaStream_t;
+typedef struct CUstream_st *cudaStream_t;
 typedef struct EmulatedGraph *cudaGraph_t;
 typedef struct EmulatedGraphExec *cudaGraphExec_t;
 typedef enum { cudaSuccess, cudaErrorMemoryAllocation, cudaErrorNotSupported } cudaError_t;

@@ -6,13 +6,14 @@ MildStatus ranks_open_device(Ranks *ranks, size_t bytes, MildError *error) {
     return MILD_OK;
 }
 
-MildStatus ranks_sum_device(Ranks *ranks, float *x, int64_t count, void *stream, MildError *error) {
+MildStatus ranks_sum_device(Ranks *ranks, float *x, int64_t count, MildStream stream,
+                            MildError *error) {
     (void)stream, (void)error;
     ranks_sum(ranks, x, count);
     return MILD_OK;
 }
 
-MildStatus ranks_sum_device_double(Ranks *ranks, double *x, int64_t count, void *stream,
+MildStatus ranks_sum_device_double(Ranks *ranks, double *x, int64_t count, MildStream stream,
                                    MildError *error) {
     (void)stream, (void)error;
     ranks_sum_double(ranks, x, count);

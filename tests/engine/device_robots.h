@@ -1,7 +1,7 @@
 /* Many robots of one kind on a GPU, each stepped by a warp: in the air, on rigid ground or on soft
  * ground. In float; define MILD_REAL_FLOAT before the inclusion. */
-#ifndef MILD_ENGINE_ROBOTS_H
-#define MILD_ENGINE_ROBOTS_H
+#ifndef DEVICE_ROBOTS_H
+#define DEVICE_ROBOTS_H
 
 #include <cuda_runtime.h>
 

@@ -1,5 +1,5 @@
 #define MILD_REAL_FLOAT
-#include "robot/engine/robots.h"
+#include "device_robots.h"
 
 #include "ground/batch/contact.h"
 #include "robot/engine/step.h"
