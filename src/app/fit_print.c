@@ -114,10 +114,10 @@ static void files_print(const FitWork *work) {
     }
     for (int f = 0, count = 0; f < work->files; f++) {
         if (work->file[f].kind == FIT_FILE_PRESS && work->file[f].count) {
-            const double excess = press_excess(work, f, &row);
+            const double percent = 100 * press_excess(work, f, &row);
             printf("%s%s %+.1f %%",
                    count++ ? ", " : "force of the curve, summed over a file: ", work->file[f].path,
-                   100 * excess);
+                   fabs(percent) < 0.05 ? 0.0 : percent);
         }
     }
     printf("\n");
