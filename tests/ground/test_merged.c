@@ -381,7 +381,8 @@ TEST(test_regain) {
 }
 
 /* Support comes back up to the cosine of the tilt where the ground is projected, and whole where it
- * is not: after 40 u0 of fresh way a plate of 15 degrees carries as on ground where slip costs nothing. */
+ * is not: after 40 u0 of fresh way a plate of 15 degrees carries as on ground where slip costs
+ * nothing. */
 TEST(test_regain_tilted) {
     for (int merged = 0; merged < 2; merged++) {
         MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
