@@ -216,26 +216,13 @@ def judge_presses(data, fitted, models=()):
 SLIPS = {"slip_length": 0.0024, "regain_length": 0.00067, "slip_growth": 0.07, "grip": 0.12}  # of grains of 5 mm (docs/grains.md)
 
 
-def rig(ground, load, pitch=0.006):
-    """A hub of that weight on a vertical slide, on a carriage too heavy for the wheel to slow; so is the wheel's inertia."""
-    points, _ = rim()
-    vertices = " ".join(f"{x:.9g}" for x in (points[:-2] - (0, 0, RADIUS)).ravel())
-    return f"""<mujoco><compiler balanceinertia="true"/><option timestep="0.002" integrator="Euler"/>
-<extension><plugin plugin="mild.ground"><instance name="ground"><config key="body" value="wheel"/><config key="ground" value="{ground}"/>
-<config key="body_pitch" value="{pitch}"/></instance></plugin></extension>
-<asset><mesh name="rim" vertex="{vertices}"/></asset>
-<worldbody><body><joint type="slide" axis="1 0 0"/><inertial pos="0 0 0" mass="1e7" diaginertia="1 1 1"/>
-<body pos="0 0 {RADIUS + 1e-4}"><joint type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="{load / 9.81 / 2}" diaginertia="1 1 1"/>
-<body name="wheel"><joint type="hinge" axis="0 1 0" armature="1e7"/><inertial pos="0 0 0" mass="{load / 9.81 / 2}" diaginertia="1 1 1"/>
-<geom type="mesh" mesh="rim" contype="0" conaffinity="0" mass="0"/></body></body></body></worldbody>
-<sensor><plugin name="feel" plugin="mild.ground" instance="ground"/></sensor></mujoco>"""
-
-
 def roll(ground, speed, load, seconds):
     """Drag [N] and sinkage [mm], means over the last fifteenth of the time, as measured (70 to 75 s)."""
     import mujoco
+    import rover_wheel
 
-    model = mujoco.MjModel.from_xml_string(rig(ground, load))
+    text = rover_wheel.rig(ground, 0.006, rover_wheel.rim(60, RADIUS, WIDTH), RADIUS, load, timestep=0.002)
+    model = mujoco.MjModel.from_xml_string(text)
     data, rows = mujoco.MjData(model), []
     data.qvel[:] = SPEED, 0, speed / RADIUS
     while data.time < seconds:

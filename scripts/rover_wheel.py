@@ -85,29 +85,29 @@ def fit(mild, folder):
 
 # ---- the wheel ----
 
-def rim(sides=96):
+def rim(sides=96, radius=RADIUS, width=WIDTH):
     angle = 2 * math.pi * np.arange(sides) / sides
-    ring = np.stack([RADIUS * np.cos(angle), np.zeros(sides), RADIUS * np.sin(angle)], axis=1)
-    return np.concatenate([ring + (0, y, 0) for y in (-WIDTH / 2, WIDTH / 2)])
+    ring = np.stack([radius * np.cos(angle), np.zeros(sides), radius * np.sin(angle)], axis=1)
+    return np.concatenate([ring + (0, y, 0) for y in (-width / 2, width / 2)])
 
 
-def rig(ground, pitch):
+def rig(ground, pitch, points, radius=RADIUS, load=LOAD, timestep=0.001):
     """A hub of the wheel's load on a vertical slide, on a carriage too heavy for the wheel to slow; so is the wheel's inertia."""
-    vertices = " ".join(f"{x:.9g}" for x in rim().ravel())
-    return f"""<mujoco><compiler balanceinertia="true"/><option timestep="0.001" integrator="Euler"/>
+    vertices = " ".join(f"{x:.9g}" for x in points.ravel())
+    return f"""<mujoco><compiler balanceinertia="true"/><option timestep="{timestep}" integrator="Euler"/>
 <extension><plugin plugin="mild.ground"><instance name="ground"><config key="body" value="wheel"/><config key="ground" value="{ground}"/>
 <config key="body_pitch" value="{pitch}"/></instance></plugin></extension>
 <asset><mesh name="rim" vertex="{vertices}"/></asset>
 <worldbody><body><joint type="slide" axis="1 0 0"/><inertial pos="0 0 0" mass="1e7" diaginertia="1 1 1"/>
-<body pos="0 0 {RADIUS + 1e-4}"><joint type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="{LOAD / GRAVITY / 2}" diaginertia="1 1 1"/>
-<body name="wheel"><joint type="hinge" axis="0 1 0" armature="1e7"/><inertial pos="0 0 0" mass="{LOAD / GRAVITY / 2}" diaginertia="1 1 1"/>
+<body pos="0 0 {radius + 1e-4}"><joint type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="{load / GRAVITY / 2}" diaginertia="1 1 1"/>
+<body name="wheel"><joint type="hinge" axis="0 1 0" armature="1e7"/><inertial pos="0 0 0" mass="{load / GRAVITY / 2}" diaginertia="1 1 1"/>
 <geom type="mesh" mesh="rim" contype="0" conaffinity="0" mass="0"/></body></body></body></worldbody>
 <sensor><plugin name="feel" plugin="mild.ground" instance="ground"/></sensor></mujoco>"""
 
 
 def roll(ground, slip, pitch=0.012, speed=SPEED):
     """Means over the second half of the way: pull [N], torque [N m], sinkage [m]."""
-    model = mujoco.MjModel.from_xml_string(rig(ground, pitch))
+    model = mujoco.MjModel.from_xml_string(rig(ground, pitch, rim()))
     data = mujoco.MjData(model)
     turn = speed / (RADIUS * (1 - slip))
     data.qvel[:] = speed, 0, turn

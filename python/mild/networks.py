@@ -108,7 +108,12 @@ class TorchScript:
     """A module of one argument. State that it keeps in buffers is that of the file again at each reset."""
 
     def __init__(self, path):
-        if zipfile.is_zipfile(path) and not any(name.endswith("/constants.pkl") for name in zipfile.ZipFile(path).namelist()):
+        if zipfile.is_zipfile(path):
+            with zipfile.ZipFile(path) as archive:
+                exported = any(name.endswith("/constants.pkl") for name in archive.namelist())
+        else:
+            exported = True  # torch says what it is
+        if not exported:
             raise ValueError(f"policy: {path} has weights alone, as a learner's checkpoint; give what was exported of it (mjlab writes an .onnx beside it)")
         try:
             import torch

@@ -90,9 +90,9 @@ static void assumptions_print(const FitWork *work, FitKind kind) {
     }
 }
 
-/* [-] Force of the curve over that of the record, in the sum over the rows of a press, less 1.
- * *row: its first one, then that of the next file. */
-static double press_excess(const FitWork *work, int file, const FitPoint **row) {
+/* [-] Relative bias of the curve: the sum of its forces over that of the record's, less 1. *row:
+ * the first one of a press, then that of the next file. */
+static double press_bias(const FitWork *work, int file, const FitPoint **row) {
     const FitSet *press = &work->set[FIT_PRESS];
     const FitPoint *end = *row + work->file[file].count;
     double fitted = 0, measured = 0;
@@ -105,8 +105,7 @@ static double press_excess(const FitWork *work, int file, const FitPoint **row) 
     return fitted / measured - 1;
 }
 
-/* Of several presses, what the curve has in each: plates of several sizes tell whether the law has
- * the size. */
+/* The bias in each of several presses: plates of several sizes tell whether the law knows them. */
 static void files_print(const FitWork *work) {
     const FitPoint *row = work->set[FIT_PRESS].points;
     if (work->set[FIT_PRESS].files < 2) {
@@ -114,9 +113,8 @@ static void files_print(const FitWork *work) {
     }
     for (int f = 0, count = 0; f < work->files; f++) {
         if (work->file[f].kind == FIT_FILE_PRESS && work->file[f].count) {
-            const double percent = 100 * press_excess(work, f, &row);
-            printf("%s%s %+.1f %%",
-                   count++ ? ", " : "force of the curve, summed over a file: ", work->file[f].path,
+            const double percent = 100 * press_bias(work, f, &row);
+            printf("%s%s %+.1f %%", count++ ? ", " : "bias by file: ", work->file[f].path,
                    fabs(percent) < 0.05 ? 0.0 : percent);
         }
     }
@@ -315,16 +313,17 @@ static int json_set(cJSON *root, const FitSet *set, FitKind kind) {
     return whole;
 }
 
-/* Of several presses, the excess of each by its file. */
-static int json_files(cJSON *root, const FitWork *work) {
+/* The bias in each of several presses, in the order of the files. */
+static int json_bias(cJSON *root, const FitWork *work) {
     const FitPoint *row = work->set[FIT_PRESS].points;
-    cJSON *object = cJSON_AddObjectToObject(root, "excess");
-    int whole = object != NULL;
+    cJSON *list = cJSON_AddArrayToObject(root, "bias");
+    int whole = list != NULL;
     for (int f = 0; f < work->files && whole; f++) {
         if (work->file[f].kind == FIT_FILE_PRESS && work->file[f].count) {
-            const double excess = press_excess(work, f, &row);
-            whole = !isfinite(excess) ||
-                    cJSON_AddNumberToObject(object, work->file[f].path, excess) != NULL;
+            cJSON *item = cJSON_CreateObject();
+            whole = cJSON_AddItemToArray(list, item) &&
+                    cJSON_AddStringToObject(item, "file", work->file[f].path) &&
+                    cJSON_AddNumberToObject(item, "force", press_bias(work, f, &row));
         }
     }
     return whole;
@@ -341,7 +340,7 @@ MildStatus fit_json_save(const FitWork *work, const char *path, MildError *error
         whole = !work->set[k].done || json_set(root, &work->set[k], (FitKind)k);
     }
     if (whole && work->set[FIT_PRESS].done && work->set[FIT_PRESS].files > 1) {
-        whole = json_files(root, work);
+        whole = json_bias(root, work);
     }
     if (!whole) {
         cJSON_Delete(root);

@@ -1,6 +1,7 @@
 """scripts/real_sand.py: the records are whole, the wheel is a wheel, and docs/real-sand.md says what the models say. Usage: test_real.py
 SOURCE_FOLDER, with the mild package in PYTHONPATH."""
 import contextlib
+import csv
 import io
 import math
 import pathlib
@@ -72,7 +73,28 @@ def page():
         assert says == [found[name][0], found[name][2], found[name][3]], (name, says, found[name])
 
 
+def page_of_wheel():
+    """Its rows of the driven wheel are those of the records, and the mean errors are of these rows."""
+    text = (root / "docs/real-sand.md").read_text(encoding="utf-8")
+    rolled, measured = {}, real_sand.wheels()
+    with open(root / "grains/real/rolled.csv", newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            rolled.setdefault(row["model"], []).append((float(row["drag_n"]), float(row["sinkage_mm"])))
+    sunk, drag = ([mean[k] for mean, _ in measured.values()] for k in (2, 0))
+    rows = {r"\*\*measured\*\*": (drag, sunk), "`mild`, slips": tuple(zip(*rolled["mild_slips"])),
+            "`mild_merged` with the same": tuple(zip(*rolled["mild_merged"]))}
+    for name, numbers in rows.items():
+        found = re.findall(rf"^\| {name} \|(.*)\|$", text, re.M)
+        says = [[float(x) for x in re.findall(r"-?\d+\.\d+", line)] for line in found]
+        assert len(says) == 2, name
+        for cells, wanted in zip(says, (numbers[1], numbers[0])):
+            assert all(abs(a - b) <= 0.051 for a, b in zip(cells, wanted, strict=False)) and len(cells) >= 9, (name, cells, wanted)
+        if "measured" not in name:
+            assert abs(says[0][9] - np.mean(np.abs(np.subtract(numbers[1], sunk))[5:])) < 0.06, name
+
+
 records()
 wheel()
 page()
+page_of_wheel()
 print("real sand: records, wheel and page")
