@@ -2,7 +2,7 @@
 """Ground models and a real sand (docs/real-sand.md): discs and a wheel that were pressed into it, and the wheel rolling, skidding and
 spinning there, measured by Pavlov and Johnson. Nothing here was measured by us.
 
-    PYTHONPATH=build/python .venv/bin/python scripts/real_sand.py                       # discs and the pressed wheel, 20 s
+    PYTHONPATH=build/python .venv/bin/python scripts/real_sand.py                       # discs and the pressed wheel, 90 s
     PYTHONPATH=build/python .venv/bin/python scripts/real_sand.py --roll                # and the driven wheel, in MuJoCo; minutes
     PYTHONPATH=build/python .venv/bin/python scripts/real_sand.py --figure docs/real-sand.png
     .venv/bin/python scripts/real_sand.py --extract CLONE                               # the records again, from a clone of theirs
@@ -15,6 +15,7 @@ import math
 import os
 import pathlib
 import subprocess
+import sys
 import tempfile
 
 import numpy as np
@@ -36,6 +37,11 @@ PRESSES = {
     "wheel": [("smooth_1", 10.2, 19.8, 9.98, -0.71), ("smooth_2", 9.89, 17.7, 2.15, -1), ("smooth_3", 9.49, 17.18, 3.67, -0.66)],
 }
 HOURS = 5  # by which the clock of the sensor was ahead of the axes'
+
+
+def fail(text):
+    print(f"real_sand.py: {text}", file=sys.stderr)
+    sys.exit(2)
 
 
 # ---- the records, from their repository ----
@@ -84,21 +90,22 @@ def press_of(clone, name, first, last, touched, zero):
 
 
 def extract(clone):
-    """Writes press.csv and wheel.csv."""
+    """Writes press.csv and wheel.csv, when all of both has been read."""
+    import rosbags.rosbag1  # noqa: F401
     import scipy.io
 
-    with open(REAL / "press.csv", "w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(["shape", "trial", "depth_m", "force_n"])
-        for shape, trials in PRESSES.items():
-            for trial, args in enumerate(trials, 1):
-                rows.writerows([shape, trial, f"{depth:.5f}", f"{force:.2f}"] for depth, force in press_of(clone, *args))
+    pressed = [[shape, trial, f"{depth:.5f}", f"{force:.2f}"] for shape, trials in PRESSES.items() for trial, args in enumerate(trials, 1)
+               for depth, force in press_of(clone, *args)]
     table = scipy.io.loadmat(io.BytesIO(blob(clone, "raw-data-processing/all_smooth_data.mat")), squeeze_me=True, struct_as_record=False)
-    with open(REAL / "wheel.csv", "w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(["rim_mm_s", "angle_deg", "drag_n", "side_n", "load_n", "sinkage_mm"])
-        for t in sorted(table["all_results"], key=lambda t: (t.beta, t.Vry)):
-            rows.writerow([t.Vry, t.beta, f"{t.avg_Fy:.2f}", f"{t.avg_Fx:.2f}", f"{-t.avg_Fz:.2f}", f"{-t.avg_Z:.2f}"])
+    driven = [[t.Vry, t.beta, f"{t.avg_Fy:.2f}", f"{t.avg_Fx:.2f}", f"{-t.avg_Fz:.2f}", f"{-t.avg_Z:.2f}"]
+              for t in sorted(table["all_results"], key=lambda t: (t.beta, t.Vry))]
+    write("press.csv", "shape,trial,depth_m,force_n", pressed)
+    write("wheel.csv", "rim_mm_s,angle_deg,drag_n,side_n,load_n,sinkage_mm", driven)
+
+
+def write(name, head, rows):
+    with open(REAL / name, "w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([head.split(","), *rows])
 
 
 def presses():
@@ -246,7 +253,7 @@ def judge_roll(data, fitted, seconds, models):
     print(f"{'load [N]':14s}" + "".join(f"{mean[1]:14.1f}" for mean, _ in measured.values()))
     print(f"{'measured':14s}" + "".join(f"{mean[0]:8.1f}{mean[2]:6.1f}" for mean, _ in measured.values()))
     print(f"{'spread':14s}" + "".join(f"{spread[0]:8.1f}{spread[2]:6.1f}" for _, spread in measured.values()))
-    rolled = [["model", "rim_mm_s", "drag_n", "sinkage_mm"]]
+    rolled = []
     with tempfile.TemporaryDirectory() as folder:
         for name in models:
             file = pathlib.Path(folder) / f"{name}.ini"
@@ -254,9 +261,8 @@ def judge_roll(data, fitted, seconds, models):
             cells = [roll(file, 1e-3 * speed, mean[1], seconds) for speed, (mean, _) in measured.items()]
             print(f"{name:14s}" + "".join(f"{drag:8.1f}{sunk:6.1f}" for drag, sunk in cells), flush=True)
             rolled += [[name, speed, f"{drag:.1f}", f"{sunk:.1f}"] for speed, (drag, sunk) in zip(measured, cells)]
-    if seconds == 75:
-        with open(REAL / "rolled.csv", "w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerows(rolled)
+    if seconds == 75 and list(models) == list(ROLLED):
+        write("rolled.csv", "model,rim_mm_s,drag_n,sinkage_mm", rolled)
 
 
 # ---- the picture ----
@@ -300,18 +306,31 @@ def draw(data, path):
     figure.savefig(path, dpi=110)
 
 
+ROLLED = ("mild", "mild_slips", "mild_merged", "bekker", "ecc_quasi", "ecc_quasi_3d", "ecc_spring")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--extract", metavar="CLONE", help="writes the records")
     parser.add_argument("--roll", action="store_true", help="the driven wheel, too")
     parser.add_argument("--seconds", type=float, default=75, help="of its way (default 75, as measured)")
-    parser.add_argument("--models", default="mild,mild_slips,mild_merged,bekker,ecc_quasi,ecc_quasi_3d,ecc_spring", help="that drive it")
+    parser.add_argument("--models", default=",".join(ROLLED), help="on whose ground it is driven")
     parser.add_argument("--figure", metavar="FILE", help="draws it and judges nothing; needs matplotlib")
     given = parser.parse_args()
-    if given.extract:
-        extract(given.extract)
-        return
-    data = presses()
+    for name in given.models.split(","):
+        if name not in ROLLED:
+            fail(f"--models {name}: choose from {' '.join(ROLLED)}")
+    try:
+        if given.extract:
+            extract(given.extract)
+            return
+        data = presses()
+    except ImportError as error:
+        fail(f"--extract needs {error.name}: pip install rosbags scipy")
+    except subprocess.CalledProcessError as error:
+        fail(f"--extract {given.extract}: {error.stderr.decode().strip() or 'no such repository'}")
+    except OSError as error:
+        fail(f"{error.filename}: {error.strerror}; --extract makes the records")
     if given.figure:
         draw(data, given.figure)
         return
