@@ -60,7 +60,7 @@ def walk(robot, policy, grounds, speed, device, seconds=10):
 
 def ground_levels(env, env_ids, count, pushes):
     """A curriculum as mjlab's of terrains. A robot begins on the first of `count` grounds; 8 s on its feet bring it to the next one, a fall within
-    1.5 s back, and beyond the last one it stands on any. Pushes grow from nothing to `pushes` until the mean level is 1. Returns that mean."""
+    1.5 s back, and beyond the last one it stands on any. Pushes grow from nothing to `pushes` as the mean level does to `count`. Returns that mean."""
     soft, now, ids = env.soft_ground, env.common_step_counter, slice(None) if env_ids is None else env_ids
     if not hasattr(soft, "level"):
         soft.level, soft.began = torch.zeros_like(soft.material), torch.zeros(env.num_envs, dtype=torch.long, device=env.device)
@@ -69,7 +69,7 @@ def ground_levels(env, env_ids, count, pushes):
     soft.level[ids], soft.began[ids] = level, now
     soft.material[ids] = torch.where(level < count, level, torch.randint_like(level, count))
     mean = soft.level.float().mean()
-    share, push = float(mean.clamp(max=1)), env.event_manager.get_term_cfg("push_robot").params["velocity_range"]
+    share, push = float(mean) / count, env.event_manager.get_term_cfg("push_robot").params["velocity_range"]
     push.update({axis: (share * low, share * high) for axis, (low, high) in pushes.items()})
     return mean
 
@@ -82,6 +82,20 @@ def progress(env, grounds, iteration):
     print(f"iteration {iteration}: off by " + ", ".join(f"{100 * share:.0f} % on {ground}" for share, ground in zip(shares, grounds)), flush=True)
 
 
+def time_left(end, device):
+    """Whether it is before `end`; of several processes the first one's clock decides, because all must take the same iterations."""
+    left = torch.tensor([time.time() < end], device=device)
+    if torch.distributed.is_initialized():
+        torch.distributed.broadcast(left, 0)
+    return bool(left)
+
+
+def thaw(model):
+    """Makes normal tensors of those that rsl_rl's normalizers left as inference tensors: of several processes, learn writes to them when it begins."""
+    for module in model.modules():
+        module._buffers.update({name: tensor.clone() for name, tensor in module._buffers.items() if tensor is not None})
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("robot", nargs="?", default="Go1", choices=ROBOTS)
@@ -91,13 +105,16 @@ if __name__ == "__main__":
     parser.add_argument("--envs", type=int, default=4096)
     parser.add_argument("--minutes", type=float, default=4)
     parser.add_argument("--load", help="a model_N.pt to go on with")
-    parser.add_argument("--log", default="runs/mjlab")
+    parser.add_argument("--out", default="runs/mjlab")
     parser.add_argument("--stand", type=float, default=0, help="seconds")
     parser.add_argument("--levels", action="store_true", help="begin on the first ground without pushes, the next one after 8 s on one's feet")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--rollout", type=int, default=24, help="steps of each robot between two updates")
+    parser.add_argument("--kl", type=float, default=0.01, help="wanted KL divergence of an update, by which the learning rate follows")
     parser.add_argument("--device", default=f"cuda:{os.environ.get('LOCAL_RANK', 0)}" if torch.cuda.is_available() else "cpu")
     given = parser.parse_args()
     config, task = config_of(given.robot, grounds=given.grounds), f"Mjlab-Velocity-Soft-Unitree-{given.robot}"
-    config.scene.num_envs, config.seed = given.envs, 1 + int(os.environ.get("RANK", 0))
+    config.scene.num_envs, config.seed = given.envs, given.seed + int(os.environ.get("RANK", 0))
     if given.levels:
         levels = {"count": len(given.grounds), "pushes": dict(config.events["push_robot"].params["velocity_range"])}
         config.curriculum["ground_levels"] = CurriculumTermCfg(func=ground_levels, params=levels)
@@ -107,13 +124,16 @@ if __name__ == "__main__":
     if given.stand:
         stand(env, given.grounds[0], given.stand)
         raise SystemExit
-    agent = dataclasses.asdict(load_rl_cfg(task)) | {"logger": "tensorboard", "save_interval": 10**6}
-    runner = load_runner_cls(task)(RslRlVecEnvWrapper(env), agent, given.log, given.device)
+    agent = dataclasses.asdict(load_rl_cfg(task)) | {"logger": "tensorboard", "save_interval": 10**6, "num_steps_per_env": given.rollout}
+    agent["algorithm"]["desired_kl"] = given.kl
+    runner = load_runner_cls(task)(RslRlVecEnvWrapper(env), agent, given.out, given.device)
     if given.load:
         runner.load(given.load)
-    end = time.time() + 60 * given.minutes
-    while time.time() < end:
+    first, end = int(os.environ.get("RANK", 0)) == 0, time.time() + 60 * given.minutes
+    while time_left(end, given.device):
         runner.learn(50, init_at_random_ep_len=runner.current_learning_iteration == 0)
-        progress(env, given.grounds, runner.current_learning_iteration)
-    if int(os.environ.get("RANK", 0)) == 0:
+        thaw(runner.alg.actor), thaw(runner.alg.critic)
+        if first:
+            progress(env, given.grounds, runner.current_learning_iteration)
+    if first:
         walk(given.robot, runner.get_inference_policy(given.device), given.test, given.speed, given.device)
