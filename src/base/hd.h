@@ -250,11 +250,10 @@ WARP_FN void group_max(Real *x, int size) {
 
 /* group_sum of x[0] to x[count - 1], to the bit, by recursive halving: at the distances size / 2,
  * size / 4, ..., 1 a lane keeps every second of its entries, the odd ones where that bit of its
- * number is set, sends the others, and adds what it gets. Then entry i is x[i / size] of the lane
- * whose number has the bits of i % size in reverse, and all read it there. About 2 count values
- * pass from lane to lane instead of count log2(size). x is overwritten. The inner loop has the
- * bound `count` too, because nvcc keeps x in registers only where bounds are constants. */
-WARP_FN void group_sums(Real (*x)[LANE_COPIES], int count, int size, Real (*sum)[LANE_COPIES]) {
+ * number is set, sends the others, and adds what it gets. Then x[0], x[1], ... of a lane are the
+ * entries group_entry, group_entry + size, ... The inner loop has the bound `count` too, because
+ * nvcc keeps x in registers only where bounds are constants. */
+WARP_FN void group_halve(Real (*x)[LANE_COPIES], int count, int size) {
     int entries = count;
     LANE_UNROLL
     for (int step = size / 2; step > 0; step /= 2) {
@@ -274,14 +273,26 @@ WARP_FN void group_sums(Real (*x)[LANE_COPIES], int count, int size, Real (*sum)
         }
         entries = (entries + 1) / 2;
     }
+}
+
+/* The first entry that group_halve leaves in a lane: the bits of its number in the group, in
+ * reverse. So it is the lane of an entry, too. */
+MILD_HD int group_entry(int lane, int size) {
+    int entry = 0;
+    LANE_UNROLL
+    for (int bit = 1; bit < size; bit *= 2) {
+        entry += lane & bit ? size / 2 / bit : 0;
+    }
+    return entry;
+}
+
+/* To each lane, the sums of group_halve. About 2 count values pass from lane to lane instead of
+ * count log2(size). x is overwritten. */
+WARP_FN void group_sums(Real (*x)[LANE_COPIES], int count, int size, Real (*sum)[LANE_COPIES]) {
+    group_halve(x, count, size);
     LANE_UNROLL
     for (int i = 0; i < count; i++) {
-        int lane = 0;
-        LANE_UNROLL
-        for (int bit = 1; bit < size; bit *= 2) {
-            lane += i & bit ? size / 2 / bit : 0;
-        }
-        group_read(x[i / size], lane, size, sum[i]);
+        group_read(x[i / size], group_entry(i, size), size, sum[i]);
     }
 }
 

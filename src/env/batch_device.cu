@@ -21,8 +21,9 @@ enum {
     TASK_BLOCKS = 8,                   /* blocks of a multiprocessor, at least */
     SHELLS_WARPS = 4,                  /* of a robot with shells near the ground */
     SHELLS_BLOCKS = 3,                 /* such robots of a multiprocessor, at least */
-    SHELLS_ROBOTS = 1024,              /* stepped at once, at most */
+    SHELLS_ROBOTS = 512,               /* stepped at once, at most: an H100 has room for 396 */
     FIND_WARPS = 4,                    /* robots of a block that are looked at */
+    FIND_BLOCKS = 8,                   /* such blocks of a multiprocessor, at least */
     TALLY_THREADS = 256,
     ORDER_THREADS = 1024
 };
@@ -65,7 +66,7 @@ static __global__ void __launch_bounds__(WARP_THREADS, ENVS_BLOCKS)
 
 /* Lists the robots whose shells may touch the ground. The order is that of arrival: each robot is
  * stepped by itself. */
-static __global__ void __launch_bounds__(LANES *FIND_WARPS)
+static __global__ void __launch_bounds__(LANES *FIND_WARPS, FIND_BLOCKS)
     find(const __grid_constant__ EnvsArrays all, int k) {
     const long robot = (long)blockIdx.x * FIND_WARPS + threadIdx.x / LANES;
     if (robot < all.envs && env_shells_wait(&all, robot) && env_shells_find(&all, robot, k) &&

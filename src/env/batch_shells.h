@@ -76,40 +76,74 @@ WARP_FN void env_shells_near(const EnvsArrays *all, long robot, const EngineGrou
 
 /* ---- the step ---- */
 
-/* Bool: a body, with feet before it, has an element that may touch the ground in this step. First
- * the bound of mild_ground_near. */
-WARP_FN int env_body_touches(const EnvsArrays *all, long robot, int at, const Real *position,
-                             const Real *rotation, const Real *twist) {
-    const BodiesSetup *setup = all->shells.setup;
-    const Real *origin = all->map_origin + 2 * robot;
-    const Real height = all->contact.height[robot];
-    const Real reach = bodies_reach(setup, at, position, rotation, origin, height);
-    return reach > bodies_least(setup, setup->sole[at].radius, twist, twist) &&
-           bodies_touch(setup, at, position, rotation, twist, origin, height);
+/* Where a body is and how it moves, in one array, which passes from lane to lane. */
+enum {
+    ENV_MOTION_POSITION = 0, /* [m] world */
+    ENV_MOTION_ROTATION = 3, /* [-] body -> world */
+    ENV_MOTION_TWIST = 12,   /* [m/s, rad/s] */
+    ENV_MOTION_NUMBERS = 18
+};
+
+MILD_HD void env_body_motion(const EnvsArrays *all, long robot, int body, Real *motion) {
+    const EngineTree *tree = &all->model->tree;
+    const Real *state = env_robot_at(all, robot)->saved.state;
+    const EngineLinks links = engine_links_saved(&env_shells_at(all, robot)->links);
+    Real *position = motion + ENV_MOTION_POSITION;
+    engine_body_pose(all->model, &links, body, position, motion + ENV_MOTION_ROTATION);
+    engine_body_twist(tree, &links, state + ENGINE_SAVED(rate), body, position,
+                      motion + ENV_MOTION_TWIST);
+    for (int k = 0; k < 3; k++) {
+        position[k] += state[ENGINE_SAVED(base) + k];
+    }
 }
 
-/* Of the bits in `near`, those of bodies with an element that may touch soft ground this step. */
-WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, int near) {
-    const EngineModel *model = all->model;
+/* Bool: the bound of mild_ground_near does not say that a body stays in the air in this step. */
+MILD_HD int env_body_reaches(const EnvsArrays *all, long robot, int body, const Real *motion) {
     const BodiesSetup *setup = all->shells.setup;
-    const EngineSaved *saved = &env_robot_at(all, robot)->saved;
-    const EngineLinks links = engine_links_saved(&env_shells_at(all, robot)->links);
+    const int at = setup->feet + body; /* feet are before it */
+    const Real *V = motion + ENV_MOTION_TWIST;
+    const Real reach =
+        bodies_reach(setup, at, motion + ENV_MOTION_POSITION, motion + ENV_MOTION_ROTATION,
+                     all->map_origin + 2 * robot, all->contact.height[robot]);
+    return reach > bodies_least(setup, setup->sole[at].radius, V, V);
+}
+
+/* Bool: a body has an element that may touch the ground in this step. All lanes have its motion. */
+WARP_FN int env_body_touches(const EnvsArrays *all, long robot, int body, const Real *motion) {
+    const BodiesSetup *setup = all->shells.setup;
+    return bodies_touch(setup, setup->feet + body, motion + ENV_MOTION_POSITION,
+                        motion + ENV_MOTION_ROTATION, motion + ENV_MOTION_TWIST,
+                        all->map_origin + 2 * robot, all->contact.height[robot]);
+}
+
+/* Of the bits in `near`, those of bodies with an element that may touch soft ground this step. A
+ * lane has a body; then all lanes have the elements of each body within the bound. */
+WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, int near) {
+    const int bodies = all->model->tree.bodies;
+    Real motion[ENV_MOTION_NUMBERS][LANE_COPIES], bit[LANE_COPIES];
     int touch = 0;
+    EACH_LANE(l) {
+        Real own[ENV_MOTION_NUMBERS] = {0};
+        const int body = LANE(l);
+        bit[l] = 0;
+        if (body < bodies && near >> body & 1) {
+            env_body_motion(all, robot, body, own);
+            bit[l] = env_body_reaches(all, robot, body, own) ? (Real)(1 << body) : 0;
+        }
+        for (int n = 0; n < ENV_MOTION_NUMBERS; n++) {
+            motion[n][l] = own[n];
+        }
+    }
+    const int reaching = (int)lane_sum(bit);
     LANE_ROLLED
-    for (int body = 0; body < model->tree.bodies; body++) {
-        const int at = setup->feet + body;
-        Real position[3], rotation[9], twist[6];
-        if (!(near >> body & 1)) {
-            continue;
-        }
-        engine_body_pose(model, &links, body, position, rotation);
-        engine_body_twist(&model->tree, &links, saved->state + ENGINE_SAVED(rate), body, position,
-                          twist);
-        for (int k = 0; k < 3; k++) {
-            position[k] += saved->state[ENGINE_SAVED(base) + k];
-        }
-        if (env_body_touches(all, robot, at, position, rotation, twist)) {
-            touch |= 1 << body;
+    for (int body = 0; body < bodies; body++) {
+        if (reaching >> body & 1) {
+            Real of[ENV_MOTION_NUMBERS];
+            LANE_UNROLL
+            for (int n = 0; n < ENV_MOTION_NUMBERS; n++) {
+                of[n] = lane_read(motion[n], body);
+            }
+            touch |= env_body_touches(all, robot, body, of) ? 1 << body : 0;
         }
     }
     return touch;

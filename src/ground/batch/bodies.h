@@ -2,9 +2,9 @@
  * soles and surfaces (docs/model.md section 20), level or on a map.
  *
  * Few robots take this step at a time, so it has one text for all sizes. Elements that may touch
- * are listed, and dealt to warps in rounds of one body each; those of a warp's first BODIES_KEPT
- * rounds are kept, and others follow from their memory whenever they are asked for. What the lanes
- * share is in BodiesWork. The method is that of contact.inc, and so are the names. */
+ * are listed, and dealt to warps in rounds of one body each; those of a warp's first rounds are
+ * kept (BODIES_REST), and others follow from their memory whenever they are asked for. What the
+ * lanes share is in BodiesWork. The method is that of contact.inc, and so are the names. */
 #ifndef MILD_BATCH_BODIES_H
 #define MILD_BATCH_BODIES_H
 
@@ -21,7 +21,7 @@
 #define BODIES_MARGIN REAL(1e-3)               /* [m] as in locate.c */
 #define BODIES_EXTRA_SPEED REAL(2)             /* [m/s] as in locate.c */
 #define BODIES_GROWTH REAL(8)                  /* [-] as NEWTON_GROWTH in newton_step.c */
-#define BODIES_FEW 4                           /* rows of a warp that are eliminated at once */
+#define BODIES_COLUMNS 8                       /* of a warp that are eliminated at once */
 
 /* The elements of a body. */
 typedef struct {
@@ -174,15 +174,20 @@ MILD_HD void bodies_normal(const BodiesSole *sole, const Real *R, int s, Real *n
     }
 }
 
-/* Velocity of an element under a twist. */
-MILD_HD ContactVelocity bodies_velocity(const BodiesElement *own, const Real *V) {
-    const Real *p = own->p;
+/* Velocity of a point of a body under a twist. p: [m] from the body's reference point, world axes.
+ * slope: gradient of the ground under it. */
+MILD_HD ContactVelocity bodies_point_velocity(const Real *p, const Real *slope, const Real *V) {
     const Real z = V[2] + V[3] * p[1] - V[4] * p[0];
     ContactVelocity v;
     v.x = V[0] + V[4] * p[2] - V[5] * p[1];
     v.y = V[1] + V[5] * p[0] - V[3] * p[2];
-    v.descent = own->slope[0] * v.x + own->slope[1] * v.y - z;
+    v.descent = slope[0] * v.x + slope[1] * v.y - z;
     return v;
+}
+
+/* That of an element. */
+MILD_HD ContactVelocity bodies_velocity(const BodiesElement *own, const Real *V) {
+    return bodies_point_velocity(own->p, own->slope, V);
 }
 
 /* ---- which bodies and elements ---- */
@@ -228,15 +233,16 @@ MILD_HD Real bodies_reach(const BodiesSetup *setup, int body, const Real *positi
 }
 
 /* Bool: an element of a body at that pose may touch the ground in this step. bodies_reach is a
- * bound that the steepest place of a map makes wide; an element meets the plane under itself
- * (bodies_velocity). V: twist. */
+ * bound that the steepest place of a map makes wide; here an element has its own place, its own
+ * speed and the plane under itself. The ground pushes where the depth in the middle of the step is
+ * above 0. So with half of BODIES_EXTRA_SPEED an element that is left out would have to gain more
+ * than all of it. V: twist. */
 WARP_FN int bodies_touch(const BodiesSetup *setup, int body, const Real *position, const Real *R,
                          const Real *V, const Real *map_origin, Real height) {
     const BodiesSole *sole = &setup->sole[body];
     const MapSpot spot =
         setup->has_map ? map_spot(&setup->map, position, map_origin, height) : bodies_no_spot();
-    Real found[LANE_COPIES], down, level;
-    bodies_speeds(sole->radius, V, &down, &level);
+    Real found[LANE_COPIES];
     EACH_LANE(l) {
         found[l] = 0;
         LANE_ROLLED
@@ -246,9 +252,9 @@ WARP_FN int bodies_touch(const BodiesSetup *setup, int body, const Real *positio
             const Real above = setup->has_map
                                    ? map_surface_near(&setup->map, &spot, p[0], p[1], slope)
                                    : height - position[2];
-            const Real steep = REAL_SQRT(slope[0] * slope[0] + slope[1] * slope[1]);
-            const Real descent = down + steep * level + BODIES_EXTRA_SPEED;
-            found[l] += above - p[2] + BODIES_MARGIN + setup->dt * descent > 0 ? 1 : 0;
+            const Real descent = real_max(bodies_point_velocity(p, slope, V).descent, 0);
+            const Real way = setup->dt * (descent + BODIES_EXTRA_SPEED / 2);
+            found[l] += above - p[2] + BODIES_MARGIN + way > 0 ? 1 : 0;
         }
     }
     return lane_sum(found) > 0;
@@ -507,6 +513,7 @@ MILD_HD void bodies_element(const BodiesSetup *setup, const BodiesWork *work, in
 typedef struct {
     Real loaded, depth, force, area, deepest, p[3];
 } BodiesLoads;
+#define BODIES_LOADS 8 /* numbers of it; in sums the deepest is the last */
 
 MILD_HD void bodies_chart(const BodiesMemory *memory, int s, const BodiesElement *own) {
     Real *plane = memory->element + BODIES_PLANE * memory->next + s;
@@ -583,66 +590,105 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
     }
 }
 
-WARP_FN void bodies_report(BodiesWork *work, int i, const BodiesLoads *lane) {
-    Real sum[8][LANE_COPIES], deepest[LANE_COPIES];
+/* Rounds of all elements of the body at place i. */
+MILD_HD int bodies_rounds(const BodiesSetup *setup, const BodiesWork *work, int i) {
+    return (setup->sole[work->body[i]].elements + LANES - 1) / LANES;
+}
+
+/* What a warp finishes at once: a round, from element `from` of the body at place i on. The sums
+ * are left in work->part[round]. */
+WARP_FN void bodies_finish_round(const BodiesSetup *setup, BodiesWork *work, int i, int from,
+                                 int round, int advance, int heap) {
+    const int elements = setup->sole[work->body[i]].elements;
+    const MapSpot spot = bodies_spot(setup, work, i);
+    Real sum[BODIES_LOADS - 1][LANE_COPIES], deepest[LANE_COPIES];
     EACH_LANE(l) {
-        const BodiesLoads *own = &lane[l];
-        const Real all[8] = {own->loaded, own->depth, own->force, own->area,
-                             own->p[0],   own->p[1],  own->p[2],  0};
-        for (int n = 0; n < 8; n++) {
+        BodiesLoads own = {0, 0, 0, 0, 0, {0, 0, 0}};
+        if (from + LANE(l) < elements) {
+            bodies_finish_element(setup, work, i, from + LANE(l), &spot, work->next.twist + 6 * i,
+                                  advance, &own, heap);
+        }
+        const Real all[BODIES_LOADS - 1] = {own.loaded, own.depth, own.force, own.area,
+                                            own.p[0],   own.p[1],  own.p[2]};
+        for (int n = 0; n < BODIES_LOADS - 1; n++) {
             sum[n][l] = all[n];
         }
-        deepest[l] = own->deepest;
+        deepest[l] = own.deepest;
     }
-    Real whole[8];
-    for (int n = 0; n < 8; n++) {
-        whole[n] = lane_sum(sum[n]);
-    }
+    group_halve(sum, BODIES_LOADS - 1, LANES);
     const Real most = lane_max(deepest);
     EACH_LANE(l) {
-        if (LANE(l) == 0) {
-            const int any = whole[0] > 0;
-            ContactFoot *foot = &work->foot[i];
-            for (int k = 0; k < 3; k++) {
-                foot->pressure_center[k] = any ? work->position[i][k] + whole[4 + k] / whole[2] : 0;
-            }
-            foot->depth_max = most;
-            foot->depth_mean = any ? whole[1] / whole[0] : 0;
-            foot->area = whole[3];
+        const int n = group_entry(LANE(l), LANES);
+        if (n < BODIES_LOADS) {
+            work->part[round][n] = n < BODIES_LOADS - 1 ? sum[0][l] : most;
         }
     }
 }
 
-/* Memory and reports at the twists of `next`; a warp takes a body. */
-TEAM_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advance, int heap) {
+/* The sums over the rounds of the body at place i. */
+MILD_HD void bodies_report(const BodiesSetup *setup, BodiesWork *work, int i) {
+    Real whole[BODIES_LOADS] = {0};
+    int round = 0;
+    ContactFoot *foot = &work->foot[i];
+    for (int j = 0; j < i; j++) {
+        round += bodies_rounds(setup, work, j);
+    }
+    const int end = round + bodies_rounds(setup, work, i);
     LANE_ROLLED
-    for (int i = TEAM_WARP; i < work->count; i += TEAM_WARPS) {
-        const BodiesSole *sole = &setup->sole[work->body[i]];
-        const BodiesMemory *memory = &work->memory[i];
-        const MapSpot spot = bodies_spot(setup, work, i);
-        BodiesLoads loads[LANE_COPIES];
-        EACH_LANE(l) {
-            const BodiesLoads none = {0, 0, 0, 0, 0, {0, 0, 0}};
-            loads[l] = none;
-            LANE_ROLLED
-            for (int s = LANE(l); s < sole->elements; s += LANES) {
-                bodies_finish_element(setup, work, i, s, &spot, work->next.twist + 6 * i, advance,
-                                      &loads[l], heap);
+    for (; round < end; round++) {
+        for (int n = 0; n < BODIES_LOADS - 1; n++) {
+            whole[n] += work->part[round][n];
+        }
+        whole[BODIES_LOADS - 1] =
+            real_max(whole[BODIES_LOADS - 1], work->part[round][BODIES_LOADS - 1]);
+    }
+    const int any = whole[0] > 0;
+    for (int k = 0; k < 3; k++) {
+        foot->pressure_center[k] = any ? work->position[i][k] + whole[4 + k] / whole[2] : 0;
+    }
+    foot->depth_max = whole[BODIES_LOADS - 1];
+    foot->depth_mean = any ? whole[1] / whole[0] : 0;
+    foot->area = whole[3];
+}
+
+/* Where the body at place i is, for the next step. */
+MILD_HD void bodies_remember(const BodiesSetup *setup, const BodiesWork *work, int i) {
+    const BodiesMemory *memory = &work->memory[i];
+    const int is_surface = setup->sole[work->body[i]].face != NULL;
+    const int step = memory->step;
+    if (is_surface || setup->has_map) {
+        for (int k = 0; k < 3; k++) {
+            memory->body[k * step] = work->position[i][k];
+        }
+        memory->body[3 * step] = work->height;
+        memory->body[BODIES_STEPPED * step] = 1;
+    }
+    if (is_surface) {
+        memory->body[BODIES_TOUCHED] = 1;
+    }
+}
+
+/* Memory and reports at the twists of `next`. Rounds are dealt to the warps, body after body; then
+ * a lane has a body. */
+TEAM_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advance, int heap) {
+    int round = 0;
+    LANE_ROLLED
+    for (int i = 0; i < work->count; i++) {
+        const int end = round + bodies_rounds(setup, work, i);
+        LANE_ROLLED
+        for (int from = 0; round < end; round++, from += LANES) {
+            if (round % TEAM_WARPS == TEAM_WARP) {
+                bodies_finish_round(setup, work, i, from, round, advance, heap);
             }
         }
-        lanes_sync(); /* what the lanes read of the body's memory is written below */
-        bodies_report(work, i, loads);
-        EACH_LANE(l) {
-            if (LANE(l) == 0 && advance && (sole->face || setup->has_map)) {
-                const int step = memory->step;
-                for (int k = 0; k < 3; k++) {
-                    memory->body[k * step] = work->position[i][k];
-                }
-                memory->body[3 * step] = work->height;
-                memory->body[BODIES_STEPPED * step] = 1;
-                if (sole->face) {
-                    memory->body[BODIES_TOUCHED] = 1;
-                }
+    }
+    team_sync(); /* what is read of the bodies' memory is written below */
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int i = TEAM_LANE(l); i < work->count; i += TEAM) {
+            bodies_report(setup, work, i);
+            if (advance) {
+                bodies_remember(setup, work, i);
             }
         }
     }

@@ -69,8 +69,10 @@ MILD_HD void bodies_pass(const BodiesSetup *setup, const BodiesElement *own, con
 
 /* ---- which elements ---- */
 
-/* Rounds of elements that a warp keeps. On a GPU these are in registers. */
-#define BODIES_KEPT (LANE_COPIES == 1 ? 1 : 8)
+/* Rounds of elements that a warp keeps behind its first. On a GPU the first is in registers, these
+ * are in memory of the thread: twelve rounds of a team, where a robot that walks has four to
+ * eight. */
+#define BODIES_REST (LANE_COPIES == 1 ? 2 : 7)
 
 /* The rim of the body at place i, from each lane's sums. */
 WARP_FN void bodies_set_rim(BodiesWork *work, int i, Real (*sums)[RIM_SUMS]) {
@@ -169,30 +171,33 @@ TEAM_FN void bodies_list(const BodiesSetup *setup, BodiesWork *work, int heap) {
     team_sync();
 }
 
-/* The element of lane l in a round. Bool: there is one. */
-MILD_HD int bodies_of_round(const BodiesSetup *setup, const BodiesWork *work, int round, int l,
-                            BodiesElement *own, int heap) {
+/* The element of lane l in a round; its share is 0 where there is none. */
+MILD_HD void bodies_of_round(const BodiesSetup *setup, const BodiesWork *work, int round, int l,
+                             BodiesElement *own, int heap) {
     const int i = work->place[round];
     const int n = (round - work->first[i]) * LANES + l;
     if (n >= work->listed[i]) {
         own->share = 0;
-        return 0;
+        return;
     }
     const MapSpot spot = bodies_spot(setup, work, i);
     bodies_element(setup, work, i, work->list[work->begin[i] + n], &spot, 0, own, heap);
-    return own->share > 0;
 }
 
-/* Those that a warp keeps. */
-TEAM_FN void bodies_keep(const BodiesSetup *setup, const BodiesWork *work,
-                         BodiesElement (*kept)[LANE_COPIES], int heap) {
-    LANE_UNROLL
-    for (int turn = 0; turn < BODIES_KEPT; turn++) {
+/* Those that a warp keeps: in `kept` of its first round. */
+TEAM_FN void bodies_keep(const BodiesSetup *setup, const BodiesWork *work, BodiesElement *kept,
+                         BodiesElement (*rest)[LANE_COPIES], int heap) {
+    LANE_ROLLED
+    for (int turn = BODIES_REST; turn >= 0; turn--) { /* the first round at last */
         const int round = TEAM_WARP + turn * TEAM_WARPS;
+        const int is = round < work->first[work->count];
         EACH_LANE(l) {
-            kept[turn][l].share = 0;
-            if (round < work->first[work->count]) {
-                bodies_of_round(setup, work, round, LANE(l), &kept[turn][l], heap);
+            kept[l].share = 0;
+            if (is) {
+                bodies_of_round(setup, work, round, LANE(l), &kept[l], heap);
+            }
+            if (is && turn > 0) {
+                rest[turn - 1][l] = kept[l];
             }
         }
     }
@@ -202,33 +207,39 @@ TEAM_FN void bodies_keep(const BodiesSetup *setup, const BodiesWork *work,
 
 /* Wrench and hessian of a round. */
 TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const BodiesPoint *point,
-                          int turn, const BodiesElement (*kept)[LANE_COPIES], int heap) {
+                          int turn, const BodiesElement *kept,
+                          const BodiesElement (*rest)[LANE_COPIES], int heap) {
     const int round = TEAM_WARP + turn * TEAM_WARPS;
     const Real *twist = point->twist + 6 * work->place[round];
-    Real part[BODIES_SUMS][LANE_COPIES], whole[BODIES_SUMS][LANE_COPIES];
+    Real part[BODIES_SUMS][LANE_COPIES];
     EACH_LANE(l) {
         LANE_UNROLL
         for (int n = 0; n < BODIES_SUMS; n++) {
             part[n][l] = 0;
         }
-        if (turn < BODIES_KEPT) {
-            const BodiesElement *own = &kept[BODIES_KEPT > 1 ? turn : 0][l];
-            if (own->share > 0) {
-                bodies_pass(setup, own, twist, part, l);
+        if (turn == 0) {
+            if (kept[l].share > 0) {
+                bodies_pass(setup, &kept[l], twist, part, l);
             }
         } else {
             BodiesElement own;
-            if (bodies_of_round(setup, work, round, LANE(l), &own, heap)) {
+            if (turn <= BODIES_REST) {
+                own = rest[turn - 1][l];
+            } else {
+                bodies_of_round(setup, work, round, LANE(l), &own, heap);
+            }
+            if (own.share > 0) {
                 bodies_pass(setup, &own, twist, part, l);
             }
         }
     }
-    group_sums(part, BODIES_SUMS, LANES, whole);
+    group_halve(part, BODIES_SUMS, LANES);
     EACH_LANE(l) {
+        const int first = group_entry(LANE(l), LANES);
         LANE_UNROLL
-        for (int n = 0; n < BODIES_SUMS; n++) {
-            if (LANE(l) == n % LANES) {
-                work->part[round][n] = whole[n][l];
+        for (int n = 0; n < BODIES_SUMS; n += LANES) {
+            if (n + first < BODIES_SUMS) {
+                work->part[round][n + first] = part[n / LANES][l];
             }
         }
     }
@@ -236,10 +247,11 @@ TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const Bodi
 
 /* W and H at the twist of a point. */
 TEAM_FN void bodies_evaluate(const BodiesSetup *setup, BodiesWork *work, BodiesPoint *point,
-                             const BodiesElement (*kept)[LANE_COPIES], int heap) {
+                             const BodiesElement *kept, const BodiesElement (*rest)[LANE_COPIES],
+                             int heap) {
     LANE_ROLLED
     for (int turn = 0; TEAM_WARP + turn * TEAM_WARPS < work->first[work->count]; turn++) {
-        bodies_round(setup, work, point, turn, kept, heap);
+        bodies_round(setup, work, point, turn, kept, rest, heap);
     }
     team_sync();
     EACH_LANE(l) {
@@ -284,86 +296,204 @@ TEAM_FN void bodies_residual(BodiesWork *work, int rows, const BodiesPoint *poin
     *scale = REAL_SQRT(real_max(lane_sum(done), 0));
 }
 
+/* What the six columns of a body do to the others. */
+typedef struct {
+    int chosen[6];     /* [column] row of the body that its row changes places with */
+    Real inverse[6];   /* [column] of the pivot */
+    Real pivot[6][6];  /* [column][from that column on] the pivot's row */
+    Real factor[6][6]; /* [row of the body][column] */
+} BodiesPanel;
+
 /* The row to take as the pivot of column k: k, unless a number below it in the rows of its body is
  * far larger. From body to body 1 + H A stays away from singular, but not from row to row: where
  * a body's forces turn its origin against them the diagonal passes through 0. */
-MILD_HD int bodies_pivot(const Real *matrix, int stride, int k) {
-    const int end = k - k % 6 + 6;
-    Real most = BODIES_GROWTH * REAL_ABS(matrix[k * stride + k]);
+MILD_HD int bodies_pivot(const Real block[6][6], int k) {
+    Real most = BODIES_GROWTH * REAL_ABS(block[k][k]);
+    int larger = 0;
     int chosen = k;
     LANE_UNROLL
-    for (int r = k + 1; r < k + 6; r++) { /* as many for every k, so that no read waits */
-        const Real size = r < end ? REAL_ABS(matrix[r * stride + k]) : 0;
-        chosen = size > most ? r : chosen;
-        most = real_max(size, most);
+    for (int r = k + 1; r < 6; r++) { /* of no row as a rule, which is soon seen */
+        larger |= REAL_ABS(block[r][k]) > most;
+    }
+    if (larger) {
+        LANE_UNROLL
+        for (int r = k + 1; r < 6; r++) {
+            const Real size = REAL_ABS(block[r][k]);
+            chosen = size > most ? r : chosen;
+            most = real_max(size, most);
+        }
     }
     return chosen;
 }
 
-/* What is left of two rows from column k on changes places. */
-TEAM_FN void bodies_swap(Real *matrix, int stride, int k, int other) {
-    team_sync(); /* all lanes have chosen */
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int j = k + TEAM_LANE(l); j < stride; j += TEAM) {
-            const Real kept = matrix[k * stride + j];
-            matrix[k * stride + j] = matrix[other * stride + j];
-            matrix[other * stride + j] = kept;
+/* Numbers k and `chosen` of six change places. The index is a constant in each round, so that x
+ * may be in registers. */
+MILD_HD void bodies_exchange(Real *x, int next, int k, int chosen) {
+    const Real kept = x[k * next];
+    LANE_UNROLL
+    for (int r = 0; r < 6; r++) {
+        if (r > k && r == chosen) {
+            x[k * next] = x[r * next];
+            x[r * next] = kept;
         }
     }
-    team_sync();
 }
 
-/* Column j of a warp's rows, BODIES_FEW at a time, less their factors times the pivot's row. The
- * reads are before the writes, so that they do not wait for each other. A factor is rounded once
- * for its whole row, which is then still a row of the same equations: with the pivot's row divided
- * in its place the error of each number grows with that row over its pivot, and Newton's method
- * ends at half of the residual on a Go1 that comes down in loose sand. */
-MILD_HD void bodies_subtract(Real *matrix, int rows, int k, int j, Real inverse) {
-    const int stride = rows + 1;
-    const Real pivot = matrix[k * stride + j];
-    LANE_ROLLED
-    for (int from = TEAM_WARP; from < rows; from += BODIES_FEW * TEAM_WARPS) {
-        Real factor[BODIES_FEW], entry[BODIES_FEW];
+/* The rows of a body, from `first` on, in the columns of its own. All lanes compute it. */
+MILD_HD void bodies_panel(const Real *matrix, int stride, int first, BodiesPanel *panel) {
+    Real block[6][6];
+    LANE_UNROLL
+    for (int r = 0; r < 6; r++) {
         LANE_UNROLL
-        for (int i = 0; i < BODIES_FEW; i++) {
-            const int r = from + i * TEAM_WARPS;
-            const int in = r < rows && r != k;
-            factor[i] = in ? matrix[r * stride + k] * inverse : 0;
-            entry[i] = in ? matrix[r * stride + j] : 0;
+        for (int c = 0; c < 6; c++) {
+            block[r][c] = matrix[(first + r) * stride + first + c];
+        }
+    }
+    LANE_UNROLL
+    for (int k = 0; k < 6; k++) {
+        const int chosen = bodies_pivot(block, k);
+        if (chosen != k) {
+            LANE_UNROLL
+            for (int c = k; c < 6; c++) {
+                bodies_exchange(&block[0][c], 6, k, chosen);
+            }
+        }
+        panel->chosen[k] = chosen;
+        panel->inverse[k] = 1 / block[k][k];
+        LANE_UNROLL
+        for (int c = k; c < 6; c++) {
+            panel->pivot[k][c] = block[k][c];
         }
         LANE_UNROLL
-        for (int i = 0; i < BODIES_FEW; i++) {
-            const int r = from + i * TEAM_WARPS;
-            if (r < rows && r != k) {
-                matrix[r * stride + j] = entry[i] - factor[i] * pivot;
+        for (int r = 0; r < 6; r++) {
+            panel->factor[r][k] = r == k ? 0 : block[r][k] * panel->inverse[k];
+            LANE_UNROLL
+            for (int c = k + 1; c < 6; c++) {
+                block[r][c] =
+                    r == k ? block[r][c] : block[r][c] - panel->factor[r][k] * panel->pivot[k][c];
             }
         }
     }
 }
 
-/* Gauss and Jordan; the last column becomes the solution. A warp has its share of the rows. */
+/* The factors of row r, which is another body's, in place of its numbers in the panel's columns. */
+MILD_HD void bodies_factors(const BodiesPanel *panel, Real *row) {
+    Real x[6];
+    LANE_UNROLL
+    for (int k = 0; k < 6; k++) {
+        x[k] = row[k];
+    }
+    LANE_UNROLL
+    for (int k = 0; k < 6; k++) {
+        const Real factor = x[k] * panel->inverse[k];
+        row[k] = factor;
+        LANE_UNROLL
+        for (int c = k + 1; c < 6; c++) {
+            x[c] -= factor * panel->pivot[k][c];
+        }
+    }
+}
+
+/* One column in the rows of the panel, x, as the panel's columns leave it. pivot: [column] its
+ * number in the row of each pivot. */
+MILD_HD void bodies_panel_column(const BodiesPanel *panel, Real *x, Real *pivot) {
+    LANE_UNROLL
+    for (int k = 0; k < 6; k++) {
+        if (panel->chosen[k] != k) {
+            bodies_exchange(x, 1, k, panel->chosen[k]);
+        }
+        pivot[k] = x[k];
+        LANE_UNROLL
+        for (int r = 0; r < 6; r++) {
+            x[r] = r == k ? x[r] : x[r] - panel->factor[r][k] * pivot[k];
+        }
+    }
+}
+
+/* The columns behind the panel, and the pivots on the diagonal. */
+TEAM_FN void bodies_columns(Real *matrix, int rows, int first, const BodiesPanel *panel) {
+    const int stride = rows + 1;
+    LANE_ROLLED
+    for (int from = first + 6 + TEAM_WARP; from < stride; from += BODIES_COLUMNS * TEAM_WARPS) {
+        Real x[6][LANE_COPIES], pivot[6][LANE_COPIES];
+        EACH_LANE(l) {
+            const int j = from + LANE(l) % BODIES_COLUMNS * TEAM_WARPS;
+            Real own[6], of[6];
+            LANE_UNROLL
+            for (int r = 0; r < 6; r++) {
+                own[r] = j < stride ? matrix[(first + r) * stride + j] : 0;
+            }
+            bodies_panel_column(panel, own, of);
+            LANE_UNROLL
+            for (int r = 0; r < 6; r++) {
+                x[r][l] = own[r];
+                pivot[r][l] = of[r];
+            }
+        }
+        lanes_sync(); /* all have read what is written below */
+        EACH_LANE(l) {
+            const int j = from + LANE(l) % BODIES_COLUMNS * TEAM_WARPS;
+            LANE_ROLLED
+            for (int r = LANE(l) / BODIES_COLUMNS; r < rows && j < stride;
+                 r += LANES / BODIES_COLUMNS) {
+                if (r < first || r >= first + 6) {
+                    const Real *factor = matrix + r * stride + first;
+                    Real entry = matrix[r * stride + j];
+                    LANE_UNROLL
+                    for (int k = 0; k < 6; k++) {
+                        entry -= factor[k] * pivot[k][l];
+                    }
+                    matrix[r * stride + j] = entry;
+                }
+            }
+            LANE_UNROLL
+            for (int r = 0; r < 6; r++) {
+                if (j < stride && LANE(l) / BODIES_COLUMNS == r % (LANES / BODIES_COLUMNS)) {
+                    matrix[(first + r) * stride + j] = x[r][l];
+                }
+            }
+        }
+    }
+    EACH_LANE(l) {
+        LANE_UNROLL
+        for (int k = 0; k < 6; k++) {
+            if (TEAM_LANE(l) == k) {
+                matrix[(first + k) * stride + first + k] = panel->pivot[k][k];
+            }
+        }
+    }
+}
+
+/* Gauss and Jordan; the last column becomes the solution. Six columns at a time, those of a body:
+ * first all lanes have the pivots and each the factors of a row, then a warp has its share of the
+ * columns behind, eight at a time, in four groups of rows. So the team waits twice for six columns.
+ *
+ * A factor is rounded once for its whole row, which is then still a row of the same equations: with
+ * the pivot's row divided in its place the error of each number grows with that row over its pivot,
+ * and Newton's method ends at half of the residual on a Go1 that comes down in loose sand. */
 TEAM_FN void bodies_eliminate(BodiesWork *work, int rows) {
     const int stride = rows + 1;
+    Real *matrix = work->matrix;
     LANE_ROLLED
-    for (int k = 0; k < rows; k++) {
-        const int chosen = bodies_pivot(work->matrix, stride, k);
-        if (chosen != k) {
-            bodies_swap(work->matrix, stride, k, chosen);
-        }
-        const Real inverse = 1 / work->matrix[k * stride + k];
+    for (int first = 0; first < rows; first += 6) {
+        BodiesPanel panel;
+        bodies_panel(matrix, stride, first, &panel);
         EACH_LANE(l) {
             LANE_ROLLED
-            for (int j = k + 1 + LANE(l); j < stride; j += LANES) {
-                bodies_subtract(work->matrix, rows, k, j, inverse);
+            for (int r = TEAM_LANE(l); r < rows; r += TEAM) {
+                if (r < first || r >= first + 6) {
+                    bodies_factors(&panel, matrix + r * stride + first);
+                }
             }
         }
+        team_sync();
+        bodies_columns(matrix, rows, first, &panel);
         team_sync();
     }
     EACH_LANE(l) {
         LANE_ROLLED
         for (int r = TEAM_LANE(l); r < rows; r += TEAM) {
-            work->matrix[r * stride + rows] /= work->matrix[r * stride + r];
+            matrix[r * stride + rows] /= matrix[r * stride + r];
         }
     }
     team_sync();
@@ -462,14 +592,15 @@ TEAM_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work, int heap)
     const int rows = 6 * work->count;
     Real least = -1, at_residual = 0, way = 1, relative = 0;
     int steps = 0, halved = 0;
-    BodiesElement kept[BODIES_KEPT][LANE_COPIES];
+    BodiesElement kept[LANE_COPIES], rest[BODIES_REST][LANE_COPIES];
     bodies_list(setup, work, heap);
-    bodies_keep(setup, work, kept, heap);
+    bodies_keep(setup, work, kept, rest, heap);
     bodies_start(work, rows, &work->next);
     bodies_copy(rows, &work->next, &work->best);
     for (;;) {
         Real residual, scale;
-        bodies_evaluate(setup, work, &work->next, (const BodiesElement(*)[LANE_COPIES])kept, heap);
+        bodies_evaluate(setup, work, &work->next, kept, (const BodiesElement(*)[LANE_COPIES])rest,
+                        heap);
         bodies_residual(work, rows, &work->next, &residual, &scale);
         const Real wanted = halved ? (1 - way / 10) * at_residual : at_residual;
         if (steps > 1 && !(residual < wanted) && halved < CONTACT_HALVINGS) {
