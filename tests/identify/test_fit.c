@@ -344,8 +344,9 @@ TEST(pressure_grows_with_the_plate) {
     assert_true(is_about(&result, "exponent", 1.35) && value_of(&result, "k_c")->high < 0);
 }
 
-/* Of any such ground, down to a modulus of 1/1000 of k_phi under the smallest of two or three plates:
- * the search passes through moduli below 0, from which a law that is 0 there does not come back. */
+/* Of any such ground, down to a modulus of 1/1000 of k_phi under the smallest of two or three
+ * plates. The search passes through moduli below 0; from a law that is 0 there it finds no way
+ * back. */
 TEST(pressure_of_small_plates) {
     Random random = random_at(7, 0, 0);
     for (int run_index = 0; run_index < 400; run_index++) {

@@ -104,8 +104,8 @@ TEST(what_is_drawn) {
     pool_destroy(pool);
 }
 
-/* k_c below 0 is drawn with the factor of k_phi, so that the modulus under every sole keeps its sign;
- * ground that does not bear the robot's feet is refused. */
+/* k_c below 0 is drawn with the factor of k_phi, so that the modulus under every sole keeps its
+ * sign. Ground that does not bear the robot's feet is refused. */
 TEST(pressure_that_grows_with_the_sole) {
     char folder[] = "/tmp/mild_soils_XXXXXX", path[64];
     MildError error = {0};
