@@ -228,7 +228,7 @@ static void plate_forces(const FitPlate *plate, const MildMaterial *raw, const F
         merged_forces(plate, raw, points, count, force);
         return;
     }
-    /* The ground takes a modulus below 0 for 0. The search needs a slope there, so here it pulls. */
+    /* The ground takes a modulus below 0 for 0. The search needs a slope there: here it pulls. */
     const double sign = fit_modulus(raw, plate->width) < 0 ? -1 : 1;
     MildMaterial mirrored = *raw;
     mirrored.k_c *= sign;
