@@ -86,6 +86,9 @@ MildStatus live_change(Soft *soft, const mjModel *m, int label, const char *text
         status = mild_material_check(&material, error);
     }
     if (status == MILD_OK) {
+        status = soft_meet(soft, &material, error);
+    }
+    if (status == MILD_OK) {
         soft->terrain.materials[label] = material;
         if (name[0]) {
             visual_colour(name, &material, soft->colour[label]);

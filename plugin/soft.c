@@ -18,6 +18,7 @@
 #include <string.h>
 
 #include "ground/scratch.h"
+#include "ground/width.h"
 #include "plugin/visual.h"
 
 #define JOINT_ROUNDS 30  /* solves of the ground with the constraints in its response */
@@ -66,6 +67,14 @@ static MildStatus lay_map(Soft *soft, MildError *error) {
     map->patch_count = soft->terrain.material_count;
     soft->map = mild_map_create(map, error);
     return soft->map ? mild_terrain_set_map(&soft->terrain, soft->map, error) : MILD_ERROR_ARGUMENT;
+}
+
+MildStatus soft_meet(const Soft *soft, const MildMaterial *material, MildError *error) {
+    MildStatus status = MILD_OK;
+    for (int f = 0; f < soft->feet && status == MILD_OK; f++) {
+        status = width_check(material, mild_sole_width(soft->soles[f]), error);
+    }
+    return status;
 }
 
 /* Without `ground` the numbers of ground.* are a material of its own. */
@@ -122,6 +131,9 @@ static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *er
         status = plugin_def_materials(m, instance, &soft->def,
                                       soft->foot[0].surface ? NULL : soft->foot[0].raster,
                                       soft_load(soft, m), &soft->terrain, error);
+    }
+    for (int i = 0; i < soft->terrain.material_count && status == MILD_OK; i++) {
+        status = soft_meet(soft, &soft->terrain.materials[i], error);
     }
     if (status == MILD_OK) {
         status = lay_map(soft, error);

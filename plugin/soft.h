@@ -47,6 +47,9 @@ typedef struct {
     MildContactResult contact;
 } Soft;
 
+/* Checks that a material bears every sole (ground/width.h). */
+MildStatus soft_meet(const Soft *soft, const MildMaterial *material, MildError *error);
+
 /* Makes the ground of an instance. Returns NULL with one line in *error. */
 Soft *soft_create(const mjModel *m, int instance, MildError *error);
 void soft_destroy(Soft *soft); /* may be NULL */

@@ -278,12 +278,15 @@ def draw(data, path):
 
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4.2))
     pushes = {name: push for name, push, _ in entries(["disc80"], data) if name in COLOURS}
+    two = next(push for name, push, _ in entries(["disc60", "disc100"], data) if name == "bekker")
     for shade, (shape, size) in zip(("0.65", "0.35", "0.0"), DISCS.items()):
         area, depths = math.pi * size**2 / 4, np.arange(5e-4, max(d[-1] for d, _ in data[shape]), 5e-4)
         for trial, (depth, force) in enumerate(data[shape]):
             left.plot(1e3 * depth, 1e-3 * force / area, color=shade, lw=1, label=None if trial else f"measured, {1e3 * size:.0f} mm")
         for name, push in pushes.items():
             left.plot(1e3 * depths, 1e-3 * push(shape, depths) / area, "--", color=COLOURS[name], lw=1, label=name if shape == "disc80" else None)
+        left.plot(1e3 * depths, 1e-3 * two(shape, depths) / area, ":", color=COLOURS["bekker"], lw=1.5,
+                  label="bekker, fitted to 60 and 100" if shape == "disc80" else None)
     left.set(xlabel="depth [mm]", ylabel="mean pressure [kPa]", xlim=(0, 32), ylim=(0, 60), title="three discs, models fitted to 80 mm")
     measured, rolled = wheels(), {}
     with open(REAL / "rolled.csv", newline="", encoding="utf-8") as file:

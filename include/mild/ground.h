@@ -120,7 +120,8 @@ typedef struct {
     double exponent;     /* [-] bekker, hunt_crossley: exponent n of the depth */
     double dissipation;  /* [s/m] hunt_crossley: the coefficient of restitution is 1 - dissipation v
                            at a small impact speed v */
-    double k_c;          /* [N/m^(n+1)] bekker: cohesive modulus, divided by plate_width */
+    double k_c;          /* [N/m^(n+1)] bekker: cohesive modulus, divided by plate_width; below 0
+                           pressure grows with the plate's width, and k_c/b + k_phi below 0 is 0 */
     double k_phi;        /* [N/m^(n+2)] bekker: frictional modulus */
     double plate_width;  /* [m] bekker: b, shorter side of the loaded plate; 0: of the sole */
     double cohesion;     /* [N/m^2] bekker: c, shear strength without load */

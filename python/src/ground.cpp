@@ -6,6 +6,10 @@
 
 #include <nanobind/stl/tuple.h>
 
+extern "C" {
+#include "ground/width.h"
+}
+
 struct Ground {
     nb::object soles; /* tuple of Sole */
     Terrain terrain;
@@ -45,6 +49,16 @@ static void set_solver(Ground &ground, const std::string &solver) {
     raise(PyExc_ValueError, "solver: '" + solver + "' is none of newton, gauss_seidel, explicit");
 }
 
+/* Every material of a terrain under every sole. */
+static void meet(const std::vector<const MildSole *> &soles, const Terrain &terrain) {
+    for (int i = 0; i < terrain.terrain.material_count; i++) {
+        for (const MildSole *sole : soles) {
+            MildError error = {};
+            check(width_check(&terrain.terrain.materials[i], mild_sole_width(sole), &error), error);
+        }
+    }
+}
+
 static void make(Ground *at, const nb::sequence &soles, nb::handle terrain, double dt, int tiles,
                  const std::string &solver, double tolerance, int max_iterations) {
     const nb::tuple kept(soles); /* a sequence may give others the next time */
@@ -58,6 +72,7 @@ static void make(Ground *at, const nb::sequence &soles, nb::handle terrain, doub
     }
     positive(dt, "dt");
     Terrain under = terrain_of(terrain);
+    meet(made, under);
     auto ground = new (at) Ground;
     try {
         set_solver(*ground, solver);
@@ -300,7 +315,11 @@ static void bind_input(nb::class_<Ground> &type) {
             "Time step [s].")
         .def_prop_rw(
             "terrain", [](Ground &ground) { return ground.terrain; },
-            [](Ground &ground, nb::handle terrain) { ground.terrain = terrain_of(terrain); },
+            [](Ground &ground, nb::handle terrain) {
+                const Terrain under = terrain_of(terrain);
+                meet(soles_of(nb::cast<nb::tuple>(ground.soles)), under);
+                ground.terrain = under;
+            },
             "A copy of the terrain; assign one, or a material, to change it.");
 }
 

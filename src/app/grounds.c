@@ -4,6 +4,7 @@
 
 #include "base/text.h"
 #include "ground/soil/soil.h"
+#include "ground/width.h"
 
 int grounds_of(MildModel model, const char *names[GROUNDS_MAX]) {
     const MildModelInfo *info = mild_model_info(model);
@@ -109,7 +110,10 @@ MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildErr
     if (status == MILD_OK) {
         status = overlay(def, material, error);
     }
-    return status == MILD_OK ? mild_material_check(material, error) : status;
+    if (status == MILD_OK) {
+        status = mild_material_check(material, error);
+    }
+    return status == MILD_OK ? width_check(material, mild_sole_width(def->sole), error) : status;
 }
 
 MildStatus grounds_finish_scene(const GroundsDef *def, Scene *scene, MildError *error) {

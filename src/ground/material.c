@@ -30,7 +30,7 @@ const MildField mild_material_fields[] = {
     FIELD(exponent, 0.1, 2.0, "[-] bekker, hunt_crossley: exponent n of the depth"),
     FIELD(dissipation, 0.0, 50.0,
           "[s/m] hunt_crossley: damping; the coefficient of restitution is 1 - dissipation v"),
-    FIELD(k_c, 0.0, 1e10, "[N/m^(n+1)] bekker: cohesive modulus, divided by plate_width"),
+    FIELD(k_c, -1e10, 1e10, "[N/m^(n+1)] bekker: cohesive modulus, divided by plate_width"),
     FIELD(k_phi, 0.0, 1e12, "[N/m^(n+2)] bekker: frictional modulus"),
     FIELD(plate_width, 0.0, 1.0, "[m] bekker: b, shorter side of the loaded plate; 0: of the sole"),
     FIELD(cohesion, 0.0, 1e6, "[N/m^2] bekker: shear strength without load"),
@@ -173,12 +173,13 @@ MildStatus mild_material_check(const MildMaterial *material, MildError *error) {
     }
     const MildStatus status = mild_fields_check(mild_material_fields, mild_material_field_count,
                                                 material, "ground", error);
-    if (status == MILD_OK && material->plate_width > 0.0 &&
-        material->plate_width < MATERIAL_PLATE_MIN) {
-        return mild_fail(
-            error, MILD_ERROR_RANGE,
-            "ground.plate_width = %g is below %g; 0 takes the shorter side of the sole",
-            material->plate_width, MATERIAL_PLATE_MIN);
+    const double least = plate_width_least(material);
+    if (status == MILD_OK && material->plate_width > 0.0 && material->plate_width < least) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "ground.plate_width = %g is below %g%s; 0 takes the shorter side of the "
+                         "sole",
+                         material->plate_width, least,
+                         least > MATERIAL_PLATE_MIN ? " = -k_c/k_phi" : "");
     }
     return status;
 }

@@ -63,7 +63,7 @@ static Law bekker_law(const MildMaterial *material, double pitch) {
     const double area = pitch * pitch;
     const double modulus = material->k_c / material->plate_width + material->k_phi;
     Law law = law_line(0.0, area, material->bed_depth);
-    law.power_force = modulus * pow(POWER_DEPTH, material->exponent) * area;
+    law.power_force = (modulus < 0.0 ? 0.0 : modulus) * pow(POWER_DEPTH, material->exponent) * area;
     law.power_exponent = material->exponent;
     return law;
 }

@@ -4,9 +4,7 @@
 
 #include "ground/model.h"
 #include "ground/share.h"
-
-/* [m] Least plate_width, given or of a sole, because Bekker's pressure grows with k_c/b. */
-#define MATERIAL_PLATE_MIN 0.005
+#include "ground/width.h"
 
 /* The row of a material's model. Returns the row of mild for an unknown model and for one without a
  * law, because the ground must survive unchecked materials. */

@@ -369,6 +369,20 @@ static int rows_mean(FitKind kind, const FitPoint *points, int count, int group,
     return kept;
 }
 
+/* No plate of the records is under a modulus below 0. */
+static MildStatus plates_check(const FitDef *def, const MildMaterial *found, MildError *error) {
+    for (int i = 0; i < def->plates; i++) {
+        const double width = def->plate[i].width;
+        if (fit_modulus(found, width) < -1e-9 * found->k_phi) {
+            return mild_fail(error, MILD_ERROR_RANGE,
+                             "fit: k_c = %g, k_phi = %g have k_c/b + k_phi below 0 under the "
+                             "plate of b = %g m: hold k_c nearer to 0, or leave out that record",
+                             found->k_c, found->k_phi, width);
+        }
+    }
+    return MILD_OK;
+}
+
 static MildStatus run_rows(const FitDef *def, const FitPoint *points, int count, FitResult *result,
                            MildError *error) {
     Run run = {.def = def,
@@ -390,7 +404,7 @@ static MildStatus run_rows(const FitDef *def, const FitPoint *points, int count,
     values_fill(&run);
     run_finish(&run);
     fit_close(&run.fit);
-    return MILD_OK;
+    return def->kind == FIT_PRESS ? plates_check(def, &result->curve, error) : MILD_OK;
 }
 
 MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResult *result,

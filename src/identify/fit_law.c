@@ -38,6 +38,10 @@ static void drag_set_c_d(MildMaterial *m, double value) {
     m->c_d = value / (m->c_g * m->phi * m->rho * m->nu);
 }
 
+double fit_modulus(const MildMaterial *material, double width) {
+    return material->model == MILD_MODEL_BEKKER ? material->k_c / width + material->k_phi : 0;
+}
+
 static double modulus(const MildMaterial *m) {
     return m->k_c / m->plate_width + m->k_phi;
 }
@@ -224,14 +228,19 @@ static void plate_forces(const FitPlate *plate, const MildMaterial *raw, const F
         merged_forces(plate, raw, points, count, force);
         return;
     }
-    const Law law = law_of(raw, plate->pitch, plate->width);
+    /* The ground takes a modulus below 0 for 0. The search needs a slope there: here it pulls. */
+    const double sign = fit_modulus(raw, plate->width) < 0 ? -1 : 1;
+    MildMaterial mirrored = *raw;
+    mirrored.k_c *= sign;
+    mirrored.k_phi *= sign;
+    const Law law = law_of(&mirrored, plate->pitch, plate->width);
     const int curves = law_curves(&law);
     const double each = plate->pitch * plate->pitch;
     const int pressure = reads((MildModel)raw->model, "plate_width");
     for (int i = 0; i < count; i++) {
         const double area = points[i].area > 0 ? points[i].area : plate->area;
         const double elements = pressure && area > 0 ? area / each : plate->elements;
-        force[i] = elements * point_force(&law, curves, &points[i]);
+        force[i] = sign * elements * point_force(&law, curves, &points[i]);
     }
 }
 

@@ -56,6 +56,9 @@ void fit_range(const MildField *field, double *low, double *high);
 /* A number of the field as a fit counts it: 0 of slip_length, by which slip costs nothing, is its
  * longest. */
 double fit_counted(const MildField *field, double number);
+/* [N/m^(n+2)] k_c/b + k_phi of bekker under a plate of that width [m]; 0 of other models. Where it
+ * is below 0, a fit's forces are. */
+double fit_modulus(const MildMaterial *material, double width);
 /* The number of a material. */
 double *fit_number(MildMaterial *material, const MildField *field);
 

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "ground/width.h"
 #include "identify/press_body.h"
 
 static const double paper_pitch = 0.0195, gravity = 9.81; /* [m], [m/s^2] */
@@ -398,6 +399,9 @@ MildStatus press_run(const PressDef *def, const MildSole *sole, PressResult *res
     int elements = mild_sole_elements(sole);
     *result = (PressResult){.elements = elements, .area = elements * pitch * pitch};
     MildStatus status = mild_material_check(&def->material, error);
+    if (status == MILD_OK) {
+        status = width_check(&def->material, mild_sole_width(sole), error);
+    }
     if (status == MILD_OK) {
         status = press_open(&press, &whole, sole, result, error);
     }

@@ -149,6 +149,24 @@ awk -F, 'NR > 1 && ($3 - $5) ^ 2 > 1 { exit 1 }' plates_fit.csv || fail "the fig
 "$mild" fit narrow.csv wide.csv --plate 0.15,0.1 --plate 0.3,0.2 --model bekker --json clay.json >/dev/null
 near "two plates: k_c" "$(value clay.json k_c)" 13190 0.5
 near "two plates: k_phi" "$(value clay.json k_phi)" 692150 0.5
+cat >grows.ini <<'SOIL' # pressure that grows with the plate: k_c below 0
+[ground]
+preset = clay
+k_c = -30000
+SOIL
+"$mild" press --ground grows.ini --plate 0.15,0.1 --depth 0.04 --csv narrow.csv >/dev/null
+"$mild" press --ground grows.ini --plate 0.3,0.2 --depth 0.04 --csv wide.csv >/dev/null
+"$mild" fit narrow.csv wide.csv --plate 0.15,0.1 --plate 0.3,0.2 --model bekker --hold-from clay --json clay.json --soil found.ini >/dev/null
+near "k_c below 0" "$(value clay.json k_c)" -30000 0.5
+near "k_phi with it" "$(value clay.json k_phi)" 692150 0.5
+"$mild" press --ground found.ini --plate 0.2,0.15 --depth 0.02 --csv found.csv >/dev/null # (692150 - 30000/0.15) 0.02^0.5 of 70 elements
+near "force of the soil that it wrote" "$(tail -n +2 found.csv | cut -d, -f3 | sort -g | tail -1)" \
+    "$("$mild" press --ground grows.ini --plate 0.2,0.15 --depth 0.02 --csv - | tail -n +2 | cut -d, -f3 | sort -g | tail -1)" 0.5
+"$mild" fit wide.csv --plate 0.3,0.2 --model bekker --hold k_c=-500 --json clay.json >/dev/null
+near "k_phi, k_c held below 0" "$(value clay.json k_phi)" 544650 0.5 # 692150 - 29500/0.2
+bad "ground.k_c 0.04 0.0433432 ground.plate_width" "$mild" press --ground grows.ini --plate 0.1,0.04 --depth 0.02 --csv out.csv
+bad "ground.k_c -90000 0.13003 ground.plate_width" "$mild" eval --ground grows.ini --ground.k_c=-90000 --controller stand --trials 1 --seconds 1
+refuse "fit k_c k_phi 0.1" "$mild" fit narrow.csv --plate 0.15,0.1 --model bekker --hold k_c=-500,k_phi=4900
 refuse "--plate 2 1" "$mild" fit small.csv --plate 0.15,0.1 --plate 0.3,0.1
 refuse "--plate 2 3" "$mild" fit small.csv large.csv small.csv --plate 0.15,0.1 --plate 0.3,0.1
 refuse "--plate 3" "$mild" fit small.csv --plate 0.15,0.1,0.1

@@ -140,10 +140,10 @@ bad "--ring 2 1" "$mild" fit r5.csv --model bekker --ring 0.2,0.12 --ring 0.2,0.
 bad "--plate 3 2" "$mild" fit d5.csv r5.csv wide.csv "${sizes[@]}"
 printf 'slip_m,pressure_pa\n1,2\n' >bad.csv
 bad "bad.csv:1 shear_pa" "$mild" fit bad.csv --model bekker
-awk=("${awk[@]}" -v kc=0) # then k_c has a limit, which the preset's 990 is beyond
+awk=("${awk[@]}" -v kphi=0) # then k_phi has a limit, which the preset's 1.5e6 is beyond
 press 1 0.025 "$p25" >n5.csv
 press 2 0.075 "$p75" >n15.csv
-bad "--soil k_c --hold --hold-from" "$mild" fit n5.csv n15.csv --model bekker --plate 0.05 --plate 0.15 \
+bad "--soil k_phi --hold --hold-from" "$mild" fit n5.csv n15.csv --model bekker --plate 0.05 --plate 0.15 \
     --hold-from dry_sand --soil new.ini
 cmp -s mars.ini before.ini || fail "a refused fit changed the soil"
 

@@ -694,6 +694,13 @@ TEST(bad_input_is_refused) {
     assert_true(mild_material_preset("snow", &materials[1]));
     assert_int_equal(mild_batch_set_materials(batch, materials, 2, &error), MILD_OK);
     assert_int_equal(mild_batch_set_materials(batch, materials, 0, &error), MILD_ERROR_RANGE);
+    materials[1].k_c = -0.9 * mild_sole_width(right) * materials[1].k_phi;
+    assert_int_equal(mild_batch_set_materials(batch, materials, 2, &error), MILD_OK);
+    materials[1].k_c *= 1.2;
+    assert_int_equal(mild_batch_set_materials(batch, materials, 2, &error), MILD_ERROR_RANGE);
+    assert_error(&error, MILD_ERROR_RANGE, "material 1 ground.k_c ground.plate_width");
+    materials[1].plate_width = 2 * mild_sole_width(right);
+    assert_int_equal(mild_batch_set_materials(batch, materials, 2, &error), MILD_OK);
 
     assert_int_equal(mild_batch_robot_bytes(batch), 10 * 160 * sizeof(float));
     assert_int_equal(mild_batch_stride(batch), 80);

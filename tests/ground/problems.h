@@ -170,6 +170,10 @@ static MildMaterial material_of(uint64_t *random, MildModel model) {
         m.k_c = kit_uniform(random, 0.0, 50e3);
         m.k_phi = pow(10.0, kit_uniform(random, 4.5, 6.0));
         m.plate_width = kit_uniform(random, 0.05, 0.2);
+        uint64_t own = *random;
+        if (kit_index(&own, 3) == 0) { /* pressure that grows with the plate */
+            m.k_c = kit_uniform(&own, -1.0, 0.0) * m.k_phi * m.plate_width;
+        }
         m.cohesion = kit_uniform(random, 0.0, 10e3);
         m.shear_length = kit_uniform(random, 0.001, 0.05);
         m.dissipation = kit_uniform(random, 0.0, 5.0);

@@ -171,6 +171,43 @@ TEST(test_width) {
     assert_int_equal(mild_material_check(&clay, &error), MILD_OK);
 }
 
+/* k_c below 0: pressure that grows with the plate, by hand (400 000 - 10 000/b) z; under a plate of
+ * 25 mm and less it is 0, never less, and where the material names such a plate it is refused. */
+TEST(pressure_grows_with_the_plate) {
+    static const struct {
+        double length, width, pressure; /* [m], [m], [Pa] at 10 mm */
+    } table[] = {{0.2, 0.2, 3500}, {0.2, 0.1, 3000}, {0.1, 0.05, 2000}, {0.1, 0.02, 0}};
+    MildError error = {0};
+    MildMaterial m = kit_preset("dry_sand");
+    m.exponent = 1.0;
+    m.k_c = -10e3;
+    m.k_phi = 400e3;
+    assert_int_equal(mild_material_check(&m, &error), MILD_OK);
+    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
+        MildSole *sole = rectangle(table[i].length, table[i].width);
+        const double area = mild_sole_elements(sole) * KIT_PITCH * KIT_PITCH;
+        const MildElementLaw law = mild_sole_law(&m, sole, 0.01);
+        print_message("b = %.2f m: %.2f Pa, by hand %.0f\n", table[i].width, law.force / area,
+                      table[i].pressure);
+        assert_true(fabs(law.force / area - table[i].pressure) <= 1e-3 * table[i].pressure);
+        assert_true(law.force >= 0.0 && law.stiffness >= 0.0);
+        mild_sole_destroy(sole);
+    }
+    m.plate_width = 0.0251;
+    assert_int_equal(mild_material_check(&m, &error), MILD_OK);
+    m.plate_width = 0.0249;
+    assert_int_equal(mild_material_check(&m, &error), MILD_ERROR_RANGE);
+    assert_error(&error, MILD_ERROR_RANGE, "ground.plate_width 0.0249 0.025 -k_c/k_phi 0");
+    m.k_phi = 0.0;
+    assert_int_equal(mild_material_check(&m, &error), MILD_ERROR_RANGE);
+    m.plate_width = 0.0;
+    m.k_phi = 400e3;
+    m.k_c = -2e10;
+    assert_int_equal(mild_material_check(&m, &error), MILD_ERROR_RANGE);
+    m.k_c = NAN;
+    assert_int_equal(mild_material_check(&m, &error), MILD_ERROR_RANGE);
+}
+
 /* A level plate 20 mm deep, dragged along x at a constant speed: friction by load against
  * (c A + mu N)(1 - exp(-j/K)). */
 TEST(test_shear) {

@@ -36,6 +36,10 @@ static MildMaterial draw_material(uint64_t *random) {
         m.exponent = kit_uniform(random, 0.4, 2.0);
         m.k_c = kit_uniform(random, 0.0, 50e3);
         m.k_phi = pow(10.0, kit_uniform(random, 4.5, 6.0));
+        uint64_t own = *random;
+        if (kit_index(&own, 3) == 0) { /* of a small body the modulus is below 0 then */
+            m.k_c = kit_uniform(&own, -0.1, 0.0) * m.k_phi;
+        }
         m.cohesion = kit_uniform(random, 0.0, 10e3);
         m.shear_length = kit_uniform(random, 0.001, 0.05);
         m.dissipation = kit_uniform(random, 0.0, 5.0);

@@ -192,6 +192,7 @@ TEST(test_width) {
         MildError error = {0};
         PressDef def = definition("clay");
         const double b = fmin(sides[i][0], sides[i][1]);
+        def.material.k_c = i == 2 ? -30e3 : def.material.k_c;
         MildSole *plate = press_plate_create(sides[i][0], sides[i][1], &error);
         press_result_close(&result);
         assert_int_equal(press_run(&def, plate, &result, &error), MILD_OK);
@@ -203,6 +204,22 @@ TEST(test_width) {
     printf("bekker under plates of three widths: %.1e off\n", worst);
     assert_true(worst < 1e-3);
     press_result_close(&result);
+}
+
+/* A plate too small for a k_c below 0. */
+TEST(small_plate) {
+    MildError error = {0};
+    PressDef def = definition("clay");
+    MildSole *plate = press_plate_create(0.1, 0.04, &error);
+    def.material.k_c = -0.041 * def.material.k_phi;
+    press_result_close(&result);
+    assert_int_equal(press_run(&def, plate, &result, &error), MILD_ERROR_RANGE);
+    assert_error(&error, MILD_ERROR_RANGE, "ground.k_c 0.04 0.041 ground.plate_width");
+    press_result_close(&result);
+    def.material.plate_width = 0.1;
+    assert_int_equal(press_run(&def, plate, &result, &error), MILD_OK);
+    press_result_close(&result);
+    mild_sole_destroy(plate);
 }
 
 TEST(test_bad_material) {

@@ -62,15 +62,20 @@ def real_sand_step(ground, z):
 
 
 def page():
-    """Of docs/real-sand.md: the rows of mild, mild_merged and 3D-RFT fitted to one disc."""
+    """Of docs/real-sand.md: the rows of mild, mild_merged and 3D-RFT fitted to one disc, of bekker to two."""
     with contextlib.redirect_stdout(io.StringIO()) as said:
         real_sand.judge_presses(real_sand.presses(), ["disc80"], ("mild", "mild_merged", "3d_rft"))
     found = {line.split()[0]: [int(x) for x in line.split()[1:]] for line in said.getvalue().splitlines() if line.startswith(("mild", "3d_rft"))}
     text = (root / "docs/real-sand.md").read_text(encoding="utf-8")
-    for name, row in (("mild", r"\| `mild`, `bekker`[^|]*\|"), ("mild_merged", r"\| `mild_merged` \|"), ("3d_rft", r"\| 3D-RFT[^|]*\|")):
+    for name, row in (("mild", r"\| `mild`, `hunt_crossley` \|"), ("mild_merged", r"\| `mild_merged` \|"), ("3d_rft", r"\| 3D-RFT[^|]*\|")):
         cells = re.search(row + r"([^|]*)\|([^|]*)\|([^|]*)\|", text).groups()
         says = [int(re.search(r"[-+]?\d+", cell).group()) for cell in cells]
         assert says == [found[name][0], found[name][2], found[name][3]], (name, says, found[name])
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        real_sand.judge_presses(real_sand.presses(), ["disc60", "disc100"], ("bekker",))
+    found = [int(x) for line in said.getvalue().splitlines() if line.startswith("bekker") for x in line.split()[1:]]
+    says = [int(x) for x in re.findall(r"[-+]\d+", re.search(r"\n\| `bekker` \|(.*)", text).group(1))[3:]]
+    assert says == found and max(map(abs, found[:3])) < 10, (says, found)  # k_c below 0: pressure that grows with the disc
 
 
 def page_of_wheel():

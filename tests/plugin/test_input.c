@@ -67,6 +67,12 @@ TEST(refuses_what_is_wrong) {
     check_bad_keys("", FOOT CONFIG("ground", "grass rubber"), "plugin.ground 2 terrain.patches");
     check_bad_keys("", FOOT CONFIG("ground.model", "bekkers"), "ground.model bekkers bekker");
     check_bad_keys("", FOOT CONFIG("ground.model", "rigid"), "ground.model rigid");
+    check_bad_keys("", FOOT CONFIG("ground", "clay") CONFIG("ground.k_c", "-690000"),
+                   "ground.k_c -690000 ground.plate_width");
+    check_bad_keys("",
+                   FOOT CONFIG("ground", "clay") CONFIG("ground.k_c", "-9000")
+                       CONFIG("ground.plate_width", "0.012"),
+                   "ground.plate_width 0.012 0.013003 -k_c/k_phi");
     check_bad_keys("", FOOT CONFIG("ground", "clay") CONFIG("ground.model", "mild"),
                    "clay bekker ground.model");
     check_bad_keys("", FOOT CONFIG("ground.k_pen", "-1"), "ground.k_pen -1");

@@ -37,8 +37,10 @@ def fall(ground, steps, twist=np.zeros(6)):
 class Press(unittest.TestCase):
     def test_bekker_law(self):
         """F = area (k_c/b + k_phi) u^n, Bekker 1969, for a slow press; near the surface ours is straight."""
-        for name, length, width in (("clay", 0.2, 0.1), ("dry_sand", 0.3, 0.2), ("snow", 0.06, 0.2)):
+        for name, length, width, k_c in (("clay", 0.2, 0.1, None), ("dry_sand", 0.3, 0.2, None), ("snow", 0.06, 0.2, None),
+                                         ("clay", 0.2, 0.1, -30e3), ("clay", 0.06, 0.2, -30e3)):
             sole, soil = mild.Sole.plate(length, width), mild.Material(name)
+            soil.k_c = soil.k_c if k_c is None else k_c  # below 0 pressure grows with the plate
             self.assertEqual(soil.plate_width, 0)  # b is the shorter side of the sole
             self.assertAlmostEqual(sole.width, min(length, width), places=12)
             press = mild.press(soil, sole, depth=0.02, speed=1e-4)
@@ -47,6 +49,23 @@ class Press(unittest.TestCase):
             law = press.area * (soil.k_c / min(length, width) + soil.k_phi) * u**soil.exponent
             np.testing.assert_allclose(press.force[down], law, rtol=1e-3)
             self.assertGreater(down.sum(), 800)
+
+    def test_small_sole(self):
+        """A k_c below 0 leaves no pressure under a small sole: refused where the two meet."""
+        sole, soil = mild.Sole.plate(0.2, 0.05), mild.Material("clay", k_c=-40e3)
+        words = r"ground\.k_c = -40000 .* b = 0\.05 m.* ground\.plate_width"
+        with self.assertRaisesRegex(ValueError, words):
+            mild.Ground([sole], soil, dt=1e-3)
+        with self.assertRaisesRegex(ValueError, words):
+            mild.press(soil, sole, depth=0.02)
+        ground = mild.Ground([sole], "clay", dt=1e-3)
+        with self.assertRaisesRegex(ValueError, words):
+            ground.terrain = soil
+        self.assertEqual(ground.terrain.materials[0].k_c, 13190)
+        soil.plate_width = 0.1
+        ground.terrain = soil
+        with self.assertRaisesRegex(ValueError, r"plate_width = 0\.05 .* -k_c/k_phi"):
+            soil.plate_width = 0.05
 
     @unittest.skipUnless(PROGRAM, "MILD_PROGRAM names no program")
     def test_program(self):
@@ -456,6 +475,16 @@ class Fit(unittest.TestCase):
                 fit.fit(X, y[:1])
         with self.assertRaisesRegex(ValueError, "plate_width"):
             mild.GroundFit(model="bekker", hold={"plate_width": 0.1}).fit(X[0], y[0])
+
+    def test_pressure_grows_with_the_plate(self):
+        """Two plates of the law with k_c below 0, by its formula: both moduli come back, and so does a k_phi of k_c = -500 held."""
+        sizes, X = [(0.1, 0.08), (0.3, 0.2)], [np.linspace(0.001, 0.04, 60)[:, None]] * 2
+        y = [mild.Sole.plate(*size).elements * 0.0195**2 * (-20e3 / min(size) + 600e3) * x[:, 0] ** 0.8 for size, x in zip(sizes, X)]
+        found = mild.GroundFit(sizes, model="bekker").fit(X, y).parameters_
+        for name, truth in (("k_c", -20e3), ("k_phi", 600e3), ("exponent", 0.8)):
+            self.assertLess(abs(found[name] / truth - 1), 1e-3, name)
+        found = mild.GroundFit(sizes[0], model="bekker", hold={"k_c": -500}).fit(X[0], y[0]).parameters_
+        self.assertLess(abs(found["k_phi"] / (600e3 - 19.5e3 / 0.08) - 1), 1e-3)
 
     def test_save(self):
         """What was fitted becomes a soil's file, the rest is the fill's; numbers that nobody knows are refused."""

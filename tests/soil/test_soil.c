@@ -85,7 +85,7 @@ static void draw(Random *random, MildMaterial *m) {
         }
     }
     m->passive = (int)random_index(random, 2);
-    m->plate_width = m->plate_width < 0.02 ? 0 : m->plate_width;
+    m->plate_width = m->plate_width < fmax(0.02, -m->k_c / m->k_phi) ? 0 : m->plate_width;
 }
 
 TEST(test_round_trip) {

@@ -21,26 +21,26 @@ static void check_bad_soils(const char *presets, int model, MildStatus status, c
     TaskDef def = def_of(presets, model);
     TaskSoils soils;
     MildError error = {0};
-    assert_refused(task_soils_open(&def, &soils, &error), status, &error, names);
+    assert_refused(task_soils_open(&def, robot, &soils, &error), status, &error, names);
 }
 
 TEST(what_is_read) {
     TaskDef def = def_of("", MILD_MODEL_MILD);
     TaskSoils soils;
     MildError error = {0};
-    assert_int_equal(task_soils_open(&def, &soils, &error), MILD_OK);
+    assert_int_equal(task_soils_open(&def, robot, &soils, &error), MILD_OK);
     assert_null(def.soils);
     def = def_of("clay, snow,foam45", MILD_MODEL_BEKKER);
     assert_int_not_equal(task_def_check_robot(&def, robot, &error), MILD_OK); /* not read yet */
     assert_error(&error, MILD_ERROR_ARGUMENT, "randomize.presets");
-    assert_int_equal(task_soils_open(&def, &soils, &error), MILD_OK);
+    assert_int_equal(task_soils_open(&def, robot, &soils, &error), MILD_OK);
     assert_int_equal(task_def_check_robot(&def, robot, &error), MILD_OK);
     assert_ptr_equal(def.soils, &soils);
     assert_int_equal(soils.count, 3);
     assert_true(soils.soil[0].k_c == 13190 && soils.soil[1].k_c == 4370);
     assert_int_equal(soils.soil[2].model, MILD_MODEL_MILD);
     def = def_of("clay", MILD_MODEL_RIGID);
-    assert_int_equal(task_soils_open(&def, &soils, &error), MILD_OK);
+    assert_int_equal(task_soils_open(&def, robot, &soils, &error), MILD_OK);
     def = def_of("clay", MILD_MODEL_BEKKER);
     task_def_choose_ground(&def); /* an evaluation names its own */
     assert_int_equal(task_def_check_robot(&def, robot, &error), MILD_OK);
@@ -73,7 +73,7 @@ TEST(what_is_drawn) {
     char names[100];
     snprintf(names, sizeof names, "clay,%s", path);
     TaskDef def = def_of(names, MILD_MODEL_BEKKER);
-    assert_int_equal(task_soils_open(&def, &soils, &error), MILD_OK);
+    assert_int_equal(task_soils_open(&def, robot, &soils, &error), MILD_OK);
     unlink(path); /* read once */
     rmdir(folder);
     TaskGrounds *grounds = task_grounds_create(&def, robot, DRAWS, 3, pool, &error);
@@ -104,6 +104,38 @@ TEST(what_is_drawn) {
     pool_destroy(pool);
 }
 
+/* k_c below 0 is drawn with the factor of k_phi, so that the modulus under every sole keeps its
+ * sign. Ground that does not bear the robot's feet is refused. */
+TEST(pressure_that_grows_with_the_sole) {
+    char folder[] = "/tmp/mild_soils_XXXXXX", path[64];
+    MildError error = {0};
+    MildMaterial soil;
+    TaskSoils soils;
+    Pool *pool = pool_create(1);
+    const double width = mild_sole_width(robot_rasters(robot)[0]);
+    assert_non_null(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/a.ini", folder);
+    assert_true(mild_material_preset("clay", &soil));
+    soil.k_c = -0.98 * width * soil.k_phi;
+    assert_int_equal(soil_write(&soil, NULL, path, &error), MILD_OK);
+    TaskDef def = def_of(path, MILD_MODEL_BEKKER);
+    assert_int_equal(task_soils_open(&def, robot, &soils, &error), MILD_OK);
+    TaskGrounds *grounds = task_grounds_create(&def, robot, 200, 3, pool, &error);
+    assert_non_null(grounds);
+    for (int i = 0; i < 200; i++) {
+        const MildMaterial *m = &grounds->ground[i].material;
+        assert_true(fabs(m->k_c / m->k_phi / (soil.k_c / soil.k_phi) - 1) < 1e-12);
+    }
+    soil.k_c = -1.02 * width * soil.k_phi;
+    assert_int_equal(soil_write(&soil, NULL, path, &error), MILD_OK);
+    check_bad_soils(path, MILD_MODEL_BEKKER, MILD_ERROR_RANGE,
+                    "randomize.presets a.ini ground.k_c ground.plate_width");
+    unlink(path);
+    rmdir(folder);
+    task_grounds_destroy(grounds);
+    pool_destroy(pool);
+}
+
 /* A soil of mild is matched to another model, as a preset is. */
 TEST(what_is_matched) {
     TaskDef def = def_of("grass", MILD_MODEL_BEKKER);
@@ -112,7 +144,7 @@ TEST(what_is_matched) {
     MildMaterial grass, wanted;
     Pool *pool = pool_create(1);
     def.randomize.preset_jitter = 0;
-    assert_int_equal(task_soils_open(&def, &soils, &error), MILD_OK);
+    assert_int_equal(task_soils_open(&def, robot, &soils, &error), MILD_OK);
     TaskGrounds *grounds = task_grounds_create(&def, robot, 5, 3, pool, &error);
     assert_true(mild_material_preset("grass", &grass));
     assert_int_equal(robot_match_model(robot, MILD_MODEL_BEKKER, &grass, &wanted, NULL), MILD_OK);

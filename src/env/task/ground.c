@@ -8,6 +8,7 @@
 
 #include "env/task/task.h"
 #include "ground/soil/soil.h"
+#include "ground/width.h"
 
 #define DRAW_TRIES 100 /* of a material that the model can match */
 #define RANDOM_USE_GROUNDS 0x47524e44u
@@ -31,6 +32,7 @@ static MildMaterial draw_preset(Random *r, const TaskDef *task) {
             mild_material_preset_name((int)random_index(r, (uint32_t)mild_material_preset_count())),
             &m);
     }
+    const MildMaterial own = m;
     double *const jittered[] = {&m.k_pen, &m.sigma_cone, &m.mu,     &m.c_d,
                                 &m.c_g,   &m.k_drift,    &m.b_drift};
     for (size_t i = 0; i < sizeof jittered / sizeof *jittered; i++) {
@@ -39,6 +41,9 @@ static MildMaterial draw_preset(Random *r, const TaskDef *task) {
     double *const others[] = {&m.k_c, &m.k_phi, &m.cohesion, &m.zeta};
     for (size_t i = 0; m.model != MILD_MODEL_MILD && i < sizeof others / sizeof *others; i++) {
         *others[i] *= spread_of(r, def);
+    }
+    if (own.k_c < 0) { /* one factor for both, or their sum might be below 0 under a sole */
+        m.k_c = own.k_c * m.k_phi / own.k_phi;
     }
     return m;
 }
@@ -222,7 +227,21 @@ static MildStatus soil_open(const TaskDef *def, const char *name, MildMaterial *
                      mild_model_names[soil->model], mild_model_names[soil->model]);
 }
 
-MildStatus task_soils_open(TaskDef *def, TaskSoils *soils, MildError *error) {
+/* A ground meets the feet of the robot. */
+static MildStatus soil_meet(const char *name, const MildMaterial *soil, const Robot *robot,
+                            MildError *error) {
+    MildStatus status = MILD_OK;
+    for (int f = 0; f < robot_feet(robot) && status == MILD_OK; f++) {
+        MildError cause = {0};
+        status = width_check(soil, mild_sole_width(robot_rasters(robot)[f]), &cause);
+        if (status != MILD_OK) {
+            mild_fail(error, status, "randomize.presets: %.150s: %s", name, cause.text);
+        }
+    }
+    return status;
+}
+
+MildStatus task_soils_open(TaskDef *def, const Robot *robot, TaskSoils *soils, MildError *error) {
     char name[TASK_TEXT_SIZE];
     const char *rest = def->randomize.presets;
     MildStatus status = MILD_OK;
@@ -235,7 +254,10 @@ MildStatus task_soils_open(TaskDef *def, TaskSoils *soils, MildError *error) {
             return mild_fail(error, MILD_ERROR_RANGE, "randomize.presets: more than %d grounds",
                              (int)TASK_SOILS_MAX);
         }
-        status = soil_open(def, name + strspn(name, " "), &soils->soil[soils->count++], error);
+        const char *own = name + strspn(name, " ");
+        MildMaterial *soil = &soils->soil[soils->count++];
+        status = soil_open(def, own, soil, error);
+        status = status == MILD_OK ? soil_meet(own, soil, robot, error) : status;
         rest += length + (rest[length] == ',');
     }
     return status;

@@ -20,8 +20,8 @@ typedef struct TaskSoils {
 
 /* Reads the presets and files that randomize.presets names, if any, and sets def->soils to them. A
  * ground of another model than mild must be one of randomize.model, because only mild's are matched
- * to other models. */
-MildStatus task_soils_open(TaskDef *def, TaskSoils *soils, MildError *error);
+ * to other models; and it must bear the robot's feet (ground/width.h). */
+MildStatus task_soils_open(TaskDef *def, const Robot *robot, TaskSoils *soils, MildError *error);
 
 struct TaskGrounds {
     int count;

@@ -2,6 +2,7 @@
 #include "device/device.h"
 #include "ground/batch/contact_shapes.h"
 #include "ground/inside.h"
+#include "ground/width.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -198,8 +199,14 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
         return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
     }
     for (int i = 0; i < count * feet && status == MILD_OK; i++) {
-        status = material_numbers(&materials[i / feet], batch->pitch[i % feet],
-                                  batch->width[i % feet], i / feet, &numbers[i], error);
+        const MildMaterial *material = &materials[i / feet];
+        const double width = batch->width[i % feet];
+        MildError cause = {0};
+        status =
+            material_numbers(material, batch->pitch[i % feet], width, i / feet, &numbers[i], error);
+        if (status == MILD_OK && width_check(material, width, &cause) != MILD_OK) {
+            status = mild_fail(error, cause.status, "batch: material %d: %s", i / feet, cause.text);
+        }
         curves |= status == MILD_OK ? numbers[i].curves : 0;
     }
     memset(numbers + count * feet, 0xff, (size_t)feet * sizeof *numbers); /* not a number */

@@ -25,7 +25,7 @@ MildStatus train_envs_open(TrainEnvs *envs, ExperimentDef *def, const Robot *rob
     }
     def->task.map = envs->map;
     def->task.imprint_tiles = terrain_imprint_tiles(&def->terrain);
-    if (task_soils_open(&def->task, &envs->soils, error) != MILD_OK) {
+    if (task_soils_open(&def->task, robot, &envs->soils, error) != MILD_OK) {
         return error->status;
     }
     if (actuator_open(&def->task, robot, &envs->actuator, error) != MILD_OK) {
