@@ -1,6 +1,6 @@
 """mjlab's velocity tasks of Go1 and G1 on soft ground (mild.mjlab): trains them by mjlab's runner for some minutes, and walks on other grounds.
 python mjlab_soft.py [Go1|G1] --grounds foam45,sand_loose --envs 4096 --minutes 4; --stand 6 needs no training.
-Several GPUs, a process and --envs robots each: torchrun --standalone --nproc_per_node 4 mjlab_soft.py G1 --levels"""
+Several GPUs, a process and --envs robots each: torchrun --standalone --nproc_per_node 4 mjlab_soft.py G1"""
 import argparse
 import dataclasses
 import os
@@ -10,11 +10,10 @@ import numpy as np
 import torch
 import warp as wp
 from mjlab.envs import ManagerBasedRlEnv
-from mjlab.managers.curriculum_manager import CurriculumTermCfg
 from mjlab.rl import RslRlVecEnvWrapper
 from mjlab.tasks.registry import load_rl_cfg, load_runner_cls
 
-from mild.mjlab import ROBOTS, config_of
+from mild.mjlab import GROUNDS, ROBOTS, config_of
 
 
 def stand(env, ground, seconds):
@@ -58,22 +57,6 @@ def walk(robot, policy, grounds, speed, device, seconds=10):
         print(f"{ground:>12s} {speed:.2f} m/s: {int(good.sum())} of {int(here.sum())} walk, at {mean[here].mean():.3f} m/s", flush=True)
 
 
-def ground_levels(env, env_ids, count, pushes):
-    """A curriculum as mjlab's of terrains. A robot begins on the first of `count` grounds; 8 s on its feet bring it to the next one, a fall within
-    1.5 s back, and beyond the last one it stands on any. Pushes grow from nothing to `pushes` as the mean level does to `count`. Returns that mean."""
-    soft, now, ids = env.soft_ground, env.common_step_counter, slice(None) if env_ids is None else env_ids
-    if not hasattr(soft, "level"):
-        soft.level, soft.began = torch.zeros_like(soft.material), torch.zeros(env.num_envs, dtype=torch.long, device=env.device)
-    lasted = (now - soft.began[ids]) * env.step_dt
-    level = (soft.level[ids] + (lasted > 8).int() - (lasted < 1.5).int()).clamp(0, count)
-    soft.level[ids], soft.began[ids] = level, now
-    soft.material[ids] = torch.where(level < count, level, torch.randint_like(level, count))
-    mean = soft.level.float().mean()
-    share, push = float(mean) / count, env.event_manager.get_term_cfg("push_robot").params["velocity_range"]
-    push.update({axis: (share * low, share * high) for axis, (low, high) in pushes.items()})
-    return mean
-
-
 def progress(env, grounds, iteration):
     """How far the robots are from the commanded velocity, by ground, as a share of it: 1 if all stand."""
     asked, has = env.command_manager.get_command("twist")[:, :2], env.scene["robot"].data.root_link_lin_vel_b[:, :2]
@@ -99,7 +82,7 @@ def thaw(model):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("robot", nargs="?", default="Go1", choices=ROBOTS)
-    parser.add_argument("--grounds", default="rubber,foam45,grass,sand_dense,sand_loose", type=lambda text: text.split(","))
+    parser.add_argument("--grounds", default=",".join(GROUNDS), type=lambda text: text.split(","))
     parser.add_argument("--test", default="foam60,foam45,sand_dense,sand_loose", type=lambda text: text.split(","), help="walked on")
     parser.add_argument("--speed", type=float, default=0.6)
     parser.add_argument("--envs", type=int, default=4096)
@@ -107,25 +90,18 @@ if __name__ == "__main__":
     parser.add_argument("--load", help="a model_N.pt to go on with")
     parser.add_argument("--out", default="runs/mjlab")
     parser.add_argument("--stand", type=float, default=0, help="seconds")
-    parser.add_argument("--levels", action="store_true", help="begin on the first ground without pushes, the next one after 8 s on one's feet")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--rollout", type=int, default=24, help="steps of each robot between two updates")
-    parser.add_argument("--kl", type=float, default=0.01, help="wanted KL divergence of an update, by which the learning rate follows")
     parser.add_argument("--device", default=f"cuda:{os.environ.get('LOCAL_RANK', 0)}" if torch.cuda.is_available() else "cpu")
     given = parser.parse_args()
     config, task = config_of(given.robot, grounds=given.grounds), f"Mjlab-Velocity-Soft-Unitree-{given.robot}"
     config.scene.num_envs, config.seed = given.envs, given.seed + int(os.environ.get("RANK", 0))
-    if given.levels:
-        levels = {"count": len(given.grounds), "pushes": dict(config.events["push_robot"].params["velocity_range"])}
-        config.curriculum["ground_levels"] = CurriculumTermCfg(func=ground_levels, params=levels)
     if given.stand:
-        config.events.pop("push_robot"), config.events.pop("base_com"), config.terminations.clear()
+        config.events.pop("push_robot"), config.events.pop("base_com"), config.terminations.clear(), config.curriculum.clear()
     env = ManagerBasedRlEnv(config, given.device)
     if given.stand:
         stand(env, given.grounds[0], given.stand)
         raise SystemExit
-    agent = dataclasses.asdict(load_rl_cfg(task)) | {"logger": "tensorboard", "save_interval": 10**6, "num_steps_per_env": given.rollout}
-    agent["algorithm"]["desired_kl"] = given.kl
+    agent = dataclasses.asdict(load_rl_cfg(task)) | {"logger": "tensorboard", "save_interval": 10**6}
     runner = load_runner_cls(task)(RslRlVecEnvWrapper(env), agent, given.out, given.device)
     if given.load:
         runner.load(given.load)

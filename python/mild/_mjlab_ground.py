@@ -19,7 +19,7 @@ class SoftGround:
     def __init__(self, env, grounds, feet, soles, entity="robot", sensor="feet_ground_contact", heights=None):
         """feet: names of sites, in the order of `sensor` and `heights`; soles have the frames of their bodies. soles: a regular
         expression of the geoms that they stand on."""
-        self.env, self.sim, model = env, env.sim, env.sim.mj_model
+        self.env, self.sim, model, self.grounds = env, env.sim, env.sim.mj_model, tuple(grounds)
         self.sites = [site_of(model, f"{entity}/{name}") for name in feet]
         self.ground = Ground(model, self.sim.wp_model, self.sim.wp_data, [model.body(model.site_bodyid[site]).name for site in self.sites],
                              list(grounds), soles=f"{re.escape(entity)}/(?:{soles})", exclude=False, timestep=env.physics_dt)

@@ -2,7 +2,6 @@
 import os
 import pathlib
 import re
-import runpy
 import subprocess
 import sys
 import tempfile
@@ -16,8 +15,7 @@ import numpy as np  # noqa: E402
 import torch  # noqa: E402
 import warp as wp  # noqa: E402
 from mjlab.envs import ManagerBasedRlEnv  # noqa: E402
-from mjlab.managers.curriculum_manager import CurriculumTermCfg  # noqa: E402
-from mjlab.tasks.registry import list_tasks, load_env_cfg  # noqa: E402
+from mjlab.tasks.registry import list_tasks, load_env_cfg, load_rl_cfg  # noqa: E402
 
 import mild  # noqa: E402
 import mild.mjlab as ours  # noqa: E402
@@ -79,11 +77,12 @@ class Tasks(unittest.TestCase):
         env.close()
 
     def test_levels(self):
-        """The example's curriculum: all begin on the first ground, unpushed; who stays up goes on, who falls at once goes back."""
+        """The G1's curriculum: all begin on the first ground, unpushed; who stays up goes on, who falls at once goes back."""
         def change(config):
-            config.events["push_robot"] = load_env_cfg("Mjlab-Velocity-Soft-Unitree-Go1").events["push_robot"]
-            config.curriculum["ground_levels"] = CurriculumTermCfg(func=runpy.run_path(str(EXAMPLE))["ground_levels"],
-                                                                   params={"count": 2, "pushes": {"x": (-0.5, 0.5)}})
+            walks = load_env_cfg("Mjlab-Velocity-Soft-Unitree-G1")
+            config.events["push_robot"] = walks.events["push_robot"]
+            config.events["push_robot"].params["velocity_range"] = {"x": (-0.5, 0.5)}
+            config.curriculum["ground_levels"] = walks.curriculum["ground_levels"]
 
         env = standing("Go1", ["rubber", "sand_loose"], 2, change)
         soft, push, second = env.soft_ground, env.event_manager.get_term_cfg("push_robot").params["velocity_range"], torch.tensor([1])
@@ -92,11 +91,14 @@ class Tasks(unittest.TestCase):
             env.common_step_counter += round(8.1 / env.step_dt)
             env.curriculum_manager.compute(env_ids=second)
             self.assertEqual(soft.level.tolist(), [0, level])
-            self.assertEqual((soft.material[0], push["x"]), (0, (-0.25 * level, 0.25 * level)))
+            self.assertEqual((soft.material[0], push["x"]), (0, (-0.125 * level, 0.125 * level)))
         self.assertIn(soft.material[1], (0, 1))
         env.curriculum_manager.compute(env_ids=second)
         self.assertEqual((soft.level.tolist(), soft.material.tolist()), ([0, 1], [0, 1]))
         env.close()
+        learns = [load_rl_cfg(f"Mjlab-Velocity-Soft-Unitree-{robot}") for robot in ("Go1", "G1")]
+        self.assertEqual([(agent.algorithm.desired_kl, agent.num_steps_per_env) for agent in learns], [(0.01, 24), (0.02, 16)])
+        self.assertNotIn("ground_levels", load_env_cfg("Mjlab-Velocity-Soft-Unitree-Go1").curriculum)
 
     def test_stand(self):
         """A robot that stands sinks as deep as its weight, on round feet and on soles of capsules."""
