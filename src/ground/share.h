@@ -90,9 +90,8 @@ MILD_HD Real share_ahead(const Element *e, const Share *share, Real level, const
     const Real force = share_force(e, q) - e->unload_stiffness * (e->yield_depth - e->depth);
     const Real into = real_max(n[0] * vx + n[1] * vy, 0);
     const Real way = REAL_SQRT(vx * vx + vy * vy) + SHARE_REST;
-    return share->slip_rate > 0
-               ? real_max(force, 0) * into / (real_max(-n[2], SHARE_STEEP) * way)
-               : 0;
+    return share->slip_rate > 0 ? real_max(force, 0) * into / (real_max(-n[2], SHARE_STEEP) * way)
+                                : 0;
 }
 
 /* Sets lean and carry, and with them the unloading line and friction, after element_begin: the
