@@ -42,7 +42,7 @@ MILD_HD void slot_carry(Slots *s, int i, double dt, double rate) {
     Element element = slot_element(s, i);
     element.law.cone_begin = s->cone_begin[i];
     Share share = slot_share(s, i);
-    element_share(&element, &memory, &share, s->fx[i], dt, rate, share.lean);
+    element_share(&element, &memory, &share, s->fx[i], dt, rate, share.lean, s->ahead[i]);
     s->mu[i] = element.mu;
     s->drift_bound[i] = element.drift_bound;
     s->lean[i] = share.lean;
@@ -53,10 +53,10 @@ MILD_HD void slot_carry(Slots *s, int i, double dt, double rate) {
     s->hold_stiffness[i] = element.hold_stiffness;
 }
 
-void foot_carry(const FootScratch *foot, double dt) {
+void foot_carry(const FootScratch *foot, const Motion *now, double dt) {
     slots_elastic(foot);
     if (foot->faces) {
-        faces_lean(foot);
+        faces_lean(foot, now);
     } else {
         slots_lean(foot);
     }

@@ -15,7 +15,22 @@ static RimPoint point_of(const FootScratch *foot, int i) {
                       rim_depth(s->depth[l], s->depth_max[l]), foot->share[e] / foot->area[e]};
 }
 
-void faces_lean(const FootScratch *foot) {
+/* [N] share_ahead of slot i, whose law is `element`. down: downward part of its outward normal. */
+static double ahead_of(const FootScratch *foot, int i, const Element *element, const Motion *now,
+                       double down) {
+    const Slots *s = slot_block(foot, i);
+    const int e = foot->element[i], l = i % SLOT_LANES;
+    const SlotVelocity v = slot_velocity(s, l, now, SLOT_UNEVEN | SLOT_FACES);
+    const Share share = slot_share(s, l);
+    double n[3] = {0.0, 0.0, -down};
+    for (int k = 0; k < 3; k++) {
+        n[0] += foot->face[k][e] * foot->arm[k + 1][0];
+        n[1] += foot->face[k][e] * foot->arm[k + 1][1];
+    }
+    return share_ahead(element, &share, s->lean[l], n, v.x, v.y);
+}
+
+void faces_lean(const FootScratch *foot, const Motion *now) {
     double sums[RIM_SUMS] = {0.0};
     for (int i = 0; i < foot->active; i++) {
         const RimPoint at = point_of(foot, i);
@@ -32,5 +47,6 @@ void faces_lean(const FootScratch *foot) {
         const double level = rim_level(&rim, &element.law, foot->heap->width, s->recovery[l], at.x,
                                        at.y, at.u, at.down);
         s->lean[l] = s->projects[l] > 0.0 && at.u > 0.0 ? level : 1.0;
+        s->ahead[l] = ahead_of(foot, i, &element, now, at.down);
     }
 }

@@ -4,8 +4,8 @@
 
 #include "ground/scratch.h"
 
-/* What the rim leaves of the load of each slot of a surface, into `lean`. On ground with
- * LAW_HEAP. */
-void faces_lean(const FootScratch *foot);
+/* What the rim leaves of the load of each slot of a surface, into `lean`, and the ground ahead of
+ * it, into `ahead`. On ground with LAW_HEAP. */
+void faces_lean(const FootScratch *foot, const Motion *now);
 
 #endif

@@ -70,6 +70,7 @@ static void slot_set_law(Slots *s, int i, const SlotLaw *from) {
     s->growth[i] = share->growth;
     s->side[i] = share->side;
     s->whole_mu[i] = share->mu;
+    s->ahead[i] = 0.0;
     s->carry[i] = 1.0;
     s->exit_drag[i] = law_exit_drag(&from->law);
     s->entry_drag[i] = law_entry_drag(&from->law);

@@ -139,7 +139,7 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     Motion free = foot_motion(foot, input->free_velocity + 6 * f);
     foot_begin(foot, input->dt, &now);
     if (foot->curves & LAW_HEAP) {
-        foot_carry(foot, input->dt);
+        foot_carry(foot, &now, input->dt);
     }
     if (foot->stops) {
         slots_clear(foot);

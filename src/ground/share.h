@@ -23,6 +23,12 @@
  * Summed over a sole that is W u^2/2 of it times its length by its width, near the mean over all
  * directions of its width (SHARE_PASSIVE).
  *
+ * A surface has walls of its own. A face presses along its normal n; the law has the vertical part
+ * of that, F. Where the face moves into the ground the horizontal part of it resists, too:
+ *
+ *     H <= mu F + F (n_x v_x + n_y v_y)/(-n_z |v|)     mu F alone where it moves out of the ground
+ * No number is new. It fades out at rest, and F is that of the depth before the step.
+ *
  * The share is held in a step. It scales virgin ground; the unloading stiffness k stays that of the
  * whole load, so the element yields at q F_g(a) and the line ends at a - q F_g(a)/k.
  *
@@ -41,6 +47,8 @@
 #define SHARE_YIELD REAL(5.8284271247461903) /* 3 + sqrt 8 */
 #define SHARE_PASSIVE 3.0                    /* [-] K_p of ground with 30 degrees of friction */
 #define SHARE_GRAVITY 9.81                   /* [m/s^2] */
+#define SHARE_REST REAL(1e-3)                /* [m/s] where a face has no way to plough on */
+#define SHARE_STEEP REAL(0.17364817766693)   /* cosine of 80 degrees; steeper faces carry nothing */
 #define SHARE_FORGET REAL(40)                /* [-] da/u0 beyond which nothing is left */
 #define SHARE_LEAST REAL(1e-6)               /* [-] least share */
 #ifdef MILD_REAL_FLOAT
@@ -68,17 +76,34 @@ MILD_HD Real share_lean(const Share *share, Real level) {
     return 1 - share->projects * (1 - level);
 }
 
+/* [N] Yield load at the share q. The firm bed is not worn. */
+MILD_HD Real share_force(const Element *e, Real q) {
+    const Real bed = law_bed_force(&e->law, e->yield_depth);
+    return q * (e->unload_stiffness * (e->yield_depth - e->zero_depth) - bed) + bed;
+}
+
+/* [N] What resists ploughing, of a face with the outward normal n and the velocity v, world, after
+ * element_begin. level: c. */
+MILD_HD Real share_ahead(const Element *e, const Share *share, Real level, const Real n[3], Real vx,
+                         Real vy) {
+    const Real q = real_min(1 - share->worn, level);
+    const Real force = share_force(e, q) - e->unload_stiffness * (e->yield_depth - e->depth);
+    const Real into = real_max(n[0] * vx + n[1] * vy, 0);
+    const Real way = REAL_SQRT(vx * vx + vy * vy) + SHARE_REST;
+    return share->slip_rate > 0 ? real_max(force, 0) * into / (real_max(-n[2], SHARE_STEEP) * way)
+                                : 0;
+}
+
 /* Sets lean and carry, and with them the unloading line and friction, after element_begin: the
  * line says the whole force at the yield depth. elastic: [N] force of ground without memory. level:
- * cosine between sole and ground. */
+ * cosine between sole and ground. ahead: [N] share_ahead of a face, 0 of a sole. */
 MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, Real elastic,
-                           Real dt, Real rate, Real level) {
+                           Real dt, Real rate, Real level, Real ahead) {
     const Real a = e->yield_depth;
     const Real k = e->unload_stiffness;
     const Real c = share_lean(share, level);
     const Real q = real_min(1 - share->worn, c);
-    const Real bed = law_bed_force(&e->law, a);
-    const Real force = q * (k * (a - e->zero_depth) - bed) + bed;
+    const Real force = share_force(e, q);
     const Real lost = 1 - q / c;
     const Real grips = real_max(SHARE_YIELD * share->grip * lost / (1 + lost), SHARE_GRIP);
     const Real held = real_min(share->mu, grips);
@@ -90,10 +115,11 @@ MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share
     const Real strikes = drag * way * h * rate;
     const Real moves = strikes / (strikes + force + ELEMENT_TINY);
     const Real mu = share->grip > 0 ? held + (share->mu - held) * moves : share->mu;
-    const int changes = q < 1 || mu != e->mu || share->side > 0;
+    const Real sides = share->side * e->depth * real_max(e->depth, 0) + ahead;
+    const int changes = q < 1 || mu != e->mu || sides > 0;
     share->lean = c;
     share->carry = q;
-    e->drift_bound += dt * share->side * e->depth * real_max(e->depth, 0);
+    e->drift_bound += dt * sides;
     Element still = *e;
     still.mu = mu;
     friction_hold(&still, memory, dt, rate, force + elastic);

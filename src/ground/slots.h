@@ -72,6 +72,9 @@ typedef struct {
     Lanes side;        /* [N/m^2] */
     Lanes whole_mu;    /* [-] Share.mu, of which `mu` is what is left in this step */
 
+    /* Of a surface on ground with LAW_HEAP: faces_lean. Otherwise 0. */
+    Lanes ahead; /* [N] share_ahead */
+
     /* Share of this step: foot_carry; without LAW_HEAP carry is 1. */
     Lanes lean;  /* [-] */
     Lanes carry; /* [-] */

@@ -271,7 +271,7 @@ static double rim_share(const DenseElement *e, const Find *find) {
 
 /* The share of virgin ground that it carries: the line keeps its slope and ends deeper. up: normal
  * of the sole's upper face. */
-static void dense_share(double dt, DenseElement *e, const Find *find) {
+static void dense_share(double dt, DenseElement *e, const Find *find, const double now[4]) {
     DenseLaw *law = &e->law;
     const double *g = find->slope, a = e->deep;
     double level = (-find->normal[2] + g[0] * find->normal[0] + g[1] * find->normal[1]) /
@@ -291,6 +291,12 @@ static void dense_share(double dt, DenseElement *e, const Find *find) {
     }
     double side = find->faces ? 0.0 : 1.5 * law->weight * find->pitch * find->pitch / find->width;
     e->radius += dt * side * e->u0 * fmax(e->u0, 0.0);
+    if (find->faces && law->slip > 0.0) { /* what is ahead of a face pushes along its normal */
+        const double *n = find->normal, pressed = q * soil + bed - e->line * (a - e->u0),
+                     steep = fmax(-n[2], sin(10.0 / 45.0 * atan(1.0))),
+                     ahead = fmax(n[0] * now[0] + n[1] * now[1], 0.0) / steep;
+        e->radius += dt * fmax(pressed, 0.0) * ahead / (hypot(now[0], now[1]) + 1e-3);
+    }
     e->slack = e->line > 0.0 ? a - (q * soil + bed) / e->line : a;
     law->k_pen *= q;
     law->kappa *= q;
@@ -368,7 +374,7 @@ static void dense_element(Dense *d, const Find *find) {
             fmin(e->law.drag_rate, 0.0) * moved_rate(&e->law, e->deep) * d->dt * e->w0 * e->w0;
     }
     element_line(e);
-    dense_share(d->dt, e, find);
+    dense_share(d->dt, e, find, now);
     dense_drag(d->dt, e, e->free[3] - now[3]);
     if (directed) {
         dense_resist(d->dt, e, nearer->model, find->normal, now, now[3]);

@@ -236,6 +236,51 @@ static double rolled(int number, double *scale) {
     return given;
 }
 
+/* [-] What resists over what carries a face that leans by 0.3 along x, 8 mm deep, and slides with
+ * that speed [m/s]. */
+static double resists(const MildMaterial *m, MildSole *face, double speed) {
+    Kit kit;
+    kit_open(&kit, 1, face, NULL, m, 1e-3);
+    const double c = cos(0.3), s = sin(0.3), down[6] = {0, 0, -0.02, 0, 0, 0};
+    const double R[9] = {c, 0, s, 0, 1, 0, -s, 0, c}, along[6] = {speed, 0, 0, 0, 0, 0};
+    double last[6] = {0, 0, -0.02, 0, 0, 0};
+    memcpy(kit.input.rotation[0], R, sizeof R);
+    kit.input.position[0][2] = -KIT_SOLE_Z * c;
+    for (int i = 0; i < 800; i++) {
+        kit_led(&kit, last, i < 400 ? down : along);
+        kit.input.position[0][0] += i < 400 ? 0.0 : 1e-3 * speed;
+        kit.input.position[0][2] -= i < 400 ? 2e-5 : 0.0;
+    }
+    const double *force = kit.result.foot[0].force;
+    const double share = -force[0] / force[2] * (speed > 0 ? 1 : -1);
+    kit_close(&kit);
+    return share;
+}
+
+/* A face that moves into the ground is resisted by the tangent of its lean besides friction, and one
+ * that moves out of it is not (share.h). At 1 mm/s half of that is left. */
+TEST(test_ploughs) {
+    MildMaterial m = grains();
+    Plate36 plate;
+    const MildShape shape = surface_plate(5, 3, KIT_SOLE_Z, &plate);
+    MildSole *face = surface_make(&shape, 1, KIT_PITCH);
+    for (int merged = 0; merged < 2; merged++) {
+        m.model = merged ? MILD_MODEL_MILD_MERGED : MILD_MODEL_MILD;
+        m.mu = 0.2;
+        m.slip_length = 0.0;
+        const double without = resists(&m, face, -0.1);
+        m.slip_length = 0.05;
+        const double into = resists(&m, face, -0.1), out = resists(&m, face, 0.1);
+        const double slow = resists(&m, face, -1e-3);
+        print_message("%s: into the ground %.5f, slowly %.5f, out of it %.5f; without slip %.5f\n",
+                      mild_model_names[m.model], into, slow, out, without);
+        assert_true(fabs(out - 0.2) < 1e-6 && fabs(without - 0.2) < 1e-6);
+        assert_true(fabs(into - 0.2 - tan(0.3) * 0.1 / 0.101) < 1e-3 * into);
+        assert_true(fabs(slow - 0.2 - tan(0.3) / 2) < 1e-3 * slow);
+    }
+    mild_sole_destroy(face);
+}
+
 static int rolled_count = 200, rolled_first;
 
 TEST(test_rolled) {

@@ -401,8 +401,15 @@ MILD_HD void bodies_carry(const BodiesSetup *setup, const BodiesWork *work, int 
     const Real worn = memory->element[CONTACT_WORN * memory->next + s];
     const Real elastic = law_elastic_force(&own->element.law, own->curves, own->element.middle);
     own->carried = contact_share(material, !sole->face, worn);
+    Real ahead = 0;
+    if (sole->face) {
+        const ContactVelocity now = bodies_velocity(own, work->velocity[i]);
+        Real normal[3];
+        bodies_normal(sole, work->rotation[i], s, normal);
+        ahead = share_ahead(&own->element, &own->carried, lean, normal, now.x, now.y);
+    }
     element_share(&own->element, &own->before, &own->carried, elastic, setup->dt, 1 / setup->dt,
-                  lean);
+                  lean, ahead);
     element_carry(&own->element, own->carried.carry);
 }
 
