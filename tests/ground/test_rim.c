@@ -257,7 +257,7 @@ static double resists(const MildMaterial *m, MildSole *face, double speed) {
     return share;
 }
 
-/* A face that moves into the ground is resisted by the tangent of its lean besides friction, and one
+/* A face that moves into the ground is resisted by the tangent of its lean besides friction, one
  * that moves out of it is not (share.h). At 1 mm/s half of that is left. */
 TEST(test_ploughs) {
     MildMaterial m = grains();
