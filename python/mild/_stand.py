@@ -6,7 +6,7 @@ import re
 import numpy as np
 
 from .describe import by_joint, choose
-from .spec import MOST, attach, floors
+from .spec import MOST, attach, floors, planes
 
 SOLE = 0.01  # [m] shapes within this of the lowest point of a foot are its sole, as in the plugin
 COLORS = {"sandy_loam": (0.55, 0.43, 0.30), "sand": (0.80, 0.68, 0.48), "dry_sand": (0.80, 0.68, 0.48), "grass": (0.42, 0.55, 0.30),
@@ -131,7 +131,7 @@ def _world(model, description, ground, painted):
     if description.policy["integrator"]:
         spec.option.integrator = getattr(mujoco.mjtIntegrator, "mjINT_" + description.policy["integrator"].upper())
     remark = "; ".join(filter(None, (remark, _clear(spec))))
-    if not any(geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in spec.worldbody.geoms):
+    if not planes(spec):
         spec.worldbody.add_geom(name="floor_of_trial", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], rgba=[0.6, 0.6, 0.6, 1])
     if painted:
         _paint(spec, ground)
@@ -204,9 +204,8 @@ def _paint(spec, ground):
                                width=256, height=256, rgb1=color, rgb2=0.93 * color)
     paint = spec.add_material(name="floor_of_trial", texrepeat=[2, 2], texuniform=True, reflectance=0, specular=0)
     paint.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = squares.name
-    for geom in spec.worldbody.geoms:
-        if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
-            geom.material, geom.rgba = paint.name, [1, 1, 1, 1]
+    for geom in planes(spec):
+        geom.material, geom.rgba = paint.name, [1, 1, 1, 1]
     for texture in list(spec.textures):
         if texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
             spec.delete(texture)

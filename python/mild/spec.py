@@ -83,14 +83,18 @@ def floors(spec):
     return names
 
 
-def hide_planes(spec):
-    """Planes of the ground are not drawn; uneven ground has height fields, which hide nothing."""
+def planes(spec):
+    """The planes of the ground, which are the world body's or those of bodies fixed in it."""
     import mujoco
 
-    for body in [spec.worldbody, *(spec.body(name) for name in floors(spec) - {spec.worldbody.name})]:
-        for geom in body.geoms:
-            if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
-                geom.rgba, geom.material = [0.5, 0.5, 0.5, 0], ""
+    bodies = [spec.worldbody, *(spec.body(name) for name in sorted(floors(spec) - {spec.worldbody.name}))]
+    return [geom for body in bodies for geom in body.geoms if geom.type == mujoco.mjtGeom.mjGEOM_PLANE]
+
+
+def hide_planes(spec):
+    """Planes of the ground are not drawn; uneven ground has height fields, which hide nothing."""
+    for geom in planes(spec):
+        geom.rgba, geom.material = [0.5, 0.5, 0.5, 0], ""
 
 
 def exclude_world(spec, names):

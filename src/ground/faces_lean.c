@@ -27,7 +27,7 @@ static double ahead_of(const FootScratch *foot, int i, const Element *element, c
         n[0] += foot->face[k][e] * foot->arm[k + 1][0];
         n[1] += foot->face[k][e] * foot->arm[k + 1][1];
     }
-    return share_ahead(element, &share, s->lean[l], n, v.x, v.y);
+    return share_ahead(element, &share, s->lean[l], n, v.x, v.y, v.descent);
 }
 
 void faces_lean(const FootScratch *foot, const Motion *now) {

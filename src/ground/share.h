@@ -26,8 +26,10 @@
  * A surface has walls of its own. A face presses along its normal n; the law has the vertical part
  * of that, F. Where the face moves into the ground the horizontal part of it resists, too:
  *
- *     H <= mu F + F (n_x v_x + n_y v_y)/(-n_z |v|)     mu F alone where it moves out of the ground
- * No number is new. It fades out at rest, and F is that of the depth before the step.
+ *     H <= mu F + F (n_x v_x + n_y v_y)/(-n_z (|v| + w))     mu F alone where it moves out
+ * with the level velocity v and the descent w >= 0, whose work F does already: a wheel that rolls
+ * turns its faces into the ground from above. It fades out at rest. F is that of the depth before
+ * the step.
  *
  * The share is held in a step. It scales virgin ground; the unloading stiffness k stays that of the
  * whole load, so the element yields at q F_g(a) and the line ends at a - q F_g(a)/k.
@@ -83,13 +85,13 @@ MILD_HD Real share_force(const Element *e, Real q) {
 }
 
 /* [N] What resists ploughing, of a face with the outward normal n and the velocity v, world, after
- * element_begin. level: c. */
+ * element_begin. level: as there. descent: [m/s] speed at which its depth grows. */
 MILD_HD Real share_ahead(const Element *e, const Share *share, Real level, const Real n[3], Real vx,
-                         Real vy) {
-    const Real q = real_min(1 - share->worn, level);
+                         Real vy, Real descent) {
+    const Real q = real_min(1 - share->worn, share_lean(share, level));
     const Real force = share_force(e, q) - e->unload_stiffness * (e->yield_depth - e->depth);
     const Real into = real_max(n[0] * vx + n[1] * vy, 0);
-    const Real way = REAL_SQRT(vx * vx + vy * vy) + SHARE_REST;
+    const Real way = REAL_SQRT(vx * vx + vy * vy) + real_max(descent, 0) + SHARE_REST;
     return share->slip_rate > 0 ? real_max(force, 0) * into / (real_max(-n[2], SHARE_STEEP) * way)
                                 : 0;
 }

@@ -381,7 +381,7 @@ static MildMap *open_place(Kit *kit, const Place *place, uint64_t *random) {
         kit->terrain.materials[m] = draw_material(m == 1 ? place->other : 0, random);
         kit->terrain.material_count = m + 1;
     }
-    kit->input.tolerance = 1e-11;
+    kit->input.tolerance = 1e-12;
     throw_bodies(kit, random);
     return map;
 }
@@ -412,7 +412,7 @@ TEST(double_text_is_the_ground) {
     for (int i = 0; i < PLACES; i++) {
         static Worst worst;
         memset(&worst, 0, sizeof worst);
-        run_place(&places[i], kit_draws(6), 1e-11, bodies_double, 1, &worst);
+        run_place(&places[i], kit_draws(6), 1e-12, bodies_double, 1, &worst);
         worst_print(places[i].name, &worst);
         assert_true(worst.wrench < 1e-10 && worst.twist < 1e-10 && worst.foot < 1e-10);
         assert_true(worst.memory < 1e-7 && worst.loaded > worst.steps / 4);

@@ -295,7 +295,7 @@ static void dense_share(double dt, DenseElement *e, const Find *find, const doub
         const double *n = find->normal, pressed = q * soil + bed - e->line * (a - e->u0),
                      steep = fmax(-n[2], sin(10.0 / 45.0 * atan(1.0))),
                      ahead = fmax(n[0] * now[0] + n[1] * now[1], 0.0) / steep;
-        e->radius += dt * fmax(pressed, 0.0) * ahead / (hypot(now[0], now[1]) + 1e-3);
+        e->radius += dt * fmax(pressed, 0.0) * ahead / (hypot(now[0], now[1]) + e->w0 + 1e-3);
     }
     e->slack = e->line > 0.0 ? a - (q * soil + bed) / e->line : a;
     law->k_pen *= q;

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -470,6 +471,16 @@ class Trials(unittest.TestCase):
         self.assertEqual([walk.end for walk in fold.rows[0].walks], ["tilt", "tilt"])
         self.assertTrue(0.05 < fold.rows[0].falls[0] <= fold.rows[0].falls[1] < 2)
         self.assertIn("0 of 2", str(fold))
+
+    def test_own_floor(self):
+        """A floor that is a body in the world, as mjlab has it, is the only one, and has the ground's colour; without one a trial has its own."""
+        text = re.sub("<geom[^>]*plane[^>]*/>", "", biped())
+        own = text.replace("<worldbody>", '<worldbody><body name="terrain"><geom name="own" type="plane" size="0 0 1"/></body>')
+        for model, name in ((own, "own"), (text, "floor_of_trial")):
+            model = _stand.stand(model, Description(stander()), "rigid", {}, painted=True).model
+            floors = np.flatnonzero(model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE))
+            self.assertEqual([model.geom(floor).name for floor in floors], [name])
+            self.assertEqual(model.mat(model.geom_matid[floors[0]]).name, "floor_of_trial")
 
     def test_sunk_is_not_fallen(self):
         """A base 0.3 of its height above the ground stands on soles deep in it, and lies when they are as high as it."""

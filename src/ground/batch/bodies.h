@@ -406,7 +406,7 @@ MILD_HD void bodies_carry(const BodiesSetup *setup, const BodiesWork *work, int 
         const ContactVelocity now = bodies_velocity(own, work->velocity[i]);
         Real normal[3];
         bodies_normal(sole, work->rotation[i], s, normal);
-        ahead = share_ahead(&own->element, &own->carried, lean, normal, now.x, now.y);
+        ahead = share_ahead(&own->element, &own->carried, lean, normal, now.x, now.y, now.descent);
     }
     element_share(&own->element, &own->before, &own->carried, elastic, setup->dt, 1 / setup->dt,
                   lean, ahead);
