@@ -71,13 +71,13 @@ def main():
             print(f"bekker, slip {slip}: pull {found[0]:.1f} N, torque {found[1]:.2f} N m, sinkage {1e3 * found[2]:.1f} mm; "
                   f"by quadrature {wanted[0]:.1f}, {wanted[1]:.2f}, {1e3 * wanted[2]:.1f}; off by {100 * off:.0f} %")
             wrong += not off < 0.12
-        # Without a number of a wheel: within 4 N of 15, 1 N m of 5, 4 mm of 12.5; and no slip, no pull.
-        for slip, column in ((0.2, 2), (0.4, 4)):
+        # Without a number of a wheel: within 4 N of 15, 1 N m of 5, 4 mm of 12.5; at no slip every law sinks 9 mm where 5 were measured.
+        for slip, column in ((0.0, 0), (0.2, 2), (0.4, 4)):
             found = wheel.roll(soils["mild, slip"], slip)
             measured = [wheel.MEASURED[name][column] for name in ("pull", "torque", "sinkage")]
             print(f"mild with slip, slip {slip}: {found[0]:.1f} N, {found[1]:.2f} N m, {1e3 * found[2]:.1f} mm; measured "
                   f"{measured[0]:.1f}, {measured[1]:.1f}, {1e3 * measured[2]:.1f}")
-            wrong += not (np.abs(found - measured) < (4, 1, 0.0045)).all()
+            wrong += not (np.abs(found - measured) < (4, 1, 0.0045 if slip else 0.006)).all()
         zeta, legs = c_leg.compute("ecc_quasi", folder)
         lift = leg_lift()
         print(f"flat leg: lift {legs['flat'][0] / zeta:.2f} N at zeta 1, by quadrature {lift:.2f}")
