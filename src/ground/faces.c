@@ -6,9 +6,6 @@
 #include "ground/models.h"
 #include "ground/terrain.h"
 
-/* [-] Cosine of 80 degrees: an element whose normal is nearer to the horizontal carries nothing. */
-#define FACES_LEAST 0.17364817766693034
-
 const double faces_level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
 /* Depth and share of every element. */
@@ -25,7 +22,7 @@ static void faces_locate(FootScratch *foot, const MildTerrain *terrain) {
     for (int i = 0; i < foot->elements; i++) {
         const double down =
             -(ez * foot->face[0][i] + nz * foot->face[1][i] + tz * foot->face[2][i]);
-        foot->share[i] = down > FACES_LEAST ? down * foot->area[i] : 0.0;
+        foot->share[i] = down > SHARE_STEEP ? down * foot->area[i] : 0.0;
     }
     for (int i = foot->elements; i < foot->padded; i++) {
         foot->depth[i] = PADDING_DEPTH;

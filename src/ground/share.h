@@ -46,13 +46,13 @@
 
 #define SHARE_LEAN REAL(0.02) /* [-] least cosine: a sole on its edge */
 #define SHARE_GRIP REAL(0.1)  /* [-] friction that an element at its yield load keeps */
-#define SHARE_YIELD REAL(5.8284271247461903) /* 3 + sqrt 8 */
-#define SHARE_PASSIVE 3.0                    /* [-] K_p of ground with 30 degrees of friction */
-#define SHARE_GRAVITY 9.81                   /* [m/s^2] */
-#define SHARE_REST REAL(1e-3)                /* [m/s] where a face has no way to plough on */
-#define SHARE_STEEP REAL(0.17364817766693)   /* cosine of 80 degrees; steeper faces carry nothing */
-#define SHARE_FORGET REAL(40)                /* [-] da/u0 beyond which nothing is left */
-#define SHARE_LEAST REAL(1e-6)               /* [-] least share */
+#define SHARE_YIELD REAL(5.8284271247461903)  /* 3 + sqrt 8 */
+#define SHARE_PASSIVE 3.0                     /* [-] K_p of ground with 30 degrees of friction */
+#define SHARE_GRAVITY 9.81                    /* [m/s^2] */
+#define SHARE_REST REAL(1e-3)                 /* [m/s] below it ploughing fades out */
+#define SHARE_STEEP REAL(0.17364817766693034) /* [-] cosine of 80 degrees: no face beyond */
+#define SHARE_FORGET REAL(40)                 /* [-] da/u0 beyond which nothing is left */
+#define SHARE_LEAST REAL(1e-6)                /* [-] least share */
 #ifdef MILD_REAL_FLOAT
 #define SHARE_ROUND REAL(1e-3) /* [-] of the elastic travel: what rounding may take from it */
 #else

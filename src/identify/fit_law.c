@@ -43,7 +43,7 @@ double fit_modulus(const MildMaterial *material, double width) {
 }
 
 static double modulus(const MildMaterial *m) {
-    return m->k_c / m->plate_width + m->k_phi;
+    return fit_modulus(m, m->plate_width);
 }
 
 static void modulus_set(MildMaterial *m, double value) {

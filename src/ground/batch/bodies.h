@@ -16,12 +16,11 @@
 #define BODIES_ROWS (6 * BODIES_MAX)
 #define BODIES_ELEMENTS 1536 /* of all bodies */
 #define BODIES_ROUNDS (BODIES_ELEMENTS / LANES + BODIES_MAX)
-#define BODIES_SUMS 42                         /* of an evaluation: a wrench and a 6 x 6 hessian */
-#define BODIES_STEEP REAL(0.17364817766693034) /* [-] cosine of 80 degrees, as in faces.c */
-#define BODIES_MARGIN REAL(1e-3)               /* [m] as in locate.c */
-#define BODIES_EXTRA_SPEED REAL(2)             /* [m/s] as in locate.c */
-#define BODIES_GROWTH REAL(8)                  /* [-] as NEWTON_GROWTH in newton_step.c */
-#define BODIES_COLUMNS 8                       /* of a warp that are eliminated at once */
+#define BODIES_SUMS 42             /* of an evaluation: a wrench and a 6 x 6 hessian */
+#define BODIES_MARGIN REAL(1e-3)   /* [m] as in locate.c */
+#define BODIES_EXTRA_SPEED REAL(2) /* [m/s] as in locate.c */
+#define BODIES_GROWTH REAL(8)      /* [-] as NEWTON_GROWTH in newton_step.c */
+#define BODIES_COLUMNS 8           /* of a warp that are eliminated at once */
 
 /* The elements of a body. */
 typedef struct {
@@ -490,7 +489,7 @@ MILD_HD void bodies_locate(const BodiesSetup *setup, const BodiesWork *work, int
         Real normal[3];
         bodies_normal(sole, R, s, normal);
         own->down = -normal[2];
-        own->share = own->down > BODIES_STEEP ? own->down * sole->face[4 * sole->elements + s] : 0;
+        own->share = own->down > SHARE_STEEP ? own->down * sole->face[4 * sole->elements + s] : 0;
     }
     own->faces_down = own->share > 0;
     if (setup->has_map) {
