@@ -2,6 +2,7 @@
 `mild bench record` are the package's own (mild.trials, mild.repository)."""
 import importlib
 import os
+import signal
 import sys
 
 from . import _processor, repository
@@ -16,12 +17,24 @@ def environment():
     return variables
 
 
+def own(arguments):
+    """Runs a command of the package. Returns its exit code; 141, as the program does, when nobody reads its output any more: `mild trial --keys | head`."""
+    try:
+        try:
+            if arguments[0] == "trial":
+                return importlib.import_module("mild.trials").main(arguments[1:])
+            return repository.main(arguments)
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for the interpreter's own flush
+        return 128 + signal.SIGPIPE
+
+
 def main(arguments=None):
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    if arguments[:1] == ["trial"]:
-        return importlib.import_module("mild.trials").main(arguments[1:])
-    if repository.command_of(arguments):
-        return repository.main(arguments)
+    if arguments[:1] == ["trial"] or repository.command_of(arguments):
+        return own(arguments)
     program = _processor.program()
     if program is None:
         print("mild: this installation has no program, because libraries of it were missing where it was built; a wheel has it "

@@ -139,7 +139,8 @@ def _world(model, description, ground, painted):
 
 
 def stand(model, description, ground, attributes, painted=False):
-    """The Robot on a ground: "rigid" is MuJoCo's own floor, that of the file if it has one. painted: the floor has the ground's colour."""
+    """The Robot on a ground: "rigid" is MuJoCo's own floor, that of the file if it has one. painted: for pictures, the floor has the ground's
+    colour, and soft ground is dented."""
     d = description
     spec, remark = _world(model, d, ground, painted)
     bare = spec.copy().compile()
@@ -163,7 +164,7 @@ def stand(model, description, ground, attributes, painted=False):
     if ground != "rigid":
         _unpair(spec, feet.names + feet.bodies)
         _undress(spec, feet.bodies)
-        attach(spec, feet.names, ground, body=feet.bodies, surface=False, sensor="feet_of_trial", name="ground_of_trial",
+        attach(spec, feet.names, ground, body=feet.bodies, surface=painted, sensor="feet_of_trial", name="ground_of_trial",
                **{"sole": " ".join(feet.soles), **attributes})
     compiled = spec.compile()
     drive, gear = _drives(compiled, [names[j] for j in order])

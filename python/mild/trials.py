@@ -362,6 +362,7 @@ class Measure:
 
 # ---- video ----
 FILM = (960, 540, 30)  # width, height, pictures a second
+GEOMS = 20000  # of a picture: a dent is plates of 20 mm (docs/plugin.md)
 
 
 @contextlib.contextmanager
@@ -404,7 +405,7 @@ class Film:
             screen = r.model.vis.global_
             screen.offwidth, screen.offheight = max(width, screen.offwidth), max(height, screen.offheight)
             try:
-                self.renderer, self.of, self.next = mujoco.Renderer(r.model, height, width), r.model, 0.0
+                self.renderer, self.of, self.next = mujoco.Renderer(r.model, height, width, max_geom=GEOMS), r.model, 0.0
             except (ImportError, RuntimeError, AttributeError) as error:
                 raise RuntimeError(f"video: MuJoCo cannot draw: {error}; set MUJOCO_GL=egl before Python starts, "
                                    "and `pip install pyopengl`") from None
@@ -415,13 +416,18 @@ class Film:
             self.next = 0.0
         if d.time >= self.next:
             self.next += 1 / rate
+            d.light_xpos[r.model.light_bodyid == 0, :2] += d.qpos[r.place : r.place + 2]  # they cast shadows only near their own place
             self.renderer.update_scene(d, self.camera)
-            self.ffmpeg.stdin.write(self.renderer.render().tobytes())
+            try:
+                self.ffmpeg.stdin.write(self.renderer.render().tobytes())
+            except BrokenPipeError:
+                raise RuntimeError("video: ffmpeg failed") from None
 
     def close(self):
         if self.renderer:
             self.renderer.close()
-        self.ffmpeg.stdin.close()
+        with contextlib.suppress(BrokenPipeError):
+            self.ffmpeg.stdin.close()
         if self.ffmpeg.wait():
             raise RuntimeError("video: ffmpeg failed")
 

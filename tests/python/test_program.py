@@ -136,6 +136,24 @@ class Program(unittest.TestCase):
             with self.assertRaisesRegex(RuntimeError, r"^video: needs ffmpeg; pip install 'mildground\[video\]'"):
                 trials.Film("walk.mp4")
 
+    def test_film_breaks(self):
+        """An ffmpeg that ends is one line, not a broken pipe."""
+        with unittest.mock.patch.dict(os.environ, {"MILD_FFMPEG": "/bin/false"}):
+            film = trials.Film("walk.mp4")
+            film.ffmpeg.wait()
+            film.ffmpeg.stdin.write(b"picture")
+            self.assertRaisesRegex(RuntimeError, "^video: ffmpeg failed$", film.close)
+
+    def test_pipe(self):
+        """Nobody reads on: no traceback."""
+        reads, writes = os.pipe()
+        os.close(reads)
+        try:
+            done = subprocess.run([sys.executable, "-m", "mild", "trial", "--keys"], stdout=writes, stderr=subprocess.PIPE, text=True, check=False)
+        finally:
+            os.close(writes)
+        self.assertEqual((done.returncode, done.stderr), (141, ""))
+
     def test_home(self):
         """A wheel's data; where MILD_HOME names another folder, that one. Empty it counts as unset, for the environments as well."""
         with tempfile.TemporaryDirectory() as name, unittest.mock.patch.object(_processor, "HERE", pathlib.Path(name)):

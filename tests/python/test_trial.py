@@ -482,6 +482,24 @@ class Trials(unittest.TestCase):
             self.assertEqual([model.geom(floor).name for floor in floors], [name])
             self.assertEqual(model.mat(model.geom_matid[floors[0]]).name, "floor_of_trial")
 
+    def test_dented_floor(self):
+        """In pictures soft ground is drawn dented, and the floor above the dents is not; the walk is the same."""
+        walks = []
+        for painted in (True, False):
+            walker = trials.Walker(biped(), networks.Callable(still), Description(stander()), "foam28",
+                                   {"noise": 0.0, "attributes": {}, "seconds": 0.5, "painted": painted})
+            model = walker.robot.model
+            floors = model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)
+            self.assertEqual(bool(model.geom_rgba[floors, 3].any()), not painted)
+            walks.append(walker.walk([0, 0, 0], 1))
+            walker.data.qpos[walker.robot.place + 2] -= 0.02
+            mujoco.mj_forward(model, walker.data)
+            scene = mujoco.MjvScene(model, trials.GEOMS)
+            mujoco.mjv_updateScene(model, walker.data, mujoco.MjvOption(), None, mujoco.MjvCamera(), int(mujoco.mjtCatBit.mjCAT_ALL), scene)
+            ground = [geom for geom in scene.geoms[: scene.ngeom] if geom.category == int(mujoco.mjtCatBit.mjCAT_STATIC)]
+            self.assertEqual(len(ground) > 1000, painted)
+        self.assertEqual(walks[0], walks[1])
+
     def test_sunk_is_not_fallen(self):
         """A base 0.3 of its height above the ground stands on soles deep in it, and lies when they are as high as it."""
         d = Description(stander())
