@@ -210,7 +210,7 @@ def _paint(spec, ground):
     for texture in list(spec.textures):
         if texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
             spec.delete(texture)
-    spec.visual.rgba.haze = [0.95, 0.97, 1, 1]
+    spec.visual.rgba.haze, spec.visual.headlight.ambient = [0.95, 0.97, 1, 1], [0.3] * 3
     spec.add_texture(name="sky_of_trial", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
                      width=64, height=64, rgb1=[0.75, 0.85, 0.95], rgb2=[0.95, 0.97, 1])
     if not spec.worldbody.lights:

@@ -381,6 +381,16 @@ def _film(path):
             pathlib.Path(path).unlink(missing_ok=True)
 
 
+def _light(model, data, place):
+    """Moves the directional lights of the world so that they shine through a place, because they cast shadows only near their own line."""
+    import mujoco
+
+    for light in np.flatnonzero((model.light_bodyid == 0) & (model.light_type == int(mujoco.mjtLightType.mjLIGHT_DIRECTIONAL))):
+        way, own = data.light_xdir[light], data.light_xpos[light]
+        if way[2] < 0:
+            own[:2] = place[:2] - way[:2] * (place[2] - own[2]) / way[2]
+
+
 class Film:
     """Pictures of MuJoCo's renderer to ffmpeg."""
 
@@ -416,7 +426,7 @@ class Film:
             self.next = 0.0
         if d.time >= self.next:
             self.next += 1 / rate
-            d.light_xpos[r.model.light_bodyid == 0, :2] += d.qpos[r.place : r.place + 2]  # they cast shadows only near their own place
+            _light(r.model, d, d.xpos[r.base])
             self.renderer.update_scene(d, self.camera)
             try:
                 self.ffmpeg.stdin.write(self.renderer.render().tobytes())

@@ -500,6 +500,16 @@ class Trials(unittest.TestCase):
             self.assertEqual(len(ground) > 1000, painted)
         self.assertEqual(walks[0], walks[1])
 
+    def test_light(self):
+        """A slanted light of the world shines through the robot wherever it is, from its own height; a spot stays."""
+        lights = '<light type="directional" pos="1 0 3.5" dir="0.3 0.4 -1"/><light type="spot" pos="1 2 3" dir="0 0 -1"/>'
+        model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{lights}</worldbody></mujoco>")
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        place = np.array([-2.0, 5.0, 0.7])
+        trials._light(model, data, place)
+        np.testing.assert_allclose(data.light_xpos, [[-2 - 0.3 * 2.8, 5 - 0.4 * 2.8, 3.5], [1, 2, 3]], atol=1e-12)
+
     def test_sunk_is_not_fallen(self):
         """A base 0.3 of its height above the ground stands on soles deep in it, and lies when they are as high as it."""
         d = Description(stander())
