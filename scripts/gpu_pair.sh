@@ -6,6 +6,7 @@ set -euo pipefail
 old=$(realpath "$1") new=$(realpath "$2") rounds=${3:-5}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+unset MILD_HOME # each program reads the configs of its own tree
 
 for bench in batch robots; do
     for ((round = 0; round < rounds; round++)); do

@@ -341,6 +341,21 @@ def shares(values):
     return {name: value / whole if whole else 0.0 for name, value in found.items()}
 
 
+def shares_of(values, seeds):
+    """{part: shares} of these seeds; that of a single seed cannot be separated from the rest."""
+    found = {part: shares({key: v for key, v in own.items() if key[2] in seeds}) for part, own in values.items()}
+    return {part: {name: v for name, v in own.items() if name != "seed" or len(seeds) > 1} for part, own in found.items()}
+
+
+def leads(values):
+    """Of {(net, ground, seed): value}: {(net, ground): [by how much ours is above that net, of each seed that both have]}."""
+    found = {}
+    for (net, ground, seed), value in values.items():
+        if net != "ours" and ("ours", ground, seed) in values:
+            found.setdefault((net, ground), []).append(values["ours", ground, seed] - value)
+    return found
+
+
 def whole_seeds(values):
     """Seeds that all nets have on all grounds, of {(net, ground, seed): value}."""
     nets, grounds, seeds = (sorted({key[i] for key in values}) for i in range(3))
@@ -386,9 +401,26 @@ def text_of(value, form):
     return "-" if value is None else format(value, form)
 
 
+def sentence(part, found, seeds):
+    return (f"{part}: of the variance of the skill the net makes {found['net']:.0%}, the ground {found['ground']:.0%}, both together {found['both']:.0%}"
+            + (f", the seed {found['seed']:.0%}" if "seed" in found else "") + f" (seeds {seeds})")
+
+
+def print_leads(values):
+    found = {part: leads(own) for part, own in values.items()}
+    nets = [name for name in CONTROLLERS if any(net == name for own in found.values() for net, _ in own)]
+    if not nets:
+        return
+    print("\n| judged on | trained on |" + "".join(f" ours less {CONTROLLERS[net].removeprefix('ours, ')} |" for net in nets) + "\n" + "|---" * (2 + len(nets)) + "|")
+    for part, ground in itertools.product(found, GROUNDS):
+        each = [found[part].get((net, ground)) for net in nets]
+        if any(each):
+            print(f"| {part} | {ground} |" + "".join(f" {mean(v):+.3f} ({min(v):+.3f} to {max(v):+.3f}) |" if v else " - |" for v in each))
+
+
 def report(factorial):
     """Prints the tables, writes FOLDER/factorial.json and, where there is matplotlib, factorial.png."""
-    lines = [x for x in factorial.lines if x["done"] == "judged" and x["task"]["kind"] == "train"]
+    lines = [x for x in factorial.lines if x["done"] == "judged" and x["task"]["kind"] == "train" and x["task"]["controller"] in factorial.given.controllers]
     if not lines:
         print("nothing is judged yet")
         return
@@ -409,18 +441,20 @@ def report(factorial):
         print(f"| {CONTROLLERS[row['controller']]} | {row['ground']} | {row['walked']} | {row['upright']} of {row['trials']} | " + " | ".join(cells) + " |")
     values = {part: {(x["task"]["controller"], x["task"]["ground"], x["task"]["seed"]): x["skill"][part] for x in lines} for part in PARTS}
     seeds = whole_seeds(values[PARTS[0]])
-    answer = {part: shares({key: v for key, v in own.items() if key[2] in seeds}) for part, own in values.items()} if seeds else None
-    if len(seeds) == 1:  # it cannot be separated from the rest
-        answer = {part: {name: v for name, v in own.items() if name != "seed"} for part, own in answer.items()}
-    print("\n" + ("\n".join(f"{part}: of the variance of the skill the net makes {s['net']:.0%}, the ground {s['ground']:.0%}, both together "
-                            f"{s['both']:.0%}" + (f", the seed {s['seed']:.0%}" if "seed" in s else "") + f" (seeds {seeds})"
-                            for part, s in answer.items())
-                  if seeds else "the net or the ground: not before each net has all grounds with a seed"))
+    answer = shares_of(values, seeds) if seeds else None
+    grounds = {key[1] for key in values[PARTS[0]]} - {"rigid"}
+    of_soft = {part: {key: v for key, v in own.items() if key[1] in grounds} for part, own in values.items()}
+    soft = shares_of(of_soft, seeds) if seeds and len(grounds) > 1 else None
+    print_leads(values)
+    print("\n" + ("\n".join(sentence(part, found, seeds) for part, found in answer.items()) if seeds else
+                  "the net or the ground: not before each net has all grounds with a seed"))
+    if soft:
+        print("\nof those trained on soft ground alone:\n" + "\n".join(sentence(part, found, seeds) for part, found in soft.items()))
     search = [{**{k: t["task"][k] for k in ("controller", "choice")}, "kl_target": factorial.given.search[t["task"]["choice"]][0],
                "robots": factorial.given.search[t["task"]["choice"]][1], "skill": t["skill"]["tuning"], "score": t["score"]}
               for t in factorial.lines if t["done"] == "judged" and t["task"]["kind"] == "tune"]
     summary = {"minutes": factorial.given.minutes, "steps": factorial.given.steps, "settings": factorial.settings, "search": search,
-               "chosen": factorial.choices(), "rows": rows, "table2": second, "shares": answer, "seeds": seeds}
+               "chosen": factorial.choices(), "rows": rows, "table2": second, "shares": answer, "shares_soft": soft, "seeds": seeds}
     (factorial.folder / "factorial.json").write_text(json.dumps(summary, indent=1) + "\n")
     try:
         import figures
@@ -437,7 +471,7 @@ def parse(words):
     parser.add_argument("--minutes", type=float, default=3.0, help="[min] of each training (default 3)")
     parser.add_argument("--steps", type=float, default=0, help="policy steps of each training in the place of minutes; not for ht2")
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--controllers", default=None, help="some of " + ",".join(CONTROLLERS) + " (default: all)")
+    parser.add_argument("--controllers", default=None, help="some of " + ",".join(CONTROLLERS) + ", in --report too (default: all)")
     parser.add_argument("--config", type=pathlib.Path, default=ROOT / "configs/factorial.ini", help="the task")
     parser.add_argument("--devices", default="cuda", help="of the trainings: cuda:0,cuda:1 (default cuda)")
     parser.add_argument("--jobs", type=int, default=1, help="trainings at a time on each device, which share it (default 1)")

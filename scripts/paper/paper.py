@@ -14,12 +14,17 @@ import sys
 import tempfile
 import time
 
-import controllers
-import latents
-import models
-import page
-import walks
-from measure import ROOT, SHIPPED, mild, models_of, rivals_of
+try:
+    import controllers
+    import latents
+    import models
+    import page
+    import walks
+    from measure import ROOT, SHIPPED, mild, models_of, rivals_of
+except ModuleNotFoundError as missing:
+    print(f"paper.py: no module {missing.name}; `make paper` installs it, or .venv/bin/pip install --require-hashes -r "
+          "scripts/paper/requirements.txt; start this with .venv/bin/python", file=sys.stderr)
+    sys.exit(2)
 
 EXPERIMENTS = {f.__name__: f for f in (controllers.table2, models.transfer, models.penetration, models.foam, controllers.passivity,
                                        walks.terrains, latents.latent, latents.parameters, latents.course, latents.ablations,

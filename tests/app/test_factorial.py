@@ -81,6 +81,10 @@ def measures():
     seeds = factorial.shares({(n, g, s): float(s) for n in range(2) for g in range(2) for s in range(2)})
     assert abs(seeds["seed"] - 1) < 1e-12
     assert factorial.whole_seeds(values) == [0, 1, 2]
+    alone = factorial.shares_of({"a part": {("ours", g, 1): 1.0 * g for g in range(2)}}, [1])["a part"]
+    assert abs(alone["ground"] - 1) < 1e-12 and "seed" not in alone, alone
+    led = factorial.leads({("ours", "mild", 1): 0.5, ("ours", "mild", 2): 0.7, ("mlp", "mild", 1): 0.75, ("mlp", "mild", 3): 9, ("flat", "rigid", 1): 9})
+    assert led == {("mlp", "mild"): [-0.25]}, led
     del values[1, 0, 1]
     assert factorial.whole_seeds(values) == [0, 2]
     assert len(factorial.PAIRS) == 9 and all(len({p.split(">")[i] for p in factorial.PAIRS}) == 9 for i in range(2))
@@ -121,6 +125,12 @@ def all_of_it():
         whole = 3 * 3 * sum((v - 0.3) ** 2 for v in NETS.values())
         share = whole / (whole + 5 * 3 * 2 * 0.01)
         assert f"nine grounds: of the variance of the skill the net makes {share:.0%}" in printed and "the seed 0%" in printed, printed
+        soft = whole / 3 * 2 / (whole / 3 * 2 + 5 * 3 * 2 * 0.0025)  # the two soft grounds are 0.1 apart
+        assert f"\nof those trained on soft ground alone:\nnine grounds: of the variance of the skill the net makes {soft:.0%}" in printed, printed
+        assert "| transitions | mild | +0.400 (+0.400 to +0.400) | +0.300 (+0.300 to +0.300) | +0.200" in printed, printed
+        _, fewer, _ = quietly(lambda: factorial.report(made(folder, *words, "--controllers", "clock,ours")))
+        assert "| ours | mild | 3 |" in fewer and "| MLP |" not in fewer and "ours less Clock |\n" in fewer, fewer
+        quietly(lambda: factorial.report(third))
         result = json.loads((pathlib.Path(folder) / "factorial.json").read_text())
         assert result["chosen"] == BEST and len(result["search"]) == 20 and len(result["rows"]) == 15
         last = result["table2"][-1]

@@ -52,6 +52,7 @@ echo '{' >torn-1.json
 bad "torn-1.json" deviations .
 # its figures need what scripts/paper/requirements.txt names
 "$python" -c 'import sklearn' 2>/dev/null && bad "paper.py: unknown experiment nosuch; there are table2 " "$python" -B "$root/scripts/paper/paper.py" nosuch
+bad "paper.py make scripts/paper/requirements.txt" "$python" -S -B "$root/scripts/paper/paper.py" latent # -S: without installed packages
 
 # lines of functions and files; a table is one line, main may be long
 house() { "$python" "$root/scripts/house.py" "$@"; }
