@@ -31,17 +31,16 @@ MILD_HD int slot_stays(const Slots *s, int i, double m1, int prints) {
 /* A loaded element writes its depth into the ground where it lifts off, less what flows back there,
  * and in every cell that it slides out of. When it slides into a deeper imprint it takes over that
  * depth. A greater depth never means more force, and an element takes a lesser one while it carries
- * nothing, so this adds no energy. refill: [-] of the material. */
+ * nothing, so this adds no energy. v: its velocity. refill: [-] of the material. */
 static void element_imprint(const Advance *a, const Memory *memory, const Slots *s, int i, int e,
-                            int lifted, double refill) {
+                            const SlotVelocity *v, int lifted, double refill) {
     if (!(s->recovery[i] < 1.0)) {
         return;
     }
     const double x0 = a->foot->point_x[e];
     const double y0 = a->foot->point_y[e];
-    const SlotVelocity v = slot_velocity(s, i, &a->motion, a->foot->faces);
-    const double x1 = x0 + a->dt * v.x;
-    const double y1 = y0 + a->dt * v.y;
+    const double x1 = x0 + a->dt * v->x;
+    const double y1 = y0 + a->dt * v->y;
     if (!lifted && imprints_same_cell(a->imprints, x0, y0, x1, y1)) {
         return;
     }
@@ -139,6 +138,38 @@ static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory
     }
 }
 
+/* The share of the elements of a block that slip has lowered. to: what they remember without it,
+ * from number e on. slid: [m] */
+static __attribute__((noinline)) void block_slip(const Slots *s, const Memory *to, int e,
+                                                 const double *slid) {
+    const double *depth_max = to->depth_max + e;
+    double *worn = to->worn + e;
+#pragma omp simd
+    for (int i = 0; i < SLOT_LANES; i++) {
+        const Element element = slot_element(s, i);
+        const Share share = slot_share(s, i);
+        const double q = real_max(share_slipped(&element, &share, slid[i]), SHARE_LEAST);
+        worn[i] = depth_max[i] > 0.0 ? 1.0 - q : 0.0;
+    }
+}
+
+/* The same where fresh penetration raises it, too. fresh: [m] */
+static __attribute__((noinline)) void block_wear(const Slots *s, const Memory *to, int e,
+                                                 const double *slid, const double *fresh) {
+    double *depth_max = to->depth_max + e;
+    double *front_speed = to->front_speed + e;
+    double *worn = to->worn + e;
+#pragma omp simd
+    for (int i = 0; i < SLOT_LANES; i++) {
+        const Element element = slot_element(s, i);
+        const Share share = slot_share(s, i);
+        ElementMemory after = {.depth_max = depth_max[i], .front_speed = front_speed[i]};
+        worn[i] = element_wear(&element, &share, &after, slid[i], fresh[i], depth_max[i] > 0.0);
+        depth_max[i] = after.depth_max;
+        front_speed[i] = after.front_speed;
+    }
+}
+
 /* Stores what the elements of some blocks remember, from number e of `memory` on. Adds to the lanes
  * of `count` 1 for each element that stays in the ground, and 1 for each of these that reversed. On
  * level ground the slopes are 0, and without faces the heights. wears: bool constant, shares wear.
@@ -151,7 +182,9 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
     const double rate = 1.0 / dt;
     const int prints = a->imprints != NULL;
     for (const Slots *s = first; s < end; s++, e += SLOT_LANES) {
-#pragma omp simd
+        Lanes slid, fresh;
+        double changes = 0.0; /* 1 for each that slips, or more than all of these if it regains */
+#pragma omp simd reduction(+ : changes)
         for (int i = 0; i < SLOT_LANES; i++) {
             const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
             const Element element = slot_element(s, i);
@@ -161,8 +194,14 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                 element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
             if (wears) {
                 const Share share = slot_share(s, i);
-                to.worn[e + i] = element_wear(&element, &share, &before, &after, dt, s->iz[i], v.x,
-                                              v.y, v.descent, stays);
+                slid[i] =
+                    element_slide(&element, &share, &before, &after, dt, s->iz[i], v.x, v.y, stays);
+                fresh[i] = element_fresh(&element, dt, v.descent);
+                const double slips = share_slips(&share, slid[i]) ? 1.0 : 0.0;
+                const double most =
+                    share_regains(&share, slid[i], fresh[i]) ? SLOT_LANES + 1.0 : slips;
+                changes += stays ? most : 0.0;
+                to.worn[e + i] = stays ? 1.0 - share.carry : 0.0;
             }
             to.depth_max[e + i] = after.depth_max;
             to.middle[e + i] = after.middle;
@@ -175,6 +214,11 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
             to.held_stiffness[e + i] = after.held_stiffness;
             count[0][i] += stays ? 1.0 : 0.0;
             count[1][i] += stays && element_turns(element.entry_speed, v.descent) ? 1.0 : 0.0;
+        }
+        if (wears && changes > SLOT_LANES) {
+            block_wear(s, memory, e, slid, fresh);
+        } else if (wears && changes > 0.0) {
+            block_slip(s, memory, e, slid);
         }
     }
 }
@@ -210,14 +254,9 @@ static int foot_advance_all(const Advance *a, const Memory *memory, const int32_
     return foot->uneven ? foot->elements : (int)sums[0];
 }
 
-/* An element that is not listed forgets. Returns whether it remembers that it was here. */
-MILD_HD int element_unlisted(const Memory *memory, int e) {
-    memory_forget(memory, e, MATERIAL_NONE);
-    return 0;
-}
-
-/* The same of a surface: an element that faces up near the ground is buried until it comes out. If
- * it was loaded it leaves an imprint. */
+/* An element of a surface that is not listed forgets. One that faces up near the ground is buried
+ * until it comes out. If it was loaded it leaves an imprint. Returns whether it remembers that it
+ * was here. */
 static int face_unlisted(const Advance *a, const Memory *memory, int e) {
     const FootScratch *foot = a->foot;
     const int buried = !foot->away && !(foot->share[e] > 0.0) && foot->depth[e] > foot->least;
@@ -230,6 +269,20 @@ static int face_unlisted(const Advance *a, const Memory *memory, int e) {
     memory->share[e] = 0.0;
     memory_forget(memory, e, buried ? MATERIAL_BURIED : MATERIAL_NONE);
     return buried;
+}
+
+/* Elements from `next` to `end` are not listed. Returns how many remember something. */
+static __attribute__((noinline)) int foot_unlisted(const Advance *a, const Memory *memory, int next,
+                                                   int end) {
+    int touched = 0;
+    for (; next < end; next++) {
+        if (a->foot->faces) {
+            touched += face_unlisted(a, memory, next);
+        } else {
+            memory_forget(memory, next, MATERIAL_NONE);
+        }
+    }
+    return touched;
 }
 
 /* Takes lane i of what blocks_remember has stored. wears: bool, shares do. */
@@ -266,7 +319,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
                           .worn = after[9]};
     int next = 0;
     int touched = 0;
-    for (int slot = 0; slot < foot->active; slot++, next++) {
+    for (int slot = 0; slot < foot->active; slot++) {
         const Slots *s = slot_block(foot, slot);
         const int i = slot % SLOT_LANES;
         const int e = foot->element[slot];
@@ -274,9 +327,8 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
             memset(stays, 0, sizeof stays);
             blocks_remember(a, s, s + 1, &block, 0, stays);
         }
-        for (; next < e; next++) {
-            touched += faces ? face_unlisted(a, memory, next) : element_unlisted(memory, next);
-        }
+        touched += foot_unlisted(a, memory, next, e);
+        next = e + 1;
         if (faces && !(s->share[i] > 0.0)) { /* it carries nothing until it has come out */
             memory->share[e] = 0.0;
             memory_forget(memory, e, MATERIAL_BURIED);
@@ -299,17 +351,14 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         }
         if (a->imprints && (carried || !lifted)) {
             const double refill = foot->derived[material[slot] & 0xff].material.refill;
-            element_imprint(a, memory, s, i, e, lifted, refill);
+            element_imprint(a, memory, s, i, e, &v, lifted, refill);
         }
         if (foot->uneven) {
             slot_plane(foot, a->height, s, memory, i, e);
         }
         touched += !lifted || lifted_material != MATERIAL_NONE;
     }
-    for (; next < foot->elements; next++) {
-        touched += faces ? face_unlisted(a, memory, next) : element_unlisted(memory, next);
-    }
-    return touched;
+    return touched + foot_unlisted(a, memory, next, foot->elements);
 }
 
 void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,

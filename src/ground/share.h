@@ -173,24 +173,35 @@ MILD_HD Real share_left(Real x) {
 #endif
 }
 
+/* [-] Growth of j0 and u0 at the depth of an element. */
+MILD_HD Real share_growth(const Element *e, const Share *share) {
+    return 1 + share->growth * real_max(e->depth, 0);
+}
+
+/* [-] What slip leaves of the share in a step. slid: [m] horizontal path. */
+MILD_HD Real share_slipped(const Element *e, const Share *share, Real slid) {
+    const Real q = share->carry;
+    const Real whole = share->lean * share_growth(e, share);
+    return q * (whole / (whole + q * slid * share->slip_rate));
+}
+
 /* [-] The share after a step. slid: [m] horizontal path; fresh: [m] penetration. */
 MILD_HD Real share_after(const Element *e, const Share *share, Real slid, Real fresh) {
     const Real c = share->lean;
-    const Real q = share->carry;
-    const Real grows = 1 + share->growth * real_max(e->depth, 0);
-    const Real whole = c * grows;
-    const Real slipped = q * (whole / (whole + q * slid * share->slip_rate));
+    const Real grows = share_growth(e, share);
+    const Real slipped = share_slipped(e, share, slid);
     const Real spent = real_min(fresh * share->regain_rate / grows, SHARE_FORGET);
     const Real left = share_left(spent);
     const Real grown = slipped + (c - slipped) * (1 - left);
     return real_max(share_grows(e, share) ? grown : slipped, SHARE_LEAST);
 }
 
-/* Adds to what element_remember has found. Where slip costs support, path counts at once where
- * friction slides, so that the loss does not depend on the step. Returns the wear to remember. */
-MILD_HD Real element_wear(const Element *e, const Share *share, const ElementMemory *memory,
-                          ElementMemory *after, Real dt, Real normal, Real vx, Real vy, Real speed,
-                          int stays) {
+/* Horizontal path [m] that a step counts; adds it to what element_remember has found. Where slip
+ * costs support, path counts at once where friction slides, so that the loss does not depend on the
+ * step. */
+MILD_HD Real element_slide(const Element *e, const Share *share, const ElementMemory *memory,
+                           ElementMemory *after, Real dt, Real normal, Real vx, Real vy,
+                           int stays) {
     const Real x = memory->pending_x + dt * vx;
     const Real y = memory->pending_y + dt * vy;
     const Real square = x * x + y * y;
@@ -201,16 +212,49 @@ MILD_HD Real element_wear(const Element *e, const Share *share, const ElementMem
     const Real least = share->slip_rate > 0 ? REAL(-1) : REMEMBER_BAND * REMEMBER_BAND;
     const int counts = square > (slides ? least : REMEMBER_BAND * REMEMBER_BAND);
     const Real slid = counts ? REAL_SQRT(square) : 0;
-    const Real fresh = real_max(e->depth + dt / 2 * speed - e->yield_depth, 0);
+    after->drift = stays ? real_min(memory->drift + slid, REMEMBER_DRIFT) : 0;
+    after->pending_x = stays && !counts ? x : 0;
+    after->pending_y = stays && !counts ? y : 0;
+    return slid;
+}
+
+/* [m] Penetration of a step beyond the yield depth. */
+MILD_HD Real element_fresh(const Element *e, Real dt, Real speed) {
+    return real_max(e->depth + dt / 2 * speed - e->yield_depth, 0);
+}
+
+/* Bool: slip lowers the share in a step. */
+MILD_HD int share_slips(const Share *share, Real slid) {
+    return slid * share->slip_rate > 0;
+}
+
+/* Bool: fresh penetration may raise the share in a step, also what slip takes from it then. Where
+ * it does not, share_after is share_slipped, and where slip does not lower it either, `carry`. */
+MILD_HD int share_regains(const Share *share, Real slid, Real fresh) {
+    return (fresh > 0) & ((share->carry < share->lean) | share_slips(share, slid));
+}
+
+/* Moves the greatest depth ahead by what the share grows. Returns the wear to remember. */
+MILD_HD Real element_wear(const Element *e, const Share *share, ElementMemory *after, Real slid,
+                          Real fresh, int stays) {
     const Real q = share_after(e, share, slid, fresh);
     const Real lead = real_max(q - share->carry, 0) * ELEMENT_ELASTIC;
     /* The added mass grows with the lead; it keeps its momentum. P is concave. */
     after->front_speed *= after->depth_max / (after->depth_max + lead + ELEMENT_TINY);
     after->depth_max = stays ? after->depth_max + lead : 0;
-    after->drift = stays ? real_min(memory->drift + slid, REMEMBER_DRIFT) : 0;
-    after->pending_x = stays && !counts ? x : 0;
-    after->pending_y = stays && !counts ? y : 0;
     return stays ? 1 - q : 0;
+}
+
+/* element_slide and element_wear where nothing is in vectors. */
+MILD_HD Real element_wear_alone(const Element *e, const Share *share, const ElementMemory *memory,
+                                ElementMemory *after, Real dt, Real normal, Real vx, Real vy,
+                                Real speed, int stays) {
+    const Real slid = element_slide(e, share, memory, after, dt, normal, vx, vy, stays);
+    const Real fresh = element_fresh(e, dt, speed);
+    if (stays && (share_slips(share, slid) || share_regains(share, slid, fresh))) {
+        return element_wear(e, share, after, slid, fresh, stays);
+    }
+    return stays ? 1 - share->carry : 0;
 }
 
 #endif

@@ -1,6 +1,7 @@
 /* The rows of the ground benches, by a clock that only the ground's own calls move, each by a time
  * of its own: what a row measured can be read from it. */
 #include "base/clock.h"
+#include "ground/state.h"
 #include "kit.h"
 #include "run/bench/bench.h"
 
@@ -12,6 +13,7 @@ enum {
     UNEVEN = 20,
     IMPRINTS = 40,
     OF_MODEL = 100,
+    SINKS = 1000, /* slip takes the support away */
     ADVANCE = 1
 };
 
@@ -21,6 +23,20 @@ static size_t plain_bytes; /* of a ground without imprints; 0: not known yet */
 WRAPS(clock_thread_seconds);
 double __wrap_clock_thread_seconds(void) {
     return now;
+}
+
+static int slipping;        /* bool: the step before slipped where slip takes the support away */
+static double slipped_from; /* [-] wear with which that one began */
+
+/* Steps that slip begin with the same memory: an element's wear does not grow. */
+static void expect_kept(const MildGround *ground, const MildContactInput *input, int sinks) {
+    const int slips = sinks && input->velocity[0][0] > 0.1;
+    const double worn = *ground_memory(ground, 0).worn;
+    if (slips && slipping) {
+        assert_true(worn == slipped_from);
+    }
+    slipping = slips;
+    slipped_from = worn;
 }
 
 WRAPS(mild_ground_solve);
@@ -33,6 +49,8 @@ void __wrap_mild_ground_solve(const MildGround *ground, const MildTerrain *terra
     now += terrain->map ? UNEVEN : 0;
     now += 2 * mild_ground_size(ground) > 3 * plain_bytes ? IMPRINTS : 0;
     now += OF_MODEL * (double)terrain->materials[0].model;
+    now += terrain->materials[0].slip_length > 0 ? SINKS : 0;
+    expect_kept(ground, input, terrain->materials[0].slip_length > 0);
     __real_mild_ground_solve(ground, terrain, input, scratch, result);
 }
 
@@ -68,6 +86,7 @@ TEST(a_row_measures_what_it_names) {
     expect_row(&report, "newton_slip", NEWTON + SLIPS);
     expect_row(&report, "gauss_seidel_stick", SWEEPS);
     expect_row(&report, "gauss_seidel_slip", SWEEPS + SLIPS);
+    expect_row(&report, "newton_slip_advance", NEWTON + SLIPS + ADVANCE);
     expect_row(&report, "newton_uneven_advance", NEWTON + UNEVEN + ADVANCE);
     expect_row(&report, "newton_prints_advance", NEWTON + IMPRINTS + ADVANCE);
     expect_row(&report, "elements", 154);
@@ -78,7 +97,11 @@ TEST(a_row_measures_what_it_names) {
         snprintf(name, sizeof name, "newton_%s_advance", mild_model_names[model]);
         expect_row(&report, name, NEWTON + ADVANCE + OF_MODEL * (double)model);
     }
-    assert_int_equal(report.count, 8 + 2 * (MILD_MODEL_RIGID - MILD_MODEL_MILD - 1));
+    const double sinks = NEWTON + OF_MODEL * (double)MILD_MODEL_MILD_MERGED + SINKS;
+    expect_row(&report, "newton_slip_sinkage", sinks);
+    expect_row(&report, "newton_slip_sinkage_advance", sinks + ADVANCE);
+    expect_row(&report, "newton_slip_sinkage_slip_advance", sinks + SLIPS + ADVANCE);
+    assert_int_equal(report.count, 12 + 2 * (MILD_MODEL_RIGID - MILD_MODEL_MILD - 1));
 }
 
 /* Per element of both plates. */

@@ -3,6 +3,7 @@
 #include "ground_kit.h"
 
 #include "ground/models.h"
+#include "ground/share.h"
 #include "ground/sole.h"
 #include "ground/state.h"
 
@@ -589,6 +590,36 @@ TEST(test_pumped) {
                       mild_model_names[models[i]], work, given);
         assert_true(given < 0.0);
     }
+}
+
+/* A step leaves out what cannot change a share, to the last bit: the exponential where nothing
+ * fresh can raise it, and all of it where nothing slips besides. */
+TEST(test_left_out) {
+    uint64_t random = 5;
+    int left_out = 0, regains = 0;
+    for (int i = 0; i < 100000; i++) {
+        const double a = kit_uniform(&random, 0.001, 0.05);
+        const Element e = {.depth = a - kit_uniform(&random, 0, 1e-3),
+                           .yield_depth = a,
+                           .zero_depth = a - kit_uniform(&random, 0, 2e-4)};
+        Share share = {.slip_rate = kit_index(&random, 2) ? 700.0 : 0.0,
+                       .regain_rate = 1500.0,
+                       .growth = kit_index(&random, 2) ? 50.0 : 0.0,
+                       .lean = kit_index(&random, 2) ? kit_uniform(&random, 0.02, 1) : 1.0};
+        share.carry = kit_index(&random, 2) ? share.lean * kit_uniform(&random, 0, 1) : share.lean;
+        const double slid = kit_index(&random, 2) ? kit_uniform(&random, 0, 1e-3) : 0.0;
+        const double fresh = kit_index(&random, 2) ? kit_uniform(&random, 0, 1e-3) : 0.0;
+        const double q = share_after(&e, &share, slid, fresh);
+        const double slipped = fmax(share_slipped(&e, &share, slid), SHARE_LEAST);
+        regains += q > slipped;
+        if (!share_regains(&share, slid, fresh)) {
+            assert_true(q == slipped);
+            left_out += !share_slips(&share, slid);
+            assert_true(share_slips(&share, slid) || q == fmax(share.carry, SHARE_LEAST));
+        }
+    }
+    print_message("%d of 100000 left out, %d regain\n", left_out, regains);
+    assert_true(left_out > 10000 && regains > 10000);
 }
 
 int main(int count, char **arguments) {

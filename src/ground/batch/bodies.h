@@ -564,8 +564,8 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         element_remember(e, &own.before, dt, 1 / dt, normal, v.x, v.y, v.descent, stays);
     Real worn = 0;
     if (own.curves & LAW_HEAP) {
-        worn = element_wear(e, &own.carried, &own.before, &after, dt, normal, v.x, v.y, v.descent,
-                            stays);
+        worn = element_wear_alone(e, &own.carried, &own.before, &after, dt, normal, v.x, v.y,
+                                  v.descent, stays);
     }
     if (stays) {
         const Real peak = element_peak(e, own.curves, normal, v.descent, middle);

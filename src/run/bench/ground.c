@@ -19,6 +19,7 @@ typedef struct {
     MildContactInput input;
     double inverse_inertia[ROWS * ROWS]; /* of the input */
     MildGround *ground;
+    MildGround *kept; /* its memory, put back before each step; NULL: the steps go on from it */
     MildScratch *scratch;
 } GroundBench;
 
@@ -69,6 +70,9 @@ static double ground_run(GroundBench *bench, int steps, int advance) {
     MildContactResult result;
     double start = clock_thread_seconds();
     for (int step = 0; step < steps; step++) {
+        if (bench->kept) {
+            memcpy(bench->ground, bench->kept, mild_ground_size(bench->ground));
+        }
         mild_ground_solve(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
         if (advance) {
             mild_ground_advance(bench->ground, &bench->terrain, &bench->input, bench->scratch,
@@ -136,6 +140,41 @@ static void ground_cases(GroundBench *bench, const Robot *robot, double dt, Benc
     }
 }
 
+/* A step of feet that slip, with its end. It begins with the same memory each time: where slip
+ * takes the support away, a foot would soon carry nothing. */
+static MildStatus ground_slips(GroundBench *bench, const char *name, BenchReport *report,
+                               MildError *error) {
+    const size_t bytes = mild_ground_size(bench->ground);
+    const MildContactInput rest = bench->input;
+    bench->kept = malloc(bytes);
+    if (!bench->kept) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
+    }
+    memcpy(bench->kept, bench->ground, bytes);
+    ground_slip(&bench->input);
+    bench_add(report, "ground", name, ground_time(bench, 1), "ns");
+    memcpy(bench->ground, bench->kept, bytes);
+    free(bench->kept);
+    bench->kept = NULL;
+    bench->input = rest;
+    return MILD_OK;
+}
+
+/* The same ground where slip takes the support away, as in grains (docs/model.md section 22). */
+static MildStatus ground_sinks(GroundBench *bench, const MildSole *const *soles,
+                               MildMaterial material, double dt, BenchReport *report,
+                               MildError *error) {
+    material.slip_length = 1.4e-3;
+    material.regain_length = 0.68e-3;
+    material.grip = 0.123;
+    material.slip_growth = 0.07;
+    bench->terrain = mild_terrain_uniform(&material);
+    ground_settle(bench, soles, dt);
+    bench_add(report, "ground", "newton_slip_sinkage", ground_time(bench, 0), "ns");
+    bench_add(report, "ground", "newton_slip_sinkage_advance", ground_time(bench, 1), "ns");
+    return ground_slips(bench, "newton_slip_sinkage_slip_advance", report, error);
+}
+
 /* The standing step on waves, and on ground that remembers imprints, to compare with
  * newton_stick_advance. */
 static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double dt,
@@ -184,7 +223,8 @@ static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchRe
         bench.ground = mild_ground_init(block, soles, BENCH_FEET);
         if (model == MILD_MODEL_MILD) {
             ground_cases(&bench, robot, dt, report);
-            status = ground_terrain(&bench, robot, dt, report, error);
+            status = ground_slips(&bench, "newton_slip_advance", report, error);
+            status = status ? status : ground_terrain(&bench, robot, dt, report, error);
             bench_add(report, "ground", "elements",
                       mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]), "-");
         } else {
@@ -194,6 +234,9 @@ static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchRe
             bench_add(report, "ground", name, ground_time(&bench, 0), "ns");
             snprintf(name, sizeof name, "newton_%s_advance", mild_model_names[model]);
             bench_add(report, "ground", name, ground_time(&bench, 1), "ns");
+        }
+        if (model == MILD_MODEL_MILD_MERGED) {
+            status = ground_sinks(&bench, soles, material, dt, report, error);
         }
     } else {
         status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
