@@ -117,6 +117,8 @@ BLOCKS = [
     ("fine", [f"ball60 {BALL60} 0 {press(0.03)}"]),
     ("deep", [deep("square100-drag40", SQUARE, 0.04, "drag:0.03@0.05"), deep("strip-drag40", STRIP, 0.04, "drag:0.03@0.05"),
               deep("strip-drag80", STRIP, 0.08, "drag:0.03@0.05")]),
+    ("sand", [f"square100-tilt22 {SQUARE} 22 {press(0.01)}", f"strip-tilt22 {STRIP} 22 {press(0.01)}",
+              f"disc120-tilt15 {DISC} 15 {press(0.012)}"]),  # predicted in docs/grains.md before they were made
 ]
 
 
