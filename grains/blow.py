@@ -114,7 +114,7 @@ def law():
     print_windows()
     for name, degrees in (("level", 0), ("tilted", 8)):
         slow, fast = ({"depth_m": rows["depth"], "force_z_n": rows["fz"]} for rows in
-                      (entry.play(Case(f"{name} {sole} {degrees} press:0.05@{speed}")) for speed in (0.2, 0.8)))
+                      (entry.play(Case(f"{name} {sole} {degrees} press:0.05@{speed}", found.edge("sand"))) for speed in (0.2, 0.8)))
         print_row(f"mild_merged {name}", [(slow, fast)])
 
 

@@ -110,13 +110,15 @@ BLOCKS = [
               deep("square100-drag80", SQUARE, 0.08, "drag:0.03@0.05")]),
     ("deep", [deep("square100-load120", SQUARE, 0.12), deep("square100-load40", SQUARE, 0.04),
               deep("square100-load20-fast", SQUARE, 0.02, "load:0.05@0.5"), deep("disc120-load80", DISC, 0.08),
-              deep("strip-load80", STRIP, 0.08)]),
+              deep("strip-load80", STRIP, 0.08), deep("square100-load120-tall", SQUARE + ",0.2", 0.12)]),
     ("sand", [f"ball100 {BALL100} 0 {press(0.04)}", f"ball100-load15 {BALL100} 0 {press(0.015)} {drag(0.03, 'load')}"]),
     ("slick", [f"ball100 {BALL100} 0 {press(0.04)}"]),
     ("wide", [f"ball160 {BALL160} 0 {press(0.03)}"]),
     ("fine", [f"ball60 {BALL60} 0 {press(0.03)}"]),
     ("deep", [deep("square100-drag40", SQUARE, 0.04, "drag:0.03@0.05"), deep("strip-drag40", STRIP, 0.04, "drag:0.03@0.05"),
               deep("strip-drag80", STRIP, 0.08, "drag:0.03@0.05")]),
+    ("sand", [f"square100-tilt22 {SQUARE} 22 {press(0.01)}", f"strip-tilt22 {STRIP} 22 {press(0.01)}",
+              f"disc120-tilt15 {DISC} 15 {press(0.012)}"]),  # predicted in docs/grains.md before they were made
 ]
 
 

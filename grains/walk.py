@@ -48,13 +48,14 @@ def feet_of(robot):
 # ---- the models' numbers ----
 
 def fit(args):
-    """As scripts/judge.py fits them, two level plates and a drag, but with elements of the robot's soles: k_pen is that of one element."""
+    """As scripts/judge.py fits them, two level plates and a drag, but with elements of the robot's soles, as k_pen is that of one element,
+    and with the plates as they are: a robot's soles on a model are not half a grain wider (judge_cases.Sole) either."""
     sys.path.insert(0, str(ROOT / "scripts"))
     import judge
     import walk_lead
     from judge_entries import GroundEntry
     pitch = walk_lead.pitch_of(feet_of(args.robot)[0])
-    records, grounds = judge.Records(ROOT / "grains" / "records"), {}
+    records, grounds = judge.Records(ROOT / "grains" / "records", 0), {}
     for family in BEDS:
         keys = [f"{family}/{name}" for name in judge.FITS[family][0]]
         given = {key: (records.cases[key][0], judge.mean_rows(records.cases[key][1])) for key in keys}

@@ -6,6 +6,8 @@ prints the error of each beside one bed's noise.
     ... scripts/judge.py --entry mine.py:law --table theirs=predictions.csv      models of others (scripts/judge_entries.py)
     ... scripts/judge.py --rival newton=out/mpm      another simulator's records of the same cases (scripts/judge_mpm.py)
 
+The models' soles are what of a body grains touch: half a grain wider on each side (judge_cases.Sole). A --rival has bodies of its own.
+
 An error is model over grains less 1; of a share of the force before (F0) and of lengths it is the difference. The noise is the
 standard deviation over beds of the same number. `*` is an error above twice the noise. --out has all numbers as judge.csv and
 figures.html with the curves."""
@@ -24,8 +26,8 @@ import numpy as np
 
 import mild
 from judge_anchors import print_anchors
-from judge_cases import COLUMNS, MEASURES, Case, measures, scale
-from judge_entries import (PITCH, Archimedes, FunctionEntry, GroundEntry, TableEntry, c_function, chrono_scm, rft_stress,
+from judge_cases import COLUMNS, EDGE, MEASURES, Case, measures, scale
+from judge_entries import (Archimedes, FunctionEntry, GroundEntry, TableEntry, c_function, chrono_scm, rft_stress,
                            wong_sand)
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -52,9 +54,11 @@ def fail(text):
 # ---- records ----
 
 class Records:
-    """Cases of a folder of records: key FAMILY/NAME: (Case, [rows of each bed])."""
+    """Cases of a folder of records: key FAMILY/NAME: (Case, [rows of each bed]). share: by how much of a grain the models'
+    soles are wider on each side."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, share=EDGE):
+        self.share = share
         file = folder / "manifest.json"
         if not file.exists():
             fail(f"{file} is not there: make records with grains/run.py")
@@ -69,8 +73,12 @@ class Records:
             beds = [read_record(file) for file in sorted(folder.glob(f"{family}/{name}-*.csv"))
                     if re.fullmatch(re.escape(name) + r"-\d+", file.stem)]
             if beds:
-                self.cases[key] = Case(row["case"]), beds
+                self.cases[key] = Case(row["case"], self.edge(family)), beds
                 self.cases[key][0].key = key
+
+    def edge(self, family):
+        """[m] by which a body touches grains beyond its outline."""
+        return self.share * self.ground(family)["grain"]
 
     def ground(self, family):
         """Numbers of the beds of a family."""
@@ -136,15 +144,15 @@ def function_entry(text):
 
 
 def entries(args, ground):
-    friction = FRICTION.get(ground["friction"], 0.38)
+    friction, pitch = FRICTION.get(ground["friction"], 0.38), args.pitch or ground["grain"]
     stress = rft_stress(ground, friction)
     rft = GroundEntry("ecc_quasi_3d", mild.Material("sand_loose", model="ecc_quasi_3d", zeta=stress / 1e6, mu=0, k_drift=0,
-                                                    b_drift=0), args.pitch)
+                                                    b_drift=0), pitch)
     rft.name, rft.fit = "3d_rft", lambda records, ground: None
     models = [name for name in args.models.split(",") if name] or [name for name in mild.models() if name != "rigid"]
-    yield from (GroundEntry(model, None, args.pitch) for model in models)
+    yield from (GroundEntry(model, None, pitch) for model in models)
     if "mild" in models:  # what slip and refill alone do
-        slips = GroundEntry("mild", None, args.pitch, slips=True)
+        slips = GroundEntry("mild", None, pitch, slips=True)
         slips.name = "mild_slips"
         yield slips
     yield rft
@@ -294,7 +302,8 @@ def write_figures(args, records, file):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--records", default=ROOT / "grains" / "records", type=pathlib.Path)
-    parser.add_argument("--pitch", default=PITCH, type=float, help="[m] elements of mild's soles")
+    parser.add_argument("--pitch", default=0, type=float, help="[m] elements of mild's soles; default: a grain")
+    parser.add_argument("--edge", default=EDGE, type=float, help="[grains] by which the models' soles are wider on each side")
     parser.add_argument("--families", default=",".join(FITS), help="beds to fit on, of " + ", ".join(FITS))
     parser.add_argument("--models", default="", help="of mild; default: all that yield")
     parser.add_argument("--entry", action="append", default=[], help="FILE.py:FUNCTION or LIB.so:FUNCTION, a model of your own")
@@ -303,7 +312,7 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, help="folder for judge.csv and figures.html")
     args = parser.parse_args()
     args.curves, args.fitted, results, begin = {}, {}, [], time.time()
-    records = Records(args.records)
+    records = Records(args.records, args.edge)
     for fitted in args.families.split(","):
         if fitted not in FITS:
             fail(f"--families: {fitted} is not one of {', '.join(FITS)}")

@@ -84,13 +84,13 @@ WONG = {"dry sand": (1528.43e3, 0.99e3, 1.1), "LETE sand": (5301e3, 102e3, 0.793
 WIDTHS, WIDE = (0.03, 0.05, 0.3), 0.15  # [m]; whole elements of 10 mm
 
 
-def strip_case(width):
-    return Case(f"strip rect:{4 * width},{width} 0 press:0.015@0.05")
+def strip_case(width, edge=0.0):
+    return Case(f"strip rect:{4 * width},{width} 0 press:0.015@0.05", edge)
 
 
-def strip_ratio(entry, narrow=0.05):
-    """Pressure under a strip over that under one of 150 mm, 15 mm deep, both four times as long."""
-    rows = [entry.play(strip_case(width)) for width in (narrow, WIDE)]
+def strip_ratio(entry, narrow=0.05, edge=0.0):
+    """Pressure under a strip over that under one of 150 mm, 15 mm deep, both four times as long, on grains of the radius `edge` [m]."""
+    rows = [entry.play(strip_case(width, edge)) for width in (narrow, WIDE)]
     return np.nan if rows[0] is None else rows[0]["fz"][-1] / rows[1]["fz"][-1] * (WIDE / narrow)**2
 
 
@@ -110,7 +110,7 @@ def pressure_ratio(records, narrow, wide, depth, what):
         if key not in records.cases:
             return None
         case, beds = records.cases[key]
-        each.append([np.interp(depth, rows["depth"], rows["fz"]) / case.sole.area.sum() for rows in beds])
+        each.append([np.interp(depth, rows["depth"], rows["fz"]) / case.plate.area.sum() for rows in beds])
     noise = math.hypot(*(np.std(part, ddof=1) / np.mean(part) for part in each)) if min(map(len, each)) > 1 else math.nan
     ratio = np.mean(each[0]) / np.mean(each[1])
     return f"{ratio:.3f} +- {ratio * noise:.3f}{what}"
@@ -127,7 +127,7 @@ def anchors(entries, records, results):
     wong = "k_c, k_phi of Wong 2008, Theory of Ground Vehicles, table 2.3"
     yield ("pressure of a strip 50 mm wide over one of 150 mm, dry sand", f"{wong_ratio('dry sand', 0.05):.3f}", wong,
            pressure_ratio(records, "sand/strip", "wide/slab", 0.015, ", 120 x 60 over 200 x 120 mm, 15 mm deep"),
-           {entry.name: strip_ratio(entry) for entry in entries if not isinstance(entry, TableEntry)}, None)
+           {entry.name: strip_ratio(entry, edge=records.edge("sand")) for entry in entries if not isinstance(entry, TableEntry)}, None)
     for sand in WONG:
         strips = list(refitted(entries, [strip_case(0.05), strip_case(0.1)], functools.partial(wong_pressure, sand), 0.01))
         for narrow in WIDTHS:

@@ -6,16 +6,30 @@ import numpy as np
 
 COLUMNS = ("time", "stage", "depth", "path", "pitch", "fx", "fz", "my")  # of rows; SI, about the middle of the bottom
 GAP = 0.0005  # [m] above the surface, where a case begins
+EDGE = 0.5  # [-] of a grain: how much wider than it is a body touches, on each side (Sole)
+
+
+def widened(outline, by):
+    """An outline with every side moved outward by `by` [m]; corners stay corners."""
+    side = np.roll(outline, -1, 0) - outline
+    out = np.column_stack([side[:, 1], -side[:, 0]]) / np.hypot(*side.T)[:, None]
+    before = np.roll(out, 1, 0)  # the corner moves by what moves both of its sides
+    return outline + by * (before + out) / (1 + (before * out).sum(1))[:, None]
 
 
 class Sole:
     """A plate: kind, outline (points, 2) [m], the radius of a sphere or 0, and squares of it: x, y, z (from the lowest
-    point) and area."""
+    point) and area.
 
-    def __init__(self, text, pitch=0.004):
+    edge [m]: what grains of the radius r = edge touch. A grain touches a body where its centre is r from it, so what the
+    centres meet is the body with r around it; and they begin r below the surface, which is where a plate touches first. A
+    ball of the radius R that is u deep thus touches the grains of a level layer within sqrt(2 (R + r) u - u^2): it is a ball of R + r. The edge
+    of a plate is a ball of R = 0: it touches within sqrt(2 r u - u^2) beyond the outline, and within r from u = r on."""
+
+    def __init__(self, text, pitch=0.004, edge=0.0):
         self.text, (self.kind, numbers) = text, text.split(":")
         v = [float(number) for number in numbers.split(",")]
-        self.radius = v[0] if self.kind == "sphere" else 0.0
+        self.radius = v[0] + edge if self.kind == "sphere" else 0.0
         if self.kind in ("disc", "sphere"):
             angle = 2 * math.pi * np.arange(48) / 48
             self.outline = (0.5 * v[0] if self.kind == "disc" else v[0]) * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -23,6 +37,7 @@ class Sole:
             self.outline = 0.5 * np.array([[-v[0], -v[1]], [v[0], -v[1]], [v[0], v[1]], [-v[0], v[1]]])
         else:
             self.outline = np.array(v).reshape(-1, 2)
+        self.outline = widened(self.outline, edge) if edge else self.outline
         (x0, y0), (x1, y1) = self.outline.min(0), self.outline.max(0)
         self.length, self.width = x1 - x0, min(x1 - x0, y1 - y0)
         nx, ny = math.ceil((x1 - x0) / pitch), math.ceil((y1 - y0) / pitch)
@@ -45,20 +60,21 @@ class Sole:
 
 
 class Case:
-    """NAME SHAPE TILT STAGE..., as grains/plan.h has it. ways: (kind, seconds, vx, vz up, pitch rate, mass) of each stage."""
+    """NAME SHAPE TILT STAGE..., as grains/plan.h has it. ways: (kind, seconds, vx, vz up, pitch rate, mass) of each stage;
+    plate: the body; sole: what of it touches grains whose radius is `edge` [m], which models are given."""
 
-    def __init__(self, text):
+    def __init__(self, text, edge=0.0):
         self.key = ""  # FAMILY/NAME, for who knows the family
         self.name, shape, tilt, *stages = text.split()
-        self.text, self.sole, self.tilt = text, Sole(shape), math.radians(float(tilt))
-        self.start = -GAP - max(float((self.sole.outline[:, 0] * math.sin(self.tilt)).max()), 0.0) * (not self.sole.radius)
-        self.ways, depth = [], self.start
+        self.text, self.plate, self.sole, self.tilt = text, Sole(shape), Sole(shape, edge=edge), math.radians(float(tilt))
+        self.start = -GAP - max(float((self.plate.outline[:, 0] * math.sin(self.tilt)).max()), 0.0) * (not self.plate.radius)
+        self.ways, self.deepest, depth = [], self.start, self.start  # deepest: where the last way down or up leads
         for stage in stages:
             kind, numbers = stage.split(":")
             v = [float(number) for number in numbers.replace("@", ",").split(",")]
             if kind == "press":
                 self.ways.append((kind, abs(v[0] - depth) / v[1], 0.0, math.copysign(v[1], depth - v[0]), 0.0, 0.0))
-                depth = v[0]
+                depth = self.deepest = v[0]
             elif kind in ("drag", "load"):
                 self.ways.append((kind, abs(v[0]) / v[1], math.copysign(v[1], v[0]), 0.0, 0.0, 0.0))
             elif kind == "swipe":
@@ -106,7 +122,7 @@ def measure_press(case, rows):
     if case.tilt:  # of a level plate it is noise, or says only where the outline's middle is
         out["moment"] = moment
         out["traction"] = rows["fx"][deep].mean() / force if force else math.nan
-    if case.tilt or case.sole.kind == "polygon":
+    if case.tilt or case.plate.kind == "polygon":
         out["pressure_center"] = -1e3 * moment / normal if normal else math.nan
     return out
 
@@ -140,7 +156,7 @@ def measures(case, rows):
         return measure_slip(case, rows, kind)
     if kind == "swipe":
         stage = rows["stage"] == len(case.ways) - 1
-        return {"swipe": np.abs(rows["my"][stage]).max() / (case.sole.length * before(rows, len(case.ways) - 1))}
+        return {"swipe": np.abs(rows["my"][stage]).max() / (case.plate.length * before(rows, len(case.ways) - 1))}
     if kind == "drop":
         return {"sinkage": 1e3 * rows["depth"].max()}
     return measure_press(case, rows)

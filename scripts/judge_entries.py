@@ -21,7 +21,7 @@ import mild
 from judge_cases import COLUMNS
 
 STEP = 1e-3  # [s] of the ground models
-PITCH = 0.01  # [m] of their soles' elements: at 19.5 mm a plate's raster is up to 6 % off its area, which no law can mend
+PITCH = 0.005  # [m] of their soles' elements, a grain: half a grain wider on each side, a plate of whole grains is whole elements
 REGAIN = 0.28  # [-] regain_length of mild_merged by its slip_length, from loads that slide on grains of 5 mm
 GROWTH = 0.07  # [-] slip_growth: squares dragged 40 and 80 mm deep say 0.085 to 0.09, but then a load on small grains sinks too far (docs/grains.md)
 REFILL = 0.22  # [-] from an imprint pressed again, sand/square100-again

@@ -3,6 +3,8 @@
 over fine squares of the plate, beside the grains. Nothing is fitted to a tilted plate.
 
     PYTHONPATH=build/python .venv/bin/python scripts/judge_tilt.py
+    ... scripts/judge_tilt.py --edge 0,0.25,0.5,0.75,1      means alone, by how much of a grain the soles are wider on each side
+    ... scripts/judge_tilt.py --predict                     force and moment of cases of grains/run.py that have no record
 
 With theta the tilt, e the distance to the sole's edge, T = tan(alpha)/nu, u the depth of a square:
 
@@ -15,13 +17,14 @@ With theta the tilt, e the distance to the sole's edge, T = tan(alpha)/nu, u the
     half drag      water line, and half of the pressure along the normal and half against the way: q = (1 + cos(theta))/2,
                    F_x = F_z tan(theta/2)"""
 import argparse
+import importlib.util
 import math
 import pathlib
 
 import numpy as np
 
 from judge import FITS, Records, mean_rows
-from judge_cases import Sole
+from judge_cases import Case, Sole
 from judge_entries import GroundEntry
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -54,31 +57,100 @@ def law(form, material, sole, tilt, depth, free):
     return force.sum(), -normal * (sole.x * force).sum()
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--records", default=ROOT / "grains" / "records", type=pathlib.Path)
-    records, errors = Records(parser.parse_args().records), {form: ([], []) for form in FORMS}
+def fitted_law(records, fitted):
+    """The numbers of the law that the judge has on a family of beds. Elements divide the plates of sand."""
+    entry = GroundEntry(MODEL, pitch=records.ground(fitted)["grain"] / (1 if records.share in (0, 0.5, 1) else 2))
+    names = [f"{fitted}/{name}" for name in FITS[fitted][0]]
+    entry.fit({name: (records.cases[name][0], mean_rows(records.cases[name][1])) for name in names}, records.ground(fitted))
+    return entry.material
+
+
+def deep(case, depth):
+    """Where a press is in the deepest 40 % of its way, of which the judge's numbers are."""
+    return depth > case.start + 0.6 * (depth[-1] - case.start)
+
+
+def predicted(forms, material, case, edge_m, depths):
+    """Mean force [N] and moment [N m] of each form over depths of the middle."""
+    sole = Sole(case.sole.text, SQUARE, edge_m)
+    free = edge(sole)
+    return {form: np.mean([law(form, material, sole, case.tilt, depth, free) for depth in depths], 0) for form in forms}
+
+
+def presses(records, families):
+    return {key: row for key, row in records.cases.items() if key.split("/")[0] in families and row[0].kind == "press" and not row[0].plate.radius}
+
+
+def print_tilted(records):
+    errors = {form: ([], []) for form in FORMS}
     print(f"errors of force and moment [%]\n{'':24}{'F_x/F_z':>8}{'half':>7}" + "".join(f"{form:>16}" for form in FORMS))
-    for fitted, (names, families) in FITS.items():
-        tilted = {key: row for key, row in records.cases.items() if key.split("/")[0] in families and row[0].kind == "press" and row[0].tilt}
-        if not tilted:
-            continue
-        entry = GroundEntry(MODEL)
-        entry.fit({f"{fitted}/{name}": (records.cases[f"{fitted}/{name}"][0], mean_rows(records.cases[f"{fitted}/{name}"][1])) for name in names},
-                  records.ground(fitted))
+    for fitted, (_, families) in FITS.items():
+        tilted = {key: row for key, row in presses(records, families).items() if row[0].tilt}
+        material = fitted_law(records, fitted) if tilted else None
         for key, (case, beds) in tilted.items():
-            rows, sole = mean_rows(beds), Sole(case.sole.text, SQUARE)
-            deep = rows["depth"] > case.start + 0.6 * (rows["depth"][-1] - case.start)
-            fx, fz, my = (rows[name][deep].mean() for name in ("fx", "fz", "my"))
-            cells, free = [], edge(sole)
-            for form in FORMS:
-                force, moment = np.mean([law(form, entry.material, sole, case.tilt, depth, free) for depth in rows["depth"][deep]], 0)
+            rows = mean_rows(beds)
+            rows = {name: rows[name][deep(case, rows["depth"])] for name in ("depth", "fx", "fz", "my")}
+            fx, fz, my = (rows[name].mean() for name in ("fx", "fz", "my"))
+            cells = []
+            for form, (force, moment) in predicted(FORMS, material, case, records.edge(fitted), rows["depth"]).items():
                 for part, error in zip(errors[form], (force / fz - 1, moment / my - 1)):
                     part.append(error)
                 cells.append(f"{100 * (force / fz - 1):+8.0f}{100 * (moment / my - 1):+8.0f}")
             print(f"{key:24}{fx / fz:8.3f}{math.tan(case.tilt / 2):7.3f}" + "".join(cells))
-    print(f"{'mean size':39}" + "".join(f"{100 * np.abs(force).mean():8.1f}{100 * np.abs(moment).mean():8.1f}" for force, moment in errors.values()))
-    print(f"{'largest':39}" + "".join(f"{100 * np.abs(force).max():8.1f}{100 * np.abs(moment).max():8.1f}" for force, moment in errors.values()))
+    for name, of in (("mean size", np.mean), ("largest", np.max)):
+        print(f"{name:39}" + "".join(f"{100 * of(np.abs(force)):8.1f}{100 * of(np.abs(moment)):8.1f}" for force, moment in errors.values()))
+
+
+def print_scan(folder, shares):
+    """Errors of level plates and of tilted ones, by how much of a grain the soles are wider."""
+    forms = ("as it is", "water line")
+    print(f"mean and largest size of errors [%]\n{'grains wider':14}{'level force':>16}" + "".join(f"{form + part:>24}" for form in forms for part in (", force", ", moment")))
+    for share in shares:
+        records, level, tilted = Records(folder, share), [], {form: [] for form in forms}
+        for fitted in ("sand", "slick", "fine"):
+            material = fitted_law(records, fitted)
+            for case, beds in presses(records, FITS[fitted][1]).values():
+                rows = mean_rows(beds)
+                rows = {name: rows[name][deep(case, rows["depth"])] for name in ("depth", "fz", "my")}
+                for form, (force, moment) in predicted(forms, material, case, records.edge(fitted), rows["depth"]).items():
+                    if case.tilt:
+                        tilted[form].append((force / rows["fz"].mean() - 1, moment / rows["my"].mean() - 1))
+                    elif form == forms[0]:
+                        level.append(force / rows["fz"].mean() - 1)
+        columns = [level, *(np.array(tilted[form])[:, part] for form in forms for part in (0, 1))]
+        print(f"{share:<14}" + "".join(f"{100 * np.mean(np.abs(column)):{width}.1f}{100 * np.max(np.abs(column)):6.1f}"
+                                       for column, width in zip(columns, (10, 18, 18, 18, 18))))
+
+
+def print_predictions(records):
+    """Cases of tilted plates in grains/run.py that have no record: what the forms say."""
+    spec = importlib.util.spec_from_file_location("run", ROOT / "grains" / "run.py")
+    run = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(run)
+    forms = ("as it is", "water line", "normal depth")
+    print(f"force up [N] and moment [N m], means over the deepest 40 % of the way\n{'':24}" + "".join(f"{form:>20}" for form in forms))
+    for fitted, (_, families) in FITS.items():
+        lacking = {f"{family}/{text.split()[0]}": Case(text, records.edge(fitted)) for family, texts in run.BLOCKS for text in texts if family in families}
+        lacking = {key: case for key, case in lacking.items() if case.kind == "press" and case.tilt and key not in records.cases}
+        material = fitted_law(records, fitted) if lacking else None
+        for key, case in lacking.items():
+            depth = np.linspace(case.start, case.deepest, 400)
+            found = predicted(forms, material, case, records.edge(fitted), depth[deep(case, depth)])
+            print(f"{key:24}" + "".join(f"{force:11.1f}{moment:9.3f}" for force, moment in found.values()))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--records", default=ROOT / "grains" / "records", type=pathlib.Path)
+    parser.add_argument("--edge", default="", help="shares of a grain, e.g. 0,0.25,0.5")
+    parser.add_argument("--predict", action="store_true")
+    args = parser.parse_args()
+    if args.edge:
+        print_scan(args.records, [float(share) for share in args.edge.split(",")])
+    elif args.predict:
+        print_predictions(Records(args.records))
+    else:
+        print_tilted(Records(args.records))
 
 
 if __name__ == "__main__":

@@ -59,6 +59,7 @@ void foot_carry(const FootScratch *foot, const Motion *now, double dt) {
         faces_lean(foot, now);
     } else {
         slots_lean(foot);
+        soles_lean(foot);
     }
     const double rate = 1.0 / dt;
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {

@@ -30,6 +30,36 @@ static double ahead_of(const FootScratch *foot, int i, const Element *element, c
     return share_ahead(element, &share, s->lean[l], n, v.x, v.y, v.descent);
 }
 
+/* Functions of their own, because that is smaller. */
+#define RIM_CALLED static __attribute__((noinline))
+
+/* [N] rim_force of a slot. */
+RIM_CALLED double force_of(const Slots *s, int l, double u) {
+    Element element = slot_element(s, l);
+    element.law.cone_begin = s->cone_begin[l];
+    return rim_force(&element.law, u);
+}
+
+/* [-] rim_share of a slot at the depth u. */
+RIM_CALLED double share_of_slot(const Slots *s, int l, double bears, double u) {
+    const Element element = slot_element(s, l);
+    return rim_share(&element.law, s->recovery[l], bears, force_of(s, l, u));
+}
+
+void soles_lean(const FootScratch *foot) {
+    for (int i = 0; i < foot->active; i++) {
+        Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
+        const Element element = slot_element(s, l);
+        const double u = rim_under(s->depth[l], s->depth_max[l]);
+        const double wet = rim_wet(&element.law, foot->heap[foot->element[i]].width, u, s->lean[l]);
+        if (wet < u) { /* rim_water */
+            const double bears = force_of(s, l, wet) + s->line_stiffness[l] * (u - wet);
+            s->lean[l] *= share_of_slot(s, l, bears, u);
+        }
+    }
+}
+
 void faces_lean(const FootScratch *foot, const Motion *now) {
     double sums[RIM_SUMS] = {0.0};
     for (int i = 0; i < foot->active; i++) {
@@ -42,10 +72,10 @@ void faces_lean(const FootScratch *foot, const Motion *now) {
         const RimPoint at = point_of(foot, i);
         Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;
-        Element element = slot_element(s, l);
-        element.law.cone_begin = s->cone_begin[l];
-        const double level = rim_level(&rim, &element.law, foot->heap->width, s->recovery[l], at.x,
-                                       at.y, at.u, at.down);
+        const Element element = slot_element(s, l);
+        const double bears =
+            rim_bears(&rim, &element.law, foot->heap->width, at.x, at.y, at.u, at.down);
+        const double level = share_of_slot(s, l, bears, at.u);
         s->lean[l] = s->projects[l] > 0.0 && at.u > 0.0 ? level : 1.0;
         s->ahead[l] = ahead_of(foot, i, &element, now, at.down);
     }

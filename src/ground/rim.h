@@ -1,4 +1,5 @@
-/* What the rim of a rounded body leaves of its load (docs/model.md section 23).
+/* What the rim of a body leaves of its load: of a rounded body (docs/model.md section 23), and of a
+ * plane sole that is tilted (section 21).
  *
  * Under a merged sole (law.h) the pressure at the distance e from the edge is that of the ground
  * beside the edge, at the edge's depth d, and what the heap adds on the way in:
@@ -18,7 +19,15 @@
  *     b = 2 sqrt(least eigenvalue of cov x)   [m] half the breadth: the radius of a disc
  *     e = b (1 - sqrt(1 - v/H))               [m] distance to the rim
  * Elements steeper than 60 degrees are walls, which grains pass (the angle of SHARE_PASSIVE): they
- * are outside the rim and keep SHARE_LEAN of their load. */
+ * are outside the rim and keep SHARE_LEAN of their load.
+ *
+ * A plane sole at the angle theta to the ground has a rim, too, where it enters the ground: the
+ * water line, u/sin(theta) from an element. Its heap has no more edge than that,
+ *
+ *     c = cos(theta) (kappa u + (k0 - kappa) P_w)/(kappa u + (k0 - kappa) P(u))
+ *     P_w = mean over the cell of min(u, T e, T u/sin(theta)) = P(u min(1, T/sin(theta)))
+ * Below the angle of its heap, sin(theta) < T, the line is nowhere nearer than u/T and c is the
+ * cosine. */
 #ifndef MILD_GROUND_RIM_H
 #define MILD_GROUND_RIM_H
 
@@ -100,20 +109,53 @@ MILD_HD Rim rim_of(const Real *sums) {
     return rim;
 }
 
-/* [-] c of an element, for element_share. law: its own, without a share. width: [-] as in
- * SoleHeap. u: [m] its depth, above 0. */
-MILD_HD Real rim_level(const Rim *rim, const Law *law, Real width, Real recovery, Real x, Real y,
-                       Real u, Real down) {
+/* [-] c: what an element bears over what it would bear alone. law: its own. */
+MILD_HD Real rim_share(const Law *law, Real recovery, Real bears, Real alone) {
+    const Real level = bears / (alone + ELEMENT_TINY);
+    /* Ground that springs back is no grains. */
+    const Real blend = level + (1 - level) * recovery;
+    return law->flat_stiffness > 0 ? real_min(real_max(blend, SHARE_LEAN), 1) : 1;
+}
+
+/* [N] Force of an element alone at the depth u. */
+MILD_HD Real rim_force(const Law *law, Real u) {
+    return law_bedless_force(law, LAW_CONE | LAW_HEAP, u);
+}
+
+/* [N] What an element of a rounded body bears. width: [-] as in SoleHeap. u: [m] its depth, above
+ * 0. */
+MILD_HD Real rim_bears(const Rim *rim, const Law *law, Real width, Real x, Real y, Real u,
+                       Real down) {
     const Real d = rim->depth + rim->slope[0] * (x - rim->x) + rim->slope[1] * (y - rim->y);
     const Real v = (u - d + RIM_MEAN * RIM_FLAT) / (rim->height + RIM_FLAT);
     const Real inside = 1 - REAL_SQRT(1 - real_min(real_max(v, 0), 1));
     const Real heap = law->cone_depth * (inside * rim->breadth / (RIM_RADIUS * width));
-    const Real whole = law_bedless_force(law, LAW_CONE | LAW_HEAP, u);
     const Real bears = law->line_stiffness * real_max(d, 0) + law->flat_stiffness * heap;
-    const Real level = down >= RIM_STEEP ? bears / (whole + ELEMENT_TINY) : 0;
-    /* Ground that springs back is no grains. */
-    const Real blend = level + (1 - level) * recovery;
-    return law->flat_stiffness > 0 ? real_min(real_max(blend, SHARE_LEAN), 1) : 1;
+    return down >= RIM_STEEP ? bears : 0;
+}
+
+/* [m] The depth u of an element of a plane sole, for rim_wet. */
+MILD_HD Real rim_under(Real depth, Real deepest) {
+    return real_max(real_max(depth, deepest), RIM_HAIR);
+}
+
+/* [m] u min(1, T/sin(theta)): so deep, an element of a level sole has the heap of one of a sole
+ * whose cosine to the ground is `level`. */
+MILD_HD Real rim_wet(const Law *law, Real width, Real u, Real level) {
+    const Real most = law->cone_depth;
+    const Real flat = RIM_RADIUS * width;                  /* u_f, were T 1 */
+    const Real square = flat * flat * (1 - level * level); /* of u_f, were T the sine */
+    return square > most * most ? u * (most / REAL_SQRT(square)) : u;
+}
+
+/* [-] c of an element of a plane sole. */
+MILD_HD Real rim_water(const Law *law, Real width, Real recovery, Real u, Real level) {
+    const Real wet = rim_wet(law, width, u, level);
+    if (!(wet < u)) {
+        return level;
+    }
+    const Real bears = rim_force(law, wet) + law->line_stiffness * (u - wet);
+    return level * rim_share(law, recovery, bears, rim_force(law, u));
 }
 
 #endif

@@ -269,6 +269,23 @@ static double rim_share(const DenseElement *e, const Find *find) {
     return left + (1.0 - left) * law->recovery;
 }
 
+/* The same of a sole whose cosine to the ground is `level`: each cell of the heap is no higher over
+ * its edge than over the line where the sole enters the ground, u/sin(theta) away. */
+static double water_share(const DenseElement *e, const Find *find, double level) {
+    const DenseLaw *law = &e->law;
+    const double radius = 0.0195 / sqrt(acos(-1.0)), sine = sqrt(1.0 - level * level),
+                 deep = fmax(fmax(e->u0, e->seen), 2e-5),
+                 heap = law->full / (radius * find->heap[1]),
+                 lowest = sine > heap ? heap / sine : 1.0;
+    if (!(law->k_pen > law->kappa)) {
+        return level;
+    }
+    const double flat = law->k_pen - law->kappa,
+                 left = (law->kappa * deep + flat * cone_share(law, deep * lowest)) /
+                        (law->kappa * deep + flat * cone_share(law, deep));
+    return level * (left + (1.0 - left) * law->recovery);
+}
+
 /* The share of virgin ground that it carries: the line keeps its slope and ends deeper. up: normal
  * of the sole's upper face. */
 static void dense_share(double dt, DenseElement *e, const Find *find, const double now[4]) {
@@ -276,12 +293,10 @@ static void dense_share(double dt, DenseElement *e, const Find *find, const doub
     const double *g = find->slope, a = e->deep;
     double level = (-find->normal[2] + g[0] * find->normal[0] + g[1] * find->normal[1]) /
                    sqrt(1.0 + g[0] * g[0] + g[1] * g[1]);
-    if (find->faces) {
-        level = rim_share(e, find);
-    }
-    double c = 1.0 - law->projected * (1.0 - fmin(fmax(level, 0.02), 1.0)),
-           q = fmin(1.0 - find->memory.worn[find->i], c), soil = virgin_force(law, a),
-           bed = law->bed_stiffness * fmax(a - law->bed, 0.0);
+    level = fmin(fmax(level, 0.02), 1.0);
+    level = find->faces ? fmin(fmax(rim_share(e, find), 0.02), 1.0) : water_share(e, find, level);
+    double c = 1.0 - law->projected * (1.0 - level), q = fmin(1.0 - find->memory.worn[find->i], c),
+           soil = virgin_force(law, a), bed = law->bed_stiffness * fmax(a - law->bed, 0.0);
     if (law->grip > 0.0) {
         double t = (3.0 + sqrt(8.0)) * law->grip,
                held = fmin(law->mu, fmax(0.1, t * (c - q) / (2.0 * c - q))),

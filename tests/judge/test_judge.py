@@ -25,6 +25,7 @@ from judge_entries import GroundEntry  # noqa: E402
 
 TRUTH = mild.Material("sand_loose", mu=0.4, recovery=0.0)
 NOISE, BEDS = 0.03, 4
+EDGE = 0.0025  # [m] half of a grain of sand
 KEEP = ("sand/disc120", "sand/square100", "sand/square100-drag15", "sand/disc100", "sand/square100-tilt15",
         "sand/square100-load10", "sand/square100-swipe15", "sand/square100-again", "sand/square100-drop05", "wide/sa01")
 
@@ -43,7 +44,7 @@ def make(folder):
     for key in KEEP:
         family, name = key.split("/")
         (folder / family).mkdir(exist_ok=True)
-        case = Case(every[key])
+        case = Case(every[key], EDGE)  # as grains touch it
         rows = GroundEntry("mild", TRUTH, 0.0195).play(case)
         for seed in range(1, BEDS + 1):
             factor = 1 + NOISE * random.standard_normal() * np.ones(3)
@@ -67,6 +68,20 @@ def a_sole_has_its_area():
         got = Sole(text).area.sum()
         print(f"{text}: area {got:.6f}, by hand {area:.6f} (2 %)")
         assert abs(got / area - 1) < 0.02
+    r, u = 0.0025, 0.01
+    for text, area in (("rect:0.1,0.06", 0.105 * 0.065), ("disc:0.12", np.pi / 4 * 0.125**2), ("sphere:0.05", np.pi * 0.0525**2),
+                       ("polygon:0.05,0,0,0.05,-0.05,0,0,-0.05", 2 * (0.05 + 2**0.5 * r)**2)):
+        got = Sole(text, 0.001, r).area.sum()
+        print(f"{text}: with half a grain of 5 mm around it {got:.6f}, by hand {area:.6f} (1 %)")
+        assert abs(got / area - 1) < 0.01
+    # a ball whose centre is at R - u meets a grain whose centre is at -r, where both centres are R + r apart
+    ball, apart = Sole("sphere:0.05", 0.001, r), ((0.05 + r)**2 - (0.05 - u + r)**2)**0.5
+    wet = ball.x[ball.depths(u, 0.0) > 0].max()
+    print(f"a ball of 100 mm, 10 mm deep, touches grains within {1e3 * apart:.1f} mm; its squares {1e3 * wet:.1f} mm")
+    assert abs(wet - apart) < 0.001
+    case = Case("x rect:0.1,0.1 15 press:0.02@0.05", r)
+    assert abs(case.plate.length - 0.1) < 1e-12 and abs(case.sole.length - 0.105) < 1e-12
+    assert case.start == Case("x rect:0.1,0.1 15 press:0.02@0.05").start, "the grains' plate begins where it did"
     turned = Sole("rect:0.1,0.06")
     assert abs(turned.depths(0.01, 0.3).max() - (0.01 + 0.048 * np.sin(0.3))) < 1e-9
 
@@ -149,13 +164,13 @@ def real_numbers():
 
 def mild_fit_says_the_same(folder):
     """The judge's numbers of sand, from the mean of eight beds and elements of 10 mm, are within the intervals that `mild fit` gives
-    five beds of the same records and the paper's elements."""
+    five beds of the same records and the paper's elements, of plates that are half a grain wider on each side."""
     records = judge_module.Records(SOURCE / "grains" / "records")
     names, ground = judge_module.FITS["sand"][0], records.ground("sand")
     entry = GroundEntry("mild_merged")
     entry.fit({f"sand/{name}": (records.cases[f"sand/{name}"][0], judge_module.mean_rows(records.cases[f"sand/{name}"][1])) for name in names}, ground)
     words = []
-    for name, plate in zip(names, ("0.12", "0.1,0.1", "0.1,0.1")):
+    for name, plate in zip(names, ("0.125", "0.105,0.105", "0.105,0.105")):
         for bed, rows in enumerate(records.cases[f"sand/{name}"][1][:5]):
             file = folder / f"{name}-{bed}.csv"
             columns = np.column_stack([rows[column] for column in ("time", "depth", "fz", "path", "fx")])

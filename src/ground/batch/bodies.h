@@ -10,7 +10,6 @@
 
 #include "base/hd.h"
 #include "ground/batch/contact.h"
-#include "ground/rim.h"
 
 #define BODIES_MAX 9 /* feet, and bodies with shells: those of the Go1 */
 #define BODIES_ROWS (6 * BODIES_MAX)
@@ -381,14 +380,18 @@ MILD_HD Real bodies_lean(const BodiesWork *work, const BodiesSole *sole, int i, 
     const Real *R = work->rotation[i];
     const Real normal[3] = {R[2], R[5], R[8]};
     if (!sole->face) {
-        return contact_lean(normal, own->slope[0], own->slope[1]);
+        const Real u = rim_under(own->depth, work->memory[i].element[s]);
+        const Real level = contact_lean(normal, own->slope[0], own->slope[1]);
+        return rim_water(&own->element.law, sole->width[s], own->element.recovery, u, level);
     }
     const Real u = bodies_rim_depth(&work->memory[i], s, own);
     if (!(material->projects > 0 && u > 0)) {
         return 1;
     }
-    return rim_level(&work->rim[i], &own->element.law, sole->breadth, own->element.recovery,
-                     own->p[0], own->p[1], u, own->down);
+    const Law *law = &own->element.law;
+    const Real bears =
+        rim_bears(&work->rim[i], law, sole->breadth, own->p[0], own->p[1], u, own->down);
+    return rim_share(law, own->element.recovery, bears, rim_force(law, u));
 }
 
 /* Its share of the load, there too. */

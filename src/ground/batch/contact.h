@@ -11,7 +11,7 @@
 #include "ground/map_view.h"
 #include "ground/motion.h"
 #include "ground/plate.h"
-#include "ground/share.h"
+#include "ground/rim.h"
 #include "ground/shear.h"
 
 #define CONTACT_FEET_MAX 4
