@@ -81,7 +81,7 @@ def rft_friction(stress):
 # k_phi [N/m^(n+2)], k_c [N/m^(n+1)], n of Wong, Theory of Ground Vehicles (2008), table 2.3, as Chrono's examples have two of its sands
 # (its vehicle demos with SCM); the pressure of a strip. The table has no scatter, no plates' widths and no depths.
 WONG = {"dry sand": (1528.43e3, 0.99e3, 1.1), "LETE sand": (5301e3, 102e3, 0.793)}
-WIDTHS, WIDE = (0.03, 0.05, 0.3), 0.15  # [m]; whole elements of 10 mm
+WIDTHS, WIDE = (0.03, 0.05, 0.3), 0.15  # [m]; whole elements of 5 mm
 
 
 def strip_case(width, edge=0.0):

@@ -53,7 +53,7 @@ void soles_lean(const FootScratch *foot) {
         const Element element = slot_element(s, l);
         const double u = rim_under(s->depth[l], s->depth_max[l]);
         const double wet = rim_wet(&element.law, foot->heap[foot->element[i]].width, u, s->lean[l]);
-        if (wet < u) { /* rim_water */
+        if (wet < u) { /* as rim_water, which is 0.2 kB larger here */
             const double bears = force_of(s, l, wet) + s->line_stiffness[l] * (u - wet);
             s->lean[l] *= share_of_slot(s, l, bears, u);
         }

@@ -163,7 +163,7 @@ def real_numbers():
 
 
 def mild_fit_says_the_same(folder):
-    """The judge's numbers of sand, from the mean of eight beds and elements of 10 mm, are within the intervals that `mild fit` gives
+    """The judge's numbers of sand, from the mean of eight beds and elements of a grain, are within the intervals that `mild fit` gives
     five beds of the same records and the paper's elements, of plates that are half a grain wider on each side."""
     records = judge_module.Records(SOURCE / "grains" / "records")
     names, ground = judge_module.FITS["sand"][0], records.ground("sand")
