@@ -39,6 +39,8 @@ set(batch_kernels
   "4 8 flat   any    8")
 set(generated ${CMAKE_BINARY_DIR}/generated/batch)
 mild_layer(ground/batch layer_ground layer_device)
+# lanes in loops, as in cmake/Env.cmake: nothing gains from -O3 but the time to compile
+set_source_files_properties(ground/batch/bodies_host.c PROPERTIES COMPILE_OPTIONS "$<$<NOT:${mild_sanitized}>:-O2>")
 target_include_directories(layer_batch PUBLIC ${generated})
 
 # contact_shapes.h: lists of the sizes. The CPU has one step for all of them (host.inc)
@@ -99,7 +101,8 @@ file(CONFIGURE OUTPUT ${generated}/ground/batch/contact_shapes.h @ONLY CONTENT [
 #define CONTACT_PER_MAX @contact_per_max@ /* elements of a lane */
 ]=])
 if(MILD_CUDA)
-  add_library(batch_device STATIC ${units} ${CMAKE_SOURCE_DIR}/src/ground/batch/reset.cu)
+  add_library(batch_device STATIC ${units} ${CMAKE_SOURCE_DIR}/src/ground/batch/reset.cu
+    ${CMAKE_SOURCE_DIR}/src/ground/batch/bodies.cu)
   target_include_directories(batch_device PRIVATE ${CMAKE_BINARY_DIR}/layers/batch)
   target_link_libraries(batch_device PRIVATE layer_ground layer_device)
   # quotients and roots within two units in the last place, and no denormal numbers

@@ -8,6 +8,12 @@
  *     mild_batch_step(...)         wrenches on the feet and twists after the step
  *     tau += J^T wrench            then integrate
  *
+ * A foot is any body with a sole, as in mild/ground.h: shins, thighs, the base and wheels too, by
+ * mild_sole_surface. Plane soles come first in all arrays. Where a robot has surfaces, feet and the
+ * surfaces near the ground are solved at once, by a slower method on a GPU (four warps a robot in
+ * the place of one). A robot whose surfaces are all away from the ground in a step takes the fast
+ * method for its feet.
+ *
  * Values are those of mild_ground_solve and mild_ground_advance within the rounding of float. Along
  * a walk, forces differ by less than 1e-4 of their size in 99 of 100 steps. A step that plain
  * Newton steps do not solve keeps the best point seen, with its residual, and one in which friction
@@ -15,9 +21,9 @@
  *
  * The ground is level, or has the heights and the labels of one map (mild_batch_set_map), in which
  * each robot has a place, a height and materials of its own. There are no patches, blended borders
- * or imprints yet. Blended borders are refused by name. Materials may be of any model but rigid,
- * which has none; materials of several models may be in one table, if the soles are those of each
- * (mild_sole_concentric).
+ * or imprints yet, and no results for the elements of robots with surfaces. Blended borders are
+ * refused by name. Materials may be of any model but rigid, which has none; materials of several
+ * models may be in one table, if the soles are those of each (mild_sole_concentric).
  *
  * World coordinates are floats: 50 m from the origin they are in steps of 4e-6 m. The place on the
  * map follows from them without further loss, so that a depth is wrong by what the foot's own
@@ -34,8 +40,9 @@
 
 MILD_API_BEGIN
 
-#define MILD_BATCH_HOST (-1)  /* the CPU in the place of a device */
-#define MILD_BATCH_FEET_MAX 4 /* feet of a robot */
+#define MILD_BATCH_HOST (-1)    /* the CPU in the place of a device */
+#define MILD_BATCH_FEET_MAX 9   /* feet of a robot */
+#define MILD_BATCH_PLANES_MAX 4 /* of them with plane soles */
 
 /* Ground under `robots` robots; see mild_batch_create. */
 typedef struct MildBatch MildBatch;
@@ -44,14 +51,14 @@ typedef struct MildBatch MildBatch;
 typedef struct {
     int robots;                   /* at least 1 */
     int feet;                     /* of each, 1 .. MILD_BATCH_FEET_MAX */
-    const MildSole *const *soles; /* [feet], not kept */
+    const MildSole *const *soles; /* [feet] plane soles, then surfaces; not kept */
     double dt;                    /* [s] above 0, at most 0.1 */
     double tolerance;             /* [-] of the residual, below 1; 0: 1e-4 */
     int max_iterations;           /* bound of Newton steps; 0: 20 */
     int device;                   /* a CUDA device, from 0, or MILD_BATCH_HOST */
-    /* bool: no foot transmits a moment, as a ball does: rows and columns of moments in every
-     * inverse_inertia are 0. On three or four feet of up to eight elements they are then not read,
-     * and a step is faster; otherwise the flag changes nothing. */
+    /* bool: no plane sole transmits a moment, as a ball does: its rows and columns of moments in
+     * every inverse_inertia are 0. On three or four plane soles of up to eight elements a step is
+     * then faster, and without surfaces they are not read; otherwise the flag changes nothing. */
     int points;
 } MildBatchDef;
 
@@ -86,27 +93,30 @@ typedef struct {
     float *elements;     /* [robots][4][feet][stride] depth [m], normal, tangent_x, tangent_y [N] of
                             the elements, in their order; behind a sole's elements, up to
                             mild_batch_stride, a depth of -1000 and no force. On uneven ground
-                            the depth that the law takes (docs/model.md section 6) */
+                            the depth that the law takes (docs/model.md section 6). NULL where a
+                            sole is a surface */
     float *residual;     /* [robots] [-] relative, in the metric of kinetic energy; 0 in the air */
     int32_t *iterations; /* [robots] Newton steps; 0 in the air */
 } MildBatchOutput;
 
 /* Makes a batch on which nothing has stepped yet, with the material sand_loose. NULL, with the
- * field's name and the remedy in *error, when a number is out of range, when a sole has more
- * elements than a warp takes (256, 128 or 64 with one, two or more feet), without the device or
- * memory. This build may be without CUDA: then only MILD_BATCH_HOST is there. */
+ * field's name and the remedy in *error, when a number is out of range, when a plane sole is behind
+ * a surface or has more elements than a warp takes (256, 128 or 64 with one, two or more plane
+ * soles), when a robot with surfaces has more than 1536 elements, without the device or memory.
+ * This build may be without CUDA: then only MILD_BATCH_HOST is there. */
 MildBatch *mild_batch_create(const MildBatchDef *def, MildError *error);
 /* Frees a batch; NULL is allowed. Waits for the device. */
 void mild_batch_destroy(MildBatch *batch);
 /* [B] Memory of one robot on the device. */
 size_t mild_batch_robot_bytes(const MildBatch *batch);
-/* Room for the elements of a foot, at least those of the largest sole: distance of feet in
+/* Room for the elements of a foot, at least those of the largest plane sole: distance of feet in
  * MildBatchOutput.elements. */
 int mild_batch_stride(const MildBatch *batch);
 
 /* Replaces the table of materials that MildBatchInput.material points into. materials: [count], of
- * any model, checked by mild_material_check. Waits for the device.
- * A graph captured before holds the old table: capture it again. Fails with the table unchanged. */
+ * any model, checked by mild_material_check and, of bekker, by the width of every sole. Waits for
+ * the device. A graph captured before holds the old table: capture it again. Fails with the table
+ * unchanged. */
 MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
                                     MildError *error);
 
@@ -120,7 +130,8 @@ MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *e
 /* Solves a contact step of every robot and, with `advance`, moves the memory of the ground to its
  * end: do that once for each step that the engine keeps. On a GPU it only puts the work into
  * `stream`, allocates nothing and waits for nothing, so it may be captured in a graph. Fails when
- * the device does. */
+ * the device does, and with nothing done when output->elements is asked for and a sole is a
+ * surface. */
 MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
                            const MildBatchOutput *output, int advance, MildStream stream,
                            MildError *error);

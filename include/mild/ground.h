@@ -291,8 +291,8 @@ typedef struct {
  * horizontal plane when it touched down. On ground of mild_merged that keeps its imprint a rounded
  * surface is carried from its rim, and elements steeper than 60 degrees carry next to nothing
  * (docs/model.md, section 23). A surface serves wherever a sole does, except in
- * mild_sole_concentric, mild_model_match and a MildBatch, which refuse it, and mild_sole_sinkage,
- * which takes it for a level sole. Returns NULL, with the name of the field in *error, when a
+ * mild_sole_concentric and mild_model_match, which refuse it, and mild_sole_sinkage, which takes it
+ * for a level sole. Returns NULL, with the name of the field in *error, when a
  * number is out of range, when a closed mesh has its triangles turned inward, when nothing is left
  * or more than 65536 elements are, or when out of memory. `def` is not kept. */
 MildSole *mild_sole_surface(const MildSurfaceDef *def, MildError *error);

@@ -158,10 +158,9 @@ MILD_HD int env_shells_wait(const EnvsArrays *all, long robot) {
 MILD_HD BodiesMemory env_foot_memory(const EnvsShells *shells, long robot, int f) {
     const BatchShape *shape = &shells->shape;
     const int all = shape->groups * shape->stride;
-    Real *memory = shells->ground.memory + robot * contact_memory_numbers(all, shape->map);
-    const BodiesMemory at = {memory + f * shape->stride, all, memory + all * CONTACT_MAP_MEMORY + f,
-                             shape->groups};
-    return at;
+    return bodies_foot_memory(shells->ground.memory +
+                                  robot * contact_memory_numbers(all, shape->map),
+                              shape->groups, shape->stride, f);
 }
 
 MILD_HD BodiesMemory env_body_memory(const EnvsArrays *all, long robot, int body) {

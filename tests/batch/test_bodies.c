@@ -367,15 +367,7 @@ static MildMap *open_place(Kit *kit, const Place *place, uint64_t *random) {
     const MildMaterial first = draw_material(place->model, random);
     MildMap *map = map_of_place(place, random);
     kit_open(kit, BODIES, soles[0], soles[1], &first, steps[kit_index(random, 3)]);
-    mild_scratch_destroy(kit->scratch);
-    free(kit->ground);
-    for (int b = 0; b < BODIES; b++) {
-        kit->soles[b] = soles[b];
-    }
-    kit->scratch = mild_scratch_create(kit->soles, BODIES, NULL);
-    kit->bytes = mild_ground_bytes(kit->soles, BODIES);
-    kit->ground = mild_ground_init(aligned_alloc(64, kit->bytes), kit->soles, BODIES);
-    assert_non_null(kit->scratch);
+    kit_soles(kit, (const MildSole *const *)soles);
     kit->terrain.map = map;
     for (int m = 1; map && m < CASE_LABELS; m++) {
         kit->terrain.materials[m] = draw_material(m == 1 ? place->other : 0, random);

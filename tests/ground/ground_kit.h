@@ -131,6 +131,18 @@ static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right,
     }
 }
 
+/* Other soles, [feet], than those of kit_open. */
+static inline void kit_soles(Kit *kit, const MildSole *const *soles) {
+    MildError error = {0};
+    memcpy(kit->soles, soles, (size_t)kit->feet * sizeof(const MildSole *));
+    mild_scratch_destroy(kit->scratch);
+    free(kit->ground);
+    kit->scratch = mild_scratch_create(kit->soles, kit->feet, &error);
+    expect_good(kit->scratch != NULL, &error);
+    kit->bytes = mild_ground_bytes(kit->soles, kit->feet);
+    kit->ground = mild_ground_init(aligned_alloc(64, kit->bytes), kit->soles, kit->feet);
+}
+
 /* Input and A of another kit. */
 static inline void kit_copy_input(Kit *kit, const Kit *from) {
     kit->input = from->input;

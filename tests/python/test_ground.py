@@ -157,8 +157,6 @@ class Surface(unittest.TestCase):
         for shapes, name in ((3, "shapes"), ([3], r"shapes\[0\]")):
             with self.assertRaisesRegex(TypeError, name):
                 mild.Sole.surface(shapes)
-        with self.assertRaisesRegex(ValueError, "surface"):
-            mild.Batch(2, [mild.Sole.surface([sphere])], dt=0.005)
 
 
 class Step(unittest.TestCase):

@@ -1,8 +1,7 @@
-#include "ground/batch/batch.h"
 #include "device/device.h"
+#include "ground/batch/bodies_batch.h"
 #include "ground/batch/contact_shapes.h"
 #include "ground/inside.h"
-#include "ground/width.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +14,35 @@
 static const int batch_sizes[][2] = {CONTACT_KINDS(BATCH_SIZE)};
 /* NOLINTNEXTLINE(misc-redundant-expression): it is what this asserts */
 _Static_assert(MILD_BATCH_HOST == DEVICE_HOST, "the same number");
-_Static_assert(MILD_BATCH_FEET_MAX == 4, "feet take 1, 2 or 4 groups");
+_Static_assert(MILD_BATCH_PLANES_MAX == 4, "feet take 1, 2 or 4 groups");
+
+/* Plane soles, which are first. */
+static int count_planes(const MildBatchDef *def) {
+    int planes = 0;
+    while (planes < def->feet && !mild_sole_surface_z(def->soles[planes])) {
+        planes++;
+    }
+    return planes;
+}
+
+static MildStatus check_soles(const MildBatchDef *def, MildError *error) {
+    const int planes = count_planes(def);
+    if (planes > MILD_BATCH_PLANES_MAX) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "batch: %d soles are plane; at most %d can be: make the others by "
+                         "mild_sole_surface",
+                         planes, MILD_BATCH_PLANES_MAX);
+    }
+    for (int f = planes; f < def->feet; f++) {
+        if (!mild_sole_surface_z(def->soles[f])) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "batch: soles[%d] is plane and behind a surface; put plane soles "
+                             "first",
+                             f);
+        }
+    }
+    return MILD_OK;
+}
 
 static MildStatus check_def(const MildBatchDef *def, MildError *error) {
     if (def->robots < 1) {
@@ -37,19 +64,12 @@ static MildStatus check_def(const MildBatchDef *def, MildError *error) {
         return mild_fail(error, MILD_ERROR_RANGE, "batch: max_iterations = %d is negative",
                          def->max_iterations);
     }
-    for (int f = 0; f < def->feet; f++) {
-        if (mild_sole_surface_z(def->soles[f])) {
-            return mild_fail(error, MILD_ERROR_ARGUMENT,
-                             "batch: sole %d is a surface; a batch takes soles of mild_sole_create",
-                             f);
-        }
-    }
     if (def->device < MILD_BATCH_HOST) {
         return mild_fail(error, MILD_ERROR_RANGE,
                          "batch: device = %d; devices count from 0, MILD_BATCH_HOST is the CPU",
                          def->device);
     }
-    return MILD_OK;
+    return check_soles(def, error);
 }
 
 /* How the elements are dealt to lanes. */
@@ -81,7 +101,8 @@ static void shape_def(MildBatch *batch, const MildBatchDef *def) {
     BatchShape *shape = &batch->shape;
     batch->device = def->device;
     shape->robots = def->robots;
-    shape->feet = def->feet;
+    shape->soles = def->feet;
+    shape->feet = count_planes(def);
     shape->points = def->points;
     shape->dt = (float)def->dt;
     shape->tolerance = (float)(def->tolerance > 0.0 ? def->tolerance : BATCH_TOLERANCE);
@@ -90,13 +111,15 @@ static void shape_def(MildBatch *batch, const MildBatchDef *def) {
         batch->pitch[f] = mild_sole_pitch(def->soles[f]);
         batch->width[f] = mild_sole_width(def->soles[f]);
         shape->elements[f] = mild_sole_elements(def->soles[f]);
+    }
+    for (int f = 0; f < shape->feet; f++) {
         shape->z[f] = (float)mild_sole_z(def->soles[f]);
         shape->area[f] = (float)(batch->pitch[f] * batch->pitch[f]);
     }
 }
 
 static size_t element_bytes(const BatchShape *shape) {
-    return 4 * (size_t)shape->feet * (size_t)shape->stride * sizeof(float);
+    return 4 * (size_t)shape->groups * (size_t)shape->stride * sizeof(float);
 }
 
 static MildStatus store_elements(MildBatch *batch, const MildSole *const *soles, MildError *error) {
@@ -145,7 +168,14 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
         return status;
     }
     const MildMaterial sand = mild_material_default();
-    return mild_batch_set_materials(batch, &sand, 1, error);
+    const int surfaces = shape->soles - shape->feet;
+    status = mild_batch_set_materials(batch, &sand, 1, error);
+    if (status == MILD_OK && surfaces > 0) {
+        status =
+            batch_bodies_open(&batch->bodies, batch, def->soles, surfaces, NULL, &sand, 1, error);
+        status = status == MILD_OK ? batch_bodies_ready(batch, error) : status;
+    }
+    return status;
 }
 
 MildBatch *mild_batch_create(const MildBatchDef *def, MildError *error) {
@@ -173,11 +203,12 @@ void mild_batch_destroy(MildBatch *batch) {
     device_free(batch->device, batch->arrays.materials);
     device_free(batch->device, batch->arrays.memory);
     batch_map_close(&batch->arrays.map, batch->device);
+    batch_bodies_close(&batch->bodies, batch->device);
     free(batch);
 }
 
 size_t mild_batch_robot_bytes(const MildBatch *batch) {
-    return batch_memory_numbers(&batch->shape) * sizeof(float);
+    return (batch_memory_numbers(&batch->shape) + batch->bodies.numbers) * sizeof(float);
 }
 
 int mild_batch_stride(const MildBatch *batch) {
@@ -190,43 +221,27 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
         return mild_fail(error, MILD_ERROR_RANGE, "batch: %d materials; 1 .. %d are possible",
                          count, BATCH_MATERIALS_MAX);
     }
+    MildError own = {0};
+    error = error ? error : &own; /* says which status */
+    MildBatch next = *batch;
     const int feet = batch->shape.feet;
-    const size_t bytes = (size_t)((count + 1) * feet) * sizeof(MaterialNumbers);
-    MaterialNumbers *numbers = malloc(bytes);
     MildStatus status = MILD_OK;
-    int curves = 0;
-    if (!numbers) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
+    next.shape.materials = count;
+    next.curves = 0;
+    if (feet > 0) {
+        next.arrays.materials = material_table(batch->device, batch->pitch, batch->width, feet,
+                                               materials, count, &next.curves, error);
+        status = next.arrays.materials ? MILD_OK : error->status;
     }
-    for (int i = 0; i < count * feet && status == MILD_OK; i++) {
-        const MildMaterial *material = &materials[i / feet];
-        const double width = batch->width[i % feet];
-        MildError cause = {0};
-        status =
-            material_numbers(material, batch->pitch[i % feet], width, i / feet, &numbers[i], error);
-        if (status == MILD_OK && width_check(material, width, &cause) != MILD_OK) {
-            status = mild_fail(error, cause.status, "batch: material %d: %s", i / feet, cause.text);
-        }
-        curves |= status == MILD_OK ? numbers[i].curves : 0;
+    if (status == MILD_OK && batch->bodies.setup) {
+        status = batch_bodies_set_materials(&next, materials, count, error);
     }
-    memset(numbers + count * feet, 0xff, (size_t)feet * sizeof *numbers); /* not a number */
-    void *table = status == MILD_OK ? device_alloc(batch->device, bytes, error) : NULL;
-    if (status == MILD_OK && !table) {
-        status = MILD_ERROR_MEMORY;
+    if (feet > 0) { /* waits until no step reads it */
+        device_free(batch->device,
+                    status == MILD_OK ? batch->arrays.materials : next.arrays.materials);
     }
-    if (status == MILD_OK) {
-        status = device_copy(batch->device, table, numbers, bytes, error);
-    }
-    free(numbers);
-    if (status != MILD_OK) {
-        device_free(batch->device, table);
-        return status;
-    }
-    device_free(batch->device, batch->arrays.materials); /* waits until no step reads it */
-    batch->arrays.materials = table;
-    batch->shape.materials = count;
-    batch->curves = curves;
-    return MILD_OK;
+    *batch = status == MILD_OK ? next : *batch;
+    return status;
 }
 
 MildBatch batch_share(const MildBatch *batch, int first, int count) {
@@ -250,14 +265,34 @@ static MildStatus batch_gpu_step(const MildBatch *batch, const MildBatchInput *i
     return device_open(batch->device, error);
 }
 
-MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
-                           const MildBatchOutput *output, int advance, MildStream stream,
-                           MildError *error) {
+/* The step of the feet. */
+static MildStatus step_feet(const MildBatch *batch, const MildBatchInput *input,
+                            const MildBatchOutput *output, int advance, MildStream stream,
+                            MildError *error) {
     if (batch->device != MILD_BATCH_HOST) {
         return batch_gpu_step(batch, input, output, advance, stream, error);
     }
     host_step(&batch->shape, &batch->arrays, input, output, advance);
     return MILD_OK;
+}
+
+MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
+                           const MildBatchOutput *output, int advance, MildStream stream,
+                           MildError *error) {
+    if (!batch->bodies.setup) {
+        return step_feet(batch, input, output, advance, stream, error);
+    }
+    if (output->elements) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "batch: elements are not there yet where a sole is a surface; set "
+                         "output.elements = NULL");
+    }
+    MildStatus status = batch_bodies_begin(batch, input, output, advance, stream, error);
+    if (status == MILD_OK && batch->shape.feet > 0) {
+        status = step_feet(batch, input, output, advance, stream, error);
+    }
+    return status == MILD_OK ? batch_bodies_end(batch, input, output, advance, stream, error)
+                             : status;
 }
 
 MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, MildStream stream,
@@ -269,6 +304,7 @@ MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, MildStream s
     for (size_t robot = 0; robot < (size_t)batch->shape.robots; robot++) {
         if (!which || which[robot]) {
             memset(batch->arrays.memory + robot * numbers, 0, numbers * sizeof(float));
+            batch_bodies_reset(&batch->bodies, robot);
         }
     }
     return MILD_OK;

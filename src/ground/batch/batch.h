@@ -9,7 +9,8 @@
 /* The same for all robots; in float whatever Real is. */
 typedef struct {
     int robots;
-    int feet;
+    int soles;  /* of a robot: feet, then surfaces */
+    int feet;   /* with plane soles */
     int groups; /* of lanes in a warp: feet rounded up to a power of two */
     int per;    /* elements of a lane */
     int stride; /* elements of a foot in memory */
@@ -18,9 +19,9 @@ typedef struct {
     int materials;                     /* in the table; behind them one that is not a number */
     int map;                           /* bool: on BatchArrays.map, not on level ground */
     int points;                        /* bool: as MildBatchDef.points */
-    int elements[MILD_BATCH_FEET_MAX]; /* of a sole */
-    float z[MILD_BATCH_FEET_MAX];      /* [m] of its plane */
-    float area[MILD_BATCH_FEET_MAX];   /* [m^2] of an element */
+    int elements[MILD_BATCH_FEET_MAX]; /* [soles] */
+    float z[MILD_BATCH_PLANES_MAX];    /* [feet] [m] of a sole's plane */
+    float area[MILD_BATCH_PLANES_MAX]; /* [feet] [m^2] of an element */
 } BatchShape;
 
 /* Where a batch keeps what; on its device. */
@@ -32,13 +33,30 @@ typedef struct {
     const uint8_t *skip; /* [robots] bool: a step leaves it alone; NULL: none. Of the caller */
 } BatchArrays;
 
+struct BodiesSetup; /* of bodies.h */
+
+/* The surfaces of a batch's robots; on its device. */
+typedef struct {
+    struct BodiesSetup *setup; /* in float; NULL: there are none */
+    float *memory;             /* [robots][numbers] of the surfaces */
+    size_t numbers;            /* of a robot */
+    size_t bytes;              /* of the device, without memory */
+    /* what the setup points to */
+    float *places;
+    MaterialNumbers *materials; /* [count + 1][surfaces] */
+    /* of mild_batch_step */
+    uint16_t *near; /* [robots] bit s: surface s may touch the ground in this step */
+    uint8_t *any;   /* [robots] bool: one of them may */
+} BatchBodies;
+
 struct MildBatch {
     BatchShape shape;
     BatchArrays arrays;
+    BatchBodies bodies;
     int device;
     int curves;                        /* LawCurve bits of all materials */
-    double pitch[MILD_BATCH_FEET_MAX]; /* [m] */
-    double width[MILD_BATCH_FEET_MAX]; /* [m] shorter side of the sole */
+    double pitch[MILD_BATCH_FEET_MAX]; /* [soles] [m] */
+    double width[MILD_BATCH_FEET_MAX]; /* [soles] [m] mild_sole_width */
 };
 
 /* [numbers] of a robot's memory. */

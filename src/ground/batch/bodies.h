@@ -84,6 +84,14 @@ MILD_HD int bodies_memory_numbers(int elements) {
     return BODIES_NUMBERS * elements + BODIES_OWN;
 }
 
+/* That of foot f in the memory of a robot, in the layout of contact.h. */
+MILD_HD BodiesMemory bodies_foot_memory(Real *memory, int groups, int stride, int f) {
+    const int all = groups * stride;
+    const BodiesMemory at = {memory + f * stride, all, memory + all * CONTACT_MAP_MEMORY + f,
+                             groups};
+    return at;
+}
+
 /* That of a surface, at `memory`. */
 MILD_HD BodiesMemory bodies_memory(Real *memory, int elements) {
     const BodiesMemory at = {memory, elements, memory + BODIES_NUMBERS * elements, 1};

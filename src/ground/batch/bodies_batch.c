@@ -6,10 +6,11 @@
 #include <string.h>
 
 #include "device/device.h"
-#include "ground/batch/bodies.h"
+#include "ground/batch/bodies_robot.h"
 #include "ground/inside.h"
 
 _Static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
+_Static_assert(BODIES_MAX == MILD_BATCH_FEET_MAX, "the same number");
 
 /* Arrays of a surface's elements: x, y and those of BodiesSole.face. */
 enum { PLACES = 7 };
@@ -58,8 +59,6 @@ static void set_foot(BodiesSole *to, const MildBatch *batch, const MildSole *sol
     to->y = batch->arrays.elements + (shape->feet + f) * shape->stride;
     to->begin = batch->arrays.elements + (2 * shape->feet + f) * shape->stride;
     to->width = batch->arrays.elements + (3 * shape->feet + f) * shape->stride;
-    to->table = (const ContactMaterial *)(const void *)(batch->arrays.materials + f);
-    to->step = shape->feet;
 }
 
 /* values: [PLACES elements] to fill. places: where they will be on the device. */
@@ -105,8 +104,6 @@ static MildStatus set_surfaces(BatchBodies *bodies, BodiesSetup *setup, const Mi
         BodiesSole *to = &setup->sole[setup->feet + s];
         set_surface(to, surface[s], values + at, bodies->places + at);
         at += PLACES * (size_t)to->elements;
-        to->table = (const ContactMaterial *)(const void *)(bodies->materials + s);
-        to->step = surfaces;
         to->memory = (int)bodies->numbers;
         bodies->numbers += (size_t)bodies_memory_numbers(to->elements);
     }
@@ -117,30 +114,16 @@ static MildStatus set_surfaces(BatchBodies *bodies, BodiesSetup *setup, const Mi
     return status;
 }
 
-/* The table of materials for the surfaces. */
-static MildStatus set_materials(BatchBodies *bodies, const MildBatch *batch,
-                                const MildSole *const *surface, int surfaces,
-                                const MildMaterial *materials, int count, MildError *error) {
-    const size_t bytes = (size_t)((count + 1) * surfaces) * sizeof(MaterialNumbers);
-    MaterialNumbers *numbers = malloc(bytes);
-    bodies->materials = device_alloc(batch->device, bytes, error);
-    if (!numbers || !bodies->materials) {
-        free(numbers);
-        return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
+/* Materials of the surfaces, in a setup. */
+static void set_tables(BodiesSetup *setup, const MildBatch *batch, const MaterialNumbers *table) {
+    const int surfaces = setup->bodies - setup->feet;
+    for (int b = 0; b < setup->bodies; b++) {
+        const MaterialNumbers *own =
+            b < setup->feet ? batch->arrays.materials + b : table + (b - setup->feet);
+        setup->sole[b].table = (const ContactMaterial *)(const void *)own;
+        setup->sole[b].step = b < setup->feet ? setup->feet : surfaces;
     }
-    MildStatus status = MILD_OK;
-    for (int i = 0; i < count * surfaces && status == MILD_OK; i++) {
-        const MildSole *sole = surface[i % surfaces];
-        status = material_numbers(&materials[i / surfaces], mild_sole_pitch(sole),
-                                  mild_sole_width(sole), i / surfaces, &numbers[i], error);
-    }
-    memset(numbers + count * surfaces, 0xff, (size_t)surfaces * sizeof *numbers); /* no number */
-    if (status == MILD_OK) {
-        status = device_copy(batch->device, bodies->materials, numbers, bytes, error);
-    }
-    bodies->bytes += bytes;
-    free(numbers);
-    return status;
+    setup->materials = batch->shape.materials;
 }
 
 static MildStatus set_all(BatchBodies *bodies, BodiesSetup *setup, const MildBatch *batch,
@@ -153,6 +136,7 @@ static MildStatus set_all(BatchBodies *bodies, BodiesSetup *setup, const MildBat
     if (status != MILD_OK) {
         return status;
     }
+    set_tables(setup, batch, bodies->materials);
     bodies->bytes += sizeof *setup;
     bodies->setup = device_alloc(batch->device, sizeof *setup, error);
     bodies->memory = device_alloc(batch->device, robots * bodies->numbers * sizeof(float), error);
@@ -188,12 +172,21 @@ MildStatus batch_bodies_open(BatchBodies *bodies, const MildBatch *batch,
     }
     if (elements > BODIES_ELEMENTS) {
         return mild_fail(error, MILD_ERROR_RANGE,
-                         "batch: feet and shells have %d elements; at most %d stand on soft ground",
+                         "batch: the soles of a robot have %d elements, with surfaces at most %d: "
+                         "take a larger spacing",
                          elements, BODIES_ELEMENTS);
     }
-    MildStatus status =
-        set_materials(bodies, batch, soles + shape->feet, surfaces, materials, count, error);
-    return status == MILD_OK ? set_all(bodies, &setup, batch, soles, surfaces, error) : status;
+    double pitch[BODIES_MAX], width[BODIES_MAX];
+    for (int s = 0; s < surfaces; s++) {
+        pitch[s] = mild_sole_pitch(soles[shape->feet + s]);
+        width[s] = mild_sole_width(soles[shape->feet + s]);
+    }
+    int curves = 0;
+    bodies->materials =
+        material_table(batch->device, pitch, width, surfaces, materials, count, &curves, error);
+    bodies->bytes += (size_t)((count + 1) * surfaces) * sizeof *bodies->materials;
+    return bodies->materials ? set_all(bodies, &setup, batch, soles, surfaces, error)
+                             : error->status;
 }
 
 void batch_bodies_close(const BatchBodies *bodies, int device) {
@@ -201,4 +194,102 @@ void batch_bodies_close(const BatchBodies *bodies, int device) {
     device_free(device, bodies->memory);
     device_free(device, bodies->places);
     device_free(device, bodies->materials);
+    device_free(device, bodies->near);
+    device_free(device, bodies->any);
+}
+
+/* ---- of a batch that steps them itself ---- */
+
+MildStatus batch_bodies_ready(MildBatch *batch, MildError *error) {
+    BatchBodies *bodies = &batch->bodies;
+    const size_t robots = (size_t)batch->shape.robots;
+    bodies->near = device_alloc(batch->device, robots * sizeof *bodies->near, error);
+    bodies->any = device_alloc(batch->device, robots * sizeof *bodies->any, error);
+    batch->arrays.skip = bodies->any;
+    return bodies->near && bodies->any ? MILD_OK : MILD_ERROR_MEMORY;
+}
+
+/* The setup comes from the device, is changed, and goes back when no step reads it. */
+static MildStatus get_setup(const MildBatch *batch, BodiesSetup *setup, MildError *error) {
+    MildStatus status = device_wait(batch->device, error);
+    return status == MILD_OK
+               ? device_copy(batch->device, setup, batch->bodies.setup, sizeof *setup, error)
+               : status;
+}
+
+static MildStatus put_setup(const MildBatch *batch, const BodiesSetup *setup, MildError *error) {
+    return device_copy(batch->device, batch->bodies.setup, setup, sizeof *setup, error);
+}
+
+MildStatus batch_bodies_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
+                                      MildError *error) {
+    const int feet = batch->shape.feet;
+    BodiesSetup setup;
+    MaterialNumbers *table =
+        material_table(batch->device, batch->pitch + feet, batch->width + feet,
+                       batch->shape.soles - feet, materials, count, &batch->curves, error);
+    MildStatus status = table ? get_setup(batch, &setup, error) : error->status;
+    if (status == MILD_OK) {
+        set_tables(&setup, batch, table);
+        status = put_setup(batch, &setup, error);
+    }
+    device_free(batch->device, status == MILD_OK ? batch->bodies.materials : table);
+    batch->bodies.materials = status == MILD_OK ? table : batch->bodies.materials;
+    return status;
+}
+
+MildStatus batch_bodies_set_map(MildBatch *batch, const MildMap *map, MildError *error) {
+    BatchBodies *bodies = &batch->bodies;
+    const size_t numbers = (size_t)batch->shape.robots * bodies->numbers;
+    BodiesSetup setup;
+    float *memory = device_alloc(batch->device, numbers * sizeof *memory, error);
+    MildStatus status = memory ? get_setup(batch, &setup, error) : error->status;
+    if (status == MILD_OK) {
+        setup.has_map = batch->shape.map;
+        setup.map = batch->arrays.map;
+        setup.steepest = (float)batch_map_steepest(map);
+        status = put_setup(batch, &setup, error);
+    }
+    device_free(batch->device, status == MILD_OK ? bodies->memory : memory);
+    bodies->memory = status == MILD_OK ? memory : bodies->memory;
+    return status;
+}
+
+void batch_bodies_reset(const BatchBodies *bodies, size_t robot) {
+    if (bodies->setup) {
+        memset(bodies->memory + robot * bodies->numbers, 0, bodies->numbers * sizeof(float));
+    }
+}
+
+static BodiesCall call_of(const MildBatch *batch, const MildBatchInput *input,
+                          const MildBatchOutput *output, int advance) {
+    return (BodiesCall){.shape = batch->shape,
+                        .arrays = batch->arrays,
+                        .bodies = batch->bodies,
+                        .input = *input,
+                        .output = *output,
+                        .advance = advance,
+                        .heap = (batch->curves & LAW_HEAP) != 0};
+}
+
+MildStatus batch_bodies_begin(const MildBatch *batch, const MildBatchInput *input,
+                              const MildBatchOutput *output, int advance, MildStream stream,
+                              MildError *error) {
+    const BodiesCall call = call_of(batch, input, output, advance);
+    if (batch->device != MILD_BATCH_HOST) {
+        return gpu_bodies_begin(&call, batch->device, stream, error);
+    }
+    host_bodies_begin(&call);
+    return MILD_OK;
+}
+
+MildStatus batch_bodies_end(const MildBatch *batch, const MildBatchInput *input,
+                            const MildBatchOutput *output, int advance, MildStream stream,
+                            MildError *error) {
+    const BodiesCall call = call_of(batch, input, output, advance);
+    if (batch->device != MILD_BATCH_HOST) {
+        return gpu_bodies_end(&call, batch->device, stream, error);
+    }
+    host_bodies_end(&call);
+    return MILD_OK;
 }

@@ -53,6 +53,7 @@ typedef struct {
 typedef struct {
     ContactSole sole[CONTACT_FEET_MAX];
     int feet;
+    int soles;      /* of the arrays of a robot, in which feet are first */
     int groups;     /* as in BatchShape; this and the next two only where the size is no constant */
     int lanes;      /* of a group */
     int per;        /* elements of a lane */
@@ -67,7 +68,7 @@ typedef struct {
     const Real *position;            /* [feet][3] [m] */
     const Real *rotation;            /* [feet][9] [-] */
     const Real *velocity;            /* [feet][6] [m/s, rad/s] */
-    const Real *inverse_inertia;     /* [6 feet][6 feet] [1/kg, 1/(kg m), 1/(kg m^2)] */
+    const Real *inverse_inertia;     /* [6 soles][6 soles] [1/kg, 1/(kg m), 1/(kg m^2)] */
     const Real *free_velocity;       /* [6 feet] [m/s, rad/s] */
     const ContactMaterial *material; /* [feet] without a map */
     Real height;                     /* [m] of the surface */

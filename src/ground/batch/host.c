@@ -4,7 +4,7 @@
 
 _Static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
 _Static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
-_Static_assert(CONTACT_FEET_MAX == MILD_BATCH_FEET_MAX, "the same number");
+_Static_assert(CONTACT_FEET_MAX == MILD_BATCH_PLANES_MAX, "the same number");
 
 HostRobot host_robot(const BatchShape *shape) {
     return shape->map ? host_robot_map(shape) : host_kind(shape);

@@ -2,7 +2,7 @@
 #include <stdlib.h>
 
 #include "device/device.h"
-#include "ground/batch/batch.h"
+#include "ground/batch/bodies_batch.h"
 #include "ground/grid.h"
 #include "ground/inside.h"
 
@@ -76,25 +76,24 @@ static int map_is_plain(const MildMap *map) {
 MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *error) {
     MildError own = {0};
     error = error ? error : &own; /* says which status */
-    BatchShape shape = batch->shape;
-    BatchArrays arrays = batch->arrays;
-    shape.map = !map_is_plain(map);
-    arrays.map = (MapView){.labels = 1};
-    if (shape.map) {
-        MildStatus status = batch_map_open(&arrays.map, map, batch->device, error);
+    MildBatch next = *batch;
+    next.shape.map = !map_is_plain(map);
+    next.arrays.map = (MapView){.labels = 1};
+    if (next.shape.map) {
+        MildStatus status = batch_map_open(&next.arrays.map, map, batch->device, error);
         if (status != MILD_OK) {
             return status;
         }
     }
-    const size_t numbers = (size_t)shape.robots * batch_memory_numbers(&shape);
-    arrays.memory = device_alloc(batch->device, numbers * sizeof(float), error);
-    if (!arrays.memory) {
-        batch_map_close(&arrays.map, batch->device);
-        return error->status;
+    const size_t numbers = (size_t)next.shape.robots * batch_memory_numbers(&next.shape);
+    next.arrays.memory = device_alloc(batch->device, numbers * sizeof(float), error);
+    MildStatus status = next.arrays.memory ? MILD_OK : error->status;
+    if (status == MILD_OK && batch->bodies.setup) {
+        status = batch_bodies_set_map(&next, map, error);
     }
-    device_free(batch->device, batch->arrays.memory); /* waits until no step uses it */
-    batch_map_close(&batch->arrays.map, batch->device);
-    batch->arrays = arrays;
-    batch->shape = shape;
-    return MILD_OK;
+    const MildBatch *left = status == MILD_OK ? batch : &next;
+    device_free(batch->device, left->arrays.memory); /* waits until no step uses it */
+    batch_map_close(&left->arrays.map, batch->device);
+    *batch = status == MILD_OK ? next : *batch;
+    return status;
 }

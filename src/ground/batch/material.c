@@ -1,17 +1,26 @@
 #include "ground/batch/material.h"
 
+#include <stdlib.h>
+#include <string.h>
+
+#include "device/device.h"
 #include "ground/begin.h"
 #include "ground/inside.h"
+#include "ground/width.h"
 
 #define MATERIAL_LAW_INDEX(name) MATERIAL_LAW_##name,
 enum { LAW_NUMBERS(MATERIAL_LAW_INDEX) MATERIAL_LAW_COUNT };
 _Static_assert(MATERIAL_LAW_COUNT + 1 == MATERIAL_LAW_NUMBERS, "all numbers");
 
-MildStatus material_numbers(const MildMaterial *material, double pitch, double width, int index,
-                            MaterialNumbers *numbers, MildError *error) {
+/* Under an element of area pitch^2 of a sole of that width. index: of the material. */
+static MildStatus material_numbers(const MildMaterial *material, double pitch, double width,
+                                   int index, MaterialNumbers *numbers, MildError *error) {
     MildError cause = {0};
     if (mild_material_check(material, &cause) != MILD_OK) {
         return mild_fail(error, MILD_ERROR_RANGE, "batch: material %d: %s", index, cause.text);
+    }
+    if (width_check(material, width, &cause) != MILD_OK) {
+        return mild_fail(error, cause.status, "batch: material %d: %s", index, cause.text);
     }
     const InsideLaw inside = mild_inside_law(material, pitch, width);
     const Law law = inside.law;
@@ -35,4 +44,29 @@ MildStatus material_numbers(const MildMaterial *material, double pitch, double w
     numbers->side = (float)inside.share.side;
     numbers->curves = inside.curves;
     return MILD_OK;
+}
+
+MaterialNumbers *material_table(int device, const double *pitch, const double *width, int soles,
+                                const MildMaterial *materials, int count, int *curves,
+                                MildError *error) {
+    const size_t bytes = (size_t)((count + 1) * soles) * sizeof(MaterialNumbers);
+    MaterialNumbers *numbers = malloc(bytes);
+    MildStatus status = MILD_OK;
+    if (!numbers) {
+        mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
+        return NULL;
+    }
+    for (int i = 0; i < count * soles && status == MILD_OK; i++) {
+        status = material_numbers(&materials[i / soles], pitch[i % soles], width[i % soles],
+                                  i / soles, &numbers[i], error);
+        *curves |= status == MILD_OK ? numbers[i].curves : 0;
+    }
+    memset(numbers + count * soles, 0xff, (size_t)soles * sizeof *numbers); /* not a number */
+    MaterialNumbers *table = status == MILD_OK ? device_alloc(device, bytes, error) : NULL;
+    if (table && device_copy(device, table, numbers, bytes, error) != MILD_OK) {
+        device_free(device, table);
+        table = NULL;
+    }
+    free(numbers);
+    return table;
 }

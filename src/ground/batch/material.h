@@ -15,9 +15,12 @@ typedef struct {
     int curves;
 } MaterialNumbers;
 
-/* Under an element of area pitch^2 of a sole whose shorter side is `width`. Fails for a material
- * that mild_material_check refuses. index: of the material, for the message. */
-MildStatus material_numbers(const MildMaterial *material, double pitch, double width, int index,
-                            MaterialNumbers *numbers, MildError *error);
+/* [count + 1][soles] of materials [count] under soles of these pitches and widths [soles] [m]
+ * (mild_sole_width), in the memory of a device; the last is not a number. Adds the LawCurve bits of
+ * all to *curves. NULL when a material is refused by mild_material_check or by the width of a sole,
+ * or when out of memory. */
+MaterialNumbers *material_table(int device, const double *pitch, const double *width, int soles,
+                                const MildMaterial *materials, int count, int *curves,
+                                MildError *error);
 
 #endif

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "device/device.h"
-#include "ground/batch/batch.h"
+#include "ground/batch/bodies_batch.h"
 #include "ground/batch/contact.h"
 #include "ground/inside.h"
 
@@ -130,14 +130,20 @@ static MildStatus check_robots(const BatchShape *shape, int first, int count, Mi
     return MILD_OK;
 }
 
+/* Bool: the soles of a ground are plane and surfaces as those of a batch, with as many elements. */
+static int is_of(const BatchShape *shape, const MildGround *ground) {
+    int same = ground->feet == shape->soles;
+    for (int f = 0; same && f < shape->soles; f++) {
+        const int face = ground->faces >> f & 1;
+        same = ground->elements[f] == shape->elements[f] && face == (f >= shape->feet);
+    }
+    return same;
+}
+
 /* Whether a ground may take part: the same soles, no imprints. */
 static MildStatus check_soles(const BatchShape *shape, int robot, const MildGround *ground,
                               MildError *error) {
-    int same = ground->feet == shape->feet && !ground->faces;
-    for (int f = 0; same && f < shape->feet; f++) {
-        same = ground->elements[f] == shape->elements[f];
-    }
-    if (!same) {
+    if (!is_of(shape, ground)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "batch: the ground of robot %d was made for other soles", robot);
     }
@@ -155,7 +161,7 @@ static MildStatus check_memory(const MildBatch *batch, int robot, const MildGrou
                                MildError *error) {
     const BatchShape *shape = &batch->shape;
     const int labels = shape->map ? batch->arrays.map.labels : 1;
-    for (int f = 0; f < shape->feet; f++) {
+    for (int f = 0; f < shape->soles; f++) {
         const Memory memory = mild_inside_memory(ground, f);
         if (ground->uneven[f] && !(shape->map && batch->arrays.map.uneven)) {
             return mild_fail(error, MILD_ERROR_ARGUMENT,
@@ -222,7 +228,9 @@ MildStatus mild_batch_load_robots(MildBatch *batch, int first, int count,
                              memory, (size_t)some * numbers * sizeof *memory, error);
     }
     free(memory);
-    return status;
+    return status == MILD_OK && batch->bodies.setup
+               ? batch_bodies_load(batch, first, count, grounds, error)
+               : status;
 }
 
 MildStatus mild_batch_store_robots(const MildBatch *batch, int first, int count,
@@ -248,7 +256,9 @@ MildStatus mild_batch_store_robots(const MildBatch *batch, int first, int count,
         }
     }
     free(memory);
-    return status;
+    return status == MILD_OK && batch->bodies.setup
+               ? batch_bodies_store(batch, first, count, grounds, error)
+               : status;
 }
 
 MildStatus mild_batch_load(MildBatch *batch, int robot, const MildGround *ground,

@@ -9,7 +9,8 @@ extern "C" {
 #include "ground/batch/contact.h"
 #include "ground/batch/robot.inc"
 
-static __global__ void forget(BatchShape shape, BatchArrays arrays, const uint8_t *which) {
+static __global__ void forget(BatchShape shape, BatchArrays arrays, BatchBodies bodies,
+                              const uint8_t *which) {
     const long robot = blockIdx.x;
     if (which && !which[robot]) {
         return;
@@ -19,11 +20,15 @@ static __global__ void forget(BatchShape shape, BatchArrays arrays, const uint8_
     for (int i = (int)threadIdx.x; i < numbers; i += (int)blockDim.x) {
         memory[i] = 0;
     }
+    for (size_t i = threadIdx.x; i < bodies.numbers; i += blockDim.x) {
+        bodies.memory[robot * bodies.numbers + i] = 0;
+    }
 }
 
 extern "C" MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which,
                                       MildStream stream, MildError *error) {
     OnDevice on(batch->device);
-    forget<<<batch->shape.robots, 256, 0, stream>>>(batch->shape, batch->arrays, which);
+    forget<<<batch->shape.robots, 256, 0, stream>>>(batch->shape, batch->arrays, batch->bodies,
+                                                    which);
     return checked(cudaGetLastError(), "reset", error);
 }
