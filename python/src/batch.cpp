@@ -204,13 +204,12 @@ void bind_batch(nb::module_ &module) {
     nb::class_<Batch>(
         module, "Batch",
         "Ground under many robots at once, in float (include/mild/batch.h).\n\n"
-        "robots; soles: a list of 1 .. 9 Sole, of each robot: at most four plane ones, then "
-        "surfaces\nof other bodies (Sole.surface); dt [s]; tolerance [-] and max_iterations of "
-        "Newton's method,\n0: the defaults; device: cpu, cuda or cuda:N; points: no plane sole "
-        "transmits a moment, so\nthat its rows and columns of moments of every inverse_inertia "
-        "are 0 (faster on three or four\nof up to eight elements). Raises ValueError for a number "
-        "out of range, for a sole with too many\nelements, for a plane sole behind a surface, and "
-        "without the device.")
+        "robots; soles: 1 .. 9 Sole of each robot, at most four plane ones, then surfaces of other "
+        "bodies;\ndt [s]; tolerance [-] and max_iterations of Newton's method, 0: the defaults; "
+        "device: cpu, cuda\nor cuda:N; points: no plane sole transmits a moment: its rows and "
+        "columns of moments of every\ninverse_inertia are 0 (faster on three or four of up to "
+        "eight elements). Raises ValueError for a\nnumber out of range, for a sole with too many "
+        "elements or out of order, and without the device.")
         .def("__init__", make, nb::arg("robots"), nb::arg("soles"), nb::arg("dt"), nb::kw_only(),
              nb::arg("tolerance") = 0.0, nb::arg("max_iterations") = 0, nb::arg("device") = "cpu",
              nb::arg("points") = false)
@@ -236,8 +235,8 @@ void bind_batch(nb::module_ &module) {
              "int32 (robots,), with a map of several labels\n(robots, labels); height (robots,) "
              "[m]; map_origin (robots, 2) [m]. Outputs: wrench (robots,\nfeet, 6) [N, N m]; "
              "new_velocity (robots, feet, 6); foot (robots, feet, 6): pressure centre,\n"
-             "depth_max, depth_mean [m], area [m^2]; elements (robots, 4, feet, stride), not with "
-             "surfaces;\nresidual (robots,); iterations int32 (robots,). stream: a cudaStream_t as a number, e.g.\n"
+             "depth_max, depth_mean [m], area [m^2]; elements (robots, 4, feet, stride); residual "
+             "(robots,);\niterations int32 (robots,). With surfaces no elements. stream: e.g.\n"
              "torch.cuda.current_stream().cuda_stream; the call only puts work into it. wrench may "
              "be the\narray of velocity and new_velocity that of free_velocity; else outputs share "
              "no memory with\nany array. Raises TypeError or ValueError with the name of the array "
