@@ -158,16 +158,18 @@ MILD_HD int env_shells_wait(const EnvsArrays *all, long robot) {
 MILD_HD BodiesMemory env_foot_memory(const EnvsShells *shells, long robot, int f) {
     const BatchShape *shape = &shells->shape;
     const int all = shape->groups * shape->stride;
-    Real *memory = shells->ground.memory + robot * contact_memory_numbers(all, shape->map);
+    const BatchArrays *ground = &shells->ground;
+    Real *memory = ground->memory + robot * contact_memory_numbers(all, shape->map);
+    Real *worn = ground->worn ? ground->worn + robot * all + f * shape->stride : NULL;
     const BodiesMemory at = {memory + f * shape->stride, all, memory + all * CONTACT_MAP_MEMORY + f,
-                             shape->groups};
+                             shape->groups, worn};
     return at;
 }
 
 MILD_HD BodiesMemory env_body_memory(const EnvsArrays *all, long robot, int body) {
     const BodiesSole *sole = &all->shells.setup->sole[body];
     return bodies_memory(all->shells.memory + robot * (long)all->shells.numbers + sole->memory,
-                         sole->elements);
+                         sole->elements, all->shells.ground.worn != NULL);
 }
 
 /* Bodies other than those of the bits in `near` forget. */

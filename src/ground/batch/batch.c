@@ -2,6 +2,7 @@
 #include "device/device.h"
 #include "ground/batch/contact_shapes.h"
 #include "ground/inside.h"
+#include "ground/law.h"
 #include "ground/width.h"
 
 #include <stdlib.h>
@@ -130,15 +131,12 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
     }
     const BatchShape *shape = &batch->shape;
     BatchArrays *arrays = &batch->arrays;
-    const size_t robots = (size_t)shape->robots;
     arrays->map.labels = 1;
     arrays->elements = device_alloc(batch->device, element_bytes(shape), error);
-    arrays->memory = arrays->elements
-                         ? device_alloc(batch->device,
-                                        robots * batch_memory_numbers(shape) * sizeof(float), error)
-                         : NULL;
-    if (!arrays->memory) {
-        return MILD_ERROR_MEMORY;
+    status = arrays->elements ? batch_memory_open(arrays, shape, batch->device, 0, error)
+                              : MILD_ERROR_MEMORY;
+    if (status != MILD_OK) {
+        return status;
     }
     status = store_elements(batch, def->soles, error);
     if (status != MILD_OK) {
@@ -177,11 +175,33 @@ void mild_batch_destroy(MildBatch *batch) {
 }
 
 size_t mild_batch_robot_bytes(const MildBatch *batch) {
-    return batch_memory_numbers(&batch->shape) * sizeof(float);
+    const BatchShape *shape = &batch->shape;
+    const size_t worn = batch->arrays.worn ? batch_worn_numbers(shape) : 0;
+    return (batch_memory_numbers(shape) + worn) * sizeof(float);
 }
 
 int mild_batch_stride(const MildBatch *batch) {
     return batch->shape.stride;
+}
+
+/* Wear for the robots, behind all that they remember. */
+static MildStatus begin_wear(MildBatch *batch, MildError *error) {
+    const BatchShape *shape = &batch->shape;
+    BatchArrays arrays = batch->arrays;
+    if (batch_memory_open(&arrays, shape, batch->device, 1, error) != MILD_OK) {
+        return MILD_ERROR_MEMORY;
+    }
+    float *before = batch->arrays.memory;
+    const size_t bytes = (size_t)shape->robots * batch_memory_numbers(shape) * sizeof *before;
+    MildStatus status = device_wait(batch->device, error);
+    if (status == MILD_OK) {
+        status = device_copy(batch->device, arrays.memory, before, bytes, error);
+    }
+    if (status == MILD_OK) {
+        batch->arrays = arrays;
+    }
+    device_free(batch->device, status == MILD_OK ? before : arrays.memory);
+    return status;
 }
 
 MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
@@ -218,6 +238,9 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
         status = device_copy(batch->device, table, numbers, bytes, error);
     }
     free(numbers);
+    if (status == MILD_OK && (curves & LAW_HEAP) && !batch->arrays.worn) {
+        status = begin_wear(batch, error);
+    }
     if (status != MILD_OK) {
         device_free(batch->device, table);
         return status;
@@ -233,6 +256,9 @@ MildBatch batch_share(const MildBatch *batch, int first, int count) {
     MildBatch share = *batch;
     share.shape.robots = count;
     share.arrays.memory += (size_t)first * batch_memory_numbers(&batch->shape);
+    if (share.arrays.worn) {
+        share.arrays.worn += (size_t)first * batch_worn_numbers(&batch->shape);
+    }
     return share;
 }
 
@@ -265,10 +291,15 @@ MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, MildStream s
     if (batch->device != MILD_BATCH_HOST) {
         return batch_gpu_reset(batch, which, stream, error);
     }
+    const BatchArrays *arrays = &batch->arrays;
     const size_t numbers = batch_memory_numbers(&batch->shape);
+    const size_t worn = batch_worn_numbers(&batch->shape);
     for (size_t robot = 0; robot < (size_t)batch->shape.robots; robot++) {
         if (!which || which[robot]) {
-            memset(batch->arrays.memory + robot * numbers, 0, numbers * sizeof(float));
+            memset(arrays->memory + robot * numbers, 0, numbers * sizeof(float));
+        }
+        if (arrays->worn && (!which || which[robot])) {
+            memset(arrays->worn + robot * worn, 0, worn * sizeof(float));
         }
     }
     return MILD_OK;

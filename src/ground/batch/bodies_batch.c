@@ -108,7 +108,7 @@ static MildStatus set_surfaces(BatchBodies *bodies, BodiesSetup *setup, const Mi
         to->table = (const ContactMaterial *)(const void *)(bodies->materials + s);
         to->step = surfaces;
         to->memory = (int)bodies->numbers;
-        bodies->numbers += (size_t)bodies_memory_numbers(to->elements);
+        bodies->numbers += (size_t)bodies_memory_numbers(to->elements, batch->arrays.worn != NULL);
     }
     bodies->bytes += numbers * sizeof *values;
     MildStatus status =

@@ -78,8 +78,8 @@ typedef struct {
     const Real *map_origin; /* [2] [m] world; NULL: 0 */
 } ContactProblem;
 
-/* Memory of a robot: CONTACT_MEMORY numbers of each element, in the order of ElementMemory, then
- * its wear (share.h), as [number][foot][stride].
+/* Memory of a robot: CONTACT_MEMORY numbers of each element, those of ElementMemory, as
+ * [number][foot][stride].
  *
  * With a map four more of each follow: number `plane` [m] and the gradient [-] along x and y of the
  * plane that the last step had for the ground, and the label that a loaded element touched down on.
@@ -87,17 +87,48 @@ typedef struct {
  * gradient . (r_x, r_y) - r_z. Then [5][foot] follow: x, y and z of that point and the height of
  * the ground [m], and whether there was a step, 1 or 0. */
 enum {
-    CONTACT_WORN = sizeof(ElementMemory) / sizeof(Real),
-    CONTACT_MEMORY,
+    CONTACT_MEMORY = sizeof(ElementMemory) / sizeof(Real),
     CONTACT_MAP_MEMORY = CONTACT_MEMORY + 4,
     CONTACT_FOOT_MEMORY = LANES /* numbers that [5][foot] have room in */
 };
 #define CONTACT_NO_PLANE                                                                           \
     REAL(1e6) /* [m] `plane` of an element that was not there in the last step */
 
+typedef struct {
+    Real *numbers;
+    Real *worn; /* [foot][stride] [-] wear of the elements (share.h); NULL: no material wears */
+} ContactMemory;
+
 /* [numbers] of the memory of a robot with room for `elements` elements. map: bool. */
 MILD_HD int contact_memory_numbers(int elements, int map) {
     return map ? elements * CONTACT_MAP_MEMORY + CONTACT_FOOT_MEMORY : elements * CONTACT_MEMORY;
+}
+
+/* What an element remembers. at: its first number, those after it `next` apart each. */
+MILD_HD ElementMemory contact_recall(const Real *at, int next) {
+    ElementMemory before;
+    before.depth_max = at[0];
+    before.middle = at[next];
+    before.front_speed = at[2 * next];
+    before.drift = at[3 * next];
+    before.pending_x = at[4 * next];
+    before.pending_y = at[5 * next];
+    before.held_x = at[6 * next];
+    before.held_y = at[7 * next];
+    before.held_stiffness = at[8 * next];
+    return before;
+}
+
+MILD_HD void contact_record(Real *at, int next, const ElementMemory *after) {
+    at[0] = after->depth_max;
+    at[next] = after->middle;
+    at[2 * next] = after->front_speed;
+    at[3 * next] = after->drift;
+    at[4 * next] = after->pending_x;
+    at[5 * next] = after->pending_y;
+    at[6 * next] = after->held_x;
+    at[7 * next] = after->held_y;
+    at[8 * next] = after->held_stiffness;
 }
 
 /* What a step knows of an element besides its material, in parts of four numbers, each of which a

@@ -86,9 +86,8 @@ MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *e
             return status;
         }
     }
-    const size_t numbers = (size_t)shape.robots * batch_memory_numbers(&shape);
-    arrays.memory = device_alloc(batch->device, numbers * sizeof(float), error);
-    if (!arrays.memory) {
+    const int worn = arrays.worn != NULL;
+    if (batch_memory_open(&arrays, &shape, batch->device, worn, error) != MILD_OK) {
         batch_map_close(&arrays.map, batch->device);
         return error->status;
     }
