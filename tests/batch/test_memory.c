@@ -36,7 +36,7 @@ TEST(wear_begins_with_a_material_that_wears) {
     kit_open(&kit, 2, left, right, &sand, 5e-3);
     MildGround *ground = kit.ground;
     const Memory memory = ground_memory(ground, 1);
-    assert_int_equal(mild_batch_robot_bytes(batch), 9 * PLACES * sizeof(float));
+    assert_int_equal(mild_batch_robot_bytes(batch), 8 * PLACES * sizeof(float));
     memory.depth_max[ELEMENT] = 0.01;
     assert_int_equal(mild_batch_load(batch, 2, ground, &e), MILD_OK);
     memory.worn[ELEMENT] = 0.25;
@@ -44,7 +44,7 @@ TEST(wear_begins_with_a_material_that_wears) {
                    "robot 0 wears mild_batch_set_materials");
     sand.slip_length = 1e-3;
     assert_int_equal(mild_batch_set_materials(batch, &sand, 1, &e), MILD_OK);
-    assert_int_equal(mild_batch_robot_bytes(batch), 10 * PLACES * sizeof(float));
+    assert_int_equal(mild_batch_robot_bytes(batch), 9 * PLACES * sizeof(float));
     assert_int_equal(mild_batch_load(batch, 0, ground, &e), MILD_OK);
     for (int robot = 2; robot >= 0; robot -= 2) {
         assert_int_equal(mild_batch_store(batch, robot, ground, &e), MILD_OK);
