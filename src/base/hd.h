@@ -140,8 +140,8 @@ MILD_HD_FN float half_unpack(uint16_t half) {
 }
 
 /* Two numbers within [-1, 1] in the bits of one Real, each as a whole number of half the bits: the
- * rounding error is 2^-16, in double 2^-32. Adding 1.5 times the power of two of the mantissa leaves
- * the whole number in the low bits, of whatever x is. */
+ * rounding error is 2^-16, in double 2^-32. PAIR_ADD moves whole numbers into the low bits of the
+ * mantissa, so that x may also be no number. */
 #ifdef MILD_REAL_FLOAT
 typedef uint32_t PairBits;
 typedef int32_t PairWhole;

@@ -253,7 +253,7 @@ TEAM_FN void env_shells_copy(const Real *from, int count, Real *to) {
 TEAM_FN void env_shells_feet(const EnvsArrays *all, long robot, BodiesWork *to) {
     const int feet = all->shells.setup->feet;
     const EnvsContact *at = &all->contact;
-    const Real *A = at->inverse_inertia + robot * 36 * feet * feet;
+    const Real *A = at->inverse_inertia + robot * contact_triangle(6 * feet, 0);
     const int rows = 6 * to->count;
     env_shells_copy(at->position + robot * 3 * feet, 3 * feet, to->position[0]);
     env_shells_copy(at->rotation + robot * 9 * feet, 9 * feet, to->rotation[0]);
@@ -262,7 +262,9 @@ TEAM_FN void env_shells_feet(const EnvsArrays *all, long robot, BodiesWork *to) 
     EACH_LANE(l) {
         LANE_ROLLED
         for (int i = TEAM_LANE(l); i < 36 * feet * feet; i += TEAM) {
-            to->inverse_inertia[i / (6 * feet) * rows + i % (6 * feet)] = A[i];
+            const int r = i / (6 * feet), c = i % (6 * feet);
+            to->inverse_inertia[r * rows + c] =
+                A[r > c ? contact_triangle(r, c) : contact_triangle(c, r)];
         }
     }
     team_sync();

@@ -93,8 +93,8 @@ static double way(const MildGround *ground, int foot, int element) {
     return memory.drift[element] + hypot(memory.pending_x[element], memory.pending_y[element]);
 }
 
-/* Feet that creep at 32 and 0.5 um/s count their ways as on the ground in double, within what a step
- * may round off the motion that is not yet counted. */
+/* Feet that creep at 32 and 0.5 um/s count their ways as mild/ground.h does, within what a step may
+ * round off the motion that is not yet counted. */
 TEST(creep_is_counted) {
     const double speed[2][2] = {{3e-5, 1e-5}, {4e-7, -3e-7}};
     const double rounded = CREEPS * 1e-5 / 65534 * sqrt(2.0) + 1e-8; /* and the sums of floats */

@@ -15,9 +15,10 @@ typedef struct {
     int stride; /* elements of a foot in memory */
     float dt, tolerance;
     int limit;
-    int materials;                     /* in the table; behind them one that is not a number */
-    int map;                           /* bool: on BatchArrays.map, not on level ground */
-    int points;                        /* bool: as MildBatchDef.points */
+    int materials; /* in the table; behind them one that is not a number */
+    int map;       /* bool: on BatchArrays.map, not on level ground */
+    int points;    /* bool: as MildBatchDef.points */
+    int triangle;  /* bool: of each inverse_inertia there is the lower triangle alone, row by row */
     int elements[MILD_BATCH_FEET_MAX]; /* of a sole */
     float z[MILD_BATCH_FEET_MAX];      /* [m] of its plane */
     float area[MILD_BATCH_FEET_MAX];   /* [m^2] of an element */

@@ -60,15 +60,22 @@ typedef struct {
     Real dt;        /* [s] */
     Real tolerance; /* [-] of the residual, in the metric of kinetic energy */
     int limit;      /* of Newton steps */
+    int triangle;   /* bool: inverse_inertia is its lower triangle, row by row */
     MapView map;    /* in a version with CONTACT_MAP */
 } ContactSetup;
+
+/* Place of an entry of a lower triangle. */
+MILD_HD int contact_triangle(int row, int column) {
+    return row * (row + 1) / 2 + column;
+}
 
 /* What a robot's engine knows before the step; see MildContactInput. */
 typedef struct {
     const Real *position;            /* [feet][3] [m] */
     const Real *rotation;            /* [feet][9] [-] */
     const Real *velocity;            /* [feet][6] [m/s, rad/s] */
-    const Real *inverse_inertia;     /* [6 feet][6 feet] [1/kg, 1/(kg m), 1/(kg m^2)] */
+    const Real *inverse_inertia;     /* [6 feet][6 feet] [1/kg, 1/(kg m), 1/(kg m^2)], or with
+                                        ContactSetup.triangle [contact_triangle(6 feet, 0)] */
     const Real *free_velocity;       /* [6 feet] [m/s, rad/s] */
     const ContactMaterial *material; /* [feet] without a map */
     Real height;                     /* [m] of the surface */
