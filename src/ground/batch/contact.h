@@ -88,8 +88,8 @@ typedef struct {
 
 /* Memory of a robot: CONTACT_MEMORY numbers of each element, those of ElementMemory, as
  * [number][foot][stride]. The two of `pending` are a pair (base/hd.h): neither exceeds
- * REMEMBER_BAND, of which a step may round off 2^-16, 0.15 nm. So d_D may be wrong by that times
- * the steps since touchdown, half a micrometre in 20 s of 5 ms.
+ * REMEMBER_BAND, of which a step rounds off at most 2^-16, 0.15 nm. So d_D is wrong by at most
+ * 0.22 nm for each step since touchdown, 0.9 um after 20 s of 5 ms.
  *
  * With a map four more of each follow: number `plane` [m] and the gradient [-] along x and y of the
  * plane that the last step had for the ground, and the label that a loaded element touched down on.
