@@ -114,9 +114,10 @@ size_t mild_batch_robot_bytes(const MildBatch *batch);
 int mild_batch_stride(const MildBatch *batch);
 
 /* Replaces the table of materials that MildBatchInput.material points into. materials: [count], of
- * any model, checked by mild_material_check and, of bekker, by the width of every sole. Waits for
- * the device. A graph captured before holds the old table: capture it again. Fails with the table
- * unchanged. */
+ * any model, checked by mild_material_check and, of bekker, by the width of every sole. The first
+ * material of mild_merged, or with a slip_length, gives the elements of all plane soles a wear to
+ * remember, 4 B each; those of surfaces have it. Waits for the device. A graph captured before
+ * holds the old table: capture it again. Fails with the table unchanged. */
 MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
                                     MildError *error);
 
@@ -138,7 +139,8 @@ MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
 /* Sets what the ground under robot 0 .. robots - 1 remembers to what `ground`, of the same soles,
  * remembers, to go on with a simulation that began on the CPU; materials of that ground are labels
  * here. Waits for the device. Fails, with the memory unchanged, when the ground has other soles,
- * imprints, mixtures, materials without a label, or is uneven and the batch is not. */
+ * imprints, mixtures, materials without a label, wear that no material of the batch has, or is
+ * uneven and the batch is not. */
 MildStatus mild_batch_load(MildBatch *batch, int robot, const MildGround *ground, MildError *error);
 /* The other way: `ground`, of the same soles and without imprints, forgets everything and remembers
  * what the ground under a robot does. Waits for the device. Fails like mild_batch_load. */

@@ -139,6 +139,42 @@ MILD_HD_FN float half_unpack(uint16_t half) {
 #endif
 }
 
+/* Two numbers within [-1, 1] in the bits of one Real, each as a whole number of half the bits: the
+ * rounding error is 2^-16, in double 2^-32. PAIR_ADD moves whole numbers into the low bits of the
+ * mantissa, so that x may also be no number. */
+#ifdef MILD_REAL_FLOAT
+typedef uint32_t PairBits;
+typedef int32_t PairWhole;
+#define PAIR_ADD 0x1.8p23f
+#else
+typedef uint64_t PairBits;
+typedef int64_t PairWhole;
+#define PAIR_ADD 0x1.8p52
+#endif
+enum { PAIR_HALF = 4 * sizeof(Real) };                           /* bits of a number */
+#define PAIR_ONE ((Real)(((PairWhole)1 << (PAIR_HALF - 1)) - 1)) /* 1 as a whole number */
+
+MILD_HD PairBits pair_bits(Real x) {
+    const Real moved = x * PAIR_ONE + PAIR_ADD;
+    PairBits bits;
+    memcpy(&bits, &moved, sizeof bits);
+    return bits;
+}
+
+MILD_HD Real pair_pack(Real x, Real y) {
+    const PairBits bits = pair_bits(x) << PAIR_HALF | (pair_bits(y) << PAIR_HALF >> PAIR_HALF);
+    Real pair;
+    memcpy(&pair, &bits, sizeof pair);
+    return pair;
+}
+
+MILD_HD void pair_unpack(Real pair, Real *x, Real *y) {
+    PairBits bits;
+    memcpy(&bits, &pair, sizeof bits);
+    *x = (Real)((PairWhole)bits >> PAIR_HALF) * (1 / PAIR_ONE);
+    *y = (Real)((PairWhole)(bits << PAIR_HALF) >> PAIR_HALF) * (1 / PAIR_ONE);
+}
+
 /* ---- lanes ---- */
 
 /* LANES lanes work together on one robot. On a GPU they are the threads of a warp; on the CPU one

@@ -93,16 +93,19 @@ static MildStatus open_ground(Batch *b, const EnvsDef *def, const TaskGrounds *g
         materials[i] = grounds->ground[i].material;
     }
     b->ground = mild_batch_create(&batch, error);
-    MildStatus status = b->ground
-                            ? mild_batch_set_materials(b->ground, materials, grounds->count, error)
-                            : MILD_ERROR_ARGUMENT;
+    MildStatus status = MILD_ERROR_ARGUMENT;
+    if (b->ground) {
+        b->ground->shape.triangle = 1;
+        status = mild_batch_set_materials(b->ground, materials, grounds->count, error);
+    }
     if (status == MILD_OK && def->task->map) {
         status = mild_batch_set_map(b->ground, def->task->map, error);
     }
     const int bodies = robot_bodies(def->robot) - batch.feet;
     if (status == MILD_OK && bodies > 0) {
-        status = batch_bodies_open(&b->bodies, b->ground, batch.soles, bodies, def->task->map,
-                                   materials, grounds->count, error);
+        status =
+            batch_bodies_open(&b->bodies, b->ground, batch.soles, bodies, def->task->map, materials,
+                              grounds->count, b->ground->arrays.worn != NULL, error);
     }
     free(materials);
     return status;
@@ -116,6 +119,11 @@ static void *take(Batch *b, size_t bytes, MildError *error) {
 
 static int labels_of(const TaskDef *task) {
     return task->map ? mild_map_label_count(task->map) : 1;
+}
+
+/* Of the lower triangle of A. */
+static size_t inertia_numbers(size_t feet) {
+    return 6 * feet * (6 * feet + 1) / 2;
 }
 
 static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
@@ -148,7 +156,7 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
                   {&contact->position, 3 * rows * sizeof(float)},
                   {&contact->rotation, 9 * rows * sizeof(float)},
                   {&contact->velocity, 6 * rows * sizeof(float)},
-                  {&contact->inverse_inertia, 36 * rows * feet * sizeof(float)},
+                  {&contact->inverse_inertia, envs * inertia_numbers(feet) * sizeof(float)},
                   {&contact->free_velocity, 6 * rows * sizeof(float)},
                   {&contact->height, envs * sizeof(float)},
                   {&contact->foot, rows * sizeof *contact->foot}};
@@ -369,7 +377,7 @@ static EnvsContact contact_from(const EnvsContact *c, size_t first, size_t feet)
     return (EnvsContact){.position = c->position + 3 * row,
                          .rotation = c->rotation + 9 * row,
                          .velocity = c->velocity + 6 * row,
-                         .inverse_inertia = c->inverse_inertia + 36 * row * feet,
+                         .inverse_inertia = c->inverse_inertia + first * inertia_numbers(feet),
                          .free_velocity = c->free_velocity + 6 * row,
                          .height = c->height + first,
                          .foot = c->foot + row};

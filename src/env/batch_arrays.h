@@ -55,8 +55,9 @@ typedef struct {
  * over what it has read: the wrenches over velocity, the twists after the step over free_velocity.
  */
 typedef struct {
-    float *position, *rotation, *velocity, *inverse_inertia, *free_velocity, *height;
-    MildBatchFoot *foot; /* of which depth_mean is the engine's on rigid ground */
+    float *position, *rotation, *velocity, *free_velocity, *height;
+    float *inverse_inertia; /* BatchShape.triangle */
+    MildBatchFoot *foot;    /* of which depth_mean is the engine's on rigid ground */
 } EnvsContact;
 /* Bodies with shells that stand: on soft ground by ground/batch/bodies.h, on rigid ground by
  * robot/engine/floor.h. */

@@ -3,6 +3,8 @@
 #ifndef ENVS_BATCH_ENV_H
 #define ENVS_BATCH_ENV_H
 
+#include <assert.h>
+
 #include "robot/engine/model.h"
 
 #define TASK_JOINTS ENGINE_JOINTS
@@ -15,7 +17,6 @@
 /* Of one environment besides its TaskEnv. */
 typedef struct {
     alignas(16) EngineSaved saved; /* between the parts of a step */
-    RobotReading reading;
     TaskSensors sensors;
     int label; /* of the map under the base */
     Real tally[TALLY_KEPT];
@@ -46,6 +47,13 @@ MILD_HD TaskEnv *env_at(const EnvsArrays *all, long robot) {
 
 MILD_HD EnvRobot *env_robot_at(const EnvsArrays *all, long robot) {
     return (EnvRobot *)(void *)all->robot + robot;
+}
+
+/* In the place of the rows that a part saves, which the next one has read: from env_measure to the
+ * end of a policy step, and in the samples of a physics step. */
+MILD_HD RobotReading *env_reading(EnvRobot *own) {
+    static_assert(sizeof(RobotReading) <= sizeof own->saved.rows, "it has room there");
+    return (RobotReading *)(void *)own->saved.rows;
 }
 
 MILD_HD EnvShells *env_shells_at(const EnvsArrays *all, long robot) {

@@ -29,7 +29,7 @@ WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, int she
                                const EnvWork *scratch) {
     const EngineTree *tree = &all->model->tree;
     const EngineWork *work = &scratch->work;
-    const RobotReading *reading = &env_robot_at(all, robot)->reading;
+    const RobotReading *reading = env_reading(env_robot_at(all, robot));
     const int feet = engine_feet(tree), rigid = all->rigid[robot];
     const int steps = env_physics_steps(all->task);
     EnvsSample *begun = all->sample + robot * steps + k, *done = begun - 1;

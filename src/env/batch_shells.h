@@ -158,15 +158,16 @@ MILD_HD int env_shells_wait(const EnvsArrays *all, long robot) {
 MILD_HD BodiesMemory env_foot_memory(const EnvsShells *shells, long robot, int f) {
     const BatchShape *shape = &shells->shape;
     const int all = shape->groups * shape->stride;
-    return bodies_foot_memory(shells->ground.memory +
-                                  robot * contact_memory_numbers(all, shape->map),
-                              shape->groups, shape->stride, f);
+    const BatchArrays *ground = &shells->ground;
+    return bodies_foot_memory(ground->memory + robot * contact_memory_numbers(all, shape->map),
+                              ground->worn ? ground->worn + robot * all : NULL, shape->groups,
+                              shape->stride, f);
 }
 
 MILD_HD BodiesMemory env_body_memory(const EnvsArrays *all, long robot, int body) {
     const BodiesSole *sole = &all->shells.setup->sole[body];
     return bodies_memory(all->shells.memory + robot * (long)all->shells.numbers + sole->memory,
-                         sole->elements);
+                         sole->elements, all->shells.ground.worn != NULL);
 }
 
 /* Bodies other than those of the bits in `near` forget. */
@@ -250,7 +251,7 @@ TEAM_FN void env_shells_copy(const Real *from, int count, Real *to) {
 TEAM_FN void env_shells_feet(const EnvsArrays *all, long robot, BodiesWork *to) {
     const int feet = all->shells.setup->feet;
     const EnvsContact *at = &all->contact;
-    const Real *A = at->inverse_inertia + robot * 36 * feet * feet;
+    const Real *A = at->inverse_inertia + robot * contact_triangle(6 * feet, 0);
     const int rows = 6 * to->count;
     env_shells_copy(at->position + robot * 3 * feet, 3 * feet, to->position[0]);
     env_shells_copy(at->rotation + robot * 9 * feet, 9 * feet, to->rotation[0]);
@@ -259,7 +260,9 @@ TEAM_FN void env_shells_feet(const EnvsArrays *all, long robot, BodiesWork *to) 
     EACH_LANE(l) {
         LANE_ROLLED
         for (int i = TEAM_LANE(l); i < 36 * feet * feet; i += TEAM) {
-            to->inverse_inertia[i / (6 * feet) * rows + i % (6 * feet)] = A[i];
+            const int r = i / (6 * feet), c = i % (6 * feet);
+            to->inverse_inertia[r * rows + c] =
+                A[r > c ? contact_triangle(r, c) : contact_triangle(c, r)];
         }
     }
     team_sync();

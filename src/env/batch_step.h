@@ -162,14 +162,15 @@ WARP_FN void env_motors(const EnvsArrays *all, const TaskEnv *env, int late, int
     lanes_sync();
 }
 
-/* env_copy of a multiple of four, from and to multiples of 16 bytes. */
-WARP_FN void env_copy4(const Real *from, int count, Real *to) {
+/* The lower triangle of A. */
+WARP_FN void env_export_inertia(const Real *A, int rows, Real *to) {
     EACH_LANE(l) {
         ENGINE_LOOP
-        for (int i = 4 * LANE(l); i < count; i += 4 * LANES) {
-            Real four[4];
-            load4(from + i, four);
-            store4(four, to + i);
+        for (int i = LANE(l); i < rows * rows; i += LANES) {
+            const int row = i / rows, column = i % rows;
+            if (column <= row) {
+                to[contact_triangle(row, column)] = A[i];
+            }
         }
     }
 }
@@ -182,8 +183,8 @@ WARP_FN void env_export(const EnvsArrays *all, long robot, const EngineWork *wor
     env_copy(work->foot_position[0], 3 * feet, at->position + robot * 3 * feet);
     env_copy(work->foot_rotation[0], 9 * feet, at->rotation + robot * 9 * feet);
     env_copy(work->foot_velocity[0], 6 * feet, at->velocity + robot * 6 * feet);
-    env_copy4(support->ground.inverse_inertia, 36 * feet * feet,
-              at->inverse_inertia + robot * 36 * feet * feet);
+    env_export_inertia(support->ground.inverse_inertia, 6 * feet,
+                       at->inverse_inertia + robot * contact_triangle(6 * feet, 0));
     env_copy(support->free_velocity[0], 6 * feet, at->free_velocity + robot * 6 * feet);
 }
 
@@ -212,7 +213,7 @@ MILD_HD void env_measure_foot(const EngineModel *model, const EnvWork *scratch, 
  * step. */
 WARP_FN void env_measure(const EnvsArrays *all, long robot, int contact, EnvWork *scratch) {
     EnvRobot *own = env_robot_at(all, robot);
-    RobotReading *reading = &own->reading;
+    RobotReading *reading = env_reading(own);
     const EngineModel *model = all->model;
     const EngineWork *work = &scratch->work;
     const int feet = engine_feet(&model->tree);
@@ -361,8 +362,15 @@ WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, i
         }
     }
     env_start_step(all, robot, k, steps, env, scratch);
-    if (sampled && k > 0 && k < steps) {
+    if (k == steps) {
+        env_store(all->model, scratch, env);
+        engine_save_acceleration(tree, &scratch->work, &own->saved);
+    }
+    if (k == steps || (sampled && k > 0)) {
         env_measure(all, robot, 1, scratch);
+    }
+    if (sampled) {
+        env_record_sample(all, robot, k, shells, scratch);
     }
     if (k < steps) {
         engine_save(tree, env->variation.rigid, &scratch->work, &own->saved);
@@ -380,13 +388,6 @@ WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, i
             const EngineGround ground = env_surface(all, robot);
             env_shells_near(all, robot, &ground, &scratch->work);
         }
-    } else {
-        env_store(all->model, scratch, env);
-        engine_save_acceleration(tree, &scratch->work, &own->saved);
-        env_measure(all, robot, 1, scratch);
-    }
-    if (sampled) {
-        env_record_sample(all, robot, k, shells, scratch);
     }
 }
 
@@ -506,7 +507,7 @@ MILD_HD double env_tally(const EnvsArrays *all, long robot, int n) {
 MILD_HD void env_end(const EnvsArrays *all, const EnvsStep *call, long robot) {
     EnvRobot *own = env_robot_at(all, robot);
     TaskEnv *env = env_at(all, robot);
-    const TaskStep step = task_end_step(env, &all->task->task, &all->task->robot, &own->reading,
+    const TaskStep step = task_end_step(env, &all->task->task, &all->task->robot, env_reading(own),
                                         env->torque, own->diverged);
     if (tile_lane() == 0) {
         call->reward[robot] = step.reward;
@@ -532,10 +533,10 @@ MILD_HD void env_observe(const EnvsArrays *all, const EnvsStep *call, long robot
     const int reset = all->reset[robot];
     EnvRobot *own = env_robot_at(all, robot);
     if (reset && tile_lane() == 0) {
-        task_first_sensors(env, &own->reading, &own->sensors);
+        task_first_sensors(env, env_reading(own), &own->sensors);
     }
     tile_sync();
-    task_observe(env, &all->task->task, &all->task->robot, &own->reading,
+    task_observe(env, &all->task->task, &all->task->robot, env_reading(own),
                  all->task->ground[env->ground[own->label]].numbers, &own->sensors, reset, &view);
 }
 

@@ -5,7 +5,7 @@
 
 #include "contact_case.h"
 
-enum { BODIES = 5, BODIES_ELEMENTS = 512, BODIES_MEMORY = 15, BODIES_PLACES = 8 };
+enum { BODIES = 5, BODIES_ELEMENTS = 512, BODIES_BEYOND = 5, BODIES_PLACES = 8 };
 
 typedef struct {
     int feet, bodies;
@@ -22,7 +22,7 @@ typedef struct {
     double position[BODIES][3], rotation[BODIES][9], velocity[BODIES][6];
     double inverse_inertia[36 * BODIES * BODIES], free_velocity[6 * BODIES];
     /* in and out */
-    double memory[BODIES_MEMORY][BODIES][BODIES_ELEMENTS], own[BODIES_PLACES][BODIES];
+    double memory[CASE_MEMORY + BODIES_BEYOND][BODIES][BODIES_ELEMENTS], own[BODIES_PLACES][BODIES];
     /* out */
     double wrench[6 * BODIES], after[6 * BODIES], foot[BODIES][6], residual;
     int iterations;

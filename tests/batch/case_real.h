@@ -17,6 +17,33 @@ static void to_double(double *to, const Real *from, int count) {
     }
 }
 
+/* The numbers of a foot's elements, `next` apart in memory and `apart` in a case, or back. Those of
+ * `pending` share one. */
+static void case_elements(Real *memory, int next, double *numbers, size_t apart, int count,
+                          int back) {
+    const Real band = (Real)1e-5;
+    double *x = numbers + 4 * apart, *y = x + apart;
+    for (int n = 0; n < CASE_WORN; n++) {
+        Real *at = memory + (n < 5 ? n : n - 1) * next;
+        double *of = numbers + (size_t)n * apart;
+        if (of != x && of != y && back) {
+            to_double(of, at, count);
+        } else if (of != x && of != y) {
+            to_real(at, of, count);
+        }
+    }
+    for (int s = 0; s < count; s++) {
+        Real *at = memory + 4 * next + s, pending[2];
+        if (back) {
+            pair_unpack(*at, &pending[0], &pending[1]);
+            x[s] = (double)(pending[0] * band);
+            y[s] = (double)(pending[1] * band);
+        } else {
+            *at = pair_pack((Real)x[s] / band, (Real)y[s] / band);
+        }
+    }
+}
+
 static ContactMaterial case_material(const CaseMaterial *from) {
     ContactMaterial m;
     int n = 0;

@@ -5,6 +5,7 @@
 #include "ground/map_view.h"
 
 enum { CASE_FEET = 4, CASE_ELEMENTS = 256, CASE_MEMORY = 10, CASE_LAW = 14, CASE_LABELS = 4 };
+enum { CASE_WORN = CASE_MEMORY - 1 }; /* of ContactCase.memory */
 
 typedef struct {
     double law[CASE_LAW], recovery, mu, k_drift, b_drift, exit_drag, entry_drag;

@@ -2,6 +2,7 @@
 #include "ground/batch/bodies_batch.h"
 #include "ground/batch/contact_shapes.h"
 #include "ground/inside.h"
+#include "ground/law.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -153,15 +154,12 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
     }
     const BatchShape *shape = &batch->shape;
     BatchArrays *arrays = &batch->arrays;
-    const size_t robots = (size_t)shape->robots;
     arrays->map.labels = 1;
     arrays->elements = device_alloc(batch->device, element_bytes(shape), error);
-    arrays->memory = arrays->elements
-                         ? device_alloc(batch->device,
-                                        robots * batch_memory_numbers(shape) * sizeof(float), error)
-                         : NULL;
-    if (!arrays->memory) {
-        return MILD_ERROR_MEMORY;
+    status = arrays->elements ? batch_memory_open(arrays, shape, batch->device, 0, error)
+                              : MILD_ERROR_MEMORY;
+    if (status != MILD_OK) {
+        return status;
     }
     status = store_elements(batch, def->soles, error);
     if (status != MILD_OK) {
@@ -171,8 +169,8 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
     const int surfaces = shape->soles - shape->feet;
     status = mild_batch_set_materials(batch, &sand, 1, error);
     if (status == MILD_OK && surfaces > 0) {
-        status =
-            batch_bodies_open(&batch->bodies, batch, def->soles, surfaces, NULL, &sand, 1, error);
+        status = batch_bodies_open(&batch->bodies, batch, def->soles, surfaces, NULL, &sand, 1, 1,
+                                   error);
         status = status == MILD_OK ? batch_bodies_ready(batch, error) : status;
     }
     return status;
@@ -208,11 +206,33 @@ void mild_batch_destroy(MildBatch *batch) {
 }
 
 size_t mild_batch_robot_bytes(const MildBatch *batch) {
-    return (batch_memory_numbers(&batch->shape) + batch->bodies.numbers) * sizeof(float);
+    const BatchShape *shape = &batch->shape;
+    const size_t worn = batch->arrays.worn ? batch_worn_numbers(shape) : 0;
+    return (batch_memory_numbers(shape) + worn + batch->bodies.numbers) * sizeof(float);
 }
 
 int mild_batch_stride(const MildBatch *batch) {
     return batch->shape.stride;
+}
+
+/* Wear for the robots, behind all that they remember. */
+static MildStatus begin_wear(MildBatch *batch, MildError *error) {
+    const BatchShape *shape = &batch->shape;
+    BatchArrays arrays = batch->arrays;
+    if (batch_memory_open(&arrays, shape, batch->device, 1, error) != MILD_OK) {
+        return MILD_ERROR_MEMORY;
+    }
+    float *before = batch->arrays.memory;
+    const size_t bytes = (size_t)shape->robots * batch_memory_numbers(shape) * sizeof *before;
+    MildStatus status = device_wait(batch->device, error);
+    if (status == MILD_OK) {
+        status = device_copy(batch->device, arrays.memory, before, bytes, error);
+    }
+    if (status == MILD_OK) {
+        batch->arrays = arrays;
+    }
+    device_free(batch->device, status == MILD_OK ? before : arrays.memory);
+    return status;
 }
 
 MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
@@ -233,6 +253,11 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
                                                materials, count, &next.curves, error);
         status = next.arrays.materials ? MILD_OK : error->status;
     }
+    if (status == MILD_OK && (next.curves & LAW_HEAP) && !batch->arrays.worn) {
+        status = begin_wear(batch, error); /* which changes nothing that a step sees */
+        next.arrays.memory = batch->arrays.memory;
+        next.arrays.worn = batch->arrays.worn;
+    }
     if (status == MILD_OK && batch->bodies.setup) {
         status = batch_bodies_set_materials(&next, materials, count, error);
     }
@@ -248,6 +273,9 @@ MildBatch batch_share(const MildBatch *batch, int first, int count) {
     MildBatch share = *batch;
     share.shape.robots = count;
     share.arrays.memory += (size_t)first * batch_memory_numbers(&batch->shape);
+    if (share.arrays.worn) {
+        share.arrays.worn += (size_t)first * batch_worn_numbers(&batch->shape);
+    }
     return share;
 }
 
@@ -300,11 +328,16 @@ MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, MildStream s
     if (batch->device != MILD_BATCH_HOST) {
         return batch_gpu_reset(batch, which, stream, error);
     }
+    const BatchArrays *arrays = &batch->arrays;
     const size_t numbers = batch_memory_numbers(&batch->shape);
+    const size_t worn = batch_worn_numbers(&batch->shape);
     for (size_t robot = 0; robot < (size_t)batch->shape.robots; robot++) {
         if (!which || which[robot]) {
-            memset(batch->arrays.memory + robot * numbers, 0, numbers * sizeof(float));
+            memset(arrays->memory + robot * numbers, 0, numbers * sizeof(float));
             batch_bodies_reset(&batch->bodies, robot);
+        }
+        if (arrays->worn && (!which || which[robot])) {
+            memset(arrays->worn + robot * worn, 0, worn * sizeof(float));
         }
     }
     return MILD_OK;

@@ -16,9 +16,10 @@ typedef struct {
     int stride; /* elements of a foot in memory */
     float dt, tolerance;
     int limit;
-    int materials;                     /* in the table; behind them one that is not a number */
-    int map;                           /* bool: on BatchArrays.map, not on level ground */
-    int points;                        /* bool: as MildBatchDef.points */
+    int materials; /* in the table; behind them one that is not a number */
+    int map;       /* bool: on BatchArrays.map, not on level ground */
+    int points;    /* bool: as MildBatchDef.points */
+    int triangle;  /* bool: of each inverse_inertia there is the lower triangle alone, row by row */
     int elements[MILD_BATCH_FEET_MAX]; /* [soles] */
     float z[MILD_BATCH_PLANES_MAX];    /* [feet] [m] of a sole's plane */
     float area[MILD_BATCH_PLANES_MAX]; /* [feet] [m^2] of an element */
@@ -29,6 +30,8 @@ typedef struct {
     float *elements;            /* [4][feet][stride] x and y [m], begin and width of SoleHeap [-] */
     MaterialNumbers *materials; /* [materials + 1][feet] */
     float *memory;              /* [robots] of contact.h */
+    float *worn;                /* [robots][groups][stride] [-] wear, behind `memory`; NULL until
+                                   there is a material that wears */
     MapView map;                /* all 0 without a map */
     const uint8_t *skip; /* [robots] bool: a step leaves it alone; NULL: none. Of the caller */
 } BatchArrays;
@@ -59,10 +62,16 @@ struct MildBatch {
     double width[MILD_BATCH_FEET_MAX]; /* [soles] [m] mild_sole_width */
 };
 
-/* [numbers] of a robot's memory. */
+/* [numbers] of a robot's memory, without wear. */
 size_t batch_memory_numbers(const BatchShape *shape);
-/* The memory of a ground as that of one robot, [batch_memory_numbers]. */
-void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *memory);
+/* [numbers] of its wear. */
+size_t batch_worn_numbers(const BatchShape *shape);
+/* The memory of a ground as that of one robot, [batch_memory_numbers] and, or NULL,
+ * [batch_worn_numbers]. */
+void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *memory, float *worn);
+/* Gives the robots a memory in which nothing is remembered. worn: bool, with their wear. */
+MildStatus batch_memory_open(BatchArrays *arrays, const BatchShape *shape, int device, int worn,
+                             MildError *error);
 /* `count` robots of a batch from `first` on, as a batch that borrows its memory. */
 MildBatch batch_share(const MildBatch *batch, int first, int count);
 

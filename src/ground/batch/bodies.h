@@ -65,6 +65,7 @@ typedef struct {
     int next;
     Real *body;
     int step;
+    Real *worn; /* [-] as in ContactMemory */
 } BodiesMemory;
 enum {
     BODIES_PLANE = CONTACT_MEMORY, /* with a map, or of a surface */
@@ -79,22 +80,24 @@ enum {
  * MATERIAL_NONE, MATERIAL_FREE and MATERIAL_BURIED of ground/state.h. */
 enum { BODIES_NONE = 0, BODIES_FREE = -1, BODIES_BURIED = -2 };
 
-/* [numbers] of the memory of a surface. */
-MILD_HD int bodies_memory_numbers(int elements) {
-    return BODIES_NUMBERS * elements + BODIES_OWN;
+/* [numbers] of the memory of a surface. worn: bool, with wear. */
+MILD_HD int bodies_memory_numbers(int elements, int worn) {
+    return (BODIES_NUMBERS + (worn != 0)) * elements + BODIES_OWN;
 }
 
-/* That of foot f in the memory of a robot, in the layout of contact.h. */
-MILD_HD BodiesMemory bodies_foot_memory(Real *memory, int groups, int stride, int f) {
+/* That of foot f in the memory of a robot, in the layout of contact.h. worn: that of the robot, or
+ * NULL. */
+MILD_HD BodiesMemory bodies_foot_memory(Real *memory, Real *worn, int groups, int stride, int f) {
     const int all = groups * stride;
     const BodiesMemory at = {memory + f * stride, all, memory + all * CONTACT_MAP_MEMORY + f,
-                             groups};
+                             groups, worn ? worn + f * stride : NULL};
     return at;
 }
 
 /* That of a surface, at `memory`. */
-MILD_HD BodiesMemory bodies_memory(Real *memory, int elements) {
-    const BodiesMemory at = {memory, elements, memory + BODIES_NUMBERS * elements, 1};
+MILD_HD BodiesMemory bodies_memory(Real *memory, int elements, int worn) {
+    Real *own = memory + BODIES_NUMBERS * elements;
+    const BodiesMemory at = {memory, elements, own, 1, worn ? own + BODIES_OWN : NULL};
     return at;
 }
 
@@ -268,29 +271,12 @@ WARP_FN int bodies_touch(const BodiesSetup *setup, int body, const Real *positio
 
 /* ---- an element at the start of a step ---- */
 
-MILD_HD ElementMemory bodies_recall(const BodiesMemory *memory, int s) {
-    const Real *at = memory->element + s;
-    const int next = memory->next;
-    const ElementMemory before = {at[0],        at[next],     at[2 * next],
-                                  at[3 * next], at[4 * next], at[5 * next],
-                                  at[6 * next], at[7 * next], at[8 * next]};
-    return before;
-}
-
 MILD_HD void bodies_record(const BodiesMemory *memory, int s, const ElementMemory *after,
                            Real worn) {
-    Real *at = memory->element + s;
-    const int next = memory->next;
-    at[0] = after->depth_max;
-    at[next] = after->middle;
-    at[2 * next] = after->front_speed;
-    at[3 * next] = after->drift;
-    at[4 * next] = after->pending_x;
-    at[5 * next] = after->pending_y;
-    at[6 * next] = after->held_x;
-    at[7 * next] = after->held_y;
-    at[8 * next] = after->held_stiffness;
-    at[CONTACT_WORN * next] = worn;
+    contact_record(memory->element + s, memory->next, after);
+    if (memory->worn) {
+        memory->worn[s] = worn;
+    }
 }
 
 /* State of element s of a body; of a sole, whose elements keep no state, from what it remembers. */
@@ -408,7 +394,7 @@ MILD_HD void bodies_carry(const BodiesSetup *setup, const BodiesWork *work, int 
     const BodiesSole *sole = &setup->sole[work->body[i]];
     const BodiesMemory *memory = &work->memory[i];
     const Real lean = bodies_lean(work, sole, i, s, material, own);
-    const Real worn = memory->element[CONTACT_WORN * memory->next + s];
+    const Real worn = memory->worn ? memory->worn[s] : 0;
     const Real elastic = law_elastic_force(&own->element.law, own->curves, own->element.middle);
     own->carried = contact_share(material, !sole->face, worn);
     Real ahead = 0;
@@ -516,7 +502,7 @@ MILD_HD void bodies_locate(const BodiesSetup *setup, const BodiesWork *work, int
 MILD_HD void bodies_element(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
                             const MapSpot *spot, int all, BodiesElement *own, int heap) {
     bodies_locate(setup, work, i, s, spot, own);
-    own->before = bodies_recall(&work->memory[i], s);
+    own->before = contact_recall(work->memory[i].element + s, work->memory[i].next);
     if (own->listed || all) {
         bodies_begin(setup, work, i, s, own, heap);
     }
@@ -715,11 +701,12 @@ TEAM_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advan
 /* A surface far from the ground forgets. */
 WARP_FN void bodies_leave(const BodiesMemory *memory, int elements) {
     const int touched = memory->body[BODIES_TOUCHED] > 0;
+    const int worn = memory->worn != NULL;
     lanes_sync(); /* all lanes have read it */
     if (touched) {
         EACH_LANE(l) {
             LANE_ROLLED
-            for (int n = LANE(l); n < bodies_memory_numbers(elements); n += LANES) {
+            for (int n = LANE(l); n < bodies_memory_numbers(elements, worn); n += LANES) {
                 memory->element[n] = 0;
             }
         }

@@ -91,7 +91,8 @@ static size_t count_places(const MildSole *const *surface, int surfaces) {
 }
 
 static MildStatus set_surfaces(BatchBodies *bodies, BodiesSetup *setup, const MildBatch *batch,
-                               const MildSole *const *surface, int surfaces, MildError *error) {
+                               const MildSole *const *surface, int surfaces, int worn,
+                               MildError *error) {
     const size_t numbers = count_places(surface, surfaces);
     float *values = malloc(numbers * sizeof *values);
     bodies->places = device_alloc(batch->device, numbers * sizeof *values, error);
@@ -105,7 +106,7 @@ static MildStatus set_surfaces(BatchBodies *bodies, BodiesSetup *setup, const Mi
         set_surface(to, surface[s], values + at, bodies->places + at);
         at += PLACES * (size_t)to->elements;
         to->memory = (int)bodies->numbers;
-        bodies->numbers += (size_t)bodies_memory_numbers(to->elements);
+        bodies->numbers += (size_t)bodies_memory_numbers(to->elements, worn);
     }
     bodies->bytes += numbers * sizeof *values;
     MildStatus status =
@@ -127,12 +128,13 @@ static void set_tables(BodiesSetup *setup, const MildBatch *batch, const Materia
 }
 
 static MildStatus set_all(BatchBodies *bodies, BodiesSetup *setup, const MildBatch *batch,
-                          const MildSole *const *soles, int surfaces, MildError *error) {
+                          const MildSole *const *soles, int surfaces, int worn, MildError *error) {
     const size_t robots = (size_t)batch->shape.robots;
     for (int f = 0; f < setup->feet; f++) {
         set_foot(&setup->sole[f], batch, soles[f], f);
     }
-    MildStatus status = set_surfaces(bodies, setup, batch, soles + setup->feet, surfaces, error);
+    MildStatus status =
+        set_surfaces(bodies, setup, batch, soles + setup->feet, surfaces, worn, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -148,7 +150,7 @@ static MildStatus set_all(BatchBodies *bodies, BodiesSetup *setup, const MildBat
 
 MildStatus batch_bodies_open(BatchBodies *bodies, const MildBatch *batch,
                              const MildSole *const *soles, int surfaces, const MildMap *map,
-                             const MildMaterial *materials, int count, MildError *error) {
+                             const MildMaterial *materials, int count, int worn, MildError *error) {
     const BatchShape *shape = &batch->shape;
     BodiesSetup setup = {.feet = shape->feet,
                          .bodies = shape->feet + surfaces,
@@ -185,7 +187,7 @@ MildStatus batch_bodies_open(BatchBodies *bodies, const MildBatch *batch,
     bodies->materials =
         material_table(batch->device, pitch, width, surfaces, materials, count, &curves, error);
     bodies->bytes += (size_t)((count + 1) * surfaces) * sizeof *bodies->materials;
-    return bodies->materials ? set_all(bodies, &setup, batch, soles, surfaces, error)
+    return bodies->materials ? set_all(bodies, &setup, batch, soles, surfaces, worn, error)
                              : error->status;
 }
 

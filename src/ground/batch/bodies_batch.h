@@ -6,10 +6,10 @@
 #include "ground/batch/batch.h"
 
 /* soles: [feet + surfaces]; those of the feet are the batch's. materials: [count] those of the
- * batch. map: that of the batch or NULL. error: not NULL. */
+ * batch. map: that of the batch or NULL. worn: bool, elements have wear. error: not NULL. */
 MildStatus batch_bodies_open(BatchBodies *bodies, const MildBatch *batch,
                              const MildSole *const *soles, int surfaces, const MildMap *map,
-                             const MildMaterial *materials, int count, MildError *error);
+                             const MildMaterial *materials, int count, int worn, MildError *error);
 void batch_bodies_close(const BatchBodies *bodies, int device);
 
 /* ---- of a batch that steps them itself ---- */

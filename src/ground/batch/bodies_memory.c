@@ -3,16 +3,18 @@
 #include "ground/batch/bodies_batch.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #include "device/device.h"
 #include "ground/batch/bodies.h"
 #include "ground/inside.h"
 
-/* The arrays of a foot's memory in the order of contact.h. */
+/* The numbers of an ElementMemory, in its order, as arrays of a foot. */
+enum { ELEMENT_NUMBERS = sizeof(ElementMemory) / sizeof(Real) };
 #define MEMORY_ARRAYS(of)                                                                          \
     {                                                                                              \
         (of).depth_max, (of).middle, (of).front_speed, (of).drift, (of).pending_x, (of).pending_y, \
-            (of).held_x, (of).held_y, (of).held_stiffness, (of).worn                               \
+            (of).held_x, (of).held_y, (of).held_stiffness                                          \
     }
 
 /* The state of bodies.h for a material of ground/state.h. */
@@ -34,13 +36,18 @@ static int32_t material_of(int state) {
  * the first step finds them the same, the body was at the origin. */
 static void surface_load(const MildGround *ground, int f, const BodiesMemory *to) {
     const Memory of = mild_inside_memory(ground, f);
-    const double *const all[CONTACT_MEMORY] = MEMORY_ARRAYS(of);
+    const double *const all[ELEMENT_NUMBERS] = MEMORY_ARRAYS(of);
     const int uneven = ground->uneven[f];
     for (int e = 0; e < ground->elements[f]; e++) {
         float *at = to->element + e;
-        for (int n = 0; n < CONTACT_MEMORY; n++) {
-            at[n * to->next] = (float)all[n][e];
+        float own[ELEMENT_NUMBERS];
+        ElementMemory element;
+        for (int n = 0; n < ELEMENT_NUMBERS; n++) {
+            own[n] = (float)all[n][e];
         }
+        memcpy(&element, own, sizeof element);
+        contact_record(at, to->next, &element);
+        to->worn[e] = (float)of.worn[e];
         const int there = uneven && of.material[e] != MATERIAL_NONE;
         at[BODIES_PLANE * to->next] = there ? (float)of.plane[e] : CONTACT_NO_PLANE;
         at[(BODIES_PLANE + 1) * to->next] = there ? (float)of.slope_x[e] : 0.0f;
@@ -55,15 +62,19 @@ static void surface_load(const MildGround *ground, int f, const BodiesMemory *to
 /* The other way. has_plane: bool, the ground of the batch is uneven. */
 static void surface_store(const BodiesMemory *from, int has_plane, MildGround *ground, int f) {
     const Memory of = mild_inside_memory(ground, f);
-    double *const all[CONTACT_MEMORY] = MEMORY_ARRAYS(of);
+    double *const all[ELEMENT_NUMBERS] = MEMORY_ARRAYS(of);
     const float *last = from->body;
     const int uneven = has_plane && last[BODIES_STEPPED] > 0.0f;
     int touched = 0;
     for (int e = 0; e < ground->elements[f]; e++) {
         const float *at = from->element + e;
-        for (int n = 0; n < CONTACT_MEMORY; n++) {
-            all[n][e] = (double)at[n * from->next];
+        const ElementMemory element = contact_recall(at, from->next);
+        float own[ELEMENT_NUMBERS];
+        memcpy(own, &element, sizeof own);
+        for (int n = 0; n < ELEMENT_NUMBERS; n++) {
+            all[n][e] = (double)own[n];
         }
+        of.worn[e] = (double)from->worn[e];
         of.material[e] = material_of((int)at[BODIES_STATE * from->next]);
         of.share[e] = (double)at[BODIES_SHARE * from->next];
         touched += of.material[e] != MATERIAL_NONE;
@@ -81,9 +92,9 @@ static void surface_store(const BodiesMemory *from, int has_plane, MildGround *g
 /* Where surface f begins in the memory of a robot. */
 static BodiesMemory surface_at(const BatchShape *shape, float *memory, int f) {
     for (int b = shape->feet; b < f; b++) {
-        memory += bodies_memory_numbers(shape->elements[b]);
+        memory += bodies_memory_numbers(shape->elements[b], 1);
     }
-    return bodies_memory(memory, shape->elements[f]);
+    return bodies_memory(memory, shape->elements[f], 1);
 }
 
 static float *one_robot(const BatchBodies *bodies, MildError *error) {

@@ -29,11 +29,12 @@ MILD_HD BodiesMemory bodies_memory_at(const BodiesCall *call, long robot, int b)
     if (sole->face) {
         return bodies_memory(call->bodies.memory + robot * (long)call->bodies.numbers +
                                  sole->memory,
-                             sole->elements);
+                             sole->elements, 1);
     }
-    const int numbers = contact_memory_numbers(shape->groups * shape->stride, shape->map);
-    return bodies_foot_memory(call->arrays.memory + robot * numbers, shape->groups, shape->stride,
-                              b);
+    const int all = shape->groups * shape->stride;
+    return bodies_foot_memory(call->arrays.memory + robot * contact_memory_numbers(all, shape->map),
+                              call->arrays.worn ? call->arrays.worn + robot * all : NULL,
+                              shape->groups, shape->stride, b);
 }
 
 /* Where the map begins under a robot; NULL: at 0. */

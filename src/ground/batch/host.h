@@ -7,8 +7,8 @@
 
 #include "ground/batch/robot.inc"
 
-typedef void (*HostRobot)(const ContactSetup *setup, const ContactProblem *problem, Real *memory,
-                          int advance, const ContactResult *result);
+typedef void (*HostRobot)(const ContactSetup *setup, const ContactProblem *problem,
+                          ContactMemory memory, int advance, const ContactResult *result);
 /* The version that is compiled for these soles, level or on a map. */
 HostRobot host_robot(const BatchShape *shape);
 HostRobot host_robot_map(const BatchShape *shape); /* on a map */

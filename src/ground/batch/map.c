@@ -85,9 +85,8 @@ MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *e
             return status;
         }
     }
-    const size_t numbers = (size_t)next.shape.robots * batch_memory_numbers(&next.shape);
-    next.arrays.memory = device_alloc(batch->device, numbers * sizeof(float), error);
-    MildStatus status = next.arrays.memory ? MILD_OK : error->status;
+    MildStatus status = batch_memory_open(&next.arrays, &next.shape, batch->device,
+                                          batch->arrays.worn != NULL, error);
     if (status == MILD_OK && batch->bodies.setup) {
         status = batch_bodies_set_map(&next, map, error);
     }

@@ -1,4 +1,5 @@
 /* What the ground of a batch remembers, from and to mild/ground.h. */
+#define MILD_REAL_FLOAT
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,20 +11,39 @@
 
 enum { MEMORY_ROBOTS = 256 }; /* copied at once */
 
-size_t batch_memory_numbers(const BatchShape *shape) {
-    return (size_t)contact_memory_numbers(shape->groups * shape->stride, shape->map);
+/* Elements that a robot has room for. */
+static int places(const BatchShape *shape) {
+    return shape->groups * shape->stride;
 }
 
-/* The arrays of a foot's memory in the order of contact.h. */
+size_t batch_memory_numbers(const BatchShape *shape) {
+    return (size_t)contact_memory_numbers(places(shape), shape->map);
+}
+
+size_t batch_worn_numbers(const BatchShape *shape) {
+    return (size_t)places(shape);
+}
+
+MildStatus batch_memory_open(BatchArrays *arrays, const BatchShape *shape, int device, int worn,
+                             MildError *error) {
+    const size_t robots = (size_t)shape->robots, numbers = robots * batch_memory_numbers(shape);
+    const size_t wear = worn ? robots * batch_worn_numbers(shape) : 0;
+    arrays->memory = device_alloc(device, (numbers + wear) * sizeof(float), error);
+    arrays->worn = arrays->memory && worn ? arrays->memory + numbers : NULL;
+    return arrays->memory ? MILD_OK : MILD_ERROR_MEMORY;
+}
+
+/* The numbers of an ElementMemory, in its order, as arrays of a foot. */
+enum { ELEMENT_NUMBERS = sizeof(ElementMemory) / sizeof(Real) };
 #define MEMORY_ARRAYS(of)                                                                          \
     {                                                                                              \
         (of).depth_max, (of).middle, (of).front_speed, (of).drift, (of).pending_x, (of).pending_y, \
-            (of).held_x, (of).held_y, (of).held_stiffness, (of).worn                               \
+            (of).held_x, (of).held_y, (of).held_stiffness                                          \
     }
 
 /* Number n of a foot's elements, or with a map of what follows them. */
 static float *numbers_at(const BatchShape *shape, float *memory, int n, int foot) {
-    return memory + (n * shape->groups + foot) * shape->stride;
+    return memory + n * places(shape) + foot * shape->stride;
 }
 
 /* The five numbers of a foot, `groups` apart. */
@@ -51,15 +71,25 @@ static void planes_of(const BatchShape *shape, const MildGround *ground, const M
     }
 }
 
-void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *memory) {
+void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *memory,
+                     float *worn) {
     memset(memory, 0, batch_memory_numbers(shape) * sizeof *memory);
+    if (worn) {
+        memset(worn, 0, batch_worn_numbers(shape) * sizeof *worn);
+    }
     for (int f = 0; f < shape->feet; f++) {
         const Memory of = mild_inside_memory(ground, f);
-        const double *const all[CONTACT_MEMORY] = MEMORY_ARRAYS(of);
-        for (int n = 0; n < CONTACT_MEMORY; n++) {
-            float *to = numbers_at(shape, memory, n, f);
-            for (int e = 0; e < shape->elements[f]; e++) {
-                to[e] = (float)all[n][e];
+        const double *const all[ELEMENT_NUMBERS] = MEMORY_ARRAYS(of);
+        for (int e = 0; e < shape->elements[f]; e++) {
+            float own[ELEMENT_NUMBERS];
+            ElementMemory element;
+            for (int n = 0; n < ELEMENT_NUMBERS; n++) {
+                own[n] = (float)all[n][e];
+            }
+            memcpy(&element, own, sizeof element);
+            contact_record(numbers_at(shape, memory, 0, f) + e, places(shape), &element);
+            if (worn) {
+                worn[f * shape->stride + e] = (float)of.worn[e];
             }
         }
         if (shape->map) {
@@ -92,21 +122,23 @@ static int store_planes(const BatchShape *shape, float *memory, int f, const Mem
     return stepped;
 }
 
-/* Moves the memory of a robot to a ground. */
+/* Moves the memory of a robot to a ground. worn: NULL: nothing is. */
 static void ground_remember(const BatchShape *shape, const MapView *map, float *memory,
-                            MildGround *ground) {
+                            const float *worn, MildGround *ground) {
     mild_ground_reset(ground);
     for (int f = 0; f < shape->feet; f++) {
         const Memory of = mild_inside_memory(ground, f);
-        double *const all[CONTACT_MEMORY] = MEMORY_ARRAYS(of);
+        double *const all[ELEMENT_NUMBERS] = MEMORY_ARRAYS(of);
         int loaded = 0;
-        for (int n = 0; n < CONTACT_MEMORY; n++) {
-            const float *from = numbers_at(shape, memory, n, f);
-            for (int e = 0; e < shape->elements[f]; e++) {
-                all[n][e] = (double)from[e];
-            }
-        }
         for (int e = 0; e < shape->elements[f]; e++) {
+            const ElementMemory element =
+                contact_recall(numbers_at(shape, memory, 0, f) + e, places(shape));
+            float own[ELEMENT_NUMBERS];
+            memcpy(own, &element, sizeof own);
+            for (int n = 0; n < ELEMENT_NUMBERS; n++) {
+                all[n][e] = (double)own[n];
+            }
+            of.worn[e] = worn ? (double)worn[f * shape->stride + e] : 0.0;
             of.material[e] = of.depth_max[e] > 0.0 ? 0 : MATERIAL_NONE;
             loaded += of.depth_max[e] > 0.0;
         }
@@ -183,6 +215,12 @@ static MildStatus check_memory(const MildBatch *batch, int robot, const MildGrou
                                  "%d: call mild_batch_set_map",
                                  robot, material & 0xff, labels);
             }
+            if (f < shape->feet && memory.worn[e] > 0.0 && !batch->arrays.worn) {
+                return mild_fail(error, MILD_ERROR_ARGUMENT,
+                                 "batch: robot %d has worn its ground, and no material of the "
+                                 "batch wears: call mild_batch_set_materials",
+                                 robot);
+            }
         }
     }
     return MILD_OK;
@@ -190,21 +228,45 @@ static MildStatus check_memory(const MildBatch *batch, int robot, const MildGrou
 
 /* ---- load and store ---- */
 
-/* Numbers for the robots that are copied at once; NULL when out of memory. */
-static float *some_robots(const BatchShape *shape, int count, MildError *error) {
-    const int most = count < MEMORY_ROBOTS ? count : MEMORY_ROBOTS;
-    float *memory =
-        malloc((size_t)(most > 0 ? most : 1) * batch_memory_numbers(shape) * sizeof *memory);
+/* Memory of the robots that are copied at once, on the CPU. */
+typedef struct {
+    float *memory; /* NULL: none could be had */
+    float *worn;   /* behind it; NULL as in BatchArrays */
+} Some;
+
+static Some some_robots(const MildBatch *batch, int count, MildError *error) {
+    const size_t most = (size_t)(count < MEMORY_ROBOTS ? count : MEMORY_ROBOTS);
+    const size_t numbers = most * batch_memory_numbers(&batch->shape);
+    float *memory = malloc(most > 0 ? most * mild_batch_robot_bytes(batch) : 1);
     if (!memory) {
         mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
     }
-    return memory;
+    return (Some){memory, memory && batch->arrays.worn ? memory + numbers : NULL};
+}
+
+/* Copies them to robots first .. first + count - 1, or with `back` from these. */
+static MildStatus copy_robots(const MildBatch *batch, int first, int count, const Some *some,
+                              int back, MildError *error) {
+    const BatchArrays at = batch_share(batch, first, count).arrays;
+    const size_t robots = (size_t)count * sizeof(float);
+    const size_t bytes = robots * batch_memory_numbers(&batch->shape);
+    const size_t worn = robots * batch_worn_numbers(&batch->shape);
+    MildStatus status = device_copy(batch->device, back ? some->memory : at.memory,
+                                    back ? at.memory : some->memory, bytes, error);
+    return status == MILD_OK && some->worn ? device_copy(batch->device, back ? some->worn : at.worn,
+                                                         back ? at.worn : some->worn, worn, error)
+                                           : status;
+}
+
+/* Robot k of them. */
+static Some some_at(const BatchShape *shape, const Some *some, int k) {
+    return (Some){some->memory + (size_t)k * batch_memory_numbers(shape),
+                  some->worn ? some->worn + (size_t)k * batch_worn_numbers(shape) : NULL};
 }
 
 MildStatus mild_batch_load_robots(MildBatch *batch, int first, int count,
                                   const MildGround *const *grounds, MildError *error) {
     const BatchShape *shape = &batch->shape;
-    const size_t numbers = batch_memory_numbers(shape);
     MildStatus status = check_robots(shape, first, count, error);
     for (int i = 0; i < count && status == MILD_OK; i++) {
         status = check_soles(shape, first + i, grounds[i], error);
@@ -215,19 +277,19 @@ MildStatus mild_batch_load_robots(MildBatch *batch, int first, int count,
     if (status != MILD_OK) {
         return status;
     }
-    float *memory = some_robots(shape, count, error);
-    if (!memory) {
+    const Some robots = some_robots(batch, count, error);
+    if (!robots.memory) {
         return MILD_ERROR_MEMORY;
     }
     for (int i = 0; i < count && status == MILD_OK; i += MEMORY_ROBOTS) {
         const int some = count - i < MEMORY_ROBOTS ? count - i : MEMORY_ROBOTS;
         for (int k = 0; k < some; k++) {
-            batch_memory_of(shape, grounds[i + k], memory + (size_t)k * numbers);
+            const Some to = some_at(shape, &robots, k);
+            batch_memory_of(shape, grounds[i + k], to.memory, to.worn);
         }
-        status = device_copy(batch->device, batch->arrays.memory + (size_t)(first + i) * numbers,
-                             memory, (size_t)some * numbers * sizeof *memory, error);
+        status = copy_robots(batch, first + i, some, &robots, 0, error);
     }
-    free(memory);
+    free(robots.memory);
     return status == MILD_OK && batch->bodies.setup
                ? batch_bodies_load(batch, first, count, grounds, error)
                : status;
@@ -236,26 +298,26 @@ MildStatus mild_batch_load_robots(MildBatch *batch, int first, int count,
 MildStatus mild_batch_store_robots(const MildBatch *batch, int first, int count,
                                    MildGround *const *grounds, MildError *error) {
     const BatchShape *shape = &batch->shape;
-    const size_t numbers = batch_memory_numbers(shape);
     MildStatus status = check_robots(shape, first, count, error);
     for (int i = 0; i < count && status == MILD_OK; i++) {
         status = check_soles(shape, first + i, grounds[i], error);
     }
-    float *memory = status == MILD_OK ? some_robots(shape, count, error) : NULL;
-    if (!memory) {
-        return status == MILD_OK ? MILD_ERROR_MEMORY : status;
+    if (status != MILD_OK) {
+        return status;
+    }
+    const Some robots = some_robots(batch, count, error);
+    if (!robots.memory) {
+        return MILD_ERROR_MEMORY;
     }
     for (int i = 0; i < count && status == MILD_OK; i += MEMORY_ROBOTS) {
         const int some = count - i < MEMORY_ROBOTS ? count - i : MEMORY_ROBOTS;
-        status =
-            device_copy(batch->device, memory, batch->arrays.memory + (size_t)(first + i) * numbers,
-                        (size_t)some * numbers * sizeof *memory, error);
+        status = copy_robots(batch, first + i, some, &robots, 1, error);
         for (int k = 0; k < some && status == MILD_OK; k++) {
-            ground_remember(shape, &batch->arrays.map, memory + (size_t)k * numbers,
-                            grounds[i + k]);
+            const Some from = some_at(shape, &robots, k);
+            ground_remember(shape, &batch->arrays.map, from.memory, from.worn, grounds[i + k]);
         }
     }
-    free(memory);
+    free(robots.memory);
     return status == MILD_OK && batch->bodies.setup
                ? batch_bodies_store(batch, first, count, grounds, error)
                : status;

@@ -15,10 +15,14 @@ static __global__ void forget(BatchShape shape, BatchArrays arrays, BatchBodies 
     if (which && !which[robot]) {
         return;
     }
-    Real *memory = batch_memory(&shape, &arrays, robot);
-    const int numbers = contact_memory_numbers(shape.groups * shape.stride, shape.map);
+    const ContactMemory memory = batch_memory(&shape, &arrays, robot);
+    const int elements = shape.groups * shape.stride;
+    const int numbers = contact_memory_numbers(elements, shape.map);
     for (int i = (int)threadIdx.x; i < numbers; i += (int)blockDim.x) {
-        memory[i] = 0;
+        memory.numbers[i] = 0;
+    }
+    for (int i = (int)threadIdx.x; memory.worn && i < elements; i += (int)blockDim.x) {
+        memory.worn[i] = 0;
     }
     for (size_t i = threadIdx.x; i < bodies.numbers; i += blockDim.x) {
         bodies.memory[robot * bodies.numbers + i] = 0;

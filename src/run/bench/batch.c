@@ -23,7 +23,7 @@ typedef struct {
     double inverse_inertia[36 * ROBOT_FEET_MAX * ROBOT_FEET_MAX]; /* of the input */
     MildContactResult result;
     int material;
-    float *memory;
+    float *memory; /* then its wear */
 } Problem;
 
 typedef struct {
@@ -64,9 +64,10 @@ static MildStatus record_problems(BatchBench *bench, const Replay *replay, int m
         for (int s = 0; s < replay->steps && bench->problems < PROBLEMS_MAX; s++) {
             Problem *problem = &bench->problem[bench->problems++];
             problem->material = material;
-            problem->memory = malloc(batch_memory_numbers(shape) * sizeof(float));
+            const size_t numbers = batch_memory_numbers(shape);
+            problem->memory = malloc((numbers + batch_worn_numbers(shape)) * sizeof(float));
             if (problem->memory) {
-                batch_memory_of(shape, ground, problem->memory);
+                batch_memory_of(shape, ground, problem->memory, problem->memory + numbers);
             }
             robot_sim_step(sim, period->torque[s], NULL, &replay->terrain, ground);
             const int feet = robot_feet(bench->robot);
@@ -162,17 +163,20 @@ static const float *input_array(BatchCase *c, const BatchBench *bench, size_t of
 /* The memory of every robot, and which material it stands on. */
 static MildStatus load_case(BatchCase *c, const BatchBench *bench, MildError *error) {
     const int robots = c->batch->shape.robots;
-    const size_t numbers = batch_memory_numbers(&c->batch->shape), bytes = numbers * sizeof(float);
-    float *memory = malloc((size_t)robots * bytes);
+    const size_t numbers = batch_memory_numbers(&c->batch->shape), all = (size_t)robots * numbers;
+    const size_t worn = c->batch->arrays.worn ? batch_worn_numbers(&c->batch->shape) : 0;
+    const size_t bytes = (size_t)robots * mild_batch_robot_bytes(c->batch);
+    float *memory = malloc(bytes);
     int32_t *material = malloc((size_t)robots * sizeof *material);
     assert(bench->problems > 0);
     for (int r = 0; memory && material && r < robots; r++) {
         const Problem *problem = &bench->problem[r % bench->problems];
-        memcpy(memory + (size_t)r * numbers, problem->memory, bytes);
+        memcpy(memory + (size_t)r * numbers, problem->memory, numbers * sizeof *memory);
+        memcpy(memory + all + (size_t)r * worn, problem->memory + numbers, worn * sizeof *memory);
         material[r] = problem->material;
     }
     if (memory && material) {
-        c->memory = device_array(c, bench->device, memory, (size_t)robots * bytes, error);
+        c->memory = device_array(c, bench->device, memory, bytes, error);
         c->input.material =
             device_array(c, bench->device, material, (size_t)robots * sizeof *material, error);
     }
