@@ -73,9 +73,9 @@ def deviation(values):
     return math.sqrt(sum((v - middle) ** 2 for v in values) / (len(values) - 1)) if len(values) > 1 else 0.0
 
 
-def models_of(given):
+def models_of(given, names=TRAINED):
     """{model: [policy of each seed]} of those that are there."""
-    found = {model: sorted(given.models.glob(f"{model}-[0-9]*.safetensors")) for model in TRAINED}
+    found = {model: sorted(given.models.glob(f"{model}-[0-9]*.safetensors")) for model in names}
     return {model: files for model, files in found.items() if files}
 
 
