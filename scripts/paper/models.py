@@ -3,10 +3,9 @@ import json
 import pathlib
 
 import figures
-from measure import TRAINED, deviation, evaluate, mean, mild, models_of, read, save, together
+from measure import SLIPS, TRAINED, deviation, evaluate, mean, mild, models_of, read, save, together
 from page import Cell, Claim, Section, Table
 
-SLIPS = ["mild_slips", "mild_merged_slips"]  # trained where slip sinks: train.sh
 JUDGES = TRAINED[:-2] + ["bekker", "hunt_crossley", "mild_merged", "rigid", "grains"]
 GRAINS = pathlib.Path(__file__).parents[2] / "grains" / "walk" / "grounds.json"  # fitted to grains: docs/grains.md
 TESTED = ["foam25", "foam45", "sand_loose"]
