@@ -29,7 +29,7 @@ typedef struct {
     MaterialNumbers *materials; /* [materials + 1][feet] */
     float *memory;              /* [robots] of contact.h */
     MapView map;                /* all 0 without a map */
-    const uint8_t *skip; /* [robots] bool: a step leaves it alone; NULL: none. Of the caller */
+    const uint16_t *skip; /* [robots] not 0: a step leaves it alone; NULL: none. Of the caller */
 } BatchArrays;
 
 struct MildBatch {
