@@ -19,6 +19,7 @@ sys.path.insert(0, str(SOURCE / "scripts"))
 import judge as judge_module  # noqa: E402
 import judge_anchors  # noqa: E402
 import judge_entries  # noqa: E402
+import judge_loose  # noqa: E402
 import mild  # noqa: E402
 from judge_cases import Case, Sole, measures  # noqa: E402
 from judge_entries import GroundEntry  # noqa: E402
@@ -160,6 +161,12 @@ def real_numbers():
         level, tilted = (judge_anchors.poppy_stress("loose", math.radians(angle), math.pi / 2)[0] for angle in (0, degrees))
         assert abs(force["ecc_quasi"] / (tilted / level) - 1) < 0.03
         assert abs(force["mild"] - 1) < 1e-3 and abs(force["mild_merged"] - math.cos(math.radians(degrees))) < 1e-3
+    loose = judge_loose.LooseHeap(1.0)
+    loose.bears = 1e8
+    real, found = judge_anchors.disc_rows([GroundEntry("mild"), judge_entries.FunctionEntry("loose", loose)])
+    assert real == "1.767 +- 0.116" and abs(found["mild"] - 1) < 0.02 and abs(found["loose"] - 5 / 3) < 0.02, (real, found)
+    rows = {text: (real, source) for text, real, source, *_ in judge_anchors.anchors([], judge_module.Records(SOURCE / "grains/records"), [])}
+    assert any("scripts/real_sand.py" in source and real.startswith("1.767") for real, source in rows.values()), rows
 
 
 def mild_fit_says_the_same(folder):

@@ -18,6 +18,9 @@ import mild  # noqa: E402
 import real_sand  # noqa: E402
 
 
+LOOSE = ("loose_heap", "loose_linear", "loose_mean")
+
+
 def records():
     data = real_sand.presses()
     assert list(data) == ["disc60", "disc80", "disc100", "wheel"] and all(len(trials) == 3 for trials in data.values())
@@ -98,18 +101,28 @@ def loose():
 def page():
     """Of docs/real-sand.md: the rows of mild, mild_merged and 3D-RFT fitted to one disc, of bekker to two."""
     with contextlib.redirect_stdout(io.StringIO()) as said:
-        real_sand.judge_presses(real_sand.presses(), ["disc80"], ("mild", "mild_merged", "3d_rft"))
-    found = {line.split()[0]: [int(x) for x in line.split()[1:]] for line in said.getvalue().splitlines() if line.startswith(("mild", "3d_rft"))}
+        real_sand.judge_presses(real_sand.presses(), ["disc80"], ("mild", "mild_merged", "3d_rft", *LOOSE))
+    rows = [line.split() for line in said.getvalue().splitlines() if line.startswith(("mild", "3d_rft", "loose")) and ":" not in line]
+    found = {name: [int(cell) for cell in cells] for name, *cells in rows}
+    alone = {name: found[name] for name in LOOSE}
     text = (root / "docs/real-sand.md").read_text(encoding="utf-8")
     for name, row in (("mild", r"\| `mild`, `hunt_crossley` \|"), ("mild_merged", r"\| `mild_merged` \|"), ("3d_rft", r"\| 3D-RFT[^|]*\|")):
         cells = re.search(row + r"([^|]*)\|([^|]*)\|([^|]*)\|", text).groups()
         says = [int(re.search(r"[-+]?\d+", cell).group()) for cell in cells]
         assert says == [found[name][0], found[name][2], found[name][3]], (name, says, found[name])
     with contextlib.redirect_stdout(io.StringIO()) as said:
-        real_sand.judge_presses(real_sand.presses(), ["disc60", "disc100"], ("bekker",))
+        real_sand.judge_presses(real_sand.presses(), ["disc60", "disc100"], ("bekker", *LOOSE))
     found = [int(x) for line in said.getvalue().splitlines() if line.startswith("bekker") for x in line.split()[1:]]
     says = [int(x) for x in re.findall(r"[-+]\d+", re.search(r"\n\| `bekker` \|(.*)", text).group(1))[3:]]
     assert says == found and max(map(abs, found[:3])) < 10, (says, found)  # k_c below 0: pressure that grows with the disc
+    rows = [line.split() for line in said.getvalue().splitlines() if line.startswith("loose") and ":" not in line]
+    two = {name: [int(cell) for cell in cells] for name, *cells in rows}
+    for name, row in two.items():
+        says = [int(x) for x in re.findall(r"[-+]\d+", re.search(rf"\n\| `{name}`[^|]*\|(.*)", text).group(1))]
+        assert says == [alone[name][0], *alone[name][2:], *row], (name, says, alone[name], row)
+    assert list(two) == list(LOOSE) and max(map(abs, two["loose_heap"])) < 8 and abs(alone["loose_heap"][3]) < 4
+    powers = re.findall(r"^loose_heap: p = \S+ u\^(\S+) e", said.getvalue(), re.M)
+    assert powers == ["1.375"], powers
 
 
 def page_of_wheel():
