@@ -10,18 +10,10 @@ import math
 
 import numpy as np
 
+from judge_cases import outline_distance
 from judge_entries import stress_wrench
 
 POWERS = np.arange(0.5, 2.5, 0.005)  # of u, among which the fit looks
-
-
-def outline_distance(sole):
-    """Of the sole's squares [m]."""
-    at, least = np.column_stack([sole.x, sole.y]), np.full(len(sole.x), np.inf)
-    for a, b in zip(sole.outline, np.roll(sole.outline, -1, 0)):
-        along = np.clip((at - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
-        least = np.minimum(least, np.hypot(*(at - a - along[:, None] * (b - a)).T))
-    return least
 
 
 def free_edge(sole, depth, tilt):
