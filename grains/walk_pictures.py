@@ -9,7 +9,7 @@ import walk_manifest
 
 CONTACT, PAUSE, SHORTEST = 5.0, 0.03, 0.15  # [N] [s] [s] of a stance
 ENDS = 0.05  # [s] at which its pressure centre is reported
-MEAN = 0.01  # [s] of the largest forces: records of before 2026-11-23 have a row for each policy step
+PERIOD = 0.01  # [s] of the policy: of the rows of records of before 2026-11-23; later ones have a row for each physics step
 COLOURS = {"grains": "#222222", "mild": "#1f77b4", "mild_merged": "#d62728", "bekker": "#2ca02c", "ecc_quasi_3d": "#9467bd", "newton_mpm": "#ff7f0e"}
 # What walk-0.json of a ground by another program says of its walk.
 REPORTED = {"grains": ("time_s", "lost_sole_s", "seconds", "steps", "late_lists", "full_lists", "surface_m"),
@@ -26,6 +26,20 @@ def read(file):
 
 # ---- stances ----
 
+def policy_steps(feet):
+    """Rows of PERIOD, as all records had them: forces are means, depths the deepest, the rest is as the step ends."""
+    step = np.ceil(feet["time_s"] / PERIOD - 1e-3).astype(int)
+    order = np.lexsort((step, feet["foot"], feet["trial"]))
+    feet, step = {name: values[order] for name, values in feet.items()}, step[order]
+    new = np.any([np.diff(values) != 0 for values in (feet["trial"], feet["foot"], step)], axis=0)
+    first = np.concatenate([[0], np.flatnonzero(new) + 1])
+    last = np.append(first[1:], len(step)) - 1
+    rows = {name: values[last] for name, values in feet.items()}
+    for name in ("force_x_n", "force_y_n", "force_z_n"):
+        rows[name] = np.add.reduceat(feet[name], first) / (last - first + 1)
+    return {**rows, "depth_m": np.maximum.reduceat(feet["depth_m"], first)}
+
+
 class Stance:
     """Rows of one foot, from touchdown to lift-off."""
 
@@ -34,24 +48,19 @@ class Stance:
         self.trial, self.foot = int(at["trial"][0]), int(at["foot"][0])
         self.time, self.force = at["time_s"], at["force_z_n"]
         self.depth, self.center = at["depth_m"], at["center_x_m"]
-        self.slide = np.hypot(self.means(at["force_x_n"]), self.means(at["force_y_n"]))
+        self.slide = np.hypot(at["force_x_n"], at["force_y_n"])
         self.way = float(np.hypot(np.ptp(at["ankle_x_m"]), np.ptp(at["ankle_y_m"])))
         self.pitch = at["pitch_rad"]
-
-    def means(self, values):
-        """Moving, over MEAN."""
-        count = min(max(1, round(MEAN / np.median(np.diff(self.time)))), len(values))
-        return np.convolve(values, np.full(count, 1 / count), mode="same")
 
     def curve(self, values):
         share = (self.time - self.time[0]) / max(self.time[-1] - self.time[0], 1e-9)
         return np.interp(SHARE, share, values)
 
     def row(self):
-        load, step = np.maximum(self.force, 0), np.median(np.diff(self.time))  # of the robot's physics
+        load = np.maximum(self.force, 0)
         ends = [self.center[part].mean() for part in (self.time < self.time[0] + ENDS - 1e-6, self.time > self.time[-1] - ENDS + 1e-6)]
         return {"trial": self.trial, "foot": self.foot, "start_s": f"{self.time[0]:.2f}",
-                "duration_s": f"{self.time[-1] - self.time[0] + step:.2f}", "force_max_n": f"{self.means(self.force).max():.1f}",
+                "duration_s": f"{self.time[-1] - self.time[0] + PERIOD:.2f}", "force_max_n": f"{self.force.max():.1f}",
                 "force_mean_n": f"{self.force.mean():.1f}", "horizontal_max_n": f"{self.slide.max():.1f}",
                 "depth_max_m": f"{self.depth.max():.4f}", "center_x_m": f"{(load * self.center).sum() / load.sum():.4f}",
                 "center_x_first_m": f"{ends[0]:.4f}", "center_x_last_m": f"{ends[1]:.4f}",
@@ -60,7 +69,7 @@ class Stance:
 
 def stances(file, skip=1.0):
     """Whole stances that begin after `skip` seconds; those of a fall's last half second are left out."""
-    feet, found = read(file), []
+    feet, found = policy_steps(read(file)), []
     for trial in np.unique(feet["trial"]):
         end = feet["time_s"][feet["trial"] == trial].max()
         for foot in np.unique(feet["foot"]):

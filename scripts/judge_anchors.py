@@ -6,6 +6,7 @@ import math
 import numpy as np
 
 import mild
+import real_sand
 from judge_cases import Case
 from judge_entries import GroundEntry, TableEntry, rft_stress
 
@@ -30,9 +31,9 @@ def poppy_case(degrees):
     return Case(f"poppy {PLATE} {degrees} press:{DEPTH}@0.05")
 
 
-def refitted(entries, cases, force, pitch):
+def refitted(entries, cases, force, pitch, deepest=DEPTH):
     """The models, those of mild fitted to presses of level plates: cases, and force(width, depth) [N/m^2] under each."""
-    depth = np.linspace(1e-3, DEPTH, 60)
+    depth = np.linspace(1e-3, deepest, 60)
     for entry in entries:
         if isinstance(entry, TableEntry) or not hasattr(entry, "play") or entry.name in ("mild_slips", "archimedes"):
             continue
@@ -103,6 +104,36 @@ def wong_ratio(sand, narrow):
     return wong_pressure(sand, narrow, 0.015) / wong_pressure(sand, WIDE, 0.015)
 
 
+# Discs that Pavlov and Johnson pressed into a loose sand: real_sand.py, which judges by more than one ratio of them.
+DISCS = ("disc60", "disc80", "disc100")
+AT, END = 0.01, 0.027  # [m] where the ratio is taken; where the way of the disc ends that is fitted
+
+
+def disc_case(name):
+    return Case(f"{name} disc:{real_sand.DISCS[name]} 0 press:0.02@0.05")
+
+
+def disc_pressure(data, name, depth):
+    """Of the mean trial [N/m^2], and one trial's scatter of it at the last depth [-]."""
+    each = np.array([np.interp(depth, *trial) for trial in data[name]])
+    return each.mean(0) / (math.pi * real_sand.DISCS[name]**2 / 4), each[:, -1].std(ddof=1) / each[:, -1].mean()
+
+
+def disc_rows(entries):
+    """The row of the discs: the pressure under the large one over that under the small one, models fitted to that between."""
+    data = real_sand.presses()
+    small, middle, large = DISCS
+    (low, below), (high, above) = (disc_pressure(data, name, np.array([AT])) for name in (small, large))
+    models = refitted(entries, [disc_case(middle)], lambda width, depth: disc_pressure(data, middle, depth)[0], 0.005, END)
+    found = {}
+    for entry in models:
+        rows = [entry.play(disc_case(name)) for name in (small, large)]
+        force = [np.interp(AT, part["depth"], part["fz"]) if part else math.nan for part in rows]
+        found[entry.name] = force[1] / force[0] * (real_sand.DISCS[small] / real_sand.DISCS[large])**2
+    ratio = high[0] / low[0]
+    return f"{ratio:.3f} +- {ratio * math.hypot(below, above):.3f}", found
+
+
 def pressure_ratio(records, narrow, wide, depth, what):
     """Pressure in grains under one plate over that under another, at a depth: text with the scatter of one bed; None: no records."""
     each = []
@@ -133,6 +164,9 @@ def anchors(entries, records, results):
         for narrow in WIDTHS:
             yield (f"strip of {1e3 * narrow:.0f} mm over one of 150 mm, {sand}, models fitted to strips 50 and 100 mm wide on it",
                    f"{wong_ratio(sand, narrow):.3f}", wong, None, {entry.name: strip_ratio(entry, narrow) for entry in strips}, None)
+    real, found = disc_rows(entries)
+    yield (f"pressure under a disc of 100 mm over that under one of 60 mm, {1e3 * AT:.0f} mm deep, loose sand, models fitted to the disc of 80 mm", real,
+           "Pavlov and Johnson; more of it: scripts/real_sand.py, docs/real-sand.md", None, found, None)
     half = math.pi / 2
     level = {packing: poppy_stress(packing, 0.0, half)[0] for packing in POPPY}
     for degrees in (15, 30):

@@ -59,6 +59,15 @@ class Sole:
         return depth + self.x * math.sin(tilt) - self.z * math.cos(tilt)
 
 
+def outline_distance(sole):
+    """[m] Of each square of a sole to its outline."""
+    distance, points = np.full(len(sole.x), np.inf), np.column_stack([sole.x, sole.y])
+    for a, b in zip(sole.outline, np.roll(sole.outline, -1, 0)):
+        along = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+        distance = np.minimum(distance, np.hypot(*(points - a - along[:, None] * (b - a)).T))
+    return distance
+
+
 class Case:
     """NAME SHAPE TILT STAGE..., as grains/plan.h has it. ways: (kind, seconds, vx, vz up, pitch rate, mass) of each stage;
     plate: the body; sole: what of it touches grains whose radius is `edge` [m], which models are given."""

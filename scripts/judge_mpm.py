@@ -36,7 +36,7 @@ ORDER = ("sand/disc120", "sand/square100", "sand/square100-drag15", "sand/square
          "sand/square100-load10", "wide/sa01", "sand/square100-again", "sand/square100-swipe15", "sand/square100-drop05")
 # Family: the case whose force fits the friction of the ground.
 FITS = {"sand": "sand/disc120", "wide": "sand/disc120", "slick": "slick/disc120", "fine": "fine/disc60"}
-PARAMETERS = ("voxel", "dt", "travel", "iterations", "tolerance", "basis", "particles", "margin", "friction", "plate_friction")
+PARAMETERS = ("voxel", "dt", "travel", "iterations", "tolerance", "basis", "particles", "margin", "friction", "plate_friction", "edge")
 
 
 def fail(text):
@@ -314,7 +314,7 @@ def friction_of(args, manifest, family, every):
     if args.friction:
         return args.friction
     key = FITS[family]
-    case = Case(every[key])
+    case = case_of(args, key.split("/")[0], every[key])
     fit = manifest.rows.setdefault("fits", {}).setdefault(key, {"grains": grains_force(args, key, case), "tried": []})
     tried = fit["tried"]
 
@@ -338,7 +338,7 @@ class Manifest:
         self.file = args.out / "manifest.json"
         self.rows = json.loads(self.file.read_text()) if self.file.exists() else {}
         wanted = {name: getattr(args, name) for name in PARAMETERS}
-        had = self.rows.setdefault("newton", {"parameters": wanted})["parameters"]
+        had = {"edge": 0.0, **self.rows.setdefault("newton", {"parameters": wanted})["parameters"]}  # 0 in records from before --edge
         other = [name for name in PARAMETERS if had.get(name) != wanted[name]]
         if other:
             fail(f"{self.file}: its records have --{other[0].replace('_', '-')} {had.get(other[0])}: give another --out")
@@ -363,8 +363,12 @@ def make_bed(args, family, case, friction, seed):
     return Bed(args, case.sole, voxels, 2500 * solid_of(args, family), friction, plate, seed)
 
 
+def case_of(args, family, text):
+    return Case(text, args.edge * args.run.FAMILIES[family]["grain"])
+
+
 def run_case(args, manifest, key, text, friction):
-    family, case = key.split("/")[0], Case(text)
+    family, case = key.split("/")[0], case_of(args, key.split("/")[0], text)
     row = manifest.rows.setdefault(key, {"case": text, "seeds": args.seed_text, "friction": friction, "beds": {}})
     options = [word for name, value in args.run.FAMILIES[family].items() for word in (f"--{name}", str(value))]
     manifest.rows[family] = {"solid": [solid_of(args, family)], "options": options}
@@ -437,6 +441,8 @@ def arguments():
     parser.add_argument("--iterations", type=int, default=250)
     parser.add_argument("--tolerance", type=float, default=1e-4)
     parser.add_argument("--basis", default="S2", help="of the contact: S2, Q1, pic, pic27")
+    parser.add_argument("--edge", type=float, default=0.0, help="[grains] by which the plate is wider on each side, as scripts/judge.py has it for "
+                        "models: 0.5")
     parser.add_argument("--device", default="", help="cuda:0 or cpu; default: Warp's")
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--check", action="store_true")

@@ -24,7 +24,7 @@ import pathlib
 import numpy as np
 
 from judge import FITS, Records, mean_rows
-from judge_cases import Case, Sole
+from judge_cases import Case, Sole, outline_distance
 from judge_entries import GroundEntry
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -34,17 +34,8 @@ FORMS = ("as it is", "half tilt", "squared", "normal depth", "water line", "both
 MODEL = "mild_merged"
 
 
-def edge(sole):
-    """[m] Distance of each square to the outline."""
-    distance, points = np.full(len(sole.x), np.inf), np.column_stack([sole.x, sole.y])
-    for a, b in zip(sole.outline, np.roll(sole.outline, -1, 0)):
-        along = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
-        distance = np.minimum(distance, np.hypot(*(points - a - along[:, None] * (b - a)).T))
-    return distance
-
-
 def law(form, material, sole, tilt, depth, free):
-    """Force up [N] and moment [N m] of a plate at a depth; free: [m] edge(sole)."""
+    """Force up [N] and moment [N m] of a plate at a depth; free: [m] outline_distance(sole)."""
     k0, kappa = material.k_pen / ELEMENT**2, material.sigma_cone / math.cos(material.alpha)
     cosine, u = math.cos(tilt), np.maximum(sole.depths(depth, tilt), 0)
     if form in ("water line", "both", "half drag"):
@@ -73,7 +64,7 @@ def deep(case, depth):
 def predicted(forms, material, case, edge_m, depths):
     """Mean force [N] and moment [N m] of each form over depths of the middle."""
     sole = Sole(case.sole.text, SQUARE, edge_m)
-    free = edge(sole)
+    free = outline_distance(sole)
     return {form: np.mean([law(form, material, sole, case.tilt, depth, free) for depth in depths], 0) for form in forms}
 
 

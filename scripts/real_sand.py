@@ -148,13 +148,24 @@ def make_wheel(judge_cases):
     return wheel
 
 
+def loose_heaps(fitted, data):
+    """Laws of loose sand, fitted to the discs `fitted`: both numbers, one with u^1, and both with the mean e of a wheel."""
+    import judge_cases
+    import judge_loose
+
+    soles = [judge_cases.Sole(f"disc:{DISCS[name]}", 0.001) for name in fitted]
+    depths, forces = zip(*(np.hstack(data[name]) for name in fitted))
+    made = {"loose_heap": judge_loose.LooseHeap(), "loose_linear": judge_loose.LooseHeap(1.0), "loose_mean": judge_loose.LooseHeap(mean=True)}
+    return {name: heap.fit_presses(soles, depths, forces) for name, heap in made.items()}
+
+
 def entries(fitted, data):
     """(name, force(shape, depths)) of each model, fitted to the discs `fitted`."""
     import judge_cases
     import judge_entries as judge
     import mild
 
-    soles = {name: judge_cases.Sole(f"disc:{size}") for name, size in DISCS.items()} | {"wheel": make_wheel(judge_cases)}
+    soles = {name: judge_cases.Sole(f"disc:{size}", 0.001) for name, size in DISCS.items()} | {"wheel": make_wheel(judge_cases)}
     points, faces = rim()
     # a bin as a row: those of the trials one after the other, each of its own disc
     depth = [np.concatenate([d for d, _ in data[name]]) for name in fitted]
@@ -190,7 +201,8 @@ def entries(fitted, data):
     volume = np.concatenate([d * soles[name].area.sum() for d, name in zip(depth, fitted)])
     law = judge.Archimedes()
     law.stress = float(volume @ np.concatenate(force) / (volume @ volume))
-    for name, function in (("chrono_scm", judge.chrono_scm), ("wong_sand", judge.wong_sand), ("archimedes", law)):
+    functions = {"chrono_scm": judge.chrono_scm, "wong_sand": judge.wong_sand, "archimedes": law, **loose_heaps(fitted, data)}
+    for name, function in functions.items():
         yield name, lambda shape, depths, f=function: np.array([f(d, 0.0, 0.0, soles[shape])[2] for d in depths]), None
 
 
@@ -216,6 +228,9 @@ def judge_presses(data, fitted, models=()):
             got = push(shape, depths)
             cells.append(f"{'-':>14s}" if got is None else f"{100 * (got.mean() / forces.mean() - 1):+14.0f}")
         print(f"{name:14s}" + "".join(cells), flush=True)
+    for name, heap in loose_heaps(fitted, data).items():
+        if not models or name in models:
+            print(f"{name}: p = {heap.bears:.4g} u^{heap.power:.3f} e [Pa]")
 
 
 # ---- the driven wheel ----

@@ -16,6 +16,7 @@ SHIPPED = ROOT / "policies/paper"  # seed 1 of each, in half precision
 SEVEN = ["rigid", "rubber", "foam60", "foam45", "foam28", "grass", "sand_loose"]  # the paper's six and the rigid plane
 NINE = ["rigid", "rubber", "foam60", "foam45", "foam28", "foam25", "grass", "sand_loose", "sand_dense"]
 TRAINED = ["mild", "con_cone", "con_spring", "ecc_spring", "ecc_quasi", "ecc_quasi_3d", "mild_merged", "rigid"]
+SLIPS = ["mild_slips", "mild_merged_slips"]  # trained where slip sinks: train.sh
 
 # [what, grounds, further options]: laws and numbers with which the shipped policy was never trained
 UNSEEN = [["Bekker's published soils", ["dry_sand", "sandy_loam", "clay", "snow", "lunar_soil"], []],
@@ -73,9 +74,9 @@ def deviation(values):
     return math.sqrt(sum((v - middle) ** 2 for v in values) / (len(values) - 1)) if len(values) > 1 else 0.0
 
 
-def models_of(given):
+def models_of(given, names=TRAINED):
     """{model: [policy of each seed]} of those that are there."""
-    found = {model: sorted(given.models.glob(f"{model}-[0-9]*.safetensors")) for model in TRAINED}
+    found = {model: sorted(given.models.glob(f"{model}-[0-9]*.safetensors")) for model in names}
     return {model: files for model, files in found.items() if files}
 
 

@@ -3,7 +3,7 @@ import json
 import pathlib
 
 import figures
-from measure import TRAINED, deviation, evaluate, mean, mild, models_of, read, save, together
+from measure import SLIPS, TRAINED, deviation, evaluate, mean, mild, models_of, read, save, together
 from page import Cell, Claim, Section, Table
 
 JUDGES = TRAINED[:-2] + ["bekker", "hunt_crossley", "mild_merged", "rigid", "grains"]
@@ -11,9 +11,9 @@ GRAINS = pathlib.Path(__file__).parents[2] / "grains" / "walk" / "grounds.json" 
 TESTED = ["foam25", "foam45", "sand_loose"]
 
 
-def policies(given):
+def policies(given, names=TRAINED):
     """[(model, seed, policy)]"""
-    return [(model, seed, policy) for model, files in models_of(given).items() for seed, policy in enumerate(files, 1)]
+    return [(model, seed, policy) for model, files in models_of(given, names).items() for seed, policy in enumerate(files, 1)]
 
 
 def judged(given, policy, judge):
@@ -27,7 +27,8 @@ def judged(given, policy, judge):
 
 def transfer(given):
     """Trained on one model, walked on every other."""
-    tasks = [(*who, judge) for who in policies(given) for judge in JUDGES]
+    rows_of = TRAINED + SLIPS
+    tasks = [(*who, judge) for who in policies(given, rows_of) for judge in JUDGES]
 
     def work(task):
         _, _, policy, judge = task
@@ -41,7 +42,7 @@ def transfer(given):
                          "clearance": r["clearance"], "penetration": r["penetration"],
                          "slip_forward": r["drift_forward"], "slip_left": r["drift_left"]})
     save(given, "transfer", rows)
-    trained = list(models_of(given))
+    trained = list(models_of(given, rows_of))
 
     def cell(a, b, value, stood=False):
         return mean(value(r) for r in rows if r["trained"] == a and r["judge"] == b and (r["upright"] or not stood))
@@ -60,7 +61,7 @@ def transfer(given):
     regret = {a: max(grains.values()) - u for a, u in grains.items()}
     best, best_outside = max(others, key=others.get), max(outside, key=outside.get)
     text = (f"Trained on the model of the row, walked on that of the column: {', '.join(TESTED)} at 0.6 m/s, "
-            f"{given.trials} trials of each of {max(len(files) for files in models_of(given).values())} seeds. Speed, cost and feet: of "
+            f"{given.trials} trials of each of {max(len(files) for files in models_of(given, rows_of).values())} seeds. Speed, cost and feet: of "
             "rows in which anybody stayed up.\n\n"
             "On all models but its own: " + ", ".join(f"{a} {u:.0f} %" for a, u in others.items()) +
             ". On bekker and hunt_crossley, with which nobody was trained: " + ", ".join(f"{a} {u:.0f} %" for a, u in outside.items()) +

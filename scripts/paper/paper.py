@@ -17,6 +17,7 @@ import time
 try:
     import controllers
     import latents
+    import measure
     import models
     import page
     import walks
@@ -57,7 +58,7 @@ def main():
     given.config, given.models_config = ROOT / "configs/walk.ini", ROOT / "configs/models.ini"
     given.out.mkdir(parents=True, exist_ok=True)
     names = given.experiments or list(EXPERIMENTS)
-    if not models_of(given) and set(names) & set(TRAINED):
+    if not models_of(given, measure.TRAINED + measure.SLIPS) and set(names) & set(TRAINED):
         print(f"{given.models} has no MODEL-SEED.safetensors (scripts/paper/train.sh): without {', '.join(TRAINED)}", file=sys.stderr)
         names = [name for name in names if name not in TRAINED]
     sections = []

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Trains one policy per ground model and seed, by configs/models.ini with Muon and 250 million steps, on one GPU, two to three minutes
 # each: FOLDER/MODEL-SEED.safetensors. What is there is kept. SEEDS: how many, or FIRST-LAST. ITERATIONS=N for fewer or more.
+# mild_slips, mild_merged_slips: those models, on grounds where slip sinks as policies/sand learned it (docs/grains.md).
 # Usage: scripts/paper/train.sh FOLDER [SEEDS [MODEL ...]]
 set -euo pipefail
 out=${1:?usage: scripts/paper/train.sh FOLDER [SEEDS [MODEL ...]]}
@@ -21,7 +22,9 @@ for seed in $(seq "${seeds%-*}" "${seeds#*-}"); do
     for model in "${models[@]}"; do
         policy=$out/$model-$seed.safetensors
         [ -e "$policy" ] && continue
-        "$mild" train --config "$config" --out "$runs/run" "${keys[@]}" --randomize.model="$model" --train.seed="$seed" >"$runs/log" 2>&1 ||
+        slip=()
+        [[ $model != *_slips ]] || slip=(--randomize.slip_share=0.6 "--randomize.slip_length=0.0015 0.01" "--randomize.grip=0.08 0.3")
+        "$mild" train --config "$config" --out "$runs/run" "${keys[@]}" --randomize.model="${model%_slips}" "${slip[@]}" --train.seed="$seed" >"$runs/log" 2>&1 ||
             { cat "$runs/log" >&2; exit 1; }
         tail -1 "$runs/log"
         cp "$runs/run/log.csv" "$out/$model-$seed.csv"

@@ -149,7 +149,7 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
                   {&all->order, envs * sizeof *all->order},
                   {&all->tally, TALLY_NUMBERS * sizeof *all->tally},
                   {&all->shells.robot, shells * b->shells},
-                  {&all->shells.near, shells},
+                  {&all->shells.near, shells * sizeof *all->shells.near},
                   {&all->shells.held, shells},
                   {&all->shells.list, shells * sizeof *all->shells.list},
                   {&all->shells.waiting, 2 * shells * sizeof *all->shells.waiting},

@@ -68,7 +68,7 @@ typedef struct {
     char *robot;   /* [envs] EnvShells of batch_env.h */
     float *memory; /* [envs][numbers] of the ground */
     size_t numbers;
-    uint8_t *near;      /* [envs] a bit for each body that is near the ground in this step */
+    uint16_t *near;     /* [envs] a bit for each body that is near the ground in this step */
     uint8_t *held;      /* [envs] bool: the memory is not all 0 */
     int32_t *list;      /* [envs] of a GPU: those with such a body */
     int *waiting;       /* [2] of a GPU: numbers in the list, and of these taken */

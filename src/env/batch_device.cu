@@ -220,7 +220,7 @@ static EnvsBytes kernels_bytes(const TaskDef *def, const TaskShape *shape) {
 static int kernels_fits(const EngineTree *tree) {
     return !ENGINE_FIXED || (tree->joints == ENGINE_JOINTS && tree->feet == ENGINE_FEET &&
                              tree->corners == ENGINE_CORNERS && tree->entries == ENGINE_ENTRIES &&
-                             tree->chain == ENGINE_CHAIN);
+                             tree->chain == ENGINE_CHAIN && tree->bodies <= ENGINE_BODIES);
 }
 
 static const char *kernels_open(int device) {

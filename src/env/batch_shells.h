@@ -5,6 +5,7 @@
 #define ENVS_BATCH_SHELLS_H
 
 #include "env/batch_floor.h"
+#define BODIES_PLACES (ENGINE_FEET + ENGINE_BODIES)
 #include "ground/batch/bodies.h"
 #include "robot/engine/ground.h"
 #include "robot/engine/shells.h"
@@ -68,7 +69,7 @@ WARP_FN void env_shells_near(const EnvsArrays *all, long robot, const EngineGrou
     }
     EACH_LANE(l) {
         if (LANE(l) == 0) {
-            all->shells.near[robot] = (uint8_t)near;
+            all->shells.near[robot] = (uint16_t)near;
         }
     }
     engine_save_links(tree, work, &env_shells_at(all, robot)->links);
@@ -199,7 +200,7 @@ WARP_FN int env_shells_find(const EnvsArrays *all, long robot, int k) {
     lanes_sync(); /* all have read what lane 0 writes */
     EACH_LANE(l) {
         if (LANE(l) == 0) {
-            all->shells.near[robot] = (uint8_t)near;
+            all->shells.near[robot] = (uint16_t)near;
             all->shells.held[robot] = near != 0 && !rigid;
             if (!near) {
                 env_shells_at(all, robot)->load = 0;

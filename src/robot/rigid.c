@@ -125,6 +125,7 @@ void rigid_collide(RobotSim *sim, const MildTerrain *terrain) {
             collide_corner(sim, terrain, pair);
         }
     }
+    sim->shell_contact = sim->data->ncon;
     if (sim->input.feet > sim->robot->def.feet) {
         collide_shells(sim, terrain);
     }
@@ -132,13 +133,15 @@ void rigid_collide(RobotSim *sim, const MildTerrain *terrain) {
 
 /* ---- results ---- */
 
-/* Number of the foot or body with shells that a contact is of. */
-static int limb_of(const RobotSim *sim, const mjContact *contact) {
+/* Number of the foot or body with shells that contact c is of. A foot's body may have shells, whose
+ * contacts follow those of all feet. */
+static int limb_of(const RobotSim *sim, int c) {
+    const mjContact *contact = sim->data->contact + c;
     int floor_first = contact->geom[0] == sim->robot->floor_geom;
     int body = sim->model->geom_bodyid[contact->geom[floor_first]];
-    int limb = sim->robot->def.feet + sim->robot->shell_bodies - 1;
-    while (limb > 0 && sim->robot->limb[limb].body != body) {
-        limb--;
+    int limb = c < sim->shell_contact ? 0 : sim->robot->def.feet;
+    while (sim->robot->limb[limb].body != body) {
+        limb++;
     }
     return limb;
 }
@@ -150,7 +153,7 @@ static void add_contact(RobotSim *sim, int c, double load[ROBOT_FEET_MAX]) {
     const mjData *d = sim->data;
     const mjContact *contact = d->contact + c;
     int floor_first = contact->geom[0] == sim->robot->floor_geom;
-    int limb = limb_of(sim, contact);
+    int limb = limb_of(sim, c);
     MildFootResult *result = &sim->contact.foot[limb];
     double local[6], force[3], torque[3], arm[3];
     mj_contactForce(sim->model, d, c, local);

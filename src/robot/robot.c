@@ -346,8 +346,8 @@ static MildStatus read_all(const Reader *readers, Robot *robot, MildError *error
 }
 
 MildStatus robot_read_models(Robot *robot, MildError *error) {
-    static const Reader parts[] = {read_bodies,     read_joints, read_limbs, robot_read_shells,
-                                   robot_read_legs, read_soles,  NULL};
+    static const Reader parts[] = {read_bodies,       read_joints,     read_limbs, read_soles,
+                                   robot_read_shells, robot_read_legs, NULL};
     return read_all(parts, robot, error);
 }
 

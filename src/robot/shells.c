@@ -1,14 +1,18 @@
 /* The shells of a robot: parts of its bodies, from geoms of the MJCF, whose height above the ground
  * is measured, and which may stand as its soles do. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "robot/description.h"
 
-/* Number of the body among the limbs; makes one behind the feet for a body that has none. */
+#define SHELL_SKIN 1e-3 /* [m] a sole so near a shell is covered by it */
+
+/* Number of the body among the limbs behind the feet; makes one for a body that has none there. A
+ * foot's body has two, for its sole is a limb of its own. */
 static int shell_limb(Robot *robot, int body, MildError *error) {
     const int limbs = robot->def.feet + robot->shell_bodies;
-    for (int b = 0; b < limbs; b++) {
+    for (int b = robot->def.feet; b < limbs; b++) {
         if (robot->limb[b].body == body) {
             return b;
         }
@@ -23,6 +27,68 @@ static int shell_limb(Robot *robot, int body, MildError *error) {
     robot->limb[limbs].body = body;
     robot_read_limb(robot, limbs);
     return limbs;
+}
+
+/* Bool: a point of the body lies in a shell, of a mesh in the box around it. */
+static int shell_contains(const RobotShell *shell, const double point[3]) {
+    double way[3], beyond[3];
+    mju_sub3(way, point, shell->center);
+    for (int k = 0; k < 3; k++) {
+        const double *turn = shell->rotation + k;
+        const double along = turn[0] * way[0] + turn[3] * way[1] + turn[6] * way[2];
+        beyond[k] = fmax(fabs(along) - shell->half[k], 0.0);
+    }
+    return mju_norm3(beyond) <= shell->radius + SHELL_SKIN;
+}
+
+/* Of a capsule the part that does not reach into a ball; bool: there is one. The axis p(t) = center
+ * + t axis, |t| <= half, keeps what is at least `far` from the ball's centre: with b = axis . way
+ * the roots of |p(t) - ball|^2 = far^2 are b +- sqrt(far^2 - |way|^2 + b^2). */
+static int trim_capsule(RobotShell *capsule, const double ball[3], double ball_radius) {
+    const double axis[3] = {capsule->rotation[2], capsule->rotation[5], capsule->rotation[8]};
+    const double far = ball_radius + capsule->radius;
+    double way[3];
+    mju_sub3(way, ball, capsule->center);
+    const double b = mju_dot3(axis, way), square = far * far - mju_dot3(way, way) + b * b;
+    if (square <= 0.0) {
+        return 1;
+    }
+    const double root = sqrt(square);
+    double low = -capsule->half[2], high = capsule->half[2];
+    if (b + root <= low || b - root >= high) {
+        return 1;
+    }
+    if (b - root - low > high - (b + root)) {
+        high = b - root;
+    } else {
+        low = b + root;
+    }
+    mju_addToScl3(capsule->center, axis, 0.5 * (low + high));
+    capsule->half[2] = 0.5 * (high - low);
+    return high > low;
+}
+
+/* A shell on a foot's body: what its sole covers is the sole's. The end of a capsule in a round
+ * foot is cut off; nothing else may reach over the sole. */
+static MildStatus beside_sole(const Robot *robot, RobotShell *shell, const char *name,
+                              MildError *error) {
+    for (int f = 0; f < robot->def.feet; f++) {
+        const RobotFootDef *foot = &robot->def.foot[f];
+        const RobotLimb *limb = &robot->limb[f];
+        if (limb->body != shell->body) {
+            continue;
+        }
+        const int capsule = shell->radius > 0.0 && shell->half[2] > 0.0;
+        const double *sole = limb->round ? foot->center : limb->sole_center;
+        if (limb->round && capsule ? !trim_capsule(shell, sole, foot->radius)
+                                   : shell_contains(shell, sole)) {
+            return mild_fail(error, MILD_ERROR_FORMAT,
+                             "%s: geom '%s' of [robot] shells covers the sole of foot '%s': leave "
+                             "it out, the foot stands there",
+                             robot->path, name, foot->name);
+        }
+    }
+    return MILD_OK;
 }
 
 /* The shape of a mesh's geom, and the box around it. MuJoCo's vertices are those of the geom's
@@ -84,13 +150,16 @@ MildStatus robot_read_shells(Robot *robot, MildError *error) {
         if (shell->body < 0) {
             return MILD_ERROR_FORMAT;
         }
+        mju_quat2Mat(shell->rotation, m->geom_quat + 4 * id);
+        if (beside_sole(robot, shell, name, error) != MILD_OK) {
+            return MILD_ERROR_FORMAT;
+        }
         shell->limb = shell_limb(robot, shell->body, error);
         if (shell->limb < 0) {
             return MILD_ERROR_RANGE;
         }
         shell->floor_geom = robot->model->body_geomadr[shell->body];
         shell->on_base = robot->model->body_weldid[shell->body] == robot->base_body;
-        mju_quat2Mat(shell->rotation, m->geom_quat + 4 * id);
     }
     robot->shells = robot->def.shells;
     return MILD_OK;

@@ -32,6 +32,7 @@ struct RobotSim {
     int rows;                  /* bodies that A has rows of: the feet, and shells near the ground;
                                   on rigid ground the shells that touch it */
     int row[ROBOT_BODIES_MAX]; /* [rows] their numbers, ascending */
+    int shell_contact;         /* rigid ground: the first contact of a shell, after those of feet */
     Unheld without[ROBOT_JOINTS_MAX];
     MildContactInput input;
     double inverse_inertia[36 * ROBOT_BODIES_MAX * ROBOT_BODIES_MAX]; /* of the input */

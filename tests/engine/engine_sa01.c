@@ -5,6 +5,7 @@
 #define ENGINE_CORNERS 8
 #define ENGINE_ENTRIES 135
 #define ENGINE_CHAIN 12
+#define ENGINE_BODIES 3
 #include "engine_text.h"
 
 #include "robot/engine/step.h"

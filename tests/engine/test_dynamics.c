@@ -632,13 +632,19 @@ TEST(test_march) {
 
 TEST(test_sizes) {
     char text[200];
-    engine_model_sizes(&kits[SA01_KIT].tree, text, sizeof text);
+    Robot *robot = kits[SA01_KIT].robot;
+    EngineTree tree;
+    double number[ENGINE_NUMBERS];
+    robot_set_shells(robot, 1);
+    assert_int_equal(engine_model_read(robot, DT, &tree, number, NULL), MILD_OK);
+    robot_set_shells(robot, 0);
+    engine_model_sizes(&tree, text, sizeof text);
     print_message("sa01: %s\n", text);
     print_message("working data in float: SA01 %zu bytes, any robot %zu\n",
                   engine_work_bytes_sa01(), engine_work_bytes());
     assert_string_equal(text, "#define ENGINE_JOINTS 12\n#define ENGINE_FEET 2\n"
                               "#define ENGINE_CORNERS 8\n#define ENGINE_ENTRIES 135\n"
-                              "#define ENGINE_CHAIN 12\n");
+                              "#define ENGINE_CHAIN 12\n#define ENGINE_BODIES 3\n");
     assert_true(engine_work_bytes_sa01() <= 6 * 1024);
 }
 

@@ -7,7 +7,7 @@
 
 #include "robot/engine/shells.h"
 
-enum { FALLS = 12, ROWS_MOST = 6 * (ROBOT_FEET_MAX + 8) };
+enum { FALLS = 12, ROWS_MOST = 6 * (ROBOT_FEET_MAX + ENGINE_BODIES_MAX) };
 
 /* What the engine gives and takes. */
 typedef struct {

@@ -18,13 +18,17 @@ ROW = {"trials": 10, "success": 7, "ends": {"time": 7, "tilt": 3}, "seconds": 8.
        "torque_max": 70.0, "clearance": 0.2}
 
 
-def feet(file):
-    """One stance of 0.5 s that begins at 2 s, a touch of 20 ms, and a stance before the first second, which is left out."""
+def feet(file, rows=1):
+    """One stance of 0.5 s that begins at 2 s, a touch of 20 ms, and a stance before the first second, which is left out. rows: in
+    a policy step; forces swing about their mean, the ankle is there as the step ends, and is deepest before."""
     lines = [COLUMNS]
     for k in range(400):
         time = 0.01 * k
         loaded = 0.2 <= time < 0.6 or 1.995 <= time < 2.495 or 3.0 <= time < 3.015
-        lines.append(f"0,1,{time:.2f},{0.001 * k},0,{0.1 if k == 210 else 0},3,4,{300 if loaded else 0},0.05,{0.08 if loaded else 0}")
+        for i in range(1, rows + 1):
+            swing, at = 2 * (i - 0.5 * (rows + 1)), k if i == rows else k - 0.4
+            lines.append(f"0,1,{0.01 * (k - 1 + i / rows):.4f},{0.001 * at},0,{0.1 if k == 210 else 0},{3 + swing},4,{300 + swing if loaded else 0},0.05,"
+                         f"{(0.08 if i == 1 else 0.07) if loaded else 0}")
     file.write_text("\n".join(lines) + "\n")
 
 
@@ -40,6 +44,10 @@ with tempfile.TemporaryDirectory() as name:
     assert row == {"trial": 0, "foot": 1, "start_s": "2.00", "duration_s": "0.50", "force_max_n": "300.0", "force_mean_n": "300.0",
                    "horizontal_max_n": "5.0", "depth_max_m": "0.0800", "center_x_m": "0.0500", "center_x_first_m": "0.0500",
                    "center_x_last_m": "0.0500", "ankle_way_m": "0.0490", "pitch_min_rad": "0.000", "pitch_max_rad": "0.100"}, row
+    feet(grains / "feet.csv", 4)
+    found = walk_pictures.stances(grains / "feet.csv")
+    assert len(found) == 1 and found[0].row() == row, found[0].row()
+    feet(grains / "feet.csv")
 
     report = {"time_s": 7.0, "lost_sole_s": 1.8, "seconds": 190.0, "steps": 5, "late_lists": 3, "full_lists": 0, "surface_m": [0.2], "trial": 0}
     (grains / "walk-0.json").write_text(json.dumps(report))  # was killed: no eval.json

@@ -12,8 +12,13 @@ import numpy as np
 
 root = pathlib.Path(sys.argv[1]).resolve()
 sys.path.insert(0, str(root / "scripts"))
+import judge_cases  # noqa: E402
+import judge_loose  # noqa: E402
 import mild  # noqa: E402
 import real_sand  # noqa: E402
+
+
+LOOSE = ("loose_heap", "loose_linear", "loose_mean")
 
 
 def records():
@@ -61,21 +66,63 @@ def real_sand_step(ground, z):
     judge_entries.ground_step(ground, (np.array([0.0, z, 0.0]), np.array([0.0, -0.02, 0.0])), 0.0, 1e-3)
 
 
+def loose():
+    """p = b u^n e: distances to the free edge of plates, a ball, a wheel and a tilted plate; what made a force is found again."""
+    disc, plate, ball = (judge_cases.Sole(text, 0.001) for text in ("disc:0.06", "rect:0.12,0.06", "sphere:0.05"))
+    edge = judge_loose.free_edge
+    assert abs(edge(disc, 0.01, 0).mean() / 0.01 - 1) < 0.01  # D/6; the disc has 48 sides
+    assert abs(edge(plate, 0.01, 0).mean() / (0.06 * (3 * 0.12 - 0.06) / (12 * 0.12)) - 1) < 0.001  # a roof by its area
+    half = math.sqrt(0.05**2 - 0.03**2)  # of the ball 20 mm deep
+    assert abs((edge(ball, 0.02, 0) * ball.area).sum() / (math.pi * half**3 / 3) - 1) < 0.005
+    rim = real_sand.make_wheel(judge_cases)
+    half, wide = math.sqrt(real_sand.RADIUS**2 - (real_sand.RADIUS - 0.02) ** 2), real_sand.WIDTH
+    assert abs((edge(rim, 0.02, 0) * rim.area).sum() / (wide**2 * (3 * 2 * half - wide) / 12) - 1) < 0.01
+    tilted = edge(plate, 0.0, math.radians(30))  # its front half is under water, and the line is its middle
+    assert (tilted[plate.x < 0] == 0).all() and abs(tilted.max() - 0.03) < 0.002 and abs(tilted[plate.x > 0.03].max() - 0.03) < 0.001
+    near = (plate.x > 0) & (plate.x < 0.01) & (abs(plate.y) < 0.01)
+    assert np.allclose(tilted[near], plate.x[near])
+
+    law = judge_loose.LooseHeap(1.3)
+    law.bears = 3e8
+    depths = np.linspace(0, 0.03, 31)
+    forces = [np.array([law(u, 0, 0, sole)[2] for u in depths]) for sole in (disc, plate)]
+    assert abs(forces[0][-1] / (3e8 * 0.03**1.3 * math.pi * 0.03**3 / 3) - 1) < 0.02
+    found = judge_loose.LooseHeap().fit_presses((disc, plate), (depths, depths), forces)
+    assert abs(found.power - 1.3) < 1e-9 and abs(found.bears / 3e8 - 1) < 1e-9
+    straight = judge_loose.LooseHeap(1.0).fit_presses((disc, plate), (depths, depths), forces)
+    assert straight.power == 1 and straight.bears < 0.5 * 3e8
+    assert law(0.02, 0, 0, plate)[2] > 0 == law(0.02, 0, 0, plate)[0] and law(-0.01, 0, 0, plate)[2] == 0
+    mean = judge_loose.LooseHeap(1.0, mean=True)
+    mean.bears = straight.bears
+    assert abs(mean(0.02, 0, 0, plate)[2] / straight(0.02, 0, 0, plate)[2] - 1) < 1e-9  # a level plate has one depth
+    assert mean(0.02, 0, 0, ball)[2] < 0.9 * straight(0.02, 0, 0, ball)[2]  # depth and distance are greatest together
+
+
 def page():
     """Of docs/real-sand.md: the rows of mild, mild_merged and 3D-RFT fitted to one disc, of bekker to two."""
     with contextlib.redirect_stdout(io.StringIO()) as said:
-        real_sand.judge_presses(real_sand.presses(), ["disc80"], ("mild", "mild_merged", "3d_rft"))
-    found = {line.split()[0]: [int(x) for x in line.split()[1:]] for line in said.getvalue().splitlines() if line.startswith(("mild", "3d_rft"))}
+        real_sand.judge_presses(real_sand.presses(), ["disc80"], ("mild", "mild_merged", "3d_rft", *LOOSE))
+    rows = [line.split() for line in said.getvalue().splitlines() if line.startswith(("mild", "3d_rft", "loose")) and ":" not in line]
+    found = {name: [int(cell) for cell in cells] for name, *cells in rows}
+    alone = {name: found[name] for name in LOOSE}
     text = (root / "docs/real-sand.md").read_text(encoding="utf-8")
     for name, row in (("mild", r"\| `mild`, `hunt_crossley` \|"), ("mild_merged", r"\| `mild_merged` \|"), ("3d_rft", r"\| 3D-RFT[^|]*\|")):
         cells = re.search(row + r"([^|]*)\|([^|]*)\|([^|]*)\|", text).groups()
         says = [int(re.search(r"[-+]?\d+", cell).group()) for cell in cells]
         assert says == [found[name][0], found[name][2], found[name][3]], (name, says, found[name])
     with contextlib.redirect_stdout(io.StringIO()) as said:
-        real_sand.judge_presses(real_sand.presses(), ["disc60", "disc100"], ("bekker",))
+        real_sand.judge_presses(real_sand.presses(), ["disc60", "disc100"], ("bekker", *LOOSE))
     found = [int(x) for line in said.getvalue().splitlines() if line.startswith("bekker") for x in line.split()[1:]]
     says = [int(x) for x in re.findall(r"[-+]\d+", re.search(r"\n\| `bekker` \|(.*)", text).group(1))[3:]]
     assert says == found and max(map(abs, found[:3])) < 10, (says, found)  # k_c below 0: pressure that grows with the disc
+    rows = [line.split() for line in said.getvalue().splitlines() if line.startswith("loose") and ":" not in line]
+    two = {name: [int(cell) for cell in cells] for name, *cells in rows}
+    for name, row in two.items():
+        says = [int(x) for x in re.findall(r"[-+]\d+", re.search(rf"\n\| `{name}`[^|]*\|(.*)", text).group(1))]
+        assert says == [alone[name][0], *alone[name][2:], *row], (name, says, alone[name], row)
+    assert list(two) == list(LOOSE) and max(map(abs, two["loose_heap"])) < 8 and abs(alone["loose_heap"][3]) < 4
+    powers = re.findall(r"^loose_heap: p = \S+ u\^(\S+) e", said.getvalue(), re.M)
+    assert powers == ["1.375"], powers
 
 
 def page_of_wheel():
@@ -100,6 +147,7 @@ def page_of_wheel():
 
 records()
 wheel()
+loose()
 page()
 page_of_wheel()
 print("real sand: records, wheel and page")

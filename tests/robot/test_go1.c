@@ -77,12 +77,17 @@ TEST(the_pose_by_hand) {
         expect_near("foot's z", foot->position[2], 0, 1e-9);
     }
     expect_near("feet apart", robot_sim_foot_distance(sim), 2 * y, 1e-9);
-    /* the knees' spheres are the lowest shells */
-    const double knee =
-        leg * cos(0.9) * cos(a) + roll_offset * sin(a) + number(item(numbers, "knee"), "radius");
+    /* the lower of a calf's capsules, of radius 0.01, is the lowest shell. From the middle of the
+     * foot's ball, in the calf's frame, its axis is (0, 0, 0.013) + s u with u along (0.016, 0,
+     * 0.08); it is cut off where the two touch. */
+    const double ux = 0.016 / hypot(0.016, 0.08), uz = 0.08 / hypot(0.016, 0.08);
+    const double far = foot_radius + 0.01;
+    const double s = -0.013 * uz + sqrt(far * far - 0.013 * 0.013 * ux * ux);
+    const double rise = sin(0.9) * s * ux + cos(0.9) * (0.013 + s * uz);
     MildMaterial any = mild_material_default();
     MildTerrain level = mild_terrain_uniform(&any);
-    expect_near("clearance", robot_sim_body_clearance(sim, &level), height - knee, 1e-9);
+    expect_near("clearance", robot_sim_body_clearance(sim, &level),
+                foot_radius + rise * cos(a) - 0.01, 1e-9);
     robot_sim_destroy(sim);
 }
 
@@ -128,7 +133,9 @@ TEST(what_may_be_left_out) {
         {"shape = round", "shape = round\nz = -0.2", MILD_ERROR_FORMAT, "robot.ini [foot.FL] z"},
         {"shape = round", "shape = ball", MILD_ERROR_ARGUMENT, "foot.FL.shape ball round"},
         {"body = FR_calf", "body = FL_calf", MILD_ERROR_FORMAT, "FL FR body"},
-        {"offset = 0\n", "", MILD_ERROR_FORMAT, "robot.ini [foot.FL] offset"}};
+        {"offset = 0\n", "", MILD_ERROR_FORMAT, "robot.ini [foot.FL] offset"},
+        {"center = 0 0 -0.213\nradius = 0.023", "center = 0 0 -0.06\nradius = 0.2",
+         MILD_ERROR_FORMAT, "FL_calf_upper shells covers FL"}};
     for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
         assert_null(changed_robot(refused[i].from, refused[i].to, &error));
         print_message("%s\n", error.text);
@@ -266,7 +273,7 @@ TEST(a_round_foot_is_a_point) {
 
 static int is_up(const RobotSim *sim, const MildTerrain *terrain) {
     return kit_tilt(robot_sim_base_rotation(sim)) < 0.5 &&
-           robot_sim_body_clearance(sim, terrain) > 0;
+           robot_sim_base_clearance(sim, terrain) > 0;
 }
 
 /* Four seconds; a push [N] for 0.1 s after the first. material: NULL for rigid ground. */

@@ -304,19 +304,23 @@ TEST(level_of_help) {
     env->assist_level = 0.5;
     env->step_first = 100;
     env->step = 300; /* 2.00 s */
-    task_assist_adapt(env, 0);
+    task_assist_adapt(env, &rig.def, 0);
     expect_near("within the grace", env->assist_level, 0.5, 0);
     env->step = 301;
-    task_assist_adapt(env, 0);
+    task_assist_adapt(env, &rig.def, 0);
     expect_near("later", env->assist_level, 0.499375, 1e-12);
     env->assist_level = 0.5;
-    task_assist_adapt(env, 1);
+    rig.def.assist_decay = 4;
+    task_assist_adapt(env, &rig.def, 0);
+    expect_near("twice as fast", env->assist_level, 0.49875, 1e-12);
+    env->assist_level = 0.5;
+    task_assist_adapt(env, &rig.def, 1);
     expect_near("a fall", env->assist_level, 0.66, 1e-12);
     env->assist_level = 0.9;
-    task_assist_adapt(env, 1);
+    task_assist_adapt(env, &rig.def, 1);
     expect_near("at most 1", env->assist_level, 1, 0);
     env->assist_level = 0;
-    task_assist_adapt(env, 1);
+    task_assist_adapt(env, &rig.def, 1);
     expect_near("from nothing", env->assist_level, 0.01, 1e-12);
     rig.def.assist = 1;
     env->assist_level = 0.5;

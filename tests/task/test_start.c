@@ -72,6 +72,22 @@ static void begin(uint32_t draw, int rigid) {
 
 /* ---- geometry ---- */
 
+/* [m] Lowest point of a capsule above z = 0, without the part that is closer to a ball than they
+ * touch. */
+static double lowest_beside(int geom, int ball) {
+    const double *size = model->geom_size + 3 * geom, *R = data->geom_xmat + 9 * geom;
+    const double axis[3] = {R[2], R[5], R[8]}, far = size[0] + model->geom_size[3 * ball];
+    double least = 1e9;
+    for (int i = 0; i <= 4000; i++) {
+        double at[3], along = size[1] * (i / 2000.0 - 1);
+        mju_addScl3(at, data->geom_xpos + 3 * geom, axis, along);
+        if (mju_dist3(at, data->geom_xpos + 3 * ball) >= far) {
+            least = fmin(least, at[2] - size[0]);
+        }
+    }
+    return least;
+}
+
 /* [m] Lowest point of a geom above z = 0. */
 static double lowest_of(int geom) {
     const double *size = model->geom_size + 3 * geom, *R = data->geom_xmat + 9 * geom;
@@ -85,23 +101,29 @@ static double lowest_of(int geom) {
     }
 }
 
-/* [m] The same of the robot in env: its shells, which are the collision geoms but for the calves,
- * and its feet, the spheres of rubber. */
+/* [m] The same of the robot in env: its shells, and its feet, the spheres of rubber. */
 static double lowest(void) {
     double least = 1e9;
     const int rubber = mj_name2id(model, mjOBJ_MATERIAL, "rubber");
-    int seen = 0;
+    int seen = 0, shin = 0;
     mju_copy(data->qpos, env->robot.qpos, 7 + JOINTS);
     mj_kinematics(model, data);
     for (int g = 0; g < model->ngeom; g++) {
         const char *name = mj_id2name(model, mjOBJ_GEOM, g);
-        const int shell = name && !strstr(name, "calf");
-        if (shell || model->geom_matid[g] == rubber) {
+        const int foot = model->geom_matid[g] == rubber;
+        if (name && strstr(name, "calf_lower")) {
+            shin = g;
+        } else if ((name && !strstr(name, "calf_capsule")) || foot) {
             least = fmin(least, lowest_of(g));
             seen++;
         }
+        if (foot) {
+            assert_int_equal(model->geom_bodyid[g], model->geom_bodyid[shin]);
+            least = fmin(least, lowest_beside(shin, g));
+            seen++;
+        }
     }
-    assert_int_equal(seen, 2 + 2 * FEET + FEET);
+    assert_int_equal(seen, 2 + 5 * FEET);
     return least;
 }
 

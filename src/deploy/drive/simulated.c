@@ -191,7 +191,7 @@ static void set_torques(Simulated *s, double *torque) {
 
 static int has_fallen(const Simulated *s) {
     return robot_sim_base_rotation(s->sim)[8] < cos(s->def->task->tilt_limit) ||
-           robot_sim_body_clearance(s->sim, task_env_terrain(s->env)) < 0;
+           robot_sim_base_clearance(s->sim, task_env_terrain(s->env)) < 0;
 }
 
 /* Stands in its start until the runner answers. */

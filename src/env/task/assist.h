@@ -20,7 +20,6 @@ enum { ASSIST_HAND_TILT, ASSIST_HAND_DAMPING, ASSIST_HAND_DRAW, ASSIST_HAND_LIMI
 #define ASSIST_LEAD                                                                                \
     1.3 /* [-] scale of the reference gait, because the joints lag behind their targets */
 #define ASSIST_GRACE 2.0  /* [s] time on its feet before the level decays */
-#define ASSIST_DECAY 8.0  /* [s] */
 #define ASSIST_RISE 1.3   /* [-] at a fall */
 #define ASSIST_LEAST 0.01 /* [-] added at a fall */
 #define ASSIST_GRAVITY 9.81
@@ -31,12 +30,12 @@ MILD_HD_FN double task_assist_share(const TaskEnv *env, const TaskDef *def) {
 }
 
 /* Updates the level after a policy step. The level is steady when the robot falls every
- * ASSIST_GRACE + ASSIST_DECAY ln(ASSIST_RISE) seconds. */
-MILD_HD_FN void task_assist_adapt(TaskEnv *env, int fallen) {
+ * ASSIST_GRACE + def->assist_decay ln(ASSIST_RISE) seconds. */
+MILD_HD_FN void task_assist_adapt(TaskEnv *env, const TaskDef *def, int fallen) {
     if (fallen) {
         env->assist_level = fmin(1.0, ASSIST_RISE * env->assist_level + ASSIST_LEAST);
     } else if ((env->step - env->step_first) * TASK_PERIOD > ASSIST_GRACE) {
-        env->assist_level *= 1 - TASK_PERIOD / ASSIST_DECAY;
+        env->assist_level *= 1 - TASK_PERIOD / def->assist_decay;
     }
 }
 

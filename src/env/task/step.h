@@ -443,7 +443,7 @@ MILD_HD_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const RobotT
     tile_sync();
     if (tile_lane() == 0) {
         task_advance_clock(env, def);
-        task_assist_adapt(env, fallen);
+        task_assist_adapt(env, def, fallen);
     }
     tile_sync();
     out.timeout = !fallen && env->step >= env->step_limit;

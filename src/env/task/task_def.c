@@ -49,6 +49,7 @@ TaskDef task_def_default(void) {
         .crossing_limit = -1.0,
         .shells_stand = 1,
         .assist = 1,
+        .assist_decay = 8,
         .solver = MILD_SOLVER_NEWTON,
         .contact_tolerance = 1e-4,
         .contact_iterations = 20,
@@ -198,6 +199,7 @@ const MildField task_fields[] = {
       "area and second moments of area, which does not change the ground; 0: the robot's own"),
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
+    T(assist_decay, D, 1, 0.1, 1000, "[s] time constant with which it fades"),
     MILD_FIELD_CHOICE(
         TaskDef, solver, mild_solver_names, MILD_SOLVERS,
         "contact solver: newton (fast); gauss_seidel, the paper's sweeps over the same "

@@ -173,6 +173,7 @@ typedef struct {
     int shells_stand;         /* bool: shells stand (robot_set_shells) */
     int sole_elements;        /* of a foot (robot_set_elements); 0: the robot's own */
     int assist;               /* bool: helping hand for beginners (assist.h) */
+    double assist_decay;      /* [s] */
     int solver;               /* MildSolver */
     double contact_tolerance; /* [-] relative residual at which the contact solver stops */
     int contact_iterations;   /* [-] hard bound of its work */

@@ -33,7 +33,7 @@ typedef struct {
     float *worn;                /* [robots][groups][stride] [-] wear, behind `memory`; NULL until
                                    there is a material that wears */
     MapView map;                /* all 0 without a map */
-    const uint8_t *skip; /* [robots] bool: a step leaves it alone; NULL: none. Of the caller */
+    const uint16_t *skip; /* [robots] not 0: a step leaves it alone; NULL: none. Of the caller */
 } BatchArrays;
 
 struct BodiesSetup; /* of bodies.h */

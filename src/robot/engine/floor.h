@@ -19,14 +19,14 @@
 /* Working data. */
 typedef struct EngineFloor {
     int count;                                         /* bodies near the ground */
-    int body[ENGINE_BODIES_MAX];                       /* [count] their numbers */
-    Real position[ENGINE_BODIES_MAX][3];               /* [m] from the base */
-    Real jacobian[ENGINE_BODIES_MAX][ENGINE_CHAIN][6]; /* J^T by place */
-    Real half[ENGINE_BODIES_MAX][ENGINE_CHAIN][6];     /* stiffness J^T */
-    Real stiffness[ENGINE_BODIES_MAX][ENGINE_BASE_ENTRIES];
-    Real twist[ENGINE_BODIES_MAX][6];        /* J qvel, then J qacc */
-    Real twist_change[ENGINE_BODIES_MAX][6]; /* J times the change of qacc */
-    Real wrench[ENGINE_BODIES_MAX][6];       /* [N, N m] of the ground, about the body's origin */
+    int body[ENGINE_BODIES];                       /* [count] their numbers */
+    Real position[ENGINE_BODIES][3];               /* [m] from the base */
+    Real jacobian[ENGINE_BODIES][ENGINE_CHAIN][6]; /* J^T by place */
+    Real half[ENGINE_BODIES][ENGINE_CHAIN][6];     /* stiffness J^T */
+    Real stiffness[ENGINE_BODIES][ENGINE_BASE_ENTRIES];
+    Real twist[ENGINE_BODIES][6];        /* J qvel, then J qacc */
+    Real twist_change[ENGINE_BODIES][6]; /* J times the change of qacc */
+    Real wrench[ENGINE_BODIES][6];       /* [N, N m] of the ground, about the body's origin */
     int points;                              /* that touch */
     EngineIndex of[ROBOT_FLOOR_POINTS];      /* number of a point's body in `body` */
     /* Four edges of each point, as in EngineContact. */

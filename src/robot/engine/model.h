@@ -112,7 +112,7 @@ typedef struct {
 
 /* ---- sizes: of the working data, and of loops where the robot is known to the compiler ---- */
 
-/* Define these five before the first inclusion, as engine_model_sizes says, to compile the code for
+/* Define these six before the first inclusion, as engine_model_sizes says, to compile the code for
  * one robot: its working data then has no gaps and its loops have known lengths. */
 #ifdef ENGINE_JOINTS
 #define ENGINE_FIXED 1
@@ -123,6 +123,7 @@ typedef struct {
 #define ENGINE_CORNERS ENGINE_CORNERS_MAX
 #define ENGINE_ENTRIES ENGINE_ENTRIES_MAX
 #define ENGINE_CHAIN ENGINE_DOFS_MAX
+#define ENGINE_BODIES ENGINE_BODIES_MAX
 #endif
 /* For a short loop of that many rounds. */
 #if ENGINE_FIXED

@@ -430,6 +430,7 @@ MildStatus engine_model_read(const Robot *robot, double dt, EngineTree *tree, do
 void engine_model_sizes(const EngineTree *tree, char *text, size_t size) {
     snprintf(text, size,
              "#define ENGINE_JOINTS %d\n#define ENGINE_FEET %d\n#define ENGINE_CORNERS %d\n"
-             "#define ENGINE_ENTRIES %d\n#define ENGINE_CHAIN %d\n",
-             tree->joints, tree->feet, tree->corners, tree->entries, tree->chain);
+             "#define ENGINE_ENTRIES %d\n#define ENGINE_CHAIN %d\n#define ENGINE_BODIES %d\n",
+             tree->joints, tree->feet, tree->corners, tree->entries, tree->chain,
+             tree->bodies ? tree->bodies : 1);
 }

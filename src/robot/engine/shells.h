@@ -25,8 +25,8 @@ typedef struct {
 /* Working data. */
 typedef struct {
     int count;                                     /* bodies near the ground */
-    int body[ENGINE_BODIES_MAX];                   /* [count] their numbers */
-    Real half[ENGINE_BODIES_MAX][ENGINE_CHAIN][6]; /* J^T, then L^-T J^T */
+    int body[ENGINE_BODIES];                   /* [count] their numbers */
+    Real half[ENGINE_BODIES][ENGINE_CHAIN][6]; /* J^T, then L^-T J^T */
     Real factor[ENGINE_DOFS][ENGINE_STRIDE];       /* as in EngineWork */
     Real inverse[ENGINE_DOFS];
 } EngineShells;

@@ -16,6 +16,7 @@ static MildStatus write_sizes(const char *folder, const char *path, MildError *e
     double *number = robot ? calloc(ENGINE_NUMBERS, sizeof *number) : NULL;
     MildStatus status = robot ? MILD_ERROR_MEMORY : error->status;
     if (number) {
+        robot_set_shells(robot, 1);
         status = engine_model_read(robot, SIZES_DT, &tree, number, error);
     } else if (robot) {
         mild_fail(error, status, "out of memory");

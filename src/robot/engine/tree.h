@@ -20,7 +20,7 @@
 #define ENGINE_ENTRIES_MAX (ENGINE_DOFS_MAX * (ENGINE_DOFS_MAX + 1) / 2) /* of a single chain */
 #define ENGINE_CORNERS_MAX 64 /* spheres under the feet on rigid ground */
 #define ENGINE_BASE_ENTRIES 21
-#define ENGINE_BODIES_MAX 8 /* with shells that stand: bits of a byte */
+#define ENGINE_BODIES_MAX 9 /* with shells that stand: those of the Go1 */
 
 typedef unsigned char EngineIndex;
 typedef unsigned long long EnginePath; /* a bit for each degree of freedom */
