@@ -13,7 +13,7 @@
 
 #define BODIES_MAX 13 /* feet, and bodies with shells: those of the Go1 */
 #ifndef BODIES_PLACES
-#define BODIES_PLACES BODIES_MAX /* of them near the ground; a program for one robot has its own */
+#define BODIES_PLACES BODIES_MAX /* of them near the ground; an includer may have its own */
 #endif
 #define BODIES_ROWS (6 * BODIES_PLACES)
 #define BODIES_ELEMENTS 1536 /* of all bodies */

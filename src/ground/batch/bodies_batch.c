@@ -10,7 +10,7 @@
 #include "ground/inside.h"
 
 _Static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
-_Static_assert(BODIES_MAX == MILD_BATCH_FEET_MAX, "the same number");
+_Static_assert(BODIES_MAX >= MILD_BATCH_FEET_MAX, "room for all");
 
 /* Arrays of a surface's elements: x, y and those of BodiesSole.face. */
 enum { PLACES = 7 };

@@ -9,6 +9,7 @@
 #define MILD_BATCH_BODIES_ROBOT_H
 
 #include "ground/batch/batch.h"
+#define BODIES_PLACES MILD_BATCH_FEET_MAX
 #include "ground/batch/bodies.h"
 
 /* A step of all robots. Arrays on the device. */
