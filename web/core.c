@@ -59,7 +59,8 @@ static struct {
     EnvShells down;
     EnvFloorWork floor;
     BodiesSetup setup; /* its gradient alone */
-    uint8_t near, held;
+    uint16_t near;
+    uint8_t held;
     /* what the robot knows of it */
     Belief belief;
     /* the picture */
@@ -175,7 +176,7 @@ static void show_foot(int f) {
     const MildFootResult *foot = &web.result.foot[f];
     const double area = mild_sole_pitch(web.sole[f]) * mild_sole_pitch(web.sole[f]);
     const int rigid = web.trial.rigid;
-    view->load[f] = web.robot->reading.foot[f].force[2];
+    view->load[f] = env_reading(web.robot)->foot[f].force[2];
     view->depth[f] = rigid ? 0 : (float)foot->depth_max;
     for (int e = 0; e < view->elements; e++) {
         view->pressure[f][e] = rigid ? 0 : (float)(elements.normal[e] / area);
@@ -203,6 +204,12 @@ static void widen(const float *from, int count, double *to) {
     }
 }
 
+/* A number of the feet's A, of which env_export gives the lower triangle. */
+static Real feet_inertia(int row, int column) {
+    const int low = row > column ? column : row;
+    return web.all.contact.inverse_inertia[contact_triangle(row + column - low, low)];
+}
+
 /* From the engine's feet to the ground. */
 static void give_feet(void) {
     const EnvsContact *contact = &web.all.contact;
@@ -211,7 +218,9 @@ static void give_feet(void) {
     widen(contact->position, 3 * feet, input->position[0]);
     widen(contact->rotation, 9 * feet, input->rotation[0]);
     widen(contact->velocity, 6 * feet, input->velocity[0]);
-    widen(contact->inverse_inertia, 36 * feet * feet, input->inverse_inertia);
+    for (int n = 0; n < 36 * feet * feet; n++) {
+        input->inverse_inertia[n] = (double)feet_inertia(n / (6 * feet), n % (6 * feet));
+    }
     widen(contact->free_velocity, 6 * feet, input->free_velocity);
 }
 
@@ -258,7 +267,7 @@ static void give_shells(void) {
     Real inertia[36 * STANDING_MAX * STANDING_MAX];
     const EngineShellsGround ground = {position, rotation, velocity, free_velocity, inertia};
     for (int n = 0; n < feet * feet; n++) {
-        inertia[n / feet * rows + n % feet] = web.all.contact.inverse_inertia[n];
+        inertia[n / feet * rows + n % feet] = feet_inertia(n / feet, n % feet);
     }
     engine_save_links(&model->tree, &web.env_scratch->work, &web.links);
     engine_shells_begin(model, &web.robot->saved, &web.links, &web.shells, &ground);
@@ -354,9 +363,9 @@ int web_move(const float *action, const float command[3]) {
         }
         env_part(&web.all, &web.call, 0, k, 0, floor, web.env_scratch);
     }
-    const TaskStep step = task_end_step(env, &web.task.task, &web.task.robot, &web.robot->reading,
+    const TaskStep step = task_end_step(env, &web.task.task, &web.task.robot, env_reading(web.robot),
                                         env->torque, web.robot->diverged);
-    task_observe(env, &web.task.task, &web.task.robot, &web.robot->reading, NULL,
+    task_observe(env, &web.task.task, &web.task.robot, env_reading(web.robot), NULL,
                  &web.robot->sensors, 0, &view);
     return step.done ? step.cause : TASK_END_time;
 }
