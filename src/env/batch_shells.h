@@ -5,7 +5,7 @@
 #define ENVS_BATCH_SHELLS_H
 
 #include "env/batch_floor.h"
-#define BODIES_PLACES (ENGINE_FEET + ENGINE_BODIES)
+#define BODIES_NEAR (ENGINE_FEET + ENGINE_BODIES)
 #include "ground/batch/bodies.h"
 #include "robot/engine/ground.h"
 #include "robot/engine/shells.h"

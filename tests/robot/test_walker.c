@@ -639,7 +639,12 @@ TEST(test_refused) {
               NULL); /* above a round foot */
     try_robot("body = toe_r", "body = torso", MILD_ERROR_FORMAT, "walker.xml torso [foot.ball]");
     try_robot("body = toe_r", "body = world", MILD_ERROR_FORMAT, "walker.xml world [foot.ball]");
-    try_robot("body = toe_r", "body = pelvis", MILD_OK, NULL); /* one joint is enough */
+    try_robot("body = toe_r\nknee = shank_r\nmirror = flat\noffset = 0.6\nshape = round\n"
+              "center = 0.01 0.02 -0.03",
+              "body = pelvis\nknee = shank_r\nmirror = flat\noffset = 0.6\nshape = round\n"
+              "center = 0 0 -0.2",
+              MILD_OK, NULL); /* one joint is enough */
+    try_robot("body = toe_r", "body = pelvis", MILD_ERROR_FORMAT, "belt shells covers ball");
     try_robot("name='neck' axis='1 0 0'", "name='neck' type='slide' axis='1 0 0'",
               MILD_ERROR_FORMAT, "walker.xml neck");
     try_robot("joint name='neck'", "joint name='nek'", MILD_ERROR_FORMAT,

@@ -49,7 +49,6 @@ typedef struct {
     MaterialNumbers *materials; /* [count + 1][surfaces] */
     /* of mild_batch_step */
     uint16_t *near; /* [robots] bit s: surface s may touch the ground in this step */
-    uint8_t *any;   /* [robots] bool: one of them may */
 } BatchBodies;
 
 struct MildBatch {

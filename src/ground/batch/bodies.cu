@@ -25,7 +25,7 @@ static __global__ void __launch_bounds__(THREADS) find(const __grid_constant__ B
 
 static __global__ void __launch_bounds__(THREADS) rest(const __grid_constant__ BodiesCall call) {
     const long robot = (long)blockIdx.x * WARPS + threadIdx.x / LANES;
-    if (robot < call.shape.robots && !call.bodies.any[robot]) {
+    if (robot < call.shape.robots && !call.bodies.near[robot]) {
         bodies_rest(&call, robot);
     }
 }
@@ -34,7 +34,7 @@ template <int HEAP>
 static __global__ void __launch_bounds__(THREADS, BLOCKS)
     solve(const __grid_constant__ BodiesCall call) {
     __shared__ BodiesWork work;
-    if (call.bodies.any[blockIdx.x]) {
+    if (call.bodies.near[blockIdx.x]) {
         bodies_solve(&call, blockIdx.x, &work, HEAP);
     }
 }

@@ -12,12 +12,12 @@
 #include "ground/batch/contact.h"
 
 #define BODIES_MAX 13 /* feet, and bodies with shells: those of the Go1 */
-#ifndef BODIES_PLACES
-#define BODIES_PLACES BODIES_MAX /* of them near the ground; an includer may have its own */
+#ifndef BODIES_NEAR
+#define BODIES_NEAR BODIES_MAX /* of them near the ground; an includer may have its own */
 #endif
-#define BODIES_ROWS (6 * BODIES_PLACES)
+#define BODIES_ROWS (6 * BODIES_NEAR)
 #define BODIES_ELEMENTS 1536 /* of all bodies */
-#define BODIES_ROUNDS (BODIES_ELEMENTS / LANES + BODIES_PLACES)
+#define BODIES_ROUNDS (BODIES_ELEMENTS / LANES + BODIES_NEAR)
 #define BODIES_SUMS 42             /* of an evaluation: a wrench and a 6 x 6 hessian */
 #define BODIES_MARGIN REAL(1e-3)   /* [m] as in locate.c */
 #define BODIES_EXTRA_SPEED REAL(2) /* [m/s] as in locate.c */
@@ -115,33 +115,33 @@ typedef struct {
  * `inverse_inertia`. Out: wrench [N, N m], velocity after the step, foot. */
 typedef struct {
     int count;
-    int body[BODIES_PLACES]; /* number of a place */
-    BodiesMemory memory[BODIES_PLACES];
+    int body[BODIES_NEAR]; /* number of a place */
+    BodiesMemory memory[BODIES_NEAR];
     const int *label_material; /* as in ContactProblem */
     const Real *map_origin;
     Real height; /* [m] of the surface */
-    Real position[BODIES_PLACES][3];
-    Real rotation[BODIES_PLACES][9];
-    Real velocity[BODIES_PLACES][6];
+    Real position[BODIES_NEAR][3];
+    Real rotation[BODIES_NEAR][9];
+    Real velocity[BODIES_NEAR][6];
     Real free_velocity[BODIES_ROWS];
     Real inverse_inertia[BODIES_ROWS * BODIES_ROWS]; /* [6 count][6 count] */
     Real wrench[BODIES_ROWS];
-    ContactFoot foot[BODIES_PLACES];
+    ContactFoot foot[BODIES_NEAR];
     Real residual; /* [-] relative */
     int iterations;
     /* ---- of the solution ---- */
-    Real least[BODIES_PLACES];         /* [m] elements less deep do not touch in this step */
-    int listed[BODIES_PLACES];         /* elements in the list, which begins at */
-    int begin[BODIES_PLACES];          /* for each place */
-    int first[BODIES_PLACES + 1];      /* round of a place; those of a place follow each other */
+    Real least[BODIES_NEAR];         /* [m] elements less deep do not touch in this step */
+    int listed[BODIES_NEAR];         /* elements in the list, which begins at */
+    int begin[BODIES_NEAR];          /* for each place */
+    int first[BODIES_NEAR + 1];      /* round of a place; those of a place follow each other */
     uint8_t place[BODIES_ROUNDS];   /* of a round */
     uint16_t list[BODIES_ELEMENTS]; /* numbers of elements */
-    Rim rim[BODIES_PLACES];            /* of surfaces with listed elements, on ground with LAW_HEAP */
+    Rim rim[BODIES_NEAR];            /* of surfaces with listed elements, on ground with LAW_HEAP */
     int active; /* rows of bodies with listed elements; P and W of others are 0 */
     uint8_t active_row[BODIES_ROWS];
     Real part[BODIES_ROUNDS][BODIES_SUMS];
     BodiesPoint at, full, next, best;
-    Real hessian[BODIES_PLACES][36];
+    Real hessian[BODIES_NEAR][36];
     Real row[2][BODIES_ROWS];                     /* what is summed over rows */
     Real matrix[BODIES_ROWS * (BODIES_ROWS + 1)]; /* [1 + H A | W + H (V - V_free)], active rows */
 } BodiesWork;

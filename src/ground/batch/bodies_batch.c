@@ -197,7 +197,6 @@ void batch_bodies_close(const BatchBodies *bodies, int device) {
     device_free(device, bodies->places);
     device_free(device, bodies->materials);
     device_free(device, bodies->near);
-    device_free(device, bodies->any);
 }
 
 /* ---- of a batch that steps them itself ---- */
@@ -206,9 +205,8 @@ MildStatus batch_bodies_ready(MildBatch *batch, MildError *error) {
     BatchBodies *bodies = &batch->bodies;
     const size_t robots = (size_t)batch->shape.robots;
     bodies->near = device_alloc(batch->device, robots * sizeof *bodies->near, error);
-    bodies->any = device_alloc(batch->device, robots * sizeof *bodies->any, error);
-    batch->arrays.skip = bodies->any;
-    return bodies->near && bodies->any ? MILD_OK : MILD_ERROR_MEMORY;
+    batch->arrays.skip = bodies->near;
+    return bodies->near ? MILD_OK : MILD_ERROR_MEMORY;
 }
 
 /* The setup comes from the device, is changed, and goes back when no step reads it. */

@@ -13,7 +13,7 @@ void host_bodies_begin(const BodiesCall *call) {
 void host_bodies_end(const BodiesCall *call) {
     BodiesWork work;
     for (long robot = 0; robot < call->shape.robots; robot++) {
-        if (call->bodies.any[robot]) {
+        if (call->bodies.near[robot]) {
             bodies_solve(call, robot, &work, 1);
         } else {
             bodies_rest(call, robot);

@@ -9,7 +9,7 @@
 #define MILD_BATCH_BODIES_ROBOT_H
 
 #include "ground/batch/batch.h"
-#define BODIES_PLACES MILD_BATCH_FEET_MAX
+#define BODIES_NEAR MILD_BATCH_FEET_MAX
 #include "ground/batch/bodies.h"
 
 /* A step of all robots. Arrays on the device. */
@@ -77,7 +77,6 @@ WARP_FN void bodies_find(const BodiesCall *call, long robot) {
     EACH_LANE(l) {
         if (LANE(l) == 0) {
             call->bodies.near[robot] = (uint16_t)near;
-            call->bodies.any[robot] = near != 0;
         }
     }
 }
