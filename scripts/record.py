@@ -34,6 +34,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 SLOW = 0.1  # share by which the last record may be worse than the median of those before it
 SAMPLE = 1.0  # [s] from one reading of the clocks to the next
 WORLDS = (4096, 16384, 65536)
+SHELLS = ("", "_without_shells")  # with trunk and shanks on the ground, and as in the days when the bars were asked for
 GPU_KEYS = ("name", "driver_version", "memory.total", "clocks.max.sm", "clocks.max.mem", "power.limit", "mig.mode.current")
 GPU_CLOCKS = ("clocks.sm", "clocks.mem", "power.draw", "temperature.gpu")
 STEPS_5MS = "--task.physics_dt=0.005"
@@ -139,6 +140,7 @@ RATIOS = {
     "a step of MuJoCo with the plugin walking on sand_loose over MuJoCo's own on a rigid floor": ("plugin/sand_loose", "plugin/rigid", 1),
     **{f"physics steps/s of {n} walking robots on soft ground over MuJoCo Warp's on a rigid floor":
        (f"robots_{n}/walking_policy_steps_per_s", f"mjwarp_{n}/rigid_5ms_{n}", 2) for n in WORLDS},
+    "the same of 16384 whose feet alone stand on it": ("robots_16384_without_shells/walking_policy_steps_per_s", "mjwarp_16384/rigid_5ms_16384", 2),
 }
 # What is asked, of a row or a ratio: the bar, and whether more is better.
 BARS = {
@@ -146,9 +148,10 @@ BARS = {
     **{f"a step walking on {ground} over MuJoCo's own on a rigid floor": (0.42, False) for ground in ("sand_loose", "foam45", "grass")},
     "train/policy_steps_per_s": (12000, True),
     "physics steps/s of 16384 walking robots on soft ground over MuJoCo Warp's on a rigid floor": (2.8, True),
-    "robots_16384/walking_policy_steps_per_s": (12e6, True),
-    "robots_16384/memory_per_robot": (12288, False),
-    "train_16384/policy_steps_per_s": (3.5e6, True),
+    "the same of 16384 whose feet alone stand on it": (2.8, True),
+    **{f"robots_16384{name}/walking_policy_steps_per_s": (12e6, True) for name in SHELLS},
+    **{f"robots_16384{name}/memory_per_robot": (12288, False) for name in SHELLS},
+    **{f"train_16384{name}/policy_steps_per_s": (3.5e6, True) for name in SHELLS},
     "walk_from_nothing/seconds": (12, False),
 }
 # Rows of the history, and whether more is better. Ratios are in it too.

@@ -363,8 +363,8 @@ int web_move(const float *action, const float command[3]) {
         }
         env_part(&web.all, &web.call, 0, k, 0, floor, web.env_scratch);
     }
-    const TaskStep step = task_end_step(env, &web.task.task, &web.task.robot, env_reading(web.robot),
-                                        env->torque, web.robot->diverged);
+    const TaskStep step = task_end_step(env, &web.task.task, &web.task.robot,
+                                        env_reading(web.robot), env->torque, web.robot->diverged);
     task_observe(env, &web.task.task, &web.task.robot, env_reading(web.robot), NULL,
                  &web.robot->sensors, 0, &view);
     return step.done ? step.cause : TASK_END_time;

@@ -130,13 +130,13 @@ typedef struct {
     Real residual; /* [-] relative */
     int iterations;
     /* ---- of the solution ---- */
-    Real least[BODIES_NEAR];         /* [m] elements less deep do not touch in this step */
-    int listed[BODIES_NEAR];         /* elements in the list, which begins at */
-    int begin[BODIES_NEAR];          /* for each place */
-    int first[BODIES_NEAR + 1];      /* round of a place; those of a place follow each other */
+    Real least[BODIES_NEAR];        /* [m] elements less deep do not touch in this step */
+    int listed[BODIES_NEAR];        /* elements in the list, which begins at */
+    int begin[BODIES_NEAR];         /* for each place */
+    int first[BODIES_NEAR + 1];     /* round of a place; those of a place follow each other */
     uint8_t place[BODIES_ROUNDS];   /* of a round */
     uint16_t list[BODIES_ELEMENTS]; /* numbers of elements */
-    Rim rim[BODIES_NEAR];            /* of surfaces with listed elements, on ground with LAW_HEAP */
+    Rim rim[BODIES_NEAR];           /* of surfaces with listed elements, on ground with LAW_HEAP */
     int active; /* rows of bodies with listed elements; P and W of others are 0 */
     uint8_t active_row[BODIES_ROWS];
     Real part[BODIES_ROUNDS][BODIES_SUMS];

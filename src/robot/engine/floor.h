@@ -18,7 +18,7 @@
 
 /* Working data. */
 typedef struct EngineFloor {
-    int count;                                         /* bodies near the ground */
+    int count;                                     /* bodies near the ground */
     int body[ENGINE_BODIES];                       /* [count] their numbers */
     Real position[ENGINE_BODIES][3];               /* [m] from the base */
     Real jacobian[ENGINE_BODIES][ENGINE_CHAIN][6]; /* J^T by place */
@@ -27,8 +27,8 @@ typedef struct EngineFloor {
     Real twist[ENGINE_BODIES][6];        /* J qvel, then J qacc */
     Real twist_change[ENGINE_BODIES][6]; /* J times the change of qacc */
     Real wrench[ENGINE_BODIES][6];       /* [N, N m] of the ground, about the body's origin */
-    int points;                              /* that touch */
-    EngineIndex of[ROBOT_FLOOR_POINTS];      /* number of a point's body in `body` */
+    int points;                          /* that touch */
+    EngineIndex of[ROBOT_FLOOR_POINTS];  /* number of a point's body in `body` */
     /* Four edges of each point, as in EngineContact. */
     Real edge[4 * ROBOT_FLOOR_POINTS][6];
     Real reference[4 * ROBOT_FLOOR_POINTS];

@@ -24,10 +24,10 @@ typedef struct {
 
 /* Working data. */
 typedef struct {
-    int count;                                     /* bodies near the ground */
+    int count;                                 /* bodies near the ground */
     int body[ENGINE_BODIES];                   /* [count] their numbers */
     Real half[ENGINE_BODIES][ENGINE_CHAIN][6]; /* J^T, then L^-T J^T */
-    Real factor[ENGINE_DOFS][ENGINE_STRIDE];       /* as in EngineWork */
+    Real factor[ENGINE_DOFS][ENGINE_STRIDE];   /* as in EngineWork */
     Real inverse[ENGINE_DOFS];
 } EngineShells;
 
