@@ -178,7 +178,8 @@ WARP_FN void env_shells_leave(const EnvsArrays *all, long robot, int near) {
     for (int b = setup->feet; b < setup->bodies; b++) {
         if (!(near >> (b - setup->feet) & 1)) {
             const BodiesMemory memory = env_body_memory(all, robot, b);
-            bodies_leave(&memory, setup->sole[b].elements);
+            bodies_leave(&memory, bodies_memory_numbers(setup->sole[b].elements,
+                                                        all->shells.ground.worn != NULL));
         }
     }
 }

@@ -701,15 +701,14 @@ TEAM_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advan
     team_sync();
 }
 
-/* A surface far from the ground forgets. */
-WARP_FN void bodies_leave(const BodiesMemory *memory, int elements) {
+/* A surface far from the ground forgets the numbers of bodies_memory_numbers. */
+WARP_FN void bodies_leave(const BodiesMemory *memory, int numbers) {
     const int touched = memory->body[BODIES_TOUCHED] > 0;
-    const int worn = memory->worn != NULL;
     lanes_sync(); /* all lanes have read it */
     if (touched) {
         EACH_LANE(l) {
             LANE_ROLLED
-            for (int n = LANE(l); n < bodies_memory_numbers(elements, worn); n += LANES) {
+            for (int n = LANE(l); n < numbers; n += LANES) {
                 memory->element[n] = 0;
             }
         }

@@ -224,7 +224,7 @@ static MildStatus put_setup(const MildBatch *batch, const BodiesSetup *setup, Mi
 MildStatus batch_bodies_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
                                       MildError *error) {
     const int feet = batch->shape.feet;
-    BodiesSetup setup;
+    BodiesSetup setup = {.feet = 0};
     MaterialNumbers *table =
         material_table(batch->device, batch->pitch + feet, batch->width + feet,
                        batch->shape.soles - feet, materials, count, &batch->curves, error);

@@ -71,7 +71,7 @@ WARP_FN void bodies_find(const BodiesCall *call, long robot) {
             near |= 1 << (b - setup->feet);
         } else if (call->advance) {
             const BodiesMemory memory = bodies_memory_at(call, robot, b);
-            bodies_leave(&memory, setup->sole[b].elements);
+            bodies_leave(&memory, bodies_memory_numbers(setup->sole[b].elements, 1));
         }
     }
     EACH_LANE(l) {

@@ -50,7 +50,7 @@ MaterialNumbers *material_table(int device, const double *pitch, const double *w
                                 const MildMaterial *materials, int count, int *curves,
                                 MildError *error) {
     const size_t bytes = (size_t)((count + 1) * soles) * sizeof(MaterialNumbers);
-    MaterialNumbers *numbers = malloc(bytes);
+    MaterialNumbers *numbers = calloc(1, bytes);
     MildStatus status = MILD_OK;
     if (!numbers) {
         mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
