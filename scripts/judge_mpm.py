@@ -314,7 +314,7 @@ def friction_of(args, manifest, family, every):
     if args.friction:
         return args.friction
     key = FITS[family]
-    case = case_of(args, key.split("/")[0], every[key])
+    case = case_of(args, key, every[key])
     fit = manifest.rows.setdefault("fits", {}).setdefault(key, {"grains": grains_force(args, key, case), "tried": []})
     tried = fit["tried"]
 
@@ -363,12 +363,12 @@ def make_bed(args, family, case, friction, seed):
     return Bed(args, case.sole, voxels, 2500 * solid_of(args, family), friction, plate, seed)
 
 
-def case_of(args, family, text):
-    return Case(text, args.edge * args.run.FAMILIES[family]["grain"])
+def case_of(args, key, text):
+    return Case(text, args.edge * args.run.FAMILIES[key.split("/")[0]]["grain"])
 
 
 def run_case(args, manifest, key, text, friction):
-    family, case = key.split("/")[0], case_of(args, key.split("/")[0], text)
+    family, case = key.split("/")[0], case_of(args, key, text)
     row = manifest.rows.setdefault(key, {"case": text, "seeds": args.seed_text, "friction": friction, "beds": {}})
     options = [word for name, value in args.run.FAMILIES[family].items() for word in (f"--{name}", str(value))]
     manifest.rows[family] = {"solid": [solid_of(args, family)], "options": options}

@@ -15,7 +15,7 @@ start() {
         >"$name.out" 2>"$name.err" </dev/null &
     runner=$!
     for ((i = 0; i < 600; i++)); do
-        address=$(sed -n 's/^mild drive: sa01 at \([0-9.]*:[0-9]*\);.*/\1/p' "$name.err" 2>/dev/null)
+        address=$(sed -n 's/^mild drive: [a-z0-9]* at \([0-9.]*:[0-9]*\);.*/\1/p' "$name.err" 2>/dev/null)
         [ -n "$address" ] && return
         sleep 0.05
     done
@@ -144,6 +144,13 @@ ended 2
 grep -q 'mild drive: damped: no state for' dead.err || fail "dead: $(cat dead.err)"
 holds dead.json end 'x == "damped"'
 holds dead.json damps 'x > 50'
+
+# a robot whose shanks are in the ground walks on: its base alone, or its tilt, is a fall
+start go1 --robot go1 --command 0.4,0,0
+robot go1 --robot go1 --ground sand_loose --seconds 2 || fail "the robot of go1"
+ended 0
+holds go1_robot.json fallen 'x == "false"'
+holds go1_robot.json way_x_m 'x > 0.5'
 
 # the runner dies: the robot damps itself after 0.1 s of its own time
 start silent --command 0.3,0,0

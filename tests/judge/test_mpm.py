@@ -155,7 +155,16 @@ def mistakes_are_one_line(folder):
     assert not (folder / "new").exists()
 
 
+def plates_are_half_a_grain_wider():
+    args = types.SimpleNamespace(edge=0.5, run=RUN)
+    every = mpm.cases(RUN)
+    for key, grain in (("sand/square100", 0.005), ("fine/strip-tilt15", 0.0025)):
+        without, wide = Case(every[key]).sole.outline, mpm.case_of(args, key, every[key]).sole.outline
+        assert np.allclose(np.ptp(wide, 0) - np.ptp(without, 0), grain, atol=1e-9), key
+
+
 if __name__ == "__main__":
+    plates_are_half_a_grain_wider()
     plates_are_closed_and_have_their_volume()
     boxes_are_those_of_grains()
     a_plate_goes_its_way()

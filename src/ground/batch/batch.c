@@ -177,6 +177,8 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
 }
 
 MildBatch *mild_batch_create(const MildBatchDef *def, MildError *error) {
+    MildError own = {0};
+    error = error ? error : &own; /* says which status */
     if (check_def(def, error) != MILD_OK) {
         return NULL;
     }
