@@ -701,8 +701,8 @@ static int open_arrays(void) {
     all->map_origin = calloc(2, sizeof *all->map_origin);
     all->reset = calloc(2, 1);
     all->rigid = all->reset ? all->reset + 1 : NULL;
-    float *block = contact->position =
-        calloc((3 + 9 + 6 + 6) * feet + 36 * feet * feet + 1, sizeof *block);
+    const size_t triangle = (size_t)contact_triangle(6 * (int)feet, 0); /* A */
+    float *block = contact->position = calloc((3 + 9 + 6 + 6) * feet + triangle + 1, sizeof *block);
     contact->foot = calloc(feet, sizeof *contact->foot);
     web.hills = calloc((size_t)WEB_HILLS * WEB_HILLS, sizeof *web.hills);
     if (!all->env || !web.robot || !web.env_scratch || !all->material || !all->map_origin ||
@@ -714,7 +714,7 @@ static int open_arrays(void) {
     contact->velocity = contact->rotation + 9 * feet;
     contact->free_velocity = contact->velocity + 6 * feet;
     contact->inverse_inertia = contact->free_velocity + 6 * feet;
-    contact->height = contact->inverse_inertia + 36 * feet * feet;
+    contact->height = contact->inverse_inertia + triangle;
     all->shells.setup = &web.setup;
     all->shells.near = &web.near;
     all->shells.held = &web.held;

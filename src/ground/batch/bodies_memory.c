@@ -3,19 +3,11 @@
 #include "ground/batch/bodies_batch.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 #include "device/device.h"
 #include "ground/batch/bodies.h"
+#include "ground/batch/element_memory.h"
 #include "ground/inside.h"
-
-/* The numbers of an ElementMemory, in its order, as arrays of a foot. */
-enum { ELEMENT_NUMBERS = sizeof(ElementMemory) / sizeof(Real) };
-#define MEMORY_ARRAYS(of)                                                                          \
-    {                                                                                              \
-        (of).depth_max, (of).middle, (of).front_speed, (of).drift, (of).pending_x, (of).pending_y, \
-            (of).held_x, (of).held_y, (of).held_stiffness                                          \
-    }
 
 /* The state of bodies.h for a material of ground/state.h. */
 static int state_of(int32_t material) {
@@ -36,17 +28,10 @@ static int32_t material_of(int state) {
  * the first step finds them the same, the body was at the origin. */
 static void surface_load(const MildGround *ground, int f, const BodiesMemory *to) {
     const Memory of = mild_inside_memory(ground, f);
-    const double *const all[ELEMENT_NUMBERS] = MEMORY_ARRAYS(of);
     const int uneven = ground->uneven[f];
     for (int e = 0; e < ground->elements[f]; e++) {
         float *at = to->element + e;
-        float own[ELEMENT_NUMBERS];
-        ElementMemory element;
-        for (int n = 0; n < ELEMENT_NUMBERS; n++) {
-            own[n] = (float)all[n][e];
-        }
-        memcpy(&element, own, sizeof element);
-        contact_record(at, to->next, &element);
+        element_load(&of, e, at, to->next);
         to->worn[e] = (float)of.worn[e];
         const int there = uneven && of.material[e] != MATERIAL_NONE;
         at[BODIES_PLANE * to->next] = there ? (float)of.plane[e] : CONTACT_NO_PLANE;
@@ -62,18 +47,12 @@ static void surface_load(const MildGround *ground, int f, const BodiesMemory *to
 /* The other way. has_plane: bool, the ground of the batch is uneven. */
 static void surface_store(const BodiesMemory *from, int has_plane, MildGround *ground, int f) {
     const Memory of = mild_inside_memory(ground, f);
-    double *const all[ELEMENT_NUMBERS] = MEMORY_ARRAYS(of);
     const float *last = from->body;
     const int uneven = has_plane && last[BODIES_STEPPED] > 0.0f;
     int touched = 0;
     for (int e = 0; e < ground->elements[f]; e++) {
         const float *at = from->element + e;
-        const ElementMemory element = contact_recall(at, from->next);
-        float own[ELEMENT_NUMBERS];
-        memcpy(own, &element, sizeof own);
-        for (int n = 0; n < ELEMENT_NUMBERS; n++) {
-            all[n][e] = (double)own[n];
-        }
+        element_store(at, from->next, &of, e);
         of.worn[e] = (double)from->worn[e];
         of.material[e] = material_of((int)at[BODIES_STATE * from->next]);
         of.share[e] = (double)at[BODIES_SHARE * from->next];

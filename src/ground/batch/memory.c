@@ -7,6 +7,7 @@
 #include "device/device.h"
 #include "ground/batch/bodies_batch.h"
 #include "ground/batch/contact.h"
+#include "ground/batch/element_memory.h"
 #include "ground/inside.h"
 
 enum { MEMORY_ROBOTS = 256 }; /* copied at once */
@@ -32,14 +33,6 @@ MildStatus batch_memory_open(BatchArrays *arrays, const BatchShape *shape, int d
     arrays->worn = arrays->memory && worn ? arrays->memory + numbers : NULL;
     return arrays->memory ? MILD_OK : MILD_ERROR_MEMORY;
 }
-
-/* The numbers of an ElementMemory, in its order, as arrays of a foot. */
-enum { ELEMENT_NUMBERS = sizeof(ElementMemory) / sizeof(Real) };
-#define MEMORY_ARRAYS(of)                                                                          \
-    {                                                                                              \
-        (of).depth_max, (of).middle, (of).front_speed, (of).drift, (of).pending_x, (of).pending_y, \
-            (of).held_x, (of).held_y, (of).held_stiffness                                          \
-    }
 
 /* Number n of a foot's elements, or with a map of what follows them. */
 static float *numbers_at(const BatchShape *shape, float *memory, int n, int foot) {
@@ -79,15 +72,8 @@ void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *m
     }
     for (int f = 0; f < shape->feet; f++) {
         const Memory of = mild_inside_memory(ground, f);
-        const double *const all[ELEMENT_NUMBERS] = MEMORY_ARRAYS(of);
         for (int e = 0; e < shape->elements[f]; e++) {
-            float own[ELEMENT_NUMBERS];
-            ElementMemory element;
-            for (int n = 0; n < ELEMENT_NUMBERS; n++) {
-                own[n] = (float)all[n][e];
-            }
-            memcpy(&element, own, sizeof element);
-            contact_record(numbers_at(shape, memory, 0, f) + e, places(shape), &element);
+            element_load(&of, e, numbers_at(shape, memory, 0, f) + e, places(shape));
             if (worn) {
                 worn[f * shape->stride + e] = (float)of.worn[e];
             }
@@ -128,16 +114,9 @@ static void ground_remember(const BatchShape *shape, const MapView *map, float *
     mild_ground_reset(ground);
     for (int f = 0; f < shape->feet; f++) {
         const Memory of = mild_inside_memory(ground, f);
-        double *const all[ELEMENT_NUMBERS] = MEMORY_ARRAYS(of);
         int loaded = 0;
         for (int e = 0; e < shape->elements[f]; e++) {
-            const ElementMemory element =
-                contact_recall(numbers_at(shape, memory, 0, f) + e, places(shape));
-            float own[ELEMENT_NUMBERS];
-            memcpy(own, &element, sizeof own);
-            for (int n = 0; n < ELEMENT_NUMBERS; n++) {
-                all[n][e] = (double)own[n];
-            }
+            element_store(numbers_at(shape, memory, 0, f) + e, places(shape), &of, e);
             of.worn[e] = worn ? (double)worn[f * shape->stride + e] : 0.0;
             of.material[e] = of.depth_max[e] > 0.0 ? 0 : MATERIAL_NONE;
             loaded += of.depth_max[e] > 0.0;
