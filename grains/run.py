@@ -59,7 +59,7 @@ def outline(robot, section):
 
 
 DISC, SQUARE, STRIP = "disc:0.12", "rect:0.1,0.1", "rect:0.12,0.06"
-BALL60, BALL100, BALL160 = "sphere:0.03", "sphere:0.05", "sphere:0.08"
+BALL60, BALL80, BALL100, BALL120, BALL160, BALL170 = (f"sphere:{r}" for r in (0.03, 0.04, 0.05, 0.06, 0.08, 0.085))
 SA01, G1, GO1 = outline("sa01", "foot.left"), outline("g1", "foot.left"), "sphere:0.023"
 
 
@@ -119,6 +119,10 @@ BLOCKS = [
               deep("strip-drag80", STRIP, 0.08, "drag:0.03@0.05")]),
     ("sand", [f"square100-tilt22 {SQUARE} 22 {press(0.01)}", f"strip-tilt22 {STRIP} 22 {press(0.01)}",
               f"disc120-tilt15 {DISC} 15 {press(0.012)}"]),  # predicted in docs/grains.md before they were made
+    ("sand", [f"ball120 {BALL120} 0 {press(0.018)}"]),  # these four, too
+    ("slick", [f"ball120 {BALL120} 0 {press(0.018)}"]),
+    ("wide", [f"ball170 {BALL170} 0 {press(0.02)}"]),
+    ("fine", [f"ball80 {BALL80} 0 {press(0.012)}"]),
 ]
 
 
