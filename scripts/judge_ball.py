@@ -7,9 +7,9 @@ the ball, beside the grains. Nothing is fitted to a ball.
 
 u: depth of a square, d: of the rim's plane, b: the rim's radius, e: distance to the rim (docs/model.md, section 23), T = tan(alpha)/nu:
 
-    as it is     p = kappa d + (k0 - kappa) T e
-    complete     p = kappa max(d, T e) + (k0 - kappa) T e: what a plate has when its heap is just complete, k0 T e, where d is less
-    no walls     as complete, and squares steeper than 60 degrees are ground inside the rim like all others"""
+    as it was    p = kappa d + (k0 - kappa) T e, until 2026-11-26
+    as it is     p = kappa max(d, T e) + (k0 - kappa) T e: what a plate has when its heap is just complete, k0 T e, where d is less
+    no walls     as it is, and squares steeper than 60 degrees are ground inside the rim like all others"""
 import argparse
 import math
 import pathlib
@@ -23,7 +23,7 @@ from judge_entries import GroundEntry
 from judge_tilt import ELEMENT, ROOT, deep, fitted_law
 
 SQUARE = 0.001  # [m]
-FORMS = ("as it is", "complete", "no walls")
+FORMS = ("as it was", "as it is", "no walls")
 WALL, LEAST = 0.5, 0.02  # [-] cosine of a wall; share of its load that it keeps
 SHALLOW = 0.4  # [-] of the radius: as deep as no wall is in the ground
 
@@ -45,7 +45,7 @@ def force(form, numbers, ball, depth):
     whole = ball.radius * slope  # u_f in the middle of a disc as wide as the ball
     t = np.minimum(u / whole, 1)
     alone = kappa * u + (k0 - kappa) * whole * (t - t**2 + t**3 / 3)
-    edge = np.maximum(d, slope * e) if form != "as it is" else d
+    edge = np.maximum(d, slope * e) if form != "as it was" else d
     bears = np.minimum(kappa * edge + (k0 - kappa) * slope * e, alone)
     return (ball.area * np.where(inside, np.maximum(bears, LEAST * alone), LEAST * alone)).sum()
 

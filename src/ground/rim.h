@@ -6,10 +6,10 @@
  *
  *     p = kappa d + (k0 - kappa) T e          once the cone is complete; T = tan(alpha)/nu
  * Below a plane sole d is the depth u of the element, and this is its law. A rounded body is deeper
- * inside than at its rim, and ground there bears no more for it. So with u for d an element of a
- * surface carries the share
+ * inside than at its rim, and ground there bears no more for it than under a plate whose heap is
+ * just complete, u = T e. So an element of a surface carries the share
  *
- *     c = (kappa d + (k0 - kappa) T e)/(kappa u + (k0 - kappa) P(u)),  at most 1
+ *     c = (kappa max(d, T e) + (k0 - kappa) T e)/(kappa u + (k0 - kappa) P(u)),  at most 1
  * of its load (share.h). The rim is found from moments of the elements in the ground, weighted by
  * projected area. The plane of least squares through the depths, u ~ mean + g (x - mean), says how
  * the body leans, and what is left of them, v, how round it is: over a paraboloid v is uniform
@@ -130,7 +130,7 @@ MILD_HD Real rim_bears(const Rim *rim, const Law *law, Real width, Real x, Real 
     const Real v = (u - d + RIM_MEAN * RIM_FLAT) / (rim->height + RIM_FLAT);
     const Real inside = 1 - REAL_SQRT(1 - real_min(real_max(v, 0), 1));
     const Real heap = law->cone_depth * (inside * rim->breadth / (RIM_RADIUS * width));
-    const Real bears = law->line_stiffness * real_max(d, 0) + law->flat_stiffness * heap;
+    const Real bears = law->line_stiffness * real_max(d, heap) + law->flat_stiffness * heap;
     return down >= RIM_STEEP ? bears : 0;
 }
 

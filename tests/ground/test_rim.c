@@ -108,7 +108,7 @@ static double sphere_force(const MildMaterial *m, double radius, double depth) {
         const double t = fmin(u / (slope * radius), 1.0);
         const double whole =
             kappa * u + (k0 - kappa) * slope * radius * (t - t * t + t * t * t / 3);
-        const double bears = kappa * fmax(rim, 0.0) + (k0 - kappa) * heap;
+        const double bears = kappa * fmax(rim, heap) + (k0 - kappa) * heap;
         const double pressure = n < 0.5 ? 0.02 * whole : fmin(bears, whole);
         force += pressure * n;
     }
