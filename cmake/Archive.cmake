@@ -1,5 +1,5 @@
 # cmake -DARCHIVE= -DAR= -DNM= -DOBJCOPY= -DPREFIX= -P Archive.cmake -- OBJECT...: an archive of the objects, in which global symbols
-# outside the interface (mild_...) get the prefix, so that they meet nobody else's.
+# outside the interface (mild_...) get the prefix, so that they meet nobody else's. With -DALL=ON the interface gets it, too.
 set(objects "")
 set(own OFF)
 math(EXPR last "${CMAKE_ARGC} - 1")
@@ -25,7 +25,7 @@ set(renames "")
 foreach(line ${lines})
   string(REGEX REPLACE "^\n|  *[A-Z] $" "" symbol "${line}")
   string(STRIP "${symbol}" symbol)
-  if(NOT symbol MATCHES "^mild_")
+  if(ALL OR NOT symbol MATCHES "^mild_")
     string(APPEND renames "${symbol} ${PREFIX}${symbol}\n")
   endif()
 endforeach()

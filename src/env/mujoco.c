@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "env/task/task.h"
+#include "robot/float/float_ground.h"
 #include "robot/phases.h"
 
 typedef struct {
@@ -15,11 +16,12 @@ typedef struct {
     const Robot *robot;
     Pool *pool;
     size_t stride;
-    char *state;         /* [count][stride] TaskEnv and ground memory */
-    TaskStep *result;    /* [count] of the last step */
-    RobotSim **sim;      /* [threads] */
-    RobotPhases *phases; /* [threads] */
-    EnvsStats stats;     /* sums */
+    char *state;          /* [count][stride] TaskEnv and ground memory */
+    TaskStep *result;     /* [count] of the last step */
+    RobotSim **sim;       /* [threads] */
+    RobotPhases *phases;  /* [threads] */
+    RobotGround **single; /* [threads] with task.contact_float, else NULL */
+    EnvsStats stats;      /* sums */
     /* of trials, else NULL */
     const EnvsTrial *trial; /* [count] */
     const MildTerrain *terrain;
@@ -51,7 +53,11 @@ static void destroy(Envs *envs) {
     for (int i = 0; m->sim && i < pool_threads(m->pool); i++) {
         robot_sim_destroy(m->sim[i]);
     }
+    for (int i = 0; m->single && i < pool_threads(m->pool); i++) {
+        float_ground_destroy(m->single[i]);
+    }
     free(m->sim);
+    free(m->single);
     free(m->phases);
     free(m->result);
     free(m->state);
@@ -64,9 +70,11 @@ static MildStatus open_arrays(Mujoco *m, MildError *error) {
     m->state = aligned_alloc(64, count * m->stride);
     m->result = calloc(count, sizeof *m->result);
     m->sim = calloc(threads, sizeof(RobotSim *));
+    m->single = m->def.contact_float ? calloc(threads, sizeof(RobotGround *)) : NULL;
     m->phases = calloc(threads, sizeof *m->phases);
     m->over = calloc(count, sizeof *m->over);
-    return m->state && m->result && m->sim && m->phases && m->over
+    return m->state && m->result && m->sim && m->phases && m->over &&
+                   (m->single || !m->def.contact_float)
                ? MILD_OK
                : mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory for %d",
                            m->base.count);
@@ -75,7 +83,10 @@ static MildStatus open_arrays(Mujoco *m, MildError *error) {
 static MildStatus open_sims(Mujoco *m, MildError *error) {
     for (int i = 0; i < pool_threads(m->pool); i++) {
         m->sim[i] = robot_sim_create(m->robot, m->def.physics_dt, error);
-        if (!m->sim[i]) {
+        if (m->sim[i] && m->single) {
+            m->single[i] = float_ground_create(m->robot, error);
+        }
+        if (!m->sim[i] || (m->single && !m->single[i])) {
             return error->status;
         }
         robot_sim_time_phases(m->sim[i], &m->phases[i]);
@@ -155,12 +166,13 @@ static void drive(void *context, const TaskEnv *env, RobotSim *sim, double *torq
 }
 
 /* The policy step of an environment; again: bool, a new episode follows where it ends. */
-static TaskStep step_env(const Mujoco *m, int i, RobotSim *sim, int again, const EnvsView *view) {
+static TaskStep step_env(const Mujoco *m, int i, int thread, int again, const EnvsView *view) {
+    RobotSim *sim = m->sim[thread];
     const size_t steps = (size_t)m->base.physics_steps;
     const float *action = m->step->action + (size_t)i * (size_t)m->shape.actions;
     Sampling sampling = {m, i, m->sample ? m->sample + (size_t)i * steps : NULL};
     const TaskDrive driven = {drive, &sampling};
-    robot_sim_set_ground(sim, m->ground ? &m->ground[i] : NULL);
+    robot_sim_set_ground(sim, m->ground ? &m->ground[i] : m->single ? m->single[thread] : NULL);
     const TaskCallback callback = {watch, &sampling, m->drive.torque ? &driven : NULL};
     for (size_t k = 0; m->sample && k < steps; k++) {
         sampling.sample[k].valid = 0;
@@ -180,7 +192,7 @@ static void step_piece(void *context, int piece, int thread) {
         *result = (TaskStep){.valid = 1};
         return;
     }
-    *result = step_env(m, piece, m->sim[thread], !last && !m->trial, &view);
+    *result = step_env(m, piece, thread, !last && !m->trial, &view);
     if (m->trial) {
         m->over[piece] = result->done && !result->timeout;
     } else if (result->done && last) {

@@ -23,9 +23,9 @@ enum { ADVANCE_NUMBERS = 10 };
 /* Bool: the element stays in the ground. Without imprints it lifts off when it rises above the
  * undisturbed surface, with imprints as soon as its unloading line carries no force. m1: depth in
  * the middle of the step. prints: bool. */
-MILD_HD int slot_stays(const Slots *s, int i, double m1, int prints) {
-    const int pressed = (prints != 0) & (s->recovery[i] < 1.0);
-    return (m1 > 0.0) & !(pressed & (m1 <= s->zero_depth[i]));
+MILD_HD int slot_stays(const Slots *s, int i, Real m1, int prints) {
+    const int pressed = (prints != 0) & (s->recovery[i] < 1);
+    return (m1 > 0) & !(pressed & (m1 <= s->zero_depth[i]));
 }
 
 /* A loaded element writes its depth into the ground where it lifts off, less what flows back there,
@@ -77,7 +77,7 @@ static void slot_raise(const Memory *memory, const Slots *s, int i, int e, int c
     const int turns = element_turns(s->entry_speed[i], speed);
     const double peak = turns ? slot_peak(s, i, curves, speed, middle) : middle;
     const double depth = s->virgin_depth[i] + peak - s->yield_depth[i];
-    memory->depth_max[e] = real_max(depth, memory->depth_max[e]); /* of a NaN and a number the number */
+    memory->depth_max[e] = real_max(depth, memory->depth_max[e]); /* not a NaN */
 }
 
 /* The same for all elements of a foot. It is not part of the vector loop, where taking the address
@@ -141,21 +141,21 @@ static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory
 /* The share of the elements of a block that slip has lowered. to: what they remember without it,
  * from number e on. slid: [m] */
 static __attribute__((noinline)) void block_slip(const Slots *s, const Memory *to, int e,
-                                                 const double *slid) {
+                                                 const Real *slid) {
     const double *depth_max = to->depth_max + e;
     double *worn = to->worn + e;
 #pragma omp simd
     for (int i = 0; i < SLOT_LANES; i++) {
         const Element element = slot_element(s, i);
         const Share share = slot_share(s, i);
-        const double q = real_max(share_slipped(&element, &share, slid[i]), SHARE_LEAST);
-        worn[i] = depth_max[i] > 0.0 ? 1.0 - q : 0.0;
+        const Real q = real_max(share_slipped(&element, &share, slid[i]), SHARE_LEAST);
+        worn[i] = depth_max[i] > 0 ? 1 - q : 0;
     }
 }
 
 /* The same where fresh penetration raises it, too. fresh: [m] */
 static __attribute__((noinline)) void block_wear(const Slots *s, const Memory *to, int e,
-                                                 const double *slid, const double *fresh) {
+                                                 const Real *slid, const Real *fresh) {
     double *depth_max = to->depth_max + e;
     double *front_speed = to->front_speed + e;
     double *worn = to->worn + e;
@@ -164,7 +164,7 @@ static __attribute__((noinline)) void block_wear(const Slots *s, const Memory *t
         const Element element = slot_element(s, i);
         const Share share = slot_share(s, i);
         ElementMemory after = {.depth_max = depth_max[i], .front_speed = front_speed[i]};
-        worn[i] = element_wear(&element, &share, &after, slid[i], fresh[i], depth_max[i] > 0.0);
+        worn[i] = element_wear(&element, &share, &after, slid[i], fresh[i], depth_max[i] > 0);
         depth_max[i] = after.depth_max;
         front_speed[i] = after.front_speed;
     }
@@ -178,12 +178,12 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                             const Memory *memory, int e, int wears, Lanes count[2]) {
     const Memory to = *memory; /* copies keep the addresses in registers */
     const Motion motion = a->motion;
-    const double dt = a->dt;
-    const double rate = 1.0 / dt;
+    const Real dt = (Real)a->dt;
+    const Real rate = 1 / dt;
     const int prints = a->imprints != NULL;
     for (const Slots *s = first; s < end; s++, e += SLOT_LANES) {
         Lanes slid, fresh;
-        double changes = 0.0; /* 1 for each that slips, or more than all of these if it regains */
+        Real changes = 0; /* 1 for each that slips, or more than all of these if it regains */
 #pragma omp simd reduction(+ : changes)
         for (int i = 0; i < SLOT_LANES; i++) {
             const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
@@ -197,11 +197,11 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                 slid[i] =
                     element_slide(&element, &share, &before, &after, dt, s->iz[i], v.x, v.y, stays);
                 fresh[i] = element_fresh(&element, dt, v.descent);
-                const double slips = share_slips(&share, slid[i]) ? 1.0 : 0.0;
-                const double most =
-                    share_regains(&share, slid[i], fresh[i]) ? SLOT_LANES + 1.0 : slips;
-                changes += stays ? most : 0.0;
-                to.worn[e + i] = stays ? 1.0 - share.carry : 0.0;
+                const Real slips = share_slips(&share, slid[i]) ? REAL(1) : 0;
+                const Real most =
+                    share_regains(&share, slid[i], fresh[i]) ? SLOT_LANES + REAL(1) : slips;
+                changes += stays ? most : 0;
+                to.worn[e + i] = stays ? 1 - share.carry : 0;
             }
             to.depth_max[e + i] = after.depth_max;
             to.middle[e + i] = after.middle;
@@ -212,12 +212,12 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
             to.held_x[e + i] = after.held_x;
             to.held_y[e + i] = after.held_y;
             to.held_stiffness[e + i] = after.held_stiffness;
-            count[0][i] += stays ? 1.0 : 0.0;
-            count[1][i] += stays && element_turns(element.entry_speed, v.descent) ? 1.0 : 0.0;
+            count[0][i] += stays ? REAL(1) : 0;
+            count[1][i] += stays && element_turns(element.entry_speed, v.descent) ? REAL(1) : 0;
         }
         if (wears && changes > SLOT_LANES) {
             block_wear(s, memory, e, slid, fresh);
-        } else if (wears && changes > 0.0) {
+        } else if (wears && changes > 0) {
             block_slip(s, memory, e, slid);
         }
     }
@@ -286,8 +286,8 @@ static __attribute__((noinline)) int foot_unlisted(const Advance *a, const Memor
 }
 
 /* Takes lane i of what blocks_remember has stored. wears: bool, shares do. */
-static void memory_take(const Memory *memory, int e, const Lanes after[ADVANCE_NUMBERS], int i,
-                        int wears) {
+static void memory_take(const Memory *memory, int e, double after[ADVANCE_NUMBERS][SLOT_LANES],
+                        int i, int wears) {
     memory->depth_max[e] = after[0][i];
     memory->middle[e] = after[1][i];
     memory->front_speed[e] = after[2][i];
@@ -306,7 +306,8 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
     const FootScratch *foot = a->foot;
     const int faces = foot->faces;
     const int32_t lifted_material = a->imprints || foot->uneven ? MATERIAL_FREE : MATERIAL_NONE;
-    Lanes after[ADVANCE_NUMBERS], stays[2]; /* of a block */
+    double after[ADVANCE_NUMBERS][SLOT_LANES]; /* of a block */
+    Lanes stays[2];
     const Memory block = {.depth_max = after[0],
                           .middle = after[1],
                           .front_speed = after[2],
@@ -339,7 +340,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         const double middle = s->depth[i] + a->dt / 2 * v.descent;
         const int lifted = !(stays[0][i] > 0.0);
         const int carried = memory->material[e] >= 0;
-        memory_take(memory, e, (const Lanes *)after, i, foot->curves & LAW_HEAP);
+        memory_take(memory, e, after, i, foot->curves & LAW_HEAP);
         if (!lifted) {
             slot_raise(memory, s, i, e, foot->curves, v.descent, middle);
         }
@@ -384,7 +385,7 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                                  .motion = foot_motion(foot, result->velocity + 6 * f),
                                  .dt = input->dt,
                                  .height = terrain->height};
-        const int all = foot->active == foot->elements && ground->tiles == 0 && !foot->faces;
+        const int all = slots_are_whole(foot) && ground->tiles == 0 && !foot->faces;
         if (all) {
             ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material);
         } else {

@@ -22,22 +22,24 @@ void slots_elastic(const FootScratch *foot) {
 /* Cosine between the sole and the ground under each slot, into `lean`. Level ground has one for
  * all, without a root for each. */
 static void slots_lean(const FootScratch *foot) {
-    const double side = foot->arm[3][2] < 0.0 ? -1.0 : 1.0; /* the face that looks down */
-    const double up[3] = {side * foot->arm[3][0], side * foot->arm[3][1], side * foot->arm[3][2]};
-    const double level = real_min(real_max(up[2], SHARE_LEAN), 1.0);
+    const Real side = foot->arm[3][2] < 0 ? REAL(-1) : REAL(1); /* the face that looks down */
+    const Real up[3] = {side * (Real)foot->arm[3][0], side * (Real)foot->arm[3][1],
+                        side * (Real)foot->arm[3][2]};
+    const Real level = real_min(real_max(up[2], SHARE_LEAN), 1);
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
         for (int i = 0; i < SLOT_LANES; i++) {
             s->lean[i] = level;
         }
         for (int i = 0; foot->uneven && i < SLOT_LANES; i++) {
-            const double gx = s->slope_x[i], gy = s->slope_y[i];
-            const double along = up[2] - gx * up[0] - gy * up[1];
-            s->lean[i] = real_min(real_max(along / sqrt(1.0 + gx * gx + gy * gy), SHARE_LEAN), 1.0);
+            const Real gx = s->slope_x[i], gy = s->slope_y[i];
+            const Real along = up[2] - gx * up[0] - gy * up[1];
+            s->lean[i] =
+                real_min(real_max(along / REAL_SQRT(1 + gx * gx + gy * gy), SHARE_LEAN), 1);
         }
     }
 }
 
-MILD_HD void slot_carry(Slots *s, int i, double dt, double rate) {
+MILD_HD void slot_carry(Slots *s, int i, Real dt, Real rate) {
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
     element.law.cone_begin = s->cone_begin[i];

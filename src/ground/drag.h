@@ -6,12 +6,12 @@
 #include "ground/scratch.h"
 
 /* Calls element_drag. curves, kind: constants in a vector loop. */
-MILD_HD void slot_drag(Slots *s, int i, double dt, const Motion *now, const Motion *free,
-                       int curves, int kind) {
-    const double slower = slot_velocity(s, i, now, kind).descent;
-    const double faster = slot_velocity(s, i, free, kind).descent;
+MILD_HD void slot_drag(Slots *s, int i, Real dt, const Motion *now, const Motion *free, int curves,
+                       int kind) {
+    const Real slower = slot_velocity(s, i, now, kind).descent;
+    const Real faster = slot_velocity(s, i, free, kind).descent;
     Element element = slot_loaded(s, i, curves);
-    element_drag(&element, curves, dt, real_max(faster - slower, 0.0));
+    element_drag(&element, curves, dt, real_max(faster - slower, 0));
     s->entry_speed[i] = element.entry_speed;
     s->stop_drag[i] = element.stop_drag;
     s->stop_growth[i] = element.stop_growth;

@@ -35,7 +35,7 @@ void energy_begin(MildScratch *scratch) {
     for (int f = 0; f < scratch->feet; f++) {
         FootScratch *foot = &scratch->foot[f];
         if (foot->turned) {
-            for (Slots *s = foot->slot; s < foot->slot + foot->padded / SLOT_LANES; s++) {
+            for (Slots *s = foot->slot; s < slots_all(foot); s++) {
                 memset(s->turn_x, 0, sizeof s->turn_x);
                 memset(s->turn_y, 0, sizeof s->turn_y);
             }

@@ -12,8 +12,8 @@ typedef double FacesMoments[3][3][10];
 static void faces_moments(const FootScratch *foot, FacesMoments M) {
     static const int place[3][6] = {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 6, 7, 8}, {0, 3, 1, 8, 9, 4}};
     const Slots *s = foot->slot;
-    const double *const at[3] = {s->x, s->y, s->z};
-    const double *const h[3][3] = {
+    const Real *const at[3] = {s->x, s->y, s->z};
+    const Real *const h[3][3] = {
         {s->hxx, s->hxy, s->hxz}, {s->hyx, s->hyy, s->hyz}, {s->hzx, s->hzy, s->hzz}};
     for (int row = 0; row < 3; row++) {
         for (int pair = 0; pair < 3; pair++) {

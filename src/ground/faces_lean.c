@@ -17,12 +17,12 @@ static RimPoint point_of(const FootScratch *foot, int i) {
 
 /* [N] share_ahead of slot i, whose law is `element`. down: downward part of its outward normal. */
 static double ahead_of(const FootScratch *foot, int i, const Element *element, const Motion *now,
-                       double down) {
+                       Real down) {
     const Slots *s = slot_block(foot, i);
     const int e = foot->element[i], l = i % SLOT_LANES;
     const SlotVelocity v = slot_velocity(s, l, now, SLOT_UNEVEN | SLOT_FACES);
     const Share share = slot_share(s, l);
-    double n[3] = {0.0, 0.0, -down};
+    Real n[3] = {0, 0, -down};
     for (int k = 0; k < 3; k++) {
         n[0] += foot->face[k][e] * foot->arm[k + 1][0];
         n[1] += foot->face[k][e] * foot->arm[k + 1][1];
@@ -61,7 +61,7 @@ void soles_lean(const FootScratch *foot) {
 }
 
 void faces_lean(const FootScratch *foot, const Motion *now) {
-    double sums[RIM_SUMS] = {0.0};
+    Real sums[RIM_SUMS] = {0};
     for (int i = 0; i < foot->active; i++) {
         const RimPoint at = point_of(foot, i);
         const double area = foot->area[foot->element[i]] * foot->pitch * foot->pitch;

@@ -34,7 +34,7 @@ static void slots_take(const FootScratch *foot, const Memory *all) {
 }
 
 void slots_gather(const FootScratch *foot, const Memory *memory) {
-    if (foot->active == foot->elements) {
+    if (slots_are_whole(foot)) {
         slots_take(foot, memory);
     } else {
         for (int i = 0; i < foot->active; i++) {
@@ -70,9 +70,9 @@ void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory,
 }
 
 void slot_scale(Slots *s, int i, double share) {
-    double *const scaled[] = {s->flat_stiffness, s->line_stiffness, s->mass_rate,     s->drag_rate,
-                              s->bed_stiffness,  s->power_force,    s->elastic_force, s->exit_drag,
-                              s->entry_drag,     s->strength,       s->k_drift,       s->b_drift};
+    Real *const scaled[] = {s->flat_stiffness, s->line_stiffness, s->mass_rate,     s->drag_rate,
+                            s->bed_stiffness,  s->power_force,    s->elastic_force, s->exit_drag,
+                            s->entry_drag,     s->strength,       s->k_drift,       s->b_drift};
     for (size_t k = 0; k < sizeof scaled / sizeof *scaled; k++) {
         scaled[k][i] *= share;
     }
@@ -106,7 +106,7 @@ void slots_imprints(const FootScratch *foot, const Imprints *imprints, const Mem
 }
 
 void slots_level(const FootScratch *foot) {
-    for (Slots *s = foot->slot; s < foot->slot + foot->padded / SLOT_LANES; s++) {
+    for (Slots *s = foot->slot; s < slots_all(foot); s++) {
         memset(s->slope_x, 0, sizeof s->slope_x);
         memset(s->slope_y, 0, sizeof s->slope_y);
     }

@@ -155,8 +155,12 @@ double map_surface(const MildMap *map, double x, double y, double slope[2]) {
     }
     GridPlace a = grid_place((x - grid->x0) * grid->inverse_x, grid->columns, grid->repeats);
     GridPlace b = grid_place((y - grid->y0) * grid->inverse_y, grid->rows, grid->repeats);
-    return cell_surface(map->height, grid->columns, a, b, grid->inverse_x, grid->inverse_y, height,
-                        slope);
+    Real own[2] = {(Real)slope[0], (Real)slope[1]};
+    height = cell_surface(map->height, grid->columns, a, b, grid->inverse_x, grid->inverse_y,
+                          height, own);
+    slope[0] = own[0];
+    slope[1] = own[1];
+    return height;
 }
 
 Label map_label(const MildMap *map, double x, double y) {

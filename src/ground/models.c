@@ -64,7 +64,7 @@ Share share_of(const MildMaterial *material, double pitch, double width) {
     const int slips = row->slips && material->slip_length > 0.0;
     const int sides = slips && material->grip > 0.0 && width > 0.0;
     const double weight = material->phi * material->rho * SHARE_GRAVITY; /* [N/m^3] */
-    return (Share){.projects = row->merged,
+    return (Share){.projects = (Real)row->merged,
                    .slip_rate = slips ? 1.0 / material->slip_length : 0.0,
                    .regain_rate = row->merged || slips
                                       ? 1.0 / fmax(material->regain_length, REGAIN_LEAST)

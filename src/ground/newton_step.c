@@ -1,11 +1,16 @@
 /* The equations of a contact step, and plain Newton steps. */
 #include "ground/newton_step.h"
 
-#define NEWTON_GROWTH 8.0     /* [-] a larger elimination factor calls for a row exchange */
-#define NEWTON_HALVINGS 6     /* of a step that does not lower the residual */
-#define NEWTON_NEAR 1e-5      /* [-] a residual below this share of the impulse may be rounding */
-#define NEWTON_ROUNDING 6e-14 /* [-] rounding of V^ + A P: 256 units in the last place */
-#define NEWTON_LENGTH 4e-16   /* [m] rounding of the elements' depths */
+#define NEWTON_GROWTH 8.0 /* [-] a larger elimination factor calls for a row exchange */
+#define NEWTON_HALVINGS 6 /* of a step that does not lower the residual */
+#define NEWTON_NEAR 1e-5  /* [-] a residual below this share of the impulse may be rounding */
+#ifdef MILD_REAL_FLOAT
+#define NEWTON_ROUNDING 3e-5 /* [-] rounding of V^ + A P: 256 units in the last place */
+#define NEWTON_LENGTH 2e-9   /* [m] rounding of the elements' depths */
+#else
+#define NEWTON_ROUNDING 6e-14
+#define NEWTON_LENGTH 4e-16
+#endif
 
 /* ---- rows ---- */
 

@@ -10,7 +10,7 @@
 #include "ground/impulse.h"
 #include "ground/moments.h"
 
-MILD_HD void slot_normal(Slots *s, int i, double dt, const Motion *motion, int kind, int curves,
+MILD_HD void slot_normal(Slots *s, int i, Real dt, const Motion *motion, int kind, int curves,
                          int stops) {
     const Element element = slot_loaded(s, i, curves);
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
@@ -22,7 +22,7 @@ MILD_HD void slot_normal(Slots *s, int i, double dt, const Motion *motion, int k
 }
 
 /* Normal impulses and their derivatives. */
-MILD_HD void foot_normal(const FootScratch *foot, double dt, const Motion *m, int kind, int curves,
+MILD_HD void foot_normal(const FootScratch *foot, Real dt, const Motion *m, int kind, int curves,
                          int stops) {
     const Motion motion = *m;
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
@@ -34,11 +34,11 @@ MILD_HD void foot_normal(const FootScratch *foot, double dt, const Motion *m, in
 }
 
 /* The way of a slot's element over which the law has a power of the depth. */
-MILD_HD void slot_way(const Slots *s, int i, double dt, const Motion *motion, int curve,
-                      double *begin, double *way) {
+MILD_HD void slot_way(const Slots *s, int i, Real dt, const Motion *motion, int curve, Real *begin,
+                      Real *way) {
     const SlotVelocity v = slot_velocity(s, i, motion, SLOT_UNEVEN | SLOT_FACES);
-    const double middle = s->depth[i] + dt / 2 * v.descent;
-    const double from = real_max(s->middle[i], 0);
+    const Real middle = s->depth[i] + dt / 2 * v.descent;
+    const Real from = real_max(s->middle[i], 0);
     *begin = curve == LAW_POWER ? s->virgin_depth[i] : from;
     *way =
         curve == LAW_POWER ? real_max(middle - s->yield_depth[i], 0) : real_max(middle, 0) - from;
@@ -46,11 +46,11 @@ MILD_HD void slot_way(const Slots *s, int i, double dt, const Motion *motion, in
 
 /* Sets what element_powers gives a slot for a curve, LAW_POWER or LAW_ELASTIC: Slots.power or
  * elastic. The same loops do it for both, and for the three powers of each. */
-static __attribute__((noinline)) void foot_powers(const FootScratch *foot, double dt,
-                                                  const Motion *m, int curve) {
+static __attribute__((noinline)) void foot_powers(const FootScratch *foot, Real dt, const Motion *m,
+                                                  int curve) {
     const Motion motion = *m;
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
-        const double *exponent = curve == LAW_POWER ? s->power_exponent : s->elastic_exponent;
+        const Real *exponent = curve == LAW_POWER ? s->power_exponent : s->elastic_exponent;
         Lanes *power = curve == LAW_POWER ? s->power : s->elastic;
         Lanes begin, way, grown[3];
 #pragma omp simd
@@ -71,7 +71,7 @@ static __attribute__((noinline)) void foot_powers(const FootScratch *foot, doubl
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
             const PowerOver grows = {grown[0][i], grown[1][i], grown[2][i]};
-            const double force =
+            const Real force =
                 curve == LAW_POWER ? s->power_force[i] * s->carry[i] : s->elastic_force[i];
             const PowerWay over = power_way_of(force, exponent[i], begin[i], way[i], &grows);
             power[0][i] = over.mean;
@@ -83,7 +83,7 @@ static __attribute__((noinline)) void foot_powers(const FootScratch *foot, doubl
 /* Picks the loop compiled for the curves and the slope of the ground under the foot. On level
  * ground the slopes are 0, so a loop for uneven ground does for both where a second one would gain
  * little. */
-static void foot_normals(const FootScratch *foot, double dt, const Motion *motion) {
+static void foot_normals(const FootScratch *foot, Real dt, const Motion *motion) {
     switch (foot_variant(foot)) {
     case LAW_LINE: foot_normal(foot, dt, motion, 1, LAW_LINE, 0); return;
     case LAW_CONE:
@@ -122,23 +122,23 @@ MILD_HD void block_friction(Slots *s, const Motion *motion, int kind, int held, 
 #pragma omp simd
     for (int i = 0; i < SLOT_LANES; i++) {
         const SlotVelocity v = slot_velocity(s, i, motion, kind);
-        const double iz = s->iz[i];
-        const double k = s->hzz[i];
+        const Real iz = s->iz[i];
+        const Real k = s->hzz[i];
         const Element element = slot_element(s, i);
-        const double bound = held ? s->bound[i] : friction_bound(&element, iz);
-        const double mu = held ? 0.0 : element.mu;
+        const Real bound = held ? s->bound[i] : friction_bound(&element, iz);
+        const Real mu = held ? 0 : element.mu;
         const Friction friction = turned ? friction_turned(&element, bound, mu, v.x, v.y)
                                          : friction_impulse(&element, bound, mu, v.x, v.y);
-        double ix = friction.x;
-        double iy = friction.y;
-        double hxz = friction.rise_x * k;
-        double hyz = friction.rise_y * k;
-        double hxx = friction.fall_xx;
-        double hxy = friction.fall_xy;
-        double hyy = friction.fall_yy;
+        Real ix = friction.x;
+        Real iy = friction.y;
+        Real hxz = friction.rise_x * k;
+        Real hyz = friction.rise_y * k;
+        Real hxx = friction.fall_xx;
+        Real hxy = friction.fall_xy;
+        Real hyy = friction.fall_yy;
         if (kind & SLOT_UNEVEN) {
-            const double gx = -s->slope_x[i];
-            const double gy = -s->slope_y[i];
+            const Real gx = -s->slope_x[i];
+            const Real gy = -s->slope_y[i];
             ix += gx * iz;
             iy += gy * iz;
             hxz += k * gx;

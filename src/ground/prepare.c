@@ -12,7 +12,7 @@
 #include "ground/models.h"
 #include "ground/terrain.h"
 
-MILD_HD void slot_begin(Slots *s, int i, double dt, double rate, const Motion *motion, int curves,
+MILD_HD void slot_begin(Slots *s, int i, Real dt, Real rate, const Motion *motion, int curves,
                         int kind) {
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
     const ElementMemory memory = slot_memory(s, i);
@@ -25,10 +25,10 @@ MILD_HD void slot_begin(Slots *s, int i, double dt, double rate, const Motion *m
 }
 
 /* Calls element_begin for all slots. On level ground the slopes are 0. */
-MILD_HD void slots_begin(const FootScratch *foot, double dt, const Motion *now, int curves,
+MILD_HD void slots_begin(const FootScratch *foot, Real dt, const Motion *now, int curves,
                          int faces) {
     const Motion motion = *now;
-    const double rate = 1.0 / dt;
+    const Real rate = 1 / dt;
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
@@ -40,7 +40,7 @@ MILD_HD void slots_begin(const FootScratch *foot, double dt, const Motion *now, 
 /* Picks the loop compiled for the curves of the ground under the foot. A line is a cone of which
  * all numbers but the line's are 0, and a cone is a heap that begins at the surface and carries all
  * of its load: one loop does for the three. */
-static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
+static void foot_begin(const FootScratch *foot, Real dt, const Motion *now) {
     switch (foot_variant(foot)) {
     case LAW_LINE:
     case LAW_CONE:
@@ -53,26 +53,26 @@ static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
 
 /* Bool: an element on ground with drag will enter virgin ground in this step by more than the
  * elastic travel. */
-static int slots_sink(const FootScratch *foot, double dt) {
-    Lanes sinking = {0.0};
-    double sum = 0.0;
+static int slots_sink(const FootScratch *foot, Real dt) {
+    Lanes sinking = {0};
+    Real sum = 0;
     for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
             const Element element = slot_element(s, i);
-            const double way = element_virgin_way(&element, dt, element.entry_speed);
-            sinking[i] += element.entry_drag > 0.0 ? way : 0.0;
+            const Real way = element_virgin_way(&element, dt, element.entry_speed);
+            sinking[i] += element.entry_drag > 0 ? way : 0;
         }
     }
     for (int i = 0; i < SLOT_LANES; i++) {
         sum += sinking[i];
     }
-    return sum > 0.0;
+    return sum > 0;
 }
 
 /* Calls element_drag for all slots. The loop for cones and heaps, which have drag, is in vectors;
  * that for surfaces and ground with a power beside them is not. */
-static void slots_drag(const FootScratch *foot, double dt, const Motion *now, const Motion *free) {
+static void slots_drag(const FootScratch *foot, Real dt, const Motion *now, const Motion *free) {
     const Motion before = *now;
     const Motion after = *free;
     if (foot_variant(foot) & ~(LAW_CONE | LAW_HEAP)) {
@@ -89,7 +89,7 @@ static void slots_drag(const FootScratch *foot, double dt, const Motion *now, co
 
 /* Clears what slots_drag and slots_explicit wrote in the step before. */
 static void slots_clear(const FootScratch *foot) {
-    for (Slots *s = foot->slot; s < foot->slot + foot->padded / SLOT_LANES; s++) {
+    for (Slots *s = foot->slot; s < slots_all(foot); s++) {
         memset(s->stop_drag, 0, sizeof s->stop_drag);
         memset(s->stop_growth, 0, sizeof s->stop_growth);
         memset(s->explicit_impulse, 0, sizeof s->explicit_impulse);

@@ -76,7 +76,7 @@ static int terrain_only(const MildTerrain *terrain, int model) {
 
 /* The face of an element of a surface. */
 static Plate face_plate(const FootScratch *foot, int e) {
-    double normal[3];
+    Real normal[3];
     for (int k = 0; k < 3; k++) {
         normal[k] = foot->arm[1][k] * foot->face[0][e] + foot->arm[2][k] * foot->face[1][e] +
                     foot->arm[3][k] * foot->face[2][e];
@@ -109,7 +109,9 @@ static __attribute__((noinline)) void foot_resist(const FootScratch *foot,
                                                   const MildTerrain *terrain, int model, double dt,
                                                   const double *rotation, const Motion *now,
                                                   int in_space) {
-    const Plate plate = plate_of(rotation);
+    const Real turn[9] = {
+        [2] = (Real)rotation[2], [5] = (Real)rotation[5], [8] = (Real)rotation[8]};
+    const Plate plate = plate_of(turn);
     if (!terrain_only(terrain, model) || foot->faces) {
         foot_resist_some(foot, terrain, model, dt, &plate, now, in_space);
     } else if (in_space) {

@@ -101,9 +101,10 @@ static void foot_set_bounds(FootScratch *foot) {
 static void foot_set_slots(FootScratch *foot, double **at, int32_t *integers) {
     foot->slot = (Slots *)take(at, (int)SLOT_NUMBERS * foot->padded);
     foot->element = integers;
-    foot->slot_material = integers + foot->padded;
-    foot->slot_holder = integers + 2 * foot->padded;
-    for (int i = 0; i < foot->padded; i++) {
+    const int slots = SLOTS_PADDED(foot->padded);
+    foot->slot_material = integers + slots;
+    foot->slot_holder = integers + 2 * slots;
+    for (int i = 0; i < slots; i++) {
         foot->slot_material[i] = MATERIAL_NONE;
         foot->slot_holder[i] = -1;
     }
@@ -125,7 +126,7 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
     int slots = 0;
     size_t doubles = 0;
     for (int f = 0; f < feet; f++) {
-        slots += sole_padded(soles[f]);
+        slots += SLOTS_PADDED(sole_padded(soles[f]));
         doubles += foot_doubles(soles[f]);
     }
     const size_t rows = 2 * 6 * (size_t)feet * ROW_LANES;
@@ -154,7 +155,7 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
         foot_set_bounds(foot);
         scratch->faces |= soles[f]->faces << f;
         foot_set_slots(foot, &at, integers);
-        integers += 3 * foot->padded;
+        integers += 3 * SLOTS_PADDED(foot->padded);
     }
     return scratch;
 }

@@ -73,14 +73,15 @@ typedef struct FootScratch {
     int32_t *element; /* [active] element of each slot, ascending */
 
     /* Law of each slot: foot_laws, foot_prepare. */
-    int curves;             /* LawCurve bits of the terrain's materials */
-    int nan;                /* bool: a material of the terrain contains NaN */
-    int turned;             /* bool: turn_x or turn_y may be nonzero */
-    int stops;              /* bool: stop_drag, stop_growth or explicit_impulse may be nonzero */
-    int32_t *slot_material; /* [padded] material whose law the slot has, encoded as in Memory */
-    int32_t *slot_holder;   /* [padded] element whose law it has, for merged cones */
+    int curves; /* LawCurve bits of the terrain's materials */
+    int nan;    /* bool: a material of the terrain contains NaN */
+    int turned; /* bool: turn_x or turn_y may be nonzero */
+    int stops;  /* bool: stop_drag, stop_growth or explicit_impulse may be nonzero */
+    int32_t
+        *slot_material;   /* [SLOTS_PADDED] material whose law the slot has, encoded as in Memory */
+    int32_t *slot_holder; /* [SLOTS_PADDED] element whose law it has, for merged cones */
     DerivedLaw derived[MILD_MATERIALS_MAX];
-    Slots *slot; /* [padded/SLOT_LANES] blocks of slots */
+    Slots *slot; /* [SLOTS_PADDED(padded)/SLOT_LANES] blocks */
 
     /* Output of mild_scratch_elements, arrays [padded], see MildElements. */
     double *normal;    /* [N] */
@@ -126,6 +127,24 @@ static inline Slots *slots_end(const FootScratch *foot) {
     return foot->slot + (foot->active + SLOT_LANES - 1) / SLOT_LANES;
 }
 
+/* Slots of `padded` elements: arrays over elements are padded to VECTOR_LANES, half a block of
+ * floats. */
+#if SLOT_BYTES / 4 > VECTOR_LANES && defined(MILD_REAL_FLOAT)
+#define SLOTS_PADDED(padded) (((padded) + SLOT_LANES - 1) / SLOT_LANES * SLOT_LANES)
+#else
+#define SLOTS_PADDED(padded) (padded)
+#endif
+
+/* One past the last block, in use or not. */
+static inline Slots *slots_all(const FootScratch *foot) {
+    return foot->slot + SLOTS_PADDED(foot->padded) / SLOT_LANES;
+}
+
+/* Bool: all elements are listed, and their arrays are whole blocks. */
+static inline int slots_are_whole(const FootScratch *foot) {
+    return foot->active == foot->elements && SLOTS_PADDED(foot->padded) == foot->padded;
+}
+
 /* The block of slot i. Its lane there is i % SLOT_LANES. */
 static inline Slots *slot_block(const FootScratch *foot, int i) {
     return foot->slot + i / SLOT_LANES;
@@ -141,7 +160,18 @@ static inline int foot_variant(const FootScratch *foot) {
 Motion foot_motion(const FootScratch *foot, const double *V);
 /* The same in the loops of a pass. */
 static inline Motion foot_moves(const FootScratch *foot, const double *V) {
+#ifdef MILD_REAL_FLOAT
+    Real arm[3][3], twist[6];
+    for (int k = 0; k < 9; k++) {
+        arm[k / 3][k % 3] = (Real)foot->arm[k / 3][k % 3];
+    }
+    for (int k = 0; k < 6; k++) {
+        twist[k] = (Real)V[k];
+    }
+    Motion motion = motion_of(arm, twist);
+#else
     Motion motion = motion_of(foot->arm, V);
+#endif
     if (foot->faces) {
         const double *q = foot->arm[3];
         const double x = V[5] * q[1], y = V[3] * q[2]; /* first: pass.c fuses these products */

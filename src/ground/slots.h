@@ -4,7 +4,9 @@
  * whole blocks. The law of the padding has no force at any depth.
  *
  * A loop over blocks has a loop over lanes inside, which is one vector. All numbers of a block lie
- * at constant distances, so one address serves them all. */
+ * at constant distances, so one address serves them all.
+ *
+ * With MILD_REAL_FLOAT a block has twice as many slots (src/robot/float). */
 #ifndef MILD_GROUND_SLOTS_H
 #define MILD_GROUND_SLOTS_H
 
@@ -14,14 +16,15 @@
 /* Lanes of a vector. MILD_WIDEST_VECTORS: the compiler takes the widest that there are
  * (src/CMakeLists.txt). */
 #if defined(__AVX512F__) && defined(MILD_WIDEST_VECTORS)
-#define SLOT_LANES 8
+#define SLOT_BYTES 64
 #elif defined(__AVX__)
-#define SLOT_LANES 4
+#define SLOT_BYTES 32
 #else
-#define SLOT_LANES 2
+#define SLOT_BYTES 16
 #endif
+#define SLOT_LANES (SLOT_BYTES / (int)sizeof(Real))
 
-typedef double Lanes[SLOT_LANES];
+typedef Real Lanes[SLOT_LANES];
 
 /* A block of slots. Meaning and symbol are at the field of the same name of Element or
  * ElementMemory. Given here are the unit and the function that writes the numbers. */
@@ -134,9 +137,9 @@ typedef struct {
 #define SLOT_NUMBERS (sizeof(Slots) / sizeof(Lanes))
 
 /* The lanes of one number in a register, for sums over all blocks. */
-typedef double LaneVector __attribute__((vector_size(sizeof(Lanes)), may_alias));
+typedef Real LaneVector __attribute__((vector_size(sizeof(Lanes)), may_alias));
 
-MILD_HD LaneVector lanes_load(const double *lanes) {
+MILD_HD LaneVector lanes_load(const Real *lanes) {
     return *(const LaneVector *)lanes;
 }
 
@@ -145,7 +148,7 @@ MILD_HD LaneVector lanes_load(const double *lanes) {
  * does not use. */
 MILD_HD Element slot_element(const Slots *s, int i) {
     return (Element){
-        .law = {LAW_NUMBERS(SLOT_LAW_LOAD)},
+        .law = {LAW_NUMBERS(SLOT_LAW_LOAD).cone_begin = 0},
         .recovery = s->recovery[i],
         .mu = s->mu[i],
         .k_drift = s->k_drift[i],
@@ -237,8 +240,8 @@ MILD_HD void slot_store(Slots *s, int i, const Element *e) {
 /* Velocity of a slot's element, x and y along the world's axes. `descent` is the speed w at which
  * its depth u = h0(x, y) - z grows: w = slope . v_xy - v_z. */
 typedef struct {
-    double x, y;    /* [m/s] */
-    double descent; /* [m/s] */
+    Real x, y;    /* [m/s] */
+    Real descent; /* [m/s] */
 } SlotVelocity;
 
 /* What a loop over slots has to count with. */

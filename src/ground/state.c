@@ -8,7 +8,7 @@
 
 #define MEMORY_DOUBLES 13 /* nine of ElementMemory, the wear, three of the plane */
 
-_Static_assert(sizeof(ElementMemory) == 9 * sizeof(double),
+_Static_assert(sizeof(ElementMemory) == 9 * sizeof(Real),
                "another number of ElementMemory also goes to Memory and here, to slots.h (Slots, "
                "slot_memory), gather.c, advance.c, and to batch/contact.inc (recall, "
                "record) and batch/memory.c");

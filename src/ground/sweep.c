@@ -84,7 +84,7 @@ static double element_normal(const Slots *s, int i, int curves, double dt, doubl
 /* Paper eq 13: predict, correct by the continuity error, project onto the friction disc. Within the
  * disc the law is I = t of friction.h, so v = (dt f - I)/(dt^2 k + c), which is a compliance in
  * series with G. On the rim I has the direction of t, which any scale of t gives. */
-static void element_friction(Slots *s, int i, const double *v, const double *delta, double G) {
+static void element_friction(Slots *s, int i, const Real *v, const double *delta, double G) {
     double radius = s->mu[i] * s->iz[i] + s->drift_bound[i];     /* r [N s] */
     double stiff = s->hold_stiffness[i] + FRICTION_LAG * radius; /* dt^2 k + c [kg] */
     double compliance = stiff > 0.0 ? 1.0 / stiff : 0.0;         /* [1/kg] */
@@ -106,7 +106,7 @@ static void element_implicit(const Sweep *sweep, const FootScratch *foot, Slots 
     const double fx = s->fx[i];
     const double fy = s->fy[i];
     s->iz[i] = element_normal(s, i, foot->curves, sweep->dt, w, G[2]);
-    double d[2] = {v[0], v[1]}; /* what friction opposes */
+    Real d[2] = {(Real)v[0], (Real)v[1]}; /* what friction opposes */
     if (foot->turned) {
         const Element element = slot_element(s, i);
         friction_turn(&element, &d[0], &d[1]);

@@ -113,14 +113,17 @@ void robot_sim_store(const RobotSim *sim, RobotState *state);
 int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
                    const MildTerrain *terrain, MildGround *ground);
 
-/* Who computes the wrenches of soft ground on the feet in the place of libmild. */
+/* Who computes the wrenches of soft ground on the feet in the place of libmild: another ground, or
+ * libmild's own in float (float_ground.h). */
 typedef struct {
     /* Writes force, torque and depths of each foot, means over the step, to *result, which is 0.
-     * Returns 0, or 1 when it cannot: the step has then diverged. */
-    int (*solve)(void *self, const MildContactInput *input, MildContactResult *result);
+     * `ground` is the memory that robot_sim_step was given, and may be advanced. Returns 0, or 1
+     * when it cannot: the step has then diverged. */
+    int (*solve)(void *self, const MildTerrain *terrain, MildGround *ground,
+                 const MildContactInput *input, MildContactResult *result);
     void *self;
 } RobotGround;
-/* From now on; NULL: libmild again. Shells do not feel such ground. *ground is borrowed. */
+/* From now on; NULL: libmild again. Shells do not feel another ground. *ground is borrowed. */
 void robot_sim_set_ground(RobotSim *sim, const RobotGround *ground);
 
 /* Valid after load or step, in the order of RobotState. */

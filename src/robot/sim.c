@@ -363,7 +363,7 @@ static void report_forces(RobotSim *sim) {
 static int stand(RobotSim *sim, const MildTerrain *terrain, MildGround *ground) {
     if (sim->other) {
         memset(&sim->contact, 0, sizeof sim->contact);
-        return sim->other->solve(sim->other->self, &sim->input, &sim->contact);
+        return sim->other->solve(sim->other->self, terrain, ground, &sim->input, &sim->contact);
     }
     mild_ground_solve(ground, terrain, &sim->input, sim->scratch, &sim->contact);
     mild_ground_advance(ground, terrain, &sim->input, sim->scratch, &sim->contact);

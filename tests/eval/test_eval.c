@@ -537,7 +537,10 @@ typedef struct {
     int left; /* answers; below 0: any number */
 } Failing;
 
-static int fail_to_answer(void *self, const MildContactInput *input, MildContactResult *result) {
+static int fail_to_answer(void *self, const MildTerrain *terrain, MildGround *ground,
+                          const MildContactInput *input, MildContactResult *result) {
+    (void)terrain;
+    (void)ground;
     Failing *failing = self;
     memset(result->foot, 0, sizeof *result->foot * (size_t)input->feet);
     return failing->left >= 0 && failing->left-- == 0;

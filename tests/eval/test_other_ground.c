@@ -187,7 +187,8 @@ static void check_dialogue(const char *how, int bodies, uint32_t rows, int quest
             double asked[QUESTION];
             MildContactResult result;
             memset(&result, 0x55, sizeof result);
-            assert_int_equal(ground[trial].solve(ground[trial].self, &input, &result), 0);
+            assert_int_equal(ground[trial].solve(ground[trial].self, NULL, NULL, &input, &result),
+                             0);
             wanted_question(&input, bodies, (k + 1) * DT, trial, asked);
             compare(&result, asked, k);
         }
@@ -221,7 +222,7 @@ TEST(signals_interrupt) {
     const RobotGround *ground = other_ground_of(other);
     MildContactResult result = {0};
     setitimer(ITIMER_REAL, &often, NULL);
-    const int failed = ground->solve(ground->self, &input, &result);
+    const int failed = ground->solve(ground->self, NULL, NULL, &input, &result);
     MildError error = {0};
     const MildStatus status = other_ground_stop(other, MILD_OK, &error);
     setitimer(ITIMER_REAL, &never, NULL);
@@ -242,10 +243,10 @@ static void check_end(const char *how, const char *names) {
     MildError error = {0};
     const int late = strcmp(how, "late") == 0;
     if (!late) {
-        assert_int_equal(ground[1].solve(ground[1].self, &input, &result), 0);
+        assert_int_equal(ground[1].solve(ground[1].self, NULL, NULL, &input, &result), 0);
     }
     for (int k = 0; k < 2; k++) {
-        assert_int_equal(ground[1].solve(ground[1].self, &input, &result), 1);
+        assert_int_equal(ground[1].solve(ground[1].self, NULL, NULL, &input, &result), 1);
     }
     assert_int_equal(other_ground_stop(other, MILD_OK, &error), MILD_ERROR_IO);
     assert_error(&error, MILD_ERROR_IO, names);
@@ -278,7 +279,7 @@ TEST(a_child_has_its_own_ends_only) {
     const MildContactInput input = make_input(inertia, FEET);
     for (int trial = 0; trial < 3; trial++) {
         MildContactResult result = {0};
-        assert_int_equal(ground[trial].solve(ground[trial].self, &input, &result), 0);
+        assert_int_equal(ground[trial].solve(ground[trial].self, NULL, NULL, &input, &result), 0);
         expect_near("descriptors", result.foot[0].force[0], before, 0);
     }
     stop_well(other);

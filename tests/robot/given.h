@@ -15,7 +15,10 @@ typedef struct {
     double free_velocity[6 * ROBOT_FEET_MAX];                     /* V_free */
 } Given;
 
-static inline int given_solve(void *self, const MildContactInput *in, MildContactResult *result) {
+static inline int given_solve(void *self, const MildTerrain *terrain, MildGround *ground,
+                              const MildContactInput *in, MildContactResult *result) {
+    (void)terrain;
+    (void)ground;
     Given *given = self;
     const size_t rows = 6 * (size_t)in->feet;
     given->feet = in->feet;

@@ -4,6 +4,7 @@
 
 #include "env/task/task_def.h"
 
+#include "robot/float/float_ground.h"
 #include "robot/robot.h"
 
 #define KP_MAX 500.0 /* [N m/rad] */
@@ -206,6 +207,9 @@ const MildField task_fields[] = {
         "implicit equations; explicit, its Algorithm 1 to the letter"),
     T(contact_tolerance, D, 1, 1e-12, 0.1,
       "[-] relative residual at which the contact solver stops"),
+    T(contact_float, B, 1, 0, 1,
+      "[bool] on a CPU the ground's loops over elements compute in float, in vectors of twice as "
+      "many; needs solver = newton and contact_tolerance of at least 1e-4. A GPU always does"),
     T(contact_iterations, MILD_FIELD_INT, 1, 1, 100000,
       "[-] most iterations of the contact solver per step"),
 };
@@ -441,6 +445,13 @@ MildStatus task_def_check(const TaskDef *def, MildError *error) {
         return mild_fail(error, MILD_ERROR_RANGE,
                          "task.physics_dt: %g s is not a whole multiple of %g", TASK_PERIOD,
                          def->physics_dt);
+    }
+    if (status == MILD_OK && def->contact_float &&
+        (def->solver != MILD_SOLVER_NEWTON || def->contact_tolerance < FLOAT_GROUND_TOLERANCE)) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "task.contact_float: float converges to a residual of %g, by newton; give "
+                         "task.solver = newton and task.contact_tolerance = %g or more",
+                         FLOAT_GROUND_TOLERANCE, FLOAT_GROUND_TOLERANCE);
     }
     if (status == MILD_OK && !def->shells_stand &&
         (def->may_lie || def->start != TASK_START_STAND)) {

@@ -176,6 +176,7 @@ typedef struct {
     double assist_decay;      /* [s] */
     int solver;               /* MildSolver */
     double contact_tolerance; /* [-] relative residual at which the contact solver stops */
+    int contact_float;        /* bool: on a CPU the ground steps in float (float_ground.h) */
     int contact_iterations;   /* [-] hard bound of its work */
     RewardDef reward;
     RandomizeDef randomize;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "robot/float/float_ground.h"
 
 enum { TIGHT, LOOSE, ENGINE, CASES };
 
@@ -15,6 +16,7 @@ typedef struct {
     RobotSim *soft, *rigid;
     mjData *engine;
     MildGround *ground;
+    RobotGround *single;    /* steps `ground` in float; NULL: not asked for */
     ReplayStop stop[CASES]; /* of ours */
     double iterations[CASES], unconverged[CASES];
     int bad;
@@ -61,6 +63,7 @@ static double play_soft(Player *player, const ReplayPeriod *period, int which) {
     memcpy(player->ground, period->ground, mild_ground_size(period->ground));
     robot_sim_set_solver(sim, MILD_SOLVER_NEWTON, player->stop[which].tolerance,
                          player->stop[which].iterations);
+    robot_sim_set_ground(sim, player->stop[which].in_float ? player->single : NULL);
     robot_sim_load(sim, &period->state, &replay->variation);
     double start = clock_seconds();
     for (int s = 0; s < replay->steps; s++) {
@@ -133,11 +136,12 @@ MildStatus replay_time(const Replay *replay, const Robot *robot, ReplayStop loos
     player.soft = robot_sim_create(robot, replay->dt, error);
     player.rigid = robot_sim_create(robot, replay->dt, error);
     player.ground = new_ground(robot);
+    player.single = loose.in_float ? float_ground_create(robot, error) : NULL;
     if (player.rigid) {
         robot_sim_load(player.rigid, &replay->period[0].state, &rigid);
         player.engine = mj_makeData(robot_sim_model(player.rigid));
     }
-    if (!player.soft || !player.engine || !player.ground) {
+    if (!player.soft || !player.engine || !player.ground || (loose.in_float && !player.single)) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "replay: out of memory");
     } else {
         play_all(&player, repeats, sums);
@@ -154,6 +158,7 @@ MildStatus replay_time(const Replay *replay, const Robot *robot, ReplayStop loos
     mj_deleteData(player.engine);
     robot_sim_destroy(player.soft);
     robot_sim_destroy(player.rigid);
+    float_ground_destroy(player.single);
     free(player.ground);
     return status;
 }

@@ -29,6 +29,7 @@ void replay_destroy(Replay *replay); /* may be NULL */
 typedef struct {
     double tolerance;
     int iterations;
+    int in_float; /* bool: on float_ground.h */
 } ReplayStop;
 
 /* Means over all steps, from the least of the repeats of each period [us per physics step]. */

@@ -25,7 +25,8 @@ static void walk_rows(BenchReport *report, const char *ground, const ReplayTimes
 MildStatus bench_walk(const ExperimentDef *def, BenchReport *report, MildError *error) {
     enum { PERIODS = 300, REPEATS = 15 };
     static const char *const grounds[] = {"sand_loose", "foam45", "grass", "rigid"};
-    const ReplayStop loose = {def->task.contact_tolerance, def->task.contact_iterations};
+    const ReplayStop loose = {def->task.contact_tolerance, def->task.contact_iterations,
+                              def->task.contact_float};
     Robot *robot = bench_robot(def, error);
     MildStatus status = robot ? MILD_OK : MILD_ERROR_IO;
     for (size_t g = 0; g < sizeof grounds / sizeof *grounds && status == MILD_OK; g++) {

@@ -98,7 +98,10 @@ static int write_question(const Child *child, const MildContactInput *input, dou
     return (int)(at - out);
 }
 
-static int solve(void *self, const MildContactInput *input, MildContactResult *result) {
+static int solve(void *self, const MildTerrain *terrain, MildGround *ground,
+                 const MildContactInput *input, MildContactResult *result) {
+    (void)terrain;
+    (void)ground;
     Child *child = self;
     double question[HEAD + ROBOT_FEET_MAX * (FOOT + 6 + 36 * ROBOT_FEET_MAX)];
     double answer[ROBOT_FEET_MAX * ANSWER] = {0};
