@@ -262,8 +262,8 @@ static double rim_share(const DenseElement *e, const Find *find) {
     double rim = find->plane[0] + find->plane[1] * find->p[0] + find->plane[2] * find->p[1];
     double high = (u - rim + 5.0 / 9.0 * 2e-4) / (find->round + 2e-4);
     double edge = find->half * (1.0 - sqrt(1.0 - fmin(fmax(high, 0.0), 1.0)));
-    double bears = law->kappa * fmax(rim, 0.0) +
-                   (law->k_pen - law->kappa) * law->full * edge / (radius * find->heap[1]);
+    double heap = law->full * edge / (radius * find->heap[1]);
+    double bears = law->kappa * fmax(rim, heap) + (law->k_pen - law->kappa) * heap;
     double own = law->kappa * u + (law->k_pen - law->kappa) * cone_share(law, u);
     double left = -find->normal[2] >= 0.5 ? bears / own : 0.0;
     return left + (1.0 - left) * law->recovery;
