@@ -6,9 +6,10 @@ add_library(ground_float OBJECT ${ground_sources})
 target_include_directories(ground_float PRIVATE $<TARGET_PROPERTY:layer_ground,INTERFACE_INCLUDE_DIRECTORIES>
   $<TARGET_PROPERTY:layer_base,INTERFACE_INCLUDE_DIRECTORIES>)
 target_compile_definitions(ground_float PRIVATE MILD_REAL_FLOAT)
-target_link_libraries(ground_float PRIVATE mild_options)
-# it reads in double what it keeps in float, as env/batch_host.c
-target_compile_options(ground_float PRIVATE -Wno-float-conversion $<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>)
+# it reads in double what it keeps in float, as env/batch_host.c; after the warnings of mild_options, where clang looks for the last word
+add_library(float_reads_double INTERFACE)
+target_compile_options(float_reads_double INTERFACE -Wno-float-conversion $<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>)
+target_link_libraries(ground_float PRIVATE mild_options float_reads_double)
 set_target_properties(ground_float PROPERTIES POSITION_INDEPENDENT_CODE ON C_VISIBILITY_PRESET hidden)
 set(archive ${CMAKE_BINARY_DIR}/generated/libground_float.a)
 add_custom_command(OUTPUT ${archive}
