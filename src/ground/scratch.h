@@ -142,7 +142,7 @@ static inline Slots *slots_all(const FootScratch *foot) {
 
 /* Bool: all elements are listed, and their arrays are whole blocks. */
 static inline int slots_are_whole(const FootScratch *foot) {
-    return foot->active == foot->elements && SLOTS_PADDED(foot->padded) == foot->padded;
+    return foot->active == foot->elements && foot->padded % SLOT_LANES == 0;
 }
 
 /* The block of slot i. Its lane there is i % SLOT_LANES. */
