@@ -77,7 +77,7 @@ static void slot_raise(const Memory *memory, const Slots *s, int i, int e, int c
     const int turns = element_turns(s->entry_speed[i], speed);
     const double peak = turns ? slot_peak(s, i, curves, speed, middle) : middle;
     const double depth = s->virgin_depth[i] + peak - s->yield_depth[i];
-    memory->depth_max[e] = real_max(depth, memory->depth_max[e]); /* not a NaN */
+    memory->depth_max[e] = real_max(depth, memory->depth_max[e]); /* a NaN changes nothing */
 }
 
 /* The same for all elements of a foot. It is not part of the vector loop, where taking the address

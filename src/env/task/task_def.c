@@ -208,8 +208,9 @@ const MildField task_fields[] = {
     T(contact_tolerance, D, 1, 1e-12, 0.1,
       "[-] relative residual at which the contact solver stops"),
     T(contact_float, B, 1, 0, 1,
-      "[bool] on a CPU the ground's loops over elements compute in float, in vectors of twice as "
-      "many; needs solver = newton and contact_tolerance of at least 1e-4. A GPU always does"),
+      "[bool] training and eval on a CPU compute the ground's loops over elements in float, in "
+      "vectors of twice as many; needs solver = newton and contact_tolerance of at least 1e-4. A "
+      "GPU always does"),
     T(contact_iterations, MILD_FIELD_INT, 1, 1, 100000,
       "[-] most iterations of the contact solver per step"),
 };
