@@ -213,8 +213,8 @@ static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean)
                             .d_log_std = c->d_log_std};
     gpu_surrogate(g->queue.stream, s, c->rows, g->sums);
     const GpuArray none = {0};
-    gpu_bias_backward(g->queue.stream, c->rows, pitch, none, gpu_array_float(s.d_log_std), none,
-                      g->queue.partial, job->beta, g->gradient + g->network.log_std);
+    gpu_sum_columns(&g->queue, c->rows, pitch, none, gpu_array_float(s.d_log_std), none,
+                    g->network.log_std);
     if (c->mirrored > 0) {
         const size_t images = (size_t)c->rows * (size_t)pitch;
         const int observation = g->network.def.observation;
@@ -341,9 +341,12 @@ void gpu_enqueue_gradient(GpuLearner *g, const GpuMinibatch *minibatch) {
                               .mirror_weight =
                                   minibatch->images > 0 ? 1.0f / (float)minibatch->images : 0.0f,
                               .beta = at == 0 ? 0.0f : 1.0f};
+        GpuQueue *q = &g->queue;
+        q->columns.count = 0;
         gather(g, &job);
         actor_half(g, &job);
         critic_half(g, &job);
+        gpu_add_columns(q->stream, q->columns, q->partial, job.beta, g->gradient);
         image += g->chunk.mirrored;
     }
     hide_clock(g);

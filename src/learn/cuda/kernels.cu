@@ -4,10 +4,9 @@
 #include "learn/loss_sample.h"
 #include "learn/noise.h"
 
-#define FOURS 16 /* of columns, of a block in the column sums */
-#define LANES (THREADS / FOURS)
-#define COLUMNS 32             /* of a block that adds up their slices */
-#define SLICE_ROWS (4 * LANES) /* of a slice, at least */
+#define FOURS_MAX 16 /* of columns, of a block in the column sums */
+#define AHEAD 2      /* rows that a thread reads before it works on the first */
+#define COLUMNS 8    /* of a block that adds up their slices; every width is a multiple */
 
 /* ---- numbers of an array ---- */
 
@@ -168,90 +167,113 @@ void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float
                elu, (const Four<float> *)bias, y.at)
 }
 
-/* Block (group of columns, slice of rows): LANES partial sums a column, added in order. A thread
- * has four columns. width: in fours. */
+/* Block (group of columns, slice of rows), [lanes][fours] threads: a thread has four columns of each
+ * lanes-th row. Their sums are added up pairwise. width, fours: in fours. */
 template <class D, class T>
-static __global__ void bias_backward(int rows, int width, const Four<T> *y, const Four<D> *d,
-                                     Four<T> *to, Four<float> *partial) {
-    __shared__ Four<float> part[LANES][FOURS];
-    const int column = (int)(blockIdx.x * FOURS + threadIdx.x), slice = (int)blockIdx.y;
-    const int slices = (int)gridDim.y, end = (int)((int64_t)rows * (slice + 1) / slices);
+static __global__ void bias_backward(int rows, int width, int fours, const Four<T> *y,
+                                     const Four<D> *d, Four<T> *to, Four<float> *partial) {
+    __shared__ Four<float> part[THREADS];
+    const int column = (int)blockIdx.x * fours + (int)threadIdx.x, slice = (int)blockIdx.y;
+    const int slices = (int)gridDim.y, lanes = THREADS / fours, lane = (int)threadIdx.y;
+    const int end = (int)((int64_t)rows * (slice + 1) / slices);
     Four<float> sum = {{0.0f, 0.0f, 0.0f, 0.0f}};
-    for (int r = (int)((int64_t)rows * slice / slices) + (int)threadIdx.y;
-         column < width && r < end; r += LANES) {
-        const int64_t i = (int64_t)r * width + column;
-        const Four<D> own = d[i];
-        Four<T> four;
-        if (y) {
-            four = y[i];
+    for (int r = (int)((int64_t)rows * slice / slices) + lane; column < width && r < end;
+         r += AHEAD * lanes) {
+        Four<D> own[AHEAD] = {}; /* beyond the slice 0, which adds nothing */
+        Four<T> four[AHEAD] = {};
+        for (int n = 0; n < AHEAD && r + n * lanes < end; n++) {
+            const int64_t i = (int64_t)(r + n * lanes) * width + column;
+            own[n] = d[i];
+            if (y) {
+                four[n] = y[i];
+            }
         }
-        for (int k = 0; k < 4; k++) {
-            float x = number_read(own.at[k]);
-            x *= y ? vector_elu_slope(number_read(four.at[k])) : 1.0f;
-            number_write(&four.at[k], x);
-            sum.at[k] += x;
-        }
-        if (to) {
-            to[i] = four;
-        }
-    }
-    part[threadIdx.y][threadIdx.x] = sum;
-    __syncthreads();
-    if (threadIdx.y > 0 || column >= width) {
-        return;
-    }
-    for (int lane = 1; lane < LANES; lane++) {
-        for (int k = 0; k < 4; k++) {
-            sum.at[k] += part[lane][threadIdx.x].at[k];
+        for (int n = 0; n < AHEAD; n++) {
+            for (int k = 0; k < 4; k++) {
+                float x = number_read(own[n].at[k]);
+                x *= y ? vector_elu_slope(number_read(four[n].at[k])) : 1.0f;
+                number_write(&four[n].at[k], x);
+                sum.at[k] += x;
+            }
+            if (to && r + n * lanes < end) {
+                to[(int64_t)(r + n * lanes) * width + column] = four[n];
+            }
         }
     }
-    partial[slice * width + column] = sum;
-}
-
-/* A block has COLUMNS columns; its rows of threads add up a share of the slices each. */
-static __global__ void add_slices(int slices, int width, const float *partial, float beta,
-                                  float *sum) {
-    __shared__ float part[THREADS / COLUMNS][COLUMNS];
-    const int column = (int)(blockIdx.x * COLUMNS + threadIdx.x), shares = THREADS / COLUMNS;
-    float total = 0.0f;
-    for (int slice = (int)threadIdx.y; column < width && slice < slices; slice += shares) {
-        total += partial[slice * width + column];
+    Four<float> *own = part + lane * fours + (int)threadIdx.x;
+    *own = sum;
+    for (int left = lanes, half; left > 1; left = half) {
+        half = (left + 1) / 2;
+        __syncthreads();
+        for (int k = 0; k < 4 && lane + half < left; k++) {
+            own->at[k] += own[half * fours].at[k];
+        }
     }
-    part[threadIdx.y][threadIdx.x] = total;
-    __syncthreads();
-    if (threadIdx.y > 0 || column >= width) {
-        return;
+    if (lane == 0 && column < width) {
+        partial[slice * width + column] = *own;
     }
-    for (int share = 1; share < shares; share++) {
-        total += part[share][threadIdx.x];
-    }
-    sum[column] = beta == 0.0f ? total : sum[column] + total;
 }
 
 template <class D, class T>
-static void launch_bias_backward(cudaStream_t stream, dim3 grid, int rows, int width, GpuArray y,
-                                 GpuArray d, GpuArray to, float *partial) {
+static void launch_bias_backward(cudaStream_t stream, dim3 grid, dim3 block, int rows, int width,
+                                 GpuArray y, GpuArray d, GpuArray to, float *partial) {
     const auto kernel = bias_backward<D, T>;
-    const dim3 block = {FOURS, LANES, 1};
-    LAUNCH(kernel, grid, block, stream, rows, width, (const Four<T> *)y.at, (const Four<D> *)d.at,
-           (Four<T> *)to.at, (Four<float> *)partial);
+    LAUNCH(kernel, grid, block, stream, rows, width, (int)block.x, (const Four<T> *)y.at,
+           (const Four<D> *)d.at, (Four<T> *)to.at, (Four<float> *)partial);
 }
 
-void gpu_bias_backward(cudaStream_t stream, int rows, int width, GpuArray y, GpuArray d,
-                       GpuArray to, float *partial, float beta, float *d_bias) {
-    const int wanted = (rows + SLICE_ROWS - 1) / SLICE_ROWS, fours = width / 4,
+int gpu_bias_backward(cudaStream_t stream, int rows, int width, GpuArray y, GpuArray d, GpuArray to,
+                      float *partial) {
+    const int all = width / 4, fours = all < FOURS_MAX ? all : FOURS_MAX, lanes = THREADS / fours,
+              wanted = (rows + 4 * lanes - 1) / (4 * lanes),
               slices = wanted < GPU_SUM_SLICES ? wanted : GPU_SUM_SLICES;
-    const dim3 grid = {(unsigned)((fours + FOURS - 1) / FOURS), (unsigned)slices, 1};
+    const dim3 grid = {(unsigned)((all + fours - 1) / fours), (unsigned)slices, 1},
+               block = {(unsigned)fours, (unsigned)lanes, 1};
     if (d.bf16) {
-        launch_bias_backward<Bf16, Bf16>(stream, grid, rows, fours, y, d, to, partial);
+        launch_bias_backward<Bf16, Bf16>(stream, grid, block, rows, all, y, d, to, partial);
     } else if (to.bf16) {
-        launch_bias_backward<float, Bf16>(stream, grid, rows, fours, y, d, to, partial);
+        launch_bias_backward<float, Bf16>(stream, grid, block, rows, all, y, d, to, partial);
     } else {
-        launch_bias_backward<float, float>(stream, grid, rows, fours, y, d, to, partial);
+        launch_bias_backward<float, float>(stream, grid, block, rows, all, y, d, to, partial);
     }
-    const dim3 columns = {(unsigned)((width + COLUMNS - 1) / COLUMNS), 1, 1},
-               block = {COLUMNS, THREADS / COLUMNS, 1};
-    LAUNCH(add_slices, columns, block, stream, slices, width, partial, beta, d_bias);
+    return slices;
+}
+
+/* A block has COLUMNS columns of one of the sums, and SHARES threads for each: a thread adds up
+ * every SHARES-th slice, then the first one adds up theirs. */
+static __global__ void add_columns(GpuColumns list, const float *__restrict__ partial, float beta,
+                                   float *gradient) {
+    enum { SHARES = THREADS / COLUMNS };
+    __shared__ float part[THREADS];
+    const int share = (int)threadIdx.x / COLUMNS;
+    int n = 0, column = (int)(blockIdx.x * COLUMNS + threadIdx.x % COLUMNS);
+    while (column >= list.sum[n].width) {
+        column -= list.sum[n++].width;
+    }
+    const GpuColumnSum own = list.sum[n];
+    float total = 0.0f;
+    for (int slice = share; slice < own.slices; slice += SHARES) {
+        total += partial[own.partial + (int64_t)slice * own.width + column];
+    }
+    part[threadIdx.x] = total;
+    __syncthreads();
+    if (share > 0) {
+        return;
+    }
+    for (int k = 1; k < SHARES; k++) {
+        total += part[k * COLUMNS + (int)threadIdx.x];
+    }
+    float *to = gradient + own.to + column;
+    *to = beta == 0.0f ? total : *to + total;
+}
+
+void gpu_add_columns(cudaStream_t stream, GpuColumns list, const float *partial, float beta,
+                     float *gradient) {
+    dim3 grid = {0, 1, 1};
+    for (int n = 0; n < list.count; n++) {
+        grid.x += (unsigned)(list.sum[n].width / COLUMNS);
+    }
+    LAUNCH(add_columns, grid, line, stream, list, partial, beta, gradient);
 }
 
 static __global__ void round_numbers(int64_t count, const float *from, Bf16 *to) {

@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "learn/cuda/array.h"
+#include "learn/network.h"
 
 #define GPU_ACTIONS_MAX 64
 #define GPU_SUM_SLICES 256 /* a column sum adds up at most this many partial sums */
@@ -56,10 +57,24 @@ void gpu_latent_noise(cudaStream_t stream, int rows, int latent, const uint64_t 
 /* ---- layers; widths are pitches, multiples of 8 ---- */
 
 void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float *bias, GpuArray y);
-/* to = d slope(y), of a layer without ELU (y.at NULL) to = d; d_bias = beta d_bias + column sums of
- * to. to.at NULL: only the sums. `to` may be d. partial: [GPU_SUM_SLICES][width]. */
-void gpu_bias_backward(cudaStream_t stream, int rows, int width, GpuArray y, GpuArray d,
-                       GpuArray to, float *partial, float beta, float *d_bias);
+/* to = d slope(y), of a layer without ELU (y.at NULL) to = d. Returns the number of slices of rows
+ * whose column sums of `to` it writes, partial [slices][width], at most GPU_SUM_SLICES. to.at NULL:
+ * only the sums. `to` may be d. */
+int gpu_bias_backward(cudaStream_t stream, int rows, int width, GpuArray y, GpuArray d, GpuArray to,
+                      float *partial);
+/* Column sums of all layers, and of log std. */
+typedef struct {
+    int width, slices;
+    int64_t partial; /* where its [slices][width] begin in the partial sums */
+    int64_t to;      /* where its [width] sums begin in the gradient */
+} GpuColumnSum;
+typedef struct {
+    int count;
+    GpuColumnSum sum[NETWORK_MLPS * MLP_LAYERS_MAX + 1];
+} GpuColumns;
+/* gradient = beta gradient + sums over the slices, where the list says. */
+void gpu_add_columns(cudaStream_t stream, GpuColumns list, const float *partial, float beta,
+                     float *gradient);
 /* Rounds to bfloat16. */
 void gpu_round(cudaStream_t stream, int64_t count, const float *from, GpuArray to);
 

@@ -32,6 +32,19 @@ static int widest_layer(const Network *network) {
     return widest > network->history ? widest : network->history;
 }
 
+/* Columns of all biases and of log std. */
+static int64_t all_columns(const Network *network) {
+    int64_t columns = network->count - network->log_std;
+    for (int i = 0; i < NETWORK_MLPS; i++) {
+        const char *name;
+        const Mlp *mlp = network_mlp(network, i, &name);
+        for (int l = 0; l < mlp->layers; l++) {
+            columns += mlp->layer[l].out;
+        }
+    }
+    return columns;
+}
+
 /* Most images that a run of this many samples of a minibatch can have: it has at most so many
  * chunks of the CPU's, each with as many images as a full one. */
 static int most_images(const Ppo *ppo, int rows) {
@@ -112,7 +125,7 @@ static size_t layout(GpuLearner *g, char *block) {
     g->sums = carve(block, &used, (size_t)(g->sum_blocks * GPU_SUMS) * sizeof *g->sums);
     g->partial = carve(block, &used, (size_t)GPU_PARTS * GPU_MOMENTS * sizeof *g->partial);
     g->queue.partial =
-        carve(block, &used, (size_t)(GPU_SUM_SLICES * widest_layer(n)) * sizeof(float));
+        carve(block, &used, (size_t)(GPU_SUM_SLICES * all_columns(n)) * sizeof(float));
     g->workspace = carve(block, &used, WORKSPACE);
     g->batch.steps = g->ppo->batch.steps;
     g->batch.envs = g->envs;

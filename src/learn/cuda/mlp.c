@@ -1,7 +1,5 @@
 #include "learn/cuda/mlp.h"
 
-#include "learn/cuda/kernels.h"
-
 static cudaDataType_t type_of(GpuArray array) {
     return array.bf16 ? CUDA_R_16BF : CUDA_R_32F;
 }
@@ -36,6 +34,19 @@ float *gpu_mlp_forward(GpuQueue *q, const Mlp *mlp, const float *parameters, int
     return outputs->y[last].at;
 }
 
+void gpu_sum_columns(GpuQueue *q, int rows, int width, GpuArray y, GpuArray d, GpuArray to,
+                     int64_t at) {
+    GpuColumns *columns = &q->columns;
+    int64_t used = 0;
+    if (columns->count > 0) {
+        const GpuColumnSum *before = &columns->sum[columns->count - 1];
+        used = before->partial + (int64_t)before->slices * before->width;
+    }
+    const int slices = gpu_bias_backward(q->stream, rows, width, y, d, to, q->partial + used);
+    columns->sum[columns->count++] =
+        (GpuColumnSum){.width = width, .slices = slices, .partial = used, .to = at};
+}
+
 /* Per layer, with d = dL/d(Wx + b):  dW = d^T x,  db = sum over rows of d,  dx = d W. */
 void gpu_mlp_backward(GpuQueue *q, const Mlp *mlp, int rows, GpuArray x, const GpuOutputs *outputs,
                       float *d_last, const GpuArray work[2], float *gradient, float beta,
@@ -45,8 +56,7 @@ void gpu_mlp_backward(GpuQueue *q, const Mlp *mlp, int rows, GpuArray x, const G
     for (int l = last; l >= 0; l--) {
         const MlpLayer *layer = &mlp->layer[l];
         const GpuArray linear = {NULL, x.bf16}, next = l > 0 ? work[l % 2] : gpu_array_float(d_x);
-        gpu_bias_backward(q->stream, rows, layer->out, l < last ? outputs->y[l] : linear, d, to,
-                          q->partial, beta, gradient + layer->bias);
+        gpu_sum_columns(q, rows, layer->out, l < last ? outputs->y[l] : linear, d, to, layer->bias);
         product(q, 'T', 'N', layer->out, layer->in, rows, to, layer->out,
                 l > 0 ? outputs->y[l - 1] : x, layer->in, beta,
                 gpu_array_float(gradient + layer->weight), layer->in);

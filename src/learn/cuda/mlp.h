@@ -5,8 +5,7 @@
 
 #include <cublas_v2.h>
 
-#include "learn/cuda/array.h"
-#include "learn/mlp.h"
+#include "learn/cuda/kernels.h"
 
 typedef struct {
     cudaStream_t stream;
@@ -14,7 +13,8 @@ typedef struct {
     cublasComputeType_t arithmetic; /* of the products */
     cublasStatus_t status;          /* the first failure of a product */
     GpuArray weights;               /* as products read them: parameters, or their rounded copy */
-    float *partial;                 /* [GPU_SUM_SLICES][widest layer] of the column sums */
+    GpuColumns columns;             /* column sums that are still to be added up */
+    float *partial;                 /* [GPU_SUM_SLICES][all columns] their partial sums */
 } GpuQueue;
 
 /* As MlpOutputs. The last layer's are floats, which the losses read. */
@@ -27,7 +27,12 @@ typedef struct {
  * bytes. Biases are read from the parameters. */
 float *gpu_mlp_forward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows,
                        GpuArray x, const GpuOutputs *outputs);
-/* d_x: gradient with respect to the input; NULL: not computed. work: as wide as the widest layer,
+/* As gpu_bias_backward, with the sums at `at` in the gradient, once the queue's columns are added
+ * up. */
+void gpu_sum_columns(GpuQueue *queue, int rows, int width, GpuArray y, GpuArray d, GpuArray to,
+                     int64_t at);
+/* The biases' gradient comes by gpu_sum_columns.
+ * d_x: gradient with respect to the input; NULL: not computed. work: as wide as the widest layer,
  * of the type of x. */
 void gpu_mlp_backward(GpuQueue *queue, const Mlp *mlp, int rows, GpuArray x,
                       const GpuOutputs *outputs, float *d_last, const GpuArray work[2],
