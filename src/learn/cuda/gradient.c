@@ -50,7 +50,6 @@ size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int bf16, int rows,
         size_t width;
     } floats[] = {
         {&c->noise, all, (size_t)w->latent},
-        {&c->spread, rows, (size_t)w->latent},
         {&c->d_mean, all, (size_t)w->action},
         {&c->d_log_std, rows, (size_t)w->action},
         {&c->d_heads, all, (size_t)w->heads},
@@ -245,7 +244,7 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
     const float epsilon = (float)def->epsilon * job->sample_weight, beta = job->beta;
     const float *mean = forward(g, all), *heads = last_of(&n->encoder, &c->encoder),
                 *theta = last_of(&n->modulation, &c->modulation);
-    gpu_sample_latent(q->stream, w, rows, heads, c->noise, c->spread, c->decoder_input);
+    gpu_sample_latent(q->stream, w, rows, heads, c->noise, c->decoder_input);
     const float *decoded =
         gpu_mlp_forward(q, &n->decoder, g->parameters, rows, c->decoder_input, &c->decoder);
 
@@ -257,8 +256,7 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
                      g->gradient, beta, c->d_decoder_input);
     gpu_mlp_backward(q, &n->actor, all, c->actor_input, &c->actor, c->d_mean, c->work, g->gradient,
                      beta, c->d_actor_input);
-    gpu_modulation_backward(q->stream, w, all, heads, actor_noise(g), theta, c->d_actor_input,
-                            c->d_heads, c->d_theta);
+    gpu_modulation_backward(q->stream, w, all, heads, actor_noise(g), c->d_actor_input, c->d_theta);
     gpu_mlp_backward(q, &n->modulation, all, c->feet, &c->modulation, c->d_theta, c->work,
                      g->gradient, beta, c->d_feet);
     const GpuHeads h = {.estimate_weight = 2.0f * epsilon,
@@ -268,8 +266,9 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
                         .order = job->order,
                         .target = g->batch.target,
                         .heads = heads,
-                        .spread = c->spread,
                         .noise = c->noise,
+                        .theta = theta,
+                        .d_input = c->d_actor_input,
                         .d_feet = c->d_feet,
                         .d_decoder_input = c->d_decoder_input,
                         .d_heads = c->d_heads};

@@ -8,6 +8,8 @@
 #define AHEAD 2      /* rows that a thread reads before it works on the first */
 #define COLUMNS 8    /* of a block that adds up their slices; every width is a multiple */
 
+#define ROWS 64 /* of a block that adds up losses, at least */
+
 /* ---- numbers of an array ---- */
 
 struct Bf16 {
@@ -49,7 +51,7 @@ static __device__ void number_write(Bf16 *to, float x) {
     }
 
 int gpu_blocks(int rows) {
-    return (int)blocks_of(rows).x;
+    return (rows + ROWS - 1) / ROWS;
 }
 
 /* Adds the block's sum of x to *to; every thread of the block calls. */
@@ -379,7 +381,7 @@ void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, Gpu
 /* One thread a number of the decoder's input [z | estimates]. */
 template <class T>
 static __global__ void sample_latent(GpuWidths w, uint32_t count, const float *heads,
-                                     const float *noise, float *spread, void *to) {
+                                     const float *noise, void *to) {
     T *input = (T *)to;
     const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.decoder_input;
     if (i >= count) {
@@ -393,16 +395,14 @@ static __global__ void sample_latent(GpuWidths w, uint32_t count, const float *h
         return;
     }
     const float *mu = h + w.estimates;
-    const float s = loss_spread(mu[w.latent + j]);
-    spread[r * w.latent + j] = s;
-    number_write(input + i, mu[j] + s * noise[r * w.latent + j]);
+    number_write(input + i, loss_latent(mu, mu + w.latent, noise + r * w.latent, j));
 }
 
 void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
-                       const float *noise, float *spread, GpuArray input) {
+                       const float *noise, GpuArray input) {
     const int64_t count = (int64_t)rows * w.decoder_input;
     LAUNCH_FOR(input, sample_latent, blocks_of(count), line, stream, w, (uint32_t)count, heads,
-               noise, spread, input.at)
+               noise, input.at)
 }
 
 /* ---- losses: one thread a sample ---- */
@@ -493,21 +493,6 @@ void gpu_reconstruction(cudaStream_t stream, GpuWidths w, int rows, float weight
            decoded, d, sums);
 }
 
-/* One thread a number of d_heads. */
-static __global__ void modulation_heads(GpuWidths w, uint32_t count, const float *heads,
-                                        const float *noise, const float *theta,
-                                        const float *d_input, float *d_heads) {
-    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.heads;
-    const int64_t r = i / pitch;
-    const int column = (int)(i % pitch);
-    if (i < count && column < w.estimates + 2 * w.latent) {
-        d_heads[i] =
-            loss_modulation_head(w.estimates, w.latent, w.per_dimension, heads + r * w.heads,
-                                 noise ? noise + r * w.latent : NULL, theta + r * w.theta,
-                                 d_input + r * w.actor_input + w.observation, column);
-    }
-}
-
 /* One thread a number of d_theta. */
 static __global__ void modulation_theta(GpuWidths w, uint32_t count, const float *heads,
                                         const float *noise, const float *d_input, float *d_theta) {
@@ -525,72 +510,96 @@ static __global__ void modulation_theta(GpuWidths w, uint32_t count, const float
 }
 
 void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
-                             const float *noise, const float *theta, const float *d_input,
-                             float *d_heads, float *d_theta) {
-    const int64_t numbers = (int64_t)rows * w.heads, thetas = (int64_t)rows * w.theta;
-    LAUNCH(modulation_heads, blocks_of(numbers), line, stream, w, (uint32_t)numbers, heads, noise,
-           theta, d_input, d_heads);
-    LAUNCH(modulation_theta, blocks_of(thetas), line, stream, w, (uint32_t)thetas, heads, noise,
+                             const float *noise, const float *d_input, float *d_theta) {
+    const int64_t count = (int64_t)rows * w.theta;
+    LAUNCH(modulation_theta, blocks_of(count), line, stream, w, (uint32_t)count, heads, noise,
            d_input, d_theta);
 }
 
-/* Dimension j of a sample's latent: twice its KL term. */
-static __device__ float latent_backward(const GpuWidths &w, const GpuHeads &h, int64_t r, int j) {
-    const float *mu = h.heads + r * w.heads + w.estimates;
-    float *d_mu = h.d_heads + r * w.heads + w.estimates;
-    const float logvar = mu[w.latent + j], spread = h.spread[r * w.latent + j],
-                d_z = h.d_decoder_input[r * w.decoder_input + j];
-    const float twice = loss_latent_twice(mu[j], logvar, spread);
-    const float weight = loss_kl_weight(h.latent_weight, h.free_bits, twice);
-    const float d_draw = loss_draw_gradient(h.sampled, d_z, d_mu[j]);
-    d_mu[j] += loss_mu_gradient(weight, mu[j], d_z);
-    d_mu[w.latent + j] =
-        loss_logvar_gradient(weight, logvar, spread, h.noise[r * w.latent + j], d_draw);
+/* Dimension j of a row's latent: mu and logvar. Returns twice its KL term, of an image 0. */
+static __device__ float latent_backward(const GpuWidths &w, const GpuHeads &h, int r, int j,
+                                        int is_image) {
+    const int at_mu = w.estimates + j, at_logvar = at_mu + w.latent;
+    const float *heads = h.heads + r * w.heads, *theta = h.theta + r * w.theta,
+                *d_input = h.d_input + r * w.actor_input + w.observation,
+                *drawn = h.sampled ? h.noise + r * w.latent : NULL;
+    float *d_heads = h.d_heads + r * w.heads;
+    const float d_mu = loss_modulation_head(w.estimates, w.latent, w.per_dimension, heads, drawn,
+                                            theta, d_input, at_mu);
+    if (is_image) {
+        d_heads[at_mu] = d_mu;
+        d_heads[at_logvar] = loss_modulation_head(w.estimates, w.latent, w.per_dimension, heads,
+                                                  drawn, theta, d_input, at_logvar);
+        return 0.0f;
+    }
+    const float mu = heads[at_mu], logvar = heads[at_logvar], noise = h.noise[r * w.latent + j],
+                d_z = h.d_decoder_input[r * w.decoder_input + j], spread = loss_spread(logvar),
+                twice = loss_latent_twice(mu, logvar, spread),
+                weight = loss_kl_weight(h.latent_weight, h.free_bits, twice);
+    d_heads[at_mu] = d_mu + loss_mu_gradient(weight, mu, d_z);
+    d_heads[at_logvar] = loss_logvar_gradient(weight, logvar, spread, noise,
+                                              loss_draw_gradient(h.sampled, d_z, d_mu));
     return twice;
 }
 
-/* A block has THREADS rows and takes their numbers in order, so that neighbours read neighbours. A
- * number of mu does what its logvar needs, too. */
-static __global__ void heads_backward(GpuWidths w, GpuHeads h, int rows, int all, double *sums) {
-    const int ends[] = {w.feet_offset, w.feet_offset + w.feet_count, w.estimates};
-    const int64_t first = (int64_t)blockIdx.x * THREADS;
-    double group[3] = {0.0, 0.0, 0.0}, twice = 0.0;
-    for (int k = 0; k < w.heads; k++) {
-        const uint32_t within = (uint32_t)(k * THREADS) + threadIdx.x;
-        const int64_t r = first + within / (uint32_t)w.heads;
-        const int column = (int)(within % (uint32_t)w.heads), foot = column - ends[0];
-        float *d = h.d_heads + r * w.heads + column;
-        if (r < all && foot >= 0 && foot < w.feet_input) {
-            *d += h.d_feet[r * w.feet + foot];
-        }
-        if (r >= rows || column >= w.estimates + w.latent) {
-            continue;
-        }
-        if (column >= w.estimates) {
-            twice += latent_backward(w, h, r, column - w.estimates);
-            continue;
-        }
-        *d += h.d_decoder_input[r * w.decoder_input + w.latent + column];
-        for (int g = 0, begin = 0; g < 3; begin = ends[g++]) {
-            if (column >= begin && column < ends[g]) {
-                const int width = ends[g] - begin;
-                group[g] += (double)loss_estimate(
-                                h.estimate_weight / (float)width, h.heads[r * w.heads + column],
-                                h.target[(int64_t)h.order[r] * w.estimates + column], d) /
-                            width;
+/* Estimate j of a row. weight: twice that of its square. Returns the square, of an image 0. */
+static __device__ float estimate_backward(const GpuWidths &w, const GpuHeads &h, int r, int j,
+                                          int is_image, int sample, float weight) {
+    const int i = r * w.heads + j, foot = j - w.feet_offset;
+    float square = 0.0f, d = h.d_input[r * w.actor_input + w.observation + j];
+    if (foot >= 0 && foot < w.feet_input) {
+        d += h.d_feet[r * w.feet + foot];
+    }
+    if (!is_image) {
+        d += h.d_decoder_input[r * w.decoder_input + w.latent + j];
+        square = loss_estimate(weight, h.heads[i], h.target[(int64_t)sample * w.estimates + j], &d);
+    }
+    h.d_heads[i] = d;
+    return square;
+}
+
+/* A block has ROWS rows. A thread has estimate j and dimension j of the latent in every lanes-th of
+ * them, so that neighbours read neighbours, and several numbers at a time. */
+static __global__ void __launch_bounds__(THREADS, 5)
+    heads_backward(GpuWidths w, GpuHeads h, int rows, int all, double *sums) {
+    const int feet_end = w.feet_offset + w.feet_count,
+              widths[] = {w.feet_offset, w.feet_count, w.estimates - feet_end},
+              columns = w.estimates > w.latent ? w.estimates : w.latent,
+              side = columns < THREADS ? columns : THREADS, lanes = THREADS / side,
+              lane = (int)threadIdx.x / side, begin = (int)blockIdx.x * ROWS,
+              end = begin + ROWS < all ? begin + ROWS : all;
+    float squares[3] = {0.0f, 0.0f, 0.0f}, twice = 0.0f;
+    for (int j = (int)threadIdx.x % side; lane < lanes && j < columns; j += side) {
+        const int group = (j >= w.feet_offset) + (j >= feet_end);
+        const int width = group == 0 ? widths[0] : group == 1 ? widths[1] : widths[2];
+        const float weight = h.estimate_weight / (float)width;
+        float square = 0.0f;
+        LANE_ROLLED
+        for (int r = begin + lane; r < end; r += lanes) {
+            const int is_image = r >= rows, sample = is_image ? 0 : h.order[r];
+            if (j < w.latent) {
+                twice += latent_backward(w, h, r, j, is_image);
             }
+            if (j < w.estimates) {
+                square += estimate_backward(w, h, r, j, is_image, sample, weight);
+            }
+        }
+        for (int g = 0; g < 3; g++) {
+            squares[g] += g == group ? square : 0.0f;
         }
     }
     double *own = sums + (int64_t)blockIdx.x * GPU_SUMS;
     for (int g = 0; g < 3; g++) {
-        add_block_sum(group[g], own + GPU_SUM_ESTIMATE + g);
+        add_block_sum(widths[g] > 0 ? (double)squares[g] / widths[g] : 0.0,
+                      own + GPU_SUM_ESTIMATE + g);
     }
-    add_block_sum(0.5 * twice, own + GPU_SUM_VAE_KL);
+    add_block_sum(0.5 * (double)twice, own + GPU_SUM_VAE_KL);
 }
 
 void gpu_heads_backward(cudaStream_t stream, GpuWidths w, GpuHeads h, int rows, int all,
                         double *sums) {
-    LAUNCH(heads_backward, blocks_of(all), line, stream, w, h, rows, all, sums);
+    const dim3 grid = {(unsigned)gpu_blocks(all), 1, 1};
+    LAUNCH(heads_backward, grid, line, stream, w, h, rows, all, sums);
 }
 
 static __global__ void value_loss(GpuValue v, int rows, double *sums) {
