@@ -51,7 +51,6 @@ size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int bf16, int rows,
     } floats[] = {
         {&c->noise, all, (size_t)w->latent},
         {&c->d_mean, all, (size_t)w->action},
-        {&c->d_log_std, rows, (size_t)w->action},
         {&c->d_heads, all, (size_t)w->heads},
         {&c->d_theta, all, (size_t)w->theta},
         {&c->d_actor_input, all, (size_t)w->actor_input},
@@ -208,12 +207,10 @@ static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean)
                             .old_log_prob = g->batch.log_prob,
                             .advantage = g->batch.advantage,
                             .mean = mean,
-                            .d_mean = c->d_mean,
-                            .d_log_std = c->d_log_std};
-    gpu_surrogate(g->queue.stream, s, c->rows, g->sums);
-    const GpuArray none = {0};
-    gpu_sum_columns(&g->queue, c->rows, pitch, none, gpu_array_float(s.d_log_std), none,
-                    g->network.log_std);
+                            .d_mean = c->d_mean};
+    const int slices =
+        gpu_surrogate(g->queue.stream, s, c->rows, g->sums, gpu_columns_next(&g->queue));
+    gpu_columns_add(&g->queue, pitch, slices, g->network.log_std);
     if (c->mirrored > 0) {
         const size_t images = (size_t)c->rows * (size_t)pitch;
         const int observation = g->network.def.observation;

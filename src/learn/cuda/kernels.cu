@@ -116,9 +116,9 @@ void gpu_mirror_history(cudaStream_t stream, GpuImages m, const float *history, 
                history, to.at)
 }
 
-static __global__ void latent_noise(int64_t count, int latent, const uint64_t *key, const int *row,
-                                    float *noise) {
-    const int64_t i = item();
+static __global__ void latent_noise(uint32_t count, uint32_t latent, const uint64_t *key,
+                                    const int *row, float *noise) {
+    const uint32_t i = (uint32_t)item();
     if (i >= count) {
         return;
     }
@@ -131,7 +131,8 @@ static __global__ void latent_noise(int64_t count, int latent, const uint64_t *k
 void gpu_latent_noise(cudaStream_t stream, int rows, int latent, const uint64_t *key,
                       const int *row, float *noise) {
     const int64_t count = (int64_t)rows * latent;
-    LAUNCH(latent_noise, blocks_of(count), line, stream, count, latent, key, row, noise);
+    LAUNCH(latent_noise, blocks_of(count), line, stream, (uint32_t)count, (uint32_t)latent, key,
+           row, noise);
 }
 
 /* ---- layers ---- */
@@ -405,83 +406,147 @@ void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *
                noise, input.at)
 }
 
-/* ---- losses: one thread a sample ---- */
+/* ---- losses ---- */
 
-static __global__ void surrogate(GpuSurrogate s, int rows, double *sums) {
-    const int64_t r = item();
-    double loss = 0.0, divergence = 0.0, clipped = 0.0;
-    if (r < rows) {
-        const int actions = s.actions, i = s.order[r];
-        const float *action = s.action + (int64_t)i * actions, *mean = s.mean + r * s.pitch;
-        const LossSurrogate sample =
-            loss_surrogate(actions, s.constant, s.clip, action, mean,
-                           s.old_mean + (int64_t)i * actions, s.old_log_prob[i], s.advantage[i]);
-        const float d_log_prob = sample.d_log_prob * s.weight;
-        float *d_mean = s.d_mean + r * s.pitch, *d_log_std = s.d_log_std + r * s.pitch;
-        for (int j = 0; j < actions; j++) {
-            const float t = loss_standard(action[j], mean[j], s.constant[j]);
-            d_mean[j] = loss_mean_gradient(d_log_prob, t, s.constant[j]);
-            d_log_std[j] = loss_log_std_gradient(d_log_prob, t) - s.entropy;
+/* A block's threads in rows: one has column `column`, and from there on every side-th, of rows
+ * first, first + lanes .. end - 1. Threads that are left over have no rows. */
+struct Share {
+    int column, side, first, lanes, end;
+};
+
+/* Of rows begin .. end - 1. */
+static __device__ Share share_of(int columns, int begin, int end) {
+    Share s;
+    s.side = columns < THREADS ? columns : THREADS;
+    s.lanes = THREADS / s.side;
+    s.column = (int)threadIdx.x % s.side;
+    s.first = begin + (int)threadIdx.x / s.side;
+    s.end = (int)threadIdx.x < s.lanes * s.side ? end : 0;
+    return s;
+}
+
+/* Of a block's ROWS rows. */
+static __device__ Share share_of_rows(int columns, int rows) {
+    const int begin = (int)blockIdx.x * ROWS;
+    return share_of(columns, begin, begin + ROWS < rows ? begin + ROWS : rows);
+}
+
+/* A block has a slice of the samples, and takes DEEP of them a thread at a time: neighbours have
+ * the actions of a sample, then one thread adds up its terms, then neighbours have the gradients of
+ * its actions. Sums of log std: partial [slices][pitch]. */
+static __global__ void surrogate(GpuSurrogate s, int rows, double *sums, float *partial) {
+    enum { DEEP = 4, SIDE_MIN = 8, TILE_MAX = DEEP * THREADS / SIDE_MIN };
+    __shared__ float squares[DEEP * THREADS + TILE_MAX], shifts[DEEP * THREADS + TILE_MAX],
+        d_log_prob[TILE_MAX], part[THREADS];
+    const int slice = (int)blockIdx.x, slices = (int)gridDim.x, thread = (int)threadIdx.x;
+    const int end = (int)((int64_t)rows * (slice + 1) / slices);
+    const Share own = share_of(s.pitch, 0, 1);
+    const int j = own.column, tile = DEEP * own.lanes, stride = own.side + 1;
+    const int is_action = own.end && j < s.actions;
+    const float inverse = is_action ? s.constant[j] : 0.0f;
+    float d_log_std = 0.0f, loss = 0.0f, divergence = 0.0f, clipped = 0.0f;
+    for (int at = (int)((int64_t)rows * slice / slices); at < end; at += tile) {
+        float t[DEEP] = {}, shift[DEEP] = {};
+        for (int n = 0; n < DEEP; n++) {
+            const int r = at + own.first + n * own.lanes;
+            if (is_action && r < end) {
+                const int64_t i = (int64_t)s.order[r] * s.actions + j;
+                const float mean = s.mean[r * s.pitch + j];
+                t[n] = loss_standard(s.action[i], mean, inverse);
+                shift[n] = loss_standard(s.old_mean[i], mean, inverse);
+            }
         }
-        for (int j = actions; j < s.pitch; j++) {
-            d_log_std[j] = 0.0f;
+        for (int n = 0; n < DEEP && is_action; n++) {
+            const int place = (own.first + n * own.lanes) * stride + j;
+            squares[place] = 0.5f * t[n] * t[n];
+            shifts[place] = 0.5f * shift[n] * shift[n];
         }
-        loss = sample.loss;
-        clipped = sample.clipped;
-        divergence = sample.kl;
+        __syncthreads();
+        if (thread < tile && at + thread < end) {
+            const int i = s.order[at + thread];
+            float log_prob = s.constant[s.actions], kl = s.constant[s.actions + 1];
+            for (int k = 0; k < s.actions; k++) {
+                log_prob -= squares[thread * stride + k];
+                kl += shifts[thread * stride + k];
+            }
+            const LossSurrogate sample =
+                loss_surrogate_of(s.clip, log_prob, kl, s.old_log_prob[i], s.advantage[i]);
+            d_log_prob[thread] = sample.d_log_prob * s.weight;
+            loss += sample.loss;
+            divergence += sample.kl;
+            clipped += (float)sample.clipped;
+        }
+        __syncthreads();
+        for (int n = 0; n < DEEP; n++) {
+            const int row = own.first + n * own.lanes;
+            if (is_action && at + row < end) {
+                const float d = d_log_prob[row];
+                s.d_mean[(at + row) * s.pitch + j] = loss_mean_gradient(d, t[n], inverse);
+                d_log_std += loss_log_std_gradient(d, t[n]) - s.entropy;
+            }
+        }
     }
-    double *own = sums + (int64_t)blockIdx.x * GPU_SUMS;
-    add_block_sum(loss, own + GPU_SUM_SURROGATE);
-    add_block_sum(divergence, own + GPU_SUM_KL);
-    add_block_sum(clipped, own + GPU_SUM_CLIPPED);
+    part[thread] = d_log_std;
+    double *to = sums + (int64_t)slice * GPU_SUMS;
+    add_block_sum((double)loss, to + GPU_SUM_SURROGATE);
+    add_block_sum((double)divergence, to + GPU_SUM_KL);
+    add_block_sum((double)clipped, to + GPU_SUM_CLIPPED);
+    if (thread < own.side) {
+        for (int lane = 1; lane < own.lanes; lane++) {
+            d_log_std += part[lane * own.side + thread];
+        }
+        partial[slice * own.side + thread] = d_log_std;
+    }
 }
 
-void gpu_surrogate(cudaStream_t stream, GpuSurrogate s, int rows, double *sums) {
-    LAUNCH(surrogate, blocks_of(rows), line, stream, s, rows, sums);
+int gpu_surrogate(cudaStream_t stream, GpuSurrogate s, int rows, double *sums, float *partial) {
+    const int blocks = gpu_blocks(rows), slices = blocks < GPU_SUM_SLICES ? blocks : GPU_SUM_SLICES;
+    const dim3 grid = {(unsigned)slices, 1, 1};
+    LAUNCH(surrogate, grid, line, stream, s, rows, sums, partial);
+    return slices;
 }
 
-/* A sample has at most one image: no two threads write one row. action_index is a permutation. */
+/* A sample has at most one image: no two threads write one number. index is a permutation. */
 static __global__ void mirror_loss(GpuMirror m, int images, double *sums) {
-    const int64_t r = item();
+    const Share own = share_of_rows(m.actions, images);
+    const int j = own.column, k = m.index[j];
+    const float sign = m.sign[j];
     float sum = 0.0f;
-    if (r < images) {
-        const int64_t sample = m.which[r] - m.first;
-        sum = loss_mirror(m.actions, m.index, m.sign, m.weight, m.mean + sample * m.pitch,
-                          m.image + r * m.pitch, m.d_mean + sample * m.pitch,
-                          m.d_image + r * m.pitch);
+    for (int r = own.first; r < own.end; r += own.lanes) {
+        const int sample = (m.which[r] - m.first) * m.pitch, image = r * m.pitch;
+        sum += loss_mirror_action(m.weight, sign, m.mean[sample + j], m.image[image + k],
+                                  m.d_mean + sample + j, m.d_image + image + k);
     }
     add_block_sum((double)sum / m.actions, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_MIRROR);
 }
 
 void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums) {
-    LAUNCH(mirror_loss, blocks_of(images), line, stream, m, images, sums);
+    const dim3 grid = {(unsigned)gpu_blocks(images), 1, 1};
+    LAUNCH(mirror_loss, grid, line, stream, m, images, sums);
 }
 
-/* A block has THREADS rows and takes their numbers in order, so that neighbours read neighbours. */
-static __global__ void reconstruction(GpuWidths w, int rows, float weight, const int *order,
-                                      const float *frame, const float *critic, const float *decoded,
-                                      float *d, double *sums) {
-    const int pitch = w.decoded;
-    const int64_t first = (int64_t)blockIdx.x * THREADS * pitch, count = (int64_t)rows * pitch;
+static __global__ void
+reconstruction(GpuWidths w, int rows, float weight, const int *__restrict__ order,
+               const float *__restrict__ frame, const float *__restrict__ critic,
+               const float *__restrict__ decoded, float *__restrict__ d, double *sums) {
+    const int columns = w.decoded_frame + w.ground_count;
+    const Share own = share_of_rows(columns, rows);
     double loss = 0.0;
-    for (int part = 0; part < 2; part++) { /* frame, ground */
-        const int begin = part ? w.decoded_frame : 0;
-        const int width = part ? w.ground_count : w.decoded_frame;
-        const int stride = part ? w.critic_input : w.observation;
-        const float *target = part ? critic + w.ground_offset : frame;
-        double sum = 0.0;
-        for (int k = 0; width > 0 && k < pitch; k++) {
-            const uint32_t within = (uint32_t)(k * THREADS) + threadIdx.x;
-            const int column = (int)(within % (uint32_t)pitch) - begin;
-            const int64_t i = first + within;
-            if (i < count && column >= 0 && column < width) {
-                const int sample = order[(int64_t)blockIdx.x * THREADS + within / (uint32_t)pitch];
-                const float gap = decoded[i] - target[(int64_t)sample * stride + column];
-                sum += (double)(gap * gap);
-                d[i] = weight / (float)width * gap;
-            }
+    for (int column = own.column; column < columns; column += own.side) {
+        const int is_ground = column >= w.decoded_frame,
+                  width = is_ground ? w.ground_count : w.decoded_frame,
+                  stride = is_ground ? w.critic_input : w.observation;
+        const float *target =
+            is_ground ? critic + w.ground_offset + column - w.decoded_frame : frame + column;
+        const float weight_each = weight / (float)width;
+        float sum = 0.0f;
+        for (int r = own.first; r < own.end; r += own.lanes) {
+            const int i = r * w.decoded + column;
+            const float gap = decoded[i] - target[(int64_t)order[r] * stride];
+            sum += gap * gap;
+            d[i] = weight_each * gap;
         }
-        loss += width > 0 ? sum / width : 0.0;
+        loss += (double)sum / width;
     }
     add_block_sum(loss, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_RECONSTRUCTION);
 }
@@ -489,8 +554,9 @@ static __global__ void reconstruction(GpuWidths w, int rows, float weight, const
 void gpu_reconstruction(cudaStream_t stream, GpuWidths w, int rows, float weight, const int *order,
                         const float *frame, const float *critic, const float *decoded, float *d,
                         double *sums) {
-    LAUNCH(reconstruction, blocks_of(rows), line, stream, w, rows, weight, order, frame, critic,
-           decoded, d, sums);
+    const dim3 grid = {(unsigned)gpu_blocks(rows), 1, 1};
+    LAUNCH(reconstruction, grid, line, stream, w, rows, weight, order, frame, critic, decoded, d,
+           sums);
 }
 
 /* One thread a number of d_theta. */
@@ -558,24 +624,22 @@ static __device__ float estimate_backward(const GpuWidths &w, const GpuHeads &h,
     return square;
 }
 
-/* A block has ROWS rows. A thread has estimate j and dimension j of the latent in every lanes-th of
- * them, so that neighbours read neighbours, and several numbers at a time. */
+/* A thread has estimate j and dimension j of the latent of its rows, so that neighbours read
+ * neighbours, and each several numbers at a time. */
 static __global__ void __launch_bounds__(THREADS, 5)
     heads_backward(GpuWidths w, GpuHeads h, int rows, int all, double *sums) {
     const int feet_end = w.feet_offset + w.feet_count,
               widths[] = {w.feet_offset, w.feet_count, w.estimates - feet_end},
-              columns = w.estimates > w.latent ? w.estimates : w.latent,
-              side = columns < THREADS ? columns : THREADS, lanes = THREADS / side,
-              lane = (int)threadIdx.x / side, begin = (int)blockIdx.x * ROWS,
-              end = begin + ROWS < all ? begin + ROWS : all;
+              columns = w.estimates > w.latent ? w.estimates : w.latent;
+    const Share own = share_of_rows(columns, all);
     float squares[3] = {0.0f, 0.0f, 0.0f}, twice = 0.0f;
-    for (int j = (int)threadIdx.x % side; lane < lanes && j < columns; j += side) {
+    for (int j = own.column; j < columns; j += own.side) {
         const int group = (j >= w.feet_offset) + (j >= feet_end);
         const int width = group == 0 ? widths[0] : group == 1 ? widths[1] : widths[2];
         const float weight = h.estimate_weight / (float)width;
         float square = 0.0f;
         LANE_ROLLED
-        for (int r = begin + lane; r < end; r += lanes) {
+        for (int r = own.first; r < own.end; r += own.lanes) {
             const int is_image = r >= rows, sample = is_image ? 0 : h.order[r];
             if (j < w.latent) {
                 twice += latent_backward(w, h, r, j, is_image);
@@ -588,12 +652,12 @@ static __global__ void __launch_bounds__(THREADS, 5)
             squares[g] += g == group ? square : 0.0f;
         }
     }
-    double *own = sums + (int64_t)blockIdx.x * GPU_SUMS;
+    double *to = sums + (int64_t)blockIdx.x * GPU_SUMS;
     for (int g = 0; g < 3; g++) {
         add_block_sum(widths[g] > 0 ? (double)squares[g] / widths[g] : 0.0,
-                      own + GPU_SUM_ESTIMATE + g);
+                      to + GPU_SUM_ESTIMATE + g);
     }
-    add_block_sum(0.5 * (double)twice, own + GPU_SUM_VAE_KL);
+    add_block_sum(0.5 * (double)twice, to + GPU_SUM_VAE_KL);
 }
 
 void gpu_heads_backward(cudaStream_t stream, GpuWidths w, GpuHeads h, int rows, int all,

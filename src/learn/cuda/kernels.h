@@ -114,9 +114,11 @@ typedef struct {
     const int *order;
     const float *action, *old_mean, *old_log_prob, *advantage; /* of the rollout */
     const float *mean;                                         /* [rows][pitch] */
-    float *d_mean, *d_log_std;                                 /* [rows][pitch] */
+    float *d_mean;                                             /* [rows][pitch] */
 } GpuSurrogate;
-void gpu_surrogate(cudaStream_t stream, GpuSurrogate s, int rows, double *sums);
+/* Returns the number of slices of the gradient of log std: partial [slices][pitch], as
+ * gpu_bias_backward. */
+int gpu_surrogate(cudaStream_t stream, GpuSurrogate s, int rows, double *sums, float *partial);
 
 typedef struct {
     int actions, pitch, first;

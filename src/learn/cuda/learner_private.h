@@ -20,7 +20,6 @@ typedef struct {
     GpuArray decoder_input; /* [rows] */
     /* gradients with respect to the array named after d_ */
     float *d_mean;          /* [rows + mirrored] */
-    float *d_log_std;       /* [rows] */
     float *d_heads;         /* [rows + mirrored] */
     float *d_theta;         /* [rows + mirrored] */
     float *d_actor_input;   /* [rows + mirrored] */

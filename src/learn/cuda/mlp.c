@@ -34,17 +34,19 @@ float *gpu_mlp_forward(GpuQueue *q, const Mlp *mlp, const float *parameters, int
     return outputs->y[last].at;
 }
 
-void gpu_sum_columns(GpuQueue *q, int rows, int width, GpuArray y, GpuArray d, GpuArray to,
-                     int64_t at) {
+static int64_t columns_end(const GpuColumns *columns) {
+    const GpuColumnSum *last = &columns->sum[columns->count - 1];
+    return columns->count > 0 ? last->partial + (int64_t)last->slices * last->width : 0;
+}
+
+float *gpu_columns_next(GpuQueue *q) {
+    return q->partial + columns_end(&q->columns);
+}
+
+void gpu_columns_add(GpuQueue *q, int width, int slices, int64_t at) {
     GpuColumns *columns = &q->columns;
-    int64_t used = 0;
-    if (columns->count > 0) {
-        const GpuColumnSum *before = &columns->sum[columns->count - 1];
-        used = before->partial + (int64_t)before->slices * before->width;
-    }
-    const int slices = gpu_bias_backward(q->stream, rows, width, y, d, to, q->partial + used);
-    columns->sum[columns->count++] =
-        (GpuColumnSum){.width = width, .slices = slices, .partial = used, .to = at};
+    const GpuColumnSum sum = {width, slices, columns_end(columns), at};
+    columns->sum[columns->count++] = sum;
 }
 
 /* Per layer, with d = dL/d(Wx + b):  dW = d^T x,  db = sum over rows of d,  dx = d W. */
@@ -56,7 +58,10 @@ void gpu_mlp_backward(GpuQueue *q, const Mlp *mlp, int rows, GpuArray x, const G
     for (int l = last; l >= 0; l--) {
         const MlpLayer *layer = &mlp->layer[l];
         const GpuArray linear = {NULL, x.bf16}, next = l > 0 ? work[l % 2] : gpu_array_float(d_x);
-        gpu_sum_columns(q, rows, layer->out, l < last ? outputs->y[l] : linear, d, to, layer->bias);
+        const int slices =
+            gpu_bias_backward(q->stream, rows, layer->out, l < last ? outputs->y[l] : linear, d, to,
+                              gpu_columns_next(q));
+        gpu_columns_add(q, layer->out, slices, layer->bias);
         product(q, 'T', 'N', layer->out, layer->in, rows, to, layer->out,
                 l > 0 ? outputs->y[l - 1] : x, layer->in, beta,
                 gpu_array_float(gradient + layer->weight), layer->in);
