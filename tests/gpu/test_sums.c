@@ -1,5 +1,5 @@
-/* Sums on the device against plain loops: over the rows of columns, and over the blocks of losses. On
- * a device with MILD_CUDA, skipped (77) where there is none; else on the stand-in. */
+/* Sums on the device against plain loops: over the rows of columns, and over the blocks of losses.
+ * On a device with MILD_CUDA, skipped (77) where there is none; else on the stand-in. */
 #include "gpu_check.h"
 
 #include "learn/loss_sample.h"

@@ -170,8 +170,8 @@ void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float
                elu, (const Four<float> *)bias, y.at)
 }
 
-/* Block (group of columns, slice of rows), [lanes][fours] threads: a thread has four columns of each
- * lanes-th row. Their sums are added up pairwise. width, fours: in fours. */
+/* Block (group of columns, slice of rows), [lanes][fours] threads: a thread has four columns of
+ * every lanes-th row. Their sums are added up pairwise. width, fours: in fours. */
 template <class D, class T>
 static __global__ void bias_backward(int rows, int width, int fours, const Four<T> *y,
                                      const Four<D> *d, Four<T> *to, Four<float> *partial) {
@@ -255,6 +255,7 @@ static __global__ void add_columns(GpuColumns list, const float *__restrict__ pa
     }
     const GpuColumnSum own = list.sum[n];
     float total = 0.0f;
+    TILE_UNROLL
     for (int slice = share; slice < own.slices; slice += SHARES) {
         total += partial[own.partial + (int64_t)slice * own.width + column];
     }
@@ -431,6 +432,23 @@ static __device__ Share share_of_rows(int columns, int rows) {
     return share_of(columns, begin, begin + ROWS < rows ? begin + ROWS : rows);
 }
 
+/* Losses of sample i, from the terms of its actions; adds them to loss, which has the order of the
+ * sums. Returns the gradient of its log_prob. */
+static __device__ float surrogate_sample(const GpuSurrogate &s, int i, const float *squares,
+                                         const float *shifts, float *loss) {
+    const float old_log_prob = s.old_log_prob[i], advantage = s.advantage[i];
+    float log_prob = s.constant[s.actions], kl = s.constant[s.actions + 1];
+    for (int j = 0; j < s.actions; j++) {
+        log_prob -= squares[j];
+        kl += shifts[j];
+    }
+    const LossSurrogate sample = loss_surrogate_of(s.clip, log_prob, kl, old_log_prob, advantage);
+    loss[0] += sample.loss;
+    loss[1] += sample.kl;
+    loss[2] += (float)sample.clipped;
+    return sample.d_log_prob * s.weight;
+}
+
 /* A block has a slice of the samples, and takes DEEP of them a thread at a time: neighbours have
  * the actions of a sample, then one thread adds up its terms, then neighbours have the gradients of
  * its actions. Sums of log std: partial [slices][pitch]. */
@@ -444,14 +462,18 @@ static __global__ void surrogate(GpuSurrogate s, int rows, double *sums, float *
     const int j = own.column, tile = DEEP * own.lanes, stride = own.side + 1;
     const int is_action = own.end && j < s.actions;
     const float inverse = is_action ? s.constant[j] : 0.0f;
-    float d_log_std = 0.0f, loss = 0.0f, divergence = 0.0f, clipped = 0.0f;
+    float d_log_std = 0.0f, loss[3] = {0.0f, 0.0f, 0.0f};
     for (int at = (int)((int64_t)rows * slice / slices); at < end; at += tile) {
+        int sample[DEEP]; /* -1: none */
         float t[DEEP] = {}, shift[DEEP] = {};
         for (int n = 0; n < DEEP; n++) {
             const int r = at + own.first + n * own.lanes;
-            if (is_action && r < end) {
-                const int64_t i = (int64_t)s.order[r] * s.actions + j;
-                const float mean = s.mean[r * s.pitch + j];
+            sample[n] = is_action && r < end ? s.order[r] : -1;
+        }
+        for (int n = 0; n < DEEP; n++) {
+            const int64_t i = (int64_t)sample[n] * s.actions + j;
+            if (sample[n] >= 0) {
+                const float mean = s.mean[(at + own.first + n * own.lanes) * s.pitch + j];
                 t[n] = loss_standard(s.action[i], mean, inverse);
                 shift[n] = loss_standard(s.old_mean[i], mean, inverse);
             }
@@ -463,23 +485,13 @@ static __global__ void surrogate(GpuSurrogate s, int rows, double *sums, float *
         }
         __syncthreads();
         if (thread < tile && at + thread < end) {
-            const int i = s.order[at + thread];
-            float log_prob = s.constant[s.actions], kl = s.constant[s.actions + 1];
-            for (int k = 0; k < s.actions; k++) {
-                log_prob -= squares[thread * stride + k];
-                kl += shifts[thread * stride + k];
-            }
-            const LossSurrogate sample =
-                loss_surrogate_of(s.clip, log_prob, kl, s.old_log_prob[i], s.advantage[i]);
-            d_log_prob[thread] = sample.d_log_prob * s.weight;
-            loss += sample.loss;
-            divergence += sample.kl;
-            clipped += (float)sample.clipped;
+            d_log_prob[thread] = surrogate_sample(
+                s, s.order[at + thread], squares + thread * stride, shifts + thread * stride, loss);
         }
         __syncthreads();
         for (int n = 0; n < DEEP; n++) {
             const int row = own.first + n * own.lanes;
-            if (is_action && at + row < end) {
+            if (sample[n] >= 0) {
                 const float d = d_log_prob[row];
                 s.d_mean[(at + row) * s.pitch + j] = loss_mean_gradient(d, t[n], inverse);
                 d_log_std += loss_log_std_gradient(d, t[n]) - s.entropy;
@@ -487,14 +499,13 @@ static __global__ void surrogate(GpuSurrogate s, int rows, double *sums, float *
         }
     }
     part[thread] = d_log_std;
-    double *to = sums + (int64_t)slice * GPU_SUMS;
-    add_block_sum((double)loss, to + GPU_SUM_SURROGATE);
-    add_block_sum((double)divergence, to + GPU_SUM_KL);
-    add_block_sum((double)clipped, to + GPU_SUM_CLIPPED);
+    for (int k = 0; k < 3; k++) {
+        add_block_sum((double)loss[k], sums + (int64_t)slice * GPU_SUMS + GPU_SUM_SURROGATE + k);
+    }
+    for (int lane = 1; thread < own.side && lane < own.lanes; lane++) {
+        d_log_std += part[lane * own.side + thread];
+    }
     if (thread < own.side) {
-        for (int lane = 1; lane < own.lanes; lane++) {
-            d_log_std += part[lane * own.side + thread];
-        }
         partial[slice * own.side + thread] = d_log_std;
     }
 }
@@ -582,44 +593,37 @@ void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const f
            d_input, d_theta);
 }
 
-/* Dimension j of a row's latent: mu and logvar. Returns twice its KL term, of an image 0. */
+/* Dimension j of a row's latent: mu and logvar. Returns twice its KL term, of an image 0. Reads all
+ * its numbers before it needs one. */
 static __device__ float latent_backward(const GpuWidths &w, const GpuHeads &h, int r, int j,
                                         int is_image) {
     const int at_mu = w.estimates + j, at_logvar = at_mu + w.latent;
-    const float *heads = h.heads + r * w.heads, *theta = h.theta + r * w.theta,
-                *d_input = h.d_input + r * w.actor_input + w.observation,
-                *drawn = h.sampled ? h.noise + r * w.latent : NULL;
+    const float *heads = h.heads + r * w.heads;
     float *d_heads = h.d_heads + r * w.heads;
-    const float d_mu = loss_modulation_head(w.estimates, w.latent, w.per_dimension, heads, drawn,
-                                            theta, d_input, at_mu);
-    if (is_image) {
-        d_heads[at_mu] = d_mu;
-        d_heads[at_logvar] = loss_modulation_head(w.estimates, w.latent, w.per_dimension, heads,
-                                                  drawn, theta, d_input, at_logvar);
-        return 0.0f;
-    }
-    const float mu = heads[at_mu], logvar = heads[at_logvar], noise = h.noise[r * w.latent + j],
-                d_z = h.d_decoder_input[r * w.decoder_input + j], spread = loss_spread(logvar),
-                twice = loss_latent_twice(mu, logvar, spread),
-                weight = loss_kl_weight(h.latent_weight, h.free_bits, twice);
+    const float mu = heads[at_mu], logvar = heads[at_logvar],
+                noise = is_image && !h.sampled ? 0.0f : h.noise[r * w.latent + j],
+                d_z = is_image ? 0.0f : h.d_decoder_input[r * w.decoder_input + j],
+                d_mu = loss_modulation_head(w.estimates, w.latent, w.per_dimension, heads, NULL,
+                                            h.theta + r * w.theta,
+                                            h.d_input + r * w.actor_input + w.observation, at_mu);
+    const float spread = loss_spread(logvar), twice = loss_latent_twice(mu, logvar, spread),
+                weight = is_image ? 0.0f : loss_kl_weight(h.latent_weight, h.free_bits, twice);
     d_heads[at_mu] = d_mu + loss_mu_gradient(weight, mu, d_z);
     d_heads[at_logvar] = loss_logvar_gradient(weight, logvar, spread, noise,
                                               loss_draw_gradient(h.sampled, d_z, d_mu));
-    return twice;
+    return is_image ? 0.0f : twice;
 }
 
 /* Estimate j of a row. weight: twice that of its square. Returns the square, of an image 0. */
 static __device__ float estimate_backward(const GpuWidths &w, const GpuHeads &h, int r, int j,
                                           int is_image, int sample, float weight) {
     const int i = r * w.heads + j, foot = j - w.feet_offset;
-    float square = 0.0f, d = h.d_input[r * w.actor_input + w.observation + j];
-    if (foot >= 0 && foot < w.feet_input) {
-        d += h.d_feet[r * w.feet + foot];
-    }
-    if (!is_image) {
-        d += h.d_decoder_input[r * w.decoder_input + w.latent + j];
-        square = loss_estimate(weight, h.heads[i], h.target[(int64_t)sample * w.estimates + j], &d);
-    }
+    const float estimate = h.heads[i],
+                target = is_image ? 0.0f : h.target[(int64_t)sample * w.estimates + j],
+                d_feet = foot >= 0 && foot < w.feet_input ? h.d_feet[r * w.feet + foot] : 0.0f,
+                d_decoder = is_image ? 0.0f : h.d_decoder_input[r * w.decoder_input + w.latent + j];
+    float d = h.d_input[r * w.actor_input + w.observation + j] + d_feet + d_decoder;
+    const float square = is_image ? 0.0f : loss_estimate(weight, estimate, target, &d);
     h.d_heads[i] = d;
     return square;
 }

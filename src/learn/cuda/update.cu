@@ -226,16 +226,36 @@ void gpu_normalise(cudaStream_t stream, PpoBatch batch, const GpuProgress *progr
 
 /* ---- several processes ---- */
 
+/* Sums over the rows of x [rows][width] into total [width], of the block's shared memory; every
+ * thread of the block calls. Neighbours read neighbours: a thread has a column of every
+ * (THREADS / width)-th row. */
+static __device__ void rows_sum(int rows, int width, const double *x, double *total) {
+    __shared__ double part[THREADS];
+    const int thread = (int)threadIdx.x, used = THREADS / width * width,
+              count = thread < used ? rows * width : 0;
+    double sum = 0.0;
+    TILE_UNROLL
+    for (int i = thread; i < count; i += used) {
+        sum += x[i];
+    }
+    part[thread] = sum;
+    __syncthreads();
+    if (thread < width) {
+        sum = 0.0;
+        for (int k = thread; k < used; k += width) {
+            sum += part[k];
+        }
+        total[thread] = sum;
+    }
+    __syncthreads();
+}
+
+/* The first row becomes the sum. */
 static __global__ void add_rows(int rows, int width, double *x) {
-    for (int k = 0; k < width; k++) {
-        double sum = 0.0;
-        for (int row = (int)threadIdx.x; row < rows; row += THREADS) {
-            sum += x[(int64_t)row * width + k];
-        }
-        sum = block_sum(sum);
-        if (threadIdx.x == 0) {
-            x[k] = sum;
-        }
+    __shared__ double total[THREADS];
+    rows_sum(rows, width, x, total);
+    if ((int)threadIdx.x < width) {
+        x[threadIdx.x] = total[threadIdx.x];
     }
 }
 
@@ -343,15 +363,8 @@ static __device__ int decide_step(const GpuDecision *d, const LossSums *sums, do
 
 static __global__ void decide(GpuDecision d, int parts, const double *partial,
                               GpuProgress *progress) {
-    double total[GPU_SUMS] = {};
-    for (int block = (int)threadIdx.x; block < d.blocks; block += THREADS) {
-        for (int k = 0; k < GPU_SUMS; k++) {
-            total[k] += d.sums[(int64_t)block * GPU_SUMS + k];
-        }
-    }
-    for (int k = 0; k < GPU_SUMS; k++) {
-        total[k] = block_sum(total[k]);
-    }
+    __shared__ double total[GPU_SUMS];
+    rows_sum(d.blocks, GPU_SUMS, d.sums, total);
     const double norm = sqrt(block_sum((int)threadIdx.x < parts ? partial[threadIdx.x] : 0.0));
     if (threadIdx.x > 0) {
         return;
