@@ -253,7 +253,7 @@ static __global__ void add_columns(GpuColumns list, const float *__restrict__ pa
     const GpuColumnSum own = list.sum[n];
     float total = 0.0f;
     for (int slice = share; slice < own.slices; slice += SHARES) {
-        total += partial[own.partial + (int64_t)slice * own.width + column];
+        total += partial[own.partial + (int64_t)slice * own.pitch + column];
     }
     part[threadIdx.x] = total;
     __syncthreads();

@@ -12,9 +12,10 @@ typedef struct {
     cublasHandle_t blas;
     cublasComputeType_t arithmetic; /* of the products */
     cublasStatus_t status;          /* the first failure of a product */
-    GpuArray weights;               /* as products read them: parameters, or their rounded copy */
-    GpuColumns columns;             /* column sums that are still to be added up */
-    float *partial;                 /* [GPU_SUM_SLICES][all columns] their partial sums */
+    int fused;          /* gpu_fused_processors; 0: bias, ELU and slope are kernels of their own */
+    GpuArray weights;   /* as products read them: parameters, or their rounded copy */
+    GpuColumns columns; /* column sums that are still to be added up */
+    float *partial;     /* their partial sums, gpu_mlp_partial of each network */
 } GpuQueue;
 
 /* As MlpOutputs. The last layer's are floats, which the losses read. */
@@ -31,6 +32,8 @@ float *gpu_mlp_forward(GpuQueue *queue, const Mlp *mlp, const float *parameters,
  * up. */
 void gpu_sum_columns(GpuQueue *queue, int rows, int width, GpuArray y, GpuArray d, GpuArray to,
                      int64_t at);
+/* Floats that the partial sums of a network's biases take at most. */
+int64_t gpu_mlp_partial(const Mlp *mlp, int fused, int rows);
 /* The biases' gradient comes by gpu_sum_columns.
  * d_x: gradient with respect to the input; NULL: not computed. work: as wide as the widest layer,
  * of the type of x. */
