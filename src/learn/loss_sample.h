@@ -75,29 +75,35 @@ MILD_HD_FN float loss_log_prob(int actions, const float *action, const float *me
     return (float)sum;
 }
 
-/* constant [actions + 2]: see loss_surrogate_constants. */
-MILD_HD_FN LossSurrogate loss_surrogate(int actions, const float *constant, float clip,
-                                        const float *action, const float *mean,
-                                        const float *old_mean, float old_log_prob,
-                                        float advantage) {
+/* From the log density of the action and KL(old || new). */
+MILD_HD_FN LossSurrogate loss_surrogate_of(float clip, float log_prob, float kl, float old_log_prob,
+                                           float advantage) {
     LossSurrogate s;
-    float log_prob = constant[actions];
-    s.kl = constant[actions + 1];
-    for (int j = 0; j < actions; j++) {
-        const float t = loss_standard(action[j], mean[j], constant[j]);
-        const float shift = (old_mean[j] - mean[j]) * constant[j];
-        log_prob -= 0.5f * t * t;
-        s.kl += 0.5f * shift * shift;
-    }
     const float ratio = expf(log_prob - old_log_prob);
     const float held = fminf(fmaxf(ratio, 1.0f - clip), 1.0f + clip);
     const float free_term = ratio * advantage;
     const float held_term = held * advantage;
     const int is_free = free_term <= held_term;
+    s.kl = kl;
     s.loss = -(is_free || isnan(free_term) ? free_term : held_term); /* NaN must propagate */
     s.d_log_prob = is_free ? -free_term : 0.0f;
     s.clipped = ratio != held;
     return s;
+}
+
+/* constant [actions + 2]: see loss_surrogate_constants. */
+MILD_HD_FN LossSurrogate loss_surrogate(int actions, const float *constant, float clip,
+                                        const float *action, const float *mean,
+                                        const float *old_mean, float old_log_prob,
+                                        float advantage) {
+    float log_prob = constant[actions], kl = constant[actions + 1];
+    for (int j = 0; j < actions; j++) {
+        const float t = loss_standard(action[j], mean[j], constant[j]);
+        const float shift = loss_standard(old_mean[j], mean[j], constant[j]);
+        log_prob -= 0.5f * t * t;
+        kl += 0.5f * shift * shift;
+    }
+    return loss_surrogate_of(clip, log_prob, kl, old_log_prob, advantage);
 }
 
 /* Converts the gradient with respect to log_prob to those with respect to the mean and the log std
@@ -112,21 +118,24 @@ MILD_HD_FN float loss_log_std_gradient(float d_log_prob, float t) {
 
 /* ---- mirror: sum over actions of (mean(o) - M_a mean(M_o o))^2 ---- */
 
-/* Returns the sum. The gradient flows through both means, because either may be the better one.
- * Adds to d_mean and overwrites d_image. weight: of the gradient, which is twice the weight of the
- * sum. */
+/* The square of an action's gap; image: of the action that is its mirror image. The gradient flows
+ * through both means, because either may be the better one: adds to d_mean and overwrites d_image.
+ * weight: of the gradient, which is twice the weight of the square. */
+MILD_HD_FN float loss_mirror_action(float weight, float sign, float mean, float image,
+                                    float *d_mean, float *d_image) {
+    const float gap = mean - sign * image;
+    *d_mean += weight * gap;
+    *d_image = -(weight * sign * gap);
+    return gap * gap;
+}
+
+/* Returns the sum. index: a permutation. */
 MILD_HD_FN float loss_mirror(int actions, const int *index, const float *sign, float weight,
                              const float *mean, const float *image, float *d_mean, float *d_image) {
     float sum = 0.0f;
     for (int j = 0; j < actions; j++) {
-        d_image[j] = 0.0f;
-    }
-    for (int j = 0; j < actions; j++) {
         const int k = index[j];
-        const float gap = mean[j] - sign[j] * image[k];
-        sum += gap * gap;
-        d_mean[j] += weight * gap;
-        d_image[k] -= weight * sign[j] * gap;
+        sum += loss_mirror_action(weight, sign[j], mean[j], image[k], &d_mean[j], &d_image[k]);
     }
     return sum;
 }

@@ -48,49 +48,6 @@ TEST(padding_is_zero_and_reversible) {
     free(back);
 }
 
-/* ---- column sums ---- */
-
-/* Sums over rows of layers with widths that fill a block's columns or do not, all added up at once,
- * twice. Slices are one row a thread, or many. */
-TEST(columns_are_added_up) {
-    static const int widths[] = {8, 48, 16, 200, 64}, row_counts[] = {1, 700, 20011};
-    enum { LAYERS = 5, WIDEST = 200, ALL = 336, NUMBERS = 20011 * WIDEST };
-    float *host = malloc(NUMBERS * sizeof *host), sums[ALL];
-    void *device = NULL;
-    const size_t partial = (size_t)GPU_SUM_SLICES * ALL, bytes = NUMBERS * sizeof *host;
-    assert_int_equal(cudaMalloc(&device, (2 * partial + ALL) * sizeof *host + bytes), cudaSuccess);
-    assert_non_null(host);
-    GpuQueue q = {.partial = device};
-    float *numbers = q.partial + partial, *gradient = numbers + NUMBERS;
-    Random random = random_at(9, 9, 9);
-    fill_normal(host, NUMBERS, 1.0, &random);
-    cudaMemcpyAsync(numbers, host, bytes, cudaMemcpyHostToDevice, NULL);
-    for (int k = 0; k < 3; k++) {
-        const GpuArray none = {0};
-        q.columns.count = 0;
-        for (int l = 0, at = ALL; l < LAYERS; l++) { /* from the end of the gradient on */
-            at -= widths[l];
-            gpu_sum_columns(&q, row_counts[k], widths[l], none, gpu_array_float(numbers), none, at);
-        }
-        gpu_add_columns(NULL, q.columns, q.partial, 0.0f, gradient);
-        gpu_add_columns(NULL, q.columns, q.partial, 1.0f, gradient);
-        cudaMemcpyAsync(sums, gradient, sizeof sums, cudaMemcpyDeviceToHost, NULL);
-        assert_int_equal(cudaStreamSynchronize(NULL), cudaSuccess);
-        for (int l = 0, at = ALL; l < LAYERS; l++) {
-            at -= widths[l];
-            for (int column = 0; column < widths[l]; column++) {
-                double sum = 0.0;
-                for (int r = 0; r < row_counts[k]; r++) {
-                    sum += 2.0 * (double)host[r * widths[l] + column];
-                }
-                assert_true(fabs(sums[at + column] - sum) < 1e-6 * row_counts[k]);
-            }
-        }
-    }
-    cudaFree(device);
-    free(host);
-}
-
 /* ---- gradient ---- */
 
 /* Gradients of every layer, weights and biases apart. */

@@ -50,9 +50,7 @@ size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int bf16, int rows,
         size_t width;
     } floats[] = {
         {&c->noise, all, (size_t)w->latent},
-        {&c->spread, rows, (size_t)w->latent},
         {&c->d_mean, all, (size_t)w->action},
-        {&c->d_log_std, rows, (size_t)w->action},
         {&c->d_heads, all, (size_t)w->heads},
         {&c->d_theta, all, (size_t)w->theta},
         {&c->d_actor_input, all, (size_t)w->actor_input},
@@ -209,12 +207,10 @@ static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean)
                             .old_log_prob = g->batch.log_prob,
                             .advantage = g->batch.advantage,
                             .mean = mean,
-                            .d_mean = c->d_mean,
-                            .d_log_std = c->d_log_std};
-    gpu_surrogate(g->queue.stream, s, c->rows, g->sums);
-    const GpuArray none = {0};
-    gpu_sum_columns(&g->queue, c->rows, pitch, none, gpu_array_float(s.d_log_std), none,
-                    g->network.log_std);
+                            .d_mean = c->d_mean};
+    const int slices =
+        gpu_surrogate(g->queue.stream, s, c->rows, g->sums, gpu_columns_next(&g->queue));
+    gpu_columns_add(&g->queue, pitch, slices, pitch, g->network.log_std);
     if (c->mirrored > 0) {
         const size_t images = (size_t)c->rows * (size_t)pitch;
         const int observation = g->network.def.observation;
@@ -245,7 +241,7 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
     const float epsilon = (float)def->epsilon * job->sample_weight, beta = job->beta;
     const float *mean = forward(g, all), *heads = last_of(&n->encoder, &c->encoder),
                 *theta = last_of(&n->modulation, &c->modulation);
-    gpu_sample_latent(q->stream, w, rows, heads, c->noise, c->spread, c->decoder_input);
+    gpu_sample_latent(q->stream, w, rows, heads, c->noise, c->decoder_input);
     const float *decoded =
         gpu_mlp_forward(q, &n->decoder, g->parameters, rows, c->decoder_input, &c->decoder);
 
@@ -257,8 +253,7 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
                      g->gradient, beta, c->d_decoder_input);
     gpu_mlp_backward(q, &n->actor, all, c->actor_input, &c->actor, c->d_mean, c->work, g->gradient,
                      beta, c->d_actor_input);
-    gpu_modulation_backward(q->stream, w, all, heads, actor_noise(g), theta, c->d_actor_input,
-                            c->d_heads, c->d_theta);
+    gpu_modulation_backward(q->stream, w, all, heads, actor_noise(g), c->d_actor_input, c->d_theta);
     gpu_mlp_backward(q, &n->modulation, all, c->feet, &c->modulation, c->d_theta, c->work,
                      g->gradient, beta, c->d_feet);
     const GpuHeads h = {.estimate_weight = 2.0f * epsilon,
@@ -268,8 +263,9 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
                         .order = job->order,
                         .target = g->batch.target,
                         .heads = heads,
-                        .spread = c->spread,
                         .noise = c->noise,
+                        .theta = theta,
+                        .d_input = c->d_actor_input,
                         .d_feet = c->d_feet,
                         .d_decoder_input = c->d_decoder_input,
                         .d_heads = c->d_heads};

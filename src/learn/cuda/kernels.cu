@@ -8,6 +8,8 @@
 #define AHEAD 2      /* rows that a thread reads before it works on the first */
 #define COLUMNS 8    /* of a block that adds up their slices; every width is a multiple */
 
+#define ROWS 64 /* of a block that adds up losses, at least */
+
 /* ---- numbers of an array ---- */
 
 struct Bf16 {
@@ -49,7 +51,7 @@ static __device__ void number_write(Bf16 *to, float x) {
     }
 
 int gpu_blocks(int rows) {
-    return (int)blocks_of(rows).x;
+    return (rows + ROWS - 1) / ROWS;
 }
 
 /* Adds the block's sum of x to *to; every thread of the block calls. */
@@ -114,9 +116,9 @@ void gpu_mirror_history(cudaStream_t stream, GpuImages m, const float *history, 
                history, to.at)
 }
 
-static __global__ void latent_noise(int64_t count, int latent, const uint64_t *key, const int *row,
-                                    float *noise) {
-    const int64_t i = item();
+static __global__ void latent_noise(uint32_t count, uint32_t latent, const uint64_t *key,
+                                    const int *row, float *noise) {
+    const uint32_t i = (uint32_t)item();
     if (i >= count) {
         return;
     }
@@ -129,7 +131,8 @@ static __global__ void latent_noise(int64_t count, int latent, const uint64_t *k
 void gpu_latent_noise(cudaStream_t stream, int rows, int latent, const uint64_t *key,
                       const int *row, float *noise) {
     const int64_t count = (int64_t)rows * latent;
-    LAUNCH(latent_noise, blocks_of(count), line, stream, count, latent, key, row, noise);
+    LAUNCH(latent_noise, blocks_of(count), line, stream, (uint32_t)count, (uint32_t)latent, key,
+           row, noise);
 }
 
 /* ---- layers ---- */
@@ -379,7 +382,7 @@ void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, Gpu
 /* One thread a number of the decoder's input [z | estimates]. */
 template <class T>
 static __global__ void sample_latent(GpuWidths w, uint32_t count, const float *heads,
-                                     const float *noise, float *spread, void *to) {
+                                     const float *noise, void *to) {
     T *input = (T *)to;
     const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.decoder_input;
     if (i >= count) {
@@ -393,95 +396,157 @@ static __global__ void sample_latent(GpuWidths w, uint32_t count, const float *h
         return;
     }
     const float *mu = h + w.estimates;
-    const float s = loss_spread(mu[w.latent + j]);
-    spread[r * w.latent + j] = s;
-    number_write(input + i, mu[j] + s * noise[r * w.latent + j]);
+    number_write(input + i, loss_latent(mu, mu + w.latent, noise + r * w.latent, j));
 }
 
 void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
-                       const float *noise, float *spread, GpuArray input) {
+                       const float *noise, GpuArray input) {
     const int64_t count = (int64_t)rows * w.decoder_input;
     LAUNCH_FOR(input, sample_latent, blocks_of(count), line, stream, w, (uint32_t)count, heads,
-               noise, spread, input.at)
+               noise, input.at)
 }
 
-/* ---- losses: one thread a sample ---- */
+/* ---- losses ---- */
 
-static __global__ void surrogate(GpuSurrogate s, int rows, double *sums) {
-    const int64_t r = item();
-    double loss = 0.0, divergence = 0.0, clipped = 0.0;
-    if (r < rows) {
-        const int actions = s.actions, i = s.order[r];
-        const float *action = s.action + (int64_t)i * actions, *mean = s.mean + r * s.pitch;
-        const LossSurrogate sample =
-            loss_surrogate(actions, s.constant, s.clip, action, mean,
-                           s.old_mean + (int64_t)i * actions, s.old_log_prob[i], s.advantage[i]);
-        const float d_log_prob = sample.d_log_prob * s.weight;
-        float *d_mean = s.d_mean + r * s.pitch, *d_log_std = s.d_log_std + r * s.pitch;
-        for (int j = 0; j < actions; j++) {
-            const float t = loss_standard(action[j], mean[j], s.constant[j]);
-            d_mean[j] = loss_mean_gradient(d_log_prob, t, s.constant[j]);
-            d_log_std[j] = loss_log_std_gradient(d_log_prob, t) - s.entropy;
+/* A block's threads in rows: one has column `column`, and from there on every side-th, of rows
+ * first, first + lanes .. end - 1. Threads that are left over have no rows. */
+struct Share {
+    int column, side, first, lanes, end;
+};
+
+/* Of rows begin .. end - 1. */
+static __device__ Share share_of(int columns, int begin, int end) {
+    Share s;
+    s.side = columns < THREADS ? columns : THREADS;
+    s.lanes = THREADS / s.side;
+    s.column = (int)threadIdx.x % s.side;
+    s.first = begin + (int)threadIdx.x / s.side;
+    s.end = (int)threadIdx.x < s.lanes * s.side ? end : 0;
+    return s;
+}
+
+/* Of a block's ROWS rows. */
+static __device__ Share share_of_rows(int columns, int rows) {
+    const int begin = (int)blockIdx.x * ROWS;
+    return share_of(columns, begin, begin + ROWS < rows ? begin + ROWS : rows);
+}
+
+/* A block has a slice of the samples, and takes DEEP of them a thread at a time: neighbours have
+ * the actions of a sample, then one thread adds up its terms, then neighbours have the gradients of
+ * its actions. Sums of log std: partial [slices][pitch]. */
+static __global__ void surrogate(GpuSurrogate s, int rows, double *sums, float *partial) {
+    enum { DEEP = 4, SIDE_MIN = 8, TILE_MAX = DEEP * THREADS / SIDE_MIN };
+    __shared__ float squares[DEEP * THREADS + TILE_MAX], shifts[DEEP * THREADS + TILE_MAX],
+        d_log_prob[TILE_MAX], part[THREADS];
+    const int slice = (int)blockIdx.x, slices = (int)gridDim.x, thread = (int)threadIdx.x;
+    const int end = (int)((int64_t)rows * (slice + 1) / slices);
+    const Share own = share_of(s.pitch, 0, 1);
+    const int j = own.column, tile = DEEP * own.lanes, stride = own.side + 1;
+    const int is_action = own.end && j < s.actions;
+    const float inverse = is_action ? s.constant[j] : 0.0f;
+    float d_log_std = 0.0f, loss = 0.0f, divergence = 0.0f, clipped = 0.0f;
+    for (int at = (int)((int64_t)rows * slice / slices); at < end; at += tile) {
+        float t[DEEP] = {}, shift[DEEP] = {};
+        for (int n = 0; n < DEEP; n++) {
+            const int r = at + own.first + n * own.lanes;
+            if (is_action && r < end) {
+                const int64_t i = (int64_t)s.order[r] * s.actions + j;
+                const float mean = s.mean[r * s.pitch + j];
+                t[n] = loss_standard(s.action[i], mean, inverse);
+                shift[n] = loss_standard(s.old_mean[i], mean, inverse);
+            }
         }
-        for (int j = actions; j < s.pitch; j++) {
-            d_log_std[j] = 0.0f;
+        for (int n = 0; n < DEEP && is_action; n++) {
+            const int place = (own.first + n * own.lanes) * stride + j;
+            squares[place] = 0.5f * t[n] * t[n];
+            shifts[place] = 0.5f * shift[n] * shift[n];
         }
-        loss = sample.loss;
-        clipped = sample.clipped;
-        divergence = sample.kl;
+        __syncthreads();
+        if (thread < tile && at + thread < end) {
+            const int i = s.order[at + thread];
+            float log_prob = s.constant[s.actions], kl = s.constant[s.actions + 1];
+            for (int k = 0; k < s.actions; k++) {
+                log_prob -= squares[thread * stride + k];
+                kl += shifts[thread * stride + k];
+            }
+            const LossSurrogate sample =
+                loss_surrogate_of(s.clip, log_prob, kl, s.old_log_prob[i], s.advantage[i]);
+            d_log_prob[thread] = sample.d_log_prob * s.weight;
+            loss += sample.loss;
+            divergence += sample.kl;
+            clipped += (float)sample.clipped;
+        }
+        __syncthreads();
+        for (int n = 0; n < DEEP; n++) {
+            const int row = own.first + n * own.lanes;
+            if (is_action && at + row < end) {
+                const float d = d_log_prob[row];
+                s.d_mean[(at + row) * s.pitch + j] = loss_mean_gradient(d, t[n], inverse);
+                d_log_std += loss_log_std_gradient(d, t[n]) - s.entropy;
+            }
+        }
     }
-    double *own = sums + (int64_t)blockIdx.x * GPU_SUMS;
-    add_block_sum(loss, own + GPU_SUM_SURROGATE);
-    add_block_sum(divergence, own + GPU_SUM_KL);
-    add_block_sum(clipped, own + GPU_SUM_CLIPPED);
+    part[thread] = d_log_std;
+    double *to = sums + (int64_t)slice * GPU_SUMS;
+    add_block_sum((double)loss, to + GPU_SUM_SURROGATE);
+    add_block_sum((double)divergence, to + GPU_SUM_KL);
+    add_block_sum((double)clipped, to + GPU_SUM_CLIPPED);
+    if (thread < own.side) {
+        for (int lane = 1; lane < own.lanes; lane++) {
+            d_log_std += part[lane * own.side + thread];
+        }
+        partial[slice * own.side + thread] = d_log_std;
+    }
 }
 
-void gpu_surrogate(cudaStream_t stream, GpuSurrogate s, int rows, double *sums) {
-    LAUNCH(surrogate, blocks_of(rows), line, stream, s, rows, sums);
+int gpu_surrogate(cudaStream_t stream, GpuSurrogate s, int rows, double *sums, float *partial) {
+    const int blocks = gpu_blocks(rows), slices = blocks < GPU_SUM_SLICES ? blocks : GPU_SUM_SLICES;
+    const dim3 grid = {(unsigned)slices, 1, 1};
+    LAUNCH(surrogate, grid, line, stream, s, rows, sums, partial);
+    return slices;
 }
 
-/* A sample has at most one image: no two threads write one row. action_index is a permutation. */
+/* A sample has at most one image: no two threads write one number. index is a permutation. */
 static __global__ void mirror_loss(GpuMirror m, int images, double *sums) {
-    const int64_t r = item();
+    const Share own = share_of_rows(m.actions, images);
+    const int j = own.column, k = m.index[j];
+    const float sign = m.sign[j];
     float sum = 0.0f;
-    if (r < images) {
-        const int64_t sample = m.which[r] - m.first;
-        sum = loss_mirror(m.actions, m.index, m.sign, m.weight, m.mean + sample * m.pitch,
-                          m.image + r * m.pitch, m.d_mean + sample * m.pitch,
-                          m.d_image + r * m.pitch);
+    for (int r = own.first; r < own.end; r += own.lanes) {
+        const int sample = (m.which[r] - m.first) * m.pitch, image = r * m.pitch;
+        sum += loss_mirror_action(m.weight, sign, m.mean[sample + j], m.image[image + k],
+                                  m.d_mean + sample + j, m.d_image + image + k);
     }
     add_block_sum((double)sum / m.actions, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_MIRROR);
 }
 
 void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums) {
-    LAUNCH(mirror_loss, blocks_of(images), line, stream, m, images, sums);
+    const dim3 grid = {(unsigned)gpu_blocks(images), 1, 1};
+    LAUNCH(mirror_loss, grid, line, stream, m, images, sums);
 }
 
-/* A block has THREADS rows and takes their numbers in order, so that neighbours read neighbours. */
-static __global__ void reconstruction(GpuWidths w, int rows, float weight, const int *order,
-                                      const float *frame, const float *critic, const float *decoded,
-                                      float *d, double *sums) {
-    const int pitch = w.decoded;
-    const int64_t first = (int64_t)blockIdx.x * THREADS * pitch, count = (int64_t)rows * pitch;
+static __global__ void
+reconstruction(GpuWidths w, int rows, float weight, const int *__restrict__ order,
+               const float *__restrict__ frame, const float *__restrict__ critic,
+               const float *__restrict__ decoded, float *__restrict__ d, double *sums) {
+    const int columns = w.decoded_frame + w.ground_count;
+    const Share own = share_of_rows(columns, rows);
     double loss = 0.0;
-    for (int part = 0; part < 2; part++) { /* frame, ground */
-        const int begin = part ? w.decoded_frame : 0;
-        const int width = part ? w.ground_count : w.decoded_frame;
-        const int stride = part ? w.critic_input : w.observation;
-        const float *target = part ? critic + w.ground_offset : frame;
-        double sum = 0.0;
-        for (int k = 0; width > 0 && k < pitch; k++) {
-            const uint32_t within = (uint32_t)(k * THREADS) + threadIdx.x;
-            const int column = (int)(within % (uint32_t)pitch) - begin;
-            const int64_t i = first + within;
-            if (i < count && column >= 0 && column < width) {
-                const int sample = order[(int64_t)blockIdx.x * THREADS + within / (uint32_t)pitch];
-                const float gap = decoded[i] - target[(int64_t)sample * stride + column];
-                sum += (double)(gap * gap);
-                d[i] = weight / (float)width * gap;
-            }
+    for (int column = own.column; column < columns; column += own.side) {
+        const int is_ground = column >= w.decoded_frame,
+                  width = is_ground ? w.ground_count : w.decoded_frame,
+                  stride = is_ground ? w.critic_input : w.observation;
+        const float *target =
+            is_ground ? critic + w.ground_offset + column - w.decoded_frame : frame + column;
+        const float weight_each = weight / (float)width;
+        float sum = 0.0f;
+        for (int r = own.first; r < own.end; r += own.lanes) {
+            const int i = r * w.decoded + column;
+            const float gap = decoded[i] - target[(int64_t)order[r] * stride];
+            sum += gap * gap;
+            d[i] = weight_each * gap;
         }
-        loss += width > 0 ? sum / width : 0.0;
+        loss += (double)sum / width;
     }
     add_block_sum(loss, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_RECONSTRUCTION);
 }
@@ -489,23 +554,9 @@ static __global__ void reconstruction(GpuWidths w, int rows, float weight, const
 void gpu_reconstruction(cudaStream_t stream, GpuWidths w, int rows, float weight, const int *order,
                         const float *frame, const float *critic, const float *decoded, float *d,
                         double *sums) {
-    LAUNCH(reconstruction, blocks_of(rows), line, stream, w, rows, weight, order, frame, critic,
-           decoded, d, sums);
-}
-
-/* One thread a number of d_heads. */
-static __global__ void modulation_heads(GpuWidths w, uint32_t count, const float *heads,
-                                        const float *noise, const float *theta,
-                                        const float *d_input, float *d_heads) {
-    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.heads;
-    const int64_t r = i / pitch;
-    const int column = (int)(i % pitch);
-    if (i < count && column < w.estimates + 2 * w.latent) {
-        d_heads[i] =
-            loss_modulation_head(w.estimates, w.latent, w.per_dimension, heads + r * w.heads,
-                                 noise ? noise + r * w.latent : NULL, theta + r * w.theta,
-                                 d_input + r * w.actor_input + w.observation, column);
-    }
+    const dim3 grid = {(unsigned)gpu_blocks(rows), 1, 1};
+    LAUNCH(reconstruction, grid, line, stream, w, rows, weight, order, frame, critic, decoded, d,
+           sums);
 }
 
 /* One thread a number of d_theta. */
@@ -525,72 +576,94 @@ static __global__ void modulation_theta(GpuWidths w, uint32_t count, const float
 }
 
 void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
-                             const float *noise, const float *theta, const float *d_input,
-                             float *d_heads, float *d_theta) {
-    const int64_t numbers = (int64_t)rows * w.heads, thetas = (int64_t)rows * w.theta;
-    LAUNCH(modulation_heads, blocks_of(numbers), line, stream, w, (uint32_t)numbers, heads, noise,
-           theta, d_input, d_heads);
-    LAUNCH(modulation_theta, blocks_of(thetas), line, stream, w, (uint32_t)thetas, heads, noise,
+                             const float *noise, const float *d_input, float *d_theta) {
+    const int64_t count = (int64_t)rows * w.theta;
+    LAUNCH(modulation_theta, blocks_of(count), line, stream, w, (uint32_t)count, heads, noise,
            d_input, d_theta);
 }
 
-/* Dimension j of a sample's latent: twice its KL term. */
-static __device__ float latent_backward(const GpuWidths &w, const GpuHeads &h, int64_t r, int j) {
-    const float *mu = h.heads + r * w.heads + w.estimates;
-    float *d_mu = h.d_heads + r * w.heads + w.estimates;
-    const float logvar = mu[w.latent + j], spread = h.spread[r * w.latent + j],
-                d_z = h.d_decoder_input[r * w.decoder_input + j];
-    const float twice = loss_latent_twice(mu[j], logvar, spread);
-    const float weight = loss_kl_weight(h.latent_weight, h.free_bits, twice);
-    const float d_draw = loss_draw_gradient(h.sampled, d_z, d_mu[j]);
-    d_mu[j] += loss_mu_gradient(weight, mu[j], d_z);
-    d_mu[w.latent + j] =
-        loss_logvar_gradient(weight, logvar, spread, h.noise[r * w.latent + j], d_draw);
+/* Dimension j of a row's latent: mu and logvar. Returns twice its KL term, of an image 0. */
+static __device__ float latent_backward(const GpuWidths &w, const GpuHeads &h, int r, int j,
+                                        int is_image) {
+    const int at_mu = w.estimates + j, at_logvar = at_mu + w.latent;
+    const float *heads = h.heads + r * w.heads, *theta = h.theta + r * w.theta,
+                *d_input = h.d_input + r * w.actor_input + w.observation,
+                *drawn = h.sampled ? h.noise + r * w.latent : NULL;
+    float *d_heads = h.d_heads + r * w.heads;
+    const float d_mu = loss_modulation_head(w.estimates, w.latent, w.per_dimension, heads, drawn,
+                                            theta, d_input, at_mu);
+    if (is_image) {
+        d_heads[at_mu] = d_mu;
+        d_heads[at_logvar] = loss_modulation_head(w.estimates, w.latent, w.per_dimension, heads,
+                                                  drawn, theta, d_input, at_logvar);
+        return 0.0f;
+    }
+    const float mu = heads[at_mu], logvar = heads[at_logvar], noise = h.noise[r * w.latent + j],
+                d_z = h.d_decoder_input[r * w.decoder_input + j], spread = loss_spread(logvar),
+                twice = loss_latent_twice(mu, logvar, spread),
+                weight = loss_kl_weight(h.latent_weight, h.free_bits, twice);
+    d_heads[at_mu] = d_mu + loss_mu_gradient(weight, mu, d_z);
+    d_heads[at_logvar] = loss_logvar_gradient(weight, logvar, spread, noise,
+                                              loss_draw_gradient(h.sampled, d_z, d_mu));
     return twice;
 }
 
-/* A block has THREADS rows and takes their numbers in order, so that neighbours read neighbours. A
- * number of mu does what its logvar needs, too. */
-static __global__ void heads_backward(GpuWidths w, GpuHeads h, int rows, int all, double *sums) {
-    const int ends[] = {w.feet_offset, w.feet_offset + w.feet_count, w.estimates};
-    const int64_t first = (int64_t)blockIdx.x * THREADS;
-    double group[3] = {0.0, 0.0, 0.0}, twice = 0.0;
-    for (int k = 0; k < w.heads; k++) {
-        const uint32_t within = (uint32_t)(k * THREADS) + threadIdx.x;
-        const int64_t r = first + within / (uint32_t)w.heads;
-        const int column = (int)(within % (uint32_t)w.heads), foot = column - ends[0];
-        float *d = h.d_heads + r * w.heads + column;
-        if (r < all && foot >= 0 && foot < w.feet_input) {
-            *d += h.d_feet[r * w.feet + foot];
-        }
-        if (r >= rows || column >= w.estimates + w.latent) {
-            continue;
-        }
-        if (column >= w.estimates) {
-            twice += latent_backward(w, h, r, column - w.estimates);
-            continue;
-        }
-        *d += h.d_decoder_input[r * w.decoder_input + w.latent + column];
-        for (int g = 0, begin = 0; g < 3; begin = ends[g++]) {
-            if (column >= begin && column < ends[g]) {
-                const int width = ends[g] - begin;
-                group[g] += (double)loss_estimate(
-                                h.estimate_weight / (float)width, h.heads[r * w.heads + column],
-                                h.target[(int64_t)h.order[r] * w.estimates + column], d) /
-                            width;
+/* Estimate j of a row. weight: twice that of its square. Returns the square, of an image 0. */
+static __device__ float estimate_backward(const GpuWidths &w, const GpuHeads &h, int r, int j,
+                                          int is_image, int sample, float weight) {
+    const int i = r * w.heads + j, foot = j - w.feet_offset;
+    float square = 0.0f, d = h.d_input[r * w.actor_input + w.observation + j];
+    if (foot >= 0 && foot < w.feet_input) {
+        d += h.d_feet[r * w.feet + foot];
+    }
+    if (!is_image) {
+        d += h.d_decoder_input[r * w.decoder_input + w.latent + j];
+        square = loss_estimate(weight, h.heads[i], h.target[(int64_t)sample * w.estimates + j], &d);
+    }
+    h.d_heads[i] = d;
+    return square;
+}
+
+/* A thread has estimate j and dimension j of the latent of its rows, so that neighbours read
+ * neighbours, and each several numbers at a time. */
+static __global__ void __launch_bounds__(THREADS, 5)
+    heads_backward(GpuWidths w, GpuHeads h, int rows, int all, double *sums) {
+    const int feet_end = w.feet_offset + w.feet_count,
+              widths[] = {w.feet_offset, w.feet_count, w.estimates - feet_end},
+              columns = w.estimates > w.latent ? w.estimates : w.latent;
+    const Share own = share_of_rows(columns, all);
+    float squares[3] = {0.0f, 0.0f, 0.0f}, twice = 0.0f;
+    for (int j = own.column; j < columns; j += own.side) {
+        const int group = (j >= w.feet_offset) + (j >= feet_end);
+        const int width = group == 0 ? widths[0] : group == 1 ? widths[1] : widths[2];
+        const float weight = h.estimate_weight / (float)width;
+        float square = 0.0f;
+        LANE_ROLLED
+        for (int r = own.first; r < own.end; r += own.lanes) {
+            const int is_image = r >= rows, sample = is_image ? 0 : h.order[r];
+            if (j < w.latent) {
+                twice += latent_backward(w, h, r, j, is_image);
+            }
+            if (j < w.estimates) {
+                square += estimate_backward(w, h, r, j, is_image, sample, weight);
             }
         }
+        for (int g = 0; g < 3; g++) {
+            squares[g] += g == group ? square : 0.0f;
+        }
     }
-    double *own = sums + (int64_t)blockIdx.x * GPU_SUMS;
+    double *to = sums + (int64_t)blockIdx.x * GPU_SUMS;
     for (int g = 0; g < 3; g++) {
-        add_block_sum(group[g], own + GPU_SUM_ESTIMATE + g);
+        add_block_sum(widths[g] > 0 ? (double)squares[g] / widths[g] : 0.0,
+                      to + GPU_SUM_ESTIMATE + g);
     }
-    add_block_sum(0.5 * twice, own + GPU_SUM_VAE_KL);
+    add_block_sum(0.5 * (double)twice, to + GPU_SUM_VAE_KL);
 }
 
 void gpu_heads_backward(cudaStream_t stream, GpuWidths w, GpuHeads h, int rows, int all,
                         double *sums) {
-    LAUNCH(heads_backward, blocks_of(all), line, stream, w, h, rows, all, sums);
+    const dim3 grid = {(unsigned)gpu_blocks(all), 1, 1};
+    LAUNCH(heads_backward, grid, line, stream, w, h, rows, all, sums);
 }
 
 static __global__ void value_loss(GpuValue v, int rows, double *sums) {

@@ -102,7 +102,7 @@ void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, int newest, GpuA
 void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, GpuArray history,
                      const float *heads, const float *noise, const float *theta, GpuArray input);
 void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
-                       const float *noise, float *spread, GpuArray input);
+                       const float *noise, GpuArray input);
 
 /* ---- losses. order: [rows] samples, whose numbers are read from the rollout ---- */
 
@@ -114,9 +114,11 @@ typedef struct {
     const int *order;
     const float *action, *old_mean, *old_log_prob, *advantage; /* of the rollout */
     const float *mean;                                         /* [rows][pitch] */
-    float *d_mean, *d_log_std;                                 /* [rows][pitch] */
+    float *d_mean;                                             /* [rows][pitch] */
 } GpuSurrogate;
-void gpu_surrogate(cudaStream_t stream, GpuSurrogate s, int rows, double *sums);
+/* Returns the number of slices of the gradient of log std: partial [slices][pitch], as
+ * gpu_bias_backward. */
+int gpu_surrogate(cudaStream_t stream, GpuSurrogate s, int rows, double *sums, float *partial);
 
 typedef struct {
     int actions, pitch, first;
@@ -132,19 +134,19 @@ void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums)
 void gpu_reconstruction(cudaStream_t stream, GpuWidths w, int rows, float weight, const int *order,
                         const float *frame, const float *critic, const float *decoded, float *d,
                         double *sums);
+/* d_theta from the gradient of the actor's input. noise: as in gpu_actor_input. */
 void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
-                             const float *noise, const float *theta, const float *d_input,
-                             float *d_heads, float *d_theta);
+                             const float *noise, const float *d_input, float *d_theta);
 
-/* Adds the gradient of the regression for the first `rows` of `all`, and that of the modulation
- * through the feet's estimates for all. */
+/* d_heads: through the actor's input and through the modulation's, that is the feet's estimates,
+ * for all rows, and from the regression for the first `rows` of `all`. */
 typedef struct {
     float estimate_weight, latent_weight; /* of a sample */
     float free_bits;
     int sampled; /* bool: the actor got the decoder's z */
     const int *order;
     const float *target; /* of the rollout */
-    const float *heads, *spread, *noise, *d_feet, *d_decoder_input;
+    const float *heads, *noise, *theta, *d_input, *d_feet, *d_decoder_input;
     float *d_heads;
 } GpuHeads;
 void gpu_heads_backward(cudaStream_t stream, GpuWidths w, GpuHeads h, int rows, int all,

@@ -18,10 +18,8 @@ typedef struct {
     GpuArray feet;          /* [rows + mirrored] the modulation's input */
     GpuArray actor_input;   /* [rows + mirrored] */
     GpuArray decoder_input; /* [rows] */
-    float *spread;          /* [rows][latent] exp(logvar / 2) */
     /* gradients with respect to the array named after d_ */
     float *d_mean;          /* [rows + mirrored] */
-    float *d_log_std;       /* [rows] */
     float *d_heads;         /* [rows + mirrored] */
     float *d_theta;         /* [rows + mirrored] */
     float *d_actor_input;   /* [rows + mirrored] */

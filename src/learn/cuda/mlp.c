@@ -54,55 +54,57 @@ float *gpu_mlp_forward(GpuQueue *q, const Mlp *mlp, const float *parameters, int
     return outputs->y[last].at;
 }
 
-/* Where the partial sums of the next columns begin. */
-static int64_t next_partial(const GpuColumns *columns) {
-    if (columns->count == 0) {
-        return 0;
-    }
-    const GpuColumnSum *before = &columns->sum[columns->count - 1];
-    return before->partial + (int64_t)before->slices * before->pitch;
+static int64_t columns_end(const GpuColumns *columns) {
+    const GpuColumnSum *last = &columns->sum[columns->count - 1];
+    return columns->count > 0 ? last->partial + (int64_t)last->slices * last->pitch : 0;
 }
 
-void gpu_sum_columns(GpuQueue *q, int rows, int width, GpuArray y, GpuArray d, GpuArray to,
-                     int64_t at) {
+float *gpu_columns_next(GpuQueue *q) {
+    return q->partial + columns_end(&q->columns);
+}
+
+void gpu_columns_add(GpuQueue *q, int width, int slices, int pitch, int64_t at) {
     GpuColumns *columns = &q->columns;
-    const int64_t partial = next_partial(columns);
-    const int slices = gpu_bias_backward(q->stream, rows, width, y, d, to, q->partial + partial);
-    columns->sum[columns->count++] = (GpuColumnSum){width, slices, width, partial, at};
+    const GpuColumnSum sum = {width, slices, pitch, columns_end(columns), at};
+    columns->sum[columns->count++] = sum;
 }
 
 int64_t gpu_mlp_partial(const Mlp *mlp, int fused, int rows) {
     int64_t most = 0;
     for (int l = 0; l < mlp->layers; l++) {
         const int width = mlp->layer[l].out;
-        int64_t own = (int64_t)GPU_SUM_SLICES * width;
+        GpuSlices s = {GPU_SUM_SLICES, width};
         if (fused && l < mlp->layers - 1) {
-            const GpuSlices s = gpu_fused_slices(rows, width);
-            own = (int64_t)s.slices * s.pitch;
+            s = gpu_fused_slices(rows, width);
         }
-        most += own;
+        most += (int64_t)s.slices * s.pitch;
     }
     return most;
 }
 
-/* to = (d W) slope(y), of the layer whose input is y, the output of the layer before, and the sums
- * of the latter's bias. */
+/* to = d slope(y), and the sums of the bias. */
+static void end_backward(GpuQueue *q, const MlpLayer *layer, int rows, GpuArray y, GpuArray d,
+                         GpuArray to) {
+    const int slices =
+        gpu_bias_backward(q->stream, rows, layer->out, y, d, to, gpu_columns_next(q));
+    gpu_columns_add(q, layer->out, slices, layer->out, layer->bias);
+}
+
+/* to = (d W) slope(y), with y the layer's input, the output of the layer before, and the sums of
+ * the latter's bias. */
 static void layer_backward(GpuQueue *q, const MlpLayer *layer, const MlpLayer *before, int rows,
                            GpuArray d, GpuArray y, GpuArray to) {
     const GpuArray weight = weight_of(q, layer);
-    if (!q->fused) {
-        product(q, 'N', 'N', rows, layer->in, layer->out, d, layer->out, weight, layer->in, 0.0f,
-                to, layer->in);
-        gpu_sum_columns(q, rows, layer->in, y, to, to, before->bias);
+    if (q->fused) {
+        const GpuSlices s = gpu_fused_slices(rows, layer->in);
+        fused_status(q, gpu_fused_backward(q->stream, q->fused, rows, layer->out, layer->in, d.at,
+                                           weight.at, y.at, to.at, gpu_columns_next(q)));
+        gpu_columns_add(q, layer->in, s.slices, s.pitch, before->bias);
         return;
     }
-    GpuColumns *columns = &q->columns;
-    const int64_t partial = next_partial(columns);
-    const GpuSlices s = gpu_fused_slices(rows, layer->in);
-    fused_status(q, gpu_fused_backward(q->stream, q->fused, rows, layer->out, layer->in, d.at,
-                                       weight.at, y.at, to.at, q->partial + partial));
-    columns->sum[columns->count++] =
-        (GpuColumnSum){layer->in, s.slices, s.pitch, partial, before->bias};
+    product(q, 'N', 'N', rows, layer->in, layer->out, d, layer->out, weight, layer->in, 0.0f, to,
+            layer->in);
+    end_backward(q, before, rows, y, to, to);
 }
 
 /* Per layer, with d = dL/d(Wx + b):  dW = d^T x,  db = sum over rows of d,  dx = d W. */
@@ -112,7 +114,7 @@ void gpu_mlp_backward(GpuQueue *q, const Mlp *mlp, int rows, GpuArray x, const G
     const int last = mlp->layers - 1;
     const GpuArray linear = {NULL, x.bf16};
     GpuArray d = gpu_array_float(d_last), to = x.bf16 ? work[(last + 1) % 2] : d;
-    gpu_sum_columns(q, rows, mlp->layer[last].out, linear, d, to, mlp->layer[last].bias);
+    end_backward(q, &mlp->layer[last], rows, linear, d, to);
     for (int l = last; l >= 0; l--) {
         const MlpLayer *layer = &mlp->layer[l];
         d = to;

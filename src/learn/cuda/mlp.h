@@ -28,13 +28,13 @@ typedef struct {
  * bytes. Biases are read from the parameters. */
 float *gpu_mlp_forward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows,
                        GpuArray x, const GpuOutputs *outputs);
-/* As gpu_bias_backward, with the sums at `at` in the gradient, once the queue's columns are added
- * up. */
-void gpu_sum_columns(GpuQueue *queue, int rows, int width, GpuArray y, GpuArray d, GpuArray to,
-                     int64_t at);
+/* Where the next partial sums of columns go, [slices][pitch], and their entry in queue.columns: `at`
+ * in the gradient. */
+float *gpu_columns_next(GpuQueue *queue);
+void gpu_columns_add(GpuQueue *queue, int width, int slices, int pitch, int64_t at);
 /* Floats that the partial sums of a network's biases take at most. */
 int64_t gpu_mlp_partial(const Mlp *mlp, int fused, int rows);
-/* The biases' gradient comes by gpu_sum_columns.
+/* The gradient of a bias is an entry in queue.columns.
  * d_x: gradient with respect to the input; NULL: not computed. work: as wide as the widest layer,
  * of the type of x. */
 void gpu_mlp_backward(GpuQueue *queue, const Mlp *mlp, int rows, GpuArray x,

@@ -343,13 +343,14 @@ static __device__ int decide_step(const GpuDecision *d, const LossSums *sums, do
 
 static __global__ void decide(GpuDecision d, int parts, const double *partial,
                               GpuProgress *progress) {
-    double total[GPU_SUMS];
-    for (int k = 0; k < GPU_SUMS; k++) {
-        double sum = 0.0;
-        for (int block = (int)threadIdx.x; block < d.blocks; block += THREADS) {
-            sum += d.sums[(int64_t)block * GPU_SUMS + k];
+    double total[GPU_SUMS] = {};
+    for (int block = (int)threadIdx.x; block < d.blocks; block += THREADS) {
+        for (int k = 0; k < GPU_SUMS; k++) {
+            total[k] += d.sums[(int64_t)block * GPU_SUMS + k];
         }
-        total[k] = block_sum(sum);
+    }
+    for (int k = 0; k < GPU_SUMS; k++) {
+        total[k] = block_sum(total[k]);
     }
     const double norm = sqrt(block_sum((int)threadIdx.x < parts ? partial[threadIdx.x] : 0.0));
     if (threadIdx.x > 0) {

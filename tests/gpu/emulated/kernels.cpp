@@ -117,6 +117,7 @@ void __syncthreads() {
 #define __global__
 #define __device__
 #define __shared__ static
+#define __launch_bounds__(...)
 #define LAUNCH(kernel, grid, block, stream, ...)                                                   \
     ((void)(stream), launch(grid, block, [&] { kernel(__VA_ARGS__); }))
 
