@@ -11,6 +11,7 @@ jobs=${JOBS:-$(nproc)}
 ranks=(-DMILD_MPI=OFF)
 [ "${1:-}" != ranks ] || ranks=(-DMILD_MPI=ON -DMILD_NCCL=ON)
 
+scripts/setup.sh cuda
 rm -rf "$bundle"
 mkdir -p "$bundle/bin" "$bundle/lib"
 sizes=engine_sizes # of the first build, because the second may not run here

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs what building, running and testing need, except what is already installed. Safe to repeat.
-# Usage: scripts/setup.sh [check|web]; with `check` also what `make check` needs, with `web` what the page does.
+# Usage: scripts/setup.sh [check|web|cuda]; with `check` also what `make check` needs, with `web` what the page does, with `cuda` the
+# headers of CUTLASS for the learner on a Hopper.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -71,4 +72,16 @@ if ! cmp -s scripts/sources.txt .venv/sources.installed; then
         -d .venv/sources -r scripts/sources.txt
     tar -xzf .venv/sources/daqp-*.tar.gz -C .venv
     cp scripts/sources.txt .venv/sources.installed
+fi
+
+if [ "${1:-}" = cuda ] && ! cmp -s scripts/cutlass.txt .venv/cutlass.installed; then
+    rm -rf .venv/cutlass* .venv/sources/nvidia_cutlass*
+    scripts/quietly.sh build/log/cutlass.log "setup: headers of CUTLASS" \
+        .venv/bin/python -m pip download --progress-bar off --disable-pip-version-check --no-deps --require-hashes \
+        -d .venv/sources -r scripts/cutlass.txt
+    .venv/bin/python -m zipfile -e .venv/sources/nvidia_cutlass-*.whl .venv/cutlass.unpacked
+    mkdir .venv/cutlass
+    mv .venv/cutlass.unpacked/cutlass_library/source/include .venv/cutlass.unpacked/*.dist-info/licenses .venv/cutlass/
+    rm -rf .venv/cutlass.unpacked
+    cp scripts/cutlass.txt .venv/cutlass.installed
 fi

@@ -7,6 +7,7 @@ cd "$(dirname "$0")/.."
 root=$PWD/build/dist archs=${ARCHS:-80 90-real 100-real 120} # 80: also 86 and 89, and as PTX whatever has no code of its own
 tools=$root/tools cuda=$root/cuda
 mkdir -p "$root"
+scripts/setup.sh cuda
 # install FOLDER FILE.txt: an environment with these packages.
 install() {
     cmp -s "$2" "$1/installed" && return

@@ -384,7 +384,7 @@ WARP_FN void env_part(const EnvsArrays *all, const EnvsStep *call, long robot, i
         if (!env->variation.rigid) {
             env_export(all, robot, &scratch->work);
         }
-        if (shells) {
+        if (shells && env->variation.shells_stand) {
             const EngineGround ground = env_surface(all, robot);
             env_shells_near(all, robot, &ground, &scratch->work);
         }

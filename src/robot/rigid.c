@@ -107,7 +107,6 @@ static void collide_shells(RobotSim *sim, const MildTerrain *terrain) {
             touching[shell->limb] |= now > 0;
         }
     }
-    sim->rows = robot->def.feet;
     for (int b = robot->def.feet; b < sim->input.feet; b++) {
         if (touching[b]) {
             sim->row[sim->rows++] = b;
@@ -126,7 +125,8 @@ void rigid_collide(RobotSim *sim, const MildTerrain *terrain) {
         }
     }
     sim->shell_contact = sim->data->ncon;
-    if (sim->input.feet > sim->robot->def.feet) {
+    sim->rows = sim->robot->def.feet;
+    if (sim->input.feet > sim->rows && sim->variation.shells_stand) {
         collide_shells(sim, terrain);
     }
 }

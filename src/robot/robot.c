@@ -11,7 +11,7 @@
 #define LEVEL 0.02 /* [rad] largest tilt of a flat sole in the default pose */
 
 RobotVariation robot_variation_nominal(void) {
-    RobotVariation variation = {.armature_scale = 1.0, .rigid_friction = 0.8};
+    RobotVariation variation = {.armature_scale = 1.0, .rigid_friction = 0.8, .shells_stand = 1};
     for (int i = 0; i <= ROBOT_JOINTS_MAX; i++) {
         variation.link_mass_scale[i] = 1.0;
     }

@@ -269,8 +269,8 @@ static void update_shells(RobotSim *sim) {
     }
 }
 
-/* The feet and those shells that may touch the ground get rows of A. Gravity adds to a velocity
- * less than mild_ground_near allows for. */
+/* The feet and those shells that stand and may touch the ground get rows of A. Gravity adds to a
+ * velocity less than mild_ground_near allows for. */
 static void choose_rows(RobotSim *sim, const MildTerrain *terrain) {
     const int feet = sim->robot->def.feet;
     if (sim->input.feet == feet) {
@@ -279,7 +279,8 @@ static void choose_rows(RobotSim *sim, const MildTerrain *terrain) {
     update_shells(sim);
     sim->rows = feet;
     sim->input.rows = (1u << feet) - 1;
-    const uint32_t near = mild_ground_near(terrain, &sim->input, sim->scratch);
+    const uint32_t near =
+        sim->variation.shells_stand ? mild_ground_near(terrain, &sim->input, sim->scratch) : 0;
     for (int b = feet; b < sim->input.feet; b++) {
         if (near >> b & 1) {
             sim->input.rows |= 1u << b;

@@ -24,6 +24,7 @@ typedef struct {
     double rigid_friction; /* [-] friction coefficient of the engine's contact when rigid */
     double rigid_time; /* [s] time constant of that contact, critically damped; 0: the model's */
     int rigid;         /* bool: the engine's own contact under the feet's corners, no soft ground */
+    int shells_stand;  /* bool: the ground pushes against shells, see robot_set_shells */
 } RobotVariation;
 
 /* State of a foot after a step, in world axes about its reference point. The reference point is the

@@ -13,6 +13,7 @@ Episode episode_of(const Envs *envs, int i) {
     Episode episode = {.index = from->index,
                        .step = from->step,
                        .rigid = from->variation.rigid,
+                       .shells_stand = from->variation.shells_stand,
                        .friction = from->variation.rigid_friction,
                        .rigid_time = from->variation.rigid_time,
                        .map = {map[0], map[1]}};

@@ -11,6 +11,7 @@ typedef struct {
     uint32_t index, step;
     int ground[MILD_MATERIALS_MAX]; /* by label */
     int rigid;                      /* bool */
+    int shells_stand;               /* bool */
     double friction;                /* [-] of rigid ground */
     double rigid_time;              /* [s] */
     double map[2];                  /* [m] */

@@ -195,6 +195,7 @@ static void same_episode(int e) {
     const Episode b = episode_of(pair.batch, e);
     assert_true(a->index == b.index && a->step == b.step);
     assert_true(a->ground[0] == b.ground[0] && a->variation.rigid == b.rigid);
+    assert_int_equal(a->variation.shells_stand, b.shells_stand);
     assert_near(a->variation.rigid_friction, b.friction, 1e-7);
     assert_near(task_env_terrain(a)->map_x, b.map[0], 1e-6);
     assert_near(task_env_terrain(a)->map_y, b.map[1], 1e-6);

@@ -82,6 +82,9 @@ static Falls fall(const char *robot, TaskDef def, int device, const MildMapDef *
             falls.steps++;
             falls.together += !apart[e];
             falls.near += held[e] != 0;
+            if (device == MILD_BATCH_HOST && held[e] && !done) {
+                assert_true(episode_of(pair.batch, e).shells_stand);
+            }
             falls.near_together += held[e] && !apart[e];
             if (!apart[e]) {
                 assert_int_equal(pair.a.cause[e], pair.b.cause[e]);
@@ -221,6 +224,82 @@ TEST(far_shells_change_no_bit) {
     assert_true(far > ENVS * some_steps() * 3 / 4);
 }
 
+/* ---- shells that do not stand in all episodes ---- */
+
+/* The rows of the CPU and of the batch engine after each step of robots that fall, half of them on
+ * rigid ground. */
+typedef struct {
+    Rows a[STEPS], b[STEPS];
+} Record;
+
+static void record_falls(int stand, double share, Record *record) {
+    TaskDef def = shells_def();
+    def.shells_stand = stand;
+    def.randomize.shells_share = share;
+    def.randomize.rigid_share = 0.5;
+    pair_open(GO1, &def, MILD_BATCH_HOST);
+    pair_reset();
+    for (int t = 0; t < some_steps(); t++) {
+        draw_falls(t, 2);
+        pair_step();
+        record->a[t] = pair.a;
+        record->b[t] = pair.b;
+    }
+    pair_close();
+}
+
+static int same_rows(const Rows *x, const Rows *y, int e) {
+    const size_t width = (size_t)pair.shape.critic, at = (size_t)e * width;
+    return x->reward[e] == y->reward[e] && x->done[e] == y->done[e] && x->cause[e] == y->cause[e] &&
+           memcmp(x->critic + at, y->critic + at, width * sizeof(float)) == 0;
+}
+
+/* With a share of 0 no bit differs from robots without shells, with 1 the steps after a touch. */
+TEST(in_no_episode_is_without) {
+    static Record without, none, all;
+    int same[2] = {0, 0}, touched[2] = {0, 0}, shell_ends = 0;
+    record_falls(0, 1, &without);
+    record_falls(1, 0, &none);
+    record_falls(1, 1, &all);
+    for (int t = 0; t < some_steps(); t++) {
+        for (int e = 0; e < ENVS; e++) {
+            same[0] += same_rows(&none.a[t], &without.a[t], e);
+            same[1] += same_rows(&none.b[t], &without.b[t], e);
+            touched[0] += !same_rows(&all.a[t], &without.a[t], e);
+            touched[1] += !same_rows(&all.b[t], &without.b[t], e);
+            shell_ends += none.a[t].done[e] && none.a[t].cause[e] == TASK_END_shell;
+        }
+    }
+    const int steps = ENVS * some_steps();
+    print_message("%d and %d of %d steps as without shells; %d and %d differ from shells that "
+                  "stand; %d ends by a shell\n",
+                  same[0], same[1], steps, touched[0], touched[1], shell_ends);
+    assert_true(same[0] == steps && same[1] == steps);
+    assert_true(touched[0] > steps / 10 && touched[1] > steps / 10 && shell_ends > 0);
+}
+
+/* Half of the robots: those of MuJoCo, and the ground touches no shell of the others (fall). */
+static TaskDef half_def(void) {
+    TaskDef def = shells_def();
+    def.randomize.shells_share = 0.5;
+    return def;
+}
+
+TEST(in_half_of_the_episodes) {
+    const TaskDef def = half_def();
+    int stand = 0;
+    pair_open(GO1, &def, MILD_BATCH_HOST);
+    pair_reset();
+    for (int e = 0; e < ENVS; e++) {
+        same_episode(e);
+        stand += episode_of(pair.batch, e).shells_stand;
+    }
+    pair_close();
+    print_message("the shells of %d of %d robots stand\n", stand, ENVS);
+    assert_true(stand > ENVS / 4 && stand < ENVS * 3 / 4);
+    check(fall(GO1, def, MILD_BATCH_HOST, NULL, 2), 0.5);
+}
+
 /* Robots that stagger, whose shells may come near. */
 TEST(standing_robots_follow_mujoco) {
     follow(SA01, shells_def(), MILD_BATCH_HOST, NULL, 0.85);
@@ -245,6 +324,7 @@ TEST(device_falls_are_those_of_mujoco) {
     check(fall(G1, shells_def(), 0, NULL, 2), 0.5);
     check(fall(GO1, shells_def(), 0, &map, 2), 0.5);
     check(fall(GO1, drop_def(TASK_START_ANY), 0, NULL, 2), 0.5);
+    check(fall(GO1, half_def(), 0, NULL, 2), 0.5);
     follow(SA01, shells_def(), 0, NULL, 0.85);
     int far, same;
     stand_twice(0, NULL, &far,

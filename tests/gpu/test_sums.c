@@ -32,7 +32,7 @@ static void check_columns(GpuQueue *q, int rows, const float *host, float *numbe
         at -= widths[l];
         const int slices =
             gpu_bias_backward(NULL, rows, widths[l], none, d, none, gpu_columns_next(q));
-        gpu_columns_add(q, widths[l], slices, at);
+        gpu_columns_add(q, widths[l], slices, widths[l], at);
     }
     gpu_add_columns(NULL, q->columns, q->partial, 0.0f, gradient);
     gpu_add_columns(NULL, q->columns, q->partial, 1.0f, gradient);
@@ -173,7 +173,7 @@ TEST(surrogates_of_many_samples) {
                             device->mean,
                             device->d_mean};
     const int slices = gpu_surrogate(NULL, s, SAMPLES, device->sums, gpu_columns_next(&q));
-    gpu_columns_add(&q, PITCH, slices, 0);
+    gpu_columns_add(&q, PITCH, slices, PITCH, 0);
     gpu_add_columns(NULL, q.columns, q.partial, 0.0f, device->gradient);
     copy_from(a, device, sizeof *a);
     double expected[GPU_SUMS] = {0.0}, d_log_std[PITCH] = {0.0}, sums[GPU_SUMS] = {0.0};

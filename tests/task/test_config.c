@@ -147,13 +147,15 @@ static const struct {
     double value;
 } still[] = {{"rigid_share", 0},  {"preset_share", 1}, {"preset_jitter", 0}, {"patch_share", 0},
              {"base_mass", 0},    {"com_offset", 0},   {"link_mass", 1},     {"armature", 1},
-             {"motor_offset", 0}, {"gain", 1},         {"strength", 1},      {"push_interval", 0}};
+             {"motor_offset", 0}, {"gain", 1},         {"strength", 1},      {"push_interval", 0},
+             {"shells_share", 1}};
 
 /* Those keys have no effect, all others their defaults: noise, latencies and the start are
  * drawn. */
 TEST(nominal) {
     TaskDef plain = task_def_default();
     TaskDef def = plain;
+    def.randomize.shells_share = 0.5;
     task_def_make_nominal(&def);
     int changed = 0;
     for (int i = 0; i < randomize_field_count; i++) {

@@ -447,6 +447,33 @@ TEST(slip_on_a_share) {
     free(env);
 }
 
+/* In as many episodes as asked for; it moves no other draw. */
+TEST(shells_stand_in_a_share) {
+    open_env();
+    TaskDef some = def;
+    some.randomize.shells_share = 0.3;
+    int stand = 0, rigid = 0;
+    for (int t = 0; t < DRAWS; t++) {
+        draw_next();
+        assert_int_equal(env->variation.shells_stand, 1);
+        const TaskEnv plain = *env;
+        task_env_draw(env, &some, robot);
+        stand += env->variation.shells_stand;
+        rigid += env->variation.shells_stand && env->variation.rigid;
+        env->variation.shells_stand = 1;
+        assert_memory_equal(env, &plain, sizeof plain);
+    }
+    expect_share("shells", stand, DRAWS, 0.3);
+    expect_share("of those on rigid ground", rigid, stand, 0.1);
+    some.randomize.shells_share = 0;
+    for (int t = 0; t < 50; t++) {
+        env->tick += 97;
+        task_env_draw(env, &some, robot);
+        assert_int_equal(env->variation.shells_stand, 0);
+    }
+    free(env);
+}
+
 /* Whatever is drawn, one foot under the whole weight rests no deeper than 0.07 m; what rests higher
  * is left alone; what was stiffened rests at 0.07 m. k_pen and sigma_cone grow by one factor. */
 TEST(limit_of_sinkage) {

@@ -263,6 +263,20 @@ TEST(the_share_is_kept) {
     close_env();
 }
 
+/* And none is dropped whose shells do not stand in this episode. */
+TEST(only_shells_that_stand_are_dropped_on) {
+    open_env(TASK_START_ANY);
+    def.randomize.shells_share = 0.5;
+    int stand = 0;
+    for (uint32_t k = 0; k < DRAWS; k++) {
+        begin(k, 0);
+        assert_int_equal(env->dropped, env->variation.shells_stand);
+        stand += env->variation.shells_stand;
+    }
+    assert_true(stand > DRAWS / 4 && stand < DRAWS * 3 / 4);
+    close_env();
+}
+
 /* A lying robot needs shells that stand. */
 TEST(without_shells_it_is_refused) {
     MildError error = {0};

@@ -140,6 +140,27 @@ TEST(base_touches) {
     rig_close(&rig);
 }
 
+/* A robot may lie in the episodes in which its shells stand. */
+TEST(lies_where_shells_stand) {
+    open_limp();
+    rig.def.may_lie = 1;
+    robot_set_shells(robot, 1);
+    for (int stand = 0; stand < 2; stand++) {
+        rig.env->variation.shells_stand = stand;
+        RobotState state = kit_state(2);
+        kit_turn(state.qpos, 0.7, 0, 1.5);
+        expect_cause("tilted", step_from(&state, 10), !stand, TASK_END_tilt);
+        state = folded();
+        rig.def.tilt_limit = 3.1;
+        kit_turn(state.qpos, 0.3, -1.0, 0.1);
+        state.qpos[2] -= 1e-2 + lowest_of_box(&state, "base_link_box");
+        expect_cause("on its back", step_from(&state, 10), !stand, TASK_END_base);
+        rig.def.tilt_limit = 1;
+    }
+    robot_set_shells(robot, 0);
+    rig_close(&rig);
+}
+
 /* One knee on the ground, the other leg stretched up and forward. */
 static void shank_touches(int leg, const char *box) {
     open_limp();
@@ -170,17 +191,22 @@ static void shank_touches(int leg, const char *box) {
     robot_set_model(robot, MILD_MODEL_CON_CONE); /* has no shells that stand */
     touch(&state, box, 0, box, TASK_END_shell);
     robot_set_model(robot, MILD_MODEL_MILD);
+    rig.env->variation.shells_stand = 0; /* they do not in this episode */
+    touch(&state, box, 0, box, TASK_END_shell);
+    rig.env->variation.shells_stand = 1;
     robot_set_shells(robot, 0);
     rig.env->variation.rigid = 0;
-    for (int stand = 0; stand < 2;
+    for (int stand = 0; stand < 4;
          stand++) { /* soft ground it may be in, whether it stands or not */
         RobotState deep = state;
-        rig.def.shells_stand = stand;
+        robot_set_shells(robot, stand & 1);
+        rig.env->variation.shells_stand = stand >> 1;
         deep.qvel[2] = -0.1;
         deep.qpos[2] += FALL - 0.1 - lowest_of_box(&deep, box);
         task_env_rest(rig.env)->terrain.height = 0;
         expect_cause("a shank in soft ground", step_from(&deep, 10), 0, TASK_END_shell);
     }
+    robot_set_shells(robot, 0);
     rig_close(&rig);
 }
 

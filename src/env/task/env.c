@@ -93,6 +93,7 @@ RobotVariation task_env_variation(const TaskEnv *env) {
     variation.rigid_friction = from->rigid_friction;
     variation.rigid_time = from->rigid_time;
     variation.rigid = from->rigid;
+    variation.shells_stand = from->shells_stand;
     return variation;
 }
 

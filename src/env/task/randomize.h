@@ -13,6 +13,7 @@
 
 #define TASK_RANDOM_EPISODE 0x45504953u
 #define TASK_RANDOM_RIGID 0x52494749u
+#define TASK_RANDOM_SHELLS 0x5348454cu
 #define TASK_RANDOM_MAP 0x4d415050u
 #define TASK_RANDOM_COMMAND 0x434f4d4du
 
@@ -50,6 +51,8 @@ MILD_HD_FN void task_draw_robot(TaskEnv *env, const TaskDef *def, Random r) {
     env->variation.rigid_friction = task_draw(&r, z->mu);
     Random contact = random_at(env->seed ^ TASK_RANDOM_RIGID, env->index, env->tick);
     env->variation.rigid_time = task_draw(&contact, z->rigid_time);
+    Random shells = random_at(env->seed ^ TASK_RANDOM_SHELLS, env->index, env->tick);
+    env->variation.shells_stand = random_unit(&shells) < z->shells_share;
     env->variation.base_mass_add = task_draw(&r, z->base_mass);
     env->variation.armature_scale = task_draw(&r, z->armature);
     for (int i = 0; i < 3; i++) {

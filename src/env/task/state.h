@@ -87,6 +87,7 @@ typedef struct {
     Real rigid_friction;                   /* [-] */
     Real rigid_time;                       /* [s] */
     int rigid;                             /* bool: rigid ground, no soft one */
+    int shells_stand;                      /* bool: as in RobotTable, in this episode */
 } TaskVariation;
 
 /* Where the robot is, in the order of robot.ini; see RobotState. */

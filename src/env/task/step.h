@@ -59,6 +59,11 @@ MILD_HD_FN void task_set_progress(TaskEnv *env, TaskProgress progress) {
     env->tick = env->tick_first = (uint32_t)progress.tick;
 }
 
+/* Bool: the shells stand in this episode. */
+MILD_HD_FN int task_shells_stand(const TaskEnv *env, const RobotTable *robot) {
+    return robot->shells_stand && env->variation.shells_stand;
+}
+
 /* ---- start of an episode ---- */
 
 /* Quaternion (w x y z) of a turn by `yaw` about z, after one by `pitch` about y, after one by
@@ -99,8 +104,8 @@ MILD_HD_FN void task_draw_attitude(TaskEnv *env, const TaskDef *def, Random *r) 
 MILD_HD_FN void task_draw_drop(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                double height) {
     Random r = random_at(env->seed ^ TASK_RANDOM_DROP, env->index, env->tick);
-    env->dropped =
-        random_unit(&r) < def->start_share && robot->shells_stand && def->start != TASK_START_STAND;
+    env->dropped = random_unit(&r) < def->start_share && task_shells_stand(env, robot) &&
+                   def->start != TASK_START_STAND;
     if (!env->dropped) {
         return;
     }
@@ -367,14 +372,15 @@ MILD_HD_FN int task_joint_is_broken(const TaskEnv *env, const RobotTable *robot)
  * contact of the legs does not keep a foot from passing before the other to its far side. */
 MILD_HD_FN TaskEnd task_end_cause(const TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                   const RobotReading *reading) {
-    const int lies = robot->shells_stand && def->may_lie;
+    const int stand = task_shells_stand(env, robot);
+    const int lies = stand && def->may_lie;
     if (!lies && reading->rotation[8] < task_cos(def->tilt_limit)) {
         return TASK_END_tilt;
     }
     if (!lies && reading->base_clearance < 0) {
         return TASK_END_base;
     }
-    if (env->variation.rigid && !robot->shells_stand && reading->body_clearance < 0) {
+    if (env->variation.rigid && !stand && reading->body_clearance < 0) {
         return TASK_END_shell;
     }
     if (def->crossing_limit > -1 && reading->foot_distance < def->crossing_limit) {

@@ -82,6 +82,7 @@ TaskDef task_def_default(void) {
                       .grip = {0.05, 0.2},
                       .passive = 1,
                       .sinkage_max = 0.07,
+                      .shells_share = 1,
                       .base_mass = {-4, 4},
                       .com_offset = 0.006,
                       .link_mass = {0.9, 1.1},
@@ -109,6 +110,7 @@ void task_def_choose_ground(TaskDef *def) {
     r->preset_jitter = 0;
     r->presets[0] = '\0';
     r->patch_share = 0;
+    r->shells_share = 1;
     def->assist = 0;
     def->sole_elements = 0;
     def->start = TASK_START_STAND;
@@ -300,6 +302,9 @@ const MildField randomize_fields[] = {
                "energy; false: as drawn (paper)"),
     Z(sinkage_max, 1, 0.005, 1,
       "[m] softer grounds are made stiffer, so that one foot sinks at most this deep"),
+    Z(shells_share, 1, 0, 1,
+      "[-] share of episodes in which shells stand; the others are as with task.shells_stand = "
+      "false"),
     Z(base_mass, 2, -8, 20, "[kg] mass added to the base, low and high (paper)"),
     Z(com_offset, 1, 0, 0.2,
       "[m] bound of the shift of the base's centre of mass (paper 0.006, vendor 0.06)"),

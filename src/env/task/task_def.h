@@ -122,6 +122,7 @@ typedef struct {
     double sinkage_max; /* [m] a draw whose one-foot static sinkage is deeper is made stiffer until
                            it fits */
     /* robot */
+    double shells_share;  /* [-] episodes in which its shells stand, if task.shells_stand */
     double base_mass[2];  /* [kg] added */
     double com_offset;    /* [m] each axis, +- */
     double link_mass[2];  /* [-] */
@@ -204,7 +205,7 @@ typedef struct TaskActuator {
 
 TaskDef task_def_default(void);
 /* For evaluation and play, on grounds that the caller chooses: no draw of them, no assistance, the
- * robot's own soles. */
+ * robot's own soles; shells stand in all episodes. */
 void task_def_choose_ground(TaskDef *def);
 /* The same and the nominal robot, undisturbed; sensor noise, latencies and the start
  * are still drawn. */

@@ -210,7 +210,7 @@ static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean)
                             .d_mean = c->d_mean};
     const int slices =
         gpu_surrogate(g->queue.stream, s, c->rows, g->sums, gpu_columns_next(&g->queue));
-    gpu_columns_add(&g->queue, pitch, slices, g->network.log_std);
+    gpu_columns_add(&g->queue, pitch, slices, pitch, g->network.log_std);
     if (c->mirrored > 0) {
         const size_t images = (size_t)c->rows * (size_t)pitch;
         const int observation = g->network.def.observation;

@@ -257,7 +257,7 @@ static __global__ void add_columns(GpuColumns list, const float *__restrict__ pa
     float total = 0.0f;
     TILE_UNROLL
     for (int slice = share; slice < own.slices; slice += SHARES) {
-        total += partial[own.partial + (int64_t)slice * own.width + column];
+        total += partial[own.partial + (int64_t)slice * own.pitch + column];
     }
     part[threadIdx.x] = total;
     __syncthreads();

@@ -64,8 +64,8 @@ int gpu_bias_backward(cudaStream_t stream, int rows, int width, GpuArray y, GpuA
                       float *partial);
 /* Column sums of all layers, and of log std. */
 typedef struct {
-    int width, slices;
-    int64_t partial; /* where its [slices][width] begin in the partial sums */
+    int width, slices, pitch;
+    int64_t partial; /* where its [slices][pitch] begin in the partial sums */
     int64_t to;      /* where its [width] sums begin in the gradient */
 } GpuColumnSum;
 typedef struct {

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "device/ranks/device.h"
+#include "learn/cuda/fused.h"
 #include "learn/cuda/learner_private.h"
 #include "learn/ppo_gradient.h"
 #include "learn/ppo_step.h"
@@ -32,17 +33,14 @@ static int widest_layer(const Network *network) {
     return widest > network->history ? widest : network->history;
 }
 
-/* Columns of all biases and of log std. */
-static int64_t all_columns(const Network *network) {
-    int64_t columns = network->count - network->log_std;
+/* Floats that the partial sums of all biases and of log std take, of so many rows. */
+static size_t partial_sums(const Network *network, int fused, int rows) {
+    int64_t count = (int64_t)GPU_SUM_SLICES * (network->count - network->log_std);
     for (int i = 0; i < NETWORK_MLPS; i++) {
         const char *name;
-        const Mlp *mlp = network_mlp(network, i, &name);
-        for (int l = 0; l < mlp->layers; l++) {
-            columns += mlp->layer[l].out;
-        }
+        count += gpu_mlp_partial(network_mlp(network, i, &name), fused, rows);
     }
-    return columns;
+    return (size_t)count;
 }
 
 /* Most images that a run of this many samples of a minibatch can have: it has at most so many
@@ -125,7 +123,7 @@ static size_t layout(GpuLearner *g, char *block) {
     g->sums = carve(block, &used, (size_t)(g->sum_blocks * GPU_SUMS) * sizeof *g->sums);
     g->partial = carve(block, &used, (size_t)GPU_PARTS * GPU_MOMENTS * sizeof *g->partial);
     g->queue.partial =
-        carve(block, &used, (size_t)(GPU_SUM_SLICES * all_columns(n)) * sizeof(float));
+        carve(block, &used, partial_sums(n, g->queue.fused, g->rows + g->images) * sizeof(float));
     g->workspace = carve(block, &used, WORKSPACE);
     g->batch.steps = g->ppo->batch.steps;
     g->batch.envs = g->envs;
@@ -586,6 +584,7 @@ static MildStatus open_device(GpuLearner *g, MildError *error) {
     }
     GpuQueue *q = &g->queue;
     q->arithmetic = arithmetic[g->ppo->def.matmul];
+    q->fused = g->ppo->def.matmul == PPO_MATMUL_BF16 ? gpu_fused_processors(g->device) : 0;
     MildStatus status =
         check(cudaStreamCreateWithFlags(&q->stream, cudaStreamNonBlocking), device, error);
     if (!status) {

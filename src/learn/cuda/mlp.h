@@ -12,9 +12,10 @@ typedef struct {
     cublasHandle_t blas;
     cublasComputeType_t arithmetic; /* of the products */
     cublasStatus_t status;          /* the first failure of a product */
-    GpuArray weights;               /* as products read them: parameters, or their rounded copy */
-    GpuColumns columns;             /* column sums that are still to be added up */
-    float *partial;                 /* [GPU_SUM_SLICES][all columns] their partial sums */
+    int fused;          /* gpu_fused_processors; 0: bias, ELU and slope are kernels of their own */
+    GpuArray weights;   /* as products read them: parameters, or their rounded copy */
+    GpuColumns columns; /* column sums that are still to be added up */
+    float *partial;     /* their partial sums, gpu_mlp_partial of each network */
 } GpuQueue;
 
 /* As MlpOutputs. The last layer's are floats, which the losses read. */
@@ -27,10 +28,12 @@ typedef struct {
  * bytes. Biases are read from the parameters. */
 float *gpu_mlp_forward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows,
                        GpuArray x, const GpuOutputs *outputs);
-/* Where the next partial sums of columns go, and their entry in queue.columns: `at` in the
- * gradient. */
+/* Where the next partial sums of columns go, [slices][pitch], and their entry in queue.columns: `at`
+ * in the gradient. */
 float *gpu_columns_next(GpuQueue *queue);
-void gpu_columns_add(GpuQueue *queue, int width, int slices, int64_t at);
+void gpu_columns_add(GpuQueue *queue, int width, int slices, int pitch, int64_t at);
+/* Floats that the partial sums of a network's biases take at most. */
+int64_t gpu_mlp_partial(const Mlp *mlp, int fused, int rows);
 /* The gradient of a bias is an entry in queue.columns.
  * d_x: gradient with respect to the input; NULL: not computed. work: as wide as the widest layer,
  * of the type of x. */

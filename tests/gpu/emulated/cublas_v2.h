@@ -5,7 +5,7 @@
 #include "cuda_runtime_api.h"
 
 typedef struct EmulatedBlas *cublasHandle_t;
-typedef enum { CUBLAS_STATUS_SUCCESS } cublasStatus_t;
+typedef enum { CUBLAS_STATUS_SUCCESS, CUBLAS_STATUS_EXECUTION_FAILED } cublasStatus_t;
 typedef enum { CUBLAS_OP_N, CUBLAS_OP_T } cublasOperation_t;
 typedef enum {
     CUBLAS_COMPUTE_32F,
