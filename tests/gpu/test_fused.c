@@ -1,5 +1,5 @@
-/* Products of bfloat16 with their ends against sums in double. With MILD_CUDA on the device, skipped
- * (77) where there is none of compute capability 9.0; else on the stand-in. */
+/* Products of bfloat16 with their ends against sums in double. With MILD_CUDA on the device,
+ * skipped (77) where there is none of compute capability 9.0; else on the stand-in. */
 #include "gpu_check.h"
 
 #include "learn/cuda/fused.h"

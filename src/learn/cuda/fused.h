@@ -1,7 +1,7 @@
 /* A product of bfloat16 with what a layer does before and after it, in one kernel, so that the
  * layer's numbers go through the memory once. CUTLASS's kernels for compute capability 9.0. Rows
- * are row-major, widths multiples of 8, arrays aligned to 16 bytes. The calls only enqueue; they return 0 where that
- * fails. */
+ * are row-major, widths multiples of 8, arrays aligned to 16 bytes. The calls only enqueue; they
+ * return 0 where that fails. */
 #ifndef MILD_GPU_FUSED_H
 #define MILD_GPU_FUSED_H
 

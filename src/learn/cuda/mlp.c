@@ -55,8 +55,11 @@ float *gpu_mlp_forward(GpuQueue *q, const Mlp *mlp, const float *parameters, int
 }
 
 static int64_t columns_end(const GpuColumns *columns) {
+    if (columns->count == 0) {
+        return 0;
+    }
     const GpuColumnSum *last = &columns->sum[columns->count - 1];
-    return columns->count > 0 ? last->partial + (int64_t)last->slices * last->pitch : 0;
+    return last->partial + (int64_t)last->slices * last->pitch;
 }
 
 float *gpu_columns_next(GpuQueue *q) {

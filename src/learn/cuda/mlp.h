@@ -28,8 +28,8 @@ typedef struct {
  * bytes. Biases are read from the parameters. */
 float *gpu_mlp_forward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows,
                        GpuArray x, const GpuOutputs *outputs);
-/* Where the next partial sums of columns go, [slices][pitch], and their entry in queue.columns: `at`
- * in the gradient. */
+/* Where the next partial sums of columns go, [slices][pitch], and their entry in queue.columns:
+ * `at` in the gradient. */
 float *gpu_columns_next(GpuQueue *queue);
 void gpu_columns_add(GpuQueue *queue, int width, int slices, int pitch, int64_t at);
 /* Floats that the partial sums of a network's biases take at most. */
