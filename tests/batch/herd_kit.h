@@ -382,8 +382,8 @@ static inline void check_errors(const char *name, Errors *errors, double median,
     const double high = errors->error[errors->count * 99 / 100];
     print_message("%-36s %d steps: median %.1e, 99 %% %.1e, worst %.1e\n", name, errors->count,
                   middle, high, errors->error[errors->count - 1]);
-    /* or not a number; the worst hundredth of few robots says little */
-    assert_true(middle < median && high < (kit_short() ? 1 : most));
+    /* or not a number; the worst hundredth of few robots is up to chance */
+    assert_true(middle < median && high < (kit_short() ? 5 : 1) * most);
 }
 
 /* Bool: mild/ground.h needed no more than plain steps. */
