@@ -93,8 +93,8 @@ static inline int some_steps(void) {
     return some < STEPS / 2 ? STEPS / 2 : some;
 }
 
-/* Robots of a herd: all, or as many as take every material at every fourth place (herd_throw) with a
- * group of lanes that is not full, where MILD_TEST_SHORT is set. */
+/* Robots of a herd: all, or where MILD_TEST_SHORT is set as many as have each material and each of
+ * the four places of herd_throw more than once. */
 static inline int robots(void) {
     return kit_short() ? 28 : ROBOTS_MAX;
 }
