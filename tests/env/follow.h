@@ -17,7 +17,7 @@ enum { ENVS = 48, GROUNDS = 64, STEPS = 110 };
 
 /* Steps of a test: all, or the first of them, in which robots fall and begin again, too. */
 static inline int some_steps(void) {
-    return kit_short() ? 40 : STEPS;
+    return kit_short() ? 24 : STEPS;
 }
 
 /* Rows of one time, with the widths of the robot's TaskShape. */

@@ -151,7 +151,7 @@ static BedDef small_bed(void) {
     def.length = 0.04f;
     def.width = 0.035f;
     def.depth = 0.025f;
-    def.settle = 0.2f;
+    def.settle = kit_short() ? 0.1f : 0.2f;
     return def;
 }
 
@@ -488,7 +488,7 @@ TEST(a_long_bed_stays_at_rest) {
     BedDef def = small_bed();
     def.seeds = {1, 2};
     def.length = 0.08f;
-    def.settle = 0.3f;
+    def.settle = kit_short() ? 0.1f : 0.3f;
     Bed tile;
     bed_open(&tile, def);
     bed_settle(&tile);

@@ -210,7 +210,7 @@ TEST(test_loops) {
 }
 
 int main(int argc, char **argv) {
-    draws = argc > 1 ? atoi(argv[1]) : kit_draws(draws);
+    draws = argc > 1 ? atoi(argv[1]) : kit_draws(kit_short() ? draws / 3 : draws);
     if (argc > 2) {
         first = atoi(argv[2]);
     }

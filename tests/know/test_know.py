@@ -17,6 +17,7 @@ sys.dont_write_bytecode = True
 import know  # noqa: E402
 
 WEIGHTS = root / "policies/knows.safetensors"
+SHORT = "MILD_TEST_SHORT" in os.environ  # as in kit.h
 
 
 def run(*arguments):
@@ -89,10 +90,12 @@ def same_as_numpy(folder):
 
 
 def judged():
-    """Coverage within four deviations of 90 % of 48 walks; R2 that shuffled or exchanged outputs have not."""
-    found = json.loads(run("know", "--grounds", 48, "--seed", 11, "--robots", 0, "--threads", 2, "--json", "-"))
+    """Coverage within four deviations of 90 % of 48 walks; R2 that shuffled or exchanged outputs have not. Too few walks say nothing of it."""
+    found = json.loads(run("know", "--grounds", 4 if SHORT else 48, "--seed", 11, "--robots", 0, "--threads", 2, "--json", "-"))
     cells = {row["parameter"]: row for row in found["rows"] if row["footsteps"] == 0}
     assert list(cells) == list(know.NAMES)
+    if SHORT:
+        return "4 walks"
     for name, row in cells.items():
         slack = 4 * math.sqrt(0.9 * 0.1 / row["walks"])
         assert row["walks"] >= 40 and row["coverage"] > 0.9 - slack, (name, row)

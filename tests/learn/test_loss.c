@@ -409,7 +409,8 @@ static void check_differences(PolicyDef policy_def, int clip_value, double free_
     for (int64_t i = 0; i < c.network.count; i++) {
         p[i] = c.parameters[i];
     }
-    for (int64_t i = 0; i < c.network.count; i++) {
+    const int stride = kit_short() ? 13 : 1; /* divides no width of a layer */
+    for (int64_t i = 0; i < c.network.count; i += stride) {
         const double step = 1e-6, at = p[i];
         p[i] = at + step;
         double high = loss_double(&c, p);
@@ -419,7 +420,7 @@ static void check_differences(PolicyDef policy_def, int clip_value, double free_
         assert_near("gradient", c.gradient[i], (high - low) / (2.0 * step), 2e-5, &worst);
     }
     print_message("worst against differences: %.1e over %d parameters\n", worst,
-                  (int)c.network.count);
+                  (int)(c.network.count / stride));
     free(p);
     case_close(&c);
 }

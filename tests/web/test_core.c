@@ -39,39 +39,52 @@ TEST(test_files) {
 
 /* ---- walks ---- */
 
-/* Walks, and returns the speed from the third second on, from where the base gets to. */
+/* Time of a walk whose speed or depth is measured: all of it, or the first steps of the gait where
+ * MILD_TEST_SHORT is set, which takes the same lines on each ground. */
+static double some(double seconds) {
+    return kit_short() ? seconds / 5 : seconds;
+}
+
+/* Steps before a walk of so many is measured: two seconds, or half of a short one. */
+static int settling(int steps) {
+    return steps < 4 * SECOND ? steps / 2 : 2 * SECOND;
+}
+
+/* Walks, and returns the speed behind the first steps, from where the base gets to. */
 static double walk(double seconds, float speed) {
     const WebView *view = web_view();
-    const int steps = (int)(seconds * SECOND);
+    const int steps = (int)(seconds * SECOND), begin = settling(steps);
     double x = 0, y = 0;
     for (int t = 0; t < steps; t++) {
         if (web_step(speed, 0, 0)) {
             fail_msg("fell after %g s", 0.01 * t);
         }
-        x = t == 2 * SECOND - 1 ? (double)view->link[0][3] : x;
-        y = t == 2 * SECOND - 1 ? (double)view->link[0][7] : y;
+        x = t == begin - 1 ? (double)view->link[0][3] : x;
+        y = t == begin - 1 ? (double)view->link[0][7] : y;
     }
-    return hypot((double)view->link[0][3] - x, (double)view->link[0][7] - y) / (0.01 * steps - 2);
+    return hypot((double)view->link[0][3] - x, (double)view->link[0][7] - y) /
+           (0.01 * (steps - begin));
 }
 
-static double rival_walk(int ground) {
+static double rival_walk(double seconds, int ground) {
+    const int steps = (int)(seconds * SECOND), begin = settling(steps);
     Rival rival = {0};
     EnvsSample sample[8];
     double before[2] = {0, 0};
     rival_start(&rival, ground, 1, 0.6);
     envs_set_samples(rival.envs, sample);
-    for (int t = 0; t < 10 * SECOND; t++) {
+    for (int t = 0; t < steps; t++) {
         float action[SA01_JOINTS];
         policy_act(policy, NULL, 1, rival.history, action, NULL, NULL);
         rival_step(&rival, action);
         assert_false(rival.done);
-        if (t == 2 * SECOND - 1) {
+        if (t == begin - 1) {
             memcpy(before, sample[0].base, sizeof before);
         }
     }
     const double x = sample[0].base[0] - before[0], y = sample[0].base[1] - before[1];
     envs_destroy(rival.envs);
-    return hypot(x, y) / 8;
+    return hypot(x, y) / (0.01 * (steps - begin));
 }
 
 /* Where a gait differs, seconds later its steps do; the speed of a shorter stride more. */
@@ -80,18 +93,18 @@ static void walks_of(int which) {
     choose(which);
     for (int ground = 0; ground <= WEB_STRIPES; ground++) {
         start(ground, WEB_LEVEL, 1);
-        const double speed = walk(7, 0.6f);
+        const double speed = walk(some(7), 0.6f);
         printf("  %s, ground %d: %.3f m/s of 0.6, leans by %.3f\n", pages[which].name, ground,
                speed, 1 - (double)web_view()->link[0][10]);
-        assert_true(fabs(speed - 0.6) < off);
+        assert_true(kit_short() || fabs(speed - 0.6) < off);
         assert_true(web_view()->link[0][10] > 0.95f);
     }
     const int sand = preset("sand_loose");
     start(sand, WEB_LEVEL, 0);
-    const double mine = walk(10, 0.6f), theirs = rival_walk(sand);
+    const double mine = walk(some(10), 0.6f), theirs = rival_walk(some(10), sand);
     printf("  %s, sand_loose: %.4f m/s, the batch engine %.4f (bound %.0f %%)\n", pages[which].name,
            mine, theirs, 100 * beside);
-    assert_true(fabs(mine / theirs - 1) < beside);
+    assert_true(kit_short() || fabs(mine / theirs - 1) < beside);
 }
 
 TEST(test_walks) {
@@ -104,7 +117,7 @@ static void hills_of(int which) {
     choose(which);
     for (int relief = WEB_WAVES; relief < WEB_RELIEFS; relief++) {
         start(preset("grass"), relief, 1);
-        const double speed = walk(10, 0.6f);
+        const double speed = walk(some(10), 0.6f);
         float low = 1, high = -1;
         for (int n = 0; n < WEB_HILLS * WEB_HILLS; n++) {
             low = fminf(low, web_hills()[n]);
@@ -112,7 +125,8 @@ static void hills_of(int which) {
         }
         printf("  %s, relief %d: %.3f m/s, ground from %.3f to %.3f m\n", pages[which].name, relief,
                speed, (double)low, (double)high);
-        assert_true(fabs(speed - 0.6) < 0.1 && low < -0.02f && high > 0.02f);
+        assert_true(kit_short() || fabs(speed - 0.6) < 0.1);
+        assert_true(low < -0.02f && high > 0.02f);
     }
 }
 
@@ -252,15 +266,16 @@ TEST(test_window) {
 }
 
 /* [m] The deepest elements of the two feet of a robot that stands: means over six of eight seconds,
- * in which it sways. */
+ * in which it sways; only the first of them where MILD_TEST_SHORT is set. */
 static double standing_depth(double stiffness) {
+    const int steps = (int)(some(8) * SECOND), begin = settling(steps);
     double sum = 0;
     web_change(stiffness, 1);
-    for (int t = 0; t < 8 * SECOND; t++) {
+    for (int t = 0; t < steps; t++) {
         assert_false(web_step(0, 0, 0));
-        sum += t < 2 * SECOND ? 0 : (double)(web_view()->depth[0] + web_view()->depth[1]) / 2;
+        sum += t < begin ? 0 : (double)(web_view()->depth[0] + web_view()->depth[1]) / 2;
     }
-    return sum / (6 * SECOND);
+    return sum / (steps - begin);
 }
 
 /* [N] The sum of what the elements press. */
@@ -337,21 +352,22 @@ TEST(test_stripes) {
 
 /* The same of the batch engine's robot on a material of that stiffness. */
 static double rival_depth(double stiffness) {
+    const int steps = (int)(some(8) * SECOND), begin = settling(steps);
     Rival rival = {0};
     double sum = 0;
     rival_start(&rival, preset("foam45"), stiffness, 0);
     EnvsSample sample[16];
     assert_true(envs_physics_steps(rival.envs) <= 16);
     envs_set_samples(rival.envs, sample);
-    for (int t = 0; t < 8 * SECOND; t++) {
+    for (int t = 0; t < steps; t++) {
         float action[SA01_JOINTS];
         web_act(rival.history, action);
         rival_step(&rival, action);
         assert_false(rival.done);
-        sum += t < 2 * SECOND ? 0 : (sample[0].foot[0].depth + sample[0].foot[1].depth) / 2;
+        sum += t < begin ? 0 : (sample[0].foot[0].depth + sample[0].foot[1].depth) / 2;
     }
     envs_destroy(rival.envs);
-    return sum / (6 * SECOND);
+    return sum / (steps - begin);
 }
 
 TEST(test_sliders) {
@@ -367,10 +383,10 @@ TEST(test_sliders) {
         printf("  depth on foam45 at %.1f times its stiffness: %.1f mm; the batch engine's %.1f\n",
                stiffness[i], 1e3 * depth[i], 1e3 * rival);
         /* with k_pen alone three times as large the feet are twice as deep */
-        assert_true(fabs(depth[i] - rival) < 0.15 * rival);
+        assert_true(kit_short() || fabs(depth[i] - rival) < 0.15 * rival);
     }
     /* what softer ground adds to the depth of a stiff one; a level sole at rest: 2.0 */
-    assert_true(depth[2] - depth[0] > 1.6 * (depth[1] - depth[0]));
+    assert_true(kit_short() || depth[2] - depth[0] > 1.6 * (depth[1] - depth[0]));
     for (int t = 0; t < 4 * SECOND; t++) {
         web_step(0, 0, 0);
         load += carried() / (4 * SECOND);
