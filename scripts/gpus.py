@@ -77,7 +77,7 @@ class Programs:
                   "--train.checkpoint_every=1000000"]
         start = [] if "--resume" in options else [
             "--config", str(ROOT / "configs" / "quick.ini"), "--ppo.steps=24", "--ppo.optimizer=adam", "--ppo.matmul=fp32"]
-        return self.by(count, "mild", "train", "--out", str(folder), *start, *common, *options)
+        return self.by(count, "mild", "train", "--out", str(folder), *start, *common, *options, *self.arguments.options)
 
     def run(self, command, seconds=300, **variables):
         """Exit code and output."""
@@ -280,6 +280,7 @@ def main():
     parser.add_argument("-n", type=int, default=2, choices=(2, 4, 8), help="GPUs (default 2)")
     parser.add_argument("--robots", type=int, default=16384, help="of each GPU (default 16384; the checks take a quarter)")
     parser.add_argument("--iterations", type=int, default=45, help="of `speed`; the first third is not counted (default 45)")
+    parser.add_argument("options", nargs="*", metavar="-- OPTION", help="of every training, as --task.shells_stand=false")
     parser.add_argument("--matmul", default="bf16", help="ppo.matmul of `speed` (default bf16)")
     parser.add_argument("--only", nargs="+", choices=STEPS, default=STEPS, metavar="STEP", help=", ".join(STEPS))
     parser.add_argument("--build", default=str(ROOT / "build"), help="folder of the programs, without a bundle")

@@ -53,6 +53,11 @@ if ((${#missing[@]})); then
         apt-get -q install --no-install-recommends -y "${missing[@]}"
 fi
 
+cutlass= # bool: also where it was before .venv is made anew
+if [ "${1:-}" = cuda ] || [ -e .venv/cutlass.installed ]; then
+    cutlass=1
+fi
+
 # The private environment holds the MuJoCo wheel (library and headers), matplotlib (figures), and what the Python package
 # is built and tested with. The copy of the requirements inside it is written last, so that an interrupted installation is repeated.
 if ! cmp -s scripts/requirements.txt .venv/requirements.installed; then
@@ -74,7 +79,7 @@ if ! cmp -s scripts/sources.txt .venv/sources.installed; then
     cp scripts/sources.txt .venv/sources.installed
 fi
 
-if [ "${1:-}" = cuda ] && ! cmp -s scripts/cutlass.txt .venv/cutlass.installed; then
+if [ -n "$cutlass" ] && ! cmp -s scripts/cutlass.txt .venv/cutlass.installed; then
     rm -rf .venv/cutlass* .venv/sources/nvidia_cutlass*
     scripts/quietly.sh build/log/cutlass.log "setup: headers of CUTLASS" \
         .venv/bin/python -m pip download --progress-bar off --disable-pip-version-check --no-deps --require-hashes \

@@ -76,11 +76,13 @@ int64_t gpu_mlp_partial(const Mlp *mlp, int fused, int rows) {
     int64_t most = 0;
     for (int l = 0; l < mlp->layers; l++) {
         const int width = mlp->layer[l].out;
-        GpuSlices s = {GPU_SUM_SLICES, width};
-        if (fused && l < mlp->layers - 1) {
-            s = gpu_fused_slices(rows, width);
+        int64_t own = (int64_t)GPU_SUM_SLICES * width;
+        if (fused) {
+            const GpuSlices s = gpu_fused_slices(rows, width);
+            const int64_t other = (int64_t)s.slices * s.pitch;
+            own = other > own ? other : own;
         }
-        most += (int64_t)s.slices * s.pitch;
+        most += own;
     }
     return most;
 }
