@@ -158,7 +158,7 @@ TEST(it_rights_itself) {
 }
 
 /* It stays on the ground, where its shells carry it, and that ends no trial. One in ten or so rolls
- * onto its feet by chance (docs/results.md): fewer than rise in it_rights_itself, on any processor. */
+ * onto its feet by chance (docs/results.md), which is fewer than rise in it_rights_itself. */
 TEST(the_walking_policy_does_not) {
     EvalTrial each[TRIALS];
     Trunk trunk = {.least = 1};
