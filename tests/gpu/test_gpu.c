@@ -190,6 +190,7 @@ static void act_both(Learner *cpu, Learner *gpu, double *apart) {
     learner_write(gpu);
 }
 
+enum { MANY = 1400 };    /* environments: 33 600 samples */
 static int is_fused = 1; /* bool: where the device can */
 
 static void compare_learner(const PolicyDef *policy, const PpoDef *def, int envs, int rows,
@@ -257,6 +258,11 @@ TEST(gradients_are_those_of_the_cpu) {
     small.critic_input = 300;
     ppo_set_decoder(&def, 4, 290, &small);
     compare_learner(&small, &def, 5, 0, worst);
+    /* more rows than the most slices have at once, and more blocks than a block has threads */
+    small = small_def();
+    def = ppo_def_default();
+    def.minibatches = 1;
+    compare_learner(&small, &def, MANY, 0, worst);
 #ifndef EMULATED
     def = ppo_def_default();
     PolicyDef full = policy_def_default();
@@ -277,18 +283,12 @@ TEST(gradients_are_those_of_the_cpu) {
 /* Products with rounded factors, and with bf16 rounded numbers between the layers too: near the
  * CPU's, as far as 11 or 8 bits go. The gradient of log std is a small difference of large numbers:
  * 2.6e-2 on an H100 with tf32. The stand-in has no tf32. */
-static void compare_rounded(int matmul, double bound, double gradient) {
-#ifdef EMULATED
-    PolicyDef policy = small_def();
-    const int envs = 37;
-#else
-    PolicyDef policy = policy_def_default();
-    const int envs = 256;
-#endif
+static void compare_rounded(const PolicyDef *policy, int envs, int matmul, double bound,
+                            double gradient) {
     PpoDef def = ppo_def_default();
     def.matmul = matmul;
     double worst[3] = {0.0};
-    compare_learner(&policy, &def, envs, 0, worst);
+    compare_learner(policy, &def, envs, 0, worst);
     print_message("%s: gradient %.1e, sums %.1e, actions %.1e (relative, bound %.0e)\n",
                   ppo_fields[ppo_field_count - 1].names[matmul], worst[0], worst[1], worst[2],
                   bound);
@@ -296,15 +296,23 @@ static void compare_rounded(int matmul, double bound, double gradient) {
 }
 
 TEST(rounded_products_are_near) {
-    compare_rounded(PPO_MATMUL_FP32, 1e-5, 1e-5);
-    compare_rounded(PPO_MATMUL_TF32, 5e-3, 5e-2);
-    for (is_fused = 0; is_fused < 2; is_fused++) {
+    const PolicyDef small = small_def();
 #ifdef EMULATED
-        compare_rounded(PPO_MATMUL_BF16, 5e-2, 4e-2);
+    const PolicyDef policy = small;
+    const int envs = 37;
+    const double unfused = 4e-2;
 #else
-        compare_rounded(PPO_MATMUL_BF16, 5e-2, 4e-1);
+    const PolicyDef policy = policy_def_default();
+    const int envs = 256;
+    const double unfused = 4e-1;
 #endif
-    }
+    compare_rounded(&policy, envs, PPO_MATMUL_FP32, 1e-5, 1e-5);
+    compare_rounded(&policy, envs, PPO_MATMUL_TF32, 5e-3, 5e-2);
+    is_fused = 0;
+    compare_rounded(&policy, envs, PPO_MATMUL_BF16, 5e-2, unfused);
+    is_fused = 1; /* where the device has such products: rounded once */
+    compare_rounded(&policy, envs, PPO_MATMUL_BF16, 5e-2, 4e-2);
+    compare_rounded(&small, MANY, PPO_MATMUL_BF16, 5e-2, 4e-2);
 }
 
 /* ---- update ---- */
@@ -474,6 +482,9 @@ TEST(updates_are_those_of_the_cpu) {
     def.std_min = 0.99; /* the noise meets its floor at a step and its ceiling at the end */
     def.std_max[0] = def.std_max[1] = 0.7;
     worse(&worst, compare_update(&policy, &def, 5, 0, NOTHING));
+    def = ppo_def_default();
+    def.minibatches = def.epochs = 1;
+    worse(&worst, compare_update(&policy, &def, MANY, 0, NOTHING));
     def = ppo_def_default();
     def.shards = PPO_SHARDS_MAX; /* some of no environment */
     worse(&worst, compare_update(&policy, &def, 37, 0, INVALID));
