@@ -252,8 +252,8 @@ def speed(programs, arguments, work):
     alone = None
     for count in counts(arguments.n):
         folder = work / f"speed{count}"
-        done, _ = programs.good(programs.train(count, folder, f"--train.envs={arguments.robots * count}",
-                                               f"--ppo.matmul={arguments.matmul}", f"--train.iterations={arguments.iterations}"))
+        done, _ = programs.good(programs.train(count, folder, f"--train.envs={arguments.robots * count}", "--ppo.matmul=bf16",
+                                               f"--train.iterations={arguments.iterations}"))
         if not done:
             return
         rates = [float(row["rate/steps_per_s"]) for row in log(folder)][arguments.iterations // 3 :]
@@ -281,7 +281,6 @@ def main():
     parser.add_argument("--robots", type=int, default=16384, help="of each GPU (default 16384; the checks take a quarter)")
     parser.add_argument("--iterations", type=int, default=45, help="of `speed`; the first third is not counted (default 45)")
     parser.add_argument("options", nargs="*", metavar="-- OPTION", help="of every training, as --task.shells_stand=false")
-    parser.add_argument("--matmul", default="bf16", help="ppo.matmul of `speed` (default bf16)")
     parser.add_argument("--only", nargs="+", choices=STEPS, default=STEPS, metavar="STEP", help=", ".join(STEPS))
     parser.add_argument("--build", default=str(ROOT / "build"), help="folder of the programs, without a bundle")
     parser.add_argument("--device", default="cuda", help="cpu tries this script on a processor")
