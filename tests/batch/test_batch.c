@@ -127,7 +127,7 @@ static void herd_bodies(Herd *at, int first, int last) {
         const int count = mild_material_preset_count();
         mild_material_preset(mild_material_preset_name(m % count), &at->material[m]);
     }
-    for (int r = 0; r < robots(); r++) {
+    for (int r = 0; r < ROBOTS; r++) {
         Kit *kit = &at->kit[r];
         kit_open(kit, at->feet, left, right, &at->material[0], 2.5e-3);
         kit_soles(kit, at->soles);
@@ -138,7 +138,7 @@ static void herd_bodies(Herd *at, int first, int last) {
             kit_rotate(kit->input.rotation[f], body->turn);
             kit->input.position[f][2] = body->lowest + 0.001 * (r % 7);
             for (int k = 0; k < 6; k++) {
-                kit->input.velocity[f][k] = body->speed[k] * (0.1 + 0.9 * r / robots());
+                kit->input.velocity[f][k] = body->speed[k] * (0.1 + 0.9 * r / ROBOTS);
             }
         }
         herd_place(at, r);
@@ -230,13 +230,13 @@ static void reset_on(const Shape *shape, int device) {
     before = arrays;
     side_step(&fresh, &arrays, 0);
     other = arrays;
-    for (int r = 0; r < robots(); r++) {
+    for (int r = 0; r < ROBOTS; r++) {
         arrays.which[r] = r % 3 == 0;
     }
     side_copy(&walked, walked.arrays->which, arrays.which, sizeof arrays.which);
     assert_int_equal(mild_batch_reset(walked.batch, walked.arrays->which, NULL, &error), MILD_OK);
     side_step(&walked, &arrays, 0);
-    for (int r = 0; r < robots(); r++) {
+    for (int r = 0; r < ROBOTS; r++) {
         const Arrays *wanted = r % 3 == 0 ? &other : &before;
         assert_memory_equal(arrays.wrench + rows * r, wanted->wrench + rows * r, bytes);
     }
@@ -244,7 +244,7 @@ static void reset_on(const Shape *shape, int device) {
     assert_int_equal(mild_batch_set_map(walked.batch, NULL, &error), MILD_OK);
     assert_int_equal(mild_batch_set_map(walked.batch, herd.map, &error), MILD_OK);
     side_step(&walked, &arrays, 0);
-    assert_memory_equal(arrays.wrench, other.wrench, (size_t)robots() * bytes);
+    assert_memory_equal(arrays.wrench, other.wrench, ROBOTS * bytes);
     side_close(&walked);
     side_close(&fresh);
     herd_close(&herd);
@@ -254,7 +254,7 @@ static void reset_on(const Shape *shape, int device) {
 static void load_on(const Shape *shape, int device) {
     MildError error = {0};
     Side walked, one, many;
-    const MildGround *grounds[ROBOTS_MAX];
+    const MildGround *grounds[ROBOTS];
     static Errors errors;
     errors.count = 0;
     herd_open(&herd, shape);
@@ -262,7 +262,7 @@ static void load_on(const Shape *shape, int device) {
     side_open(&one, &herd, device);
     side_open(&many, &herd, device);
     walk_together(&walked);
-    for (int r = 0; r < robots(); r++) {
+    for (int r = 0; r < ROBOTS; r++) {
         grounds[r] = herd.kit[r].ground;
         assert_int_equal(mild_batch_load(one.batch, r, grounds[r], &error), MILD_OK);
     }
@@ -270,12 +270,12 @@ static void load_on(const Shape *shape, int device) {
     other = arrays;
     against_ground(&errors, &herd, &arrays);
     check_errors("loaded", &errors, 2e-5, 3e-2);
-    assert_int_equal(mild_batch_load_robots(many.batch, 1, robots() - 1, grounds + 1, &error),
+    assert_int_equal(mild_batch_load_robots(many.batch, 1, ROBOTS - 1, grounds + 1, &error),
                      MILD_OK);
     assert_int_equal(mild_batch_load_robots(many.batch, 0, 1, grounds, &error), MILD_OK);
     side_step(&many, &arrays, 0);
     assert_memory_equal(arrays.wrench, other.wrench,
-                        (size_t)robots() * (size_t)(6 * herd.feet) * sizeof(float));
+                        ROBOTS * (size_t)(6 * herd.feet) * sizeof(float));
     side_close(&walked);
     side_close(&one);
     side_close(&many);
@@ -319,7 +319,7 @@ static void forgets_in_the_air(Kit *kit, MildGround *ground) {
 static void store_on(const Shape *shape, int device) {
     MildError error = {0};
     Side walked, again;
-    MildGround *grounds[ROBOTS_MAX];
+    MildGround *grounds[ROBOTS];
     static Errors errors;
     int off = 0, planes = 0;
     errors.count = 0;
@@ -327,17 +327,17 @@ static void store_on(const Shape *shape, int device) {
     side_open(&walked, &herd, device);
     side_open(&again, &herd, device);
     walk_together(&walked);
-    for (int r = 0; r < robots(); r++) {
+    for (int r = 0; r < ROBOTS; r++) {
         void *block = aligned_alloc(64, herd.kit[r].bytes);
         grounds[r] = mild_ground_init(block, herd.kit[r].soles, herd.feet);
     }
-    assert_int_equal(mild_batch_store_robots(walked.batch, 0, robots() - 1, grounds, &error),
+    assert_int_equal(mild_batch_store_robots(walked.batch, 0, ROBOTS - 1, grounds, &error),
                      MILD_OK);
-    assert_int_equal(mild_batch_store(walked.batch, robots() - 1, grounds[robots() - 1], &error),
+    assert_int_equal(mild_batch_store(walked.batch, ROBOTS - 1, grounds[ROBOTS - 1], &error),
                      MILD_OK);
     side_step(&walked, &arrays, 0);
     other = arrays;
-    for (int r = 0; r < robots(); r++) {
+    for (int r = 0; r < ROBOTS; r++) {
         Kit *kit = &herd.kit[r];
         for (int f = 0; f < kit->feet; f++) {
             for (int e = 0; e < mild_sole_elements(kit->soles[f]); e++) {
@@ -352,15 +352,15 @@ static void store_on(const Shape *shape, int device) {
     print_message("%d of %d planes off\n", off, planes);
     assert_true(off <= planes / 500);
     /* once more from there: the same bits on level ground, where nothing is counted from a place */
-    assert_int_equal(mild_batch_load_robots(again.batch, 0, robots(),
-                                            (const MildGround *const *)grounds, &error),
-                     MILD_OK);
+    assert_int_equal(
+        mild_batch_load_robots(again.batch, 0, ROBOTS, (const MildGround *const *)grounds, &error),
+        MILD_OK);
     side_step(&again, &arrays, 0);
     if (!herd.map) {
         assert_memory_equal(arrays.wrench, other.wrench,
-                            (size_t)robots() * (size_t)(6 * herd.feet) * sizeof(float));
+                            ROBOTS * (size_t)(6 * herd.feet) * sizeof(float));
     }
-    for (int r = 0; r < robots(); r++) {
+    for (int r = 0; r < ROBOTS; r++) {
         forgets_in_the_air(&herd.kit[r], grounds[r]);
         free(grounds[r]);
     }
@@ -386,7 +386,7 @@ TEST(reset_load_and_store) {
 static void unknown_on(const Shape *shape, int device) {
     Side side;
     herd_open(&herd, shape);
-    for (int r = 0; r < robots(); r++) {
+    for (int r = 0; r < ROBOTS; r++) {
         double *at = herd.kit[r].input.position[0]; /* in the ground */
         const double top = mild_terrain_height_at(&herd.kit[r].terrain, at[0], at[1]);
         at[2] = shape->surfaces < shape->feet ? at[2] - 0.04 : top + 0.02;
@@ -400,7 +400,7 @@ static void unknown_on(const Shape *shape, int device) {
         arrays.material[4 * herd.labels + label] = -1;
     }
     side_step(&side, &arrays, 0);
-    for (int r = 0; r < robots(); r++) {
+    for (int r = 0; r < ROBOTS; r++) {
         const int rows = 6 * herd.feet;
         const float *wrench = arrays.wrench + rows * r;
         if (r == 3 || r == 4) {
@@ -457,7 +457,7 @@ TEST(step_is_captured) {
     assert_int_equal(cudaStreamSynchronize(stream), cudaSuccess);
     side_copy(&side, &arrays, side.arrays, sizeof arrays);
     assert_memory_equal(arrays.wrench, other.wrench,
-                        (size_t)robots() * (size_t)(6 * herd.feet) * sizeof(float));
+                        ROBOTS * (size_t)(6 * herd.feet) * sizeof(float));
     cudaGraphExecDestroy(ready);
     cudaGraphDestroy(graph);
     cudaStreamDestroy(stream);
