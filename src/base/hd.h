@@ -175,6 +175,21 @@ MILD_HD void pair_unpack(Real pair, Real *x, Real *y) {
     *y = (Real)((PairWhole)(bits << PAIR_HALF) >> PAIR_HALF) * (1 / PAIR_ONE);
 }
 
+/* ---- memory ahead of its use ---- */
+
+/* A number from a GPU's global memory, not from shared memory, to its shared memory, for which
+ * nobody waits before lanes_brought. */
+MILD_HD void number_bring(const Real *from, Real *to) {
+#if defined(__CUDA_ARCH__) && defined(MILD_REAL_FLOAT)
+    asm volatile(
+        "cp.async.ca.shared.global [%0], [%1], 4;" ::"r"((unsigned)__cvta_generic_to_shared(to)),
+        "l"(from)
+        : "memory");
+#else
+    *to = *from;
+#endif
+}
+
 /* ---- lanes ---- */
 
 /* LANES lanes work together on one robot. On a GPU they are the threads of a warp; on the CPU one
@@ -211,6 +226,12 @@ WARP_FN void lanes_sync(void) {
     __syncwarp();
 }
 
+/* The same of what each lane asked for by number_bring. */
+WARP_FN void lanes_brought(void) {
+    asm volatile("cp.async.wait_all;" ::: "memory");
+    __syncwarp();
+}
+
 /* x of lane `from`. */
 WARP_FN Real lane_read(const Real *x, int from) {
     return __shfl_sync(0xffffffffu, x[0], from);
@@ -237,6 +258,9 @@ WARP_FN void lane_swap(const Real *x, int step, Real *y) {
 #define LANE_ROLLED
 
 WARP_FN void lanes_sync(void) {
+}
+
+WARP_FN void lanes_brought(void) {
 }
 
 WARP_FN Real lane_read(const Real *x, int from) {

@@ -236,6 +236,25 @@ static const char *kernels_open(int device) {
     return launched();
 }
 
+/* Launches a kernel whose blocks go before those of the ground, which takes longest: its places
+ * are taken by shares that come to it one after the other. */
+template <typename... Types, typename... Arguments>
+static const char *launch(void (*kernel)(Types...), int blocks, int threads, size_t shared,
+                          MildStream stream, const Arguments &...arguments) {
+    cudaLaunchAttribute first = {};
+    first.id = cudaLaunchAttributePriority;
+    first.val.priority = -1; /* the ground's is 0 */
+    cudaLaunchConfig_t config = {};
+    config.gridDim = dim3((unsigned)blocks);
+    config.blockDim = dim3((unsigned)threads);
+    config.dynamicSmemBytes = shared;
+    config.stream = (cudaStream_t)stream;
+    config.attrs = &first;
+    config.numAttrs = 1;
+    cudaLaunchKernelEx(&config, kernel, Types(arguments)...);
+    return launched();
+}
+
 static const char *kernels_create(const EnvsArrays *all, MildStream stream) {
     OnDevice on(all->device);
     create<<<lanes_blocks(all->envs), TASK_THREADS, 0, stream>>>(*all);
@@ -253,32 +272,28 @@ static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int
     OnDevice on(all->device);
     const auto run = all->shells.setup ? (all->sample ? part<1, 1> : part<0, 1>)
                                        : (all->sample ? part<1, 0> : part<0, 0>);
-    run<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, stream>>>(*all, *call, k);
-    return launched();
+    return launch(run, warp_blocks(all->envs), WARP_THREADS, work_bytes, stream, *all, *call, k);
 }
 
 static const char *kernels_shells(const EnvsArrays *all, int k, MildStream stream) {
     OnDevice on(all->device);
     const int looked = (all->envs + FIND_WARPS - 1) / FIND_WARPS;
     const int steps = all->envs < SHELLS_ROBOTS ? all->envs : SHELLS_ROBOTS;
-    find<<<looked, LANES * FIND_WARPS, 0, stream>>>(*all, k);
+    launch(find, looked, LANES * FIND_WARPS, 0, stream, *all, k);
     const auto run = all->shells.heap ? shells<1> : shells<0>;
-    run<<<steps, LANES * SHELLS_WARPS, shells_bytes, stream>>>(*all);
-    return launched();
+    return launch(run, steps, LANES * SHELLS_WARPS, shells_bytes, stream, *all);
 }
 
 static const char *kernels_end(const EnvsArrays *all, const EnvsStep *call, MildStream stream) {
     OnDevice on(all->device);
-    end<<<lanes_blocks(all->envs), TASK_THREADS, 0, stream>>>(*all, *call);
-    return launched();
+    return launch(end, lanes_blocks(all->envs), TASK_THREADS, 0, stream, *all, *call);
 }
 
 static const char *kernels_first(const EnvsArrays *all, const EnvsStep *call, MildStream stream) {
     OnDevice on(all->device);
-    pose<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, stream>>>(*all);
-    observe<<<lanes_blocks(all->envs), TASK_THREADS, 0, stream>>>(*all, *call);
-    arrange<<<1, ORDER_THREADS, 0, stream>>>(*all);
-    return launched();
+    launch(pose, warp_blocks(all->envs), WARP_THREADS, work_bytes, stream, *all);
+    launch(observe, lanes_blocks(all->envs), TASK_THREADS, 0, stream, *all, *call);
+    return launch(arrange, 1, ORDER_THREADS, 0, stream, *all);
 }
 
 static const char *kernels_move_progress(const EnvsArrays *all, int back, MildStream stream) {

@@ -115,20 +115,40 @@ MILD_HD int contact_memory_numbers(int elements, int map) {
     return map ? elements * CONTACT_MAP_MEMORY + CONTACT_FOOT_MEMORY : elements * CONTACT_MEMORY;
 }
 
-/* What an element remembers. at: its first number, those after it `next` apart each. */
-MILD_HD ElementMemory contact_recall(const Real *at, int next) {
+/* What an element remembers, as it lies in memory. */
+typedef struct {
+    Real number[CONTACT_MEMORY];
+} ContactKept;
+
+/* at: its first number, those after it `next` apart each. */
+MILD_HD ContactKept contact_kept(const Real *at, int next) {
+    ContactKept kept;
+    for (int n = 0; n < CONTACT_MEMORY; n++) {
+        kept.number[n] = at[n * next];
+    }
+    return kept;
+}
+
+MILD_HD ElementMemory contact_unpack(const ContactKept *kept) {
+    const Real *at = kept->number;
     ElementMemory before;
     before.depth_max = at[0];
-    before.middle = at[next];
-    before.front_speed = at[2 * next];
-    before.drift = at[3 * next];
-    pair_unpack(at[4 * next], &before.pending_x, &before.pending_y);
+    before.middle = at[1];
+    before.front_speed = at[2];
+    before.drift = at[3];
+    pair_unpack(at[4], &before.pending_x, &before.pending_y);
     before.pending_x *= REMEMBER_BAND;
     before.pending_y *= REMEMBER_BAND;
-    before.held_x = at[5 * next];
-    before.held_y = at[6 * next];
-    before.held_stiffness = at[7 * next];
+    before.held_x = at[5];
+    before.held_y = at[6];
+    before.held_stiffness = at[7];
     return before;
+}
+
+/* What an element remembers. */
+MILD_HD ElementMemory contact_recall(const Real *at, int next) {
+    const ContactKept kept = contact_kept(at, next);
+    return contact_unpack(&kept);
 }
 
 MILD_HD void contact_record(Real *at, int next, const ElementMemory *after) {

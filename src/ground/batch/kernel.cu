@@ -30,30 +30,23 @@ extern "C" {
 static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
 static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
 
-/* Robots of a block: two where their elements have room. */
-enum {
-    SHARED_MOST = 48 * 1024, /* [B] of a block */
-    WARPS = 2 * sizeof(map_Shared) <= SHARED_MOST ? 2 : 1,
-    THREADS = WARPS * LANES
-};
-
+/* A block has one robot: one that takes long keeps no other's place. */
 #define CONTACT_TURN(version)                                                                      \
-    static __global__ void __launch_bounds__(THREADS, KERNEL_ROBOTS / WARPS) contact_##version(    \
+    static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_##version(              \
         const __grid_constant__ ContactSetup setup, const __grid_constant__ BatchShape shape,      \
         const __grid_constant__ BatchArrays arrays, const __grid_constant__ MildBatchInput input,  \
         const __grid_constant__ MildBatchOutput output, int advance) {                             \
-        __shared__ version##_Shared shared[WARPS];                                                 \
-        const int warp = (int)(threadIdx.x / LANES);                                               \
-        const long robot = (long)blockIdx.x * WARPS + warp;                                        \
-        if (robot >= shape.robots || (arrays.skip && arrays.skip[robot])) {                        \
+        __shared__ version##_Shared shared;                                                        \
+        const long robot = blockIdx.x;                                                             \
+        if (arrays.skip && arrays.skip[robot]) {                                                   \
             return;                                                                                \
         }                                                                                          \
         ContactProblem problem;                                                                    \
         ContactResult result;                                                                      \
         batch_problem(&shape, &arrays, &input, robot, &problem);                                   \
         batch_result(&shape, &output, robot, &result);                                             \
-        version##_robot(&setup, &problem, &shared[warp], batch_memory(&shape, &arrays, robot),     \
-                        advance, &result);                                                         \
+        version##_robot(&setup, &problem, &shared, batch_memory(&shape, &arrays, robot), advance,  \
+                        &result);                                                                  \
     }
 CONTACT_TURN(level)
 CONTACT_TURN(map)
@@ -62,11 +55,10 @@ static MildStatus step(const MildBatch *batch, const MildBatchInput *input,
                        const MildBatchOutput *output, int advance, MildStream stream,
                        MildError *error) {
     const BatchShape *shape = &batch->shape;
-    const int blocks = (shape->robots + WARPS - 1) / WARPS;
     ContactSetup setup;
     OnDevice on(batch->device);
     batch_setup(shape, &batch->arrays, &setup);
-    (shape->map ? contact_map : contact_level)<<<blocks, THREADS, 0, stream>>>(
+    (shape->map ? contact_map : contact_level)<<<shape->robots, LANES, 0, stream>>>(
         setup, *shape, batch->arrays, *input, *output, advance);
     return checked(cudaGetLastError(), "step", error);
 }

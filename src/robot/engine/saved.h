@@ -86,26 +86,25 @@ WARP_FN void engine_restore(const EngineTree *tree, int rigid, const EngineSaved
         for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
             const EngineEntry entry = tree->entry[e];
             const int d = entry.dof;
-            if (entry.place == tree->above[d]) {
-                work->inverse[d] = saved->factor[e];
-            } else {
-                work->factor[d][entry.place] = saved->factor[e];
-            }
+            const int diagonal = entry.place == tree->above[d];
+            number_bring(saved->factor + e,
+                         diagonal ? work->inverse + d : work->factor[d] + entry.place);
         }
         LANE_ROLLED
         for (int n = LANE(l); n < ENGINE_STATE; n += LANES) {
-            state[n] = saved->state[n];
+            number_bring(saved->state + n, state + n);
         }
         LANE_ROLLED
         for (int n = LANE(l); n < 6 * ENGINE_CHAIN * engine_feet(tree); n += LANES) {
-            rows[n] = saved->rows[n];
+            number_bring(saved->rows + n, rows + n);
         }
         LANE_ROLLED
         for (int n = LANE(l); rigid && n < 12 * engine_feet(tree); n += LANES) {
-            *link_pose_number(work, tree->foot_link[n / 12], n % 12) = saved->foot_link[n];
+            number_bring(saved->foot_link + n,
+                         link_pose_number(work, tree->foot_link[n / 12], n % 12));
         }
     }
-    lanes_sync();
+    lanes_brought();
 }
 
 #endif
