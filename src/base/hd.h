@@ -177,8 +177,8 @@ MILD_HD void pair_unpack(Real pair, Real *x, Real *y) {
 
 /* ---- memory ahead of its use ---- */
 
-/* A number from a GPU's global memory, not from shared memory, to its shared memory, for which
- * nobody waits before lanes_brought. */
+/* Starts to copy a number from a GPU's global memory to its shared memory. It is there after
+ * lanes_brought. */
 MILD_HD void number_bring(const Real *from, Real *to) {
 #if defined(__CUDA_ARCH__) && defined(MILD_REAL_FLOAT)
     asm volatile(
@@ -226,7 +226,7 @@ WARP_FN void lanes_sync(void) {
     __syncwarp();
 }
 
-/* The same of what each lane asked for by number_bring. */
+/* The same of what number_bring copies, once it is there. */
 WARP_FN void lanes_brought(void) {
     asm volatile("cp.async.wait_all;" ::: "memory");
     __syncwarp();

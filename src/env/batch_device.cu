@@ -236,14 +236,14 @@ static const char *kernels_open(int device) {
     return launched();
 }
 
-/* Launches a kernel whose blocks go before those of the ground, which takes longest: its places
- * are taken by shares that come to it one after the other. */
+/* Launches a kernel whose blocks start before waiting blocks of the ground's kernel. The ground
+ * takes longest, so other shares fill its places meanwhile. */
 template <typename... Types, typename... Arguments>
 static const char *launch(void (*kernel)(Types...), int blocks, int threads, size_t shared,
                           MildStream stream, const Arguments &...arguments) {
     cudaLaunchAttribute first = {};
     first.id = cudaLaunchAttributePriority;
-    first.val.priority = -1; /* the ground's is 0 */
+    first.val.priority = -1; /* of the ground: 0, in streams of default priority */
     cudaLaunchConfig_t config = {};
     config.gridDim = dim3((unsigned)blocks);
     config.blockDim = dim3((unsigned)threads);
@@ -279,9 +279,9 @@ static const char *kernels_shells(const EnvsArrays *all, int k, MildStream strea
     OnDevice on(all->device);
     const int looked = (all->envs + FIND_WARPS - 1) / FIND_WARPS;
     const int steps = all->envs < SHELLS_ROBOTS ? all->envs : SHELLS_ROBOTS;
-    launch(find, looked, LANES * FIND_WARPS, 0, stream, *all, k);
     const auto run = all->shells.heap ? shells<1> : shells<0>;
-    return launch(run, steps, LANES * SHELLS_WARPS, shells_bytes, stream, *all);
+    const char *why = launch(find, looked, LANES * FIND_WARPS, 0, stream, *all, k);
+    return why ? why : launch(run, steps, LANES * SHELLS_WARPS, shells_bytes, stream, *all);
 }
 
 static const char *kernels_end(const EnvsArrays *all, const EnvsStep *call, MildStream stream) {
@@ -291,9 +291,11 @@ static const char *kernels_end(const EnvsArrays *all, const EnvsStep *call, Mild
 
 static const char *kernels_first(const EnvsArrays *all, const EnvsStep *call, MildStream stream) {
     OnDevice on(all->device);
-    launch(pose, warp_blocks(all->envs), WARP_THREADS, work_bytes, stream, *all);
-    launch(observe, lanes_blocks(all->envs), TASK_THREADS, 0, stream, *all, *call);
-    return launch(arrange, 1, ORDER_THREADS, 0, stream, *all);
+    const char *why = launch(pose, warp_blocks(all->envs), WARP_THREADS, work_bytes, stream, *all);
+    if (!why) {
+        why = launch(observe, lanes_blocks(all->envs), TASK_THREADS, 0, stream, *all, *call);
+    }
+    return why ? why : launch(arrange, 1, ORDER_THREADS, 0, stream, *all);
 }
 
 static const char *kernels_move_progress(const EnvsArrays *all, int back, MildStream stream) {

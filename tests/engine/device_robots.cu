@@ -101,8 +101,8 @@ WARP_FN void material_of(const EngineRobots *robots, const BatchShape *shape,
  * from step to step. */
 template <int MAP>
 WARP_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
-                      const ContactSetup *setup, ContactProblem problem, long robot, Real *memory,
-                      ground_Shared *shared, Workplace *place) {
+                      const ContactSetup *setup, ContactProblem problem, long robot,
+                      ContactMemory memory, ground_Shared *shared, Workplace *place) {
     EngineWork *work = &place->work;
     const EngineAction action = {&robots->variation[robot], place->torque,
                                  robots->push ? robots->push + 6 * robot : NULL, 0};

@@ -66,8 +66,8 @@ static MildStatus step(const MildBatch *batch, const MildBatchInput *input,
 extern "C" {
 extern const BatchKernel KERNEL;
 const BatchKernel KERNEL = {KERNEL_GROUPS, KERNEL_PER, KERNEL_POINTS,
-                            KERNEL_CURVES == LAW_ANY   ? ~0
-                            : KERNEL_CURVES == LAW_ALL ? ~LAW_HEAP
-                                                       : KERNEL_CURVES,
+                            (int)KERNEL_CURVES == (int)LAW_ANY   ? ~0
+                            : (int)KERNEL_CURVES == (int)LAW_ALL ? ~LAW_HEAP
+                                                                 : KERNEL_CURVES,
                             step};
 }
