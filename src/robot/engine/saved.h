@@ -1,6 +1,6 @@
 /* What engine_end needs of engine_begin's work where something else is done between the two: a
- * quarter of EngineWork, in a GPU's global memory; on a CPU in any. The factor of M is a list of its
- * entries. */
+ * quarter of EngineWork, in a GPU's global memory; on a CPU in any. The factor of M is a list of
+ * its entries. */
 #ifndef MILD_ENGINE_SAVED_H
 #define MILD_ENGINE_SAVED_H
 
