@@ -226,7 +226,7 @@ WARP_FN void lanes_sync(void) {
     __syncwarp();
 }
 
-/* The same of what number_bring copies, once it is there. */
+/* Waits for what the lanes copy by number_bring, and makes it visible to the others. */
 WARP_FN void lanes_brought(void) {
     asm volatile("cp.async.wait_all;" ::: "memory");
     __syncwarp();

@@ -13,8 +13,8 @@
 _Static_assert(ENVS_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fills");
 
 /* Shares of the robots. One NVIDIA H200: three make 5 % more steps than one with 16 384 robots, 7 %
- * with 4096 and 2 % with 65 536. Four make 0.2 to 0.5 % more than three with 16 384 (H100, where
- * the ground's kernel comes last). The CPU steps them in turn, so that its tests see them. */
+ * with 4096 and 2 % with 65 536. Four make as many as three within 0.5 % (H100, 16 384 robots).
+ * The CPU steps them in turn, so that its tests see them. */
 enum { SHARES = 4 };
 
 typedef struct {

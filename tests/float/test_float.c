@@ -160,7 +160,7 @@ typedef struct {
 } Cycle;
 
 /* A foot that is pressed in by 6 mm and led round in the ground, whatever the ground does. Returns
- * the least work that a cycle after the first has taken, over all that went to and fro in it. */
+ * the least work that a cycle has taken, over all that went to and fro in it. */
 static double led(const MildTerrain *terrain, double turn, const Cycle *cycle) {
     MildError error = {0};
     MildGround *ground = new_ground();
@@ -205,7 +205,7 @@ static double led(const MildTerrain *terrain, double turn, const Cycle *cycle) {
             memcpy(input.velocity[0], v, 6 * sizeof *v);
         }
         assert_true(size > 0);
-        least = n > 0 ? fmin(least, work / size) : least;
+        least = fmin(least, work / size);
     }
     float_ground_destroy(single);
     free(ground);
