@@ -52,9 +52,20 @@ typedef struct {
     Real rise_y;  /* [-] */
 } Friction;
 
+/* Steps of Newton's method that begin it. */
+#define FRICTION_BEGINS 2
+
 /* Friction at the velocity (vx, vy) with the bound r. mu: derivative of r with respect to I_z, 0
- * when the solver holds the bound fixed. */
-MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, Real vx, Real vy) {
+ * when the solver holds the bound fixed.
+ *
+ * begins: bool, the slopes are for a first step of Newton's method, whose V may be far from the
+ * solution. Where an element slides, I does not change along n, so such a step passes over the 4
+ * mm/s in which it sticks, to sliding the other way. Then an element slides that way if its spring
+ * before the step had half of the bound there already. Any other has the slopes of I = t times a
+ * fixed min(1, r/|t|), whose energy is nowhere below that of friction (as in lagged diffusivity;
+ * with f in place of the dual variable of Chan, Golub and Mulet 1999). */
+MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, int begins, Real vx,
+                                  Real vy) {
     const Real stiffness = e->hold_stiffness + FRICTION_LAG * r;
     const Real tx = e->hold_x - stiffness * vx;
     const Real ty = e->hold_y - stiffness * vy;
@@ -76,12 +87,16 @@ MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, Real vx, Re
     const Real lag_y = -share * FRICTION_LAG * vy;
     const Real lag_n = 1 - (nx * lag_x + ny * lag_y);
 
+    const int turns = begins && nx * e->hold_x + ny * e->hold_y < r / 2;
+    const Real mx = turns ? 0 : nx;
+    const Real my = turns ? 0 : ny;
+
     Friction result;
     result.x = share * tx - e->damping * vx;
     result.y = share * ty - e->damping * vy;
-    result.fall_xx = e->damping + yields * (1 - nx * nx);
-    result.fall_xy = -yields * nx * ny;
-    result.fall_yy = e->damping + yields * (1 - ny * ny);
+    result.fall_xx = e->damping + yields * (1 - mx * mx);
+    result.fall_xy = -yields * mx * my;
+    result.fall_yy = e->damping + yields * (1 - my * my);
     result.rise_x = mu * (lag_x + nx * lag_n);
     result.rise_y = mu * (lag_y + ny * lag_n);
     return result;
@@ -104,7 +119,7 @@ MILD_HD Friction friction_turned(const Element *e, Real r, Real mu, Real vx, Rea
     const Real along = vx * e->turn_x + vy * e->turn_y;
     const Real within = along < 0 && along > -square ? 1 / (square + REAL_LEAST) : 0;
     friction_turn(e, &vx, &vy);
-    Friction result = friction_impulse(e, r, mu, vx, vy);
+    Friction result = friction_impulse(e, r, mu, 0, vx, vy);
     const Real x = within * (result.fall_xx * e->turn_x + result.fall_xy * e->turn_y);
     const Real y = within * (result.fall_xy * e->turn_x + result.fall_yy * e->turn_y);
     result.fall_xx -= x * e->turn_x;

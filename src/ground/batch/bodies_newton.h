@@ -50,13 +50,15 @@ MILD_HD void bodies_add(const Real *p, const Real I[3], const Real h[3][3],
     }
 }
 
-/* Wrench and hessian of one element at the twist V. I = friction + I_z g, see pass.c. */
+/* Wrench and hessian of one element at the twist V. I = friction + I_z g, see pass.c. begins: bool,
+ * see friction_impulse. */
 MILD_HD void bodies_pass(const BodiesSetup *setup, const BodiesElement *own, const Real *V,
-                         Real (*sums)[LANE_COPIES], int l) {
+                         int begins, Real (*sums)[LANE_COPIES], int l) {
     const Element *e = &own->element;
     const ContactVelocity v = bodies_velocity(own, V);
     const Impulse normal = element_impulse(e, own->curves, 1, setup->dt, v.descent);
-    const Friction f = friction_impulse(e, friction_bound(e, normal.value), e->mu, v.x, v.y);
+    const Real bound = friction_bound(e, normal.value);
+    const Friction f = friction_impulse(e, bound, e->mu, begins, v.x, v.y);
     const Real g[2] = {-own->slope[0], -own->slope[1]};
     const Real I[3] = {f.x + g[0] * normal.value, f.y + g[1] * normal.value, normal.value};
     const Real xz = normal.slope * (f.rise_x + g[0]);
@@ -207,7 +209,7 @@ TEAM_FN void bodies_keep(const BodiesSetup *setup, const BodiesWork *work, Bodie
 
 /* Wrench and hessian of a round. */
 TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const BodiesPoint *point,
-                          int turn, const BodiesElement *kept,
+                          int begins, int turn, const BodiesElement *kept,
                           const BodiesElement (*rest)[LANE_COPIES], int heap) {
     const int round = TEAM_WARP + turn * TEAM_WARPS;
     const Real *twist = point->twist + 6 * work->place[round];
@@ -219,7 +221,7 @@ TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const Bodi
         }
         if (turn == 0) {
             if (kept[l].share > 0) {
-                bodies_pass(setup, &kept[l], twist, part, l);
+                bodies_pass(setup, &kept[l], twist, begins, part, l);
             }
         } else {
             BodiesElement own;
@@ -229,7 +231,7 @@ TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const Bodi
                 bodies_of_round(setup, work, round, LANE(l), &own, heap);
             }
             if (own.share > 0) {
-                bodies_pass(setup, &own, twist, part, l);
+                bodies_pass(setup, &own, twist, begins, part, l);
             }
         }
     }
@@ -247,11 +249,11 @@ TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const Bodi
 
 /* W and H at the twist of a point. */
 TEAM_FN void bodies_evaluate(const BodiesSetup *setup, BodiesWork *work, BodiesPoint *point,
-                             const BodiesElement *kept, const BodiesElement (*rest)[LANE_COPIES],
-                             int heap) {
+                             int begins, const BodiesElement *kept,
+                             const BodiesElement (*rest)[LANE_COPIES], int heap) {
     LANE_ROLLED
     for (int turn = 0; TEAM_WARP + turn * TEAM_WARPS < work->first[work->count]; turn++) {
-        bodies_round(setup, work, point, turn, kept, rest, heap);
+        bodies_round(setup, work, point, begins, turn, kept, rest, heap);
     }
     team_sync();
     EACH_LANE(l) {
@@ -499,8 +501,9 @@ TEAM_FN void bodies_eliminate(BodiesWork *work, int rows) {
     team_sync();
 }
 
-/* Newton's step from `at`, where H was taken: (1 + H A) P = W + H (V - V_free). */
-TEAM_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, BodiesPoint *next) {
+/* Newton's step from `at`, where H was taken. corrects: bool, as in contact_newton.inc. */
+TEAM_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, int corrects,
+                         BodiesPoint *next) {
     const int active = work->active;
     const int stride = active + 1;
     LANE_ROLLED
@@ -514,9 +517,9 @@ TEAM_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, Bodi
             for (int m = LANE(l); m < stride; m += LANES) {
                 const int right = m == active; /* the right side */
                 const int j = work->active_row[right ? 0 : m];
-                Real sum = right ? at->wrench[r] : r == j ? 1 : 0;
+                Real sum = right ? at->wrench[r] - at->impulse[r] : r == j ? 1 : 0;
                 LANE_UNROLL
-                for (int k = 0; k < 6; k++) {
+                for (int k = 0; k < 6 && !(right && corrects); k++) {
                     sum += H[k] * (right ? at->twist[first + k] - work->free_velocity[first + k]
                                          : A[k * rows + j]);
                 }
@@ -529,7 +532,7 @@ TEAM_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, Bodi
     EACH_LANE(l) {
         LANE_ROLLED
         for (int n = TEAM_LANE(l); n < active; n += TEAM) {
-            next->impulse[work->active_row[n]] = work->matrix[n * stride + active];
+            work->row[0][work->active_row[n]] = work->matrix[n * stride + active];
         }
     }
     team_sync();
@@ -537,7 +540,9 @@ TEAM_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, Bodi
         LANE_ROLLED
         for (int n = TEAM_LANE(l); n < active; n += TEAM) {
             const int r = work->active_row[n];
-            next->twist[r] = work->free_velocity[r] + bodies_times(work, rows, r, next->impulse);
+            const Real from = corrects ? at->twist[r] : work->free_velocity[r];
+            next->impulse[r] = at->impulse[r] + work->row[0][r];
+            next->twist[r] = from + bodies_times(work, rows, r, work->row[0]);
         }
     }
     team_sync();
@@ -599,8 +604,8 @@ TEAM_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work, int heap)
     bodies_copy(rows, &work->next, &work->best);
     for (;;) {
         Real residual, scale;
-        bodies_evaluate(setup, work, &work->next, kept, (const BodiesElement(*)[LANE_COPIES])rest,
-                        heap);
+        bodies_evaluate(setup, work, &work->next, steps < FRICTION_BEGINS, kept,
+                        (const BodiesElement(*)[LANE_COPIES])rest, heap);
         bodies_residual(work, rows, &work->next, &residual, &scale);
         const Real wanted = halved ? (1 - way / 10) * at_residual : at_residual;
         if (steps > 1 && !(residual < wanted) && halved < CONTACT_HALVINGS) {
@@ -625,7 +630,7 @@ TEAM_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work, int heap)
             break;
         }
         bodies_copy(rows, &work->next, &work->at);
-        bodies_move(work, rows, &work->at, &work->next);
+        bodies_move(work, rows, &work->at, steps > 0, &work->next);
         steps++;
     }
     EACH_LANE(l) {
