@@ -52,9 +52,6 @@ typedef struct {
     Real rise_y;  /* [-] */
 } Friction;
 
-/* Steps of Newton's method that begin it. */
-#define FRICTION_BEGINS 2
-
 /* Friction at the velocity (vx, vy) with the bound r. mu: derivative of r with respect to I_z, 0
  * when the solver holds the bound fixed.
  *

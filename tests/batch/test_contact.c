@@ -2,6 +2,7 @@
  * code in double and in float, of one, two and four feet, on level ground and on maps. */
 #include "batch_kit.h"
 #include "case_law.h"
+#include "ground/batch/contact.h"
 #include "ground/begin.h"
 #include "ground/grid.h"
 #include "ground/map_kit.h"
@@ -59,6 +60,9 @@ static void case_map(ContactCase *c, const MildTerrain *terrain) {
     c->map_origin[1] = terrain->map_y;
 }
 
+/* Of ContactCase. With 0 the steps of Newton's method are those of mild/ground.h. */
+static int begins;
+
 /* The problem of a kit before its step. What the case remembers of planes stays. */
 static void case_of(ContactCase *c, const Kit *kit, int groups, int per, double tolerance) {
     const int n = 6 * kit->feet;
@@ -76,6 +80,7 @@ static void case_of(ContactCase *c, const Kit *kit, int groups, int per, double 
     c->dt = kit->input.dt;
     c->tolerance = tolerance;
     c->limit = 60;
+    c->begins = begins;
     c->height = kit->terrain.height;
     for (int f = 0; f < kit->feet; f++) {
         const MildSole *sole = kit->soles[f];
@@ -369,7 +374,7 @@ static void run_shape(const Shape *shape, int walks, double tolerance, void (*ru
             kit.mass[f] = kit_uniform(&random, 3.0, 40.0);
             kit.inertia[f] = kit.mass[f] * kit_uniform(&random, 0.02, 0.1);
         }
-        kit.input.tolerance = 1e-11;
+        kit.input.tolerance = fmin(tolerance, 1e-11);
         kit.terrain.height = kit_uniform(&random, -0.002, 0.002);
         walk(&kit, &random, WALK_STEPS, tolerance, shape->groups, shape->per, shape->points, 0, run,
              worst);
@@ -387,19 +392,24 @@ static int same_steps(int points, const Worst *worst) {
                         0.04 * scale * worst->iterations_ground;
 }
 
+/* Without steps that begin; with them, on their way to the same solution, which is sought closer. */
 TEST(double_text_is_the_ground) {
-    for (int i = 0; i < SHAPES; i++) {
+    for (int i = 0; i < 2 * SHAPES; i++) {
         static Worst worst;
         worst = (Worst){0};
-        run_shape(&shapes[i], kit_draws(20), 1e-11, contact_case_double, &worst);
-        worst_print(shapes[i].name, &worst);
+        begins = i < SHAPES ? 0 : CONTACT_BEGINS;
+        run_shape(&shapes[i % SHAPES], kit_draws(begins ? 8 : 20), begins ? 1e-12 : 1e-11, contact_case_double,
+                  &worst);
+        worst_print(shapes[i % SHAPES].name, &worst);
         assert_true(worst.wrench < 1e-10 && worst.twist < 1e-10 && worst.foot < 1e-10);
         assert_true(worst.element < 1e-6 && worst.memory < 1e-7);
-        assert_true(worst.unsolved < worst.steps / 20 && same_steps(shapes[i].points, &worst));
+        assert_true(worst.unsolved < worst.steps / 20);
+        assert_true(begins || same_steps(shapes[i].points, &worst));
     }
 }
 
 TEST(float_text_is_near_it) {
+    begins = CONTACT_BEGINS;
     for (int i = 0; i < SHAPES; i++) {
         static Worst worst;
         worst = (Worst){0};
@@ -552,7 +562,7 @@ static void run_relief(const Relief *relief, int walks, double tolerance,
         kit.terrain.material_count = CASE_LABELS;
         memcpy(kit.terrain.materials, m, sizeof m);
         kit.terrain.map = map;
-        kit.input.tolerance = 1e-11;
+        kit.input.tolerance = fmin(tolerance, 1e-11);
         kit_random_state(&kit, &random);
         stand_above(&kit, relief, &random);
         walk(&kit, &random, WALK_STEPS, tolerance, relief->groups, relief->per, relief->points,
@@ -563,18 +573,22 @@ static void run_relief(const Relief *relief, int walks, double tolerance,
 }
 
 TEST(double_text_is_the_ground_on_maps) {
-    for (int i = 0; i < RELIEFS; i++) {
+    for (int i = 0; i < 2 * RELIEFS; i++) {
         static Worst worst;
         worst = (Worst){0};
-        run_relief(&reliefs[i], kit_draws(20), 1e-11, contact_map_double, &worst);
-        worst_print(reliefs[i].name, &worst);
+        begins = i < RELIEFS ? 0 : CONTACT_BEGINS;
+        run_relief(&reliefs[i % RELIEFS], kit_draws(begins ? 8 : 20), begins ? 1e-12 : 1e-11, contact_map_double,
+                   &worst);
+        worst_print(reliefs[i % RELIEFS].name, &worst);
         assert_true(worst.wrench < 1e-10 && worst.twist < 1e-10 && worst.foot < 1e-10);
         assert_true(worst.element < 1e-6 && worst.memory < 1e-7);
-        assert_true(worst.unsolved < worst.steps / 20 && same_steps(reliefs[i].points, &worst));
+        assert_true(worst.unsolved < worst.steps / 20);
+        assert_true(begins || same_steps(reliefs[i].points, &worst));
     }
 }
 
 TEST(float_text_is_near_it_on_maps) {
+    begins = CONTACT_BEGINS;
     for (int i = 0; i < RELIEFS; i++) {
         static Worst worst;
         worst = (Worst){0};

@@ -604,7 +604,7 @@ TEAM_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work, int heap)
     bodies_copy(rows, &work->next, &work->best);
     for (;;) {
         Real residual, scale;
-        bodies_evaluate(setup, work, &work->next, steps < FRICTION_BEGINS, kept,
+        bodies_evaluate(setup, work, &work->next, contact_begins(steps, CONTACT_BEGINS), kept,
                         (const BodiesElement(*)[LANE_COPIES])rest, heap);
         bodies_residual(work, rows, &work->next, &residual, &scale);
         const Real wanted = halved ? (1 - way / 10) * at_residual : at_residual;

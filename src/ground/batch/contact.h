@@ -18,6 +18,13 @@
 #define CONTACT_FEET_MAX 4
 #define CONTACT_PADDING REAL(-1e3) /* [m] depth of elements that a foot does not have */
 #define CONTACT_HALVINGS 6         /* of one Newton step */
+#define CONTACT_BEGINS 2           /* Newton steps that begin it, see friction_impulse */
+#define CONTACT_AGAIN 8            /* steps after which it begins again: it may be in a cycle */
+
+/* Bool: the next Newton step is one that begins. */
+MILD_HD int contact_begins(int steps, int begins) {
+    return steps % CONTACT_AGAIN < begins;
+}
 
 /* What a step needs of a material under one element of a foot. */
 typedef struct {
@@ -61,6 +68,7 @@ typedef struct {
     Real dt;        /* [s] */
     Real tolerance; /* [-] of the residual, in the metric of kinetic energy */
     int limit;      /* of Newton steps */
+    int begins;     /* of these; CONTACT_BEGINS */
     int triangle;   /* bool: inverse_inertia is its lower triangle, row by row */
     MapView map;    /* in a version with CONTACT_MAP */
 } ContactSetup;
