@@ -603,10 +603,12 @@ TEAM_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work, int heap)
     bodies_start(work, rows, &work->next);
     bodies_copy(rows, &work->next, &work->best);
     for (;;) {
-        Real residual, scale;
+        Real residual = 0, scale = 0; /* of the start nobody asks */
         bodies_evaluate(setup, work, &work->next, contact_begins(steps, CONTACT_BEGINS), kept,
                         (const BodiesElement(*)[LANE_COPIES])rest, heap);
-        bodies_residual(work, rows, &work->next, &residual, &scale);
+        if (steps > 0) {
+            bodies_residual(work, rows, &work->next, &residual, &scale);
+        }
         const Real wanted = halved ? (1 - way / 10) * at_residual : at_residual;
         if (steps > 1 && !(residual < wanted) && halved < CONTACT_HALVINGS) {
             way = halved ? way / 2 : REAL(0.5);
