@@ -15,7 +15,7 @@ _Static_assert(ENVS_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fil
 /* Shares of the robots. One NVIDIA H200: three make 5 % more steps than one with 16 384 robots, 7 %
  * with 4096 and 2 % with 65 536. Four make as many as three within 0.5 % (H100, 16 384 robots).
  * The CPU steps them in turn, so that its tests see them. */
-enum { SHARES = 4 };
+enum { SHARES = 3 };
 
 typedef struct {
     Envs base;
