@@ -428,6 +428,15 @@ static inline void all_against_ground(Errors *twists, Errors *moments, Errors *r
     }
 }
 
+/* Robots whose step ended above the tolerance. */
+static inline int herd_unsolved(const Arrays *a) {
+    int count = 0;
+    for (int r = 0; r < ROBOTS; r++) {
+        count += !(a->residual[r] <= 1e-4F);
+    }
+    return count;
+}
+
 /* Forces of a step against the kits'. */
 static inline void against_ground(Errors *errors, const Herd *herd, const Arrays *a) {
     for (int r = 0; r < ROBOTS; r++) {

@@ -73,6 +73,7 @@ TEST(steps_are_those_of_the_ground) {
         for (int i = 0; i < SHAPES; i++) {
             static Errors errors, twists, moments, reports;
             Side side;
+            int unsolved = 0;
             errors.count = twists.count = moments.count = reports.count = 0;
             herd_open(&herd, &shapes[i]);
             side_open(&side, &herd, device);
@@ -84,6 +85,7 @@ TEST(steps_are_those_of_the_ground) {
                 assert_memory_equal(&once, &arrays.wrench[2], sizeof once);
                 against_ground(&errors, &herd, &arrays);
                 all_against_ground(&twists, &moments, &reports, &herd, &arrays);
+                unsolved += herd_unsolved(&arrays);
                 herd_advance(&herd);
                 side_follow(&side, &herd);
             }
@@ -91,6 +93,10 @@ TEST(steps_are_those_of_the_ground) {
             check_errors("    twists", &twists, 1e-6, 3e-3);
             check_errors("    moments", &moments, 2e-5, 1e-2);
             check_errors("    centres, depths, areas", &reports, 1e-6, 3e-3);
+            print_message("    %d steps are not solved\n", unsolved);
+            /* 96 and 179 of 2880 on surfaces, if steps did not correct P and V */
+            assert_true(!mild_model_is_concentric(shapes[i].model) ||
+                        unsolved <= some_steps() * ROBOTS / 40);
             side_close(&side);
             herd_close(&herd);
         }
