@@ -61,8 +61,7 @@ typedef struct {
  * before the step had half of the bound there already. Any other has the slopes of I = t times a
  * fixed min(1, r/|t|), whose energy is nowhere below that of friction (as in lagged diffusivity;
  * with f in place of the dual variable of Chan, Golub and Mulet 1999). */
-MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, int begins, Real vx,
-                                  Real vy) {
+MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, int begins, Real vx, Real vy) {
     const Real stiffness = e->hold_stiffness + FRICTION_LAG * r;
     const Real tx = e->hold_x - stiffness * vx;
     const Real ty = e->hold_y - stiffness * vy;

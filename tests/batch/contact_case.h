@@ -21,7 +21,7 @@ typedef struct {
     double begin[CASE_FEET][CASE_ELEMENTS], width[CASE_FEET][CASE_ELEMENTS]; /* of SoleHeap */
     double area[CASE_FEET];
     double dt, tolerance, height;
-    int limit, begins; /* as in ContactSetup */
+    int limit, begins;                  /* as in ContactSetup */
     CaseMaterial material[CASE_LABELS]; /* [0] without a map */
     double position[3 * CASE_FEET], rotation[9 * CASE_FEET], velocity[6 * CASE_FEET];
     double inverse_inertia[36 * CASE_FEET * CASE_FEET], free_velocity[6 * CASE_FEET];
