@@ -52,16 +52,16 @@ typedef struct {
     Real rise_y;  /* [-] */
 } Friction;
 
-/* Friction at the velocity (vx, vy) with the bound r. mu: derivative of r with respect to I_z, 0
- * when the solver holds the bound fixed.
+/* Friction at the velocity (vx, vy) with the bound r, and the slopes for a step of Newton's method.
+ * mu: derivative of r with respect to I_z, 0 when the solver holds the bound fixed.
  *
- * begins: bool, the slopes are for a first step of Newton's method, whose V may be far from the
- * solution. Where an element slides, I does not change along n, so such a step passes over the 4
- * mm/s in which it sticks, to sliding the other way. Then an element slides that way if its spring
- * before the step had half of the bound there already. Any other has the slopes of I = t times a
- * fixed min(1, r/|t|), whose energy is nowhere below that of friction (as in lagged diffusivity;
- * with f in place of the dual variable of Chan, Golub and Mulet 1999). */
-MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, int begins, Real vx, Real vy) {
+ * begins: bool, a first step, whose V may be far from the solution. Where an element slides, I does
+ * not change along n, so such a step passes over the 4 mm/s in which it sticks, to sliding the other
+ * way. Then an element slides that way if its spring before the step had half of the bound there
+ * already. Any other has the slopes of I = t times a fixed min(1, r/|t|), whose energy is nowhere
+ * below that of friction (as in lagged diffusivity; with f in place of the dual variable of Chan,
+ * Golub and Mulet 1999). */
+MILD_HD Friction friction_step(const Element *e, Real r, Real mu, int begins, Real vx, Real vy) {
     const Real stiffness = e->hold_stiffness + FRICTION_LAG * r;
     const Real tx = e->hold_x - stiffness * vx;
     const Real ty = e->hold_y - stiffness * vy;
@@ -83,9 +83,9 @@ MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, int begins,
     const Real lag_y = -share * FRICTION_LAG * vy;
     const Real lag_n = 1 - (nx * lag_x + ny * lag_y);
 
-    const int turns = begins && nx * e->hold_x + ny * e->hold_y < r / 2;
-    const Real mx = turns ? 0 : nx;
-    const Real my = turns ? 0 : ny;
+    const int may_hold = begins && nx * e->hold_x + ny * e->hold_y < r / 2;
+    const Real mx = may_hold ? 0 : nx;
+    const Real my = may_hold ? 0 : ny;
 
     Friction result;
     result.x = share * tx - e->damping * vx;
@@ -96,6 +96,11 @@ MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, int begins,
     result.rise_x = mu * (lag_x + nx * lag_n);
     result.rise_y = mu * (lag_y + ny * lag_n);
     return result;
+}
+
+/* The same with its own derivatives. */
+MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, Real vx, Real vy) {
+    return friction_step(e, r, mu, 0, vx, vy);
 }
 
 /* Replaces the velocity by the one that friction opposes: the velocity minus its nearest point on
@@ -115,7 +120,7 @@ MILD_HD Friction friction_turned(const Element *e, Real r, Real mu, Real vx, Rea
     const Real along = vx * e->turn_x + vy * e->turn_y;
     const Real within = along < 0 && along > -square ? 1 / (square + REAL_LEAST) : 0;
     friction_turn(e, &vx, &vy);
-    Friction result = friction_impulse(e, r, mu, 0, vx, vy);
+    Friction result = friction_impulse(e, r, mu, vx, vy);
     const Real x = within * (result.fall_xx * e->turn_x + result.fall_xy * e->turn_y);
     const Real y = within * (result.fall_xy * e->turn_x + result.fall_yy * e->turn_y);
     result.fall_xx -= x * e->turn_x;

@@ -128,7 +128,7 @@ MILD_HD void block_friction(Slots *s, const Motion *motion, int kind, int held, 
         const Real bound = held ? s->bound[i] : friction_bound(&element, iz);
         const Real mu = held ? 0 : element.mu;
         const Friction friction = turned ? friction_turned(&element, bound, mu, v.x, v.y)
-                                         : friction_impulse(&element, bound, mu, 0, v.x, v.y);
+                                         : friction_impulse(&element, bound, mu, v.x, v.y);
         Real ix = friction.x;
         Real iy = friction.y;
         Real hxz = friction.rise_x * k;

@@ -462,6 +462,27 @@ TEST(test_friction) {
     expect_near("stiffness", rest.fall_xx, 3.5, 1e-12);
 }
 
+/* The slopes of a first step: with nothing held those of a fixed share of t, so that the slope along
+ * v times v is I; with more than half of the bound held against v those of sliding. */
+TEST(test_friction_begins) {
+    const double vx = 0.024, vy = 0.032;
+    const Element e = {.damping = 0.02};
+    const Friction first = friction_step(&e, 0.01, 0.5, 1, vx, vy);
+    const Friction slides = friction_impulse(&e, 0.01, 0.5, vx, vy);
+    expect_near("x", first.x, slides.x, 0.0);
+    expect_near("along", first.fall_xx * vx + first.fall_xy * vy, -first.x, 1e-15);
+    expect_near("along", first.fall_xy * vx + first.fall_yy * vy, -first.y, 1e-15);
+    expect_near("sliding", slides.fall_xx * vx + slides.fall_xy * vy, 0.02 * vx, 1e-15);
+    for (int more = 0; more < 2; more++) {
+        const double f = more ? 0.0051 : 0.0049;
+        const Element held = {.hold_x = -0.6 * f, .hold_y = -0.8 * f, .hold_stiffness = 1.0};
+        const Friction begun = friction_step(&held, 0.01, 0.5, 1, vx, vy);
+        const Friction plain = friction_impulse(&held, 0.01, 0.5, vx, vy);
+        assert_true((begun.fall_xx == plain.fall_xx) == more);
+        assert_true(begun.rise_x == plain.rise_x);
+    }
+}
+
 /* Weak ground, drag alone: V goes to 0.3 h where the foot stops; F = 0.01 of the drag at h: to 0.4
  * h; much F: to 0.75 h, a uniform stop. V(w) is (h + w)/2 + (stop - 1/2) (h - w)^2/h. */
 TEST(test_drag) {

@@ -51,14 +51,14 @@ MILD_HD void bodies_add(const Real *p, const Real I[3], const Real h[3][3],
 }
 
 /* Wrench and hessian of one element at the twist V. I = friction + I_z g, see pass.c. begins: bool,
- * see friction_impulse. */
+ * see friction_step. */
 MILD_HD void bodies_pass(const BodiesSetup *setup, const BodiesElement *own, const Real *V,
                          int begins, Real (*sums)[LANE_COPIES], int l) {
     const Element *e = &own->element;
     const ContactVelocity v = bodies_velocity(own, V);
     const Impulse normal = element_impulse(e, own->curves, 1, setup->dt, v.descent);
     const Real bound = friction_bound(e, normal.value);
-    const Friction f = friction_impulse(e, bound, e->mu, begins, v.x, v.y);
+    const Friction f = friction_step(e, bound, e->mu, begins, v.x, v.y);
     const Real g[2] = {-own->slope[0], -own->slope[1]};
     const Real I[3] = {f.x + g[0] * normal.value, f.y + g[1] * normal.value, normal.value};
     const Real xz = normal.slope * (f.rise_x + g[0]);

@@ -18,7 +18,7 @@
 #define CONTACT_FEET_MAX 4
 #define CONTACT_PADDING REAL(-1e3) /* [m] depth of elements that a foot does not have */
 #define CONTACT_HALVINGS 6         /* of one Newton step */
-#define CONTACT_BEGINS 2           /* Newton steps that begin it, see friction_impulse */
+#define CONTACT_BEGINS 2           /* Newton steps that begin it, see friction_step */
 #define CONTACT_AGAIN 8            /* steps after which it begins again: it may be in a cycle */
 
 /* Bool: the next Newton step is one that begins. */
