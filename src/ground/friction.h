@@ -55,12 +55,12 @@ typedef struct {
 /* Friction at the velocity (vx, vy) with the bound r, and the slopes for a step of Newton's method.
  * mu: derivative of r with respect to I_z, 0 when the solver holds the bound fixed.
  *
- * begins: bool, a first step, whose V may be far from the solution. Where an element slides, I does
- * not change along n, so such a step passes over the 4 mm/s in which it sticks, to sliding the other
- * way. Then an element slides that way if its spring before the step had half of the bound there
- * already. Any other has the slopes of I = t times a fixed min(1, r/|t|), whose energy is nowhere
- * below that of friction (as in lagged diffusivity; with f in place of the dual variable of Chan,
- * Golub and Mulet 1999). */
+ * begins: bool, a step that begins, whose V may be far from the solution. Where an element slides,
+ * I does not change along n, so such a step passes over the 4 mm/s in which it sticks, to sliding
+ * the other way. Then an element slides that way if its spring before the step had half of the
+ * bound there already. Any other has the slopes of I = t times a fixed min(1, r/|t|), whose energy
+ * is nowhere below that of friction (as in lagged diffusivity; with f in place of the dual variable
+ * of Chan, Golub and Mulet 1999). */
 MILD_HD Friction friction_step(const Element *e, Real r, Real mu, int begins, Real vx, Real vy) {
     const Real stiffness = e->hold_stiffness + FRICTION_LAG * r;
     const Real tx = e->hold_x - stiffness * vx;
