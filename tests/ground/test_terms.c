@@ -462,8 +462,8 @@ TEST(test_friction) {
     expect_near("stiffness", rest.fall_xx, 3.5, 1e-12);
 }
 
-/* The slopes of a first step: with nothing held those of a fixed share of t, so that the slope along
- * v times v is I; with more than half of the bound held against v those of sliding. */
+/* The slopes of a first step: with nothing held those of a fixed share of t, so that the slope
+ * along v times v is I; with more than half of the bound held against v those of sliding. */
 TEST(test_friction_begins) {
     const double vx = 0.024, vy = 0.032;
     const Element e = {.damping = 0.02};
