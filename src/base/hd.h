@@ -406,6 +406,20 @@ WARP_FN int lanes_rank(const int *flag, int *rank) {
 #endif
 }
 
+/* The first lane whose flag is not 0; LANES if there is none. */
+WARP_FN int lanes_first(const int *flag) {
+#ifdef __CUDACC__
+    const unsigned all = __ballot_sync(0xffffffffu, flag[0]);
+    return all ? __ffs((int)all) - 1 : LANES;
+#else
+    int first = LANES;
+    for (int l = LANES - 1; l >= 0; l--) {
+        first = flag[l] ? l : first;
+    }
+    return first;
+#endif
+}
+
 TEAM_FN void team_sync(void) {
 #ifdef __CUDACC__
     __syncthreads();

@@ -152,7 +152,7 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
                   {&all->shells.near, shells * sizeof *all->shells.near},
                   {&all->shells.held, shells},
                   {&all->shells.list, shells * sizeof *all->shells.list},
-                  {&all->shells.waiting, 2 * shells * sizeof *all->shells.waiting},
+                  {&all->shells.waiting, 4 * shells * sizeof *all->shells.waiting},
                   {&contact->position, 3 * rows * sizeof(float)},
                   {&contact->rotation, 9 * rows * sizeof(float)},
                   {&contact->velocity, 6 * rows * sizeof(float)},
@@ -400,7 +400,7 @@ static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
         all.shells.near += first;
         all.shells.held += first;
         all.shells.list += first;
-        all.shells.waiting += 2 * first;
+        all.shells.waiting += 4 * first;
     }
     all.contact = contact_from(&all.contact, first, (size_t)b->shape.feet);
     all.trial = all.trial ? all.trial + first : NULL;
@@ -421,6 +421,7 @@ static Share share_of(const Batch *b, const EnvsStep *step, int i, MildStream st
         share.arrays.shells.shape = share.ground.shape;
         share.arrays.shells.ground = share.ground.arrays;
         share.ground.arrays.skip = share.arrays.shells.near;
+        share.ground.arrays.beside = 1;
     }
     return share;
 }

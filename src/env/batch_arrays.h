@@ -71,7 +71,8 @@ typedef struct {
     uint16_t *near;     /* [envs] a bit for each body that is near the ground in this step */
     uint8_t *held;      /* [envs] bool: the memory is not all 0 */
     int32_t *list;      /* [envs] of a GPU: those with such a body */
-    int *waiting;       /* [2] of a GPU: numbers in the list, and of these taken */
+    int *waiting;       /* [2][2] of a GPU: numbers in the list, and of these taken; of a part k at
+                           [k % 2], where the part before has put 0 */
     BatchShape shape;   /* of the feet's ground */
     BatchArrays ground; /* the feet's */
 } EnvsShells;

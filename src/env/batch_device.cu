@@ -22,8 +22,6 @@ enum {
     SHELLS_WARPS = 4,                  /* of a robot with shells near the ground */
     SHELLS_BLOCKS = 3,                 /* such robots of a multiprocessor, at least */
     SHELLS_ROBOTS = 512,               /* stepped at once, at most: an H100 has room for 396 */
-    FIND_WARPS = 4,                    /* robots of a block that are looked at */
-    FIND_BLOCKS = 8,                   /* such blocks of a multiprocessor, at least */
     TALLY_THREADS = 256,
     ORDER_THREADS = 1024
 };
@@ -50,41 +48,47 @@ static int lanes_blocks(int envs) {
     return (envs + TASK_ROBOTS - 1) / TASK_ROBOTS;
 }
 
+static __device__ int *waiting_of(const EnvsArrays *all, int k) {
+    return all->shells.waiting + 2 * (k % 2);
+}
+
+/* Lists a robot after part k if its shells may touch the ground. The order is that of arrival: each
+ * robot is stepped by itself. */
+static __device__ void list_shells(const EnvsArrays *all, long robot, int k) {
+    if (env_shells_wait(all, robot) && env_shells_find(all, robot, k) && threadIdx.x % LANES == 0) {
+        all->shells.list[atomicAdd(&waiting_of(all, k)[0], 1)] = (int32_t)robot;
+    }
+}
+
 template <int SAMPLED, int SHELLS>
 static __global__ void __launch_bounds__(WARP_THREADS, ENVS_BLOCKS)
     part(const __grid_constant__ EnvsArrays all, const __grid_constant__ EnvsStep call, int k) {
     extern __shared__ __align__(16) Real shared[];
     const long place = warp_robot();
     if (SHELLS && blockIdx.x == 0 && threadIdx.x < 2) {
-        all.shells.waiting[threadIdx.x] = 0;
+        waiting_of(&all, k + 1)[threadIdx.x] = 0;
     }
     if (place < all.envs) {
-        env_part(&all, &call, all.order[place], k, SAMPLED, SHELLS,
-                 (EnvWork *)shared + threadIdx.x / LANES);
+        const long robot = all.order[place];
+        env_part(&all, &call, robot, k, SAMPLED, SHELLS, (EnvWork *)shared + threadIdx.x / LANES);
+        if (SHELLS && k < env_physics_steps(all.task)) {
+            list_shells(&all, robot, k);
+        }
     }
 }
 
-/* Lists the robots whose shells may touch the ground. The order is that of arrival: each robot is
- * stepped by itself. */
-static __global__ void __launch_bounds__(LANES *FIND_WARPS, FIND_BLOCKS)
-    find(const __grid_constant__ EnvsArrays all, int k) {
-    const long robot = (long)blockIdx.x * FIND_WARPS + threadIdx.x / LANES;
-    if (robot < all.envs && env_shells_wait(&all, robot) && env_shells_find(&all, robot, k) &&
-        threadIdx.x % LANES == 0) {
-        all.shells.list[atomicAdd(&all.shells.waiting[0], 1)] = (int32_t)robot;
-    }
-}
-
-/* Steps the robots in the list, a block one after the other. */
+/* Steps the robots in the list of part k, a block one after the other. */
 template <int HEAP>
 static __global__ void __launch_bounds__(LANES *SHELLS_WARPS, SHELLS_BLOCKS)
-    shells(const __grid_constant__ EnvsArrays all) {
+    shells(const __grid_constant__ EnvsArrays all, int k) {
     extern __shared__ __align__(16) Real shared[];
     __shared__ int place;
-    const int count = all.shells.waiting[0];
+    kernel_let_go(); /* the ground under all other robots may begin */
+    int *const waiting = waiting_of(&all, k);
+    const int count = waiting[0];
     for (;;) {
         if (threadIdx.x == 0) {
-            place = atomicAdd(&all.shells.waiting[1], 1);
+            place = atomicAdd(&waiting[1], 1);
         }
         __syncthreads();
         const int own = place;
@@ -277,11 +281,9 @@ static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int
 
 static const char *kernels_shells(const EnvsArrays *all, int k, MildStream stream) {
     OnDevice on(all->device);
-    const int looked = (all->envs + FIND_WARPS - 1) / FIND_WARPS;
     const int steps = all->envs < SHELLS_ROBOTS ? all->envs : SHELLS_ROBOTS;
     const auto run = all->shells.heap ? shells<1> : shells<0>;
-    const char *why = launch(find, looked, LANES * FIND_WARPS, 0, stream, *all, k);
-    return why ? why : launch(run, steps, LANES * SHELLS_WARPS, shells_bytes, stream, *all);
+    return launch(run, steps, LANES * SHELLS_WARPS, shells_bytes, stream, *all, k);
 }
 
 static const char *kernels_end(const EnvsArrays *all, const EnvsStep *call, MildStream stream) {

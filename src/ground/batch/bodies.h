@@ -21,6 +21,8 @@
 #define BODIES_SUMS 42             /* of an evaluation: a wrench and a 6 x 6 hessian */
 #define BODIES_MARGIN REAL(1e-3)   /* [m] as in locate.c */
 #define BODIES_EXTRA_SPEED REAL(2) /* [m/s] as in locate.c */
+#define BODIES_GAIN REAL(0.5)      /* [m/s] of bodies_touch */
+#define BODIES_ABOVE REAL(1e-4)    /* [m] of bodies_touch, for rounding */
 #define BODIES_GROWTH REAL(8)      /* [-] as NEWTON_GROWTH in newton_step.c */
 #define BODIES_COLUMNS 8           /* of a warp that are eliminated at once */
 
@@ -247,13 +249,16 @@ MILD_HD Real bodies_reach(const BodiesSetup *setup, int body, const Real *positi
 /* Bool: an element of a body at that pose may touch the ground in this step. bodies_reach is a
  * bound that the steepest place of a map makes wide; here an element has its own place, its own
  * speed and the plane under itself. The ground pushes where the depth in the middle of the step is
- * above 0. So with half of BODIES_EXTRA_SPEED an element that is left out would have to gain more
- * than all of it. V: twist. */
+ * above 0: of an element that is left out, if the step makes it faster by more than BODIES_GAIN.
+ * Then it touches in the next step. On an uneven map a body that is left out forgets the planes of
+ * the last step, so there it has to be far from a surface that rises ahead, too. V: twist. */
 WARP_FN int bodies_touch(const BodiesSetup *setup, int body, const Real *position, const Real *R,
                          const Real *V, const Real *map_origin, Real height) {
     const BodiesSole *sole = &setup->sole[body];
     const MapSpot spot =
         setup->has_map ? map_spot(&setup->map, position, map_origin, height) : bodies_no_spot();
+    const int uneven = setup->has_map && setup->map.uneven;
+    const Real dt = setup->dt;
     Real found[LANE_COPIES];
     EACH_LANE(l) {
         found[l] = 0;
@@ -265,8 +270,9 @@ WARP_FN int bodies_touch(const BodiesSetup *setup, int body, const Real *positio
                                    ? map_surface_near(&setup->map, &spot, p[0], p[1], slope)
                                    : height - position[2];
             const Real descent = real_max(bodies_point_velocity(p, slope, V).descent, 0);
-            const Real way = setup->dt * (descent + BODIES_EXTRA_SPEED / 2);
-            found[l] += above - p[2] + BODIES_MARGIN + way > 0 ? 1 : 0;
+            const Real way = uneven ? BODIES_MARGIN + dt * (descent + BODIES_EXTRA_SPEED / 2)
+                                    : BODIES_ABOVE + dt / 2 * (descent + BODIES_GAIN);
+            found[l] += above - p[2] + way > 0 ? 1 : 0;
         }
     }
     return lane_sum(found) > 0;

@@ -466,6 +466,83 @@ TEAM_FN void bodies_columns(Real *matrix, int rows, int first, const BodiesPanel
     }
 }
 
+/* The lane whose row is the pivot of column k. place: [lane] of its row among the pivots, which may
+ * change. As bodies_pivot, without moving rows. column: [lane] the number there. */
+WARP_FN int bodies_pivot_lane(int k, const Real *column, int *place) {
+    const int end = k - k % 6 + 6;
+    int flag[LANE_COPIES];
+    EACH_LANE(l) {
+        flag[l] = place[l] == k;
+    }
+    const int first = lanes_first(flag);
+    const Real least = BODIES_GROWTH * REAL_ABS(lane_read(column, first));
+    EACH_LANE(l) {
+        flag[l] = place[l] > k && place[l] < end && REAL_ABS(column[l]) > least;
+    }
+    if (lanes_first(flag) == LANES) { /* as a rule */
+        return first;
+    }
+    Real size[LANE_COPIES];
+    EACH_LANE(l) {
+        size[l] = flag[l] ? REAL_ABS(column[l]) : 0;
+    }
+    const Real most = lane_max(size);
+    EACH_LANE(l) {
+        flag[l] = flag[l] && REAL_ABS(column[l]) >= most;
+    }
+    const int chosen = lanes_first(flag);
+    int at[LANE_COPIES];
+    Real was[LANE_COPIES];
+    EACH_LANE(l) {
+        was[l] = (Real)place[l];
+    }
+    const int free = (int)lane_read(was, chosen);
+    EACH_LANE(l) {
+        at[l] = LANE(l) == first ? free : place[l];
+        place[l] = LANE(l) == chosen ? k : at[l];
+    }
+    return chosen;
+}
+
+/* bodies_eliminate for at most LANES rows, by one warp: a lane has a row, in registers. With each
+ * column that is done the others move one to the left, so that the text of all columns is one. */
+WARP_FN void bodies_eliminate_rows(Real *matrix, int rows) {
+    const int stride = rows + 1;
+    Real M[LANES + 1][LANE_COPIES], own[LANE_COPIES], factor[LANE_COPIES];
+    int place[LANE_COPIES];
+    EACH_LANE(l) {
+        LANE_UNROLL
+        for (int c = 0; c <= LANES; c++) {
+            M[c][l] = LANE(l) < rows && c < stride ? matrix[LANE(l) * stride + c] : 0;
+        }
+        place[l] = LANE(l);
+        own[l] = 0;
+    }
+    LANE_ROLLED
+    for (int k = 0; k < rows; k++) {
+        const int columns = LANE_COPIES == 1 ? LANES : rows - k; /* a constant on a GPU */
+        const int pivot = bodies_pivot_lane(k, M[0], place);
+        const Real inverse = 1 / lane_read(M[0], pivot);
+        EACH_LANE(l) {
+            const int is_pivot = LANE(l) == pivot;
+            own[l] = is_pivot ? inverse : own[l];
+            factor[l] = is_pivot ? 0 : M[0][l] * inverse;
+        }
+        LANE_UNROLL
+        for (int c = 0; c < columns; c++) {
+            const Real entry = lane_read(M[c + 1], pivot);
+            EACH_LANE(l) {
+                M[c][l] = M[c + 1][l] - factor[l] * entry;
+            }
+        }
+    }
+    EACH_LANE(l) {
+        if (LANE(l) < rows) {
+            matrix[place[l] * stride + rows] = M[0][l] * own[l];
+        }
+    }
+}
+
 /* Gauss and Jordan; the last column becomes the solution. Six columns at a time, those of a body:
  * first all lanes have the pivots and each the factors of a row, then a warp has its share of the
  * columns behind, eight at a time, in four groups of rows. So the team waits twice for six columns.
@@ -528,7 +605,12 @@ TEAM_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, int 
         }
     }
     team_sync();
-    bodies_eliminate(work, active);
+    if (active > LANES) {
+        bodies_eliminate(work, active);
+    } else if (TEAM_WARP == 0) {
+        bodies_eliminate_rows(work->matrix, active);
+    }
+    team_sync();
     EACH_LANE(l) {
         LANE_ROLLED
         for (int n = TEAM_LANE(l); n < active; n += TEAM) {

@@ -195,6 +195,11 @@ typedef struct {
     Real carry;                            /* [-] of Share */
 } CONTACT_PART ContactOwnLaw;
 
+/* What an element carries of its load in this step, of Share. */
+typedef struct {
+    Real carry, lean; /* [-] */
+} ContactLoad;
+
 /* Velocity of an element, along the world's axes. descent: speed at which its depth grows. */
 typedef struct {
     Real x, y;    /* [m/s] */

@@ -38,15 +38,17 @@ static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
         const __grid_constant__ MildBatchOutput output, int advance) {                             \
         __shared__ version##_Shared shared;                                                        \
         const long robot = blockIdx.x;                                                             \
-        if (arrays.skip && arrays.skip[robot]) {                                                   \
-            return;                                                                                \
+        if (!(arrays.skip && arrays.skip[robot])) {                                                \
+            ContactProblem problem;                                                                \
+            ContactResult result;                                                                  \
+            batch_problem(&shape, &arrays, &input, robot, &problem);                               \
+            batch_result(&shape, &output, robot, &result);                                         \
+            version##_robot(&setup, &problem, &shared, batch_memory(&shape, &arrays, robot),       \
+                            advance, &result);                                                     \
         }                                                                                          \
-        ContactProblem problem;                                                                    \
-        ContactResult result;                                                                      \
-        batch_problem(&shape, &arrays, &input, robot, &problem);                                   \
-        batch_result(&shape, &output, robot, &result);                                             \
-        version##_robot(&setup, &problem, &shared, batch_memory(&shape, &arrays, robot), advance,  \
-                        &result);                                                                  \
+        if (arrays.beside && robot == 0) {                                                         \
+            kernel_wait();                                                                         \
+        }                                                                                          \
     }
 CONTACT_TURN(level)
 CONTACT_TURN(map)
@@ -58,8 +60,17 @@ static MildStatus step(const MildBatch *batch, const MildBatchInput *input,
     ContactSetup setup;
     OnDevice on(batch->device);
     batch_setup(shape, &batch->arrays, &setup);
-    (shape->map ? contact_map : contact_level)<<<shape->robots, LANES, 0, stream>>>(
-        setup, *shape, batch->arrays, *input, *output, advance);
+    cudaLaunchAttribute beside = {};
+    beside.id = cudaLaunchAttributeProgrammaticStreamSerialization;
+    beside.val.programmaticStreamSerializationAllowed = 1;
+    cudaLaunchConfig_t config = {};
+    config.gridDim = dim3((unsigned)shape->robots);
+    config.blockDim = dim3(LANES);
+    config.stream = (cudaStream_t)stream;
+    config.attrs = &beside;
+    config.numAttrs = batch->arrays.beside && device_lets_go(batch->device) ? 1 : 0;
+    cudaLaunchKernelEx(&config, shape->map ? contact_map : contact_level, setup, *shape,
+                       batch->arrays, *input, *output, advance);
     return checked(cudaGetLastError(), "step", error);
 }
 
