@@ -506,15 +506,11 @@ MILD_HD void bodies_locate(const BodiesSetup *setup, const BodiesWork *work, int
     own->listed = own->faces_down && own->depth > work->least[i];
 }
 
-/* All of it. Where it is not listed, its law is unset. all: bool, begin those that are not listed,
- * too. */
-MILD_HD void bodies_element(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
-                            const MapSpot *spot, int all, BodiesElement *own, int heap) {
-    bodies_locate(setup, work, i, s, spot, own);
+/* What it remembers and its law, after bodies_locate. */
+MILD_HD void bodies_recall(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
+                           BodiesElement *own, int heap) {
     own->before = contact_recall(work->memory[i].element + s, work->memory[i].next);
-    if (own->listed || all) {
-        bodies_begin(setup, work, i, s, own, heap);
-    }
+    bodies_begin(setup, work, i, s, own, heap);
 }
 
 #include "ground/batch/bodies_newton.h"
@@ -535,13 +531,27 @@ MILD_HD void bodies_chart(const BodiesMemory *memory, int s, const BodiesElement
     plane[2 * memory->next] = own->slope[1];
 }
 
-/* An element that does not take part forgets. One that faces up near the ground is buried until it
- * comes out; so is one that carries nothing. */
-MILD_HD void bodies_forget(const BodiesMemory *memory, int s, int buried) {
+/* An element of a surface that does not take part forgets. One that faces up near the ground is
+ * buried until it comes out; so is one that carries nothing. state: before the step. */
+MILD_HD void bodies_forget(const BodiesMemory *memory, int s, int state, int buried) {
     const ElementMemory none = {0, 0, 0, 0, 0, 0, 0, 0, 0};
-    bodies_record(memory, s, &none, 0);
-    memory->element[BODIES_STATE * memory->next + s] = buried ? BODIES_BURIED : BODIES_NONE;
-    memory->element[BODIES_SHARE * memory->next + s] = 0;
+    const int after = buried ? BODIES_BURIED : BODIES_NONE;
+    if (state != after) { /* else there is nothing to forget */
+        bodies_record(memory, s, &none, 0);
+        memory->element[BODIES_STATE * memory->next + s] = (Real)after;
+        memory->element[BODIES_SHARE * memory->next + s] = 0;
+    }
+}
+
+/* An element of a sole that was in the air and stays there: it remembers where it is. */
+MILD_HD void bodies_hover(const BodiesSetup *setup, const BodiesMemory *memory, int s,
+                          const BodiesElement *own, const Real *V) {
+    memory->element[memory->next + s] =
+        own->depth + setup->dt / 2 * bodies_velocity(own, V).descent;
+    if (setup->has_map) {
+        memory->element[BODIES_STATE * memory->next + s] = (Real)own->label;
+        bodies_chart(memory, s, own);
+    }
 }
 
 /* Memory of an element at the twist V. advance: bool, of contact.inc. */
@@ -553,11 +563,19 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
     const int uneven = setup->has_map && setup->map.uneven;
     const Real dt = setup->dt;
     BodiesElement own;
-    bodies_element(setup, work, i, s, spot, !sole->face, &own, heap);
-    if (sole->face && !(own.listed && own.share > 0)) {
-        const int up = !own.faces_down && own.depth > work->least[i];
+    bodies_locate(setup, work, i, s, spot, &own);
+    if (!own.listed && (sole->face || !(memory->element[s] > 0))) {
+        if (advance && sole->face) {
+            bodies_forget(memory, s, own.state, !own.faces_down && own.depth > work->least[i]);
+        } else if (advance) {
+            bodies_hover(setup, memory, s, &own, V);
+        }
+        return;
+    }
+    bodies_recall(setup, work, i, s, &own, heap);
+    if (sole->face && !(own.share > 0)) {
         if (advance) {
-            bodies_forget(memory, s, own.listed || up);
+            bodies_forget(memory, s, own.state, 1);
         }
         return;
     }

@@ -183,7 +183,9 @@ MILD_HD void bodies_of_round(const BodiesSetup *setup, const BodiesWork *work, i
         return;
     }
     const MapSpot spot = bodies_spot(setup, work, i);
-    bodies_element(setup, work, i, work->list[work->begin[i] + n], &spot, 0, own, heap);
+    const int s = work->list[work->begin[i] + n];
+    bodies_locate(setup, work, i, s, &spot, own);
+    bodies_recall(setup, work, i, s, own, heap);
 }
 
 /* Those that a warp keeps: in `kept` of its first round. */

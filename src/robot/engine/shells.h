@@ -29,6 +29,8 @@ typedef struct {
     Real half[ENGINE_BODIES][ENGINE_CHAIN][6]; /* J^T, then L^-T J^T */
     Real factor[ENGINE_DOFS][ENGINE_STRIDE];   /* as in EngineWork */
     Real inverse[ENGINE_DOFS];
+    Real rate[ENGINE_DOFS];      /* [m/s, rad/s] */
+    Real half_gain[ENGINE_DOFS]; /* y of engine_half_solve */
 } EngineShells;
 
 /* What engine_shells_begin gives of the bodies to the ground, one behind the other; the first of
@@ -115,9 +117,14 @@ WARP_FN void engine_restore_links(const EngineTree *tree, const EngineSavedLinks
     lanes_sync();
 }
 
-/* The factor from its list. */
+/* The factor from its list, rates and y. */
 TEAM_FN void shells_factor(const EngineTree *tree, const EngineSaved *saved, EngineShells *shells) {
     EACH_LANE(l) {
+        LANE_ROLLED
+        for (int d = TEAM_LANE(l); d < engine_dofs(tree); d += TEAM) {
+            shells->rate[d] = saved->state[ENGINE_SAVED(rate) + d];
+            shells->half_gain[d] = saved->state[ENGINE_ACCELERATION + d];
+        }
         LANE_ROLLED
         for (int e = TEAM_LANE(l); e < engine_entries(tree); e += TEAM) {
             const EngineEntry entry = tree->entry[e];
@@ -166,11 +173,9 @@ TEAM_FN void shells_pose(const EngineModel *model, const EngineSaved *saved,
 }
 
 /* Twists, half <- L^-T J^T in place, and V_free: engine_half_solve. */
-TEAM_FN void shells_half(const EngineModel *model, const EngineSaved *saved, EngineShells *shells,
+TEAM_FN void shells_half(const EngineModel *model, EngineShells *shells,
                          const EngineShellsGround *ground) {
     const EngineTree *tree = &model->tree;
-    const Real *rate = saved->state + ENGINE_SAVED(rate);
-    const Real *y = saved->state + ENGINE_ACCELERATION;
     EACH_LANE(l) {
         LANE_ROLLED
         for (int n = TEAM_LANE(l); n < 6 * shells->count; n += TEAM) {
@@ -181,17 +186,15 @@ TEAM_FN void shells_half(const EngineModel *model, const EngineSaved *saved, Eng
             Real *x = shells->half[i][0] + c;
             Real speed = 0;
             Real gain = 0;
-            LANE_ROLLED
             for (int k = engine_row_length(tree, link) - 1; k >= 0; k--) {
-                speed += x[6 * k] * rate[dof[k]];
+                speed += x[6 * k] * shells->rate[dof[k]];
             }
             LANE_ROLLED
             for (int k = engine_row_length(tree, link) - 1; k >= 0; k--) {
                 const int d = dof[k];
                 const Real solved = x[6 * k] * shells->inverse[d];
                 x[6 * k] = solved;
-                gain += solved * y[d];
-                LANE_ROLLED
+                gain += solved * shells->half_gain[d];
                 for (int place = 0; place < k; place++) {
                     x[6 * place] -= shells->factor[d][place] * solved;
                 }
@@ -219,7 +222,6 @@ TEAM_FN void shells_inertia(const EngineTree *tree, const EngineSaved *saved,
                 j < feet ? saved->rows + 6 * ENGINE_CHAIN * j : shells->half[j - feet][0];
             Real sum = 0;
             right += n % rows % 6;
-            LANE_ROLLED
             for (int k = 0; k < tree->body_shared[shells->body[i]][other]; k++) {
                 sum += left[6 * k] * right[6 * k];
             }
@@ -239,7 +241,7 @@ TEAM_FN void engine_shells_begin(const EngineModel *model, const EngineSaved *sa
     const EngineLinks links = engine_links_saved(poses);
     shells_factor(&model->tree, saved, shells);
     shells_pose(model, saved, &links, shells, ground);
-    shells_half(model, saved, shells, ground);
+    shells_half(model, shells, ground);
     shells_inertia(&model->tree, saved, shells, ground);
 }
 
