@@ -506,45 +506,6 @@ WARP_FN int bodies_pivot_lane(int k, const Real *column, int *place) {
     return chosen;
 }
 
-/* bodies_eliminate for at most LANES rows, by one warp: a lane has a row, in registers. With each
- * column that is done the others move one to the left, so that the text of all columns is one. */
-WARP_FN void bodies_eliminate_rows(Real *matrix, int rows) {
-    const int stride = rows + 1;
-    Real M[LANES + 1][LANE_COPIES], own[LANE_COPIES], factor[LANE_COPIES];
-    int place[LANE_COPIES];
-    EACH_LANE(l) {
-        LANE_UNROLL
-        for (int c = 0; c <= LANES; c++) {
-            M[c][l] = LANE(l) < rows && c < stride ? matrix[LANE(l) * stride + c] : 0;
-        }
-        place[l] = LANE(l);
-        own[l] = 0;
-    }
-    LANE_ROLLED
-    for (int k = 0; k < rows; k++) {
-        const int columns = LANE_COPIES == 1 ? LANES : rows - k; /* a constant on a GPU */
-        const int pivot = bodies_pivot_lane(k, M[0], place);
-        const Real inverse = 1 / lane_read(M[0], pivot);
-        EACH_LANE(l) {
-            const int is_pivot = LANE(l) == pivot;
-            own[l] = is_pivot ? inverse : own[l];
-            factor[l] = is_pivot ? 0 : M[0][l] * inverse;
-        }
-        LANE_UNROLL
-        for (int c = 0; c < columns; c++) {
-            const Real entry = lane_read(M[c + 1], pivot);
-            EACH_LANE(l) {
-                M[c][l] = M[c + 1][l] - factor[l] * entry;
-            }
-        }
-    }
-    EACH_LANE(l) {
-        if (LANE(l) < rows) {
-            matrix[place[l] * stride + rows] = M[0][l] * own[l];
-        }
-    }
-}
-
 /* Gauss and Jordan; the last column becomes the solution. Six columns at a time, those of a body:
  * first all lanes have the pivots and each the factors of a row, then a warp has its share of the
  * columns behind, eight at a time, in four groups of rows. So the team waits twice for six columns.
@@ -580,39 +541,46 @@ TEAM_FN void bodies_eliminate(BodiesWork *work, int rows) {
     team_sync();
 }
 
-/* Newton's step from `at`, where H was taken. corrects: bool, as in contact_newton.inc. */
-TEAM_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, int corrects,
-                         BodiesPoint *next) {
+/* Number m of the row of the active row n in [1 + H A | right side], where H is that row's of its
+ * body's hessian. corrects: bool, as in contact_newton.inc. */
+MILD_HD Real bodies_entry(const BodiesWork *work, int rows, const BodiesPoint *at, int corrects,
+                          int n, int m, const Real *H) {
+    const int r = work->active_row[n];
+    const int first = r - r % 6;
+    const int right = m == work->active; /* the right side */
+    const int j = work->active_row[right ? 0 : m];
+    const Real *A = work->inverse_inertia + first * rows;
+    Real sum = right ? at->wrench[r] - at->impulse[r] : r == j ? 1 : 0;
+    LANE_UNROLL
+    for (int k = 0; k < 6 && !(right && corrects); k++) {
+        sum += H[k] *
+               (right ? at->twist[first + k] - work->free_velocity[first + k] : A[k * rows + j]);
+    }
+    return sum;
+}
+
+MILD_HD const Real *bodies_hessian_row(const BodiesWork *work, int n) {
+    const int r = work->active_row[n];
+    return work->hessian[r / 6] + 6 * (r % 6);
+}
+
+/* Solves Newton's equations of any number of rows, in shared memory. The solution is left in
+ * work->row[0]. */
+TEAM_FN void bodies_solve_shared(BodiesWork *work, int rows, const BodiesPoint *at, int corrects) {
     const int active = work->active;
     const int stride = active + 1;
     LANE_ROLLED
     for (int n = TEAM_WARP; n < active; n += TEAM_WARPS) {
-        const int r = work->active_row[n];
-        const int first = r - r % 6;
-        const Real *H = work->hessian[r / 6] + 6 * (r % 6);
-        const Real *A = work->inverse_inertia + first * rows;
         EACH_LANE(l) {
             LANE_ROLLED
             for (int m = LANE(l); m < stride; m += LANES) {
-                const int right = m == active; /* the right side */
-                const int j = work->active_row[right ? 0 : m];
-                Real sum = right ? at->wrench[r] - at->impulse[r] : r == j ? 1 : 0;
-                LANE_UNROLL
-                for (int k = 0; k < 6 && !(right && corrects); k++) {
-                    sum += H[k] * (right ? at->twist[first + k] - work->free_velocity[first + k]
-                                         : A[k * rows + j]);
-                }
-                work->matrix[n * stride + m] = sum;
+                work->matrix[n * stride + m] =
+                    bodies_entry(work, rows, at, corrects, n, m, bodies_hessian_row(work, n));
             }
         }
     }
     team_sync();
-    if (active > LANES) {
-        bodies_eliminate(work, active);
-    } else if (TEAM_WARP == 0) {
-        bodies_eliminate_rows(work->matrix, active);
-    }
-    team_sync();
+    bodies_eliminate(work, active);
     EACH_LANE(l) {
         LANE_ROLLED
         for (int n = TEAM_LANE(l); n < active; n += TEAM) {
@@ -620,6 +588,101 @@ TEAM_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, int 
         }
     }
     team_sync();
+}
+
+/* Columns of a warp in bodies_solve_rows: column m is number m / TEAM_WARPS of warp m % TEAM_WARPS.
+ * On the CPU one warp has all. */
+#define BODIES_OWN_COLUMNS (LANE_COPIES == 1 ? 9 : LANES + 1)
+
+/* Column `number` of a warp's, whose index is a constant in each round, so that M may be in
+ * registers. */
+MILD_HD Real bodies_own_column(Real M[BODIES_OWN_COLUMNS][LANE_COPIES], int number, int l) {
+    Real value = M[0][l];
+    LANE_UNROLL
+    for (int c = 1; c < BODIES_OWN_COLUMNS; c++) {
+        value = c == number ? M[c][l] : value;
+    }
+    return value;
+}
+
+/* The same of at most LANES rows and BODIES_OWN_COLUMNS TEAM_WARPS columns: a lane has a row, of
+ * which its warp has some columns in registers. Gauss and Jordan: the warp that has column k shows
+ * it to the team, all choose the pivot, and each warp subtracts its row from its own columns. */
+TEAM_FN void bodies_solve_rows(BodiesWork *work, int rows, const BodiesPoint *at, int corrects) {
+    const int active = work->active;
+    Real M[BODIES_OWN_COLUMNS][LANE_COPIES], own[LANE_COPIES], column[LANE_COPIES];
+    int place[LANE_COPIES];
+    EACH_LANE(l) {
+        const int is_row = LANE(l) < active;
+        const int n = is_row ? LANE(l) : 0;
+        Real H[6];
+        LANE_UNROLL
+        for (int k = 0; k < 6; k++) {
+            H[k] = is_row ? bodies_hessian_row(work, n)[k] : 0;
+        }
+        LANE_UNROLL
+        for (int c = 0; c < BODIES_OWN_COLUMNS; c++) {
+            const int m = TEAM_WARP + c * TEAM_WARPS;
+            M[c][l] = m <= active ? bodies_entry(work, rows, at, corrects, n, m, H) : 0;
+        }
+        place[l] = LANE(l);
+        own[l] = 0;
+        if (TEAM_WARP == 0 && is_row) {
+            work->row[0][n] = M[0][l];
+        }
+    }
+    team_sync();
+    LANE_ROLLED
+    for (int k = 0, owner = 0, number = 0; k < active; k++) {
+        Real factor[LANE_COPIES];
+        EACH_LANE(l) {
+            column[l] = LANE(l) < active ? work->row[k % 2][LANE(l)] : 0;
+        }
+        const int pivot = bodies_pivot_lane(k, column, place);
+        const Real inverse = 1 / lane_read(column, pivot);
+        EACH_LANE(l) {
+            const int is_pivot = LANE(l) == pivot;
+            own[l] = is_pivot ? inverse : own[l];
+            factor[l] = is_pivot ? 0 : column[l] * inverse;
+        }
+        LANE_UNROLL
+        for (int c = 0; c < BODIES_OWN_COLUMNS; c++) {
+            const Real entry = lane_read(M[c], pivot);
+            EACH_LANE(l) {
+                M[c][l] -= factor[l] * entry;
+            }
+        }
+        owner = owner + 1 < TEAM_WARPS ? owner + 1 : 0; /* of the next column */
+        number += owner == 0;
+        EACH_LANE(l) {
+            if (TEAM_WARP == owner && LANE(l) < active) {
+                const Real next = bodies_own_column(M, number, l);
+                if (k + 1 < active) {
+                    work->row[(k + 1) % 2][LANE(l)] = next;
+                } else { /* the right side */
+                    column[l] = next;
+                }
+            }
+        }
+        team_sync();
+    }
+    EACH_LANE(l) {
+        if (active % TEAM_WARPS == TEAM_WARP && LANE(l) < active) {
+            work->row[0][work->active_row[place[l]]] = column[l] * own[l];
+        }
+    }
+    team_sync();
+}
+
+/* Newton's step from `at`, where H was taken. corrects: bool, as in contact_newton.inc. */
+TEAM_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, int corrects,
+                         BodiesPoint *next) {
+    const int active = work->active;
+    if (active <= LANES && active < BODIES_OWN_COLUMNS * TEAM_WARPS) {
+        bodies_solve_rows(work, rows, at, corrects);
+    } else {
+        bodies_solve_shared(work, rows, at, corrects);
+    }
     EACH_LANE(l) {
         LANE_ROLLED
         for (int n = TEAM_LANE(l); n < active; n += TEAM) {
