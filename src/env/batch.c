@@ -171,7 +171,7 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
         at += (arrays[i].bytes + 255) / 256 * 256;
     }
     all->shells.setup = b->bodies.setup;
-    all->shells.heap = (b->ground->curves & LAW_HEAP) != 0;
+    all->shells.curves = batch_bodies_curves(b->ground);
     all->shells.memory = b->bodies.memory;
     all->shells.numbers = b->bodies.numbers;
     return b->block ? MILD_OK : MILD_ERROR_MEMORY;

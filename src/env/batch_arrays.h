@@ -64,9 +64,9 @@ typedef struct {
 struct BodiesSetup;
 typedef struct {
     const struct BodiesSetup *setup; /* NULL: there are none */
-    int heap;      /* bool: materials with LAW_HEAP are among those of the ground */
-    char *robot;   /* [envs] EnvShells of batch_env.h */
-    float *memory; /* [envs][numbers] of the ground */
+    int curves;                      /* of bodies_step */
+    char *robot;                     /* [envs] EnvShells of batch_env.h */
+    float *memory;                   /* [envs][numbers] of the ground */
     size_t numbers;
     uint16_t *near;     /* [envs] a bit for each body that is near the ground in this step */
     uint8_t *held;      /* [envs] bool: the memory is not all 0 */

@@ -78,7 +78,7 @@ static __global__ void __launch_bounds__(WARP_THREADS, ENVS_BLOCKS)
 }
 
 /* Steps the robots in the list of part k, a block one after the other. */
-template <int HEAP>
+template <int CURVES>
 static __global__ void __launch_bounds__(LANES *SHELLS_WARPS, SHELLS_BLOCKS)
     shells(const __grid_constant__ EnvsArrays all, int k) {
     extern __shared__ __align__(16) Real shared[];
@@ -97,7 +97,7 @@ static __global__ void __launch_bounds__(LANES *SHELLS_WARPS, SHELLS_BLOCKS)
         }
         const long robot = all.shells.list[own];
         if (!all.rigid[robot]) {
-            env_shells_step(&all, robot, (EnvShellsWork *)shared, HEAP);
+            env_shells_step(&all, robot, (EnvShellsWork *)shared, CURVES);
         } else if (TEAM_WARP == 0) {
             env_floor_step(&all, robot, (EnvFloorWork *)shared);
         }
@@ -235,8 +235,9 @@ static const char *kernels_open(int device) {
     cudaFuncSetAttribute(part<0, 1>, most, (int)work_bytes);
     cudaFuncSetAttribute(part<1, 1>, most, (int)work_bytes);
     cudaFuncSetAttribute(pose, most, (int)work_bytes);
-    cudaFuncSetAttribute(shells<0>, most, (int)shells_bytes);
-    cudaFuncSetAttribute(shells<1>, most, (int)shells_bytes);
+    cudaFuncSetAttribute(shells<LAW_CONE>, most, (int)shells_bytes);
+    cudaFuncSetAttribute(shells<LAW_ALL>, most, (int)shells_bytes);
+    cudaFuncSetAttribute(shells<LAW_ANY>, most, (int)shells_bytes);
     return launched();
 }
 
@@ -282,7 +283,9 @@ static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int
 static const char *kernels_shells(const EnvsArrays *all, int k, MildStream stream) {
     OnDevice on(all->device);
     const int steps = all->envs < SHELLS_ROBOTS ? all->envs : SHELLS_ROBOTS;
-    const auto run = all->shells.heap ? shells<1> : shells<0>;
+    const auto run = all->shells.curves == LAW_CONE  ? shells<LAW_CONE>
+                     : all->shells.curves == LAW_ALL ? shells<LAW_ALL>
+                                                     : shells<LAW_ANY>;
     return launch(run, steps, LANES * SHELLS_WARPS, shells_bytes, stream, *all, k);
 }
 

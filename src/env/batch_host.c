@@ -38,7 +38,7 @@ void envs_host_shells(const EnvsArrays *all, int k, long robot) {
     if (all->rigid[robot]) {
         env_floor_step(all, robot, &floor);
     } else {
-        env_shells_step(all, robot, &work, 1);
+        env_shells_step(all, robot, &work, LAW_ANY);
     }
 }
 

@@ -298,8 +298,8 @@ TEAM_FN void env_shells_results(const EnvsArrays *all, long robot, const EnvShel
                       &env_robot_at(all, robot)->saved);
 }
 
-/* The step of a robot with bodies near the ground. heap: of bodies_step. */
-TEAM_FN void env_shells_step(const EnvsArrays *all, long robot, EnvShellsWork *work, int heap) {
+/* The step of a robot with bodies near the ground. curves: of bodies_step. */
+TEAM_FN void env_shells_step(const EnvsArrays *all, long robot, EnvShellsWork *work, int curves) {
     const int near = all->shells.near[robot];
     const int feet = all->shells.setup->feet;
     BodiesWork *ground = &work->ground;
@@ -310,7 +310,7 @@ TEAM_FN void env_shells_step(const EnvsArrays *all, long robot, EnvShellsWork *w
                                        ground->inverse_inertia};
     engine_shells_begin(all->model, &env_robot_at(all, robot)->saved,
                         &env_shells_at(all, robot)->links, &work->engine, &bodies);
-    bodies_step(all->shells.setup, ground, 1, heap);
+    bodies_step(all->shells.setup, ground, 1, curves);
     env_shells_results(all, robot, work);
 }
 

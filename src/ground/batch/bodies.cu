@@ -30,12 +30,12 @@ static __global__ void __launch_bounds__(THREADS) rest(const __grid_constant__ B
     }
 }
 
-template <int HEAP>
+template <int CURVES>
 static __global__ void __launch_bounds__(THREADS, BLOCKS)
     solve(const __grid_constant__ BodiesCall call) {
     __shared__ BodiesWork work;
     if (call.bodies.near[blockIdx.x]) {
-        bodies_solve(&call, blockIdx.x, &work, HEAP);
+        bodies_solve(&call, blockIdx.x, &work, CURVES);
     }
 }
 
@@ -54,6 +54,9 @@ extern "C" MildStatus gpu_bodies_end(const BodiesCall *call, int device, MildStr
                                      MildError *error) {
     OnDevice on(device);
     rest<<<blocks_of(call), THREADS, 0, stream>>>(*call);
-    (call->heap ? solve<1> : solve<0>)<<<call->shape.robots, THREADS, 0, stream>>>(*call);
+    const auto run = call->curves == LAW_CONE  ? solve<LAW_CONE>
+                     : call->curves == LAW_ALL ? solve<LAW_ALL>
+                                               : solve<LAW_ANY>;
+    run<<<call->shape.robots, THREADS, 0, stream>>>(*call);
     return checked(cudaGetLastError(), "step", error);
 }

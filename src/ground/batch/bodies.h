@@ -165,6 +165,11 @@ typedef struct {
     int curves;
 } BodiesElement;
 
+/* The curves of an element in a step, of its material's bits. */
+MILD_HD int bodies_curves(int bits, int curves) {
+    return curves == LAW_ANY ? bits : curves == LAW_ALL ? bits & ~LAW_HEAP : curves;
+}
+
 /* A spot without a map. */
 MILD_HD MapSpot bodies_no_spot(void) {
     const MapSpot none = {{0, 0}, {0, 0}, {0, 0}, {0, 0}, 0};
@@ -444,9 +449,9 @@ MILD_HD void bodies_direct(const BodiesSole *sole, const Real *R, int s,
     }
 }
 
-/* Its law in this step; foot_prepare. heap: bool, of bodies_step. */
+/* Its law in this step; foot_prepare. curves: of bodies_step. */
 MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
-                          BodiesElement *own, int heap) {
+                          BodiesElement *own, int curves) {
     const BodiesSole *sole = &setup->sole[work->body[i]];
     const int wanted = work->label_material ? work->label_material[own->label] : 0;
     const int known = wanted >= 0 && wanted < setup->materials ? wanted : setup->materials;
@@ -456,7 +461,7 @@ MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int 
     const Real dt = setup->dt;
     Element *e = &own->element;
     contact_stand_on(material, e);
-    own->curves = heap ? material->curves : material->curves & ~LAW_HEAP;
+    own->curves = bodies_curves(material->curves, curves);
     if (sole->face) {
         bodies_share(setup, work, i, s, own->state, material, own);
     }
@@ -477,7 +482,9 @@ MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int 
         }
         element_drag(e, cone, dt, real_max(free - now.descent, 0));
     }
-    bodies_direct(sole, work->rotation[i], s, material, &now, dt, own);
+    if (curves == LAW_ANY || curves == LAW_ALL) { /* materials may have bits of LawMotion */
+        bodies_direct(sole, work->rotation[i], s, material, &now, dt, own);
+    }
 }
 
 /* Where element s of the body at place i is. Its law and what it remembers are unset. */
@@ -508,9 +515,9 @@ MILD_HD void bodies_locate(const BodiesSetup *setup, const BodiesWork *work, int
 
 /* What it remembers and its law, after bodies_locate. */
 MILD_HD void bodies_recall(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
-                           BodiesElement *own, int heap) {
+                           BodiesElement *own, int curves) {
     own->before = contact_recall(work->memory[i].element + s, work->memory[i].next);
-    bodies_begin(setup, work, i, s, own, heap);
+    bodies_begin(setup, work, i, s, own, curves);
 }
 
 #include "ground/batch/bodies_newton.h"
@@ -557,7 +564,7 @@ MILD_HD void bodies_hover(const BodiesSetup *setup, const BodiesMemory *memory, 
 /* Memory of an element at the twist V. advance: bool, of contact.inc. */
 MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *work, int i, int s,
                                    const MapSpot *spot, const Real *V, int advance,
-                                   BodiesLoads *loads, int heap) {
+                                   BodiesLoads *loads, int curves) {
     const BodiesSole *sole = &setup->sole[work->body[i]];
     const BodiesMemory *memory = &work->memory[i];
     const int uneven = setup->has_map && setup->map.uneven;
@@ -572,7 +579,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         }
         return;
     }
-    bodies_recall(setup, work, i, s, &own, heap);
+    bodies_recall(setup, work, i, s, &own, curves);
     if (sole->face && !(own.share > 0)) {
         if (advance) {
             bodies_forget(memory, s, own.state, 1);
@@ -628,7 +635,7 @@ MILD_HD int bodies_rounds(const BodiesSetup *setup, const BodiesWork *work, int 
 /* What a warp finishes at once: a round, from element `from` of the body at place i on. The sums
  * are left in work->part[round]. */
 WARP_FN void bodies_finish_round(const BodiesSetup *setup, BodiesWork *work, int i, int from,
-                                 int round, int advance, int heap) {
+                                 int round, int advance, int curves) {
     const int elements = setup->sole[work->body[i]].elements;
     const MapSpot spot = bodies_spot(setup, work, i);
     Real sum[BODIES_LOADS - 1][LANE_COPIES], deepest[LANE_COPIES];
@@ -636,7 +643,7 @@ WARP_FN void bodies_finish_round(const BodiesSetup *setup, BodiesWork *work, int
         BodiesLoads own = {0, 0, 0, 0, 0, {0, 0, 0}};
         if (from + LANE(l) < elements) {
             bodies_finish_element(setup, work, i, from + LANE(l), &spot, work->next.twist + 6 * i,
-                                  advance, &own, heap);
+                                  advance, &own, curves);
         }
         const Real all[BODIES_LOADS - 1] = {own.loaded, own.depth, own.force, own.area,
                                             own.p[0],   own.p[1],  own.p[2]};
@@ -700,7 +707,7 @@ MILD_HD void bodies_remember(const BodiesSetup *setup, const BodiesWork *work, i
 
 /* Memory and reports at the twists of `next`. Rounds are dealt to the warps, body after body; then
  * a lane has a body. */
-TEAM_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advance, int heap) {
+TEAM_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advance, int curves) {
     int round = 0;
     LANE_ROLLED
     for (int i = 0; i < work->count; i++) {
@@ -708,7 +715,7 @@ TEAM_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advan
         LANE_ROLLED
         for (int from = 0; round < end; round++, from += LANES) {
             if (round % TEAM_WARPS == TEAM_WARP) {
-                bodies_finish_round(setup, work, i, from, round, advance, heap);
+                bodies_finish_round(setup, work, i, from, round, advance, curves);
             }
         }
     }
@@ -740,9 +747,9 @@ WARP_FN void bodies_leave(const BodiesMemory *memory, int numbers) {
     }
 }
 
-/* A whole step. advance: bool, the memory moves to its end. heap: bool, materials may have
- * LAW_HEAP; a constant, because the code is shorter without. */
-TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance, int heap) {
+/* A whole step. advance: bool, the memory moves to its end. curves: of
+ * batch_bodies_curves, a constant, because the code of one curve is shorter. */
+TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance, int curves) {
     const int rows = 6 * work->count;
     EACH_LANE(l) {
         LANE_ROLLED
@@ -752,7 +759,7 @@ TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance
         }
     }
     team_sync();
-    bodies_newton(setup, work, heap);
+    bodies_newton(setup, work, curves);
     EACH_LANE(l) {
         LANE_ROLLED
         for (int r = TEAM_LANE(l); r < rows; r += TEAM) {
@@ -762,7 +769,7 @@ TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance
         }
     }
     team_sync();
-    bodies_finish(setup, work, advance, heap);
+    bodies_finish(setup, work, advance, curves);
 }
 
 #endif

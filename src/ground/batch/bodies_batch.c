@@ -261,6 +261,11 @@ void batch_bodies_reset(const BatchBodies *bodies, size_t robot) {
     }
 }
 
+int batch_bodies_curves(const MildBatch *batch) {
+    const int bits = batch->curves;
+    return !(bits & ~LAW_CONE) ? LAW_CONE : bits & LAW_HEAP ? LAW_ANY : LAW_ALL;
+}
+
 static BodiesCall call_of(const MildBatch *batch, const MildBatchInput *input,
                           const MildBatchOutput *output, int advance) {
     return (BodiesCall){.shape = batch->shape,
@@ -269,7 +274,7 @@ static BodiesCall call_of(const MildBatch *batch, const MildBatchInput *input,
                         .input = *input,
                         .output = *output,
                         .advance = advance,
-                        .heap = (batch->curves & LAW_HEAP) != 0};
+                        .curves = batch_bodies_curves(batch)};
 }
 
 MildStatus batch_bodies_begin(const MildBatch *batch, const MildBatchInput *input,

@@ -11,6 +11,8 @@ MildStatus batch_bodies_open(BatchBodies *bodies, const MildBatch *batch,
                              const MildSole *const *soles, int surfaces, const MildMap *map,
                              const MildMaterial *materials, int count, int worn, MildError *error);
 void batch_bodies_close(const BatchBodies *bodies, int device);
+/* `curves` of bodies_step for the batch's materials. */
+int batch_bodies_curves(const MildBatch *batch);
 
 /* ---- of a batch that steps them itself ---- */
 /* After batch_bodies_open: memory of mild_batch_step. */

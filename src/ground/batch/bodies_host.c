@@ -14,7 +14,7 @@ void host_bodies_end(const BodiesCall *call) {
     BodiesWork work;
     for (long robot = 0; robot < call->shape.robots; robot++) {
         if (call->bodies.near[robot]) {
-            bodies_solve(call, robot, &work, 1);
+            bodies_solve(call, robot, &work, LAW_ANY);
         } else {
             bodies_rest(call, robot);
         }

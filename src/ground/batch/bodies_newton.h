@@ -53,10 +53,11 @@ MILD_HD void bodies_add(const Real *p, const Real I[3], const Real h[3][3],
 /* Wrench and hessian of one element at the twist V. I = friction + I_z g, see pass.c. begins: bool,
  * see friction_step. */
 MILD_HD void bodies_pass(const BodiesSetup *setup, const BodiesElement *own, const Real *V,
-                         int begins, Real (*sums)[LANE_COPIES], int l) {
+                         int begins, int curves, Real (*sums)[LANE_COPIES], int l) {
     const Element *e = &own->element;
     const ContactVelocity v = bodies_velocity(own, V);
-    const Impulse normal = element_impulse(e, own->curves, 1, setup->dt, v.descent);
+    const Impulse normal =
+        element_impulse(e, bodies_curves(own->curves, curves), 1, setup->dt, v.descent);
     const Real bound = friction_bound(e, normal.value);
     const Friction f = friction_step(e, bound, e->mu, begins, v.x, v.y);
     const Real g[2] = {-own->slope[0], -own->slope[1]};
@@ -94,10 +95,10 @@ WARP_FN void bodies_set_rim(BodiesWork *work, int i, Real (*sums)[RIM_SUMS]) {
 }
 
 /* Lists those of the body at place i that may touch; by a warp. */
-WARP_FN void bodies_list_body(const BodiesSetup *setup, BodiesWork *work, int i, int heap) {
+WARP_FN void bodies_list_body(const BodiesSetup *setup, BodiesWork *work, int i, int curves) {
     const BodiesSole *sole = &setup->sole[work->body[i]];
     const int elements = sole->elements;
-    const int rounded = heap && sole->face;
+    const int rounded = curves & LAW_HEAP && sole->face;
     Real sums[LANE_COPIES][RIM_SUMS] = {{0}};
     const MapSpot spot = bodies_spot(setup, work, i);
     uint16_t *list = work->list + work->begin[i];
@@ -138,7 +139,7 @@ WARP_FN void bodies_list_body(const BodiesSetup *setup, BodiesWork *work, int i,
 }
 
 /* The list, and its rounds. */
-TEAM_FN void bodies_list(const BodiesSetup *setup, BodiesWork *work, int heap) {
+TEAM_FN void bodies_list(const BodiesSetup *setup, BodiesWork *work, int curves) {
     EACH_LANE(l) {
         if (TEAM_LANE(l) == 0) {
             int begin = 0;
@@ -151,7 +152,7 @@ TEAM_FN void bodies_list(const BodiesSetup *setup, BodiesWork *work, int heap) {
     team_sync();
     LANE_ROLLED
     for (int i = TEAM_WARP; i < work->count; i += TEAM_WARPS) {
-        bodies_list_body(setup, work, i, heap);
+        bodies_list_body(setup, work, i, curves);
     }
     team_sync();
     EACH_LANE(l) {
@@ -175,7 +176,7 @@ TEAM_FN void bodies_list(const BodiesSetup *setup, BodiesWork *work, int heap) {
 
 /* The element of lane l in a round; its share is 0 where there is none. */
 MILD_HD void bodies_of_round(const BodiesSetup *setup, const BodiesWork *work, int round, int l,
-                             BodiesElement *own, int heap) {
+                             BodiesElement *own, int curves) {
     const int i = work->place[round];
     const int n = (round - work->first[i]) * LANES + l;
     if (n >= work->listed[i]) {
@@ -185,12 +186,12 @@ MILD_HD void bodies_of_round(const BodiesSetup *setup, const BodiesWork *work, i
     const MapSpot spot = bodies_spot(setup, work, i);
     const int s = work->list[work->begin[i] + n];
     bodies_locate(setup, work, i, s, &spot, own);
-    bodies_recall(setup, work, i, s, own, heap);
+    bodies_recall(setup, work, i, s, own, curves);
 }
 
 /* Those that a warp keeps: in `kept` of its first round. */
 TEAM_FN void bodies_keep(const BodiesSetup *setup, const BodiesWork *work, BodiesElement *kept,
-                         BodiesElement (*rest)[LANE_COPIES], int heap) {
+                         BodiesElement (*rest)[LANE_COPIES], int curves) {
     LANE_ROLLED
     for (int turn = BODIES_REST; turn >= 0; turn--) { /* the first round at last */
         const int round = TEAM_WARP + turn * TEAM_WARPS;
@@ -198,7 +199,7 @@ TEAM_FN void bodies_keep(const BodiesSetup *setup, const BodiesWork *work, Bodie
         EACH_LANE(l) {
             kept[l].share = 0;
             if (is) {
-                bodies_of_round(setup, work, round, LANE(l), &kept[l], heap);
+                bodies_of_round(setup, work, round, LANE(l), &kept[l], curves);
             }
             if (is && turn > 0) {
                 rest[turn - 1][l] = kept[l];
@@ -212,7 +213,7 @@ TEAM_FN void bodies_keep(const BodiesSetup *setup, const BodiesWork *work, Bodie
 /* Wrench and hessian of a round. */
 TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const BodiesPoint *point,
                           int begins, int turn, const BodiesElement *kept,
-                          const BodiesElement (*rest)[LANE_COPIES], int heap) {
+                          const BodiesElement (*rest)[LANE_COPIES], int curves) {
     const int round = TEAM_WARP + turn * TEAM_WARPS;
     const Real *twist = point->twist + 6 * work->place[round];
     Real part[BODIES_SUMS][LANE_COPIES];
@@ -223,17 +224,17 @@ TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const Bodi
         }
         if (turn == 0) {
             if (kept[l].share > 0) {
-                bodies_pass(setup, &kept[l], twist, begins, part, l);
+                bodies_pass(setup, &kept[l], twist, begins, curves, part, l);
             }
         } else {
             BodiesElement own;
             if (turn <= BODIES_REST) {
                 own = rest[turn - 1][l];
             } else {
-                bodies_of_round(setup, work, round, LANE(l), &own, heap);
+                bodies_of_round(setup, work, round, LANE(l), &own, curves);
             }
             if (own.share > 0) {
-                bodies_pass(setup, &own, twist, begins, part, l);
+                bodies_pass(setup, &own, twist, begins, curves, part, l);
             }
         }
     }
@@ -252,10 +253,10 @@ TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const Bodi
 /* W and H at the twist of a point. */
 TEAM_FN void bodies_evaluate(const BodiesSetup *setup, BodiesWork *work, BodiesPoint *point,
                              int begins, const BodiesElement *kept,
-                             const BodiesElement (*rest)[LANE_COPIES], int heap) {
+                             const BodiesElement (*rest)[LANE_COPIES], int curves) {
     LANE_ROLLED
     for (int turn = 0; TEAM_WARP + turn * TEAM_WARPS < work->first[work->count]; turn++) {
-        bodies_round(setup, work, point, begins, turn, kept, rest, heap);
+        bodies_round(setup, work, point, begins, turn, kept, rest, curves);
     }
     team_sync();
     EACH_LANE(l) {
@@ -647,9 +648,11 @@ TEAM_FN void bodies_solve_rows(BodiesWork *work, int rows, const BodiesPoint *at
         }
         LANE_UNROLL
         for (int c = 0; c < BODIES_OWN_COLUMNS; c++) {
-            const Real entry = lane_read(M[c], pivot);
-            EACH_LANE(l) {
-                M[c][l] -= factor[l] * entry;
+            if (TEAM_WARP + c * TEAM_WARPS > k && TEAM_WARP + c * TEAM_WARPS <= active) {
+                const Real entry = lane_read(M[c], pivot);
+                EACH_LANE(l) {
+                    M[c][l] -= factor[l] * entry;
+                }
             }
         }
         owner = owner + 1 < TEAM_WARPS ? owner + 1 : 0; /* of the next column */
@@ -740,19 +743,19 @@ TEAM_FN void bodies_between(BodiesWork *work, int rows, Real way) {
 }
 
 /* As in contact.inc; the least residual's point is left in work->best. */
-TEAM_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work, int heap) {
+TEAM_FN void bodies_newton(const BodiesSetup *setup, BodiesWork *work, int curves) {
     const int rows = 6 * work->count;
     Real least = -1, at_residual = 0, way = 1, relative = 0;
     int steps = 0, halved = 0;
     BodiesElement kept[LANE_COPIES], rest[BODIES_REST][LANE_COPIES];
-    bodies_list(setup, work, heap);
-    bodies_keep(setup, work, kept, rest, heap);
+    bodies_list(setup, work, curves);
+    bodies_keep(setup, work, kept, rest, curves);
     bodies_start(work, rows, &work->next);
     bodies_copy(rows, &work->next, &work->best);
     for (;;) {
         Real residual = 0, scale = 0; /* of the start nobody asks */
         bodies_evaluate(setup, work, &work->next, contact_begins(steps, CONTACT_BEGINS), kept,
-                        (const BodiesElement(*)[LANE_COPIES])rest, heap);
+                        (const BodiesElement(*)[LANE_COPIES])rest, curves);
         if (steps > 0) {
             bodies_residual(work, rows, &work->next, &residual, &scale);
         }

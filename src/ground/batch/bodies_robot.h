@@ -20,7 +20,7 @@ typedef struct BodiesCall {
     MildBatchInput input;
     MildBatchOutput output;
     int advance; /* bool, of mild_batch_step */
-    int heap;    /* bool, of bodies_step */
+    int curves;  /* of bodies_step */
 } BodiesCall;
 
 /* Memory of sole b. */
@@ -223,10 +223,10 @@ TEAM_FN void bodies_results(const BodiesCall *call, long robot, const BodiesWork
     }
 }
 
-/* heap: bool, of bodies_step; a constant. */
-TEAM_FN void bodies_solve(const BodiesCall *call, long robot, BodiesWork *work, int heap) {
+/* curves: of bodies_step; a constant. */
+TEAM_FN void bodies_solve(const BodiesCall *call, long robot, BodiesWork *work, int curves) {
     bodies_gather(call, robot, work);
-    bodies_step(call->bodies.setup, work, call->advance, heap);
+    bodies_step(call->bodies.setup, work, call->advance, curves);
     bodies_results(call, robot, work);
 }
 
