@@ -34,8 +34,8 @@ typedef struct {
                                    there is a material that wears */
     MapView map;                /* all 0 without a map */
     const uint16_t *skip; /* [robots] not 0: a step leaves it alone; NULL: none. Of the caller */
-    int beside; /* bool: the kernel before in the stream steps the robots of `skip` and nothing else,
-                   so that a GPU may work on both at once. Of the caller */
+    int beside; /* bool: the kernel before in the stream steps the robots of `skip` and nothing
+                   else, so that a GPU may work on both at once. Of the caller */
 } BatchArrays;
 
 struct BodiesSetup; /* of bodies.h */
