@@ -10,6 +10,8 @@ import subprocess
 import sys
 
 RULE = "-" * 74
+# shared memory of a process that was killed; a pipe to one that has ended, which libevent still asks for
+NOISE = ("Read -1, expected", "[warn] Epoll")
 
 
 def without_frames(lines):
@@ -28,7 +30,7 @@ def without_frames(lines):
                 yield message + "\n"
             frame = None
         elif frame is None:
-            if "Read -1, expected" not in line:  # shared memory of a process that was killed
+            if not any(text in line for text in NOISE):
                 yield line
         else:
             frame.append(text)

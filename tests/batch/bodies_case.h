@@ -31,5 +31,6 @@ typedef struct {
 /* Solves and advances. */
 void bodies_double(BodiesCase *c);
 void bodies_float(BodiesCase *c);
+void bodies_float_shared(BodiesCase *c); /* no equations in registers */
 
 #endif

@@ -565,7 +565,7 @@ static double first_pivot(const BodiesCase *c) {
  * beside it are tried. */
 TEST(vanishing_pivots_do_no_harm) {
     static Kit kit;
-    static BodiesCase c, exact;
+    static BodiesCase c, exact, shared;
     double low = 1e-3, high = 1;
     for (int n = 0; n < 40; n++) {
         const double middle = sqrt(low * high);
@@ -578,11 +578,13 @@ TEST(vanishing_pivots_do_no_harm) {
     double worst = 0;
     for (int n = -2000; n < 2000; n++) {
         open_lying(&kit, &c, low * (1 + 1e-8 * n));
-        exact = c;
+        exact = shared = c;
         exact.tolerance = 1e-11;
         bodies_double(&exact);
         bodies_float(&c);
+        bodies_float_shared(&shared);
         worst = worse(worst, apart(c.wrench + ROW, exact.wrench + ROW, 6, 1.0));
+        worst = worse(worst, apart(shared.wrench + ROW, exact.wrench + ROW, 6, 1.0));
         assert_true(exact.wrench[ROW + 2] > 0.5);
         kit_close(&kit);
     }

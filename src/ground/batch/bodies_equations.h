@@ -291,6 +291,9 @@ TEAM_FN void bodies_solve_shared(BodiesWork *work, int rows, const BodiesPoint *
     team_sync();
 }
 
+#ifndef BODIES_REGISTER_ROWS
+#define BODIES_REGISTER_ROWS LANES /* rows at most of those; an includer may have its own */
+#endif
 /* Columns of a warp in bodies_solve_rows: column m is number m / TEAM_WARPS of warp m % TEAM_WARPS.
  * On the CPU one warp has all. */
 #define BODIES_OWN_COLUMNS (LANE_COPIES == 1 ? 9 : LANES + 1)
@@ -330,7 +333,7 @@ TEAM_FN void bodies_load_rows(BodiesWork *work, int rows, const BodiesPoint *at,
     team_sync();
 }
 
-/* The same of at most LANES rows and BODIES_OWN_COLUMNS TEAM_WARPS columns: a lane has a row, of
+/* The same of at most BODIES_REGISTER_ROWS rows and BODIES_OWN_COLUMNS TEAM_WARPS columns: a lane has a row, of
  * which its warp has some columns in registers. Gauss and Jordan: the warp that has column k shows
  * it to the team, all choose the pivot, and each warp subtracts its row from its own columns. */
 TEAM_FN void bodies_solve_rows(BodiesWork *work, int rows, const BodiesPoint *at, int corrects) {

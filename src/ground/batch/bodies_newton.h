@@ -307,7 +307,7 @@ TEAM_FN void bodies_residual(BodiesWork *work, int rows, const BodiesPoint *poin
 TEAM_FN void bodies_move(BodiesWork *work, int rows, const BodiesPoint *at, int corrects,
                          BodiesPoint *next) {
     const int active = work->active;
-    if (active <= LANES && active < BODIES_OWN_COLUMNS * TEAM_WARPS) {
+    if (active <= BODIES_REGISTER_ROWS && active < BODIES_OWN_COLUMNS * TEAM_WARPS) {
         bodies_solve_rows(work, rows, at, corrects);
     } else {
         bodies_solve_shared(work, rows, at, corrects);
