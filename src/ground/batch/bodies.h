@@ -550,11 +550,9 @@ MILD_HD void bodies_forget(const BodiesMemory *memory, int s, int state, int bur
     }
 }
 
-/* An element of a sole that was in the air and stays there: it remembers where it is. */
+/* An element of a sole that was in the air and stays there: a map's surface under it. */
 MILD_HD void bodies_hover(const BodiesSetup *setup, const BodiesMemory *memory, int s,
-                          const BodiesElement *own, const Real *V) {
-    memory->element[memory->next + s] =
-        own->depth + setup->dt / 2 * bodies_velocity(own, V).descent;
+                          const BodiesElement *own) {
     if (setup->has_map) {
         memory->element[BODIES_STATE * memory->next + s] = (Real)own->label;
         bodies_chart(memory, s, own);
@@ -575,7 +573,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         if (advance && sole->face) {
             bodies_forget(memory, s, own.state, !own.faces_down && own.depth > work->least[i]);
         } else if (advance) {
-            bodies_hover(setup, memory, s, &own, V);
+            bodies_hover(setup, memory, s, &own);
         }
         return;
     }

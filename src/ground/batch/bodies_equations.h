@@ -333,9 +333,10 @@ TEAM_FN void bodies_load_rows(BodiesWork *work, int rows, const BodiesPoint *at,
     team_sync();
 }
 
-/* The same of at most BODIES_REGISTER_ROWS rows and BODIES_OWN_COLUMNS TEAM_WARPS columns: a lane has a row, of
- * which its warp has some columns in registers. Gauss and Jordan: the warp that has column k shows
- * it to the team, all choose the pivot, and each warp subtracts its row from its own columns. */
+/* The same of at most BODIES_REGISTER_ROWS rows and BODIES_OWN_COLUMNS TEAM_WARPS columns: a lane
+ * has a row, of which its warp has some columns in registers. Gauss and Jordan: the warp that has
+ * column k shows it to the team, all choose the pivot, and each warp subtracts its row from its own
+ * columns. */
 TEAM_FN void bodies_solve_rows(BodiesWork *work, int rows, const BodiesPoint *at, int corrects) {
     const int active = work->active;
     Real M[BODIES_OWN_COLUMNS][LANE_COPIES], own[LANE_COPIES], column[LANE_COPIES];
