@@ -254,9 +254,10 @@ MILD_HD Real bodies_reach(const BodiesSetup *setup, int body, const Real *positi
 /* Bool: an element of a body at that pose may touch the ground in this step. bodies_reach is a
  * bound that the steepest place of a map makes wide; here an element has its own place, its own
  * speed and the plane under itself. The ground pushes where the depth in the middle of the step is
- * above 0: of an element that is left out, if the step makes it faster by more than BODIES_GAIN.
- * Then it touches in the next step. On an uneven map a body that is left out forgets the planes of
- * the last step, so there it has to be far from a surface that rises ahead, too. V: twist. */
+ * above 0, so an element that is left out would touch only if the step made it faster by more than
+ * BODIES_GAIN; then it touches in the next step. On an uneven map a body that is left out forgets
+ * the planes of the last step, and the surface may rise ahead of it: the bound there is wider. V:
+ * twist. */
 WARP_FN int bodies_touch(const BodiesSetup *setup, int body, const Real *position, const Real *R,
                          const Real *V, const Real *map_origin, Real height) {
     const BodiesSole *sole = &setup->sole[body];
