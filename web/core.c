@@ -321,7 +321,7 @@ static void stand_on_ground(void) {
 
 /* The same on rigid ground, of shells alone: env_part does the feet. */
 static void stand_on_floor(int k) {
-    if (env_shells_wait(&web.all, 0) && env_shells_find(&web.all, 0, k)) {
+    if (env_shells_wait(&web.all, 0) && env_shells_follow(&web.all, 0, k)) {
         env_floor_step(&web.all, 0, &web.floor);
     }
     web.view.shell_load = (float)web.down.load;

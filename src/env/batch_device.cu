@@ -9,19 +9,20 @@
 #include "env/kernels.h"
 
 #ifndef ENVS_WARPS
-#define ENVS_WARPS (ENGINE_FIXED ? 4 : 1) /* robots of a block */
+/* Robots of a block. Those of a block begin together and read the same instructions. */
+#define ENVS_WARPS (ENGINE_FIXED ? 8 : 1)
 #endif
 #ifndef ENVS_BLOCKS
-#define ENVS_BLOCKS (ENGINE_FIXED ? 6 : 1) /* blocks of a multiprocessor, at least */
+#define ENVS_BLOCKS (ENGINE_FIXED ? 3 : 1) /* blocks of a multiprocessor, at least */
 #endif
 enum {
     WARP_THREADS = LANES * ENVS_WARPS,
     TASK_THREADS = 128,
     TASK_ROBOTS = TASK_THREADS / TILE, /* of a block */
     TASK_BLOCKS = 8,                   /* blocks of a multiprocessor, at least */
-    SHELLS_WARPS = 4,                  /* of a robot with shells near the ground */
-    SHELLS_BLOCKS = 3,                 /* such robots of a multiprocessor, at least */
-    SHELLS_ROBOTS = 512,               /* stepped at once, at most: an H100 has room for 396 */
+    SHELLS_WARPS = 3,                  /* of a robot with shells near the ground */
+    SHELLS_BLOCKS = 4,                 /* such robots of a multiprocessor, at least */
+    SHELLS_ROBOTS = 512,               /* stepped at once, at most: an H100 has room for 528 */
     TALLY_THREADS = 256,
     ORDER_THREADS = 1024
 };
@@ -55,7 +56,8 @@ static __device__ int *waiting_of(const EnvsArrays *all, int k) {
 /* Lists a robot after part k if its shells may touch the ground. The order is that of arrival: each
  * robot is stepped by itself. */
 static __device__ void list_shells(const EnvsArrays *all, long robot, int k) {
-    if (env_shells_wait(all, robot) && env_shells_find(all, robot, k) && threadIdx.x % LANES == 0) {
+    if (env_shells_wait(all, robot) && env_shells_follow(all, robot, k) &&
+        threadIdx.x % LANES == 0) {
         all->shells.list[atomicAdd(&waiting_of(all, k)[0], 1)] = (int32_t)robot;
     }
 }

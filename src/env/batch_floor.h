@@ -12,15 +12,6 @@ typedef struct {
     EngineFloor floor;
 } EnvFloorWork;
 
-/* Of the bits in `near` of a robot on rigid ground: all if a point touches, else none. */
-WARP_FN int env_floor_touch(const EnvsArrays *all, long robot, int near) {
-    const EngineLinks links = engine_links_saved(&env_shells_at(all, robot)->links);
-    const EngineGround ground = env_surface(all, robot);
-    const Real *base = env_robot_at(all, robot)->saved.state + ENGINE_SAVED(base);
-    const FloorPose pose = {all->model, &links, base, &ground, near};
-    return engine_floor_touches(&pose) ? near : 0;
-}
-
 /* The wrenches of the feet for env_import, the acceleration for engine_integrate; the measures. */
 WARP_FN void env_floor_results(const EnvsArrays *all, long robot, const EnvFloorWork *work) {
     const EngineModel *model = all->model;

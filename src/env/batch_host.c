@@ -32,7 +32,7 @@ void envs_host_shells(const EnvsArrays *all, int k, long robot) {
     EnvFloorWork floor;
     work.engine.count = work.ground.count = 0; /* gcc does not see that a lane sets them */
     floor.floor.count = floor.floor.points = 0;
-    if (!env_shells_wait(all, robot) || !env_shells_find(all, robot, k)) {
+    if (!env_shells_wait(all, robot) || !env_shells_follow(all, robot, k)) {
         return;
     }
     if (all->rigid[robot]) {

@@ -10,8 +10,8 @@
 #include "robot/engine/ground.h"
 #include "robot/engine/shells.h"
 
-/* [m] A body so far above the ground does not reach it in a step. */
-#define ENV_SHELLS_FAR REAL(0.15)
+/* [m/s] A body that this speed would not bring to the ground in a step is not asked for its own. */
+#define ENV_SHELLS_FAST REAL(8)
 
 /* In shared memory. */
 typedef struct {
@@ -32,38 +32,109 @@ WARP_FN void env_shells_away(const EnvsArrays *all, long robot, int up) {
     lanes_sync();
 }
 
-/* Bool: the body is near the ground. */
-MILD_HD int env_body_near(const EnvsArrays *all, const EngineGround *ground, const EngineWork *work,
-                          int body) {
-    const EngineModel *model = all->model;
+/* ---- which bodies may touch ---- */
+
+/* Where a body is and how it moves, after engine_begin. */
+typedef struct {
+    Real position[3]; /* [m] world */
+    Real rotation[9]; /* [-] body -> world */
+    Real twist[6];    /* [m/s, rad/s] */
+} EnvBodyMotion;
+
+/* [m] Upper bound on the depth of any element of a body; its pose. */
+MILD_HD Real env_body_pose(const EnvsArrays *all, long robot, const EngineWork *work, int body,
+                           EnvBodyMotion *motion) {
     const EngineLinks links = engine_links_of(work);
-    Real position[3], rotation[9];
-    engine_body_pose(model, &links, body, position, rotation);
+    Real *position = motion->position;
+    engine_body_pose(all->model, &links, body, position, motion->rotation);
     for (int k = 0; k < 3; k++) {
         position[k] += work->base[k];
     }
-    return bodies_reach(all->shells.setup, engine_feet(&model->tree) + body, position, rotation,
-                        ground->map_origin, ground->height) > -ENV_SHELLS_FAR;
+    return bodies_reach(all->shells.setup, all->shells.setup->feet + body, position,
+                        motion->rotation, all->map_origin + 2 * robot, all->contact.height[robot]);
 }
 
-/* Which bodies are near the ground, after engine_begin. */
-WARP_FN void env_shells_near(const EnvsArrays *all, long robot, const EngineGround *ground,
-                             const EngineWork *work) {
-    const EngineTree *tree = &all->model->tree;
-    const BodiesSetup *setup = all->shells.setup;
-    int near;
-    if (all->rigid[robot]) {
-        near = engine_floor_near(all->model, work, ground, setup->steepest);
-    } else {
-        Real bit[LANE_COPIES];
-        EACH_LANE(l) {
-            bit[l] = 0;
-            if (LANE(l) < tree->bodies && env_body_near(all, ground, work, LANE(l))) {
-                bit[l] = (Real)(1 << LANE(l));
+/* Its twist, after its pose: a lane has a degree of freedom. */
+WARP_FN void env_body_twist(const EngineModel *model, const EngineWork *work, int body,
+                            EnvBodyMotion *motion) {
+    const EngineTree *tree = &model->tree;
+    const EngineLinks links = engine_links_of(work);
+    const int link = tree->body_link[body];
+    Real from[3]; /* [m] the base */
+    Real part[6][LANE_COPIES];
+    for (int k = 0; k < 3; k++) {
+        from[k] = motion->position[k] - work->base[k];
+    }
+    EACH_LANE(l) {
+        for (int c = 0; c < 6; c++) {
+            part[c][l] = 0;
+        }
+        LANE_ROLLED
+        for (int place = LANE(l); place < engine_row_length(tree, link); place += LANES) {
+            const Real rate = work->rate[tree->row_dof[link][place]];
+            Real column[6];
+            link_column(tree, &links, link, from, place, column);
+            for (int c = 0; c < 6; c++) {
+                part[c][l] += column[c] * rate;
             }
         }
-        near = (int)lane_sum(bit);
     }
+    for (int c = 0; c < 6; c++) {
+        motion->twist[c] = lane_sum(part[c]);
+    }
+}
+
+/* Bool: a body has an element that may touch soft ground in this step. Before its elements the
+ * bound of mild_ground_near is asked. */
+WARP_FN int env_body_touches(const EnvsArrays *all, long robot, const EngineWork *work, int body) {
+    const BodiesSetup *setup = all->shells.setup;
+    const int at = setup->feet + body; /* feet are before it */
+    EnvBodyMotion motion;              /* the same in all lanes */
+    const Real reach = env_body_pose(all, robot, work, body, &motion);
+    env_body_twist(all->model, work, body, &motion);
+    return reach > bodies_least(setup, setup->sole[at].radius, motion.twist, motion.twist) &&
+           bodies_touch(setup, at, motion.position, motion.rotation, motion.twist,
+                        all->map_origin + 2 * robot, all->contact.height[robot]);
+}
+
+/* Bits of the bodies with an element that may touch soft ground in this step: of those that are
+ * not far, which a lane has each. */
+WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, const EngineWork *work) {
+    const int bodies = all->model->tree.bodies;
+    const Real way = BODIES_MARGIN + all->shells.setup->dt * (ENV_SHELLS_FAST + BODIES_EXTRA_SPEED);
+    Real bit[LANE_COPIES];
+    int touch = 0;
+    EACH_LANE(l) {
+        EnvBodyMotion motion;
+        bit[l] = 0;
+        if (LANE(l) < bodies && env_body_pose(all, robot, work, LANE(l), &motion) > -way) {
+            bit[l] = (Real)(1 << LANE(l));
+        }
+    }
+    const int near = (int)lane_sum(bit);
+    LANE_ROLLED
+    for (int body = 0; near >> body; body++) {
+        if (near >> body & 1) {
+            touch |= env_body_touches(all, robot, work, body) ? 1 << body : 0;
+        }
+    }
+    return touch;
+}
+
+/* Of a robot on rigid ground the bits of the bodies near it, if a point of one touches; else 0. */
+WARP_FN int env_floor_touch(const EnvsArrays *all, const EngineGround *ground,
+                            const EngineWork *work) {
+    const int near = engine_floor_near(all->model, work, ground, all->shells.setup->steepest);
+    const EngineLinks links = engine_links_of(work);
+    const FloorPose pose = {all->model, &links, work->base, ground, near};
+    return near && engine_floor_touches(&pose) ? near : 0;
+}
+
+/* Which bodies may touch the ground, after engine_begin. */
+WARP_FN void env_shells_near(const EnvsArrays *all, long robot, const EngineGround *ground,
+                             const EngineWork *work) {
+    const int near =
+        all->rigid[robot] ? env_floor_touch(all, ground, work) : env_shells_touch(all, robot, work);
     if (!near) {
         return;
     }
@@ -72,83 +143,10 @@ WARP_FN void env_shells_near(const EnvsArrays *all, long robot, const EngineGrou
             all->shells.near[robot] = (uint16_t)near;
         }
     }
-    engine_save_links(tree, work, &env_shells_at(all, robot)->links);
+    engine_save_links(&all->model->tree, work, &env_shells_at(all, robot)->links);
 }
 
 /* ---- the step ---- */
-
-/* Where a body is and how it moves, in one array, which passes from lane to lane. */
-enum {
-    ENV_MOTION_POSITION = 0, /* [m] world */
-    ENV_MOTION_ROTATION = 3, /* [-] body -> world */
-    ENV_MOTION_TWIST = 12,   /* [m/s, rad/s] */
-    ENV_MOTION_NUMBERS = 18
-};
-
-MILD_HD void env_body_motion(const EnvsArrays *all, long robot, int body, Real *motion) {
-    const EngineTree *tree = &all->model->tree;
-    const Real *state = env_robot_at(all, robot)->saved.state;
-    const EngineLinks links = engine_links_saved(&env_shells_at(all, robot)->links);
-    Real *position = motion + ENV_MOTION_POSITION;
-    engine_body_pose(all->model, &links, body, position, motion + ENV_MOTION_ROTATION);
-    engine_body_twist(tree, &links, state + ENGINE_SAVED(rate), body, position,
-                      motion + ENV_MOTION_TWIST);
-    for (int k = 0; k < 3; k++) {
-        position[k] += state[ENGINE_SAVED(base) + k];
-    }
-}
-
-/* Bool: the bound of mild_ground_near does not say that a body stays in the air in this step. */
-MILD_HD int env_body_reaches(const EnvsArrays *all, long robot, int body, const Real *motion) {
-    const BodiesSetup *setup = all->shells.setup;
-    const int at = setup->feet + body; /* feet are before it */
-    const Real *V = motion + ENV_MOTION_TWIST;
-    const Real reach =
-        bodies_reach(setup, at, motion + ENV_MOTION_POSITION, motion + ENV_MOTION_ROTATION,
-                     all->map_origin + 2 * robot, all->contact.height[robot]);
-    return reach > bodies_least(setup, setup->sole[at].radius, V, V);
-}
-
-/* Bool: a body has an element that may touch the ground in this step. All lanes have its motion. */
-WARP_FN int env_body_touches(const EnvsArrays *all, long robot, int body, const Real *motion) {
-    const BodiesSetup *setup = all->shells.setup;
-    return bodies_touch(setup, setup->feet + body, motion + ENV_MOTION_POSITION,
-                        motion + ENV_MOTION_ROTATION, motion + ENV_MOTION_TWIST,
-                        all->map_origin + 2 * robot, all->contact.height[robot]);
-}
-
-/* Of the bits in `near`, those of bodies with an element that may touch soft ground this step. A
- * lane has a body; then all lanes have the elements of each body within the bound. */
-WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, int near) {
-    const int bodies = all->model->tree.bodies;
-    Real motion[ENV_MOTION_NUMBERS][LANE_COPIES], bit[LANE_COPIES];
-    int touch = 0;
-    EACH_LANE(l) {
-        Real own[ENV_MOTION_NUMBERS] = {0};
-        const int body = LANE(l);
-        bit[l] = 0;
-        if (body < bodies && near >> body & 1) {
-            env_body_motion(all, robot, body, own);
-            bit[l] = env_body_reaches(all, robot, body, own) ? (Real)(1 << body) : 0;
-        }
-        for (int n = 0; n < ENV_MOTION_NUMBERS; n++) {
-            motion[n][l] = own[n];
-        }
-    }
-    const int reaching = (int)lane_sum(bit);
-    LANE_ROLLED
-    for (int body = 0; body < bodies; body++) {
-        if (reaching >> body & 1) {
-            Real of[ENV_MOTION_NUMBERS];
-            LANE_UNROLL
-            for (int n = 0; n < ENV_MOTION_NUMBERS; n++) {
-                of[n] = lane_read(motion[n], body);
-            }
-            touch |= env_body_touches(all, robot, body, of) ? 1 << body : 0;
-        }
-    }
-    return touch;
-}
 
 /* Bool: there is something to do for a robot. */
 MILD_HD int env_shells_wait(const EnvsArrays *all, long robot) {
@@ -184,24 +182,18 @@ WARP_FN void env_shells_leave(const EnvsArrays *all, long robot, int near) {
     }
 }
 
-/* After part k of a policy step: which bodies may touch the ground, in `near`. The others forget,
- * and in a new episode all do; on rigid ground there is nothing to remember. Bool: env_shells_step
- * is to follow, or env_floor_step. */
-WARP_FN int env_shells_find(const EnvsArrays *all, long robot, int k) {
-    const int listed = all->shells.near[robot];
+/* After part k of a policy step: bodies that cannot touch the ground forget, and in a new episode
+ * all do; on rigid ground there is nothing to remember. Bool: env_shells_step is to follow, or
+ * env_floor_step. */
+WARP_FN int env_shells_follow(const EnvsArrays *all, long robot, int k) {
+    const int near = all->shells.near[robot];
     const int rigid = all->rigid[robot];
-    const int held = all->shells.held[robot];
-    int near = 0;
-    if (listed) {
-        near = rigid ? env_floor_touch(all, robot, listed) : env_shells_touch(all, robot, listed);
-    }
-    if (held) {
+    if (all->shells.held[robot]) {
         env_shells_leave(all, robot, rigid || (k == 0 && all->reset[robot]) ? 0 : near);
     }
     lanes_sync(); /* all have read what lane 0 writes */
     EACH_LANE(l) {
         if (LANE(l) == 0) {
-            all->shells.near[robot] = (uint16_t)near;
             all->shells.held[robot] = near != 0 && !rigid;
             if (!near) {
                 env_shells_at(all, robot)->load = 0;

@@ -296,7 +296,7 @@ TEAM_FN void bodies_solve_shared(BodiesWork *work, int rows, const BodiesPoint *
 #endif
 /* Columns of a warp in bodies_solve_rows: column m is number m / TEAM_WARPS of warp m % TEAM_WARPS.
  * On the CPU one warp has all. */
-#define BODIES_OWN_COLUMNS (LANE_COPIES == 1 ? 9 : LANES + 1)
+#define BODIES_OWN_COLUMNS (LANE_COPIES == 1 ? 7 : LANES + 1)
 
 /* Column `number` of a warp's, whose index is a constant in each round, so that M may be in
  * registers. */
