@@ -20,9 +20,11 @@ enum {
     TASK_THREADS = 128,
     TASK_ROBOTS = TASK_THREADS / TILE, /* of a block */
     TASK_BLOCKS = 8,                   /* blocks of a multiprocessor, at least */
-    SHELLS_WARPS = 3,                  /* of a robot with shells near the ground */
-    SHELLS_BLOCKS = 4,                 /* such robots of a multiprocessor, at least */
-    SHELLS_ROBOTS = 512,               /* stepped at once, at most: an H100 has room for 528 */
+    /* Of a robot with shells near the ground; and such robots of a multiprocessor, at least. Shared
+     * memory has room for three with four feet and their calves. */
+    SHELLS_WARPS = ENGINE_FEET > 2 ? 4 : 3,
+    SHELLS_BLOCKS = ENGINE_FEET > 2 ? 3 : 4,
+    SHELLS_ROBOTS = 512, /* stepped at once, at most: an H100 has room for 528 */
     TALLY_THREADS = 256,
     ORDER_THREADS = 1024
 };

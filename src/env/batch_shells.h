@@ -6,6 +6,7 @@
 
 #include "env/batch_floor.h"
 #define BODIES_NEAR (ENGINE_FEET + ENGINE_BODIES)
+#define BODIES_WARP_COLUMNS (ENGINE_FEET > 2 ? 9 : 7)
 #include "ground/batch/bodies.h"
 #include "robot/engine/ground.h"
 #include "robot/engine/shells.h"

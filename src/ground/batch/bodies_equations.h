@@ -295,8 +295,11 @@ TEAM_FN void bodies_solve_shared(BodiesWork *work, int rows, const BodiesPoint *
 #define BODIES_REGISTER_ROWS LANES /* rows at most of those; an includer may have its own */
 #endif
 /* Columns of a warp in bodies_solve_rows: column m is number m / TEAM_WARPS of warp m % TEAM_WARPS.
- * On the CPU one warp has all. */
-#define BODIES_OWN_COLUMNS (LANE_COPIES == 1 ? 7 : LANES + 1)
+ * On the CPU one warp has all. An includer may have its own number for a GPU. */
+#ifndef BODIES_WARP_COLUMNS
+#define BODIES_WARP_COLUMNS 9
+#endif
+#define BODIES_OWN_COLUMNS (LANE_COPIES == 1 ? BODIES_WARP_COLUMNS : LANES + 1)
 
 /* Column `number` of a warp's, whose index is a constant in each round, so that M may be in
  * registers. */
