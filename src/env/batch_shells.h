@@ -55,44 +55,19 @@ MILD_HD Real env_body_pose(const EnvsArrays *all, long robot, const EngineWork *
                         motion->rotation, all->map_origin + 2 * robot, all->contact.height[robot]);
 }
 
-/* Its twist, after its pose: a lane has a degree of freedom. */
-WARP_FN void env_body_twist(const EngineModel *model, const EngineWork *work, int body,
-                            EnvBodyMotion *motion) {
-    const EngineTree *tree = &model->tree;
-    const EngineLinks links = engine_links_of(work);
-    const int link = tree->body_link[body];
-    Real from[3]; /* [m] the base */
-    Real part[6][LANE_COPIES];
-    for (int k = 0; k < 3; k++) {
-        from[k] = motion->position[k] - work->base[k];
-    }
-    EACH_LANE(l) {
-        for (int c = 0; c < 6; c++) {
-            part[c][l] = 0;
-        }
-        LANE_ROLLED
-        for (int place = LANE(l); place < engine_row_length(tree, link); place += LANES) {
-            const Real rate = work->rate[tree->row_dof[link][place]];
-            Real column[6];
-            link_column(tree, &links, link, from, place, column);
-            for (int c = 0; c < 6; c++) {
-                part[c][l] += column[c] * rate;
-            }
-        }
-    }
-    for (int c = 0; c < 6; c++) {
-        motion->twist[c] = lane_sum(part[c]);
-    }
-}
-
 /* Bool: a body has an element that may touch soft ground in this step. Before its elements the
  * bound of mild_ground_near is asked. */
 WARP_FN int env_body_touches(const EnvsArrays *all, long robot, const EngineWork *work, int body) {
     const BodiesSetup *setup = all->shells.setup;
     const int at = setup->feet + body; /* feet are before it */
-    EnvBodyMotion motion;              /* the same in all lanes */
+    const EngineLinks links = engine_links_of(work);
+    EnvBodyMotion motion; /* the same in all lanes */
+    Real from[3];         /* [m] the base */
     const Real reach = env_body_pose(all, robot, work, body, &motion);
-    env_body_twist(all->model, work, body, &motion);
+    for (int k = 0; k < 3; k++) {
+        from[k] = motion.position[k] - work->base[k];
+    }
+    engine_body_twist(&all->model->tree, &links, work->rate, body, from, motion.twist);
     return reach > bodies_least(setup, setup->sole[at].radius, motion.twist, motion.twist) &&
            bodies_touch(setup, at, motion.position, motion.rotation, motion.twist,
                         all->map_origin + 2 * robot, all->contact.height[robot]);

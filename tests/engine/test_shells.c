@@ -17,6 +17,7 @@ typedef struct {
     EngineShells shells;
     double position[ENGINE_BODIES_MAX][3], rotation[ENGINE_BODIES_MAX][9];
     double velocity[ENGINE_BODIES_MAX][6], free_velocity[6 * ENGINE_BODIES_MAX];
+    double before[ENGINE_BODIES_MAX][6]; /* twists by engine_body_twist */
     double inverse_inertia[ROWS_MOST * ROWS_MOST];
 } Engine;
 
@@ -60,6 +61,13 @@ static void engine_first(const EngineModel *model, const RobotSim *sim, const do
     for (int i = 0; i < e->shells.count; i++) {
         e->shells.body[i] = sim->row[model->tree.feet + i] - model->tree.feet;
     }
+    for (int i = 0; i < e->shells.count; i++) {
+        const EngineLinks links = engine_links_of(&e->work);
+        double position[3], rotation[9];
+        engine_body_pose(model, &links, e->shells.body[i], position, rotation);
+        engine_body_twist(&model->tree, &links, e->work.rate, e->shells.body[i], position,
+                          e->before[i]);
+    }
     engine_shells_begin(model, &e->saved, &e->links, &e->shells, &ground);
 }
 
@@ -92,6 +100,7 @@ static void compare(const EngineModel *model, const RobotSim *sim, const Engine 
         worst->pose = worse(worst->pose, apart(e->rotation[i], in->rotation[b], 9));
         memcpy(twist, in->velocity[b], sizeof twist);
         worst->twist = worse(worst->twist, apart(e->velocity[i], twist, 6));
+        worst->twist = worse(worst->twist, apart(e->before[i], twist, 6));
         memcpy(twist, in->free_velocity + 6 * b, sizeof twist);
         worst->twist = worse(worst->twist, apart(e->free_velocity + 6 * i, twist, 6));
     }

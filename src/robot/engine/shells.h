@@ -72,20 +72,28 @@ MILD_HD void engine_body_pose(const EngineModel *model, const EngineLinks *links
     }
 }
 
-/* Its twist at `position` [m] from the base, under the rates of the degrees of freedom. */
-MILD_HD void engine_body_twist(const EngineTree *tree, const EngineLinks *links, const Real *rate,
+/* Its twist at `position` [m] from the base, under the rates of the degrees of freedom, of which a
+ * lane has one. position: the same in all lanes, and so is the twist. */
+WARP_FN void engine_body_twist(const EngineTree *tree, const EngineLinks *links, const Real *rate,
                                int body, const Real *position, Real *twist) {
     const int link = tree->body_link[body];
-    for (int c = 0; c < 6; c++) {
-        twist[c] = 0;
-    }
-    LANE_ROLLED
-    for (int place = 0; place < engine_row_length(tree, link); place++) {
-        Real column[6];
-        link_column(tree, links, link, position, place, column);
+    Real part[6][LANE_COPIES];
+    EACH_LANE(l) {
         for (int c = 0; c < 6; c++) {
-            twist[c] += column[c] * rate[tree->row_dof[link][place]];
+            part[c][l] = 0;
         }
+        LANE_ROLLED
+        for (int place = LANE(l); place < engine_row_length(tree, link); place += LANES) {
+            const Real speed = rate[tree->row_dof[link][place]];
+            Real column[6];
+            link_column(tree, links, link, position, place, column);
+            for (int c = 0; c < 6; c++) {
+                part[c][l] += column[c] * speed;
+            }
+        }
+    }
+    for (int c = 0; c < 6; c++) {
+        twist[c] = lane_sum(part[c]);
     }
 }
 
