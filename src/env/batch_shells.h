@@ -35,24 +35,26 @@ WARP_FN void env_shells_away(const EnvsArrays *all, long robot, int up) {
 
 /* ---- which bodies may touch ---- */
 
-/* Where a body is and how it moves, after engine_begin. */
+/* Where a body is, after engine_begin. */
 typedef struct {
-    Real position[3]; /* [m] world */
-    Real rotation[9]; /* [-] body -> world */
-    Real twist[6];    /* [m/s, rad/s] */
-} EnvBodyMotion;
+    Real from_base[3]; /* [m] world axes */
+    Real position[3];  /* [m] world */
+    Real rotation[9];  /* [-] body -> world */
+} EnvBodyPose;
 
-/* [m] Upper bound on the depth of any element of a body; its pose. */
-MILD_HD Real env_body_pose(const EnvsArrays *all, long robot, const EngineWork *work, int body,
-                           EnvBodyMotion *motion) {
+MILD_HD void env_body_pose(const EnvsArrays *all, const EngineWork *work, int body,
+                           EnvBodyPose *pose) {
     const EngineLinks links = engine_links_of(work);
-    Real *position = motion->position;
-    engine_body_pose(all->model, &links, body, position, motion->rotation);
+    engine_body_pose(all->model, &links, body, pose->from_base, pose->rotation);
     for (int k = 0; k < 3; k++) {
-        position[k] += work->base[k];
+        pose->position[k] = work->base[k] + pose->from_base[k];
     }
-    return bodies_reach(all->shells.setup, all->shells.setup->feet + body, position,
-                        motion->rotation, all->map_origin + 2 * robot, all->contact.height[robot]);
+}
+
+/* [m] Upper bound on the depth of any element of a body. */
+MILD_HD Real env_body_reach(const EnvsArrays *all, long robot, int body, const EnvBodyPose *pose) {
+    return bodies_reach(all->shells.setup, all->shells.setup->feet + body, pose->position,
+                        pose->rotation, all->map_origin + 2 * robot, all->contact.height[robot]);
 }
 
 /* Bool: a body has an element that may touch soft ground in this step. Before its elements the
@@ -61,30 +63,29 @@ WARP_FN int env_body_touches(const EnvsArrays *all, long robot, const EngineWork
     const BodiesSetup *setup = all->shells.setup;
     const int at = setup->feet + body; /* feet are before it */
     const EngineLinks links = engine_links_of(work);
-    EnvBodyMotion motion; /* the same in all lanes */
-    Real from[3];         /* [m] the base */
-    const Real reach = env_body_pose(all, robot, work, body, &motion);
-    for (int k = 0; k < 3; k++) {
-        from[k] = motion.position[k] - work->base[k];
-    }
-    engine_body_twist(&all->model->tree, &links, work->rate, body, from, motion.twist);
-    return reach > bodies_least(setup, setup->sole[at].radius, motion.twist, motion.twist) &&
-           bodies_touch(setup, at, motion.position, motion.rotation, motion.twist,
-                        all->map_origin + 2 * robot, all->contact.height[robot]);
+    EnvBodyPose pose; /* the same in all lanes */
+    Real twist[6];
+    env_body_pose(all, work, body, &pose);
+    engine_body_twist(&all->model->tree, &links, work->rate, body, pose.from_base, twist);
+    return env_body_reach(all, robot, body, &pose) >
+               bodies_least(setup, setup->sole[at].radius, twist, twist) &&
+           bodies_touch(setup, at, pose.position, pose.rotation, twist, all->map_origin + 2 * robot,
+                        all->contact.height[robot]);
 }
 
-/* Bits of the bodies with an element that may touch soft ground in this step: of those that are
- * not far, which a lane has each. */
+/* Bits of the bodies with an element that may touch soft ground in this step. A lane has a body,
+ * and those that are not too far are asked one after the other. */
 WARP_FN int env_shells_touch(const EnvsArrays *all, long robot, const EngineWork *work) {
     const int bodies = all->model->tree.bodies;
-    const Real way = BODIES_MARGIN + all->shells.setup->dt * (ENV_SHELLS_FAST + BODIES_EXTRA_SPEED);
+    const Real far = BODIES_MARGIN + all->shells.setup->dt * (ENV_SHELLS_FAST + BODIES_EXTRA_SPEED);
     Real bit[LANE_COPIES];
     int touch = 0;
     EACH_LANE(l) {
-        EnvBodyMotion motion;
         bit[l] = 0;
-        if (LANE(l) < bodies && env_body_pose(all, robot, work, LANE(l), &motion) > -way) {
-            bit[l] = (Real)(1 << LANE(l));
+        if (LANE(l) < bodies) {
+            EnvBodyPose pose;
+            env_body_pose(all, work, LANE(l), &pose);
+            bit[l] = env_body_reach(all, robot, LANE(l), &pose) > -far ? (Real)(1 << LANE(l)) : 0;
         }
     }
     const int near = (int)lane_sum(bit);

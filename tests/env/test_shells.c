@@ -118,6 +118,7 @@ static Falls fall(const char *robot, TaskDef def, int device, const MildMapDef *
 static void check(Falls falls, double least) {
     assert_true(falls.near > 200 && falls.near_together > least * falls.near);
     assert_true(falls.together > least * falls.steps);
+    assert_true(falls.first < 1e-3); /* 9e-3 with bodies that touch a physics step late */
 }
 
 TEST(falls_are_those_of_mujoco) {

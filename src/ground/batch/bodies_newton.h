@@ -73,7 +73,7 @@ MILD_HD void bodies_pass(const BodiesSetup *setup, const BodiesElement *own, con
 /* ---- which elements ---- */
 
 /* Rounds of elements that a warp keeps behind its first. On a GPU the first is in registers, these
- * are in memory of the thread: nine rounds of a team, where a robot that walks has four to
+ * are in memory of the thread: nine rounds of three warps, where a robot that walks has four to
  * eight. */
 #define BODIES_REST (LANE_COPIES == 1 ? 2 : 7)
 
