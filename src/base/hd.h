@@ -66,6 +66,12 @@ MILD_HD Real real_min(Real a, Real b) {
 
 /* ---- numbers that a GPU computes in its own way ---- */
 
+/* x, at most 1. x >= 0: a GPU, whose product with this limit is one instruction, returns 0 below
+ * it. */
+MILD_HD Real real_to_one(Real x) {
+    return ON_GPU(__saturatef(x), real_min(x, 1));
+}
+
 /* __powf: powf has hundreds of instructions. rsqrtf: one instruction, right to 2 units in the last
  * place. */
 #ifdef MILD_REAL_FLOAT

@@ -37,10 +37,9 @@ MILD_HD void element_unloading_line(Element *e, int curves, Real force) {
     e->zero_depth = a - (chord ? travel : quotient);
 }
 
-/* Sets the fields that hold for a step from the material and `depth`, except explicit_impulse,
- * stop_drag, stop_growth and turn. speed: present downward speed. rate: 1/dt. */
-MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, Real dt, Real rate,
-                           Real speed) {
+/* element_begin without friction's spring. Returns the yield force [N], from which that follows. */
+MILD_HD Real element_begin_still(Element *e, const ElementMemory *memory, int curves, Real dt,
+                                 Real rate, Real speed) {
     /* Virgin ground begins at the greatest depth so far, which is at least where this step
      * starts. */
     e->middle = memory->middle > 0 ? memory->middle : e->depth - dt / 2 * speed;
@@ -61,7 +60,15 @@ MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, 
 
     e->drift_bound = dt * e->k_drift * memory->drift * real_max(e->depth, 0);
     e->damping = e->depth > 0 ? dt * e->b_drift : 0;
-    friction_hold(e, memory, dt, rate, force + law_elastic_force(&e->law, curves, e->middle));
+    return force + law_elastic_force(&e->law, curves, e->middle);
+}
+
+/* Sets the fields that hold for a step from the material and `depth`, except explicit_impulse,
+ * stop_drag, stop_growth and turn. speed: present downward speed. rate: 1/dt. */
+MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, Real dt, Real rate,
+                           Real speed) {
+    const Real force = element_begin_still(e, memory, curves, dt, rate, speed);
+    friction_hold(e, memory, dt, rate, force);
 }
 
 /* [m] How far the element will go into virgin ground, beyond the elastic travel, at the downward

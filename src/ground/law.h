@@ -133,8 +133,10 @@ MILD_HD Law law_merged(Law law, Real begin, Real width) {
 
 /* t [-], 1 when the cone is complete. */
 MILD_HD Real law_cone_progress(const Law *law, int curves, Real depth) {
-    const Real closing = curves & LAW_HEAP ? real_max(depth - law->cone_begin, 0) : depth;
-    return real_min(closing * law->inverse_cone_depth, 1);
+    const Real below = depth - law->cone_begin;
+    /* real_to_one cuts what is below 0 where it is an instruction */
+    const Real closing = curves & LAW_HEAP ? ON_GPU(below, real_max(below, 0)) : depth;
+    return real_to_one(closing * law->inverse_cone_depth);
 }
 
 /* 1 - (1 - t)^3 [-], the recruited share of what the complete cone recruits. */

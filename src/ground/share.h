@@ -96,11 +96,15 @@ MILD_HD Real share_ahead(const Element *e, const Share *share, Real level, const
                                 : 0;
 }
 
-/* Sets lean and carry, and with them the unloading line and friction, after element_begin: the
- * line says the whole force at the yield depth. elastic: [N] force of ground without memory. level:
- * cosine between sole and ground. ahead: [N] share_ahead of a face, 0 of a sole. */
-MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, Real elastic,
-                           Real dt, Real rate, Real level, Real ahead) {
+/* What a share makes of an element's yield load. */
+typedef struct {
+    Real force;  /* [N] without that of ground without memory */
+    int changes; /* bool: it is not that of the element, or friction is another */
+} ShareLoad;
+
+/* element_share without friction's spring. */
+MILD_HD ShareLoad element_share_still(Element *e, Share *share, Real dt, Real rate, Real level,
+                                      Real ahead) {
     const Real a = e->yield_depth;
     const Real k = e->unload_stiffness;
     const Real c = share_lean(share, level);
@@ -118,18 +122,26 @@ MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share
     const Real moves = strikes / (strikes + force + ELEMENT_TINY);
     const Real mu = share->grip > 0 ? held + (share->mu - held) * moves : share->mu;
     const Real sides = share->side * e->depth * real_max(e->depth, 0) + ahead;
-    const int changes = q < 1 || mu != e->mu || sides > 0;
+    const ShareLoad load = {force, q < 1 || mu != e->mu || sides > 0};
     share->lean = c;
     share->carry = q;
     e->drift_bound += dt * sides;
-    Element still = *e;
-    still.mu = mu;
-    friction_hold(&still, memory, dt, rate, force + elastic);
     e->zero_depth = q < 1 ? a - force / (k + ELEMENT_TINY) : e->zero_depth;
-    e->hold_x = changes ? still.hold_x : e->hold_x;
-    e->hold_y = changes ? still.hold_y : e->hold_y;
-    e->hold_stiffness = changes ? still.hold_stiffness : e->hold_stiffness;
     e->mu = mu;
+    return load;
+}
+
+/* Sets lean and carry, and with them the unloading line and friction, after element_begin: the
+ * line says the whole force at the yield depth. elastic: [N] force of ground without memory. level:
+ * cosine between sole and ground. ahead: [N] share_ahead of a face, 0 of a sole. */
+MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, Real elastic,
+                           Real dt, Real rate, Real level, Real ahead) {
+    const ShareLoad load = element_share_still(e, share, dt, rate, level, ahead);
+    Element still = *e;
+    friction_hold(&still, memory, dt, rate, load.force + elastic);
+    e->hold_x = load.changes ? still.hold_x : e->hold_x;
+    e->hold_y = load.changes ? still.hold_y : e->hold_y;
+    e->hold_stiffness = load.changes ? still.hold_stiffness : e->hold_stiffness;
 }
 
 /* Virgin ground as the element feels it. Called wherever an element with LAW_HEAP is loaded for

@@ -194,6 +194,10 @@ typedef struct {
     Real mu, line_stiffness, virgin_depth; /* as its motion so far has made them */
     Real carry;                            /* [-] of Share */
 } CONTACT_PART ContactOwnLaw;
+typedef struct {
+    Real mu, carry;              /* [-] as its share has made them */
+    Real cone_depth, cone_begin; /* [m] of its merged cone */
+} CONTACT_PART ContactHeap;
 
 /* What an element carries of its load in this step, of Share. */
 typedef struct {
