@@ -37,6 +37,11 @@ MILD_HD void element_unloading_line(Element *e, int curves, Real force) {
     e->zero_depth = a - (chord ? travel : quotient);
 }
 
+/* [m/s] w_y, from `depth` and yield_depth. rate: 1/dt. */
+MILD_HD Real element_yield_speed(const Element *e, Real rate) {
+    return real_max(2 * (e->yield_depth - e->depth) * rate, 0);
+}
+
 /* element_begin without friction's spring. Returns the yield force [N], from which that follows. */
 MILD_HD Real element_begin_still(Element *e, const ElementMemory *memory, int curves, Real dt,
                                  Real rate, Real speed) {
@@ -50,7 +55,7 @@ MILD_HD Real element_begin_still(Element *e, const ElementMemory *memory, int cu
 
     /* The added mass is at the front. It has the speed that the element gave it, or rests until the
      * element arrives. */
-    e->yield_speed = real_max(2 * (e->yield_depth - e->depth) * rate, 0);
+    e->yield_speed = element_yield_speed(e, rate);
     e->front_speed = real_max(memory->front_speed, e->yield_speed);
     e->entry_speed = real_max(speed, 0);
     e->added_mass = 0;

@@ -37,7 +37,7 @@ static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
         const __grid_constant__ BatchArrays arrays, const __grid_constant__ MildBatchInput input,  \
         const __grid_constant__ MildBatchOutput output, int advance) {                             \
         __shared__ version##_Shared shared;                                                        \
-        const long robot = blockIdx.x;                                                             \
+        const int robot = (int)blockIdx.x;                                                         \
         if (!(arrays.skip && arrays.skip[robot])) {                                                \
             ContactProblem problem;                                                                \
             ContactResult result;                                                                  \
