@@ -27,7 +27,7 @@ set(batch_kernels
   "4 1 flat   all    8"
   "4 4 flat   all    8"
   "4 8 flat   all    8"
-  "2 5 flat   heap   12"
+  "2 5 flat   heap   16"
   "1 1 flat   any    8"
   "1 3 flat   any    8"
   "1 8 flat   any    8"

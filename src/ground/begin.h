@@ -32,7 +32,7 @@ MILD_HD void element_unloading_line(Element *e, int curves, Real force) {
         bed > 0 ? law_steepest(&e->law, curves, a) : law_bedless_slope(&e->law, curves, a);
     const Real steep = slope + bed;
     const int chord = force >= steep * travel;
-    const Real quotient = force / ((chord ? travel : steep) + ELEMENT_TINY); /* one division */
+    const Real quotient = real_over(force, (chord ? travel : steep) + ELEMENT_TINY); /* one */
     e->unload_stiffness = chord ? quotient : steep;
     e->zero_depth = a - (chord ? travel : quotient);
 }
@@ -107,18 +107,18 @@ MILD_HD void element_drag(Element *e, int curves, Real dt, Real gain) {
     const int drags = extra > 0 && element_virgin_way(e, dt, e->entry_speed) > 0;
 
     /* What the free motion adds to h^2 on the way to the front. */
-    const Real faster = drags ? 2 * (gain / dt * real_max(a - e->middle, 0)) : 0;
+    const Real faster = drags ? 2 * (real_over(gain, dt) * real_max(a - e->middle, 0)) : 0;
     const Real h = REAL_SQRT(e->entry_speed * e->entry_speed + faster);
 
     const Real slope = law_bedless_slope(&e->law, curves, a);
     const Real force = law_bedless_force(&e->law, curves, a) + slope / 2 * (u0 - a);
     const Real growth = law_moved(&e->law, curves, u0) - law_moved(&e->law, curves, a);
     const Real drag = extra * law_moved_share(&e->law, curves, a);
-    const Real stop =
-        real_min(BEGIN_STOP + REAL_SQRT(force / (drag * h * h + ELEMENT_TINY)), BEGIN_STOP_MOST);
+    const Real stop = real_min(
+        BEGIN_STOP + REAL_SQRT(real_over(force, drag * h * h + ELEMENT_TINY)), BEGIN_STOP_MOST);
 
     e->entry_speed = h;
-    e->stop_drag = drags ? extra * (stop - REAL(0.5)) / (h + ELEMENT_TINY) : 0;
+    e->stop_drag = drags ? real_over(extra * (stop - REAL(0.5)), h + ELEMENT_TINY) : 0;
     e->stop_growth = drags ? growth : 0;
 }
 

@@ -111,7 +111,7 @@ MILD_HD Rim rim_of(const Real *sums) {
 
 /* [-] c: what an element bears over what it would bear alone. law: its own. */
 MILD_HD Real rim_share(const Law *law, Real recovery, Real bears, Real alone) {
-    const Real level = bears / (alone + ELEMENT_TINY);
+    const Real level = real_over(bears, alone + ELEMENT_TINY);
     /* Ground that springs back is no grains. */
     const Real blend = level + (1 - level) * recovery;
     return law->flat_stiffness > 0 ? real_min(real_max(blend, SHARE_LEAN), 1) : 1;
@@ -151,7 +151,7 @@ MILD_HD Real rim_wet(const Law *law, Real width, Real u, Real level) {
 /* [-] rim_wet over u. cone_depth: [m] of a disc: the width of a heap cancels. */
 MILD_HD Real rim_wet_share(Real cone_depth, Real level) {
     const Real square = RIM_RADIUS * RIM_RADIUS * (1 - level * level);
-    return square > cone_depth * cone_depth ? cone_depth / REAL_SQRT(square) : 1;
+    return real_min(cone_depth * REAL_INVERSE_SQRT(square), 1);
 }
 
 /* [-] c of an element of a plane sole whose rim_wet is `wet`. */
