@@ -3,7 +3,7 @@
 # Kernels of a robot's contact step, one unit each: groups of lanes, at least as many as feet; elements of a lane; feet,
 # `flat` for any or `points` for those that transmit no moment; curves of the ground, `all` or the only ones, which is less
 # text and fewer registers, or `heap` for cones that merge or wear, `any` for all of these; robots of a multiprocessor. A
-# batch takes the first that fits. The rows `flat all` are the sizes that a batch can have, smallest first. On the CPU the same sizes are numbers of one step.
+# batch takes the first that fits; materials that create energy (passive = false) have `all` or `any`. The rows `flat all` are the sizes that a batch can have, smallest first. On the CPU the same sizes are numbers of one step.
 #
 # Of one element a lane only points have kernels for cones: there is little to gain otherwise. Resistive force theory has
 # those for the feet of most robots.
@@ -27,7 +27,7 @@ set(batch_kernels
   "4 1 flat   all    8"
   "4 4 flat   all    8"
   "4 8 flat   all    8"
-  "2 5 flat   heap   12"
+  "2 5 flat   heap   16"
   "1 1 flat   any    8"
   "1 3 flat   any    8"
   "1 8 flat   any    8"

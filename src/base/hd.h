@@ -56,15 +56,35 @@ typedef double Real;
 #define ON_GPU(gpu, cpu) cpu
 #endif
 
+/* REAL_FORGETS: defined by a file in which the limit of a number and NaN may be the number, also
+ * where b is NaN. A GPU has an instruction for that, and two for the other. */
+#ifdef REAL_FORGETS
+#define REAL_LIMIT(gpu, cpu) ON_GPU(gpu, cpu)
+#else
+#define REAL_LIMIT(gpu, cpu) cpu
+#endif
+
 MILD_HD Real real_max(Real a, Real b) {
-    return a > b ? a : b;
+    return REAL_LIMIT(fmaxf(a, b), a > b ? a : b);
 }
 
 MILD_HD Real real_min(Real a, Real b) {
-    return a < b ? a : b;
+    return REAL_LIMIT(fminf(a, b), a < b ? a : b);
 }
 
 /* ---- numbers that a GPU computes in its own way ---- */
+
+/* a/b, right to 2 units in the last place. b: at most 2^126, for a GPU multiplies by its inverse:
+ * two instructions in place of six. */
+MILD_HD Real real_over(Real a, Real b) {
+    return ON_GPU(__fdividef(a, b), a / b);
+}
+
+/* x, at most 1. x >= 0: a GPU, whose product with this limit is one instruction, returns 0 below
+ * it. */
+MILD_HD Real real_to_one(Real x) {
+    return ON_GPU(__saturatef(x), real_min(x, 1));
+}
 
 /* __powf: powf has hundreds of instructions. rsqrtf: one instruction, right to 2 units in the last
  * place. */
@@ -176,6 +196,19 @@ MILD_HD void pair_unpack(Real pair, Real *x, Real *y) {
 }
 
 /* ---- memory ahead of its use ---- */
+
+/* memory, from which a GPU computes addresses as it stands, in place of each anew from what it was
+ * made of: one instruction an address. real_load reads from it what a kernel does not write. */
+MILD_HD const Real *real_pinned(const Real *memory) {
+#ifdef __CUDA_ARCH__
+    asm("" : "+l"(memory));
+#endif
+    return memory;
+}
+
+MILD_HD Real real_load(const Real *memory) {
+    return ON_GPU(__ldg(memory), *memory);
+}
 
 /* Starts to copy a number from a GPU's global memory to its shared memory. It is there after
  * lanes_brought. */

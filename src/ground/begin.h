@@ -32,15 +32,19 @@ MILD_HD void element_unloading_line(Element *e, int curves, Real force) {
         bed > 0 ? law_steepest(&e->law, curves, a) : law_bedless_slope(&e->law, curves, a);
     const Real steep = slope + bed;
     const int chord = force >= steep * travel;
-    const Real quotient = force / ((chord ? travel : steep) + ELEMENT_TINY); /* one division */
+    const Real quotient = real_over(force, (chord ? travel : steep) + ELEMENT_TINY); /* one */
     e->unload_stiffness = chord ? quotient : steep;
     e->zero_depth = a - (chord ? travel : quotient);
 }
 
-/* Sets the fields that hold for a step from the material and `depth`, except explicit_impulse,
- * stop_drag, stop_growth and turn. speed: present downward speed. rate: 1/dt. */
-MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, Real dt, Real rate,
-                           Real speed) {
+/* [m/s] w_y, from `depth` and yield_depth. rate: 1/dt. */
+MILD_HD Real element_yield_speed(const Element *e, Real rate) {
+    return real_max(2 * (e->yield_depth - e->depth) * rate, 0);
+}
+
+/* element_begin without friction's spring. Returns the yield force [N], from which that follows. */
+MILD_HD Real element_begin_still(Element *e, const ElementMemory *memory, int curves, Real dt,
+                                 Real rate, Real speed) {
     /* Virgin ground begins at the greatest depth so far, which is at least where this step
      * starts. */
     e->middle = memory->middle > 0 ? memory->middle : e->depth - dt / 2 * speed;
@@ -51,7 +55,7 @@ MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, 
 
     /* The added mass is at the front. It has the speed that the element gave it, or rests until the
      * element arrives. */
-    e->yield_speed = real_max(2 * (e->yield_depth - e->depth) * rate, 0);
+    e->yield_speed = element_yield_speed(e, rate);
     e->front_speed = real_max(memory->front_speed, e->yield_speed);
     e->entry_speed = real_max(speed, 0);
     e->added_mass = 0;
@@ -61,7 +65,15 @@ MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, 
 
     e->drift_bound = dt * e->k_drift * memory->drift * real_max(e->depth, 0);
     e->damping = e->depth > 0 ? dt * e->b_drift : 0;
-    friction_hold(e, memory, dt, rate, force + law_elastic_force(&e->law, curves, e->middle));
+    return force + law_elastic_force(&e->law, curves, e->middle);
+}
+
+/* Sets the fields that hold for a step from the material and `depth`, except explicit_impulse,
+ * stop_drag, stop_growth and turn. speed: present downward speed. rate: 1/dt. */
+MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, Real dt, Real rate,
+                           Real speed) {
+    const Real force = element_begin_still(e, memory, curves, dt, rate, speed);
+    friction_hold(e, memory, dt, rate, force);
 }
 
 /* [m] How far the element will go into virgin ground, beyond the elastic travel, at the downward
@@ -95,18 +107,18 @@ MILD_HD void element_drag(Element *e, int curves, Real dt, Real gain) {
     const int drags = extra > 0 && element_virgin_way(e, dt, e->entry_speed) > 0;
 
     /* What the free motion adds to h^2 on the way to the front. */
-    const Real faster = drags ? 2 * (gain / dt * real_max(a - e->middle, 0)) : 0;
+    const Real faster = drags ? 2 * (real_over(gain, dt) * real_max(a - e->middle, 0)) : 0;
     const Real h = REAL_SQRT(e->entry_speed * e->entry_speed + faster);
 
     const Real slope = law_bedless_slope(&e->law, curves, a);
     const Real force = law_bedless_force(&e->law, curves, a) + slope / 2 * (u0 - a);
     const Real growth = law_moved(&e->law, curves, u0) - law_moved(&e->law, curves, a);
     const Real drag = extra * law_moved_share(&e->law, curves, a);
-    const Real stop =
-        real_min(BEGIN_STOP + REAL_SQRT(force / (drag * h * h + ELEMENT_TINY)), BEGIN_STOP_MOST);
+    const Real stop = real_min(
+        BEGIN_STOP + REAL_SQRT(real_over(force, drag * h * h + ELEMENT_TINY)), BEGIN_STOP_MOST);
 
     e->entry_speed = h;
-    e->stop_drag = drags ? extra * (stop - REAL(0.5)) / (h + ELEMENT_TINY) : 0;
+    e->stop_drag = drags ? real_over(extra * (stop - REAL(0.5)), h + ELEMENT_TINY) : 0;
     e->stop_growth = drags ? growth : 0;
 }
 

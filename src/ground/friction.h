@@ -30,7 +30,7 @@ MILD_HD void friction_hold(Element *e, const ElementMemory *memory, Real dt, Rea
                            Real yield_force) {
     const Real bound = e->mu * yield_force + e->drift_bound * rate;
     const Real k = bound * (1 / FRICTION_ELASTIC);
-    const Real keeps = k < memory->held_stiffness ? k / memory->held_stiffness : 1;
+    const Real keeps = k < memory->held_stiffness ? real_over(k, memory->held_stiffness) : 1;
     e->hold_stiffness = dt * dt * k;
     e->hold_x = dt * keeps * memory->held_x;
     e->hold_y = dt * keeps * memory->held_y;

@@ -74,8 +74,14 @@ typedef enum {
     LAW_PLANE = 1 << 16, /* resistive force theory in the plane of motion (plate.h) */
     LAW_SPACE = 1 << 17, /* the same in three dimensions */
     LAW_SHEAR = 1 << 18, /* shear strength that builds up with slip (shear.h) */
-    LAW_RESIST = LAW_PLANE | LAW_SPACE
+    LAW_RESIST = LAW_PLANE | LAW_SPACE,
+    LAW_CREATES = 1 << 19 /* negative added mass or drag: element_explicit may not be 0 */
 } LawMotion;
+
+/* Bool: the ground of a law may create energy (passive = false). */
+MILD_HD int law_creates(Real mass_rate, Real drag_rate) {
+    return mass_rate < 0 || drag_rate < 0;
+}
 
 typedef struct {
     Real flat_stiffness;     /* k_pen - kappa [N/m] of the cone, per recruited depth        eq 4 */
@@ -133,8 +139,10 @@ MILD_HD Law law_merged(Law law, Real begin, Real width) {
 
 /* t [-], 1 when the cone is complete. */
 MILD_HD Real law_cone_progress(const Law *law, int curves, Real depth) {
-    const Real closing = curves & LAW_HEAP ? real_max(depth - law->cone_begin, 0) : depth;
-    return real_min(closing * law->inverse_cone_depth, 1);
+    const Real below = depth - law->cone_begin;
+    /* real_to_one cuts what is below 0 where it is an instruction */
+    const Real closing = curves & LAW_HEAP ? ON_GPU(below, real_max(below, 0)) : depth;
+    return real_to_one(closing * law->inverse_cone_depth);
 }
 
 /* 1 - (1 - t)^3 [-], the recruited share of what the complete cone recruits. */

@@ -38,7 +38,7 @@ MILD_HD Real element_peak(const Element *e, int curves, Real normal, Real speed,
     const Real x0 = real_max(p - e->zero_depth, 0);
     const Real x1 = real_max(a - e->zero_depth, x0);
     const Real line_work = p < a ? e->unload_stiffness / 2 * (x1 * x1 - x0 * x0) : 0;
-    const Real energy = normal / 2 * v * v / (h - speed) - line_work;
+    const Real energy = real_over(normal / 2 * v * v, h - speed) - line_work;
     if (energy <= 0) {
         return middle;
     }
@@ -54,7 +54,7 @@ MILD_HD Real element_peak(const Element *e, int curves, Real normal, Real speed,
     if (force + root <= 0) {
         return middle; /* ground without force, as under a trailing face: only rounding slowed it */
     }
-    const Real way = 2 * energy / (force + root);
+    const Real way = real_over(2 * energy, force + root);
     const Real beyond = real_max(real_max(p, a) + way - middle, 0);
     return middle + (1 + e->recovery) / 2 * beyond;
 }
@@ -94,7 +94,7 @@ MILD_HD ElementMemory element_remember(const Element *e, const ElementMemory *me
     const Real held_y = e->hold_y - e->hold_stiffness * vy;
     const Real held = REAL_SQRT(held_x * held_x + held_y * held_y);
     const Real bound = friction_bound(e, normal);
-    const Real share = rate * (held > bound ? bound / held : 1);
+    const Real share = rate * (held > bound ? real_over(bound, held) : 1);
     after.held_x = stays ? share * held_x : 0;
     after.held_y = stays ? share * held_y : 0;
     after.held_stiffness = stays ? rate * rate * e->hold_stiffness : 0;

@@ -111,7 +111,7 @@ MILD_HD Rim rim_of(const Real *sums) {
 
 /* [-] c: what an element bears over what it would bear alone. law: its own. */
 MILD_HD Real rim_share(const Law *law, Real recovery, Real bears, Real alone) {
-    const Real level = bears / (alone + ELEMENT_TINY);
+    const Real level = real_over(bears, alone + ELEMENT_TINY);
     /* Ground that springs back is no grains. */
     const Real blend = level + (1 - level) * recovery;
     return law->flat_stiffness > 0 ? real_min(real_max(blend, SHARE_LEAN), 1) : 1;
@@ -148,14 +148,24 @@ MILD_HD Real rim_wet(const Law *law, Real width, Real u, Real level) {
     return square > most * most ? u * (most / REAL_SQRT(square)) : u;
 }
 
-/* [-] c of an element of a plane sole. */
-MILD_HD Real rim_water(const Law *law, Real width, Real recovery, Real u, Real level) {
-    const Real wet = rim_wet(law, width, u, level);
+/* [-] rim_wet over u. cone_depth: [m] of a disc: the width of a heap cancels. */
+MILD_HD Real rim_wet_share(Real cone_depth, Real level) {
+    const Real square = RIM_RADIUS * RIM_RADIUS * (1 - level * level);
+    return real_min(cone_depth * REAL_INVERSE_SQRT(square), 1);
+}
+
+/* [-] c of an element of a plane sole whose rim_wet is `wet`. */
+MILD_HD Real rim_water_at(const Law *law, Real recovery, Real u, Real level, Real wet) {
     if (!(wet < u)) {
         return level;
     }
     const Real bears = rim_force(law, wet) + law->line_stiffness * (u - wet);
     return level * rim_share(law, recovery, bears, rim_force(law, u));
+}
+
+/* [-] c of an element of a plane sole. */
+MILD_HD Real rim_water(const Law *law, Real width, Real recovery, Real u, Real level) {
+    return rim_water_at(law, recovery, u, level, rim_wet(law, width, u, level));
 }
 
 #endif

@@ -96,18 +96,22 @@ MILD_HD Real share_ahead(const Element *e, const Share *share, Real level, const
                                 : 0;
 }
 
-/* Sets lean and carry, and with them the unloading line and friction, after element_begin: the
- * line says the whole force at the yield depth. elastic: [N] force of ground without memory. level:
- * cosine between sole and ground. ahead: [N] share_ahead of a face, 0 of a sole. */
-MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, Real elastic,
-                           Real dt, Real rate, Real level, Real ahead) {
+/* What a share makes of an element's yield load. */
+typedef struct {
+    Real force;  /* [N] without that of ground without memory */
+    int changes; /* bool: it is not that of the element, or friction is another */
+} ShareLoad;
+
+/* element_share without friction's spring. */
+MILD_HD ShareLoad element_share_still(Element *e, Share *share, Real dt, Real rate, Real level,
+                                      Real ahead) {
     const Real a = e->yield_depth;
     const Real k = e->unload_stiffness;
     const Real c = share_lean(share, level);
     const Real q = real_min(1 - share->worn, c);
     const Real force = share_force(e, q);
-    const Real lost = 1 - q / c;
-    const Real grips = real_max(SHARE_YIELD * share->grip * lost / (1 + lost), SHARE_GRIP);
+    const Real lost = 1 - real_over(q, c);
+    const Real grips = real_max(real_over(SHARE_YIELD * share->grip * lost, 1 + lost), SHARE_GRIP);
     const Real held = real_min(share->mu, grips);
 
     /* The recruited mass is set in motion by the whole of mu. */
@@ -115,21 +119,29 @@ MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share
     const Real way = real_max(e->depth + dt / 2 * h - a, 0);
     const Real drag = real_max(e->law.drag_rate, 0) * law_moved_share(&e->law, LAW_HEAP, a);
     const Real strikes = drag * way * h * rate;
-    const Real moves = strikes / (strikes + force + ELEMENT_TINY);
+    const Real moves = real_over(strikes, strikes + force + ELEMENT_TINY);
     const Real mu = share->grip > 0 ? held + (share->mu - held) * moves : share->mu;
     const Real sides = share->side * e->depth * real_max(e->depth, 0) + ahead;
-    const int changes = q < 1 || mu != e->mu || sides > 0;
+    const ShareLoad load = {force, q < 1 || mu != e->mu || sides > 0};
     share->lean = c;
     share->carry = q;
     e->drift_bound += dt * sides;
-    Element still = *e;
-    still.mu = mu;
-    friction_hold(&still, memory, dt, rate, force + elastic);
-    e->zero_depth = q < 1 ? a - force / (k + ELEMENT_TINY) : e->zero_depth;
-    e->hold_x = changes ? still.hold_x : e->hold_x;
-    e->hold_y = changes ? still.hold_y : e->hold_y;
-    e->hold_stiffness = changes ? still.hold_stiffness : e->hold_stiffness;
+    e->zero_depth = q < 1 ? a - real_over(force, k + ELEMENT_TINY) : e->zero_depth;
     e->mu = mu;
+    return load;
+}
+
+/* Sets lean and carry, and with them the unloading line and friction, after element_begin: the
+ * line says the whole force at the yield depth. elastic: [N] force of ground without memory. level:
+ * cosine between sole and ground. ahead: [N] share_ahead of a face, 0 of a sole. */
+MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, Real elastic,
+                           Real dt, Real rate, Real level, Real ahead) {
+    const ShareLoad load = element_share_still(e, share, dt, rate, level, ahead);
+    Element still = *e;
+    friction_hold(&still, memory, dt, rate, load.force + elastic);
+    e->hold_x = load.changes ? still.hold_x : e->hold_x;
+    e->hold_y = load.changes ? still.hold_y : e->hold_y;
+    e->hold_stiffness = load.changes ? still.hold_stiffness : e->hold_stiffness;
 }
 
 /* Virgin ground as the element feels it. Called wherever an element with LAW_HEAP is loaded for
@@ -182,7 +194,7 @@ MILD_HD Real share_growth(const Element *e, const Share *share) {
 MILD_HD Real share_slipped(const Element *e, const Share *share, Real slid) {
     const Real q = share->carry;
     const Real whole = share->lean * share_growth(e, share);
-    return q * (whole / (whole + q * slid * share->slip_rate));
+    return q * real_over(whole, whole + q * slid * share->slip_rate);
 }
 
 /* [-] The share after a step. slid: [m] horizontal path; fresh: [m] penetration. */
@@ -190,7 +202,7 @@ MILD_HD Real share_after(const Element *e, const Share *share, Real slid, Real f
     const Real c = share->lean;
     const Real grows = share_growth(e, share);
     const Real slipped = share_slipped(e, share, slid);
-    const Real spent = real_min(fresh * share->regain_rate / grows, SHARE_FORGET);
+    const Real spent = real_min(real_over(fresh * share->regain_rate, grows), SHARE_FORGET);
     const Real left = share_left(spent);
     const Real grown = slipped + (c - slipped) * (1 - left);
     return real_max(share_grows(e, share) ? grown : slipped, SHARE_LEAST);
@@ -240,7 +252,7 @@ MILD_HD Real element_wear(const Element *e, const Share *share, ElementMemory *a
     const Real q = share_after(e, share, slid, fresh);
     const Real lead = real_max(q - share->carry, 0) * ELEMENT_ELASTIC;
     /* The added mass grows with the lead; it keeps its momentum. P is concave. */
-    after->front_speed *= after->depth_max / (after->depth_max + lead + ELEMENT_TINY);
+    after->front_speed *= real_over(after->depth_max, after->depth_max + lead + ELEMENT_TINY);
     after->depth_max = stays ? after->depth_max + lead : 0;
     return stays ? 1 - q : 0;
 }

@@ -1,5 +1,7 @@
 /* What the elements of a batch remember beside mild/ground.h: how much of it, and how exactly. */
 #include "batch_kit.h"
+#include "ground/batch/batch.h"
+#include "ground/law.h"
 #include "ground/state.h"
 
 static MildSole *left, *right;
@@ -129,6 +131,25 @@ TEST(creep_is_counted) {
     mild_batch_destroy(batch);
     kit_close(&kit);
     kit_close(&found);
+}
+
+/* A GPU's kernels for cones leave out the impulse of materials that create energy: a batch knows
+ * when it has one. */
+TEST(a_batch_knows_what_creates_energy) {
+    MildError e = {0};
+    MildBatch *batch = open_batch(1, &e);
+    for (int which = 0; which < 6; which++) {
+        MildMaterial sand[2] = {mild_material_default(), mild_material_default()};
+        sand[1].model = which % 2 ? MILD_MODEL_MILD_MERGED : MILD_MODEL_MILD;
+        sand[1].c_g = which / 2 == 1 ? -1.0 : sand[1].c_g;
+        sand[1].c_d = which / 2 == 2 ? -1.0 : sand[1].c_d;
+        for (int passive = 0; passive < 2; passive++) {
+            sand[1].passive = passive;
+            assert_int_equal(mild_batch_set_materials(batch, sand, 2, &e), MILD_OK);
+            assert_int_equal((batch->curves & LAW_CREATES) != 0, !passive && which / 2 > 0);
+        }
+    }
+    mild_batch_destroy(batch);
 }
 
 TEST_MAIN(open_soles, close_soles)

@@ -131,14 +131,14 @@ static MildStatus store_elements(MildBatch *batch, const MildSole *const *soles,
         return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
     }
     for (size_t f = 0; f < feet; f++) {
-        float *own = elements + f * stride;
+        float *own = elements + 4 * f * stride;
         for (size_t i = 0; i < stride; i++) {
             const int in = (int)i < shape->elements[f];
             const SoleHeap heap = in ? mild_inside_heap(soles[f], (int)i) : (SoleHeap){0.0, 1.0};
             own[i] = in ? (float)mild_sole_x(soles[f])[i] : 0.0f;
-            own[feet * stride + i] = in ? (float)mild_sole_y(soles[f])[i] : 0.0f;
-            own[2 * feet * stride + i] = (float)heap.begin;
-            own[3 * feet * stride + i] = (float)heap.width;
+            own[stride + i] = in ? (float)mild_sole_y(soles[f])[i] : 0.0f;
+            own[2 * stride + i] = (float)heap.begin;
+            own[3 * stride + i] = (float)heap.width;
         }
     }
     MildStatus status =

@@ -27,7 +27,7 @@ typedef struct {
 
 /* Where a batch keeps what; on its device. */
 typedef struct {
-    float *elements;            /* [4][feet][stride] x and y [m], begin and width of SoleHeap [-] */
+    float *elements;            /* [feet][4][stride] x and y [m], begin and width of SoleHeap [-] */
     MaterialNumbers *materials; /* [materials + 1][feet] */
     float *memory;              /* [robots] of contact.h */
     float *worn;                /* [robots][groups][stride] [-] wear, behind `memory`; NULL until

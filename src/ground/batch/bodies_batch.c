@@ -55,10 +55,10 @@ static void set_sole(BodiesSole *to, const MildSole *sole) {
 static void set_foot(BodiesSole *to, const MildBatch *batch, const MildSole *sole, int f) {
     const BatchShape *shape = &batch->shape;
     set_sole(to, sole);
-    to->x = batch->arrays.elements + f * shape->stride;
-    to->y = batch->arrays.elements + (shape->feet + f) * shape->stride;
-    to->begin = batch->arrays.elements + (2 * shape->feet + f) * shape->stride;
-    to->width = batch->arrays.elements + (3 * shape->feet + f) * shape->stride;
+    to->x = batch->arrays.elements + 4 * f * shape->stride;
+    to->y = to->x + shape->stride;
+    to->begin = to->x + 2 * shape->stride;
+    to->width = to->x + 3 * shape->stride;
 }
 
 /* values: [PLACES elements] to fill. places: where they will be on the device. */
@@ -262,7 +262,7 @@ void batch_bodies_reset(const BatchBodies *bodies, size_t robot) {
 }
 
 int batch_bodies_curves(const MildBatch *batch) {
-    const int bits = batch->curves;
+    const int bits = batch->curves & ~LAW_CREATES; /* the kernels for cones know it, too */
     return !(bits & ~LAW_CONE) ? LAW_CONE : bits & LAW_HEAP ? LAW_ANY : LAW_ALL;
 }
 

@@ -23,7 +23,7 @@
 
 /* Bool: the next Newton step is one that begins. */
 MILD_HD int contact_begins(int steps, int begins) {
-    return steps % CONTACT_AGAIN < begins;
+    return (int)((unsigned)steps % CONTACT_AGAIN) < begins;
 }
 
 /* What a step needs of a material under one element of a foot. */
@@ -46,12 +46,18 @@ typedef struct {
     int curves;        /* LawCurve and LawMotion bits of the law */
 } ContactMaterial;
 
+/* Where an element is in its sole. */
+enum {
+    CONTACT_X,     /* [m] centre in the foot frame; beyond the foot's elements 0 */
+    CONTACT_Y,     /* [m] */
+    CONTACT_BEGIN, /* [-] of SoleHeap; read on ground with LAW_HEAP */
+    CONTACT_WIDTH, /* [-] beyond the foot's elements 1 */
+    CONTACT_PLACES
+};
+
 /* One foot's sole. */
 typedef struct {
-    const Real *x;     /* [stride] [m] element centres in the foot frame; beyond `elements` 0 */
-    const Real *y;     /* [stride] [m] */
-    const Real *begin; /* [stride] [-] of SoleHeap; read on ground with LAW_HEAP */
-    const Real *width; /* [stride] [-] beyond `elements` 1 */
+    const Real *place; /* [CONTACT_PLACES][stride] of its elements */
     Real z;            /* [m] sole plane in the foot frame */
     Real area;         /* [m^2] of an element */
     int elements;
@@ -178,10 +184,12 @@ typedef struct {
     Real depth, middle, yield_depth, zero_depth;
 } CONTACT_PART ContactPath;
 typedef struct {
-    Real unload_stiffness, added_mass, front_speed, yield_speed;
+    Real unload_stiffness, added_mass, front_speed;
+    Real last; /* yield_speed; where elements have a share alone, its `carry` [-] */
 } CONTACT_PART ContactFront;
 typedef struct {
-    Real entry_speed, stop_drag, stop_growth, explicit_impulse;
+    Real entry_speed, stop_drag, stop_growth;
+    Real last; /* explicit_impulse; where elements have a share alone, their mu [-] */
 } CONTACT_PART ContactStop;
 typedef struct {
     Real hold_x, hold_y, hold_stiffness, drift_bound;

@@ -15,7 +15,7 @@ void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBat
     const HostRobot step = host_robot(shape);
     ContactSetup setup = {.feet = 0};
     batch_setup(shape, arrays, &setup);
-    for (long robot = 0; robot < shape->robots; robot++) {
+    for (int robot = 0; robot < shape->robots; robot++) {
         ContactProblem problem;
         ContactResult result;
         if (arrays->skip && arrays->skip[robot]) {

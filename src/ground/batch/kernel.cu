@@ -3,6 +3,7 @@
  * KERNEL_POINTS, KERNEL_CURVES and KERNEL_HEAP, what they are for (contact.inc); KERNEL_ROBOTS of
  * a multiprocessor. */
 #define MILD_REAL_FLOAT
+#define REAL_FORGETS /* what is no number shows in the forces */
 
 extern "C" {
 #include "ground/batch/batch.h"
@@ -30,14 +31,16 @@ extern "C" {
 static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
 static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
 
-/* A block has one robot: one that takes long keeps no other's place. */
-#define CONTACT_TURN(version)                                                                      \
-    static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_##version(              \
+/* A block has one robot: one that takes long keeps no other's place. With a map and a share an
+ * element has more numbers than there is shared memory for on sixteen robots. */
+#define MAP_ROBOTS (KERNEL_HEAP && KERNEL_ROBOTS > 12 ? 12 : KERNEL_ROBOTS)
+#define CONTACT_TURN(version, robots)                                                              \
+    static __global__ void __launch_bounds__(LANES, robots) contact_##version(                     \
         const __grid_constant__ ContactSetup setup, const __grid_constant__ BatchShape shape,      \
         const __grid_constant__ BatchArrays arrays, const __grid_constant__ MildBatchInput input,  \
         const __grid_constant__ MildBatchOutput output, int advance) {                             \
         __shared__ version##_Shared shared;                                                        \
-        const long robot = blockIdx.x;                                                             \
+        const int robot = (int)blockIdx.x;                                                         \
         if (!(arrays.skip && arrays.skip[robot])) {                                                \
             ContactProblem problem;                                                                \
             ContactResult result;                                                                  \
@@ -50,8 +53,8 @@ static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
             kernel_wait();                                                                         \
         }                                                                                          \
     }
-CONTACT_TURN(level)
-CONTACT_TURN(map)
+CONTACT_TURN(level, KERNEL_ROBOTS)
+CONTACT_TURN(map, MAP_ROBOTS)
 
 static MildStatus step(const MildBatch *batch, const MildBatchInput *input,
                        const MildBatchOutput *output, int advance, MildStream stream,

@@ -43,6 +43,7 @@ static MildStatus material_numbers(const MildMaterial *material, double pitch, d
     numbers->growth = (float)inside.share.growth;
     numbers->side = (float)inside.share.side;
     numbers->curves = inside.curves;
+    numbers->curves |= law_creates(law.mass_rate, law.drag_rate) ? (int)LAW_CREATES : 0;
     return MILD_OK;
 }
 

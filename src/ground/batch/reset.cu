@@ -11,7 +11,7 @@ extern "C" {
 
 static __global__ void forget(BatchShape shape, BatchArrays arrays, BatchBodies bodies,
                               const uint8_t *which) {
-    const long robot = blockIdx.x;
+    const int robot = (int)blockIdx.x;
     if (which && !which[robot]) {
         return;
     }
@@ -25,7 +25,7 @@ static __global__ void forget(BatchShape shape, BatchArrays arrays, BatchBodies 
         memory.worn[i] = 0;
     }
     for (size_t i = threadIdx.x; i < bodies.numbers; i += blockDim.x) {
-        bodies.memory[robot * bodies.numbers + i] = 0;
+        bodies.memory[(size_t)robot * bodies.numbers + i] = 0;
     }
 }
 
