@@ -6,11 +6,12 @@
 
 #include "env/task/gait.h"
 
-#define RATIO_MAX 0.25  /* [-] */
+#define RATIO_MAX 0.2   /* [-] */
 #define ERROR_MAX 0.5   /* [-] of the speed of one cycle */
 #define SPEED_MIN 0.1   /* [m/s] of a command whose ratio can be learned */
-#define CHANGE_MAX 0.02 /* [m/s] of the command in a policy step that begins anew */
+#define CHANGE_MAX 0.01 /* [m/s] of the command that begins anew */
 #define SETTLING 2      /* cycles after that */
+#define DOUBT 4         /* cycles after which the mean weighs as much as what was before */
 #define TURNED_MAX 0.2  /* [rad] of a cycle that r can learn from */
 
 /* ---- the legs ---- */
@@ -64,14 +65,8 @@ static MildStatus take_leg(const mjModel *m, const Robot *robot, int foot, Speed
 
 MildStatus speed_hold_legs(const Robot *robot, double gain, SpeedHoldLegs *legs, MildError *error) {
     memset(legs, 0, sizeof *legs);
-    if (gain == 0) {
+    if (gain == 0 || robot_points(robot)) {
         return MILD_OK;
-    }
-    if (robot_points(robot)) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "robot %s: its round feet roll, so their steps are not its way; the speed "
-                         "is held by feet with soles: --task.speed_hold=0",
-                         robot_name(robot));
     }
     RobotSim *sim = robot_sim_create(robot, 0.005, error);
     if (!sim) {
@@ -257,13 +252,15 @@ static void learn(SpeedHold *hold, double gain) {
     const double *wanted = hold->wanted, turned = hold->yaw[SPEED_HOLD_LATE] - hold->begin_yaw;
     const double wanted_speed = hypot(wanted[0], wanted[1]);
     hold->shift = hold->cycles > 0 ? best_shift(hold->along) : SPEED_HOLD_EARLY - 1;
+    const double n = ++hold->cycles, share = fmax(gain, 1 / n),
+                 weight = n * n / (n * n + DOUBT * DOUBT);
     for (int i = 0; i < SPEED_HOLD_SHIFTS; i++) {
         double v[2] = {hold->way[i][0], hold->way[i][1]};
         turn(-0.75 * turned, v);
         v[0] /= (hold->duration * TASK_PERIOD);
         v[1] /= (hold->duration * TASK_PERIOD);
         const double along = (v[0] * wanted[0] + v[1] * wanted[1]) / fmax(wanted_speed, 1e-6);
-        hold->along[i] += fmax(gain, 1.0 / (1 + hold->cycles)) * (along - hold->along[i]);
+        hold->along[i] += share * (along - hold->along[i]);
         if (i == hold->shift) {
             hold->speed[0] = v[0];
             hold->speed[1] = v[1];
@@ -273,14 +270,15 @@ static void learn(SpeedHold *hold, double gain) {
     for (int i = 0; i < 2; i++) {
         hold->speed[i] *= top;
         if (fabs(wanted[i]) >= SPEED_MIN) {
-            const double known = 1 / (1 + hold->ratio[i]);
-            const double error = hold->speed[i] / wanted[i] * known - known;
-            const double factor = known + fmax(gain, 1.0 / (2 + hold->cycles)) *
-                                              fmax(fmin(error, ERROR_MAX), -ERROR_MAX);
-            hold->ratio[i] = fmax(fmin(1 / factor - 1, RATIO_MAX), -RATIO_MAX);
+            const double command = wanted[i] * (1 + hold->ratio[i]);
+            const double factor =
+                fmax(fmin(hold->speed[i] / command, 1 + ERROR_MAX), 1 - ERROR_MAX);
+            hold->mean[i] += share * (factor - hold->mean[i]);
+            const double known = 1 + hold->before[i],
+                         now = known + weight * (hold->mean[i] - known);
+            hold->ratio[i] = fmax(fmin(1 / now - 1, RATIO_MAX), -RATIO_MAX);
         }
     }
-    hold->cycles++;
 }
 
 static void pass_cycle(SpeedHold *hold, double gain) {
@@ -295,6 +293,16 @@ static void pass_cycle(SpeedHold *hold, double gain) {
     memset(hold->way, 0, sizeof hold->way);
 }
 
+/* What was learned is where it goes on from. */
+static void begin_anew(SpeedHold *hold, const double command[2]) {
+    hold->settling = SETTLING;
+    hold->cycles = 0;
+    for (int i = 0; i < 2; i++) {
+        hold->wanted[i] = command[i];
+        hold->before[i] = 1 / (1 + hold->ratio[i]) - 1;
+    }
+}
+
 void speed_hold(SpeedHold *hold, const SpeedHoldLegs *legs, const float *frame, double command[3]) {
     const unsigned stance = legs->gain > 0 ? stance_of(legs, frame + 9 + 3 * legs->joints) : 0;
     if (!stance) {
@@ -303,11 +311,8 @@ void speed_hold(SpeedHold *hold, const SpeedHoldLegs *legs, const float *frame, 
     }
     if (fabs(command[0] - hold->wanted[0]) > CHANGE_MAX ||
         fabs(command[1] - hold->wanted[1]) > CHANGE_MAX) {
-        hold->settling = SETTLING;
-        hold->cycles = 0;
+        begin_anew(hold, command);
     }
-    hold->wanted[0] = command[0];
-    hold->wanted[1] = command[1];
     take_frame(hold, legs, frame, stance);
     hold->duration++;
     if (hold->frames == SPEED_HOLD_FRAMES &&

@@ -11,10 +11,12 @@
  * the base goes slower against it than against one on the ground: v(c) is largest where the feet
  * really change. c is where the mean of v over past cycles, along the command, is largest.
  *
- * The command that the policy sees is the wanted one times 1 + r, with 1/(1 + r) the mean of the
- * factors v over command of the cycles, the first one 1: each cycle
+ * The command that the policy sees is the wanted one times 1 + r. Steps telescope, so the error of
+ * the mean over n cycles falls as 1/n, and its weight beside what was known before as n^2:
  *
- *     1/(1 + r) += max(gain, 1/(2 + cycles)) (v/command - 1/(1 + r)),    |r| <= 0.25.
+ *     m += max(gain, 1/n) (v/command - m),    1/(1 + r) = known + n^2/(n^2 + 16) (m - known)
+ *
+ * with known = 1 at the start, and what r was where the wanted command changed; |r| <= 0.2.
  *
  * docs/controllers.md has what it measures and what it is worth. */
 #ifndef CONTROL_SPEED_HOLD_H
@@ -49,12 +51,14 @@ typedef struct {
 
 /* Of one robot; zeros before the first frame. */
 typedef struct {
-    double ratio[2]; /* [-] r, forward and to the left */
-    double speed[2]; /* [m/s] v of the last cycle */
-    int shift;       /* of this speed: c + SPEED_HOLD_EARLY - 1 */
-    int cycles;      /* that r has learned from since it settled */
-    int settling;    /* cycles that a start or another command makes useless */
-    double wanted[2];
+    double ratio[2];                 /* [-] r, forward and to the left */
+    double speed[2];                 /* [m/s] v of the last cycle */
+    int shift;                       /* of this speed: c + SPEED_HOLD_EARLY - 1 */
+    int cycles;                      /* that r has learned from since it settled */
+    double before[2];                /* [-] 1/(1 + r) - 1 then */
+    double mean[2];                  /* [-] of the cycles' factors since then */
+    int settling;                    /* cycles that a start or another command makes useless */
+    double wanted[2];                /* [m/s] the command since it settled */
     double along[SPEED_HOLD_SHIFTS]; /* [m/s] mean of v(c) along the command */
     /* the last frames, newest first */
     int frames;
@@ -67,8 +71,8 @@ typedef struct {
     double way[SPEED_HOLD_SHIFTS][2]; /* [m] in the heading frame of its begin */
 } SpeedHold;
 
-/* gain: of a task. Fails for round feet, which roll, and for a leg of more than
- * SPEED_HOLD_LINKS_MAX bodies. */
+/* gain: of a task. Off for round feet, which roll, so that their steps are not their way. Fails for
+ * a leg of more than SPEED_HOLD_LINKS_MAX bodies. */
 MildStatus speed_hold_legs(const Robot *robot, double gain, SpeedHoldLegs *legs, MildError *error);
 /* [m] The feet's sole centres in the base's frame at joint angles q [joints]. */
 void speed_hold_feet(const SpeedHoldLegs *legs, const double *q, double (*foot)[3]);
