@@ -327,7 +327,8 @@ MildStatus play_run(Play *play, MildError *error) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     }
     if (status == MILD_OK) {
-        status = speed_hold_legs(play->robot, walk.task.speed_hold, &walk.legs, error);
+        status = speed_hold_legs(play->robot, play->controller->torque ? 0 : walk.task.speed_hold,
+                                 &walk.legs, error);
     }
     if (status == MILD_OK) {
         task_env_init(walk.env, &walk.task, play->robot, play->seed, 0);

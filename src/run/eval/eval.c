@@ -392,8 +392,10 @@ MildStatus eval_run(const EvalRun *run, EvalRow *rows, MildError *error) {
     t.task.episode = run->eval.seconds;
     status = open_envs(&t, error);
     status = status == MILD_OK ? open_arrays(&t, error) : status;
-    status =
-        status == MILD_OK ? speed_hold_legs(run->robot, t.task.speed_hold, &t.legs, error) : status;
+    status = status == MILD_OK
+                 ? speed_hold_legs(run->robot, run->controller->torque ? 0 : t.task.speed_hold,
+                                   &t.legs, error)
+                 : status;
     if (status == MILD_OK && run->eval.track) {
         status = track_make(&t.track, t.trials, steps, error);
     }
