@@ -6,13 +6,13 @@
 
 #include "env/task/gait.h"
 
-#define RATIO_MAX 0.2   /* [-] */
-#define ERROR_MAX 0.5   /* [-] of the speed of one cycle */
-#define SPEED_MIN 0.1   /* [m/s] of a command whose ratio can be learned */
-#define CHANGE_MAX 0.01 /* [m/s] of the command that begins anew */
-#define SETTLING 2      /* cycles after that */
-#define DOUBT 4         /* cycles after which the mean weighs as much as what was before */
-#define TURNED_MAX 0.2  /* [rad] of a cycle that r can learn from */
+#define RATIO_MAX 0.2    /* [-] */
+#define ERROR_MAX 0.5    /* [-] of the speed of one cycle */
+#define SPEED_MIN 0.1    /* [m/s] of a command whose ratio can be learned */
+#define CHANGE_MAX 0.01  /* [m/s] of the command that begins anew */
+#define TURNING_MAX 0.25 /* [rad/s] of a command in a cycle that r can learn from */
+#define SETTLING 2       /* cycles after that */
+#define DOUBT 4          /* cycles after which the mean weighs as much as what was before */
 
 /* ---- the legs ---- */
 
@@ -166,11 +166,10 @@ static unsigned stance_of(const SpeedHoldLegs *legs, const float *clock) {
 static void take_frame(SpeedHold *hold, const SpeedHoldLegs *legs, const float *frame,
                        unsigned stance) {
     double q[ROBOT_JOINTS_MAX], foot[ROBOT_FEET_MAX][3];
-    const float *omega = frame, *gravity = frame + 6, *angle = frame + 9;
+    const float *gravity = frame + 6, *angle = frame + 9;
     const int older = SPEED_HOLD_FRAMES - 1;
     memmove(hold->foot + 1, hold->foot, (size_t)older * sizeof *hold->foot);
     memmove(hold->stance + 1, hold->stance, (size_t)older * sizeof *hold->stance);
-    memmove(hold->yaw + 1, hold->yaw, (size_t)older * sizeof *hold->yaw);
     for (int i = 0; i < legs->joints; i++) {
         q[i] = legs->pose[i] + (double)angle[i];
     }
@@ -178,9 +177,6 @@ static void take_frame(SpeedHold *hold, const SpeedHoldLegs *legs, const float *
     for (int f = 0; f < legs->feet; f++) {
         to_heading(gravity, foot[f], hold->foot[0][f]);
     }
-    const double turning =
-        -(double)(omega[0] * gravity[0] + omega[1] * gravity[1] + omega[2] * gravity[2]);
-    hold->yaw[0] = hold->yaw[1] + TASK_PERIOD * turning;
     hold->stance[0] = stance;
     hold->frames += hold->frames < SPEED_HOLD_FRAMES;
 }
@@ -202,12 +198,6 @@ static void mean_place(const SpeedHold *hold, int feet, unsigned which, int age,
     place[1] /= count > 0 ? count : 1;
 }
 
-static void turn(double angle, double v[2]) {
-    const double c = cos(angle), s = sin(angle), x = v[0];
-    v[0] = c * x - s * v[1];
-    v[1] = s * x + c * v[1];
-}
-
 /* The stance passed to other feet in the frame of age SPEED_HOLD_LATE. */
 static void take_step(SpeedHold *hold, int feet) {
     const unsigned now = hold->stance[SPEED_HOLD_LATE], before = hold->stance[SPEED_HOLD_LATE + 1];
@@ -216,11 +206,8 @@ static void take_step(SpeedHold *hold, int feet) {
         double from[2], to[2];
         mean_place(hold, feet, before, age, from);
         mean_place(hold, feet, now, age, to);
-        to[0] -= from[0];
-        to[1] -= from[1];
-        turn(hold->yaw[age] - hold->begin_yaw, to);
-        hold->way[i][0] += to[0];
-        hold->way[i][1] += to[1];
+        hold->way[i][0] += to[0] - from[0];
+        hold->way[i][1] += to[1] - from[1];
     }
 }
 
@@ -249,16 +236,13 @@ static double top_over_shift(const double *along, int shift) {
 }
 
 static void learn(SpeedHold *hold, double gain) {
-    const double *wanted = hold->wanted, turned = hold->yaw[SPEED_HOLD_LATE] - hold->begin_yaw;
+    const double *wanted = hold->wanted, time = hold->duration * TASK_PERIOD;
     const double wanted_speed = hypot(wanted[0], wanted[1]);
     hold->shift = hold->cycles > 0 ? best_shift(hold->along) : SPEED_HOLD_EARLY - 1;
     const double n = ++hold->cycles, share = fmax(gain, 1 / n),
                  weight = n * n / (n * n + DOUBT * DOUBT);
     for (int i = 0; i < SPEED_HOLD_SHIFTS; i++) {
-        double v[2] = {hold->way[i][0], hold->way[i][1]};
-        turn(-0.75 * turned, v);
-        v[0] /= (hold->duration * TASK_PERIOD);
-        v[1] /= (hold->duration * TASK_PERIOD);
+        const double v[2] = {hold->way[i][0] / time, hold->way[i][1] / time};
         const double along = (v[0] * wanted[0] + v[1] * wanted[1]) / fmax(wanted_speed, 1e-6);
         hold->along[i] += share * (along - hold->along[i]);
         if (i == hold->shift) {
@@ -282,14 +266,12 @@ static void learn(SpeedHold *hold, double gain) {
 }
 
 static void pass_cycle(SpeedHold *hold, double gain) {
-    const double turned = hold->yaw[SPEED_HOLD_LATE] - hold->begin_yaw;
-    if (hold->begun && hold->settling == 0 && fabs(turned) < TURNED_MAX) {
+    if (hold->begun && hold->settling == 0 && !hold->turning) {
         learn(hold, gain);
     }
     hold->settling -= hold->settling > 0;
     hold->begun = 1;
-    hold->duration = 0;
-    hold->begin_yaw = hold->yaw[SPEED_HOLD_LATE];
+    hold->turning = hold->duration = 0;
     memset(hold->way, 0, sizeof hold->way);
 }
 
@@ -315,6 +297,7 @@ void speed_hold(SpeedHold *hold, const SpeedHoldLegs *legs, const float *frame, 
     }
     take_frame(hold, legs, frame, stance);
     hold->duration++;
+    hold->turning |= fabs(command[2]) > TURNING_MAX;
     if (hold->frames == SPEED_HOLD_FRAMES &&
         hold->stance[SPEED_HOLD_LATE] != hold->stance[SPEED_HOLD_LATE + 1]) {
         take_step(hold, legs->feet);

@@ -3,7 +3,7 @@
  * the stance passes from some feet to others, the base has come as far as these are apart. Over a
  * gait cycle
  *
- *     v(c) = sum over its passings of R(yaw) (p' - p) / its duration
+ *     v(c) = sum over its passings of p' - p / its duration
  *
  * with p and p' the means of the old and the new stance feet's sole centres in the base's heading
  * frame, from three frames' joint angles around c frames after the clock's passing. The noise of
@@ -64,11 +64,9 @@ typedef struct {
     int frames;
     double foot[SPEED_HOLD_FRAMES][ROBOT_FEET_MAX][2]; /* [m] in the heading frame */
     unsigned stance[SPEED_HOLD_FRAMES];                /* bits of the feet */
-    double yaw[SPEED_HOLD_FRAMES];                     /* [rad] */
     /* the cycle since foot 0's last start of a stance */
-    int begun, duration; /* bool; frames */
-    double begin_yaw;
-    double way[SPEED_HOLD_SHIFTS][2]; /* [m] in the heading frame of its begin */
+    int begun, duration;              /* bool; frames */
+    double way[SPEED_HOLD_SHIFTS][2]; /* [m] */
 } SpeedHold;
 
 /* gain: of a task. Off for round feet, which roll, so that their steps are not their way. Fails for

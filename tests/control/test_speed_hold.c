@@ -43,6 +43,23 @@ static void feet_are_where_mujoco_has_them(void **state) {
     }
 }
 
+/* A leg of one hinge, whose anchor and zero are its own, on a hip that is turned by 90 degrees. */
+static void hinges_have_anchors_and_zeros(void **state) {
+    SpeedHoldLegs legs = {.joints = 1, .feet = 1, .links = {1}, .sole_center = {{0, 0, -1}}};
+    const double q[1] = {0.7};
+    double foot[1][3];
+    (void)state;
+    legs.link[0][0] = (SpeedHoldLink){.axis = {0, 1, 0},
+                                      .anchor = {0, 0, 0.5},
+                                      .zero = 0.2,
+                                      .place = {0.1, 0.2, 0.3},
+                                      .turn = {0, -1, 0, 1, 0, 0, 0, 0, 1}};
+    speed_hold_feet(&legs, q, foot);
+    expect_near("x", foot[0][0], 0.1, 1e-15);
+    expect_near("y", foot[0][1], 0.2 - 1.5 * sin(0.5), 1e-15);
+    expect_near("z", foot[0][2], 0.3 + 0.5 - 1.5 * cos(0.5), 1e-15);
+}
+
 static void round_feet_are_left_alone(void **state) {
     MildError error = {0};
     SpeedHoldLegs legs;
@@ -56,6 +73,7 @@ static void round_feet_are_left_alone(void **state) {
 /* ---- a walker of two straight legs ---- */
 
 #define LENGTH 0.9 /* [m] of a leg */
+#define WIDTH 0.1  /* [m] of a foothold from the middle */
 enum { JOINTS = 4, FRAME = 11 + 3 * JOINTS };
 #define HALF 40 /* policy steps of a stance */
 
@@ -67,6 +85,7 @@ typedef struct {
     double turning; /* [rad/s] */
     double pitch;   /* [rad] */
     int late;       /* steps by which a foot comes down and another lifts off after the clock */
+    int both;       /* steps before and after that in which both feet stand */
     double noise;   /* [-] share of the sensors' noise in training */
     int free;       /* bool: nothing corrects its command */
     double at[2];   /* [m] world */
@@ -94,6 +113,7 @@ static SpeedHoldLegs straight_legs(double gain) {
 static Walker walker_at(double wanted, double factor) {
     return (Walker){.legs = straight_legs(0.1),
                     .factor = factor,
+                    .both = 4,
                     .wanted = {wanted},
                     .command = {wanted},
                     .random = random_at(7, 0, 0)};
@@ -103,28 +123,30 @@ static double some_noise(Walker *w, double bound) {
     return w->noise * bound * (2 * random_unit(&w->random) - 1);
 }
 
-/* Where the body is half a stance later: there the foot is put. */
-static void next_place(const Walker *w, double place[2]) {
-    const double time = 0.5 * HALF * TASK_PERIOD, ahead = w->yaw + 0.5 * w->turning * time;
-    for (int i = 0; i < 2; i++) {
-        const double c = i == 0 ? cos(ahead) : sin(ahead), s = i == 0 ? -sin(ahead) : cos(ahead);
-        place[i] = w->at[i] + w->factor * time * (c * w->command[0] + s * w->command[1]);
-    }
+/* Beside where the body is half a stance later: there the foot is put. */
+static void next_place(const Walker *w, int foot, double place[2]) {
+    const double time = 0.5 * HALF * TASK_PERIOD, left = foot == 0 ? WIDTH : -WIDTH;
+    const double mean = w->yaw + 0.5 * w->turning * time, then = w->yaw + w->turning * time;
+    const double *v = w->command;
+    place[0] =
+        w->at[0] + w->factor * time * (cos(mean) * v[0] - sin(mean) * v[1]) - sin(then) * left;
+    place[1] =
+        w->at[1] + w->factor * time * (sin(mean) * v[0] + cos(mean) * v[1]) + cos(then) * left;
 }
 
-/* A foot stands from its start, `late` after the clock's, to four steps after the other's start;
- * three before the end of its swing it is down again. */
+/* A foot stands from `both` steps before its start, which is `late` after the clock's, to as many
+ * after the other's. */
 static void move_feet(Walker *w) {
     for (int f = 0; f < 2; f++) {
         const int since = (w->step - w->late + (f == 0 ? 0 : HALF) + 8 * HALF) % (2 * HALF);
-        const int lifted = since - (HALF + 4), swing = HALF - 8;
+        const int lifted = since - (HALF + w->both), swing = HALF - 2 * w->both;
         if (lifted == 0) {
             w->from[f][0] = w->foot[f][0];
             w->from[f][1] = w->foot[f][1];
         }
         if (lifted > 0 && lifted <= swing) {
             double to[2];
-            next_place(w, to);
+            next_place(w, f, to);
             for (int i = 0; i < 2; i++) {
                 w->foot[f][i] = w->from[f][i] + (to[i] - w->from[f][i]) * lifted / swing;
             }
@@ -195,21 +217,35 @@ static void speed_is_that_of_the_feet(void **state) {
             w.free = 1;
             w.late = late;
             w.pitch = 0.1 * late;
-            walk(&w, 2 * HALF * 8);
-            expect_near("forward", w.hold.speed[0], w.wanted[0], 2e-3 * 0.4);
-            expect_near("left", w.hold.speed[1], 0, 1e-6);
+            walk(&w, 2 * HALF * 6);
+            for (int cycle = 0; cycle < 20; cycle++) {
+                walk(&w, 2 * HALF);
+                expect_near("forward", w.hold.speed[0], w.wanted[0], 2e-3 * 0.4);
+                expect_near("left", w.hold.speed[1], 0, 1e-6);
+            }
         }
     }
+}
+
+/* The feet change at once, so v(c) has a top and no plateau. */
+static void the_top_is_that_of_a_parabola(void **state) {
+    Walker w = walker_at(0.8, 1);
+    (void)state;
+    w.free = 1;
+    w.both = 0;
+    w.late = 2;
+    walk(&w, 2 * HALF * 12);
+    expect_near("forward", w.hold.speed[0], 0.8, 0.005 * 0.8);
 }
 
 static void a_slow_walk_comes_to_its_speed(void **state) {
     static const double factors[] = {0.85, 1, 1.15};
     (void)state;
-    for (int i = 0; i < 3; i++) {
-        Walker w = walker_at(0.5, factors[i]);
+    for (int i = 0; i < 6; i++) {
+        Walker w = walker_at(i % 2 ? -0.5 : 0.5, factors[i / 2]);
         walk(&w, 2 * HALF * 60);
         expect_near("speed", speed_over(&w, 4), 0.5, 0.005 * 0.5);
-        expect_near("ratio", w.hold.ratio[0], 1 / factors[i] - 1, 0.005);
+        expect_near("ratio", w.hold.ratio[0], 1 / factors[i / 2] - 1, 0.005);
     }
 }
 
@@ -238,13 +274,16 @@ static void the_ratio_is_bounded(void **state) {
     expect_near("command", w.command[0], 0.36, 1e-12);
 }
 
-static void a_slow_turn_does_no_harm(void **state) {
-    Walker w = walker_at(0.4, 1);
+static void turning_changes_nothing(void **state) {
     (void)state;
-    w.turning = 0.2; /* 0.16 rad a cycle */
-    walk(&w, 2 * HALF * 10);
-    expect_near("forward", w.hold.speed[0], 0.4, 0.01 * 0.4);
-    expect_near("left", w.hold.speed[1], 0, 0.015 * 0.4);
+    for (int i = -1; i <= 1; i++) {
+        Walker w = walker_at(0.4, 1);
+        w.turning = i;
+        w.free = 1;
+        walk(&w, 2 * HALF * 10);
+        expect_near("forward", w.hold.speed[0], 0.4, 0.01 * 0.4); /* the chord of an arc */
+        expect_near("left", w.hold.speed[1], 0, 0.002 * 0.4);
+    }
 }
 
 /* ---- when it learns nothing ---- */
@@ -252,9 +291,12 @@ static void a_slow_turn_does_no_harm(void **state) {
 static void fast_turns_teach_nothing(void **state) {
     Walker w = walker_at(0.4, 0.8);
     (void)state;
-    w.turning = 0.5;
+    w.wanted[2] = 0.3;
     walk(&w, 2 * HALF * 10);
     assert_true(w.hold.ratio[0] == 0 && w.command[0] == 0.4);
+    w.wanted[2] = -0.2;
+    walk(&w, 2 * HALF * 3);
+    assert_true(w.hold.ratio[0] > 0);
 }
 
 static void another_command_must_settle(void **state) {
@@ -268,7 +310,8 @@ static void another_command_must_settle(void **state) {
     assert_true(w.hold.ratio[0] == learned); /* kept */
     expect_near("command", w.command[0], 0.6 * (1 + learned), 1e-12);
     walk(&w, 2 * HALF * 2);
-    assert_true(w.hold.ratio[0] != learned);
+    assert_true(w.hold.ratio[0] != learned); /* from there */
+    expect_near("ratio", w.hold.ratio[0], learned, 0.02);
 }
 
 /* A stick that moves by 0.2 m/s each second. */
@@ -313,13 +356,15 @@ static void off_changes_nothing(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(feet_are_where_mujoco_has_them),
+        cmocka_unit_test(hinges_have_anchors_and_zeros),
         cmocka_unit_test(round_feet_are_left_alone),
         cmocka_unit_test(speed_is_that_of_the_feet),
+        cmocka_unit_test(the_top_is_that_of_a_parabola),
         cmocka_unit_test(a_slow_walk_comes_to_its_speed),
         cmocka_unit_test(noise_leaves_the_speed_right),
         cmocka_unit_test(sideways_is_held_too),
         cmocka_unit_test(the_ratio_is_bounded),
-        cmocka_unit_test(a_slow_turn_does_no_harm),
+        cmocka_unit_test(turning_changes_nothing),
         cmocka_unit_test(fast_turns_teach_nothing),
         cmocka_unit_test(another_command_must_settle),
         cmocka_unit_test(a_slow_ramp_teaches_nothing),
