@@ -65,7 +65,7 @@ typedef struct {
     double foot[SPEED_HOLD_FRAMES][ROBOT_FEET_MAX][2]; /* [m] in the heading frame */
     unsigned stance[SPEED_HOLD_FRAMES];                /* bits of the feet */
     /* the cycle since foot 0's last start of a stance */
-    int begun, duration;              /* bool; frames */
+    int begun, turning, duration;     /* bool, bool, frames */
     double way[SPEED_HOLD_SHIFTS][2]; /* [m] */
 } SpeedHold;
 
