@@ -6,13 +6,13 @@
 
 #include "env/task/gait.h"
 
-#define RATIO_MAX 0.2    /* [-] */
-#define ERROR_MAX 0.5    /* [-] of the speed of one cycle */
-#define SPEED_MIN 0.1    /* [m/s] of a command whose ratio can be learned */
-#define CHANGE_MAX 0.01  /* [m/s] of the command that begins anew */
-#define TURNING_MAX 0.25 /* [rad/s] of a command in a cycle that r can learn from */
-#define SETTLING 2       /* cycles after that */
-#define DOUBT 4          /* cycles after which the mean weighs as much as what was before */
+#define RATIO_MAX 0.2   /* [-] */
+#define ERROR_MAX 0.5   /* [-] of the speed of one cycle */
+#define SPEED_MIN 0.1   /* [m/s] of a command whose ratio can be learned */
+#define CHANGE_MAX 0.01 /* [m/s] of the command that begins anew */
+#define TURNING_MAX 0.4 /* [rad/s] of a command in a cycle that r can learn from */
+#define SETTLING 2      /* cycles after that */
+#define DOUBT 4         /* cycles after which the mean weighs as much as what was before */
 
 /* ---- the legs ---- */
 

@@ -306,13 +306,13 @@ static void turning_changes_nothing(void **state) {
 static void fast_turns_teach_nothing(void **state) {
     Walker w = walker_at(0.4, 0.8);
     (void)state;
-    w.wanted[2] = 0.3;
+    w.wanted[2] = 0.5;
     walk(&w, 2 * HALF * 10);
     assert_true(w.hold.ratio[0] == 0 && w.command[0] == 0.4);
-    w.wanted[2] = -0.3;
+    w.wanted[2] = -0.5;
     walk(&w, 2 * HALF * 3);
     assert_true(w.hold.ratio[0] == 0);
-    w.wanted[2] = -0.2;
+    w.wanted[2] = -0.3;
     walk(&w, 2 * HALF * 3);
     assert_true(w.hold.ratio[0] > 0);
 }
