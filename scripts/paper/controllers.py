@@ -2,7 +2,7 @@
 import math
 
 import figures
-from measure import NINE, SEVEN, deviation, evaluate, mean, mild, note_of, read, rivals_of, save, together
+from measure import ALONE, NINE, SEVEN, deviation, evaluate, mean, mild, note_of, read, rivals_of, save, together
 from page import Cell, Claim, Section, Table
 
 SPEEDS = [0.3, 0.6, 0.9, 1.2]
@@ -185,7 +185,7 @@ def swing(points, k):
 
 def passivity(given):
     """The centre of mass under the policy and under passivity-based control, and where the latter falls."""
-    who = {"MILD": ["--policy", given.policy, "--config", given.config, "--task.physics_dt=0.0025"],
+    who = {"MILD": ["--policy", given.policy, "--config", given.config, *ALONE, "--task.physics_dt=0.0025"],
            "passivity": ["--controller", "passivity"]}
     tracks = {name: given.raw / f"track_{name}.csv" for name in who}
 

@@ -10,6 +10,7 @@
 #include "app/live.h"
 #include "app/progress.h"
 #include "base/clock.h"
+#include "control/speed_hold.h"
 #include "identify/belief/log.h"
 #include "run/eval/eval.h"
 
@@ -41,11 +42,13 @@ typedef struct {
     TaskEnv *env;
     RobotSim *sim;
     double command[3]; /* [m/s, m/s, rad/s] given by the keys */
-    int steer;         /* bool: keys were used; until then the heading is held */
-    double speed;      /* [m/s] shown */
-    double end;        /* [s] */
-    int ground;        /* material under the base */
-    Live live;         /* the ground, which keys change in a window */
+    SpeedHoldLegs legs;
+    SpeedHold hold;
+    int steer;    /* bool: keys were used; until then the heading is held */
+    double speed; /* [m/s] shown */
+    double end;   /* [s] */
+    int ground;   /* material under the base */
+    Live live;    /* the ground, which keys change in a window */
     Pace pace;
     int lost; /* bool: the simulation diverged, so the state must not be drawn */
 } Walk;
@@ -72,6 +75,11 @@ static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const 
     }
 }
 
+/* The frame that the policy sees next. */
+static const float *newest_frame(const Walk *walk) {
+    return task_env_history(walk->env) + (TASK_FRAMES - 1) * (size_t)walk->env->shape.observation;
+}
+
 static void set_command(Walk *walk) {
     eval_command(walk->env, walk->command[0], walk->command[1]);
     if (walk->steer) {
@@ -83,17 +91,16 @@ static void start(Walk *walk) {
     Play *play = walk->play;
     EnvsView none = {0};
     belief_reset(&play->knows);
+    walk->hold = (SpeedHold){.frames = 0};
     set_command(walk);
     task_env_reset_on(walk->env, &walk->task, play->robot, walk->sim, &walk->live.terrain,
                       play->scene->rigid, &none);
     walk->speed = 0;
 }
 
-/* The frame that the policy sees next. */
 static void look_at_ground(Walk *walk) {
     Play *play = walk->play;
-    const float *frame =
-        task_env_history(walk->env) + (TASK_FRAMES - 1) * (size_t)walk->env->shape.observation;
+    const float *frame = newest_frame(walk);
     if (play->belief && belief_step(&play->knows, play->belief, frame) & BELIEF_ALARM &&
         play->knows.alarms <= PLAY_ALARMS) {
         play->alarm[play->knows.alarms - 1] = play->time;
@@ -119,6 +126,7 @@ static void step(Walk *walk) {
                      fmax(hypot(rotation[0], rotation[3]), 1e-6);
     walk->speed += TASK_PERIOD / SPEED_TIME * (forward - walk->speed);
     set_command(walk);
+    speed_hold(&walk->hold, &walk->legs, newest_frame(walk), walk->env->command);
     if (play->others) {
         others_step(play->others);
     }
@@ -317,6 +325,10 @@ MildStatus play_run(Play *play, MildError *error) {
     }
     if (!walk.env) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    }
+    if (status == MILD_OK) {
+        status = speed_hold_legs(play->robot, play->controller->torque ? 0 : walk.task.speed_hold,
+                                 &walk.legs, error);
     }
     if (status == MILD_OK) {
         task_env_init(walk.env, &walk.task, play->robot, play->seed, 0);

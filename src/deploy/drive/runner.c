@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "control/speed_hold.h"
 #include "deploy/drive/sensor.h"
 #include "identify/belief/log.h"
 
@@ -20,6 +21,8 @@ struct Runner {
     SensorLimits limits;
     Controller controller;
     TaskEnv *env; /* its sensors are packets, its physics is elsewhere */
+    SpeedHoldLegs legs;
+    SpeedHold hold;
     int joints;
     PacketMode mode;
 
@@ -72,6 +75,7 @@ static void begin_episode(Runner *r) {
     task_env_draw(r->env, &r->task, r->def.robot);
     task_begin_episode(r->env, &r->task, robot_table(r->def.robot), 0, 0);
     r->env->phase = 0;
+    r->hold = (SpeedHold){.frames = 0};
 }
 
 Runner *runner_create(const RunnerDef *def, MildError *error) {
@@ -90,7 +94,8 @@ Runner *runner_create(const RunnerDef *def, MildError *error) {
     r->ticked = -1;
     belief_reset(&r->report.belief);
     r->format = (PacketFormat){r->joints, packet_robot(def->robot), def->key};
-    if (controller_learned(def->policy, def->robot, NULL, 1, &r->controller, error) != MILD_OK) {
+    if (speed_hold_legs(def->robot, r->task.speed_hold, &r->legs, error) != MILD_OK ||
+        controller_learned(def->policy, def->robot, NULL, 1, &r->controller, error) != MILD_OK) {
         free(r);
         return NULL;
     }
@@ -338,10 +343,13 @@ static int is_finite(const Runner *r) {
     return finite;
 }
 
-/* The newest frame of the policy's history. */
+/* [observation] Of the policy's history. */
+static const float *newest_frame(const Runner *r) {
+    return task_env_history(r->env) + (TASK_FRAMES - 1) * (size_t)r->env->shape.observation;
+}
+
 static void look_at_ground(Runner *r) {
-    const float *frame =
-        task_env_history(r->env) + (TASK_FRAMES - 1) * (size_t)r->env->shape.observation;
+    const float *frame = newest_frame(r);
     if (r->def.belief) {
         belief_step(&r->report.belief, r->def.belief, frame);
     }
@@ -370,6 +378,8 @@ static void step_policy(Runner *r, const TaskSensors *reading, const double comm
     task_begin_step(r->env, &r->task, r->action);
     set_targets(r, reading);
     set_command(r, command);
+    speed_hold(&r->hold, &r->legs, newest_frame(r), r->env->command);
+    set_command(r, r->env->command);
     task_advance_clock(r->env, &r->task);
     r->report.steps++;
 }

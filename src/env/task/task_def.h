@@ -159,6 +159,7 @@ typedef struct {
     double standing_below; /* [m/s, rad/s] a command whose parts are all below this is to stand */
     double gait_period;    /* [s] of fast commands, see task_gait_period */
     double gait_slowing, gait_slow_below; /* [-], [m/s] of slow ones */
+    double speed_hold;                    /* [-] see control/speed_hold.h; 0: off */
     double swing_apex;                    /* [m] */
     double double_support; /* [-] |sin(2 pi phase)| below which either contact state is right */
     int history_stride;    /* policy steps that each older frame of the history is the mean of */

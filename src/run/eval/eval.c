@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "control/speed_hold.h"
 #include "device/device.h"
 #include "env/envs.h"
 #include "run/eval/actions.h"
@@ -83,8 +84,10 @@ typedef struct {
     void *device_block, *block;
     float *device_action; /* [trials][joints] on the device */
     Results device, host;
-    float *action;    /* [trials][joints] */
-    double *command;  /* [trials][3] */
+    float *action;   /* [trials][joints] */
+    double *command; /* [trials][3] */
+    SpeedHoldLegs legs;
+    SpeedHold *hold;  /* [trials] */
     Measure *measure; /* [trials] */
     uint8_t *end;     /* [trials] TaskEnd; TASK_END_time while it walks */
     Track track;      /* if EvalDef.track is given */
@@ -196,10 +199,11 @@ static MildStatus open_arrays(Trials *t, MildError *error) {
     t->block = calloc(1, t->bytes);
     t->action = calloc(trials * joints, sizeof *t->action);
     t->command = calloc(trials, 3 * sizeof *t->command);
+    t->hold = calloc(trials, sizeof *t->hold);
     t->measure = calloc(trials, sizeof *t->measure);
     t->end = calloc(trials, 1);
     t->env = t->run->batch ? NULL : calloc(trials, sizeof *t->env);
-    if (!t->block || !t->action || !t->command || !t->measure || !t->end ||
+    if (!t->block || !t->action || !t->command || !t->hold || !t->measure || !t->end ||
         (!t->env && !t->run->batch)) {
         return fail_memory(t, error);
     }
@@ -228,6 +232,7 @@ static void close_trials(Trials *t) {
     free(t->block);
     free(t->action);
     free(t->command);
+    free(t->hold);
     measure_free(t->measure, t->trials);
     free(t->end);
     track_free(&t->track);
@@ -248,11 +253,18 @@ static void start_trial(void *context, int trial, int thread) {
     direct(&t->run->eval, speed_of(t, trial), 0, ahead, t->command + 3 * (size_t)trial);
 }
 
+/* [observation] What the policy sees next. */
+static const float *newest_frame(const Trials *t, int trial) {
+    const TaskShape shape = task_shape(t->run->robot);
+    return t->host.history + (size_t)(trial + 1) * (size_t)shape.history - shape.observation;
+}
+
 /* Measures the policy step, and says where to go in the next one. */
 static void take_trial(void *context, int trial, int thread) {
     Trials *t = context;
     const EvalDef *eval = &t->run->eval;
     const EnvsSample *first = t->host.sample + (size_t)trial * (size_t)t->samples, *at = first;
+    double *command;
     (void)thread;
     if (is_over(t, trial)) {
         return;
@@ -270,8 +282,9 @@ static void take_trial(void *context, int trial, int thread) {
     if (eval->track) {
         track_take(&t->track, trial, at - 1);
     }
-    direct(eval, speed_of(t, trial), t->measure[trial].time, (at - 1)->quaternion,
-           t->command + 3 * (size_t)trial);
+    command = t->command + 3 * (size_t)trial;
+    direct(eval, speed_of(t, trial), t->measure[trial].time, (at - 1)->quaternion, command);
+    speed_hold(&t->hold[trial], &t->legs, newest_frame(t, trial), command);
     if (t->env) {
         push_trial(t->env[trial], eval->push);
     }
@@ -379,6 +392,10 @@ MildStatus eval_run(const EvalRun *run, EvalRow *rows, MildError *error) {
     t.task.episode = run->eval.seconds;
     status = open_envs(&t, error);
     status = status == MILD_OK ? open_arrays(&t, error) : status;
+    status = status == MILD_OK
+                 ? speed_hold_legs(run->robot, run->controller->torque ? 0 : t.task.speed_hold,
+                                   &t.legs, error)
+                 : status;
     if (status == MILD_OK && run->eval.track) {
         status = track_make(&t.track, t.trials, steps, error);
     }
