@@ -187,6 +187,7 @@ TEST(device_and_host_agree) {
     for (int i = 0; i < SHAPES; i++) {
         static Errors errors;
         Side host, device, again;
+        int unsolved = 0;
         errors.count = 0;
         herd_open(&herd, &shapes[i]);
         side_open(&host, &herd, MILD_BATCH_HOST);
@@ -200,10 +201,15 @@ TEST(device_and_host_agree) {
             assert_memory_equal(arrays.wrench, other.wrench, sizeof arrays.wrench);
             assert_memory_equal(arrays.after, other.after, sizeof arrays.after);
             side_step(&host, &other, 1);
-            against_other(&errors, herd.feet, &arrays, &other);
+            unsolved += against_other(&errors, herd.feet, &arrays, &other);
             herd_advance(&herd);
+            side_follow(&host, &herd);
+            side_follow(&device, &herd);
+            side_follow(&again, &herd);
         }
-        check_errors(shapes[i].name, &errors, 1e-5, 3e-2);
+        check_errors(shapes[i].name, &errors, 1e-5, 1e-3);
+        print_message("    %d steps are not solved by both\n", unsolved);
+        assert_true(unsolved <= some_steps() * ROBOTS / 15);
         side_close(&host);
         side_close(&device);
         side_close(&again);
