@@ -12,10 +12,9 @@ static double angle_of(const Robot *robot, Random *r, int joint) {
     return low + (high - low) * random_unit(r);
 }
 
-static void feet_are_where_mujoco_has_them(void **state) {
+TEST(feet_are_where_mujoco_has_them) {
     static const char *const names[] = {"sa01", "g1"};
     const RobotVariation nominal = robot_variation_nominal();
-    (void)state;
     for (size_t n = 0; n < sizeof names / sizeof *names; n++) {
         MildError error = {0};
         Robot *robot = kit_robot_named(names[n]);
@@ -44,11 +43,10 @@ static void feet_are_where_mujoco_has_them(void **state) {
 }
 
 /* A leg of one hinge, whose anchor and zero are its own, on a hip that is turned by 90 degrees. */
-static void hinges_have_anchors_and_zeros(void **state) {
+TEST(hinges_have_anchors_and_zeros) {
     SpeedHoldLegs legs = {.joints = 1, .feet = 1, .links = {1}, .sole_center = {{0, 0, -1}}};
     const double q[1] = {0.7};
     double foot[1][3];
-    (void)state;
     legs.link[0][0] = (SpeedHoldLink){.axis = {0, 1, 0},
                                       .anchor = {0, 0, 0.5},
                                       .zero = 0.2,
@@ -60,11 +58,10 @@ static void hinges_have_anchors_and_zeros(void **state) {
     expect_near("z", foot[0][2], 0.3 + 0.5 - 1.5 * cos(0.5), 1e-15);
 }
 
-static void round_feet_are_left_alone(void **state) {
+TEST(round_feet_are_left_alone) {
     MildError error = {0};
     SpeedHoldLegs legs;
     Robot *robot = kit_robot_named("go1");
-    (void)state;
     expect_good(speed_hold_legs(robot, 0.1, &legs, &error) == MILD_OK, &error);
     assert_true(legs.gain == 0);
     robot_destroy(robot);
@@ -209,8 +206,7 @@ static double speed_over(Walker *w, int cycles) {
     return hypot(w->at[0] - from[0], w->at[1] - from[1]) / (2 * HALF * cycles * TASK_PERIOD);
 }
 
-static void speed_is_that_of_the_feet(void **state) {
-    (void)state;
+TEST(speed_is_that_of_the_feet) {
     for (int late = -2; late <= 4; late += 2) {
         for (int back = 0; back < 2; back++) {
             Walker w = walker_at(back ? -0.4 : 0.4, 1);
@@ -228,9 +224,8 @@ static void speed_is_that_of_the_feet(void **state) {
 }
 
 /* The feet change at once, so v(c) has a top and no plateau. */
-static void the_top_is_that_of_a_parabola(void **state) {
+TEST(the_top_is_that_of_a_parabola) {
     Walker w = walker_at(0.8, 1);
-    (void)state;
     w.free = 1;
     w.both = 0;
     w.late = 2;
@@ -238,9 +233,8 @@ static void the_top_is_that_of_a_parabola(void **state) {
     expect_near("forward", w.hold.speed[0], 0.8, 0.005 * 0.8);
 }
 
-static void a_slow_walk_comes_to_its_speed(void **state) {
+TEST(a_slow_walk_comes_to_its_speed) {
     static const double factors[] = {0.85, 1, 1.15};
-    (void)state;
     for (int i = 0; i < 6; i++) {
         Walker w = walker_at(i % 2 ? -0.5 : 0.5, factors[i / 2]);
         walk(&w, 2 * HALF * 60);
@@ -250,9 +244,8 @@ static void a_slow_walk_comes_to_its_speed(void **state) {
 }
 
 /* The factor is the same in each cycle; its weight grows. */
-static void doubt_ends_after_a_few_cycles(void **state) {
+TEST(doubt_ends_after_a_few_cycles) {
     Walker w = walker_at(0.5, 0.9);
-    (void)state;
     while (w.hold.cycles == 0) {
         walk(&w, 1);
     }
@@ -264,33 +257,29 @@ static void doubt_ends_after_a_few_cycles(void **state) {
     }
 }
 
-static void noise_leaves_the_speed_right(void **state) {
+TEST(noise_leaves_the_speed_right) {
     Walker w = walker_at(0.4, 0.9);
-    (void)state;
     w.noise = 1;
     walk(&w, 2 * HALF * 10);
     expect_near("speed under noise", speed_over(&w, 100), 0.4, 0.015 * 0.4);
 }
 
-static void sideways_is_held_too(void **state) {
+TEST(sideways_is_held_too) {
     Walker w = walker_at(0.3, 0.9);
-    (void)state;
     w.wanted[1] = w.command[1] = 0.2;
     walk(&w, 2 * HALF * 60);
     expect_near("ratio forward", w.hold.ratio[0], 1 / 0.9 - 1, 0.005);
     expect_near("ratio left", w.hold.ratio[1], 1 / 0.9 - 1, 0.005);
 }
 
-static void the_ratio_is_bounded(void **state) {
+TEST(the_ratio_is_bounded) {
     Walker w = walker_at(0.3, 0.5);
-    (void)state;
     walk(&w, 2 * HALF * 30);
     expect_near("ratio", w.hold.ratio[0], 0.2, 0);
     expect_near("command", w.command[0], 0.36, 1e-12);
 }
 
-static void turning_changes_nothing(void **state) {
-    (void)state;
+TEST(turning_changes_nothing) {
     for (int i = -1; i <= 1; i++) {
         Walker w = walker_at(0.4, 1);
         w.turning = i;
@@ -303,9 +292,8 @@ static void turning_changes_nothing(void **state) {
 
 /* ---- when it learns nothing ---- */
 
-static void fast_turns_teach_nothing(void **state) {
+TEST(fast_turns_teach_nothing) {
     Walker w = walker_at(0.4, 0.8);
-    (void)state;
     w.wanted[2] = 0.5;
     walk(&w, 2 * HALF * 10);
     assert_true(w.hold.ratio[0] == 0 && w.command[0] == 0.4);
@@ -317,9 +305,8 @@ static void fast_turns_teach_nothing(void **state) {
     assert_true(w.hold.ratio[0] > 0);
 }
 
-static void another_command_must_settle(void **state) {
+TEST(another_command_must_settle) {
     Walker w = walker_at(0.4, 0.9);
-    (void)state;
     walk(&w, 2 * HALF * 10);
     const double learned = w.hold.ratio[0];
     assert_true(learned > 0.05);
@@ -333,9 +320,8 @@ static void another_command_must_settle(void **state) {
 }
 
 /* A stick that moves by 0.2 m/s each second. */
-static void a_slow_ramp_teaches_nothing(void **state) {
+TEST(a_slow_ramp_teaches_nothing) {
     Walker w = walker_at(0.2, 0.9);
-    (void)state;
     walk(&w, 2 * HALF * 10);
     const double learned = w.hold.ratio[0];
     for (int k = 0; k < 4 * 2 * HALF; k++) {
@@ -346,23 +332,21 @@ static void a_slow_ramp_teaches_nothing(void **state) {
 }
 
 /* A standing robot's clock is (0, 0). */
-static void standing_forgets(void **state) {
+TEST(standing_forgets) {
     Walker w = walker_at(0.4, 0.9);
     float frame[FRAME] = {0};
     double command[3] = {0, 0, 0.3};
-    (void)state;
     walk(&w, 2 * HALF * 10);
     speed_hold(&w.hold, &w.legs, frame, command);
     assert_true(w.hold.ratio[0] == 0 && w.hold.frames == 0);
     assert_true(command[0] == 0 && command[1] == 0 && command[2] == 0.3);
 }
 
-static void off_changes_nothing(void **state) {
+TEST(off_changes_nothing) {
     Walker w = walker_at(0.4, 0.7);
     MildError error = {0};
     SpeedHoldLegs legs;
     Robot *robot = kit_robot_named("sa01");
-    (void)state;
     expect_good(speed_hold_legs(robot, 0, &legs, &error) == MILD_OK, &error);
     assert_true(legs.gain == 0 && legs.feet == 0);
     w.legs = legs;
@@ -371,24 +355,4 @@ static void off_changes_nothing(void **state) {
     robot_destroy(robot);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(feet_are_where_mujoco_has_them),
-        cmocka_unit_test(hinges_have_anchors_and_zeros),
-        cmocka_unit_test(round_feet_are_left_alone),
-        cmocka_unit_test(speed_is_that_of_the_feet),
-        cmocka_unit_test(the_top_is_that_of_a_parabola),
-        cmocka_unit_test(a_slow_walk_comes_to_its_speed),
-        cmocka_unit_test(doubt_ends_after_a_few_cycles),
-        cmocka_unit_test(noise_leaves_the_speed_right),
-        cmocka_unit_test(sideways_is_held_too),
-        cmocka_unit_test(the_ratio_is_bounded),
-        cmocka_unit_test(turning_changes_nothing),
-        cmocka_unit_test(fast_turns_teach_nothing),
-        cmocka_unit_test(another_command_must_settle),
-        cmocka_unit_test(a_slow_ramp_teaches_nothing),
-        cmocka_unit_test(standing_forgets),
-        cmocka_unit_test(off_changes_nothing),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)
