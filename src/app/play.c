@@ -75,11 +75,6 @@ static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const 
     }
 }
 
-/* The frame that the policy sees next. */
-static const float *newest_frame(const Walk *walk) {
-    return task_env_history(walk->env) + (TASK_FRAMES - 1) * (size_t)walk->env->shape.observation;
-}
-
 static void set_command(Walk *walk) {
     eval_command(walk->env, walk->command[0], walk->command[1]);
     if (walk->steer) {
@@ -98,9 +93,10 @@ static void start(Walk *walk) {
     walk->speed = 0;
 }
 
+/* By the frame that the policy sees next. */
 static void look_at_ground(Walk *walk) {
     Play *play = walk->play;
-    const float *frame = newest_frame(walk);
+    const float *frame = task_env_frame(walk->env);
     if (play->belief && belief_step(&play->knows, play->belief, frame) & BELIEF_ALARM &&
         play->knows.alarms <= PLAY_ALARMS) {
         play->alarm[play->knows.alarms - 1] = play->time;
@@ -126,7 +122,7 @@ static void step(Walk *walk) {
                      fmax(hypot(rotation[0], rotation[3]), 1e-6);
     walk->speed += TASK_PERIOD / SPEED_TIME * (forward - walk->speed);
     set_command(walk);
-    speed_hold(&walk->hold, &walk->legs, newest_frame(walk), walk->env->command);
+    speed_hold(&walk->hold, &walk->legs, task_env_frame(walk->env), walk->env->command);
     if (play->others) {
         others_step(play->others);
     }

@@ -53,7 +53,7 @@ static void clock_act(void *self, int rows, TaskEnv *const *envs, float *actions
         float *action = actions + r * clock->joints;
         const float *last = envs[r]->action[0];
         if (clock_is_due(envs[r])) {
-            const float *frame = task_env_history(envs[r]) + (TASK_FRAMES - 1) * clock->observation;
+            const float *frame = task_env_frame(envs[r]);
             clock_decide(clock, frame, last, action);
         } else {
             memcpy(action, last, (size_t)clock->joints * sizeof *action);

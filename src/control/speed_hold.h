@@ -1,4 +1,4 @@
-/* Holds the commanded speed by what the legs have walked. A policy follows a command up to a factor
+/* Holds the commanded speed by leg odometry. A policy follows a command up to a factor
  * of a few percent, which depends on the ground, the robot and its latencies. Legs measure it: when
  * the stance passes from some feet to others, the base has come as far as these are apart. Over a
  * gait cycle

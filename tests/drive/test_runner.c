@@ -2,6 +2,7 @@
  * lost, late and old packets; a dead robot; commands; the end. */
 #include "runner_kit.h"
 
+#include "control/speed_hold.h"
 #include "run/eval/scene.h"
 
 /* ---- the task's own environment ---- */
@@ -100,6 +101,46 @@ TEST(the_same_as_the_task) {
     assert_true(worst < 2e-5 && farthest > 0.3);
     assert_true(report->steps == 200 && report->holds == 0 && report->lost == 0);
     assert_int_equal(report->targets_limited, limited);
+    runner_destroy(runner);
+    free_world(&w);
+}
+
+/* Eight seconds of a walk whose speed is held: the runner commands what a speed hold makes of the
+ * task's own frames. */
+TEST(the_speed_is_held_as_in_the_task) {
+    const EnvsView none = {0};
+    MildError error = {0};
+    SpeedHoldLegs legs;
+    SpeedHold hold = {.frames = 0};
+    World w = make_world();
+    noisy.speed_hold = 0.1;
+    Runner *runner = make_runner();
+    noisy.speed_hold = 0;
+    double worst = 0;
+    assert_int_equal(speed_hold_legs(robot, 0.1, &legs, &error), MILD_OK);
+    for (uint32_t k = 0; k < 800; k++) {
+        const double now = 0.01 * k;
+        const StatePacket state = state_of(&w, k + 1, now);
+        double command[3] = {forward[0], 0, 0};
+        give(runner, &state, now);
+        const TargetPacket target = tick(runner, now, forward);
+        w.controller.act(w.controller.self, 1, &w.env, w.action);
+        for (int i = 0; i < JOINTS; i++) {
+            const double kp = robot_kp(robot)[i], limit = 0.85 * robot_effort(robot)[i];
+            const double wanted = robot_default_pose(robot)[i] + 0.5 * (double)w.action[i];
+            const double torque = kp * (wanted - (double)state.angle[i]) -
+                                  robot_kd(robot)[i] * (double)state.speed[i];
+            if (fabs(torque) <= limit) {
+                worst = fmax(worst, fabs((double)target.angle[i] - wanted));
+            }
+        }
+        speed_hold(&hold, &legs, task_env_frame(w.env), command);
+        memcpy(w.env->command, command, sizeof command);
+        assert_true(!task_env_step(w.env, &task, robot, w.sim, w.action, 0, &none, NULL).done);
+    }
+    print_message("targets within %.1e, a command of %.4f m/s\n", worst, w.env->command[0]);
+    assert_true(fabs(w.env->command[0] - forward[0]) > 1e-3);
+    assert_true(worst < 2e-5);
     runner_destroy(runner);
     free_world(&w);
 }

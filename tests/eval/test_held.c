@@ -14,12 +14,10 @@ static double last[TRIALS]; /* [m/s] forward */
 
 static void decided(void *context, const EvalDecision *decision) {
     const TaskEnv *env = decision->env;
-    const float *newest =
-        task_env_history(decision->env) + env->shape.history - env->shape.observation;
     double command[3] = {SPEED, SIDEWAYS, 0};
     (void)context;
     if (decision->time > 0) { /* the first frame was there before the trial */
-        speed_hold(&hold[decision->trial], &legs, newest, command);
+        speed_hold(&hold[decision->trial], &legs, task_env_frame(decision->env), command);
     }
     assert_true(env->command[0] == command[0] && env->command[1] == command[1]);
     last[decision->trial] = command[0];

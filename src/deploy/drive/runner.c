@@ -343,13 +343,8 @@ static int is_finite(const Runner *r) {
     return finite;
 }
 
-/* [observation] Of the policy's history. */
-static const float *newest_frame(const Runner *r) {
-    return task_env_history(r->env) + (TASK_FRAMES - 1) * (size_t)r->env->shape.observation;
-}
-
 static void look_at_ground(Runner *r) {
-    const float *frame = newest_frame(r);
+    const float *frame = task_env_frame(r->env);
     if (r->def.belief) {
         belief_step(&r->report.belief, r->def.belief, frame);
     }
@@ -378,7 +373,7 @@ static void step_policy(Runner *r, const TaskSensors *reading, const double comm
     task_begin_step(r->env, &r->task, r->action);
     set_targets(r, reading);
     set_command(r, command);
-    speed_hold(&r->hold, &r->legs, newest_frame(r), r->env->command);
+    speed_hold(&r->hold, &r->legs, task_env_frame(r->env), r->env->command);
     set_command(r, r->env->command);
     task_advance_clock(r->env, &r->task);
     r->report.steps++;

@@ -42,6 +42,10 @@ float *task_env_history(TaskEnv *env) {
     return (float *)(void *)((char *)task_env_rest(env) + task_whole_lines(sizeof(TaskRest)));
 }
 
+const float *task_env_frame(TaskEnv *env) {
+    return task_env_history(env) + (TASK_FRAMES - 1) * (size_t)env->shape.observation;
+}
+
 MildGround *task_env_ground(TaskEnv *env) {
     return (MildGround *)(void *)((char *)env + front_bytes(&env->shape, env->held));
 }

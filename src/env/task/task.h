@@ -49,6 +49,7 @@ TaskRest *task_env_rest(TaskEnv *env);
 const MildTerrain *task_env_terrain(const TaskEnv *env); /* of TaskRest */
 /* [shape.history] What the policy sees: five means of older frames, then the newest frame. */
 float *task_env_history(TaskEnv *env);
+const float *task_env_frame(TaskEnv *env); /* [shape.observation] the newest frame of it */
 MildGround *task_env_ground(TaskEnv *env);
 
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,

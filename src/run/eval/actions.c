@@ -33,7 +33,7 @@ void actions_print_row(FILE *csv, const EvalDecision *decision) {
     const TaskShape *shape = &env->shape;
     const double *qpos = env->robot.qpos, *qvel = env->robot.qvel;
     const double clip = decision->task->action_clip;
-    const float *frame = task_env_history(env) + (TASK_FRAMES - 1) * shape->observation;
+    const float *frame = task_env_frame(env);
     char ground[sizeof decision->scene->name];
     scene_ground_at(decision->scene, qpos[0], qpos[1], ground, sizeof ground);
     fprintf(csv, "%d,%s,%g,%.2f", decision->trial, ground, decision->speed, decision->time);
