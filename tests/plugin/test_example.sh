@@ -7,11 +7,12 @@ python=$2
 export MILD_PLUGIN=$3 PYTHONDONTWRITEBYTECODE=1
 
 # same ROBOT POLICY CONFIG GROUND STEP INTEGRATOR BOUND: the share by which the speeds may differ. Euler is eval's own integrator;
-# the others damp by the gains kd at the end of the step. plugin_walk.py has ground under the feet alone, and so has eval here.
+# the others damp by the gains kd at the end of the step. plugin_walk.py has ground under the feet alone and no
+# speed hold, and so has eval here.
 same() {
     { cat "$root/configs/$3.ini"; printf '\n[task]\nobserve_noise = false\n[randomize]\nlatency = 0 0\n'; } >exact.ini
     "$mild" eval --policy "$root/policies/$2.safetensors" --config exact.ini --ground "$4" --speed 0.5 --seconds 10 --trials 2 \
-        --task.physics_dt="$5" --task.shells_stand=false --json eval.json >/dev/null || fail "eval of $1"
+        --task.physics_dt="$5" --task.shells_stand=false --task.speed_hold=0 --json eval.json >/dev/null || fail "eval of $1"
     local plain
     plain=$("$python" "$root/scripts/plugin_walk.py" "$1" --ground "$4" --step "$5" --integrator "$6" --trials 1) ||
         fail "plugin_walk.py $1"

@@ -637,7 +637,7 @@ class Trials(unittest.TestCase):
             exact, file = pathlib.Path(folder) / "exact.ini", pathlib.Path(folder) / "eval.json"
             exact.write_text((ROOT / "configs/walk.ini").read_text() + "\n[task]\nobserve_noise = false\n[randomize]\nlatency = 0 0\n")
             subprocess.run([os.environ["MILD_PROGRAM"], "eval", "--config", exact, "--ground", "foam45", "--speed", "0.6", "--trials", "2", "--seconds", "6",
-                            "--task.physics_dt=0.0025", "--task.shells_stand=false", "--json", file], check=True, stdout=subprocess.DEVNULL)
+                            "--task.physics_dt=0.0025", "--task.shells_stand=false", "--task.speed_hold=0", "--json", file], check=True, stdout=subprocess.DEVNULL)
             wanted = json.loads(file.read_text())["rows"][0]
         print(f"speed {row.mean('speed'):.3f} and {wanted['velocity']:.3f}, cost {row.mean('cost'):.3f} and {wanted['cot']:.3f}, "
               f"sinkage {row.mean('sinkage'):.4f} and {wanted['penetration']:.4f}")
