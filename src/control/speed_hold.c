@@ -13,6 +13,7 @@
 #define TURNING_MAX 0.4 /* [rad/s] of a command in a cycle that r can learn from */
 #define SETTLING 2      /* cycles after that */
 #define DOUBT 4         /* cycles after which the mean weighs as much as what was before */
+#define LEVELLING 0.05  /* [-] share of a frame's gravity in what is down */
 
 /* ---- the legs ---- */
 
@@ -136,8 +137,7 @@ void speed_hold_feet(const SpeedHoldLegs *legs, const double *q, double (*foot)[
 /* ---- a frame ---- */
 
 /* Into the heading frame: z against gravity, x where the base looks. */
-static void to_heading(const float gravity[3], const double v[3], double out[2]) {
-    const double g[3] = {gravity[0], gravity[1], gravity[2]};
+static void to_heading(const double g[3], const double v[3], double out[2]) {
     const double length = fmax(sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]), 1e-6);
     const double z[3] = {-g[0] / length, -g[1] / length, -g[2] / length};
     const double level = fmax(sqrt(1 - z[0] * z[0]), 1e-6);
@@ -163,10 +163,27 @@ static unsigned stance_of(const SpeedHoldLegs *legs, const float *clock) {
     return stance;
 }
 
+/* A vector g that is at rest in the world turns in the base with -w x g. rate: [rad/s] of the base.
+ */
+static void take_down(SpeedHold *hold, const float *rate, const float *gravity) {
+    const double share = hold->frames > 0 ? LEVELLING : 1;
+    double w[3], turn[3];
+    for (int i = 0; i < 3; i++) {
+        w[i] = (hold->rate[i] + (double)rate[i]) / 2; /* between the two frames */
+        hold->rate[i] = (double)rate[i];
+    }
+    mju_cross(turn, hold->down, w);
+    for (int i = 0; i < 3; i++) {
+        const double down = hold->down[i] + TASK_PERIOD * turn[i];
+        hold->down[i] = down + share * ((double)gravity[i] - down);
+    }
+}
+
 static void take_frame(SpeedHold *hold, const SpeedHoldLegs *legs, const float *frame,
                        unsigned stance) {
     double q[ROBOT_JOINTS_MAX], foot[ROBOT_FEET_MAX][3];
-    const float *gravity = frame + 6, *angle = frame + 9;
+    const float *angle = frame + 9;
+    take_down(hold, frame, frame + 6);
     const int older = SPEED_HOLD_FRAMES - 1;
     memmove(hold->foot + 1, hold->foot, (size_t)older * sizeof *hold->foot);
     memmove(hold->stance + 1, hold->stance, (size_t)older * sizeof *hold->stance);
@@ -175,7 +192,7 @@ static void take_frame(SpeedHold *hold, const SpeedHoldLegs *legs, const float *
     }
     speed_hold_feet(legs, q, foot);
     for (int f = 0; f < legs->feet; f++) {
-        to_heading(gravity, foot[f], hold->foot[0][f]);
+        to_heading(hold->down, foot[f], hold->foot[0][f]);
     }
     hold->stance[0] = stance;
     hold->frames += hold->frames < SPEED_HOLD_FRAMES;
@@ -204,11 +221,12 @@ static void take_step(SpeedHold *hold, int feet) {
     for (int i = 0; i < SPEED_HOLD_SHIFTS; i++) {
         const int age = SPEED_HOLD_LATE + SPEED_HOLD_EARLY - 1 - i;
         double from[2], to[2];
-        mean_place(hold, feet, before, age, from);
-        mean_place(hold, feet, now, age, to);
+        mean_place(hold, feet, before, age + SPEED_HOLD_BEFORE, from);
+        mean_place(hold, feet, now, age - SPEED_HOLD_AFTER, to);
         hold->way[i][0] += to[0] - from[0];
         hold->way[i][1] += to[1] - from[1];
     }
+    hold->duration -= SPEED_HOLD_BEFORE + SPEED_HOLD_AFTER;
 }
 
 /* The shift of the largest mean, of three. */
@@ -266,7 +284,7 @@ static void learn(SpeedHold *hold, double gain) {
 }
 
 static void pass_cycle(SpeedHold *hold, double gain) {
-    if (hold->begun && hold->settling == 0 && !hold->turning) {
+    if (hold->begun && hold->settling == 0 && !hold->turning && hold->duration > 0) {
         learn(hold, gain);
     }
     hold->settling -= hold->settling > 0;

@@ -1,15 +1,19 @@
 /* Holds the commanded speed by leg odometry. A policy follows a command up to a factor
  * of a few percent, which depends on the ground, the robot and its latencies. Legs measure it: when
- * the stance passes from some feet to others, the base has come as far as these are apart. Over a
- * gait cycle
+ * the stance passes from some feet to others, the base has come as far as these are apart. In the
+ * frames around that both may be in the air, so these are left out, of the way and of its time.
+ * Over a gait cycle
  *
- *     v(c) = sum over its passings of p' - p / its duration
+ *     v(c) = sum over its passings of p'(c + 2) - p(c - 1) / (its frames - 3 for each of them)
  *
- * with p and p' the means of the old and the new stance feet's sole centres in the base's heading
- * frame, from three frames' joint angles around c frames after the clock's passing. The noise of
- * gravity tilts both alike and leaves p' - p as it is. Which c? A foot in the air moves forward, so
- * the base goes slower against it than against one on the ground: v(c) is largest where the feet
- * really change. c is where the mean of v over past cycles, along the command, is largest.
+ * with p(k) and p'(k) the means of the old and the new stance feet's sole centres in the base's
+ * heading frame, from the joint angles of three frames around k frames after the clock's passing.
+ * Which c? A foot in the air moves forward, so the base goes slower against it than against one on
+ * the ground: v(c) is largest where the feet really change. c is where the mean of v over past
+ * cycles, along the command, is largest.
+ *
+ * What is down follows the turning rate, and the noisy gravity with a time constant of 0.2 s: the
+ * noise tilts p and p' nearly alike, and leaves p' - p as it is.
  *
  * The command that the policy sees is the wanted one times 1 + r. Steps telescope, so the error of
  * the mean over n cycles falls as 1/n, and its weight beside what was known before as n^2:
@@ -24,11 +28,13 @@
 
 #include "robot/robot.h"
 
-enum { SPEED_HOLD_LINKS_MAX = 16, SPEED_HOLD_EARLY = 4, SPEED_HOLD_LATE = 6 };
+enum { SPEED_HOLD_LINKS_MAX = 16, SPEED_HOLD_EARLY = 4, SPEED_HOLD_LATE = 8 };
+/* Frames at a passing that are left out, before c and after it. */
+enum { SPEED_HOLD_BEFORE = 1, SPEED_HOLD_AFTER = 2 };
 /* Values of c, and the frames that are kept for them. */
 enum {
-    SPEED_HOLD_SHIFTS = SPEED_HOLD_EARLY + SPEED_HOLD_LATE - 1,
-    SPEED_HOLD_FRAMES = SPEED_HOLD_EARLY + SPEED_HOLD_LATE + 2
+    SPEED_HOLD_SHIFTS = SPEED_HOLD_EARLY + SPEED_HOLD_LATE - 1 - SPEED_HOLD_AFTER,
+    SPEED_HOLD_FRAMES = SPEED_HOLD_EARLY + SPEED_HOLD_LATE + SPEED_HOLD_BEFORE + 1
 };
 
 /* From a body to its parent: about a hinge, then to its place there. */
@@ -62,10 +68,11 @@ typedef struct {
     double along[SPEED_HOLD_SHIFTS]; /* [m/s] mean of v(c) along the command */
     /* the last frames, newest first */
     int frames;
+    double down[3], rate[3];                           /* [-], [rad/s] of the newest, in the base */
     double foot[SPEED_HOLD_FRAMES][ROBOT_FEET_MAX][2]; /* [m] in the heading frame */
     unsigned stance[SPEED_HOLD_FRAMES];                /* bits of the feet */
     /* the cycle since foot 0's last start of a stance */
-    int begun, turning, duration;     /* bool, bool, frames */
+    int begun, turning, duration;     /* bool, bool, frames without those that are left out */
     double way[SPEED_HOLD_SHIFTS][2]; /* [m] */
 } SpeedHold;
 

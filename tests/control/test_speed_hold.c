@@ -81,8 +81,10 @@ typedef struct {
     double factor;  /* [-] its speed over that of the command */
     double turning; /* [rad/s] */
     double pitch;   /* [rad] */
+    double sway;    /* [rad] amplitude of the pitch, two periods a cycle; 0: it stays */
+    double bias;    /* [rad/s] of the gyroscope, about y */
     int late;       /* steps by which a foot comes down and another lifts off after the clock */
-    int both;       /* steps before and after that in which both feet stand */
+    int both;       /* steps before and after that in which both feet stand; below 0, none */
     double noise;   /* [-] share of the sensors' noise in training */
     int free;       /* bool: nothing corrects its command */
     double at[2];   /* [m] world */
@@ -166,6 +168,8 @@ static void make_frame(Walker *w, float *frame) {
     const double g[3] = {sin(w->pitch), 0, -cos(w->pitch)};
     memset(frame, 0, FRAME * sizeof *frame);
     frame[0] = (float)(-w->turning * g[0]);
+    frame[1] = (float)(w->bias + w->sway * cos(2 * TASK_TWO_PI * phase) * 2 * TASK_TWO_PI /
+                                     (2 * HALF * TASK_PERIOD));
     frame[2] = (float)(-w->turning * g[2]);
     for (int i = 0; i < 3; i++) {
         frame[6 + i] = (float)(g[i] + some_noise(w, 0.075));
@@ -188,6 +192,7 @@ static void walk(Walker *w, int steps) {
         w->at[1] += TASK_PERIOD * w->factor * (s * w->command[0] + c * w->command[1]);
         w->yaw += TASK_PERIOD * w->turning;
         w->step++;
+        w->pitch = w->sway != 0 ? w->sway * sin(2 * TASK_TWO_PI * w->step / (2 * HALF)) : w->pitch;
         move_feet(w);
         make_frame(w, frame);
         memcpy(w->command, w->wanted, sizeof w->command);
@@ -223,14 +228,34 @@ TEST(speed_is_that_of_the_feet) {
     }
 }
 
-/* The feet change at once, so v(c) has a top and no plateau. */
+/* For two steps no foot stands: v(c) has a top and no plateau. */
 TEST(the_top_is_that_of_a_parabola) {
-    Walker w = walker_at(0.8, 1);
+    for (int late = -1; late <= 3; late++) {
+        Walker w = walker_at(0.8, 1);
+        w.free = 1;
+        w.both = -1;
+        w.late = late;
+        walk(&w, 2 * HALF * 12);
+        expect_near("forward", w.hold.speed[0], 0.8, 0.005 * 0.8);
+    }
+}
+
+/* What is down moves with the base: where only gravity told it, it would come 0.2 s late. */
+TEST(a_base_that_sways_is_followed) {
+    Walker w = walker_at(0.6, 1);
     w.free = 1;
-    w.both = 0;
-    w.late = 2;
+    w.sway = 0.1;
     walk(&w, 2 * HALF * 12);
-    expect_near("forward", w.hold.speed[0], 0.8, 0.005 * 0.8);
+    expect_near("forward", w.hold.speed[0], 0.6, 0.003 * 0.6);
+    expect_near("left", w.hold.speed[1], 0, 1e-3);
+}
+
+TEST(a_gyroscope_may_be_wrong) {
+    Walker w = walker_at(0.6, 1);
+    w.free = 1;
+    w.bias = 0.05;
+    walk(&w, 2 * HALF * 50);
+    expect_near("forward", w.hold.speed[0], 0.6, 0.01 * 0.6);
 }
 
 TEST(a_slow_walk_comes_to_its_speed) {
