@@ -105,6 +105,11 @@ MILD_HD void element_drag(Element *e, int curves, Real dt, Real gain) {
     const Real u0 = real_max(e->depth, a);
     const Real extra = real_max(2 * e->entry_drag, 0); /* [kg/m] (c_d - 1) m_a' at the surface */
     const int drags = extra > 0 && element_virgin_way(e, dt, e->entry_speed) > 0;
+    if (ON_GPU(!drags, 0)) { /* what follows finds the same */
+        e->stop_drag = 0;
+        e->stop_growth = 0;
+        return;
+    }
 
     /* What the free motion adds to h^2 on the way to the front. */
     const Real faster = drags ? 2 * (real_over(gain, dt) * real_max(a - e->middle, 0)) : 0;

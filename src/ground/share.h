@@ -102,6 +102,23 @@ typedef struct {
     int changes; /* bool: it is not that of the element, or friction is another */
 } ShareLoad;
 
+/* [-] Friction of an element at the share q of c, whose yield load is `force` [N]. rate: 1/dt. */
+MILD_HD Real share_grip(const Element *e, const Share *share, Real q, Real c, Real force, Real dt,
+                        Real rate) {
+    const Real lost = 1 - real_over(q, c);
+    const Real grips = real_max(real_over(SHARE_YIELD * share->grip * lost, 1 + lost), SHARE_GRIP);
+    const Real held = real_min(share->mu, grips);
+
+    /* The recruited mass is set in motion by the whole of mu. */
+    const Real a = e->yield_depth;
+    const Real h = e->entry_speed;
+    const Real way = real_max(e->depth + dt / 2 * h - a, 0);
+    const Real drag = real_max(e->law.drag_rate, 0) * law_moved_share(&e->law, LAW_HEAP, a);
+    const Real strikes = drag * way * h * rate;
+    const Real moves = real_over(strikes, strikes + force + ELEMENT_TINY);
+    return share->grip > 0 ? held + (share->mu - held) * moves : share->mu;
+}
+
 /* element_share without friction's spring. */
 MILD_HD ShareLoad element_share_still(Element *e, Share *share, Real dt, Real rate, Real level,
                                       Real ahead) {
@@ -110,17 +127,9 @@ MILD_HD ShareLoad element_share_still(Element *e, Share *share, Real dt, Real ra
     const Real c = share_lean(share, level);
     const Real q = real_min(1 - share->worn, c);
     const Real force = share_force(e, q);
-    const Real lost = 1 - real_over(q, c);
-    const Real grips = real_max(real_over(SHARE_YIELD * share->grip * lost, 1 + lost), SHARE_GRIP);
-    const Real held = real_min(share->mu, grips);
-
-    /* The recruited mass is set in motion by the whole of mu. */
-    const Real h = e->entry_speed;
-    const Real way = real_max(e->depth + dt / 2 * h - a, 0);
-    const Real drag = real_max(e->law.drag_rate, 0) * law_moved_share(&e->law, LAW_HEAP, a);
-    const Real strikes = drag * way * h * rate;
-    const Real moves = real_over(strikes, strikes + force + ELEMENT_TINY);
-    const Real mu = share->grip > 0 ? held + (share->mu - held) * moves : share->mu;
+    /* a GPU passes by where nothing grips, a vector does not */
+    const int grips = ON_GPU(share->grip > 0, 1);
+    const Real mu = grips ? share_grip(e, share, q, c, force, dt, rate) : share->mu;
     const Real sides = share->side * e->depth * real_max(e->depth, 0) + ahead;
     const ShareLoad load = {force, q < 1 || mu != e->mu || sides > 0};
     share->lean = c;
