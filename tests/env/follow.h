@@ -227,10 +227,12 @@ static double forces_apart(int e) {
  * within a few steps, so that an environment is left alone once it differs, until its next
  * episode; a share of `least` of the steps is before that. In resistive force theory the force
  * jumps where a sole begins to move at 4 mm/s, in three dimensions also where it comes to face its
- * motion (plate.h), and rounding decides in which step. */
+ * motion (plate.h), and rounding decides in which step. So does that of ground that creates energy,
+ * where an element leaves virgin ground. */
 static void follow(const char *robot, TaskDef def, int device, const MildMapDef *on, double least) {
     const int model = def.randomize.model;
-    const int jumps = model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D;
+    const int jumps =
+        model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D || !def.randomize.passive;
     MildMap *map = on ? mild_map_create(on, NULL) : NULL;
     def.map = map;
     int apart[ENVS] = {0}, steps = 0, together = 0, done = 0, timeouts = 0;

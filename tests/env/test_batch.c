@@ -19,8 +19,7 @@ TEST(follows_mujoco_on_a_map) {
     follow(SA01, some_def(), MILD_BATCH_HOST, &map, 0.85);
 }
 
-/* The keys of the paper's own training (configs/paper.ini). The force of ground that creates energy
- * jumps where an element leaves virgin ground, so that robots part sooner. */
+/* The keys of the paper's own training (configs/paper.ini), whose ground creates energy. */
 static TaskDef printed_def(void) {
     TaskDef def = some_def();
     def.torque_hold = 1;
