@@ -86,20 +86,6 @@ MILD_HD Real real_to_one(Real x) {
     return ON_GPU(__saturatef(x), real_min(x, 1));
 }
 
-/* min(max(x - from, 0) scale, 1), scale > 0: one instruction of a GPU beside the product of the last
- * two. */
-MILD_HD Real real_ramp(Real x, Real from, Real scale) {
-#if defined(__CUDA_ARCH__) && defined(MILD_REAL_FLOAT)
-    float ramp;
-    asm("fma.rn.ftz.sat.f32 %0, %1, %2, %3;"
-        : "=f"(ramp)
-        : "f"(x), "f"(scale), "f"(-(from * scale)));
-    return ramp;
-#else
-    return real_min(real_max(x - from, 0) * scale, 1);
-#endif
-}
-
 /* __powf: powf has hundreds of instructions. rsqrtf: one instruction, right to 2 units in the last
  * place. */
 #ifdef MILD_REAL_FLOAT

@@ -13,6 +13,7 @@
 #define TURNING_MAX 0.4 /* [rad/s] of a command in a cycle that r can learn from */
 #define SETTLING 2      /* cycles after that */
 #define DOUBT 4         /* cycles after which the mean weighs as much as what was before */
+#define FLYING 0.75     /* [m/s] of a command at which both feet may be in the air */
 #define LEVELLING 0.05  /* [-] share of a frame's gravity in what is down */
 
 /* ---- the legs ---- */
@@ -218,15 +219,17 @@ static void mean_place(const SpeedHold *hold, int feet, unsigned which, int age,
 /* The stance passed to other feet in the frame of age SPEED_HOLD_LATE. */
 static void take_step(SpeedHold *hold, int feet) {
     const unsigned now = hold->stance[SPEED_HOLD_LATE], before = hold->stance[SPEED_HOLD_LATE + 1];
+    const int flies = hypot(hold->wanted[0], hold->wanted[1]) > FLYING;
+    const int early = flies ? SPEED_HOLD_BEFORE : 0, late = flies ? SPEED_HOLD_AFTER : 0;
     for (int i = 0; i < SPEED_HOLD_SHIFTS; i++) {
         const int age = SPEED_HOLD_LATE + SPEED_HOLD_EARLY - 1 - i;
         double from[2], to[2];
-        mean_place(hold, feet, before, age + SPEED_HOLD_BEFORE, from);
-        mean_place(hold, feet, now, age - SPEED_HOLD_AFTER, to);
+        mean_place(hold, feet, before, age + early, from);
+        mean_place(hold, feet, now, age - late, to);
         hold->way[i][0] += to[0] - from[0];
         hold->way[i][1] += to[1] - from[1];
     }
-    hold->duration -= SPEED_HOLD_BEFORE + SPEED_HOLD_AFTER;
+    hold->duration -= early + late;
 }
 
 /* The shift of the largest mean, of three. */

@@ -1,14 +1,14 @@
 /* Holds the commanded speed by leg odometry. A policy follows a command up to a factor
  * of a few percent, which depends on the ground, the robot and its latencies. Legs measure it: when
- * the stance passes from some feet to others, the base has come as far as these are apart. In the
- * frames around that both may be in the air, so these are left out, of the way and of its time.
- * Over a gait cycle
+ * the stance passes from some feet to others, the base has come as far as these are apart. Over a
+ * gait cycle
  *
- *     v(c) = sum over its passings of p'(c + 2) - p(c - 1) / (its frames - 3 for each of them)
+ *     v(c) = sum over its passings of p'(c) - p(c) / its duration
  *
  * with p(k) and p'(k) the means of the old and the new stance feet's sole centres in the base's
  * heading frame, from the joint angles of three frames around k frames after the clock's passing.
- * Which c? A foot in the air moves forward, so the base goes slower against it than against one on
+ * Above 0.75 m/s both feet may be in the air then: three frames are left out, of the way and of its
+ * time, p'(c + 2) - p(c - 1). Which c? A foot in the air moves forward, so the base goes slower against it than against one on
  * the ground: v(c) is largest where the feet really change. c is where the mean of v over past
  * cycles, along the command, is largest.
  *

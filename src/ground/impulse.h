@@ -164,20 +164,21 @@ MILD_HD Impulse element_impulse_of(const Element *e, int curves, int stops, Real
                                    const ImpulsePowers *powers) {
     const Real middle = e->depth + dt / 2 * speed;
     const Real virgin_way = real_max(middle - e->yield_depth, 0);
-    LawWay virgin = {0, 0, 0, 0};
-    Impulse growth = {0, 0};
     /* a GPU passes by where none of its lanes reaches virgin ground, a vector does not */
-    if (ON_GPU(virgin_way > 0, 1)) {
+    const int reaches = ON_GPU(virgin_way > 0, 1);
+    LawWay virgin = {0, 0, 0, 0};
+    if (reaches) {
         virgin = law_way(&e->law, curves, e->virgin_depth, virgin_way, &powers->virgin);
-        if (curves & LAW_CONE) {
-            growth = growth_impulse(e, dt, speed, &virgin, stops);
-        }
     }
 
     Impulse sum = path_impulse(e, dt, middle, virgin_way, &virgin);
     const Impulse lag = lag_impulse(e, dt, speed);
     if (curves & LAW_CONE) {
         const Impulse mass = mass_impulse(e, speed);
+        Impulse growth = {0, 0};
+        if (reaches) {
+            growth = growth_impulse(e, dt, speed, &virgin, stops);
+        }
         sum.value += mass.value + growth.value;
         sum.slope += mass.slope + growth.slope;
     }

@@ -139,8 +139,10 @@ MILD_HD Law law_merged(Law law, Real begin, Real width) {
 
 /* t [-], 1 when the cone is complete. */
 MILD_HD Real law_cone_progress(const Law *law, int curves, Real depth) {
-    return curves & LAW_HEAP ? real_ramp(depth, law->cone_begin, law->inverse_cone_depth)
-                             : real_to_one(depth * law->inverse_cone_depth);
+    const Real below = depth - law->cone_begin;
+    /* real_to_one cuts what is below 0 where it is an instruction */
+    const Real closing = curves & LAW_HEAP ? ON_GPU(below, real_max(below, 0)) : depth;
+    return real_to_one(closing * law->inverse_cone_depth);
 }
 
 /* 1 - (1 - t)^3 [-], the recruited share of what the complete cone recruits. */
@@ -275,20 +277,20 @@ MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way, const P
         const Real share_begin = law_cone_share(law, curves, begin);
         const Real share_half = law_cone_share(law, curves, half);
         const Real share_end = law_cone_share(law, curves, end);
-        const Real shares = share_begin + 4 * share_half + share_end;
+        const Real share_mean = (share_begin + 4 * share_half + share_end) * REAL(1.0 / 6.0);
         const Real flat_half = law_flat_share(law, curves, half);
         const Real flat_end = law_flat_share(law, curves, end);
-        Real recruited = whole * shares;
-        if (curves & LAW_HEAP) {
-            recruited += real_min(begin, law->cone_begin) + 4 * real_min(half, law->cone_begin) +
-                         real_min(end, law->cone_begin);
-        }
-        over.mean += law->flat_stiffness * REAL(1.0 / 6.0) * recruited;
-        over.mean_slope += law->flat_stiffness * REAL(1.0 / 6.0) * (2 * flat_half + flat_end);
+        over.mean += law->flat_stiffness * whole * share_mean;
+        over.mean_slope += law->flat_stiffness * (2 * flat_half + flat_end) * REAL(1.0 / 6.0);
         over.recruited = way > 0 ? whole * (share_end - share_begin) : 0;
         over.recruited_slope = way > 0 ? flat_end : 0;
     }
     if (curves & LAW_HEAP) {
+        const Real open_begin = real_min(begin, law->cone_begin);
+        const Real open_half = real_min(half, law->cone_begin);
+        const Real open_end = real_min(end, law->cone_begin);
+        over.mean +=
+            law->flat_stiffness * ((open_begin + 4 * open_half + open_end) * REAL(1.0 / 6.0));
         const Real moved = law_moved_depth(law);
         const Real moves = (real_min(end, moved) - real_min(begin, moved)) * (1 / LAW_MOVES);
         const Real moves_slope = end < moved ? 1 / LAW_MOVES : 0;
