@@ -11,7 +11,8 @@ enum { FRAMES_MAX = 60 };
 
 static WindowInput script[FRAMES_MAX]; /* what the window says after each frame */
 static int frames, resets;
-static double now;                      /* [s] */
+static double gain = -1; /* [-] task.speed_hold of the shipped policy; below 0: nobody walks */
+static double now;       /* [s] */
 static double shown[FRAMES_MAX + 1][3]; /* commands that the picture shows */
 static double acted[FRAMES_MAX + 1][3]; /* commands that the policy last saw before a frame */
 static double walked[FRAMES_MAX + 1];   /* [s] that the picture shows */
@@ -58,15 +59,23 @@ static void hold(void *self, int rows, TaskEnv *const *envs, float *actions) {
     memset(actions, 0, sizeof *actions * (size_t) * (const int *)self);
 }
 
+static Controller policy;
+static void walk_on(void *self, int rows, TaskEnv *const *envs, float *actions) {
+    (void)self;
+    memcpy(latest, envs[0]->command, sizeof latest);
+    policy.act(policy.self, rows, envs, actions);
+}
+
 /* Plays the script's first `count` frames. */
 static void play(int count) {
     MildError error = {0};
     TaskDef task = task_def_default();
     Scene scene;
     task_def_make_nominal(&task);
+    task.speed_hold = fmax(gain, 0);
     Robot *robot = kit_robot(SA01);
     int joints = robot_joints(robot);
-    Controller controller = {.self = &joints, .name = "hold", .act = hold};
+    Controller controller = {.self = &joints, .name = "hold", .act = gain < 0 ? hold : walk_on};
     assert_int_equal(scene_make(&scene, "grass", 2, &error), MILD_OK);
     Play walk = {.task = &task,
                  .robot = robot,
@@ -168,6 +177,32 @@ TEST(time_of_the_walk) {
     assert_true(fabs(walked[20] - walked[15] - 2.5 * frame) < 0.011);
     assert_int_equal(resets, 1);
     assert_true(fabs(walked[29] - 4 * frame) < 0.011);
+}
+
+/* The command that the shipped policy sees is corrected by what it has walked, by a fifth at most,
+ * with task.speed_hold alone. R forgets. */
+TEST(the_speed_is_held) {
+    MildError error = {0};
+    Robot *robot = kit_robot(SA01);
+    const char *file = MILD_SOURCE_DIR "/policies/mild.safetensors";
+    expect_good(controller_learned(file, robot, NULL, 1, &policy, &error) == MILD_OK, &error);
+    for (int held = 0; held < 2; held++) {
+        clear();
+        script[0].command[0] = 0.4;
+        for (int f = 0; f < 60; f++) {
+            script[f].time_scale = 10;
+        }
+        script[55].reset = 1;
+        gain = 0.1 * held;
+        play(60);
+        gain = -1;
+        const double off = fabs(acted[55][0] - 0.4);
+        assert_true(held ? off > 1e-4 && off < 0.08 : off < 1e-9);
+        assert_true(fabs(acted[2][0] - 0.4) < 1e-9 && fabs(acted[58][0] - 0.4) < 1e-9);
+        assert_true(fabs(shown[55][0] - acted[55][0]) < 1e-9);
+    }
+    controller_destroy(&policy);
+    robot_destroy(robot);
 }
 
 TEST_MAIN(NULL, NULL)
