@@ -8,9 +8,9 @@
  * with p(k) and p'(k) the means of the old and the new stance feet's sole centres in the base's
  * heading frame, from the joint angles of three frames around k frames after the clock's passing.
  * Above 0.75 m/s both feet may be in the air then: three frames are left out, of the way and of its
- * time, p'(c + 2) - p(c - 1). Which c? A foot in the air moves forward, so the base goes slower against it than against one on
- * the ground: v(c) is largest where the feet really change. c is where the mean of v over past
- * cycles, along the command, is largest.
+ * time, p'(c + 2) - p(c - 1). Which c? A foot in the air moves forward, so the base goes slower
+ * against it than against one on the ground: v(c) is largest where the feet really change. c is
+ * where the mean of v over past cycles, along the command, is largest.
  *
  * What is down follows the turning rate, and the noisy gravity with a time constant of 0.2 s: the
  * noise tilts p and p' nearly alike, and leaves p' - p as it is.
