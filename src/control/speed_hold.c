@@ -13,7 +13,8 @@
 #define TURNING_MAX 0.4 /* [rad/s] of a command in a cycle that r can learn from */
 #define SETTLING 2      /* cycles after that */
 #define DOUBT 4         /* cycles after which the mean weighs as much as what was before */
-#define FLYING 0.75     /* [m/s] of a command at which both feet may be in the air */
+#define FLYING 0.08     /* [-] Froude number above which both feet may be in the air */
+#define GRAVITY 9.81    /* [m/s^2] */
 #define LEVELLING 0.05  /* [-] share of a frame's gravity in what is down */
 
 /* ---- the legs ---- */
@@ -79,6 +80,7 @@ MildStatus speed_hold_legs(const Robot *robot, double gain, SpeedHoldLegs *legs,
     const mjModel *m = robot_sim_model(sim);
     MildStatus status = MILD_OK;
     legs->gain = gain;
+    legs->flying = sqrt(FLYING * GRAVITY * robot_stand_height(robot));
     legs->joints = robot_joints(robot);
     legs->feet = robot_feet(robot);
     memcpy(legs->pose, robot_default_pose(robot), (size_t)legs->joints * sizeof *legs->pose);
@@ -217,15 +219,15 @@ static void mean_place(const SpeedHold *hold, int feet, unsigned which, int age,
 }
 
 /* The stance passed to other feet in the frame of age SPEED_HOLD_LATE. */
-static void take_step(SpeedHold *hold, int feet) {
+static void take_step(SpeedHold *hold, const SpeedHoldLegs *legs) {
     const unsigned now = hold->stance[SPEED_HOLD_LATE], before = hold->stance[SPEED_HOLD_LATE + 1];
-    const int flies = hypot(hold->wanted[0], hold->wanted[1]) > FLYING;
+    const int flies = hypot(hold->wanted[0], hold->wanted[1]) > legs->flying;
     const int early = flies ? SPEED_HOLD_BEFORE : 0, late = flies ? SPEED_HOLD_AFTER : 0;
     for (int i = 0; i < SPEED_HOLD_SHIFTS; i++) {
         const int age = SPEED_HOLD_LATE + SPEED_HOLD_EARLY - 1 - i;
         double from[2], to[2];
-        mean_place(hold, feet, before, age + early, from);
-        mean_place(hold, feet, now, age - late, to);
+        mean_place(hold, legs->feet, before, age + early, from);
+        mean_place(hold, legs->feet, now, age - late, to);
         hold->way[i][0] += to[0] - from[0];
         hold->way[i][1] += to[1] - from[1];
     }
@@ -321,7 +323,7 @@ void speed_hold(SpeedHold *hold, const SpeedHoldLegs *legs, const float *frame, 
     hold->turning |= fabs(command[2]) > TURNING_MAX;
     if (hold->frames == SPEED_HOLD_FRAMES &&
         hold->stance[SPEED_HOLD_LATE] != hold->stance[SPEED_HOLD_LATE + 1]) {
-        take_step(hold, legs->feet);
+        take_step(hold, legs);
         if (hold->stance[SPEED_HOLD_LATE] & ~hold->stance[SPEED_HOLD_LATE + 1] & 1) {
             pass_cycle(hold, legs->gain);
         }

@@ -1,16 +1,16 @@
-/* Holds the commanded speed by leg odometry. A policy follows a command up to a factor
- * of a few percent, which depends on the ground, the robot and its latencies. Legs measure it: when
- * the stance passes from some feet to others, the base has come as far as these are apart. Over a
- * gait cycle
+/* Holds the commanded speed by leg odometry. A policy follows a command up to a factor of a few
+ * percent, which depends on the ground, the robot and its latencies. Legs measure it: when the
+ * stance passes from some feet to others, the base has come as far as these are apart. Over a gait
+ * cycle
  *
- *     v(c) = sum over its passings of p'(c) - p(c) / its duration
+ *     v(c) = (sum over its passings of p'(c) - p(c)) / its duration
  *
  * with p(k) and p'(k) the means of the old and the new stance feet's sole centres in the base's
  * heading frame, from the joint angles of three frames around k frames after the clock's passing.
- * Above 0.75 m/s both feet may be in the air then: three frames are left out, of the way and of its
- * time, p'(c + 2) - p(c - 1). Which c? A foot in the air moves forward, so the base goes slower
- * against it than against one on the ground: v(c) is largest where the feet really change. c is
- * where the mean of v over past cycles, along the command, is largest.
+ * Above a Froude number of 0.08 both feet may be in the air then: three frames are left out, of the
+ * way, p'(c + 2) - p(c - 1), and of its time. Which c? A foot in the air moves forward, so the base
+ * goes slower against it than against one on the ground: v(c) is largest where the feet really
+ * change. c is where the mean of v over past cycles, along the command, is largest.
  *
  * What is down follows the turning rate, and the noisy gravity with a time constant of 0.2 s: the
  * noise tilts p and p' nearly alike, and leaves p' - p as it is.
@@ -46,7 +46,8 @@ typedef struct {
 
 /* A robot's legs, constant. */
 typedef struct {
-    double gain; /* [-] TaskDef.speed_hold; 0: off, and nothing else is there */
+    double gain;   /* [-] TaskDef.speed_hold; 0: off, and nothing else is there */
+    double flying; /* [m/s] speed above which both feet may be in the air */
     int joints, feet;
     double pose[ROBOT_JOINTS_MAX];         /* [rad] what a frame's angles are from */
     double gait_offset[ROBOT_FEET_MAX];    /* of RobotTable */

@@ -23,6 +23,8 @@ TEST(feet_are_where_mujoco_has_them) {
         Random r = random_at(1, (uint32_t)n, 0);
         assert_non_null(sim);
         expect_good(speed_hold_legs(robot, 0.1, &legs, &error) == MILD_OK, &error);
+        const double fast = legs.flying * legs.flying;
+        expect_near("Froude number", fast / (9.81 * robot_stand_height(robot)), 0.08, 1e-12);
         for (int trial = 0; trial < 50; trial++) {
             RobotState at = {.qpos = {0, 0, 0, 1}};
             double foot[ROBOT_FEET_MAX][3];
@@ -96,7 +98,8 @@ typedef struct {
 } Walker;
 
 static SpeedHoldLegs straight_legs(double gain) {
-    SpeedHoldLegs legs = {.gain = gain, .joints = JOINTS, .feet = 2, .gait_offset = {0, 0.5}};
+    SpeedHoldLegs legs = {
+        .gain = gain, .flying = 0.75, .joints = JOINTS, .feet = 2, .gait_offset = {0, 0.5}};
     for (int f = 0; f < 2; f++) {
         legs.links[f] = 2;
         legs.sole_center[f][2] = -LENGTH;
