@@ -439,6 +439,19 @@ WARP_FN int lanes_rank(const int *flag, int *rank) {
 #endif
 }
 
+/* Bool: the flag of some lane is not 0. */
+WARP_FN int lanes_any(const int *flag) {
+#ifdef __CUDACC__
+    return __any_sync(0xffffffffu, flag[0]);
+#else
+    int any = 0;
+    for (int l = 0; l < LANES; l++) {
+        any |= flag[l] != 0;
+    }
+    return any;
+#endif
+}
+
 /* The first lane whose flag is not 0; LANES if there is none. */
 WARP_FN int lanes_first(const int *flag) {
 #ifdef __CUDACC__

@@ -471,18 +471,23 @@ static void first_piece(void *context, int piece, int thread) {
 
 /* ---- steps ---- */
 
-/* One step of the ground under the robots of a share. */
-static MildStatus step_ground(Share *share, MildError *error) {
+static MildBatchInput ground_input(const Share *share) {
     const EnvsArrays *all = &share->arrays;
     const EnvsContact *c = &all->contact;
-    const MildBatchInput input = {.position = c->position,
-                                  .rotation = c->rotation,
-                                  .velocity = c->velocity,
-                                  .inverse_inertia = c->inverse_inertia,
-                                  .free_velocity = c->free_velocity,
-                                  .material = all->material,
-                                  .map_origin = all->map_origin,
-                                  .height = c->height};
+    return (MildBatchInput){.position = c->position,
+                            .rotation = c->rotation,
+                            .velocity = c->velocity,
+                            .inverse_inertia = c->inverse_inertia,
+                            .free_velocity = c->free_velocity,
+                            .material = all->material,
+                            .map_origin = all->map_origin,
+                            .height = c->height};
+}
+
+/* One step of the ground under the robots of a share. */
+static MildStatus step_ground(Share *share, MildError *error) {
+    const EnvsContact *c = &share->arrays.contact;
+    const MildBatchInput input = ground_input(share);
     const MildBatchOutput output = {
         .wrench = c->velocity, .velocity = c->free_velocity, .foot = c->foot};
     return mild_batch_step(&share->ground, &input, &output, 1, share->stream, error);
@@ -496,7 +501,10 @@ static MildStatus step_shells(const Batch *b, const Share *share, int k, MildErr
         return MILD_OK;
     }
     if (b->kernels) {
-        return checked(b->kernels->shells(all, k, share->stream), error);
+        const MildBatchInput input = ground_input(share);
+        const MildStatus status = batch_order(&share->ground, &input, share->stream, error);
+        return status == MILD_OK ? checked(b->kernels->shells(all, k, share->stream), error)
+                                 : status;
     }
     pool_run(b->pool, all->envs, shells_piece, &call);
     return MILD_OK;

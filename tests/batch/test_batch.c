@@ -217,6 +217,71 @@ TEST(device_and_host_agree) {
     }
 }
 
+/* Throws a foot of two robots in three up now and then. */
+static void herd_throw_up(int step) {
+    for (int r = 0; r < ROBOTS && step % 8 == 0; r++) {
+        const int f = (r + step / 8) % 2;
+        herd.kit[r].input.velocity[f][2] += r % 3 ? 0.2 * (1 + r % 4) : 0.0;
+    }
+}
+
+/* Robots of the last step that were in pairs. */
+static int paired(const Side *side) {
+    int32_t order[ROBOTS];
+    int count = 0;
+    side_copy(side, order, side->batch->arrays.order, sizeof order);
+    for (int i = 0; i + 1 < ROBOTS; i += 2) {
+        count += order[i] % 4 != 3 && order[i + 1] % 4 != 3 ? 2 : 0;
+    }
+    return count;
+}
+
+/* Two robots of a warp that have a foot in the air are as one alone is, and the same bits in every
+ * run. */
+TEST(device_pairs_are_robots) {
+    if (!has_device()) {
+        skip();
+    }
+    for (int i = 0; i < SHAPES; i++) {
+        static Errors errors;
+        Side alone, pairs, again;
+        int pairs_of_all = 0;
+        if (shapes[i].feet != 2 || shapes[i].kind != MILD_MAP_FLAT || shapes[i].surfaces > 0 ||
+            shapes[i].pattern != MILD_PATTERN_NONE) {
+            continue;
+        }
+        errors.count = 0;
+        herd_open(&herd, &shapes[i]);
+        side_open(&alone, &herd, 0);
+        side_open(&pairs, &herd, 0);
+        side_open(&again, &herd, 0);
+        pairs.batch->pairs_from = again.batch->pairs_from = 1;
+        for (int s = 0; s < some_steps(); s++) {
+            herd_throw_up(s);
+            herd_solve(&herd, &arrays);
+            side_step(&again, &arrays, 1);
+            other = arrays;
+            side_step(&pairs, &arrays, 1);
+            assert_memory_equal(arrays.wrench, other.wrench, sizeof arrays.wrench);
+            assert_memory_equal(arrays.after, other.after, sizeof arrays.after);
+            pairs_of_all += batch_pairs(pairs.batch) ? paired(&pairs) : 0;
+            side_step(&alone, &other, 1);
+            against_other(&errors, herd.feet, &arrays, &other);
+            herd_advance(&herd);
+            side_follow(&alone, &herd);
+            side_follow(&pairs, &herd);
+            side_follow(&again, &herd);
+        }
+        check_errors(shapes[i].name, &errors, 1e-5, 1e-3);
+        print_message("    %d of %d robots were in pairs\n", pairs_of_all, some_steps() * ROBOTS);
+        assert_true(!batch_pairs(pairs.batch) || pairs_of_all > some_steps() * ROBOTS / 5);
+        side_close(&alone);
+        side_close(&pairs);
+        side_close(&again);
+        herd_close(&herd);
+    }
+}
+
 /* Twenty steps of all robots by the kits and by a batch, and the problem of the next. */
 static void walk_together(Side *walked) {
     for (int s = 0; s < 20; s++) {

@@ -116,9 +116,10 @@ WARP_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
     const ContactResult result = {
         work->wrench[0], work->now.support.free_velocity[0], NULL, NULL, NULL, NULL};
     if (MAP) {
-        ground_robot_map(setup, &problem, (ground_Shared_map *)shared, memory, 1, &result);
+        ground_robot_map(setup, &problem, (ground_Shared_map *)shared, &memory, 1, &result, 0,
+                         NULL);
     } else {
-        ground_robot(setup, &problem, shared, memory, 1, &result);
+        ground_robot(setup, &problem, shared, &memory, 1, &result, NULL);
     }
     lanes_sync();
     return engine_end(model, 0, work);

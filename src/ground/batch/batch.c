@@ -1,14 +1,20 @@
+#define MILD_REAL_FLOAT
 #include "device/device.h"
 #include "ground/batch/bodies_batch.h"
+#include "ground/batch/contact.h"
 #include "ground/batch/contact_shapes.h"
 #include "ground/inside.h"
 #include "ground/law.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define BATCH_TOLERANCE 1e-4
 #define BATCH_LIMIT 20
+/* Robots from which on a step makes pairs. A GPU that has fewer waits for the slowest of them, which
+ * is slower in a pair. */
+#define BATCH_PAIRS_FROM 12288
 #define BATCH_MATERIALS_MAX 1000000
 
 #define BATCH_SIZE(groups, per) {groups, per},
@@ -101,6 +107,7 @@ static MildStatus shape_lanes(BatchShape *shape, MildError *error) {
 static void shape_def(MildBatch *batch, const MildBatchDef *def) {
     BatchShape *shape = &batch->shape;
     batch->device = def->device;
+    batch->pairs_from = BATCH_PAIRS_FROM;
     shape->robots = def->robots;
     shape->soles = def->feet;
     shape->feet = count_planes(def);
@@ -116,11 +123,19 @@ static void shape_def(MildBatch *batch, const MildBatchDef *def) {
     for (int f = 0; f < shape->feet; f++) {
         shape->z[f] = (float)mild_sole_z(def->soles[f]);
         shape->area[f] = (float)(batch->pitch[f] * batch->pitch[f]);
+        const double *const x = mild_sole_x(def->soles[f]), *const y = mild_sole_y(def->soles[f]);
+        for (int e = 0; e < shape->elements[f]; e++) {
+            const float at[2] = {(float)x[e], (float)y[e]};
+            for (int k = 0; k < 2; k++) {
+                shape->low[f][k] = e ? fminf(shape->low[f][k], at[k]) : at[k];
+                shape->high[f][k] = e ? fmaxf(shape->high[f][k], at[k]) : at[k];
+            }
+        }
     }
 }
 
 static size_t element_bytes(const BatchShape *shape) {
-    return 4 * (size_t)shape->groups * (size_t)shape->stride * sizeof(float);
+    return CONTACT_PLACES * (size_t)shape->groups * (size_t)shape->stride * sizeof(float);
 }
 
 static MildStatus store_elements(MildBatch *batch, const MildSole *const *soles, MildError *error) {
@@ -131,14 +146,14 @@ static MildStatus store_elements(MildBatch *batch, const MildSole *const *soles,
         return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
     }
     for (size_t f = 0; f < feet; f++) {
-        float *own = elements + 4 * f * stride;
+        float *own = elements + CONTACT_PLACES * f * stride;
         for (size_t i = 0; i < stride; i++) {
             const int in = (int)i < shape->elements[f];
             const SoleHeap heap = in ? mild_inside_heap(soles[f], (int)i) : (SoleHeap){0.0, 1.0};
-            own[i] = in ? (float)mild_sole_x(soles[f])[i] : 0.0f;
-            own[stride + i] = in ? (float)mild_sole_y(soles[f])[i] : 0.0f;
-            own[2 * stride + i] = (float)heap.begin;
-            own[3 * stride + i] = (float)heap.width;
+            own[CONTACT_X * stride + i] = in ? (float)mild_sole_x(soles[f])[i] : 0.0f;
+            own[CONTACT_Y * stride + i] = in ? (float)mild_sole_y(soles[f])[i] : 0.0f;
+            own[CONTACT_BEGIN * stride + i] = (float)heap.begin;
+            own[CONTACT_WIDTH * stride + i] = (float)heap.width;
         }
     }
     MildStatus status =
@@ -158,6 +173,11 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
     arrays->elements = device_alloc(batch->device, element_bytes(shape), error);
     status = arrays->elements ? batch_memory_open(arrays, shape, batch->device, 0, error)
                               : MILD_ERROR_MEMORY;
+    if (status == MILD_OK && shape->feet == 2 && batch->device != MILD_BATCH_HOST) {
+        const size_t bytes = (size_t)shape->robots * sizeof *arrays->order;
+        arrays->order = device_alloc(batch->device, bytes, error);
+        status = arrays->order ? MILD_OK : MILD_ERROR_MEMORY;
+    }
     if (status != MILD_OK) {
         return status;
     }
@@ -202,6 +222,7 @@ void mild_batch_destroy(MildBatch *batch) {
     device_free(batch->device, batch->arrays.elements);
     device_free(batch->device, batch->arrays.materials);
     device_free(batch->device, batch->arrays.memory);
+    device_free(batch->device, batch->arrays.order);
     batch_map_close(&batch->arrays.map, batch->device);
     batch_bodies_close(&batch->bodies, batch->device);
     free(batch);
@@ -275,24 +296,50 @@ MildBatch batch_share(const MildBatch *batch, int first, int count) {
     MildBatch share = *batch;
     share.shape.robots = count;
     share.arrays.memory += (size_t)first * batch_memory_numbers(&batch->shape);
+    if (share.arrays.order) {
+        share.arrays.order += first;
+    }
     if (share.arrays.worn) {
         share.arrays.worn += (size_t)first * batch_worn_numbers(&batch->shape);
     }
     return share;
 }
 
-static MildStatus batch_gpu_step(const MildBatch *batch, const MildBatchInput *input,
-                                 const MildBatchOutput *output, int advance, MildStream stream,
-                                 MildError *error) {
+/* The kernel that fits, or NULL. */
+static const BatchKernel *batch_kernel(const MildBatch *batch) {
     const BatchShape *shape = &batch->shape;
     for (int i = 0; batch_kernels[i]; i++) {
         const BatchKernel *k = batch_kernels[i];
         if (k->groups == shape->groups && k->per == shape->per && (shape->points || !k->points) &&
             !(batch->curves & ~k->curves)) {
-            return k->step(batch, input, output, advance, stream, error);
+            return k;
         }
     }
-    return device_open(batch->device, error);
+    return NULL;
+}
+
+int batch_pairs(const MildBatch *batch) {
+    const BatchKernel *k = batch->device == MILD_BATCH_HOST ? NULL : batch_kernel(batch);
+    return k && k->pairs && !batch->shape.map && batch->shape.robots >= batch->pairs_from;
+}
+
+MildStatus batch_order(const MildBatch *batch, const MildBatchInput *input, MildStream stream,
+                       MildError *error) {
+    return batch_pairs(batch) ? batch_gpu_order(batch, input, stream, error) : MILD_OK;
+}
+
+static MildStatus batch_gpu_step(const MildBatch *batch, const MildBatchInput *input,
+                                 const MildBatchOutput *output, int advance, MildStream stream,
+                                 MildError *error) {
+    const BatchKernel *k = batch_kernel(batch);
+    MildStatus status = MILD_OK;
+    if (!k) {
+        return device_open(batch->device, error);
+    }
+    if (!batch->arrays.beside) {
+        status = batch_order(batch, input, stream, error);
+    }
+    return status == MILD_OK ? k->step(batch, input, output, advance, stream, error) : status;
 }
 
 /* The step of the feet. */
