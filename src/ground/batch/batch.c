@@ -12,8 +12,8 @@
 
 #define BATCH_TOLERANCE 1e-4
 #define BATCH_LIMIT 20
-/* Robots from which on a step makes pairs. A GPU that has fewer waits for the slowest of them, which
- * is slower in a pair. */
+/* Robots from which on a step makes pairs. A GPU that has fewer waits for the slowest of them,
+ * which is slower in a pair. */
 #define BATCH_PAIRS_FROM 12288
 #define BATCH_MATERIALS_MAX 1000000
 

@@ -237,7 +237,7 @@ MILD_HD void contact_depths(const ContactSole *sole, const Real *R, const Real *
     depth[2] = -R[7];
 }
 
-/* The same a time dt later, where foot f moves by V. Returns a bound on the greatest of them [m]. */
+/* The same a time dt later, where foot f moves by V. Returns a bound on the greatest [m]. */
 MILD_HD Real contact_depths_after(const ContactSole *sole, const ContactProblem *problem, int f,
                                   const Real *V, Real dt, Real depth[3]) {
     const Real *R = problem->rotation + 9 * f;

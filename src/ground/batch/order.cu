@@ -11,9 +11,9 @@ extern "C" {
 
 enum { THREADS = 1024, WARPS = THREADS / LANES };
 
-/* Fills BatchArrays.order: of each robot its number times 4 and its feet that may touch the ground,
- * bit f for foot f; first those with both, which take longest. Of the others two in a row are a pair
- * (contact_pair.inc).
+/* Fills BatchArrays.order: of each robot its number times 4 and its feet that may touch the
+ * ground, bit f for foot f; first those with both, which take longest. Of the others two in a row
+ * are a pair (contact_pair.inc).
  *
  * Each of n blocks puts every n-th robot in order. */
 static __global__ void __launch_bounds__(THREADS)
