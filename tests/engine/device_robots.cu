@@ -116,8 +116,7 @@ WARP_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
     const ContactResult result = {
         work->wrench[0], work->now.support.free_velocity[0], NULL, NULL, NULL, NULL};
     if (MAP) {
-        ground_robot_map(setup, &problem, (ground_Shared_map *)shared, &memory, 1, &result, 0,
-                         NULL);
+        ground_robot_map(setup, &problem, (ground_Shared_map *)shared, &memory, 1, &result, NULL);
     } else {
         ground_robot(setup, &problem, shared, &memory, 1, &result, NULL);
     }

@@ -29,12 +29,12 @@ typedef struct {
 
 /* Where a batch keeps what; on its device. */
 typedef struct {
-    float *elements;            /* [feet][4][stride] of ContactSole */
+    float *elements;            /* [feet][CONTACT_PLACES][stride], see contact.h */
     MaterialNumbers *materials; /* [materials + 1][feet] */
     float *memory;              /* [robots] of contact.h */
     float *worn;                /* [robots][groups][stride] [-] wear, behind `memory`; NULL until
                                    there is a material that wears */
-    int32_t *order;             /* [robots] of a step of pairs, see order.cu; else NULL */
+    int32_t *order;             /* [robots] of two feet on a GPU, see order.cu; else NULL */
     MapView map;                /* all 0 without a map */
     const uint16_t *skip; /* [robots] not 0: a step leaves it alone; NULL: none. Of the caller */
     int beside; /* bool: the kernel before in the stream steps the robots of `skip` and nothing
