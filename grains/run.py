@@ -27,8 +27,10 @@ RECORDS = ROOT / "grains" / "records"
 V = 0.05  # [m/s] of plates that are led: inertial number under 0.005
 
 # Options of the beds. sand: the ground that laws are fitted to; slick: less friction; fine: half the grain; wide: room for
-# soles and large plates; deep: as far as a robot's foot goes down; hertz, rolling: other contacts.
+# soles and large plates; deep: as far as a robot's foot goes down; hertz, rolling: other contacts; medium, loose: grains that
+# roll with resistance, which lie as loose as natural sand; loose_thin, loose_thick: as loose, with a nearer and a further floor.
 BOX, WIDE, FINE, DEEP = "0.45,0.35,0.12", "0.72,0.44,0.12", "0.33,0.28,0.08", "0.5,0.4,0.25"
+LOOSE = {"seeds": "1-3", "box": "0.35,0.29,0.12", "grain": 0.004, "friction": 0.8, "rolling": 1}
 FAMILIES = {
     "sand": {"seeds": "1-8", "box": BOX, "grain": 0.005, "friction": 0.5},
     "slick": {"seeds": "1-8", "box": BOX, "grain": 0.005, "friction": 0.3},
@@ -37,6 +39,10 @@ FAMILIES = {
     "deep": {"seeds": "1-4", "box": DEEP, "grain": 0.005, "friction": 0.5, "settle": 0.8},
     "hertz": {"seeds": "1-4", "box": BOX, "grain": 0.005, "friction": 0.5, "contact": "hertz", "stiffness": 1e7},
     "rolling": {"seeds": "1-4", "box": BOX, "grain": 0.005, "friction": 0.5, "rolling": 0.1},
+    "medium": {**LOOSE, "friction": 0.5, "rolling": 0.3},
+    "loose": LOOSE,
+    "loose_thin": {**LOOSE, "box": "0.35,0.29,0.06"},
+    "loose_thick": {**LOOSE, "box": "0.35,0.29,0.2", "settle": 0.7},
 }
 
 
@@ -123,6 +129,8 @@ BLOCKS = [
     ("slick", [f"ball120 {BALL120} 0 {press(0.018)}"]),
     ("wide", [f"ball170 {BALL170} 0 {press(0.02)}"]),
     ("fine", [f"ball80 {BALL80} 0 {press(0.012)}"]),
+    *((family, [f"disc{size} disc:{size / 1000:g} 0 {press(0.022)}" for size in (60, 80, 100)])
+      for family in ("loose", "medium", "loose_thin", "loose_thick")),  # docs/real-sand.md, predicted before
 ]
 
 
