@@ -42,6 +42,7 @@ FAMILIES = {
     "medium": {**LOOSE, "friction": 0.5, "rolling": 0.3},
     "loose": LOOSE,
     "loose_thin": {**LOOSE, "box": "0.35,0.29,0.06"},
+    "loose_thinner": {**LOOSE, "box": "0.35,0.29,0.045"},
     "loose_thick": {**LOOSE, "box": "0.35,0.29,0.2", "settle": 0.7},
 }
 
@@ -130,7 +131,7 @@ BLOCKS = [
     ("wide", [f"ball170 {BALL170} 0 {press(0.02)}"]),
     ("fine", [f"ball80 {BALL80} 0 {press(0.012)}"]),
     *((family, [f"disc{size} disc:{size / 1000:g} 0 {press(0.022)}" for size in (60, 80, 100)])
-      for family in ("loose", "medium", "loose_thin", "loose_thick")),  # docs/real-sand.md, predicted before
+      for family in ("loose", "medium", "loose_thin", "loose_thick", "loose_thinner")),  # docs/real-sand.md; all but the last predicted before
 ]
 
 

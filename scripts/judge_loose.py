@@ -1,4 +1,5 @@
-"""A law of loose sand that no model of mild has, as an entry of judge.py and real_sand.py: the heap of mild_merged that is never complete.
+"""The heap of mild_merged that is never complete, as an entry of judge.py and real_sand.py. Loose grains have it above a near floor alone
+(docs/real-sand.md, "Loose grains").
 
     build/mild judge --entry scripts/judge_loose.py:loose_heap
 

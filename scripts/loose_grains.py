@@ -81,7 +81,7 @@ def main():
     records = Records(parser.parse_args().records)
     real = {name: trials for name, trials in real_sand.presses().items() if name in real_sand.DISCS}
     beds = {}
-    for family in ("medium", "loose", "loose_thin", "loose_thick"):
+    for family in ("medium", "loose_thick", "loose", "loose_thin", "loose_thinner"):
         cases = {name: records.cases[f"{family}/{name}"][1] for name in real_sand.DISCS if f"{family}/{name}" in records.cases}
         if len(cases) < len(real_sand.DISCS):
             print(f"loose_grains.py: {family}: no records; make them with grains/run.py", file=sys.stderr)
