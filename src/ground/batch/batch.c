@@ -174,7 +174,7 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
     status = arrays->elements ? batch_memory_open(arrays, shape, batch->device, 0, error)
                               : MILD_ERROR_MEMORY;
     if (status == MILD_OK && shape->feet == 2 && batch->device != MILD_BATCH_HOST) {
-        const size_t bytes = (size_t)shape->robots * sizeof *arrays->order;
+        const size_t bytes = (size_t)shape->robots * BATCH_ORDER * sizeof *arrays->order;
         arrays->order = device_alloc(batch->device, bytes, error);
         status = arrays->order ? MILD_OK : MILD_ERROR_MEMORY;
     }
@@ -297,7 +297,7 @@ MildBatch batch_share(const MildBatch *batch, int first, int count) {
     share.shape.robots = count;
     share.arrays.memory += (size_t)first * batch_memory_numbers(&batch->shape);
     if (share.arrays.order) {
-        share.arrays.order += first;
+        share.arrays.order += (size_t)first * BATCH_ORDER;
     }
     if (share.arrays.worn) {
         share.arrays.worn += (size_t)first * batch_worn_numbers(&batch->shape);

@@ -27,6 +27,8 @@ typedef struct {
     float high[MILD_BATCH_PLANES_MAX][2]; /* [feet] [m] greatest */
 } BatchShape;
 
+enum { BATCH_ORDER = 3 }; /* numbers of a robot */
+
 /* Where a batch keeps what; on its device. */
 typedef struct {
     float *elements;            /* [feet][CONTACT_PLACES][stride], see contact.h */
@@ -34,7 +36,8 @@ typedef struct {
     float *memory;              /* [robots] of contact.h */
     float *worn;                /* [robots][groups][stride] [-] wear, behind `memory`; NULL until
                                    there is a material that wears */
-    int32_t *order;             /* [robots] of two feet on a GPU, see order.cu; else NULL */
+    int32_t *order;             /* [robots][BATCH_ORDER] of two feet on a GPU, see order.h; else
+                                   NULL */
     MapView map;                /* all 0 without a map */
     const uint16_t *skip; /* [robots] not 0: a step leaves it alone; NULL: none. Of the caller */
     int beside; /* bool: the kernel before in the stream steps the robots of `skip` and nothing

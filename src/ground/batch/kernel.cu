@@ -12,6 +12,7 @@ extern "C" {
 
 #include "device/cuda.h"
 #include "ground/batch/contact.h"
+#include "ground/batch/order.h"
 
 #define CONTACT_CURVES KERNEL_CURVES
 #define CONTACT_HEAP KERNEL_HEAP
@@ -48,6 +49,7 @@ static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
     const __grid_constant__ ContactSetup setup, const __grid_constant__ BatchShape shape,          \
         const __grid_constant__ BatchArrays arrays, const __grid_constant__ MildBatchInput input,  \
         const __grid_constant__ MildBatchOutput output, int advance
+#define LEFT_BLOCKS 2048 /* of contact_rest that do what contact_pairs has left */
 /* Bool: robot i is among those of a step. */
 #define IS_STEPPED(i) (!(arrays.skip && arrays.skip[i]))
 /* Steps robot i; at, done: foot and done of the version `pair`, where i differs between lanes. */
@@ -74,36 +76,57 @@ static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_level(CON
 }
 
 #if KERNEL_PAIRS
-/* The robots at two places in a row of the order: as a pair, or else one after the other. */
+/* Two robots with one foot near the ground or none. Where they are no pair they are left for
+ * contact_rest: a kernel with the code of both waits longer for instructions. */
 static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_pairs(CONTACT_ARGUMENTS) {
-    __shared__ union {
-        level_Shared level;
-        pair_Shared pair;
-    } shared;
+    __shared__ pair_Shared shared;
+    const BatchOrder order = batch_order_of(&shape, &arrays);
+    const int chunk = (int)blockIdx.x % order.chunks, pair = (int)blockIdx.x / order.chunks;
+    const int place =
+        (shape.robots - 1 - chunk) / order.chunks - 2 * pair - (int)threadIdx.x / (LANES / 2);
     if (!arrays.beside) {
         kernel_wait(); /* for order.cu */
     }
-    const int place = 2 * (int)blockIdx.x + (int)threadIdx.x / (LANES / 2);
-    const int turn = place < shape.robots ? arrays.order[place] : -1;
-    int waits = turn >= 0 && IS_STEPPED(turn / 4);
-    if (__all_sync(~0u, waits && turn % 4 != 3)) {
-        int done;
-        CONTACT_ROBOT(pair, &shared.pair, turn / 4, turn % 4 / 2, &done)
-        waits = !done;
+    kernel_let_go();
+    const int turn = place >= 0 ? __ldcg(&order.list[place * order.chunks + chunk]) : 3;
+    const int waits = !is_both(turn) && IS_STEPPED(turn / 4);
+    int done = 0;
+    if (__all_sync(~0u, waits)) {
+        CONTACT_ROBOT(pair, &shared, turn / 4, turn % 4 / 2, &done)
     }
-    LANE_ROLLED
-    for (int k = 0; k < 2; k++) {
-        if (__shfl_sync(~0u, waits, LANES / 2 * k)) {
-            const int robot = __shfl_sync(~0u, turn, LANES / 2 * k) / 4;
-            CONTACT_ROBOT(level, &shared.level, robot, 0, NULL)
-        }
+    if (waits && !done && threadIdx.x % (LANES / 2) == 0) {
+        order.left[atomicAdd(order.count, 1)] = turn;
     }
     if (arrays.beside && blockIdx.x == 0) {
         kernel_wait();
     }
 }
-#else
-#define contact_pairs contact_level
+
+/* The robots with both feet near it, beside contact_pairs; then, by the last blocks, those left. */
+static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_rest(CONTACT_ARGUMENTS) {
+    __shared__ level_Shared shared;
+    const BatchOrder order = batch_order_of(&shape, &arrays);
+    const int blocks = (int)gridDim.x, from_end = blocks - 1 - (int)blockIdx.x;
+    int at = (int)blockIdx.x, stride = blocks, count = shape.robots, lefts = 0;
+    for (;;) {
+        const int turn = at < count ? __ldcg(lefts ? &order.left[at] : &order.list[at]) : -1;
+        const int is_robot = turn >= 0 && (lefts || is_both(turn));
+        if (is_robot && IS_STEPPED(turn / 4)) {
+            CONTACT_ROBOT(level, &shared, turn / 4, 0, NULL)
+        }
+        at += stride; /* of the same chunk: behind a robot of a pair there are no others */
+        if (!is_robot) {
+            if (lefts || from_end >= LEFT_BLOCKS) {
+                break;
+            }
+            kernel_wait();
+            lefts = 1;
+            count = __ldcg(order.count);
+            at = from_end;
+            stride = blocks < LEFT_BLOCKS ? blocks : LEFT_BLOCKS;
+        }
+    }
+}
 #endif
 
 static __global__ void __launch_bounds__(LANES, MAP_ROBOTS) contact_map(CONTACT_ARGUMENTS) {
@@ -127,14 +150,24 @@ static MildStatus step(const MildBatch *batch, const MildBatchInput *input,
     beside.id = cudaLaunchAttributeProgrammaticStreamSerialization;
     beside.val.programmaticStreamSerializationAllowed = 1;
     cudaLaunchConfig_t config = {};
-    const int pairs = batch_pairs(batch);
-    config.gridDim = dim3((unsigned)(pairs ? (shape->robots + 1) / 2 : shape->robots));
+    config.gridDim = dim3((unsigned)shape->robots);
     config.blockDim = dim3(LANES);
     config.stream = (cudaStream_t)stream;
     config.attrs = &beside;
-    const int waits = batch->arrays.beside || pairs;
-    config.numAttrs = waits && device_lets_go(batch->device) ? 1 : 0;
-    const auto run = shape->map ? contact_map : pairs ? contact_pairs : contact_level;
+    const int lets_go = device_lets_go(batch->device);
+    config.numAttrs = batch->arrays.beside && lets_go ? 1 : 0;
+    auto run = shape->map ? contact_map : contact_level;
+#if KERNEL_PAIRS
+    if (batch_pairs(batch)) { /* half of each chunk: pairs; robots, with as many behind them */
+        const int chunks = (shape->robots + ORDER_ROBOTS - 1) / ORDER_ROBOTS;
+        const int half = ((shape->robots + chunks - 1) / chunks + 1) / 2;
+        config.gridDim = dim3((unsigned)(half * chunks));
+        config.numAttrs = lets_go ? 1 : 0;
+        cudaLaunchKernelEx(&config, contact_pairs, setup, *shape, batch->arrays, *input, *output,
+                           advance);
+        run = contact_rest;
+    }
+#endif
     cudaLaunchKernelEx(&config, run, setup, *shape, batch->arrays, *input, *output, advance);
     return checked(cudaGetLastError(), "step", error);
 }

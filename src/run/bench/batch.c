@@ -136,12 +136,19 @@ static void close_case(BatchCase *c) {
     mild_batch_destroy(c->batch);
 }
 
+/* The problem of a robot. Robots in a row have not moments of a walk that follow each other: a
+ * batch's robots are not alike, and those of a warp wait for each other. */
+static const Problem *problem_of(const BatchBench *bench, int robot) {
+    enum { APART = 1009 }; /* a prime */
+    assert(bench->problems > 0);
+    return &bench->problem[(size_t)robot * APART % (size_t)bench->problems];
+}
+
 /* count numbers of every robot, taken from its problem by their place in it. */
 static float *numbers_of(const BatchBench *bench, int robots, size_t offset, int count) {
     float *all = malloc((size_t)robots * (size_t)count * sizeof *all);
-    assert(bench->problems > 0);
     for (int r = 0; all && r < robots; r++) {
-        const char *problem = (const char *)&bench->problem[r % bench->problems];
+        const char *problem = (const char *)problem_of(bench, r);
         const double *from = (const double *)(problem + offset);
         for (int i = 0; i < count; i++) {
             all[(size_t)r * (size_t)count + (size_t)i] = (float)from[i];
@@ -168,9 +175,8 @@ static MildStatus load_case(BatchCase *c, const BatchBench *bench, MildError *er
     const size_t bytes = (size_t)robots * mild_batch_robot_bytes(c->batch);
     float *memory = malloc(bytes);
     int32_t *material = malloc((size_t)robots * sizeof *material);
-    assert(bench->problems > 0);
     for (int r = 0; memory && material && r < robots; r++) {
-        const Problem *problem = &bench->problem[r % bench->problems];
+        const Problem *problem = problem_of(bench, r);
         memcpy(memory + (size_t)r * numbers, problem->memory, numbers * sizeof *memory);
         memcpy(memory + all + (size_t)r * worn, problem->memory + numbers, worn * sizeof *memory);
         material[r] = problem->material;
@@ -260,7 +266,7 @@ static MildStatus force_errors(const BatchCase *c, const BatchBench *bench, size
     for (size_t p = 0; status == MILD_OK && p < count; p++) {
         double apart = 0.0, size = 0.0;
         for (int i = 0; i < 3 * feet; i++) {
-            const double force = bench->problem[p].result.foot[i / 3].force[i % 3];
+            const double force = problem_of(bench, (int)p)->result.foot[i / 3].force[i % 3];
             const double found = wrench[p * 6 * (size_t)feet + (size_t)(i / 3 * 6 + i % 3)];
             apart += (found - force) * (found - force);
             size += force * force;
