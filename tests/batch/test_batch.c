@@ -235,7 +235,8 @@ static void herd_mislead(int step) {
     }
 }
 
-/* Robots of the last step that were in pairs, and that were taken for one and were none (order.h). */
+/* Robots of the last step that were in pairs, and that were taken for one and were none
+ * (order.h). */
 static void count_pairs(const Side *side, int *paired, int *left) {
     static int32_t order[ROBOTS * BATCH_ORDER];
     side_copy(side, order, side->batch->arrays.order, sizeof order);

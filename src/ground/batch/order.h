@@ -5,8 +5,8 @@
 
 enum { ORDER_ROBOTS = 256 }; /* of a chunk, at most */
 
-/* A chunk has robots that lie next to each other, as many as the next chunk has or one more. Place p
- * of a chunk is at [p * chunks + chunk] of the list: the robot's number times 4 and its feet that
+/* A chunk has robots that lie next to each other, as many as the next chunk has or one more. Place
+ * p of a chunk is at [p * chunks + chunk] of the list: the robot's number times 4 and its feet that
  * may touch the ground, bit f for foot f. Those with both come first; the others, an even number,
  * are pairs, two by two from the last place on. */
 struct BatchOrder {
