@@ -178,7 +178,8 @@ static void bind_sole(nb::module_ &module) {
         .def("__init__", make_sole, nb::arg("outline"), nb::arg("pitch") = 0.0195,
              nb::arg("sole_z") = 0.0, nb::arg("target_elements") = 0)
         .def_static("plate", make_plate, nb::arg("length"), nb::arg("width"),
-                    "A plate of length x width [m] at the paper's pitch, centred under its foot.")
+                    "A plate of length x width [m] at the paper's pitch, centred under its foot: of whole "
+                    "elements, whose area a fit or a press may miss by 5 % on small plates (docs/python.md).")
         .def_static(
             "surface", make_surface, nb::arg("shapes"), nb::arg("pitch") = 0.0195,
             nb::arg("spacing") = 0.0,
