@@ -2,7 +2,8 @@
 """Loose sand that others measured beside loose grains (docs/real-sand.md, "Loose grains"): how the pressure under a disc grows with its
 size and its depth.
 
-    PYTHONPATH=build/python .venv/bin/python scripts/loose_grains.py        # 1 minute
+    PYTHONPATH=build/python .venv/bin/python scripts/loose_grains.py        # 3 s
+    ... scripts/loose_grains.py --figure docs/loose-grains.png
     grains/run.py --only '^(loose|medium)' --gpus 0                         # makes the records that are not there
 
 p ~ D^a u^n near a depth; a from all discs at that depth, n from each disc between half of it and twice of it. Where nothing but the
@@ -75,10 +76,34 @@ def print_models(name, discs, edge):
                                                  for disc, got in zip(soles, cells)) + f"    n {heap.power:.2f}")
 
 
+def draw(real, beds, records, path):
+    """Pressure over depth under the three discs: in the sand, and above floors."""
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    shown = {"the real sand": real} | {f"grains, floor at {1e3 * np.mean(records.manifest[family]['surface_m']):.0f} mm": beds[family]
+                                       for family in ("loose_thinner", "loose_thin", "loose", "loose_thick") if family in beds}
+    figure, panels = plt.subplots(1, len(shown), figsize=(13, 3.6), sharey=True)
+    for axes, (title, discs) in zip(panels, shown.items()):
+        for colour, (disc, trials) in zip(("tab:orange", "tab:green", "tab:blue"), discs.items()):
+            area = math.pi * real_sand.DISCS[disc]**2 / 4
+            for k, (depth, force) in enumerate(trials):
+                axes.plot(1e3 * depth, 1e-3 * force / area, color=colour, lw=1, label=None if k else f"{disc[4:]} mm")
+        axes.set(title=title, xlabel="depth [mm]", xlim=(0, 22), ylim=(0, 50))
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel("mean pressure [kPa]")
+    panels[0].legend(title="disc")
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--records", default=ROOT / "grains" / "records", type=pathlib.Path)
-    records = Records(parser.parse_args().records)
+    parser.add_argument("--figure", type=pathlib.Path, help="draw the curves into this file")
+    args = parser.parse_args()
+    records = Records(args.records)
     real = {name: trials for name, trials in real_sand.presses().items() if name in real_sand.DISCS}
     beds = {}
     for family in ("medium", "loose_thick", "loose", "loose_thin", "loose_thinner"):
@@ -88,6 +113,9 @@ def main():
             continue
         beds[family] = {name: [np.array([rows["depth"], rows["fz"]]) for rows in trials] for name, trials in cases.items()}
     deeps = "".join(f"{f'{1e3 * z:.0f} mm deep':>24}" for z in (DEPTH / 2, DEPTH, 2 * DEPTH))
+    if args.figure:
+        draw(real, beds, records, args.figure)
+        return
     head = 3 * "".join(f"{disc[4:]:>8}" for disc in real_sand.DISCS)
     print(f"pressure [kPa] under discs of 60 to 100 mm\n{'':36}{deeps}\n{'':36}{head}{'a':>9}{'n':>17}{'a + n':>16}")
     print_growth("real sand", real, "0.50 solid")
