@@ -177,10 +177,8 @@ static void bind_sole(nb::module_ &module) {
         "Raises ValueError when the outline crosses itself or encloses no area.")
         .def("__init__", make_sole, nb::arg("outline"), nb::arg("pitch") = 0.0195,
              nb::arg("sole_z") = 0.0, nb::arg("target_elements") = 0)
-        .def_static(
-            "plate", make_plate, nb::arg("length"), nb::arg("width"),
-            "A plate of length x width [m] at the paper's pitch, centred under its foot. It "
-            "has whole elements: 95 cm^2 of 0.1 x 0.1 m (docs/python.md).")
+        .def_static("plate", make_plate, nb::arg("length"), nb::arg("width"),
+                    "A plate of length x width [m], of whole elements, centred (docs/python.md).")
         .def_static(
             "surface", make_surface, nb::arg("shapes"), nb::arg("pitch") = 0.0195,
             nb::arg("spacing") = 0.0,
