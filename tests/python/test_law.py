@@ -17,7 +17,7 @@ MATERIALS = {name: mild.Material(preset, model="mild_merged", **fields) for name
     ("sand_loose", "sand_loose", {}), ("sand_dense", "sand_dense", {}), ("grass", "grass", {}), ("foam45", "foam45", {}),
     ("grains", "sand_loose", GRAINS), ("slips", "sand_loose", SLIPS), ("grips", "sand_loose", SLIPS | {"grip": 0.118}),
     ("grows", "sand_loose", SLIPS | {"grip": 0.118, "slip_growth": 0.07}),
-    ("springs", "sand_loose", GRAINS | {"recovery": 0.3, "c_d": 0.7}),
+    ("springs", "sand_loose", GRAINS | {"recovery": 0.3, "c_d": 0.7, "bed_depth": 0.03}),
     ("shallow", "sand_loose", {"slip_length": 0.0019, "grip": 0.123, "bed_depth": 0.025}))}
 START = 0.0010137  # [m] of the lowest point above the ground: no step begins or ends at the surface
 
@@ -70,7 +70,7 @@ class Law(unittest.TestCase):
     drag                 up 1.5e-10   along 9.9e-11
     slide, then press    up 1.6e-10   along 1.0e-10
     blow                 up 4.6e-9
-    closed motion        up 5.1e-10   along 2.0e-10
+    closed motion        up 3.0e-10   along 1.7e-10
 
     Bounds are three times the greater. Level squares differ by rounding. What is more is in the cells at the edge of a disc (in the blow in the
     step in which their added mass is complete) and in c of tilted soles."""
@@ -116,8 +116,8 @@ class Law(unittest.TestCase):
                                     for dt in (0.25e-3, 1e-3, 5e-3)])
 
     def test_closed(self):
-        self.compare("closed motion", 1.5e-9, [functools.partial(play, twists=closed(seed, 150, 4e-3), dt=4e-3, height=0.02 + START)
-                                             for seed in (1, 2)])
+        self.compare("closed motion", 1e-9, [functools.partial(play, twists=closed(seed, 150, 4e-3), dt=4e-3, height=0.02 + START)
+                                           for seed in (1, 2)])
 
 
 if __name__ == "__main__":
