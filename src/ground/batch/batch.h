@@ -27,7 +27,7 @@ typedef struct {
     float high[MILD_BATCH_PLANES_MAX][2]; /* [feet] [m] greatest */
 } BatchShape;
 
-enum { BATCH_ORDER = 3 }; /* numbers of a robot */
+enum { BATCH_ORDER = 3 }; /* numbers that `order` has for a robot */
 
 /* Where a batch keeps what; on its device. */
 typedef struct {

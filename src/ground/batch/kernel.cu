@@ -107,20 +107,20 @@ static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_rest(CONT
     __shared__ level_Shared shared;
     const BatchOrder order = batch_order_of(&shape, &arrays);
     const int blocks = (int)gridDim.x, from_end = blocks - 1 - (int)blockIdx.x;
-    int at = (int)blockIdx.x, stride = blocks, count = shape.robots, lefts = 0;
+    int at = (int)blockIdx.x, stride = blocks, count = shape.robots, is_left = 0;
     for (;;) {
-        const int turn = at < count ? __ldcg(lefts ? &order.left[at] : &order.list[at]) : -1;
-        const int is_robot = turn >= 0 && (lefts || is_both(turn));
+        const int turn = at < count ? __ldcg(is_left ? &order.left[at] : &order.list[at]) : -1;
+        const int is_robot = turn >= 0 && (is_left || is_both(turn));
         if (is_robot && IS_STEPPED(turn / 4)) {
             CONTACT_ROBOT(level, &shared, turn / 4, 0, NULL)
         }
         at += stride; /* of the same chunk: behind a robot of a pair there are no others */
         if (!is_robot) {
-            if (lefts || from_end >= LEFT_BLOCKS) {
+            if (is_left || from_end >= LEFT_BLOCKS) {
                 break;
             }
             kernel_wait();
-            lefts = 1;
+            is_left = 1;
             count = __ldcg(order.count);
             at = from_end;
             stride = blocks < LEFT_BLOCKS ? blocks : LEFT_BLOCKS;

@@ -32,7 +32,7 @@ static __global__ void __launch_bounds__(ORDER_ROBOTS)
     if (is_robot) {
         batch_problem(&shape, &arrays, &input, robot, &problem);
         near = contact_near(&setup, &problem, 0) + 2 * contact_near(&setup, &problem, 1);
-        near = arrays.skip && arrays.skip[robot] ? 3 : near; /* is no partner */
+        near = arrays.skip && arrays.skip[robot] ? 3 : near; /* no partner */
     }
     const unsigned both = __ballot_sync(~0u, is_both(near));
     const int before = __popc(both & ((1u << lane) - 1));
@@ -47,10 +47,10 @@ static __global__ void __launch_bounds__(ORDER_ROBOTS)
     }
     const int ahead = of_others + before; /* with both feet near */
     const int place = is_both(near) ? ahead : all + thread - ahead;
-    /* one that is over is solved with those */
-    const int is_over = place == all && (size - all) % 2;
+    /* the odd one is solved with those */
+    const int is_odd = place == all && (size - all) % 2;
     if (is_robot) {
-        order.list[place * order.chunks + chunk] = 4 * robot + (is_over ? 3 : near);
+        order.list[place * order.chunks + chunk] = 4 * robot + (is_odd ? 3 : near);
     }
     if (chunk == 0 && thread == 0) {
         *order.count = 0;

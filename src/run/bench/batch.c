@@ -136,8 +136,8 @@ static void close_case(BatchCase *c) {
     mild_batch_destroy(c->batch);
 }
 
-/* The problem of a robot. Robots in a row have not moments of a walk that follow each other: a
- * batch's robots are not alike, and those of a warp wait for each other. */
+/* The problem of a robot. Neighbours have moments of a walk that are far apart: in a training they
+ * are not alike either, and two robots of a warp wait for each other. */
 static const Problem *problem_of(const BatchBench *bench, int robot) {
     enum { APART = 1009 }; /* a prime */
     assert(bench->problems > 0);
