@@ -37,10 +37,10 @@
 #define WRAPS(name) __typeof__(name) __real_##name, __wrap_##name
 
 /* The main function of a program of cases, with what is called before the first and after the last,
- * or NULL. */
+ * or NULL. Arguments of the program are names of cases: it runs these alone. */
 #define TEST_MAIN(before, after)                                                                   \
-    int main(void) {                                                                               \
-        return run_cases(before, after);                                                           \
+    int main(int argc, char **argv) {                                                              \
+        return kit_choose(argc - 1, argv + 1) ? run_cases(before, after) : 2;                      \
     }
 
 enum { KIT_CASES = 64 };
@@ -54,6 +54,31 @@ static inline void kit_add(const char *name, CMUnitTestFunction run, CMFixtureFu
     }
     const struct CMUnitTest added = {name, run, before, after, NULL};
     kit_cases[kit_case_count++] = added;
+}
+
+/* Keeps the cases with these names, in the order of the text; all where there are none. Bool: there
+ * is a case of each name. */
+static inline int kit_choose(int count, char **names) {
+    int chosen[KIT_CASES] = {0};
+    for (int n = 0; n < count; n++) {
+        size_t i = 0;
+        while (i < kit_case_count && strcmp(kit_cases[i].name, names[n]) != 0) {
+            i++;
+        }
+        if (i == kit_case_count) {
+            fprintf(stderr, "%s: not a case of this program\n", names[n]);
+            return 0;
+        }
+        chosen[i] = 1;
+    }
+    size_t kept = 0;
+    for (size_t i = 0; i < kit_case_count; i++) {
+        if (count == 0 || chosen[i]) {
+            kit_cases[kept++] = kit_cases[i];
+        }
+    }
+    kit_case_count = kept;
+    return 1;
 }
 
 /* Runs the cases; the exit status. */

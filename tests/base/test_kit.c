@@ -71,4 +71,23 @@ TEST(an_error_is_taken_once) {
     assert_non_null(kit_error_fault(&error, MILD_ERROR_IO, "a.ini"));
 }
 
+TEST(cases_are_chosen_by_name) {
+    struct CMUnitTest all[KIT_CASES];
+    const size_t count = kit_case_count;
+    memcpy(all, kit_cases, sizeof all);
+    char *names[] = {"errors_have_faults", "whole_words_are_named", "errors_have_faults", "errors"};
+    const int found = kit_choose(3, names);
+    const size_t kept = kit_case_count;
+    const char *first = kit_cases[0].name, *second = kit_cases[1].name;
+    memcpy(kit_cases, all, sizeof all); /* which cmocka is reading */
+    kit_case_count = count;
+    assert_true(found);
+    assert_int_equal(kept, 2);
+    assert_string_equal(first, "whole_words_are_named");
+    assert_string_equal(second, "errors_have_faults");
+    assert_false(kit_choose(4, names));
+    assert_true(kit_choose(0, names));
+    assert_int_equal(kit_case_count, count);
+}
+
 TEST_MAIN(NULL, NULL)
