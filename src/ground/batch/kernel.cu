@@ -81,14 +81,16 @@ static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_level(CON
 static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_pairs(CONTACT_ARGUMENTS) {
     __shared__ pair_Shared shared;
     const BatchOrder order = batch_order_of(&shape, &arrays);
-    const int chunk = (int)blockIdx.x % order.chunks, pair = (int)blockIdx.x / order.chunks;
-    const int place =
-        (shape.robots - 1 - chunk) / order.chunks - 2 * pair - (int)threadIdx.x / (LANES / 2);
+    const int chunk = (int)blockIdx.x, chunks = (int)gridDim.x;
+    int last = 2 * (int)gridDim.y - 1; /* a chunk may have one or two places less */
+    last -= last * chunks + chunk >= shape.robots;
+    last -= last * chunks + chunk >= shape.robots;
+    const int place = last - 2 * (int)blockIdx.y - (int)threadIdx.x / (LANES / 2);
     if (!arrays.beside) {
         kernel_wait(); /* for order.cu */
     }
     kernel_let_go();
-    const int turn = place >= 0 ? __ldcg(&order.list[place * order.chunks + chunk]) : 3;
+    const int turn = place >= 0 ? __ldcg(&order.list[place * chunks + chunk]) : 3;
     const int waits = !is_both(turn) && IS_STEPPED(turn / 4);
     int done = 0;
     if (__all_sync(~0u, waits)) {
@@ -97,7 +99,7 @@ static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_pairs(CON
     if (waits && !done && threadIdx.x % (LANES / 2) == 0) {
         order.left[atomicAdd(order.count, 1)] = turn;
     }
-    if (arrays.beside && blockIdx.x == 0) {
+    if (arrays.beside && blockIdx.x + blockIdx.y == 0) {
         kernel_wait();
     }
 }
@@ -161,10 +163,11 @@ static MildStatus step(const MildBatch *batch, const MildBatchInput *input,
     if (batch_pairs(batch)) { /* half of each chunk: pairs; robots, with as many behind them */
         const int chunks = (shape->robots + ORDER_ROBOTS - 1) / ORDER_ROBOTS;
         const int half = ((shape->robots + chunks - 1) / chunks + 1) / 2;
-        config.gridDim = dim3((unsigned)(half * chunks));
+        config.gridDim = dim3((unsigned)chunks, (unsigned)half);
         config.numAttrs = lets_go ? 1 : 0;
         cudaLaunchKernelEx(&config, contact_pairs, setup, *shape, batch->arrays, *input, *output,
                            advance);
+        config.gridDim = dim3((unsigned)(half * chunks));
         run = contact_rest;
     }
 #endif
