@@ -340,10 +340,11 @@ static EnvsMemory memory(const Envs *envs) {
     const Batch *b = own_const(envs);
     const size_t task = b->arrays.stride, engine = b->robot;
     const size_t shells = b->bodies.numbers * sizeof *b->bodies.memory;
+    const size_t order = b->ground->arrays.order ? BATCH_ORDER * sizeof(int32_t) : 0;
     const size_t all = b->bytes + b->bodies.bytes;
     return (EnvsMemory){.task = task,
                         .engine = engine,
-                        .ground = mild_batch_robot_bytes(b->ground) + shells,
+                        .ground = mild_batch_robot_bytes(b->ground) + order + shells,
                         .rest = all / (size_t)b->arrays.envs - task - engine};
 }
 
