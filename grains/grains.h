@@ -330,6 +330,10 @@ DEVICE bool grain_touch_plate(const Grains &g, int i, uint32_t touching, Body *a
     const Vec3 rolling = a->torque - before + arm * cross(normal, force);
     const Vec3 back = vec(-force.x, -force.y, -force.z);
     plate_add(plate, back, cross(at, back) - rolling);
+    if (g.shape.band > 0.0f) {
+        const double up = (double)back.z * (double)(1 << SUM_BITS);
+        add_to(&plate->band[shape_band(g.shape, p, radius)], (long long)up);
+    }
     return true;
 }
 

@@ -28,6 +28,8 @@ static const char usage[] =
     "  --bed FILE            a settled bed, lines of `x y z radius` [m]\n"
     "  --write-bed FILE      writes the first settled bed so\n"
     "  --rows N              about how many rows a record has (default 150)\n"
+    "  --bands W             [m] writes FOLDER/NAME-SEED-bands.csv too: force up by bands of the\n"
+    "                        bottom so wide, from its edge, under a sphere from its middle\n"
     "  --case TEXT           a case; stages are press:DEPTH@SPEED, drag:PATH@SPEED,\n"
     "                        load:PATH@SPEED, swipe:DEG@RATE, hold:T, drop:MASS@SPEED,T;\n"
     "                        shapes are disc:D, rect:L,W, polygon:X,Y,..., sphere:R\n"
@@ -47,6 +49,7 @@ struct Options {
     BedDef bed;
     std::string out = ".", write_bed;
     int rows = 150;
+    float band = 0;
     std::vector<Case> cases;
     WalkDef walk;
 };
@@ -139,6 +142,8 @@ static void option_read(Options *o, const std::string &name, const std::string &
         o->write_bed = value;
     } else if (name == "--rows") {
         o->rows = std::max(1, (int)number(value, name));
+    } else if (name == "--bands") {
+        o->band = (float)number(value, name);
     } else if (name == "--case") {
         o->cases.push_back(case_read(value));
     } else {
@@ -207,7 +212,8 @@ int main(int count, char **word) {
         bed_write(bed, o.write_bed);
     }
     const std::vector<char *> saved = bed_save(bed);
-    for (const Case &c : o.cases) {
+    for (Case &c : o.cases) {
+        c.shape.band = o.band;
         start = std::chrono::steady_clock::now();
         bed_restore(&bed, saved);
         case_run(&bed, c, o.rows, o.out);

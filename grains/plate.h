@@ -6,13 +6,14 @@
 
 #include "device.h"
 
-enum : int { SHAPE_POINTS = 64 };
+enum : int { SHAPE_POINTS = 64, BANDS = 64 };
 
 struct Shape {
     int points;   /* of the outline, counter-clockwise or not; 0: a sphere, or no plate */
     float radius; /* of a sphere; 0: none [m] */
     float height; /* of the block [m] */
     float reach;  /* no point of it is farther from its origin [m] */
+    float band;   /* width of a band of Plate.band; 0: none is summed [m] */
     float x[SHAPE_POINTS], y[SHAPE_POINTS];
 };
 
@@ -29,6 +30,7 @@ struct Plate {
     long long sum[6];                /* force and moment about its origin, over the steps so far */
     uint32_t cell_x, cell_y, cell_z; /* its place in the units of the grains */
     float turn[9];                   /* its frame to the world, row major */
+    long long band[BANDS];           /* force up by place, over the steps so far: shape_band */
     float side;                      /* -1: the shape's mirror image in its x-z plane, else 1 */
     Vec3 velocity, spin;             /* of its origin [m/s], [rad/s] */
 };
@@ -79,6 +81,18 @@ DEVICE float shape_nearest(const Shape &s, Vec3 p, Vec3 *normal) {
     const float far = length(d);
     *normal = (1.0f / fmaxf(far, 1e-12f)) * d;
     return far;
+}
+
+/* The band of a grain with the centre p, in the plate's frame, which it touches. What its centre
+ * meets is the shape with its radius around it: under a block a band is as far from the edge of
+ * that, and the last has the grains beside the block and over it; under a sphere it is as far from
+ * the middle. */
+DEVICE int shape_band(const Shape &s, Vec3 p, float radius) {
+    float qx = 0, qy = 0;
+    const float far = s.points == 0 ? sqrtf(p.x * p.x + p.y * p.y)
+                                    : radius - outline_nearest(s, p.x, p.y, &qx, &qy);
+    const bool beside = s.points > 0 && p.z > 0.0f;
+    return beside || far > s.band * (BANDS - 1) ? BANDS - 1 : (int)fmaxf(far / s.band, 0.0f);
 }
 
 /* From the shape's frame to the world's, and back. */

@@ -5,7 +5,7 @@
 #include "plan.h"
 
 struct Record {
-    std::vector<FILE *> file; /* a bed each */
+    std::vector<FILE *> file, bands; /* a bed each; bands: empty where none are summed */
     std::vector<Plate> plate;
     std::vector<double> start; /* depth where the stage began [m] */
     double time = 0, path = 0;
@@ -21,6 +21,26 @@ inline void plates_write(const Bed &bed, const std::vector<Plate> &plate) {
     copy(bed.g.plate, plate.data(), plate.size());
 }
 
+inline std::string case_file(const Bed &bed, const Case &c, int b, const std::string &folder,
+                             const char *what) {
+    return folder + "/" + c.name + "-" + std::to_string(bed.def.seeds[(size_t)b]) + what + ".csv";
+}
+
+inline FILE *case_open(const std::string &name, const char *columns) {
+    FILE *out = fopen((name + ".part").c_str(), "w");
+    if (!out) {
+        stop("cannot write ", name.c_str());
+    }
+    fputs(columns, out);
+    return out;
+}
+
+inline void case_close(FILE *out, const std::string &name) {
+    if (fclose(out) || rename((name + ".part").c_str(), name.c_str())) {
+        stop("cannot write ", name.c_str());
+    }
+}
+
 /* The plate's lowest point half a millimetre above each bed's own surface. */
 inline void case_begin(Bed *bed, const Case &c, Record *r, const std::string &folder) {
     bed->g.shape = c.shape;
@@ -33,26 +53,23 @@ inline void case_begin(Bed *bed, const Case &c, Record *r, const std::string &fo
         p->pitch = c.tilt;
         p->z = (double)bed->surface[(size_t)b] + 0.0005 + shape_lowest(c.shape, c.tilt);
         plate_place(p, bed->g);
-        const std::string name =
-            folder + "/" + c.name + "-" + std::to_string(bed->def.seeds[(size_t)b]) + ".csv";
-        FILE *out = fopen((name + ".part").c_str(), "w");
-        if (!out) {
-            stop("cannot write ", name.c_str());
+        r->file.push_back(case_open(
+            case_file(*bed, c, b, folder, ""),
+            "time_s,stage,depth_m,path_m,pitch_rad,sinkage_m,force_x_n,force_y_n,force_z_n,"
+            "moment_x_nm,moment_y_nm,moment_z_nm,cop_x_m,cop_y_m\n"));
+        if (c.shape.band > 0) {
+            r->bands.push_back(case_open(case_file(*bed, c, b, folder, "-bands"),
+                                         "time_s,depth_m,band_m,force_z_n...\n"));
         }
-        fprintf(out,
-                "time_s,stage,depth_m,path_m,pitch_rad,sinkage_m,force_x_n,force_y_n,force_z_n,"
-                "moment_x_nm,moment_y_nm,moment_z_nm,cop_x_m,cop_y_m\n");
-        r->file.push_back(out);
     }
     plates_write(*bed, r->plate);
 }
 
 inline void case_end(const Bed &bed, const Case &c, Record *r, const std::string &folder) {
     for (int b = 0; b < bed.g.beds; b++) {
-        const std::string name =
-            folder + "/" + c.name + "-" + std::to_string(bed.def.seeds[(size_t)b]) + ".csv";
-        if (fclose(r->file[(size_t)b]) || rename((name + ".part").c_str(), name.c_str())) {
-            stop("cannot write ", name.c_str());
+        case_close(r->file[(size_t)b], case_file(bed, c, b, folder, ""));
+        if (!r->bands.empty()) {
+            case_close(r->bands[(size_t)b], case_file(bed, c, b, folder, "-bands"));
         }
     }
 }
@@ -88,6 +105,15 @@ inline void row_write(FILE *out, const Plate &p, int stage, double time, double 
     fprintf(out, ",%.3g,%.3g\n", pressed ? -w[4] / normal : 0, pressed ? mx / normal : 0);
 }
 
+inline void bands_write(FILE *out, Plate *p, float width, double time, double depth, long steps) {
+    fprintf(out, "%.5g,%.5g,%.4g", time, depth, (double)width);
+    for (long long &band : p->band) {
+        fprintf(out, ",%.4g", (double)band / (double)(1 << SUM_BITS) / (double)steps);
+        band = 0;
+    }
+    fputc('\n', out);
+}
+
 /* Goes on by `steps`; writes a row of each bed: means over these steps, the pose at their end. */
 inline void case_row(Bed *bed, int stage, long steps, Record *r) {
     bed_go(bed, steps);
@@ -103,8 +129,11 @@ inline void case_row(Bed *bed, int stage, long steps, Record *r) {
         }
         p->pushed = 0;
         r->force[b] = w[2];
-        row_write(r->file[b], *p, stage, r->time, p->x, (double)bed->surface[b] - p->z, r->start[b],
-                  w);
+        const double depth = (double)bed->surface[b] - p->z;
+        row_write(r->file[b], *p, stage, r->time, p->x, depth, r->start[b], w);
+        if (!r->bands.empty()) {
+            bands_write(r->bands[b], p, bed->g.shape.band, r->time, depth, steps);
+        }
     }
     plates_write(*bed, r->plate);
 }

@@ -265,6 +265,80 @@ TEST(a_resting_plate_pushes_with_its_weight) {
     bed_close(&bed);
 }
 
+/* Grains of 10 mm under a plate are in the bands of their place: a block's by the distance of a
+ * centre from the edge of what centres meet, beside it and over it in the last; a sphere's from the
+ * middle. */
+TEST(bands_are_places_under_the_plate) {
+    Shape block = case_read("a rect:0.1,0.06 0 hold:1").shape;
+    Shape sphere = case_read("a sphere:0.05 0 hold:1").shape;
+    block.band = sphere.band = 0.004f;
+    const float r = 0.005f;
+    const struct {
+        Vec3 centre;
+        int block, sphere;
+    } rows[] = {
+        {vec(0, 0, -r), 8, 0},                  /* 30 + 5 mm within */
+        {vec(0.02f, -0.0135f, -r), 5, 6},       /* 16.5 + 5 mm within the long edge; 24.1 away */
+        {vec(0.0525f, 0, -0.004f), 0, 13},      /* 2.5 mm outside, so 2.5 within */
+        {vec(-0.049f, -0.029f, -r), 1, 14},     /* at a corner, 1 mm from both */
+        {vec(0.055f, 0, 0.02f), BANDS - 1, 13}, /* beside it */
+        {vec(0.3f, 0, -r), 0, BANDS - 1},       /* none of these touch */
+    };
+    for (const auto &row : rows) {
+        assert_int_equal(shape_band(block, row.centre, r), row.block);
+        assert_int_equal(shape_band(sphere, row.centre, r), row.sphere);
+    }
+}
+
+/* The numbers of a line after its first `skip`. */
+static std::vector<double> line_numbers(const char *line, size_t skip) {
+    std::vector<double> out;
+    for (const std::string &word : words(line, ",\n")) {
+        out.push_back(atof(word.c_str()));
+    }
+    out.erase(out.begin(), out.begin() + (long)std::min(skip, out.size()));
+    return out;
+}
+
+/* What bands have together is the force up of the same row. */
+TEST(bands_sum_to_the_force) {
+    Bed bed;
+    bed_open(&bed, small_bed());
+    bed_settle(&bed);
+    Case c = case_read("banded sphere:0.012 0 press:0.006@0.1");
+    c.shape.band = 0.002f;
+    const char *folder = getenv("TMPDIR") ? getenv("TMPDIR") : "/tmp";
+    case_run(&bed, c, 12, folder);
+    const std::string name = std::string(folder) + "/banded-1";
+    FILE *forces = fopen((name + ".csv").c_str(), "r");
+    FILE *bands = fopen((name + "-bands.csv").c_str(), "r");
+    assert_non_null(forces);
+    assert_non_null(bands);
+    char force[1024], band[4096];
+    double most = 0;
+    int rows = 0;
+    while (fgets(force, sizeof force, forces) && fgets(band, sizeof band, bands)) {
+        const std::vector<double> of = line_numbers(force, 0), up = line_numbers(band, 3);
+        if (rows++ > 0) {
+            double sum = 0;
+            for (double part : up) {
+                sum += part;
+            }
+            assert_int_equal(up.size(), BANDS);
+            expect_near("bands", sum, of[8], 1e-3 * (fabs(of[8]) + 0.01));
+            expect_near("depth", line_numbers(band, 1)[0], of[2], 1e-6);
+            most = fmax(most, of[8]);
+        }
+    }
+    fclose(forces);
+    fclose(bands);
+    remove((name + ".csv").c_str());
+    remove((name + "-bands.csv").c_str());
+    printf("%d rows, up to %.3f N\n", rows - 1, most);
+    assert_true(rows > 10 && most > 0.05);
+    bed_close(&bed);
+}
+
 /* A bed is its seed's, whichever beds are made beside it and whenever lists were made. */
 TEST(a_seed_gives_the_same_bits) {
     BedDef def = small_bed();
