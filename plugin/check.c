@@ -3,7 +3,8 @@
 #include <math.h>
 #include <stdio.h>
 
-#define UPRIGHT 0.9 /* [-] cosine of the tilt of a foot in qpos0 that is still a foot's */
+#define AREA_OFF 0.1 /* [-] by which a foot's elements may cover more or less than its sole */
+#define UPRIGHT 0.9  /* [-] cosine of the tilt of a foot in qpos0 that is still a foot's */
 
 MildStatus check_model(const mjModel *m, int instance, MildError *error) {
     if (m->opt.integrator == mjINT_RK4) {
@@ -98,6 +99,12 @@ static double upright(const mjModel *m, const Foot *foot) {
     return matrix[8];
 }
 
+/* [-] Area of the foot's elements over that of its sole. */
+static double covered(const Foot *foot) {
+    const double pitch = mild_sole_pitch(foot->raster);
+    return mild_sole_elements(foot->raster) * pitch * pitch / foot->area;
+}
+
 int check_feet(const mjModel *m, const Soft *soft, char *text, size_t size) {
     for (int f = 0; f < soft->feet; f++) {
         const Foot *foot = &soft->foot[f];
@@ -109,6 +116,14 @@ int check_feet(const mjModel *m, const Soft *soft, char *text, size_t size) {
                      "the z axis of foot '%.60s' is not vertical in the pose of the file; its sole "
                      "lies across z: name a site whose z axis points up from the sole",
                      foot_name(m, foot));
+            return 1;
+        }
+        if (foot->area > 0 && fabs(covered(foot) - 1) > AREA_OFF) {
+            snprintf(text, size,
+                     "the %d elements of foot '%.60s' cover %.3g of its sole, which has %.3g cm2; "
+                     "set a smaller pitch (now %g m)",
+                     mild_sole_elements(foot->raster), foot_name(m, foot), covered(foot),
+                     1e4 * foot->area, mild_sole_pitch(foot->raster));
             return 1;
         }
     }

@@ -7,8 +7,8 @@
 /* Fails for a model that the plugin cannot serve: the integrator, flags, a second
  * instance. */
 MildStatus check_model(const mjModel *m, int instance, MildError *error);
-/* Writes one line about a foot that stands on MuJoCo's own contact as well, or whose frame is not
- * upright in qpos0. Returns 0 when there is nothing to say. */
+/* Writes one line about a foot that stands on MuJoCo's own contact as well, whose frame is not
+ * upright in qpos0, or whose elements have another area than its sole. Returns 0 when there is nothing to say. */
 int check_feet(const mjModel *m, const Soft *soft, char *text, size_t size);
 
 #endif

@@ -393,6 +393,11 @@ static void cloud_frame(const mjModel *m, const Foot *foot, Cloud *cloud) {
 static MildStatus make_raster(const PluginDef *def, const double *outline, int points, double z,
                               Foot *foot, MildError *error) {
     const MildSoleDef sole = {outline, points, def->pitch, z, def->elements};
+    double twice = 0;
+    for (int i = 0, j = points - 1; i < points; j = i++) {
+        twice += outline[2 * j] * outline[2 * i + 1] - outline[2 * i] * outline[2 * j + 1];
+    }
+    foot->area = def->elements ? 0 : fabs(twice) / 2;
     foot->raster = mild_sole_create(&sole, error);
     return foot->raster ? MILD_OK : MILD_ERROR_ARGUMENT;
 }

@@ -14,6 +14,7 @@ typedef struct {
     int round;        /* bool: a sphere that transmits no moment */
     double center[3]; /* [m] round: centre of the sphere, body frame */
     double radius;    /* [m] round */
+    double area;      /* [m^2] of the sole; 0: its elements are not to have the same */
     MildSole *raster;
     MildSole *sole; /* the raster, or one element in its middle (mild_sole_concentric) */
 } Foot;

@@ -495,7 +495,8 @@ MildStatus mild_contact_check(const MildGround *ground, const MildTerrain *terra
                               const MildContactInput *input, MildError *error);
 /* Updates the memory of the ground for the step that was just solved with this scratch, input and
  * result. It assumes that positions advance by dt times the new velocity. Call it once for each
- * step that the engine keeps. */
+ * step that the engine keeps, also where converged is 0. Where a number of the step is not finite,
+ * it does nothing: the ground remembers what it did before. */
 void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                          const MildContactInput *input, const MildScratch *scratch,
                          const MildContactResult *result);

@@ -365,7 +365,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
 void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                          const MildContactInput *input, const MildScratch *scratch,
                          const MildContactResult *result) {
-    if (!scratch_fits(scratch, ground)) {
+    if (!scratch_fits(scratch, ground) || !scratch->is_number) {
         return;
     }
     if (ground->tiles > 0 && ++ground->imprint_time == 0) {

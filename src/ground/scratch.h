@@ -108,6 +108,7 @@ struct MildScratch {
     double hessian[MILD_FEET_MAX][36];
     double velocity[TWIST_MAX]; /* [m/s, rad/s] V+ of the last solve */
     double dt;                  /* [s] of the last solve */
+    int is_number;              /* bool: its problem and all of its results are finite */
     double *block;              /* the one allocation behind all arrays */
     FootScratch foot[];         /* [feet] */
 };

@@ -160,6 +160,7 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
     memset(result->foot, 0, (size_t)scratch->feet * sizeof *result->foot);
     result->residual = 0.0;
     result->iterations = result->converged = 0;
+    scratch->is_number = 0;
     scratch->dt = input->dt;
     if (!scratch_fits(scratch, ground) || !input->inverse_inertia) {
         memcpy(result->velocity, input->free_velocity, bytes);
@@ -189,5 +190,6 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
         foot_result(scratch, input, f, &result->foot[f]);
         nan |= scratch->foot[f].nan;
     }
-    result->converged = result->converged && !nan && all_finite(input, result, scratch->feet);
+    scratch->is_number = !nan && all_finite(input, result, scratch->feet);
+    result->converged = result->converged && scratch->is_number;
 }

@@ -18,12 +18,20 @@ static void cone_stress_set(MildMaterial *m, double value) {
     m->sigma_cone = value * cos(m->alpha);
 }
 
+/* value, at most and at least what the field of that name may be. */
+static double allowed(const char *name, double value) {
+    const MildField *field =
+        mild_field_find(mild_material_fields, mild_material_field_count, name, NULL);
+    return fmin(fmax(value, field->min), field->max);
+}
+
 static double cone_shape(const MildMaterial *m) {
     return tan(m->alpha) / m->nu;
 }
 
 static void cone_shape_set(MildMaterial *m, double value) {
-    m->nu = tan(m->alpha) / value;
+    m->nu = allowed("nu", tan(m->alpha) / value);
+    m->alpha = atan(m->nu * value); /* as it was, where that nu is allowed */
 }
 
 static double drag(const MildMaterial *m) {
@@ -31,7 +39,9 @@ static double drag(const MildMaterial *m) {
 }
 
 static void drag_set_c_g(MildMaterial *m, double value) {
-    m->c_g = value / (m->c_d * m->phi * m->rho * m->nu);
+    const double c_g = value / (m->c_d * m->phi * m->rho * m->nu);
+    m->c_g = allowed("c_g", c_g);
+    m->c_d *= m->c_g != 0 ? c_g / m->c_g : 1; /* 1 where that c_g is allowed */
 }
 
 static void drag_set_c_d(MildMaterial *m, double value) {

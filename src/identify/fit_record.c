@@ -5,14 +5,14 @@
 
 #include "identify/inverse.h"
 
-enum { LOCAL_ROWS = 200, TERMS = 5 };
+enum { LOCAL_ROWS = 200, TERMS = 5, TURN_ROWS = 3 };
 
 /* [1/s] A way up faster than this by its depth, such as the rebound of a dropped body, is not the
  * unloading line: ground follows 5 ms late (docs/model.md section 6). */
 #define UNLOAD_RATE 2.0
 
 int fit_loading(FitPoint *points, int count) {
-    int kept = 0;
+    int kept = 0, last = 0;
     double deepest = DBL_MIN; /* at depth 0 the law gives no information */
     for (int i = 0; i < count; i++) {
         if (!(points[i].depth >= deepest)) {
@@ -20,6 +20,11 @@ int fit_loading(FitPoint *points, int count) {
         }
         deepest = points[i].depth;
         points[kept++] = points[i];
+        last = i;
+    }
+    /* Where the way turns between two rows, the deepest may be one of the way back already. */
+    for (int k = 0; k < TURN_ROWS && last < count - 1 && kept > FIT_POINTS_MIN; k++) {
+        kept -= points[kept - 1].force < points[kept - 2].force;
     }
     return kept;
 }

@@ -16,6 +16,7 @@
 #define FIT_END 2e-3
 
 #define FIT_BOUND 0.1 /* [-] */
+#define FIT_OTHERS 8  /* [rows] of the noise of all */
 
 enum { FIT_ITERATIONS = 100, FIT_STARTS = 5, FIT_END_STEPS = 60 };
 
@@ -338,9 +339,12 @@ static double excess_allowed(const Fit *fit) {
  * from the present estimate, in excess of the least, over the variance of a row. Rows may differ in
  * noise: then that variance is the mean of (r/(1 - h))^2 with the leverage h, weighted by d^2,
  * where d is the change of a row's force from the minimum. Of a linear law this gives the interval
- * "HC3" of MacKinnon and White 1985. */
+ * "HC3" of MacKinnon and White 1985. A curve may go through the few rows that know a coordinate,
+ * which then say nothing about their noise; so FIT_OTHERS rows with that of all count beside them.
+ */
 static double profile(Fit *fit, double value) {
-    double sum = 0, weight = DBL_MIN;
+    double sum = 0, weight = DBL_MIN, squares = DBL_MIN;
+    const double all = fit->least / fmax(fit->count - fit->coordinates, 1);
     fit->value[fit->fixed] = value;
     fit_descend(fit);
     const double excess = fit_miss(fit) - fit->least;
@@ -349,10 +353,14 @@ static double profile(Fit *fit, double value) {
         const double miss = fit->residual[i] / fmax(1 - fit->leverage[i], 1e-3);
         sum += change * change * miss * miss;
         weight += change * change;
+        squares += change * change * change * change;
     }
+    const double know = weight * weight / squares; /* rows */
+    const double own = sum / weight;
+    const double variance = fmax(own, (know * own + FIT_OTHERS * all) / (know + FIT_OTHERS));
     const double freedom = fit->rows - fit->coordinates;
     const double each = fit->rows < fit->count ? fit->count / fmax(freedom, 1) : 1;
-    return excess / (each * sum / weight + floor_variance(fit) + DBL_MIN);
+    return excess / (each * variance + floor_variance(fit) + DBL_MIN);
 }
 
 /* The end of the interval on the side of `limit`: the root of profile = allowed, sought in its

@@ -674,6 +674,42 @@ TEST(loading) {
     assert_true(points[0].speed == 0);
 }
 
+/* The way turns between two rows, and the deepest row is one of the way back: its force is less
+ * than that of the one before, and no virgin ground's. A record that ends there has no way back. */
+TEST(the_turn_is_no_loading) {
+    enum { DOWN = 20, UP = 10 };
+    for (int ends = 0; ends < 2; ends++) {
+        for (int i = 0; i < DOWN + UP; i++) {
+            const double depth = 1e-3 * (i <= DOWN ? i + 1 : 2 * DOWN - i);
+            points[i] = (FitPoint){.depth = depth, .force = i < DOWN ? 1e4 * depth : 0};
+        }
+        assert_true(points[DOWN].depth > points[DOWN - 1].depth);
+        const int kept = fit_loading(points, ends ? DOWN + 1 : DOWN + UP);
+        assert_int_equal(kept, ends ? DOWN + 1 : DOWN);
+        assert_true(points[DOWN - 1].force == 1e4 * points[DOWN - 1].depth);
+    }
+}
+
+/* Whatever a combination comes to, the material that carries it is one: what one number may not
+ * take another of the combination takes. */
+TEST(combinations_stay_in_range) {
+    const struct {
+        const char *carrier;
+        double least, most;
+    } rows[] = {{"c_g", 10, 3e6}, {"nu", 0.015, 100}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const FitCombination *c = fit_combination(rows[i].carrier);
+        for (double share = 0; share < 1.01; share += 0.1) {
+            MildMaterial material = fit_probe(0);
+            MildError error = {0};
+            const double value = rows[i].least * pow(rows[i].most / rows[i].least, share);
+            c->set(&material, value);
+            expect_good(mild_material_check(&material, &error) == MILD_OK, &error);
+            expect_near(c->name, c->get(&material) / value, 1, 1e-12);
+        }
+    }
+}
+
 TEST(refused) {
     FitDef def = plate("grass");
     FitResult result;
