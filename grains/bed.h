@@ -95,10 +95,18 @@ inline std::vector<Vec3> bed_read(const std::string &file) {
     }
     std::vector<Vec3> grains;
     Vec3 p = {};
-    while (fscanf(in, "%f %f %f %f", &p.x, &p.y, &p.z, &p.unused) == 4) {
+    int read = 0;
+    while ((read = fscanf(in, "%f %f %f %f", &p.x, &p.y, &p.z, &p.unused)) == 4) {
+        if (!std::isfinite(p.x + p.y + p.z) || !(p.unused > 0)) {
+            break;
+        }
         grains.push_back(p);
     }
     fclose(in);
+    if (read != EOF || grains.empty()) {
+        stop("not lines of `x y z radius`: ",
+             (file + ", grain " + std::to_string(grains.size() + 1)).c_str());
+    }
     return grains;
 }
 

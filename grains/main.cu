@@ -57,19 +57,32 @@ struct Options {
 struct FloatOption {
     const char *name;
     float BedDef::*value;
+    double least, most;
 };
 
 static const FloatOption float_options[] = {
-    {"--grain", &BedDef::grain},       {"--spread", &BedDef::spread},
-    {"--friction", &BedDef::friction}, {"--rolling", &BedDef::rolling},
-    {"--density", &BedDef::density},   {"--restitution", &BedDef::restitution},
-    {"--steps", &BedDef::steps},       {"--stiffness", &BedDef::stiffness},
-    {"--settle", &BedDef::settle}};
+    {"--grain", &BedDef::grain, 1e-5, 1},     {"--spread", &BedDef::spread, 0, 0.9},
+    {"--friction", &BedDef::friction, 0, 10}, {"--rolling", &BedDef::rolling, 0, 10},
+    {"--density", &BedDef::density, 1, 1e5},  {"--restitution", &BedDef::restitution, 0.01, 1},
+    {"--steps", &BedDef::steps, 1, 1e4},      {"--stiffness", &BedDef::stiffness, 1, 1e13},
+    {"--settle", &BedDef::settle, 0, 1e3}};
+
+/* A number within a range. */
+static double number_within(const std::string &name, const std::string &value, double least,
+                            double most) {
+    const double x = number(value, name);
+    if (!(x >= least && x <= most)) {
+        char range[80];
+        snprintf(range, sizeof range, " is outside %g .. %g", least, most);
+        stop(name.c_str(), (" " + value + range).c_str());
+    }
+    return x;
+}
 
 static bool option_float(BedDef *def, const std::string &name, const std::string &value) {
     for (const FloatOption &option : float_options) {
         if (name == option.name) {
-            def->*option.value = (float)number(value, name);
+            def->*option.value = (float)number_within(name, value, option.least, option.most);
             return true;
         }
     }
@@ -78,9 +91,10 @@ static bool option_float(BedDef *def, const std::string &name, const std::string
 
 static void option_seeds(BedDef *def, const std::string &value) {
     const std::vector<std::string> part = words(value, "-");
-    const long first = (long)number(part.empty() ? "" : part[0], "--seeds");
-    const long last = part.size() > 1 ? (long)number(part[1], "--seeds") : first;
-    if (part.size() > 2 || first < 0 || last < first || last - first > 63) {
+    const std::string begin = part.empty() ? "" : part[0];
+    const long first = (long)number_within("--seeds", begin, 0, 1e9);
+    const long last = part.size() > 1 ? (long)number_within("--seeds", part[1], 0, 1e9) : first;
+    if (part.size() > 2 || last < first || last - first > 63) {
         stop("--seeds: A or A-B, up to 64 of them");
     }
     def->seeds.clear();
@@ -91,8 +105,8 @@ static void option_seeds(BedDef *def, const std::string &value) {
 
 static void option_box(BedDef *def, const std::string &value) {
     const std::vector<double> v = numbers(":" + value);
-    if (v.size() != 3) {
-        stop("--box: L,W,H");
+    if (v.size() != 3 || !(v[0] > 0 && v[1] > 0 && v[2] > 0)) {
+        stop("--box: L,W,H, each above 0, not ", value.c_str());
     }
     def->length = (float)v[0];
     def->width = (float)v[1];
@@ -103,6 +117,9 @@ static void option_box(BedDef *def, const std::string &value) {
 static bool option_walk(WalkDef *walk, const std::string &name, const std::string &value) {
     if (name == "--sole") {
         walk->shape = shape_read(value);
+        if (walk->shape.points == 0) {
+            stop("--sole: an outline, not ", value.c_str());
+        }
     } else if (name == "--sides") {
         walk->sides = numbers(":" + value);
         if (walk->sides.empty() || walk->sides.size() > RANGE_BEDS) {
@@ -141,9 +158,9 @@ static void option_read(Options *o, const std::string &name, const std::string &
     } else if (name == "--write-bed") {
         o->write_bed = value;
     } else if (name == "--rows") {
-        o->rows = std::max(1, (int)number(value, name));
+        o->rows = (int)number_within(name, value, 1, 1e6);
     } else if (name == "--bands") {
-        o->band = (float)number(value, name);
+        o->band = (float)number_within(name, value, 1e-6, 1);
     } else if (name == "--case") {
         o->cases.push_back(case_read(value));
     } else {
@@ -152,10 +169,7 @@ static void option_read(Options *o, const std::string &name, const std::string &
 }
 
 static void bed_write(const Bed &bed, const std::string &file) {
-    FILE *out = fopen(file.c_str(), "w");
-    if (!out) {
-        stop("cannot write ", file.c_str());
-    }
+    FILE *out = case_open(file, "");
     const std::vector<Place> place = bed_places(bed);
     for (int i = 0; i < bed.g.per; i++) {
         if (place[(size_t)i].radius > 0) {
@@ -165,7 +179,7 @@ static void bed_write(const Bed &bed, const std::string &file) {
                     (double)p.radius);
         }
     }
-    fclose(out);
+    case_close(out, file);
 }
 
 static double seconds_since(std::chrono::steady_clock::time_point start) {

@@ -74,6 +74,10 @@ inline Shape shape_read(const std::string &word) {
     Shape s = {};
     const size_t sizes = kind == "disc" ? 1 : kind == "rect" ? 2 : 0; /* without a height */
     s.height = sizes && v.size() == sizes + 1 ? (float)v[sizes] : 0.06f;
+    const auto is_size = [](double x) { return x > 0; };
+    if (sizes && !std::all_of(v.begin(), v.end(), is_size)) {
+        stop("the sizes of a plate are above 0, not as in ", word.c_str());
+    }
     if (!(s.height > 0)) {
         stop("the height of a plate is above 0, not as in ", word.c_str());
     }
@@ -90,7 +94,7 @@ inline Shape shape_read(const std::string &word) {
         for (size_t k = 0; k < v.size(); k += 2) {
             shape_point(&s, v[k], v[k + 1]);
         }
-    } else if (kind == "sphere" && v.size() == 1) {
+    } else if (kind == "sphere" && v.size() == 1 && v[0] > 0) {
         s.radius = (float)v[0];
         s.reach = 2 * s.radius;
     } else {

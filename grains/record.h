@@ -36,7 +36,8 @@ inline FILE *case_open(const std::string &name, const char *columns) {
 }
 
 inline void case_close(FILE *out, const std::string &name) {
-    if (fclose(out) || rename((name + ".part").c_str(), name.c_str())) {
+    const bool failed = ferror(out) != 0;
+    if (fclose(out) || failed || rename((name + ".part").c_str(), name.c_str())) {
         stop("cannot write ", name.c_str());
     }
 }

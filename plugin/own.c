@@ -37,6 +37,7 @@ static int is_own(const Soft *soft, const MildGround *ground, int f) {
     }
     for (int e = 0; e < ground->padded[f]; e++) {
         own &= is_material(&soft->terrain, memory.material[e], memory.share != NULL);
+        own &= memory.worn[e] >= 0 && memory.worn[e] < 1;
         own &= !memory.share || memory.share[e] >= 0;
     }
     return own;

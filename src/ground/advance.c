@@ -14,7 +14,7 @@ typedef struct {
     const double *rotation;   /* [9] foot to world */
     Motion motion;            /* of the foot after the step */
     double dt;                /* [s] */
-    double height;            /* [m] of the terrain, without its map */
+    const MildTerrain *terrain;
 } Advance;
 
 /* The numbers that a step gives the memory of an element, in the order of Memory. */
@@ -248,7 +248,7 @@ static int foot_advance_all(const Advance *a, const Memory *memory, const int32_
     blocks_remember(a, foot->slot, slots_end(foot), memory, 0, count);
     lanes_sum(count, 2, sums);
     if (foot->uneven) {
-        foot_planes(foot, a->height, memory);
+        foot_planes(foot, a->terrain->height, memory);
     }
     foot_finish(a, memory, material, sums[1] > 0.0);
     return foot->uneven ? foot->elements : (int)sums[0];
@@ -261,8 +261,9 @@ static int face_unlisted(const Advance *a, const Memory *memory, int e) {
     const FootScratch *foot = a->foot;
     const int buried = !foot->away && !(foot->share[e] > 0.0) && foot->depth[e] > foot->least;
     const int32_t material = memory->material[e];
-    if (buried && a->imprints && material >= 0 &&
-        foot->derived[material & 0xff].material.recovery < 1.0) {
+    const int index = material & 0xff;
+    if (buried && a->imprints && material >= 0 && index < a->terrain->material_count &&
+        a->terrain->materials[index].recovery < 1.0) {
         const ImprintElement left = {foot->point_x[e], foot->point_y[e], foot->pitch, a->rotation};
         imprints_press(a->imprints, &left, memory->depth_max[e]);
     }
@@ -355,7 +356,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
             element_imprint(a, memory, s, i, e, &v, lifted, refill);
         }
         if (foot->uneven) {
-            slot_plane(foot, a->height, s, memory, i, e);
+            slot_plane(foot, a->terrain->height, s, memory, i, e);
         }
         touched += !lifted || lifted_material != MATERIAL_NONE;
     }
@@ -384,7 +385,7 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                                  .rotation = foot->faces ? faces_level : input->rotation[f],
                                  .motion = foot_motion(foot, result->velocity + 6 * f),
                                  .dt = input->dt,
-                                 .height = terrain->height};
+                                 .terrain = terrain};
         const int all = slots_are_whole(foot) && ground->tiles == 0 && !foot->faces;
         if (all) {
             ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material);

@@ -6,7 +6,7 @@
 #include <limits.h>
 #include <stdlib.h>
 
-#define PATTERN_WORK 4e9 /* limit on the cells visited while borders are blended */
+#define PATTERN_WORK 1e9 /* limit on the cells visited while borders are blended */
 
 /* Label of the field (i, j). */
 typedef int (*PatternLabel)(const MildMapDef *def, int i, int j);
@@ -66,18 +66,23 @@ static void pattern_blend(MildMap *map, double border, int i, int j) {
     int cells = (int)ceil(nearest / cell); /* to search on either side */
     int cells_y = grid->rows > 1 ? cells : 0;
     for (int dj = -cells_y; dj <= cells_y; dj++) {
+        const int row = neighbour(j + dj, grid->rows, grid->repeats);
+        const Label *labels = &map->label[(size_t)row * (size_t)grid->columns];
+        const double y = dj ? cell * (abs(dj) - 0.5) : 0;
         for (int di = -cells; di <= cells; di++) {
-            int column = neighbour(i + di, grid->columns, grid->repeats);
-            int row = neighbour(j + dj, grid->rows, grid->repeats);
-            int other = map->label[(size_t)row * (size_t)grid->columns + (size_t)column].first;
-            double x = cell * fmax(abs(di) - 0.5, 0.0);
-            double y = cell * fmax(abs(dj) - 0.5, 0.0);
-            double distance = sqrt(x * x + y * y);
-            if (other == here->first || distance >= nearest) {
+            const int column = i + di; /* most are in the grid */
+            const int inside = column >= 0 && column < grid->columns;
+            const int other =
+                labels[inside ? column : neighbour(column, grid->columns, grid->repeats)].first;
+            if (other == here->first) {
                 continue;
             }
-            nearest = distance;
-            here->second = (unsigned char)other;
+            const double x = di ? cell * (abs(di) - 0.5) : 0;
+            const double distance = sqrt(x * x + y * y);
+            if (distance < nearest) {
+                nearest = distance;
+                here->second = (unsigned char)other;
+            }
         }
     }
     /* With a subnormal border, rounding half of it could make the share negative. */

@@ -128,8 +128,11 @@ static void step_twists(const MildScratch *scratch, const MildContactInput *inpu
     const int stride = 6 * scratch->given;
     memcpy(result->velocity, input->free_velocity, 6 * (size_t)scratch->feet * sizeof(double));
     for (int f = 0; f < scratch->feet; f++) {
+        if (scratch->place[f] < 0) {
+            continue;
+        }
         const double *row = input->inverse_inertia + 6 * scratch->place[f] * stride;
-        for (int i = 0; scratch->place[f] >= 0 && i < 6; i++, row += stride) {
+        for (int i = 0; i < 6; i++, row += stride) {
             double sum = result->velocity[6 * f + i];
             for (int k = 0; k < scratch->listed; k++) {
                 const double *A = row + 6 * scratch->place[scratch->list[k]];

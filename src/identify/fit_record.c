@@ -11,6 +11,8 @@ enum { LOCAL_ROWS = 200, TERMS = 5, TURN_ROWS = 3 };
  * unloading line: ground follows 5 ms late (docs/model.md section 6). */
 #define UNLOAD_RATE 2.0
 
+#define TURN_FORCE 0.95 /* [-] of the force before: what is less is no loading */
+
 int fit_loading(FitPoint *points, int count) {
     int kept = 0, last = 0;
     double deepest = DBL_MIN; /* at depth 0 the law gives no information */
@@ -24,7 +26,7 @@ int fit_loading(FitPoint *points, int count) {
     }
     /* Where the way turns between two rows, the deepest may be one of the way back already. */
     for (int k = 0; k < TURN_ROWS && last < count - 1 && kept > FIT_POINTS_MIN; k++) {
-        kept -= points[kept - 1].force < points[kept - 2].force;
+        kept -= points[kept - 1].force < TURN_FORCE * points[kept - 2].force;
     }
     return kept;
 }

@@ -277,12 +277,13 @@ TEST(bands_are_places_under_the_plate) {
         Vec3 centre;
         int block, sphere;
     } rows[] = {
-        {vec(0, 0, -r), 8, 0},                  /* 30 + 5 mm within */
-        {vec(0.02f, -0.0135f, -r), 5, 6},       /* 16.5 + 5 mm within the long edge; 24.1 away */
-        {vec(0.0525f, 0, -0.004f), 0, 13},      /* 2.5 mm outside, so 2.5 within */
-        {vec(-0.049f, -0.029f, -r), 1, 14},     /* at a corner, 1 mm from both */
-        {vec(0.055f, 0, 0.02f), BANDS - 1, 13}, /* beside it */
-        {vec(0.3f, 0, -r), 0, BANDS - 1},       /* none of these touch */
+        {vec(0, 0, -r), 8, 0},                   /* 30 + 5 mm within */
+        {vec(0.02f, -0.0135f, -r), 5, 6},        /* 16.5 + 5 mm within the long edge; 24.1 away */
+        {vec(0.0525f, 0, -0.004f), 0, 13},       /* 2.5 mm outside, so 2.5 within */
+        {vec(-0.049f, -0.029f, -r), 1, 14},      /* at a corner, 1 mm from both */
+        {vec(0.055f, 0, 0.02f), BANDS - 1, 13},  /* beside it */
+        {vec(0.054f, 0, 0.003f), BANDS - 1, 13}, /* and a little above its bottom */
+        {vec(0.3f, 0, -r), 0, BANDS - 1},        /* none of these touch */
     };
     for (const auto &row : rows) {
         assert_int_equal(shape_band(block, row.centre, r), row.block);

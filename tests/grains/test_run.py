@@ -46,6 +46,10 @@ def records_are_made_once(folder):
     run.BLOCKS = [("tiny", ["press rect:0.02,0.02 0 press:0.002@0.2", "tilted disc:0.02 10 press:0.001@0.2"]),
                   ("tiny", ["drag rect:0.02,0.02 0 press:0.002@0.2 drag:0.002@0.2 load:0.002@0.2 swipe:2@2 hold:0.002"])]
     assert begin(folder, "--only", "press") == 0
+    with open(folder / "tiny" / "press-1.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert float(rows[0]["depth_m"]) < 0 and all(
+        abs(float(row["sinkage_m"]) - (float(row["depth_m"]) + 0.0005)) < 2e-6 for row in rows)  # since the stage began, above the bed
     first = (folder / "tiny" / "press-2.csv").read_bytes()
     assert not (folder / "tiny" / "drag-1.csv").exists()
     assert begin(folder) == 0
@@ -73,7 +77,10 @@ def mistakes_are_one_line():
     assert got.returncode == 2 and got.stderr.startswith("run.py: ") and got.stderr.count("\n") == 1
     for args in (["--grain", "x"], ["--nothing", "1"], ["--case", "a disc:0.1 0"], ["--case", "a cube:1 0 press:0.1@1"],
                  ["--case", "a disc:0.1 0 press:0.1"], ["--case", "a disc:0.1 0 fly:1@1"], ["--box", "1,1"],
-                 ["--box", "0.01,0.01,0.01"], ["--seeds", "3-1"], ["--bed", "/none"], ["--contact", "glue"], ["--grain"]):
+                 ["--box", "0.01,0.01,0.01"], ["--seeds", "3-1"], ["--bed", "/none"], ["--contact", "glue"], ["--grain"],
+                 ["--steps", "0"], ["--density", "0"], ["--spread", "2"], ["--bands", "-1"], ["--seeds", "1e30"], ["--rows", "1e20"],
+                 ["--grain", "0"], ["--sole", "sphere:0.02"], ["--bed", "/dev/null"], ["--case", "a sphere:-0.1 0 press:0.1@1"],
+                 ["--case", "a rect:0,0.1 0 press:0.1@1"], ["--bed", __file__]):
         got = subprocess.run([PROGRAM, *args], capture_output=True, text=True)
         print(" ".join(args), "->", got.stderr.strip())
         assert got.returncode == 2 and got.stderr.startswith("grains: ") and got.stderr.count("\n") == 1, args

@@ -244,6 +244,20 @@ TEST(test_refused_rows) {
     mild_ground_solve(kit.ground, &kit.terrain, &kit.input, kit.scratch, &kit.result);
     assert_false(kit.result.converged);
     assert_memory_equal(kit.result.velocity, kit.input.free_velocity, 12 * sizeof(double));
+    /* and nothing of the step before is done again */
+    kit.input.inverse_inertia = kit.A;
+    kit.input.position[0][2] = kit.input.position[1][2] = -0.01;
+    kit.input.velocity[0][2] = kit.input.free_velocity[2] = -0.1;
+    kit_solve(&kit);
+    mild_ground_advance(kit.ground, &kit.terrain, &kit.input, kit.scratch, &kit.result);
+    void *before = aligned_alloc(64, kit.bytes);
+    memcpy(before, kit.ground, kit.bytes);
+    assert_true(mild_ground_depth_max(kit.ground, 0)[0] > 0);
+    kit.input.inverse_inertia = NULL;
+    kit_solve(&kit);
+    mild_ground_advance(kit.ground, &kit.terrain, &kit.input, kit.scratch, &kit.result);
+    assert_memory_equal(kit.ground, before, kit.bytes);
+    free(before);
     kit_close(&kit);
     mild_sole_destroy(sole[0]);
     mild_sole_destroy(sole[1]);

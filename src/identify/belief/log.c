@@ -104,10 +104,14 @@ static MildStatus read_rows(Reader *reader, BeliefLog *log, MildError *error) {
     int room = 0, taken;
     for (char *line = csv_line(&reader->text, &status, error); line && status == MILD_OK;
          line = csv_line(&reader->text, &status, error)) {
+        if (log->count == ROWS_MAX) {
+            return mild_fail(error, MILD_ERROR_RANGE, "%.200s:%d: more than %d rows; cut the log",
+                             reader->text.path, reader->text.number, ROWS_MAX);
+        }
         if (log->count == room) {
-            room = 2 * room + 1024;
+            room = room < ROWS_MAX / 2 - 1024 ? 2 * room + 1024 : ROWS_MAX;
             void *more = realloc(log->frame, sizeof *log->frame * (size_t)room);
-            if (!more || room > ROWS_MAX) {
+            if (!more) {
                 return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: no memory for %d rows",
                                  reader->text.path, room);
             }
