@@ -27,7 +27,7 @@ import numpy as np
 import mild
 from judge_anchors import print_anchors
 from judge_cases import COLUMNS, EDGE, MEASURES, Case, measures, scale
-from judge_entries import (Archimedes, FunctionEntry, GroundEntry, TableEntry, c_function, chrono_scm, rft_stress,
+from judge_entries import (Archimedes, EntryError, FunctionEntry, GroundEntry, TableEntry, c_function, chrono_scm, rft_stress,
                            wong_sand)
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -216,14 +216,18 @@ def print_results(results):
     for fitted in dict.fromkeys(row[0] for row in results):
         rows = [row for row in results if row[0] == fitted]
         names = list(dict.fromkeys(name for row in rows for name in row[6]))
-        print(f"\nfitted on {', '.join(dict.fromkeys(row[1] for row in rows if row[2]))}\n"
+        used = list(dict.fromkeys(row[1] for row in rows if row[2]))
+        hand = [key for key in used if key in FITTED_BY_HAND]
+        print(f"\nfitted on {', '.join(key for key in used if key not in hand)}" + (
+              f"\nout of the score, too, because constants of mild_merged are from them: {', '.join(hand)}" if hand else "") + "\n"
               "errors [%; % of the force before; mm], one bed's noise in the same unit")
         print(f"{'':41}{'grains':>8}{'noise':>6}" + "".join(f"{name[:12]:>13}" for name in names))
         for _, key, used, measure, value, noise, values in rows:
             by, size = scale(measure, value), abs(scale(measure, value))
             unit = 1 if MEASURES[measure][1] == "mm" else 100
             errors = [text_of((values.get(name, np.nan) - value) / by, noise / size, measure) for name in names]
-            print(f"{key + ' fit' * used:29.29}{measure:12.12}{value:8.3g}{unit * noise / size:6.1f}" +
+            mark = " out" if key in FITTED_BY_HAND else " fit" * used
+            print(f"{key + mark:29.29}{measure:12.12}{value:8.3g}{unit * noise / size:6.1f}" +
                   "".join(f"{error:>13}" for error in errors))
 
 
@@ -316,7 +320,10 @@ def main():
     for fitted in args.families.split(","):
         if fitted not in FITS:
             fail(f"--families: {fitted} is not one of {', '.join(FITS)}")
-        judge_family(args, records, fitted, results)
+        try:
+            judge_family(args, records, fitted, results)
+        except EntryError as error:
+            fail(str(error))
     if not results:
         fail("nothing to judge")
     print_results(results)

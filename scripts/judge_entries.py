@@ -162,18 +162,32 @@ def ground_step(ground, motion, mass, dt):
 
 # ---- functions f(depth, tilt, slip, sole) ----
 
+class EntryError(Exception):
+    """What an entry did wrong, in a line that names it."""
+
+
 class FunctionEntry:
     """A function of the contract above."""
 
     def __init__(self, name, function):
         self.name, self.function = name, function
 
+    def call(self, function, *arguments):
+        try:
+            return function(*arguments)
+        except Exception as error:
+            raise EntryError(f"--entry {self.name}: {type(error).__name__}: {error}") from error
+
     def fit(self, records, ground):
         if hasattr(self.function, "fit"):
             self.function.fit(records, ground)
 
     def wrench(self, depth, tilt, slip, sole):
-        return np.asarray(self.function(depth, tilt, slip, sole), float)
+        wrench = self.call(lambda: np.asarray(self.function(depth, tilt, slip, sole), float))
+        if wrench.shape != (6,) or not np.isfinite(wrench).all():
+            raise EntryError(f"--entry {self.name}: six finite numbers are wanted, fx fy fz mx my mz; at depth {depth:.4g} m, tilt {tilt:.4g} rad, "
+                             f"slip {slip:.4g} m it returned {np.array2string(wrench, threshold=6)}".replace("\n", " "))
+        return wrench
 
     def sunk(self, load, depth, tilt, slip, sole):
         """The depth, from `depth` on, at which the function carries a load."""

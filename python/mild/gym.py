@@ -166,8 +166,8 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
 
     Every step returns new arrays, into which the library writes without a copy. Environments that ended begin anew in the
     same step (SAME_STEP): the observation is the first of the new episode, info["final_obs"] (num_envs, ...) has the last of
-    the old one where info["_final_obs"], and info["final_info"]["reward_terms"] (num_envs, terms) the sums of the reward's
-    terms over it, in the order of `reward_names`. The first episodes are shorter than the later ones, so that they do not
+    the old one where info["_final_obs"] and else 0, and info["final_info"] the sums of the reward's terms over it,
+    "reward_terms" (num_envs, terms), in the order of `reward_names`, and whether it ended because a number was none, "diverged". The first episodes are shorter than the later ones, so that they do not
     end together. One seed stands for all environments."""
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": ["rgb_array"], "render_fps": 100}
@@ -181,7 +181,7 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
         self.reward_names = self._envs.reward_names
 
     def reset(self, *, seed=None, options=None):
-        """New episodes. seed: a whole number, from which all environments draw differently. options: must be empty."""
+        """New episodes. seed: a whole number, from which all environments draw differently; without it they draw on, and what was drawn for a start from which no step was taken is drawn again. options: must be empty."""
         if options:
             raise ValueError(f"options: {', '.join(options)}: there are none; environments reset themselves (SAME_STEP)")
         observation = self._begin(seed)
@@ -197,7 +197,9 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
     def _info(self, arrays, done):
         if not done.any():
             return {}
-        final = {"reward_terms": arrays["terms"], "_reward_terms": done, "diverged": ~arrays["valid"], "_diverged": done}
+        for name in ("terms", "last"):  # where no episode ended the library writes nothing
+            arrays[name][~done] = 0
+        final = {"reward_terms": arrays["terms"], "_reward_terms": done, "diverged": done & ~arrays["valid"], "_diverged": done}
         return {"final_obs": self._seen(arrays["last"]), "_final_obs": done, "final_info": final, "_final_info": done}
 
     def statistics(self):

@@ -1,6 +1,7 @@
 """rsl_rl: environments whose tensors the library writes, on the CPU or a CUDA device; and its policies as files of mild:
 python -m mild.rsl_rl model_1500.pt --config configs/quick.ini --out walk.safetensors"""
 import argparse
+import os
 import itertools
 
 import torch
@@ -149,6 +150,8 @@ def main():
     for text in overrides:
         if not text.startswith("--") or "." not in text or "=" not in text:
             parser.error(f"unknown option {text}")
+    if os.path.exists(given.out) and os.path.exists(given.checkpoint) and os.path.samefile(given.out, given.checkpoint):
+        parser.error(f"--out: {given.out} is the checkpoint; name another file")
     try:
         envs = open_envs(1, config=given.config, overrides=dict(text[2:].split("=", 1) for text in overrides), robot=given.robot, device="cpu", threads=1)
         policy_of(envs, given.checkpoint, given.out)

@@ -313,7 +313,11 @@ MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
     }
     free(cells);
     free(work);
-    if (!reached) {
+    if (!reached && !def->target_elements) {
+        mild_fail(error, MILD_ERROR_RANGE,
+                  "sole: its outline has no centre of a cell of pitch %g; use a smaller sole.pitch",
+                  def->pitch);
+    } else if (!reached) {
         mild_fail(
             error, MILD_ERROR_RANGE,
             "sole.target_elements = %d: fewer cells of pitch %g touch the outline; use a smaller "

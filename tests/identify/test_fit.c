@@ -691,22 +691,20 @@ TEST(the_turn_is_no_loading) {
 }
 
 /* Whatever a combination comes to, the material that carries it is one: what one number may not
- * take another of the combination takes. */
-TEST(combinations_stay_in_range) {
-    const struct {
-        const char *carrier;
-        double least, most;
-    } rows[] = {{"c_g", 10, 3e6}, {"nu", 0.015, 100}};
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        const FitCombination *c = fit_combination(rows[i].carrier);
-        for (double share = 0; share < 1.01; share += 0.1) {
-            MildMaterial material = fit_probe(0);
-            MildError error = {0};
-            const double value = rows[i].least * pow(rows[i].most / rows[i].least, share);
-            c->set(&material, value);
-            expect_good(mild_material_check(&material, &error) == MILD_OK, &error);
-            expect_near(c->name, c->get(&material) / value, 1, 1e-12);
-        }
+ * take another takes. */
+TEST(what_is_fitted_is_a_material) {
+    static const double drags[] = {1, 30, 90}, slopes[] = {0.12, 3, 9};
+    for (int t = 0; t < 9; t++) {
+        MildError error = {0};
+        FitDef def = plate("sand_dense");
+        def.material.c_g = 45;
+        def.material.c_d = drags[t % 3];
+        def.material.nu = slopes[t / 3];
+        press_exactly(&def, points, ROWS, 0.04, 0.3, 0);
+        FitResult result = run(&def, ROWS);
+        expect_good(mild_material_check(&result.curve, &error) == MILD_OK, &error);
+        assert_true(result.residual_share < 1e-3);
+        expect_near("k_pen", value_of(&result, "k_pen")->value / def.material.k_pen, 1, 0.05);
     }
 }
 

@@ -4,6 +4,7 @@ import collections
 import json
 import math
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -104,10 +105,8 @@ def a_free_plate_falls_and_rests():
 
 
 def records_are_those_of_grains(folder):
-    header = "".join(line.strip().strip('"').replace("\\n", "").rstrip('",').rstrip('"') + ("," if line.strip().endswith(',"') else "")
-                     for line in (SOURCE / "grains" / "record.h").read_text().splitlines()
-                     if line.strip().startswith(('"time_s', '"moment_x')))
-    header = header.replace('");', "")
+    text = (SOURCE / "grains" / "record.h").read_text()
+    header = "".join(re.findall(r'"([^"]*)"', text[text.index('"time_s,stage'):text.index(";", text.index('"time_s,stage'))])).replace("\\n", "")
     assert header == mpm.COLUMNS, header
     rows, _ = mpm.play(Case("x rect:0.1,0.1 15 press:0.015@0.05"), Spring(), options())
     file = folder / "sand" / "x-1.csv"

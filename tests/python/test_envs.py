@@ -125,6 +125,22 @@ class Episodes(unittest.TestCase):
         env.close()
         single.close()
 
+    def test_rows_that_did_not_end(self):
+        """Have zeros, not what memory held."""
+        env = make_vec(8)
+        env.reset(seed=4)
+        partly = 0
+        for step in range(60):
+            _, _, ended, truncated, info = env.step(actions_of(env, step))
+            goes_on = ~(ended | truncated)
+            if info and goes_on.any():
+                partly += 1
+                final = info["final_info"]
+                self.assertTrue((info["final_obs"][goes_on] == 0).all() and (final["reward_terms"][goes_on] == 0).all())
+                self.assertFalse(final["diverged"][goes_on].any())
+        self.assertGreater(partly, 2)
+        env.close()
+
     def test_reward_terms(self):
         """Where the sum is not clipped, the terms of an episode add up to its rewards."""
         env = make_vec(8, {"reward.clip_sum": False})
