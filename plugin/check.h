@@ -8,7 +8,8 @@
  * instance. */
 MildStatus check_model(const mjModel *m, int instance, MildError *error);
 /* Writes one line about a foot that stands on MuJoCo's own contact as well, whose frame is not
- * upright in qpos0, or whose elements have another area than its sole. Returns 0 when there is nothing to say. */
+ * upright in qpos0, or whose elements have another area than its sole. Returns 0 when there is
+ * nothing to say. */
 int check_feet(const mjModel *m, const Soft *soft, char *text, size_t size);
 
 #endif

@@ -208,8 +208,8 @@ void bind_material(nb::module_ &module) {
         module, "Material",
         "Parameters of the element law (docs/model.md section 10): Material(preset, **fields).\n\n"
         "preset: a name of mild.presets(), a soil's file (docs/soil.md), or a Material to start\n"
-        "from. Fields are those below. `model` says which law reads the numbers and changes none of\n"
-        "them; a preset has those of mild. match() makes the numbers of another model.\n"
+        "from. Fields are those below. `model` says which law reads the numbers and changes\n"
+        "none of them; a preset has those of mild. match() makes the numbers of another model.\n"
         "Raises ValueError for a number outside its range, TypeError for a name that is none.");
     bind_fields(type);
     type.def("__init__", make, nb::arg("preset") = "sand_loose", nb::arg("fields"))
