@@ -25,7 +25,7 @@ const MildField plugin_fields[] = {
         "[text] preset, or the file of a soil, which ends in .ini; several when terrain.patches is "
         "set (default sand_loose)"),
     FIELD(sole_z, MILD_FIELD_DOUBLE, 1, -10, 10, "[m] height of the outline's plane in that frame"),
-    FIELD(pitch, MILD_FIELD_DOUBLE, 1, 1e-4, 1, "[m] edge of a ground element"),
+    FIELD(pitch, MILD_FIELD_DOUBLE, 1, 1e-3, 1, "[m] edge of a ground element"),
     FIELD(body_pitch, MILD_FIELD_DOUBLE, 1, 1e-3, 1, "[m] between the elements of a body"),
     FIELD(elements, MILD_FIELD_INT, 1, 0, 65536, "[-] elements of a sole; 0: as many as fit"),
     FIELD(height, MILD_FIELD_DOUBLE, 1, -1e3, 1e3, "[m] of the surface above z = 0"),

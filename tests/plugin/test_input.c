@@ -174,6 +174,30 @@ TEST(warns_of_a_foot_that_lies_on_its_side) {
     mj_deleteModel(m);
 }
 
+/* Elements that have another area than the sole are said, unless their number is asked for. */
+TEST(warns_of_another_area) {
+    const struct {
+        const char *configs;
+        int warns;
+    } cases[] = {{FOOT, 1},
+                 {FOOT CONFIG("pitch", "0.01"), 0},
+                 {FOOT CONFIG("elements", "12"), 0},
+                 {FOOT CONFIG("outline", "-.039 -.0195 .039 -.0195 .039 .0195 -.039 .0195"), 0}};
+    for (int c = 0; c < 4; c++) {
+        mjModel *m =
+            compile("", cases[c].configs, OFF, "", "type='box' size='.04 .025 .02' " OFF, "");
+        assert_non_null(m);
+        mjData *d = mj_makeData(m);
+        print_message("%d: %s\n", c, kit_said);
+        assert_int_equal(kit_messages, cases[c].warns);
+        if (cases[c].warns) {
+            assert_names(kit_said, "12 foot 1.14 40 cm2 pitch 0.0195");
+        }
+        mj_deleteData(d);
+        mj_deleteModel(m);
+    }
+}
+
 #define WHEEL                                                                                      \
     "<mesh name='wheel' vertex='.1 .03 0 .0707 .03 .0707 0 .03 .1 -.0707 .03 .0707 -.1 .03 0 "     \
     "-.0707 .03 -.0707 0 .03 -.1 .0707 .03 -.0707 .0924 -.03 .0383 .0383 -.03 .0924 -.0383 -.03 "  \
