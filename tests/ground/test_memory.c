@@ -282,6 +282,14 @@ TEST(test_restore) {
                          MILD_ERROR_FORMAT);
         assert_memory_equal(kit.ground, saved, kit.bytes);
     }
+    const double wears[] = {-0.1, 0.0, 0.999, 1.0}; /* nothing carries nothing at all */
+    for (int i = 0; i < 4; i++) {
+        memcpy(bent, saved, kit.bytes);
+        memcpy(bent + 320 + 80 * 9 * sizeof(double), &wears[i], sizeof wears[i]);
+        assert_int_equal(mild_ground_restore(kit.ground, bent, kit.bytes, &error),
+                         i % 3 ? MILD_OK : MILD_ERROR_FORMAT);
+    }
+    assert_int_equal(mild_ground_restore(kit.ground, saved, kit.bytes, &error), MILD_OK);
     assert_int_equal(mild_ground_restore(kit.ground, saved, kit.bytes - 1, &error),
                      MILD_ERROR_FORMAT);
     snprintf(names, sizeof names, "%zu %zu", kit.bytes - 1, kit.bytes);
