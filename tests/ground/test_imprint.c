@@ -200,8 +200,9 @@ TEST(test_ends_of_the_range) {
         stamp_press(&stamp, 0.0, far[k], 0.0, 0.04);
         assert_true(stamp_at(&stamp, 0.0, far[k]) == 0.0);
         assert_true(stamp_at(&stamp, far[k], 0.0) == 0.0);
-        stamp_stand(&stamp, far[k], 0.0, 0.0, 0.01); /* nor found */
-        assert_true(mild_ground_depth_max(stamp.ground, 0)[0] == 0.01);
+        stamp_stand(&stamp, far[k], 0.0, 0.0, 0.01);        /* nor found */
+        const double stood = isfinite(far[k]) ? 0.01 : 0.0; /* no step where there is no place */
+        assert_true(mild_ground_depth_max(stamp.ground, 0)[0] == stood);
         stamp_stand(&stamp, far[k], 0.0, 0.0, -5e-4);
     }
     assert_true(fabs(stamp_at(&stamp, 0.0, 0.0) - 0.03) < 1e-9);
