@@ -167,7 +167,7 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
     Every step returns new arrays, into which the library writes without a copy. Environments that ended begin anew in the
     same step (SAME_STEP): the observation is the first of the new episode, info["final_obs"] (num_envs, ...) has the last of
     the old one where info["_final_obs"] and else 0, and info["final_info"] the sums of the reward's terms over it,
-    "reward_terms" (num_envs, terms), in the order of `reward_names`, and whether it ended because a number was none, "diverged". The first episodes are shorter than the later ones, so that they do not
+    "reward_terms" (num_envs, terms), in the order of `reward_names`, and whether it ended because a number was not finite, "diverged". The first episodes are shorter than the later ones, so that they do not
     end together. One seed stands for all environments."""
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": ["rgb_array"], "render_fps": 100}

@@ -6,7 +6,7 @@
 #include <limits.h>
 #include <stdlib.h>
 
-#define PATTERN_WORK 1e9 /* limit on the cells visited while borders are blended */
+#define PATTERN_WORK 4e9 /* limit on the cells visited while borders are blended */
 
 /* Label of the field (i, j). */
 typedef int (*PatternLabel)(const MildMapDef *def, int i, int j);
