@@ -160,59 +160,28 @@ TEST(nothing_is_steady_before_two_seconds) {
     assert_true(m.steady_time == DT && m.work == DT && m.start[0] == 3 && m.end[0] == 3);
 }
 
-/* What the random start does in the first second counts neither for the legs nor for smoothness. */
+/* What the random start does in the first second does not count: two trials whose legs overlap then
+ * and come nearest later, and one that is over by then. */
 TEST(legs_after_the_first_second) {
+    const uint8_t ends[] = {TASK_END_time, TASK_END_time, TASK_END_tilt};
+    const EvalDef eval = {.trials = 3};
     Script s;
-    Measure m;
+    Measure m[3];
+    EvalRow row;
     script_start(&s);
-    measure_start(&m, DT);
-    s.sample.legs = -0.02;
-    for (int k = 0; k < STEPS(1) - 1; k++) {
-        measure_sample(&m, &s.sample);
+    for (int i = 0; i < 3; i++) {
+        measure_start(&m[i], DT);
+        for (int k = 1; k < STEPS(1) + (i < 2 ? 3 : 0); k++) {
+            s.sample.legs = k < STEPS(1) ? -0.02 : k == STEPS(1) + i ? 0.01 * (i + 1) : 0.03;
+            measure_sample(&m[i], &s.sample);
+        }
     }
-    assert_true(isnan(measure_legs(&m)));
-    for (int k = 0; k < 3; k++) {
-        s.sample.legs = k == 1 ? -0.01 : 0.03;
-        measure_sample(&m, &s.sample);
-        expect_near("legs", measure_legs(&m), k ? -0.01 : 0.03, 0);
-    }
-    measure_start(&m, DT);
-    m.time = 1;
-    s.sample.legs = 1e9; /* a robot that has none */
-    measure_sample(&m, &s.sample);
-    assert_true(isnan(measure_legs(&m)));
-}
-
-/* Steps of 0.25 s, of which the last three of seven count. Targets of joint 0: -1 1 0 0.5 0.75
- * -0.25 -1 rad; they change by 0.25, -1, -0.75, and over two steps by 0.75, -0.75, -1.75. Of rates
- * that grow with the number of the step the squares sum to 16 + 25 + 36. */
-TEST(smoothness_by_hand) {
-    static const float actions[] = {-2, 5, 0, 1, 1.5f, -0.5f, -9};
-    Script s;
-    Smooth smooth = {0}, torques = {0}, sum = {0};
-    script_start(&s);
-    for (int k = 0; k < 7; k++) {
-        float action[SA01_JOINTS + 1] = {actions[k], 1};
-        action[SA01_JOINTS] = (float)(k % 2); /* no joint has it */
-        s.sample.speed[SA01_JOINTS] = 99;
-        s.sample.speed[2] = 3;
-        s.sample.speed[11] = -k;
-        s.sample.omega[0] = 0.12 * k;
-        s.sample.omega[1] = -0.16 * k;
-        s.sample.omega[2] = -0.5 * k;
-        assert_int_equal(isnan(smooth_result(&smooth).tilt_rate), k <= 4);
-        smooth_take(&smooth, 1, 0.25, &s.sample, action, 0.5, 2);
-        smooth_take(&torques, 1, 0.25, &s.sample, NULL, 0.5, 2);
-    }
-    smooth_add(&sum, &torques);
-    assert_true(isnan(smooth_result(&sum).target_jump) && isnan(smooth_result(&sum).action_jerk));
-    smooth_add(&sum, &smooth);
-    const Smoothness of = smooth_result(&sum);
-    expect_near("largest change of a target", of.target_jump, 1, 1e-12);
-    expect_near("change in two steps", of.action_jerk, sqrt(4.1875 / 12 / 3) / 0.25, 1e-12);
-    expect_near("roll and pitch rate", of.tilt_rate, 0.2 * sqrt(77.0 / 3), 1e-12);
-    expect_near("yaw rate", of.yaw_rate, 0.5 * sqrt(77.0 / 3), 1e-12);
-    expect_near("joint speed", of.joint_speed, sqrt((3 * 9 + 77) / 12.0 / 3), 1e-12);
+    eval_summarise(&row, "foam45", &eval, m, ends, 400, NULL);
+    expect_near("legs", row.legs, 0.01, 0);
+    eval_summarise(&row, "foam45", &(EvalDef){.trials = 1}, m + 1, ends, 400, NULL);
+    expect_near("legs", row.legs, 0.02, 0);
+    eval_summarise(&row, "foam45", &(EvalDef){.trials = 1}, m + 2, ends, 400, NULL);
+    assert_true(isnan(row.legs));
 }
 
 /* ---- feet ---- */
