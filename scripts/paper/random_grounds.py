@@ -13,7 +13,6 @@ import json
 import os
 import pathlib
 import random
-from types import SimpleNamespace
 
 from measure import ROOT, mild, save, together
 
@@ -36,16 +35,16 @@ def options(ground):
     return [f"--ground.{key}={value:.6g}" for key, value in ground.items()]
 
 
-def judge(who, speeds, trials, seed=1, jobs=1, count=60):
-    """(grounds, [rows of mild eval of each]). who: options of mild eval that say who walks."""
+def drawn(seed, count=60):
+    """The grounds."""
     limits, chance = ranges(), random.Random(seed)
-    grounds = [draw(limits, chance) for _ in range(count)]
+    return [draw(limits, chance) for _ in range(count)]
 
-    def walk(number):
-        return json.loads(mild("eval", "--ground", "foam45", *options(grounds[number]), f"--speed={speeds}", "--trials", trials,
-                               "--seed", number + 1, "--threads", 1, "--json", "-", *who))["rows"]
 
-    return grounds, together(SimpleNamespace(jobs=jobs), walk, range(count))
+def walk(who, ground, number, speeds, trials):
+    """Rows of mild eval on ground number `number`. who: options of mild eval that say who walks."""
+    return json.loads(mild("eval", "--ground", "foam45", *options(ground), f"--speed={speeds}", "--trials", trials, "--seed", number + 1,
+                           "--threads", 1, "--json", "-", *who))["rows"]
 
 
 def main():
@@ -59,7 +58,8 @@ def main():
     parser.add_argument("options", nargs="*", help="after --: of mild eval")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
-    grounds, found = judge(given.options, given.speeds, given.trials, given.seed, given.jobs, given.grounds)
+    grounds = drawn(given.seed, given.grounds)
+    found = together(given, lambda n: walk(given.options, grounds[n], n, given.speeds, given.trials), range(len(grounds)))
     rows = [{"ground": number, "speed": row["speed"], "upright": row["success"], "trials": row["trials"], "velocity": row["velocity"],
              "cot": row["cot"], "torque_max": row["torque_max"], "shells": row["shells"],
              "ends": " ".join(f"{end}:{n}" for end, n in row["ends"].items() if n and end != "time"),

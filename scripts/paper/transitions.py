@@ -38,25 +38,21 @@ def cell_of(pair, row):
     error = None if row["velocity"] is None else row["velocity"] - row["speed"]
     return {"pair": pair, "speed": row["speed"], "trials": row["trials"], "upright": row["success"], "crossed": crossed, "error": error,
             "cot": row["cot"], "torque": max(t["torque_max"] for t in each), "legs": row["legs"],
-            "ends": {end: n for end, n in row["ends"].items() if n and end != "time"}}
+            "target_jump": row.get("target_jump"), "ends": {end: n for end, n in row["ends"].items() if n and end != "time"}}
+
+
+def walk_over(who, pair, speed, trials, seed):
+    """The cell of a pair at a speed. who: options of mild eval that say who walks."""
+    seconds = START + 2 * PATCH / abs(speed)
+    report = mild("eval", *who, "--ground", pair.replace(">", "+"), f"--speed={speed}", "--patch", PATCH, "--trials", trials, "--seed", seed,
+                "--seconds", f"{seconds:.2f}", "--threads", 1, "--json", "-")
+    return cell_of(pair, json.loads(report)["rows"][0])
 
 
 def judge(who, pairs, speeds, trials, seed=1, jobs=1):
-    """Cells in the order of pairs and speeds. who: options of mild eval that say who walks."""
-    firsts = {}
-    for pair in pairs:
-        firsts.setdefault(pair.split(">")[0], []).append(pair)
-    tasks = [(speed, own) for own in firsts.values() for speed in speeds]
-
-    def work(task):
-        speed, own = task
-        seconds = START + 2 * PATCH / abs(speed)
-        report = mild("eval", *who, "--ground", ",".join(pair.replace(">", "+") for pair in own), f"--speed={speed}", "--patch", PATCH,
-                    "--trials", trials, "--seed", seed, "--seconds", f"{seconds:.2f}", "--threads", 1, "--json", "-")
-        return [cell_of(pair, row) for pair, row in zip(own, json.loads(report)["rows"])]
-
-    found = {(c["pair"], c["speed"]): c for cells in together(SimpleNamespace(jobs=jobs), work, tasks) for c in cells}
-    return [found[pair, speed] for pair in pairs for speed in speeds]
+    """Cells in the order of pairs and speeds."""
+    cells = list(itertools.product(pairs, speeds))
+    return together(SimpleNamespace(jobs=jobs), lambda cell: walk_over(who, *cell, trials, seed), cells)
 
 
 def total(cells):

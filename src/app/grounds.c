@@ -125,6 +125,17 @@ MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildErr
     return status == MILD_OK ? width_check(material, mild_sole_width(def->sole), error) : status;
 }
 
+/* `rigid` in a course: firm whatever --ground.KEY says of the soft grounds beside it. The other
+ * overrides are taken. */
+static MildStatus finish_hard(const GroundsDef *def, MildMaterial *material, MildError *error) {
+    static const CliArgs none;
+    MildMaterial unused = *material;
+    GroundsDef hard = *def;
+    hard.args = &none;
+    MildStatus status = grounds_finish(&hard, material, error);
+    return status == MILD_OK ? overlay(def, &unused, error) : status;
+}
+
 MildStatus grounds_finish_scene(const GroundsDef *def, Scene *scene, MildError *error) {
     MildStatus status = MILD_OK;
     if (def->model == MILD_MODEL_RIGID) {
@@ -133,7 +144,8 @@ MildStatus grounds_finish_scene(const GroundsDef *def, Scene *scene, MildError *
         return overlay(def, &unused, error);
     }
     for (int i = 0; status == MILD_OK && i < scene->terrain.material_count; i++) {
-        status = grounds_finish(def, &scene->terrain.materials[i], error);
+        MildMaterial *material = &scene->terrain.materials[i];
+        status = (scene_is_hard(scene, i) ? finish_hard : grounds_finish)(def, material, error);
     }
     return status;
 }

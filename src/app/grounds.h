@@ -42,7 +42,8 @@ GroundsDef grounds_for_robot(int model, Robot *robot, TaskDef *task, TerrainDef 
                              const CliArgs *args);
 /* Turns a preset into the material of the model, then applies the overrides. */
 MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildError *error);
-/* The same for every ground of a scene. The model rigid selects the engine's own contact. */
+/* The same for every ground of a scene; --ground.KEY leaves `rigid` in a course alone. The model
+ * rigid selects the engine's own contact. */
 MildStatus grounds_finish_scene(const GroundsDef *def, Scene *scene, MildError *error);
 /* Puts the map of --terrain.KEY=VALUE under a finished scene and the task. The caller destroys
  * *map (NULL: level ground) after both. With a pattern of materials the scene's grounds are the

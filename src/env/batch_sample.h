@@ -61,6 +61,7 @@ WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, int she
         if (LANE(l) == LANES - 1 && k > 0) {
             for (int i = 0; i < 3; i++) {
                 done->base[i] = (double)work->base[i];
+                done->omega[i] = (double)work->rate[3 + i];
             }
             for (int i = 0; i < 4; i++) {
                 done->quaternion[i] = (double)work->quaternion[i];

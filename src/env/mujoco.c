@@ -283,6 +283,7 @@ void envs_read_sample(const TaskEnv *env, const RobotSim *sim, const double *tor
     memcpy(sample->quaternion, qpos + 3, sizeof sample->quaternion);
     memcpy(sample->mass_center, robot_sim_mass_center(sim), sizeof sample->mass_center);
     memcpy(sample->torque, torque, joints * sizeof *torque);
+    memcpy(sample->omega, robot_sim_qvel(sim) + 3, sizeof sample->omega);
     memcpy(sample->speed, robot_sim_qvel(sim) + 6, joints * sizeof *sample->speed);
     for (int f = 0; f < sample->feet; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);

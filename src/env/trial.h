@@ -32,6 +32,7 @@ typedef struct {
     double base[3];                  /* [m] world */
     double above;                    /* [m] height of the base above the ground under it */
     double quaternion[4];            /* [-] base -> world, w x y z */
+    double omega[3];                 /* [rad/s] of the base, its own axes */
     double legs;                     /* [m] least distance of two legs: robot_sim_leg_distance */
     double shell_load;               /* [N] vertical force of the ground on the shells */
     double mass_center[3];           /* [m] of the robot, world; by MuJoCo, else unset */

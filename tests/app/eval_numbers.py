@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Holds the numbers of `mild eval --json` to what the program says elsewhere: eval_numbers.py TABLE JSON STANCES TRACK FIRST TURN TURN_JSON.
-Table and JSON of two trials, their stances and track as CSV, JSON of the first trial alone, table and JSON of a walk that turns."""
+"""Holds the numbers of `mild eval --json` to what the program says elsewhere: eval_numbers.py TABLE JSON STANCES TRACK ACTIONS FIRST TURN TURN_JSON.
+Table and JSON of two trials, their stances, track and actions as CSV, JSON of the first trial alone, table and JSON of a walk that turns."""
 import csv
 import json
 import math
@@ -38,8 +38,8 @@ def mean(values):
     return sum(values) / len(values)
 
 
-table, both, stances, track, first, turn_table, turning = sys.argv[1:]
-one, r, s, t = row(first), row(both), rows(stances), rows(track)
+table, both, stances, track, actions, first, turn_table, turning = sys.argv[1:]
+one, r, s, t, a = row(first), row(both), rows(stances), rows(track), rows(actions)
 speed, upright, trials, velocity, half, cot, torque, clearance, sink, drift, power, sideways, asked_sideways = cells(table)
 for what, is_, wanted, within in (
         ("speed", r["speed"], speed, 0.005), ("success", r["success"], upright, 0), ("trials", r["trials"], trials, 0),
@@ -90,6 +90,29 @@ for one_of, own in zip(r["each"], trial):
     near("place of the base at the end", one_of["x"], float(own[-1]["base_x_m"]), 1e-5)
 near("velocity_sideways of the track", r["velocity_sideways"], mean(rate(own, "base_y_m") for own in steady), 0.005)
 near("base_oscillation", r["base_oscillation"], mean(max(own) - min(own) for own in height), 2e-3)
+
+# the actions: how smoothly it moves after the first second (the last step's end is not in them)
+def columns(own, name, unit=""):
+    return [[float(x[c]) for c in own[0] if c.startswith(name) and c.endswith(unit)] for x in own]
+
+
+def changes(own, steps):
+    """[rad] of the targets, at the SA01's 0.5 rad per unit action."""
+    targets = columns(own, "action")
+    return [[0.5 * (b - a) for a, b in zip(*pair)] for pair in zip(targets[100 - steps:], targets[100:])]
+
+
+def rms(values):
+    return math.sqrt(mean(v * v for row in values for v in row))
+
+
+walks = [[x for x in a if x["trial"] == str(k)] for k in range(2)]
+settled = [x for own in walks for x in own[101:]]
+near("target_jump", r["target_jump"], max(abs(v) for own in walks for row in changes(own, 1) for v in row), 1e-7)
+near("action_jerk", r["action_jerk"], rms([row for own in walks for row in changes(own, 2)]) / 0.25, 1e-6)
+near("tilt_rate", r["tilt_rate"], math.sqrt(2) * rms([w[:2] for w in columns(settled, "omega")]), 0.002 * r["tilt_rate"])
+near("yaw_rate", r["yaw_rate"], rms([w[2:] for w in columns(settled, "omega")]), 0.002 * r["yaw_rate"])
+near("joint_speed", r["joint_speed"], rms(columns(settled, "speed_", "_rad_s")), 0.002 * r["joint_speed"])
 
 # of two trials the first is known by itself; so the deviation is known: |x0 - mean| times the root of 2
 # (by itself its network works on one row instead of two, whose sums are rounded otherwise; the torques of both are printed)

@@ -133,6 +133,10 @@ static void compare_rows(const char *const *names, const double *speeds, int spe
         near("drift", row, row->drift / own.drift, 1, 0.2);
         near("energy", row, row->energy / own.energy, 1, 0.04);
         near("base_oscillation", row, row->base_oscillation / own.base_oscillation, 1, 0.1);
+        near("tilt_rate", row, row->smooth.tilt_rate / own.smooth.tilt_rate, 1, 0.1);
+        near("yaw_rate", row, row->smooth.yaw_rate / own.smooth.yaw_rate, 1, 0.1);
+        near("joint_speed", row, row->smooth.joint_speed / own.smooth.joint_speed, 1, 0.04);
+        near("action_jerk", row, row->smooth.action_jerk / own.smooth.action_jerk, 1, 0.04);
         near("turning", row, row->velocity_turn, own.velocity_turn, 0.02);
         near("seconds", row, row->seconds, own.seconds, 1e-9);
     }

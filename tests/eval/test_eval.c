@@ -579,7 +579,7 @@ TEST(a_diverged_trial_has_not_succeeded) {
 
 /* ---- the legs ---- */
 
-/* What is drawn, by MuJoCo, at every decision. */
+/* What is drawn, by MuJoCo, at every decision after the first second. */
 typedef struct {
     mjData *data;
     double least; /* [m] */
@@ -589,6 +589,9 @@ static void see_legs(void *context, const EvalDecision *decision) {
     static const char *const part[] = {"leg_%c3_capsule", "leg_%c4_capsule", "leg_%c6_capsule"};
     Drawn *drawn = context;
     const mjModel *m = robot_visual_model(robot);
+    if (decision->time < 1) {
+        return;
+    }
     robot_engine_qpos(robot, decision->env->robot.qpos, drawn->data->qpos);
     mj_kinematics(m, drawn->data);
     for (int n = 0; n < 9; n++) {

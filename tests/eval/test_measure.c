@@ -160,6 +160,30 @@ TEST(nothing_is_steady_before_two_seconds) {
     assert_true(m.steady_time == DT && m.work == DT && m.start[0] == 3 && m.end[0] == 3);
 }
 
+/* What the random start does in the first second does not count: two trials whose legs overlap then
+ * and come nearest later, and one that is over by then. */
+TEST(legs_after_the_first_second) {
+    const uint8_t ends[] = {TASK_END_time, TASK_END_time, TASK_END_tilt};
+    const EvalDef eval = {.trials = 3};
+    Script s;
+    Measure m[3];
+    EvalRow row;
+    script_start(&s);
+    for (int i = 0; i < 3; i++) {
+        measure_start(&m[i], DT);
+        for (int k = 1; k < STEPS(1) + (i < 2 ? 3 : 0); k++) {
+            s.sample.legs = k < STEPS(1) ? -0.02 : k == STEPS(1) + i ? 0.01 * (i + 1) : 0.03;
+            measure_sample(&m[i], &s.sample);
+        }
+    }
+    eval_summarise(&row, "foam45", &eval, m, ends, 400, NULL);
+    expect_near("legs", row.legs, 0.01, 0);
+    eval_summarise(&row, "foam45", &(EvalDef){.trials = 1}, m + 1, ends, 400, NULL);
+    expect_near("legs", row.legs, 0.02, 0);
+    eval_summarise(&row, "foam45", &(EvalDef){.trials = 1}, m + 2, ends, 400, NULL);
+    assert_true(isnan(row.legs));
+}
+
 /* ---- feet ---- */
 
 /* Holds both feet as they are for some steps. */

@@ -259,6 +259,15 @@ static const float *newest_frame(const Trials *t, int trial) {
     return t->host.history + (size_t)(trial + 1) * (size_t)shape.history - shape.observation;
 }
 
+/* after: the last physics step. */
+static void take_smooth(Trials *t, int trial, const EnvsSample *after) {
+    const Controller *controller = t->run->controller;
+    const float *action = t->action + (size_t)trial * (size_t)after->joints;
+    smooth_take(&t->measure[trial].smooth, MEASURE_SETTLED, TASK_PERIOD, after,
+                controller->torque ? NULL : action,
+                task_action_scale(&t->task, robot_table(t->run->robot)), t->task.action_clip);
+}
+
 /* Measures the policy step, and says where to go in the next one. */
 static void take_trial(void *context, int trial, int thread) {
     Trials *t = context;
@@ -282,6 +291,7 @@ static void take_trial(void *context, int trial, int thread) {
     if (eval->track) {
         track_take(&t->track, trial, at - 1);
     }
+    take_smooth(t, trial, at - 1);
     command = t->command + 3 * (size_t)trial;
     direct(eval, speed_of(t, trial), t->measure[trial].time, (at - 1)->quaternion, command);
     speed_hold(&t->hold[trial], &t->legs, newest_frame(t, trial), command);

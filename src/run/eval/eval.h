@@ -83,7 +83,8 @@ typedef struct {
     double stride;           /* [m] from a foot's touchdown to its next one, after the first 2 s */
     double cadence;          /* [1/s] of these strides */
     double energy;           /* [J] integral |tau . qd| dt */
-    double legs;             /* [m] least distance of two legs in all trials; negative: overlap */
+    double legs;             /* [m] least distance of two legs after 1 s, of all trials */
+    Smoothness smooth;       /* after 1 s, of all trials */
     double shells;           /* [-] share of the load that shells carried, mean of the trials */
     double base_oscillation; /* [m] peak to peak of the base height over the steady part */
     double seconds;          /* [s] mean time until a fall or the end */
@@ -94,7 +95,7 @@ typedef struct {
     TaskEnd end;
     double up; /* [s] when it came up, see measure_up; NaN: it was not up when its time ended */
     double seconds; /* [s] until then */
-    double legs;    /* [m] least distance of two legs; NaN without two */
+    double legs;    /* [m] least distance of two legs, see measure_legs */
     double shells;  /* [-] share of the load that shells carried */
     double torque;  /* [N m] largest over joints and time */
     double x;       /* [m] world, where the base was then */

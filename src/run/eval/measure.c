@@ -160,7 +160,9 @@ void measure_sample(Measure *m, const EnvsSample *sample) {
         measure_steady(m, sample, yaw, power_abs);
     }
     m->time += m->dt;
-    m->legs = fmin(m->legs, sample->legs);
+    if (m->time >= MEASURE_SETTLED) {
+        m->legs = fmin(m->legs, sample->legs);
+    }
     m->shell_load += sample->shell_load * m->dt;
     m->load += sample->shell_load * m->dt;
     memcpy(m->base, sample->base, sizeof m->base);

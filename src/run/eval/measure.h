@@ -3,8 +3,10 @@
 #define MILD_MEASURE_H
 
 #include "env/envs.h"
+#include "run/eval/smooth.h"
 
 #define MEASURE_STEADY 2.0    /* [s] start of the steady part */
+#define MEASURE_SETTLED 1.0   /* [s] from here on legs and smoothness count: the start is random */
 #define MEASURE_UP_TILT 0.3   /* [rad] a robot that is up tilts less */
 #define MEASURE_UP_HEIGHT 0.7 /* [-] and its base is higher over its soles, of the nominal height */
 #define MEASURE_UP_TIME 2.0   /* [s] so long */
@@ -30,7 +32,8 @@ typedef struct {
     double torque;         /* [N m] largest of the latest step */
     double base[2];        /* [m] after the latest step */
     double yaw;            /* [rad] after the latest step */
-    double legs;           /* [m] least distance of two legs */
+    double legs;           /* [m] least distance of two legs from MEASURE_SETTLED on */
+    Smooth smooth;         /* from then on, too; set by smooth_take */
     double load;           /* [N s] of the feet and of the shells */
     double shell_load;     /* [N s] of the shells */
     double nominal_height; /* [m] of the base above the soles; set by the caller for measure_up */
@@ -85,7 +88,8 @@ void measure_finish(Measure *measure);
 double measure_up(const Measure *measure);
 /* [-] Share of the load that the shells carried; 0 without load. */
 double measure_shells(const Measure *measure);
-/* [m] Least distance of two legs; NaN where the robot has no two legs that touch. */
+/* [m] Least distance of two legs from MEASURE_SETTLED on, negative: overlap; NaN where the robot has no two legs that
+ * touch, or where the trial was over by then. */
 double measure_legs(const Measure *measure);
 void measure_free(Measure *measures, int count); /* measures: from calloc; may be NULL */
 

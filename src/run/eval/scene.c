@@ -7,6 +7,7 @@
 #include "ground/soil/soil.h"
 
 #define SCENE_FAR 1e4 /* [m] */
+#define HARD "rigid"
 
 /* `rigid` inside a course, because the engine's own floor is under both feet or under none: rubber
  * 70 times as hard, into which the edge of a sole sinks 5 mm, with the friction of rigid ground. */
@@ -20,7 +21,7 @@ static MildMaterial hard_ground(void) {
 }
 
 static MildStatus find_ground(const char *name, MildMaterial *material, MildError *error) {
-    if (strcmp(name, "rigid") == 0) {
+    if (strcmp(name, HARD) == 0) {
         *material = hard_ground();
         return MILD_OK;
     }
@@ -77,7 +78,7 @@ MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildE
         return mild_fail(error, MILD_ERROR_ARGUMENT, "ground name is too long: %.40s...", name);
     }
     strcpy(scene->name, name);
-    if (strcmp(name, "rigid") == 0) {
+    if (strcmp(name, HARD) == 0) {
         MildMaterial any = mild_material_default();
         scene->terrain = mild_terrain_uniform(&any);
         scene->rigid = 1;
@@ -86,13 +87,23 @@ MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildE
     return lay_course(scene, patch_length, error);
 }
 
-const char *scene_ground_at(const Scene *scene, double x, double y, char *text, int size) {
-    int index = mild_terrain_material_at(&scene->terrain, x, y);
+/* The rest of a course's name from ground number `index` on; "" behind the last. */
+static const char *part_of(const Scene *scene, int index) {
     const char *part = scene->name;
     for (int i = 0; i < index && part; i++) {
         part = strchr(part, '+');
         part = part ? part + 1 : NULL;
     }
-    snprintf(text, (size_t)size, "%.*s", part ? (int)strcspn(part, "+") : 0, part ? part : "");
+    return part ? part : "";
+}
+
+const char *scene_ground_at(const Scene *scene, double x, double y, char *text, int size) {
+    const char *part = part_of(scene, mild_terrain_material_at(&scene->terrain, x, y));
+    snprintf(text, (size_t)size, "%.*s", (int)strcspn(part, "+"), part);
     return text;
+}
+
+int scene_is_hard(const Scene *scene, int index) {
+    const char *part = part_of(scene, index);
+    return strcspn(part, "+") == strlen(HARD) && strncmp(part, HARD, strlen(HARD)) == 0;
 }

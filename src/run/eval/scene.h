@@ -18,6 +18,8 @@ typedef struct {
  * from the start. The first ground also extends to the other side of the start, and the last has no
  * end. */
 MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildError *error);
+/* Bool: ground number `index` of a course is `rigid`, whose numbers are its own. */
+int scene_is_hard(const Scene *scene, int index);
 /* Name of the ground under x. */
 const char *scene_ground_at(const Scene *scene, double x, double y, char *text, int size);
 

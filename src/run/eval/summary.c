@@ -114,6 +114,7 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
     const int trials = eval->trials;
     MildStatus status = MILD_OK;
     double torque_square = 0, up = 0;
+    Smooth smooth = {0};
     *row = (EvalRow){.speed = eval->speed,
                      .sideways = eval->sideways,
                      .turn = eval->turn,
@@ -135,6 +136,7 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
         row->seconds += m->time / trials;
         row->shells += measure_shells(m) / trials;
         row->legs = fmin(row->legs, measure_legs(m)); /* of a number and NaN the number */
+        smooth_add(&smooth, &m->smooth);
         row->torque_max += m->torque_max / trials;
         torque_square += m->torque_max * m->torque_max / trials;
         if (eval->stances && status == MILD_OK) {
@@ -142,6 +144,7 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
         }
     }
     row->up = mean(up, row->righted);
+    row->smooth = smooth_result(&smooth);
     row->torque_deviation = deviation(row->torque_max, torque_square, trials);
     summarise_motion(row, measures, ends, weight);
     summarise_feet(row, measures);
