@@ -1,0 +1,82 @@
+/* The artificial athlete against a mass on a linear spring, solved in time, and against concrete. */
+#include "identify/athlete.h"
+#include "kit.h"
+
+#define AREA (0.25 * 3.14159265358979 * ATHLETE_FOOT * ATHLETE_FOOT)
+#define CELL (0.0195 * 0.0195) /* [m^2] to which k_pen belongs */
+
+/* Ground of a stiffness [N/m^3] that gives all energy back. */
+static MildMaterial spring(double stiffness) {
+    MildMaterial m = mild_material_default();
+    m.model = MILD_MODEL_HUNT_CROSSLEY;
+    m.k_pen = stiffness * CELL;
+    m.exponent = 1.0;
+    m.dissipation = 0.0;
+    return m;
+}
+
+static Athlete drop(const MildMaterial *material) {
+    MildError error = {0};
+    Athlete athlete = {0};
+    expect_good(athlete_drop(material, &athlete, &error) == MILD_OK, &error);
+    return athlete;
+}
+
+/* [N] m y'' = m g - c y from y = 0, y' = v: y(t) = y0 (1 - cos wt) + v/w sin wt, y0 = m g/c. The
+ * turn is at tan wt = -v/(w y0), and the force there is c y. */
+static double half_period(const AthleteDevice *device, double ground) {
+    const double c = 1.0 / (1.0 / device->spring + 1.0 / ground);
+    const double rate = sqrt(c / ATHLETE_MASS);
+    const double rest = ATHLETE_MASS * ATHLETE_GRAVITY / c;
+    const double speed = sqrt(2.0 * ATHLETE_GRAVITY * device->fall);
+    const double phase = atan2(speed / rate, -rest);
+    return c * (rest * (1.0 - cos(phase)) + speed / rate * sin(phase));
+}
+
+TEST(test_spring) {
+    double worst = 0.0;
+    for (double stiffness = 4e6; stiffness < 1e9; stiffness *= 3.0) {
+        const MildMaterial material = spring(stiffness);
+        const Athlete athlete = drop(&material);
+        const double peak = half_period(&athlete_shock, stiffness * AREA);
+        const double concrete = half_period(&athlete_shock, 1e18);
+        worst = fmax(worst, fabs(athlete.reduction - (1.0 - peak / concrete)));
+        worst = fmax(worst, fabs(athlete.returned - 1.0));
+        worst = fmax(worst, fabs(athlete.deformation * stiffness * AREA / 1500.0 - 1.0));
+        expect_near("closed form", athlete_peak(&athlete_shock, 1.0 / (stiffness * AREA)), peak,
+                    1e-6 * peak);
+    }
+    printf("worst difference from the spring in time: %.2g\n", worst);
+    assert_true(worst < 0.006);
+}
+
+/* FIFA and ASTM F3189 take 6760 N for concrete; EN 14808 and 14809 accept 6.60 kN +- 0.25 and have
+ * about 1500 N. Ground as stiff as can be reduces nothing. */
+TEST(test_concrete) {
+    expect_near("shock", athlete_peak(&athlete_shock, 0.0), 6760.0, 10.0);
+    expect_near("deformation", athlete_peak(&athlete_deform, 0.0), 1500.0, 100.0);
+    MildMaterial stiff = spring(0.0);
+    stiff.k_pen = 1e7;
+    const Athlete athlete = drop(&stiff);
+    assert_true(fabs(athlete.reduction) < 0.012 && athlete.deformation < 2e-5);
+}
+
+/* A firm bed is left out, and a ground that takes energy returns less. */
+TEST(test_kinds) {
+    MildMaterial material = spring(4e6);
+    const Athlete deep = drop(&material);
+    material.bed_depth = 0.001;
+    const Athlete shallow = drop(&material);
+    assert_memory_equal(&deep, &shallow, sizeof deep);
+    material.dissipation = 0.5;
+    assert_true(drop(&material).returned < 0.5);
+    material = mild_material_default();
+    assert_true(drop(&material).returned < 0.01);
+    material.k_pen = NAN;
+    MildError error = {0};
+    Athlete athlete;
+    assert_int_equal(athlete_drop(&material, &athlete, &error), MILD_ERROR_RANGE);
+    assert_error(&error, MILD_ERROR_RANGE, "ground.k_pen nan 10000000 [N/m] penetration");
+}
+
+TEST_MAIN(NULL, NULL)
