@@ -39,7 +39,7 @@ def parameters(folder):
     """{parameter: {ground: text}} from `mild info grounds`."""
     with open(f"{folder}/grounds.txt", encoding="utf-8") as file:
         lines = [line.split() for line in file]
-    names = next(line for line in lines if line and line[0] == GROUNDS[0])
+    names = next(line for line in lines if line[:2] == list(GROUNDS[:2]))
     return {line[0]: dict(zip(names, line[1:])) for line in lines if len(line) == len(names) + 1}
 
 

@@ -466,7 +466,7 @@ static MildMapDef map_of(int ground, int relief) {
     if (ground == WEB_STRIPES) {
         def.patches = MILD_PATTERN_STRIPES;
         def.patch_size = WEB_STRIPE;
-        def.patch_count = mild_material_preset_count();
+        def.patch_count = WEB_PRESETS;
     }
     return def;
 }
@@ -476,15 +476,15 @@ static const char *lay(int ground, int relief) {
     static MildError error;
     const MildMapDef def = map_of(ground, relief);
     MildMap *map = mild_map_create(&def, &error);
-    const int presets = mild_material_preset_count(), all = ground == WEB_STRIPES;
+    const int all = ground == WEB_STRIPES;
     if (!map) {
         return error.text;
     }
     mild_map_destroy(web.map);
     web.map = map;
-    web.terrain = (MildTerrain){.material_count = all ? presets : 1};
+    web.terrain = (MildTerrain){.material_count = all ? WEB_PRESETS : 1};
     for (int m = 0; m < web.terrain.material_count; m++) {
-        const int preset = all ? m : ground < presets ? ground : 0;
+        const int preset = all ? m : ground < WEB_PRESETS ? ground : 0;
         mild_material_preset(mild_material_preset_name(preset), &web.plain[m]);
         if (ground == WEB_OWN) {
             web.plain[m] = soil.material;

@@ -106,10 +106,11 @@ enum {
 };
 #define WEB_STRIPE 2.4 /* [m] width of a ground where all are shown */
 
-/* Ground 0 .. mild_material_preset_count() - 1 are the presets; then these three. */
-#define WEB_RIGID mild_material_preset_count()
-#define WEB_STRIPES (mild_material_preset_count() + 1)
-#define WEB_OWN (mild_material_preset_count() + 2) /* that of web_soil */
+/* Ground 0 .. WEB_PRESETS - 1 are the first presets, the paper's; then these three. */
+#define WEB_PRESETS 8
+#define WEB_RIGID WEB_PRESETS
+#define WEB_STRIPES (WEB_PRESETS + 1)
+#define WEB_OWN (WEB_PRESETS + 2) /* that of web_soil, which may name any preset */
 
 typedef enum { WEB_LEVEL, WEB_WAVES, WEB_ROUGH, WEB_RELIEFS } WebRelief;
 

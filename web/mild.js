@@ -73,8 +73,8 @@ class Core {
     this.c = exports;
     this.robots = new Map(); // what web_open takes
     if (exports._initialize) exports._initialize();
-    const count = exports.mild_material_preset_count();
-    this.names = Array.from({ length: count }, (_, i) => this.text(exports.mild_material_preset_name(i))).concat('rigid');
+    const paper = Object.keys(GROUNDS).length - 1; // WEB_PRESETS of core.h
+    this.names = Array.from({ length: paper }, (_, i) => this.text(exports.mild_material_preset_name(i))).concat('rigid');
   }
 
   keep(robot, bytes) {

@@ -10,35 +10,46 @@
 #include "app/grounds.h"
 #include "app/robots.h"
 #include "base/text.h"
+#include "identify/athlete.h"
 #include "learn/cuda/learner.h"
 #include "run/config/experiment_keys.h"
 
-/* Sources of the presets' numbers; docs/ has the details. */
+/* What each preset is, and where its numbers are from; "[choice]" is ours. docs/model.md section 10
+ * has the details. */
 static const struct {
-    const char *ground, *what, *source;
+    const char *ground, *source;
 } sources[] = {
-    {"rubber", "sports-hall rubber mat", "stiff end of the paper's ranges; elastic"},
-    {"foam60", "foam of 60 kg/m^3",
-     "k_pen from a Gibson-Ashby foam on a 50 mm slab; weighs grams: no added mass"},
-    {"foam45", "foam of 45 kg/m^3", "as foam60"},
-    {"foam28", "foam of 28 kg/m^3", "as foam60"},
-    {"foam25", "foam of 25 kg/m^3", "as foam60"},
-    {"grass", "lawn", "inside the paper's ranges; half of the depth springs back"},
-    {"sand_loose", "loose dry sand",
-     "inside the paper's ranges; inertia (c_g, c_d, phi) after Choi et al. 2023"},
-    {"sand_dense", "packed dry sand", "as sand_loose, denser"},
-    {"dry_sand", "dry sand", "Wong 2008, table 2.3, Land Locomotion Laboratory"},
-    {"sandy_loam", "sandy loam, 15 % moisture", "as dry_sand"},
-    {"clay", "clayey soil, 38 % moisture", "Wong 2008, table 2.3, Thailand"},
-    {"snow", "snow (U.S.)", "Wong 2008, table 2.3"},
-    {"lunar_soil", "lunar soil", "Carrier, Olhoeft, Mendell 1991, section 9.1"},
+    {"rubber", "the paper's: stiff end of its ranges; a tile is 7 to 70 times stiffer"},
+    {"foam60", "the paper's: foam of 60 kg/m^3, k_pen of a Gibson-Ashby foam on a 50 mm slab"},
+    {"foam45", "the paper's: foam of 45 kg/m^3, as foam60"},
+    {"foam28", "the paper's: foam of 28 kg/m^3, as foam60"},
+    {"foam25", "the paper's: foam of 25 kg/m^3, as foam60"},
+    {"grass", "the paper's: inside its ranges [choice]; half of the depth springs back"},
+    {"sand_loose", "the paper's: inside its ranges [choice]; inertia after Choi et al. 2023"},
+    {"sand_dense", "the paper's: as sand_loose, denser"},
+    {"rubber_tile", "tile of 20 to 40 mm [choice], inside EN 14904: 25 to 75 %, up to 5 mm"},
+    {"running_track",
+     "EN 14877: 35 to 50 %, 0.6 to 2.5 mm; Colino 2020 measured 37 %, returned 63"},
+    {"artificial_turf", "FIFA Quality: 55 to 70 %, 4 to 11 mm"},
+    {"gym_mat", "40 mm of polyethylene foam LD33 (Zotefoams): 40 kPa at a quarter of it"},
+    {"carpet", "2 mm of pile on a firm floor [choice]"},
+    {"dry_sand_loose", "Li et al. 2013: 0.254 MPa/m, loosely packed poppy seeds; slip of grains"},
+    {"dry_sand_close", "Li et al. 2013: 0.464 MPa/m, closely packed; slip of grains"},
+    {"moist_sand", "7 times dry_sand_loose: Thiel et al. 2020, wet beach by dry; slip of grains"},
+    {"fresh_snow", "50 mm [choice] of Wong's snow (U.S.), its pressure there; slip of grains"},
+    {"groomed_snow", "Moessner et al. 2013: 0.04 N/mm^3, the softest piste"},
+    {"dry_sand", "Wong 2008, table 2.3, Land Locomotion Laboratory"},
+    {"sandy_loam", "15 % moisture; as dry_sand"},
+    {"clay", "38 % moisture; Wong 2008, table 2.3, Thailand"},
+    {"snow", "Wong 2008, table 2.3, snow (U.S.)"},
+    {"lunar_soil", "Carrier, Olhoeft, Mendell 1991, section 9.1"},
 };
-enum { SOURCES = sizeof sources / sizeof *sources };
+enum { SOURCES = sizeof sources / sizeof *sources, BLOCK = 8 /* grounds of the paper */ };
 
 static void print_cells(const char *title, const char *const *cells, int count) {
     printf("  %-12s", title);
     for (int i = 0; i < count; i++) {
-        printf(" %10s", cells[i]);
+        printf(" %15s", cells[i]);
     }
     printf("\n");
 }
@@ -77,41 +88,75 @@ static MildSole *paper_sole(void) {
 }
 static const double paper_weight = 40 * 9.81; /* [N] */
 
-static void print_sinkage(const MildSole *sole, const char *const *grounds, int count) {
-    printf("\nsinkage of 40 kg at rest [mm]\n");
-    for (int feet = 2; feet >= 1; feet--) {
-        char value[GROUNDS_MAX][64];
-        const char *cells[GROUNDS_MAX];
-        for (int p = 0; p < count; p++) {
-            MildMaterial material;
-            mild_material_preset(grounds[p], &material);
-            snprintf(value[p], sizeof value[p], "%.1f",
-                     1e3 * mild_sole_sinkage(sole, &material, paper_weight / feet));
-            cells[p] = value[p];
+static const char *source_of(const char *ground) {
+    for (int i = 0; i < SOURCES; i++) {
+        if (strcmp(sources[i].ground, ground) == 0) {
+            return sources[i].source;
         }
-        print_cells(feet == 2 ? "two feet" : "one foot", cells, count);
     }
+    return "";
 }
 
-/* The grounds of every model that has some. */
-static void print_grounds(const MildSole *sole) {
+/* An athlete has no numbers on ground that stays dented, nor where it strikes the firm bed. */
+static MildStatus print_measures(const MildSole *sole, const char *ground, MildError *error) {
+    MildMaterial m;
+    Athlete athlete;
+    mild_material_preset(ground, &m);
+    const MildStatus status = athlete_drop(&m, &athlete, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    const double area =
+        mild_sole_elements(sole) * mild_sole_pitch(sole) * mild_sole_pitch(sole); /* [m^2] */
+    const double depth = mild_sole_sinkage(sole, &m, paper_weight / 2);
+    char reduction[16] = "-", deformation[16] = "-";
+    if (m.recovery == 1.0 && athlete.deformation < m.bed_depth) {
+        snprintf(reduction, sizeof reduction, "%.0f", 100.0 * athlete.reduction);
+        snprintf(deformation, sizeof deformation, "%.1f", 1e3 * athlete.deformation);
+    }
+    printf("  %-15s %-11s %7.3g %7.3g %8.0f %5.2f %9s %11s  %s\n", ground,
+           mild_model_names[m.model], 1e-6 * paper_weight / 2 / area / depth, 1e3 * depth,
+           100.0 * athlete.returned, m.mu, reduction, deformation, source_of(ground));
+    return MILD_OK;
+}
+
+static MildStatus print_table(const MildSole *sole, MildError *error) {
+    const char *grounds[GROUNDS_MAX];
+    const int count = grounds_all(grounds);
+    MildStatus status = MILD_OK;
+    printf("grounds (--ground NAME), stiffness and sinkage under half of the SA01's weight on one "
+           "sole; energy returned\nand force reduction of EN 14808's artificial athlete, vertical "
+           "deformation of EN 14809's\n\n");
+    printf("  %-15s %-11s %7s %7s %8s %5s %9s %11s\n", "", "law", "MPa/m", "mm", "returned", "mu",
+           "reduction", "deformation");
+    printf("  %-15s %-11s %7s %7s %8s %5s %9s %11s  %s\n", "", "", "", "", "%", "", "%", "mm",
+           "source");
+    for (int i = 0; i < count && status == MILD_OK; i++) {
+        status = print_measures(sole, grounds[i], error);
+    }
+    return status;
+}
+
+/* The numbers of the grounds of every model that has some. */
+static void print_grounds(void) {
     for (int m = 0; m < MILD_MODELS; m++) {
         const char *grounds[GROUNDS_MAX];
         const int count = grounds_of((MildModel)m, grounds);
-        if (count > 0) {
-            printf("%sgrounds of %s (--ground NAME)\n\n", m ? "\n" : "", mild_model_names[m]);
-            print_preset_table((MildModel)m, grounds, count);
-            print_sinkage(sole, grounds, count);
+        for (int first = 0; first < count; first += BLOCK) {
+            printf("\nof %s\n",
+                   m == MILD_MODEL_MILD ? "mild and mild_merged" : mild_model_names[m]);
+            print_preset_table((MildModel)m, grounds + first,
+                               count - first < BLOCK ? count - first : BLOCK);
         }
     }
 }
 
-/* Prints a number by which the model is matched, for every preset. */
+/* Prints a number by which the model is matched, for every preset of the paper. */
 static void print_matched(const MildSole *sole, MildModel model, const char *key) {
     const MildField *field =
         mild_field_find(mild_material_fields, mild_material_field_count, key, NULL);
     printf("  %-13s %-10s", mild_model_names[model], key);
-    for (int p = 0; p < mild_material_preset_count(); p++) {
+    for (int p = 0; p < BLOCK; p++) {
         MildMaterial mild, rival;
         mild_material_preset(mild_material_preset_name(p), &mild);
         if (mild_model_match(model, &mild, sole, paper_weight / 2, &rival, NULL) != MILD_OK) {
@@ -132,9 +177,8 @@ static void print_models(void) {
 
 static void print_rivals(const MildSole *sole) {
     printf(
-        "\nParameters of the other models. Each is matched to sink as deep as mild under 20 kg on "
-        "one foot. The numbers\n"
-        "are for one element, or for the whole sole with con_*. All other parameters are the "
+        "\nParameters of the other models on the paper's grounds. Each is matched to sink as deep "
+        "under 20 kg on one foot.\nThe numbers are for one element, or for the whole sole with con_*. All other parameters are the "
         "preset's.\n");
     for (int m = 0; m < MILD_MODELS; m++) {
         const MildModelInfo *info = mild_model_info((MildModel)m);
@@ -155,13 +199,20 @@ static int info_grounds(void) {
     if (!sole) {
         return cli_fail_text("info", "out of memory");
     }
-    printf("presets, SI units; any value can be replaced on the command line, e.g. "
-           "--ground.k_pen=500\n\n");
-    print_grounds(sole);
-    printf("\n");
-    print_models();
-    print_rivals(sole);
+    MildError error = {0};
+    const MildStatus status = print_table(sole, &error);
+    if (status == MILD_OK) {
+        printf("\nnumbers, SI units; any can be replaced on the command line, e.g. "
+               "--ground.k_pen=500\n");
+        print_grounds();
+        printf("\n");
+        print_models();
+        print_rivals(sole);
+    }
     mild_sole_destroy(sole);
+    if (status != MILD_OK) {
+        return cli_fail("info", &error);
+    }
     printf("\nparameters\n");
     for (int f = 0; f < mild_material_field_count; f++) {
         const MildField *field = &mild_material_fields[f];
@@ -173,10 +224,6 @@ static int info_grounds(void) {
             snprintf(range, sizeof range, "%g .. %g", field->min, field->max);
         }
         printf("  %-12s  %-16s %s\n", field->name, range, field->help);
-    }
-    printf("\nsources\n");
-    for (int i = 0; i < SOURCES; i++) {
-        printf("  %-10s  %s; %s\n", sources[i].ground, sources[i].what, sources[i].source);
     }
     return 0;
 }

@@ -5,8 +5,8 @@
 
 #include "ground/width.h"
 
-#define STEP 0.0064   /* [-] of sqrt(m/k): a contact on concrete takes 500 steps */
-#define LONGEST 0.3   /* [s] */
+#define STEP 0.01     /* [-] of sqrt(m/k): a contact on concrete takes 300 steps */
+#define LONGEST 2.0   /* [s] */
 #define BOTTOMLESS 10 /* [m] */
 
 const AthleteDevice athlete_shock = {.fall = 0.055, .spring = 2e6};
@@ -40,7 +40,7 @@ double athlete_peak(const AthleteDevice *device, double compliance) {
 
 /* The elements have the area of the disc. */
 static MildSole *foot_create(MildError *error) {
-    enum { CORNERS = 96, ELEMENTS = 37 };
+    enum { CORNERS = 96, ELEMENTS = 12 };
     const double pi = 3.141592653589793;
     double outline[2 * CORNERS];
     for (int i = 0; i < CORNERS; i++) {

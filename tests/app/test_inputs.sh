@@ -27,7 +27,7 @@ bad "--policy.actor_hidden=32,-1,0,0 policy.actor_hidden" "$mild" train --out ru
 
 # every parameter of a ground
 parameters=0
-for key in $("$mild" info grounds | awk '$1 == "rubber" { table = 1; next } table && NF == 0 { exit } table { print $1 }'); do
+for key in $("$mild" info grounds | awk '$2 == "foam60" { table = 1; next } table && NF == 0 { exit } table { print $1 }'); do
     parameters=$((parameters + 1))
     ! short || ((parameters % 8 == 0)) || continue
     for value in nan -1e9 1e400 seven ''; do

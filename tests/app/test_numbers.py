@@ -199,21 +199,21 @@ def columns(text, name):
     return dict(zip(grounds, row.split()[len(name):]))
 
 
-def info_presets(text, other):
-    """Every number of the table, laid over another preset, gives the preset itself; the sinkage is a press's."""
+def info_presets(text, table):
+    """Every number of a block, laid over another preset of the law, gives the preset itself; the sinkage is a press's."""
     grounds = text.strip().splitlines()[0].split()
-    fields = [line.split()[0] for line in text.strip().splitlines()[1:] if line.startswith("  ") and "feet" not in line and "foot" not in line]
-    true("fields", len(fields) > 9 and len(grounds) > 4)
+    fields = [line.split()[0] for line in text.strip().splitlines()[1:]]
+    true("fields", len(fields) > 9 and len(grounds) > 1)
     move = ("--depth", 0.008, "--drag", 0.02, "--speed", 0.3, "--tilt", 3)
     for ground in grounds:
+        law, stiffness, sinkage = table[ground]
         values = [f"--ground.{field}={columns(text, [field])[ground]}" for field in fields]
-        base = other if ground != other else grounds[0]
+        base = next(other for other in table if other != ground and table[other][0] == law)
         for a, b in zip(pressed("--ground", ground, *move)[0], pressed("--ground", base, *move, *values)[0]):
             for key in ("force_n", "force_x_n", "moment_y_nm"):
                 near(f"{ground}: {key} with the numbers of info", b[key], a[key], 2e-3 * (abs(a[key]) + a["force_n"] + 1))
-        for feet, words in ((2, ["two", "feet"]), (1, ["one", "foot"])):
-            near(f"{ground}: sinkage on {words[0]}", float(columns(text, words)[ground]),
-                 sinks(40 * GRAVITY / feet, "--ground", ground), 0.15)
+        near(f"{ground}: sinkage", sinkage, sinks(20 * GRAVITY, "--ground", ground), 0.15)
+        near(f"{ground}: stiffness", stiffness, 20 * GRAVITY / (77 * 0.0195**2) / sinkage / 1e3, 0.01 * stiffness)
 
 
 def info_matched(text, sinkage, grounds):
@@ -223,7 +223,7 @@ def info_matched(text, sinkage, grounds):
         words = line.split()
         if len(words) == 2 + len(grounds) and re.fullmatch(r"[\d.e+-]+", words[2]):
             models.setdefault(words[0], []).append((words[1], dict(zip(grounds, words[2:]))))
-    near("models that are matched", len(models), 8, 0)
+    near("models that are matched", len(models), 9, 0)
     for model, rows in models.items():
         for ground in ("foam28", "sand_loose", "rubber"):
             values = [f"--ground.{key}={cells[ground]}" for key, cells in rows]
@@ -258,13 +258,14 @@ def info_robots():
 
 
 def info():
-    whole = printed_by("info", "grounds")
-    mild_part, rest = whole.split("grounds of bekker (--ground NAME)")
-    mild_part = mild_part.split("(--ground NAME)\n")[1]
-    bekker_part = rest.split("ground models")[0]
-    info_presets(mild_part, "grass")
-    info_presets(bekker_part, "dry_sand")
-    info_matched(rest.split("Parameters of the other models")[1], columns(mild_part, ["two", "feet"]), mild_part.split("\n")[1].split())
+    table, rest = printed_by("info", "grounds").split("\nnumbers, SI units")
+    table = {ground: (law, float(stiffness), float(sinkage)) for ground, law, stiffness, sinkage in
+             re.findall(r"^  (\w+) +(\w+) +([\d.]+) +([\d.]+) +\d+ +[\d.]+ +[\d.-]+ +[\d.-]+  \S", table, re.M)}
+    blocks = [block.split("\n", 1)[1] for block in rest.split("\nground models")[0].split("\n\n") if block.startswith("of ")]
+    near("grounds", len(table), sum(len(block.splitlines()[0].split()) for block in blocks), 0)
+    for block in blocks:
+        info_presets(block, table)
+    info_matched(rest.split("Parameters of the other models")[1], {ground: row[2] for ground, row in table.items()}, blocks[0].splitlines()[0].split())
     info_ranges(rest.split("\nparameters\n")[1])
     info_robots()
     size, unit = re.search(r"memory +([\d.]+) (\w+)", printed_by("info", "devices")).groups()

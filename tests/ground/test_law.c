@@ -109,9 +109,9 @@ TEST(test_preset_numbers) {
         assert_true(mild_material_preset(table[i].name, &m));
         assert_true(of_paper.k_pen == table[i].k_pen && of_paper.sigma_cone == table[i].sigma_cone);
         assert_true(m.model == (m.recovery > 0 ? MILD_MODEL_MILD : MILD_MODEL_MILD_MERGED));
-        assert_true(m.recovery > 0 ? m.slip_length == 0
-                                   : m.slip_length == 1.4e-3 && m.slip_growth == 0.07 &&
-                                         m.grip == 0.123);
+        assert_true(m.recovery > 0
+                        ? m.slip_length == 0
+                        : m.slip_length == 1.4e-3 && m.slip_growth == 0.07 && m.grip == 0.123);
         assert_true(m.alpha == table[i].alpha && m.nu == table[i].nu);
         assert_true(m.c_g == table[i].c_g && m.c_d == table[i].c_d && m.phi == table[i].phi);
         assert_true(m.recovery == table[i].recovery && m.rho == 1000 && m.passive == 1);
@@ -126,7 +126,7 @@ TEST(test_presets) {
     } table[] = {{"rubber", 1.9, 3.8, 0.1},   {"foam60", 3.3, 7.7, 0.1}, {"foam45", 8, 25, 0.5},
                  {"foam28", 23, 49, 0.6},     {"foam25", 28, 58, 0.6},   {"grass", 6, 17.5, 0.5},
                  {"sand_loose", 15, 37, 0.5}, {"sand_dense", 5, 17, 0.5}};
-    assert_int_equal(mild_material_preset_count(), 8);
+    assert_true(mild_material_preset_count() > PAPER_PRESETS);
     for (int i = 0; i < 8; i++) {
         MildMaterial m;
         MildError error;
@@ -143,7 +143,7 @@ TEST(test_presets) {
     }
     MildMaterial m;
     assert_false(mild_material_preset("rigid", &m));
-    assert_null(mild_material_preset_name(8));
+    assert_null(mild_material_preset_name(mild_material_preset_count()));
 }
 
 TEST_MAIN(NULL, NULL)

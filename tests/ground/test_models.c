@@ -72,7 +72,7 @@ static double pressed_force(int model, const MildMaterial *material, double dept
 
 TEST(test_matched) {
     double worst_depth = 0.0, worst_force = 0.0;
-    for (int p = 0; p < mild_material_preset_count(); p++) {
+    for (int p = 0; p < PAPER_PRESETS; p++) {
         MildMaterial mild = kit_preset(mild_material_preset_name(p));
         double depth = mild_sole_sinkage(raster[0], &mild, LOAD);
         for (int model = 0; model < SOFT_MODELS; model++) {
@@ -103,7 +103,7 @@ TEST(test_matched) {
 TEST(test_con_cone_is_scaled) {
     const double pitch = mild_sole_pitch(raster[0]);
     const double area = mild_sole_elements(raster[0]) * pitch * pitch;
-    for (int p = 0; p < mild_material_preset_count(); p++) {
+    for (int p = 0; p < PAPER_PRESETS; p++) {
         const MildMaterial mild = kit_preset(mild_material_preset_name(p));
         const MildMaterial rival = rival_of(MILD_MODEL_CON_CONE, &mild);
         assert_true(fabs(rival.k_pen / rival.sigma_cone * 0.15e6 / (1e6 * area) - 1.0) < 1e-9);
@@ -115,7 +115,7 @@ TEST(test_con_cone_is_scaled) {
  * settles within a physics step of 1 ms. */
 TEST(test_presets_serve_every_model) {
     const MildMaterial sand = kit_preset("dry_sand");
-    for (int p = 0; p < mild_material_preset_count(); p++) {
+    for (int p = 0; p < PAPER_PRESETS; p++) {
         const MildMaterial m = kit_preset(mild_material_preset_name(p));
         assert_true(m.k_c == sand.k_c && m.k_phi == sand.k_phi && m.exponent == sand.exponent);
         assert_true(m.cohesion == sand.cohesion && m.shear_length == sand.shear_length);
@@ -254,7 +254,7 @@ TEST(test_equilibrium) {
     static const double steps[2] = {1e-3, 5e-3};
     double worst = 0.0;
     for (int model = 0; model < SOFT_MODELS; model++) {
-        for (int p = 0; p < mild_material_preset_count(); p++) {
+        for (int p = 0; p < PAPER_PRESETS; p++) {
             for (int d = kit_finest(); d < 2; d++) {
                 MildMaterial mild = kit_preset(mild_material_preset_name(p)),
                              rival = rival_of(model, &mild);

@@ -322,7 +322,7 @@ TEST(test_bekker) {
         print_message("  %-24s %6.1f %6.1f mm   n %.2f\n", soils[s].name, two[s], one[s],
                       soils[s].n);
     }
-    for (int p = 0; p < mild_material_preset_count(); p++) {
+    for (int p = 0; p < PAPER_PRESETS; p++) {
         MildMaterial m = kit_preset(mild_material_preset_name(p));
         double a = 1e3 * pressed_sinkage(&m, sole, 0.5 * weight),
                b = 1e3 * pressed_sinkage(&m, sole, weight), apart = INFINITY;
@@ -364,7 +364,7 @@ TEST(test_rft) {
     print_message("stress per depth of a level plate [N/m^3]: generic coefficients %.3g, poppy "
                   "seeds loose %.3g, close %.3g\n",
                   generic, poppy_loose, poppy_close);
-    for (int p = 0; p < mild_material_preset_count(); p++) {
+    for (int p = 0; p < PAPER_PRESETS; p++) {
         MildMaterial m = kit_preset(mild_material_preset_name(p));
         double full = KIT_PITCH / sqrt(acos(-1.0)) * tan(m.alpha) / m.nu, force[2];
         for (int i = 0; i < 2;

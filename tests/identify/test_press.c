@@ -1,12 +1,12 @@
 /* The press against the closed law of its elements, and what each kind of ground gives back. */
 #include "identify/press.h"
-#include "kit.h"
+#include "materials.h"
 
 static PressResult result;
 
 static PressDef definition(const char *ground) {
     PressDef def = {.turns = 1, .turn = {0.03}, .speed = 1e-3};
-    assert_true(mild_material_preset(ground, &def.material));
+    def.material = kit_preset(ground);
     return def;
 }
 

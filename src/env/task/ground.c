@@ -2,6 +2,7 @@
 #include "env/task/ground.h"
 
 #include <assert.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -203,8 +204,9 @@ void task_ground_numbers(const Robot *robot, const MildMaterial *m, float *numbe
     double cells = mild_model_is_concentric((MildModel)m->model)
                        ? mild_sole_elements(robot_rasters(robot)[0])
                        : 1;
-    const double values[TASK_GROUND_NUMBERS] = {m->k_pen / 500 / cells,
-                                                m->sigma_cone / 1e5,
+    /* A floor is a hundred times as stiff as foam: beyond 4 all are firm. */
+    const double values[TASK_GROUND_NUMBERS] = {fmin(m->k_pen / 500 / cells, 4),
+                                                fmin(m->sigma_cone / 1e5, 4),
                                                 m->alpha,
                                                 m->nu,
                                                 m->c_g / 4,
