@@ -146,10 +146,12 @@ extern const int mild_material_field_count;
 
 /* The paper's loose sand: of mild, slip costs nothing. */
 MildMaterial mild_material_default(void);
-/* Writes a preset to *material. Presets of mild: rubber foam60 foam45 foam28 foam25 grass; of
- * mild_merged, and slip costs support: sand_loose sand_dense; of bekker: dry_sand sandy_loam clay
- * snow lunar_soil. Returns false, and leaves *material alone, when the name is unknown. (`rigid` is
- * not a material but the engine's own contact.) */
+/* Writes a preset to *material. The paper's, of mild: rubber foam60 foam45 foam28 foam25 grass; of
+ * mild_merged, and slip costs support: sand_loose sand_dense. Measured ones, of mild: rubber_tile
+ * running_track artificial_turf gym_mat carpet groomed_snow; of mild_merged: dry_sand_loose
+ * dry_sand_close moist_sand fresh_snow; of bekker: dry_sand sandy_loam clay snow lunar_soil.
+ * Returns false, and leaves *material alone, when the name is unknown. (`rigid` is not a material
+ * but the engine's own contact.) */
 int mild_material_preset(const char *name, MildMaterial *material);
 /* Number of presets of mild and mild_merged. */
 int mild_material_preset_count(void);
