@@ -91,7 +91,7 @@ static FitResult run(const FitDef *def, int count) {
 
 TEST(recovery) {
     double worst[2] = {0, 0};
-    for (int g = 0; g < mild_material_preset_count(); g++) {
+    for (int g = 0; g < PAPER_PRESETS; g++) {
         for (int run_index = 0; run_index < 2 * SEEDS; run_index++) {
             FitDef truth = plate(mild_material_preset_name(g));
             hold(&truth, SHAPE_AND_MASS);
@@ -132,7 +132,7 @@ TEST(exact) {
     static const char *const undetermined[] = {"sigma_cone", "alpha", "nu", "c_g",
                                                "c_d",        "phi",   "rho"};
     double worst = 0;
-    for (int g = 0; g < mild_material_preset_count(); g++) {
+    for (int g = 0; g < PAPER_PRESETS; g++) {
         const FitDef truth = plate(mild_material_preset_name(g));
         FitDef def = {.plate = {truth.plate[0]}, .plates = 1, .material = mild_material_default()};
         const MildMaterial *m = &truth.material;

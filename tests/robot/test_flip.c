@@ -152,7 +152,7 @@ static double largest_step(const char *name) {
 
 TEST(test_explicit_soil_flips) {
     int fallen = 0;
-    for (int p = 0; p < mild_material_preset_count(); p++) {
+    for (int p = 0; p < PAPER_PRESETS; p++) {
         const char *name = mild_material_preset_name(p);
         Standing outside = stand_still(name, DT, 1), ours = stand_still(name, DT, 0);
         print_message("%-11s %g ms: explicit %s %5.2f s, joints at %7.3f rad/s, stands up to %g "
@@ -168,7 +168,7 @@ TEST(test_explicit_soil_flips) {
         }
     }
     print_message("the explicit force fells the robot on %d of %d grounds\n", fallen,
-                  mild_material_preset_count());
+                  PAPER_PRESETS);
 }
 
 TEST_MAIN(setup, teardown)
