@@ -210,8 +210,7 @@ static inline void herd_open(Herd *herd, const Shape *shape) {
         herd->material[m] = kit_material(&herd->random);
         if (shape->model != MILD_MODEL_MILD) {
             MildMaterial sand;
-            mild_material_preset(mild_material_preset_name(m % mild_material_preset_count()),
-                                 &sand);
+            mild_material_preset(mild_material_preset_name(m % PAPER_PRESETS), &sand);
             assert_int_equal(
                 mild_model_match(shape->model, &sand, left, 150.0, &herd->material[m], NULL),
                 MILD_OK);

@@ -130,8 +130,7 @@ static void herd_bodies(Herd *at, int first, int last) {
         at->surfaces += mild_sole_surface_z(at->soles[f]) != NULL;
     }
     for (int m = 0; m < MATERIALS; m++) {
-        const int count = mild_material_preset_count();
-        mild_material_preset(mild_material_preset_name(m % count), &at->material[m]);
+        at->material[m] = kit_preset(mild_material_preset_name(m % PAPER_PRESETS));
     }
     for (int r = 0; r < ROBOTS; r++) {
         Kit *kit = &at->kit[r];
