@@ -44,7 +44,7 @@ offers "$(echo $topics)" mild info ''
 # values, also the second of a list and behind an equals sign; files are the shell's
 offers 'sand_loose sand_dense sandy_loam' mild press --ground sand
 offers 'rubber,foam25' mild eval --ground rubber,foam25
-offers 'rubber,grass' mild eval --ground rubber,g
+offers 'rubber,grass' mild eval --ground rubber,gra
 offers 'con_cone con_spring' mild play --model = con
 offers "$(echo $("$mild" info robots | sed -n 's/^\([a-z0-9_]*\): .*joints.*/\1/p'))" mild train --robot ''
 offers '' mild train --config ''

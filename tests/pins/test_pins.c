@@ -5,6 +5,7 @@
 #include "envs_kit.h"
 #include "identify/press.h"
 #include "learn/toy.h"
+#include "materials.h"
 #include "pins.h"
 #include "run/train/trainer.h"
 #include "task/task_kit.h"
@@ -42,7 +43,7 @@ static void pin_press(const char *kind, const char *ground, const PressDef *def)
 
 /* Down twice with the front edge lower, dragged, out; and dropped. */
 TEST(presses) {
-    for (int p = 0; p < mild_material_preset_count(); p++) {
+    for (int p = 0; p < PAPER_PRESETS; p++) {
         const char *ground = mild_material_preset_name(p);
         PressDef def = {.turns = 3, .turn = {0.01, 0.004, 0.02}, .speed = 0.05, .tilt = 0.05};
         mild_material_preset(ground, &def.material);
