@@ -291,6 +291,9 @@ TEST(concentric_ground) {
     expect_near("k_pen", (double)rig.critic[80], 1.4, TOLERANCE);
     expect_near("k_drift", (double)rig.critic[88], 2.0, TOLERANCE);
     expect_near("b_drift", (double)rig.critic[89], 0.3, TOLERANCE);
+    m->k_pen = m->sigma_cone = 5e6; /* a floor */
+    look(&reading);
+    assert_true(rig.critic[80] == 4 && rig.critic[81] == 4);
     rig_close(&rig);
     robot_set_model(robot, MILD_MODEL_MILD);
 }
