@@ -81,7 +81,7 @@ TaskDef task_def_default(void) {
                       .bed_depth = {0.10, 0.15},
                       .slip_share = 1,
                       .slip_length = {0.001, 0.01},
-                      .grip = {0.05, 0.3},
+                      .grip = {0.08, 0.3},
                       .passive = 1,
                       .sinkage_max = 0.07,
                       .shells_share = 1,
