@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "ground/models.h"
 #include "ground/soil/soil.h"
 
 #define WORD 512 /* bytes of a name */
@@ -118,8 +119,8 @@ static MildStatus find_ground(const char *name, MildMaterial *material, MildErro
     return soil_find(name, material, error);
 }
 
-MildStatus plugin_def_model(const mjModel *m, int instance, const PluginDef *def, MildModel *model,
-                            MildError *error) {
+MildStatus plugin_def_model(const mjModel *m, int instance, const PluginDef *def, int *model,
+                            MildModel *first, MildError *error) {
     const char *text = def->ground;
     char word[WORD] = "";
     MildMaterial material;
@@ -131,38 +132,39 @@ MildStatus plugin_def_model(const mjModel *m, int instance, const PluginDef *def
         return status;
     }
     const int own = material.model;
+    material.model = -1;
     status = read_section(m, instance, &sections[MATERIAL_SECTION], &material, error);
     if (status != MILD_OK) {
         return status;
     }
-    *model = (MildModel)material.model;
-    if (*model == MILD_MODEL_RIGID) {
+    *model = material.model;
+    *first = (MildModel)(*model >= 0 ? *model : own);
+    if (*first == MILD_MODEL_RIGID) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "ground.model 'rigid' is MuJoCo's own contact; leave the plugin out");
     }
-    if (own != MILD_MODEL_MILD && material.model != own) {
+    if (!model_is_cones(own) && (int)*first != own) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "ground '%.60s' is one of %s, which has no match in %s; leave out "
                          "ground.model",
-                         word, mild_model_names[own], mild_model_names[*model]);
+                         word, mild_model_names[own], mild_model_names[*first]);
     }
     return MILD_OK;
 }
 
 /* A preset as a material of the model, with the keys ground.*. */
-static MildStatus finish_material(const mjModel *m, int instance, MildModel model,
-                                  const MildSole *sole, double load, MildMaterial *material,
-                                  MildError *error) {
-    const MildMaterial mild = *material;
+static MildStatus finish_material(const mjModel *m, int instance, int model, const MildSole *sole,
+                                  double load, MildMaterial *material, MildError *error) {
+    const MildMaterial from = *material;
     MildStatus status = MILD_OK;
-    if (mild.model == MILD_MODEL_MILD && model != MILD_MODEL_MILD) {
+    if (model >= 0 && model != from.model && model_is_cones(from.model)) {
         if (!sole) {
             return mild_fail(error, MILD_ERROR_ARGUMENT,
                              "ground.model '%s' is matched to a preset under the sole of a foot; "
                              "name a foot in feet, or leave out ground.model",
                              mild_model_names[model]);
         }
-        status = mild_model_match(model, &mild, sole, load, material, error);
+        status = mild_model_match((MildModel)model, &from, sole, load, material, error);
     }
     if (status == MILD_OK) {
         status = read_section(m, instance, &sections[MATERIAL_SECTION], material, error);
@@ -175,8 +177,9 @@ MildStatus plugin_def_materials(const mjModel *m, int instance, const PluginDef 
                                 MildError *error) {
     const char *text = def->ground;
     char word[WORD];
-    MildModel model = MILD_MODEL_MILD;
-    MildStatus status = plugin_def_model(m, instance, def, &model, error);
+    int model = -1;
+    MildModel first = MILD_MODEL_MILD;
+    MildStatus status = plugin_def_model(m, instance, def, &model, &first, error);
     *terrain = (MildTerrain){.height = def->height};
     while (status == MILD_OK && plugin_word(&text, word, sizeof word)) {
         MildMaterial *material = &terrain->materials[terrain->material_count];

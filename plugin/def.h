@@ -39,15 +39,15 @@ const char *plugin_text(const mjModel *m, int instance, const char *attribute);
 
 /* Reads everything but ground.*, which needs the soles. */
 MildStatus plugin_def_read(const mjModel *m, int instance, PluginDef *def, MildError *error);
-/* Lays the materials of `ground` in the terrain, as the commands of the program do: presets,
- * matched to ground.model on the sole under `load` [N], then the keys ground.*. sole: NULL without
+/* Lays the materials of `ground` in the terrain, as the commands of the program do: presets of
+ * their own laws or matched to ground.model on the sole under `load` [N], then the keys ground.*. sole: NULL without
  * feet. */
 MildStatus plugin_def_materials(const mjModel *m, int instance, const PluginDef *def,
                                 const MildSole *sole, double load, MildTerrain *terrain,
                                 MildError *error);
-/* The model of ground.model or of the first preset. */
-MildStatus plugin_def_model(const mjModel *m, int instance, const PluginDef *def, MildModel *model,
-                            MildError *error);
+/* *model: of ground.model, or -1 without that key. *first: the same, or that of the first preset. */
+MildStatus plugin_def_model(const mjModel *m, int instance, const PluginDef *def, int *model,
+                            MildModel *first, MildError *error);
 
 /* Takes the next word from *text into `word` and moves *text behind it. Returns 0 at the end. A
  * longer word is cut off, and then names nothing. */

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "ground/models.h"
 #include "plugin/visual.h"
 
 #define NAME 64 /* bytes */
@@ -71,13 +72,15 @@ MildStatus live_change(Soft *soft, const mjModel *m, int label, const char *text
     while (status == MILD_OK && *text) {
         status = read_line(&text, &material, name, error);
     }
-    if (status == MILD_OK && material.model == MILD_MODEL_MILD && model != MILD_MODEL_MILD &&
+    if (status == MILD_OK && soft->model >= 0 && model_is_cones(material.model) &&
         !soft->foot[0].surface) {
-        status = mild_model_match(model, &material, soft->foot[0].raster, soft_load(soft, m),
-                                  &matched, error);
+        status = mild_model_match((MildModel)soft->model, &material, soft->foot[0].raster,
+                                  soft_load(soft, m), &matched, error);
         material = status == MILD_OK ? matched : material;
     }
-    if (status == MILD_OK && material.model != (int)model) {
+    const int stays = soft->model < 0 && model_is_cones((int)model) ? model_is_cones(material.model)
+                                                                    : material.model == (int)model;
+    if (status == MILD_OK && !stays) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "ground.model %s, but the model's ground is one of %s, which stays",
                          mild_model_names[material.model], mild_model_names[model]);

@@ -105,13 +105,13 @@ static int alloc_arrays(Soft *soft, const mjModel *m) {
 /* What the size of the state follows from. compiling: bool, as for feet_create. */
 static MildStatus make_feet(Soft *soft, const mjModel *m, int instance, int compiling,
                             MildError *error) {
-    MildModel model = MILD_MODEL_MILD;
+    MildModel first = MILD_MODEL_MILD;
     MildStatus status = plugin_def_read(m, instance, &soft->def, error);
     if (status == MILD_OK) {
-        status = plugin_def_model(m, instance, &soft->def, &model, error);
+        status = plugin_def_model(m, instance, &soft->def, &soft->model, &first, error);
     }
     if (status == MILD_OK) {
-        status = feet_create(m, &soft->def, model, compiling, soft->foot, &soft->feet, error);
+        status = feet_create(m, &soft->def, first, compiling, soft->foot, &soft->feet, error);
     }
     for (int f = 0; f < soft->feet && status == MILD_OK; f++) {
         soft->soles[f] = soft->foot[f].sole;

@@ -13,6 +13,7 @@
 
 typedef struct {
     PluginDef def;
+    int model;                /* of ground.model, or -1: each ground has its own */
     Foot foot[MILD_FEET_MAX]; /* those of `feet`, then the bodies of `body` */
     int feet;                 /* both */
     const MildSole *soles[MILD_FEET_MAX];

@@ -116,8 +116,8 @@ typedef struct {
     double zeta;         /* [-] ecc_quasi*: stress per depth under a level plate moving straight
                            down, in 1e6 N/m^3 */
     int passive;         /* bool: clamp c_g >= 0 and c_d >= 1/2, so that no energy is created */
-    int model;           /* MildModel, not MILD_MODEL_RIGID: the law that reads these numbers. A
-                            preset has those of `mild`; mild_model_match makes another's */
+    int model;           /* MildModel, not MILD_MODEL_RIGID: the law that reads these numbers;
+                            mild_model_match makes another's */
     double exponent;     /* [-] bekker, hunt_crossley: exponent n of the depth */
     double dissipation;  /* [s/m] hunt_crossley: the coefficient of restitution is 1 - dissipation v
                            at a small impact speed v */
@@ -144,14 +144,14 @@ typedef struct {
 extern const MildField mild_material_fields[];
 extern const int mild_material_field_count;
 
-/* The preset sand_loose. */
+/* The paper's loose sand: of mild, slip costs nothing. */
 MildMaterial mild_material_default(void);
-/* Writes a preset to *material. Presets of mild: rubber foam60 foam45 foam28 foam25 grass
- * sand_loose sand_dense. Presets of bekker: dry_sand sandy_loam clay snow lunar_soil. Returns
- * false, and leaves *material alone, when the name is unknown. (`rigid` is not a material but the
- * engine's own contact.) */
+/* Writes a preset to *material. Presets of mild: rubber foam60 foam45 foam28 foam25 grass; of
+ * mild_merged, and slip costs support: sand_loose sand_dense; of bekker: dry_sand sandy_loam clay
+ * snow lunar_soil. Returns false, and leaves *material alone, when the name is unknown. (`rigid` is
+ * not a material but the engine's own contact.) */
 int mild_material_preset(const char *name, MildMaterial *material);
-/* Number of presets of mild. */
+/* Number of presets of mild and mild_merged. */
 int mild_material_preset_count(void);
 /* Name of a preset; NULL when index is not 0 .. count - 1. */
 const char *mild_material_preset_name(int index);
@@ -331,14 +331,15 @@ MildElementLaw mild_element_law(const MildMaterial *material, double pitch, doub
 MildElementLaw mild_sole_law(const MildMaterial *material, const MildSole *sole, double depth);
 /* [m] Depth at which a level sole that is pressed slowly into virgin ground carries `load` [N]. */
 double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, double load);
-/* Derives the material of another model for a fair comparison with `mild`, a material of
- * MILD_MODEL_MILD: under `load` [N] a level foot sinks to the same depth. Half the weight of a
- * biped is a good load. Friction, drift, recovery and bed are those of `mild`, apart from what
- * MildModelInfo.match_note names. sole: the raster. For a concentric model the result belongs to
- * mild_sole_concentric of that raster. Fails, with *rival unchanged, for rigid, when `mild` is a
- * material of another model or fails mild_material_check, when the load is not positive, or when
- * the result fails mild_material_check. */
-MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole,
+/* Derives the material of another model for a fair comparison with `from`, a material of `mild` or
+ * `mild_merged`: under `load` [N] a level foot sinks to the same depth. Half the weight of a biped
+ * is a good load. Friction, drift, recovery and bed are those of `from`, apart from what
+ * MildModelInfo.match_note names; from `mild_merged` into another model slip costs nothing. sole:
+ * the raster. For a concentric model the result belongs to mild_sole_concentric of that raster.
+ * Fails, with *rival unchanged, for rigid, when `from` is a material of another model or fails
+ * mild_material_check, when the load is not positive, or when the result fails
+ * mild_material_check. */
+MildStatus mild_model_match(MildModel model, const MildMaterial *from, const MildSole *sole,
                             double load, MildMaterial *rival, MildError *error);
 
 /* Resistive force theory. alpha [-] are the coefficients of the stress on a plate: force [N] =

@@ -45,12 +45,12 @@ def ground_keys(ground, folder):
         names.append(os.fspath(one))
         if "," in names[-1]:
             raise ValueError(f"ground: {names[-1]!r} has a comma, which separates grounds; move the file, or give mild.Material of it")
-    others = sorted(set(models) - {"mild"})
-    if not names or len(others) > 1:
-        raise ValueError(f"ground: {' and '.join(others)} in one task; name grounds of one model" if names else "ground: an empty list")
-    keys = {"randomize.rigid_share": 0, "randomize.preset_share": 1, "randomize.preset_jitter": 0, "randomize.patch_share": 0,
-            "randomize.presets": ",".join(names)}
-    return {**keys, **({"randomize.model": others[0]} if others else {})}
+    whole = sorted(set(models) & {"con_cone", "con_spring"})  # one element under a sole
+    if not names or (whole and len(set(models)) > 1):
+        raise ValueError(f"ground: {' and '.join(sorted(set(models)))} in one task; name grounds of one model" if names else
+                         "ground: an empty list")
+    return {"randomize.rigid_share": 0, "randomize.preset_share": 1, "randomize.preset_jitter": 0, "randomize.patch_share": 0,
+            "randomize.slip_share": 0, "randomize.presets": ",".join(names), "randomize.model": whole[0] if whole else "own"}
 
 
 class _Task:

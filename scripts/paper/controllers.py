@@ -2,7 +2,7 @@
 import math
 
 import figures
-from measure import ALONE, NINE, SEVEN, deviation, evaluate, mean, mild, note_of, read, rivals_of, save, together
+from measure import ALONE, NINE, OF_PAPER, SEVEN, deviation, evaluate, mean, mild, note_of, read, rivals_of, save, together
 from page import Cell, Claim, Section, Table
 
 SPEEDS = [0.3, 0.6, 0.9, 1.2]
@@ -190,7 +190,7 @@ def passivity(given):
     tracks = {name: given.raw / f"track_{name}.csv" for name in who}
 
     def track(name):
-        mild("eval", *who[name], "--ground", ",".join(STEERED), "--speed", 0.6, "--trials", given.trials, "--threads", 1,
+        mild("eval", *who[name], *OF_PAPER, "--ground", ",".join(STEERED), "--speed", 0.6, "--trials", given.trials, "--threads", 1,
              "--track", tracks[name])
         return windows(tracks[name])
 

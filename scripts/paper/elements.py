@@ -22,7 +22,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 from deviations import measures, spread
-from measure import ALONE, MILD, NINE, ROOT, mild
+from measure import ALONE, MILD, NINE, OF_PAPER, ROOT, mild
 
 CONFIG = ROOT / "configs/quick.ini"
 TRAIN = ["--train.envs=4096", "--train.minutes=0", "--train.iterations=400", "--ppo.anneal=280 400", "--ppo.steps=24", "--ppo.optimizer=adam",
@@ -120,7 +120,7 @@ def judge(given):
         if has(given, task, "safetensors") and not has(given, task, "json"):
             part = path_of(given, task, "part")
             begin = time.monotonic()
-            mild("eval", "--policy", path_of(given, task, "safetensors"), "--config", CONFIG, *ALONE, "--train.device=cpu", "--train.robots=mujoco", "--ground",
+            mild("eval", "--policy", path_of(given, task, "safetensors"), "--config", CONFIG, *ALONE, *OF_PAPER, "--train.device=cpu", "--train.robots=mujoco", "--ground",
                  given.grounds, "--speed", SPEEDS, "--trials", given.trials, "--json", part)
             part.replace(path_of(given, task, "json"))
             print("%d-%d: judged in %.0f s" % (*task, time.monotonic() - begin), flush=True)

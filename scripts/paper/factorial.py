@@ -48,7 +48,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import transitions
 from half import halve
-from measure import MILD, NINE, ROOT, UNSEEN, mean, mild
+from measure import MILD, NINE, ROOT, UNSEEN, law_of, mean, mild
 
 CONTROLLERS = {"mlp": "MLP", "clock": "Clock", "ht2": "HT-2", "flat": "ours, no modulation", "ours": "ours"}
 GROUNDS = ["rigid", "ecc_spring", "mild"]
@@ -98,7 +98,7 @@ def who_of(controller, policy, config):
 
 
 def walked(given, who, grounds, speeds, *more):
-    printed = mild("eval", *who, "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)), "--trials", given.trials, "--seconds", TRIAL,
+    printed = mild("eval", *who, *law_of(grounds, more), "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)), "--trials", given.trials, "--seconds", TRIAL,
                    "--threads", given.threads, "--json", "-", *more)
     return [cell_of(row) for row in json.loads(printed)["rows"]]
 

@@ -147,7 +147,7 @@ class Search:
             common = [f"--train.seed={self.seed}", *options]
             run_mild(gpu, "train", "--config", str(ROOT / "configs/models.ini"), "--out", run, *common)
             run_mild(gpu, "eval", "--policy", f"{run}/policy.safetensors", "--config", f"{run}/config.ini", "--ground",
-                     "rigid,rubber,foam45,sand_loose", "--speed", "0.3,0.6", "--trials", "10", "--train.robots=batch",
+                     "rigid,rubber,foam45,sand_loose", "--model", "mild", "--speed", "0.3,0.6", "--trials", "10", "--train.robots=batch",
                      "--json", result)
             rows = json.loads(pathlib.Path(result).read_text())["rows"]
         upright = sum(row["success"] for row in rows) / sum(row["trials"] for row in rows)

@@ -14,6 +14,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 MILD = shlex.split(os.environ.get("MILD", str(ROOT / "build/mild")))
 SHIPPED = ROOT / "policies/paper"  # seed 1 of each, in half precision
 SEVEN = ["rigid", "rubber", "foam60", "foam45", "foam28", "grass", "sand_loose"]  # the paper's six and the rigid plane
+OF_PAPER = ["--model", "mild"]  # its law on sand too, where slip costs nothing
 ALONE = ["--task.speed_hold=0"]  # a policy is judged without the speed hold of configs/walk.ini
 NINE = ["rigid", "rubber", "foam60", "foam45", "foam28", "foam25", "grass", "sand_loose", "sand_dense"]
 TRAINED = ["mild", "con_cone", "con_spring", "ecc_spring", "ecc_quasi", "ecc_quasi_3d", "mild_merged", "rigid"]
@@ -42,11 +43,17 @@ def together(given, work, items):
         return list(pool.map(work, items))
 
 
+def law_of(grounds, more):
+    """Options: the paper's law, unless another one is given or the grounds are none of its nine."""
+    known = all(part in NINE for ground in grounds for part in ground.split("+"))
+    return OF_PAPER if known and "--model" not in more else []
+
+
 def evaluate(given, policy, grounds, speeds, *more):
     """Rows of `mild eval`; no policy: --controller says who walks. NaN: not measured."""
     who = ["--policy", policy] if policy else []
     rows = json.loads(mild("eval", *who, "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)),
-                           "--trials", given.trials, "--threads", 1, "--json", "-", *ALONE, *more))["rows"]
+                           "--trials", given.trials, "--threads", 1, "--json", "-", *ALONE, *law_of(grounds, more), *more))["rows"]
     return [{key: float("nan") if value is None else value for key, value in row.items()} for row in rows]
 
 

@@ -27,7 +27,7 @@ from deviations import measures
 
 HERE = pathlib.Path(__file__).resolve().parent
 MILD = os.environ.get("MILD", str(HERE.parents[1] / "build/mild"))
-JUDGE = ["--train.device=cpu", "--train.robots=mujoco", "--ground", "rigid,rubber,foam45,sand_loose", "--speed", "0.3,0.6"]
+JUDGE = ["--model", "mild", "--train.device=cpu", "--train.robots=mujoco", "--ground", "rigid,rubber,foam45,sand_loose", "--speed", "0.3,0.6"]
 SCRIPTS = {"models": "train.sh", "latent": "latent.sh", "deviations": "deviations.sh", "factorial": "factorial.py"}
 
 

@@ -126,7 +126,7 @@ static MildStatus write_json(const Eval *e, MildError *error) {
         cJSON_AddStringToObject(root, "ablate", e->ablate);
     }
     cJSON_AddStringToObject(root, "robot", robot_name(c->robot));
-    cJSON_AddStringToObject(root, "model", mild_model_names[c->grounds.model]);
+    cJSON_AddStringToObject(root, "model", grounds_model_name(c->grounds.model));
     cJSON_AddStringToObject(root, "version", build_version());
     cJSON *rows = cJSON_AddArrayToObject(root, "rows");
     for (int i = 0; i < e->row_count; i++) {
@@ -297,7 +297,7 @@ static MildStatus evaluate_batch(Eval *e, MildError *error) {
 
 static void print_header(const Eval *e, FILE *table) {
     char line[256];
-    if (e->context.grounds.model != MILD_MODEL_MILD) {
+    if (e->context.grounds.model != TASK_MODEL_OWN) {
         fprintf(table, "ground model %s\n", mild_model_names[e->context.grounds.model]);
     }
     eval_print_header(line, sizeof line);

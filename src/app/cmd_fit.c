@@ -15,6 +15,7 @@
 #include "app/report.h"
 #include "base/file.h"
 #include "base/text.h"
+#include "ground/models.h"
 #include "ground/soil/soil.h"
 #include "identify/belief/log.h"
 #include "identify/fit_drag.h"
@@ -190,13 +191,15 @@ static MildStatus from_read(const FitOptions *options, FitWork *work, MildError 
     if (status != MILD_OK) {
         return status;
     }
-    if (work->preset.model != model) {
+    if (work->preset.model != model &&
+        !(model_is_cones(work->preset.model) && model_is_cones(model))) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--hold-from %s: a ground of %s has no numbers for %s; use --hold "
                          "NAME=VALUE",
                          options->from, mild_model_names[work->preset.model],
                          mild_model_names[model]);
     }
+    work->preset.model = model;
     work->material = work->preset;
     work->from = options->from;
     work->bed = 1;
@@ -429,7 +432,7 @@ static MildStatus files_read(const CliArgs *args, FitWork *work, MildError *erro
 
 static MildStatus model_choose(const FitOptions *options, const CliArgs *args, FitWork *work,
                                MildError *error) {
-    MildModel model;
+    int model;
     MildStatus status = grounds_model(options->model, args, &model, error);
     if (status != MILD_OK) {
         return status;
@@ -442,7 +445,7 @@ static MildStatus model_choose(const FitOptions *options, const CliArgs *args, F
     const MildField *bed =
         mild_field_find(mild_material_fields, mild_material_field_count, "bed_depth", NULL);
     work->material = mild_material_default();
-    work->material.model = (int)model;
+    work->material.model = model == TASK_MODEL_OWN ? MILD_MODEL_MILD : model;
     work->material.bed_depth = bed->max;
     return held_read(options, work, error);
 }

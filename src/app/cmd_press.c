@@ -93,11 +93,11 @@ static double sole_area(const MildSole *sole) {
 
 /* Sets the material of the model and the sole that the model presses with. The material is matched
  * on this tool, under the pressure of half the robot's weight on its own sole. */
-static MildStatus tool_set_model(Tool *tool, MildModel model, const CliArgs *args,
-                                 MildMaterial *material, TerrainDef *terrain, MildError *error) {
+static MildStatus tool_set_model(Tool *tool, int model, const CliArgs *args, MildMaterial *material,
+                                 TerrainDef *terrain, MildError *error) {
     GroundsDef finish = {
         .model = model, .sole = tool->raster, .load = 1, .args = args, .terrain = terrain};
-    MildStatus status = model == MILD_MODEL_MILD ? MILD_OK : tool_open_robot(tool, error);
+    MildStatus status = model == TASK_MODEL_OWN ? MILD_OK : tool_open_robot(tool, error);
     if (status == MILD_OK && tool->robot) {
         finish.load = robot_foot_load(tool->robot) * sole_area(tool->raster) /
                       sole_area(robot_rasters(tool->robot)[0]);
@@ -105,7 +105,7 @@ static MildStatus tool_set_model(Tool *tool, MildModel model, const CliArgs *arg
     if (status == MILD_OK) {
         status = grounds_finish(&finish, material, error);
     }
-    if (status == MILD_OK && mild_model_is_concentric(model)) {
+    if (status == MILD_OK && mild_model_is_concentric(task_model_soles(model))) {
         tool->sole = tool->concentric = mild_sole_concentric(tool->raster, error);
         if (!tool->concentric) {
             status = error->status;
@@ -522,7 +522,7 @@ int cmd_press(int argc, char **argv) {
         return cli_fail_text("press", "--ground NAME is missing (mild info grounds lists all)");
     }
     MildError error;
-    MildModel model;
+    int model;
     Tool tool = {.robot_name = options.robot};
     MildStatus status = options_check(&options, &error);
     if (status != MILD_OK) {

@@ -23,7 +23,7 @@ static MildStatus open_task(Context *c, const CliArgs *args, MildError *error) {
 }
 
 MildStatus context_open(Context *c, const CliArgs *args, MildError *error) {
-    MildModel model;
+    int model;
     if (!c->policy && !c->without_policy) {
         c->policy = robot_policy(c->robot_name, c->shipped);
     } else if (c->policy) {

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/text.h"
+#include "ground/models.h"
 #include "ground/soil/soil.h"
 #include "ground/width.h"
 
@@ -41,8 +42,7 @@ MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, Mi
     return soil_find(name, material, error);
 }
 
-MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *model,
-                         MildError *error) {
+MildStatus grounds_model(const char *option, const CliArgs *args, int *model, MildError *error) {
     static const char key[] = "ground.model=";
     const char *name = option;
     for (int i = 0; i < args->override_count; i++) {
@@ -57,8 +57,13 @@ MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *mod
         }
         name = other;
     }
-    *model = MILD_MODEL_MILD;
-    if (!name || mild_model_find(name, model)) {
+    MildModel found;
+    *model = TASK_MODEL_OWN;
+    if (!name) {
+        return MILD_OK;
+    }
+    if (mild_model_find(name, &found)) {
+        *model = (int)found;
         return MILD_OK;
     }
     return mild_fail(error, MILD_ERROR_ARGUMENT,
@@ -66,9 +71,13 @@ MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *mod
                      name, text_nearest(name, (const char **)mild_model_names, MILD_MODELS));
 }
 
-GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, TerrainDef *terrain,
+const char *grounds_model_name(int model) {
+    return model == TASK_MODEL_OWN ? "own" : mild_model_names[model];
+}
+
+GroundsDef grounds_for_robot(int model, Robot *robot, TaskDef *task, TerrainDef *terrain,
                              const CliArgs *args) {
-    robot_set_model(robot, model);
+    robot_set_model(robot, task_model_soles(model));
     return (GroundsDef){.model = model,
                         .sole = robot_rasters(robot)[0],
                         .load = robot_foot_load(robot),
@@ -95,17 +104,17 @@ static MildStatus overlay(const GroundsDef *def, MildMaterial *material, MildErr
 }
 
 MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildError *error) {
-    const MildMaterial mild = *material;
-    const int own = mild.model != MILD_MODEL_MILD; /* the preset of another model */
-    if (own && def->model != MILD_MODEL_MILD && (int)def->model != mild.model) {
+    const MildMaterial from = *material;
+    const int matched = def->model != TASK_MODEL_OWN && def->model != from.model;
+    if (matched && !model_is_cones(from.model)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "this ground is one of %s, which has no match in %s: leave out --model",
-                         mild_model_names[mild.model], mild_model_names[def->model]);
+                         mild_model_names[from.model], mild_model_names[def->model]);
     }
-    material->model = own ? mild.model : (int)def->model;
     MildStatus status = mild_material_check(material, error);
-    if (status == MILD_OK && !own) {
-        status = mild_model_match(def->model, &mild, def->sole, def->load, material, error);
+    if (status == MILD_OK && matched) {
+        status =
+            mild_model_match((MildModel)def->model, &from, def->sole, def->load, material, error);
     }
     if (status == MILD_OK) {
         status = overlay(def, material, error);
@@ -190,6 +199,7 @@ const char *grounds_names(char *text, size_t size) {
 const char *grounds_model_help(char *text, size_t size) {
     char names[240];
     list_names(MILD_MODELS, mild_model_names, names, sizeof names);
-    snprintf(text, size, "ground model, matched to the sinkage of mild (default mild): %s", names);
+    snprintf(text, size,
+             "ground model, matched to the sinkage of each ground (default: its own): %s", names);
     return text;
 }

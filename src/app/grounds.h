@@ -10,7 +10,7 @@
 #include "run/eval/scene.h"
 
 enum { GROUNDS_MAX = 32 };
-/* The names of the grounds of a model, and of all models. They return how many there are. */
+/* The names of the grounds of a model, those of mild_merged among mild's, and of all models. They return how many there are. */
 int grounds_of(MildModel model, const char *names[GROUNDS_MAX]);
 int grounds_all(const char *names[GROUNDS_MAX]);
 
@@ -18,15 +18,17 @@ int grounds_all(const char *names[GROUNDS_MAX]);
  * *rigid, or fails when that is NULL. */
 MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, MildError *error);
 
-/* The model of --model NAME (NULL: not given) or --ground.model=NAME; mild when neither is
- * given. */
-MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *model,
-                         MildError *error);
+/* The model of --model NAME (NULL: not given) or --ground.model=NAME; TASK_MODEL_OWN when neither
+ * is given. */
+MildStatus grounds_model(const char *option, const CliArgs *args, int *model, MildError *error);
+
+/* Its name, "own" for TASK_MODEL_OWN. */
+const char *grounds_model_name(int model);
 
 /* What a command needs to turn names of grounds into materials. */
 typedef struct {
-    MildModel model;
-    const MildSole *sole; /* raster on which other models are matched to mild */
+    int model;            /* MildModel, or TASK_MODEL_OWN: each ground keeps its law */
+    const MildSole *sole; /* raster on which models are matched */
     double load;          /* [N] on that sole */
     const CliArgs *args; /* --ground.KEY=VALUE, applied to the matched material; --task.KEY=VALUE */
     TaskDef *task;       /* NULL: the command takes no --task */
@@ -36,7 +38,7 @@ typedef struct {
 
 /* The GroundsDef for a robot: models are matched under half its weight, and overrides come from
  * `args`. Gives the robot the soles of the model. */
-GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, TerrainDef *terrain,
+GroundsDef grounds_for_robot(int model, Robot *robot, TaskDef *task, TerrainDef *terrain,
                              const CliArgs *args);
 /* Turns a preset into the material of the model, then applies the overrides. */
 MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildError *error);

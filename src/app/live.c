@@ -14,8 +14,7 @@ Live live_begin(const MildTerrain *terrain, int presets) {
 
 /* Names of the fields that are the stiffness of a model; NULL ends them. */
 static const char *const *stiffness_of(int model) {
-    static const char *const of_mild[] = {"k_pen", "sigma_cone", NULL};
-    return model == MILD_MODEL_MILD ? of_mild : mild_model_info((MildModel)model)->scaled;
+    return mild_model_info((MildModel)model)->scaled;
 }
 
 static double *number_of(MildMaterial *material, const char *name) {

@@ -98,7 +98,7 @@ static void rival_scale(MildMaterial *m, const ModelRow *row, double pressure, d
     }
 }
 
-static MildStatus match_check(int model, const MildMaterial *mild, double load, MildError *error) {
+static MildStatus match_check(int model, const MildMaterial *from, double load, MildError *error) {
     if (model < 0 || model >= MILD_MODELS) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "model: there is no model %d", model);
     }
@@ -106,11 +106,12 @@ static MildStatus match_check(int model, const MildMaterial *mild, double load, 
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "model: rigid is the engine's own contact and has no material");
     }
-    const MildStatus status = mild_material_check(mild, error);
-    if (status == MILD_OK && mild->model != MILD_MODEL_MILD) {
+    const MildStatus status = mild_material_check(from, error);
+    if (status == MILD_OK && !model_is_cones(from->model)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "model: only a material of mild can be matched, and this is one of %s",
-                         mild_model_names[mild->model]);
+                         "model: only a material of mild or mild_merged can be matched, and this "
+                         "is one of %s",
+                         mild_model_names[from->model]);
     }
     if (status == MILD_OK && !(load > 0.0 && load < INFINITY)) {
         return mild_fail(error, MILD_ERROR_RANGE, "model: load = %g N must be positive", load);
@@ -118,11 +119,15 @@ static MildStatus match_check(int model, const MildMaterial *mild, double load, 
     return status;
 }
 
-MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole,
+MildStatus mild_model_match(MildModel model, const MildMaterial *from, const MildSole *sole,
                             double load, MildMaterial *rival, MildError *error) {
-    MildStatus status = match_check((int)model, mild, load, error);
+    MildStatus status = match_check((int)model, from, load, error);
     if (status != MILD_OK) {
         return status;
+    }
+    if (from->model == (int)model) {
+        *rival = *from;
+        return MILD_OK;
     }
     if (mild_sole_surface_z(sole)) {
         return mild_fail(
@@ -133,12 +138,15 @@ MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const Mil
     const double cells = mild_sole_elements(sole);
     const double cell = mild_sole_pitch(sole) * mild_sole_pitch(sole);
     const double area = row->info.concentric ? cells * cell : cell;
-    const double depth = mild_sole_sinkage(sole, mild, load);
+    const double depth = mild_sole_sinkage(sole, from, load);
     const double pressure =
-        load / (cells * cell) - LAW_BED_STRESS * fmax(depth - mild->bed_depth, 0.0);
+        load / (cells * cell) - LAW_BED_STRESS * fmax(depth - from->bed_depth, 0.0);
 
-    MildMaterial matched = *mild;
+    MildMaterial matched = *from;
     matched.model = (int)model;
+    if (from->model == MILD_MODEL_MILD_MERGED) {
+        matched.slip_length = matched.grip = matched.slip_growth = 0.0;
+    }
     if (row->info.concentric) {
         material_concentrate(&matched, cells);
     }

@@ -23,8 +23,8 @@ typedef struct {
     /* Bool: slip takes the support away where the material has a slip_length. */
     int slips;
 
-    /* Used by mild_model_match: changes a material of mild into one of this model, where the two
-     * differ. The `scaled` fields are then multiplied by a factor that gives the same sinkage, so
+    /* Used by mild_model_match: changes a material of mild or mild_merged into one of this model,
+     * where the two differ. The `scaled` fields are then multiplied by a factor that gives the same sinkage, so
      * only their ratios matter here. area: [m^2] of an element of the model. NULL: nothing
      * differs. */
     void (*reference)(MildMaterial *material, double area);

@@ -40,6 +40,10 @@ const ModelRow *model_row(int model) {
     return rows[known ? model : MILD_MODEL_MILD];
 }
 
+int model_is_cones(int model) {
+    return model == MILD_MODEL_MILD || model == MILD_MODEL_MILD_MERGED;
+}
+
 MildMaterial material_at(const MildMaterial *material, double pitch) {
     const double r = model_row(material->model)->info.concentric ? 1.0 : pitch / MATERIAL_PITCH;
     MildMaterial own = *material;

@@ -9,6 +9,8 @@
 /* The row of a material's model. Returns the row of mild for an unknown model and for one without a
  * law, because the ground must survive unchecked materials. */
 const ModelRow *model_row(int model);
+/* Bool: mild or mild_merged, whose materials mild_model_match takes. */
+int model_is_cones(int model);
 /* The same ground under elements of that pitch (docs/model.md section 16). The numbers of a
  * concentric model belong to the whole sole, and stay. */
 MildMaterial material_at(const MildMaterial *material, double pitch);

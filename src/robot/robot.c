@@ -587,9 +587,9 @@ void robot_set_model(Robot *robot, MildModel model) {
     robot->table.shells_stand = robot_bodies(robot) > robot->def.feet;
 }
 
-MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *mild,
+MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *from,
                              MildMaterial *rival, MildError *error) {
-    return mild_model_match(model, mild, robot->rasters[0], robot_foot_load(robot), rival, error);
+    return mild_model_match(model, from, robot->rasters[0], robot_foot_load(robot), rival, error);
 }
 
 const mjModel *robot_visual_model(const Robot *robot) {

@@ -86,7 +86,7 @@ MildStatus robot_set_elements(Robot *robot, int elements, MildError *error);
  * robot_set_model may be called. */
 void robot_set_shells(Robot *robot, int stand);
 /* mild_model_match for this robot: the first foot's raster under robot_foot_load. */
-MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *mild,
+MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *from,
                              MildMaterial *rival, MildError *error);
 /* The whole file with its shapes, cameras and lights, for pictures. The sims' own model has only
  * what a step needs. */

@@ -24,7 +24,7 @@ double __wrap_clock_seconds(void) {
 
 WRAPS(bench_record_walk);
 Replay *__wrap_bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
-                                 MildModel model, int periods, MildError *error) {
+                                 int model, int periods, MildError *error) {
     is_walking = 1;
     Replay *replay = __real_bench_record_walk(def, robot, ground, model, periods, error);
     is_walking = 0;

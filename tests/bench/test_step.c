@@ -90,7 +90,7 @@ int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *pus
 
 WRAPS(bench_record_walk);
 Replay *__wrap_bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
-                                 MildModel model, int periods, MildError *error) {
+                                 int model, int periods, MildError *error) {
     is_walking = 1;
     walked = 0;
     Replay *replay = __real_bench_record_walk(def, robot, ground, model, periods, error);

@@ -105,8 +105,13 @@ TEST(test_preset_numbers) {
                  {"sand_loose", 380, 0.15e6, 1.047, 2.0, 2.7, 17.2, 0.57, 0},
                  {"sand_dense", 700, 0.24e6, 1.047, 1.6, 2.7, 17.2, 0.62, 0}};
     for (int i = 0; i < 8; i++) {
-        MildMaterial m = kit_preset(table[i].name);
-        assert_true(m.k_pen == table[i].k_pen && m.sigma_cone == table[i].sigma_cone);
+        MildMaterial m, of_paper = kit_preset(table[i].name);
+        assert_true(mild_material_preset(table[i].name, &m));
+        assert_true(of_paper.k_pen == table[i].k_pen && of_paper.sigma_cone == table[i].sigma_cone);
+        assert_true(m.model == (m.recovery > 0 ? MILD_MODEL_MILD : MILD_MODEL_MILD_MERGED));
+        assert_true(m.recovery > 0 ? m.slip_length == 0
+                                   : m.slip_length == 1.4e-3 && m.slip_growth == 0.07 &&
+                                         m.grip == 0.123);
         assert_true(m.alpha == table[i].alpha && m.nu == table[i].nu);
         assert_true(m.c_g == table[i].c_g && m.c_d == table[i].c_d && m.phi == table[i].phi);
         assert_true(m.recovery == table[i].recovery && m.rho == 1000 && m.passive == 1);
@@ -128,6 +133,7 @@ TEST(test_presets) {
         assert_string_equal(mild_material_preset_name(i), table[i].name);
         assert_true(mild_material_preset(table[i].name, &m));
         assert_int_equal(mild_material_check(&m, &error), MILD_OK);
+        m = kit_preset(table[i].name);
         double weight = 40.0 * KIT_GRAVITY, two = sinkage(&m, weight / 154.0),
                one = sinkage(&m, weight / 77.0);
         print_message("%-10s sinks %5.2f / %5.2f mm (table %.1f / %.1f)\n", table[i].name, two, one,

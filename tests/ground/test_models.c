@@ -199,7 +199,7 @@ TEST(test_refusals) {
     assert_error(&error, MILD_ERROR_ARGUMENT, "model rigid");
     assert_int_not_equal(
         mild_model_match(MILD_MODEL_CON_CONE, &spring, raster[0], LOAD, &rival, &error), MILD_OK);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "model mild ecc_spring");
+    assert_error(&error, MILD_ERROR_ARGUMENT, "model mild mild_merged ecc_spring");
     assert_int_not_equal(
         mild_model_match(MILD_MODEL_CON_CONE, &mild, raster[0], NAN, &rival, &error), MILD_OK);
     static const int unknown[] = {-1, MILD_MODELS, 1 << 30};

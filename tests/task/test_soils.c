@@ -136,8 +136,21 @@ TEST(pressure_that_grows_with_the_sole) {
     pool_destroy(pool);
 }
 
-/* A soil of mild is matched to another model, as a preset is. */
+/* A soil of mild is matched to another model, as a preset is. Granular presets carry the SA01 as
+ * deep as the paper's. */
 TEST(what_is_matched) {
+    static const struct {
+        const char *name;
+        double k_pen, sigma_cone;
+    } paper[] = {{"sand_loose", 380, 0.15e6}, {"sand_dense", 700, 0.24e6}};
+    for (int i = 0; i < 2; i++) {
+        MildMaterial own, m;
+        assert_true(mild_material_preset(paper[i].name, &own));
+        assert_int_equal(robot_match_model(robot, MILD_MODEL_MILD, &own, &m, NULL), MILD_OK);
+        assert_true(fabs(m.k_pen / paper[i].k_pen - 1) < 2e-6);
+        assert_true(fabs(m.sigma_cone / paper[i].sigma_cone - 1) < 2e-6);
+        assert_true(m.model == MILD_MODEL_MILD && m.slip_length == 0 && m.grip == 0);
+    }
     TaskDef def = def_of("grass", MILD_MODEL_BEKKER);
     TaskSoils soils;
     MildError error = {0};

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "env/task/task.h"
+#include "ground/models.h"
 #include "ground/soil/soil.h"
 #include "ground/width.h"
 
@@ -39,7 +40,7 @@ static MildMaterial draw_preset(Random *r, const TaskDef *task) {
         *jittered[i] *= spread_of(r, def);
     }
     double *const others[] = {&m.k_c, &m.k_phi, &m.cohesion, &m.zeta};
-    for (size_t i = 0; m.model != MILD_MODEL_MILD && i < sizeof others / sizeof *others; i++) {
+    for (size_t i = 0; !model_is_cones(m.model) && i < sizeof others / sizeof *others; i++) {
         *others[i] *= spread_of(r, def);
     }
     if (own.k_c < 0) { /* one factor for both, or their sum might be below 0 under a sole */
@@ -85,6 +86,14 @@ static MildMaterial draw_ranges(Random *r, const RandomizeDef *def, const Robot 
     return m;
 }
 
+/* The law of a ground that was drawn. */
+static int model_wanted(const RandomizeDef *def, const MildMaterial *m, int is_preset) {
+    if (def->model != TASK_MODEL_OWN) {
+        return def->model;
+    }
+    return is_preset || m->recovery > SLIP_RECOVERY ? m->model : MILD_MODEL_MILD_MERGED;
+}
+
 /* Slip costs support on a share of the grounds that stay dented. start: the draw before any of the
  * material's own, which this moves none of. */
 static void draw_slip(const Random *start, const RandomizeDef *def, MildMaterial *m) {
@@ -95,6 +104,7 @@ static void draw_slip(const Random *start, const RandomizeDef *def, MildMaterial
     double grip = task_draw(&r, def->grip);
     if (slips && m->recovery <= SLIP_RECOVERY) {
         m->slip_length = length;
+        m->slip_growth = 0;
         m->grip = grip;
     }
 }
@@ -107,21 +117,24 @@ static MildMaterial draw_new(Random *r, const TaskDef *task, const Robot *robot)
     MildMaterial m, rival;
     const Random start = *r;
     for (int tries = 0; tries < DRAW_TRIES; tries++) {
-        m = random_unit(r) < preset ? draw_preset(r, task) : draw_ranges(r, def, robot);
+        const int is_preset = random_unit(r) < preset;
+        m = is_preset ? draw_preset(r, task) : draw_ranges(r, def, robot);
         m.passive = def->passive;
         if (def->model == MILD_MODEL_RIGID) {
             return m; /* the engine's contact does not use it */
         }
-        if (m.model != MILD_MODEL_MILD) {
-            return m; /* of randomize.model, with numbers of its own */
+        if (!model_is_cones(m.model)) {
+            return m; /* which has no match */
         }
-        if (robot_match_model(robot, (MildModel)def->model, &m, &rival, NULL) == MILD_OK) {
+        const int model = model_wanted(def, &m, is_preset);
+        if (robot_match_model(robot, (MildModel)model, &m, &rival, NULL) == MILD_OK) {
             draw_slip(&start, def, &rival);
             return rival;
         }
     }
     m = mild_material_default();
-    MildStatus status = robot_match_model(robot, (MildModel)def->model, &m, &rival, NULL);
+    const int model = model_wanted(def, &m, 1);
+    MildStatus status = robot_match_model(robot, (MildModel)model, &m, &rival, NULL);
     assert(status == MILD_OK);
     (void)status;
     return rival;
@@ -219,7 +232,8 @@ static MildStatus soil_open(const TaskDef *def, const char *name, MildMaterial *
     if (status != MILD_OK) {
         return mild_fail(error, status, "randomize.presets: %s", cause.text);
     }
-    if (soil->model == MILD_MODEL_MILD || soil->model == model || model == MILD_MODEL_RIGID) {
+    const int own = model == TASK_MODEL_OWN && !mild_model_is_concentric((MildModel)soil->model);
+    if (own || model_is_cones(soil->model) || soil->model == model || model == MILD_MODEL_RIGID) {
         return MILD_OK;
     }
     return mild_fail(error, MILD_ERROR_ARGUMENT,

@@ -60,7 +60,8 @@ TaskDef task_def_default(void) {
                    .tracking_width = 0.1,
                    .tracking_time = 0.4,
                    .reference_amplitude = 0.40},
-        .randomize = {.rigid_share = 0.1,
+        .randomize = {.model = TASK_MODEL_OWN,
+                      .rigid_share = 0.1,
                       .preset_share = 0.5,
                       .preset_jitter = 0.2,
                       .patch_share = 0.3,
@@ -78,8 +79,9 @@ TaskDef task_def_default(void) {
                       .b_drift = {0.10, 0.10},
                       .recovery = {0, 1},
                       .bed_depth = {0.10, 0.15},
-                      .slip_length = {0.001, 0.005},
-                      .grip = {0.05, 0.2},
+                      .slip_share = 1,
+                      .slip_length = {0.001, 0.01},
+                      .grip = {0.05, 0.3},
                       .passive = 1,
                       .sinkage_max = 0.07,
                       .shells_share = 1,
@@ -102,12 +104,17 @@ TaskDef task_def_default(void) {
     return def;
 }
 
+MildModel task_model_soles(int model) {
+    return model == TASK_MODEL_OWN ? MILD_MODEL_MILD : (MildModel)model;
+}
+
 void task_def_choose_ground(TaskDef *def) {
     RandomizeDef *r = &def->randomize;
     r->rigid_share = 0;
     r->rigid_time[0] = r->rigid_time[1] = 0;
     r->preset_share = 1;
     r->preset_jitter = 0;
+    r->slip_share = 0;
     r->presets[0] = '\0';
     r->patch_share = 0;
     r->shells_share = 1;
@@ -265,10 +272,14 @@ const MildField reward_fields[] = {
 };
 const int reward_field_count = sizeof reward_fields / sizeof *reward_fields;
 
+#define MODEL_NAME(id, name) #name,
+static const char *const model_names[MILD_MODELS + 1] = {MILD_MODEL_LIST(MODEL_NAME) "own"};
+
 #define Z(member, count, min, max, help) MILD_FIELD(RandomizeDef, member, D, count, min, max, help)
 const MildField randomize_fields[] = {
-    MILD_FIELD_CHOICE(RandomizeDef, model, mild_model_names, MILD_MODELS,
-                      "[-] ground model; its parameters are matched to those drawn for mild"),
+    MILD_FIELD_CHOICE(RandomizeDef, model, model_names, MILD_MODELS + 1,
+                      "[-] ground model, to which the grounds drawn are matched; own: that of the "
+                      "preset, else mild_merged where recovery is at most 0.2 and mild elsewhere"),
     Z(rigid_share, 1, 0, 1, "[-] share of episodes on the engine's own rigid contact"),
     Z(rigid_time, 2, 0, 2,
       "[s] time constant of the rigid contact (MuJoCo's solref, damping ratio 1), low and high; "
@@ -279,7 +290,7 @@ const MildField randomize_fields[] = {
       "[-] each parameter of a preset is scaled by 1 plus or minus up to this"),
     MILD_FIELD(RandomizeDef, presets, MILD_FIELD_TEXT, TASK_TEXT_SIZE, 0, 0,
                "[text] what preset_share draws from: presets and files of soils (docs/soil.md), "
-               "separated by commas; empty: the presets of mild"),
+               "separated by commas; empty: all of mild and mild_merged"),
     Z(patch_share, 1, 0, 1, "[-] share of soft episodes whose ground changes in stripes"),
     Z(patch_length, 2, 0.1, 100, "[m] length of a stripe, low and high"),
     Z(k_pen, 2, 0, 1e6, "[N/m] penetration stiffness, low and high (paper)"),
@@ -296,8 +307,8 @@ const MildField randomize_fields[] = {
     Z(recovery, 2, 0, 1, "[-] share of the depth that springs back, low and high"),
     Z(bed_depth, 2, 0.001, 10, "[m] depth of the firm bed below the surface, low and high"),
     Z(slip_share, 1, 0, 1,
-      "[-] share of the grounds that stay dented, recovery up to 0.2, on which slip costs support "
-      "(models mild and mild_merged)"),
+      "[-] share of the grounds of mild and mild_merged with a recovery of at most 0.2 on which slip "
+      "costs as much support as drawn below; of the others a preset keeps its own"),
     Z(slip_length, 2, 1e-4, 1, "[m] of those: path over which slip halves it, low and high"),
     Z(grip, 2, 0, 1, "[-] of those: greatest friction by the virgin load, low and high"),
     MILD_FIELD(RandomizeDef, passive, B, 1, 0, 1,

@@ -97,12 +97,15 @@ typedef struct {
     int acceleration_form;               /* a TaskAcceleration */
 } RewardDef;
 
+/* Of RandomizeDef.model: a preset keeps its law, and a ground drawn from the ranges has that of
+ * mild_merged where it stays dented, else that of mild. */
+enum { TASK_MODEL_OWN = MILD_MODELS };
 enum { TASK_TEXT_SIZE = 152 }; /* characters of a list of grounds, as long as a config's text */
 
 /* Domain randomisation; ranges are uniform. docs/task.md section 11. */
 typedef struct {
-    int model; /* MildModel of the soft episodes, matched to mild's draws; rigid: all on the
-                  engine's contact */
+    int model; /* MildModel of the soft episodes, to which draws are matched; rigid: all on the
+                  engine's contact; or TASK_MODEL_OWN */
     /* ground: shares of episodes; what remains after rigid and preset draws from the paper's ranges
      */
     double rigid_share;           /* [-] engine contact */
@@ -208,6 +211,8 @@ TaskDef task_def_default(void);
 /* For evaluation and play, on grounds that the caller chooses: no draw of them, no assistance, the
  * robot's own soles; shells stand in all episodes. */
 void task_def_choose_ground(TaskDef *def);
+/* A model with the soles of RandomizeDef.model, for robot_set_model. */
+MildModel task_model_soles(int model);
 /* The same and the nominal robot, undisturbed; sensor noise, latencies and the start
  * are still drawn. */
 void task_def_make_nominal(TaskDef *def);

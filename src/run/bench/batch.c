@@ -28,7 +28,7 @@ typedef struct {
 
 typedef struct {
     Robot *robot;
-    MildModel model;
+    int model; /* RandomizeDef.model */
     MildMaterial material[GROUNDS];
     Problem *problem; /* [PROBLEMS_MAX] */
     int problems;
@@ -324,12 +324,12 @@ MildStatus bench_batch(const ExperimentDef *def, BenchReport *report, MildError 
     static const int sizes[2][4] = {{1024, 0}, {4096, 16384, 65536, 0}};
     const int device = strncmp(def->train.device, "cuda", 4) == 0 ? 0 : MILD_BATCH_HOST;
     BatchBench bench = {.robot = bench_robot(def, error),
-                        .model = (MildModel)def->task.randomize.model,
+                        .model = def->task.randomize.model,
                         .problem = calloc(PROBLEMS_MAX, sizeof(Problem)),
                         .dt = def->task.physics_dt,
                         .device = device};
     if (bench.robot) {
-        robot_set_model(bench.robot, bench.model);
+        robot_set_model(bench.robot, task_model_soles(bench.model));
     }
     MildStatus status = bench.robot && bench.problem ? record(&bench, def, error) : MILD_ERROR_IO;
     for (int i = 0; status == MILD_OK && sizes[device >= 0][i] > 0; i++) {

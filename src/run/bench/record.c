@@ -28,7 +28,7 @@ MildStatus bench_open(BenchContext *c, const ExperimentDef *def, MildError *erro
     }
     c->def.task.randomize.patch_share = 0;
     experiment_fit_robot(&c->def, c->robot);
-    robot_set_model(c->robot, (MildModel)c->def.task.randomize.model);
+    robot_set_model(c->robot, task_model_soles(c->def.task.randomize.model));
     robot_set_shells(c->robot, c->def.task.shells_stand);
     c->pool = pool_create(def->train.threads);
     return c->pool ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
@@ -137,7 +137,7 @@ static MildStatus walk_record(Walk *walk, const Scene *scene, Replay *replay, Mi
 }
 
 Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
-                          MildModel model, int periods, MildError *error) {
+                          int model, int periods, MildError *error) {
     Walk walk = {.def = def->task, .robot = robot};
     Scene scene;
     task_def_make_nominal(&walk.def);
@@ -151,9 +151,10 @@ Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const ch
     if (status == MILD_OK) {
         status = scene_make(&scene, ground, 1.0, error);
     }
-    if (status == MILD_OK && model != MILD_MODEL_MILD) {
-        const MildMaterial mild = scene.terrain.materials[0];
-        status = robot_match_model(robot, model, &mild, &scene.terrain.materials[0], error);
+    if (status == MILD_OK && model != TASK_MODEL_OWN) {
+        const MildMaterial own = scene.terrain.materials[0];
+        status =
+            robot_match_model(robot, (MildModel)model, &own, &scene.terrain.materials[0], error);
     }
     if (status == MILD_OK) {
         status = walk_open(&walk, &scene, error);

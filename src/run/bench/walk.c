@@ -31,7 +31,7 @@ MildStatus bench_walk(const ExperimentDef *def, BenchReport *report, MildError *
     MildStatus status = robot ? MILD_OK : MILD_ERROR_IO;
     for (size_t g = 0; g < sizeof grounds / sizeof *grounds && status == MILD_OK; g++) {
         ReplayTimes times;
-        Replay *replay = bench_record_walk(def, robot, grounds[g], MILD_MODEL_MILD, PERIODS, error);
+        Replay *replay = bench_record_walk(def, robot, grounds[g], TASK_MODEL_OWN, PERIODS, error);
         status = replay ? replay_time(replay, robot, loose, REPEATS, &times, error) : error->status;
         // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): error->status is no success
         if (status == MILD_OK && !replay->variation.rigid) {

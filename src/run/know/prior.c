@@ -43,6 +43,7 @@ PriorGround prior_draw(Prior prior, Random *r, const MildSole *sole, double load
         } while (prior == PRIOR_PAPER && !is_of_paper(mild_material_preset_name(preset)));
         *material = mild_material_default();
         mild_material_preset(mild_material_preset_name(preset), material);
+        mild_model_match(MILD_MODEL_MILD, material, sole, load, material, NULL);
         if (prior == PRIOR_PAPER) {
             draw_paper(r, material);
         } else if (prior == PRIOR_WIDE) {

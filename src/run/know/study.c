@@ -31,7 +31,7 @@ static void draw_commands(const StudyDef *def, int straight, Random *r, Walk *wa
     }
 }
 
-/* Of another model, matched to mild; drawn again where there is no match. */
+/* Matched to the model; drawn again where there is no match. */
 static PriorGround draw_ground(const StudyDef *def, Random *r, MildMaterial *material) {
     const MildSole *sole = robot_rasters(def->robot)[0];
     const double load = robot_foot_load(def->robot);
@@ -43,11 +43,8 @@ static PriorGround draw_ground(const StudyDef *def, Random *r, MildMaterial *mat
             *material = *def->preset;
             ground = prior_ground(material, sole, load);
         }
-    } while (def->model != MILD_MODEL_MILD &&
-             robot_match_model(def->robot, def->model, material, &rival, NULL) != MILD_OK);
-    if (def->model != MILD_MODEL_MILD) {
-        *material = rival;
-    }
+    } while (robot_match_model(def->robot, def->model, material, &rival, NULL) != MILD_OK);
+    *material = rival;
     return ground;
 }
 

@@ -69,7 +69,7 @@ static int make_learner(Trainer *trainer, MildError *error) {
     const TaskMirror sides = task_mirror(trainer->robot);
     const PpoMirror mirror = {sides.observation_index, sides.observation_sign, sides.action_index,
                               sides.action_sign};
-    robot_set_model(trainer->robot, (MildModel)def->task.randomize.model);
+    robot_set_model(trainer->robot, task_model_soles(def->task.randomize.model));
     robot_set_shells(trainer->robot, def->task.shells_stand);
     if (task_set_elements(&def->task, trainer->robot, error) != MILD_OK) {
         return 0;
