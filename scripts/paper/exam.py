@@ -61,14 +61,14 @@ SLIDES = {
 }
 OTHERS = {"random": "60 random grounds of Table II", "transitions": "72 transitions"}
 WHAT = {**{name: part[0] for name, part in {**PARTS, **SLIDES}.items()}, **OTHERS}
-FOR_SA01 = {"half", "random"}  # grounds that its soles bear
+TOO_SOFT = {"go1": {"random", "snow"}}  # parts where its small feet sink until the trunk lies on the ground
 
 
 # ---- the walks ----
 
 def with_errors(row):
-    """A row of `mild eval` with what is measured less what is asked: [m/s], [m/s], [rad/s]; None: not measured."""
-    errors = {key: None if row[is_] is None else row[is_] - row[asked] for key, asked, is_ in
+    """A row of `mild eval` with what is measured less what is asked: [m/s], [m/s], [rad/s]; None: nobody stayed up."""
+    errors = {key: row[is_] - row[asked] if row["success"] and row[is_] is not None else None for key, asked, is_ in
               (("error", "speed", "velocity"), ("error_sideways", "sideways", "velocity_sideways"), ("error_turn", "turn", "velocity_turn"))}
     return {**row, **errors}
 
@@ -125,7 +125,7 @@ def trained(given, speeds):
 def cell(row):
     """What counts of a row of `mild eval`, or of a transition."""
     if "pair" in row:
-        return {**row, "where": [row["pair"], row["speed"]], "axes": [(row["speed"], row["error"])]}
+        return {**row, "where": [row["pair"], row["speed"]], "axes": [(row["speed"], row["error"] if row["upright"] else None)]}
     axes = [(row[asked], row[error]) for asked, error in (("speed", "error"), ("sideways", "error_sideways"), ("turn", "error_turn")) if row[asked]]
     return {"where": [f"{row['ground']} {row['case']}".strip(), row["speed"]], "axes": axes, "upright": row["success"], "trials": row["trials"],
             "ends": row["ends"], "cot": row["cot"], "torque": max(t["torque_max"] for t in row["each"]), "legs": row["legs"],
@@ -195,13 +195,13 @@ def parse(words):
     own, more = (words[:words.index("--")], words[words.index("--") + 1:]) if "--" in words else (words, [])
     robot = robot_of(more)
     policy, config = ("mild", "walk") if robot == "sa01" else (robot, robot)
-    names = [name for name in WHAT if robot == "sa01" or name not in FOR_SA01]
+    names = [name for name in WHAT if name not in TOO_SOFT.get(robot, ())]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--policy", type=pathlib.Path, default=ROOT / f"policies/{policy}.safetensors")
     parser.add_argument("--config", type=pathlib.Path, default=ROOT / f"configs/{config}.ini")
     parser.add_argument("--mild", type=pathlib.Path, help="the program (default: $MILD, or build/mild)")
-    parser.add_argument("--parts", default=",".join(names), help="of " + " ".join(WHAT) + " (default: all; of robots other than sa01 all but "
-                        + " ".join(sorted(FOR_SA01)) + ")")
+    parser.add_argument("--parts", default=",".join(names), help="of " + " ".join(WHAT) + " (default: all; of the Go1 all but "
+                        + " ".join(sorted(TOO_SOFT["go1"])) + ")")
     parser.add_argument("--trials", type=int, default=10, help="of each ground and speed (default 10; where slip sinks and on random grounds at most 2)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="programs at a time (default: one per core)")
