@@ -383,7 +383,7 @@ int cmd_drive(int argc, char **argv) {
                            .glitch = 0.02,
                            .turn_limit = 10,
                            .speed_limit = 30,
-                           .angle_limit = 0.2,
+                           .angle_limit = 0.5,
                            .torque_share = 1};
     d.simulated = (SimulatedDef){.patience = 30, .seed = 1};
     const CliOption options[] = {
@@ -419,7 +419,7 @@ int cmd_drive(int argc, char **argv) {
          "used; 0: none (default 30)"},
         {"angle-limit", CLI_NUMBER, &d.runner.angle_limit, -1, 10, "A",
          "[rad] a state with a joint so far beyond its range is not used; negative: none (default "
-         "0.2)"},
+         "0.5)"},
         {"glitch", CLI_NUMBER, &d.runner.glitch, 0, 10, "T",
          "[s] states beyond these limits may come for so long; then the robot is damped, for good "
          "(default 0.02)"},

@@ -60,8 +60,9 @@ class Robot:
         clock = int((time.monotonic() if clock is None else clock) * 1e6) & (2**64 - 1)
         sequence = self.sequence if sequence is None else sequence
         head = HEAD.pack(b"MILD", version, 1, n, mode, sequence & 0xFFFFFFFF, 0, clock, self.session, self.peer, self.robot)
-        q, qd = (q or POSE)[:n], (qd or [0] * 12)[:n]
-        return seal(head + struct.pack(f"<{7 + 2 * n}f", *quaternion, *omega, *q, *qd), self.key)
+        flicker = 1e-6 * (sequence & 1)  # of the last bits, as real sensors do: what repeats itself damps
+        q, qd = [angle + flicker for angle in (q or POSE)[:n]], (qd or [0] * 12)[:n]
+        return seal(head + struct.pack(f"<{7 + 2 * n}f", *quaternion, *omega[:2], omega[2] + flicker, *q, *qd), self.key)
 
     def send(self, packet):
         self.socket.sendto(packet, self.to)

@@ -69,7 +69,7 @@ static inline Runner *make_runner(void) {
 }
 
 /* A robot that stands upright in its default pose, and knows the runner. Its clock is 95 s ahead of
- * the runner's. */
+ * the runner's, and the last bits of its sensors flicker as real ones do. */
 static inline StatePacket standing(uint32_t sequence, double time) {
     StatePacket state = {.mode = PACKET_walk,
                          .sequence = sequence,
@@ -77,8 +77,10 @@ static inline StatePacket standing(uint32_t sequence, double time) {
                          .session = ROBOT_SESSION,
                          .peer = SESSION,
                          .quaternion = {1, 0, 0, 0}};
+    const float flicker = sequence % 2 ? 1e-6f : 0;
+    state.angular_velocity[2] = flicker;
     for (int i = 0; i < JOINTS; i++) {
-        state.angle[i] = (float)robot_default_pose(robot)[i];
+        state.angle[i] = (float)robot_default_pose(robot)[i] + flicker;
     }
     return state;
 }

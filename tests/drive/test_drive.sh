@@ -88,6 +88,13 @@ counts = dict(ticks=r"(\d+) ticks", missed_ticks=r"(\d+) missed", steps=r"(\d+) 
               late=r"late (\d+)", ends_ignored=r"ignored (\d+)", seconds=r"([\d.]+) s,")
 for key, pattern in counts.items():
     assert abs(float(re.search(pattern, printed).group(1)) - run[key]) < 0.0051, key
+ground = {name: one for name, one in run["ground"].items() if isinstance(one, dict)}
+scale = {"mm": 1e3, "kN/m^3": 1e-3}
+said = re.findall(r"(\w+) ([\d.e+-]+) ?(\S*) \(([\d.e+-]+) \.\. ([\d.e+-]+)\)", printed)
+assert len(ground) == len(said) > 3, printed
+for name, median, unit, low, high in said:  # three digits of what is printed, and its interval of 90 %
+    one = [scale.get(unit, 1) * ground[name][key] for key in ("low", "median", "high")]
+    assert one[0] < one[1] < one[2] and all(abs(a / float(b) - 1) < 0.006 for a, b in zip(one, (low, median, high))), (name, one)
 PY
 grep -q '^compute ' walk.out && grep -q 'below .* us .*#' walk.out || fail "no histogram: $(cat walk.out)"
 
@@ -312,4 +319,6 @@ bad "--json no_such_folder/x.json no_such_folder" "$mild" drive --json no_such_f
 for option in late damp-after stall-after glitch turn-limit speed-limit angle-limit torque-share seconds patience drop; do
     bad "--$option" "$mild" drive "--$option" -7
 done
+bad "--torque-share 0.01 1" "$mild" drive --torque-share 1.01
+bad "--torque-share 0.01 1" "$mild" drive --torque-share 0
 finish "two processes walk, and end as they should"

@@ -93,7 +93,6 @@ Runner *runner_create(const RunnerDef *def, MildError *error) {
     r->target.session = def->session;
     r->ticked = -1;
     belief_reset(&r->report.belief);
-    r->format = (PacketFormat){r->joints, packet_robot(def->robot), def->key};
     if (speed_hold_legs(def->robot, r->task.speed_hold, &r->legs, error) != MILD_OK ||
         controller_learned(def->policy, def->robot, NULL, 1, &r->controller, error) != MILD_OK) {
         free(r);
@@ -272,6 +271,15 @@ static void check_tilt(Runner *r, const TaskSensors *reading) {
     }
 }
 
+/* Damps a robot whose sensors do not agree. Before the first step there is no target. */
+static void check_sensors(Runner *r) {
+    char why[sizeof r->report.why];
+    if (r->report.steps > 0 && watch_disagrees(&r->report.watch, r->def.robot, &r->limits,
+                                               &r->state, r->target.angle, why, sizeof why)) {
+        runner_damp(r, why);
+    }
+}
+
 /* Damps when there was no usable state for too long, or no tick. */
 static void check_times(Runner *r, double now) {
     char why[sizeof r->report.why];
@@ -382,6 +390,7 @@ static void step_policy(Runner *r, const TaskSensors *reading, const double comm
 static void walk(Runner *r, double now, const double command[3]) {
     const TaskSensors reading = sensor_read(&r->state, r->joints);
     check_tilt(r, &reading);
+    check_sensors(r);
     if (r->mode == PACKET_damp) {
         return;
     }

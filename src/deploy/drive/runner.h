@@ -6,8 +6,8 @@
  *   walk  a tick with a new state, which carries the runner's session: one step of the policy
  *   hold  a tick without one: the last targets again, no step
  *   damp  the newest usable state is older than damp_after, impossible ones came for longer than
- *         `glitch`, the robot is tilted beyond the limit, or a tick was late by the runner's own
- *         fault: for good */
+ *         `glitch`, the sensors do not agree, the robot is tilted beyond the limit, or a tick was
+ *         late by the runner's own fault: for good */
 #ifndef DRIVE_RUNNER_H
 #define DRIVE_RUNNER_H
 
@@ -16,6 +16,7 @@
 #include "control/controller.h"
 #include "deploy/drive/packet.h"
 #include "deploy/drive/times.h"
+#include "deploy/drive/watch.h"
 #include "identify/belief/belief.h"
 
 typedef struct {
@@ -53,6 +54,7 @@ typedef struct {
     long holds;           /* ticks without a new state */
     long damps;           /* ticks */
     long targets_limited; /* of single joints */
+    Watch watch;          /* how far the sensors agree */
     Times age;            /* of the state used in a step, since it arrived */
     Belief belief;        /* with RunnerDef.belief */
     char why[240];        /* the reason for damping; "": none */
