@@ -48,7 +48,7 @@ static void expect_share(const BenchReport *report, const char *name, double wan
 }
 
 TEST(update_rows_are_times_by_steps) {
-    BenchReport report = {.count = 0};
+    static BenchReport report;
     MildError error = {0};
     ExperimentDef def = experiment_def_default();
     def.train.envs = ENVS;
