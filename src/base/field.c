@@ -251,7 +251,7 @@ const MildField *mild_field_find(const MildField *fields, int count, const char 
     const char *closest = NULL;
     int least = INT_MAX;
     for (int f = 0; f < count && !found; f++) {
-        int distance = text_distance(fields[f].name, name);
+        const int distance = text_distance(name, fields[f].name);
         found = strcmp(fields[f].name, name) == 0 ? &fields[f] : NULL;
         if (found || distance < least) {
             least = distance;

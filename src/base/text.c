@@ -9,36 +9,65 @@
 
 enum { NAME_MAX_LENGTH = 63 };
 
-static int smallest(int a, int b, int c) {
-    int least = a < b ? a : b;
-    return least < c ? least : c;
+static int smaller(int a, int b) {
+    return a < b ? a : b;
+}
+
+/* Edits (a character more, less or another, or two neighbours exchanged) from a[0..length) to each
+ * beginning of b, into to[0..strlen(b)]. */
+static void edits(const char *a, int length, const char *b, int to[NAME_MAX_LENGTH + 1]) {
+    int before[2][NAME_MAX_LENGTH + 1]; /* of the beginnings of a that are 1 and 2 shorter */
+    const int length_b = (int)strnlen(b, NAME_MAX_LENGTH);
+    const size_t row = sizeof before[0];
+    for (int j = 0; j <= length_b; j++) {
+        to[j] = j;
+    }
+    memcpy(before[0], to, row);
+    for (int i = 1; i <= length; i++) {
+        memcpy(before[1], before[0], row);
+        memcpy(before[0], to, row);
+        to[0] = i;
+        for (int j = 1; j <= length_b; j++) {
+            const int other = before[0][j - 1] + (a[i - 1] != b[j - 1]);
+            to[j] = smaller(other, smaller(before[0][j], to[j - 1]) + 1);
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+                to[j] = smaller(to[j], before[1][j - 2] + 1);
+            }
+        }
+    }
+}
+
+/* Half edits from a[0..length) to b, or to b without its last words, which are half an edit. */
+static int words_distance(const char *a, int length, const char *b) {
+    int to[NAME_MAX_LENGTH + 1], length_b = (int)strnlen(b, NAME_MAX_LENGTH);
+    edits(a, length, b, to);
+    int distance = 2 * to[length_b];
+    for (int j = 1; j < length_b; j++) {
+        if (b[j] == '_' || (j == length && length > 1 && strncmp(a, b, (size_t)length) == 0)) {
+            distance = smaller(distance, 2 * to[j] + 1);
+        }
+    }
+    return distance;
 }
 
 int text_distance(const char *a, const char *b) {
-    int row[NAME_MAX_LENGTH + 1];
-    int length_b = (int)strnlen(b, NAME_MAX_LENGTH);
-    for (int j = 0; j <= length_b; j++) {
-        row[j] = j;
-    }
-    for (int i = 1; i <= NAME_MAX_LENGTH && a[i - 1]; i++) {
-        int diagonal = row[0];
-        row[0] = i;
-        for (int j = 1; j <= length_b; j++) {
-            int above = row[j];
-            row[j] = smallest(above + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1]));
-            diagonal = above;
+    const int length = (int)strnlen(a, NAME_MAX_LENGTH);
+    int distance = words_distance(a, length, b);
+    for (int i = 1; i + 1 < length; i++) {
+        if (a[i] == '_') {
+            const int rest = length - i - 1;
+            distance = smaller(distance, words_distance(a, i, b) + rest);
+            distance = smaller(distance, words_distance(a + i + 1, rest, b) + i);
         }
     }
-    return row[length_b];
+    return distance;
 }
 
 const char *text_nearest(const char *name, const char *const *names, int count) {
     const char *best = NULL;
     int best_distance = INT_MAX;
-    const size_t length = strlen(name);
     for (int i = 0; i < count; i++) {
-        const int begins = length > 1 && strncmp(names[i], name, length) == 0;
-        int distance = begins ? names[i][length] != 0 : text_distance(name, names[i]);
+        const int distance = text_distance(name, names[i]);
         if (distance < best_distance) {
             best_distance = distance;
             best = names[i];

@@ -5,11 +5,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Levenshtein distance between two names; only the first 63 characters count. */
+/* Half edits from a name that somebody wrote to one that there is: a character more, less or
+ * another, or two neighbours exchanged, is an edit. Words, which _ divides, may be missing: at the
+ * end of `b`, or of what `a` begins, for half an edit; at either end of `a` for half an edit a
+ * character. Only the first 63 characters count. */
 int text_distance(const char *a, const char *b);
 
-/* The name among names[0..count) with the smallest distance to `name`, where one that begins with
- * `name` is at a distance of 1; NULL when count is 0. */
+/* The first of names[0..count) at the smallest distance from `name`; NULL when count is 0. */
 const char *text_nearest(const char *name, const char *const *names, int count);
 
 /* Reads all of `text` as a finite number or an integer. Returns 0 when it is not one. */
