@@ -77,7 +77,8 @@ class Attach(unittest.TestCase):
                                 ((spec, ["plate"] * 17), "feet: 17 of them and 0 in body"), ((spec, ["plate"] * 2), "'plate' and 'plate' are on one body, 'plate'"),
                                 ((spec, ["plate", "under"]), "'plate' and 'under' are on one body, 'plate'"),
                                 ((spec, ["left foot"]), "blanks"), ((spec, [5]), "feet: 5"),
-                                ((spec, ["plate"], 3), "ground"), ((spec, ["plate"], [3]), "ground")):
+                                ((spec, ["plate"], 3), "ground"), ((spec, ["plate"], [3]), "ground"),
+                                *(((spec, ["plate"], wrong), "'snad'; nearest is 'sand_loose'") for wrong in ("snad", "grass, snad", ["grass", "snad"]))):
             with self.assertRaisesRegex((TypeError, ValueError), name):
                 mild.attach(*arguments)
         for feet, body, name in (([], ["under"], "no body 'under'"), (["plate"], ["plate"], "body: 'plate' and 'plate'"),
@@ -295,11 +296,12 @@ class Attach(unittest.TestCase):
                 data.qpos[0] = 1
                 mujoco.mj_step(model, data, 1500)
                 self.assertAlmostEqual(0.01 - data.qpos[2], found, delta=0.01 * found)
-            path.write_text("[ground]\npreset = rubbr\n")
             spec = mujoco.MjSpec.from_string(PLATE)
-            with self.assertRaisesRegex(ValueError, "hard.ini:2: preset: .*'rubbr'.*'rubber'"):
-                mild.attach(spec, ["plate"], path)
             mild.attach(spec, ["plate"], [path, "grass"], terrain__patches="stripes")
+            path.write_text("[ground]\npreset = rubbr\n")
+            for wrong in (path, [path, "grass"]):
+                with self.assertRaisesRegex(ValueError, "hard.ini:2: preset: .*'rubbr'.*'rubber'"):
+                    mild.attach(spec, ["plate"], wrong)
             with self.assertRaisesRegex(ValueError, "hard.ini:2: preset: .*'rubbr'"):
                 spec.compile()
             with self.assertRaisesRegex(ValueError, "without blanks"):
