@@ -76,6 +76,21 @@ const char *text_nearest(const char *name, const char *const *names, int count) 
     return best;
 }
 
+size_t text_line(const char **rest, const char **line) {
+    const char *text = *line = *rest;
+    const size_t whole = strcspn(text, "\r\n");
+    size_t length = 0;
+    *rest = text + whole + (strncmp(text + whole, "\r\n", 2) == 0 ? 2 : text[whole] != '\0');
+    while (length < whole && !((text[length] == ';' || text[length] == '#') &&
+                               (length == 0 || strchr(" \t", text[length - 1])))) {
+        length++;
+    }
+    while (length > 0 && strchr(" \t", text[length - 1])) {
+        length--;
+    }
+    return length;
+}
+
 int text_double(const char *text, double *value) {
     char *end;
     errno = 0;

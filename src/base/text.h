@@ -14,6 +14,11 @@ int text_distance(const char *a, const char *b);
 /* The first of names[0..count) at the smallest distance from `name`; NULL when count is 0. */
 const char *text_nearest(const char *name, const char *const *names, int count);
 
+/* Takes the next line off *rest, as configurations have it: without its end (LF, CR LF or CR), its
+ * comment, which begins with ; or # at its start or after a blank, and blanks at its end. Returns
+ * its length from *line. */
+size_t text_line(const char **rest, const char **line);
+
 /* Reads all of `text` as a finite number or an integer. Returns 0 when it is not one. */
 int text_double(const char *text, double *value);
 int text_int(const char *text, int *value);

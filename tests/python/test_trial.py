@@ -98,6 +98,9 @@ class Descriptions(unittest.TestCase):
             self.assertEqual(len(d.terms), 8)
             path.write_text("[policy]\nlayout = unitree_rl_gym\n[observation]\ngravity = 1\ncommand = 1\ncommand.2 = 0*3\n")
             self.assertEqual([t.name for t in Description(path).terms], ["gravity", "command", "command"])
+            path.write_text("[policy] layout = unitree_rl_gym\n[observation]\ngravity = 1\n")
+            with self.assertRaisesRegex(ValueError, r"mine.ini.* line: 1 .*layout"):
+                Description(path)
         self.assertEqual(numbers("0.5*2 -1"), [0.5, 0.5, -1.0])
 
     def test_joints(self):
