@@ -243,10 +243,9 @@ static void print_knowledge(const Play *play) {
         return;
     }
     belief_text(&play->knows, play->belief, text, sizeof text);
-    printf(
-        "from its own sensors the robot says of the last %d footsteps, with 90 %% (at rest: a "
-        "sole under half of its weight; deepest, above: an element in a step):\n    %s\n",
-        play->knows.footsteps, text);
+    printf("from its own sensors the robot says of the last %d footsteps, with 90 %% (at rest: a "
+           "sole under half of its weight; deepest, above: an element in a step):\n    %s\n",
+           play->knows.footsteps, text);
     for (int i = 0; i < play->knows.alarms && i < PLAY_ALARMS; i++) {
         printf("%s%.1f s%s", i ? ", " : "it felt another ground at ", play->alarm[i],
                i == play->knows.alarms - 1 || i == PLAY_ALARMS - 1 ? "\n" : "");
