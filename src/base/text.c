@@ -13,41 +13,30 @@ static int smaller(int a, int b) {
     return a < b ? a : b;
 }
 
-/* Edits (a character more, less or another, or two neighbours exchanged) from a[0..length) to each
- * beginning of b, into to[0..strlen(b)]. */
-static void edits(const char *a, int length, const char *b, int to[NAME_MAX_LENGTH + 1]) {
-    int before[2][NAME_MAX_LENGTH + 1]; /* of the beginnings of a that are 1 and 2 shorter */
-    const int length_b = (int)strnlen(b, NAME_MAX_LENGTH);
-    const size_t row = sizeof before[0];
-    for (int j = 0; j <= length_b; j++) {
-        to[j] = j;
-    }
-    memcpy(before[0], to, row);
-    for (int i = 1; i <= length; i++) {
-        memcpy(before[1], before[0], row);
-        memcpy(before[0], to, row);
-        to[0] = i;
-        for (int j = 1; j <= length_b; j++) {
-            const int other = before[0][j - 1] + (a[i - 1] != b[j - 1]);
-            to[j] = smaller(other, smaller(before[0][j], to[j - 1]) + 1);
-            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
-                to[j] = smaller(to[j], before[1][j - 2] + 1);
-            }
-        }
-    }
-}
-
 /* Half edits from a[0..length) to b, or to b without its last words, which are half an edit. */
 static int words_distance(const char *a, int length, const char *b) {
-    int to[NAME_MAX_LENGTH + 1], length_b = (int)strnlen(b, NAME_MAX_LENGTH);
-    edits(a, length, b, to);
-    int distance = 2 * to[length_b];
-    for (int j = 1; j < length_b; j++) {
-        if (b[j] == '_' || (j == length && length > 1 && strncmp(a, b, (size_t)length) == 0)) {
-            distance = smaller(distance, 2 * to[j] + 1);
+    uint8_t edits[NAME_MAX_LENGTH + 1][NAME_MAX_LENGTH + 1]; /* of the beginnings of both */
+    int distance = INT_MAX;
+    for (int j = 0;; j++) {
+        for (int i = 0; i <= length; i++) {
+            int least = i + j;
+            if (i > 0 && j > 0) {
+                least = smaller(edits[i - 1][j - 1] + (a[i - 1] != b[j - 1]),
+                                smaller(edits[i - 1][j], edits[i][j - 1]) + 1);
+            }
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+                least = smaller(least, edits[i - 2][j - 2] + 1);
+            }
+            edits[i][j] = (uint8_t)least;
+        }
+        const int now = 2 * edits[length][j];
+        if (j == NAME_MAX_LENGTH || !b[j]) {
+            return smaller(distance, now);
+        }
+        if ((j > 0 && b[j] == '_') || (j > 1 && j == length && now == 0)) {
+            distance = smaller(distance, now + 1);
         }
     }
-    return distance;
 }
 
 int text_distance(const char *a, const char *b) {

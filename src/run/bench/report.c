@@ -6,7 +6,7 @@
 void bench_add(BenchReport *report, const char *bench, const char *name, double value,
                const char *unit) {
     if (report->count == report->room) {
-        const int room = 2 * report->room + 32;
+        const int room = 2 * report->room + 8;
         BenchRow *more = realloc(report->rows, (size_t)room * sizeof *more);
         if (!more) {
             report->is_short = 1;
