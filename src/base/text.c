@@ -13,56 +13,53 @@ static int smaller(int a, int b) {
     return a < b ? a : b;
 }
 
-/* Half edits from a[0..length) to b, or to b without its last words, which are half an edit. */
-static int words_distance(const char *a, int length, const char *b) {
+/* Half edits from a to b, where words may be missing: text_nearest. */
+static int half_edits(const char *a, const char *b) {
     uint8_t edits[NAME_MAX_LENGTH + 1][NAME_MAX_LENGTH + 1]; /* of the beginnings of both */
+    const int length = (int)strnlen(a, NAME_MAX_LENGTH);
     int distance = INT_MAX;
     for (int j = 0;; j++) {
+        const int more = j < NAME_MAX_LENGTH && b[j]; /* bool: b goes on */
         for (int i = 0; i <= length; i++) {
-            int least = i + j;
+            int least = 2 * j;
+            if (i > 0) {
+                least = j == 0 && a[i - 1] == '_' ? i : edits[i - 1][j] + 2;
+            }
             if (i > 0 && j > 0) {
-                least = smaller(edits[i - 1][j - 1] + (a[i - 1] != b[j - 1]),
-                                smaller(edits[i - 1][j], edits[i][j - 1]) + 1);
+                least = smaller(least, smaller(edits[i - 1][j - 1] + 2 * (a[i - 1] != b[j - 1]),
+                                               edits[i][j - 1] + 2));
             }
             if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
-                least = smaller(least, edits[i - 2][j - 2] + 1);
+                least = smaller(least, edits[i - 2][j - 2] + 2);
             }
             edits[i][j] = (uint8_t)least;
+            const int all = i == length; /* bool: no last word of a is missing */
+            if ((all || a[i] == '_') && (!more || b[j] == '_' || (all && least == 0))) {
+                distance = smaller(distance, least + length - i + more);
+            }
         }
-        const int now = 2 * edits[length][j];
-        if (j == NAME_MAX_LENGTH || !b[j]) {
-            return smaller(distance, now);
-        }
-        if ((j > 0 && b[j] == '_') || (j > 1 && j == length && now == 0)) {
-            distance = smaller(distance, now + 1);
+        if (!more) {
+            return distance;
         }
     }
 }
 
-int text_distance(const char *a, const char *b) {
-    const int length = (int)strnlen(a, NAME_MAX_LENGTH);
-    int distance = words_distance(a, length, b);
-    for (int i = 1; i + 1 < length; i++) {
-        if (a[i] == '_') {
-            const int rest = length - i - 1;
-            distance = smaller(distance, words_distance(a, i, b) + rest);
-            distance = smaller(distance, words_distance(a + i + 1, rest, b) + i);
-        }
-    }
-    return distance;
-}
-
-const char *text_nearest(const char *name, const char *const *names, int count) {
-    const char *best = NULL;
-    int best_distance = INT_MAX;
+int text_nearest_of(const char *name, const void *names, size_t stride, int count) {
+    int best = -1, least = INT_MAX;
     for (int i = 0; i < count; i++) {
-        const int distance = text_distance(name, names[i]);
-        if (distance < best_distance) {
-            best_distance = distance;
-            best = names[i];
+        const char *known = *(const char *const *)((const char *)names + (size_t)i * stride);
+        const int distance = half_edits(name, known);
+        if (distance < least) {
+            least = distance;
+            best = i;
         }
     }
     return best;
+}
+
+const char *text_nearest(const char *name, const char *const *names, int count) {
+    const int i = text_nearest_of(name, names, sizeof *names, count);
+    return i < 0 ? NULL : names[i];
 }
 
 size_t text_line(const char **rest, const char **line) {
