@@ -149,10 +149,9 @@ static MildStatus sheet_open(Sheet *sheet, MildError *error) {
     return sheet->file ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
 }
 
-/* Writes it to `path` if all went well so far, and its size to `table`: a row for each physics step
- * is many. A sheet that was not opened is left. */
-static MildStatus sheet_close(Sheet *sheet, const char *path, FILE *table, MildStatus status,
-                              MildError *error) {
+/* Writes it to `path` if all went well so far, and says its size, because a row for each physics
+ * step is many. A sheet that was not opened is left. */
+static MildStatus sheet_close(Sheet *sheet, const char *path, MildStatus status, MildError *error) {
     char size[32];
     if (sheet->file && fclose(sheet->file) && status == MILD_OK) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
@@ -160,7 +159,7 @@ static MildStatus sheet_close(Sheet *sheet, const char *path, FILE *table, MildS
     if (sheet->file && status == MILD_OK) {
         status = report_text(sheet->text, sheet->size, path, error);
         if (status == MILD_OK && strcmp(path, "-") != 0) {
-            fprintf(table, "%s: %s\n", path, text_bytes((double)sheet->size, size, sizeof size));
+            fprintf(stderr, "%s: %s\n", path, text_bytes((double)sheet->size, size, sizeof size));
         }
     }
     free(sheet->text);
@@ -280,7 +279,7 @@ static MildStatus evaluate_inside(Eval *e, FILE *table, MildError *error) {
         status = evaluate_rows(e, table, error);
     }
     e->eval.callback = NULL;
-    return sheet_close(&sheet, e->latent, table, status, error);
+    return sheet_close(&sheet, e->latent, status, error);
 }
 
 /* All at once, by the batch engine: its rows have one map, because each has one material. */
@@ -306,17 +305,13 @@ static void print_header(const Eval *e, FILE *table) {
     fprintf(table, "%s\n", line);
 }
 
-/* Where the table goes: standard output, unless a file takes that. */
-static FILE *table_of(const Eval *e) {
+static MildStatus evaluate_table(Eval *e, MildError *error) {
     const char *outputs[] = {e->json, e->latent, e->stances, e->actions, e->track, e->feet};
     int taken = 0; /* bool: standard output */
     for (int i = 0; i < (int)(sizeof outputs / sizeof *outputs); i++) {
         taken = taken || (outputs[i] && strcmp(outputs[i], "-") == 0);
     }
-    return taken ? stderr : stdout;
-}
-
-static MildStatus evaluate_table(Eval *e, FILE *table, MildError *error) {
+    FILE *table = taken ? stderr : stdout;
     const int batch = train_is_batch(&e->context.train);
     MildStatus status = batch ? evaluate_batch(e, error) : MILD_OK;
     if (status != MILD_OK) {
@@ -333,7 +328,6 @@ static MildStatus evaluate_table(Eval *e, FILE *table, MildError *error) {
 }
 
 static MildStatus evaluate(Eval *e, MildError *error) {
-    FILE *table = table_of(e);
     Sheet stances = {0}, actions = {0}, track = {0}, feet = {0};
     MildStatus status = e->stances ? sheet_open(&stances, error) : MILD_OK;
     if (status == MILD_OK && e->actions) {
@@ -362,13 +356,13 @@ static MildStatus evaluate(Eval *e, MildError *error) {
     e->eval.track = track.file;
     e->eval.feet = feet.file;
     if (status == MILD_OK) {
-        status = evaluate_table(e, table, error);
+        status = evaluate_table(e, error);
     }
     e->eval.stances = e->eval.actions = e->eval.track = e->eval.feet = NULL;
-    status = sheet_close(&stances, e->stances, table, status, error);
-    status = sheet_close(&actions, e->actions, table, status, error);
-    status = sheet_close(&track, e->track, table, status, error);
-    return sheet_close(&feet, e->feet, table, status, error);
+    status = sheet_close(&stances, e->stances, status, error);
+    status = sheet_close(&actions, e->actions, status, error);
+    status = sheet_close(&track, e->track, status, error);
+    return sheet_close(&feet, e->feet, status, error);
 }
 
 /* Checks all grounds before the first trial: a typing error in the last one should not cost an
