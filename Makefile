@@ -120,14 +120,12 @@ paper: build
 	@$(if $(QUICK),:,if nvidia-smi >/dev/null 2>&1; then scripts/paper/train.sh runs/paper; fi)
 	@.venv/bin/python scripts/paper/paper.py $(if $(QUICK),--trials 3 --models policies/paper)
 
-# emscripten and, for the test, Chromium: large, so nothing else installs them.
-web:
+# With the program, which serves it. emscripten and, for the test, Chromium: large, so nothing else installs them.
+web: program
 	@scripts/setup.sh web
-	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
 	@scripts/web.sh
 
 web-test: web
-	@cmake --build build --parallel $(JOBS) --target mild
 	@node tests/web/test_page.mjs .
 	@scripts/web_test.py
 

@@ -1,6 +1,6 @@
 # The layer gpu. Only its kernels are CUDA C++; everything else is C that calls the CUDA runtime and cuBLAS.
 if(NOT MILD_CUDA)
-  mild_layer(learn/cuda layer_learn)
+  mild_layer(learn/cuda layer_learn layer_device)
   return()
 endif()
 # -fmad=false: the random numbers equal the processor's bit for bit; these kernels wait for memory, not for arithmetic

@@ -4,6 +4,7 @@
 string(REPLACE "mildground" "mild" mild_package ${SKBUILD_PROJECT_NAME}) # the name on the package index is no module's
 string(REPLACE "-" "_" mild_package ${mild_package}) # mild, or mild_cuda (python/cuda)
 set(MILD_SECOND_MARCH "" CACHE STRING "x86-64-v4: the wheel has a second copy for such processors; empty: it has not")
+add_compile_definitions(MILD_WHEEL) # device/gpu.h
 find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
 if(NOT EXISTS "${MUJOCO_ROOT}") # the wheel that pip installed for this build
   execute_process(COMMAND ${Python_EXECUTABLE} -c "import importlib.util as u; print(u.find_spec('mujoco').origin)"

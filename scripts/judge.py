@@ -313,8 +313,13 @@ def main():
     parser.add_argument("--entry", action="append", default=[], help="FILE.py:FUNCTION or LIB.so:FUNCTION, a model of your own")
     parser.add_argument("--table", action="append", default=[], help="NAME=FILE.csv, predictions of your own")
     parser.add_argument("--rival", action="append", default=[], help="NAME=FOLDER, records of another simulator")
-    parser.add_argument("--out", type=pathlib.Path, help="folder for judge.csv and figures.html")
+    parser.add_argument("--out", type=pathlib.Path, help="folder for judge.csv and figures.html, which matplotlib draws")
     args = parser.parse_args()
+    if args.out:
+        try:
+            import matplotlib  # noqa: F401
+        except ImportError:
+            fail("--out draws figures.html with matplotlib, which is not here: pip install matplotlib")
     args.curves, args.fitted, results, begin = {}, {}, [], time.time()
     records = Records(args.records, args.edge)
     for fitted in args.families.split(","):

@@ -48,7 +48,7 @@ const ENDS = ['', 'It is no longer finite', 'It leans too far', 'Its body touche
   'A joint broke out'];
 
 // What the robot knows of its ground: BeliefParameter. Low to high: 90 %.
-const KNOWN = [['sinks', ' mm'], ['k_pen', ' N/m'], ['sigma', ' kN/m³'], ['friction', ''], ['slip length', ' mm']];
+const KNOWN = [['sinks at rest', ' mm'], ['k_pen', ' N/m'], ['sigma', ' kN/m³'], ['friction', ''], ['slip length', ' mm']];
 
 // ---- the core ----
 

@@ -1,5 +1,5 @@
 """mjlab's velocity tasks of Go1 and G1 on soft ground (mild.mjlab): trains them by mjlab's runner for some minutes, and walks on other grounds.
-python mjlab_soft.py [Go1|G1] --grounds foam45,sand_loose --envs 4096 --minutes 4; --stand 6 needs no training.
+python mjlab_soft.py [Go1|G1] --ground foam45,sand_loose --envs 4096 --minutes 4; --stand 6 needs no training.
 Several GPUs, a process and --envs robots each: torchrun --standalone --nproc_per_node 4 mjlab_soft.py G1"""
 import argparse
 import dataclasses
@@ -38,7 +38,7 @@ def stand(env, ground, seconds):
 
 def walk(robot, policy, grounds, speed, device, seconds=10):
     """Ten robots on each ground, with another seed and without noise or pushes, with the command to walk straight ahead."""
-    config, twist = config_of(robot, play=True, grounds=grounds), {"heading": None, "lin_vel_y": (0, 0), "ang_vel_z": (0, 0)}
+    config, twist = config_of(robot, play=True, ground=grounds), {"heading": None, "lin_vel_y": (0, 0), "ang_vel_z": (0, 0)}
     command, config.seed, config.scene.num_envs = config.commands["twist"], 2, 10 * len(grounds)
     command.ranges = dataclasses.replace(command.ranges, lin_vel_x=(speed, speed), **twist)
     command.heading_command, command.rel_standing_envs, command.rel_heading_envs, command.rel_forward_envs = False, 0, 0, 0
@@ -82,7 +82,7 @@ def thaw(model):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("robot", nargs="?", default="Go1", choices=ROBOTS)
-    parser.add_argument("--grounds", default=",".join(GROUNDS), type=lambda text: text.split(","))
+    parser.add_argument("--ground", default=",".join(GROUNDS), type=lambda text: text.split(","))
     parser.add_argument("--test", default="foam60,foam45,sand_dense,sand_loose", type=lambda text: text.split(","), help="walked on")
     parser.add_argument("--speed", type=float, default=0.6)
     parser.add_argument("--envs", type=int, default=4096)
@@ -93,13 +93,13 @@ if __name__ == "__main__":
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--device", default=f"cuda:{os.environ.get('LOCAL_RANK', 0)}" if torch.cuda.is_available() else "cpu")
     given = parser.parse_args()
-    config, task = config_of(given.robot, grounds=given.grounds), f"Mjlab-Velocity-Soft-Unitree-{given.robot}"
+    config, task = config_of(given.robot, ground=given.ground), f"Mjlab-Velocity-Soft-Unitree-{given.robot}"
     config.scene.num_envs, config.seed = given.envs, given.seed + int(os.environ.get("RANK", 0))
     if given.stand:
         config.events.pop("push_robot"), config.events.pop("base_com"), config.terminations.clear(), config.curriculum.clear()
     env = ManagerBasedRlEnv(config, given.device)
     if given.stand:
-        stand(env, given.grounds[0], given.stand)
+        stand(env, given.ground[0], given.stand)
         raise SystemExit
     agent = dataclasses.asdict(load_rl_cfg(task)) | {"logger": "tensorboard", "save_interval": 10**6}
     runner = load_runner_cls(task)(RslRlVecEnvWrapper(env), agent, given.out, given.device)
@@ -110,6 +110,6 @@ if __name__ == "__main__":
         runner.learn(50, init_at_random_ep_len=runner.current_learning_iteration == 0)
         thaw(runner.alg.actor), thaw(runner.alg.critic)
         if first:
-            progress(env, given.grounds, runner.current_learning_iteration)
+            progress(env, given.ground, runner.current_learning_iteration)
     if first:
         walk(given.robot, runner.get_inference_policy(given.device), given.test, given.speed, given.device)

@@ -1,5 +1,5 @@
 """Soft ground in Newton (mild.newton): a stool of four legs sinks into each ground as deep as its weight on its soles. It needs
-pip install newton[sim]; python newton_soft.py --grounds sand_loose,foam45 --device cuda:0"""
+pip install newton[sim]; python newton_soft.py --ground sand_loose,foam45 --device cuda:0"""
 import argparse
 import pathlib
 
@@ -49,13 +49,13 @@ def stand(grounds, count, device, seconds=6):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--grounds", default="rubber,foam45,grass,sand_loose", type=lambda text: text.split(","))
+    parser.add_argument("--ground", default="rubber,foam45,grass,sand_loose", type=lambda text: text.split(","))
     parser.add_argument("--worlds", type=int, default=8)
     parser.add_argument("--device", default="cpu")
     given = parser.parse_args()
-    solver, ground = stand(given.grounds, given.worlds, given.device)
+    solver, ground = stand(given.ground, given.worlds, given.device)
     force, depth, load = ground.wrench.numpy()[:, :, 2], ground.foot.numpy()[:, :, 3], solver.mj_model.body_subtreemass[1] * 9.81
-    for index, name in enumerate(given.grounds):
+    for index, name in enumerate(given.ground):
         rows = ground.material.numpy() == index
         print(f"{name:>12s}: {rows.sum()} stools of {load:.1f} N, carried {force[rows].sum(1).mean():.1f} N, {1e3 * depth[rows].mean():.2f} mm deep; "
               f"that load on a sole: {1e3 * np.mean([one.sinkage(name, load / 4) for one in ground.soles]):.2f} mm")

@@ -36,6 +36,7 @@ class Save(BaseCallback):
 
 
 def save(model):
+    options.out.mkdir(parents=True, exist_ok=True)
     for name, write in (("policy.zip", model.save), ("normalize.pkl", model.get_vec_normalize_env().save)):
         write(options.out / ("new." + name))
         (options.out / ("new." + name)).replace(options.out / name)
@@ -44,7 +45,6 @@ def save(model):
 def train():
     if options.out.exists():
         parser.error(f"{options.out} exists; name another folder by --out")
-    options.out.mkdir(parents=True)
     env = VecNormalize(VecMonitor(Env(options.envs, config=options.config, ground=options.ground)), norm_reward=False)
     model = PPO("MlpPolicy", env, n_steps=24, batch_size=6 * options.envs, n_epochs=5, gamma=0.99, gae_lambda=0.95, learning_rate=3e-4,
                 verbose=1, device="cpu", policy_kwargs={"net_arch": [256, 128], "activation_fn": torch.nn.ELU, "log_std_init": -0.5})

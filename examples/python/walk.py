@@ -5,6 +5,7 @@ The robot is an MJCF, the ground comes by mild.attach, the policy is policy.py: 
 import contextlib
 import pathlib
 import sys
+import threading
 import time
 
 import mujoco
@@ -30,7 +31,7 @@ model.opt.timestep = 0.0025
 data = mujoco.MjData(model)
 data.qpos[2], data.qpos[7:] = 0.84, POSE
 policy, rotation = Policy(ROOT / "policies/mild.safetensors"), np.zeros(9)
-window = contextlib.nullcontext()
+window, threads = contextlib.nullcontext(), set(threading.enumerate())
 if view:
     import mujoco.viewer
     window = mujoco.viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
@@ -48,6 +49,8 @@ with window as viewer:
         if viewer:
             viewer.sync()
             time.sleep(max(0, start + data.time - time.monotonic()))
+for thread in set(threading.enumerate()) - threads:
+    thread.join()  # the viewer draws until its window is gone; a program that ends before crashes
 print(f"{ground}: {data.qpos[0]:.2f} m in {data.time:.1f} s, {'upright' if data.qpos[2] > 0.6 else 'fallen'}")
 if picture:
     from PIL import Image

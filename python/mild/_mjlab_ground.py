@@ -16,13 +16,13 @@ class SoftGround:
     wrench, shape, material: tensors that share the memory of mild.warp.Ground's wrench, foot and material. imprint: how deep each foot
     stood when it last touched the ground [m]."""
 
-    def __init__(self, env, grounds, feet, soles, entity="robot", sensor="feet_ground_contact", heights=None):
+    def __init__(self, env, ground, feet, soles, entity="robot", sensor="feet_ground_contact", heights=None):
         """feet: names of sites, in the order of `sensor` and `heights`; soles have the frames of their bodies. soles: a regular
         expression of the geoms that they stand on."""
-        self.env, self.sim, model, self.grounds = env, env.sim, env.sim.mj_model, tuple(grounds)
+        self.env, self.sim, model, self.grounds = env, env.sim, env.sim.mj_model, tuple(ground)
         self.sites = [site_of(model, f"{entity}/{name}") for name in feet]
         self.ground = Ground(model, self.sim.wp_model, self.sim.wp_data, [model.body(model.site_bodyid[site]).name for site in self.sites],
-                             list(grounds), soles=f"{re.escape(entity)}/(?:{soles})", exclude=False, timestep=env.physics_dt)
+                             list(ground), soles=f"{re.escape(entity)}/(?:{soles})", exclude=False, timestep=env.physics_dt)
         self.m, self.d, self.soles, self.round, self.radius = self.sim.wp_model, self.sim.wp_data, self.ground.soles, self.ground.round, self.ground.radius[0]
         self.wrench, self.shape, self.material = (wp.to_torch(a) for a in (self.ground.wrench, self.ground.foot, self.ground.material))
         self.step, self.reset, self.capture = self.sim.step, self.sim.reset, self.sim.create_graph

@@ -145,9 +145,7 @@ class Description:
 
     def __init__(self, source: "str | pathlib.Path | dict | None" = None, changes=()):
         """source: a file, the name of a layout, a dict of sections, or None; changes: {"section.key": text}, over the file."""
-        parser = configparser.ConfigParser(delimiters=("=",), comment_prefixes=("#", ";"), inline_comment_prefixes=("#", ";"),
-                                           interpolation=None, empty_lines_in_values=False)
-        parser.optionxform = str
+        parser = _parser()
         self.name = source if isinstance(source, (str, pathlib.Path)) else "a dict"
         _read(parser, source)
         for key, value in dict(changes).items():
@@ -169,13 +167,20 @@ class Description:
             raise ValueError(f"{self.name}: policy.decimation and history.frames must be 1 or more")
 
 
+def _parser():
+    parser = configparser.ConfigParser(delimiters=("=",), comment_prefixes=("#", ";"), inline_comment_prefixes=("#", ";"),
+                                       interpolation=None, empty_lines_in_values=False)
+    parser.optionxform = str
+    parser.SECTCRE = re.compile(r"\[(?P<header>[^]]+)\]$")  # its own drops without a word what stands behind a section
+    return parser
+
+
 def _read(parser, source):
     """A file after the layout that it completes; a section [observation] replaces that of the layout."""
     if source is None:
         return
     if isinstance(source, dict):
-        own = configparser.ConfigParser(delimiters=("=",), interpolation=None)
-        own.optionxform = str
+        own = _parser()
         own.read_dict({section: {key: str(value) for key, value in keys.items()} for section, keys in source.items()})
         folder = pathlib.Path()
     else:
@@ -184,9 +189,7 @@ def _read(parser, source):
             path = FOLDER / f"{source}.ini"
         if not path.is_file():
             raise ValueError(f"describe: there is no file '{source}', and no such layout; there are {', '.join(layouts())}")
-        own, folder = configparser.ConfigParser(delimiters=("=",), comment_prefixes=("#", ";"), inline_comment_prefixes=("#", ";"),
-                                                interpolation=None, empty_lines_in_values=False), path.parent
-        own.optionxform = str
+        own, folder = _parser(), path.parent
         try:
             own.read_string(path.read_text(), str(source))
         except configparser.Error as error:

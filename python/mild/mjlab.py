@@ -1,12 +1,13 @@
 """mjlab's velocity tasks on soft ground: `train Mjlab-Velocity-Soft-Unitree-Go1`, after `pip install mildground[mjlab]` (docs/python.md).
 
 mjlab imports this module by itself. Robots of one environment stand on GROUNDS in turn; other grounds are a parameter of the event:
---env.events.ground.params.grounds "('foam45', 'sand_loose')". A task of your own becomes soft by `soften`. What was trained is judged by `mild trial`,
+--env.events.ground.params.ground "('foam45', 'sand_loose')". A task of your own becomes soft by `soften`. What was trained is judged by `mild trial`,
 which wants the robot and a description of what the policy sees and does: python -m mild.mjlab Mjlab-Velocity-Soft-Unitree-Go1 --out go1"""
 import argparse
 import dataclasses
 import pathlib
 import shutil
+import warnings
 
 import torch
 from mjlab.managers.curriculum_manager import CurriculumTermCfg
@@ -27,24 +28,28 @@ ROBOTS = {"Go1": (unitree_go1_flat_env_cfg, unitree_go1_ppo_runner_cfg, ("FR", "
           "G1": (unitree_g1_flat_env_cfg, unitree_g1_ppo_runner_cfg, ("left_foot", "right_foot"))}
 
 
-def ground(env, env_ids, **keys):
+def lay(env, env_ids, **keys):
     """The event: puts a SoftGround under the environment, once, as `env.soft_ground`."""
     if hasattr(env, "soft_ground"):
         raise RuntimeError("ground: the environment has soft ground already; the event's mode must be 'startup'")
     env.soft_ground = SoftGround(env, **keys)
 
 
-def soften(config, feet, grounds=GROUNDS, soles=r".*_foot\d*_collision", low=LOW, entity="robot", sensor="feet_ground_contact", heights="foot_height_scan"):
+def soften(config, feet, ground=GROUNDS, soles=r".*_foot\d*_collision", low=LOW, entity="robot", sensor="feet_ground_contact", heights="foot_height_scan",
+           grounds=None):
     """Puts soft ground into a ManagerBasedRlEnvCfg on level ground, and returns it.
 
     feet: sites of the feet, in the order of `sensor`, mjlab's sensor of their contacts, which then has the ground's forces (None: no
     sensor), and of `heights`, its sensor of their heights, which then counts from the middle of the imprint in which a foot last stood
-    (None: no sensor). grounds: presets or files of soils; the robots take them in turn. soles: regular expression of the geoms on which
+    (None: no sensor). ground: presets or files of soils, a list or a text with commas; the robots take them in turn. soles: regular expression of the geoms on which
     a foot stands, one sphere or capsules. low: of all geoms that leave the floor's collisions (its bit is 1) and keep the robot's own."""
+    if grounds is not None:
+        warnings.warn("soften: grounds is named ground now", DeprecationWarning, stacklevel=2)
+        ground = grounds
     parts = config.scene.entities[entity]
     parts.collisions = tuple(dataclasses.replace(c, contype={low: 2, ".*": 1}, conaffinity={low: 2, ".*": 3}) for c in parts.collisions)
-    config.events["ground"] = EventTermCfg(func=ground, mode="startup", params={
-        "grounds": tuple(grounds), "feet": tuple(feet), "soles": soles, "entity": entity, "sensor": sensor, "heights": heights})
+    config.events["ground"] = EventTermCfg(func=lay, mode="startup", params={
+        "ground": tuple(ground.split(",") if isinstance(ground, str) else ground), "feet": tuple(feet), "soles": soles, "entity": entity, "sensor": sensor, "heights": heights})
     return config
 
 
@@ -65,11 +70,11 @@ def ground_levels(env, env_ids):
     return mean
 
 
-def config_of(robot, play=False, grounds=GROUNDS):
+def config_of(robot, play=False, ground=GROUNDS):
     """mjlab's task of "Go1" or "G1" on level ground, softened. The weight of the speed is doubled, because steps out of deep imprints cost
     posture and smoothness: at mjlab's own weight a robot that stands on sand loses nothing. The G1 goes from ground to ground (ground_levels)."""
     make, _, feet = ROBOTS[robot]
-    config = soften(make(play=play), feet, grounds)
+    config = soften(make(play=play), feet, ground)
     config.rewards["track_linear_velocity"].weight *= 2
     if robot == "G1" and not play:
         config.curriculum["ground_levels"] = CurriculumTermCfg(func=ground_levels)

@@ -20,8 +20,8 @@ def attach(spec, feet=(), ground="sand_loose", *, body=(), exclude=True, surface
     ground is drawn in its own colour, dented, and planes of the floor are not seen; they are touched as before. sensor: name of a sensor to add, whose data are (feet + bodies, 12) numbers, a row for each
     foot and then for each body: force, torque, centre of pressure, area, largest and mean depth (docs/plugin.md).
     attributes: those of the plugin with __ for the dot: prints=64, ground__mu=0.5, terrain__kind="waves". library: the
-    plugin's file; None: $MILD_PLUGIN, or the package's own. Raises TypeError for what is no MjSpec, ValueError for feet and
-    bodies that the spec does not have, RuntimeError without the plugin; mujoco reports attributes that are wrong when it
+    plugin's file; None: $MILD_PLUGIN, or the package's own. Raises TypeError for what is no MjSpec, ValueError for feet,
+    bodies and grounds that there are not, RuntimeError without the plugin; mujoco reports attributes that are wrong when it
     compiles."""
     import mujoco
 
@@ -130,11 +130,12 @@ def ground_of(ground):
 
     if isinstance(ground, (str, os.PathLike)):
         ground = os.fspath(ground)
-        if not ground.endswith(".ini"):
-            return {"ground": ground}
-        ground = Material(ground)
+        ground = Material(ground) if ground.endswith(".ini") else ground.replace(",", " ").split()
     if isinstance(ground, (list, tuple)) and all(isinstance(one, (str, os.PathLike)) for one in ground):
-        return {"ground": " ".join(listed(os.fspath(one)) for one in ground)}
+        words = [listed(os.fspath(one)) for one in ground]
+        for word in words:
+            Material(word)  # refuses here what the plugin would refuse when the spec is compiled
+        return {"ground": " ".join(words)}
 
     if not isinstance(ground, Material):
         raise TypeError(f"ground: a {type(ground).__name__}, but it must be a preset, a soil's file, a Material, or a list of presets and files")

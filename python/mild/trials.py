@@ -10,6 +10,7 @@ import subprocess
 import sys
 import types
 import typing
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -99,21 +100,26 @@ def _text(value, digits):
 
 
 def trial(model: "str | os.PathLike | mujoco.MjSpec", policy: "str | os.PathLike | Callable[[np.ndarray], Sequence[float]]",
-          describe: "str | os.PathLike | Mapping | Description", *, grounds: Sequence[str] = GROUNDS, speeds: Sequence[float] = (0.5,),
+          describe: "str | os.PathLike | Mapping | Description", *, ground: "str | Sequence[str]" = GROUNDS, speeds: Sequence[float] = (0.5,),
           sideways: float = 0.0, turn: float = 0.0, trials: int = 10, seconds: float = 10.0, seed: int = 1, noise: float = 1.0,
           changes: Mapping[str, object] = types.MappingProxyType({}), attributes: Mapping[str, object] = types.MappingProxyType({}),
-          video: "str | os.PathLike | None" = None, jobs: int = 1, report: "Callable[[Row], None] | None" = None) -> "Table":
+          video: "str | os.PathLike | None" = None, jobs: int = 1, report: "Callable[[Row], None] | None" = None,
+          grounds: "Sequence[str] | None" = None) -> "Table":
     """Lets a policy walk on grounds, and returns a Table, whose text is one row for each ground and speed.
 
     model: an MJCF file, XML text, or a mujoco.MjSpec. policy: a file .onnx or .pt (TorchScript), FILE.py:NAME, or a callable that
     makes an action (n,) of an observation (m,); its reset(), if there is one, begins a walk. describe: what it sees and does, a
-    file, a layout (mild.layouts()), a dict of sections, or a Description. grounds: presets of mild.presets(), and "rigid", which is
+    file, a layout (mild.layouts()), a dict of sections, or a Description. ground: presets of mild.presets(), a list or a text with commas, and "rigid", which is
     MuJoCo's own floor. speeds: forward commands [m/s]. trials: of each row, which differ by seed, heading, place, joints and
     noise; noise: times that of the description. changes: {"section.key": text} over the description. attributes: of mild.attach,
     such as ground__mu. video: a file, the first trial of each row. jobs: processes; more than one need policy, model and describe
     as files. report: called with each Row. Raises ValueError with one line for what is wrong, RuntimeError for what is missing."""
     d = describe if isinstance(describe, Description) else Description(describe, changes)
-    cells = [(ground, (float(speed), float(sideways), float(turn))) for ground in grounds for speed in speeds]
+    if grounds is not None:
+        warnings.warn("trial: grounds is named ground now", DeprecationWarning, stacklevel=2)
+        ground = grounds
+    cells = [(one, (float(speed), float(sideways), float(turn)))
+             for one in (ground.split(",") if isinstance(ground, str) else ground) for speed in speeds]
     if not cells or trials < 1 or not seconds > 0:
         raise ValueError("trial: needs a ground, a speed, and more than 0 trials and seconds")
     options = dict(trials=int(trials), seconds=float(seconds), seed=int(seed), noise=float(noise), attributes=dict(attributes), painted=bool(video))
@@ -539,7 +545,7 @@ def main(argv=None):
             os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo reads it once, when it is imported
         _quietly()
         out = sys.stderr if arguments.json == "-" else sys.stdout
-        table = trial(arguments.model, arguments.policy, arguments.describe, grounds=arguments.ground, speeds=arguments.speed,
+        table = trial(arguments.model, arguments.policy, arguments.describe, ground=arguments.ground, speeds=arguments.speed,
                       sideways=arguments.sideways, turn=arguments.turn, trials=arguments.trials, seconds=arguments.seconds, seed=arguments.seed,
                       noise=arguments.noise, changes=changes, attributes=attributes, video=arguments.video, jobs=arguments.jobs)
         print(table, file=out)

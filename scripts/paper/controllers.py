@@ -190,7 +190,7 @@ def passivity(given):
     tracks = {name: given.raw / f"track_{name}.csv" for name in who}
 
     def track(name):
-        mild("eval", *who[name], *OF_PAPER, "--ground", ",".join(STEERED), "--speed", 0.6, "--trials", given.trials, "--threads", 1,
+        mild("eval", "--seed", given.seed, *who[name], *OF_PAPER, "--ground", ",".join(STEERED), "--speed", 0.6, "--trials", given.trials, "--threads", 1,
              "--track", tracks[name])
         return windows(tracks[name])
 

@@ -121,7 +121,7 @@ def judge(given):
             part = path_of(given, task, "part")
             begin = time.monotonic()
             mild("eval", "--policy", path_of(given, task, "safetensors"), "--config", CONFIG, *ALONE, *OF_PAPER, "--train.device=cpu", "--train.robots=mujoco", "--ground",
-                 given.grounds, "--speed", SPEEDS, "--trials", given.trials, "--json", part)
+                 given.ground, "--speed", SPEEDS, "--trials", given.trials, "--json", part)
             part.replace(path_of(given, task, "json"))
             print("%d-%d: judged in %.0f s" % (*task, time.monotonic() - begin), flush=True)
 
@@ -150,7 +150,7 @@ def parse():
     parser.add_argument("--devices", default="cuda", help="of the trainings: cuda:0,cuda:1, or cpu (default cuda)")
     parser.add_argument("--jobs", type=int, default=1, help="trainings at a time on each device (default 1)")
     parser.add_argument("--seconds", type=float, default=1e6, help="[s] for the trainings")
-    parser.add_argument("--grounds", default=",".join(NINE), help="of the judge (default: nine)")
+    parser.add_argument("--ground", default=",".join(NINE), help="of the judge (default: nine)")
     parser.add_argument("--trials", type=int, default=10, help="of the judge, of each ground and speed (default 10)")
     words = sys.argv[1:] + ([] if "--" in sys.argv else ["--"])
     given = parser.parse_args(words[:words.index("--")])

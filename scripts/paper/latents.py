@@ -17,7 +17,7 @@ def latent(given):
 
     def work(item):
         ground, path = item
-        mild("eval", "--policy", given.policy, "--config", given.config, *ALONE, *OF_PAPER, "--ground", ground, "--speed", "0.4,0.8",
+        mild("eval", "--seed", given.seed, "--policy", given.policy, "--config", given.config, *ALONE, *OF_PAPER, "--ground", ground, "--speed", "0.4,0.8",
              "--trials", max(6, given.trials), "--seconds", 15, "--threads", 1, "--latent", path)
 
     together(given, work, zip(SEVEN, paths))
@@ -62,7 +62,7 @@ def parameters(given):
         i, (k_pen, stress, ground) = item
         paths = [given.raw / f"parameters_{i}_{kind}.csv" for kind in ("latent", "actions", "stances")]
         mild("eval", "--policy", given.policy, "--config", given.config, *ALONE, *OF_PAPER, "--ground", ground, f"--ground.k_pen={k_pen}",
-             f"--ground.sigma_cone={stress}", "--speed", 0.6, "--trials", 1, "--seed", i, "--seconds", 8, "--threads", 1,
+             f"--ground.sigma_cone={stress}", "--speed", 0.6, "--trials", 1, "--seed", i + 1000 * (given.seed - 1), "--seconds", 8, "--threads", 1,
              "--latent", paths[0], "--actions", paths[1], "--stances", paths[2])
         seen = latent_stats.walk(*paths)
         for path in paths:  # 1.3 MB each walk
@@ -104,7 +104,7 @@ def course(given):
 
     def work(way):
         path = given.raw / f"course_{way}.csv"
-        mild("eval", "--policy", given.policy, "--config", given.config, *ALONE, *OF_PAPER, "--ground", "rubber,foam28,rubber+foam28+rubber",
+        mild("eval", "--seed", given.seed, "--policy", given.policy, "--config", given.config, *ALONE, *OF_PAPER, "--ground", "rubber,foam28,rubber+foam28+rubber",
              f"--speed={tracks[way]}", "--trials", 4, "--seconds", 14, "--patch", 2.5, "--threads", 1, "--latent", path)
         return path
 

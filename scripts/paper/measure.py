@@ -52,7 +52,7 @@ def law_of(grounds, more):
 def evaluate(given, policy, grounds, speeds, *more):
     """Rows of `mild eval`; no policy: --controller says who walks. NaN: not measured."""
     who = ["--policy", policy] if policy else []
-    rows = json.loads(mild("eval", *who, "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)),
+    rows = json.loads(mild("eval", "--seed", given.seed, *who, "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)),
                            "--trials", given.trials, "--threads", 1, "--json", "-", *ALONE, *law_of(grounds, more), *more))["rows"]
     return [{key: float("nan") if value is None else value for key, value in row.items()} for row in rows]
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The paper's experiments: measures them with build/mild, draws them, and writes one page, OUT/index.html, that opens anywhere.
 
-  scripts/paper/paper.py [EXPERIMENT ...] [--models FOLDER] [--policy FILE] [--out out/paper] [--trials N]
+  scripts/paper/paper.py [EXPERIMENT ...] [--models FOLDER] [--policy FILE] [--out out/paper] [--trials N] [--seed N]
 
 The policies of --models are MODEL-SEED.safetensors, ht2*.safetensors and clock*.safetensors: those of scripts/paper/train.sh in
 runs/paper if there are any, else the shipped ones. What the paper measured on hardware is measured in simulation here. Each
@@ -50,6 +50,7 @@ def main():
     parser.add_argument("--policy", type=pathlib.Path, default=ROOT / "policies/mild.safetensors")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "out/paper")
     parser.add_argument("--trials", type=int, default=10, help="per row (default 10)")
+    parser.add_argument("--seed", type=int, default=1, help="of the trials (default 1)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="programs at a time (default: one per core)")
     given = parser.parse_args()
     unknown = [name for name in given.experiments if name not in EXPERIMENTS]
@@ -70,7 +71,7 @@ def main():
             print(f"{name}: {time.time() - begin:.0f} s, {processor_seconds() - worked:.0f} s of processor time", flush=True)
     seeds = max((len(files) for files in models_of(given).values()), default=0)
     rivals = ", ".join(f"{name} {len(files)}" for name, (_, files) in rivals_of(given).items()) or "none"
-    how = (f"{given.trials} trials a row; weights of {shown(given.models)}; seeds of each training by ground model: {seeds}, of the rivals: "
+    how = (f"{given.trials} trials a row, seed {given.seed}; weights of {shown(given.models)}; seeds of each training by ground model: {seeds}, of the rivals: "
            f"{rivals}. The policy of a section is the shipped one unless it says another.")
     page.write(given.out / "index.html", sections, mild("--version").strip(), how)
     print(given.out / "index.html")

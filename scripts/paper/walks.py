@@ -91,7 +91,7 @@ def repeat(given):
     texts = []
     for threads in (1, 1, max(2, given.jobs)):
         path = given.raw / "repeat.csv"
-        printed = mild("eval", "--policy", given.policy, "--config", given.config, *ALONE, *OF_PAPER, "--ground", "foam45,sand_loose", "--speed", "0.6,1.2",
+        printed = mild("eval", "--seed", given.seed, "--policy", given.policy, "--config", given.config, *ALONE, *OF_PAPER, "--ground", "foam45,sand_loose", "--speed", "0.6,1.2",
                        "--trials", 4, "--threads", threads, "--stances", path, "--json", "-")
         texts.append(printed + path.read_text())
     same = texts[0] == texts[1] == texts[2]

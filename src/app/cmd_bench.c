@@ -128,6 +128,10 @@ static MildStatus run_benches(const CliArgs *args, const char *robot, FILE *file
             continue;
         }
         status = benches[i].run(&def, report, error);
+        if (status == MILD_OK && report->is_short) {
+            status = mild_fail(error, MILD_ERROR_MEMORY, "bench %s: out of memory for its rows",
+                               benches[i].name);
+        }
         if (status == MILD_OK) {
             print_rows(report, first, file);
         }
@@ -177,12 +181,13 @@ int cmd_bench(int argc, char **argv) {
     if (bad) {
         return bad;
     }
-    BenchReport report = {.count = 0};
+    BenchReport report = {0};
     MildError error = {0};
     FILE *table = json && strcmp(json, "-") == 0 ? stderr : stdout;
     MildStatus status = run_benches(&args, robot, table, &report, &error);
     if (status == MILD_OK && json) {
         status = save_json(&report, json, &error);
     }
+    bench_report_free(&report);
     return status == MILD_OK ? 0 : cli_fail("bench", &error);
 }

@@ -205,11 +205,11 @@ static void print_table(Command *c) {
     Play *play = &c->play;
     double weight = robot_total_mass(play->robot) * GRAVITY;
     printf("%-12s %9s %7s %9s %8s %10s %9s %5s\n", "ground", "distance", "time", "speed", "upright",
-           "clearance", "sinkage", "COT");
+           "clearance", "deepest", "COT");
     for (int i = 0; i < c->grounds.count; i++) {
         PlayLeg *leg = &play->leg[i];
         Measure *m = &leg->measure;
-        char clearance[TEXT_CELL], sinkage[TEXT_CELL], cot[TEXT_CELL];
+        char clearance[TEXT_CELL], deepest[TEXT_CELL], cot[TEXT_CELL];
         if (leg->steps == 0) {
             printf("%-12s   not reached\n", c->names[i]);
             continue;
@@ -220,7 +220,7 @@ static void print_table(Command *c) {
         printf("%-12s %7.2f m %5.1f s %5.2f m/s %8s %7s mm %6s mm %5s\n", c->names[i], distance,
                time, distance / time, leg->fell ? "fell" : "yes",
                millimetres("%.0f", m->apex_sum, m->swings, clearance),
-               millimetres("%.1f", m->deepest_sum, m->stances, sinkage),
+               millimetres("%.1f", m->deepest_sum, m->stances, deepest),
                text_cell("%.2f", steady > 0.1 ? m->work / (weight * steady) : NAN, cot));
     }
 }
@@ -228,7 +228,7 @@ static void print_table(Command *c) {
 /* Where the others are at the end, and how deep. */
 static void print_others(const Command *c) {
     const Play *play = &c->play;
-    printf("%-12s %9s %8s %9s\n", "others", "robots", "upright", "sinkage");
+    printf("%-12s %9s %8s %9s\n", "others", "robots", "upright", "deepest");
     for (int i = 0; i < c->grounds.count; i++) {
         const OthersRow row = others_on(play->others, i);
         printf("%-12s %9d %8d %6.1f mm\n", c->names[i], row.robots, row.upright, 1e3 * row.sinkage);
@@ -243,10 +243,9 @@ static void print_knowledge(const Play *play) {
         return;
     }
     belief_text(&play->knows, play->belief, text, sizeof text);
-    printf(
-        "from its own sensors the robot says of the last %d footsteps, with 90 %% (sinkage: of a "
-        "sole under half of its weight, standing):\n    %s\n",
-        play->knows.footsteps, text);
+    printf("from its own sensors the robot says of the last %d footsteps, with 90 %% (at rest: a "
+           "sole under half of its weight; deepest, above: an element in a step):\n    %s\n",
+           play->knows.footsteps, text);
     for (int i = 0; i < play->knows.alarms && i < PLAY_ALARMS; i++) {
         printf("%s%.1f s%s", i ? ", " : "it felt another ground at ", play->alarm[i],
                i == play->knows.alarms - 1 || i == PLAY_ALARMS - 1 ? "\n" : "");

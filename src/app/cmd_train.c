@@ -10,11 +10,14 @@
 #include "app/commands.h"
 #include "app/progress.h"
 #include "app/robots.h"
+#include "base/file.h"
 #include "base/paths.h"
 #include "base/text.h"
 #include "device/ranks/ranks.h"
 #include "run/config/experiment_keys.h"
 #include "run/train/run.h"
+
+enum { VERSION_MAX = 1 << 16 }; /* bytes of version.txt */
 
 typedef struct {
     Ranks *ranks; /* NULL: alone */
@@ -25,26 +28,45 @@ typedef struct {
     char note[1024];
 } Command;
 
-/* Notes the command that made the policy, truncated if necessary. config.ini in the run folder has
- * every key. */
-static void write_note(Command *run, const CliArgs *args) {
+/* The command, truncated if necessary. config.ini in the run folder has every key. */
+static void write_command(const Command *run, const CliArgs *args, char *note, int size) {
     const char *folder = run->resume ? run->out : "configs",
                *name = run->resume ? "config" : "default";
-    int size = (int)sizeof run->note;
-    int used =
-        run->config
-            ? snprintf(run->note, sizeof run->note, "mild train --config %s", run->config)
-            : snprintf(run->note, sizeof run->note, "mild train --config %s/%s.ini", folder, name);
+    int used = run->config
+                   ? snprintf(note, (size_t)size, "mild train --config %s", run->config)
+                   : snprintf(note, (size_t)size, "mild train --config %s/%s.ini", folder, name);
     if (run->robot && used < size) {
-        used += snprintf(run->note + used, (size_t)(size - used), " --robot %s", run->robot);
+        used += snprintf(note + used, (size_t)(size - used), " --robot %s", run->robot);
     }
     for (int i = 0; i < args->override_count && used < size; i++) {
-        used += snprintf(run->note + used, (size_t)(size - used), " --%s", args->overrides[i]);
+        used += snprintf(note + used, (size_t)(size - used), " --%s", args->overrides[i]);
     }
     if (used < size) {
-        snprintf(run->note + used, (size_t)(size - used), ", seed %" PRIu64 ", version %s",
+        snprintf(note + used, (size_t)(size - used), ", seed %" PRIu64 ", version %s",
                  run->def.train.seed, build_version());
     }
+}
+
+/* Notes the command that made the policy, and before it those that the run was begun and resumed
+ * with: the second line of its version.txt. */
+static void write_note(Command *run, const CliArgs *args) {
+    char path[PATH_SIZE], command[sizeof run->note / 2];
+    MildError unused = {0};
+    size_t size;
+    char *text = run->resume && path_join(run->out, "version.txt", path, NULL) == MILD_OK
+                     ? file_read(path, VERSION_MAX, &size, &unused)
+                     : NULL;
+    const char *before = text ? strchr(text, '\n') : NULL;
+    if (before) {
+        const int length = (int)strcspn(++before, "\n");
+        write_command(run, args, command, (int)sizeof command);
+        const int again = strstr(before, command) != NULL;
+        snprintf(run->note, sizeof run->note, "%.*s%s%s", length, before,
+                 again ? "" : "; resumed: ", again ? "" : command);
+    } else {
+        write_command(run, args, run->note, (int)sizeof run->note);
+    }
+    free(text);
 }
 
 /* A resumed run keeps the config that it began with, unless --config or overrides change it. */

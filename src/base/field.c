@@ -247,19 +247,9 @@ int mild_field_print(const MildField *field, const void *def, char *text, size_t
 
 const MildField *mild_field_find(const MildField *fields, int count, const char *name,
                                  const char **nearest) {
-    const MildField *found = NULL;
-    const char *closest = NULL;
-    int least = INT_MAX;
-    for (int f = 0; f < count && !found; f++) {
-        int distance = text_distance(fields[f].name, name);
-        found = strcmp(fields[f].name, name) == 0 ? &fields[f] : NULL;
-        if (found || distance < least) {
-            least = distance;
-            closest = fields[f].name;
-        }
-    }
+    const int i = text_nearest_of(name, &fields->name, sizeof *fields, count);
     if (nearest) {
-        *nearest = closest;
+        *nearest = i < 0 ? NULL : fields[i].name;
     }
-    return found;
+    return i >= 0 && strcmp(fields[i].name, name) == 0 ? &fields[i] : NULL;
 }

@@ -9,42 +9,72 @@
 
 enum { NAME_MAX_LENGTH = 63 };
 
-static int smallest(int a, int b, int c) {
-    int least = a < b ? a : b;
-    return least < c ? least : c;
+static int smaller(int a, int b) {
+    return a < b ? a : b;
 }
 
-int text_distance(const char *a, const char *b) {
-    int row[NAME_MAX_LENGTH + 1];
-    int length_b = (int)strnlen(b, NAME_MAX_LENGTH);
-    for (int j = 0; j <= length_b; j++) {
-        row[j] = j;
-    }
-    for (int i = 1; i <= NAME_MAX_LENGTH && a[i - 1]; i++) {
-        int diagonal = row[0];
-        row[0] = i;
-        for (int j = 1; j <= length_b; j++) {
-            int above = row[j];
-            row[j] = smallest(above + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1]));
-            diagonal = above;
+/* Half edits from a to b, where words may be missing: text_nearest. */
+static int half_edits(const char *a, const char *b) {
+    uint8_t edits[NAME_MAX_LENGTH + 1][NAME_MAX_LENGTH + 1]; /* of the beginnings of both */
+    const int length = (int)strnlen(a, NAME_MAX_LENGTH);
+    int distance = INT_MAX;
+    for (int j = 0;; j++) {
+        const int more = j < NAME_MAX_LENGTH && b[j]; /* bool: b goes on */
+        for (int i = 0; i <= length; i++) {
+            int least = 2 * j;
+            if (i > 0) {
+                least = j == 0 && a[i - 1] == '_' ? i : edits[i - 1][j] + 2;
+            }
+            if (i > 0 && j > 0) {
+                least = smaller(least, smaller(edits[i - 1][j - 1] + 2 * (a[i - 1] != b[j - 1]),
+                                               edits[i][j - 1] + 2));
+            }
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+                least = smaller(least, edits[i - 2][j - 2] + 2);
+            }
+            edits[i][j] = (uint8_t)least;
+            const int all = i == length; /* bool: no last word of a is missing */
+            if ((all || a[i] == '_') && (!more || b[j] == '_' || (all && least == 0))) {
+                distance = smaller(distance, least + length - i + more);
+            }
+        }
+        if (!more) {
+            return distance;
         }
     }
-    return row[length_b];
 }
 
-const char *text_nearest(const char *name, const char *const *names, int count) {
-    const char *best = NULL;
-    int best_distance = INT_MAX;
-    const size_t length = strlen(name);
+int text_nearest_of(const char *name, const void *names, size_t stride, int count) {
+    int best = -1, least = INT_MAX;
     for (int i = 0; i < count; i++) {
-        const int begins = length > 1 && strncmp(names[i], name, length) == 0;
-        int distance = begins ? names[i][length] != 0 : text_distance(name, names[i]);
-        if (distance < best_distance) {
-            best_distance = distance;
-            best = names[i];
+        const char *known = *(const char *const *)((const char *)names + (size_t)i * stride);
+        const int distance = half_edits(name, known);
+        if (distance < least) {
+            least = distance;
+            best = i;
         }
     }
     return best;
+}
+
+const char *text_nearest(const char *name, const char *const *names, int count) {
+    const int i = text_nearest_of(name, names, sizeof *names, count);
+    return i < 0 ? NULL : names[i];
+}
+
+size_t text_line(const char **rest, const char **line) {
+    const char *text = *line = *rest;
+    const size_t whole = strcspn(text, "\r\n");
+    size_t length = 0;
+    *rest = text + whole + (strncmp(text + whole, "\r\n", 2) == 0 ? 2 : text[whole] != '\0');
+    while (length < whole && !((text[length] == ';' || text[length] == '#') &&
+                               (length == 0 || strchr(" \t", text[length - 1])))) {
+        length++;
+    }
+    while (length > 0 && strchr(" \t", text[length - 1])) {
+        length--;
+    }
+    return length;
 }
 
 int text_double(const char *text, double *value) {

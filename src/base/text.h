@@ -5,12 +5,20 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Levenshtein distance between two names; only the first 63 characters count. */
-int text_distance(const char *a, const char *b);
-
-/* The name among names[0..count) with the smallest distance to `name`, where one that begins with
- * `name` is at a distance of 1; NULL when count is 0. */
+/* The nearest of names[0..count) to a name that somebody wrote, the first of several; NULL when
+ * count is 0. A character more, less or another, or two neighbours exchanged, is an edit. Words,
+ * which _ divides, may be missing: at the end of a known name, or of what `name` begins, for half
+ * an edit; at both ends of `name` for half an edit a character. Only the first 63 characters of a
+ * name count. */
 const char *text_nearest(const char *name, const char *const *names, int count);
+
+/* The index of the nearest of names that lie `stride` bytes apart; -1: there is none. */
+int text_nearest_of(const char *name, const void *names, size_t stride, int count);
+
+/* Takes the next line off *rest, as configurations have it: without its end (LF, CR LF or CR), its
+ * comment, which begins with ; or # at its start or after a blank, and blanks at its end. Returns
+ * its length from *line. */
+size_t text_line(const char **rest, const char **line);
 
 /* Reads all of `text` as a finite number or an integer. Returns 0 when it is not one. */
 int text_double(const char *text, double *value);

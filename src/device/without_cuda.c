@@ -4,9 +4,7 @@
 
 MildStatus gpu_open(int device, MildError *error) {
     return mild_fail(error, MILD_ERROR_ARGUMENT,
-                     "device %d: built without CUDA; configure with -DMILD_CUDA=ON, or take the "
-                     "cpu (in C MILD_BATCH_HOST)",
-                     device);
+                     "device %d: " GPU_MISSING ", or take the cpu (in C MILD_BATCH_HOST)", device);
 }
 
 void *gpu_alloc(int device, size_t bytes, MildError *error) {

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/file.h"
+#include "base/text.h"
 
 enum { FILE_SIZE_MAX = 1 << 20, LIST_SIZE = 4096 };
 enum { SECTION_MAX = 49 }; /* characters of a section's name; inih drops the rest */
@@ -200,25 +201,15 @@ static int check_header(Reader *reader, const char *line, size_t length) {
     return find_section(reader, name, &section);
 }
 
-/* Like fgets over the text. Comments start at ';' or '#', at the start of a line or after a
- * blank. */
+/* Like fgets over the text. */
 static char *next_line(char *buffer, int size, void *stream) {
     Reader *reader = stream;
     if (reader->status != MILD_OK || !*reader->rest) {
         return NULL;
     }
     reader->line++;
-    const char *line = reader->rest;
-    size_t whole = strcspn(line, "\n"), length = 0;
-    reader->rest = line + whole + (line[whole] == '\n');
-    while (length < whole &&
-           !((line[length] == ';' || line[length] == '#') &&
-             (length == 0 || line[length - 1] == ' ' || line[length - 1] == '\t'))) {
-        length++;
-    }
-    while (length > 0 && strchr(" \t\r", line[length - 1])) {
-        length--;
-    }
+    const char *line;
+    const size_t length = text_line(&reader->rest, &line);
     if ((int)length > size - 2) {
         fail_line(reader, "the line is too long; continue the value on an indented line");
         return NULL;

@@ -586,8 +586,8 @@ static const char *ground_name(const View *view, const RobotSim *sim) {
 }
 
 static void draw_text(View *view, mjrRect viewport, const RobotSim *sim, const ViewInfo *info) {
-    const char *keys = info->fell ? "ground\ncommand\nspeed\nsinkage\ntime\n"
-                                  : "ground\ncommand\nspeed\nsinkage\ntime";
+    const char *keys = info->fell ? "ground\ncommand\nspeed\ndeepest\ntime\n"
+                                  : "ground\ncommand\nspeed\ndeepest\ntime";
     char values[240];
     char depths[80] = "";
     for (int f = 0; f < view->feet; f++) {

@@ -149,11 +149,11 @@ for robots in mujoco batch; do
         END {exit bad || NR < 6}' stances.csv || fail "stances.csv of $robots"
 done
 bad "/dev/full" "$mild" eval --ground rigid --trials 1 --seconds 0.1 --stances /dev/full
-expect 0 '' "$mild" eval --ground rigid,grass --speed 0,0.3 --trials 2 --seconds 0.2 --track track.csv
+expect 0 '^track.csv: [0-9.]* KiB$' "$mild" eval --ground rigid,grass --speed 0,0.3 --trials 2 --seconds 0.2 --track track.csv
 awk -F, 'NR == 1 && !/^ground,speed_m_s,trial,time_s,com_x_m/ || NF != 12 {bad = 1} END {exit bad}' track.csv && [ "$(wc -l <track.csv)" = 161 ] ||
     fail "rows of track.csv: $(wc -l <track.csv)"
 bad "--track" "$mild" eval --ground grass --trials 1 --seconds 0.1 --train.robots=batch --track track.csv
-expect 0 '' "$mild" eval --ground rigid,grass --speed 0,0.3 --trials 2 --seconds 0.2 --feet feet.csv
+expect 0 '^feet.csv: [0-9.]* KiB$' "$mild" eval --ground rigid,grass --speed 0,0.3 --trials 2 --seconds 0.2 --feet feet.csv
 awk -F, 'NR == 1 && !/^ground,speed_m_s,trial,foot,time_s,ankle_x_m/ || NF != 21 {bad = 1} END {exit bad}' feet.csv && [ "$(wc -l <feet.csv)" = 1281 ] ||
     fail "rows of feet.csv: $(wc -l <feet.csv)"
 bad "--feet" "$mild" eval --ground grass --trials 1 --seconds 0.1 --train.robots=batch --feet feet.csv

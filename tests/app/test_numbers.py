@@ -325,7 +325,7 @@ def benches():
 def play():
     """The table's row is what eval measures of the same walk, within what another start and another length change."""
     header, row = printed_by("play", "--ground", "sand_loose", "--speed", 0.5, "--seconds", 9, "--pressure", "play.csv").splitlines()[:2]
-    true("columns", header.split() == ["ground", "distance", "time", "speed", "upright", "clearance", "sinkage", "COT"])
+    true("columns", header.split() == ["ground", "distance", "time", "speed", "upright", "clearance", "deepest", "COT"])
     way, time, speed, clearance, sinkage, cot = found(
         r"sand_loose +([\d.-]+) m +([\d.]+) s +([\d.-]+) m/s +yes +([\d.]+) mm +([\d.]+) mm +([\d.]+)", row)
     printed_by("eval", "--ground", "sand_loose", "--speed", 0.5, "--seconds", 9, "--trials", 2, "--json", "eval.json")

@@ -45,6 +45,8 @@ good "$mild" train --out part --resume --train.iterations=4 --train.threads=1
 same_numbers whole/$last part/$last
 same_numbers whole/policy.safetensors part/policy.safetensors
 [ "$(log_numbers whole)" = "$(log_numbers part)" ] || fail "the logs of the whole and of the resumed run differ"
+grep -aq '"mild train [^"]*--train.iterations=2, seed [^"]*; resumed: mild train [^"]*--train.iterations=4[^"]*"' part/policy.safetensors ||
+    fail "the note of a resumed policy: $(sed -n 2p part/version.txt)"
 [ "$(ls part/checkpoint_* | wc -l)" = 3 ] || fail "not the last three checkpoints are kept"
 
 # a full disk (here: no file above 64 KiB) while saving

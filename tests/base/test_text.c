@@ -5,13 +5,15 @@
 #include "kit.h"
 #include "mild/error.h"
 
-/* Edits from a name to another, by which of the other and a name of so many edits is nearer. */
+/* Half edits from a name to another, by which of the other and names of so many edits, with and
+ * without a word behind, is nearer. */
 static int distance(const char *name, const char *other) {
     char rival[80] = "";
-    for (int edits = 1; edits < 10; edits++) {
-        snprintf(rival, sizeof rival, "%.*s%s", edits, "//////////", name);
+    for (int half = 1; half < 20; half++) {
+        snprintf(rival, sizeof rival, "%.*s%s%s", half / 2, "//////////", name,
+                 half % 2 ? "_/" : "");
         if (text_nearest(name, (const char *[]){rival, other}, 2) == other) {
-            return edits - 1;
+            return half - 1;
         }
     }
     return -1;
@@ -20,24 +22,28 @@ static int distance(const char *name, const char *other) {
 TEST(test_distance) {
     static const struct {
         const char *a, *b;
-        int distance;
+        int half_edits;
     } pairs[] = {
         {"", "", 0},
-        {"", "abc", 3},
-        {"abc", "", 3},
+        {"abc", "", 6},
         {"sand", "sand", 0},
-        {"kitten", "sitting", 3},
-        {"sunday", "saturday", 3},
-        {"flaw", "lawn", 2},
-        {"a", "b", 1},
-        {"ab", "ba", 2},
-        {"foam", "foam4", 1},
-        {"envs", "env", 1},
-        {"intention", "execution", 5},
+        {"kitten", "sitting", 6},
+        {"sunday", "saturday", 6},
+        {"flaw", "lawn", 4},
+        {"intention", "execution", 10},
+        {"ab", "ba", 2}, /* neighbours exchanged */
+        {"ca", "abc", 6},
+        {"foam", "foam4", 1}, /* begins the other */
+        {"envs", "env", 2},
+        {"snad", "sand_loose", 3}, /* words at the end of the other */
+        {"snad", "snow", 4},
+        {"action_rate", "action_smoothness", 6}, /* of both, and half an edit a character */
+        {"action_rate", "yaw_rate", 12},
+        {"feet_slip", "slip", 5},
+        {"loose_sand", "sand_loose", 7},
     };
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
-        assert_int_equal(distance(pairs[i].a, pairs[i].b), pairs[i].distance);
-        assert_int_equal(distance(pairs[i].b, pairs[i].a), pairs[i].distance);
+        assert_int_equal(distance(pairs[i].a, pairs[i].b), pairs[i].half_edits);
     }
     char longer[80], other[80], cut[64]; /* names count as cut at 63 characters */
     memset(longer, 'a', sizeof longer - 1);
@@ -60,7 +66,7 @@ TEST(test_nearest) {
     assert_string_equal(text_nearest("foam44", names, 4), "foam45");
     assert_string_equal(text_nearest("foam", names, 4), "foam60");     /* the first of two alike */
     assert_string_equal(text_nearest("sand", names, 4), "sand_loose"); /* though 6 away */
-    assert_string_equal(text_nearest("s", names, 4), "rubber");        /* too short to begin one */
+    assert_string_equal(text_nearest("s", names, 4), "sand_loose");    /* by its first word */
     assert_string_equal(text_nearest("foam45", (const char *[]){"foam45x", "foam45"}, 2), "foam45");
     assert_string_equal(text_nearest("sand_loos", names, 4), "sand_loose");
     assert_string_equal(text_nearest("foam45", names, 2), "foam60");

@@ -70,7 +70,7 @@ static void expect_row(const BenchReport *report, const char *name, double wante
 
 TEST(batch_rows_are_of_the_steps) {
     static double errors[ROBOTS];
-    BenchReport report = {.count = 0};
+    static BenchReport report;
     MildError error = {0};
     double mean = 0;
     const ExperimentDef def = experiment_def_default();

@@ -83,7 +83,7 @@ static double share(const double returns[EPISODES], double x) {
 }
 
 TEST(returns_are_of_the_first_episodes) {
-    BenchReport report = {.count = 0};
+    static BenchReport report;
     MildError error = {0};
     ExperimentDef def = experiment_def_default();
     def.train.threads = 1;

@@ -87,7 +87,7 @@ static void expect_row(const BenchReport *report, const char *name, double wante
 }
 
 TEST(robots_rows_are_of_the_steps) {
-    BenchReport report = {.count = 0};
+    static BenchReport report;
     MildError error = {0};
     ExperimentDef def = experiment_def_default();
     def.train.envs = ENVS;

@@ -180,7 +180,7 @@ static void check_walk(const BenchReport *report, const char *ground, int g) {
  * ours moves by its iterations, and the engine's by a share. */
 TEST(test_walk_rows) {
     static const char *const grounds[GROUNDS] = {"sand_loose", "foam45", "grass"};
-    BenchReport report = {.count = 0};
+    static BenchReport report;
     MildError error = {0};
     ExperimentDef def = experiment_def_default();
     if (kit_short()) {
@@ -204,7 +204,7 @@ TEST(test_walk_rows) {
 /* Where a walk's steps all take the same, so does their mean; the engine's floor lies as deep as
  * the soles on soft ground. */
 TEST(test_whole_walk) {
-    BenchReport report = {.count = 0};
+    static BenchReport report;
     MildError error = {0};
     const ExperimentDef def = experiment_def_default();
     if (kit_short()) {

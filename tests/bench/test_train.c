@@ -49,7 +49,7 @@ MildStatus __wrap_train_iterate(Trainer *trainer, TrainReport *report, MildError
 }
 
 static void check_parts(int threads) {
-    BenchReport report = {.count = 0};
+    BenchReport report = {0};
     MildError error = {0};
     ExperimentDef def = experiment_def_default();
     iterations = 0;
@@ -87,6 +87,7 @@ static void check_parts(int threads) {
     assert_true(fabs(value_of(&report, "physics") -
                      1e6 * (counted.physics - counted.ground) / threads / steps) < 1e-6 * step);
     assert_true(value_of(&report, "threads") == threads);
+    bench_report_free(&report);
 }
 
 TEST(the_parts_are_the_whole) {

@@ -48,7 +48,7 @@ static void expect_share(const BenchReport *report, const char *name, double wan
 }
 
 TEST(update_rows_are_times_by_steps) {
-    BenchReport report = {.count = 0};
+    static BenchReport report;
     MildError error = {0};
     ExperimentDef def = experiment_def_default();
     def.train.envs = ENVS;
@@ -63,6 +63,14 @@ TEST(update_rows_are_times_by_steps) {
     expect_share(&report, "flops", flops / steps, 0.01);
     expect_share(&report, "rate", 1e-12 * flops / both, 0.01);
     assert_int_equal(report.count, 5);
+    const BenchRow first = report.rows[0];
+    while (report.count < 60) { /* a report takes as many as there are */
+        expect_good(bench_update(&def, &report, &error) == MILD_OK, &error);
+        const BenchRow *row = &report.rows[report.count - 5];
+        assert_true(memcmp(row->name, first.name, sizeof first.name) == 0 && !report.is_short);
+    }
+    assert_true(report.rows[0].value == first.value &&
+                strcmp(report.rows[0].name, first.name) == 0);
 }
 
 TEST_MAIN(NULL, NULL)

@@ -45,7 +45,7 @@ TEST(test_reads_every_type) {
         "567890123456789012345678901234567890123456789012345678901234567890123456789012345678901234"
         "56789012345678\n"
         "[sample]\n  stiffness = 2.5 ; remark\n\tpair: -0.5, 0.5 # remark\r\n"
-        "count=7\n\n  on = true\nseed = 18446744073709551615\nname = sand\n[ground]\nk_pen=500";
+        "count=7\r\r  on = true\rseed = 18446744073709551615\nname = sand\n[ground]\nk_pen=500";
     assert_int_equal(config_read_text(f.sections, 2, text, "x.ini", 0, &f.error), MILD_OK);
     assert_true(f.sample.stiffness == 2.5 && f.sample.pair[0] == -0.5 && f.sample.pair[1] == 0.5);
     assert_true(f.sample.count == 7 && f.sample.on == 1 && f.sample.seed == UINT64_MAX);
@@ -63,6 +63,7 @@ TEST(test_mistakes) {
         {"[sample]\nk_pen = 2", MILD_ERROR_FORMAT, "x.ini:2 sample.k_pen ground.k_pen"},
         {"\n[sampel]\n", MILD_ERROR_FORMAT, "x.ini:2 sampel sample"},
         {"[sample]\ncount = 11", MILD_ERROR_RANGE, "x.ini:2 sample.count 11 1 10"},
+        {"\r[sample] count = 1\r", MILD_ERROR_FORMAT, "x.ini:2 count = 1 [section]"},
         {"[sample]\ncount = 1.5", MILD_ERROR_ARGUMENT, "x.ini:2 sample.count 1.5"},
         {"[sample]\ncount =", MILD_ERROR_ARGUMENT, "x.ini:2 sample.count"},
         {"[sample]\nstiffness = nan", MILD_ERROR_ARGUMENT, "x.ini:2 sample.stiffness nan"},

@@ -25,6 +25,12 @@ python3 -c 'compile(open("front.py").read(), "README.md", "exec")' || fail "the 
 grep -q 'mild.attach(spec, feet=\[.*ground=' front.py && grep -q 'def attach(spec, feet=(), ground=' "$source/python/mild/spec.py" ||
     fail "README.md calls mild.attach in a way that python/mild/spec.py does not have"
 
+grep -ho '`make [a-z]* && build/mild' "$source"/README.md "$source"/docs/*.md | cut -d' ' -f2 | sort -u >targets
+for target in $(cat targets); do # what a page runs next must be there
+    make -s -n -C "$source" "$target" | grep -q 'cmake --build build .*--target mild$' || fail "make $target does not build build/mild"
+done
+[ -s targets ] || fail "no page runs build/mild after a target of make"
+
 python3 "$source/scripts/drawings.py" --check || fail "drawings"
 mkdir -p tree/docs tree/scripts
 cp "$source/scripts/drawings.py" tree/scripts/

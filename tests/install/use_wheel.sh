@@ -12,6 +12,8 @@ mild eval --robot sa01 --ground rubber --speed 0.5 --trials 1 --seconds 2 >eval.
 grep -q '^rubber .* 1/1 ' eval.txt || fail "eval: $(cat eval.txt)"
 mild press --ground foam45 --plate 0.1,0.1 --csv press.csv >/dev/null
 mild train --out run --train.envs=16 --train.minutes=0 --train.iterations=2 --ppo.steps=4 --ppo.minibatches=2 >/dev/null 2>&1 || fail "train"
+if mild train --out gpu --train.device=cuda 2>gpu.txt; then fail "a GPU without mildground_cuda"; fi
+grep -q 'install the wheel mildground_cuda' gpu.txt || fail "train.device: $(cat gpu.txt)"
 [ "$(mild --version)" = "$(python -m mild --version)" ] || fail "python -m mild"
 python "$tree/tests/python/check_wheel.py"
 MILD_PROCESSOR=x86-64-v3 "$bin/python" "$tree/tests/python/check_wheel.py" >/dev/null

@@ -61,8 +61,10 @@ def make(folder):
     (folder / "manifest.json").write_text(json.dumps(manifest))
 
 
-def judge(*args):
-    return subprocess.run([sys.executable, SOURCE / "scripts" / "judge.py", *map(str, args)], capture_output=True, text=True)
+def judge(*args, path=""):
+    """path: where Python looks first."""
+    return subprocess.run([sys.executable, SOURCE / "scripts" / "judge.py", *map(str, args)], capture_output=True, text=True,
+                          env=dict(os.environ, PYTHONPATH=f"{path}:{os.environ['PYTHONPATH']}"))
 
 
 def a_sole_has_its_area():
@@ -211,6 +213,10 @@ def mild_fit_says_the_same(folder):
 
 
 def mistakes_are_one_line(folder):
+    (folder / "bare").mkdir()
+    (folder / "bare/matplotlib.py").write_text("raise ImportError\n")  # before anything is judged
+    run = judge("--records", folder / "none", "--out", folder / "out", path=folder / "bare")
+    assert run.returncode == 2 and run.stderr == "judge.py: --out draws figures.html with matplotlib, which is not here: pip install matplotlib\n", run.stderr
     for args in (("--records", folder / "none"), ("--records", folder, "--families", "mud"),
                  ("--records", folder, "--entry", "none.py"),
                  ("--records", folder, "--entry", f"{folder / 'mine.py'}:none"),

@@ -205,6 +205,7 @@ class StableBaselines(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             def run(*arguments):
                 return subprocess.run([sys.executable, example, *arguments], cwd=folder, capture_output=True, text=True)
+            self.assertIn("'snad'", run("2000", "--ground", "snad", "--out", "o").stderr)  # and leaves no folder
             trained = run("2000", "--envs", "8", "--out", "o")
             self.assertEqual(trained.returncode, 0, trained.stderr)
             said = trained.stdout.splitlines()[-1]

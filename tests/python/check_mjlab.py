@@ -28,7 +28,7 @@ def standing(robot, grounds, steps, change=lambda config: None):
     """An environment of two robots that nothing pushes, after some steps without an action."""
     config = load_env_cfg(f"Mjlab-Velocity-Soft-Unitree-{robot}", play=True)
     config.scene.num_envs, config.seed = 2, 1
-    config.events["ground"].params["grounds"] = grounds
+    config.events["ground"].params["ground"] = grounds
     change(config)
     env = ManagerBasedRlEnv(config, "cpu")
     env.reset()
@@ -103,7 +103,7 @@ class Tasks(unittest.TestCase):
     def test_stand(self):
         """A robot that stands sinks as deep as its weight, on round feet and on soles of capsules."""
         for robot, depth in (("Go1", 61.0), ("G1", 33.6)):
-            said = subprocess.run([sys.executable, EXAMPLE, robot, "--stand", "6", "--envs", "1", "--grounds", "sand_loose"], capture_output=True, text=True,
+            said = subprocess.run([sys.executable, EXAMPLE, robot, "--stand", "6", "--envs", "1", "--ground", "sand_loose"], capture_output=True, text=True,
                                   check=True).stdout.splitlines()[-1]
             carried, load, sunk, wanted = (float(number) for number in re.match(
                 r"feet carry ([\d.]+) N of ([\d.]+); mean sinkage ([\d.]+) mm, of these loads ([\d.]+) mm", said).groups())

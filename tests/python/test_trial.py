@@ -98,6 +98,9 @@ class Descriptions(unittest.TestCase):
             self.assertEqual(len(d.terms), 8)
             path.write_text("[policy]\nlayout = unitree_rl_gym\n[observation]\ngravity = 1\ncommand = 1\ncommand.2 = 0*3\n")
             self.assertEqual([t.name for t in Description(path).terms], ["gravity", "command", "command"])
+            path.write_text("[policy] layout = unitree_rl_gym\n[observation]\ngravity = 1\n")
+            with self.assertRaisesRegex(ValueError, r"mine.ini.* line: 1 .*layout"):
+                Description(path)
         self.assertEqual(numbers("0.5*2 -1"), [0.5, 0.5, -1.0])
 
     def test_joints(self):
@@ -457,17 +460,18 @@ class Measures(unittest.TestCase):
 class Trials(unittest.TestCase):
     def test_rigid(self):
         """A robot with stiff joints stands; one with the command to fold falls, at a time; noise moves it and the seed decides."""
-        table = mild.trial(biped(), still, stander(), grounds=["rigid"], speeds=[0, 0.5], trials=3, seconds=3)
+        table = mild.trial(biped(), still, stander(), ground=["rigid"], speeds=[0, 0.5], trials=3, seconds=3)
         self.assertEqual([row.upright for row in table.rows], [3, 3])
         self.assertLess(abs(table.rows[0].mean("speed")), 0.02)
         self.assertIsNone(table.rows[0].mean("cost"))
         self.assertEqual(table.rows[0].mean("sinkage"), 0)
-        again = mild.trial(biped(), still, stander(), grounds=["rigid"], speeds=[0, 0.5], trials=3, seconds=3)
+        with self.assertWarnsRegex(DeprecationWarning, "grounds is named ground"):
+            again = mild.trial(biped(), still, stander(), grounds=["rigid"], speeds=[0, 0.5], trials=3, seconds=3)
         self.assertEqual(json.dumps(table.as_dict()), json.dumps(again.as_dict()))
-        other = mild.trial(biped(), still, stander(), grounds=["rigid"], speeds=[0, 0.5], trials=3, seconds=3, seed=2)
+        other = mild.trial(biped(), still, stander(), ground=["rigid"], speeds=[0, 0.5], trials=3, seconds=3, seed=2)
         self.assertEqual(other.rows[0].walks[0], table.rows[0].walks[1])
         self.assertNotEqual(table.rows[0].walks[0].torque, table.rows[0].walks[1].torque)
-        fold = mild.trial(biped(), lambda o: np.full(4, 0.8), stander(), grounds=["rigid"], trials=2, seconds=3)
+        fold = mild.trial(biped(), lambda o: np.full(4, 0.8), stander(), ground=["rigid"], trials=2, seconds=3)
         self.assertEqual([walk.end for walk in fold.rows[0].walks], ["tilt", "tilt"])
         self.assertTrue(0.05 < fold.rows[0].falls[0] <= fold.rows[0].falls[1] < 2)
         self.assertIn("0 of 2", str(fold))
@@ -570,12 +574,12 @@ class Trials(unittest.TestCase):
                 self.assertEqual([o[4] for o in seen[7:]], [0, *wanted])
                 self.assertEqual(seen[7][0], 0)  # nothing is left of the walk before
         with self.assertRaisesRegex(ValueError, r"\b3 numbers.*\b4 joints"):
-            mild.trial(biped(), lambda o: np.zeros(3), stander(), grounds=["rigid"], trials=1)
+            mild.trial(biped(), lambda o: np.zeros(3), stander(), ground=["rigid"], trials=1)
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_soft(self):
         """It stands on foam as deep as its soles carry its weight, to within a twentieth, and on a pair with the floor too."""
-        table = mild.trial(biped(), still, stander(), grounds=["rubber", "foam45"], trials=2, seconds=3, noise=0)
+        table = mild.trial(biped(), still, stander(), ground="rubber,foam45", trials=2, seconds=3, noise=0)
         load = table.about["mass"] * 9.81 / 2
         for row in table.rows:
             wanted = mild.Sole([[-0.1, -0.05], [0.1, -0.05], [0.1, 0.05], [-0.1, 0.05]]).sinkage(mild.Material(row.ground), load)
@@ -584,9 +588,9 @@ class Trials(unittest.TestCase):
         pair = '<contact><pair geom1="sole" geom2="ground"/></contact></mujoco>'
         text = biped(BOX.replace("<geom type=\"box\"", '<geom name="SOLE" type="box"')).replace("<worldbody>", '<worldbody><geom name="ground" type="plane" size="9 9 1"/>')
         text = text.replace("SOLE", "sole", 1).replace("SOLE", "sole2").replace("</mujoco>", pair)
-        paired = mild.trial(text, still, stander(), grounds=["foam45"], trials=1, seconds=3, noise=0)
+        paired = mild.trial(text, still, stander(), ground=["foam45"], trials=1, seconds=3, noise=0)
         self.assertAlmostEqual(paired.rows[0].mean("sinkage"), table.rows[1].mean("sinkage"), delta=1e-6)
-        softer = mild.trial(biped(), still, stander(), grounds=["foam45"], trials=1, seconds=3, noise=0, attributes={"ground__k_pen": 400})
+        softer = mild.trial(biped(), still, stander(), ground=["foam45"], trials=1, seconds=3, noise=0, attributes={"ground__k_pen": 400})
         self.assertNotAlmostEqual(softer.rows[0].mean("sinkage"), table.rows[1].mean("sinkage"), places=4)
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
@@ -630,7 +634,7 @@ class Trials(unittest.TestCase):
         ini = configparser.ConfigParser(inline_comment_prefixes=";")
         ini.read(ROOT / "robots/sa01/robot.ini")
         outline = "; ".join(" ".join(ini[f"foot.{side}"]["outline"].split()) for side in ("left", "right"))
-        table = mild.trial(ROOT / "robots/sa01/sa01.xml", Walker(), d, grounds=["foam45"], speeds=[0.6], trials=1, seconds=6,
+        table = mild.trial(ROOT / "robots/sa01/sa01.xml", Walker(), d, ground=["foam45"], speeds=[0.6], trials=1, seconds=6,
                            attributes={"outline": outline, "sole_z": -0.055, "elements": 77}, noise=0)
         row = table.rows[0]
         with tempfile.TemporaryDirectory() as folder:

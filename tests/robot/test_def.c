@@ -192,7 +192,7 @@ TEST(test_one_foot) {
 }
 
 TEST(test_reading) {
-    accept(edit("height = 0.7 ; [m]\n", "height = 0.7\t# [m]\r\n\n   \n"));
+    accept(edit("height = 0.7 ; [m]\n", "height = 0.7\t# [m]\r\n\n   \r"));
     accept(edit("[joints]\n", "[joints] ; of all\n"));
     refuse("[robot]", "[robots]", "dir/robot.ini:3 [robots] [robot] [joints]");
     refuse("[foot.r]", "[feet.r]", "dir/robot.ini:34 [feet.r]");

@@ -63,7 +63,7 @@ TEST(test_hand) {
     assert_true(m.exponent == 0.8 && m.k_c == 5790 && m.k_phi == 180000 && m.cohesion == 150);
     assert_true(m.mu == 0.62 && m.shear_length == 0.018 && m.recovery == 0.05);
     assert_true(m.plate_width == 0 && m.refill == 0); /* left out: off */
-    const MildMaterial bom = parsed("\xef\xbb\xbf; x\r\n  [ground]\r\n preset = clay \r\n mu=0.3");
+    const MildMaterial bom = parsed("\xef\xbb\xbf; x\r\n  [ground]\r\n preset = clay \r mu=0.3");
     MildMaterial clay = kit_preset("clay");
     assert_true(bom.mu == 0.3 && bom.k_c == clay.k_c && bom.model == MILD_MODEL_BEKKER);
     const MildMaterial plain = parsed("[ground]\npreset = foam45");

@@ -153,7 +153,7 @@ const light = ({ color }) => color.match(/\d+/g).reduce((sum, n) => sum + Number
 assert.ok(front.color !== front2.color && back.color === back2.color && light(front) !== light(front2), 'each foot has its own pressures');
 const known = [9, 12, 16, 210, 380, 700, 90, 150, 230, 0.4, 0.6, 0.9, 20, 300, 900];
 panel.drawKnowledge({ ...view, footsteps: 4, alarms: 2, known: Float32Array.from(known) });
-assert.deepEqual($('knows').textContent.split('\n'), ['sinks 12 mm (9.0 to 16)', 'k_pen 380 N/m (210 to 700)', 'sigma 150 kN/m³ (90 to 230)',
+assert.deepEqual($('knows').textContent.split('\n'), ['sinks at rest 12 mm (9.0 to 16)', 'k_pen 380 N/m (210 to 700)', 'sigma 150 kN/m³ (90 to 230)',
   'friction 0.60 (0.40 to 0.90)', 'slip length 300 mm (20 to 900)', '4 steps on it; it changed 2 times']);
 panel.drawKnowledge({ ...view, footsteps: 0, alarms: 0, known: new Float32Array(15) });
 assert.match($('knows').textContent, /not felt/);

@@ -79,22 +79,6 @@ static MildStatus line_fail(const Reader *r, int line, MildError *error, const c
     return mild_fail(error, MILD_ERROR_FORMAT, "%.*s:%d: %s", NAME_SHOWN, r->name, line, what);
 }
 
-/* Length of a line without its remark, which begins with ; or # at its start or after a blank, and
- * without blanks at its end: as in any other configuration. */
-static size_t code_length(const char *line, size_t length) {
-    size_t kept = 0;
-    for (; kept < length; kept++) {
-        const int begins = kept == 0 || line[kept - 1] == ' ' || line[kept - 1] == '\t';
-        if (begins && (line[kept] == ';' || line[kept] == '#')) {
-            break;
-        }
-    }
-    while (kept > 0 && strchr(" \t\r", line[kept - 1])) {
-        kept--;
-    }
-    return kept;
-}
-
 static MildStatus section_read(Reader *r, const char *code, MildError *error) {
     char what[LINE_MAX + 80];
     if (strcmp(code, "[ground]") != 0) {
@@ -153,14 +137,12 @@ static MildStatus key_read(Reader *r, char *code, MildError *error) {
 
 static MildStatus line_read(Reader *r, const char *line, size_t length, MildError *error) {
     char code[LINE_MAX];
-    const size_t blanks = strspn(line, " \t") < length ? strspn(line, " \t") : length;
-    const size_t kept = code_length(line + blanks, length - blanks);
-    if (kept >= sizeof code) {
+    if (length >= sizeof code) {
         return line_fail(r, r->line, error, "a line longer than 399 characters; shorten it");
     }
-    memcpy(code, line + blanks, kept);
-    code[kept] = '\0';
-    if (kept == 0) {
+    memcpy(code, line, length);
+    code[length] = '\0';
+    if (length == 0) {
         return MILD_OK;
     }
     return code[0] == '[' ? section_read(r, code, error) : key_read(r, code, error);
@@ -240,10 +222,11 @@ MildStatus soil_parse(const char *text, const char *name, MildMaterial *material
     MildStatus status = MILD_OK;
     const char *rest = strncmp(text, "\xef\xbb\xbf", 3) == 0 ? text + 3 : text;
     while (*rest && status == MILD_OK) {
-        const size_t length = strcspn(rest, "\n");
+        const char *line;
+        rest += strspn(rest, " \t");
+        const size_t length = text_line(&rest, &line);
         reader.line++;
-        status = line_read(&reader, rest, length, error);
-        rest += length + (rest[length] == '\n');
+        status = line_read(&reader, line, length, error);
     }
     if (status == MILD_OK && !reader.inside) {
         return mild_fail(error, MILD_ERROR_FORMAT,

@@ -341,8 +341,8 @@ static void write_all(const Belief *belief, const BeliefNet *net, const char *be
         const BeliefName *name = &belief_names[i];
         const BeliefParameter p = (BeliefParameter)i;
         const char *unit = name->unit[0] == '-' ? "" : name->unit;
-        used += snprintf(text + used, (size_t)(size - used), "%s%s %.3g%s%s (%.3g .. %.3g)%s",
-                         i ? between : "", name->name,
+        used += snprintf(text + used, (size_t)(size - used), "%s%s%s %.3g%s%s (%.3g .. %.3g)%s",
+                         i ? between : "", name->name, i == BELIEF_sinkage ? " at rest" : "",
                          name->scale * belief_quantile(belief, net, p, 0.5), *unit ? " " : "", unit,
                          name->scale * belief_quantile(belief, net, p, 0.05),
                          name->scale * belief_quantile(belief, net, p, 0.95), end);

@@ -3,7 +3,9 @@
 
 #include <stdio.h>
 
-static const char reason[] = "built without CUDA; configure with -DMILD_CUDA=ON";
+#include "device/gpu.h"
+
+static const char reason[] = GPU_MISSING;
 
 MildStatus gpu_learner_attach(Ppo *ppo, const GpuLearnerDef *def, MildError *error) {
     (void)ppo;

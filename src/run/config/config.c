@@ -46,26 +46,14 @@ static MildStatus key_fail(const ConfigSection *sections, int count, const Confi
                      where, section->name, key, home, nearest ? nearest : "");
 }
 
-/* Length of the line without its comment. A comment starts with ; or # at the start of the line or
- * after a blank. */
-static size_t code_length(const char *line) {
-    size_t length = 0;
-    for (; line[length] && line[length] != '\n'; length++) {
-        int blank_before = length == 0 || line[length - 1] == ' ' || line[length - 1] == '\t';
-        if (blank_before && (line[length] == ';' || line[length] == '#')) {
-            break;
-        }
-    }
-    return length;
-}
-
 /* Whether a line of a config file can hold the text. A resumed run reads the text back from such a
  * line. */
 static int text_fits_line(const char *text) {
-    size_t length = strlen(text);
-    int blanks =
+    const char *rest = text, *line;
+    const size_t length = strlen(text);
+    const int blanks =
         length > 0 && (isspace((unsigned char)text[0]) || isspace((unsigned char)text[length - 1]));
-    return length <= TEXT_MAX && code_length(text) == length && !blanks;
+    return length <= TEXT_MAX && text_line(&rest, &line) == length && !blanks;
 }
 
 /* A key that the last version read with this value (VERSIONING.md), and what stands for it now. */
@@ -172,7 +160,11 @@ static void reader_check_line(Reader *reader, const char *line) {
     char name[64], where[WHERE_MAX];
     reader_where(reader, where);
     size_t length = strcspn(line, "]\n");
-    if (*line == '[' && line[length] == ']') {
+    if (*line == '[' && line[length] == ']' && line[length + 1] != '\n') {
+        reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT,
+                                   "%s: '%.*s' stands behind a [section]; give it its own line",
+                                   where, (int)strcspn(line + length + 1, "\n"), line + length + 1);
+    } else if (*line == '[' && line[length] == ']') {
         snprintf(name, sizeof name, "%.*s", (int)length - 1, line + 1);
         const char *nearest = NULL;
         if (!section_find(reader->sections, reader->count, name, &nearest)) {
@@ -192,13 +184,9 @@ static char *reader_line(char *buffer, int size, void *stream) {
         return NULL;
     }
     reader->line++;
-    const char *line = reader->rest + strspn(reader->rest, " \t\r");
-    size_t length = code_length(line);
-    while (length > 0 &&
-           (line[length - 1] == ' ' || line[length - 1] == '\t' || line[length - 1] == '\r')) {
-        length--;
-    }
-    reader->rest = strchr(line, '\n') ? strchr(line, '\n') + 1 : line + strlen(line);
+    const char *line;
+    reader->rest += strspn(reader->rest, " \t");
+    const size_t length = text_line(&reader->rest, &line);
     if ((int)length > size - 2) {
         char where[WHERE_MAX];
         reader->status =

@@ -323,8 +323,9 @@ MildStatus train_run_claim(const char *folder, int resume, MildError *error) {
     MildStatus status = MILD_OK;
     for (int i = 0; i < RUN_NAMES && status == MILD_OK; i++) {
         char path[PATH_SIZE];
-        if (resume && strcmp(run_names[i], "config.ini") == 0) {
-            continue; /* it is read, and written again with what has changed */
+        if (resume &&
+            (strcmp(run_names[i], "config.ini") == 0 || strcmp(run_names[i], "version.txt") == 0)) {
+            continue; /* read, and written again with what has changed */
         }
         status = path_join(folder, run_names[i], path, error);
         status = status == MILD_OK ? file_claim(path, "--out", error) : status;
