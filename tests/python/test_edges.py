@@ -415,7 +415,7 @@ class Program(unittest.TestCase):
         np.testing.assert_allclose([there["way_x_m"], there["way_y_m"]], wanted, atol=0.35)
         np.testing.assert_allclose(limits["0.37"], 0.37 * limits["1"], rtol=1e-6)
         for share in ("0", "0.0099", "1.001", "-0.3"):
-            self.assertRegex(run("drive", "--torque-share", share, code=2), rf"^mild drive: --torque-share: {share} is outside 0\.01 \.\. 1$")
+            self.assertRegex(run("drive", "--torque-share", share, "--listen", "x", code=2), rf"^mild drive: --torque-share: {share} is outside 0\.01 \.\. 1$")
 
 
 SA01_MASS = sum(mujoco.MjModel.from_xml_path(str(ROOT / "robots/sa01/sa01.xml")).body_mass)
