@@ -11,5 +11,9 @@ MildStatus check_model(const mjModel *m, int instance, MildError *error);
  * upright in qpos0, or whose elements have another area than its sole. Returns 0 when there is
  * nothing to say. */
 int check_feet(const mjModel *m, const Soft *soft, char *text, size_t size);
+/* The same of a sensor of MuJoCo's on a foot, which feels nothing of this ground. */
+int check_sensors(const mjModel *m, const Soft *soft, char *text, size_t size);
+/* The same of a body of the robot that a rigid floor carried in the step just done. */
+int check_rests(const mjModel *m, const mjData *d, const Soft *soft, char *text, size_t size);
 
 #endif

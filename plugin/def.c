@@ -26,7 +26,9 @@ const MildField plugin_fields[] = {
         "[text] preset, or the file of a soil, which ends in .ini; several when terrain.patches is "
         "set (default sand_loose)"),
     FIELD(sole_z, MILD_FIELD_DOUBLE, 1, -10, 10, "[m] height of the outline's plane in that frame"),
-    FIELD(pitch, MILD_FIELD_DOUBLE, 1, 1e-3, 1, "[m] edge of a ground element"),
+    FIELD(pitch, MILD_FIELD_DOUBLE, 1, 1e-3, 1,
+          "[m] edge of a ground element (default: near 0.0195, such that they have the sole's "
+          "area; 0.0195 with elements)"),
     FIELD(body_pitch, MILD_FIELD_DOUBLE, 1, 1e-3, 1, "[m] between the elements of a body"),
     FIELD(elements, MILD_FIELD_INT, 1, 0, 65536, "[-] elements of a sole; 0: as many as fit"),
     FIELD(height, MILD_FIELD_DOUBLE, 1, -1e3, 1e3, "[m] of the surface above z = 0"),
@@ -92,8 +94,7 @@ static MildStatus read_section(const mjModel *m, int instance, const Section *se
 }
 
 MildStatus plugin_def_read(const mjModel *m, int instance, PluginDef *def, MildError *error) {
-    *def = (PluginDef){
-        .ground = "sand_loose", .pitch = 0.0195, .body_pitch = 0.03, .map = mild_map_def_default()};
+    *def = (PluginDef){.ground = "sand_loose", .body_pitch = 0.03, .map = mild_map_def_default()};
     MildStatus status = read_section(m, instance, &sections[PLUGIN_SECTION], def, error);
     return status == MILD_OK ? read_section(m, instance, &sections[MAP_SECTION], &def->map, error)
                              : status;

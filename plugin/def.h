@@ -19,7 +19,7 @@ typedef struct {
     char outline[PLUGIN_OUTLINE_SIZE]; /* [m] polygons, one or one for each foot */
     char ground[PLUGIN_TEXT_SIZE];     /* presets and soils' files, by label of the pattern */
     double sole_z;                     /* [m] plane of the outline in the frame of the foot */
-    double pitch;                      /* [m] edge of an element */
+    double pitch;                      /* [m] edge of an element; 0: as the sole wants it */
     double body_pitch;                 /* [m] between the elements of a body */
     int elements;                      /* of a sole; 0: as many as fit */
     double height;                     /* [m] of the surface */

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/text.h"
+#include "ground/sole.h"
 #include "plugin/body.h"
 #include "plugin/wheel.h"
 
@@ -390,9 +391,9 @@ static void cloud_frame(const mjModel *m, const Foot *foot, Cloud *cloud) {
     }
 }
 
-static MildStatus make_raster(const PluginDef *def, const double *outline, int points, double z,
-                              Foot *foot, MildError *error) {
-    const MildSoleDef sole = {outline, points, def->pitch, z, def->elements};
+static MildStatus make_raster(const PluginDef *def, double pitch, const double *outline, int points,
+                              double z, Foot *foot, MildError *error) {
+    const MildSoleDef sole = {outline, points, pitch, z, def->elements};
     double twice = 0;
     for (int i = 0, j = points - 1; i < points; j = i++) {
         twice += outline[2 * j] * outline[2 * i + 1] - outline[2 * i] * outline[2 * j + 1];
@@ -412,19 +413,20 @@ static MildStatus no_shape(const mjModel *m, const Foot *foot, MildError *error)
  * element centres on a line of length L at most L/pitch + 1 are inside. */
 static MildStatus sole_of_bounds(const PluginDef *def, const Cloud *cloud, Foot *foot,
                                  MildError *error) {
+    const double pitch = def->pitch > 0 ? def->pitch : SOLE_PITCH_LEAST;
     double low[2] = {DBL_MAX, DBL_MAX}, high[2] = {-DBL_MAX, -DBL_MAX}, half[2], middle[2];
     for (int k = 0; k < 2; k++) {
         for (int i = 0; i < cloud->count; i++) {
             low[k] = fmin(low[k], cloud->at[i][k]);
             high[k] = fmax(high[k], cloud->at[i][k]);
         }
-        half[k] = 0.5 * def->pitch * (floor((high[k] - low[k]) / def->pitch + BOUNDS_SLACK) + 1);
+        half[k] = 0.5 * pitch * (floor((high[k] - low[k]) / pitch + BOUNDS_SLACK) + 1);
         middle[k] = 0.5 * (low[k] + high[k]);
     }
     const double outline[8] = {middle[0] - half[0], middle[1] - half[1], middle[0] + half[0],
                                middle[1] - half[1], middle[0] + half[0], middle[1] + half[1],
                                middle[0] - half[0], middle[1] + half[1]};
-    return make_raster(def, outline, 4, 0, foot, error);
+    return make_raster(def, pitch, outline, 4, 0, foot, error);
 }
 
 /* The convex hull of what lies lowest. */
@@ -439,7 +441,7 @@ static MildStatus sole_of_cloud(const mjModel *m, const PluginDef *def, Cloud *c
     } else if (corners < 3 || corners > OUTLINE_MAX) {
         status = no_shape(m, foot, error);
     } else {
-        status = make_raster(def, hull, corners, z, foot, error);
+        status = make_raster(def, def->pitch, hull, corners, z, foot, error);
     }
     free(hull);
     return status;
@@ -480,7 +482,7 @@ static MildStatus sole_of_sphere(const mjModel *m, const PluginDef *def, int geo
         outline[2 * i] = reach * cos(angle);
         outline[2 * i + 1] = reach * sin(angle);
     }
-    return make_raster(def, outline, CIRCLE_POINTS, 0, foot, error);
+    return make_raster(def, def->pitch, outline, CIRCLE_POINTS, 0, foot, error);
 }
 
 /* The only geom of the foot when it is a sphere, or -1. */
@@ -536,7 +538,7 @@ static MildStatus sole_from_outline(const PluginDef *def, int f, Foot *foot, Mil
     int points = 0;
     MildStatus status = parse_outline(at, outline, &points, error);
     if (status == MILD_OK) {
-        status = make_raster(def, outline, points, def->sole_z, foot, error);
+        status = make_raster(def, def->pitch, outline, points, def->sole_z, foot, error);
     }
     free(outline);
     free(copy);
@@ -592,7 +594,8 @@ static MildStatus make_soles(const mjModel *m, const PluginDef *def, MildModel m
     for (int f = 0; status == MILD_OK && f < count; f++) {
         status = check_moves(m, &feet[f], error);
         if (status == MILD_OK && feet[f].surface) {
-            const double pitch = f > 0 ? mild_sole_pitch(feet[0].sole) : def->pitch;
+            const double own = def->pitch > 0 ? def->pitch : MATERIAL_PITCH;
+            const double pitch = f > 0 ? mild_sole_pitch(feet[0].sole) : own;
             status = body_surface(m, def, pitch, compiling, &feet[f], error);
         } else if (status == MILD_OK) {
             status = make_sole(m, def, model, compiling, f, &feet[f], error);

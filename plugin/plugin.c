@@ -53,12 +53,14 @@ static Soft *create(const mjModel *m, int instance, MildError *error) {
     return check_model(m, instance, error) == MILD_OK ? soft_create(m, instance, error) : NULL;
 }
 
-/* Bool: the warning about the feet of the model that was compiled last has been given. */
-static atomic_int warned;
+/* Bool: the warnings about the model that was compiled last have been given, and the one about a
+ * body that a rigid floor carries. */
+static atomic_int warned, rested;
 
 /* Called first, when the model is compiled; what is wrong is said by `init`. */
 static int state_size(const mjModel *m, int instance) {
     atomic_store(&warned, 0);
+    atomic_store(&rested, 0);
     return (int)(soft_room(m, instance) / sizeof(mjtNum));
 }
 
@@ -79,8 +81,13 @@ static int init(const mjModel *m, mjData *d, int instance) {
         refuse(m, d, instance, error.text);
     }
     /* the compiler makes an mjData of its own, for which the model has no signature yet */
-    if (m->signature && check_feet(m, soft, text, sizeof text) && !atomic_exchange(&warned, 1)) {
-        say(m, instance, text);
+    if (m->signature && !atomic_exchange(&warned, 1)) {
+        if (check_feet(m, soft, text, sizeof text)) {
+            say(m, instance, text);
+        }
+        if (check_sensors(m, soft, text, sizeof text)) {
+            say(m, instance, text);
+        }
     }
     return 0;
 }
@@ -129,7 +136,12 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability) {
 static void advance(const mjModel *m, mjData *d, int instance) {
     Soft *soft = soft_of(d, instance);
     if (soft) {
+        char text[400];
         soft_advance(soft, m, d, own_state(soft, m, d, instance));
+        if (!atomic_load(&rested) && check_rests(m, d, soft, text, sizeof text) &&
+            !atomic_exchange(&rested, 1)) {
+            say(m, instance, text);
+        }
     }
 }
 

@@ -221,7 +221,9 @@ typedef struct {
     const double *outline; /* [points][2] [m] polygon in the foot frame, in either orientation; it
                               must not cross itself */
     int points;            /* points of the outline, 3 .. 4096 */
-    double pitch;          /* [m] edge of an element: how fine the raster is; 0.0195 in the paper */
+    double pitch;          /* [m] edge of an element: how fine the raster is, 0.001 .. 1; 0: the
+                              paper's 0.0195 with target_elements; else near it, such that the
+                              elements have the outline's area */
     double sole_z;         /* [m] sole plane in the foot frame, negative below the ankle */
     /* Number of elements wanted (77 for the SA01), or 0 for outline area divided by element area.
      * The raster is shifted until the count is nearest to this. Then border cells are dropped, or
@@ -427,8 +429,8 @@ typedef struct {
      * step may exceed the tolerance if rounding permits no smaller residual. */
     double residual;
     int iterations; /* Newton steps or sweeps done */
-    /* Bool. Also 0 when a pose or a result is not finite, when a number of a material is NaN, or
-     * when dt is not positive. */
+    /* Bool. Also 0 when a pose, a twist or a result is not finite, when a number of a material is
+     * NaN, or when dt is not positive. */
     int converged;
 } MildContactResult;
 

@@ -5,6 +5,7 @@
 
 extern "C" {
 #include "identify/fit.h"
+#include "identify/fit_csv.h"
 #include "identify/fit_drag.h"
 #include "identify/fit_slide.h"
 }
@@ -59,6 +60,21 @@ static std::vector<FitPoint> points_of(nb::handle rows) {
         points.push_back(point);
     }
     return points;
+}
+
+/* What `mild fit` refuses, of each plate's rows. */
+static void check_rows(const std::vector<FitPoint> &points, int plates) {
+    for (int p = 0; p < plates; p++) {
+        const std::string where = plates > 1 ? "X[" + std::to_string(p) + "]" : "X";
+        std::vector<FitPoint> own;
+        for (const FitPoint &point : points) {
+            if (point.plate == p) {
+                own.push_back(point);
+            }
+        }
+        MildError error = {};
+        check(fit_rows_check(where.c_str(), own.data(), (int)own.size(), &error), error);
+    }
 }
 
 static const char *state_name(FitState state) {
@@ -181,9 +197,17 @@ static std::vector<FitPoint> slide_of(const FitPlate &plate, int number, const M
     }
     int before = (int)count;
     int copied = 0;
-    if (fit_sliding(points.data(), &before, slide.data(), &copied) < FIT_POINTS_MIN) {
+    const std::string where = "drags[" + std::to_string(number) + "]";
+    MildError error = {};
+    check(fit_rows_check(where.c_str(), points.data(), (int)count, &error), error);
+    const int slid = fit_sliding(points.data(), &before, slide.data(), &copied);
+    if (slid < FIT_POINTS_MIN) {
         raise(PyExc_ValueError, "drags: fewer than " + std::to_string((int)FIT_POINTS_MIN) +
                                     " rows slide, or none by 1 mm");
+    }
+    const bool along = std::isfinite(slide[(size_t)copied - 1].along);
+    if (const char *wrong = fit_slide_wrong(slide.data(), copied, slid, along)) {
+        raise(PyExc_ValueError, where + ": " + wrong);
     }
     rows.resize((size_t)fit_slide_rows(&plate, &curve, slide.data(), copied, rows.data()));
     return rows;
@@ -244,6 +268,7 @@ static nb::dict run(const nb::sequence &soles, nb::handle rows, const std::strin
     const FitDef def = def_of(soles, model, held, fill.is_none() ? nullptr : &filled,
                               nb::len(drags) > 0 ? &drag : nullptr);
     const std::vector<FitPoint> points = points_of(rows);
+    check_rows(points, def.plates);
     FitResult result = {};
     MildError error = {};
     MildStatus status;
@@ -295,6 +320,8 @@ static nb::object forces(const nb::sequence &soles, const Material &material, nb
 static nb::object loading(nb::handle rows) {
     std::vector<FitPoint> points = points_of(rows);
     const int count = points.empty() ? 0 : fit_loading(points.data(), (int)points.size());
+    MildError error = {};
+    check(fit_rows_check("loading", points.data(), count, &error), error);
     if (count > 0) {
         fit_speeds(points.data(), count);
     }

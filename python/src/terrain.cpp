@@ -171,11 +171,12 @@ static void bind_sole(nb::module_ &module) {
         module, "Sole",
         "Footprint of a foot as square elements.\n\n"
         "outline: (points, 2) [m] polygon in the foot frame. pitch [m]: edge of an "
-        "element; it does not change the ground.\nsole_z [m]: plane of the sole in the foot "
+        "element; it does not change the ground; 0: near 0.0195, such that the elements have the "
+        "outline's area.\nsole_z [m]: plane of the sole in the foot "
         "frame, negative below the ankle.\n"
         "target_elements: number of elements wanted; 0: by the area.\n"
         "Raises ValueError when the outline crosses itself or encloses no area.")
-        .def("__init__", make_sole, nb::arg("outline"), nb::arg("pitch") = 0.0195,
+        .def("__init__", make_sole, nb::arg("outline"), nb::arg("pitch") = 0.0,
              nb::arg("sole_z") = 0.0, nb::arg("target_elements") = 0)
         .def_static("plate", make_plate, nb::arg("length"), nb::arg("width"),
                     "A plate of length x width [m], of whole elements, centred (docs/python.md).")

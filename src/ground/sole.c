@@ -9,6 +9,11 @@
 
 #define SOLE_POINTS_MAX 4096 /* limited because the search for crossing edges is quadratic in it */
 #define RASTER_PHASES 16     /* raster offsets tried along each axis */
+/* A pitch of its own: MATERIAL_PITCH times powers of this ratio are tried, so many of them. */
+#define PITCH_RATIO 1.02
+#define PITCH_COARSER 5
+#define PITCH_FINER 35   /* to SOLE_PITCH_LEAST */
+#define PITCH_LEVER 0.05 /* [-] by which its second moments may miss the outline's */
 
 /* A raster of square cells with edge `pitch` that covers the outline. */
 typedef struct {
@@ -69,9 +74,9 @@ static MildStatus numbers_check(const MildSoleDef *def, MildError *error) {
                              def->outline[i]);
         }
     }
-    if (!(def->pitch >= 1e-3 && def->pitch <= 1.0)) {
+    if (def->pitch != 0.0 && !(def->pitch >= 1e-3 && def->pitch <= 1.0)) {
         return mild_fail(error, MILD_ERROR_RANGE,
-                         "sole.pitch = %g is outside 0.001 .. 1: [m] edge of an element",
+                         "sole.pitch = %g is outside 0.001 .. 1: [m] edge of an element, or 0",
                          def->pitch);
     }
     if (!isfinite(def->sole_z)) {
@@ -219,6 +224,71 @@ static Raster raster_choose(const MildSoleDef *def, const Outline *outline) {
     return best;
 }
 
+/* Second moments [m^4] of an outline about its centroid, along x and y. */
+static void outline_moments(const MildSoleDef *def, const Outline *outline, double moment[2]) {
+    double sign = 0.0;
+    moment[0] = moment[1] = 0.0;
+    for (int i = 0; i < def->points; i++) {
+        const double *p = &def->outline[2 * i], *q = &def->outline[2 * ((i + 1) % def->points)];
+        const double a[2] = {p[0] - outline->center[0], p[1] - outline->center[1]};
+        const double b[2] = {q[0] - outline->center[0], q[1] - outline->center[1]};
+        const double cross = a[0] * b[1] - b[0] * a[1];
+        for (int k = 0; k < 2; k++) {
+            moment[k] += cross * (a[k] * a[k] + a[k] * b[k] + b[k] * b[k]) / 12.0;
+        }
+        sign += cross;
+    }
+    for (int k = 0; k < 2; k++) {
+        moment[k] = sign < 0.0 ? -moment[k] : moment[k];
+    }
+}
+
+/* Elements of the raster, and by how much [-] their second moments miss the outline's, at most. */
+static int raster_miss(const MildSoleDef *def, const Outline *outline, const double moment[2],
+                       double *miss) {
+    const double cell = def->pitch * def->pitch;
+    const Raster raster = raster_choose(def, outline);
+    double sum[2] = {0.0, 0.0};
+    int count = 0;
+    for (int i = 0; i < raster.columns * raster.rows; i++) {
+        const double at[2] = {raster.origin[0] + (i / raster.rows + 0.5) * def->pitch,
+                              raster.origin[1] + (i % raster.rows + 0.5) * def->pitch};
+        const int in = outline_inside(def, at[0], at[1]);
+        count += in;
+        for (int k = 0; k < 2; k++) {
+            const double arm = at[k] - outline->center[k];
+            sum[k] += in * cell * (arm * arm + cell / 12.0);
+        }
+    }
+    *miss = fmax(fabs(sum[0] / moment[0] - 1.0), fabs(sum[1] / moment[1] - 1.0));
+    return count;
+}
+
+/* The pitch [m] nearest to MATERIAL_PITCH whose elements have the outline's area, and its second
+ * moments within PITCH_LEVER; else the one that misses these least. Without any, MATERIAL_PITCH. */
+static double pitch_choose(const MildSoleDef *def) {
+    const Outline outline = outline_measure(def);
+    double moment[2], least = INFINITY, best = MATERIAL_PITCH;
+    outline_moments(def, &outline, moment);
+    for (int k = 0; k <= 2 * PITCH_FINER && least > PITCH_LEVER; k++) {
+        const int power = k % 2 ? (k + 1) / 2 : -k / 2; /* 0, 1, -1, 2, ... */
+        MildSoleDef tried = *def;
+        double miss = INFINITY;
+        tried.pitch = MATERIAL_PITCH * pow(PITCH_RATIO, power);
+        const int count = power > PITCH_COARSER ? 0 : raster_miss(&tried, &outline, moment, &miss);
+        if (count == 0) {
+            continue;
+        }
+        tried.pitch = sqrt(outline.area / count);
+        if (tried.pitch >= 1e-3 && tried.pitch <= 1.0 &&
+            raster_miss(&tried, &outline, moment, &miss) == count && miss < least - 1e-9) {
+            least = miss;
+            best = tried.pitch;
+        }
+    }
+    return best;
+}
+
 typedef struct {
     double coverage; /* [-] share of its area inside the outline */
     int cell;        /* column times rows plus row */
@@ -285,8 +355,8 @@ static MildSole *sole_from_cells(const MildSoleDef *def, const Outline *outline,
     return sole;
 }
 
-MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
-    if (numbers_check(def, error) != MILD_OK || outline_check(def, error) != MILD_OK) {
+static MildSole *sole_raster(const MildSoleDef *def, MildError *error) {
+    if (outline_check(def, error) != MILD_OK) {
         return NULL;
     }
     Outline outline = outline_measure(def);
@@ -327,6 +397,21 @@ MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
         mild_fail(error, MILD_ERROR_MEMORY, "sole: out of memory for %d elements", chosen);
     }
     return sole;
+}
+
+MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
+    if (numbers_check(def, error) != MILD_OK) {
+        return NULL;
+    }
+    MildSoleDef own = *def;
+    if (own.pitch == 0.0) {
+        own.pitch = MATERIAL_PITCH;
+        if (outline_check(&own, error) != MILD_OK) {
+            return NULL;
+        }
+        own.pitch = own.target_elements ? MATERIAL_PITCH : pitch_choose(&own);
+    }
+    return sole_raster(&own, error);
 }
 
 MildSole *mild_sole_concentric(const MildSole *sole, MildError *error) {

@@ -22,6 +22,8 @@ struct MildSole {
 };
 
 #define MATERIAL_PITCH 0.0195 /* [m] edge of the element that a material's numbers belong to */
+/* [m] A sole that chooses its pitch has no more elements than one of this pitch may have. */
+#define SOLE_PITCH_LEAST (0.5 * MATERIAL_PITCH)
 
 /* The merged cone of an element, in radii of the disc of an element of MATERIAL_PITCH: it closes
  * from `begin` on, over `width`, times tan(alpha)/nu. The

@@ -116,8 +116,9 @@ static int all_finite(const MildContactInput *input, const MildContactResult *re
     for (int f = 0; f < feet; f++) {
         const MildFootResult *foot = &result->foot[f];
         all &= finite(input->position[f], 3) & finite(input->rotation[f], 9) &
-               finite(foot->force, 3) & finite(foot->torque, 3) & finite(foot->zmp_axis, 3) &
-               finite(foot->zmp_sole, 2) & finite(foot->pressure_center, 3);
+               finite(input->velocity[f], 6) & finite(foot->force, 3) & finite(foot->torque, 3) &
+               finite(foot->zmp_axis, 3) & finite(foot->zmp_sole, 2) &
+               finite(foot->pressure_center, 3);
     }
     return all;
 }

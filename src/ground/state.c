@@ -83,9 +83,9 @@ MildGround ground_layout(const MildSole *const *soles, int feet, int tiles) {
         layout.elements[f] = mild_sole_elements(soles[f]);
         layout.padded[f] = sole_padded(soles[f]);
         layout.faces |= soles[f]->faces << f;
+        layout.imprint_cell = fmax(layout.imprint_cell, 0.5 * mild_sole_pitch(soles[f]));
     }
     layout.tiles = imprints_round(tiles, MILD_IMPRINT_TILES_MAX);
-    layout.imprint_cell = 0.5 * mild_sole_pitch(soles[0]);
     return layout;
 }
 

@@ -263,6 +263,29 @@ static MildStatus fit_check(const FitDef *def, const FitPoint *points, int count
     return MILD_OK;
 }
 
+/* A press in kilonewtons: what carries less than this at the greatest depth is no ground. */
+#define SOFTEST 1e3 /* [Pa/m] */
+
+static MildStatus unit_check(const FitDef *def, const FitPoint *points, int count,
+                             MildError *error) {
+    for (int p = 0; def->kind == FIT_PRESS && p < def->plates; p++) {
+        const double area = def->plate[p].elements * def->plate[p].pitch * def->plate[p].pitch;
+        const FitPoint *deepest = NULL;
+        for (int i = 0; i < count; i++) {
+            if (points[i].plate == p && (!deepest || points[i].depth > deepest->depth)) {
+                deepest = &points[i];
+            }
+        }
+        if (deepest && deepest->depth > 0 && deepest->force < SOFTEST * area * deepest->depth) {
+            return mild_fail(error, MILD_ERROR_RANGE,
+                             "fit: force_n is %g at depth_m %g under %.3g m2, which no ground is "
+                             "that soft for; it must be in newtons",
+                             deepest->force, deepest->depth, area);
+        }
+    }
+    return MILD_OK;
+}
+
 /* [m] The width that all plates share, else 0. */
 static double plates_width(const FitDef *def) {
     for (int i = 1; i < def->plates; i++) {
@@ -410,6 +433,7 @@ static MildStatus run_rows(const FitDef *def, const FitPoint *points, int count,
 MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResult *result,
                    MildError *error) {
     MildStatus status = fit_check(def, points, count, error);
+    status = status == MILD_OK ? unit_check(def, points, count, error) : status;
     if (status != MILD_OK || count <= FIT_ROWS) {
         return status == MILD_OK ? run_rows(def, points, count, result, error) : status;
     }

@@ -131,6 +131,16 @@ static MildStatus csv_header(Record *record, MildError *error) {
     return status == MILD_OK ? kind_find(record, error) : status;
 }
 
+/* Checks that a number of line `row` is within the limit of its column. */
+static MildStatus limit_check(const char *where, int row, CsvColumn c, double value,
+                              MildError *error) {
+    if (!(fabs(value) > column_limits[c])) {
+        return MILD_OK;
+    }
+    return mild_fail(error, MILD_ERROR_RANGE, "%.200s:%d: %s %g is beyond %g; it must be in %s",
+                     where, row, column_names[c], value, column_limits[c], column_units[c]);
+}
+
 static MildStatus csv_cell(const Record *record, CsvColumn c, char **cells, int count,
                            double *value, MildError *error) {
     int place = record->column[c];
@@ -149,12 +159,7 @@ static MildStatus csv_cell(const Record *record, CsvColumn c, char **cells, int 
             "%.200s:%d: %s '%.40s' is not a finite number; correct it or delete the row",
             record->text.path, record->text.number, column_names[c], cells[place]);
     }
-    if (fabs(*value) <= column_limits[c]) {
-        return MILD_OK;
-    }
-    return mild_fail(error, MILD_ERROR_RANGE, "%.200s:%d: %s %g is beyond %g; it must be in %s",
-                     record->text.path, record->text.number, column_names[c], *value,
-                     column_limits[c], column_units[c]);
+    return limit_check(record->text.path, record->text.number, c, *value, error);
 }
 
 /* A row of the numbers that the file has, NaN for the others. It is of plate 0 until the caller
@@ -246,6 +251,22 @@ static MildStatus csv_rows(Record *record, FitFile *file, MildError *error) {
     return status;
 }
 
+const char *fit_slide_wrong(const FitPoint *slide, int count, int slid, int along) {
+    double up = 0, against = 0, top = 0;
+    for (int i = 0; i < count; i++) {
+        const FitPoint *row = &slide[i];
+        up += row->force;
+        top = fmax(top, row->depth);
+        against += row->slip > 0 && isfinite(row->along) ? row->along : 0;
+    }
+    return !count                    ? NULL
+           : slid < FIT_POINTS_MIN   ? "too few rows slide, at least 8 are needed"
+           : !(up > 0 && top > 0)    ? "the plate slides, and force_n carries nothing"
+           : along && !(against > 0) ? "force_x_n does not resist the slip; it is the force on the "
+                                       "plate, negative where it moves to +x"
+                                     : NULL;
+}
+
 /* Takes the slide out of a press, and checks that it is of use. */
 static MildStatus csv_slide(const Record *record, FitFile *file, MildError *error) {
     if (file->kind != FIT_FILE_PRESS || !file->count) {
@@ -256,20 +277,8 @@ static MildStatus csv_slide(const Record *record, FitFile *file, MildError *erro
         return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", record->text.path);
     }
     const int slid = fit_sliding(file->points, &file->count, file->slide, &file->slide_count);
-    double up = 0, against = 0, top = 0;
-    for (int i = 0; i < file->slide_count; i++) {
-        const FitPoint *row = &file->slide[i];
-        up += row->force;
-        top = fmax(top, row->depth);
-        against += row->slip > 0 && isfinite(row->along) ? row->along : 0;
-    }
-    const int pulls = record->column[CSV_ALONG] >= 0 && !(against > 0);
-    const char *wrong = !file->slide_count      ? NULL
-                        : slid < FIT_POINTS_MIN ? "too few rows slide, at least 8 are needed"
-                        : !(up > 0 && top > 0)  ? "the plate slides, and force_n carries nothing"
-                        : pulls ? "force_x_n does not resist the slip; it is the force on the "
-                                  "plate, negative where it moves to +x"
-                                : NULL;
+    const char *wrong =
+        fit_slide_wrong(file->slide, file->slide_count, slid, record->column[CSV_ALONG] >= 0);
     return wrong ? mild_fail(error, MILD_ERROR_FORMAT, "%.200s:%d: %s", record->text.path,
                              record->text.number, wrong)
                  : MILD_OK;
@@ -281,13 +290,40 @@ static const char *const no_push[FIT_FILES] = {
     "shear_pa does not resist the slip; it is positive where it does",
     "torque_nm does not resist the turn; it is positive where it does"};
 
+/* Checks that forces resist. row: where the message points. */
+static MildStatus push_check(const char *where, int row, FitFileKind kind, const FitPoint *points,
+                             int count, MildError *error) {
+    double push = 0;
+    for (int i = 0; i < count; i++) {
+        push += points[i].force;
+    }
+    return push <= 0
+               ? mild_fail(error, MILD_ERROR_FORMAT, "%.200s:%d: %s", where, row, no_push[kind])
+               : MILD_OK;
+}
+
+MildStatus fit_rows_check(const char *where, const FitPoint *points, int count, MildError *error) {
+    static const CsvColumn columns[] = {CSV_TIME,  CSV_DEPTH, CSV_FORCE,
+                                        CSV_SPEED, CSV_SLIP,  CSV_ALONG};
+    for (int i = 0; i < count; i++) {
+        const FitPoint *p = &points[i];
+        const double number[] = {p->time, p->depth, p->force, p->speed, p->slip, p->along};
+        for (size_t k = 0; k < sizeof columns / sizeof *columns; k++) {
+            MildStatus status = limit_check(where, i + 1, columns[k], number[k], error);
+            if (status != MILD_OK) {
+                return status;
+            }
+        }
+    }
+    return count ? push_check(where, count, FIT_FILE_PRESS, points, count, error) : MILD_OK;
+}
+
 /* Checks that the rows are a press or a slip: enough that go on, and a force that resists. */
 static MildStatus csv_loading(const Record *record, FitFile *file, MildError *error) {
     const CsvColumn way = file->kind == FIT_FILE_SHEAR  ? CSV_SLIP
                           : file->kind == FIT_FILE_RING ? CSV_ANGLE
                                                         : CSV_DEPTH;
     const int rows = file->count;
-    double push = 0;
     file->count = fit_loading(file->points, rows);
     if (file->count < FIT_POINTS_MIN && file->slide_count) {
         file->count = 0; /* the record begins with the slide */
@@ -309,17 +345,12 @@ static MildStatus csv_loading(const Record *record, FitFile *file, MildError *er
                          record->text.number, column_names[way], file->points[0].depth,
                          way == CSV_DEPTH ? "press to some depth" : "slip over some way");
     }
-    for (int i = 0; i < file->count; i++) {
-        push += file->points[i].force;
-    }
-    if (push <= 0) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "%.200s:%d: %s", record->text.path,
-                         record->text.number, no_push[file->kind]);
-    }
-    if (file->kind == FIT_FILE_PRESS) {
+    MildStatus status = push_check(record->text.path, record->text.number, file->kind, file->points,
+                                   file->count, error);
+    if (status == MILD_OK && file->kind == FIT_FILE_PRESS) {
         fit_speeds(file->points, file->count);
     }
-    return MILD_OK;
+    return status;
 }
 
 /* The way up of a press, before its rows make room for the way down. */

@@ -37,6 +37,13 @@ typedef struct {
 MildStatus fit_csv_read(const char *path, FitFile *file, MildError *error);
 void fit_file_close(FitFile *file);
 
+/* What is wrong with a plate's rows, as fit_csv_read says of a file's: a number beyond its column's
+ * limit, forces that do not push back. The message names row `where:N`. */
+MildStatus fit_rows_check(const char *where, const FitPoint *points, int count, MildError *error);
+/* The same of the slide of fit_sliding, whose `slid` rows slide; NULL: nothing. along: bool, the
+ * force along was measured. */
+const char *fit_slide_wrong(const FitPoint *slide, int count, int slid, int along);
+
 /* Torques and loads of a ring of these radii [m] become stresses. */
 void fit_file_ring(FitFile *file, double outer, double inner);
 

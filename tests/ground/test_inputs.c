@@ -231,7 +231,7 @@ TEST(test_sole_refused) {
         const char *names;
     } bad[] = {{{square, 2, KIT_PITCH, 0, 0}, MILD_ERROR_ARGUMENT, "sole.points 2 3"},
                {{NULL, 4, KIT_PITCH, 0, 0}, MILD_ERROR_ARGUMENT, "sole.points 3"},
-               {{square, 4, 0.0, 0, 0}, MILD_ERROR_RANGE, "sole.pitch 0"},
+               {{square, 4, 9e-4, 0, 0}, MILD_ERROR_RANGE, "sole.pitch 0.0009"},
                {{square, 4, NAN, 0, 0}, MILD_ERROR_RANGE, "sole.pitch nan"},
                {{square, 4, KIT_PITCH, NAN, 0}, MILD_ERROR_RANGE, "sole.sole_z nan"},
                {{square, 4, KIT_PITCH, 0, -1}, MILD_ERROR_RANGE, "sole.target_elements -1"},

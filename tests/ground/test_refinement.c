@@ -221,4 +221,73 @@ TEST(test_outline) {
     }
 }
 
+/* A sole of this outline that chooses its pitch has the outline's area, and about its levers. */
+static void own_pitch(const char *name, const double *outline, int points) {
+    double area = 0, first[2] = {0, 0}, second[2] = {0, 0}, mean[2] = {0, 0}, square[2] = {0, 0};
+    const MildSoleDef def = {outline, points, 0, 0, 0};
+    MildSole *sole = mild_sole_create(&def, NULL);
+    assert_non_null(sole);
+    const int count = mild_sole_elements(sole);
+    const double pitch = mild_sole_pitch(sole);
+    for (int i = 0; i < points; i++) { /* triangles from the origin */
+        const double *a = &outline[2 * i], *b = &outline[2 * ((i + 1) % points)];
+        const double part = 0.5 * (a[0] * b[1] - b[0] * a[1]);
+        area += part;
+        for (int k = 0; k < 2; k++) {
+            first[k] += part * (a[k] + b[k]) / 3;
+            second[k] += part * (a[k] * a[k] + a[k] * b[k] + b[k] * b[k]) / 6;
+        }
+    }
+    for (int e = 0; e < count; e++) {
+        const double at[2] = {mild_sole_x(sole)[e], mild_sole_y(sole)[e]};
+        for (int k = 0; k < 2; k++) {
+            mean[k] += at[k] / count;
+            square[k] += (at[k] * at[k] + pitch * pitch / 12) / count;
+        }
+    }
+    print_message("  %-14s %4d elements of %5.2f mm, area %+.1e", name, count, 1e3 * pitch,
+                  count * pitch * pitch / fabs(area) - 1);
+    assert_true(fabs(count * pitch * pitch / fabs(area) - 1) < 1e-9);
+    assert_true(pitch > 0.0195 / 2 && pitch < 0.0195 * 1.2);
+    for (int k = 0; k < 2; k++) {
+        const double lever = sqrt(second[k] / area - first[k] / area * (first[k] / area));
+        const double own = sqrt(square[k] - mean[k] * mean[k]);
+        print_message(", lever %.1f of %.1f mm", 1e3 * own, 1e3 * lever);
+        assert_true(fabs(own / lever - 1) < 0.09 && fabs(mean[k] - first[k] / area) < pitch / 2);
+    }
+    print_message("\n");
+    mild_sole_destroy(sole);
+}
+
+/* A foot of two half discs, its length between their centres [m]; 0: a round foot. */
+static void own_pitch_round(const char *name, double length_between, double radius) {
+    double outline[2 * 32];
+    for (int i = 0; i < 32; i++) {
+        const double angle = 2 * 3.14159265358979 * (i + 0.5) / 32;
+        outline[2 * i] = radius * cos(angle) + (cos(angle) > 0 ? length_between : 0);
+        outline[2 * i + 1] = radius * sin(angle);
+    }
+    own_pitch(name, outline, 32);
+}
+
+/* Feet of public robots, and boxes of no kind. */
+TEST(test_own_pitch) {
+    static const double boxes[][2] = {{0.08, 0.05},  {0.1, 0.1},     {0.25, 0.125}, {0.287, 0.1},
+                                      {0.2, 0.012},  {0.03, 0.03},   {0.011, 0.01}, {0.181, 0.067},
+                                      {0.31, 0.021}, {0.555, 0.333}, {0.066, 0.19}, {0.04, 0.017}};
+    static const double corner[] = {0, 0, 0.2, 0, 0.2, 0.05, 0.05, 0.05, 0.05, 0.15, 0, 0.15};
+    for (size_t i = 0; i < sizeof boxes / sizeof *boxes; i++) {
+        const double x = boxes[i][0] / 2, y = boxes[i][1] / 2;
+        const double outline[] = {-x, -y, x, -y, x, y, -x, y};
+        char name[32];
+        snprintf(name, sizeof name, "box %g x %g", 2e3 * x, 2e3 * y);
+        own_pitch(name, outline, 4);
+    }
+    own_pitch("corner", corner, 6);
+    own_pitch_round("H1", 0.21, 0.03);
+    own_pitch_round("G1", 0.17, 0.03);
+    own_pitch_round("Go1", 0, 0.023);
+    own_pitch_round("Spot", 0, 0.036);
+}
+
 TEST_MAIN(NULL, NULL)

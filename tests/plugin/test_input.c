@@ -179,8 +179,8 @@ TEST(warns_of_another_area) {
     const struct {
         const char *configs;
         int warns;
-    } cases[] = {{FOOT, 1},
-                 {FOOT CONFIG("pitch", "0.01"), 0},
+    } cases[] = {{FOOT CONFIG("pitch", "0.0195"), 1},
+                 {FOOT, 0},
                  {FOOT CONFIG("elements", "12"), 0},
                  {FOOT CONFIG("outline", "-.039 -.0195 .039 -.0195 .039 .0195 -.039 .0195"), 0}};
     for (int c = 0; c < 4; c++) {
@@ -192,6 +192,72 @@ TEST(warns_of_another_area) {
         assert_int_equal(kit_messages, cases[c].warns);
         if (cases[c].warns) {
             assert_names(kit_said, "12 foot 1.14 40 cm2 pitch 0.0195");
+        }
+        mj_deleteData(d);
+        mj_deleteModel(m);
+    }
+}
+
+/* Sensors of MuJoCo's that are meant for what carries a foot, and some that are not. */
+TEST(warns_of_a_sensor_that_does_not_feel_the_ground) {
+    const struct {
+        const char *sensor;
+        int warns;
+    } cases[] = {{"touch name='felt' site='sole'", 1},
+                 {"force name='felt' site='sole'", 1},
+                 {"torque name='felt' site='sole'", 1},
+                 {"contact name='felt' body1='foot'", 1},
+                 {"contact name='felt' geom1='box' geom2='floor'", 1},
+                 {"contact name='felt' body1='foot' body2='b1'", 0},
+                 {"accelerometer name='felt' site='sole'", 0},
+                 {"touch name='felt' site='base'", 0},
+                 {"plugin name='felt' plugin='mild.ground' instance='soft'", 0}};
+    for (int c = 0; c < 9; c++) {
+        char end[300];
+        snprintf(end, sizeof end,
+                 "<worldbody><site name='base'/></worldbody><sensor><%s/></sensor>",
+                 cases[c].sensor);
+        mjModel *m = compile("", FOOT, OFF, "", BOX OFF, end);
+        assert_non_null(m);
+        mjData *d = mj_makeData(m);
+        print_message("%d: %s\n", c, kit_said);
+        assert_int_equal(kit_messages, cases[c].warns);
+        if (cases[c].warns) {
+            assert_names(kit_said, "sensor 'felt' 'foot' mild.ground");
+        }
+        mj_deleteData(d);
+        mj_deleteModel(m);
+    }
+}
+
+/* A shin that comes down on a rigid floor beside a soft foot is said once; not where it is excluded,
+ * soft, or another robot's. */
+TEST(warns_of_a_body_that_a_rigid_floor_carries) {
+    const struct {
+        const char *keys, *shin;
+        int warns;
+    } cases[] = {{"", "", 1}, {"", OFF, 0}, {CONFIG("body", "shin"), OFF, 0}};
+    for (int c = 0; c < 3; c++) {
+        char text[3000];
+        const int end = (int)strlen(kit_head(text, sizeof text, 0.002, "implicitfast", "foot",
+                                             "sand_loose", cases[c].keys));
+        snprintf(text + end, sizeof text - (size_t)end,
+                 "<worldbody><geom name='floor' type='plane' size='1 1 .1'/><body name='other' "
+                 "pos='0 .8 .05'><freejoint/><geom size='.05' mass='9'/></body><body name='shin' "
+                 "pos='0 0 .2'><freejoint/><geom type='capsule' fromto='.1 0 0 .1 0 -.16' "
+                 "size='.03' mass='5' %s/><geom type='capsule' fromto='-.1 0 0 -.1 0 -.16' "
+                 "size='.03' mass='5' %s/><body name='foot' pos='0 0 -.19'><geom type='box' "
+                 "size='.05 .05 .01' mass='1' " OFF "/></body></body></worldbody></mujoco>",
+                 cases[c].shin, cases[c].shin);
+        mjModel *m = kit_model(text);
+        mjData *d = mj_makeData(m);
+        kit_run(m, d, 0.5);
+        mj_resetData(m, d);
+        kit_run(m, d, 0.5);
+        print_message("%d: %s\n", c, kit_messages ? kit_said : "-");
+        assert_int_equal(kit_messages, cases[c].warns);
+        if (cases[c].warns) {
+            assert_names(kit_said, "'shin' floor rigid N body");
         }
         mj_deleteData(d);
         mj_deleteModel(m);
@@ -292,45 +358,42 @@ TEST(rk4_at_run_time) {
 
 /* ---- soles ---- */
 
-static int elements_of(const char *configs, const char *geom) {
+/* Bool: the first sole's elements have this area [m^2] within 1 %. */
+static int has_area(const char *configs, const char *geom, double area) {
     mjModel *m = compile("", configs, OFF, "", geom, "");
     if (!m) {
         fail_msg("%s", kit_said);
     }
     mjData *d = mj_makeData(m);
-    const int elements = mild_sole_elements(plugin_soft(m, d)->soles[0]);
+    const MildSole *sole = plugin_soft(m, d)->soles[0];
+    const double pitch = mild_sole_pitch(sole), own = mild_sole_elements(sole) * pitch * pitch;
+    print_message("%4d elements of %.2f mm: %.2f of %.2f cm2\n", mild_sole_elements(sole),
+                  1e3 * pitch, 1e4 * own, 1e4 * area);
     mj_deleteData(d);
     mj_deleteModel(m);
-    return elements;
+    return fabs(own / area - 1) < 0.01;
 }
 
-/* Area of the sole over that of an element, for outlines from shapes, sites and numbers. */
+/* Outlines from shapes, sites and numbers, whose elements have the sole's area. */
 TEST(soles_follow_the_shapes) {
-    const double element = 0.0195 * 0.0195;
-    assert_in_range(elements_of(FOOT, BOX OFF), 0.94 * 0.02 / element, 1.06 * 0.02 / element);
-    assert_in_range(elements_of(CONFIG("feet", "sole"), BOX OFF), 0.94 * 0.02 / element,
-                    1.06 * 0.02 / element);
-    assert_in_range(elements_of(CONFIG("sole", "box"), BOX OFF), 0.94 * 0.02 / element,
-                    1.06 * 0.02 / element);
-    assert_int_equal(elements_of(FOOT CONFIG("elements", "40"), BOX OFF), 40);
-    assert_in_range(elements_of(FOOT CONFIG("outline", "-.1 -.1 .1 -.1 .1 .1 -.1 .1"), BOX OFF),
-                    0.94 * 0.04 / element, 1.06 * 0.04 / element);
+    assert_true(has_area(FOOT, BOX OFF, 0.02));
+    assert_true(has_area(CONFIG("feet", "sole"), BOX OFF, 0.02));
+    assert_true(has_area(CONFIG("sole", "box"), BOX OFF, 0.02));
+    assert_true(has_area(FOOT CONFIG("elements", "40"), BOX OFF, 40 * 0.0195 * 0.0195));
+    assert_true(has_area(FOOT CONFIG("outline", "-.1 -.1 .1 -.1 .1 .1 -.1 .1"), BOX OFF, 0.04));
     /* a site whose z axis is the long axis of the box: the sole is its end */
-    assert_in_range(elements_of(CONFIG("feet", "end"), BOX OFF), 4, 7);
+    assert_true(has_area(CONFIG("feet", "end"), BOX OFF, 0.002));
     /* what lies 80 mm above the sole is not the sole */
-    assert_in_range(
-        elements_of(FOOT, BOX OFF "/><geom type='box' size='.3 .3 .01' pos='0 0 .08' " OFF),
-        0.94 * 0.02 / element, 1.06 * 0.02 / element);
-    const double round = 3.1416 * 0.06 * 0.06 / element;
-    assert_in_range(elements_of(FOOT, "type='cylinder' size='.06 .02' " OFF), 0.93 * round,
-                    1.07 * round);
-    const double capsule = (0.2 * 0.1 + 3.1416 * 0.05 * 0.05) / element;
+    assert_true(
+        has_area(FOOT, BOX OFF "/><geom type='box' size='.3 .3 .01' pos='0 0 .08' " OFF, 0.02));
+    assert_true(has_area(FOOT, "type='cylinder' size='.06 .02' " OFF, 3.1416 * 0.06 * 0.06));
     /* with a ledge, without which it would roll */
-    assert_in_range(elements_of(FOOT,
-                                "type='capsule' size='.05 .1' euler='0 90 0' " OFF
-                                "/><geom type='box' size='.01 .05 .001' pos='0 0 -.049' " OFF),
-                    0.93 * capsule, 1.07 * capsule);
-    assert_in_range(elements_of(FOOT, "type='ellipsoid' size='.12 .12 .01' " OFF), 40, 130);
+    assert_true(has_area(FOOT,
+                         "type='capsule' size='.05 .1' euler='0 90 0' " OFF
+                         "/><geom type='box' size='.01 .05 .001' pos='0 0 -.049' " OFF,
+                         0.2 * 0.1 + 3.1416 * 0.05 * 0.05));
+    /* what of it is within 10 mm of its lowest point */
+    assert_true(has_area(FOOT, "type='ellipsoid' size='.12 .12 .01' " OFF, 3.1 * 0.12 * 0.12));
 }
 
 /* ---- keys ---- */

@@ -169,9 +169,6 @@ class Batch(unittest.TestCase):
         self.assertEqual(pairs, 2 * len(outputs) * (len(plain) - 1) - 2)
 
     def test_arguments(self):
-        arrays = Arrays(self.batch, self.rng)
-        with self.assertRaisesRegex(ValueError, "material: 5"):
-            self.batch.step(**arrays.all(material=np.full(6, 5, np.int32)))
         for arguments, name in (((0, self.soles, 0.002), "robots"), ((2, [], 0.002), "soles"), ((2, self.soles, -1), "dt")):
             with self.assertRaisesRegex(ValueError, name):
                 mild.Batch(*arguments)
@@ -183,26 +180,6 @@ class Batch(unittest.TestCase):
             self.batch.set_materials(["mud"])
         with self.assertRaisesRegex(TypeError, "map"):
             self.batch.set_map(3)
-
-    def test_map(self):
-        """A map of two labels: materials (robots, labels), and the numbers of single grounds on the same map."""
-        names = ["grass", "sand_loose"]
-        slope = mild.Map("slope", slope=0.1, patches="checker", patch_size=0.5, patch_count=2)
-        self.batch.set_materials(names)
-        self.batch.set_map(slope)
-        arrays, both = Arrays(self.batch, self.rng), np.tile(np.array([0, 1], np.int32), (6, 1))
-        with self.assertRaisesRegex(ValueError, "material"):
-            self.batch.step(**arrays.all(material=both[:, 0].copy()))
-        self.batch.step(**arrays.all(material=both, height=np.full(6, -5, np.float32)))
-        self.assertEqual(np.abs(arrays.outputs["wrench"]).max(), 0)
-        self.batch.step(**arrays.all(material=both, height=np.full(6, 0.03, np.float32)))
-        self.assertGreater(arrays.outputs["wrench"].max(), 100)
-        ground = mild.Ground(self.soles, mild.Terrain(names, map=slope, height=0.03), 0.002)
-        for i in range(6):
-            for name, array in arrays.inputs.items():
-                getattr(ground, name)[:] = array[i]
-            ground.solve()
-            np.testing.assert_allclose(arrays.outputs["wrench"][i, :, 2], ground.force[:, 2], rtol=1e-3, atol=0.05)
 
     def test_map_origin(self):
         """The origin of each robot's map is that of its Terrain."""

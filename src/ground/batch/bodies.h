@@ -129,7 +129,7 @@ typedef struct {
     Real inverse_inertia[BODIES_ROWS * BODIES_ROWS]; /* [6 count][6 count] */
     Real wrench[BODIES_ROWS];
     ContactFoot foot[BODIES_NEAR];
-    Real residual; /* [-] relative */
+    Real residual; /* [-] relative; NaN: problem or results are no numbers, the memory stays */
     int iterations;
     /* ---- of the solution ---- */
     Real least[BODIES_NEAR];        /* [m] elements less deep do not touch in this step */
@@ -746,6 +746,17 @@ WARP_FN void bodies_leave(const BodiesMemory *memory, int numbers) {
     }
 }
 
+/* Bool: row r of the results, and what its lane has of the problem, are numbers. */
+MILD_HD int bodies_is_number(const BodiesWork *work, int r) {
+    const int i = r / 6;
+    Real sum = 0 * work->height + 0 * work->wrench[r] + 0 * work->next.twist[r];
+    for (int k = r % 6; k < 9; k += 6) {
+        sum += contact_blank(work->position[i], work->rotation[i], work->velocity[i],
+                             work->free_velocity + 6 * i, k);
+    }
+    return sum == 0;
+}
+
 /* A whole step. advance: bool, the memory moves to its end. curves: of
  * batch_bodies_curves, a constant, because the code of one curve is shorter. */
 TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance, int curves) {
@@ -765,10 +776,13 @@ TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance
             work->next.twist[r] =
                 work->free_velocity[r] + bodies_times(work, rows, r, work->best.wrench);
             work->wrench[r] = work->best.wrench[r] / setup->dt;
+            if (!bodies_is_number(work, r)) {
+                work->residual = REAL(NAN); /* lanes that write it write the same */
+            }
         }
     }
     team_sync();
-    bodies_finish(setup, work, advance, curves);
+    bodies_finish(setup, work, advance && work->residual >= 0, curves);
 }
 
 #endif

@@ -43,8 +43,8 @@ MILD_HD const Real *bodies_map_origin(const BodiesCall *call, long robot) {
     return call->input.map_origin ? call->input.map_origin + 2 * robot : NULL;
 }
 
-/* Bool: surface b may touch the ground in this step. An element is asked for at the twist now and
- * at that without ground. */
+/* Bool: surface b may touch the ground in this step, or its pose and motion are no numbers, which
+ * bodies_step reports. An element is asked for at the twist now and at that without ground. */
 WARP_FN int bodies_is_near(const BodiesCall *call, long robot, int b) {
     const BodiesSetup *setup = call->bodies.setup;
     const MildBatchInput *in = &call->input;
@@ -56,6 +56,13 @@ WARP_FN int bodies_is_near(const BodiesCall *call, long robot, int b) {
     const Real *origin = bodies_map_origin(call, robot);
     const Real height = in->height ? in->height[robot] : 0;
     const Real least = bodies_least(setup, setup->sole[b].radius, V, free);
+    Real blank = 0;
+    for (int k = 0; k < 9; k++) {
+        blank += contact_blank(position, R, V, free, k);
+    }
+    if (!(blank == 0)) {
+        return 1;
+    }
     return bodies_reach(setup, b, position, R, origin, height) > least &&
            (bodies_touch(setup, b, position, R, V, origin, height) ||
             bodies_touch(setup, b, position, R, free, origin, height));

@@ -328,6 +328,17 @@ MILD_HD void contact_direct(const ContactMaterial *material, const Real *rotatio
     }
 }
 
+/* A rotation has no larger entry; more than 1 for rounding. */
+#define CONTACT_TURN REAL(2)
+
+/* 0, or NaN where number k of a foot's pose and motion, 0 .. 8, is none or turns nothing. */
+MILD_HD Real contact_blank(const Real *position, const Real *rotation, const Real *velocity,
+                           const Real *free_velocity, int k) {
+    Real sum = rotation[k] + (k < 3 ? position[k] : 0);
+    sum += k < 6 ? velocity[k] + free_velocity[k] : 0;
+    return REAL_ABS(rotation[k]) <= CONTACT_TURN ? 0 * sum : REAL(NAN);
+}
+
 /* What the ground does to a foot, mean over the step. */
 typedef struct {
     Real pressure_center[3]; /* [m] world, as in MildFootResult; 0 without load */
@@ -342,7 +353,7 @@ typedef struct {
     Real *velocity;    /* [feet][6] [m/s, rad/s] after the step */
     ContactFoot *foot; /* [feet] or NULL */
     Real *elements;    /* [4][feet][stride] or NULL: depth [m], normal, tangent_x, tangent_y [N] */
-    Real *residual;    /* [1] [-] relative, in the metric of kinetic energy */
+    Real *residual;    /* [1] [-] relative, in the metric of kinetic energy; NaN: see is_number */
     int *iterations;   /* [1] Newton steps */
 } ContactResult;
 

@@ -1,0 +1,513 @@
+"""What enters and leaves, in one scenario in which no two numbers are equal: a yawed, tilted robot of two different feet on waves of two grounds, a
+walk that turns and goes sideways, a sole without symmetry. Every number that leaves is held to a reading of it that comes another way."""
+import contextlib
+import csv
+import dataclasses
+import json
+import math
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import types
+import unittest
+import unittest.mock
+
+import mujoco
+import numpy as np
+
+import mild
+from mild import gym
+from mild._soles import feet_of
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "tests/drive")]
+import know  # noqa: E402
+from robot import Robot, Runner  # noqa: E402
+
+MILD = os.environ["MILD_PROGRAM"]
+ROBOT = """<mujoco><compiler angle="radian"/><option timestep="0.0031" integrator="Euler"/><worldbody>
+  <body name="trunk" pos=".13 -.21 .36" euler=".03 -.05 .41"><freejoint/><geom type="box" size=".11 .07 .05" pos=".013 -.008 .02" mass="7.3"/>
+    <body name="left" pos=".02 .12 -.2"><joint name="l" axis=".2 1 .1" damping="0"/><geom type="box" size=".083 .041 .013" pos=".017 -.006 -.11" mass="1.1"/></body>
+    <body name="right" pos="-.03 -.14 -.19"><joint name="r" axis="1 .3 -.2"/><geom type="box" size=".071 .047 .011" pos="-.009 .004 -.13" mass=".9"/></body>
+  </body></worldbody></mujoco>"""
+FEET, GROUNDS, MAP = ["left", "right"], ["sand_loose", "grass"], {"amplitude": 0.017, "wavelength": 0.73, "patches": "checker", "patch_size": 0.19}
+STEP, DECIMATION, STEPS, HEIGHT = 0.0031, 7, 133, 0.0053
+WALK = ("--ground", "sand_loose", "--speed", 0.43, "--sideways", -0.07, "--turn", 0.19, "--trials", 2, "--seconds", 5.3, "--seed", 7)
+COMMAND = 0.43, -0.07, 0.19
+
+
+def run(*arguments, code=0):
+    """Standard output of the program; with `code` its one line of an error."""
+    done = subprocess.run([MILD, *map(str, arguments)], capture_output=True, text=True, cwd=ROOT, env={**os.environ, "MILD_HOME": str(ROOT)})
+    assert done.returncode == code, (arguments, done.returncode, done.stderr)
+    return done.stderr.strip() if code else done.stdout
+
+
+def rows(path):
+    """Columns of a CSV file, by name; numbers where they are some."""
+    with open(path, newline="", encoding="utf-8") as file:
+        head, *table = csv.reader(file)
+    return {name: np.array([float(x) if re.fullmatch(r"-?[\d.e+-]+|nan", x) else np.nan for x in column]) for name, column in zip(head, zip(*table))}
+
+
+def problem(plain, data):
+    """What a step without ground says of the feet: poses, J, V, A and V_free, of MuJoCo alone."""
+    mujoco.mj_forward(plain, data)
+    mass, jacobian = np.zeros((plain.nv, plain.nv)), np.zeros((12, plain.nv))
+    mujoco.mj_fullM(plain, data, mass)
+    for i, name in enumerate(FEET):
+        body = plain.body(name).id
+        mujoco.mj_jac(plain, data, jacobian[6 * i : 6 * i + 3], jacobian[6 * i + 3 : 6 * i + 6], data.xpos[body], body)
+    bodies = [plain.body(name).id for name in FEET]
+    velocity = jacobian @ data.qvel
+    return mass, jacobian, {"position": data.xpos[bodies], "rotation": data.xmat[bodies].reshape(2, 3, 3), "velocity": velocity.reshape(2, 6),
+                            "inverse_inertia": jacobian @ np.linalg.solve(mass, jacobian.T),
+                            "free_velocity": (velocity + STEP * jacobian @ data.qacc).reshape(2, 6)}
+
+
+def fall():
+    """A fall of the robot: for each step what enters the ground, the plugin's sensor (2, 12), and J^T W from MuJoCo's equation of motion."""
+    spec = mujoco.MjSpec.from_string(ROBOT)
+    spec.add_sensor(name="time", type=mujoco.mjtSensor.mjSENS_CLOCK)
+    mild.attach(spec, FEET, GROUNDS, sensor="felt", height=HEIGHT, terrain__kind="waves", **{f"terrain__{key}": value for key, value in MAP.items()})
+    soft, plain = spec.compile(), mujoco.MjModel.from_xml_string(ROBOT)
+    data, other, seen = mujoco.MjData(soft), mujoco.MjData(plain), []
+    data.qvel[:] = 0.21, -0.17, -0.9, 0.4, -0.3, 0.5, 0.6, -0.7
+    for _ in range(STEPS):
+        other.qpos[:], other.qvel[:] = data.qpos, data.qvel
+        mass, jacobian, given = problem(plain, other)
+        before = data.qvel.copy()
+        mujoco.mj_step(soft, data)
+        pushed = mass @ (data.qvel - before) / STEP + other.qfrc_bias
+        seen.append((given, data.sensor("felt").data.reshape(2, 12).copy(), jacobian, pushed))
+    return plain, seen
+
+
+class Scenario(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
+        cls.plain, cls.seen = fall()
+
+    def test_plugin(self):
+        """Wrenches move the robot as the sensor says; the pressure's centre and the zero moment lie alike."""
+        most = max(np.abs(sensor[:, :6]).max() for _, sensor, _, _ in self.seen)
+        for given, sensor, jacobian, pushed in self.seen:
+            np.testing.assert_allclose(jacobian.T @ sensor[:, :6].ravel(), pushed, atol=1e-6 * most)
+        loaded = self.seen[-1][1]
+        self.assertTrue((loaded[:, 2] > 10).all() and (np.abs(loaded[:, [0, 1, 3, 4]]) > 0.01).all(), loaded)
+        self.assertEqual(len(set(np.abs(loaded).round(9).ravel())), loaded.size)
+
+    def batch(self, soles, mapped=True, robots=1):
+        batch = mild.Batch(robots, soles, STEP)
+        batch.set_materials(GROUNDS)
+        batch.set_map(mild.Map("waves", patch_count=2, **MAP) if mapped else None)
+        return batch
+
+    @staticmethod
+    def arrays(given, robots, surfaces=0):
+        """Inputs of a batch for so many robots, with surfaces that ride on the left foot, and outputs."""
+        feet = 2 + surfaces
+        more = {"position": given["position"][[0]], "rotation": given["rotation"][[0]], "velocity": given["velocity"][[0]], "free_velocity": given["free_velocity"][[0]]}
+        inputs = {name: np.concatenate([given[name], *[value] * surfaces]) for name, value in more.items()}
+        square = np.zeros((6 * feet, 6 * feet))
+        square[:12, :12], square[12:, 12:] = given["inverse_inertia"], 0.1 * np.eye(6 * surfaces)
+        inputs |= {"inverse_inertia": square, "height": np.array(HEIGHT)}
+        inputs = {name: np.ascontiguousarray(np.tile(value, (robots, *[1] * value.ndim)), np.float32) for name, value in inputs.items()}
+        return inputs, {"wrench": np.zeros((robots, feet, 6), np.float32), "new_velocity": np.zeros((robots, feet, 6), np.float32),
+                        "foot": np.zeros((robots, feet, 6), np.float32), "residual": np.full(robots, -1, np.float32)}
+
+    def test_batch(self):
+        """mild.Batch and mild.Ground get from MuJoCo's numbers what the plugin felt; the robot on exchanged materials does not."""
+        soles, label = feet_of(self.plain, FEET)[2], np.array([[0, 1], [1, 0]], np.int32)
+        batch, other = self.batch(soles, robots=2), []
+        terrain = mild.Terrain(GROUNDS, map=mild.Map("waves", patch_count=2, **MAP), height=HEIGHT)
+        ground = mild.Ground(soles, terrain, STEP)
+        most = max(np.abs(sensor[:, :6]).max() for _, sensor, _, _ in self.seen)
+        for given, sensor, _, _ in self.seen:
+            inputs, outputs = self.arrays(given, 2)
+            batch.step(**inputs, **outputs, material=label)
+            for name, value in given.items():
+                getattr(ground, name)[:] = value
+            self.assertTrue(ground.solve())
+            ground.advance()
+            np.testing.assert_allclose(np.hstack([ground.force, ground.torque]), sensor[:, :6], atol=1e-6 * most)
+            np.testing.assert_allclose(outputs["wrench"][0], sensor[:, :6], atol=2e-3 * most)
+            np.testing.assert_allclose(outputs["foot"][0], sensor[:, [6, 7, 8, 10, 11, 9]], atol=3e-3)
+            self.assertTrue((0 <= outputs["residual"]).all() and (outputs["residual"] < 1e-3).all())
+            other.append(np.abs(outputs["wrench"][1] - outputs["wrench"][0]).max())
+        self.assertGreater(max(other), 0.05 * most)
+        for robot in range(2):
+            for column in range(2):
+                for wrong in (-1, 2):
+                    bad = label.copy()
+                    bad[robot, column] = wrong
+                    with self.assertRaisesRegex(ValueError, rf"^material: {wrong} is outside 0 \.\. 1$"):
+                        batch.step(**inputs, **outputs, material=bad)
+
+    def test_no_number(self):
+        """A step of no numbers says so, and leaves the ground as it was: that of a batch, plane soles and surfaces, on waves and level, and of a Ground."""
+        soles = feet_of(self.plain, FEET)[2]
+        shin = mild.Sole.surface([{"type": "capsule", "size": [0.031, 0.043], "pos": [0.02, 0.01, -0.11]}])
+        bad_of = {name: [np.nan, np.inf] for name in ("position", "rotation", "velocity", "free_velocity", "inverse_inertia")}
+        bad_of["rotation"] = [np.nan, 1e30]
+        for surfaces in (0, 1):
+            for mapped in (True, False):
+                label = np.array([[0, 1]] * 2 if mapped else [0] * 2, np.int32)
+                two, loads = [self.batch([*soles, *[shin] * surfaces], mapped, 2) for _ in range(2)], []
+                bad = [(name, value, k) for name, values in bad_of.items() for value in values for k in (0, 7)]
+                for at, (given, *_) in enumerate(self.seen[:40]):
+                    if at > 12 and bad:
+                        name, value, k = bad.pop()
+                        inputs, outputs = self.arrays(given, 2, surfaces)
+                        two[0].step(**inputs, **outputs, material=label, advance=False)
+                        self.assertTrue((outputs["residual"] >= 0).all())
+                        inputs[name][1].ravel()[k % inputs[name][1].size] = value
+                        inputs["inverse_inertia"][0] = 0  # so that the other robot's step is one without motion
+                        inputs["velocity"][0] = inputs["free_velocity"][0] = 0
+                        two[1].step(**inputs, **outputs, material=label)
+                        self.assertTrue(np.isnan(outputs["residual"][1]), (name, value, k, outputs["wrench"][1]))
+                        self.assertGreaterEqual(outputs["residual"][0], 0)
+                    felt = []
+                    for batch in two:
+                        inputs, outputs = self.arrays(given, 2, surfaces)
+                        batch.step(**inputs, **outputs, material=label)
+                        felt.append(outputs["wrench"][1])
+                    np.testing.assert_array_equal(felt[1], felt[0])
+                    loads.append(felt[0][:, 2])
+                self.assertEqual(bad, [])
+                self.assertGreater((np.array(loads)[13:33] > 20).all(1).sum(), 8)
+        ground = mild.Ground(soles, "grass", STEP)
+        for name, value in ((name, value) for name, values in bad_of.items() for value in values):
+            for array, number in self.seen[-1][0].items():
+                getattr(ground, array)[:] = number
+            self.assertTrue(ground.solve())
+            getattr(ground, name).ravel()[3] = value
+            if (name, value) != ("rotation", 1e30):
+                self.assertFalse(ground.solve(), name)
+
+    def test_mjlab(self):
+        """mjlab's sensors get the force on the ground, the step is one of physics, and the description has the task's numbers."""
+        felt = self.seen[-1][1]
+        ground, soft = adapters(felt)
+        felt_by_ground = soft.sense()
+        np.testing.assert_allclose(felt_by_ground.force[0], -felt[:, :3])
+        np.testing.assert_allclose(sum(felt_by_ground.force[0]), -self.seen[-1][3][:3], atol=1e-3)  # of the equation of motion
+        np.testing.assert_array_equal(felt_by_ground.found[0], felt[:, 9] > 0)
+        np.testing.assert_allclose(soft.measure().heights[0], SITES + felt[:, 11] / 2)
+        self.assertEqual((ground.keys["timestep"], ground.keys["exclude"], ground.feet), (STEP, False, ["body12", "body11"]))
+        from mild.describe import Description
+        (self.folder / "policy.ini").write_text(sys.modules["mild.mjlab"].describe(task(), "robot/imu"))
+        said = Description(self.folder / "policy.ini")
+        self.assertEqual((said.policy["step"], said.policy["decimation"], said.policy["frame"]), (STEP, DECIMATION, "robot/imu"))
+        self.assertEqual([(pattern.pattern, value) for pattern, value in said.scale], [("robot/hip", 0.31), ("robot/knee", 0.47)])
+        self.assertEqual([(pattern.pattern, value) for pattern, value in said.default], [(".*", 0), ("robot/hip", 0.13), ("robot/knee", -0.59)])
+        self.assertEqual([(term.name, term.scale) for term in said.terms], [("angular_velocity", 0.23), ("joint_position", 1), ("command", 0.71)])
+
+    def test_gym(self):
+        """diverged is where a robot ended with a number that is none, not where it fell, nor where it goes on."""
+        env = gym.VectorEnv(4, ground="grass")
+        env.reset(seed=3)
+        act = env._act
+
+        def ended(action):
+            arrays = act(action)
+            arrays["done"][:], arrays["timeout"][:], arrays["valid"][:] = [1, 1, 0, 1], [0, 0, 0, 1], [1, 0, 1, 1]
+            return arrays
+
+        with unittest.mock.patch.object(env, "_act", ended):
+            _, _, terminated, truncated, info = env.step(np.zeros((4, 12)))
+        self.assertEqual((terminated.tolist(), truncated.tolist()), ([True, True, False, False], [False, False, False, True]))
+        self.assertEqual(info["final_info"]["diverged"].tolist(), [False, True, False, False])
+        self.assertEqual(info["final_info"]["_diverged"].tolist(), [True, True, False, True])
+        env.close()
+
+
+class Program(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
+
+    def test_press(self):
+        """The SA01's sole, tilted: every column of the file and of mild.press, of paths, forces and falls; moments about the reference point give
+        the zero moment's place; a Ground that is moved by hand pushes alike."""
+        text = (ROOT / "robots/sa01/robot.ini").read_text().split("[foot.left]")[1]
+        outline = np.array(re.search(r"outline = ([-\d.\s]+)", text)[1].split(), float).reshape(-1, 2)
+        sole, tilt = mild.Sole(outline, pitch=0.0195, sole_z=-0.055, target_elements=77), math.radians(7)
+        for keys in ({"depth": 0.023, "speed": 0.031, "step": 0.001}, {"force": (290, 70), "cycles": 2, "speed": 0.013}, {"drop": 0.053, "mass": 19},
+                     {"impact": 0.71, "mass": 11}, {"depth": 0.019, "drag": 0.029, "speed": 0.023}):
+            options = [part for name, value in keys.items() for part in (f"--{name}", ",".join(map(str, np.atleast_1d(value))))]
+            run("press", "--ground", "grass", "--plate", "sole", "--tilt", 7, *options, "--csv", self.folder / "p.csv")
+            table, press = rows(self.folder / "p.csv"), mild.press("grass", sole, tilt=tilt, **keys)
+            for name, column in table.items():
+                if name != "area_m2":
+                    np.testing.assert_allclose(column, getattr(press, re.sub("_(s|m|n|nm|rad)$", "", name)), rtol=1e-6, atol=1e-9, err_msg=f"{name} of {keys}")
+            on = press.force > 1
+            self.assertGreater(np.abs(press.zmp_y[on]).max(), 1e-3)
+            self.assertGreater(len(set(np.abs(press.zmp_x[on]).round(9)) - set(np.abs(press.zmp_y[on]).round(9))), 5)
+            if "drop" not in keys and "impact" not in keys and "drag" not in keys:
+                np.testing.assert_allclose(press.zmp_x[on], -press.moment_y[on] / press.force[on], atol=1e-9)
+                np.testing.assert_allclose(press.zmp_y[on], press.moment_x[on] / press.force[on], atol=1e-9)
+        press, ground = mild.press("grass", sole, depth=0.023, speed=0.031, step=0.001, tilt=tilt), mild.Ground([sole], "grass", 0.001)
+        ground.rotation[:] = [[math.cos(tilt), 0, math.sin(tilt)], [0, 1, 0], [-math.sin(tilt), 0, math.cos(tilt)]]
+        for i in range(1, 700):
+            ground.position[0] = [0, 0, -ground.rotation[0, 2, 2] * sole.z - press.depth[i - 1]]
+            ground.velocity[0, 2] = ground.free_velocity[0, 2] = -0.031
+            ground.solve()
+            ground.advance()
+            self.assertLess(abs(ground.force[0, 2] - press.force[i]), 0.02 * press.force.max())
+
+    def test_fit(self):
+        """Rows, units and numbers of `mild fit` and of GroundFit from one record with noise; both refuse other units, and a sign, in one text."""
+        random, plate = np.random.default_rng(5), mild.Sole.plate(0.23, 0.11)
+        press = mild.press("grass", plate, depth=0.041, speed=0.017)
+        force = press.force + random.normal(0, 1.7, len(press.force)) * (press.force > 0)
+        def write(name, depth=1.0, up=1.0):
+            np.savetxt(self.folder / name, np.column_stack([press.time, depth * press.depth, up * force]), "%.12g", ",", header="time_s,depth_m,force_n", comments="")
+            return self.folder / name
+        X, y = mild.loading(press.time, press.depth, force)
+        found = json.loads(run("fit", write("fit.csv"), "--plate", "0.23,0.11", "--json", "-"))
+        fit = mild.GroundFit(plate).fit(X, y)
+        self.assertAlmostEqual(found["residual"], np.sqrt(np.mean((fit.predict(X) - y)**2)), delta=1e-4)
+        self.assertEqual(len(y), (np.diff(np.maximum.accumulate(press.depth), prepend=0) > 0).sum())  # deeper than all before
+        self.assertAlmostEqual(found["independent_rows"], len(y), delta=0.01 * len(y))  # of independent noise all count
+        printed = dict(re.findall(r"^(\S+(?: c_d phi rho nu)?) .*?(\S+)$", run("fit", self.folder / "fit.csv", "--plate", "0.23,0.11"), re.M))
+        units = {name: re.match(r"\[(.*?)\]", text)[1] for name, text in re.findall(r"^\s*(\w+) = .*?; (\[.*)$", run("info", "config"), re.M)}
+        for name, value in {**found["parameters"], **found["combinations"]}.items():
+            for key, number in value.items():
+                if name != "recovery":  # of the way up, which X leaves out
+                    ours = fit.parameters_[name] if name in fit.parameters_ else fit.combinations_[name][0]
+                    low, high = fit.intervals_.get(name, fit.combinations_.get(name, [0, 0, 0])[-2:])
+                    self.assertAlmostEqual(number / {"value": ours, "low": low, "high": high}[key], 1, delta=1e-3, msg=(name, key))
+                    self.assertEqual(printed[name], fit.units_[name], name)
+            if name in units:
+                self.assertEqual(printed[name], units[name], name)
+            self.assertTrue(value["low"] < value["value"] < value["high"])
+        self.assertEqual((fit.units_["sigma_cone/cos(alpha)"], fit.units_["tan(alpha)/nu"]), ("N/m^3", "-"))
+        self.assertTrue(found["parameters"]["k_pen"]["low"] < mild.Material("grass").k_pen < found["parameters"]["k_pen"]["high"])
+        for depth, up, words in ((1e3, 1, "depth_m [0-9.]+ is beyond 2; it must be in metres, positive down"), (1, -1, "force_n does not push back on the way down"),
+                                 (1, 1e-3, "force_n is [0-9.]+ at depth_m .* it must be in newtons")):
+            said = run("fit", write("bad.csv", depth, up), "--plate", "0.23,0.11", code=2)
+            self.assertRegex(said, rf"^mild fit: [^\n]*{words}[^\n]*$")
+            tail = re.search(words + "[^\n]*$", said)[0]
+            with self.assertRaisesRegex(ValueError, re.sub(r"[0-9.]+ (?=is beyond)", "[0-9.]+ ", tail.replace("(", r"\("))):
+                columns = mild.loading(press.time, depth * press.depth, up * force)
+                mild.GroundFit(plate).fit(*columns)
+            with self.assertRaisesRegex(ValueError, words):
+                mild.GroundFit(plate).fit(X * [depth, depth, depth], up * y)
+
+    def test_eval(self):
+        """Speeds along and across the heading, work, turn and the feet's forces, from where the robot went and what it did."""
+        files = {name: self.folder / f"{name}.csv" for name in ("track", "actions", "feet", "stances")}
+        row = json.loads(run("eval", *WALK, "--json", "-", *[part for name, file in files.items() for part in (f"--{name}", file)]))["rows"][0]
+        track, did, feet, stances = (rows(files[name]) for name in ("track", "actions", "feet", "stances"))
+        self.assertEqual((row["speed"], row["sideways"], row["turn"], row["trials"], row["success"], row["ends"]["time"]), (*COMMAND, 2, 2, 2))
+        speeds, across, turning = [], [], []
+        for trial in range(2):
+            t, a = ({name: column[table["trial"] == trial] for name, column in table.items()} for table in (track, did))
+            w, x, y, z = (a[f"quaternion_{k}"] for k in "wxyz")
+            yaw = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+            late = np.flatnonzero(t["time_s"] >= 2)
+            steps = np.diff(np.column_stack([t["base_x_m"], t["base_y_m"]]), axis=0)[late[:-1]] / 0.01
+            heading = np.interp(t["time_s"][late[:-1]], a["time_s"], yaw)
+            speeds.append(np.mean(steps[:, 0] * np.cos(heading) + steps[:, 1] * np.sin(heading)))
+            across.append(np.mean(-steps[:, 0] * np.sin(heading) + steps[:, 1] * np.cos(heading)))
+            turning.append((yaw[-1] - yaw[late[0]]) / (a["time_s"][-1] - a["time_s"][late[0]]))
+            np.testing.assert_allclose([a["command_x_m_s"][300], a["command_y_m_s"][300], a["command_turn_rad_s"][300]], COMMAND, atol=1e-6)
+            self.assertAlmostEqual(row["each"][trial]["x"], t["base_x_m"][-1], delta=2e-5)
+            self.forces(t, {name: column[feet["trial"] == trial] for name, column in feet.items()})
+        for name, own, within in (("velocity", speeds, 0.01), ("velocity_sideways", across, 0.01), ("velocity_turn", turning, 0.01)):
+            self.assertAlmostEqual(row[name], np.mean(own), delta=within, msg=name)
+        self.assertAlmostEqual(row["velocity_deviation"], np.std(speeds, ddof=1), delta=0.01)
+        self.assertAlmostEqual(row["penetration"], stances["depth_m"].mean(), delta=1e-6)
+
+    def forces(self, track, feet):
+        """Forces of the feet change the momentum of the whole robot: over a second, each axis."""
+        com, time = np.column_stack([track[f"com_{k}_m"] for k in "xyz"]), track["time_s"]
+        speed = np.diff(com, axis=0) / 0.01  # in the middle of a policy step
+        first, last = 231, 471
+        inside = (feet["time_s"] > time[first] + 0.005 + 1e-6) & (feet["time_s"] <= time[last] + 0.005 + 1e-6)
+        count = inside.sum() / 2
+        impulse = np.array([feet[f"force_{k}_n"][inside].sum() for k in "xyz"]) * (time[last] - time[first]) / count
+        gained = speed[last] - speed[first] + [0, 0, 9.81 * (time[last] - time[first])]
+        np.testing.assert_allclose(impulse, SA01_MASS * gained, atol=0.002 * impulse[2])
+
+    def test_know(self):
+        """What is judged, from the frames of the same walks and `mild fit`, which reads them one by one."""
+        keys = ("--grounds", 9, "--seconds", 7, "--changes", 0.3, "--speed", "0.37,0.91", "--robots", 0, "--quiet", 0.3, "--seed", 23)
+        found = json.loads(run("know", *keys, "--json", "-"))
+        run("know", *keys, "--walks", self.folder / "w.npy")
+        walks, truth = np.load(self.folder / "w.npy"), rows(self.folder / "w.csv")
+        said, minutes, alarms, borders = {}, 0, 0, []
+        for i, walk in enumerate(walks):
+            lasted = int(truth["lasted"][i])
+            frames, second = walk[:lasted, : know.FRAME], np.flatnonzero((walk[:lasted, -2:] == 1).any(1))
+            touched = second[0] if len(second) else lasted
+            minutes += touched / 6000
+            self.assertEqual((found["walks"][i]["fell"], round(100 * found["walks"][i]["seconds"])), (lasted < 700, max(lasted - 200, 0)))
+            with open(self.folder / "w1.csv", "w", encoding="utf-8") as file:
+                file.write(",".join(["time_s", *(f"observation{k}" for k in range(know.FRAME))]) + "\n")
+                file.writelines(",".join([f"{t / 100:.2f}", *(f"{x:.9g}" for x in row)]) + "\n" for t, row in enumerate(frames))
+            judged = json.loads(run("fit", self.folder / "w1.csv", "--json", "-"))
+            if touched == lasted:
+                said[i] = judged["parameters"]
+            alarms += sum(step["alarm"] for step in judged["footsteps"] if step["time_s"] < touched / 100 and lasted == 700)
+            borders.append(self.border(judged["footsteps"], touched, len(second)))
+            for name, column in (("sinkage", "sinkage0"), ("mu", "mu0"), ("slip_length", "slip_length0"), ("asked", "vx")):
+                self.assertAlmostEqual(found["walks"][i][name] / truth[column][i], 1, delta=1e-5)
+            if lasted == 700:
+                self.assertAlmostEqual(found["walks"][i]["speed"], walk[200:lasted, 2 * know.FRAME].mean() / 4, delta=0.02)  # task.velocity_scale
+        cells = {row["parameter"]: row for row in found["rows"] if row["footsteps"] == 0}
+        self.assertGreater(len(said), 2)
+        for name in know.NAMES:
+            value = np.array([truth[f"{name}0"][i] for i in said])
+            middle, low, high = (np.array([said[i][name][key] for i in said]) for key in ("median", "low", "high"))
+            r2 = 1 - np.mean(np.log(middle / value)**2) / np.var(np.log(value))
+            self.assertEqual((cells[name]["walks"], cells[name]["coverage"]), (len(said), np.mean((low <= value) & (value <= high))))
+            self.assertAlmostEqual(cells[name]["r2"], r2, delta=0.1 * max(1, abs(r2)))  # of the mean, not the median
+            self.assertAlmostEqual(cells[name]["factor"] / np.sort(high / low)[len(said) // 2], 1, delta=1e-3)
+        self.assertAlmostEqual(found["minutes"], minutes, delta=1e-9)
+        self.assertEqual((found["fell"], found["false_alarms"] + found["before_falls"], found["grounds"]), (int((truth["lasted"] < 700).sum()), alarms, 9))
+        crossed = [border for border in borders if border]
+        flagged = [flag for _, flag in crossed if flag]
+        self.assertEqual(found["borders"][0], {"borders": len(crossed), "in_two": sum(flag <= 2 for flag in flagged),
+                                               "in_four": sum(flag <= 4 for flag in flagged), "delay": np.mean(flagged) if flagged else None})
+
+    @staticmethod
+    def border(steps, touched, crossed_at_all):
+        """Footsteps on the second ground, and which of them said so; None: fewer than four, or none at all."""
+        count = flagged = began = 0
+        for step in steps:
+            end = round(100 * step["time_s"])
+            if crossed_at_all and end >= touched:
+                count += 2 * (end - touched) >= end - began
+                flagged = flagged or (max(count, 1) if step["alarm"] else 0)
+            began = end
+        return (count, flagged) if crossed_at_all and count >= 4 else None
+
+    def test_drive(self):
+        """The ground that the runner knows is that of its log; targets ask for the share of the torque; the simulated robot went as it was told."""
+        log, command = self.folder / "log.csv", ",".join(map(str, COMMAND))
+        with contextlib.chdir(self.folder):
+            runner = Runner(MILD, "--command", command, "--torque-share", "0.87", "--log", str(log), patience=("--damp-after", "20", "--late", "10", "--stall-after", "20"))
+            there = json.loads(run("drive", "--simulate", "--lockstep", "--connect", f"127.0.0.1:{runner.port}", "--ground", "sand_loose", "--seconds", 6.3, "--json", "-"))
+            code, found, said = runner.end()
+            self.assertEqual((code, found["end"], found["damps"], there["end"], there["fallen"], there["seconds"]), (0, "robot", 0, "time", False, 6.3), said)
+            limits = {}
+            for share in "1", "0.37":
+                runner = Runner(MILD, "--torque-share", share)
+                robot = Robot(runner.port)
+                limits[share] = np.array(robot.start().targets[-1]["limit"])
+                robot.socket.close()
+                runner.process.terminate()
+                runner.end()
+        table, judged = rows(log), json.loads(run("fit", log, "--json", "-"))
+        np.testing.assert_allclose(np.diff(table["time_s"]), 0.01, atol=1e-6)
+        self.assertEqual((len(table["time_s"]), found["ground"]["footsteps"], found["ground"]["changes"]), (found["steps"], judged["footsteps_on_this_ground"], judged["alarms"]))
+        for name, interval in judged["parameters"].items():
+            np.testing.assert_allclose([found["ground"][name][key] for key in ("low", "median", "high")], [interval[key] for key in ("low", "median", "high")], rtol=1e-4)
+        np.testing.assert_allclose([table[f"observation{k}"][-1] for k in (3, 4, 5)], np.array(COMMAND) * [2, 2, 1], rtol=1e-6)
+        angle = 0.19 * 6.3  # an arc
+        wanted = np.array([[np.sin(angle), np.cos(angle) - 1], [1 - np.cos(angle), np.sin(angle)]]) @ [0.43, -0.07] / 0.19
+        np.testing.assert_allclose([there["way_x_m"], there["way_y_m"]], wanted, atol=0.35)
+        np.testing.assert_allclose(limits["0.37"], 0.37 * limits["1"], rtol=1e-6)
+        for share in ("0", "0.0099", "1.001", "-0.3"):
+            self.assertRegex(run("drive", "--torque-share", share, "--listen", "x", code=2), rf"^mild drive: --torque-share: {share} is outside 0\.01 \.\. 1$")
+
+
+SA01_MASS = sum(mujoco.MjModel.from_xml_path(str(ROOT / "robots/sa01/sa01.xml")).body_mass)
+SITES = np.array([0.37, 0.29])  # [m] heights of the feet's sites
+
+
+# ---- stand-ins of mjlab, PyTorch and Warp ----
+
+class Tensor(np.ndarray):
+    is_cuda = False
+
+    def float(self):
+        return self.astype(np.float64)
+
+    def bool(self):
+        return self.astype(np.bool_)
+
+    def masked_fill(self, mask, value):
+        return np.where(mask, value, self).view(Tensor)
+
+
+def stand_in(name, **members):
+    for at in range(1, name.count(".") + 2):
+        sys.modules.setdefault(".".join(name.split(".")[:at]), types.ModuleType(name))
+    vars(sys.modules[name]).update(members)
+
+
+class Ground:
+    """What mild.warp.Ground shows, with the plugin's numbers of the last step."""
+    felt = None
+
+    def __init__(self, model, m, d, feet, ground, **keys):
+        self.keys, self.feet, self.soles, self.round, self.radius, self.material = keys, feet, [None] * 2, False, [0], np.zeros(1, int)
+        self.wrench, self.foot = Ground.felt[None, :, :6], Ground.felt[None][..., [6, 7, 8, 10, 11, 9]]
+
+    def step(self):
+        pass
+
+    def reset(self, which):
+        pass
+
+    def acting(self):
+        return contextlib.nullcontext()
+
+
+def task(play=False):
+    """A task of mjlab."""
+    term = types.SimpleNamespace(history_length=0, scale=None)
+    space = types.SimpleNamespace
+    return space(scene=space(entities={"robot": space(collisions=(), init_state=space(joint_pos={"hip": 0.13, "knee": -0.59}))}), events={}, curriculum={},
+                 rewards={"track_linear_velocity": space(weight=2.3)}, actions={"joint_pos": space(scale={"hip": 0.31, "knee": 0.47})},
+                 observations={"actor": space(terms={"base_ang_vel": space(history_length=0, scale=0.23), "joint_pos": term, "command": space(history_length=0, scale=0.71)})},
+                 sim=space(mujoco=space(timestep=STEP)), decimation=DECIMATION)
+
+
+def adapters(felt):
+    """mild.mjlab's ground in an environment of two sites, and the mild.warp.Ground that it made."""
+    space = types.SimpleNamespace
+    def tensor(array, dtype=None, device=None):
+        return np.array(array, dtype).view(Tensor)
+
+    stand_in("torch", zeros=lambda *shape, dtype=None, device=None: tensor(np.zeros(shape), dtype), zeros_like=lambda a: tensor(np.zeros_like(a)), uint8=np.uint8,
+             where=lambda *a: tensor(np.where(*a)))
+    stand_in("warp", to_torch=tensor, from_torch=np.asarray, ScopedDevice=lambda device: contextlib.nullcontext(), ScopedStream=lambda stream: contextlib.nullcontext())
+    stand_in("mjlab.sensor.contact_sensor", ContactData=space)
+    stand_in("mjlab.sim.sim", _suspend_gc=None)
+    stand_in("mjlab.managers.curriculum_manager", CurriculumTermCfg=space)
+    stand_in("mjlab.managers.event_manager", EventTermCfg=space)
+    stand_in("mjlab.scene", Scene=None)
+    stand_in("mjlab.tasks.registry", list_tasks=None, load_env_cfg=None, register_mjlab_task=lambda **keys: None)
+    agent = lambda: space(algorithm=space(desired_kl=0.01), num_steps_per_env=24, experiment_name="soft")  # noqa: E731
+    for robot in ("g1", "go1"):
+        stand_in(f"mjlab.tasks.velocity.config.{robot}.env_cfgs", **{f"unitree_{robot}_flat_env_cfg": task})
+        stand_in(f"mjlab.tasks.velocity.config.{robot}.rl_cfg", **{f"unitree_{robot}_ppo_runner_cfg": agent})
+    stand_in("mjlab.tasks.velocity.rl", VelocityOnPolicyRunner=None)
+    stand_in("mild.warp", Ground=Ground)
+    Ground.felt = felt
+    from mild import _mjlab_ground
+    from mild import mjlab  # noqa: F401
+    model = space(site=lambda name: space(id={"robot/a": 2, "robot/b": 1}[name]), site_bodyid=[0, 11, 12], body=lambda i: space(name=f"body{i}"))
+    sim = space(mj_model=model, wp_model=None, wp_data=space(site_xpos=np.array([[[0, 0, 9], [1, 2, SITES[1]], [3, 4, SITES[0]]]])), step=lambda: None, reset=lambda worlds: None,
+                create_graph=lambda: None, use_cuda_graph=False, wp_device="cpu")
+    scan = unittest.mock.Mock(_compute_data=lambda: Scan(heights=None))
+    env = space(sim=sim, num_envs=1, device="cpu", physics_dt=STEP, step_dt=STEP * DECIMATION, scene={"feet_ground_contact": space(), "heights": scan})
+    soft = _mjlab_ground.SoftGround(env, GROUNDS, ["a", "b"], ".*", heights="heights")
+    return soft.ground, soft
+
+
+@dataclasses.dataclass
+class Scan:
+    heights: object
+
+
+if __name__ == "__main__":
+    unittest.main()
