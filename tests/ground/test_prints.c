@@ -381,7 +381,7 @@ TEST(test_no_creep) {
 
 /* One of CHANGED_STRIDE pairs; with 1 all were tried, 3902. */
 
-enum { CHANGED = 128, CHANGED_STEPS = 400, CHANGED_STRIDE = 5 };
+enum { CHANGED = 128, CHANGED_STEPS = 250, CHANGED_STRIDE = 11 };
 
 /* Every preset in every model of these elements; sands of merged cones wear. */
 static int changed_materials(MildMaterial *list, const MildSole *raster, int concentric) {
@@ -466,13 +466,13 @@ static double changed_stored(const Kit *kit, double *force) {
 static double changed_returns(Kit *kit, const MildGround *fresh) {
     double last[6] = {0}, twist[6] = {0}, worst = 0.0;
     MildGround *own = kit->ground;
-    twist[2] = 0.3;
+    twist[2] = 1.0;
     memset(kit->A, 0, sizeof kit->A);
     while (!kit_lifted(kit) || kit->input.position[0][2] < 0.2) {
         changed_lead(kit, last, twist);
     }
-    twist[2] = -0.3;
-    for (double up = kit->input.position[0][2]; up > 0.02; up -= 0.3 * kit->input.dt) {
+    twist[2] = -1.0;
+    for (double up = kit->input.position[0][2]; up > 0.02; up -= kit->input.dt) {
         Kit other = *kit;
         double forked[6];
         memcpy(forked, last, sizeof forked);
