@@ -60,8 +60,18 @@ static MildStatus read_line(const char **text, MildMaterial *material, char *nam
                  : mild_fail(error, MILD_ERROR_ARGUMENT, "ground has no number '%s'", line);
 }
 
-MildStatus live_change(Soft *soft, const mjModel *m, int label, const char *text,
-                       MildError *error) {
+/* Puts a material in the place of another. */
+static void exchange(Soft *soft, MildGround *ground, int label, const MildMaterial *material) {
+    const MildTerrain before = soft->terrain;
+    soft->terrain.materials[label] = *material;
+    if (ground) {
+        mild_ground_change(ground, &before, &soft->terrain, soft->scratch);
+        soft->solved = 0;
+    }
+}
+
+MildStatus live_change(Soft *soft, const mjModel *m, MildGround *ground, int label,
+                       const char *text, MildError *error) {
     MildStatus status = check_label(soft, label, error);
     if (status != MILD_OK) {
         return status;
@@ -92,7 +102,7 @@ MildStatus live_change(Soft *soft, const mjModel *m, int label, const char *text
         status = soft_meet(soft, &material, error);
     }
     if (status == MILD_OK) {
-        soft->terrain.materials[label] = material;
+        exchange(soft, ground, label, &material);
         if (name[0]) {
             visual_colour(name, &material, soft->colour[label]);
         }

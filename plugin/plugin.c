@@ -154,17 +154,23 @@ static void visualize(const mjModel *m, mjData *d, const mjvOption *option, mjvS
     }
 }
 
-/* The ground of the instance of this name, or of the only one (NULL); NULL when there is none. */
-static Soft *find_soft(const mjModel *m, const mjData *d, const char *name) {
+/* The instance of this name, or the only one (NULL); -1 when there is none with a ground. */
+static int find_instance(const mjModel *m, const mjData *d, const char *name) {
     for (int i = 0; i < m->nplugin; i++) {
         const mjpPlugin *plugin = mjp_getPluginAtSlot(m->plugin[i]);
         const char *own = mj_id2name(m, mjOBJ_PLUGIN, i);
         if (plugin && strcmp(plugin->name, PLUGIN_NAME) == 0 &&
             (!name || (own && strcmp(own, name) == 0))) {
-            return soft_of(d, i);
+            return soft_of(d, i) ? i : -1;
         }
     }
-    return NULL;
+    return -1;
+}
+
+/* Its ground; NULL when there is none. */
+static Soft *find_soft(const mjModel *m, const mjData *d, const char *name) {
+    const int instance = find_instance(m, d, name);
+    return instance < 0 ? NULL : soft_of(d, instance);
 }
 
 const Soft *plugin_soft(const mjModel *m, const mjData *d) {
@@ -180,12 +186,15 @@ int plugin_ground_print(const mjModel *m, const mjData *d, const char *name, int
 int plugin_ground_change(const mjModel *m, mjData *d, const char *name, int label, const char *text,
                          char *error, int size) {
     MildError said = {0};
-    Soft *soft = find_soft(m, d, name);
-    if (!soft) {
+    const int instance = find_instance(m, d, name);
+    if (instance < 0) {
         snprintf(error, (size_t)size, "the model has no " PLUGIN_NAME " of this name");
         return -1;
     }
-    if (live_change(soft, m, label, text, &said) != MILD_OK) {
+    Soft *soft = soft_of(d, instance);
+    MildGround *ground = ground_of(m, d, instance);
+    ground = soft_owns(soft, ground) ? ground : NULL; /* the next step resets what is none */
+    if (live_change(soft, m, ground, label, text, &said) != MILD_OK) {
         snprintf(error, (size_t)size, "%s", said.text);
         return -1;
     }

@@ -409,6 +409,7 @@ int web_step(float vx, float vy, float wz) {
 /* ---- where it walks ---- */
 
 void web_change(double stiffness, double friction) {
+    const MildTerrain before = web.terrain;
     web.stiffness = stiffness;
     web.friction = friction;
     for (int m = 0; m < web.terrain.material_count; m++) {
@@ -421,6 +422,7 @@ void web_change(double stiffness, double friction) {
         material->zeta *= stiffness;
         material->mu *= friction;
     }
+    mild_ground_change(web.ground, &before, &web.terrain, web.scratch);
     web_env()->variation.rigid_friction = REAL(TASK_RIGID_FRICTION * friction);
 }
 

@@ -123,6 +123,15 @@ int mild_batch_stride(const MildBatch *batch);
  * holds the old table: capture it again. Fails with the table unchanged. */
 MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
                                     MildError *error);
+/* The same under robots that stand, which a material that stiffens would throw: re-expresses what
+ * their ground remembers, as mild_ground_change does. material: as in MildBatchInput, of the last
+ * step, but on the CPU. What the robots remember goes to the CPU and back, 9 kB for a foot of 77
+ * elements. Where the new ground must lie lower under a robot, a batch on level ground goes on as
+ * one on a map, whose steps take longer, until mild_batch_set_map. Fails as
+ * mild_batch_set_materials does; without memory for these planes with the new materials, and what
+ * the robots remember as it was. */
+MildStatus mild_batch_change_materials(MildBatch *batch, const MildMaterial *materials, int count,
+                                       const int32_t *material, MildError *error);
 
 /* Puts the robots on a map, which is copied to the device; NULL, or a map without heights and
  * labels: on level ground. Each robot forgets what its ground remembers. With labels,

@@ -23,7 +23,8 @@ class RunningGround:
         return Material(**dict(line.split("=", 1) for line in text.value.decode().splitlines()))
 
     def set(self, ground=None, *, label=0, **numbers):
-        """The ground is another one from the next step on, and what it remembers stays: an imprint of foam is one in sand.
+        """The ground is another one from the next step on. It carries no more than before at first: where it would, its surface
+        lies lower under a foot until that lifts off. An imprint of foam is one in sand.
 
         ground: a preset, a soil's file or a Material; None: as it is. numbers: of the material, such as mu=0.2, over it. label: see
         material(). The ground model stays: a preset of `mild` is matched to it (docs/plugin.md). Raises ValueError for what is

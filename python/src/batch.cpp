@@ -50,7 +50,8 @@ static void make(Batch *at, int robots, const nb::sequence &soles, double dt, do
     }
 }
 
-static void set_materials(Batch &batch, const nb::sequence &materials) {
+/* material: of robots that stand. */
+static void set_materials(Batch &batch, const nb::sequence &materials, nb::handle material) {
     Entered entered(batch.busy, "Batch.set_materials");
     MildBatch *at = open_batch(batch);
     std::vector<MildMaterial> list;
@@ -61,7 +62,18 @@ static void set_materials(Batch &batch, const nb::sequence &materials) {
     if (list.empty()) {
         raise(PyExc_ValueError, "materials: at least one is needed");
     }
-    check(mild_batch_set_materials(at, list.data(), (int)list.size(), &error), error);
+    if (material.is_none()) {
+        check(mild_batch_set_materials(at, list.data(), (int)list.size(), &error), error);
+    } else {
+        const std::vector<int32_t> index = nb::cast<std::vector<int32_t>>(material);
+        if (index.size() != (size_t)(batch.robots * batch.labels)) {
+            raise(PyExc_ValueError, "material: " + std::to_string(index.size()) +
+                                        " numbers, but the robots stand on " +
+                                        std::to_string(batch.robots * batch.labels));
+        }
+        check(mild_batch_change_materials(at, list.data(), (int)list.size(), index.data(), &error),
+              error);
+    }
     batch.materials = (int)list.size();
 }
 
@@ -214,8 +226,10 @@ void bind_batch(nb::module_ &module) {
              nb::arg("tolerance") = 0.0, nb::arg("max_iterations") = 0, nb::arg("device") = "cpu",
              nb::arg("points") = false)
         .def("set_materials", set_materials, nb::arg("materials"),
+             nb::arg("material").none() = nb::none(),
              "The table that `material` of step points into: Material or presets. Waits for the "
-             "device.")
+             "device. material:\nof robots that stand, as in their last step, a flat list: what "
+             "their ground remembers is\nre-expressed, so that none is thrown.")
         .def("set_map", set_map, nb::arg("map").none(),
              "Puts the robots on a Map; None: on level ground. All forget what the ground "
              "remembers.")

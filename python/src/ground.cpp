@@ -13,7 +13,7 @@ extern "C" {
 struct Ground {
     nb::object soles; /* tuple of Sole */
     Terrain terrain;
-    Terrain used; /* a copy for the step that was solved */
+    Terrain used; /* a copy: that of the solve, and of what the ground remembers */
     int feet = 0;
     int tiles = 0;
     void *block = nullptr;
@@ -88,7 +88,7 @@ static void make(Ground *at, const nb::sequence &soles, nb::handle terrain, doub
         }
         ground->ground = mild_ground_init_imprints(ground->block, made.data(), ground->feet, tiles);
         ground->soles = kept;
-        ground->terrain = under;
+        ground->terrain = ground->used = under;
         ground->tiles = tiles;
         ground->input.dt = dt;
         ground->input.tolerance = tolerance;
@@ -106,9 +106,19 @@ static void make(Ground *at, const nb::sequence &soles, nb::handle terrain, doub
 
 /* ---- a step ---- */
 
+/* The ground meets the terrain that was assigned, unless a solve waits for its end. */
+static void change(Ground &ground) {
+    if (!ground.solved) {
+        mild_ground_change(ground.ground, &ground.used.terrain, &ground.terrain.terrain,
+                           ground.scratch);
+        ground.used = ground.terrain;
+    }
+}
+
 static bool solve(Ground &ground) {
     Entered entered(ground.busy, "Ground.solve");
-    ground.used = ground.terrain;
+    ground.solved = false;
+    change(ground);
     {
         nb::gil_scoped_release released;
         mild_ground_solve(ground.ground, &ground.used.terrain, &ground.input, ground.scratch,
@@ -130,9 +140,12 @@ static void advance(Ground &ground) {
         raise(PyExc_RuntimeError, "Ground.advance: there is no step to keep; call solve() first");
     }
     ground.solved = false;
-    nb::gil_scoped_release released;
-    mild_ground_advance(ground.ground, &ground.used.terrain, &ground.input, ground.scratch,
-                        &ground.result);
+    {
+        nb::gil_scoped_release released;
+        mild_ground_advance(ground.ground, &ground.used.terrain, &ground.input, ground.scratch,
+                            &ground.result);
+    }
+    change(ground);
 }
 
 static void reset(Ground &ground) {
@@ -318,9 +331,13 @@ static void bind_input(nb::class_<Ground> &type) {
             [](Ground &ground, nb::handle terrain) {
                 const Terrain under = terrain_of(terrain);
                 meet(soles_of(nb::cast<nb::tuple>(ground.soles)), under);
+                Entered entered(ground.busy, "Ground.terrain");
                 ground.terrain = under;
+                change(ground);
             },
-            "A copy of the terrain; assign one, or a material, to change it.");
+            "A copy of the terrain; assign one, or a material, to change it. Where the new ground "
+            "would carry more than the old, its surface lies lower under a foot until that lifts "
+            "off.");
 }
 
 static void bind_result(nb::class_<Ground> &type) {

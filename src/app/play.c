@@ -262,7 +262,10 @@ static MildStatus take_ground_keys(Walk *walk, const WindowInput *input, MildErr
         return MILD_OK;
     }
     const int other = live_take(&walk->live, walk->ground, input);
-    live_apply(&walk->live, &task_env_rest(walk->env)->terrain);
+    MildTerrain *terrain = &task_env_rest(walk->env)->terrain;
+    const MildTerrain before = *terrain;
+    live_apply(&walk->live, terrain);
+    robot_sim_change_ground(walk->sim, &before, terrain, task_env_ground(walk->env));
     walk->play->changed = 1;
     return other ? view_reset(walk->play->view, &walk->live.terrain, error) : MILD_OK;
 }

@@ -363,6 +363,15 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
     return touched + foot_unlisted(a, memory, next, foot->elements);
 }
 
+/* MildGround.uneven after a step. */
+static int32_t foot_uneven(const FootScratch *foot, int32_t before) {
+    int below = 0;
+    for (int e = 0; before == GROUND_LOWERED && !foot->away && e < foot->elements; e++) {
+        below |= foot->depth[e] > 0.0;
+    }
+    return below ? GROUND_LOWERED : foot->uneven;
+}
+
 void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                          const MildContactInput *input, const MildScratch *scratch,
                          const MildContactResult *result) {
@@ -375,7 +384,7 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
     const Imprints imprints = ground_imprints(ground);
     for (int f = 0; f < ground->feet; f++) {
         const FootScratch *foot = &scratch->foot[f];
-        ground->uneven[f] = foot->uneven;
+        ground->uneven[f] = foot_uneven(foot, ground->uneven[f]);
         if (ground->touched[f] == 0 && foot->active == 0 && (!foot->faces || foot->away)) {
             continue;
         }

@@ -113,7 +113,7 @@ void faces_slots(FootScratch *foot, const MildGround *ground, int f, const MildT
     slots_gather(foot, memory);
     faces_gather(foot, memory);
     if (foot->uneven) {
-        slots_uneven(foot, ground->uneven[f], memory, terrain->height);
+        slots_uneven(foot, ground->uneven[f], memory, terrain->height, now);
     }
     faces_laws(foot, terrain, memory, now, dt);
     if (ground->tiles > 0) {

@@ -47,7 +47,16 @@ void slots_gather(const FootScratch *foot, const Memory *memory) {
     }
 }
 
-void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory, double height) {
+/* Bool: the surface does not lie lower under an element that carries nothing: it is above the
+ * terrain, or the foot is on ground that has not changed. While it rises it may have been below. */
+static int slot_is_out(const Slots *s, int l, int32_t before, const Motion *now) {
+    return s->depth[l] <= 0.0 &&
+           (before != GROUND_LOWERED ||
+            slot_velocity(s, l, now, SLOT_UNEVEN | SLOT_FACES).descent >= 0.0);
+}
+
+void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory, double height,
+                  const Motion *now) {
     for (int i = 0; i < foot->active; i++) {
         Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;
@@ -56,7 +65,7 @@ void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory,
         s->slope_x[l] = foot->slope_x[e];
         s->slope_y[l] = foot->slope_y[e];
         if (!before || m == MATERIAL_NONE || m == MATERIAL_BURIED ||
-            (m == MATERIAL_FREE && s->depth[l] <= 0.0)) {
+            (m == MATERIAL_FREE && slot_is_out(s, l, before, now))) {
             continue;
         }
         const double plane = height + memory->plane[e] + memory->slope_x[e] * foot->point_x[e] +

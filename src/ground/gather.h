@@ -14,7 +14,8 @@ void slots_gather(const FootScratch *foot, const Memory *memory);
  * this plane, the element would be deeper after the step without having been pressed down, and
  * would gain energy. So an element that stays in the ground starts at its depth below the last
  * step's plane when that is smaller. */
-void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory, double height);
+void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory, double height,
+                  const Motion *now);
 /* Clears the slopes when a foot has left uneven ground. On level ground nothing writes them. */
 void slots_level(const FootScratch *foot);
 

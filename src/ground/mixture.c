@@ -85,9 +85,9 @@ static double between(double a, double b, double share) {
     return a + share * (b - a);
 }
 
-/* What material m gives a slot with element e. */
-static SlotLaw slot_law(const FootScratch *foot, int m, int e) {
-    SlotLaw own = foot->derived[m].slot;
+/* What a material gives a slot with element e. */
+static SlotLaw slot_law(const FootScratch *foot, const DerivedLaw *derived, int e) {
+    SlotLaw own = derived->slot;
     if (own.share.projects > 0.0) {
         own.law = law_merged(own.law, foot->heap[e].begin, foot->heap[e].width);
     }
@@ -111,13 +111,18 @@ static void slot_law_mix(SlotLaw *a, const SlotLaw *b, double t) {
     a->recovery = between(a->recovery, b->recovery, t);
 }
 
-/* Sets slot i, of element e, to a material or a mixture of two. */
-static void slot_set_mixture(const FootScratch *foot, int i, int e, int32_t mixture) {
-    SlotLaw own = slot_law(foot, mixture & 0xff, e);
+SlotLaw mixture_law(const FootScratch *foot, const DerivedLaw *derived, int32_t mixture, int e) {
+    SlotLaw own = slot_law(foot, &derived[mixture & 0xff], e);
     if (mixture > 0xff) {
-        const SlotLaw other = slot_law(foot, mixture >> 8 & 0xff, e);
+        const SlotLaw other = slot_law(foot, &derived[mixture >> 8 & 0xff], e);
         slot_law_mix(&own, &other, (mixture >> 16) / 255.0);
     }
+    return own;
+}
+
+/* Sets slot i, of element e, to a material or a mixture of two. */
+static void slot_set_mixture(const FootScratch *foot, int i, int e, int32_t mixture) {
+    const SlotLaw own = mixture_law(foot, foot->derived, mixture, e);
     slot_set_law(slot_block(foot, i), i % SLOT_LANES, &own);
 }
 

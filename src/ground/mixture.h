@@ -8,6 +8,8 @@
 /* Derives the laws of the terrain's materials. Laws of materials whose bytes have not changed are
  * kept. */
 void foot_laws(FootScratch *foot, const MildTerrain *terrain);
+/* What a material or a mixture of two gives element e of a foot. derived: [MILD_MATERIALS_MAX] */
+SlotLaw mixture_law(const FootScratch *foot, const DerivedLaw *derived, int32_t mixture, int e);
 /* Gives each slot the law of the material that its element touched down on, so that a foot that
  * slides across a border keeps its law. An element in the air takes the material under it. */
 void slots_materials(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory);

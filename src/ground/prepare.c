@@ -113,11 +113,12 @@ static void foot_direct(const FootScratch *foot, const MildTerrain *terrain, dou
 
 /* Gives the slots their elements, material and ground: what they remember, and where they are. */
 static void foot_slots(FootScratch *foot, const MildGround *ground, int f,
-                       const MildTerrain *terrain, const Memory *memory, const double *R) {
+                       const MildTerrain *terrain, const Memory *memory, const double *R,
+                       const Motion *now) {
     slots_gather(foot, memory);
     slots_materials(foot, terrain, memory);
     if (foot->uneven) {
-        slots_uneven(foot, ground->uneven[f], memory, terrain->height);
+        slots_uneven(foot, ground->uneven[f], memory, terrain->height, now);
     }
     if (ground->tiles > 0) {
         Imprints imprints = ground_imprints(ground);
@@ -134,7 +135,7 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     if (foot->faces) {
         faces_slots(foot, ground, f, terrain, &memory, &now, input->dt);
     } else {
-        foot_slots(foot, ground, f, terrain, &memory, R);
+        foot_slots(foot, ground, f, terrain, &memory, R, &now);
     }
     Motion free = foot_motion(foot, input->free_velocity + 6 * f);
     foot_begin(foot, input->dt, &now);
@@ -190,6 +191,7 @@ int contact_prepare(const MildGround *ground, const MildTerrain *terrain,
     for (int f = 0; f < scratch->feet; f++) {
         FootScratch *foot = &scratch->foot[f];
         foot_take_pose(foot, terrain, input, f);
+        foot->uneven |= ground->uneven[f] == GROUND_LOWERED;
         const double steepest = foot->uneven ? terrain_steepest(terrain) : 0.0;
         if (scratch->place[f] < 0) {
             foot->away = 1;

@@ -16,13 +16,18 @@ struct MildGround {
     int32_t elements[MILD_FEET_MAX]; /* number for each foot */
     int32_t padded[MILD_FEET_MAX];   /* elements rounded up to whole vectors */
     int32_t touched[MILD_FEET_MAX];  /* number of elements that remember something */
-    int32_t uneven[MILD_FEET_MAX];   /* bool: Memory.plane and slopes are those of the last step */
+    int32_t uneven[MILD_FEET_MAX];   /* bool: Memory.plane and slopes are those of the last step; or
+                                        GROUND_LOWERED */
     int32_t tiles;                   /* of imprints; 0: the ground forgets at lift-off */
     uint32_t imprint_time;           /* counts the steps that could change an imprint */
     double imprint_cell;             /* [m] edge of a cell */
     int32_t faces;                   /* bit f: foot f is a surface */
     int32_t reserved[9];             /* pads to 320 bytes, so that the arrays behind are aligned */
 };
+
+/* MildGround.uneven of a foot under which the surface may lie lower than the terrain, as the planes
+ * say (change.h). Its steps are those of uneven ground until it has come out. */
+#define GROUND_LOWERED 2
 
 /* What an element stands on: the index of a material, or first | second << 8 | share << 16 for a
  * mixture of two (share 255: all of the second). Negative: the element carries no load. */

@@ -151,6 +151,9 @@ double robot_sim_leg_distance(const RobotSim *sim);
 /* [N] Vertical force of the ground on the shells, mean over the last step. */
 double robot_sim_shell_load(const RobotSim *sim);
 const MildScratch *robot_sim_scratch(const RobotSim *sim);
+/* mild_ground_change for the ground that robot_sim_step is given. */
+void robot_sim_change_ground(RobotSim *sim, const MildTerrain *from, const MildTerrain *to,
+                             MildGround *ground);
 const MildContactResult *robot_sim_contact(const RobotSim *sim);
 /* Input of the last step on soft ground. */
 const MildContactInput *robot_sim_contact_input(const RobotSim *sim);

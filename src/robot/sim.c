@@ -533,6 +533,11 @@ const MildScratch *robot_sim_scratch(const RobotSim *sim) {
     return sim->scratch;
 }
 
+void robot_sim_change_ground(RobotSim *sim, const MildTerrain *from, const MildTerrain *to,
+                             MildGround *ground) {
+    mild_ground_change(ground, from, to, sim->scratch);
+}
+
 const MildContactResult *robot_sim_contact(const RobotSim *sim) {
     return &sim->contact;
 }

@@ -103,8 +103,18 @@ static double sinkage_after(const Robot *robot, RobotSim *sim, const Stand *stan
     return depth / count;
 }
 
+/* Keys pressed under a robot. */
+static void press(Live *live, const WindowInput *input, RobotSim *sim, MildTerrain *terrain,
+                  MildGround *ground) {
+    const MildTerrain before = *terrain;
+    live_take(live, 0, input);
+    live_apply(live, terrain);
+    robot_sim_change_ground(sim, &before, terrain, ground);
+}
+
 /* The robot stands on rubber, which becomes softer and softer under it: it sinks to the rest depth
- * of the law. Another preset does not reach it while it stands. */
+ * of the law. Where it becomes stiff at once, the robot stays down. Another preset does not reach
+ * it while it stands. */
 TEST(a_standing_robot_sinks) {
     MildError error = {0};
     Robot *robot = kit_robot(SA01);
@@ -126,14 +136,22 @@ TEST(a_standing_robot_sinks) {
         const double rest = mild_sole_sinkage(robot_soles(robot)[0], &terrain.materials[0], load);
         print_message("%d presses: %.2f mm, the law's %.2f mm\n", presses, 1e3 * depth, 1e3 * rest);
         assert_true(fabs(depth / rest - 1) < 0.02);
-        live_take(&live, 0, &(WindowInput){.stiffness = -2});
-        live_apply(&live, &terrain);
+        press(&live, &(WindowInput){.stiffness = -2}, sim, &terrain, ground);
     }
+    const double height = robot_sim_qpos(sim)[2];
+    press(&live, &(WindowInput){.stiffness = 20}, sim, &terrain, ground);
+    for (int i = 0; i < (int)(0.3 / DT); i++) {
+        double torque[SA01_JOINTS];
+        stand_torque(stand, sim, 1, torque);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+        assert_true(robot_sim_qpos(sim)[2] < height + 0.5e-3);
+    }
+    robot_sim_load(sim, &start, &nominal);
+    mild_ground_reset(ground);
     terrain.materials[0] = live.original[0];
     live = live_begin(&terrain, 2);
     depth = sinkage_after(robot, sim, stand, &terrain, ground);
-    live_take(&live, 0, &(WindowInput){.ground = 2});
-    live_apply(&live, &terrain);
+    press(&live, &(WindowInput){.ground = 2}, sim, &terrain, ground);
     assert_true(fabs(sinkage_after(robot, sim, stand, &terrain, ground) - depth) < 0.05e-3);
     free(ground);
     robot_sim_destroy(sim);

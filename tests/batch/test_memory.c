@@ -152,4 +152,74 @@ TEST(a_batch_knows_what_creates_energy) {
     mild_batch_destroy(batch);
 }
 
+/* [N] Greatest difference between the feet's load of a step of a kit and of a batch at its input. */
+static double step_beside(Kit *kit, MildBatch *batch, MildError *error) {
+    float position[6], rotation[18], velocity[12], inertia[144], free_velocity[12];
+    float wrench[12], after[12];
+    double worst = 0.0;
+    kit_inverse_inertia(kit);
+    kit_free(kit, NULL);
+    kit_solve(kit);
+    to_float(position, kit->input.position[0], 6);
+    to_float(rotation, kit->input.rotation[0], 18);
+    to_float(velocity, kit->input.velocity[0], 12);
+    to_float(inertia, kit->A, 144);
+    to_float(free_velocity, kit->input.free_velocity, 12);
+    const MildBatchInput input = {.position = position,
+                                  .rotation = rotation,
+                                  .velocity = velocity,
+                                  .inverse_inertia = inertia,
+                                  .free_velocity = free_velocity};
+    const MildBatchOutput output = {.wrench = wrench, .velocity = after};
+    assert_int_equal(mild_batch_step(batch, &input, &output, 1, NULL, error), MILD_OK);
+    for (int f = 0; f < 2; f++) {
+        worst = fmax(worst, fabs((double)wrench[6 * f + 2] - kit->result.foot[f].force[2]));
+    }
+    kit_advance(kit);
+    return worst;
+}
+
+/* Materials that change under a robot change it as mild_ground_change does, and throw nothing. */
+TEST(materials_change_under_a_robot) {
+    static const char *const pairs[][2] = {{"sand_loose", "grass"},  {"sand_loose", "rubber"},
+                                           {"foam60", "sand_dense"}, {"snow", "foam45"},
+                                           {"rubber", "foam25"},     {"sand_dense", "sand_loose"}};
+    for (size_t p = 0; p < sizeof pairs / sizeof *pairs; p++) {
+        MildError e = {0};
+        const MildMaterial from = kit_preset(pairs[p][0]), to = kit_preset(pairs[p][1]);
+        MildBatch *batch = open_batch(1, &e);
+        Kit kit;
+        kit_open(&kit, 2, left, right, &from, 5e-3);
+        kit.inertia[0] = kit.inertia[1] = 1e3; /* the feet do not topple */
+        kit.input.position[0][2] = kit.input.position[1][2] = -KIT_SOLE_Z - 0.08;
+        for (int s = 0; s < 200; s++) {
+            kit_step(&kit, NULL);
+            for (int k = 0; k < 12; k++) { /* it comes to rest */
+                kit.input.velocity[k / 6][k % 6] *= 0.8;
+            }
+        }
+        assert_int_equal(mild_batch_set_materials(batch, &from, 1, &e), MILD_OK);
+        assert_int_equal(mild_batch_load(batch, 0, kit.ground, &e), MILD_OK);
+        assert_true(step_beside(&kit, batch, &e) < 2.0);
+        const double stood = kit.input.position[0][2];
+        const MildTerrain old = kit.terrain;
+        kit.terrain.materials[0] = to;
+        mild_ground_change(kit.ground, &old, &kit.terrain, kit.scratch);
+        assert_int_equal(mild_batch_change_materials(batch, &to, 1, NULL, &e), MILD_OK);
+        double worst = 0.0, highest = -1.0;
+        for (int s = 0; s < 300; s++) {
+            worst = fmax(worst, step_beside(&kit, batch, &e));
+            highest = fmax(highest, kit.input.position[0][2] - stood);
+            if (s == 100) { /* the batch stores what is lower */
+                assert_int_equal(mild_batch_store(batch, 0, kit.ground, &e), MILD_OK);
+            }
+        }
+        print_message("%s becomes %s: off by %.2g N, rises by %.2g mm\n", pairs[p][0], pairs[p][1],
+                      worst, 1e3 * highest);
+        assert_true(worst < 4.0 && highest < 1e-4);
+        kit_close(&kit);
+        mild_batch_destroy(batch);
+    }
+}
+
 TEST_MAIN(open_soles, close_soles)

@@ -104,6 +104,23 @@ class Batch(unittest.TestCase):
         self.assertGreater(np.abs(wrench[0]).max(), 10)
         np.testing.assert_allclose(wrench[1], wrench[0], rtol=1e-4, atol=1e-4 * np.abs(wrench[0]).max())
 
+    def test_changed_materials(self):
+        """Robots at rest in sand that becomes grass carry no more than before."""
+        self.batch.set_materials(["foam45", "sand_loose"])
+        arrays = Arrays(self.batch, self.rng)
+        for name, array in arrays.inputs.items():
+            array[:] = np.eye(3) if name == "rotation" else 0
+        arrays.inputs["position"][..., 2] = -0.05 - self.soles[0].z
+        material = np.ones(6, np.int32)
+        self.batch.step(**arrays.all(material=material))
+        before = arrays.outputs["wrench"][..., 2].copy()
+        with self.assertRaisesRegex(ValueError, "material: 5 numbers, but the robots stand on 6"):
+            self.batch.set_materials(["foam45", "grass"], material=[1] * 5)
+        self.batch.set_materials(["foam45", "grass"], material=material.tolist())
+        self.batch.step(**arrays.all(material=material))
+        after = arrays.outputs["wrench"][..., 2]
+        self.assertTrue(np.all((after > 0) & (after < before * 1.001)))
+
     def test_load_and_store(self):
         """A robot goes on where a ground of the CPU is, and back."""
         self.batch.set_materials(["sand_loose"])

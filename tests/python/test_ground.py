@@ -178,6 +178,24 @@ class Step(unittest.TestCase):
         self.assertAlmostEqual(ground.depth_max[0], elements["depth"][loaded].max(), delta=1e-9)
         self.assertGreater(np.ptp(elements["depth"]), 1e-5)
 
+    def test_changed_terrain(self):
+        """10 kg that stand in loose sand are not thrown by what it becomes, and rest on it."""
+        corners = np.array([[-0.05, -0.03], [0.05, -0.03], [0.05, 0.03], [-0.05, 0.03]])
+        ground = mild.Ground([mild.Sole(corners, 0.0195)], "sand_loose", dt=0.002)
+        ground.inverse_inertia[:] = np.diag([0.1] * 3 + [1e-3] * 3)
+        ground.position[0, 2] = -0.1
+        for step in range(1800):
+            if step == 300:
+                stood, ground.terrain = ground.position[0, 2], "rubber"
+            ground.free_velocity[0] = ground.velocity[0] - [0, 0, 9.81 * ground.dt, 0, 0, 0]
+            ground.solve()
+            ground.advance()
+            ground.velocity[:] = ground.new_velocity
+            ground.position[0] += ground.dt * ground.velocity[0, :3]
+            if step >= 300:
+                self.assertLess(ground.position[0, 2], stood + 1e-4)
+        self.assertAlmostEqual(ground.force[0, 2], 98.1, delta=0.5)
+
     def test_arrays_are_views(self):
         ground = mild.Ground([mild.Sole.plate(0.2, 0.1)])
         ground.position[0, 2] = 7

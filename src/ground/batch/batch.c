@@ -162,6 +162,15 @@ static MildStatus store_elements(MildBatch *batch, const MildSole *const *soles,
     return status;
 }
 
+static MildStatus open_change(MildBatch *batch, const MildBatchDef *def, MildError *error) {
+    batch->blank = mild_ground_init(aligned_alloc(64, mild_ground_bytes(def->soles, def->feet)),
+                                    def->soles, def->feet);
+    batch->scratch = mild_scratch_create(def->soles, def->feet, error);
+    return batch->blank && batch->scratch
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
+}
+
 static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildError *error) {
     MildStatus status = device_open(batch->device, error);
     if (status != MILD_OK) {
@@ -182,6 +191,10 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
         return status;
     }
     status = store_elements(batch, def->soles, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    status = open_change(batch, def, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -225,6 +238,9 @@ void mild_batch_destroy(MildBatch *batch) {
     device_free(batch->device, batch->arrays.order);
     batch_map_close(&batch->arrays.map, batch->device);
     batch_bodies_close(&batch->bodies, batch->device);
+    mild_scratch_destroy(batch->scratch);
+    free(batch->blank);
+    free(batch->stands);
     free(batch);
 }
 
@@ -271,6 +287,11 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
     MildStatus status = MILD_OK;
     next.shape.materials = count;
     next.curves = 0;
+    next.stands = malloc((size_t)count * sizeof *materials);
+    if (!next.stands) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
+    }
+    memcpy(next.stands, materials, (size_t)count * sizeof *materials);
     if (feet > 0) {
         next.arrays.materials = material_table(batch->device, batch->pitch, batch->width, feet,
                                                materials, count, &next.curves, error);
@@ -288,6 +309,7 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
         device_free(batch->device,
                     status == MILD_OK ? batch->arrays.materials : next.arrays.materials);
     }
+    free(status == MILD_OK ? batch->stands : next.stands);
     *batch = status == MILD_OK ? next : *batch;
     return status;
 }

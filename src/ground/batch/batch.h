@@ -68,6 +68,10 @@ struct MildBatch {
     int pairs_from;                    /* robots from which on a step makes pairs */
     double pitch[MILD_BATCH_FEET_MAX]; /* [soles] [m] */
     double width[MILD_BATCH_FEET_MAX]; /* [soles] [m] mild_sole_width */
+    /* of mild_batch_change_materials, on the CPU */
+    MildMaterial *stands; /* [shape.materials] */
+    MildScratch *scratch;
+    MildGround *blank; /* of a robot that remembers nothing */
 };
 
 /* [numbers] of a robot's memory, without wear. */
@@ -90,6 +94,13 @@ MildStatus batch_map_open(MapView *view, const MildMap *map, int device, MildErr
 /* [-] Upper bound on the gradient of a map; NULL: 0. */
 double batch_map_steepest(const MildMap *map);
 void batch_map_close(const MapView *view, int device);
+/* Gives every element a plane of its own, as on uneven ground: a batch on level ground goes on as
+ * one on a map without heights. The robots forget. */
+MildStatus batch_lower(MildBatch *batch, MildError *error);
+/* Bool: the planes are there for that alone. */
+static inline int batch_map_is_lowered(const MapView *view) {
+    return view->uneven && !view->height && view->slope.high == 0 && view->slope.low == 0;
+}
 
 /* ---- the CPU: host.c ---- */
 void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBatchInput *input,

@@ -238,7 +238,7 @@ MildStatus batch_bodies_set_materials(MildBatch *batch, const MildMaterial *mate
     return status;
 }
 
-MildStatus batch_bodies_set_map(MildBatch *batch, const MildMap *map, MildError *error) {
+MildStatus batch_bodies_set_map(MildBatch *batch, double steepest, MildError *error) {
     BatchBodies *bodies = &batch->bodies;
     const size_t numbers = (size_t)batch->shape.robots * bodies->numbers;
     BodiesSetup setup;
@@ -247,7 +247,7 @@ MildStatus batch_bodies_set_map(MildBatch *batch, const MildMap *map, MildError 
     if (status == MILD_OK) {
         setup.has_map = batch->shape.map;
         setup.map = batch->arrays.map;
-        setup.steepest = (float)batch_map_steepest(map);
+        setup.steepest = (float)steepest;
         status = put_setup(batch, &setup, error);
     }
     device_free(batch->device, status == MILD_OK ? bodies->memory : memory);

@@ -22,7 +22,7 @@ MildStatus batch_bodies_ready(MildBatch *batch, MildError *error);
 MildStatus batch_bodies_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
                                       MildError *error);
 /* For a batch that has the new map; they forget. Fails with nothing changed. */
-MildStatus batch_bodies_set_map(MildBatch *batch, const MildMap *map, MildError *error);
+MildStatus batch_bodies_set_map(MildBatch *batch, double steepest, MildError *error);
 /* What lies under the surfaces of a robot of the CPU forgets; where there are none, nothing. */
 void batch_bodies_reset(const BatchBodies *bodies, size_t robot);
 /* Before and after the step of the feet. */

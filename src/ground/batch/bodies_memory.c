@@ -44,11 +44,11 @@ static void surface_load(const MildGround *ground, int f, const BodiesMemory *to
     to->body[BODIES_TOUCHED] = 1.0f;
 }
 
-/* The other way. has_plane: bool, the ground of the batch is uneven. */
-static void surface_store(const BodiesMemory *from, int has_plane, MildGround *ground, int f) {
+/* The other way. plane: MildGround.uneven of a ground that the batch has stepped. */
+static void surface_store(const BodiesMemory *from, int plane, MildGround *ground, int f) {
     const Memory of = mild_inside_memory(ground, f);
     const float *last = from->body;
-    const int uneven = has_plane && last[BODIES_STEPPED] > 0.0f;
+    const int uneven = last[BODIES_STEPPED] > 0.0f ? plane : 0;
     int touched = 0;
     for (int e = 0; e < ground->elements[f]; e++) {
         const float *at = from->element + e;

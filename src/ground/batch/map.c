@@ -73,6 +73,24 @@ static int map_is_plain(const MildMap *map) {
     return !map || (mild_map_is_level(map) && !map->label);
 }
 
+/* Goes on as `next`, on the map of that view. steepest: [-] of it. keeps: bool, the map is that of
+ * the batch. */
+static MildStatus go_on(MildBatch *batch, MildBatch *next, double steepest, int keeps,
+                        MildError *error) {
+    MildStatus status = batch_memory_open(&next->arrays, &next->shape, batch->device,
+                                          batch->arrays.worn != NULL, error);
+    if (status == MILD_OK && batch->bodies.setup) {
+        status = batch_bodies_set_map(next, steepest, error);
+    }
+    const MildBatch *left = status == MILD_OK ? batch : next;
+    device_free(batch->device, left->arrays.memory); /* waits until no step uses it */
+    if (!keeps) {
+        batch_map_close(&left->arrays.map, batch->device);
+    }
+    *batch = status == MILD_OK ? *next : *batch;
+    return status;
+}
+
 MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *error) {
     MildError own = {0};
     error = error ? error : &own; /* says which status */
@@ -85,14 +103,12 @@ MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *e
             return status;
         }
     }
-    MildStatus status = batch_memory_open(&next.arrays, &next.shape, batch->device,
-                                          batch->arrays.worn != NULL, error);
-    if (status == MILD_OK && batch->bodies.setup) {
-        status = batch_bodies_set_map(&next, map, error);
-    }
-    const MildBatch *left = status == MILD_OK ? batch : &next;
-    device_free(batch->device, left->arrays.memory); /* waits until no step uses it */
-    batch_map_close(&left->arrays.map, batch->device);
-    *batch = status == MILD_OK ? next : *batch;
-    return status;
+    return go_on(batch, &next, batch_map_steepest(map), 0, error);
+}
+
+MildStatus batch_lower(MildBatch *batch, MildError *error) {
+    MildBatch next = *batch;
+    next.shape.map = 1;
+    next.arrays.map.uneven = 1;
+    return go_on(batch, &next, 0.0, 1, error);
 }

@@ -122,7 +122,8 @@ static void ground_remember(const BatchShape *shape, const MapView *map, float *
             loaded += of.depth_max[e] > 0.0;
         }
         const int stepped = shape->map && store_planes(shape, memory, f, &of);
-        ground->uneven[f] = stepped && map->uneven;
+        const int uneven = batch_map_is_lowered(map) ? GROUND_LOWERED : map->uneven;
+        ground->uneven[f] = stepped ? uneven : 0;
         ground->touched[f] = ground->uneven[f] ? shape->elements[f] : loaded;
     }
 }
