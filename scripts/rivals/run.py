@@ -10,7 +10,7 @@ import torch
 from envs import ROOT, Envs
 
 CONFIG = ROOT / "configs" / "walk.ini"  # our task: commands, rewards, randomisation
-# The stages of scripts/train_walk.sh, whose rewards the rivals get too.
+# Stages, whose rewards the rivals get too.
 GAIT = {
     "terrain__kind": "flat", "task__wz": [-1, 1], "randomize__push_linear": 0.3, "randomize__push_angular": 0.3,
     "reward__linear_velocity": 5, "reward__yaw_rate": 1.5, "reward__reference_motion": 2.2, "reward__torque": -1e-10,

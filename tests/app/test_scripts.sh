@@ -5,8 +5,6 @@ source "$(dirname "$0")/../kit.sh" "$1"
 python=$root/.venv/bin/python
 [ -x "$python" ] || python=python3
 
-bad "scripts/train_walk.sh" "$root/scripts/train_walk.sh"
-bad "scripts/train_walk.sh" "$root/scripts/train_walk.sh" a b
 latent() { "$python" "$root/scripts/latent.py" "$@"; }
 bad "latent.py csv" latent
 bad "none.csv" latent none.csv
@@ -25,27 +23,6 @@ printf '{"rows": [{"ground": "snow", "speed": 0.6, "success": 0, "velocity": 0, 
 printf '{"rows": [{"ground": "snow", "speed": 0.6, "success": 2, "velocity": 0.5, "cot": 0.7, "measured": 2, %s}]}' "$row" >went.json
 expect 0 '0.60  *fell  *0 of 2  *-  *-  *9 ' "$python" "$root/scripts/compare.py" fell=fell.json went=went.json
 expect 0 '0.60  *went  *2 of 2  *0.50  *0.70  *9 ' "$python" "$root/scripts/compare.py" fell=fell.json went=went.json
-average() { "$python" "$root/scripts/average.py" "$@"; }
-bad "average.py" average
-bad "average none" average none none 0.5 mean
-bad "average foreign" average none foreign 0.5 ./foreign
-bad "average foreign" average foreign foreign 0.5 mean
-bad "F32" average "$root/policies/mild.safetensors" "$root/policies/mild.safetensors" 0.5 mean
-"$python" "$root/tests/export/make_policy.py" "$root/policies/mild.safetensors" a 1
-"$python" "$root/tests/export/make_policy.py" "$root/policies/mild.safetensors" b 2
-head -c 3000 a >torn
-bad "average torn" average torn a 0.5 mean
-bad "average half 0 1" average a b half mean
-[ -e mean ] && fail "average wrote after an error"
-average a b 0.25 mean || fail "average"
-"$python" - <<'CHECK' || fail "the mean is another"
-import json, numpy
-def numbers(path):
-    whole = open(path, "rb").read()
-    return numpy.frombuffer(whole[8 + int.from_bytes(whole[:8], "little"):], "<f4")
-assert numpy.abs(0.75 * numbers("a") + 0.25 * numbers("b") - numbers("mean")).max() < 1e-6 < numpy.abs(numbers("a") - numbers("b")).max()
-CHECK
-expect 0 rigid "$mild" eval --policy mean --ground rigid --trials 1 --seconds 0.1
 deviations() { "$python" "$root/scripts/paper/deviations.py" "$@"; }
 bad "NAME-SEED.json ." deviations .
 echo '{' >torn-1.json

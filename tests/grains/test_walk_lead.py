@@ -71,7 +71,7 @@ with tempfile.TemporaryDirectory() as name:
     folder = pathlib.Path(name)
     (folder / "grains").mkdir()
     robot = walk.fitted(folder, "sa01")
-    subprocess.run([MILD, "eval", "--robot", robot, "--policy", SOURCE / "policies" / "sand.safetensors", "--speed", "0.6", "--trials", "1", "--seconds", "3", "--task.physics_dt",
+    subprocess.run([MILD, "eval", "--robot", robot, "--policy", SOURCE / "grains" / "walk" / "sand.safetensors", "--speed", "0.6", "--trials", "1", "--seconds", "3", "--task.physics_dt",
                     "0.0005", "--feet", folder / "grains" / "feet.csv", *walk.ground_of("sand", "mild_merged")], check=True, stdout=subprocess.DEVNULL)
     same, stiff = forces(folder, NUMBERS), forces(folder, {**NUMBERS, **{key: str(2 * float(NUMBERS[key])) for key in ("k_pen", "sigma_cone")}})
     print("force up of the walk, led, forward of the walk, led; up, led through twice the strength:", [(*a, b[1]) for a, b in zip(same, stiff)])

@@ -63,7 +63,7 @@ with tempfile.TemporaryDirectory() as name:
     stub = out / "mild"
     stub.write_text("#!/bin/sh\nfor last; do :; done\necho '%s' >$last\n" % json.dumps({"rows": [{**ROW, "ends": {}}]}))
     stub.chmod(0o755)
-    policy = SOURCE / "policies" / "sand.safetensors"
+    policy = SOURCE / "grains" / "walk" / "sand.safetensors"
     args = types.SimpleNamespace(mild=stub, policy=policy, seconds=1, seed=7, bed_seed=11, dt=0.0005, threads=1, robot="sa01")
     for ground, program in (("mild", None), ("grains", ["grains", "--seeds", 11])):
         folder = out / "rolling" / "0.6" / ground
@@ -71,8 +71,8 @@ with tempfile.TemporaryDirectory() as name:
     walk_pictures.write_walks(out, ["rolling"], ["0.6"], out / "walks.json")
     on_grains, on_mild = (row["made"] for row in json.loads((out / "walks.json").read_text()))
     assert on_grains["bed_seed"] == 11 and on_mild["bed_seed"] is None and on_mild["seed"] == 7
-    assert on_mild["policy"] == "policies/sand.safetensors" and on_mild["policy_sha256"] == hashlib.sha256(policy.read_bytes()).hexdigest()
-    assert on_mild["command"][1:6] == ["eval", "--robot", "sa01", "--policy", "policies/sand.safetensors"], on_mild["command"]
+    assert on_mild["policy"] == "grains/walk/sand.safetensors" and on_mild["policy_sha256"] == hashlib.sha256(policy.read_bytes()).hexdigest()
+    assert on_mild["command"][1:6] == ["eval", "--robot", "sa01", "--policy", "grains/walk/sand.safetensors"], on_mild["command"]
     assert "grains --seeds 11" in on_grains["command"]
 
 # the walks of the repository, which were made before: the manifest names each
