@@ -111,6 +111,7 @@ MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildErr
                          "this ground is one of %s, which has no match in %s: leave out --model",
                          mild_model_names[from.model], mild_model_names[def->model]);
     }
+    material->model = def->model == MILD_MODEL_RIGID ? def->model : from.model;
     MildStatus status = mild_material_check(material, error);
     if (status == MILD_OK && matched) {
         status =

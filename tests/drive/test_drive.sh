@@ -90,7 +90,7 @@ for key, pattern in counts.items():
     assert abs(float(re.search(pattern, printed).group(1)) - run[key]) < 0.0051, key
 ground = {name: one for name, one in run["ground"].items() if isinstance(one, dict)}
 scale = {"mm": 1e3, "kN/m^3": 1e-3}
-said = re.findall(r"(\w+) ([\d.e+-]+) ?(\S*) \(([\d.e+-]+) \.\. ([\d.e+-]+)\)", printed)
+said = re.findall(r"(\w+) ([\d.e+-]+) ?(\S*) \(([\d.e+-]+) \.\. ([\d.e+-]+)\)", printed.replace(" at rest", ""))
 assert len(ground) == len(said) > 3, printed
 for name, median, unit, low, high in said:  # three digits of what is printed, and its interval of 90 %
     one = [scale.get(unit, 1) * ground[name][key] for key in ("low", "median", "high")]

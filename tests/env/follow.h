@@ -65,7 +65,8 @@ static void pair_open(const char *robot, const TaskDef *def, int device) {
     pair.def = *def;
     pair.robot = kit_robot(robot);
     pair.shape = task_shape(pair.robot);
-    robot_set_model(pair.robot, task_model_soles(def->randomize.model));
+    const int model = def->randomize.model;
+    robot_set_model(pair.robot, model < MILD_MODELS ? (MildModel)model : MILD_MODEL_MILD);
     robot_set_shells(pair.robot, def->shells_stand);
     assert_int_equal(task_set_elements(def, pair.robot, &error), MILD_OK);
     pair.pool = pool_create(2);

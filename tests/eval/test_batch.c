@@ -248,7 +248,7 @@ TEST(falls_are_counted) {
 /* The Go1, held in its pose by a policy of zeros and stiff joints, on four round feet. It has as
  * many joints as SA01, and so an observation of the same width. */
 TEST(four_feet_are_measured) {
-    static const char *const names[] = {"rigid", "rubber", "sand_loose", NULL};
+    static const char *const names[] = {"rigid", "rubber", "grass", NULL};
     static const double speed = 0.3;
     const EvalDef eval = {.speed = speed, .trials = 3, .seconds = 3, .seed = 1};
     MildError error = {0};
