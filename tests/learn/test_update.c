@@ -607,7 +607,7 @@ TEST(actions_scatter_around_the_mean) {
     ppo_act(ppo, 1);
     ppo->iteration++;
     ppo_act(ppo, 2);
-    double worst = 0.0;
+    double worst = 0.0, apart = 0.0;
     for (int t = 0; t < 3; t++) {
         double sum[2] = {0}, square[2] = {0}, product[2] = {0};
         for (int e = 0; e < MANY; e++) {
@@ -622,7 +622,7 @@ TEST(actions_scatter_around_the_mean) {
                 square[j] += noise * noise / MANY;
                 product[j] += noise * other / MANY;
                 log_prob -= 0.5 * noise * noise + log(std) + 0.9189385332046727;
-                assert_true(b->mean[2 * i + j] == means[2 * e + j]);
+                apart = fmax(apart, fabs((double)b->mean[2 * i + j] - (double)means[2 * e + j]));
             }
             worst = fmax(worst, fabs(log_prob - (double)b->log_prob[i]));
         }
@@ -631,8 +631,8 @@ TEST(actions_scatter_around_the_mean) {
             assert_true(fabs(product[j]) < 0.07);
         }
     }
-    print_message("log probability: worst %.1e\n", worst);
-    assert_true(worst < 1e-4);
+    print_message("log probability: worst %.1e, mean %.1e\n", worst, apart);
+    assert_true(worst < 1e-4 && apart < 1e-6); /* products round by where their rows lie */
     ppo_destroy(ppo);
     policy_destroy(policy);
     pool_destroy(pool);

@@ -148,7 +148,7 @@ static const struct {
 } still[] = {{"rigid_share", 0},  {"preset_share", 1}, {"preset_jitter", 0}, {"patch_share", 0},
              {"base_mass", 0},    {"com_offset", 0},   {"link_mass", 1},     {"armature", 1},
              {"motor_offset", 0}, {"gain", 1},         {"strength", 1},      {"push_interval", 0},
-             {"shells_share", 1}};
+             {"shells_share", 1}, {"slip_share", 0}};
 
 /* Those keys have no effect, all others their defaults: noise, latencies and the start are
  * drawn. */

@@ -427,12 +427,12 @@ TEST(efforts) {
 TEST(collision) {
     TaskMotion *m = new_scene();
     expect_term(REWARD_collision, "apart", 0);
-    m->foot_distance = 0.101;
-    m->knee_distance = 0.091;
+    m->foot_distance = 0.141;
+    m->knee_distance = 0.121;
     expect_term(REWARD_collision, "just apart", 0);
-    m->foot_distance = 0.099;
+    m->foot_distance = 0.139;
     expect_term(REWARD_collision, "feet", -1);
-    m->knee_distance = 0.089;
+    m->knee_distance = 0.119;
     expect_term(REWARD_collision, "feet and knees", -2);
     m->foot_distance = 0.2;
     expect_term(REWARD_collision, "knees", -1);

@@ -7,8 +7,6 @@
 #include "run/bench/bench.h"
 #include "run/bench/record.h"
 
-static const char *const bench_preset = "sand_loose";
-
 /* ---- the ground alone ---- */
 
 enum { GROUND_REPEATS = 60, BENCH_FEET = 2, ROWS = 6 * BENCH_FEET };
@@ -208,9 +206,9 @@ static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double 
 /* Newton on each model; on rivals of mild at rest: one element for the concentric ones. */
 static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchReport *report,
                                MildError *error) {
-    MildMaterial mild, material;
+    const MildMaterial mild = mild_material_default();
+    MildMaterial material;
     robot_set_model(robot, model);
-    mild_material_preset(bench_preset, &mild);
     MildStatus status = robot_match_model(robot, model, &mild, &material, error);
     if (status != MILD_OK) {
         return status;
@@ -297,8 +295,7 @@ static void elements_times(GroundBench *bench, const MildSole *const *soles, dou
 
 static MildStatus elements_case(int columns, int rows, double dt, BenchReport *report,
                                 MildError *error) {
-    MildMaterial material;
-    mild_material_preset(bench_preset, &material);
+    MildMaterial material = mild_material_default();
     MildSole *sole = elements_plate(columns, rows, &material, error);
     if (!sole) {
         return error->status;
