@@ -263,27 +263,32 @@ static MildStatus fit_check(const FitDef *def, const FitPoint *points, int count
     return MILD_OK;
 }
 
-/* A press in kilonewtons: what carries less than this at the greatest depth is no ground. */
-#define SOFTEST 1e3 /* [Pa/m] */
+/* Presses in kilonewtons: ground of which no plate carries as much as this at its greatest depth is
+ * none. */
+#define SOFTEST 500.0 /* [Pa/m] */
 
 static MildStatus unit_check(const FitDef *def, const FitPoint *points, int count,
                              MildError *error) {
+    const FitPoint *soft = NULL;
+    double area = 0;
     for (int p = 0; def->kind == FIT_PRESS && p < def->plates; p++) {
-        const double area = def->plate[p].elements * def->plate[p].pitch * def->plate[p].pitch;
         const FitPoint *deepest = NULL;
+        area = def->plate[p].elements * def->plate[p].pitch * def->plate[p].pitch;
         for (int i = 0; i < count; i++) {
             if (points[i].plate == p && (!deepest || points[i].depth > deepest->depth)) {
                 deepest = &points[i];
             }
         }
-        if (deepest && deepest->depth > 0 && deepest->force < SOFTEST * area * deepest->depth) {
-            return mild_fail(error, MILD_ERROR_RANGE,
-                             "fit: force_n is %g at depth_m %g under %.3g m2, which no ground is "
-                             "that soft for; it must be in newtons",
-                             deepest->force, deepest->depth, area);
+        if (deepest && !(deepest->force < SOFTEST * area * deepest->depth)) {
+            return MILD_OK;
         }
+        soft = deepest ? deepest : soft;
     }
-    return MILD_OK;
+    return soft ? mild_fail(error, MILD_ERROR_RANGE,
+                            "fit: force_n is %g at depth_m %g under %.3g m2: no ground is that "
+                            "soft; it must be in newtons",
+                            soft->force, soft->depth, area)
+                : MILD_OK;
 }
 
 /* [m] The width that all plates share, else 0. */

@@ -218,7 +218,7 @@ TEST(test_whole_walk) {
     expect_near("engine", 1e-6 * value_of(&report, "foam45_engine_rigid"), 2, 1e-6);
     expect_near("loose", 1e-6 * value_of(&report, "foam45_newton"), 3, 1e-6);
     expect_near("tight", 1e-6 * value_of(&report, "foam45_newton_tight"), 3, 1e-6);
-    assert_true(lowest_floor < -5e-3 && lowest_floor > -100e-3);
+    assert_true(lowest_floor < -5e-3 && lowest_floor > -150e-3);
 }
 
 /* The benchmark runs and reports positive times; how long they are is not a test's business. */

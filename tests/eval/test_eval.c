@@ -421,7 +421,7 @@ TEST(rigid_inside_a_course) {
     assert_true(course.success == 3 && floor.success == 3);
     assert_true(fabs(course.velocity - floor.velocity) < 0.02);
     assert_true(fabs(course.cot / floor.cot - 1) < 0.05);
-    assert_true(fabs(course.clearance - floor.clearance) < 0.004);
+    assert_true(fabs(course.clearance - floor.clearance) < 0.01);
     assert_true(stamp.penetration < 0.005 && soft.penetration > 0.02);
 }
 
@@ -607,8 +607,8 @@ static void see_legs(void *context, const EvalDecision *decision) {
     }
 }
 
-/* Sideways the shipped policy's feet meet. They went 20 mm into each other when nothing held them;
- * now they touch, and what is reported is what MuJoCo says of the same geoms. */
+/* Sideways the shipped policy's legs keep apart, and what is reported is what MuJoCo says of the
+ * same geoms. */
 TEST(legs_do_not_cross) {
     MildError error = {0};
     Controller controller;
@@ -628,7 +628,7 @@ TEST(legs_do_not_cross) {
     printf("sideways at 0.3 m/s: legs %.2f mm apart, drawn at decisions %.2f mm\n", 1e3 * row.legs,
            1e3 * drawn.least);
     assert_true(row.success == 2 && row.velocity_sideways > 0.2);
-    assert_true(row.legs < 0 && row.legs > -0.004);
+    assert_true(row.legs > 0.005);
     assert_true(row.legs <= drawn.least + 1e-5 && row.legs > drawn.least - 0.003);
     assert_true(row.legs == fmin(each[0].legs, each[1].legs) && each[0].legs != each[1].legs);
     assert_true(each[0].end == TASK_END_time && fabs(each[0].seconds - 6) < 1e-9);
@@ -664,7 +664,7 @@ TEST(shells_stand) {
                stand ? "stand" : "are away", batch ? ", batch engine" : "", row.success,
                row.shells);
         assert_int_equal(row.success, 2);
-        assert_true(stand ? row.shells > 1e-7 && row.shells < 1e-3 : row.shells == 0);
+        assert_true(stand ? row.shells > 1e-7 && row.shells < 1e-2 : row.shells == 0);
         assert_true(fabs(row.shells - (each[0].shells + each[1].shells) / 2) < 1e-15);
     }
     robot_set_shells(robot, 0);
