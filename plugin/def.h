@@ -40,12 +40,12 @@ const char *plugin_text(const mjModel *m, int instance, const char *attribute);
 /* Reads everything but ground.*, which needs the soles. */
 MildStatus plugin_def_read(const mjModel *m, int instance, PluginDef *def, MildError *error);
 /* Lays the materials of `ground` in the terrain, as the commands of the program do: presets of
- * their own laws or matched to ground.model on the sole under `load` [N], then the keys ground.*. sole: NULL without
- * feet. */
+ * their own laws or matched to ground.model on the sole under `load` [N], then the keys ground.*.
+ * sole: NULL without feet. */
 MildStatus plugin_def_materials(const mjModel *m, int instance, const PluginDef *def,
                                 const MildSole *sole, double load, MildTerrain *terrain,
                                 MildError *error);
-/* *model: of ground.model, or -1 without that key. *first: the same, or that of the first preset. */
+/* *model: of ground.model, or -1 without that key. *first: the same, or the first preset's. */
 MildStatus plugin_def_model(const mjModel *m, int instance, const PluginDef *def, int *model,
                             MildModel *first, MildError *error);
 

@@ -10,8 +10,8 @@
 int live_print(const Soft *soft, int label, char *text, int size);
 /* Puts the material of such lines in its place, from the next step on, and re-expresses in it what
  * the ground remembers (mild_ground_change). Lines that are missing keep their numbers; name=PRESET
- * chooses the colour. One of `mild` or `mild_merged` is matched to ground.model; without that key it
- * keeps its law. On failure nothing has changed. ground: NULL: it remembers nothing. */
+ * chooses the colour. One of `mild` or `mild_merged` is matched to ground.model; without that key
+ * it keeps its law. On failure nothing has changed. ground: NULL: it remembers nothing. */
 MildStatus live_change(Soft *soft, const mjModel *m, MildGround *ground, int label,
                        const char *text, MildError *error);
 

@@ -513,7 +513,7 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
 /* Call it when numbers of a terrain's materials have changed between two steps: `from` is the
  * terrain before, `to` that of the next step. It re-expresses what the ground remembers of loaded
  * elements in the new laws, so that none carries more than before or gives back more energy. Where
- * the new ground would, its surface lies lower under the element until it has come out of the ground
+ * the new ground would, its surface lies lower under the element until it is out of the ground
  * (docs/model.md section 5). Without the call, ground that stiffens under a load throws it. The
  * scratch has the ground's soles; the result of its last solve is lost. Elements on a material that
  * only one of the terrains has stay as they are. */

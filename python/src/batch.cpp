@@ -266,7 +266,7 @@ void bind_batch(nb::module_ &module) {
         .def_prop_ro(
             "robots", [](const Batch &batch) { return batch.robots; }, "Number of robots.")
         .def_prop_ro(
-            "feet", [](const Batch &batch) { return batch.feet; }, "Feet of each.")
+            "feet", [](const Batch &b) { return b.feet; }, "Feet of each.")
         .def_prop_ro(
             "stride", [](const Batch &batch) { return mild_batch_stride(open_batch(batch)); },
             "Last dimension of `elements`: elements of a foot, rounded up.")

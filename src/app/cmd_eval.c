@@ -565,9 +565,9 @@ int cmd_eval(int argc, char **argv) {
          "also write where the robot went, after every policy step, as CSV: ground, speed, trial, "
          "time, centre of mass, base, roll and pitch of the base"},
         {"feet", CLI_OUTPUT, &e->feet, 0, 0, "FILE",
-         "also write what the ground does to each foot, in every physics step, as CSV (8 s of a trial: "
-         "2.6 MB): ground, speed, trial, foot, time, ankle, its rotation, force and moment, pressure "
-         "centre, depth"},
+         "also write what the ground does to each foot, in every physics step, as CSV (8 s of a "
+         "trial: 2.6 MB): ground, speed, trial, foot, time, ankle, its rotation, force and moment, "
+         "pressure centre, depth"},
         {"program", CLI_TEXT, &e->program, 0, 0, "COMMAND",
          "a program that computes the soft ground in the place of the model, asked in every "
          "physics step; one runs for each trial (docs/grains.md)"},

@@ -178,8 +178,8 @@ static void print_models(void) {
 static void print_rivals(const MildSole *sole) {
     printf(
         "\nParameters of the other models on the paper's grounds. Each is matched to sink as deep "
-        "under 20 kg on one foot.\nThe numbers are for one element, or for the whole sole with con_*. All other parameters are the "
-        "preset's.\n");
+        "under 20 kg on one foot.\nThe numbers are for one element, or for the whole sole with "
+        "con_*. All other parameters are the preset's.\n");
     for (int m = 0; m < MILD_MODELS; m++) {
         const MildModelInfo *info = mild_model_info((MildModel)m);
         for (int k = 0; k < MILD_MODEL_SCALED && info->scaled[k]; k++) {

@@ -10,7 +10,8 @@
 #include "run/eval/scene.h"
 
 enum { GROUNDS_MAX = 32 };
-/* The names of the grounds of a model, those of mild_merged among mild's, and of all models. They return how many there are. */
+/* The names of the grounds of a model, those of mild_merged among mild's, and of all models. They
+ * return how many there are. */
 int grounds_of(MildModel model, const char *names[GROUNDS_MAX]);
 int grounds_all(const char *names[GROUNDS_MAX]);
 

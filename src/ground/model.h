@@ -24,9 +24,9 @@ typedef struct {
     int slips;
 
     /* Used by mild_model_match: changes a material of mild or mild_merged into one of this model,
-     * where the two differ. The `scaled` fields are then multiplied by a factor that gives the same sinkage, so
-     * only their ratios matter here. area: [m^2] of an element of the model. NULL: nothing
-     * differs. */
+     * where the two differ. The `scaled` fields are then multiplied by a factor that gives the same
+     * sinkage, so only their ratios matter here. area: [m^2] of an element of the model. NULL:
+     * nothing differs. */
     void (*reference)(MildMaterial *material, double area);
 
     /* LawMotion bit of `direction`, whose formulas src/ground/batch has too (contact_direct). 0:

@@ -152,7 +152,7 @@ TEST(a_batch_knows_what_creates_energy) {
     mild_batch_destroy(batch);
 }
 
-/* [N] Greatest difference between the feet's load of a step of a kit and of a batch at its input. */
+/* [N] Greatest difference of the feet's load of a step of a kit and of a batch at its input. */
 static double step_beside(Kit *kit, MildBatch *batch, MildError *error) {
     float position[6], rotation[18], velocity[12], inertia[144], free_velocity[12];
     float wrench[12], after[12];

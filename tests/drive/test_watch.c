@@ -1,4 +1,4 @@
-/* Sensors that disagree damp the robot before it falls; those of ordinary walks never do. Prints the
+/* Sensors that disagree damp the robot before it falls; those of ordinary walks do not. Prints the
  * tables of docs/drive.md, section 2. */
 #include "walk_kit.h"
 

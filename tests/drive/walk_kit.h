@@ -1,4 +1,4 @@
-/* A robot that walks in MuJoCo under a runner, packet by packet, in its own time: with the noise and
+/* A robot that walks in MuJoCo under a runner, packet by packet, in its own time: with noise and
  * the latencies of training, with pushes, and with a sensor that lies from some time on. */
 #ifndef WALK_KIT_H
 #define WALK_KIT_H
@@ -86,7 +86,7 @@ static inline double walk_noise(Random *r, double most) {
     return most * (2 * random_unit(r) - 1);
 }
 
-/* To steps of 14 bits a turn, of 16 bits of 35 rad/s, and of what such an encoder makes of speeds. */
+/* To steps of 14 bits a turn, of 16 bits of 35 rad/s, and what such an encoder makes of speeds. */
 static inline void walk_round(StatePacket *state, int joints) {
     for (int i = 0; i < 4; i++) {
         state->quaternion[i] = 1e-4f * roundf(1e4f * state->quaternion[i]);

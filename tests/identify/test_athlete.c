@@ -1,4 +1,4 @@
-/* The artificial athlete against a mass on a linear spring, solved in time, and against concrete. */
+/* The artificial athlete against a mass on a linear spring, solved in time, and on concrete. */
 #include "identify/athlete.h"
 #include "kit.h"
 

@@ -230,8 +230,8 @@ TEST(warns_of_a_sensor_that_does_not_feel_the_ground) {
     }
 }
 
-/* A shin that comes down on a rigid floor beside a soft foot is said once; not where it is excluded,
- * soft, or another robot's. */
+/* A shin that comes down on a rigid floor beside a soft foot is said once; not where it is
+ * excluded, soft, or another robot's. */
 TEST(warns_of_a_body_that_a_rigid_floor_carries) {
     const struct {
         const char *keys, *shin;

@@ -307,7 +307,7 @@ const MildField randomize_fields[] = {
     Z(recovery, 2, 0, 1, "[-] share of the depth that springs back, low and high"),
     Z(bed_depth, 2, 0.001, 10, "[m] depth of the firm bed below the surface, low and high"),
     Z(slip_share, 1, 0, 1,
-      "[-] share of the grounds of mild and mild_merged with a recovery of at most 0.2 on which slip "
+      "[-] share of the grounds of mild and mild_merged, recovery up to 0.2, on which slip "
       "costs as much support as drawn below; of the others a preset keeps its own"),
     Z(slip_length, 2, 1e-4, 1, "[m] of those: path over which slip halves it, low and high"),
     Z(grip, 2, 0, 1, "[-] of those: greatest friction by the virgin load, low and high"),

@@ -22,8 +22,8 @@ void bench_close(BenchContext *c);
 MildStatus bench_walker(const Robot *robot, Pool *pool, int envs, TaskDef *task,
                         Controller *controller, MildError *error);
 /* Records the shipped policy at 0.6 m/s on a ground (scene.h), of its own law or matched to a
- * model whose soles the robot has (RandomizeDef.model); replay_destroy it. NULL when it falls, is a policy of another robot, or when the
- * ground has no match. */
+ * model whose soles the robot has (RandomizeDef.model); replay_destroy it. NULL when it falls, is a
+ * policy of another robot, or when the ground has no match. */
 Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
                           int model, int periods, MildError *error);
 

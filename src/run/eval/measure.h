@@ -88,8 +88,8 @@ void measure_finish(Measure *measure);
 double measure_up(const Measure *measure);
 /* [-] Share of the load that the shells carried; 0 without load. */
 double measure_shells(const Measure *measure);
-/* [m] Least distance of two legs from MEASURE_SETTLED on, negative: overlap; NaN where the robot has no two legs that
- * touch, or where the trial was over by then. */
+/* [m] Least distance of two legs from MEASURE_SETTLED on, negative: overlap; NaN where the robot
+ * has no two legs that touch, or where the trial was over by then. */
 double measure_legs(const Measure *measure);
 void measure_free(Measure *measures, int count); /* measures: from calloc; may be NULL */
 
