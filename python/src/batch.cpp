@@ -228,8 +228,7 @@ void bind_batch(nb::module_ &module) {
         .def("set_materials", set_materials, nb::arg("materials"),
              nb::arg("material").none() = nb::none(),
              "The table that `material` of step points into: Material or presets. Waits for the "
-             "device. material:\nof robots that stand, as in their last step, a flat list: what "
-             "their ground remembers is\nre-expressed, so that none is thrown.")
+             "device. material:\na flat list, as in the last step: standing robots are not thrown.")
         .def("set_map", set_map, nb::arg("map").none(),
              "Puts the robots on a Map; None: on level ground. All forget what the ground "
              "remembers.")
@@ -264,7 +263,7 @@ void bind_batch(nb::module_ &module) {
         .def("store", store, nb::arg("robot"), nb::arg("ground"), "The other way.")
         .def("close", close_batch, "Frees the memory; further calls raise RuntimeError.")
         .def_prop_ro(
-            "robots", [](const Batch &batch) { return batch.robots; }, "Number of robots.")
+            "robots", [](const Batch &b) { return b.robots; }, "Number of robots.")
         .def_prop_ro(
             "feet", [](const Batch &b) { return b.feet; }, "Feet of each.")
         .def_prop_ro(
