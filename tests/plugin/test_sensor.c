@@ -81,7 +81,7 @@ TEST(at_rest_it_is_the_weight) {
     assert_true(fabs(beside[0]) < 1e-3 && fabs(beside[1]) < 1e-3);
     assert_true(fabs(light[MEAN] - depth) < 1e-6 && fabs(light[DEEPEST] - depth) < 1e-6);
     assert_true(heavy[DEEPEST] > 1.2 * heavy[MEAN]); /* its mass is in front */
-    assert_true(fabs(light[AREA] - 55 * 0.0195 * 0.0195) < 1e-12);
+    assert_true(fabs(light[AREA] - 0.2 * 0.1) < 1e-12);
     assert_true(fabs(d->sensordata[m->sensor_adr[1]] - d->time) <
                 2.1e-3); /* the next one is whole */
     mj_deleteData(d);
