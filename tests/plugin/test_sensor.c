@@ -95,7 +95,8 @@ static mjModel *twins(const double turn[4], const double shift[3]) {
     "<geom type='box' size='0.1 0.05 0.01' mass='1' contype='0' conaffinity='0'/><geom "           \
     "type='box' pos='0.03 0.02 0.04' size='0.02 0.01 0.01' mass='4' contype='0' conaffinity='0'/>"
     char head[1000], text[3000];
-    kit_head(head, sizeof head, 0.002, "implicitfast", "plain turned", "sand_loose", "");
+    kit_head(head, sizeof head, 0.002, "implicitfast", "plain turned", "sand_loose",
+             CONFIG("ground.model", "mild"));
     snprintf(text, sizeof text,
              "%s<worldbody><body name='plain' pos='0 0 0.015'><freejoint/>" SHAPE
              "</body><body name='other'><freejoint/><frame pos='%g %g %g' quat='%g %g %g "
