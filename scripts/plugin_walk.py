@@ -65,7 +65,7 @@ def numbers(text):
 
 def stand_on(spec, feet, args):
     """Soft ground under the feet; their soles are those of robot.ini, or geoms of the model."""
-    config = {"feet": " ".join(foot["body"] for foot in feet), "ground": args.ground}
+    config = {"feet": " ".join(foot["body"] for foot in feet), "ground": args.ground, "pitch": feet[0].get("pitch", "0.0195")}
     if args.sole:
         config["sole"] = " ".join(args.sole)
     elif feet[0]["shape"] == "outline":

@@ -7,15 +7,19 @@
 #include <math.h>
 
 #include "draws.h"
+#include "materials.h"
 #include "plugin_kit.h"
 
 #define TURN_MOST 0.1 /* [rad] in a step; beyond it the way of a foot is not its twist */
 #define STEPS 120
+#define SETTLES 30 /* rounds: a step that ends with so many has not settled, as the plugin says */
+#define AGREES 1.1e-6 /* [m/s, rad/s] within which the twists of the others are as expected */
 
 static int falls = 40;
 static uint64_t first = 1;
 static const char *chosen; /* integrator; NULL: each in turn */
 static double step = 0.005;
+static int paper; /* bool: the paper's presets and pitch alone */
 
 static const char *const integrators[] = {"implicitfast", "Euler", "implicit", "discrete"};
 
@@ -33,7 +37,8 @@ static void add(char *text, size_t size, const char *format, ...) {
 }
 
 static void add_ground(uint64_t *random, char *text, size_t size) {
-    const char *preset = mild_material_preset_name(kit_index(random, mild_material_preset_count()));
+    const int count = paper ? PAPER_PRESETS : mild_material_preset_count();
+    const char *preset = mild_material_preset_name(kit_index(random, count));
     const double recovery = kit_index(random, 3) ? kit_uniform(random, 0, 1) : kit_index(random, 2);
     add(text, size, "<config key='ground' value='%s'/>", preset);
     add(text, size, "<config key='ground.k_pen' value='%.17g'/>", kit_spread(random, 8, 1400));
@@ -49,6 +54,7 @@ static void add_ground(uint64_t *random, char *text, size_t size) {
     add(text, size, "<config key='ground.bed_depth' value='%.17g'/>",
         kit_uniform(random, 0.1, 0.15));
     add(text, size, "<config key='ground.passive' value='true'/>");
+    add(text, size, paper ? CONFIG("pitch", "0.0195") : "");
 }
 
 /* The body's inertia: that of a box, of any proportions. */
@@ -168,7 +174,9 @@ static void draw_motion(uint64_t *random, const mjModel *m, mjData *d) {
 typedef struct {
     double turn;     /* [rad] most in a step */
     double gain;     /* [-] most energy from the ground so far, as a share of the most kinetic */
-    double surprise; /* [m/s] most between the twists that the ground expects and gets */
+    double surprise; /* [m/s, rad/s] most between the twists that the ground expects and gets */
+    double open;     /* [m/s, rad/s] the same in steps that have not settled */
+    int opens;       /* steps that have not settled */
     int loaded;      /* steps */
 } Fall;
 
@@ -217,9 +225,12 @@ static Fall fall(const mjModel *m, mjData *d, const mjModel *bare) {
         for (int f = 0; f < soft->feet; f++) {
             loaded |= soft->contact.foot[f].contacts > 0;
         }
+        const int settled = soft->rounds < SETTLES;
+        double *surprise = settled ? &result.surprise : &result.open;
         for (int r = 0; r < 6 * soft->feet && loaded; r++) {
-            result.surprise = fmax(result.surprise, fabs(expected[r] - soft->contact.velocity[r]));
+            *surprise = fmax(*surprise, fabs(expected[r] - soft->contact.velocity[r]));
         }
+        result.opens += !settled;
         result.loaded += loaded;
         result.turn = fmax(result.turn, m->opt.timestep * mju_norm3(d->qvel + 3));
         most = fmax(most, kinetic(m, d));
@@ -238,7 +249,8 @@ typedef struct {
     uint64_t seed;         /* of the worst */
     int spun, spun_gained; /* falls that turn by more */
     double spun_worst;     /* [-] */
-    double surprise;       /* [m/s, rad/s] of the others */
+    double surprise, open; /* [m/s, rad/s] of the others */
+    int opens, steps;      /* steps of the others: not settled, loaded */
 } Falls;
 
 static void fall_once(uint64_t seed, int kind, const char *integrator, Falls *all) {
@@ -257,6 +269,10 @@ static void fall_once(uint64_t seed, int kind, const char *integrator, Falls *al
     } else {
         all->gained += one.gain > 1e-9;
         all->surprise = fmax(all->surprise, one.surprise);
+        all->open = fmax(all->open, one.open);
+        all->opens += one.opens;
+        all->steps += one.loaded;
+        assert_int_equal(kit_messages, one.opens > 0); /* said, and said once */
         if (one.gain > all->worst) {
             all->worst = one.gain;
             all->seed = seed;
@@ -269,6 +285,7 @@ static void fall_once(uint64_t seed, int kind, const char *integrator, Falls *al
 
 TEST(the_ground_never_gives_energy) {
     static const char *const names[KINDS] = {"robots", "anything", "shells"};
+    paper = 0;
     for (int n = 0; n < 4 * KINDS; n++) {
         const char *integrator = integrators[n % 4];
         if (chosen && strcmp(chosen, integrator) != 0) {
@@ -278,15 +295,17 @@ TEST(the_ground_never_gives_energy) {
         for (int i = 0; i < falls; i++) {
             fall_once(first + (uint64_t)i, n / 4, integrator, &all);
         }
-        print_message("%-12s %-8s: %d falls, %d loaded; %d gain, at most %.1e (seed %llu), twists "
-                      "apart by %.1e; %d turn by over %.1f rad in a step, %d of them gain, at most "
-                      "%.2g\n",
-                      integrator, names[n / 4], all.falls, all.loaded, all.gained, all.worst,
-                      (unsigned long long)all.seed, all.surprise, all.spun, TURN_MOST,
-                      all.spun_gained, all.spun_worst);
+        print_message(
+            "%-12s %-8s: %d falls, %d loaded; %d gain, at most %.1e (seed %llu), twists "
+            "apart by %.1e, in %d of %d steps by %.1e; %d turn by over %.1f rad in a step, %d of "
+            "them gain, at most %.2g\n",
+            integrator, names[n / 4], all.falls, all.loaded, all.gained, all.worst,
+            (unsigned long long)all.seed, all.surprise, all.opens, all.steps, all.open, all.spun,
+            TURN_MOST, all.spun_gained, all.spun_worst);
         assert_int_equal(all.falls, all.loaded);
         assert_true(all.worst < 1e-9);
-        assert_true(all.surprise < (falls > 40 ? INFINITY : 1e-5));
+        assert_true(all.surprise < AGREES);
+        assert_true(all.opens <= 1 + all.steps / 1000 && all.open < 1e-3);
     }
 }
 
@@ -294,11 +313,13 @@ TEST(the_ground_never_gives_energy) {
  * those of tests/ground/test_falls.c. With a tenth of the step it gains nothing. */
 TEST(a_bounce_within_a_step_gains_little) {
     Falls all = {0};
+    paper = 1;
     fall_once(100323, ANY, "implicitfast", &all);
     print_message("light body: gains %.1e, twists apart by %.1e\n", all.worst, all.surprise);
     assert_int_equal(all.spun, 0);
-    assert_true(all.worst < 0.05); /* 3.7 % */
-    assert_true(all.surprise < 1e-5);
+    assert_true(all.worst > 0.03 && all.worst < 0.05); /* 3.7 % */
+    assert_true(all.surprise < AGREES);
+    assert_int_equal(all.opens, 0);
 }
 
 int main(int argc, char **argv) {

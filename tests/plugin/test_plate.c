@@ -29,7 +29,7 @@ static mjModel *free_plate(double dt, const char *integrator, const char *ground
 static MildSole *plate_sole(void) {
     static const double outline[] = {-HALF_X, -HALF_Y, HALF_X,  -HALF_Y,
                                      HALF_X,  HALF_Y,  -HALF_X, HALF_Y};
-    const MildSoleDef def = {outline, 4, 0.0195, -HALF_Z, 0};
+    const MildSoleDef def = {outline, 4, 0, -HALF_Z, 0};
     MildError error = {0};
     MildSole *sole = mild_sole_create(&def, &error);
     assert_non_null(sole);

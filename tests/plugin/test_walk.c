@@ -37,6 +37,7 @@ static void feet_config(const RobotDef *def, char *text, size_t size) {
         add(text, size, "%s ", def->foot[f].body);
     }
     add(text, size, "'/>");
+    add(text, size, "<config key='pitch' value='%.17g'/>", first->pitch);
     if (first->shape == ROBOT_SOLE_ROUND) {
         add(text, size, "<config key='sole' value='");
         for (int f = 0; f < def->feet; f++) {
@@ -45,8 +46,7 @@ static void feet_config(const RobotDef *def, char *text, size_t size) {
         add(text, size, "'/>");
         return;
     }
-    add(text, size, "<config key='sole_z' value='%.17g'/><config key='pitch' value='%.17g'/>",
-        first->z, first->pitch);
+    add(text, size, "<config key='sole_z' value='%.17g'/>", first->z);
     add(text, size, "<config key='elements' value='%d'/><config key='outline' value='",
         first->elements);
     for (int f = 0; f < def->feet; f++) {
@@ -287,7 +287,8 @@ static EvalRow walk(const Walker *walker, const Robot *robot, const char *ground
 
 static void check_walk(const Walker *walker, const Robot *robot, const char *ground, double dt,
                        const char *integrator, int trials) {
-    MildMaterial material = kit_preset(ground);
+    MildMaterial material;
+    assert_true(mild_material_preset(ground, &material));
     const EvalRow own = walk(walker, robot, ground, dt, trials);
     use_plugin(robot, &material, dt, integrator);
     const EvalRow mujoco = walk(walker, robot, ground, dt, trials);
