@@ -81,13 +81,15 @@ same() {
 }
 "$mild" press --ground ./mars.ini --csv a.csv >/dev/null && "$mild" press --ground clay "${keys[@]}" --csv b.csv >/dev/null
 same a.csv b.csv press
-for model in mild bekker; do # the file's own model stays
-    "$mild" eval --ground ./mars.ini --model $model --trials 2 --seconds 2 --json a.json >/dev/null
+for model in "" "--model bekker"; do # the file's own model stays
+    "$mild" eval --ground ./mars.ini $model --trials 2 --seconds 2 --json a.json >/dev/null
     "$mild" eval --ground clay "${keys[@]}" --trials 2 --seconds 2 --json b.json >/dev/null
     sed -i 's|"./mars.ini"|"clay"|; /"model"/d' a.json && sed -i '/"model"/d' b.json
-    same a.json b.json "eval --model $model"
+    same a.json b.json "eval $model"
 done
-bad "con_spring --model" "$mild" eval --ground mars.ini --model con_spring
+for model in mild con_spring; do
+    bad "bekker $model --model" "$mild" eval --ground mars.ini --model $model
+done
 expect 0 '^rubber+./mars.ini+grass ' "$mild" eval --ground rubber+./mars.ini+grass,clay,mars.ini --trials 1 --seconds 1
 "$mild" eval --ground rubber+./mars.ini --patch 0.3 --trials 2 --seconds 3 --json a.json >/dev/null
 "$mild" eval --ground rubber+dry_sand --patch 0.3 --trials 2 --seconds 3 --json b.json >/dev/null
@@ -111,7 +113,7 @@ grep -q '^presets = grit.ini,foam45$' run/config.ini || fail "the run does not s
 "${train[@]}" --out run2 --randomize.presets=grit.ini --randomize.preset_jitter=0 >/dev/null 2>&1
 "${train[@]}" --out run3 --randomize.presets=sand_loose --randomize.preset_jitter=0 >/dev/null 2>&1
 cmp -s run2/policy.safetensors run3/policy.safetensors && fail "training does not see the file"
-bad "randomize.presets mars.ini randomize.model" "${train[@]}" --out no --randomize.presets=mars.ini
+bad "randomize.presets mars.ini randomize.model" "${train[@]}" --out no --randomize.presets=mars.ini --randomize.model=mild
 bad "randomize.presets nosuch.ini" "${train[@]}" --out no --randomize.presets=grit.ini,nosuch.ini
 
 # mistakes name file, line, key and remedy

@@ -102,7 +102,7 @@ row+=",\"torque_max\":$number"
 for key in clearance penetration drift; do row+=",\"$key\":$measured"; done
 row+=",\"energy\":$number"
 row+="\(,\"[a-z_]*\":$measured\)*,\"start\":\"stand\",\"ends\":{[a-z_\":0-9,]*},\"each\":\[{[^]]*}\]}" # test_schema.sh has the rest
-grep -qx "{\"policy\":\"whole/policy.safetensors\",\"robot\":\"sa01\",\"model\":\"mild\",\"version\":\"[0-9.]*[^\"]*\",\"rows\":\[$row\(,$row\)\{3\}\]}" \
+grep -qx "{\"policy\":\"whole/policy.safetensors\",\"robot\":\"sa01\",\"model\":\"own\",\"version\":\"[0-9.]*[^\"]*\",\"rows\":\[$row\(,$row\)\{3\}\]}" \
     <<<"$json" || fail "eval.json: $json"
 good "$mild" eval --policy whole/policy.safetensors --ground rigid,rubber+sand_loose --speed 0,0.6 --trials 2 --seconds 3 \
     --threads 1 --json again.json

@@ -24,7 +24,7 @@ static const char *const printed[] = {
     "randomize.c_d=-6.0 28.0", "randomize.phi=0.50 0.64", "randomize.mu=0.2 1.3",
     "randomize.k_pen=8 1400", "randomize.sigma_cone=10000 240000", "randomize.base_mass=-4 4",
     "randomize.com_offset=6e-3", "randomize.latency=1e-3 10e-3", "randomize.motor_offset=0.035",
-    "randomize.passive=false",
+    "randomize.passive=false", "randomize.model=mild", "randomize.slip_share=0",
     /* sections II.C and III.A */
     "train.envs=4096", "train.iterations=20000", "train.minutes=0", "task.vx=0.0 1.2",
     "task.wz=-1.5 1.5", "task.kp=50 50 70 70 20 20", "task.kd=5 5 7 7 0.2 0.2",

@@ -383,10 +383,8 @@ TEST(test_sliders) {
         printf("  depth on foam45 at %.1f times its stiffness: %.1f mm; the batch engine's %.1f\n",
                stiffness[i], 1e3 * depth[i], 1e3 * rival);
         /* with k_pen alone three times as large the feet are twice as deep */
-        assert_true(kit_short() || fabs(depth[i] - rival) < 0.15 * rival);
+        assert_true(kit_short() || fabs(depth[i] - rival) < 0.1 * rival);
     }
-    /* what softer ground adds to the depth of a stiff one; a level sole at rest: 2.0 */
-    assert_true(kit_short() || depth[2] - depth[0] > 1.6 * (depth[1] - depth[0]));
     for (int t = 0; t < 4 * SECOND; t++) {
         web_step(0, 0, 0);
         load += carried() / (4 * SECOND);
@@ -410,17 +408,17 @@ static double facing(void) {
     return atan2((double)web_view()->link[0][4], (double)web_view()->link[0][0]);
 }
 
-/* Three seconds that turn and go sideways: the velocity that is shown is, in the mean over the last
+/* Four seconds that turn and go sideways: the velocity that is shown is, in the mean over the last
  * one, that of the drawn base, along its heading, to the left, and of its turning. */
 static void turn_away(void) {
     const WebView *view = web_view();
     double from[3], shown[3] = {0, 0, 0};
-    for (int t = 0; t < 3 * SECOND; t++) {
+    for (int t = 0; t < 4 * SECOND; t++) {
         assert_false(web_step(0.37f, 0.11f, 0.5f));
-        for (int k = 0; k < 3 && t >= 2 * SECOND; k++) {
+        for (int k = 0; k < 3 && t >= 3 * SECOND; k++) {
             shown[k] += (double)view->velocity[k] / SECOND;
         }
-        if (t == 2 * SECOND - 1) {
+        if (t == 3 * SECOND - 1) {
             from[0] = (double)view->link[0][3];
             from[1] = (double)view->link[0][7];
             from[2] = facing();
