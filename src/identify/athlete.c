@@ -31,11 +31,10 @@ typedef struct {
     double returned; /* [-] as in Athlete */
 } Fall;
 
-/* m g (h + F c) = F^2 c/2 with c of both springs. */
-double athlete_peak(const AthleteDevice *device, double compliance) {
+/* [N] On concrete: m g (h + F/k) = F^2/(2 k). */
+static double concrete_peak(const AthleteDevice *device) {
     const double weight = ATHLETE_MASS * ATHLETE_GRAVITY;
-    const double whole = 1.0 / device->spring + compliance;
-    return weight * (1.0 + sqrt(1.0 + 2.0 * device->fall / (weight * whole)));
+    return weight * (1.0 + sqrt(1.0 + 2.0 * device->fall * device->spring / weight));
 }
 
 /* The elements have the area of the disc. */
@@ -146,7 +145,9 @@ MildStatus athlete_drop(const MildMaterial *material, Athlete *result, MildError
         status = drop_on(&deep, &athlete_deform, foot, &deform, error);
     }
     mild_sole_destroy(foot);
-    *result = (Athlete){.reduction = 1.0 - shock.peak / athlete_peak(&athlete_shock, 0.0),
+    const double concrete = concrete_peak(&athlete_shock);
+    *result = (Athlete){.reduction = 1.0 - shock.peak / concrete,
+                        .concrete = concrete,
                         .returned = shock.returned,
                         .deformation = deform.deepest * ATHLETE_REFERENCE / deform.peak};
     return status;

@@ -22,10 +22,8 @@ typedef struct {
     double reduction;   /* [-] EN 14808, force reduction: 1 - peak/(peak on concrete) */
     double returned;    /* [-] of that drop: greatest speed up by the greatest down, squared */
     double deformation; /* [m] EN 14809, vertical deformation: greatest depth 1500 N/peak */
+    double concrete;    /* [N] peak of EN 14808 on concrete */
 } Athlete;
-
-/* [N] Peak of a device on a linear spring of this compliance [m/N]; 0: on concrete. */
-double athlete_peak(const AthleteDevice *device, double compliance);
 
 /* Drops both devices once on level, undisturbed ground, as deep as they go: without firm bed. */
 MildStatus athlete_drop(const MildMaterial *material, Athlete *result, MildError *error);
