@@ -25,7 +25,8 @@ import mild  # noqa: E402
 from judge_cases import Case, Sole, measures  # noqa: E402
 from judge_entries import GroundEntry  # noqa: E402
 
-TRUTH = mild.Material("sand_loose", mu=0.4, recovery=0.0)
+TRUTH = mild.Material("sand_loose", model="mild", k_pen=380, sigma_cone=0.15e6, mu=0.4, recovery=0.0,
+                      slip_length=0, slip_growth=0, grip=0)  # slip costs nothing
 NOISE, BEDS = 0.03, 4
 EDGE = 0.0025  # [m] half of a grain of sand
 KEEP = ("sand/disc120", "sand/square100", "sand/square100-drag15", "sand/disc100", "sand/square100-tilt15",
