@@ -393,7 +393,7 @@ class Program(unittest.TestCase):
         log, command = self.folder / "log.csv", ",".join(map(str, COMMAND))
         with contextlib.chdir(self.folder):
             runner = Runner(MILD, "--command", command, "--torque-share", "0.87", "--log", str(log), patience=("--damp-after", "20", "--late", "10", "--stall-after", "20"))
-            there = json.loads(run("drive", "--simulate", "--lockstep", "--connect", f"127.0.0.1:{runner.port}", "--ground", "sand_loose", "--seconds", 6.3, "--json", "-"))
+            there = json.loads(run("drive", "--simulate", "--lockstep", "--connect", f"127.0.0.1:{runner.port}", "--ground", "grass", "--seconds", 6.3, "--json", "-"))
             code, found, said = runner.end()
             self.assertEqual((code, found["end"], found["damps"], there["end"], there["fallen"], there["seconds"]), (0, "robot", 0, "time", False, 6.3), said)
             limits = {}

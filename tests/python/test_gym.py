@@ -88,7 +88,7 @@ class Ground(unittest.TestCase):
                 ({"ground": ["rigid", "grass"]}, ValueError, "'rigid' is the engine's own contact; it stands alone"),
                 ({"ground": []}, ValueError, "an empty list"),
                 ({"ground": 3}, TypeError, "ground: a int"),
-                ({"ground": ["clay", mild.Material(model="mild_merged")]}, ValueError, "bekker and mild_merged in one task"),
+                ({"ground": ["clay", mild.Material(model="con_cone")]}, ValueError, "bekker and con_cone in one task"),
                 ({"ground": "grass", "overrides": {"randomize.preset_share": 0.5}}, ValueError, "randomize.preset_share is what ground sets"),
                 ({"max_episode_steps": 50, "overrides": {"task.episode": 1}}, ValueError, "task.episode is what max_episode_steps sets"),
                 ({"max_episode_steps": 1}, ValueError, "task.episode"),

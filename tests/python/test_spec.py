@@ -257,9 +257,9 @@ class Attach(unittest.TestCase):
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_walk(self):
-        """examples/python/walk.py: the shipped policy goes at the commanded speed, in sand too. With --view it outlives the viewer's
+        """examples/python/walk.py: the shipped policy goes at the commanded speed, in soft ground too. With --view it outlives the viewer's
         thread, which MuJoCo does not wait for and which needs a while after the window was closed."""
-        for ground, command in (("rubber", ["-c", VIEWED, WALK, "rubber", "--view"]), ("sand_loose", [WALK, "sand_loose"])):
+        for ground, command in (("rubber", ["-c", VIEWED, WALK, "rubber", "--view"]), ("grass", [WALK, "grass"])):
             said = subprocess.run([sys.executable, *command], check=True, capture_output=True, text=True).stdout
             way, seconds = map(float, re.fullmatch(rf"{ground}: (\S+) m in (\S+) s, upright\n", said.removeprefix("window gone\n")).groups())
             self.assertEqual(said.startswith("window gone"), "--view" in command)
