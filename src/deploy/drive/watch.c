@@ -46,13 +46,20 @@ static int is_old(Watch *w, const Repeat *r, const char *name, char *why, size_t
     return 1;
 }
 
+static int is_equal(const float *a, const float *b, int count) {
+    int equal = 1;
+    for (int i = 0; i < count; i++) {
+        equal &= a[i] == b[i];
+    }
+    return equal;
+}
+
 static int is_repeated(Watch *w, const Robot *robot, const StatePacket *state, const float *target,
                        char *why, size_t size) {
     const StatePacket *before = &w->before;
     const int joints = robot_joints(robot);
-    const int same = memcmp(before->quaternion, state->quaternion, sizeof state->quaternion) == 0 &&
-                     memcmp(before->angular_velocity, state->angular_velocity,
-                            sizeof state->angular_velocity) == 0;
+    const int same = is_equal(before->quaternion, state->quaternion, 4) &&
+                     is_equal(before->angular_velocity, state->angular_velocity, 3);
     take_repeat(&w->imu, w->begun && same, target, 0, joints);
     int old = is_old(w, &w->imu, "the IMU", why, size);
     for (int i = 0; i < joints && !old; i++) {
