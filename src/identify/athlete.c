@@ -85,7 +85,8 @@ static Fall drop_run(Drop *drop) {
     double fastest = drop->speed;
     double rise = 0.0;
     Fall fall = {0};
-    for (double time = 0.0; time < LONGEST; time += drop->input.dt) {
+    const int steps = (int)(LONGEST / drop->input.dt);
+    for (int i = 0; i < steps; i++) {
         const double force = drop_step(drop);
         fall.peak = fmax(fall.peak, force);
         fall.deepest = fmax(fall.deepest, drop->depth);
