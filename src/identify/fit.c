@@ -265,7 +265,7 @@ static MildStatus fit_check(const FitDef *def, const FitPoint *points, int count
 
 /* Presses in kilonewtons: ground of which no plate carries as much as this at its greatest depth is
  * none. */
-#define SOFTEST 500.0 /* [Pa/m] */
+#define SOFTEST 1e3 /* [Pa/m] */
 
 static MildStatus unit_check(const FitDef *def, const FitPoint *points, int count,
                              MildError *error) {

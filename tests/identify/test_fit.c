@@ -353,7 +353,7 @@ TEST(pressure_of_small_plates) {
         const double least = 0.02 + 0.06 * random_unit(&random);
         const double width[] = {least, least * (1.2 + random_unit(&random)), 4 * least};
         const double n = 0.3 + 1.6 * random_unit(&random);
-        const double k_phi = pow(10, 4.5 + 3 * random_unit(&random));
+        const double k_phi = pow(10, 4.8 + 2.7 * random_unit(&random));
         const double k_c = -(1 - pow(10, -3 * random_unit(&random))) * least * k_phi;
         FitDef def = bekker_rows(run_index % 2 + 2, width, k_c, k_phi, n);
         FitResult result = run(&def, (run_index % 2 + 2) * (ROWS / 4));
