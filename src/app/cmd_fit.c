@@ -199,6 +199,9 @@ static MildStatus from_read(const FitOptions *options, FitWork *work, MildError 
                          options->from, mild_model_names[work->preset.model],
                          mild_model_names[model]);
     }
+    if (work->preset.model != model) { /* as in mild_model_match: slip is mild_merged's */
+        work->preset.slip_length = work->preset.grip = work->preset.slip_growth = 0;
+    }
     work->preset.model = model;
     work->material = work->preset;
     work->from = options->from;
