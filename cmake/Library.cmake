@@ -7,10 +7,12 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-set_target_properties(layer_base layer_device layer_ground layer_batch PROPERTIES
+set_target_properties(layer_base layer_device layer_law layer_terrain layer_sole layer_step layer_models layer_batch PROPERTIES
   C_VISIBILITY_PRESET hidden) # MILD_API_BEGIN makes visible
-set(mild_objects $<TARGET_OBJECTS:layer_ground>
-  $<FILTER:$<TARGET_OBJECTS:layer_base>,INCLUDE,/\(error|field|text\)\\.c\\.o$>)
+set(mild_objects $<FILTER:$<TARGET_OBJECTS:layer_base>,INCLUDE,/\(error|field|text\)\\.c\\.o$>)
+foreach(wing ${ground_wings})
+  list(APPEND mild_objects $<TARGET_OBJECTS:layer_${wing}>)
+endforeach()
 set(mild_batch_objects $<TARGET_OBJECTS:layer_batch> $<TARGET_OBJECTS:layer_device>)
 if(MILD_CUDA)
   list(APPEND mild_batch_objects $<TARGET_OBJECTS:batch_device> $<TARGET_OBJECTS:device_gpu>)
@@ -92,7 +94,7 @@ Libs.private: -lm
 endfunction()
 
 mild_library(mild "Soft ground for legged robots: two-way, per-element contact forces" "${mild_objects}" ""
-  layer_base layer_ground)
+  layer_base layer_law layer_terrain layer_sole layer_step layer_models)
 mild_library(mild_batch "Soft ground under many robots at once, on a CPU or a GPU" "${mild_batch_objects}"
   "mild = ${PROJECT_VERSION}" layer_batch layer_device)
 set_target_properties(mild_shared PROPERTIES EXPORT_NAME mild)

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "ground/models.h"
+#include "ground/law/models.h"
 #include "ground/soil/soil.h"
 
 #define WORD 512 /* bytes of a name */

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "base/text.h"
-#include "ground/sole.h"
+#include "ground/sole/sole.h"
 #include "plugin/body.h"
 #include "plugin/wheel.h"
 

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "ground/models.h"
+#include "ground/law/models.h"
 #include "plugin/visual.h"
 
 #define NAME 64 /* bytes */

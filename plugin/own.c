@@ -17,7 +17,7 @@ static int is_read(const Soft *soft, const MildGround *ground, int f) {
     return !soft->foot[f].surface || ground->touched[f] != 0 || (soft->input.rows >> f & 1) != 0;
 }
 
-/* Bool: a material as Memory encodes it (ground/state.h) is one of the terrain. */
+/* Bool: a material as Memory encodes it (ground/step/state.h) is one of the terrain. */
 static int is_material(const MildTerrain *terrain, int32_t code, int surface) {
     if (code < 0) {
         return code == MATERIAL_NONE || code == MATERIAL_FREE ||

@@ -3,7 +3,7 @@
 #ifndef PLUGIN_SOFT_H
 #define PLUGIN_SOFT_H
 
-#include "ground/state.h"
+#include "ground/step/state.h"
 #include "plugin/foot.h"
 #include "plugin/metric.h"
 #include "plugin/mix.h"
@@ -48,7 +48,7 @@ typedef struct {
     MildContactResult contact;
 } Soft;
 
-/* Checks that a material bears every sole (ground/width.h). */
+/* Checks that a material bears every sole (ground/law/width.h). */
 MildStatus soft_meet(const Soft *soft, const MildMaterial *material, MildError *error);
 
 /* Makes the ground of an instance. Returns NULL with one line in *error. */

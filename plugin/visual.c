@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "ground/state.h"
+#include "ground/step/state.h"
 
 #define ABOVE 0.001  /* [m] height of a patch above the ground, so that a floor does not hide it */
 #define DARKEST 0.03 /* [m] depth at which pressed ground is darkest */

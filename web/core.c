@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 #include "ground/soil/soil.h"
-#include "ground/terrain.h"
+#include "ground/terrain/terrain.h"
 #include "learn/vector.h"
 #include "web/core.h"
 #include "web/window.h"

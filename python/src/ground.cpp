@@ -7,7 +7,7 @@
 #include <nanobind/stl/tuple.h>
 
 extern "C" {
-#include "ground/width.h"
+#include "ground/law/width.h"
 }
 
 struct Ground {

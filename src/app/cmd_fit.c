@@ -15,7 +15,7 @@
 #include "app/report.h"
 #include "base/file.h"
 #include "base/text.h"
-#include "ground/models.h"
+#include "ground/law/models.h"
 #include "ground/soil/soil.h"
 #include "identify/belief/log.h"
 #include "identify/fit_drag.h"

@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "base/text.h"
-#include "ground/models.h"
+#include "ground/law/models.h"
+#include "ground/law/width.h"
 #include "ground/soil/soil.h"
-#include "ground/width.h"
 
 int grounds_of(MildModel model, const char *names[GROUNDS_MAX]) {
     const MildModelInfo *info = mild_model_info(model);

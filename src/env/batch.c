@@ -7,7 +7,7 @@
 #include "device/device.h"
 #include "env/kernels.h"
 #include "ground/batch/bodies_batch.h"
-#include "ground/law.h"
+#include "ground/law/law.h"
 #include "robot/engine/read.h"
 
 _Static_assert(ENVS_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fills");

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "ground/width.h"
+#include "ground/law/width.h"
 
 #define STEP 0.01     /* [-] of sqrt(m/k): a contact on concrete takes 300 steps */
 #define LONGEST 2.0   /* [s] */

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "ground/models.h"
+#include "ground/law/models.h"
 
 #define STRIDE 2e-4 /* [m] slip in a step of the path */
 #define STRIDES_MAX 100

@@ -4,8 +4,8 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "ground/models.h"
-#include "ground/sole.h"
+#include "ground/law/models.h"
+#include "ground/sole/sole.h"
 #include "identify/fit_drag.h"
 
 /* ---- combinations ---- */

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ground/width.h"
+#include "ground/law/width.h"
 #include "identify/press_body.h"
 
 static const double paper_pitch = 0.0195, gravity = 9.81; /* [m], [m/s^2] */

@@ -1,7 +1,7 @@
 /* Coarser rasters of the soles (docs/model.md section 16). */
 #include <math.h>
 
-#include "ground/sole.h"
+#include "ground/sole/sole.h"
 #include "robot/description.h"
 #include "robot/robot.h"
 

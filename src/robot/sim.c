@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "ground/grid.h"
+#include "ground/terrain/grid.h"
 
 #define QVEL_MAX 1e3 /* [m/s, rad/s] a larger velocity means divergence */
 

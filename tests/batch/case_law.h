@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "contact_case.h"
-#include "ground/begin.h"
-#include "ground/models.h"
+#include "ground/law/begin.h"
+#include "ground/law/models.h"
 
 static void case_law(CaseMaterial *c, const MildMaterial *m, const MildSole *sole) {
     const Law law = law_of(m, mild_sole_pitch(sole), mild_sole_width(sole));

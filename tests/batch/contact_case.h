@@ -2,7 +2,7 @@
 #ifndef CONTACT_CASE_H
 #define CONTACT_CASE_H
 
-#include "ground/map_view.h"
+#include "ground/terrain/map_view.h"
 
 enum { CASE_FEET = 4, CASE_ELEMENTS = 256, CASE_MEMORY = 10, CASE_LAW = 14, CASE_LABELS = 4 };
 enum { CASE_WORN = CASE_MEMORY - 1 }; /* of ContactCase.memory */

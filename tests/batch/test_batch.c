@@ -1,6 +1,6 @@
 /* mild/batch.h on the CPU and, where there is one, on a GPU: against mild/ground.h, against each
  * other, and what it refuses. */
-#include "ground/state.h"
+#include "ground/step/state.h"
 #include "herd_kit.h"
 
 #ifdef MILD_CUDA

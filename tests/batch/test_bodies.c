@@ -4,13 +4,13 @@
 #include "batch_kit.h"
 #include "bodies_case.h"
 #include "case_law.h"
-#include "ground/begin.h"
-#include "ground/grid.h"
+#include "ground/law/begin.h"
+#include "ground/law/models.h"
 #include "ground/map_kit.h"
-#include "ground/models.h"
-#include "ground/scratch.h"
-#include "ground/sole.h"
+#include "ground/sole/sole.h"
+#include "ground/step/scratch.h"
 #include "ground/surface_kit.h"
+#include "ground/terrain/grid.h"
 
 enum { FEET = 2, WALK = 60, FALL = 250, FORCES = 20000 };
 
@@ -94,7 +94,7 @@ static void memory_arrays(const Memory *m, double *const all[CASE_MEMORY]) {
     memcpy((void *)all, arrays, sizeof arrays);
 }
 
-/* The state of bodies.h for a material of ground/state.h, and back. */
+/* The state of bodies.h for a material of ground/step/state.h, and back. */
 static int state_of(int32_t material) {
     return material >= 0               ? material + 1
            : material == MATERIAL_FREE ? -1

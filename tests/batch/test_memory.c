@@ -1,8 +1,8 @@
 /* What the elements of a batch remember beside mild/ground.h: how much of it, and how exactly. */
 #include "batch_kit.h"
 #include "ground/batch/batch.h"
-#include "ground/law.h"
-#include "ground/state.h"
+#include "ground/law/law.h"
+#include "ground/step/state.h"
 
 static MildSole *left, *right;
 

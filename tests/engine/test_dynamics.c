@@ -10,7 +10,7 @@
 #include "robots.h"
 
 #include "control/stand.h"
-#include "ground/grid.h"
+#include "ground/terrain/grid.h"
 
 #include "../sa01.h"
 #include "../widest.h"

@@ -6,7 +6,7 @@
 
 #include "falls.h"
 
-#include "ground/grid.h"
+#include "ground/terrain/grid.h"
 
 enum { FALLS = 24 };
 

@@ -5,13 +5,13 @@
 #include "dense_power.h"
 
 /* The constants of these five. */
-#include "ground/begin.h"
-#include "ground/element_law.h"
-#include "ground/friction.h"
-#include "ground/impulse.h"
-#include "ground/resist.h"
-#include "ground/scratch.h"
-#include "ground/sole.h"
+#include "ground/law/begin.h"
+#include "ground/law/element_law.h"
+#include "ground/law/friction.h"
+#include "ground/law/impulse.h"
+#include "ground/models/resist.h"
+#include "ground/sole/sole.h"
+#include "ground/step/scratch.h"
 
 #define DENSE_STEPS 200 /* of Newton's method at given bounds */
 #define DENSE_ROUNDS 3000
@@ -327,7 +327,7 @@ static void point_velocity(const Find *find, const double *twist, double v[4]) {
     v[3] = find->slope[0] * v[0] + find->slope[1] * v[1] - v[2];
 }
 
-/* How the drag of an element that goes on into virgin ground counts: see src/ground/begin.h. */
+/* How the drag of an element that goes on into virgin ground counts: see src/ground/law/begin.h. */
 static void dense_drag(double dt, DenseElement *e, double gained) {
     const DenseLaw *law = &e->law;
     double a = e->front, extra = fmax(law->drag_rate, 0.0) - fmax(law->mass_rate, 0.0),

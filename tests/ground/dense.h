@@ -39,11 +39,11 @@ typedef struct {
     double seen;                                /* [m] greatest depth that its ground remembers */
     double line, slack;                         /* [N/m], [m] */
     double hit, still,
-        stopped; /* [m/s], [-], [m] of the drag, see src/ground/begin.h; the last without m_a' */
+        stopped; /* [m/s], [-], [m] of the drag, see src/ground/law/begin.h; the last without m_a' */
     double mass,
         active; /* [kg] m_a(a); [N s] what parameters that create energy give, explicitly */
     double radius, damping; /* [N s], [kg] */
-    double hold[2], grip;   /* [N s], [kg] friction that is held, see src/ground/friction.h */
+    double hold[2], grip;   /* [N s], [kg] friction that is held, see src/ground/law/friction.h */
     double before[2],
         turn[2];              /* [m/s] horizontal velocity before the step; where friction begins at
                                   minus it, that again, else 0 (docs/model.md section 17) */

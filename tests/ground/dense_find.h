@@ -5,8 +5,8 @@
 
 #include "dense_law.h"
 
-#include "ground/scratch.h"
-#include "ground/sole.h"
+#include "ground/sole/sole.h"
+#include "ground/step/scratch.h"
 
 /* A foot of the kit, and of the element in hand its place in the world. */
 typedef struct {

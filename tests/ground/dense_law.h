@@ -6,7 +6,7 @@
 #include "dense.h"
 #include "dense_power.h"
 
-#include "ground/element_law.h"
+#include "ground/law/element_law.h"
 
 static int is_resistive(const MildMaterial *m) {
     return m->model == MILD_MODEL_ECC_QUASI || m->model == MILD_MODEL_ECC_QUASI_3D;

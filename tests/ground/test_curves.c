@@ -2,7 +2,7 @@
  * and what the contact step makes of them. */
 #include "ground_kit.h"
 
-#include "ground/models.h"
+#include "ground/law/models.h"
 
 TEST(test_pow) {
     uint64_t random = 3;

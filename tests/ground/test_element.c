@@ -3,7 +3,7 @@
 
 #define ELEMENT_STEP element_step_double
 #include "element_step.inc"
-#include "ground/models.h"
+#include "ground/law/models.h"
 #include "round.h"
 
 #define ELEMENTS 500

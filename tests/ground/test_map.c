@@ -1,8 +1,8 @@
 /* Height maps and patterns against their formulas. */
 #include "map_kit.h"
 
-#include "ground/map.h"
-#include "ground/map_view.h"
+#include "ground/terrain/map.h"
+#include "ground/terrain/map_view.h"
 
 /* Waves and steps at random points: at grid points the formula, between them within the error of
  * bilinear interpolation, (2 pi/wavelength)^2 amplitude cell^2/8. */

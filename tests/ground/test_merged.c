@@ -2,9 +2,9 @@
  * (docs/model.md section 21), and slip takes the support away (section 22). */
 #include "ground_kit.h"
 
-#include "ground/models.h"
-#include "ground/sole.h"
-#include "ground/state.h"
+#include "ground/law/models.h"
+#include "ground/sole/sole.h"
+#include "ground/step/state.h"
 
 static const double pi = 3.14159265358979323846;
 

@@ -2,7 +2,7 @@
  * matched to mild. */
 #include "ground_kit.h"
 
-#include "ground/resist.h"
+#include "ground/models/resist.h"
 
 #define SOFT_MODELS MILD_MODEL_RIGID
 #define LOAD (20.0 * KIT_GRAVITY) /* [N] half of the paper's robot */
@@ -47,7 +47,7 @@ static MildMaterial rival_of(int model, const MildMaterial *mild) {
 /* ---- matching ---- */
 
 /* [m] by how much resistive force theory yields deeper than the element is, going straight down:
- * the elastic travel belongs to its greatest coefficient (src/ground/resist.c). 7 um: 0.4 %
+ * the elastic travel belongs to its greatest coefficient (src/ground/models/resist.c). 7 um: 0.4 %
  * of the force at 1.9 mm. */
 #define RESIST_LEAD (ELEMENT_ELASTIC * (1.0 - 1.0 / RESIST_PEAK))
 

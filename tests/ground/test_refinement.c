@@ -4,7 +4,7 @@
  * sole. docs/model.md, section 16. */
 #include "ground_kit.h"
 
-#include "ground/models.h"
+#include "ground/law/models.h"
 
 enum { LEVELS = 4 };
 static const double pitches[LEVELS] = {0.039, 0.0195, 0.00975, 0.004875};

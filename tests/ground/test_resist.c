@@ -2,8 +2,8 @@
  * coefficients. */
 #include "ground_kit.h"
 
-#include "ground/begin.h"
-#include "ground/resist.h"
+#include "ground/law/begin.h"
+#include "ground/models/resist.h"
 
 #define PI 3.14159265358979323846
 

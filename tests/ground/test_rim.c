@@ -2,8 +2,8 @@
  * to quadrature over the body itself. */
 #include "surface_kit.h"
 
-#include "ground/rim.h"
-#include "ground/sole.h"
+#include "ground/law/rim.h"
+#include "ground/sole/sole.h"
 
 /* Numbers of grains of 2.5 mm: k0 = 1.2 MPa/m, kappa = 0.2 MPa/m; plastic, no bed, no mass. */
 static MildMaterial grains(void) {

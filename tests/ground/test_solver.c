@@ -4,7 +4,7 @@
 #include "dense.h"
 #include "problems.h"
 
-#include "ground/scratch.h"
+#include "ground/step/scratch.h"
 
 static int first_problem = 0, problem_count = 2000, kind_count = 100;
 

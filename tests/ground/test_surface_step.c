@@ -1,8 +1,8 @@
 /* Contact steps of surfaces: against plane soles, closed forms, differences, closed motions. */
 #include "surface_kit.h"
 
-#include "ground/pass.h"
-#include "ground/scratch.h"
+#include "ground/step/pass.h"
+#include "ground/step/scratch.h"
 
 /* A random material of each model in turn. */
 static MildMaterial any_material(uint64_t *random, int index) {

@@ -2,7 +2,7 @@
  * those and no others. */
 #include "ground_kit.h"
 
-#include "ground/models.h"
+#include "ground/law/models.h"
 
 #define SOFT_MODELS MILD_MODEL_RIGID
 

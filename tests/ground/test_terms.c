@@ -2,10 +2,10 @@
  * differences. */
 #include "ground_kit.h"
 
-#include "ground/begin.h"
-#include "ground/impulse.h"
-#include "ground/models.h"
-#include "ground/remember.h"
+#include "ground/law/begin.h"
+#include "ground/law/impulse.h"
+#include "ground/law/models.h"
+#include "ground/law/remember.h"
 
 /* 2 (2 u - u^2/u_f ...): a cone of 20 mm, added mass and drag. At 10 mm a quarter of the flat area
  * is left, and 7/8 of 20/3 mm = 5.8333 mm are recruited. */

@@ -4,8 +4,8 @@
  * 000. */
 #include "ground_kit.h"
 
-#include "ground/friction.h"
-#include "ground/scratch.h"
+#include "ground/law/friction.h"
+#include "ground/step/scratch.h"
 
 #define SOLES 4
 

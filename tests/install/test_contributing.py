@@ -105,8 +105,8 @@ def include_flags(tree):
 def units(tree, touched):
     """The units that see what the recipes changed: each file, and for a header those that its rows make."""
     made = {"src/env/task/task_def.h": ["src/env/task/task_def.c"], "src/env/task/reward.h": ["src/env/task/env.c"],
-            "include/mild/ground.h": ["src/ground/models.c", "src/ground/material.c"],
-            "include/mild/map.h": ["src/ground/map.c"], "src/control/controller.h": ["src/control/controllers.c"],
+            "include/mild/ground.h": ["src/ground/models/models.c", "src/ground/models/material.c"],
+            "include/mild/map.h": ["src/ground/terrain/map.c"], "src/control/controller.h": ["src/control/controllers.c"],
             "src/app/commands.h": ["src/app/commands.c"]}
     found = []
     for name in touched:

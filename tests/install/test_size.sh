@@ -15,4 +15,4 @@ cmake --build "$work" --target mild_shared >"$work/log" 2>&1 || fail "$(cat "$wo
 strip -o "$work/small" "$work/src/libmild.so"
 size=$(stat -c %s "$work/small")
 echo "libmild.so, stripped, for x86-64-v3: $size B; at most $2"
-[ "$size" -le "$2" ] || fail "libmild.so is larger than it may be; see cmake/Library.cmake"
+[ "$size" -le "$2" ] || fail "libmild.so is larger than it may be; see cmake/Ground.cmake"

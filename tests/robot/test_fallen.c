@@ -28,7 +28,7 @@
 #include <stdio.h>
 
 #include "all_robots.h"
-#include "ground/scratch.h"
+#include "ground/step/scratch.h"
 
 static const double seconds = 0.6; /* of a fall */
 static int falls = 270;

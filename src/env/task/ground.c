@@ -8,9 +8,9 @@
 #include <string.h>
 
 #include "env/task/task.h"
-#include "ground/models.h"
+#include "ground/law/models.h"
+#include "ground/law/width.h"
 #include "ground/soil/soil.h"
-#include "ground/width.h"
 
 #define DRAW_TRIES 100 /* of a material that the model can match */
 #define RANDOM_USE_GROUNDS 0x47524e44u

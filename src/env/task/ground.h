@@ -20,7 +20,7 @@ typedef struct TaskSoils {
 
 /* Reads the presets and files that randomize.presets names, if any, and sets def->soils to them. A
  * ground of another model than mild and mild_merged must be one of randomize.model, because only
- * theirs are matched to other models; and it must bear the robot's feet (ground/width.h). */
+ * theirs are matched to other models; and it must bear the robot's feet (ground/law/width.h). */
 MildStatus task_soils_open(TaskDef *def, const Robot *robot, TaskSoils *soils, MildError *error);
 
 struct TaskGrounds {

@@ -3,8 +3,8 @@
 #include "ground/batch/bodies_batch.h"
 #include "ground/batch/contact.h"
 #include "ground/batch/contact_shapes.h"
-#include "ground/inside.h"
-#include "ground/law.h"
+#include "ground/law/law.h"
+#include "ground/step/inside.h"
 
 #include <math.h>
 #include <stdlib.h>

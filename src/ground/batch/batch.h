@@ -3,7 +3,7 @@
 #define MILD_BATCH_PRIVATE_H
 
 #include "ground/batch/material.h"
-#include "ground/map_view.h"
+#include "ground/terrain/map_view.h"
 #include "mild/batch.h"
 
 /* The same for all robots; in float whatever Real is. */

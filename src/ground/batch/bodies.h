@@ -82,7 +82,7 @@ enum {
     BODIES_OWN = 8 /* numbers of a body */
 };
 /* State of an element of a surface: 1 plus the label that it touched down on, or one of these: the
- * MATERIAL_NONE, MATERIAL_FREE and MATERIAL_BURIED of ground/state.h. */
+ * MATERIAL_NONE, MATERIAL_FREE and MATERIAL_BURIED of ground/step/state.h. */
 enum { BODIES_NONE = 0, BODIES_FREE = -1, BODIES_BURIED = -2 };
 
 /* [numbers] of the memory of a surface. worn: bool, with wear. */

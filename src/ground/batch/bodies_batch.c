@@ -7,7 +7,7 @@
 
 #include "device/device.h"
 #include "ground/batch/bodies_robot.h"
-#include "ground/inside.h"
+#include "ground/step/inside.h"
 
 _Static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
 _Static_assert(BODIES_MAX >= MILD_BATCH_FEET_MAX, "room for all");

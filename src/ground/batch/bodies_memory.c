@@ -7,9 +7,9 @@
 #include "device/device.h"
 #include "ground/batch/bodies.h"
 #include "ground/batch/element_memory.h"
-#include "ground/inside.h"
+#include "ground/step/inside.h"
 
-/* The state of bodies.h for a material of ground/state.h. */
+/* The state of bodies.h for a material of ground/step/state.h. */
 static int state_of(int32_t material) {
     return material >= 0                 ? 1 + (material & 0xff)
            : material == MATERIAL_FREE   ? BODIES_FREE

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "ground/batch/batch.h"
-#include "ground/state.h"
+#include "ground/step/state.h"
 
 /* Copies of what all robots remember. */
 typedef struct {

@@ -6,14 +6,14 @@
 #define MILD_BATCH_CONTACT_H
 
 #include "base/hd.h"
-#include "ground/begin.h"
-#include "ground/impulse.h"
-#include "ground/map_view.h"
-#include "ground/motion.h"
-#include "ground/plate.h"
-#include "ground/remember.h"
-#include "ground/rim.h"
-#include "ground/shear.h"
+#include "ground/law/begin.h"
+#include "ground/law/impulse.h"
+#include "ground/law/motion.h"
+#include "ground/law/plate.h"
+#include "ground/law/remember.h"
+#include "ground/law/rim.h"
+#include "ground/law/shear.h"
+#include "ground/terrain/map_view.h"
 
 #define CONTACT_FEET_MAX 4
 #define CONTACT_PADDING REAL(-1e3) /* [m] depth of elements that a foot does not have */

@@ -4,7 +4,7 @@
 #define MILD_GROUND_BATCH_ELEMENT_MEMORY_H
 
 #include "ground/batch/contact.h"
-#include "ground/inside.h"
+#include "ground/step/inside.h"
 
 /* A sole's arrays in the order of ElementMemory. */
 enum { ELEMENT_ARRAYS = sizeof(ElementMemory) / sizeof(Real) };

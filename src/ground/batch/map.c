@@ -3,8 +3,8 @@
 
 #include "device/device.h"
 #include "ground/batch/bodies_batch.h"
-#include "ground/grid.h"
-#include "ground/inside.h"
+#include "ground/step/inside.h"
+#include "ground/terrain/grid.h"
 
 /* First labels of all cells; NULL when out of memory or when a border is blended. */
 static unsigned char *first_labels(const MildMap *map, size_t cells, MildError *error) {

@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "device/device.h"
-#include "ground/begin.h"
-#include "ground/inside.h"
-#include "ground/width.h"
+#include "ground/law/begin.h"
+#include "ground/law/width.h"
+#include "ground/step/inside.h"
 
 #define MATERIAL_LAW_INDEX(name) MATERIAL_LAW_##name,
 enum { LAW_NUMBERS(MATERIAL_LAW_INDEX) MATERIAL_LAW_COUNT };

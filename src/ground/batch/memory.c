@@ -8,7 +8,7 @@
 #include "ground/batch/bodies_batch.h"
 #include "ground/batch/contact.h"
 #include "ground/batch/element_memory.h"
-#include "ground/inside.h"
+#include "ground/step/inside.h"
 
 enum { MEMORY_ROBOTS = 256 }; /* copied at once */
 

@@ -3,7 +3,7 @@
 #ifndef MILD_ENGINE_GROUND_H
 #define MILD_ENGINE_GROUND_H
 
-#include "ground/map_view.h"
+#include "ground/terrain/map_view.h"
 #include "robot/engine/data.h"
 
 typedef struct {

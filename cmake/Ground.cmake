@@ -1,0 +1,54 @@
+# The ground that a simulator links, in five wings: the law of an element, the terrain, the soles, the step that joins them, and the
+# models, whose rows fill the table of law/models.h. `layer_ground` is all of them.
+mild_layer(ground/law layer_base)
+mild_layer(ground/terrain layer_base)
+mild_layer(ground/sole layer_law)
+mild_layer(ground/step layer_terrain layer_sole)
+mild_layer(ground/models layer_step)
+target_link_libraries(layer_step INTERFACE $<LINK_ONLY:layer_models>) # the table's rows
+set(ground_wings law terrain sole step models)
+add_library(layer_ground INTERFACE)
+set(ground_sources)
+foreach(wing ${ground_wings})
+  target_link_libraries(layer_ground INTERFACE layer_${wing})
+  get_target_property(sources layer_${wing} SOURCES)
+  list(APPEND ground_sources ${sources})
+endforeach()
+# Slots lie in blocks of a vector (step/slots.h): of eight lanes where gcc takes vectors of 512 bits.
+if(CMAKE_C_COMPILER_ID STREQUAL GNU)
+  separate_arguments(flags NATIVE_COMMAND "${CMAKE_C_FLAGS}")
+  execute_process(COMMAND ${CMAKE_C_COMPILER} -march=${MILD_MARCH} ${flags} -Q --help=target OUTPUT_VARIABLE said ERROR_QUIET)
+  if(said MATCHES "-mprefer-vector-width=[ \t]+(none|512)")
+    target_compile_definitions(mild_options INTERFACE MILD_WIDEST_VECTORS)
+  endif()
+endif()
+# Small, because every simulator loads it: -O3 or -O2 for the loops over elements that take most of a step, -Oz for the rest.
+# No exception passes through C, so no tables to unwind it by. A section for each function and table: a program that links the
+# archive with -Wl,--gc-sections takes only what it calls.
+include(CheckCCompilerFlag)
+check_c_compiler_flag(-Oz mild_has_oz) # gcc since 12
+set(smallest $<IF:$<BOOL:${mild_has_oz}>,-Oz,-Os>)
+set(small -fno-asynchronous-unwind-tables -ffunction-sections -fdata-sections -fno-plt)
+if(CMAKE_C_COMPILER_ID STREQUAL GNU) # nothing moves ahead of a loop that has no register left for it: 6 kB
+  list(APPEND small -fno-gcse -fno-ipa-cp-clone -fno-move-loop-invariants -fno-tree-loop-im -fira-loop-pressure -flive-range-shrinkage)
+endif()
+set(ground_base_sources) # what libmild has of the layer base (cmake/Library.cmake)
+foreach(name error field text)
+  list(APPEND ground_base_sources ${CMAKE_CURRENT_SOURCE_DIR}/base/${name}.c)
+endforeach()
+foreach(source ${ground_sources} ${ground_base_sources})
+  get_filename_component(name ${source} NAME_WE)
+  if(name STREQUAL pass)
+    set(level -O3)
+  elseif(name MATCHES "^(gather|moments|newton_step|solve|sweep)$")
+    set(level -O2)
+  else()
+    set(level ${smallest})
+  endif()
+  set_property(SOURCE ${source} APPEND PROPERTY COMPILE_OPTIONS
+    "$<$<CONFIG:Release>:${small}>" $<$<AND:$<CONFIG:Release>,$<NOT:${mild_sanitized}>>:${level}>)
+endforeach()
+# The element's law uses fused multiply-add, and one instruction for each maximum. NaN is therefore detected elsewhere: in
+# solve.c, and for materials in mixture.c.
+set_property(SOURCE ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/pass.c ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/moments.c APPEND PROPERTY
+  COMPILE_OPTIONS -ffp-contract=fast -ffinite-math-only -fno-signed-zeros)

@@ -1,0 +1,2 @@
+#define POWER_FN /* for the files that define POWER_CALLED */
+#include "ground/law/power.h"

@@ -1,0 +1,14 @@
+#include "ground/law/model.h"
+#include "ground/models/resist.h"
+
+const ModelRow model_ecc_quasi_3d = {
+    .info = {.summary = "three-dimensional resistive force theory under every element",
+             .source = "Agarwal et al. 2023",
+             .fields = {"zeta", "mu", "k_drift", "b_drift", "bed_depth", "refill"},
+             .scaled = {"zeta"},
+             .match_note = "recovery 0; mu, k_drift, b_drift 0: friction is part of zeta"},
+    .law = resist_law,
+    .reference = resist_material,
+    .motion = LAW_SPACE,
+    .direction = resist_space,
+};
