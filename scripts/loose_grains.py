@@ -3,7 +3,7 @@
 size and its depth.
 
     PYTHONPATH=build/python .venv/bin/python scripts/loose_grains.py        # 3 s
-    ... scripts/loose_grains.py --figure docs/loose-grains.png
+    ... scripts/loose_grains.py --figure loose-grains.png
     grains/run.py --only '^(loose|medium)' --gpus 0                         # makes the records that are not there
 
 p ~ D^a u^n near a depth; a from all discs at that depth, n from each disc between half of it and twice of it. Where nothing but the
