@@ -17,8 +17,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ground/step/scratch.h"
 #include "ground/law/width.h"
+#include "ground/step/scratch.h"
 #include "plugin/visual.h"
 
 #define JOINT_ROUNDS 30  /* solves of the ground with the constraints in its response */

@@ -39,7 +39,7 @@ typedef struct {
     double seen;                                /* [m] greatest depth that its ground remembers */
     double line, slack;                         /* [N/m], [m] */
     double hit, still,
-        stopped; /* [m/s], [-], [m] of the drag, see src/ground/law/begin.h; the last without m_a' */
+        stopped; /* [m/s], [-], [m] of the drag, see ground/law/begin.h; the last without m_a' */
     double mass,
         active; /* [kg] m_a(a); [N s] what parameters that create energy give, explicitly */
     double radius, damping; /* [N s], [kg] */
