@@ -19,7 +19,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 PICTURES = (".png", ".webp", ".svg", ".csv")
 KINDS = {".c": "c", ".h": "c", ".cu": "cuda", ".cpp": "cpp", ".py": "python", ".sh": "bash", ".json": "json", ".ini": "ini", ".xml": "xml",
          ".ipynb": "json", ".cff": "yaml", ".mjs": "javascript", ".js": "javascript"}
-LAST = dict.fromkeys(["CHANGELOG.md", "docs/training-log.md", "docs/api.md"], "---\nsearch:\n  boost: 0.3\n---\n\n")  # of what a search finds
+LAST = dict.fromkeys(["CHANGELOG.md", "docs/log.md", "docs/api.md"], "---\nsearch:\n  boost: 0.3\n---\n\n")  # of what a search finds
 # What the index of docs/README.md leaves to the tree's other pages.
 MORE = ["docs/README.md", "docs/api.md", "configs/default.ini", "examples/README.md", "CHANGELOG.md", "VERSIONING.md", "SECURITY.md", "src/README.md"]
 

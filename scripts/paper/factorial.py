@@ -53,7 +53,7 @@ from measure import MILD, NINE, ROOT, UNSEEN, law_of, mean, mild
 CONTROLLERS = {"mlp": "MLP", "clock": "Clock", "ht2": "HT-2", "flat": "ours, no modulation", "ours": "ours"}
 GROUNDS = ["rigid", "ecc_spring", "mild"]
 SEARCH = [(kl_target, robots) for kl_target in (0.01, 0.02) for robots in (1024, 4096)]
-ENTROPY = 0.004  # its weight; docs/training-log.md says why it is not searched for
+ENTROPY = 0.004  # its weight; docs/log.md says why it is not searched for
 EQUAL = 4096  # robots of every training with --steps: 250 M steps of 1024 take ten minutes of a GPU
 TUNING = 0.25  # share of the time
 STARTING = 8  # [s] beside the time of a training, until one has been seen

@@ -122,7 +122,7 @@ template <class Shapes> int backward(const Job &job, const Bf16 *y, Bf16 *to, fl
         {{{{{}, {}, {}}, {partial}}, {}}, y, {job.width, _1{}, 0}, to, {job.width, _1{}, 0}});
 }
 
-/* The fastest of those tried on an H100 (docs/training-log.md). Sums over tiles of 128 columns are
+/* The fastest of those tried on an H100 (docs/log.md). Sums over tiles of 128 columns are
  * slow: CUTLASS keeps them in the thread's local memory. */
 using ForwardWide = Shapes<128, 256, 2>;
 using ForwardMiddle = Shapes<128, 128, 1>;
