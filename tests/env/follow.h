@@ -276,8 +276,8 @@ static void follow(const char *robot, TaskDef def, int device, const MildMapDef 
     printf(
         "%s, %s, device %d: %d of %d steps together, %d episodes ended, %d by time; rewards of the "
         "first ten steps differ by %.1e\n",
-        robot_name(pair.robot), mild_model_names[model], device, together, steps, done, timeouts,
-        worst);
+        robot_name(pair.robot), model < MILD_MODELS ? mild_model_names[model] : "own", device,
+        together, steps, done, timeouts, worst);
     for (int end = 0; end < TASK_END_COUNT; end++) {
         printf("%s %d%s", task_end_names[end], ends[end], end < TASK_END_COUNT - 1 ? ", " : "\n");
     }
