@@ -29,8 +29,8 @@ include(CheckCCompilerFlag)
 check_c_compiler_flag(-Oz mild_has_oz) # gcc since 12
 set(smallest $<IF:$<BOOL:${mild_has_oz}>,-Oz,-Os>)
 set(small -fno-asynchronous-unwind-tables -ffunction-sections -fdata-sections -fno-plt)
-if(CMAKE_C_COMPILER_ID STREQUAL GNU) # nothing moves ahead of a loop that has no register left for it: 6 kB
-  list(APPEND small -fno-gcse -fno-ipa-cp-clone -fno-move-loop-invariants -fno-tree-loop-im -fira-loop-pressure -flive-range-shrinkage)
+if(CMAKE_C_COMPILER_ID STREQUAL GNU) # nothing moves ahead of a loop that has no register left for it: 5 kB
+  list(APPEND small -fno-gcse -fno-ipa-cp-clone -fira-loop-pressure -flive-range-shrinkage)
 endif()
 set(ground_base_sources) # what libmild has of the layer base (cmake/Library.cmake)
 foreach(name error field text)
