@@ -1,7 +1,6 @@
 /* Bodies thrown at and into the ground, far from any robot: free bodies of 1 to 60 kg with any
  * inertia and lever, some deep in the firm bed, and point masses on sticks. `ground_test_thrown
- * COUNT [FIRST]` runs other draws than `make test`; docs/model.md sections 7 and 17 report 20
- * 000. */
+ * COUNT [FIRST]` runs other draws than `make test`; docs/model.md section 7 reports 3000. */
 #include "ground_kit.h"
 
 #include "ground/law/friction.h"

@@ -1,4 +1,4 @@
-/* Gait clock (docs/task.md section 4): a foot is in stance during the half of the period that
+/* Gait clock (docs/task.md section 7): a foot is in stance during the half of the period that
  * starts at its offset. */
 #ifndef TASK_GAIT_H
 #define TASK_GAIT_H
