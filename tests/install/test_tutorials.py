@@ -3,8 +3,8 @@
 
 A block behind 'This is `FILE`' (or `FILE`, in a line that ends with a colon) is saved as FILE. Blocks of sh are run, with `mild` and
 `python` on the PATH. A block of text is what the block before it prints: words are equal, numbers within 5 % or one of the last digit,
-in a row of walks (it has '+-') the mean before it within 10 % and the rest within half: another processor rounds otherwise, and a walk
-amplifies that. A line '...' stands for any lines. Trainings are cut short by SHORT. The page ends with a picture, which must have been made.
+in a row of walks (it says 3/3 or yes, upright) the speed within 10 % and the rest within half: another processor rounds otherwise, and a
+walk amplifies that. A line '...' stands for any lines. Trainings are cut short by SHORT. The page ends with a picture, which must have been made.
 Usage: test_tutorials.py SOURCE_FOLDER PATH_TO_MILD PYTHON_PACKAGE PAGE [--keep FOLDER]"""
 import argparse
 import os
@@ -18,6 +18,7 @@ import tempfile
 BLOCK = re.compile(r"^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.M | re.S)
 FILE = re.compile(r"`(?P<name>[\w./-]+\.\w+)`[^`\n]*:\n\n$")
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+WALK = re.compile(r"\d+/\d+|yes")
 LINES = 80
 # What a reader waits for longer than a test may: (page, words of the page, words that are run).
 SHORT = [
@@ -71,9 +72,10 @@ def near(wanted, got, share=0.05):
 def same(wanted, got):
     wanted, got = wanted.split(), got.split()
     shares = [0.05] * len(wanted)
-    if "+-" in wanted:
+    speed = next((i - 1 for i, word in enumerate(wanted) if word in ("+-", "m/s")), None)
+    if speed is not None and any(WALK.fullmatch(word) for word in wanted):
         shares = [0.5] * len(wanted)
-        shares[wanted.index("+-") - 1] = 0.1
+        shares[speed] = 0.1
     return len(wanted) == len(got) and all(map(near, wanted, got, shares))
 
 
@@ -134,13 +136,18 @@ def look_for_picture(source, page, work):
 
 def check_itself():
     """What this test is for is seen."""
-    for wanted, printed in [("a 1.00", "a 1.06"), ("a 1", "b 1"), ("a", "a\nb"), ("a\nb", "a"), ("a\n...\nc", "a\nb"), ("1 mm", "1 m"), ("3/3", "2/3"), ("3/3 1 +- 0.1", "2/3 1 +- 0.1"),
-                           ("1.0 +- 0.10", "1.2 +- 0.10"), ("1.0 +- 0.10", "1.0 +- 0.16")]:
+    differ = [("a 1.00", "a 1.06"), ("a 1", "b 1"), ("a", "a\nb"), ("a\nb", "a"), ("a\n...\nc", "a\nb"), ("1 mm", "1 m"), ("3/3", "2/3"),
+              ("3/3 1 +- 0.1", "2/3 1 +- 0.1"), ("3/3 1.0 +- 0.10", "3/3 1.2 +- 0.10"), ("3/3 1.0 +- 0.10", "3/3 1.0 +- 0.16"),
+              ("1.0 m/s yes", "1.2 m/s yes"), ("1.0 m/s yes", "1.0 m/s no"), ("9.0 1.0 m/s", "6.0 1.0 m/s")]
+    equal = [("a 1.00", "a   1.02"), ("0.01", "0.02"), ("a\n...", "a\nb\nc"), ("...\nc 5e+05", "a\nc 5.1e+05"),
+             ("3/3 1.0 +- 0.10 9", "3/3 1.1 +- 0.06 5"), ("1.0 m/s yes 9", "1.1 m/s yes 5")]
+    for wanted, printed in differ:
         if compare(wanted, printed) is None:
             raise Wrong(f"the test does not distinguish {wanted!r} from {printed!r}")
-    for wanted, printed in [("a 1.00", "a   1.02"), ("0.01", "0.02"), ("1.0 +- 0.10 9", "1.1 +- 0.06 5"), ("a\n...", "a\nb\nc"), ("...\nc 5e+05", "a\nc 5.1e+05")]:
+    for wanted, printed in equal:
         if compare(wanted, printed) is not None:
             raise Wrong(f"the test distinguishes {wanted!r} from {printed!r}")
+
 
 
 def main():
