@@ -1,25 +1,26 @@
 #!/usr/bin/env python3
-"""The learner of scripts/rivals: advantages against numbers by hand and a plain sum, and Clock finds the best action of a task made up here.
-Exits with 77 where PyTorch is missing. Usage: test_learners.py SOURCE_FOLDER"""
+"""The learner of scripts/rivals: advantages against numbers by hand and a plain sum, Clock finds the best action of a task made up here, and
+both rivals train in the package's environments. Exits with 77 where PyTorch or the package is missing. Usage: test_learners.py SOURCE_FOLDER"""
 import dataclasses
 import pathlib
+import subprocess
 import sys
 import tempfile
 import types
 import unittest
 
-try:
-    import torch
-except ImportError as missing:
-    print(f"skipped: {missing}")
-    sys.exit(77)
-
 root = pathlib.Path(sys.argv.pop(1)).resolve()
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(root / "scripts/rivals"))
-import files  # noqa: E402
-import ppo  # noqa: E402
-import train_clock  # noqa: E402
+try:
+    import torch
+
+    import files
+    import ppo
+    import train_clock
+except ImportError as missing:
+    print(f"skipped: {missing}")
+    sys.exit(77)
 
 torch.set_num_threads(1)
 CPU = torch.device("cpu")
@@ -99,6 +100,19 @@ class Learning(unittest.TestCase):
         self.assertEqual((texts["kind"], texts["note"]), ("mild clock", "made up"))
         for name, weight in clock.ppo.mean_weights.items():
             self.assertTrue(torch.equal(tensors[f"actor.{name}"], weight))
+
+    def test_in_the_environments(self):
+        """Two iterations of each rival, by its command."""
+        with tempfile.TemporaryDirectory() as folder:
+            for name, more in (("clock", ()), ("ht2", ("--record", "40", "--pretrain", "2", "--warm", "1"))):
+                out = pathlib.Path(folder, name)
+                subprocess.run([sys.executable, "-B", root / f"scripts/rivals/train_{name}.py", "--out", out, "--device", "cpu", "--envs", "4",
+                                "--iterations", "2", *more], check=True, stdout=subprocess.DEVNULL)
+                rows = (out / "log.csv").read_text().splitlines()
+                self.assertEqual(len(rows), 3)
+                tensors, texts = files.read(out / f"{name}.safetensors")
+                self.assertEqual(texts["kind"], f"mild {name}")
+                self.assertTrue(all(torch.isfinite(tensor).all() for tensor in tensors.values()))
 
 
 unittest.main()
