@@ -478,7 +478,7 @@ def parse(words):
     parser.add_argument("--judges", type=int, default=2, help="judges at a time, which share half of the cores (default 2)")
     parser.add_argument("--trials", type=int, default=5, help="of each cell (default 5)")
     parser.add_argument("--seconds", type=float, default=1e9, help="[s] no training begins that would not end by then")
-    parser.add_argument("--python", default=sys.executable, help="with PyTorch, for clock and ht2 (default: this one)")
+    parser.add_argument("--python", default=sys.executable, help="with PyTorch and mild, for clock and ht2 (default: this one)")
     parser.add_argument("--take", default="", metavar="FOLDER[,FOLDER]", help="other folders of this command, whose results belong to these")
     parser.add_argument("--judge", action="store_true", help="train nothing, judge what is trained")
     parser.add_argument("--report", action="store_true", help="train and judge nothing")

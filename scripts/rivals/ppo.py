@@ -1,6 +1,5 @@
 """Proximal policy optimisation (Schulman et al. 2017) of a network of PyTorch in the environments of mild, with what src/learn/ppo.h
-has: generalised advantages, a learning rate that follows the KL divergence, a critic with its own observation, Muon. And what samples.py
-tries: advantages that are computed anew in every epoch, by V-trace or not, and minibatches of the environments that surprise the critic."""
+has: generalised advantages, a learning rate that follows the KL divergence, a critic with its own observation."""
 import math
 from dataclasses import dataclass
 
@@ -28,9 +27,6 @@ class Settings:
     std_end: float = 0.12  # greatest at the end of the run
     end: float = 0.15  # share of the run in which KL target and noise fall
     average: float = 0.95  # decay per iteration of the running mean of the weights, which is saved
-    optimizer: str = "adam"  # or muon, for the weights between hidden layers
-    advantages: str = "once"  # epoch: anew in each epoch, with the critic of then; vtrace: and with the actor of then, see Rollout
-    priority: float = 0.0  # alpha: a minibatch draws environments by their sum of |advantage| to this power; 0: every sample once an epoch
 
 
 def mlp(widths, activation):
@@ -68,48 +64,17 @@ class Rollout:
         self.done, self.timeout = zeros(steps, envs), zeros(steps, envs)
         self.valid = torch.ones(steps, envs, device=device)
 
-    def advantages(self, value, gamma, decay, ratio=None):
-        """Generalised advantages and returns (Schulman et al. 2016). An episode that ended by time goes on with the value before.
-
-        ratio: [steps][envs] pi/mu of the present policy and the rollout's. Then V-trace (Espeholt et al. 2018, eq 1 and remark 1, both
-        clips 1), as PufferLib has it: with w_t = min(1, pi/mu)
-            v_s - V_s = sum over t >= s of (gamma lambda)^(t-s) w_s .. w_(t-1) w_t (r_t + gamma V_(t+1) - V_t)
-        is the advantage, and v_s the return. With pi = mu these are the generalised ones."""
+    def advantages(self, value, gamma, decay):
+        """Generalised advantages and returns (Schulman et al. 2016). An episode that ended by time goes on with the value before."""
         reward = self.reward + gamma * self.timeout * value[:-1]
         advantage = torch.zeros_like(reward)
         after = torch.zeros_like(reward[0])
-        weight = torch.ones_like(reward) if ratio is None else ratio.clamp(max=1)
         for t in reversed(range(len(reward))):
             goes_on = 1 - self.done[t]
             error = reward[t] + gamma * goes_on * value[t + 1] - value[t]
-            after = weight[t] * (error + gamma * decay * goes_on * after)
+            after = error + gamma * decay * goes_on * after
             advantage[t] = after
         return advantage, advantage + value[:-1]
-
-
-class Muon:
-    """Muon (Jordan et al. 2024) with steps as long as Adam's (Liu et al. 2025), as src/learn/muon.h has it."""
-
-    def __init__(self, weights):
-        self.weights, self.momentum = weights, [torch.zeros_like(weight) for weight in weights]
-
-    @torch.no_grad()
-    def step(self, rate):
-        for weight, momentum in zip(self.weights, self.momentum):
-            momentum.mul_(0.95).add_(weight.grad)
-            x = weight.grad + 0.95 * momentum
-            turned = len(x) > x.shape[1]
-            x = x.T if turned else x
-            x = x / (x.norm() + 1e-7)
-            for _ in range(5):
-                gram = x @ x.T
-                x = 3.4445 * x + (-4.7750 * gram + 2.0315 * gram @ gram) @ x
-            weight.sub_(rate * 0.2 * math.sqrt(max(x.shape)) * (x.T if turned else x))
-
-
-def between_hidden(net):
-    """Weights of the linear layers that are neither the first nor the last."""
-    return [layer.weight for layer in net.modules() if isinstance(layer, nn.Linear)][1:-1]
 
 
 class Ppo:
@@ -120,12 +85,9 @@ class Ppo:
         self.log_std = nn.Parameter(torch.full((actions,), math.log(settings.std), device=device))
         self.mean_weights = None  # running mean of the actor's
         self.rate, self.kl_target, self.std_max = settings.learning_rate, settings.kl_target, 10.0
-        self.muon = Muon(between_hidden(actor) + between_hidden(critic)) if settings.optimizer == "muon" else None
-        moved = {id(weight) for weight in self.muon.weights} if self.muon else set()
-        groups = [{"params": [p for p in (*actor.parameters(), self.log_std) if id(p) not in moved]},
-                  {"params": [p for p in critic.parameters() if id(p) not in moved], "lr": settings.critic_rate or self.rate}]
+        groups = [{"params": [*actor.parameters(), self.log_std]},
+                  {"params": [*critic.parameters()], "lr": settings.critic_rate or self.rate}]
         self.parameters = [*actor.parameters(), self.log_std, *critic.parameters()]
-        self.done = 0.0  # share of the run
         self.optimizer = torch.optim.Adam(groups, lr=self.rate, fused=device.type == "cuda")
 
     def sample(self, mean):
@@ -137,7 +99,7 @@ class Ppo:
 
     def anneal(self, done):
         """done: share of the run, 0 .. 1."""
-        s, self.done = self.settings, done
+        s = self.settings
         share = min(max((done - 1 + s.end) / s.end, 0), 1) if s.end > 0 else 0
         self.kl_target = s.kl_target * 0.1**share
         if share > 0:
@@ -161,39 +123,17 @@ class Ppo:
         norm = nn.utils.clip_grad_norm_(self.parameters, self.settings.gradient_norm)
         if torch.isfinite(norm):
             self.optimizer.step()
-            if self.muon:
-                self.muon.step(self.rate)
             with torch.no_grad():
                 self.log_std.clamp_(math.log(self.settings.std_min), math.log(self.std_max))
 
     @torch.no_grad()
-    def targets(self, rollout, evaluate=None):
-        """Advantages, scaled to mean 0 and spread 1, and returns, flattened. evaluate: of update, if the actor has moved since."""
+    def targets(self, rollout):
+        """Advantages, scaled to mean 0 and spread 1, and returns, flattened."""
         s, r = self.settings, rollout
-        value, ratio = torch.stack([self.values(row) for row in r.critic]), None
-        if evaluate and s.advantages == "vtrace":
-            rows = torch.arange(r.reward.numel(), device=self.device).chunk(s.minibatches)
-            now = torch.cat([evaluate(part).float() for part in rows]).view_as(r.action)
-            ratio = torch.exp(log_density(r.action, now, self.log_std) - r.log_prob)
-        advantage, returns = r.advantages(value, s.gamma, s.decay, ratio)
+        advantage, returns = r.advantages(torch.stack([self.values(row) for row in r.critic]), s.gamma, s.decay)
         good = r.valid > 0
         centre, spread = advantage[good].mean(), advantage[good].std() + 1e-8
         return ((advantage - centre) / spread).flatten(), returns.flatten()
-
-    def minibatches(self, rollout, advantage):
-        """Rows of each minibatch of an epoch, and the weights of their advantages or None. With a priority, as PufferLib: whole rollouts of
-        environments, with replacement; weights (number times probability)^-beta, beta from 0.2 to near 1 over the run (Schaul et al. 2016)."""
-        s, (steps, envs) = self.settings, rollout.reward.shape
-        if not s.priority:
-            for rows in torch.randperm(steps * envs, device=self.device).chunk(s.minibatches):
-                yield rows, None
-            return
-        chance = advantage.view(steps, envs).abs().sum(0) ** s.priority + 1e-6
-        chance, beta = chance / chance.sum(), 0.2 + 0.8 * s.priority * self.done
-        first = envs * torch.arange(steps, device=self.device)[:, None]
-        for _ in range(s.minibatches):
-            drawn = torch.multinomial(chance, envs // s.minibatches, replacement=True)
-            yield (first + drawn).flatten(), ((envs * chance[drawn]) ** -beta).repeat(steps)
 
     def update(self, rollout, evaluate, extra=None, actor=True):
         """evaluate(rows): means of the actions of these flattened rows; extra(rows, means): a loss to add. actor: bool, off trains
@@ -206,10 +146,8 @@ class Ppo:
             action, mean = r.action.flatten(0, 1), r.mean.flatten(0, 1)
             log_prob, log_std = r.log_prob.flatten(), self.log_std.clone()
         kls, surrogates, values, extras = [], [], [], []
-        for epoch in range(s.epochs):
-            if epoch and s.advantages != "once":
-                advantage, returns = self.targets(r, evaluate)
-            for rows, share in self.minibatches(r, advantage):
+        for _ in range(s.epochs):
+            for rows in torch.randperm(r.reward.numel(), device=self.device).chunk(s.minibatches):
                 w = weight[rows]
                 value_loss = (w * (self.values(critic[rows]) - returns[rows]) ** 2).mean()
                 values.append(value_loss.detach())
@@ -221,7 +159,7 @@ class Ppo:
                     kl = divergence(mean[rows], log_std, now, self.log_std).mean()
                     self.follow(kl.item())
                 ratio = torch.exp(log_density(action[rows], now, self.log_std) - log_prob[rows])
-                a = advantage[rows] if share is None else share * advantage[rows]
+                a = advantage[rows]
                 surrogate = (w * torch.max(-ratio * a, -ratio.clamp(1 - s.clip, 1 + s.clip) * a)).mean()
                 other = extra(rows, now) if extra else torch.zeros((), device=self.device)
                 self.step(surrogate + value_loss - s.entropy * self.log_std.sum() + other)

@@ -32,7 +32,6 @@ def options(text, minutes):
                         "ground (scripts/paper/factorial.py)")
     parser.add_argument("--kl-target", type=float, help="[nat] of the learner (default: the method's)")
     parser.add_argument("--entropy", type=float, help="weight of the learner (default: the method's)")
-    parser.add_argument("--library", help="libmild_envs.so (default: in build/, or of this bundle)")
     return parser
 
 
@@ -62,7 +61,7 @@ def open_envs(arguments, keys):
         keys = {"randomize__model": arguments.model, **{key: value for key, value in keys.items() if key == "task__assist"}}
     else:
         keys = {**RIGID, **keys}
-    return Envs(arguments.config, arguments.library, **where, **keys)
+    return Envs(arguments.config, **where, **keys)
 
 
 class Progress:

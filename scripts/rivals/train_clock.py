@@ -3,7 +3,7 @@
 Reinforcement Learning): two layers of 256 ReLU that see one frame with the gait clock, 40 Hz, smoothed actions, a mirror loss, rigid
 contact whose time constant is drawn. Task, rewards and commands are those of configs/walk.ini.
 
-  cmake -S . -B build -DMILD_CUDA=ON && cmake --build build --target mild_envs mild
+  cmake -S . -B build -DMILD_CUDA=ON && cmake --build build --target _envs mild
   scripts/rivals/train_clock.py --out runs/clock
   build/mild eval --controller clock --policy runs/clock/clock.safetensors --config configs/walk.ini --ground rigid --speed 0.6
 """

@@ -4,7 +4,7 @@ transformer over 16 frames and the actions between them. Stage 1 predicts the ne
 an earlier policy (policies/mild.safetensors) on flat ground; a learned mask token stands for actions that are missing. Stage 2 is PPO
 on uneven rigid ground. Task, rewards and commands are those of configs/walk.ini.
 
-  cmake -S . -B build -DMILD_CUDA=ON && cmake --build build --target mild_envs mild
+  cmake -S . -B build -DMILD_CUDA=ON && cmake --build build --target _envs mild
   scripts/rivals/train_ht2.py --out runs/ht2
   build/mild eval --controller ht2 --policy runs/ht2/ht2.safetensors --config configs/walk.ini --ground rigid --speed 0.6
 """

@@ -18,7 +18,6 @@ SOURCE, MILD = pathlib.Path(sys.argv[1]), sys.argv[2]
 sys.path.insert(0, str(SOURCE / "scripts"))
 import judge as judge_module  # noqa: E402
 import judge_anchors  # noqa: E402
-import judge_ball  # noqa: E402
 import judge_entries  # noqa: E402
 import judge_loose  # noqa: E402
 import mild  # noqa: E402
@@ -153,20 +152,6 @@ def a_command(folder):
     assert run.returncode == 2 and run.stderr.count("\n") == 1 and "python -m mild judge" in run.stderr, run.stderr
 
 
-def a_ball_has_a_rim():
-    """Of judge_ball.py: its wet radius, and that its forms are the same under a ball that is a plate there."""
-    ball = Sole("sphere:0.05", 0.001)
-    u, d, e, inside, b = judge_ball.rim(ball, 0.015, True)
-    wet = math.sqrt(0.05**2 - 0.035**2)
-    assert abs(b / wet - 1) < 0.01 and d < 6e-4 and abs(e[inside].mean() / (wet / 3) - 1) < 0.05 and (u[inside] > 0).all()
-    _, deeper, _, inside, b = judge_ball.rim(ball, 0.04, True)
-    assert b < 0.9 * math.sqrt(0.05**2 - 0.01**2) and deeper > 0.01 and inside.sum() < (ball.z < 0.04).sum()  # walls
-    numbers = 1.2e6, 0.2e6, 0.1
-    low, high, same = (judge_ball.force(form, numbers, ball, 0.015) for form in judge_ball.FORMS)
-    heap = math.pi / 3 * 1e6 * 0.1 * wet**3
-    assert abs(low / heap - 1) < 0.08 and abs(high / (1.2 * heap) - 1) < 0.08 and abs(same / high - 1) < 1e-6, (low, high, heap)
-
-
 def real_numbers():
     """Poppy seeds by hand; and resistive force theory (ecc_quasi), whose own table is of all their media, is near them."""
     up, along = judge_anchors.poppy_stress("loose", math.radians(30), math.pi / 2)
@@ -232,7 +217,6 @@ if __name__ == "__main__":
     a_sole_has_its_area()
     measures_by_hand()
     real_numbers()
-    a_ball_has_a_rim()
     with tempfile.TemporaryDirectory() as name:
         make(pathlib.Path(name))
         the_truth_is_found_and_others_are_not(pathlib.Path(name))

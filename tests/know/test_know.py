@@ -119,8 +119,6 @@ def cared(folder):
     true_ground = walk("true", "--clock", "10,1.6,1.6", "--true-ground")  # 12 s have 15 footsteps of it
     plain, never = walk("plain"), walk("never", "--clock", "1e-9,1.6,1.6")
     assert plain["walks"] == never["walks"] and plain["rows"] == never["rows"] and deep(plain) > 0 and deep(true_ground) == 0
-    said = subprocess.run([sys.executable, root / "scripts/know_pair.py", folder / "plain.json", folder / "never.json"], check=True, capture_output=True, text=True).stdout
-    assert "6 walks" in said and "0 saved, 0 lost" in said and said.count("+0.0000 +- 0.0000") == 2, said
     found = walk("rubber", "--ground", "rubber")["walks"]
     run("eval", "--ground", "rubber", "--speed", 0.6, "--trials", 6, "--seconds", 12, "--json", folder / "eval.json")
     row = json.loads((folder / "eval.json").read_text())["rows"][0]
