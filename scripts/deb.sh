@@ -53,7 +53,7 @@ test_package() {
     inside 'source /usr/share/bash-completion/completions/mild && COMP_WORDS=(mild tra) COMP_CWORD=1 && _mild && echo $COMPREPLY' |
         grep -x train >/dev/null
     if [ -e "$root/web" ]; then
-        inside '{ timeout 2 mild web --port 0 || true; }' | grep '^mild web: http' >/dev/null
+        inside '{ mild web 2>&1 || true; }' | grep 'install python3' >/dev/null # which is but recommended
     else
         inside '{ mild web 2>&1 || true; }' | grep 'this installation has no page' >/dev/null
     fi
