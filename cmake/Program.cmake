@@ -1,4 +1,4 @@
-# Installation of the program, its data, man page and completion, and the Debian package (`make deb`, docs/install.md).
+# Installation of the program, its data and manual page, and the Debian package (`make deb`, docs/install.md).
 # MuJoCo has no Debian package: its library goes into lib/mild, where only this program looks for it.
 set(MILD_MUJOCO_PLACE lib/mild)
 set_target_properties(mild PROPERTIES INSTALL_RPATH "$ORIGIN/../${MILD_MUJOCO_PLACE}")
@@ -17,21 +17,18 @@ file(GLOB mujoco_licences ${mujoco_folder}/../mujoco*.dist-info/licenses/*)
 install(FILES ${mujoco_licences} DESTINATION share/doc/mild/mujoco COMPONENT program)
 install(FILES ${daqp_folder}/../LICENSE DESTINATION share/doc/mild RENAME LICENSE-DAQP COMPONENT program OPTIONAL)
 
-# The program prints both from the tables of its help.
-file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/pages.cmake.in @ONLY CONTENT [=[
-set(pages @CMAKE_BINARY_DIR@/generated/pages)
-file(MAKE_DIRECTORY ${pages})
-execute_process(COMMAND $<TARGET_FILE:mild> info completion OUTPUT_FILE ${pages}/mild RESULT_VARIABLE one)
-execute_process(COMMAND $<TARGET_FILE:mild> info man OUTPUT_FILE ${pages}/mild.1 RESULT_VARIABLE two)
-execute_process(COMMAND gzip -9nf ${pages}/mild.1 RESULT_VARIABLE three)
-if(one OR two OR three)
-  message(FATAL_ERROR "mild info man, or completion, failed: ${one} ${two} ${three}")
-endif()
+# The manual page is the program's help, by help2man where there is one.
+find_program(HELP2MAN help2man)
+if(HELP2MAN)
+  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/manual.cmake.in @ONLY CONTENT [=[
+execute_process(COMMAND @HELP2MAN@ --no-info --name "soft ground for legged robots" --output mild.1 $<TARGET_FILE:mild>
+  COMMAND_ERROR_IS_FATAL ANY WORKING_DIRECTORY @CMAKE_BINARY_DIR@/generated)
+execute_process(COMMAND gzip -9nf mild.1 COMMAND_ERROR_IS_FATAL ANY WORKING_DIRECTORY @CMAKE_BINARY_DIR@/generated)
 ]=])
-file(GENERATE OUTPUT ${CMAKE_BINARY_DIR}/generated/pages.cmake INPUT ${CMAKE_BINARY_DIR}/generated/pages.cmake.in)
-install(SCRIPT ${CMAKE_BINARY_DIR}/generated/pages.cmake COMPONENT program)
-install(FILES ${CMAKE_BINARY_DIR}/generated/pages/mild DESTINATION share/bash-completion/completions COMPONENT program)
-install(FILES ${CMAKE_BINARY_DIR}/generated/pages/mild.1.gz DESTINATION share/man/man1 COMPONENT program)
+  file(GENERATE OUTPUT ${CMAKE_BINARY_DIR}/generated/manual.cmake INPUT ${CMAKE_BINARY_DIR}/generated/manual.cmake.in)
+  install(SCRIPT ${CMAKE_BINARY_DIR}/generated/manual.cmake COMPONENT program)
+  install(FILES ${CMAKE_BINARY_DIR}/generated/mild.1.gz DESTINATION share/man/man1 COMPONENT program)
+endif()
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME mild)
@@ -45,5 +42,5 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 get_filename_component(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${mujoco_file} DIRECTORY)
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "ffmpeg, libegl1, libgl1-mesa-dri, libglfw3, python3-matplotlib")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "ffmpeg, libegl1, libgl1-mesa-dri, libglfw3, python3, python3-matplotlib")
 include(CPack)

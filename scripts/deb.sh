@@ -49,11 +49,11 @@ test_package() {
     inside 'mild eval --ground rigid,foam45 --trials 1 --seconds 3' | grep -c ' 1/1 ' | grep -x 2 >/dev/null
     inside 'mild train --out run --train.envs=16 --train.minutes=0 --train.iterations=2 --ppo.steps=4 --ppo.minibatches=2 &&
         mild report run && mild eval --policy run/policy.safetensors --trials 1 --seconds 0.1' | grep '^report run/report.html' >/dev/null
-    inside 'zcat /usr/share/man/man1/mild.1.gz' | grep '^\.SS mild report' >/dev/null
-    inside 'source /usr/share/bash-completion/completions/mild && COMP_WORDS=(mild tra) COMP_CWORD=1 && _mild && echo $COMPREPLY' |
-        grep -x train >/dev/null
+    if command -v help2man >/dev/null; then
+        inside 'zcat /usr/share/man/man1/mild.1.gz' | grep -x report >/dev/null
+    fi
     if [ -e "$root/web" ]; then
-        inside '{ timeout 2 mild web --port 0 || true; }' | grep '^mild web: http' >/dev/null
+        inside '{ mild web 2>&1 || true; }' | grep 'install python3' >/dev/null # which is but recommended
     else
         inside '{ mild web 2>&1 || true; }' | grep 'this installation has no page' >/dev/null
     fi

@@ -121,7 +121,7 @@ class Browser:
 def serve(mild):
     """Starts `mild web` on a free port; returns the process and the address."""
     server = subprocess.Popen([mild, "web", "--port", "0"], stdout=subprocess.PIPE, text=True)
-    found = re.search(r"http://\S+", server.stdout.readline())
+    found = re.search(r"http://[\w.:]+/", server.stdout.readline())
     if not found:
         sys.exit("web_test: mild web does not say where the page is")
     return server, found[0]

@@ -97,12 +97,6 @@ static void print_command_help(const CliCommand *command) {
     }
 }
 
-static void (*help_printer)(const CliCommand *) = print_command_help;
-
-void cli_set_help(void (*print)(const CliCommand *command)) {
-    help_printer = print ? print : print_command_help;
-}
-
 /* ---- values ---- */
 
 static int out_of_range(const CliCommand *command, const CliOption *option, const char *text) {
@@ -391,7 +385,7 @@ CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *
     args->given = 0;
     for (int i = 1; i < argc; i++) {
         if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
-            help_printer(command);
+            print_command_help(command);
             return CLI_DONE;
         }
     }

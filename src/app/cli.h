@@ -70,7 +70,6 @@ typedef struct {
     const CliWord *words;
     int word_count;
     const char *overrides; /* help on --section.key=value; NULL: the command takes none */
-    const char *sections;  /* of these, for completion: "task ground"; NULL: those of a training */
     const char *examples;  /* whole lines, or NULL */
     int positional_max;    /* largest number of words without dashes */
     const char *picture;   /* option whose picture gets a file of its numbers; NULL: none */
@@ -95,9 +94,6 @@ CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *
 /* The first of the options that is on the line, or NULL. names: without dashes, ended by NULL. */
 const char *cli_first_given(const CliCommand *command, const CliArgs *args,
                             const char *const *names);
-
-/* Chooses who prints a command's help; NULL: cli_parse itself, as text on standard output. */
-void cli_set_help(void (*print)(const CliCommand *command));
 
 /* For an output that no standard output takes: 0, or an error and its exit code when it is `-`. */
 int cli_refuse_dash(const char *command, const char *option, const char *path);

@@ -24,16 +24,11 @@ static const struct {
      "pose and in turns; ratio_to_rigid is newton over engine_rigid"},
     {"ground", bench_ground, "the contact solver alone"},
     {"elements", bench_elements, "the contact solver with 20 to 2000 elements"},
-    {"solver", bench_solver,
-     "newton compared with the paper's gauss_seidel sweeps, at the same error"},
     {"walk", bench_walk, "the same as step, along a walk of the shipped policy"},
     {"batch", bench_batch,
      "the contact solver in batches, on train.device, along that walk, on grounds of "
      "randomize.model"},
     {"robots", bench_robots, "the environments alone on train.device, in the batch engine"},
-    {"episodes", bench_episodes,
-     "returns of the shipped policy in whole episodes: batch engine, on train.device, against "
-     "MuJoCo; distance is Kolmogorov's, below 1.36 in 19 of 20 cases if they are alike"},
     {"update", bench_update,
      "the learner alone: actions of a rollout and update, on train.device, from random numbers"},
     {"train", bench_train, "policy steps per second in training, and how the time is spent"},
@@ -149,7 +144,7 @@ int cmd_bench(int argc, char **argv) {
          "write {machine, version, rows: [{bench, case, value, unit}]} to FILE; - for standard "
          "output"},
         {"robot", CLI_TEXT, &robot, 0, 0, "NAME|DIR",
-         ROBOTS_HELP "; walk and solver need sa01, the shipped policy's (default sa01)"},
+         ROBOTS_HELP "; walk needs sa01, the shipped policy's (default sa01)"},
     };
     CliWord words[WORDS];
     for (int i = 0; i < BENCHES; i++) {

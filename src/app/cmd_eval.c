@@ -589,7 +589,6 @@ int cmd_eval(int argc, char **argv) {
             "it, without --randomize or --push.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
-        .sections = "task ground terrain",
         .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 "
                      "--terrain.kind=waves --terrain.memory=true; --train.robots=batch runs all "
                      "rows at once in the batch engine, on --train.device=cpu or cuda:N",

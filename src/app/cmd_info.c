@@ -305,8 +305,6 @@ static const struct {
      "every config key with its meaning, range and default, as a complete config file"},
     {"build", info_build, "version, compiler and libraries"},
     {"devices", info_devices, "processor, memory and GPU of this machine"},
-    {"man", manual_print, "the man page, of all commands, in roff: mild info man | man -l -"},
-    {"completion", completion_print, "completion for bash and zsh: source <(mild info completion)"},
 };
 enum { TOPICS = sizeof topics / sizeof *topics };
 
@@ -317,7 +315,7 @@ int cmd_info(int argc, char **argv) {
     }
     const CliCommand command = {
         .name = "info",
-        .usage = "grounds | models | robots | config | build | devices | man | completion",
+        .usage = "grounds | models | robots | config | build | devices",
         .summary = "Prints what the program offers and what it runs on.",
         .words_title = "topics",
         .words = words,

@@ -496,7 +496,6 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
         .option_count = sizeof options / sizeof *options,
         .picture = "pressure",
         .numbers = ".csv",
-        .sections = "task ground terrain",
         .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 "
                      "--terrain.kind=waves --terrain.memory=true",
         .examples = "  mild play --ground rubber,foam45,sand_loose --video walk.mp4 --pressure "

@@ -340,7 +340,6 @@ static CliOutcome options_parse(const CliOption *table, int count, int argc, cha
         .summary = summary,
         .options = table,
         .option_count = count,
-        .sections = "ground terrain",
         .overrides = "any key of sections [ground] and [terrain], e.g. --ground.k_pen=500 "
                      "--terrain.kind=waves; `mild info grounds` lists the first",
         .examples = examples,

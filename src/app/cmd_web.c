@@ -1,41 +1,39 @@
-/* mild web: serves the walk in a browser that `make web` built (docs/web.md). */
+/* mild web: serves the walk in a browser that `make web` built (docs/web.md), by Python. */
+#include <errno.h>
 #include <stdio.h>
-#include <sys/stat.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "app/cli.h"
 #include "app/commands.h"
-#include "app/serve.h"
+#include "app/package.h"
 #include "base/paths.h"
 
-/* As serve_folder opens them: no links. */
-static int is_served(const char *path) {
-    struct stat about;
-    return lstat(path, &about) == 0 && S_ISREG(about.st_mode) && access(path, R_OK) == 0;
-}
+/* Python's own server, which ends in one line when it cannot listen. */
+static const char code[] =
+    "import runpy, sys\n"
+    "try:\n"
+    "    runpy.run_module('http.server', run_name='__main__', alter_sys=True)\n"
+    "except OSError as error:\n"
+    "    print('mild web: --address and --port:', error, file=sys.stderr)\n"
+    "    sys.exit(2)\n";
 
-static MildStatus check_built(const char *folder, MildError *error) {
-    static const char *const files[] = {"index.html", "mild.wasm", "sa01.bin"};
-    char path[PATH_SIZE];
-    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
-        MildStatus status = path_join(folder, files[i], path, error);
-        if (status != MILD_OK) {
-            return status;
-        }
-        if (!is_served(path)) {
-            return mild_fail(
-                error, MILD_ERROR_IO,
-                "no file %.200s to read: this installation has no page; `make web` in the "
-                "source tree builds it (it installs emscripten), then `mild web --folder "
-                "build/web`",
-                path);
-        }
-    }
-    return MILD_OK;
+/* Replaces this process; returns where that cannot be. -I: the working directory is no place of
+ * modules. -u: the address is printed at once, into a pipe too. */
+static int become_server(const char *folder, const char *address, int port) {
+    char python[PATH_SIZE], number[8];
+    package_python(python);
+    snprintf(number, sizeof number, "%d", port);
+    execlp(python, python, "-I", "-u", "-c", code, "--directory", folder, "--bind", address, number,
+           (char *)NULL);
+    return cli_fail_text("web",
+                         "%.200s: %s; the page is served by Python: install python3, or name one "
+                         "by MILD_PYTHON",
+                         python, strerror(errno));
 }
 
 int cmd_web(int argc, char **argv) {
-    char built[PATH_SIZE];
+    char built[PATH_SIZE], index[PATH_SIZE];
     const char *folder = path_data("build/web", built), *address = "127.0.0.1";
     int port = 8080;
     const CliOption options[] = {
@@ -48,8 +46,8 @@ int cmd_web(int argc, char **argv) {
     const CliCommand command = {
         .name = "web",
         .usage = "[--port N] [--address A] [--folder DIR]",
-        .summary = "Serves the walk in a browser, which `make web` builds. Open the address that "
-                   "it prints; Ctrl-C ends it.",
+        .summary = "Serves the walk in a browser, which `make web` builds, by `python3 -m "
+                   "http.server`. Open the address that it prints; Ctrl-C ends it.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .examples = "  mild web\n  mild web --port 0\n",
@@ -60,12 +58,15 @@ int cmd_web(int argc, char **argv) {
         return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     }
     MildError error = {0};
-    MildStatus status = check_built(folder, &error);
-    const int listening = status == MILD_OK ? serve_listen(address, &port, &error) : -1;
-    if (listening >= 0) {
-        printf("mild web: http://%s:%d/ (Ctrl-C ends it)\n", address, port);
-        fflush(stdout);
-        serve_folder(listening, folder, &error);
+    if (path_join(folder, "index.html", index, &error) != MILD_OK) {
+        return cli_fail("web", &error);
     }
-    return cli_fail("web", &error);
+    if (access(index, R_OK) != 0) {
+        return cli_fail_text("web",
+                             "no file %.200s to read: this installation has no page; `make web` in "
+                             "the source tree builds it (it installs emscripten), then `mild web "
+                             "--folder build/web`",
+                             index);
+    }
+    return become_server(folder, address, port);
 }

@@ -15,13 +15,17 @@
 #include "robot/engine.h"
 
 static void print_help(FILE *file) {
-    fprintf(file, "mild %s: %s\n\nusage: mild COMMAND [options]\n\ncommands:\n", build_version(),
-            commands_about);
+    fprintf(file, "mild %s: soft ground for legged robots\n\n", build_version());
+    fprintf(file, "usage: mild COMMAND [options]\n\ncommands:\n");
     for (int i = 0; i < command_count; i++) {
         fprintf(file, "  %-10s%s\n", commands[i].name, commands[i].help);
     }
-    fprintf(file, "\nRun `mild COMMAND --help` for the options of a command. %s\n\ntry first:\n%s",
-            commands_exit, commands_examples);
+    fputs(
+        "\nRun `mild COMMAND --help` for the options of a command. The exit code is 0 on success and "
+        "2 after\nan error, which is one line on standard error.\n\ntry first:\n"
+        "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
+        "  mild press --ground foam45 --depth 0.03\n",
+        file);
 }
 
 /* Only the last flush shows whether standard output took everything, for example on a full disk. */

@@ -33,7 +33,7 @@ int package_has(const char *command) {
     return 0;
 }
 
-static void find_python(char python[PATH_SIZE]) {
+void package_python(char python[PATH_SIZE]) {
     const char *named = getenv("MILD_PYTHON");
     if (named && *named) {
         snprintf(python, PATH_SIZE, "%s", named);
@@ -54,7 +54,7 @@ static void become_python(char *said, char **arguments) {
         return;
     }
     setenv("MILD", path_program(folder), 1);
-    find_python(python);
+    package_python(python);
     if (access(path_beside_program("python/mild/__main__.py", folder), R_OK) == 0) {
         path_beside_program("python", folder);
     } else {

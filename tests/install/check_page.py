@@ -2,6 +2,7 @@
 """`mild web` of an installed program serves each file of its page as it is; one without a page says so. scripts/wheels.sh
 Usage: check_page.py MILD FOLDER_OF_THE_PAGE"""
 import pathlib
+import re
 import subprocess
 import sys
 import urllib.request
@@ -15,9 +16,9 @@ if not folder.exists():
     sys.exit()
 there = sorted(path.name for path in folder.iterdir())
 assert there == FILES, f"{folder} has {there}"
-with subprocess.Popen([mild, "web", "--port", "0"], stdout=subprocess.PIPE, text=True) as server:
+with subprocess.Popen([mild, "web", "--port", "0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
     try:
-        address = server.stdout.readline().split()[2]
+        address = re.search(r"http://[\d.:]+/", server.stdout.readline())[0]
         for name in FILES:
             with urllib.request.urlopen(address + name, timeout=30) as answer:
                 assert answer.read() == (folder / name).read_bytes(), f"{address}{name} is not the page's {name}"

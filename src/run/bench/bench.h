@@ -12,8 +12,6 @@ MildStatus bench_step(const ExperimentDef *def, BenchReport *report, MildError *
 MildStatus bench_ground(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Solve and advance of two plates, 20 to 2000 elements together, standing and slipping. */
 MildStatus bench_elements(const ExperimentDef *def, BenchReport *report, MildError *error);
-/* Newton against the paper's sweeps on the same problems, both stopped at the same error. */
-MildStatus bench_solver(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* The physics steps of a walk of the shipped policy, with our contact and with the engine's own. */
 MildStatus bench_walk(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* The ground in batches on train.device: steps per second along a walk, and how near in float. */
@@ -21,9 +19,6 @@ MildStatus bench_batch(const ExperimentDef *def, BenchReport *report, MildError 
 /* The environments alone on train.device: batch engine, ground and task under no action but the
  * assistance. */
 MildStatus bench_robots(const ExperimentDef *def, BenchReport *report, MildError *error);
-/* Returns of the shipped policy's episodes in the batch engine on train.device, and by MuJoCo: the
- * same distribution? */
-MildStatus bench_episodes(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* The learner alone on train.device, from a rollout of random numbers. */
 MildStatus bench_update(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Training as a whole, and how its time is spent. */
