@@ -42,7 +42,7 @@ typedef struct {
     TaskEnv *env;
     RobotSim *sim;
     double command[3]; /* [m/s, m/s, rad/s] given by the keys */
-    SpeedHoldLegs legs;
+    SpeedHoldDef speed_hold;
     SpeedHold hold;
     int steer;    /* bool: keys were used; until then the heading is held */
     double speed; /* [m/s] shown */
@@ -86,7 +86,7 @@ static void start(Walk *walk) {
     Play *play = walk->play;
     EnvsView none = {0};
     belief_reset(&play->knows);
-    walk->hold = (SpeedHold){.frames = 0};
+    walk->hold = (SpeedHold){.cycles = 0};
     set_command(walk);
     task_env_reset_on(walk->env, &walk->task, play->robot, walk->sim, &walk->live.terrain,
                       play->scene->rigid, &none);
@@ -122,7 +122,8 @@ static void step(Walk *walk) {
                      fmax(hypot(rotation[0], rotation[3]), 1e-6);
     walk->speed += TASK_PERIOD / SPEED_TIME * (forward - walk->speed);
     set_command(walk);
-    speed_hold(&walk->hold, &walk->legs, task_env_frame(walk->env), walk->env->command);
+    speed_hold(&walk->hold, &walk->speed_hold, task_env_frame(walk->env),
+               controller_estimates(play->controller, 0), walk->env->command);
     if (play->others) {
         others_step(play->others);
     }
@@ -326,10 +327,7 @@ MildStatus play_run(Play *play, MildError *error) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     }
     if (status == MILD_OK) {
-        status = speed_hold_legs(play->robot, play->controller->torque ? 0 : walk.task.speed_hold,
-                                 &walk.legs, error);
-    }
-    if (status == MILD_OK) {
+        walk.speed_hold = speed_hold_def(&walk.task, play->robot, play->controller);
         task_env_init(walk.env, &walk.task, play->robot, play->seed, 0);
         start(&walk);
         if (play->sketch) {

@@ -19,6 +19,9 @@ typedef struct {
      * (TaskDrive), in place of its actions. Called after `act`, for different rows at the same
      * time. NULL: the joints' PD on the actions. */
     void (*torque)(void *self, int row, const TaskEnv *env, RobotSim *sim, double *torque);
+    /* [TaskShape.estimates] What it took the base's velocity and the rest (EnvsView.estimate) for in
+     * a row's last action. NULL: it estimates nothing. */
+    const float *(*estimates)(void *self, int row);
 } Controller;
 
 /* One row of a controller that commands torques. */
@@ -77,6 +80,8 @@ MildStatus controller_make(const char *name, const ControllerDef *def, Controlle
  * NULL. Fails when the file holds a policy of another robot or of another shape. */
 MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, int rows_max,
                               Controller *controller, MildError *error);
+/* [estimates] of a row's last action, or NULL. */
+const float *controller_estimates(const Controller *controller, int row);
 void controller_destroy(Controller *controller);
 
 #endif

@@ -101,6 +101,7 @@ MildStatus controller_make_clock(const ControllerDef *def, Controller *controlle
         clock_destroy(clock);
         return mild_fail(error, cause.status, "%s", cause.text);
     }
-    *controller = (Controller){clock, "clock", clock_act, clock_destroy, NULL, NULL};
+    *controller =
+        (Controller){.self = clock, .name = "clock", .act = clock_act, .destroy = clock_destroy};
     return MILD_OK;
 }

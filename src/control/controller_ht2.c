@@ -333,6 +333,6 @@ MildStatus controller_make_ht2(const ControllerDef *def, Controller *controller,
         ht2_destroy(ht2);
         return mild_fail(error, cause.status, "%s", cause.text);
     }
-    *controller = (Controller){ht2, "ht2", ht2_act, ht2_destroy, NULL, NULL};
+    *controller = (Controller){.self = ht2, .name = "ht2", .act = ht2_act, .destroy = ht2_destroy};
     return MILD_OK;
 }

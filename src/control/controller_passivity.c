@@ -85,7 +85,10 @@ MildStatus controller_make_passivity(const ControllerDef *def, Controller *contr
             return error->status;
         }
     }
-    *controller = (Controller){passivity,         "passivity", passivity_act,
-                               passivity_destroy, NULL,        passivity_torque};
+    *controller = (Controller){.self = passivity,
+                               .name = "passivity",
+                               .act = passivity_act,
+                               .destroy = passivity_destroy,
+                               .torque = passivity_torque};
     return MILD_OK;
 }

@@ -52,6 +52,7 @@ MildStatus controller_make_stand(const ControllerDef *def, Controller *controlle
         standing_destroy(standing);
         return mild_fail(error, MILD_ERROR_MEMORY, "stand: out of memory");
     }
-    *controller = (Controller){standing, "stand", standing_act, standing_destroy, NULL, NULL};
+    *controller = (Controller){
+        .self = standing, .name = "stand", .act = standing_act, .destroy = standing_destroy};
     return MILD_OK;
 }

@@ -18,6 +18,6 @@ MildStatus controller_make_zero(const ControllerDef *def, Controller *controller
         return mild_fail(error, MILD_ERROR_MEMORY, "zero: out of memory");
     }
     *joints = robot_joints(def->robot);
-    *controller = (Controller){joints, "zero", zero_act, free, NULL, NULL};
+    *controller = (Controller){.self = joints, .name = "zero", .act = zero_act, .destroy = free};
     return MILD_OK;
 }

@@ -71,6 +71,10 @@ TaskDrive controller_drive(ControllerRow *row) {
     return (TaskDrive){row_torque, row};
 }
 
+const float *controller_estimates(const Controller *controller, int row) {
+    return controller->estimates ? controller->estimates(controller->self, row) : NULL;
+}
+
 void controller_destroy(Controller *controller) {
     if (controller->self) {
         controller->destroy(controller->self);

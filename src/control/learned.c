@@ -12,15 +12,16 @@ typedef struct {
     int rows_max;
     size_t width;         /* of a history */
     float *history;       /* [rows_max][width] */
-    LearnedInside inside; /* of a watched one, else all NULL */
-    float *seen;          /* memory of its rows, then that of the means */
+    LearnedInside inside; /* estimates; the others of a watched one, else NULL */
+    float *seen;          /* memory of the others, then of the means */
     PolicyInstead instead;
     int newest; /* bool: the older frames are the newest one */
 } Learned;
 
 static void learned_act_on(void *self, int rows, const float *history, float *actions) {
     Learned *learned = self;
-    policy_act(learned->policy, learned->pool, rows, history, actions, NULL, NULL);
+    policy_act(learned->policy, learned->pool, rows, history, actions,
+               learned->inside.rows.estimates, NULL);
 }
 
 /* The newest frame over the older ones of a history. */
@@ -45,10 +46,16 @@ static void learned_act(void *self, int rows, TaskEnv *const *envs, float *actio
                       actions, &learned->inside.rows);
 }
 
+static const float *learned_estimates(void *self, int row) {
+    const Learned *learned = self;
+    return learned->inside.rows.estimates + (size_t)row * (size_t)learned->inside.estimates;
+}
+
 static void learned_destroy(void *self) {
     Learned *learned = self;
     policy_destroy(learned->policy);
     free(learned->history);
+    free(learned->inside.rows.estimates);
     free(learned->seen);
     free(learned);
 }
@@ -87,7 +94,7 @@ MildStatus learned_watch(Controller *controller, const LearnedInside **inside, M
                  estimates = (size_t)def->estimates, theta = (size_t)policy_theta(learned->policy);
     if (!learned->seen) {
         learned->seen =
-            calloc((rows + 1) * (2 * latent + theta + estimates), sizeof *learned->seen);
+            calloc(rows * (2 * latent + theta) + latent + estimates + theta, sizeof *learned->seen);
     }
     if (!learned->seen) {
         return mild_fail(error, MILD_ERROR_MEMORY, "controller: out of memory for %d rows",
@@ -95,11 +102,9 @@ MildStatus learned_watch(Controller *controller, const LearnedInside **inside, M
     }
     seen->latent = def->latent;
     seen->theta = (int)theta;
-    seen->estimates = def->estimates;
     seen->rows.latent = learned->seen;
     seen->rows.modulated = seen->rows.latent + rows * latent;
     seen->rows.theta = seen->rows.modulated + rows * latent;
-    seen->rows.estimates = seen->rows.theta + rows * theta;
     *inside = seen;
     return MILD_OK;
 }
@@ -109,7 +114,7 @@ void learned_ablate(Controller *controller, Ablation ablation, const float *mean
     const LearnedInside *seen = &learned->inside;
     const size_t latent = (size_t)seen->latent, estimates = (size_t)seen->estimates;
     const size_t bytes = (latent + estimates + (size_t)seen->theta) * sizeof *means;
-    float *kept = seen->rows.estimates + (size_t)learned->rows_max * estimates;
+    float *kept = seen->rows.theta + (size_t)learned->rows_max * (size_t)seen->theta;
     PolicyInstead *instead = &learned->instead;
     memset(instead, 0, sizeof *instead);
     learned->newest = ablation == ABLATION_history;
@@ -163,19 +168,27 @@ MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, 
     }
     Learned *learned = calloc(1, sizeof *learned);
     float *history = calloc((size_t)rows_max * (size_t)shape.history, sizeof *history);
-    if (!learned || !history) {
+    float *estimates = calloc((size_t)rows_max * (size_t)shape.estimates, sizeof *estimates);
+    if (!learned || !history || !estimates) {
         free(learned);
         free(history);
+        free(estimates);
         policy_destroy(policy);
         return mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
     }
-    *learned = (Learned){.policy = policy,
-                         .pool = pool,
-                         .rows_max = rows_max,
-                         .width = (size_t)shape.history,
-                         .history = history};
-    *controller =
-        (Controller){learned, "learned", learned_act, learned_destroy, learned_act_on, NULL};
+    *learned =
+        (Learned){.policy = policy,
+                  .pool = pool,
+                  .rows_max = rows_max,
+                  .width = (size_t)shape.history,
+                  .history = history,
+                  .inside = {.estimates = shape.estimates, .rows = {.estimates = estimates}}};
+    *controller = (Controller){.self = learned,
+                               .name = "learned",
+                               .act = learned_act,
+                               .destroy = learned_destroy,
+                               .act_on = learned_act_on,
+                               .estimates = learned_estimates};
     return MILD_OK;
 }
 

@@ -66,6 +66,11 @@ static void walk_on(void *self, int rows, TaskEnv *const *envs, float *actions) 
     policy.act(policy.self, rows, envs, actions);
 }
 
+static const float *walk_estimates(void *self, int row) {
+    (void)self;
+    return policy.estimates(policy.self, row);
+}
+
 /* Plays the script's first `count` frames. */
 static void play(int count) {
     MildError error = {0};
@@ -75,7 +80,10 @@ static void play(int count) {
     task.speed_hold = fmax(gain, 0);
     Robot *robot = kit_robot(SA01);
     int joints = robot_joints(robot);
-    Controller controller = {.self = &joints, .name = "hold", .act = gain < 0 ? hold : walk_on};
+    Controller controller = {.self = &joints,
+                             .name = "hold",
+                             .act = gain < 0 ? hold : walk_on,
+                             .estimates = gain < 0 ? NULL : walk_estimates};
     assert_int_equal(scene_make(&scene, "grass", 2, &error), MILD_OK);
     Play walk = {.task = &task,
                  .robot = robot,

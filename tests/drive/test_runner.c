@@ -109,15 +109,13 @@ TEST(the_same_as_the_task) {
  * task's own frames. */
 TEST(the_speed_is_held_as_in_the_task) {
     const EnvsView none = {0};
-    MildError error = {0};
-    SpeedHoldLegs legs;
-    SpeedHold hold = {.frames = 0};
+    SpeedHold hold = {.cycles = 0};
     World w = make_world();
     noisy.speed_hold = 0.1;
+    const SpeedHoldDef held = speed_hold_def(&noisy, robot, &w.controller);
     Runner *runner = make_runner();
     noisy.speed_hold = 0;
     double worst = 0;
-    assert_int_equal(speed_hold_legs(robot, 0.1, &legs, &error), MILD_OK);
     for (uint32_t k = 0; k < 800; k++) {
         const double now = 0.01 * k;
         const StatePacket state = state_of(&w, k + 1, now);
@@ -134,7 +132,8 @@ TEST(the_speed_is_held_as_in_the_task) {
                 worst = fmax(worst, fabs((double)target.angle[i] - wanted));
             }
         }
-        speed_hold(&hold, &legs, task_env_frame(w.env), command);
+        speed_hold(&hold, &held, task_env_frame(w.env), controller_estimates(&w.controller, 0),
+                   command);
         memcpy(w.env->command, command, sizeof command);
         assert_true(!task_env_step(w.env, &task, robot, w.sim, w.action, 0, &none, NULL).done);
     }

@@ -34,7 +34,7 @@ static void zero_act(void *self, int rows, TaskEnv *const *envs, float *actions)
 
 static Controller zero_controller(Asked *asked) {
     *asked = (Asked){0};
-    return (Controller){asked, "zero", zero_act, NULL, zero_act_on, NULL};
+    return (Controller){.self = asked, .name = "zero", .act = zero_act, .act_on = zero_act_on};
 }
 
 static Controller walker(Pool *pool, int rows) {

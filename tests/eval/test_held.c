@@ -1,5 +1,5 @@
 /* The commands of a trial under task.speed_hold: those that a speed hold makes of the frames that
- * the policy sees. */
+ * the policy sees, and of what it takes its velocity for. */
 #include "control/speed_hold.h"
 #include "eval_kit.h"
 
@@ -7,8 +7,10 @@ enum { TRIALS = 4 };
 #define SPEED 0.3
 #define SIDEWAYS 0.2
 
-static SpeedHoldLegs legs;
+static SpeedHoldDef held;
+static Controller controller;
 static SpeedHold hold[TRIALS];
+static float estimate[TRIALS][3]; /* of the decision before */
 static int decisions;
 static double last[TRIALS]; /* [m/s] forward */
 
@@ -17,17 +19,19 @@ static void decided(void *context, const EvalDecision *decision) {
     double command[3] = {SPEED, SIDEWAYS, 0};
     (void)context;
     if (decision->time > 0) { /* the first frame was there before the trial */
-        speed_hold(&hold[decision->trial], &legs, task_env_frame(decision->env), command);
+        speed_hold(&hold[decision->trial], &held, task_env_frame(decision->env),
+                   estimate[decision->trial], command);
     }
     assert_true(env->command[0] == command[0] && env->command[1] == command[1]);
     last[decision->trial] = command[0];
+    memcpy(estimate[decision->trial], controller_estimates(&controller, decision->trial),
+           sizeof estimate[0]);
     decisions++;
 }
 
 /* Walks on foam, where the policy alone is too fast. */
 static void walk(double gain) {
     MildError error = {0};
-    Controller controller;
     TaskDef task = def;
     Scene scene;
     EvalRow row;
@@ -42,10 +46,10 @@ static void walk(double gain) {
     task.speed_hold = gain;
     decisions = 0;
     memset(hold, 0, sizeof hold);
-    expect_good(speed_hold_legs(robot, gain, &legs, &error) == MILD_OK, &error);
     assert_int_equal(scene_make(&scene, "foam25", 2, &error), MILD_OK);
     expect_good(controller_learned(POLICY, robot, pool, TRIALS, &controller, &error) == MILD_OK,
                 &error);
+    held = speed_hold_def(&task, robot, &controller);
     expect_good(kit_run(&task, pool, &controller, &scene, &eval, &row, &error) == MILD_OK, &error);
     assert_int_equal(row.success, TRIALS);
     assert_int_equal(decisions, TRIALS * 1400);

@@ -21,7 +21,7 @@ struct Runner {
     SensorLimits limits;
     Controller controller;
     TaskEnv *env; /* its sensors are packets, its physics is elsewhere */
-    SpeedHoldLegs legs;
+    SpeedHoldDef speed_hold;
     SpeedHold hold;
     int joints;
     PacketMode mode;
@@ -75,7 +75,7 @@ static void begin_episode(Runner *r) {
     task_env_draw(r->env, &r->task, r->def.robot);
     task_begin_episode(r->env, &r->task, robot_table(r->def.robot), 0, 0);
     r->env->phase = 0;
-    r->hold = (SpeedHold){.frames = 0};
+    r->hold = (SpeedHold){.cycles = 0};
 }
 
 Runner *runner_create(const RunnerDef *def, MildError *error) {
@@ -93,11 +93,11 @@ Runner *runner_create(const RunnerDef *def, MildError *error) {
     r->target.session = def->session;
     r->ticked = -1;
     belief_reset(&r->report.belief);
-    if (speed_hold_legs(def->robot, r->task.speed_hold, &r->legs, error) != MILD_OK ||
-        controller_learned(def->policy, def->robot, NULL, 1, &r->controller, error) != MILD_OK) {
+    if (controller_learned(def->policy, def->robot, NULL, 1, &r->controller, error) != MILD_OK) {
         free(r);
         return NULL;
     }
+    r->speed_hold = speed_hold_def(&r->task, def->robot, &r->controller);
     r->env = aligned_alloc(64, task_env_bytes(&r->task, def->robot));
     if (!r->env) {
         runner_destroy(r);
@@ -381,7 +381,8 @@ static void step_policy(Runner *r, const TaskSensors *reading, const double comm
     task_begin_step(r->env, &r->task, r->action);
     set_targets(r, reading);
     set_command(r, command);
-    speed_hold(&r->hold, &r->legs, task_env_frame(r->env), r->env->command);
+    speed_hold(&r->hold, &r->speed_hold, task_env_frame(r->env),
+               controller_estimates(&r->controller, 0), r->env->command);
     set_command(r, r->env->command);
     task_advance_clock(r->env, &r->task);
     r->report.steps++;

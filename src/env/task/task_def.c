@@ -183,8 +183,8 @@ const MildField task_fields[] = {
     T(gait_slow_below, D, 1, 0.01, 10,
       "[m/s] speed |vx| + 3 |vy| + 1 m |wz| from which the period is gait_period"),
     T(speed_hold, D, 1, 0, 1,
-      "[-] eval, play and drive correct the commanded speed by the legs' steps: least weight of a "
-      "gait cycle; 0: not at all, nor for round feet"),
+      "[-] eval, play and drive correct the commanded speed by the policy's own estimate of it: "
+      "least weight of a gait cycle; 0: not at all"),
     T(swing_apex, D, 1, 0.01, 0.4,
       "[m] height of the swing foot above the undisturbed surface that the clock asks for"),
     T(double_support, D, 1, 0, 1,

@@ -86,7 +86,7 @@ typedef struct {
     Results device, host;
     float *action;   /* [trials][joints] */
     double *command; /* [trials][3] */
-    SpeedHoldLegs legs;
+    SpeedHoldDef speed_hold;
     SpeedHold *hold;  /* [trials] */
     Measure *measure; /* [trials] */
     uint8_t *end;     /* [trials] TaskEnd; TASK_END_time while it walks */
@@ -294,7 +294,8 @@ static void take_trial(void *context, int trial, int thread) {
     take_smooth(t, trial, at - 1);
     command = t->command + 3 * (size_t)trial;
     direct(eval, speed_of(t, trial), t->measure[trial].time, (at - 1)->quaternion, command);
-    speed_hold(&t->hold[trial], &t->legs, newest_frame(t, trial), command);
+    speed_hold(&t->hold[trial], &t->speed_hold, newest_frame(t, trial),
+               controller_estimates(t->run->controller, trial), command);
     if (t->env) {
         push_trial(t->env[trial], eval->push);
     }
@@ -402,10 +403,7 @@ MildStatus eval_run(const EvalRun *run, EvalRow *rows, MildError *error) {
     t.task.episode = run->eval.seconds;
     status = open_envs(&t, error);
     status = status == MILD_OK ? open_arrays(&t, error) : status;
-    status = status == MILD_OK
-                 ? speed_hold_legs(run->robot, run->controller->torque ? 0 : t.task.speed_hold,
-                                   &t.legs, error)
-                 : status;
+    t.speed_hold = speed_hold_def(&t.task, run->robot, run->controller);
     if (status == MILD_OK && run->eval.track) {
         status = track_make(&t.track, t.trials, steps, error);
     }
