@@ -473,7 +473,8 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
         status = allocate(e, error);
     }
     if (status == MILD_OK) {
-        status = context_move(c, e->eval.trials, error);
+        const int rows = train_is_batch(&c->train) ? e->grounds.count * e->speeds.count : 1;
+        status = context_move(c, rows * e->eval.trials, error);
     }
     if (status == MILD_OK) {
         robots_warn_slow("eval", &c->train, c->robot_name ? c->robot_name : c->named);

@@ -1,5 +1,6 @@
 #include "control/learned.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,6 +21,7 @@ typedef struct {
 
 static void learned_act_on(void *self, int rows, const float *history, float *actions) {
     Learned *learned = self;
+    assert(rows <= learned->rows_max);
     policy_act(learned->policy, learned->pool, rows, history, actions,
                learned->inside.rows.estimates, NULL);
 }

@@ -102,7 +102,7 @@ static void compare_rows(const char *const *names, const double *speeds, int spe
     EvalDef eval = {
         .turn = turn, .trials = is_short ? 2 : 6, .seconds = is_short ? 0.4 : 6, .seed = 1};
     Pool *pool = pool_create(2);
-    Controller controller = walker(pool, eval.trials);
+    Controller controller = walker(pool, ROWS * eval.trials);
     EvalRow rows[ROWS], own;
     Scene scene[ROWS];
     char line[256];

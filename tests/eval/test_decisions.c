@@ -115,7 +115,7 @@ TEST(a_fall_ends_one_trial) {
     char *actions = NULL, *track = NULL;
     size_t size[2];
     MildError error = {0};
-    Controller walks, falls = {&walks, "falls", falling_act, NULL, NULL, NULL};
+    Controller walks, falls = {.self = &walks, .name = "falls", .act = falling_act};
     const EvalCallback callback = {decided, NULL};
     const EvalDef eval = {.speed = 0.5,
                           .trials = TRIALS,

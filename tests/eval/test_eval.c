@@ -119,7 +119,8 @@ static void zero_destroy(void *self) {
 static EvalRow run(Zero *zero, const char *ground, EvalDef eval, int threads) {
     MildError error = {0};
     *zero = (Zero){0};
-    Controller controller = {zero, "zero", zero_act, zero_destroy, NULL, NULL};
+    Controller controller = {
+        .self = zero, .name = "zero", .act = zero_act, .destroy = zero_destroy};
     Pool *pool = pool_create(threads);
     Scene scene;
     EvalRow row;
@@ -347,7 +348,7 @@ static void walk_pushed(Noting *noting, double push, uint64_t seed) {
     assert_int_equal(scene_make(&scene, "rubber", 2, &error), MILD_OK);
     assert_int_equal(controller_learned(POLICY, robot, pool, PUSHED, &noting->inner, &error),
                      MILD_OK);
-    Controller controller = {noting, "noting", noting_act, NULL, NULL, NULL};
+    Controller controller = {.self = noting, .name = "noting", .act = noting_act};
     assert_int_equal(kit_run(&def, pool, &controller, &scene, &eval, &row, &error), MILD_OK);
     assert_true(row.push == push && row.success == PUSHED);
     controller_destroy(&noting->inner);
@@ -433,7 +434,8 @@ static void run_rows(const Scene *scenes, int scene_count, const double *speeds,
                      EvalRow *rows, EvalTrial *each) {
     MildError error = {0};
     Zero zero = {0};
-    Controller controller = {&zero, "zero", zero_act, zero_destroy, NULL, NULL};
+    Controller controller = {
+        .self = &zero, .name = "zero", .act = zero_act, .destroy = zero_destroy};
     Pool *pool = pool_create(2);
     const EvalDef eval = {.trials = OF_ROW, .seconds = 1.5, .push = 1, .seed = 1};
     EvalRun run = kit_row(&def, pool, &controller, scenes, &eval);
@@ -491,7 +493,8 @@ TEST(rows_and_trials_are_their_own) {
 TEST(files_are_of_the_row) {
     MildError error = {0};
     Zero zero = {0};
-    Controller controller = {&zero, "zero", zero_act, zero_destroy, NULL, NULL};
+    Controller controller = {
+        .self = &zero, .name = "zero", .act = zero_act, .destroy = zero_destroy};
     Pool *pool = pool_create(1);
     char *text[2] = {NULL, NULL};
     size_t size[2];
@@ -550,7 +553,8 @@ static int fail_to_answer(void *self, const MildTerrain *terrain, MildGround *gr
 TEST(a_diverged_trial_has_not_succeeded) {
     MildError error = {0};
     Zero zero = {0};
-    Controller controller = {&zero, "zero", zero_act, zero_destroy, NULL, NULL};
+    Controller controller = {
+        .self = &zero, .name = "zero", .act = zero_act, .destroy = zero_destroy};
     Pool *pool = pool_create(1);
     Failing failing[3] = {{-1}, {10}, {-1}};
     RobotGround ground[3];

@@ -132,7 +132,7 @@ TEST(the_numbers_are_the_policys) {
     InsideLog log = {.feet = SA01_FEET};
     const EvalCallback callback = inside_callback(&log);
     const EvalDef eval = {.speed = 0.5, .trials = TRIALS, .seconds = 0.2, .callback = &callback};
-    Controller controller = {&keeping, "keeping", keeping_act, NULL, NULL, NULL};
+    Controller controller = {.self = &keeping, .name = "keeping", .act = keeping_act};
     double sum[LATENT + SA01_ESTIMATES + 2] = {0}; /* theta1, theta2 */
     Scene scene;
     EvalRow row;

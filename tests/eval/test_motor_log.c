@@ -216,7 +216,7 @@ static void log_shaken(uint64_t seed) {
     const TaskActuator numbered = {NULL, 0, torque_of_number};
     MildError error = {0};
     int falls;
-    Controller controller = {NULL, "nothing", nothing_act, NULL, NULL, NULL};
+    Controller controller = {.name = "nothing", .act = nothing_act};
     const MotorLogDef log = {.task = &def,
                              .robot = robot,
                              .controller = &controller,
