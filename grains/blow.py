@@ -5,7 +5,7 @@
     grains/blow.py table out/blow/*        a row for each folder: 5 kg on a square of 100 mm fall
     grains/blow.py sole out/blow/*         a sole that is led down fast, beyond the same led slowly
     grains/blow.py law                     the same sole on mild_merged, fitted to the records of sand as the judge does
-    grains/blow.py table                   of the records in grains/records/sand alone"""
+    grains/blow.py table                   of the records in grains/records.tar.xz/sand alone"""
 import argparse
 import pathlib
 import sys
@@ -13,6 +13,10 @@ import sys
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+import pack  # noqa: E402
+
+RECORDS = ROOT / "grains" / "records.tar.xz"
 SHARE, TIME = 0.75, 0.010  # [N s], [s]
 WINDOWS = ((-10, 0), (0, 5), (5, 10), (10, 15), (15, 20), (20, 30), (30, 40))  # [mm]
 # folder: stiffness [Pa], depth of the bed [m], settling [s]; the deep bed settles to a denser one
@@ -47,7 +51,7 @@ def print_list():
 def records(folder, *names):
     """Rows of all beds of the first name that is there."""
     for name in names:
-        found = [np.genfromtxt(file, delimiter=",", names=True) for file in sorted(folder.glob(f"{name}-[0-9]*.csv"))]
+        found = [np.genfromtxt(file.read_text().splitlines(), delimiter=",", names=True) for file in sorted(folder.glob(f"{name}-[0-9]*.csv"))]
         if found:
             return found
     return []
@@ -103,12 +107,12 @@ def soles(folders):
 
 def law():
     """The row of `sole` that mild_merged has."""
-    sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "grains")]
+    sys.path.insert(0, str(ROOT / "grains"))
     import judge
     import walk
     from judge_cases import Case
     from judge_entries import GroundEntry
-    found, entry = judge.Records(ROOT / "grains" / "records"), GroundEntry("mild_merged")
+    found, entry = judge.Records(pack.opened(RECORDS)), GroundEntry("mild_merged")
     names, (sole, _) = judge.FITS["sand"][0], walk.outline("sa01")
     entry.fit({name: (found.cases[f"sand/{name}"][0], judge.mean_rows(found.cases[f"sand/{name}"][1])) for name in names}, found.ground("sand"))
     print_windows()
@@ -121,7 +125,7 @@ def law():
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=("list", "table", "sole", "law"))
-    parser.add_argument("folders", nargs="*", type=pathlib.Path)
+    parser.add_argument("folders", nargs="*", type=pack.opened)
     args = parser.parse_args()
     missing = [folder for folder in args.folders if not folder.is_dir()]
     if missing:
@@ -129,7 +133,7 @@ def main():
     if args.what in ("list", "law"):
         {"list": print_list, "law": law}[args.what]()
     else:
-        {"table": table, "sole": soles}[args.what](args.folders or [ROOT / "grains" / "records" / "sand"])
+        {"table": table, "sole": soles}[args.what](args.folders or [pack.opened(RECORDS / "sand")])
 
 
 if __name__ == "__main__":

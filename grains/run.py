@@ -2,13 +2,14 @@
 """Runs the list of grain simulations (docs/grains.md) and keeps their records.
 
     grains/run.py --list                                what there is, and what it is expected to cost
-    grains/run.py --program build/grains/grains --gpus 0,1     all that is not there yet
+    grains/run.py --program build/grains/grains --gpus 0,1     what grains/records.tar.xz lacks, into out/records
     grains/run.py --only 'sand/disc120' --out out/again        one case again, to compare
-    grains/run.py --have grains/records --out new --seconds 500    what is not there yet, as far as the time goes
+    grains/run.py --have out/again --out new --seconds 500         what out/again lacks, as far as the time goes
 
 A block is one start of the program: beds of one family, which settle once, and some cases on all of them. Blocks are in the
 order in which they are worth having; an interrupted run goes on where it stopped, case by case. Records are
-grains/records/FAMILY/CASE-SEED.csv, and manifest.json beside them has the command, seeds, numbers and time of each case."""
+OUT/FAMILY/CASE-SEED.csv, and manifest.json beside them has the command, seeds, numbers and time of each case;
+`scripts/pack.py grains/records.tar.xz out/records` puts them into the archive, which every reader opens by itself."""
 import argparse
 import configparser
 import datetime
@@ -23,7 +24,10 @@ import sys
 import threading
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-RECORDS = ROOT / "grains" / "records"
+sys.path.insert(0, str(ROOT / "scripts"))
+import pack  # noqa: E402
+
+RECORDS = ROOT / "grains" / "records.tar.xz"
 V = 0.05  # [m/s] of plates that are led: inertial number under 0.005
 
 # Options of the beds. sand: the ground that laws are fitted to; slick: less friction; fine: half the grain; wide: room for
@@ -340,16 +344,18 @@ def main():
     parser.add_argument("--gpus", default="", help="their numbers, e.g. 0,1; without it one program on what there is")
     parser.add_argument("--per-gpu", type=int, default=1, help="programs on each; the beds of one fill an H100")
     parser.add_argument("--together", action="store_true", help="family by family: beds settle once")
-    parser.add_argument("--out", default=RECORDS, type=pathlib.Path)
+    parser.add_argument("--out", type=pathlib.Path, help="folder; without it out/records, for what grains/records.tar.xz has not")
     parser.add_argument("--only", default="", help="cases FAMILY/CASE that this regular expression finds")
     parser.add_argument("--seeds", default="", help="A or A-B instead of each family's own")
     parser.add_argument("--rows", type=int, default=130, help="of a record, about")
-    parser.add_argument("--have", type=pathlib.Path, help="folder of records that need not be made again")
+    parser.add_argument("--have", type=pack.opened, help="folder or archive of records that need not be made again")
     parser.add_argument("--seconds", type=float, default=0, help="end after this time, and keep what is finished")
     parser.add_argument("--rate", type=float, default=2e9, help="grain-steps a second, for what it is expected to cost")
     parser.add_argument("--device", default="", help="what to call the machine in the manifest")
     parser.add_argument("--list", action="store_true")
     args = parser.parse_args()
+    if not args.out:
+        args.out, args.have = ROOT / "out" / "records", args.have or pack.opened(RECORDS)
     list(check())
     show(args)
     if args.list:

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A robot walks on grains, and on the ground models that are fitted to them (docs/grains.md, "The robot walks on grains").
 
-    grains/walk.py fit                      the models' numbers from grains/records, into grains/walk/grounds.json
+    grains/walk.py fit                      the models' numbers from grains/records.tar.xz, into grains/walk/grounds.json
     grains/walk.py grains --out out/walk    the walks on grains, by build/grains/grains; wants a GPU
     grains/walk.py models --out out/walk    the same walks on the models, some seconds each
     grains/walk.py mpm --out out/walk       the same walks on Newton's implicit MPM, by walk_mpm.py; wants a GPU
@@ -26,6 +26,10 @@ import time
 import walk_manifest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+import pack  # noqa: E402
+
+RECORDS = ROOT / "grains" / "records.tar.xz"
 GROUNDS = ROOT / "grains" / "walk" / "grounds.json"
 # Beds under the robot by the family of records that the models are fitted to: deeper, because it sinks farther than plates.
 BEDS = {"sand": {"friction": 0.5, "rolling": 0}, "rolling": {"friction": 0.5, "rolling": 0.1}}
@@ -50,12 +54,11 @@ def feet_of(robot):
 def fit(args):
     """As scripts/judge.py fits them, two level plates and a drag, but with elements of the robot's soles, as k_pen is that of one element,
     and with the plates as they are: a robot's soles on a model are not half a grain wider (judge_cases.Sole) either."""
-    sys.path.insert(0, str(ROOT / "scripts"))
     import judge
     import walk_lead
     from judge_entries import GroundEntry
     pitch = walk_lead.pitch_of(feet_of(args.robot)[0])
-    records, grounds = judge.Records(ROOT / "grains" / "records", 0), {}
+    records, grounds = judge.Records(pack.opened(RECORDS), 0), {}
     for family in BEDS:
         keys = [f"{family}/{name}" for name in judge.FITS[family][0]]
         given = {key: (records.cases[key][0], judge.mean_rows(records.cases[key][1])) for key in keys}
@@ -144,14 +147,14 @@ def on_models(args):
 
 
 def mpm_friction(args):
-    """That which fits the level press of the same grains, with the same numbers of the solver (grains/newton/manifest.json)."""
+    """That which fits the level press of the same grains, with the same numbers of the solver (grains/newton.tar.xz)."""
     if args.friction:
         return args.friction
-    rows = json.loads((ROOT / "grains" / "newton" / "manifest.json").read_text())
+    rows = json.loads(pack.opened(ROOT / "grains" / "newton.tar.xz" / "manifest.json").read_text())
     had, wanted = rows["newton"]["parameters"], {"voxel": args.voxel, "iterations": args.iterations, "basis": "S2", "particles": 2}
     other = [name for name, value in wanted.items() if had[name] != value]
     if other:
-        fail(f"grains/newton was fitted with --{other[0]} {had[other[0]]}: give --friction")
+        fail(f"grains/newton.tar.xz was fitted with --{other[0]} {had[other[0]]}: give --friction")
     fit = rows["fits"]["sand/disc120"]
     return min(fit["tried"], key=lambda pair: abs(pair[1] - fit["grains"]))[0]
 
@@ -159,7 +162,7 @@ def mpm_friction(args):
 def on_mpm(args):
     """Only sand: its press has a friction."""
     (sole, height), friction = outline(args.robot), mpm_friction(args)
-    solid = json.loads((ROOT / "grains" / "records" / "manifest.json").read_text())["sand"]["solid"]
+    solid = json.loads(pack.opened(RECORDS / "manifest.json").read_text())["sand"]["solid"]
     for speed in args.speeds:
         folder = folder_of(args, "sand", speed, "newton_mpm")
         ground = {"friction": friction, "plate-friction": BEDS["sand"]["friction"], "solid": sum(solid) / len(solid), "window": args.window,
@@ -241,7 +244,7 @@ def main():
     parser.add_argument("--voxel", default=0.01, type=float, help="[m] of MPM")
     parser.add_argument("--iterations", default=250, type=int, help="of MPM, in a step at most")
     parser.add_argument("--window", default="0.88,0.56,0.2", help="[m] of MPM: length, width and depth of the ground under the robot")
-    parser.add_argument("--friction", type=float, help="of MPM; default: that of grains/newton")
+    parser.add_argument("--friction", type=float, help="of MPM; default: that of grains/newton.tar.xz")
     parser.add_argument("--image", default=ROOT / "docs" / "walk-on-grains.png", type=pathlib.Path)
     args = parser.parse_args()
     args.out = args.out.resolve()

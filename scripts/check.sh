@@ -143,7 +143,7 @@ stage_aarch64() {
         -DCMAKE_C_COMPILER=aarch64-linux-gnu-gcc -DMILD_MARCH=armv8-a -DCMAKE_BUILD_TYPE=Release
     build aarch64 mild_shared mild_static fuzz_field fuzz_sole fuzz_map fuzz_solve
     for target in field sole map solve; do
-        qemu-aarch64 -L /usr/aarch64-linux-gnu "$root/aarch64/tests/fuzz_$target" tests/fuzz/corpus/$target
+        qemu-aarch64 -L /usr/aarch64-linux-gnu "$root/aarch64/tests/fuzz_$target" "$root/aarch64/tests/corpus/$target"
     done
 }
 

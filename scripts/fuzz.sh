@@ -2,7 +2,7 @@
 # Runs the fuzz targets of tests/fuzz one after the other, with clang's address and undefined-behaviour sanitizers. What they
 # learn is kept in build/fuzz/learned. An input that fails is printed and kept in build/fuzz.
 # Usage: scripts/fuzz.sh [TARGET ...]; RUNS executions each (default 10 million), at most MINUTES each (default no limit).
-# With `merge` as the first word it rewrites tests/fuzz/corpus with the smallest inputs that cover everything found so far.
+# With `merge` as the first word it rewrites tests/fuzz/corpus.tar.xz with the smallest inputs that cover everything found so far.
 set -eu
 cd "$(dirname "$0")/.."
 runs=${RUNS:-10000000} minutes=${MINUTES:-0} build=build/fuzz
@@ -14,6 +14,7 @@ fi
 command -v clang >/dev/null || { echo "fuzz: clang is needed: apt-get install clang" >&2; exit 2; }
 all=$(grep -o '^ *mild_fuzz([a-z]*' tests/CMakeLists.txt | sed 's/.*(//')
 targets=${*:-$all}
+# it unpacks the corpus, too
 cmake -S . -B $build -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_COMPILER=clang -DMILD_SANITIZE=ON -DMILD_FUZZ=ON --log-level=WARNING
 cmake --build $build --parallel "${JOBS:-$(nproc)}" --target $(printf 'fuzz_%s ' $targets) >/dev/null
 # without stack traces for allocations, which cost a third of the speed
@@ -30,7 +31,7 @@ length() {
 }
 
 fuzz() {
-    local target=$1 kept=tests/fuzz/corpus/$1 dictionary=tests/fuzz/dict/$1.dict options=()
+    local target=$1 kept=$build/tests/corpus/$1 dictionary=tests/fuzz/dict/$1.dict options=()
     if [ "$target" = config ]; then
         dictionary=$build/config.dict
         grep -oE '^[a-z_0-9]+ =|^\[[a-z]+\]' configs/default.ini | sort -u | sed 's/.*/"&"/' >"$dictionary"
@@ -48,7 +49,7 @@ fuzz() {
 
 # Files named found_* are past findings and are kept.
 minimise() {
-    local target=$1 kept=tests/fuzz/corpus/$1 fresh=$build/merge/$1
+    local target=$1 kept=$build/tests/corpus/$1 fresh=$build/merge/$1
     rm -rf "$fresh"
     mkdir -p "$fresh" "$kept"
     $build/tests/fuzz_"$target" -set_cover_merge=1 -use_counters=0 "$fresh" $build/learned/"$target" "$kept" >$build/"$target".log 2>&1
@@ -61,4 +62,5 @@ failed=0
 for target in $targets; do
     if [ $merge = 1 ]; then minimise "$target"; else fuzz "$target" || failed=1; fi
 done
+[ $merge = 0 ] || scripts/pack.py --new tests/fuzz/corpus.tar.xz $build/tests/corpus
 exit $failed

@@ -25,6 +25,7 @@ import time
 import numpy as np
 
 import mild
+import pack
 from judge_anchors import print_anchors
 from judge_cases import COLUMNS, EDGE, MEASURES, Case, measures, scale
 from judge_entries import (Archimedes, EntryError, FunctionEntry, GroundEntry, TableEntry, c_function, chrono_scm, rft_stress,
@@ -54,8 +55,8 @@ def fail(text):
 # ---- records ----
 
 class Records:
-    """Cases of a folder of records: key FAMILY/NAME: (Case, [rows of each bed]). share: by how much of a grain the models'
-    soles are wider on each side."""
+    """Cases of a folder of records, or of an archive (pack.py): key FAMILY/NAME: (Case, [rows of each bed]). share: by how much of
+    a grain the models' soles are wider on each side."""
 
     def __init__(self, folder, share=EDGE):
         self.share = share
@@ -90,7 +91,7 @@ class Records:
 
 
 def read_record(file):
-    table = np.genfromtxt(file, delimiter=",", names=True)
+    table = np.genfromtxt(file.read_text().splitlines(), delimiter=",", names=True)
     missing = [name for name in CSV_COLUMNS if name not in table.dtype.names]
     if missing:
         fail(f"{file} has no column {missing[0]}: it must be a record of grains")
@@ -167,9 +168,9 @@ def entries(args, ground):
         yield TableEntry(name, file)
     for text in args.rival:
         name, _, folder = text.partition("=")
-        if not folder or not pathlib.Path(folder).is_dir():
+        if not folder or not pack.opened(folder).is_dir():
             fail(f"--rival {text}: it must be NAME=FOLDER of records")
-        yield Rival(name, pathlib.Path(folder))
+        yield Rival(name, pack.opened(folder))
 
 
 # ---- rows of the judgement ----
@@ -305,7 +306,7 @@ def write_figures(args, records, file):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--records", default=ROOT / "grains" / "records", type=pathlib.Path)
+    parser.add_argument("--records", default=f"{ROOT}/grains/records.tar.xz", type=pack.opened, help="of grains: a folder, or an archive's")
     parser.add_argument("--pitch", default=0, type=float, help="[m] elements of mild's soles; default: a grain")
     parser.add_argument("--edge", default=EDGE, type=float, help="[grains] by which the models' soles are wider on each side")
     parser.add_argument("--families", default=",".join(FITS), help="beds to fit on, of " + ", ".join(FITS))

@@ -22,6 +22,7 @@ import time
 
 import numpy as np
 
+import pack
 from judge_cases import Case, measures
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -293,7 +294,7 @@ def grains_force(args, key, case):
         fail(f"{args.records / key}-*.csv is not there: make it with grains/run.py, or give --friction")
     names = {"time_s": "time", "stage": "stage", "depth_m": "depth", "path_m": "path", "force_x_n": "fx", "force_z_n": "fz",
              "moment_y_nm": "my"}
-    tables = [np.genfromtxt(file, delimiter=",", names=True) for file in files]
+    tables = [np.genfromtxt(file.read_text().splitlines(), delimiter=",", names=True) for file in files]
     return float(np.mean([measures(case, {short: table[name] for name, short in names.items()})["force"] for table in tables]))
 
 
@@ -426,7 +427,7 @@ def seeds_of(text):
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "out" / "mpm")
-    parser.add_argument("--records", type=pathlib.Path, default=ROOT / "grains" / "records", help="of grains, for the friction")
+    parser.add_argument("--records", type=pack.opened, default=f"{ROOT}/grains/records.tar.xz", help="of grains, for the friction")
     parser.add_argument("--only", default="", help="cases FAMILY/CASE that this regular expression finds")
     parser.add_argument("--seconds", type=float, default=0, help="end after this time, and keep what is finished")
     parser.add_argument("--seeds", default="1", help="A or A-B: places of the particles")

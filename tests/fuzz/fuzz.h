@@ -1,6 +1,6 @@
 /* What the fuzz targets share. A target is a libFuzzer function; with clang and -DMILD_FUZZ=ON it
- * is built as fuzz_NAME, otherwise as replay_NAME, a test that runs every file of corpus/NAME
- * through it (replay.c). */
+ * is built as fuzz_NAME, otherwise with replay.c, a test that runs every file of NAME/ in
+ * corpus.tar.xz through it. */
 #ifndef MILD_FUZZ_H
 #define MILD_FUZZ_H
 

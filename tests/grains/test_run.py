@@ -1,4 +1,4 @@
-"""The program grains and grains/run.py on beds of a few hundred grains: records, manifest, going on, mistakes.
+"""The program grains and grains/run.py on beds of a few hundred grains: records, manifest, going on, mistakes; archives of records.
 test_run.py PROGRAM SOURCE"""
 import csv
 import importlib.util
@@ -60,6 +60,8 @@ def records_are_made_once(folder):
     assert manifest["tiny/drag"]["seeds"] == "1-2" and manifest["tiny/drag"]["hours"] >= 0
     other = folder / "other"
     assert begin(other, "--have", str(folder)) == 0 and not list(other.glob("tiny/*.csv"))
+    packed(folder)
+    assert begin(folder / "more", "--have", str(folder / "tiny.tar.xz")) == 0 and not list(folder.glob("more/tiny/*.csv"))
     assert begin(other, "--only", "press", "--seeds", "2") == 0
     same = (other / "tiny" / "press-2.csv").read_bytes() == first
     print(f"records of one bed alone are those of two beds: {same}")
@@ -69,6 +71,56 @@ def records_are_made_once(folder):
     assert [row["stage"] for row in rows] == sorted(row["stage"] for row in rows) and rows[-1]["stage"] == 4
     assert abs(rows[-1]["path_m"] - 0.004) < 1e-5 and abs(rows[-1]["pitch_rad"] - 0.0349) < 2e-3
     assert abs([row for row in rows if row["stage"] == 1][-1]["depth_m"] - 0.002) < 1e-5
+
+
+def pack(*words):
+    return subprocess.run([sys.executable, SOURCE / "scripts" / "pack.py", *map(str, words)], capture_output=True, text=True)
+
+
+def packed(folder):
+    """tiny.tar.xz of the records is read as they are, is the same when made again, and takes a file more."""
+    archive, again = folder / "tiny.tar.xz", folder / "again.tar.xz"
+    assert pack(archive, folder / "manifest.json").returncode == 0 and pack(f"{archive}/tiny", folder / "tiny").returncode == 0
+    inside = run.pack.opened(archive)
+    names = sorted(file.name for file in inside.glob("tiny/*-1.csv"))
+    assert names == sorted(file.name for file in folder.glob("tiny/*-1.csv")) and len(names) == 3
+    for name in ("manifest.json", *(f"tiny/{name}" for name in names)):
+        assert (inside / name).exists() and (inside / name).read_text() == (run.pack.opened(folder) / name).read_text()
+    assert (inside / "tiny").is_dir() and not (inside / "tin").exists() and not (inside / "tiny" / names[0]).is_dir()
+    assert [file.stem for file in run.pack.opened(archive / "tiny").glob("press-1.csv")] == ["press-1"]
+    with run.pack.tarfile.open(archive) as file:
+        file.extractall(folder / "copy")
+    assert pack("--new", again, folder / "copy").returncode == 0 and again.read_bytes() == archive.read_bytes()
+    (folder / "copy" / "manifest.json").write_text("{}")
+    assert pack(again, folder / "copy" / "manifest.json").returncode == 0 and pack("--check", again, archive).returncode == 0
+    assert run.pack.opened(again / "manifest.json").read_text() == "{}"
+
+
+def archives_are_whole():
+    """Those of the repository."""
+    archives = [SOURCE / "tests/fuzz/corpus.tar.xz", *sorted((SOURCE / "grains").glob("*.tar.xz"))]
+    got = pack("--check", *archives)
+    print(got.stdout, got.stderr)
+    assert got.returncode == 0 and len(got.stdout.splitlines()) == 4
+    records = run.pack.opened(run.RECORDS)
+    manifest = json.loads((records / "manifest.json").read_text())
+    cases = [f"{family}/{case.split()[0]}" for family, block in run.BLOCKS for case in block]
+    assert all(key in manifest and list(records.glob(f"{key}-[0-9].csv")) for key in cases)
+
+
+def archives_that_are_not(folder):
+    for content in (b"", b"no archive", (SOURCE / "grains/newton.tar.xz").read_bytes()[:9000]):
+        (folder / "bad.tar.xz").write_bytes(content)
+        words = [SOURCE / "grains" / "run.py", "--list", "--have", folder / "bad.tar.xz"]
+        got = subprocess.run([sys.executable, *words], capture_output=True, text=True)
+        print("pack.py ->", got.stderr.strip())
+        assert got.returncode == 2 and got.stderr.startswith("pack.py: ") and got.stderr.count("\n") == 1 and "bad.tar.xz" in got.stderr
+    with run.pack.tarfile.open(folder / "other.tar.xz", "w:xz") as archive:
+        archive.add(__file__, "x.py")
+    for words in (("--check", folder / "other.tar.xz"), (folder / "x.zip", __file__), (folder / "x.tar.xz", folder / "none")):
+        got = pack(*words)
+        print("pack.py ->", got.stderr.strip())
+        assert got.returncode == 2 and got.stderr.startswith("pack.py: ") and got.stderr.count("\n") == 1
 
 
 def mistakes_are_one_line():
@@ -89,5 +141,8 @@ def mistakes_are_one_line():
 if __name__ == "__main__":
     the_list_is_as_it_should_be()
     mistakes_are_one_line()
+    archives_are_whole()
+    with tempfile.TemporaryDirectory() as name:
+        archives_that_are_not(pathlib.Path(name))
     with tempfile.TemporaryDirectory() as name:
         records_are_made_once(pathlib.Path(name))

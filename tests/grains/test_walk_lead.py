@@ -43,7 +43,8 @@ def pressed(numbers, model, depth, speed=0.05):
 
 
 def in_grains(depth):
-    tables = [np.genfromtxt(file, delimiter=",", names=True) for file in sorted((SOURCE / "grains" / "records" / "wide").glob("sa01-[0-9].csv"))]
+    files = sorted(walk.pack.opened(walk.RECORDS / "wide").glob("sa01-[0-9].csv"))
+    tables = [np.genfromtxt(file.read_text().splitlines(), delimiter=",", names=True) for file in files]
     return np.mean([np.interp(depth, table["depth_m"], table["force_z_n"]) for table in tables])
 
 

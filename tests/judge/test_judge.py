@@ -21,12 +21,14 @@ import judge_anchors  # noqa: E402
 import judge_entries  # noqa: E402
 import judge_loose  # noqa: E402
 import mild  # noqa: E402
+import pack  # noqa: E402
 from judge_cases import Case, Sole, measures  # noqa: E402
 from judge_entries import GroundEntry  # noqa: E402
 
 TRUTH = mild.Material("sand_loose", model="mild", k_pen=380, sigma_cone=0.15e6, mu=0.4, recovery=0.0,
                       slip_length=0, slip_growth=0, grip=0)  # slip costs nothing
 NOISE, BEDS = 0.03, 4
+RECORDS = SOURCE / "grains/records.tar.xz"
 EDGE = 0.0025  # [m] half of a grain of sand
 KEEP = ("sand/disc120", "sand/square100", "sand/square100-drag15", "sand/disc100", "sand/square100-tilt15",
         "sand/square100-load10", "sand/square100-swipe15", "sand/square100-again", "sand/square100-drop05", "wide/sa01")
@@ -168,14 +170,15 @@ def real_numbers():
     loose.bears = 1e8
     real, found = judge_anchors.disc_rows([GroundEntry("mild"), judge_entries.FunctionEntry("loose", loose)])
     assert real == "1.767 +- 0.116" and abs(found["mild"] - 1) < 0.02 and abs(found["loose"] - 5 / 3) < 0.02, (real, found)
-    rows = {text: (real, source) for text, real, source, *_ in judge_anchors.anchors([], judge_module.Records(SOURCE / "grains/records"), [])}
+    records = judge_module.Records(pack.opened(RECORDS))
+    rows = {text: (real, source) for text, real, source, *_ in judge_anchors.anchors([], records, [])}
     assert any("scripts/real_sand.py" in source and real.startswith("1.767") for real, source in rows.values()), rows
 
 
 def mild_fit_says_the_same(folder):
     """The judge's numbers of sand, from the mean of eight beds and elements of a grain, are within the intervals that `mild fit` gives
     five beds of the same records and the paper's elements, of plates that are half a grain wider on each side."""
-    records = judge_module.Records(SOURCE / "grains" / "records")
+    records = judge_module.Records(pack.opened(RECORDS))
     names, ground = judge_module.FITS["sand"][0], records.ground("sand")
     entry = GroundEntry("mild_merged")
     entry.fit({f"sand/{name}": (records.cases[f"sand/{name}"][0], judge_module.mean_rows(records.cases[f"sand/{name}"][1])) for name in names}, ground)
