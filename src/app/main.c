@@ -20,12 +20,11 @@ static void print_help(FILE *file) {
     for (int i = 0; i < command_count; i++) {
         fprintf(file, "  %-10s%s\n", commands[i].name, commands[i].help);
     }
-    fputs(
-        "\nRun `mild COMMAND --help` for the options of a command. The exit code is 0 on success and "
-        "2 after\nan error, which is one line on standard error.\n\ntry first:\n"
-        "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
-        "  mild press --ground foam45 --depth 0.03\n",
-        file);
+    fputs("\nRun `mild COMMAND --help` for the options of a command. The exit code is 0 on "
+          "success and 2 after\nan error, which is one line on standard error.\n\ntry first:\n"
+          "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
+          "  mild press --ground foam45 --depth 0.03\n",
+          file);
 }
 
 /* Only the last flush shows whether standard output took everything, for example on a full disk. */

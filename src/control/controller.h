@@ -19,8 +19,7 @@ typedef struct {
      * (TaskDrive), in place of its actions. Called after `act`, for different rows at the same
      * time. NULL: the joints' PD on the actions. */
     void (*torque)(void *self, int row, const TaskEnv *env, RobotSim *sim, double *torque);
-    /* [TaskShape.estimates] What it took the base's velocity and the rest (EnvsView.estimate) for in
-     * a row's last action. NULL: it estimates nothing. */
+    /* [TaskShape.estimates] Its estimate of EnvsView.estimate in a row's last action; or NULL. */
     const float *(*estimates)(void *self, int row);
 } Controller;
 
