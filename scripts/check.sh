@@ -9,7 +9,7 @@
 #   aarch64   the library for another processor, run under qemu
 #   wheel     the Python package with the program: made, looked at, and used where nothing else is
 #   site      the documentation as a site: every link; in Chromium, where there is one, every page and a search
-#   recipes   what CONTRIBUTING.md says, done in a copy of the tree: a reward, a model, a terrain, a controller, a command
+#   recipes   what CONTRIBUTING.md says, done in a copy of the tree: a reward, a task, a model, a terrain, a controller, a command
 set -euo pipefail
 cd "$(dirname "$0")/.."
 jobs=${JOBS:-$(nproc)} root=$PWD/build/check

@@ -59,7 +59,7 @@ static MildStatus pack_model(const Robot *robot, const TaskDef *task, WebModel *
     if (status == MILD_OK) {
         envs_model_fill(&tree, number, &file->model);
         file->robot = *robot_table(robot);
-        file->shape = task_shape(robot);
+        file->shape = task_shape(task, robot);
         file->gravity = -robot->model->opt.gravity[2];
         memcpy(file->task, task, sizeof file->task);
         status = task_gains(task, robot, &file->gains, error);
@@ -240,7 +240,7 @@ static MildStatus pack_belief(const Robot *robot, WebModel *file, MildError *err
 static int pack(Robot *robot, Policy *policy, const TaskDef *task, const char *path,
                 MildError *error) {
     static WebModel file;
-    const TaskShape shape = task_shape(robot);
+    const TaskShape shape = task_shape(task, robot);
     memcpy(file.magic, WEB_MAGIC, sizeof file.magic);
     file.bytes = (int32_t)sizeof file;
     if (policy_def(policy)->observation != shape.observation) {

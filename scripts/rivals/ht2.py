@@ -41,7 +41,7 @@ class Layer(nn.Module):
 class Ht2(nn.Module):
     def __init__(self, observation, actions, context=CONTEXT, width=WIDTH, heads=HEADS, layers=LAYERS, ratio=RATIO):
         super().__init__()
-        self.actions, self.place, self.context = actions, observation - actions - 2, context
+        self.actions, self.place, self.context = actions, 9 + 2 * actions, context
         self.embed_observation = nn.Linear(observation - actions, width)
         self.embed_action = nn.Linear(actions, width, bias=False)
         self.mask = nn.Parameter(0.02 * torch.randn(width))

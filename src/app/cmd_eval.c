@@ -348,7 +348,7 @@ static MildStatus evaluate(Eval *e, MildError *error) {
         eval_print_stances_header(stances.file);
     }
     if (actions.file) {
-        actions_print_header(actions.file, e->context.robot);
+        actions_print_header(actions.file, &e->context.task, e->context.robot);
     }
     if (track.file) {
         track_print_header(track.file);

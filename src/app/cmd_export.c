@@ -20,7 +20,7 @@ static MildStatus write_files(const Exporting *e, MildError *error) {
     char note[1024];
     Network network;
     MildStatus status = MILD_OK;
-    Policy *policy = learned_policy(c->policy, c->robot, note, sizeof note, error);
+    Policy *policy = learned_policy(c->policy, &c->task, c->robot, note, sizeof note, error);
     if (!policy) {
         return error->status;
     }

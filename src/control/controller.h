@@ -75,8 +75,9 @@ MildStatus controller_check(const char *name, MildError *error);
 MildStatus controller_make(const char *name, const ControllerDef *def, Controller *controller,
                            MildError *error);
 
-/* The paper's controller: a trained policy file, deterministic (z = mu, mean action). pool may be
- * NULL. Fails when the file holds a policy of another robot or of another shape. */
+/* The paper's controller: a trained policy file, deterministic (z = mu, mean action), for frames of
+ * the default task. pool may be NULL. Fails when the file holds a policy of another robot or of
+ * another shape. */
 MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, int rows_max,
                               Controller *controller, MildError *error);
 /* [estimates] of a row's last action, or NULL. */

@@ -93,7 +93,7 @@ MildStatus controller_make_clock(const ControllerDef *def, Controller *controlle
     if (!clock) {
         return mild_fail(error, MILD_ERROR_MEMORY, "clock: out of memory");
     }
-    clock->observation = task_shape(def->robot).observation;
+    clock->observation = task_shape(def->task, def->robot).observation;
     clock->joints = robot_joints(def->robot);
     clock->weights = weights_read(def->policy, "mild clock", "scripts/rivals/train_clock.py",
                                   robot_name(def->robot), &cause);

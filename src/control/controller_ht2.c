@@ -156,18 +156,19 @@ static void apply_layer(const Ht2 *ht2, const Layer *layer, const Scratch *s, in
 
 /* ---- a policy step ---- */
 
-/* Where the last action is in a frame (task/observe.h); the clock follows it. */
+/* Where the last action is in a frame (task/observe.h); what else is in it follows. */
 static int action_place(const Ht2 *ht2) {
-    return ht2->observation - ht2->joints - 2;
+    return 9 + 2 * ht2->joints;
 }
 
 /* Token j of `tokens`, whose context begins with the episode or not. */
 static void embed(const Ht2 *ht2, const Scratch *s, const float *frames, int j, int begins) {
     const int width = ht2->width, joints = ht2->joints, place = action_place(ht2);
     const float *frame = frames + (long)j * ht2->observation, *action = frame + place;
+    const size_t behind = (size_t)(ht2->observation - place - joints);
     float *x = s->x + (long)j * width, *rest = s->wide;
     memcpy(rest, frame, (size_t)place * sizeof *rest);
-    memcpy(rest + place, action + joints, 2 * sizeof *rest);
+    memcpy(rest + place, action + joints, behind * sizeof *rest);
     linear_apply(&ht2->embed, 1, rest, x);
     for (int i = 0; i < width; i++) {
         x[i] += ht2->position[(long)j * width + i];
@@ -323,7 +324,7 @@ MildStatus controller_make_ht2(const ControllerDef *def, Controller *controller,
     if (!ht2) {
         return mild_fail(error, MILD_ERROR_MEMORY, "ht2: out of memory");
     }
-    ht2->observation = task_shape(def->robot).observation;
+    ht2->observation = task_shape(def->task, def->robot).observation;
     ht2->joints = robot_joints(def->robot);
     ht2->pool = def->pool;
     ht2->weights = weights_read(def->policy, "mild ht2", "scripts/rivals/train_ht2.py",

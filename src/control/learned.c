@@ -130,9 +130,9 @@ void learned_ablate(Controller *controller, Ablation ablation, const float *mean
 
 /* ---- creation ---- */
 
-Policy *learned_policy(const char *path, const Robot *robot, char *note, int note_size,
-                       MildError *error) {
-    const TaskShape shape = task_shape(robot);
+Policy *learned_policy(const char *path, const TaskDef *task, const Robot *robot, char *note,
+                       int note_size, MildError *error) {
+    const TaskShape shape = task_shape(task, robot);
     Policy *policy = policy_load(path, note, note_size, error);
     if (!policy) {
         return NULL;
@@ -160,11 +160,13 @@ Policy *learned_policy(const char *path, const Robot *robot, char *note, int not
     return policy;
 }
 
-MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, int rows_max,
-                              Controller *controller, MildError *error) {
-    const TaskShape shape = task_shape(robot);
+MildStatus controller_make_learned(const ControllerDef *def, Controller *controller,
+                                   MildError *error) {
+    const TaskShape shape = task_shape(def->task, def->robot);
+    const char *path = def->policy;
+    const int rows_max = def->rows_max;
     MildError inner = {0};
-    Policy *policy = learned_policy(path, robot, NULL, 0, &inner);
+    Policy *policy = learned_policy(path, def->task, def->robot, NULL, 0, &inner);
     if (!policy) {
         return mild_fail(error, inner.status, "%s", inner.text);
     }
@@ -180,7 +182,7 @@ MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, 
     }
     *learned =
         (Learned){.policy = policy,
-                  .pool = pool,
+                  .pool = def->pool,
                   .rows_max = rows_max,
                   .width = (size_t)shape.history,
                   .history = history,
@@ -194,7 +196,9 @@ MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, 
     return MILD_OK;
 }
 
-MildStatus controller_make_learned(const ControllerDef *def, Controller *controller,
-                                   MildError *error) {
-    return controller_learned(def->policy, def->robot, def->pool, def->rows_max, controller, error);
+MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, int rows_max,
+                              Controller *controller, MildError *error) {
+    const TaskDef task = task_def_default();
+    const ControllerDef def = {path, &task, robot, pool, rows_max};
+    return controller_make_learned(&def, controller, error);
 }

@@ -7,9 +7,9 @@
 #include "learn/inside.h"
 #include "learn/policy.h"
 
-/* The policy of a file, if it is one for this robot. note: as of policy_load. */
-Policy *learned_policy(const char *path, const Robot *robot, char *note, int note_size,
-                       MildError *error);
+/* The policy of a file, if it is one for this task and robot. note: as of policy_load. */
+Policy *learned_policy(const char *path, const TaskDef *task, const Robot *robot, char *note,
+                       int note_size, MildError *error);
 
 /* Parts that may be taken out, and what the actor gets in their place. */
 #define ABLATION_LIST(X)                                                                           \

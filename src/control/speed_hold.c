@@ -14,7 +14,7 @@
 SpeedHoldDef speed_hold_def(const TaskDef *task, const Robot *robot, const Controller *controller) {
     return (SpeedHoldDef){.gain = controller->estimates ? task->speed_hold : 0,
                           .scale = task->velocity_scale,
-                          .clock = 9 + 3 * robot_joints(robot)};
+                          .clock = task_shape(task, robot).observation - 2};
 }
 
 static void learn(SpeedHold *hold, double gain) {

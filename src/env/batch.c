@@ -219,7 +219,7 @@ static MildStatus copy_task(Batch *b, const EnvsDef *def, const TaskGrounds *gro
                      .has_map = def->task->map != NULL,
                      .labels = labels_of(def->task),
                      .striped = def->striped,
-                     .shape = task_shape(def->robot),
+                     .shape = task_shape(def->task, def->robot),
                      .seed = def->seed,
                      .first = def->first};
     if (task.has_map) {
@@ -306,7 +306,7 @@ static MildStatus open_shares(Batch *b, MildError *error) {
 
 static MildStatus open_batch(Batch *b, const EnvsDef *def, const TaskGrounds *grounds,
                              MildError *error) {
-    b->shape = task_shape(def->robot);
+    b->shape = task_shape(def->task, def->robot);
     b->device = def->device;
     b->pool = def->pool;
     b->labels = (size_t)labels_of(def->task);

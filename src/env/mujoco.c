@@ -380,7 +380,7 @@ Envs *envs_create_mujoco(const EnvsDef *def, MildError *error) {
     }
     *m = (Mujoco){.base = {.backend = &backend, .count = def->count},
                   .def = *def->task,
-                  .shape = task_shape(def->robot),
+                  .shape = task_shape(def->task, def->robot),
                   .robot = def->robot,
                   .pool = def->pool,
                   .trial = def->trial,

@@ -161,7 +161,7 @@ TEST(its_numbers_are_the_tasks) {
     task.velocity_scale = 3;
     const SpeedHoldDef def = speed_hold_def(&task, robot, &seeing);
     assert_true(def.gain == 0.1 && def.scale == 3);
-    assert_int_equal(def.clock, task_shape(robot).observation - 2);
+    assert_int_equal(def.clock, task_shape(&task, robot).observation - 2);
     assert_true(speed_hold_def(&task, robot, &blind).gain == 0);
     Walker w = walker_at(0.4, 0.7);
     w.def.gain = 0;

@@ -65,7 +65,7 @@ static void pair_open(const char *robot, const TaskDef *def, int device) {
     pair.device = device;
     pair.def = *def;
     pair.robot = kit_robot(robot);
-    pair.shape = task_shape(pair.robot);
+    pair.shape = task_shape(def, pair.robot);
     const int model = def->randomize.model;
     robot_set_model(pair.robot, model < MILD_MODELS ? (MildModel)model : MILD_MODEL_MILD);
     robot_set_shells(pair.robot, def->shells_stand);

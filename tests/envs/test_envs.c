@@ -226,7 +226,8 @@ TEST(mirror) {
     MildEnvs *envs = open_envs(keys, KEYS);
     MildError error = {0};
     Robot *robot = robot_create(SA01, &error);
-    const TaskMirror wanted = task_mirror(robot);
+    const TaskDef def = task_def_default();
+    const TaskMirror wanted = task_mirror(&def, robot);
     int observation[SA01_OBSERVATION], action[SA01_JOINTS];
     float observation_sign[SA01_OBSERVATION], action_sign[SA01_JOINTS];
     mild_envs_mirror(envs, observation, observation_sign, action, action_sign);

@@ -128,11 +128,11 @@ TEST(a_fall_ends_one_trial) {
     EvalRow row;
     Pool *pool = pool_create(2);
     joints = robot_joints(robot);
-    frame = task_shape(robot).observation;
+    frame = task_shape(&def, robot).observation;
     assert_true(BEFORE - 3 + 3 * joints + frame <= COLUMNS_MAX);
     assert_int_equal(scene_make(&scene, "foam60", 2, &error), MILD_OK);
     assert_int_equal(controller_learned(POLICY, robot, pool, TRIALS, &walks, &error), MILD_OK);
-    actions_print_header(eval.actions, robot);
+    actions_print_header(eval.actions, &def, robot);
     assert_int_equal(kit_run(&def, pool, &falls, &scene, &eval, &row, &error), MILD_OK);
     fclose(eval.actions);
     fclose(eval.track);

@@ -6,6 +6,8 @@ the program and runs the commands of the recipes. The blocks of the page are its
 A block of C stands behind the words 'In [FILE](...), before `LINE`:' or 'New file [FILE](...):'; a block of sh has commands.
 Usage: test_contributing.py SOURCE_FOLDER [--run] [--jobs N]"""
 import argparse
+import csv
+import math
 import os
 import pathlib
 import re
@@ -16,7 +18,7 @@ import tempfile
 
 BLOCK = re.compile(r"^(?P<fence>```)(?P<kind>c|sh)\n(?P<text>.*?)^```$", re.M | re.S)
 PLACE = re.compile(r"(?:In \[(?P<file>[^\]]+)\]\([^)]*\),\s+before\s+`(?P<before>[^`]+)`|New file \[(?P<new>[^\]]+)\]\([^)]*\)):\n\n$")
-RECIPES = ["A reward", "A ground model", "A terrain", "A controller", "A command"]
+RECIPES = ["A reward", "A task", "A ground model", "A terrain", "A controller", "A command"]
 LEFT_OUT = {".git", ".venv", "out", "runs", "docs"}
 NVCC = ["nvcc", "/usr/local/cuda/bin/nvcc"]
 
@@ -105,6 +107,7 @@ def include_flags(tree):
 def units(tree, touched):
     """The units that see what the recipes changed: each file, and for a header those that its rows make."""
     made = {"src/env/task/task_def.h": ["src/env/task/task_def.c"], "src/env/task/reward.h": ["src/env/task/env.c"],
+            "src/env/task/state.h": ["src/env/task/shape.c", "src/deploy/export/describe.c"], "src/env/task/randomize.h": ["src/env/task/env.c"],
             "include/mild/ground.h": ["src/ground/models/models.c", "src/ground/models/material.c"],
             "include/mild/map.h": ["src/ground/terrain/map.c"], "src/control/controller.h": ["src/control/controllers.c"],
             "src/app/commands.h": ["src/app/commands.c"]}
@@ -120,7 +123,7 @@ def compile_c(tree, names):
     compiler = os.environ.get("CC", "cc")
     for name in names:
         call([compiler, "-std=c17", "-O0", "-D_POSIX_C_SOURCE=200809L", "-Wall", "-Wextra", "-Wconversion", "-Werror",
-              "-fopenmp-simd", *include_flags(tree), "-c", name, "-o", os.devnull], tree)
+              "-fopenmp-simd", *include_flags(tree), "-Itests", f'-DMILD_SOURCE_DIR="{tree}"', "-c", name, "-o", os.devnull], tree)
 
 
 def compile_cuda(tree, nvcc):
@@ -129,6 +132,16 @@ def compile_cuda(tree, nvcc):
     unit.write_text('#define ENVS_KERNELS envs_kernels_any\n#include "env/batch_device.cu"\n', encoding="utf-8")
     call([nvcc, "-std=c++17", "-O0", "-arch=sm_90", "-Werror", "cross-execution-space-call", *include_flags(tree), "-ptx", unit.name, "-o", os.devnull],
          tree)
+
+
+def check_rewards(tree, command):
+    """In the log of a training, the rewards that its command turns on are numbers, and not 0."""
+    out = re.search(r" train .*--out (\S+)", command)
+    for name in re.findall(r"--reward\.(\w+)=", command) if out else []:
+        with open(tree / out[1] / "log.csv", encoding="utf-8") as log:
+            column = [float(row[f"reward/{name}"]) for row in csv.DictReader(log)]
+        if not any(math.isfinite(number) and number != 0 for number in column):
+            raise Wrong(f"reward/{name} counts nowhere in {out[1]}/log.csv: {column}")
 
 
 def run_commands(tree, steps, jobs):
@@ -145,10 +158,11 @@ def run_commands(tree, steps, jobs):
         if step[0] == "run":
             print(f"  {step[1]}", flush=True)
             call(step[1], tree, shell=True)
+            check_rewards(tree, step[1])
 
 
 def check_itself(work):
-    """What this test is for is seen: a line that is not there, a block without a place, code that does not compile."""
+    """What this test is for is seen: a line that is not there, a block without a place, a reward that counts nowhere."""
     (work / "one.c").write_text("int a;\nint b;\nint b;\n", encoding="utf-8")
     for before in ("int c;", "int b;"):
         try:
@@ -156,6 +170,14 @@ def check_itself(work):
         except Wrong:
             continue
         raise Wrong(f"a line that is there not once is no fault: {before}")
+    (work / "log.csv").write_text("reward/a,reward/b\nnan,nan\n0,-0.5\n", encoding="utf-8")
+    check_rewards(work, "mild train --out . --reward.b=-1")
+    try:
+        check_rewards(work, "mild train --out . --reward.a=1")
+    except Wrong:
+        pass
+    else:
+        raise Wrong("a reward of nan and 0 is no fault")
     try:
         recipes("## A reward\n\nHere:\n\n```c\nint a;\n```\n")
     except Wrong as wrong:

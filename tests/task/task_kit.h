@@ -26,7 +26,8 @@ static inline int kit_setup(void **unused) {
         fprintf(stderr, "%s\n", error.text);
         return 1;
     }
-    mirror = task_mirror(robot);
+    const TaskDef def = task_def_default();
+    mirror = task_mirror(&def, robot);
     return 0;
 }
 
@@ -42,10 +43,10 @@ typedef struct {
     TaskDef def;
     TaskEnv *env;
     RobotSim *sim;
-    float history[SA01_HISTORY];
-    float critic[SA01_CRITIC];
-    float estimate[SA01_ESTIMATES];
-    float frame[SA01_OBSERVATION];
+    float history[TASK_HISTORY_MAX];
+    float critic[TASK_CRITIC_MAX];
+    float estimate[TASK_ESTIMATES_MAX];
+    float frame[TASK_OBSERVATION_MAX];
     EnvsView view;
 } Rig;
 

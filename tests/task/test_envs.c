@@ -82,10 +82,10 @@ static void step_many(void) {
 /* ---- each as alone ---- */
 
 static void expect_row(int e, const Rig *alone) {
-    if (memcmp(many.history[e], alone->history, sizeof alone->history) != 0 ||
-        memcmp(many.critic[e], alone->critic, sizeof alone->critic) != 0 ||
-        memcmp(many.estimate[e], alone->estimate, sizeof alone->estimate) != 0 ||
-        memcmp(many.frame[e], alone->frame, sizeof alone->frame) != 0) {
+    if (memcmp(many.history[e], alone->history, sizeof many.history[e]) != 0 ||
+        memcmp(many.critic[e], alone->critic, sizeof many.critic[e]) != 0 ||
+        memcmp(many.estimate[e], alone->estimate, sizeof many.estimate[e]) != 0 ||
+        memcmp(many.frame[e], alone->frame, sizeof many.frame[e]) != 0) {
         fail_msg("row %d is not environment %d's", e, e);
     }
 }

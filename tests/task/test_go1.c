@@ -55,7 +55,7 @@ static int teardown(void **unused) {
 }
 
 TEST(widths) {
-    TaskShape shape = task_shape(robot);
+    TaskShape shape = task_shape(&def, robot);
     assert_int_equal(shape.observation, OBSERVATION);
     assert_int_equal(shape.estimates, ESTIMATES);
     assert_int_equal(shape.critic, CRITIC);
@@ -113,7 +113,7 @@ static void look_at(const RobotState *state, double side, double phase, const fl
 
 /* The frame of the mirrored robot is the mirrored frame, and the estimates' feet change sides. */
 TEST(mirror_image) {
-    const TaskMirror mirror = task_mirror(robot);
+    const TaskMirror mirror = task_mirror(&def, robot);
     static const int other_foot[FEET] = {1, 0, 3, 2};
     for (uint32_t draw = 0; draw < 10; draw++) {
         RobotState state = moving_state(draw), image = mirrored(&state);

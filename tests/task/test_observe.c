@@ -319,7 +319,8 @@ TEST(contact_reaches_the_critic) {
         expect_entry("height", f, (double)rig.estimate[9 + f], 10 * o.sole_lowest[f], TOLERANCE);
         assert_true(rig.estimate[9 + f] < 0);
     }
-    assert_memory_equal(rig.frame, rig.critic, sizeof rig.frame); /* neither noise nor latency */
+    assert_memory_equal(rig.frame, rig.critic,
+                        SA01_OBSERVATION * sizeof *rig.frame); /* neither noise nor latency */
     rig_close(&rig);
 }
 
@@ -437,7 +438,8 @@ TEST(history) {
             task_env_observe(rig.env, &rig.def, robot, rig.sim, &reading, t == 0, &rig.view);
             expect_history(strides[s], t + 1);
         }
-        assert_memory_equal(rig.history, task_env_history(rig.env), sizeof rig.history);
+        assert_memory_equal(rig.history, task_env_history(rig.env),
+                            SA01_HISTORY * sizeof *rig.history);
         reading.omega[0] = -5; /* the next episode knows nothing of this one */
         task_env_observe(rig.env, &rig.def, robot, rig.sim, &reading, 1, &rig.view);
         for (int i = 0; i < TASK_FRAMES; i++) {

@@ -22,7 +22,7 @@ static TaskMotion *new_scene(void) {
     m->env = &scene.env;
     m->robot = robot_table(robot);
     memcpy(m->q, robot_default_pose(robot), SA01_JOINTS * sizeof *m->q);
-    scene.env.shape = task_shape(robot);
+    scene.env.shape = task_shape(&scene.def, robot);
     m->gravity[2] = -1;
     m->base_height = 0.83;
     m->foot_distance = m->knee_distance = 0.2;

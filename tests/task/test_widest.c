@@ -5,12 +5,16 @@
 
 enum { LEGS = WIDEST_LEGS, HINGES = WIDEST_HINGES };
 
+static TaskShape shape;
+
 static int widest_setup(void **unused) {
     (void)unused;
     MildError error = {0};
     robot = widest_open(&error);
     expect_good(robot != NULL, &error);
-    mirror = task_mirror(robot);
+    const TaskDef def = task_def_default();
+    shape = task_shape(&def, robot);
+    mirror = task_mirror(&def, robot);
     return 0;
 }
 
@@ -20,19 +24,19 @@ static int widest_teardown(void **unused) {
 }
 
 TEST(widths) {
-    TaskShape shape = task_shape(robot);
     assert_int_equal(shape.joints, ROBOT_JOINTS_MAX);
     assert_int_equal(shape.feet, ROBOT_FEET_MAX);
     assert_int_equal(shape.actions, ROBOT_JOINTS_MAX);
-    assert_int_equal(shape.observation, TASK_OBSERVATION_MAX);
-    assert_int_equal(shape.history, TASK_HISTORY_MAX);
+    const int spare = TASK_OBSERVATION_MAX - shape.observation; /* what the task leaves out */
+    assert_in_range(spare, 0, 0 TASK_FRAME_LIST(TASK_FRAME_ONE) - 2);
+    assert_int_equal(shape.history + TASK_FRAMES * spare, TASK_HISTORY_MAX);
     assert_int_equal(shape.estimates, TASK_ESTIMATES_MAX);
-    assert_int_equal(shape.critic, TASK_CRITIC_MAX);
+    assert_int_equal(shape.critic + spare, TASK_CRITIC_MAX);
 }
 
 /* Twice mirrored is the same, in every entry. */
 TEST(mirror_twice) {
-    for (int i = 0; i < TASK_OBSERVATION_MAX; i++) {
+    for (int i = 0; i < shape.observation; i++) {
         int j = mirror.observation_index[i];
         assert_int_equal(mirror.observation_index[j], i);
         assert_true(mirror.observation_sign[i] * mirror.observation_sign[j] == 1);
@@ -86,8 +90,7 @@ TEST(steps) {
     assert_non_null(env);
     assert_non_null(sim);
     static float rows[4][TASK_HISTORY_MAX + 1];
-    const int width[4] = {TASK_HISTORY_MAX, TASK_CRITIC_MAX, TASK_ESTIMATES_MAX,
-                          TASK_OBSERVATION_MAX};
+    const int width[4] = {shape.history, shape.critic, shape.estimates, shape.observation};
     for (int k = 0; k < 4; k++) {
         for (int i = 0; i <= TASK_HISTORY_MAX; i++) {
             rows[k][i] = NAN;

@@ -93,7 +93,8 @@ Runner *runner_create(const RunnerDef *def, MildError *error) {
     r->target.session = def->session;
     r->ticked = -1;
     belief_reset(&r->report.belief);
-    if (controller_learned(def->policy, def->robot, NULL, 1, &r->controller, error) != MILD_OK) {
+    const ControllerDef learned = {def->policy, &r->task, def->robot, NULL, 1};
+    if (controller_make_learned(&learned, &r->controller, error) != MILD_OK) {
         free(r);
         return NULL;
     }

@@ -217,7 +217,22 @@ static void remove_folder(const char *folder) {
     rmdir(folder);
 }
 
+/* policy_observe of c/policy.c writes a frame of TASK_FRAME_LIST with the clock alone. */
+static MildStatus check_frame(const Export *export, MildError *error) {
+    const PolicyDef *def = &export->network->def;
+    const int most = 9 + 3 * def->actions + 2;
+    return def->observation == most
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "the C code writes frames of %d numbers, and this policy's have %d; "
+                           "give --onnx in the place of --c",
+                           most, def->observation);
+}
+
 MildStatus export_c(const Export *export, const char *folder, MildError *error) {
+    if (check_frame(export, error) != MILD_OK) {
+        return error->status;
+    }
     if (access(folder, F_OK) == 0) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "%s exists already; name a new folder, or remove it", folder);

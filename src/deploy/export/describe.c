@@ -33,6 +33,9 @@ static void add_joint_names(Description *d, const Robot *robot) {
     snprintf(d->key[d->count++], DESCRIBE_KEY, "joint_names");
 }
 
+#define FRAME_NAME(name, has, value, sign) #name,
+#define FRAME_HAS(name, has, value, sign) has,
+
 static void add_robot(Description *d, const Export *export, const TaskGains *gains) {
     const Robot *robot = export->robot;
     const int joints = robot_joints(robot);
@@ -47,6 +50,27 @@ static void add_robot(Description *d, const Export *export, const TaskGains *gai
     add_numbers(d, "joint_pos_high", robot_joint_high(robot), joints);
 }
 
+/* Neighbours of one name in TASK_FRAME_LIST are one quantity. */
+static void add_frame(Description *d, const TaskDef *def, int joints) {
+    static const char *const name[] = {TASK_FRAME_LIST(FRAME_NAME) ""};
+    const int has[] = {TASK_FRAME_LIST(FRAME_HAS)};
+    char names[DESCRIBE_VALUE] = "", widths[DESCRIBE_VALUE] = "";
+    int width = 0;
+    (void)def;
+    for (size_t i = 0; i < sizeof has / sizeof *has; i++) {
+        width += has[i] != 0;
+        if (width > 0 && strcmp(name[i], name[i + 1]) != 0) {
+            const size_t at = strlen(names), to = strlen(widths);
+            snprintf(names + at, sizeof names - at, ",%s", name[i]);
+            snprintf(widths + to, sizeof widths - to, ",%d", width);
+            width = 0;
+        }
+    }
+    add(d, "observation_names",
+        "base_ang_vel,command,projected_gravity,joint_pos,joint_vel,last_action%s", names);
+    add(d, "observation_widths", "3,3,3,%d,%d,%d%s", joints, joints, joints, widths);
+}
+
 static void add_rules(Description *d, const Export *export) {
     const TaskDef *task = export->task;
     const int stride = task->history_stride;
@@ -54,10 +78,7 @@ static void add_rules(Description *d, const Export *export) {
     add(d, "action_scale", "%.9g", task_action_scale(task, robot_table(export->robot)));
     add(d, "action_clip", "%.9g", task->action_clip);
     add(d, "action_rule", "joint target [rad] = default_joint_pos + action_scale * action");
-    add(d, "observation_names",
-        "base_ang_vel,command,projected_gravity,joint_pos,joint_vel,last_action,clock");
-    add(d, "observation_widths", "3,3,3,%d,%d,%d,2", robot_joints(export->robot),
-        robot_joints(export->robot), robot_joints(export->robot));
+    add_frame(d, task, robot_joints(export->robot));
     add(d, "observation_rule",
         "angular velocity [rad/s] and unit gravity in the base's axes; command (forward, left "
         "[m/s], turning left [rad/s]) times 2, 2, 1; joint_pos minus default_joint_pos [rad]; "

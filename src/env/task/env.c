@@ -19,7 +19,7 @@ static size_t front_bytes(const TaskShape *shape, uint32_t held) {
 }
 
 size_t task_env_bytes(const TaskDef *def, const Robot *robot) {
-    TaskShape shape = task_shape(robot);
+    TaskShape shape = task_shape(def, robot);
     return front_bytes(&shape, task_frames_held(def)) +
            mild_ground_bytes_imprints(robot_soles(robot), robot_bodies(robot), def->imprint_tiles) +
            (def->motors ? def->motors->bytes : 0);
@@ -58,7 +58,7 @@ static void *motors_of(TaskEnv *env) {
 
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
                    uint32_t index) {
-    const TaskShape shape = task_shape(robot);
+    const TaskShape shape = task_shape(def, robot);
     TaskGains gains;
     MildStatus status = task_gains(def, robot, &gains, NULL);
     assert(status == MILD_OK); /* task_def_check_robot has seen them */

@@ -6,8 +6,7 @@
  *   9..         q - q_default [rad]
  *   9 + n..     qd times 0.05
  *   9 + 2 n..   last action
- *   9 + 3 n, +1 sin, cos of the gait clock; (0, 0) when standing: unlike the vendor's (0, 1) it is
- *               its own mirror image */
+ *   9 + 3 n..   those of TASK_FRAME_LIST (state.h) that the task has, the clock last */
 #ifndef TASK_OBSERVE_H
 #define TASK_OBSERVE_H
 
@@ -40,6 +39,15 @@ MILD_HD_FN void task_read_motors(const Real *q, const Real *qd, TaskSensors *sen
     }
 }
 
+/* sin, cos of the gait clock; (0, 0) when standing: unlike the vendor's (0, 1) it is its own mirror
+ * image. */
+MILD_HD_FN Real observe_clock(const TaskEnv *env, const TaskDef *def, int cosine) {
+    if (!def->clock || task_is_standing(def, env->command_seen)) {
+        return 0;
+    }
+    return cosine ? task_cos(TASK_TWO_PI * env->phase) : task_sin(TASK_TWO_PI * env->phase);
+}
+
 /* A frame without noise. joint, speed: [joints]. */
 MILD_HD_FN void observe_frame(const TaskEnv *env, const TaskDef *def, const double *pose,
                               const Real *omega, const Real *gravity, const Real *joint,
@@ -50,16 +58,18 @@ MILD_HD_FN void observe_frame(const TaskEnv *env, const TaskDef *def, const doub
         frame[3 + i] = (float)(env->command_seen[i] * (i < 2 ? 2 : 1));
         frame[6 + i] = (float)gravity[i];
     }
-    float *q = frame + 9, *qd = q + joints, *action = qd + joints, *clock = action + joints;
+    float *q = frame + 9, *qd = q + joints, *action = qd + joints, *last = action + joints;
     for (int i = tile_lane(); i < joints; i += TILE) {
         q[i] = (float)(joint[i] - pose[i]);
         qd[i] = (float)(0.05 * speed[i]);
         action[i] = env->action[0][i];
     }
     if (tile_lane() == 0) {
-        int still = !def->clock || task_is_standing(def, env->command_seen);
-        clock[0] = still ? 0 : (float)task_sin(TASK_TWO_PI * env->phase);
-        clock[1] = still ? 0 : (float)task_cos(TASK_TWO_PI * env->phase);
+#define OBSERVE_NUMBER(name, has, value, sign)                                                     \
+    if (has) {                                                                                     \
+        *last++ = (float)(value);                                                                  \
+    }
+        TASK_FRAME_LIST(OBSERVE_NUMBER)
     }
 }
 

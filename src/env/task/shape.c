@@ -4,11 +4,20 @@
 #define TASK_END_NAME(name, help) #name,
 const char *const task_end_names[] = {TASK_ENDS(TASK_END_NAME)};
 
-TaskShape task_shape(const Robot *robot) {
+/* Numbers of TASK_FRAME_LIST that the task has. */
+static int frame_last(const TaskDef *def) {
+    int count = 0;
+    (void)def;
+#define FRAME_COUNT(name, has, value, sign) count += (has) ? 1 : 0;
+    TASK_FRAME_LIST(FRAME_COUNT)
+    return count;
+}
+
+TaskShape task_shape(const TaskDef *def, const Robot *robot) {
     int joints = robot_joints(robot), feet = robot_feet(robot);
     TaskShape shape = {.joints = joints,
                        .feet = feet,
-                       .observation = 9 + 3 * joints + 2,
+                       .observation = 9 + 3 * joints + frame_last(def),
                        .actions = joints,
                        .estimates = 3 + 4 * feet};
     shape.history = TASK_FRAMES * shape.observation;
@@ -23,10 +32,11 @@ int task_critic_ground(const TaskShape *shape) {
 /* Mirror image in the x-z plane. y components, roll, yaw and their rates change sign, and the
  * joints swap sides. If left and right legs alternate, the clock shifts by half a period, (sin,
  * cos) -> (-sin, -cos). If they move together, it does not change. */
-TaskMirror task_mirror(const Robot *robot) {
+TaskMirror task_mirror(const TaskDef *def, const Robot *robot) {
     static const float head[9] = {-1, 1, -1, 1, -1, -1, 1, -1, 1};
     TaskMirror mirror = {.observation_index = {0}};
-    int joints = robot_joints(robot), clock = 9 + 3 * joints;
+    int joints = robot_joints(robot), at = 9 + 3 * joints;
+    (void)def;
     for (int i = 0; i < 9; i++) {
         mirror.observation_index[i] = i;
         mirror.observation_sign[i] = head[i];
@@ -41,9 +51,11 @@ TaskMirror task_mirror(const Robot *robot) {
             mirror.observation_sign[9 + block * joints + i] = sign;
         }
     }
-    for (int i = clock; i < clock + 2; i++) {
-        mirror.observation_index[i] = i;
-        mirror.observation_sign[i] = robot_mirror_shift(robot) > 0 ? -1 : 1;
+#define FRAME_MIRROR(name, has, value, sign)                                                       \
+    if (has) {                                                                                     \
+        mirror.observation_index[at] = at;                                                         \
+        mirror.observation_sign[at++] = sign;                                                      \
     }
+    TASK_FRAME_LIST(FRAME_MIRROR)
     return mirror;
 }

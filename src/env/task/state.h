@@ -34,24 +34,32 @@ extern const char *const task_end_names[];
 /* [-] Friction of rigid ground that a caller has chosen (task_env_reset_on). */
 #define TASK_RIGID_FRICTION 0.8
 
-/* Numbers per environment; they follow from the robot's joints and feet. */
+/* The last numbers of a frame, behind those of the joints: name, bool: the TaskDef def has it, what
+ * the TaskEnv env says of it, its sign in the mirror image of a robot. The networks look for the
+ * clock at the end. */
+#define TASK_FRAME_LIST(X)                                                                         \
+    X(clock, 1, observe_clock(env, def, 0), robot_mirror_shift(robot) > 0 ? -1 : 1)                \
+    X(clock, 1, observe_clock(env, def, 1), robot_mirror_shift(robot) > 0 ? -1 : 1)
+#define TASK_FRAME_ONE(name, has, value, sign) +1
+
+/* Numbers per environment; they follow from the robot's joints and feet, and from the task. */
 typedef struct {
     int joints;
     int feet;
     int observation; /* one frame: angular velocity 3, command 3, gravity 3, joints' angles, speeds
-                        and last actions, clock 2 (observe.h) */
+                        and last actions, those of TASK_FRAME_LIST (observe.h) */
     int history;     /* TASK_FRAMES frames */
     int actions;     /* one per joint */
     int estimates;   /* base velocity 3, feet velocities 3 each, feet heights */
     int critic;      /* frame, estimates, 6 of each foot, 34 of the episode (observe.h) */
 } TaskShape;
 enum { /* of a robot with ROBOT_JOINTS_MAX joints and ROBOT_FEET_MAX feet */
-       TASK_OBSERVATION_MAX = 9 + 3 * ROBOT_JOINTS_MAX + 2,
+       TASK_OBSERVATION_MAX = 9 + 3 * ROBOT_JOINTS_MAX TASK_FRAME_LIST(TASK_FRAME_ONE),
        TASK_HISTORY_MAX = TASK_FRAMES * TASK_OBSERVATION_MAX,
        TASK_ESTIMATES_MAX = 3 + 4 * ROBOT_FEET_MAX,
        TASK_CRITIC_MAX = TASK_OBSERVATION_MAX + TASK_ESTIMATES_MAX + 6 * ROBOT_FEET_MAX + 34
 };
-TaskShape task_shape(const Robot *robot);
+TaskShape task_shape(const TaskDef *def, const Robot *robot);
 MILD_HD_FN float *task_row(float *rows, long i, int width) {
     return rows ? rows + i * width : NULL;
 }
@@ -76,7 +84,7 @@ typedef struct {
     int action_index[ROBOT_JOINTS_MAX];
     float action_sign[ROBOT_JOINTS_MAX];
 } TaskMirror;
-TaskMirror task_mirror(const Robot *robot);
+TaskMirror task_mirror(const TaskDef *def, const Robot *robot);
 
 /* What differs from robot to robot; see RobotVariation. */
 typedef struct {

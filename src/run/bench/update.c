@@ -65,7 +65,7 @@ static MildStatus open_learner(Learner *l, const ExperimentDef *def, int rows, M
     }
     ExperimentDef fitted = *def;
     experiment_fit_robot(&fitted, robot);
-    const TaskMirror sides = task_mirror(robot);
+    const TaskMirror sides = task_mirror(&fitted.task, robot);
     const PpoMirror mirror = {sides.observation_index, sides.observation_sign, sides.action_index,
                               sides.action_sign};
     fitted.ppo.learning_rate = fitted.ppo.learning_rate_min = fitted.ppo.kl_target = 0.0;

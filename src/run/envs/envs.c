@@ -27,7 +27,7 @@ static MildStatus build(MildEnvs *envs, MildError *error) {
     if (status != MILD_OK) {
         return status;
     }
-    envs->shape = task_shape(envs->robot);
+    envs->shape = task_shape(&def->task, envs->robot);
     envs->pool = pool_create(def->train.threads);
     if (!envs->pool) {
         return mild_fail(error, MILD_ERROR_MEMORY, "cannot start %d threads", def->train.threads);
@@ -95,7 +95,7 @@ const char *mild_envs_reward_name(int index) {
 
 void mild_envs_mirror(const MildEnvs *envs, int *observation_index, float *observation_sign,
                       int *action_index, float *action_sign) {
-    const TaskMirror mirror = task_mirror(envs->robot);
+    const TaskMirror mirror = task_mirror(&envs->def.task, envs->robot);
     const size_t observation = (size_t)envs->shape.observation,
                  actions = (size_t)envs->shape.actions;
     memcpy(observation_index, mirror.observation_index, observation * sizeof *observation_index);

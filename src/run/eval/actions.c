@@ -8,8 +8,8 @@ static void print_joints(FILE *csv, const Robot *robot, const char *what, const 
     }
 }
 
-void actions_print_header(FILE *csv, const Robot *robot) {
-    const TaskShape shape = task_shape(robot);
+void actions_print_header(FILE *csv, const TaskDef *task, const Robot *robot) {
+    const TaskShape shape = task_shape(task, robot);
     fprintf(csv, "trial,ground,speed_m_s,time_s,command_x_m_s,command_y_m_s,command_turn_rad_s,"
                  "phase,quaternion_w,quaternion_x,quaternion_y,quaternion_z,omega_x_rad_s,"
                  "omega_y_rad_s,omega_z_rad_s");

@@ -10,7 +10,7 @@
 /* The names of the columns: trial, ground, speed, time; command, phase, quaternion (w x y z) and
  * angular velocity of the base, angle and speed of each joint, all true; the observation, with
  * noise and delay; the action within its clip. SI units, but for phase, observation and action. */
-void actions_print_header(FILE *csv, const Robot *robot);
+void actions_print_header(FILE *csv, const TaskDef *task, const Robot *robot);
 void actions_print_row(FILE *csv, const EvalDecision *decision);
 
 #endif

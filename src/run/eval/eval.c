@@ -182,7 +182,7 @@ static Results carve(const Trials *t, void *block) {
     Results at;
     at.sample = block;
     at.history = (float *)(void *)(at.sample + trials * (size_t)t->samples);
-    at.reward = at.history + trials * (size_t)task_shape(t->run->robot).history;
+    at.reward = at.history + trials * (size_t)task_shape(&t->task, t->run->robot).history;
     at.done = (uint8_t *)(at.reward + trials);
     at.timeout = at.done + trials;
     at.valid = at.timeout + trials;
@@ -192,7 +192,7 @@ static Results carve(const Trials *t, void *block) {
 
 static MildStatus open_arrays(Trials *t, MildError *error) {
     const size_t trials = (size_t)t->trials, joints = (size_t)robot_joints(t->run->robot);
-    const size_t history = (size_t)task_shape(t->run->robot).history;
+    const size_t history = (size_t)task_shape(&t->task, t->run->robot).history;
     t->samples = envs_physics_steps(t->envs);
     t->bytes = trials * ((size_t)t->samples * sizeof(EnvsSample) + (history + 1) * sizeof(float) +
                          4 * sizeof(uint8_t));
@@ -255,7 +255,7 @@ static void start_trial(void *context, int trial, int thread) {
 
 /* [observation] What the policy sees next. */
 static const float *newest_frame(const Trials *t, int trial) {
-    const TaskShape shape = task_shape(t->run->robot);
+    const TaskShape shape = task_shape(&t->task, t->run->robot);
     return t->host.history + (size_t)(trial + 1) * (size_t)shape.history - shape.observation;
 }
 

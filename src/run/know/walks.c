@@ -185,7 +185,7 @@ static MildStatus step_all(Walks *w, int step, int *lasted, MildError *error) {
 MildStatus walks_run(const WalksDef *def, int *lasted, MildError *error) {
     Walks w = {.def = def,
                .task = *def->task,
-               .shape = task_shape(def->robot),
+               .shape = task_shape(def->task, def->robot),
                .steps = (int)(def->seconds / TASK_PERIOD + 0.5)};
     MildStatus status = open_walks(&w, error);
     status = status == MILD_OK ? start(&w, error) : status;

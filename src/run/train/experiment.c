@@ -18,7 +18,7 @@ ExperimentDef experiment_def_default(void) {
 }
 
 void experiment_fit_robot(ExperimentDef *def, const Robot *robot) {
-    TaskShape shape = task_shape(robot);
+    TaskShape shape = task_shape(&def->task, robot);
     snprintf(def->policy.robot, sizeof def->policy.robot, "%s", robot_name(robot));
     task_policy_keys_print(&def->task, def->policy.task, sizeof def->policy.task);
     def->policy.observation = shape.observation;

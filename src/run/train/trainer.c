@@ -66,7 +66,7 @@ static int make_learner(Trainer *trainer, MildError *error) {
         return 0;
     }
     experiment_fit_robot(&trainer->def, trainer->robot);
-    const TaskMirror sides = task_mirror(trainer->robot);
+    const TaskMirror sides = task_mirror(&def->task, trainer->robot);
     const PpoMirror mirror = {sides.observation_index, sides.observation_sign, sides.action_index,
                               sides.action_sign};
     robot_set_model(trainer->robot, task_model_soles(def->task.randomize.model));
