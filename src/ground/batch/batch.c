@@ -314,17 +314,17 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
     return status;
 }
 
-MildBatch batch_share(const MildBatch *batch, int first, int count) {
-    MildBatch share = *batch;
-    share.shape.robots = count;
-    share.arrays.memory += (size_t)first * batch_memory_numbers(&batch->shape);
-    if (share.arrays.order) {
-        share.arrays.order += (size_t)first * BATCH_ORDER;
+MildBatch batch_slice(const MildBatch *batch, int first, int count) {
+    MildBatch slice = *batch;
+    slice.shape.robots = count;
+    slice.arrays.memory += (size_t)first * batch_memory_numbers(&batch->shape);
+    if (slice.arrays.order) {
+        slice.arrays.order += (size_t)first * BATCH_ORDER;
     }
-    if (share.arrays.worn) {
-        share.arrays.worn += (size_t)first * batch_worn_numbers(&batch->shape);
+    if (slice.arrays.worn) {
+        slice.arrays.worn += (size_t)first * batch_worn_numbers(&batch->shape);
     }
-    return share;
+    return slice;
 }
 
 /* The kernel that fits, or NULL. */

@@ -85,7 +85,7 @@ void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *m
 MildStatus batch_memory_open(BatchArrays *arrays, const BatchShape *shape, int device, int worn,
                              MildError *error);
 /* `count` robots of a batch from `first` on, as a batch that borrows its memory. */
-MildBatch batch_share(const MildBatch *batch, int first, int count);
+MildBatch batch_slice(const MildBatch *batch, int first, int count);
 
 /* ---- a map: map.c ---- */
 /* Makes a view of a map whose arrays are copies in the memory of a device. Fails for a map that a

@@ -227,7 +227,7 @@ static Some some_robots(const MildBatch *batch, int count, MildError *error) {
 /* Copies them to robots first .. first + count - 1, or with `back` from these. */
 static MildStatus copy_robots(const MildBatch *batch, int first, int count, const Some *some,
                               int back, MildError *error) {
-    const BatchArrays at = batch_share(batch, first, count).arrays;
+    const BatchArrays at = batch_slice(batch, first, count).arrays;
     const size_t robots = (size_t)count * sizeof(float);
     const size_t bytes = robots * batch_memory_numbers(&batch->shape);
     const size_t worn = robots * batch_worn_numbers(&batch->shape);
