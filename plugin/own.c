@@ -36,9 +36,9 @@ static int is_own(const Soft *soft, const MildGround *ground, int f) {
         own &= isfinite(*at) != 0;
     }
     for (int e = 0; e < ground->padded[f]; e++) {
-        own &= is_material(&soft->terrain, memory.material[e], memory.share != NULL);
+        own &= is_material(&soft->terrain, memory.material[e], memory.area_share != NULL);
         own &= memory.worn[e] >= 0 && memory.worn[e] < 1;
-        own &= !memory.share || memory.share[e] >= 0;
+        own &= !memory.area_share || memory.area_share[e] >= 0;
     }
     return own;
 }

@@ -85,7 +85,7 @@ static void case_map(BodiesCase *c, const MildTerrain *terrain) {
 }
 
 /* Numbers of BodiesCase.memory behind those of an element on level ground. */
-enum { PLANE = CASE_MEMORY, SLOPE_X, SLOPE_Y, STATE, SHARE };
+enum { PLANE = CASE_MEMORY, SLOPE_X, SLOPE_Y, STATE, AREA_SHARE };
 
 static void memory_arrays(const Memory *m, double *const all[CASE_MEMORY]) {
     double *const arrays[CASE_MEMORY] = {m->depth_max,      m->middle,    m->front_speed, m->drift,
@@ -119,7 +119,7 @@ static void case_remember(BodiesCase *c, const Kit *kit, int b) {
         c->memory[SLOPE_X][b][e] = there ? memory.slope_x[e] : 0;
         c->memory[SLOPE_Y][b][e] = there ? memory.slope_y[e] : 0;
         c->memory[STATE][b][e] = c->faces[b] ? state_of(material) : material > 0 ? material : 0;
-        c->memory[SHARE][b][e] = c->faces[b] ? memory.share[e] : 0;
+        c->memory[AREA_SHARE][b][e] = c->faces[b] ? memory.area_share[e] : 0;
     }
 }
 
@@ -206,7 +206,8 @@ static void compare_element(Worst *worst, const BodiesCase *c, const Kit *kit, c
     if (c->faces[b]) {
         worst->buried += material == MATERIAL_BURIED;
         assert_int_equal((int)c->memory[STATE][b][e], state_of(material));
-        worst->memory = worse(worst->memory, fabs(c->memory[SHARE][b][e] - memory->share[e]));
+        worst->memory =
+            worse(worst->memory, fabs(c->memory[AREA_SHARE][b][e] - memory->area_share[e]));
     }
     if (kit->ground->uneven[b] && (material >= 0 || material == MATERIAL_FREE)) {
         const double x = c->memory[SLOPE_X][b][e], y = c->memory[SLOPE_Y][b][e];

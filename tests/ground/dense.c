@@ -395,7 +395,8 @@ static void dense_element(Dense *d, const Find *find) {
         dense_resist(d->dt, e, nearer->model, find->normal, now, now[3]);
     }
     if (nearer->model == MILD_MODEL_BEKKER) {
-        element_shear(d->dt, e, nearer, find->share * find->pitch * find->pitch, memory->drift[i]);
+        element_shear(d->dt, e, nearer, find->area_share * find->pitch * find->pitch,
+                      memory->drift[i]);
     }
     element_hold(d->dt, e, memory->held_x[i], memory->held_y[i], memory->held_stiffness[i]);
 }
@@ -421,7 +422,7 @@ static void dense_foot(Dense *d, const Kit *kit, int f) {
                  .pitch = mild_sole_pitch(sole),
                  .width = mild_sole_width(sole),
                  .normal = {side * R[2], side * R[5], side * R[8]},
-                 .share = 1.0,
+                 .area_share = 1.0,
                  .area = 1.0,
                  .faces = mild_sole_surface_z(sole) != NULL};
     const int n = mild_sole_elements(sole);

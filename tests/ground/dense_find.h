@@ -16,7 +16,7 @@ typedef struct {
     double pitch, width, normal[3]; /* width: shorter side; normal: of the face that looks down */
     int i;
     double p[3], at[3], slope[2]; /* ankle -> element, world point, gradient of the ground */
-    double share, area;           /* [-] of a surface: what it presses with, and its area, both
+    double area_share, area;      /* [-] of a surface: what it presses with, and its area, both
                                      over those of a square of the raster; else 1 */
     int faces;                    /* bool: a surface */
     double heap[2];               /* [-] of the element, see dense_law.h */
@@ -102,7 +102,7 @@ static double find_share(const Find *find, const DenseLaw *law, int directed, do
     if (buried) {
         *deepest = fmax(*deepest, fmax(m0 / (1.0 - law->recovery), m0 + ELEMENT_ELASTIC));
     }
-    return !find->faces ? 1.0 : directed ? find->area : find->share;
+    return !find->faces ? 1.0 : directed ? find->area : find->area_share;
 }
 
 /* An element in the ground, for dense_rim. */
@@ -164,8 +164,8 @@ static int find_element(Find *find, const MildSole *sole) {
                 find->normal[k] += R[3 * k + j] * mild_sole_surface_normal(sole, j)[find->i];
             }
         }
-        find->share = find->memory.material[find->i] >= 0 ? find->memory.share[find->i]
-                                                          : -find->normal[2] * find->area;
+        find->area_share = find->memory.material[find->i] >= 0 ? find->memory.area_share[find->i]
+                                                               : -find->normal[2] * find->area;
         if (!(-find->normal[2] > cos(80.0 / 180.0 * acos(-1.0)))) {
             return 0;
         }

@@ -580,16 +580,16 @@ TEST(states_are_copied) {
     }
     assert_memory_equal(one.ground, two.ground, one.bytes);
     Memory memory = ground_memory(one.ground, 0);
-    assert_non_null(memory.share);
-    memory.share[3] = -1.0;
+    assert_non_null(memory.area_share);
+    memory.area_share[3] = -1.0;
     assert_int_not_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
-    memory.share[3] = 0.0;
+    memory.area_share[3] = 0.0;
     memory.material[3] = -4;
     assert_int_not_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
     memory.material[3] = MATERIAL_BURIED;
     assert_int_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
     memory = ground_memory(one.ground, 1);
-    assert_null(memory.share);
+    assert_null(memory.area_share);
     memory.material[3] = MATERIAL_BURIED; /* not of a plane sole */
     assert_int_not_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
     kit_close(&one);

@@ -75,7 +75,7 @@ typedef struct {
 enum {
     BODIES_PLANE = CONTACT_MEMORY, /* with a map, or of a surface */
     BODIES_STATE = BODIES_PLANE + 3,
-    BODIES_SHARE,
+    BODIES_AREA_SHARE,
     BODIES_NUMBERS,     /* of an element of a surface */
     BODIES_STEPPED = 4, /* of the numbers of a body */
     BODIES_TOUCHED,
@@ -153,12 +153,12 @@ typedef struct {
     Real p[3]; /* [m] from the body's reference point, world axes */
     Real depth;
     Real slope[2];
-    Real share;     /* [-] 1 for a sole; 0: carries nothing */
-    int state;      /* before the step, of bodies_state */
-    int label;      /* that it stands on */
-    Real down;      /* [-] of a surface: downward part of its normal */
-    int faces_down; /* bool: of a surface; 1 for a sole */
-    int listed;     /* bool: may touch in this step */
+    Real area_share; /* [-] 1 for a sole; 0: carries nothing */
+    int state;       /* before the step, of bodies_state */
+    int label;       /* that it stands on */
+    Real down;       /* [-] of a surface: downward part of its normal */
+    int faces_down;  /* bool: of a surface; 1 for a sole */
+    int listed;      /* bool: may touch in this step */
     ElementMemory before;
     Element element; /* with its share of the load */
     Share carried;   /* that share, on ground with LAW_HEAP */
@@ -346,7 +346,7 @@ MILD_HD void bodies_scale(Element *e, Real share) {
     e->b_drift *= share;
 }
 
-/* The share of an element of a surface, and its law times that: faces_laws and faces_unload. A
+/* The area share of an element of a surface, and its law times that: faces_laws and faces_unload. A
  * buried element begins without force; under elastic ground it has none. */
 MILD_HD void bodies_share(const BodiesSetup *setup, const BodiesWork *work, int i, int s, int state,
                           const ContactMaterial *material, BodiesElement *own) {
@@ -356,9 +356,10 @@ MILD_HD void bodies_share(const BodiesSetup *setup, const BodiesWork *work, int 
     const Real m0 = own->depth - setup->dt / 2 * bodies_velocity(own, work->velocity[i]).descent;
     const int buried = state == BODIES_BURIED && m0 > 0;
     const Real lasting = 1 - e->recovery;
-    own->share = state > 0 ? memory->element[BODIES_SHARE * memory->next + s] : own->share;
+    own->area_share =
+        state > 0 ? memory->element[BODIES_AREA_SHARE * memory->next + s] : own->area_share;
     if (!(lasting > 0) && (buried || (state == BODIES_FREE && own->before.middle > 0))) {
-        own->share = 0;
+        own->area_share = 0;
     }
     if (lasting > 0 && buried) {
         const Real least = real_max(m0 / lasting, m0 + ELEMENT_ELASTIC);
@@ -367,7 +368,7 @@ MILD_HD void bodies_share(const BodiesSetup *setup, const BodiesWork *work, int 
     const int directed = (material->curves & LAW_RESIST) && material->law.flat_stiffness == 0 &&
                          material->law.power_force == 0;
     const Real whole = sole->face[4 * sole->elements + s];
-    bodies_scale(e, directed && own->share > 0 ? whole : own->share);
+    bodies_scale(e, directed && own->area_share > 0 ? whole : own->area_share);
 }
 
 /* The merged cone of element s, on ground with LAW_HEAP; sole_heap. */
@@ -445,7 +446,7 @@ MILD_HD void bodies_direct(const BodiesSole *sole, const Real *R, int s,
     }
     if (own->curves & LAW_SHEAR) {
         const Shear shear = {material->mu, material->cohesion, material->shear_length,
-                             sole->square * own->share};
+                             sole->square * own->area_share};
         element_shear(e, &own->before, &shear, own->curves, dt, 1 / dt);
     }
 }
@@ -496,16 +497,17 @@ MILD_HD void bodies_locate(const BodiesSetup *setup, const BodiesWork *work, int
     own->state = bodies_state(setup, sole, &work->memory[i], s);
     own->slope[0] = own->slope[1] = 0;
     own->label = 0;
-    own->share = 1;
+    own->area_share = 1;
     own->down = 1;
     bodies_point(sole, R, s, own->p);
     if (sole->face) {
         Real normal[3];
         bodies_normal(sole, R, s, normal);
         own->down = -normal[2];
-        own->share = own->down > SHARE_STEEP ? own->down * sole->face[4 * sole->elements + s] : 0;
+        own->area_share =
+            own->down > SHARE_STEEP ? own->down * sole->face[4 * sole->elements + s] : 0;
     }
-    own->faces_down = own->share > 0;
+    own->faces_down = own->area_share > 0;
     if (setup->has_map) {
         bodies_survey(setup, work, i, s, own->state, spot, own);
     } else {
@@ -547,7 +549,7 @@ MILD_HD void bodies_forget(const BodiesMemory *memory, int s, int state, int bur
     if (state != after) { /* else there is nothing to forget */
         bodies_record(memory, s, &none, 0);
         memory->element[BODIES_STATE * memory->next + s] = (Real)after;
-        memory->element[BODIES_SHARE * memory->next + s] = 0;
+        memory->element[BODIES_AREA_SHARE * memory->next + s] = 0;
     }
 }
 
@@ -579,7 +581,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         return;
     }
     bodies_recall(setup, work, i, s, &own, curves);
-    if (sole->face && !(own.share > 0)) {
+    if (sole->face && !(own.area_share > 0)) {
         if (advance) {
             bodies_forget(memory, s, own.state, 1);
         }
@@ -606,7 +608,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         bodies_record(memory, s, &after, worn);
         if (sole->face) {
             *state = (Real)(stays ? 1 + own.label : uneven ? BODIES_FREE : BODIES_NONE);
-            state[memory->next] = stays ? own.share : 0;
+            state[memory->next] = stays ? own.area_share : 0;
         } else if (setup->has_map) {
             *state = (Real)own.label;
         }
@@ -618,7 +620,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         loads->loaded += 1;
         loads->depth += own.depth;
         loads->force += normal;
-        loads->area += own.share * sole->square;
+        loads->area += own.area_share * sole->square;
         loads->deepest = real_max(loads->deepest, own.depth);
         for (int k = 0; k < 3; k++) {
             loads->p[k] += normal * own.p[k];

@@ -38,7 +38,7 @@ static void surface_load(const MildGround *ground, int f, const BodiesMemory *to
         at[(BODIES_PLANE + 1) * to->next] = there ? (float)of.slope_x[e] : 0.0f;
         at[(BODIES_PLANE + 2) * to->next] = there ? (float)of.slope_y[e] : 0.0f;
         at[BODIES_STATE * to->next] = (float)state_of(of.material[e]);
-        at[BODIES_SHARE * to->next] = (float)of.share[e];
+        at[BODIES_AREA_SHARE * to->next] = (float)of.area_share[e];
     }
     to->body[BODIES_STEPPED] = uneven ? 1.0f : 0.0f;
     to->body[BODIES_TOUCHED] = 1.0f;
@@ -55,7 +55,7 @@ static void surface_store(const BodiesMemory *from, int plane, MildGround *groun
         element_store(at, from->next, &of, e);
         of.worn[e] = (double)from->worn[e];
         of.material[e] = material_of((int)at[BODIES_STATE * from->next]);
-        of.share[e] = (double)at[BODIES_SHARE * from->next];
+        of.area_share[e] = (double)at[BODIES_AREA_SHARE * from->next];
         touched += of.material[e] != MATERIAL_NONE;
         if (uneven && (of.material[e] >= 0 || of.material[e] == MATERIAL_FREE)) {
             of.slope_x[e] = (double)at[(BODIES_PLANE + 1) * from->next];

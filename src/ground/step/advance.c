@@ -259,7 +259,7 @@ static int foot_advance_all(const Advance *a, const Memory *memory, const int32_
  * was here. */
 static int face_unlisted(const Advance *a, const Memory *memory, int e) {
     const FootScratch *foot = a->foot;
-    const int buried = !foot->away && !(foot->share[e] > 0.0) && foot->depth[e] > foot->least;
+    const int buried = !foot->away && !(foot->area_share[e] > 0.0) && foot->depth[e] > foot->least;
     const int32_t material = memory->material[e];
     const int index = material & 0xff;
     if (buried && a->imprints && material >= 0 && index < a->terrain->material_count &&
@@ -267,7 +267,7 @@ static int face_unlisted(const Advance *a, const Memory *memory, int e) {
         const ImprintElement left = {foot->point_x[e], foot->point_y[e], foot->pitch, a->rotation};
         imprints_press(a->imprints, &left, memory->depth_max[e]);
     }
-    memory->share[e] = 0.0;
+    memory->area_share[e] = 0.0;
     memory_forget(memory, e, buried ? MATERIAL_BURIED : MATERIAL_NONE);
     return buried;
 }
@@ -331,8 +331,8 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         }
         touched += foot_unlisted(a, memory, next, e);
         next = e + 1;
-        if (faces && !(s->share[i] > 0.0)) { /* it carries nothing until it has come out */
-            memory->share[e] = 0.0;
+        if (faces && !(s->area_share[i] > 0.0)) { /* it carries nothing until it has come out */
+            memory->area_share[e] = 0.0;
             memory_forget(memory, e, MATERIAL_BURIED);
             touched++;
             continue;
@@ -349,7 +349,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         memory->material[e] = lifted || barred ? lifted_material : material[slot];
         memory->front_speed[e] = barred ? 0.0 : memory->front_speed[e]; /* it carries nothing */
         if (faces) {
-            memory->share[e] = lifted ? 0.0 : s->share[i];
+            memory->area_share[e] = lifted ? 0.0 : s->area_share[i];
         }
         if (a->imprints && (carried || !lifted)) {
             const double refill = foot->derived[material[slot] & 0xff].material.refill;

@@ -18,7 +18,7 @@ static double law_scale(const FootScratch *foot, const Memory *memory, int e, in
     if (!foot->faces) {
         return 1.0;
     }
-    return directed ? foot->area[e] : memory->share[e];
+    return directed ? foot->area[e] : memory->area_share[e];
 }
 
 static int is_directed(const DerivedLaw *derived, int32_t mixture) {

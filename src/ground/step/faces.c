@@ -8,7 +8,7 @@
 
 const double faces_level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
-/* Depth and share of every element. */
+/* Depth and area share of every element. */
 static void faces_locate(FootScratch *foot, const MildTerrain *terrain) {
     const double ez = foot->arm[1][2], nz = foot->arm[2][2], tz = foot->arm[3][2];
     foot_points(foot);
@@ -22,7 +22,7 @@ static void faces_locate(FootScratch *foot, const MildTerrain *terrain) {
     for (int i = 0; i < foot->elements; i++) {
         const double down =
             -(ez * foot->face[0][i] + nz * foot->face[1][i] + tz * foot->face[2][i]);
-        foot->share[i] = down > SHARE_STEEP ? down * foot->area[i] : 0.0;
+        foot->area_share[i] = down > SHARE_STEEP ? down * foot->area[i] : 0.0;
     }
     for (int i = foot->elements; i < foot->padded; i++) {
         foot->depth[i] = PADDING_DEPTH;
@@ -38,20 +38,21 @@ void faces_list(FootScratch *foot, const MildTerrain *terrain, const MildContact
     faces_locate(foot, terrain);
     for (int i = 0; i < foot->elements; i++) {
         foot->element[foot->active] = i;
-        foot->active += foot->share[i] > 0.0 && foot->depth[i] > foot->least;
+        foot->active += foot->area_share[i] > 0.0 && foot->depth[i] > foot->least;
     }
 }
 
-/* Height and share of the slots. A loaded element keeps the share of its touchdown. */
+/* Height and area share of the slots. A loaded element keeps that of its touchdown. */
 static void faces_gather(const FootScratch *foot, const Memory *memory) {
     for (int i = 0; i < foot_end(foot); i++) {
         Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;
-        s->z[l] = s->share[l] = 0.0;
+        s->z[l] = s->area_share[l] = 0.0;
         if (i < foot->active) {
             const int e = foot->element[i];
             s->z[l] = foot->height[e];
-            s->share[l] = memory->material[e] >= 0 ? memory->share[e] : foot->share[e];
+            s->area_share[l] =
+                memory->material[e] >= 0 ? memory->area_share[e] : foot->area_share[e];
         }
     }
 }
@@ -71,7 +72,7 @@ static int slot_is_under(const FootScratch *foot, int i, const Memory *memory, c
            (memory->material[e] == MATERIAL_FREE && memory->middle[e] > 0.0);
 }
 
-/* Gives each slot the law of its material times its share. An element that was under elastic ground
+/* Gives each slot the law of its material times its area share. An element that was under elastic ground
  * gets none. */
 static void faces_laws(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory,
                        const Motion *now, double dt) {
@@ -85,11 +86,11 @@ static void faces_laws(const FootScratch *foot, const MildTerrain *terrain, cons
         const int e = foot->element[i];
         const int model = terrain->materials[foot->slot_material[i] & 0xff].model;
         if (!(s->recovery[l] < 1.0) && slot_is_under(foot, i, memory, now, dt)) {
-            s->share[l] = 0.0;
+            s->area_share[l] = 0.0;
         }
         /* The theory's coefficients count the slope themselves. */
         const int directed = (model_row(model)->motion & LAW_RESIST) && slot_directed(s, l);
-        slot_scale(s, l, directed && s->share[l] > 0.0 ? foot->area[e] : s->share[l]);
+        slot_scale(s, l, directed && s->area_share[l] > 0.0 ? foot->area[e] : s->area_share[l]);
     }
 }
 
@@ -130,7 +131,7 @@ double faces_loaded(const FootScratch *foot, double *area) {
         const Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;
         z += s->z[l] * s->iz[l];
-        *area += s->iz[l] > 0.0 ? s->share[l] * foot->pitch * foot->pitch : 0.0;
+        *area += s->iz[l] > 0.0 ? s->area_share[l] * foot->pitch * foot->pitch : 0.0;
     }
     return z;
 }

@@ -12,7 +12,7 @@ static RimPoint point_of(const FootScratch *foot, int i) {
     const Slots *s = slot_block(foot, i);
     const int e = foot->element[i], l = i % SLOT_LANES;
     return (RimPoint){foot->point_x[e] - foot->origin[0], foot->point_y[e] - foot->origin[1],
-                      rim_depth(s->depth[l], s->depth_max[l]), foot->share[e] / foot->area[e]};
+                      rim_depth(s->depth[l], s->depth_max[l]), foot->area_share[e] / foot->area[e]};
 }
 
 /* [N] share_ahead of slot i, whose law is `element`. down: downward part of its outward normal. */

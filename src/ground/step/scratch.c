@@ -8,7 +8,7 @@
  * point_y, point_z, normal, tangent_x, tangent_y and flat; state and slip share the next; heap has
  * two. */
 #define FOOT_ARRAYS 15
-#define FACES_ARRAYS 6 /* more of a surface: height, face[3], area and share */
+#define FACES_ARRAYS 6 /* more of a surface: height, face[3], area and area_share */
 
 /* Numbers of a foot in the block. */
 static size_t foot_doubles(const MildSole *sole) {
@@ -66,7 +66,7 @@ static void foot_set_faces(FootScratch *foot, const MildSole *sole, double **at)
     foot->faces = SLOT_FACES;
     foot->height = take(at, foot->padded);
     foot->area = take(at, foot->padded);
-    foot->share = take(at, foot->padded);
+    foot->area_share = take(at, foot->padded);
     for (int k = 0; k < 3; k++) {
         foot->face[k] = take(at, foot->padded);
         memcpy(foot->face[k], mild_sole_surface_normal(sole, k),

@@ -46,19 +46,19 @@ typedef struct FootScratch {
     double half[3];   /* [m] half of its sides */
 
     /* A surface (faces.c): mild_scratch_create. NULL and 0 for a plane sole. */
-    int faces;       /* SLOT_FACES, or 0: all elements lie at z and face down */
-    double *height;  /* [padded] [m] above z, in the foot frame */
-    double *face[3]; /* [padded] [-] outward normal, foot frame */
-    double *area;    /* [padded] [-] area over pitch^2 */
-    double *share;   /* [padded] [-] projected area over pitch^2; 0: faces up. faces_locate */
-    double least;    /* [m] elements deeper than this may touch: foot_list */
+    int faces;          /* SLOT_FACES, or 0: all elements lie at z and face down */
+    double *height;     /* [padded] [m] above z, in the foot frame */
+    double *face[3];    /* [padded] [-] outward normal, foot frame */
+    double *area;       /* [padded] [-] area over pitch^2 */
+    double *area_share; /* [padded] [-] projected area over pitch^2; 0: faces up. faces_locate */
+    double least;       /* [m] elements deeper than this may touch: foot_list */
 
     /* Pose: foot_locate. The vector from the ankle to an element is p = arm[0] + x arm[1] + y
      * arm[2] + height arm[3]. */
     double origin[3]; /* [m] the ankle, world */
     double arm[4][3]; /* world: the frame's point (0, 0, z) [m], its axes [-], z for a surface */
     int uneven;       /* bool: the terrain is not level; otherwise all slopes are 0 */
-    int away;         /* bool: no element can touch; depth and share are not set */
+    int away;         /* bool: no element can touch; depth and area_share are not set */
     double reach;     /* [m] upper bound on the depths: foot_reach */
     double *depth;    /* [padded] [m] */
     double *slope_x;  /* [padded] [-] gradient of the ground; uneven ground only */

@@ -35,8 +35,8 @@ typedef struct {
     Lanes depth; /* [m] */
 
     /* Of a surface: faces_gather, faces_laws. Otherwise 0. */
-    Lanes z;     /* [m] above the plane of the foot */
-    Lanes share; /* [-] projected area over pitch^2; 0: carries nothing */
+    Lanes z;          /* [m] above the plane of the foot */
+    Lanes area_share; /* [-] projected area over pitch^2; 0: carries nothing */
 
     /* Gradient of the ground under it: slots_uneven; 0 where the foot is not `uneven`. */
     Lanes slope_x; /* [-] */

@@ -61,9 +61,9 @@ Memory ground_memory(const MildGround *ground, int foot) {
     for (int k = 0; k < MEMORY_DOUBLES; k++, at += ground->padded[foot]) {
         *arrays[k] = at;
     }
-    memory.share = NULL;
+    memory.area_share = NULL;
     if (ground->faces >> foot & 1) {
-        memory.share = at;
+        memory.area_share = at;
         at += ground->padded[foot];
     }
     memory.material = (int32_t *)at;
@@ -166,8 +166,8 @@ static __attribute__((cold)) int foot_is_valid(const MildGround *ground, int foo
         valid &= isfinite(memory.depth_max[i]) != 0;
     }
     for (size_t i = 0; i < padded; i++) {
-        valid &= material_is_valid(memory.material[i], memory.share != NULL);
-        valid &= !memory.share || memory.share[i] >= 0.0;
+        valid &= material_is_valid(memory.material[i], memory.area_share != NULL);
+        valid &= !memory.area_share || memory.area_share[i] >= 0.0;
         valid &= memory.worn[i] >= 0.0 && memory.worn[i] < 1.0;
     }
     return valid;
