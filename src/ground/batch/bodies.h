@@ -161,7 +161,7 @@ typedef struct {
     int listed;      /* bool: may touch in this step */
     ElementMemory before;
     Element element; /* with its share of the load */
-    Share carried;   /* that share, on ground with LAW_HEAP */
+    Share share;     /* that share, on ground with LAW_HEAP */
     int curves;
 } BodiesElement;
 
@@ -371,12 +371,12 @@ MILD_HD void bodies_share(const BodiesSetup *setup, const BodiesWork *work, int 
     bodies_scale(e, directed && own->area_share > 0 ? whole : own->area_share);
 }
 
-/* The merged cone of element s, on ground with LAW_HEAP; sole_heap. */
+/* The heap of element s, on ground with LAW_HEAP; sole_heap. */
 MILD_HD void bodies_merge(const BodiesSole *sole, int s, const ContactMaterial *material,
                           Element *e) {
     if (material->projects > 0) {
-        e->law = sole->face ? law_merged(e->law, LAW_HEAP_LEAST, sole->breadth)
-                            : law_merged(e->law, sole->begin[s], sole->width[s]);
+        e->law = sole->face ? law_of_heap(e->law, LAW_HEAP_LEAST, sole->breadth)
+                            : law_of_heap(e->law, sole->begin[s], sole->width[s]);
     }
 }
 
@@ -412,17 +412,17 @@ MILD_HD void bodies_carry(const BodiesSetup *setup, const BodiesWork *work, int 
     const Real lean = bodies_lean(work, sole, i, s, material, own);
     const Real worn = memory->worn ? memory->worn[s] : 0;
     const Real elastic = law_elastic_force(&own->element.law, own->curves, own->element.middle);
-    own->carried = contact_share(material, !sole->face, worn);
+    own->share = contact_share(material, !sole->face, worn);
     Real ahead = 0;
     if (sole->face) {
         const ContactVelocity now = bodies_velocity(own, work->velocity[i]);
         Real normal[3];
         bodies_normal(sole, work->rotation[i], s, normal);
-        ahead = share_ahead(&own->element, &own->carried, lean, normal, now.x, now.y, now.descent);
+        ahead = share_ahead(&own->element, &own->share, lean, normal, now.x, now.y, now.descent);
     }
-    element_share(&own->element, &own->before, &own->carried, elastic, setup->dt, 1 / setup->dt,
-                  lean, ahead);
-    element_carry(&own->element, own->carried.carry);
+    element_share(&own->element, &own->before, &own->share, elastic, setup->dt, 1 / setup->dt, lean,
+                  ahead);
+    element_share_virgin(&own->element, own->share.q);
 }
 
 /* contact_direct for a plate of its own. */
@@ -596,7 +596,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         element_remember(e, &own.before, dt, 1 / dt, normal, v.x, v.y, v.descent, stays);
     Real worn = 0;
     if (own.curves & LAW_HEAP) {
-        worn = element_wear_alone(e, &own.carried, &own.before, &after, dt, normal, v.x, v.y,
+        worn = element_wear_alone(e, &own.share, &own.before, &after, dt, normal, v.x, v.y,
                                   v.descent, stays);
     }
     if (stays) {

@@ -198,7 +198,7 @@ typedef struct {
 } CONTACT_PART ContactPath;
 typedef struct {
     Real unload_stiffness, added_mass, front_speed;
-    Real last; /* yield_speed; where elements have a share alone, its `carry` [-] */
+    Real last; /* yield_speed; where elements have a share alone, its q [-] */
 } CONTACT_PART ContactFront;
 typedef struct {
     Real entry_speed, stop_drag, stop_growth;
@@ -213,12 +213,12 @@ typedef struct {
 } CONTACT_PART ContactSurface;
 typedef struct {
     Real mu, line_stiffness, virgin_depth; /* as its motion so far has made them */
-    Real carry;                            /* [-] of Share */
+    Real share;                            /* [-] q of Share */
 } CONTACT_PART ContactOwnLaw;
 
 /* What an element carries of its load in this step, of Share. */
 typedef struct {
-    Real carry, lean; /* [-] */
+    Real share, lean; /* [-] q and lean of Share */
 } ContactLoad;
 
 /* ---- feet that are in the air ---- */

@@ -25,7 +25,7 @@ struct MildSole {
 /* [m] A sole that chooses its pitch has no more elements than one of this pitch may have. */
 #define SOLE_PITCH_LEAST (0.5 * MATERIAL_PITCH)
 
-/* The merged cone of an element, in radii of the disc of an element of MATERIAL_PITCH: it closes
+/* The heap of an element, in radii of the disc of an element of MATERIAL_PITCH: it closes
  * from `begin` on, over `width`, times tan(alpha)/nu. The
  * elements of a surface have the cone of a disc as wide as the surface; its rim lowers their load
  * (rim.h). */

@@ -201,7 +201,7 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                 const Real most =
                     share_regains(&share, slid[i], fresh[i]) ? SLOT_LANES + REAL(1) : slips;
                 changes += stays ? most : 0;
-                to.worn[e + i] = stays ? 1 - share.carry : 0;
+                to.worn[e + i] = stays ? 1 - share.q : 0;
             }
             to.depth_max[e + i] = after.depth_max;
             to.middle[e + i] = after.middle;

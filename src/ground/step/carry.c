@@ -48,7 +48,7 @@ MILD_HD void slot_carry(Slots *s, int i, Real dt, Real rate) {
     s->mu[i] = element.mu;
     s->drift_bound[i] = element.drift_bound;
     s->lean[i] = share.lean;
-    s->carry[i] = share.carry;
+    s->share[i] = share.q;
     s->zero_depth[i] = element.zero_depth;
     s->hold_x[i] = element.hold_x;
     s->hold_y[i] = element.hold_y;

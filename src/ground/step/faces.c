@@ -72,8 +72,8 @@ static int slot_is_under(const FootScratch *foot, int i, const Memory *memory, c
            (memory->material[e] == MATERIAL_FREE && memory->middle[e] > 0.0);
 }
 
-/* Gives each slot the law of its material times its area share. An element that was under elastic ground
- * gets none. */
+/* Gives each slot the law of its material times its area share. An element that was under elastic
+ * ground gets none. */
 static void faces_laws(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory,
                        const Motion *now, double dt) {
     for (int i = 0; i < foot->active; i++) {

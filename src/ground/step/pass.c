@@ -72,7 +72,7 @@ static __attribute__((noinline)) void foot_powers(const FootScratch *foot, Real 
         for (int i = 0; i < SLOT_LANES; i++) {
             const PowerOver grows = {grown[0][i], grown[1][i], grown[2][i]};
             const Real force =
-                curve == LAW_POWER ? s->power_force[i] * s->carry[i] : s->elastic_force[i];
+                curve == LAW_POWER ? s->power_force[i] * s->share[i] : s->elastic_force[i];
             const PowerWay over = power_way_of(force, exponent[i], begin[i], way[i], &grows);
             power[0][i] = over.mean;
             power[1][i] = over.slope;

@@ -40,7 +40,7 @@ typedef struct FootScratch {
     double center_x; /* [m] centroid in the foot frame */
     double center_y; /* [m] */
     double radius;   /* [m] distance from the ankle to the farthest element */
-    SoleHeap *heap;  /* [elements] merged cones */
+    SoleHeap *heap;  /* [elements] */
 
     double middle[3]; /* [m] of the bounding box, foot frame */
     double half[3];   /* [m] half of its sides */
@@ -79,7 +79,7 @@ typedef struct FootScratch {
     int stops;  /* bool: stop_drag, stop_growth or explicit_impulse may be nonzero */
     int32_t
         *slot_material;   /* [SLOTS_PADDED] material whose law the slot has, encoded as in Memory */
-    int32_t *slot_holder; /* [SLOTS_PADDED] element whose law it has, for merged cones */
+    int32_t *slot_holder; /* [SLOTS_PADDED] element whose law it has, for heaps */
     DerivedLaw derived[MILD_MATERIALS_MAX];
     Slots *slot; /* [SLOTS_PADDED(padded)/SLOT_LANES] blocks */
 

@@ -78,9 +78,9 @@ typedef struct {
     /* Of a surface on ground with LAW_HEAP: faces_lean. Otherwise 0. */
     Lanes ahead; /* [N] share_ahead */
 
-    /* Share of this step: foot_carry; without LAW_HEAP carry is 1. */
+    /* Share of this step: foot_carry; without LAW_HEAP share is 1. */
     Lanes lean;  /* [-] */
-    Lanes carry; /* [-] */
+    Lanes share; /* [-] Share.q */
 
     /* Law of this step: slots_begin, changed by slots_resist. */
     Lanes middle;           /* [m] */
@@ -190,7 +190,7 @@ MILD_HD Share slot_share(const Slots *s, int i) {
         .mu = s->whole_mu[i],
         .worn = s->worn[i],
         .lean = s->lean[i],
-        .carry = s->carry[i],
+        .q = s->share[i],
     };
 }
 
@@ -199,7 +199,7 @@ MILD_HD Element slot_loaded(const Slots *s, int i, int curves) {
     Element element = slot_element(s, i);
     if (curves & LAW_HEAP) {
         element.law.cone_begin = s->cone_begin[i];
-        element_carry(&element, s->carry[i]);
+        element_share_virgin(&element, s->share[i]);
     }
     return element;
 }

@@ -53,12 +53,11 @@ typedef struct {
     double *held_y;         /* [N] */
     double *held_stiffness; /* [N/m] */
     double *worn;           /* [-] Share.worn, share.h */
-    double *plane;   /* [m] uneven ground: the last step had u = plane + slope . (x, y) - z */
-    double *slope_x; /* [-] gradient of that plane, world axes */
-    double *slope_y; /* [-] */
-    double *
-        area_share; /* [-] of a surface (else NULL): Slots.area_share at touchdown; 0 without load */
-    int32_t *material; /* the material it touched down on, encoded as above */
+    double *plane;      /* [m] uneven ground: the last step had u = plane + slope . (x, y) - z */
+    double *slope_x;    /* [-] gradient of that plane, world axes */
+    double *slope_y;    /* [-] */
+    double *area_share; /* [-] of a surface (else NULL): the slot's at touchdown; 0 without load */
+    int32_t *material;  /* the material it touched down on, encoded as above */
 } Memory;
 
 /* The memory of a foot. Callers with a const ground must only read through it. */
