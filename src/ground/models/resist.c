@@ -32,9 +32,9 @@ MILD_HD void slot_resist(Slots *s, int i, double dt, double rate, const Plate *p
 }
 
 /* One text of both theories, in place of four inlined. */
-static __attribute__((noinline)) Alpha some_alpha(const Plate *plate, int in_space, double lean,
+static __attribute__((noinline)) Alpha some_alpha(const Plate *plate, int in_space, double forward,
                                                   double level, double down) {
-    return plate_alpha(plate, in_space, lean, level, down);
+    return plate_alpha(plate, in_space, forward, level, down);
 }
 
 /* The same of any slot. */
@@ -43,8 +43,8 @@ static void some_resist(Slots *s, int i, double dt, const Plate *plate, const Mo
     const SlotVelocity v = slot_velocity(s, i, motion, SLOT_UNEVEN | SLOT_FACES);
     const ElementMemory memory = slot_memory(s, i);
     const PlateMotion m = plate_motion(plate, v.x, v.y, v.descent);
-    const Alpha sinking = some_alpha(plate, in_space, m.lean, m.level, m.down + RESIST_REST);
-    const Alpha sliding = some_alpha(plate, in_space, m.lean, m.level + RESIST_REST, m.down);
+    const Alpha sinking = some_alpha(plate, in_space, m.forward, m.level, m.down + RESIST_REST);
+    const Alpha sliding = some_alpha(plate, in_space, m.forward, m.level + RESIST_REST, m.down);
     Element element = slot_element(s, i);
     element_yield(&element, &memory, dt, 1.0 / dt, s->strength[i], sliding.x, sinking.z, curves);
     s->line_stiffness[i] = element.law.line_stiffness;
