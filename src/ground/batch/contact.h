@@ -290,7 +290,7 @@ MILD_HD Real contact_lean(const Real normal[3], Real x, Real y) {
     return real_min(real_max(along / REAL_SQRT(1 + x * x + y * y), SHARE_LEAN), 1);
 }
 
-/* The share of an element before the step. plane: bool, of a sole; else of a surface, which has no
+/* The share of an element before the step. plane: bool, of a sole; else of a shell, which has no
  * ground at its sides. */
 MILD_HD Share contact_share(const ContactMaterial *material, int plane, Real worn) {
     const Share share = {material->projects,

@@ -142,12 +142,12 @@ static MildStatus check_robots(const BatchShape *shape, int first, int count, Mi
     return MILD_OK;
 }
 
-/* Bool: the soles of a ground are plane and surfaces as those of a batch, with as many elements. */
+/* Bool: the soles of a ground are plane and shells as those of a batch, with as many elements. */
 static int is_of(const BatchShape *shape, const MildGround *ground) {
     int same = ground->feet == shape->soles;
     for (int f = 0; same && f < shape->soles; f++) {
-        const int face = ground->faces >> f & 1;
-        same = ground->elements[f] == shape->elements[f] && face == (f >= shape->feet);
+        const int shell = ground->shells >> f & 1;
+        same = ground->elements[f] == shape->elements[f] && shell == (f >= shape->feet);
     }
     return same;
 }

@@ -23,7 +23,7 @@
  * Summed over a sole that is W u^2/2 of it times its length by its width, near the mean over all
  * directions of its width (SHARE_PASSIVE).
  *
- * A surface has walls of its own. A face presses along its normal n; the law has the vertical part
+ * A shell has walls of its own. A face presses along its normal n; the law has the vertical part
  * of that, F. Where the face moves into the ground the horizontal part of it resists, too:
  *
  *     H <= mu F + F (n_x v_x + n_y v_y)/(-n_z (|v| + w))     mu F alone where it moves out

@@ -130,9 +130,8 @@ MildStatus mild_model_match(MildModel model, const MildMaterial *from, const Mil
         return MILD_OK;
     }
     if (mild_sole_surface_z(sole)) {
-        return mild_fail(
-            error, MILD_ERROR_ARGUMENT,
-            "sole: a model is matched under a sole of mild_sole_create, not a surface");
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "sole: a model is matched under a sole of mild_sole_create, not a shell");
     }
     const ModelRow *row = model_row((int)model);
     const double cells = mild_sole_elements(sole);

@@ -25,7 +25,7 @@ static int share_is_nan(const Share *share) {
 static __attribute__((cold)) void law_derive(const FootScratch *foot, const MildMaterial *material,
                                              DerivedLaw *derived) {
     const Law law = law_of(material, foot->pitch, foot->width);
-    const Share share = share_of(material, foot->pitch, foot->faces ? 0.0 : foot->width);
+    const Share share = share_of(material, foot->pitch, foot->shell ? 0.0 : foot->width);
     const MildMaterial own = material_at(material, foot->pitch);
     const int slips = share.slip_rate > 0.0;
     *derived =
