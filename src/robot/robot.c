@@ -360,8 +360,8 @@ static MildStatus read_robot(Robot *robot, const char *folder, MildError *error)
         (int)sizeof robot->path) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", folder);
     }
-    static const PartReader parts[] = {robot_load_models,   check_models, robot_read_models,
-                                       robot_read_surfaces, read_stand,   NULL};
+    static const PartReader parts[] = {robot_load_models,      check_models, robot_read_models,
+                                       robot_read_shell_soles, read_stand,   NULL};
     return read_all(parts, robot, error);
 }
 
