@@ -224,7 +224,7 @@ static Shapes *shapes_of(const mjModel *m, const Foot *foot, int bounds, MildErr
     return NULL;
 }
 
-/* ---- surfaces ---- */
+/* ---- shells ---- */
 
 /* Elements of each shape alone, whose sum is that of the body without regard to what lies inside
  * another shape; 0 when a shape is refused. */
@@ -242,8 +242,8 @@ static int count_elements(const Shapes *shapes, double pitch) {
     return sum;
 }
 
-/* A surface of at least `elements` elements: four sides of a long box. */
-static MildSole *surface_of(int elements, MildError *error) {
+/* A shell of at least `elements` elements: four sides of a long box. */
+static MildSole *shell_of(int elements, MildError *error) {
     const double edge = 1e-3;
     const MildShape box = {.type = MILD_SHAPE_BOX,
                            .size = {0.5 * edge * (0.25 * elements + 1), edge / 2, edge / 2}};
@@ -272,11 +272,11 @@ static MildStatus check_room(const mjModel *m, const PluginDef *def, const Foot 
                      foot_body_name(m, foot), used, room);
 }
 
-MildStatus body_surface(const mjModel *m, const PluginDef *def, double pitch, int compiling,
-                        Foot *foot, MildError *error) {
+MildStatus body_shell(const mjModel *m, const PluginDef *def, double pitch, int compiling,
+                      Foot *foot, MildError *error) {
     if (compiling && !foot_has_primitive(m, foot)) {
         const int room = room_of(m, def, foot, error);
-        foot->sole = foot->raster = room > 0 ? surface_of(room, error) : NULL;
+        foot->sole = foot->raster = room > 0 ? shell_of(room, error) : NULL;
         return foot->sole ? MILD_OK : MILD_ERROR_ARGUMENT;
     }
     Shapes *shapes = shapes_of(m, foot, 0, error);
@@ -284,11 +284,11 @@ MildStatus body_surface(const mjModel *m, const PluginDef *def, double pitch, in
         return MILD_ERROR_ARGUMENT;
     }
     MildError why = {0};
-    const MildSurfaceDef surface = {.shapes = shapes->shape,
-                                    .count = shapes->count,
-                                    .pitch = pitch,
-                                    .spacing = def->body_pitch};
-    foot->sole = foot->raster = mild_sole_surface(&surface, &why);
+    const MildSurfaceDef shell = {.shapes = shapes->shape,
+                                  .count = shapes->count,
+                                  .pitch = pitch,
+                                  .spacing = def->body_pitch};
+    foot->sole = foot->raster = mild_sole_surface(&shell, &why);
     shapes_free(shapes);
     if (!foot->sole) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "body: '%.60s': %s", foot_body_name(m, foot),

@@ -8,7 +8,7 @@
 /* Covers the shapes of a body with elements. pitch: [m] of the ground's law, that of the feet.
  * compiling: as for feet_create; a body with meshes then gets elements enough for the room that
  * their bounding boxes may need. */
-MildStatus body_surface(const mjModel *m, const PluginDef *def, double pitch, int compiling,
-                        Foot *foot, MildError *error);
+MildStatus body_shell(const mjModel *m, const PluginDef *def, double pitch, int compiling,
+                      Foot *foot, MildError *error);
 
 #endif

@@ -83,7 +83,7 @@ static int standing_on(const mjModel *m, const Foot *foot, char *text, size_t si
             snprintf(text, size,
                      "%s of %s '%.60s' still touches %s, which is rigid; set its contype and "
                      "conaffinity to 0, or exclude the two bodies",
-                     geom_name(m, g, a, sizeof a), foot->surface ? "body" : "foot body",
+                     geom_name(m, g, a, sizeof a), foot->shell ? "body" : "foot body",
                      foot_body_name(m, foot), geom_name(m, w, b, sizeof b));
             return 1;
         }
@@ -117,7 +117,7 @@ int check_feet(const mjModel *m, const Soft *soft, char *text, size_t size) {
         if (standing_on(m, foot, text, size)) {
             return 1;
         }
-        if (!foot->round && !foot->surface && fabs(upright(m, foot)) < UPRIGHT) {
+        if (!foot->round && !foot->shell && fabs(upright(m, foot)) < UPRIGHT) {
             snprintf(text, size,
                      "the z axis of foot '%.60s' is not vertical in the pose of the file; its sole "
                      "lies across z: name a site whose z axis points up from the sole",

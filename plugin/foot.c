@@ -135,14 +135,14 @@ static MildStatus find_bodies(const mjModel *m, const PluginDef *def, Foot *feet
         for (int f = 0; f < *count; f++) {
             if (feet[f].body == body) {
                 return mild_fail(error, MILD_ERROR_ARGUMENT, "body: '%.60s' is %s; name it once",
-                                 name, feet[f].surface ? "named twice" : "a foot already");
+                                 name, feet[f].shell ? "named twice" : "a foot already");
             }
         }
         MildStatus status = add_foot(m, feet, count, body, -1, error);
         if (status != MILD_OK) {
             return status;
         }
-        feet[*count - 1].surface = 1;
+        feet[*count - 1].shell = 1;
     }
     return MILD_OK;
 }
@@ -185,7 +185,7 @@ int foot_may_touch_floor(const mjModel *m, const Foot *foot, int geom) {
     if (m->geom_bodyid[geom] != foot->body) {
         return 0;
     }
-    if (foot->surface) {
+    if (foot->shell) {
         return 1;
     }
     if (foot->round) {
@@ -584,7 +584,7 @@ static MildStatus check_moves(const mjModel *m, const Foot *foot, MildError *err
                ? MILD_OK
                : mild_fail(error, MILD_ERROR_ARGUMENT,
                            "%s: body '%.60s' is fixed to the world; it must move",
-                           foot->surface ? "body" : "feet", foot_body_name(m, foot));
+                           foot->shell ? "body" : "feet", foot_body_name(m, foot));
 }
 
 /* All of them, once they are found. */
@@ -593,10 +593,10 @@ static MildStatus make_soles(const mjModel *m, const PluginDef *def, MildModel m
     MildStatus status = MILD_OK;
     for (int f = 0; status == MILD_OK && f < count; f++) {
         status = check_moves(m, &feet[f], error);
-        if (status == MILD_OK && feet[f].surface) {
+        if (status == MILD_OK && feet[f].shell) {
             const double own = def->pitch > 0 ? def->pitch : MATERIAL_PITCH;
             const double pitch = f > 0 ? mild_sole_pitch(feet[0].sole) : own;
-            status = body_surface(m, def, pitch, compiling, &feet[f], error);
+            status = body_shell(m, def, pitch, compiling, &feet[f], error);
         } else if (status == MILD_OK) {
             status = make_sole(m, def, model, compiling, f, &feet[f], error);
             if (status == MILD_OK && !compiling) {

@@ -83,7 +83,7 @@ MildStatus live_change(Soft *soft, const mjModel *m, MildGround *ground, int lab
         status = read_line(&text, &material, name, error);
     }
     if (status == MILD_OK && soft->model >= 0 && model_is_cones(material.model) &&
-        !soft->foot[0].surface) {
+        !soft->foot[0].shell) {
         status = mild_model_match((MildModel)soft->model, &material, soft->foot[0].raster,
                                   soft_load(soft, m), &matched, error);
         material = status == MILD_OK ? matched : material;

@@ -6,7 +6,7 @@
 
 /* Bool: the header is that of a ground with these feet. */
 static int has_layout(const MildGround *ground, const MildGround *layout) {
-    return ground->feet == layout->feet && ground->faces == layout->faces &&
+    return ground->feet == layout->feet && ground->shells == layout->shells &&
            memcmp(ground->elements, layout->elements, sizeof layout->elements) == 0 &&
            memcmp(ground->padded, layout->padded, sizeof layout->padded) == 0 &&
            ground->tiles == layout->tiles && ground->imprint_cell == layout->imprint_cell;
@@ -14,14 +14,13 @@ static int has_layout(const MildGround *ground, const MildGround *layout) {
 
 /* Bool: the step reads the elements of the foot. */
 static int is_read(const Soft *soft, const MildGround *ground, int f) {
-    return !soft->foot[f].surface || ground->touched[f] != 0 || (soft->input.rows >> f & 1) != 0;
+    return !soft->foot[f].shell || ground->touched[f] != 0 || (soft->input.rows >> f & 1) != 0;
 }
 
 /* Bool: a material as Memory encodes it (ground/step/state.h) is one of the terrain. */
-static int is_material(const MildTerrain *terrain, int32_t code, int surface) {
+static int is_material(const MildTerrain *terrain, int32_t code, int shell) {
     if (code < 0) {
-        return code == MATERIAL_NONE || code == MATERIAL_FREE ||
-               (surface && code == MATERIAL_BURIED);
+        return code == MATERIAL_NONE || code == MATERIAL_FREE || (shell && code == MATERIAL_BURIED);
     }
     return (code & 0xff) < terrain->material_count &&
            (code >> 8 & 0xff) < terrain->material_count && code >> 24 == 0;
@@ -36,9 +35,9 @@ static int is_own(const Soft *soft, const MildGround *ground, int f) {
         own &= isfinite(*at) != 0;
     }
     for (int e = 0; e < ground->padded[f]; e++) {
-        own &= is_material(&soft->terrain, memory.material[e], memory.share != NULL);
+        own &= is_material(&soft->terrain, memory.material[e], memory.area_share != NULL);
         own &= memory.worn[e] >= 0 && memory.worn[e] < 1;
-        own &= !memory.share || memory.share[e] >= 0;
+        own &= !memory.area_share || memory.area_share[e] >= 0;
     }
     return own;
 }

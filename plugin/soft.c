@@ -45,7 +45,7 @@ static int root_of(const mjModel *m, int body) {
 static double foot_load(const mjModel *m, const Foot *feet, int count) {
     const int root = root_of(m, feet[0].body);
     double mass = 0;
-    while (count > 1 && feet[count - 1].surface) {
+    while (count > 1 && feet[count - 1].shell) {
         count--;
     }
     for (int b = 1; b < m->nbody; b++) {
@@ -129,7 +129,7 @@ static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *er
     }
     if (status == MILD_OK) {
         status = plugin_def_materials(m, instance, &soft->def,
-                                      soft->foot[0].surface ? NULL : soft->foot[0].raster,
+                                      soft->foot[0].shell ? NULL : soft->foot[0].raster,
                                       soft_load(soft, m), &soft->terrain, error);
     }
     for (int i = 0; i < soft->terrain.material_count && status == MILD_OK; i++) {
@@ -271,7 +271,7 @@ static void find_near(Soft *soft, const mjModel *m, const mjData *d) {
     input->inverse_inertia = soft->inverse_inertia;
     input->dt = m->opt.timestep;
     for (int f = 0; f < soft->feet; f++) {
-        if (soft->foot[f].surface) {
+        if (soft->foot[f].shell) {
             locate_body(soft, m, d, f);
             bodies++;
         } else {
@@ -598,7 +598,7 @@ static void warn_of_disagreement(Soft *soft, const mjModel *m, const mjData *d) 
 static void warn_of_tilt(Soft *soft, const mjModel *m, const mjData *d) {
     for (int f = 0; f < soft->feet && !soft->tilted; f++) {
         const double up = fabs(soft->input.rotation[f][8]);
-        if (!soft->foot[f].surface && soft->contact.foot[f].contacts > 0 && up < STANDS) {
+        if (!soft->foot[f].shell && soft->contact.foot[f].contacts > 0 && up < STANDS) {
             mju_warning(PLUGIN_NAME
                         ": foot '%s' stands on the ground with its sole tilted by %.0f "
                         "degrees at %g s; beyond 60 what touches is no longer the sole; "

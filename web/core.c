@@ -622,8 +622,8 @@ static int open_policy(const WebModel *file) {
     return web.weight && web.wide[0] && web.wide[1];
 }
 
-/* The surface of a body with shells. */
-static MildSole *open_surface(const WebModel *file, int body) {
+/* The sole that the shells of a body make. */
+static MildSole *open_shell(const WebModel *file, int body) {
     MildShape shapes[ROBOT_SHELLS_MAX];
     MildSurfaceDef def = {shapes, 0, file->sole[0].pitch, file->shell_spacing};
     for (int s = 0; s < file->shells; s++) {
@@ -662,7 +662,7 @@ static int open_soles(const WebModel *file) {
         }
     }
     for (int b = web.feet; b < web.standing; b++) {
-        web.sole[b] = open_surface(file, b - web.feet);
+        web.sole[b] = open_shell(file, b - web.feet);
         if (!web.sole[b]) {
             return 0;
         }

@@ -40,7 +40,7 @@ typedef struct {
     double outline[2 * ROBOT_OUTLINE_MAX]; /* [m] */
 } WebSole;
 
-/* A part of the surface of a body with shells; see MildShape. */
+/* A shell of a body, as RobotShell; see MildShape. */
 typedef struct {
     int32_t body; /* of EngineTree.bodies */
     int32_t type; /* MildShapeType */

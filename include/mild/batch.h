@@ -9,9 +9,9 @@
  *     tau += J^T wrench            then integrate
  *
  * A foot is any body with a sole, as in mild/ground.h: shins, thighs, the base and wheels too, by
- * mild_sole_surface. Plane soles come first in all arrays. Where a robot has surfaces, feet and the
- * surfaces near the ground are solved at once, by a slower method on a GPU (four warps a robot in
- * the place of one). A robot whose surfaces are all away from the ground in a step takes the fast
+ * mild_sole_surface. Plane soles come first in all arrays. Where a robot has shells, feet and the
+ * shells near the ground are solved at once, by a slower method on a GPU (four warps a robot in
+ * the place of one). A robot whose shells are all away from the ground in a step takes the fast
  * method for its feet.
  *
  * Values are those of mild_ground_solve and mild_ground_advance within the rounding of float. Along
@@ -21,7 +21,7 @@
  *
  * The ground is level, or has the heights and the labels of one map (mild_batch_set_map), in which
  * each robot has a place, a height and materials of its own. There are no patches, blended borders
- * or imprints yet, and no results for the elements of robots with surfaces. Blended borders are
+ * or imprints yet, and no results for the elements of robots with shells. Blended borders are
  * refused by name. Materials may be of any model but rigid, which has none; materials of several
  * models may be in one table, if the soles are those of each (mild_sole_concentric).
  *
@@ -51,14 +51,14 @@ typedef struct MildBatch MildBatch;
 typedef struct {
     int robots;                   /* at least 1 */
     int feet;                     /* of each, 1 .. MILD_BATCH_FEET_MAX */
-    const MildSole *const *soles; /* [feet] plane soles, then surfaces; not kept */
+    const MildSole *const *soles; /* [feet] plane soles, then shells; not kept */
     double dt;                    /* [s] above 0, at most 0.1 */
     double tolerance;             /* [-] of the residual, below 1; 0: 1e-4 */
     int max_iterations;           /* bound of Newton steps; 0: 20 */
     int device;                   /* a CUDA device, from 0, or MILD_BATCH_HOST */
     /* bool: no plane sole transmits a moment, as a ball does: its rows and columns of moments in
      * every inverse_inertia are 0. On three or four plane soles of up to eight elements a step is
-     * then faster, and without surfaces they are not read; otherwise the flag changes nothing. */
+     * then faster, and without shells they are not read; otherwise the flag changes nothing. */
     int points;
 } MildBatchDef;
 
@@ -94,7 +94,7 @@ typedef struct {
                             the elements, in their order; behind a sole's elements, up to
                             mild_batch_stride, a depth of -1000 and no force. On uneven ground
                             the depth that the law takes (docs/model.md section 6). NULL where a
-                            sole is a surface */
+                            sole is a shell */
     float *
         residual; /* [robots] [-] relative, in the metric of kinetic energy; 0 in the air; NaN where
                             a number of the problem or of the results is none, or a rotation turns
@@ -104,8 +104,8 @@ typedef struct {
 
 /* Makes a batch on which nothing has stepped yet, with the material sand_loose. NULL, with the
  * field's name and the remedy in *error, when a number is out of range, when a plane sole is behind
- * a surface or has more elements than a warp takes (256, 128 or 64 with one, two or more plane
- * soles), when a robot with surfaces has more than 1536 elements, without the device or memory.
+ * a shell or has more elements than a warp takes (256, 128 or 64 with one, two or more plane
+ * soles), when a robot with shells has more than 1536 elements, without the device or memory.
  * This build may be without CUDA: then only MILD_BATCH_HOST is there. */
 MildBatch *mild_batch_create(const MildBatchDef *def, MildError *error);
 /* Frees a batch; NULL is allowed. Waits for the device. */
@@ -119,7 +119,7 @@ int mild_batch_stride(const MildBatch *batch);
 /* Replaces the table of materials that MildBatchInput.material points into. materials: [count], of
  * any model, checked by mild_material_check and, of bekker, by the width of every sole. The first
  * material of mild_merged, or with a slip_length, gives the elements of all plane soles a wear to
- * remember, 4 B each; those of surfaces have it. Waits for the device. A graph captured before
+ * remember, 4 B each; those of shells have it. Waits for the device. A graph captured before
  * holds the old table: capture it again. Fails with the table unchanged. */
 MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
                                     MildError *error);
@@ -144,7 +144,7 @@ MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *e
  * end: do that once for each step that the engine keeps. On a GPU it only puts the work into
  * `stream`, allocates nothing and waits for nothing, so it may be captured in a graph. Fails when
  * the device does, and with nothing done when output->elements is asked for and a sole is a
- * surface. */
+ * shell. */
 MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
                            const MildBatchOutput *output, int advance, MildStream stream,
                            MildError *error);

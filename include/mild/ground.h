@@ -245,7 +245,7 @@ int mild_sole_elements(const MildSole *sole);
 /* [m] Edge of an element. The area of an element is its square. */
 double mild_sole_pitch(const MildSole *sole);
 /* Shorter side [m] of the outline's bounding box in the foot frame: Bekker's b, unless the material
- * has a plate_width of its own. That of mild_sole_concentric is that of its sole. That of a surface
+ * has a plate_width of its own. That of mild_sole_concentric is that of its sole. That of a shell
  * is the second longest side of its bounding box. */
 double mild_sole_width(const MildSole *sole);
 /* Centres of the elements in the foot frame [m]: arrays of mild_sole_elements() numbers for x and
@@ -255,9 +255,9 @@ const double *mild_sole_y(const MildSole *sole);
 double mild_sole_z(const MildSole *sole);
 /* [m] Mean over the cell of each element of the distance to the edge of the outline, outside which
  * it is 0: an array of mild_sole_elements() numbers owned by the sole (docs/model.md section 21).
- * NULL for a surface. */
+ * NULL for a shell. */
 const double *mild_sole_edge(const MildSole *sole);
-/* ---- surfaces: elements anywhere on a body (docs/model.md section 20) ---- */
+/* ---- shells: elements anywhere on a body (docs/model.md section 20) ---- */
 
 /* What a shape is. Sizes are those of a MuJoCo geom. */
 typedef enum {
@@ -279,7 +279,7 @@ typedef struct {
     int triangle_count;     /* mesh */
 } MildShape;
 
-/* What a surface is made from. */
+/* What a shell is made from. */
 typedef struct {
     const MildShape *shapes; /* [count] they may overlap */
     int count;               /* 1 .. 256 */
@@ -287,21 +287,21 @@ typedef struct {
     double spacing;          /* [m] distance of the elements, 0.001 .. 1; 0: pitch */
 } MildSurfaceDef;
 
-/* Makes a sole whose elements cover the outer surface of a body, each with an outward normal and an
- * area near spacing^2. The law is that of an element of area pitch^2; an element here presses with
- * as many of these as its area has. The frame is that of the body; its origin is what other
- * functions call the ankle. Elements inside another shape are left out; for that a mesh
- * must be closed. The areas sum to that of the surface. An element carries load while its normal
+/* Makes a shell: a sole whose elements cover the outer surface of a body, each with an outward
+ * normal and an area near spacing^2. The law is that of an element of area pitch^2; an element here
+ * presses with as many of these as its area has. The frame is that of the body; its origin is what
+ * other functions call the ankle. Elements inside another shape are left out; for that a mesh must
+ * be closed. The areas sum to that of the surface. An element carries load while its normal
  * points down by more than 10 degrees below the horizontal, with its area projected on the
  * horizontal plane when it touched down. On ground of mild_merged that keeps its imprint a rounded
  * surface is carried from its rim, and elements steeper than 60 degrees carry next to nothing
- * (docs/model.md, section 23). A surface serves wherever a sole does, except in
+ * (docs/model.md, section 23). A shell serves wherever a sole does, except in
  * mild_sole_concentric and mild_model_match, which refuse it, and mild_sole_sinkage, which takes it
  * for a level sole. Returns NULL, with the name of the field in *error, when a
  * number is out of range, when a closed mesh has its triangles turned inward, when nothing is left
  * or more than 65536 elements are, or when out of memory. `def` is not kept. */
 MildSole *mild_sole_surface(const MildSurfaceDef *def, MildError *error);
-/* Arrays of mild_sole_elements() numbers owned by the sole, for each element of a surface: height
+/* Arrays of mild_sole_elements() numbers owned by the sole, for each element of a shell: height
  * above the frame's origin [m] (mild_sole_z is their mean), component of the outward unit normal
  * along an axis of the frame, axis 0 .. 2 [-], and area [m^2]. NULL for a sole of
  * mild_sole_create. */
@@ -531,7 +531,7 @@ typedef enum {
 typedef struct {
     /* [m] u at the start of the step, negative above the ground. On uneven ground the law,
      * depth_max and depth_mean take the smaller of this and what the ground of the last step
-     * gives. Where no element of a surface can touch, and of a foot without rows, an upper bound of
+     * gives. Where no element of a shell can touch, and of a foot without rows, an upper bound of
      * all as mild_ground_near found it. */
     const double *depth;
     const double *normal;    /* [N] vertical part of the force, mean over the step */

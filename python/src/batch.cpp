@@ -216,7 +216,7 @@ void bind_batch(nb::module_ &module) {
     nb::class_<Batch>(
         module, "Batch",
         "Ground under many robots at once, in float (include/mild/batch.h).\n\n"
-        "robots; soles: 1 .. 9 Sole of each robot, at most four plane ones, then surfaces of other "
+        "robots; soles: 1 .. 9 Sole of each robot, at most four plane ones, then shells of other "
         "bodies;\ndt [s]; tolerance [-] and max_iterations of Newton's method, 0: the defaults; "
         "device: cpu, cuda\nor cuda:N; points: no plane sole transmits a moment: its rows and "
         "columns of moments of every\ninverse_inertia are 0 (faster on three or four of up to "
@@ -249,7 +249,7 @@ void bind_batch(nb::module_ &module) {
              "[m]; map_origin (robots, 2) [m]. Outputs: wrench (robots,\nfeet, 6) [N, N m]; "
              "new_velocity (robots, feet, 6); foot (robots, feet, 6): pressure centre,\n"
              "depth_max, depth_mean [m], area [m^2]; elements (robots, 4, feet, stride); residual "
-             "(robots,);\niterations int32 (robots,). With surfaces no elements. stream: e.g.\n"
+             "(robots,);\niterations int32 (robots,). With shells no elements. stream: e.g.\n"
              "torch.cuda.current_stream().cuda_stream; the call only puts work into it. wrench may "
              "be the\narray of velocity and new_velocity that of free_velocity; else outputs share "
              "no memory with\nany array. Raises TypeError or ValueError with the name of the array "

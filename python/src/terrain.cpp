@@ -183,14 +183,14 @@ static void bind_sole(nb::module_ &module) {
         .def_static(
             "surface", make_surface, nb::arg("shapes"), nb::arg("pitch") = 0.0195,
             nb::arg("spacing") = 0.0,
-            "The outer surface of a body beside the feet, or of a foot that is no plane: a shin, a "
-            "trunk, a wheel.\n\n"
+            "A shell: the outer surface of a body beside the feet, or of a foot that is no plane: "
+            "a shin, a trunk, a wheel.\n\n"
             "shapes: a list of dicts: type, 'box' (size: half edges), 'capsule' (size: radius, "
             "half length along z), 'sphere' (size: radius) or 'mesh' (vertices: (n, 3), "
             "triangles: (m, 3), counterclockwise from outside); pos [m] and quat (w x y z) in the "
             "body's frame.\npitch [m]: that of the feet. spacing [m] of the elements; 0: pitch.\n"
             "Raises ValueError, with the name of the key, where a number is out of range. A Batch "
-            "does not take surfaces. docs/model.md, section 20, has the law.")
+            "does not take shells. docs/model.md, section 20, has the law.")
         .def("concentric", make_concentric,
              "The sole of one element in the middle, for the concentric models.")
         .def(

@@ -51,11 +51,11 @@ typedef struct {
     Live live;    /* the ground, which keys change in a window */
     Pace pace;
     int lost; /* bool: the simulation diverged, so the state must not be drawn */
-} Walk;
+} PlayWalk;
 
 /* TaskCallback: every physics step. */
 static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const double *torque) {
-    Walk *walk = context;
+    PlayWalk *walk = context;
     Play *play = walk->play;
     const double *qpos = robot_sim_qpos(sim);
     walk->ground = mild_terrain_material_at(task_env_terrain(env), qpos[0], qpos[1]);
@@ -75,14 +75,14 @@ static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const 
     }
 }
 
-static void set_command(Walk *walk) {
+static void set_command(PlayWalk *walk) {
     eval_command(walk->env, walk->command[0], walk->command[1]);
     if (walk->steer) {
         memcpy(walk->env->command, walk->command, sizeof walk->command);
     }
 }
 
-static void start(Walk *walk) {
+static void start(PlayWalk *walk) {
     Play *play = walk->play;
     EnvsView none = {0};
     belief_reset(&play->knows);
@@ -94,7 +94,7 @@ static void start(Walk *walk) {
 }
 
 /* By the frame that the policy sees next. */
-static void look_at_ground(Walk *walk) {
+static void look_at_ground(PlayWalk *walk) {
     Play *play = walk->play;
     const float *frame = task_env_frame(walk->env);
     if (play->belief && belief_step(&play->knows, play->belief, frame) & BELIEF_ALARM &&
@@ -106,7 +106,7 @@ static void look_at_ground(Walk *walk) {
     }
 }
 
-static void step(Walk *walk) {
+static void step(PlayWalk *walk) {
     Play *play = walk->play;
     float action[ROBOT_JOINTS_MAX];
     EnvsView none = {0};
@@ -143,7 +143,7 @@ static void step(Walk *walk) {
     walk->lost = !out.valid;
 }
 
-static MildStatus frame(Walk *walk, MildError *error) {
+static MildStatus frame(PlayWalk *walk, MildError *error) {
     Play *play = walk->play;
     if (walk->lost) {
         return MILD_OK;
@@ -185,7 +185,7 @@ static void wait_until(double time) {
 
 /* On a terminal in the place of the one before; in a file one below the other. Written past the
  * stream, which lets no cursor move. */
-static void print_sketch(Walk *walk, int terminal) {
+static void print_sketch(PlayWalk *walk, int terminal) {
     Play *play = walk->play;
     if (play->frames++ > 0 && terminal) {
         dprintf(STDOUT_FILENO, "\033[%dA\r", sketch_rows(play->sketch) + 1);
@@ -196,7 +196,7 @@ static void print_sketch(Walk *walk, int terminal) {
 }
 
 /* In real time on a terminal; in a file a picture each second. */
-static void run_printed(Walk *walk) {
+static void run_printed(PlayWalk *walk) {
     Play *play = walk->play;
     const int terminal = isatty(STDOUT_FILENO);
     const double rate = terminal ? SKETCH_RATE : 1, begin = clock_seconds();
@@ -212,7 +212,7 @@ static void run_printed(Walk *walk) {
     }
 }
 
-static MildStatus run_filmed(Walk *walk, MildError *error) {
+static MildStatus run_filmed(PlayWalk *walk, MildError *error) {
     Play *play = walk->play;
     Progress progress = progress_begin("playing");
     MildStatus status = MILD_OK;
@@ -235,7 +235,7 @@ static MildStatus run_filmed(Walk *walk, MildError *error) {
     return status;
 }
 
-static MildStatus restart(Walk *walk, MildError *error) {
+static MildStatus restart(PlayWalk *walk, MildError *error) {
     Play *play = walk->play;
     play->fell = walk->lost = 0;
     play->time = 0;
@@ -244,7 +244,7 @@ static MildStatus restart(Walk *walk, MildError *error) {
     return view_reset(play->view, &walk->live.terrain, error);
 }
 
-static void take_keys(Walk *walk, const WindowInput *input) {
+static void take_keys(PlayWalk *walk, const WindowInput *input) {
     if (input->halt) {
         memset(walk->command, 0, sizeof walk->command);
     }
@@ -258,7 +258,7 @@ static void take_keys(Walk *walk, const WindowInput *input) {
 }
 
 /* The keys that change the ground. What was measured on it before does not go on. */
-static MildStatus take_ground_keys(Walk *walk, const WindowInput *input, MildError *error) {
+static MildStatus take_ground_keys(PlayWalk *walk, const WindowInput *input, MildError *error) {
     if (walk->play->scene->rigid || !(input->ground || input->friction || input->stiffness)) {
         return MILD_OK;
     }
@@ -271,7 +271,7 @@ static MildStatus take_ground_keys(Walk *walk, const WindowInput *input, MildErr
     return other ? view_reset(walk->play->view, &walk->live.terrain, error) : MILD_OK;
 }
 
-static void measure_pace(Walk *walk, double now, int paused) {
+static void measure_pace(PlayWalk *walk, double now, int paused) {
     Pace *pace = &walk->pace;
     if (paused || pace->clock == 0) {
         *pace = (Pace){walk->play->time, now, paused ? 0 : pace->factor};
@@ -281,7 +281,7 @@ static void measure_pace(Walk *walk, double now, int paused) {
     }
 }
 
-static MildStatus run_window(Walk *walk, MildError *error) {
+static MildStatus run_window(PlayWalk *walk, MildError *error) {
     Play *play = walk->play;
     WindowInput input = {.time_scale = 1};
     double shown = clock_seconds(), fallen = 0,
@@ -313,7 +313,7 @@ static MildStatus run_window(Walk *walk, MildError *error) {
 }
 
 MildStatus play_run(Play *play, MildError *error) {
-    Walk walk = {.play = play, .task = *play->task, .command = {play->speed, 0, 0}};
+    PlayWalk walk = {.play = play, .task = *play->task, .command = {play->speed, 0, 0}};
     walk.live = live_begin(&play->scene->terrain, play->presets);
     walk.end = play->seconds;
     walk.task.episode = play->window ? WINDOW_TIME : play->seconds + 1.0;

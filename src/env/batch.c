@@ -15,15 +15,15 @@ _Static_assert(ENVS_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fil
 /* Shares of the robots. One NVIDIA H200: three make 5 % more steps than one with 16 384 robots, 7 %
  * with 4096 and 2 % with 65 536. 16 384 walking robots make 12.1 M steps a second in three, 12.0 M
  * in four and 11.7 M in six (one H100). The CPU steps them in turn, so that its tests see them. */
-enum { SHARES = 3 };
+enum { SLICES = 3 };
 
 typedef struct {
     Envs base;
     EnvsArrays arrays; /* their memory is the device's */
     MildBatch *ground;
     BatchBodies bodies; /* with shells that stand; all 0: none */
-    DeviceFork *fork;   /* streams of all shares but the first, on a GPU; else NULL */
-    int shares;         /* of the robots */
+    DeviceFork *fork;   /* streams of all slices but the first, on a GPU; else NULL */
+    int slices;         /* of the robots */
     TaskShape shape;
     size_t labels;              /* of the map, 1 without */
     const EnvsKernels *kernels; /* NULL: on the host */
@@ -295,12 +295,12 @@ static MildStatus create_envs(Batch *b, MildError *error) {
     return MILD_OK;
 }
 
-static MildStatus open_shares(Batch *b, MildError *error) {
-    b->shares = b->arrays.envs >= SHARES ? SHARES : 1;
-    if (b->device == MILD_BATCH_HOST || b->shares == 1) {
+static MildStatus open_slices(Batch *b, MildError *error) {
+    b->slices = b->arrays.envs >= SLICES ? SLICES : 1;
+    if (b->device == MILD_BATCH_HOST || b->slices == 1) {
         return MILD_OK;
     }
-    b->fork = device_fork_create(b->device, b->shares - 1, error);
+    b->fork = device_fork_create(b->device, b->slices - 1, error);
     return b->fork ? MILD_OK : error->status;
 }
 
@@ -313,7 +313,7 @@ static MildStatus open_batch(Batch *b, const EnvsDef *def, const TaskGrounds *gr
     b->arrays.envs = def->count;
     b->arrays.device = def->device;
     MildStatus status = open_ground(b, def, grounds, error);
-    status = status == MILD_OK ? open_shares(b, error) : status;
+    status = status == MILD_OK ? open_slices(b, error) : status;
     status = status == MILD_OK ? copy_model(b, def, error) : status;
     status = status == MILD_OK ? take_arrays(b, def->task, error) : status;
     status = status == MILD_OK ? copy_grounds(b, def, grounds, error) : status;
@@ -348,16 +348,16 @@ static EnvsMemory memory(const Envs *envs) {
                         .rest = all / (size_t)b->arrays.envs - task - engine};
 }
 
-/* ---- shares ---- */
+/* ---- slices ---- */
 
 /* A part of the robots, which a GPU steps in a stream of its own: while the last robots of one
- * share's kernel leave places free, the next kernel of another takes them. */
+ * slice's kernel leave places free, the next kernel of another takes them. */
 typedef struct {
     EnvsArrays arrays;
     EnvsStep step;
     MildBatch ground;
     MildStream stream;
-} Share;
+} Slice;
 
 static uint8_t *flag_from(uint8_t *flags, size_t first) {
     return flags ? flags + first : NULL;
@@ -410,21 +410,21 @@ static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
     return all;
 }
 
-static Share share_of(const Batch *b, const EnvsStep *step, int i, MildStream stream) {
+static Slice slice_of(const Batch *b, const EnvsStep *step, int i, MildStream stream) {
     const long envs = b->arrays.envs;
-    const long first = envs * i / b->shares, end = envs * (i + 1) / b->shares;
+    const long first = envs * i / b->slices, end = envs * (i + 1) / b->slices;
     const int count = (int)(end - first);
-    Share share = {.arrays = arrays_from(b, (size_t)first, count),
+    Slice slice = {.arrays = arrays_from(b, (size_t)first, count),
                    .step = step_from(step, &b->shape, (size_t)first),
-                   .ground = batch_share(b->ground, (int)first, count),
+                   .ground = batch_slice(b->ground, (int)first, count),
                    .stream = i > 0 && b->fork ? device_fork_stream(b->fork, i - 1) : stream};
-    if (share.arrays.shells.setup) {
-        share.arrays.shells.shape = share.ground.shape;
-        share.arrays.shells.ground = share.ground.arrays;
-        share.ground.arrays.skip = share.arrays.shells.near;
-        share.ground.arrays.beside = 1;
+    if (slice.arrays.shells.setup) {
+        slice.arrays.shells.shape = slice.ground.shape;
+        slice.arrays.shells.ground = slice.ground.arrays;
+        slice.ground.arrays.skip = slice.arrays.shells.near;
+        slice.ground.arrays.beside = 1;
     }
-    return share;
+    return slice;
 }
 
 /* ---- steps on the CPU ---- */
@@ -472,8 +472,8 @@ static void first_piece(void *context, int piece, int thread) {
 
 /* ---- steps ---- */
 
-static MildBatchInput ground_input(const Share *share) {
-    const EnvsArrays *all = &share->arrays;
+static MildBatchInput ground_input(const Slice *slice) {
+    const EnvsArrays *all = &slice->arrays;
     const EnvsContact *c = &all->contact;
     return (MildBatchInput){.position = c->position,
                             .rotation = c->rotation,
@@ -485,26 +485,26 @@ static MildBatchInput ground_input(const Share *share) {
                             .height = c->height};
 }
 
-/* One step of the ground under the robots of a share. */
-static MildStatus step_ground(Share *share, MildError *error) {
-    const EnvsContact *c = &share->arrays.contact;
-    const MildBatchInput input = ground_input(share);
+/* One step of the ground under the robots of a slice. */
+static MildStatus step_ground(Slice *slice, MildError *error) {
+    const EnvsContact *c = &slice->arrays.contact;
+    const MildBatchInput input = ground_input(slice);
     const MildBatchOutput output = {
         .wrench = c->velocity, .velocity = c->free_velocity, .foot = c->foot};
-    return mild_batch_step(&share->ground, &input, &output, 1, share->stream, error);
+    return mild_batch_step(&slice->ground, &input, &output, 1, slice->stream, error);
 }
 
 /* The same under robots with shells near it, after part k. */
-static MildStatus step_shells(const Batch *b, const Share *share, int k, MildError *error) {
-    const EnvsArrays *all = &share->arrays;
-    Call call = {all, &share->step, k};
+static MildStatus step_shells(const Batch *b, const Slice *slice, int k, MildError *error) {
+    const EnvsArrays *all = &slice->arrays;
+    Call call = {all, &slice->step, k};
     if (!all->shells.setup) {
         return MILD_OK;
     }
     if (b->kernels) {
-        const MildBatchInput input = ground_input(share);
-        const MildStatus status = batch_order(&share->ground, &input, share->stream, error);
-        return status == MILD_OK ? checked(b->kernels->shells(all, k, share->stream), error)
+        const MildBatchInput input = ground_input(slice);
+        const MildStatus status = batch_order(&slice->ground, &input, slice->stream, error);
+        return status == MILD_OK ? checked(b->kernels->shells(all, k, slice->stream), error)
                                  : status;
     }
     pool_run(b->pool, all->envs, shells_piece, &call);
@@ -512,21 +512,21 @@ static MildStatus step_shells(const Batch *b, const Share *share, int k, MildErr
 }
 
 /* The physics steps of a policy step: parts with the ground between them. Then the task. */
-static MildStatus step_share(const Batch *b, Share *share, MildError *error) {
-    const EnvsArrays *all = &share->arrays;
-    Call call = {&share->arrays, &share->step, 0};
+static MildStatus step_slice(const Batch *b, Slice *slice, MildError *error) {
+    const EnvsArrays *all = &slice->arrays;
+    Call call = {&slice->arrays, &slice->step, 0};
     MildStatus status = MILD_OK;
     for (call.part = 0; status == MILD_OK && call.part <= b->base.physics_steps; call.part++) {
-        status = call.part > 0 ? step_shells(b, share, call.part - 1, error) : MILD_OK;
-        status = status == MILD_OK && call.part > 0 ? step_ground(share, error) : status;
+        status = call.part > 0 ? step_shells(b, slice, call.part - 1, error) : MILD_OK;
+        status = status == MILD_OK && call.part > 0 ? step_ground(slice, error) : status;
         if (status == MILD_OK && b->kernels) {
-            status = checked(b->kernels->part(all, &share->step, call.part, share->stream), error);
+            status = checked(b->kernels->part(all, &slice->step, call.part, slice->stream), error);
         } else if (status == MILD_OK) {
             pool_run(b->pool, all->envs, part_piece, &call);
         }
     }
     if (status == MILD_OK && b->kernels) {
-        return checked(b->kernels->end(all, &share->step, share->stream), error);
+        return checked(b->kernels->end(all, &slice->step, slice->stream), error);
     }
     if (status == MILD_OK) {
         pool_run(b->pool, all->envs, end_piece, &call);
@@ -535,22 +535,22 @@ static MildStatus step_share(const Batch *b, Share *share, MildError *error) {
 }
 
 /* The first episodes. */
-static MildStatus begin_share(const Batch *b, Share *share, MildError *error) {
-    Call call = {&share->arrays, &share->step, 0};
+static MildStatus begin_slice(const Batch *b, Slice *slice, MildError *error) {
+    Call call = {&slice->arrays, &slice->step, 0};
     if (b->kernels) {
-        return checked(b->kernels->begin(&share->arrays, share->stream), error);
+        return checked(b->kernels->begin(&slice->arrays, slice->stream), error);
     }
-    pool_run(b->pool, share->arrays.envs, begin_piece, &call);
+    pool_run(b->pool, slice->arrays.envs, begin_piece, &call);
     return MILD_OK;
 }
 
 /* New episodes forget their ground, and all are seen. */
-static MildStatus see_share(const Batch *b, Share *share, MildError *error) {
-    const EnvsArrays *all = &share->arrays;
-    Call call = {&share->arrays, &share->step, 0};
-    MildStatus status = mild_batch_reset(&share->ground, all->reset, share->stream, error);
+static MildStatus see_slice(const Batch *b, Slice *slice, MildError *error) {
+    const EnvsArrays *all = &slice->arrays;
+    Call call = {&slice->arrays, &slice->step, 0};
+    MildStatus status = mild_batch_reset(&slice->ground, all->reset, slice->stream, error);
     if (status == MILD_OK && b->kernels) {
-        return checked(b->kernels->first(all, &share->step, share->stream), error);
+        return checked(b->kernels->first(all, &slice->step, slice->stream), error);
     }
     if (status == MILD_OK) {
         pool_run(b->pool, all->envs, first_piece, &call);
@@ -558,21 +558,21 @@ static MildStatus see_share(const Batch *b, Share *share, MildError *error) {
     return status;
 }
 
-static MildStatus each_share(const Batch *b, const EnvsStep *step, MildStream stream,
-                             MildStatus (*work)(const Batch *, Share *, MildError *),
+static MildStatus each_slice(const Batch *b, const EnvsStep *step, MildStream stream,
+                             MildStatus (*work)(const Batch *, Slice *, MildError *),
                              MildError *error) {
     MildStatus status = b->fork ? device_fork(b->fork, stream, error) : MILD_OK;
-    for (int i = 0; status == MILD_OK && i < b->shares; i++) {
-        Share share = share_of(b, step, i, stream);
-        status = work(b, &share, error);
-        status = status == MILD_OK ? see_share(b, &share, error) : status;
+    for (int i = 0; status == MILD_OK && i < b->slices; i++) {
+        Slice slice = slice_of(b, step, i, stream);
+        status = work(b, &slice, error);
+        status = status == MILD_OK ? see_slice(b, &slice, error) : status;
     }
     return status == MILD_OK && b->fork ? device_join(b->fork, stream, error) : status;
 }
 
 static MildStatus reset(Envs *envs, const EnvsView *first, MildStream stream, MildError *error) {
     const EnvsStep none = {.next = *first};
-    return each_share(own(envs), &none, stream, begin_share, error);
+    return each_slice(own(envs), &none, stream, begin_slice, error);
 }
 
 static MildStatus step(Envs *envs, const EnvsStep *step, MildStream stream, MildError *error) {
@@ -580,7 +580,7 @@ static MildStatus step(Envs *envs, const EnvsStep *step, MildStream stream, Mild
                ? mild_fail(error, MILD_ERROR_ARGUMENT,
                            "the batch engine does not keep the end of an episode; train.robots = "
                            "mujoco does")
-               : each_share(own(envs), step, stream, step_share, error);
+               : each_slice(own(envs), step, stream, step_slice, error);
 }
 
 static MildStatus wait(Envs *envs, MildError *error) {

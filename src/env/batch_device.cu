@@ -246,7 +246,7 @@ static const char *kernels_open(int device) {
 }
 
 /* Launches a kernel whose blocks start before waiting blocks of the ground's kernel. The ground
- * takes longest, so other shares fill its places meanwhile. */
+ * takes longest, so other slices fill its places meanwhile. */
 template <typename... Types, typename... Arguments>
 static const char *launch(void (*kernel)(Types...), int blocks, int threads, size_t shared,
                           MildStream stream, const Arguments &...arguments) {

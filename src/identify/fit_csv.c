@@ -68,67 +68,67 @@ typedef struct {
     int columns;             /* in the header */
     int column[CSV_COLUMNS]; /* place in the line, -1: absent or not read */
     double time;             /* [s] of the previous row */
-} Record;
+} FitReader;
 
 /* The places of the columns in the header. */
-static MildStatus columns_find(Record *record, char **cells, MildError *error) {
+static MildStatus columns_find(FitReader *reader, char **cells, MildError *error) {
     for (int c = 0; c < CSV_COLUMNS; c++) {
-        record->column[c] = -1;
-        for (int i = 0; i < record->columns; i++) {
+        reader->column[c] = -1;
+        for (int i = 0; i < reader->columns; i++) {
             if (strcmp(cells[i], column_names[c]) != 0) {
                 continue;
             }
-            if (record->column[c] >= 0) {
+            if (reader->column[c] >= 0) {
                 return mild_fail(error, MILD_ERROR_FORMAT,
-                                 "%.200s:%d: two columns are named %s; keep one", record->text.path,
-                                 record->text.number, column_names[c]);
+                                 "%.200s:%d: two columns are named %s; keep one", reader->text.path,
+                                 reader->text.number, column_names[c]);
             }
-            record->column[c] = i;
+            reader->column[c] = i;
         }
     }
     return MILD_OK;
 }
 
 /* What the file is: a press, unless it has a column that only another kind has. */
-static MildStatus kind_find(Record *record, MildError *error) {
-    const int *column = record->column;
-    record->kind = column[CSV_SLIP] >= 0 || column[CSV_SHEAR] >= 0     ? FIT_FILE_SHEAR
+static MildStatus kind_find(FitReader *reader, MildError *error) {
+    const int *column = reader->column;
+    reader->kind = column[CSV_SLIP] >= 0 || column[CSV_SHEAR] >= 0     ? FIT_FILE_SHEAR
                    : column[CSV_ANGLE] >= 0 || column[CSV_TORQUE] >= 0 ? FIT_FILE_RING
                                                                        : FIT_FILE_PRESS;
     if (column[CSV_DEPTH] >= 0) {
-        record->kind = FIT_FILE_PRESS;
+        reader->kind = FIT_FILE_PRESS;
     }
     for (int c = 0; c < CSV_COLUMNS; c++) {
-        if (column[c] < 0 && needed(record->kind) & bit((CsvColumn)c)) {
+        if (column[c] < 0 && needed(reader->kind) & bit((CsvColumn)c)) {
             return mild_fail(error, MILD_ERROR_FORMAT,
                              "%.200s:%d: no column %s; name the columns in the first line: "
                              "depth_m,force_n and, where speed matters, time_s or speed_m_s; of a "
                              "plate that is dragged also slip_m,force_x_n; of a shear test "
                              "slip_m,shear_pa,pressure_pa, or of a ring angle_rad,torque_nm,"
                              "force_n",
-                             record->text.path, record->text.number, column_names[c]);
+                             reader->text.path, reader->text.number, column_names[c]);
         }
-        if (!(read_of(record->kind) & bit((CsvColumn)c))) {
-            record->column[c] = -1;
+        if (!(read_of(reader->kind) & bit((CsvColumn)c))) {
+            reader->column[c] = -1;
         }
     }
     return MILD_OK;
 }
 
-static MildStatus csv_header(Record *record, MildError *error) {
+static MildStatus csv_header(FitReader *reader, MildError *error) {
     char *cells[CSV_CELLS_MAX];
     MildStatus status;
-    char *line = csv_line(&record->text, &status, error);
+    char *line = csv_line(&reader->text, &status, error);
     if (status != MILD_OK) {
         return status;
     }
     if (!line) {
         return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%.200s: empty; a header line and rows are needed", record->text.path);
+                         "%.200s: empty; a header line and rows are needed", reader->text.path);
     }
-    record->columns = csv_split(line, cells);
-    status = columns_find(record, cells, error);
-    return status == MILD_OK ? kind_find(record, error) : status;
+    reader->columns = csv_split(line, cells);
+    status = columns_find(reader, cells, error);
+    return status == MILD_OK ? kind_find(reader, error) : status;
 }
 
 /* Checks that a number of line `row` is within the limit of its column. */
@@ -141,9 +141,9 @@ static MildStatus limit_check(const char *where, int row, CsvColumn c, double va
                      where, row, column_names[c], value, column_limits[c], column_units[c]);
 }
 
-static MildStatus csv_cell(const Record *record, CsvColumn c, char **cells, int count,
+static MildStatus csv_cell(const FitReader *reader, CsvColumn c, char **cells, int count,
                            double *value, MildError *error) {
-    int place = record->column[c];
+    int place = reader->column[c];
     *value = NAN;
     if (place < 0) {
         return MILD_OK;
@@ -151,21 +151,21 @@ static MildStatus csv_cell(const Record *record, CsvColumn c, char **cells, int 
     if (place >= count || !*cells[place]) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "%.200s:%d: %s is missing; fill the gap or delete the row",
-                         record->text.path, record->text.number, column_names[c]);
+                         reader->text.path, reader->text.number, column_names[c]);
     }
     if (!text_double(cells[place], value)) {
         return mild_fail(
             error, MILD_ERROR_FORMAT,
             "%.200s:%d: %s '%.40s' is not a finite number; correct it or delete the row",
-            record->text.path, record->text.number, column_names[c], cells[place]);
+            reader->text.path, reader->text.number, column_names[c], cells[place]);
     }
-    return limit_check(record->text.path, record->text.number, c, *value, error);
+    return limit_check(reader->text.path, reader->text.number, c, *value, error);
 }
 
 /* A row of the numbers that the file has, NaN for the others. It is of plate 0 until the caller
  * says otherwise. */
-static FitPoint point_of(const Record *record, const double number[CSV_COLUMNS]) {
-    switch (record->kind) {
+static FitPoint point_of(const FitReader *reader, const double number[CSV_COLUMNS]) {
+    switch (reader->kind) {
     case FIT_FILE_SHEAR:
         return (FitPoint){.time = NAN,
                           .depth = number[CSV_SLIP],
@@ -181,64 +181,64 @@ static FitPoint point_of(const Record *record, const double number[CSV_COLUMNS])
                           .depth = number[CSV_DEPTH],
                           .force = number[CSV_FORCE],
                           .speed = number[CSV_SPEED],
-                          .slip = number[record->column[CSV_SLIP] >= 0 ? CSV_SLIP : CSV_X],
+                          .slip = number[reader->column[CSV_SLIP] >= 0 ? CSV_SLIP : CSV_X],
                           .along = number[CSV_ALONG],
-                          .area = record->column[CSV_AREA] >= 0 ? number[CSV_AREA] : 0};
+                          .area = reader->column[CSV_AREA] >= 0 ? number[CSV_AREA] : 0};
     }
 }
 
-static MildStatus csv_row(Record *record, char *line, FitPoint *point, MildError *error) {
+static MildStatus csv_row(FitReader *reader, char *line, FitPoint *point, MildError *error) {
     char *cells[CSV_CELLS_MAX];
     double number[CSV_COLUMNS];
     int count = csv_split(line, cells);
     MildStatus status = MILD_OK;
     if (count < 0) {
         return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%.200s:%d: more than %d columns; keep those needed", record->text.path,
-                         record->text.number, CSV_CELLS_MAX);
+                         "%.200s:%d: more than %d columns; keep those needed", reader->text.path,
+                         reader->text.number, CSV_CELLS_MAX);
     }
     // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): csv_split wrote `count` cells
-    while (count > record->columns && !*cells[count - 1]) {
+    while (count > reader->columns && !*cells[count - 1]) {
         count--; /* commas at the end */
     }
-    if (count > record->columns) {
+    if (count > reader->columns) {
         return mild_fail(
             error, MILD_ERROR_FORMAT,
             "%.200s:%d: %d values under %d columns; a decimal point, not a comma, is needed",
-            record->text.path, record->text.number, count, record->columns);
+            reader->text.path, reader->text.number, count, reader->columns);
     }
     for (int c = 0; c < CSV_COLUMNS && status == MILD_OK; c++) {
-        status = csv_cell(record, (CsvColumn)c, cells, count, &number[c], error);
+        status = csv_cell(reader, (CsvColumn)c, cells, count, &number[c], error);
     }
     if (status == MILD_OK) {
-        *point = point_of(record, number);
+        *point = point_of(reader, number);
     }
-    if (status == MILD_OK && point->time <= record->time) {
+    if (status == MILD_OK && point->time <= reader->time) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "%.200s:%d: time_s %g does not come after %g of the row before; sort the "
                          "rows or split the "
                          "record into one file per press",
-                         record->text.path, record->text.number, point->time, record->time);
+                         reader->text.path, reader->text.number, point->time, reader->time);
     }
-    record->time = point->time;
+    reader->time = point->time;
     return status;
 }
 
-static MildStatus csv_rows(Record *record, FitFile *file, MildError *error) {
+static MildStatus csv_rows(FitReader *reader, FitFile *file, MildError *error) {
     MildStatus status;
     int room = 0;
-    for (char *line = csv_line(&record->text, &status, error); line;
-         line = csv_line(&record->text, &status, error)) {
+    for (char *line = csv_line(&reader->text, &status, error); line;
+         line = csv_line(&reader->text, &status, error)) {
         if (file->count == room) {
             room = 2 * room + 256;
             FitPoint *more = realloc(file->points, sizeof *more * (size_t)room);
             if (!more) {
                 return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory",
-                                 record->text.path);
+                                 reader->text.path);
             }
             file->points = more;
         }
-        status = csv_row(record, line, file->points + file->count, error);
+        status = csv_row(reader, line, file->points + file->count, error);
         if (status != MILD_OK) {
             return status;
         }
@@ -246,7 +246,7 @@ static MildStatus csv_rows(Record *record, FitFile *file, MildError *error) {
             continue;
         }
         return mild_fail(error, MILD_ERROR_RANGE, "%.200s:%d: more than %d rows; take every tenth",
-                         record->text.path, record->text.number, FIT_CSV_ROWS_MAX);
+                         reader->text.path, reader->text.number, FIT_CSV_ROWS_MAX);
     }
     return status;
 }
@@ -268,19 +268,19 @@ const char *fit_slide_wrong(const FitPoint *slide, int count, int slid, int alon
 }
 
 /* Takes the slide out of a press, and checks that it is of use. */
-static MildStatus csv_slide(const Record *record, FitFile *file, MildError *error) {
+static MildStatus csv_slide(const FitReader *reader, FitFile *file, MildError *error) {
     if (file->kind != FIT_FILE_PRESS || !file->count) {
         return MILD_OK;
     }
     file->slide = malloc(sizeof *file->slide * (size_t)file->count);
     if (!file->slide) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", record->text.path);
+        return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", reader->text.path);
     }
     const int slid = fit_sliding(file->points, &file->count, file->slide, &file->slide_count);
     const char *wrong =
-        fit_slide_wrong(file->slide, file->slide_count, slid, record->column[CSV_ALONG] >= 0);
-    return wrong ? mild_fail(error, MILD_ERROR_FORMAT, "%.200s:%d: %s", record->text.path,
-                             record->text.number, wrong)
+        fit_slide_wrong(file->slide, file->slide_count, slid, reader->column[CSV_ALONG] >= 0);
+    return wrong ? mild_fail(error, MILD_ERROR_FORMAT, "%.200s:%d: %s", reader->text.path,
+                             reader->text.number, wrong)
                  : MILD_OK;
 }
 
@@ -319,7 +319,7 @@ MildStatus fit_rows_check(const char *where, const FitPoint *points, int count, 
 }
 
 /* Checks that the rows are a press or a slip: enough that go on, and a force that resists. */
-static MildStatus csv_loading(const Record *record, FitFile *file, MildError *error) {
+static MildStatus csv_loading(const FitReader *reader, FitFile *file, MildError *error) {
     const CsvColumn way = file->kind == FIT_FILE_SHEAR  ? CSV_SLIP
                           : file->kind == FIT_FILE_RING ? CSV_ANGLE
                                                         : CSV_DEPTH;
@@ -333,7 +333,7 @@ static MildStatus csv_loading(const Record *record, FitFile *file, MildError *er
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "%.200s:%d: %s: %d of %d rows go %s than all before, at least %d "
                          "are needed; %s",
-                         record->text.path, record->text.number, column_names[way], file->count,
+                         reader->text.path, reader->text.number, column_names[way], file->count,
                          rows, way == CSV_DEPTH ? "deeper" : "further", FIT_POINTS_MIN,
                          way == CSV_DEPTH ? "depth is positive down from the surface"
                                           : "it is positive from where the stress begins");
@@ -341,11 +341,11 @@ static MildStatus csv_loading(const Record *record, FitFile *file, MildError *er
     // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): fewer are refused above
     if (file->points[0].depth == file->points[file->count - 1].depth) {
         return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%.200s:%d: %s is %g in every row; a %s is needed", record->text.path,
-                         record->text.number, column_names[way], file->points[0].depth,
+                         "%.200s:%d: %s is %g in every row; a %s is needed", reader->text.path,
+                         reader->text.number, column_names[way], file->points[0].depth,
                          way == CSV_DEPTH ? "press to some depth" : "slip over some way");
     }
-    MildStatus status = push_check(record->text.path, record->text.number, file->kind, file->points,
+    MildStatus status = push_check(reader->text.path, reader->text.number, file->kind, file->points,
                                    file->count, error);
     if (status == MILD_OK && file->kind == FIT_FILE_PRESS) {
         fit_speeds(file->points, file->count);
@@ -354,13 +354,13 @@ static MildStatus csv_loading(const Record *record, FitFile *file, MildError *er
 }
 
 /* The way up of a press, before its rows make room for the way down. */
-static MildStatus csv_unloading(const Record *record, FitFile *file, MildError *error) {
+static MildStatus csv_unloading(const FitReader *reader, FitFile *file, MildError *error) {
     if (file->kind != FIT_FILE_PRESS || file->slide_count || !file->count) {
         return MILD_OK;
     }
     file->back = malloc(sizeof *file->back * (size_t)file->count);
     if (!file->back) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", record->text.path);
+        return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", reader->text.path);
     }
     file->back_count = fit_unloading(file->points, file->count, file->back);
     for (int i = 0; i < file->back_count; i++) {
@@ -370,26 +370,26 @@ static MildStatus csv_unloading(const Record *record, FitFile *file, MildError *
 }
 
 static MildStatus read_file(FILE *stream, const char *name, FitFile *file, MildError *error) {
-    Record record = {.time = -INFINITY};
+    FitReader reader = {.time = -INFINITY};
     *file = (FitFile){.path = name};
-    MildStatus status = csv_begin(&record.text, stream, name, error);
+    MildStatus status = csv_begin(&reader.text, stream, name, error);
     if (status == MILD_OK) {
-        status = csv_header(&record, error);
+        status = csv_header(&reader, error);
     }
     if (status == MILD_OK) {
-        file->kind = record.kind;
-        status = csv_rows(&record, file, error);
+        file->kind = reader.kind;
+        status = csv_rows(&reader, file, error);
     }
     if (status == MILD_OK) {
-        status = csv_slide(&record, file, error);
+        status = csv_slide(&reader, file, error);
     }
     if (status == MILD_OK) {
-        status = csv_unloading(&record, file, error);
+        status = csv_unloading(&reader, file, error);
     }
     if (status == MILD_OK) {
-        status = csv_loading(&record, file, error);
+        status = csv_loading(&reader, file, error);
     }
-    csv_end(&record.text);
+    csv_end(&reader.text);
     return status;
 }
 

@@ -223,7 +223,7 @@ static void merged_forces(const FitPlate *plate, const MildMaterial *raw, const 
     for (int e = 0; e < mild_sole_elements(plate->sole);) {
         e = heaps_gather(plate->sole, e, kind, &kinds);
         for (int k = 0; k < kinds; k++) {
-            const Law own = law_merged(law, kind[k].heap.begin, kind[k].heap.width);
+            const Law own = law_of_heap(law, kind[k].heap.begin, kind[k].heap.width);
             for (int i = 0; i < count; i++) {
                 force[i] += kind[k].elements * point_force(&own, curves, &points[i]);
             }

@@ -130,9 +130,9 @@ typedef struct {
     RobotDef *def;
     MildError *error;
     MildStatus status;
-} Reader;
+} DefReader;
 
-static MildStatus fail_line(Reader *reader, const char *text) {
+static MildStatus fail_line(DefReader *reader, const char *text) {
     return reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT, "%s:%d: %s", reader->path,
                                       reader->line, text);
 }
@@ -145,7 +145,7 @@ typedef struct {
     int *seen; /* [count] line of the key; 0: not yet */
 } Section;
 
-static int find_section(Reader *reader, const char *name, Section *section) {
+static int find_section(DefReader *reader, const char *name, Section *section) {
     if (strcmp(name, "robot") == 0) {
         *section = (Section){robot_fields, ROBOT_KEYS, &reader->robot, reader->robot_seen};
         return 1;
@@ -182,7 +182,7 @@ static int find_section(Reader *reader, const char *name, Section *section) {
 }
 
 /* Checks the header itself, because inih ignores sections without keys. */
-static int check_header(Reader *reader, const char *line, size_t length) {
+static int check_header(DefReader *reader, const char *line, size_t length) {
     char name[SECTION_MAX + 1];
     Section section;
     if (length < 2 || line[length - 1] != ']') {
@@ -203,7 +203,7 @@ static int check_header(Reader *reader, const char *line, size_t length) {
 
 /* Like fgets over the text. */
 static char *next_line(char *buffer, int size, void *stream) {
-    Reader *reader = stream;
+    DefReader *reader = stream;
     if (reader->status != MILD_OK || !*reader->rest) {
         return NULL;
     }
@@ -225,7 +225,7 @@ static char *next_line(char *buffer, int size, void *stream) {
 }
 
 /* Adds an indented line to the list that it belongs to. */
-static MildStatus continue_value(Reader *reader, const Section *section, const MildField *field,
+static MildStatus continue_value(DefReader *reader, const Section *section, const MildField *field,
                                  const char *value) {
     char *text = (char *)section->values + field->offset;
     if (field->type != MILD_FIELD_TEXT) {
@@ -242,7 +242,7 @@ static MildStatus continue_value(Reader *reader, const Section *section, const M
 }
 
 static int take_key(void *user, const char *name, const char *key, const char *value) {
-    Reader *reader = user;
+    DefReader *reader = user;
     Section section;
     if (reader->status != MILD_OK) {
         return 0;
@@ -280,7 +280,8 @@ static int take_key(void *user, const char *name, const char *key, const char *v
 
 /* ---- lists ---- */
 
-static MildStatus fail_key(Reader *reader, const char *section, const char *key, const char *what) {
+static MildStatus fail_key(DefReader *reader, const char *section, const char *key,
+                           const char *what) {
     return reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT, "%s: [%s] %s: %s",
                                       reader->path, section, key, what);
 }
@@ -294,7 +295,7 @@ static const char *next_word(const char *text, size_t *length) {
 }
 
 /* Reads names into `names`. Returns their number, or -1 after an error. */
-static int take_names(Reader *reader, const char *section, const char *key, const char *text,
+static int take_names(DefReader *reader, const char *section, const char *key, const char *text,
                       RobotName *names, int most) {
     char what[160];
     size_t length = 0;
@@ -312,7 +313,7 @@ static int take_names(Reader *reader, const char *section, const char *key, cons
 }
 
 /* Reads finite numbers into `numbers`. Returns their number, or -1 after an error. */
-static int take_numbers(Reader *reader, const char *section, const char *key, const char *text,
+static int take_numbers(DefReader *reader, const char *section, const char *key, const char *text,
                         double *numbers, int most) {
     char what[160], word[64];
     size_t length = 0;
@@ -338,7 +339,7 @@ static int take_numbers(Reader *reader, const char *section, const char *key, co
 
 /* Reads a number for each joint, none below `least`. If the list is empty, uses `fallback`, or
  * zeros. */
-static MildStatus take_column(Reader *reader, const char *key, const char *text, double *column,
+static MildStatus take_column(DefReader *reader, const char *key, const char *text, double *column,
                               const double *fallback, double least) {
     char what[160];
     int joints = reader->def->joints;
@@ -372,7 +373,7 @@ static int find_joint(const RobotDef *def, const char *name) {
     return i;
 }
 
-static MildStatus check_joint_names(Reader *reader) {
+static MildStatus check_joint_names(DefReader *reader) {
     const RobotDef *def = reader->def;
     char what[240];
     for (int i = 0; i < def->joints; i++) {
@@ -401,7 +402,7 @@ static MildStatus check_joint_names(Reader *reader) {
     return MILD_OK;
 }
 
-static MildStatus take_joints(Reader *reader) {
+static MildStatus take_joints(DefReader *reader) {
     RobotDef *def = reader->def;
     const JointsText *text = &reader->joints;
     static const double zeros[ROBOT_JOINTS_MAX];
@@ -442,7 +443,7 @@ static MildStatus take_joints(Reader *reader) {
 
 /* ---- feet ---- */
 
-static MildStatus fail_foot(Reader *reader, const RobotFootDef *foot, const char *key,
+static MildStatus fail_foot(DefReader *reader, const RobotFootDef *foot, const char *key,
                             const char *what) {
     char section[ROBOT_NAME_SIZE + 8];
     snprintf(section, sizeof section, "foot.%s", foot->name);
@@ -450,7 +451,7 @@ static MildStatus fail_foot(Reader *reader, const RobotFootDef *foot, const char
 }
 
 /* A round foot on rigid ground is its own sphere. */
-static MildStatus take_round(Reader *reader, RobotFootDef *foot, const int *seen) {
+static MildStatus take_round(DefReader *reader, RobotFootDef *foot, const int *seen) {
     for (int k = 0; k < FOOT_KEYS; k++) {
         const char *key = foot_fields[k].name;
         int missing = !seen[k] && (strcmp(key, "center") == 0 || strcmp(key, "radius") == 0);
@@ -468,7 +469,7 @@ static MildStatus take_round(Reader *reader, RobotFootDef *foot, const int *seen
     return MILD_OK;
 }
 
-static MildStatus take_flat(Reader *reader, RobotFootDef *foot, const FootText *text,
+static MildStatus take_flat(DefReader *reader, RobotFootDef *foot, const FootText *text,
                             const int *seen) {
     char section[ROBOT_NAME_SIZE + 8];
     snprintf(section, sizeof section, "foot.%s", foot->name);
@@ -501,7 +502,7 @@ static MildStatus take_flat(Reader *reader, RobotFootDef *foot, const FootText *
     return MILD_OK;
 }
 
-static MildStatus take_foot(Reader *reader, int f) {
+static MildStatus take_foot(DefReader *reader, int f) {
     RobotDef *def = reader->def;
     RobotFootDef *foot = &def->foot[f];
     const int *seen = reader->foot_seen[f];
@@ -535,7 +536,7 @@ static int find_foot(const RobotDef *def, const char *name) {
 
 /* The mirror image of a gait is either the same gait half a cycle later or the gait itself. All
  * feet must agree on which. */
-static MildStatus check_gait(Reader *reader) {
+static MildStatus check_gait(DefReader *reader) {
     RobotDef *def = reader->def;
     for (int f = 0; f < def->feet; f++) {
         const RobotFootDef *foot = &def->foot[f];
@@ -567,7 +568,7 @@ static int optional(const char *key) {
     return found;
 }
 
-static MildStatus take_robot(Reader *reader) {
+static MildStatus take_robot(DefReader *reader) {
     RobotDef *def = reader->def;
     *def = reader->robot.def;
     for (int k = 0; k < ROBOT_KEYS; k++) {
@@ -586,7 +587,7 @@ static MildStatus take_robot(Reader *reader) {
     return def->shells < 0 || def->legs < 0 ? reader->status : MILD_OK;
 }
 
-static MildStatus take_all(Reader *reader) {
+static MildStatus take_all(DefReader *reader) {
     if (take_robot(reader) != MILD_OK || take_joints(reader) != MILD_OK) {
         return reader->status;
     }
@@ -604,7 +605,7 @@ static MildStatus take_all(Reader *reader) {
 }
 
 MildStatus robot_def_parse(const char *text, const char *path, RobotDef *def, MildError *error) {
-    Reader *reader = calloc(1, sizeof *reader);
+    DefReader *reader = calloc(1, sizeof *reader);
     if (!reader) {
         return mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
     }

@@ -56,8 +56,8 @@ typedef struct Robot {
     mjModel *model;                       /* bodies, joints, floor and corners: what a step needs */
     mjModel *visual;                      /* the whole file, for pictures */
     MildSole *rasters[ROBOT_FEET_MAX];    /* by the pitch and the elements of robot.ini */
-    MildSole *soles[ROBOT_BODIES_MAX];    /* the rasters, or coarser ones (raster.c); then the
-                                             surfaces of the shells */
+    MildSole *soles[ROBOT_BODIES_MAX];    /* the rasters, or coarser ones (raster.c); then of
+                                             each body the one of its shells */
     MildSole *concentric[ROBOT_FEET_MAX]; /* one element in the middle of each */
     int is_concentric;                    /* bool: the feet use `concentric`, not `soles` */
     int nq;                               /* 7 + joints */
@@ -115,6 +115,6 @@ void robot_take_rasters(Robot *robot);
 MildStatus robot_read_models(Robot *robot, MildError *error);
 MildStatus robot_read_shells(Robot *robot, MildError *error);
 MildStatus robot_read_legs(Robot *robot, MildError *error);
-MildStatus robot_read_surfaces(Robot *robot, MildError *error);
+MildStatus robot_read_shell_soles(Robot *robot, MildError *error);
 
 #endif

@@ -334,10 +334,10 @@ static MildStatus check_models(Robot *robot, MildError *error) {
     return status == MILD_OK ? robot_check_model(robot->model, robot->path, error) : status;
 }
 
-typedef MildStatus (*Reader)(Robot *robot, MildError *error);
+typedef MildStatus (*PartReader)(Robot *robot, MildError *error);
 
 /* The readers one after the other, until one fails. readers: ends with NULL. */
-static MildStatus read_all(const Reader *readers, Robot *robot, MildError *error) {
+static MildStatus read_all(const PartReader *readers, Robot *robot, MildError *error) {
     MildStatus status = MILD_OK;
     for (; status == MILD_OK && *readers; readers++) {
         status = (*readers)(robot, error);
@@ -346,8 +346,8 @@ static MildStatus read_all(const Reader *readers, Robot *robot, MildError *error
 }
 
 MildStatus robot_read_models(Robot *robot, MildError *error) {
-    static const Reader parts[] = {read_bodies,       read_joints,     read_limbs, read_soles,
-                                   robot_read_shells, robot_read_legs, NULL};
+    static const PartReader parts[] = {read_bodies,       read_joints,     read_limbs, read_soles,
+                                       robot_read_shells, robot_read_legs, NULL};
     return read_all(parts, robot, error);
 }
 
@@ -360,8 +360,8 @@ static MildStatus read_robot(Robot *robot, const char *folder, MildError *error)
         (int)sizeof robot->path) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", folder);
     }
-    static const Reader parts[] = {robot_load_models,   check_models, robot_read_models,
-                                   robot_read_surfaces, read_stand,   NULL};
+    static const PartReader parts[] = {robot_load_models,      check_models, robot_read_models,
+                                       robot_read_shell_soles, read_stand,   NULL};
     return read_all(parts, robot, error);
 }
 

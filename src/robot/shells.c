@@ -206,7 +206,7 @@ int robot_shell_shapes(const Robot *robot, int limb, MildShape shapes[ROBOT_SHEL
     return count;
 }
 
-MildStatus robot_read_surfaces(Robot *robot, MildError *error) {
+MildStatus robot_read_shell_soles(Robot *robot, MildError *error) {
     for (int b = robot->def.feet; b < robot->def.feet + robot->shell_bodies; b++) {
         MildShape shapes[ROBOT_SHELLS_MAX];
         const int count = robot_shell_shapes(robot, b, shapes);

@@ -16,17 +16,17 @@ typedef struct {
     double lowest;   /* [m] height: a steep disc does not reach below the body's edge */
 } Facet;
 
-/* Writes the elements of a body that face down and reach below the undisturbed ground. surface: of
+/* Writes the elements of a body that face down and reach below the undisturbed ground. shell: of
  * the body, which had rows in the last step (MildContactInput); rotation: [9] body -> world;
  * elements: of that step. Returns how many, at most mild_sole_elements. */
-static inline int facets_of(const MildSole *surface, const double *rotation,
+static inline int facets_of(const MildSole *shell, const double *rotation,
                             const MildElements *elements, Facet *facets) {
-    const double *area = mild_sole_surface_area(surface);
+    const double *area = mild_sole_surface_area(shell);
     int count = 0;
-    for (int e = 0; e < mild_sole_elements(surface); e++) {
+    for (int e = 0; e < mild_sole_elements(shell); e++) {
         double normal[3] = {0, 0, 0};
         for (int axis = 0; axis < 3; axis++) {
-            const double along = mild_sole_surface_normal(surface, axis)[e];
+            const double along = mild_sole_surface_normal(shell, axis)[e];
             for (int k = 0; k < 3; k++) {
                 normal[k] += rotation[3 * k + axis] * along;
             }

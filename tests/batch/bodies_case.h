@@ -9,7 +9,7 @@ enum { BODIES = 5, BODIES_ELEMENTS = 512, BODIES_BEYOND = 5, BODIES_PLACES = 8 }
 
 typedef struct {
     int feet, bodies;
-    int elements[BODIES], faces[BODIES]; /* faces: bool, a surface */
+    int elements[BODIES], shell[BODIES]; /* shell: bool */
     /* x, y, z, normal, area over that of the law */
     double place[7][BODIES][BODIES_ELEMENTS];
     double begin[BODIES][BODIES_ELEMENTS], width[BODIES][BODIES_ELEMENTS]; /* of SoleHeap */

@@ -8,9 +8,9 @@
 
 enum { ROBOTS = 96, STEPS = 30, MATERIALS = 12, LABELS = 3, ROWS = 6 * MILD_FEET_MAX };
 
-enum { SURFACES = 5 };
+enum { SHELLS = 5 };
 
-static MildSole *left, *right, *center, *plate, *surface[SURFACES];
+static MildSole *left, *right, *center, *plate, *shell[SHELLS];
 
 /* A wheel that turns about y: a closed mesh of its rim and its two sides. */
 static inline MildSole *make_wheel(double radius, double breadth) {
@@ -55,11 +55,11 @@ static inline int open_soles(void **state) {
     MildShape shin = surface_box(0.05, 0.04, 0.1), base = surface_box(0.12, 0.08, 0.04);
     shin.pos[0] = 0.03; /* the frame's origin is not its middle */
     shin.pos[2] = -0.06;
-    surface[0] = surface_make(&shin, 1, KIT_PITCH);
-    surface[1] = surface_make(&capsule, 1, KIT_PITCH);
-    surface[2] = make_wheel(0.08, 0.05);
-    surface[3] = surface_make(&sphere, 1, KIT_PITCH);
-    surface[4] = surface_make(&base, 1, KIT_PITCH);
+    shell[0] = surface_make(&shin, 1, KIT_PITCH);
+    shell[1] = surface_make(&capsule, 1, KIT_PITCH);
+    shell[2] = make_wheel(0.08, 0.05);
+    shell[3] = surface_make(&sphere, 1, KIT_PITCH);
+    shell[4] = surface_make(&base, 1, KIT_PITCH);
     return 0;
 }
 
@@ -69,8 +69,8 @@ static inline int close_soles(void **state) {
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
         mild_sole_destroy(all[i]);
     }
-    for (int s = 0; s < SURFACES; s++) {
-        mild_sole_destroy(surface[s]);
+    for (int s = 0; s < SHELLS; s++) {
+        mild_sole_destroy(shell[s]);
     }
     return 0;
 }
@@ -83,7 +83,7 @@ typedef struct {
     MildModel model;
     MildMapKind kind; /* flat without a pattern: no map */
     MildPattern pattern;
-    int surfaces; /* of the feet: the last ones */
+    int shells; /* of the feet: the last ones */
 } Shape;
 
 /* Steps that are compared: all, or the first half, in which feet come down, where MILD_TEST_DRAWS
@@ -94,13 +94,13 @@ static inline int some_steps(void) {
 }
 
 typedef struct {
-    int feet, surfaces; /* of the feet */
+    int feet, shells; /* of the feet */
     const MildSole *soles[MILD_FEET_MAX];
     MildMaterial material[MATERIALS];
     MildMap *map; /* or NULL */
     int labels;
     Kit kit[ROBOTS];
-    int pushed; /* bool: by random forces, and surfaces hang together */
+    int pushed; /* bool: by random forces, and shells hang together */
     uint64_t random;
 } Herd;
 
@@ -133,8 +133,8 @@ static inline MildMap *herd_map(const Shape *of, int *labels) {
     return of->kind == MILD_MAP_FLAT && *labels == 1 ? NULL : make_map(&def);
 }
 
-/* [m] From the origin of a surface to its farthest element. */
-static inline double surface_radius(const MildSole *sole) {
+/* [m] From the origin of a shell to its farthest element. */
+static inline double shell_radius(const MildSole *sole) {
     double most = 0;
     for (int e = 0; e < mild_sole_elements(sole); e++) {
         const double x = mild_sole_x(sole)[e], y = mild_sole_y(sole)[e];
@@ -144,11 +144,11 @@ static inline double surface_radius(const MildSole *sole) {
     return most;
 }
 
-/* Surfaces any way up, turning, a little above the ground or in it. Those of every fourth robot are
+/* Shells any way up, turning, a little above the ground or in it. Those of every fourth robot are
  * far away, and every second one of every other fourth. */
 static inline void herd_throw(Herd *herd, int r) {
     Kit *kit = &herd->kit[r];
-    for (int f = herd->feet - herd->surfaces; f < herd->feet; f++) {
+    for (int f = herd->feet - herd->shells; f < herd->feet; f++) {
         double R[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, turn[3];
         double *at = kit->input.position[f];
         const int away = r % 4 == 0 || (r % 4 == 1 && f % 2);
@@ -157,7 +157,7 @@ static inline void herd_throw(Herd *herd, int r) {
         memcpy(kit->input.rotation[f], R, sizeof R);
         kit_vector(&herd->random, 6, kit->input.velocity[f] + 3);
         at[0] = 0.3 * f;
-        at[2] = kit_uniform(&herd->random, -0.03, 0.03) + 0.7 * surface_radius(kit->soles[f]) +
+        at[2] = kit_uniform(&herd->random, -0.03, 0.03) + 0.7 * shell_radius(kit->soles[f]) +
                 (away ? 2 : 0);
     }
 }
@@ -194,13 +194,13 @@ static inline void herd_open(Herd *herd, const Shape *shape) {
     static const double heights[3] = {0.0, 0.3, -0.2};
     const int concentric = mild_model_is_concentric(shape->model);
     herd->feet = shape->feet;
-    herd->surfaces = shape->surfaces;
+    herd->shells = shape->shells;
     herd->random = 5;
     herd->pushed = 1;
     herd->map = herd_map(shape, &herd->labels);
     for (int f = 0; f < shape->feet; f++) {
-        const int planes = shape->feet - shape->surfaces;
-        herd->soles[f] = f >= planes  ? surface[(f - planes) % SURFACES]
+        const int planes = shape->feet - shape->shells;
+        herd->soles[f] = f >= planes  ? shell[(f - planes) % SHELLS]
                          : concentric ? center
                          : planes > 2 ? plate
                          : f          ? right
@@ -228,7 +228,7 @@ static inline void herd_open(Herd *herd, const Shape *shape) {
         Kit *kit = &herd->kit[r];
         kit_open(kit, shape->feet, (MildSole *)herd->soles[0],
                  (MildSole *)herd->soles[shape->feet > 1], &herd->material[r % MATERIALS], 5e-3);
-        if (shape->surfaces > 0) {
+        if (shape->shells > 0) {
             kit_soles(kit, herd->soles);
         }
         kit_random_state(kit, &herd->random);
@@ -263,7 +263,7 @@ static inline void herd_solve(Herd *herd, Arrays *a) {
             }
         }
         kit_inverse_inertia(kit);
-        if (herd->pushed && herd->surfaces > 0) {
+        if (herd->pushed && herd->shells > 0) {
             herd_tie(herd, kit);
         }
         kit_free(kit, (const double(*)[3])force);
@@ -308,7 +308,7 @@ static inline void side_open_step(Side *side, const Herd *herd, int device, doub
     side->arrays = device == MILD_BATCH_HOST ? calloc(1, sizeof(Arrays))
                                              : device_alloc(device, sizeof(Arrays), &error);
     assert_non_null(side->arrays);
-    side->elements = herd->surfaces == 0;
+    side->elements = herd->shells == 0;
 }
 
 static inline void side_open(Side *side, const Herd *herd, int device) {
@@ -449,7 +449,7 @@ static inline void against_ground(Errors *errors, const Herd *herd, const Arrays
             wanted[i] = herd->kit[r].result.foot[i / 3].force[i % 3];
             loaded |= found[i] != 0 || wanted[i] != 0;
         }
-        if (!loaded && herd->surfaces > 0) { /* many are in the air */
+        if (!loaded && herd->shells > 0) { /* many are in the air */
             continue;
         }
         add_error(errors, found, wanted, 3 * herd->feet);

@@ -36,21 +36,21 @@ static const Shape shapes[] = {
     {"mild_merged, rough, checker", 2, MILD_MODEL_MILD_MERGED, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER,
      0},
     {"mild_merged, four feet", 4, MILD_MODEL_MILD_MERGED, MILD_MAP_FLAT, MILD_PATTERN_NONE, 0},
-    {"two feet and five surfaces", 7, MILD_MODEL_MILD, MILD_MAP_FLAT, MILD_PATTERN_NONE, 5},
-    {"two feet, two surfaces, rough", 4, MILD_MODEL_MILD, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 2},
-    {"three surfaces", 3, MILD_MODEL_MILD, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
-    {"five surfaces, waves", 5, MILD_MODEL_MILD, MILD_MAP_WAVES, MILD_PATTERN_NONE, 5},
-    {"four feet, five surfaces", 9, MILD_MODEL_MILD, MILD_MAP_FLAT, MILD_PATTERN_NONE, 5},
-    {"surfaces, con_cone", 4, MILD_MODEL_CON_CONE, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
-    {"surfaces, con_spring", 4, MILD_MODEL_CON_SPRING, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
-    {"surfaces, ecc_spring", 4, MILD_MODEL_ECC_SPRING, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
-    {"surfaces, ecc_quasi", 4, MILD_MODEL_ECC_QUASI, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
-    {"surfaces, ecc_quasi_3d", 4, MILD_MODEL_ECC_QUASI_3D, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
-    {"surfaces, bekker, checker", 4, MILD_MODEL_BEKKER, MILD_MAP_FLAT, MILD_PATTERN_CHECKER, 3},
-    {"surfaces, hunt_crossley", 4, MILD_MODEL_HUNT_CROSSLEY, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
-    {"surfaces, mild_merged", 4, MILD_MODEL_MILD_MERGED, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
-    {"surfaces, mild_merged, rough", 4, MILD_MODEL_MILD_MERGED, MILD_MAP_ROUGH,
-     MILD_PATTERN_CHECKER, 3},
+    {"two feet and five shells", 7, MILD_MODEL_MILD, MILD_MAP_FLAT, MILD_PATTERN_NONE, 5},
+    {"two feet, two shells, rough", 4, MILD_MODEL_MILD, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 2},
+    {"three shells", 3, MILD_MODEL_MILD, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
+    {"five shells, waves", 5, MILD_MODEL_MILD, MILD_MAP_WAVES, MILD_PATTERN_NONE, 5},
+    {"four feet, five shells", 9, MILD_MODEL_MILD, MILD_MAP_FLAT, MILD_PATTERN_NONE, 5},
+    {"shells, con_cone", 4, MILD_MODEL_CON_CONE, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
+    {"shells, con_spring", 4, MILD_MODEL_CON_SPRING, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
+    {"shells, ecc_spring", 4, MILD_MODEL_ECC_SPRING, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
+    {"shells, ecc_quasi", 4, MILD_MODEL_ECC_QUASI, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
+    {"shells, ecc_quasi_3d", 4, MILD_MODEL_ECC_QUASI_3D, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
+    {"shells, bekker, checker", 4, MILD_MODEL_BEKKER, MILD_MAP_FLAT, MILD_PATTERN_CHECKER, 3},
+    {"shells, hunt_crossley", 4, MILD_MODEL_HUNT_CROSSLEY, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
+    {"shells, mild_merged", 4, MILD_MODEL_MILD_MERGED, MILD_MAP_FLAT, MILD_PATTERN_NONE, 3},
+    {"shells, mild_merged, rough", 4, MILD_MODEL_MILD_MERGED, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER,
+     3},
 };
 
 /* Those that further tests take. */
@@ -94,7 +94,7 @@ TEST(steps_are_those_of_the_ground) {
             check_errors("    moments", &moments, 2e-5, 1e-2);
             check_errors("    centres, depths, areas", &reports, 1e-6, 3e-3);
             print_message("    %d steps are not solved\n", unsolved);
-            /* 96 and 179 of 2880 on surfaces, if steps did not correct P and V */
+            /* 96 and 179 of 2880 on shells, if steps did not correct P and V */
             assert_true(!mild_model_is_concentric(shapes[i].model) ||
                         unsolved <= some_steps() * ROBOTS / 40);
             side_close(&side);
@@ -113,9 +113,9 @@ typedef struct {
     double speed[6]; /* [m/s, rad/s] times 0.1 .. 1 */
 } Body;
 static const Body bodies[] = {
-    {"wheel", &surface[2], 0.08, {0, 0, 0}, {1.6, 0, 0, 0, 20, 0}},
-    {"capsule", &surface[1], 0.04, {1.5708, 0, 0}, {0.2, 0, -0.3, 0, 5, 1}},
-    {"box", &surface[4], 0.09, {0, 0.5, 0.2}, {0.5, 0.2, -0.5, 0, 0, 0}},
+    {"wheel", &shell[2], 0.08, {0, 0, 0}, {1.6, 0, 0, 0, 20, 0}},
+    {"capsule", &shell[1], 0.04, {1.5708, 0, 0}, {0.2, 0, -0.3, 0, 5, 1}},
+    {"box", &shell[4], 0.09, {0, 0.5, 0.2}, {0.5, 0.2, -0.5, 0, 0, 0}},
     {"foot", &left, 0.055, {0, 0, 0}, {0.1, 0.1, -0.3, 0, 0, 0}},
 };
 enum { BODIES = sizeof bodies / sizeof *bodies };
@@ -127,7 +127,7 @@ static void herd_bodies(Herd *at, int first, int last) {
     at->labels = 1;
     for (int f = 0; f < at->feet; f++) {
         at->soles[f] = *bodies[last - f].sole;
-        at->surfaces += mild_sole_surface_z(at->soles[f]) != NULL;
+        at->shells += mild_sole_surface_z(at->soles[f]) != NULL;
     }
     for (int m = 0; m < MATERIALS; m++) {
         at->material[m] = kit_preset(mild_material_preset_name(m % PAPER_PRESETS));
@@ -302,9 +302,9 @@ static double planes_apart(const MildGround *a, const MildGround *b, int f, int 
         assert_int_equal(a->uneven[f], b->uneven[f]);
         assert_int_equal(m.material[e], n.material[e]);
     }
-    const int is_surface = f >= herd.feet - herd.surfaces; /* forgets earlier that it was near */
+    const int is_shell = f >= herd.feet - herd.shells; /* forgets earlier that it was near */
     if (!a->uneven[f] || n.material[e] == MATERIAL_NONE || n.material[e] == MATERIAL_BURIED ||
-        (is_surface && m.material[e] == MATERIAL_NONE)) {
+        (is_shell && m.material[e] == MATERIAL_NONE)) {
         return 0.0;
     }
     return fmax(fabs(m.plane[e] - n.plane[e]),
@@ -409,7 +409,7 @@ static void unknown_on(const Shape *shape, int device) {
     for (int r = 0; r < ROBOTS; r++) {
         double *at = herd.kit[r].input.position[0]; /* in the ground */
         const double top = mild_terrain_height_at(&herd.kit[r].terrain, at[0], at[1]);
-        at[2] = shape->surfaces < shape->feet ? at[2] - 0.04 : top + 0.02;
+        at[2] = shape->shells < shape->feet ? at[2] - 0.04 : top + 0.02;
     }
     side_open(&side, &herd, device);
     herd_solve(&herd, &arrays);
@@ -550,10 +550,10 @@ TEST(bad_input_is_refused) {
     mild_batch_destroy(NULL);
 }
 
-TEST(strange_surfaces_are_refused) {
+TEST(strange_shells_are_refused) {
     const MildShape box = surface_box(0.4, 0.3, 0.1);
     MildSole *large = surface_make(&box, 1, KIT_PITCH);
-    const MildSole *soles[6] = {left, surface[1], right, plate, plate, plate};
+    const MildSole *soles[6] = {left, shell[1], right, plate, plate, plate};
     const MildBatchDef good = {
         .robots = 3, .feet = 2, .soles = soles, .dt = 5e-3, .device = MILD_BATCH_HOST};
     MildBatchDef def = good;
@@ -571,7 +571,7 @@ TEST(strange_surfaces_are_refused) {
     float numbers[300] = {0};
     const MildBatchInput input = {numbers, numbers, numbers, numbers, numbers, NULL, NULL, NULL};
     MildBatchOutput output = {numbers, numbers, NULL, numbers, NULL, NULL};
-    soles[1] = surface[1];
+    soles[1] = shell[1];
     MildBatch *batch = mild_batch_create(&good, &e);
     expect_good(batch != NULL, &e);
     assert_refused(mild_batch_step(batch, &input, &output, 0, NULL, &e), MILD_ERROR_ARGUMENT, &e,
@@ -580,21 +580,21 @@ TEST(strange_surfaces_are_refused) {
     def.feet = 1;
     MildBatch *without = mild_batch_create(&def, &e);
     const size_t more = mild_batch_robot_bytes(batch) - mild_batch_robot_bytes(without);
-    assert_true(more > sizeof(float) * (size_t)mild_sole_elements(surface[1]));
+    assert_true(more > sizeof(float) * (size_t)mild_sole_elements(shell[1]));
     mild_batch_destroy(without);
 
-    /* a material that no surface can stand on; the table stays as it is */
+    /* a material that no shell can stand on; the table stays as it is */
     MildMaterial snow = mild_material_default();
     assert_true(mild_material_preset("snow", &snow));
     snow.k_c = -0.95 * mild_sole_width(left) * snow.k_phi;
-    assert_true(mild_sole_width(surface[1]) < 0.95 * mild_sole_width(left));
+    assert_true(mild_sole_width(shell[1]) < 0.95 * mild_sole_width(left));
     assert_refused(mild_batch_set_materials(batch, &snow, 1, &e), MILD_ERROR_RANGE, &e,
                    "material 0 ground.k_c ground.plate_width");
     snow.plate_width = mild_sole_width(left);
     assert_int_equal(mild_batch_set_materials(batch, &snow, 1, &e), MILD_OK);
 
     /* grounds of other soles */
-    const MildSole *const others[3][2] = {{left, right}, {left, surface[0]}, {left, surface[1]}};
+    const MildSole *const others[3][2] = {{left, right}, {left, shell[0]}, {left, shell[1]}};
     for (int i = 0; i < 3; i++) {
         Kit kit;
         kit_open(&kit, 2, left, right, &snow, 5e-3);
@@ -643,9 +643,9 @@ TEST(strange_ground_is_refused) {
     kit_open(&prints, 2, left, right, &sand, 5e-3);
     kit_open(&fits, 2, left, right, &sand, 5e-3);
     kit_prints(&prints, 8);
-    fits.ground->faces = 1; /* as of surfaces with as many elements */
+    fits.ground->shells = 1; /* as of shells with as many elements */
     assert_refused(mild_batch_load(batch, 0, fits.ground, &e), MILD_ERROR_ARGUMENT, &e, "robot 0");
-    fits.ground->faces = 0;
+    fits.ground->shells = 0;
     MildGround *good = fits.ground;
     assert_refused(mild_batch_load(batch, 0, one.ground, &e), MILD_ERROR_ARGUMENT, &e, "robot 0");
     assert_refused(mild_batch_load(batch, 1, prints.ground, &e), MILD_ERROR_ARGUMENT, &e,

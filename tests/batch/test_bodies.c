@@ -1,5 +1,5 @@
 /* The step of a robot whose shells are near the ground (bodies.h) against mild_ground_solve and
- * mild_ground_advance: the same code in double and in float, of soles and surfaces, on level ground
+ * mild_ground_advance: the same code in double and in float, of soles and shells, on level ground
  * and on maps. */
 #include "batch_kit.h"
 #include "bodies_case.h"
@@ -46,7 +46,7 @@ static void case_sole(BodiesCase *c, const Kit *kit, int b) {
     const double square = mild_sole_pitch(sole) * mild_sole_pitch(sole);
     const double *z = mild_sole_surface_z(sole);
     c->elements[b] = mild_sole_elements(sole);
-    c->faces[b] = z != NULL;
+    c->shell[b] = z != NULL;
     c->z[b] = mild_sole_z(sole);
     c->square[b] = square;
     c->radius[b] = foot->radius;
@@ -85,7 +85,7 @@ static void case_map(BodiesCase *c, const MildTerrain *terrain) {
 }
 
 /* Numbers of BodiesCase.memory behind those of an element on level ground. */
-enum { PLANE = CASE_MEMORY, SLOPE_X, SLOPE_Y, STATE, SHARE };
+enum { PLANE = CASE_MEMORY, SLOPE_X, SLOPE_Y, STATE, AREA_SHARE };
 
 static void memory_arrays(const Memory *m, double *const all[CASE_MEMORY]) {
     double *const arrays[CASE_MEMORY] = {m->depth_max,      m->middle,    m->front_speed, m->drift,
@@ -108,7 +108,7 @@ static void case_remember(BodiesCase *c, const Kit *kit, int b) {
     double *all[CASE_MEMORY];
     memory_arrays(&memory, all);
     c->own[4][b] = kit->ground->uneven[b];
-    c->own[5][b] = c->faces[b];
+    c->own[5][b] = c->shell[b];
     for (int e = 0; e < c->elements[b]; e++) {
         const int32_t material = memory.material[e];
         for (int n = 0; n < CASE_MEMORY; n++) {
@@ -118,8 +118,8 @@ static void case_remember(BodiesCase *c, const Kit *kit, int b) {
         c->memory[PLANE][b][e] = there ? memory.plane[e] : 1e6;
         c->memory[SLOPE_X][b][e] = there ? memory.slope_x[e] : 0;
         c->memory[SLOPE_Y][b][e] = there ? memory.slope_y[e] : 0;
-        c->memory[STATE][b][e] = c->faces[b] ? state_of(material) : material > 0 ? material : 0;
-        c->memory[SHARE][b][e] = c->faces[b] ? memory.share[e] : 0;
+        c->memory[STATE][b][e] = c->shell[b] ? state_of(material) : material > 0 ? material : 0;
+        c->memory[AREA_SHARE][b][e] = c->shell[b] ? memory.area_share[e] : 0;
     }
 }
 
@@ -175,7 +175,7 @@ static void compare(Worst *worst, const BodiesCase *c, const Kit *kit) {
         memcpy(wanted + 3 * b, foot->force, 3 * sizeof(double));
         worst->wrench = worse(worst->wrench, apart(c->wrench + 6 * b + 3, foot->torque, 3, 1.0));
         if (foot->contacts > 0 && foot->force[2] > 1.0) {
-            worst->loaded += c->faces[b];
+            worst->loaded += c->shell[b];
             worst->foot = worse(worst->foot, apart(c->foot[b], foot->pressure_center, 3, 0.1));
             worst->foot = worse(worst->foot, apart(c->foot[b] + 3, &foot->depth_max, 1, 1e-3));
             /* an element within rounding of the surface is loaded in one of the two */
@@ -203,10 +203,11 @@ static void compare_element(Worst *worst, const BodiesCase *c, const Kit *kit, c
         const double wanted = n == 1 && material < 0 ? a : all[n][e];
         worst->memory = worse(worst->memory, fabs(a - wanted) / (fabs(wanted) + scale[n]));
     }
-    if (c->faces[b]) {
+    if (c->shell[b]) {
         worst->buried += material == MATERIAL_BURIED;
         assert_int_equal((int)c->memory[STATE][b][e], state_of(material));
-        worst->memory = worse(worst->memory, fabs(c->memory[SHARE][b][e] - memory->share[e]));
+        worst->memory =
+            worse(worst->memory, fabs(c->memory[AREA_SHARE][b][e] - memory->area_share[e]));
     }
     if (kit->ground->uneven[b] && (material >= 0 || material == MATERIAL_FREE)) {
         const double x = c->memory[SLOPE_X][b][e], y = c->memory[SLOPE_Y][b][e];
@@ -392,7 +393,7 @@ static void run_place(const Place *place, int walks, double tolerance, void (*ru
 
 static void worst_print(const char *name, Worst *w) {
     print_message(
-        "%-24s %4d steps, %3d left out, %4d loaded surfaces, %6d buried elements: force "
+        "%-24s %4d steps, %3d left out, %4d loaded shells, %6d buried elements: force "
         "median %.1e, 95 %% %.1e; worst: wrench %.1e, twist %.1e, foot %.1e, memory %.1e; "
         "Newton steps %.2f (%.2f)\n",
         name, w->steps, w->unsolved, w->loaded, w->buried, quantile(w, 0.5), quantile(w, 0.95),

@@ -237,9 +237,9 @@ TEST(far_shells_change_no_bit) {
  * rigid ground. */
 typedef struct {
     Rows a[STEPS], b[STEPS];
-} Record;
+} Fallen;
 
-static void record_falls(int stand, double share, Record *record) {
+static void record_falls(int stand, double share, Fallen *record) {
     TaskDef def = shells_def();
     def.shells_stand = stand;
     def.randomize.shells_share = share;
@@ -263,7 +263,7 @@ static int same_rows(const Rows *x, const Rows *y, int e) {
 
 /* With a share of 0 no bit differs from robots without shells, with 1 the steps after a touch. */
 TEST(in_no_episode_is_without) {
-    static Record without, none, all;
+    static Fallen without, none, all;
     int same[2] = {0, 0}, touched[2] = {0, 0}, shell_ends = 0;
     record_falls(0, 1, &without);
     record_falls(1, 0, &none);

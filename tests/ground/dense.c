@@ -251,7 +251,7 @@ static void element_shear(double dt, DenseElement *e, const MildMaterial *m, dou
     e->radius += e->u0 > 0.0 ? dt * share * m->cohesion * area : 0.0;
 }
 
-/* What the rim of a surface leaves of the load of an element at the depth u: the pressure that the
+/* What the rim of a shell leaves of the load of an element at the depth u: the pressure that the
  * rim's depth and the distance to it give, over its own. */
 static double rim_share(const DenseElement *e, const Find *find) {
     const DenseLaw *law = &e->law;
@@ -294,7 +294,7 @@ static void dense_share(double dt, DenseElement *e, const Find *find, const doub
     double level = (-find->normal[2] + g[0] * find->normal[0] + g[1] * find->normal[1]) /
                    sqrt(1.0 + g[0] * g[0] + g[1] * g[1]);
     level = fmin(fmax(level, 0.02), 1.0);
-    level = find->faces ? fmin(fmax(rim_share(e, find), 0.02), 1.0) : water_share(e, find, level);
+    level = find->shell ? fmin(fmax(rim_share(e, find), 0.02), 1.0) : water_share(e, find, level);
     double c = 1.0 - law->projected * (1.0 - level), q = fmin(1.0 - find->memory.worn[find->i], c),
            soil = virgin_force(law, a), bed = law->bed_stiffness * fmax(a - law->bed, 0.0);
     if (law->grip > 0.0) {
@@ -304,9 +304,9 @@ static void dense_share(double dt, DenseElement *e, const Find *find, const doub
                struck = fmax(law->drag_rate, 0.0) * moved_rate(law, a) * way * e->w0 / dt;
         law->mu = held + (law->mu - held) * struck / fmax(carried + struck, 1e-300);
     }
-    double side = find->faces ? 0.0 : 1.5 * law->weight * find->pitch * find->pitch / find->width;
+    double side = find->shell ? 0.0 : 1.5 * law->weight * find->pitch * find->pitch / find->width;
     e->radius += dt * side * e->u0 * fmax(e->u0, 0.0);
-    if (find->faces && law->slip > 0.0) { /* what is ahead of a face pushes along its normal */
+    if (find->shell && law->slip > 0.0) { /* what is ahead of a face pushes along its normal */
         const double *n = find->normal, pressed = q * soil + bed - e->line * (a - e->u0),
                      steep = fmax(-n[2], sin(10.0 / 45.0 * atan(1.0))),
                      ahead = fmax(n[0] * now[0] + n[1] * now[1], 0.0) / steep;
@@ -370,7 +370,7 @@ static void dense_element(Dense *d, const Find *find) {
         d->elements--;
         return;
     }
-    if (find->faces) {
+    if (find->shell) {
         law_times(&e->law, share);
     }
     memcpy(e->before, now, sizeof e->before);
@@ -395,7 +395,8 @@ static void dense_element(Dense *d, const Find *find) {
         dense_resist(d->dt, e, nearer->model, find->normal, now, now[3]);
     }
     if (nearer->model == MILD_MODEL_BEKKER) {
-        element_shear(d->dt, e, nearer, find->share * find->pitch * find->pitch, memory->drift[i]);
+        element_shear(d->dt, e, nearer, find->area_share * find->pitch * find->pitch,
+                      memory->drift[i]);
     }
     element_hold(d->dt, e, memory->held_x[i], memory->held_y[i], memory->held_stiffness[i]);
 }
@@ -421,11 +422,11 @@ static void dense_foot(Dense *d, const Kit *kit, int f) {
                  .pitch = mild_sole_pitch(sole),
                  .width = mild_sole_width(sole),
                  .normal = {side * R[2], side * R[5], side * R[8]},
-                 .share = 1.0,
+                 .area_share = 1.0,
                  .area = 1.0,
-                 .faces = mild_sole_surface_z(sole) != NULL};
+                 .shell = mild_sole_surface_z(sole) != NULL};
     const int n = mild_sole_elements(sole);
-    if (find.faces) {
+    if (find.shell) {
         RimPoint *point = calloc((size_t)n, sizeof *point);
         int count = 0;
         for (find.i = 0; point && find.i < n; find.i++) {

@@ -1,4 +1,4 @@
-/* The elements of a foot, where they are and what ground they find, and the rim of a surface, for
+/* The elements of a foot, where they are and what ground they find, and the rim of a shell, for
  * dense.c. */
 #ifndef DENSE_FIND_H
 #define DENSE_FIND_H
@@ -16,11 +16,11 @@ typedef struct {
     double pitch, width, normal[3]; /* width: shorter side; normal: of the face that looks down */
     int i;
     double p[3], at[3], slope[2]; /* ankle -> element, world point, gradient of the ground */
-    double share, area;           /* [-] of a surface: what it presses with, and its area, both
+    double area_share, area;      /* [-] of a shell: what it presses with, and its area, both
                                      over those of a square of the raster; else 1 */
-    int faces;                    /* bool: a surface */
+    int shell;                    /* bool */
     double heap[2];               /* [-] of the element, see dense_law.h */
-    double plane[3];    /* of a surface, dense_rim: least squares through its depths less half of
+    double plane[3];    /* of a shell, dense_rim: least squares through its depths less half of
                         `round`, [m] and [-] */
     double round, half; /* [m] height of what is round; half breadth */
 } Find;
@@ -49,7 +49,7 @@ static double find_depth(const Find *find) {
 static double find_deepest(const Find *find, double recovery) {
     const MildGround *ground = find->kit->ground;
     static const double level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-    const double *R = find->faces ? level : find->kit->input.rotation[find->f];
+    const double *R = find->shell ? level : find->kit->input.rotation[find->f];
     double deepest = find->memory.depth_max[find->i], m0 = find->memory.middle[find->i], sum = 0.0;
     if (ground->tiles == 0 || find->memory.material[find->i] >= 0 || recovery >= 1.0) {
         return deepest;
@@ -95,14 +95,14 @@ static double find_share(const Find *find, const DenseLaw *law, int directed, do
     const int code = find->memory.material[find->i];
     const int buried = code == MATERIAL_BURIED && m0 > 0.0;
     const int lifted = code == MATERIAL_FREE && find->memory.middle[find->i] > 0.0 &&
-                       (find->faces || find->kit->ground->tiles > 0);
+                       (find->shell || find->kit->ground->tiles > 0);
     if (law->recovery >= 1.0 && (buried || lifted)) {
         return 0.0;
     }
     if (buried) {
         *deepest = fmax(*deepest, fmax(m0 / (1.0 - law->recovery), m0 + ELEMENT_ELASTIC));
     }
-    return !find->faces ? 1.0 : directed ? find->area : find->share;
+    return !find->shell ? 1.0 : directed ? find->area : find->area_share;
 }
 
 /* An element in the ground, for dense_rim. */
@@ -155,7 +155,7 @@ static void dense_rim(Find *find, const RimPoint *at, int count) {
 static int find_element(Find *find, const MildSole *sole) {
     const double *R = find->kit->input.rotation[find->f];
     double x = mild_sole_x(sole)[find->i], y = mild_sole_y(sole)[find->i], z = mild_sole_z(sole);
-    if (find->faces) {
+    if (find->shell) {
         z = mild_sole_surface_z(sole)[find->i];
         find->area = mild_sole_surface_area(sole)[find->i] / (find->pitch * find->pitch);
         for (int k = 0; k < 3; k++) {
@@ -164,8 +164,8 @@ static int find_element(Find *find, const MildSole *sole) {
                 find->normal[k] += R[3 * k + j] * mild_sole_surface_normal(sole, j)[find->i];
             }
         }
-        find->share = find->memory.material[find->i] >= 0 ? find->memory.share[find->i]
-                                                          : -find->normal[2] * find->area;
+        find->area_share = find->memory.material[find->i] >= 0 ? find->memory.area_share[find->i]
+                                                               : -find->normal[2] * find->area;
         if (!(-find->normal[2] > cos(80.0 / 180.0 * acos(-1.0)))) {
             return 0;
         }

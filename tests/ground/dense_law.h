@@ -35,7 +35,7 @@ static void law_curve(const MildMaterial *m, double area, double k_pen, DenseLaw
 }
 
 /* Of an element of that pitch. Stiffness, drift and cone are those of the paper's element, by area;
- * of a concentric model those of the whole sole. heap: where the merged cone of the element begins
+ * of a concentric model those of the whole sole. heap: where the heap of the element begins
  * to close, and its width, by the radius of a disc of the paper's element. */
 static DenseLaw law_material(const MildMaterial *m, double pitch, const double heap[2]) {
     double area = pitch * pitch, c_g = m->passive ? fmax(m->c_g, 0.0) : m->c_g,

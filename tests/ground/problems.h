@@ -132,7 +132,7 @@ typedef enum {
     HUNT_CROSSLEY,
     MERGED,
     EVERYTHING,
-    SURFACES,
+    SHELLS,
     KINDS
 } Kind;
 static const char *const kind_names[KINDS] = {"springs",
@@ -147,7 +147,7 @@ static const char *const kind_names[KINDS] = {"springs",
                                               "hunt_crossley",
                                               "mild_merged and slip",
                                               "everything at once",
-                                              "everything under surfaces"};
+                                              "everything under shells"};
 
 /* One of the models of the raster, with numbers for it. */
 static MildMaterial material_of(uint64_t *random, MildModel model) {
@@ -315,10 +315,10 @@ static int kind_problem(Kit *kit, MildMap **map, Kind kind, int number) {
     MildMaterial m = kind_material(kind, &random);
     double dt = steps[kit_index(&random, 3)];
     int all = kind >= EVERYTHING;
-    MildSole *const *from = kind == CONCENTRIC ? centers : kind == SURFACES ? covered : soles;
+    MildSole *const *from = kind == CONCENTRIC ? centers : kind == SHELLS ? covered : soles;
     problem_open(kit, &random, from, number % 2 ? SOLES - 2 : 0, &m, dt);
     *map = NULL;
-    for (int f = 0; kind == SURFACES && f < kit->feet; f++) {
+    for (int f = 0; kind == SHELLS && f < kit->feet; f++) {
         double turn[3];
         for (int k = 0; k < 3; k++) {
             turn[k] = kit_uniform(&random, -3.0, 3.0);
@@ -337,7 +337,7 @@ static int kind_problem(Kit *kit, MildMap **map, Kind kind, int number) {
     if (kind == PRINTS || all) {
         problem_visit(kit, &random);
     }
-    if (kind == SURFACES) {
+    if (kind == SHELLS) {
         problem_turn(kit, &random);
     }
     return problem_solve(kit, &random);

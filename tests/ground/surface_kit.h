@@ -1,4 +1,4 @@
-/* Surfaces for tests: shapes, and what does not come from the library about them. */
+/* Shells for tests: shapes, and what does not come from the library about them. */
 #ifndef SURFACE_KIT_H
 #define SURFACE_KIT_H
 

@@ -100,7 +100,7 @@ TEST(test_failing_allocation) {
     mild_sole_destroy(sole);
 }
 
-/* A surface grows its list, a mesh its pieces too; a step on it allocates nothing. */
+/* A shell grows its list, a mesh its pieces too; a step on it allocates nothing. */
 TEST(test_failing_surface) {
     if (!COUNTING) {
         skip();
@@ -128,7 +128,7 @@ TEST(test_failing_surface) {
     for (int s = 0; s < 50; s++) {
         kit_step(&kit, NULL);
     }
-    print_message("surfaces: %d clean refusals, %d allocations in 50 steps\n", refused,
+    print_message("shells: %d clean refusals, %d allocations in 50 steps\n", refused,
                   allocations - before);
     assert_true(refused > 5);
     assert_int_equal(allocations, before);

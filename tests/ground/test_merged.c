@@ -45,7 +45,7 @@ static double level_force(const MildSole *sole, const MildMaterial *m, double de
     double sum = 0.0;
     for (int i = 0; i < mild_sole_elements(sole); i++) {
         const SoleHeap heap = sole_heap(sole, i);
-        const Law own = law_merged(law, heap.begin, heap.width);
+        const Law own = law_of_heap(law, heap.begin, heap.width);
         sum += law_force(&own, LAW_CONE | LAW_HEAP, depth);
     }
     return sum;

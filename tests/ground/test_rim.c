@@ -56,7 +56,7 @@ TEST(test_one) {
     assert_true(fabs(one.depth - 0.01) < 1e-7 && one.height < 1e-7);
 }
 
-/* Presses a surface straight down by small steps, its lowest point to a depth; returns the force up
+/* Presses a shell straight down by small steps, its lowest point to a depth; returns the force up
  * [N]. bottom: [m] that point below the frame. */
 static double press(MildSole *sole, const MildMaterial *m, const double *R, double bottom,
                     double depth) {

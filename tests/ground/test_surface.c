@@ -1,4 +1,4 @@
-/* Making surfaces: areas, shadows and volumes against those of the shapes, parts that overlap,
+/* Making shells: areas, shadows and volumes against those of the shapes, parts that overlap,
  * refusals. */
 #include "surface_kit.h"
 
@@ -157,12 +157,12 @@ TEST(numbers_of_a_surface) {
     assert_null(mild_sole_surface_area(plane));
     MildError error = {0};
     assert_null(mild_sole_concentric(sole, &error));
-    assert_error(&error, MILD_ERROR_ARGUMENT, "sole surface mild_sole_create");
+    assert_error(&error, MILD_ERROR_ARGUMENT, "sole shell mild_sole_create");
     const MildMaterial sand = mild_material_default();
     MildMaterial rival = sand;
     assert_int_not_equal(
         mild_model_match(MILD_MODEL_ECC_SPRING, &sand, sole, 100.0, &rival, &error), MILD_OK);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "sole surface mild_sole_create");
+    assert_error(&error, MILD_ERROR_ARGUMENT, "sole shell mild_sole_create");
     mild_sole_destroy(sole);
     mild_sole_destroy(plane);
 }

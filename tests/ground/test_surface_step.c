@@ -1,4 +1,4 @@
-/* Contact steps of surfaces: against plane soles, closed forms, differences, closed motions. */
+/* Contact steps of shells: against plane soles, closed forms, differences, closed motions. */
 #include "surface_kit.h"
 
 #include "ground/step/pass.h"
@@ -46,7 +46,7 @@ static void throw_both(Kit *one, Kit *two, int imprints, uint64_t *random) {
     for (int k = 0; k < 6; k++) {
         one->input.velocity[0][k] = kit_uniform(random, -0.2, 0.2);
     }
-    if (imprints) { /* imprints take the elements of a surface for level squares: no tilt */
+    if (imprints) { /* imprints take the elements of a shell for level squares: no tilt */
         memset(one->center[0], 0, sizeof one->center[0]);
         memset(one->input.velocity[0] + 3, 0, 3 * sizeof(double));
         one->inertia[0] = 1e9;
@@ -580,16 +580,16 @@ TEST(states_are_copied) {
     }
     assert_memory_equal(one.ground, two.ground, one.bytes);
     Memory memory = ground_memory(one.ground, 0);
-    assert_non_null(memory.share);
-    memory.share[3] = -1.0;
+    assert_non_null(memory.area_share);
+    memory.area_share[3] = -1.0;
     assert_int_not_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
-    memory.share[3] = 0.0;
+    memory.area_share[3] = 0.0;
     memory.material[3] = -4;
     assert_int_not_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
     memory.material[3] = MATERIAL_BURIED;
     assert_int_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
     memory = ground_memory(one.ground, 1);
-    assert_null(memory.share);
+    assert_null(memory.area_share);
     memory.material[3] = MATERIAL_BURIED; /* not of a plane sole */
     assert_int_not_equal(mild_ground_restore(two.ground, one.ground, one.bytes, &error), MILD_OK);
     kit_close(&one);
@@ -598,7 +598,7 @@ TEST(states_are_copied) {
     mild_sole_destroy(plate);
 }
 
-/* A scratch of a plane sole with as many elements does not fit the ground of a surface. */
+/* A scratch of a plane sole with as many elements does not fit the ground of a shell. */
 TEST(a_scratch_of_soles_does_not_fit) {
     Plate36 plate;
     const MildShape shape = surface_plate(3, 2, 0.0, &plate);

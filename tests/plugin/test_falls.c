@@ -132,7 +132,7 @@ static void draw_models(uint64_t *random, int kind, const char *integrator, mjMo
 static double lowest(const mjModel *m, const mjData *d) {
     double low = INFINITY;
     for (int g = 0; g < m->ngeom; g++) {
-        if (plugin_soft(m, d)->foot[0].surface) {
+        if (plugin_soft(m, d)->foot[0].shell) {
             low = fmin(low, d->geom_xpos[3 * g + 2] - m->geom_rbound[g]);
             continue;
         }

@@ -2,7 +2,7 @@
 somebody who had not read the sources; where the page left room, forces of the library decided. test_law.py compares the two. Names are
 those of the page, and each function names its sections there.
 
-Left out: uneven ground and terrains, imprints, surfaces of bodies, concentric soles, other models, `passive = false`, the solvers."""
+Left out: uneven ground and terrains, imprints, shells of bodies, concentric soles, other models, `passive = false`, the solvers."""
 import types
 
 import numpy as np

@@ -108,13 +108,13 @@ class Scenario(unittest.TestCase):
         return batch
 
     @staticmethod
-    def arrays(given, robots, surfaces=0):
-        """Inputs of a batch for so many robots, with surfaces that ride on the left foot, and outputs."""
-        feet = 2 + surfaces
+    def arrays(given, robots, shells=0):
+        """Inputs of a batch for so many robots, with shells that ride on the left foot, and outputs."""
+        feet = 2 + shells
         more = {"position": given["position"][[0]], "rotation": given["rotation"][[0]], "velocity": given["velocity"][[0]], "free_velocity": given["free_velocity"][[0]]}
-        inputs = {name: np.concatenate([given[name], *[value] * surfaces]) for name, value in more.items()}
+        inputs = {name: np.concatenate([given[name], *[value] * shells]) for name, value in more.items()}
         square = np.zeros((6 * feet, 6 * feet))
-        square[:12, :12], square[12:, 12:] = given["inverse_inertia"], 0.1 * np.eye(6 * surfaces)
+        square[:12, :12], square[12:, 12:] = given["inverse_inertia"], 0.1 * np.eye(6 * shells)
         inputs |= {"inverse_inertia": square, "height": np.array(HEIGHT)}
         inputs = {name: np.ascontiguousarray(np.tile(value, (robots, *[1] * value.ndim)), np.float32) for name, value in inputs.items()}
         return inputs, {"wrench": np.zeros((robots, feet, 6), np.float32), "new_velocity": np.zeros((robots, feet, 6), np.float32),
@@ -149,20 +149,20 @@ class Scenario(unittest.TestCase):
                         batch.step(**inputs, **outputs, material=bad)
 
     def test_no_number(self):
-        """A step of no numbers says so, and leaves the ground as it was: that of a batch, plane soles and surfaces, on waves and level, and of a Ground."""
+        """A step of no numbers says so, and leaves the ground as it was: that of a batch, plane soles and shells, on waves and level, and of a Ground."""
         soles = feet_of(self.plain, FEET)[2]
         shin = mild.Sole.surface([{"type": "capsule", "size": [0.031, 0.043], "pos": [0.02, 0.01, -0.11]}])
         bad_of = {name: [np.nan, np.inf] for name in ("position", "rotation", "velocity", "free_velocity", "inverse_inertia")}
         bad_of["rotation"] = [np.nan, 1e30]
-        for surfaces in (0, 1):
+        for shells in (0, 1):
             for mapped in (True, False):
                 label = np.array([[0, 1]] * 2 if mapped else [0] * 2, np.int32)
-                two, loads = [self.batch([*soles, *[shin] * surfaces], mapped, 2) for _ in range(2)], []
+                two, loads = [self.batch([*soles, *[shin] * shells], mapped, 2) for _ in range(2)], []
                 bad = [(name, value, k) for name, values in bad_of.items() for value in values for k in (0, 7)]
                 for at, (given, *_) in enumerate(self.seen[:40]):
                     if at > 12 and bad:
                         name, value, k = bad.pop()
-                        inputs, outputs = self.arrays(given, 2, surfaces)
+                        inputs, outputs = self.arrays(given, 2, shells)
                         two[0].step(**inputs, **outputs, material=label, advance=False)
                         self.assertTrue((outputs["residual"] >= 0).all())
                         inputs[name][1].ravel()[k % inputs[name][1].size] = value
@@ -173,7 +173,7 @@ class Scenario(unittest.TestCase):
                         self.assertGreaterEqual(outputs["residual"][0], 0)
                     felt = []
                     for batch in two:
-                        inputs, outputs = self.arrays(given, 2, surfaces)
+                        inputs, outputs = self.arrays(given, 2, shells)
                         batch.step(**inputs, **outputs, material=label)
                         felt.append(outputs["wrench"][1])
                     np.testing.assert_array_equal(felt[1], felt[0])

@@ -18,20 +18,20 @@ static const char magic[4] = {'M', 'I', 'L', 'D'};
 
 typedef struct {
     uint8_t *at;
-} Writer;
+} PacketWriter;
 
 typedef struct {
     const uint8_t *at;
     int sound; /* bool: all floats so far are finite and not huge */
-} Reader;
+} PacketReader;
 
-static void put(Writer *w, uint64_t number, int bytes) {
+static void put(PacketWriter *w, uint64_t number, int bytes) {
     for (int i = 0; i < bytes; i++) {
         *w->at++ = (uint8_t)(number >> (8 * i));
     }
 }
 
-static uint64_t take(Reader *r, int bytes) {
+static uint64_t take(PacketReader *r, int bytes) {
     uint64_t number = 0;
     for (int i = 0; i < bytes; i++) {
         number |= (uint64_t)*r->at++ << (8 * i);
@@ -39,7 +39,7 @@ static uint64_t take(Reader *r, int bytes) {
     return number;
 }
 
-static void put_floats(Writer *w, const float *numbers, int count) {
+static void put_floats(PacketWriter *w, const float *numbers, int count) {
     for (int i = 0; i < count; i++) {
         uint32_t bits;
         memcpy(&bits, &numbers[i], sizeof bits);
@@ -47,7 +47,7 @@ static void put_floats(Writer *w, const float *numbers, int count) {
     }
 }
 
-static void take_floats(Reader *r, float *numbers, int count) {
+static void take_floats(PacketReader *r, float *numbers, int count) {
     for (int i = 0; i < count; i++) {
         const uint32_t bits = (uint32_t)take(r, 4);
         memcpy(&numbers[i], &bits, sizeof bits);
@@ -87,8 +87,9 @@ typedef struct {
     uint64_t time, session, peer;
 } Head;
 
-static Writer begin(uint8_t *bytes, PacketKind kind, const PacketFormat *format, const Head *head) {
-    Writer w = {bytes};
+static PacketWriter begin(uint8_t *bytes, PacketKind kind, const PacketFormat *format,
+                          const Head *head) {
+    PacketWriter w = {bytes};
     memcpy(w.at, magic, sizeof magic);
     w.at += sizeof magic;
     put(&w, PACKET_VERSION, 1);
@@ -108,7 +109,7 @@ static size_t seal_size(const Key *key) {
     return key ? SEAL_SIZE : 4;
 }
 
-static size_t seal(Writer *w, const PacketFormat *format, uint8_t *bytes) {
+static size_t seal(PacketWriter *w, const PacketFormat *format, uint8_t *bytes) {
     const size_t size = (size_t)(w->at - bytes);
     if (format->key) {
         key_seal(format->key, bytes, size, w->at);
@@ -120,7 +121,7 @@ static size_t seal(Writer *w, const PacketFormat *format, uint8_t *bytes) {
 
 size_t packet_write_state(const StatePacket *s, const PacketFormat *format, uint8_t *bytes) {
     const Head head = {s->mode, s->sequence, s->answers, s->time, s->session, s->peer};
-    Writer w = begin(bytes, PACKET_STATE, format, &head);
+    PacketWriter w = begin(bytes, PACKET_STATE, format, &head);
     put_floats(&w, s->quaternion, 4);
     put_floats(&w, s->angular_velocity, 3);
     put_floats(&w, s->angle, format->joints);
@@ -130,7 +131,7 @@ size_t packet_write_state(const StatePacket *s, const PacketFormat *format, uint
 
 size_t packet_write_target(const TargetPacket *t, const PacketFormat *format, uint8_t *bytes) {
     const Head head = {t->mode, t->sequence, t->answers, t->time, t->session, t->peer};
-    Writer w = begin(bytes, PACKET_TARGET, format, &head);
+    PacketWriter w = begin(bytes, PACKET_TARGET, format, &head);
     put_floats(&w, t->angle, format->joints);
     put_floats(&w, t->kp, format->joints);
     put_floats(&w, t->kd, format->joints);
@@ -141,7 +142,7 @@ size_t packet_write_target(const TargetPacket *t, const PacketFormat *format, ui
 /* ---- reading ---- */
 
 static uint32_t robot_of(const uint8_t *bytes) {
-    Reader r = {bytes + PACKET_HEAD - 4, 1};
+    PacketReader r = {bytes + PACKET_HEAD - 4, 1};
     return (uint32_t)take(&r, 4);
 }
 
@@ -153,7 +154,7 @@ static PacketFault check_seal(const uint8_t *bytes, size_t size, size_t body, co
     if (key) {
         return key_fits(key, bytes, body, bytes + body) ? PACKET_FAULT_none : PACKET_FAULT_key;
     }
-    Reader end = {bytes + body, 1};
+    PacketReader end = {bytes + body, 1};
     return take(&end, 4) == crc32(0, bytes, (uInt)body) ? PACKET_FAULT_none : PACKET_FAULT_checksum;
 }
 
@@ -203,8 +204,8 @@ const char *packet_explain(PacketFault fault, const uint8_t *bytes, const Packet
     return text;
 }
 
-static Reader begin_reading(const uint8_t *bytes, Head *head) {
-    Reader r = {bytes + 7, 1};
+static PacketReader begin_reading(const uint8_t *bytes, Head *head) {
+    PacketReader r = {bytes + 7, 1};
     head->mode = (PacketMode)take(&r, 1);
     head->sequence = (uint32_t)take(&r, 4);
     head->answers = (uint32_t)take(&r, 4);
@@ -234,7 +235,7 @@ PacketFault packet_read_state(const uint8_t *bytes, size_t size, const PacketFor
     if (fault != PACKET_FAULT_none) {
         return fault;
     }
-    Reader r = begin_reading(bytes, &h);
+    PacketReader r = begin_reading(bytes, &h);
     *state =
         (StatePacket){h.mode, h.sequence, h.answers, h.time, h.session, h.peer, {0}, {0}, {0}, {0}};
     take_floats(&r, state->quaternion, 4);
@@ -261,7 +262,7 @@ PacketFault packet_read_target(const uint8_t *bytes, size_t size, const PacketFo
     if (fault != PACKET_FAULT_none) {
         return fault;
     }
-    Reader r = begin_reading(bytes, &h);
+    PacketReader r = begin_reading(bytes, &h);
     *target = (TargetPacket){h.mode, h.sequence, h.answers, h.time, h.session,
                              h.peer, {0},        {0},       {0},    {0}};
     take_floats(&r, target->angle, joints);

@@ -10,7 +10,7 @@
 typedef struct {
     int64_t count;
     double asked[];
-} Memory;
+} MotorMemory;
 
 MotorDef motor_def_default(void) {
     return (MotorDef){.delay = 0.005, .coulomb = 0.02, .viscous = 0.1, .peak = 0.5};
@@ -30,7 +30,7 @@ static double motor_torque(const Motor *motor, int joint, double asked, double s
 static void torque_of_joints(const void *self, void *state, const double *error,
                              const double *speed, double *torque) {
     const Motor *motor = self;
-    Memory *memory = state;
+    MotorMemory *memory = state;
     const int joints = robot_joints(motor->robot);
     const int64_t held = motor->lag + 1, now = memory->count++;
     const int64_t then = now > motor->lag ? now - motor->lag : 0;
@@ -46,7 +46,7 @@ static void torque_of_joints(const void *self, void *state, const double *error,
 void motor_init(Motor *motor, const MotorDef *def, const Robot *robot, double dt) {
     const int lag = (int)lround(def->delay / dt);
     const size_t bytes =
-        sizeof(Memory) + (size_t)(lag + 1) * (size_t)robot_joints(robot) * sizeof(double);
+        sizeof(MotorMemory) + (size_t)(lag + 1) * (size_t)robot_joints(robot) * sizeof(double);
     *motor = (Motor){.def = *def,
                      .robot = robot,
                      .lag = lag,

@@ -158,9 +158,9 @@ double actuator_torque(const Actuator *actuator, int joint, const double *error,
 typedef struct {
     int64_t count;
     double rows[];
-} Memory;
+} NetworkMemory;
 
-static double *memory_row(const Actuator *actuator, Memory *memory, int64_t step) {
+static double *memory_row(const Actuator *actuator, NetworkMemory *memory, int64_t step) {
     const int64_t held = (ACTUATOR_TIMES - 1) * actuator->lag + 1;
     return memory->rows + (step > 0 ? step % held : 0) * 2 * actuator->joint_count;
 }
@@ -168,7 +168,7 @@ static double *memory_row(const Actuator *actuator, Memory *memory, int64_t step
 static void torque_of_joints(const void *self, void *state, const double *error,
                              const double *speed, double *torque) {
     const Actuator *actuator = self;
-    Memory *memory = state;
+    NetworkMemory *memory = state;
     const int joints = actuator->joint_count;
     const int64_t now = memory->count++;
     double *row = memory_row(actuator, memory, now);
@@ -203,7 +203,7 @@ static MildStatus use(Actuator *actuator, TaskDef *task, MildError *error) {
     }
     actuator->lag = (int)lround(lag);
     const size_t bytes =
-        sizeof(Memory) + (size_t)rows * 2 * (size_t)actuator->joint_count * sizeof(double);
+        sizeof(NetworkMemory) + (size_t)rows * 2 * (size_t)actuator->joint_count * sizeof(double);
     actuator->motors = (TaskActuator){
         .self = actuator, .bytes = (bytes + 63) / 64 * 64, .torque = torque_of_joints};
     task->motors = &actuator->motors;

@@ -22,9 +22,9 @@ typedef struct {
     int columns;       /* in the header */
     int place[PLACES]; /* of a number in the line, -1: absent */
     int room;          /* rows that there is memory for */
-} Reader;
+} RecordReader;
 
-static int places(const Reader *reader) {
+static int places(const RecordReader *reader) {
     return 1 + QUANTITIES * reader->record->joints;
 }
 
@@ -38,7 +38,7 @@ static const char *column_name(const Robot *robot, int number, char *name, size_
 
 /* ---- header ---- */
 
-static MildStatus find_column(Reader *reader, int number, char **cells, MildError *error) {
+static MildStatus find_column(RecordReader *reader, int number, char **cells, MildError *error) {
     char name[128];
     column_name(reader->record->robot, number, name, sizeof name);
     reader->place[number] = -1;
@@ -57,7 +57,7 @@ static MildStatus find_column(Reader *reader, int number, char **cells, MildErro
 }
 
 /* A joint is logged whole or not at all, and one at least is. */
-static MildStatus check_joints(const Reader *reader, MildError *error) {
+static MildStatus check_joints(const RecordReader *reader, MildError *error) {
     int logged = 0;
     char name[128];
     for (int i = 0; i < reader->record->joints; i++) {
@@ -86,7 +86,7 @@ static MildStatus check_joints(const Reader *reader, MildError *error) {
                      column_name(reader->record->robot, 1, name, sizeof name));
 }
 
-static MildStatus read_header(Reader *reader, MildError *error) {
+static MildStatus read_header(RecordReader *reader, MildError *error) {
     char *cells[CSV_CELLS_MAX];
     MildStatus status;
     char *line = csv_line(&reader->text, &status, error);
@@ -112,7 +112,7 @@ static MildStatus read_header(Reader *reader, MildError *error) {
 
 /* ---- rows ---- */
 
-static MildStatus grow(Reader *reader, MildError *error) {
+static MildStatus grow(RecordReader *reader, MildError *error) {
     Record *record = reader->record;
     if (record->rows == RECORD_ROWS_MAX) {
         return mild_fail(error, MILD_ERROR_RANGE, "%.200s:%d: more than %d rows in all",
@@ -131,7 +131,7 @@ static MildStatus grow(Reader *reader, MildError *error) {
                  : mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", reader->text.path);
 }
 
-static MildStatus read_number(const Reader *reader, int number, char **cells, int count,
+static MildStatus read_number(const RecordReader *reader, int number, char **cells, int count,
                               double *value, MildError *error) {
     char name[128];
     const int place = reader->place[number];
@@ -155,7 +155,7 @@ static MildStatus read_number(const Reader *reader, int number, char **cells, in
                            reader->text.number, name, *value, most);
 }
 
-static MildStatus read_row(Reader *reader, char *line, MildError *error) {
+static MildStatus read_row(RecordReader *reader, char *line, MildError *error) {
     Record *record = reader->record;
     char *cells[CSV_CELLS_MAX];
     const int count = csv_split(line, cells), row = record->rows;
@@ -192,7 +192,7 @@ static int compare(const void *a, const void *b) {
 }
 
 /* The median of the times between rows. */
-static MildStatus find_interval(const Reader *reader, MildError *error) {
+static MildStatus find_interval(const RecordReader *reader, MildError *error) {
     RecordFile *file = reader->file;
     file->rows = reader->record->rows - file->first;
     if (file->rows < 2) {
@@ -219,7 +219,8 @@ static MildStatus read_file(Record *record, FILE *file, const char *name, MildEr
                          RECORD_FILES_MAX);
     }
     record->joints = robot_joints(record->robot);
-    Reader reader = {.record = record, .file = &record->file[record->files], .room = record->rows};
+    RecordReader reader = {
+        .record = record, .file = &record->file[record->files], .room = record->rows};
     *reader.file = (RecordFile){.first = record->rows};
     MildStatus status = csv_begin(&reader.text, file, name, error);
     if (status == MILD_OK) {

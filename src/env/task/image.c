@@ -20,10 +20,10 @@ typedef struct {
     png_infop info;
     unsigned char *bytes;
     png_bytep *row;
-} Reader;
+} ImageReader;
 
 static void on_error(png_structp png, png_const_charp message) {
-    const Reader *reader = png_get_error_ptr(png);
+    const ImageReader *reader = png_get_error_ptr(png);
     mild_fail(reader->error, MILD_ERROR_FORMAT, "%.200s: not a readable PNG: %.100s", reader->path,
               message);
     png_longjmp(png, 1);
@@ -35,7 +35,7 @@ static void on_warning(png_structp png, png_const_charp message) {
 }
 
 /* Converts any image to one grey channel of 8 or 16 bits. */
-static void make_grey(Reader *reader, Image *image) {
+static void make_grey(ImageReader *reader, Image *image) {
     png_structp png = reader->png;
     png_set_expand(png);
     png_set_strip_alpha(png);
@@ -48,7 +48,7 @@ static void make_grey(Reader *reader, Image *image) {
     image->rows = (int)png_get_image_height(png, reader->info);
 }
 
-static int allocate(Reader *reader, Image *image, size_t stride) {
+static int allocate(ImageReader *reader, Image *image, size_t stride) {
     size_t rows = (size_t)image->rows;
     reader->bytes = malloc(rows * stride);
     reader->row = malloc(rows * sizeof *reader->row);
@@ -59,7 +59,7 @@ static int allocate(Reader *reader, Image *image, size_t stride) {
     return reader->bytes && reader->row && image->grey;
 }
 
-static void convert(const Reader *reader, Image *image, int wide) {
+static void convert(const ImageReader *reader, Image *image, int wide) {
     for (int r = 0; r < image->rows; r++) {
         for (int c = 0; c < image->columns; c++) {
             const unsigned char *at = reader->row[r] + (wide ? 2 * c : c);
@@ -69,7 +69,7 @@ static void convert(const Reader *reader, Image *image, int wide) {
     }
 }
 
-static MildStatus decode(Reader *reader, Image *image) {
+static MildStatus decode(ImageReader *reader, Image *image) {
     if (setjmp(png_jmpbuf(reader->png))) {
         return reader->error->status;
     }
@@ -90,7 +90,7 @@ static MildStatus decode(Reader *reader, Image *image) {
     return MILD_OK;
 }
 
-static MildStatus read_open(Reader *reader, Image *image) {
+static MildStatus read_open(ImageReader *reader, Image *image) {
     unsigned char signature[SIGNATURE];
     if (fread(signature, 1, SIGNATURE, reader->file) != SIGNATURE ||
         png_sig_cmp(signature, 0, SIGNATURE) != 0) {
@@ -111,7 +111,7 @@ static MildStatus read_open(Reader *reader, Image *image) {
 MildStatus image_read_file(FILE *file, const char *name, Image *image, MildError *error) {
     MildError local = {0};
     memset(image, 0, sizeof *image);
-    Reader reader = {.path = name, .file = file, .error = &local};
+    ImageReader reader = {.path = name, .file = file, .error = &local};
     MildStatus status = read_open(&reader, image);
     if (status == MILD_OK) {
         return MILD_OK;

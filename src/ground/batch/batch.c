@@ -43,7 +43,7 @@ static MildStatus check_soles(const MildBatchDef *def, MildError *error) {
     for (int f = planes; f < def->feet; f++) {
         if (!mild_sole_surface_z(def->soles[f])) {
             return mild_fail(error, MILD_ERROR_ARGUMENT,
-                             "batch: soles[%d] is plane and behind a surface; put plane soles "
+                             "batch: soles[%d] is plane and behind a shell; put plane soles "
                              "first",
                              f);
         }
@@ -199,11 +199,11 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
         return status;
     }
     const MildMaterial sand = mild_material_default();
-    const int surfaces = shape->soles - shape->feet;
+    const int shells = shape->soles - shape->feet;
     status = mild_batch_set_materials(batch, &sand, 1, error);
-    if (status == MILD_OK && surfaces > 0) {
-        status = batch_bodies_open(&batch->bodies, batch, def->soles, surfaces, NULL, &sand, 1, 1,
-                                   error);
+    if (status == MILD_OK && shells > 0) {
+        status =
+            batch_bodies_open(&batch->bodies, batch, def->soles, shells, NULL, &sand, 1, 1, error);
         status = status == MILD_OK ? batch_bodies_ready(batch, error) : status;
     }
     return status;
@@ -314,17 +314,17 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
     return status;
 }
 
-MildBatch batch_share(const MildBatch *batch, int first, int count) {
-    MildBatch share = *batch;
-    share.shape.robots = count;
-    share.arrays.memory += (size_t)first * batch_memory_numbers(&batch->shape);
-    if (share.arrays.order) {
-        share.arrays.order += (size_t)first * BATCH_ORDER;
+MildBatch batch_slice(const MildBatch *batch, int first, int count) {
+    MildBatch slice = *batch;
+    slice.shape.robots = count;
+    slice.arrays.memory += (size_t)first * batch_memory_numbers(&batch->shape);
+    if (slice.arrays.order) {
+        slice.arrays.order += (size_t)first * BATCH_ORDER;
     }
-    if (share.arrays.worn) {
-        share.arrays.worn += (size_t)first * batch_worn_numbers(&batch->shape);
+    if (slice.arrays.worn) {
+        slice.arrays.worn += (size_t)first * batch_worn_numbers(&batch->shape);
     }
-    return share;
+    return slice;
 }
 
 /* The kernel that fits, or NULL. */
@@ -383,7 +383,7 @@ MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
     }
     if (output->elements) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "batch: elements are not there yet where a sole is a surface; set "
+                         "batch: elements are not there yet where a sole is a shell; set "
                          "output.elements = NULL");
     }
     MildStatus status = batch_bodies_begin(batch, input, output, advance, stream, error);

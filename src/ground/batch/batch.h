@@ -9,7 +9,7 @@
 /* The same for all robots; in float whatever Real is. */
 typedef struct {
     int robots;
-    int soles;  /* of a robot: feet, then surfaces */
+    int soles;  /* of a robot: feet, then shells */
     int feet;   /* with plane soles */
     int groups; /* of lanes in a warp: feet rounded up to a power of two */
     int per;    /* elements of a lane */
@@ -46,17 +46,17 @@ typedef struct {
 
 struct BodiesSetup; /* of bodies.h */
 
-/* The surfaces of a batch's robots; on its device. */
+/* The shells of a batch's robots; on its device. */
 typedef struct {
     struct BodiesSetup *setup; /* in float; NULL: there are none */
-    float *memory;             /* [robots][numbers] of the surfaces */
+    float *memory;             /* [robots][numbers] of the shells */
     size_t numbers;            /* of a robot */
     size_t bytes;              /* of the device, without memory */
     /* what the setup points to */
     float *places;
-    MaterialNumbers *materials; /* [count + 1][surfaces] */
+    MaterialNumbers *materials; /* [count + 1][shells] */
     /* of mild_batch_step */
-    uint16_t *near; /* [robots] bit s: surface s may touch the ground in this step */
+    uint16_t *near; /* [robots] bit s: shell s may touch the ground in this step */
 } BatchBodies;
 
 struct MildBatch {
@@ -85,7 +85,7 @@ void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *m
 MildStatus batch_memory_open(BatchArrays *arrays, const BatchShape *shape, int device, int worn,
                              MildError *error);
 /* `count` robots of a batch from `first` on, as a batch that borrows its memory. */
-MildBatch batch_share(const MildBatch *batch, int first, int count);
+MildBatch batch_slice(const MildBatch *batch, int first, int count);
 
 /* ---- a map: map.c ---- */
 /* Makes a view of a map whose arrays are copies in the memory of a device. Fails for a map that a

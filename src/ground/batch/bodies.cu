@@ -1,5 +1,5 @@
-/* A step of a batch with surfaces on a GPU (bodies_robot.h): a warp a robot, and a team where a
- * surface is near the ground. */
+/* A step of a batch with shells on a GPU (bodies_robot.h): a warp a robot, and a team where a
+ * shell is near the ground. */
 #define MILD_REAL_FLOAT
 
 extern "C" {

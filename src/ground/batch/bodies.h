@@ -1,5 +1,5 @@
 /* The contact step of one robot whose shells are near the ground, by a team: any number of bodies,
- * soles and surfaces (docs/model.md section 20), level or on a map.
+ * soles and shells (docs/model.md section 20), level or on a map.
  *
  * Few robots take this step at a time, so it has one text for all sizes. Elements that may touch
  * are listed, and dealt to warps in rounds of one body each; those of a warp's first rounds are
@@ -30,12 +30,12 @@
 typedef struct {
     const Real *x;     /* [elements] [m] centre in the body's frame */
     const Real *y;     /* [m] */
-    const Real *begin; /* [-] a sole: of SoleHeap; a surface: NULL */
+    const Real *begin; /* [-] a sole: of SoleHeap; a shell: NULL */
     const Real *width; /* [-] */
-    const Real *face;  /* a sole: NULL; a surface: [5][elements] z [m], outward normal, area over
+    const Real *face;  /* a sole: NULL; a shell: [5][elements] z [m], outward normal, area over
                          `square` */
     Real z;            /* [m] of a sole's plane */
-    Real breadth;      /* [-] of a surface: width of SoleHeap */
+    Real breadth;      /* [-] of a shell: width of SoleHeap */
     Real square;       /* [m^2] area of an element in the law */
     Real middle[3];    /* [m] of the bounding box, body's frame */
     Real half[3];      /* [m] */
@@ -43,7 +43,7 @@ typedef struct {
     int elements;
     const ContactMaterial *table; /* material m at [m step] */
     int step;
-    int memory; /* a surface: where its memory begins in that of a robot */
+    int memory; /* a shell: where its memory begins in that of a robot */
 } BodiesSole;
 
 /* The same for all robots and steps: feet first. */
@@ -61,9 +61,9 @@ typedef struct BodiesSetup {
 } BodiesSetup;
 
 /* Memory of a body. Number n of element s is at element[n next + s]: CONTACT_MEMORY numbers, then
- * plane [m], its gradient [-] along x and y, a label, as in contact.h; of a surface the last is the
+ * plane [m], its gradient [-] along x and y, a label, as in contact.h; of a shell the last is the
  * state and the area's share [-] follows. Numbers of the body are `step` apart: the reference point
- * and height of the last step [m], whether there was a step; of a surface then whether anything is
+ * and height of the last step [m], whether there was a step; of a shell then whether anything is
  * remembered. */
 typedef struct {
     Real *element;
@@ -73,19 +73,19 @@ typedef struct {
     Real *worn; /* [-] as in ContactMemory */
 } BodiesMemory;
 enum {
-    BODIES_PLANE = CONTACT_MEMORY, /* with a map, or of a surface */
+    BODIES_PLANE = CONTACT_MEMORY, /* with a map, or of a shell */
     BODIES_STATE = BODIES_PLANE + 3,
-    BODIES_SHARE,
-    BODIES_NUMBERS,     /* of an element of a surface */
+    BODIES_AREA_SHARE,
+    BODIES_NUMBERS,     /* of an element of a shell */
     BODIES_STEPPED = 4, /* of the numbers of a body */
     BODIES_TOUCHED,
     BODIES_OWN = 8 /* numbers of a body */
 };
-/* State of an element of a surface: 1 plus the label that it touched down on, or one of these: the
+/* State of an element of a shell: 1 plus the label that it touched down on, or one of these: the
  * MATERIAL_NONE, MATERIAL_FREE and MATERIAL_BURIED of ground/step/state.h. */
 enum { BODIES_NONE = 0, BODIES_FREE = -1, BODIES_BURIED = -2 };
 
-/* [numbers] of the memory of a surface. worn: bool, with wear. */
+/* [numbers] of the memory of a shell. worn: bool, with wear. */
 MILD_HD int bodies_memory_numbers(int elements, int worn) {
     return (BODIES_NUMBERS + (worn != 0)) * elements + BODIES_OWN;
 }
@@ -99,7 +99,7 @@ MILD_HD BodiesMemory bodies_foot_memory(Real *memory, Real *worn, int groups, in
     return at;
 }
 
-/* That of a surface, at `memory`. */
+/* That of a shell, at `memory`. */
 MILD_HD BodiesMemory bodies_memory(Real *memory, int elements, int worn) {
     Real *own = memory + BODIES_NUMBERS * elements;
     const BodiesMemory at = {memory, elements, own, 1, worn ? own + BODIES_OWN : NULL};
@@ -138,7 +138,7 @@ typedef struct {
     int first[BODIES_NEAR + 1];     /* round of a place; those of a place follow each other */
     uint8_t place[BODIES_ROUNDS];   /* of a round */
     uint16_t list[BODIES_ELEMENTS]; /* numbers of elements */
-    Rim rim[BODIES_NEAR];           /* of surfaces with listed elements, on ground with LAW_HEAP */
+    Rim rim[BODIES_NEAR];           /* of shells with listed elements, on ground with LAW_HEAP */
     int active; /* rows of bodies with listed elements; P and W of others are 0 */
     uint8_t active_row[BODIES_ROWS];
     Real part[BODIES_ROUNDS][BODIES_SUMS];
@@ -153,15 +153,15 @@ typedef struct {
     Real p[3]; /* [m] from the body's reference point, world axes */
     Real depth;
     Real slope[2];
-    Real share;     /* [-] 1 for a sole; 0: carries nothing */
-    int state;      /* before the step, of bodies_state */
-    int label;      /* that it stands on */
-    Real down;      /* [-] of a surface: downward part of its normal */
-    int faces_down; /* bool: of a surface; 1 for a sole */
-    int listed;     /* bool: may touch in this step */
+    Real area_share; /* [-] 1 for a sole; 0: carries nothing */
+    int state;       /* before the step, of bodies_state */
+    int label;       /* that it stands on */
+    Real down;       /* [-] of a shell: downward part of its normal */
+    int faces_down;  /* bool: of a shell; 1 for a sole */
+    int listed;      /* bool: may touch in this step */
     ElementMemory before;
     Element element; /* with its share of the load */
-    Share carried;   /* that share, on ground with LAW_HEAP */
+    Share share;     /* that share, on ground with LAW_HEAP */
     int curves;
 } BodiesElement;
 
@@ -346,7 +346,7 @@ MILD_HD void bodies_scale(Element *e, Real share) {
     e->b_drift *= share;
 }
 
-/* The share of an element of a surface, and its law times that: faces_laws and faces_unload. A
+/* The area share of an element of a shell, and its law times that: shell_laws and shell_unload. A
  * buried element begins without force; under elastic ground it has none. */
 MILD_HD void bodies_share(const BodiesSetup *setup, const BodiesWork *work, int i, int s, int state,
                           const ContactMaterial *material, BodiesElement *own) {
@@ -356,9 +356,10 @@ MILD_HD void bodies_share(const BodiesSetup *setup, const BodiesWork *work, int 
     const Real m0 = own->depth - setup->dt / 2 * bodies_velocity(own, work->velocity[i]).descent;
     const int buried = state == BODIES_BURIED && m0 > 0;
     const Real lasting = 1 - e->recovery;
-    own->share = state > 0 ? memory->element[BODIES_SHARE * memory->next + s] : own->share;
+    own->area_share =
+        state > 0 ? memory->element[BODIES_AREA_SHARE * memory->next + s] : own->area_share;
     if (!(lasting > 0) && (buried || (state == BODIES_FREE && own->before.middle > 0))) {
-        own->share = 0;
+        own->area_share = 0;
     }
     if (lasting > 0 && buried) {
         const Real least = real_max(m0 / lasting, m0 + ELEMENT_ELASTIC);
@@ -367,15 +368,15 @@ MILD_HD void bodies_share(const BodiesSetup *setup, const BodiesWork *work, int 
     const int directed = (material->curves & LAW_RESIST) && material->law.flat_stiffness == 0 &&
                          material->law.power_force == 0;
     const Real whole = sole->face[4 * sole->elements + s];
-    bodies_scale(e, directed && own->share > 0 ? whole : own->share);
+    bodies_scale(e, directed && own->area_share > 0 ? whole : own->area_share);
 }
 
-/* The merged cone of element s, on ground with LAW_HEAP; sole_heap. */
+/* The heap of element s, on ground with LAW_HEAP; sole_heap. */
 MILD_HD void bodies_merge(const BodiesSole *sole, int s, const ContactMaterial *material,
                           Element *e) {
     if (material->projects > 0) {
-        e->law = sole->face ? law_merged(e->law, LAW_HEAP_LEAST, sole->breadth)
-                            : law_merged(e->law, sole->begin[s], sole->width[s]);
+        e->law = sole->face ? law_of_heap(e->law, LAW_HEAP_LEAST, sole->breadth)
+                            : law_of_heap(e->law, sole->begin[s], sole->width[s]);
     }
 }
 
@@ -383,7 +384,7 @@ MILD_HD Real bodies_rim_depth(const BodiesMemory *memory, int s, const BodiesEle
     return rim_depth(own->depth, memory->element[s]);
 }
 
-/* What is left of its load; slots_lean, and faces_lean of a surface. */
+/* What is left of its load; slots_lean, and shell_lean of a shell. */
 MILD_HD Real bodies_lean(const BodiesWork *work, const BodiesSole *sole, int i, int s,
                          const ContactMaterial *material, const BodiesElement *own) {
     const Real *R = work->rotation[i];
@@ -411,17 +412,17 @@ MILD_HD void bodies_carry(const BodiesSetup *setup, const BodiesWork *work, int 
     const Real lean = bodies_lean(work, sole, i, s, material, own);
     const Real worn = memory->worn ? memory->worn[s] : 0;
     const Real elastic = law_elastic_force(&own->element.law, own->curves, own->element.middle);
-    own->carried = contact_share(material, !sole->face, worn);
+    own->share = contact_share(material, !sole->face, worn);
     Real ahead = 0;
     if (sole->face) {
         const ContactVelocity now = bodies_velocity(own, work->velocity[i]);
         Real normal[3];
         bodies_normal(sole, work->rotation[i], s, normal);
-        ahead = share_ahead(&own->element, &own->carried, lean, normal, now.x, now.y, now.descent);
+        ahead = share_ahead(&own->element, &own->share, lean, normal, now.x, now.y, now.descent);
     }
-    element_share(&own->element, &own->before, &own->carried, elastic, setup->dt, 1 / setup->dt,
-                  lean, ahead);
-    element_carry(&own->element, own->carried.carry);
+    element_share(&own->element, &own->before, &own->share, elastic, setup->dt, 1 / setup->dt, lean,
+                  ahead);
+    element_share_virgin(&own->element, own->share.q);
 }
 
 /* contact_direct for a plate of its own. */
@@ -445,7 +446,7 @@ MILD_HD void bodies_direct(const BodiesSole *sole, const Real *R, int s,
     }
     if (own->curves & LAW_SHEAR) {
         const Shear shear = {material->mu, material->cohesion, material->shear_length,
-                             sole->square * own->share};
+                             sole->square * own->area_share};
         element_shear(e, &own->before, &shear, own->curves, dt, 1 / dt);
     }
 }
@@ -496,16 +497,17 @@ MILD_HD void bodies_locate(const BodiesSetup *setup, const BodiesWork *work, int
     own->state = bodies_state(setup, sole, &work->memory[i], s);
     own->slope[0] = own->slope[1] = 0;
     own->label = 0;
-    own->share = 1;
+    own->area_share = 1;
     own->down = 1;
     bodies_point(sole, R, s, own->p);
     if (sole->face) {
         Real normal[3];
         bodies_normal(sole, R, s, normal);
         own->down = -normal[2];
-        own->share = own->down > SHARE_STEEP ? own->down * sole->face[4 * sole->elements + s] : 0;
+        own->area_share =
+            own->down > SHARE_STEEP ? own->down * sole->face[4 * sole->elements + s] : 0;
     }
-    own->faces_down = own->share > 0;
+    own->faces_down = own->area_share > 0;
     if (setup->has_map) {
         bodies_survey(setup, work, i, s, own->state, spot, own);
     } else {
@@ -539,7 +541,7 @@ MILD_HD void bodies_chart(const BodiesMemory *memory, int s, const BodiesElement
     plane[2 * memory->next] = own->slope[1];
 }
 
-/* An element of a surface that does not take part forgets. One that faces up near the ground is
+/* An element of a shell that does not take part forgets. One that faces up near the ground is
  * buried until it comes out; so is one that carries nothing. state: before the step. */
 MILD_HD void bodies_forget(const BodiesMemory *memory, int s, int state, int buried) {
     const ElementMemory none = {0, 0, 0, 0, 0, 0, 0, 0, 0};
@@ -547,7 +549,7 @@ MILD_HD void bodies_forget(const BodiesMemory *memory, int s, int state, int bur
     if (state != after) { /* else there is nothing to forget */
         bodies_record(memory, s, &none, 0);
         memory->element[BODIES_STATE * memory->next + s] = (Real)after;
-        memory->element[BODIES_SHARE * memory->next + s] = 0;
+        memory->element[BODIES_AREA_SHARE * memory->next + s] = 0;
     }
 }
 
@@ -579,7 +581,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         return;
     }
     bodies_recall(setup, work, i, s, &own, curves);
-    if (sole->face && !(own.share > 0)) {
+    if (sole->face && !(own.area_share > 0)) {
         if (advance) {
             bodies_forget(memory, s, own.state, 1);
         }
@@ -594,7 +596,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         element_remember(e, &own.before, dt, 1 / dt, normal, v.x, v.y, v.descent, stays);
     Real worn = 0;
     if (own.curves & LAW_HEAP) {
-        worn = element_wear_alone(e, &own.carried, &own.before, &after, dt, normal, v.x, v.y,
+        worn = element_wear_alone(e, &own.share, &own.before, &after, dt, normal, v.x, v.y,
                                   v.descent, stays);
     }
     if (stays) {
@@ -606,7 +608,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         bodies_record(memory, s, &after, worn);
         if (sole->face) {
             *state = (Real)(stays ? 1 + own.label : uneven ? BODIES_FREE : BODIES_NONE);
-            state[memory->next] = stays ? own.share : 0;
+            state[memory->next] = stays ? own.area_share : 0;
         } else if (setup->has_map) {
             *state = (Real)own.label;
         }
@@ -618,7 +620,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         loads->loaded += 1;
         loads->depth += own.depth;
         loads->force += normal;
-        loads->area += own.share * sole->square;
+        loads->area += own.area_share * sole->square;
         loads->deepest = real_max(loads->deepest, own.depth);
         for (int k = 0; k < 3; k++) {
             loads->p[k] += normal * own.p[k];
@@ -690,16 +692,16 @@ MILD_HD void bodies_report(const BodiesSetup *setup, BodiesWork *work, int i) {
 /* Where the body at place i is, for the next step. */
 MILD_HD void bodies_remember(const BodiesSetup *setup, const BodiesWork *work, int i) {
     const BodiesMemory *memory = &work->memory[i];
-    const int is_surface = setup->sole[work->body[i]].face != NULL;
+    const int is_shell = setup->sole[work->body[i]].face != NULL;
     const int step = memory->step;
-    if (is_surface || setup->has_map) {
+    if (is_shell || setup->has_map) {
         for (int k = 0; k < 3; k++) {
             memory->body[k * step] = work->position[i][k];
         }
         memory->body[3 * step] = work->height;
         memory->body[BODIES_STEPPED * step] = 1;
     }
-    if (is_surface) {
+    if (is_shell) {
         memory->body[BODIES_TOUCHED] = 1;
     }
 }
@@ -731,7 +733,7 @@ TEAM_FN void bodies_finish(const BodiesSetup *setup, BodiesWork *work, int advan
     team_sync();
 }
 
-/* A surface far from the ground forgets the numbers of bodies_memory_numbers. */
+/* A shell far from the ground forgets the numbers of bodies_memory_numbers. */
 WARP_FN void bodies_leave(const BodiesMemory *memory, int numbers) {
     const int touched = memory->body[BODIES_TOUCHED] > 0;
     lanes_sync(); /* all lanes have read it */

@@ -12,7 +12,7 @@
 _Static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
 _Static_assert(BODIES_MAX >= MILD_BATCH_FEET_MAX, "room for all");
 
-/* Arrays of a surface's elements: x, y and those of BodiesSole.face. */
+/* Arrays of a shell's elements: x, y and those of BodiesSole.face. */
 enum { PLACES = 7 };
 
 /* Point of element i. */
@@ -62,7 +62,7 @@ static void set_foot(BodiesSole *to, const MildBatch *batch, const MildSole *sol
 }
 
 /* values: [PLACES elements] to fill. places: where they will be on the device. */
-static void set_surface(BodiesSole *to, const MildSole *sole, float *values, const float *places) {
+static void set_shell(BodiesSole *to, const MildSole *sole, float *values, const float *places) {
     set_sole(to, sole);
     const int n = to->elements;
     const double square = mild_sole_pitch(sole) * mild_sole_pitch(sole);
@@ -81,19 +81,18 @@ static void set_surface(BodiesSole *to, const MildSole *sole, float *values, con
     to->breadth = (float)mild_inside_heap(sole, 0).width;
 }
 
-/* [numbers] of the places of all surfaces. */
-static size_t count_places(const MildSole *const *surface, int surfaces) {
+/* [numbers] of the places of all shells. */
+static size_t count_places(const MildSole *const *shell, int shells) {
     size_t numbers = 0;
-    for (int s = 0; s < surfaces; s++) {
-        numbers += PLACES * (size_t)mild_sole_elements(surface[s]);
+    for (int s = 0; s < shells; s++) {
+        numbers += PLACES * (size_t)mild_sole_elements(shell[s]);
     }
     return numbers;
 }
 
-static MildStatus set_surfaces(BatchBodies *bodies, BodiesSetup *setup, const MildBatch *batch,
-                               const MildSole *const *surface, int surfaces, int worn,
-                               MildError *error) {
-    const size_t numbers = count_places(surface, surfaces);
+static MildStatus set_shells(BatchBodies *bodies, BodiesSetup *setup, const MildBatch *batch,
+                             const MildSole *const *shell, int shells, int worn, MildError *error) {
+    const size_t numbers = count_places(shell, shells);
     float *values = malloc(numbers * sizeof *values);
     bodies->places = device_alloc(batch->device, numbers * sizeof *values, error);
     if (!values || !bodies->places) {
@@ -101,9 +100,9 @@ static MildStatus set_surfaces(BatchBodies *bodies, BodiesSetup *setup, const Mi
         return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
     }
     size_t at = 0;
-    for (int s = 0; s < surfaces; s++) {
+    for (int s = 0; s < shells; s++) {
         BodiesSole *to = &setup->sole[setup->feet + s];
-        set_surface(to, surface[s], values + at, bodies->places + at);
+        set_shell(to, shell[s], values + at, bodies->places + at);
         at += PLACES * (size_t)to->elements;
         to->memory = (int)bodies->numbers;
         bodies->numbers += (size_t)bodies_memory_numbers(to->elements, worn);
@@ -115,26 +114,25 @@ static MildStatus set_surfaces(BatchBodies *bodies, BodiesSetup *setup, const Mi
     return status;
 }
 
-/* Materials of the surfaces, in a setup. */
+/* Materials of the shells, in a setup. */
 static void set_tables(BodiesSetup *setup, const MildBatch *batch, const MaterialNumbers *table) {
-    const int surfaces = setup->bodies - setup->feet;
+    const int shells = setup->bodies - setup->feet;
     for (int b = 0; b < setup->bodies; b++) {
         const MaterialNumbers *own =
             b < setup->feet ? batch->arrays.materials + b : table + (b - setup->feet);
         setup->sole[b].table = (const ContactMaterial *)(const void *)own;
-        setup->sole[b].step = b < setup->feet ? setup->feet : surfaces;
+        setup->sole[b].step = b < setup->feet ? setup->feet : shells;
     }
     setup->materials = batch->shape.materials;
 }
 
 static MildStatus set_all(BatchBodies *bodies, BodiesSetup *setup, const MildBatch *batch,
-                          const MildSole *const *soles, int surfaces, int worn, MildError *error) {
+                          const MildSole *const *soles, int shells, int worn, MildError *error) {
     const size_t robots = (size_t)batch->shape.robots;
     for (int f = 0; f < setup->feet; f++) {
         set_foot(&setup->sole[f], batch, soles[f], f);
     }
-    MildStatus status =
-        set_surfaces(bodies, setup, batch, soles + setup->feet, surfaces, worn, error);
+    MildStatus status = set_shells(bodies, setup, batch, soles + setup->feet, shells, worn, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -149,11 +147,11 @@ static MildStatus set_all(BatchBodies *bodies, BodiesSetup *setup, const MildBat
 }
 
 MildStatus batch_bodies_open(BatchBodies *bodies, const MildBatch *batch,
-                             const MildSole *const *soles, int surfaces, const MildMap *map,
+                             const MildSole *const *soles, int shells, const MildMap *map,
                              const MildMaterial *materials, int count, int worn, MildError *error) {
     const BatchShape *shape = &batch->shape;
     BodiesSetup setup = {.feet = shape->feet,
-                         .bodies = shape->feet + surfaces,
+                         .bodies = shape->feet + shells,
                          .dt = shape->dt,
                          .tolerance = shape->tolerance,
                          .limit = shape->limit,
@@ -166,7 +164,7 @@ MildStatus batch_bodies_open(BatchBodies *bodies, const MildBatch *batch,
         return mild_fail(
             error, MILD_ERROR_RANGE,
             "batch: %d feet and %d bodies with shells; at most %d stand on soft ground",
-            shape->feet, surfaces, BODIES_MAX);
+            shape->feet, shells, BODIES_MAX);
     }
     int elements = 0;
     for (int b = 0; b < setup.bodies; b++) {
@@ -174,20 +172,20 @@ MildStatus batch_bodies_open(BatchBodies *bodies, const MildBatch *batch,
     }
     if (elements > BODIES_ELEMENTS) {
         return mild_fail(error, MILD_ERROR_RANGE,
-                         "batch: the soles of a robot have %d elements, with surfaces at most %d: "
+                         "batch: the soles of a robot have %d elements, with shells at most %d: "
                          "take a larger spacing",
                          elements, BODIES_ELEMENTS);
     }
     double pitch[BODIES_MAX], width[BODIES_MAX];
-    for (int s = 0; s < surfaces; s++) {
+    for (int s = 0; s < shells; s++) {
         pitch[s] = mild_sole_pitch(soles[shape->feet + s]);
         width[s] = mild_sole_width(soles[shape->feet + s]);
     }
     int curves = 0;
     bodies->materials =
-        material_table(batch->device, pitch, width, surfaces, materials, count, &curves, error);
-    bodies->bytes += (size_t)((count + 1) * surfaces) * sizeof *bodies->materials;
-    return bodies->materials ? set_all(bodies, &setup, batch, soles, surfaces, worn, error)
+        material_table(batch->device, pitch, width, shells, materials, count, &curves, error);
+    bodies->bytes += (size_t)((count + 1) * shells) * sizeof *bodies->materials;
+    return bodies->materials ? set_all(bodies, &setup, batch, soles, shells, worn, error)
                              : error->status;
 }
 

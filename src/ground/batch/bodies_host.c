@@ -1,4 +1,4 @@
-/* A step of a batch with surfaces on the CPU, robot after robot. */
+/* A step of a batch with shells on the CPU, robot after robot. */
 #define MILD_REAL_FLOAT
 #include "ground/batch/bodies_robot.h"
 

@@ -1,4 +1,4 @@
-/* What the ground under the surfaces of a batch remembers, from and to mild/ground.h. */
+/* What the ground under the shells of a batch remembers, from and to mild/ground.h. */
 #define MILD_REAL_FLOAT
 #include "ground/batch/bodies_batch.h"
 
@@ -26,7 +26,7 @@ static int32_t material_of(int state) {
 
 /* Planes count from the world's origin in a ground, and from where the body was in a batch; so that
  * the first step finds them the same, the body was at the origin. */
-static void surface_load(const MildGround *ground, int f, const BodiesMemory *to) {
+static void shell_load(const MildGround *ground, int f, const BodiesMemory *to) {
     const Memory of = mild_inside_memory(ground, f);
     const int uneven = ground->uneven[f];
     for (int e = 0; e < ground->elements[f]; e++) {
@@ -38,14 +38,14 @@ static void surface_load(const MildGround *ground, int f, const BodiesMemory *to
         at[(BODIES_PLANE + 1) * to->next] = there ? (float)of.slope_x[e] : 0.0f;
         at[(BODIES_PLANE + 2) * to->next] = there ? (float)of.slope_y[e] : 0.0f;
         at[BODIES_STATE * to->next] = (float)state_of(of.material[e]);
-        at[BODIES_SHARE * to->next] = (float)of.share[e];
+        at[BODIES_AREA_SHARE * to->next] = (float)of.area_share[e];
     }
     to->body[BODIES_STEPPED] = uneven ? 1.0f : 0.0f;
     to->body[BODIES_TOUCHED] = 1.0f;
 }
 
 /* The other way. plane: MildGround.uneven of a ground that the batch has stepped. */
-static void surface_store(const BodiesMemory *from, int plane, MildGround *ground, int f) {
+static void shell_store(const BodiesMemory *from, int plane, MildGround *ground, int f) {
     const Memory of = mild_inside_memory(ground, f);
     const float *last = from->body;
     const int uneven = last[BODIES_STEPPED] > 0.0f ? plane : 0;
@@ -55,7 +55,7 @@ static void surface_store(const BodiesMemory *from, int plane, MildGround *groun
         element_store(at, from->next, &of, e);
         of.worn[e] = (double)from->worn[e];
         of.material[e] = material_of((int)at[BODIES_STATE * from->next]);
-        of.share[e] = (double)at[BODIES_SHARE * from->next];
+        of.area_share[e] = (double)at[BODIES_AREA_SHARE * from->next];
         touched += of.material[e] != MATERIAL_NONE;
         if (uneven && (of.material[e] >= 0 || of.material[e] == MATERIAL_FREE)) {
             of.slope_x[e] = (double)at[(BODIES_PLANE + 1) * from->next];
@@ -68,8 +68,8 @@ static void surface_store(const BodiesMemory *from, int plane, MildGround *groun
     ground->touched[f] = touched;
 }
 
-/* Where surface f begins in the memory of a robot. */
-static BodiesMemory surface_at(const BatchShape *shape, float *memory, int f) {
+/* Where shell f begins in the memory of a robot. */
+static BodiesMemory shell_at(const BatchShape *shape, float *memory, int f) {
     for (int b = shape->feet; b < f; b++) {
         memory += bodies_memory_numbers(shape->elements[b], 1);
     }
@@ -92,8 +92,8 @@ MildStatus batch_bodies_load(MildBatch *batch, int first, int count,
     MildStatus status = memory ? MILD_OK : MILD_ERROR_MEMORY;
     for (int i = 0; i < count && status == MILD_OK; i++) {
         for (int f = shape->feet; f < shape->soles; f++) {
-            const BodiesMemory to = surface_at(shape, memory, f);
-            surface_load(grounds[i], f, &to);
+            const BodiesMemory to = shell_at(shape, memory, f);
+            shell_load(grounds[i], f, &to);
         }
         status = device_copy(batch->device, batch->bodies.memory + (size_t)(first + i) * numbers,
                              memory, numbers * sizeof *memory, error);
@@ -114,8 +114,8 @@ MildStatus batch_bodies_store(const MildBatch *batch, int first, int count,
             device_copy(batch->device, memory, batch->bodies.memory + (size_t)(first + i) * numbers,
                         numbers * sizeof *memory, error);
         for (int f = shape->feet; f < shape->soles && status == MILD_OK; f++) {
-            const BodiesMemory from = surface_at(shape, memory, f);
-            surface_store(&from, has_plane, grounds[i], f);
+            const BodiesMemory from = shell_at(shape, memory, f);
+            shell_store(&from, has_plane, grounds[i], f);
         }
     }
     free(memory);

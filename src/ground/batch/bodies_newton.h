@@ -180,7 +180,7 @@ MILD_HD void bodies_of_round(const BodiesSetup *setup, const BodiesWork *work, i
     const int i = work->place[round];
     const int n = (round - work->first[i]) * LANES + l;
     if (n >= work->listed[i]) {
-        own->share = 0;
+        own->area_share = 0;
         return;
     }
     const MapSpot spot = bodies_spot(setup, work, i);
@@ -197,7 +197,7 @@ TEAM_FN void bodies_keep(const BodiesSetup *setup, const BodiesWork *work, Bodie
         const int round = TEAM_WARP + turn * TEAM_WARPS;
         const int is = round < work->first[work->count];
         EACH_LANE(l) {
-            kept[l].share = 0;
+            kept[l].area_share = 0;
             if (is) {
                 bodies_of_round(setup, work, round, LANE(l), &kept[l], curves);
             }
@@ -223,7 +223,7 @@ TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const Bodi
             part[n][l] = 0;
         }
         if (turn == 0) {
-            if (kept[l].share > 0) {
+            if (kept[l].area_share > 0) {
                 bodies_pass(setup, &kept[l], twist, begins, curves, part, l);
             }
         } else {
@@ -233,7 +233,7 @@ TEAM_FN void bodies_round(const BodiesSetup *setup, BodiesWork *work, const Bodi
             } else {
                 bodies_of_round(setup, work, round, LANE(l), &own, curves);
             }
-            if (own.share > 0) {
+            if (own.area_share > 0) {
                 bodies_pass(setup, &own, twist, begins, curves, part, l);
             }
         }

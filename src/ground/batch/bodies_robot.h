@@ -1,10 +1,10 @@
-/* mild_batch_step where bodies have surfaces: its parts for one robot. Few robots have a surface
+/* mild_batch_step where bodies have shells: its parts for one robot. Few robots have a shell
  * near the ground at a time, so
  *
- *     bodies_find   a warp: which surfaces may touch the ground in this step
- *     contact.inc   where none does: the feet, as without surfaces; it leaves the others alone
- *     bodies_rest   a warp, then: the twists of the surfaces
- *     bodies_solve  a team, where one does: feet and these surfaces at once */
+ *     bodies_find   a warp: which shells may touch the ground in this step
+ *     contact.inc   where none does: the feet, as without shells; it leaves the others alone
+ *     bodies_rest   a warp, then: the twists of the shells
+ *     bodies_solve  a team, where one does: feet and these shells at once */
 #ifndef MILD_BATCH_BODIES_ROBOT_H
 #define MILD_BATCH_BODIES_ROBOT_H
 
@@ -43,7 +43,7 @@ MILD_HD const Real *bodies_map_origin(const BodiesCall *call, long robot) {
     return call->input.map_origin ? call->input.map_origin + 2 * robot : NULL;
 }
 
-/* Bool: surface b may touch the ground in this step, or its pose and motion are no numbers, which
+/* Bool: shell b may touch the ground in this step, or its pose and motion are no numbers, which
  * bodies_step reports. An element is asked for at the twist now and at that without ground. */
 WARP_FN int bodies_is_near(const BodiesCall *call, long robot, int b) {
     const BodiesSetup *setup = call->bodies.setup;
@@ -68,7 +68,7 @@ WARP_FN int bodies_is_near(const BodiesCall *call, long robot, int b) {
             bodies_touch(setup, b, position, R, free, origin, height));
 }
 
-/* Surfaces that are not near forget. */
+/* Shells that are not near forget. */
 WARP_FN void bodies_find(const BodiesCall *call, long robot) {
     const BodiesSetup *setup = call->bodies.setup;
     int near = 0;
@@ -93,7 +93,7 @@ MILD_HD void bodies_no_foot(MildBatchFoot *foot) {
     *foot = none;
 }
 
-/* What contact.inc has not written of a robot without a surface near the ground. */
+/* What contact.inc has not written of a robot without a shell near the ground. */
 WARP_FN void bodies_rest(const BodiesCall *call, long robot) {
     const int feet = call->shape.feet;
     const int soles = call->shape.soles;
@@ -124,7 +124,7 @@ WARP_FN void bodies_rest(const BodiesCall *call, long robot) {
     }
 }
 
-/* Feet, then the surfaces near the ground. */
+/* Feet, then the shells near the ground. */
 TEAM_FN void bodies_gather(const BodiesCall *call, long robot, BodiesWork *work) {
     const BodiesSetup *setup = call->bodies.setup;
     const MildBatchInput *in = &call->input;

@@ -198,7 +198,7 @@ typedef struct {
 } CONTACT_PART ContactPath;
 typedef struct {
     Real unload_stiffness, added_mass, front_speed;
-    Real last; /* yield_speed; where elements have a share alone, its `carry` [-] */
+    Real last; /* yield_speed; where elements have a share alone, its q [-] */
 } CONTACT_PART ContactFront;
 typedef struct {
     Real entry_speed, stop_drag, stop_growth;
@@ -213,12 +213,12 @@ typedef struct {
 } CONTACT_PART ContactSurface;
 typedef struct {
     Real mu, line_stiffness, virgin_depth; /* as its motion so far has made them */
-    Real carry;                            /* [-] of Share */
+    Real share;                            /* [-] q of Share */
 } CONTACT_PART ContactOwnLaw;
 
 /* What an element carries of its load in this step, of Share. */
 typedef struct {
-    Real carry, lean; /* [-] */
+    Real share, lean; /* [-] q and lean of Share */
 } ContactLoad;
 
 /* ---- feet that are in the air ---- */
@@ -290,7 +290,7 @@ MILD_HD Real contact_lean(const Real normal[3], Real x, Real y) {
     return real_min(real_max(along / REAL_SQRT(1 + x * x + y * y), SHARE_LEAN), 1);
 }
 
-/* The share of an element before the step. plane: bool, of a sole; else of a surface, which has no
+/* The share of an element before the step. plane: bool, of a sole; else of a shell, which has no
  * ground at its sides. */
 MILD_HD Share contact_share(const ContactMaterial *material, int plane, Real worn) {
     const Share share = {material->projects,

@@ -142,12 +142,12 @@ static MildStatus check_robots(const BatchShape *shape, int first, int count, Mi
     return MILD_OK;
 }
 
-/* Bool: the soles of a ground are plane and surfaces as those of a batch, with as many elements. */
+/* Bool: the soles of a ground are plane and shells as those of a batch, with as many elements. */
 static int is_of(const BatchShape *shape, const MildGround *ground) {
     int same = ground->feet == shape->soles;
     for (int f = 0; same && f < shape->soles; f++) {
-        const int face = ground->faces >> f & 1;
-        same = ground->elements[f] == shape->elements[f] && face == (f >= shape->feet);
+        const int shell = ground->shells >> f & 1;
+        same = ground->elements[f] == shape->elements[f] && shell == (f >= shape->feet);
     }
     return same;
 }
@@ -227,7 +227,7 @@ static Some some_robots(const MildBatch *batch, int count, MildError *error) {
 /* Copies them to robots first .. first + count - 1, or with `back` from these. */
 static MildStatus copy_robots(const MildBatch *batch, int first, int count, const Some *some,
                               int back, MildError *error) {
-    const BatchArrays at = batch_share(batch, first, count).arrays;
+    const BatchArrays at = batch_slice(batch, first, count).arrays;
     const size_t robots = (size_t)count * sizeof(float);
     const size_t bytes = robots * batch_memory_numbers(&batch->shape);
     const size_t worn = robots * batch_worn_numbers(&batch->shape);

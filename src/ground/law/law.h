@@ -130,7 +130,7 @@ MILD_HD int law_variant(int curves) {
 
 /* The law of an element of a merged sole, from that of a disc. begin, width: [-] as in SoleHeap;
  * begin = 0 leaves a cone. */
-MILD_HD Law law_merged(Law law, Real begin, Real width) {
+MILD_HD Law law_of_heap(Law law, Real begin, Real width) {
     law.cone_begin = law.cone_depth * begin;
     law.cone_depth *= width;
     law.inverse_cone_depth = 1 / law.cone_depth;

@@ -19,7 +19,7 @@ Law law_of(const MildMaterial *material, double pitch, double width);
 /* LawCurve bits of a material whose law is `law`. */
 int curves_of(const MildMaterial *material, const Law *law);
 /* The share of its load that the ground carries (share.h): the material's numbers, under an element
- * as for law_of. width: 0 for a surface. The rest is 0. */
+ * as for law_of. width: 0 for a shell. The rest is 0. */
 Share share_of(const MildMaterial *material, double pitch, double width);
 /* [-] Share of the depth that its virgin ground springs back: the material's, but 0 in resistive
  * force theory, whose unloading line has no other length (plate.h). */

@@ -12,7 +12,7 @@ typedef struct {
     Real x[3];    /* [m/s], [1/s], [1/s] */
     Real y[3];    /* the same */
     Real z[3];    /* the same */
-    Real lift[3]; /* [1/s] along x, y and z, for each metre above the plane: surfaces only */
+    Real lift[3]; /* [1/s] along x, y and z, for each metre above the plane: shells only */
 } Motion;
 
 /* The field of a foot with the twist V (linear, angular). arm: the point (0, 0, z) of the frame's

@@ -134,24 +134,24 @@ PLATE_FN Plate plate_of(const Real *rotation) {
 }
 
 /* Coefficients against the heading and upward, for motion at the horizontal speed `level` and the
- * downward speed `down`. lean: component of the normal along the heading. in_space: bool, use the
- * 3D theory. */
-MILD_HD Alpha plate_alpha(const Plate *plate, int in_space, Real lean, Real level, Real down) {
+ * downward speed `down`. forward: component of the normal along the heading. in_space: bool, use
+ * the 3D theory. */
+MILD_HD Alpha plate_alpha(const Plate *plate, int in_space, Real forward, Real level, Real down) {
     const Real scale = 1 / REAL_SQRT(level * level + down * down);
     const Real c = level * scale;
     const Real s = down * scale;
     if (!in_space) {
-        const Real slope = lean * (-1 / plate->normal[2]);
+        const Real slope = forward * (-1 / plate->normal[2]);
         const Real whole = 1 / (1 + slope * slope);
         return plane_alpha((1 - slope * slope) * whole, 2 * slope * whole, c, s);
     }
-    const Real z = lean * c - plate->normal[2] * s;
+    const Real z = forward * c - plate->normal[2] * s;
     const Real faces = z < 0 ? 0 : 1 / RESIST_LEVEL;
     const Real f1 = cubic(plate->f[0], s, z);
     const Real f2 = cubic(plate->f[1], s, z);
     const Real f3 = cubic(plate->f[2], s, z);
     Alpha alpha;
-    alpha.x = -faces * (f1 * lean + f2 * c);
+    alpha.x = -faces * (f1 * forward + f2 * c);
     alpha.z = faces * (f1 * plate->normal[2] - f2 * s - f3);
     return alpha;
 }
@@ -186,9 +186,9 @@ MILD_HD void element_yield(Element *e, const ElementMemory *memory, Real dt, Rea
 
 /* The motion of a plate, as plate_alpha takes it. */
 typedef struct {
-    Real lean;  /* [-] component of the normal along the heading */
-    Real level; /* [m/s] horizontal speed; 0 where friction may still hold it */
-    Real down;  /* [m/s] downward speed */
+    Real forward; /* [-] component of the normal along the heading */
+    Real level;   /* [m/s] horizontal speed; 0 where friction may still hold it */
+    Real down;    /* [m/s] downward speed */
 } PlateMotion;
 
 /* vx and vy: velocity along the world's axes. descent: downward. */
@@ -201,7 +201,7 @@ MILD_HD PlateMotion plate_motion(const Plate *plate, Real vx, Real vy, Real desc
     const Real scale = 1 / (REAL_SQRT(hx * hx + hy * hy) + ELEMENT_TINY);
     const Real moves = REAL_SQRT(vx * vx + vy * vy);
     PlateMotion motion;
-    motion.lean = (plate->normal[0] * hx + plate->normal[1] * hy) * scale;
+    motion.forward = (plate->normal[0] * hx + plate->normal[1] * hy) * scale;
     motion.level = moves * FRICTION_LAG < 1 ? 0 : moves;
     motion.down = real_max(descent, 0);
     return motion;
@@ -213,8 +213,8 @@ MILD_HD void element_resist(Element *e, const ElementMemory *memory, const Plate
                             int in_space, int curves, Real dt, Real rate, Real strength, Real vx,
                             Real vy, Real descent) {
     const PlateMotion m = plate_motion(plate, vx, vy, descent);
-    const Alpha sinking = plate_alpha(plate, in_space, m.lean, m.level, m.down + RESIST_REST);
-    const Alpha sliding = plate_alpha(plate, in_space, m.lean, m.level + RESIST_REST, m.down);
+    const Alpha sinking = plate_alpha(plate, in_space, m.forward, m.level, m.down + RESIST_REST);
+    const Alpha sliding = plate_alpha(plate, in_space, m.forward, m.level + RESIST_REST, m.down);
     element_yield(e, memory, dt, rate, strength, sliding.x, sinking.z, curves);
 }
 

@@ -7,7 +7,7 @@
  *     p = kappa d + (k0 - kappa) T e          once the cone is complete; T = tan(alpha)/nu
  * Below a plane sole d is the depth u of the element, and this is its law. A rounded body is deeper
  * inside than at its rim, and ground there bears no more for it than under a plate whose heap is
- * just complete, u = T e. So an element of a surface carries the share
+ * just complete, u = T e. So an element of a shell carries the share
  *
  *     c = (kappa max(d, T e) + (k0 - kappa) T e)/(kappa u + (k0 - kappa) P(u)),  at most 1
  * of its load (share.h). The rim is found from moments of the elements in the ground, weighted by
@@ -34,7 +34,7 @@
 #include "ground/law/share.h"
 
 #define RIM_STEEP REAL(0.5)      /* [-] least cosine of an element that is no wall */
-#define RIM_FLAT REAL(2e-4)      /* [m] H of a surface that counts as half round */
+#define RIM_FLAT REAL(2e-4)      /* [m] H of a shell that counts as half round */
 #define RIM_HAIR REAL(2e-5)      /* [m] rounds off the root of H^2, which is a difference */
 #define RIM_RIDGE REAL(1e-4)     /* [-] of an element's own moment: a row has no slope across */
 #define RIM_MEAN REAL(5.0 / 9.0) /* [-] v/H where e is b/3, the mean under a disc */

@@ -23,7 +23,7 @@
  * Summed over a sole that is W u^2/2 of it times its length by its width, near the mean over all
  * directions of its width (SHARE_PASSIVE).
  *
- * A surface has walls of its own. A face presses along its normal n; the law has the vertical part
+ * A shell has walls of its own. A face presses along its normal n; the law has the vertical part
  * of that, F. Where the face moves into the ground the horizontal part of it resists, too:
  *
  *     H <= mu F + F (n_x v_x + n_y v_y)/(-n_z (|v| + w))     mu F alone where it moves out
@@ -70,7 +70,7 @@ typedef struct {
     Real mu;          /* [-] of the material */
     Real worn;        /* [-] memory: 1 - q */
     Real lean;        /* [-] c */
-    Real carry;       /* [-] q */
+    Real q;           /* [-] the share of this step */
 } Share;
 
 /* [-] c where the cosine between sole and ground is `level`. */
@@ -133,14 +133,14 @@ MILD_HD ShareLoad element_share_still(Element *e, Share *share, Real dt, Real ra
     const Real sides = share->side * e->depth * real_max(e->depth, 0) + ahead;
     const ShareLoad load = {force, q < 1 || mu != e->mu || sides > 0};
     share->lean = c;
-    share->carry = q;
+    share->q = q;
     e->drift_bound += dt * sides;
     e->zero_depth = q < 1 ? a - real_over(force, k + ELEMENT_TINY) : e->zero_depth;
     e->mu = mu;
     return load;
 }
 
-/* Sets lean and carry, and with them the unloading line and friction, after element_begin: the
+/* Sets lean and q, and with them the unloading line and friction, after element_begin: the
  * line says the whole force at the yield depth. elastic: [N] force of ground without memory. level:
  * cosine between sole and ground. ahead: [N] share_ahead of a face, 0 of a sole. */
 MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, Real elastic,
@@ -155,17 +155,17 @@ MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share
 
 /* Virgin ground as the element feels it. Called wherever an element with LAW_HEAP is loaded for
  * the law of a step. */
-MILD_HD void element_carry(Element *e, Real carry) {
-    e->law.flat_stiffness *= carry;
-    e->law.line_stiffness *= carry;
-    e->law.power_force *= carry;
+MILD_HD void element_share_virgin(Element *e, Real q) {
+    e->law.flat_stiffness *= q;
+    e->law.line_stiffness *= q;
+    e->law.power_force *= q;
 }
 
 /* Bool: the ground at the yield depth is plastic, so that the share may grow. */
 MILD_HD int share_grows(const Element *e, const Share *share) {
     const Real travel = e->yield_depth - e->zero_depth;
     return e->recovery * e->yield_depth <= ELEMENT_ELASTIC &&
-           travel >= share->carry * (ELEMENT_ELASTIC * (1 - SHARE_ROUND));
+           travel >= share->q * (ELEMENT_ELASTIC * (1 - SHARE_ROUND));
 }
 
 /* exp(-x) within 1e-14, 0 <= x <= SHARE_FORGET, and 1 at 0. The series of real_exp2, of which each
@@ -201,7 +201,7 @@ MILD_HD Real share_growth(const Element *e, const Share *share) {
 
 /* [-] What slip leaves of the share in a step. slid: [m] horizontal path. */
 MILD_HD Real share_slipped(const Element *e, const Share *share, Real slid) {
-    const Real q = share->carry;
+    const Real q = share->q;
     const Real whole = share->lean * share_growth(e, share);
     return q * real_over(whole, whole + q * slid * share->slip_rate);
 }
@@ -250,16 +250,16 @@ MILD_HD int share_slips(const Share *share, Real slid) {
 }
 
 /* Bool: fresh penetration may raise the share in a step, also what slip takes from it then. Where
- * it does not, share_after is share_slipped, and where slip does not lower it either, `carry`. */
+ * it does not, share_after is share_slipped, and where slip does not lower it either, q. */
 MILD_HD int share_regains(const Share *share, Real slid, Real fresh) {
-    return (fresh > 0) & ((share->carry < share->lean) | share_slips(share, slid));
+    return (fresh > 0) & ((share->q < share->lean) | share_slips(share, slid));
 }
 
 /* Moves the greatest depth ahead by what the share grows. Returns the wear to remember. */
 MILD_HD Real element_wear(const Element *e, const Share *share, ElementMemory *after, Real slid,
                           Real fresh, int stays) {
     const Real q = share_after(e, share, slid, fresh);
-    const Real lead = real_max(q - share->carry, 0) * ELEMENT_ELASTIC;
+    const Real lead = real_max(q - share->q, 0) * ELEMENT_ELASTIC;
     /* The added mass grows with the lead; it keeps its momentum. P is concave. */
     after->front_speed *= real_over(after->depth_max, after->depth_max + lead + ELEMENT_TINY);
     after->depth_max = stays ? after->depth_max + lead : 0;
@@ -275,7 +275,7 @@ MILD_HD Real element_wear_alone(const Element *e, const Share *share, const Elem
     if (stays && (share_slips(share, slid) || share_regains(share, slid, fresh))) {
         return element_wear(e, share, after, slid, fresh, stays);
     }
-    return stays ? 1 - share->carry : 0;
+    return stays ? 1 - share->q : 0;
 }
 
 #endif

@@ -45,7 +45,7 @@ MildElementLaw mild_sole_law(const MildMaterial *material, const MildSole *sole,
     MildElementLaw sum = {0};
     for (int i = 0; i < (merged ? elements : 1); i++) {
         const SoleHeap heap = merged ? sole_heap(sole, i) : (SoleHeap){0.0, 1.0};
-        const Law own = merged ? law_merged(law, heap.begin, heap.width) : law;
+        const Law own = merged ? law_of_heap(law, heap.begin, heap.width) : law;
         const MildElementLaw one = law_at(&own, depth);
         law_add(&sum, merged ? 1.0 : elements, &one);
     }
@@ -130,9 +130,8 @@ MildStatus mild_model_match(MildModel model, const MildMaterial *from, const Mil
         return MILD_OK;
     }
     if (mild_sole_surface_z(sole)) {
-        return mild_fail(
-            error, MILD_ERROR_ARGUMENT,
-            "sole: a model is matched under a sole of mild_sole_create, not a surface");
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "sole: a model is matched under a sole of mild_sole_create, not a shell");
     }
     const ModelRow *row = model_row((int)model);
     const double cells = mild_sole_elements(sole);

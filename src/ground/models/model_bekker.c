@@ -106,7 +106,7 @@ static __attribute__((noinline)) void shear_lanes(const FootScratch *foot,
                         : slot_mu(terrain, mixture);
         to->cohesion[l] = material->cohesion;
         to->length[l] = material->shear_length;
-        to->area[l] = foot->faces ? s->share[l] * area : area;
+        to->area[l] = foot->shell ? s->area_share[l] * area : area;
     }
 }
 

@@ -32,19 +32,19 @@ MILD_HD void slot_resist(Slots *s, int i, double dt, double rate, const Plate *p
 }
 
 /* One text of both theories, in place of four inlined. */
-static __attribute__((noinline)) Alpha some_alpha(const Plate *plate, int in_space, double lean,
+static __attribute__((noinline)) Alpha some_alpha(const Plate *plate, int in_space, double forward,
                                                   double level, double down) {
-    return plate_alpha(plate, in_space, lean, level, down);
+    return plate_alpha(plate, in_space, forward, level, down);
 }
 
 /* The same of any slot. */
 static void some_resist(Slots *s, int i, double dt, const Plate *plate, const Motion *motion,
                         int in_space, int curves) {
-    const SlotVelocity v = slot_velocity(s, i, motion, SLOT_UNEVEN | SLOT_FACES);
+    const SlotVelocity v = slot_velocity(s, i, motion, SLOT_UNEVEN | SLOT_SHELL);
     const ElementMemory memory = slot_memory(s, i);
     const PlateMotion m = plate_motion(plate, v.x, v.y, v.descent);
-    const Alpha sinking = some_alpha(plate, in_space, m.lean, m.level, m.down + RESIST_REST);
-    const Alpha sliding = some_alpha(plate, in_space, m.lean, m.level + RESIST_REST, m.down);
+    const Alpha sinking = some_alpha(plate, in_space, m.forward, m.level, m.down + RESIST_REST);
+    const Alpha sliding = some_alpha(plate, in_space, m.forward, m.level + RESIST_REST, m.down);
     Element element = slot_element(s, i);
     element_yield(&element, &memory, dt, 1.0 / dt, s->strength[i], sliding.x, sinking.z, curves);
     s->line_stiffness[i] = element.law.line_stiffness;
@@ -74,7 +74,7 @@ static int terrain_only(const MildTerrain *terrain, int model) {
     return only;
 }
 
-/* The face of an element of a surface. */
+/* The face of an element of a shell. */
 static Plate face_plate(const FootScratch *foot, int e) {
     Real normal[3];
     for (int k = 0; k < 3; k++) {
@@ -97,7 +97,7 @@ static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain
             continue; /* blended with another curve: stays a level plate */
         }
         Plate own = *plate;
-        if (foot->faces) {
+        if (foot->shell) {
             own = face_plate(foot, foot->element[i]);
         }
         some_resist(s, l, dt, &own, now, in_space, foot->curves);
@@ -112,7 +112,7 @@ static __attribute__((noinline)) void foot_resist(const FootScratch *foot,
     const Real turn[9] = {
         [2] = (Real)rotation[2], [5] = (Real)rotation[5], [8] = (Real)rotation[8]};
     const Plate plate = plate_of(turn);
-    if (!terrain_only(terrain, model) || foot->faces) {
+    if (!terrain_only(terrain, model) || foot->shell) {
         foot_resist_some(foot, terrain, model, dt, &plate, now, in_space);
     } else if (in_space) {
         slots_resist(foot, dt, &plate, now, 1);

@@ -71,15 +71,15 @@ typedef struct {
     int inside;       /* bool: [ground] was read */
     Value preset;
     Value value[KEYS_MAX]; /* in the order of mild_material_fields */
-} Reader;
+} SoilReader;
 
-_Static_assert(sizeof(Reader) < 1 << 16, "it lies on the stack");
+_Static_assert(sizeof(SoilReader) < 1 << 16, "it lies on the stack");
 
-static MildStatus line_fail(const Reader *r, int line, MildError *error, const char *what) {
+static MildStatus line_fail(const SoilReader *r, int line, MildError *error, const char *what) {
     return mild_fail(error, MILD_ERROR_FORMAT, "%.*s:%d: %s", NAME_SHOWN, r->name, line, what);
 }
 
-static MildStatus section_read(Reader *r, const char *code, MildError *error) {
+static MildStatus section_read(SoilReader *r, const char *code, MildError *error) {
     char what[LINE_MAX + 80];
     if (strcmp(code, "[ground]") != 0) {
         snprintf(what, sizeof what, "'%.60s': a soil has the section [ground] alone", code);
@@ -90,7 +90,7 @@ static MildStatus section_read(Reader *r, const char *code, MildError *error) {
 }
 
 /* Where the value of a key goes; NULL and a message for a key that is none. */
-static Value *key_find(Reader *r, const char *key, MildError *error) {
+static Value *key_find(SoilReader *r, const char *key, MildError *error) {
     char what[200];
     const char *nearest = NULL;
     if (strcmp(key, "preset") == 0) {
@@ -107,7 +107,7 @@ static Value *key_find(Reader *r, const char *key, MildError *error) {
     return NULL;
 }
 
-static MildStatus key_read(Reader *r, char *code, MildError *error) {
+static MildStatus key_read(SoilReader *r, char *code, MildError *error) {
     char what[200];
     char *equals = strpbrk(code, "=:");
     if (!equals) {
@@ -135,7 +135,7 @@ static MildStatus key_read(Reader *r, char *code, MildError *error) {
     return MILD_OK;
 }
 
-static MildStatus line_read(Reader *r, const char *line, size_t length, MildError *error) {
+static MildStatus line_read(SoilReader *r, const char *line, size_t length, MildError *error) {
     char code[LINE_MAX];
     if (length >= sizeof code) {
         return line_fail(r, r->line, error, "a line longer than 399 characters; shorten it");
@@ -149,7 +149,7 @@ static MildStatus line_read(Reader *r, const char *line, size_t length, MildErro
 }
 
 /* A value into a material. */
-static MildStatus value_apply(const Reader *r, const MildField *field, MildMaterial *material,
+static MildStatus value_apply(const SoilReader *r, const MildField *field, MildMaterial *material,
                               MildError *error) {
     const Value *value = &r->value[field - mild_material_fields];
     MildError cause = {0};
@@ -161,7 +161,7 @@ static MildStatus value_apply(const Reader *r, const MildField *field, MildMater
 }
 
 /* What the file starts from: the preset, or the default of the library, and the model. */
-static MildStatus base_find(const Reader *r, MildMaterial *material, MildError *error) {
+static MildStatus base_find(const SoilReader *r, MildMaterial *material, MildError *error) {
     char what[400];
     const MildField *model =
         mild_field_find(mild_material_fields, mild_material_field_count, "model", NULL);
@@ -189,7 +189,7 @@ static int is_needed(const MildMaterial *material, const MildField *field) {
            *(const double *)((const char *)&usual + field->offset) != 0;
 }
 
-static MildStatus keys_apply(const Reader *r, MildMaterial *material, MildError *error) {
+static MildStatus keys_apply(const SoilReader *r, MildMaterial *material, MildError *error) {
     char what[200];
     for (int i = 0; i < mild_material_field_count; i++) {
         const MildField *field = &mild_material_fields[i];
@@ -216,7 +216,7 @@ static MildStatus keys_apply(const Reader *r, MildMaterial *material, MildError 
 
 MildStatus soil_parse(const char *text, const char *name, MildMaterial *material,
                       MildError *error) {
-    Reader reader = {.name = name};
+    SoilReader reader = {.name = name};
     MildMaterial read;
     MildError cause = {0};
     MildStatus status = MILD_OK;

@@ -1,4 +1,4 @@
-/* Elements of a surface while it is being made (sole_surface.c, sole_mesh.c). */
+/* Elements of a shell while it is being made (sole_surface.c, sole_mesh.c). */
 #ifndef MILD_GROUND_SAMPLES_H
 #define MILD_GROUND_SAMPLES_H
 

@@ -343,7 +343,7 @@ static MildSole *sole_from_cells(const MildSoleDef *def, const Outline *outline,
         return NULL;
     }
     sole->elements = count;
-    sole->faces = 0;
+    sole->shell = 0;
     sole->pitch = def->pitch;
     sole->width = fmin(outline->high[0] - outline->low[0], outline->high[1] - outline->low[1]);
     sole->z = def->sole_z;
@@ -415,9 +415,9 @@ MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
 }
 
 MildSole *mild_sole_concentric(const MildSole *sole, MildError *error) {
-    if (sole->faces) {
+    if (sole->shell) {
         mild_fail(error, MILD_ERROR_ARGUMENT,
-                  "sole: a surface has no middle; a concentric model needs mild_sole_create");
+                  "sole: a shell has no middle; a concentric model needs mild_sole_create");
         return NULL;
     }
     MildSole *one = malloc(sizeof *one + SOLE_PLANE_ARRAYS * sizeof(double));
@@ -472,7 +472,7 @@ double mild_sole_z(const MildSole *sole) {
 SoleHeap sole_heap(const MildSole *sole, int element) {
     const int n = sole->elements;
     const double radius = MATERIAL_PITCH / sqrt(3.14159265358979323846);
-    if (sole->faces) {
+    if (sole->shell) {
         return (SoleHeap){LAW_HEAP_LEAST, fmax(0.5 * sole->width / radius, 1.0)};
     }
     const double edge = sole->values[SOLE_EDGE * n + element] / radius;
@@ -485,5 +485,5 @@ SoleHeap sole_heap(const MildSole *sole, int element) {
 }
 
 const double *mild_sole_edge(const MildSole *sole) {
-    return sole->faces ? NULL : sole->values + (size_t)SOLE_EDGE * (size_t)sole->elements;
+    return sole->shell ? NULL : sole->values + (size_t)SOLE_EDGE * (size_t)sole->elements;
 }

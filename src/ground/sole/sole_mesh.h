@@ -1,4 +1,4 @@
-/* Meshes as parts of a surface. */
+/* Meshes as parts of a shell. */
 #ifndef MILD_GROUND_SOLE_MESH_H
 #define MILD_GROUND_SOLE_MESH_H
 

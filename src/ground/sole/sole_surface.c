@@ -1,4 +1,4 @@
-/* Surfaces: elements that cover the shapes of a body (docs/model.md, "Surfaces"). */
+/* Shells: elements that cover the shapes of a body (docs/model.md, section 20). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -268,7 +268,7 @@ static MildSole *sole_of(const Samples *samples, double pitch) {
     if (!sole) {
         return NULL;
     }
-    *sole = (MildSole){.elements = n, .faces = 1, .pitch = pitch, .width = samples_width(samples)};
+    *sole = (MildSole){.elements = n, .shell = 1, .pitch = pitch, .width = samples_width(samples)};
     for (int i = 0; i < n; i++) {
         const Sample *sample = &samples->list[i];
         for (int k = 0; k < 3; k++) {
@@ -306,7 +306,7 @@ MildSole *mild_sole_surface(const MildSurfaceDef *def, MildError *error) {
 }
 
 static const double *surface_array(const MildSole *sole, int array) {
-    return sole->faces ? sole->values + (size_t)array * (size_t)sole->elements : NULL;
+    return sole->shell ? sole->values + (size_t)array * (size_t)sole->elements : NULL;
 }
 
 const double *mild_sole_surface_z(const MildSole *sole) {

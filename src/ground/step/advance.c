@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "ground/law/remember.h"
-#include "ground/step/faces.h"
 #include "ground/step/moments.h"
 #include "ground/step/scratch.h"
+#include "ground/step/shell.h"
 
 /* The elements of a foot in one step. */
 typedef struct {
@@ -172,8 +172,8 @@ static __attribute__((noinline)) void block_wear(const Slots *s, const Memory *t
 
 /* Stores what the elements of some blocks remember, from number e of `memory` on. Adds to the lanes
  * of `count` 1 for each element that stays in the ground, and 1 for each of these that reversed. On
- * level ground the slopes are 0, and without faces the heights. wears: bool constant, shares wear.
- */
+ * level ground the slopes are 0, and without a shell the heights. wears: bool constant, shares
+ * wear. */
 MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *end,
                             const Memory *memory, int e, int wears, Lanes count[2]) {
     const Memory to = *memory; /* copies keep the addresses in registers */
@@ -186,7 +186,7 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
         Real changes = 0; /* 1 for each that slips, or more than all of these if it regains */
 #pragma omp simd reduction(+ : changes)
         for (int i = 0; i < SLOT_LANES; i++) {
-            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
+            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_SHELL);
             const Element element = slot_element(s, i);
             const ElementMemory before = slot_memory(s, i);
             const int stays = slot_stays(s, i, s->depth[i] + dt / 2 * v.descent, prints);
@@ -201,7 +201,7 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                 const Real most =
                     share_regains(&share, slid[i], fresh[i]) ? SLOT_LANES + REAL(1) : slips;
                 changes += stays ? most : 0;
-                to.worn[e + i] = stays ? 1 - share.carry : 0;
+                to.worn[e + i] = stays ? 1 - share.q : 0;
             }
             to.depth_max[e + i] = after.depth_max;
             to.middle[e + i] = after.middle;
@@ -254,12 +254,12 @@ static int foot_advance_all(const Advance *a, const Memory *memory, const int32_
     return foot->uneven ? foot->elements : (int)sums[0];
 }
 
-/* An element of a surface that is not listed forgets. One that faces up near the ground is buried
+/* An element of a shell that is not listed forgets. One that faces up near the ground is buried
  * until it comes out. If it was loaded it leaves an imprint. Returns whether it remembers that it
  * was here. */
 static int face_unlisted(const Advance *a, const Memory *memory, int e) {
     const FootScratch *foot = a->foot;
-    const int buried = !foot->away && !(foot->share[e] > 0.0) && foot->depth[e] > foot->least;
+    const int buried = !foot->away && !(foot->area_share[e] > 0.0) && foot->depth[e] > foot->least;
     const int32_t material = memory->material[e];
     const int index = material & 0xff;
     if (buried && a->imprints && material >= 0 && index < a->terrain->material_count &&
@@ -267,7 +267,7 @@ static int face_unlisted(const Advance *a, const Memory *memory, int e) {
         const ImprintElement left = {foot->point_x[e], foot->point_y[e], foot->pitch, a->rotation};
         imprints_press(a->imprints, &left, memory->depth_max[e]);
     }
-    memory->share[e] = 0.0;
+    memory->area_share[e] = 0.0;
     memory_forget(memory, e, buried ? MATERIAL_BURIED : MATERIAL_NONE);
     return buried;
 }
@@ -277,7 +277,7 @@ static __attribute__((noinline)) int foot_unlisted(const Advance *a, const Memor
                                                    int end) {
     int touched = 0;
     for (; next < end; next++) {
-        if (a->foot->faces) {
+        if (a->foot->shell) {
             touched += face_unlisted(a, memory, next);
         } else {
             memory_forget(memory, next, MATERIAL_NONE);
@@ -301,11 +301,11 @@ static void memory_take(const Memory *memory, int e, double after[ADVANCE_NUMBER
     memory->worn[e] = wears ? after[9][i] : memory->worn[e];
 }
 
-/* The general case: some elements are listed, the ground keeps imprints, or the foot is a surface.
+/* The general case: some elements are listed, the ground keeps imprints, or the foot is a shell.
  * Returns how many elements remember something. */
 static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
     const FootScratch *foot = a->foot;
-    const int faces = foot->faces;
+    const int shell = foot->shell;
     const int32_t lifted_material = a->imprints || foot->uneven ? MATERIAL_FREE : MATERIAL_NONE;
     double after[ADVANCE_NUMBERS][SLOT_LANES]; /* of a block */
     Lanes stays[2];
@@ -331,13 +331,13 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         }
         touched += foot_unlisted(a, memory, next, e);
         next = e + 1;
-        if (faces && !(s->share[i] > 0.0)) { /* it carries nothing until it has come out */
-            memory->share[e] = 0.0;
+        if (shell && !(s->area_share[i] > 0.0)) { /* it carries nothing until it has come out */
+            memory->area_share[e] = 0.0;
             memory_forget(memory, e, MATERIAL_BURIED);
             touched++;
             continue;
         }
-        const SlotVelocity v = slot_velocity(s, i, &a->motion, SLOT_UNEVEN | faces);
+        const SlotVelocity v = slot_velocity(s, i, &a->motion, SLOT_UNEVEN | shell);
         const double middle = s->depth[i] + a->dt / 2 * v.descent;
         const int lifted = !(stays[0][i] > 0.0);
         const int carried = memory->material[e] >= 0;
@@ -348,8 +348,8 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         const int barred = (material[slot] & SLOT_BARRED) != 0;
         memory->material[e] = lifted || barred ? lifted_material : material[slot];
         memory->front_speed[e] = barred ? 0.0 : memory->front_speed[e]; /* it carries nothing */
-        if (faces) {
-            memory->share[e] = lifted ? 0.0 : s->share[i];
+        if (shell) {
+            memory->area_share[e] = lifted ? 0.0 : s->area_share[i];
         }
         if (a->imprints && (carried || !lifted)) {
             const double refill = foot->derived[material[slot] & 0xff].material.refill;
@@ -385,17 +385,17 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
     for (int f = 0; f < ground->feet; f++) {
         const FootScratch *foot = &scratch->foot[f];
         ground->uneven[f] = foot_uneven(foot, ground->uneven[f]);
-        if (ground->touched[f] == 0 && foot->active == 0 && (!foot->faces || foot->away)) {
+        if (ground->touched[f] == 0 && foot->active == 0 && (!foot->shell || foot->away)) {
             continue;
         }
         const Memory memory = ground_memory(ground, f);
         const Advance advance = {.foot = foot,
                                  .imprints = ground->tiles > 0 ? &imprints : NULL,
-                                 .rotation = foot->faces ? faces_level : input->rotation[f],
+                                 .rotation = foot->shell ? shell_level : input->rotation[f],
                                  .motion = foot_motion(foot, result->velocity + 6 * f),
                                  .dt = input->dt,
                                  .terrain = terrain};
-        const int all = slots_are_whole(foot) && ground->tiles == 0 && !foot->faces;
+        const int all = slots_are_whole(foot) && ground->tiles == 0 && !foot->shell;
         if (all) {
             ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material);
         } else {

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "ground/step/faces_lean.h"
+#include "ground/step/shell_lean.h"
 
 /* This loop is not in vectors, for which a power is long: few feet stand on ground without memory
  * beside other ground. */
@@ -48,7 +48,7 @@ MILD_HD void slot_carry(Slots *s, int i, Real dt, Real rate) {
     s->mu[i] = element.mu;
     s->drift_bound[i] = element.drift_bound;
     s->lean[i] = share.lean;
-    s->carry[i] = share.carry;
+    s->share[i] = share.q;
     s->zero_depth[i] = element.zero_depth;
     s->hold_x[i] = element.hold_x;
     s->hold_y[i] = element.hold_y;
@@ -57,8 +57,8 @@ MILD_HD void slot_carry(Slots *s, int i, Real dt, Real rate) {
 
 void foot_carry(const FootScratch *foot, const Motion *now, double dt) {
     slots_elastic(foot);
-    if (foot->faces) {
-        faces_lean(foot, now);
+    if (foot->shell) {
+        shell_lean(foot, now);
     } else {
         slots_lean(foot);
         soles_lean(foot);

@@ -13,12 +13,12 @@ typedef struct {
     int count; /* that both terrains have */
 } Change;
 
-/* [-] By what the law of an element is scaled: see faces_laws. */
+/* [-] By what the law of an element is scaled: see shell_laws. */
 static double law_scale(const FootScratch *foot, const Memory *memory, int e, int directed) {
-    if (!foot->faces) {
+    if (!foot->shell) {
         return 1.0;
     }
-    return directed ? foot->area[e] : memory->share[e];
+    return directed ? foot->area[e] : memory->area_share[e];
 }
 
 static int is_directed(const DerivedLaw *derived, int32_t mixture) {

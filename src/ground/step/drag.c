@@ -6,7 +6,7 @@ void slots_drag_any(const FootScratch *foot, double dt, const Motion *now, const
         foot->curves | LAW_CONE | LAW_HEAP; /* no branches for these; a power is long */
     for (int i = 0; i < foot->active; i++) {
         slot_drag(slot_block(foot, i), i % SLOT_LANES, dt, now, free, curves,
-                  SLOT_UNEVEN | SLOT_FACES);
+                  SLOT_UNEVEN | SLOT_SHELL);
     }
 }
 
@@ -24,7 +24,7 @@ int slots_explicit(const FootScratch *foot, int materials, double dt, const Moti
         }
         const Element element = slot_loaded(s, l, LAW_ANY);
         s->explicit_impulse[l] = element_explicit(
-            &element, LAW_ANY, dt, slot_velocity(s, l, free, SLOT_UNEVEN | foot->faces).descent);
+            &element, LAW_ANY, dt, slot_velocity(s, l, free, SLOT_UNEVEN | foot->shell).descent);
     }
     return any;
 }

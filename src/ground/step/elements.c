@@ -15,7 +15,7 @@ static void foot_scatter(const MildScratch *scratch, int f) {
         const int i = slot % SLOT_LANES;
         const int e = foot->element[slot];
         const Element element = slot_loaded(s, i, foot->curves);
-        const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
+        const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_SHELL);
         const double beyond = element.depth + dt / 2 * v.descent - element.yield_depth;
         const int loaded = s->iz[i] > 0.0;
         const int deeper = beyond > 0.0;

@@ -66,7 +66,7 @@ static double foot_caused(const FootScratch *foot, const Motion *change) {
             const double iz = s->iz[i];
             const double ix = s->ix[i] + s->slope_x[i] * iz;
             const double iy = s->iy[i] + s->slope_y[i] * iz;
-            const SlotVelocity at = slot_velocity(s, i, &v, SLOT_FACES);
+            const SlotVelocity at = slot_velocity(s, i, &v, SLOT_SHELL);
             lanes[i] += ix * at.x + iy * at.y;
         }
     }
@@ -95,7 +95,7 @@ static double friction_caused(const MildScratch *scratch, const MildContactInput
             twist[i] = result->velocity[6 * f + i] - input->free_velocity[6 * f + i];
         }
         const Motion change = foot_motion(foot, twist);
-        const int sums = !foot->uneven && !foot->faces && input->solver == MILD_SOLVER_NEWTON;
+        const int sums = !foot->uneven && !foot->shell && input->solver == MILD_SOLVER_NEWTON;
         sum += sums ? level_caused(scratch->sums[f], &change) : foot_caused(foot, &change);
     }
     return sum;
@@ -126,8 +126,8 @@ static __attribute__((cold)) double foot_gift(const FootScratch *foot, const Mot
     for (int i = 0; i < foot->active; i++) {
         const Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;
-        const SlotVelocity u = slot_velocity(s, l, before, SLOT_FACES);
-        const SlotVelocity v = slot_velocity(s, l, after, SLOT_FACES);
+        const SlotVelocity u = slot_velocity(s, l, before, SLOT_SHELL);
+        const SlotVelocity v = slot_velocity(s, l, after, SLOT_SHELL);
         sum += fmax(slot_gift(s, l, &u, &v), 0.0);
     }
     return sum;
@@ -139,8 +139,8 @@ static __attribute__((cold)) void foot_turn(FootScratch *foot, const Motion *bef
     for (int i = 0; i < foot->active; i++) {
         Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;
-        const SlotVelocity u = slot_velocity(s, l, before, SLOT_FACES);
-        const SlotVelocity v = slot_velocity(s, l, after, SLOT_FACES);
+        const SlotVelocity u = slot_velocity(s, l, before, SLOT_SHELL);
+        const SlotVelocity v = slot_velocity(s, l, after, SLOT_SHELL);
         if (!all && !(slot_gift(s, l, &u, &v) > 0.0)) {
             continue;
         }

@@ -52,7 +52,7 @@ void slots_gather(const FootScratch *foot, const Memory *memory) {
 static int slot_is_out(const Slots *s, int l, int32_t before, const Motion *now) {
     return s->depth[l] <= 0.0 &&
            (before != GROUND_LOWERED ||
-            slot_velocity(s, l, now, SLOT_UNEVEN | SLOT_FACES).descent >= 0.0);
+            slot_velocity(s, l, now, SLOT_UNEVEN | SLOT_SHELL).descent >= 0.0);
 }
 
 void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory, double height,

@@ -33,7 +33,7 @@ void literal_drift(const MildScratch *scratch, const MildContactInput *input) {
         for (int slot = 0; slot < foot->active; slot++) {
             Slots *s = slot_block(foot, slot);
             const int i = slot % SLOT_LANES;
-            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
+            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_SHELL);
             const double speed = sqrt(v.x * v.x + v.y * v.y);
             const double drag = s->drift_bound[i] + s->damping[i] * speed;
             s->ix[i] -= speed > 0.0 ? drag * v.x / speed : 0.0;

@@ -25,7 +25,7 @@ static int share_is_nan(const Share *share) {
 static __attribute__((cold)) void law_derive(const FootScratch *foot, const MildMaterial *material,
                                              DerivedLaw *derived) {
     const Law law = law_of(material, foot->pitch, foot->width);
-    const Share share = share_of(material, foot->pitch, foot->faces ? 0.0 : foot->width);
+    const Share share = share_of(material, foot->pitch, foot->shell ? 0.0 : foot->width);
     const MildMaterial own = material_at(material, foot->pitch);
     const int slips = share.slip_rate > 0.0;
     *derived =
@@ -71,7 +71,7 @@ static void slot_set_law(Slots *s, int i, const SlotLaw *from) {
     s->side[i] = share->side;
     s->whole_mu[i] = share->mu;
     s->ahead[i] = 0.0;
-    s->carry[i] = 1.0;
+    s->share[i] = 1.0;
     s->exit_drag[i] = law_exit_drag(&from->law);
     s->entry_drag[i] = law_entry_drag(&from->law);
     s->strength[i] = from->law.line_stiffness;
@@ -89,7 +89,7 @@ static double between(double a, double b, double share) {
 static SlotLaw slot_law(const FootScratch *foot, const DerivedLaw *derived, int e) {
     SlotLaw own = derived->slot;
     if (own.share.projects > 0.0) {
-        own.law = law_merged(own.law, foot->heap[e].begin, foot->heap[e].width);
+        own.law = law_of_heap(own.law, foot->heap[e].begin, foot->heap[e].width);
     }
     return own;
 }

@@ -7,8 +7,8 @@
 
 #include "ground/law/friction.h"
 #include "ground/law/impulse.h"
-#include "ground/step/faces_hessian.h"
 #include "ground/step/moments.h"
+#include "ground/step/shell_hessian.h"
 
 MILD_HD void slot_normal(Slots *s, int i, Real dt, const Motion *motion, int kind, int curves,
                          int stops) {
@@ -36,7 +36,7 @@ MILD_HD void foot_normal(const FootScratch *foot, Real dt, const Motion *m, int 
 /* The way of a slot's element over which the law has a power of the depth. */
 MILD_HD void slot_way(const Slots *s, int i, Real dt, const Motion *motion, int curve, Real *begin,
                       Real *way) {
-    const SlotVelocity v = slot_velocity(s, i, motion, SLOT_UNEVEN | SLOT_FACES);
+    const SlotVelocity v = slot_velocity(s, i, motion, SLOT_UNEVEN | SLOT_SHELL);
     const Real middle = s->depth[i] + dt / 2 * v.descent;
     const Real from = real_max(s->middle[i], 0);
     *begin = curve == LAW_POWER ? s->virgin_depth[i] : from;
@@ -72,7 +72,7 @@ static __attribute__((noinline)) void foot_powers(const FootScratch *foot, Real 
         for (int i = 0; i < SLOT_LANES; i++) {
             const PowerOver grows = {grown[0][i], grown[1][i], grown[2][i]};
             const Real force =
-                curve == LAW_POWER ? s->power_force[i] * s->carry[i] : s->elastic_force[i];
+                curve == LAW_POWER ? s->power_force[i] * s->share[i] : s->elastic_force[i];
             const PowerWay over = power_way_of(force, exponent[i], begin[i], way[i], &grows);
             power[0][i] = over.mean;
             power[1][i] = over.slope;
@@ -102,7 +102,7 @@ static void foot_normals(const FootScratch *foot, Real dt, const Motion *motion)
         return;
     case LAW_POWER: foot_normal(foot, dt, motion, 1, LAW_POWER, 0); return;
     case LAW_ELASTIC: foot_normal(foot, dt, motion, 1, LAW_ELASTIC, 0); return;
-    default: foot_normal(foot, dt, motion, SLOT_UNEVEN | SLOT_FACES, LAW_ANY, 1); return;
+    default: foot_normal(foot, dt, motion, SLOT_UNEVEN | SLOT_SHELL, LAW_ANY, 1); return;
     }
 }
 
@@ -116,7 +116,7 @@ static void foot_normals(const FootScratch *foot, Real dt, const Motion *motion)
  *
  *     h = -dI/dv = f + k c g^T
  *
- * kind: SLOT_UNEVEN, SLOT_FACES. held: bool, the friction bounds are Slots.bound. turned: bool,
+ * kind: SLOT_UNEVEN, SLOT_SHELL. held: bool, the friction bounds are Slots.bound. turned: bool,
  * some elements have a reversal velocity in Slots.turn_x and turn_y (energy.c). */
 MILD_HD void block_friction(Slots *s, const Motion *motion, int kind, int held, int turned) {
 #pragma omp simd
@@ -168,7 +168,7 @@ MILD_HD void foot_friction(const FootScratch *foot, const Motion *m, int kind, i
     }
 }
 
-/* Sums over the foot of I, x I, y I and, for a surface, height I. */
+/* Sums over the foot of I, x I, y I and, for a shell, height I. */
 static void foot_sums(const FootScratch *foot, double sums[12]) {
     LaneVector all[12] = {{0.0}};
     for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
@@ -184,7 +184,7 @@ static void foot_sums(const FootScratch *foot, double sums[12]) {
         all[7] += y * iy;
         all[8] += y * iz;
     }
-    for (const Slots *s = foot->slot, *end = slots_end(foot); foot->faces && s < end; s++) {
+    for (const Slots *s = foot->slot, *end = slots_end(foot); foot->shell && s < end; s++) {
         const LaneVector z = lanes_load(s->z);
         all[9] += z * lanes_load(s->ix);
         all[10] += z * lanes_load(s->iy);
@@ -201,10 +201,10 @@ static __attribute__((noinline)) void cross_add(const double *p, const double *I
 }
 
 /* Picks the loop compiled for the ground under the foot. Reversals and held bounds are seldom: one
- * loop does for both, and for surfaces. */
+ * loop does for both, and for shells. */
 static void foot_frictions(const FootScratch *foot, const Motion *motion, int held) {
-    if (held || foot->turned || foot->faces) {
-        foot_friction(foot, motion, SLOT_UNEVEN | SLOT_FACES, held, 1);
+    if (held || foot->turned || foot->shell) {
+        foot_friction(foot, motion, SLOT_UNEVEN | SLOT_SHELL, held, 1);
     } else if (foot->uneven) {
         foot_friction(foot, motion, 1, 0, 0);
     } else {
@@ -233,7 +233,7 @@ static void pass(MildScratch *scratch, double dt, const double *twist, int held)
         for (int i = 0; i < 3; i++) {
             cross_add(foot->arm[i], sums + 3 * i, wrench + 3);
         }
-        if (foot->faces) {
+        if (foot->shell) {
             cross_add(foot->arm[3], sums + 9, wrench + 3);
         }
     }
@@ -315,8 +315,8 @@ void contact_hessian(MildScratch *scratch) {
     for (int k = 0; k < scratch->listed; k++) {
         const int f = scratch->list[k];
         const FootScratch *foot = &scratch->foot[f];
-        if (foot->faces) {
-            faces_hessian(foot, scratch->hessian[f]);
+        if (foot->shell) {
+            shell_hessian(foot, scratch->hessian[f]);
             continue;
         }
         Moments sums;

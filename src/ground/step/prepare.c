@@ -6,10 +6,10 @@
 #include "ground/law/models.h"
 #include "ground/step/carry.h"
 #include "ground/step/drag.h"
-#include "ground/step/faces.h"
 #include "ground/step/gather.h"
 #include "ground/step/locate.h"
 #include "ground/step/mixture.h"
+#include "ground/step/shell.h"
 #include "ground/terrain/terrain.h"
 
 MILD_HD void slot_begin(Slots *s, int i, Real dt, Real rate, const Motion *motion, int curves,
@@ -26,13 +26,13 @@ MILD_HD void slot_begin(Slots *s, int i, Real dt, Real rate, const Motion *motio
 
 /* Calls element_begin for all slots. On level ground the slopes are 0. */
 MILD_HD void slots_begin(const FootScratch *foot, Real dt, const Motion *now, int curves,
-                         int faces) {
+                         int shell) {
     const Motion motion = *now;
     const Real rate = 1 / dt;
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
-            slot_begin(s, i, dt, rate, &motion, curves, SLOT_UNEVEN | faces);
+            slot_begin(s, i, dt, rate, &motion, curves, SLOT_UNEVEN | shell);
         }
     }
 }
@@ -47,7 +47,7 @@ static void foot_begin(const FootScratch *foot, Real dt, const Motion *now) {
     case LAW_CONE | LAW_HEAP: slots_begin(foot, dt, now, LAW_CONE | LAW_HEAP, 0); return;
     case LAW_POWER: slots_begin(foot, dt, now, LAW_POWER, 0); return;
     case LAW_ELASTIC: slots_begin(foot, dt, now, LAW_ELASTIC, 0); return;
-    default: slots_begin(foot, dt, now, LAW_ANY, SLOT_FACES); return;
+    default: slots_begin(foot, dt, now, LAW_ANY, SLOT_SHELL); return;
     }
 }
 
@@ -71,7 +71,7 @@ static int slots_sink(const FootScratch *foot, Real dt) {
 }
 
 /* Calls element_drag for all slots. The loop for cones and heaps, which have drag, is in vectors;
- * that for surfaces and ground with a power beside them is not. */
+ * that for shells and ground with a power beside them is not. */
 static void slots_drag(const FootScratch *foot, Real dt, const Motion *now, const Motion *free) {
     const Motion before = *now;
     const Motion after = *free;
@@ -132,8 +132,8 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     const double *R = input->rotation[f];
     const Motion now = foot_motion(foot, input->velocity[f]);
     foot_laws(foot, terrain);
-    if (foot->faces) {
-        faces_slots(foot, ground, f, terrain, &memory, &now, input->dt);
+    if (foot->shell) {
+        shell_slots(foot, ground, f, terrain, &memory, &now, input->dt);
     } else {
         foot_slots(foot, ground, f, terrain, &memory, R, &now);
     }
@@ -196,8 +196,8 @@ int contact_prepare(const MildGround *ground, const MildTerrain *terrain,
         if (scratch->place[f] < 0) {
             foot->away = 1;
             foot->active = 0;
-        } else if (foot->faces) {
-            faces_list(foot, terrain, input, steepest, f);
+        } else if (foot->shell) {
+            shell_list(foot, terrain, input, steepest, f);
         } else {
             foot_locate(foot, terrain, ground->tiles > 0);
             foot_list(foot, input, steepest, f);

@@ -8,12 +8,12 @@
  * point_y, point_z, normal, tangent_x, tangent_y and flat; state and slip share the next; heap has
  * two. */
 #define FOOT_ARRAYS 15
-#define FACES_ARRAYS 6 /* more of a surface: height, face[3], area and share */
+#define SHELL_ARRAYS 6 /* more of a shell: height, face[3], area and area_share */
 
 /* Numbers of a foot in the block. */
 static size_t foot_doubles(const MildSole *sole) {
     return (size_t)sole_padded(sole) *
-           (SLOT_NUMBERS + FOOT_ARRAYS + (sole->faces ? FACES_ARRAYS : 0));
+           (SLOT_NUMBERS + FOOT_ARRAYS + (sole->shell ? SHELL_ARRAYS : 0));
 }
 
 /* Takes the next `count` numbers of the block. */
@@ -58,15 +58,15 @@ static void foot_set(FootScratch *foot, const MildSole *sole, double **at) {
     }
 }
 
-/* Takes and fills the arrays of a surface. */
+/* Takes and fills the arrays of a shell. */
 static void foot_set_faces(FootScratch *foot, const MildSole *sole, double **at) {
-    if (!sole->faces) {
+    if (!sole->shell) {
         return;
     }
-    foot->faces = SLOT_FACES;
+    foot->shell = SLOT_SHELL;
     foot->height = take(at, foot->padded);
     foot->area = take(at, foot->padded);
-    foot->share = take(at, foot->padded);
+    foot->area_share = take(at, foot->padded);
     for (int k = 0; k < 3; k++) {
         foot->face[k] = take(at, foot->padded);
         memcpy(foot->face[k], mild_sole_surface_normal(sole, k),
@@ -84,7 +84,7 @@ static void foot_set_bounds(FootScratch *foot) {
     double high[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (int i = 0; i < foot->elements; i++) {
         const double p[3] = {foot->x[i], foot->y[i],
-                             foot->z + (foot->faces ? foot->height[i] : 0.0)};
+                             foot->z + (foot->shell ? foot->height[i] : 0.0)};
         for (int k = 0; k < 3; k++) {
             low[k] = fmin(low[k], p[k]);
             high[k] = fmax(high[k], p[k]);
@@ -111,7 +111,7 @@ static void foot_set_slots(FootScratch *foot, double **at, int32_t *integers) {
 }
 
 int scratch_fits(const MildScratch *scratch, const MildGround *ground) {
-    int fits = scratch->feet == ground->feet && scratch->faces == ground->faces;
+    int fits = scratch->feet == ground->feet && scratch->shells == ground->shells;
     for (int f = 0; f < ground->feet; f++) {
         fits = fits && scratch->foot[f].elements == ground->elements[f];
     }
@@ -153,7 +153,7 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
         foot_set(foot, soles[f], &at);
         foot_set_faces(foot, soles[f], &at);
         foot_set_bounds(foot);
-        scratch->faces |= soles[f]->faces << f;
+        scratch->shells |= soles[f]->shell << f;
         foot_set_slots(foot, &at, integers);
         integers += 3 * SLOTS_PADDED(foot->padded);
     }
@@ -188,7 +188,7 @@ void foot_points(const FootScratch *foot) {
         foot->point_y[i] = oy + ey * x[i] + ny * y[i];
         foot->point_z[i] = oz + ez * x[i] + nz * y[i];
     }
-    for (int i = 0; foot->faces && i < foot->padded; i++) {
+    for (int i = 0; foot->shell && i < foot->padded; i++) {
         foot->point_x[i] += foot->arm[3][0] * foot->height[i];
         foot->point_y[i] += foot->arm[3][1] * foot->height[i];
         foot->point_z[i] += foot->arm[3][2] * foot->height[i];

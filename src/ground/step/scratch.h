@@ -40,25 +40,25 @@ typedef struct FootScratch {
     double center_x; /* [m] centroid in the foot frame */
     double center_y; /* [m] */
     double radius;   /* [m] distance from the ankle to the farthest element */
-    SoleHeap *heap;  /* [elements] merged cones */
+    SoleHeap *heap;  /* [elements] */
 
     double middle[3]; /* [m] of the bounding box, foot frame */
     double half[3];   /* [m] half of its sides */
 
-    /* A surface (faces.c): mild_scratch_create. NULL and 0 for a plane sole. */
-    int faces;       /* SLOT_FACES, or 0: all elements lie at z and face down */
-    double *height;  /* [padded] [m] above z, in the foot frame */
-    double *face[3]; /* [padded] [-] outward normal, foot frame */
-    double *area;    /* [padded] [-] area over pitch^2 */
-    double *share;   /* [padded] [-] projected area over pitch^2; 0: faces up. faces_locate */
-    double least;    /* [m] elements deeper than this may touch: foot_list */
+    /* A shell (shell.c): mild_scratch_create. NULL and 0 for a plane sole. */
+    int shell;          /* SLOT_SHELL, or 0: all elements lie at z and face down */
+    double *height;     /* [padded] [m] above z, in the foot frame */
+    double *face[3];    /* [padded] [-] outward normal, foot frame */
+    double *area;       /* [padded] [-] area over pitch^2 */
+    double *area_share; /* [padded] [-] projected area over pitch^2; 0: faces up. shell_locate */
+    double least;       /* [m] elements deeper than this may touch: foot_list */
 
     /* Pose: foot_locate. The vector from the ankle to an element is p = arm[0] + x arm[1] + y
      * arm[2] + height arm[3]. */
     double origin[3]; /* [m] the ankle, world */
-    double arm[4][3]; /* world: the frame's point (0, 0, z) [m], its axes [-], z for a surface */
+    double arm[4][3]; /* world: the frame's point (0, 0, z) [m], its axes [-], z for a shell */
     int uneven;       /* bool: the terrain is not level; otherwise all slopes are 0 */
-    int away;         /* bool: no element can touch; depth and share are not set */
+    int away;         /* bool: no element can touch; depth and area_share are not set */
     double reach;     /* [m] upper bound on the depths: foot_reach */
     double *depth;    /* [padded] [m] */
     double *slope_x;  /* [padded] [-] gradient of the ground; uneven ground only */
@@ -79,7 +79,7 @@ typedef struct FootScratch {
     int stops;  /* bool: stop_drag, stop_growth or explicit_impulse may be nonzero */
     int32_t
         *slot_material;   /* [SLOTS_PADDED] material whose law the slot has, encoded as in Memory */
-    int32_t *slot_holder; /* [SLOTS_PADDED] element whose law it has, for merged cones */
+    int32_t *slot_holder; /* [SLOTS_PADDED] element whose law it has, for heaps */
     DerivedLaw derived[MILD_MATERIALS_MAX];
     Slots *slot; /* [SLOTS_PADDED(padded)/SLOT_LANES] blocks */
 
@@ -94,7 +94,7 @@ typedef struct FootScratch {
 
 struct MildScratch {
     int feet;
-    int32_t faces; /* bit f: foot f is a surface */
+    int32_t shells; /* bit f: foot f is a shell */
     /* Feet in the step's equations: contact_prepare. */
     int given;                      /* feet that input.inverse_inertia has rows of */
     int place[MILD_FEET_MAX];       /* index of a foot among these; -1: none */
@@ -151,10 +151,10 @@ static inline Slots *slot_block(const FootScratch *foot, int i) {
     return foot->slot + i / SLOT_LANES;
 }
 
-/* The curves of the compiled loop for a foot. The loop of all curves is also that of surfaces: it
+/* The curves of the compiled loop for a foot. The loop of all curves is also that of shells: it
  * counts with the heights of the elements, which are 0 in a plane sole. */
 static inline int foot_variant(const FootScratch *foot) {
-    return foot->faces ? LAW_ANY : law_variant(foot->curves);
+    return foot->shell ? LAW_ANY : law_variant(foot->curves);
 }
 
 /* The velocity field of a foot with the twist V. */
@@ -173,7 +173,7 @@ static inline Motion foot_moves(const FootScratch *foot, const double *V) {
 #else
     Motion motion = motion_of(foot->arm, V);
 #endif
-    if (foot->faces) {
+    if (foot->shell) {
         const double *q = foot->arm[3];
         const double x = V[5] * q[1], y = V[3] * q[2]; /* first: pass.c fuses these products */
         motion.lift[0] = V[4] * q[2] - x;

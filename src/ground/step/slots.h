@@ -34,9 +34,9 @@ typedef struct {
     Lanes y;     /* [m] */
     Lanes depth; /* [m] */
 
-    /* Of a surface: faces_gather, faces_laws. Otherwise 0. */
-    Lanes z;     /* [m] above the plane of the foot */
-    Lanes share; /* [-] projected area over pitch^2; 0: carries nothing */
+    /* Of a shell: shell_gather, shell_laws. Otherwise 0. */
+    Lanes z;          /* [m] above the plane of the foot */
+    Lanes area_share; /* [-] projected area over pitch^2; 0: carries nothing */
 
     /* Gradient of the ground under it: slots_uneven; 0 where the foot is not `uneven`. */
     Lanes slope_x; /* [-] */
@@ -75,12 +75,12 @@ typedef struct {
     Lanes side;        /* [N/m^2] */
     Lanes whole_mu;    /* [-] Share.mu, of which `mu` is what is left in this step */
 
-    /* Of a surface on ground with LAW_HEAP: faces_lean. Otherwise 0. */
+    /* Of a shell on ground with LAW_HEAP: shell_lean. Otherwise 0. */
     Lanes ahead; /* [N] share_ahead */
 
-    /* Share of this step: foot_carry; without LAW_HEAP carry is 1. */
+    /* Share of this step: foot_carry; without LAW_HEAP share is 1. */
     Lanes lean;  /* [-] */
-    Lanes carry; /* [-] */
+    Lanes share; /* [-] Share.q */
 
     /* Law of this step: slots_begin, changed by slots_resist. */
     Lanes middle;           /* [m] */
@@ -190,7 +190,7 @@ MILD_HD Share slot_share(const Slots *s, int i) {
         .mu = s->whole_mu[i],
         .worn = s->worn[i],
         .lean = s->lean[i],
-        .carry = s->carry[i],
+        .q = s->share[i],
     };
 }
 
@@ -199,7 +199,7 @@ MILD_HD Element slot_loaded(const Slots *s, int i, int curves) {
     Element element = slot_element(s, i);
     if (curves & LAW_HEAP) {
         element.law.cone_begin = s->cone_begin[i];
-        element_carry(&element, s->carry[i]);
+        element_share_virgin(&element, s->share[i]);
     }
     return element;
 }
@@ -247,7 +247,7 @@ typedef struct {
 /* What a loop over slots has to count with. */
 enum {
     SLOT_UNEVEN = 1, /* the ground slopes */
-    SLOT_FACES = 2,  /* the elements do not lie in a plane */
+    SLOT_SHELL = 2,  /* the elements do not lie in a plane */
 };
 
 /* kind: the bits above. It must be a constant in a loop over slots. */
@@ -256,7 +256,7 @@ MILD_HD SlotVelocity slot_velocity(const Slots *s, int i, const Motion *motion, 
     v.x = motion_at(motion->x, s->x[i], s->y[i]);
     v.y = motion_at(motion->y, s->x[i], s->y[i]);
     v.descent = -motion_at(motion->z, s->x[i], s->y[i]);
-    if (kind & SLOT_FACES) {
+    if (kind & SLOT_SHELL) {
         v.x += motion->lift[0] * s->z[i];
         v.y += motion->lift[1] * s->z[i];
         v.descent -= motion->lift[2] * s->z[i];

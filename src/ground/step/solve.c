@@ -4,9 +4,9 @@
 
 #include "ground/law/friction.h"
 #include "ground/step/energy.h"
-#include "ground/step/faces.h"
 #include "ground/step/moments.h"
 #include "ground/step/prepare.h"
+#include "ground/step/shell.h"
 #include "ground/step/solver.h"
 
 const char *const mild_solver_names[MILD_SOLVERS] = {"newton", "gauss_seidel", "explicit"};
@@ -45,7 +45,7 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
         return;
     }
     result->depth_mean = sums[0] / loaded;
-    const double z = foot->faces ? faces_loaded(foot, &result->area) : 0.0;
+    const double z = foot->shell ? shell_loaded(foot, &result->area) : 0.0;
     for (int k = 0; k < 3; k++) {
         result->pressure_center[k] =
             position[k] + foot->arm[0][k] +

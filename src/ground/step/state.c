@@ -17,15 +17,15 @@ int sole_padded(const MildSole *sole) {
     return (mild_sole_elements(sole) + VECTOR_LANES - 1) / VECTOR_LANES * VECTOR_LANES;
 }
 
-/* Arrays of numbers of a foot. A surface has one more. faces: MildGround.faces. */
-static size_t foot_doubles(int32_t faces, int foot) {
-    return MEMORY_DOUBLES + (size_t)(faces >> foot & 1);
+/* Arrays of numbers of a foot. A shell has one more. shells: MildGround.shells. */
+static size_t foot_doubles(int32_t shells, int foot) {
+    return MEMORY_DOUBLES + (size_t)(shells >> foot & 1);
 }
 
 static size_t feet_bytes(const MildGround *ground, int feet) {
     size_t bytes = 0;
     for (int f = 0; f < feet; f++) {
-        const size_t element = foot_doubles(ground->faces, f) * sizeof(double) + sizeof(int32_t);
+        const size_t element = foot_doubles(ground->shells, f) * sizeof(double) + sizeof(int32_t);
         bytes += ((size_t)ground->padded[f] * element + 63) / 64 * 64;
     }
     return bytes;
@@ -61,9 +61,9 @@ Memory ground_memory(const MildGround *ground, int foot) {
     for (int k = 0; k < MEMORY_DOUBLES; k++, at += ground->padded[foot]) {
         *arrays[k] = at;
     }
-    memory.share = NULL;
-    if (ground->faces >> foot & 1) {
-        memory.share = at;
+    memory.area_share = NULL;
+    if (ground->shells >> foot & 1) {
+        memory.area_share = at;
         at += ground->padded[foot];
     }
     memory.material = (int32_t *)at;
@@ -82,7 +82,7 @@ MildGround ground_layout(const MildSole *const *soles, int feet, int tiles) {
     for (int f = 0; f < feet; f++) {
         layout.elements[f] = mild_sole_elements(soles[f]);
         layout.padded[f] = sole_padded(soles[f]);
-        layout.faces |= soles[f]->faces << f;
+        layout.shells |= soles[f]->shell << f;
         layout.imprint_cell = fmax(layout.imprint_cell, 0.5 * mild_sole_pitch(soles[f]));
     }
     layout.tiles = imprints_round(tiles, MILD_IMPRINT_TILES_MAX);
@@ -109,7 +109,7 @@ MildGround *mild_ground_init(void *block, const MildSole *const *soles, int feet
 static void foot_forget(MildGround *ground, int foot) {
     Memory memory = ground_memory(ground, foot);
     size_t n = (size_t)ground->padded[foot];
-    memset(memory.depth_max, 0, foot_doubles(ground->faces, foot) * n * sizeof(double));
+    memset(memory.depth_max, 0, foot_doubles(ground->shells, foot) * n * sizeof(double));
     for (size_t i = 0; i < n; i++) {
         memory.material[i] = MATERIAL_NONE;
     }
@@ -149,12 +149,12 @@ double mild_ground_imprint_at(const MildGround *ground, double x, double y) {
     return imprints_depth(&imprints, x, y);
 }
 
-/* Bool: an encoded material that a step can follow. faces: bool, of a surface. */
-static int material_is_valid(int32_t material, int faces) {
+/* Bool: an encoded material that a step can follow. shell: bool, of one. */
+static int material_is_valid(int32_t material, int shell) {
     return material >= 0 ? (material & 0xff) < MILD_MATERIALS_MAX &&
                                (material >> 8 & 0xff) < MILD_MATERIALS_MAX && material >> 24 == 0
                          : material == MATERIAL_NONE || material == MATERIAL_FREE ||
-                               (faces && material == MATERIAL_BURIED);
+                               (shell && material == MATERIAL_BURIED);
 }
 
 /* Bool: the memory of every element of a foot is finite, on materials that exist. */
@@ -162,12 +162,12 @@ static __attribute__((cold)) int foot_is_valid(const MildGround *ground, int foo
     const Memory memory = ground_memory(ground, foot);
     const size_t padded = (size_t)ground->padded[foot];
     int valid = ground->touched[foot] >= 0 && ground->touched[foot] <= ground->padded[foot];
-    for (size_t i = 0; i < foot_doubles(ground->faces, foot) * padded; i++) {
+    for (size_t i = 0; i < foot_doubles(ground->shells, foot) * padded; i++) {
         valid &= isfinite(memory.depth_max[i]) != 0;
     }
     for (size_t i = 0; i < padded; i++) {
-        valid &= material_is_valid(memory.material[i], memory.share != NULL);
-        valid &= !memory.share || memory.share[i] >= 0.0;
+        valid &= material_is_valid(memory.material[i], memory.area_share != NULL);
+        valid &= !memory.area_share || memory.area_share[i] >= 0.0;
         valid &= memory.worn[i] >= 0.0 && memory.worn[i] < 1.0;
     }
     return valid;
@@ -176,7 +176,7 @@ static __attribute__((cold)) int foot_is_valid(const MildGround *ground, int foo
 /* Bool: the headers are those of grounds of the same soles and tiles. */
 static int layouts_agree(const MildGround *a, const MildGround *b) {
     return a->feet == b->feet && memcmp(a->elements, b->elements, sizeof a->elements) == 0 &&
-           memcmp(a->padded, b->padded, sizeof a->padded) == 0 && a->faces == b->faces &&
+           memcmp(a->padded, b->padded, sizeof a->padded) == 0 && a->shells == b->shells &&
            a->tiles == b->tiles && a->imprint_cell == b->imprint_cell;
 }
 

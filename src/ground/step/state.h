@@ -21,7 +21,7 @@ struct MildGround {
     int32_t tiles;                   /* of imprints; 0: the ground forgets at lift-off */
     uint32_t imprint_time;           /* counts the steps that could change an imprint */
     double imprint_cell;             /* [m] edge of a cell */
-    int32_t faces;                   /* bit f: foot f is a surface */
+    int32_t shells;                  /* bit f: foot f is a shell */
     int32_t reserved[9];             /* pads to 320 bytes, so that the arrays behind are aligned */
 };
 
@@ -31,10 +31,9 @@ struct MildGround {
 
 /* What an element stands on: the index of a material, or first | second << 8 | share << 16 for a
  * mixture of two (share 255: all of the second). Negative: the element carries no load. */
-#define MATERIAL_NONE (-1) /* no load, and nothing is remembered of the last step */
-#define MATERIAL_FREE (-2) /* no load, but it was near the ground in the last step */
-#define MATERIAL_BURIED                                                                            \
-    (-3) /* of a surface: faced up near the ground, and found no way out since */
+#define MATERIAL_NONE (-1)   /* no load, and nothing is remembered of the last step */
+#define MATERIAL_FREE (-2)   /* no load, but it was near the ground in the last step */
+#define MATERIAL_BURIED (-3) /* of a shell: faced up near the ground, and found no way out since */
 
 /* Added to the material of a slot: its law has been scaled to nothing, and the element remembers
  * MATERIAL_FREE (slots_imprints). */
@@ -53,11 +52,11 @@ typedef struct {
     double *held_y;         /* [N] */
     double *held_stiffness; /* [N/m] */
     double *worn;           /* [-] Share.worn, share.h */
-    double *plane;     /* [m] uneven ground: the last step had u = plane + slope . (x, y) - z */
-    double *slope_x;   /* [-] gradient of that plane, world axes */
-    double *slope_y;   /* [-] */
-    double *share;     /* [-] of a surface (else NULL): Slots.share at touchdown; 0 without load */
-    int32_t *material; /* the material it touched down on, encoded as above */
+    double *plane;      /* [m] uneven ground: the last step had u = plane + slope . (x, y) - z */
+    double *slope_x;    /* [-] gradient of that plane, world axes */
+    double *slope_y;    /* [-] */
+    double *area_share; /* [-] of a shell (else NULL): the slot's at touchdown; 0 without load */
+    int32_t *material;  /* the material it touched down on, encoded as above */
 } Memory;
 
 /* The memory of a foot. Callers with a const ground must only read through it. */

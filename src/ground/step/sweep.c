@@ -176,7 +176,7 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
             Slots *s = slot_block(foot, slot);
             const int i = slot % SLOT_LANES;
             double p[3];
-            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_FACES);
+            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_SHELL);
             slot_arm(foot, s, i, p);
             s->fx[i] = s->fy[i] = 0.0;
             s->iz[i] = sweep->literal

@@ -18,7 +18,7 @@ typedef struct {
     int time, trial;         /* -1: no such column */
     int wanted;              /* trial */
     double before;           /* [s] time of the row before */
-} Reader;
+} LogReader;
 
 static int find_column(char *const *cells, int count, const char *name) {
     for (int i = 0; i < count; i++) {
@@ -29,7 +29,7 @@ static int find_column(char *const *cells, int count, const char *name) {
     return -1;
 }
 
-static MildStatus read_header(Reader *reader, MildError *error) {
+static MildStatus read_header(LogReader *reader, MildError *error) {
     char *cells[CSV_CELLS_MAX], name[32];
     MildStatus status;
     char *line = csv_line(&reader->text, &status, error);
@@ -54,7 +54,7 @@ static MildStatus read_header(Reader *reader, MildError *error) {
                : mild_fail(error, MILD_ERROR_FORMAT, "%.200s: no column time_s", reader->text.path);
 }
 
-static MildStatus read_number(const Reader *reader, char *const *cells, int count, int place,
+static MildStatus read_number(const LogReader *reader, char *const *cells, int count, int place,
                               double *value, MildError *error) {
     if (place < count && text_double(cells[place], value)) {
         return MILD_OK;
@@ -65,7 +65,8 @@ static MildStatus read_number(const Reader *reader, char *const *cells, int coun
 }
 
 /* Bool in *taken: the row is of the trial. */
-static MildStatus read_row(Reader *reader, char *line, float *frame, int *taken, MildError *error) {
+static MildStatus read_row(LogReader *reader, char *line, float *frame, int *taken,
+                           MildError *error) {
     char *cells[CSV_CELLS_MAX];
     double time = 0.0, value = 0.0, trial = reader->wanted;
     const int count = csv_split(line, cells);
@@ -99,7 +100,7 @@ static MildStatus read_row(Reader *reader, char *line, float *frame, int *taken,
     return status;
 }
 
-static MildStatus read_rows(Reader *reader, BeliefLog *log, MildError *error) {
+static MildStatus read_rows(LogReader *reader, BeliefLog *log, MildError *error) {
     MildStatus status;
     int room = 0, taken;
     for (char *line = csv_line(&reader->text, &status, error); line && status == MILD_OK;
@@ -130,7 +131,7 @@ static MildStatus read_rows(Reader *reader, BeliefLog *log, MildError *error) {
 }
 
 MildStatus belief_log_read(const char *path, int trial, BeliefLog *log, MildError *error) {
-    Reader reader = {.wanted = trial, .before = INFINITY};
+    LogReader reader = {.wanted = trial, .before = INFINITY};
     *log = (BeliefLog){.count = 0};
     FILE *file = file_open(path, error);
     if (!file) {

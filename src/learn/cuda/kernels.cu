@@ -411,13 +411,13 @@ void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *
 
 /* A block's threads in rows: one has column `column`, and from there on every side-th, of rows
  * first, first + lanes .. end - 1. Threads that are left over have no rows. */
-struct Share {
+struct ThreadRows {
     int column, side, first, lanes, end;
 };
 
 /* Of rows begin .. end - 1. */
-static __device__ Share share_of(int columns, int begin, int end) {
-    Share s;
+static __device__ ThreadRows rows_of(int columns, int begin, int end) {
+    ThreadRows s;
     s.side = columns < THREADS ? columns : THREADS;
     s.lanes = THREADS / s.side;
     s.column = (int)threadIdx.x % s.side;
@@ -427,9 +427,9 @@ static __device__ Share share_of(int columns, int begin, int end) {
 }
 
 /* Of a block's ROWS rows. */
-static __device__ Share share_of_rows(int columns, int rows) {
+static __device__ ThreadRows rows_of_block(int columns, int rows) {
     const int begin = (int)blockIdx.x * ROWS;
-    return share_of(columns, begin, begin + ROWS < rows ? begin + ROWS : rows);
+    return rows_of(columns, begin, begin + ROWS < rows ? begin + ROWS : rows);
 }
 
 /* Losses of sample i, from the terms of its actions; adds them to loss, which has the order of the
@@ -458,7 +458,7 @@ static __global__ void surrogate(GpuSurrogate s, int rows, double *sums, float *
         d_log_prob[TILE_MAX], part[THREADS];
     const int slice = (int)blockIdx.x, slices = (int)gridDim.x, thread = (int)threadIdx.x;
     const int end = (int)((int64_t)rows * (slice + 1) / slices);
-    const Share own = share_of(s.pitch, 0, 1);
+    const ThreadRows own = rows_of(s.pitch, 0, 1);
     const int j = own.column, tile = DEEP * own.lanes, stride = own.side + 1;
     const int is_action = own.end && j < s.actions;
     const float inverse = is_action ? s.constant[j] : 0.0f;
@@ -519,7 +519,7 @@ int gpu_surrogate(cudaStream_t stream, GpuSurrogate s, int rows, double *sums, f
 
 /* A sample has at most one image: no two threads write one number. index is a permutation. */
 static __global__ void mirror_loss(GpuMirror m, int images, double *sums) {
-    const Share own = share_of_rows(m.actions, images);
+    const ThreadRows own = rows_of_block(m.actions, images);
     const int j = own.column, k = m.index[j];
     const float sign = m.sign[j];
     float sum = 0.0f;
@@ -541,7 +541,7 @@ reconstruction(GpuWidths w, int rows, float weight, const int *__restrict__ orde
                const float *__restrict__ frame, const float *__restrict__ critic,
                const float *__restrict__ decoded, float *__restrict__ d, double *sums) {
     const int columns = w.decoded_frame + w.ground_count;
-    const Share own = share_of_rows(columns, rows);
+    const ThreadRows own = rows_of_block(columns, rows);
     double loss = 0.0;
     for (int column = own.column; column < columns; column += own.side) {
         const int is_ground = column >= w.decoded_frame,
@@ -635,7 +635,7 @@ static __global__ void __launch_bounds__(THREADS, 5)
     const int feet_end = w.feet_offset + w.feet_count,
               widths[] = {w.feet_offset, w.feet_count, w.estimates - feet_end},
               columns = w.estimates > w.latent ? w.estimates : w.latent;
-    const Share own = share_of_rows(columns, all);
+    const ThreadRows own = rows_of_block(columns, all);
     float squares[3] = {0.0f, 0.0f, 0.0f}, twice = 0.0f;
     for (int j = own.column; j < columns; j += own.side) {
         const int group = (j >= w.feet_offset) + (j >= feet_end);

@@ -49,10 +49,10 @@ typedef struct {
     Envs *envs;         /* one */
     TaskEnv *env;       /* of envs */
     EnvsSample *sample; /* [physics steps] of the last policy step */
-} Walk;
+} BenchWalk;
 
 /* period: the state before the step, and its torques; NULL: not recorded. */
-static MildStatus walk_step(const Walk *walk, ReplayPeriod *period, int *upright,
+static MildStatus walk_step(const BenchWalk *walk, ReplayPeriod *period, int *upright,
                             MildError *error) {
     float action[ROBOT_JOINTS_MAX], reward;
     uint8_t done = 0, timeout, valid;
@@ -85,7 +85,7 @@ MildStatus bench_walker(const Robot *robot, Pool *pool, int envs, TaskDef *task,
                              : status;
 }
 
-static MildStatus walk_open(Walk *walk, const Scene *scene, MildError *error) {
+static MildStatus walk_open(BenchWalk *walk, const Scene *scene, MildError *error) {
     walk->pool = pool_create(1);
     if (!walk->pool) {
         return mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
@@ -113,14 +113,15 @@ static MildStatus walk_open(Walk *walk, const Scene *scene, MildError *error) {
     return walk->sample ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
 }
 
-static void walk_close(Walk *walk) {
+static void walk_close(BenchWalk *walk) {
     controller_destroy(&walk->controller);
     envs_destroy(walk->envs);
     free(walk->sample);
     pool_destroy(walk->pool);
 }
 
-static MildStatus walk_record(Walk *walk, const Scene *scene, Replay *replay, MildError *error) {
+static MildStatus walk_record(BenchWalk *walk, const Scene *scene, Replay *replay,
+                              MildError *error) {
     const int settle = (int)(walk_settle / TASK_PERIOD);
     int upright = 1;
     eval_command(walk->env, walk_speed, 0);
@@ -138,7 +139,7 @@ static MildStatus walk_record(Walk *walk, const Scene *scene, Replay *replay, Mi
 
 Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
                           int model, int periods, MildError *error) {
-    Walk walk = {.def = def->task, .robot = robot};
+    BenchWalk walk = {.def = def->task, .robot = robot};
     Scene scene;
     task_def_make_nominal(&walk.def);
     walk.def.episode = walk_settle + (periods + 1) * TASK_PERIOD;

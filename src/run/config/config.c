@@ -147,16 +147,16 @@ typedef struct {
     int *seen;               /* [keys] line on which the key was set, 0: not yet */
     MildStatus status;
     MildError *error;
-} Reader;
+} ConfigReader;
 
-static const char *reader_where(const Reader *reader, char *where) {
+static const char *reader_where(const ConfigReader *reader, char *where) {
     snprintf(where, WHERE_MAX, "%.140s:%d", reader->name, reader->line);
     return where;
 }
 
 /* Checks the line itself, so that the first mistake is reported: inih accepts empty sections and
  * continues after a syntax error. line: without its comment, ends with a newline. */
-static void reader_check_line(Reader *reader, const char *line) {
+static void reader_check_line(ConfigReader *reader, const char *line) {
     char name[64], where[WHERE_MAX];
     reader_where(reader, where);
     size_t length = strcspn(line, "]\n");
@@ -179,7 +179,7 @@ static void reader_check_line(Reader *reader, const char *line) {
 /* fgets over the text. Drops indentation, because inih would add an indented line to the value
  * before it. */
 static char *reader_line(char *buffer, int size, void *stream) {
-    Reader *reader = stream;
+    ConfigReader *reader = stream;
     if (reader->status != MILD_OK || !*reader->rest) {
         return NULL;
     }
@@ -201,7 +201,7 @@ static char *reader_line(char *buffer, int size, void *stream) {
     return reader->status == MILD_OK ? buffer : NULL;
 }
 
-static int *reader_seen(Reader *reader, const char *section_name, const MildField *field) {
+static int *reader_seen(ConfigReader *reader, const char *section_name, const MildField *field) {
     for (int i = 0; i < reader->count; i++) {
         const ConfigSection *section = &reader->sections[i];
         if (strcmp(section->name, section_name) == 0) {
@@ -212,7 +212,7 @@ static int *reader_seen(Reader *reader, const char *section_name, const MildFiel
 }
 
 static int reader_key(void *user, const char *section, const char *key, const char *value) {
-    Reader *reader = user;
+    ConfigReader *reader = user;
     if (reader->status != MILD_OK) {
         return 0;
     }
@@ -240,7 +240,7 @@ static int reader_key(void *user, const char *section, const char *key, const ch
     return 1;
 }
 
-static MildStatus reader_check_complete(const Reader *reader) {
+static MildStatus reader_check_complete(const ConfigReader *reader) {
     for (int i = 0; i < reader->count; i++) {
         for (int j = 0; j < reader->sections[i].count; j++) {
             if (!reader->seen[reader->first[i] + j]) {
@@ -256,7 +256,7 @@ static MildStatus reader_check_complete(const Reader *reader) {
 
 MildStatus config_read_text(const ConfigSection *sections, int count, const char *text,
                             const char *name, int complete, MildError *error) {
-    Reader reader = {
+    ConfigReader reader = {
         .sections = sections, .count = count, .name = name, .rest = text, .error = error};
     if (strncmp(text, "\xef\xbb\xbf", 3) == 0) {
         reader.rest += 3; /* byte order mark of some editors */

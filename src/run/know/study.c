@@ -17,7 +17,7 @@ static void draw_command(Random *r, double command[3]) {
 }
 
 /* Any command, or several; straight ones for a study at given speeds and over a border. */
-static void draw_commands(const StudyDef *def, int straight, Random *r, Walk *walk) {
+static void draw_commands(const StudyDef *def, int straight, Random *r, WalkRoute *walk) {
     const double share = random_unit(r);
     walk->commands = straight || share < 0.6 ? 1 : 2 + (int)random_index(r, WALK_COMMANDS - 1);
     for (int i = 0; i < walk->commands; i++) {
@@ -129,7 +129,7 @@ MildStatus study_run(const StudyDef *def, StudyWalk *walk, int count, const Stud
     robot_set_model(def->robot, def->model);
     for (int first = 0; first < count && status == MILD_OK; first += STUDY_BATCH) {
         const int batch = count - first < STUDY_BATCH ? count - first : STUDY_BATCH;
-        Walk walks[STUDY_BATCH];
+        WalkRoute walks[STUDY_BATCH];
         int lasted[STUDY_BATCH];
         Numbered numbered = {watcher, first};
         for (int i = 0; i < batch; i++) {

@@ -36,7 +36,7 @@ typedef struct {
     double noise;   /* [-] of that of training */
     int lasted;     /* [policy steps] until a fall or the end */
     double seconds; /* [s] that were asked for */
-    Walk walk;
+    WalkRoute walk;
 } StudyWalk;
 
 /* Who looks at the walks; as WalksDef has it, with the number of the walk in the study. */

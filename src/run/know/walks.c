@@ -39,7 +39,7 @@ static void turn_clock(Walks *w, int i, double period) {
 }
 
 static void direct(Walks *w, int i, int step) {
-    const Walk *walk = &w->def->walk[i];
+    const WalkRoute *walk = &w->def->walk[i];
     const double *asked = walk->command[step * walk->commands / w->steps];
     double *command = w->command + 3 * (size_t)i;
     memcpy(command, asked, 3 * sizeof *command);

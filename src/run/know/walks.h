@@ -17,7 +17,7 @@ typedef struct {
      * is 0 */
     double command[WALK_COMMANDS][3];
     int commands;
-} Walk;
+} WalkRoute;
 
 /* A policy step of a walk that has not fallen. */
 typedef struct {
@@ -41,7 +41,7 @@ typedef struct {
     const Robot *robot;
     Pool *pool;
     Controller *controller;
-    const Walk *walk; /* [count] */
+    const WalkRoute *walk; /* [count] */
     int count;
     double seconds;
     uint64_t seed;

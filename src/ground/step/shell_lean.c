@@ -1,8 +1,8 @@
-#include "ground/step/faces_lean.h"
+#include "ground/step/shell_lean.h"
 
 #include "ground/law/rim.h"
 
-/* A slot of a surface, as the rim sees it. */
+/* A slot of a shell, as the rim sees it. */
 typedef struct {
     double x, y, u; /* [m] its place, world axes, and rim_depth */
     double down;    /* [-] downward part of its outward normal */
@@ -12,7 +12,7 @@ static RimPoint point_of(const FootScratch *foot, int i) {
     const Slots *s = slot_block(foot, i);
     const int e = foot->element[i], l = i % SLOT_LANES;
     return (RimPoint){foot->point_x[e] - foot->origin[0], foot->point_y[e] - foot->origin[1],
-                      rim_depth(s->depth[l], s->depth_max[l]), foot->share[e] / foot->area[e]};
+                      rim_depth(s->depth[l], s->depth_max[l]), foot->area_share[e] / foot->area[e]};
 }
 
 /* [N] share_ahead of slot i, whose law is `element`. down: downward part of its outward normal. */
@@ -20,7 +20,7 @@ static double ahead_of(const FootScratch *foot, int i, const Element *element, c
                        Real down) {
     const Slots *s = slot_block(foot, i);
     const int e = foot->element[i], l = i % SLOT_LANES;
-    const SlotVelocity v = slot_velocity(s, l, now, SLOT_UNEVEN | SLOT_FACES);
+    const SlotVelocity v = slot_velocity(s, l, now, SLOT_UNEVEN | SLOT_SHELL);
     const Share share = slot_share(s, l);
     Real n[3] = {0, 0, -down};
     for (int k = 0; k < 3; k++) {
@@ -60,7 +60,7 @@ void soles_lean(const FootScratch *foot) {
     }
 }
 
-void faces_lean(const FootScratch *foot, const Motion *now) {
+void shell_lean(const FootScratch *foot, const Motion *now) {
     Real sums[RIM_SUMS] = {0};
     for (int i = 0; i < foot->active; i++) {
         const RimPoint at = point_of(foot, i);

@@ -1,4 +1,4 @@
-#include "ground/step/faces.h"
+#include "ground/step/shell.h"
 
 #include "ground/law/models.h"
 #include "ground/step/gather.h"
@@ -6,10 +6,10 @@
 #include "ground/step/mixture.h"
 #include "ground/terrain/terrain.h"
 
-const double faces_level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+const double shell_level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
-/* Depth and share of every element. */
-static void faces_locate(FootScratch *foot, const MildTerrain *terrain) {
+/* Depth and area share of every element. */
+static void shell_locate(FootScratch *foot, const MildTerrain *terrain) {
     const double ez = foot->arm[1][2], nz = foot->arm[2][2], tz = foot->arm[3][2];
     foot_points(foot);
     if (foot->uneven) {
@@ -22,43 +22,44 @@ static void faces_locate(FootScratch *foot, const MildTerrain *terrain) {
     for (int i = 0; i < foot->elements; i++) {
         const double down =
             -(ez * foot->face[0][i] + nz * foot->face[1][i] + tz * foot->face[2][i]);
-        foot->share[i] = down > SHARE_STEEP ? down * foot->area[i] : 0.0;
+        foot->area_share[i] = down > SHARE_STEEP ? down * foot->area[i] : 0.0;
     }
     for (int i = foot->elements; i < foot->padded; i++) {
         foot->depth[i] = PADDING_DEPTH;
     }
 }
 
-void faces_list(FootScratch *foot, const MildTerrain *terrain, const MildContactInput *input,
+void shell_list(FootScratch *foot, const MildTerrain *terrain, const MildContactInput *input,
                 double steepest, int f) {
     foot->active = 0;
     if (foot_is_away(foot, terrain, input, steepest, f)) {
         return;
     }
-    faces_locate(foot, terrain);
+    shell_locate(foot, terrain);
     for (int i = 0; i < foot->elements; i++) {
         foot->element[foot->active] = i;
-        foot->active += foot->share[i] > 0.0 && foot->depth[i] > foot->least;
+        foot->active += foot->area_share[i] > 0.0 && foot->depth[i] > foot->least;
     }
 }
 
-/* Height and share of the slots. A loaded element keeps the share of its touchdown. */
-static void faces_gather(const FootScratch *foot, const Memory *memory) {
+/* Height and area share of the slots. A loaded element keeps that of its touchdown. */
+static void shell_gather(const FootScratch *foot, const Memory *memory) {
     for (int i = 0; i < foot_end(foot); i++) {
         Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;
-        s->z[l] = s->share[l] = 0.0;
+        s->z[l] = s->area_share[l] = 0.0;
         if (i < foot->active) {
             const int e = foot->element[i];
             s->z[l] = foot->height[e];
-            s->share[l] = memory->material[e] >= 0 ? memory->share[e] : foot->share[e];
+            s->area_share[l] =
+                memory->material[e] >= 0 ? memory->area_share[e] : foot->area_share[e];
         }
     }
 }
 
 /* [m] Depth of a slot in the middle of the last step, by its present speed. */
 static double slot_middle(const Slots *s, int i, const Motion *now, double dt) {
-    return s->depth[i] - 0.5 * dt * slot_velocity(s, i, now, SLOT_UNEVEN | SLOT_FACES).descent;
+    return s->depth[i] - 0.5 * dt * slot_velocity(s, i, now, SLOT_UNEVEN | SLOT_SHELL).descent;
 }
 
 /* Bool: the element of a slot, which carried nothing, was below the surface: it faced up there, or
@@ -71,9 +72,9 @@ static int slot_is_under(const FootScratch *foot, int i, const Memory *memory, c
            (memory->material[e] == MATERIAL_FREE && memory->middle[e] > 0.0);
 }
 
-/* Gives each slot the law of its material times its share. An element that was under elastic ground
- * gets none. */
-static void faces_laws(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory,
+/* Gives each slot the law of its material times its area share. An element that was under elastic
+ * ground gets none. */
+static void shell_laws(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory,
                        const Motion *now, double dt) {
     for (int i = 0; i < foot->active; i++) {
         foot->slot_material[i] = MATERIAL_NONE; /* scaled in the last step */
@@ -85,16 +86,16 @@ static void faces_laws(const FootScratch *foot, const MildTerrain *terrain, cons
         const int e = foot->element[i];
         const int model = terrain->materials[foot->slot_material[i] & 0xff].model;
         if (!(s->recovery[l] < 1.0) && slot_is_under(foot, i, memory, now, dt)) {
-            s->share[l] = 0.0;
+            s->area_share[l] = 0.0;
         }
         /* The theory's coefficients count the slope themselves. */
         const int directed = (model_row(model)->motion & LAW_RESIST) && slot_directed(s, l);
-        slot_scale(s, l, directed && s->share[l] > 0.0 ? foot->area[e] : s->share[l]);
+        slot_scale(s, l, directed && s->area_share[l] > 0.0 ? foot->area[e] : s->area_share[l]);
     }
 }
 
 /* A buried element begins without force, at the end of the unloading line of some greater depth. */
-static void faces_unload(const FootScratch *foot, const Memory *memory, const Motion *now,
+static void shell_unload(const FootScratch *foot, const Memory *memory, const Motion *now,
                          double dt) {
     for (int i = 0; i < foot->active; i++) {
         Slots *s = slot_block(foot, i);
@@ -108,29 +109,29 @@ static void faces_unload(const FootScratch *foot, const Memory *memory, const Mo
     }
 }
 
-void faces_slots(FootScratch *foot, const MildGround *ground, int f, const MildTerrain *terrain,
+void shell_slots(FootScratch *foot, const MildGround *ground, int f, const MildTerrain *terrain,
                  const Memory *memory, const Motion *now, double dt) {
     slots_gather(foot, memory);
-    faces_gather(foot, memory);
+    shell_gather(foot, memory);
     if (foot->uneven) {
         slots_uneven(foot, ground->uneven[f], memory, terrain->height, now);
     }
-    faces_laws(foot, terrain, memory, now, dt);
+    shell_laws(foot, terrain, memory, now, dt);
     if (ground->tiles > 0) {
         const Imprints imprints = ground_imprints(ground);
-        slots_imprints(foot, &imprints, memory, faces_level);
+        slots_imprints(foot, &imprints, memory, shell_level);
     }
-    faces_unload(foot, memory, now, dt);
+    shell_unload(foot, memory, now, dt);
 }
 
-double faces_loaded(const FootScratch *foot, double *area) {
+double shell_loaded(const FootScratch *foot, double *area) {
     double z = 0.0;
     *area = 0.0;
     for (int i = 0; i < foot->active; i++) {
         const Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;
         z += s->z[l] * s->iz[l];
-        *area += s->iz[l] > 0.0 ? s->share[l] * foot->pitch * foot->pitch : 0.0;
+        *area += s->iz[l] > 0.0 ? s->area_share[l] * foot->pitch * foot->pitch : 0.0;
     }
     return z;
 }

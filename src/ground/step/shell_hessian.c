@@ -1,15 +1,15 @@
-#include "ground/step/faces_hessian.h"
+#include "ground/step/shell_hessian.h"
 
 #include <string.h>
 
 #include "ground/step/moments.h"
 
 /* Moments of the entries of h, by 1, x, y, z, x^2, xy, y^2, yz, z^2, zx. */
-typedef double FacesMoments[3][3][10];
+typedef double ShellMoments[3][3][10];
 
 /* Three times the loop for x and y, over (x, y), (y, z) and (z, x): a loop of its own would be
  * faster and larger. */
-static void faces_moments(const FootScratch *foot, FacesMoments M) {
+static void shell_moments(const FootScratch *foot, ShellMoments M) {
     static const int place[3][6] = {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 6, 7, 8}, {0, 3, 1, 8, 9, 4}};
     const Slots *s = foot->slot;
     const Real *const at[3] = {s->x, s->y, s->z};
@@ -28,24 +28,24 @@ static void faces_moments(const FootScratch *foot, FacesMoments M) {
 }
 
 /* torque += p x I */
-static void faces_cross(const double *p, const double *I, double *torque) {
+static void shell_cross(const double *p, const double *I, double *torque) {
     for (int k = 0; k < 3; k++) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
         torque[k] += p[i] * I[j] - p[j] * I[i];
     }
 }
 
-void faces_hessian(const FootScratch *foot, double *H) {
+void shell_hessian(const FootScratch *foot, double *H) {
     static const int product[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 9}, {2, 5, 6, 7}, {3, 9, 7, 8}};
-    FacesMoments M;
-    faces_moments(foot, M);
+    ShellMoments M;
+    shell_moments(foot, M);
     memset(H, 0, 36 * sizeof *H);
     for (int k = 0; k < 4; k++) {
         double rows[3][6] = {{0.0}};
         for (int r = 0; r < 3; r++) {
             for (int l = 0; l < 4; l++) {
                 const int at = product[k][l];
-                faces_cross(foot->arm[l], (const double[3]){M[r][0][at], M[r][1][at], M[r][2][at]},
+                shell_cross(foot->arm[l], (const double[3]){M[r][0][at], M[r][1][at], M[r][2][at]},
                             rows[r] + 3);
             }
             for (int c = 0; c < 3; c++) {
@@ -55,7 +55,7 @@ void faces_hessian(const FootScratch *foot, double *H) {
         for (int c = 0; c < 6; c++) { /* column c of the rows is a force: k = 0 adds it, too */
             const double force[3] = {rows[0][c], rows[1][c], rows[2][c]};
             double torque[3] = {0.0};
-            faces_cross(foot->arm[k], force, torque);
+            shell_cross(foot->arm[k], force, torque);
             for (int r = 0; r < 3; r++) {
                 H[6 * r + c] += k == 0 ? force[r] : 0.0;
                 H[6 * (3 + r) + c] += torque[r];
