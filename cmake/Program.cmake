@@ -8,6 +8,7 @@ install(DIRECTORY ${CMAKE_SOURCE_DIR}/robots ${CMAKE_SOURCE_DIR}/configs ${CMAKE
   DESTINATION share/mild COMPONENT program)
 install(FILES ${CMAKE_SOURCE_DIR}/scripts/press.py ${CMAKE_SOURCE_DIR}/scripts/fit.py
   ${CMAKE_SOURCE_DIR}/scripts/pressure.py DESTINATION share/mild/scripts COMPONENT program) # --figure, --pressure
+install(FILES ${CMAKE_SOURCE_DIR}/python/mild/report.py DESTINATION share/mild/python/mild COMPONENT program) # mild report
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/docs/schema DESTINATION share/mild COMPONENT program)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/web DESTINATION share/mild/build COMPONENT program OPTIONAL) # where scripts/web.sh ran
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION share/doc/mild RENAME copyright COMPONENT program)

@@ -67,6 +67,7 @@ strip -o "$bundle/lib/libmild_envs.so" build/x86-64-v3/libmild_envs.so
 mkdir "$bundle/scripts"
 cp -r scripts/rivals "$bundle/scripts/"
 cp -r robots configs policies LICENSE NOTICE "$bundle/"
+cp --parents python/mild/report.py "$bundle/" # mild report
 cp .venv/daqp-*/LICENSE "$bundle/LICENSE-DAQP" # parts of the program
 cp .venv/cutlass/licenses/LICENSE.txt "$bundle/LICENSE-CUTLASS"
 

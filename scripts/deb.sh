@@ -48,7 +48,8 @@ test_package() {
         grep 'k_pen' >/dev/null
     inside 'mild eval --ground rigid,foam45 --trials 1 --seconds 3' | grep -c ' 1/1 ' | grep -x 2 >/dev/null
     inside 'mild train --out run --train.envs=16 --train.minutes=0 --train.iterations=2 --ppo.steps=4 --ppo.minibatches=2 &&
-        mild report run && mild eval --policy run/policy.safetensors --trials 1 --seconds 0.1' | grep '^report run/report.html' >/dev/null
+        mild eval --policy run/policy.safetensors --trials 1 --seconds 0.1 && { mild report run 2>&1 || true; }' |
+        grep 'install python3' >/dev/null # which is but recommended
     if command -v help2man >/dev/null; then
         inside 'zcat /usr/share/man/man1/mild.1.gz' | grep -x report >/dev/null
     fi

@@ -25,7 +25,7 @@ length() {
     case $1 in
     policy | checkpoint) echo 3500 ;;
     actuator) echo 20000 ;;
-    config | fit | history | record | png) echo 512 ;;
+    config | fit | record | png) echo 512 ;;
     *) echo 256 ;;
     esac
 }

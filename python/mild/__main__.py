@@ -1,11 +1,13 @@
-"""The command `mild`, and `python -m mild`: the program of this package. `mild trial`, `mild judge` and
-`mild bench record` are the package's own (mild.trials, mild.repository)."""
+"""The command `mild`, and `python -m mild`: the program of this package. `mild trial`, `mild report`, `mild judge` and
+`mild bench record` are the package's own (mild.trials, mild.report, mild.repository)."""
 import importlib
 import os
 import signal
 import sys
 
 from . import _processor, repository
+
+MODULES = {"trial": "mild.trials", "report": "mild.report"}  # by command; imported when it is asked for
 
 
 def environment():
@@ -21,8 +23,8 @@ def own(arguments):
     """Runs a command of the package. Returns its exit code; 141, as the program does, when nobody reads its output any more: `mild trial --keys | head`."""
     try:
         try:
-            if arguments[0] == "trial":
-                return importlib.import_module("mild.trials").main(arguments[1:])
+            if arguments[0] in MODULES:
+                return importlib.import_module(MODULES[arguments[0]]).main(arguments[1:])
             return repository.main(arguments)
         finally:
             sys.stdout.flush()
@@ -33,7 +35,7 @@ def own(arguments):
 
 def main(arguments=None):
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    if arguments[:1] == ["trial"] or repository.command_of(arguments):
+    if arguments and arguments[0] in MODULES or repository.command_of(arguments):
         return own(arguments)
     program = _processor.program()
     if program is None:

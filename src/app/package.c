@@ -1,5 +1,6 @@
 #include "app/package.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -42,17 +43,24 @@ void package_python(char python[PATH_SIZE]) {
     }
 }
 
-/* Replaces this process; returns where that cannot be. */
-static void become_python(char *said, char **arguments) {
-    char python[PATH_SIZE], folder[PATH_SIZE], program[sizeof code];
+/* Becomes the words of `head`, then `arguments`. Returns where that cannot be. */
+static void become(char *const *head, int words, char **arguments) {
     int count = 0;
     while (arguments[count]) {
         count++;
     }
-    char **words = calloc((size_t)count + 6, sizeof *words);
-    if (!words) {
+    char **all = calloc((size_t)(words + count) + 1, sizeof *all);
+    if (!all) {
         return;
     }
+    memcpy(all, head, (size_t)words * sizeof *all);
+    memcpy(all + words, arguments, (size_t)count * sizeof *all);
+    execvp(all[0], all);
+    free(all);
+}
+
+static void become_package(char *said, char **arguments) {
+    char python[PATH_SIZE], folder[PATH_SIZE], program[sizeof code];
     setenv("MILD", path_program(folder), 1);
     package_python(python);
     if (access(path_beside_program("python/mild/__main__.py", folder), R_OK) == 0) {
@@ -62,10 +70,7 @@ static void become_python(char *said, char **arguments) {
     }
     memcpy(program, code, sizeof code);
     char *const head[] = {python, "-c", program, said, folder};
-    memcpy(words, head, sizeof head);
-    memcpy(words + 5, arguments, (size_t)count * sizeof *words);
-    execvp(python, words);
-    free(words);
+    become(head, sizeof head / sizeof *head, arguments);
 }
 
 int package_run(char **arguments) {
@@ -74,8 +79,23 @@ int package_run(char **arguments) {
     snprintf(said, sizeof said, "mild: %s is a command of the Python package: python -m mild %s",
              name, name);
     if (strcmp(name, "trial") != 0) {
-        become_python(said, arguments);
+        become_package(said, arguments);
     }
     fprintf(stderr, "%s\n", said);
     return CLI_EXIT_BAD_INPUT;
+}
+
+int package_script(const char *script, char **arguments) {
+    char python[PATH_SIZE], path[PATH_SIZE], isolated[] = "-I";
+    package_python(python);
+    if (access(path_data(script, path), R_OK) != 0) {
+        return cli_fail_text(arguments[0], "%.300s: %s; python -m mild %s is the same", path,
+                             strerror(errno), arguments[0]);
+    }
+    char *const head[] = {python, isolated, path};
+    become(head, sizeof head / sizeof *head, arguments + 1);
+    return cli_fail_text(arguments[0],
+                         "%.200s: %s; this command is in Python: install python3, or name one by "
+                         "MILD_PYTHON",
+                         python, strerror(errno));
 }

@@ -1,4 +1,4 @@
-/* Commands of the Python package, which the program has not: `trial`, `judge`, `bench record`. */
+/* Commands in Python: those of the package, `trial`, `judge`, `bench record`, and `report`. */
 #ifndef MILD_PACKAGE_H
 #define MILD_PACKAGE_H
 
@@ -12,6 +12,11 @@ int package_has(const char *command);
  * The variable MILD is this program there. arguments: the command, its own, NULL. Returns an exit
  * code. */
 int package_run(char **arguments);
+
+/* Becomes a shipped file of the package, "python/mild/report.py", which needs nothing but Python:
+ * not the package, and no module of the working directory. Returns an exit code where that cannot
+ * be. arguments: the command, its own, NULL. */
+int package_script(const char *script, char **arguments);
 
 /* The Python that MILD_PYTHON names, that of .venv, or "python3". */
 void package_python(char python[PATH_SIZE]);

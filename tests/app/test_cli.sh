@@ -18,7 +18,6 @@ for command in eval play "actuator log"; do # shellcheck disable=SC2086
 done
 
 bad "ground" "$mild" press ground
-bad "run17 16" "$mild" report run{1..17}
 
 # mistakes in configs and overrides
 printf '[train]\nenvs = 4\niteration = 1\n' >bad_key.ini
@@ -284,7 +283,7 @@ done
 
 # a file is written into a folder that is there; nobody else's folder is made
 for option in "play --video" "play --pressure" "press --ground foam45 --csv" "press --ground foam45 --figure" "eval --json" "eval --track" "bench step --json" \
-    "report . --out" "actuator log --out" "export --onnx"; do
+    "actuator log --out" "export --onnx"; do
     bad "nope/x.png" "$mild" $option nope/x.png
 done
 bad "--video" "$mild" play --video -

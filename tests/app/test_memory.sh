@@ -47,15 +47,6 @@ fit=("$mild" fit press.csv --plate 0.2,0.1)
 total=$(count "${fit[@]}")
 for n in $(seq "$first" 2 "$total"); do starved "$n" "" "${fit[@]}"; done
 
-mkdir run
-printf 'iteration,a\n1,2\n' >run/log.csv
-printf '[train]\nenvs = 4\n' >run/config.ini
-printf '{"rows": [{"ground": "grass"}]}' >run/eval.json
-printf 'few bytes' >run/a.mp4
-report=("$mild" report run --out -)
-total=$(count "${report[@]}")
-for share in {0..60}; do starved $((first + (total - first) * share / 60)) "" "${report[@]}"; done
-for n in $(seq $((total - 40)) "$total"); do starved "$n" "" "${report[@]}"; done
 # what is written stays as it was; a folder is made whole or not at all
 "$mild" export --c made >/dev/null || fail "no export"
 if "$mild" export --onnx policy.onnx >/dev/null 2>&1; then # built with it

@@ -41,11 +41,18 @@ MILD_PYTHON=$work/bare "$mild" judge --help >/dev/null 2>&1 # whatever it finds
 # the package as installed, with no repository around it
 mkdir -p installed/mild
 touch installed/mild/__init__.py
-cp "$root"/python/mild/{__main__,_processor,repository}.py installed/mild
+cp "$root"/python/mild/{__main__,_processor,report,repository}.py installed/mild
+mkdir -p installed/mild/data/configs installed/run
+cp "$root/configs/default.ini" installed/mild/data/configs
+printf 'iteration,a\n1,2\n' >installed/run/log.csv
+printf '[train]\nenvs = 7\n' >installed/run/config.ini
 cd installed
 export PYTHONDONTWRITEBYTECODE=1 MILD_HOME=
 bad "mild judge: scripts/judge.py MILD_HOME" python3 -m mild judge --out out
 bad "mild bench record: scripts/record.py MILD_HOME" python3 -m mild bench record out
+bad "mild report: none/log.csv" python3 -m mild report none
+expect 0 '^report run/report.html$' python3 -m mild report run
+grep -q '<td>train.envs<td>7<td>[0-9]' run/report.html || fail "no default of train.envs in the page of the package"
 bad "this installation has no program" python3 -m mild bench step # a command of the program
 
 # and with one: the script has the rest of the line

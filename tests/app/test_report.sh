@@ -73,6 +73,31 @@ labels = [float(x) for x in re.findall(r"text-anchor=end>([-0-9.e]+)<", page.spl
 assert labels == [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1], labels
 END
 
+# Columns as a training has them: 300 points of 500 rows. A point is the mean of the rows whose iterations, from 0 to 1497 by 3, are nearest
+# to its place; the axis holds the least and the greatest of these with a margin of 4 %. Of the last twentieth: rows 474 to 499.
+mkdir long
+awk 'BEGIN { print "iteration,episode/reward"
+    for (i = 0; i < 500; i++) printf "%d,%s\n", 3 * i, i % 7 == 5 ? "nan" : i * i % 101 - 50 }' >long/log.csv
+expect 0 '' "$mild" report long
+python3 - long/report.html <<'END' || fail "points of a long run"
+import re, sys
+page = open(sys.argv[1], encoding="utf-8").read()
+rows = [(3 * i, i * i % 101 - 50) for i in range(500) if i % 7 != 5]
+places = [1497 * k / 299 for k in range(300)]
+near = [[value for at, value in rows if abs(at - place) < 1497 / 299 / 2] for place in places]
+means = [(place, sum(values) / len(values)) for place, values in zip(places, near) if values]
+low, high = min(value for _, value in means), max(value for _, value in means)
+margin = 0.04 * (high - low)
+way = re.search(r'<path fill=none .*? d="M(.*?)h0"', page).group(1)
+points = [tuple(map(float, point.split())) for point in way.split("L")]
+assert len(points) == len(means) < 300, (len(points), len(means))
+for (x, y), (place, value) in zip(points, means):
+    assert abs(x - (52 + place / 1497 * (350 - 52))) < 0.051, (x, place)
+    assert abs(y - (178 + (value - low + margin) / (high - low + 2 * margin) * (26 - 178))) < 0.051, (y, place, value)
+last = [value for at, value in rows if at >= 3 * 474]
+assert f"<td class=n>1497<td class=n>{sum(last) / len(last):.2f}<" in page
+END
+
 # a training is writing the last row; a run without a config
 printf '101,7' >>seed1/log.csv
 rm other/config.ini
@@ -86,6 +111,22 @@ for name in plain same; do
 done
 expect 0 "" "$mild" report plain same seed2 --out alike.html
 grep -qF 'plain (2 seeds)' alike.html || fail "runs without a seed are not one group"
+
+# a named page: no page by halves, and links are for others to follow
+ln -s ../seed1/config.ini pages/link.html
+bad "--out pages/link.html" "$mild" report seed1 --out pages/link.html
+mkdir linked theirs
+ln -s ../seed1/log.csv linked/log.csv
+bad "linked/log.csv link" "$mild" report linked
+cp seed2/log.csv theirs
+echo '<title>mine</title>' >theirs/report.html
+bad "theirs/report.html --out" "$mild" report theirs
+mkfifo theirs/version.txt
+bad "theirs/version.txt pipe" "$mild" report theirs --out pages/theirs.html
+bad "--out" "$mild" report seed1 --out a.html --out b.html
+bad "standard output" bash -c '"$0" report seed1 --out - >/dev/full' "$mild"
+bad "install python3 MILD_PYTHON /no/python" env MILD_PYTHON=/no/python "$mild" report seed1
+bad "here/python/mild/report.py" env MILD_HOME=here "$mild" report seed1
 
 bad "nowhere/log.csv" "$mild" report nowhere
 bad "report RUN" "$mild" report
@@ -107,5 +148,23 @@ rm odd/eval.json
 printf '[train]\nenvs\n' >odd/config.ini
 bad "odd/config.ini:2" "$mild" report odd
 bad "folder/log.csv" "$mild" report folder
+rm odd/config.ini
+log() { # NAMES TEXT: a log that is refused
+    printf "$2" >odd/log.csv
+    bad "$1" "$mild" report odd
+}
+log 'odd/log.csv iteration,' ''
+log 'odd/log.csv iteration,' 'iteration,a'
+log 'odd/log.csv iteration,' 'iteration\n1\n'
+log 'odd/log.csv row' 'iteration,a\n1,2'
+log 'odd/log.csv:3 1 2' 'iteration,a\n1,2\n2\n3,4\n'
+log 'odd/log.csv:2 3 2' 'iteration,a\n1,2,3\n'
+log 'odd/log.csv:2 1,' 'iteration,a\n1,\n2,3\n'
+log 'odd/log.csv:2 row' 'iteration,a\n\n'
+log 'odd/log.csv:3 iteration 2' 'iteration,a\n2,2\n2,3\n'
+log 'odd/log.csv:2 iteration nan' 'iteration,a\nnan,2\n'
+log 'odd/log.csv:2 iteration -1' 'iteration,a\n-1,2\n'
+log 'odd/log.csv:2 iteration 1e+300' 'iteration,a\n1e300,2\n'
+log 'odd/log.csv:3 row' 'iteration,a\n1,2\n\0,3\n'
 
 finish "report: pages, curves, bad input"

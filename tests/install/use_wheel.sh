@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Uses an installed wheel as somebody who has nothing else does: evaluates, presses, trains, carries a foot, steps environments, serves the
+# Uses an installed wheel as somebody who has nothing else does: evaluates, presses, trains, reports, carries a foot, steps environments, serves the
 # page, runs three examples; in the folder where it is started, which is empty. Needs what scripts/wheel.txt lists. scripts/wheels.sh
 # Usage: use_wheel.sh BIN_FOLDER_OF_THE_ENVIRONMENT
 set -euo pipefail
@@ -12,6 +12,7 @@ mild eval --robot sa01 --ground rubber --speed 0.5 --trials 1 --seconds 2 >eval.
 grep -q '^rubber .* 1/1 ' eval.txt || fail "eval: $(cat eval.txt)"
 mild press --ground foam45 --plate 0.1,0.1 --csv press.csv >/dev/null
 mild train --out run --train.envs=16 --train.minutes=0 --train.iterations=2 --ppo.steps=4 --ppo.minibatches=2 >/dev/null 2>&1 || fail "train"
+mild report run | grep -qx 'report run/report.html' || fail "report"
 if mild train --out gpu --train.device=cuda 2>gpu.txt; then fail "a GPU without mildground_cuda"; fi
 grep -q 'install the wheel mildground_cuda' gpu.txt || fail "train.device: $(cat gpu.txt)"
 [ "$(mild --version)" = "$(python -m mild --version)" ] || fail "python -m mild"

@@ -7,9 +7,7 @@
 
 #include "base/paths.h"
 #include "files.h"
-#include "run/train/history.h"
 #include "run/train/log.h"
-#include "run/train/settings.h"
 
 static char folder[64];
 
@@ -251,6 +249,8 @@ TEST_WITH(test_config, make_folder, remove_folder) {
     assert_int_equal(
         log_config(log, "[train]\nenvs = 64\nvx = 0 1.2\n\n[ppo]\nmirror = true\n", &error),
         MILD_OK);
+    assert_int_not_equal(log_config(log, "[train]\nenvs\n", &error), MILD_OK);
+    assert_error(&error, MILD_ERROR_FORMAT, "config.ini:2");
     log_close(log);
     char path[PATH_SIZE];
     find_events(path);
@@ -305,6 +305,18 @@ static void assert_same(Part summary, int n, const char *name, double number) {
     assert_true(value == (float)number || (isnan(value) && isnan(number)));
 }
 
+/* The numbers of a log.csv below its first line: as many as `count`, and nothing else. */
+static void read_rows(const char *path, double *number, int count) {
+    static char text[400000];
+    read_file(path, text, sizeof text);
+    char *at = strchr(text, '\n') + 1;
+    for (int i = 0; i < count; i++, at++) {
+        number[i] = strtod(at, &at);
+        assert_true(*at == ',' || *at == '\n');
+    }
+    assert_int_equal(*at, '\0');
+}
+
 /* TensorBoard shows the numbers of log.csv under their names, at their iterations: as many as make
  * several events of each row. Of an event: wall time 1, step 2, summary 5; of its value: tag 1,
  * simple_value 2. */
@@ -312,11 +324,10 @@ TEST_WITH(test_scalars, make_folder, remove_folder) {
     enum { COLUMNS = 300, ROWS = 3 };
     static char names[COLUMNS][120], data[400000];
     static const char *columns[COLUMNS];
-    static double values[COLUMNS];
+    static double values[COLUMNS], rows[ROWS][1 + COLUMNS];
     const double start = (double)time(NULL);
     char path[PATH_SIZE];
     MildError error = {0};
-    History history;
     for (int i = 0; i < COLUMNS; i++) {
         snprintf(names[i], sizeof names[i], "group/%090d", i);
         columns[i] = names[i];
@@ -330,8 +341,7 @@ TEST_WITH(test_scalars, make_folder, remove_folder) {
     }
     log_close(log);
     path_join(folder, "log.csv", path, NULL);
-    assert_int_equal(history_read(path, &history, &error), MILD_OK);
-    assert_int_equal(history.columns, 1 + COLUMNS);
+    read_rows(path, rows[0], ROWS * (1 + COLUMNS));
     find_events(path);
     const size_t length = read_file(path, data, sizeof data);
     int seen = 0;
@@ -340,103 +350,13 @@ TEST_WITH(test_scalars, make_folder, remove_folder) {
         for (int n = 0; at > 0 && n < count_of(FOLLOW(event, 5), 1); n++, seen++) {
             const int written = COLUMNS - 1; /* a row; what was not measured is left out */
             const int column = seen % written + (seen % written >= 7);
-            const double *row = history.value + seen / written * (1 + COLUMNS);
+            const double *row = rows[seen / written];
             assert_int_equal(FOLLOW(event, 2).number, (uint64_t)row[0]);
             assert_in_range(number_in(FOLLOW(event, 1)), start, start + 60);
-            assert_same(FOLLOW(event, 5), n, history.name[1 + column], row[1 + column]);
+            assert_same(FOLLOW(event, 5), n, names[column], row[1 + column]);
         }
     }
     assert_int_equal(seen, ROWS * (COLUMNS - 1));
-    history_free(&history);
-}
-
-/* ---- log.csv read back ---- */
-
-static MildStatus read_log(const char *text, size_t size, History *history, MildError *error) {
-    char path[PATH_SIZE];
-    path_join(folder, "log.csv", path, NULL);
-    kit_write(path, text, size);
-    return history_read(path, history, error);
-}
-
-TEST_WITH(test_history, make_folder, remove_folder) {
-    static const char *const columns[] = {"reward/gait", "rate"};
-    char path[PATH_SIZE];
-    MildError error = {0};
-    History history;
-    Log *log = log_open(folder, columns, 2, -1, &error);
-    assert_int_equal(log_row(log, 3, (double[]){0.125, 1e9}, &error), MILD_OK);
-    assert_int_equal(log_row(log, 4, (double[]){NAN, -2e-7}, &error), MILD_OK);
-    log_close(log);
-    path_join(folder, "log.csv", path, NULL);
-    FILE *torn = fopen(path, "a");
-    fputs("5,2.5,7", torn);
-    fclose(torn);
-    assert_int_equal(history_read(path, &history, &error), MILD_OK);
-    assert_int_equal(history.rows, 2);
-    assert_int_equal(history.columns, 3);
-    assert_int_equal(history_column(&history, "reward/gait"), 1);
-    assert_int_equal(history_column(&history, "reward"), -1);
-    const double *v = history.value;
-    assert_true(v[0] == 3 && v[1] == 0.125 && v[2] == 1e9 && v[3] == 4 && v[5] == -2e-7);
-    assert_true(isnan(v[4]));
-    history_free(&history);
-
-    static const struct {
-        const char *text, *names;
-        size_t size;
-    } bad[] = {{"", "log.csv iteration,", 0},
-               {"iteration,a", "log.csv iteration,", 11},
-               {"time,a\n1,2\n", "log.csv iteration,", 11},
-               {"iteration\n1\n", "log.csv iteration,", 12},
-               {"iteration,a\n", "log.csv row", 12},
-               {"iteration,a\n1,2", "log.csv row", 15},
-               {"iteration,a\n1,2\n2\n3,4\n", "log.csv:3 1 2", 22},
-               {"iteration,a\n1,2,3\n", "log.csv:2 3 2", 18},
-               {"iteration,a\n1,\n2,3\n", "log.csv:2 1,", 19},
-               {"iteration,a\n1,x\n", "log.csv:2 1,x", 16},
-               {"iteration,a\n\n", "log.csv:2 row", 13},
-               {"iteration,a\n2,2\n2,3\n", "log.csv:3 iteration 2", 20},
-               {"iteration,a\nnan,2\n", "log.csv:2 iteration nan", 18},
-               {"iteration,a\n-1,2\n", "log.csv:2 iteration -1", 17},
-               {"iteration,a\n1e300,2\n", "log.csv:2 iteration 1e+300", 20},
-               {"iteration,a\n1,2\n\0,3\n", "log.csv byte", 20}};
-    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-        assert_int_not_equal(read_log(bad[i].text, bad[i].size, &history, &error), MILD_OK);
-        assert_error(&error, MILD_ERROR_FORMAT, bad[i].names);
-    }
-    char *many = malloc(20000), *end = stpcpy(many, "iteration,a\n");
-    for (int i = 0; i <= 999; i++) {
-        end += sprintf(end, i % 2 ? "%d,nan\n" : "%d,%d\n", i, 3 * i);
-    }
-    assert_int_equal(read_log(many, (size_t)(end - many), &history, &error), MILD_OK);
-    free(many);
-    double mean[10]; /* at 0, 111 .. 999: of the even iterations within 55.5 */
-    history_means(&history, 1, 0, 999, 10, mean);
-    assert_true(mean[0] == 3 * 27 && mean[1] == 3 * 111 && mean[2] == 3 * 222);
-    assert_true(mean[9] == 3 * 971);
-    history_means(&history, 1, -2000, -1000, 10, mean);
-    assert_true(isnan(mean[0]) && isnan(mean[9]));
-    history_free(&history);
-
-    assert_int_equal(read_log("iteration,a\r\n1,2\r\n", 18, &history, &error), MILD_OK);
-    assert_string_equal(history.name[1], "a");
-    history_free(&history);
-}
-
-TEST(test_settings) {
-    MildError error = {0};
-    Settings settings;
-    assert_int_equal(settings_read("[train]\nenvs = 4\n; a remark\n[ppo]\nenvs = a b\n", "it",
-                                   &settings, &error),
-                     MILD_OK);
-    assert_int_equal(settings.count, 2);
-    assert_string_equal(settings_find(&settings, "train.envs"), "4");
-    assert_string_equal(settings_find(&settings, "ppo.envs"), "a b");
-    assert_null(settings_find(&settings, "envs"));
-    settings_free(&settings);
-    assert_int_not_equal(settings_read("[train]\nenvs\n", "it", &settings, &error), MILD_OK);
-    assert_error(&error, MILD_ERROR_FORMAT, "it:2");
 }
 
 TEST_MAIN(NULL, NULL)

@@ -45,12 +45,3 @@ void settings_free(Settings *settings) {
     free(settings->list);
     *settings = (Settings){0};
 }
-
-const char *settings_find(const Settings *settings, const char *key) {
-    for (int i = 0; i < settings->count; i++) {
-        if (strcmp(settings->list[i].key, key) == 0) {
-            return settings->list[i].value;
-        }
-    }
-    return NULL;
-}

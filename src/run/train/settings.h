@@ -19,7 +19,4 @@ typedef struct {
 MildStatus settings_read(const char *text, const char *name, Settings *settings, MildError *error);
 void settings_free(Settings *settings);
 
-/* The value of a key, or NULL. */
-const char *settings_find(const Settings *settings, const char *key);
-
 #endif
