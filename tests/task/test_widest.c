@@ -28,7 +28,7 @@ TEST(widths) {
     assert_int_equal(shape.feet, ROBOT_FEET_MAX);
     assert_int_equal(shape.actions, ROBOT_JOINTS_MAX);
     const int spare = TASK_OBSERVATION_MAX - shape.observation; /* what the task leaves out */
-    assert_in_range(spare, 0, 0 TASK_FRAME_LIST(TASK_FRAME_ONE) - 2);
+    assert_in_range(spare, 0, TASK_FRAME_LAST - 2);
     assert_int_equal(shape.history + TASK_FRAMES * spare, TASK_HISTORY_MAX);
     assert_int_equal(shape.estimates, TASK_ESTIMATES_MAX);
     assert_int_equal(shape.critic + spare, TASK_CRITIC_MAX);

@@ -40,7 +40,8 @@ extern const char *const task_end_names[];
 #define TASK_FRAME_LIST(X)                                                                         \
     X(clock, 1, observe_clock(env, def, 0), robot_mirror_shift(robot) > 0 ? -1 : 1)                \
     X(clock, 1, observe_clock(env, def, 1), robot_mirror_shift(robot) > 0 ? -1 : 1)
-#define TASK_FRAME_ONE(name, has, value, sign) +1
+#define TASK_FRAME_ONE(name, has, value, sign) "."
+enum { TASK_FRAME_LAST = (int)sizeof(TASK_FRAME_LIST(TASK_FRAME_ONE)) - 1 }; /* rows of it */
 
 /* Numbers per environment; they follow from the robot's joints and feet, and from the task. */
 typedef struct {
@@ -54,7 +55,7 @@ typedef struct {
     int critic;      /* frame, estimates, 6 of each foot, 34 of the episode (observe.h) */
 } TaskShape;
 enum { /* of a robot with ROBOT_JOINTS_MAX joints and ROBOT_FEET_MAX feet */
-       TASK_OBSERVATION_MAX = 9 + 3 * ROBOT_JOINTS_MAX TASK_FRAME_LIST(TASK_FRAME_ONE),
+       TASK_OBSERVATION_MAX = 9 + 3 * ROBOT_JOINTS_MAX + TASK_FRAME_LAST,
        TASK_HISTORY_MAX = TASK_FRAMES * TASK_OBSERVATION_MAX,
        TASK_ESTIMATES_MAX = 3 + 4 * ROBOT_FEET_MAX,
        TASK_CRITIC_MAX = TASK_OBSERVATION_MAX + TASK_ESTIMATES_MAX + 6 * ROBOT_FEET_MAX + 34
