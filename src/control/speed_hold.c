@@ -9,7 +9,6 @@
 #define CHANGE_MAX 0.01 /* [m/s] of the command that begins anew */
 #define TURNING_MAX 0.4 /* [rad/s] of a command in a cycle that r can learn from */
 #define SETTLING 2      /* cycles after that */
-#define DOUBT 1         /* cycles after which the mean weighs as much as what was before */
 
 SpeedHoldDef speed_hold_def(const TaskDef *task, const Robot *robot, const Controller *controller) {
     return (SpeedHoldDef){.gain = controller->estimates ? task->speed_hold : 0,
@@ -18,15 +17,13 @@ SpeedHoldDef speed_hold_def(const TaskDef *task, const Robot *robot, const Contr
 }
 
 static void learn(SpeedHold *hold, double gain) {
-    const double n = ++hold->cycles, share = fmax(gain, 1 / n),
-                 weight = n * n / (n * n + DOUBT * DOUBT);
+    const double n = ++hold->cycles, share = fmax(gain, 1 / n), weight = n * n / (n * n + 1);
     for (int i = 0; i < 2; i++) {
-        hold->speed[i] = hold->way[i] / hold->steps;
         if (fabs(hold->wanted[i]) >= SPEED_MIN) {
             const double command = hold->wanted[i] * (1 + hold->ratio[i]);
-            const double factor =
-                fmax(fmin(hold->speed[i] / command, 1 + ERROR_MAX), 1 - ERROR_MAX);
-            hold->mean[i] += share * (factor - hold->mean[i]);
+            const double factor = hold->way[i] / hold->steps / command;
+            hold->mean[i] +=
+                share * (fmax(fmin(factor, 1 + ERROR_MAX), 1 - ERROR_MAX) - hold->mean[i]);
             const double known = 1 + hold->before[i],
                          now = known + weight * (hold->mean[i] - known);
             hold->ratio[i] = fmax(fmin(1 / now - 1, RATIO_MAX), -RATIO_MAX);

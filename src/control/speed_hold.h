@@ -3,7 +3,7 @@
  * the mean of the estimate over a cycle of the gait clock, and a command that the policy sees of
  * the wanted one times 1 + r, forward and to the left,
  *
- *     m += max(gain, 1/n) (v/command - m),    1/(1 + r) = known + n^2/(n^2 + 16) (m - known)
+ *     m += max(gain, 1/n) (v/command - m),    1/(1 + r) = known + n^2/(n^2 + 1) (m - known)
  *
  * over the n cycles since the wanted command changed; known = 1 at the start, and what r was where
  * it changed; |r| <= 0.2. docs/controllers.md has what it is worth. */
@@ -22,7 +22,6 @@ typedef struct {
 /* Of one robot; zeros before the first frame. */
 typedef struct {
     double ratio[2];  /* [-] r, forward and to the left */
-    double speed[2];  /* [m/s] mean of the last cycle */
     int cycles;       /* n */
     double before[2]; /* [-] 1/(1 + r) - 1 where the wanted command changed */
     double mean[2];   /* [-] m */

@@ -48,8 +48,23 @@ static void fill_histories(TaskEnv **envs, uint32_t draw) {
     }
 }
 
-/* Every environment gets the mean action of its own history, with and without threads, whatever the
- * controller was asked before: it remembers nothing, so an episode's reset needs no call. */
+/* From the environments, or from their histories alone. */
+static void act(Controller *controller, int rows, TaskEnv *const *envs, int alone, float *actions) {
+    float histories[ENVS * SA01_HISTORY];
+    for (int e = 0; e < rows && alone; e++) {
+        memcpy(histories + e * SA01_HISTORY, task_env_history(envs[e]),
+               SA01_HISTORY * sizeof *histories);
+    }
+    if (alone) {
+        controller->act_on(controller->self, rows, histories, actions);
+    } else {
+        controller->act(controller->self, rows, envs, actions);
+    }
+}
+
+/* Every environment gets the mean action and the estimates of its own history, with and without
+ * threads, whatever the controller was asked before: it remembers nothing, so an episode's reset
+ * needs no call. */
 TEST(acts_as_its_policy) {
     MildError error = {0};
     PolicyDef def = task_policy_def();
@@ -64,15 +79,19 @@ TEST(acts_as_its_policy) {
         assert_int_equal(controller_learned(PATH, robot, pool, ENVS, &controller, &error), MILD_OK);
         assert_string_equal(controller.name, "learned");
         double worst = 0, least = 1;
-        for (uint32_t draw = 0; draw < 3; draw++) {
-            float actions[ENVS * SA01_JOINTS + 1], one[SA01_JOINTS];
+        for (uint32_t draw = 0; draw < 4; draw++) {
+            float actions[ENVS * SA01_JOINTS + 1], one[SA01_JOINTS], estimates[SA01_ESTIMATES];
             int rows = draw == 1 ? 2 : ENVS;
             actions[rows * SA01_JOINTS] = 42;
             fill_histories(envs, draw % 2);
-            controller.act(controller.self, rows, envs, actions);
+            act(&controller, rows, envs, draw == 3, actions);
             assert_true(actions[rows * SA01_JOINTS] == 42);
             for (int e = 0; e < rows; e++) {
-                policy_act(policy, NULL, 1, task_env_history(envs[e]), one, NULL, NULL);
+                const float *estimated = controller_estimates(&controller, e);
+                policy_act(policy, NULL, 1, task_env_history(envs[e]), one, estimates, NULL);
+                for (int j = 0; j < SA01_ESTIMATES; j++) {
+                    worst = fmax(worst, fabs((double)estimated[j] - (double)estimates[j]));
+                }
                 for (int j = 0; j < SA01_JOINTS; j++) {
                     double gap = (double)actions[e * SA01_JOINTS + j] - (double)one[j];
                     worst = fmax(worst, fabs(gap));
