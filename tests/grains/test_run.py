@@ -117,7 +117,12 @@ def archives_that_are_not(folder):
         assert got.returncode == 2 and got.stderr.startswith("pack.py: ") and got.stderr.count("\n") == 1 and "bad.tar.xz" in got.stderr
     with run.pack.tarfile.open(folder / "other.tar.xz", "w:xz") as archive:
         archive.add(__file__, "x.py")
-    for words in (("--check", folder / "other.tar.xz"), (folder / "x.zip", __file__), (folder / "x.tar.xz", folder / "none")):
+    (folder / "SHA256SUMS").write_text(f"{'0' * 64}  x.py\n")
+    with run.pack.tarfile.open(folder / "changed.tar.xz", "w:xz") as archive:
+        archive.add(__file__, "x.py")
+        archive.add(folder / "SHA256SUMS", "SHA256SUMS")
+    for words in (("--check", folder / "other.tar.xz"), ("--check", folder / "changed.tar.xz"), (folder / "x.zip", __file__),
+                  (folder / "x.tar.xz", folder / "none")):
         got = pack(*words)
         print("pack.py ->", got.stderr.strip())
         assert got.returncode == 2 and got.stderr.startswith("pack.py: ") and got.stderr.count("\n") == 1
