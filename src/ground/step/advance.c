@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ground/law/remember.h"
+#include "ground/step/frame.h"
 #include "ground/step/moments.h"
 #include "ground/step/scratch.h"
 #include "ground/step/shell.h"
@@ -12,7 +13,8 @@ typedef struct {
     const FootScratch *foot;
     const Imprints *imprints; /* NULL: the ground forgets at lift-off */
     const double *rotation;   /* [9] foot to world */
-    Motion motion;            /* of the foot after the step */
+    Motion motion;            /* of the foot after the step, in its frame */
+    Real world[3][3];         /* [-] that frame to the world */
     double dt;                /* [s] */
     const MildTerrain *terrain;
 } Advance;
@@ -170,6 +172,16 @@ static __attribute__((noinline)) void block_wear(const Slots *s, const Memory *t
     }
 }
 
+/* [m/s] How much faster the element of a slot gets deeper than it penetrates: in the frame of the
+ * foot it goes along the normal. */
+MILD_HD Real slot_sinks(const Slots *s, int i, const Advance *a, const SlotVelocity *v) {
+    const Real z = s->slope_x[i] * v->x + s->slope_y[i] * v->y - v->descent;
+    const Real sinks = a->world[2][0] * v->x + a->world[2][1] * v->y + a->world[2][2] * z;
+    const Real x = a->world[0][0] * v->x + a->world[0][1] * v->y + a->world[0][2] * z;
+    const Real y = a->world[1][0] * v->x + a->world[1][1] * v->y + a->world[1][2] * z;
+    return s->slope_x[i] * x + s->slope_y[i] * y - sinks - v->descent;
+}
+
 /* Stores what the elements of some blocks remember, from number e of `memory` on. Adds to the lanes
  * of `count` 1 for each element that stays in the ground, and 1 for each of these that reversed. On
  * level ground the slopes are 0, and without a shell the heights. wears: bool constant, shares
@@ -203,8 +215,9 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                 changes += stays ? most : 0;
                 to.worn[e + i] = stays ? 1 - share.q : 0;
             }
-            to.depth_max[e + i] = after.depth_max;
-            to.middle[e + i] = after.middle;
+            const Real shift = dt * slot_sinks(s, i, a, &v);
+            to.depth_max[e + i] = after.depth_max > 0 ? real_max(after.depth_max + shift, 0) : 0;
+            to.middle[e + i] = after.middle + shift;
             to.front_speed[e + i] = after.front_speed;
             to.drift[e + i] = after.drift;
             to.pending_x[e + i] = after.pending_x;
@@ -389,12 +402,18 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
             continue;
         }
         const Memory memory = ground_memory(ground, f);
-        const Advance advance = {.foot = foot,
-                                 .imprints = ground->tiles > 0 ? &imprints : NULL,
-                                 .rotation = foot->shell ? shell_level : input->rotation[f],
-                                 .motion = foot_motion(foot, result->velocity + 6 * f),
-                                 .dt = input->dt,
-                                 .terrain = terrain};
+        double twist[6];
+        frame_from_world(foot, result->velocity + 6 * f, twist);
+        Advance advance = {.foot = foot,
+                           .imprints = ground->tiles > 0 ? &imprints : NULL,
+                           .rotation = foot->shell ? shell_level : input->rotation[f],
+                           .motion = foot_motion(foot, twist),
+                           .dt = input->dt,
+                           .terrain = terrain};
+        for (int k = 0; k < 9; k++) {
+            const Real one = k % 4 == 0 ? 1 : 0;
+            advance.world[k / 3][k % 3] = foot->framed ? (Real)foot->frame[k] : one;
+        }
         const int all = slots_are_whole(foot) && ground->tiles == 0 && !foot->shell;
         if (all) {
             ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material);

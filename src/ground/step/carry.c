@@ -21,10 +21,9 @@ void slots_elastic(const FootScratch *foot) {
 
 /* Cosine between the sole and the ground under each slot, into `lean`. Level ground has one for
  * all, without a root for each. */
-static void slots_lean(const FootScratch *foot) {
-    const Real side = foot->arm[3][2] < 0 ? REAL(-1) : REAL(1); /* the face that looks down */
-    const Real up[3] = {side * (Real)foot->arm[3][0], side * (Real)foot->arm[3][1],
-                        side * (Real)foot->arm[3][2]};
+static void slots_lean(const FootScratch *foot, const double *R) {
+    const Real side = R[8] < 0 ? REAL(-1) : REAL(1); /* the face that looks down */
+    const Real up[3] = {side * (Real)R[2], side * (Real)R[5], side * (Real)R[8]};
     const Real level = real_min(real_max(up[2], SHARE_LEAN), 1);
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
         for (int i = 0; i < SLOT_LANES; i++) {
@@ -55,13 +54,12 @@ MILD_HD void slot_carry(Slots *s, int i, Real dt, Real rate) {
     s->hold_stiffness[i] = element.hold_stiffness;
 }
 
-void foot_carry(const FootScratch *foot, const Motion *now, double dt) {
+void foot_carry(const FootScratch *foot, const double *R, const Motion *now, double dt) {
     slots_elastic(foot);
     if (foot->shell) {
         shell_lean(foot, now);
     } else {
-        slots_lean(foot);
-        soles_lean(foot);
+        slots_lean(foot, R);
     }
     const double rate = 1.0 / dt;
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {

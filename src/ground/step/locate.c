@@ -32,6 +32,7 @@ void foot_set_pose(FootScratch *foot, const MildTerrain *terrain, const double *
     }
     foot->uneven = !terrain_is_level(terrain);
     foot->away = 0;
+    foot->framed = 0;
 }
 
 void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints) {

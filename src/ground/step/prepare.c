@@ -6,6 +6,7 @@
 #include "ground/law/models.h"
 #include "ground/step/carry.h"
 #include "ground/step/drag.h"
+#include "ground/step/frame.h"
 #include "ground/step/gather.h"
 #include "ground/step/locate.h"
 #include "ground/step/mixture.h"
@@ -130,17 +131,21 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
                          const MildTerrain *terrain, const MildContactInput *input) {
     const Memory memory = ground_memory(ground, f);
     const double *R = input->rotation[f];
-    const Motion now = foot_motion(foot, input->velocity[f]);
+    const Motion moves = foot_motion(foot, input->velocity[f]);
     foot_laws(foot, terrain);
     if (foot->shell) {
-        shell_slots(foot, ground, f, terrain, &memory, &now, input->dt);
+        shell_slots(foot, ground, f, terrain, &memory, &moves, input->dt);
     } else {
-        foot_slots(foot, ground, f, terrain, &memory, R, &now);
+        foot_slots(foot, ground, f, terrain, &memory, R, &moves);
     }
-    Motion free = foot_motion(foot, input->free_velocity + 6 * f);
+    foot_frame(foot, R);
+    double before[6], after[6];
+    frame_from_world(foot, input->velocity[f], before);
+    frame_from_world(foot, input->free_velocity + 6 * f, after);
+    const Motion now = foot_motion(foot, before), free = foot_motion(foot, after);
     foot_begin(foot, input->dt, &now);
     if (foot->curves & LAW_HEAP) {
-        foot_carry(foot, &now, input->dt);
+        foot_carry(foot, R, &now, input->dt);
     }
     if (foot->stops) {
         slots_clear(foot);
@@ -150,7 +155,7 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
         slots_drag(foot, input->dt, &now, &free);
         foot->stops = 1;
     }
-    foot_direct(foot, terrain, input->dt, R, &now);
+    foot_direct(foot, terrain, input->dt, R, &moves);
 }
 
 /* Places of the feet in the input's rows. */

@@ -57,6 +57,8 @@ typedef struct FootScratch {
      * arm[2] + height arm[3]. */
     double origin[3]; /* [m] the ankle, world */
     double arm[4][3]; /* world: the frame's point (0, 0, z) [m], its axes [-], z for a shell */
+    int framed;       /* bool: the sole presses in a frame of its own, in which the arms are then */
+    double frame[9];  /* [-] that frame to the world, row major: foot_frame */
     int uneven;       /* bool: the terrain is not level; otherwise all slopes are 0 */
     int away;         /* bool: no element can touch; depth and area_share are not set */
     double reach;     /* [m] upper bound on the depths: foot_reach */
@@ -106,7 +108,9 @@ struct MildScratch {
     double wrench[TWIST_MAX];       /* [N s, N m s] sum of B^T I at the last pass */
     /* [kg, kg m, kg m^2] -d wrench/d twist of each foot, 6 x 6, row major. */
     double hessian[MILD_FEET_MAX][36];
-    double velocity[TWIST_MAX]; /* [m/s, rad/s] V+ of the last solve */
+    double velocity[TWIST_MAX]; /* [m/s, rad/s] V+ of the last solve, in the frames of the feet */
+    MildContactInput input;     /* contact_in_frames */
+    double inverse[TWIST_MAX * TWIST_MAX];
     double dt;                  /* [s] of the last solve */
     int is_number;              /* bool: its problem and all of its results are finite */
     double *block;              /* the one allocation behind all arrays */

@@ -4,6 +4,7 @@
 
 #include "ground/law/friction.h"
 #include "ground/step/energy.h"
+#include "ground/step/frame.h"
 #include "ground/step/moments.h"
 #include "ground/step/prepare.h"
 #include "ground/step/shell.h"
@@ -46,10 +47,15 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
     }
     result->depth_mean = sums[0] / loaded;
     const double z = foot->shell ? shell_loaded(foot, &result->area) : 0.0;
+    double center[6] = {0.0};
     for (int k = 0; k < 3; k++) {
-        result->pressure_center[k] =
-            position[k] + foot->arm[0][k] +
+        center[k] =
+            foot->arm[0][k] +
             (sums[3] * foot->arm[1][k] + sums[4] * foot->arm[2][k] + z * foot->arm[3][k]) / force;
+    }
+    frame_to_world(foot, center, center);
+    for (int k = 0; k < 3; k++) {
+        result->pressure_center[k] = position[k] + center[k];
     }
 }
 
@@ -82,10 +88,11 @@ static void foot_result(const MildScratch *scratch, const MildContactInput *inpu
                         MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
     const double *R = input->rotation[f];
-    double *F = result->force, *tau = result->torque;
+    double *F = result->force, *tau = result->torque, wrench[6];
+    frame_to_world(foot, scratch->wrench + 6 * f, wrench);
     for (int k = 0; k < 3; k++) {
-        F[k] = scratch->wrench[6 * f + k] / input->dt;
-        tau[k] = scratch->wrench[6 * f + 3 + k] / input->dt;
+        F[k] = wrench[k] / input->dt;
+        tau[k] = wrench[3 + k] / input->dt;
     }
     foot_axis(F, tau, result->zmp_axis);
     double z = R[6] * foot->center_x + R[7] * foot->center_y + R[8] * foot->z;
@@ -170,19 +177,21 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
         memcpy(result->velocity, input->free_velocity, bytes);
         return;
     }
+    const MildContactInput *own = input;
     if (contact_prepare(ground, terrain, input, scratch) == 0) {
         memcpy(result->velocity, input->free_velocity, bytes);
         result->converged = 1;
     } else {
+        own = contact_in_frames(scratch, input);
         energy_begin(scratch);
-        step_solve(scratch, input, result);
+        step_solve(scratch, own, result);
         int iterations = result->iterations;
         const int rounds = input->solver == MILD_SOLVER_EXPLICIT ? 0 : ENERGY_ROUNDS;
         for (int round = 1; round <= rounds; round++) {
-            if (!energy_created(scratch, input, result, round == rounds)) {
+            if (!energy_created(scratch, own, result, round == rounds)) {
                 break;
             }
-            step_solve(scratch, input, result);
+            step_solve(scratch, own, result);
             iterations += result->iterations;
         }
         result->iterations = iterations;
@@ -191,6 +200,7 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
     int nan = 0;
     for (int k = 0; k < scratch->listed; k++) {
         const int f = scratch->list[k];
+        frame_to_world(&scratch->foot[f], result->velocity + 6 * f, result->velocity + 6 * f);
         foot_result(scratch, input, f, &result->foot[f]);
         nan |= scratch->foot[f].nan;
     }
