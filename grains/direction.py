@@ -3,7 +3,7 @@
 
     PYTHONPATH=build/python .venv/bin/python grains/direction.py predict --out out/predicted.csv     no record is read but those of the fit
     grains/run.py --only '^(led|landing)' --out out/records                                           the records, 12 minutes of a GPU
-    .venv/bin/python grains/direction.py table [--rows] [--predicted out/predicted.csv]               errors of each model
+    PYTHONPATH=build/python .venv/bin/python grains/direction.py table [--rows] [--predicted out/predicted.csv]               errors of each model
 
 Numbers of a case: the force along and up [N], mean over the deepest 40 % of a way down or the second half of a way along; of a landing
 the largest force up within 15 ms of contact [N], the impulses up of 10 and of 30 ms and along of 30 ms [N s], the depth [m]; of a
@@ -120,6 +120,8 @@ def table(args):
             if not got:
                 continue
             for name, force in vectors(means).items():
+                if abs(force) < 1:  # [N] in the air
+                    continue
                 other = vectors(got)[name]
                 error = abs(other - force) / abs(force)
                 (way if "/way" in case else led).append((error, abs(np.degrees(np.angle(other / force))) if other else 90))

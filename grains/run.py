@@ -53,7 +53,7 @@ FAMILIES = {
     "led_wide": {"seeds": "11-13", "box": WIDE, "grain": 0.005, "friction": 0.5},
     "led_deep": {"seeds": "11-13", "box": DEEP, "grain": 0.005, "friction": 0.5, "settle": 0.8},
     "led_fine": {"seeds": "11-13", "box": FINE, "grain": 0.0025, "friction": 0.5, "settle": 0.4},
-    "landing": {"seeds": "11-13", "box": "0.72,0.44,0.3", "grain": 0.005, "friction": 0.5, "settle": 1},
+    "landing": {"seeds": "11-13", "box": "0.72,0.44,0.3", "grain": 0.005, "friction": 0.5, "settle": 1, "steps": 50},
 }
 
 

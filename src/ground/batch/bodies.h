@@ -421,7 +421,7 @@ MILD_HD void bodies_carry(const BodiesSetup *setup, const BodiesWork *work, int 
         ahead = share_ahead(&own->element, &own->share, lean, normal, now.x, now.y, now.descent);
     }
     element_share(&own->element, &own->before, &own->share, elastic, setup->dt, 1 / setup->dt, lean,
-                  ahead);
+                  ahead, 0);
     element_share_virgin(&own->element, own->share.q);
 }
 

@@ -54,6 +54,9 @@
 #include "ground/law/power.h"
 
 #define LAW_HEAP_LEAST REAL(1e-9) /* [-] least `begin` of a heap: what begins at 0 is a cone */
+#ifndef LAW_TAIL
+#define LAW_TAIL REAL(0.02)
+#endif
 #define LAW_MOVES REAL(5)         /* [-] depth per recruited depth of what moves with a heap */
 
 /* The curves that a law has besides line and bed. All elements of a foot use the union of its
@@ -175,13 +178,13 @@ MILD_HD Real law_moved_depth(const Law *law) {
 
 /* P_m(u) [m] */
 MILD_HD Real law_moved(const Law *law, int curves, Real depth) {
-    const Real heap = real_min(depth, law_moved_depth(law)) * (1 / LAW_MOVES);
+    const Real heap = real_min(depth, law_moved_depth(law)) * (1 / LAW_MOVES - LAW_TAIL) + LAW_TAIL * depth;
     return law_is_heap(law, curves) ? heap : law_recruited(law, curves, depth);
 }
 
 /* P_m'(u) [-] */
 MILD_HD Real law_moved_share(const Law *law, int curves, Real depth) {
-    const Real heap = depth < law_moved_depth(law) ? 1 / LAW_MOVES : 0;
+    const Real heap = depth < law_moved_depth(law) ? 1 / LAW_MOVES : LAW_TAIL;
     return law_is_heap(law, curves) ? heap : law_flat_share(law, curves, depth);
 }
 
@@ -292,8 +295,8 @@ MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way, const P
         over.mean +=
             law->flat_stiffness * ((open_begin + 4 * open_half + open_end) * REAL(1.0 / 6.0));
         const Real moved = law_moved_depth(law);
-        const Real moves = (real_min(end, moved) - real_min(begin, moved)) * (1 / LAW_MOVES);
-        const Real moves_slope = end < moved ? 1 / LAW_MOVES : 0;
+        const Real moves = (real_min(end, moved) - real_min(begin, moved)) * (1 / LAW_MOVES - LAW_TAIL) + LAW_TAIL * way;
+        const Real moves_slope = end < moved ? 1 / LAW_MOVES : LAW_TAIL;
         const int heap = law_is_heap(law, curves) && way > 0;
         over.recruited = heap ? moves : over.recruited;
         over.recruited_slope = heap ? moves_slope : over.recruited_slope;

@@ -102,26 +102,27 @@ typedef struct {
     int changes; /* bool: it is not that of the element, or friction is another */
 } ShareLoad;
 
-/* [-] Friction of an element at the share q of c, whose yield load is `force` [N]. rate: 1/dt. */
-MILD_HD Real share_grip(const Element *e, const Share *share, Real q, Real c, Real force, Real dt,
-                        Real rate) {
+/* [-] Friction of an element at the share q of c, whose yield load is `force` [N]. slides: [m^2/s^2]
+ * square of its speed along the ground. rate: 1/dt. */
+MILD_HD Real share_grip(const Element *e, const Share *share, Real q, Real c, Real force,
+                        Real slides, Real dt, Real rate) {
     const Real lost = 1 - real_over(q, c);
-    const Real grips = real_max(real_over(SHARE_YIELD * share->grip * lost, 1 + lost), SHARE_GRIP);
-    const Real held = real_min(share->mu, grips);
+    const Real held = real_min(share->mu, real_over(SHARE_YIELD * share->grip * lost, 1 + lost));
 
-    /* The recruited mass is set in motion by the whole of mu. */
+    /* The recruited mass is set in motion along by mu and the square of the sine of the way. */
     const Real a = e->yield_depth;
     const Real h = e->entry_speed;
     const Real way = real_max(e->depth + dt / 2 * h - a, 0);
     const Real drag = real_max(e->law.drag_rate, 0) * law_moved_share(&e->law, LAW_HEAP, a);
     const Real strikes = drag * way * h * rate;
     const Real moves = real_over(strikes, strikes + force + ELEMENT_TINY);
-    return share->grip > 0 ? held + (share->mu - held) * moves : share->mu;
+    const Real struck = share->mu * real_over(slides, slides + h * h + ELEMENT_TINY);
+    return share->grip > 0 ? held + (struck - held) * moves : share->mu;
 }
 
 /* element_share without friction's spring. */
 MILD_HD ShareLoad element_share_still(Element *e, Share *share, Real dt, Real rate, Real level,
-                                      Real ahead) {
+                                      Real ahead, Real slides) {
     const Real a = e->yield_depth;
     const Real k = e->unload_stiffness;
     const Real c = share_lean(share, level);
@@ -129,7 +130,7 @@ MILD_HD ShareLoad element_share_still(Element *e, Share *share, Real dt, Real ra
     const Real force = share_force(e, q);
     /* a GPU passes by where nothing grips, a vector does not */
     const int grips = ON_GPU(share->grip > 0, 1);
-    const Real mu = grips ? share_grip(e, share, q, c, force, dt, rate) : share->mu;
+    const Real mu = grips ? share_grip(e, share, q, c, force, slides, dt, rate) : share->mu;
     const Real sides = share->side * e->depth * real_max(e->depth, 0) + ahead;
     const ShareLoad load = {force, q < 1 || mu != e->mu || sides > 0};
     share->lean = c;
@@ -144,8 +145,8 @@ MILD_HD ShareLoad element_share_still(Element *e, Share *share, Real dt, Real ra
  * line says the whole force at the yield depth. elastic: [N] force of ground without memory. level:
  * cosine between sole and ground. ahead: [N] share_ahead of a face, 0 of a sole. */
 MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, Real elastic,
-                           Real dt, Real rate, Real level, Real ahead) {
-    const ShareLoad load = element_share_still(e, share, dt, rate, level, ahead);
+                           Real dt, Real rate, Real level, Real ahead, Real slides) {
+    const ShareLoad load = element_share_still(e, share, dt, rate, level, ahead, slides);
     Element still = *e;
     friction_hold(&still, memory, dt, rate, load.force + elastic);
     e->hold_x = load.changes ? still.hold_x : e->hold_x;
@@ -242,6 +243,25 @@ MILD_HD Real element_slide(const Element *e, const Share *share, const ElementMe
 /* [m] Penetration of a step beyond the yield depth. */
 MILD_HD Real element_fresh(const Element *e, Real dt, Real speed) {
     return real_max(e->depth + dt / 2 * speed - e->yield_depth, 0);
+}
+
+/* The added mass of an element that slows down faster than the ground stops it runs ahead, and
+ * takes the yield depth with it:
+ *
+ *     w_a <- w_a - dt q F_g(a)/m_a
+ * Called after element_remember, which has the mass at the element. */
+MILD_HD void element_run(const Element *e, const ElementMemory *memory, ElementMemory *after,
+                         Real dt, Real speed, int stays) {
+    const Real force = e->unload_stiffness * (e->yield_depth - e->zero_depth);
+    const Real v = memory->front_speed;
+    const Real grows = e->law.mass_rate * law_moved_share(&e->law, LAW_HEAP, e->yield_depth);
+    const Real runs =
+        real_over(e->added_mass * v - dt * force, e->added_mass + grows * dt * v + ELEMENT_TINY);
+    const Real front = e->yield_depth + dt * runs;
+    const int ahead = stays && e->added_mass > 0 && runs > real_max(speed, 0) &&
+                      front > after->depth_max;
+    after->depth_max = ahead ? front : after->depth_max;
+    after->front_speed = ahead ? runs : after->front_speed;
 }
 
 /* Bool: slip lowers the share in a step. */

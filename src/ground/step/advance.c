@@ -64,6 +64,16 @@ static void element_imprint(const Advance *a, const Memory *memory, const Slots 
     memory->front_speed[e] = 0.0;
 }
 
+/* [m/s] How much faster the element of a slot gets deeper than it penetrates: in the frame of the
+ * foot it goes along the normal. */
+MILD_HD Real slot_sinks(const Slots *s, int i, const Advance *a, const SlotVelocity *v) {
+    const Real z = s->slope_x[i] * v->x + s->slope_y[i] * v->y - v->descent;
+    const Real sinks = a->world[2][0] * v->x + a->world[2][1] * v->y + a->world[2][2] * z;
+    const Real x = a->world[0][0] * v->x + a->world[0][1] * v->y + a->world[0][2] * z;
+    const Real y = a->world[1][0] * v->x + a->world[1][1] * v->y + a->world[1][2] * z;
+    return s->slope_x[i] * x + s->slope_y[i] * y - sinks - v->descent;
+}
+
 /* [m] element_peak of a slot that reversed within the step. */
 static __attribute__((cold, noinline)) double slot_peak(const Slots *s, int i, int curves,
                                                         double speed, double middle) {
@@ -74,11 +84,13 @@ static __attribute__((cold, noinline)) double slot_peak(const Slots *s, int i, i
 
 /* Raises the greatest depth of a slot, of element e, if the element reversed within the step: it
  * was then deeper than at either end. */
-static void slot_raise(const Memory *memory, const Slots *s, int i, int e, int curves, double speed,
-                       double middle) {
-    const int turns = element_turns(s->entry_speed[i], speed);
-    const double peak = turns ? slot_peak(s, i, curves, speed, middle) : middle;
-    const double depth = s->virgin_depth[i] + peak - s->yield_depth[i];
+static void slot_raise(const Advance *a, const Memory *memory, const Slots *s, int i, int e,
+                       const SlotVelocity *v, double middle) {
+    const int turns = element_turns(s->entry_speed[i], v->descent);
+    const double peak =
+        turns ? slot_peak(s, i, a->foot->curves, v->descent, middle) : middle;
+    const double depth =
+        s->virgin_depth[i] + peak - s->yield_depth[i] + a->dt * slot_sinks(s, i, a, v);
     memory->depth_max[e] = real_max(depth, memory->depth_max[e]); /* a NaN changes nothing */
 }
 
@@ -91,7 +103,7 @@ static __attribute__((cold, noinline)) void foot_peaks(const Advance *a, const M
         const SlotVelocity v = slot_velocity(s, i, &a->motion, 1);
         const double middle = s->depth[i] + a->dt / 2 * v.descent;
         if (middle > 0.0 && element_turns(s->entry_speed[i], v.descent)) {
-            slot_raise(memory, s, i, e, a->foot->curves, v.descent, middle);
+            slot_raise(a, memory, s, i, e, &v, middle);
         }
     }
 }
@@ -172,16 +184,6 @@ static __attribute__((noinline)) void block_wear(const Slots *s, const Memory *t
     }
 }
 
-/* [m/s] How much faster the element of a slot gets deeper than it penetrates: in the frame of the
- * foot it goes along the normal. */
-MILD_HD Real slot_sinks(const Slots *s, int i, const Advance *a, const SlotVelocity *v) {
-    const Real z = s->slope_x[i] * v->x + s->slope_y[i] * v->y - v->descent;
-    const Real sinks = a->world[2][0] * v->x + a->world[2][1] * v->y + a->world[2][2] * z;
-    const Real x = a->world[0][0] * v->x + a->world[0][1] * v->y + a->world[0][2] * z;
-    const Real y = a->world[1][0] * v->x + a->world[1][1] * v->y + a->world[1][2] * z;
-    return s->slope_x[i] * x + s->slope_y[i] * y - sinks - v->descent;
-}
-
 /* Stores what the elements of some blocks remember, from number e of `memory` on. Adds to the lanes
  * of `count` 1 for each element that stays in the ground, and 1 for each of these that reversed. On
  * level ground the slopes are 0, and without a shell the heights. wears: bool constant, shares
@@ -206,6 +208,9 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                 element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
             if (wears) {
                 const Share share = slot_share(s, i);
+                Element heap = element;
+                heap.law.cone_begin = s->cone_begin[i];
+                element_run(&heap, &before, &after, dt, v.descent, stays);
                 slid[i] =
                     element_slide(&element, &share, &before, &after, dt, s->iz[i], v.x, v.y, stays);
                 fresh[i] = element_fresh(&element, dt, v.descent);
@@ -356,7 +361,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         const int carried = memory->material[e] >= 0;
         memory_take(memory, e, after, i, foot->curves & LAW_HEAP);
         if (!lifted) {
-            slot_raise(memory, s, i, e, foot->curves, v.descent, middle);
+            slot_raise(a, memory, s, i, e, &v, middle);
         }
         const int barred = (material[slot] & SLOT_BARRED) != 0;
         memory->material[e] = lifted || barred ? lifted_material : material[slot];

@@ -38,12 +38,14 @@ static void slots_lean(const FootScratch *foot, const double *R) {
     }
 }
 
-MILD_HD void slot_carry(Slots *s, int i, Real dt, Real rate) {
+MILD_HD void slot_carry(Slots *s, int i, Real dt, Real rate, const Motion *now) {
+    const SlotVelocity v = slot_velocity(s, i, now, SLOT_UNEVEN | SLOT_SHELL);
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
     element.law.cone_begin = s->cone_begin[i];
     Share share = slot_share(s, i);
-    element_share(&element, &memory, &share, s->fx[i], dt, rate, share.lean, s->ahead[i]);
+    element_share(&element, &memory, &share, s->fx[i], dt, rate, share.lean, s->ahead[i],
+                  v.x * v.x + v.y * v.y);
     s->mu[i] = element.mu;
     s->drift_bound[i] = element.drift_bound;
     s->lean[i] = share.lean;
@@ -62,10 +64,11 @@ void foot_carry(const FootScratch *foot, const double *R, const Motion *now, dou
         slots_lean(foot, R);
     }
     const double rate = 1.0 / dt;
+    const Motion motion = *now;
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
-            slot_carry(s, i, dt, rate);
+            slot_carry(s, i, dt, rate, &motion);
         }
     }
 }
