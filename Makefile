@@ -59,14 +59,14 @@ setup:
 	@scripts/setup.sh
 
 build: setup
-	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
+	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release -DMILD_LAB=ON --log-level=WARNING $(CMAKE_FLAGS)
 	@cmake --build build --parallel $(JOBS)
 
 # The program alone; tests, plugin and Python module come with `build`, and take longer than it. VERBOSE=1 shows the compiler.
 .PHONY: program
 program: setup
 	@scripts/quietly.sh build/log/configure.log "configuring the build" \
-		cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
+		cmake -S . -B build -DCMAKE_BUILD_TYPE=Release -DMILD_LAB=ON --log-level=WARNING $(CMAKE_FLAGS)
 	@scripts/quietly.sh build/log/compile.log "building build/mild" cmake --build build --parallel $(JOBS) --target mild
 
 test: build

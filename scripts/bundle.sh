@@ -16,7 +16,7 @@ rm -rf "$bundle"
 mkdir -p "$bundle/bin" "$bundle/lib"
 sizes=engine_sizes # of the first build, because the second may not run here
 for march in x86-64-v3 x86-64-v4; do
-    cmake -S . -B "build/$march" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_CUDA=ON -DMILD_VIEW=OFF "${ranks[@]}" \
+    cmake -S . -B "build/$march" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_LAB=ON -DMILD_CUDA=ON -DMILD_VIEW=OFF "${ranks[@]}" \
         -DMILD_MARCH=$march -DMILD_ENGINE_SIZES="$sizes" -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
         -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' >/dev/null
     cmake --build "build/$march" --parallel "$jobs" --target mild mild_envs gpu_test_gpu gpu_test_parts batch_test_batch batch_test_points \

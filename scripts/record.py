@@ -122,7 +122,7 @@ def commands():
         *(Command("train_16384" + name, "mild", ["MILD", *QUICK, "--train.envs=16384", "--train.iterations=45", "--out", "FOLDER", *more],
                   rows_of_log, gpu=True) for name, more in (("", []), ("_without_shells", ["--task.shells_stand=false"]))),
         Command("walk_from_nothing", "mild", ["bash", "-c", walk, "MILD", "FOLDER", "FILE"], rows_of_walk, gpu=True, rounds=1),
-        Command("newton_mpm", "Newton's MPM", ["PYTHON", "scripts/judge_mpm.py", "--out", "FOLDER/mpm", "--friction", "0.42", "--only",
+        Command("newton_mpm", "Newton's MPM", ["PYTHON", "lab/grains/judge_mpm.py", "--out", "FOLDER/mpm", "--friction", "0.42", "--only",
                                                "^sand/disc120$", "--seconds", "120"], rows_of_mpm, gpu=True,
                 modules=("newton", "warp", "numpy"), rounds=1),
         Command("mjlab", "mjlab", ["bash", "-c", '"$0" scripts/mjlab_time.py Go1 >"$1"', "PYTHON", "FILE"], rows_of_mjlab, gpu=True,

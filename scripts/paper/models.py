@@ -7,7 +7,7 @@ from measure import SLIPS, TRAINED, deviation, evaluate, mean, mild, models_of, 
 from page import Cell, Claim, Section, Table
 
 JUDGES = TRAINED[:-2] + ["bekker", "hunt_crossley", "mild_merged", "rigid", "grains"]
-GRAINS = pathlib.Path(__file__).parents[2] / "grains" / "walk" / "grounds.json"  # fitted to grains: docs/grains.md
+GRAINS = pathlib.Path(__file__).parents[2] / "lab/grains" / "walk" / "grounds.json"  # fitted to grains: lab/grains/README.md
 TESTED = ["foam25", "foam45", "sand_loose"]
 
 

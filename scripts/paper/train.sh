@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Trains one policy per ground model and seed, by configs/models.ini with Muon and 250 million steps, on one GPU, two to three minutes
 # each: FOLDER/MODEL-SEED.safetensors. What is there is kept. SEEDS: how many, or FIRST-LAST. ITERATIONS=N for fewer or more.
-# mild_slips, mild_merged_slips: those models, on grounds where slip sinks as grains/walk/sand learned it (docs/grains.md).
+# mild_slips, mild_merged_slips: those models, on grounds where slip sinks as lab/grains/walk/sand learned it (lab/grains/README.md).
 # Usage: scripts/paper/train.sh FOLDER [SEEDS [MODEL ...]]
 set -euo pipefail
 out=${1:?usage: scripts/paper/train.sh FOLDER [SEEDS [MODEL ...]]}

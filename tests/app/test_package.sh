@@ -48,7 +48,7 @@ printf 'iteration,a\n1,2\n' >installed/run/log.csv
 printf '[train]\nenvs = 7\n' >installed/run/config.ini
 cd installed
 export PYTHONDONTWRITEBYTECODE=1 MILD_HOME=
-bad "mild judge: scripts/judge.py MILD_HOME" python3 -m mild judge --out out
+bad "mild judge: lab/grains/judge.py MILD_HOME" python3 -m mild judge --out out
 bad "mild bench record: scripts/record.py MILD_HOME" python3 -m mild bench record out
 bad "mild report: none/log.csv" python3 -m mild report none
 expect 0 '^report run/report.html$' python3 -m mild report run

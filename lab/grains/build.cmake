@@ -1,0 +1,42 @@
+if(MILD_FUZZ)
+  return()
+endif()
+# Beds of grains: a program of its own, `cmake --build build --target grains`; nothing of it is installed.
+# With MILD_CUDA on a GPU, otherwise on the CPU with OpenMP. The test is always the CPU's.
+find_package(OpenMP COMPONENTS CXX)
+add_executable(grains grains/main.cu)
+add_executable(grains_draw grains/draw.cpp) # pictures for walk.py
+set_target_properties(grains grains_draw PROPERTIES CXX_STANDARD 17 CUDA_STANDARD 17 RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/grains)
+if(MILD_CUDA)
+  target_compile_options(grains PRIVATE -O3 -ftz=true -prec-div=false -prec-sqrt=false)
+else()
+  set_source_files_properties(grains/main.cu PROPERTIES LANGUAGE CXX)
+  target_link_libraries(grains PRIVATE mild_options $<TARGET_NAME_IF_EXISTS:OpenMP::OpenMP_CXX>)
+endif()
+target_link_libraries(grains_draw PRIVATE mild_options)
+
+if(MILD_TESTS)
+  add_executable(grains_test_grains grains/tests/test_grains.cpp)
+  target_include_directories(grains_test_grains PRIVATE ${CMAKE_SOURCE_DIR} ${CMAKE_SOURCE_DIR}/include ${CMAKE_SOURCE_DIR}/tests)
+  target_link_libraries(grains_test_grains PRIVATE cmocka mild_options $<TARGET_NAME_IF_EXISTS:OpenMP::OpenMP_CXX>)
+  set_target_properties(grains_test_grains PROPERTIES CXX_STANDARD 17)
+  add_test(NAME grains/grains COMMAND grains_test_grains)
+  set_tests_properties(grains/grains PROPERTIES COST 1000) # begins first
+  set(tests ${CMAKE_CURRENT_LIST_DIR}/tests)
+  if(NOT MILD_CUDA) # the program of that build needs a GPU
+    add_test(NAME grains/run COMMAND python3 ${tests}/test_run.py $<TARGET_FILE:grains> ${CMAKE_SOURCE_DIR})
+    add_test(NAME grains/walk COMMAND python3 ${tests}/test_walk.py $<TARGET_FILE:mild> $<TARGET_FILE:grains> ${CMAKE_SOURCE_DIR})
+  endif()
+endif()
+if(MILD_TESTS AND TARGET _envs)
+  set(python ${CMAKE_SOURCE_DIR}/.venv/bin/python)
+  add_test(NAME judge/judge COMMAND ${python} ${tests}/test_judge.py ${CMAKE_SOURCE_DIR} $<TARGET_FILE:mild>)
+  add_test(NAME judge/real COMMAND ${python} ${tests}/test_real.py ${CMAKE_SOURCE_DIR})
+  add_test(NAME judge/mpm COMMAND ${python} ${tests}/test_mpm.py ${CMAKE_SOURCE_DIR})
+  add_test(NAME grains/walk_mpm COMMAND ${python} ${tests}/test_walk_mpm.py $<TARGET_FILE:mild>)
+  add_test(NAME grains/walk_lead COMMAND ${python} ${tests}/test_walk_lead.py ${CMAKE_SOURCE_DIR} $<TARGET_FILE:mild>)
+  add_test(NAME grains/blow COMMAND ${python} ${tests}/test_blow.py ${CMAKE_SOURCE_DIR})
+  add_test(NAME grains/walk_pictures COMMAND ${python} ${tests}/test_walk_pictures.py ${CMAKE_SOURCE_DIR})
+  set_tests_properties(judge/judge judge/real judge/mpm grains/walk_lead grains/blow PROPERTIES ENVIRONMENT
+    "PYTHONPATH=${CMAKE_BINARY_DIR}/python;PYTHONDONTWRITEBYTECODE=1")
+endif()
