@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Commands of the Python package: `mild judge` and `mild bench record` become the Python that MILD_PYTHON names, with the arguments as
-# they are, and say how they are run where there is none. Usage: test_package.sh PATH_TO_MILD
+# Commands that are other programs. mild-NAME, as git has it. `mild judge` and `mild bench record` become the Python that MILD_PYTHON
+# names, with the arguments as they are, and say how they are run where there is none. Usage: test_package.sh PATH_TO_MILD
 root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$root/tests/kit.sh" "$1"
 
@@ -29,6 +29,22 @@ bad "python -m mild judge" env MILD_PYTHON= PATH=/nowhere MILD_HOME=/nowhere ./a
 printf '#!/bin/sh\nexec python3 -S -E "$@"\n' >bare # without installed packages
 chmod +x bare
 bad "python -m mild judge" env MILD_PYTHON=$work/bare ./alone judge --out out
+
+# mild-NAME, beside the program first, then on PATH; an option and a path are no such names
+mkdir bin
+printf '#!/bin/sh\nprintf "<%%s>\\n" "$0" "$MILD" "$@" >other.txt\nexit 8\n' | tee mild-other >bin/mild-other
+printf '#!/bin/sh\ntouch wrong\n' | tee bin/mild-eval >bin/mild---other
+chmod +x mild-other bin/*
+PATH=$work/bin:$PATH "$mild" other 'a b' --help ''
+[ $? = 8 ] || fail "not the exit code of mild-other"
+[ "$(cat other.txt)" = "$(printf '<%s>\n' "$work/bin/mild-other" "$mild" 'a b' --help '')" ] || fail "mild-other: $(cat other.txt)"
+PATH=$work/bin:$PATH ./alone other
+grep -qx "<$work/mild-other>" other.txt || fail "not the one beside the program: $(cat other.txt)"
+PATH=$work/bin:$PATH "$mild" eval --help >/dev/null || fail "a program in the place of a row"
+bad "unknown --other" env "PATH=$work/bin:$PATH" "$mild" --other
+bad "unknown bin/../other" env "PATH=$work/bin:$PATH" "$mild" bin/../other
+bad "unknown othr" "$mild" othr
+[ ! -e wrong ] || fail "another program was run"
 
 # files of the working directory are no packages
 mkdir mild

@@ -44,8 +44,6 @@ fit fit foam.json sand.json bekker.json drag.json
 "$mild" eval --ground grass --trials 1 --seconds 6 --actions walk.csv >/dev/null || fail "eval --actions"
 "$mild" fit walk.csv --json fit_walk.json >/dev/null || fail "fit of a walk"
 fit fit_walk fit_walk.json
-"$mild" know --grounds 2 --seconds 5 --json know.json >/dev/null || fail "know"
-fit know know.json
 sed 's/"alarms":.*/"alarms": -1,/' fit_walk.json >bad.json && unfit fit_walk '.alarms: below 0'
 
 # each kind of fault, in a copy of what fits

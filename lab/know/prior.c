@@ -1,4 +1,4 @@
-#include "run/know/prior.h"
+#include "know/prior.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "run/know/walks.h"
+#include "know/walks.h"
 
 #include <math.h>
 #include <stdlib.h>

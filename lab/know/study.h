@@ -2,8 +2,8 @@
 #ifndef KNOW_STUDY_H
 #define KNOW_STUDY_H
 
-#include "run/know/prior.h"
-#include "run/know/walks.h"
+#include "know/prior.h"
+#include "know/walks.h"
 
 /* Walks that share a robot's noise and randomisation. */
 enum { STUDY_BATCH = 48 };

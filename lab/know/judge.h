@@ -3,7 +3,7 @@
 #define KNOW_JUDGE_H
 
 #include "identify/belief/belief.h"
-#include "run/know/study.h"
+#include "know/study.h"
 
 /* Footsteps after which the posterior is judged; the last: at the end of the walk. */
 enum { JUDGE_DEPTHS = 4, JUDGE_LAST = JUDGE_DEPTHS - 1 };

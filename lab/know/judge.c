@@ -1,4 +1,4 @@
-#include "run/know/judge.h"
+#include "know/judge.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -7,14 +7,14 @@
 
 #include "app/build.h"
 #include "app/cli.h"
-#include "app/commands.h"
 #include "app/context.h"
 #include "app/report.h"
 #include "base/file.h"
 #include "base/text.h"
 #include "identify/belief/file.h"
+#include "know/judge.h"
+#include "lab/commands.h"
 #include "run/config/experiment_keys.h"
-#include "run/know/judge.h"
 
 #define CLOCK_LEAST 0.2 /* [s] as of task.gait_period */
 

@@ -1,4 +1,4 @@
-#include "run/know/study.h"
+#include "know/study.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Learns the weights by which a robot knows its ground (docs/identify.md), from walks that `mild know --walks` writes.
 
-  scripts/know.py walk --out out/know       # 18 000 walks for the posterior, 12 000 over borders and 28 h without for the alarm
-  scripts/know.py train out/know --out policies/knows.safetensors
-  scripts/know.py alarm out/know --weights policies/knows.safetensors    # the alarm of these weights alone
-  scripts/know.py bound out/know            # R2 of the sensors beside that of the true states, by the same networks
+  lab/know/know.py walk --out out/know       # 18 000 walks for the posterior, 12 000 over borders and 28 h without for the alarm
+  lab/know/know.py train out/know --out policies/knows.safetensors
+  lab/know/know.py alarm out/know --weights policies/knows.safetensors    # the alarm of these weights alone
+  lab/know/know.py bound out/know            # R2 of the sensors beside that of the true states, by the same networks
 
 Needs NumPy alone. One network embeds each footstep, the mean of the embeddings over the footsteps is all that is remembered, and
 another reads from it the mean and the variance of each parameter, in standard deviations of its prior. The loss is the likelihood.
@@ -20,7 +20,7 @@ import zlib
 
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 NAMES = ("sinkage", "k_pen", "sigma_cone", "mu", "slip_length")
 COUNT = len(NAMES)
 FRAME, BINS, EMBED, HIDDEN, KNOTS, MEMORY = 47, 8, 96, 64, 31, 24
@@ -467,7 +467,7 @@ def train(given):
     widen = calibrated(network, walks)
     save(given.out, {"embed": network.embed, "embed_bias": network.embed_bias, "hidden": network.hidden, "hidden_bias": network.hidden_bias,
                      "out": network.out, "out_bias": network.out_bias, "prior": walks.knots, "widen": widen,
-                     **learn_alarm(given, network.embedded)}, f"scripts/know.py train --seed {given.seed}")
+                     **learn_alarm(given, network.embedded)}, f"lab/know/know.py train --seed {given.seed}")
 
 
 def crossings(given, *kinds):
@@ -492,7 +492,7 @@ def alarm_alone(given):
     tensors, note = load(given.weights)
     embed, bias = (tensors[name].astype(np.float32) for name in ("embed", "embed_bias"))
     learned = learn_alarm(given, lambda features: elu(features @ embed + bias))
-    save(given.weights, {**tensors, **learned}, note.split("; ")[0] + f"; scripts/know.py alarm --seed {given.seed}")
+    save(given.weights, {**tensors, **learned}, note.split("; ")[0] + f"; lab/know/know.py alarm --seed {given.seed}")
 
 
 def main():

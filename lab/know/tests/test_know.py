@@ -12,7 +12,7 @@ import tempfile
 import numpy as np
 
 mild, root = (pathlib.Path(path).resolve() for path in sys.argv[1:])
-sys.path.insert(0, str(root / "scripts"))
+sys.path.insert(0, str(root / "lab/know"))
 sys.dont_write_bytecode = True
 import know  # noqa: E402
 
@@ -134,6 +134,8 @@ def commands(folder):
     run("play", "--ground", "sand_loose", "--seconds", 6, "--pressure", folder / "p.csv", "--log", folder / "log.csv")
     text = run("fit", folder / "log.csv")
     assert all(name in text for name in know.NAMES), text
+    run("know", "--grounds", 2, "--seconds", 5, "--json", folder / "know.json")
+    subprocess.run([sys.executable, root / "tests/app/schema.py", root / "docs/schema/know.json", folder / "know.json"], check=True)
     for arguments, words in ((("fit", folder / "log.csv", "--plate", "0.2,0.1"), "walk's log"),
                              (("fit", folder / "log.csv", "--trial", "3", "--json", "/nowhere/x"), "/nowhere"),
                              (("know", "--clock", "0.02,1"), "slip length and two periods"), (("know", "--clock", "0.02,1,0.1"), "at least 0.2 s"), (("know", "--prior", "flat"), "neither wide nor paper nor presets"), (("know", "--ground", "mud"), "mud"),
