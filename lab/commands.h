@@ -2,7 +2,9 @@
 #ifndef LAB_COMMANDS_H
 #define LAB_COMMANDS_H
 
-#define LAB_COMMANDS(X) X(know, "judge what a robot knows of its ground from its own sensors")
+#define LAB_COMMANDS(X)                                                                            \
+    X(know, "judge what a robot knows of its ground from its own sensors")                         \
+    X(bench, "measure speed and memory on this machine")
 
 #define LAB_DECLARE(name, help) int cmd_##name(int argc, char **argv);
 LAB_COMMANDS(LAB_DECLARE)

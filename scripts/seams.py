@@ -34,7 +34,7 @@ def inside():
     declared, named = {}, collections.defaultdict(set)
     public = {name for folder in PUBLIC for _, text in sources(folder) for name in re.findall(r"\w+", text)}
     for path, text in itertools.chain(sources("src"), lab(tests=False)):
-        layer = str(path.parent)
+        layer = "app" if path.name.startswith("cmd_") else str(path.parent)  # the lab's commands, too
         for name in set(re.findall(r"\b[a-z_]\w*\b", text)):
             named[name].add(layer)
         if path.suffix == ".h":

@@ -1,4 +1,4 @@
-"""The commands `mild judge` (lab/grains/README.md) and `mild bench record` (docs/record.md): scripts of the repository, whose grains' records
+"""The commands `mild judge` (lab/grains/README.md) and `mild bench record` (lab/bench/README.md): scripts of the repository, whose grains' records
 and robots of others are too large for a wheel."""
 import os
 import pathlib
@@ -7,7 +7,7 @@ import sys
 
 from . import _processor
 
-SCRIPTS = {("judge",): "lab/grains/judge.py", ("bench", "record"): "scripts/record.py"}
+SCRIPTS = {("judge",): "lab/grains/judge.py", ("bench", "record"): "lab/bench/record.py"}
 
 
 def command_of(arguments):

@@ -17,7 +17,6 @@
     X(export, "write a policy as an ONNX graph or as C, to run it elsewhere")                      \
     X(drive, "run a policy for a robot over UDP, or be that robot, simulated")                     \
     X(report, "draw the curves of training runs on one page")                                      \
-    X(bench, "measure speed and memory on this machine")                                           \
     X(info, "list grounds, models, config keys, versions and devices")                             \
     X(web, "serve the walk in a browser that `make web` builds")
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Commands that are other programs. mild-NAME, as git has it. `mild judge` and `mild bench record` become the Python that MILD_PYTHON
-# names, with the arguments as they are, and say how they are run where there is none. Usage: test_package.sh PATH_TO_MILD
+# Commands that are other programs. mild-NAME, as git has it. `mild judge` becomes the Python that MILD_PYTHON names, with the arguments
+# as they are, and says how it is run where there is none. Usage: test_package.sh PATH_TO_MILD
 root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$root/tests/kit.sh" "$1"
 
@@ -13,15 +13,10 @@ MILD_PYTHON=$work/python "$mild" judge --out 'a b' '$(touch shell)' "'" '' -- '*
 grep -qx '<judge>' got.txt || fail "no command: $(cat got.txt)"
 [ ! -e shell ] || fail "a shell read the arguments"
 [ "$(head -n 1 got.txt)" = '<-c>' ] || fail "not by -c: $(cat got.txt)"
-MILD=other MILD_PYTHON=$work/python "$mild" bench record 'a b' --list
-[ $? = 7 ] || fail "bench record: not the exit code of Python"
-[ "$(tail -n 4 got.txt)" = "$(printf '<%s>\n' bench record 'a b' --list)" ] || fail "arguments of bench record: $(cat got.txt)"
-[ "$(cat program.txt)" = "$mild" ] || fail "bench record measures $(cat program.txt)"
 
 # no Python, or none with the package: one line, as for the command that is not started
 for none in "$work/none" "$work" /dev/null; do
     bad "python -m mild judge" env "MILD_PYTHON=$none" "$mild" judge --out out
-    bad "python -m mild bench record" env "MILD_PYTHON=$none" "$mild" bench record out
 done
 bad "python -m mild trial" env MILD_PYTHON=$work/python "$mild" trial robot.xml walk.onnx
 cp "$mild" alone # without the package beside it
@@ -65,7 +60,7 @@ printf '[train]\nenvs = 7\n' >installed/run/config.ini
 cd installed
 export PYTHONDONTWRITEBYTECODE=1 MILD_HOME=
 bad "mild judge: lab/grains/judge.py MILD_HOME" python3 -m mild judge --out out
-bad "mild bench record: scripts/record.py MILD_HOME" python3 -m mild bench record out
+bad "mild bench record: lab/bench/record.py MILD_HOME" python3 -m mild bench record out
 bad "mild report: none/log.csv" python3 -m mild report none
 expect 0 '^report run/report.html$' python3 -m mild report run
 grep -q '<td>train.envs<td>7<td>[0-9]' run/report.html || fail "no default of train.envs in the page of the package"
@@ -76,4 +71,4 @@ export MILD_HOME=$root
 expect 0 '^walk  *mild  *ready$' python3 -m mild bench record --list
 bad "record.py: --wrong --help" python3 -m mild bench record out --wrong
 bad "record.py: --rounds none" python3 -m mild bench record out --rounds none
-finish "package: judge and bench record are started with their arguments, or their line is said"
+finish "package: judge and mild-NAME are started with their arguments, or their line is said"

@@ -1,4 +1,4 @@
-#include "run/bench/report.h"
+#include "bench/report.h"
 
 #include <stdio.h>
 #include <stdlib.h>

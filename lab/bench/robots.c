@@ -1,12 +1,12 @@
 #include <stdlib.h>
 
 #include "base/clock.h"
+#include "bench/bench.h"
+#include "bench/record.h"
 #include "control/controller.h"
 #include "device/device.h"
 #include "env/envs.h"
 #include "ground/batch/batch.h"
-#include "run/bench/bench.h"
-#include "run/bench/record.h"
 
 /* Rows of the environments, in the memory of the device. */
 typedef struct {

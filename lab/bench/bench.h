@@ -2,7 +2,7 @@
 #ifndef BENCH_BENCH_H
 #define BENCH_BENCH_H
 
-#include "run/bench/report.h"
+#include "bench/report.h"
 #include "run/train/experiment.h"
 
 /* One physics step of the robot standing on sand, with our contact and with the engine's own.

@@ -2,8 +2,8 @@
 #ifndef BENCH_RECORD_H
 #define BENCH_RECORD_H
 
+#include "bench/replay.h"
 #include "control/controller.h"
-#include "run/bench/replay.h"
 #include "run/train/experiment.h"
 
 /* NULL, with the reason in *error. */

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""scripts/record.py with made-up programs in the place of mild, of the peers and of nvidia-smi: the numbers of a record are theirs, what
+"""lab/bench/record.py with made-up programs in the place of mild, of the peers and of nvidia-smi: the numbers of a record are theirs, what
 is missing is named, and a number that was changed afterwards is seen. With the real program: what its benches write is read.
 Usage: test_record.py PATH_TO_MILD SOURCE_FOLDER"""
 import json
@@ -10,10 +10,11 @@ import subprocess
 import sys
 import tempfile
 
-from stand_in import program
-
 mild, root = (pathlib.Path(name).resolve() for name in sys.argv[1:3])
-record = root / "scripts/record.py"
+sys.path.insert(0, str(root / "tests/app"))
+from stand_in import program  # noqa: E402
+
+record = root / "lab/bench/record.py"
 
 # A step takes 6 us on soft ground and 8 with rigid contact; with a GPU 16384 robots make 5e6 policy steps/s, MuJoCo Warp 4e6 physics steps/s.
 MILD = '''#!/bin/sh
@@ -222,7 +223,7 @@ for torn in ("{", "7", '{"values": {}}'):
     (work / "torn.jsonl").write_text(lines.read_text() + torn + "\n")
     one_line("torn.jsonl, line 3", "history", "--file", work / "torn.jsonl")
     one_line("torn.jsonl, line 3", "add", dirty, "--dirty", "--file", work / "torn.jsonl")
-if (root / "docs/record.jsonl").exists():  # ours can be read
+if (root / "lab/bench/record.jsonl").exists():  # ours can be read
     history = subprocess.run([sys.executable, record, "history"], capture_output=True, text=True, check=False)
     assert history.returncode in (0, 1) and not history.stderr and "| step/newton |" in history.stdout, history
 

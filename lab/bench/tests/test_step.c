@@ -3,8 +3,8 @@
 #include <time.h>
 
 #include "base/clock.h"
+#include "bench/record.h"
 #include "bench_kit.h"
-#include "run/bench/record.h"
 
 /* ---- a clock that only steps move: 2 s by the engine's own, 3 s by ours ---- */
 

@@ -1,9 +1,9 @@
 /* The rows of the bench of the ground in batches: steps by a clock that only they move, forces
  * against those that the recorded steps had. */
 #include "base/clock.h"
+#include "bench/record.h"
 #include "bench_kit.h"
 #include "ground/batch/batch.h"
-#include "run/bench/record.h"
 
 enum { ROBOTS = 1024, FEET = 2, MOST = 4000 };
 enum { APART = 1009 }; /* robots in a row are recorded steps so far apart */

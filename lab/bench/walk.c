@@ -1,7 +1,7 @@
 #include <stdio.h>
 
-#include "run/bench/bench.h"
-#include "run/bench/record.h"
+#include "bench/bench.h"
+#include "bench/record.h"
 
 static void walk_row(BenchReport *report, const char *ground, const char *what, double value,
                      const char *unit) {

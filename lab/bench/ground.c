@@ -4,8 +4,8 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "run/bench/bench.h"
-#include "run/bench/record.h"
+#include "bench/bench.h"
+#include "bench/record.h"
 
 /* ---- the ground alone ---- */
 

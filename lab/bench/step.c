@@ -1,13 +1,13 @@
-#include "run/bench/step.h"
+#include "bench/step.h"
 
 #include <mujoco/mujoco.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"
+#include "bench/bench.h"
+#include "bench/record.h"
 #include "control/stand.h"
-#include "run/bench/bench.h"
-#include "run/bench/record.h"
 
 #define REPEATS_MAX 1000
 #define WARM_STEPS 500

@@ -1,4 +1,4 @@
-#include "run/bench/record.h"
+#include "bench/record.h"
 
 #include <stdlib.h>
 #include <string.h>

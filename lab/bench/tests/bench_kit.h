@@ -2,8 +2,8 @@
 #ifndef BENCH_KIT_H
 #define BENCH_KIT_H
 
+#include "bench/bench.h"
 #include "kit.h"
-#include "run/bench/bench.h"
 
 /* The value of a row; fails where there is none. */
 static inline double value_of(const BenchReport *report, const char *name) {

@@ -4,11 +4,11 @@
   mild bench record out/record                    # all that this machine can measure, ten minutes on two cores; --list: what that is
   mild bench record out/record --rounds 1 --only step,walk,mujoco
   mild bench record check out/record              # raw output, rows, ratios and page belong together
-  mild bench record add out/record                # a line of docs/record.jsonl: our numbers by commit
+  mild bench record add out/record                # a line of lab/bench/record.jsonl: our numbers by commit
   mild bench record history                       # that file as tables; exit code 1 if the last record of a machine is slow
-  mild bench record history --picture docs/record.png
+  mild bench record history --picture lab/bench/record.png
 
-scripts/record.py is the same. The first measures, in turns: each round has every command once, ours and the peers', and a ratio is of one round. OUT/record.json (schema:
+lab/bench/record.py is the same. The first measures, in turns: each round has every command once, ours and the peers', and a ratio is of one round. OUT/record.json (schema:
 docs/schema/record.json) has medians and every round's number, OUT/raw what the commands wrote, OUT/record.md is the page, made from
 record.json alone. A peer that is not installed, or has no GPU to run on, is named with the reason. --python is the interpreter that
 has them: `pip install -r scripts/newton.txt` brings MuJoCo, MuJoCo Warp and Newton, scripts/mjlab.txt mjlab."""
@@ -30,7 +30,7 @@ import tempfile
 import threading
 import time
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 SLOW = 0.1  # share by which the last record may be worse than the median of those before it
 SAMPLE = 1.0  # [s] from one reading of the clocks to the next
 WORLDS = (4096, 16384, 65536)
@@ -103,7 +103,7 @@ def commands():
            '"$0" eval --policy "$1/run/policy.safetensors" --config configs/quick.ini --ground rigid,foam45,sand_loose --speed 0.6 --json "$2"'
     plugin = ["PYTHON", "scripts/plugin_walk.py", "sa01", "--ground", "sand_loose", "--step", "0.0025", "--integrator", "Euler", "--speed", "0.6",
               "--time", "--plugin", "PLUGIN", "--json", "FILE"]
-    peer = ["PYTHON", "scripts/mjwarp.py", "robots/sa01", "--dt", "0.005", "--json", "FILE"]
+    peer = ["PYTHON", "lab/bench/mjwarp.py", "robots/sa01", "--dt", "0.005", "--json", "FILE"]
     found = [
         bench("step", "step"), bench("walk", "walk"),
         Command("plugin", "MuJoCo with the plugin", plugin, modules=("mujoco", "numpy")),
@@ -125,7 +125,7 @@ def commands():
         Command("newton_mpm", "Newton's MPM", ["PYTHON", "lab/grains/judge_mpm.py", "--out", "FOLDER/mpm", "--friction", "0.42", "--only",
                                                "^sand/disc120$", "--seconds", "120"], rows_of_mpm, gpu=True,
                 modules=("newton", "warp", "numpy"), rounds=1),
-        Command("mjlab", "mjlab", ["bash", "-c", '"$0" scripts/mjlab_time.py Go1 >"$1"', "PYTHON", "FILE"], rows_of_mjlab, gpu=True,
+        Command("mjlab", "mjlab", ["bash", "-c", '"$0" lab/bench/mjlab_time.py Go1 >"$1"', "PYTHON", "FILE"], rows_of_mjlab, gpu=True,
                 modules=("mjlab", "mild", "torch"), rounds=1),
     ]
     return found
@@ -585,11 +585,11 @@ def main():
     for name, work in (("check", check), ("add", add)):
         one = words.add_parser(name)
         one.add_argument("out", type=pathlib.Path)
-        one.add_argument("--file", type=pathlib.Path, default=ROOT / "docs/record.jsonl")
+        one.add_argument("--file", type=pathlib.Path, default=ROOT / "lab/bench/record.jsonl")
         one.add_argument("--dirty", action="store_true")
         one.set_defaults(work=work)
     past = words.add_parser("history")
-    past.add_argument("--file", type=pathlib.Path, default=ROOT / "docs/record.jsonl")
+    past.add_argument("--file", type=pathlib.Path, default=ROOT / "lab/bench/record.jsonl")
     past.add_argument("--slow", type=float, default=SLOW, help=f"share of a slow-down that ends with exit code 1 (default {SLOW})")
     past.add_argument("--picture", type=pathlib.Path)
     past.set_defaults(work=history)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Is a build faster than another? Runs `mild bench` of both in turns and prints the median of the ratios new / old.
 
-    scripts/pair.py OLD/build/mild build/mild step ground walk --rounds 9
+    lab/bench/pair.py OLD/build/mild build/mild step ground walk --rounds 9
 
 Each program runs in its own tree (the folder above build/), so that it finds its own configs and policy."""
 import argparse

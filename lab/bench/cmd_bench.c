@@ -4,12 +4,12 @@
 
 #include "app/build.h"
 #include "app/cli.h"
-#include "app/commands.h"
 #include "app/package.h"
 #include "app/report.h"
 #include "app/robots.h"
 #include "base/text.h"
-#include "run/bench/bench.h"
+#include "bench/bench.h"
+#include "lab/commands.h"
 #include "run/config/experiment_keys.h"
 
 /* memory comes first, because it reports the peak of the whole process so far. */
@@ -38,7 +38,7 @@ enum { BENCHES = sizeof benches / sizeof *benches, WORDS };
 /* No bench, but a script that runs them and the peers; it has the rest of the line. */
 static const CliWord record = {
     "record", "first word: benches and peers in turns, as JSON and a page, and their history "
-              "(docs/record.md; mild bench record --help)"};
+              "(lab/bench/README.md; mild bench record --help)"};
 
 static MildStatus save_json(const BenchReport *report, const char *path, MildError *error) {
     char machine[256];

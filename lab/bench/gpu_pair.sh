@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Is a build as fast on a GPU as another, and are its results the same? Runs both in turns on one device: `mild bench batch` and
 # `robots`, then a short training whose parameters must be the same to the bit.
-# Usage: scripts/gpu_pair.sh OLD/build/mild NEW/build/mild [ROUNDS]
+# Usage: lab/bench/gpu_pair.sh OLD/build/mild NEW/build/mild [ROUNDS]
 set -euo pipefail
 old=$(realpath "$1") new=$(realpath "$2") rounds=${3:-5}
 work=$(mktemp -d)

@@ -1,4 +1,4 @@
-#include "run/bench/replay.h"
+#include "bench/replay.h"
 
 #include <math.h>
 #include <mujoco/mujoco.h>

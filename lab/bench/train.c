@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "run/bench/bench.h"
+#include "bench/bench.h"
 #include "run/train/trainer.h"
 
 /* Time inside the environments is summed over the threads, and so divided by their number. */

@@ -4,11 +4,11 @@
 
 #include "base/clock.h"
 #include "base/random.h"
+#include "bench/bench.h"
+#include "bench/record.h"
 #include "env/task/task.h"
 #include "learn/cuda/learner.h"
 #include "learn/network.h"
-#include "run/bench/bench.h"
-#include "run/bench/record.h"
 
 typedef struct {
     Policy *policy;

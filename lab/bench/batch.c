@@ -9,9 +9,9 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "bench/bench.h"
+#include "bench/record.h"
 #include "device/device.h"
-#include "run/bench/bench.h"
-#include "run/bench/record.h"
 
 enum { PERIODS = 300, GROUNDS = 2, PROBLEMS_MAX = 4000, ARRAYS_MAX = 12 };
 enum { HOST_REPEATS = 3, REPEATS = 20 };

@@ -1,9 +1,9 @@
 /* The rows of the ground benches, by a clock that only the ground's own calls move, each by a time
  * of its own: what a row measured can be read from it. */
 #include "base/clock.h"
+#include "bench/bench.h"
 #include "ground/step/state.h"
 #include "kit.h"
-#include "run/bench/bench.h"
 
 /* [s] of the calls */
 enum {
