@@ -50,7 +50,7 @@ help:
 	@echo "make newton-check  the ground in MuJoCo Warp and Newton beside the engine plugin, on the CPU, in build/newton-venv"
 	@echo "make isaaclab-check  the ground in Isaac Lab 3's own G1 task without its simulator, on the CPU (8 GB), for PYTHON312=python3.12"
 	@echo "make jax-check   the batch ground inside jax.jit, and under MJX's robots, in build/jax-venv"
-	@echo "make dds-check   examples/drive: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
+	@echo "make dds-check   lab/drive/examples: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
 	@echo "make notebook-check  the notebook of each tutorial in Jupyter's kernel, in build/notebooks-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
@@ -138,11 +138,12 @@ docs:
 deb: setup
 	@JOBS=$(JOBS) scripts/deb.sh $(if $(TEST),test)
 
-# $(call environment,NAME,PYTHON): build/NAME-venv with what scripts/NAME.txt lists, by uv, which is faster than pip by minutes.
-environment = cmp -s scripts/$(1).txt build/$(1)-venv/installed || { $(or $(2),python3) -m venv --clear build/$(1)-venv && \
+# $(call environment,NAME,PYTHON): build/NAME-venv with what NAME.txt of scripts or lab lists, by uv, which is faster than pip by minutes.
+listed = $(wildcard scripts/$(1).txt lab/*/$(1).txt)
+environment = cmp -s $(listed) build/$(1)-venv/installed || { $(or $(2),python3) -m venv --clear build/$(1)-venv && \
 	build/$(1)-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/uv.txt && \
-	build/$(1)-venv/bin/uv pip install -q --python build/$(1)-venv/bin/python --require-hashes -r scripts/$(1).txt && \
-	cp scripts/$(1).txt build/$(1)-venv/installed; }
+	build/$(1)-venv/bin/uv pip install -q --python build/$(1)-venv/bin/python --require-hashes -r $(listed) && \
+	cp $(listed) build/$(1)-venv/installed; }
 # $(call with_wheel,NAME,PYTHON): the same with the wheel, as a user has it.
 with_wheel = $(call environment,$(1),$(2)) && \
 	build/$(1)-venv/bin/pip install -q --disable-pip-version-check --no-deps --force-reinstall build/dist/mildground-*.whl
@@ -188,11 +189,11 @@ jax-check: wheel
 	@$(call with_wheel,jax)
 	@build/jax-venv/bin/python -W ignore tests/python/check_jax.py
 
-# The bridges of examples/drive.
+# The bridges of lab/drive.
 dds-check: build
 	@$(call environment,dds)
-	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_unitree.py build/mild
-	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_ros2.py build/mild
+	@PYTHONPATH=build/python build/dds-venv/bin/python lab/drive/tests/test_unitree.py build/mild
+	@PYTHONPATH=build/python build/dds-venv/bin/python lab/drive/tests/test_ros2.py build/mild
 
 # As a user has them: from the wheel. The notebooks with their pictures stay in build/notebooks.
 notebook-check: wheel

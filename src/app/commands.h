@@ -15,7 +15,6 @@
     X(fit, "find the parameters of a ground from recorded presses")                                \
     X(actuator, "fit a network to logs of a robot's motors")                                       \
     X(export, "write a policy as an ONNX graph or as C, to run it elsewhere")                      \
-    X(drive, "run a policy for a robot over UDP, or be that robot, simulated")                     \
     X(report, "draw the curves of training runs on one page")                                      \
     X(info, "list grounds, models, config keys, versions and devices")                             \
     X(web, "serve the walk in a browser that `make web` builds")
