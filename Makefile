@@ -35,7 +35,7 @@ help:
 	@echo "make fuzz    RUNS=$(RUNS) random inputs for everything that reads (clang; 2 to 25 minutes a target, an hour for model)"
 	@echo "make mutants N=$(N) random faults in src/LAYER=$(LAYER): how many do its tests catch? (docs/testing.md)"
 	@echo "make mutants FAULTS=1  the named faults of tests/faults.txt: all must be caught"
-	@echo "make paper   the paper's experiments as one page, out/paper/index.html (docs/paper.md); QUICK=1: few trials, shipped weights"
+	@echo "make paper   the paper's experiments as one page, out/paper/index.html (lab/paper/README.md); QUICK=1: few trials, shipped weights"
 	@echo "make web     the walk in a browser, build/web, for \`build/mild web\` or any static host (docs/web.md)"
 	@echo "make web-test   ten seconds of it in headless Chromium"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
@@ -116,9 +116,9 @@ mutants: setup
 
 # Trains only where there is a GPU (a build with CMAKE_FLAGS=-DMILD_CUDA=ON); keeps what runs/paper has. QUICK: the shipped weights.
 paper: build
-	@.venv/bin/pip install -q --require-hashes -r scripts/paper/requirements.txt
-	@$(if $(QUICK),:,if nvidia-smi >/dev/null 2>&1; then scripts/paper/train.sh runs/paper; fi)
-	@.venv/bin/python scripts/paper/paper.py $(if $(QUICK),--trials 3 --models policies/paper)
+	@.venv/bin/pip install -q --require-hashes -r lab/paper/requirements.txt
+	@$(if $(QUICK),:,if nvidia-smi >/dev/null 2>&1; then lab/paper/train.sh runs/paper; fi)
+	@.venv/bin/python lab/paper/paper.py $(if $(QUICK),--trials 3 --models policies/paper)
 
 # With the program, which serves it. emscripten and, for the test, Chromium: large, so nothing else installs them.
 web: program
@@ -170,7 +170,7 @@ wheels: setup
 python-check: wheel
 	@$(call with_wheel,learners)
 	@build/learners-venv/bin/python tests/python/check_learners.py
-	@build/learners-venv/bin/python tests/envs/test_learners.py .
+	@build/learners-venv/bin/python lab/paper/tests/test_learners.py .
 	@build/learners-venv/bin/python tests/python/check_cuda.py
 
 mjlab-check: wheel

@@ -64,8 +64,7 @@ ldd "${programs[@]}" | awk '$2 == "=>" { print $3 }' | sort -u |
     grep -Ev '/(libc|libm|libdl|librt|libpthread|libcublas|libcublasLt|libnccl)\.so' | xargs -I{} cp -L {} "$bundle/lib/"
 find "$bundle/lib" -name '*.so*' -type f -exec strip {} +
 strip -o "$bundle/lib/libmild_envs.so" build/x86-64-v3/libmild_envs.so
-mkdir "$bundle/scripts"
-cp -r scripts/rivals "$bundle/scripts/"
+cp -r --parents lab/paper/rivals "$bundle/"
 cp -r robots configs policies LICENSE NOTICE "$bundle/"
 cp --parents python/mild/report.py "$bundle/" # mild report
 cp .venv/daqp-*/LICENSE "$bundle/LICENSE-DAQP" # parts of the program

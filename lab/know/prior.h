@@ -20,7 +20,7 @@
 
 typedef enum {
     PRIOR_WIDE,    /* all of PRIOR_LIST, under any preset of mild */
-    PRIOR_PAPER,   /* that of scripts/paper/latents.py: k_pen and sigma_cone alone, under three */
+    PRIOR_PAPER,   /* that of lab/paper/latents.py: k_pen and sigma_cone alone, under three */
     PRIOR_PRESETS, /* a preset of mild as it is */
     PRIORS
 } Prior;

@@ -2,7 +2,7 @@
  * with Deep Reinforcement Learning): a network of two hidden layers that sees the newest frame
  * alone, with its gait clock. It decides 40 times a second, so a decision lasts two and three
  * policy periods in turn, and the action moves half the way to each new one. Trained by
- * scripts/rivals/train_clock.py, whose files it reads.
+ * lab/paper/rivals/train_clock.py, whose files it reads.
  *
  * It remembers nothing: the period of an episode and the present action are the environment's. */
 #include <stdlib.h>
@@ -95,7 +95,7 @@ MildStatus controller_make_clock(const ControllerDef *def, Controller *controlle
     }
     clock->observation = task_shape(def->task, def->robot).observation;
     clock->joints = robot_joints(def->robot);
-    clock->weights = weights_read(def->policy, "mild clock", "scripts/rivals/train_clock.py",
+    clock->weights = weights_read(def->policy, "mild clock", "lab/paper/rivals/train_clock.py",
                                   robot_name(def->robot), &cause);
     if (!clock->weights || clock_take(clock, &cause) != MILD_OK) {
         clock_destroy(clock);

@@ -1,6 +1,6 @@
 /* The rival "HT-2" (Radosavovic et al. 2024, Learning Humanoid Locomotion over Challenging
  * Terrain): a causal transformer over the last frames of the episode and the actions before them.
- * Trained by scripts/rivals/train_ht2.py, whose files it reads.
+ * Trained by lab/paper/rivals/train_ht2.py, whose files it reads.
  *
  * Token j of a context, oldest first, is made from the frame o_j without its last action, from that
  * action a_j, and from its place p_j: x_j = W_o o_j + b_o + W_a a_j + p_j. Where the episode begins
@@ -327,7 +327,7 @@ MildStatus controller_make_ht2(const ControllerDef *def, Controller *controller,
     ht2->observation = task_shape(def->task, def->robot).observation;
     ht2->joints = robot_joints(def->robot);
     ht2->pool = def->pool;
-    ht2->weights = weights_read(def->policy, "mild ht2", "scripts/rivals/train_ht2.py",
+    ht2->weights = weights_read(def->policy, "mild ht2", "lab/paper/rivals/train_ht2.py",
                                 robot_name(def->robot), &cause);
     if (!ht2->weights || take_all(ht2, def->policy, &cause) != MILD_OK ||
         make_memory(ht2, def->rows_max, &cause) != MILD_OK) {

@@ -11,7 +11,7 @@ import sys
 import tempfile
 
 mild, root = (pathlib.Path(name).resolve() for name in sys.argv[1:3])
-sys.path.insert(0, str(root / "tests/app"))
+sys.path.insert(0, str(root / "lab"))
 from stand_in import program  # noqa: E402
 
 record = root / "lab/bench/record.py"
