@@ -1,3 +1,18 @@
+# Controllers are found by name in layer control, so they are a part of it.
+include(${CMAKE_CURRENT_LIST_DIR}/control/Daqp.cmake)
+set(root ${CMAKE_BINARY_DIR}/layers/paper)
+file(MAKE_DIRECTORY ${root}/paper)
+file(CREATE_LINK ${CMAKE_CURRENT_LIST_DIR}/control ${root}/paper/control SYMBOLIC)
+file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_LIST_DIR}/control/*.c)
+target_sources(layer_control PRIVATE ${sources})
+target_include_directories(layer_control PRIVATE ${root})
+target_link_libraries(layer_control PUBLIC daqp)
+install(FILES ${daqp_folder}/../LICENSE DESTINATION share/doc/mild RENAME LICENSE-DAQP COMPONENT program OPTIONAL)
+
+if(MILD_TESTS)
+  include_directories(${root})
+  mild_tests(paper layer_control)
+endif()
 if(MILD_TESTS AND NOT MILD_SANITIZE AND NOT MILD_FUZZ) # scripts: the same in every build
   set(tests ${CMAKE_CURRENT_LIST_DIR}/tests)
   foreach(test exam transitions) # with the program

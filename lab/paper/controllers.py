@@ -224,7 +224,7 @@ def passivity(given):
     changes = "; ".join(f"{a} {', '.join(f'{100 * x:+.0f} %' for x in xs)}" for a, xs in less.items())
     text = f"""Walks at 0.6 m/s. Peak to peak of the centre of mass about its straight line over 2 s, and of the base's pitch and roll: mean ±
 standard deviation over windows after the first 4 s, of trials until they fall. The passivity-based controller knows the state exactly and at
-once and commands torques at 400 Hz; the policy has noisy, late sensors and 100 Hz (docs/controllers.md). Both at physics steps of 2.5 ms.
+once and commands torques at 400 Hz; the policy has noisy, late sensors and 100 Hz (lab/paper/control/README.md). Both at physics steps of 2.5 ms.
 
 The policy's oscillation against the other's, on {", ".join(STEERED)}: {changes}. The other plans a centre of mass of constant height, and keeps
 it; the policy lets it rise and fall over a straight leg, which is cheap. Where the ground yields the other's base rolls."""

@@ -1,4 +1,4 @@
-"""The network of the rival "HT-2" (src/control/controller_ht2.c says how it computes) and what acts on its contexts."""
+"""The network of the rival "HT-2" (lab/paper/control/controller_ht2.c says how it computes) and what acts on its contexts."""
 import math
 
 import torch

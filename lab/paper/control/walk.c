@@ -1,9 +1,9 @@
-#include "control/walk.h"
+#include "paper/control/walk.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "control/dcm.h"
+#include "paper/control/dcm.h"
 
 #define GRAVITY 9.81
 #define PI 3.141592653589793

@@ -14,9 +14,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "control/controller.h"
-#include "control/weights.h"
+#include "lab/controllers.h"
 #include "learn/product.h"
+#include "paper/control/weights.h"
 
 enum { HT2_LAYERS_MAX = 16 };
 #define HT2_NORM_LEAST 1e-5F /* added to the variance */

@@ -1,7 +1,7 @@
 /* The walk's plan with feet and a centre of mass that follow it exactly: where the feet go, for how
  * long, and that the targets are each other's derivatives. */
-#include "control/walk.h"
 #include "kit.h"
+#include "paper/control/walk.h"
 
 #define DT 0.0025
 

@@ -9,8 +9,8 @@
 #ifndef CONTROL_BODY_H
 #define CONTROL_BODY_H
 
-#include "control/walk.h"
-#include "control/wrench.h"
+#include "paper/control/walk.h"
+#include "paper/control/wrench.h"
 #include "robot/robot.h"
 
 /* Gains and limits. */
@@ -18,7 +18,7 @@ typedef struct {
     double dcm_gain;            /* [1/s] k: errors of the DCM decay with exp(-k t) */
     double turn_stiffness;      /* [N m/rad] of the base's orientation */
     double turn_damping;        /* [N m s/rad] */
-    double still_turn_damping;  /* [N m s/rad] before the first step: see docs/controllers.md */
+    double still_turn_damping;  /* [N m s/rad] before the first step: see README.md */
     double swing_stiffness;     /* [N/m] of the swing foot's support point */
     double swing_damping;       /* [N s/m] */
     double sole_stiffness;      /* [N m/rad] of the swing foot's orientation */

@@ -7,9 +7,9 @@
 
 enum { ENVS = 3, STEPS = 13, SECOND = 8, TENSORS_MAX = 64 };
 
-#include "control_kit.h"
+#include "control/control_kit.h"
 
-#define FOLDER MILD_SOURCE_DIR "/tests/control/"
+#define FOLDER MILD_SOURCE_DIR "/lab/paper/tests/"
 #define PATH "build_test_rivals.safetensors"
 
 static const char *const kinds[2] = {"clock", "ht2"};
@@ -197,6 +197,15 @@ TEST(one_clear_line) {
         assert_int_equal(make(kinds[k], "no/such/file", NULL, &controller, &error), MILD_ERROR_IO);
     }
     unlink(PATH);
+}
+
+TEST(names) {
+    static const char *const wanted[] = {"clock", "ht2", "passivity"};
+    for (int i = 0; i < 3; i++) {
+        assert_true(controller_has(wanted[i], CONTROLLER_FOLLOWS));
+        assert_false(controller_has(wanted[i], CONTROLLER_POLICY));
+    }
+    assert_true(controller_has("passivity", CONTROLLER_OWN_GAINS));
 }
 
 TEST_MAIN(setup, teardown)

@@ -1,4 +1,4 @@
-#include "control/dcm.h"
+#include "paper/control/dcm.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Writes the references of test_rivals.c: small networks of both kinds with random weights, frames of two episodes, and the actions
-that PyTorch computes in double precision. Usage: make_rivals.py FOLDER (tests/control), with PyTorch."""
+that PyTorch computes in double precision. Usage: make_rivals.py FOLDER (lab/paper/tests), with PyTorch."""
 import pathlib
 import sys
 
 import torch
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts" / "rivals"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "rivals"))
 import files
 import ht2
 import ppo
@@ -25,7 +25,7 @@ def scatter(net):
 def write(path, net, prefix, kind, texts, frames, actions):
     tensors = {prefix + name: weight for name, weight in net.state_dict().items()}
     tensors["train.frames"], tensors["train.actions"] = frames, actions
-    files.write(path, tensors, {"kind": kind, "version": "1", "robot": "sa01", "note": "tests/control/make_rivals.py", **texts})
+    files.write(path, tensors, {"kind": kind, "version": "1", "robot": "sa01", "note": "lab/paper/tests/make_rivals.py", **texts})
 
 
 def clock(frames):

@@ -1,4 +1,4 @@
-#include "control/weights.h"
+#include "paper/control/weights.h"
 
 #include <math.h>
 #include <stdio.h>

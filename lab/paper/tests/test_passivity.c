@@ -2,8 +2,8 @@
  * walking. */
 #include <mujoco/mujoco.h>
 
-#include "control/body.h"
 #include "control/controller.h"
+#include "paper/control/body.h"
 #include "robots.h"
 
 #define GRAVITY 9.81
@@ -356,7 +356,7 @@ TEST(motors_give_no_energy) {
 }
 
 /* Outside of that condition, feet and all pushed sideways on foam, the motors put energy in before
- * the robot rests again (docs/controllers.md). */
+ * the robot rests again (lab/paper/control/README.md). */
 TEST(feet_that_move_are_another_matter) {
     Stand stand;
     RobotState state;

@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "control/controller.h"
-#include "control/weights.h"
+#include "lab/controllers.h"
 #include "learn/product.h"
+#include "paper/control/weights.h"
 
 enum { CLOCK_LAYERS = 3, CLOCK_PERIODS = 5 };
 #define CLOCK_SMOOTHING 0.5F /* [-] share of the new action */

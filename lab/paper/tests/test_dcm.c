@@ -1,7 +1,7 @@
 /* The plan of the DCM against its differential equation b xi' = xi - p, integrated step by step. */
 #include "base/random.h"
-#include "control/dcm.h"
 #include "kit.h"
+#include "paper/control/dcm.h"
 
 static double point_at(const DcmSegment *s, int k, double t) {
     return s->from[k] + (s->to[k] - s->from[k]) * t / s->duration +

@@ -1,11 +1,11 @@
-/* The passivity-based walk as a controller (docs/controllers.md): the plan of walk.h, the whole
+/* The passivity-based walk as a controller (README.md): the plan of walk.h, the whole
  * body of body.h. Torques are computed at every physics step from the true state. */
 #include <stdlib.h>
 #include <string.h>
 
-#include "control/body.h"
-#include "control/controller.h"
-#include "control/walk.h"
+#include "lab/controllers.h"
+#include "paper/control/body.h"
+#include "paper/control/walk.h"
 
 /* One environment's walk. */
 typedef struct {

@@ -1,8 +1,8 @@
 /* The wrench's program against mechanics, and its solution against the conditions of Karush, Kuhn
  * and Tucker, on random feet and wrenches. */
 #include "base/random.h"
-#include "control/wrench.h"
 #include "kit.h"
+#include "paper/control/wrench.h"
 
 #define WEIGHT 325.0 /* [N] */
 

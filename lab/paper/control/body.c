@@ -1,4 +1,4 @@
-#include "control/body.h"
+#include "paper/control/body.h"
 
 #include <math.h>
 #include <stdlib.h>
