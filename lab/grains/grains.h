@@ -390,16 +390,16 @@ BOTH void plate_cells(Plate *p, const Grains &g, double x, double y, double z) {
 /* What grains feel, from pose and motion of a case. A positive pitch lowers the edge at +x. */
 BOTH void plate_place(Plate *p, const Grains &g) {
     const float sine = (float)sin(p->pitch), cosine = (float)cos(p->pitch);
-    plate_cells(p, g, p->x, 0, p->z);
+    const float left = (float)sin(p->yaw), ahead = (float)cos(p->yaw);
+    const float turn[9] = {ahead * cosine, -left, ahead * sine, left * cosine, ahead, left * sine,
+                           -sine,          0,     cosine};
+    plate_cells(p, g, p->x, p->y, p->z);
     for (int k = 0; k < 9; k++) {
-        p->turn[k] = 0;
+        p->turn[k] = turn[k];
     }
-    p->turn[0] = p->turn[8] = cosine;
-    p->turn[2] = sine;
-    p->turn[6] = -sine;
-    p->turn[4] = p->side = 1;
-    p->velocity = vec((float)p->vx, 0, (float)p->vz);
-    p->spin = vec(0, (float)p->rate, 0);
+    p->side = 1;
+    p->velocity = vec((float)p->vx, (float)p->vy, (float)p->vz);
+    p->spin = vec(-left * (float)p->rate, ahead * (float)p->rate, (float)p->turning);
 }
 
 DEVICE void plate_step(int bed, const Grains &g) {
@@ -411,7 +411,9 @@ DEVICE void plate_step(int bed, const Grains &g) {
         p->vz += dt * (force / p->mass - (double)g.law.gravity);
     }
     p->x += dt * p->vx;
+    p->y += dt * p->vy;
     p->z += dt * p->vz;
+    p->yaw += dt * p->turning;
     p->pitch += dt * p->rate;
     plate_place(p, g);
 }

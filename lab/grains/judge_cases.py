@@ -69,7 +69,7 @@ def outline_distance(sole):
 
 
 class Case:
-    """NAME SHAPE TILT STAGE..., as lab/grains/plan.h has it. ways: (kind, seconds, vx, vz up, pitch rate, mass) of each stage;
+    """NAME SHAPE TILT STAGE..., as lab/grains/plan.h has it. ways: (kind, seconds, vx, vz up, pitch rate, mass, vy, yaw rate) of each stage;
     plate: the body; sole: what of it touches grains whose radius is `edge` [m], which models are given."""
 
     def __init__(self, text, edge=0.0):
@@ -82,17 +82,21 @@ class Case:
             kind, numbers = stage.split(":")
             v = [float(number) for number in numbers.replace("@", ",").split(",")]
             if kind == "press":
-                self.ways.append((kind, abs(v[0] - depth) / v[1], 0.0, math.copysign(v[1], depth - v[0]), 0.0, 0.0))
+                self.ways.append((kind, abs(v[0] - depth) / v[1], 0.0, math.copysign(v[1], depth - v[0]), 0.0, 0.0, 0.0, 0.0))
                 depth = self.deepest = v[0]
             elif kind in ("drag", "load"):
-                self.ways.append((kind, abs(v[0]) / v[1], math.copysign(v[1], v[0]), 0.0, 0.0, 0.0))
+                self.ways.append((kind, abs(v[0]) / v[1], math.copysign(v[1], v[0]), 0.0, 0.0, 0.0, 0.0, 0.0))
             elif kind == "swipe":
                 angle = math.radians(v[0])
-                self.ways.append((kind, abs(angle) / v[1], 0.0, 0.0, math.copysign(v[1], angle), 0.0))
+                self.ways.append((kind, abs(angle) / v[1], 0.0, 0.0, math.copysign(v[1], angle), 0.0, 0.0, 0.0))
             elif kind == "drop":
-                self.ways.append((kind, v[2], 0.0, -v[1], 0.0, v[0]))
+                self.ways.append((kind, v[2], 0.0, -v[1], 0.0, v[0], 0.0, 0.0))
+            elif kind == "move":
+                vx, vy, vz, pitch, yaw, seconds, *mass = v
+                self.ways.append((kind, seconds, vx, vz, pitch, mass[0] if mass else 0.0, vy, yaw))
+                depth -= vz * seconds * (not mass)
             else:
-                self.ways.append((kind, v[0], 0.0, 0.0, 0.0, 0.0))
+                self.ways.append((kind, v[0], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
     @property
     def kind(self):

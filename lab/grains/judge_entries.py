@@ -125,11 +125,11 @@ class GroundEntry:
         if case.sole.radius and self.model.startswith("con_"):  # one element, which has no surface
             return None
         ground = mild.Ground([self.sole(case)], self.material, dt=STEP, tiles=64 if case.kind == "again" else 0)
-        table, pose, time, force = [], np.array([0.0, -case.start, case.tilt]), 0.0, 0.0  # x, z, pitch
-        for stage, (kind, seconds, vx, vz, rate, mass) in enumerate(case.ways):
+        table, pose, time, force = [], np.array([0.0, 0.0, -case.start, case.tilt, 0.0]), 0.0, 0.0  # x, y, z, pitch, yaw
+        for stage, (kind, seconds, vx, vz, rate, mass, vy, yaw) in enumerate(case.ways):
             mass = mass or (force / 9.81 if kind == "load" else 0.0)
             steps = max(1, round(seconds / STEP))
-            speed, dt = np.array([vx, vz, rate]), seconds / steps
+            speed, dt = np.array([vx, vy, vz, rate, yaw]), seconds / steps
             ground_step(ground, None, mass, dt)
             for _ in range(steps):
                 before = pose.copy()
@@ -137,7 +137,7 @@ class GroundEntry:
                 pose = before + dt * speed
                 time += dt
                 force = ground.force[0, 2]
-                table.append((time, stage, -pose[1], pose[0], pose[2], ground.force[0, 0], force, ground.torque[0, 1]))
+                table.append((time, stage, -pose[2], pose[0], pose[3], ground.force[0, 0], force, ground.torque[0, 1]))
         return as_rows(table, case)
 
 
@@ -149,15 +149,15 @@ def ground_step(ground, motion, mass, dt):
         ground.inverse_inertia[2, 2] = 1 / mass
     if motion is None:
         return None
-    (x, z, pitch), (vx, vz, rate) = motion
-    c, s = math.cos(pitch), math.sin(pitch)
-    ground.position[0] = x, 0, z
-    ground.rotation[0] = [[c, 0, s], [0, 1, 0], [-s, 0, c]]
-    ground.velocity[0] = vx, 0, vz, 0, rate, 0
-    ground.free_velocity[0] = vx, 0, vz - (9.81 * dt if mass else 0.0), 0, rate, 0
+    (x, y, z, pitch, yaw), (vx, vy, vz, rate, turning) = motion
+    c, s, ahead, left = math.cos(pitch), math.sin(pitch), math.cos(yaw), math.sin(yaw)
+    ground.position[0] = x, y, z
+    ground.rotation[0] = [[ahead * c, -left, ahead * s], [left * c, ahead, left * s], [-s, 0, c]]
+    ground.velocity[0] = vx, vy, vz, -left * rate, ahead * rate, turning
+    ground.free_velocity[0] = vx, vy, vz - (9.81 * dt if mass else 0.0), -left * rate, ahead * rate, turning
     ground.solve()
     ground.advance()
-    return np.array([vx, ground.new_velocity[0, 2] if mass else vz, rate])
+    return np.array([vx, vy, ground.new_velocity[0, 2] if mass else vz, rate, turning])
 
 
 # ---- functions f(depth, tilt, slip, sole) ----
@@ -201,7 +201,7 @@ class FunctionEntry:
 
     def play(self, case):
         table, depth, slip, tilt, time, load = [], case.start, 0.0, case.tilt, 0.0, 0.0
-        for stage, (kind, seconds, vx, vz, rate, mass) in enumerate(case.ways):
+        for stage, (kind, seconds, vx, vz, rate, mass, *_) in enumerate(case.ways):
             steps = max(20, round(seconds / 5e-3)) if kind != "drop" else round(seconds / 2e-4)
             dt = seconds / steps
             for _ in range(steps):

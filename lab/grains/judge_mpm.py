@@ -239,7 +239,7 @@ def play(case, bed, args):
     for _ in range(round(SETTLE / args.dt)):
         in_time(args)
         bed.step(pose, np.zeros(3), args.dt)
-    for stage, (kind, seconds, vx, vz, rate, mass) in enumerate(case.ways):
+    for stage, (kind, seconds, vx, vz, rate, mass, *_) in enumerate(case.ways):
         steps, dt = stage_steps(case.ways[stage], args)
         mass = mass or (rows[-1]["wrench"][2] / GRAVITY if kind == "load" else 0.0)
         if kind in ("load", "drop") and mass <= 0:

@@ -11,6 +11,8 @@
  *        swipe:DEG@RATE      turns about the bottom's middle [deg, rad/s]
  *        hold:SECONDS        stands
  *        drop:MASS@SPEED,S   falls for S seconds, with this mass and, at first, downward speed
+ *        move:VX,VY,VZ,PITCH,YAW,S[,MASS]   moves for S seconds at these speeds [m/s], z up, and
+ *                            rates [rad/s]; with a mass it is free in z
  */
 #ifndef GRAINS_PLAN_H
 #define GRAINS_PLAN_H
@@ -20,6 +22,7 @@
 struct Stage {
     std::string kind;
     double amount, speed, seconds;
+    double move[6]; /* velocity, rates of pitch and yaw, mass */
 };
 
 struct Case {
@@ -117,7 +120,8 @@ inline double shape_lowest(const Shape &s, double tilt) {
 
 inline Stage stage_read(const std::string &word) {
     const std::vector<double> v = numbers(word);
-    Stage s = {word.substr(0, word.find(':')), v.empty() ? 0 : v[0], v.size() > 1 ? v[1] : 0, 0};
+    Stage s = {
+        word.substr(0, word.find(':')), v.empty() ? 0 : v[0], v.size() > 1 ? v[1] : 0, 0, {}};
     const bool led = s.kind == "press" || s.kind == "drag" || s.kind == "load" || s.kind == "swipe";
     if (led && v.size() == 2 && v[1] > 0) {
         s.amount *= s.kind == "swipe" ? 0.017453292519943295 : 1;
@@ -126,8 +130,13 @@ inline Stage stage_read(const std::string &word) {
         s.seconds = s.amount;
     } else if (s.kind == "drop" && v.size() == 3 && v[0] > 0 && v[2] > 0) {
         s.seconds = v[2];
+    } else if (s.kind == "move" && (v.size() == 6 || (v.size() == 7 && v[6] > 0)) && v[5] > 0) {
+        s.seconds = v[5];
+        std::copy(v.begin(), v.begin() + 5, s.move);
+        s.move[5] = v.size() == 7 ? v[6] : 0;
     } else {
-        stop("a stage is press:D@V, drag:X@V, load:X@V, swipe:DEG@W, hold:T or drop:M@V,T, not ",
+        stop("a stage is press:D@V, drag:X@V, load:X@V, swipe:DEG@W, hold:T, drop:M@V,T or "
+             "move:VX,VY,VZ,PITCH,YAW,T[,M], not ",
              word.c_str());
     }
     return s;

@@ -1,5 +1,5 @@
 /* The rigid plate of a bed: a block on an outline, or a sphere. Its origin lies in its bottom. In a
- * case it moves in x and z and turns about y, led or as a falling mass; the sole of a robot moves
+ * case it moves and turns as it is led, or falls with a mass; the sole of a robot moves
  * freely (ride.h). */
 #ifndef GRAINS_PLATE_H
 #define GRAINS_PLATE_H
@@ -22,10 +22,12 @@ enum : int { SUM_BITS = 30 };
 
 struct Plate {
     /* of a case */
-    double x, z, pitch;  /* pose; the middle of the box and the floor are 0 [m], [rad] */
-    double vx, vz, rate; /* [m/s], [rad/s] */
-    double mass;         /* above 0: moves in z under this mass's weight [kg] */
-    long long pushed;    /* sum[2] before this step */
+    double x, y, z;       /* place; the middle of the box and the floor are 0 [m] */
+    double yaw, pitch;    /* turned by yaw about z, then by pitch about its own y [rad] */
+    double vx, vy, vz;    /* [m/s] */
+    double turning, rate; /* of yaw and pitch [rad/s] */
+    double mass;          /* above 0: moves in z under this mass's weight [kg] */
+    long long pushed;     /* sum[2] before this step */
     /* of all, what grains feel */
     long long sum[6];                /* force and moment about its origin, over the steps so far */
     uint32_t cell_x, cell_y, cell_z; /* its place in the units of the grains */

@@ -79,11 +79,21 @@ inline void stage_begin(const Bed &bed, const Stage &s, Record *r) {
     plates_read(bed, &r->plate);
     for (size_t b = 0; b < r->plate.size(); b++) {
         Plate *p = &r->plate[b];
+        const bool moves = s.kind == "move";
         const bool free = s.kind == "load" || s.kind == "drop";
         p->vx = s.kind == "drag" || s.kind == "load" ? s.speed * (s.amount < 0 ? -1 : 1) : 0;
         p->rate = s.kind == "swipe" ? s.speed * (s.amount < 0 ? -1 : 1) : 0;
         p->vz = s.kind == "press" || s.kind == "drop" ? -s.speed : 0;
+        p->vy = p->turning = 0;
         p->mass = !free ? 0 : s.kind == "drop" ? s.amount : r->force[b] / (double)bed.g.law.gravity;
+        if (moves) {
+            p->vx = s.move[0];
+            p->vy = s.move[1];
+            p->vz = s.move[2];
+            p->rate = s.move[3];
+            p->turning = s.move[4];
+            p->mass = s.move[5];
+        }
         r->start[b] = (double)bed.surface[b] - p->z;
         if (free && p->mass <= 0) {
             stop("a load stage begins on a plate that carries nothing: ", s.kind.c_str());
@@ -96,14 +106,16 @@ inline void stage_begin(const Bed &bed, const Stage &s, Record *r) {
 /* Centre of pressure in the plate's frame, where its normal force acts. */
 inline void row_write(FILE *out, const Plate &p, int stage, double time, double path, double depth,
                       double start, const double w[6]) {
-    const double s = sin(p.pitch), c = cos(p.pitch);
-    const double normal = s * w[0] + c * w[2], mx = c * w[3] - s * w[5];
+    const double s = sin(p.pitch), c = cos(p.pitch), left = sin(p.yaw), ahead = cos(p.yaw);
+    const double along = ahead * w[0] + left * w[1], mx0 = ahead * w[3] + left * w[4];
+    const double my = ahead * w[4] - left * w[3];
+    const double normal = s * along + c * w[2], mx = c * mx0 - s * w[5];
     const bool pressed = fabs(normal) > 1e-3;
     fprintf(out, "%.5g,%d,%.5g,%.5g,%.4g,%.4g", time, stage, depth, path, p.pitch, depth - start);
     for (int k = 0; k < 6; k++) {
         fprintf(out, ",%.4g", w[k]);
     }
-    fprintf(out, ",%.3g,%.3g\n", pressed ? -w[4] / normal : 0, pressed ? mx / normal : 0);
+    fprintf(out, ",%.3g,%.3g\n", pressed ? -my / normal : 0, pressed ? mx / normal : 0);
 }
 
 inline void bands_write(FILE *out, Plate *p, float width, double time, double depth, long steps) {

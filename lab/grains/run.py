@@ -33,7 +33,7 @@ V = 0.05  # [m/s] of plates that are led: inertial number under 0.005
 # Options of the beds. sand: the ground that laws are fitted to; slick: less friction; fine: half the grain; wide: room for
 # soles and large plates; deep: as far as a robot's foot goes down; hertz, rolling: other contacts; medium, loose: grains that
 # roll with resistance, which lie as loose as natural sand; loose_thin, loose_thinner, loose_thick: as loose, with a
-# nearer and a further floor.
+# nearer and a further floor. led, landing: beds of their own for direction.py.
 BOX, WIDE, FINE, DEEP = "0.45,0.35,0.12", "0.72,0.44,0.12", "0.33,0.28,0.08", "0.5,0.4,0.25"
 LOOSE = {"seeds": "1-3", "box": "0.35,0.29,0.12", "grain": 0.004, "friction": 0.8, "rolling": 1}
 FAMILIES = {
@@ -49,6 +49,11 @@ FAMILIES = {
     "loose_thin": {**LOOSE, "box": "0.35,0.29,0.06"},
     "loose_thinner": {**LOOSE, "box": "0.35,0.29,0.045"},
     "loose_thick": {**LOOSE, "box": "0.35,0.29,0.2", "settle": 0.7},
+    "led": {"seeds": "11-13", "box": BOX, "grain": 0.005, "friction": 0.5},
+    "led_wide": {"seeds": "11-13", "box": WIDE, "grain": 0.005, "friction": 0.5},
+    "led_deep": {"seeds": "11-13", "box": DEEP, "grain": 0.005, "friction": 0.5, "settle": 0.8},
+    "led_fine": {"seeds": "11-13", "box": FINE, "grain": 0.0025, "friction": 0.5, "settle": 0.4},
+    "landing": {"seeds": "11-13", "box": "0.72,0.44,0.3", "grain": 0.005, "friction": 0.5, "settle": 1, "steps": 50},
 }
 
 
@@ -70,6 +75,7 @@ def outline(robot, section):
     return "polygon:" + ",".join(f"{px - x / area:.4f},{py - y / area:.4f}" for px, py in points)
 
 
+PLATE = "rect:0.12,0.1"
 DISC, SQUARE, STRIP = "disc:0.12", "rect:0.1,0.1", "rect:0.12,0.06"
 BALL60, BALL80, BALL100, BALL120, BALL160, BALL170 = (f"sphere:{r}" for r in (0.03, 0.04, 0.05, 0.06, 0.08, 0.085))
 SA01, G1, GO1 = outline("sa01", "foot.left"), outline("g1", "foot.left"), "sphere:0.023"
@@ -85,6 +91,23 @@ def deep(name, shape, depth, stage="load:0.03@0.05"):
 
 def drag(path=0.03, kind="drag"):
     return f"{kind}:{path}@{V}"
+
+
+def toward(shape, half, tilt, angle, speed=0.1, depth=0.01):
+    """A plate of `half` its length [m], tilted [deg], moves at an angle below the horizontal [deg] until its middle is `depth` deep."""
+    way = depth + 0.0005 + half * math.sin(math.radians(abs(tilt)))
+    down = speed * math.sin(math.radians(angle))
+    return f"way{tilt:+d}-{angle} {shape} {tilt} move:{speed * math.cos(math.radians(angle)):.5g},0,{-down:.5g},0,0,{way / down:.5g}"
+
+
+def along(shape, tilt, depth, *ways, speed=0.1):
+    """A tilted plate is pressed, then moves forward and back by `ways` [m]."""
+    moves = " ".join(f"move:{math.copysign(speed, way):.5g},0,0,0,0,{abs(way) / speed:.5g}" for way in ways)
+    return f"along{tilt:+d}{'-back' * (len(ways) > 1)} {shape} {tilt} press:{depth}@{speed} {moves}"
+
+
+def landing(name, shape, tilt, mass, speed, forward=0.0):
+    return f"{name} {shape} {tilt} move:{forward:g},0,{-speed:g},0,0,0.12,{mass:g}"
 
 
 FIRST = [f"disc120 {DISC} 0 {press(0.025)}", f"square100 {SQUARE} 0 {press(0.025)}",
@@ -137,6 +160,20 @@ BLOCKS = [
     ("fine", [f"ball80 {BALL80} 0 {press(0.012)}"]),
     *((family, [f"disc{size} disc:{size / 1000:g} 0 {press(0.022)}" for size in (60, 80, 100)])
       for family in ("loose", "medium", "loose_thin", "loose_thick", "loose_thinner")),  # lab/grains/real-sand.md; all but the last predicted before
+    # What follows was predicted by every model before it was made: lab/grains/predicted.csv
+    ("led", [toward(PLATE, 0.06, tilt, angle) for angle, tilts in ((90, (0, 10, 20, 30)), (60, (-30, -15, 0, 15, 30)),
+                                                                 (30, (-30, -15, 0, 15, 30))) for tilt in tilts]),
+    ("led", [along(PLATE, tilt, 0.015, 0.03) for tilt in (-20, -10, 10, 20)] + [along(PLATE, -15, 0.015, 0.02, -0.02),
+             f"onto-print {PLATE} 0 press:0.02@0.1 press:-0.005@0.2 move:0.2,0,0,0,0,0.275 press:0.025@0.1"]),
+    ("landing", [landing("sa01-1", SA01, 0, 20, 1), landing("sa01-2", SA01, 0, 20, 2), landing("sa01-3", SA01, 0, 10, 3),
+                 landing("sa01-heel", SA01, -10, 20, 1.5), landing("sa01-toe", SA01, 15, 20, 1.5),
+                 landing("sa01-forward", SA01, 0, 20, 1.5, 1), landing("g1-2", G1, 0, 40, 2),
+                 landing("g1-heel-forward", G1, -10, 20, 1.5, 0.5)]),
+    ("led_wide", [f"walk {SA01} -12 move:0.25,0,-0.4,3.5,0,0.08 move:0.02,0,-0.03,0,0,0.25 move:0.1,0,0.05,2,0,0.12 move:0.2,0,0.4,0,0,0.1",
+                  f"run {SA01} 5 move:1,0,-1.2,0,0,0.03 move:0.3,0,-0.2,-1,0,0.06 move:0.5,0,0.3,3,0,0.06 move:0.5,0,1,0,0,0.05",
+                  f"roll-hold {SA01} -8 press:0.02@0.2 move:0,0,0,5,0,0.05 hold:0.2"]),
+    ("led_deep", [f"along+0-thin {PLATE},0.02 0 press:0.04@0.2 move:0.1,0,0,0,0,0.3", f"along+0-tall {PLATE},0.2 0 press:0.04@0.2 move:0.1,0,0,0,0,0.3"]),
+    ("led_fine", [toward(STRIP, 0.06, -15, 60, 0.2), toward(STRIP, 0.06, 15, 30, 0.2), along(STRIP, -15, 0.012, 0.03, speed=0.2)]),
 ]
 
 
@@ -186,6 +223,8 @@ def seconds_of(case):
             depth = amount
         elif kind in ("hold", "drop"):
             seconds += rest[1] if rest else amount
+        elif kind == "move":
+            seconds += rest[4]
         else:
             seconds += abs(math.radians(amount) if kind == "swipe" else amount) / rest[0]
     return seconds

@@ -201,6 +201,7 @@ TEST(the_plate_gets_what_the_grains_lose) {
     bed.g.plate[0] = {};
     bed.g.plate[0].z = 0.05;
     bed.g.plate[0].pitch = c.tilt;
+    bed.g.plate[0].yaw = 0.4;
     plate_place(&bed.g.plate[0], bed.g);
     double before[6] = {0}, after[6] = {0};
     for (double *sum : {before, after}) {
@@ -232,6 +233,31 @@ TEST(the_plate_gets_what_the_grains_lose) {
         expect_entry("plate", k, got, before[k] - after[k], 1e-3 * size);
     }
     assert_true(fabs(before[2] - after[2]) > 0.1 * fabs(before[2]));
+    bed_close(&bed);
+}
+
+/* A point of a plate that moves and turns in all ways has the velocity that grains feel there. */
+TEST(a_led_plate_moves_as_it_turns) {
+    Bed bed = stage_open(BedDef(), {ball(0.01f, 0.01f, 0.01f, 0.002f)}, 0);
+    Plate *p = &bed.g.plate[0];
+    *p = {};
+    p->z = 0.05;
+    p->yaw = 0.7;
+    p->pitch = -0.3;
+    p->vx = 0.5;
+    p->vy = -0.3;
+    p->vz = 0.2;
+    p->turning = 3;
+    p->rate = -2;
+    plate_place(p, bed.g);
+    const Vec3 at = vec(0.04f, -0.03f, 0.02f), before = plate_to_world(*p, at);
+    const Vec3 velocity = p->velocity + cross(p->spin, before);
+    const double x = p->x, y = p->y, z = p->z, dt = (double)bed.g.law.dt;
+    plate_step(0, bed.g);
+    const Vec3 after = plate_to_world(*p, at);
+    expect_near("x", (p->x - x + (double)(after.x - before.x)) / dt, (double)velocity.x, 2e-3);
+    expect_near("y", (p->y - y + (double)(after.y - before.y)) / dt, (double)velocity.y, 2e-3);
+    expect_near("z", (p->z - z + (double)(after.z - before.z)) / dt, (double)velocity.z, 2e-3);
     bed_close(&bed);
 }
 
