@@ -182,7 +182,7 @@ def entries(fitted, data):
                 sole = sole.concentric() if model.startswith("con_") else sole
             made, found, z, speed, dt = mild.Ground([sole], material, dt=1e-3), [], 5e-4, 2.5e-3, 1e-3
             while -z < depths[-1]:
-                judge.ground_step(made, (np.array([0.0, z, 0.0]), np.array([0.0, -speed, 0.0])), 0.0, dt)
+                judge.ground_step(made, (np.array([0.0, 0.0, z, 0.0, 0.0]), np.array([0.0, 0.0, -speed, 0.0, 0.0])), 0.0, dt)
                 z -= dt * speed
                 found.append((-z, made.force[0, 2]))
             return np.interp(depths, *np.array(found).T)

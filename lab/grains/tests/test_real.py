@@ -63,7 +63,7 @@ def wheel():
 def real_sand_step(ground, z):
     import judge_entries
 
-    judge_entries.ground_step(ground, (np.array([0.0, z, 0.0]), np.array([0.0, -0.02, 0.0])), 0.0, 1e-3)
+    judge_entries.ground_step(ground, (np.array([0.0, 0.0, z, 0.0, 0.0]), np.array([0.0, 0.0, -0.02, 0.0, 0.0])), 0.0, 1e-3)
 
 
 def loose():
