@@ -14,29 +14,26 @@ extern "C" {
 #include "ground/batch/contact.h"
 #include "ground/batch/order.h"
 
+#define CONTACT_FEET KERNEL_GROUPS
+#define CONTACT_PER KERNEL_PER
 #define CONTACT_CURVES KERNEL_CURVES
 #define CONTACT_HEAP KERNEL_HEAP
 #define CONTACT_POINTS KERNEL_POINTS
 #define CONTACT_MAP 0
-#define CONTACT_FEET KERNEL_GROUPS
-#define CONTACT_PER KERNEL_PER
-#define CONTACT(name) level_##name
+namespace level {
 #include "ground/batch/contact.inc"
+}
+#if KERNEL_PAIRS
+#define CONTACT_PAIRS 1
+namespace pair {
+#include "ground/batch/contact.inc"
+}
+#endif
 #undef CONTACT_MAP
 #define CONTACT_MAP 1
-#define CONTACT_FEET KERNEL_GROUPS
-#define CONTACT_PER KERNEL_PER
-#define CONTACT(name) map_##name
+namespace map {
 #include "ground/batch/contact.inc"
-#if KERNEL_PAIRS
-#undef CONTACT_MAP
-#define CONTACT_MAP 0
-#define CONTACT_PAIRS 1
-#define CONTACT_FEET KERNEL_GROUPS
-#define CONTACT_PER KERNEL_PER
-#define CONTACT(name) pair_##name
-#include "ground/batch/contact.inc"
-#endif
+}
 #include "ground/batch/robot.inc"
 
 static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
@@ -61,12 +58,12 @@ static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
         batch_problem(&shape, &arrays, &input, i, &problem);                                       \
         batch_result(&shape, &output, i, &result);                                                 \
         problem.foot = at;                                                                         \
-        version##_robot(&setup, &problem, shared, &memory, advance, &result, done);                \
+        version::contact_robot(&setup, &problem, shared, &memory, advance, &result, done);         \
         __syncwarp(); /* for `shared` */                                                           \
     }
 
 static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_level(CONTACT_ARGUMENTS) {
-    __shared__ level_Shared shared;
+    __shared__ level::ContactShared shared;
     if (IS_STEPPED(blockIdx.x)) {
         CONTACT_ROBOT(level, &shared, (int)blockIdx.x, 0, NULL)
     }
@@ -79,7 +76,7 @@ static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_level(CON
 /* Two robots with one foot near the ground or none. Where they are no pair they are left for
  * contact_rest: a kernel with the code of both waits longer for instructions. */
 static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_pairs(CONTACT_ARGUMENTS) {
-    __shared__ pair_Shared shared;
+    __shared__ pair::ContactShared shared;
     const BatchOrder order = batch_order_of(&shape, &arrays);
     const int chunk = (int)blockIdx.x, chunks = (int)gridDim.x;
     int last = 2 * (int)gridDim.y - 1; /* a chunk may have one or two places less */
@@ -106,7 +103,7 @@ static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_pairs(CON
 
 /* The robots with both feet near it, beside contact_pairs; then, by the last blocks, those left. */
 static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_rest(CONTACT_ARGUMENTS) {
-    __shared__ level_Shared shared;
+    __shared__ level::ContactShared shared;
     const BatchOrder order = batch_order_of(&shape, &arrays);
     const int blocks = (int)gridDim.x, from_end = blocks - 1 - (int)blockIdx.x;
     int at = (int)blockIdx.x, stride = blocks, count = shape.robots, is_left = 0;
@@ -132,7 +129,7 @@ static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_rest(CONT
 #endif
 
 static __global__ void __launch_bounds__(LANES, MAP_ROBOTS) contact_map(CONTACT_ARGUMENTS) {
-    __shared__ map_Shared shared;
+    __shared__ map::ContactShared shared;
     if (IS_STEPPED(blockIdx.x)) {
         CONTACT_ROBOT(map, &shared, (int)blockIdx.x, 0, NULL)
     }
