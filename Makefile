@@ -35,7 +35,7 @@ help:
 	@echo "make fuzz    RUNS=$(RUNS) random inputs for everything that reads (clang; 2 to 25 minutes a target, an hour for model)"
 	@echo "make mutants N=$(N) random faults in src/LAYER=$(LAYER): how many do its tests catch? (docs/testing.md)"
 	@echo "make mutants FAULTS=1  the named faults of tests/faults.txt: all must be caught"
-	@echo "make paper   the paper's experiments as one page, out/paper/index.html (docs/paper.md); QUICK=1: few trials, shipped weights"
+	@echo "make paper   the paper's experiments as one page, out/paper/index.html (lab/paper/README.md); QUICK=1: few trials, shipped weights"
 	@echo "make web     the walk in a browser, build/web, for \`build/mild web\` or any static host (docs/web.md)"
 	@echo "make web-test   ten seconds of it in headless Chromium"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
@@ -50,7 +50,7 @@ help:
 	@echo "make newton-check  the ground in MuJoCo Warp and Newton beside the engine plugin, on the CPU, in build/newton-venv"
 	@echo "make isaaclab-check  the ground in Isaac Lab 3's own G1 task without its simulator, on the CPU (8 GB), for PYTHON312=python3.12"
 	@echo "make jax-check   the batch ground inside jax.jit, and under MJX's robots, in build/jax-venv"
-	@echo "make dds-check   examples/drive: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
+	@echo "make dds-check   lab/drive/examples: robots walk by Unitree's and by ROS 2's messages over DDS, in build/dds-venv"
 	@echo "make notebook-check  the notebook of each tutorial in Jupyter's kernel, in build/notebooks-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
@@ -59,14 +59,14 @@ setup:
 	@scripts/setup.sh
 
 build: setup
-	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
+	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release -DMILD_LAB=ON --log-level=WARNING $(CMAKE_FLAGS)
 	@cmake --build build --parallel $(JOBS)
 
 # The program alone; tests, plugin and Python module come with `build`, and take longer than it. VERBOSE=1 shows the compiler.
 .PHONY: program
 program: setup
 	@scripts/quietly.sh build/log/configure.log "configuring the build" \
-		cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
+		cmake -S . -B build -DCMAKE_BUILD_TYPE=Release -DMILD_LAB=ON --log-level=WARNING $(CMAKE_FLAGS)
 	@scripts/quietly.sh build/log/compile.log "building build/mild" cmake --build build --parallel $(JOBS) --target mild
 
 test: build
@@ -116,9 +116,9 @@ mutants: setup
 
 # Trains only where there is a GPU (a build with CMAKE_FLAGS=-DMILD_CUDA=ON); keeps what runs/paper has. QUICK: the shipped weights.
 paper: build
-	@.venv/bin/pip install -q --require-hashes -r scripts/paper/requirements.txt
-	@$(if $(QUICK),:,if nvidia-smi >/dev/null 2>&1; then scripts/paper/train.sh runs/paper; fi)
-	@.venv/bin/python scripts/paper/paper.py $(if $(QUICK),--trials 3 --models policies/paper)
+	@.venv/bin/pip install -q --require-hashes -r lab/paper/requirements.txt
+	@$(if $(QUICK),:,if nvidia-smi >/dev/null 2>&1; then lab/paper/train.sh runs/paper; fi)
+	@.venv/bin/python lab/paper/paper.py $(if $(QUICK),--trials 3 --models policies/paper)
 
 # With the program, which serves it. emscripten and, for the test, Chromium: large, so nothing else installs them.
 web: program
@@ -138,11 +138,12 @@ docs:
 deb: setup
 	@JOBS=$(JOBS) scripts/deb.sh $(if $(TEST),test)
 
-# $(call environment,NAME,PYTHON): build/NAME-venv with what scripts/NAME.txt lists, by uv, which is faster than pip by minutes.
-environment = cmp -s scripts/$(1).txt build/$(1)-venv/installed || { $(or $(2),python3) -m venv --clear build/$(1)-venv && \
+# $(call environment,NAME,PYTHON): build/NAME-venv with what NAME.txt of scripts or lab lists, by uv, which is faster than pip by minutes.
+listed = $(wildcard scripts/$(1).txt lab/*/$(1).txt)
+environment = cmp -s $(listed) build/$(1)-venv/installed || { $(or $(2),python3) -m venv --clear build/$(1)-venv && \
 	build/$(1)-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/uv.txt && \
-	build/$(1)-venv/bin/uv pip install -q --python build/$(1)-venv/bin/python --require-hashes -r scripts/$(1).txt && \
-	cp scripts/$(1).txt build/$(1)-venv/installed; }
+	build/$(1)-venv/bin/uv pip install -q --python build/$(1)-venv/bin/python --require-hashes -r $(listed) && \
+	cp $(listed) build/$(1)-venv/installed; }
 # $(call with_wheel,NAME,PYTHON): the same with the wheel, as a user has it.
 with_wheel = $(call environment,$(1),$(2)) && \
 	build/$(1)-venv/bin/pip install -q --disable-pip-version-check --no-deps --force-reinstall build/dist/mildground-*.whl
@@ -169,7 +170,7 @@ wheels: setup
 python-check: wheel
 	@$(call with_wheel,learners)
 	@build/learners-venv/bin/python tests/python/check_learners.py
-	@build/learners-venv/bin/python tests/envs/test_learners.py .
+	@build/learners-venv/bin/python lab/paper/tests/test_learners.py .
 	@build/learners-venv/bin/python tests/python/check_cuda.py
 
 mjlab-check: wheel
@@ -188,11 +189,11 @@ jax-check: wheel
 	@$(call with_wheel,jax)
 	@build/jax-venv/bin/python -W ignore tests/python/check_jax.py
 
-# The bridges of examples/drive.
+# The bridges of lab/drive.
 dds-check: build
 	@$(call environment,dds)
-	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_unitree.py build/mild
-	@PYTHONPATH=build/python build/dds-venv/bin/python tests/drive/test_ros2.py build/mild
+	@PYTHONPATH=build/python build/dds-venv/bin/python lab/drive/tests/test_unitree.py build/mild
+	@PYTHONPATH=build/python build/dds-venv/bin/python lab/drive/tests/test_ros2.py build/mild
 
 # As a user has them: from the wheel. The notebooks with their pictures stay in build/notebooks.
 notebook-check: wheel

@@ -16,7 +16,6 @@ install(FILES ${CMAKE_SOURCE_DIR}/NOTICE ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_S
   DESTINATION share/doc/mild COMPONENT program)
 file(GLOB mujoco_licences ${mujoco_folder}/../mujoco*.dist-info/licenses/*)
 install(FILES ${mujoco_licences} DESTINATION share/doc/mild/mujoco COMPONENT program)
-install(FILES ${daqp_folder}/../LICENSE DESTINATION share/doc/mild RENAME LICENSE-DAQP COMPONENT program OPTIONAL)
 
 # The manual page is the program's help, by help2man where there is one.
 find_program(HELP2MAN help2man)

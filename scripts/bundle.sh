@@ -16,7 +16,7 @@ rm -rf "$bundle"
 mkdir -p "$bundle/bin" "$bundle/lib"
 sizes=engine_sizes # of the first build, because the second may not run here
 for march in x86-64-v3 x86-64-v4; do
-    cmake -S . -B "build/$march" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_CUDA=ON -DMILD_VIEW=OFF "${ranks[@]}" \
+    cmake -S . -B "build/$march" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_LAB=ON -DMILD_CUDA=ON -DMILD_VIEW=OFF "${ranks[@]}" \
         -DMILD_MARCH=$march -DMILD_ENGINE_SIZES="$sizes" -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
         -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' >/dev/null
     cmake --build "build/$march" --parallel "$jobs" --target mild mild_envs gpu_test_gpu gpu_test_parts batch_test_batch batch_test_points \
@@ -64,8 +64,7 @@ ldd "${programs[@]}" | awk '$2 == "=>" { print $3 }' | sort -u |
     grep -Ev '/(libc|libm|libdl|librt|libpthread|libcublas|libcublasLt|libnccl)\.so' | xargs -I{} cp -L {} "$bundle/lib/"
 find "$bundle/lib" -name '*.so*' -type f -exec strip {} +
 strip -o "$bundle/lib/libmild_envs.so" build/x86-64-v3/libmild_envs.so
-mkdir "$bundle/scripts"
-cp -r scripts/rivals "$bundle/scripts/"
+cp -r --parents lab/paper/rivals "$bundle/"
 cp -r robots configs policies LICENSE NOTICE "$bundle/"
 cp --parents python/mild/report.py "$bundle/" # mild report
 cp .venv/daqp-*/LICENSE "$bundle/LICENSE-DAQP" # parts of the program

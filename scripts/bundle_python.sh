@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Adds the Python package's environments to build/bundle (scripts/bundle.sh), for another machine's Python: build/bundle/python,
-# to be named in PYTHONPATH; scripts/rivals finds it there. Its mild._envs is linked to the bundle's libmild_envs.so, so that no
+# to be named in PYTHONPATH; lab/paper/rivals finds it there. Its mild._envs is linked to the bundle's libmild_envs.so, so that no
 # kernel is compiled again.
 # Usage: [BUILD=build/x86-64-v3] scripts/bundle_python.sh PYTHON, an interpreter of that machine's version with its headers, e.g. python3.12
 set -euo pipefail

@@ -18,7 +18,7 @@ sources() {
     if git rev-parse --is-inside-work-tree >/dev/null 2>&1; then
         git ls-files -co --exclude-standard '*.c' '*.h' '*.inc' '*.cu' '*.cpp'
     else # an archive without git
-        find include src tests examples -name '*.[ch]' -o -name '*.inc' -o -name '*.cu' -o -name '*.cpp'
+        find include src lab tests examples -name '*.[ch]' -o -name '*.inc' -o -name '*.cu' -o -name '*.cpp'
     fi
 }
 
@@ -61,7 +61,7 @@ stage_sanitize() {
 # Files that are newer than their stamp, or include a header that is, by the compiler's dependency lists.
 changed() {
     local file stamp list dependency
-    for file in $(sources | grep '^src/.*\.c$'); do
+    for file in $(sources | grep -E '^(src|lab)/.*\.c$'); do
         stamp=$root/tidy/${file//\//_}
         list=$(find "$root/sanitize/src" -path "*/${file#src/}.o.d" | head -1)
         [ -n "$list" ] || continue # not part of this build, such as the learner on a GPU

@@ -11,7 +11,7 @@ make_package() {
     ! command -v ccache >/dev/null || launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache)
     # several processes need MPI at run time, which is large: build from source for that
     cmake -S . -B "$root" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_MARCH=x86-64-v3 -DMILD_MPI=OFF \
-        -DMILD_TESTS=OFF -DMILD_DATA_DIR=/usr/share/mild -DCMAKE_INSTALL_PREFIX=/usr "${launcher[@]}"
+        -DMILD_LAB=ON -DMILD_TESTS=OFF -DMILD_DATA_DIR=/usr/share/mild -DCMAKE_INSTALL_PREFIX=/usr "${launcher[@]}"
     cmake --build "$root" --parallel "$jobs" --target mild mild_shared mild_static mild_batch_shared mild_batch_static mild_envs >/dev/null
     rm -rf "$root"/mild_*.deb "$root/web"
     if command -v emcc >/dev/null; then

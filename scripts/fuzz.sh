@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs the fuzz targets of tests/fuzz one after the other, with clang's address and undefined-behaviour sanitizers. What they
+# Runs the fuzz targets of tests/fuzz and lab one after the other, with clang's address and undefined-behaviour sanitizers. What they
 # learn is kept in build/fuzz/learned. An input that fails is printed and kept in build/fuzz.
 # Usage: scripts/fuzz.sh [TARGET ...]; RUNS executions each (default 10 million), at most MINUTES each (default no limit).
 # With `merge` as the first word it rewrites tests/fuzz/corpus.tar.xz with the smallest inputs that cover everything found so far.
@@ -12,10 +12,10 @@ if [ "${1:-}" = merge ]; then
     shift
 fi
 command -v clang >/dev/null || { echo "fuzz: clang is needed: apt-get install clang" >&2; exit 2; }
-all=$(grep -o '^ *mild_fuzz([a-z]*' tests/CMakeLists.txt | sed 's/.*(//')
+all=$(grep -oh '^ *mild_fuzz([a-z]*' tests/CMakeLists.txt lab/*/build.cmake | sed 's/.*(//')
 targets=${*:-$all}
 # it unpacks the corpus, too
-cmake -S . -B $build -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_COMPILER=clang -DMILD_SANITIZE=ON -DMILD_FUZZ=ON --log-level=WARNING
+cmake -S . -B $build -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_COMPILER=clang -DMILD_LAB=ON -DMILD_SANITIZE=ON -DMILD_FUZZ=ON --log-level=WARNING
 cmake --build $build --parallel "${JOBS:-$(nproc)}" --target $(printf 'fuzz_%s ' $targets) >/dev/null
 # without stack traces for allocations, which cost a third of the speed
 export ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=4:max_malloc_fill_size=0

@@ -9,7 +9,7 @@ if ! [ -x build/uv/bin/uv ]; then
     python3 -m venv build/uv
     build/uv/bin/pip install --quiet --disable-pip-version-check --require-hashes -r scripts/uv.txt
 fi
-[ $# -gt 0 ] || set -- scripts/{requirements,uv,site,dds,wheel,wheels,cuda,learners,mjlab,newton,isaaclab,jax,notebooks}.in scripts/paper/requirements.in tests/export/requirements.in
+[ $# -gt 0 ] || set -- scripts/{requirements,uv,site,wheel,wheels,cuda,learners,mjlab,newton,isaaclab,jax,notebooks}.in lab/drive/dds.in lab/paper/requirements.in tests/export/requirements.in
 for file; do
     version=3.11
     [[ $file != *isaaclab.in ]] || version=3.12 # the only one that it is for

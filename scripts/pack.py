@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Data of many small files as one archive, and the way to read it: no file of it needs to be unpacked.
 
-    scripts/pack.py grains/records.tar.xz out/records           all below the folder goes in; what has the same name is replaced
+    scripts/pack.py lab/grains/records.tar.xz out/records           all below the folder goes in; what has the same name is replaced
     scripts/pack.py tests/fuzz/corpus.tar.xz/solve found_rows   a file goes into a folder of the archive
     scripts/pack.py --new ARCHIVE FOLDER                        what the archive had is dropped
     scripts/pack.py --check ARCHIVE...                          against the hashes in it
@@ -30,7 +30,7 @@ def fail(text):
 # ---- reading ----
 
 def opened(path):
-    """pathlib's path of a file or folder, or one that is read alike from an archive: grains/records.tar.xz/sand."""
+    """pathlib's path of a file or folder, or one that is read alike from an archive: lab/grains/records.tar.xz/sand."""
     path = pathlib.Path(path)
     archive, _ = split(path)
     if archive is None or not archive.is_file():

@@ -5,7 +5,7 @@ cd "$(dirname "$0")/.."
 minutes=${MINUTES:-5}
 mild=build/mild
 shipped=policies/mild.safetensors
-start=${START:-policies/paper/mild-1.safetensors} # two and a half minutes of training on a GPU (scripts/paper/train.sh)
+start=${START:-policies/paper/mild_merged_slips-1.safetensors} # two and a half minutes of training on a GPU (lab/paper/train.sh)
 # A training of fewer policy steps changes less than the table shows: a minute on two cores (docs/log.md).
 least=480000
 run=runs/tour # its own folder, a new one each time

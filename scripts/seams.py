@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Counts the functions inside of layers that tests call: those which a header of src declares and which no other layer,
+"""Counts the functions inside of layers that tests call: those which a header of src or lab declares and which no other layer,
 nor the Python package, the plugin or exported C, names. Tests of a layer's seam, what these and the public headers call, leave its
 inside free to change (docs/testing.md). Ends with 1 if there are more than --most. Usage: scripts/seams.py [--list] [--most N]"""
 import argparse
 import collections
+import itertools
 import pathlib
 import re
 import sys
@@ -23,12 +24,17 @@ def sources(folder):
             yield path.relative_to(ROOT / folder), re.sub(r'"(\\.|[^"\\\n])*"', '""', text)
 
 
+def lab(tests):
+    """The sources of lab's layers, either those of tests or the others; grains is a program, not a layer."""
+    return ((path, text) for path, text in sources("lab") if ("tests" in path.parts) == tests and path.parts[0] != "grains")
+
+
 def inside():
     """{layer: {function}} of the functions that only their own layer names, and the headers that declare them."""
     declared, named = {}, collections.defaultdict(set)
     public = {name for folder in PUBLIC for _, text in sources(folder) for name in re.findall(r"\w+", text)}
-    for path, text in sources("src"):
-        layer = str(path.parent)
+    for path, text in itertools.chain(sources("src"), lab(tests=False)):
+        layer = "app" if path.name.startswith("cmd_") else str(path.parent)  # the lab's commands, too
         for name in set(re.findall(r"\b[a-z_]\w*\b", text)):
             named[name].add(layer)
         if path.suffix == ".h":
@@ -44,7 +50,7 @@ def main():
     options = parser.parse_args()
     private = inside()
     calls = collections.defaultdict(set)
-    for path, text in sources("tests"):
+    for path, text in itertools.chain(sources("tests"), lab(tests=True)):
         own = {*OWN.findall(text), *STAND_IN.findall(text)}
         for name in re.findall(r"\b([a-z_]\w*)\s*\(", text):
             if name in private and name not in own:

@@ -29,7 +29,7 @@ make_wheel() {
         export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
     fi
     if command -v emcc >/dev/null; then # as `make web`; cmake/Wheel.cmake takes build/web
-        quiet cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING
+        quiet cmake -S . -B build -DCMAKE_BUILD_TYPE=Release -DMILD_LAB=ON --log-level=WARNING
         quiet scripts/web.sh
     fi
     rm -rf "$root"/raw "$root"/mildground-*.whl

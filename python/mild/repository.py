@@ -1,4 +1,4 @@
-"""The commands `mild judge` (docs/grains.md) and `mild bench record` (docs/record.md): scripts of the repository, whose grains' records
+"""The commands `mild judge` (lab/grains/README.md) and `mild bench record` (lab/bench/README.md): scripts of the repository, whose grains' records
 and robots of others are too large for a wheel."""
 import os
 import pathlib
@@ -7,7 +7,7 @@ import sys
 
 from . import _processor
 
-SCRIPTS = {("judge",): "judge.py", ("bench", "record"): "record.py"}
+SCRIPTS = {("judge",): "lab/grains/judge.py", ("bench", "record"): "lab/bench/record.py"}
 
 
 def command_of(arguments):
@@ -20,7 +20,7 @@ def repository(script):
     here = pathlib.Path(__file__).resolve()
     homes = [pathlib.Path(os.environ["MILD_HOME"])] if os.environ.get("MILD_HOME") else []
     return next((home for home in (*homes, *here.parents, pathlib.Path.cwd(), *pathlib.Path.cwd().parents)
-                 if (home / "scripts" / script).is_file()), None)
+                 if (home / script).is_file()), None)
 
 
 def main(arguments):
@@ -29,14 +29,14 @@ def main(arguments):
     script = SCRIPTS[command]
     home = repository(script)
     if home is None:
-        print(f"mild {' '.join(command)}: scripts/{script} is in the repository, not in this package; run it in a clone of it, or set "
+        print(f"mild {' '.join(command)}: {script} is in the repository, not in this package; run it in a clone of it, or set "
               "MILD_HOME to one", file=sys.stderr)
         return 2
     program = _processor.program()
     if program:
         os.environ.setdefault("MILD", str(program))  # the program that started this has set it
-    sys.argv = [str(home / "scripts" / script), *arguments[len(command) :]]
-    sys.path.insert(0, str(home / "scripts"))
+    sys.argv = [str(home / script), *arguments[len(command) :]]
+    sys.path.insert(0, os.path.dirname(sys.argv[0]))
     try:
         runpy.run_path(sys.argv[0], run_name="__main__")
     except SystemExit as error:

@@ -571,7 +571,7 @@ int cmd_eval(int argc, char **argv) {
          "pressure centre, depth"},
         {"program", CLI_TEXT, &e->program, 0, 0, "COMMAND",
          "a program that computes the soft ground in the place of the model, asked in every "
-         "physics step; one runs for each trial (docs/grains.md)"},
+         "physics step; one runs for each trial (lab/grains/README.md)"},
         {"json", CLI_OUTPUT, &e->json, 0, 0, "FILE",
          "also write the table as JSON to FILE; - for standard output"},
     };

@@ -1,5 +1,6 @@
 /* One function per command, one file per function: cmd_NAME.c. argv[0] is the command's name;
- * returns the exit code. A command has one row, in COMMAND_LIST. */
+ * returns the exit code. A command has one row, in COMMAND_LIST; those of
+ * lab/commands.h come after them where the lab is built. */
 #ifndef MILD_COMMANDS_H
 #define MILD_COMMANDS_H
 
@@ -12,12 +13,9 @@
     X(play, "watch a policy walk, in a window or as a video")                                      \
     X(press, "press a plate or a sole into a ground and record the force")                         \
     X(fit, "find the parameters of a ground from recorded presses")                                \
-    X(know, "judge what a robot knows of its ground from its own sensors")                         \
     X(actuator, "fit a network to logs of a robot's motors")                                       \
     X(export, "write a policy as an ONNX graph or as C, to run it elsewhere")                      \
-    X(drive, "run a policy for a robot over UDP, or be that robot, simulated")                     \
     X(report, "draw the curves of training runs on one page")                                      \
-    X(bench, "measure speed and memory on this machine")                                           \
     X(info, "list grounds, models, config keys, versions and devices")                             \
     X(web, "serve the walk in a browser that `make web` builds")
 

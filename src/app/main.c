@@ -82,6 +82,7 @@ int main(int argc, char **argv) {
     if (package_has(argv[1])) {
         return package_run(argv + 1);
     }
+    package_other(argv + 1);
     fprintf(stderr, "mild: unknown command '%s'; nearest is '%s' (mild --help lists all)\n",
             argv[1], text_nearest(argv[1], names, command_count));
     return CLI_EXIT_BAD_INPUT;

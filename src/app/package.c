@@ -85,6 +85,19 @@ int package_run(char **arguments) {
     return CLI_EXIT_BAD_INPUT;
 }
 
+void package_other(char **arguments) {
+    char name[64], beside[PATH_SIZE], program[PATH_SIZE];
+    const int length = snprintf(name, sizeof name, "mild-%s", arguments[0]);
+    if (length >= (int)sizeof name || *arguments[0] == '-' || strchr(name, '/')) {
+        return;
+    }
+    setenv("MILD", path_program(program), 1);
+    if (*path_beside_program(name, beside)) {
+        become((char *[]){beside}, 1, arguments + 1);
+    }
+    become((char *[]){name}, 1, arguments + 1);
+}
+
 int package_script(const char *script, char **arguments) {
     char python[PATH_SIZE], path[PATH_SIZE], isolated[] = "-I";
     package_python(python);

@@ -1,4 +1,5 @@
-/* Commands in Python: those of the package, `trial`, `judge`, `bench record`, and `report`. */
+/* Commands that are other programs: those of the Python package, `trial`, `judge`, `bench record`,
+ * and `report`; and any program mild-NAME. */
 #ifndef MILD_PACKAGE_H
 #define MILD_PACKAGE_H
 
@@ -12,6 +13,10 @@ int package_has(const char *command);
  * The variable MILD is this program there. arguments: the command, its own, NULL. Returns an exit
  * code. */
 int package_run(char **arguments);
+
+/* As git has it: becomes the program mild-NAME of the folder of this one, or else of PATH, with the
+ * variable MILD as above. Returns where there is none. arguments: NAME, its own, NULL. */
+void package_other(char **arguments);
 
 /* Becomes a shipped file of the package, "python/mild/report.py", which needs nothing but Python:
  * not the package, and no module of the working directory. Returns an exit code where that cannot

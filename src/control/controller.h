@@ -1,5 +1,5 @@
 /* What moves the robots. A controller is one row of CONTROLLER_LIST and one file that implements
- * this interface. Evaluation and play know nothing else about it. */
+ * this interface; those of lab/controllers.h come after them where the lab is built. Evaluation and play know nothing else about it. */
 #ifndef MILD_CONTROLLER_H
 #define MILD_CONTROLLER_H
 
@@ -39,12 +39,7 @@ enum {
 
 /* Name, properties and summary; the file defines controller_make_NAME. */
 #define CONTROLLER_LIST(X)                                                                         \
-    X(clock, CONTROLLER_FOLLOWS,                                                                   \
-      "a network that sees one frame, at 40 Hz (Singh et al. 2024), of --policy")                  \
-    X(ht2, CONTROLLER_FOLLOWS, "a transformer (Radosavovic et al. 2024), of --policy")             \
     X(learned, CONTROLLER_FOLLOWS | CONTROLLER_POLICY, "the policy of --policy")                   \
-    X(passivity, CONTROLLER_FOLLOWS | CONTROLLER_OWN_GAINS,                                        \
-      "a biped that knows its true state: a DCM plan and whole-body impedances command torques")   \
     X(stand, CONTROLLER_OWN_GAINS,                                                                 \
       "stands still and balances, ignores the command; gains stand_kp, stand_kd of robot.ini")     \
     X(zero, 0, "takes no action, so the joints hold the default pose")
@@ -62,7 +57,6 @@ typedef struct {
     MildStatus controller_make_##name(const ControllerDef *def, Controller *controller,            \
                                       MildError *error);
 CONTROLLER_LIST(CONTROLLER_MAKE)
-#undef CONTROLLER_MAKE
 
 int controller_count(void);
 const char *controller_name(int index); /* index < controller_count() */

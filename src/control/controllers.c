@@ -4,12 +4,18 @@
 #include "base/text.h"
 #include "control/controller.h"
 
+#ifdef MILD_LAB
+#include "lab/controllers.h"
+#else
+#define LAB_CONTROLLERS(X)
+#endif
+
 #define ROW(name, properties, summary) {#name, summary, properties, controller_make_##name},
 static const struct {
     const char *name, *summary;
     int properties;
     MildStatus (*make)(const ControllerDef *def, Controller *controller, MildError *error);
-} controllers[] = {CONTROLLER_LIST(ROW)};
+} controllers[] = {CONTROLLER_LIST(ROW) LAB_CONTROLLERS(ROW)};
 #undef ROW
 enum { CONTROLLERS = sizeof controllers / sizeof *controllers };
 

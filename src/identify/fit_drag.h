@@ -8,7 +8,7 @@
  * (docs/model.md section 22; without grip by mu F). The shape of F_v is that of the fitted press.
  * Its size is each record's own, by least squares, because a bed differs from the next by more than
  * slip_length should feel. A row of F counts by 1/F, because the scatter of grains is as the root
- * of the force (docs/grains.md). Pure functions: thread safe. */
+ * of the force (lab/grains/README.md). Pure functions: thread safe. */
 #ifndef LAB_FIT_DRAG_H
 #define LAB_FIT_DRAG_H
 

@@ -87,6 +87,4 @@ bad "task.actuator train.robots" "$mild" eval --task.actuator=motor.safetensors 
 bad "task.actuator train.robots" "$mild" train --out x --task.actuator=motor.safetensors --train.robots=batch \
     --randomize.patch_share=0 --train.envs=2
 bad "task.actuator" "$mild" eval --controller stand --speed 0 --task.actuator=motor.safetensors
-bad "task.actuator" "$mild" eval --controller passivity --task.actuator=motor.safetensors
-bad "task.actuator motor.safetensors" "$mild" bench walk --task.actuator=motor.safetensors
 finish "actuator: logs, fits, the key"

@@ -68,7 +68,7 @@ awk "BEGIN { exit !($(peak --ground.k_pen=500) > $(peak) && $(peak --ground.k_pe
 # another maker's network goes to `mild trial`, which the one line of error spells out
 echo "a network of another maker" >walk.onnx
 echo "a checkpoint of a learner" >walk.pt
-for command in eval play drive; do
+for command in eval play; do
     bad walk.onnx "$mild" $command --policy walk.onnx
     expect 2 "$command: walk.onnx: .*\`mild trial ROBOT.xml walk.onnx --describe LAYOUT\`" "$mild" $command --policy walk.onnx
 done
@@ -220,7 +220,6 @@ own=$(walked "${as[@]}")
 [ "$(walked --robot go1 --controller stand)" = "$(walked --robot go1 --controller stand --task.gait_period=0.8)" ] || fail "a controller without a policy"
 printf '[train]\nrobot = go1\n[task]\nphysics_dt = 0.005\n' >few.ini
 [ "$own" = "$(walked --policy "$go1" --config few.ini)" ] || fail "a config that says nothing of how it walks"
-expect 0 'problems' "$mild" bench batch --robot go1
 # its shanks dip into loose sand, which ends nothing, whether they stand there or not
 short || expect 0 '1/1' "$mild" eval --policy "$go1" --ground sand_loose --speed 0.6 --trials 1 --seconds 4
 expect 0 'task.shell_depth has no effect' "$mild" eval --policy "$go1" --ground rigid --speed 0 --trials 1 --seconds 0.1 --task.shell_depth=0.1
@@ -240,7 +239,6 @@ expect 0 'sa01: 12 joints, 2 feet, 33.1 kg' "$mild" info robots
 bad "go2 go1" "$mild" eval --robot go2
 bad "go2 go1" "$mild" play --robot go2
 bad "go2 go1" "$mild" press --ground sand_loose --robot go2
-bad "go2 go1" "$mild" bench step --robot go2
 bad "go2 go1 train.robot" "$mild" train --robot go2 --out run
 bad "--train.robot= ./x" "$mild" train --robot ' ./x' --out run
 bad "--robot" "$mild" train --robot "./$(printf '%600s' | tr ' ' x)" --out run
@@ -269,20 +267,8 @@ bad "ground grounds" "$mild" info ground
 "$mild" info config >complete.ini
 bad "--out" "$mild" train --config complete.ini # the printed config is read back without complaint
 
-# bench
-bad "stepp step" "$mild" bench stepp
-bad "recor record" "$mild" bench recor
-bad "record first mild bench record OUT" "$mild" bench step record
-short || expect 0 'newton_stick' "$mild" bench ground --json bench.json
-short || grep -q '"case":.*"newton_stick"' bench.json || fail "bench.json"
-# in float, along a walk, forces are those of the step in double
-short || expect 0 'force_worst *\(0\.000\|[0-9.]*e-0[4-9]\)' "$mild" bench batch
-for key in machine version rows bench case value unit; do
-    short || grep -q "\"$key\":" bench.json || fail "bench.json lacks $key"
-done
-
 # a file is written into a folder that is there; nobody else's folder is made
-for option in "play --video" "play --pressure" "press --ground foam45 --csv" "press --ground foam45 --figure" "eval --json" "eval --track" "bench step --json" \
+for option in "play --video" "play --pressure" "press --ground foam45 --csv" "press --ground foam45 --figure" "eval --json" "eval --track" \
     "actuator log --out" "export --onnx"; do
     bad "nope/x.png" "$mild" $option nope/x.png
 done

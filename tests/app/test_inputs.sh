@@ -86,7 +86,6 @@ touch file
 mkdir folder
 for target in no/such/folder/out file/out folder ''; do
     bad "--json" timeout 60 "$mild" eval --trials 10000 --seconds 3600 --json "$target"
-    bad "--json" timeout 60 "$mild" bench --json "$target"
     bad "--csv" "$mild" press --ground sand_loose --csv "$target"
     bad "--figure" "$mild" press --ground sand_loose --figure "$target"
 done

@@ -28,9 +28,6 @@ done
 grep -q '"clearance":[[:space:]]*null' stand.json || fail "clearance without a swing: $(grep clearance stand.json)"
 grep -q '"cot":[[:space:]]*null' stand.json || fail "cost of transport of a robot that stands"
 
-"$mild" bench memory --train.envs=16 --json bench.json >/dev/null || fail "bench"
-fit bench bench.json
-
 "$mild" press --ground foam45 --plate 0.2,0.1 --depth 0.03 --csv foam.csv >/dev/null || fail "press"
 "$mild" press --ground sand_loose --plate 0.1,0.1 --csv sand.csv >/dev/null || fail "press"
 "$mild" fit foam.csv --plate 0.2,0.1 --json foam.json >/dev/null || fail "fit"
@@ -44,8 +41,6 @@ fit fit foam.json sand.json bekker.json drag.json
 "$mild" eval --ground grass --trials 1 --seconds 6 --actions walk.csv >/dev/null || fail "eval --actions"
 "$mild" fit walk.csv --json fit_walk.json >/dev/null || fail "fit of a walk"
 fit fit_walk fit_walk.json
-"$mild" know --grounds 2 --seconds 5 --json know.json >/dev/null || fail "know"
-fit know know.json
 sed 's/"alarms":.*/"alarms": -1,/' fit_walk.json >bad.json && unfit fit_walk '.alarms: below 0'
 
 # each kind of fault, in a copy of what fits
@@ -57,7 +52,6 @@ sed 's/"energy":/"energie":/' walk.json >bad.json && unfit eval '.rows\[0\].ener
 sed 's/"torque_max":.*/"torque_max": -1,/' walk.json >bad.json && unfit eval 'torque_max: below 0'
 sed 's/"version":.*/"version": "new",/' walk.json >bad.json && unfit eval '.version: not of the form'
 sed '/"policy":/d' walk.json >bad.json && unfit eval ': not one of'
-printf '{"machine": "m", "version": "0.1.0", "rows": []}' >bad.json && unfit bench '.rows: fewer than 1'
 sed 's/"value":.*/"value": "much",/' foam.json >bad.json && unfit fit '.value: no number'
 
 # its numbers are those that the table, the stances and the track give, each under its own name

@@ -5,32 +5,11 @@ source "$(dirname "$0")/../kit.sh" "$1"
 python=$root/.venv/bin/python
 [ -x "$python" ] || python=python3
 
-latent() { "$python" "$root/scripts/latent.py" "$@"; }
-bad "latent.py csv" latent
-bad "none.csv" latent none.csv
-bad "latent.py ." latent .
-echo hello >foreign
-bad "time_s modulated0" latent foreign
-bad "--latent" latent "$root/policies/mild.safetensors"
-printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3,x\n' >words
-bad "x" latent words
-printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3\n' >short
-bad "--latent" latent short
-printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3,1\n' >one
-bad "3 2" latent one
 row='"trials": 2, "torque_max": 9, "clearance": 0.1, "penetration": 0.2'
 printf '{"rows": [{"ground": "snow", "speed": 0.6, "success": 0, "velocity": 0, "cot": 0, "measured": 0, %s}]}' "$row" >fell.json
 printf '{"rows": [{"ground": "snow", "speed": 0.6, "success": 2, "velocity": 0.5, "cot": 0.7, "measured": 2, %s}]}' "$row" >went.json
 expect 0 '0.60  *fell  *0 of 2  *-  *-  *9 ' "$python" "$root/scripts/compare.py" fell=fell.json went=went.json
 expect 0 '0.60  *went  *2 of 2  *0.50  *0.70  *9 ' "$python" "$root/scripts/compare.py" fell=fell.json went=went.json
-deviations() { "$python" "$root/scripts/paper/deviations.py" "$@"; }
-bad "NAME-SEED.json ." deviations .
-echo '{' >torn-1.json
-bad "torn-1.json" deviations .
-# its figures need what scripts/paper/requirements.txt names
-"$python" -c 'import sklearn' 2>/dev/null && bad "paper.py: unknown experiment nosuch; there are table2 " "$python" -B "$root/scripts/paper/paper.py" nosuch
-bad "paper.py make scripts/paper/requirements.txt" "$python" -S -B "$root/scripts/paper/paper.py" latent # -S: without installed packages
-
 # lines of functions and files; a table is one line, main may be long
 house() { "$python" "$root/scripts/house.py" "$@"; }
 { echo 'void table(void) {'; echo '    int a[] = {'; yes '        1,' | head -70; echo '    };'; yes '    f(a);' | head -59; echo '}'; } >short.c
@@ -74,15 +53,4 @@ said=$(quietly logs/bad.log "breaking" bash -c 'seq 1000; echo "error: no such t
     fail "quietly hides a failure: $said"
 [ "$(VERBOSE=1 quietly logs/none.log "counting" seq 3 | tr '\n' ' ')" = "1 2 3 " ] && [ ! -e logs/none.log ] || fail "VERBOSE"
 
-# the printed training, very short: what stands in its configuration, and its evaluation; called again it goes on
-bad "printed.sh" "$root/scripts/paper/printed.sh"
-bad "printed.sh" "$root/scripts/paper/printed.sh" --train.envs=4
-printed() { MILD=$mild TRIALS=1 "$root/scripts/paper/printed.sh" printed --train.device=cpu --train.robots=mujoco --train.envs=4 "$@"; }
-printed --train.iterations=1 >table 2>log || fail "printed.sh: $(cat log)"
-for key in "physics_dt = 0.005" "matmul = tf32" "iterations = 1" "modulation_per_dimension = false"; do
-    grep -q "^$key$" printed/config.ini || fail "printed.sh: no '$key' in its configuration"
-done
-[ "$(grep -c '/1' table)" = 36 ] && [ -s printed/eval.json ] || fail "printed.sh: nine grounds at four speeds are $(cat table)"
-printed --train.iterations=2 >table 2>log || fail "printed.sh goes on: $(cat log)"
-grep -q "^resumed" table && [ "$(wc -l <printed/log.csv)" = 3 ] || fail "printed.sh begins again: $(cat log)"
 finish "scripts: bad input"

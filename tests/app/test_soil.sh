@@ -95,7 +95,6 @@ expect 0 '^rubber+./mars.ini+grass ' "$mild" eval --ground rubber+./mars.ini+gra
 "$mild" eval --ground rubber+dry_sand --patch 0.3 --trials 2 --seconds 3 --json b.json >/dev/null
 cmp -s a.json b.json && fail "the file in a course is not seen"
 expect 0 './mars.ini' "$mild" play --ground rubber,./mars.ini --seconds 1
-bad "nosuch.ini" "$mild" drive --simulate --ground nosuch.ini
 (cd / && "$mild" eval --ground "$work/mars.ini" --trials 1 --seconds 1 >/dev/null) || fail "a file by its whole path"
 
 # a soil that says only what differs, and one of mild matched to another model

@@ -24,7 +24,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         (pathlib.Path(folder) / "build").mkdir()
         (pathlib.Path(folder) / "build/mild").symlink_to(mild)
-        (pathlib.Path(folder) / "grains").symlink_to(root / "grains")
+        (pathlib.Path(folder) / "lab").symlink_to(root / "lab")
         said = None
         for i in range(1, len(parts), 3):
             kind, text = parts[i], parts[i + 1]

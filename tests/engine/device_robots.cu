@@ -2,26 +2,28 @@
 #include "device_robots.h"
 
 #include "ground/batch/contact.h"
+#include "ground/batch/contact_shapes.h"
 #include "robot/engine/step.h"
 
 /* The ground's step for this number of feet, level and on a map; see contact.inc. */
 #ifndef ENGINE_PER
 #define ENGINE_PER 5 /* elements of a lane */
 #endif
-#define GROUND_FEET (ENGINE_FEET == 3 ? 4 : ENGINE_FEET)
-#define CONTACT_CURVES LAW_CONE
-#define CONTACT_HEAP 0
-#define CONTACT_FEET GROUND_FEET
-#define CONTACT_PER ENGINE_PER
-#define CONTACT_MAP 0
-#define CONTACT(name) ground_##name
+enum {
+    CONTACT_FEET = ENGINE_FEET == 3 ? 4 : ENGINE_FEET,
+    CONTACT_PER = ENGINE_PER,
+    CONTACT_CURVES = LAW_CONE,
+    CONTACT_POINTS = 0,
+    CONTACT_PAIRS = 0
+};
+namespace level {
+enum { CONTACT_MAP = 0 };
 #include "ground/batch/contact.inc"
-#undef CONTACT_MAP
-#define CONTACT_FEET GROUND_FEET
-#define CONTACT_PER ENGINE_PER
-#define CONTACT_MAP 1
-#define CONTACT(name) ground_##name##_map
+} // namespace level
+namespace map {
+enum { CONTACT_MAP = 1 };
 #include "ground/batch/contact.inc"
+} // namespace map
 #include "ground/batch/robot.inc"
 
 #ifndef ENGINE_WARPS
@@ -102,7 +104,7 @@ WARP_FN void material_of(const EngineRobots *robots, const BatchShape *shape,
 template <int MAP>
 WARP_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
                       const ContactSetup *setup, ContactProblem problem, long robot,
-                      ContactMemory memory, ground_Shared *shared, Workplace *place) {
+                      ContactMemory memory, level::ContactShared *shared, Workplace *place) {
     EngineWork *work = &place->work;
     const EngineAction action = {&robots->variation[robot], place->torque,
                                  robots->push ? robots->push + 6 * robot : NULL, 0};
@@ -116,9 +118,10 @@ WARP_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
     const ContactResult result = {
         work->wrench[0], work->now.support.free_velocity[0], NULL, NULL, NULL, NULL};
     if (MAP) {
-        ground_robot_map(setup, &problem, (ground_Shared_map *)shared, &memory, 1, &result, NULL);
+        map::contact_robot(setup, &problem, (map::ContactShared *)shared, &memory, 1, &result,
+                           NULL);
     } else {
-        ground_robot(setup, &problem, shared, &memory, 1, &result, NULL);
+        level::contact_robot(setup, &problem, shared, &memory, 1, &result, NULL);
     }
     lanes_sync();
     return engine_end(model, 0, work);
@@ -150,7 +153,7 @@ static __global__ void __launch_bounds__(THREADS, ENGINE_BLOCKS)
                 const __grid_constant__ BatchArrays arrays, int steps) {
     extern __shared__ __align__(16) Real shared[];
     const int warp = threadIdx.x / LANES;
-    ground_Shared_map *contact = (ground_Shared_map *)shared; /* the larger one; on soft ground */
+    map::ContactShared *contact = (map::ContactShared *)shared; /* the larger one; on soft ground */
     Workplace *place = (Workplace *)(contact + (SOFT ? ENGINE_WARPS : 0)) + warp;
     const long robot = (long)blockIdx.x * ENGINE_WARPS + warp;
     const EngineTree *tree = &model->tree;
@@ -169,7 +172,7 @@ static __global__ void __launch_bounds__(THREADS, ENGINE_BLOCKS)
         if (SOFT) {
             bad = step_soft<MAP>(model, &robots, &setup, problem, robot,
                                  batch_memory(&shape, &arrays, robot),
-                                 (ground_Shared *)(contact + warp), place);
+                                 (level::ContactShared *)(contact + warp), place);
         } else {
             bad = step(model, &robots, MAP ? &setup.map : NULL, robot, place);
         }
@@ -186,7 +189,7 @@ size_t engine_shared_bytes(void) {
 }
 
 static size_t block_bytes(int soft) {
-    return ENGINE_WARPS * (sizeof(Workplace) + (soft ? sizeof(ground_Shared_map) : 0));
+    return ENGINE_WARPS * (sizeof(Workplace) + (soft ? sizeof(map::ContactShared) : 0));
 }
 
 typedef void (*Kernel)(const EngineModel *model, EngineRobots robots, ContactSetup setup,

@@ -12,10 +12,13 @@ fail() {
     exit 1
 }
 
-# includes FOLDER PATTERN: lines "layer/file layer/included" of the files in FOLDER that PATTERN names, without endings. Of layers in a
+# includes PATTERN FOLDER...: lines "layer/file layer/included" of the files in FOLDER that PATTERN names, without endings. Of layers in a
 # room only the ground's wings: elsewhere a struct's header serves the files that its own file calls.
 includes() {
-    (cd "$1" && grep -HoE --include="$2" -r '^#include "[a-z]+(/(law|terrain|sole|step|models))?/[a-z_0-9]+\.h"' . || true) |
+    local folder
+    for folder in "${@:2}"; do
+        (cd "$folder" && grep -HoE --include="$1" -r '^#include "[a-z]+(/(law|terrain|sole|step|models))?/[a-z_0-9]+\.h"' . || true)
+    done |
         sed -nE 's|^\./([^:]*)\.[a-z]+:#include "([^"]*)\.h"|\1 \2|p' | grep -v ' mild/' || true
 }
 
@@ -39,17 +42,17 @@ one_way() {
     }
 }
 
-# check FOLDER: of the sources in it, with the calls in $work/calls
+# check FOLDER...: of the sources in it, with the calls in $work/calls
 check() {
-    includes "$1" '*.[chi]*' | sed -E 's,/[^/ ]*( |$),\1,g' | awk '$1 != $2' | one_way layers || return 1
-    includes "$1" '*.h' | one_way headers || return 1
-    { includes "$1" '*.[ch]' | awk '$1 != $2'; cat "$work/calls"; } | one_way files || return 1
+    includes '*.[chi]*' "$@" | sed -E 's,/[^/ ]*( |$),\1,g' | awk '$1 != $2' | one_way layers || return 1
+    includes '*.h' "$@" | one_way headers || return 1
+    { includes '*.[ch]' "$@" | awk '$1 != $2'; cat "$work/calls"; } | one_way files || return 1
 }
 
 calls "$@" >"$work/calls"
 [ "$(grep -c ground/ "$work/calls")" -gt 20 ] || fail "no calls found in $*"
-[ "$(includes "$source/src" '*.[ch]' | wc -l)" -gt 200 ] || fail "no includes found in $source/src"
-check "$source/src" || fail "see above"
+[ "$(includes '*.[ch]' "$source/src" | wc -l)" -gt 200 ] || fail "no includes found in $source/src"
+check "$source/src" "$source/lab" || fail "see above"
 
 # The check sees what it is for.
 mkdir -p "$work/wrong/base" "$work/wrong/ground" "$work/wrong/robot"
@@ -70,4 +73,4 @@ sees files
 echo 'ground/b ground/a' >>"$work/calls"
 echo '#include "ground/b.h"' >"$work/wrong/ground/a.h"
 sees files
-echo "$(includes "$source/src" '*.[ch]' | sort -u | wc -l) includes, $(sort -u "$work/calls" | wc -l) calls: all one way"
+echo "$(includes '*.[ch]' "$source/src" "$source/lab" | sort -u | wc -l) includes, $(sort -u "$work/calls" | wc -l) calls: all one way"

@@ -127,7 +127,7 @@ TEST(plate_falls_as_by_hand) {
 
 /* ---- a plate that slides, on the merged law whose support slip takes away ---- */
 
-/* As grains of 5 mm have it (docs/grains.md). */
+/* As grains of 5 mm have it (lab/grains/README.md). */
 static const char merged_soil[] =
     "[ground]\nmodel = mild_merged\nk_pen = 525\nsigma_cone = 224e3\nalpha = 0.3\n"
     "nu = 3.37\nc_g = 29.1\nc_d = 1\nphi = 0.59\nrho = 2500\nmu = 0.5\nk_drift = 400\n"

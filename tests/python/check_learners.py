@@ -33,7 +33,7 @@ class Rivals(unittest.TestCase):
     def test_teacher(self):
         """What HT-2 learns from is the shipped policy, read from its file."""
         root = pathlib.Path(__file__).parents[2]
-        sys.path[:0] = [str(root / "scripts/rivals"), str(root / "examples/python")]
+        sys.path[:0] = [str(root / "lab/paper/rivals"), str(root / "examples/python")]
         import policy
         import train_ht2
         path = root / "policies/mild.safetensors"

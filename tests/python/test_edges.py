@@ -1,14 +1,11 @@
 """What enters and leaves, in one scenario in which no two numbers are equal: a yawed, tilted robot of two different feet on waves of two grounds, a
 walk that turns and goes sideways, a sole without symmetry. Every number that leaves is held to a reading of it that comes another way."""
 import contextlib
-import csv
 import dataclasses
 import json
 import math
-import os
 import pathlib
 import re
-import subprocess
 import sys
 import tempfile
 import types
@@ -19,15 +16,10 @@ import mujoco
 import numpy as np
 
 import mild
+from edges import ROOT, rows, run
 from mild import gym
 from mild._soles import feet_of
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "tests/drive")]
-import know  # noqa: E402
-from robot import Robot, Runner  # noqa: E402
-
-MILD = os.environ["MILD_PROGRAM"]
 ROBOT = """<mujoco><compiler angle="radian"/><option timestep="0.0031" integrator="Euler"/><worldbody>
   <body name="trunk" pos=".13 -.21 .36" euler=".03 -.05 .41"><freejoint/><geom type="box" size=".11 .07 .05" pos=".013 -.008 .02" mass="7.3"/>
     <body name="left" pos=".02 .12 -.2"><joint name="l" axis=".2 1 .1" damping="0"/><geom type="box" size=".083 .041 .013" pos=".017 -.006 -.11" mass="1.1"/></body>
@@ -37,20 +29,6 @@ FEET, GROUNDS, MAP = ["left", "right"], ["sand_loose", "grass"], {"amplitude": 0
 STEP, DECIMATION, STEPS, HEIGHT = 0.0031, 7, 133, 0.0053
 WALK = ("--ground", "sand_loose", "--speed", 0.43, "--sideways", -0.07, "--turn", 0.19, "--trials", 2, "--seconds", 5.3, "--seed", 7)
 COMMAND = 0.43, -0.07, 0.19
-
-
-def run(*arguments, code=0):
-    """Standard output of the program; with `code` its one line of an error."""
-    done = subprocess.run([MILD, *map(str, arguments)], capture_output=True, text=True, cwd=ROOT, env={**os.environ, "MILD_HOME": str(ROOT)})
-    assert done.returncode == code, (arguments, done.returncode, done.stderr)
-    return done.stderr.strip() if code else done.stdout
-
-
-def rows(path):
-    """Columns of a CSV file, by name; numbers where they are some."""
-    with open(path, newline="", encoding="utf-8") as file:
-        head, *table = csv.reader(file)
-    return {name: np.array([float(x) if re.fullmatch(r"-?[\d.e+-]+|nan", x) else np.nan for x in column]) for name, column in zip(head, zip(*table))}
 
 
 def problem(plain, data):
@@ -334,88 +312,6 @@ class Program(unittest.TestCase):
         impulse = np.array([feet[f"force_{k}_n"][inside].sum() for k in "xyz"]) * (time[last] - time[first]) / count
         gained = speed[last] - speed[first] + [0, 0, 9.81 * (time[last] - time[first])]
         np.testing.assert_allclose(impulse, SA01_MASS * gained, atol=0.002 * impulse[2])
-
-    def test_know(self):
-        """What is judged, from the frames of the same walks and `mild fit`, which reads them one by one."""
-        keys = ("--grounds", 9, "--seconds", 7, "--changes", 0.3, "--speed", "0.37,0.91", "--robots", 0, "--quiet", 0.3, "--seed", 23)
-        found = json.loads(run("know", *keys, "--json", "-"))
-        run("know", *keys, "--walks", self.folder / "w.npy")
-        walks, truth = np.load(self.folder / "w.npy"), rows(self.folder / "w.csv")
-        said, minutes, alarms, borders = {}, 0, 0, []
-        for i, walk in enumerate(walks):
-            lasted = int(truth["lasted"][i])
-            frames, second = walk[:lasted, : know.FRAME], np.flatnonzero((walk[:lasted, -2:] == 1).any(1))
-            touched = second[0] if len(second) else lasted
-            minutes += touched / 6000
-            self.assertEqual((found["walks"][i]["fell"], round(100 * found["walks"][i]["seconds"])), (lasted < 700, max(lasted - 200, 0)))
-            with open(self.folder / "w1.csv", "w", encoding="utf-8") as file:
-                file.write(",".join(["time_s", *(f"observation{k}" for k in range(know.FRAME))]) + "\n")
-                file.writelines(",".join([f"{t / 100:.2f}", *(f"{x:.9g}" for x in row)]) + "\n" for t, row in enumerate(frames))
-            judged = json.loads(run("fit", self.folder / "w1.csv", "--json", "-"))
-            if touched == lasted:
-                said[i] = judged["parameters"]
-            alarms += sum(step["alarm"] for step in judged["footsteps"] if step["time_s"] < touched / 100 and lasted == 700)
-            borders.append(self.border(judged["footsteps"], touched, len(second)))
-            for name, column in (("sinkage", "sinkage0"), ("mu", "mu0"), ("slip_length", "slip_length0"), ("asked", "vx")):
-                self.assertAlmostEqual(found["walks"][i][name] / truth[column][i], 1, delta=1e-5)
-            if lasted == 700:
-                self.assertAlmostEqual(found["walks"][i]["speed"], walk[200:lasted, 2 * know.FRAME].mean() / 4, delta=0.02)  # task.velocity_scale
-        cells = {row["parameter"]: row for row in found["rows"] if row["footsteps"] == 0}
-        self.assertGreater(len(said), 2)
-        for name in know.NAMES:
-            value = np.array([truth[f"{name}0"][i] for i in said])
-            middle, low, high = (np.array([said[i][name][key] for i in said]) for key in ("median", "low", "high"))
-            r2 = 1 - np.mean(np.log(middle / value)**2) / np.var(np.log(value))
-            self.assertEqual((cells[name]["walks"], cells[name]["coverage"]), (len(said), np.mean((low <= value) & (value <= high))))
-            self.assertAlmostEqual(cells[name]["r2"], r2, delta=0.15 * max(1, abs(r2)))  # of the mean, not the median
-            self.assertAlmostEqual(cells[name]["factor"] / np.sort(high / low)[len(said) // 2], 1, delta=1e-3)
-        self.assertAlmostEqual(found["minutes"], minutes, delta=1e-9)
-        self.assertEqual((found["fell"], found["false_alarms"] + found["before_falls"], found["grounds"]), (int((truth["lasted"] < 700).sum()), alarms, 9))
-        crossed = [border for border in borders if border]
-        flagged = [flag for _, flag in crossed if flag]
-        self.assertEqual(found["borders"][0], {"borders": len(crossed), "in_two": sum(flag <= 2 for flag in flagged),
-                                               "in_four": sum(flag <= 4 for flag in flagged), "delay": np.mean(flagged) if flagged else None})
-
-    @staticmethod
-    def border(steps, touched, crossed_at_all):
-        """Footsteps on the second ground, and which of them said so; None: fewer than four, or none at all."""
-        count = flagged = began = 0
-        for step in steps:
-            end = round(100 * step["time_s"])
-            if crossed_at_all and end >= touched:
-                count += 2 * (end - touched) >= end - began
-                flagged = flagged or (max(count, 1) if step["alarm"] else 0)
-            began = end
-        return (count, flagged) if crossed_at_all and count >= 4 else None
-
-    def test_drive(self):
-        """The ground that the runner knows is that of its log; targets ask for the share of the torque; the simulated robot went as it was told."""
-        log, command = self.folder / "log.csv", ",".join(map(str, COMMAND))
-        with contextlib.chdir(self.folder):
-            runner = Runner(MILD, "--command", command, "--torque-share", "0.87", "--log", str(log), patience=("--damp-after", "20", "--late", "10", "--stall-after", "20"))
-            there = json.loads(run("drive", "--simulate", "--lockstep", "--connect", f"127.0.0.1:{runner.port}", "--ground", "grass", "--seconds", 6.3, "--json", "-"))
-            code, found, said = runner.end()
-            self.assertEqual((code, found["end"], found["damps"], there["end"], there["fallen"], there["seconds"]), (0, "robot", 0, "time", False, 6.3), said)
-            limits = {}
-            for share in "1", "0.37":
-                runner = Runner(MILD, "--torque-share", share)
-                robot = Robot(runner.port)
-                limits[share] = np.array(robot.start().targets[-1]["limit"])
-                robot.socket.close()
-                runner.process.terminate()
-                runner.end()
-        table, judged = rows(log), json.loads(run("fit", log, "--json", "-"))
-        np.testing.assert_allclose(np.diff(table["time_s"]), 0.01, atol=1e-6)
-        self.assertEqual((len(table["time_s"]), found["ground"]["footsteps"], found["ground"]["changes"]), (found["steps"], judged["footsteps_on_this_ground"], judged["alarms"]))
-        for name, interval in judged["parameters"].items():
-            np.testing.assert_allclose([found["ground"][name][key] for key in ("low", "median", "high")], [interval[key] for key in ("low", "median", "high")], rtol=1e-4)
-        np.testing.assert_allclose([table[f"observation{k}"][-1] for k in (3, 4, 5)], np.array(COMMAND) * [2, 2, 1], rtol=1e-6)
-        angle = 0.19 * 6.3  # an arc
-        wanted = np.array([[np.sin(angle), np.cos(angle) - 1], [1 - np.cos(angle), np.sin(angle)]]) @ [0.43, -0.07] / 0.19
-        np.testing.assert_allclose([there["way_x_m"], there["way_y_m"]], wanted, atol=0.35)
-        np.testing.assert_allclose(limits["0.37"], 0.37 * limits["1"], rtol=1e-6)
-        for share in ("0", "0.0099", "1.001", "-0.3"):
-            self.assertRegex(run("drive", "--torque-share", share, "--listen", "x", code=2), rf"^mild drive: --torque-share: {share} is outside 0\.01 \.\. 1$")
 
 
 SA01_MASS = sum(mujoco.MjModel.from_xml_path(str(ROOT / "robots/sa01/sa01.xml")).body_mass)

@@ -11,7 +11,7 @@ CIRCLE = np.linspace(0, 2 * np.pi, 128, endpoint=False)
 OUTLINES = {"square": 0.05 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]),
             "disc": 0.06 * np.column_stack([np.cos(CIRCLE), np.sin(CIRCLE)])}
 GRAINS = {"alpha": 0.3, "nu": 3.1125, "k_pen": 473.75, "sigma_cone": 2.2836e5, "c_d": 1, "c_g": 29, "phi": 0.59, "rho": 2500, "mu": 0.5,
-          "recovery": 0, "k_drift": 0, "b_drift": 0}  # docs/soil.md, docs/grains.md
+          "recovery": 0, "k_drift": 0, "b_drift": 0}  # docs/soil.md, lab/grains/README.md
 SLIPS = GRAINS | {"slip_length": 0.0022182, "regain_length": 0.00076}
 MATERIALS = {name: mild.Material(preset, model="mild_merged", **fields) for name, preset, fields in (
     ("sand_loose", "sand_loose", {}), ("sand_dense", "sand_dense", {}), ("grass", "grass", {}), ("foam45", "foam45", {}),

@@ -1,18 +1,29 @@
 /* The batch on the CPU: the code of the GPU, robot after robot. */
-#define CONTACT_MAP 0
-#include "ground/batch/host.inc"
+#define MILD_REAL_FLOAT
+
+#include "ground/batch/host.h"
+
+#include "ground/batch/batch.h"
+#include "ground/batch/contact_shapes.h"
+#include "ground/batch/robot.inc"
 
 _Static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
 _Static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
 _Static_assert(CONTACT_FEET_MAX == MILD_BATCH_PLANES_MAX, "the same number");
 
-HostRobot host_robot(const BatchShape *shape) {
-    return shape->map ? host_robot_map(shape) : host_kind(shape);
+/* The version for these soles, as batch_kernel on a GPU. */
+static HostRobot *host_robot(const BatchShape *shape) {
+#define HOST_POINTS(g, p)                                                                          \
+    if (shape->points && shape->groups == (g) && shape->per == (p)) {                              \
+        return shape->map ? host_points_map : host_points;                                         \
+    }
+    CONTACT_POINT_KINDS(HOST_POINTS)
+    return shape->map ? host_feet_map : host_feet;
 }
 
 void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBatchInput *input,
                const MildBatchOutput *output, int advance) {
-    const HostRobot step = host_robot(shape);
+    HostRobot *const step = host_robot(shape);
     ContactSetup setup = {.feet = 0};
     batch_setup(shape, arrays, &setup);
     for (int robot = 0; robot < shape->robots; robot++) {
@@ -21,8 +32,9 @@ void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBat
         if (arrays->skip && arrays->skip[robot]) {
             continue;
         }
+        const ContactMemory memory = batch_memory(shape, arrays, robot);
         batch_problem(shape, arrays, input, robot, &problem);
         batch_result(shape, output, robot, &result);
-        step(&setup, &problem, batch_memory(shape, arrays, robot), advance, &result);
+        step(&setup, &problem, &memory, advance, &result);
     }
 }

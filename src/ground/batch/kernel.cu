@@ -1,6 +1,6 @@
 /* The contact step of a batch on a GPU: a warp a robot, or two. cmake/Batch.cmake makes a unit of
  * each size. Before the inclusion: KERNEL, the name of what it gives; KERNEL_GROUPS, KERNEL_PER,
- * KERNEL_POINTS, KERNEL_CURVES and KERNEL_HEAP, what they are for (contact.inc); KERNEL_ROBOTS of
+ * KERNEL_POINTS and KERNEL_CURVES, what they are for (contact.inc); KERNEL_ROBOTS of
  * a multiprocessor; KERNEL_PAIRS, 1 where a warp may have two robots of which one foot is in the
  * air. */
 #define MILD_REAL_FLOAT
@@ -12,30 +12,28 @@ extern "C" {
 
 #include "device/cuda.h"
 #include "ground/batch/contact.h"
+#include "ground/batch/contact_shapes.h"
 #include "ground/batch/order.h"
 
-#define CONTACT_CURVES KERNEL_CURVES
-#define CONTACT_HEAP KERNEL_HEAP
-#define CONTACT_POINTS KERNEL_POINTS
-#define CONTACT_MAP 0
-#define CONTACT_FEET KERNEL_GROUPS
-#define CONTACT_PER KERNEL_PER
-#define CONTACT(name) level_##name
+enum {
+    CONTACT_FEET = KERNEL_GROUPS,
+    CONTACT_PER = KERNEL_PER,
+    CONTACT_CURVES = KERNEL_CURVES,
+    CONTACT_POINTS = KERNEL_POINTS
+};
+namespace level {
+enum { CONTACT_MAP = 0, CONTACT_PAIRS = 0 };
 #include "ground/batch/contact.inc"
-#undef CONTACT_MAP
-#define CONTACT_MAP 1
-#define CONTACT_FEET KERNEL_GROUPS
-#define CONTACT_PER KERNEL_PER
-#define CONTACT(name) map_##name
+} // namespace level
+namespace map {
+enum { CONTACT_MAP = 1, CONTACT_PAIRS = 0 };
 #include "ground/batch/contact.inc"
+} // namespace map
 #if KERNEL_PAIRS
-#undef CONTACT_MAP
-#define CONTACT_MAP 0
-#define CONTACT_PAIRS 1
-#define CONTACT_FEET KERNEL_GROUPS
-#define CONTACT_PER KERNEL_PER
-#define CONTACT(name) pair_##name
+namespace pair {
+enum { CONTACT_MAP = 0, CONTACT_PAIRS = 1 };
 #include "ground/batch/contact.inc"
+} // namespace pair
 #endif
 #include "ground/batch/robot.inc"
 
@@ -44,7 +42,7 @@ static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
 
 /* A block has one robot: one that takes long keeps no other's place. With a map and a share an
  * element has more numbers than there is shared memory for on sixteen robots. */
-#define MAP_ROBOTS (KERNEL_HEAP && KERNEL_ROBOTS > 12 ? 12 : KERNEL_ROBOTS)
+#define MAP_ROBOTS (map::CONTACT_HEAP && KERNEL_ROBOTS > 12 ? 12 : KERNEL_ROBOTS)
 #define CONTACT_ARGUMENTS                                                                          \
     const __grid_constant__ ContactSetup setup, const __grid_constant__ BatchShape shape,          \
         const __grid_constant__ BatchArrays arrays, const __grid_constant__ MildBatchInput input,  \
@@ -61,12 +59,12 @@ static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
         batch_problem(&shape, &arrays, &input, i, &problem);                                       \
         batch_result(&shape, &output, i, &result);                                                 \
         problem.foot = at;                                                                         \
-        version##_robot(&setup, &problem, shared, &memory, advance, &result, done);                \
+        version::contact_robot(&setup, &problem, shared, &memory, advance, &result, done);         \
         __syncwarp(); /* for `shared` */                                                           \
     }
 
 static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_level(CONTACT_ARGUMENTS) {
-    __shared__ level_Shared shared;
+    __shared__ level::ContactShared shared;
     if (IS_STEPPED(blockIdx.x)) {
         CONTACT_ROBOT(level, &shared, (int)blockIdx.x, 0, NULL)
     }
@@ -79,7 +77,7 @@ static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_level(CON
 /* Two robots with one foot near the ground or none. Where they are no pair they are left for
  * contact_rest: a kernel with the code of both waits longer for instructions. */
 static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_pairs(CONTACT_ARGUMENTS) {
-    __shared__ pair_Shared shared;
+    __shared__ pair::ContactShared shared;
     const BatchOrder order = batch_order_of(&shape, &arrays);
     const int chunk = (int)blockIdx.x, chunks = (int)gridDim.x;
     int last = 2 * (int)gridDim.y - 1; /* a chunk may have one or two places less */
@@ -106,7 +104,7 @@ static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_pairs(CON
 
 /* The robots with both feet near it, beside contact_pairs; then, by the last blocks, those left. */
 static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_rest(CONTACT_ARGUMENTS) {
-    __shared__ level_Shared shared;
+    __shared__ level::ContactShared shared;
     const BatchOrder order = batch_order_of(&shape, &arrays);
     const int blocks = (int)gridDim.x, from_end = blocks - 1 - (int)blockIdx.x;
     int at = (int)blockIdx.x, stride = blocks, count = shape.robots, is_left = 0;
@@ -132,7 +130,7 @@ static __global__ void __launch_bounds__(LANES, KERNEL_ROBOTS) contact_rest(CONT
 #endif
 
 static __global__ void __launch_bounds__(LANES, MAP_ROBOTS) contact_map(CONTACT_ARGUMENTS) {
-    __shared__ map_Shared shared;
+    __shared__ map::ContactShared shared;
     if (IS_STEPPED(blockIdx.x)) {
         CONTACT_ROBOT(map, &shared, (int)blockIdx.x, 0, NULL)
     }

@@ -8,12 +8,12 @@
  *     c - q <- (c - q) exp(-da/u0)       da: fresh penetration, beyond the yield depth
  * The element remembers 1 - q, its wear. Both lengths grow with the depth u by the same factor
  * 1 + g u, so a load that slides sinks the same way. In grains j0 is some 1 mm and 7 to 9 % of the
- * depth, for soles of any width (docs/grains.md).
+ * depth, for soles of any width (lab/grains/README.md).
  *
  * A sliding element at the share lambda = q/c of its yield load is held by at most
  *     H = (3 + sqrt 8) t lambda (1 - lambda)/(2 - lambda) F_g,
  * whose greatest value is t F_g, at lambda = 2 - sqrt 2. Grains hold a sole that slides under load
- * so (docs/grains.md); a parabola, as of footings, would hold it by a third less. Two things hold
+ * so (lab/grains/README.md); a parabola, as of footings, would hold it by a third less. Two things hold
  * it besides. Ground that the sole strikes and sets in motion pushes with the force G of the drag:
  * it is held by the whole of mu, so the coefficient is the mean of both by F and G. And ground at
  * the sides of a sole that is u deep, of the width W, which is pushed away (Rankine):

@@ -24,7 +24,7 @@ static MildStatus take(const Safetensors *file, const Part *part, const char *pa
         tensor->bytes != part->count * sizeof(float)) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "%s: no weights of a belief: tensor '%s' of %zu numbers is missing; "
-                         "scripts/know.py makes the file",
+                         "lab/know/know.py makes the file",
                          path, part->name, part->count);
     }
     memcpy(part->to, tensor->data, tensor->bytes);

@@ -1,4 +1,4 @@
-/* The weights of a belief, from a safetensors file that scripts/know.py writes. */
+/* The weights of a belief, from a safetensors file that lab/know/know.py writes. */
 #ifndef IDENTIFY_BELIEF_FILE_H
 #define IDENTIFY_BELIEF_FILE_H
 

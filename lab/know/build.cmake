@@ -1,0 +1,10 @@
+mild_layer(know layer_app)
+target_link_libraries(mild PRIVATE layer_know)
+
+if(MILD_TESTS AND EXISTS ${python})
+  add_test(NAME know/know COMMAND ${python} ${CMAKE_CURRENT_LIST_DIR}/tests/test_know.py $<TARGET_FILE:mild> ${CMAKE_SOURCE_DIR})
+endif()
+if(MILD_TESTS AND TARGET _envs)
+  add_test(NAME know/edges COMMAND ${python} ${CMAKE_CURRENT_LIST_DIR}/tests/test_edges.py)
+  set_tests_properties(know/edges PROPERTIES ENVIRONMENT "${lab_package};MILD_PROGRAM=$<TARGET_FILE:mild>")
+endif()

@@ -1,0 +1,2 @@
+#define PAIR pair_double
+#include "pair.inc"

@@ -1,0 +1,3 @@
+#define MILD_REAL_FLOAT
+#define PAIR pair_float
+#include "pair.inc"
