@@ -138,6 +138,7 @@ typedef struct {
     int first[BODIES_NEAR + 1];     /* round of a place; those of a place follow each other */
     uint8_t place[BODIES_ROUNDS];   /* of a round */
     uint16_t list[BODIES_ELEMENTS]; /* numbers of elements */
+    Real frame[BODIES_NEAR][3];     /* [-] axes of the frames in which soles press; 0: of a shell */
     Rim rim[BODIES_NEAR];           /* of shells with listed elements, on ground with LAW_HEAP */
     int active; /* rows of bodies with listed elements; P and W of others are 0 */
     uint8_t active_row[BODIES_ROWS];
@@ -159,6 +160,7 @@ typedef struct {
     Real down;       /* [-] of a shell: downward part of its normal */
     int faces_down;  /* bool: of a shell; 1 for a sole */
     int listed;      /* bool: may touch in this step */
+    Real frame[3];   /* [-] of the body, in which its velocity and impulse are */
     ElementMemory before;
     Element element; /* with its share of the load */
     Share share;     /* that share, on ground with LAW_HEAP */
@@ -206,7 +208,14 @@ MILD_HD ContactVelocity bodies_point_velocity(const Real *p, const Real *slope, 
 
 /* That of an element. */
 MILD_HD ContactVelocity bodies_velocity(const BodiesElement *own, const Real *V) {
-    return bodies_point_velocity(own->p, own->slope, V);
+    const Real level[2] = {0, 0};
+    const ContactVelocity moves = bodies_point_velocity(own->p, level, V);
+    const Real world[3] = {moves.x, moves.y, -moves.descent};
+    Real v[3];
+    frame_of_world(own->frame, world, v);
+    const ContactVelocity own_way = {v[0], v[1],
+                                     own->slope[0] * v[0] + own->slope[1] * v[1] - v[2]};
+    return own_way;
 }
 
 /* ---- which bodies and elements ---- */
@@ -285,6 +294,25 @@ WARP_FN int bodies_touch(const BodiesSetup *setup, int body, const Real *positio
 }
 
 /* ---- an element at the start of a step ---- */
+
+/* Sets the frame of the body at place i; foot_frame. */
+MILD_HD void bodies_set_frame(const BodiesSetup *setup, BodiesWork *work, int i) {
+    const BodiesSole *sole = &setup->sole[work->body[i]];
+    const Real *R = work->rotation[i];
+    const Real up[3] = {R[2], R[5], R[8]}, way[2] = {R[2] * sole->z, R[5] * sole->z};
+    Real slope[2] = {0, 0};
+    int label = 0;
+    if (setup->has_map) {
+        const MapSpot spot =
+            map_spot(&setup->map, work->position[i], work->map_origin, work->height);
+        map_surface_near(&setup->map, &spot, way[0], way[1], slope);
+        label = map_label_near(&setup->map, &spot, way[0], way[1]);
+    }
+    const int wanted = work->label_material ? work->label_material[label] : 0;
+    const int known = wanted >= 0 && wanted < setup->materials ? wanted : setup->materials;
+    const int turns = !sole->face && sole->table[known * sole->step].projects > 0;
+    frame_axis(up, slope[0], slope[1], turns ? FRAME_TURN : 0, work->frame[i]);
+}
 
 MILD_HD void bodies_record(const BodiesMemory *memory, int s, const ElementMemory *after,
                            Real worn) {
@@ -390,9 +418,7 @@ MILD_HD Real bodies_lean(const BodiesWork *work, const BodiesSole *sole, int i, 
     const Real *R = work->rotation[i];
     const Real normal[3] = {R[2], R[5], R[8]};
     if (!sole->face) {
-        const Real u = rim_under(own->depth, work->memory[i].element[s]);
-        const Real level = contact_lean(normal, own->slope[0], own->slope[1]);
-        return rim_water(&own->element.law, sole->width[s], own->element.recovery, u, level);
+        return contact_lean(normal, own->slope[0], own->slope[1]);
     }
     const Real u = bodies_rim_depth(&work->memory[i], s, own);
     if (!(material->projects > 0 && u > 0)) {
@@ -413,15 +439,15 @@ MILD_HD void bodies_carry(const BodiesSetup *setup, const BodiesWork *work, int 
     const Real worn = memory->worn ? memory->worn[s] : 0;
     const Real elastic = law_elastic_force(&own->element.law, own->curves, own->element.middle);
     own->share = contact_share(material, !sole->face, worn);
+    const ContactVelocity now = bodies_velocity(own, work->velocity[i]);
     Real ahead = 0;
     if (sole->face) {
-        const ContactVelocity now = bodies_velocity(own, work->velocity[i]);
         Real normal[3];
         bodies_normal(sole, work->rotation[i], s, normal);
         ahead = share_ahead(&own->element, &own->share, lean, normal, now.x, now.y, now.descent);
     }
     element_share(&own->element, &own->before, &own->share, elastic, setup->dt, 1 / setup->dt, lean,
-                  ahead, 0);
+                  ahead, now.x * now.x + now.y * now.y);
     element_share_virgin(&own->element, own->share.q);
 }
 
@@ -500,6 +526,9 @@ MILD_HD void bodies_locate(const BodiesSetup *setup, const BodiesWork *work, int
     own->area_share = 1;
     own->down = 1;
     bodies_point(sole, R, s, own->p);
+    for (int k = 0; k < 3; k++) {
+        own->frame[k] = work->frame[i][k];
+    }
     if (sole->face) {
         Real normal[3];
         bodies_normal(sole, R, s, normal);
@@ -594,14 +623,19 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
     const Real normal = element_impulse(e, own.curves, 1, dt, v.descent).value;
     ElementMemory after =
         element_remember(e, &own.before, dt, 1 / dt, normal, v.x, v.y, v.descent, stays);
+    const Real sinks =
+        dt * frame_sinks(own.frame, own.slope[0], own.slope[1], v.x, v.y, v.descent);
     Real worn = 0;
+    after.depth_max = stays ? real_max(after.depth_max + sinks, 0) : 0;
+    after.middle += sinks;
     if (own.curves & LAW_HEAP) {
         worn = element_wear_alone(e, &own.share, &own.before, &after, dt, normal, v.x, v.y,
                                   v.descent, stays);
     }
     if (stays) {
         const Real peak = element_peak(e, own.curves, normal, v.descent, middle);
-        after.depth_max = real_max(after.depth_max, e->virgin_depth + peak - e->yield_depth);
+        after.depth_max =
+            real_max(after.depth_max, e->virgin_depth + peak - e->yield_depth + sinks);
     }
     if (advance) {
         Real *state = memory->element + BODIES_STATE * memory->next + s;

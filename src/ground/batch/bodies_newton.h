@@ -67,7 +67,23 @@ MILD_HD void bodies_pass(const BodiesSetup *setup, const BodiesElement *own, con
     const Real h[3][3] = {{f.fall_xx + xz * g[0], f.fall_xy + xz * g[1], xz},
                           {f.fall_xy + yz * g[0], f.fall_yy + yz * g[1], yz},
                           {normal.slope * g[0], normal.slope * g[1], normal.slope}};
-    bodies_add(own->p, I, h, sums, l);
+    Real world[3], turned[3][3], back[3][3];
+    frame_to_world(own->frame, I, world);
+    for (int r = 0; r < 3; r++) { /* h Q^T, and its columns by rows */
+        Real row[3];
+        frame_to_world(own->frame, h[r], row);
+        for (int c = 0; c < 3; c++) {
+            turned[c][r] = row[c];
+        }
+    }
+    for (int c = 0; c < 3; c++) { /* Q h Q^T */
+        Real column[3];
+        frame_to_world(own->frame, turned[c], column);
+        for (int r = 0; r < 3; r++) {
+            back[r][c] = column[r];
+        }
+    }
+    bodies_add(own->p, world, back, sums, l);
 }
 
 /* ---- which elements ---- */

@@ -7,6 +7,7 @@
 
 #include "base/hd.h"
 #include "ground/law/begin.h"
+#include "ground/law/frame.h"
 #include "ground/law/impulse.h"
 #include "ground/law/motion.h"
 #include "ground/law/plate.h"

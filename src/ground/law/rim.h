@@ -1,5 +1,4 @@
-/* What the rim of a body leaves of its load: of a rounded body (docs/model.md section 23), and of a
- * plane sole that is tilted (section 21).
+/* What the rim of a rounded body leaves of its load (docs/model.md section 23).
  *
  * Under a merged sole (law.h) the pressure at the distance e from the edge is that of the ground
  * beside the edge, at the edge's depth d, and what the heap adds on the way in:
@@ -19,15 +18,7 @@
  *     b = 2 sqrt(least eigenvalue of cov x)   [m] half the breadth: the radius of a disc
  *     e = b (1 - sqrt(1 - v/H))               [m] distance to the rim
  * Elements steeper than 60 degrees are walls, which grains pass (the angle of SHARE_PASSIVE): they
- * are outside the rim and keep SHARE_LEAN of their load.
- *
- * A plane sole at the angle theta to the ground has a rim, too, where it enters the ground: the
- * water line, u/sin(theta) from an element. Its heap has no more edge than that,
- *
- *     c = cos(theta) (kappa u + (k0 - kappa) P_w)/(kappa u + (k0 - kappa) P(u))
- *     P_w = mean over the cell of min(u, T e, T u/sin(theta)) = P(u min(1, T/sin(theta)))
- * Below the angle of its heap, sin(theta) < T, the line is nowhere nearer than u/T and c is the
- * cosine. */
+ * are outside the rim and keep SHARE_LEAN of their load. */
 #ifndef MILD_GROUND_RIM_H
 #define MILD_GROUND_RIM_H
 
@@ -132,40 +123,6 @@ MILD_HD Real rim_bears(const Rim *rim, const Law *law, Real width, Real x, Real 
     const Real heap = law->cone_depth * (inside * rim->breadth / (RIM_RADIUS * width));
     const Real bears = law->line_stiffness * real_max(d, heap) + law->flat_stiffness * heap;
     return down >= RIM_STEEP ? bears : 0;
-}
-
-/* [m] The depth u of an element of a plane sole, for rim_wet. */
-MILD_HD Real rim_under(Real depth, Real deepest) {
-    return real_max(real_max(depth, deepest), RIM_HAIR);
-}
-
-/* [m] u min(1, T/sin(theta)): so deep, an element of a level sole has the heap of one of a sole
- * whose cosine to the ground is `level`. */
-MILD_HD Real rim_wet(const Law *law, Real width, Real u, Real level) {
-    const Real most = law->cone_depth;
-    const Real flat = RIM_RADIUS * width;                  /* u_f, were T 1 */
-    const Real square = flat * flat * (1 - level * level); /* of u_f, were T the sine */
-    return square > most * most ? u * (most / REAL_SQRT(square)) : u;
-}
-
-/* [-] rim_wet over u. cone_depth: [m] of a disc: the width of a heap cancels. */
-MILD_HD Real rim_wet_share(Real cone_depth, Real level) {
-    const Real square = RIM_RADIUS * RIM_RADIUS * (1 - level * level);
-    return real_min(cone_depth * REAL_INVERSE_SQRT(square), 1);
-}
-
-/* [-] c of an element of a plane sole whose rim_wet is `wet`. */
-MILD_HD Real rim_water_at(const Law *law, Real recovery, Real u, Real level, Real wet) {
-    if (!(wet < u)) {
-        return level;
-    }
-    const Real bears = rim_force(law, wet) + law->line_stiffness * (u - wet);
-    return level * rim_share(law, recovery, bears, rim_force(law, u));
-}
-
-/* [-] c of an element of a plane sole. */
-MILD_HD Real rim_water(const Law *law, Real width, Real recovery, Real u, Real level) {
-    return rim_water_at(law, recovery, u, level, rim_wet(law, width, u, level));
 }
 
 #endif

@@ -45,7 +45,6 @@
 #include "ground/law/remember.h"
 
 #define SHARE_LEAN REAL(0.02) /* [-] least cosine: a sole on its edge */
-#define SHARE_GRIP REAL(0.0)  /* [-] friction that an element at its yield load keeps */
 #define SHARE_YIELD REAL(5.8284271247461903)  /* 3 + sqrt 8 */
 #define SHARE_PASSIVE 3.0                     /* [-] K_p of ground with 30 degrees of friction */
 #define SHARE_GRAVITY 9.81                    /* [m/s^2] */
@@ -243,25 +242,6 @@ MILD_HD Real element_slide(const Element *e, const Share *share, const ElementMe
 /* [m] Penetration of a step beyond the yield depth. */
 MILD_HD Real element_fresh(const Element *e, Real dt, Real speed) {
     return real_max(e->depth + dt / 2 * speed - e->yield_depth, 0);
-}
-
-/* The added mass of an element that slows down faster than the ground stops it runs ahead, and
- * takes the yield depth with it:
- *
- *     w_a <- w_a - dt q F_g(a)/m_a
- * Called after element_remember, which has the mass at the element. */
-MILD_HD void element_run(const Element *e, const ElementMemory *memory, ElementMemory *after,
-                         Real dt, Real speed, int stays) {
-    const Real force = e->unload_stiffness * (e->yield_depth - e->zero_depth);
-    const Real v = memory->front_speed;
-    const Real grows = e->law.mass_rate * law_moved_share(&e->law, LAW_HEAP, e->yield_depth);
-    const Real runs =
-        real_over(e->added_mass * v - dt * force, e->added_mass + grows * dt * v + ELEMENT_TINY);
-    const Real front = e->yield_depth + dt * runs;
-    const int ahead = stays && e->added_mass > 0 && runs > real_max(speed, 0) &&
-                      front > after->depth_max;
-    after->depth_max = ahead ? front : after->depth_max;
-    after->front_speed = ahead ? runs : after->front_speed;
 }
 
 /* Bool: slip lowers the share in a step. */

@@ -2,6 +2,7 @@
 #define POWER_CALLED /* power.h: no vector loop here needs a power */
 #include <string.h>
 
+#include "ground/law/frame.h"
 #include "ground/law/remember.h"
 #include "ground/step/frame.h"
 #include "ground/step/moments.h"
@@ -14,7 +15,6 @@ typedef struct {
     const Imprints *imprints; /* NULL: the ground forgets at lift-off */
     const double *rotation;   /* [9] foot to world */
     Motion motion;            /* of the foot after the step, in its frame */
-    Real world[3][3];         /* [-] that frame to the world */
     double dt;                /* [s] */
     const MildTerrain *terrain;
 } Advance;
@@ -64,14 +64,9 @@ static void element_imprint(const Advance *a, const Memory *memory, const Slots 
     memory->front_speed[e] = 0.0;
 }
 
-/* [m/s] How much faster the element of a slot gets deeper than it penetrates: in the frame of the
- * foot it goes along the normal. */
-MILD_HD Real slot_sinks(const Slots *s, int i, const Advance *a, const SlotVelocity *v) {
-    const Real z = s->slope_x[i] * v->x + s->slope_y[i] * v->y - v->descent;
-    const Real sinks = a->world[2][0] * v->x + a->world[2][1] * v->y + a->world[2][2] * z;
-    const Real x = a->world[0][0] * v->x + a->world[0][1] * v->y + a->world[0][2] * z;
-    const Real y = a->world[1][0] * v->x + a->world[1][1] * v->y + a->world[1][2] * z;
-    return s->slope_x[i] * x + s->slope_y[i] * y - sinks - v->descent;
+/* [m/s] frame_sinks of a slot. v: its velocity in the frame of the foot. */
+MILD_HD Real slot_sinks(const Slots *s, int i, const Real frame[3], const SlotVelocity *v) {
+    return frame_sinks(frame, s->slope_x[i], s->slope_y[i], v->x, v->y, v->descent);
 }
 
 /* [m] element_peak of a slot that reversed within the step. */
@@ -90,7 +85,7 @@ static void slot_raise(const Advance *a, const Memory *memory, const Slots *s, i
     const double peak =
         turns ? slot_peak(s, i, a->foot->curves, v->descent, middle) : middle;
     const double depth =
-        s->virgin_depth[i] + peak - s->yield_depth[i] + a->dt * slot_sinks(s, i, a, v);
+        s->virgin_depth[i] + peak - s->yield_depth[i] + a->dt * slot_sinks(s, i, a->foot->frame, v);
     memory->depth_max[e] = real_max(depth, memory->depth_max[e]); /* a NaN changes nothing */
 }
 
@@ -194,6 +189,7 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
     const Motion motion = a->motion;
     const Real dt = (Real)a->dt;
     const Real rate = 1 / dt;
+    const Real frame[3] = {a->foot->frame[0], a->foot->frame[1], a->foot->frame[2]};
     const int prints = a->imprints != NULL;
     for (const Slots *s = first; s < end; s++, e += SLOT_LANES) {
         Lanes slid, fresh;
@@ -208,9 +204,6 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                 element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
             if (wears) {
                 const Share share = slot_share(s, i);
-                Element heap = element;
-                heap.law.cone_begin = s->cone_begin[i];
-                element_run(&heap, &before, &after, dt, v.descent, stays);
                 slid[i] =
                     element_slide(&element, &share, &before, &after, dt, s->iz[i], v.x, v.y, stays);
                 fresh[i] = element_fresh(&element, dt, v.descent);
@@ -220,7 +213,7 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                 changes += stays ? most : 0;
                 to.worn[e + i] = stays ? 1 - share.q : 0;
             }
-            const Real shift = dt * slot_sinks(s, i, a, &v);
+            const Real shift = dt * slot_sinks(s, i, frame, &v);
             to.depth_max[e + i] = after.depth_max > 0 ? real_max(after.depth_max + shift, 0) : 0;
             to.middle[e + i] = after.middle + shift;
             to.front_speed[e + i] = after.front_speed;
@@ -408,17 +401,13 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
         }
         const Memory memory = ground_memory(ground, f);
         double twist[6];
-        frame_from_world(foot, result->velocity + 6 * f, twist);
-        Advance advance = {.foot = foot,
+        twist_of_world(foot, result->velocity + 6 * f, twist);
+        const Advance advance = {.foot = foot,
                            .imprints = ground->tiles > 0 ? &imprints : NULL,
                            .rotation = foot->shell ? shell_level : input->rotation[f],
                            .motion = foot_motion(foot, twist),
                            .dt = input->dt,
                            .terrain = terrain};
-        for (int k = 0; k < 9; k++) {
-            const Real one = k % 4 == 0 ? 1 : 0;
-            advance.world[k / 3][k % 3] = foot->framed ? (Real)foot->frame[k] : one;
-        }
         const int all = slots_are_whole(foot) && ground->tiles == 0 && !foot->shell;
         if (all) {
             ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material);

@@ -1,5 +1,7 @@
 #include "ground/step/locate.h"
 
+#include <string.h>
+
 #include "ground/terrain/terrain.h"
 
 #define LISTED_MARGIN 1e-3 /* [m] elements this close to the ground are listed */
@@ -33,6 +35,7 @@ void foot_set_pose(FootScratch *foot, const MildTerrain *terrain, const double *
     foot->uneven = !terrain_is_level(terrain);
     foot->away = 0;
     foot->framed = 0;
+    memset(foot->frame, 0, sizeof foot->frame);
 }
 
 void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints) {

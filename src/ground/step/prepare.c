@@ -138,10 +138,10 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     } else {
         foot_slots(foot, ground, f, terrain, &memory, R, &moves);
     }
-    foot_frame(foot, R);
+    foot_frame(foot, terrain, R);
     double before[6], after[6];
-    frame_from_world(foot, input->velocity[f], before);
-    frame_from_world(foot, input->free_velocity + 6 * f, after);
+    twist_of_world(foot, input->velocity[f], before);
+    twist_of_world(foot, input->free_velocity + 6 * f, after);
     const Motion now = foot_motion(foot, before), free = foot_motion(foot, after);
     foot_begin(foot, input->dt, &now);
     if (foot->curves & LAW_HEAP) {

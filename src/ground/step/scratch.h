@@ -58,7 +58,7 @@ typedef struct FootScratch {
     double origin[3]; /* [m] the ankle, world */
     double arm[4][3]; /* world: the frame's point (0, 0, z) [m], its axes [-], z for a shell */
     int framed;       /* bool: the sole presses in a frame of its own, in which the arms are then */
-    double frame[9];  /* [-] that frame to the world, row major: foot_frame */
+    Real frame[3];    /* [-] its axis: foot_frame */
     int uneven;       /* bool: the terrain is not level; otherwise all slopes are 0 */
     int away;         /* bool: no element can touch; depth and area_share are not set */
     double reach;     /* [m] upper bound on the depths: foot_reach */
@@ -109,7 +109,7 @@ struct MildScratch {
     /* [kg, kg m, kg m^2] -d wrench/d twist of each foot, 6 x 6, row major. */
     double hessian[MILD_FEET_MAX][36];
     double velocity[TWIST_MAX]; /* [m/s, rad/s] V+ of the last solve, in the frames of the feet */
-    MildContactInput input;     /* contact_in_frames */
+    MildContactInput input;     /* input_of_world, whose inverse inertia is */
     double inverse[TWIST_MAX * TWIST_MAX];
     double dt;                  /* [s] of the last solve */
     int is_number;              /* bool: its problem and all of its results are finite */

@@ -46,20 +46,6 @@ RIM_CALLED double share_of_slot(const Slots *s, int l, double bears, double u) {
     return rim_share(&element.law, s->recovery[l], bears, force_of(s, l, u));
 }
 
-void soles_lean(const FootScratch *foot) {
-    for (int i = 0; i < foot->active; i++) {
-        Slots *s = slot_block(foot, i);
-        const int l = i % SLOT_LANES;
-        const Element element = slot_element(s, l);
-        const double u = rim_under(s->depth[l], s->depth_max[l]);
-        const double wet = rim_wet(&element.law, foot->heap[foot->element[i]].width, u, s->lean[l]);
-        if (wet < u) { /* as rim_water, which is 0.2 kB larger here */
-            const double bears = force_of(s, l, wet) + s->line_stiffness[l] * (u - wet);
-            s->lean[l] *= share_of_slot(s, l, bears, u);
-        }
-    }
-}
-
 void shell_lean(const FootScratch *foot, const Motion *now) {
     Real sums[RIM_SUMS] = {0};
     for (int i = 0; i < foot->active; i++) {

@@ -53,7 +53,7 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
             foot->arm[0][k] +
             (sums[3] * foot->arm[1][k] + sums[4] * foot->arm[2][k] + z * foot->arm[3][k]) / force;
     }
-    frame_to_world(foot, center, center);
+    twist_to_world(foot, center, center);
     for (int k = 0; k < 3; k++) {
         result->pressure_center[k] = position[k] + center[k];
     }
@@ -89,7 +89,7 @@ static void foot_result(const MildScratch *scratch, const MildContactInput *inpu
     const FootScratch *foot = &scratch->foot[f];
     const double *R = input->rotation[f];
     double *F = result->force, *tau = result->torque, wrench[6];
-    frame_to_world(foot, scratch->wrench + 6 * f, wrench);
+    twist_to_world(foot, scratch->wrench + 6 * f, wrench);
     for (int k = 0; k < 3; k++) {
         F[k] = wrench[k] / input->dt;
         tau[k] = wrench[3 + k] / input->dt;
@@ -182,7 +182,7 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
         memcpy(result->velocity, input->free_velocity, bytes);
         result->converged = 1;
     } else {
-        own = contact_in_frames(scratch, input);
+        own = input_of_world(scratch, input);
         energy_begin(scratch);
         step_solve(scratch, own, result);
         int iterations = result->iterations;
@@ -200,7 +200,7 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
     int nan = 0;
     for (int k = 0; k < scratch->listed; k++) {
         const int f = scratch->list[k];
-        frame_to_world(&scratch->foot[f], result->velocity + 6 * f, result->velocity + 6 * f);
+        twist_to_world(&scratch->foot[f], result->velocity + 6 * f, result->velocity + 6 * f);
         foot_result(scratch, input, f, &result->foot[f]);
         nan |= scratch->foot[f].nan;
     }
