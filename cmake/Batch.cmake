@@ -105,7 +105,7 @@ if(MILD_CUDA)
   add_library(batch_device STATIC ${units} ${CMAKE_SOURCE_DIR}/src/ground/batch/order.cu
     ${CMAKE_SOURCE_DIR}/src/ground/batch/reset.cu
     ${CMAKE_SOURCE_DIR}/src/ground/batch/bodies.cu)
-  target_include_directories(batch_device PRIVATE ${CMAKE_BINARY_DIR}/layers/batch)
+  target_include_directories(batch_device PRIVATE ${CMAKE_BINARY_DIR}/layers/batch ${generated})
   target_link_libraries(batch_device PRIVATE layer_ground layer_device)
   # quotients and roots within two units in the last place, and no denormal numbers
   target_compile_options(batch_device PRIVATE -ftz=true -prec-div=false -prec-sqrt=false)
