@@ -63,7 +63,7 @@ changed() {
     local file stamp list dependency
     for file in $(sources | grep -E '^(src|lab)/.*\.c$'); do
         stamp=$root/tidy/${file//\//_}
-        list=$(find "$root/sanitize/src" -path "*/${file#src/}.o.d" | head -1)
+        list=$(find "$root/sanitize" -path "*/${file#*/}.o.d" | head -1)
         [ -n "$list" ] || continue # not part of this build, such as the learner on a GPU
         for dependency in $(sed 's/^[^:]*://; s/\\$//' "$list") .clang-tidy; do
             case $dependency in /usr/*) continue ;; esac
