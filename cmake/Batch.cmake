@@ -78,10 +78,6 @@ foreach(row ${batch_kernels})
   if(groups EQUAL 2 AND NOT points AND curves MATCHES "CONE|HEAP")
     set(pairs 1)
   endif()
-  set(heap 0)
-  if(curves MATCHES "HEAP|ANY")
-    set(heap 1)
-  endif()
   if(curves STREQUAL "LAW_HEAP")
     set(curves "(LAW_CONE | LAW_HEAP)")
   endif()
@@ -91,7 +87,6 @@ foreach(row ${batch_kernels})
 #define KERNEL_PER @per@
 #define KERNEL_POINTS @points@
 #define KERNEL_CURVES @curves@
-#define KERNEL_HEAP @heap@
 #define KERNEL_PAIRS @pairs@
 #define KERNEL_ROBOTS @robots@
 #include "ground/batch/kernel.cu"

@@ -2,26 +2,28 @@
 #include "device_robots.h"
 
 #include "ground/batch/contact.h"
+#include "ground/batch/contact_shapes.h"
 #include "robot/engine/step.h"
 
 /* The ground's step for this number of feet, level and on a map; see contact.inc. */
 #ifndef ENGINE_PER
 #define ENGINE_PER 5 /* elements of a lane */
 #endif
-#define CONTACT_FEET (ENGINE_FEET == 3 ? 4 : ENGINE_FEET)
-#define CONTACT_PER ENGINE_PER
-#define CONTACT_CURVES LAW_CONE
-#define CONTACT_HEAP 0
-#define CONTACT_POINTS 0
-#define CONTACT_MAP 0
+enum {
+    CONTACT_FEET = ENGINE_FEET == 3 ? 4 : ENGINE_FEET,
+    CONTACT_PER = ENGINE_PER,
+    CONTACT_CURVES = LAW_CONE,
+    CONTACT_POINTS = 0,
+    CONTACT_PAIRS = 0
+};
 namespace level {
+enum { CONTACT_MAP = 0 };
 #include "ground/batch/contact.inc"
-}
-#undef CONTACT_MAP
-#define CONTACT_MAP 1
+} // namespace level
 namespace map {
+enum { CONTACT_MAP = 1 };
 #include "ground/batch/contact.inc"
-}
+} // namespace map
 #include "ground/batch/robot.inc"
 
 #ifndef ENGINE_WARPS

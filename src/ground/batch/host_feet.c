@@ -1,6 +1,5 @@
 /* Feet on level ground. */
 #define MILD_REAL_FLOAT
 #define HOST_ROBOT host_feet
-#define CONTACT_MAP 0
-#define CONTACT_POINTS 0
+enum { CONTACT_MAP = 0, CONTACT_POINTS = 0 };
 #include "ground/batch/host.inc"

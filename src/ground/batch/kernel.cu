@@ -1,6 +1,6 @@
 /* The contact step of a batch on a GPU: a warp a robot, or two. cmake/Batch.cmake makes a unit of
  * each size. Before the inclusion: KERNEL, the name of what it gives; KERNEL_GROUPS, KERNEL_PER,
- * KERNEL_POINTS, KERNEL_CURVES and KERNEL_HEAP, what they are for (contact.inc); KERNEL_ROBOTS of
+ * KERNEL_POINTS and KERNEL_CURVES, what they are for (contact.inc); KERNEL_ROBOTS of
  * a multiprocessor; KERNEL_PAIRS, 1 where a warp may have two robots of which one foot is in the
  * air. */
 #define MILD_REAL_FLOAT
@@ -12,28 +12,29 @@ extern "C" {
 
 #include "device/cuda.h"
 #include "ground/batch/contact.h"
+#include "ground/batch/contact_shapes.h"
 #include "ground/batch/order.h"
 
-#define CONTACT_FEET KERNEL_GROUPS
-#define CONTACT_PER KERNEL_PER
-#define CONTACT_CURVES KERNEL_CURVES
-#define CONTACT_HEAP KERNEL_HEAP
-#define CONTACT_POINTS KERNEL_POINTS
-#define CONTACT_MAP 0
+enum {
+    CONTACT_FEET = KERNEL_GROUPS,
+    CONTACT_PER = KERNEL_PER,
+    CONTACT_CURVES = KERNEL_CURVES,
+    CONTACT_POINTS = KERNEL_POINTS
+};
 namespace level {
+enum { CONTACT_MAP = 0, CONTACT_PAIRS = 0 };
 #include "ground/batch/contact.inc"
-}
-#if KERNEL_PAIRS
-#define CONTACT_PAIRS 1
-namespace pair {
-#include "ground/batch/contact.inc"
-}
-#endif
-#undef CONTACT_MAP
-#define CONTACT_MAP 1
+} // namespace level
 namespace map {
+enum { CONTACT_MAP = 1, CONTACT_PAIRS = 0 };
 #include "ground/batch/contact.inc"
-}
+} // namespace map
+#if KERNEL_PAIRS
+namespace pair {
+enum { CONTACT_MAP = 0, CONTACT_PAIRS = 1 };
+#include "ground/batch/contact.inc"
+} // namespace pair
+#endif
 #include "ground/batch/robot.inc"
 
 static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
@@ -41,7 +42,7 @@ static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
 
 /* A block has one robot: one that takes long keeps no other's place. With a map and a share an
  * element has more numbers than there is shared memory for on sixteen robots. */
-#define MAP_ROBOTS (KERNEL_HEAP && KERNEL_ROBOTS > 12 ? 12 : KERNEL_ROBOTS)
+#define MAP_ROBOTS (map::CONTACT_HEAP && KERNEL_ROBOTS > 12 ? 12 : KERNEL_ROBOTS)
 #define CONTACT_ARGUMENTS                                                                          \
     const __grid_constant__ ContactSetup setup, const __grid_constant__ BatchShape shape,          \
         const __grid_constant__ BatchArrays arrays, const __grid_constant__ MildBatchInput input,  \
