@@ -73,11 +73,6 @@ foreach(row ${batch_kernels})
   endif()
   set(unit ${generated}/contact_${name}.cu)
   string(TOUPPER "LAW_${curves}" curves)
-  # of two feet on cones one is in the air most of the time
-  set(pairs 0)
-  if(groups EQUAL 2 AND NOT points AND curves MATCHES "CONE|HEAP")
-    set(pairs 1)
-  endif()
   if(curves STREQUAL "LAW_HEAP")
     set(curves "(LAW_CONE | LAW_HEAP)")
   endif()
@@ -87,7 +82,6 @@ foreach(row ${batch_kernels})
 #define KERNEL_PER @per@
 #define KERNEL_POINTS @points@
 #define KERNEL_CURVES @curves@
-#define KERNEL_PAIRS @pairs@
 #define KERNEL_ROBOTS @robots@
 #include "ground/batch/kernel.cu"
 ]=] @ONLY)
@@ -102,8 +96,7 @@ file(CONFIGURE OUTPUT ${generated}/ground/batch/contact_shapes.h @ONLY CONTENT [
 #define CONTACT_PER_MAX @contact_per_max@ /* elements of a lane */
 ]=])
 if(MILD_CUDA)
-  add_library(batch_device STATIC ${units} ${CMAKE_SOURCE_DIR}/src/ground/batch/order.cu
-    ${CMAKE_SOURCE_DIR}/src/ground/batch/reset.cu
+  add_library(batch_device STATIC ${units} ${CMAKE_SOURCE_DIR}/src/ground/batch/reset.cu
     ${CMAKE_SOURCE_DIR}/src/ground/batch/bodies.cu)
   target_include_directories(batch_device PRIVATE ${CMAKE_BINARY_DIR}/layers/batch ${generated})
   target_link_libraries(batch_device PRIVATE layer_ground layer_device)
