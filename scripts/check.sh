@@ -1,14 +1,18 @@
 #!/usr/bin/env bash
-# Runs the stages of `make check` (docs/testing.md). Each stage has its own folder under build/check.
-# Usage: scripts/check.sh [STAGE ...]; without a STAGE it runs all of them:
+# Runs the stages of `make check` and `make nightly` (docs/testing.md). Each has its own folder under build/check.
+# Usage: scripts/check.sh [STAGE ...]; without a STAGE it runs those of a landing, the first six:
 #   format    clang-format 14 has nothing to change, 100 columns, braces
-#   sanitize  clang, warnings as errors, address and undefined-behaviour sanitizers: every test of our own code, the long ones begun
-#   tidy      clang-tidy 14 over src/, only files that changed since they last passed
-#   thread    gcc, thread sanitizer: pool, task, evaluation, training
-#   vectors   the layers with loops over vectors, for AVX2 and for AVX-512 with vectors of 512 bits: their tests (256: make test)
+#   tidy      clang-tidy 14 over src/, without its analyzer
+#   sanitize  clang, warnings as errors, address and undefined-behaviour sanitizers: the core in C, and what fuzzing found
 #   aarch64   the library for another processor, run under qemu
 #   wheel     the Python package with the program: made, looked at, and used where nothing else is
 #   site      the documentation as a site: every link; in Chromium, where there is one, every page and a search
+# and those of a night:
+#   long      the tests that `make test` leaves out: labels lab and nightly
+#   analyzer  clang-tidy 14 over src/, with its analyzer
+#   sanitize_all  as sanitize, every test, the long ones begun
+#   thread    gcc, thread sanitizer: pool, task, evaluation, training
+#   vectors   the layers with loops over vectors, for AVX2 and for AVX-512 with vectors of 512 bits: their tests (256: make test)
 #   recipes   what CONTRIBUTING.md says, done in a copy of the tree: a reward, a task, a model, a terrain, a controller, a command
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -51,44 +55,60 @@ configure_sanitize() {
         -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DCMAKE_DISABLE_FIND_PACKAGE_OpenMP=ON
 }
 
-stage_sanitize() {
-    configure_sanitize
-    build sanitize
-    MILD_TEST_SHORT=1 MILD_TEST_DRAWS=0.1 UBSAN_OPTIONS=print_stacktrace=1 ASAN_OPTIONS=detect_stack_use_after_return=1 \
-        ctest --test-dir "$root/sanitize" --output-on-failure --parallel $((jobs + 1)) --timeout 900
-}
-
-# Files that are newer than their stamp, or include a header that is, by the compiler's dependency lists.
-changed() {
-    local file stamp list dependency
-    for file in $(sources | grep '^src/.*\.c$'); do
-        stamp=$root/tidy/${file//\//_}
-        list=$(find "$root/sanitize/src" -path "*/${file#src/}.o.d" | head -1)
-        [ -n "$list" ] || continue # not part of this build, such as the learner on a GPU
-        for dependency in $(sed 's/^[^:]*://; s/\\$//' "$list") .clang-tidy; do
-            case $dependency in /usr/*) continue ;; esac
-            if ! [ "$stamp" -nt "$dependency" ]; then
-                echo "$file"
-                break
-            fi
+# tests_of LAYER...: the targets of their tests.
+tests_of() {
+    local layer source
+    for layer in "$@"; do
+        for source in tests/"$layer"/test_*.c; do
+            source=${source##*/}
+            echo "${layer}_${source%.c}"
         done
     done
 }
 
-# analyzer.h would redefine what error.c defines
-tidy_file() {
-    local first=(--extra-arg=-include --extra-arg="$PWD/scripts/analyzer.h")
-    [[ $1 != */error.c ]] || first=()
-    clang-tidy-14 -p build/check/sanitize --quiet "${first[@]}" "$1" 2>/dev/null || return 1
-    touch "build/check/tidy/${1//\//_}"
+# sanitize [TARGET ...]: these or all, and their tests.
+sanitize() {
+    configure_sanitize
+    build sanitize "$@"
+    local names=${*/%/|} # layer_test_name is of the test layer/test_name, fuzz_name of fuzz/name
+    names=${names// /} names=${names//_test_//test_} names=${names//fuzz_/fuzz/}
+    MILD_TEST_SHORT=1 MILD_TEST_DRAWS=0.1 UBSAN_OPTIONS=print_stacktrace=1 ASAN_OPTIONS=detect_stack_use_after_return=1 \
+        ctest --test-dir "$root/sanitize" --output-on-failure --parallel $((jobs + 1)) --timeout 900 -R "^(${names%|})${1:+$}"
 }
-export -f tidy_file
+
+# Of the core in C, without tests that measure for long what others go over too; and what fuzzing found.
+stage_sanitize() {
+    local long='ground_test_(accuracy|merged|prints|refinement|rim|step|surface_step|thrown)|batch_test_(batch|bodies|contact)'
+    sanitize $(tests_of base ground soil batch learn control task | grep -vE "^($long)$") $(basename -s .c tests/fuzz/fuzz_*.c)
+}
+
+stage_sanitize_all() {
+    sanitize
+}
+
+# tidy WITHOUT OPTION...: the files of the build with clang but WITHOUT. clang-tidy needs no objects, only sources that are generated.
+tidy() {
+    local without=$1
+    shift
+    configure_sanitize
+    build sanitize version onnx_messages
+    sed -n "s|^ *\"file\": \"$PWD/\(src/.*\.c\)\".*|\1|p" "$root/sanitize/compile_commands.json" | sort -u | grep -v "$without" |
+        xargs -P "$jobs" -I{} clang-tidy-14 -p "$root/sanitize" --quiet "$@" {} 2>/dev/null
+}
 
 stage_tidy() {
-    configure_sanitize
-    build sanitize # the generated header, and what each file reads
-    mkdir -p "$root/tidy"
-    changed | xargs -r -P "$jobs" -I{} bash -c 'tidy_file {}'
+    tidy '^$' --checks='-clang-analyzer-*'
+}
+
+# analyzer.h would redefine what error.c defines
+stage_analyzer() {
+    tidy /error.c --extra-arg=-include --extra-arg="$PWD/scripts/analyzer.h"
+}
+
+# Tests that `make test` leaves out, of the build that it makes.
+stage_long() {
+    make --no-print-directory build
+    ctest --test-dir build --output-on-failure --parallel $((jobs + 1)) --timeout 900 -L '^(lab|nightly)$'
 }
 
 # Tests of what starts threads. That gcc has no warnings is seen by `.ci/run`, whose `make test` takes them for errors.
@@ -100,17 +120,6 @@ stage_thread() {
     ! setarch -R true 2>/dev/null || fixed=(setarch -R)
     MILD_TEST_SHORT=1 TSAN_OPTIONS=halt_on_error=1 "${fixed[@]}" ctest --test-dir "$root/thread" --output-on-failure \
         --parallel "$jobs" --timeout 900 -R '^(base/test_pool|task/test_(envs|task|terrain)$|eval/test_(batch|eval)|app/train)'
-}
-
-# tests_of LAYER...: the targets of their tests.
-tests_of() {
-    local layer source
-    for layer in "$@"; do
-        for source in tests/"$layer"/test_*.c; do
-            source=${source##*/}
-            echo "${layer}_${source%.c}"
-        done
-    done
 }
 
 # vectors PROCESSOR BITS LAYER...: the layers' tests, compiled for that processor with vectors of that many bits. Fewer random
@@ -162,7 +171,7 @@ stage_site() {
     fi
 }
 
-for stage in ${*:-format sanitize tidy thread vectors aarch64 wheel recipes site}; do
+for stage in ${*:-format tidy sanitize aarch64 wheel site}; do
     begin=$SECONDS
     echo "check: $stage"
     "stage_$stage"
