@@ -77,8 +77,7 @@ core = ground task learn plugin
 
 quick: setup
 	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
-	@cmake --build build --parallel $(JOBS) --target mild mild_plugin app_test_play \
-		$(foreach layer,$(core),$(patsubst tests/$(layer)/%.c,$(layer)_%,$(wildcard tests/$(layer)/test_*.c)))
+	@cmake --build build --parallel $(JOBS) --target mild mild_plugin app_test_play $(core:%=%_tests)
 	@$(ctest) -R '^($(subst $() ,|,$(core)))/|^app/test_play'
 
 test: build

@@ -55,31 +55,19 @@ configure_sanitize() {
         -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DCMAKE_DISABLE_FIND_PACKAGE_OpenMP=ON
 }
 
-# tests_of LAYER...: the targets of their tests.
-tests_of() {
-    local layer source
-    for layer in "$@"; do
-        for source in tests/"$layer"/test_*.c; do
-            source=${source##*/}
-            echo "${layer}_${source%.c}"
-        done
-    done
-}
-
-# sanitize [TARGET ...]: these or all, and their tests.
+# sanitize [LAYER ...]: the tests of these or of all, but those of `without`.
 sanitize() {
     configure_sanitize
-    build sanitize "$@"
-    local names=${*/%/|} # layer_test_name is of the test layer/test_name, fuzz_name of fuzz/name
-    names=${names// /} names=${names//_test_//test_} names=${names//fuzz_/fuzz/}
+    build sanitize "${@/%/_tests}"
     MILD_TEST_SHORT=1 MILD_TEST_DRAWS=0.1 UBSAN_OPTIONS=print_stacktrace=1 ASAN_OPTIONS=detect_stack_use_after_return=1 \
-        ctest --test-dir "$root/sanitize" --output-on-failure --parallel $((jobs + 1)) --timeout 900 -R "^(${names%|})${1:+$}"
+        ctest --test-dir "$root/sanitize" --output-on-failure --parallel $((jobs + 1)) --timeout 900 \
+        -R "^($(IFS='|'; echo "$*"))${1:+/}" -E "^(${without:-none})$"
 }
 
 # Of the core in C, without tests that measure for long what others go over too; and what fuzzing found.
 stage_sanitize() {
-    local long='ground_test_(accuracy|merged|prints|refinement|rim|step|surface_step|thrown)|batch_test_(batch|bodies|contact)'
-    sanitize $(tests_of base ground soil batch learn control task | grep -vE "^($long)$") $(basename -s .c tests/fuzz/fuzz_*.c)
+    local without='ground/test_(accuracy|merged|prints|refinement|rim|step|surface_step|thrown)|batch/test_(batch|bodies|contact)'
+    sanitize base ground soil batch learn control task fuzz
 }
 
 stage_sanitize_all() {
@@ -133,7 +121,7 @@ vectors() {
     fi
     configure "$name" -DMILD_MARCH="$processor" -DCMAKE_C_FLAGS="-mprefer-vector-width=$bits" \
         -DCMAKE_BUILD_TYPE=Release -DMILD_VIEW=OFF -DMILD_PYTHON=OFF
-    build "$name" $(tests_of "$@")
+    build "$name" "${@/%/_tests}"
     MILD_TEST_SHORT=1 MILD_TEST_DRAWS=0.1 ctest --test-dir "$root/$name" --output-on-failure --parallel "$jobs" --timeout 900 \
         -R "^($(IFS='|'; echo "$*"))/test_"
 }
