@@ -39,8 +39,9 @@ set(batch_kernels
   "4 8 flat   any    8")
 set(generated ${CMAKE_BINARY_DIR}/generated/batch)
 mild_layer(ground/batch layer_ground layer_device)
-# lanes in loops, as in cmake/Env.cmake: nothing gains from -O3 but the time to compile
-set_source_files_properties(ground/batch/bodies_host.c PROPERTIES COMPILE_OPTIONS "$<$<NOT:${mild_sanitized}>:-O2>")
+# lanes in loops, as in cmake/Env.cmake: nothing gains from -O3 but the time to compile, and with sanitizers nothing from -O1
+set_source_files_properties(ground/batch/bodies_host.c PROPERTIES COMPILE_OPTIONS "$<IF:${mild_sanitized},-O0,-O2>")
+set_source_files_properties(ground/batch/host.c ground/batch/host_map.c PROPERTIES COMPILE_OPTIONS "$<${mild_sanitized}:-O0>")
 target_include_directories(layer_batch PUBLIC ${generated})
 
 # contact_shapes.h: lists of the sizes. The CPU has one step for all of them (host.inc)

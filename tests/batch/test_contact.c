@@ -426,8 +426,8 @@ TEST(double_text_is_the_ground) {
         static Worst worst;
         worst = (Worst){0};
         begins = i < SHAPES ? 0 : CONTACT_BEGINS;
-        run_shape(&shapes[i % SHAPES], kit_draws(begins ? 8 : 20), begins ? 1e-12 : 1e-11,
-                  contact_case_double, &worst);
+        run_shape(&shapes[i % SHAPES], kit_draws(8), begins ? 1e-12 : 1e-11, contact_case_double,
+                  &worst);
         worst_print(shapes[i % SHAPES].name, &worst);
         assert_true(worst.wrench < 1e-10 && worst.twist < 1e-10 && worst.foot < 1e-10);
         assert_true(worst.element < 1e-6 && worst.memory < 1e-7);
@@ -441,7 +441,7 @@ TEST(float_text_is_near_it) {
     for (int i = 0; i < SHAPES; i++) {
         static Worst worst;
         worst = (Worst){0};
-        run_shape(&shapes[i], kit_draws(20), 1e-4, contact_case_float, &worst);
+        run_shape(&shapes[i], kit_draws(8), 1e-4, contact_case_float, &worst);
         worst_print(shapes[i].name, &worst);
         assert_true(quantile(&worst, 0.5) < 1e-5 && usual_worst(&worst) < 1e-3);
         assert_true(worst.twist < 5e-3 && worst.unsolved < worst.steps / 20);
@@ -642,8 +642,8 @@ TEST(double_text_is_the_ground_on_maps) {
         static Worst worst;
         worst = (Worst){0};
         begins = i < RELIEFS ? 0 : CONTACT_BEGINS;
-        run_relief(&reliefs[i % RELIEFS], kit_draws(begins ? 8 : 20), begins ? 1e-12 : 1e-11,
-                   contact_map_double, &worst);
+        run_relief(&reliefs[i % RELIEFS], kit_draws(8), begins ? 1e-12 : 1e-11, contact_map_double,
+                   &worst);
         worst_print(reliefs[i % RELIEFS].name, &worst);
         assert_true(worst.wrench < 1e-10 && worst.twist < 1e-10 && worst.foot < 1e-10);
         assert_true(worst.element < 1e-6 && worst.memory < 1e-7);
@@ -657,7 +657,7 @@ TEST(float_text_is_near_it_on_maps) {
     for (int i = 0; i < RELIEFS; i++) {
         static Worst worst;
         worst = (Worst){0};
-        run_relief(&reliefs[i], kit_draws(20), 1e-4, contact_map_float, &worst);
+        run_relief(&reliefs[i], kit_draws(8), 1e-4, contact_map_float, &worst);
         worst_print(reliefs[i].name, &worst);
         assert_true(quantile(&worst, 0.5) < (reliefs[i].exact ? 3e-6 : 1e-5));
         assert_true(usual_worst(&worst) < 1e-3);
