@@ -80,7 +80,7 @@ tidy() {
     shift
     configure_sanitize
     build sanitize version onnx_messages
-    sed -n "s|^ *\"file\": \"$PWD/\(\(src\|lab\)/.*\.c\)\".*|\1|p" "$root/sanitize/compile_commands.json" | sort -u | grep -v "$without" |
+    sed -nE "s#^ *\"file\": \"$PWD/((src|lab)/.*\.c)\".*#\1#p" "$root/sanitize/compile_commands.json" | sort -u | grep -v "$without" |
         xargs -P "$jobs" -I{} clang-tidy-14 -p "$root/sanitize" --quiet "$@" {} 2>/dev/null
 }
 
