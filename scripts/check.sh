@@ -66,7 +66,7 @@ sanitize() {
 
 # Of the core in C, without tests that measure for long what others go over too; and what fuzzing found.
 stage_sanitize() {
-    local without='ground/test_(accuracy|merged|prints|refinement|rim|step|surface_step|thrown)|batch/test_(batch|bodies|contact)'
+    local without='ground/test_(accuracy|merged|prints|refinement|rim|step|surface_step|thrown)|batch/test_(batch|bodies|contact|points)'
     sanitize base ground soil batch learn control task fuzz
 }
 
