@@ -20,12 +20,14 @@ PYTHON312 ?= python3.12
 TEST ?=
 PYTHONS ?=
 
-.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check newton-check isaaclab-check jax-check dds-check notebook-check check export-check fuzz mutants clean help
+.PHONY: setup build quick test nightly run bench install plugin plugin-check deb docs site paper web web-test wheel wheels wheel-cuda python-check mjlab-check newton-check isaaclab-check jax-check dds-check notebook-check check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
-	@echo "make test    set up, build, run every test"
-	@echo "make check   format, clang-tidy, sanitizers, gcc and clang with -Werror, aarch64, wheel, recipes, site (STAGES=format: that one)"
+	@echo "make quick   the tests of ground, task, learn, plugin and one walk, and what they need"
+	@echo "make test    set up, build, run the tests of the core"
+	@echo "make check   format, clang-tidy, sanitizers, aarch64, wheel, site (STAGES=format: that one)"
+	@echo "make nightly all other tests, and the long stages of check"
 	@echo "make build   set up, build build/mild"
 	@echo "make bench   set up, build, measure speed and memory"
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
@@ -69,13 +71,25 @@ program: setup
 		cmake -S . -B build -DCMAKE_BUILD_TYPE=Release -DMILD_LAB=ON --log-level=WARNING $(CMAKE_FLAGS)
 	@scripts/quietly.sh build/log/compile.log "building build/mild" cmake --build build --parallel $(JOBS) --target mild
 
+# Lanes of tests (docs/testing.md).
+ctest = ctest --test-dir build --output-on-failure --parallel $$(($(JOBS) + 1)) --timeout 280 -LE '^(lab|nightly)$$'
+core = ground task learn plugin
+
+quick: setup
+	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
+	@cmake --build build --parallel $(JOBS) --target mild mild_plugin app_test_play $(core:%=%_tests)
+	@$(ctest) -R '^($(subst $() ,|,$(core)))/|^app/test_play'
+
 test: build
-	@ctest --test-dir build --output-on-failure --parallel $$(($(JOBS) + 1)) --timeout 280
+	@$(ctest)
 
 # Own builds, under build/check. Installs the tools it needs, which `make test` does without.
 check:
 	@scripts/setup.sh check
 	@JOBS=$(JOBS) scripts/check.sh $(STAGES)
+
+nightly:
+	@$(MAKE) --no-print-directory check STAGES="$(or $(STAGES),long analyzer sanitize_all thread vectors recipes)"
 
 plugin-check: build
 	@if [ -n "$(VERSION)" ]; then tests/plugin/test_version.sh "$(VERSION)" build; else $(MAKE) --no-print-directory wheel && \

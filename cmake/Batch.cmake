@@ -39,8 +39,9 @@ set(batch_kernels
   "4 8 flat   any    8")
 set(generated ${CMAKE_BINARY_DIR}/generated/batch)
 mild_layer(ground/batch layer_ground layer_device)
-# lanes in loops, as in cmake/Env.cmake: nothing gains from -O3 but the time to compile
-set_source_files_properties(ground/batch/bodies_host.c PROPERTIES COMPILE_OPTIONS "$<$<NOT:${mild_sanitized}>:-O2>")
+# lanes in loops, as in cmake/Env.cmake: nothing gains from -O3 but the time to compile, and with sanitizers nothing from -O1
+set_source_files_properties(ground/batch/bodies_host.c PROPERTIES COMPILE_OPTIONS "$<IF:${mild_sanitized},-O0,-O2>")
+set_source_files_properties(ground/batch/host.c ground/batch/host_map.c PROPERTIES COMPILE_OPTIONS "$<${mild_sanitized}:-O0>")
 target_include_directories(layer_batch PUBLIC ${generated})
 
 # contact_shapes.h: lists of the sizes. The CPU has one step for all of them (host.inc)
@@ -73,11 +74,6 @@ foreach(row ${batch_kernels})
   endif()
   set(unit ${generated}/contact_${name}.cu)
   string(TOUPPER "LAW_${curves}" curves)
-  # of two feet on cones one is in the air most of the time
-  set(pairs 0)
-  if(groups EQUAL 2 AND NOT points AND curves MATCHES "CONE|HEAP")
-    set(pairs 1)
-  endif()
   if(curves STREQUAL "LAW_HEAP")
     set(curves "(LAW_CONE | LAW_HEAP)")
   endif()
@@ -87,7 +83,6 @@ foreach(row ${batch_kernels})
 #define KERNEL_PER @per@
 #define KERNEL_POINTS @points@
 #define KERNEL_CURVES @curves@
-#define KERNEL_PAIRS @pairs@
 #define KERNEL_ROBOTS @robots@
 #include "ground/batch/kernel.cu"
 ]=] @ONLY)
@@ -102,10 +97,9 @@ file(CONFIGURE OUTPUT ${generated}/ground/batch/contact_shapes.h @ONLY CONTENT [
 #define CONTACT_PER_MAX @contact_per_max@ /* elements of a lane */
 ]=])
 if(MILD_CUDA)
-  add_library(batch_device STATIC ${units} ${CMAKE_SOURCE_DIR}/src/ground/batch/order.cu
-    ${CMAKE_SOURCE_DIR}/src/ground/batch/reset.cu
+  add_library(batch_device STATIC ${units} ${CMAKE_SOURCE_DIR}/src/ground/batch/reset.cu
     ${CMAKE_SOURCE_DIR}/src/ground/batch/bodies.cu)
-  target_include_directories(batch_device PRIVATE ${CMAKE_BINARY_DIR}/layers/batch)
+  target_include_directories(batch_device PRIVATE ${CMAKE_BINARY_DIR}/layers/batch ${generated})
   target_link_libraries(batch_device PRIVATE layer_ground layer_device)
   # quotients and roots within two units in the last place, and no denormal numbers
   target_compile_options(batch_device PRIVATE -ftz=true -prec-div=false -prec-sqrt=false)

@@ -3,7 +3,7 @@ mild_layer(env layer_task layer_engine)
 # lanes in loops: nothing gains from -O3 but the time to compile
 # an environment keeps floats, and computes in double where it reads a definition
 set_source_files_properties(env/batch_host.c PROPERTIES COMPILE_OPTIONS
-    "$<$<NOT:${mild_sanitized}>:-O2>;-Wno-float-conversion;$<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>")
+    "$<IF:${mild_sanitized},-O0,-O2>;-Wno-float-conversion;$<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>")
 if(MILD_CUDA)
   # The kernels, compiled once for each robot, whose sizes the program `engine_sizes` reads from its folder, and once for
   # any robot, last.

@@ -1,14 +1,18 @@
 #!/usr/bin/env bash
-# Runs the stages of `make check` (docs/testing.md). Each stage has its own folder under build/check.
-# Usage: scripts/check.sh [STAGE ...]; without a STAGE it runs all of them:
+# Runs the stages of `make check` and `make nightly` (docs/testing.md). Each has its own folder under build/check.
+# Usage: scripts/check.sh [STAGE ...]; without a STAGE it runs those of a landing, the first six:
 #   format    clang-format 14 has nothing to change, 100 columns, braces
-#   sanitize  clang, warnings as errors, address and undefined-behaviour sanitizers: every test of our own code, the long ones begun
-#   tidy      clang-tidy 14 over src/, only files that changed since they last passed
-#   thread    gcc, thread sanitizer: pool, task, evaluation, training
-#   vectors   the layers with loops over vectors, for AVX2 and for AVX-512 with vectors of 512 bits: their tests (256: make test)
+#   tidy      clang-tidy 14 over src/, without its analyzer
+#   sanitize  clang, warnings as errors, address and undefined-behaviour sanitizers: the core in C, and what fuzzing found
 #   aarch64   the library for another processor, run under qemu
 #   wheel     the Python package with the program: made, looked at, and used where nothing else is
 #   site      the documentation as a site: every link; in Chromium, where there is one, every page and a search
+# and those of a night:
+#   long      the tests that `make test` leaves out: labels lab and nightly
+#   analyzer  clang-tidy 14 over src/, with its analyzer
+#   sanitize_all  as sanitize, every test, the long ones begun
+#   thread    gcc, thread sanitizer: pool, task, evaluation, training
+#   vectors   the layers with loops over vectors, for AVX2 and for AVX-512 with vectors of 512 bits: their tests (256: make test)
 #   recipes   what CONTRIBUTING.md says, done in a copy of the tree: a reward, a task, a model, a terrain, a controller, a command
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -47,48 +51,52 @@ stage_format() {
 # C++ by clang too: its sanitizers take a third of the time of gcc's. In the environment, because cmake forgets all other options of
 # a folder made before when one names another compiler. No OpenMP: its threads would wait in loops for processors that other tests have.
 configure_sanitize() {
-    CXX=clang++-14 configure sanitize -DCMAKE_C_COMPILER=clang-14 -DMILD_SANITIZE=ON -DCMAKE_BUILD_TYPE=Release \
+    CXX=clang++-14 configure sanitize -DMILD_LAB=ON -DCMAKE_C_COMPILER=clang-14 -DMILD_SANITIZE=ON -DCMAKE_BUILD_TYPE=Release \
         -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DCMAKE_DISABLE_FIND_PACKAGE_OpenMP=ON
 }
 
-stage_sanitize() {
+# sanitize [LAYER ...]: the tests of these or of all, but those of `without`.
+sanitize() {
     configure_sanitize
-    build sanitize
+    build sanitize "${@/%/_tests}"
     MILD_TEST_SHORT=1 MILD_TEST_DRAWS=0.1 UBSAN_OPTIONS=print_stacktrace=1 ASAN_OPTIONS=detect_stack_use_after_return=1 \
-        ctest --test-dir "$root/sanitize" --output-on-failure --parallel $((jobs + 1)) --timeout 900
+        ctest --test-dir "$root/sanitize" --output-on-failure --parallel $((jobs + 1)) --timeout 900 \
+        -R "^($(IFS='|'; echo "$*"))${1:+/}" -E "^(${without:-none})$"
 }
 
-# Files that are newer than their stamp, or include a header that is, by the compiler's dependency lists.
-changed() {
-    local file stamp list dependency
-    for file in $(sources | grep -E '^(src|lab)/.*\.c$'); do
-        stamp=$root/tidy/${file//\//_}
-        list=$(find "$root/sanitize/src" -path "*/${file#src/}.o.d" | head -1)
-        [ -n "$list" ] || continue # not part of this build, such as the learner on a GPU
-        for dependency in $(sed 's/^[^:]*://; s/\\$//' "$list") .clang-tidy; do
-            case $dependency in /usr/*) continue ;; esac
-            if ! [ "$stamp" -nt "$dependency" ]; then
-                echo "$file"
-                break
-            fi
-        done
-    done
+# Of the core in C, without tests that measure for long what others go over too; and what fuzzing found.
+stage_sanitize() {
+    local without='ground/test_(accuracy|merged|prints|refinement|rim|step|surface_step|thrown)|batch/test_(batch|bodies|contact|points)'
+    sanitize base ground soil batch learn control task fuzz
+}
+
+stage_sanitize_all() {
+    sanitize
+}
+
+# tidy WITHOUT OPTION...: the files of the build with clang but WITHOUT. clang-tidy needs no objects, only sources that are generated.
+tidy() {
+    local without=$1
+    shift
+    configure_sanitize
+    build sanitize version onnx_messages
+    sed -nE "s#^ *\"file\": \"$PWD/((src|lab)/.*\.c)\".*#\1#p" "$root/sanitize/compile_commands.json" | sort -u | grep -v "$without" |
+        xargs -P "$jobs" -I{} clang-tidy-14 -p "$root/sanitize" --quiet "$@" {} 2>/dev/null
+}
+
+stage_tidy() {
+    tidy '^$' --checks='-clang-analyzer-*'
 }
 
 # analyzer.h would redefine what error.c defines
-tidy_file() {
-    local first=(--extra-arg=-include --extra-arg="$PWD/scripts/analyzer.h")
-    [[ $1 != */error.c ]] || first=()
-    clang-tidy-14 -p build/check/sanitize --quiet "${first[@]}" "$1" 2>/dev/null || return 1
-    touch "build/check/tidy/${1//\//_}"
+stage_analyzer() {
+    tidy /error.c --extra-arg=-include --extra-arg="$PWD/scripts/analyzer.h"
 }
-export -f tidy_file
 
-stage_tidy() {
-    configure_sanitize
-    build sanitize # the generated header, and what each file reads
-    mkdir -p "$root/tidy"
-    changed | xargs -r -P "$jobs" -I{} bash -c 'tidy_file {}'
+# Tests that `make test` leaves out, of the build that it makes.
+stage_long() {
+    make --no-print-directory build
+    ctest --test-dir build --output-on-failure --parallel $((jobs + 1)) --timeout 900 -L '^(lab|nightly)$'
 }
 
 # Tests of what starts threads. That gcc has no warnings is seen by `.ci/run`, whose `make test` takes them for errors.
@@ -102,17 +110,6 @@ stage_thread() {
         --parallel "$jobs" --timeout 900 -R '^(base/test_pool|task/test_(envs|task|terrain)$|eval/test_(batch|eval)|app/train)'
 }
 
-# tests_of LAYER...: the targets of their tests.
-tests_of() {
-    local layer source
-    for layer in "$@"; do
-        for source in tests/"$layer"/test_*.c; do
-            source=${source##*/}
-            echo "${layer}_${source%.c}"
-        done
-    done
-}
-
 # vectors PROCESSOR BITS LAYER...: the layers' tests, compiled for that processor with vectors of that many bits. Fewer random
 # draws, because it is the compiler that is tested. Skipped where glibc says that the processor here is another.
 vectors() {
@@ -124,7 +121,7 @@ vectors() {
     fi
     configure "$name" -DMILD_MARCH="$processor" -DCMAKE_C_FLAGS="-mprefer-vector-width=$bits" \
         -DCMAKE_BUILD_TYPE=Release -DMILD_VIEW=OFF -DMILD_PYTHON=OFF
-    build "$name" $(tests_of "$@")
+    build "$name" "${@/%/_tests}"
     MILD_TEST_SHORT=1 MILD_TEST_DRAWS=0.1 ctest --test-dir "$root/$name" --output-on-failure --parallel "$jobs" --timeout 900 \
         -R "^($(IFS='|'; echo "$*"))/test_"
 }
@@ -162,7 +159,7 @@ stage_site() {
     fi
 }
 
-for stage in ${*:-format sanitize tidy thread vectors aarch64 wheel recipes site}; do
+for stage in ${*:-format tidy sanitize aarch64 wheel site}; do
     begin=$SECONDS
     echo "check: $stage"
     "stage_$stage"

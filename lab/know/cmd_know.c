@@ -382,7 +382,7 @@ static int parse_and_run(Know *k, CliArgs *args, int argc, char **argv) {
         {"changes", CLI_NUMBER, &k->study.change_share, 0, 1, "P",
          "[-] share of the walks that cross a border onto another ground (default 0)"},
         {"prior", CLI_TEXT, &k->prior, 0, 0, "NAME",
-         "what grounds are drawn from: wide; paper, that of lab/paper/README.md; or presets, as they are "
+         "what grounds are drawn from: wide; paper, that of lab/paper; or presets, as they are "
          "(default wide)"},
         {"ground", CLI_TEXT, &k->ground, 0, 0, "NAME", "one ground for all walks, or rigid"},
         {"model", CLI_TEXT, &k->context.model, 0, 0, "NAME",

@@ -1,5 +1,6 @@
 /* What moves the robots. A controller is one row of CONTROLLER_LIST and one file that implements
- * this interface; those of lab/controllers.h come after them where the lab is built. Evaluation and play know nothing else about it. */
+ * this interface. Evaluation and play know nothing else about it. Where the lab is built, the rows
+ * of lab/controllers.h follow. */
 #ifndef MILD_CONTROLLER_H
 #define MILD_CONTROLLER_H
 

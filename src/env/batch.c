@@ -340,11 +340,10 @@ static EnvsMemory memory(const Envs *envs) {
     const Batch *b = own_const(envs);
     const size_t task = b->arrays.stride, engine = b->robot;
     const size_t shells = b->bodies.numbers * sizeof *b->bodies.memory;
-    const size_t order = b->ground->arrays.order ? BATCH_ORDER * sizeof(int32_t) : 0;
     const size_t all = b->bytes + b->bodies.bytes;
     return (EnvsMemory){.task = task,
                         .engine = engine,
-                        .ground = mild_batch_robot_bytes(b->ground) + order + shells,
+                        .ground = mild_batch_robot_bytes(b->ground) + shells,
                         .rest = all / (size_t)b->arrays.envs - task - engine};
 }
 
@@ -502,10 +501,7 @@ static MildStatus step_shells(const Batch *b, const Slice *slice, int k, MildErr
         return MILD_OK;
     }
     if (b->kernels) {
-        const MildBatchInput input = ground_input(slice);
-        const MildStatus status = batch_order(&slice->ground, &input, slice->stream, error);
-        return status == MILD_OK ? checked(b->kernels->shells(all, k, slice->stream), error)
-                                 : status;
+        return checked(b->kernels->shells(all, k, slice->stream), error);
     }
     pool_run(b->pool, all->envs, shells_piece, &call);
     return MILD_OK;

@@ -8,11 +8,12 @@ for_mpirun=()
 for test in "${@:3}"; do
     for_mpirun+=("$(realpath "$test")")
 done
-# no network; a short path for its sockets; as many processes as wanted, as root too
+# no network; a short path for its sockets; as many processes as wanted, which leave the processor when they wait; as root too
 # products whose last bits depend on the rows beside a row, on any processor
 export DNNL_MAX_CPU_ISA=AVX2
 export TMPDIR=$work OMPI_MCA_btl=self,vader OMPI_MCA_btl_vader_single_copy_mechanism=none \
-    OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+    OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_mpi_yield_when_idle=1 \
+    OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 
 tiny=(--train.envs=20 --train.minutes=0 --train.checkpoint_every=1 --ppo.steps=24
     --policy.actor_hidden=32,0,0,0 --policy.critic_hidden=32,0,0,0 --policy.encoder_hidden=32,0,0,0
@@ -46,7 +47,7 @@ reward() {
 }
 
 # the calls of ranks.h, and the learner on GPUs (a stand-in for them) by parts
-for n in 2 8 16; do
+for n in 2 16; do
     for test in "${for_mpirun[@]}"; do
         good mpirun -n $n "$test"
     done
@@ -70,11 +71,9 @@ done
 # more than eight, with as many shards: the bits of one process with these shards, which are not those of eight
 many=("${tiny[@]}" --train.envs=40 --ppo.shards=32 --train.iterations=3)
 good "$mild" train --out many "${many[@]}"
-for n in 16 32; do
-    good mpirun -n $n "$mild" train --out many$n "${many[@]}"
-    same_numbers many/checkpoint_000000003.safetensors many$n/checkpoint_000000003.safetensors
-    [ "$(log_numbers many)" = "$(log_numbers many$n)" ] || fail "the logs of 1 and $n processes differ"
-done
+good mpirun -n 16 "$mild" train --out many16 "${many[@]}"
+same_numbers many/checkpoint_000000003.safetensors many16/checkpoint_000000003.safetensors
+[ "$(log_numbers many)" = "$(log_numbers many16)" ] || fail "the logs of 1 and 16 processes differ"
 good "$mild" train --out eight "${tiny[@]}" --train.envs=40 --train.iterations=3
 numbers many/policy.safetensors >one.numbers
 numbers eight/policy.safetensors >other.numbers

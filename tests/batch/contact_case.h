@@ -16,8 +16,6 @@ typedef struct {
 typedef struct {
     int feet, groups, per;
     int points; /* bool: by the version for feet that transmit no moment */
-    int alone;  /* bool: by that for one foot where the other is in the air; after it 1: it was, 0:
-                   both are near the ground, -1: the other was not in the air */
     int elements[CASE_FEET];
     double x[CASE_FEET][CASE_ELEMENTS], y[CASE_FEET][CASE_ELEMENTS], z[CASE_FEET];
     double begin[CASE_FEET][CASE_ELEMENTS], width[CASE_FEET][CASE_ELEMENTS]; /* of SoleHeap */

@@ -2,5 +2,4 @@
 #define CONTACT_CASE contact_case_double
 #define FEET_ROBOT feet_double
 #define POINTS_ROBOT points_double
-#define PAIR_ROBOT pair_double
 #include "contact_case.inc"

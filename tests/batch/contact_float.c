@@ -3,5 +3,4 @@
 #define CONTACT_CASE contact_case_float
 #define FEET_ROBOT host_feet
 #define POINTS_ROBOT host_points
-#define PAIR_ROBOT pair_float
 #include "contact_case.inc"

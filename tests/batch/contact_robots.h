@@ -6,9 +6,4 @@
 
 HostRobot feet_double, points_double, feet_map_double, points_map_double;
 
-/* Both robots of a warp; all arrays are [LANES]. */
-typedef void PairRobot(const ContactSetup *setup, const ContactProblem *problem,
-                       const ContactMemory *memory, const ContactResult *result, int *done);
-PairRobot pair_double, pair_float;
-
 #endif

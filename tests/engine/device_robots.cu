@@ -13,8 +13,7 @@ enum {
     CONTACT_FEET = ENGINE_FEET == 3 ? 4 : ENGINE_FEET,
     CONTACT_PER = ENGINE_PER,
     CONTACT_CURVES = LAW_CONE,
-    CONTACT_POINTS = 0,
-    CONTACT_PAIRS = 0
+    CONTACT_POINTS = 0
 };
 namespace level {
 enum { CONTACT_MAP = 0 };
@@ -118,10 +117,9 @@ WARP_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
     const ContactResult result = {
         work->wrench[0], work->now.support.free_velocity[0], NULL, NULL, NULL, NULL};
     if (MAP) {
-        map::contact_robot(setup, &problem, (map::ContactShared *)shared, &memory, 1, &result,
-                           NULL);
+        map::contact_robot(setup, &problem, (map::ContactShared *)shared, &memory, 1, &result);
     } else {
-        level::contact_robot(setup, &problem, shared, &memory, 1, &result, NULL);
+        level::contact_robot(setup, &problem, shared, &memory, 1, &result);
     }
     lanes_sync();
     return engine_end(model, 0, work);

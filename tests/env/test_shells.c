@@ -61,10 +61,10 @@ typedef struct {
     double first; /* largest difference of the critics where shells have just come near */
 } Falls;
 
-/* Whether robots have fallen for long enough: all steps, or until `check` sees enough of them lie
- * where MILD_TEST_SHORT is set. */
+/* Whether robots have fallen for long enough: until some have begun again and `check` sees enough
+ * of them lie, earlier where MILD_TEST_SHORT is set. */
 static int has_fallen(const Falls *falls, int t) {
-    return t == STEPS || (kit_short() && t >= some_steps() && falls->near > 300);
+    return t == STEPS || (t >= (kit_short() ? some_steps() : STEPS / 2) && falls->near > 300);
 }
 
 /* As follow, of robots that fall. An environment is left alone once it differs, until its next

@@ -1,9 +1,9 @@
 /* The ground creates no energy: random materials of the paper's ranges, random motions. Arguments:
- * number of draws (default 3000) and the first (default 0); `ground_test_passive 100000` is what
+ * number of draws (default 1000) and the first (default 0); `ground_test_passive 100000` is what
  * docs/model.md reports. */
 #include "ground_kit.h"
 
-static int draws = 3000, first = 0;
+static int draws = 1000, first = 0;
 
 /* SplitMix64 counts in equal steps: each draw begins `numbers` numbers, all that it uses, after the
  * one before. */
@@ -210,7 +210,7 @@ TEST(test_loops) {
 }
 
 int main(int argc, char **argv) {
-    draws = argc > 1 ? atoi(argv[1]) : kit_draws(kit_short() ? draws / 3 : draws);
+    draws = argc > 1 ? atoi(argv[1]) : kit_draws(draws);
     if (argc > 2) {
         first = atoi(argv[2]);
     }

@@ -330,8 +330,8 @@ static int is_about(FitResult *result, const char *name, double truth) {
 }
 
 /* Pressure that grows with the plate: 7.7 and 13.7 kPa at 10 mm under discs of 60 and 100 mm, and a
- * power of 1.35 of the depth, as others measured in real sand (lab/grains/real-sand.md). k_c and k_phi by
- * hand from the two. */
+ * power of 1.35 of the depth, as others measured in real sand (lab/grains/real-sand.md). k_c and
+ * k_phi by hand from the two. */
 TEST(pressure_grows_with_the_plate) {
     const double width[] = {0.03, 0.05}, power = pow(0.01, 1.35);
     const double k_c = (7.7e3 - 13.7e3) / (1 / 0.03 - 1 / 0.05) / power;

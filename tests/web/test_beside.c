@@ -185,7 +185,7 @@ TEST(test_same_loads) {
 
 /* ---- a soil of another law ---- */
 
-/* The merged law as grains of 5 mm have it, whose support slip takes away (lab/grains/README.md). */
+/* The merged law as grains of 5 mm have it, whose support slip takes away (lab/grains). */
 static const char merged_soil[] =
     "[ground]\nmodel = mild_merged\nk_pen = 525\nsigma_cone = 224e3\nalpha = 0.3\n"
     "nu = 3.37\nc_g = 29.1\nc_d = 1\nphi = 0.59\nrho = 2500\nmu = 0.5\nk_drift = 400\n"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Scripts of the paper with bad input: one line, exit 2; the printed training. Usage: test_scripts.sh PATH_TO_MILD
+# Scripts of the paper with bad input: one line, exit 2; the printed training; the shipped weights. Usage: test_scripts.sh PATH_TO_MILD
 root=$(cd "$(dirname "$0")/../../.." && pwd)
 source "$root/tests/kit.sh" "$1"
 python=$root/.venv/bin/python
@@ -37,4 +37,11 @@ done
 [ "$(grep -c '/1' table)" = 36 ] && [ -s printed/eval.json ] || fail "printed.sh: nine grounds at four speeds are $(cat table)"
 printed --train.iterations=2 >table 2>log || fail "printed.sh goes on: $(cat log)"
 grep -q "^resumed" table && [ "$(wc -l <printed/log.csv)" = 3 ] || fail "printed.sh begins again: $(cat log)"
+# the weights of the paper's experiments, in half precision
+for file in "$root"/policies/paper/*.safetensors; do
+    kind=learned
+    ! short || [[ ${file##*/} = [chr]* ]] || continue
+    case ${file##*/} in ht2*) kind=ht2 ;; clock*) kind=clock ;; esac
+    expect 0 '1/1' "$mild" eval --policy "$file" --controller $kind --ground rigid --trials 1 --seconds 0.1
+done
 finish "scripts of the paper: bad input, the printed training"

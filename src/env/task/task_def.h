@@ -56,8 +56,8 @@ typedef struct Robot Robot;
 enum { TASK_REWARD_LIST(TASK_REWARD_ENUM) TASK_REWARD_COUNT };
 #undef TASK_REWARD_ENUM
 
-/* Forms of a reward: ours, and the paper's formula to the letter (lab/paper/deviations.md). Rise is for
- * feet that sink deep. */
+/* Forms of a reward: ours, and the paper's formula to the letter (lab/paper/deviations.md). Rise is
+ * for feet that sink deep. */
 typedef enum {
     TASK_CLEARANCE_LIFT,
     TASK_CLEARANCE_ERROR,

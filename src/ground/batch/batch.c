@@ -12,9 +12,6 @@
 
 #define BATCH_TOLERANCE 1e-4
 #define BATCH_LIMIT 20
-/* Robots from which on a step makes pairs. A GPU that has fewer waits for the slowest of them,
- * which is slower in a pair. */
-#define BATCH_PAIRS_FROM 12288
 #define BATCH_MATERIALS_MAX 1000000
 
 #define BATCH_SIZE(groups, per) {groups, per},
@@ -107,7 +104,6 @@ static MildStatus shape_lanes(BatchShape *shape, MildError *error) {
 static void shape_def(MildBatch *batch, const MildBatchDef *def) {
     BatchShape *shape = &batch->shape;
     batch->device = def->device;
-    batch->pairs_from = BATCH_PAIRS_FROM;
     shape->robots = def->robots;
     shape->soles = def->feet;
     shape->feet = count_planes(def);
@@ -123,14 +119,6 @@ static void shape_def(MildBatch *batch, const MildBatchDef *def) {
     for (int f = 0; f < shape->feet; f++) {
         shape->z[f] = (float)mild_sole_z(def->soles[f]);
         shape->area[f] = (float)(batch->pitch[f] * batch->pitch[f]);
-        const double *const x = mild_sole_x(def->soles[f]), *const y = mild_sole_y(def->soles[f]);
-        for (int e = 0; e < shape->elements[f]; e++) {
-            const float at[2] = {(float)x[e], (float)y[e]};
-            for (int k = 0; k < 2; k++) {
-                shape->low[f][k] = e ? fminf(shape->low[f][k], at[k]) : at[k];
-                shape->high[f][k] = e ? fmaxf(shape->high[f][k], at[k]) : at[k];
-            }
-        }
     }
 }
 
@@ -182,11 +170,6 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
     arrays->elements = device_alloc(batch->device, element_bytes(shape), error);
     status = arrays->elements ? batch_memory_open(arrays, shape, batch->device, 0, error)
                               : MILD_ERROR_MEMORY;
-    if (status == MILD_OK && shape->feet == 2 && batch->device != MILD_BATCH_HOST) {
-        const size_t bytes = (size_t)shape->robots * BATCH_ORDER * sizeof *arrays->order;
-        arrays->order = device_alloc(batch->device, bytes, error);
-        status = arrays->order ? MILD_OK : MILD_ERROR_MEMORY;
-    }
     if (status != MILD_OK) {
         return status;
     }
@@ -235,7 +218,6 @@ void mild_batch_destroy(MildBatch *batch) {
     device_free(batch->device, batch->arrays.elements);
     device_free(batch->device, batch->arrays.materials);
     device_free(batch->device, batch->arrays.memory);
-    device_free(batch->device, batch->arrays.order);
     batch_map_close(&batch->arrays.map, batch->device);
     batch_bodies_close(&batch->bodies, batch->device);
     mild_scratch_destroy(batch->scratch);
@@ -318,9 +300,6 @@ MildBatch batch_slice(const MildBatch *batch, int first, int count) {
     MildBatch slice = *batch;
     slice.shape.robots = count;
     slice.arrays.memory += (size_t)first * batch_memory_numbers(&batch->shape);
-    if (slice.arrays.order) {
-        slice.arrays.order += (size_t)first * BATCH_ORDER;
-    }
     if (slice.arrays.worn) {
         slice.arrays.worn += (size_t)first * batch_worn_numbers(&batch->shape);
     }
@@ -340,28 +319,12 @@ static const BatchKernel *batch_kernel(const MildBatch *batch) {
     return NULL;
 }
 
-int batch_pairs(const MildBatch *batch) {
-    const BatchKernel *k = batch->device == MILD_BATCH_HOST ? NULL : batch_kernel(batch);
-    return k && k->pairs && !batch->shape.map && batch->shape.robots >= batch->pairs_from;
-}
-
-MildStatus batch_order(const MildBatch *batch, const MildBatchInput *input, MildStream stream,
-                       MildError *error) {
-    return batch_pairs(batch) ? batch_gpu_order(batch, input, stream, error) : MILD_OK;
-}
-
 static MildStatus batch_gpu_step(const MildBatch *batch, const MildBatchInput *input,
                                  const MildBatchOutput *output, int advance, MildStream stream,
                                  MildError *error) {
     const BatchKernel *k = batch_kernel(batch);
-    MildStatus status = MILD_OK;
-    if (!k) {
-        return device_open(batch->device, error);
-    }
-    if (!batch->arrays.beside) {
-        status = batch_order(batch, input, stream, error);
-    }
-    return status == MILD_OK ? k->step(batch, input, output, advance, stream, error) : status;
+    return k ? k->step(batch, input, output, advance, stream, error)
+             : device_open(batch->device, error);
 }
 
 /* The step of the feet. */

@@ -20,14 +20,10 @@ typedef struct {
     int map;       /* bool: on BatchArrays.map, not on level ground */
     int points;    /* bool: as MildBatchDef.points */
     int triangle;  /* bool: of each inverse_inertia there is the lower triangle alone, row by row */
-    int elements[MILD_BATCH_FEET_MAX];    /* [soles] */
-    float z[MILD_BATCH_PLANES_MAX];       /* [feet] [m] of a sole's plane */
-    float area[MILD_BATCH_PLANES_MAX];    /* [feet] [m^2] of an element */
-    float low[MILD_BATCH_PLANES_MAX][2];  /* [feet] [m] least x and y of the elements */
-    float high[MILD_BATCH_PLANES_MAX][2]; /* [feet] [m] greatest */
+    int elements[MILD_BATCH_FEET_MAX]; /* [soles] */
+    float z[MILD_BATCH_PLANES_MAX];    /* [feet] [m] of a sole's plane */
+    float area[MILD_BATCH_PLANES_MAX]; /* [feet] [m^2] of an element */
 } BatchShape;
-
-enum { BATCH_ORDER = 3 }; /* numbers that `order` has for a robot */
 
 /* Where a batch keeps what; on its device. */
 typedef struct {
@@ -36,8 +32,6 @@ typedef struct {
     float *memory;              /* [robots] of contact.h */
     float *worn;                /* [robots][groups][stride] [-] wear, behind `memory`; NULL until
                                    there is a material that wears */
-    int32_t *order;             /* [robots][BATCH_ORDER] of two feet on a GPU, see order.h; else
-                                   NULL */
     MapView map;                /* all 0 without a map */
     const uint16_t *skip; /* [robots] not 0: a step leaves it alone; NULL: none. Of the caller */
     int beside; /* bool: the kernel before in the stream steps the robots of `skip` and nothing
@@ -65,7 +59,6 @@ struct MildBatch {
     BatchBodies bodies;
     int device;
     int curves;                        /* LawCurve bits of all materials */
-    int pairs_from;                    /* robots from which on a step makes pairs */
     double pitch[MILD_BATCH_FEET_MAX]; /* [soles] [m] */
     double width[MILD_BATCH_FEET_MAX]; /* [soles] [m] mild_sole_width */
     /* of mild_batch_change_materials, on the CPU */
@@ -106,7 +99,7 @@ static inline int batch_map_is_lowered(const MapView *view) {
 void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBatchInput *input,
                const MildBatchOutput *output, int advance);
 
-/* ---- a GPU: kernel.cu, order.cu and reset.cu, or without_cuda.c ---- */
+/* ---- a GPU: kernel.cu and reset.cu, or without_cuda.c ---- */
 /* A step in `stream`. */
 typedef MildStatus (*BatchStep)(const MildBatch *batch, const MildBatchInput *input,
                                 const MildBatchOutput *output, int advance, MildStream stream,
@@ -117,20 +110,10 @@ typedef struct {
     int per;
     int points; /* bool: only for such a batch */
     int curves; /* LawCurve and LawMotion bits that the materials may have */
-    int pairs;  /* bool: on level ground it may make pairs, see batch_pairs */
     BatchStep step;
 } BatchKernel;
 /* Those of this build, NULL behind them. A batch takes the first that fits (cmake/Batch.cmake). */
 extern const BatchKernel *const batch_kernels[];
-/* Bool: on a GPU the batch's step gives a warp two robots of which a foot is in the air
- * (contact_pair.inc). */
-int batch_pairs(const MildBatch *batch);
-/* Fills BatchArrays.order for a step of pairs. Before a step with `beside` the caller does that,
- * before the kernel beside which it is; else mild_batch_step. */
-MildStatus batch_order(const MildBatch *batch, const MildBatchInput *input, MildStream stream,
-                       MildError *error);
-MildStatus batch_gpu_order(const MildBatch *batch, const MildBatchInput *input, MildStream stream,
-                           MildError *error);
 MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which, MildStream stream,
                            MildError *error);
 

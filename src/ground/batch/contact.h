@@ -61,8 +61,6 @@ typedef struct {
     const Real *place; /* [CONTACT_PLACES][stride] of its elements */
     Real z;            /* [m] sole plane in the foot frame */
     Real area;         /* [m^2] of an element */
-    Real low[2];       /* [m] least x and y of its elements */
-    Real high[2];      /* [m] greatest */
     int elements;
 } ContactSole;
 
@@ -99,7 +97,6 @@ MILD_HD void contact_arms(const ContactSole *sole, const Real *R, Real arm[3][3]
 
 /* What a robot's engine knows before the step; see MildContactInput. */
 typedef struct {
-    int foot;                        /* with CONTACT_PAIRS: that of the lane; else not read */
     const Real *position;            /* [feet][3] [m] */
     const Real *rotation;            /* [feet][9] [-] */
     const Real *velocity;            /* [feet][6] [m/s, rad/s] */
@@ -221,50 +218,6 @@ typedef struct {
 typedef struct {
     Real share, lean; /* [-] q and lean of Share */
 } ContactLoad;
-
-/* ---- feet that are in the air ---- */
-
-/* [m] A foot of which all elements are farther above the ground than this at the middle of a step
- * without ground is taken to be so with the ground under the other foot, too: in a step of 5 ms
- * that would have to throw it down by 0.4 m/s. contact_pair.inc looks at that. */
-#define CONTACT_CLEAR REAL(1e-3)
-
-/* Depth [m] of the elements of a foot, as motion_at takes it. R: rotation of the foot. at: its
- * reference point. height: of the ground, which is level. */
-MILD_HD void contact_depths(const ContactSole *sole, const Real *R, const Real *at, Real height,
-                            Real depth[3]) {
-    depth[0] = height - at[2] - R[8] * sole->z;
-    depth[1] = -R[6];
-    depth[2] = -R[7];
-}
-
-/* The same a time dt later, where foot f moves by V. Returns a bound on the greatest [m]. */
-MILD_HD Real contact_depths_after(const ContactSole *sole, const ContactProblem *problem, int f,
-                                  const Real *V, Real dt, Real depth[3]) {
-    const Real *R = problem->rotation + 9 * f;
-    Real arm[3][3];
-    contact_arms(sole, R, arm);
-    contact_depths(sole, R, problem->position + 3 * f, problem->height, depth);
-    const Motion motion = motion_of(arm, V);
-    LANE_UNROLL
-    for (int k = 0; k < 3; k++) {
-        depth[k] -= dt * motion.z[k];
-    }
-    return depth[0] + real_max(depth[1] * sole->low[0], depth[1] * sole->high[0]) +
-           real_max(depth[2] * sole->low[1], depth[2] * sole->high[1]);
-}
-
-/* Bool: foot f may touch the ground in this step. So it may, too, where its motion is no number. */
-MILD_HD int contact_near(const ContactSetup *setup, const ContactProblem *problem, int f) {
-    const ContactSole *sole = &setup->sole[f];
-    const Real half = setup->dt / 2;
-    Real depth[3];
-    const Real before =
-        contact_depths_after(sole, problem, f, problem->velocity + 6 * f, -half, depth);
-    const Real after =
-        contact_depths_after(sole, problem, f, problem->free_velocity + 6 * f, half, depth);
-    return !(before <= 0 && after < -CONTACT_CLEAR);
-}
 
 /* Velocity of an element, along the world's axes. descent: speed at which its depth grows. */
 typedef struct {

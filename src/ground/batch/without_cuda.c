@@ -4,13 +4,6 @@
 
 const BatchKernel *const batch_kernels[] = {NULL};
 
-MildStatus batch_gpu_order(const MildBatch *batch, const MildBatchInput *input, MildStream stream,
-                           MildError *error) {
-    (void)input;
-    (void)stream;
-    return device_open(batch->device, error);
-}
-
 MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which, MildStream stream,
                            MildError *error) {
     (void)which;

@@ -13,10 +13,10 @@
  * A sliding element at the share lambda = q/c of its yield load is held by at most
  *     H = (3 + sqrt 8) t lambda (1 - lambda)/(2 - lambda) F_g,
  * whose greatest value is t F_g, at lambda = 2 - sqrt 2. Grains hold a sole that slides under load
- * so (lab/grains/README.md); a parabola, as of footings, would hold it by a third less. Two things hold
- * it besides. Ground that the sole strikes and sets in motion pushes with the force G of the drag:
- * it is held by the whole of mu, so the coefficient is the mean of both by F and G. And ground at
- * the sides of a sole that is u deep, of the width W, which is pushed away (Rankine):
+ * so (lab/grains/README.md); a parabola, as of footings, would hold it by a third less. Two things
+ * hold it besides. Ground that the sole strikes and sets in motion pushes with the force G of the
+ * drag: it is held by the whole of mu, so the coefficient is the mean of both by F and G. And
+ * ground at the sides of a sole that is u deep, of the width W, which is pushed away (Rankine):
  *
  *     G = c_d m_a' h^2                   h: speed at which virgin ground is reached
  *     H <= mu F + K_p phi rho g u^2 s/(2 W)

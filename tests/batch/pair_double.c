@@ -1,2 +1,0 @@
-#define PAIR pair_double
-#include "pair.inc"
