@@ -269,23 +269,6 @@ static double rim_share(const DenseElement *e, const Find *find) {
     return left + (1.0 - left) * law->recovery;
 }
 
-/* The same of a sole whose cosine to the ground is `level`: each cell of the heap is no higher over
- * its edge than over the line where the sole enters the ground, u/sin(theta) away. */
-static double water_share(const DenseElement *e, const Find *find, double level) {
-    const DenseLaw *law = &e->law;
-    const double radius = 0.0195 / sqrt(acos(-1.0)), sine = sqrt(1.0 - level * level),
-                 deep = fmax(fmax(e->u0, e->seen), 2e-5),
-                 heap = law->full / (radius * find->heap[1]),
-                 lowest = sine > heap ? heap / sine : 1.0;
-    if (!(law->k_pen > law->kappa)) {
-        return level;
-    }
-    const double flat = law->k_pen - law->kappa,
-                 left = (law->kappa * deep + flat * cone_share(law, deep * lowest)) /
-                        (law->kappa * deep + flat * cone_share(law, deep));
-    return level * (left + (1.0 - left) * law->recovery);
-}
-
 /* The share of virgin ground that it carries: the line keeps its slope and ends deeper. up: normal
  * of the sole's upper face. */
 static void dense_share(double dt, DenseElement *e, const Find *find, const double now[4]) {
@@ -294,15 +277,17 @@ static void dense_share(double dt, DenseElement *e, const Find *find, const doub
     double level = (-find->normal[2] + g[0] * find->normal[0] + g[1] * find->normal[1]) /
                    sqrt(1.0 + g[0] * g[0] + g[1] * g[1]);
     level = fmin(fmax(level, 0.02), 1.0);
-    level = find->shell ? fmin(fmax(rim_share(e, find), 0.02), 1.0) : water_share(e, find, level);
+    level = find->shell ? fmin(fmax(rim_share(e, find), 0.02), 1.0) : level;
     double c = 1.0 - law->projected * (1.0 - level), q = fmin(1.0 - find->memory.worn[find->i], c),
            soil = virgin_force(law, a), bed = law->bed_stiffness * fmax(a - law->bed, 0.0);
     if (law->grip > 0.0) {
         double t = (3.0 + sqrt(8.0)) * law->grip,
-               held = fmin(law->mu, fmax(0.1, t * (c - q) / (2.0 * c - q))),
+               held = fmin(law->mu, t * (c - q) / (2.0 * c - q)),
                way = fmax(e->u0 + 0.5 * dt * e->w0 - a, 0.0), carried = q * soil + bed,
-               struck = fmax(law->drag_rate, 0.0) * moved_rate(law, a) * way * e->w0 / dt;
-        law->mu = held + (law->mu - held) * struck / fmax(carried + struck, 1e-300);
+               struck = fmax(law->drag_rate, 0.0) * moved_rate(law, a) * way * e->w0 / dt,
+               along = now[0] * now[0] + now[1] * now[1],
+               sine = along / fmax(along + e->w0 * e->w0, 1e-300);
+        law->mu = held + (law->mu * sine - held) * struck / fmax(carried + struck, 1e-300);
     }
     double side = find->shell ? 0.0 : 1.5 * law->weight * find->pitch * find->pitch / find->width;
     e->radius += dt * side * e->u0 * fmax(e->u0, 0.0);
@@ -318,11 +303,17 @@ static void dense_share(double dt, DenseElement *e, const Find *find, const doub
     law->sinkage *= q;
 }
 
-/* Velocity of a point at p, and the speed at which its depth grows, of a foot's twist. */
+/* Velocity of a point at p along the axes in which the foot presses, and the speed at which it
+ * penetrates, of the foot's twist. */
 static void point_velocity(const Find *find, const double *twist, double v[4]) {
-    kit_cross(twist + 3, find->p, v);
+    double moves[3];
+    kit_cross(twist + 3, find->p, moves);
     for (int k = 0; k < 3; k++) {
-        v[k] += twist[k];
+        moves[k] += twist[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        const double *axis = find->frame[k];
+        v[k] = axis[0] * moves[0] + axis[1] * moves[1] + axis[2] * moves[2];
     }
     v[3] = find->slope[0] * v[0] + find->slope[1] * v[1] - v[2];
 }
@@ -413,6 +404,41 @@ static double find_seen(const Find *find, double dt) {
     return deepest;
 }
 
+/* The axes are the world's; under a plane sole on ground whose cones merge they are turned by the
+ * smallest rotation that takes the normal of the ground under the point (0, 0, z) to one that is
+ * 0.6 of the way from it to the sole's: about their cross product, by their angle. */
+static void find_frame(Find *find, const MildSole *sole, const double *R) {
+    const MildTerrain *terrain = &find->kit->terrain;
+    const double *at = find->kit->input.position[find->f], z = mild_sole_z(sole);
+    const double x = at[0] + R[2] * z, y = at[1] + R[5] * z;
+    double slope[2], n[3], e[3], axis[3], size = 0.0, sine, angle;
+    mild_terrain_slope_at(terrain, x, y, slope);
+    const int merged = terrain->materials[mild_terrain_material_at(terrain, x, y)].model ==
+                       MILD_MODEL_MILD_MERGED;
+    for (int k = 0; k < 3; k++) {
+        n[k] = (k < 2 ? -slope[k] : 1.0) / sqrt(1.0 + slope[0] * slope[0] + slope[1] * slope[1]);
+        e[k] = 0.4 * n[k] - 0.6 * find->normal[k];
+        size += e[k] * e[k];
+    }
+    kit_cross(n, e, axis);
+    sine = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]) / sqrt(size);
+    angle = atan2(sine, (n[0] * e[0] + n[1] * e[1] + n[2] * e[2]) / sqrt(size));
+    for (int k = 0; k < 3; k++) {
+        double unit[3] = {k == 0, k == 1, k == 2}, turned[3];
+        memcpy(find->frame[k], unit, sizeof unit);
+        if (find->shell || !merged || sine < 1e-12) {
+            continue;
+        }
+        const double a[3] = {axis[0] / sine / sqrt(size), axis[1] / sine / sqrt(size),
+                             axis[2] / sine / sqrt(size)};
+        kit_cross(a, unit, turned);
+        for (int i = 0; i < 3; i++) {
+            find->frame[k][i] = cos(angle) * unit[i] + sin(angle) * turned[i] +
+                                (1.0 - cos(angle)) * a[k] * a[i];
+        }
+    }
+}
+
 static void dense_foot(Dense *d, const Kit *kit, int f) {
     const MildSole *sole = kit->soles[f];
     const double *R = kit->input.rotation[f], side = R[8] > 0.0 ? -1.0 : 1.0;
@@ -426,6 +452,7 @@ static void dense_foot(Dense *d, const Kit *kit, int f) {
                  .area = 1.0,
                  .shell = mild_sole_surface_z(sole) != NULL};
     const int n = mild_sole_elements(sole);
+    find_frame(&find, sole, R);
     if (find.shell) {
         RimPoint *point = calloc((size_t)n, sizeof *point);
         int count = 0;

@@ -19,6 +19,7 @@ typedef struct {
     double area_share, area;      /* [-] of a shell: what it presses with, and its area, both
                                      over those of a square of the raster; else 1 */
     int shell;                    /* bool */
+    double frame[3][3];           /* rows: the axes in which the foot presses, world */
     double heap[2];               /* [-] of the element, see dense_law.h */
     double plane[3];    /* of a shell, dense_rim: least squares through its depths less half of
                         `round`, [m] and [-] */

@@ -132,11 +132,13 @@ static double moved_rate(const DenseLaw *law, double u) {
     if (law->begin == 0.0) {
         return cone_flat(law, u);
     }
-    return u / LAW_MOVES < law->begin + law->full / 3.0 ? 1.0 / LAW_MOVES : 0.0;
+    return u / LAW_MOVES < law->begin + law->full / 3.0 ? 1.0 / LAW_MOVES : LAW_TAIL;
 }
 
 static double moved(const DenseLaw *law, double u) {
-    return law->begin == 0.0 ? cone_share(law, u) : fmin(u / LAW_MOVES, cone_share(law, 1e3));
+    double all = cone_share(law, 1e3);
+    return law->begin == 0.0 ? cone_share(law, u)
+                             : fmin(u / LAW_MOVES, all) + LAW_TAIL * fmax(u - LAW_MOVES * all, 0.0);
 }
 
 #endif

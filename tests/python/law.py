@@ -15,9 +15,9 @@ SMOOTH = 2e-6  # [m/s] E, over which the lag begins: section 6
 TURNED = 1e-4  # [m/s] speed at the front above which a foot can have turned round within a step: section 6
 SPRING = 2e-5  # [m] delta, over which friction is elastic: section 6
 COUNTED, LONGEST = 1e-5, 0.1  # [m] least way that is counted, and greatest path: section 8
-SHALLOW = 2e-5  # [m] least depth of the water line: section 21
+TURN = 0.6  # share of the tilt by which a sole presses along its normal: section 21
+TAIL = 0.02  # depth that moves beyond a heap, by depth: section 21
 POINTS = 4  # along a cell's edge, for the distances in it: section 21
-LEAST_GRIP = 0.1  # of mu_q: section 22
 PRESSURE = 3  # K_p, passive earth pressure: section 22
 GRAVITY = 9.81  # [m/s^2] for the ground at the sides: section 22
 
@@ -69,7 +69,7 @@ class Law:
         """Sections 3, 16 and 21."""
         m = material
         self.sole, self.s = sole, sole.pitch**2
-        self.slope = np.tan(m.alpha) / m.nu  # T of section 21
+        slope = np.tan(m.alpha) / m.nu  # T of section 21
         self.kappa, self.k0 = m.sigma_cone / np.cos(m.alpha), m.k_pen / PITCH**2
         self.moved = max(m.c_g, 0) * m.phi * m.rho * m.nu * self.s
         self.c_d, self.mu, self.recovery, self.bed_depth = max(m.c_d, 0.5), m.mu, m.recovery, m.bed_depth
@@ -79,17 +79,17 @@ class Law:
         self.side = PRESSURE * m.phi * m.rho * GRAVITY * self.s / (2 * sole.width) if m.slip_length > 0 and m.grip > 0 else 0
         mean, deviation = heap(sole, outline)
         width = np.minimum(np.sqrt(18) * deviation, 3 * mean)
-        self.u_b, self.u_w, self.u_f = (mean - width / 3) * self.slope, width * self.slope, mean * self.slope
+        self.u_b, self.u_w, self.u_f = (mean - width / 3) * slope, width * slope, mean * slope
 
     def recruited(self, u):
         """P, section 21."""
         t = np.clip((u - self.u_b) / self.u_w, 0, 1)
         return np.minimum(u, self.u_b) + self.u_w * (t - t * t + t**3 / 3)
 
-    def force(self, u, line=1.0):
-        """F_g, sections 3 and 21; of P the part that a water line leaves."""
+    def force(self, u):
+        """F_g, sections 3 and 21."""
         u = np.maximum(u, 0)
-        return self.s * (self.kappa * u + (self.k0 - self.kappa) * self.recruited(u * line))
+        return self.s * (self.kappa * u + (self.k0 - self.kappa) * self.recruited(u))
 
     def stiffness(self, u):
         """K, sections 3 and 21."""
@@ -102,17 +102,21 @@ class Law:
 
     def mass(self, u):
         """m_a, section 21."""
-        return self.moved * np.minimum(np.maximum(u, 0) / 5, self.u_f)
+        u = np.maximum(u, 0)
+        return self.moved * (np.minimum(u, 5 * self.u_f) * (1 / 5 - TAIL) + TAIL * u)
 
     def mass_slope(self, u):
         """m_a', section 21."""
-        return self.moved / 5 * (u / 5 < self.u_f)
+        return self.moved * np.where(u / 5 < self.u_f, 1 / 5, TAIL)
 
-    def tilted(self, u, rotation):
-        """c, section 21: projected area and water line; what springs back has no water line."""
-        cos = rotation[2, 2]
-        line = min(1, self.slope / max(np.sqrt(max(0, 1 - cos * cos)), 1e-300))
-        return cos * (1 - (1 - self.recovery) * (1 - self.force(u, line) / self.force(u)))
+
+def frame(rotation):
+    """Q, section 21: the smallest rotation that takes the vertical to the direction in which the sole presses."""
+    e = np.array([0, 0, 1]) + TURN * (rotation[:, 2] - [0, 0, 1])
+    e /= np.linalg.norm(e)
+    v = np.array([-e[1], e[0], 0])
+    cross = np.array([[0, 0, v[1]], [0, 0, -v[0]], [-v[1], v[0], 0]])
+    return np.eye(3) + cross + cross @ cross / (1 + e[2])
 
 
 class Foot:
@@ -126,21 +130,23 @@ class Foot:
 
     def step(self, position, rotation, twist, new_twist):
         """Section 6: the force [N] on each element, (n, 3), from the pose and twist now and the twist after the step."""
-        e = self.motion(position, rotation, twist, new_twist)
+        Q = frame(rotation)
+        e = self.motion(position, rotation, twist, new_twist, Q)
         self.share(e, rotation)
         self.unloading_line(e)
         self.front(e)
         e.I_z = np.maximum(0, self.path(e) + self.mass(e) + self.growth(e) + self.lag(e))
         I_xy = self.friction(e)
         self.remember(e)
-        return np.column_stack([I_xy, e.I_z]) / self.dt
+        return np.column_stack([I_xy, e.I_z]) @ Q.T / self.dt
 
-    def motion(self, position, rotation, twist, new_twist):
-        """Sections 1, 5 and 6: depths [m] and speeds [m/s] of the elements; the step leads from the depth m0 to m1."""
+    def motion(self, position, rotation, twist, new_twist, Q):
+        """Sections 1, 5, 6 and 21: depths [m] and speeds in the frame Q [m/s] of the elements; the step leads from the depth m0 to m1."""
         sole, dt = self.law.sole, self.dt
         p = np.column_stack([sole.x, sole.y, np.full(len(sole.x), sole.z)]) @ rotation.T
-        before, after = (V[:3] + np.cross(V[3:], p) for V in (twist, new_twist))
-        e = types.SimpleNamespace(u0=-(position[2] + p[:, 2]), w0=-before[:, 2], w=-after[:, 2], v=after[:, :2])
+        before, after = ((V[:3] + np.cross(V[3:], p)) @ Q for V in (twist, new_twist))
+        e = types.SimpleNamespace(u0=-(position[2] + p[:, 2]), w0=-before[:, 2], w=-after[:, 2], v0=before[:, :2], v=after[:, :2])
+        e.sinks = -after @ Q[2] - e.w  # how much faster the depth grows than the way along the normal
         e.m0 = np.where(self.middle > 0, self.middle, e.u0 - dt * e.w0 / 2)
         e.m1 = e.u0 + dt * e.w / 2
         e.a = np.maximum(np.maximum(e.m0, self.u_max), 0)
@@ -148,7 +154,7 @@ class Foot:
 
     def share(self, e, rotation):
         """Sections 21 and 22: c and q, held in a step; q falls at once when the sole tilts."""
-        e.c = self.law.tilted(np.maximum(np.maximum(self.u_max, e.u0), SHALLOW), rotation)
+        e.c = rotation[2, 2]
         e.q = np.minimum(1 - self.worn, e.c)
 
     def unloading_line(self, e):
@@ -211,10 +217,12 @@ class Foot:
         if law.slip_length == 0 or law.grip == 0:
             return np.full_like(e.q, law.mu)
         share, h = e.q / e.c, np.maximum(e.w0, 0)
-        mu_q = np.minimum(law.mu, np.maximum(LEAST_GRIP, (3 + np.sqrt(8)) * law.grip * (1 - share) / (2 - share)))
+        mu_q = np.minimum(law.mu, (3 + np.sqrt(8)) * law.grip * (1 - share) / (2 - share))
         G = law.c_d * law.mass_slope(e.a) * h * np.maximum(e.u0 + self.dt * h / 2 - e.a, 0) / self.dt
         yields = e.q * e.F_a + e.bed_a
-        return over(mu_q * yields + law.mu * G, yields + G, mu_q)
+        slides = (e.v0**2).sum(1)
+        struck = law.mu * over(slides, slides + h**2, 0)
+        return over(mu_q * yields + struck * G, yields + G, mu_q)
 
     def friction(self, e):
         """Sections 6, 8 and 22: a spring below its bound r, with damping; drift resistance and the ground at the sides are in r too."""
@@ -261,12 +269,14 @@ class Foot:
         """Sections 5, 6 and 22: the memory after the step; all but `middle` is forgotten above the surface."""
         self.pending = self.pending + self.dt * e.v
         q = self.wear(e)
-        led = e.m1 + np.where(e.regains, ELASTIC * np.maximum(q - e.q, 0), 0)
-        deepest = np.maximum(self.u_max, np.maximum(self.peak(e), led))
+        shift = self.dt * e.sinks
+        led = np.maximum(e.m1, e.a) + shift + np.where(e.regains, ELASTIC * np.maximum(q - e.q, 0), 0)
+        deepest = np.maximum(self.peak(e) + shift, led)
         in_ground, leads = e.m1 > 0, (e.m1 > e.a) & (e.w > e.w_y)
         from_above = (self.u_max > 0) & (e.w_a <= e.w_y)  # has given the mass w - w_y only
         given = np.where(from_above, e.w - e.w_y, e.w)
-        self.front_speed = np.where(in_ground & leads, given * over(e.m1, led), 0)  # the same momentum at the depth led to
-        self.u_max, self.worn, self.middle = np.where(in_ground, deepest, 0), np.where(in_ground, 1 - q, 0), e.m1
+        self.front_speed = np.where(in_ground & leads, given * over(e.m1 + shift, led), 0)  # the same momentum at the depth led to
+        self.u_max, self.worn = np.where(in_ground, np.maximum(deepest, 0), 0), np.where(in_ground, 1 - q, 0)
+        self.middle = e.m1 + shift
         for memory in (self.drift, self.held_stiffness, self.held, self.pending):
             memory[~in_ground] = 0

@@ -155,7 +155,7 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
         slots_drag(foot, input->dt, &now, &free);
         foot->stops = 1;
     }
-    foot_direct(foot, terrain, input->dt, R, &moves);
+    foot_direct(foot, terrain, input->dt, R, &now);
 }
 
 /* Places of the feet in the input's rows. */
