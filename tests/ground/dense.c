@@ -281,8 +281,7 @@ static void dense_share(double dt, DenseElement *e, const Find *find, const doub
     double c = 1.0 - law->projected * (1.0 - level), q = fmin(1.0 - find->memory.worn[find->i], c),
            soil = virgin_force(law, a), bed = law->bed_stiffness * fmax(a - law->bed, 0.0);
     if (law->grip > 0.0) {
-        double t = (3.0 + sqrt(8.0)) * law->grip,
-               held = fmin(law->mu, t * (c - q) / (2.0 * c - q)),
+        double t = (3.0 + sqrt(8.0)) * law->grip, held = fmin(law->mu, t * (c - q) / (2.0 * c - q)),
                way = fmax(e->u0 + 0.5 * dt * e->w0 - a, 0.0), carried = q * soil + bed,
                struck = fmax(law->drag_rate, 0.0) * moved_rate(law, a) * way * e->w0 / dt,
                along = now[0] * now[0] + now[1] * now[1],
@@ -413,8 +412,8 @@ static void find_frame(Find *find, const MildSole *sole, const double *R) {
     const double x = at[0] + R[2] * z, y = at[1] + R[5] * z;
     double slope[2], n[3], e[3], axis[3], size = 0.0, sine, angle;
     mild_terrain_slope_at(terrain, x, y, slope);
-    const int merged = terrain->materials[mild_terrain_material_at(terrain, x, y)].model ==
-                       MILD_MODEL_MILD_MERGED;
+    const int merged =
+        terrain->materials[mild_terrain_material_at(terrain, x, y)].model == MILD_MODEL_MILD_MERGED;
     for (int k = 0; k < 3; k++) {
         n[k] = (k < 2 ? -slope[k] : 1.0) / sqrt(1.0 + slope[0] * slope[0] + slope[1] * slope[1]);
         e[k] = 0.4 * n[k] - 0.6 * find->normal[k];
@@ -433,8 +432,8 @@ static void find_frame(Find *find, const MildSole *sole, const double *R) {
                              axis[2] / sine / sqrt(size)};
         kit_cross(a, unit, turned);
         for (int i = 0; i < 3; i++) {
-            find->frame[k][i] = cos(angle) * unit[i] + sin(angle) * turned[i] +
-                                (1.0 - cos(angle)) * a[k] * a[i];
+            find->frame[k][i] =
+                cos(angle) * unit[i] + sin(angle) * turned[i] + (1.0 - cos(angle)) * a[k] * a[i];
         }
     }
 }

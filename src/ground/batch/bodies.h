@@ -619,14 +619,13 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
     const Element *e = &own.element;
     const ContactVelocity v = bodies_velocity(&own, V);
     const Real middle = own.depth + dt / 2 * v.descent;
-    const int stays = middle > 0;
+    const Real sinks = dt * frame_sinks(own.frame, own.slope[0], own.slope[1], v.x, v.y, v.descent);
+    const int stays = middle > 0 && element_deepest(e, middle) + sinks > 0;
     const Real normal = element_impulse(e, own.curves, 1, dt, v.descent).value;
     ElementMemory after =
         element_remember(e, &own.before, dt, 1 / dt, normal, v.x, v.y, v.descent, stays);
-    const Real sinks =
-        dt * frame_sinks(own.frame, own.slope[0], own.slope[1], v.x, v.y, v.descent);
     Real worn = 0;
-    after.depth_max = stays ? real_max(after.depth_max + sinks, 0) : 0;
+    after.depth_max += stays ? sinks : 0;
     after.middle += sinks;
     if (own.curves & LAW_HEAP) {
         worn = element_wear_alone(e, &own.share, &own.before, &after, dt, normal, v.x, v.y,

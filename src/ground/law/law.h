@@ -57,7 +57,7 @@
 #ifndef LAW_TAIL
 #define LAW_TAIL REAL(0.02)
 #endif
-#define LAW_MOVES REAL(5)         /* [-] depth per recruited depth of what moves with a heap */
+#define LAW_MOVES REAL(5) /* [-] depth per recruited depth of what moves with a heap */
 
 /* The curves that a law has besides line and bed. All elements of a foot use the union of its
  * materials' bits, because a law without a curve has 0 for that curve's numbers. */
@@ -178,7 +178,8 @@ MILD_HD Real law_moved_depth(const Law *law) {
 
 /* P_m(u) [m] */
 MILD_HD Real law_moved(const Law *law, int curves, Real depth) {
-    const Real heap = real_min(depth, law_moved_depth(law)) * (1 / LAW_MOVES - LAW_TAIL) + LAW_TAIL * depth;
+    const Real heap =
+        real_min(depth, law_moved_depth(law)) * (1 / LAW_MOVES - LAW_TAIL) + LAW_TAIL * depth;
     return law_is_heap(law, curves) ? heap : law_recruited(law, curves, depth);
 }
 
@@ -295,7 +296,9 @@ MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way, const P
         over.mean +=
             law->flat_stiffness * ((open_begin + 4 * open_half + open_end) * REAL(1.0 / 6.0));
         const Real moved = law_moved_depth(law);
-        const Real moves = (real_min(end, moved) - real_min(begin, moved)) * (1 / LAW_MOVES - LAW_TAIL) + LAW_TAIL * way;
+        const Real moves =
+            (real_min(end, moved) - real_min(begin, moved)) * (1 / LAW_MOVES - LAW_TAIL) +
+            LAW_TAIL * way;
         const Real moves_slope = end < moved ? 1 / LAW_MOVES : LAW_TAIL;
         const int heap = law_is_heap(law, curves) && way > 0;
         over.recruited = heap ? moves : over.recruited;

@@ -59,6 +59,11 @@ MILD_HD Real element_peak(const Element *e, int curves, Real normal, Real speed,
     return middle + (1 + e->recovery) / 2 * beyond;
 }
 
+/* [m] Greatest depth after a step that ends at m1 [m], but for a reversal within it. */
+MILD_HD Real element_deepest(const Element *e, Real middle) {
+    return e->virgin_depth + real_max(middle - e->yield_depth, 0);
+}
+
 /* Memory after the step. Values are selected with ?:, never multiplied by 0, so that NaN is
  * forgotten too. normal: I_z. vx, vy, speed: velocity after the step, with `speed` downward. rate:
  * 1/dt. stays: bool, the element is still in the ground. Otherwise it forgets everything except
@@ -67,7 +72,7 @@ MILD_HD ElementMemory element_remember(const Element *e, const ElementMemory *me
                                        Real rate, Real normal, Real vx, Real vy, Real speed,
                                        int stays) {
     const Real middle = e->depth + dt / 2 * speed;
-    const Real deepest = e->virgin_depth + real_max(middle - e->yield_depth, 0);
+    const Real deepest = element_deepest(e, middle);
     ElementMemory after;
     after.depth_max = stays ? deepest : 0;
     after.middle = stays ? real_min(middle, deepest) : middle;

@@ -44,7 +44,7 @@
 
 #include "ground/law/remember.h"
 
-#define SHARE_LEAN REAL(0.02) /* [-] least cosine: a sole on its edge */
+#define SHARE_LEAN REAL(0.02)                 /* [-] least cosine: a sole on its edge */
 #define SHARE_YIELD REAL(5.8284271247461903)  /* 3 + sqrt 8 */
 #define SHARE_PASSIVE 3.0                     /* [-] K_p of ground with 30 degrees of friction */
 #define SHARE_GRAVITY 9.81                    /* [m/s^2] */

@@ -82,8 +82,7 @@ static __attribute__((cold, noinline)) double slot_peak(const Slots *s, int i, i
 static void slot_raise(const Advance *a, const Memory *memory, const Slots *s, int i, int e,
                        const SlotVelocity *v, double middle) {
     const int turns = element_turns(s->entry_speed[i], v->descent);
-    const double peak =
-        turns ? slot_peak(s, i, a->foot->curves, v->descent, middle) : middle;
+    const double peak = turns ? slot_peak(s, i, a->foot->curves, v->descent, middle) : middle;
     const double depth =
         s->virgin_depth[i] + peak - s->yield_depth[i] + a->dt * slot_sinks(s, i, a->foot->frame, v);
     memory->depth_max[e] = real_max(depth, memory->depth_max[e]); /* a NaN changes nothing */
@@ -199,7 +198,10 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
             const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_SHELL);
             const Element element = slot_element(s, i);
             const ElementMemory before = slot_memory(s, i);
-            const int stays = slot_stays(s, i, s->depth[i] + dt / 2 * v.descent, prints);
+            const Real shift = dt * slot_sinks(s, i, frame, &v);
+            const Real m1 = s->depth[i] + dt / 2 * v.descent;
+            const int stays =
+                slot_stays(s, i, m1, prints) & (element_deepest(&element, m1) + shift > 0);
             ElementMemory after =
                 element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
             if (wears) {
@@ -213,8 +215,7 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                 changes += stays ? most : 0;
                 to.worn[e + i] = stays ? 1 - share.q : 0;
             }
-            const Real shift = dt * slot_sinks(s, i, frame, &v);
-            to.depth_max[e + i] = after.depth_max > 0 ? real_max(after.depth_max + shift, 0) : 0;
+            to.depth_max[e + i] = stays ? after.depth_max + shift : 0;
             to.middle[e + i] = after.middle + shift;
             to.front_speed[e + i] = after.front_speed;
             to.drift[e + i] = after.drift;
@@ -403,11 +404,11 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
         double twist[6];
         twist_of_world(foot, result->velocity + 6 * f, twist);
         const Advance advance = {.foot = foot,
-                           .imprints = ground->tiles > 0 ? &imprints : NULL,
-                           .rotation = foot->shell ? shell_level : input->rotation[f],
-                           .motion = foot_motion(foot, twist),
-                           .dt = input->dt,
-                           .terrain = terrain};
+                                 .imprints = ground->tiles > 0 ? &imprints : NULL,
+                                 .rotation = foot->shell ? shell_level : input->rotation[f],
+                                 .motion = foot_motion(foot, twist),
+                                 .dt = input->dt,
+                                 .terrain = terrain};
         const int all = slots_are_whole(foot) && ground->tiles == 0 && !foot->shell;
         if (all) {
             ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material);

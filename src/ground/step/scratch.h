@@ -111,10 +111,10 @@ struct MildScratch {
     double velocity[TWIST_MAX]; /* [m/s, rad/s] V+ of the last solve, in the frames of the feet */
     MildContactInput input;     /* input_of_world, whose inverse inertia is */
     double inverse[TWIST_MAX * TWIST_MAX];
-    double dt;                  /* [s] of the last solve */
-    int is_number;              /* bool: its problem and all of its results are finite */
-    double *block;              /* the one allocation behind all arrays */
-    FootScratch foot[];         /* [feet] */
+    double dt;          /* [s] of the last solve */
+    int is_number;      /* bool: its problem and all of its results are finite */
+    double *block;      /* the one allocation behind all arrays */
+    FootScratch foot[]; /* [feet] */
 };
 
 /* Bool: made for soles of the same numbers of elements as the ground. */
