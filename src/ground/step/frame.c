@@ -27,7 +27,7 @@ void foot_frame(FootScratch *foot, const MildTerrain *terrain, const double *R) 
     frame_axis(sole, (Real)slope[0], (Real)slope[1], FRAME_TURN, foot->frame);
     foot->framed = foot->frame[0] != 0 || foot->frame[1] != 0 || foot->frame[2] != 0;
     for (int k = 0; foot->framed && k < 4; k++) {
-        vector_of_world(foot, foot->arm[k], foot->arm[k]);
+        vector_of_world(foot, foot->arm[k], foot->lever[k]);
     }
 }
 

@@ -36,6 +36,7 @@ void foot_set_pose(FootScratch *foot, const MildTerrain *terrain, const double *
     foot->away = 0;
     foot->framed = 0;
     memset(foot->frame, 0, sizeof foot->frame);
+    memcpy(foot->lever, foot->arm, sizeof foot->lever);
 }
 
 void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints) {

@@ -231,10 +231,10 @@ static void pass(MildScratch *scratch, double dt, const double *twist, int held)
         memcpy(wrench, sums, 3 * sizeof *sums);
         memset(wrench + 3, 0, 3 * sizeof *wrench);
         for (int i = 0; i < 3; i++) {
-            cross_add(foot->arm[i], sums + 3 * i, wrench + 3);
+            cross_add(foot->lever[i], sums + 3 * i, wrench + 3);
         }
         if (foot->shell) {
-            cross_add(foot->arm[3], sums + 9, wrench + 3);
+            cross_add(foot->lever[3], sums + 9, wrench + 3);
         }
     }
 }
@@ -276,7 +276,7 @@ static __attribute__((noinline)) void factor_add(const FootScratch *foot, const 
     static const int product[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
     Three rows[6] = {{0.0}}; /* of the three rows of h: [M_k0, N_k] */
     for (int l = 0; l < 3; l++) {
-        const double *p = foot->arm[l];
+        const double *p = foot->lever[l];
         const int at = product[k][l];
         Three m[3]; /* M_kl */
         for (int c = 0; c < 3; c++) {
@@ -287,7 +287,7 @@ static __attribute__((noinline)) void factor_add(const FootScratch *foot, const 
         rows[4] += p[2] * m[0] - p[0] * m[2];
         rows[5] += p[0] * m[1] - p[1] * m[0];
     }
-    const double *q = foot->arm[k];
+    const double *q = foot->lever[k];
     for (int c = 0; c < 6; c++) {
         const Three row = rows[c];
         for (int r = 0; k == 0 && r < 3; r++) {

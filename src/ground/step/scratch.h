@@ -55,19 +55,20 @@ typedef struct FootScratch {
 
     /* Pose: foot_locate. The vector from the ankle to an element is p = arm[0] + x arm[1] + y
      * arm[2] + height arm[3]. */
-    double origin[3]; /* [m] the ankle, world */
-    double arm[4][3]; /* world: the frame's point (0, 0, z) [m], its axes [-], z for a shell */
-    int framed;       /* bool: the sole presses in a frame of its own, in which the arms are then */
-    Real frame[3];    /* [-] its axis: foot_frame */
-    int uneven;       /* bool: the terrain is not level; otherwise all slopes are 0 */
-    int away;         /* bool: no element can touch; depth and area_share are not set */
-    double reach;     /* [m] upper bound on the depths: foot_reach */
-    double *depth;    /* [padded] [m] */
-    double *slope_x;  /* [padded] [-] gradient of the ground; uneven ground only */
-    double *slope_y;  /* [padded] [-] */
-    double *point_x;  /* [padded] [m] centres in the world: foot_points */
-    double *point_y;  /* [padded] [m] */
-    double *point_z;  /* [padded] [m] */
+    double origin[3];   /* [m] the ankle, world */
+    double arm[4][3];   /* world: the frame's point (0, 0, z) [m], its axes [-], z for a shell */
+    int framed;         /* bool: the sole presses in a frame of its own */
+    Real frame[3];      /* [-] its axis: foot_frame */
+    double lever[4][3]; /* the arms in that frame */
+    int uneven;         /* bool: the terrain is not level; otherwise all slopes are 0 */
+    int away;           /* bool: no element can touch; depth and area_share are not set */
+    double reach;       /* [m] upper bound on the depths: foot_reach */
+    double *depth;      /* [padded] [m] */
+    double *slope_x;    /* [padded] [-] gradient of the ground; uneven ground only */
+    double *slope_y;    /* [padded] [-] */
+    double *point_x;    /* [padded] [m] centres in the world: foot_points */
+    double *point_y;    /* [padded] [m] */
+    double *point_z;    /* [padded] [m] */
 
     /* List of the elements that may touch the ground: foot_list. */
     int active;       /* slots in use */
@@ -168,17 +169,17 @@ static inline Motion foot_moves(const FootScratch *foot, const double *V) {
 #ifdef MILD_REAL_FLOAT
     Real arm[3][3], twist[6];
     for (int k = 0; k < 9; k++) {
-        arm[k / 3][k % 3] = (Real)foot->arm[k / 3][k % 3];
+        arm[k / 3][k % 3] = (Real)foot->lever[k / 3][k % 3];
     }
     for (int k = 0; k < 6; k++) {
         twist[k] = (Real)V[k];
     }
     Motion motion = motion_of(arm, twist);
 #else
-    Motion motion = motion_of(foot->arm, V);
+    Motion motion = motion_of(foot->lever, V);
 #endif
     if (foot->shell) {
-        const double *q = foot->arm[3];
+        const double *q = foot->lever[3];
         const double x = V[5] * q[1], y = V[3] * q[2]; /* first: pass.c fuses these products */
         motion.lift[0] = V[4] * q[2] - x;
         motion.lift[1] = V[5] * q[0] - y;
@@ -190,8 +191,8 @@ static inline Motion foot_moves(const FootScratch *foot, const double *V) {
 /* p: vector from the ankle to the element of a slot, world axes. */
 static inline void slot_arm(const FootScratch *foot, const Slots *s, int i, double p[3]) {
     for (int k = 0; k < 3; k++) {
-        p[k] = foot->arm[0][k] + foot->arm[1][k] * s->x[i] + foot->arm[2][k] * s->y[i] +
-               foot->arm[3][k] * s->z[i];
+        p[k] = foot->lever[0][k] + foot->lever[1][k] * s->x[i] + foot->lever[2][k] * s->y[i] +
+               foot->lever[3][k] * s->z[i];
     }
 }
 

@@ -45,8 +45,8 @@ void shell_hessian(const FootScratch *foot, double *H) {
         for (int r = 0; r < 3; r++) {
             for (int l = 0; l < 4; l++) {
                 const int at = product[k][l];
-                shell_cross(foot->arm[l], (const double[3]){M[r][0][at], M[r][1][at], M[r][2][at]},
-                            rows[r] + 3);
+                shell_cross(foot->lever[l],
+                            (const double[3]){M[r][0][at], M[r][1][at], M[r][2][at]}, rows[r] + 3);
             }
             for (int c = 0; c < 3; c++) {
                 rows[r][c] = M[r][c][k];
@@ -55,7 +55,7 @@ void shell_hessian(const FootScratch *foot, double *H) {
         for (int c = 0; c < 6; c++) { /* column c of the rows is a force: k = 0 adds it, too */
             const double force[3] = {rows[0][c], rows[1][c], rows[2][c]};
             double torque[3] = {0.0};
-            shell_cross(foot->arm[k], force, torque);
+            shell_cross(foot->lever[k], force, torque);
             for (int r = 0; r < 3; r++) {
                 H[6 * r + c] += k == 0 ? force[r] : 0.0;
                 H[6 * (3 + r) + c] += torque[r];

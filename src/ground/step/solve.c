@@ -47,15 +47,10 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
     }
     result->depth_mean = sums[0] / loaded;
     const double z = foot->shell ? shell_loaded(foot, &result->area) : 0.0;
-    double center[6] = {0.0};
     for (int k = 0; k < 3; k++) {
-        center[k] =
-            foot->arm[0][k] +
+        result->pressure_center[k] =
+            position[k] + foot->arm[0][k] +
             (sums[3] * foot->arm[1][k] + sums[4] * foot->arm[2][k] + z * foot->arm[3][k]) / force;
-    }
-    twist_to_world(foot, center, center);
-    for (int k = 0; k < 3; k++) {
-        result->pressure_center[k] = position[k] + center[k];
     }
 }
 
