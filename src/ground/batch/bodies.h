@@ -801,6 +801,7 @@ TEAM_FN void bodies_step(const BodiesSetup *setup, BodiesWork *work, int advance
         for (int i = TEAM_LANE(l); i < work->count; i += TEAM) {
             work->least[i] = bodies_least(setup, setup->sole[work->body[i]].radius,
                                           work->velocity[i], work->free_velocity + 6 * i);
+            bodies_set_frame(setup, work, i);
         }
     }
     team_sync();

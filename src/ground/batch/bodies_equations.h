@@ -342,7 +342,7 @@ TEAM_FN void bodies_load_rows(BodiesWork *work, int rows, const BodiesPoint *at,
  * columns. */
 TEAM_FN void bodies_solve_rows(BodiesWork *work, int rows, const BodiesPoint *at, int corrects) {
     const int active = work->active;
-    Real M[BODIES_OWN_COLUMNS][LANE_COPIES], own[LANE_COPIES], column[LANE_COPIES];
+    Real M[BODIES_OWN_COLUMNS][LANE_COPIES], own[LANE_COPIES], column[LANE_COPIES] = {0};
     int place[LANE_COPIES];
     bodies_load_rows(work, rows, at, corrects, M);
     EACH_LANE(l) {

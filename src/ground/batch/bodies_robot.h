@@ -170,12 +170,6 @@ TEAM_FN void bodies_gather(const BodiesCall *call, long robot, BodiesWork *work)
         }
     }
     team_sync();
-    EACH_LANE(l) {
-        if (TEAM_LANE(l) < work->count) {
-            bodies_set_frame(setup, work, TEAM_LANE(l));
-        }
-    }
-    team_sync();
 }
 
 /* The place of sole b in the work; -1: none. */
