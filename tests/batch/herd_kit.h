@@ -6,7 +6,7 @@
 #include "ground/map_kit.h"
 #include "ground/surface_kit.h"
 
-enum { ROBOTS = 32, STEPS = 30, MATERIALS = 12, LABELS = 3, ROWS = 6 * MILD_FEET_MAX };
+enum { ROBOTS = 48, STEPS = 30, MATERIALS = 12, LABELS = 3, ROWS = 6 * MILD_FEET_MAX };
 
 enum { SHELLS = 5 };
 

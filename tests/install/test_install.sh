@@ -149,7 +149,7 @@ mkdir batch
 cat >batch/CMakeLists.txt <<'END'
 cmake_minimum_required(VERSION 3.20)
 project(batch LANGUAGES C)
-find_package(mild 0.2 REQUIRED)
+find_package(mild 0.3 REQUIRED)
 add_executable(batch ../batch.c)
 target_link_libraries(batch PRIVATE mild::batch)
 END

@@ -1,5 +1,5 @@
-/* Every call of ranks.h, alone and, started by mpirun (app/test_ranks.sh), among 2 and 16 processes:
- * each computes what all should get by itself, and compares. */
+/* Every call of ranks.h, alone and, started by mpirun (app/test_ranks.sh), among 2 and 16
+ * processes: each computes what all should get by itself, and compares. */
 #include <float.h>
 
 #include "base/random.h"

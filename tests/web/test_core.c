@@ -412,7 +412,7 @@ static double facing(void) {
  * one, that of the drawn base, along its heading, to the left, and of its turning. */
 static void turn_away(void) {
     const WebView *view = web_view();
-    double from[3], shown[3] = {0, 0, 0};
+    double from[3] = {0, 0, 0}, shown[3] = {0, 0, 0};
     for (int t = 0; t < 4 * SECOND; t++) {
         assert_false(web_step(0.37f, 0.11f, 0.5f));
         for (int k = 0; k < 3 && t >= 3 * SECOND; k++) {

@@ -1,4 +1,5 @@
-"""lab/grains/blow.py: a blow made by hand, the table of the records, a sole, and what is refused. test_blow.py SOURCE"""
+"""lab/grains/blow.py: a blow made by hand, the table of the records, a sole, and what is refused; direction.py: a landing made by hand,
+the table of the records. test_blow.py SOURCE"""
 import pathlib
 import subprocess
 import sys
@@ -10,6 +11,8 @@ SOURCE = pathlib.Path(sys.argv[1])
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(SOURCE / "lab/grains"))
 import blow  # noqa: E402
+import direction  # noqa: E402
+from judge_cases import Case  # noqa: E402
 
 
 def rows(time, depth, force):
@@ -49,3 +52,14 @@ listed = run("list").stdout
 assert listed.count("build/grains/grains") == 7 and listed.count("--case 'tilted-") == 2
 wrong = run("table", "none")
 assert wrong.returncode == 2 and wrong.stderr.count("\n") == 1, wrong.stderr
+
+# 100 N up and 20 N back from 10 ms on: the impulses of 10 and of 30 ms
+rows_of = {"time": time, "stage": 0 * time, "depth": time, "fz": 100.0 * (time > 0.01), "fx": -20.0 * (time > 0.01)}
+found = direction.numbers(Case("landing rect:0.1,0.1 0 move:1,0,-1,0,0,0.04,5"), rows_of)
+wanted = {"impulse up 10 ms": 1, "impulse up 30 ms": 3, "impulse along 30 ms": -0.6, "peak": 100, "depth": 0.04}
+assert found.keys() == wanted.keys() and all(abs(found[name] - wanted[name]) < 0.011 for name in wanted), found
+assert direction.vectors({"along": 3, "up": 4}) == {"": 3 + 4j}
+told = subprocess.run([sys.executable, SOURCE / "lab/grains/direction.py", "table"], capture_output=True, text=True).stdout
+print(told)
+line = next(line.split()[1:] for line in told.split("\n") if line.startswith("mild_merged  "))
+assert [float(word) for word in line[:4]] == [17.7, 26.2, 7.4, 69.9], line  # lab/grains/README.md

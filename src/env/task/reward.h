@@ -231,7 +231,7 @@ MILD_HD_FN Real reward_gate(const TaskMotion *m) {
     return gate;
 }
 
-/* Penalises legs that are too close, because the engine computes no contact between them. */
+/* Penalises legs that are too close. */
 MILD_HD_FN Real reward_collision(const TaskMotion *m) {
     int close =
         (m->foot_distance < m->robot->feet_least) + (m->knee_distance < m->robot->knee_least);
