@@ -262,7 +262,7 @@ class Foot:
         self.drift = np.where(counted, np.minimum(self.drift + length, LONGEST), self.drift)
         self.pending[counted] = 0
         line = e.a - e.u_z  # shorter than the elastic travel where ground is stiffer than its chord, and in the first 0.1 mm
-        e.regains = (e.m1 > e.a) & (self.u_max > 0) & (law.recovery * e.a <= ELASTIC) & (line >= e.q * ELASTIC * (1 - 1e-6))
+        e.regains = (e.m1 > e.a) & (law.recovery * e.a <= ELASTIC) & (line >= e.q * ELASTIC * (1 - 1e-6))
         return np.where(e.regains, e.c - (e.c - q) * np.exp(-np.maximum(e.m1 - e.a, 0) / (law.regain_length * growth)), q)
 
     def remember(self, e):
