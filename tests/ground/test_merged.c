@@ -289,6 +289,13 @@ static void press_tilted(double tilt, double depth, double out[3]) {
     out[0] = f[0];
     out[1] = f[2];
     out[2] = kit.result.foot[0].torque[1] - (arm[1] * f[0] - arm[0] * f[2]); /* about its middle */
+    const MildElements of = mild_scratch_elements(kit.scratch, 0);
+    double sum[2] = {0, 0};
+    for (int e = 0; e < mild_sole_elements(sole); e++) {
+        sum[0] += of.tangent_x[e];
+        sum[1] += of.normal[e];
+    }
+    assert_true(hypot(sum[0] - f[0], sum[1] - f[2]) < 1e-9 * f[2]);
     kit_close(&kit);
     mild_sole_destroy(sole);
 }

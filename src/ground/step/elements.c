@@ -1,6 +1,7 @@
 /* What the elements of a foot did in the last solve. */
 #include <string.h>
 
+#include "ground/law/frame.h"
 #include "ground/law/friction.h"
 #include "ground/step/scratch.h"
 
@@ -10,6 +11,7 @@ static void foot_scatter(const MildScratch *scratch, int f) {
     const Motion motion = foot_motion(foot, scratch->velocity + 6 * f);
     const double dt = scratch->dt;
     const double rate = 1.0 / dt;
+    const Real frame[3] = {(Real)foot->frame[0], (Real)foot->frame[1], (Real)foot->frame[2]};
     for (int slot = 0; slot < foot->active; slot++) {
         const Slots *s = slot_block(foot, slot);
         const int i = slot % SLOT_LANES;
@@ -19,9 +21,12 @@ static void foot_scatter(const MildScratch *scratch, int f) {
         const double beyond = element.depth + dt / 2 * v.descent - element.yield_depth;
         const int loaded = s->iz[i] > 0.0;
         const int deeper = beyond > 0.0;
-        foot->normal[e] = s->iz[i] * rate;
-        foot->tangent_x[e] = s->ix[i] * rate;
-        foot->tangent_y[e] = s->iy[i] * rate;
+        const Real impulse[3] = {s->ix[i], s->iy[i], s->iz[i]};
+        Real world[3];
+        frame_to_world(frame, impulse, world);
+        foot->normal[e] = world[2] * rate;
+        foot->tangent_x[e] = world[0] * rate;
+        foot->tangent_y[e] = world[1] * rate;
         foot->flat[e] = law_flat_share(&element.law, foot->curves,
                                        element.virgin_depth + (deeper ? beyond : 0.0));
         foot->state[e] = (uint8_t)(!loaded  ? MILD_ELEMENT_FREE

@@ -5,7 +5,8 @@
 
 #include "ground/step/scratch.h"
 
-/* Sets the frame of a foot by the ground under the point (0, 0, z) of its sole, and its levers. R: [9] rotation of the foot. */
+/* Sets the frame of a foot by the ground under the point (0, 0, z) of its sole, and its levers. R:
+ * [9] rotation of the foot. */
 void foot_frame(FootScratch *foot, const MildTerrain *terrain, const double *R);
 /* Twists or wrenches, two vectors, of the world in the frame of a foot, and back. The two may be
  * the same. */
