@@ -211,7 +211,7 @@ static void lie_down(int axis, double angle, const char *ground, const char *int
     assert_true(given < 1e-9 && work < -0.1 * MASS * GRAVITY * 0.2);
     assert_true(fabs(force[2] - MASS * GRAVITY) < 0.01 * MASS * GRAVITY);
     assert_true(hypot(force[0], force[1]) < 0.01 * MASS * GRAVITY);
-    assert_true(fastest < 0.02);
+    assert_true(fastest < 0.03); /* heels creep: sand at its yield load holds nothing along */
     assert_true(shells > 0.8 * force[2]);
     assert_int_equal(unsolved, 0);
     assert_int_equal(kit_messages, 0);

@@ -151,7 +151,7 @@ TEST(cycles_end) {
     } hard[] = {{"armature", "Euler", "rubber", 0.001},
                 {"tendon", "implicitfast", "foam45", 0.002},
                 {"tendon", "discrete", "running_track", 0.001},
-                {"friction", "implicitfast", "sand_dense", 0.004}};
+                {"activation", "implicitfast", "running_track", 0.004}};
     for (int n = 0; n < 4; n++) {
         int loaded, rounds;
         const double worst = surprise(find_case(hard[n].name), hard[n].dt, hard[n].integrator,
