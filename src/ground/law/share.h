@@ -105,7 +105,7 @@ typedef struct {
  * square of its speed along the ground. rate: 1/dt. */
 MILD_HD Real share_grip(const Element *e, const Share *share, Real q, Real c, Real force,
                         Real slides, Real dt, Real rate) {
-    const Real lost = 1 - real_over(q, c);
+    const Real lost = real_max(1 - real_over(q, c), 0); /* a GPU's q/c may round above 1 */
     const Real held = real_min(share->mu, real_over(SHARE_YIELD * share->grip * lost, 1 + lost));
 
     /* The recruited mass is set in motion along by mu and the square of the sine of the way. */
