@@ -276,7 +276,8 @@ MILD_HD_FN int task_motors_act(const TaskEnv *env, const TaskDef *def, int k, in
 
 MILD_HD_FN void task_feet_motion(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                  const RobotReading *reading, TaskMotion *m) {
-    const double half_period = 0.5 * task_gait_period(def, env->command_seen);
+    const double swing_time =
+        (1 - task_gait_share(def, env->command_seen)) * task_gait_period(def, env->command_seen);
     Real stance_height = 0;
     int stances = 0;
     for (int f = 0; f < env->shape.feet; f++) {
@@ -286,18 +287,16 @@ MILD_HD_FN void task_feet_motion(TaskEnv *env, const TaskDef *def, const RobotTa
         m->foot_force[f] =
             task_sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
         m->contact[f] = force[2] > TASK_CONTACT_FORCE;
-        m->stance[f] = task_gait_stance(robot, env->phase, m->standing, f);
-        m->either[f] = task_gait_either(def, robot, env->phase, m->standing, f);
-        m->wanted_height[f] = task_gait_height(def, robot, env->phase, m->standing, f);
+        m->wanted[f] = task_gait_foot(def, robot, env->phase, env->command, f);
         if (m->contact[f]) {
-            m->landed_air_time += fmin((double)env->air_time[f], half_period);
+            m->landed_air_time += fmin((double)env->air_time[f], swing_time);
         }
-        if (m->stance[f]) {
+        if (m->wanted[f].stance) {
             stance_height += reading->foot[f].sole_center[2];
             stances++;
         }
     }
-    m->base_height = env->robot.qpos[2] - stance_height / (Real)(stances ? stances : 1);
+    m->base_height = stances ? env->robot.qpos[2] - stance_height / (Real)stances : reading->above;
     tile_sync();
     for (int f = tile_lane(); f < env->shape.feet; f += TILE) {
         env->air_time[f] = m->contact[f] ? 0 : env->air_time[f] + REAL(TASK_PERIOD);
