@@ -384,6 +384,7 @@ static void fill_table(Robot *robot) {
         table->joint_high[i] = robot->high[i];
         table->effort[i] = robot->effort[i];
         table->speed[i] = def->speed[i];
+        table->full_speed[i] = def->full_speed[i];
         table->swing[i] = def->swing[i];
         table->still[i] = def->still[i];
     }

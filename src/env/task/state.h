@@ -196,6 +196,7 @@ typedef struct {
     Real kd;        /* [N m s/rad] */
     Real limit;     /* [N m] */
     Real fastest;   /* [rad/s] 0: no limit */
+    Real full;      /* [rad/s] up to which it gives all of `limit`; 0: up to `fastest` */
 } TaskMotor;
 
 /* What the clock wants of a foot. */

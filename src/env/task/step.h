@@ -248,18 +248,28 @@ MILD_HD_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Ro
     motor.kd = env->strength[i] * REAL(gains->kd[i]) * env->kd_scale[i];
     motor.limit = gains->limit[i];
     motor.fastest = robot->speed[i];
+    motor.full = robot->full_speed[i];
     return motor;
+}
+
+/* [N m] Greatest torque in the direction of motion: a motor's voltage bounds it from the speed
+ * `full` on. */
+MILD_HD_FN double task_torque_most(const TaskMotor *motor, double qd) {
+    const double speed = fabs(qd), end = motor->fastest;
+    const double full = motor->full > 0 ? motor->full : end;
+    if (end == 0 || speed < full) {
+        return motor->limit;
+    }
+    return speed < end ? motor->limit * (end - speed) / (end - full) : 0;
 }
 
 /* [N m] Torque at angle q and speed qd. late: bool, the last action still counts.
  *
- * tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). A motor at its speed limit gives
- * no torque in the direction of motion. */
+ * tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)) */
 MILD_HD_FN double task_torque(const TaskMotor *motor, int late, double q, double qd) {
     double tau = motor->kp * (motor->target[late] - q) - motor->kd * qd;
-    tau = tau > motor->limit ? motor->limit : tau < -motor->limit ? -motor->limit : tau;
-    int over = motor->fastest > 0 && fabs(qd) >= motor->fastest && tau * qd > 0;
-    return over ? 0 : tau;
+    const double most = tau * qd > 0 ? task_torque_most(motor, qd) : motor->limit;
+    return tau > most ? most : tau < -most ? -most : tau;
 }
 
 /* Bool: physics step k of `steps` computes torques anew; else those of the step before go on, which
