@@ -105,6 +105,13 @@ static cJSON *row_json(const EvalRow *row, const EvalTrial *each) {
                   {"drift_path", row->drift_path},
                   {"stride", row->stride},
                   {"cadence", row->cadence},
+                  {"flight", row->flight},
+                  {"duty", row->duty},
+                  {"load_peak", row->load_peak},
+                  {"load_rate", row->load_rate},
+                  {"joint_speed_max", row->joint_speed_max},
+                  {"torque_rms", row->torque_rms},
+                  {"at_limit", row->at_limit},
                   {"righted", row->righted},
                   {"up", row->up}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
