@@ -14,7 +14,7 @@ static const double walk_speed = 0.6,
 
 Robot *bench_robot(const ExperimentDef *def, MildError *error) {
     Robot *robot = robot_open(def->train.robot, error);
-    if (robot && task_set_elements(&def->task, robot, error) != MILD_OK) {
+    if (robot && task_set_robot(&def->task, robot, error) != MILD_OK) {
         robot_destroy(robot);
         return NULL;
     }

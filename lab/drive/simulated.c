@@ -181,7 +181,8 @@ static void set_torques(Simulated *s, double *torque) {
                                  .kp = silent ? 0 : (double)s->target.kp[i],
                                  .kd = (double)s->target.kd[i],
                                  .limit = fmin(fabs((double)s->target.limit[i]), most),
-                                 .fastest = robot_speed(robot)[i]};
+                                 .fastest = robot_speed(robot)[i],
+                                 .full = robot_table(robot)->full_speed[i]};
         torque[i] = task_torque(&motor, 0, q[i], qd[i]);
     }
     if (silent || s->target.mode >= PACKET_damp) {

@@ -105,6 +105,13 @@ static cJSON *row_json(const EvalRow *row, const EvalTrial *each) {
                   {"drift_path", row->drift_path},
                   {"stride", row->stride},
                   {"cadence", row->cadence},
+                  {"flight", row->flight},
+                  {"duty", row->duty},
+                  {"load_peak", row->load_peak},
+                  {"load_rate", row->load_rate},
+                  {"joint_speed_max", row->joint_speed_max},
+                  {"torque_rms", row->torque_rms},
+                  {"at_limit", row->at_limit},
                   {"righted", row->righted},
                   {"up", row->up}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
@@ -518,7 +525,7 @@ int cmd_eval(int argc, char **argv) {
          "grounds that `mild info grounds` lists, one row each; rubber+foam45 is a course of both, "
          "in which rigid is a very hard material (default rigid,foam45,sand_loose)"},
         context_model(c),
-        {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]",
+        {"speed", CLI_NUMBERS, &e->speeds, -4, 4, "V[,V]",
          "[m/s] commanded forward speeds, one row each (default 0.6; 0 for a controller that "
          "stands)"},
         {"sideways", CLI_NUMBER, &e->eval.sideways, -1.5, 1.5, "V",

@@ -470,7 +470,7 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
          "draw the sole pressure on each ground; the numbers go to FILE.csv beside it"},
         {"log", CLI_OUTPUT, &c->log, 0, 0, "FILE.csv",
          "write the frames that the policy sees, for mild fit FILE.csv"},
-        {"speed", CLI_NUMBER, &c->play.speed, -1.3, 1.3, "V",
+        {"speed", CLI_NUMBER, &c->play.speed, -4, 4, "V",
          "[m/s] commanded forward speed (default 0.6; 0 for a controller that stands)"},
         {"seconds", CLI_NUMBER, &c->play.seconds, 0, 3600, "T",
          "[s] length of the walk; 0: long enough for the course (default 0)"},

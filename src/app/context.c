@@ -49,7 +49,7 @@ MildStatus context_open(Context *c, const CliArgs *args, MildError *error) {
         return MILD_OK;
     }
     status = task_def_check_robot(&c->task, c->robot, error);
-    return status == MILD_OK ? task_set_elements(&c->task, c->robot, error) : status;
+    return status == MILD_OK ? task_set_robot(&c->task, c->robot, error) : status;
 }
 
 MildStatus context_scene(Context *c, const char *name, double patch, Scene *scene,
@@ -66,7 +66,7 @@ MildStatus context_scene(Context *c, const char *name, double patch, Scene *scen
         status = task_def_check(&c->task, error); /* its actuator is opened later */
     }
     if (status == MILD_OK) {
-        status = task_set_elements(&c->task, c->robot, error);
+        status = task_set_robot(&c->task, c->robot, error);
     }
     return status == MILD_OK ? grounds_lay_map(&c->grounds, scene, &c->map, error) : status;
 }

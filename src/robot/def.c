@@ -25,6 +25,7 @@ typedef struct {
     char stand_kd[LIST_SIZE];
     char effort[LIST_SIZE];
     char speed[LIST_SIZE];
+    char full_speed[LIST_SIZE];
     char swing[LIST_SIZE];
     char still[LIST_SIZE];
 } JointsText;
@@ -83,6 +84,7 @@ static const MildField joint_fields[] = {
     J(stand_kd, "[N m s/rad] velocity gain of the controller `stand`; default kd"),
     J(effort, "[N m] torque limit; 0, the default: actuatorfrcrange of the MJCF"),
     J(speed, "[rad/s] speed limit of the motor; 0, the default: none"),
+    J(full_speed, "[rad/s] up to which it gives its whole torque; 0, the default: up to speed"),
     J(swing, "[-] amplitude in the reference swing motion, times reward.reference_amplitude"),
     J(still, "[-] 1 for joints that reward.default_pose keeps near the pose; default 0"),
 };
@@ -430,12 +432,18 @@ static MildStatus take_joints(DefReader *reader) {
                    {"stand_kd", text->stand_kd, def->stand_kd, def->kd, 0},
                    {"effort", text->effort, def->effort, zeros, 0},
                    {"speed", text->speed, def->speed, zeros, 0},
+                   {"full_speed", text->full_speed, def->full_speed, zeros, 0},
                    {"swing", text->swing, def->swing, zeros, -1e6},
                    {"still", text->still, def->still, zeros, 0}};
     for (size_t i = 0; i < sizeof columns / sizeof *columns; i++) {
         if (take_column(reader, columns[i].key, columns[i].text, columns[i].column,
                         columns[i].fallback, columns[i].least) != MILD_OK) {
             return reader->status;
+        }
+    }
+    for (int i = 0; i < def->joints; i++) {
+        if (def->full_speed[i] > def->speed[i]) {
+            return fail_key(reader, "joints", "full_speed", "is above speed");
         }
     }
     return check_joint_names(reader);

@@ -73,6 +73,7 @@ typedef struct {
     double stand_kd[ROBOT_JOINTS_MAX];    /* [N m s/rad] */
     double effort[ROBOT_JOINTS_MAX];      /* [N m] 0: actuatorfrcrange of the MJCF */
     double speed[ROBOT_JOINTS_MAX];       /* [rad/s] 0: no limit */
+    double full_speed[ROBOT_JOINTS_MAX];  /* [rad/s] see RobotTable */
     double swing[ROBOT_JOINTS_MAX];       /* [-] amplitude in the reference swing motion */
     double still[ROBOT_JOINTS_MAX];       /* [-] 1: should stay near the pose, 0: may move */
     /* sections [foot.NAME] */

@@ -365,6 +365,12 @@ static MildStatus read_robot(Robot *robot, const char *folder, MildError *error)
     return read_all(parts, robot, error);
 }
 
+void robot_set_gait(Robot *robot, const double *offset) {
+    for (int f = 0; f < robot->def.feet; f++) {
+        robot->table.gait_offset[f] = offset ? offset[f % 4] : robot->def.foot[f].offset;
+    }
+}
+
 /* Once the rest is known. */
 static void fill_table(Robot *robot) {
     const RobotDef *def = &robot->def;
@@ -378,12 +384,11 @@ static void fill_table(Robot *robot) {
         table->joint_high[i] = robot->high[i];
         table->effort[i] = robot->effort[i];
         table->speed[i] = def->speed[i];
+        table->full_speed[i] = def->full_speed[i];
         table->swing[i] = def->swing[i];
         table->still[i] = def->still[i];
     }
-    for (int f = 0; f < def->feet; f++) {
-        table->gait_offset[f] = def->foot[f].offset;
-    }
+    robot_set_gait(robot, NULL);
     memcpy(table->feet_range, def->feet_range, sizeof table->feet_range);
     memcpy(table->knee_range, def->knee_range, sizeof table->knee_range);
     table->feet_least = def->feet_least;
@@ -557,7 +562,16 @@ const double *robot_mirror_sign(const Robot *robot) {
 }
 
 double robot_mirror_shift(const Robot *robot) {
-    return robot->def.mirror_shift;
+    const double *offset = robot->table.gait_offset;
+    double shift = -1;
+    for (int f = 0; f < robot->def.feet; f++) {
+        const double own = fabs(offset[f] - offset[robot->limb[f].mirror]);
+        if ((own != 0 && own != 0.5) || (f > 0 && own != shift)) {
+            return -1;
+        }
+        shift = own;
+    }
+    return shift;
 }
 
 const RobotTable *robot_table(const Robot *robot) {

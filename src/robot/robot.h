@@ -61,7 +61,9 @@ int robot_ankle(const Robot *robot, int foot);     /* joint that pitches a flat 
 /* The robot's mirror image in the x-z plane: q'_i = sign_i q_mirror_i. */
 const int *robot_mirror_joint(const Robot *robot);
 const double *robot_mirror_sign(const Robot *robot);
-double robot_mirror_shift(const Robot *robot); /* [-] of the gait cycle: 0.5 when sides alternate */
+/* [-] Share of the gait cycle between a gait and its mirror image: 0.5 when sides alternate, 0 when
+ * they move together, -1 when it has none. */
+double robot_mirror_shift(const Robot *robot);
 /* What a task needs, as one block without pointers. */
 const RobotTable *robot_table(const Robot *robot);
 
@@ -82,6 +84,8 @@ void robot_set_model(Robot *robot, MildModel model);
  * round foot, and after robot_set_model of a concentric model. Call it before making sims and
  * ground memory. */
 MildStatus robot_set_elements(Robot *robot, int elements, MildError *error);
+/* Lets the stance of foot f begin at offset[f % 4] of the gait cycle; NULL: where robot.ini says. */
+void robot_set_gait(Robot *robot, const double *offset);
 /* Lets the shells stand too (stand: bool; at first they do not). Call it when
  * robot_set_model may be called. */
 void robot_set_shells(Robot *robot, int stand);

@@ -69,7 +69,7 @@ static void pair_open(const char *robot, const TaskDef *def, int device) {
     const int model = def->randomize.model;
     robot_set_model(pair.robot, model < MILD_MODELS ? (MildModel)model : MILD_MODEL_MILD);
     robot_set_shells(pair.robot, def->shells_stand);
-    assert_int_equal(task_set_elements(def, pair.robot, &error), MILD_OK);
+    assert_int_equal(task_set_robot(def, pair.robot, &error), MILD_OK);
     pair.pool = pool_create(2);
     pair.grounds = task_grounds_create(def, pair.robot, GROUNDS, 7, pair.pool, &error);
     assert_non_null(pair.grounds);

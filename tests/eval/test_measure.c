@@ -335,6 +335,49 @@ TEST(strides_and_the_way_of_a_sole) {
     expect_near("way", row.drift_path, 0.04, 1e-12);
 }
 
+/* Strides of a second, each foot down for 3/8 of it and half a second apart: 1 - 2 3/8 of flight. A
+ * foot bears 300 N, then 900 N, after 3 s 700 N: at most twice the weight on average, and 500 N more
+ * at once. Joint 1 drives at 25 rad/s, where its 40 N m have fallen to 20, for 3/4 of the time, and
+ * brakes with as much for the rest. */
+TEST(flight_and_loads) {
+    const EvalDef eval = {.speed = 3, .trials = 1, .seconds = 6};
+    const uint8_t ran = TASK_END_time;
+    TaskMotor motor[SA01_JOINTS];
+    Script s;
+    Measure m;
+    EvalRow row;
+    script_start(&s);
+    measure_start(&m, DT);
+    m.motor = motor;
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        motor[i] = (TaskMotor){.limit = 10};
+    }
+    motor[1] = (TaskMotor){.limit = 40, .full = 20, .fastest = 30};
+    for (int k = 0; k < STEPS(6); k++) {
+        for (int f = 0; f < SA01_FEET; f++) {
+            const int since = (k + f * STEPS(0.5)) % STEPS(1);
+            const double late = k < STEPS(3) ? 900 : 700;
+            s.sample.foot[f].load = since >= STEPS(0.375) ? 0 : since < STEPS(0.125) ? 300 : late;
+        }
+        s.sample.torque[0] = 9.8;
+        s.sample.speed[1] = 25;
+        s.sample.torque[1] = k % 4 ? 20 : -20;
+        s.sample.torque[2] = k == STEPS(1) ? 70 : 0; /* before the steady part */
+        measure_sample(&m, &s.sample);
+    }
+    eval_summarise(&row, "foam45", &eval, &m, &ran, 400, NULL);
+    expect_near("flight", row.flight, 0.25, 1e-12);
+    expect_near("duty", row.duty, 0.375, 1e-12);
+    expect_near("peak", row.load_peak, 2, 1e-12);
+    expect_near("rate", row.load_rate, 500 / 400.0 / 0.01, 1e-9);
+    expect_near("fastest joint", row.joint_speed_max, 25, 0);
+    expect_near("torque", row.torque_rms, 20, 1e-12);
+    expect_near("at its limit", row.at_limit, 0.75, 1e-12);
+    m.motor = NULL;
+    eval_summarise(&row, "foam45", &eval, &m, &ran, 400, NULL);
+    assert_true(isnan(row.at_limit));
+}
+
 /* Contact is more than 5 N. */
 TEST(contact_is_a_load_above_five_newton) {
     for (int loaded = 0; loaded < 2; loaded++) {

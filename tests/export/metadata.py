@@ -32,7 +32,7 @@ joints = {key: value.partition(";")[0].split() for key, value in robot["joints"]
 assert joints["names"] == names
 for key, name in (("default_joint_pos", "pose"), ("joint_stiffness", "kp"), ("joint_damping", "kd")):
     assert numbers[key] == list(map(float, joints[name])), (key, numbers[key])
-assert numbers["joint_effort_limit"] == ([86.8] * 4 + [20.4] * 2) * 2 and numbers["joint_velocity_limit"] == [0] * 12
+assert numbers["joint_effort_limit"] == ([86.8] * 4 + [20.4] * 2) * 2 and numbers["joint_velocity_limit"] == ([25] * 4 + [31] * 2) * 2
 mjcf = (root / "robots/sa01/sa01.xml").read_text(encoding="utf-8")
 for name, low, high in zip(names, numbers["joint_pos_low"], numbers["joint_pos_high"], strict=True):
     assert re.search(rf'name="{name}"[^>]*range="([^"]*)"', mjcf)[1] == f"{low:g} {high:g}", (name, low, high)

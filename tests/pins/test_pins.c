@@ -59,7 +59,7 @@ TEST(presses) {
 
 /* ---- rollouts ---- */
 
-enum { ENVS = 6, STEPS = 100 };
+enum { ENVS = 6, STEPS = 150 };
 
 /* What the learner sees of every step: histories, critic inputs, rewards, ends of episodes. */
 static uint64_t hash_rollout(const TaskDef *def) {
@@ -77,7 +77,7 @@ static uint64_t hash_rollout(const TaskDef *def) {
     for (int t = 0; t < STEPS; t++) {
         for (int i = 0; i < ENVS * SA01_JOINTS; i++) {
             Random random = random_at(99, (uint32_t)i, (uint32_t)t);
-            action[i] = (float)(2.5 * random_normal(&random));
+            action[i] = (float)(6 * random_normal(&random));
         }
         envs_step(envs, &step, NULL, &error);
         hash = pin_hash(hash, history, sizeof history);

@@ -133,16 +133,19 @@ TEST(test_joint_keys) {
     expect_numbers("stand_kd", def.stand_kd, 4, kd);
     expect_numbers("effort", def.effort, 4, zero);
     expect_numbers("speed", def.speed, 4, zero);
+    expect_numbers("full_speed", def.full_speed, 4, zero);
     expect_numbers("swing", def.swing, 4, zero);
     expect_numbers("still", def.still, 4, zero);
-    def = accept(edit("kd =", "stand_kp = 21 22 23 24\nstand_kd = 0.1 0.2 0.3 0.4\n"
-                              "effort = 31 32 33 34\nspeed = 1 2 3 4\nswing = -1 2 -1 0\n"
-                              "still = 1 0 1 0\nkd ="));
-    const double columns[6][4] = {{21, 22, 23, 24}, {0.1, 0.2, 0.3, 0.4}, {31, 32, 33, 34},
-                                  {1, 2, 3, 4},     {-1, 2, -1, 0},       {1, 0, 1, 0}};
-    const double *got[6] = {def.stand_kp, def.stand_kd, def.effort,
-                            def.speed,    def.swing,    def.still};
-    for (int k = 0; k < 6; k++) {
+    def = accept(edit(
+        "kd =", "stand_kp = 21 22 23 24\nstand_kd = 0.1 0.2 0.3 0.4\n"
+                "effort = 31 32 33 34\nspeed = 1 2 3 4\nfull_speed = 1 0 2 3\nswing = -1 2 -1 0\n"
+                "still = 1 0 1 0\nkd ="));
+    const double columns[7][4] = {{21, 22, 23, 24}, {0.1, 0.2, 0.3, 0.4}, {31, 32, 33, 34},
+                                  {1, 2, 3, 4},     {1, 0, 2, 3},         {-1, 2, -1, 0},
+                                  {1, 0, 1, 0}};
+    const double *got[7] = {def.stand_kp,   def.stand_kd, def.effort, def.speed,
+                            def.full_speed, def.swing,    def.still};
+    for (int k = 0; k < 7; k++) {
         expect_numbers("column", got[k], 4, columns[k]);
     }
     expect_numbers("kd", def.kd, 4, kd);
@@ -317,6 +320,7 @@ TEST(test_joints_refused) {
     refuse("kp =", "stand_kd = 1 1 1 -1\nkp =", "[joints] stand_kd -1 d 0");
     refuse("kp =", "effort = 1 1 1 -1\nkp =", "[joints] effort -1 d 0");
     refuse("kp =", "speed = 1 1 1 -1\nkp =", "[joints] speed -1 d 0");
+    refuse("kp =", "speed = 1 1 1 1\nfull_speed = 1 1 1 1.1\nkp =", "[joints] full_speed above");
     refuse("kp =", "still = 1 1 1 -1\nkp =", "[joints] still -1 d 0");
     refuse("kp = 11", "kp = 11x", "[joints] kp 11x");
     refuse("kp = 11", "kp = nan", "[joints] kp nan");

@@ -463,4 +463,24 @@ TEST(solver_follows_the_keys) {
     rig_close(&rig);
 }
 
+/* 88 N m up to 22 rad/s, half of it half way to 32 rad/s, none from there on; a brake has them all. */
+TEST(torque_falls_with_speed) {
+    const struct {
+        double qd, forward, backward;
+    } rows[] = {{0, 88, -88}, {21.9, 88, -88}, {27, 44, -88},  {31, 8.8, -88},
+                {32, 0, -88}, {40, 0, -88},    {-27, 88, -44}, {-32, 88, 0}};
+    TaskMotor motor = {.kp = 1, .limit = 88, .fastest = 32, .full = 22};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        motor.target[0] = 1000;
+        expect_entry("forward", (int)i, task_torque(&motor, 0, 0, rows[i].qd), rows[i].forward,
+                     1e-12);
+        motor.target[0] = -1000;
+        expect_entry("backward", (int)i, task_torque(&motor, 0, 0, rows[i].qd), rows[i].backward,
+                     1e-12);
+    }
+    motor.full = 0; /* all of it up to 32 rad/s */
+    expect_near("forward", task_torque(&motor, 0, -2000, 31.9), 88, 0);
+    expect_near("forward", task_torque(&motor, 0, -2000, 32), 0, 0);
+}
+
 TEST_MAIN(kit_setup, kit_teardown)

@@ -42,17 +42,24 @@ TEST(slow_clock) {
     expect_near("below", task_gait_period(&def, command), 1.0, 1e-12);
 }
 
+static const double ahead[3] = {0.6, 0, 0}, still[3] = {0, 0, 0};
+
+static TaskFoot foot_at(const TaskDef *def, double phase, const double *command, int foot) {
+    return task_gait_foot(def, robot_table(robot), phase, command, foot);
+}
+
 /* Left stands in the first half of the period, right in the second. */
 TEST(schedule) {
+    const TaskDef def = task_def_default();
     const double first[] = {0, 0.01, 0.25, 0.4999}, second[] = {0.5, 0.51, 0.75, 0.9999};
     for (int i = 0; i < 4; i++) {
-        assert_true(task_gait_stance(robot_table(robot), first[i], 0, SA01_LEFT));
-        assert_false(task_gait_stance(robot_table(robot), first[i], 0, SA01_RIGHT));
-        assert_false(task_gait_stance(robot_table(robot), second[i], 0, SA01_LEFT));
-        assert_true(task_gait_stance(robot_table(robot), second[i], 0, SA01_RIGHT));
+        assert_true(foot_at(&def, first[i], ahead, SA01_LEFT).stance);
+        assert_false(foot_at(&def, first[i], ahead, SA01_RIGHT).stance);
+        assert_false(foot_at(&def, second[i], ahead, SA01_LEFT).stance);
+        assert_true(foot_at(&def, second[i], ahead, SA01_RIGHT).stance);
         for (int foot = 0; foot < SA01_FEET; foot++) {
-            assert_true(task_gait_stance(robot_table(robot), first[i], 1, foot));
-            assert_true(task_gait_stance(robot_table(robot), second[i], 1, foot));
+            assert_true(foot_at(&def, first[i], still, foot).stance);
+            assert_true(foot_at(&def, second[i], still, foot).stance);
         }
     }
 }
@@ -64,22 +71,17 @@ TEST(wanted_height) {
                  wanted[] = {0.0309016994, 0.0587785252, 0.1, 0.0309016994};
     for (int i = 0; i < 4; i++) {
         double phase = 0.5 * s[i];
-        expect_entry("right", i, task_gait_height(&def, robot_table(robot), phase, 0, SA01_RIGHT),
-                     wanted[i], 1e-9);
-        expect_entry("left", i,
-                     task_gait_height(&def, robot_table(robot), phase + 0.5, 0, SA01_LEFT),
-                     wanted[i], 1e-9);
-        expect_entry("left in stance", i,
-                     task_gait_height(&def, robot_table(robot), phase, 0, SA01_LEFT), 0, 0);
-        expect_entry("right in stance", i,
-                     task_gait_height(&def, robot_table(robot), phase + 0.5, 0, SA01_RIGHT), 0, 0);
-        expect_entry("standing", i,
-                     task_gait_height(&def, robot_table(robot), phase, 1, SA01_RIGHT), 0, 0);
+        expect_entry("right", i, foot_at(&def, phase, ahead, SA01_RIGHT).height, wanted[i], 1e-9);
+        expect_entry("left", i, foot_at(&def, phase + 0.5, ahead, SA01_LEFT).height, wanted[i],
+                     1e-9);
+        expect_entry("left in stance", i, foot_at(&def, phase, ahead, SA01_LEFT).height, 0, 0);
+        expect_entry("right in stance", i, foot_at(&def, phase + 0.5, ahead, SA01_RIGHT).height, 0,
+                     0);
+        expect_entry("standing", i, foot_at(&def, phase, still, SA01_RIGHT).height, 0, 0);
     }
-    expect_near("lift-off", task_gait_height(&def, robot_table(robot), 0, 0, SA01_RIGHT), 0, 0);
+    expect_near("lift-off", foot_at(&def, 0, ahead, SA01_RIGHT).height, 0, 0);
     def.swing_apex = 0.06;
-    expect_near("apex", task_gait_height(&def, robot_table(robot), 0.25, 0, SA01_RIGHT), 0.06,
-                1e-12);
+    expect_near("apex", foot_at(&def, 0.25, ahead, SA01_RIGHT).height, 0.06, 1e-12);
 }
 
 /* Which joints bend, by how much; all others keep the pose. */
@@ -87,7 +89,7 @@ static void expect_reference(const TaskDef *def, double phase, int standing, int
     const double *pose = robot_default_pose(robot);
     double q[SA01_JOINTS];
     for (int i = 0; i < robot_joints(robot); i++) {
-        q[i] = task_gait_reference(def, robot_table(robot), phase, standing, i);
+        q[i] = task_gait_reference(def, robot_table(robot), phase, standing ? still : ahead, i);
     }
     for (int i = 0; i < SA01_JOINTS; i++) {
         int joint = i % LEG_JOINTS;
@@ -114,6 +116,56 @@ TEST(reference) {
     expect_reference(&def, 0.25, 0, 1, 0.26);
     def.double_support = 0.6;
     expect_reference(&def, 1.0 / 12, 0, 1, 0);
+}
+
+/* Of a run the same, in stance for share = 0.35 - by hand: s = (phase - lift-off)/0.65, and half of
+ * the speeds between a walk and a run have a share of 0.425. */
+TEST(run) {
+    TaskDef def = task_def_default();
+    const double fast[3] = {3, 0, 0}, half[3] = {-2, 0, 0};
+    def.stance_share[0] = 0.35;
+    expect_near("walk", task_gait_share(&def, ahead), 0.5, 0);
+    expect_near("between", task_gait_share(&def, half), 0.425, 1e-12);
+    expect_near("run", task_gait_share(&def, fast), 0.35, 1e-12);
+    int flight = 0, stance = 0;
+    for (int k = 0; k < 1000; k++) {
+        const int left = foot_at(&def, (k + 0.5) / 1000, fast, SA01_LEFT).stance;
+        const int right = foot_at(&def, (k + 0.5) / 1000, fast, SA01_RIGHT).stance;
+        assert_false(left && right);
+        assert_int_equal(left, k < 350);
+        assert_int_equal(right, k >= 500 && k < 850);
+        flight += !left && !right;
+        stance += left;
+    }
+    assert_int_equal(flight, 300); /* 1 - 2 share */
+    assert_int_equal(stance, 350);
+    expect_near("left", foot_at(&def, 0.675, fast, SA01_LEFT).height, 0.1, 1e-12); /* s = 1/2 */
+    expect_near("right", foot_at(&def, 0.175, fast, SA01_RIGHT).height, 0.1, 1e-12);
+    expect_near("bend", foot_at(&def, 0.35 + 0.65 / 6, fast, SA01_LEFT).bend, 0.5, 1e-9);
+    def.run_speed[0] = def.run_speed[1] = 2; /* at once */
+    expect_near("at once", task_gait_share(&def, half), 0.35, 0);
+    expect_near("below", task_gait_share(&def, (const double[3]){1.999, 0, 0}), 0.5, 0);
+}
+
+/* Both feet of a hop do the same; a skip has no mirror image. */
+TEST(other_gaits) {
+    TaskDef def = task_def_default();
+    for (def.gait = 1; task_gait_names[def.gait][0] != 'h'; def.gait++) {
+    }
+    assert_int_equal(task_set_robot(&def, robot, NULL), MILD_OK);
+    assert_true(robot_mirror_shift(robot) == 0);
+    for (double phase = 0.01; phase < 1; phase += 0.1) {
+        const TaskFoot left = foot_at(&def, phase, ahead, SA01_LEFT);
+        const TaskFoot right = foot_at(&def, phase, ahead, SA01_RIGHT);
+        assert_memory_equal(&left, &right, sizeof left);
+        assert_int_equal(left.stance, phase < 0.5);
+    }
+    def.gait++;
+    assert_int_equal(task_set_robot(&def, robot, NULL), MILD_OK);
+    assert_true(robot_mirror_shift(robot) == -1);
+    def.gait = 0;
+    assert_int_equal(task_set_robot(&def, robot, NULL), MILD_OK);
+    assert_true(robot_mirror_shift(robot) == 0.5);
 }
 
 TEST_MAIN(kit_setup, kit_teardown)

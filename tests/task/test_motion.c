@@ -130,20 +130,26 @@ TEST(schedule) {
     rig.env->phase = 0.25;
     TaskMotion m = describe();
     assert_false(m.standing);
-    assert_true(m.stance[0] && !m.stance[1]);
-    expect_near("wanted left", m.wanted_height[0], 0, 0);
-    expect_near("wanted right", m.wanted_height[1], 0.1, TOLERANCE);
+    assert_true(m.wanted[0].stance && !m.wanted[1].stance);
+    expect_near("wanted left", m.wanted[0].height, 0, 0);
+    expect_near("wanted right", m.wanted[1].height, 0.1, TOLERANCE);
     expect_near("base above the left sole", m.base_height, z - o.sole[0][2], TOLERANCE);
     rig.env->phase = 0.75;
     m = describe();
-    assert_true(!m.stance[0] && m.stance[1]);
+    assert_true(!m.wanted[0].stance && m.wanted[1].stance);
     expect_near("base above the right sole", m.base_height, z - o.sole[1][2], TOLERANCE);
+    rig.env->command[0] = 3;
+    rig.def.stance_share[0] = 0.35;
+    rig.env->phase = 0.9; /* flight: above the ground, level at 0.05 m */
+    m = describe();
+    assert_true(!m.wanted[0].stance && !m.wanted[1].stance);
+    expect_near("base in flight", m.base_height, z - 0.05, TOLERANCE);
     memset(rig.env->command, 0, sizeof rig.env->command);
     m = describe();
-    assert_true(m.standing && m.stance[0] && m.stance[1]);
+    assert_true(m.standing && m.wanted[0].stance && m.wanted[1].stance);
     expect_near("base above both", m.base_height, z - 0.5 * (o.sole[0][2] + o.sole[1][2]),
                 TOLERANCE);
-    expect_near("wanted left", m.wanted_height[0], 0, 0);
+    expect_near("wanted left", m.wanted[0].height, 0, 0);
     rig_close(&rig);
 }
 
@@ -156,11 +162,11 @@ TEST(double_support) {
     for (int i = 0; i < 9; i++) {
         rig.env->phase = phase[i];
         TaskMotion m = describe();
-        assert_true(m.either[0] == either[i] && m.either[1] == either[i]);
+        assert_true(m.wanted[0].either == either[i] && m.wanted[1].either == either[i]);
     }
     memset(rig.env->command, 0, sizeof rig.env->command);
     TaskMotion m = describe();
-    assert_true(!m.either[0] && !m.either[1]); /* standing: both are to be down */
+    assert_true(!m.wanted[0].either && !m.wanted[1].either); /* standing: both are to be down */
     rig_close(&rig);
 }
 

@@ -16,6 +16,7 @@ static Scene scene;
 static TaskMotion *new_scene(void) {
     memset(&scene, 0, sizeof scene);
     scene.def = task_def_default();
+    scene.def.standing_below = 0; /* it walks in place */
     scene.env.phase = 0.25;
     TaskMotion *m = &scene.motion;
     m->def = &scene.def;
@@ -26,8 +27,8 @@ static TaskMotion *new_scene(void) {
     m->gravity[2] = -1;
     m->base_height = 0.83;
     m->foot_distance = m->knee_distance = 0.2;
-    m->contact[0] = m->stance[0] = 1;
-    m->wanted_height[1] = 0.08;
+    m->contact[0] = m->wanted[0].stance = 1;
+    m->wanted[1].height = 0.08;
     return m;
 }
 
@@ -163,11 +164,11 @@ TEST(feet_clearance) {
     scene.def.swing_apex = 0.2;
     expect_term(REWARD_feet_clearance, "twice the apex", 0.9424777961);
     scene.def.swing_apex = 0.1;
-    m->stance[0] = 0; /* both swing: the sum, not the mean */
+    m->wanted[0].stance = 0; /* both swing: the sum, not the mean */
     m->foot_height[0] = 0.02;
-    m->wanted_height[0] = 0.03;
+    m->wanted[0].height = 0.03;
     expect_term(REWARD_feet_clearance, "two feet", 2.6389378290);
-    m->stance[0] = m->stance[1] = 1;
+    m->wanted[0].stance = m->wanted[1].stance = 1;
     expect_term(REWARD_feet_clearance, "both stand", 0);
 }
 
@@ -191,7 +192,7 @@ TEST(clearance_from_the_print) {
     expect_term(REWARD_feet_clearance, "20 mm too high", 3.0630528372);
     m->foot_height[0] = 0.3; /* not down yet: as lift */
     expect_term(REWARD_feet_clearance, "from the surface", 2.6389378290);
-    m->stance[0] = m->stance[1] = 1;
+    m->wanted[0].stance = m->wanted[1].stance = 1;
     expect_term(REWARD_feet_clearance, "both stand", 0);
 }
 
@@ -208,10 +209,10 @@ TEST(clearance_as_printed) {
     expect_term(REWARD_feet_clearance, "20 mm too high", 0.048);
     m->foot_height[1] = -0.02;
     expect_term(REWARD_feet_clearance, "sunk by 20 mm", 0.24);
-    m->stance[0] = 0;
-    m->wanted_height[0] = 0.1;
+    m->wanted[0].stance = 0;
+    m->wanted[0].height = 0.1;
     expect_term(REWARD_feet_clearance, "two feet", 0.72);
-    m->stance[0] = m->stance[1] = 1;
+    m->wanted[0].stance = m->wanted[1].stance = 1;
     expect_term(REWARD_feet_clearance, "both stand", 0);
 }
 
@@ -224,7 +225,7 @@ TEST(gait_as_printed) {
     expect_term(REWARD_gait, "the right drags", 1.4);
     m->contact[0] = 0;
     expect_term(REWARD_gait, "both wrong", -0.42);
-    m->either[0] = 1;
+    m->wanted[0].either = 1;
     expect_term(REWARD_gait, "left in double support", 1.4);
 }
 
@@ -235,9 +236,9 @@ TEST(gait) {
     expect_term(REWARD_gait, "the right drags", 0.49);
     m->contact[0] = 0;
     expect_term(REWARD_gait, "both wrong", -0.42);
-    m->either[0] = 1;
+    m->wanted[0].either = 1;
     expect_term(REWARD_gait, "left in double support", 0.49);
-    m->either[1] = 1;
+    m->wanted[1].either = 1;
     expect_term(REWARD_gait, "double support", 1.4);
 }
 
@@ -298,10 +299,10 @@ TEST(reference_motion) {
     expect_term(REWARD_reference_motion, "the wrong leg", -0.0823201108);
     scene.env.phase = 0.75;
     expect_term(REWARD_reference_motion, "half a period later the right leg", 2.2);
-    scene.motion.standing = 1;
+    scene.def.standing_below = 0.1;
     expect_term(REWARD_reference_motion, "bent while standing", 0.0900150501);
     new_scene();
-    scene.motion.standing = 1;
+    scene.def.standing_below = 0.1;
     expect_term(REWARD_reference_motion, "standing", 2.2);
 }
 
@@ -402,6 +403,9 @@ TEST(contact_force) {
     expect_term(REWARD_contact_force, "700 N", -4);
     m->foot_force[1] = 1000;
     expect_term(REWARD_contact_force, "700 and 1000 N: 200 and 400 count", -12);
+    set_command(3, 0, 0); /* a run's feet bear 0.5/0.4 of that */
+    scene.def.stance_share[0] = 0.4;
+    expect_term(REWARD_contact_force, "700 and 1000 N: 75 and 375 count", -9);
 }
 
 TEST(efforts) {

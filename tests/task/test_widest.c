@@ -50,12 +50,13 @@ TEST(mirror_twice) {
 /* Stance in the half of the cycle after the foot's offset, swing in the other: h = apex sin(pi s);
  * all joints of a swinging leg bend by amplitude |sin| times `swing`. */
 TEST(gait_of_any_offset) {
+    const double ahead[3] = {0.6, 0, 0}, still[3] = {0};
     TaskDef def = task_def_default();
     int swings = 0;
     for (double phase = 0.003; phase < 1; phase += 0.0137) {
         double q[ROBOT_JOINTS_MAX];
         for (int i = 0; i < robot_joints(robot); i++) {
-            q[i] = task_gait_reference(&def, robot_table(robot), phase, 0, i);
+            q[i] = task_gait_reference(&def, robot_table(robot), phase, ahead, i);
         }
         for (int f = 0; f < LEGS; f++) {
             double since =
@@ -65,13 +66,11 @@ TEST(gait_of_any_offset) {
             double height = swing ? def.swing_apex * sin(KIT_PI * (since - 0.5) / 0.5) : 0;
             double bend = -wave >= def.double_support ? -wave * def.reward.reference_amplitude : 0;
             swings += swing;
-            assert_int_equal(task_gait_stance(robot_table(robot), phase, 0, f), !swing);
-            expect_near("height", task_gait_height(&def, robot_table(robot), phase, 0, f), height,
-                        1e-12);
-            assert_int_equal(task_gait_either(&def, robot_table(robot), phase, 0, f),
-                             fabs(wave) < def.double_support);
-            assert_false(task_gait_either(&def, robot_table(robot), phase, 1, f));
-            assert_true(task_gait_stance(robot_table(robot), phase, 1, f));
+            const TaskFoot foot = task_gait_foot(&def, robot_table(robot), phase, ahead, f);
+            assert_int_equal(foot.stance, !swing);
+            expect_near("height", foot.height, height, 1e-12);
+            assert_int_equal(foot.either, fabs(wave) < def.double_support);
+            assert_true(task_gait_foot(&def, robot_table(robot), phase, still, f).stance);
             for (int i = 0; i < HINGES; i++) {
                 expect_entry("reference", f * HINGES + i, q[f * HINGES + i], (i ? 0.5 : -1) * bend,
                              1e-12);

@@ -150,7 +150,7 @@ static inline Walk *walk_make(const WalkDef *def, const RunnerDef *runner) {
     expect_good(w->robot != NULL, &error);
     expect_good(scene_make(&scene, def->ground, 1, &error) == MILD_OK, &error);
     robot_set_shells(w->robot, w->task.shells_stand);
-    expect_good(task_set_elements(&w->task, w->robot, &error) == MILD_OK, &error);
+    expect_good(task_set_robot(&w->task, w->robot, &error) == MILD_OK, &error);
     if (def->slope != 0) {
         MildMapDef map = mild_map_def_default();
         map.kind = MILD_MAP_SLOPE;

@@ -47,8 +47,7 @@ MILD_HD_FN double task_assist_pose(const TaskEnv *env, const TaskDef *def, const
     if (share == 0) {
         return rest;
     }
-    int standing = task_is_standing(def, env->command);
-    double reference = task_gait_reference(def, robot, env->phase, standing, i);
+    double reference = task_gait_reference(def, robot, env->phase, env->command, i);
     return rest + share * ASSIST_LEAD * (reference - rest);
 }
 

@@ -238,8 +238,11 @@ void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
 
 /* A torque within the limits of the motor: that of a motor whose PD asks for it. */
 static double limited(const TaskMotor *motor, double torque, double qd) {
-    const TaskMotor asked = {
-        .target = {torque}, .kp = 1, .limit = motor->limit, .fastest = motor->fastest};
+    const TaskMotor asked = {.target = {torque},
+                             .kp = 1,
+                             .limit = motor->limit,
+                             .fastest = motor->fastest,
+                             .full = motor->full};
     return task_torque(&asked, 0, 0, qd);
 }
 

@@ -125,7 +125,6 @@ MILD_HD_FN void observe_estimates(const TaskEnv *env, const TaskDef *def,
 /* Six numbers of each foot. */
 MILD_HD_FN void observe_feet(const TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                              const RobotReading *reading, float *out) {
-    int standing = task_is_standing(def, env->command);
     const float force_scale = (float)(0.6 * robot->foot_force); /* [N] */
     for (int f = tile_lane(); f < env->shape.feet; f += TILE) {
         const Real *force = reading->foot[f].force;
@@ -136,7 +135,7 @@ MILD_HD_FN void observe_feet(const TaskEnv *env, const TaskDef *def, const Robot
             own[i] = scaled > 5 ? 5 : scaled < -5 ? -5 : scaled;
         }
         own[3] = force[2] > 5;
-        own[4] = (float)task_gait_stance(robot, env->phase, standing, f);
+        own[4] = (float)task_gait_foot(def, robot, env->phase, env->command, f).stance;
         own[5] = (float)(10 * reading->foot[f].depth_mean);
     }
 }

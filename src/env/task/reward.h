@@ -39,8 +39,8 @@ MILD_HD_FN Real reward_stance_depth(const TaskMotion *m) {
     Real sum = 0;
     int feet = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
-        sum -= m->stance[f] ? m->foot_height[f] : 0;
-        feet += m->stance[f];
+        sum -= m->wanted[f].stance ? m->foot_height[f] : 0;
+        feet += m->wanted[f].stance;
     }
     return sum > 0 ? sum / REAL(feet) : 0;
 }
@@ -56,10 +56,10 @@ MILD_HD_FN Real reward_feet_clearance(const TaskMotion *m) {
     const Real depth = form == TASK_CLEARANCE_RISE ? reward_stance_depth(m) : 0;
     Real sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
-        Real h = m->foot_height[f], wanted = m->wanted_height[f];
-        if (!m->stance[f] && form == TASK_CLEARANCE_ERROR) {
+        Real h = m->foot_height[f], wanted = m->wanted[f].height;
+        if (!m->wanted[f].stance && form == TASK_CLEARANCE_ERROR) {
             sum += REAL(fabs(wanted - h));
-        } else if (!m->stance[f]) {
+        } else if (!m->wanted[f].stance) {
             sum += REAL(1.5707963) *
                    (task_clamp(h + depth, 0, wanted + depth) -
                     REAL(0.5) * task_clamp(h - wanted, 0, 0.3)) /
@@ -75,7 +75,7 @@ MILD_HD_FN Real reward_gait(const TaskMotion *m) {
     const int sums = m->def->reward.gait_form == TASK_GAIT_SUM;
     Real sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
-        const int matches = m->either[f] || m->contact[f] == m->stance[f];
+        const int matches = m->wanted[f].either || m->contact[f] == m->wanted[f].stance;
         sum += matches ? 1 : sums ? 0 : REAL(-0.3);
     }
     return sums ? REAL(1.3) * reward_per_pair(m, sum) - REAL(0.3) : sum / REAL(m->env->shape.feet);
@@ -105,8 +105,8 @@ MILD_HD_FN Real reward_action_smoothness(const TaskMotion *m) {
 MILD_HD_FN Real reward_reference_motion(const TaskMotion *m) {
     Real sum = 0;
     for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
-        sum += task_square(m->q[i] -
-                           task_gait_reference(m->def, m->robot, m->env->phase, m->standing, i));
+        sum += task_square(
+            m->q[i] - task_gait_reference(m->def, m->robot, m->env->phase, m->env->command, i));
     }
     Real d = task_sqrt(tile_sum(sum));
     return task_exp(-2 * d) - REAL(0.2) * task_clamp(d, 0, 0.5);
@@ -171,8 +171,10 @@ MILD_HD_FN Real reward_base_motion(const TaskMotion *m) {
             task_exp(-5 * task_sqrt(task_square(m->omega[0]) + task_square(m->omega[1]))));
 }
 
+/* A foot that stands for half as long bears twice as much. */
 MILD_HD_FN Real reward_contact_force(const TaskMotion *m) {
-    Real sum = 0, hard = m->robot->foot_force;
+    const double share = task_gait_share(m->def, m->env->command);
+    Real sum = 0, hard = m->robot->foot_force * 0.5 / share;
     for (int f = 0; f < m->env->shape.feet; f++) {
         sum += task_clamp(m->foot_force[f] - hard, 0, REAL(0.8) * hard);
     }

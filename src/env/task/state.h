@@ -196,34 +196,42 @@ typedef struct {
     Real kd;        /* [N m s/rad] */
     Real limit;     /* [N m] */
     Real fastest;   /* [rad/s] 0: no limit */
+    Real full;      /* [rad/s] up to which it gives all of `limit`; 0: up to `fastest` */
 } TaskMotor;
+
+/* What the clock wants of a foot. */
+typedef struct {
+    int stance;    /* bool */
+    int either;    /* bool: near touchdown and lift-off, where stance and swing are both right */
+    double height; /* [m] apex sin(pi s), s: progress of the swing, so that the foot leaves and
+                      meets h0 on time */
+    double bend;   /* [-] of the swing leg in the reference motion */
+} TaskFoot;
 
 /* Everything that reward terms may use, computed once per policy step (task_describe_motion). */
 typedef struct {
     const TaskDef *def;
     const RobotTable *robot;
     const TaskEnv *env;
-    Real velocity[3];              /* [m/s] of the base, heading frame */
-    Real omega[3];                 /* [rad/s] of the base, base frame */
-    Real gravity[3];               /* [-] unit vector along gravity, base frame */
-    Real twist_change;             /* norm of the change of the base twist in this step, or of its
+    Real velocity[3];            /* [m/s] of the base, heading frame */
+    Real omega[3];               /* [rad/s] of the base, base frame */
+    Real gravity[3];             /* [-] unit vector along gravity, base frame */
+    Real twist_change;           /* norm of the change of the base twist in this step, or of its
                                       linear part (acceleration_form) */
-    Real q[TASK_JOINTS];           /* [rad] */
-    Real qd[TASK_JOINTS];          /* [rad/s] */
-    Real qd_before[TASK_JOINTS];   /* [rad/s] one policy step ago */
-    Real torque[TASK_JOINTS];      /* [N m] */
-    Real base_height;              /* [m] above the stance soles */
-    Real foot_height[TASK_FEET];   /* [m] lowest sole point above the undisturbed surface */
-    Real foot_force[TASK_FEET];    /* [N] of the ground on the foot */
-    Real foot_speed[TASK_FEET];    /* [m/s] horizontal, of the sole */
-    Real landed_air_time;          /* [s] summed over the feet that touched down */
-    int contact[TASK_FEET];        /* bool: the ground carries the foot */
-    int stance[TASK_FEET];         /* bool: the clock wants the foot in stance */
-    int either[TASK_FEET];         /* bool: stance and swing are both right */
-    Real wanted_height[TASK_FEET]; /* [m] h_des of the clock */
-    Real foot_distance;            /* [m] see robot_sim_foot_distance */
-    Real knee_distance;            /* [m] see robot_sim_knee_distance */
-    int standing;                  /* bool: the command is to stand */
+    Real q[TASK_JOINTS];         /* [rad] */
+    Real qd[TASK_JOINTS];        /* [rad/s] */
+    Real qd_before[TASK_JOINTS]; /* [rad/s] one policy step ago */
+    Real torque[TASK_JOINTS];    /* [N m] */
+    Real base_height;            /* [m] above the stance soles; in flight, as `above` */
+    Real foot_height[TASK_FEET]; /* [m] lowest sole point above the undisturbed surface */
+    Real foot_force[TASK_FEET];  /* [N] of the ground on the foot */
+    Real foot_speed[TASK_FEET];  /* [m/s] horizontal, of the sole */
+    Real landed_air_time;        /* [s] summed over the feet that touched down */
+    int contact[TASK_FEET];      /* bool: the ground carries the foot */
+    TaskFoot wanted[TASK_FEET];  /* by the clock */
+    Real foot_distance;          /* [m] see robot_sim_foot_distance */
+    Real knee_distance;          /* [m] see robot_sim_knee_distance */
+    int standing;                /* bool: the command is to stand */
 } TaskMotion;
 
 #endif

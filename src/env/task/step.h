@@ -248,18 +248,28 @@ MILD_HD_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Ro
     motor.kd = env->strength[i] * REAL(gains->kd[i]) * env->kd_scale[i];
     motor.limit = gains->limit[i];
     motor.fastest = robot->speed[i];
+    motor.full = robot->full_speed[i];
     return motor;
+}
+
+/* [N m] Greatest torque in the direction of motion: a motor's voltage bounds it from the speed
+ * `full` on. */
+MILD_HD_FN double task_torque_most(const TaskMotor *motor, double qd) {
+    const double speed = fabs(qd), end = motor->fastest;
+    const double full = motor->full > 0 ? motor->full : end;
+    if (end == 0 || speed < full) {
+        return motor->limit;
+    }
+    return speed < end ? motor->limit * (end - speed) / (end - full) : 0;
 }
 
 /* [N m] Torque at angle q and speed qd. late: bool, the last action still counts.
  *
- * tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). A motor at its speed limit gives
- * no torque in the direction of motion. */
+ * tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)) */
 MILD_HD_FN double task_torque(const TaskMotor *motor, int late, double q, double qd) {
     double tau = motor->kp * (motor->target[late] - q) - motor->kd * qd;
-    tau = tau > motor->limit ? motor->limit : tau < -motor->limit ? -motor->limit : tau;
-    int over = motor->fastest > 0 && fabs(qd) >= motor->fastest && tau * qd > 0;
-    return over ? 0 : tau;
+    const double most = tau * qd > 0 ? task_torque_most(motor, qd) : motor->limit;
+    return tau > most ? most : tau < -most ? -most : tau;
 }
 
 /* Bool: physics step k of `steps` computes torques anew; else those of the step before go on, which
@@ -276,7 +286,8 @@ MILD_HD_FN int task_motors_act(const TaskEnv *env, const TaskDef *def, int k, in
 
 MILD_HD_FN void task_feet_motion(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
                                  const RobotReading *reading, TaskMotion *m) {
-    const double half_period = 0.5 * task_gait_period(def, env->command_seen);
+    const double swing_time =
+        (1 - task_gait_share(def, env->command_seen)) * task_gait_period(def, env->command_seen);
     Real stance_height = 0;
     int stances = 0;
     for (int f = 0; f < env->shape.feet; f++) {
@@ -286,18 +297,16 @@ MILD_HD_FN void task_feet_motion(TaskEnv *env, const TaskDef *def, const RobotTa
         m->foot_force[f] =
             task_sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
         m->contact[f] = force[2] > TASK_CONTACT_FORCE;
-        m->stance[f] = task_gait_stance(robot, env->phase, m->standing, f);
-        m->either[f] = task_gait_either(def, robot, env->phase, m->standing, f);
-        m->wanted_height[f] = task_gait_height(def, robot, env->phase, m->standing, f);
+        m->wanted[f] = task_gait_foot(def, robot, env->phase, env->command, f);
         if (m->contact[f]) {
-            m->landed_air_time += fmin((double)env->air_time[f], half_period);
+            m->landed_air_time += fmin((double)env->air_time[f], swing_time);
         }
-        if (m->stance[f]) {
+        if (m->wanted[f].stance) {
             stance_height += reading->foot[f].sole_center[2];
             stances++;
         }
     }
-    m->base_height = env->robot.qpos[2] - stance_height / (Real)(stances ? stances : 1);
+    m->base_height = stances ? env->robot.qpos[2] - stance_height / (Real)stances : reading->above;
     tile_sync();
     for (int f = tile_lane(); f < env->shape.feet; f += TILE) {
         env->air_time[f] = m->contact[f] ? 0 : env->air_time[f] + REAL(TASK_PERIOD);

@@ -35,6 +35,8 @@ TaskDef task_def_default(void) {
         .standing_below = 0.1,
         .gait_period = 0.8,
         .gait_slow_below = 1.2,
+        .stance_share = {0.5, 0.5},
+        .run_speed = {1.5, 2.5},
         .swing_apex = 0.10,
         .double_support = 0.1,
         .history_stride = 8,
@@ -140,6 +142,10 @@ void task_def_make_nominal(TaskDef *def) {
 #define B MILD_FIELD_BOOL
 #define T(member, type, count, min, max, help)                                                     \
     MILD_FIELD(TaskDef, member, type, count, min, max, help)
+#define TASK_GAIT_NAME(name, a, b, c, d) #name,
+#define TASK_GAIT_OFFSETS(name, a, b, c, d) {a, b, c, d},
+const char *const task_gait_names[] = {"robot", TASK_GAIT_LIST(TASK_GAIT_NAME)};
+static const double gait_offsets[][4] = {{0}, TASK_GAIT_LIST(TASK_GAIT_OFFSETS)};
 const char *const task_start_names[TASK_STARTS] = {"stand", "back", "side", "any"};
 const MildField task_fields[] = {
     T(physics_dt, D, 1, 0.0005, 0.005, "[s] physics step; must divide 0.01, the policy step"),
@@ -167,21 +173,30 @@ const MildField task_fields[] = {
       "[bool] neither tilt nor a shell of the base that stands ends an episode"),
     T(episode, D, 1, 0.1, 1000, "[s] longest episode"),
     T(command_interval, D, 1, 0.1, 1000, "[s] time after which a new command is drawn"),
-    T(vx, D, 2, -3, 3, "[m/s] forward command, low and high"),
+    T(vx, D, 2, -4, 4, "[m/s] forward command, low and high"),
     T(vy, D, 2, -3, 3, "[m/s] sideways command, low and high"),
     T(wz, D, 2, -3, 3, "[rad/s] turning command, low and high"),
     T(backward_share, D, 1, 0, 1, "[-] share of commands to walk backward"),
-    T(backward_vx, D, 2, -3, 3, "[m/s] backward command, low and high"),
+    T(backward_vx, D, 2, -4, 4, "[m/s] backward command, low and high"),
     T(standing_share, D, 1, 0, 1, "[-] share of commands to stand"),
     T(straight_share, D, 1, 0, 1,
       "[-] share of walking commands without sideways and turning motion"),
     T(standing_below, D, 1, 0, 10,
       "[m/s, rad/s] a command whose three parts are all below this is to stand; 0: none is"),
+    MILD_FIELD_CHOICE(
+        TaskDef, gait, task_gait_names, sizeof task_gait_names / sizeof *task_gait_names,
+        "[-] which feet stand together: robot, as offset of robot.ini says; bipeds hop "
+        "or skip, the Go1 trots, paces, bounds, hops (pronks) or skips (gallops)"),
     T(gait_period, D, 1, 0.2, 3, "[s] period of the gait clock"),
     T(gait_slowing, D, 1, 0, 3,
       "[-] share by which the clock's period grows at no speed; at gait_slow_below it does not"),
     T(gait_slow_below, D, 1, 0.01, 10,
       "[m/s] speed |vx| + 3 |vy| + 1 m |wz| from which the period is gait_period"),
+    T(stance_share, D, 2, 0.1, 0.9,
+      "[-] share of the period that a foot stands, of a run and of a walk; below 0.5 a biped flies"),
+    T(run_speed, D, 2, 0, 4,
+      "[m/s] forward speed up to which the share is a walk's and from which it is a run's, linear "
+      "between"),
     T(speed_hold, D, 1, 0, 1,
       "[-] eval, play and drive correct the commanded speed by the policy's own estimate of it: "
       "least weight of a gait cycle; 0: not at all"),
@@ -440,8 +455,9 @@ MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildErro
     return status == MILD_OK ? task_gains(def, robot, &gains, error) : status;
 }
 
-MildStatus task_set_elements(const TaskDef *def, Robot *robot, MildError *error) {
+MildStatus task_set_robot(const TaskDef *def, Robot *robot, MildError *error) {
     MildError cause = {0};
+    robot_set_gait(robot, def->gait ? gait_offsets[def->gait] : NULL);
     const MildStatus status = robot_set_elements(robot, def->sole_elements, &cause);
     return status == MILD_OK ? MILD_OK
                              : mild_fail(error, status, "task.sole_elements = %d: %s",

@@ -38,10 +38,11 @@ typedef struct Robot Robot;
     X(knee_distance, 0.2, "keeping the lateral distance of the knees in knee_range (vendor)")      \
     X(orientation, 1.5, "an upright base (vendor)")                                                \
     X(air_time, 1.0,                                                                               \
-      "the time in the air [s], paid at touchdown, at most half a gait period (vendor)")           \
+      "the time in the air [s], paid at touchdown, at most the swing of the clock (vendor)")       \
     X(base_motion, 0.5, "little vertical, roll and pitch motion of the base (vendor)")             \
     X(contact_force, -0.02,                                                                        \
-      "the foot force [N] above foot_force of robot.ini, at most 0.8 of it (vendor)")              \
+      "the foot force [N] above foot_force of robot.ini times 0.5/stance_share, at most 0.8 of "   \
+      "that (vendor)")                                                                             \
     X(torque, -1e-10, "the sum of squared torques [N^2 m^2] (vendor)")                             \
     X(joint_speed, -1e-5, "the sum of squared joint speeds [rad^2/s^2] (vendor)")                  \
     X(joint_acceleration, -5e-9, "the sum of squared joint accelerations [rad^2/s^4] (vendor)")    \
@@ -80,6 +81,16 @@ typedef enum {
     TASK_START_ANY,
     TASK_STARTS
 } TaskStart;
+
+/* Gaits: name, phases at which the stances of four feet begin, front left, front right, rear left,
+ * rear right; a biped has the first two. What walks at one stance_share runs at another. The Go1's
+ * hop is a pronk, its skip a gallop, which has no mirror image. */
+#define TASK_GAIT_LIST(X)                                                                          \
+    X(trot, 0, 0.5, 0.5, 0)                                                                        \
+    X(pace, 0, 0.5, 0, 0.5)                                                                        \
+    X(bound, 0, 0, 0.5, 0.5)                                                                       \
+    X(hop, 0, 0, 0, 0)                                                                             \
+    X(skip, 0, 0.3, 0.5, 0.8)
 
 typedef struct {
     double weight[TASK_REWARD_COUNT]; /* [1/s] */
@@ -160,14 +171,17 @@ typedef struct {
     double vx[2], vy[2], wz[2];
     double backward_share, backward_vx[2], standing_share, straight_share;
     double standing_below; /* [m/s, rad/s] a command whose parts are all below this is to stand */
+    int gait;              /* of task_gait_names; 0: the robot's own */
     double gait_period;    /* [s] of fast commands, see task_gait_period */
     double gait_slowing, gait_slow_below; /* [-], [m/s] of slow ones */
     double speed_hold;                    /* [-] see control/speed_hold.h; 0: off */
-    double swing_apex;                    /* [m] */
-    double double_support; /* [-] |sin(2 pi phase)| below which either contact state is right */
-    int history_stride;    /* policy steps that each older frame of the history is the mean of */
-    int clock;             /* bool: clock in the observation */
-    int observe_noise;     /* bool */
+    double stance_share[2]; /* [-] of the period: running, walking; see task_gait_share */
+    double run_speed[2];    /* [m/s] up to which it walks, from which it runs */
+    double swing_apex;      /* [m] */
+    double double_support;  /* [-] |sin(2 pi phase)| below which either contact state is right */
+    int history_stride;     /* policy steps that each older frame of the history is the mean of */
+    int clock;              /* bool: clock in the observation */
+    int observe_noise;      /* bool */
     double noise_q, noise_qd, noise_omega, noise_gravity; /* +- uniform, qd after scaling */
     double velocity_scale; /* [-] of the base velocity among the estimates. 0.05 m/s is a tenth of a
                               slow walk, so it must matter to the regression and to the actor */
@@ -219,8 +233,8 @@ void task_def_make_nominal(TaskDef *def);
 MildStatus task_def_check(const TaskDef *def, MildError *error);
 /* The same, that the lists of gains fit the robot, and that a file of an actuator has been read. */
 MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildError *error);
-/* robot_set_elements by the def. */
-MildStatus task_set_elements(const TaskDef *def, Robot *robot, MildError *error);
+/* robot_set_gait and robot_set_elements by the def. */
+MildStatus task_set_robot(const TaskDef *def, Robot *robot, MildError *error);
 /* Gains of each joint [robot_joints]; 0 beyond the robot's joints. */
 typedef struct {
     double kp[ROBOT_JOINTS_MAX];    /* [N m/rad] task.kp or the robot's */
@@ -241,6 +255,7 @@ MILD_HD_FN double task_nominal_height(const TaskDef *def, const RobotTable *robo
 }
 
 extern const char *const task_start_names[TASK_STARTS];
+extern const char *const task_gait_names[];
 extern const MildField task_fields[];
 extern const int task_field_count;
 extern const MildField reward_fields[]; /* offsets into RewardDef */

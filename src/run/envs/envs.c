@@ -23,7 +23,7 @@ static MildStatus build(MildEnvs *envs, MildError *error) {
     experiment_fit_robot(def, envs->robot);
     robot_set_model(envs->robot, task_model_soles(def->task.randomize.model));
     robot_set_shells(envs->robot, def->task.shells_stand);
-    MildStatus status = task_set_elements(&def->task, envs->robot, error);
+    MildStatus status = task_set_robot(&def->task, envs->robot, error);
     if (status != MILD_OK) {
         return status;
     }

@@ -87,11 +87,12 @@ typedef struct {
     float *action;   /* [trials][joints] */
     double *command; /* [trials][3] */
     SpeedHoldDef speed_hold;
-    SpeedHold *hold;  /* [trials] */
-    Measure *measure; /* [trials] */
-    uint8_t *end;     /* [trials] TaskEnd; TASK_END_time while it walks */
-    Track track;      /* if EvalDef.track is given */
-    Feet feet;        /* if EvalDef.feet is given */
+    SpeedHold *hold;                   /* [trials] */
+    Measure *measure;                  /* [trials] */
+    TaskMotor motor[ROBOT_JOINTS_MAX]; /* limits */
+    uint8_t *end;                      /* [trials] TaskEnd; TASK_END_time while it walks */
+    Track track;                       /* if EvalDef.track is given */
+    Feet feet;                         /* if EvalDef.feet is given */
 } Trials;
 
 static int row_of(const Trials *t, int trial) {
@@ -177,6 +178,17 @@ static MildStatus open_envs(Trials *t, MildError *error) {
     return t->envs ? MILD_OK : error->status;
 }
 
+static MildStatus take_limits(Trials *t, MildError *error) {
+    const RobotTable *table = robot_table(t->run->robot);
+    TaskGains gains;
+    const MildStatus status = task_gains(&t->task, t->run->robot, &gains, error);
+    for (int i = 0; i < table->joints; i++) {
+        t->motor[i] = (TaskMotor){
+            .limit = gains.limit[i], .fastest = table->speed[i], .full = table->full_speed[i]};
+    }
+    return status;
+}
+
 static Results carve(const Trials *t, void *block) {
     const size_t trials = (size_t)t->trials;
     Results at;
@@ -249,6 +261,7 @@ static void start_trial(void *context, int trial, int thread) {
     measure_start(measure, t->task.physics_dt);
     measure->steady_end = t->run->eval.stop;
     measure->keep = t->run->eval.stances != NULL;
+    measure->motor = t->motor;
     measure->nominal_height = robot_nominal_height(t->run->robot);
     direct(&t->run->eval, speed_of(t, trial), 0, ahead, t->command + 3 * (size_t)trial);
 }
@@ -402,6 +415,7 @@ MildStatus eval_run(const EvalRun *run, EvalRow *rows, MildError *error) {
     t.trials = t.rows * run->eval.trials;
     t.task.episode = run->eval.seconds;
     status = open_envs(&t, error);
+    status = status == MILD_OK ? take_limits(&t, error) : status;
     status = status == MILD_OK ? open_arrays(&t, error) : status;
     t.speed_hold = speed_hold_def(&t.task, run->robot, run->controller);
     if (status == MILD_OK && run->eval.track) {

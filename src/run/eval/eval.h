@@ -82,6 +82,14 @@ typedef struct {
                                 distance */
     double stride;           /* [m] from a foot's touchdown to its next one, after the first 2 s */
     double cadence;          /* [1/s] of these strides */
+    double flight;           /* [-] share of the time after the first 2 s without a foot down */
+    double duty;             /* [-] share of it that a foot is down, mean over the feet */
+    double load_peak;        /* [weights] largest vertical force on a foot in a stance */
+    double load_rate;        /* [weights/s] its largest rise in 10 ms */
+    double joint_speed_max;  /* [rad/s] largest after the first 2 s, of all trials */
+    double torque_rms;       /* [N m] root mean square of the joint that has the largest */
+    double at_limit;         /* [-] share of the time that the joint that is most often at its
+                                limit is there */
     double energy;           /* [J] integral |tau . qd| dt */
     double legs;             /* [m] least distance of two legs after 1 s, of all trials */
     Smoothness smooth;       /* after 1 s, of all trials */

@@ -4,10 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "env/task/step.h"
+
 #define CONTACT_FORCE 5.0  /* [N] */
 #define SWING_HEIGHT 0.005 /* [m] a lower lift does not count as a swing */
 #define LEGS_MOST 1e6      /* [m] further apart: there are none */
 #define TWO_PI 6.283185307179586
+#define AT_LIMIT 0.99     /* [-] of the greatest torque */
 #define CHATTER_TIME 0.03 /* [s] a shorter loss of contact does not end a stance */
 
 double measure_yaw(const double q[4]) {
@@ -52,7 +55,7 @@ static void start_stance(Measure *m, int f, const double *at) {
     m->began[f] = time;
     m->touchdown[f][0] = m->last[f][0] = at[0];
     m->touchdown[f][1] = m->last[f][1] = at[1];
-    m->deepest[f] = m->path[f] = m->hardest[f] = 0;
+    m->deepest[f] = m->path[f] = m->hardest[f] = m->peak[f] = m->rise[f] = 0;
 }
 
 static void keep_stance(Measure *m, const MeasureStance *stance) {
@@ -84,6 +87,8 @@ static void end_stance(Measure *m, int f) {
                                   .torque = m->hardest[f]};
     m->in_stance[f] = 0;
     m->deepest_sum += stance.depth;
+    m->peak_sum += m->peak[f];
+    m->rise_sum += m->rise[f];
     m->drift_sum += hypot(x, y);
     m->path_sum += m->path[f];
     m->way_sum[0] += fabs(stance.way[0]);
@@ -94,7 +99,17 @@ static void end_stance(Measure *m, int f) {
     m->stances++;
 }
 
+/* [N] By which the load on the foot has risen in MEASURE_RISE. */
+static double take_rise(Measure *m, int f, double load) {
+    const int steps = (int)lround(fmin(fmax(MEASURE_RISE / m->dt, 1), MEASURE_RISE_STEPS));
+    double *oldest = &m->recent[f][m->samples % steps];
+    const double rise = load - *oldest;
+    *oldest = load;
+    return rise;
+}
+
 static void measure_foot(Measure *m, int f, const EnvsFoot *foot) {
+    const double rise = take_rise(m, f, foot->load);
     if (foot->load > CONTACT_FORCE) {
         if (!m->in_stance[f]) {
             start_stance(m, f, foot->center);
@@ -102,6 +117,8 @@ static void measure_foot(Measure *m, int f, const EnvsFoot *foot) {
         m->air_time[f] = m->apex[f] = 0;
         m->path[f] += hypot(foot->center[0] - m->last[f][0], foot->center[1] - m->last[f][1]);
         m->hardest[f] = fmax(m->hardest[f], m->torque);
+        m->peak[f] = fmax(m->peak[f], foot->load);
+        m->rise[f] = fmax(m->rise[f], rise);
         m->last[f][0] = foot->center[0];
         m->last[f][1] = foot->center[1];
         m->lasted[f] = m->time - m->began[f];
@@ -113,6 +130,31 @@ static void measure_foot(Measure *m, int f, const EnvsFoot *foot) {
     if (m->in_stance[f] && m->air_time[f] > CHATTER_TIME) {
         end_stance(m, f);
     }
+}
+
+/* Bool: the motor of joint i gives all that it can at the speed at which it computed the torque. */
+static int is_limited(const Measure *m, int i, double torque) {
+    const TaskMotor *motor = &m->motor[i];
+    const double most =
+        torque * m->speed[i] < 0 ? (double)motor->limit : task_torque_most(motor, m->speed[i]);
+    return fabs(torque) >= AT_LIMIT * most;
+}
+
+static void measure_motors(Measure *m, const EnvsSample *sample) {
+    for (int i = 0; i < sample->joints; i++) {
+        m->joint_speed = fmax(m->joint_speed, fabs(sample->speed[i]));
+        m->torque_square[i] += sample->torque[i] * sample->torque[i] * m->dt;
+        m->limited[i] += m->motor && is_limited(m, i, sample->torque[i]) ? m->dt : 0;
+    }
+}
+
+static void measure_contact(Measure *m, const EnvsSample *sample) {
+    int standing = 0;
+    for (int f = 0; f < sample->feet; f++) {
+        standing += sample->foot[f].load > CONTACT_FORCE;
+    }
+    m->flight += standing ? 0 : m->dt;
+    m->stance += standing * m->dt / sample->feet;
 }
 
 /* The steady part starts at the position of the base before its first step, so that distance and
@@ -131,6 +173,8 @@ static void measure_steady(Measure *m, const EnvsSample *sample, double yaw, dou
     m->work += power_abs * m->dt;
     m->base_low = fmin(m->base_low, sample->above);
     m->base_high = fmax(m->base_high, sample->above);
+    measure_motors(m, sample);
+    measure_contact(m, sample);
 }
 
 /* Bool: tilt and height are those of a robot that stands. */
@@ -176,6 +220,8 @@ void measure_sample(Measure *m, const EnvsSample *sample) {
         m->load += sample->foot[f].load * m->dt;
         measure_foot(m, f, &sample->foot[f]);
     }
+    memcpy(m->speed, sample->speed, sizeof m->speed);
+    m->samples++;
 }
 
 void measure_step(Measure *measure, const TaskEnv *env, const RobotSim *sim, const double *torque) {

@@ -3,6 +3,7 @@
 #define MILD_MEASURE_H
 
 #include "env/envs.h"
+#include "env/task/state.h"
 #include "run/eval/smooth.h"
 
 #define MEASURE_STEADY 2.0    /* [s] start of the steady part */
@@ -10,6 +11,8 @@
 #define MEASURE_UP_TILT 0.3   /* [rad] a robot that is up tilts less */
 #define MEASURE_UP_HEIGHT 0.7 /* [-] and its base is higher over its soles, of the nominal height */
 #define MEASURE_UP_TIME 2.0   /* [s] so long */
+#define MEASURE_RISE 0.01     /* [s] in which the load on a foot rises, for its rate */
+#define MEASURE_RISE_STEPS 20 /* physics steps of it, at most */
 
 /* A finished stance. */
 typedef struct {
@@ -25,19 +28,20 @@ typedef struct {
 /* A stance begins when the ground carries the foot and ends with the last contact before a pause of
  * CHATTER_TIME. */
 typedef struct {
-    double dt;             /* [s] physics step */
-    double time;           /* [s] since the start */
-    double energy;         /* [J] integral |sum tau qd| dt */
-    double torque_max;     /* [N m] */
-    double torque;         /* [N m] largest of the latest step */
-    double base[2];        /* [m] after the latest step */
-    double yaw;            /* [rad] after the latest step */
-    double legs;           /* [m] least distance of two legs from MEASURE_SETTLED on */
-    Smooth smooth;         /* from then on, too; set by smooth_take */
-    double load;           /* [N s] of the feet and of the shells */
-    double shell_load;     /* [N s] of the shells */
-    double nominal_height; /* [m] of the base above the soles; set by the caller for measure_up */
-    double up_since;       /* [s] start of the running time in which it is up; NaN: it is not */
+    double dt;              /* [s] physics step */
+    double time;            /* [s] since the start */
+    double energy;          /* [J] integral |sum tau qd| dt */
+    double torque_max;      /* [N m] */
+    double torque;          /* [N m] largest of the latest step */
+    double base[2];         /* [m] after the latest step */
+    double yaw;             /* [rad] after the latest step */
+    double legs;            /* [m] least distance of two legs from MEASURE_SETTLED on */
+    Smooth smooth;          /* from then on, too; set by smooth_take */
+    double load;            /* [N s] of the feet and of the shells */
+    double shell_load;      /* [N s] of the shells */
+    double nominal_height;  /* [m] of the base above the soles; set by the caller for measure_up */
+    const TaskMotor *motor; /* [joints] limits of the motors; set by the caller; NULL: none */
+    double up_since;        /* [s] start of the running time in which it is up; NaN: it is not */
 
     /* steady part */
     double steady_end;          /* [s] where it ends; 0: with the trial */
@@ -48,6 +52,11 @@ typedef struct {
     double turned;              /* [rad] */
     double work;                /* [J] integral sum |tau qd| dt */
     double base_low, base_high; /* [m] */
+    double flight;              /* [s] without a foot on the ground */
+    double stance;              /* [s] that a foot is on the ground, mean over the feet */
+    double joint_speed;         /* [rad/s] largest */
+    double torque_square[ROBOT_JOINTS_MAX]; /* [N^2 m^2 s] */
+    double limited[ROBOT_JOINTS_MAX];       /* [s] with the torque at its limit */
 
     /* the running stance or swing of each foot */
     int in_stance[ROBOT_FEET_MAX];       /* bool */
@@ -61,11 +70,17 @@ typedef struct {
     double swing[ROBOT_FEET_MAX];        /* [m] apex of the swing before */
     double path[ROBOT_FEET_MAX];         /* [m] of the sole centre since the first contact */
     double hardest[ROBOT_FEET_MAX];      /* [N m] largest torque since then */
-    int landed[ROBOT_FEET_MAX];          /* bool: began and touchdown are of the steady part */
+    double peak[ROBOT_FEET_MAX];         /* [N] largest load since then */
+    double rise[ROBOT_FEET_MAX];         /* [N] in MEASURE_RISE, largest */
+    double recent[ROBOT_FEET_MAX][MEASURE_RISE_STEPS]; /* [N] ring of the latest loads */
+    int samples;                                       /* physics steps */
+    double speed[ROBOT_JOINTS_MAX]; /* [rad/s] at which the motors computed the latest torque */
+    int landed[ROBOT_FEET_MAX];     /* bool: began and touchdown are of the steady part */
 
     /* finished ones */
     int swings, stances, strides; /* a stride: from a foot's touchdown to its next one */
     double apex_sum, deepest_sum, drift_sum, path_sum; /* [m] */
+    double peak_sum, rise_sum;                         /* [N] */
     double stride_sum, stride_time;                    /* [m] [s] of the strides */
     double way_sum[2];   /* [m] of the magnitudes of MeasureStance.way */
     int keep;            /* bool: each of them is kept; the owner frees `kept` */

@@ -109,6 +109,35 @@ static void summarise_feet(EvalRow *row, const Measure *measures) {
     row->cadence = strides ? strides / time : NAN;
 }
 
+/* Contact and motors over the steady parts of all trials. */
+static void summarise_loads(EvalRow *row, const Measure *measures, double weight) {
+    double time = 0, flight = 0, stance = 0, peak = 0, rise = 0, square[ROBOT_JOINTS_MAX] = {0},
+           limited[ROBOT_JOINTS_MAX] = {0}, squares = 0, most = 0;
+    int stances = 0, motors = 0;
+    for (int i = 0; i < row->trials; i++) {
+        const Measure *m = &measures[i];
+        time += m->steady_time;
+        flight += m->flight;
+        stance += m->stance;
+        peak += m->peak_sum;
+        rise += m->rise_sum;
+        stances += m->stances;
+        motors |= m->motor != NULL;
+        row->joint_speed_max = fmax(row->joint_speed_max, m->joint_speed);
+        for (int j = 0; j < ROBOT_JOINTS_MAX; j++) {
+            squares = fmax(squares, square[j] += m->torque_square[j]);
+            most = fmax(most, limited[j] += m->limited[j]);
+        }
+    }
+    row->joint_speed_max = time > 0 ? row->joint_speed_max : NAN;
+    row->flight = time > 0 ? flight / time : NAN;
+    row->duty = time > 0 ? stance / time : NAN;
+    row->load_peak = mean(peak / weight, stances);
+    row->load_rate = mean(rise / weight / MEASURE_RISE, stances);
+    row->torque_rms = time > 0 ? sqrt(squares / time) : NAN;
+    row->at_limit = motors && time > 0 ? most / time : NAN;
+}
+
 MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
                           const uint8_t *ends, double weight, MildError *error) {
     const int trials = eval->trials;
@@ -148,6 +177,7 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
     row->torque_deviation = deviation(row->torque_max, torque_square, trials);
     summarise_motion(row, measures, ends, weight);
     summarise_feet(row, measures);
+    summarise_loads(row, measures, weight);
     return status;
 }
 
@@ -190,11 +220,24 @@ static void print_up(const EvalRow *row, char *text, size_t size) {
     }
 }
 
+/* "  flight 21 %", "  at limit 3 %": how much of the time, where there is any. */
+static void print_loads(const EvalRow *row, char *text, size_t size) {
+    int used = 0;
+    text[0] = '\0';
+    if (row->flight >= 0.01) {
+        used = snprintf(text, size, "  flight %.0f %%", 100 * row->flight);
+    }
+    if (row->at_limit >= 0.01) {
+        snprintf(text + used, size - (size_t)used, "  at limit %.0f %%", 100 * row->at_limit);
+    }
+}
+
 void eval_print_row(const EvalRow *row, char *text, int size) {
     const int upright = row->start == TASK_START_STAND ? row->success : row->righted;
     char velocity[32], sideways[64] = "", turning[64] = "", up[64];
     char cot[TEXT_CELL], clearance[TEXT_CELL], sink[TEXT_CELL], drift[TEXT_CELL], part[TEXT_CELL];
-    char power[TEXT_CELL], ends[96];
+    char power[TEXT_CELL], ends[96], loads[64];
+    print_loads(row, loads, sizeof loads);
     print_ends(row, ends, sizeof ends);
     print_speed(row, velocity, sizeof velocity);
     print_up(row, up, sizeof up);
@@ -207,10 +250,10 @@ void eval_print_row(const EvalRow *row, char *text, int size) {
                  text_cell("%.3f", row->velocity_turn, part), row->turn);
     }
     snprintf(
-        text, (size_t)size, "%-26s %5.2f %4d/%-2d %s %5s %7.1f %4s mm %4s mm %4s mm %7s%s%s%s%s",
+        text, (size_t)size, "%-26s %5.2f %4d/%-2d %s %5s %7.1f %4s mm %4s mm %4s mm %7s%s%s%s%s%s",
         row->ground, row->speed, upright, row->trials, velocity, text_cell("%.2f", row->cot, cot),
         row->torque_max, text_cell("%.0f", 1e3 * row->clearance, clearance),
         text_cell("%.1f", 1e3 * row->penetration, sink), text_cell("%.1f", 1e3 * row->drift, drift),
         text_cell("%.0f", row->seconds > 0 ? row->energy / row->seconds : NAN, power), sideways,
-        turning, up, ends);
+        turning, up, loads, ends);
 }

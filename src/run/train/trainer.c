@@ -66,14 +66,15 @@ static int make_learner(Trainer *trainer, MildError *error) {
         return 0;
     }
     experiment_fit_robot(&trainer->def, trainer->robot);
+    robot_set_model(trainer->robot, task_model_soles(def->task.randomize.model));
+    robot_set_shells(trainer->robot, def->task.shells_stand);
+    if (task_set_robot(&def->task, trainer->robot, error) != MILD_OK) {
+        return 0;
+    }
     const TaskMirror sides = task_mirror(&def->task, trainer->robot);
     const PpoMirror mirror = {sides.observation_index, sides.observation_sign, sides.action_index,
                               sides.action_sign};
-    robot_set_model(trainer->robot, task_model_soles(def->task.randomize.model));
-    robot_set_shells(trainer->robot, def->task.shells_stand);
-    if (task_set_elements(&def->task, trainer->robot, error) != MILD_OK) {
-        return 0;
-    }
+    const int lopsided = robot_mirror_shift(trainer->robot) < 0;
     const int threads = def->train.threads ? def->train.threads : ranks_threads(trainer->ranks);
     trainer->pool = pool_create(threads);
     if (!trainer->pool) {
@@ -84,8 +85,9 @@ static int make_learner(Trainer *trainer, MildError *error) {
     if (!trainer->policy || start_policy(trainer, error) != MILD_OK) {
         return 0;
     }
-    trainer->ppo = ppo_create_part(&def->ppo, trainer->policy, trainer->pool, &mirror,
-                                   def->train.envs, def->train.seed, trainer->ranks, error);
+    trainer->ppo =
+        ppo_create_part(&def->ppo, trainer->policy, trainer->pool, lopsided ? NULL : &mirror,
+                        def->train.envs, def->train.seed, trainer->ranks, error);
     return trainer->ppo != NULL;
 }
 
