@@ -1,11 +1,10 @@
-/* Robots on the plugin as on our own step: `eval` and the stand controller, with every physics step
- * made by mj_step of the robot's MJCF with the plugin. The linker puts the step below in the place
+/* Robots on the plugin as on our own step: `eval` with every physics step made by mj_step of the
+ * robot's MJCF with the plugin. The linker puts the step below in the place
  * of robot_sim_step. With a number as argument, that many trials of each walk, at all steps. */
 #include <math.h>
 
 #include "plugin_kit.h"
 
-#include "control/stand.h"
 #include "mild/batch.h"
 #include "robot/sim.h"
 #include "robots.h"
@@ -173,75 +172,6 @@ int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *pus
         }
     }
     return data->warning[mjWARN_BADQACC].number + data->warning[mjWARN_BADQVEL].number > 0;
-}
-
-/* ---- standing ---- */
-
-typedef struct {
-    int stands;
-    double depth; /* [m] mean over the feet at the end */
-    double load;  /* [N] on all feet at the end */
-} Standing;
-
-static Standing stand_for(const Robot *robot, const MildMaterial *material, double dt,
-                          double seconds) {
-    MildError error = {0};
-    Stand *stand = stand_create(robot, &error);
-    RobotSim *sim = robot_sim_create(robot, dt, &error);
-    assert_non_null(stand);
-    assert_non_null(sim);
-    const int feet = robot_feet(robot);
-    MildGround *ground = kit_ground(robot);
-    MildTerrain terrain = mild_terrain_uniform(material);
-    RobotVariation variation = robot_variation_nominal();
-    RobotState state = stand_state(
-        stand, 1, mild_sole_sinkage(robot_soles(robot)[0], material, robot_foot_load(robot)));
-    Standing result = {.stands = 1};
-    robot_sim_load(sim, &state, &variation);
-    for (int i = 0; i < (int)(seconds / dt + 0.5) && result.stands; i++) {
-        double torque[ROBOT_JOINTS_MAX] = {0};
-        stand_torque(stand, sim, 1, torque);
-        int bad = robot_sim_step(sim, torque, NULL, &terrain, ground);
-        result.stands = !bad && robot_sim_base_rotation(sim)[8] > 0.9;
-    }
-    for (int f = 0; f < feet; f++) {
-        result.depth += robot_sim_foot(sim, f)->result.depth_mean / feet;
-        result.load += robot_sim_foot(sim, f)->force[2];
-    }
-    free(ground);
-    robot_sim_destroy(sim);
-    stand_destroy(stand);
-    return result;
-}
-
-static void check_stand(const char *name, const char *ground, double dt, const char *integrator) {
-    char folder[200];
-    MildMaterial material;
-    snprintf(folder, sizeof folder, MILD_SOURCE_DIR "/robots/%s", name);
-    Robot *robot = kit_robot(folder);
-    assert_true(mild_material_preset(ground, &material));
-    const Standing own = stand_for(robot, &material, dt, 4);
-    use_plugin(robot, &material, dt, integrator);
-    const Standing mujoco = stand_for(robot, &material, dt, 4);
-    use_own_step();
-    print_message("%s %-10s %g ms %-12s sinks %7.3f mm, by our own step %7.3f, load %.1f N\n", name,
-                  ground, 1e3 * dt, integrator, 1e3 * mujoco.depth, 1e3 * own.depth, mujoco.load);
-    assert_true(own.stands && mujoco.stands);
-    assert_true(fabs(mujoco.depth - own.depth) < 0.02 * own.depth);
-    robot_destroy(robot);
-}
-
-TEST(robots_stand) {
-    static const char *const grounds[] = {"rubber", "foam45", "sand_loose"};
-    static const char *const integrators[] = {"Euler", "implicitfast", "discrete"};
-    static const double steps[] = {0.001, 0.002, 0.005};
-    for (int g = 0; g < 3; g++) {
-        for (int k = 0; k < 3; k++) {
-            check_stand("sa01", grounds[g], steps[k], integrators[(g + k) % 3]);
-            check_stand("go1", grounds[g], steps[k], integrators[(g + k) % 3]);
-            check_stand("g1", grounds[g], steps[k], integrators[(g + k) % 3]);
-        }
-    }
 }
 
 /* ---- walking ---- */
