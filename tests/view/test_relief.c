@@ -172,15 +172,6 @@ TEST(normals_are_those_of_the_surface) {
     destroy();
 }
 
-TEST(print_stays_when_the_foot_walks_on) {
-    make("sand_loose", 0);
-    press(-0.3, 0, DEPTH);
-    press(0.3, 0, 0.5 * DEPTH);
-    assert_true(fabs(depth_at(-0.25, 0) - DEPTH) < 0.002);
-    assert_true(fabs(depth_at(0.35, 0) - 0.5 * DEPTH) < 0.002);
-    destroy();
-}
-
 /* Neighbouring tiles share their edge: both must be refreshed and agree. */
 TEST(tiles_agree_on_their_edge) {
     make("sand_loose", 0);
