@@ -70,14 +70,6 @@ class Checkers(unittest.TestCase):
             info = env.step(actions_of(env, step))[4]
         env.close()
 
-    def test_sync_vector(self):
-        """Single environments in Gymnasium's own vector environment."""
-        env = gymnasium.make_vec("mild/SA01-v0", num_envs=2, vectorization_mode="sync", overrides=SHORT)
-        env.reset(seed=1)
-        for step in range(120):
-            env.step(actions_of(env, step))
-        env.close()
-
 
 class Episodes(unittest.TestCase):
     def test_time_and_falls(self):

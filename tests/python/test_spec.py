@@ -240,14 +240,6 @@ class Attach(unittest.TestCase):
             mild.ground(bare, mujoco.MjData(bare))
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
-    def test_exclude_once(self):
-        """A pair that the model excludes already is not excluded again."""
-        spec = mujoco.MjSpec.from_string(PLATE)
-        spec.add_exclude(bodyname1="plate", bodyname2="world")
-        mild.attach(spec, ["plate"])
-        self.assertEqual(spec.compile().nexclude, 1)
-
-    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_load_plugin(self):
         """A model whose XML names the plugin."""
         mild.load_plugin()
