@@ -183,38 +183,6 @@ TEST(latencies_are_independent) {
     free(env);
 }
 
-/* A key turned off is off, and the nominal task is the nominal robot. */
-TEST(nominal) {
-    open_env();
-    task_def_make_nominal(&def);
-    const RobotVariation still = robot_variation_nominal();
-    for (int t = 0; t < 50; t++) {
-        draw_next();
-        const TaskVariation *v = &env->variation;
-        assert_true(v->base_mass_add == 0 && v->armature_scale == 1 && !v->rigid);
-        for (int i = 0; i < 3; i++) {
-            assert_true(v->com_offset[i] == 0);
-        }
-        assert_memory_equal(v->link_mass_scale, still.link_mass_scale,
-                            sizeof still.link_mass_scale);
-        for (int i = 0; i < SA01_JOINTS; i++) {
-            assert_true(env->kp_scale[i] == 1 && env->kd_scale[i] == 1 && env->strength[i] == 1);
-            assert_true(env->motor_offset[i] == 0);
-        }
-        assert_int_equal(task_env_rest(env)->terrain.patch_count, 0);
-        const MildMaterial *m = &task_env_rest(env)->terrain.materials[0];
-        int found = 0;
-        for (int p = 0; p < mild_material_preset_count(); p++) {
-            MildMaterial preset = mild_material_default();
-            mild_material_preset(mild_material_preset_name(p), &preset);
-            found += memcmp(&preset, m, sizeof preset) == 0;
-        }
-        assert_int_equal(found, 1);
-    }
-    assert_true(def.randomize.push_interval == 0 && !def.assist);
-    free(env);
-}
-
 /* Same (seed, environment, tick): same episode; another of any of them: another. */
 TEST(draws_are_a_function) {
     open_env();
@@ -234,36 +202,6 @@ TEST(draws_are_a_function) {
         env->index -= k == 2;
         env->tick -= k == 3;
     }
-    free(env);
-}
-
-/* Each bit of the seed counts: for the episode, the command, the place on a map. */
-TEST(every_bit_of_the_seed) {
-    MildError error = {0};
-    MildMapDef shape = mild_map_def_default();
-    shape.kind = MILD_MAP_ROUGH;
-    MildMap *map = mild_map_create(&shape, &error);
-    assert_non_null(map);
-    open_env();
-    def.map = map;
-    def.standing_share = 0;
-    double offset = 0, command = 0, place = 0;
-    for (int bit = -1; bit < 64; bit++) {
-        uint64_t seed = env->seed;
-        env->seed ^= bit < 0 ? 0 : (uint64_t)1 << bit;
-        task_env_draw(env, &def, robot);
-        task_draw_command(env, &def);
-        assert_true(env->motor_offset[3] != offset);
-        assert_true(env->command[0] != command);
-        assert_true(task_env_rest(env)->terrain.map_x != place);
-        if (bit < 0) {
-            offset = env->motor_offset[3];
-            command = env->command[0];
-            place = task_env_rest(env)->terrain.map_x;
-        }
-        env->seed = seed;
-    }
-    mild_map_destroy(map);
     free(env);
 }
 
