@@ -93,7 +93,8 @@ static void check_actions(char *text) {
     }
 }
 
-/* A point after each step but that of the fall, with the angles of the next decision's quaternion. */
+/* A point after each step but that of the fall, with the angles of the next decision's
+ * quaternion. */
 static void check_track(char *text) {
     double first[TRIALS], last[TRIALS];
     int points[TRIALS] = {0};

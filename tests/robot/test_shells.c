@@ -1,5 +1,5 @@
-/* Shells that stand on soft ground carry the robot. That in the air they change no bit of a step is in
- * plugin/test_body.c, that the ground under all bodies only takes energy in test_fallen.c. */
+/* Shells that stand on soft ground carry the robot. That in the air they change no bit of a step is
+ * in plugin/test_body.c, that the ground under all bodies only takes energy in test_fallen.c. */
 #include "all_robots.h"
 
 #define FILES MILD_SOURCE_DIR "/robots/sa01"

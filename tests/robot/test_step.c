@@ -1,5 +1,5 @@
-/* The step of SA01: the solver's twist, momentum, determinism, bad numbers. Against the engine's step
- * and dense algebra: test_walker.c. */
+/* The step of SA01: the solver's twist, momentum, determinism, bad numbers. Against the engine's
+ * step and dense algebra: test_walker.c. */
 #include <math.h>
 #include <string.h>
 
