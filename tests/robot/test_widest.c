@@ -1,5 +1,4 @@
-/* The widest robot that fits: forty joints, four feet, its feet against the engine's
- * Jacobians, its step against the engine's. */
+/* The widest robot that fits: forty joints, four feet, its step against the engine's. */
 #include <math.h>
 #include <string.h>
 
@@ -7,10 +6,9 @@
 
 #include <mujoco/mujoco.h>
 
-#include "given.h"
 #include "widest.h"
 
-enum { LEGS = WIDEST_LEGS, JOINTS = ROBOT_JOINTS_MAX, NV = ROBOT_NV_MAX, ROWS = 6 * LEGS };
+enum { JOINTS = ROBOT_JOINTS_MAX, NV = ROBOT_NV_MAX };
 
 static RobotSim *sim;
 
@@ -83,35 +81,6 @@ TEST(test_distances) {
     memcpy(up.qpos + 3, nose_up, sizeof nose_up);
     robot_sim_load(sim, &up, &nominal);
     assert_true(robot_sim_knee_distance(sim) == 0 && robot_sim_foot_distance(sim) == 0);
-}
-
-/* A = J M^-1 J^T of four balls on four chains, and the chains' common base. */
-TEST(test_map) {
-    RobotVariation nominal = robot_variation_nominal();
-    const mjModel *m = robot_sim_model(sim);
-    mjData *d = robot_sim_data(sim);
-    Given given = {.feet = 0};
-    double worst = 0;
-    for (uint32_t draw = 0; draw < 5; draw++) {
-        static double j[ROWS * NV], solved[ROWS * NV], wanted[ROWS * ROWS];
-        RobotState state = draw_state(draw);
-        robot_sim_load(sim, &state, &nominal);
-        mj_makeM(m, d);
-        mj_factorM(m, d);
-        memset(j, 0, sizeof j);
-        for (int f = 0; f < LEGS; f++) {
-            mj_jac(m, d, j + 6 * f * NV, NULL, robot_sim_foot(sim, f)->position,
-                   robot_foot_body(robot, f));
-        }
-        mj_solveM(m, d, solved, j, ROWS);
-        mju_mulMatMatT(wanted, j, solved, ROWS, NV, ROWS);
-        assert_int_equal(given_step(&given, sim, &state), 0);
-        for (int i = 0; i < ROWS * ROWS; i++) {
-            worst = fmax(worst, fabs(given.inverse_inertia[i] - wanted[i]) / (1 + fabs(wanted[i])));
-        }
-    }
-    print_message("inverse inertia of four feet: worst %.1e\n", worst);
-    assert_true(worst < 1e-10);
 }
 
 TEST(test_step) {
