@@ -99,6 +99,7 @@ TEST(power_and_speed) {
         expect_near("torque of the step", m.torque, 0.25 * k, 0);
         expect_near("greatest torque", m.torque_max, 0.5, 0);
     }
+    assert_true(m.base_low > 1e8 && m.base_high < -1e8); /* nothing is steady yet */
 }
 
 /* On a circle to the left: 0.5 m/s forward and 0.1 m/s to the left of a heading that turns by 0.8
