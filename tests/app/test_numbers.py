@@ -89,60 +89,6 @@ def press_straight():
         near("table, up", up, min(rows[turn:], key=lambda r: abs(r["depth_m"] - 1e-3 * depth))["force_n"], 0.01 * (up + 50))
 
 
-def press_turns():
-    """The table of turns: where it turned, with which force."""
-    lines = table(printed_by("press", "--ground", "grass", "--depth", "0.01,0.008,0.02"))
-    forces = [printed_by("press", "--ground", "grass", "--depth", d) for d in (0.01, 0.02)]
-    peaks = [found(r"peak ([\d.]+) N", text)[0] for text in forces]
-    near("pairs of turns", len(lines), 2, 0)
-    for line, (number, down, up, peak) in zip(lines, ((1, 10, 8, peaks[0]), (2, 20, 0, peaks[1]))):
-        near("number of the turn", line[0], number, 0)
-        near("down to", line[1], down, 1e-3)
-        near("force there", line[2], peak, 0.06)
-        near("up to", line[3], up, 1e-3)
-        true("less force above", line[4] < 0.9 * line[2])
-
-
-def press_tilted():
-    """Front edge down: the force acts in front, and turns the front up, which is negative about y."""
-    _, c, printed = pressed("--ground", "foam45", "--plate", "0.2,0.1", "--tilt", 5, "--depth", 0.02)
-    near("tilted", found(r"tilted ([\d.-]+) deg", printed)[0], 5, 0)
-    for force, x, y, px, py in zip(*(c[k] for k in ("force_n", "moment_x_nm", "moment_y_nm", "zmp_x_m", "zmp_y_m"))):
-        if force > 0:
-            near("moment about y", y, -px * force, 1e-6 * force)
-            near("moment about x", x, 0, 1e-6 * force)
-            near("sideways", py, 0, 1e-9)
-    true("in front", 0.01 < max(p for p in c["zmp_x_m"] if p == p) <= 0.1)
-    # the lower edge touches first: half the plate times the sine above the surface
-    near("first contact", c["depth_m"][0], -(0.2 // PITCH * PITCH / 2 - PITCH / 2) * math.sin(math.radians(5)), 2e-3)
-
-
-def press_dragged():
-    """Forward at constant depth: the ground resists, along x alone."""
-    rows, c, printed = pressed("--ground", "grass", "--depth", 0.01, "--drag", 0.05, "--drag-speed", 0.1, "--tilt", 4)
-    moving = [r for r in rows if 0 < r["x_m"] < 0.05]
-    near("moved", max(c["x_m"]), 0.05, 1e-9)
-    near("tilt", max(c["tilt_rad"]), math.radians(4), 1e-9)
-    near("tilt stays", min(c["tilt_rad"]), math.radians(4), 1e-9)
-    near("time of the drag", moving[-1]["time_s"] - moving[0]["time_s"], (moving[-1]["x_m"] - moving[0]["x_m"]) / 0.1, 1e-9)
-    true("the drag's rows", len(moving) > 100)
-    for r in moving[10:]:
-        true("friction resists", r["force_x_n"] < -0.1 * r["force_n"])
-        near("friction sideways", r["force_y_n"], 0, 1e-6)
-        near("depth of the drag", r["depth_m"], 0.01, 1e-9)
-    work = -integral([r["x_m"] for r in rows], [r["force_x_n"] for r in rows])
-    near("work of the drag", found(r"work of the drag ([\d.]+) J", printed)[0], work, 2e-3 * work + 6e-4)
-    way, speed = found(r"dragged ([\d.]+) mm at ([\d.]+) m/s", printed)
-    near("way of the drag", way, 50, 0)
-    near("its speed", speed, 0.1, 0)
-    for moved, forward, up in table(printed_by("press", "--ground", "grass", "--depth", 0.01, "--drag", 0.05, "--drag-speed", 0.1,
-                                         "--tilt", 4).split("moved")[1]):
-        row = min(moving, key=lambda r: abs(r["x_m"] - 1e-3 * moved))
-        if 1 < moved < 49:
-            near("table of the drag, forward", forward, row["force_x_n"], 0.5)
-            near("table of the drag, up", up, row["force_n"], 0.5)
-
-
 def press_dropped():
     """A free fall, a first stop, and at rest the weight."""
     options = ("--ground", "sand_loose", "--drop", 0.03, "--impact", 0.2, "--mass", 8, "--tilt", 3)
@@ -177,9 +123,6 @@ def press_dropped():
 
 def press():
     press_straight()
-    press_turns()
-    press_tilted()
-    press_dragged()
     press_dropped()
 
 

@@ -1,4 +1,4 @@
-/* Random steps for the tests of the batch engine, here and on a GPU. */
+/* Random steps for the tests of the batch engine. */
 #ifndef TESTS_ENGINE_CASES_H
 #define TESTS_ENGINE_CASES_H
 

@@ -165,15 +165,6 @@ TEST(rows_agree_on_a_map) {
     mild_map_destroy(map);
 }
 
-/* A soil of bekker, and grounds matched to another model. */
-TEST(rows_agree_on_other_models) {
-    static const char *const names[] = {"dry_sand", "grass", NULL};
-    static const double speed = 0.5;
-    model = MILD_MODEL_ECC_QUASI_3D;
-    compare_rows(names, &speed, 1, 0, MILD_BATCH_HOST);
-    model = MILD_MODEL_MILD;
-}
-
 TEST(turning_rows_agree) {
     static const char *const names[] = {"foam60", NULL};
     static const double speed = 0.4;
@@ -243,49 +234,6 @@ TEST(falls_are_counted) {
     assert_true(own.seconds > 0.2 && fabs(rows[0].seconds / own.seconds - 1) < 0.1);
     assert_true(fabs(rows[0].energy / own.energy - 1) < 0.1);
     pool_destroy(pool);
-}
-
-/* The Go1, held in its pose by a policy of zeros and stiff joints, on four round feet. It has as
- * many joints as SA01, and so an observation of the same width. */
-TEST(four_feet_are_measured) {
-    static const char *const names[] = {"rigid", "rubber", "grass", NULL};
-    static const double speed = 0.3;
-    const EvalDef eval = {.speed = speed, .trials = 3, .seconds = 3, .seed = 1};
-    MildError error = {0};
-    Asked asked;
-    Controller controller = zero_controller(&asked);
-    Robot *biped = robot;
-    const TaskDef before = def;
-    Pool *pool = pool_create(2);
-    EvalRow rows[ROWS], own;
-    Scene scene[ROWS];
-    char line[256];
-    const int count = scenes_of(names, scene);
-    strcpy(def.kp, "50");
-    strcpy(def.kd, "1.5");
-    robot = robot_create(MILD_SOURCE_DIR "/robots/go1", &error);
-    assert_true(robot && robot_feet(robot) == 4 && robot_joints(robot) == SA01_JOINTS);
-    assert_int_equal(run_batch(&controller, pool, names, &speed, 1, eval, rows, &error), MILD_OK);
-    for (int i = 0; i < count; i++) {
-        const EvalRow *row = &rows[i];
-        assert_int_equal(kit_run(&def, pool, &controller, &scene[i], &eval, &own, &error), MILD_OK);
-        eval_print_row(row, line, sizeof line);
-        printf("%s\n", line);
-        eval_print_row(&own, line, sizeof line);
-        printf("%s\n", line);
-        assert_true(row->success == own.success && row->success > 0);
-        near("velocity", row, row->velocity, own.velocity, 1e-4);
-        near("cot", row, row->cot / own.cot, 1, 1e-3);
-        near("torque_max", row, row->torque_max / own.torque_max, 1, 1e-3);
-        near("clearance", row, row->clearance, own.clearance, 1e-5);
-        near("penetration", row, row->penetration, own.penetration, 1e-3 * own.penetration);
-        near("drift", row, row->drift / own.drift, 1, 1e-3);
-        near("energy", row, row->energy / own.energy, 1, 1e-3);
-    }
-    pool_destroy(pool);
-    robot_destroy(robot);
-    robot = biped;
-    def = before;
 }
 
 /* What the policy sees: its own speed, sideways too, turned towards world x, until the stop. */

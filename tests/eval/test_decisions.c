@@ -1,12 +1,14 @@
 /* What a trial writes down at each decision and each policy step, of three robots of which the
  * second falls: the CSV of EvalDef.actions against the environments that the watch was shown, and
  * the points of EvalDef.track. */
+#include <mujoco/mujoco.h>
+
 #include "eval_kit.h"
 
 #include "run/eval/actions.h"
 
 enum { TRIALS = 3, FALLS = 1, STEPS = 200, COLUMNS_MAX = 160 };
-enum { BEFORE = 15 }; /* columns before the joints' */
+enum { BEFORE = 15, QUATERNION = 5 }; /* columns before the joints'; its place in `shown` */
 
 static double shown[TRIALS][STEPS][COLUMNS_MAX]; /* from the column `time_s` on */
 static float given[TRIALS * ROBOT_JOINTS_MAX];   /* actions of the last call of falling_act */
@@ -91,16 +93,24 @@ static void check_actions(char *text) {
     }
 }
 
-/* A point after each step but that of the fall. */
+/* A point after each step but that of the fall, with the angles of the next decision's
+ * quaternion. */
 static void check_track(char *text) {
     double first[TRIALS], last[TRIALS];
     int points[TRIALS] = {0};
     char *more, *line = strtok_r(text, "\n", &more);
     for (; line; line = strtok_r(NULL, "\n", &more)) {
         int trial;
-        double time, x;
-        assert_int_equal(sscanf(line, "foam60,0.5,%d,%lf,%lf", &trial, &time, &x), 3);
+        double time, x, roll, pitch, R[9];
+        assert_int_equal(sscanf(line, "foam60,0.5,%d,%lf,%lf,%*f,%*f,%*f,%*f,%*f,%lf,%lf", &trial,
+                                &time, &x, &roll, &pitch),
+                         5);
         assert_true(trial >= 0 && trial < TRIALS);
+        if (points[trial] + 1 < decisions[trial]) {
+            mju_quat2Mat(R, shown[trial][points[trial] + 1] + QUATERNION);
+            expect_near("roll", roll, atan2(R[7], R[8]), 5.1e-6);
+            expect_near("pitch", pitch, asin(-R[6]), 5.1e-6);
+        }
         first[trial] = points[trial] == 0 ? x : first[trial];
         last[trial] = x;
         assert_true(fabs(time - 0.01 * ++points[trial]) < 1e-6);

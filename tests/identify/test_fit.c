@@ -152,25 +152,6 @@ TEST(exact) {
     printf("no noise, nothing held: worst error %.1e\n", worst);
 }
 
-/* Far from the start: cones that are complete at 0.5 mm to 0.1 m, stiffer or softer than their
- * surroundings. Of the first, ten rows determine k_pen. */
-TEST(shapes) {
-    static const double alphas[] = {0.1, 0.7, 1.047, 1.4, 1.45}, nus[] = {2, 3, 0.5, 1, 0.9};
-    for (int i = 0; i < 10; i++) {
-        FitDef truth = plate("grass");
-        MildMaterial *m = &truth.material;
-        m->alpha = alphas[i / 2];
-        m->nu = nus[i / 2];
-        m->sigma_cone = (i % 2 ? 3 : 0.3) * m->k_pen * cos(m->alpha) / (0.0195 * 0.0195);
-        hold(&truth, "c_g c_d phi rho");
-        press_exactly(&truth, points, ROWS, 0.04, 0.01, 0);
-        FitResult result = run(&truth, ROWS);
-        is_within(&result, "k_pen", m->k_pen, 0.01);
-        is_within(&result, "tan(alpha)/nu", tan(m->alpha) / m->nu, 0.01);
-        is_within(&result, "sigma_cone/cos(alpha)", m->sigma_cone / cos(m->alpha), 0.01);
-    }
-}
-
 /* What is held turns the combinations into parameters: with alpha both parts of the cone, with phi
  * and rho the mass, of which a record that brakes determines c_d. */
 TEST(held) {
@@ -327,21 +308,6 @@ static FitDef bekker_rows(int plates, const double *width, double k_c, double k_
 
 static int is_about(FitResult *result, const char *name, double truth) {
     return fabs(value_of(result, name)->value / truth - 1) < 2e-3;
-}
-
-/* Pressure that grows with the plate: 7.7 and 13.7 kPa at 10 mm under discs of 60 and 100 mm, and a
- * power of 1.35 of the depth, as others measured in real sand (lab/grains/real-sand.md). k_c and
- * k_phi by hand from the two. */
-TEST(pressure_grows_with_the_plate) {
-    const double width[] = {0.03, 0.05}, power = pow(0.01, 1.35);
-    const double k_c = (7.7e3 - 13.7e3) / (1 / 0.03 - 1 / 0.05) / power;
-    const double k_phi = 13.7e3 / power - k_c / 0.05;
-    FitDef def = bekker_rows(2, width, k_c, k_phi, 1.35);
-    FitResult result = run(&def, ROWS / 2);
-    print_message("k_c %.5g, k_phi %.5g\n", value_of(&result, "k_c")->value,
-                  value_of(&result, "k_phi")->value);
-    assert_true(is_about(&result, "k_c", k_c) && is_about(&result, "k_phi", k_phi));
-    assert_true(is_about(&result, "exponent", 1.35) && value_of(&result, "k_c")->high < 0);
 }
 
 /* Of any such ground, down to a modulus of 1/1000 of k_phi under the smallest of two or three

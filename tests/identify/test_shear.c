@@ -168,14 +168,6 @@ TEST(one_pressure) {
     expect_fitted(&result, "mu", MU, 1e-4);
 }
 
-TEST(only_bekker_shears) {
-    const MildField *fields[FIT_PARAMETERS_MAX];
-    for (int m = 0; m < MILD_MODEL_RIGID; m++) {
-        assert_int_equal(fit_parameters((MildModel)m, FIT_SHEAR, fields),
-                         m == MILD_MODEL_BEKKER ? 3 : 0);
-    }
-}
-
 /* ---- unloading ---- */
 
 /* A way up from `deepest`, where the force was `most`: the line of docs/model.md section 5. */

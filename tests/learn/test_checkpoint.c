@@ -154,23 +154,6 @@ TEST(another_network_is_refused) {
     run_close(&same);
 }
 
-/* An actor that has learned without the clock goes on without it, and one with it with it. */
-TEST(another_view_of_the_clock_is_refused) {
-    PolicyDef blind = toy_policy_def();
-    PpoDef def = toy_ppo_def();
-    blind.actor_phase = 0;
-    Run run, other;
-    run_open_toy(&run);
-    run_open(&other, &blind, &def);
-    save(&run);
-    check_bad_checkpoint(&other, MILD_ERROR_ARGUMENT, "policy.actor_phase true false");
-    save(&other);
-    check_bad_checkpoint(&run, MILD_ERROR_ARGUMENT, "policy.actor_phase false true");
-    unlink(PATH);
-    run_close(&run);
-    run_close(&other);
-}
-
 /* The moments of one optimiser are none to the other. */
 TEST(another_optimizer_is_refused) {
     MildError error = {0};

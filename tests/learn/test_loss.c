@@ -1,23 +1,19 @@
-/* The joint loss and its gradient: against PyTorch's stored values, and against central differences
- * of the loss written down a second time in double precision. */
+/* The joint loss and its gradient: against the loss written down a second time in double precision,
+ * and its central differences. */
 #include "check.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "learn/loss.h"
 #include "learn/loss_sample.h"
-#include "learn/policy.h"
 #include "learn/product.h"
-#include "learn/safetensors.h"
 
 #define ROWS 40
 #define MIRRORED 20
 
-/* As in make_reference.py. */
 static const int mirror_o[] = {0, 2, 1, 4, 3}, mirror_a[] = {1, 0};
 static const float sign_o[] = {-1, 1, 1, -1, -1}, sign_a[] = {-1, -1};
 static const PpoMirror mirror = {mirror_o, sign_o, mirror_a, sign_a};
@@ -97,119 +93,6 @@ static void assert_near(const char *what, double ours, double theirs, double tol
     }
 }
 
-/* ---- PyTorch ---- */
-
-static void take_input(const Safetensors *file, const char *name, float *to) {
-    char key[64];
-    snprintf(key, sizeof key, "train.input.%s", name);
-    const Safetensor *tensor = safetensors_find(file, key);
-    assert_non_null(tensor);
-    memcpy(to, tensor->data, tensor->bytes);
-}
-
-static void take_inputs(const Safetensors *file, Case *c) {
-    LossChunk *chunk = &c->chunk;
-    take_input(file, "history", chunk->history);
-    take_input(file, "estimate", chunk->estimate);
-    take_input(file, "clean", chunk->decoder_target);
-    take_input(file, "noise", chunk->noise);
-    take_input(file, "action", chunk->action);
-    take_input(file, "old_mean", chunk->old_mean);
-    take_input(file, "old_log_prob", chunk->old_log_prob);
-    take_input(file, "advantage", chunk->advantage);
-    take_input(file, "critic", chunk->critic);
-    take_input(file, "old_value", chunk->old_value);
-    take_input(file, "returns", chunk->returns);
-    take_input(file, "old_std", c->context.old_std);
-}
-
-/* The file of a policy whose numbers are their own places: it says under which name, and where in
- * its tensor, a file has each. */
-static Safetensors *open_places(int64_t count) {
-    char path[64];
-    MildError error = {0};
-    const PolicyDef def = small_def();
-    Policy *policy = policy_create(&def, 1, &error);
-    assert_non_null(policy);
-    for (int64_t i = 0; i < count; i++) {
-        policy_parameters(policy)[i] = (float)i;
-    }
-    snprintf(path, sizeof path, "/tmp/mild_places_%d", getpid());
-    assert_int_equal(policy_save(policy, path, "", &error), MILD_OK);
-    Safetensors *places = safetensors_read(path, &error);
-    assert_non_null(places);
-    unlink(path);
-    policy_destroy(policy);
-    return places;
-}
-
-static float number_at(const Safetensor *tensor, size_t i) {
-    float number;
-    memcpy(&number, (const char *)tensor->data + i * sizeof number, sizeof number);
-    return number;
-}
-
-/* The parameters, which have the names of a policy's file. */
-static void take_parameters(const Safetensors *file, const Safetensors *places, float *parameters) {
-    for (int k = 0; k < safetensors_count(places); k++) {
-        const Safetensor *where = safetensors_at(places, k);
-        const Safetensor *from = safetensors_find(file, where->name);
-        assert_true(from && from->bytes == where->bytes);
-        for (size_t i = 0; i < from->bytes / sizeof(float); i++) {
-            parameters[(int)number_at(where, i)] = number_at(from, i);
-        }
-    }
-}
-
-static void check_gradient(const Safetensors *file, const Safetensors *places,
-                           const float *gradient, double *worst) {
-    for (int k = 0; k < safetensors_count(places); k++) {
-        const Safetensor *where = safetensors_at(places, k);
-        char key[64];
-        snprintf(key, sizeof key, "train.gradient.%s", where->name);
-        const Safetensor *want = safetensors_find(file, key);
-        assert_non_null(want);
-        assert_int_equal(want->bytes, where->bytes);
-        for (size_t i = 0; i < want->bytes / sizeof(float); i++) {
-            assert_near(where->name, (double)gradient[(int)number_at(where, i)],
-                        (double)number_at(want, i), 1e-5, worst);
-        }
-    }
-}
-
-TEST(test_matches_pytorch) {
-    MildError error = {0};
-    const char *path = MILD_SOURCE_DIR "/tests/learn/reference.safetensors";
-    Safetensors *file = safetensors_read(path, &error);
-    assert_non_null(file);
-    Case c;
-    case_open(&c, small_def());
-    Safetensors *places = open_places(c.network.count);
-    take_parameters(file, places, c.parameters);
-    take_inputs(file, &c);
-    case_run(&c);
-
-    float terms[11];
-    double worst_loss = 0.0, worst_gradient = 0.0;
-    memcpy(terms, safetensors_find(file, "train.losses")->data, sizeof terms);
-    const double ours[] = {c.sums.surrogate / ROWS,   c.sums.kl / ROWS,
-                           c.sums.clipped / ROWS,     c.sums.reconstruction / ROWS,
-                           c.sums.vae_kl / ROWS,      c.sums.estimate[0] / ROWS,
-                           c.sums.estimate[1] / ROWS, c.sums.estimate[2] / ROWS,
-                           c.sums.mirror / MIRRORED,  c.sums.value / ROWS};
-    for (size_t i = 0; i < sizeof ours / sizeof *ours; i++) {
-        assert_near("loss", ours[i], terms[i], 1e-5, &worst_loss);
-    }
-    assert_true(terms[2] > 0.1f && terms[2] < 0.9f); /* both branches of the clip are there */
-
-    check_gradient(file, places, c.gradient, &worst_gradient);
-    print_message("worst against PyTorch: losses %.1e, gradients %.1e\n", worst_loss,
-                  worst_gradient);
-    safetensors_destroy(file);
-    safetensors_destroy(places);
-    case_close(&c);
-}
-
 /* ---- the loss in double, straight from its formulas ---- */
 
 static void mlp_double(const Mlp *mlp, const double *p, const double *x, double *y) {
@@ -268,7 +151,9 @@ static void act_double(const Network *n, const double *p, const double *history,
     mlp_double(&n->actor, p, input, mean);
 }
 
-static double regression_double(const Case *c, const double *p, const double *heads, int r) {
+/* Returns what sample r adds to the loss, and adds its parts to the sums. */
+static double regression_double(const Case *c, const double *p, const double *heads, int r,
+                                LossSums *sums) {
     const Network *n = &c->network;
     const PolicyDef *d = &n->def;
     double input[64], decoded[64], loss = 0.0;
@@ -277,32 +162,39 @@ static double regression_double(const Case *c, const double *p, const double *he
     for (int j = 0; j < d->latent; j++) {
         double mu = heads[d->estimates + j], logvar = heads[d->estimates + d->latent + j];
         input[j] = mu + exp(0.5 * logvar) * (double)c->chunk.noise[r * d->latent + j];
-        loss += c->def.kl_weight *
-                fmax(-0.5 * (1.0 + logvar - mu * mu - exp(logvar)), c->def.free_bits);
+        const double kl = -0.5 * (1.0 + logvar - mu * mu - exp(logvar));
+        loss += c->def.kl_weight * fmax(kl, c->def.free_bits);
+        sums->vae_kl += kl;
     }
     memcpy(input + d->latent, heads, (size_t)d->estimates * sizeof *input);
     mlp_double(&n->decoder, p, input, decoded);
     const int frame = d->decoder_frame ? d->observation : 0, width = frame + d->ground_count;
     for (int j = 0; j < width; j++) {
-        loss += pow(decoded[j] - (double)c->chunk.decoder_target[r * width + j], 2) /
-                (j < frame ? frame : d->ground_count);
+        const double square = pow(decoded[j] - (double)c->chunk.decoder_target[r * width + j], 2);
+        sums->reconstruction += square / (j < frame ? frame : d->ground_count);
+        loss += square / (j < frame ? frame : d->ground_count);
     }
     for (int g = 0; g < 3; g++) {
         for (int j = ends[g]; j < ends[g + 1]; j++) {
-            loss += pow(heads[j] - (double)c->chunk.estimate[r * d->estimates + j], 2) /
-                    (ends[g + 1] - ends[g]);
+            const double square =
+                pow(heads[j] - (double)c->chunk.estimate[r * d->estimates + j], 2);
+            sums->estimate[g] += square / (ends[g + 1] - ends[g]);
+            loss += square / (ends[g + 1] - ends[g]);
         }
     }
     return loss;
 }
 
-static double policy_double(const Case *c, const double *p, const double *mean, int r) {
+static double policy_double(const Case *c, const double *p, const double *mean, int r,
+                            LossSums *sums) {
     const Network *n = &c->network;
     const int actions = n->def.actions;
     double log_prob = 0.0, entropy = 0.0;
     for (int j = 0; j < actions; j++) {
-        double log_std = p[n->log_std + j],
-               t = ((double)c->chunk.action[r * actions + j] - mean[j]) / exp(log_std);
+        double log_std = p[n->log_std + j], old = (double)c->context.old_std[j],
+               t = ((double)c->chunk.action[r * actions + j] - mean[j]) / exp(log_std),
+               shift = (double)c->chunk.old_mean[r * actions + j] - mean[j];
+        sums->kl += log_std - log(old) - 0.5 + 0.5 * (old * old + shift * shift) / exp(2 * log_std);
         log_prob -= 0.5 * t * t + log_std + 0.5 * log(2.0 * 3.14159265358979323846);
         entropy += log_std + 0.5 + 0.5 * log(2.0 * 3.14159265358979323846);
     }
@@ -318,14 +210,18 @@ static double policy_double(const Case *c, const double *p, const double *mean, 
     double held_value = old + fmin(fmax(value - old, -c->def.clip), c->def.clip);
     double value_loss = pow(value - returns, 2);
     value_loss = c->def.clip_value ? fmax(value_loss, pow(held_value - returns, 2)) : value_loss;
-    return -fmin(ratio * advantage, held * advantage) - c->def.entropy * entropy +
-           c->def.value_weight * value_loss;
+    const double surrogate = -fmin(ratio * advantage, held * advantage);
+    sums->surrogate += surrogate;
+    sums->clipped += ratio != held;
+    sums->value += value_loss;
+    return surrogate - c->def.entropy * entropy + c->def.value_weight * value_loss;
 }
 
-static double loss_double(const Case *c, const double *p) {
+static double loss_double(const Case *c, const double *p, LossSums *sums) {
     const Network *n = &c->network;
     const PolicyDef *d = &n->def;
     double loss = 0.0;
+    *sums = (LossSums){0};
     for (int r = 0; r < ROWS; r++) {
         double history[64], image[64], heads[64], mean[8], turned[8];
         for (int i = 0; i < n->history; i++) {
@@ -336,14 +232,14 @@ static double loss_double(const Case *c, const double *p) {
         }
         const float *noise = c->chunk.outputs.noise ? c->chunk.noise + r * d->latent : NULL;
         act_double(n, p, history, noise, heads, mean);
-        loss += c->def.epsilon * regression_double(c, p, heads, r) / ROWS;
-        loss += (1.0 - c->def.epsilon) * policy_double(c, p, mean, r) / ROWS;
+        loss += c->def.epsilon * regression_double(c, p, heads, r, sums) / ROWS;
+        loss += (1.0 - c->def.epsilon) * policy_double(c, p, mean, r, sums) / ROWS;
         noise = noise && r < MIRRORED ? noise + ROWS * d->latent : noise;
         act_double(n, p, image, noise, heads, turned);
         for (int j = 0; r < MIRRORED && j < d->actions; j++) {
-            loss += c->def.mirror_weight *
-                    pow(mean[j] - (double)sign_a[j] * turned[mirror_a[j]], 2) /
-                    (MIRRORED * d->actions);
+            const double gap = mean[j] - (double)sign_a[j] * turned[mirror_a[j]];
+            sums->mirror += gap * gap / d->actions;
+            loss += c->def.mirror_weight * gap * gap / (MIRRORED * d->actions);
         }
     }
     return loss;
@@ -365,29 +261,38 @@ static void clear_clock(Case *c) {
     }
 }
 
+/* Normal numbers in every array, none of which lies in another. */
 static void fill_inputs(Case *c, Random *random) {
     LossChunk *k = &c->chunk;
     const PolicyDef *d = &c->network.def;
-    fill_normal(c->parameters, c->network.count, 0.35, random);
-    clear_clock(c);
-    fill_normal(k->history, ROWS * c->network.history, 1.0, random);
-    fill_normal(k->estimate, ROWS * d->estimates, 1.0, random);
-    fill_normal(k->decoder_target, ROWS * c->network.decoded, 1.0, random);
-    fill_normal(k->noise, ROWS * d->latent, 1.0, random);
-    if (k->outputs.noise) {
-        fill_normal(k->noise + ROWS * d->latent, MIRRORED * d->latent, 1.0, random);
+    const struct {
+        float *at;
+        int64_t count;
+        double scale;
+    } inputs[] = {{c->parameters, c->network.count, 0.35},
+                  {k->history, ROWS * c->network.history, 1.0},
+                  {k->estimate, ROWS * d->estimates, 1.0},
+                  {k->decoder_target, ROWS * c->network.decoded, 1.0},
+                  {k->noise, (ROWS + (k->outputs.noise ? MIRRORED : 0)) * d->latent, 1.0},
+                  {k->action, ROWS * d->actions, 1.0},
+                  {k->old_mean, ROWS * d->actions, 1.0},
+                  {k->advantage, ROWS, 1.0},
+                  {k->critic, ROWS * d->critic_input, 1.0},
+                  {k->old_value, ROWS, 0.5},
+                  {k->returns, ROWS, 1.0}};
+    for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++) {
+        fill_normal(inputs[i].at, inputs[i].count, inputs[i].scale, random);
+        for (size_t b = 0; b < i; b++) {
+            assert_true(inputs[i].at >= inputs[b].at + inputs[b].count ||
+                        inputs[b].at >= inputs[i].at + inputs[i].count);
+        }
     }
-    fill_normal(k->action, ROWS * d->actions, 1.0, random);
-    fill_normal(k->old_mean, ROWS * d->actions, 1.0, random);
-    fill_normal(k->advantage, ROWS, 1.0, random);
-    fill_normal(k->critic, ROWS * d->critic_input, 1.0, random);
-    fill_normal(k->old_value, ROWS, 0.5, random);
-    fill_normal(k->returns, ROWS, 1.0, random);
+    clear_clock(c);
     for (int r = 0; r < ROWS; r++) {
         k->old_log_prob[r] = (float)(-2.5 + 0.3 * random_normal(random));
     }
     for (int j = 0; j < d->actions; j++) {
-        c->context.old_std[j] = 1.0f;
+        c->context.old_std[j] = j ? 1.1f : 0.8f;
     }
 }
 
@@ -398,6 +303,8 @@ static void check_differences(PolicyDef policy_def, int clip_value, double free_
                               uint64_t seed) {
     Case c;
     Random random = random_at(seed, 0, 0);
+    LossSums sums;
+    const double *const ours = (const double *)&c.sums, *const wanted = (const double *)&sums;
     case_open(&c, policy_def);
     c.def.clip_value = clip_value;
     c.def.free_bits = free_bits;
@@ -409,13 +316,18 @@ static void check_differences(PolicyDef policy_def, int clip_value, double free_
     for (int64_t i = 0; i < c.network.count; i++) {
         p[i] = c.parameters[i];
     }
+    loss_double(&c, p, &sums);
+    for (size_t i = 0; i < sizeof sums / sizeof *wanted; i++) {
+        assert_near("sum", ours[i], wanted[i], 1e-5, &worst);
+    }
+    assert_true(sums.clipped > 0 && sums.clipped < ROWS);
     const int stride = kit_short() ? 13 : 1; /* divides no width of a layer */
     for (int64_t i = 0; i < c.network.count; i += stride) {
         const double step = 1e-6, at = p[i];
         p[i] = at + step;
-        double high = loss_double(&c, p);
+        double high = loss_double(&c, p, &sums);
         p[i] = at - step;
-        double low = loss_double(&c, p);
+        double low = loss_double(&c, p, &sums);
         p[i] = at;
         assert_near("gradient", c.gradient[i], (high - low) / (2.0 * step), 2e-5, &worst);
     }
@@ -463,188 +375,6 @@ TEST(test_awareness_matches_differences) {
     check_differences(def, 1, 0.0, 1, 14);
     def.modulation_per_dimension = 1;
     check_differences(def, 1, 0.7, 1, 15);
-}
-
-/* Each part of the decoder's output is a mean over its own numbers: 2^2 + 3^2, whatever the widths.
- */
-static void parts_weigh_the_same(int ground) {
-    const int width = 5 + ground;
-    Case c;
-    Random random = random_at(9, 0, 0);
-    PolicyDef def = small_def();
-    def.ground_offset = 5;
-    def.ground_count = ground;
-    case_open(&c, def);
-    assert_int_equal(c.network.decoded, width);
-    fill_inputs(&c, &random);
-    const MlpLayer *last = &c.network.decoder.layer[c.network.decoder.layers - 1];
-    memset(c.parameters + last->weight, 0, (size_t)(last->in * last->out) * sizeof(float));
-    memset(c.parameters + last->bias, 0, (size_t)last->out * sizeof(float));
-    for (int i = 0; i < ROWS * width; i++) { /* decoded 0: squares 4 and 9 */
-        c.chunk.decoder_target[i] = i % width < 5 ? 2.0f : 3.0f;
-    }
-    case_run(&c);
-    double worst = 0.0;
-    assert_near("loss", c.sums.reconstruction / ROWS, 4.0 + 9.0, 1e-6, &worst);
-    for (int j = 0; j < width; j++) { /* epsilon 2 (0 - target) / width of the part */
-        assert_near("gradient", c.gradient[last->bias + j],
-                    j < 5 ? -0.3 * 4.0 / 5.0 : -0.3 * 6.0 / ground, 1e-6, &worst);
-    }
-    case_close(&c);
-}
-
-TEST(test_parts_of_the_decoder_weigh_the_same) {
-    parts_weigh_the_same(2);
-    parts_weigh_the_same(1);
-}
-
-/* Chunks add up: the gradient with beta 1 on top of another is their sum. */
-TEST(test_chunks_add) {
-    Case c;
-    Random random = random_at(4, 0, 0);
-    case_open(&c, small_def());
-    fill_inputs(&c, &random);
-    case_run(&c);
-    float *once = calloc((size_t)c.network.count, sizeof *once);
-    assert_non_null(once);
-    memcpy(once, c.gradient, (size_t)c.network.count * sizeof *once);
-    loss_actor(&c.context, &c.chunk, c.gradient, 1.0f, &c.sums);
-    loss_critic(&c.context, &c.chunk, c.gradient, 1.0f, &c.sums);
-    double worst = 0.0;
-    for (int64_t i = 0; i < c.network.count; i++) {
-        assert_near("twice", c.gradient[i], 2.0 * (double)once[i], 1e-5, &worst);
-    }
-    free(once);
-    case_close(&c);
-}
-
-/* Takes an area of the block for itself. */
-static void claim(const float *block, size_t floats, char *taken, const float *area, int rows,
-                  int width) {
-    assert_true(area >= block);
-    const size_t first = (size_t)(area - block), count = (size_t)rows * (size_t)width;
-    assert_true(first + count <= floats);
-    for (size_t i = first; i < first + count; i++) {
-        assert_int_equal(taken[i], 0);
-        taken[i] = 1;
-    }
-}
-
-/* Every array of a chunk has the rows and columns that loss.h gives it, for itself alone. */
-static void areas_are_apart(int modulation_input, int feet, int input) {
-    Case c;
-    PolicyDef def = small_def();
-    def.ground_count = 3;
-    def.modulation_input = modulation_input;
-    case_open(&c, def);
-    const Network *n = &c.network;
-    const PolicyDef *d = &n->def;
-    const LossChunk *k = &c.chunk;
-    const Mlp *const mlps[] = {&n->encoder, &n->modulation, &n->actor, &n->decoder, &n->critic};
-    const MlpOutputs *const outputs[] = {&k->outputs.encoder, &k->outputs.modulation,
-                                         &k->outputs.actor, &k->decoder, &k->value};
-    LossChunk again;
-    const size_t floats = loss_carve(n, ROWS, MIRRORED, NULL, &again);
-    char *taken = calloc(floats, 1);
-    assert_non_null(taken);
-    const int all = ROWS + MIRRORED;
-    int widest = 0;
-    for (int i = 0; i < NETWORK_MLPS; i++) {
-        for (int l = 0; l < mlps[i]->layers; l++) {
-            const MlpLayer *layer = &mlps[i]->layer[l];
-            claim(c.block, floats, taken, outputs[i]->y[l], i < 3 ? all : ROWS, layer->out);
-            widest = layer->out > widest ? layer->out : widest;
-            widest = layer->in > widest ? layer->in : widest;
-        }
-    }
-    const struct {
-        const float *at;
-        int rows, width;
-    } areas[] = {{k->history, all, n->history},
-                 {k->estimate, ROWS, d->estimates},
-                 {k->decoder_target, ROWS, n->decoded},
-                 {k->noise, all, d->latent},
-                 {k->action, ROWS, d->actions},
-                 {k->old_mean, ROWS, d->actions},
-                 {k->old_log_prob, ROWS, 1},
-                 {k->advantage, ROWS, 1},
-                 {k->critic, ROWS, d->critic_input},
-                 {k->old_value, ROWS, 1},
-                 {k->returns, ROWS, 1},
-                 {k->outputs.modulation_input, all, input},
-                 {k->outputs.actor_input, all, n->actor_input},
-                 {k->decoder_input, ROWS, n->decoder_input},
-                 {k->spread, ROWS, d->latent},
-                 {k->d_mean, all, d->actions},
-                 {k->d_heads, all, n->heads},
-                 {k->d_theta, all, n->theta},
-                 {k->d_actor_input, all, d->estimates + d->latent},
-                 {k->d_feet, all, feet},
-                 {k->d_decoded, ROWS, n->decoded},
-                 {k->d_decoder_input, ROWS, n->decoder_input},
-                 {k->d_value, ROWS, 1},
-                 {k->work[0], all, widest},
-                 {k->work[1], all, widest}};
-    for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
-        claim(c.block, floats, taken, areas[i].at, areas[i].rows, areas[i].width);
-    }
-    free(taken);
-    case_close(&c);
-}
-
-TEST(test_areas_are_apart) {
-    areas_are_apart(POLICY_INPUT_FEET, 3, 3);
-    areas_are_apart(POLICY_INPUT_FEET_PHASE, 5, 7);
-}
-
-/* Every latent gets the log-variance b: it counts as held within -12 and 6. Without noise only the
- * KL term e^b - 1 - b pulls, back inside from anywhere; without the KL term what would lead farther
- * out is dropped. */
-TEST(test_logvar_is_held) {
-    static const double logvar[] = {-40, -12.5, -11.5, 0.3, 5.5, 6.5, 50};
-    enum { COUNT = sizeof logvar / sizeof *logvar };
-    Case c;
-    Random random = random_at(6, 0, 0);
-    case_open(&c, small_def());
-    fill_inputs(&c, &random);
-    const PolicyDef *d = &c.network.def;
-    const MlpLayer *heads = &c.network.encoder.layer[c.network.encoder.layers - 1];
-    const int first = d->estimates + d->latent; /* mu stands before them */
-    double worst = 0.0, dropped = 0.0;
-    for (int j = first; j < first + d->latent; j++) {
-        memset(c.parameters + heads->weight + (int64_t)j * heads->in, 0,
-               (size_t)heads->in * sizeof *c.parameters);
-    }
-    for (int k = 0; k < COUNT; k++) {
-        const double held = fmin(fmax(logvar[k], -12), 6), kl_weight = c.def.kl_weight;
-        for (int j = first; j < first + d->latent; j++) {
-            c.parameters[heads->bias + j] = (float)logvar[k];
-        }
-        case_run(&c);
-        for (int i = 0; i < ROWS * d->latent; i++) {
-            assert_near("spread", c.chunk.spread[i] / exp(0.5 * held), 1.0, 1e-5, &worst);
-        }
-        c.def.kl_weight = 0;
-        case_run(&c);
-        for (int j = first; j < first + d->latent; j++) {
-            double g = (double)c.gradient[heads->bias + j];
-            assert_true(held == logvar[k] || g * (logvar[k] - held) >= 0.0);
-            dropped += held != logvar[k] && g != 0.0;
-        }
-        c.def.kl_weight = kl_weight;
-        float noise[ROWS * 8];
-        memcpy(noise, c.chunk.noise, sizeof(float) * ROWS * (size_t)d->latent);
-        memset(c.chunk.noise, 0, sizeof(float) * ROWS * (size_t)d->latent);
-        case_run(&c);
-        const double wanted = c.def.epsilon * kl_weight * 0.5 * expm1(held);
-        for (int j = first; j < first + d->latent; j++) {
-            assert_near("pull", c.gradient[heads->bias + j] / wanted, 1.0, 1e-4, &worst);
-        }
-        memcpy(c.chunk.noise, noise, sizeof(float) * ROWS * (size_t)d->latent);
-    }
-    print_message("held log-variances: worst %.1e\n", worst);
-    assert_true(dropped > 0); /* some gradients do lead inside */
-    case_close(&c);
 }
 
 /* The log-variance at -20, -12, 0, 6 and 20, with the gradient pushing down and up: used within its

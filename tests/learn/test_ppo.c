@@ -382,20 +382,6 @@ TEST(test_decoder_must_fit) {
     pool_destroy(pool);
 }
 
-TEST(test_nothing_valid_changes_nothing) {
-    Run a, b;
-    run_open(&a, 2, 4, toy_ppo_def());
-    run_open(&b, 2, 4, toy_ppo_def());
-    toy_rollout(&a.toy, a.ppo);
-    memset(ppo_batch(a.ppo)->valid, 0, 4 * 40);
-    PpoReport report;
-    ppo_update(a.ppo, &report);
-    assert_same_parameters(&a, &b);
-    assert_int_equal(ppo_iteration(a.ppo), 1);
-    run_close(&a);
-    run_close(&b);
-}
-
 /* Resting anywhere in [-1, 1] earns 0.44 /s on average; the goal, reached at once, about 0.93. What
  * was learned must stay: with returns ten times as large the critic could not follow, and the
  * policy fell back to 0.2 by iteration 60. */
@@ -432,18 +418,6 @@ static void check_toy(PpoDef def) {
 
 TEST(test_learns_the_toy_task) {
     check_toy(toy_ppo_def());
-}
-
-TEST(test_learns_with_rounded_products) {
-    PpoDef def = toy_ppo_def();
-    def.matmul = PPO_MATMUL_BF16;
-    check_toy(def);
-}
-
-TEST(test_learns_with_muon) {
-    PpoDef def = toy_ppo_def();
-    def.optimizer = PPO_OPTIMIZER_MUON;
-    check_toy(def);
 }
 
 TEST(test_create_refuses) {

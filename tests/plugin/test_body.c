@@ -1,7 +1,6 @@
 /* Bodies with elements all over: a robot that falls lies on its shells. While they are in the air
- * they change nothing and cost next to nothing. */
+ * they change nothing. */
 #include <math.h>
-#include <time.h>
 
 #include "plugin/sensor.h"
 #include "plugin_kit.h"
@@ -109,53 +108,6 @@ TEST(in_the_air_they_change_no_bit) {
         mj_deleteData(e);
         mj_deleteModel(bare);
         mj_deleteModel(full);
-    }
-}
-
-/* [us] CPU time of a step of the standing robot. */
-static double cost(const mjModel *m, mjData *d, int steps) {
-    struct timespec from, to;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &from);
-    for (int i = 0; i < steps; i++) {
-        mj_step(m, d);
-    }
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &to);
-    return (1e6 * (double)(to.tv_sec - from.tv_sec) + 1e-3 * (double)(to.tv_nsec - from.tv_nsec)) /
-           steps;
-}
-
-/* Turn about, the least of many: what other programs add is left out. */
-TEST(in_the_air_they_cost_nothing) {
-    if (kit_short()) {
-        skip(); /* a sanitizer has times of its own */
-    }
-    const char *const keys[] = {"", CONFIG("body", BODIES)};
-    mjModel *m[2];
-    mjData *d[2];
-    double least[3] = {INFINITY, INFINITY, INFINITY};
-    for (int k = 0; k < 2; k++) {
-        m[k] = quadruped("implicitfast", keys[k]);
-        d[k] = mj_makeData(m[k]);
-        kit_run(m[k], d[k], 0.5);
-    }
-    for (int round = 0; round < 60; round++) {
-        for (int k = 0; k < 2; k++) {
-            least[k] = fmin(least[k], cost(m[k], d[k], 50));
-        }
-    }
-    lay(d[1], 0, mjPI / 2, 0.2);
-    kit_run(m[1], d[1], 2);
-    const int rows = plugin_soft(m[1], d[1])->near_rows;
-    for (int round = 0; round < 20; round++) {
-        least[2] = fmin(least[2], cost(m[1], d[1], 50));
-    }
-    print_message("a step: %.2f us with four feet, %.2f with nine bodies in the air (%+.1f %%), "
-                  "%.2f on its side with %d of 13 near\n",
-                  least[0], least[1], 100 * (least[1] / least[0] - 1), least[2], rows / 6);
-    assert_true(least[1] < 1.15 * least[0]); /* 3 % on an idle machine */
-    for (int k = 0; k < 2; k++) {
-        mj_deleteData(d[k]);
-        mj_deleteModel(m[k]);
     }
 }
 
@@ -362,112 +314,6 @@ TEST(shapes_are_covered) {
                         "", "<mesh name='box' vertex='" VERTICES "'/>") /
                  box -
              1) < 1e-9);
-}
-
-/* ---- the state ---- */
-
-static void steps(const mjModel *m, mjData *d, int count) {
-    for (int i = 0; i < count; i++) {
-        for (int u = 0; u < m->nu; u++) {
-            d->ctrl[u] = 0.6 * sin(20 * d->time + u);
-        }
-        mj_step(m, d);
-    }
-}
-
-static void check_same(const mjModel *m, const mjData *a, const mjData *b) {
-    assert_memory_equal(a->qpos, b->qpos, (size_t)m->nq * sizeof(double));
-    assert_memory_equal(a->qvel, b->qvel, (size_t)m->nv * sizeof(double));
-    assert_memory_equal(a->plugin_state, b->plugin_state, (size_t)m->npluginstate * sizeof(double));
-}
-
-/* Thrashing on its side: a copy, a restored state, another order of stages and a second evaluation
- * go on bit by bit; other bytes in the state of a body are noticed. */
-TEST(the_state_is_complete) {
-    mjModel *m = quadruped("implicitfast", CONFIG("body", BODIES) CONFIG("prints", "64"));
-    mjData *d = mj_makeData(m), *other = mj_makeData(m);
-    const int size = mj_stateSize(m, mjSTATE_INTEGRATION);
-    double *saved = calloc((size_t)size, sizeof *saved);
-    lay(d, 0, mjPI / 2, 0.2);
-    steps(m, d, 300);
-    const Soft *soft = plugin_soft(m, d);
-    assert_in_range(soft->near_rows / 6, 6, 13);
-    mj_getState(m, d, saved, mjSTATE_INTEGRATION);
-    mjData *copy = mj_copyData(NULL, m, d);
-    mj_setState(m, other, saved, mjSTATE_INTEGRATION);
-    steps(m, d, 100);
-    steps(m, copy, 100);
-    check_same(m, d, copy);
-    for (int i = 0; i < 100; i++) {
-        for (int u = 0; u < m->nu; u++) {
-            other->ctrl[u] = 0.6 * sin(20 * other->time + u);
-        }
-        mj_forward(m, other);
-        mj_forwardSkip(m, other, mjSTAGE_POS, 1);
-        mj_forwardSkip(m, other, mjSTAGE_VEL, 1);
-        mj_implicit(m, other);
-    }
-    check_same(m, d, other);
-    mj_forward(m, d); /* a copy within a step */
-    mj_copyData(copy, m, d);
-    mj_implicit(m, d);
-    mj_implicit(m, copy);
-    check_same(m, d, copy);
-    const MildGround *ground = (const MildGround *)(const void *)d->plugin_state;
-    const double *depth = mild_ground_depth_max(ground, 4);
-    kit_messages = 0;
-    d->plugin_state[depth - d->plugin_state] = NAN;
-    mj_step(m, d);
-    assert_int_equal(kit_messages, 1);
-    assert_names(kit_said, "state");
-    mj_resetData(m, d);
-    mj_resetData(m, other);
-    steps(m, d, 50);
-    steps(m, other, 50);
-    check_same(m, d, other);
-    free(saved);
-    mj_deleteData(copy);
-    mj_deleteData(d);
-    mj_deleteData(other);
-    mj_deleteModel(m);
-}
-
-/* Patches under the bodies, and an arrow for each that is loaded. */
-TEST(they_are_drawn) {
-    mjModel *m = humanoid(0.002, "implicitfast", "sand_loose");
-    mjData *d = mj_makeData(m);
-    mjvScene scene;
-    mjvOption option;
-    mjvCamera camera;
-    int patches = 0, arrows = 0, loaded = 0, pressed = 0;
-    mjv_defaultScene(&scene);
-    mjv_defaultOption(&option);
-    mjv_defaultCamera(&camera);
-    mjv_makeScene(m, &scene, 5000);
-    option.flags[mjVIS_CONTACTFORCE] = 1;
-    lay(d, 1, -mjPI / 2, 0.3);
-    kit_run(m, d, 1);
-    mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_DECOR, &scene);
-    for (int i = 0; i < scene.ngeom; i++) {
-        patches += scene.geoms[i].type == mjGEOM_BOX;
-        arrows += scene.geoms[i].type == mjGEOM_ARROW;
-    }
-    const Soft *soft = plugin_soft(m, d);
-    for (int f = 0; f < soft->feet; f++) {
-        const double *depth =
-            mild_ground_depth_max((const MildGround *)(const void *)d->plugin_state, f);
-        loaded += soft->contact.foot[f].contacts > 0;
-        for (int e = 0; e < mild_sole_elements(soft->soles[f]); e++) {
-            pressed += depth[e] > 0;
-        }
-    }
-    print_message("%d patches, %d arrows\n", patches, arrows);
-    assert_true(pressed > 100 && loaded > 4);
-    assert_int_equal(patches, pressed);
-    assert_int_equal(arrows, loaded);
-    mjv_freeScene(&scene);
-    mj_deleteData(d);
-    mj_deleteModel(m);
 }
 
 /* ---- what a user may get wrong ---- */

@@ -130,12 +130,27 @@ TEST(refuses_a_second_instance) {
     assert_names(kit_said, "mild.ground instance");
 }
 
+/* Its data are made with a warning that has these names, which is said once for a model; NULL: with
+ * none. */
+static void expect_warning(mjModel *m, const char *names) {
+    if (!m) {
+        fail_msg("%s", kit_said);
+    }
+    mjData *first = mj_makeData(m), *second = mj_makeData(m);
+    print_message("%s\n", kit_said);
+    assert_int_equal(kit_messages, names != NULL);
+    if (names) {
+        assert_names(kit_said, names);
+    }
+    mj_deleteData(first);
+    mj_deleteData(second);
+    mj_deleteModel(m);
+}
+
 /* A foot that MuJoCo also lets stand on its own floor is warned about, whatever the way. */
 TEST(warns_of_a_rigid_floor) {
-    const struct {
-        const char *floor;
-        const char *geom;
-        const char *end;
+    static const struct {
+        const char *floor, *geom, *end;
         int warns;
     } cases[] = {
         {"", BOX, "", 1},
@@ -147,60 +162,29 @@ TEST(warns_of_a_rigid_floor) {
         {OFF, BOX OFF, "<contact><pair geom1='box' geom2='floor'/></contact>", 1},
     };
     for (int c = 0; c < 7; c++) {
-        mjModel *m = compile("", FOOT, cases[c].floor, "", cases[c].geom, cases[c].end);
-        const int warns = cases[c].warns;
-        assert_non_null(m);
-        mjData *first = mj_makeData(m);
-        print_message("%d: %s\n", c, kit_said);
-        assert_int_equal(kit_messages, warns);
-        if (warns) {
-            assert_names(kit_said, "geom box floor contype");
-        }
-        mjData *d = mj_makeData(m); /* said once for a model */
-        assert_int_equal(kit_messages, warns);
-        mj_deleteData(first);
-        mj_deleteData(d);
-        mj_deleteModel(m);
+        expect_warning(compile("", FOOT, cases[c].floor, "", cases[c].geom, cases[c].end),
+                       cases[c].warns ? "geom box floor contype" : NULL);
     }
 }
 
 TEST(warns_of_a_foot_that_lies_on_its_side) {
-    mjModel *m = compile("", FOOT, OFF, "euler='90 0 0'", BOX OFF, "");
-    assert_non_null(m);
-    mjData *d = mj_makeData(m);
-    print_message("%s\n", kit_said);
-    assert_names(kit_said, "foot z");
-    mj_deleteData(d);
-    mj_deleteModel(m);
+    expect_warning(compile("", FOOT, OFF, "euler='90 0 0'", BOX OFF, ""), "foot z");
 }
 
 /* Elements that have another area than the sole are said, unless their number is asked for. */
 TEST(warns_of_another_area) {
-    const struct {
-        const char *configs;
-        int warns;
-    } cases[] = {{FOOT CONFIG("pitch", "0.0195"), 1},
-                 {FOOT, 0},
-                 {FOOT CONFIG("elements", "12"), 0},
-                 {FOOT CONFIG("outline", "-.039 -.0195 .039 -.0195 .039 .0195 -.039 .0195"), 0}};
+    static const char *const keys[] = {
+        FOOT CONFIG("pitch", "0.0195"), FOOT, FOOT CONFIG("elements", "12"),
+        FOOT CONFIG("outline", "-.039 -.0195 .039 -.0195 .039 .0195 -.039 .0195")};
     for (int c = 0; c < 4; c++) {
-        mjModel *m =
-            compile("", cases[c].configs, OFF, "", "type='box' size='.04 .025 .02' " OFF, "");
-        assert_non_null(m);
-        mjData *d = mj_makeData(m);
-        print_message("%d: %s\n", c, kit_said);
-        assert_int_equal(kit_messages, cases[c].warns);
-        if (cases[c].warns) {
-            assert_names(kit_said, "12 foot 1.14 40 cm2 pitch 0.0195");
-        }
-        mj_deleteData(d);
-        mj_deleteModel(m);
+        expect_warning(compile("", keys[c], OFF, "", "type='box' size='.04 .025 .02' " OFF, ""),
+                       c == 0 ? "12 foot 1.14 40 cm2 pitch 0.0195" : NULL);
     }
 }
 
 /* Sensors of MuJoCo's that are meant for what carries a foot, and some that are not. */
 TEST(warns_of_a_sensor_that_does_not_feel_the_ground) {
-    const struct {
+    static const struct {
         const char *sensor;
         int warns;
     } cases[] = {{"touch name='felt' site='sole'", 1},
@@ -217,16 +201,8 @@ TEST(warns_of_a_sensor_that_does_not_feel_the_ground) {
         snprintf(end, sizeof end,
                  "<worldbody><site name='base'/></worldbody><sensor><%s/></sensor>",
                  cases[c].sensor);
-        mjModel *m = compile("", FOOT, OFF, "", BOX OFF, end);
-        assert_non_null(m);
-        mjData *d = mj_makeData(m);
-        print_message("%d: %s\n", c, kit_said);
-        assert_int_equal(kit_messages, cases[c].warns);
-        if (cases[c].warns) {
-            assert_names(kit_said, "sensor 'felt' 'foot' mild.ground");
-        }
-        mj_deleteData(d);
-        mj_deleteModel(m);
+        expect_warning(compile("", FOOT, OFF, "", BOX OFF, end),
+                       cases[c].warns ? "sensor 'felt' 'foot' mild.ground" : NULL);
     }
 }
 

@@ -60,39 +60,6 @@ TEST(changes_as_if_made_so) {
     mj_deleteModel(sand);
 }
 
-/* A heavy plate that stands deep in loose sand stays down whatever the sand becomes. */
-TEST(throws_nothing) {
-    static const char *const becomes[] = {"grass", "foam45", "rubber", NULL};
-    mjModel *m = plate_on("sand_loose", "");
-    for (int i = 0; i < 4; i++) {
-        char text[4000] = "recovery=0.9\nk_pen=2000", error[300] = "";
-        mjData *d = mj_makeData(m);
-        d->qpos[2] = -0.1;
-        kit_run(m, d, 2);
-        const double before = d->qpos[2];
-        if (becomes[i]) {
-            mjModel *other = plate_on(becomes[i], "");
-            mjData *fresh = mj_makeData(other);
-            plugin_ground_print(other, fresh, NULL, 0, text, sizeof text);
-            mj_deleteData(fresh);
-            mj_deleteModel(other);
-        }
-        assert_int_equal(plugin_ground_change(m, d, NULL, 0, text, error, sizeof error), 0);
-        double highest = -1;
-        for (int s = 0; s < 1500; s++) {
-            mj_step(m, d);
-            highest = fmax(highest, d->qpos[2]);
-        }
-        print_message("%s: from %.1f mm to %.1f mm, at most %.1f mm\n",
-                      becomes[i] ? becomes[i] : "numbers", 1e3 * before, 1e3 * d->qpos[2],
-                      1e3 * highest);
-        assert_true(before < -0.09 && highest < before + 1e-4 && d->qpos[2] > before - 0.05);
-        assert_true(fabs(d->qvel[2]) < 1e-3);
-        mj_deleteData(d);
-    }
-    mj_deleteModel(m);
-}
-
 /* A preset is matched to the model of the ground, as that of the file was. */
 TEST(model_stays) {
     char text[4000], now[4000], error[300] = "";

@@ -133,14 +133,4 @@ TEST(a_site_may_be_turned) {
     }
 }
 
-TEST(without_a_sensor_there_is_no_data) {
-    mjModel *m = plates("heavy light", "");
-    mjData *d = mj_makeData(m);
-    assert_int_equal(m->nsensordata, 0);
-    kit_run(m, d, 0.1);
-    assert_int_equal(kit_messages, 0);
-    mj_deleteData(d);
-    mj_deleteModel(m);
-}
-
 TEST_MAIN(kit_setup, NULL)

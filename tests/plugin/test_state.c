@@ -87,25 +87,6 @@ TEST(restores_bit_by_bit) {
     mj_deleteModel(m);
 }
 
-/* The memory matters: the plates where they were, on ground that has forgotten, go elsewhere. */
-TEST(memory_matters) {
-    mjModel *m = hopper(MOTOR);
-    mjData *d = mj_makeData(m), *other = mj_makeData(m);
-    const int size = mj_stateSize(m, mjSTATE_PHYSICS);
-    double *saved = calloc((size_t)size, sizeof *saved);
-    steps(m, d, 237);
-    mj_getState(m, d, saved, mjSTATE_PHYSICS);
-    mj_setState(m, other, saved, mjSTATE_PHYSICS);
-    other->time = d->time;
-    steps(m, d, 100);
-    steps(m, other, 100);
-    assert_true(fabs(d->qpos[2] - other->qpos[2]) > 1e-4);
-    free(saved);
-    mj_deleteData(d);
-    mj_deleteData(other);
-    mj_deleteModel(m);
-}
-
 TEST(copies_go_on_alike) {
     mjModel *m = hopper(MOTOR);
     mjData *d = mj_makeData(m);

@@ -70,42 +70,8 @@ class Checkers(unittest.TestCase):
             info = env.step(actions_of(env, step))[4]
         env.close()
 
-    def test_sync_vector(self):
-        """Single environments in Gymnasium's own vector environment."""
-        env = gymnasium.make_vec("mild/SA01-v0", num_envs=2, vectorization_mode="sync", overrides=SHORT)
-        env.reset(seed=1)
-        for step in range(120):
-            env.step(actions_of(env, step))
-        env.close()
-
 
 class Episodes(unittest.TestCase):
-    def test_time_and_falls(self):
-        """Standing still for an episode of 0.1 s ends by time; wild actions end by a fall."""
-        env = gymnasium.make("mild/SA01-v0", overrides={**SHORT, "task.episode": 1}, config="configs/quick.ini")
-        env.reset(seed=1)
-        lengths = []
-        for _ in range(3):
-            for length in range(1, 200):
-                _, _, ended, truncated, info = env.step(np.zeros(12, np.float32))
-                if ended or truncated:
-                    break
-            lengths.append(length)
-            self.assertEqual(set(info["reward_terms"]), set(env.unwrapped._envs.reward_names))
-            with self.assertRaisesRegex(RuntimeError, "reset"):
-                env.step(np.zeros(12, np.float32))
-            env.reset()
-        self.assertLessEqual(max(lengths), 100)
-        env.close()
-        env = make_vec(1, {"task.episode": 20})
-        env.reset(seed=1)
-        for step in range(300):
-            _, _, ended, truncated, _ = env.step(8 * actions_of(env, 9 * step))
-            if ended[0]:
-                break
-        self.assertTrue(ended[0] and not truncated[0])
-        env.close()
-
     def test_same_step(self):
         """The observation after an end is the first of the next episode; final_obs is what a twin that is not reset sees."""
         env, single = make_vec(1), gymnasium.make("mild/SA01-v0", overrides=SHORT)
@@ -114,7 +80,7 @@ class Episodes(unittest.TestCase):
         np.testing.assert_array_equal(observation[0], other)
         for step in range(200):
             observation, reward, ended, truncated, info = env.step(actions_of(env, step))
-            other, paid, other_ended, other_truncated, _ = single.step(actions_of(env, step)[0])
+            other, paid, other_ended, other_truncated, last = single.step(actions_of(env, step)[0])
             self.assertEqual((reward[0], ended[0], truncated[0]), (np.float32(paid), other_ended, other_truncated))
             if ended[0] or truncated[0]:
                 break
@@ -122,6 +88,9 @@ class Episodes(unittest.TestCase):
         self.assertTrue(info["_final_obs"][0] and info["_final_info"][0])
         np.testing.assert_array_equal(info["final_obs"][0], other)
         self.assertGreater(np.abs(observation[0] - other).max(), 0.01)
+        self.assertEqual(set(last["reward_terms"]), set(single.unwrapped._envs.reward_names))
+        with self.assertRaisesRegex(RuntimeError, "the episode has ended"):
+            single.unwrapped.step(np.zeros(12))
         env.close()
         single.close()
 

@@ -73,14 +73,6 @@ class Ground(unittest.TestCase):
         for ground in ("rubber", "rigid", "clay", mild.Material("foam28", k_pen=100)):
             self.assertTrue((walk(ground) != usual).any(), ground)
 
-    def test_seed(self):
-        """A ground that is a Material is there for every seed; two seeds differ."""
-        env = gymnasium.make("mild/Go1-v0", ground=mild.Material("sand_dense", mu=0.4))
-        first = env.reset(seed=1)[0]
-        self.assertTrue((env.reset(seed=2)[0] != first).any())
-        np.testing.assert_array_equal(env.reset(seed=1)[0], first)
-        env.close()
-
     def test_arguments(self):
         for keys, error, words in (
                 ({"ground": "gras"}, ValueError, "unknown ground 'gras'; nearest is 'grass'"),

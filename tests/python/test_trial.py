@@ -351,19 +351,6 @@ class Networks(unittest.TestCase):
             with self.assertRaisesRegex(RuntimeError, r"pip install mildground\[trial\]"):
                 networks.load(file.name, Description(stander()))
 
-    def test_real_onnx(self):
-        """mild's own export, by onnxruntime where there is one, does what the numpy policy does."""
-        try:
-            import onnxruntime  # noqa: F401
-        except ImportError:
-            self.skipTest("onnxruntime is not installed")
-        program = os.environ.get("MILD_PROGRAM")
-        with tempfile.TemporaryDirectory() as folder:
-            file = folder + "/g1.onnx"
-            subprocess.run([program, "export", "--policy", str(ROOT / "policies/g1.safetensors"), "--onnx", file], check=True, stdout=subprocess.DEVNULL)
-            network = networks.load(file, Description(stander()))
-            self.assertEqual(len(network.act(np.zeros(network.size, np.float32))), 12)
-
     def test_real_state(self):
         """The stand-in's network as a file, by the onnx and onnxruntime of where they are: two states, one of whole numbers."""
         try:

@@ -215,62 +215,50 @@ TEST(test_reading) {
     refuse_text("", "[robot] name");
 }
 
-/* A key's least and greatest number are accepted, a little less and a little more are refused with
- * the `names`. */
-static void expect_range(const char *from, const char *key, double least, double greatest,
+/* With the last number of a line, which begins with `line`, at its least and at its greatest it is
+ * accepted; a little less and a little more are refused with the `names`. */
+static void expect_range(const char *from, const char *line, double least, double greatest,
                          const char *names) {
-    char line[128];
+    char to[128];
     for (int k = 0; k < 4; k++) {
         const double beyond = 1e-6 * fmax(fabs(least), 1e-3);
         const double numbers[] = {least, greatest, least - beyond, greatest * (1 + 1e-6)};
-        snprintf(line, sizeof line, "%s = %.9g\n", key, numbers[k]);
+        snprintf(to, sizeof to, "%s %.9g\n", line, numbers[k]);
         if (k < 2) {
-            accept(edit(from, line));
+            accept(edit(from, to));
         } else {
-            refuse_as(MILD_ERROR_RANGE, edit(from, line), names);
+            refuse_as(MILD_ERROR_RANGE, edit(from, to), names);
         }
     }
 }
 
 TEST(test_ranges) {
-    expect_range("height = 0.7 ; [m]\n", "height", 0.01, 5, "robot.height");
-    expect_range("action_scale = 0.25\n", "action_scale", 0.01, 2, "robot.action_scale");
-    expect_range("feet_least = 0.09\n", "feet_least", 0, 5, "robot.feet_least");
-    expect_range("knee_least = 0.08\n", "knee_least", 0, 5, "robot.knee_least");
-    expect_range("foot_force = 450\n", "foot_force", 0.1, 1e6, "robot.foot_force");
-    expect_range("z = -0.05\n", "z", -5, 5, "foot.l.z");
-    expect_range("radius = 0.02\n", "radius", 1e-4, 1, "foot.r.radius");
-    expect_range("z = -0.05\n", "z = -0.05\npitch", 1e-4, 1, "foot.l.pitch");
-    expect_range("z = -0.05\n", "z = -0.05\ncorner_radius", 1e-5, 1, "foot.l.corner_radius");
-    accept(edit("feet_range = 0.11 0.31", "feet_range = 0 5"));
-    refuse_as(MILD_ERROR_RANGE, edit("feet_range = 0.11 0.31", "feet_range = -0.001 5"),
-              "robot.feet_range -0.001");
-    refuse_as(MILD_ERROR_RANGE, edit("feet_range = 0.11 0.31", "feet_range = 0 5.001"),
-              "robot.feet_range 5.001");
-    accept(edit("knee_range = 0.12 0.32", "knee_range = 0 5"));
-    refuse_as(MILD_ERROR_RANGE, edit("knee_range = 0.12 0.32", "knee_range = -0.001 5"),
-              "robot.knee_range -0.001");
-    refuse_as(MILD_ERROR_RANGE, edit("knee_range = 0.12 0.32", "knee_range = 0 5.001"),
-              "robot.knee_range 5.001");
-    accept(edit("assist = 301 31 101 32", "assist = 0 0 1e6 1e6"));
-    refuse_as(MILD_ERROR_RANGE, edit("assist = 301 31 101 32", "assist = -0.001 0 0 0"),
-              "robot.assist -0.001");
-    refuse_as(MILD_ERROR_RANGE, edit("assist = 301 31 101 32", "assist = 0 0 0 1000001"),
-              "robot.assist 1000001");
+    expect_range("height = 0.7 ; [m]\n", "height =", 0.01, 5, "robot.height");
+    expect_range("action_scale = 0.25\n", "action_scale =", 0.01, 2, "robot.action_scale");
+    expect_range("feet_range = 0.11 0.31\n", "feet_range = 0", 0, 5, "robot.feet_range");
+    expect_range("knee_range = 0.12 0.32\n", "knee_range = 0", 0, 5, "robot.knee_range");
+    expect_range("feet_least = 0.09\n", "feet_least =", 0, 5, "robot.feet_least");
+    expect_range("knee_least = 0.08\n", "knee_least =", 0, 5, "robot.knee_least");
+    expect_range("foot_force = 450\n", "foot_force =", 0.1, 1e6, "robot.foot_force");
+    expect_range("assist = 301 31 101 32\n", "assist = 0 0 0", 0, 1e6, "robot.assist");
+    expect_range("center = 0.7 0.8 0.9\n", "center = 0 0", -5, 5, "foot.r.center");
+    expect_range("z = -0.05\n", "z =", -5, 5, "foot.l.z");
+    expect_range("radius = 0.02\n", "radius =", 1e-4, 1, "foot.r.radius");
+    expect_range("z = -0.05\n", "z = -0.05\npitch =", 1e-4, 1, "foot.l.pitch");
+    expect_range("z = -0.05\n", "z = -0.05\ncorner_radius =", 1e-5, 1, "foot.l.corner_radius");
+    accept(edit("z = -0.05", "z = -0.05\nelements = 65536"));
+    static const char *const refused[][3] = {
+        {"assist = 301 31 101 32", "assist = -0.001 0 0 0", "robot.assist -0.001"},
+        {"center = 0.7 0.8 0.9", "center = -5.001 0 5", "foot.r.center -5.001"},
+        {"offset = 0.25", "offset = -0.001", "foot.l.offset -0.001"},
+        {"offset = 0.25", "offset = 1.001", "foot.l.offset 1.001"},
+        {"z = -0.05", "z = -0.05\nelements = 65537", "foot.l.elements 65537"},
+        {"z = -0.05", "z = -0.05\nelements = -1", "foot.l.elements -1"}};
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
+        refuse_as(MILD_ERROR_RANGE, edit(refused[i][0], refused[i][1]), refused[i][2]);
+    }
     refuse_as(MILD_ERROR_ARGUMENT, edit("assist = 301 31 101 32", "assist = 1 2 3"),
               "dir/robot.ini:15 robot.assist 3 4");
-    accept(edit("center = 0.7 0.8 0.9", "center = -5 0 5"));
-    refuse_as(MILD_ERROR_RANGE, edit("center = 0.7 0.8 0.9", "center = -5.001 0 5"),
-              "foot.r.center -5.001");
-    refuse_as(MILD_ERROR_RANGE, edit("center = 0.7 0.8 0.9", "center = 0 0 5.001"),
-              "foot.r.center 5.001");
-    refuse_as(MILD_ERROR_RANGE, edit("offset = 0.25", "offset = -0.001"), "foot.l.offset -0.001");
-    refuse_as(MILD_ERROR_RANGE, edit("offset = 0.25", "offset = 1.001"), "foot.l.offset 1.001");
-    accept(edit("z = -0.05", "z = -0.05\nelements = 65536"));
-    refuse_as(MILD_ERROR_RANGE, edit("z = -0.05", "z = -0.05\nelements = 65537"),
-              "foot.l.elements 65537");
-    refuse_as(MILD_ERROR_RANGE, edit("z = -0.05", "z = -0.05\nelements = -1"),
-              "foot.l.elements -1");
 }
 
 /* Each key of [robot] but `source` is needed. */

@@ -1,19 +1,14 @@
-/* The quadruped robots/go1 against the published numbers of go1.json: its geometry by hand, four
- * round feet, and the stand controller on every ground. */
+/* The quadruped robots/go1 against the published numbers of go1.json: its geometry by hand, and the
+ * stand controller on every ground. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #define MODEL MILD_SOURCE_DIR "/robots/go1"
 #include "numbers.h"
 #include "stand_kit.h"
 
-#include <mujoco/mujoco.h>
-
-#include "mild/map.h"
-
-enum { FEET = 4, JOINTS = 12, NV = 18, FL = 0, FR = 1, RL = 2, RR = 3 };
+enum { FEET = 4, JOINTS = 12, FL = 0, FR = 1, RL = 2, RR = 3 };
 
 /* The published numbers. */
 static double hip_x, hip_y;           /* [m] hip roll axis from the trunk's centre */
@@ -103,170 +98,6 @@ TEST(efforts_speeds_and_gait) {
     expect_near("shift",
                 fabs(robot_table(robot)->gait_offset[FL] - robot_table(robot)->gait_offset[FR]),
                 0.5, 0);
-}
-
-/* With `from` written as `to` in robot.ini. */
-static Robot *changed_robot(const char *from, const char *to, MildError *error) {
-    return kit_robot_changed(MODEL, "go1.xml", "robot.ini", from, to, error);
-}
-
-TEST(what_may_be_left_out) {
-    MildError error = {0};
-    Robot *changed = changed_robot("stand_kp    =", "# a remark\n; stand_kp    =", &error);
-    expect_good(changed != NULL, &error);
-    for (int i = 0; i < JOINTS; i++) {
-        expect_near("stand_kp without a list", robot_stand_kp(changed)[i], robot_kp(robot)[i], 0);
-        expect_near("stand_kd", robot_stand_kd(changed)[i], robot_stand_kd(robot)[i], 0);
-    }
-    robot_destroy(changed);
-    changed = changed_robot("height = 0.28            ;", "height = 0.28            #", &error);
-    expect_good(changed != NULL, &error);
-    expect_near("height", robot_nominal_height(changed), 0.28, 0);
-    robot_destroy(changed);
-    static const struct {
-        const char *from, *to;
-        MildStatus status;
-        const char *names;
-    } refused[] = {
-        {"center = 0 0 -0.213", "", MILD_ERROR_FORMAT, "robot.ini [foot.FL] center"},
-        {"radius = 0.023", "", MILD_ERROR_FORMAT, "robot.ini [foot.FL] radius"},
-        {"shape = round", "shape = round\nz = -0.2", MILD_ERROR_FORMAT, "robot.ini [foot.FL] z"},
-        {"shape = round", "shape = ball", MILD_ERROR_ARGUMENT, "foot.FL.shape ball round"},
-        {"body = FR_calf", "body = FL_calf", MILD_ERROR_FORMAT, "FL FR body"},
-        {"offset = 0\n", "", MILD_ERROR_FORMAT, "robot.ini [foot.FL] offset"},
-        {"center = 0 0 -0.213\nradius = 0.023", "center = 0 0 -0.06\nradius = 0.2",
-         MILD_ERROR_FORMAT, "FL_calf_upper shells covers FL"}};
-    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
-        assert_null(changed_robot(refused[i].from, refused[i].to, &error));
-        print_message("%s\n", error.text);
-        assert_error(&error, refused[i].status, refused[i].names);
-    }
-}
-
-/* ---- round feet ---- */
-
-/* Turned, bent and in motion. */
-static RobotState moving_state(uint32_t draw) {
-    Random r = random_at(5, draw, 0);
-    RobotState state = stand_state(stand, 0, 0.0);
-    double turn[4] = {1, random_uniform(&r, -0.15, 0.15), random_uniform(&r, -0.15, 0.15),
-                      random_uniform(&r, -1, 1)};
-    mju_normalize4(turn);
-    memcpy(state.qpos + 3, turn, sizeof turn);
-    for (int i = 0; i < JOINTS; i++) {
-        state.qpos[7 + i] += random_uniform(&r, -0.2, 0.2);
-    }
-    for (int i = 0; i < NV; i++) {
-        state.qvel[i] = random_uniform(&r, -0.5, 0.5);
-    }
-    return state;
-}
-
-/* The lowest point of the sphere, and its Jacobian as a point of the calf: the engine's own. */
-static void lowest_point(RobotSim *sim, int foot, double point[3], double jacobian[3 * NV]) {
-    const mjModel *m = robot_sim_model(sim);
-    const mjData *d = robot_sim_data(sim);
-    static const char *const calves[FEET] = {"FL_calf", "FR_calf", "RL_calf", "RR_calf"};
-    int body = mj_name2id(m, mjOBJ_BODY, calves[foot]);
-    const double *turn = d->xmat + 9 * body;
-    for (int k = 0; k < 3; k++) {
-        point[k] = d->xpos[3 * body + k] - leg * turn[3 * k + 2];
-    }
-    point[2] -= foot_radius;
-    mj_jac(m, d, jacobian, NULL, point, body);
-}
-
-/* [m] How far heights are off above the rough ground under each foot, which is drawn lower. */
-static double height_error(RobotSim *sim, const MildTerrain *low) {
-    double worst = 0;
-    double clearance = robot_sim_sole_clearance(sim, low), least = 1e9;
-    for (int f = 0; f < FEET; f++) {
-        const double *at = robot_sim_foot(sim, f)->position;
-        const double height = at[2] - mild_terrain_height_at(low, at[0], at[1]);
-        worst = fmax(worst, fabs(robot_sim_foot(sim, f)->sole_height - height));
-        least = fmin(least, height);
-    }
-    return fmax(worst, fabs(clearance - least));
-}
-
-/* How far the lowest points of the feet are off, [m] and [m/s]; their Jacobians. */
-static void position_errors(RobotSim *sim, const RobotState *state, double jacobian[FEET][3 * NV],
-                            double *worst_position, double *worst_speed) {
-    for (int f = 0; f < FEET; f++) {
-        const RobotFoot *foot = robot_sim_foot(sim, f);
-        double point[3], speed[3];
-        lowest_point(sim, f, point, jacobian[f]);
-        mju_mulMatVec(speed, jacobian[f], state->qvel, 3, NV);
-        for (int k = 0; k < 3; k++) {
-            *worst_position = fmax(*worst_position, fabs(point[k] - foot->position[k]));
-            *worst_speed = fmax(*worst_speed, fabs(speed[k] - foot->velocity[k]));
-            *worst_speed = fmax(*worst_speed, fabs(foot->velocity[3 + k]));
-        }
-    }
-}
-
-/* Place and speed of the foot, and after a step: acceleration = M^-1 (tau - b + J^T F), with no
- * moment. */
-TEST(a_round_foot_is_a_point) {
-    RobotSim *sim = new_sim(0.0005);
-    MildGround *ground = kit_ground(robot);
-    MildMaterial sand = mild_material_default();
-    MildTerrain terrain = mild_terrain_uniform(&sand);
-    MildMapDef rough = mild_map_def_default(); /* the disc is not loaded evenly */
-    MildError error = {0};
-    rough.kind = MILD_MAP_ROUGH;
-    MildMap *map = mild_map_create(&rough, &error);
-    assert_non_null(map);
-    assert_int_equal(mild_terrain_set_map(&terrain, map, &error), MILD_OK);
-    RobotVariation nominal = robot_variation_nominal();
-    MildTerrain low = terrain;
-    low.height = -0.3;
-    double worst_position = 0, worst_speed = 0, worst_step = 0, worst_height = 0, largest = 0;
-    for (uint32_t draw = 0; draw < 20; draw++) {
-        RobotState state = moving_state(draw);
-        double torque[JOINTS], jacobian[FEET][3 * NV], force[NV] = {0}, rate[NV];
-        robot_sim_load(sim, &state, &nominal);
-        position_errors(sim, &state, jacobian, &worst_position, &worst_speed);
-        worst_height = fmax(worst_height, height_error(sim, &low));
-        const mjModel *m = robot_sim_model(sim);
-        mjData *d = mj_makeData(m);
-        robot_engine_qpos(robot, state.qpos, d->qpos);
-        memcpy(d->qvel, state.qvel, sizeof state.qvel[0] * NV);
-        mj_fwdPosition(m, d);
-        mj_fwdVelocity(m, d);
-        stand_torque(stand, sim, 0, torque);
-        mild_ground_reset(ground);
-        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
-        for (int k = 0; k < NV; k++) {
-            force[k] = (k >= 6 ? torque[k - 6] : 0) - d->qfrc_bias[k];
-        }
-        for (int f = 0; f < FEET; f++) {
-            const RobotFoot *foot = robot_sim_foot(sim, f);
-            double pulled[NV];
-            mju_mulMatTVec(pulled, jacobian[f], foot->force, 3, NV);
-            mju_addTo(force, pulled, NV);
-            largest = fmax(largest, foot->force[2]);
-            for (int k = 0; k < 3; k++) {
-                assert_true(foot->torque[k] == 0);
-            }
-        }
-        mj_solveM(m, d, rate, force, 1);
-        for (int k = 0; k < NV; k++) {
-            double change = (robot_sim_qvel(sim)[k] - state.qvel[k]) / robot_sim_dt(sim);
-            worst_step = fmax(worst_step, fabs(change - rate[k]));
-        }
-        mj_deleteData(d);
-    }
-    print_message(
-        "lowest points off by %.1e m, %.1e m/s, %.1e m of height; accelerations by %.1e under "
-        "%.0f N\n",
-        worst_position, worst_speed, worst_height, worst_step, largest);
-    assert_true(worst_position < 1e-12 && worst_speed < 1e-12 && worst_step < 1e-8);
-    assert_true(worst_height < 1e-12);
-    assert_true(largest > 5);
-    mild_map_destroy(map);
-    free(ground);
-    robot_sim_destroy(sim);
 }
 
 /* ---- standing ---- */

@@ -1,5 +1,5 @@
 /* Coarser rasters: area, centroid and second moments of area are those of the robot's own raster,
- * so a linear bed answers with the same force and moment; and what is refused. */
+ * so a linear bed would answer with the same force and moment; and what is refused. */
 #include "all_robots.h"
 
 enum { COUNTS = 4 };
@@ -80,43 +80,6 @@ TEST(elements_cover_the_sole) {
         assert_true(apart < 0.71 * 0.0195 && mirrored < 1e-12);
     }
     robot_set_elements(robot, 0, NULL);
-}
-
-/* ---- forces ---- */
-
-/* Upward force and moments about the ankle of a sole 10 mm deep, tilted about both axes, on
- * springs: the law that the library gives an element of its pitch. */
-static void press(const MildSole *sole, const MildMaterial *springs, double wrench[3]) {
-    memset(wrench, 0, 3 * sizeof *wrench);
-    for (int i = 0; i < mild_sole_elements(sole); i++) {
-        const double x = mild_sole_x(sole)[i], y = mild_sole_y(sole)[i];
-        const double depth = 0.010 - 0.02 * x + 0.05 * y;
-        assert_true(depth > 0 && depth < springs->bed_depth);
-        const double force = mild_element_law(springs, mild_sole_pitch(sole), depth).force;
-        wrench[0] += force;
-        wrench[1] += y * force;
-        wrench[2] -= x * force;
-    }
-}
-
-TEST(springs_answer_alike) {
-    MildMaterial springs = kit_preset("foam45");
-    springs.model = MILD_MODEL_ECC_SPRING;
-    springs.k_pen = 3000;
-    const double once = mild_element_law(&springs, 0.03, 0.004).force;
-    expect_near("twice the depth", mild_element_law(&springs, 0.03, 0.008).force, 2 * once, 1e-12);
-    double own[3], other[3];
-    press(robot_rasters(robots[0])[0], &springs, own);
-    for (int c = 0; c < COUNTS; c++) {
-        assert_int_equal(robot_set_elements(robots[0], counts[c], NULL), MILD_OK);
-        press(robot_soles(robots[0])[0], &springs, other);
-        print_message("%d elements: %.3f N, %.4f and %.4f N m\n", counts[c], other[0], other[1],
-                      other[2]);
-        for (int k = 0; k < 3; k++) {
-            expect_entry("wrench", k, other[k], own[k], 1e-12 * own[0]);
-        }
-    }
-    robot_set_elements(robots[0], 0, NULL);
 }
 
 /* ---- what is refused ---- */

@@ -1,5 +1,5 @@
-/* Shells that stand on soft ground: in the air they change no bit of a step, and under load they
- * carry the robot. That the ground under all bodies only takes energy is in test_fallen.c. */
+/* Shells that stand on soft ground carry the robot. That in the air they change no bit of a step is
+ * in plugin/test_body.c, that the ground under all bodies only takes energy in test_fallen.c. */
 #include "all_robots.h"
 
 #define FILES MILD_SOURCE_DIR "/robots/sa01"
@@ -13,37 +13,6 @@ static void hold_pose(const Robot *robot, const RobotSim *sim, double stiffness,
         const double error = pose[j] - robot_sim_qpos(sim)[7 + j];
         torque[j] = stiffness * effort[j] * (error - 0.03 * robot_sim_qvel(sim)[6 + j]);
         torque[j] = fmax(fmin(torque[j], effort[j]), -effort[j]);
-    }
-}
-
-/* ---- in the air ---- */
-
-/* Positions after a second on the feet, shells far above the ground. */
-static void stand_still(Robot *robot, int shells, double qpos[ROBOT_NQ_MAX], double *load) {
-    robot_set_shells(robot, shells);
-    assert_true(robot_bodies(robot) > robot_feet(robot) || !shells);
-    RobotSim *sim = robot_sim_create(robot, 0.0025, NULL);
-    MildGround *ground = kit_ground(robot);
-    MildTerrain terrain = kit_terrain("rubber");
-    double torque[ROBOT_JOINTS_MAX];
-    *load = 0;
-    for (int s = 0; s < STAND_STEPS / 8; s++) {
-        hold_pose(robot, sim, 4, torque);
-        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
-        *load += robot_sim_shell_load(sim);
-    }
-    memcpy(qpos, robot_sim_qpos(sim), ROBOT_NQ_MAX * sizeof *qpos);
-    free(ground);
-    robot_sim_destroy(sim);
-}
-
-TEST(in_the_air_they_change_nothing) {
-    for (int r = 0; r < ROBOTS; r++) {
-        double without[ROBOT_NQ_MAX], with[ROBOT_NQ_MAX], load;
-        stand_still(robots[r], 0, without, &load);
-        stand_still(robots[r], 1, with, &load);
-        assert_memory_equal(with, without, sizeof with);
-        assert_true(load == 0);
     }
 }
 

@@ -1,5 +1,5 @@
-/* What a workspace reports of a pose and of a step, against the engine's own functions on data of
- * their own: feet, clearances, distances, forces of rigid contact; its limits and its clock. */
+/* What a workspace reports of a step, against the engine's own functions on data of their own: feet
+ * and forces of rigid contact; its limits and its clock. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -12,8 +12,6 @@
 #include "sa01_sole.h"
 
 static const char *const feet[SA01_FEET] = {"leg_l6_link", "leg_r6_link"};
-static const char *const knees[SA01_FEET] = {"leg_l4_link", "leg_r4_link"};
-static const char *const shells[3] = {"base_link", "leg_l4_link", "leg_r4_link"};
 /* Middle of each sole's bounds in its foot's frame: 60 mm ahead, 5.5 mm outward, 55 mm below. */
 static const double middle[SA01_FEET][3] = {{0.06, 0.0055, -0.055}, {0.06, -0.0055, -0.055}};
 
@@ -105,40 +103,6 @@ static void check_foot(const RobotSim *sim, const mjModel *m, const mjData *d, i
     }
 }
 
-TEST(test_feet) {
-    RobotSim *sim = new_sim(0.001);
-    RobotVariation nominal = robot_variation_nominal();
-    MildMap *map = waves();
-    MildTerrain level = kit_terrain("grass"), wavy = level;
-    level.height = -0.3;
-    wavy.map = map, wavy.height = -0.2;
-    for (uint32_t draw = 0; draw < 30; draw++) {
-        RobotState state = draw_state(draw, 1, 0.8);
-        robot_sim_load(sim, &state, &nominal);
-        const mjModel *m = robot_sim_model(sim);
-        mjData *d = engine_at(m, state.qpos, state.qvel);
-        const MildTerrain *grounds[] = {NULL, &level, &wavy};
-        for (int g = 0; g < 3; g++) {
-            double least = 1e9, wanted = 1e9;
-            if (grounds[g]) {
-                least = robot_sim_sole_clearance(sim, grounds[g]);
-            }
-            for (int f = 0; f < SA01_FEET; f++) {
-                double low = lowest_point(m, d, f, grounds[g]);
-                wanted = fmin(wanted, low);
-                expect_entry("height of a sole", f, robot_sim_foot(sim, f)->sole_height, low,
-                             1e-12);
-            }
-            expect_entry("clearance", g, grounds[g] ? least : wanted, wanted, 1e-12);
-        }
-        check_foot(sim, m, d, 0);
-        check_foot(sim, m, d, 1);
-        mj_deleteData(d);
-    }
-    mild_map_destroy(map);
-    robot_sim_destroy(sim);
-}
-
 /* After a step: the pose's quantities are those of its end, heights those above its ground. */
 TEST(test_feet_after_a_step) {
     RobotSim *sim = new_sim(0.0025);
@@ -163,97 +127,6 @@ TEST(test_feet_after_a_step) {
     }
     free(ground);
     mild_map_destroy(map);
-    robot_sim_destroy(sim);
-}
-
-/* ---- clearances and distances ---- */
-
-/* [m] Lowest corner of a shell's box above the ground under the box's middle. */
-static double box_clearance(const mjModel *m, const mjData *d, int s, const MildTerrain *terrain) {
-    char name[32];
-    snprintf(name, sizeof name, "%s_box", shells[s]);
-    int geom = mj_name2id(m, mjOBJ_GEOM, name);
-    assert_true(geom >= 0);
-    const double *at = d->geom_xpos + 3 * geom, *half = m->geom_size + 3 * geom;
-    double low = 1e9;
-    for (int corner = 0; corner < 8; corner++) {
-        const double local[3] = {corner & 1 ? half[0] : -half[0], corner & 2 ? half[1] : -half[1],
-                                 corner & 4 ? half[2] : -half[2]};
-        double world[3];
-        mju_mulMatVec3(world, d->geom_xmat + 9 * geom, local);
-        low = fmin(low, at[2] + world[2]);
-    }
-    return low - mild_terrain_height_at(terrain, at[0], at[1]);
-}
-
-TEST(test_clearance_of_the_shells) {
-    RobotSim *sim = new_sim(0.001);
-    RobotVariation nominal = robot_variation_nominal();
-    MildMap *map = waves();
-    MildTerrain level = kit_terrain("grass"), wavy = level;
-    level.height = 0.2;
-    wavy.map = map;
-    const mjModel *m = robot_visual_model(robot);
-    int lowest[3] = {0};
-    for (uint32_t draw = 0; draw < 60; draw++) {
-        RobotState state = draw_state(draw, 1, 3);
-        robot_sim_load(sim, &state, &nominal);
-        mjData *d = engine_at(m, state.qpos, state.qvel);
-        for (int g = 0; g < 2; g++) {
-            const MildTerrain *terrain = g ? &wavy : &level;
-            double least = 1e9;
-            int which = 0;
-            for (int s = 0; s < 3; s++) {
-                double clearance = box_clearance(m, d, s, terrain);
-                which = clearance < least ? s : which;
-                least = fmin(least, clearance);
-            }
-            lowest[which]++;
-            expect_entry("clearance", (int)draw, robot_sim_body_clearance(sim, terrain), least,
-                         1e-9);
-        }
-        mj_deleteData(d);
-    }
-    print_message("lowest: base %d times, shanks %d and %d\n", lowest[0], lowest[1], lowest[2]);
-    assert_true(lowest[0] > 5 && lowest[1] > 5 && lowest[2] > 5);
-    robot_sim_destroy(sim);
-    mild_map_destroy(map);
-}
-
-/* Left less right along the base's left, laid level; 0 when the base points straight up. */
-TEST(test_lateral_distances) {
-    RobotSim *sim = new_sim(0.001);
-    RobotVariation nominal = robot_variation_nominal();
-    for (uint32_t draw = 0; draw < 30; draw++) {
-        RobotState state = draw_state(draw, 1, 0.6);
-        robot_sim_load(sim, &state, &nominal);
-        const mjModel *m = robot_sim_model(sim);
-        mjData *d = engine_at(m, state.qpos, state.qvel);
-        const double x[3] = {1, 0, 0}, z[3] = {0, 0, 1};
-        double ahead[3], left[3], between[3], sole[2][3];
-        mju_rotVecQuat(ahead, x, state.qpos + 3);
-        ahead[2] = 0;
-        mju_normalize3(ahead);
-        mju_cross(left, z, ahead);
-        mju_sub3(between, d->xpos + 3 * mj_name2id(m, mjOBJ_BODY, knees[0]),
-                 d->xpos + 3 * mj_name2id(m, mjOBJ_BODY, knees[1]));
-        expect_entry("knees", (int)draw, robot_sim_knee_distance(sim), mju_dot3(between, left),
-                     1e-12);
-        for (int f = 0; f < SA01_FEET; f++) {
-            int body = mj_name2id(m, mjOBJ_BODY, feet[f]);
-            mju_mulMatVec3(sole[f], d->xmat + 9 * body, middle[f]);
-            mju_addTo3(sole[f], d->xpos + 3 * body);
-        }
-        mju_sub3(between, sole[0], sole[1]);
-        expect_entry("feet", (int)draw, robot_sim_foot_distance(sim), mju_dot3(between, left),
-                     2e-4);
-        mj_deleteData(d);
-    }
-    RobotState up = draw_state(1, 1, 0);
-    const double nose_up[4] = {sqrt(0.5), 0, -sqrt(0.5), 0};
-    memcpy(up.qpos + 3, nose_up, sizeof nose_up);
-    robot_sim_load(sim, &up, &nominal);
-    assert_true(robot_sim_knee_distance(sim) == 0 && robot_sim_foot_distance(sim) == 0);
     robot_sim_destroy(sim);
 }
 

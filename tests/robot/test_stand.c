@@ -72,20 +72,4 @@ TEST(test_papers_solver) {
     }
 }
 
-/* Joints held at the default pose without balance: rigid ground carries that, soft foam cannot (see
- * stand.c). */
-TEST(test_plain_gains) {
-    Standing rigid = stand_still(NULL, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);
-    assert_true(rigid.stands);
-    for (int p = 0; p < mild_material_preset_count(); p++) {
-        MildMaterial material = kit_preset(mild_material_preset_name(p));
-        Standing result = stand_still(&material, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);
-        print_message("plain gains on %-11s %s after %.2f s\n", mild_material_preset_name(p),
-                      result.stands ? "stand" : "fall", result.seconds);
-        if (strcmp(mild_material_preset_name(p), "foam25") == 0) {
-            assert_false(result.stands);
-        }
-    }
-}
-
 TEST_MAIN(setup, teardown)

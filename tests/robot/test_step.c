@@ -1,4 +1,5 @@
-/* The step: against the engine's own step, against dense algebra, momentum, determinism. */
+/* The step of SA01: the solver's twist, momentum, determinism, bad numbers. Against the engine's
+ * step and dense algebra: test_walker.c. */
 #include <math.h>
 #include <string.h>
 
@@ -29,41 +30,6 @@ static RobotState random_state(uint32_t index) {
     return state;
 }
 
-/* Our rigid step is the engine's step, joint limits and contacts included. */
-TEST(test_rigid_is_the_engine) {
-    RobotSim *sim = new_sim(0.001);
-    RobotVariation rigid = robot_variation_nominal();
-    rigid.rigid = 1;
-    MildTerrain terrain = kit_terrain("sand_loose");
-    mjModel *m = robot_sim_model(sim);
-    mjData *engine = mj_makeData(m);
-    double worst = 0.0;
-    for (uint32_t draw = 0; draw < 20; draw++) {
-        RobotState state = random_state(draw);
-        mj_resetData(m, engine);
-        robot_sim_load(sim, &state, &rigid);
-        memcpy(engine->qpos, state.qpos, sizeof state.qpos);
-        memcpy(engine->qvel, state.qvel, sizeof state.qvel);
-        for (int i = 0; i < 300;
-             i++) { /* with no torque the robot collapses into its joint limits */
-            double torque[SA01_JOINTS] = {0};
-            if (draw % 2 == 0) {
-                stand_torque(stand, sim, 0, torque);
-            }
-            memcpy(engine->qfrc_applied + 6, torque, sizeof torque);
-            mj_step(m, engine);
-            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
-        }
-        for (int i = 0; i < SA01_NQ; i++) {
-            worst = fmax(worst, fabs(engine->qpos[i] - robot_sim_qpos(sim)[i]));
-        }
-    }
-    print_message("rigid against mj_step: worst %.2e\n", worst);
-    assert_true(worst < 1e-9);
-    mj_deleteData(engine);
-    robot_sim_destroy(sim);
-}
-
 /* Dense J of both feet from the engine. */
 static void dense_jacobian(RobotSim *sim, double j[ROWS * SA01_NV]) {
     static const char *const names[SA01_FEET] = {"leg_l6_link", "leg_r6_link"};
@@ -73,93 +39,6 @@ static void dense_jacobian(RobotSim *sim, double j[ROWS * SA01_NV]) {
         mj_jacBody(m, robot_sim_data(sim), rows, rows + 3 * SA01_NV,
                    mj_name2id(m, mjOBJ_BODY, names[f]));
     }
-}
-
-/* x <- M^-1 x by Gaussian elimination on the full matrix. */
-static void dense_solve(const double *mass, double *x) {
-    double a[SA01_NV][SA01_NV + 1];
-    for (int i = 0; i < SA01_NV; i++) {
-        memcpy(a[i], mass + i * SA01_NV, SA01_NV * sizeof(double));
-        a[i][SA01_NV] = x[i];
-    }
-    for (int p = 0; p < SA01_NV; p++) {
-        for (int i = p + 1; i < SA01_NV; i++) {
-            double factor = a[i][p] / a[p][p];
-            for (int k = p; k <= SA01_NV; k++) {
-                a[i][k] -= factor * a[p][k];
-            }
-        }
-    }
-    for (int i = SA01_NV - 1; i >= 0; i--) {
-        double sum = a[i][SA01_NV];
-        for (int k = i + 1; k < SA01_NV; k++) {
-            sum -= a[i][k] * x[k];
-        }
-        x[i] = sum / a[i][i];
-    }
-}
-
-/* What the ground is asked with, and what its wrenches do: A, V_free, J^T W and M^-1 J^T W. */
-TEST(test_map_against_dense) {
-    RobotSim *sim = new_sim(0.001);
-    RobotVariation nominal = robot_variation_nominal();
-    double worst_a = 0.0, worst_wrench = 0.0, worst_twist = 0.0;
-    for (uint32_t draw = 0; draw < 50; draw++) {
-        RobotState state = random_state(draw);
-        robot_sim_load(sim, &state, &nominal);
-        const mjModel *m = robot_sim_model(sim);
-        mjData *d = robot_sim_data(sim);
-        mj_makeM(m, d);
-        double mass[SA01_NV * SA01_NV], j[ROWS * SA01_NV], solved[ROWS * SA01_NV];
-        mj_fullM(m, d, mass);
-        dense_jacobian(sim, j);
-        memcpy(solved, j, sizeof solved);
-        for (int r = 0; r < ROWS; r++) {
-            dense_solve(mass, solved + r * SA01_NV);
-            double twist = 0.0;
-            for (int k = 0; k < SA01_NV; k++) {
-                twist += j[r * SA01_NV + k] * state.qvel[k];
-            }
-            worst_twist =
-                fmax(worst_twist, fabs(twist - robot_sim_foot(sim, r / 6)->velocity[r % 6]));
-        }
-        Given given = {.feet = 0};
-        double rate[SA01_NV], force[SA01_NV];
-        assert_int_equal(given_step(&given, sim, &state), 0);
-        memcpy(rate, d->qvel, sizeof rate);
-        memcpy(force, d->qfrc_smooth, sizeof force);
-        for (int r = 0; r < ROWS; r++) {
-            double twist = 0.0;
-            for (int c = 0; c < ROWS; c++) {
-                double sum = 0.0;
-                for (int k = 0; k < SA01_NV; k++) {
-                    sum += j[r * SA01_NV + k] * solved[c * SA01_NV + k];
-                }
-                worst_a = fmax(worst_a,
-                               fabs(sum - given.inverse_inertia[r * ROWS + c]) / (1.0 + fabs(sum)));
-            }
-            for (int k = 0; k < SA01_NV; k++) {
-                twist += j[r * SA01_NV + k] * rate[k];
-            }
-            worst_twist = fmax(worst_twist, fabs(twist - given.free_velocity[r]));
-        }
-        given_some(&given, SA01_FEET);
-        assert_int_equal(given_step(&given, sim, &state), 0);
-        for (int k = 0; k < SA01_NV; k++) {
-            double f = 0.0, a = 0.0;
-            for (int r = 0; r < ROWS; r++) {
-                f += j[r * SA01_NV + k] * given.wrench[r / 6][r % 6];
-                a += solved[r * SA01_NV + k] * given.wrench[r / 6][r % 6];
-            }
-            const double change = (d->qvel[k] - rate[k]) / 0.001;
-            worst_wrench = fmax(worst_wrench, fabs(f - (d->qfrc_smooth[k] - force[k])));
-            worst_wrench = fmax(worst_wrench, fabs(a - change) / (1.0 + fabs(a)));
-        }
-    }
-    print_message("A %.2e, wrench %.2e, twist %.2e from dense\n", worst_a, worst_wrench,
-                  worst_twist);
-    assert_true(worst_a < 1e-10 && worst_wrench < 1e-10 && worst_twist < 1e-12);
-    robot_sim_destroy(sim);
 }
 
 /* Foot twist after a soft step = what the contact solver promised: the robot and the solver see the
@@ -345,28 +224,6 @@ TEST(test_bad_numbers) {
     robot_sim_load(sim, &state, &nominal);
     assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
     free(ground);
-    robot_sim_destroy(sim);
-}
-
-TEST(test_clearance_and_distances) {
-    RobotSim *sim = new_sim(0.001);
-    MildTerrain terrain = kit_terrain("sand_loose");
-    RobotVariation nominal = robot_variation_nominal();
-    RobotState state = stand_state(stand, 0, 0.0);
-    robot_sim_load(sim, &state, &nominal);
-    /* shank box: 0.32 below the knee axis of a shank leaning 0.24 rad, plus its corner */
-    double ankle = 0.055,
-           expected = ankle + 0.37 * cos(0.24) - (0.32 * cos(0.24) + 0.025 * sin(0.24));
-    assert_true(fabs(robot_sim_body_clearance(sim, &terrain) - expected) < 1e-9);
-    assert_true(fabs(robot_sim_foot_distance(sim) - 2 * (0.07513 + 0.0055)) < 3e-4);
-    assert_true(fabs(robot_sim_knee_distance(sim) - 2 * 0.07506) < 1e-4);
-    state.qpos[3] = cos(0.4);
-    state.qpos[6] = sin(0.4); /* heading does not matter */
-    robot_sim_load(sim, &state, &nominal);
-    assert_true(fabs(robot_sim_knee_distance(sim) - 2 * 0.07506) < 1e-4);
-    state.qpos[2] = 0.1;
-    robot_sim_load(sim, &state, &nominal);
-    assert_true(robot_sim_body_clearance(sim, &terrain) < 0.0);
     robot_sim_destroy(sim);
 }
 

@@ -115,30 +115,6 @@ TEST(defaults) {
     fclose(ini);
 }
 
-/* A path fits as long as the struct has room; a longer one is refused. */
-TEST(paths_of_pictures) {
-    int count;
-    const MildField *fields = terrain_fields(&count);
-    TerrainDef def = terrain_def_default();
-    char text[256];
-    memset(text, 'x', sizeof text);
-    text[199] = '\0';
-    const char *const keys[] = {"image", "labels"};
-    for (int i = 0; i < 2; i++) {
-        const MildField *field = mild_field_find(fields, count, keys[i], NULL);
-        assert_non_null(field);
-        assert_int_equal(mild_field_parse(field, &def, text, "terrain", NULL), MILD_OK);
-        assert_string_equal(i ? def.labels : def.image, text);
-    }
-    assert_int_equal(def.memory, 0);
-    text[199] = 'x';
-    text[200] = '\0';
-    for (int i = 0; i < 2; i++) {
-        const MildField *field = mild_field_find(fields, count, keys[i], NULL);
-        assert_true(mild_field_parse(field, &def, text, "terrain", NULL) != MILD_OK);
-    }
-}
-
 /* ---- the nominal task ---- */
 
 /* What task_def_make_nominal leaves of a random key: [0] and, of a range, [1]. */
@@ -284,20 +260,6 @@ TEST(robot_or_task) {
     def.reward.nominal_height = 0.7;
     expect_near("action scale", task_action_scale(&def, robot_table(robot)), 0.25, 0);
     expect_near("height", task_nominal_height(&def, robot_table(robot)), 0.7, 0);
-}
-
-/* Half, a quarter, a tenth and a twentieth of the policy step fit; nothing between. */
-TEST(physics_steps) {
-    const double fits[] = {0.005, 0.0025, 0.002, 0.001, 0.0005}, no[] = {0.004, 0.0015, 0.0024};
-    TaskDef def = task_def_default();
-    for (int i = 0; i < 5; i++) {
-        def.physics_dt = fits[i];
-        assert_int_equal(task_def_check(&def, NULL), MILD_OK);
-    }
-    for (int i = 0; i < 3; i++) {
-        def.physics_dt = no[i];
-        assert_int_equal(task_def_check(&def, NULL), MILD_ERROR_RANGE);
-    }
 }
 
 TEST_MAIN(kit_setup, kit_teardown)

@@ -374,17 +374,6 @@ TEST(intervals_are_rounded) {
     rig_close(&rig);
 }
 
-/* A command that eval and play have set stays. */
-TEST(frozen_command) {
-    open_with_dt(0.0025);
-    rig.def.command_interval = 0.02;
-    for (int t = 0; t < 6; t++) {
-        rig_step(&rig, NULL);
-        assert_true(rig.env->command[0] == 0.5 && rig.env->command[1] == 0);
-    }
-    rig_close(&rig);
-}
-
 /* 0.01 s of a period of 0.8 s is 1/80. */
 TEST(clock_runs) {
     open_with_dt(0.0025);

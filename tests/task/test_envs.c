@@ -2,8 +2,6 @@
  * add up what the episodes report. */
 #include "task_kit.h"
 
-#include <malloc.h>
-
 #include "envs_kit.h"
 
 enum { ENVS = 6 };
@@ -259,92 +257,6 @@ TEST(an_episode_of_one_step) {
     close_many();
 }
 
-/* ---- times, bytes, hash ---- */
-
-/* The ground is a part of physics, physics a part of what two threads worked; taken once. */
-TEST(times) {
-    TaskDef def = kit_quiet_def();
-    open_many(&def, 2);
-    double physics, ground;
-    envs_times(many.envs, &physics, &ground);
-    assert_true(physics == 0 && ground == 0); /* a start takes no physics step */
-    for (int t = 0; t < 5; t++) {
-        step_many();
-    }
-    envs_times(many.envs, &physics, &ground);
-    print_message("physics %.2g s, ground %.2g s of it\n", physics, ground);
-    assert_true(ground > 1e-6 && physics > ground && physics < 60);
-    envs_times(many.envs, &physics, &ground);
-    assert_true(physics == 0 && ground == 0);
-    close_many();
-}
-
-TEST(bytes) {
-    TaskDef def = kit_quiet_def();
-    open_many(&def, 1);
-    size_t size;
-    assert_non_null(envs_state(many.envs, &size));
-    assert_int_equal(size, ENVS * task_env_bytes(&def, robot));
-    assert_int_equal(envs_bytes(many.envs), size + ENVS * sizeof(TaskStep));
-    assert_int_equal((uintptr_t)envs_state(many.envs, &size) % 64, 0);
-    close_many();
-}
-
-/* Of the kit, by which other tests compare environments: whatever moves changes it. */
-TEST(hash) {
-    const uint64_t begin = 0xcbf29ce484222325u;
-    assert_true(kit_fnv(begin, "foobar", 6) == 0x85944171f73967e8u); /* its authors' */
-    TaskDef def = kit_quiet_def();
-    open_many(&def, 1);
-    draw_actions(0);
-    step_many();
-    TaskEnv *env = env_of(ENVS - 1);
-    char *const parts[] = {(char *)&env->robot.qpos[SA01_NQ - 1],
-                           (char *)&env->robot.qvel[SA01_NV - 1],
-                           (char *)&task_env_rest(env)->qacc[SA01_NV - 1],
-                           (char *)&task_env_history(env)[SA01_HISTORY - 1],
-                           (char *)&env->command[2],
-                           (char *)&env->reward_sum,
-                           (char *)task_env_ground(env) + mild_ground_size(task_env_ground(env)) -
-                               1};
-    const uint64_t before = kit_hash(many.envs, ENVS);
-    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
-        *parts[i] ^= 1;
-        assert_true(kit_hash(many.envs, ENVS) != before);
-        *parts[i] ^= 1;
-    }
-    assert_true(kit_hash(many.envs, ENVS) == before);
-    close_many();
-}
-
-/* What is opened and closed again leaves the heap as it was. */
-TEST(nothing_is_lost) {
-    TaskDef def = kit_quiet_def();
-    size_t used[4];
-    for (int i = 0; i < 4; i++) {
-        open_many(&def, 2);
-        step_many();
-        close_many();
-        struct mallinfo2 heap = mallinfo2();
-        used[i] = heap.uordblks + heap.hblkhd;
-    }
-    print_message("heap after the second and the last: %zu and %zu bytes\n", used[1], used[3]);
-    assert_true(used[3] < used[1] + 8192); /* a thread keeps a little; a workspace is larger */
-}
-
-/* ---- refusals ---- */
-
-TEST(refused) {
-    MildError error = {0};
-    Pool *pool = pool_create(1);
-    TaskDef def = task_def_default();
-    def.physics_dt = 0.003;
-    assert_null(kit_mujoco(&def, robot, pool, 1, 0, &error));
-    assert_error(&error, MILD_ERROR_RANGE, "task.physics_dt 0.01 0.003");
-    envs_destroy(NULL);
-    pool_destroy(pool);
-}
-
 /* Environments that are a part of more: the number selects the random numbers. */
 TEST(numbered_from) {
     const TaskDef def = task_def_default();
@@ -357,24 +269,6 @@ TEST(numbered_from) {
         rig_close(&alone);
     }
     close_many();
-}
-
-/* The means of two groups of robots together. */
-TEST(statistics_of_two) {
-    EnvsStats stats = {.episodes = 3 + 1, .falls = 2, .steps = 50, .assist = 1.5 + 0.5};
-    stats.length = 6 + 2;
-    stats.reward = 30 + 10;
-    stats.speed_error = 0.6 + 0.6;
-    stats.terms[1] = 4;
-    stats = envs_means(stats, 4);
-    assert_int_equal(stats.episodes, 4);
-    assert_int_equal(stats.falls, 2);
-    expect_near("steps", stats.steps, 50, 0);
-    expect_near("length", stats.length, 2, 1e-15);
-    expect_near("reward", stats.reward, 10, 1e-15);
-    expect_near("speed error", stats.speed_error, 0.3, 1e-15);
-    expect_near("help", stats.assist, 0.5, 0);
-    expect_near("term", stats.terms[1], 0.5, 1e-15);
 }
 
 TEST_MAIN(kit_setup, kit_teardown)

@@ -205,29 +205,6 @@ TEST(wrench_by_hand) {
     rig_close(&rig);
 }
 
-/* Tilted any way, turning any way: 300 u x e_z - 30 omega in the world, u the base's axis. */
-TEST(wrench_in_space) {
-    open_in_the_air(0);
-    help(1, 0.5);
-    for (uint32_t draw = 0; draw < 20; draw++) {
-        RobotState state = kit_moving_state(3, draw);
-        kit_load(rig.sim, &state, rig.env);
-        Oracle o = oracle_of(rig.sim);
-        const double z[3] = {0, 0, 1};
-        double wrench[6] = {0}, up[3], restoring[3], omega[3];
-        task_assist(rig.env, &rig.def, robot_table(robot), robot_sim_base_rotation(rig.sim),
-                    robot_sim_qvel(rig.sim), wrench);
-        mju_rotVecQuat(up, z, o.orientation);
-        mju_cross(restoring, up, z);
-        mju_rotVecQuat(omega, o.omega, o.orientation);
-        for (int i = 0; i < 2; i++) {
-            expect_entry("torque", i, wrench[3 + i], 150 * restoring[i] - 15 * omega[i], 1e-9);
-        }
-        expect_near("no twisting", wrench[5], 0, 0);
-    }
-    rig_close(&rig);
-}
-
 /* In the air the whole robot falls with half of gravity, and with all of it alone. */
 TEST(hand_acts_in_the_step) {
     open_in_the_air(0);

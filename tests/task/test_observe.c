@@ -1,5 +1,5 @@
 /* Every entry of the observation, the estimates and the critic's input at states in motion, one by
- * one, against the engine's own functions or a hand's; noise; history; mirror. */
+ * one, against the engine's own functions or a hand's; noise; history. */
 #include "sa01.h"
 #include "task_oracle.h"
 
@@ -91,21 +91,6 @@ TEST(frame) {
         expect_frame("critic", rig.critic, o.omega, o.gravity, rig.env->robot.qpos + 7,
                      rig.env->robot.qvel + 6, clock_at_03);
     }
-    rig_close(&rig);
-}
-
-TEST(readings) {
-    rig_open_quiet(&rig, 0.5);
-    Oracle o = rig_place(&rig, 11);
-    TaskSensors reading;
-    task_read_imu(robot_sim_base_rotation(rig.sim), robot_sim_qvel(rig.sim), &reading);
-    task_read_motors(robot_sim_qpos(rig.sim) + 7, robot_sim_qvel(rig.sim) + 6, &reading);
-    for (int i = 0; i < 3; i++) {
-        expect_entry("omega", i, reading.omega[i], o.omega[i], 1e-9);
-        expect_entry("gravity", i, reading.gravity[i], o.gravity[i], 1e-9);
-    }
-    assert_memory_equal(reading.q, rig.env->robot.qpos + 7, sizeof reading.q);
-    assert_memory_equal(reading.qd, rig.env->robot.qvel + 6, sizeof reading.qd);
     rig_close(&rig);
 }
 
@@ -383,30 +368,6 @@ TEST(noise) {
     rig_close(&rig);
 }
 
-/* Another environment, tick or seed draws other noise. */
-TEST(noise_is_a_stream) {
-    rig_open_quiet(&rig, 0.5);
-    TaskSensors reading = other_reading();
-    rig.def.observe_noise = 1;
-    look(&reading);
-    float first[SA01_OBSERVATION];
-    memcpy(first, rig.frame, sizeof first);
-    look(&reading);
-    assert_memory_equal(first, rig.frame, sizeof first);
-    rig.env->tick++;
-    look(&reading);
-    assert_memory_not_equal(first, rig.frame, sizeof first);
-    rig.env->tick--;
-    rig.env->index++;
-    look(&reading);
-    assert_memory_not_equal(first, rig.frame, sizeof first);
-    rig.env->index--;
-    rig.env->seed++;
-    look(&reading);
-    assert_memory_not_equal(first, rig.frame, sizeof first);
-    rig_close(&rig);
-}
-
 /* ---- history ---- */
 
 /* Frame t has t in its first entry: the history's means are then means of counts. */
@@ -447,99 +408,6 @@ TEST(history) {
         }
         rig_close(&rig);
     }
-}
-
-/* Step by step the newest frame is added to those before it. */
-TEST(history_of_steps) {
-    TaskDef def = kit_quiet_def();
-    def.history_stride = 1;
-    rig_open(&rig, &def, 3, 0);
-    rig_start(&rig, 0.5, 0, 0);
-    float seen[9][SA01_OBSERVATION];
-    for (int t = 0; t < 9; t++) {
-        rig_step(&rig, NULL);
-        memcpy(seen[t], rig.frame, sizeof seen[t]);
-    }
-    for (int i = 0; i < TASK_FRAMES; i++) {
-        assert_memory_equal(rig.history + i * SA01_OBSERVATION, seen[3 + i], sizeof seen[0]);
-    }
-    assert_memory_not_equal(seen[8], seen[7], sizeof seen[0]);
-    rig_close(&rig);
-}
-
-/* Any pointer of the view may be missing. */
-TEST(views) {
-    rig_open_quiet(&rig, 0.5);
-    TaskSensors reading = other_reading();
-    const EnvsView none = {0};
-    task_env_observe(rig.env, &rig.def, robot, rig.sim, &reading, 0, &none);
-    assert_true(task_env_history(rig.env)[SA01_HISTORY - SA01_OBSERVATION] == 0.5f);
-    rig_close(&rig);
-}
-
-/* ---- mirror ---- */
-
-/* The mirror image of a robot in the plane y = 0. */
-static RobotState mirrored(const RobotState *state) {
-    const int sign[LEG_JOINTS] = {-1, -1, 1, 1, 1, -1};
-    RobotState image = *state;
-    image.qpos[1] *= -1;
-    image.qpos[4] *= -1;
-    image.qpos[6] *= -1;
-    image.qvel[1] *= -1;
-    image.qvel[3] *= -1;
-    image.qvel[5] *= -1;
-    for (int i = 0; i < SA01_JOINTS; i++) {
-        int other = (i + LEG_JOINTS) % SA01_JOINTS;
-        image.qpos[7 + i] = sign[i % LEG_JOINTS] * state->qpos[7 + other];
-        image.qvel[6 + i] = sign[i % LEG_JOINTS] * state->qvel[6 + other];
-    }
-    return image;
-}
-
-static void look_at(const RobotState *state, const double command[3], double phase,
-                    const float *action) {
-    TaskSensors reading;
-    task_env_set_state(rig.env, state);
-    kit_load(rig.sim, state, rig.env);
-    memcpy(rig.env->command_seen, command, sizeof rig.env->command_seen);
-    memcpy(rig.env->action[0], action, SA01_JOINTS * sizeof *action);
-    rig.env->phase = phase;
-    task_read_imu(robot_sim_base_rotation(rig.sim), robot_sim_qvel(rig.sim), &reading);
-    task_read_motors(robot_sim_qpos(rig.sim) + 7, robot_sim_qvel(rig.sim) + 6, &reading);
-    look(&reading);
-}
-
-/* The frame of the mirrored robot is the mirrored frame. */
-TEST(mirror_image) {
-    rig_open_quiet(&rig, 0.5);
-    const int sign[LEG_JOINTS] = {-1, -1, 1, 1, 1, -1};
-    double worst = 0;
-    for (uint32_t draw = 0; draw < 10; draw++) {
-        RobotState state = kit_moving_state(1, draw), image = mirrored(&state);
-        float action[SA01_JOINTS], other[SA01_JOINTS], first[SA01_OBSERVATION];
-        for (int i = 0; i < SA01_JOINTS; i++) {
-            action[i] = 0.3f * (float)(i - 4);
-        }
-        for (int i = 0; i < SA01_JOINTS; i++) {
-            other[i] = (float)sign[i % LEG_JOINTS] * action[(i + LEG_JOINTS) % SA01_JOINTS];
-        }
-        const double command[3] = {0.6, 0.2, -0.8}, turned[3] = {0.6, -0.2, 0.8};
-        look_at(&state, command, 0.2, action);
-        memcpy(first, rig.frame, sizeof first);
-        look_at(&image, turned, 0.7, other);
-        for (int i = 0; i < SA01_OBSERVATION; i++) {
-            float wanted = mirror.observation_sign[i] * first[mirror.observation_index[i]];
-            expect_entry("mirrored frame", i, (double)rig.frame[i], (double)wanted, TOLERANCE);
-            worst = fmax(worst, (double)fabsf(rig.frame[i] - wanted));
-        }
-        for (int i = 0; i < SA01_JOINTS; i++) {
-            float wanted = mirror.action_sign[i] * action[mirror.action_index[i]];
-            expect_entry("mirrored action", i, (double)other[i], (double)wanted, 0);
-        }
-    }
-    print_message("mirrored frames: worst difference %.1e\n", worst);
-    rig_close(&rig);
 }
 
 TEST_MAIN(kit_setup, kit_teardown)

@@ -69,58 +69,6 @@ TEST(same_numbers_whatever_the_thread_count) {
     assert_true(one == rollout(1, ENVS, STEPS, MILD_MODEL_MILD, &stats));
 }
 
-/* Matched to one draw, every model carries the robot at about the same depth: after 0.3 s of
- * standing with stiff joints the feet bear the weight. */
-TEST(every_ground_model_carries) {
-    for (int model = 0; model < MILD_MODELS; model++) {
-        int rigid = model == MILD_MODEL_RIGID;
-        TaskDef def = kit_quiet_def();
-        strcpy(def.kp, "240 240 240 240 200 200");
-        strcpy(def.kd, "6 6 6 6 1 1");
-        strcpy(def.torque_share, "1");
-        def.randomize.model = model;
-        robot_set_model(robot, (MildModel)model);
-        Rig rig;
-        rig_open(&rig, &def, 5, 2);
-        rig.env->command_frozen = 1;
-        task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
-        const MildMaterial *m = &task_env_rest(rig.env)->terrain.materials[0];
-        assert_true(rig.env->variation.rigid == rigid);
-        assert_true(rigid || m->model == model);
-        double load = 0, depth = 0;
-        for (int t = 0; t < 30; t++) {
-            TaskStep step = rig_step(&rig, NULL);
-            assert_true(step.valid && !step.done);
-            for (int f = 0; f < SA01_FEET && t >= 20; f++) {
-                load += robot_sim_foot(rig.sim, f)->force[2] / 10;
-                depth -= robot_sim_foot(rig.sim, f)->sole_center[2] / (10 * SA01_FEET);
-            }
-        }
-        double rest =
-            rigid ? 0 : mild_sole_sinkage(robot_soles(robot)[0], m, robot_foot_load(robot));
-        printf("%-12s load %.2f of the weight, soles %.1f mm deep, at rest %.1f mm\n",
-               mild_model_names[model], load / (2 * robot_foot_load(robot)), 1e3 * depth,
-               1e3 * rest);
-        expect_near("load", load / (2 * robot_foot_load(robot)), 1, 0.2);
-        expect_near("depth", depth, rest, 0.010); /* landing leaves the plastic ones deeper */
-        rig_close(&rig);
-    }
-    robot_set_model(robot, MILD_MODEL_MILD);
-}
-
-TEST(mirror_is_an_involution) {
-    for (int i = 0; i < SA01_OBSERVATION; i++) {
-        int j = mirror.observation_index[i];
-        assert_int_equal(mirror.observation_index[j], i);
-        assert_true(mirror.observation_sign[i] * mirror.observation_sign[j] == 1);
-    }
-    for (int i = 0; i < SA01_JOINTS; i++) {
-        int j = mirror.action_index[i];
-        assert_int_equal(mirror.action_index[j], i);
-        assert_true(mirror.action_sign[i] * mirror.action_sign[j] == 1);
-    }
-}
-
 /* Mirrored start and mirrored actions give the mirrored observation: mirror table and robot agree.
  * frame: [shape.observation] the last one. */
 static void expect_mirrored(const TaskDef *def, float *frame) {

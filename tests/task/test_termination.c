@@ -64,19 +64,6 @@ TEST(tilt) {
     rig_close(&rig);
 }
 
-TEST(upright_in_the_air) {
-    open_limp();
-    for (int k = 0; k < 8; k++) {
-        RobotState state = kit_state(1.5);
-        kit_turn(state.qpos, k - 3.5, 0, 0);
-        state.qvel[0] = k - 4; /* neither speed nor height ends an episode */
-        state.qvel[2] = 0.5 * k;
-        state.qvel[5] = 4 - k;
-        expect_alive("upright in the air", step_from(&state, 10));
-    }
-    rig_close(&rig);
-}
-
 /* [m] lowest point of a box geom above z = 0, from the file's shapes. */
 static double lowest_of_box(const RobotState *state, const char *name) {
     const mjModel *m = robot_visual_model(robot);

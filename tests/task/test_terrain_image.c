@@ -31,43 +31,6 @@ static void write_png(const void *pixels, png_uint_32 format, int columns, int r
     assert_true(png_image_write_to_file(&image, path, 0, pixels, 0, NULL));
 }
 
-/* 8 and 16 bits, grey and colour: what was written comes back. */
-TEST(test_round_trip) {
-    static png_byte grey[ROWS * COLUMNS], color[ROWS * COLUMNS * 4];
-    static png_uint_16 wide[ROWS * COLUMNS];
-    double worst[3] = {0};
-    for (int i = 0; i < ROWS * COLUMNS; i++) {
-        grey[i] = (png_byte)((i * 37) % 256);
-        wide[i] = (png_uint_16)((i * 7919) % 65536);
-        memset(color + 4 * i, grey[i], 3);
-        color[4 * i + 3] = 255;
-    }
-    for (int kind = 0; kind < 3; kind++) {
-        Image image;
-        MildError error = {0};
-        write_png(kind == 0   ? (void *)grey
-                  : kind == 1 ? (void *)wide
-                              : (void *)color,
-                  kind == 0   ? PNG_FORMAT_GRAY
-                  : kind == 1 ? PNG_FORMAT_LINEAR_Y
-                              : PNG_FORMAT_RGBA,
-                  COLUMNS, ROWS);
-        MildStatus status = image_read(path, &image, &error);
-        expect_good(status == MILD_OK, &error);
-        assert_int_equal(image.columns, COLUMNS);
-        assert_int_equal(image.rows, ROWS);
-        for (int i = 0; i < ROWS * COLUMNS; i++) {
-            worst[kind] =
-                fmax(worst[kind],
-                     fabs(image.grey[i] - (kind == 1 ? wide[i] / 65535.0 : grey[i] / 255.0)));
-        }
-        image_close(&image);
-    }
-    print_message("pictures come back within %.1e (8 bits), %.1e (16 bits), %.1e (colour)\n",
-                  worst[0], worst[1], worst[2]);
-    assert_true(worst[0] < 1e-12 && worst[1] < 1e-12 && worst[2] < 0.005);
-}
-
 /* ---- kinds of PNG that libpng's short interface does not write ---- */
 
 typedef struct {
@@ -169,21 +132,6 @@ TEST(test_too_large) {
         assert_null(image.grey);
     }
     free(zeros);
-}
-
-/* An open file, which stands under another name in messages. */
-TEST(test_open_file) {
-    Image image;
-    MildError error = {0};
-    char nothing[16] = "no picture";
-    FILE *file = fmemopen(nothing, sizeof nothing, "rb");
-    assert_int_equal(image_read_file(file, "the-name", &image, &error), MILD_ERROR_FORMAT);
-    assert_error(&error, MILD_ERROR_FORMAT, "the-name PNG");
-    fclose(file);
-    file = fmemopen(nothing, 3, "rb"); /* shorter than a signature */
-    assert_int_equal(image_read_file(file, "short", &image, &error), MILD_ERROR_FORMAT);
-    assert_error(&error, MILD_ERROR_FORMAT, "short PNG");
-    fclose(file);
 }
 
 /* No picture, a picture cut anywhere, a picture with any byte changed: an error with the file's

@@ -23,17 +23,6 @@ static int widest_teardown(void **unused) {
     return widest_close(robot);
 }
 
-TEST(widths) {
-    assert_int_equal(shape.joints, ROBOT_JOINTS_MAX);
-    assert_int_equal(shape.feet, ROBOT_FEET_MAX);
-    assert_int_equal(shape.actions, ROBOT_JOINTS_MAX);
-    const int spare = TASK_OBSERVATION_MAX - shape.observation; /* what the task leaves out */
-    assert_in_range(spare, 0, TASK_FRAME_LAST - 2);
-    assert_int_equal(shape.history + TASK_FRAMES * spare, TASK_HISTORY_MAX);
-    assert_int_equal(shape.estimates, TASK_ESTIMATES_MAX);
-    assert_int_equal(shape.critic + spare, TASK_CRITIC_MAX);
-}
-
 /* Twice mirrored is the same, in every entry. */
 TEST(mirror_twice) {
     for (int i = 0; i < shape.observation; i++) {

@@ -34,11 +34,6 @@ TEST(same_at_any_frame_rate) {
     assert_true(worst < 1e-3);
 }
 
-TEST(nothing_stays_behind) {
-    assert_true(fabs(followed(8, 25) - SPEED * 8) < 1e-4);
-    assert_true(fabs(followed(8, 7) - SPEED * 8) < 1e-4);
-}
-
 TEST(no_time_no_motion) {
     Follow follow;
     double look[3];

@@ -171,43 +171,6 @@ TEST(others_are_seen) {
     view_destroy(view);
 }
 
-/* The robot stands on foam: the drawn surface is where the ground's elements are, and level again
- * once it is gone. */
-TEST(dents_are_where_the_elements_are) {
-    MildError error = {0};
-    MildTerrain sand = terrain;
-    terrain = kit_terrain("foam25");
-    ReliefDef area = {-1, 1, -1, 1, 0.01, 0, NULL, 1};
-    Relief *relief = relief_create(&area, &terrain, robot_rasters(robot), SA01_FEET, &error);
-    assert_non_null(relief);
-    load_at(0.0);
-    double worst = 0, deepest = 0, position[SA01_FEET][3], rotation[SA01_FEET][9];
-    for (int i = 0; i < 400; i++) {
-        for (int f = 0; f < SA01_FEET; f++) {
-            memcpy(position[f], robot_sim_foot(sim, f)->position, sizeof position[f]);
-            memcpy(rotation[f], robot_sim_foot(sim, f)->rotation, sizeof rotation[f]);
-        }
-        relief_press(relief, 0, (const double(*)[3])position, (const double(*)[9])rotation);
-        step();
-    }
-    for (int f = 0; f < SA01_FEET; f++) {
-        MildElements now = mild_scratch_elements(robot_sim_scratch(sim), f);
-        for (int e = 0; e < mild_sole_elements(robot_soles(robot)[f]); e++) {
-            double drawn = relief_depth_at(relief, now.point_x[e], now.point_y[e]);
-            worst = fmax(worst, fabs(drawn - now.depth[e]));
-            deepest = fmax(deepest, now.depth[e]);
-        }
-    }
-    print_message("foam25: elements up to %.1f mm deep, drawn within %.2f mm\n", 1e3 * deepest,
-                  1e3 * worst);
-    assert_true(deepest > 0.02 && worst < 0.002);
-    position[0][2] = position[1][2] = 1.0;
-    relief_press(relief, 0, (const double(*)[3])position, (const double(*)[9])rotation);
-    assert_true(relief_depth_at(relief, position[0][0], position[0][1]) == 0);
-    relief_destroy(relief);
-    terrain = sand;
-}
-
 TEST(bad_size_is_one_line) {
     MildError error = {0};
     ViewDef def = view_def_default();

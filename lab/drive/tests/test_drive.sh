@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Two processes, a runner and a simulated robot: a walk; states that are lost or come late; either side dead; garbage; bad input. In
+# Two processes, a runner and a simulated robot: a walk; states that are lost or come late; either side dead; bad input. In
 # lockstep, so that a busy machine only makes it slower. Usage: test_drive.sh PATH_TO_MILD PYTHON
 tests=$(realpath "$(dirname "$0")")
 source "$tests/../../../tests/kit.sh" "$1"
@@ -120,26 +120,6 @@ wait "$runner" # with 2 where the robot has fallen
 holds clock_robot.json real_time_factor 'x > 0 && x < 1.05'
 holds clock_robot.json sent "x >= 199 * $(value clock_robot.json seconds) && x <= 202 * $(value clock_robot.json seconds)"
 holds clock.json steps 'x > 0 && x <= 110'
-
-# garbage from elsewhere, before the robot is there and while it walks
-start garbage --command 0.3,0,0
-"$python" - "$address" <<'PY' &
-import os, random, socket, sys, time
-host, port = sys.argv[1].split(":")
-sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-random.seed(1)
-for k in range(600):
-    head = b"MILD\2\1\14\1" if k % 3 == 0 else b""
-    sender.sendto(head + os.urandom(random.randrange(0, 2000 if k % 5 == 0 else 200)), (host, int(port)))
-    time.sleep(0.002)
-PY
-robot garbage --seconds 2 || fail "the robot of garbage"
-wait $!
-ended 0
-holds garbage_robot.json fallen 'x == "false"'
-holds garbage.json steps 'x >= 200'
-refused=$(($(value garbage.json magic) + $(value garbage.json size) + $(value garbage.json checksum)))
-[ $((refused + $(value garbage.json strangers))) -ge 300 ] || fail "garbage was not counted"
 
 # the robot dies: the runner damps, says so, and ends
 start dead --command 0.3,0,0 --damp-after 0.2

@@ -31,7 +31,7 @@ MILD_HD_FN double task_gait_period(const TaskDef *def, const Real command[3]) {
  * are both in the air for 1 - 2 share of it. */
 MILD_HD_FN double task_gait_share(const TaskDef *def, const Real command[3]) {
     const double *share = def->stance_share, *speed = def->run_speed, v = fabs(command[0]);
-    const double run = v < speed[1] ? fmax(0, (v - speed[0]) / (speed[1] - speed[0])) : 1;
+    const double run = v < speed[1] ? fmax(0.0, (v - speed[0]) / (speed[1] - speed[0])) : 1;
     return share[1] - run * (share[1] - share[0]);
 }
 
@@ -47,12 +47,12 @@ MILD_HD_FN TaskFoot task_gait_foot(const TaskDef *def, const RobotTable *robot, 
     /* The foot's own clock, on which stance and swing last half of the period each. */
     phase += since < share ? since * (0.5 / share - 1) : (1 - since) * (1 - 0.5 / (1 - share));
     const double cycle = phase - (offset - 0.5 * second);
-    const double wave = (second ? -1 : 1) * task_sin(TASK_TWO_PI * cycle);
+    const Real wave = (second ? -1 : 1) * task_sin(TASK_TWO_PI * cycle);
     double lifted = cycle - 0.5 * !second;
     lifted -= floor(lifted);
     const int swings = lifted < 0.5;
     const TaskFoot moves = {!swings, fabs(wave) < def->double_support,
-                            swings ? def->swing_apex * task_sin(TASK_TWO_PI * lifted) : 0,
+                            REAL(swings ? def->swing_apex * task_sin(TASK_TWO_PI * lifted) : 0),
                             -wave < def->double_support ? 0 : -wave};
     return moves;
 }

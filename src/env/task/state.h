@@ -201,11 +201,11 @@ typedef struct {
 
 /* What the clock wants of a foot. */
 typedef struct {
-    int stance;    /* bool */
-    int either;    /* bool: near touchdown and lift-off, where stance and swing are both right */
-    double height; /* [m] apex sin(pi s), s: progress of the swing, so that the foot leaves and
-                      meets h0 on time */
-    double bend;   /* [-] of the swing leg in the reference motion */
+    int stance;  /* bool */
+    int either;  /* bool: near touchdown and lift-off, where stance and swing are both right */
+    Real height; /* [m] apex sin(pi s), s: progress of the swing, so that the foot leaves and meets
+                    h0 on time */
+    Real bend;   /* [-] of the swing leg in the reference motion */
 } TaskFoot;
 
 /* Everything that reward terms may use, computed once per policy step (task_describe_motion). */
