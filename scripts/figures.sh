@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Draws the figures of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain] [walk]
-# [robots] [rise] [actuator] [motion] [patchwork]; without a name all. The drawings are scripts/drawings.py's.
+# [robots] [run] [rise] [actuator] [motion] [patchwork]; without a name all. The drawings are scripts/drawings.py's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mild=build/mild
@@ -95,6 +95,12 @@ rise() {
         "select='eq(n,24)+eq(n,29)+eq(n,33)+eq(n,36)+eq(n,42)+eq(n,90)',scale=480:-1:flags=area,tile=3x2"
 }
 
+# The G1 runs on grass: three moments.
+run() {
+    "$mild" play --robot g1 --policy policies/g1_run.safetensors --ground grass --speed 2.8 --seconds 5 --video "$work/run.mp4"
+    still "$work/run.mp4" docs/run.png "select='eq(n,96)+eq(n,98)+eq(n,106)',scale=480:-1:flags=area,tile=3x1"
+}
+
 # A robot among its imprints on waves of two materials, after five seconds.
 terrain() {
     "$mild" play --ground sand_dense,sand_loose --speed 0.5 --seconds 5.2 --video "$work/terrain.mp4" \
@@ -121,9 +127,9 @@ actuator() {
 for name in "${@:-all}"; do
     case $name in
     presets | recovery | impact | eccentric) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
-    terrain | walk | robots | rise | actuator | motion | patchwork) "$name" ;;
+    terrain | walk | robots | run | rise | actuator | motion | patchwork) "$name" ;;
     sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
-    all) for each in presets recovery impact sinkage eccentric terrain walk robots rise actuator motion patchwork; do "$0" "$each"; done ;;
-    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots rise actuator motion patchwork" >&2 && exit 2 ;;
+    all) for each in presets recovery impact sinkage eccentric terrain walk robots run rise actuator motion patchwork; do "$0" "$each"; done ;;
+    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots run rise actuator motion patchwork" >&2 && exit 2 ;;
     esac
 done

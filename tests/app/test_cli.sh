@@ -191,6 +191,10 @@ file=gait/policy.safetensors
 expect 0 "" "$mild" export --policy $file --c gait_c
 grep -q 'POLICY_GAIT_PERIOD 7.0*e-01' gait_c/policy.h || fail "the gait of an exported policy"
 
+# the G1 runs: no foot is down for a tenth of the time
+"$mild" eval --robot g1 --policy "$root/policies/g1_run.safetensors" --ground grass --speed 2.5 --trials 1 --seconds 5 | \
+    grep -q '1/1 *2\.[45].*flight 1[0-9] %' || fail "the G1's run"
+
 # robots and controllers
 expect 0 'go1: 12 joints, 4 feet, 12.7 kg' "$mild" info robots
 bad "go2 go1" "$mild" eval --robot go2

@@ -31,8 +31,8 @@ MILD_HD_FN double task_gait_period(const TaskDef *def, const Real command[3]) {
  * are both in the air for 1 - 2 share of it. */
 MILD_HD_FN double task_gait_share(const TaskDef *def, const Real command[3]) {
     const double *share = def->stance_share, *speed = def->run_speed, v = fabs(command[0]);
-    const double run = v < speed[1] ? fmax(0.0, (v - speed[0]) / (speed[1] - speed[0])) : 1;
-    return share[1] - run * (share[1] - share[0]);
+    const double run = v < speed[1] ? (v - speed[0]) / (speed[1] - speed[0]) : 1;
+    return share[1] - (run > 0 ? run : 0) * (share[1] - share[0]);
 }
 
 MILD_HD_FN TaskFoot task_gait_foot(const TaskDef *def, const RobotTable *robot, double phase,
