@@ -41,7 +41,8 @@ static void path_go(Path *path, const FitPoint *row, const Share *share, int gro
 /* [-] Friction of ground that carries the share q of its virgin load. */
 static double friction(const MildMaterial *material, const Share *share, double q) {
     const double grips = (double)SHARE_YIELD * (double)share->grip * (1 - q) / (2 - q);
-    return share->grip > 0 ? fmin(material->mu, grips) : material->mu;
+    return share->grip > 0 ? fmin(material->mu, fmax(grips, (double)share_least(share)))
+                           : material->mu;
 }
 
 /* Shares of the rows up, in `share`; the shares of the rows along are between theirs. */

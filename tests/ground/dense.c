@@ -281,7 +281,9 @@ static void dense_share(double dt, DenseElement *e, const Find *find, const doub
     double c = 1.0 - law->projected * (1.0 - level), q = fmin(1.0 - find->memory.worn[find->i], c),
            soil = virgin_force(law, a), bed = law->bed_stiffness * fmax(a - law->bed, 0.0);
     if (law->grip > 0.0) {
-        double t = (3.0 + sqrt(8.0)) * law->grip, held = fmin(law->mu, t * (c - q) / (2.0 * c - q)),
+        double t = (3.0 + sqrt(8.0)) * law->grip,
+               least = find->shell || !(law->projected * law->weight > 0.0) ? 0.1 : 0.0,
+               held = fmin(law->mu, fmax(least, t * (c - q) / (2.0 * c - q))),
                way = fmax(e->u0 + 0.5 * dt * e->w0 - a, 0.0), carried = q * soil + bed,
                struck = fmax(law->drag_rate, 0.0) * moved_rate(law, a) * way * e->w0 / dt,
                along = now[0] * now[0] + now[1] * now[1],

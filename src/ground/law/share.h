@@ -52,6 +52,7 @@
 #define SHARE_STEEP REAL(0.17364817766693034) /* [-] cosine of 80 degrees: no face beyond */
 #define SHARE_FORGET REAL(40)                 /* [-] da/u0 beyond which nothing is left */
 #define SHARE_LEAST REAL(1e-6)                /* [-] least share */
+#define SHARE_GRIP REAL(0.1)                  /* [-] least friction of a sole without a frame */
 #ifdef MILD_REAL_FLOAT
 #define SHARE_ROUND REAL(1e-3) /* [-] of the elastic travel: what rounding may take from it */
 #else
@@ -101,12 +102,19 @@ typedef struct {
     int changes; /* bool: it is not that of the element, or friction is another */
 } ShareLoad;
 
+/* [-] Least friction: none under a plane sole on ground whose cones merge, which presses in a frame
+ * (frame.h). Shells and soles on `mild` have no frame. */
+MILD_HD Real share_least(const Share *share) {
+    return share->projects * share->side > 0 ? 0 : SHARE_GRIP;
+}
+
 /* [-] Friction of an element at the share q of c, whose yield load is `force` [N]. slides: [m^2/s^2]
  * square of its speed along the ground. rate: 1/dt. */
 MILD_HD Real share_grip(const Element *e, const Share *share, Real q, Real c, Real force,
                         Real slides, Real dt, Real rate) {
-    const Real lost = real_max(1 - real_over(q, c), 0); /* a GPU's q/c may round above 1 */
-    const Real held = real_min(share->mu, real_over(SHARE_YIELD * share->grip * lost, 1 + lost));
+    const Real lost = 1 - real_over(q, c);
+    const Real grips = real_over(SHARE_YIELD * share->grip * lost, 1 + lost);
+    const Real held = real_min(share->mu, real_max(grips, share_least(share)));
 
     /* The recruited mass is set in motion along by mu and the square of the sine of the way. */
     const Real a = e->yield_depth;
