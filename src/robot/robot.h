@@ -84,7 +84,8 @@ void robot_set_model(Robot *robot, MildModel model);
  * round foot, and after robot_set_model of a concentric model. Call it before making sims and
  * ground memory. */
 MildStatus robot_set_elements(Robot *robot, int elements, MildError *error);
-/* Lets the stance of foot f begin at offset[f % 4] of the gait cycle; NULL: where robot.ini says. */
+/* Lets the stance of foot f begin at offset[f % 4] of the gait cycle; NULL: where robot.ini says
+ * so. */
 void robot_set_gait(Robot *robot, const double *offset);
 /* Lets the shells stand too (stand: bool; at first they do not). Call it when
  * robot_set_model may be called. */

@@ -452,7 +452,7 @@ TEST(solver_follows_the_keys) {
     rig_close(&rig);
 }
 
-/* 88 N m up to 22 rad/s, half of it half way to 32 rad/s, none from there on; a brake has them all. */
+/* 88 N m up to 22 rad/s, half of it half way to 32 rad/s, none from there on; a brake has all. */
 TEST(torque_falls_with_speed) {
     const struct {
         double qd, forward, backward;

@@ -193,7 +193,8 @@ const MildField task_fields[] = {
     T(gait_slow_below, D, 1, 0.01, 10,
       "[m/s] speed |vx| + 3 |vy| + 1 m |wz| from which the period is gait_period"),
     T(stance_share, D, 2, 0.1, 0.9,
-      "[-] share of the period that a foot stands, of a run and of a walk; below 0.5 a biped flies"),
+      "[-] share of the period that a foot stands, of a run and of a walk; below 0.5 a biped "
+      "flies"),
     T(run_speed, D, 2, 0, 4,
       "[m/s] forward speed up to which the share is a walk's and from which it is a run's, linear "
       "between"),
