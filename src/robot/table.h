@@ -15,9 +15,7 @@ typedef struct {
     double joint_high[ROBOT_JOINTS_MAX];
     double effort[ROBOT_JOINTS_MAX];
     double speed[ROBOT_JOINTS_MAX];
-    double
-        full_speed[ROBOT_JOINTS_MAX]; /* [rad/s] up to which a motor gives its whole torque, which
-                                            falls to 0 at `speed`; 0: up to there */
+    double full_speed[ROBOT_JOINTS_MAX]; /* [rad/s] whole torque up to there; 0: up to `speed` */
     double swing[ROBOT_JOINTS_MAX];
     double still[ROBOT_JOINTS_MAX];     /* [-] 1: should stay near the default pose */
     double gait_offset[ROBOT_FEET_MAX]; /* [-] phase of the gait cycle when its stance begins */

@@ -84,8 +84,8 @@ typedef struct {
     double cadence;          /* [1/s] of these strides */
     double flight;           /* [-] share of the time after the first 2 s without a foot down */
     double duty;             /* [-] share of it that a foot is down, mean over the feet */
-    double load_peak;        /* [weights] largest vertical force on a foot in a stance */
-    double load_rate;        /* [weights/s] its largest rise in 10 ms */
+    double load_peak;        /* [weights] largest vertical force on a foot in a stance, mean */
+    double load_rate;        /* [weights/s] its largest rise in 10 ms, mean */
     double joint_speed_max;  /* [rad/s] largest after the first 2 s, of all trials */
     double torque_rms;       /* [N m] root mean square of the joint that has the largest */
     double at_limit;         /* [-] share of the time that the joint that is most often at its
