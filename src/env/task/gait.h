@@ -59,12 +59,16 @@ MILD_HD_FN TaskFoot task_gait_foot(const TaskDef *def, const RobotTable *robot, 
 
 /* [rad] Angle of joint i in the vendor's reference motion: the swing leg bends by
  * A |sin| times `swing` of robot.ini. For SA01 that is (-1, 2, -1) in hip pitch, knee and ankle
- * pitch. */
+ * pitch. bend: of its foot, 0 of the trunk. */
+MILD_HD_FN double task_gait_joint(const TaskDef *def, const RobotTable *robot, double bend, int i) {
+    return robot->default_pose[i] + robot->swing[i] * (def->reward.reference_amplitude * bend);
+}
+
 MILD_HD_FN double task_gait_reference(const TaskDef *def, const RobotTable *robot, double phase,
                                       const Real command[3], int i) {
     const int foot = robot->joint_foot[i];
     const double bend = foot < 0 ? 0 : task_gait_foot(def, robot, phase, command, foot).bend;
-    return robot->default_pose[i] + robot->swing[i] * (def->reward.reference_amplitude * bend);
+    return task_gait_joint(def, robot, bend, i);
 }
 
 #endif

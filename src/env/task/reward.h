@@ -105,8 +105,9 @@ MILD_HD_FN Real reward_action_smoothness(const TaskMotion *m) {
 MILD_HD_FN Real reward_reference_motion(const TaskMotion *m) {
     Real sum = 0;
     for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
-        sum += task_square(
-            m->q[i] - task_gait_reference(m->def, m->robot, m->env->phase, m->env->command, i));
+        const int foot = m->robot->joint_foot[i];
+        const double bend = foot < 0 ? 0 : m->wanted[foot].bend;
+        sum += task_square(m->q[i] - task_gait_joint(m->def, m->robot, bend, i));
     }
     Real d = task_sqrt(tile_sum(sum));
     return task_exp(-2 * d) - REAL(0.2) * task_clamp(d, 0, 0.5);
