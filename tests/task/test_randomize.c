@@ -381,27 +381,6 @@ TEST(slip_on_a_share) {
     free(env);
 }
 
-/* Of the grounds that stay dented, presets too; the others keep their law and all numbers. */
-TEST(mild_on_a_share) {
-    open_env();
-    TaskDef some = def;
-    some.randomize.mild_share = 0.3;
-    int dented = 0, mild = 0;
-    for (int t = 0; t < DRAWS; t++) {
-        draw_next();
-        const MildMaterial plain = task_env_rest(env)->terrain.materials[0];
-        task_env_draw(env, &some, robot);
-        const MildMaterial m = task_env_rest(env)->terrain.materials[0];
-        dented += plain.model == MILD_MODEL_MILD_MERGED;
-        mild += m.model != plain.model;
-        assert_true(m.model == plain.model
-                        ? memcmp(&m, &plain, sizeof m) == 0
-                        : m.model == MILD_MODEL_MILD && m.recovery <= 0.2 && m.mu == plain.mu);
-    }
-    expect_share("mild", mild, dented, 0.3);
-    free(env);
-}
-
 /* In as many episodes as asked for; it moves no other draw. */
 TEST(shells_stand_in_a_share) {
     open_env();

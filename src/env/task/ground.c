@@ -16,7 +16,6 @@
 #define RANDOM_USE_GROUNDS 0x47524e44u
 #define RANDOM_USE_DRIFT 0x44524654u
 #define RANDOM_USE_SLIP 0x534c4950u
-#define RANDOM_USE_LAW 0x4c415721u
 #define SLIP_RECOVERY 0.2 /* [-] ground that springs back by more has no grains that flow */
 
 static double spread_of(Random *r, const RandomizeDef *def) {
@@ -88,16 +87,10 @@ static MildMaterial draw_ranges(Random *r, const RandomizeDef *def, const Robot 
     return m;
 }
 
-/* The law of a ground that was drawn. start: as in draw_slip. */
-static int model_wanted(const Random *start, const RandomizeDef *def, const MildMaterial *m,
-                        int is_preset) {
-    Random r = *start;
-    r.seed ^= RANDOM_USE_LAW;
+/* The law of a ground that was drawn. */
+static int model_wanted(const RandomizeDef *def, const MildMaterial *m, int is_preset) {
     if (def->model != TASK_MODEL_OWN) {
         return def->model;
-    }
-    if (m->recovery <= SLIP_RECOVERY && random_unit(&r) < def->mild_share) {
-        return MILD_MODEL_MILD;
     }
     return is_preset || m->recovery > SLIP_RECOVERY ? m->model : MILD_MODEL_MILD_MERGED;
 }
@@ -134,14 +127,14 @@ static MildMaterial draw_new(Random *r, const TaskDef *task, const Robot *robot)
         if (!model_is_cones(m.model)) {
             return m; /* which has no match */
         }
-        const int model = model_wanted(&start, def, &m, is_preset);
+        const int model = model_wanted(def, &m, is_preset);
         if (robot_match_model(robot, (MildModel)model, &m, &rival, NULL) == MILD_OK) {
             draw_slip(&start, def, &rival);
             return rival;
         }
     }
     m = mild_material_default();
-    const int model = model_wanted(&start, def, &m, 1);
+    const int model = model_wanted(def, &m, 1);
     MildStatus status = robot_match_model(robot, (MildModel)model, &m, &rival, NULL);
     assert(status == MILD_OK);
     (void)status;

@@ -296,9 +296,6 @@ const MildField randomize_fields[] = {
     MILD_FIELD_CHOICE(RandomizeDef, model, model_names, MILD_MODELS + 1,
                       "[-] ground model, to which the grounds drawn are matched; own: that of the "
                       "preset, else mild_merged where recovery is at most 0.2 and mild elsewhere"),
-    Z(mild_share, 1, 0, 1,
-      "[-] share of those with recovery up to 0.2 that follow mild all the same; they resist a "
-      "slip less"),
     Z(rigid_share, 1, 0, 1, "[-] share of episodes on the engine's own rigid contact"),
     Z(rigid_time, 2, 0, 2,
       "[s] time constant of the rigid contact (MuJoCo's solref, damping ratio 1), low and high; "

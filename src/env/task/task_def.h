@@ -119,7 +119,6 @@ typedef struct {
                   engine's contact; or TASK_MODEL_OWN */
     /* ground: shares of episodes; what remains after rigid and preset draws from the paper's ranges
      */
-    double mild_share;            /* [-] of those with memory, on mild whatever their own law */
     double rigid_share;           /* [-] engine contact */
     double rigid_time[2];         /* [s] its time constant; 0 0: the robot's own contact */
     double preset_share;          /* [-] a named preset, parameters times 1 +- preset_jitter */
