@@ -82,7 +82,7 @@ typedef struct {
                                 distance */
     double stride;           /* [m] from a foot's touchdown to its next one, after the first 2 s */
     double cadence;          /* [1/s] of these strides */
-    double flight;           /* [-] share of the time after the first 2 s without a foot down */
+    double flight;           /* [-] share of the time after the first 2 s with nothing down */
     double duty;             /* [-] share of it that a foot is down, mean over the feet */
     double load_peak;        /* [weights] largest vertical force on a foot in a stance, mean */
     double load_rate;        /* [weights/s] its largest rise in 10 ms, mean */

@@ -153,7 +153,7 @@ static void measure_contact(Measure *m, const EnvsSample *sample) {
     for (int f = 0; f < sample->feet; f++) {
         standing += sample->foot[f].load > CONTACT_FORCE;
     }
-    m->flight += standing ? 0 : m->dt;
+    m->flight += standing || sample->shell_load > CONTACT_FORCE ? 0 : m->dt;
     m->stance += standing * m->dt / sample->feet;
 }
 

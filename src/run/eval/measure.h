@@ -52,7 +52,7 @@ typedef struct {
     double turned;              /* [rad] */
     double work;                /* [J] integral sum |tau qd| dt */
     double base_low, base_high; /* [m] */
-    double flight;              /* [s] without a foot on the ground */
+    double flight;              /* [s] without a foot or a shell on the ground */
     double stance;              /* [s] that a foot is on the ground, mean over the feet */
     double joint_speed;         /* [rad/s] largest */
     double torque_square[ROBOT_JOINTS_MAX]; /* [N^2 m^2 s] */
