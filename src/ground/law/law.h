@@ -54,10 +54,8 @@
 #include "ground/law/power.h"
 
 #define LAW_HEAP_LEAST REAL(1e-9) /* [-] least `begin` of a heap: what begins at 0 is a cone */
-#ifndef LAW_TAIL
-#define LAW_TAIL REAL(0.02)
-#endif
-#define LAW_MOVES REAL(5) /* [-] depth per recruited depth of what moves with a heap */
+#define LAW_MOVES REAL(5)         /* [-] depth per recruited depth of what moves with a heap */
+#define LAW_TAIL REAL(0.02)       /* [-] recruited depth per depth beyond that */
 
 /* The curves that a law has besides line and bed. All elements of a foot use the union of its
  * materials' bits, because a law without a curve has 0 for that curve's numbers. */
