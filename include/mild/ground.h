@@ -377,8 +377,8 @@ typedef struct {
                                           a falling foot needs less than 50 ms */
     double position[MILD_FEET_MAX][3]; /* [m] ankle, world */
     /* [-] Foot to world, row major, orthonormal. A sole presses with either side; tilted, its
-     * elements keep their area in `mild`, as in the paper; in `mild_merged` they have its projection
-     * and press in a direction between the ground's normal and the sole's. */
+     * elements keep their area in `mild`, as in the paper; in `mild_merged` they have its
+     * projection and press in a direction between the ground's normal and the sole's. */
     double rotation[MILD_FEET_MAX][9];
     /* [m/s, rad/s] Present twist at the ankle: linear, then angular; world axes. */
     double velocity[MILD_FEET_MAX][6];

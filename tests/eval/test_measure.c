@@ -321,9 +321,9 @@ TEST(strides_and_the_way_of_a_sole) {
 }
 
 /* Strides of a second, each foot down for 3/8 of it and half a second apart: 1 - 2 3/8 of flight,
- * but from 4 s on the knees are down. A foot bears 300 N, then 900 N, after 3 s 700 N: at most twice the weight on average, and 500 N
- * more at once. Joint 1 drives at 25 rad/s, where its 40 N m have fallen to 20, for 3/4 of the
- * time, and brakes with as much for the rest. */
+ * but from 4 s on the knees are down. A foot bears 300 N, then 900 N, after 3 s 700 N: at most
+ * twice the weight on average, and 500 N more at once. Joint 1 drives at 25 rad/s, where its 40 N m
+ * have fallen to 20, for 3/4 of the time, and brakes with as much for the rest. */
 TEST(flight_and_loads) {
     const EvalDef eval = {.speed = 3, .trials = 1, .seconds = 6};
     const uint8_t ran = TASK_END_time;

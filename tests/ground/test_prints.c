@@ -74,6 +74,36 @@ TEST(test_second_step) {
     mild_sole_destroy(sole);
 }
 
+/* A tilted plate that goes straight down slides in its frame, and leaves no print beside itself. */
+TEST(test_straight_down) {
+    MildSole *sole = kit_plate(4, 4);
+    MildMaterial m = kit_preset("sand_loose");
+    m.model = MILD_MODEL_MILD_MERGED;
+    const double c = cos(0.3), s = sin(0.3), tilted[9] = {c, 0, s, 0, 1, 0, -s, 0, c};
+    double most = 0.0, deepest = 0.0;
+    for (int place = 0; place < 50; place++) {
+        Kit kit;
+        prints_open(&kit, 1, sole, NULL, &m, 1e-3, TILES);
+        memcpy(kit.input.rotation[0], tilted, sizeof tilted);
+        kit.input.position[0][0] = 3e-4 * place;
+        for (int k = 0; k <= 40; k++) {
+            move_to(&kit, 1e-3 * k);
+        }
+        for (int e = 0; e < mild_sole_elements(sole); e++) {
+            const double at[2] = {kit.input.position[0][0] + c * mild_sole_x(sole)[e] +
+                                      s * KIT_SOLE_Z,
+                                  kit.input.position[0][1] + mild_sole_y(sole)[e]};
+            most = fmax(most, mild_ground_imprint_at(kit.ground, at[0], at[1]));
+        }
+        deepest = fmax(deepest, kit.result.foot[0].depth_max);
+        kit_close(&kit);
+    }
+    print_message("prints of a tilted plate %.1f mm deep: %.3f mm\n", 1e3 * deepest, 1e3 * most);
+    assert_true(deepest > 0.01);
+    assert_true(most == 0.0);
+    mild_sole_destroy(sole);
+}
+
 /* Not at the sole's edge: there a cell may lie half outside. */
 static int has_neighbours(const MildSole *sole, int e) {
     int count = 0;

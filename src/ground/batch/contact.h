@@ -219,7 +219,8 @@ typedef struct {
     Real share, lean; /* [-] q and lean of Share */
 } ContactLoad;
 
-/* Velocity of an element, along the world's axes. descent: speed at which its depth grows. */
+/* Velocity of an element, of a sole along the axes of its frame (frame.h). descent: speed at which
+ * it penetrates. */
 typedef struct {
     Real x, y;    /* [m/s] */
     Real descent; /* [m/s] */

@@ -1,7 +1,7 @@
 /* The frame in which a plane sole presses on ground whose cones merge (docs/model.md section 21).
  *
- * A yield force has a direction: a tilted sole that is pressed straight down is pushed sideways, and
- * one that is dragged is lifted where its underside faces the way. In grains the force is along
+ * A yield force has a direction: a tilted sole that is pressed straight down is pushed sideways,
+ * and one that is dragged is lifted where its underside faces the way. In grains it is along
  *
  *     e = n + t (m - n), normalised       n: normal of the ground, m: of the sole, both up
  * with t = FRAME_TURN. The step is that of a level sole in a frame of which e is the normal: an
@@ -18,7 +18,8 @@
 
 #define FRAME_TURN REAL(0.6) /* [-] share of the tilt: eleven tilted plates on grains */
 
-/* v. sole: normal of the sole's plane, either way. slope: gradient of the ground. turn: [-] t. */
+/* v. sole: normal of the sole's plane, either way. slope: gradient of the ground. turn: [-] t;
+ * 0: v is 0. */
 MILD_HD void frame_axis(const Real sole[3], Real slope_x, Real slope_y, Real turn, Real v[3]) {
     const Real side = sole[2] < 0 ? REAL(-1) : REAL(1);
     const Real upright = REAL_INVERSE_SQRT(1 + slope_x * slope_x + slope_y * slope_y);
@@ -28,7 +29,7 @@ MILD_HD void frame_axis(const Real sole[3], Real slope_x, Real slope_y, Real tur
         e[k] = n[k] + turn * (side * sole[k] - n[k]);
         square += e[k] * e[k];
     }
-    const Real length = REAL_INVERSE_SQRT(real_max(square, REAL(1e-12)));
+    const Real length = turn > 0 ? REAL_INVERSE_SQRT(real_max(square, REAL(1e-12))) : 0;
     v[0] = (n[1] * e[2] - n[2] * e[1]) * length;
     v[1] = (n[2] * e[0] - n[0] * e[2]) * length;
     v[2] = (n[0] * e[1] - n[1] * e[0]) * length;
@@ -51,13 +52,19 @@ MILD_HD void frame_of_world(const Real v[3], const Real world[3], Real a[3]) {
     frame_to_world(back, world, a);
 }
 
-/* [m/s] By how much the depth of an element grows faster than it penetrates. x, y, descent: its
- * velocity in the frame. slope: gradient of the ground. */
+/* [m/s] Velocity of an element in the world. x, y, descent: in the frame. slope: gradient of the
+ * ground. */
+MILD_HD void frame_velocity(const Real v[3], Real slope_x, Real slope_y, Real x, Real y,
+                            Real descent, Real world[3]) {
+    const Real own[3] = {x, y, slope_x * x + slope_y * y - descent};
+    frame_to_world(v, own, world);
+}
+
+/* [m/s] By how much the depth of an element grows faster than it penetrates; as frame_velocity. */
 MILD_HD Real frame_sinks(const Real v[3], Real slope_x, Real slope_y, Real x, Real y,
                          Real descent) {
-    const Real own[3] = {x, y, slope_x * x + slope_y * y - descent};
     Real world[3];
-    frame_to_world(v, own, world);
+    frame_velocity(v, slope_x, slope_y, x, y, descent, world);
     return slope_x * world[0] + slope_y * world[1] - world[2] - descent;
 }
 

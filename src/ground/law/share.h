@@ -15,8 +15,9 @@
  * whose greatest value is t F_g, at lambda = 2 - sqrt 2. Grains hold a sole that slides under load
  * so (lab/grains/README.md); a parabola, as of footings, would hold it by a third less. Two things
  * hold it besides. Ground that the sole strikes and sets in motion pushes with the force G of the
- * drag: it is held by the whole of mu, so the coefficient is the mean of both by F and G. And
- * ground at the sides of a sole that is u deep, of the width W, which is pushed away (Rankine):
+ * drag: it is held by mu v^2/(v^2 + h^2), v: the speed along, so the coefficient is the mean of
+ * both by F and G. And ground at the sides of a sole that is u deep, of the width W, which is
+ * pushed away (Rankine):
  *
  *     G = c_d m_a' h^2                   h: speed at which virgin ground is reached
  *     H <= mu F + K_p phi rho g u^2 s/(2 W)
@@ -102,14 +103,14 @@ typedef struct {
     int changes; /* bool: it is not that of the element, or friction is another */
 } ShareLoad;
 
-/* [-] Least friction: none under a plane sole on ground whose cones merge, which presses in a frame
- * (frame.h). Shells and soles on `mild` have no frame. */
+/* [-] Least friction: none under a plane sole where cones merge, which the frame holds (frame.h).
+ * Shells and ground of `mild` have none. */
 MILD_HD Real share_least(const Share *share) {
     return share->projects * share->side > 0 ? 0 : SHARE_GRIP;
 }
 
-/* [-] Friction of an element at the share q of c, whose yield load is `force` [N]. slides: [m^2/s^2]
- * square of its speed along the ground. rate: 1/dt. */
+/* [-] Friction of an element at the share q of c, whose yield load is `force` [N]. slides: square
+ * of its speed along the ground [m^2/s^2], of a sole in its frame. rate: 1/dt. */
 MILD_HD Real share_grip(const Element *e, const Share *share, Real q, Real c, Real force,
                         Real slides, Real dt, Real rate) {
     const Real lost = 1 - real_over(q, c);

@@ -33,16 +33,20 @@ MILD_HD int slot_stays(const Slots *s, int i, Real m1, int prints) {
 /* A loaded element writes its depth into the ground where it lifts off, less what flows back there,
  * and in every cell that it slides out of. When it slides into a deeper imprint it takes over that
  * depth. A greater depth never means more force, and an element takes a lesser one while it carries
- * nothing, so this adds no energy. v: its velocity. refill: [-] of the material. */
+ * nothing, so this adds no energy. v: its velocity in
+ * the frame of the foot. refill: [-] of the material. */
 static void element_imprint(const Advance *a, const Memory *memory, const Slots *s, int i, int e,
                             const SlotVelocity *v, int lifted, double refill) {
     if (!(s->recovery[i] < 1.0)) {
         return;
     }
+    const Real *frame = a->foot->frame;
+    Real world[3];
+    frame_velocity(frame, s->slope_x[i], s->slope_y[i], v->x, v->y, v->descent, world);
     const double x0 = a->foot->point_x[e];
     const double y0 = a->foot->point_y[e];
-    const double x1 = x0 + a->dt * v->x;
-    const double y1 = y0 + a->dt * v->y;
+    const double x1 = x0 + a->dt * world[0];
+    const double y1 = y0 + a->dt * world[1];
     if (!lifted && imprints_same_cell(a->imprints, x0, y0, x1, y1)) {
         return;
     }
@@ -88,15 +92,15 @@ static void slot_raise(const Advance *a, const Memory *memory, const Slots *s, i
     memory->depth_max[e] = real_max(depth, memory->depth_max[e]); /* a NaN changes nothing */
 }
 
-/* The same for all elements of a foot. It is not part of the vector loop, where taking the address
- * of a local variable would prevent vectorisation. */
+/* The same for all elements of a foot that stay. It is not part of the vector loop, where taking
+ * the address of a local variable would prevent vectorisation. */
 static __attribute__((cold, noinline)) void foot_peaks(const Advance *a, const Memory *memory) {
     for (int e = 0; e < a->foot->elements; e++) {
         const Slots *s = slot_block(a->foot, e);
         const int i = e % SLOT_LANES;
         const SlotVelocity v = slot_velocity(s, i, &a->motion, 1);
         const double middle = s->depth[i] + a->dt / 2 * v.descent;
-        if (middle > 0.0 && element_turns(s->entry_speed[i], v.descent)) {
+        if (memory->depth_max[e] > 0.0 && element_turns(s->entry_speed[i], v.descent)) {
             slot_raise(a, memory, s, i, e, &v, middle);
         }
     }

@@ -21,9 +21,10 @@ void slots_elastic(const FootScratch *foot) {
 
 /* Cosine between the sole and the ground under each slot, into `lean`. Level ground has one for
  * all, without a root for each. */
-static void slots_lean(const FootScratch *foot, const double *R) {
-    const Real side = R[8] < 0 ? REAL(-1) : REAL(1); /* the face that looks down */
-    const Real up[3] = {side * (Real)R[2], side * (Real)R[5], side * (Real)R[8]};
+static void slots_lean(const FootScratch *foot) {
+    const double *normal = foot->arm[3];
+    const Real side = normal[2] < 0 ? REAL(-1) : REAL(1); /* the face that looks down */
+    const Real up[3] = {side * (Real)normal[0], side * (Real)normal[1], side * (Real)normal[2]};
     const Real level = real_min(real_max(up[2], SHARE_LEAN), 1);
     for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
         for (int i = 0; i < SLOT_LANES; i++) {
@@ -56,12 +57,12 @@ MILD_HD void slot_carry(Slots *s, int i, Real dt, Real rate, const Motion *now) 
     s->hold_stiffness[i] = element.hold_stiffness;
 }
 
-void foot_carry(const FootScratch *foot, const double *R, const Motion *now, double dt) {
+void foot_carry(const FootScratch *foot, const Motion *now, double dt) {
     slots_elastic(foot);
     if (foot->shell) {
         shell_lean(foot, now);
     } else {
-        slots_lean(foot, R);
+        slots_lean(foot);
     }
     const double rate = 1.0 / dt;
     const Motion motion = *now;

@@ -6,12 +6,20 @@
 #include "ground/law/models.h"
 #include "ground/terrain/terrain.h"
 
-static void vector_of_world(const FootScratch *foot, const double *world, double *own) {
-    const Real from[3] = {(Real)world[0], (Real)world[1], (Real)world[2]};
-    Real to[3];
-    frame_of_world(foot->frame, from, to);
+/* side: 1 into the world, -1 into the frame. */
+static void vector_turn(const FootScratch *foot, Real side, const double *from, double *to) {
+    const Real axis[3] = {side * foot->frame[0], side * foot->frame[1], side * foot->frame[2]};
+    Real own[3] = {(Real)from[0], (Real)from[1], (Real)from[2]};
+    frame_to_world(axis, own, own);
     for (int k = 0; k < 3; k++) {
-        own[k] = to[k];
+        to[k] = own[k];
+    }
+}
+
+static void twist_turn(const FootScratch *foot, Real side, const double *from, double *to) {
+    memmove(to, from, 6 * sizeof *to);
+    for (int k = 0; foot->framed && k < 6; k += 3) {
+        vector_turn(foot, side, to + k, to + k);
     }
 }
 
@@ -27,23 +35,16 @@ void foot_frame(FootScratch *foot, const MildTerrain *terrain, const double *R) 
     frame_axis(sole, (Real)slope[0], (Real)slope[1], FRAME_TURN, foot->frame);
     foot->framed = foot->frame[0] != 0 || foot->frame[1] != 0 || foot->frame[2] != 0;
     for (int k = 0; foot->framed && k < 4; k++) {
-        vector_of_world(foot, foot->arm[k], foot->lever[k]);
+        vector_turn(foot, -1, foot->arm[k], foot->lever[k]);
     }
 }
 
 void twist_of_world(const FootScratch *foot, const double *world, double *own) {
-    memmove(own, world, 6 * sizeof *own);
-    for (int k = 0; foot->framed && k < 6; k += 3) {
-        vector_of_world(foot, own + k, own + k);
-    }
+    twist_turn(foot, -1, world, own);
 }
 
 void twist_to_world(const FootScratch *foot, const double *own, double *world) {
-    FootScratch back = {.framed = foot->framed};
-    for (int k = 0; k < 3; k++) {
-        back.frame[k] = -foot->frame[k];
-    }
-    twist_of_world(&back, own, world);
+    twist_turn(foot, 1, own, world);
 }
 
 /* Q^T A Q of the rows and columns of a foot, from number `first` on. */

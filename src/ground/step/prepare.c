@@ -145,7 +145,7 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     const Motion now = foot_motion(foot, before), free = foot_motion(foot, after);
     foot_begin(foot, input->dt, &now);
     if (foot->curves & LAW_HEAP) {
-        foot_carry(foot, R, &now, input->dt);
+        foot_carry(foot, &now, input->dt);
     }
     if (foot->stops) {
         slots_clear(foot);

@@ -106,8 +106,8 @@ struct MildScratch {
     double *rows;                   /* [2][6 feet][ROW_LANES] of Newton's method */
     double window[2 * ROW_LANES];   /* 1 at ROW_LANES, else 0: newton_step.c */
     double sums[MILD_FEET_MAX][12]; /* [N s, N s m] of I, x I, y I, height I at the last pass */
-    double wrench[TWIST_MAX];       /* [N s, N m s] sum of B^T I at the last pass */
-    /* [kg, kg m, kg m^2] -d wrench/d twist of each foot, 6 x 6, row major. */
+    double wrench[TWIST_MAX];       /* [N s, N m s] sum of B^T I at the last pass, in the frames */
+    /* [kg, kg m, kg m^2] -d wrench/d twist of each foot, 6 x 6, row major, in its frame. */
     double hessian[MILD_FEET_MAX][36];
     double velocity[TWIST_MAX]; /* [m/s, rad/s] V+ of the last solve, in the frames of the feet */
     MildContactInput input;     /* input_of_world, whose inverse inertia is */
@@ -188,7 +188,7 @@ static inline Motion foot_moves(const FootScratch *foot, const double *V) {
     return motion;
 }
 
-/* p: vector from the ankle to the element of a slot, world axes. */
+/* p: vector from the ankle to the element of a slot, in the foot's frame. */
 static inline void slot_arm(const FootScratch *foot, const Slots *s, int i, double p[3]) {
     for (int k = 0; k < 3; k++) {
         p[k] = foot->lever[0][k] + foot->lever[1][k] * s->x[i] + foot->lever[2][k] * s->y[i] +

@@ -30,20 +30,12 @@ static double ahead_of(const FootScratch *foot, int i, const Element *element, c
     return share_ahead(element, &share, s->lean[l], n, v.x, v.y, v.descent);
 }
 
-/* Functions of their own, because that is smaller. */
-#define RIM_CALLED static __attribute__((noinline))
-
-/* [N] rim_force of a slot. */
-RIM_CALLED double force_of(const Slots *s, int l, double u) {
-    Element element = slot_element(s, l);
-    element.law.cone_begin = s->cone_begin[l];
-    return rim_force(&element.law, u);
-}
-
 /* [-] rim_share of a slot at the depth u. */
-RIM_CALLED double share_of_slot(const Slots *s, int l, double bears, double u) {
+static double share_of_slot(const Slots *s, int l, double bears, double u) {
     const Element element = slot_element(s, l);
-    return rim_share(&element.law, s->recovery[l], bears, force_of(s, l, u));
+    Law law = element.law;
+    law.cone_begin = s->cone_begin[l];
+    return rim_share(&element.law, s->recovery[l], bears, rim_force(&law, u));
 }
 
 void shell_lean(const FootScratch *foot, const Motion *now) {
