@@ -407,27 +407,30 @@ static double find_seen(const Find *find, double dt) {
 
 /* The axes are the world's; under a plane sole on ground whose cones merge they are turned by the
  * smallest rotation that takes the normal of the ground under the point (0, 0, z) to one that is
- * 0.6 of the way from it to the sole's: about their cross product, by their angle. */
+ * t = 0.6 (1 - 5 recovery) of the way from it to the sole's, at least 0: about their cross product,
+ * by their angle, whose sine is at most 0.32. */
 static void find_frame(Find *find, const MildSole *sole, const double *R) {
     const MildTerrain *terrain = &find->kit->terrain;
     const double *at = find->kit->input.position[find->f], z = mild_sole_z(sole);
     const double x = at[0] + R[2] * z, y = at[1] + R[5] * z;
     double slope[2], n[3], e[3], axis[3], size = 0.0, sine, angle;
     mild_terrain_slope_at(terrain, x, y, slope);
-    const int merged =
-        terrain->materials[mild_terrain_material_at(terrain, x, y)].model == MILD_MODEL_MILD_MERGED;
+    const MildMaterial *m = &terrain->materials[mild_terrain_material_at(terrain, x, y)];
+    const double t =
+        m->model == MILD_MODEL_MILD_MERGED ? 0.6 * fmax(1.0 - 5.0 * m->recovery, 0.0) : 0.0;
     for (int k = 0; k < 3; k++) {
         n[k] = (k < 2 ? -slope[k] : 1.0) / sqrt(1.0 + slope[0] * slope[0] + slope[1] * slope[1]);
-        e[k] = 0.4 * n[k] - 0.6 * find->normal[k];
+        e[k] = (1.0 - t) * n[k] - t * find->normal[k];
         size += e[k] * e[k];
     }
     kit_cross(n, e, axis);
     sine = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]) / sqrt(size);
     angle = atan2(sine, (n[0] * e[0] + n[1] * e[1] + n[2] * e[2]) / sqrt(size));
+    angle = fmin(angle, asin(0.32));
     for (int k = 0; k < 3; k++) {
         double unit[3] = {k == 0, k == 1, k == 2}, turned[3];
         memcpy(find->frame[k], unit, sizeof unit);
-        if (find->shell || !merged || sine < 1e-12) {
+        if (find->shell || t == 0.0 || sine < 1e-12) {
             continue;
         }
         const double a[3] = {axis[0] / sine / sqrt(size), axis[1] / sine / sqrt(size),

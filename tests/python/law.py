@@ -16,6 +16,7 @@ TURNED = 1e-4  # [m/s] speed at the front above which a foot can have turned rou
 SPRING = 2e-5  # [m] delta, over which friction is elastic: section 6
 COUNTED, LONGEST = 1e-5, 0.1  # [m] least way that is counted, and greatest path: section 8
 TURN = 0.6  # share of the tilt by which a sole presses along its normal: section 21
+TURN_MOST = 0.32  # sine of the largest turn: section 21
 TAIL = 0.02  # depth that moves beyond a heap, by depth: section 21
 POINTS = 4  # along a cell's edge, for the distances in it: section 21
 PRESSURE = 3  # K_p, passive earth pressure: section 22
@@ -110,13 +111,14 @@ class Law:
         return self.moved * np.where(u / 5 < self.u_f, 1 / 5, TAIL)
 
 
-def frame(rotation):
+def frame(rotation, recovery):
     """Q, section 21: the smallest rotation that takes the vertical to the direction in which the sole presses."""
-    e = np.array([0, 0, 1]) + TURN * (rotation[:, 2] - [0, 0, 1])
+    e = np.array([0, 0, 1]) + TURN * max(1 - 5 * recovery, 0) * (rotation[:, 2] - [0, 0, 1])
     e /= np.linalg.norm(e)
     v = np.array([-e[1], e[0], 0])
+    v *= min(TURN_MOST / max(np.linalg.norm(v), 1e-12), 1)
     cross = np.array([[0, 0, v[1]], [0, 0, -v[0]], [-v[1], v[0], 0]])
-    return np.eye(3) + cross + cross @ cross / (1 + e[2])
+    return np.eye(3) + cross + cross @ cross / (1 + np.sqrt(1 - v @ v))
 
 
 class Foot:
@@ -130,7 +132,7 @@ class Foot:
 
     def step(self, position, rotation, twist, new_twist):
         """Section 6: the force [N] on each element, (n, 3), from the pose and twist now and the twist after the step."""
-        Q = frame(rotation)
+        Q = frame(rotation, self.law.recovery)
         e = self.motion(position, rotation, twist, new_twist, Q)
         self.share(e, rotation)
         self.unloading_line(e)

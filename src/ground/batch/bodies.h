@@ -310,8 +310,9 @@ MILD_HD void bodies_set_frame(const BodiesSetup *setup, BodiesWork *work, int i)
     }
     const int wanted = work->label_material ? work->label_material[label] : 0;
     const int known = wanted >= 0 && wanted < setup->materials ? wanted : setup->materials;
-    const int turns = !sole->face && sole->table[known * sole->step].projects > 0;
-    frame_axis(up, slope[0], slope[1], turns ? FRAME_TURN : 0, work->frame[i]);
+    const ContactMaterial *material = &sole->table[known * sole->step];
+    const int turns = !sole->face && material->projects > 0;
+    frame_axis(up, slope[0], slope[1], turns ? frame_turn(material->recovery) : 0, work->frame[i]);
 }
 
 MILD_HD void bodies_record(const BodiesMemory *memory, int s, const ElementMemory *after,

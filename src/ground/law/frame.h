@@ -4,7 +4,7 @@
  * and one that is dragged is lifted where its underside faces the way. In grains it is along
  *
  *     e = n + t (m - n), normalised       n: normal of the ground, m: of the sole, both up
- * with t = FRAME_TURN. The step is that of a level sole in a frame of which e is the normal: an
+ * with t = frame_turn. The step is that of a level sole in a frame of which e is the normal: an
  * element penetrates along -e and slips across it. Its depth stays the vertical one. So the
  * equations keep their form, and what an element gains by a force along e it pays by a way along e.
  *
@@ -16,7 +16,15 @@
 
 #include "ground/law/element.h"
 
-#define FRAME_TURN REAL(0.6) /* [-] share of the tilt: eleven tilted plates on grains */
+#define FRAME_MOST REAL(0.32) /* [-] sine of the largest turn: of tilts of 31 degrees and more */
+#define FRAME_TURN REAL(0.6)  /* [-] share of the tilt: eleven tilted plates on grains */
+
+/* [-] t. Ground that springs back gives energy to a sole that it pushes along: its line unloads
+ * along e, and a greater depth loads it again. By a share r/(1 - r) of what the line holds more than
+ * it took, so there is no frame from the recovery r = 1/5 on. */
+MILD_HD Real frame_turn(Real recovery) {
+    return FRAME_TURN * real_max(1 - 5 * recovery, 0);
+}
 
 /* v. sole: normal of the sole's plane, either way. slope: gradient of the ground. turn: [-] t;
  * 0: v is 0. */
@@ -33,6 +41,11 @@ MILD_HD void frame_axis(const Real sole[3], Real slope_x, Real slope_y, Real tur
     v[0] = (n[1] * e[2] - n[2] * e[1]) * length;
     v[1] = (n[2] * e[0] - n[0] * e[2]) * length;
     v[2] = (n[0] * e[1] - n[1] * e[0]) * length;
+    const Real sine = REAL_SQRT(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    const Real within = sine > FRAME_MOST ? FRAME_MOST / sine : 1;
+    for (int k = 0; k < 3; k++) {
+        v[k] *= within;
+    }
 }
 
 /* Q a: a vector of the frame, in the world. */

@@ -28,11 +28,13 @@ void foot_frame(FootScratch *foot, const MildTerrain *terrain, const double *R) 
     const int material = mild_terrain_material_at(terrain, x, y);
     const Real sole[3] = {(Real)R[2], (Real)R[5], (Real)R[8]};
     double slope[2];
-    if (foot->shell || !model_row(terrain->materials[material].model)->merged) {
+    const MildMaterial *ground = &terrain->materials[material];
+    if (foot->shell || !model_row(ground->model)->merged) {
         return;
     }
     terrain_surface(terrain, x, y, slope);
-    frame_axis(sole, (Real)slope[0], (Real)slope[1], FRAME_TURN, foot->frame);
+    frame_axis(sole, (Real)slope[0], (Real)slope[1], frame_turn((Real)ground->recovery),
+               foot->frame);
     foot->framed = foot->frame[0] != 0 || foot->frame[1] != 0 || foot->frame[2] != 0;
     for (int k = 0; foot->framed && k < 4; k++) {
         vector_turn(foot, -1, foot->arm[k], foot->lever[k]);
