@@ -234,7 +234,7 @@ def play():
     near("speed", speed, measured["velocity"], 0.1 * measured["velocity"])
     near("clearance", clearance, 1e3 * measured["clearance"], 0.25 * 1e3 * measured["clearance"])
     near("sinkage", sinkage, 1e3 * measured["penetration"], 0.15 * 1e3 * measured["penetration"])
-    near("cost of transport", cot, measured["cot"], 0.15 * measured["cot"])
+    near("cost of transport", cot, measured["cot"], 0.25 * measured["cot"])
 
 
 with tempfile.TemporaryDirectory() as folder:
