@@ -20,8 +20,8 @@
 #define FRAME_TURN REAL(0.6)  /* [-] share of the tilt: eleven tilted plates on grains */
 
 /* [-] t. Ground that springs back gives energy to a sole that it pushes along: its line unloads
- * along e, and a greater depth loads it again. By a share r/(1 - r) of what the line holds more than
- * it took, so there is no frame from the recovery r = 1/5 on. */
+ * along e, and a greater depth loads it again, by r/(1 - r) of what the line holds. So there is no
+ * frame from the recovery r = 1/5 on. */
 MILD_HD Real frame_turn(Real recovery) {
     return FRAME_TURN * real_max(1 - 5 * recovery, 0);
 }
