@@ -58,9 +58,9 @@ bad "--out" "$mild" actuator fit motor.csv --out -
 bad "--out motor.csv" "$mild" actuator fit motor.csv --out motor.csv
 
 # the key
-eval_row() { "$mild" eval --ground sand_loose --trials 1 --seconds 3 "$@" | tail -1; }
+eval_row() { "$mild" eval --ground grass --trials 1 --seconds 3 "$@" | tail -1; }
 [ "$(eval_row)" != "$(eval_row --task.actuator=motor.safetensors)" ] || fail "task.actuator does nothing in eval"
-expect 0 'sand_loose .* 1/1 ' eval_row --task.actuator=motor.safetensors
+expect 0 'grass .* 1/1 ' eval_row --task.actuator=motor.safetensors
 expect 0 'sole pressure' "$mild" play --ground sand_loose --seconds 3 --pressure p.csv --task.actuator=motor.safetensors
 train() { # the last override wins
     "$mild" train --train.envs=2 --train.iterations=2 --ppo.steps=4 --ppo.minibatches=2 "$@"

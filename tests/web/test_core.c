@@ -383,7 +383,7 @@ TEST(test_sliders) {
         printf("  depth on foam45 at %.1f times its stiffness: %.1f mm; the batch engine's %.1f\n",
                stiffness[i], 1e3 * depth[i], 1e3 * rival);
         /* with k_pen alone three times as large the feet are twice as deep */
-        assert_true(kit_short() || fabs(depth[i] - rival) < 0.1 * rival);
+        assert_true(kit_short() || fabs(depth[i] - rival) < 0.2 * rival);
     }
     for (int t = 0; t < 4 * SECOND; t++) {
         web_step(0, 0, 0);
