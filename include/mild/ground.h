@@ -409,7 +409,7 @@ typedef struct {
     /* [m] Vector from the ankle, world axes, to the zero moment point on the horizontal plane
      * through the centroid of the elements. */
     double zmp_sole[2];
-    /* [m] Centre of pressure, world: sum of p f divided by sum of f, with f the normal forces of
+    /* [m] Centre of pressure, world: sum of p f divided by sum of f, with f the vertical forces of
      * the elements. For a level sole it is the ankle plus zmp_sole. 0 without load. */
     double pressure_center[3];
     double area; /* [m^2] of the loaded elements; of a surface projected, see mild_sole_surface */

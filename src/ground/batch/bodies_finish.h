@@ -53,15 +53,24 @@ MILD_HD void bodies_settle(const BodiesSetup *setup, const BodiesSole *sole,
     }
 }
 
-/* Adds a loaded element. area: [m^2]. */
-MILD_HD void bodies_load_add(BodiesLoads *loads, const BodiesElement *own, Real normal, Real area) {
+/* [N s] Vertical impulse of an element with the normal impulse `normal` at the velocity v. */
+MILD_HD Real bodies_lift(const BodiesElement *own, Real normal, const ContactVelocity *v) {
+    const Element *e = &own->element;
+    const Friction f = friction_impulse(e, friction_bound(e, normal), e->mu, v->x, v->y);
+    Real I[3] = {f.x - own->slope[0] * normal, f.y - own->slope[1] * normal, normal};
+    frame_to_world(own->frame, I, I);
+    return I[2];
+}
+
+/* Adds a loaded element. force: [N s] vertical. area: [m^2]. */
+MILD_HD void bodies_load_add(BodiesLoads *loads, const BodiesElement *own, Real force, Real area) {
     loads->loaded += 1;
     loads->depth += own->depth;
-    loads->force += normal;
+    loads->force += force;
     loads->area += area;
     loads->deepest = real_max(loads->deepest, own->depth);
     for (int k = 0; k < 3; k++) {
-        loads->p[k] += normal * own->p[k];
+        loads->p[k] += force * own->p[k];
     }
 }
 
@@ -114,7 +123,8 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         bodies_settle(setup, sole, memory, s, &own, stays);
     }
     if (normal > 0) {
-        bodies_load_add(loads, &own, normal, own.area_share * sole->square);
+        const Real force = bodies_lift(&own, normal, &v);
+        bodies_load_add(loads, &own, force, own.area_share * sole->square);
     }
 }
 

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "ground/law/frame.h"
 #include "ground/law/friction.h"
 #include "ground/step/energy.h"
 #include "ground/step/frame.h"
@@ -16,6 +17,10 @@ const char *const mild_solver_names[MILD_SOLVERS] = {"newton", "gauss_seidel", "
 static void foot_loaded(const MildScratch *scratch, const double *position, int f,
                         MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
+    const Real frame[3] = {(Real)foot->frame[0], (Real)foot->frame[1], (Real)foot->frame[2]};
+    const Real vertical[3] = {0, 0, 1};
+    Real up[3]; /* the vertical in the frame of the foot */
+    frame_of_world(frame, vertical, up);
     Lanes lanes[5] = {{0.0}};
     Lanes deep = {0.0};
     for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
@@ -23,12 +28,13 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
         for (int i = 0; i < SLOT_LANES; i++) {
             const double on = s->iz[i] > 0.0 ? 1.0 : 0.0;
             const double depth = on * s->depth[i];
+            const double lift = on * (up[0] * s->ix[i] + up[1] * s->iy[i] + up[2] * s->iz[i]);
             deep[i] = depth > deep[i] ? depth : deep[i];
             lanes[0][i] += depth;
             lanes[1][i] += on;
-            lanes[2][i] += s->iz[i];
-            lanes[3][i] += s->x[i] * s->iz[i];
-            lanes[4][i] += s->y[i] * s->iz[i];
+            lanes[2][i] += lift;
+            lanes[3][i] += s->x[i] * lift;
+            lanes[4][i] += s->y[i] * lift;
         }
     }
     double sums[5];
@@ -38,7 +44,7 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
         deepest = fmax(deepest, deep[i]);
     }
     const double loaded = sums[1]; /* number of loaded elements */
-    const double force = sums[2];  /* [N s] of the normal impulses */
+    const double force = sums[2];  /* [N s] of the vertical impulses */
     result->contacts = (int)loaded;
     result->area = loaded * foot->pitch * foot->pitch;
     result->depth_max = deepest;
