@@ -278,7 +278,7 @@ class Foot:
         leads = (e.m1 > e.a) & (e.w > e.w_y)
         from_above = (self.u_max > 0) & (e.w_a <= e.w_y)  # has given the mass w - w_y only
         given = np.where(from_above, e.w - e.w_y, e.w)
-        self.front_speed = np.where(in_ground & leads, given * over(e.m1 + shift, led), 0)  # the same momentum at the depth led to
+        self.front_speed = np.where(in_ground & leads, given * over(e.m1 + np.minimum(shift, 0), led), 0)  # the same momentum at the depth led to
         self.u_max, self.worn = np.where(in_ground, deepest, 0), np.where(in_ground, 1 - q, 0)
         self.middle = e.m1 + shift
         for memory in (self.drift, self.held_stiffness, self.held, self.pending):

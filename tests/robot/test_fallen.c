@@ -24,11 +24,14 @@
  *               impulses (energy.c) and what gravity and joints turned within the step
  *     solver    4 K residual: the twist solved for is within it, and impulses are at most twice
  *               the free motion
- * None of these is fitted. Up to 1e-5 J more pass: an element whose depth grows faster than it
- * penetrates (law/frame.h) holds a little that no work has paid. */
+ *     frame     deepens an element by d, to D, more than it penetrates (law/frame.h). On the line
+ *               it gains at most r F d + k (r d)^2/2. A line that moves on holds more of the force,
+ *               which grows at most as the depth: of the new line 1 - (1 - d/D)^2
+ * None of these is fitted. */
 #include <stdio.h>
 
 #include "all_robots.h"
+#include "ground/law/frame.h"
 #include "ground/step/frame.h"
 #include "ground/step/scratch.h"
 
@@ -187,7 +190,7 @@ static void throw_robot(const Robot *robot, RobotSim *sim, const MildTerrain *te
 typedef struct {
     double work;    /* W */
     double stored;  /* S */
-    double touched; /* of S, what elements hold that were above the ground in the step before */
+    double touched; /* of S, what the last step gave by touch or by moving a line */
     double allowed; /* but for `touched` of the next step */
     double kinetic; /* of the robot */
 } Account;
@@ -220,18 +223,22 @@ static double slot_stored(const Slots *s, int i) {
     return sum;
 }
 
-/* [J] What the engine's way may put into an element. The ground never pulls, so the static impulse
- * is at most the whole, less its terms that pull: the lag, the added mass, the damping of elastic
- * ground on the way up. descent, after: downward speeds before and after the step. */
-static double slot_way(const Slots *s, int i, double dt, double descent, double after) {
+/* [J] What the engine's way and the frame may put into an element. The ground never pulls, so the
+ * static impulse is at most the whole, less its terms that pull: the lag, the added mass, the
+ * damping of elastic ground on the way up. descent, after: downward speeds before and after the
+ * step. sinks: [m] by which the frame deepens the element without penetrating. */
+static double slot_way(const Slots *s, int i, double dt, double descent, double after,
+                       double sinks) {
     const double beyond = s->depth[i] - s->middle[i] - dt / 2 * descent;
+    const double deeper = s->recovery[i] * fmax(sinks, 0);
     const double lag =
         dt * ELEMENT_LAG * s->unload_stiffness[i] * fmax(-(after + s->entry_speed[i]), 0);
     const double mass =
         s->added_mass[i] * fmax(s->front_speed[i] - fmax(after, s->yield_speed[i]), 0);
     const double rises = fmax(s->middle[i] - s->depth[i] - dt / 2 * after, 0);
     const double damped = s->elastic_damping[i] * rises * slot_elastic(s, i, s->middle[i]);
-    return (s->iz[i] + lag + mass + damped) / dt * fmax(beyond, 0);
+    const double most = (s->iz[i] + lag + mass + damped) / dt; /* [N] static force */
+    return most * (fmax(beyond, 0) + deeper) + s->unload_stiffness[i] * deeper * deeper / 2;
 }
 
 /* Velocity of a slot's element in the frame of its foot [m/s]; descent: at which it penetrates. */
@@ -251,6 +258,8 @@ static Moves slot_moves(const FootScratch *foot, const Slots *s, int i, const do
     return (Moves){x, y, s->slope_x[i] * x + s->slope_y[i] * y - z};
 }
 
+static double deepened[MILD_FEET_MAX][1024]; /* [m] each element, by the frame, in the last step */
+
 /* Adds what the elements of a body store, and what its motion allows. Returns [J] the work that the
  * ground expects to do on it. */
 static double count_body(const RobotSim *sim, int body, Account *account) {
@@ -265,6 +274,7 @@ static double count_body(const RobotSim *sim, int body, Account *account) {
         work += impulse * (before[k] + V[k]) / 2;
         energy += impulse * (V[k] - free_of_it[k]) / 2;
     }
+    const Real frame[3] = {(Real)foot->frame[0], (Real)foot->frame[1], (Real)foot->frame[2]};
     double twists[3][6];
     twist_of_world(foot, before, twists[0]);
     twist_of_world(foot, V, twists[1]);
@@ -280,9 +290,15 @@ static double count_body(const RobotSim *sim, int body, Account *account) {
         const double fy = s->iy[i] + s->slope_y[i] * s->iz[i];
         const double stored = slot_stored(s, i);
         turned += fabs(fx * (v[2].x - v[0].x) + fy * (v[2].y - v[0].y)) / 2;
-        account->allowed += slot_way(s, i, dt, v[0].descent, v[1].descent);
+        double *sunk = &deepened[body][foot->element[e]];
+        const double moved = *sunk > 0 ? fmin(*sunk / s->yield_depth[i], 1) : 0; /* [-] d/D */
+        const double sinks =
+            dt * (double)frame_sinks(frame, s->slope_x[i], s->slope_y[i], (Real)v[1].x,
+                                     (Real)v[1].y, (Real)v[1].descent);
+        account->allowed += slot_way(s, i, dt, v[0].descent, v[1].descent, sinks);
         account->stored += stored;
-        account->touched += s->last_middle[i] > 0 ? 0 : stored;
+        account->touched += s->last_middle[i] > 0 ? moved * (2 - moved) * slot_line(s, i) : stored;
+        *sunk = sinks;
     }
     account->allowed += 0.08 * fmax(energy, 0) + turned;
     return work;
@@ -346,6 +362,7 @@ static void fall(Robot *robot, int model, int number, Falls *all) {
     Place place = draw_place(robot, model, &random);
     throw_robot(robot, sim, &place.terrain, &random);
     const double damping = random_uniform(&random, 0, 0.5); /* [N m s/rad] */
+    memset(deepened, 0, sizeof deepened);
     double sum = 0, most = 0, kinetic = 0, allowed = 0;
     int touch = 0, lost = 0, over = 0;
     Account last = {0};
@@ -365,7 +382,7 @@ static void fall(Robot *robot, int model, int number, Falls *all) {
         const double beyond = rise - last.allowed - now.touched;
         all->steps += last.work != 0;
         all->rise += rise > 0;
-        over += beyond > 1e-5;
+        over += beyond > 0;
         if (beyond > all->worst) {
             all->worst = beyond;
             all->seed = (int)first + number;
@@ -433,6 +450,15 @@ TEST(a_barred_front_rests) {
     falls = 4;
     first = 1111;
     only = NULL;
+    expect_no_energy();
+}
+
+/* One of these falls was given 8 mJ: added mass that a tilted sole reached through its frame had
+ * the speed of the sole without an impulse. */
+TEST(the_frame_moves_no_mass) {
+    falls = 27;
+    first = 6021;
+    only = "mild_merged";
     expect_no_energy();
 }
 

@@ -107,8 +107,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
     ElementMemory after =
         element_remember(e, &own.before, dt, 1 / dt, normal, v.x, v.y, v.descent, stays);
     Real worn = 0;
-    after.depth_max += stays ? sinks : 0;
-    after.middle += sinks;
+    after = element_sunk(after, sinks, stays);
     if (own.curves & LAW_HEAP) {
         worn = element_wear_alone(e, &own.share, &own.before, &after, dt, normal, v.x, v.y,
                                   v.descent, stays);

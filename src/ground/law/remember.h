@@ -106,4 +106,14 @@ MILD_HD ElementMemory element_remember(const Element *e, const ElementMemory *me
     return after;
 }
 
+/* The same where the depth grew by `sinks` [m] more than the element penetrated (frame.h). The
+ * added mass, which grows as the depth at most, keeps its momentum. */
+MILD_HD ElementMemory element_sunk(ElementMemory after, Real sinks, int stays) {
+    const Real deepest = after.depth_max + sinks;
+    after.front_speed *= sinks > 0 ? real_over(after.depth_max, deepest) : 1;
+    after.depth_max = stays ? deepest : 0;
+    after.middle += sinks;
+    return after;
+}
+
 #endif

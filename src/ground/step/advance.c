@@ -208,6 +208,7 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                 slot_stays(s, i, m1, prints) & (element_deepest(&element, m1) + shift > 0);
             ElementMemory after =
                 element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
+            after = element_sunk(after, shift, stays);
             if (wears) {
                 const Share share = slot_share(s, i);
                 slid[i] =
@@ -219,8 +220,8 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                 changes += stays ? most : 0;
                 to.worn[e + i] = stays ? 1 - share.q : 0;
             }
-            to.depth_max[e + i] = stays ? after.depth_max + shift : 0;
-            to.middle[e + i] = after.middle + shift;
+            to.depth_max[e + i] = after.depth_max;
+            to.middle[e + i] = after.middle;
             to.front_speed[e + i] = after.front_speed;
             to.drift[e + i] = after.drift;
             to.pending_x[e + i] = after.pending_x;
