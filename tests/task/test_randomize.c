@@ -577,6 +577,32 @@ TEST(commands) {
     free(env);
 }
 
+/* A robot begins with slow commands; the highest grows where one near it is followed. */
+TEST(commands_that_grow) {
+    static const double rows[][3] = {/* command, speed [m/s], by how much the highest grows */
+                                     {0.8, 0.7, 0.2},   {0.8, 0.6, 0}, {1.2, 0.7, 0},
+                                     {1.2, 0.5, -0.25}, {0.6, 0.6, 0}, {0.9, 0.1, -0.25},
+                                     {0.6, 0.1, -0.2},  {0.4, 0.1, 0}};
+    open_env();
+    double highest = 0, before;
+    def.vx_start = env->command_most = 0.5;
+    for (int t = 0; t < DRAWS; t++) {
+        env->tick++;
+        task_draw_command(env, &def);
+        highest = fmax(highest, env->command[0]);
+    }
+    assert_true(highest > 0.49 && highest <= 0.5);
+    env->command_most = 1;
+    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+        before = env->command_most;
+        env->command[0] = rows[k][0];
+        env->smooth_velocity[0] = rows[k][1];
+        task_command_adapt(env, &def);
+        expect_near("the highest command grows", env->command_most - before, rows[k][2], 1e-12);
+    }
+    free(env);
+}
+
 /* ---- start ---- */
 
 /* Yaw anywhere, joints +-0.05 rad, base velocities +-0.1, joints at rest, clock at 0 or 0.5, first
@@ -640,6 +666,7 @@ TEST(nothing_is_left) {
         rig.env->push[t] = rig.env->air_time[0] = rig.env->air_time[1] = 0.3;
     }
     rig.env->assist_level = 0.7;
+    rig.env->command_most = 2;
     task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
     for (int i = 0; i < 6; i++) {
         expect_entry("push", i, rig.env->push[i], 0, 0);
@@ -661,6 +688,7 @@ TEST(nothing_is_left) {
     expect_near("reward_sum", rig.env->reward_sum, 0, 0);
     expect_near("speed_error_sum", rig.env->speed_error_sum, 0, 0);
     expect_near("the level of help lives on", rig.env->assist_level, 0.7, 0);
+    expect_near("and the highest command", rig.env->command_most, 2, 0);
     MildGround *fresh = aligned_alloc(64, mild_ground_size(task_env_ground(rig.env)));
     mild_ground_init_imprints(fresh, robot_soles(robot), SA01_FEET, 0);
     assert_memory_equal(fresh, task_env_ground(rig.env), mild_ground_size(fresh));

@@ -80,6 +80,25 @@ MILD_HD_FN void task_draw_robot(TaskEnv *env, const TaskDef *def, Random r) {
     tile_sync();
 }
 
+#define COMMAND_NEAR 0.7     /* [-] of the highest: a command near it */
+#define COMMAND_FOLLOWED 0.8 /* [-] of the command: a speed that follows it */
+#define COMMAND_GROWTH 0.25  /* [m/s] */
+
+/* A robot's highest forward command grows where it follows one near it when the next is drawn
+ * (command curriculum of Rudin et al. 2021), and falls where it has less than half of it. */
+MILD_HD_FN void task_command_adapt(TaskEnv *env, const TaskDef *def) {
+    const double asked = env->command[0], has = env->smooth_velocity[0];
+    const double most = env->command_most;
+    if (!(asked > COMMAND_NEAR * fmin(most, def->vx[1]))) {
+        return;
+    }
+    if (has > COMMAND_FOLLOWED * asked) {
+        env->command_most = fmax(most, fmin(most + COMMAND_GROWTH, def->vx[1]));
+    } else if (has < 0.5 * asked) {
+        env->command_most = fmax(most - COMMAND_GROWTH, fmin(most, def->vx_start));
+    }
+}
+
 /* Draws the command that the policy is to follow. */
 MILD_HD_FN void task_draw_command(TaskEnv *env, const TaskDef *def) {
     Random r = random_at(env->seed ^ TASK_RANDOM_COMMAND, env->index, env->tick);
@@ -89,7 +108,8 @@ MILD_HD_FN void task_draw_command(TaskEnv *env, const TaskDef *def) {
         return;
     }
     kind -= def->standing_share;
-    env->command[0] = task_draw(&r, kind < def->backward_share ? def->backward_vx : def->vx);
+    const double forward[2] = {def->vx[0], fmax(def->vx[0], fmin(def->vx[1], env->command_most))};
+    env->command[0] = task_draw(&r, kind < def->backward_share ? def->backward_vx : forward);
     if (random_unit(&r) >= def->straight_share) {
         env->command[1] = task_draw(&r, def->vy);
         env->command[2] = task_draw(&r, def->wz);

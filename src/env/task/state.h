@@ -155,6 +155,7 @@ typedef struct {
     int lag_command, lag_motor, lag_imu; /* [physics steps] */
     double assist_level; /* [-] level of assistance: decays while on its feet, rises with falls;
                             persists across episodes */
+    double command_most; /* [m/s] highest forward command, see task_command_adapt; persists */
     Real assist_draw;    /* [-] share of the level used in this episode, in [0.5, 1) */
     Real push[6];        /* [m/s, rad/s] last push, for the critic; decays */
     /* state */
@@ -175,6 +176,7 @@ typedef struct {
 /* What lasts beyond an episode. */
 typedef struct {
     double assist_level;
+    double command_most;
     uint64_t tick;
 } TaskProgress;
 

@@ -46,16 +46,18 @@ MILD_HD_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape s
     env->index = index;
     env->step_limit = (uint32_t)(def->episode / TASK_PERIOD + 0.5);
     env->assist_level = 1;
+    env->command_most = def->vx_start;
 }
 
 /* What an environment keeps, and back, before a new episode. */
 MILD_HD_FN TaskProgress task_progress(const TaskEnv *env) {
-    const TaskProgress progress = {env->assist_level, env->tick};
+    const TaskProgress progress = {env->assist_level, env->command_most, env->tick};
     return progress;
 }
 
 MILD_HD_FN void task_set_progress(TaskEnv *env, TaskProgress progress) {
     env->assist_level = progress.assist_level;
+    env->command_most = progress.command_most;
     env->tick = env->tick_first = (uint32_t)progress.tick;
 }
 
@@ -408,6 +410,7 @@ MILD_HD_FN void task_advance_clock(TaskEnv *env, const TaskDef *def) {
     task_see_command(env);
     uint32_t interval = (uint32_t)(def->command_interval / TASK_PERIOD + 0.5);
     if (!env->command_frozen && interval && env->step % interval == 0) {
+        task_command_adapt(env, def);
         task_draw_command(env, def);
     }
 }

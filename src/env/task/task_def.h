@@ -169,6 +169,7 @@ typedef struct {
     double episode;     /* [s] */
     double command_interval; /* [s] */
     double vx[2], vy[2], wz[2];
+    double vx_start; /* [m/s] highest forward command of a new robot: task_command_adapt */
     double backward_share, backward_vx[2], standing_share, straight_share;
     double standing_below; /* [m/s, rad/s] a command whose parts are all below this is to stand */
     int gait;              /* of task_gait_names; 0: the robot's own */
