@@ -52,7 +52,9 @@ class Batch(unittest.TestCase):
                     of = ground.elements(f)
                     for k, name in enumerate(("depth", "normal", "tangent_x", "tangent_y")):
                         got = arrays.outputs["elements"][i, k, f, :sole.elements]
-                        np.testing.assert_allclose(got, of[name], rtol=1e-2, atol=2e-3 * max(np.abs(of[name]).max(), 0.1))
+                        # the .2 mN of drag on a foot without load: its ways of some um are rounded
+                        least = 0.1 if name.startswith("tangent") and not of["normal"].any() else 1e-3
+                        np.testing.assert_allclose(got, of[name], rtol=1e-2, atol=2e-3 * max(np.abs(of[name]).max(), least))
                 ground.advance()
             self.assertTrue((arrays.outputs["iterations"] >= 1).all())
             self.assertTrue((arrays.outputs["residual"] >= 0).all() and arrays.outputs["residual"].max() < 1e-3)
