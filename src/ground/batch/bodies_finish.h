@@ -2,7 +2,7 @@
 #ifndef MILD_BATCH_BODIES_FINISH_H
 #define MILD_BATCH_BODIES_FINISH_H
 
-/* What is summed over a body's loaded elements. */
+/* What is summed over a body's loaded elements; force and p over all of them. */
 typedef struct {
     Real loaded, depth, force, area, deepest, p[3];
 } BodiesLoads;
@@ -62,13 +62,16 @@ MILD_HD Real bodies_lift(const BodiesElement *own, Real normal, const ContactVel
     return I[2];
 }
 
-/* Adds a loaded element. force: [N s] vertical. area: [m^2]. */
-MILD_HD void bodies_load_add(BodiesLoads *loads, const BodiesElement *own, Real force, Real area) {
-    loads->loaded += 1;
-    loads->depth += own->depth;
+/* Adds an element. loaded: bool. force: [N s] vertical. area: [m^2]. */
+MILD_HD void bodies_load_add(BodiesLoads *loads, const BodiesElement *own, int loaded, Real force,
+                             Real area) {
+    if (loaded) {
+        loads->loaded += 1;
+        loads->depth += own->depth;
+        loads->area += area;
+        loads->deepest = real_max(loads->deepest, own->depth);
+    }
     loads->force += force;
-    loads->area += area;
-    loads->deepest = real_max(loads->deepest, own->depth);
     for (int k = 0; k < 3; k++) {
         loads->p[k] += force * own->p[k];
     }
@@ -121,10 +124,8 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
         bodies_record(memory, s, &after, worn);
         bodies_settle(setup, sole, memory, s, &own, stays);
     }
-    if (normal > 0) {
-        const Real force = bodies_lift(&own, normal, &v);
-        bodies_load_add(loads, &own, force, own.area_share * sole->square);
-    }
+    const Real force = bodies_lift(&own, normal, &v);
+    bodies_load_add(loads, &own, normal > 0, force, own.area_share * sole->square);
 }
 
 #endif

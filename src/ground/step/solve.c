@@ -13,7 +13,7 @@
 
 const char *const mild_solver_names[MILD_SOLVERS] = {"newton", "gauss_seidel", "explicit"};
 
-/* Sums over the loaded elements: contact count, area, depths, centre of pressure. */
+/* Sums over the loaded elements: contact count, area, depths; centre of pressure of all of them. */
 static void foot_loaded(const MildScratch *scratch, const double *position, int f,
                         MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
@@ -28,7 +28,7 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
         for (int i = 0; i < SLOT_LANES; i++) {
             const double on = s->iz[i] > 0.0 ? 1.0 : 0.0;
             const double depth = on * s->depth[i];
-            const double lift = on * (up[0] * s->ix[i] + up[1] * s->iy[i] + up[2] * s->iz[i]);
+            const double lift = up[0] * s->ix[i] + up[1] * s->iy[i] + up[2] * s->iz[i];
             deep[i] = depth > deep[i] ? depth : deep[i];
             lanes[0][i] += depth;
             lanes[1][i] += on;
