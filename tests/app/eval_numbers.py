@@ -66,7 +66,7 @@ near("drift_forward", r["drift_forward"], mean(abs(float(x["forward_m"])) for x 
 near("drift_left", r["drift_left"], mean(abs(float(x["left_m"])) for x in s), 1e-6)
 near("drift of the stances", r["drift"], mean(math.hypot(float(x["forward_m"]), float(x["left_m"])) for x in s), 2e-6)
 
-near("largest torque of the stances", max(x["torque_max"] for x in r["each"]), max(float(x["torque_n_m"]) for x in s), 0.5)  # or in a swing
+near("largest torque of the stances", max(x["torque_max"] for x in r["each"]), max(float(x["torque_n_m"]) for x in s), 1e-3)
 near("torque_max of the trials", r["torque_max"], mean(x["torque_max"] for x in r["each"]), 1e-9)
 strides = [(math.hypot(float(b["x_m"]) - float(a["x_m"]), float(b["y_m"]) - float(a["y_m"])), float(b["start_s"]) - float(a["start_s"]))
            for k in "01" for foot in "01"
@@ -120,7 +120,7 @@ near("joint_speed", r["joint_speed"], rms(columns(settled, "speed_", "_rad_s")),
 # themselves; the torques of both are printed)
 first = {"velocity": one["velocity"], "cot": one["cot"], "torque_max": r["each"][0]["torque_max"]}
 for name, key in (("velocity_deviation", "velocity"), ("cot_deviation", "cot"), ("torque_deviation", "torque_max")):
-    near(name, r[name], math.sqrt(2) * abs(first[key] - r[key]), 2e-7 * first[key])
+    near(name, r[name], math.sqrt(2) * abs(first[key] - r[key]), 5e-8 * first[key])
     if one[name] is not None:
         near(f"{name} of one trial", 1, 0, 0)
 

@@ -226,7 +226,8 @@ def play():
     true("columns", header.split() == ["ground", "distance", "time", "speed", "upright", "clearance", "deepest", "COT"])
     way, time, speed, clearance, sinkage, cot = found(
         r"sand_loose +([\d.-]+) m +([\d.]+) s +([\d.-]+) m/s +yes +([\d.]+) mm +([\d.]+) mm +([\d.]+)", row)
-    printed_by("eval", "--ground", "sand_loose", "--speed", 0.5, "--seconds", 9, "--trials", 2, "--json", "eval.json")
+    printed_by("eval", "--ground", "sand_loose", "--speed", 0.5, "--seconds", 9, "--trials", 4, "--json", "eval.json",
+               "--task.observe_noise=false")  # play has none
     with open("eval.json", encoding="utf-8") as file:
         measured = json.load(file)["rows"][0]
     near("time after the start", time, 8, 0.06)
@@ -234,7 +235,7 @@ def play():
     near("speed", speed, measured["velocity"], 0.1 * measured["velocity"])
     near("clearance", clearance, 1e3 * measured["clearance"], 0.25 * 1e3 * measured["clearance"])
     near("sinkage", sinkage, 1e3 * measured["penetration"], 0.15 * 1e3 * measured["penetration"])
-    near("cost of transport", cot, measured["cot"], 0.25 * measured["cot"])
+    near("cost of transport", cot, measured["cot"], 0.15 * measured["cot"])
 
 
 with tempfile.TemporaryDirectory() as folder:

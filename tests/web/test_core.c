@@ -246,23 +246,35 @@ static double pressed_between(double low, double high, float depth) {
     return cells * cell * cell;
 }
 
+/* [rad] Where the robot faces, by its drawn base. */
+static double facing(void) {
+    return atan2((double)web_view()->link[0][4], (double)web_view()->link[0][0]);
+}
+
+/* Walks at a speed along x, past x [m]. The page holds no heading, and in sand the robot turns. */
+static void walk_past(double x, float speed) {
+    const WebView *view = web_view();
+    for (int t = 0; speed * ((double)view->link[0][3] - x) < 0; t++) {
+        assert_true(t < 30 * SECOND);
+        assert_false(web_step(speed, 0, (float)-facing()));
+    }
+}
+
 /* The window follows the robot: what left it and comes back is what the ground remembers, which
  * standing up again leaves as it is. The slope around a print, which is drawn first, is no part of
- * that: so what lies deeper than 30 mm. */
+ * that; of prints of 110 mm it is up to 70 mm deep. */
 TEST(test_window) {
     start(preset("sand_loose"), WEB_LEVEL, 1);
-    walk(5, 0.6f);
-    const double before = pressed_between(0.2, 1.2, 0.03f);
+    walk_past(3, 0.6f);
+    const double before = pressed_between(0.2, 1.2, 0.08f);
     web_again();
-    walk(12, 1.0f);
-    const double far = (double)web_view()->link[0][3];
-    const double ahead = pressed_between(far + 1, far + 4, 0);
-    walk(12, -1.0f);
-    const double back = (double)web_view()->link[0][3], after = pressed_between(0.2, 1.2, 0.03f);
-    printf("  %.3f m^2 pressed; after a way to %.2f m and back to %.2f m %.3f m^2\n", before, far,
-           back, after);
-    assert_true(far > 7 && back > 2 && back < 4.5 && before > 0.05);
-    assert_true(fabs(after / before - 1) < 0.25 && ahead == 0);
+    walk_past(11, 1.0f);
+    const double ahead = pressed_between(12, 15, 0);
+    assert_true(pressed_between(0.2, 1.2, 0.08f) != before); /* it has left the window */
+    walk_past(4, -1.0f);
+    const double after = pressed_between(0.2, 1.2, 0.08f);
+    printf("  %.3f m^2 pressed; after a way to 11 m and back to 4 m %.3f m^2\n", before, after);
+    assert_true(before > 0.05 && fabs(after / before - 1) < 0.05 && ahead == 0);
 }
 
 /* [m] The deepest elements of the two feet of a robot that stands: means over six of eight seconds,
@@ -321,7 +333,7 @@ static void soles_of(int which) {
            pages[which].name, 1e3 * worst, view->feet, load, weight, shells);
     printf("  each foot's load is apart from that of its elements by at most %.2f N\n", apart);
     assert_int_equal(view->feet, which == ON_GO1 ? 4 : 2);
-    assert_true(seen > SECOND && worst < 1e-2 && apart < 0.1); /* soles lean */
+    assert_true(seen > SECOND && worst < 5e-4 && apart < 0.1);
     assert_true(fabs((load + shells) / weight - 1) < 0.1 && load > 0.7 * weight);
 }
 
@@ -373,17 +385,18 @@ static double rival_depth(double stiffness) {
 TEST(test_sliders) {
     double load = 0;
     start(preset("foam45"), WEB_LEVEL, 1);
-    const double stiffness[3] = {3, 1, 0.7};
-    double depth[3];
-    for (int i = 0; i < 3; i++) {
+    /* on softer foam it leans, and how deep its feet are hangs on how it came to stand */
+    const double stiffness[2] = {3, 1};
+    double depth[2];
+    for (int i = 0; i < 2; i++) {
         depth[i] = standing_depth(stiffness[i]);
     }
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 2; i++) {
         const double rival = rival_depth(stiffness[i]);
         printf("  depth on foam45 at %.1f times its stiffness: %.1f mm; the batch engine's %.1f\n",
                stiffness[i], 1e3 * depth[i], 1e3 * rival);
         /* with k_pen alone three times as large the feet are twice as deep */
-        assert_true(kit_short() || fabs(depth[i] - rival) < 0.2 * rival);
+        assert_true(kit_short() || fabs(depth[i] - rival) < 0.1 * rival);
     }
     for (int t = 0; t < 4 * SECOND; t++) {
         web_step(0, 0, 0);
@@ -401,11 +414,6 @@ TEST(test_sliders) {
         printf("  on ice it gets to %.2f of 0.8 m/s\n", (double)fastest);
         assert_true(fastest < 0.6f);
     }
-}
-
-/* [rad] Where the robot faces, by its drawn base. */
-static double facing(void) {
-    return atan2((double)web_view()->link[0][4], (double)web_view()->link[0][0]);
 }
 
 /* Four seconds that turn and go sideways: the velocity that is shown is, in the mean over the last
@@ -487,9 +495,7 @@ TEST(test_soil) {
     walk_two_seconds(NULL, preset("grass"), usual);
     assert_memory_equal(own, usual, sizeof own);
     walk_two_seconds("[ground]\npreset = grass\nk_pen = 200\nsigma_cone = 1e5\n", 0, own);
-    printf("  grass at 200 N/m %.1f mm deep, as it is %.1f mm\n", 1e3 * (double)own[2],
-           1e3 * (double)usual[2]);
-    assert_true(own[2] > 1.1f * usual[2]);
+    assert_true(own[2] > 1.2f * usual[2]);
     walk_two_seconds("[ground]\npreset = sandy_loam\n", 0, usual); /* another model */
     assert_true(usual[2] > 0 && usual[2] < own[2]);
     strcpy(web_text(), "[ground]\npreset = gras\n");
