@@ -58,7 +58,7 @@ static void draw_falls(int t, double most) {
 typedef struct {
     int steps, together, near, near_together;
     int ends[TASK_END_COUNT];
-    double first; /* largest difference of the critics where shells have just come near */
+    double first; /* largest growth of the critics' difference where shells have just come near */
 } Falls;
 
 /* Whether robots have fallen for long enough: until some have begun again and `check` sees enough
@@ -74,6 +74,7 @@ static Falls fall(const char *robot, TaskDef def, int device, const MildMapDef *
     Falls falls = {0};
     int apart[ENVS] = {0};
     uint8_t held[ENVS], before[ENVS] = {0};
+    double last[ENVS] = {0}; /* gap of the step before */
     def.map = map;
     pair_open(robot, &def, device);
     pair_reset();
@@ -95,10 +96,12 @@ static Falls fall(const char *robot, TaskDef def, int device, const MildMapDef *
             if (!apart[e]) {
                 assert_int_equal(pair.a.cause[e], pair.b.cause[e]);
                 falls.ends[pair.b.cause[e]] += done;
-                falls.first = fmax(falls.first, held[e] && !before[e] && !done ? gap : 0);
+                const int near = held[e] && !before[e] && !done;
+                falls.first = fmax(falls.first, near ? gap - last[e] : 0);
             }
             apart[e] = done && same ? 0 : apart[e];
             before[e] = done ? 0 : held[e];
+            last[e] = done ? 0 : gap;
         }
     }
     printf(
