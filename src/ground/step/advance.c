@@ -185,7 +185,7 @@ static __attribute__((noinline)) void block_wear(const Slots *s, const Memory *t
 /* Stores what the elements of some blocks remember, from number e of `memory` on. Adds to the lanes
  * of `count` 1 for each element that stays in the ground, and 1 for each of these that reversed. On
  * level ground the slopes are 0, and without a shell the heights. wears: bool constant, shares
- * wear. */
+ * wear; else no foot has a frame. */
 MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *end,
                             const Memory *memory, int e, int wears, Lanes count[2]) {
     const Memory to = *memory; /* copies keep the addresses in registers */
@@ -202,7 +202,7 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
             const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_SHELL);
             const Element element = slot_element(s, i);
             const ElementMemory before = slot_memory(s, i);
-            const Real shift = dt * slot_sinks(s, i, frame, &v);
+            const Real shift = wears ? dt * slot_sinks(s, i, frame, &v) : 0;
             const Real m1 = s->depth[i] + dt / 2 * v.descent;
             const int stays =
                 slot_stays(s, i, m1, prints) & (element_deepest(&element, m1) + shift > 0);
