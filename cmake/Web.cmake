@@ -14,16 +14,17 @@ set_source_files_properties(${CMAKE_SOURCE_DIR}/web/core.c ${CMAKE_SOURCE_DIR}/w
 set(web_robots ${CMAKE_BINARY_DIR}/generated/web)
 file(MAKE_DIRECTORY ${web_robots})
 # MILD_HOME: a build for elsewhere (scripts/deb.sh) has its data where nothing is yet
-function(web_robot name policy config)
+function(web_robot name file policy config)
   set(shipped ${CMAKE_SOURCE_DIR}/policies/${policy}.safetensors ${CMAKE_SOURCE_DIR}/configs/${config}.ini)
   set(robot ${CMAKE_SOURCE_DIR}/robots/${name})
-  add_custom_command(OUTPUT ${web_robots}/${name}.bin
+  add_custom_command(OUTPUT ${web_robots}/${file}.bin
     COMMAND ${CMAKE_COMMAND} -E env MILD_HOME=${CMAKE_SOURCE_DIR}
-      $<TARGET_FILE:web_pack> ${robot} ${shipped} ${web_robots}/${name}.bin
+      $<TARGET_FILE:web_pack> ${robot} ${shipped} ${web_robots}/${file}.bin
     DEPENDS web_pack ${shipped} ${CMAKE_SOURCE_DIR}/policies/knows.safetensors ${CMAKE_SOURCE_DIR}/configs/default.ini
     ${robot}/robot.ini ${robot}/${name}.xml VERBATIM)
 endfunction()
-web_robot(sa01 mild walk)
-web_robot(g1 g1 g1)
-web_robot(go1 go1 go1)
-add_custom_target(web_robots DEPENDS ${web_robots}/sa01.bin ${web_robots}/g1.bin ${web_robots}/go1.bin)
+web_robot(sa01 sa01 mild walk)
+web_robot(g1 g1 g1 g1)
+web_robot(g1 g1_run g1_run g1_run)
+web_robot(go1 go1 go1 go1)
+add_custom_target(web_robots DEPENDS ${web_robots}/sa01.bin ${web_robots}/g1.bin ${web_robots}/g1_run.bin ${web_robots}/go1.bin)

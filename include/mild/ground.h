@@ -483,8 +483,8 @@ void mild_scratch_destroy(MildScratch *scratch);
 
 /* Bit f: foot f may touch the ground in the step of `input`, whose inverse_inertia and rows need
  * not be set yet. For robots of which many bodies have soles: ask, compute the rows of A for these
- * feet alone, and set input.rows. It writes only scratch. Cost: a few dozen operations for each
- * foot. */
+ * feet alone, and set input.rows. It writes only scratch, which mild_ground_advance needs as the
+ * solve left it. Cost: a few dozen operations for each foot. */
 uint32_t mild_ground_near(const MildTerrain *terrain, const MildContactInput *input,
                           MildScratch *scratch);
 /* Solves one contact step: impulses by eqs 4, 5, 13 and 14, twists by eq 9. It reads the ground and

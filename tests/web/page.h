@@ -16,10 +16,10 @@
 enum { SECOND = 100 /* policy steps */ };
 
 /* The robots of the page. All have as many joints and see as much. */
-enum { ON_SA01, ON_G1, ON_GO1, ROBOTS };
+enum { ON_SA01, ON_G1, ON_GO1, ROBOTS, ON_G1_RUN = ROBOTS, PAGES };
 
 typedef struct {
-    const char *name, *policy, *config;
+    const char *name, *robot_name, *policy, *config;
     WebModel *model;
     size_t bytes;
     Robot *robot;
@@ -27,9 +27,11 @@ typedef struct {
     TaskDef task;
 } Page;
 
-static Page pages[ROBOTS] = {{.name = "sa01", .policy = "mild", .config = "walk"},
-                             {.name = "g1", .policy = "g1", .config = "g1"},
-                             {.name = "go1", .policy = "go1", .config = "go1"}};
+static Page pages[PAGES] = {
+    {.name = "sa01", .robot_name = "sa01", .policy = "mild", .config = "walk"},
+    {.name = "g1", .robot_name = "g1", .policy = "g1", .config = "g1"},
+    {.name = "go1", .robot_name = "go1", .policy = "go1", .config = "go1"},
+    {.name = "g1_run", .robot_name = "g1", .policy = "g1_run", .config = "g1_run"}};
 static Pool *pool;
 /* Of the robot that the tests are on: SA01, where they do not choose another. */
 static WebModel *model;
@@ -56,7 +58,7 @@ static inline void open_page(Page *page) {
     page->model = aligned_alloc(64, 1 << 20);
     page->bytes = fread(page->model, 1, 1 << 20, file);
     fclose(file);
-    snprintf(path, sizeof path, MILD_SOURCE_DIR "/robots/%s", page->name);
+    snprintf(path, sizeof path, MILD_SOURCE_DIR "/robots/%s", page->robot_name);
     page->robot = robot_create(path, &error);
     snprintf(path, sizeof path, MILD_SOURCE_DIR "/policies/%s.safetensors", page->policy);
     page->weights = policy_load(path, NULL, 0, &error);
@@ -72,7 +74,7 @@ static inline void open_page(Page *page) {
 static inline int setup(void **state) {
     (void)state;
     pool = pool_create(1);
-    for (int i = 0; i < ROBOTS; i++) {
+    for (int i = 0; i < PAGES; i++) {
         open_page(&pages[i]);
     }
     choose(ON_SA01);
@@ -81,7 +83,7 @@ static inline int setup(void **state) {
 
 static inline int teardown(void **state) {
     (void)state;
-    for (int i = 0; i < ROBOTS; i++) {
+    for (int i = 0; i < PAGES; i++) {
         policy_destroy(pages[i].weights);
         robot_destroy(pages[i].robot);
         free(pages[i].model);

@@ -337,6 +337,26 @@ static void soles_of(int which) {
     assert_true(fabs((load + shells) / weight - 1) < 0.1 && load > 0.7 * weight);
 }
 
+/* The G1 that runs: 3 m/s over grass, with both feet off the ground. */
+TEST(test_run) {
+    const WebView *view = web_view();
+    int flies = 0;
+    choose(ON_G1_RUN);
+    start(preset("grass"), WEB_LEVEL, 1);
+    walk(3, 3);
+    const double from = (double)view->link[0][3], left = (double)view->link[0][7];
+    for (int t = 0; t < 3 * SECOND; t++) {
+        assert_false(web_step(3, 0, 0));
+        flies += view->load[0] == 0 && view->load[1] == 0;
+    }
+    const double speed =
+        hypot((double)view->link[0][3] - from, (double)view->link[0][7] - left) / 3;
+    printf("  it runs at %.2f m/s and flies %d %% of the time\n", speed,
+           flies * 100 / (3 * SECOND));
+    choose(ON_SA01);
+    assert_true(speed > 2.7 && flies > 3 * SECOND / 10);
+}
+
 TEST(test_soles) {
     for (int i = ROBOTS - 1; i >= 0; i--) {
         soles_of(i);
