@@ -28,7 +28,7 @@ static Safetensor tensor_of(const char *name, SafetensorsType type, const void *
 
 static int has_rows(const char *name) {
     static const char *const names[] = {"train.history", "train.critic", "train.target",
-                                        "train.frame",   "train.extra",  "train.kept"};
+                                        "train.frame",   "train.environments",  "train.progress"};
     int found = 0;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         found |= strcmp(name, names[i]) == 0;
@@ -109,11 +109,11 @@ typedef struct {
 } Extra;
 
 static Extra whole_extra(const void *bytes, size_t size) {
-    return (Extra){"train.extra", bytes, size, 1};
+    return (Extra){"train.environments", bytes, size, 1};
 }
 
 static Extra kept_extra(const void *bytes, size_t size) {
-    return (Extra){"train.kept", bytes, size, 0};
+    return (Extra){"train.progress", bytes, size, 0};
 }
 
 /* What resuming needs besides the policy. The sizes are those of the file; the data are those of
@@ -390,7 +390,7 @@ MildStatus ppo_load_file(Ppo *ppo, const Safetensors *file, const char *path, vo
 /* Takes the caller's bytes only if the file has as many of them. */
 static MildStatus load_learner(Ppo *ppo, const Safetensors *file, const char *path, void *kept,
                                size_t kept_size, int *found, MildError *error) {
-    const Safetensor *have = safetensors_find(file, "train.kept");
+    const Safetensor *have = safetensors_find(file, "train.progress");
     const Extra some = kept_extra(kept, kept_size);
     *found = have && have->bytes == whole_bytes(ppo, kept_size);
     return take(ppo, file, path, &some, *found ? kept : NULL, error);
