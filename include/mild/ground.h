@@ -410,7 +410,8 @@ typedef struct {
      * through the centroid of the elements. */
     double zmp_sole[2];
     /* [m] Centre of pressure, world: sum of p f divided by sum of f, with f the vertical forces of
-     * the elements. For a level sole it is the ankle plus zmp_sole. 0 without load. */
+     * the elements. For a level sole it is the ankle plus zmp_sole. 0 where their sum is not above
+     * 0. It may lie outside the sole where drag nearly cancels the load. */
     double pressure_center[3];
     double area; /* [m^2] of the loaded elements; of a surface projected, see mild_sole_surface */
     double depth_max;  /* [m] largest depth of a loaded element */
@@ -483,8 +484,8 @@ void mild_scratch_destroy(MildScratch *scratch);
 
 /* Bit f: foot f may touch the ground in the step of `input`, whose inverse_inertia and rows need
  * not be set yet. For robots of which many bodies have soles: ask, compute the rows of A for these
- * feet alone, and set input.rows. It writes only scratch, which mild_ground_advance needs as the
- * solve left it. Cost: a few dozen operations for each foot. */
+ * feet alone, and set input.rows. It overwrites scratch: do not call it between a solve and its
+ * mild_ground_advance. Cost: a few dozen operations for each foot. */
 uint32_t mild_ground_near(const MildTerrain *terrain, const MildContactInput *input,
                           MildScratch *scratch);
 /* Solves one contact step: impulses by eqs 4, 5, 13 and 14, twists by eq 9. It reads the ground and

@@ -611,9 +611,9 @@ MILD_HD void bodies_report(const BodiesSetup *setup, BodiesWork *work, int i) {
         whole[BODIES_LOADS - 1] =
             real_max(whole[BODIES_LOADS - 1], work->part[round][BODIES_LOADS - 1]);
     }
-    const int any = whole[0] > 0;
+    const int any = whole[0] > 0, bears = any && whole[2] > 0;
     for (int k = 0; k < 3; k++) {
-        foot->pressure_center[k] = any ? work->position[i][k] + whole[4 + k] / whole[2] : 0;
+        foot->pressure_center[k] = bears ? work->position[i][k] + whole[4 + k] / whole[2] : 0;
     }
     foot->depth_max = whole[BODIES_LOADS - 1];
     foot->depth_mean = any ? whole[1] / whole[0] : 0;

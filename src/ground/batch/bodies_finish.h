@@ -2,7 +2,7 @@
 #ifndef MILD_BATCH_BODIES_FINISH_H
 #define MILD_BATCH_BODIES_FINISH_H
 
-/* What is summed over a body's loaded elements; force and p over all of them. */
+/* What is summed over a body's loaded elements; force and p over all, loaded or not. */
 typedef struct {
     Real loaded, depth, force, area, deepest, p[3];
 } BodiesLoads;

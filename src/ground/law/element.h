@@ -9,6 +9,7 @@
  *     element_impulse    impulse.h    normal impulse at a trial velocity, any number of times
  *     friction_impulse   friction.h   tangential impulse at the same velocity
  *     element_remember   remember.h   memory at the end of the step
+ *     element_sunk       remember.h   the same, deepened by its frame
  *     element_peak       remember.h   the greatest depth within the step
  *
  * In docs/model.md a is the yield depth, m a depth in the middle of a step, w a downward speed. */

@@ -107,7 +107,7 @@ MILD_HD ElementMemory element_remember(const Element *e, const ElementMemory *me
 }
 
 /* The same where the depth grew by `sinks` [m] more than the element penetrated (frame.h). The
- * added mass, which grows as the depth at most, keeps its momentum. */
+ * added mass, which grows at most in proportion to the depth, gains no momentum. */
 MILD_HD ElementMemory element_sunk(ElementMemory after, Real sinks, int stays) {
     const Real deepest = after.depth_max + sinks;
     after.front_speed *= sinks > 0 ? real_over(after.depth_max, deepest) : 1;

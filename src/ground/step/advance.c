@@ -185,7 +185,7 @@ static __attribute__((noinline)) void block_wear(const Slots *s, const Memory *t
 /* Stores what the elements of some blocks remember, from number e of `memory` on. Adds to the lanes
  * of `count` 1 for each element that stays in the ground, and 1 for each of these that reversed. On
  * level ground the slopes are 0, and without a shell the heights. wears: bool constant, shares
- * wear; else no foot has a frame. */
+ * wear; else this foot has no frame. */
 MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *end,
                             const Memory *memory, int e, int wears, Lanes count[2]) {
     const Memory to = *memory; /* copies keep the addresses in registers */

@@ -13,7 +13,8 @@
 
 const char *const mild_solver_names[MILD_SOLVERS] = {"newton", "gauss_seidel", "explicit"};
 
-/* Sums over the loaded elements: contact count, area, depths; centre of pressure of all of them. */
+/* Sums over the loaded elements: contact count, area, depths. Centre of pressure by the vertical
+ * forces of all elements, loaded or not. */
 static void foot_loaded(const MildScratch *scratch, const double *position, int f,
                         MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
@@ -53,7 +54,7 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
     }
     result->depth_mean = sums[0] / loaded;
     const double z = foot->shell ? shell_loaded(foot, &result->area) : 0.0;
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3 && force > 0.0; k++) {
         result->pressure_center[k] =
             position[k] + foot->arm[0][k] +
             (sums[3] * foot->arm[1][k] + sums[4] * foot->arm[2][k] + z * foot->arm[3][k]) / force;
