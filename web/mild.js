@@ -14,7 +14,7 @@ const ROBOTS = [
   { file: 'sa01', name: 'SA01', most: [1.15, 0.9, 0.35, 1.0], pressure: 40e3, away: 3, below: 0.33 },
   { file: 'g1', name: 'G1', most: [0.9, 0.4, 0.2, 0.8], pressure: 80e3, away: 3.4, below: 0.15 },
   { file: 'go1', name: 'Go1', most: [1.0, 0.4, 0.2, 0.8], pressure: 120e3, away: 2.2, below: 0.11 },
-  { file: 'g1_run', name: 'G1, running', most: [3.0, 0.4, 0.2, 0.8], pressure: 120e3, away: 4.4, below: 0.15 },
+  { file: 'g1_run', name: 'running G1', most: [3.0, 0.4, 0.2, 0.8], pressure: 120e3, away: 4.4, below: 0.15 },
 ];
 
 // What a ground is called, and its colour as drawn.

@@ -52,7 +52,7 @@ class Batch(unittest.TestCase):
                     of = ground.elements(f)
                     for k, name in enumerate(("depth", "normal", "tangent_x", "tangent_y")):
                         got = arrays.outputs["elements"][i, k, f, :sole.elements]
-                        # the .2 mN of drag on a foot without load: its ways of some um are rounded
+                        # of the 0.2 mN of drag on a foot without load, whose displacements of a few um are rounded
                         least = 0.1 if name.startswith("tangent") and not of["normal"].any() else 1e-3
                         np.testing.assert_allclose(got, of[name], rtol=1e-2, atol=2e-3 * max(np.abs(of[name]).max(), least))
                 ground.advance()

@@ -649,10 +649,18 @@ TEST(commands_that_grow) {
         own->command[0] = rows[k][0];
         own->smooth_velocity[0] = rows[k][1];
         own->step = (uint32_t)(rig.def.command_interval / TASK_PERIOD + 0.5) - 1;
+        own->step_first = 0;
         rig_step(&rig, action);
         expect_near("the highest command grows", own->command_most - before, rows[k][2], 1e-12);
         assert_true(own->command[0] <= own->command_most);
     }
+    own->step_first = own->step + 1; /* an episode that has just begun says nothing */
+    own->step = 2 * own->step - 1;
+    own->command[0] = 1.2;
+    own->smooth_velocity[0] = 0;
+    own->command_most = 1;
+    rig_step(&rig, action);
+    expect_near("the highest command stays", own->command_most, 1, 0);
     rig_close(&rig);
 }
 

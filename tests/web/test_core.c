@@ -405,7 +405,7 @@ static double rival_depth(double stiffness) {
 TEST(test_sliders) {
     double load = 0;
     start(preset("foam45"), WEB_LEVEL, 1);
-    /* on softer foam it leans, and how deep its feet are hangs on how it came to stand */
+    /* on softer foam it leans, and how deep its feet are depends on how it came to stand */
     const double stiffness[2] = {3, 1};
     double depth[2];
     for (int i = 0; i < 2; i++) {

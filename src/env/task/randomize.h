@@ -84,8 +84,9 @@ MILD_HD_FN void task_draw_robot(TaskEnv *env, const TaskDef *def, Random r) {
 #define COMMAND_FOLLOWED 0.8 /* [-] of the command: a speed that follows it */
 #define COMMAND_GROWTH 0.25  /* [m/s] */
 
-/* A robot's highest forward command grows where it follows one near it when the next is drawn
- * (command curriculum of Rudin et al. 2021), and falls where it has less than half of it. */
+/* A robot's highest forward command grows where it follows one near it when the next of an episode
+ * is drawn (command curriculum of Rudin et al. 2021), and falls where it has less than half of
+ * it. */
 MILD_HD_FN void task_command_adapt(TaskEnv *env, const TaskDef *def) {
     const double asked = env->command[0], has = env->smooth_velocity[0];
     const double most = env->command_most;

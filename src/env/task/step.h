@@ -410,7 +410,9 @@ MILD_HD_FN void task_advance_clock(TaskEnv *env, const TaskDef *def) {
     task_see_command(env);
     uint32_t interval = (uint32_t)(def->command_interval / TASK_PERIOD + 0.5);
     if (!env->command_frozen && interval && env->step % interval == 0) {
-        task_command_adapt(env, def);
+        if (env->step - env->step_first >= interval) { /* it had the whole time to follow */
+            task_command_adapt(env, def);
+        }
         task_draw_command(env, def);
     }
 }

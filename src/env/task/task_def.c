@@ -175,7 +175,7 @@ const MildField task_fields[] = {
     T(episode, D, 1, 0.1, 1000, "[s] longest episode"),
     T(command_interval, D, 1, 0.1, 1000, "[s] time after which a new command is drawn"),
     T(vx, D, 2, -4, 4, "[m/s] forward command, low and high"),
-    T(vx_start, D, 1, 0, 4,
+    T(vx_start, D, 1, 0.1, 4,
       "[m/s] highest forward command of a new robot; it grows as commands near it are followed"),
     T(vy, D, 2, -3, 3, "[m/s] sideways command, low and high"),
     T(wz, D, 2, -3, 3, "[rad/s] turning command, low and high"),
