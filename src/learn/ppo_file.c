@@ -27,8 +27,8 @@ static Safetensor tensor_of(const char *name, SafetensorsType type, const void *
 /* ---- several processes: the file has the environments of all, each of them those of its part */
 
 static int has_rows(const char *name) {
-    static const char *const names[] = {"train.history", "train.critic", "train.target",
-                                        "train.frame",   "train.environments",  "train.progress"};
+    static const char *const names[] = {"train.history", "train.critic",       "train.target",
+                                        "train.frame",   "train.environments", "train.progress"};
     int found = 0;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         found |= strcmp(name, names[i]) == 0;
