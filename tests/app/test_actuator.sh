@@ -57,7 +57,7 @@ bad "100" "$mild" actuator fit short.csv --out x.safetensors
 bad "--out" "$mild" actuator fit motor.csv --out -
 bad "--out motor.csv" "$mild" actuator fit motor.csv --out motor.csv
 
-# the key; on grass, because with so short a fit the robot falls in sand (8 of 10 trials; with a whole one never)
+# the key; on grass, because after so short a fit the robot falls in loose sand (8 of 10 trials), after a whole one it does not (0 of 10)
 eval_row() { "$mild" eval --ground grass --trials 1 --seconds 3 "$@" | tail -1; }
 [ "$(eval_row)" != "$(eval_row --task.actuator=motor.safetensors)" ] || fail "task.actuator does nothing in eval"
 expect 0 'grass .* 1/1 ' eval_row --task.actuator=motor.safetensors

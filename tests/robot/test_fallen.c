@@ -279,6 +279,7 @@ static double count_body(const RobotSim *sim, int body, Account *account) {
     twist_of_world(foot, before, twists[0]);
     twist_of_world(foot, V, twists[1]);
     twist_of_world(foot, free_of_it, twists[2]);
+    assert_true(foot->elements <= (int)(sizeof *deepened / sizeof **deepened));
     for (int e = 0; e < foot->active; e++) {
         const Slots *s = slot_block(foot, e);
         const int i = e % SLOT_LANES;
