@@ -353,7 +353,7 @@ int web_move(const float *action, const float command[3]) {
     const int steps = env_physics_steps(&web.task);
     const EnvsView view = {.history = web.history};
     const int floor = web.trial.rigid && web.standing > web.feet;
-    memcpy(env->command, command, sizeof env->command);
+    memcpy(env->command, command, 3 * sizeof *command);
     web.call.action = action;
     for (int k = 0; k <= steps; k++) {
         if (k > 0 && !web.trial.rigid) {

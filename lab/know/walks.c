@@ -41,7 +41,7 @@ static void turn_clock(Walks *w, int i, double period) {
 static void direct(Walks *w, int i, int step) {
     const WalkRoute *walk = &w->def->walk[i];
     const double *asked = walk->command[step * walk->commands / w->steps];
-    double *command = w->command + 3 * (size_t)i;
+    double *command = w->command + TASK_COMMANDS * (size_t)i;
     memcpy(command, asked, 3 * sizeof *command);
     if (w->def->care) {
         const WalkCare care = w->def->care(w->def->context, i);
@@ -63,7 +63,7 @@ static void show(const Walks *w, int i, int step) {
                     .step = step,
                     .frame = w->frame + (size_t)i * (size_t)w->shape.observation,
                     .critic = w->critic + (size_t)i * (size_t)w->shape.critic,
-                    .command = w->command + 3 * (size_t)i,
+                    .command = w->command + TASK_COMMANDS * (size_t)i,
                     .forward = w->env[i]->robot.qpos[0]};
     for (int s = 0; step > 0 && s < w->samples; s++) {
         const EnvsSample *sample = last - s;
@@ -93,7 +93,7 @@ static MildStatus open_walks(Walks *w, MildError *error) {
     w->action = calloc(count * (size_t)w->shape.actions, sizeof(float));
     w->reward = calloc(count, sizeof(float));
     w->done = calloc(4 * count, 1);
-    w->command = calloc(3 * count, sizeof(double));
+    w->command = calloc(TASK_COMMANDS * count, sizeof(double));
     if (!w->terrain || !w->trial || !w->env || !w->frame || !w->critic || !w->history ||
         !w->action || !w->reward || !w->done || !w->command) {
         return mild_fail(error, MILD_ERROR_MEMORY, "out of memory for %d walks", def->count);
@@ -153,7 +153,7 @@ static EnvsView view_of(const Walks *w) {
 static MildStatus start(Walks *w, MildError *error) {
     const EnvsView first = view_of(w);
     for (int i = 0; i < w->def->count; i++) {
-        memcpy(w->command + 3 * (size_t)i, w->def->walk[i].command[0], 3 * sizeof(double));
+        memcpy(w->command + TASK_COMMANDS * (size_t)i, w->def->walk[i].command[0], 3 * sizeof(double));
     }
     MildStatus status = envs_set_commands(w->envs, w->command, error);
     return status == MILD_OK ? envs_reset(w->envs, &first, NULL, error) : status;

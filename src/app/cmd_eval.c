@@ -106,6 +106,8 @@ static cJSON *row_json(const EvalRow *row, const EvalTrial *each) {
                   {"stride", row->stride},
                   {"cadence", row->cadence},
                   {"flight", row->flight},
+                  {"jump", row->jump},
+                  {"rise", row->rise},
                   {"duty", row->duty},
                   {"load_peak", row->load_peak},
                   {"load_rate", row->load_rate},
@@ -425,6 +427,9 @@ static MildStatus check_command(Eval *e, MildError *error) {
     }
     MildStatus status = robots_check_command(controller, "sideways", e->eval.sideways, error);
     if (status == MILD_OK) {
+        status = robots_check_jump(&e->context.task, e->eval.jump, error);
+    }
+    if (status == MILD_OK) {
         status = robots_check_command(controller, "turn", e->eval.turn, error);
     }
     for (int i = 0; i < e->speeds.count && status == MILD_OK; i++) {
@@ -533,6 +538,9 @@ int cmd_eval(int argc, char **argv) {
         {"turn", CLI_NUMBER, &e->eval.turn, -1.5, 1.5, "W",
          "[rad/s] commanded turning speed to the left; speeds are then along the robot's heading "
          "(default 0: the heading is held along x)"},
+        {"jump", CLI_NUMBER, &e->eval.jump, 0, 1, "H",
+         "[m] commanded rise of jumps, one after the other from 1 s on, of a policy trained with "
+         "task.jump; --speed is their mean speed (default 0)"},
         {"push", CLI_NUMBER, &e->eval.push, 0, 5, "V",
          "[m/s] added to the speed of the base every 4 s, in a random direction (default 0)"},
         {"start", CLI_TEXT, &e->start, 0, 0, "HOW",

@@ -408,7 +408,8 @@ static MildStatus choose_walk(Command *c, MildError *error) {
         double course = c->grounds.count * c->patch / fmax(fabs(play->speed), 0.1) + COURSE_EXTRA;
         play->seconds = follows ? fmax(course, COURSE_LEAST) : COURSE_LEAST;
     }
-    return robots_check_command(c->context.controller, "speed", play->speed, error);
+    MildStatus status = robots_check_command(c->context.controller, "speed", play->speed, error);
+    return status == MILD_OK ? robots_check_jump(&c->context.task, play->jump, error) : status;
 }
 
 static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
@@ -472,6 +473,9 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
          "write the frames that the policy sees, for mild fit FILE.csv"},
         {"speed", CLI_NUMBER, &c->play.speed, -4, 4, "V",
          "[m/s] commanded forward speed (default 0.6; 0 for a controller that stands)"},
+        {"jump", CLI_NUMBER, &c->play.jump, 0, 1, "H",
+         "[m] commanded rise of jumps, one after the other from 1 s on; --speed is their mean speed "
+         "(default 0)"},
         {"seconds", CLI_NUMBER, &c->play.seconds, 0, 3600, "T",
          "[s] length of the walk; 0: long enough for the course (default 0)"},
         {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S",

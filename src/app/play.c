@@ -80,6 +80,7 @@ static void set_command(PlayWalk *walk) {
     if (walk->steer) {
         memcpy(walk->env->command, walk->command, sizeof walk->command);
     }
+    walk->env->command[TASK_RISE] = walk->play->time < MEASURE_SETTLED ? 0 : walk->play->jump;
 }
 
 static void start(PlayWalk *walk) {

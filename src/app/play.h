@@ -36,6 +36,7 @@ typedef struct {
     Pressure *pressure;          /* NULL: not measured */
     Others *others;              /* in the video; NULL: none */
     double seconds, speed, rate; /* [s], [m/s], [1/s] frames */
+    double jump;                 /* [m] see EvalDef.jump */
     uint64_t seed;
     const BeliefNet *belief; /* what the robot knows of its ground; NULL: it has none */
     FILE *log;               /* of the frames that its policy sees (belief/log.h); NULL: none */

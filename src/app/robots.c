@@ -99,3 +99,12 @@ MildStatus robots_check_command(const char *controller, const char *option, doub
                            "--%s %g: controller %s follows no command; leave it out", option, value,
                            controller);
 }
+
+MildStatus robots_check_jump(const TaskDef *task, double jump, MildError *error) {
+    return jump == 0 || task->jump[1] > 0
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "--jump %g: the policy was not trained to jump (task.jump); leave it "
+                           "out, or name one that was with --policy",
+                           jump);
+}

@@ -25,5 +25,7 @@ int robots_print(void);
 /* Fails when a controller that follows no command gets one to move. option: of the command. */
 MildStatus robots_check_command(const char *controller, const char *option, double value,
                                 MildError *error);
+/* Fails when a jump [m] is asked of a policy whose task has none. */
+MildStatus robots_check_jump(const TaskDef *task, double jump, MildError *error);
 
 #endif

@@ -180,7 +180,8 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
 /* Trials and their commands. */
 static MildStatus copy_trials(Batch *b, const EnvsDef *def, MildError *error) {
     EnvsArrays *all = &b->arrays;
-    const size_t envs = (size_t)def->count, commands = 3 * envs * sizeof *all->command;
+    const size_t envs = (size_t)def->count;
+    const size_t commands = TASK_COMMANDS * envs * sizeof *all->command;
     b->trials = take(b, commands + envs * sizeof *all->trial, error);
     if (!b->trials) {
         return MILD_ERROR_MEMORY;
@@ -655,7 +656,7 @@ static MildStatus set_commands(Envs *envs, const double *command, MildError *err
     const EnvsArrays *all = &b->arrays;
     Call call = {all, NULL, 0};
     MildStatus status = device_copy(b->device, all->command, command,
-                                    3 * (size_t)all->envs * sizeof *command, error);
+                                    TASK_COMMANDS * (size_t)all->envs * sizeof *command, error);
     if (status == MILD_OK && b->device != MILD_BATCH_HOST) {
         return checked(b->kernels->set_command(all, NULL), error);
     }

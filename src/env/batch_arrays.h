@@ -94,7 +94,7 @@ typedef struct {
     EnvsContact contact;
     EnvsShells shells;
     const EnvsTrial *trial; /* [envs] or NULL */
-    double *command;        /* [envs][3] of the trials */
+    double *command;        /* [envs][TASK_COMMANDS] of the trials */
     EnvsSample *sample;     /* [envs][physics steps] or NULL */
     const EnvsTask *task;
     const EngineModel *model;

@@ -17,8 +17,8 @@ MILD_HD void env_set_trial(const EnvsArrays *all, long robot, TaskEnv *env) {
 
 MILD_HD void env_set_command(const EnvsArrays *all, long robot) {
     TaskEnv *env = env_at(all, robot);
-    for (int i = 0; i < 3; i++) {
-        env->command[i] = all->command[3 * robot + i];
+    for (int i = 0; i < TASK_COMMANDS; i++) {
+        env->command[i] = all->command[TASK_COMMANDS * robot + i];
     }
     env->command_frozen = 1;
 }
@@ -61,6 +61,7 @@ WARP_FN void env_record_sample(const EnvsArrays *all, long robot, int k, int she
         if (LANE(l) == LANES - 1 && k > 0) {
             for (int i = 0; i < 3; i++) {
                 done->base[i] = (double)work->base[i];
+                done->mass_center[i] = NAN;
                 done->omega[i] = (double)work->rate[3 + i];
             }
             for (int i = 0; i < 4; i++) {

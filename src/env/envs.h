@@ -98,8 +98,8 @@ size_t envs_bytes(const Envs *envs);       /* of all */
 /* ---- trials ---- */
 
 /* With EnvsDef.trial. The first episode of an environment is its trial; what follows its end is
- * left to the backend. Commands from the next policy step on, [count][3] on the CPU, see
- * TaskEnv.command; the first ones before envs_reset. Waits for the device. */
+ * left to the backend. Commands from the next policy step on, [count][TASK_COMMANDS] on the CPU;
+ * the first ones before envs_reset. Waits for the device. */
 MildStatus envs_set_commands(Envs *envs, const double *command, MildError *error);
 /* From now on the physics steps of each policy step are written to `sample`,
  * [count][envs_physics_steps] in the memory of the device; NULL: no longer. */

@@ -256,7 +256,7 @@ static MildStatus set_commands(Envs *envs, const double *command, MildError *err
     for (int i = 0; i < m->base.count; i++) {
         TaskEnv *env = env_at(m, i);
         env->command_frozen = 1;
-        memcpy(env->command, command + 3 * (size_t)i, sizeof env->command);
+        memcpy(env->command, command + TASK_COMMANDS * (size_t)i, sizeof env->command);
     }
     return MILD_OK;
 }

@@ -35,7 +35,7 @@ typedef struct {
     double omega[3];                 /* [rad/s] of the base, its own axes */
     double legs;                     /* [m] least distance of two legs: robot_sim_leg_distance */
     double shell_load;               /* [N] vertical force of the ground on the shells */
-    double mass_center[3];           /* [m] of the robot, world; by MuJoCo, else unset */
+    double mass_center[3];           /* [m] of the robot, world; by MuJoCo, else NaN */
     double torque[ROBOT_JOINTS_MAX]; /* [N m] */
     double speed[ROBOT_JOINTS_MAX];  /* [rad/s] of the joints after the step */
     EnvsFoot foot[ROBOT_FEET_MAX];

@@ -121,14 +121,15 @@ static void check_sample(const EnvsSample *sample, const MildTerrain *terrain) {
     assert_true(sample->valid && fabs(sample->above - above) < 1e-5);
 }
 
-static void choose_trial(int i, EnvsTrial *trial, double command[3]) {
+static void choose_trial(int i, EnvsTrial *trial, double command[TASK_COMMANDS]) {
     *trial = (EnvsTrial){.stream = (uint32_t)(i % 2), .ground = i / 2, .rigid = i == 3};
     command[0] = 0.1 * i;
     command[1] = -0.2;
     command[2] = 0.3;
+    command[TASK_RISE] = 0;
 }
 
-static void check_trial(Envs *envs, int i, int t, const double command[3]) {
+static void check_trial(Envs *envs, int i, int t, const double command[TASK_COMMANDS]) {
     const Episode is = episode_of(envs, i);
     assert_true(is.index == (uint32_t)(i % 2) && is.ground[0] == i / 2);
     assert_true(is.map[0] == 0 && is.map[1] == 0);
@@ -151,7 +152,7 @@ TEST(trials_are_chosen) {
     MildMap *map = mild_map_create(&waves, &error);
     MildTerrain ground[3];
     EnvsTrial trial[TRIALS];
-    double command[TRIALS][3];
+    double command[TRIALS][TASK_COMMANDS];
     static float history[TRIALS][SA01_HISTORY], action[TRIALS][SA01_JOINTS], reward[TRIALS];
     static EnvsSample sample[TRIALS][2];
     uint8_t flags[3][TRIALS];

@@ -22,7 +22,7 @@ static struct {
     float history[TRIALS][SA01_HISTORY], action[TRIALS][SA01_JOINTS], reward[TRIALS];
     uint8_t done[TRIALS], timeout[TRIALS], valid[TRIALS];
     EnvsSample sample[TRIALS][PHYSICS_STEPS];
-    double command[TRIALS][3];
+    double command[TRIALS][TASK_COMMANDS];
 } at;
 
 static Envs *start(int batch, EnvsDrive drive) {

@@ -9,7 +9,7 @@ TEST(standing_commands) {
     assert_true(task_is_standing(&def, small));
     for (int i = 0; i < 3; i++) {
         for (int sign = -1; sign <= 1; sign += 2) {
-            double command[3] = {0};
+            double command[TASK_COMMANDS] = {0};
             command[i] = 0.1001 * sign;
             assert_false(task_is_standing(&def, command));
         }
@@ -24,7 +24,7 @@ TEST(standing_commands) {
 /* T = 0.8 (1 + 0.5 (1 - v/1.2)) s by hand, below 1.2 m/s and above. */
 TEST(slow_clock) {
     const struct {
-        double command[3], period;
+        double command[TASK_COMMANDS], period;
     } rows[] = {{{0, 0, 0}, 1.2},        {{0.3, 0, 0}, 1.1},  {{-0.6, 0, 0}, 1.0},
                 {{0, 0.2, 0}, 1.0},      {{0, -0.1, 0}, 1.1}, {{0, 0, 0.9}, 0.9},
                 {{0.3, 0.1, -0.3}, 0.9}, {{1.2, 0, 0}, 0.8},  {{-1.3, 0, 0}, 0.8},
@@ -38,11 +38,11 @@ TEST(slow_clock) {
                      1e-12);
     }
     def.gait_slow_below = 0.6;
-    const double command[3] = {0.3, 0, 0};
+    const double command[TASK_COMMANDS] = {0.3};
     expect_near("below", task_gait_period(&def, command), 1.0, 1e-12);
 }
 
-static const double ahead[3] = {0.6, 0, 0}, still[3] = {0, 0, 0};
+static const double ahead[TASK_COMMANDS] = {0.6}, still[TASK_COMMANDS] = {0};
 
 static TaskFoot foot_at(const TaskDef *def, double phase, const double *command, int foot) {
     return task_gait_foot(def, robot_table(robot), phase, command, foot);

@@ -147,7 +147,7 @@ TEST(mirror_image) {
     }
 }
 
-static const double ahead[3] = {0.6, 0, 0}, still[3] = {0};
+static const double ahead[TASK_COMMANDS] = {0.6}, still[TASK_COMMANDS] = {0};
 
 static int stands_at(double phase, const double *command, int foot) {
     return task_gait_foot(&def, robot_table(robot), phase, command, foot).stance;

@@ -39,7 +39,7 @@ TEST(mirror_twice) {
 /* Stance in the half of the cycle after the foot's offset, swing in the other: h = apex sin(pi s);
  * all joints of a swinging leg bend by amplitude |sin| times `swing`. */
 TEST(gait_of_any_offset) {
-    const double ahead[3] = {0.6, 0, 0}, still[3] = {0};
+    const double ahead[TASK_COMMANDS] = {0.6}, still[TASK_COMMANDS] = {0};
     TaskDef def = task_def_default();
     int swings = 0;
     for (double phase = 0.003; phase < 1; phase += 0.0137) {

@@ -135,7 +135,7 @@ static inline void rival_start_material(Rival *rival, int batch, const MildMater
                          .trial = &rival->trial,
                          .terrain = &rival->terrain,
                          .terrains = 1};
-    const double stand[3] = {0, 0, 0}, walk[3] = {speed, 0, 0};
+    const double stand[TASK_COMMANDS] = {0}, walk[TASK_COMMANDS] = {speed};
     const EnvsView view = {.history = rival->history};
     rival->envs = envs_create(&def, &error);
     assert_non_null(rival->envs);

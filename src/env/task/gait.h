@@ -7,10 +7,19 @@
 
 #include "env/task/state.h"
 
+#define GAIT_GRAVITY 9.81
+
 /* Bool: the command is to stand. */
-MILD_HD_FN int task_is_standing(const TaskDef *def, const Real command[3]) {
+MILD_HD_FN int task_is_standing(const TaskDef *def, const Real command[TASK_COMMANDS]) {
     const double below = def->standing_below;
-    return fabs(command[0]) < below && fabs(command[1]) < below && fabs(command[2]) < below;
+    return fabs(command[0]) < below && fabs(command[1]) < below && fabs(command[2]) < below &&
+           command[TASK_RISE] <= 0;
+}
+
+/* [s] Free flight up by the command's rise and down again, 2 sqrt(2 rise/g); 0: no jump. */
+MILD_HD_FN double task_jump_flight(const Real command[TASK_COMMANDS]) {
+    const double rise = command[TASK_RISE];
+    return rise > 0 ? 2 * task_sqrt(2 * rise / GAIT_GRAVITY) : 0;
 }
 
 /* [s] Period of the clock under a command,
@@ -19,8 +28,13 @@ MILD_HD_FN int task_is_standing(const TaskDef *def, const Real command[3]) {
  * v = |v_x| + 3 |v_y| + 1 m |w_z|
  *
  * Slow steps are long, because each pays for a lifted leg and an imprint. Steps to the side and
- * turns weigh more, because they reach the end of their range at a lower speed. */
-MILD_HD_FN double task_gait_period(const TaskDef *def, const Real command[3]) {
+ * turns weigh more, because they reach the end of their range at a lower speed. A jump takes
+ * jump_stance and its flight. */
+MILD_HD_FN double task_gait_period(const TaskDef *def, const Real command[TASK_COMMANDS]) {
+    const double flight = task_jump_flight(command);
+    if (flight > 0) {
+        return def->jump_stance + flight;
+    }
     const double forward = command[0], left = command[1], turning = command[2];
     const double v = fabs(forward) + 3 * fabs(left) + fabs(turning);
     const double slow = 1 - v / def->gait_slow_below;
@@ -29,14 +43,18 @@ MILD_HD_FN double task_gait_period(const TaskDef *def, const Real command[3]) {
 
 /* [-] Share of the period that a foot stands. Below 1/2 the robot flies: feet half a period apart
  * are both in the air for 1 - 2 share of it. */
-MILD_HD_FN double task_gait_share(const TaskDef *def, const Real command[3]) {
+MILD_HD_FN double task_gait_share(const TaskDef *def, const Real command[TASK_COMMANDS]) {
+    const double flight = task_jump_flight(command);
+    if (flight > 0) {
+        return def->jump_stance / (def->jump_stance + flight);
+    }
     const double *share = def->stance_share, *speed = def->run_speed, v = fabs(command[0]);
     const double run = v < speed[1] ? (v - speed[0]) / (speed[1] - speed[0]) : 1;
     return share[1] - (run > 0 ? run : 0) * (share[1] - share[0]);
 }
 
 MILD_HD_FN TaskFoot task_gait_foot(const TaskDef *def, const RobotTable *robot, double phase,
-                                   const Real command[3], int foot) {
+                                   const Real command[TASK_COMMANDS], int foot) {
     const TaskFoot stands = {1, 0, 0, 0};
     const double offset = robot->gait_offset[foot], share = task_gait_share(def, command);
     const double since = phase - offset + (phase < offset);
@@ -65,7 +83,7 @@ MILD_HD_FN double task_gait_joint(const TaskDef *def, const RobotTable *robot, d
 }
 
 MILD_HD_FN double task_gait_reference(const TaskDef *def, const RobotTable *robot, double phase,
-                                      const Real command[3], int i) {
+                                      const Real command[TASK_COMMANDS], int i) {
     const int foot = robot->joint_foot[i];
     const double bend = foot < 0 ? 0 : task_gait_foot(def, robot, phase, command, foot).bend;
     return task_gait_joint(def, robot, bend, i);

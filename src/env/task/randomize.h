@@ -82,38 +82,55 @@ MILD_HD_FN void task_draw_robot(TaskEnv *env, const TaskDef *def, Random r) {
 
 #define COMMAND_NEAR 0.7     /* [-] of the highest: a command near it */
 #define COMMAND_FOLLOWED 0.8 /* [-] of the command: a speed that follows it */
-#define COMMAND_GROWTH 0.25  /* [m/s] */
+#define COMMAND_GROWTH 0.0625 /* [-] of the highest of all */
 
-/* A robot's highest forward command grows where it follows one near it when the next of an episode
- * is drawn (command curriculum of Rudin et al. 2021), and falls where it has less than half of
- * it. */
+/* A robot's highest command, forward or, where it jumps, of the rise, grows where it follows one
+ * near it when the next of an episode is drawn (command curriculum of Rudin et al. 2021), and falls
+ * where it has less than half of it. */
 MILD_HD_FN void task_command_adapt(TaskEnv *env, const TaskDef *def) {
-    const double asked = env->command[0], has = env->smooth_velocity[0];
-    const double most = env->command_most;
-    if (!(asked > COMMAND_NEAR * fmin(most, def->vx[1]))) {
+    const int jumps = def->jump[1] > 0;
+    const double asked = env->command[jumps ? TASK_RISE : TASK_FORWARD];
+    const double has = jumps ? env->risen[1] : env->smooth_velocity[0];
+    const double most = env->command_most, top = jumps ? def->jump[1] : def->vx[1];
+    const double growth = COMMAND_GROWTH * top;
+    if (!(asked > COMMAND_NEAR * fmin(most, top))) {
         return;
     }
     if (has > COMMAND_FOLLOWED * asked) {
-        env->command_most = fmax(most, fmin(most + COMMAND_GROWTH, def->vx[1]));
+        env->command_most = fmax(most, fmin(most + growth, top));
     } else if (has < 0.5 * asked) {
-        env->command_most = fmax(most - COMMAND_GROWTH, fmin(most, def->vx_start));
+        env->command_most = fmax(most - growth, fmin(most, jumps ? def->jump_start : def->vx_start));
     }
+}
+
+/* Uniform in the range up to the highest command of the robot. */
+MILD_HD_FN double task_draw_below(Random *r, const double range[2], double most) {
+    const double below[2] = {range[0], fmax(range[0], fmin(range[1], most))};
+    return task_draw(r, below);
 }
 
 /* Draws the command that the policy is to follow. */
 MILD_HD_FN void task_draw_command(TaskEnv *env, const TaskDef *def) {
     Random r = random_at(env->seed ^ TASK_RANDOM_COMMAND, env->index, env->tick);
     double kind = random_unit(&r);
-    env->command[0] = env->command[1] = env->command[2] = 0;
+    for (int i = 0; i < TASK_COMMANDS; i++) {
+        env->command[i] = 0;
+    }
     if (kind < def->standing_share) {
         return;
     }
     kind -= def->standing_share;
-    const double forward[2] = {def->vx[0], fmax(def->vx[0], fmin(def->vx[1], env->command_most))};
-    env->command[0] = task_draw(&r, kind < def->backward_share ? def->backward_vx : forward);
+    const int jumps = def->jump[1] > 0;
+    const double most = env->command_most;
+    env->command[0] = kind < def->backward_share
+                          ? task_draw(&r, def->backward_vx)
+                          : task_draw_below(&r, def->vx, jumps ? def->vx[1] : most);
     if (random_unit(&r) >= def->straight_share) {
         env->command[1] = task_draw(&r, def->vy);
         env->command[2] = task_draw(&r, def->wz);
+    }
+    if (jumps) {
+        env->command[TASK_RISE] = task_draw_below(&r, def->jump, most);
     }
 }
 

@@ -224,6 +224,20 @@ MILD_HD_FN Real reward_rise(const TaskMotion *m) {
     return task_clamp(m->base_height / REAL(task_nominal_height(m->def, m->robot)), 0, 1);
 }
 
+/* The base is to fly as free fall does. With the rise h of the command it leaves the ground at
+ * w = sqrt(2 g h), and after a time t of its flight it has risen by w t - g t^2/2. */
+MILD_HD_FN Real reward_jump(const TaskMotion *m) {
+    const Real *command = m->env->command;
+    const double share = task_gait_share(m->def, command), phase = m->env->phase;
+    if (task_jump_flight(command) == 0 || phase < share) {
+        return 0;
+    }
+    const double t = (phase - share) * task_gait_period(m->def, command);
+    const double w = task_sqrt(2 * GAIT_GRAVITY * command[TASK_RISE]);
+    const Real e = m->rise - REAL(w * t - 0.5 * GAIT_GRAVITY * t * t);
+    return task_exp(-fabs(e) / REAL(0.05));
+}
+
 /* [-] By what all terms with a positive weight but upright are multiplied, so that a robot that
  * lies still is not paid for standing still. */
 MILD_HD_FN Real reward_gate(const TaskMotion *m) {

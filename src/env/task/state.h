@@ -31,6 +31,10 @@ extern const char *const task_end_names[];
 
 #define TASK_FRAMES 6 /* H + 1, newest last (paper, H = 5) */
 
+/* A command: [m/s] forward, [m/s] to the left, [rad/s] turning left, all in the heading frame, and
+ * [m] the rise of the base in a jump, 0: none. */
+enum { TASK_FORWARD, TASK_LEFT, TASK_TURN, TASK_RISE, TASK_COMMANDS };
+
 /* [-] Friction of rigid ground that a caller has chosen (task_env_reset_on). */
 #define TASK_RIGID_FRICTION 0.8
 
@@ -38,6 +42,7 @@ extern const char *const task_end_names[];
  * the TaskEnv env says of it, its sign in the mirror image of a robot. The networks look for the
  * clock at the end. */
 #define TASK_FRAME_LIST(X)                                                                         \
+    X(jump, def->jump[1] > 0, 5 * env->command_seen[TASK_RISE], 1)                                 \
     X(clock, 1, observe_clock(env, def, 0), robot_mirror_shift(robot) > 0 ? -1 : 1)                \
     X(clock, 1, observe_clock(env, def, 1), robot_mirror_shift(robot) > 0 ? -1 : 1)
 #define TASK_FRAME_ONE(name, has, value, sign) "."
@@ -142,8 +147,8 @@ typedef struct {
     uint32_t step_first;  /* step at which the episode began */
     int dropped;          /* bool: the episode began lying, see TaskStart */
     double phase;         /* [-] gait clock in [0, 1) */
-    Real command[3];      /* [m/s, m/s, rad/s] vx, vy, wz in the heading frame */
-    Real command_seen[3]; /* what the policy sees, one policy step late */
+    Real command[TASK_COMMANDS];
+    Real command_seen[TASK_COMMANDS]; /* what the policy sees, one policy step late */
     int command_frozen;   /* bool: eval and play set the command themselves */
     /* what was drawn for this episode */
     TaskVariation variation;
@@ -155,7 +160,7 @@ typedef struct {
     int lag_command, lag_motor, lag_imu; /* [physics steps] */
     double assist_level; /* [-] level of assistance: decays while on its feet, rises with falls;
                             persists across episodes */
-    double command_most; /* [m/s] highest forward command, see task_command_adapt; persists */
+    double command_most; /* [m/s or m] highest command, see task_command_adapt; persists */
     Real assist_draw;    /* [-] share of the level used in this episode, in [0.5, 1) */
     Real push[6];        /* [m/s, rad/s] last push, for the critic; decays */
     /* state */
@@ -169,6 +174,8 @@ typedef struct {
                                 reward.tracking_time */
     Real joint_speed[TASK_JOINTS]; /* one policy step ago */
     Real air_time[TASK_FEET];
+    Real risen[2]; /* [m] highest of the base above nominal: in this period of the clock, in the one
+                    before */
     /* sums over the running episode, for the log */
     Real reward_sum, term_sum[TASK_REWARD_COUNT], speed_error_sum;
 } TaskEnv;
@@ -225,6 +232,7 @@ typedef struct {
     Real qd_before[TASK_JOINTS]; /* [rad/s] one policy step ago */
     Real torque[TASK_JOINTS];    /* [N m] */
     Real base_height;            /* [m] above the stance soles; in flight, as `above` */
+    Real rise; /* [m] of the base over its nominal height above the undisturbed surface */
     Real foot_height[TASK_FEET]; /* [m] lowest sole point above the undisturbed surface */
     Real foot_force[TASK_FEET];  /* [N] of the ground on the foot */
     Real foot_speed[TASK_FEET];  /* [m/s] horizontal, of the sole */

@@ -46,7 +46,7 @@ MILD_HD_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape s
     env->index = index;
     env->step_limit = (uint32_t)(def->episode / TASK_PERIOD + 0.5);
     env->assist_level = 1;
-    env->command_most = def->vx_start;
+    env->command_most = def->jump[1] > 0 ? def->jump_start : def->vx_start;
 }
 
 /* What an environment keeps, and back, before a new episode. */
@@ -145,7 +145,7 @@ MILD_HD_FN void task_draw_start(TaskEnv *env, const TaskDef *def, const RobotTab
         env->robot.qvel[i] = z->initial_velocity * (2 * random_unit(&own) - 1);
     }
     r = random_after(r, 6);
-    env->phase = random_unit(&r) < 0.5 ? 0 : 0.5;
+    env->phase = random_unit(&r) < 0.5 || def->jump[1] > 0 ? 0 : 0.5;
     /* The first episodes end at different times, so that the environments do not reset in
      * lockstep. */
     env->step = env->tick == env->tick_first && !env->command_frozen
@@ -157,7 +157,7 @@ MILD_HD_FN void task_draw_start(TaskEnv *env, const TaskDef *def, const RobotTab
 }
 
 MILD_HD_FN void task_see_command(TaskEnv *env) {
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < TASK_COMMANDS; i++) {
         env->command_seen[i] = env->command[i];
     }
 }
@@ -170,6 +170,7 @@ MILD_HD_FN void task_clear_episode(TaskEnv *env, const TaskDef *def) {
     tile_clear(env->joint_speed, sizeof env->joint_speed);
     tile_clear(env->smooth_velocity, sizeof env->smooth_velocity);
     tile_clear(env->push, sizeof env->push);
+    tile_clear(env->risen, sizeof env->risen);
     tile_clear(env->term_sum, sizeof env->term_sum);
     env->reward_sum = env->speed_error_sum = 0;
     if (tile_lane() == 0 && !env->command_frozen) {
@@ -309,6 +310,7 @@ MILD_HD_FN void task_feet_motion(TaskEnv *env, const TaskDef *def, const RobotTa
         }
     }
     m->base_height = stances ? env->robot.qpos[2] - stance_height / (Real)stances : reading->above;
+    m->rise = reading->above - REAL(task_nominal_height(def, robot));
     tile_sync();
     for (int f = tile_lane(); f < env->shape.feet; f += TILE) {
         env->air_time[f] = m->contact[f] ? 0 : env->air_time[f] + REAL(TASK_PERIOD);
@@ -406,7 +408,14 @@ MILD_HD_FN void task_advance_clock(TaskEnv *env, const TaskDef *def) {
     env->tick++;
     env->step++;
     env->phase += TASK_PERIOD / task_gait_period(def, env->command_seen);
+    if (env->phase >= 1) {
+        env->risen[1] = env->risen[0];
+        env->risen[0] = 0;
+    }
     env->phase -= floor(env->phase);
+    if (def->jump[1] > 0 && task_is_standing(def, env->command_seen)) {
+        env->phase = 0; /* a jump begins with its stance */
+    }
     task_see_command(env);
     uint32_t interval = (uint32_t)(def->command_interval / TASK_PERIOD + 0.5);
     if (!env->command_frozen && interval && env->step % interval == 0) {
@@ -440,6 +449,7 @@ MILD_HD_FN int task_take_reward(TaskEnv *env, const TaskDef *def, const RobotTab
         env->speed_error_sum += hypot(env->smooth_velocity[0] - env->command[0],
                                       env->smooth_velocity[1] - env->command[1]);
         env->reward_sum += (Real)*reward;
+        env->risen[0] = motion.rise > env->risen[0] ? motion.rise : env->risen[0];
     }
     for (int i = tile_lane(); i < TASK_REWARD_COUNT; i += TILE) {
         env->term_sum[i] += terms[i] * REAL(TASK_PERIOD);

@@ -50,6 +50,9 @@ typedef struct Robot Robot;
     X(upright, 0,                                                                                  \
       "(1 - g_z)/2, g_z: unit gravity along the base's z axis; 1 upright, 0 on its back")          \
     X(rise, 0, "the height above the stance soles over the nominal one, in [0, 1]")                \
+    X(jump, 0,                                                                                     \
+      "exp(-|e|/0.05 m) in the flight of a jump, e: the base's height less that of the free "      \
+      "flight which the clock asks for")                                                           \
     X(collision, -1.0,                                                                             \
       "feet or knees being closer than feet_least, knee_least of robot.ini (vendor)")
 
@@ -170,6 +173,9 @@ typedef struct {
     double command_interval; /* [s] */
     double vx[2], vy[2], wz[2];
     double vx_start; /* [m/s] highest forward command of a new robot: task_command_adapt */
+    double jump[2];  /* [m] rise of the base in a jump; 0 0: the robot does not jump */
+    double jump_start;  /* [m] highest one of a new robot: task_command_adapt */
+    double jump_stance; /* [s] on the feet between two flights */
     double backward_share, backward_vx[2], standing_share, straight_share;
     double standing_below; /* [m/s, rad/s] a command whose parts are all below this is to stand */
     int gait;              /* of task_gait_names; 0: the robot's own */

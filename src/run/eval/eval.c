@@ -22,19 +22,21 @@
 /* ---- commands and pushes ---- */
 
 static void hold_heading(const double quaternion[4], double speed, double sideways,
-                         double command[3]) {
+                         double command[TASK_COMMANDS]) {
     const double turn = -HEADING_GAIN * measure_yaw(quaternion);
     command[0] = speed;
     command[1] = sideways;
     command[2] = speed == 0 && sideways == 0 ? 0 : fmin(fmax(turn, -HEADING_LIMIT), HEADING_LIMIT);
+    command[TASK_RISE] = 0;
 }
 
-/* [m/s, m/s, rad/s] The command at a time of a trial [s] for a robot with the orientation
- * `quaternion` (w x y z): that of eval_command, with `turn` where it is not 0, and none from the
- * stop on. */
+/* The command at a time of a trial [s] for a robot with the orientation `quaternion` (w x y z):
+ * that of eval_command, with `turn` where it is not 0, and none from the stop on. A robot that is to
+ * jump stands first, so that its rise has a measure, and then holds its heading. */
 static void direct(const EvalDef *eval, double speed, double time, const double quaternion[4],
-                   double command[3]) {
-    if (eval->stop > 0 && time >= eval->stop) {
+                   double command[TASK_COMMANDS]) {
+    const int stands = eval->jump > 0 && time < MEASURE_SETTLED;
+    if (stands || (eval->stop > 0 && time >= eval->stop)) {
         hold_heading(quaternion, 0, 0, command);
         return;
     }
@@ -42,6 +44,7 @@ static void direct(const EvalDef *eval, double speed, double time, const double 
     if (eval->turn != 0) {
         command[2] = eval->turn;
     }
+    command[TASK_RISE] = eval->jump;
 }
 
 void eval_command(TaskEnv *env, double speed, double sideways) {
@@ -85,7 +88,7 @@ typedef struct {
     float *device_action; /* [trials][joints] on the device */
     Results device, host;
     float *action;   /* [trials][joints] */
-    double *command; /* [trials][3] */
+    double *command; /* [trials][TASK_COMMANDS] */
     SpeedHoldDef speed_hold;
     SpeedHold *hold;                   /* [trials] */
     Measure *measure;                  /* [trials] */
@@ -210,7 +213,7 @@ static MildStatus open_arrays(Trials *t, MildError *error) {
                          4 * sizeof(uint8_t));
     t->block = calloc(1, t->bytes);
     t->action = calloc(trials * joints, sizeof *t->action);
-    t->command = calloc(trials, 3 * sizeof *t->command);
+    t->command = calloc(trials, TASK_COMMANDS * sizeof *t->command);
     t->hold = calloc(trials, sizeof *t->hold);
     t->measure = calloc(trials, sizeof *t->measure);
     t->end = calloc(trials, 1);
@@ -263,7 +266,7 @@ static void start_trial(void *context, int trial, int thread) {
     measure->keep = t->run->eval.stances != NULL;
     measure->motor = t->motor;
     measure->nominal_height = robot_nominal_height(t->run->robot);
-    direct(&t->run->eval, speed_of(t, trial), 0, ahead, t->command + 3 * (size_t)trial);
+    direct(&t->run->eval, speed_of(t, trial), 0, ahead, t->command + TASK_COMMANDS * (size_t)trial);
 }
 
 /* [observation] What the policy sees next. */
@@ -305,7 +308,7 @@ static void take_trial(void *context, int trial, int thread) {
         track_take(&t->track, trial, at - 1);
     }
     take_smooth(t, trial, at - 1);
-    command = t->command + 3 * (size_t)trial;
+    command = t->command + TASK_COMMANDS * (size_t)trial;
     direct(eval, speed_of(t, trial), t->measure[trial].time, (at - 1)->quaternion, command);
     speed_hold(&t->hold[trial], &t->speed_hold, newest_frame(t, trial),
                controller_estimates(t->run->controller, trial), command);

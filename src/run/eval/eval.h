@@ -33,6 +33,7 @@ typedef struct {
     double speed;    /* [m/s] commanded, forward */
     double sideways; /* [m/s] commanded, to the left */
     double turn;     /* [rad/s] commanded; 0: the heading is held */
+    double jump;     /* [m] commanded rise of jumps, after a second of standing; 0: none */
     double push;     /* [m/s] added to the base in a random direction, every 4 s; by MuJoCo */
     int trials;
     double seconds; /* [s] per trial */
@@ -68,6 +69,7 @@ typedef struct {
     double turn;               /* [rad/s] commanded */
     double velocity_turn;      /* [rad/s] measured */
     double push;               /* [m/s] */
+    double jump;               /* [m] commanded rise */
     double cot;                /* [-] sum |tau qd| / (m g v); NaN when the command is to stand */
     double torque_max;         /* [N m] largest over joints and time, mean over trials */
     double velocity_deviation; /* [m/s] standard deviation over the trials of velocity */
@@ -82,6 +84,8 @@ typedef struct {
                                 distance */
     double stride;           /* [m] from a foot's touchdown to its next one, after the first 2 s */
     double cadence;          /* [1/s] of these strides */
+    double rise;             /* [m] of the centre of mass in the flights of the steady part, over
+                                where it was after MEASURE_SETTLED, mean; by MuJoCo */
     double flight;           /* [-] share of the time after the first 2 s with nothing down */
     double duty;             /* [-] share of it that a foot is down, mean over the feet */
     double load_peak;        /* [weights] largest vertical force on a foot in a stance, mean */

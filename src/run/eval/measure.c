@@ -153,7 +153,16 @@ static void measure_contact(Measure *m, const EnvsSample *sample) {
     for (int f = 0; f < sample->feet; f++) {
         standing += sample->foot[f].load > CONTACT_FORCE;
     }
-    m->flight += standing || sample->shell_load > CONTACT_FORCE ? 0 : m->dt;
+    const int flies = !standing && sample->shell_load <= CONTACT_FORCE;
+    m->flight += flies ? m->dt : 0;
+    if (flies) {
+        m->flight_apex = m->flying > 0 ? fmax(m->flight_apex, sample->mass_center[2])
+                                       : sample->mass_center[2];
+    } else if (m->flying >= MEASURE_FLIGHT) {
+        m->flights++;
+        m->flight_rise += m->flight_apex - m->settled;
+    }
+    m->flying = flies ? m->flying + m->dt : 0;
     m->stance += standing * m->dt / sample->feet;
 }
 
@@ -204,7 +213,9 @@ void measure_sample(Measure *m, const EnvsSample *sample) {
         measure_steady(m, sample, yaw, power_abs);
     }
     m->time += m->dt;
-    if (m->time >= MEASURE_SETTLED) {
+    if (m->time < MEASURE_SETTLED) {
+        m->settled = sample->mass_center[2];
+    } else {
         m->legs = fmin(m->legs, sample->legs);
     }
     m->shell_load += sample->shell_load * m->dt;

@@ -8,6 +8,7 @@
 
 #define MEASURE_STEADY 2.0    /* [s] start of the steady part */
 #define MEASURE_SETTLED 1.0   /* [s] from here on legs and smoothness count: the start is random */
+#define MEASURE_FLIGHT 0.05   /* [s] shorter flights are no jumps */
 #define MEASURE_UP_TILT 0.3   /* [rad] a robot that is up tilts less */
 #define MEASURE_UP_HEIGHT 0.7 /* [-] and its base is higher over its soles, of the nominal height */
 #define MEASURE_UP_TIME 2.0   /* [s] so long */
@@ -35,6 +36,7 @@ typedef struct {
     double torque;          /* [N m] largest of the latest step */
     double base[2];         /* [m] after the latest step */
     double yaw;             /* [rad] after the latest step */
+    double settled;         /* [m] height of the centre of mass at MEASURE_SETTLED */
     double legs;            /* [m] least distance of two legs from MEASURE_SETTLED on */
     Smooth smooth;          /* from then on, too; set by smooth_take */
     double load;            /* [N s] of the feet and of the shells */
@@ -53,6 +55,10 @@ typedef struct {
     double work;                /* [J] integral sum |tau qd| dt */
     double base_low, base_high; /* [m] */
     double flight;              /* [s] without a foot or a shell on the ground */
+    double flying;              /* [s] since it left the ground; 0: it is down */
+    double flight_apex;         /* [m] highest of the centre of mass since then, world */
+    int flights;                /* finished ones of MEASURE_FLIGHT at least */
+    double flight_rise;         /* [m] sum of their apexes over `settled` */
     double stance;              /* [s] that a foot is on the ground, mean over the feet */
     double joint_speed;         /* [rad/s] largest */
     double torque_square[ROBOT_JOINTS_MAX]; /* [N^2 m^2 s] */

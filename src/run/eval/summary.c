@@ -111,13 +111,15 @@ static void summarise_feet(EvalRow *row, const Measure *measures) {
 
 /* Contact and motors over the steady parts of all trials. */
 static void summarise_loads(EvalRow *row, const Measure *measures, double weight) {
-    double time = 0, flight = 0, stance = 0, peak = 0, rise = 0, square[ROBOT_JOINTS_MAX] = {0},
+    double time = 0, flight = 0, flight_rise = 0, stance = 0, peak = 0, rise = 0, square[ROBOT_JOINTS_MAX] = {0},
            limited[ROBOT_JOINTS_MAX] = {0}, squares = 0, most = 0;
-    int stances = 0, motors = 0;
+    int stances = 0, motors = 0, flights = 0;
     for (int i = 0; i < row->trials; i++) {
         const Measure *m = &measures[i];
         time += m->steady_time;
         flight += m->flight;
+        flights += m->flights;
+        flight_rise += m->flight_rise;
         stance += m->stance;
         peak += m->peak_sum;
         rise += m->rise_sum;
@@ -131,6 +133,7 @@ static void summarise_loads(EvalRow *row, const Measure *measures, double weight
     }
     row->joint_speed_max = time > 0 ? row->joint_speed_max : NAN;
     row->flight = time > 0 ? flight / time : NAN;
+    row->rise = mean(flight_rise, flights);
     row->duty = time > 0 ? stance / time : NAN;
     row->load_peak = mean(peak / weight, stances);
     row->load_rate = mean(rise / weight / MEASURE_RISE, stances);
@@ -148,6 +151,7 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
                      .sideways = eval->sideways,
                      .turn = eval->turn,
                      .push = eval->push,
+                     .jump = eval->jump,
                      .start = eval->start,
                      .trials = trials,
                      .legs = NAN};
@@ -226,6 +230,9 @@ static void print_loads(const EvalRow *row, char *text, size_t size) {
     text[0] = '\0';
     if (row->flight >= 0.01) {
         used = snprintf(text, size, "  flight %.0f %%", 100 * row->flight);
+    }
+    if (row->jump > 0) {
+        used += snprintf(text + used, size - (size_t)used, "  rise %.3f m", row->rise);
     }
     if (row->at_limit >= 0.01) {
         snprintf(text + used, size - (size_t)used, "  at limit %.0f %%", 100 * row->at_limit);
