@@ -144,7 +144,7 @@ TEST(run) {
     expect_near("bend", foot_at(&def, 0.35 + 0.65 / 6, fast, SA01_LEFT).bend, 0.5, 1e-9);
     def.run_speed[0] = def.run_speed[1] = 2; /* at once */
     expect_near("at once", task_gait_share(&def, half), 0.35, 0);
-    expect_near("below", task_gait_share(&def, (const double[3]){1.999, 0, 0}), 0.5, 0);
+    expect_near("below", task_gait_share(&def, (const double[TASK_COMMANDS]){1.999, 0, 0}), 0.5, 0);
 }
 
 /* Both feet of a hop do the same; a skip has no mirror image. */

@@ -82,7 +82,8 @@ MILD_HD_FN void task_draw_robot(TaskEnv *env, const TaskDef *def, Random r) {
 
 #define COMMAND_NEAR 0.7     /* [-] of the highest: a command near it */
 #define COMMAND_FOLLOWED 0.8 /* [-] of the command: a speed that follows it */
-#define COMMAND_GROWTH 0.0625 /* [-] of the highest of all */
+#define COMMAND_GROWTH 0.25  /* [m/s] */
+#define JUMP_GROWTH 0.02     /* [m] */
 
 /* A robot's highest command, forward or, where it jumps, of the rise, grows where it follows one
  * near it when the next of an episode is drawn (command curriculum of Rudin et al. 2021), and falls
@@ -92,14 +93,15 @@ MILD_HD_FN void task_command_adapt(TaskEnv *env, const TaskDef *def) {
     const double asked = env->command[jumps ? TASK_RISE : TASK_FORWARD];
     const double has = jumps ? env->risen[1] : env->smooth_velocity[0];
     const double most = env->command_most, top = jumps ? def->jump[1] : def->vx[1];
-    const double growth = COMMAND_GROWTH * top;
+    const double growth = jumps ? JUMP_GROWTH : COMMAND_GROWTH;
     if (!(asked > COMMAND_NEAR * fmin(most, top))) {
         return;
     }
     if (has > COMMAND_FOLLOWED * asked) {
         env->command_most = fmax(most, fmin(most + growth, top));
     } else if (has < 0.5 * asked) {
-        env->command_most = fmax(most - growth, fmin(most, jumps ? def->jump_start : def->vx_start));
+        env->command_most =
+            fmax(most - growth, fmin(most, jumps ? def->jump_start : def->vx_start));
     }
 }
 

@@ -142,14 +142,14 @@ typedef struct {
     uint32_t tick;       /* policy steps since creation, never reset */
     uint32_t tick_first; /* at creation or when the run went on: then episodes are staggered */
     /* episode */
-    uint32_t step;        /* policy steps on the clock of this episode */
-    uint32_t step_limit;  /* step at which the episode times out */
-    uint32_t step_first;  /* step at which the episode began */
-    int dropped;          /* bool: the episode began lying, see TaskStart */
-    double phase;         /* [-] gait clock in [0, 1) */
+    uint32_t step;       /* policy steps on the clock of this episode */
+    uint32_t step_limit; /* step at which the episode times out */
+    uint32_t step_first; /* step at which the episode began */
+    int dropped;         /* bool: the episode began lying, see TaskStart */
+    double phase;        /* [-] gait clock in [0, 1) */
     Real command[TASK_COMMANDS];
     Real command_seen[TASK_COMMANDS]; /* what the policy sees, one policy step late */
-    int command_frozen;   /* bool: eval and play set the command themselves */
+    int command_frozen;               /* bool: eval and play set the command themselves */
     /* what was drawn for this episode */
     TaskVariation variation;
     int ground[MILD_MATERIALS_MAX];      /* of TaskDef.grounds, by label; unused without them */

@@ -156,8 +156,8 @@ static void measure_contact(Measure *m, const EnvsSample *sample) {
     const int flies = !standing && sample->shell_load <= CONTACT_FORCE;
     m->flight += flies ? m->dt : 0;
     if (flies) {
-        m->flight_apex = m->flying > 0 ? fmax(m->flight_apex, sample->mass_center[2])
-                                       : sample->mass_center[2];
+        m->flight_apex =
+            m->flying > 0 ? fmax(m->flight_apex, sample->mass_center[2]) : sample->mass_center[2];
     } else if (m->flying >= MEASURE_FLIGHT) {
         m->flights++;
         m->flight_rise += m->flight_apex - m->settled;

@@ -111,8 +111,8 @@ static void summarise_feet(EvalRow *row, const Measure *measures) {
 
 /* Contact and motors over the steady parts of all trials. */
 static void summarise_loads(EvalRow *row, const Measure *measures, double weight) {
-    double time = 0, flight = 0, flight_rise = 0, stance = 0, peak = 0, rise = 0, square[ROBOT_JOINTS_MAX] = {0},
-           limited[ROBOT_JOINTS_MAX] = {0}, squares = 0, most = 0;
+    double time = 0, flight = 0, flight_rise = 0, stance = 0, peak = 0, rise = 0,
+           square[ROBOT_JOINTS_MAX] = {0}, limited[ROBOT_JOINTS_MAX] = {0}, squares = 0, most = 0;
     int stances = 0, motors = 0, flights = 0;
     for (int i = 0; i < row->trials; i++) {
         const Measure *m = &measures[i];
