@@ -188,6 +188,74 @@ static void step(Envs &envs, nb::handle action, Buffers &buffers, uintptr_t stre
     check(status, error);
 }
 
+/* ---- save and fork ---- */
+
+static MildEnvs *begun_envs(const Envs &envs, const char *call) {
+    MildEnvs *at = open_envs(envs);
+    if (!envs.begun) {
+        raise(PyExc_RuntimeError, std::string(call) + ": no episode has begun; call reset() first");
+    }
+    return at;
+}
+
+/* A block of at least what is needed. */
+static Array take_block(const Envs &envs, MildEnvs *at, nb::handle block, bool own_ground,
+                        bool write) {
+    const size_t bytes = mild_envs_block_bytes(at, own_ground);
+    if (bytes == 0) {
+        raise(PyExc_ValueError, "block: MuJoCo steps these environments; set train.robots = batch");
+    }
+    const int64_t length = block.is_none() ? 0 : (int64_t)nb::len(block);
+    if (length < (int64_t)bytes || (!own_ground && length != (int64_t)bytes)) {
+        raise(PyExc_ValueError, "block: it has " + std::to_string(length) + " bytes, but these " +
+                                    "environments' has " + std::to_string(bytes));
+    }
+    return take_array(block, {"block", nb::dtype<uint8_t>(), {length}, envs.shape.device, write});
+}
+
+static size_t block_bytes(const Envs &envs) {
+    return mild_envs_block_bytes(open_envs(envs), 0);
+}
+
+static void save(Envs &envs, nb::handle block, int index, uintptr_t stream) {
+    Entered entered(envs.busy, "Envs.save");
+    MildEnvs *at = begun_envs(envs, "Envs.save");
+    if (index < 0 || index >= envs.shape.envs) {
+        raise(PyExc_IndexError, "save: there is no environment " + std::to_string(index));
+    }
+    const Array to = take_block(envs, at, block, false, true);
+    MildError error = {};
+    check(mild_envs_save(at, index, pointer<uint8_t>(to), stream_of(stream), &error), error);
+}
+
+static void fork_envs(Envs &envs, nb::handle block, bool own_ground, uintptr_t stream) {
+    Entered entered(envs.busy, "Envs.fork");
+    MildEnvs *at = begun_envs(envs, "Envs.fork");
+    const Array from = take_block(envs, at, block, own_ground, false);
+    MildError error = {};
+    MildStatus status;
+    {
+        nb::gil_scoped_release released;
+        status = mild_envs_fork(at, pointer<uint8_t>(from), own_ground, stream_of(stream), &error);
+    }
+    check(status, error);
+}
+
+static void read_motion(Envs &envs, nb::handle qpos, nb::handle qvel, nb::handle torque,
+                        uintptr_t stream) {
+    Entered entered(envs.busy, "Envs.read");
+    MildEnvs *at = begun_envs(envs, "Envs.read");
+    const int64_t n = envs.shape.envs, joints = envs.shape.actions;
+    const int where = envs.shape.device;
+    const Array a = take_optional(qpos, {"qpos", nb::dtype<float>(), {n, 7 + joints}, where, true});
+    const Array b = take_optional(qvel, {"qvel", nb::dtype<float>(), {n, 6 + joints}, where, true});
+    const Array c = take_optional(torque, {"torque", nb::dtype<float>(), {n, joints}, where, true});
+    check_apart({&a, &b, &c});
+    const EnvsMotion motion = {pointer<float>(a), pointer<float>(b), pointer<float>(c)};
+    MildError error = {};
+    check(mild_envs_read(at, &motion, stream_of(stream), &error), error);
+}
+
 static std::string model(const Envs &envs) {
     return mild_envs_model(open_envs(envs));
 }
@@ -305,6 +373,25 @@ NB_MODULE(_envs, module) {
              "A policy step. action: (envs, actions) float32 in units of the action scale; on the "
              "CPU\nValueError for one that is not finite. Environments that ended begin anew in "
              "the same step.")
+        .def_prop_ro("block_bytes", block_bytes,
+                     "Bytes of what save() writes; 0 where MuJoCo steps the robots.")
+        .def("save", save, nb::arg("block").none(), nb::arg("index") = 0, nb::arg("stream") = 0,
+             "Writes an environment to a block: uint8 (block_bytes,), on the device. Robot, ground "
+             "under it\nand task; not its random numbers. Of the batch engine (train.robots: "
+             "batch).")
+        .def("fork", fork_envs, nb::arg("block").none(), nb::arg("own_ground") = false,
+             nb::arg("stream") = 0,
+             "Puts a block into all environments, of these or of others with the same keys but "
+             "train.envs,\ntrain.seed, task.physics_dt and randomize. own_ground: each keeps its "
+             "ground, which forgets\nthe feet, and the robot is set down on it as deep as it "
+             "stands there.")
+        .def("read", read_motion, nb::kw_only(), nb::arg("qpos").none() = nb::none(),
+             nb::arg("qvel").none() = nb::none(), nb::arg("torque").none() = nb::none(),
+             nb::arg("stream") = 0,
+             "Writes where the robots are: float32 qpos (envs, 7 + joints) [m, -, rad], base, "
+             "quaternion\nw x y z, joints; qvel (envs, 6 + joints) [m/s, rad/s], world axes, base "
+             "axes, joints; torque\n(envs, joints) [N m] of the last physics step. Of the batch "
+             "engine.")
         .def_prop_ro("model", model, "The robot's MJCF.")
         .def_prop_ro("robot", robot, "The robot's name.")
         .def_prop_ro("task", task, "What a policy's file says of how it walks.")

@@ -138,6 +138,25 @@ MildStatus mild_envs_step(MildEnvs *envs, const EnvsStep *step, MildStream strea
     return envs_step(envs->envs.envs, step, stream, error);
 }
 
+size_t mild_envs_block_bytes(const MildEnvs *envs, int own_ground) {
+    return envs_block_bytes(envs->envs.envs, own_ground);
+}
+
+MildStatus mild_envs_save(MildEnvs *envs, int index, void *block, MildStream stream,
+                          MildError *error) {
+    return envs_save(envs->envs.envs, index, block, stream, error);
+}
+
+MildStatus mild_envs_fork(MildEnvs *envs, const void *block, int own_ground, MildStream stream,
+                          MildError *error) {
+    return envs_fork(envs->envs.envs, block, own_ground, stream, error);
+}
+
+MildStatus mild_envs_read(MildEnvs *envs, const EnvsMotion *motion, MildStream stream,
+                          MildError *error) {
+    return envs_read(envs->envs.envs, motion, stream, error);
+}
+
 MildStatus mild_envs_stats(MildEnvs *envs, EnvsStats *stats, MildStream stream, MildError *error) {
     EnvsStats sums;
     MildStatus status = envs_sums(envs->envs.envs, &sums, stream, error);
