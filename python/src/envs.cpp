@@ -198,45 +198,52 @@ static MildEnvs *begun_envs(const Envs &envs, const char *call) {
     return at;
 }
 
-/* A block of at least what is needed. */
-static Array take_block(const Envs &envs, MildEnvs *at, nb::handle block, bool own_ground,
-                        bool write) {
-    const size_t bytes = mild_envs_block_bytes(at, own_ground);
-    if (bytes == 0) {
-        raise(PyExc_ValueError, "block: MuJoCo steps these environments; set train.robots = batch");
+/* Blocks of as many bytes as the caller's have. */
+static Array take_blocks(const Envs &envs, MildEnvs *at, nb::handle blocks, bool write,
+                         std::vector<int64_t> &shape) {
+    if (mild_envs_block_bytes(at, 0) == 0) {
+        raise(PyExc_ValueError,
+              "blocks: MuJoCo steps these environments; set train.robots = batch");
     }
-    const int64_t length = block.is_none() ? 0 : (int64_t)nb::len(block);
-    if (length < (int64_t)bytes || (!own_ground && length != (int64_t)bytes)) {
-        raise(PyExc_ValueError, "block: it has " + std::to_string(length) + " bytes, but these " +
-                                    "environments' has " + std::to_string(bytes));
+    const int64_t bytes = (int64_t)mild_envs_block_bytes(at, 0);
+    shape = {1, bytes};
+    if (!blocks.is_none() && nb::len(blocks) > 0) {
+        const nb::object one = blocks[0];
+        shape[0] = (int64_t)nb::len(blocks);
+        shape[1] = write ? bytes : (int64_t)nb::len(one);
     }
-    return take_array(block, {"block", nb::dtype<uint8_t>(), {length}, envs.shape.device, write});
+    return take_array(blocks, {"blocks", nb::dtype<uint8_t>(), shape, envs.shape.device, write});
 }
 
 static size_t block_bytes(const Envs &envs) {
     return mild_envs_block_bytes(open_envs(envs), 0);
 }
 
-static void save(Envs &envs, nb::handle block, int index, uintptr_t stream) {
+static void save(Envs &envs, nb::handle blocks, int first, uintptr_t stream) {
     Entered entered(envs.busy, "Envs.save");
     MildEnvs *at = begun_envs(envs, "Envs.save");
-    if (index < 0 || index >= envs.shape.envs) {
-        raise(PyExc_IndexError, "save: there is no environment " + std::to_string(index));
+    std::vector<int64_t> shape;
+    const Array to = take_blocks(envs, at, blocks, true, shape);
+    if (first < 0 || first + shape[0] > envs.shape.envs) {
+        raise(PyExc_IndexError, "save: there is no environment " +
+                                    std::to_string(first < 0 ? first : first + shape[0] - 1));
     }
-    const Array to = take_block(envs, at, block, false, true);
     MildError error = {};
-    check(mild_envs_save(at, index, pointer<uint8_t>(to), stream_of(stream), &error), error);
+    check(mild_envs_save(at, first, (int)shape[0], pointer<uint8_t>(to), stream_of(stream), &error),
+          error);
 }
 
-static void fork_envs(Envs &envs, nb::handle block, bool own_ground, uintptr_t stream) {
+static void fork_envs(Envs &envs, nb::handle blocks, bool own_ground, uintptr_t stream) {
     Entered entered(envs.busy, "Envs.fork");
     MildEnvs *at = begun_envs(envs, "Envs.fork");
-    const Array from = take_block(envs, at, block, own_ground, false);
+    std::vector<int64_t> shape;
+    const Array from = take_blocks(envs, at, blocks, false, shape);
     MildError error = {};
     MildStatus status;
     {
         nb::gil_scoped_release released;
-        status = mild_envs_fork(at, pointer<uint8_t>(from), own_ground, stream_of(stream), &error);
+        status = mild_envs_fork(at, pointer<uint8_t>(from), (int)shape[0], (size_t)shape[1],
+                                own_ground, stream_of(stream), &error);
     }
     check(status, error);
 }
@@ -375,16 +382,16 @@ NB_MODULE(_envs, module) {
              "the same step.")
         .def_prop_ro("block_bytes", block_bytes,
                      "Bytes of what save() writes; 0 where MuJoCo steps the robots.")
-        .def("save", save, nb::arg("block").none(), nb::arg("index") = 0, nb::arg("stream") = 0,
-             "Writes an environment to a block: uint8 (block_bytes,), on the device. Robot, ground "
-             "under it\nand task; not its random numbers. Of the batch engine (train.robots: "
-             "batch).")
-        .def("fork", fork_envs, nb::arg("block").none(), nb::arg("own_ground") = false,
+        .def("save", save, nb::arg("blocks").none(), nb::arg("first") = 0, nb::arg("stream") = 0,
+             "Writes environments from `first` on to blocks: uint8 (count, block_bytes), on the "
+             "device.\nRobot, ground under it and task; not its random numbers. Of the batch "
+             "engine (train.robots: batch).")
+        .def("fork", fork_envs, nb::arg("blocks").none(), nb::arg("own_ground") = false,
              nb::arg("stream") = 0,
-             "Puts a block into all environments, of these or of others with the same keys but "
-             "train.envs,\ntrain.seed, task.physics_dt and randomize. own_ground: each keeps its "
-             "ground, which forgets\nthe feet, and the robot is set down on it as deep as it "
-             "stands there.")
+             "Puts blocks into all environments, the first into the first of as many equal groups, "
+             "and so\non; of these or of others with the same keys but train.envs, train.seed, "
+             "task.physics_dt and\nrandomize. own_ground: each keeps its ground, which forgets the "
+             "feet, and the robot is set\ndown on it as deep as it stands there.")
         .def("read", read_motion, nb::kw_only(), nb::arg("qpos").none() = nb::none(),
              nb::arg("qvel").none() = nb::none(), nb::arg("torque").none() = nb::none(),
              nb::arg("stream") = 0,

@@ -65,15 +65,17 @@ size_t envs_block_bytes(const Envs *envs, int own_ground) {
     return envs->backend->block_bytes ? envs->backend->block_bytes(envs, own_ground) : 0;
 }
 
-MildStatus envs_save(Envs *envs, int i, void *block, MildStream stream, MildError *error) {
-    return envs->backend->save ? envs->backend->save(envs, i, block, stream, error)
+MildStatus envs_save(Envs *envs, int first, int count, void *blocks, MildStream stream,
+                     MildError *error) {
+    return envs->backend->save ? envs->backend->save(envs, first, count, blocks, stream, error)
                                : need_batch("save", error);
 }
 
-MildStatus envs_fork(Envs *envs, const void *block, int own_ground, MildStream stream,
-                     MildError *error) {
-    return envs->backend->fork ? envs->backend->fork(envs, block, own_ground, stream, error)
-                               : need_batch("fork", error);
+MildStatus envs_fork(Envs *envs, const void *blocks, int count, size_t bytes, int own_ground,
+                     MildStream stream, MildError *error) {
+    return envs->backend->fork
+               ? envs->backend->fork(envs, blocks, count, bytes, own_ground, stream, error)
+               : need_batch("fork", error);
 }
 
 MildStatus envs_read(Envs *envs, const EnvsMotion *motion, MildStream stream, MildError *error) {

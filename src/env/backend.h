@@ -19,9 +19,10 @@ typedef struct {
     void (*set_samples)(Envs *envs, EnvsSample *sample);
     /* of the batch engine, else NULL */
     size_t (*block_bytes)(const Envs *envs, int own_ground);
-    MildStatus (*save)(Envs *envs, int i, void *block, MildStream stream, MildError *error);
-    MildStatus (*fork)(Envs *envs, const void *block, int own_ground, MildStream stream,
+    MildStatus (*save)(Envs *envs, int first, int count, void *blocks, MildStream stream,
                        MildError *error);
+    MildStatus (*fork)(Envs *envs, const void *blocks, int count, size_t bytes, int own_ground,
+                       MildStream stream, MildError *error);
     MildStatus (*read)(Envs *envs, const EnvsMotion *motion, MildStream stream, MildError *error);
     /* of MuJoCo, else NULL */
     void (*times)(Envs *envs, double *physics, double *ground);

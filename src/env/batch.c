@@ -711,7 +711,7 @@ static size_t fork_rows(const Batch *b, int own_ground, EnvsFork *fork) {
     Row rows[ROWS];
     size_t place = 0;
     list_rows(b, &all, &ground, rows);
-    *fork = (EnvsFork){.own_ground = own_ground};
+    *fork = (EnvsFork){.own_ground = own_ground, .group = 1};
     for (int kind = ROW_STATE; kind <= (own_ground ? ROW_STATE : ROW_GROUND); kind++) {
         for (int i = 0; i < ROWS; i++) {
             if ((int)rows[i].kind != kind || rows[i].bytes == 0) {
@@ -732,25 +732,44 @@ static size_t block_bytes(const Envs *envs, int own_ground) {
     return fork_rows(own_const(envs), own_ground, &fork);
 }
 
-static MildStatus save(Envs *envs, int i, void *block, MildStream stream, MildError *error) {
+static MildStatus save(Envs *envs, int first, int count, void *blocks, MildStream stream,
+                       MildError *error) {
     const Batch *b = own(envs);
     EnvsFork fork;
-    fork_rows(b, 0, &fork);
-    fork.block = block;
-    if (b->kernels) {
-        return checked(b->kernels->save(&b->arrays, &fork, i, stream), error);
+    const size_t stride = fork_rows(b, 0, &fork);
+    fork.stride = stride;
+    fork.block = blocks;
+    for (int r = 0; r < fork.count; r++) {
+        fork.row[r].at += (size_t)first * fork.row[r].bytes;
     }
-    envs_host_save(&fork, i);
+    if (b->kernels) {
+        return checked(b->kernels->save(&b->arrays, &fork, count, stream), error);
+    }
+    for (int i = 0; i < count; i++) {
+        envs_host_save(&fork, i);
+    }
     return MILD_OK;
 }
 
-static MildStatus fork_all(Envs *envs, const void *block, int own_ground, MildStream stream,
-                           MildError *error) {
+static MildStatus fork_all(Envs *envs, const void *blocks, int count, size_t stride, int own_ground,
+                           MildStream stream, MildError *error) {
     const Batch *b = own(envs);
     EnvsFork fork;
     Call call = {.arrays = &b->arrays, .fork = &fork};
-    fork_rows(b, own_ground, &fork);
-    fork.block = (char *)(uintptr_t)block; /* which is read */
+    const size_t least = fork_rows(b, own_ground, &fork);
+    if (count < 1 || b->arrays.envs % count != 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "fork: %d environments are not a multiple of %d blocks", b->arrays.envs,
+                         count);
+    }
+    if (own_ground ? stride < least : stride != least) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "fork: a block of %zu bytes, but these environments' has %zu", stride,
+                         least);
+    }
+    fork.block = (char *)(uintptr_t)blocks; /* which are read */
+    fork.stride = stride;
+    fork.group = b->arrays.envs / count;
     MildStatus status = MILD_OK;
     if (b->kernels) {
         status = checked(b->kernels->fork(&b->arrays, &fork, stream), error);

@@ -216,9 +216,8 @@ static __global__ void __launch_bounds__(TALLY_THREADS)
 }
 
 /* A block for each row of an environment. */
-static __global__ void __launch_bounds__(FORK_THREADS)
-    save(const __grid_constant__ EnvsFork fork, int robot) {
-    env_move_row(&fork, (int)blockIdx.x, robot, 1, (int)threadIdx.x, FORK_THREADS);
+static __global__ void __launch_bounds__(FORK_THREADS) save(const __grid_constant__ EnvsFork fork) {
+    env_move_row(&fork, (int)blockIdx.y, blockIdx.x, 1, (int)threadIdx.x, FORK_THREADS);
 }
 
 /* A block for each environment. */
@@ -353,10 +352,11 @@ static const char *kernels_tally(const EnvsArrays *all, MildStream stream) {
     return launched();
 }
 
-static const char *kernels_save(const EnvsArrays *all, const EnvsFork *fork, int robot,
+static const char *kernels_save(const EnvsArrays *all, const EnvsFork *fork, int blocks,
                                 MildStream stream) {
     OnDevice on(all->device);
-    save<<<fork->count, FORK_THREADS, 0, stream>>>(*fork, robot);
+    const dim3 grid((unsigned)blocks, (unsigned)fork->count);
+    save<<<grid, FORK_THREADS, 0, stream>>>(*fork);
     return launched();
 }
 

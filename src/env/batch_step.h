@@ -543,11 +543,12 @@ MILD_HD void env_observe(const EnvsArrays *all, const EnvsStep *call, long robot
 
 /* ---- save and fork: envs.h ---- */
 
-/* Row r of an environment to (save: bool) or from the block, by lane of lanes. Rows of whole words
+/* Row r of an environment to (save: bool) or from its block, by lane of lanes. Rows of whole words
  * begin at one, on either side. */
 MILD_HD void env_move_row(const EnvsFork *fork, int r, long robot, int save, int lane, int lanes) {
     const size_t bytes = fork->row[r].bytes;
-    char *own = fork->row[r].at + (size_t)robot * bytes, *block = fork->block + fork->row[r].place;
+    char *own = fork->row[r].at + (size_t)robot * bytes;
+    char *block = fork->block + (size_t)(robot / fork->group) * fork->stride + fork->row[r].place;
     char *to = save ? block : own;
     const char *from = save ? own : block;
     const size_t words = bytes % sizeof(float) ? 0 : bytes / sizeof(float);

@@ -10,7 +10,9 @@ enum { ENVS_ROWS_MAX = 24 };
 
 /* Between an environment of each row's array and a block. */
 typedef struct {
-    char *block;
+    char *block;    /* the first */
+    size_t stride;  /* [B] from block to block */
+    int group;      /* environments that have a block in common */
     int own_ground; /* bool: see envs_fork */
     int count;      /* of rows */
     struct {
@@ -50,7 +52,7 @@ void envs_host_set_command(const EnvsArrays *all, long robot);
 void envs_host_move_progress(const EnvsArrays *all, int back);
 /* Fills arrays.tally. */
 void envs_host_tally(const EnvsArrays *all);
-/* From the environment to the block, from the block to the environment. */
+/* From the environment to its block, from the block to the environment. */
 void envs_host_save(const EnvsFork *fork, long robot);
 void envs_host_fork(const EnvsArrays *all, const EnvsFork *fork, long robot);
 void envs_host_read(const EnvsArrays *all, const EnvsMotion *motion, long robot);
@@ -73,7 +75,7 @@ typedef struct {
     const char *(*move_progress)(const EnvsArrays *all, int back, MildStream stream);
     const char *(*set_command)(const EnvsArrays *all, MildStream stream);
     const char *(*tally)(const EnvsArrays *all, MildStream stream);
-    const char *(*save)(const EnvsArrays *all, const EnvsFork *fork, int robot, MildStream stream);
+    const char *(*save)(const EnvsArrays *all, const EnvsFork *fork, int blocks, MildStream stream);
     const char *(*fork)(const EnvsArrays *all, const EnvsFork *fork, MildStream stream);
     const char *(*read)(const EnvsArrays *all, const EnvsMotion *motion, MildStream stream);
 } EnvsKernels;

@@ -142,14 +142,14 @@ size_t mild_envs_block_bytes(const MildEnvs *envs, int own_ground) {
     return envs_block_bytes(envs->envs.envs, own_ground);
 }
 
-MildStatus mild_envs_save(MildEnvs *envs, int index, void *block, MildStream stream,
+MildStatus mild_envs_save(MildEnvs *envs, int first, int count, void *blocks, MildStream stream,
                           MildError *error) {
-    return envs_save(envs->envs.envs, index, block, stream, error);
+    return envs_save(envs->envs.envs, first, count, blocks, stream, error);
 }
 
-MildStatus mild_envs_fork(MildEnvs *envs, const void *block, int own_ground, MildStream stream,
-                          MildError *error) {
-    return envs_fork(envs->envs.envs, block, own_ground, stream, error);
+MildStatus mild_envs_fork(MildEnvs *envs, const void *blocks, int count, size_t bytes,
+                          int own_ground, MildStream stream, MildError *error) {
+    return envs_fork(envs->envs.envs, blocks, count, bytes, own_ground, stream, error);
 }
 
 MildStatus mild_envs_read(MildEnvs *envs, const EnvsMotion *motion, MildStream stream,
