@@ -1,0 +1,290 @@
+"""Walks without a network: sampling MPC over the batch engine. Every 20 ms the plant's state is put into thousands of environments, which
+try different plans of joint targets for half a second; the best ones are averaged (predictive sampling, CEM or MPPI, by `elite` and
+`temperature`), the first 20 ms are done, and the plan is shifted.
+
+    python examples/python/plan/plan.py --robot go1 --ground foam45 --device cuda --samples 2048
+
+Costs are the rewards of the task (docs/task.md, section 8). Their weights, the gait and the numbers of the planner are in plan.json. On
+the CPU it needs NumPy, on a GPU PyTorch."""
+import argparse
+import configparser
+import json
+import math
+import pathlib
+import time
+
+import numpy as np
+
+from mild.envs import open_envs
+
+HERE = pathlib.Path(__file__).resolve().parent
+PERIOD = 0.01  # [s] policy step
+# Nothing is drawn but how an episode begins.
+KEYS = {"train.robots": "batch", "train.grounds": 1, "task.assist": False, "task.observe_noise": False, "task.episode": 1000,
+        "task.command_interval": 1000, "task.shells_stand": False, "task.history_stride": 1, "task.vy": (0, 0), "task.wz": (0, 0),
+        "task.standing_share": 0, "task.backward_share": 0, "task.straight_share": 1, "reward.clip_sum": False,
+        "randomize.patch_share": 0, "randomize.preset_jitter": 0, "randomize.slip_share": 0, "randomize.sinkage_max": 1,
+        "randomize.base_mass": (0, 0), "randomize.com_offset": 0, "randomize.link_mass": (1, 1), "randomize.armature": (1, 1),
+        "randomize.motor_offset": 0, "randomize.gain": (1, 1), "randomize.strength": (1, 1), "randomize.latency": (0, 0),
+        "randomize.push_interval": 0, "randomize.mu": (0.8, 0.8)}
+
+
+def ground_keys(ground):
+    rigid = ground == "rigid"
+    return {"randomize.rigid_share": int(rigid), "randomize.preset_share": int(not rigid), "randomize.presets": "" if rigid else ground}
+
+
+class Arrays:
+    """NumPy, or PyTorch on a GPU."""
+
+    def __init__(self, device):
+        self.gpu = device != "cpu"
+        if self.gpu:
+            import torch
+            self.xp, self.device = torch, torch.device(device)
+            torch.cuda.set_device(self.device)
+        else:
+            self.xp, self.random = np, np.random.default_rng(0)
+
+    def zeros(self, *shape, dtype="float32"):
+        return self.xp.zeros(shape, dtype=getattr(self.xp, dtype), **({"device": self.device} if self.gpu else {}))
+
+    def normal(self, *shape):
+        return self.xp.randn(shape, device=self.device) if self.gpu else self.random.standard_normal(shape, np.float32)
+
+    def of(self, numbers):
+        numbers = np.ascontiguousarray(numbers, np.float32)
+        return self.xp.from_numpy(numbers).to(self.device) if self.gpu else numbers
+
+    def host(self, x):
+        return x.cpu().numpy() if self.gpu else x
+
+    def sort(self, x):
+        return self.xp.sort(x, dim=-1).values if self.gpu else np.sort(x)
+
+    def stream(self):
+        return self.xp.cuda.current_stream().cuda_stream if self.gpu else 0
+
+    def graph(self, work):
+        """`work` as one launch: on a GPU a captured graph."""
+        if not self.gpu:
+            return work
+        torch = self.xp
+        side = torch.cuda.Stream()
+        side.wait_stream(torch.cuda.current_stream())
+        with torch.cuda.stream(side):
+            work()
+        torch.cuda.synchronize()
+        graph = torch.cuda.CUDAGraph()
+        with torch.cuda.graph(graph, capture_error_mode="thread_local"):
+            work()
+        return graph.replay
+
+
+class Robots:
+    """Environments and the arrays that their steps write."""
+
+    def __init__(self, arrays, count, robot, keys, device, seed=1, threads=None):
+        self.arrays = arrays
+        self.envs = e = open_envs(count, robot=robot, overrides=keys, device=device, seed=seed, threads=threads)
+        flags = {name: arrays.zeros(count, dtype="bool") for name in ("done", "timeout", "valid")}
+        self.done, self.reward = flags["done"], arrays.zeros(count)
+        self.frame, self.estimate = arrays.zeros(count, e.observation), arrays.zeros(count, e.estimates)
+        self.history = arrays.zeros(count, e.frames, e.observation)
+        self.qpos = arrays.zeros(count, 7 + e.actions)
+        self.buffers = e.buffers(history=self.history, reward=self.reward, frame=self.frame, estimate=self.estimate, **flags)
+        e.reset(self.buffers, arrays.stream())
+
+    def step(self, action):
+        self.envs.step(action, self.buffers, self.arrays.stream())
+
+    def read(self):
+        self.envs.read(qpos=self.qpos, stream=self.arrays.stream())
+        return self.qpos
+
+    def close(self):
+        self.envs.close()
+
+
+def yaw_of(xp, qpos):
+    w, x, y, z = (qpos[:, 3 + i] for i in range(4))
+    return xp.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+class Gait:
+    """Joint targets by the clock alone, in units of the action: a swing leg bends, a standing one sweeps back at the asked speed."""
+
+    def __init__(self, robot, numbers, speed):
+        ini = configparser.ConfigParser(inline_comment_prefixes=";")
+        ini.read(HERE.parents[2] / "robots" / robot / "robot.ini")
+        self.joints = joints = ini["joints"]["names"].split()
+        feet = [section for section in ini.sections() if section.startswith("foot.")]
+        self.scale = float(ini["robot"]["action_scale"])
+        self.offset = np.array([float(ini[foot]["offset"]) for foot in feet])
+        self.leg = np.arange(len(joints)) * len(feet) // len(joints)
+        self.swing = np.array([float(x) for x in ini["joints"]["swing"].split()])
+        self.sweep, self.sway, self.lean = (self.by_name(joints, numbers[name]) for name in ("sweep", "sway", "lean"))
+        self.period, self.bend, self.speed = numbers["period"], numbers["bend"], speed * numbers["speed_gain"]
+
+    @staticmethod
+    def by_name(joints, numbers):
+        return np.array([next((value for end, value in numbers.items() if joint.endswith(end)), 0.0) for joint in joints])
+
+    def actions(self, phase):
+        """[..., joints] for the clock [...]."""
+        since = (np.asarray(phase)[..., None] - self.offset) % 1
+        swings, s = since >= 0.5, 2 * since % 1
+        bend = np.where(swings, np.sin(np.pi * s) ** 2, 0)
+        ahead = 0.5 * self.period * self.speed * np.where(swings, -0.5 * np.cos(np.pi * s), 0.5 - s)  # [m] of the foot, of the hip
+        sway = np.sin(2 * np.pi * np.asarray(phase))[..., None]
+        angle = self.bend * self.swing * bend[..., self.leg] + self.sweep * ahead[..., self.leg] + self.sway * sway + self.lean
+        return angle / self.scale
+
+
+class Planner:
+    """Plans for `trials` robots at once, from their blocks and clocks."""
+
+    def __init__(self, arrays, robots, gait, numbers, trials, own_ground):
+        self.arrays, self.robots, self.gait, self.numbers, self.own_ground = arrays, robots, gait, numbers, own_ground
+        self.trials, self.samples, self.joints = trials, robots.envs.envs // trials, robots.envs.actions
+        self.steps, self.every = round(numbers["horizon"] / PERIOD), numbers["every"]
+        knots = numbers["knots"]
+        self.basis_host = self.hats(np.arange(self.steps) / (self.steps - 1) * (knots - 1), knots)
+        shift = self.hats(np.arange(knots) + self.every / (self.steps - 1) * (knots - 1), knots) * numbers["keep"]
+        self.basis, self.shift = arrays.of(self.basis_host), arrays.of(shift)
+        self.sigma = arrays.of(gait.by_name(gait.joints, numbers["noise"]) / gait.scale)
+        self.mean = arrays.zeros(trials, knots, self.joints)
+        self.nominal = arrays.zeros(self.steps, trials, self.joints)
+        self.start = arrays.zeros(3, trials)  # x, y, yaw of the line that is walked
+        self.score, self.first = arrays.zeros(trials, self.samples), arrays.zeros(self.every, trials, self.joints)
+        self.blocks, self.run = None, None
+
+    @staticmethod
+    def hats(at, knots):
+        return np.maximum(0, 1 - abs(np.minimum(at, knots - 1)[:, None] - np.arange(knots)))
+
+    def rollout(self, plans):
+        """Scores [trials, samples] of knots [trials, samples, knots, joints]."""
+        xp, n, robots = self.arrays.xp, self.numbers, self.robots
+        actions = xp.einsum("tk,mnkj->tmnj", self.basis, plans) + self.nominal[:, :, None]
+        actions = actions.reshape(self.steps, -1, self.joints)
+        robots.envs.fork(self.blocks, own_ground=self.own_ground, stream=self.arrays.stream())
+        alive, score = self.arrays.zeros(robots.envs.envs) + 1, self.arrays.zeros(robots.envs.envs)
+        for t in range(self.steps):
+            robots.step(actions[t])
+            alive = alive * (~robots.done)
+            score += alive * robots.reward - n["fall"] * PERIOD * (1 - alive)
+        qpos, (x, y, yaw) = robots.read(), self.start[:, :, None]
+        turned = (yaw_of(xp, qpos).reshape(self.trials, -1) - yaw + math.pi) % (2 * math.pi) - math.pi
+        place = qpos.reshape(self.trials, self.samples, -1)
+        side = (place[:, :, 1] - y) * xp.cos(yaw) - (place[:, :, 0] - x) * xp.sin(yaw)
+        line = n["heading"] * turned * turned + n["side"] * side * side
+        return (score - alive * line.reshape(-1)).reshape(self.trials, self.samples)
+
+    def improve(self):
+        xp, n = self.arrays.xp, self.numbers
+        plans = self.mean[:, None] + self.sigma * self.arrays.normal(self.trials, self.samples, n["knots"], self.joints)
+        plans[:, 0] = self.mean
+        plans[:, 1] = 0
+        score = self.rollout(plans)
+        ranked = self.arrays.sort(score)
+        best, least = ranked[:, -1:], ranked[:, -max(1, round(n["elite"] * self.samples)), None]
+        elite = score >= least
+        spread = ((best - score) * elite).sum(-1)[:, None] / elite.sum(-1)[:, None] + 1e-6
+        weight = xp.exp((score - best) / (n["temperature"] * spread)) * elite
+        weight = (weight / weight.sum(-1)[:, None]).reshape(self.trials, self.samples)
+        self.score[:] = score
+        self.mean[:] = xp.einsum("mn,mnkj->mkj", weight, plans)
+        self.first[:] = xp.einsum("tk,mkj->tmj", self.basis[: self.every], self.mean) + self.nominal[: self.every]
+        self.mean[:] = xp.einsum("lk,mkj->mlj", self.shift, self.mean)
+
+    def plan(self, blocks, phase):
+        """Actions [every, trials, joints] of the next steps."""
+        clock = phase + np.arange(self.steps)[:, None] * PERIOD / self.gait.period
+        self.nominal[:] = self.arrays.of(self.gait.actions(clock))
+        if self.run is None:
+            self.blocks = blocks
+            self.run = self.arrays.graph(self.improve)
+            self.mean[:] = 0
+        self.run()
+        return self.first
+
+
+def walk(given, numbers, log=print):
+    """Trials side by side; returns what became of each, and the time that a plan takes."""
+    robot, speed, device = given.robot, given.speed, given.device
+    arrays = Arrays(device)
+    believes = given.believes or given.ground
+    keys = {**KEYS, **numbers["keys"], "task.vx": (speed, speed), "task.gait_period": numbers["gait"]["period"]}
+    plant = Robots(arrays, given.trials, robot, {**keys, **ground_keys(given.ground)}, device, given.seed, given.threads)
+    robots = Robots(arrays, given.trials * given.samples, robot, {**keys, **ground_keys(believes)}, device, 1, given.threads)
+    gait = Gait(robot, numbers["gait"], speed)
+    planner = Planner(arrays, robots, gait, numbers["planner"], given.trials, believes != given.ground)
+    blocks = arrays.zeros(given.trials, plant.envs.block_bytes, dtype="uint8")
+    start = np.array(arrays.host(plant.read()))
+    yaw = yaw_of(np, start)
+    planner.start[:] = arrays.of(np.stack([start[:, 0], start[:, 1], yaw]))
+    clock = np.array(arrays.host(plant.frame))[:, -2:]
+    phase = np.arctan2(clock[:, 0], clock[:, 1]) / (2 * np.pi)
+    trials = [{"upright": given.seconds, "forward": 0.0, "side": 0.0, "turned": 0.0} for _ in range(given.trials)]
+    fallen, times, path = np.zeros(given.trials, bool), [], []
+    for k in range(round(given.seconds / PERIOD / planner.every)):
+        before = time.perf_counter()
+        plant.envs.save(blocks, stream=arrays.stream())
+        actions = planner.plan(blocks, phase)
+        arrays.host(actions[0, 0])  # waits for the device
+        times.append(time.perf_counter() - before)
+        for i in range(planner.every):
+            plant.step(actions[i])
+            phase = phase + PERIOD / gait.period
+            for m in np.flatnonzero(arrays.host(plant.done) & ~fallen):
+                trials[m]["upright"], fallen[m] = (k * planner.every + i + 1) * PERIOD, True
+            here = np.array(arrays.host(plant.read()))
+            path.append(here)
+            for m in np.flatnonzero(~fallen):
+                x, y = here[m, :2] - start[m, :2]
+                trials[m].update(forward=float(x * math.cos(yaw[m]) + y * math.sin(yaw[m])),
+                                 side=float(y * math.cos(yaw[m]) - x * math.sin(yaw[m])),
+                                 turned=float((yaw_of(np, here[m:m + 1])[0] - yaw[m] + np.pi) % (2 * np.pi) - np.pi))
+        if fallen.all() or (given.limit and sum(times) > given.limit):
+            break
+        if log and k % max(1, round(1 / PERIOD / planner.every)) == 0:
+            log(f"{k * planner.every * PERIOD:5.1f} s: {(~fallen).sum()} upright, forward {np.mean([t['forward'] for t in trials]):.2f} m, "
+                f"score {float(planner.score.max()):.2f}, {1e3 * np.median(times):.1f} ms a plan", flush=True)
+    for t in trials:
+        t["walked"] = bool(t["upright"] >= given.seconds and abs(t["forward"] / given.seconds - speed) <= 0.2 * speed)
+    plant.close(), robots.close()
+    return {"robot": robot, "ground": given.ground, "believes": believes, "speed": speed, "samples": given.samples, "walked":
+            sum(t["walked"] for t in trials), "upright": int((~fallen).sum()), "trials": trials,
+            "plan_ms": 1e3 * float(np.median(times[1:] or times))}, np.array(path)
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--robot", default="go1", help="sa01, g1 or go1")
+    parser.add_argument("--ground", default="rigid", help="rigid, or a preset (mild info materials)")
+    parser.add_argument("--believes", help="the ground that the planner believes in; default: the true one")
+    parser.add_argument("--speed", type=float, default=0.5, help="[m/s]")
+    parser.add_argument("--seconds", type=float, default=10)
+    parser.add_argument("--samples", type=int, default=2048)
+    parser.add_argument("--trials", type=int, default=1, help="side by side, with starts of their own")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--device", default="cpu", help="cpu, cuda or cuda:N")
+    parser.add_argument("--threads", type=int)
+    parser.add_argument("--limit", type=float, help="[s] of planning, after which it ends")
+    parser.add_argument("--numbers", default=str(HERE / "plan.json"), help="costs and numbers of the planner")
+    parser.add_argument("--path", help="a file for qpos [step, trial, 7 + joints], .npy")
+    return parser
+
+
+def main():
+    given = arguments().parse_args()
+    numbers = json.loads(pathlib.Path(given.numbers).read_text())[given.robot]
+    result, path = walk(given, numbers)
+    if given.path:
+        np.save(given.path, path)
+    print(json.dumps(result))
+
+
+if __name__ == "__main__":
+    main()
