@@ -386,12 +386,14 @@ NB_MODULE(_envs, module) {
              "Writes environments from `first` on to blocks: uint8 (count, block_bytes), on the "
              "device.\nRobot, ground under it and task; not its random numbers. Of the batch "
              "engine (train.robots: batch).")
-        .def("fork", fork_envs, nb::arg("blocks").none(), nb::arg("own_ground") = false,
-             nb::arg("stream") = 0,
-             "Puts blocks into all environments, the first into the first of as many equal groups, "
-             "and so\non; of these or of others with the same keys but train.envs, train.seed, "
-             "task.physics_dt and\nrandomize. own_ground: each keeps its ground, which forgets the "
-             "feet, and the robot is set\ndown on it as deep as it stands there.")
+        .def(
+            "fork", fork_envs, nb::arg("blocks").none(), nb::arg("own_ground") = false,
+            nb::arg("stream") = 0,
+            "Puts blocks into all environments, the first into the first of as many equal groups, "
+            "and so\non; of these or of others with the same keys but train.envs and "
+            "task.physics_dt (and train.seed,\nif it draws the same grounds). own_ground: each "
+            "keeps its ground, which forgets the feet, and\nthe robot is set down on it as deep as "
+            "it stands there; then randomize may differ, too.")
         .def("read", read_motion, nb::kw_only(), nb::arg("qpos").none() = nb::none(),
              nb::arg("qvel").none() = nb::none(), nb::arg("torque").none() = nb::none(),
              nb::arg("stream") = 0,

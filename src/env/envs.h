@@ -80,7 +80,7 @@ void envs_times(Envs *envs, double *physics, double *ground);
 
 /* A block is all that decides what an environment does next, its random numbers aside: robot,
  * ground under it, task. It is in the memory of the device, and fits all Envs whose definitions
- * differ in nothing but count, seed, physics_dt, and what randomize draws.
+ * differ in nothing but count, first and physics_dt, and with own_ground in seed and randomize.
  *
  * Bytes of a block; with own_ground (bool) of the part that envs_fork reads. */
 size_t envs_block_bytes(const Envs *envs, int own_ground);

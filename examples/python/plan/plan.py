@@ -76,7 +76,7 @@ class Arrays:
             work()
         torch.cuda.synchronize()
         graph = torch.cuda.CUDAGraph()
-        with torch.cuda.graph(graph, capture_error_mode="thread_local"):
+        with torch.cuda.graph(graph, stream=torch.cuda.Stream(), capture_error_mode="thread_local"):
             work()
         return graph.replay
 
@@ -114,9 +114,9 @@ def yaw_of(xp, qpos):
 class Gait:
     """Joint targets by the clock alone, in units of the action: a swing leg bends, a standing one sweeps back at the asked speed."""
 
-    def __init__(self, robot, numbers, speed):
+    def __init__(self, model, numbers, speed):
         ini = configparser.ConfigParser(inline_comment_prefixes=";")
-        ini.read(HERE.parents[2] / "robots" / robot / "robot.ini")
+        ini.read(pathlib.Path(model).with_name("robot.ini"))
         self.joints = joints = ini["joints"]["names"].split()
         feet = [section for section in ini.sections() if section.startswith("foot.")]
         self.scale = float(ini["robot"]["action_scale"])
@@ -157,6 +157,7 @@ class Planner:
         self.nominal = arrays.zeros(self.steps, trials, self.joints)
         self.start = arrays.zeros(3, trials)  # x, y, yaw of the line that is walked
         self.score, self.first = arrays.zeros(trials, self.samples), arrays.zeros(self.every, trials, self.joints)
+        self.noise = arrays.zeros(trials, self.samples, knots, self.joints)
         self.blocks, self.run = None, None
 
     @staticmethod
@@ -183,7 +184,7 @@ class Planner:
 
     def improve(self):
         xp, n = self.arrays.xp, self.numbers
-        plans = self.mean[:, None] + self.sigma * self.arrays.normal(self.trials, self.samples, n["knots"], self.joints)
+        plans = self.mean[:, None] + self.sigma * self.noise
         plans[:, 0] = self.mean
         plans[:, 1] = 0
         score = self.rollout(plans)
@@ -202,6 +203,7 @@ class Planner:
         """Actions [every, trials, joints] of the next steps."""
         clock = phase + np.arange(self.steps)[:, None] * PERIOD / self.gait.period
         self.nominal[:] = self.arrays.of(self.gait.actions(clock))
+        self.noise[:] = self.arrays.normal(*self.noise.shape)
         if self.run is None:
             self.blocks = blocks
             self.run = self.arrays.graph(self.improve)
@@ -218,7 +220,7 @@ def walk(given, numbers, log=print):
     keys = {**KEYS, **numbers["keys"], "task.vx": (speed, speed), "task.gait_period": numbers["gait"]["period"]}
     plant = Robots(arrays, given.trials, robot, {**keys, **ground_keys(given.ground)}, device, given.seed, given.threads)
     robots = Robots(arrays, given.trials * given.samples, robot, {**keys, **ground_keys(believes)}, device, 1, given.threads)
-    gait = Gait(robot, numbers["gait"], speed)
+    gait = Gait(plant.envs.model, numbers["gait"], speed)
     planner = Planner(arrays, robots, gait, numbers["planner"], given.trials, believes != given.ground)
     blocks = arrays.zeros(given.trials, plant.envs.block_bytes, dtype="uint8")
     start = np.array(arrays.host(plant.read()))
