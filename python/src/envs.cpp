@@ -207,10 +207,12 @@ static Array take_blocks(const Envs &envs, MildEnvs *at, nb::handle blocks, bool
     }
     const int64_t bytes = (int64_t)mild_envs_block_bytes(at, 0);
     shape = {1, bytes};
-    if (!blocks.is_none() && nb::len(blocks) > 0) {
-        const nb::object one = blocks[0];
-        shape[0] = (int64_t)nb::len(blocks);
-        shape[1] = write ? bytes : (int64_t)nb::len(one);
+    if (nb::hasattr(blocks, "shape")) {
+        const nb::tuple own(blocks.attr("shape"));
+        if (own.size() == 2) {
+            shape[0] = nb::cast<int64_t>(own[0]);
+            shape[1] = write ? bytes : nb::cast<int64_t>(own[1]);
+        }
     }
     return take_array(blocks, {"blocks", nb::dtype<uint8_t>(), shape, envs.shape.device, write});
 }

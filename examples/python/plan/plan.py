@@ -87,7 +87,7 @@ class Robots:
     def __init__(self, arrays, count, robot, keys, device, seed=1, threads=None):
         self.arrays = arrays
         self.envs = e = open_envs(count, robot=robot, overrides=keys, device=device, seed=seed, threads=threads)
-        flags = {name: arrays.zeros(count, dtype="bool") for name in ("done", "timeout", "valid")}
+        flags = {name: arrays.zeros(count, dtype="uint8") for name in ("done", "timeout", "valid")}
         self.done, self.reward = flags["done"], arrays.zeros(count)
         self.frame, self.estimate = arrays.zeros(count, e.observation), arrays.zeros(count, e.estimates)
         self.history = arrays.zeros(count, e.frames, e.observation)
@@ -173,7 +173,7 @@ class Planner:
         alive, score = self.arrays.zeros(robots.envs.envs) + 1, self.arrays.zeros(robots.envs.envs)
         for t in range(self.steps):
             robots.step(actions[t])
-            alive = alive * (~robots.done)
+            alive = alive * (robots.done == 0)
             score += alive * robots.reward - n["fall"] * PERIOD * (1 - alive)
         qpos, (x, y, yaw) = robots.read(), self.start[:, :, None]
         turned = (yaw_of(xp, qpos).reshape(self.trials, -1) - yaw + math.pi) % (2 * math.pi) - math.pi
@@ -219,7 +219,7 @@ def walk(given, numbers, log=print):
     believes = given.believes or given.ground
     keys = {**KEYS, **numbers["keys"], "task.vx": (speed, speed), "task.gait_period": numbers["gait"]["period"]}
     plant = Robots(arrays, given.trials, robot, {**keys, **ground_keys(given.ground)}, device, given.seed, given.threads)
-    robots = Robots(arrays, given.trials * given.samples, robot, {**keys, **ground_keys(believes)}, device, 1, given.threads)
+    robots = Robots(arrays, given.trials * given.samples, robot, {**keys, **ground_keys(believes)}, device, given.seed, given.threads)
     gait = Gait(plant.envs.model, numbers["gait"], speed)
     planner = Planner(arrays, robots, gait, numbers["planner"], given.trials, believes != given.ground)
     blocks = arrays.zeros(given.trials, plant.envs.block_bytes, dtype="uint8")
@@ -239,7 +239,7 @@ def walk(given, numbers, log=print):
         for i in range(planner.every):
             plant.step(actions[i])
             phase = phase + PERIOD / gait.period
-            for m in np.flatnonzero(arrays.host(plant.done) & ~fallen):
+            for m in np.flatnonzero((arrays.host(plant.done) > 0) & ~fallen):
                 trials[m]["upright"], fallen[m] = (k * planner.every + i + 1) * PERIOD, True
             here = np.array(arrays.host(plant.read()))
             path.append(here)
