@@ -22,7 +22,7 @@ sys.path.insert(0, str(HERE))
 # place in plan.json, low, high, on a logarithmic scale or not, whole numbers or not; * stands for every name that is there
 SPACE = [("planner.horizon", 0.3, 1.0, 0, 0), ("planner.knots", 3, 10, 0, 1), ("planner.keep", 0.7, 1, 0, 0), ("planner.noise.*", 0.01, 0.4, 1, 0),
          ("planner.elite", 0.01, 0.5, 1, 0), ("planner.temperature", 0.05, 3, 1, 0), ("planner.fall", 2, 200, 1, 0),
-         ("planner.heading", 0.5, 50, 1, 0), ("planner.side", 0.5, 50, 1, 0), ("gait.period", 0.3, 1.0, 0, 0), ("gait.bend", 0.1, 1.2, 0, 0),
+         ("planner.speed", 0.5, 100, 1, 0), ("planner.heading", 0.5, 50, 1, 0), ("planner.side", 0.5, 50, 1, 0), ("gait.period", 0.3, 1.0, 0, 0), ("gait.bend", 0.1, 1.2, 0, 0),
          ("gait.speed_gain", 0, 1.6, 0, 0), ("gait.sway.*", -0.2, 0.2, 0, 0), ("gait.lean.*", -0.2, 0.2, 0, 0),
          ("keys.reward\\.linear_velocity", 1, 40, 1, 0), ("keys.reward\\.yaw_rate", 0.3, 10, 1, 0), ("keys.reward\\.orientation", 0.3, 20, 1, 0),
          ("keys.reward\\.base_height", 0.1, 20, 1, 0), ("keys.reward\\.base_motion", 0.1, 20, 1, 0), ("keys.reward\\.gait", 0.1, 20, 1, 0),
@@ -92,6 +92,21 @@ def evaluate(given, numbers, seed):
     return float(np.mean(scores)), results
 
 
+def serialize():
+    """Opens, closes and captures one after the other: these wait for the whole device, and a graph must not be captured beside."""
+    import plan
+    lock = threading.RLock()
+
+    def locked(function):
+        def call(*arguments, **keys):
+            with lock:
+                return function(*arguments, **keys)
+        return call
+
+    plan.Robots.__init__, plan.Robots.close = locked(plan.Robots.__init__), locked(plan.Robots.close)
+    plan.Arrays.graph = locked(plan.Arrays.graph)
+
+
 class Search:
     """Candidates around the mean of the best so far."""
 
@@ -158,6 +173,7 @@ def worker(search, given, end):
 def child(given, end):
     base = json.loads(pathlib.Path(given.numbers).read_text())[given.robot]
     search = Search(given, base)
+    serialize()
     print(f"{len(search.dims)} numbers, {len(search.done)} candidates so far", flush=True)
     threads = [threading.Thread(target=worker, args=(search, given, end), daemon=True) for _ in range(given.workers)]
     for thread in threads:
