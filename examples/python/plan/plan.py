@@ -21,7 +21,8 @@ HERE = pathlib.Path(__file__).resolve().parent
 PERIOD = 0.01  # [s] policy step
 # Nothing is drawn but how an episode begins.
 KEYS = {"train.robots": "batch", "train.grounds": 1, "task.assist": False, "task.observe_noise": False, "task.episode": 1000,
-        "task.command_interval": 1000, "task.velocity_scale": 1, "task.shells_stand": False, "task.history_stride": 1, "task.vy": (0, 0), "task.wz": (0, 0),
+        "task.command_interval": 1000, "task.velocity_scale": 1, "task.shells_stand": False, "task.history_stride": 1,
+        "task.vy": (0, 0), "task.wz": (0, 0),
         "task.standing_share": 0, "task.backward_share": 0, "task.straight_share": 1, "reward.clip_sum": False,
         "randomize.patch_share": 0, "randomize.preset_jitter": 0, "randomize.slip_share": 0, "randomize.sinkage_max": 1,
         "randomize.base_mass": (0, 0), "randomize.com_offset": 0, "randomize.link_mass": (1, 1), "randomize.armature": (1, 1),
@@ -30,8 +31,8 @@ KEYS = {"train.robots": "batch", "train.grounds": 1, "task.assist": False, "task
 
 
 def ground_keys(ground):
-    rigid = ground == "rigid"
-    return {"randomize.rigid_share": int(rigid), "randomize.preset_share": int(not rigid), "randomize.presets": "" if rigid else ground}
+    soft = ground != "rigid"
+    return {"randomize.rigid_share": int(not soft), "randomize.preset_share": int(soft), "randomize.presets": ground if soft else ""}
 
 
 class Arrays:
@@ -52,9 +53,8 @@ class Arrays:
     def normal(self, *shape):
         return self.xp.randn(shape, device=self.device) if self.gpu else self.random.standard_normal(shape, np.float32)
 
-    def of(self, numbers):
-        numbers = np.ascontiguousarray(numbers, np.float32)
-        return self.xp.from_numpy(numbers).to(self.device) if self.gpu else numbers
+    def of(self, x):
+        return self.xp.as_tensor(np.float32(x), device=self.device) if self.gpu else np.float32(x)
 
     def host(self, x):
         return x.cpu().numpy() if self.gpu else x
@@ -79,10 +79,10 @@ class Arrays:
         try:
             with torch.cuda.graph(graph, stream=torch.cuda.Stream(), capture_error_mode="thread_local"):
                 work()
+            return graph.replay
         except RuntimeError as error:
             print(f"no graph: {error}", flush=True)
             return work
-        return graph.replay
 
 
 class Robots:
@@ -116,7 +116,8 @@ def yaw_of(xp, qpos):
 
 
 class Gait:
-    """Joint targets by the clock alone, in units of the action: a swing leg bends, a standing one sweeps back at the asked speed."""
+    """Joint targets by clock and posture, in units of the action: a swing leg bends, a standing one sweeps back at the asked speed, and
+    both follow the errors of `posture` [rad per unit], a swing leg those of `step` besides."""
 
     def __init__(self, model, numbers, speed):
         ini = configparser.ConfigParser(inline_comment_prefixes=";")
@@ -129,56 +130,68 @@ class Gait:
         self.swing = np.array([float(x) for x in ini["joints"]["swing"].split()])
         self.sweep, self.sway, self.lean = (self.by_name(joints, numbers[name]) for name in ("sweep", "sway", "lean"))
         self.period, self.asked, self.speed = numbers["period"], speed, speed * numbers["speed_gain"]
+        self.feedback = [self.matrix(numbers[name]) for name in ("posture", "step")]
         self.bend = numbers["bend"] if abs(speed) >= 0.1 else 0  # below it stands: task.standing_below
 
     @staticmethod
     def by_name(joints, numbers):
         return np.array([next((value for end, value in numbers.items() if joint.endswith(end)), 0.0) for joint in joints])
 
+    def matrix(self, numbers):
+        """[11, joints]: what the joints' targets get of a robot's errors: see Planner.follow."""
+        return np.array([self.by_name(self.joints, numbers.get(name, {})) for name in
+                         ("vx", "vy", "wx", "wy", "wz", "", "", "", "gx", "gy", "")]) / self.scale
+
     def actions(self, phase):
-        """[..., joints] for the clock [...]."""
+        """[..., joints] for the clock [...], and whether the joint is of a swing leg."""
         since = (np.asarray(phase)[..., None] - self.offset) % 1
         swings, s = since >= 0.5, 2 * since % 1
         bend = np.where(swings, np.sin(np.pi * s) ** 2, 0)
         ahead = 0.5 * self.period * self.speed * np.where(swings, -0.5 * np.cos(np.pi * s), 0.5 - s)  # [m] of the foot, of the hip
-        sway = np.sin(2 * np.pi * np.asarray(phase))[..., None]
-        angle = self.bend * self.swing * bend[..., self.leg] + self.sweep * ahead[..., self.leg] + self.sway * sway * (self.bend > 0) + self.lean
-        return angle / self.scale
+        sway = np.sin(2 * np.pi * np.asarray(phase))[..., None] * (self.bend > 0)
+        angle = self.bend * self.swing * bend[..., self.leg] + self.sweep * ahead[..., self.leg] + self.sway * sway + self.lean
+        return angle / self.scale, swings[..., self.leg] * (self.bend > 0)
 
 
 class Planner:
     """Plans for `trials` robots at once, from their blocks and clocks."""
 
-    def __init__(self, arrays, robots, gait, numbers, trials, own_ground):
-        self.arrays, self.robots, self.gait, self.numbers, self.own_ground = arrays, robots, gait, numbers, own_ground
-        self.trials, self.samples, self.joints = trials, robots.envs.envs // trials, robots.envs.actions
+    def __init__(self, arrays, plant, robots, gait, numbers, own_ground):
+        self.arrays, self.plant, self.robots, self.gait, self.numbers, self.own_ground = arrays, plant, robots, gait, numbers, own_ground
+        self.trials = trials = plant.envs.envs
+        self.samples, self.joints = robots.envs.envs // trials, robots.envs.actions
         self.steps, self.every = round(numbers["horizon"] / PERIOD), numbers["every"]
         knots = numbers["knots"]
-        self.basis_host = self.hats(np.arange(self.steps) / (self.steps - 1) * (knots - 1), knots)
-        shift = self.hats(np.arange(knots) + self.every / (self.steps - 1) * (knots - 1), knots) * numbers["keep"]
-        self.basis, self.shift = arrays.of(self.basis_host), arrays.of(shift)
+        scale = (knots - 1) / (self.steps - 1)  # knots per step
+        self.basis = arrays.of(self.hats(np.arange(self.steps) * scale, knots))
+        self.shift = arrays.of(self.hats(np.arange(knots) + self.every * scale, knots) * numbers["keep"])
         self.sigma = arrays.of(gait.by_name(gait.joints, numbers["noise"]) / gait.scale)
         self.mean = arrays.zeros(trials, knots, self.joints)
-        self.nominal = arrays.zeros(self.steps, trials, self.joints)
+        self.nominal, self.swings = (arrays.zeros(self.steps, trials, self.joints) for _ in range(2))
+        self.feedback = arrays.of(np.hstack(gait.feedback))
         self.start = arrays.zeros(3, trials)  # x, y, yaw of the line that is walked
         self.score, self.first = arrays.zeros(trials, self.samples), arrays.zeros(self.every, trials, self.joints)
         self.wanted = arrays.of([gait.asked, 0])  # [m/s] of the base
-        self.noise = arrays.zeros(trials, self.samples, knots, self.joints)
-        self.blocks, self.run = None, None
+        self.noise, self.run = arrays.zeros(trials, self.samples, knots, self.joints), None
 
     @staticmethod
     def hats(at, knots):
         return np.maximum(0, 1 - abs(np.minimum(at, knots - 1)[:, None] - np.arange(knots)))
 
+    def follow(self, robots, action, t):
+        """An action [trials, any, joints] of step t with the gait's answer to the errors of robots: velocity, turning, tilt."""
+        frame, velocity = robots.frame[:, :9], robots.estimate[:, :2] - self.wanted
+        answer = (velocity @ self.feedback[:2] + frame @ self.feedback[2:]).reshape(self.trials, -1, 2 * self.joints)
+        return action + answer[:, :, :self.joints] + answer[:, :, self.joints:] * self.swings[t][:, None]
+
     def rollout(self, plans):
         """Scores [trials, samples] of knots [trials, samples, knots, joints]."""
         xp, n, robots = self.arrays.xp, self.numbers, self.robots
         actions = xp.einsum("tk,mnkj->tmnj", self.basis, plans) + self.nominal[:, :, None]
-        actions = actions.reshape(self.steps, -1, self.joints)
         robots.envs.fork(self.blocks, own_ground=self.own_ground, stream=self.arrays.stream())
         alive, score = self.arrays.zeros(robots.envs.envs) + 1, self.arrays.zeros(robots.envs.envs)
         for t in range(self.steps):
-            robots.step(actions[t])
+            robots.step(self.follow(robots if t else self.plant, actions[t], t).reshape(-1, self.joints))
             alive = alive * (robots.done == 0)
             velocity = robots.estimate[:, :2] - self.wanted
             cost = n["speed"] * (velocity * velocity).sum(-1)
@@ -210,7 +223,8 @@ class Planner:
     def plan(self, blocks, phase):
         """Actions [every, trials, joints] of the next steps."""
         clock = phase + np.arange(self.steps)[:, None] * PERIOD / self.gait.period
-        self.nominal[:] = self.arrays.of(self.gait.actions(clock))
+        nominal, swings = self.gait.actions(clock)
+        self.nominal[:], self.swings[:] = self.arrays.of(nominal), self.arrays.of(swings)
         self.noise[:] = self.arrays.normal(*self.noise.shape)
         if self.run is None:
             self.blocks = blocks
@@ -222,75 +236,60 @@ class Planner:
 
 def walk(given, numbers, log=print):
     """Trials side by side; returns what became of each, and the time that a plan takes."""
-    robot, speed, device = given.robot, given.speed, given.device
+    robot, speed, device, believes = given.robot, given.speed, given.device, given.believes or given.ground
     arrays = Arrays(device)
-    believes = given.believes or given.ground
     keys = {**KEYS, **numbers["keys"], "task.vx": (speed, speed), "task.gait_period": numbers["gait"]["period"]}
     plant = Robots(arrays, given.trials, robot, {**keys, **ground_keys(given.ground)}, device, given.seed, given.threads)
     robots = Robots(arrays, given.trials * given.samples, robot, {**keys, **ground_keys(believes)}, device, given.seed, given.threads)
     gait = Gait(plant.envs.model, numbers["gait"], speed)
-    planner = Planner(arrays, robots, gait, numbers["planner"], given.trials, believes != given.ground)
+    planner = Planner(arrays, plant, robots, gait, numbers["planner"], believes != given.ground)
     blocks = arrays.zeros(given.trials, plant.envs.block_bytes, dtype="uint8")
     start = np.array(arrays.host(plant.read()))
     yaw = yaw_of(np, start)
     planner.start[:] = arrays.of(np.stack([start[:, 0], start[:, 1], yaw]))
     clock = np.array(arrays.host(plant.frame))[:, -2:]
     phase = np.arctan2(clock[:, 0], clock[:, 1]) / (2 * np.pi)
-    trials = [{"upright": given.seconds, "forward": 0.0, "side": 0.0, "turned": 0.0} for _ in range(given.trials)]
-    fallen, times, path = np.zeros(given.trials, bool), [], []
+    alive, upright, moved, times, path = np.ones(given.trials, bool), np.zeros(given.trials), np.zeros((3, given.trials)), [], []
     for k in range(round(given.seconds / PERIOD / planner.every)):
         before = time.perf_counter()
         plant.envs.save(blocks, stream=arrays.stream())
         actions = planner.plan(blocks, phase)
         arrays.host(actions[0, 0])  # waits for the device
-        times.append(time.perf_counter() - before)
+        times.append(1e3 * (time.perf_counter() - before))
         for i in range(planner.every):
-            plant.step(actions[i])
+            plant.step(planner.follow(plant, actions[i][:, None], i)[:, 0])
             phase = phase + PERIOD / gait.period
-            for m in np.flatnonzero((arrays.host(plant.done) > 0) & ~fallen):
-                trials[m]["upright"], fallen[m] = (k * planner.every + i + 1) * PERIOD, True
-            here = np.array(arrays.host(plant.read()))
-            path.append(here)
-            for m in np.flatnonzero(~fallen):
-                x, y = here[m, :2] - start[m, :2]
-                trials[m].update(forward=float(x * math.cos(yaw[m]) + y * math.sin(yaw[m])),
-                                 side=float(y * math.cos(yaw[m]) - x * math.sin(yaw[m])),
-                                 turned=float((yaw_of(np, here[m:m + 1])[0] - yaw[m] + np.pi) % (2 * np.pi) - np.pi))
-        if fallen.all() or (given.limit and sum(times) > given.limit):
+            path.append(np.array(arrays.host(plant.read())))
+            alive = alive & (arrays.host(plant.done) == 0)
+            upright += PERIOD * alive
+            (x, y), turned = (path[-1] - start)[:, :2].T, (yaw_of(np, path[-1]) - yaw + np.pi) % (2 * np.pi) - np.pi
+            along = np.stack([x * np.cos(yaw) + y * np.sin(yaw), y * np.cos(yaw) - x * np.sin(yaw), turned])
+            moved = np.where(alive, along, moved)
+        if not alive.any():
             break
-        if log and k % max(1, round(1 / PERIOD / planner.every)) == 0:
-            log(f"{k * planner.every * PERIOD:5.1f} s: {(~fallen).sum()} upright, forward {np.mean([t['forward'] for t in trials]):.2f} m, "
-                f"score {float(planner.score.max()):.2f}, {1e3 * np.median(times):.1f} ms a plan", flush=True)
-    for t in trials:
-        t["walked"] = bool(t["upright"] >= given.seconds and abs(t["forward"] / given.seconds - speed) <= 0.2 * speed)
+        if log and k % round(1 / PERIOD / planner.every) == 0:
+            log(f"{k * planner.every * PERIOD:5.1f} s: {alive.sum()} upright, {moved[0].mean():.2f} m, {np.median(times):.1f} ms a plan",
+                flush=True)
     plant.close(), robots.close()
-    return {"robot": robot, "ground": given.ground, "believes": believes, "speed": speed, "samples": given.samples, "walked":
-            sum(t["walked"] for t in trials), "upright": int((~fallen).sum()), "trials": trials,
-            "plan_ms": 1e3 * float(np.median(times[1:] or times))}, np.array(path)
-
-
-def arguments():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--robot", default="go1", help="sa01, g1 or go1")
-    parser.add_argument("--ground", default="rigid", help="rigid, or a preset (mild info materials)")
-    parser.add_argument("--believes", help="the ground that the planner believes in; default: the true one")
-    parser.add_argument("--speed", type=float, default=0.5, help="[m/s]")
-    parser.add_argument("--seconds", type=float, default=10)
-    parser.add_argument("--samples", type=int, default=2048)
-    parser.add_argument("--trials", type=int, default=1, help="side by side, with starts of their own")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--device", default="cpu", help="cpu, cuda or cuda:N")
-    parser.add_argument("--threads", type=int)
-    parser.add_argument("--limit", type=float, help="[s] of planning, after which it ends")
-    parser.add_argument("--numbers", default=str(HERE / "plan.json"), help="costs and numbers of the planner")
-    parser.add_argument("--path", help="a file for qpos [step, trial, 7 + joints], .npy")
-    return parser
+    walked = alive & (abs(moved[0] / given.seconds - speed) <= 0.2 * max(speed, 0.1))
+    trials = [{"upright": round(float(u), 2), "forward": float(m[0]), "side": float(m[1]), "turned": float(m[2]), "walked": bool(w)}
+              for u, m, w in zip(upright, moved.T, walked)]
+    return {"robot": robot, "ground": given.ground, "believes": believes, "speed": speed, "samples": given.samples,
+            "walked": int(walked.sum()), "upright": int(alive.sum()), "trials": trials,
+            "plan_ms": float(np.median(times[1:] or times))}, np.array(path)
 
 
 def main():
-    given = arguments().parse_args()
-    numbers = json.loads(pathlib.Path(given.numbers).read_text())[given.robot]
-    result, path = walk(given, numbers)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, default, words in (
+            ("robot", "go1", "sa01, g1 or go1"), ("ground", "rigid", "rigid, or a preset (mild info grounds)"),
+            ("believes", "", "the ground that the planner believes in; empty: the true one"), ("speed", 0.5, "[m/s]"), ("seconds", 10.0, "of a walk"),
+            ("samples", 2048, "plans that are tried at once"), ("trials", 1, "side by side, with starts of their own"), ("seed", 1, "of the starts"),
+            ("device", "cpu", "cpu, cuda or cuda:N"), ("threads", 0, "of the CPU; 0: one per core"),
+            ("numbers", str(HERE / "plan.json"), "costs and numbers of the planner"), ("path", "", "file for qpos [step, trial, 7 + joints], .npy")):
+        parser.add_argument("--" + name, type=type(default), default=default, help=words)
+    given = parser.parse_args()
+    result, path = walk(given, json.loads(pathlib.Path(given.numbers).read_text())[given.robot])
     if given.path:
         np.save(given.path, path)
     print(json.dumps(result))

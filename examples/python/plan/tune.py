@@ -51,6 +51,11 @@ def dimensions(numbers):
             value = min(max(node[name], low), high)
             at = math.log(value / low) / math.log(high / low) if log else (value - low) / (high - low)
             found.append(((*path, name), low, high, log, whole, at))
+    for kind in ("posture", "step"):
+        for error, joints in numbers["gait"][kind].items():
+            for joint, value in joints.items():
+                reach = 0.3 + abs(value)
+                found.append((("gait", kind, error, joint), value - reach, value + reach, 0, 0, 0.5))
     return found
 
 
@@ -72,7 +77,7 @@ def score_of(result, seconds):
         share = min(1, t["upright"] / seconds)
         wanted = result["speed"] * max(t["upright"], 0.3)
         slow = min(1, abs(t["forward"] - wanted) / wanted)
-        total += share * (1 - 0.5 * slow - 0.1 * min(1, abs(t["turned"])) - 0.1 * min(1, abs(t["side"])))
+        total += share * (1 - 0.8 * slow - 0.1 * min(1, abs(t["turned"])) - 0.1 * min(1, abs(t["side"])))
     return total / len(result["trials"])
 
 
@@ -81,7 +86,7 @@ def evaluate(given, numbers, seed):
     scores, results = [], []
     for ground in given.grounds.split(","):
         of = types.SimpleNamespace(robot=given.robot, ground=ground, believes=None, speed=given.speed, seconds=given.seconds, samples=given.samples,
-                                   trials=given.trials, seed=seed, device=given.device, threads=1, limit=given.limit)
+                                   trials=given.trials, seed=seed, device=given.device, threads=1)
         result, _ = plan.walk(of, numbers, log=None)
         scores.append(score_of(result, given.seconds))
         results.append({"ground": ground, "score": round(scores[-1], 4), "walked": result["walked"], "upright": result["upright"],
@@ -200,7 +205,6 @@ def main():
     parser.add_argument("--parents", type=int, default=8)
     parser.add_argument("--width", type=float, default=0.12, help="of the first candidates, of the range")
     parser.add_argument("--minutes", type=float, default=8)
-    parser.add_argument("--limit", type=float, default=60, help="[s] of planning of a walk")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--device", default="cuda")
     parser.add_argument("--numbers", default=str(HERE / "plan.json"))
