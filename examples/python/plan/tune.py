@@ -37,11 +37,13 @@ def parts(place):
     return [part.replace("\0", ".") for part in place.replace("\\.", "\0").split(".")]
 
 
-def dimensions(numbers):
-    """(path, low, high, log, whole) of every number that is searched, and where it is now in [0, 1]."""
+def dimensions(numbers, gait):
+    """gait: bool, with that of the gait, which gait.py searches. (path, low, high, log, whole) of every number that is searched, and where it is now in [0, 1]."""
     found = []
     for place, low, high, log, whole in SPACE:
         *path, last = parts(place)
+        if path[0] == "gait" and not gait:
+            continue
         node = numbers
         for part in path:
             node = node.setdefault(part, {})
@@ -51,7 +53,7 @@ def dimensions(numbers):
             value = min(max(node[name], low), high)
             at = math.log(value / low) / math.log(high / low) if log else (value - low) / (high - low)
             found.append(((*path, name), low, high, log, whole, at))
-    for kind in ("posture", "step"):
+    for kind in ("posture", "step") if gait else ():
         for error, joints in numbers["gait"][kind].items():
             for joint, value in joints.items():
                 reach = 0.3 + abs(value)
@@ -116,7 +118,7 @@ class Search:
     """Candidates around the mean of the best so far."""
 
     def __init__(self, given, base):
-        self.given, self.base, self.dims = given, base, dimensions(base)
+        self.given, self.base, self.dims = given, base, dimensions(base, given.gait)
         self.lock, self.random = threading.Lock(), np.random.default_rng(given.seed + int(time.time()))
         self.done, self.first = [], np.array([d[-1] for d in self.dims])
         if given.out and os.path.exists(given.out):
@@ -146,6 +148,10 @@ class Search:
             line = json.dumps({"score": round(score, 4), **row, "point": [round(float(x), 4) for x in point],
                                **({"numbers": numbers_at(self.base, self.dims, point)} if top else {})})
             print(("BEST " if top else "") + line, flush=True)
+            if top and self.given.best:
+                everything = json.loads(pathlib.Path(self.given.numbers).read_text())
+                everything[self.given.robot] = numbers_at(self.base, self.dims, point)
+                pathlib.Path(self.given.best).write_text(json.dumps(everything, indent=1) + "\n")
             if self.given.out:
                 with open(self.given.out, "a") as out:
                     out.write(line + "\n")
@@ -209,6 +215,8 @@ def main():
     parser.add_argument("--device", default="cuda")
     parser.add_argument("--numbers", default=str(HERE / "plan.json"))
     parser.add_argument("--out", help="a file of JSON lines")
+    parser.add_argument("--best", help="a file like plan.json, with the best numbers")
+    parser.add_argument("--gait", action="store_true", help="the gait's numbers, too, which gait.py finds sooner")
     parser.add_argument("--end", type=float, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.end:
