@@ -56,18 +56,17 @@ class Walks:
         clock = np.array(self.a.host(first.frame))[:, -2:]
         self.phase = np.arctan2(clock[:, 0], clock[:, 1]) / (2 * np.pi)
 
-    def rows(self, gaits):
+    def rows(self, made):
         """What differs from candidate to candidate, [candidates, ...]."""
-        made = [plan.Gait(self.robots.envs.model, gait, self.given.speed) for gait in gaits]
         of = self.a.of
         return made[0], {"bend": of([g.bend for g in made]), "speed": of([g.speed for g in made]), "period": of([g.period for g in made]),
                          "sway": of([g.sway for g in made]), "lean": of([g.lean for g in made]),
                          "feedback": of([np.hstack(g.feedback) for g in made])}
 
-    def run(self, gaits):
+    def run(self, made):
         """Scores [candidates], and of the best: upright [s], forward [m], side [m]."""
         given, a, xp, robots = self.given, self.a, self.a.xp, self.robots
-        base, c = self.rows(gaits)
+        base, c = self.rows(made)
         starts, count, joints = given.starts, given.candidates, len(base.joints)
         grow = lambda x: a.of(x)[:, None]
         robots.envs.fork(self.blocks, stream=a.stream())
@@ -132,7 +131,7 @@ def main():
     width, random, best = given.width * reach, np.random.default_rng(given.seed), -1.0
     walks = [Walks(given, numbers, ground) for ground in given.grounds.split(",")]
     print(f"{len(where)} numbers, {given.candidates} candidates, {given.starts} starts", flush=True)
-    generation, top = 0, None
+    generation, top, ini = 0, None, plan.robot_ini(walks[0].robots.envs.model)
     while time.time() < end:
         before = time.time()
         points = np.clip(mean + width * random.standard_normal((given.candidates, len(mean))), low, high)
@@ -140,7 +139,8 @@ def main():
         if top is not None:
             points[1] = top
         gaits = [put(numbers["gait"], where, point) for point in points]
-        found = [walk.run(gaits) for walk in walks]
+        made = [plan.Gait(ini, gait, given.speed) for gait in gaits]
+        found = [walk.run(made) for walk in walks]
         score = np.mean([f[0] for f in found], 0)
         order = np.argsort(-score)
         elite = points[order[:max(4, given.candidates // 16)]]

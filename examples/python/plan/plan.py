@@ -43,7 +43,6 @@ class Arrays:
         if self.gpu:
             import torch
             self.xp, self.device = torch, torch.device(device)
-            torch.cuda.set_device(self.device)
         else:
             self.xp, self.random = np, np.random.default_rng(0)
 
@@ -94,8 +93,7 @@ class Robots:
         flags = {name: arrays.zeros(count, dtype="uint8") for name in ("done", "timeout", "valid")}
         self.done, self.reward = flags["done"], arrays.zeros(count)
         self.frame, self.estimate = arrays.zeros(count, e.observation), arrays.zeros(count, e.estimates)
-        self.history = arrays.zeros(count, e.frames, e.observation)
-        self.qpos = arrays.zeros(count, 7 + e.actions)
+        self.history, self.qpos = arrays.zeros(count, e.frames, e.observation), arrays.zeros(count, 7 + e.actions)
         self.buffers = e.buffers(history=self.history, reward=self.reward, frame=self.frame, estimate=self.estimate, **flags)
         e.reset(self.buffers, arrays.stream())
 
@@ -115,17 +113,20 @@ def yaw_of(xp, qpos):
     return xp.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
+def robot_ini(model):
+    ini = configparser.ConfigParser(inline_comment_prefixes=";")
+    ini.read(pathlib.Path(model).with_name("robot.ini"))
+    return ini
+
+
 class Gait:
     """Joint targets by clock and posture, in units of the action: a swing leg bends, a standing one sweeps back at the asked speed, and
     both follow the errors of `posture` [rad per unit], a swing leg those of `step` besides."""
 
-    def __init__(self, model, numbers, speed):
-        ini = configparser.ConfigParser(inline_comment_prefixes=";")
-        ini.read(pathlib.Path(model).with_name("robot.ini"))
+    def __init__(self, ini, numbers, speed):
         self.joints = joints = ini["joints"]["names"].split()
-        feet = [section for section in ini.sections() if section.startswith("foot.")]
-        self.scale = float(ini["robot"]["action_scale"])
-        self.offset = np.array([float(ini[foot]["offset"]) for foot in feet])
+        feet = [float(ini[section]["offset"]) for section in ini.sections() if section.startswith("foot.")]
+        self.scale, self.offset = float(ini["robot"]["action_scale"]), np.array(feet)
         self.leg = np.arange(len(joints)) * len(feet) // len(joints)
         self.swing = np.array([float(x) for x in ini["joints"]["swing"].split()])
         self.sweep, self.sway, self.lean = (self.by_name(joints, numbers[name]) for name in ("sweep", "sway", "lean"))
@@ -241,7 +242,7 @@ def walk(given, numbers, log=print):
     keys = {**KEYS, **numbers["keys"], "task.vx": (speed, speed), "task.gait_period": numbers["gait"]["period"]}
     plant = Robots(arrays, given.trials, robot, {**keys, **ground_keys(given.ground)}, device, given.seed, given.threads)
     robots = Robots(arrays, given.trials * given.samples, robot, {**keys, **ground_keys(believes)}, device, given.seed, given.threads)
-    gait = Gait(plant.envs.model, numbers["gait"], speed)
+    gait = Gait(robot_ini(plant.envs.model), numbers["gait"], speed)
     planner = Planner(arrays, plant, robots, gait, numbers["planner"], believes != given.ground)
     blocks = arrays.zeros(given.trials, plant.envs.block_bytes, dtype="uint8")
     start = np.array(arrays.host(plant.read()))
