@@ -188,6 +188,83 @@ static void step(Envs &envs, nb::handle action, Buffers &buffers, uintptr_t stre
     check(status, error);
 }
 
+/* ---- save and fork ---- */
+
+static MildEnvs *begun_envs(const Envs &envs, const char *call) {
+    MildEnvs *at = open_envs(envs);
+    if (!envs.begun) {
+        raise(PyExc_RuntimeError, std::string(call) + ": no episode has begun; call reset() first");
+    }
+    return at;
+}
+
+/* Blocks of as many bytes as the caller's have. */
+static Array take_blocks(const Envs &envs, MildEnvs *at, nb::handle blocks, bool write,
+                         std::vector<int64_t> &shape) {
+    if (mild_envs_block_bytes(at, 0) == 0) {
+        raise(PyExc_ValueError,
+              "blocks: MuJoCo steps these environments; set train.robots = batch");
+    }
+    const int64_t bytes = (int64_t)mild_envs_block_bytes(at, 0);
+    shape = {1, bytes};
+    if (nb::hasattr(blocks, "shape")) {
+        const nb::tuple own(blocks.attr("shape"));
+        if (own.size() == 2) {
+            shape[0] = nb::cast<int64_t>(own[0]);
+            shape[1] = write ? bytes : nb::cast<int64_t>(own[1]);
+        }
+    }
+    return take_array(blocks, {"blocks", nb::dtype<uint8_t>(), shape, envs.shape.device, write});
+}
+
+static size_t block_bytes(const Envs &envs) {
+    return mild_envs_block_bytes(open_envs(envs), 0);
+}
+
+static void save(Envs &envs, nb::handle blocks, int first, uintptr_t stream) {
+    Entered entered(envs.busy, "Envs.save");
+    MildEnvs *at = begun_envs(envs, "Envs.save");
+    std::vector<int64_t> shape;
+    const Array to = take_blocks(envs, at, blocks, true, shape);
+    if (first < 0 || first + shape[0] > envs.shape.envs) {
+        raise(PyExc_IndexError, "save: there is no environment " +
+                                    std::to_string(first < 0 ? first : first + shape[0] - 1));
+    }
+    MildError error = {};
+    check(mild_envs_save(at, first, (int)shape[0], pointer<uint8_t>(to), stream_of(stream), &error),
+          error);
+}
+
+static void fork_envs(Envs &envs, nb::handle blocks, bool own_ground, uintptr_t stream) {
+    Entered entered(envs.busy, "Envs.fork");
+    MildEnvs *at = begun_envs(envs, "Envs.fork");
+    std::vector<int64_t> shape;
+    const Array from = take_blocks(envs, at, blocks, false, shape);
+    MildError error = {};
+    MildStatus status;
+    {
+        nb::gil_scoped_release released;
+        status = mild_envs_fork(at, pointer<uint8_t>(from), (int)shape[0], (size_t)shape[1],
+                                own_ground, stream_of(stream), &error);
+    }
+    check(status, error);
+}
+
+static void read_motion(Envs &envs, nb::handle qpos, nb::handle qvel, nb::handle torque,
+                        uintptr_t stream) {
+    Entered entered(envs.busy, "Envs.read");
+    MildEnvs *at = begun_envs(envs, "Envs.read");
+    const int64_t n = envs.shape.envs, joints = envs.shape.actions;
+    const int where = envs.shape.device;
+    const Array a = take_optional(qpos, {"qpos", nb::dtype<float>(), {n, 7 + joints}, where, true});
+    const Array b = take_optional(qvel, {"qvel", nb::dtype<float>(), {n, 6 + joints}, where, true});
+    const Array c = take_optional(torque, {"torque", nb::dtype<float>(), {n, joints}, where, true});
+    check_apart({&a, &b, &c});
+    const EnvsMotion motion = {pointer<float>(a), pointer<float>(b), pointer<float>(c)};
+    MildError error = {};
+    check(mild_envs_read(at, &motion, stream_of(stream), &error), error);
+}
+
 static std::string model(const Envs &envs) {
     return mild_envs_model(open_envs(envs));
 }
@@ -305,6 +382,27 @@ NB_MODULE(_envs, module) {
              "A policy step. action: (envs, actions) float32 in units of the action scale; on the "
              "CPU\nValueError for one that is not finite. Environments that ended begin anew in "
              "the same step.")
+        .def_prop_ro("block_bytes", block_bytes,
+                     "Bytes of what save() writes; 0 where MuJoCo steps the robots.")
+        .def("save", save, nb::arg("blocks").none(), nb::arg("first") = 0, nb::arg("stream") = 0,
+             "Writes environments from `first` on to blocks: uint8 (count, block_bytes), on the "
+             "device.\nRobot, ground under it and task; not its random numbers. Of the batch "
+             "engine (train.robots: batch).")
+        .def(
+            "fork", fork_envs, nb::arg("blocks").none(), nb::arg("own_ground") = false,
+            nb::arg("stream") = 0,
+            "Puts blocks into all environments, the first into the first of as many equal groups, "
+            "and so\non; of these or of others with the same keys but train.envs and "
+            "task.physics_dt (and train.seed,\nif it draws the same grounds). own_ground: each "
+            "keeps its ground, which forgets the feet, and\nthe robot is set down on it as deep as "
+            "it stands there; then randomize may differ, too.")
+        .def("read", read_motion, nb::kw_only(), nb::arg("qpos").none() = nb::none(),
+             nb::arg("qvel").none() = nb::none(), nb::arg("torque").none() = nb::none(),
+             nb::arg("stream") = 0,
+             "Writes where the robots are: float32 qpos (envs, 7 + joints) [m, -, rad], base, "
+             "quaternion\nw x y z, joints; qvel (envs, 6 + joints) [m/s, rad/s], world axes, base "
+             "axes, joints; torque\n(envs, joints) [N m] of the last physics step. Of the batch "
+             "engine.")
         .def_prop_ro("model", model, "The robot's MJCF.")
         .def_prop_ro("robot", robot, "The robot's name.")
         .def_prop_ro("task", task, "What a policy's file says of how it walks.")

@@ -56,6 +56,33 @@ void envs_times(Envs *envs, double *physics, double *ground) {
     }
 }
 
+static MildStatus need_batch(const char *what, MildError *error) {
+    return mild_fail(error, MILD_ERROR_ARGUMENT,
+                     "%s: MuJoCo steps these environments; set train.robots = batch", what);
+}
+
+size_t envs_block_bytes(const Envs *envs, int own_ground) {
+    return envs->backend->block_bytes ? envs->backend->block_bytes(envs, own_ground) : 0;
+}
+
+MildStatus envs_save(Envs *envs, int first, int count, void *blocks, MildStream stream,
+                     MildError *error) {
+    return envs->backend->save ? envs->backend->save(envs, first, count, blocks, stream, error)
+                               : need_batch("save", error);
+}
+
+MildStatus envs_fork(Envs *envs, const void *blocks, int count, size_t bytes, int own_ground,
+                     MildStream stream, MildError *error) {
+    return envs->backend->fork
+               ? envs->backend->fork(envs, blocks, count, bytes, own_ground, stream, error)
+               : need_batch("fork", error);
+}
+
+MildStatus envs_read(Envs *envs, const EnvsMotion *motion, MildStream stream, MildError *error) {
+    return envs->backend->read ? envs->backend->read(envs, motion, stream, error)
+                               : need_batch("read", error);
+}
+
 char *envs_state(Envs *envs, size_t *bytes) {
     *bytes = 0;
     return envs->backend->state ? envs->backend->state(envs, bytes) : NULL;

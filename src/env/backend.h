@@ -17,6 +17,13 @@ typedef struct {
     EnvsMemory (*memory)(const Envs *envs);
     MildStatus (*set_commands)(Envs *envs, const double *command, MildError *error);
     void (*set_samples)(Envs *envs, EnvsSample *sample);
+    /* of the batch engine, else NULL */
+    size_t (*block_bytes)(const Envs *envs, int own_ground);
+    MildStatus (*save)(Envs *envs, int first, int count, void *blocks, MildStream stream,
+                       MildError *error);
+    MildStatus (*fork)(Envs *envs, const void *blocks, int count, size_t bytes, int own_ground,
+                       MildStream stream, MildError *error);
+    MildStatus (*read)(Envs *envs, const EnvsMotion *motion, MildStream stream, MildError *error);
     /* of MuJoCo, else NULL */
     void (*times)(Envs *envs, double *physics, double *ground);
     char *(*state)(Envs *envs, size_t *bytes);

@@ -126,49 +126,82 @@ static size_t inertia_numbers(size_t feet) {
     return 6 * feet * (6 * feet + 1) / 2;
 }
 
+/* What a fork does with an array. */
+typedef enum {
+    ROW_STATE,  /* it is copied */
+    ROW_GROUND, /* it is copied, unless environments keep their own ground */
+    ROW_WORK    /* it is left: nothing in it outlasts a policy step */
+} RowKind;
+
+/* An array with a row for each environment. */
+typedef struct {
+    void *at;     /* pointer to the array's pointer */
+    size_t bytes; /* of a row; 0: there is no such array */
+    RowKind kind;
+} Row;
+
+/* The arrays that take_arrays allocates, state first, and behind them those of the ground. Whatever
+ * an environment has between two policy steps is here: slices, saves and forks follow this table. */
+enum { ROWS_TAKEN = 19, ROWS = ROWS_TAKEN + 3 };
+_Static_assert((int)ROWS <= (int)ENVS_ROWS_MAX, "room for every row");
+
+static void list_rows(const Batch *b, EnvsArrays *all, BatchArrays *ground, Row rows[ROWS]) {
+    const size_t feet = (size_t)b->shape.feet;
+    const size_t shells = b->bodies.setup ? 1 : 0;
+    EnvsContact *contact = &all->contact;
+    const Row list[ROWS] = {
+        {&all->env, all->stride, ROW_STATE},
+        {&all->robot, b->robot, ROW_STATE},
+        {&all->shells.robot, shells * b->shells, ROW_STATE},
+        {&all->shells.near, shells * sizeof *all->shells.near, ROW_STATE},
+        {&all->reset, sizeof *all->reset, ROW_STATE},
+        {&contact->position, 3 * feet * sizeof(float), ROW_STATE},
+        {&contact->rotation, 9 * feet * sizeof(float), ROW_STATE},
+        {&contact->velocity, 6 * feet * sizeof(float), ROW_STATE},
+        {&contact->inverse_inertia, inertia_numbers(feet) * sizeof(float), ROW_STATE},
+        {&contact->free_velocity, 6 * feet * sizeof(float), ROW_STATE},
+        {&contact->foot, feet * sizeof *contact->foot, ROW_STATE},
+        {&contact->height, sizeof(float), ROW_GROUND},
+        {&all->material, b->labels * sizeof *all->material, ROW_GROUND},
+        {&all->map_origin, 2 * sizeof *all->map_origin, ROW_GROUND},
+        {&all->rigid, sizeof *all->rigid, ROW_GROUND},
+        {&all->shells.held, shells * sizeof *all->shells.held, ROW_GROUND},
+        {&all->shells.list, shells * sizeof *all->shells.list, ROW_WORK},
+        {&all->shells.waiting, 4 * shells * sizeof *all->shells.waiting, ROW_WORK},
+        {&all->order, sizeof *all->order, ROW_WORK},
+        {&all->shells.memory, shells * b->bodies.numbers * sizeof(float), ROW_GROUND},
+        {&ground->memory, batch_memory_numbers(&b->ground->shape) * sizeof(float), ROW_GROUND},
+        {&ground->worn,
+         b->ground->arrays.worn ? batch_worn_numbers(&b->ground->shape) * sizeof(float) : 0,
+         ROW_GROUND}};
+    memcpy(rows, list, sizeof list);
+}
+
+static size_t whole_lines(size_t bytes) {
+    return (bytes + 255) / 256 * 256;
+}
+
 static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
     const TaskShape *shape = &b->shape;
     EnvsArrays *all = &b->arrays;
-    EnvsContact *contact = &all->contact;
+    BatchArrays ground;
+    Row rows[ROWS];
     const EnvsBytes of = b->kernels ? b->kernels->bytes(task, shape) : envs_host_bytes(task, shape);
-    const size_t envs = (size_t)all->envs;
-    const size_t feet = (size_t)shape->feet, rows = envs * feet;
-    const size_t shells = b->bodies.setup ? envs : 0;
+    const size_t envs = (size_t)all->envs, tally = TALLY_NUMBERS * sizeof *all->tally;
     all->stride = of.stride;
     b->robot = of.robot;
     b->shells = of.shells;
-    const struct {
-        void *at; /* pointer to the array's pointer */
-        size_t bytes;
-    } arrays[] = {{&all->env, envs * all->stride},
-                  {&all->robot, envs * b->robot},
-                  {&all->material, envs * b->labels * sizeof *all->material},
-                  {&all->map_origin, 2 * envs * sizeof *all->map_origin},
-                  {&all->reset, envs},
-                  {&all->rigid, envs},
-                  {&all->order, envs * sizeof *all->order},
-                  {&all->tally, TALLY_NUMBERS * sizeof *all->tally},
-                  {&all->shells.robot, shells * b->shells},
-                  {&all->shells.near, shells * sizeof *all->shells.near},
-                  {&all->shells.held, shells},
-                  {&all->shells.list, shells * sizeof *all->shells.list},
-                  {&all->shells.waiting, 4 * shells * sizeof *all->shells.waiting},
-                  {&contact->position, 3 * rows * sizeof(float)},
-                  {&contact->rotation, 9 * rows * sizeof(float)},
-                  {&contact->velocity, 6 * rows * sizeof(float)},
-                  {&contact->inverse_inertia, envs * inertia_numbers(feet) * sizeof(float)},
-                  {&contact->free_velocity, 6 * rows * sizeof(float)},
-                  {&contact->height, envs * sizeof(float)},
-                  {&contact->foot, rows * sizeof *contact->foot}};
-    size_t bytes = 0;
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
-        bytes += (arrays[i].bytes + 255) / 256 * 256;
+    list_rows(b, all, &ground, rows);
+    size_t bytes = whole_lines(tally);
+    for (int i = 0; i < ROWS_TAKEN; i++) {
+        bytes += whole_lines(envs * rows[i].bytes);
     }
     b->block = take(b, bytes, error);
-    char *at = b->block;
-    for (size_t i = 0; at && i < sizeof arrays / sizeof *arrays; i++) {
-        memcpy(arrays[i].at, &at, sizeof at);
-        at += (arrays[i].bytes + 255) / 256 * 256;
+    all->tally = b->block;
+    char *at = b->block ? (char *)b->block + whole_lines(tally) : NULL;
+    for (int i = 0; at && i < ROWS_TAKEN; i++) {
+        memcpy(rows[i].at, &at, sizeof at);
+        at += whole_lines(envs * rows[i].bytes);
     }
     all->shells.setup = b->bodies.setup;
     all->shells.curves = batch_bodies_curves(b->ground);
@@ -373,37 +406,21 @@ static EnvsStep step_from(const EnvsStep *step, const TaskShape *shape, size_t f
                       .next = task_view_from(&step->next, shape, (long)first)};
 }
 
-static EnvsContact contact_from(const EnvsContact *c, size_t first, size_t feet) {
-    const size_t row = first * feet;
-    return (EnvsContact){.position = c->position + 3 * row,
-                         .rotation = c->rotation + 9 * row,
-                         .velocity = c->velocity + 6 * row,
-                         .inverse_inertia = c->inverse_inertia + first * inertia_numbers(feet),
-                         .free_velocity = c->free_velocity + 6 * row,
-                         .height = c->height + first,
-                         .foot = c->foot + row};
-}
-
 /* `count` robots from `first` on. */
 static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
     EnvsArrays all = b->arrays;
+    BatchArrays ground = b->ground->arrays; /* batch_slice has its own */
+    Row rows[ROWS];
     all.envs = count;
-    all.env += first * all.stride;
-    all.robot += first * b->robot;
-    all.material += first * b->labels;
-    all.map_origin += 2 * first;
-    all.reset += first;
-    all.rigid += first;
-    all.order += first;
-    if (all.shells.setup) {
-        all.shells.robot += first * b->shells;
-        all.shells.memory += first * all.shells.numbers;
-        all.shells.near += first;
-        all.shells.held += first;
-        all.shells.list += first;
-        all.shells.waiting += 4 * first;
+    list_rows(b, &all, &ground, rows);
+    for (int i = 0; i < ROWS; i++) {
+        char *at;
+        memcpy(&at, rows[i].at, sizeof at);
+        if (at) {
+            at += first * rows[i].bytes;
+            memcpy(rows[i].at, &at, sizeof at);
+        }
     }
-    all.contact = contact_from(&all.contact, first, (size_t)b->shape.feet);
     all.trial = all.trial ? all.trial + first : NULL;
     all.command = all.command ? all.command + 3 * first : NULL;
     all.sample = all.sample ? all.sample + first * (size_t)b->base.physics_steps : NULL;
@@ -434,6 +451,8 @@ typedef struct {
     const EnvsArrays *arrays;
     const EnvsStep *step;
     int part;
+    const EnvsFork *fork;
+    const EnvsMotion *motion;
 } Call;
 
 static void begin_piece(void *context, int piece, int thread) {
@@ -470,6 +489,18 @@ static void first_piece(void *context, int piece, int thread) {
     envs_host_first(call->arrays, call->step, piece);
 }
 
+static void fork_piece(void *context, int piece, int thread) {
+    const Call *call = context;
+    (void)thread;
+    envs_host_fork(call->arrays, call->fork, piece);
+}
+
+static void read_piece(void *context, int piece, int thread) {
+    const Call *call = context;
+    (void)thread;
+    envs_host_read(call->arrays, call->motion, piece);
+}
+
 /* ---- steps ---- */
 
 static MildBatchInput ground_input(const Slice *slice) {
@@ -497,7 +528,7 @@ static MildStatus step_ground(Slice *slice, MildError *error) {
 /* The same under robots with shells near it, after part k. */
 static MildStatus step_shells(const Batch *b, const Slice *slice, int k, MildError *error) {
     const EnvsArrays *all = &slice->arrays;
-    Call call = {all, &slice->step, k};
+    Call call = {.arrays = all, .step = &slice->step, .part = k};
     if (!all->shells.setup) {
         return MILD_OK;
     }
@@ -511,7 +542,7 @@ static MildStatus step_shells(const Batch *b, const Slice *slice, int k, MildErr
 /* The physics steps of a policy step: parts with the ground between them. Then the task. */
 static MildStatus step_slice(const Batch *b, Slice *slice, MildError *error) {
     const EnvsArrays *all = &slice->arrays;
-    Call call = {&slice->arrays, &slice->step, 0};
+    Call call = {.arrays = &slice->arrays, .step = &slice->step};
     MildStatus status = MILD_OK;
     for (call.part = 0; status == MILD_OK && call.part <= b->base.physics_steps; call.part++) {
         status = call.part > 0 ? step_shells(b, slice, call.part - 1, error) : MILD_OK;
@@ -533,7 +564,7 @@ static MildStatus step_slice(const Batch *b, Slice *slice, MildError *error) {
 
 /* The first episodes. */
 static MildStatus begin_slice(const Batch *b, Slice *slice, MildError *error) {
-    Call call = {&slice->arrays, &slice->step, 0};
+    Call call = {.arrays = &slice->arrays, .step = &slice->step};
     if (b->kernels) {
         return checked(b->kernels->begin(&slice->arrays, slice->stream), error);
     }
@@ -544,7 +575,7 @@ static MildStatus begin_slice(const Batch *b, Slice *slice, MildError *error) {
 /* New episodes forget their ground, and all are seen. */
 static MildStatus see_slice(const Batch *b, Slice *slice, MildError *error) {
     const EnvsArrays *all = &slice->arrays;
-    Call call = {&slice->arrays, &slice->step, 0};
+    Call call = {.arrays = &slice->arrays, .step = &slice->step};
     MildStatus status = mild_batch_reset(&slice->ground, all->reset, slice->stream, error);
     if (status == MILD_OK && b->kernels) {
         return checked(b->kernels->first(all, &slice->step, slice->stream), error);
@@ -654,7 +685,7 @@ static MildStatus load_progress(Envs *envs, const TaskProgress *progress, MildEr
 static MildStatus set_commands(Envs *envs, const double *command, MildError *error) {
     const Batch *b = own(envs);
     const EnvsArrays *all = &b->arrays;
-    Call call = {all, NULL, 0};
+    Call call = {.arrays = all};
     MildStatus status = device_copy(b->device, all->command, command,
                                     TASK_COMMANDS * (size_t)all->envs * sizeof *command, error);
     if (status == MILD_OK && b->device != MILD_BATCH_HOST) {
@@ -670,6 +701,97 @@ static void set_samples(Envs *envs, EnvsSample *sample) {
     own(envs)->arrays.sample = sample;
 }
 
+/* ---- save and fork ---- */
+
+/* The rows of a block, those of the ground last, so that a fork without them reads its beginning.
+ * Returns its bytes. */
+static size_t fork_rows(const Batch *b, int own_ground, EnvsFork *fork) {
+    EnvsArrays all = b->arrays;
+    BatchArrays ground = b->ground->arrays;
+    Row rows[ROWS];
+    size_t place = 0;
+    list_rows(b, &all, &ground, rows);
+    *fork = (EnvsFork){.own_ground = own_ground, .group = 1};
+    for (int kind = ROW_STATE; kind <= (own_ground ? ROW_STATE : ROW_GROUND); kind++) {
+        for (int i = 0; i < ROWS; i++) {
+            if ((int)rows[i].kind != kind || rows[i].bytes == 0) {
+                continue;
+            }
+            memcpy(&fork->row[fork->count].at, rows[i].at, sizeof(char *));
+            fork->row[fork->count].bytes = rows[i].bytes;
+            fork->row[fork->count].place = place;
+            fork->count++;
+            place += (rows[i].bytes + 15) / 16 * 16;
+        }
+    }
+    return place;
+}
+
+static size_t block_bytes(const Envs *envs, int own_ground) {
+    EnvsFork fork;
+    return fork_rows(own_const(envs), own_ground, &fork);
+}
+
+static MildStatus save(Envs *envs, int first, int count, void *blocks, MildStream stream,
+                       MildError *error) {
+    const Batch *b = own(envs);
+    EnvsFork fork;
+    const size_t stride = fork_rows(b, 0, &fork);
+    fork.stride = stride;
+    fork.block = blocks;
+    for (int r = 0; r < fork.count; r++) {
+        fork.row[r].at += (size_t)first * fork.row[r].bytes;
+    }
+    if (b->kernels) {
+        return checked(b->kernels->save(&b->arrays, &fork, count, stream), error);
+    }
+    for (int i = 0; i < count; i++) {
+        envs_host_save(&fork, i);
+    }
+    return MILD_OK;
+}
+
+static MildStatus fork_all(Envs *envs, const void *blocks, int count, size_t stride, int own_ground,
+                           MildStream stream, MildError *error) {
+    const Batch *b = own(envs);
+    EnvsFork fork;
+    Call call = {.arrays = &b->arrays, .fork = &fork};
+    const size_t least = fork_rows(b, own_ground, &fork);
+    if (count < 1 || b->arrays.envs % count != 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "fork: %d environments are not a multiple of %d blocks", b->arrays.envs,
+                         count);
+    }
+    if (own_ground ? stride < least : stride != least) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "fork: a block of %zu bytes, but these environments' has %zu", stride,
+                         least);
+    }
+    fork.block = (char *)(uintptr_t)blocks; /* which are read */
+    fork.stride = stride;
+    fork.group = b->arrays.envs / count;
+    MildStatus status = MILD_OK;
+    if (b->kernels) {
+        status = checked(b->kernels->fork(&b->arrays, &fork, stream), error);
+    } else {
+        pool_run(b->pool, b->arrays.envs, fork_piece, &call);
+    }
+    return status == MILD_OK && own_ground
+               ? mild_batch_reset(b->ground, b->arrays.reset, stream, error)
+               : status;
+}
+
+static MildStatus read_motion(Envs *envs, const EnvsMotion *motion, MildStream stream,
+                              MildError *error) {
+    const Batch *b = own(envs);
+    Call call = {.arrays = &b->arrays, .motion = motion};
+    if (b->kernels) {
+        return checked(b->kernels->read(&b->arrays, motion, stream), error);
+    }
+    pool_run(b->pool, b->arrays.envs, read_piece, &call);
+    return MILD_OK;
+}
+
 static const EnvsBackend backend = {.destroy = destroy,
                                     .reset = reset,
                                     .step = step,
@@ -679,7 +801,11 @@ static const EnvsBackend backend = {.destroy = destroy,
                                     .load_progress = load_progress,
                                     .memory = memory,
                                     .set_commands = set_commands,
-                                    .set_samples = set_samples};
+                                    .set_samples = set_samples,
+                                    .block_bytes = block_bytes,
+                                    .save = save,
+                                    .fork = fork_all,
+                                    .read = read_motion};
 
 /* Those of trials, with the depth of a robot that stands on them. NULL: out of memory. */
 static TaskGrounds *trial_grounds(const EnvsDef *def, MildError *error) {

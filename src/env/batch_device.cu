@@ -26,7 +26,8 @@ enum {
     SHELLS_BLOCKS = ENGINE_FEET > 2 ? 3 : 4,
     SHELLS_ROBOTS = 512, /* stepped at once, at most: an H100 has room for 528 */
     TALLY_THREADS = 256,
-    ORDER_THREADS = 1024
+    ORDER_THREADS = 1024,
+    FORK_THREADS = 128
 };
 
 static const size_t work_bytes = ENVS_WARPS * sizeof(EnvWork);
@@ -214,6 +215,32 @@ static __global__ void __launch_bounds__(TALLY_THREADS)
     }
 }
 
+/* A block for each row of an environment. */
+static __global__ void __launch_bounds__(FORK_THREADS) save(const __grid_constant__ EnvsFork fork) {
+    env_move_row(&fork, (int)blockIdx.y, blockIdx.x, 1, (int)threadIdx.x, FORK_THREADS);
+}
+
+/* A block for each environment. */
+static __global__ void __launch_bounds__(FORK_THREADS)
+    fork_all(const __grid_constant__ EnvsArrays all, const __grid_constant__ EnvsFork fork) {
+    const long robot = blockIdx.x;
+    const EnvKept kept = env_keep(&all, robot);
+    __syncthreads();
+    env_move_rows(&fork, robot, 0, (int)threadIdx.x, FORK_THREADS);
+    __syncthreads();
+    if (threadIdx.x == 0) {
+        env_take_back(&all, &fork, robot, &kept);
+    }
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS)
+    read(const __grid_constant__ EnvsArrays all, const __grid_constant__ EnvsMotion motion) {
+    const long robot = lanes_robot();
+    if (robot < all.envs) {
+        env_read_motion(&all, &motion, robot);
+    }
+}
+
 /* NULL, or the last error. */
 static const char *launched(void) {
     const cudaError_t status = cudaGetLastError();
@@ -325,10 +352,32 @@ static const char *kernels_tally(const EnvsArrays *all, MildStream stream) {
     return launched();
 }
 
+static const char *kernels_save(const EnvsArrays *all, const EnvsFork *fork, int blocks,
+                                MildStream stream) {
+    OnDevice on(all->device);
+    const dim3 grid((unsigned)blocks, (unsigned)fork->count);
+    save<<<grid, FORK_THREADS, 0, stream>>>(*fork);
+    return launched();
+}
+
+static const char *kernels_fork(const EnvsArrays *all, const EnvsFork *fork, MildStream stream) {
+    OnDevice on(all->device);
+    fork_all<<<all->envs, FORK_THREADS, 0, stream>>>(*all, *fork);
+    return launched();
+}
+
+static const char *kernels_read(const EnvsArrays *all, const EnvsMotion *motion,
+                                MildStream stream) {
+    OnDevice on(all->device);
+    read<<<lanes_blocks(all->envs), TASK_THREADS, 0, stream>>>(*all, *motion);
+    return launched();
+}
+
 extern "C" {
 extern const EnvsKernels ENVS_KERNELS;
 const EnvsKernels ENVS_KERNELS = {
-    ENGINE_FIXED,          kernels_fits,        kernels_open, kernels_bytes,  kernels_create,
-    kernels_begin,         kernels_first,       kernels_part, kernels_shells, kernels_end,
-    kernels_move_progress, kernels_set_command, kernels_tally};
+    ENGINE_FIXED,   kernels_fits,  kernels_open,          kernels_bytes,
+    kernels_create, kernels_begin, kernels_first,         kernels_part,
+    kernels_shells, kernels_end,   kernels_move_progress, kernels_set_command,
+    kernels_tally,  kernels_save,  kernels_fork,          kernels_read};
 }

@@ -65,6 +65,20 @@ void envs_host_tally(const EnvsArrays *all) {
     }
 }
 
+void envs_host_save(const EnvsFork *fork, long robot) {
+    env_move_rows(fork, robot, 1, 0, 1);
+}
+
+void envs_host_fork(const EnvsArrays *all, const EnvsFork *fork, long robot) {
+    const EnvKept kept = env_keep(all, robot);
+    env_move_rows(fork, robot, 0, 0, 1);
+    env_take_back(all, fork, robot, &kept);
+}
+
+void envs_host_read(const EnvsArrays *all, const EnvsMotion *motion, long robot) {
+    env_read_motion(all, motion, robot);
+}
+
 void envs_model_fill(const EngineTree *tree, const double *number, EngineModel *model) {
     Real *to = (Real *)(void *)&model->number;
     model->tree = *tree;

@@ -20,6 +20,7 @@
 #include "env/batch_env.h"
 #include "env/batch_sample.h"
 #include "env/batch_shells.h"
+#include "env/kernels.h"
 #include "env/task/step.h"
 #include "robot/engine/measure.h"
 #include "robot/engine/step.h"
@@ -538,6 +539,112 @@ MILD_HD void env_observe(const EnvsArrays *all, const EnvsStep *call, long robot
     tile_sync();
     task_observe(env, &all->task->task, &all->task->robot, env_reading(own),
                  all->task->ground[env->ground[own->label]].numbers, &own->sensors, reset, &view);
+}
+
+/* ---- save and fork: envs.h ---- */
+
+/* Row r of an environment to (save: bool) or from its block, by lane of lanes. Rows of whole words
+ * begin at one, on either side. */
+MILD_HD void env_move_row(const EnvsFork *fork, int r, long robot, int save, int lane, int lanes) {
+    const size_t bytes = fork->row[r].bytes;
+    char *own = fork->row[r].at + (size_t)robot * bytes;
+    char *block = fork->block + (size_t)(robot / fork->group) * fork->stride + fork->row[r].place;
+    char *to = save ? block : own;
+    const char *from = save ? own : block;
+    const size_t words = bytes % sizeof(float) ? 0 : bytes / sizeof(float);
+    for (size_t i = (size_t)lane; i < words; i += (size_t)lanes) {
+        ((uint32_t *)(void *)to)[i] = ((const uint32_t *)(const void *)from)[i];
+    }
+    for (size_t i = (size_t)lane; words == 0 && i < bytes; i += (size_t)lanes) {
+        to[i] = from[i];
+    }
+}
+
+MILD_HD void env_move_rows(const EnvsFork *fork, long robot, int save, int lane, int lanes) {
+    for (int r = 0; r < fork->count; r++) {
+        env_move_row(fork, r, robot, save, lane, lanes);
+    }
+}
+
+/* What a fork leaves to the environment. */
+typedef struct {
+    uint64_t seed;
+    uint32_t index, tick, tick_first;
+    Real tally[TALLY_KEPT];
+    /* with own_ground */
+    int ground[MILD_MATERIALS_MAX];
+    int rigid;
+    Real rigid_friction, rigid_time;
+} EnvKept;
+
+MILD_HD EnvKept env_keep(const EnvsArrays *all, long robot) {
+    const TaskEnv *env = env_at(all, robot);
+    EnvKept kept;
+    kept.seed = env->seed;
+    kept.index = env->index;
+    kept.tick = env->tick;
+    kept.tick_first = env->tick_first;
+    for (int i = 0; i < TALLY_KEPT; i++) {
+        kept.tally[i] = env_robot_at(all, robot)->tally[i];
+    }
+    for (int label = 0; label < MILD_MATERIALS_MAX; label++) {
+        kept.ground[label] = env->ground[label];
+    }
+    kept.rigid = env->variation.rigid;
+    kept.rigid_friction = env->variation.rigid_friction;
+    kept.rigid_time = env->variation.rigid_time;
+    return kept;
+}
+
+/* Sets a robot down on its own ground: the lowest sole is as deep as one that stands. */
+MILD_HD void env_set_down(const EnvsArrays *all, long robot, TaskEnv *env) {
+    const RobotReading *reading = env_reading(env_robot_at(all, robot));
+    const int ground = env->ground[env_first_label(all, robot)];
+    Real lowest = 0;
+    for (int f = 0; f < env->shape.feet; f++) {
+        lowest = real_min(lowest, reading->foot[f].sole_height);
+    }
+    env->robot.qpos[2] -= lowest;
+    env->robot.qpos[2] -= env->variation.rigid ? 0 : (Real)all->task->ground[ground].depth;
+}
+
+/* By one thread, after the rows. */
+MILD_HD void env_take_back(const EnvsArrays *all, const EnvsFork *fork, long robot,
+                           const EnvKept *kept) {
+    TaskEnv *env = env_at(all, robot);
+    env->seed = kept->seed;
+    env->index = kept->index;
+    env->tick = kept->tick;
+    env->tick_first = kept->tick_first;
+    for (int i = 0; i < TALLY_KEPT; i++) {
+        env_robot_at(all, robot)->tally[i] = kept->tally[i];
+    }
+    if (!fork->own_ground) {
+        return;
+    }
+    for (int label = 0; label < MILD_MATERIALS_MAX; label++) {
+        env->ground[label] = kept->ground[label];
+    }
+    env->variation.rigid = kept->rigid;
+    env->variation.rigid_friction = kept->rigid_friction;
+    env->variation.rigid_time = kept->rigid_time;
+    env_set_down(all, robot, env);
+    all->reset[robot] = 1; /* what the ground remembers goes */
+}
+
+/* By a tile. */
+MILD_HD void env_read_motion(const EnvsArrays *all, const EnvsMotion *motion, long robot) {
+    const TaskEnv *env = env_at(all, robot);
+    const int joints = env->shape.joints;
+    for (int i = tile_lane(); motion->qpos && i < 7 + joints; i += TILE) {
+        motion->qpos[robot * (7 + joints) + i] = (float)env->robot.qpos[i];
+    }
+    for (int i = tile_lane(); motion->qvel && i < 6 + joints; i += TILE) {
+        motion->qvel[robot * (6 + joints) + i] = (float)env->robot.qvel[i];
+    }
+    for (int i = tile_lane(); motion->torque && i < joints; i += TILE) {
+        motion->torque[robot * joints + i] = (float)env->torque[i];
+    }
 }
 
 #endif

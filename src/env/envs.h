@@ -76,6 +76,31 @@ EnvsStats envs_means(EnvsStats sums, int count);
  * engine. */
 void envs_times(Envs *envs, double *physics, double *ground);
 
+/* ---- save and fork: of the batch engine ---- */
+
+/* A block is all that decides what an environment does next, its random numbers aside: robot,
+ * ground under it, task. It is in the memory of the device, and fits all Envs whose definitions
+ * differ in nothing but count, first and physics_dt, and with own_ground in seed and randomize.
+ *
+ * Bytes of a block; with own_ground (bool) of the part that envs_fork reads. */
+size_t envs_block_bytes(const Envs *envs, int own_ground);
+/* `count` environments from `first` on to as many blocks. On a GPU it only puts work into the
+ * stream, as envs_fork does. */
+MildStatus envs_save(Envs *envs, int first, int count, void *blocks, MildStream stream,
+                     MildError *error);
+/* `count` blocks of `bytes` each to all environments: the first block to the first of `count` equal
+ * groups of them, and so on. Each environment keeps its seed, its number and its count of steps, so
+ * that without noise and pushes all of a group do the same under the same actions.
+ *
+ * own_ground: bool, each also keeps its ground, which forgets the feet, and the robot is set down
+ * on it: the lowest sole is as deep as one that stands there. So a block fits grounds of any
+ * kind. */
+MildStatus envs_fork(Envs *envs, const void *blocks, int count, size_t bytes, int own_ground,
+                     MildStream stream, MildError *error);
+
+/* Where the robots are. Of the batch engine. */
+MildStatus envs_read(Envs *envs, const EnvsMotion *motion, MildStream stream, MildError *error);
+
 /* Everything that persists, as one block without pointers, so that saving and loading are copies;
  * NULL for the batch engine. */
 char *envs_state(Envs *envs, size_t *bytes);

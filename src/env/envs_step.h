@@ -23,6 +23,14 @@ typedef struct {
     float *terms;  /* [envs][rewards] sum of each reward term over the episode */
 } EnvsStep;
 
+/* Where the robots are and how they move, in the order of robot.ini, on the device. Each may be
+ * NULL. */
+typedef struct {
+    float *qpos;   /* [envs][7 + joints] [m, -, rad] base, quaternion w x y z, joints */
+    float *qvel;   /* [envs][6 + joints] [m/s, rad/s] base: world axes, base axes; joints */
+    float *torque; /* [envs][joints] [N m] of the last physics step */
+} EnvsMotion;
+
 enum { ENVS_TERMS_MAX = 32 };
 
 /* Of the episodes that ended since the last call. Means of length, reward, speed_error and terms

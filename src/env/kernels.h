@@ -6,6 +6,22 @@
 #include "env/batch_arrays.h"
 #include "env/envs.h"
 
+enum { ENVS_ROWS_MAX = 24 };
+
+/* Between an environment of each row's array and a block. */
+typedef struct {
+    char *block;    /* the first */
+    size_t stride;  /* [B] from block to block */
+    int group;      /* environments that have a block in common */
+    int own_ground; /* bool: see envs_fork */
+    int count;      /* of rows */
+    struct {
+        char *at; /* of environment 0 */
+        size_t bytes;
+        size_t place; /* [B] in the block */
+    } row[ENVS_ROWS_MAX];
+} EnvsFork;
+
 #define ENVS_MODEL_NUMBERS ((int)(sizeof(EngineNumbers) / sizeof(Real)))
 
 /* [B] of an environment in EnvsArrays, by the code of the CPU or of a device, which may be
@@ -36,6 +52,10 @@ void envs_host_set_command(const EnvsArrays *all, long robot);
 void envs_host_move_progress(const EnvsArrays *all, int back);
 /* Fills arrays.tally. */
 void envs_host_tally(const EnvsArrays *all);
+/* From the environment to its block, from the block to the environment. */
+void envs_host_save(const EnvsFork *fork, long robot);
+void envs_host_fork(const EnvsArrays *all, const EnvsFork *fork, long robot);
+void envs_host_read(const EnvsArrays *all, const EnvsMotion *motion, long robot);
 
 /* ---- a GPU ---- */
 
@@ -55,6 +75,9 @@ typedef struct {
     const char *(*move_progress)(const EnvsArrays *all, int back, MildStream stream);
     const char *(*set_command)(const EnvsArrays *all, MildStream stream);
     const char *(*tally)(const EnvsArrays *all, MildStream stream);
+    const char *(*save)(const EnvsArrays *all, const EnvsFork *fork, int blocks, MildStream stream);
+    const char *(*fork)(const EnvsArrays *all, const EnvsFork *fork, MildStream stream);
+    const char *(*read)(const EnvsArrays *all, const EnvsMotion *motion, MildStream stream);
 } EnvsKernels;
 
 /* Those of this build, NULL behind them: cmake/Env.cmake, or batch_without_cuda.c. A robot takes

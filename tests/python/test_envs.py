@@ -206,6 +206,52 @@ class Memory(unittest.TestCase):
         env.close()
 
 
+QUIET = {"task.assist": False, "task.observe_noise": False, "randomize.push_interval": 0, "train.robots": "batch", "train.grounds": 1,
+         "randomize.patch_share": 0, "task.physics_dt": 0.005}
+
+
+class Fork(unittest.TestCase):
+    def open(self, count, seed=1):
+        task = envs.open_envs(count, overrides=QUIET, seed=seed, threads=2)
+        self.addCleanup(task.close)
+        flags = {name: np.zeros(count, np.uint8) for name in ("done", "timeout", "valid")}
+        history = np.zeros((count, task.frames, task.observation), np.float32)
+        buffers = task.buffers(history=history, reward=np.zeros(count, np.float32), **flags)
+        task.reset(buffers)
+        return task, buffers, history
+
+    def test_all_do_the_same(self):
+        plant, buffers, seen = self.open(3)
+        planner, more, all_seen = self.open(8)
+        for step in range(5):
+            plant.step(np.float32(0.3 * np.sin(step + np.arange(36)).reshape(3, 12)), buffers)
+        blocks = np.zeros((2, plant.block_bytes), np.uint8)
+        plant.save(blocks, first=1)
+        planner.fork(blocks)
+        for _ in range(5):
+            plant.step(np.full((3, 12), 0.2, np.float32), buffers)
+            planner.step(np.full((8, 12), 0.2, np.float32), more)
+        np.testing.assert_array_equal(all_seen, seen[np.repeat([1, 2], 4)])
+        qpos, torque = np.zeros((8, 19), np.float32), np.zeros((8, 12), np.float32)
+        planner.read(qpos=qpos, torque=torque)
+        self.assertTrue((qpos[:4] == qpos[0]).all() and (qpos[0] != qpos[4]).any() and torque.all())
+
+    def test_misuse(self):
+        task, buffers, _ = self.open(4)
+        blocks = np.zeros((3, task.block_bytes), np.uint8)
+        for call, text in ((lambda: task.fork(blocks), "3 blocks"), (lambda: task.fork(blocks[:1, :-16].copy()), "block of"),
+                           (lambda: task.save(blocks[0]), "blocks"), (lambda: task.fork(None), "blocks")):
+            with self.assertRaisesRegex((ValueError, TypeError), text):
+                call()
+        with self.assertRaisesRegex(IndexError, "environment 4"):
+            task.save(blocks, first=2)
+        other = envs.open_envs(4, threads=2)
+        self.addCleanup(other.close)
+        self.assertEqual(other.block_bytes, 0)
+        with self.assertRaisesRegex(RuntimeError, "reset"):
+            other.save(blocks)
+
+
 class Misuse(unittest.TestCase):
     def test_arguments(self):
         for keys, name in (({"overrides": 3}, "overrides"), ({"config": 0}, "config"), ({"overrides": {"task.vxx": 1}}, "task.vx"),

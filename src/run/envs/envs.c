@@ -138,6 +138,25 @@ MildStatus mild_envs_step(MildEnvs *envs, const EnvsStep *step, MildStream strea
     return envs_step(envs->envs.envs, step, stream, error);
 }
 
+size_t mild_envs_block_bytes(const MildEnvs *envs, int own_ground) {
+    return envs_block_bytes(envs->envs.envs, own_ground);
+}
+
+MildStatus mild_envs_save(MildEnvs *envs, int first, int count, void *blocks, MildStream stream,
+                          MildError *error) {
+    return envs_save(envs->envs.envs, first, count, blocks, stream, error);
+}
+
+MildStatus mild_envs_fork(MildEnvs *envs, const void *blocks, int count, size_t bytes,
+                          int own_ground, MildStream stream, MildError *error) {
+    return envs_fork(envs->envs.envs, blocks, count, bytes, own_ground, stream, error);
+}
+
+MildStatus mild_envs_read(MildEnvs *envs, const EnvsMotion *motion, MildStream stream,
+                          MildError *error) {
+    return envs_read(envs->envs.envs, motion, stream, error);
+}
+
 MildStatus mild_envs_stats(MildEnvs *envs, EnvsStats *stats, MildStream stream, MildError *error) {
     EnvsStats sums;
     MildStatus status = envs_sums(envs->envs.envs, &sums, stream, error);

@@ -21,6 +21,8 @@
 #ifndef MILD_ENVS_H
 #define MILD_ENVS_H
 
+#include <stddef.h>
+
 #include "env/envs_step.h"
 #include "mild/error.h"
 
@@ -80,6 +82,26 @@ MildStatus mild_envs_reset(MildEnvs *envs, const EnvsView *first, MildStream str
 
 /* A policy step of all environments. */
 MildStatus mild_envs_step(MildEnvs *envs, const EnvsStep *step, MildStream stream,
+                          MildError *error);
+
+/* Save and fork, where the batch engine steps the robots (train.robots = batch), e.g. to plan:
+ * `count` environments from `first` on are saved to as many blocks, and these put into all
+ * environments, a block into each of `count` equal groups, of these or of others opened with the
+ * same keys but train.envs and task.physics_dt (and train.seed, if it draws the same grounds).
+ * Without noise and pushes all of a group then do the same under the same actions. Blocks are the
+ * caller's, on the device, at a multiple of 16, each of mild_envs_block_bytes of the environments
+ * that wrote it; on a GPU these functions only put work into the stream.
+ *
+ * own_ground: bool, each environment keeps its ground, which forgets the feet, and the robot is set
+ * down on it as deep as it stands there: for a ground that another one is believed to be. Then
+ * train.seed and the section randomize may differ, too. */
+size_t mild_envs_block_bytes(const MildEnvs *envs, int own_ground);
+MildStatus mild_envs_save(MildEnvs *envs, int first, int count, void *blocks, MildStream stream,
+                          MildError *error);
+MildStatus mild_envs_fork(MildEnvs *envs, const void *blocks, int count, size_t bytes,
+                          int own_ground, MildStream stream, MildError *error);
+/* Where the robots are and how they move; where the batch engine steps them. */
+MildStatus mild_envs_read(MildEnvs *envs, const EnvsMotion *motion, MildStream stream,
                           MildError *error);
 
 /* Means over the episodes that ended since the last call. Waits for the device. */
