@@ -16,7 +16,7 @@ suffix=$("$other" -c 'import sysconfig; print(sysconfig.get_config_var("EXT_SUFF
 
 # Archives of the build that the bundle is made of, with its kernels where it has some.
 build=${BUILD:-build/x86-64-v3}/src
-archives=("$build"/liblayer_{identify,soil,batch,ground,device,base}.a)
+archives=("$build"/liblayer_{identify,soil,batch,models,step,sole,terrain,law,device,base}.a)
 cuda=()
 if [ -e "$build/libbatch_device.a" ]; then
     archives+=("$build"/lib{batch_device,device_gpu}.a)

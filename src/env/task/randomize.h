@@ -83,7 +83,7 @@ MILD_HD_FN void task_draw_robot(TaskEnv *env, const TaskDef *def, Random r) {
 #define COMMAND_NEAR 0.7     /* [-] of the highest: a command near it */
 #define COMMAND_FOLLOWED 0.8 /* [-] of the command: a speed that follows it */
 #define COMMAND_GROWTH 0.25  /* [m/s] */
-#define JUMP_GROWTH 0.02     /* [m] */
+#define JUMP_GROWTH 0.025    /* [m] */
 
 /* A robot's highest command, forward or, where it jumps, of the rise, grows where it follows one
  * near it when the next of an episode is drawn (command curriculum of Rudin et al. 2021), and falls
