@@ -4,10 +4,7 @@
 
 #include "ground/law/frame.h"
 #include "ground/law/remember.h"
-#include "ground/step/frame.h"
-#include "ground/step/moments.h"
-#include "ground/step/scratch.h"
-#include "ground/step/shell.h"
+#include "ground/step/step.h"
 
 /* The elements of a foot in one step. */
 typedef struct {

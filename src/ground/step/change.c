@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "ground/law/models.h"
-#include "ground/step/mixture.h"
+#include "ground/step/step.h"
 
 /* Materials of a foot, before and after. */
 typedef struct {

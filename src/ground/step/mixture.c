@@ -1,9 +1,9 @@
-#include "ground/step/mixture.h"
-
+/* Materials of the slots: of one or, near a smooth border, a mixture of two. */
 #include <string.h>
 
 #include "ground/law/begin.h"
 #include "ground/law/models.h"
+#include "ground/step/step.h"
 #include "ground/terrain/terrain.h"
 
 /* Bool: material m is part of a mixture, encoded as in Memory (state.h). */
