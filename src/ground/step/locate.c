@@ -72,12 +72,10 @@ static double foot_descent(const FootScratch *foot, const double *V, double stee
            steepest * (level + foot->radius * sqrt(tilt + V[5] * V[5]));
 }
 
-/* [m] Least depth at the start of the step of an element that may touch in it. */
-static double foot_least(const FootScratch *foot, const MildContactInput *input, double steepest,
-                         int f) {
+void foot_set_least(FootScratch *foot, const MildContactInput *input, double steepest, int f) {
     const double descent = real_max(foot_descent(foot, input->velocity[f], steepest),
                                     foot_descent(foot, input->free_velocity + 6 * f, steepest));
-    return -LISTED_MARGIN - input->dt * (descent + LISTED_EXTRA_SPEED);
+    foot->least = -LISTED_MARGIN - input->dt * (descent + LISTED_EXTRA_SPEED);
 }
 
 /* [m] Upper bound on the depth of any element: its bounding box against the ground under its middle
@@ -98,16 +96,14 @@ static double foot_reach(const FootScratch *foot, const MildTerrain *terrain, do
     return height - at[2] + low;
 }
 
-int foot_is_away(FootScratch *foot, const MildTerrain *terrain, const MildContactInput *input,
-                 double steepest, int f) {
-    foot->least = foot_least(foot, input, steepest, f);
+int foot_is_away(FootScratch *foot, const MildTerrain *terrain, double steepest) {
     foot->reach = foot_reach(foot, terrain, steepest);
     foot->away = foot->reach <= foot->least;
     return foot->away;
 }
 
-void foot_list(FootScratch *foot, const MildContactInput *input, double steepest, int f) {
-    const double least = foot_least(foot, input, steepest, f);
+void foot_list(FootScratch *foot) {
+    const double least = foot->least;
     const double *depth = foot->depth;
     double near = 0.0;
     /* Count whole vectors, unless that would count the padding. */

@@ -1,4 +1,5 @@
 /* Materials of the slots: of one or, near a smooth border, a mixture of two. */
+#define POWER_CALLED /* power.h: no vector loop here needs a power */
 #include <string.h>
 
 #include "ground/law/begin.h"
@@ -21,20 +22,24 @@ static int share_is_nan(const Share *share) {
     return isnan(share->slip_rate + share->regain_rate + share->grip + share->growth + share->side);
 }
 
-/* Derives what a material gives a slot. Where path costs support it adds no resistance. */
+SlotLaw material_law(const MildMaterial *material, double pitch, double width, double sides) {
+    const Share share = share_of(material, pitch, sides);
+    const MildMaterial own = material_at(material, pitch);
+    const int slips = share.slip_rate > 0.0;
+    return (SlotLaw){law_of(material, pitch, width), share, slips ? 0.0 : own.k_drift,
+                     slips ? 0.0 : own.b_drift, recovery_of(material)};
+}
+
 static __attribute__((cold)) void law_derive(const FootScratch *foot, const MildMaterial *material,
                                              DerivedLaw *derived) {
-    const Law law = law_of(material, foot->pitch, foot->width);
-    const Share share = share_of(material, foot->pitch, foot->shell ? 0.0 : foot->width);
-    const MildMaterial own = material_at(material, foot->pitch);
-    const int slips = share.slip_rate > 0.0;
-    *derived =
-        (DerivedLaw){.material = *material,
-                     .slot = {law, share, slips ? 0.0 : own.k_drift, slips ? 0.0 : own.b_drift,
-                              recovery_of(material)},
-                     .curves = curves_of(material, &law),
-                     .known = 1,
-                     .nan = law_is_nan(&law) || material_is_nan(material) || share_is_nan(&share)};
+    const SlotLaw slot =
+        material_law(material, foot->pitch, foot->width, foot->shell ? 0.0 : foot->width);
+    *derived = (DerivedLaw){.material = *material,
+                            .slot = slot,
+                            .curves = curves_of(material, &slot.law),
+                            .known = 1,
+                            .nan = law_is_nan(&slot.law) || material_is_nan(material) ||
+                                   share_is_nan(&slot.share)};
 }
 
 void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
@@ -72,6 +77,7 @@ static void slot_set_law(Slots *s, int i, const SlotLaw *from) {
     s->whole_mu[i] = share->mu;
     s->ahead[i] = 0.0;
     s->share[i] = 1.0;
+    s->power[0][i] = s->power[1][i] = s->elastic[0][i] = s->elastic[1][i] = 0.0;
     s->exit_drag[i] = law_exit_drag(&from->law);
     s->entry_drag[i] = law_entry_drag(&from->law);
     s->strength[i] = from->law.line_stiffness;
@@ -173,5 +179,19 @@ void slots_materials(const FootScratch *foot, const MildTerrain *terrain, const 
         foot->slot_material[i] = m;
         foot->slot_holder[i] = e;
         slot_set_mixture(foot, i, e, m);
+    }
+}
+
+/* This loop is not in vectors, for which a power is long: few feet stand on ground without memory
+ * beside other ground. */
+void slots_elastic(const FootScratch *foot) {
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+        memset(s->fx, 0, sizeof s->fx);
+    }
+    for (int i = 0; foot->curves & LAW_ELASTIC && i < foot->active; i++) {
+        Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
+        const Element element = slot_element(s, l);
+        s->fx[l] = law_elastic_force(&element.law, LAW_ELASTIC, element.middle);
     }
 }

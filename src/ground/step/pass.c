@@ -110,14 +110,12 @@ static __attribute__((noinline)) void foot_powers(const FootScratch *foot, Real 
  * little. */
 static void foot_normals(const FootScratch *foot, Real dt, const Motion *motion) {
     switch (foot_variant(foot)) {
-    case LAW_LINE: foot_normal(foot, dt, motion, 1, LAW_LINE, 0); return;
     case LAW_CONE:
-        if (foot->uneven || foot->stops) {
-            foot_normal(foot, dt, motion, 1, LAW_CONE, 1);
-        } else {
+        if (!foot->uneven && !foot->stops) {
             foot_normal(foot, dt, motion, 0, LAW_CONE, 0);
-        }
-        return;
+            return;
+        } /* else a heap that begins at the surface and carries all of its load */
+        // fall through
     case LAW_CONE | LAW_HEAP:
         if (foot->uneven || foot->stops) {
             foot_normal(foot, dt, motion, 1, LAW_CONE | LAW_HEAP, 1);
@@ -125,6 +123,7 @@ static void foot_normals(const FootScratch *foot, Real dt, const Motion *motion)
             foot_normal(foot, dt, motion, 0, LAW_CONE | LAW_HEAP, 0);
         }
         return;
+    case LAW_LINE: /* a power without force */
     case LAW_POWER: foot_normal(foot, dt, motion, 1, LAW_POWER, 0); return;
     case LAW_ELASTIC: foot_normal(foot, dt, motion, 1, LAW_ELASTIC, 0); return;
     default: foot_normal(foot, dt, motion, SLOT_UNEVEN | SLOT_SHELL, LAW_ANY, 1); return;
@@ -331,10 +330,12 @@ static __attribute__((noinline)) void factor_add(const FootScratch *foot, const 
                                                  double *H) {
     static const int product[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
     Three rows[6] = {{0.0}}; /* of the three rows of h: [M_k0, N_k] */
+#pragma GCC unroll 3
     for (int l = 0; l < 3; l++) {
         const double *p = foot->lever[l];
         const int at = product[k][l];
         Three m[3]; /* M_kl */
+#pragma GCC unroll 3
         for (int c = 0; c < 3; c++) {
             m[c] = (Three){M[0][c][at], M[1][c][at], M[2][c][at]};
             rows[c] = l == 0 ? m[c] : rows[c];

@@ -47,20 +47,6 @@ static void foot_begin(const FootScratch *foot, Real dt, const Motion *now) {
 
 /* ---- the share of its load that each slot carries ---- */
 
-/* This loop is not in vectors, for which a power is long: few feet stand on ground without memory
- * beside other ground. */
-void slots_elastic(const FootScratch *foot) {
-    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
-        memset(s->fx, 0, sizeof s->fx);
-    }
-    for (int i = 0; foot->curves & LAW_ELASTIC && i < foot->active; i++) {
-        Slots *s = slot_block(foot, i);
-        const int l = i % SLOT_LANES;
-        const Element element = slot_element(s, l);
-        s->fx[l] = law_elastic_force(&element.law, LAW_ELASTIC, element.middle);
-    }
-}
-
 /* Cosine between the sole and the ground under each slot, into `lean`. Level ground has one for
  * all, without a root for each. */
 static void slots_lean(const FootScratch *foot) {
@@ -298,7 +284,8 @@ uint32_t mild_ground_near(const MildTerrain *terrain, const MildContactInput *in
         FootScratch *foot = &scratch->foot[f];
         foot_take_pose(foot, terrain, input, f);
         const double steepest = foot->uneven ? terrain_steepest(terrain) : 0.0;
-        near |= foot_is_away(foot, terrain, input, steepest, f) ? 0u : 1u << f;
+        foot_set_least(foot, input, steepest, f);
+        near |= foot_is_away(foot, terrain, steepest) ? 0u : 1u << f;
     }
     return near;
 }
@@ -312,14 +299,15 @@ int contact_prepare(const MildGround *ground, const MildTerrain *terrain,
         foot_take_pose(foot, terrain, input, f);
         foot->uneven |= ground->uneven[f] == GROUND_LOWERED;
         const double steepest = foot->uneven ? terrain_steepest(terrain) : 0.0;
+        foot_set_least(foot, input, steepest, f);
         if (scratch->place[f] < 0) {
             foot->away = 1;
             foot->active = 0;
         } else if (foot->shell) {
-            shell_list(foot, terrain, input, steepest, f);
+            shell_list(foot, terrain, steepest);
         } else {
             foot_locate(foot, terrain, ground->tiles > 0);
-            foot_list(foot, input, steepest, f);
+            foot_list(foot);
         }
         if (foot->active > 0) {
             foot_prepare(foot, ground, f, terrain, input);

@@ -29,10 +29,9 @@ static void shell_locate(FootScratch *foot, const MildTerrain *terrain) {
     }
 }
 
-void shell_list(FootScratch *foot, const MildTerrain *terrain, const MildContactInput *input,
-                double steepest, int f) {
+void shell_list(FootScratch *foot, const MildTerrain *terrain, double steepest) {
     foot->active = 0;
-    if (foot_is_away(foot, terrain, input, steepest, f)) {
+    if (foot_is_away(foot, terrain, steepest)) {
         return;
     }
     shell_locate(foot, terrain);

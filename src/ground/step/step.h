@@ -18,8 +18,6 @@
  * touch. */
 int contact_prepare(const MildGround *ground, const MildTerrain *terrain,
                     const MildContactInput *input, MildScratch *scratch);
-/* The force of ground without memory under each slot [N], into the working array fx. */
-void slots_elastic(const FootScratch *foot);
 
 /* ---- locate.c: where the elements of a foot are, which may touch, and their slots ---- */
 
@@ -32,14 +30,14 @@ void foot_set_pose(FootScratch *foot, const MildTerrain *terrain, const double *
 void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints);
 /* Depth of every element of a foot on uneven ground, and the gradient under it. */
 void foot_surface(FootScratch *foot, const MildTerrain *terrain);
-/* Bool: no element can touch in this step, seen from the bounding box. Sets least, reach and away.
- * After foot_set_pose. steepest: upper bound [-] on the gradient of the ground. */
-int foot_is_away(FootScratch *foot, const MildTerrain *terrain, const MildContactInput *input,
-                 double steepest, int f);
+/* Sets `least` for the motion of foot f. steepest: upper bound [-] on the gradient of the ground. */
+void foot_set_least(FootScratch *foot, const MildContactInput *input, double steepest, int f);
+/* Bool: no element can touch in this step, seen from the bounding box. Sets reach and away. After
+ * foot_set_pose and foot_set_least. */
+int foot_is_away(FootScratch *foot, const MildTerrain *terrain, double steepest);
 /* Lists the elements that may touch in this step, in ascending order. The common cases, all
- * elements or none, are found without a branch per element. steepest: upper bound [-] on the
- * gradient of the ground. f: index of the foot in `input`. */
-void foot_list(FootScratch *foot, const MildContactInput *input, double steepest, int f);
+ * elements or none, are found without a branch per element. */
+void foot_list(FootScratch *foot);
 
 /* Copies the listed elements into consecutive slots. */
 void slots_gather(const FootScratch *foot, const Memory *memory);
@@ -68,6 +66,9 @@ void slots_imprints(const FootScratch *foot, const Imprints *imprints, const Mem
 
 /* ---- mixture.c: materials of the slots. Near a smooth border a slot has the law of two ---- */
 
+/* What a material gives a slot. Where path costs support it adds no resistance. pitch: [m] edge of
+ * an element. width: [m] shorter side of the sole. sides: width, but 0 for a shell. */
+SlotLaw material_law(const MildMaterial *material, double pitch, double width, double sides);
 /* Derives the laws of the terrain's materials. Laws of materials whose bytes have not changed are
  * kept. */
 void foot_laws(FootScratch *foot, const MildTerrain *terrain);
@@ -78,13 +79,13 @@ SlotLaw mixture_law(const FootScratch *foot, const DerivedLaw *derived, int32_t 
 void slots_materials(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory);
 /* Gives the padding a law without force at any depth. */
 void slots_pad(const FootScratch *foot);
+/* The force of ground without memory under each slot [N], into the working array fx. */
+void slots_elastic(const FootScratch *foot);
 
 /* ---- shell.c: shells (docs/model.md, section 20): elements with a height, normal and area ---- */
 
-/* After foot_locate: lists the elements that face down and may touch in this step. steepest, f: as
- * in foot_list. */
-void shell_list(FootScratch *foot, const MildTerrain *terrain, const MildContactInput *input,
-                double steepest, int f);
+/* The same for a shell: lists the elements that face down, too. */
+void shell_list(FootScratch *foot, const MildTerrain *terrain, double steepest);
 /* Gives the slots their elements, material and ground, as foot_prepare does for a plane sole. now:
  * motion at the start of the step. Imprints take the elements for level squares. */
 void shell_slots(FootScratch *foot, const MildGround *ground, int f, const MildTerrain *terrain,

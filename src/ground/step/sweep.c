@@ -75,6 +75,7 @@ static void element_inverse_mass(const Sweep *sweep, int f, const double *p, dou
 
 /* The normal impulse of a slot at the downward speed w. curves: of the ground under the foot. */
 static Impulse slot_impulse(const Slots *s, int i, int curves, double dt, double w) {
+    curves |= LAW_CONE | LAW_HEAP; /* no branches for these; a power is long */
     const Element element = slot_loaded(s, i, curves);
     return element_impulse(&element, curves, 1, dt, w);
 }
@@ -137,12 +138,11 @@ static void element_implicit(const Sweep *sweep, const FootScratch *foot, Slots 
 /* Eqs 3 to 5: dt F_GM [N s] of the depth and the downward speed w before the step, on the way up
  * too. */
 static double literal_normal(const Slots *s, int i, int curves, double dt, double w) {
+    curves |= LAW_CONE | LAW_HEAP;
     const Element element = slot_loaded(s, i, curves);
     const double u = element.depth;
     double force = law_force(&element.law, curves, u) + law_elastic_force(&element.law, curves, u);
-    if (curves & LAW_CONE) {
-        force += element.law.drag_rate * law_moved_share(&element.law, curves, u) * w * w;
-    }
+    force += element.law.drag_rate * law_moved_share(&element.law, curves, u) * w * w;
     return u > 0.0 ? dt * fmax(force, 0.0) : 0.0;
 }
 
