@@ -69,4 +69,9 @@ static inline int ppo_piece_begin(int count, int piece) {
     return (int)((int64_t)count * piece / PPO_PIECES);
 }
 
+/* Generalised advantage estimation (Schulman et al. 2016). From batch->value: fills advantage (normalised over the usable samples), returns, and
+ * ppo->substitute and ppo->starved. A sample is usable if it is valid and its reward and value are
+ * finite. */
+void ppo_returns(Ppo *ppo, PpoReport *report);
+
 #endif

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "ground/sole/sole_mesh.h"
+#include "ground/sole/sole_inside.h"
 
 #define MESH_PIECES_MAX (1 << 21)
 #define MESH_CUT 0.25   /* [-] longest edge of a piece, over the pitch */

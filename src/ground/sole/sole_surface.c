@@ -3,9 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ground/sole/samples.h"
 #include "ground/sole/sole.h"
-#include "ground/sole/sole_mesh.h"
+#include "ground/sole/sole_inside.h"
 
 #define SHAPES_MAX 256
 #define MESH_MOST (1 << 20)
@@ -13,6 +12,24 @@
 #define SHAPE_ROUND 8   /* least elements around a circle: 8 have 2 % too much projected area */
 #define SHAPE_SKIN 1e-6 /* [m] shapes closer than this touch */
 #define SHAPE_PI 3.14159265358979323846
+
+void samples_add(Samples *samples, const Sample *sample) {
+    if (samples->count == samples->most || samples->failed) {
+        samples->full |= samples->count == samples->most;
+        return;
+    }
+    if (samples->count == samples->room) {
+        const int room = samples->room ? 2 * samples->room : 256;
+        Sample *list = realloc(samples->list, (size_t)room * sizeof *list);
+        if (!list) {
+            samples->failed = 1;
+            return;
+        }
+        samples->list = list;
+        samples->room = room;
+    }
+    samples->list[samples->count++] = *sample;
+}
 
 /* Number of elements of about that pitch along a length. */
 static int divide(double length, double pitch, int least) {
