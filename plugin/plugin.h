@@ -10,9 +10,9 @@ void plugin_register(void);
 /* The ground of the model's instance in this mjData; NULL when the model has none. */
 const Soft *plugin_soft(const mjModel *m, const mjData *d);
 
-/* As live_print and live_change, of the instance of this name, or of the only one (NULL). d: one of this model, between
- * two steps. What is wrong is a line in error[size], and the result then negative. Python's
- * mild.ground calls them. */
+/* As live_print and live_change, of the instance of this name, or of the only one (NULL). d: one of
+ * this model, between two steps. What is wrong is a line in error[size], and the result then
+ * negative. Python's mild.ground calls them. */
 int plugin_ground_print(const mjModel *m, const mjData *d, const char *name, int label, char *text,
                         int size);
 int plugin_ground_change(const mjModel *m, mjData *d, const char *name, int label, const char *text,

@@ -17,8 +17,7 @@
 #include "ground/law/models.h"
 #include "ground/soil/soil.h"
 #include "identify/belief/log.h"
-#include "identify/fit_drag.h"
-#include "identify/fit_slide.h"
+#include "identify/fit_law.h"
 #include "identify/press.h"
 
 typedef struct {

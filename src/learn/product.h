@@ -25,8 +25,8 @@ void product(char transpose_a, char transpose_b, int m, int n, int k, const floa
 /* Bool: this processor multiplies bfloat16 (AVX512_BF16, AMX). */
 int product_has_bf16(void);
 
-/* As product, with factors rounded to bfloat16 and sums in float. Returns 0, or 1 when memory runs out or oneDNN fails, with c as it
- * was or partly written. */
+/* As product, with factors rounded to bfloat16 and sums in float. Returns 0, or 1 when memory runs
+ * out or oneDNN fails, with c as it was or partly written. */
 int product_bf16(char transpose_a, char transpose_b, int m, int n, int k, const float *a, int lda,
                  const float *b, int ldb, float beta, float *c, int ldc);
 

@@ -30,7 +30,8 @@ void foot_set_pose(FootScratch *foot, const MildTerrain *terrain, const double *
 void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints);
 /* Depth of every element of a foot on uneven ground, and the gradient under it. */
 void foot_surface(FootScratch *foot, const MildTerrain *terrain);
-/* Sets `least` for the motion of foot f. steepest: upper bound [-] on the gradient of the ground. */
+/* Sets `least` for the motion of foot f. steepest: upper bound [-] on the gradient of the
+ * ground. */
 void foot_set_least(FootScratch *foot, const MildContactInput *input, double steepest, int f);
 /* Bool: no element can touch in this step, seen from the bounding box. Sets reach and away. After
  * foot_set_pose and foot_set_least. */
@@ -139,7 +140,7 @@ void lanes_sum(const Lanes *lanes, int count, double *sums);
 void moments(const Real *xs, const Real *ys, int end, const Real *a, const Real *b, const Real *c,
              double sums[3][6]);
 
-/* ---- newton.c and sweep.c: the equations, V+ = V_free + A W(V+) (docs/model.md, section 7) ---- */
+/* ---- newton.c and sweep.c: V+ = V_free + A W(V+) (docs/model.md, section 7) ---- */
 
 /* The solvers leave the impulses in the slots and the wrenches in the scratch, and set velocity,
  * residual, iterations and converged of the result. */
