@@ -10,7 +10,7 @@
 typedef struct {
     int body;         /* that carries the sole */
     int site;         /* whose frame is the foot's; -1: the body's frame */
-    int shell;        /* bool: of `body`, elements all over its shapes (body.h) */
+    int shell;        /* bool: of `body`, elements all over its shapes (body.c) */
     int round;        /* bool: a sphere that transmits no moment */
     double center[3]; /* [m] round: centre of the sphere, body frame */
     double radius;    /* [m] round */

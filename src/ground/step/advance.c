@@ -131,7 +131,7 @@ static void foot_planes(const FootScratch *all, double height, const Memory *mem
  * element reversed. */
 static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory *all,
                                                   const int32_t *material, int turned) {
-    const int end = a->foot->padded & -VECTOR_LANES; /* changes nothing; see moments.c */
+    const int end = a->foot->padded & -VECTOR_LANES; /* changes nothing; no loop for a remainder */
     const double *depth_max = all->depth_max;
     int32_t *remembered = all->material;
     if (turned) {
