@@ -13,24 +13,6 @@
 #define SHAPE_SKIN 1e-6 /* [m] shapes closer than this touch */
 #define SHAPE_PI 3.14159265358979323846
 
-void samples_add(Samples *samples, const Sample *sample) {
-    if (samples->count == samples->most || samples->failed) {
-        samples->full |= samples->count == samples->most;
-        return;
-    }
-    if (samples->count == samples->room) {
-        const int room = samples->room ? 2 * samples->room : 256;
-        Sample *list = realloc(samples->list, (size_t)room * sizeof *list);
-        if (!list) {
-            samples->failed = 1;
-            return;
-        }
-        samples->list = list;
-        samples->room = room;
-    }
-    samples->list[samples->count++] = *sample;
-}
-
 /* Number of elements of about that pitch along a length. */
 static int divide(double length, double pitch, int least) {
     return (int)fmax(fmin(round(length / pitch), SOLE_ELEMENTS_MAX), least);

@@ -1,5 +1,4 @@
 /* Materials of the slots: of one or, near a smooth border, a mixture of two. */
-#define POWER_CALLED /* power.h: no vector loop here needs a power */
 #include <string.h>
 
 #include "ground/law/begin.h"
@@ -179,19 +178,5 @@ void slots_materials(const FootScratch *foot, const MildTerrain *terrain, const 
         foot->slot_material[i] = m;
         foot->slot_holder[i] = e;
         slot_set_mixture(foot, i, e, m);
-    }
-}
-
-/* This loop is not in vectors, for which a power is long: few feet stand on ground without memory
- * beside other ground. */
-void slots_elastic(const FootScratch *foot) {
-    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
-        memset(s->fx, 0, sizeof s->fx);
-    }
-    for (int i = 0; foot->curves & LAW_ELASTIC && i < foot->active; i++) {
-        Slots *s = slot_block(foot, i);
-        const int l = i % SLOT_LANES;
-        const Element element = slot_element(s, l);
-        s->fx[l] = law_elastic_force(&element.law, LAW_ELASTIC, element.middle);
     }
 }

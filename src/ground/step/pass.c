@@ -271,8 +271,11 @@ void contact_pass_held(MildScratch *scratch, double dt, const double *twist) {
     pass(scratch, dt, twist, 1);
 }
 
-void moments(const Real *xs, const Real *ys, int end, const Real *a, const Real *b, const Real *c,
-             double sums[3][6]) {
+/* Sums over slots of each of a, b and c times 1, x, y, x^2, xy, y^2. The arrays are those of the
+ * first block of slots. Three at a time are as many sums as the registers hold. end: slots, rounded
+ * up to whole blocks. */
+static void moments(const Real *xs, const Real *ys, int end, const Real *a, const Real *b,
+                    const Real *c, double sums[3][6]) {
     LaneVector A[6] = {{0.0}}, B[6] = {{0.0}}, C[6] = {{0.0}};
     for (int i = 0; i < end * (int)SLOT_NUMBERS; i += SLOT_LANES * (int)SLOT_NUMBERS) {
         const LaneVector x = lanes_load(xs + i), y = lanes_load(ys + i);
@@ -300,6 +303,28 @@ void moments(const Real *xs, const Real *ys, int end, const Real *a, const Real 
     lanes_sum((const Lanes *)A, 6, sums[0]);
     lanes_sum((const Lanes *)B, 6, sums[1]);
     lanes_sum((const Lanes *)C, 6, sums[2]);
+}
+
+/* Three times the loop for x and y, over (x, y), (y, z) and (z, x): a loop of its own would be
+ * faster and larger. */
+static void shell_moments(const FootScratch *foot, ShellMoments M) {
+    static const uint8_t place[3][6] = {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 6, 7, 8}, {0, 3, 1, 8, 9, 4}};
+    const Slots *s = foot->slot;
+    const Real *const at[3] = {s->x, s->y, s->z};
+    const Real *const h[3][3] = {
+        {s->hxx, s->hxy, s->hxz}, {s->hyx, s->hyy, s->hyz}, {s->hzx, s->hzy, s->hzz}};
+    for (int row = 0; row < 3; row++) {
+        for (int pair = 0; pair < 3; pair++) {
+            double sums[3][6];
+            moments(at[pair], at[(pair + 1) % 3], foot_end(foot), h[row][0], h[row][1], h[row][2],
+                    sums);
+            for (int c = 0; c < 3; c++) {
+                for (int k = 0; k < 6; k++) {
+                    M[row][c][place[pair][k]] = sums[c][k];
+                }
+            }
+        }
+    }
 }
 
 /* Sums over the foot of each entry of h times 1, x, y, x^2, xy, y^2. They determine the foot's
@@ -373,7 +398,9 @@ void contact_hessian(MildScratch *scratch) {
         const int f = scratch->list[k];
         const FootScratch *foot = &scratch->foot[f];
         if (foot->shell) {
-            shell_hessian(foot, scratch->hessian[f]);
+            ShellMoments moved;
+            shell_moments(foot, moved);
+            shell_hessian(foot, moved, scratch->hessian[f]);
             continue;
         }
         Moments sums;

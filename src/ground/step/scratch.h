@@ -122,6 +122,8 @@ struct MildScratch {
 int scratch_fits(const MildScratch *scratch, const MildGround *ground);
 /* Computes the world position of every element: point_x, point_y, point_z. */
 void foot_points(const FootScratch *foot);
+/* The force of ground without memory under each slot [N], into the working array fx. */
+void slots_elastic(const FootScratch *foot);
 
 /* Slots in use, rounded up to whole blocks. */
 static inline int foot_end(const FootScratch *foot) {

@@ -196,29 +196,6 @@ void shell_lean(const FootScratch *foot, const Motion *now) {
 
 /* ---- hessian ---- */
 
-/* Moments of the entries of h, by 1, x, y, z, x^2, xy, y^2, yz, z^2, zx. */
-typedef double ShellMoments[3][3][10];
-
-/* Three times the loop for x and y, over (x, y), (y, z) and (z, x): a loop of its own would be
- * faster and larger. */
-static void shell_moments(const FootScratch *foot, ShellMoments M) {
-    static const int place[3][6] = {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 6, 7, 8}, {0, 3, 1, 8, 9, 4}};
-    const Slots *s = foot->slot;
-    const Real *const at[3] = {s->x, s->y, s->z};
-    const Real *const h[3][3] = {
-        {s->hxx, s->hxy, s->hxz}, {s->hyx, s->hyy, s->hyz}, {s->hzx, s->hzy, s->hzz}};
-    for (int row = 0; row < 3; row++) {
-        for (int pair = 0; pair < 3; pair++) {
-            double sums[3][6];
-            moments(at[pair], at[(pair + 1) % 3], foot_end(foot), h[row][0], h[row][1], h[row][2],
-                    sums);
-            for (int k = 0; k < 18; k++) {
-                M[row][k / 6][place[pair][k % 6]] = sums[k / 6][k % 6];
-            }
-        }
-    }
-}
-
 /* torque += p x I */
 static void shell_cross(const double *p, const double *I, double *torque) {
     for (int k = 0; k < 3; k++) {
@@ -227,10 +204,8 @@ static void shell_cross(const double *p, const double *I, double *torque) {
     }
 }
 
-void shell_hessian(const FootScratch *foot, double *H) {
+void shell_hessian(const FootScratch *foot, const ShellMoments M, double *H) {
     static const int product[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 9}, {2, 5, 6, 7}, {3, 9, 7, 8}};
-    ShellMoments M;
-    shell_moments(foot, M);
     memset(H, 0, 36 * sizeof *H);
     for (int k = 0; k < 4; k++) {
         double rows[3][6] = {{0.0}};

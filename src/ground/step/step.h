@@ -80,8 +80,6 @@ SlotLaw mixture_law(const FootScratch *foot, const DerivedLaw *derived, int32_t 
 void slots_materials(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory);
 /* Gives the padding a law without force at any depth. */
 void slots_pad(const FootScratch *foot);
-/* The force of ground without memory under each slot [N], into the working array fx. */
-void slots_elastic(const FootScratch *foot);
 
 /* ---- shell.c: shells (docs/model.md, section 20): elements with a height, normal and area ---- */
 
@@ -101,8 +99,10 @@ double shell_loaded(const FootScratch *foot, double *area);
  * it, into `ahead`. On ground with LAW_HEAP. */
 void shell_lean(const FootScratch *foot, const Motion *now);
 
-/* After a pass: that of pass.c with p = sum over four factors (1, x, y, height). H: [36]. */
-void shell_hessian(const FootScratch *foot, double *H);
+/* Moments of the entries of -dI/dv of a shell's slots, by 1, x, y, z, x^2, xy, y^2, yz, z^2, zx. */
+typedef double ShellMoments[3][3][10];
+/* The hessian as in pass.c with p = sum over four factors (1, x, y, height). H: [36]. */
+void shell_hessian(const FootScratch *foot, const ShellMoments M, double *H);
 
 /* ---- frame.c: feet that press in a frame of their own (law/frame.h) ---- */
 
@@ -133,12 +133,6 @@ void contact_hessian(MildScratch *scratch);
 
 /* sums[k]: of the lanes of lanes[k], in their order. */
 void lanes_sum(const Lanes *lanes, int count, double *sums);
-
-/* Sums over slots of each of a, b and c times 1, x, y, x^2, xy, y^2. The arrays are those of the
- * first block of slots. Three at a time are as many sums as the registers hold. end: slots, rounded
- * up to whole blocks. */
-void moments(const Real *xs, const Real *ys, int end, const Real *a, const Real *b, const Real *c,
-             double sums[3][6]);
 
 /* ---- newton.c and sweep.c: V+ = V_free + A W(V+) (docs/model.md, section 7) ---- */
 
