@@ -10,6 +10,10 @@
  * motion. */
 #define LISTED_EXTRA_SPEED 2.0
 
+Motion foot_motion(const FootScratch *foot, const double *V) {
+    return foot_moves(foot, V);
+}
+
 void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
     for (int i = 0; i < foot->padded; i++) {
         double slope[2];

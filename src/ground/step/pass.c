@@ -355,7 +355,6 @@ static __attribute__((noinline)) void factor_add(const FootScratch *foot, const 
                                                  double *H) {
     static const int product[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
     Three rows[6] = {{0.0}}; /* of the three rows of h: [M_k0, N_k] */
-#pragma GCC unroll 3
     for (int l = 0; l < 3; l++) {
         const double *p = foot->lever[l];
         const int at = product[k][l];

@@ -5,7 +5,7 @@
  *                             pass.c      impulses at a trial velocity, for newton.c
  *                             energy.c    solves again where friction has created energy
  *     mild_ground_advance     advance.c   what the ground remembers
- *     mild_scratch_elements   scratch.c   what each element did
+ *     mild_scratch_elements   elements.c  what each element did
  */
 #ifndef MILD_GROUND_STEP_H
 #define MILD_GROUND_STEP_H
