@@ -22,32 +22,20 @@ if(CMAKE_C_COMPILER_ID STREQUAL GNU)
     target_compile_definitions(mild_options INTERFACE MILD_WIDEST_VECTORS)
   endif()
 endif()
-# Small, because every simulator loads it: -O3 or -O2 for the loops over elements, which take most of a step, -Os for what else a step
-# calls, -Oz for the rest. `mild bench ground` says what a level costs.
+# Small, because every simulator loads it: -O2 for the loops that take most of a step, -Os for the rest.
 # No exception passes through C, so no tables to unwind it by. A section for each function and table: a program that links the
 # archive with -Wl,--gc-sections takes only what it calls.
-include(CheckCCompilerFlag)
-check_c_compiler_flag(-Oz mild_has_oz) # gcc since 12
-set(often "advance|carry|drag|imprint|model_bekker|prepare|resist|slot_impulse")
-set(loops "gather|locate|moments|newton|newton_step|plate|solve|sweep")
-set(smallest $<IF:$<BOOL:${mild_has_oz}>,-Oz,-Os>)
-if(CMAKE_C_COMPILER_ID STREQUAL GNU) # nothing moves ahead of a loop: 1 kB
-  list(APPEND smallest -fno-tree-loop-im -fno-move-loop-invariants)
-endif()
+set(loops "locate|newton|newton_step|pass|solve|sweep")
 set(ground_base_sources) # what libmild has of the layer base (cmake/Library.cmake)
 foreach(name error field text)
   list(APPEND ground_base_sources ${CMAKE_CURRENT_SOURCE_DIR}/base/${name}.c)
 endforeach()
 foreach(source ${ground_sources} ${ground_base_sources})
   get_filename_component(name ${source} NAME_WE)
-  if(name STREQUAL pass)
-    set(level -O3)
-  elseif(name MATCHES "^(${loops})$")
+  if(name MATCHES "^(${loops})$")
     set(level -O2)
-  elseif(name MATCHES "^(${often})$")
-    set(level -Os)
   else()
-    set(level ${smallest})
+    set(level -Os)
   endif()
   set_property(SOURCE ${source} APPEND PROPERTY COMPILE_OPTIONS
     "$<$<CONFIG:Release>:-fno-asynchronous-unwind-tables;-ffunction-sections;-fdata-sections;-fno-plt>"
@@ -55,8 +43,5 @@ foreach(source ${ground_sources} ${ground_base_sources})
 endforeach()
 # The element's law uses fused multiply-add, and one instruction for each maximum. NaN is therefore detected elsewhere: in
 # solve.c, and for materials in mixture.c.
-set(fused ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/pass.c ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/moments.c)
-set_property(SOURCE ${fused} APPEND PROPERTY COMPILE_OPTIONS -ffp-contract=fast -ffinite-math-only -fno-signed-zeros)
-# No constant moves ahead of their loops, which have no register left for it: 6 kB.
-set_property(SOURCE ${fused} APPEND PROPERTY COMPILE_OPTIONS
-  "$<$<AND:$<CONFIG:Release>,$<C_COMPILER_ID:GNU>>:-fno-gcse;-fno-ipa-cp-clone;-fira-loop-pressure;-flive-range-shrinkage>")
+set_property(SOURCE ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/pass.c APPEND PROPERTY COMPILE_OPTIONS
+  -ffp-contract=fast -ffinite-math-only -fno-signed-zeros)

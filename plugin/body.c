@@ -1,4 +1,4 @@
-#include "plugin/body.h"
+#include "plugin/foot.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-#include "plugin/check.h"
+#include "plugin/plugin.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -8,8 +8,6 @@
 
 #include "base/text.h"
 #include "ground/sole/sole.h"
-#include "plugin/body.h"
-#include "plugin/wheel.h"
 
 #define WORD 128          /* bytes of a name */
 #define SOLE_BAND 0.01    /* [m] what lies higher above the lowest point is not the sole */

@@ -10,7 +10,7 @@
 typedef struct {
     int body;         /* that carries the sole */
     int site;         /* whose frame is the foot's; -1: the body's frame */
-    int shell;        /* bool: of `body`, elements all over its shapes (body.h) */
+    int shell;        /* bool: of `body`, elements all over its shapes (body.c) */
     int round;        /* bool: a sphere that transmits no moment */
     double center[3]; /* [m] round: centre of the sphere, body frame */
     double radius;    /* [m] round */
@@ -42,5 +42,22 @@ int foot_may_touch_floor(const mjModel *m, const Foot *foot, int geom);
 
 /* Present place of the foot's frame. */
 void foot_pose(const mjData *d, const Foot *foot, double position[3], double rotation[9]);
+
+/* ---- body.c: bodies that touch the ground with any side, such as shins, trunk or wheels ---- */
+
+/* Covers the shapes of a body with elements. pitch: [m] of the ground's law, that of the feet.
+ * compiling: as for feet_create; a body with meshes then gets elements enough for the room that
+ * their bounding boxes may need. */
+MildStatus body_shell(const mjModel *m, const PluginDef *def, double pitch, int compiling,
+                      Foot *foot, MildError *error);
+
+/* ---- wheel.c: feet that turn, such as wheels and rollers ---- */
+
+/* A sole is cut once, in the pose of the file, and turns with its body; that of a wheel would soon
+ * be on top. Fails for a foot whose shapes are as high over the ground after a turn about a
+ * horizontal axis as before, when a joint allows the turn: the axis is that of a hinge above the
+ * foot that turns by more than 30 degrees, or of one of the shapes when their body moves freely.
+ * Round feet may. */
+MildStatus wheel_check(const mjModel *m, const PluginDef *def, const Foot *foot, MildError *error);
 
 #endif

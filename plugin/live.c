@@ -1,10 +1,9 @@
-#include "plugin/live.h"
+#include "plugin/plugin.h"
 
 #include <stdio.h>
 #include <string.h>
 
 #include "ground/law/models.h"
-#include "plugin/visual.h"
 
 #define NAME 64 /* bytes */
 

@@ -1,15 +1,37 @@
 /* The engine plugin: soft ground under any MJCF (docs/plugin.md). It acts at two stages, because
  * MuJoCo has a stage of actuation only in models with actuators (soft.h); at a third it says what
- * it did (sensor.h). */
+ * it did (sensor_write). */
 #include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "plugin/check.h"
-#include "plugin/live.h"
 #include "plugin/plugin.h"
-#include "plugin/sensor.h"
-#include "plugin/visual.h"
+
+/* ---- sensors ---- */
+
+static void write_foot(const MildFootResult *foot, mjtNum *data) {
+    mju_copy3(data, foot->force);
+    mju_copy3(data + 3, foot->torque);
+    mju_copy3(data + 6, foot->pressure_center);
+    data[9] = foot->area;
+    data[10] = foot->depth_max;
+    data[11] = foot->depth_mean;
+}
+
+void sensor_write(const Soft *soft, const mjModel *m, mjData *d, int instance) {
+    for (int s = 0; s < m->nsensor; s++) {
+        if (m->sensor_type[s] != mjSENS_PLUGIN || m->sensor_plugin[s] != instance) {
+            continue;
+        }
+        mjtNum *data = d->sensordata + m->sensor_adr[s];
+        mju_zero(data, m->sensor_dim[s]);
+        for (int f = 0; f < soft->feet && soft->known; f++) {
+            write_foot(&soft->contact.foot[f], data + (ptrdiff_t)(SENSOR_NUMBERS * f));
+        }
+    }
+}
+
+/* ---- stages ---- */
 
 /* NULL in an mjData whose `init` has failed, which the compiler may go on with. */
 static Soft *soft_of(const mjData *d, int instance) {

@@ -19,7 +19,7 @@
 
 #include "ground/law/width.h"
 #include "ground/step/scratch.h"
-#include "plugin/visual.h"
+#include "plugin/plugin.h"
 
 #define JOINT_ROUNDS 30  /* solves of the ground with the constraints in its response */
 #define JOINT_TRIES 12   /* of them in the same zones */

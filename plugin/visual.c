@@ -1,4 +1,4 @@
-#include "plugin/visual.h"
+#include "plugin/plugin.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "plugin/wheel.h"
+#include "plugin/foot.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,4 +1,3 @@
-#include "bench/step.h"
 
 #include <mujoco/mujoco.h>
 #include <stdlib.h>

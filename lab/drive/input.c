@@ -1,4 +1,4 @@
-#include "drive/input.h"
+#include "drive/drive.h"
 
 #include <errno.h>
 #include <fcntl.h>

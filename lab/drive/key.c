@@ -1,4 +1,4 @@
-#include "drive/key.h"
+#include "drive/packet.h"
 
 #include <sodium.h>
 #include <stdlib.h>

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "control/speed_hold.h"
-#include "drive/sensor.h"
 #include "identify/belief/log.h"
 
 #define CLOCK_DRIFT 1e-3 /* [-] by which two clocks may run apart */

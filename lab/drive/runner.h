@@ -15,9 +15,80 @@
 
 #include "control/controller.h"
 #include "drive/packet.h"
-#include "drive/times.h"
-#include "drive/watch.h"
+#include "env/task/task.h"
 #include "identify/belief/belief.h"
+
+/* ---- times.c: a histogram of durations from 1 us to 100 s ---- */
+
+enum { TIMES_DECADE = 24, TIMES_BINS = 8 * TIMES_DECADE }; /* each bin 10 % wide */
+
+typedef struct {
+    long count, bin[TIMES_BINS];
+    double longest; /* [s] */
+} Times;
+
+void times_add(Times *times, double seconds);
+/* [s] Upper end of the bin where this share of the durations is reached, at most the longest; 0
+ * when there are none. */
+double times_quantile(const Times *times, double share);
+/* [s] Lower end of a bin; index TIMES_BINS: upper end of the last. */
+double times_edge(int bin);
+
+/* ---- sensor.c: whether what sensors say can be true, and what the policy is shown of it ---- */
+
+typedef struct {
+    double turn;  /* [rad/s] of the base; 0: none */
+    double speed; /* [rad/s] of a joint; 0: none */
+    double angle; /* [rad] of a joint beyond its range; negative: none */
+} SensorLimits;
+
+/* Bool: a number is beyond its limit, or has changed since the state `before` (NULL: there is
+ * none) by more than the speeds of the two allow in that time. `why` names the number. */
+int sensor_is_impossible(const Robot *robot, const SensorLimits *limits, const StatePacket *before,
+                         const StatePacket *state, char *why, size_t size);
+
+TaskSensors sensor_read(const StatePacket *state, int joints);
+/* Brings the reading into the range that the training of the shipped policies sees
+ * (lab/drive/README.md, section 2). */
+void sensor_clip(const Robot *robot, TaskSensors *reading);
+
+/* ---- watch.c: whether sensors agree ---- */
+
+/* With time, because a number that repeats is old, and with each other, because an angle is the
+ * integral of its speed. Each state alone may be possible (sensor.c). */
+
+typedef enum { WATCH_REPEAT, WATCH_TURN, WATCH_ANGLE, WATCH_CHECKS } WatchCheck;
+
+/* Sums over the states whose weight falls by 1/e in 4 s. */
+typedef struct {
+    double sum, squares;
+} Disagreement;
+
+/* Bits that stay the same. */
+typedef struct {
+    int ticks;                      /* for so many */
+    double moved;                   /* [rad] the way of a target from where it was then */
+    float target[ROBOT_JOINTS_MAX]; /* [rad] then */
+} Repeat;
+
+/* Of one robot; zeros before the first state. */
+typedef struct {
+    int begun; /* bool */
+    StatePacket before;
+    double pace;                          /* [-] states that the robot sends in a period */
+    double weight;                        /* of the states */
+    Disagreement turn[3];                 /* [rad] the quaternion beside the gyro, own axes */
+    Disagreement angle[ROBOT_JOINTS_MAX]; /* [rad] angles beside speeds */
+    Repeat imu, joint[ROBOT_JOINTS_MAX];
+    double share[WATCH_CHECKS]; /* [-] of a bound, the largest so far; a fault is above 1 */
+} Watch;
+
+/* A tick with a new state. target: [joints] the newest one sent. Bool: the sensors do not agree.
+ * `why` says which. A limit of 0 (turn, speed) turns off the check of what it is of. */
+int watch_disagrees(Watch *watch, const Robot *robot, const SensorLimits *limits,
+                    const StatePacket *state, const float *target, char *why, size_t size);
+
+/* ---- runner.c ---- */
 
 typedef struct {
     const char *policy;  /* file */

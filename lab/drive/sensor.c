@@ -1,4 +1,4 @@
-#include "drive/sensor.h"
+#include "drive/runner.h"
 
 #include <math.h>
 #include <stdio.h>

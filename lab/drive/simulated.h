@@ -3,7 +3,7 @@
 #ifndef DRIVE_SIMULATED_H
 #define DRIVE_SIMULATED_H
 
-#include "drive/key.h"
+#include "drive/packet.h"
 #include "drive/udp.h"
 #include "env/task/task.h"
 

@@ -1,4 +1,4 @@
-#include "drive/times.h"
+#include "drive/runner.h"
 
 #include <math.h>
 

@@ -1,4 +1,4 @@
-#include "drive/watch.h"
+#include "drive/runner.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -96,7 +96,7 @@ class GroundEntry:
         self.material = mild.Material(m, phi=solid, rho=ground["density"], mu=ground["friction"], **moves)
 
     def fit_slip(self, soles, data, drags):
-        """slip_length and grip as `mild fit` finds them (src/identify/fit_drag.h). A level drag does not determine regain_length, and
+        """slip_length and grip as `mild fit` finds them (src/identify/fit_law.h). A level drag does not determine regain_length, and
         nothing fitted determines refill."""
         hold = {name: getattr(self.material, name) for name in ("alpha", "phi", "rho", "mu")}
         hold["slip_growth"] = GROWTH

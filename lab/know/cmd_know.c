@@ -12,7 +12,7 @@
 #include "base/file.h"
 #include "base/text.h"
 #include "identify/belief/file.h"
-#include "know/judge.h"
+#include "know/know.h"
 #include "lab/commands.h"
 #include "run/config/experiment_keys.h"
 

@@ -1,4 +1,4 @@
-#include "know/prior.h"
+#include "know/know.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "know/walks.h"
+#include "know/know.h"
 
 #include <math.h>
 #include <stdlib.h>

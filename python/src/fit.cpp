@@ -6,8 +6,7 @@
 extern "C" {
 #include "identify/fit.h"
 #include "identify/fit_csv.h"
-#include "identify/fit_drag.h"
-#include "identify/fit_slide.h"
+#include "identify/fit_law.h"
 }
 
 static FitPlate plate_of(const Sole &sole) {

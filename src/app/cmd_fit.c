@@ -9,7 +9,6 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/figure.h"
-#include "app/fit_walk.h"
 #include "app/fit_work.h"
 #include "app/grounds.h"
 #include "app/report.h"
@@ -18,8 +17,7 @@
 #include "ground/law/models.h"
 #include "ground/soil/soil.h"
 #include "identify/belief/log.h"
-#include "identify/fit_drag.h"
-#include "identify/fit_slide.h"
+#include "identify/fit_law.h"
 #include "identify/press.h"
 
 typedef struct {

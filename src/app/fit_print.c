@@ -7,7 +7,7 @@
 #include "app/fit_work.h"
 #include "app/report.h"
 #include "base/text.h"
-#include "identify/fit_drag.h"
+#include "identify/fit_law.h"
 
 /* ---- the table ---- */
 

@@ -1,4 +1,4 @@
-#include "app/fit_walk.h"
+#include "app/fit_work.h"
 
 #include <math.h>
 #include <stdio.h>

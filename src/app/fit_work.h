@@ -5,6 +5,7 @@
 #include "app/cli.h"
 #include "identify/fit.h"
 #include "identify/fit_csv.h"
+#include "mild/error.h"
 
 enum { FIT_KINDS = 4, FIT_FIELDS_MAX = 64 };
 
@@ -45,5 +46,10 @@ const char *fit_residual_text(const FitWork *work, FitKind kind, char *text, siz
  * leave numbers of the model unknown. command: the command line, for its head. */
 MildStatus fit_soil_save(const FitWork *work, const char *command, const char *path,
                          MildError *error);
+
+/* ---- fit_walk.c: of a robot's log, what its ground was ---- */
+
+/* Prints the posterior, and each change of ground on the way. json: NULL: none. */
+MildStatus fit_walk(const char *path, int trial, const char *json, MildError *error);
 
 #endif

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "identify/fit_drag.h"
+#include "identify/fit_law.h"
 #include "identify/fit_solve.h"
 
 /* [-] An effect below this share of the force is none. */

@@ -1,4 +1,4 @@
-#include "identify/fit_drag.h"
+#include "identify/fit_law.h"
 
 #include <math.h>
 

@@ -6,7 +6,6 @@
 
 #include "ground/law/models.h"
 #include "ground/sole/sole.h"
-#include "identify/fit_drag.h"
 
 /* ---- combinations ---- */
 

@@ -13,7 +13,7 @@
  * Under the pressure p the ground of bekker resists a slip j by the shear stress
  *     s(j) = (cohesion + p mu) (1 - exp(-j/shear_length))
  * and a ring that turns by an angle by the mean of s over it, weighted by the radius, which is its
- * torque over that of a stress of 1. A plate that slides where slip costs support: fit_drag.h. Pure
+ * torque over that of a stress of 1. A plate that slides where slip costs support: below. Pure
  * functions: thread safe. */
 #ifndef LAB_FIT_LAW_H
 #define LAB_FIT_LAW_H
@@ -66,5 +66,39 @@ double *fit_number(MildMaterial *material, const MildField *field);
  * the rows name. The material's `passive` and plate_width are ignored. */
 void fit_forces(FitKind kind, const FitPlate *plates, const MildMaterial *material,
                 const FitPoint *points, int count, double *force);
+
+/* ---- fit_drag.c: a plate that slides, on ground where slip costs support ---- */
+
+/* For mild and mild_merged.
+ *
+ * Ground that carries F_v(u) without slip carries, after the slip s and the fresh penetration a,
+ *     F = q F_v(u),   dq/ds = -q^2/slip_length,   dq/da = (1 - q)/regain_length
+ * with both lengths times 1 + slip_growth u/slip_length (slip_growth is not fitted), and holds the
+ * plate back by
+ *     H = min(mu, max(0.1, (3 + sqrt 8) grip (1 - q)/(2 - q))) F + side(u)
+ * (docs/model.md section 22; without grip by mu F). The shape of F_v is that of the fitted press.
+ * Its size is each record's own, by least squares, because a bed differs from the next by more than
+ * slip_length should feel. A row of F counts by 1/F, because the scatter of grains is as the root
+ * of the force (lab/grains/README.md). Pure functions: thread safe. */
+
+/* Bool: slip costs support under the model. */
+int fit_drag_is_modelled(MildModel model);
+
+/* Bool: a row is of the same record as the one before it. */
+int fit_drag_is_next(const FitPoint *row);
+/* What the rows of one record should have. */
+void fit_drag_forces(const FitPlate *plate, const MildMaterial *material, const FitPoint *points,
+                     int count, double *force);
+
+/* ---- fit_slide.c: the rows of a fit of such a plate, from those of its record ---- */
+
+/* The rows of a fit, rows[2 * count], from those that fit_sliding found on a plate. curve: the
+ * force that a press of the ground has. Returns their number; 0 where nothing pushes up. */
+int fit_slide_rows(const FitPlate *plate, const MildMaterial *curve, const FitPoint *slide,
+                   int count, FitPoint *rows);
+
+/* The ground that a fit of FIT_DRAG starts from: the press's numbers where the press determines
+ * them, else `known`'s. press: NULL: none was fitted. */
+MildMaterial fit_slide_base(const MildMaterial *known, const MildMaterial *press);
 
 #endif

@@ -22,7 +22,7 @@ typedef enum {
     FIT_PRESS,  /* a plate on its way down */
     FIT_UNLOAD, /* a plate on its way up */
     FIT_SHEAR,  /* a plate or ring that slides under load, as stresses */
-    FIT_DRAG    /* a plate that slides where slip costs support, fit_drag.h */
+    FIT_DRAG    /* a plate that slides where slip costs support, fit_law.h */
 } FitKind;
 
 /* One row of a record. time and speed may be NaN where unknown; fit_speeds fills speed and

@@ -6,7 +6,7 @@
 
 #include "learn/noise.h"
 #include "learn/ppo_gradient.h"
-#include "learn/ppo_returns.h"
+#include "learn/ppo_private.h"
 #include "learn/ppo_step.h"
 #include "learn/returns.h"
 

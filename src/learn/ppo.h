@@ -20,8 +20,8 @@ Ppo *ppo_create_part(const PpoDef *def, Policy *policy, Pool *pool, const PpoMir
                      int envs, uint64_t seed, Ranks *ranks, MildError *error);
 void ppo_destroy(Ppo *ppo);
 int ppo_first_env(const Ppo *ppo);
-/* Computes on another device from now on (learn/backend.h). Takes ownership of the backend, which
- * ppo_destroy destroys. */
+/* Computes on another device from now on (PpoBackend, ppo_private.h). Takes ownership of the
+ * backend, which ppo_destroy destroys. */
 struct PpoBackend;
 void ppo_use(Ppo *ppo, const struct PpoBackend *backend);
 /* The rollout. Its arrays are on the backend's device if ppo_is_resident, else on the CPU. The

@@ -4,13 +4,37 @@
 
 #include "base/pool.h"
 #include "device/ranks/ranks.h"
-#include "learn/backend.h"
 #include "learn/muon.h"
 #include "learn/order.h"
 #include "learn/policy.h"
 #include "learn/policy_private.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
+#include "mild/error.h"
+
+/* ---- backends ---- */
+
+/* A compute backend is the learner on a device other than the CPU: networks, optimiser and
+ * counters. It computes the same functions as ppo.c, from the same random numbers and equal up to
+ * rounding, so a resumed run may change its device. The rollout is in the arrays of the batch,
+ * which may be on the device too (ppo_is_resident).
+ *
+ * `self` is the first argument of every function. A function that fails gives the reason. */
+typedef struct PpoBackend {
+    void *self;
+    /* As ppo_act. With a resident rollout it only enqueues work, and errors show in update. */
+    MildStatus (*act)(void *self, int t, MildError *error);
+    /* As ppo_update, without the rows that the next rollout begins with if they are on the CPU.
+     * Sets the learner's counters and learning rate. */
+    MildStatus (*update)(void *self, PpoReport *report, MildError *error);
+    /* Parameters, moments, running mean of the weights and ppo->start from the device to the
+     * learner, and back, with the counters, seed and learning rate. */
+    MildStatus (*pull)(void *self, MildError *error);
+    MildStatus (*push)(void *self, MildError *error);
+    void (*destroy)(void *self);
+} PpoBackend;
+
+/* ---- the learner ---- */
 
 /* A minibatch consists of ppo.shards runs of samples, each with its own gradient, and a shard is
  * cut into chunks. Sums are taken in the order of the shards. So no result depends on the number of
@@ -68,5 +92,10 @@ MildStatus ppo_move_rollout(Ppo *ppo, const PpoBatch *device, MildError *error);
 static inline int ppo_piece_begin(int count, int piece) {
     return (int)((int64_t)count * piece / PPO_PIECES);
 }
+
+/* Generalised advantage estimation (Schulman et al. 2016). From batch->value: fills advantage
+ * (normalised over the usable samples), returns, and ppo->substitute and ppo->starved. A sample is
+ * usable if it is valid and its reward and value are finite. */
+void ppo_returns(Ppo *ppo, PpoReport *report);
 
 #endif

@@ -1,4 +1,4 @@
-#include "learn/ppo_returns.h"
+#include "learn/ppo_private.h"
 
 #include <math.h>
 

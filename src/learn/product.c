@@ -7,8 +7,6 @@
 #include <oneapi/dnnl/dnnl.h>
 #include <string.h>
 
-#include "learn/product_bf16.h"
-
 /* OpenMP's two calls, as its specification declares them: clang comes without omp.h. They set the
  * calling thread only. */
 extern void omp_set_num_threads(int threads);

@@ -1,4 +1,4 @@
-#include "learn/product_bf16.h"
+#include "learn/product.h"
 
 #include <oneapi/dnnl/dnnl.h>
 #include <pthread.h>

@@ -1,4 +1,4 @@
-#include "view/gl.h"
+#include "view/view_parts.h"
 
 #include <EGL/egl.h>
 #include <EGL/eglext.h>

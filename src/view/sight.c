@@ -1,4 +1,4 @@
-#include "view/sight.h"
+#include "view/view_parts.h"
 
 #include <math.h>
 

@@ -7,13 +7,11 @@
 #include <string.h>
 
 #include "view/follow.h"
-#include "view/gl.h"
-#include "view/inset.h"
 #include "view/look.h"
 #include "view/model.h"
 #include "view/relief.h"
-#include "view/sight.h"
 #include "view/smooth.h"
+#include "view/view_parts.h"
 
 #define VIEW_OVERLAP 1.0015F   /* [-] scale of a tile, which prevents gaps between tiles */
 #define VIEW_FINE 64           /* most tiles with imprints at once */

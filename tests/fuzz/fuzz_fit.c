@@ -3,7 +3,7 @@
 #include "fuzz.h"
 #include "identify/fit.h"
 #include "identify/fit_csv.h"
-#include "identify/fit_slide.h"
+#include "identify/fit_law.h"
 #include "unnamed_file.h"
 
 static void check(const FitValue *value) {

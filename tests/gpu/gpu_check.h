@@ -11,7 +11,7 @@
 #include "learn/cuda/learner.h"
 #include "learn/cuda/learner_private.h"
 #include "learn/ppo_gradient.h"
-#include "learn/ppo_returns.h"
+#include "learn/ppo_private.h"
 
 enum { ON_CPU, MIXED, RESIDENT };
 

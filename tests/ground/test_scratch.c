@@ -5,11 +5,11 @@
 enum { ROBOTS = 6 };
 
 static MildMaterial any_material(uint64_t *random) {
-    static const MildModel models[6] = {MILD_MODEL_MILD,      MILD_MODEL_MILD,
-                                        MILD_MODEL_MILD,      MILD_MODEL_ECC_SPRING,
-                                        MILD_MODEL_ECC_QUASI, MILD_MODEL_ECC_QUASI_3D};
+    static const MildModel models[8] = {
+        MILD_MODEL_MILD,      MILD_MODEL_MILD,         MILD_MODEL_MILD,   MILD_MODEL_ECC_SPRING,
+        MILD_MODEL_ECC_QUASI, MILD_MODEL_ECC_QUASI_3D, MILD_MODEL_BEKKER, MILD_MODEL_HUNT_CROSSLEY};
     MildMaterial m = kit_index(random, 5) ? kit_material(random) : mild_material_default();
-    m.model = (int)models[kit_index(random, 6)];
+    m.model = (int)models[kit_index(random, 8)];
     m.zeta = kit_uniform(random, 0.05, 1.5);
     m.passive = kit_index(random, 4) > 0;
     if (kit_index(random, 5) == 0) {

@@ -1,7 +1,7 @@
 /* Contact steps of shells: against plane soles, closed forms, differences, closed motions. */
 #include "surface_kit.h"
 
-#include "ground/step/pass.h"
+#include "ground/step/step.h"
 #include "ground/step/scratch.h"
 
 /* A random material of each model in turn. */

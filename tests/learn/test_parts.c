@@ -10,7 +10,7 @@
 #include "learn/noise.h"
 #include "learn/ppo.h"
 #include "learn/ppo_gradient.h"
-#include "learn/ppo_returns.h"
+#include "learn/ppo_private.h"
 #include "learn/product.h"
 #include "learn/vector.h"
 

@@ -2,7 +2,7 @@
  * they change nothing. */
 #include <math.h>
 
-#include "plugin/sensor.h"
+#include "plugin/plugin.h"
 #include "plugin_kit.h"
 
 #define OFF "contype='0' conaffinity='0'"

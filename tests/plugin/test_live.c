@@ -1,7 +1,7 @@
 /* The ground changes while it runs. */
 #include <math.h>
 
-#include "plugin/live.h"
+#include "plugin/plugin.h"
 #include "plugin_kit.h"
 
 #define PLATE                                                                                      \

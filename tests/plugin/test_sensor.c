@@ -2,7 +2,7 @@
  * of what stands still. */
 #include <math.h>
 
-#include "plugin/sensor.h"
+#include "plugin/plugin.h"
 #include "plugin_kit.h"
 
 #define GRAVITY 9.81

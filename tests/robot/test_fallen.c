@@ -32,7 +32,7 @@
 
 #include "all_robots.h"
 #include "ground/law/frame.h"
-#include "ground/step/frame.h"
+#include "ground/step/step.h"
 #include "ground/step/scratch.h"
 
 static const double seconds = 0.6; /* of a fall */

@@ -5,9 +5,9 @@
 #include <unistd.h>
 
 #include "base/random.h"
-#include "drive/input.h"
+#include "drive/drive.h"
 #include "drive/packet.h"
-#include "drive/times.h"
+#include "drive/runner.h"
 #include "files.h"
 
 #define SA01_CRC 0x974b2030u

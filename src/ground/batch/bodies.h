@@ -234,7 +234,7 @@ MILD_HD Real bodies_descent(const BodiesSetup *setup, Real radius, const Real *V
     return down + setup->steepest * level;
 }
 
-/* [m] Depth below which elements are listed; foot_least. */
+/* [m] Depth below which elements are listed; foot_set_least. */
 MILD_HD Real bodies_least(const BodiesSetup *setup, Real radius, const Real *V, const Real *free) {
     const Real descent =
         real_max(bodies_descent(setup, radius, V), bodies_descent(setup, radius, free));

@@ -1,3 +1,4 @@
+#define POWER_FN /* here lie the functions that files with POWER_CALLED call: power.h */
 #include "ground/law/element_law.h"
 
 Law law_line(double slope, double area, double bed_depth) {

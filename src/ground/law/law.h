@@ -46,7 +46,7 @@
  * (element_law.c). A model's `law` (model.h) fills in the numbers. `curves` is a constant in the
  * vector loops, so a curve costs nothing on ground that does not have it. law_variant says which
  * loop serves a foot; for a loop of the new curve alone, add it there and to the switches of
- * pass.c and prepare.c. Look at element_drag's callers (prepare.c, drag.h, contact.inc) if the
+ * pass.c and prepare.c. Look at element_drag's callers (prepare.c, contact.inc) if the
  * curve has a drag, and at resist.c if a resistive force may be blended with it. */
 #ifndef MILD_GROUND_LAW_H
 #define MILD_GROUND_LAW_H

@@ -42,7 +42,7 @@ typedef struct {
 } PowerWay;
 
 /* POWER_CALLED: defined by a file whose vector loops need no power. It calls the functions of
- * power.c, in place of a copy for each use. */
+ * element_law.c, in place of a copy for each use. */
 #ifdef POWER_CALLED
 Real real_exp2(Real x);
 Real real_pow(Real x, Real y);

@@ -7,8 +7,7 @@
  * (ElementMemory in element.h). */
 #include "ground/law/model.h"
 #include "ground/law/shear.h"
-#include "ground/step/carry.h"
-#include "ground/step/scratch.h"
+#include "ground/step/step.h"
 
 /* Wong 2008, table 2.3, gives n, k_c, k_phi, c and the angle of the first four soils, in the rows
  * named below. It gives K by the kind of ground: 10 mm for firm sand, 25 mm for loose sand, 6 mm

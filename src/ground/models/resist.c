@@ -4,6 +4,12 @@
 
 #include "ground/law/element_law.h"
 
+void mild_resist_plane(double beta, double gamma, double alpha[2]) {
+    const Alpha plane = plane_alpha(cos(2.0 * beta), sin(2.0 * beta), cos(gamma), sin(gamma));
+    alpha[0] = plane.x;
+    alpha[1] = plane.z;
+}
+
 void mild_resist_space(const double normal[3], const double direction[3], double alpha[3]) {
     double x = -direction[2];
     double z = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
@@ -86,7 +92,7 @@ static Plate face_plate(const FootScratch *foot, int e) {
 
 /* The foot's slots on `model`, among slots on others. in_space: bool. */
 static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain, int model,
-                             double dt, const Plate *plate, const Motion *now, int in_space) {
+                             double dt, const Plate *sole, const Motion *now, int in_space) {
     for (int i = 0; i < foot->active; i++) {
         Slots *s = slot_block(foot, i);
         const int l = i % SLOT_LANES;
@@ -96,10 +102,7 @@ static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain
         if (!slot_directed(s, l) || foot->slot_material[i] & SLOT_BARRED) {
             continue; /* blended with another curve: stays a level plate */
         }
-        Plate own = *plate;
-        if (foot->shell) {
-            own = face_plate(foot, foot->element[i]);
-        }
+        const Plate own = foot->shell ? face_plate(foot, foot->element[i]) : *sole;
         some_resist(s, l, dt, &own, now, in_space, foot->curves);
     }
 }

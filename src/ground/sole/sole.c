@@ -5,7 +5,7 @@
 
 #include "ground/law/law.h"
 #include "ground/sole/sole.h"
-#include "ground/sole/sole_edge.h"
+#include "ground/sole/sole_inside.h"
 
 #define SOLE_POINTS_MAX 4096 /* limited because the search for crossing edges is quadratic in it */
 #define RASTER_PHASES 16     /* raster offsets tried along each axis */

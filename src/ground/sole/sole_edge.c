@@ -1,4 +1,4 @@
-#include "ground/sole/sole_edge.h"
+#include "ground/sole/sole_inside.h"
 
 #include <math.h>
 

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "ground/sole/sole_mesh.h"
+#include "ground/sole/sole_inside.h"
 
 #define MESH_PIECES_MAX (1 << 21)
 #define MESH_CUT 0.25   /* [-] longest edge of a piece, over the pitch */
@@ -15,6 +15,24 @@ typedef struct {
     double normal[3];    /* [-] */
     double area;         /* [m^2] */
 } Triangle;
+
+void samples_add(Samples *samples, const Sample *sample) {
+    if (samples->count == samples->most || samples->failed) {
+        samples->full |= samples->count == samples->most;
+        return;
+    }
+    if (samples->count == samples->room) {
+        const int room = samples->room ? 2 * samples->room : 256;
+        Sample *list = realloc(samples->list, (size_t)room * sizeof *list);
+        if (!list) {
+            samples->failed = 1;
+            return;
+        }
+        samples->list = list;
+        samples->room = room;
+    }
+    samples->list[samples->count++] = *sample;
+}
 
 static double length_of(const double *a) {
     return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);

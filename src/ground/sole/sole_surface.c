@@ -3,9 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ground/sole/samples.h"
 #include "ground/sole/sole.h"
-#include "ground/sole/sole_mesh.h"
+#include "ground/sole/sole_inside.h"
 
 #define SHAPES_MAX 256
 #define MESH_MOST (1 << 20)

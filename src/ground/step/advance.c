@@ -4,10 +4,7 @@
 
 #include "ground/law/frame.h"
 #include "ground/law/remember.h"
-#include "ground/step/frame.h"
-#include "ground/step/moments.h"
-#include "ground/step/scratch.h"
-#include "ground/step/shell.h"
+#include "ground/step/step.h"
 
 /* The elements of a foot in one step. */
 typedef struct {
@@ -134,7 +131,7 @@ static void foot_planes(const FootScratch *all, double height, const Memory *mem
  * element reversed. */
 static __attribute__((noinline)) void foot_finish(const Advance *a, const Memory *all,
                                                   const int32_t *material, int turned) {
-    const int end = a->foot->padded & -VECTOR_LANES; /* changes nothing; see moments.c */
+    const int end = a->foot->padded & -VECTOR_LANES; /* changes nothing; no loop for a remainder */
     const double *depth_max = all->depth_max;
     int32_t *remembered = all->material;
     if (turned) {

@@ -16,7 +16,7 @@ static void foot_scatter(const MildScratch *scratch, int f) {
         const Slots *s = slot_block(foot, slot);
         const int i = slot % SLOT_LANES;
         const int e = foot->element[slot];
-        const Element element = slot_loaded(s, i, foot->curves);
+        const Element element = slot_loaded(s, i, LAW_ANY);
         const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_SHELL);
         const double beyond = element.depth + dt / 2 * v.descent - element.yield_depth;
         const int loaded = s->iz[i] > 0.0;
@@ -27,8 +27,8 @@ static void foot_scatter(const MildScratch *scratch, int f) {
         foot->normal[e] = world[2] * rate;
         foot->tangent_x[e] = world[0] * rate;
         foot->tangent_y[e] = world[1] * rate;
-        foot->flat[e] = law_flat_share(&element.law, foot->curves,
-                                       element.virgin_depth + (deeper ? beyond : 0.0));
+        foot->flat[e] =
+            law_flat_share(&element.law, LAW_ANY, element.virgin_depth + (deeper ? beyond : 0.0));
         foot->state[e] = (uint8_t)(!loaded  ? MILD_ELEMENT_FREE
                                    : deeper ? MILD_ELEMENT_VIRGIN
                                             : MILD_ELEMENT_UNLOADING);

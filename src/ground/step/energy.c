@@ -18,12 +18,11 @@
  * therefore takes energy both at the new speed and at the mean speed. It is still minus the
  * gradient of a convex function of v, so the solvers need no change. The elastic friction force
  * that such an element held is dropped. */
-#include "ground/step/energy.h"
+#include "ground/step/step.h"
 
 #include <string.h>
 
 #include "ground/law/friction.h"
-#include "ground/step/moments.h"
 
 /* [-] Share of the impulses' energy above which a step is solved again. Steps in walking stay below
  * it. The impulses' energy is up to four times the kinetic energy of the feet, because a passive

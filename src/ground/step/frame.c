@@ -1,9 +1,9 @@
-#include "ground/step/frame.h"
-
+/* Feet that press in a frame of their own (law/frame.h). */
 #include <string.h>
 
 #include "ground/law/frame.h"
 #include "ground/law/models.h"
+#include "ground/step/step.h"
 #include "ground/terrain/terrain.h"
 
 /* side: 1 into the world, -1 into the frame. */

@@ -1,20 +1,17 @@
 #include "ground/step/inside.h"
 
-#include "ground/law/element_law.h"
 #include "ground/law/models.h"
+#include "ground/step/step.h"
 
 InsideLaw mild_inside_law(const MildMaterial *material, double pitch, double width) {
-    const Law law = law_of(material, pitch, width);
-    const Share share = share_of(material, pitch, width);
-    const MildMaterial own = material_at(material, pitch);
-    const int slips = share.slip_rate > 0.0; /* then path adds no resistance */
+    const SlotLaw slot = material_law(material, pitch, width, width);
     return (InsideLaw){
-        .law = law,
-        .share = share,
-        .k_drift = slips ? 0.0 : own.k_drift,
-        .b_drift = slips ? 0.0 : own.b_drift,
-        .recovery = law_recovery(&law, recovery_of(material)),
-        .curves = curves_of(material, &law) | model_row(material->model)->motion,
+        .law = slot.law,
+        .share = slot.share,
+        .k_drift = slot.k_drift,
+        .b_drift = slot.b_drift,
+        .recovery = law_recovery(&slot.law, slot.recovery),
+        .curves = curves_of(material, &slot.law) | model_row(material->model)->motion,
     };
 }
 

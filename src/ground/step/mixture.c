@@ -1,9 +1,9 @@
-#include "ground/step/mixture.h"
-
+/* Materials of the slots: of one or, near a smooth border, a mixture of two. */
 #include <string.h>
 
 #include "ground/law/begin.h"
 #include "ground/law/models.h"
+#include "ground/step/step.h"
 #include "ground/terrain/terrain.h"
 
 /* Bool: material m is part of a mixture, encoded as in Memory (state.h). */
@@ -21,20 +21,24 @@ static int share_is_nan(const Share *share) {
     return isnan(share->slip_rate + share->regain_rate + share->grip + share->growth + share->side);
 }
 
-/* Derives what a material gives a slot. Where path costs support it adds no resistance. */
+SlotLaw material_law(const MildMaterial *material, double pitch, double width, double sides) {
+    const Share share = share_of(material, pitch, sides);
+    const MildMaterial own = material_at(material, pitch);
+    const int slips = share.slip_rate > 0.0;
+    return (SlotLaw){law_of(material, pitch, width), share, slips ? 0.0 : own.k_drift,
+                     slips ? 0.0 : own.b_drift, recovery_of(material)};
+}
+
 static __attribute__((cold)) void law_derive(const FootScratch *foot, const MildMaterial *material,
                                              DerivedLaw *derived) {
-    const Law law = law_of(material, foot->pitch, foot->width);
-    const Share share = share_of(material, foot->pitch, foot->shell ? 0.0 : foot->width);
-    const MildMaterial own = material_at(material, foot->pitch);
-    const int slips = share.slip_rate > 0.0;
-    *derived =
-        (DerivedLaw){.material = *material,
-                     .slot = {law, share, slips ? 0.0 : own.k_drift, slips ? 0.0 : own.b_drift,
-                              recovery_of(material)},
-                     .curves = curves_of(material, &law),
-                     .known = 1,
-                     .nan = law_is_nan(&law) || material_is_nan(material) || share_is_nan(&share)};
+    const SlotLaw slot =
+        material_law(material, foot->pitch, foot->width, foot->shell ? 0.0 : foot->width);
+    *derived = (DerivedLaw){.material = *material,
+                            .slot = slot,
+                            .curves = curves_of(material, &slot.law),
+                            .known = 1,
+                            .nan = law_is_nan(&slot.law) || material_is_nan(material) ||
+                                   share_is_nan(&slot.share)};
 }
 
 void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
@@ -72,6 +76,7 @@ static void slot_set_law(Slots *s, int i, const SlotLaw *from) {
     s->whole_mu[i] = share->mu;
     s->ahead[i] = 0.0;
     s->share[i] = 1.0;
+    s->power[0][i] = s->power[1][i] = s->elastic[0][i] = s->elastic[1][i] = 0.0;
     s->exit_drag[i] = law_exit_drag(&from->law);
     s->entry_drag[i] = law_entry_drag(&from->law);
     s->strength[i] = from->law.line_stiffness;

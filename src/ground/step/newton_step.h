@@ -5,8 +5,7 @@
 
 #include <string.h>
 
-#include "ground/step/pass.h"
-#include "ground/step/solver.h"
+#include "ground/step/step.h"
 
 /* A row of six numbers for each foot and its right-hand side, padded to whole vectors. It uses the
  * compiler's vector type because loops over rows this short take three times as long when the

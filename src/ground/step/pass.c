@@ -1,14 +1,39 @@
 /* The loops over a foot's slots have no branches, so that they vectorise. Normal impulses and
  * friction have a loop each. A single loop would be one dependency chain, too long for the
  * processor to overlap several vectors. */
-#include "ground/step/pass.h"
-
 #include <string.h>
 
 #include "ground/law/friction.h"
 #include "ground/law/impulse.h"
-#include "ground/step/moments.h"
-#include "ground/step/shell_hessian.h"
+#include "ground/step/step.h"
+
+#ifdef MILD_REAL_FLOAT
+/* In halves: sixteen in a row would take as long as the loop before them. */
+void lanes_sum(const Lanes *lanes, int count, double *sums) {
+    for (int k = 0; k < count; k++) {
+        Lanes part;
+        memcpy(part, lanes[k], sizeof part);
+#pragma GCC unroll 4
+        for (int half = SLOT_LANES / 2; half > 0; half /= 2) {
+#pragma omp simd
+            for (int l = 0; l < half; l++) {
+                part[l] += part[l + half];
+            }
+        }
+        sums[k] = (double)part[0];
+    }
+}
+#else
+void lanes_sum(const Lanes *lanes, int count, double *sums) {
+    for (int k = 0; k < count; k++) {
+        double sum = 0.0;
+        for (int l = 0; l < SLOT_LANES; l++) {
+            sum += lanes[k][l];
+        }
+        sums[k] = sum;
+    }
+}
+#endif
 
 MILD_HD void slot_normal(Slots *s, int i, Real dt, const Motion *motion, int kind, int curves,
                          int stops) {
@@ -85,14 +110,12 @@ static __attribute__((noinline)) void foot_powers(const FootScratch *foot, Real 
  * little. */
 static void foot_normals(const FootScratch *foot, Real dt, const Motion *motion) {
     switch (foot_variant(foot)) {
-    case LAW_LINE: foot_normal(foot, dt, motion, 1, LAW_LINE, 0); return;
     case LAW_CONE:
-        if (foot->uneven || foot->stops) {
-            foot_normal(foot, dt, motion, 1, LAW_CONE, 1);
-        } else {
+        if (!foot->uneven && !foot->stops) {
             foot_normal(foot, dt, motion, 0, LAW_CONE, 0);
-        }
-        return;
+            return;
+        } /* else a heap that begins at the surface and carries all of its load */
+        // fall through
     case LAW_CONE | LAW_HEAP:
         if (foot->uneven || foot->stops) {
             foot_normal(foot, dt, motion, 1, LAW_CONE | LAW_HEAP, 1);
@@ -100,6 +123,7 @@ static void foot_normals(const FootScratch *foot, Real dt, const Motion *motion)
             foot_normal(foot, dt, motion, 0, LAW_CONE | LAW_HEAP, 0);
         }
         return;
+    case LAW_LINE: /* a power without force */
     case LAW_POWER: foot_normal(foot, dt, motion, 1, LAW_POWER, 0); return;
     case LAW_ELASTIC: foot_normal(foot, dt, motion, 1, LAW_ELASTIC, 0); return;
     default: foot_normal(foot, dt, motion, SLOT_UNEVEN | SLOT_SHELL, LAW_ANY, 1); return;
@@ -247,6 +271,62 @@ void contact_pass_held(MildScratch *scratch, double dt, const double *twist) {
     pass(scratch, dt, twist, 1);
 }
 
+/* Sums over slots of each of a, b and c times 1, x, y, x^2, xy, y^2. The arrays are those of the
+ * first block of slots. Three at a time are as many sums as the registers hold. end: slots, rounded
+ * up to whole blocks. */
+static void moments(const Real *xs, const Real *ys, int end, const Real *a, const Real *b,
+                    const Real *c, double sums[3][6]) {
+    LaneVector A[6] = {{0.0}}, B[6] = {{0.0}}, C[6] = {{0.0}};
+    for (int i = 0; i < end * (int)SLOT_NUMBERS; i += SLOT_LANES * (int)SLOT_NUMBERS) {
+        const LaneVector x = lanes_load(xs + i), y = lanes_load(ys + i);
+        const LaneVector xx = x * x, xy = x * y, yy = y * y;
+        const LaneVector p = lanes_load(a + i), q = lanes_load(b + i), r = lanes_load(c + i);
+        A[0] += p;
+        A[1] += p * x;
+        A[2] += p * y;
+        A[3] += p * xx;
+        A[4] += p * xy;
+        A[5] += p * yy;
+        B[0] += q;
+        B[1] += q * x;
+        B[2] += q * y;
+        B[3] += q * xx;
+        B[4] += q * xy;
+        B[5] += q * yy;
+        C[0] += r;
+        C[1] += r * x;
+        C[2] += r * y;
+        C[3] += r * xx;
+        C[4] += r * xy;
+        C[5] += r * yy;
+    }
+    lanes_sum((const Lanes *)A, 6, sums[0]);
+    lanes_sum((const Lanes *)B, 6, sums[1]);
+    lanes_sum((const Lanes *)C, 6, sums[2]);
+}
+
+/* Three times the loop for x and y, over (x, y), (y, z) and (z, x): a loop of its own would be
+ * faster and larger. */
+static void shell_moments(const FootScratch *foot, ShellMoments M) {
+    static const uint8_t place[3][6] = {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 6, 7, 8}, {0, 3, 1, 8, 9, 4}};
+    const Slots *s = foot->slot;
+    const Real *const at[3] = {s->x, s->y, s->z};
+    const Real *const h[3][3] = {
+        {s->hxx, s->hxy, s->hxz}, {s->hyx, s->hyy, s->hyz}, {s->hzx, s->hzy, s->hzz}};
+    for (int row = 0; row < 3; row++) {
+        for (int pair = 0; pair < 3; pair++) {
+            double sums[3][6];
+            moments(at[pair], at[(pair + 1) % 3], foot_end(foot), h[row][0], h[row][1], h[row][2],
+                    sums);
+            for (int c = 0; c < 3; c++) {
+                for (int k = 0; k < 6; k++) {
+                    M[row][c][place[pair][k]] = sums[c][k];
+                }
+            }
+        }
+    }
+}
+
 /* Sums over the foot of each entry of h times 1, x, y, x^2, xy, y^2. They determine the foot's
  * hessian, because p is linear in x and y. */
 typedef double Moments[3][3][6];
@@ -279,6 +359,7 @@ static __attribute__((noinline)) void factor_add(const FootScratch *foot, const 
         const double *p = foot->lever[l];
         const int at = product[k][l];
         Three m[3]; /* M_kl */
+#pragma GCC unroll 3
         for (int c = 0; c < 3; c++) {
             m[c] = (Three){M[0][c][at], M[1][c][at], M[2][c][at]};
             rows[c] = l == 0 ? m[c] : rows[c];
@@ -316,7 +397,9 @@ void contact_hessian(MildScratch *scratch) {
         const int f = scratch->list[k];
         const FootScratch *foot = &scratch->foot[f];
         if (foot->shell) {
-            shell_hessian(foot, scratch->hessian[f]);
+            ShellMoments moved;
+            shell_moments(foot, moved);
+            shell_hessian(foot, moved, scratch->hessian[f]);
             continue;
         }
         Moments sums;

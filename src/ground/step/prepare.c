@@ -1,16 +1,9 @@
-#include "ground/step/prepare.h"
-
+/* First stage of a contact step: lists the elements that may touch and fixes the law of each. */
 #include <string.h>
 
 #include "ground/law/begin.h"
 #include "ground/law/models.h"
-#include "ground/step/carry.h"
-#include "ground/step/drag.h"
-#include "ground/step/frame.h"
-#include "ground/step/gather.h"
-#include "ground/step/locate.h"
-#include "ground/step/mixture.h"
-#include "ground/step/shell.h"
+#include "ground/step/step.h"
 #include "ground/terrain/terrain.h"
 
 MILD_HD void slot_begin(Slots *s, int i, Real dt, Real rate, const Motion *motion, int curves,
@@ -52,6 +45,67 @@ static void foot_begin(const FootScratch *foot, Real dt, const Motion *now) {
     }
 }
 
+/* ---- the share of its load that each slot carries ---- */
+
+/* Cosine between the sole and the ground under each slot, into `lean`. Level ground has one for
+ * all, without a root for each. */
+static void slots_lean(const FootScratch *foot) {
+    const double *normal = foot->arm[3];
+    const Real side = normal[2] < 0 ? REAL(-1) : REAL(1); /* the face that looks down */
+    const Real up[3] = {side * (Real)normal[0], side * (Real)normal[1], side * (Real)normal[2]};
+    const Real level = real_min(real_max(up[2], SHARE_LEAN), 1);
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+        for (int i = 0; i < SLOT_LANES; i++) {
+            s->lean[i] = level;
+        }
+        for (int i = 0; foot->uneven && i < SLOT_LANES; i++) {
+            const Real gx = s->slope_x[i], gy = s->slope_y[i];
+            const Real along = up[2] - gx * up[0] - gy * up[1];
+            s->lean[i] =
+                real_min(real_max(along / REAL_SQRT(1 + gx * gx + gy * gy), SHARE_LEAN), 1);
+        }
+    }
+}
+
+MILD_HD void slot_carry(Slots *s, int i, Real dt, Real rate, const Motion *now) {
+    const SlotVelocity v = slot_velocity(s, i, now, SLOT_UNEVEN | SLOT_SHELL);
+    const ElementMemory memory = slot_memory(s, i);
+    Element element = slot_element(s, i);
+    element.law.cone_begin = s->cone_begin[i];
+    Share share = slot_share(s, i);
+    element_share(&element, &memory, &share, s->fx[i], dt, rate, share.lean, s->ahead[i],
+                  v.x * v.x + v.y * v.y);
+    s->mu[i] = element.mu;
+    s->drift_bound[i] = element.drift_bound;
+    s->lean[i] = share.lean;
+    s->share[i] = share.q;
+    s->zero_depth[i] = element.zero_depth;
+    s->hold_x[i] = element.hold_x;
+    s->hold_y[i] = element.hold_y;
+    s->hold_stiffness[i] = element.hold_stiffness;
+}
+
+/* Sets the share of this step and what follows from it, after slots_begin. For ground with
+ * LAW_HEAP. */
+static void foot_carry(const FootScratch *foot, const Motion *now, double dt) {
+    slots_elastic(foot);
+    if (foot->shell) {
+        shell_lean(foot, now);
+    } else {
+        slots_lean(foot);
+    }
+    const double rate = 1.0 / dt;
+    const Motion motion = *now;
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            slot_carry(s, i, dt, rate, &motion);
+        }
+    }
+}
+
+/* ---- drag ---- */
+
 /* Bool: an element on ground with drag will enter virgin ground in this step by more than the
  * elastic travel. */
 static int slots_sink(const FootScratch *foot, Real dt) {
@@ -69,6 +123,29 @@ static int slots_sink(const FootScratch *foot, Real dt) {
         sum += sinking[i];
     }
     return sum > 0;
+}
+
+/* Calls element_drag. curves, kind: constants in a vector loop. */
+MILD_HD void slot_drag(Slots *s, int i, Real dt, const Motion *now, const Motion *free, int curves,
+                       int kind) {
+    const Real slower = slot_velocity(s, i, now, kind).descent;
+    const Real faster = slot_velocity(s, i, free, kind).descent;
+    Element element = slot_loaded(s, i, curves);
+    element_drag(&element, curves, dt, real_max(faster - slower, 0));
+    s->entry_speed[i] = element.entry_speed;
+    s->stop_drag[i] = element.stop_drag;
+    s->stop_growth[i] = element.stop_growth;
+}
+
+/* The same for all slots of a foot on any ground. */
+static void slots_drag_any(const FootScratch *foot, double dt, const Motion *now,
+                           const Motion *free) {
+    const int curves =
+        foot->curves | LAW_CONE | LAW_HEAP; /* no branches for these; a power is long */
+    for (int i = 0; i < foot->active; i++) {
+        slot_drag(slot_block(foot, i), i % SLOT_LANES, dt, now, free, curves,
+                  SLOT_UNEVEN | SLOT_SHELL);
+    }
 }
 
 /* Calls element_drag for all slots. The loop for cones and heaps, which have drag, is in vectors;
@@ -96,6 +173,29 @@ static void slots_clear(const FootScratch *foot) {
         memset(s->explicit_impulse, 0, sizeof s->explicit_impulse);
     }
 }
+
+/* Sets the explicit impulse of materials that create energy (passive = false). Returns true when
+ * the terrain has such a material. */
+static int slots_explicit(const FootScratch *foot, int materials, double dt, const Motion *free) {
+    int any = 0;
+    for (int m = 0; m < materials; m++) {
+        any |=
+            foot->derived[m].slot.law.mass_rate < 0.0 || foot->derived[m].slot.law.drag_rate < 0.0;
+    }
+    for (int i = 0; any && i < foot->active; i++) {
+        Slots *s = slot_block(foot, i);
+        const int l = i % SLOT_LANES;
+        if (!(s->depth[l] > 0.0) || s->middle[l] < s->depth_max[l]) {
+            continue; /* above the ground or on the unloading line */
+        }
+        const Element element = slot_loaded(s, l, LAW_ANY);
+        s->explicit_impulse[l] = element_explicit(
+            &element, LAW_ANY, dt, slot_velocity(s, l, free, SLOT_UNEVEN | foot->shell).descent);
+    }
+    return any;
+}
+
+/* ---- a foot ---- */
 
 /* Applies the models whose law depends on the motion. */
 static void foot_direct(const FootScratch *foot, const MildTerrain *terrain, double dt,
@@ -184,7 +284,8 @@ uint32_t mild_ground_near(const MildTerrain *terrain, const MildContactInput *in
         FootScratch *foot = &scratch->foot[f];
         foot_take_pose(foot, terrain, input, f);
         const double steepest = foot->uneven ? terrain_steepest(terrain) : 0.0;
-        near |= foot_is_away(foot, terrain, input, steepest, f) ? 0u : 1u << f;
+        foot_set_least(foot, input, steepest, f);
+        near |= foot_is_away(foot, terrain, steepest) ? 0u : 1u << f;
     }
     return near;
 }
@@ -198,14 +299,15 @@ int contact_prepare(const MildGround *ground, const MildTerrain *terrain,
         foot_take_pose(foot, terrain, input, f);
         foot->uneven |= ground->uneven[f] == GROUND_LOWERED;
         const double steepest = foot->uneven ? terrain_steepest(terrain) : 0.0;
+        foot_set_least(foot, input, steepest, f);
         if (scratch->place[f] < 0) {
             foot->away = 1;
             foot->active = 0;
         } else if (foot->shell) {
-            shell_list(foot, terrain, input, steepest, f);
+            shell_list(foot, terrain, steepest);
         } else {
             foot_locate(foot, terrain, ground->tiles > 0);
-            foot_list(foot, input, steepest, f);
+            foot_list(foot);
         }
         if (foot->active > 0) {
             foot_prepare(foot, ground, f, terrain, input);

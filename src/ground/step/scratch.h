@@ -51,7 +51,7 @@ typedef struct FootScratch {
     double *face[3];    /* [padded] [-] outward normal, foot frame */
     double *area;       /* [padded] [-] area over pitch^2 */
     double *area_share; /* [padded] [-] projected area over pitch^2; 0: faces up. shell_locate */
-    double least;       /* [m] elements deeper than this may touch: foot_list */
+    double least;       /* [m] elements deeper than this may touch: foot_set_least */
 
     /* Pose: foot_locate. The vector from the ankle to an element is p = arm[0] + x arm[1] + y
      * arm[2] + height arm[3]. */
@@ -122,6 +122,8 @@ struct MildScratch {
 int scratch_fits(const MildScratch *scratch, const MildGround *ground);
 /* Computes the world position of every element: point_x, point_y, point_z. */
 void foot_points(const FootScratch *foot);
+/* The force of ground without memory under each slot [N], into the working array fx. */
+void slots_elastic(const FootScratch *foot);
 
 /* Slots in use, rounded up to whole blocks. */
 static inline int foot_end(const FootScratch *foot) {

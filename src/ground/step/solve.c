@@ -4,12 +4,7 @@
 
 #include "ground/law/frame.h"
 #include "ground/law/friction.h"
-#include "ground/step/energy.h"
-#include "ground/step/frame.h"
-#include "ground/step/moments.h"
-#include "ground/step/prepare.h"
-#include "ground/step/shell.h"
-#include "ground/step/solver.h"
+#include "ground/step/step.h"
 
 const char *const mild_solver_names[MILD_SOLVERS] = {"newton", "gauss_seidel", "explicit"};
 

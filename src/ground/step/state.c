@@ -10,7 +10,7 @@
 
 _Static_assert(sizeof(ElementMemory) == 9 * sizeof(Real),
                "another number of ElementMemory also goes to Memory and here, to slots.h (Slots, "
-               "slot_memory), gather.c, advance.c, and to batch/contact.inc (recall, "
+               "slot_memory), locate.c, advance.c, and to batch/contact.inc (recall, "
                "record) and batch/memory.c");
 
 int sole_padded(const MildSole *sole) {

@@ -26,7 +26,7 @@ struct MildGround {
 };
 
 /* MildGround.uneven of a foot under which the surface may lie lower than the terrain, as the planes
- * say (change.h). Its steps are those of uneven ground until it has come out. */
+ * say (change.c). Its steps are those of uneven ground until it has come out. */
 #define GROUND_LOWERED 2
 
 /* What an element stands on: the index of a material, or first | second << 8 | share << 16 for a

@@ -2,9 +2,8 @@
 #include <string.h>
 
 #include "ground/law/friction.h"
-#include "ground/step/literal.h"
-#include "ground/step/slot_impulse.h"
-#include "ground/step/solver.h"
+#include "ground/law/impulse.h"
+#include "ground/step/step.h"
 
 #define SWEEP_TOLERANCE 1e-10 /* [-] of the wrench's change, unless the caller sets one */
 #define SWEEP_LIMIT 1000      /* sweeps, unless the caller sets a limit */
@@ -74,6 +73,13 @@ static void element_inverse_mass(const Sweep *sweep, int f, const double *p, dou
     }
 }
 
+/* The normal impulse of a slot at the downward speed w. curves: of the ground under the foot. */
+static Impulse slot_impulse(const Slots *s, int i, int curves, double dt, double w) {
+    curves |= LAW_CONE | LAW_HEAP; /* no branches for these; a power is long */
+    const Element element = slot_loaded(s, i, curves);
+    return element_impulse(&element, curves, 1, dt, w);
+}
+
 /* Implicit normal impulse: one Newton step on I - I(w). An impulse dI slows the element by G_zz
  * dI. */
 static double element_normal(const Slots *s, int i, int curves, double dt, double w, double G) {
@@ -126,6 +132,55 @@ static void element_implicit(const Sweep *sweep, const FootScratch *foot, Slots 
     s->ix[i] = s->fx[i] + bx - relax * (b * d[0] + bx) - nx;
     s->iy[i] = s->fy[i] + by - relax * (b * d[1] + by) - ny;
 }
+
+/* ---- MILD_SOLVER_EXPLICIT: Algorithm 1 to the letter instead of the implicit sweep ---- */
+
+/* Eqs 3 to 5: dt F_GM [N s] of the depth and the downward speed w before the step, on the way up
+ * too. */
+static double literal_normal(const Slots *s, int i, int curves, double dt, double w) {
+    curves |= LAW_CONE | LAW_HEAP;
+    const Element element = slot_loaded(s, i, curves);
+    const double u = element.depth;
+    double force = law_force(&element.law, curves, u) + law_elastic_force(&element.law, curves, u);
+    force += element.law.drag_rate * law_moved_share(&element.law, curves, u) * w * w;
+    return u > 0.0 ? dt * fmax(force, 0.0) : 0.0;
+}
+
+/* Eq 13 of a cone without anything else, at the velocity v. delta: [m/s] continuity error. G:
+ * [1/kg] entry of B A B^T. */
+static void literal_friction(Slots *s, int i, const double *v, const double *delta, double G) {
+    const double beta = 0.5 / G; /* [kg] */
+    const double gamma = 0.1 * beta;
+    const double x = s->fx[i] - gamma * delta[0] - beta * v[0];
+    const double y = s->fy[i] - gamma * delta[1] - beta * v[1];
+    const double radius = s->mu[i] * s->iz[i];
+    const double length = sqrt(x * x + y * y);
+    const double scale = length > radius ? radius / length : 1.0;
+    s->fx[i] = x * scale;
+    s->fy[i] = y * scale;
+    s->ix[i] = s->fx[i] - s->slope_x[i] * s->iz[i];
+    s->iy[i] = s->fy[i] - s->slope_y[i] * s->iz[i];
+}
+
+/* Eq 14: drift resistance against the velocity before the step. */
+static void literal_drift(const MildScratch *scratch, const MildContactInput *input) {
+    for (int k = 0; k < scratch->listed; k++) {
+        const int f = scratch->list[k];
+        const FootScratch *foot = &scratch->foot[f];
+        const Motion motion = foot_motion(foot, input->velocity[f]);
+        for (int slot = 0; slot < foot->active; slot++) {
+            Slots *s = slot_block(foot, slot);
+            const int i = slot % SLOT_LANES;
+            const SlotVelocity v = slot_velocity(s, i, &motion, SLOT_UNEVEN | SLOT_SHELL);
+            const double speed = sqrt(v.x * v.x + v.y * v.y);
+            const double drag = s->drift_bound[i] + s->damping[i] * speed;
+            s->ix[i] -= speed > 0.0 ? drag * v.x / speed : 0.0;
+            s->iy[i] -= speed > 0.0 ? drag * v.y / speed : 0.0;
+        }
+    }
+}
+
+/* ---- sweeps ---- */
 
 /* One iteration of the inner loop of Algorithm 1. The change of impulse moves the feet at once. */
 static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, Slots *s, int i) {

@@ -60,4 +60,14 @@ struct MildMap {
     size_t bytes;    /* memory of the map */
 };
 
+/* ---- what fills a map: pattern.c and shape.c ---- */
+
+/* Fills the map's labels, label and label_count from `def`. Fails when an image is missing, when
+ * numbers contradict each other, when there are too many cells, or when out of memory. */
+MildStatus pattern_fill(MildMap *map, const MildMapDef *def, MildError *error);
+
+/* Fills the map's heights, height and slope from `def`. Fails when an image is missing or contains
+ * an unusable value, when there are too many points, or when out of memory. */
+MildStatus shape_fill(MildMap *map, const MildMapDef *def, MildError *error);
+
 #endif

@@ -4,8 +4,6 @@
 
 #include "base/float.h"
 #include "ground/terrain/map_view.h"
-#include "ground/terrain/pattern.h"
-#include "ground/terrain/shape.h"
 
 #define FIELD(member, low, high, help)                                                             \
     MILD_FIELD(MildMapDef, member, MILD_FIELD_DOUBLE, 1, low, high, help)

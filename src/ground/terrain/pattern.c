@@ -1,7 +1,7 @@
 /* A pattern consists of fields, each of one material. With smooth borders the fields are divided
  * into small cells, and a cell near a border also has the label and the share of the neighbouring
  * material. */
-#include "ground/terrain/pattern.h"
+#include "ground/terrain/grid.h"
 
 #include <limits.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* The heights at the grid points follow the formulas of MildMapKind (mild/map.h). For a shape that
  * repeats, the grid holds one period. */
-#include "ground/terrain/shape.h"
+#include "ground/terrain/grid.h"
 
 #include <stdlib.h>
 

@@ -1,0 +1,53 @@
+/* What the files of this wing call of each other. */
+#ifndef MILD_GROUND_SOLE_SOLE_INSIDE_H
+#define MILD_GROUND_SOLE_SOLE_INSIDE_H
+
+#include "mild/ground.h"
+
+/* ---- elements of a shell while it is being made ---- */
+
+typedef struct {
+    double at[3];     /* [m] */
+    double normal[3]; /* [-] outward */
+    double area;      /* [m^2] */
+    int64_t key;      /* shape; within sole_mesh.c the cell */
+} Sample;
+
+typedef struct {
+    Sample *list;
+    int count;
+    int room;   /* of the list */
+    int most;   /* of count */
+    int failed; /* bool: out of memory */
+    int full;   /* bool: more than `most` */
+} Samples;
+
+/* Counts what does not fit in `full` and `failed`. */
+void samples_add(Samples *samples, const Sample *sample);
+
+/* ---- sole_mesh.c: meshes as parts of a shell ---- */
+
+/* Adds elements of a mesh, in its own frame. */
+void mesh_sample(const MildShape *mesh, double pitch, Samples *samples);
+/* Bool: the surface has no border. *volume: that it encloses [m^3], negative where the triangles
+ * face inward. */
+int mesh_closed(const MildShape *mesh, double *volume);
+/* Bool: a point in the mesh's frame lies inside a closed mesh. */
+int mesh_contains(const MildShape *mesh, const double point[3]);
+
+/* ---- sole_edge.c: how far the cells of a plane raster are from the edge of the outline ---- */
+
+typedef struct {
+    double area;            /* [m^2] of the outline */
+    double low[2], high[2]; /* [m] its box */
+} EdgeBox;
+
+/* Bool: the point is inside the outline. */
+int outline_inside(const MildSoleDef *def, double x, double y);
+/* Mean and standard deviation of that distance over the n cells about (x, y) [m]. Cells cover more
+ * or less than the outline, and each counts whole: so the distances are scaled to the mean over the
+ * outline. work: [points] scratch space. */
+void sole_edges(const MildSoleDef *def, const EdgeBox *box, int n, const double *x, const double *y,
+                double *edge, double *spread, int *work);
+
+#endif
