@@ -161,7 +161,7 @@ def worker(search, given, end):
     stream = None
     if given.device != "cpu":
         import torch
-        torch.cuda.set_device(torch.device(given.device))
+        torch.cuda.set_device(torch.device(given.device).index or 0)
         stream = torch.cuda.Stream()
     while time.time() < end:
         point = search.ask()
