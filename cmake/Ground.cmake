@@ -28,8 +28,8 @@ endif()
 # archive with -Wl,--gc-sections takes only what it calls.
 include(CheckCCompilerFlag)
 check_c_compiler_flag(-Oz mild_has_oz) # gcc since 12
-set(often "advance|carry|drag|imprint|model_bekker|prepare|resist|slot_impulse")
-set(loops "gather|locate|moments|newton|newton_step|plate|solve|sweep")
+set(often "advance|carry|derivative_free|drag|imprint|model_bekker|prepare|resist|slot_impulse")
+set(loops "derivative|gather|locate|moments|newton|newton_step|plate|solve|sweep")
 set(smallest $<IF:$<BOOL:${mild_has_oz}>,-Oz,-Os>)
 if(CMAKE_C_COMPILER_ID STREQUAL GNU) # nothing moves ahead of a loop: 1 kB
   list(APPEND smallest -fno-tree-loop-im -fno-move-loop-invariants)
@@ -55,7 +55,8 @@ foreach(source ${ground_sources} ${ground_base_sources})
 endforeach()
 # The element's law uses fused multiply-add, and one instruction for each maximum. NaN is therefore detected elsewhere: in
 # solve.c, and for materials in mixture.c.
-set(fused ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/pass.c ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/moments.c)
+set(fused ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/pass.c ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/moments.c
+  ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/derivative_free.c)
 set_property(SOURCE ${fused} APPEND PROPERTY COMPILE_OPTIONS -ffp-contract=fast -ffinite-math-only -fno-signed-zeros)
 # No constant moves ahead of their loops, which have no register left for it: 6 kB.
 set_property(SOURCE ${fused} APPEND PROPERTY COMPILE_OPTIONS
