@@ -521,6 +521,53 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
 void mild_ground_change(MildGround *ground, const MildTerrain *from, const MildTerrain *to,
                         MildScratch *scratch);
 
+/* ---- derivatives of a contact step (docs/gradients.md) ---- */
+
+/* What mild_ground_derivative is asked for: arrays of the caller, NULL for what is not wanted.
+ * Matrices are row major. W: force and torque of each foot as in MildFootResult, row 6 f + i. V:
+ * twists after the step. Rows and columns of a foot that touches nothing are 0, and of dV/dV_free
+ * those of the identity. */
+typedef struct {
+    /* [N s/m, N s, N m s] [feet][6][6] dW/dV of each foot: the law alone, by a twist that is given,
+     * as inverse dynamics needs. Exact. */
+    double *law;
+    /* [N s/m, N s, N m s] [6 feet][6 feet] dW/dV_free of the solved step. Exact. */
+    double *wrench_by_free;
+    double *velocity_by_free; /* [-, m, 1/m] [6 feet][6 feet] dV/dV_free. Exact. */
+    /* [N/m, N/rad, N, N m/rad] [6 feet][6 feet] dW/d(pose): column 6 f + k moves foot f along the
+     * world's axis k; column 6 f + 3 + k turns it about that axis through its ankle. V_free, A and
+     * what the ground remembers stay. Differenced. */
+    double *wrench_by_pose;
+    /* [N s/m, N s, N m s] [6 feet][6 feet] dW/d(present twist), V_free and A stay. Differenced. */
+    double *wrench_by_velocity;
+    /* [N or N m by the field's unit] [6 feet][field_count] dW/d(fields of a material).
+     * Differenced. */
+    double *wrench_by_material;
+    int material;     /* index into the terrain's materials */
+    int field_count;  /* columns of wrench_by_material */
+    const int *field; /* [field_count] indices into mild_material_fields, of numbers (DOUBLE) */
+    /* Another scratch of the same soles, which is overwritten; NULL will do where nothing
+     * differenced is wanted and the solver is Newton's. */
+    MildScratch *work;
+} MildContactDerivative;
+
+/* Derivatives of the step that was just solved with this ground, terrain, input, scratch and
+ * result, before mild_ground_advance, which it leaves as it would be. They are those of the law on
+ * its present branch (each element sticks, slides, yields, unloads or is out of the ground) by the
+ * implicit function theorem. *Exact* ones are in closed form. *Differenced* ones are differences of
+ * the law at the twists of the solution, with no contact solve inside: two passes over the elements
+ * a column for all feet at once, within some 1e-6 unless an element is at a kink. With an
+ * inverse_inertia of zeros in `input` they are those at twists that are given. Of a number that
+ * switches a rule off at 0 (slip_length, grip, plate_width) there is none at 0: its column is 0. So
+ * is that of a number that is infinite. Cost: docs/gradients.md. Fails when the step has not
+ * converged, when its solver is MILD_SOLVER_EXPLICIT, when `work` is missing or of other soles,
+ * when the material or a field does not exist or is no number, and when the equations are
+ * singular. */
+MildStatus mild_ground_derivative(const MildGround *ground, const MildTerrain *terrain,
+                                  const MildContactInput *input, MildScratch *scratch,
+                                  const MildContactResult *result,
+                                  const MildContactDerivative *derivative, MildError *error);
+
 /* What an element did in the last step. */
 typedef enum {
     MILD_ELEMENT_FREE = 0,      /* carries no normal force */

@@ -5,7 +5,7 @@ if(MILD_TESTS)
   mild_tests(bench layer_bench)
   target_link_options(bench_test_train PRIVATE -Wl,--wrap=clock_seconds,--wrap=train_iterate)
   target_link_options(bench_test_ground PRIVATE
-    -Wl,--wrap=clock_thread_seconds,--wrap=mild_ground_solve,--wrap=mild_ground_advance)
+    -Wl,--wrap=clock_thread_seconds,--wrap=mild_ground_solve,--wrap=mild_ground_advance,--wrap=mild_ground_derivative)
   target_link_options(bench_test_step PRIVATE
     -Wl,--wrap=mj_step,--wrap=robot_sim_step,--wrap=robot_sim_set_solver,--wrap=bench_record_walk)
   target_link_options(bench_test_update PRIVATE -Wl,--wrap=clock_seconds,--wrap=ppo_act,--wrap=ppo_update,--wrap=product)

@@ -19,6 +19,7 @@ typedef struct {
     MildGround *ground;
     MildGround *kept; /* its memory, put back before each step; NULL: the steps go on from it */
     MildScratch *scratch;
+    int derives; /* bool: each solve is followed by dW/dV_free and dV/dV_free */
 } GroundBench;
 
 /* Centre of the sole's elements from the ankle, x and y [m]. */
@@ -66,12 +67,18 @@ static void ground_input(GroundBench *bench, const MildSole *const *soles, doubl
 /* Seconds that `steps` steps take. */
 static double ground_run(GroundBench *bench, int steps, int advance) {
     MildContactResult result;
+    double wrench[ROWS * ROWS], twist[ROWS * ROWS];
+    const MildContactDerivative wanted = {.wrench_by_free = wrench, .velocity_by_free = twist};
     double start = clock_thread_seconds();
     for (int step = 0; step < steps; step++) {
         if (bench->kept) {
             memcpy(bench->ground, bench->kept, mild_ground_size(bench->ground));
         }
         mild_ground_solve(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
+        if (bench->derives) {
+            mild_ground_derivative(bench->ground, &bench->terrain, &bench->input, bench->scratch,
+                                   &result, &wanted, NULL);
+        }
         if (advance) {
             mild_ground_advance(bench->ground, &bench->terrain, &bench->input, bench->scratch,
                                 &result);
@@ -128,6 +135,9 @@ static void ground_cases(GroundBench *bench, const Robot *robot, double dt, Benc
                                             {"gauss_seidel_stick", "gauss_seidel_slip"}};
     ground_settle(bench, robot_soles(robot), dt);
     bench_add(report, "ground", "newton_stick_advance", ground_time(bench, 1), "ns");
+    bench->derives = 1;
+    bench_add(report, "ground", "newton_stick_derivative", ground_time(bench, 0), "ns");
+    bench->derives = 0;
     MildContactInput *input = &bench->input, rest = *input;
     for (int solver = 0; solver < 2; solver++) {
         input->solver = solver ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON;
@@ -170,6 +180,9 @@ static MildStatus ground_sinks(GroundBench *bench, const MildSole *const *soles,
     ground_settle(bench, soles, dt);
     bench_add(report, "ground", "newton_slip_sinkage", ground_time(bench, 0), "ns");
     bench_add(report, "ground", "newton_slip_sinkage_advance", ground_time(bench, 1), "ns");
+    bench->derives = 1;
+    bench_add(report, "ground", "newton_slip_sinkage_derivative", ground_time(bench, 0), "ns");
+    bench->derives = 0;
     return ground_slips(bench, "newton_slip_sinkage_slip_advance", report, error);
 }
 

@@ -220,4 +220,12 @@ class Entered {
     std::atomic<bool> &busy;
 };
 
+/* Rows of doubles as a NumPy array that owns them. */
+inline nb::object array_of(std::vector<double> numbers, std::vector<size_t> shape) {
+    auto *kept = new std::vector<double>(std::move(numbers));
+    nb::capsule owner(kept, [](void *p) noexcept { delete (std::vector<double> *)p; });
+    return nb::cast(
+        nb::ndarray<nb::numpy, double>(kept->data(), shape.size(), shape.data(), owner));
+}
+
 #endif

@@ -291,14 +291,6 @@ static nb::dict run(const nb::sequence &soles, nb::handle rows, const std::strin
     return all;
 }
 
-/* Rows of doubles as a NumPy array that owns them. */
-static nb::object array_of(std::vector<double> numbers, std::vector<size_t> shape) {
-    auto *kept = new std::vector<double>(std::move(numbers));
-    nb::capsule owner(kept, [](void *p) noexcept { delete (std::vector<double> *)p; });
-    return nb::cast(
-        nb::ndarray<nb::numpy, double>(kept->data(), shape.size(), shape.data(), owner));
-}
-
 static nb::object forces(const nb::sequence &soles, const Material &material, nb::handle rows) {
     const std::vector<FitPoint> points = points_of(rows);
     FitPlate plates[FIT_PLATES_MAX];

@@ -19,6 +19,7 @@ struct Ground {
     void *block = nullptr;
     MildGround *ground = nullptr;
     MildScratch *scratch = nullptr;
+    MildScratch *work = nullptr; /* of derivative; made when it is first asked for */
     MildContactInput input = {};
     std::vector<double> inverse_inertia; /* of the input */
     MildContactResult result = {};
@@ -29,6 +30,7 @@ struct Ground {
     Ground(const Ground &) = delete;
     ~Ground() {
         mild_scratch_destroy(scratch);
+        mild_scratch_destroy(work);
         std::free(block);
     }
 };
@@ -152,6 +154,85 @@ static void reset(Ground &ground) {
     Entered entered(ground.busy, "Ground.reset");
     ground.solved = false;
     mild_ground_reset(ground.ground);
+}
+
+/* Indices of a material's numbers by their names. */
+static std::vector<int> fields_of(const std::vector<std::string> &names) {
+    std::vector<int> fields;
+    for (const std::string &name : names) {
+        const char *nearest = nullptr;
+        const MildField *field = mild_field_find(mild_material_fields, mild_material_field_count,
+                                                 name.c_str(), &nearest);
+        if (!field || field->type != MILD_FIELD_DOUBLE) {
+            raise(PyExc_ValueError,
+                  "fields: '" + name + "' is not a number of a material" +
+                      (field || !nearest ? "" : "; is it '" + std::string(nearest) + "'?"));
+        }
+        fields.push_back((int)(field - mild_material_fields));
+    }
+    return fields;
+}
+
+static nb::dict derivative(Ground &ground, bool pose, bool velocity,
+                           const std::vector<std::string> &names, int material) {
+    Entered entered(ground.busy, "Ground.derivative");
+    if (!ground.solved) {
+        raise(PyExc_RuntimeError,
+              "Ground.derivative: it is that of a solve; call solve() first, advance() after");
+    }
+    const std::vector<int> fields = fields_of(names);
+    const size_t feet = (size_t)ground.feet, rows = 6 * feet;
+    MildError error = {};
+    if (!ground.work) {
+        ground.work = mild_scratch_create(soles_of(nb::cast<nb::tuple>(ground.soles)).data(),
+                                          ground.feet, &error);
+        if (!ground.work) {
+            raise(error);
+        }
+    }
+    const struct {
+        const char *name;
+        bool wanted;
+        std::vector<size_t> shape;
+        double *MildContactDerivative::*at;
+    } all[] = {
+        {"law", true, {feet, 6, 6}, &MildContactDerivative::law},
+        {"wrench_by_free", true, {rows, rows}, &MildContactDerivative::wrench_by_free},
+        {"velocity_by_free", true, {rows, rows}, &MildContactDerivative::velocity_by_free},
+        {"wrench_by_pose", pose, {rows, rows}, &MildContactDerivative::wrench_by_pose},
+        {"wrench_by_velocity", velocity, {rows, rows}, &MildContactDerivative::wrench_by_velocity},
+        {"wrench_by_material",
+         !fields.empty(),
+         {rows, fields.size()},
+         &MildContactDerivative::wrench_by_material}};
+    MildContactDerivative asked = {};
+    asked.material = material;
+    asked.field = fields.data();
+    asked.field_count = (int)fields.size();
+    asked.work = ground.work;
+    std::vector<std::vector<double>> numbers;
+    for (const auto &one : all) {
+        size_t count = one.wanted;
+        for (size_t side : one.shape) {
+            count *= side;
+        }
+        numbers.emplace_back(count);
+        asked.*one.at = one.wanted ? numbers.back().data() : nullptr;
+    }
+    MildStatus status;
+    {
+        nb::gil_scoped_release released;
+        status = mild_ground_derivative(ground.ground, &ground.used.terrain, &ground.input,
+                                        ground.scratch, &ground.result, &asked, &error);
+    }
+    check(status, error);
+    nb::dict made;
+    for (size_t k = 0; k < numbers.size(); k++) {
+        if (all[k].wanted) {
+            made[all[k].name] = array_of(std::move(numbers[k]), all[k].shape);
+        }
+    }
+    return made;
 }
 
 /* ---- state ---- */
@@ -398,6 +479,16 @@ void bind_ground(nb::module_ &module) {
              "Checks what solve takes on trust: poses and twists that are finite, rotations that "
              "are\northonormal, an inverse_inertia that is symmetric and positive semidefinite. "
              "Raises\nValueError for the first that is wrong. Use it while you write an engine.")
+        .def("derivative", derivative, nb::arg("pose") = false, nb::arg("velocity") = false,
+             nb::arg("fields") = std::vector<std::string>(), nb::arg("material") = 0,
+             "Derivatives of the step just solved (docs/gradients.md), before advance(): a dict of "
+             "arrays.\nW: force and torque of each foot, V: new_velocity; row or column 6 f + k: "
+             "number k of foot f.\nlaw: (feet, 6, 6) dW/dV of each foot alone. wrench_by_free, "
+             "velocity_by_free: (6 feet, 6 feet)\nby free_velocity. pose: also wrench_by_pose, by "
+             "the feet's positions and turns about the world's\naxes. velocity: also "
+             "wrench_by_velocity, by the present twists. fields: also wrench_by_material,\n"
+             "(6 feet, fields), by these numbers of a material of the terrain. Raises RuntimeError "
+             "without a\nsolve, ValueError where it has not converged.")
         .def("advance", advance,
              "Moves the memory of the ground to the end of the step just solved. Raises "
              "RuntimeError\nwithout one.")

@@ -543,5 +543,78 @@ class Fit(unittest.TestCase):
             mild.loading([0], [0, 1], [0, 1])
 
 
+class Derivative(unittest.TestCase):
+    def ground(self):
+        sole = mild.Sole.plate(0.2, 0.1)
+        ground = mild.Ground([sole, sole], mild.Material("foam45"), dt=0.002)
+        rng = np.random.default_rng(5)
+        square = rng.uniform(-0.3, 0.3, (12, 12))
+        ground.inverse_inertia[:] = square @ square.T + np.diag(([0.1] * 3 + [10.0] * 3) * 2)
+        ground.position[:] = [[0, 0.1, -0.004], [0, -0.1, -0.006]]
+        ground.velocity[:] = ground.free_velocity[:] = rng.uniform(-0.1, 0.1, (2, 6))
+        ground.free_velocity[:, 2] -= 0.1
+        assert ground.solve()
+        return ground
+
+    @staticmethod
+    def wrench(ground):
+        assert ground.solve()
+        return np.hstack([ground.force, ground.torque]).ravel()
+
+    def differences(self, ground, numbers, h):
+        """dW by each of the numbers of a view."""
+        columns = []
+        for k in range(numbers.size):
+            kept = numbers.flat[k]
+            sides = []
+            for side in (-h, h):
+                numbers.flat[k] = kept + side
+                sides.append(self.wrench(ground))
+            numbers.flat[k] = kept
+            columns.append((sides[1] - sides[0]) / (2 * h))
+        ground.solve()
+        return np.array(columns).T
+
+    def test_differences(self):
+        ground = self.ground()
+        got = ground.derivative(pose=True, velocity=True, fields=["k_pen", "mu"])
+        self.assertEqual({name: array.shape for name, array in got.items()},
+                         {"law": (2, 6, 6), "wrench_by_free": (12, 12), "velocity_by_free": (12, 12), "wrench_by_pose": (12, 12),
+                          "wrench_by_velocity": (12, 12), "wrench_by_material": (12, 2)})
+        by_free = self.differences(ground, ground.free_velocity, 1e-6)
+        np.testing.assert_allclose(got["wrench_by_free"], by_free, atol=1e-6 * abs(by_free).max())
+        np.testing.assert_allclose(got["velocity_by_free"], np.eye(12) + ground.dt * ground.inverse_inertia @ by_free, atol=1e-6)
+        by_velocity = self.differences(ground, ground.velocity, 1e-5)
+        np.testing.assert_allclose(got["wrench_by_velocity"], by_velocity, atol=1e-6 * abs(by_free).max())
+        by_position = self.differences(ground, ground.position, 1e-7)
+        moved = got["wrench_by_pose"].reshape(12, 2, 6)[:, :, :3].reshape(12, 6)
+        np.testing.assert_allclose(moved, by_position, atol=1e-6 * abs(by_position).max())
+
+    def test_material(self):
+        ground = self.ground()
+        got = ground.derivative(fields=["k_pen", "mu"])["wrench_by_material"]
+        for column, name in enumerate(("k_pen", "mu")):
+            sides = []
+            for side in (-1e-5, 1e-5):
+                other, foam = self.ground(), mild.Material("foam45")
+                setattr(foam, name, getattr(foam, name) * (1 + side))
+                other.terrain = foam
+                sides.append(self.wrench(other))
+            slope = (sides[1] - sides[0]) / 2e-5 / getattr(mild.Material("foam45"), name)
+            np.testing.assert_allclose(got[:, column], slope, atol=1e-5 * abs(slope).max())
+
+    def test_refused(self):
+        ground = self.ground()
+        with self.assertRaisesRegex(ValueError, "'k_pan' .* 'k_pen'"):
+            ground.derivative(fields=["k_pan"])
+        with self.assertRaisesRegex(ValueError, "passive"):
+            ground.derivative(fields=["passive"])
+        with self.assertRaisesRegex(ValueError, "material = 3"):
+            ground.derivative(fields=["mu"], material=3)
+        ground.advance()
+        with self.assertRaisesRegex(RuntimeError, "solve"):
+            ground.derivative()
+
+
 if __name__ == "__main__":
     unittest.main()

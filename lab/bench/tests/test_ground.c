@@ -14,6 +14,7 @@ enum {
     IMPRINTS = 40,
     OF_MODEL = 100,
     SINKS = 1000, /* slip takes the support away */
+    DERIVES = 3,
     ADVANCE = 1
 };
 
@@ -54,6 +55,17 @@ void __wrap_mild_ground_solve(const MildGround *ground, const MildTerrain *terra
     __real_mild_ground_solve(ground, terrain, input, scratch, result);
 }
 
+WRAPS(mild_ground_derivative);
+MildStatus __wrap_mild_ground_derivative(const MildGround *ground, const MildTerrain *terrain,
+                                         const MildContactInput *input, MildScratch *scratch,
+                                         const MildContactResult *result,
+                                         const MildContactDerivative *derivative,
+                                         MildError *error) {
+    now += DERIVES;
+    return __real_mild_ground_derivative(ground, terrain, input, scratch, result, derivative,
+                                         error);
+}
+
 WRAPS(mild_ground_advance);
 void __wrap_mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                                 const MildContactInput *input, const MildScratch *scratch,
@@ -83,6 +95,7 @@ TEST(a_row_measures_what_it_names) {
     assert_int_equal(bench_ground(&def, &report, &error), MILD_OK);
     expect_row(&report, "newton_stick", NEWTON);
     expect_row(&report, "newton_stick_advance", NEWTON + ADVANCE);
+    expect_row(&report, "newton_stick_derivative", NEWTON + DERIVES);
     expect_row(&report, "newton_slip", NEWTON + SLIPS);
     expect_row(&report, "gauss_seidel_stick", SWEEPS);
     expect_row(&report, "gauss_seidel_slip", SWEEPS + SLIPS);
@@ -100,8 +113,9 @@ TEST(a_row_measures_what_it_names) {
     const double sinks = NEWTON + OF_MODEL * (double)MILD_MODEL_MILD_MERGED + SINKS;
     expect_row(&report, "newton_slip_sinkage", sinks);
     expect_row(&report, "newton_slip_sinkage_advance", sinks + ADVANCE);
+    expect_row(&report, "newton_slip_sinkage_derivative", sinks + DERIVES);
     expect_row(&report, "newton_slip_sinkage_slip_advance", sinks + SLIPS + ADVANCE);
-    assert_int_equal(report.count, 12 + 2 * (MILD_MODEL_RIGID - MILD_MODEL_MILD - 1));
+    assert_int_equal(report.count, 14 + 2 * (MILD_MODEL_RIGID - MILD_MODEL_MILD - 1));
 }
 
 /* Per element of both plates. */
