@@ -31,6 +31,14 @@ static inline int kit_finest(void) {
     return getenv("MILD_TEST_DRAWS") != NULL;
 }
 
+/* Prints what was measured, and fails unless it is below a bound; NaN fails. */
+static inline void expect_below(const char *what, double got, double bound) {
+    print_message("%s: %.3g, bound %.3g\n", what, got, bound);
+    if (!(got < bound)) {
+        fail_msg("%s: %.12g instead of less than %.3g", what, got, bound);
+    }
+}
+
 static inline void kit_vector(uint64_t *random, double size, double *x) {
     for (int k = 0; k < 3; k++) {
         x[k] = kit_uniform(random, -size, size);
