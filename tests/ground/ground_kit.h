@@ -377,6 +377,55 @@ static inline void kit_random_state(Kit *kit, uint64_t *random) {
     }
 }
 
+/* What a foot showed that was thrown and shaken, over all cycles from touch to lift-off. */
+typedef struct {
+    int cycles, missed;  /* missed: steps that did not converge */
+    double worst, share; /* [J], [-] most energy gained in a cycle, and by the energy exchanged */
+    int draw;            /* of the worst */
+} Shaken;
+
+/* Shakes the first foot at random for a time: between touch and lift-off the ground takes energy. */
+static inline void kit_shake(Kit *kit, double seconds, uint64_t *random, int draw, Shaken *all) {
+    const double weight = kit->mass[0] * KIT_GRAVITY, spring = kit_uniform(random, 2.0, 8.0);
+    double work = 0.0, taken = 0.0, shake[3], force[1][3];
+    int missed = 0;
+    for (int k = 0; k < 3; k++) {
+        shake[k] = kit_uniform(random, 0.0, 1.0);
+    }
+    for (int s = 0; s < (int)(seconds / kit->input.dt); s++) {
+        const double t = s * kit->input.dt;
+        double before[6];
+        memcpy(before, kit->input.velocity[0], sizeof before);
+        for (int k = 0; k < 3; k++) {
+            force[0][k] = weight * (k == 2 ? 1.5 * sin(spring * t * 6.28) + 0.8 * shake[2] * t
+                                           : shake[k] * sin(20 * t));
+        }
+        kit_step(kit, (const double(*)[3])force);
+        const double w = kit_work(kit, 0, before);
+        missed += !kit->result.converged;
+        work += w;
+        taken += fabs(w);
+        if (!kit_lifted(kit) || taken == 0.0) {
+            continue;
+        }
+        all->draw = all->cycles == 0 || work > all->worst ? draw : all->draw;
+        all->worst = all->cycles == 0 ? work : fmax(all->worst, work);
+        all->share = taken > 1e-6 ? fmax(all->share, work / taken) : all->share;
+        all->missed += missed;
+        all->cycles++; /* closed */
+        work = taken = 0.0;
+        missed = 0;
+    }
+}
+
+static inline void kit_shaken(const char *name, const Shaken *all, int cycles) {
+    print_message("%s: %d closed cycles, most energy gained %.2e J (draw %d), %.2e of what was "
+                  "exchanged at most; %d steps did not converge\n",
+                  name, all->cycles, all->worst, all->draw, all->share, all->missed);
+    assert_true(all->cycles > cycles);
+    assert_true(all->worst < 1e-9);
+}
+
 /* Asserts that motions first .. first + count - 1, from the air to the air, give no energy. motion:
  * [J] what the ground gave; *work: the sum of its works' sizes, for a scale. */
 static inline void kit_closed(int first, int count, double (*motion)(int number, double *work)) {
