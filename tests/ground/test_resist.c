@@ -73,33 +73,6 @@ TEST(test_signs) {
     assert_true(most < 0.0 && peak < RESIST_PEAK);
 }
 
-TEST(test_symmetry) {
-    uint64_t random = 4;
-    double worst = 0.0;
-    for (int draw = 0; draw < 2000; draw++) {
-        double beta = kit_uniform(&random, 0.0, 1.5), gamma = kit_uniform(&random, 0.0, 1.5),
-               a = kit_uniform(&random, -PI, PI);
-        double b = kit_uniform(&random, -PI, PI), turn = kit_uniform(&random, -PI, PI), n[3], v[3],
-               one[3], two[3], mirror[3];
-        unit(beta, a, n);
-        moving(gamma, b, v);
-        mild_resist_space(n, v, one);
-        unit(beta, a + turn, n);
-        moving(gamma, b + turn, v);
-        mild_resist_space(n, v, two);
-        unit(beta, -a, n);
-        moving(gamma, -b, v);
-        mild_resist_space(n, v, mirror);
-        worst = fmax(worst, fabs(two[0] - (one[0] * cos(turn) - one[1] * sin(turn))));
-        worst = fmax(worst, fabs(two[1] - (one[0] * sin(turn) + one[1] * cos(turn))));
-        worst = fmax(worst, fabs(two[2] - one[2]));
-        worst = fmax(worst, fmax(fabs(mirror[0] - one[0]),
-                                 fmax(fabs(mirror[1] + one[1]), fabs(mirror[2] - one[2]))));
-    }
-    print_message("3D: turned and mirrored within %.1e\n", worst);
-    assert_true(worst < 1e-12);
-}
-
 /* Force on a plate of 5 x 3 elements tilted by beta about y, 20 mm deep in its middle, moved by
  * hand at 0.2 m/s. */
 static void plate_force(int model, double beta, double gamma, double *force, double *product) {

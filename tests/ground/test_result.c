@@ -141,49 +141,6 @@ TEST(test_depths_of_the_loaded_elements) {
     mild_sole_destroy(sole);
 }
 
-/* A set of eight tiles keeps eight places: the ninth takes the oldest one's, and no other's.
- * Each is pressed to 10 mm in steps of 1 mm, and a step remembers its middle: 9.5 mm. */
-TEST(test_prints_keep_what_they_were_given) {
-    MildSole *sole = kit_plate(1, 1);
-    const MildSole *soles[1] = {sole};
-    MildMaterial sand = mild_material_default();
-    size_t none = mild_ground_bytes_imprints(soles, 1, 0);
-    /* a tile: 64 depths of two bytes and eight bytes of place and time */
-    assert_int_equal(mild_ground_bytes_imprints(soles, 1, 8) - none, 8 * 136);
-    assert_int_equal(mild_ground_bytes_imprints(soles, 1, 1) - none, 8 * 136);
-    assert_int_equal(mild_ground_bytes_imprints(soles, 1, 9) - none, 16 * 136);
-    assert_int_equal(mild_ground_bytes_imprints(soles, 1, 128) - none, 128 * 136);
-    assert_int_equal(mild_ground_bytes_imprints(soles, 1, -3) - none, 0);
-    for (int places = 8; places <= 10; places++) {
-        Kit kit;
-        kit_open(&kit, 1, sole, NULL, &sand, 1e-3);
-        kit_prints(&kit, 8);
-        /* tiles are four pitches wide; 0.3 pitches beside the middle of every twentieth one */
-        const double at = 2.3 * KIT_PITCH, apart = 80 * KIT_PITCH;
-        for (int n = 0; n < places; n++) {
-            kit.input.position[0][0] = at + apart * n;
-            kit.input.position[0][1] = at;
-            for (int s = 0; s <= 20; s++) {
-                double z = -KIT_SOLE_Z - 1e-3 * (s <= 10 ? s : 18 - s);
-                kit.input.velocity[0][2] = kit.input.free_velocity[2] =
-                    (z - kit.input.position[0][2]) / kit.input.dt;
-                kit_solve(&kit);
-                kit_advance(&kit);
-                kit.input.position[0][2] = z;
-            }
-        }
-        int kept = 0;
-        for (int n = 0; n < places; n++) {
-            double depth = mild_ground_imprint_at(kit.ground, at + apart * n, at);
-            assert_true(n < places - 8 ? depth == 0.0 : fabs(depth - 0.0095) < 1.1e-5);
-            kept += depth > 0.0;
-        }
-        assert_int_equal(kept, 8);
-        kit_close(&kit);
-    }
-    mild_sole_destroy(sole);
-}
-
 /* Forces whose square is 0 or infinite, and torques beside next to no force, have a finite axis. */
 TEST(test_axis_is_finite) {
     MildSole *sole = kit_sole(0, 77);

@@ -248,48 +248,4 @@ TEST(test_paths) {
     assert_true(heights < 1e-9);
 }
 
-/* A step at numbers that are none was kept; lifted and put down again, the foot stands as if
- * nothing had been. */
-TEST(test_bad_step_forgotten) {
-    MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
-    MildMaterial m = mild_material_default();
-    for (int t = 0; t < 36; t++) {
-        Kit kit;
-        uint64_t random = 40u;
-        kit_open(&kit, 2, left, right, &m, 1e-3);
-        if (t % 2) {
-            kit_prints(&kit, 64);
-        }
-        MildContactInput good = kit.input;
-        kit.input.position[0][2] += t % 4 < 2 ? -0.01 : 0.0; /* all or some listed */
-        for (int k = 0; t % 4 >= 2 && k < 2; k++) {
-            kit_random_state(&kit, &random);
-        }
-        kit_inverse_inertia(&kit);
-        kit_free(&kit, NULL);
-        double bad[3] = {NAN, INFINITY, 1e300},
-               *victims[3] = {&kit.input.inverse_inertia[26], &kit.input.free_velocity[2],
-                              &kit.input.velocity[1][4]};
-        *victims[t / 4 % 3] = bad[t / 12];
-        kit_solve(&kit);
-        kit_advance(&kit);
-        kit.input = good;
-        for (int f = 0; f < 2; f++) {
-            kit.input.position[f][2] += 0.5;
-        }
-        kit_step(&kit, NULL);
-        kit.input = good;
-        for (int s = 0; s < 5; s++) {
-            kit_step(&kit, NULL);
-            for (int i = 0; i < 12; i++) {
-                assert_true(fabs(kit.result.velocity[i]) < 1.0);
-            }
-            assert_true(kit.result.converged);
-        }
-        kit_close(&kit);
-    }
-    mild_sole_destroy(left);
-    mild_sole_destroy(right);
-}
-
 TEST_MAIN(NULL, NULL)
