@@ -278,41 +278,6 @@ TEST(test_tilt) {
     }
 }
 
-/* A strip that is turned about its middle deep in its heap: M/(B V0) is 1/12 of a roof-shaped
- * pressure, and 1/8 of an even one. */
-static double turned_moment(int model) {
-    MildMaterial m = grains(0.02);
-    m.model = model;
-    m.mu = 0.0;
-    m.sigma_cone = model == MILD_MODEL_MILD ? 0.223e6 : 0.0; /* nothing but the heap */
-    m.bed_depth = 10.0;
-    MildSole *sole = kit_rectangle(1.0, 0.1, 0.005, 0);
-    Kit kit;
-    kit_open(&kit, 1, sole, NULL, &m, 1e-3);
-    press_to(&kit, 1.0, 500);
-    lead(&kit, 0, 0, 0);
-    const double load = kit.result.foot[0].force[2];
-    double moment = 0.0;
-    for (int i = 0; i < 60; i++) { /* about x, which runs along the strip */
-        const double twist[6] = {0, 0, 0, 0.5, 0, 0};
-        memcpy(kit.input.free_velocity, twist, sizeof twist);
-        memcpy(kit.input.velocity[0], twist, sizeof twist);
-        kit_solve(&kit);
-        const double *R = kit.input.rotation[0], *force = kit.result.foot[0].force;
-        moment = kit.result.foot[0].torque[0] -
-                 KIT_SOLE_Z * (R[5] * force[2] - R[8] * force[1]); /* about its middle */
-        kit_advance(&kit);
-    }
-    kit_close(&kit);
-    mild_sole_destroy(sole);
-    return fabs(moment) / (0.1 * load);
-}
-
-TEST(test_swipe) {
-    expect_near("a roof", turned_moment(MILD_MODEL_MILD_MERGED), 1.0 / 12, 0.04 / 12);
-    expect_near("an even pressure", turned_moment(MILD_MODEL_MILD), 1.0 / 8, 0.04 / 8);
-}
-
 /* ---- slip ---- */
 
 /* A plate dragged at constant depth: F/F0 = 1/(1 + s/j0), at any step, for both models. */
@@ -347,117 +312,6 @@ TEST(test_drag) {
         mild_sole_destroy(sole);
     }
     expect_below("F/F0 against 1/(1 + s/(j0 + g u))", worst, 1e-9);
-}
-
-/* Fresh penetration gives the support back: 1 - lambda falls as exp(-da/u0), where u0 grows with
- * the depth as j0 does. Small steps: the share is held in each. */
-TEST(test_regain) {
-    for (int grows = 0; grows < 2; grows++) {
-        MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
-        MildMaterial m = grains(0.104);
-        m.slip_length = 0.0019;
-        m.regain_length = 0.00068;
-        m.slip_growth = grows ? 0.4 : 0;
-        Kit kit;
-        kit_open(&kit, 1, sole, NULL, &m, 1e-3);
-        press_to(&kit, 0.02, 200);
-        for (int i = 0; i < 40; i++) {
-            lead(&kit, 0.1, 0, 0);
-            kit_advance(&kit);
-        }
-        const double j0 = m.slip_length + 0.02 * m.slip_growth;
-        const double lost = 1 - 1 / (1 + 0.004 / j0);
-        double worst = 0.0, depth = 0.02, spent = 0.0;
-        for (int i = 0; i < 2000; i++) {
-            lead(&kit, 0, 0.001, 0);
-            kit_advance(&kit);
-            depth += 1e-6;
-            spent += 1e-6 / (m.regain_length * (1 + depth * m.slip_growth / m.slip_length));
-            const double wanted = (1 - lost * exp(-spent)) * level_force(sole, &m, depth);
-            worst = i > 200 ? fmax(worst, fabs(kit.result.foot[0].force[2] / wanted - 1)) : worst;
-        }
-        expect_below("regained support", worst, 0.06); /* the elastic travel takes its part */
-        kit_close(&kit);
-        mild_sole_destroy(sole);
-    }
-}
-
-/* Support comes back up to the cosine of the tilt where the ground is projected, and whole where it
- * is not: after 40 u0 of fresh way a plate of 15 degrees carries as on ground where slip costs
- * nothing. */
-TEST(test_regain_tilted) {
-    for (int merged = 0; merged < 2; merged++) {
-        MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
-        MildMaterial m = grains(0.104);
-        m.model = merged ? MILD_MODEL_MILD_MERGED : MILD_MODEL_MILD;
-        m.regain_length = 0.0005;
-        m.mu = 0;
-        double force[2] = {0, 0}, worn = 1;
-        for (int slips = 0; slips < 2; slips++) { /* first ground where slip costs nothing */
-            m.slip_length = 0.0019 * slips;
-            const double c = cos(15 * pi / 180), s = sin(15 * pi / 180);
-            Kit kit;
-            kit_open(&kit, 1, sole, NULL, &m, 1e-3);
-            const double R[9] = {c, 0, s, 0, 1, 0, -s, 0, c};
-            memcpy(kit.input.rotation[0], R, sizeof R);
-            kit.input.position[0][2] = -c * KIT_SOLE_Z;
-            press_to(&kit, 0.03, 300);
-            lead(&kit, 0, 0, 0);
-            const double first = kit.result.foot[0].force[2];
-            for (int i = 0; i < 40 * slips; i++) {
-                lead(&kit, 0.1, 0, 0);
-                kit_advance(&kit);
-            }
-            worn = slips ? kit.result.foot[0].force[2] / first : 1;
-            const double along = merged ? -tan(presses(15 * pi / 180)) : 0; /* no slip on the way */
-            for (int i = 0; i < 2000; i++) {
-                lead(&kit, 0.01 * along, 0.01, 0);
-                kit_advance(&kit);
-            }
-            lead(&kit, 0.01 * along, 0.01, 0);
-            force[slips] = kit.result.foot[0].force[2];
-            kit_close(&kit);
-        }
-        expect_below("support after slip", worn, 0.5);
-        expect_near("after fresh way", force[1], force[0], 0.003 * force[0]);
-        mild_sole_destroy(sole);
-    }
-}
-
-/* A foot that slips under load sinks; the force of a sliding sole and its drag keep to grip's
- * bound. */
-TEST(test_sinks) {
-    MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
-    MildMaterial m = grains(0.104);
-    double depth[2];
-    for (int slips = 0; slips < 2; slips++) {
-        m.slip_length = slips ? 0.0019 : 0.0;
-        m.grip = 0.123;
-        Kit kit;
-        kit_open(&kit, 1, sole, NULL, &m, 1e-3);
-        for (int i = 0; i < 3000; i++) {
-            memset(kit.A, 0, sizeof kit.A);
-            kit.A[14] = 1 / 8.0; /* moves up and down alone */
-            const double v = i < 1000 ? 0.0 : i < 2000 ? 0.02 : 0.0;
-            memset(kit.input.free_velocity, 0, sizeof kit.input.free_velocity);
-            kit.input.free_velocity[0] = v;
-            const double weight = KIT_GRAVITY * fmin(i / 1000.0, 1.0); /* put on slowly */
-            kit.input.free_velocity[2] = kit.input.velocity[0][2] - weight * kit.input.dt;
-            kit_solve(&kit);
-            if (slips) {
-                const MildFootResult *foot = &kit.result.foot[0];
-                const double deep = foot->depth_max + 1e-3;
-                const double sides = 1.5 * m.phi * m.rho * 9.81 * deep * deep * 0.12;
-                assert_true(fabs(foot->force[0]) <=
-                            0.123 * level_force(sole, &m, deep) * 1.02 + sides + 1e-9);
-            }
-            kit_advance(&kit);
-        }
-        depth[slips] = -(kit.input.position[0][2] + KIT_SOLE_Z);
-        kit_close(&kit);
-    }
-    assert_true(depth[1] > depth[0] + 0.005);
-    mild_sole_destroy(sole);
 }
 
 /* ---- energy: closed motions with slip and tilt give nothing ---- */
@@ -495,34 +349,9 @@ static double closed_motion(int number, double *scale) {
     Kit kit;
     kit_open(&kit, 1, sole, NULL, &m, steps[kit_index(&random, 4)]);
     const int parts = 40 + kit_index(&random, 60); /* turns of 0.01 rad a step at most */
-    double given = 0.0, work = 0.0, last[6] = {0};
-    for (int k = 0; k < KNOTS; k++) {
-        const double *from = knot[k], *to = knot[(k + 1) % KNOTS];
-        for (int i = 0; i < parts; i++) {
-            double at[4], next[4];
-            for (int j = 0; j < 4; j++) {
-                at[j] = from[j] + (to[j] - from[j]) * i / parts;
-                next[j] = from[j] + (to[j] - from[j]) * (i + 1) / parts;
-            }
-            /* Small turns about y, then x; the twist carries the pose to the next within the
-                 * step's own error, so the pose is set again. */
-            const double cy = cos(at[2]), sy = sin(at[2]), cx = cos(at[3]), sx = sin(at[3]);
-            const double R[9] = {cy, sy * sx, sy * cx, 0, cx, -sx, -sy, cy * sx, cy * cx};
-            memcpy(kit.input.rotation[0], R, sizeof R);
-            kit.input.position[0][0] = at[1];
-            kit.input.position[0][2] = -at[0] - KIT_SOLE_Z;
-            const double dt = kit.input.dt;
-            const double twist[6] = {(next[1] - at[1]) / dt,  0,
-                                     -(next[0] - at[0]) / dt, (next[3] - at[3]) / dt * cy,
-                                     (next[2] - at[2]) / dt,  -(next[3] - at[3]) / dt * sy};
-            const double w = kit_led(&kit, last, twist);
-            given += w;
-            work += fabs(w);
-        }
-    }
+    const double given = kit_led_through(&kit, knot, KNOTS, parts, -KIT_SOLE_Z, scale);
     kit_close(&kit);
     mild_sole_destroy(sole);
-    *scale = work;
     return given;
 }
 
@@ -591,33 +420,6 @@ TEST(test_pumped) {
         const double given = pumped(models[i], &work);
         expect_below(mild_model_names[models[i]], given, 0.0);
     }
-}
-
-/* A share falls by slip and rises by fresh ground in one step, too: what a step leaves out where
- * neither acts, or slip alone, does not count. Pressed and slid at once, then held. */
-TEST(test_left_out) {
-    MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
-    MildMaterial m = grains(0.104);
-    m.slip_length = 0.0019;
-    m.regain_length = 0.0005;
-    for (int k = 0; k < 4; k++) {
-        const double slid = k & 1 ? 1e-3 : 0.0, fresh = k & 2 ? 1e-3 : 0.0;
-        Kit kit;
-        kit_open(&kit, 1, sole, NULL, &m, 1e-3);
-        press_to(&kit, 0.02, 200);
-        lead(&kit, slid / 1e-3, fresh / 1e-3, 0);
-        kit_advance(&kit);
-        lead(&kit, 0, 0, 0);
-        kit_advance(&kit);
-        const double slipped = 1 / (1 + slid / m.slip_length);
-        const double wanted = 1 - (1 - slipped) * exp(-fresh / m.regain_length);
-        const double found = kit.result.foot[0].force[2] / level_force(sole, &m, 0.02 + fresh);
-        print_message("slides %.0f mm and sinks %.0f: carries %.4f, wanted %.4f\n", 1e3 * slid,
-                      1e3 * fresh, found, wanted);
-        assert_true(fabs(found - wanted) < 0.1); /* half a step early, and elastic travel */
-        kit_close(&kit);
-    }
-    mild_sole_destroy(sole);
 }
 
 int main(int count, char **arguments) {
