@@ -42,14 +42,21 @@ void *aligned_alloc(size_t alignment, size_t size) {
 }
 #endif
 
+/* Of planes and of a shell. */
 TEST(test_no_allocation) {
     uint64_t random = 31;
+    const MildShape box = surface_box(0.1, 0.05, 0.04);
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
-    MildMaterial m = mild_material_default();
+    MildSole *shell = surface_make(&box, 1, 0.02);
+    const MildMaterial m = mild_material_default();
     Kit kit;
     kit_open(&kit, 2, left, right, &m, 1e-3);
-    const int before = allocations;
     for (int t = 0; t < 200; t++) {
+        if (t == 150) {
+            const MildSole *const soles[2] = {left, shell};
+            kit_soles(&kit, soles);
+        }
+        const int before = allocations;
         kit_random_state(&kit, &random);
         kit.terrain.materials[0] = kit_material(&random);
         kit.input.solver = t % 10 ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL;
@@ -58,76 +65,48 @@ TEST(test_no_allocation) {
             kit_step(&kit, NULL);
         }
         mild_ground_reset(kit.ground);
+        assert_int_equal(allocations, before);
     }
-    assert_int_equal(allocations, before);
     kit_close(&kit);
     mild_sole_destroy(left);
     mild_sole_destroy(right);
+    mild_sole_destroy(shell);
 }
 
-TEST(test_failing_allocation) {
-    if (!COUNTING) {
-        skip();
-    }
-    MildSole *sole = kit_sole(0, 77);
-    const MildSole *soles[1] = {sole};
-    double box[8] = {0, 0, 0.1, 0, 0.1, 0.1, 0, 0.1};
-    MildSoleDef def = {box, 4, KIT_PITCH, KIT_SOLE_Z, 0};
-    int refused = 0;
-    for (int n = 1; n <= 5; n++) {
-        MildError error = {0};
-        fail_at = n;
-        MildSole *made = mild_sole_create(&def, &error);
-        if (!made) {
-            assert_int_equal(error.status, MILD_ERROR_MEMORY);
-        }
-        refused += !made;
-        mild_sole_destroy(made);
-        fail_at = n;
-        MildScratch *scratch = mild_scratch_create(soles, 1, &error);
-        if (!scratch) {
-            assert_int_equal(error.status, MILD_ERROR_MEMORY);
-        }
-        refused += !scratch;
-        mild_scratch_destroy(scratch);
-        fail_at = 0;
-    }
-    assert_int_equal(refused, 5);
-    mild_sole_destroy(sole);
-}
-
-/* A shell grows its list, a mesh its pieces too; a step on it allocates nothing. */
-TEST(test_failing_surface) {
+/* Soles, shells, whose lists grow, and scratches, with the n-th allocation failing until none does:
+ * nothing comes back, and nothing leaks. */
+TEST(test_failing_allocations) {
     if (!COUNTING) {
         skip();
     }
     double vertices[18];
+    const double box[8] = {0, 0, 0.1, 0, 0.1, 0.1, 0, 0.1};
     const MildShape shapes[2] = {surface_wedge(0.1, 0.1, 0.1, vertices),
                                  surface_box(0.2, 0.05, 0.05)};
-    const MildSurfaceDef def = {.shapes = shapes, .count = 2, .pitch = 0.01};
-    MildSole *sole = NULL;
-    int refused = 0;
-    for (int n = 1; !sole; n++) {
-        MildError error = {0};
-        fail_at = n;
-        sole = mild_sole_surface(&def, &error);
-        fail_at = 0;
-        if (!sole) {
-            assert_int_equal(error.status, MILD_ERROR_MEMORY);
-            refused++;
+    const MildSoleDef plane = {box, 4, KIT_PITCH, KIT_SOLE_Z, 0};
+    const MildSurfaceDef shell = {.shapes = shapes, .count = 2, .pitch = 0.01};
+    static const int least[3] = {2, 6, 2}; /* refusals */
+    MildSole *soles[2] = {NULL, NULL};
+    MildScratch *scratch = NULL;
+    for (int what = 0; what < 3; what++) {
+        int refused = 0;
+        for (const void *made = NULL; !made; refused += !made) {
+            MildError error = {0};
+            fail_at = refused + 1;
+            if (what < 2) {
+                made = soles[what] =
+                    what ? mild_sole_surface(&shell, &error) : mild_sole_create(&plane, &error);
+            } else {
+                made = scratch = mild_scratch_create((const MildSole *const *)soles, 2, &error);
+            }
+            fail_at = 0;
+            assert_int_equal(error.status, made ? MILD_OK : MILD_ERROR_MEMORY);
         }
+        assert_true(refused >= least[what]);
     }
-    const MildMaterial m = mild_material_default();
-    Kit kit;
-    kit_open(&kit, 1, sole, NULL, &m, 1e-3);
-    const int before = allocations;
-    for (int s = 0; s < 50; s++) {
-        kit_step(&kit, NULL);
-    }
-    assert_true(refused > 5);
-    assert_int_equal(allocations, before);
-    kit_close(&kit);
-    mild_sole_destroy(sole);
+    mild_scratch_destroy(scratch);
+    mild_sole_destroy(soles[0]);
+    mild_sole_destroy(soles[1]);
 }
 
 /* A robot's ground is small enough for thousands of robots. */
