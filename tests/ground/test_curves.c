@@ -273,43 +273,4 @@ TEST(test_restitution) {
     expect_below("at 20 mm/s against 1 - d v", first, 2e-3);
 }
 
-/* The same force at the same depth and speed, whatever happened before; and none that pulls. */
-TEST(test_no_memory) {
-    MildSole *plate = kit_plate(4, 3);
-    MildMaterial m = mild_material_default(); /* whose sand is plastic */
-    m.model = MILD_MODEL_HUNT_CROSSLEY;
-    m.exponent = 1.5;
-    m.dissipation = 5.0; /* no force below -0.13 m/s */
-    Kit kit;
-    kit_open(&kit, 1, plate, NULL, &m, 1e-3);
-    const double one = m.k_pen * 0.01;
-    double worst = 0.0;
-    double before = 0.0; /* [m/s] */
-    int up = 0, free = 0;
-    for (int s = 0; s < 4000; s++) {
-        const double t = s * 1e-3;
-        const double w = (0.015 + 0.001 * t) * 12.0 * cos(12.0 * t);
-        kit.input.velocity[0][2] = kit.input.free_velocity[2] = -w;
-        const double u0 = -KIT_SOLE_Z - kit.input.position[0][2];
-        kit_solve(&kit);
-        /* the way leads from middle to middle: mean depth u0, mean speed that of both steps */
-        const double mean = (before + w) / 2;
-        const double wanted =
-            u0 > 0.0 ? 12.0 * one * pow(u0 / 0.01, 1.5) * (1.0 + 1.5 * m.dissipation * mean) : 0.0;
-        before = w;
-        const double got = kit.result.foot[0].force[2];
-        assert_true(got >= 0.0);
-        free += got == 0.0 && u0 > 1e-3;
-        up += w < 0.0 && got > 0.0;
-        if (u0 > 1e-3) {
-            worst = fmax(worst, fabs(got - fmax(wanted, 0.0)) / (12.0 * one));
-        }
-        kit_advance(&kit);
-    }
-    kit_close(&kit);
-    mild_sole_destroy(plate);
-    expect_below("force against the law", worst, 1e-3);
-    assert_true(up > 300 && free > 20);
-}
-
 TEST_MAIN(NULL, NULL)
