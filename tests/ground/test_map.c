@@ -155,33 +155,6 @@ TEST(test_measures) {
     mild_map_destroy(map);
 }
 
-/* What only becomes visible with a kind is usable as it is: uneven by some mm to some dm. */
-TEST(test_defaults) {
-    for (int kind = MILD_MAP_SLOPE; kind <= MILD_MAP_MIXED; kind++) {
-        for (int patches = MILD_PATTERN_NONE; patches <= MILD_PATTERN_CHECKER; patches++) {
-            MildMapDef def = mild_map_def_default();
-            assert_true(def.kind == MILD_MAP_FLAT && def.patches == MILD_PATTERN_NONE);
-            def.kind = kind, def.patches = patches;
-            if (kind == MILD_MAP_IMAGE) {
-                continue; /* it has no default */
-            }
-            if (kind == MILD_MAP_MIXED) {
-                def.size = 10.0; /* the least */
-            }
-            MildMap *map = make_map(&def);
-            MildTerrain terrain = terrain_on(map, 0.0);
-            double low = INFINITY, high = -INFINITY;
-            for (int n = 0; n < 100 * 100; n++) {
-                const double h = mild_terrain_height_at(&terrain, n % 100 * 0.02, n / 100 * 0.02);
-                low = fmin(low, h), high = fmax(high, h);
-            }
-            assert_true(high - low > 5e-3 && high - low < 0.3);
-            assert_int_equal(mild_map_label_count(map), patches == MILD_PATTERN_NONE ? 1 : 2);
-            mild_map_destroy(map);
-        }
-    }
-}
-
 /* A tilted plane as an image: bilinear interpolation gives it exactly (float heights: a relative
  * 6e-8), slopes too; beyond the border its last height goes on. */
 TEST(test_plane) {

@@ -185,28 +185,6 @@ TEST(test_bounds) {
     }
 }
 
-/* Largest difference of two maps at their grid points. */
-static double difference(const MildMapDef *first, const MildMapDef *second) {
-    MildMap *maps[2] = {make_map(first), make_map(second)};
-    const MildTerrain a = terrain_on(maps[0], 0.0), b = terrain_on(maps[1], 0.0);
-    double worst = 0.0;
-    for (double x = 0.0; x < size; x += cell) {
-        for (double y = 0.0; y < size; y += cell) {
-            worst = fmax(worst,
-                         fabs(mild_terrain_height_at(&a, x, y) - mild_terrain_height_at(&b, x, y)));
-        }
-    }
-    mild_map_destroy(maps[0]);
-    mild_map_destroy(maps[1]);
-    return worst;
-}
-
-TEST(test_seeds) {
-    const MildMapDef one = mixed(1), again = mixed(1), two = mixed(2);
-    assert_true(difference(&one, &again) == 0.0);
-    assert_true(difference(&one, &two) > amplitude / 4);
-}
-
 /* Where no whole number of cells fits in a tile they are made smaller, and edges stay at 0. Tiles
  * of 2 m are the smallest. */
 TEST(test_odd_sizes) {

@@ -56,9 +56,7 @@ TEST(test_passive_by_hand) {
     MildSole *sole = kit_plate(2, 1);
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     double worst = -INFINITY, worst_way = -INFINITY;
-    int gains = 0;
-    int worst_draw = -1;
-    int worst_way_draw = -1;
+    int gains = 0; /* by the second account */
     for (int draw = first; draw < first + draws; draw++) {
         uint64_t random = draw_seed(13, draw, 16);
         MildMaterial m = kit_material(&random);
@@ -85,17 +83,14 @@ TEST(test_passive_by_hand) {
         if (taken == 0.0) {
             continue;
         }
-        worst_draw = work / taken > worst ? draw : worst_draw;
         worst = fmax(worst, work / taken);
-        worst_way_draw = way / taken > worst_way ? draw : worst_way_draw;
         worst_way = fmax(worst_way, way / taken);
         gains += way > 0.0;
     }
-    print_message("down and up by hand: %d draws, most work given back in excess, as a share: %.2e "
-                  "at the mean speed (draw %d), %.2e along the way (draw %d; %d draws above 0)\n",
-                  draws, worst, worst_draw, worst_way, worst_way_draw, gains);
+    print_message("down and up by hand: %d of %d draws gain along the way\n", gains, draws);
+    expect_below("excess given back at the mean speed, as a share", worst, 0.0);
+    expect_below("along the way", worst_way, 0.0);
     mild_sole_destroy(sole);
-    assert_true(worst < 0.0 && worst_way < 0.0);
 }
 
 /* One step along the loop: x, z and tilt about y; returns the ground's work on the foot, at the
@@ -119,7 +114,7 @@ static double loop_step(Kit *kit, const double size[3], const double phase[3], d
 TEST(test_loops) {
     MildSole *sole = kit_sole(0, 77);
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
-    double worst = -INFINITY, worst_share = -INFINITY;
+    double worst = -INFINITY;
     int worst_draw = -1;
     for (int draw = first; draw < first + draws; draw++) {
         uint64_t random = draw_seed(17, draw, 24);
@@ -145,16 +140,12 @@ TEST(test_loops) {
             }
             worst_draw = work > worst ? draw : worst_draw;
             worst = fmax(worst, work);
-            worst_share = fmax(worst_share, work / taken);
         }
         kit_close(&kit);
     }
-    print_message(
-        "closed loops by hand: %d draws, most energy gained in a round %.2e J (draw %d), share "
-        "%.2e\n",
-        draws, worst, worst_draw, worst_share);
+    print_message("closed loops by hand: the worst is draw %d\n", worst_draw);
+    expect_below("energy gained in a round [J]", worst, 1e-9);
     mild_sole_destroy(sole);
-    assert_true(worst < 1e-9);
 }
 
 int main(int argc, char **argv) {

@@ -61,8 +61,8 @@ TEST(test_one_element_carries_all) {
         }
         mild_sole_destroy(sole);
     }
-    print_message("one element: zmp, pressure centre and torque off by %.1e at most\n", worst);
-    assert_true(worst < 1e-9 && least > 1e-3);
+    expect_below("zero moment points, pressure centre, torque of one element", worst, 1e-9);
+    assert_true(least > 1e-3);
 }
 
 /* Many elements, tilted so that some are loaded: about zmp_sole, which lies in the height of the
@@ -105,9 +105,8 @@ TEST(test_zmp_takes_the_horizontal_torque) {
         }
         kit_close(&kit);
     }
-    print_message("zmp of %d tilted soles: torque that is left %.1e m times the force\n", loaded,
-                  worst);
-    assert_true(loaded > 100 && worst < 1e-9);
+    expect_below("torque that is left, by the force [m]", worst, 1e-9);
+    assert_true(loaded > 100);
     mild_sole_destroy(sole);
 }
 
@@ -126,8 +125,6 @@ TEST(test_depths_of_the_loaded_elements) {
     kit.input.velocity[0][2] = kit.input.free_velocity[2] = -speed;
     kit_solve(&kit);
     const MildFootResult *r = &kit.result.foot[0];
-    print_message("tilted plate: %d of 4 loaded, deepest %.3f mm, mean %.3f mm\n", r->contacts,
-                  1e3 * r->depth_max, 1e3 * r->depth_mean);
     assert_int_equal(r->contacts, 2);
     assert_true(fabs(r->area - 2 * KIT_PITCH * KIT_PITCH) < 1e-12);
     double move = speed * 1e-3; /* depths of the step's start or end */
@@ -145,7 +142,7 @@ TEST(test_depths_of_the_loaded_elements) {
 TEST(test_axis_is_finite) {
     MildSole *sole = kit_sole(0, 77);
     uint64_t random = 3;
-    int loaded = 0, tiny = 0;
+    int loaded = 0;
     for (int draw = 0; draw < 3000; draw++) {
         MildMaterial m = kit_material(&random);
         Kit kit;
@@ -162,13 +159,9 @@ TEST(test_axis_is_finite) {
             sum += 0.0 * r->zmp_axis[k] + 0.0 * r->pressure_center[k] + 0.0 * r->force[k];
         }
         assert_true(!kit.result.converged || sum == 0.0);
-        const double *F = r->force, size = fabs(F[0]) + fabs(F[1]) + fabs(F[2]);
         loaded += kit.result.converged && r->contacts > 0;
-        tiny += kit.result.converged && size > 0.0 && size < 1e-160;
         kit_close(&kit);
     }
-    print_message("%d loaded soles, %d with a force whose square is 0: every point finite\n",
-                  loaded, tiny);
     mild_sole_destroy(sole);
     assert_true(loaded > 300);
 }
