@@ -155,36 +155,6 @@ TEST(test_edges) {
     expect_below("a period on [m]", repeat, 1e-9);
 }
 
-/* Bounds of height and gradient, the period, and that the map's plane is level. */
-TEST(test_bounds) {
-    uint64_t random = 45;
-    for (uint64_t seed = 1; seed <= SEEDS; seed++) {
-        MildMapDef def = mixed(seed);
-        def.amplitude = 0.0; /* pyramids only */
-        MildMap *map = make_map(&def);
-        MildTerrain terrain = terrain_on(map, 0.0);
-        double low, high, x, y, gradient[2];
-        mild_map_range(map, &low, &high);
-        assert_true(low >= -slope * edge / 2 - 1e-7 && high <= slope * edge / 2 + 1e-7);
-        mild_map_extent(map, &x, &y);
-        assert_true(fabs(x - size) < 1e-9 && fabs(y - size) < 1e-9);
-        assert_false(mild_map_is_level(map));
-        for (int n = 0; n < 2000; n++) {
-            mild_terrain_slope_at(&terrain, kit_uniform(&random, 0.0, size),
-                                  kit_uniform(&random, 0.0, size), gradient);
-            assert_true(fmax(fabs(gradient[0]), fabs(gradient[1])) < slope + 1e-6);
-        }
-        mild_map_destroy(map);
-        def = mixed(seed);
-        def.slope = 0.0; /* all but pyramids */
-        map = make_map(&def);
-        mild_map_range(map, &low, &high);
-        assert_true(low >= -amplitude - 1e-7 && high <= amplitude + 1e-7);
-        assert_true(high - low > amplitude / 4);
-        mild_map_destroy(map);
-    }
-}
-
 /* Where no whole number of cells fits in a tile they are made smaller, and edges stay at 0. Tiles
  * of 2 m are the smallest. */
 TEST(test_odd_sizes) {

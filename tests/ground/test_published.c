@@ -108,65 +108,6 @@ TEST(test_durian) {
     mild_sole_destroy(sole);
 }
 
-/* Root mean square of E - (E0 - A) exp(-2z/d1) - A - B z over the trace, with the best A and B for
- * this d1; or, tied, the best k of the force law. Both are linear least squares. */
-static double durian_miss(double d1, int tied) {
-    double e0 = trace_energy[0], aa = 0, ab = 0, bb = 0, ay = 0, by = 0, yy = 0;
-    for (int i = 0; i < trace_count; i++) {
-        double z = trace_depth[i], fade = exp(-2.0 * z / d1), a = 1.0 - fade, b = z,
-               y = trace_energy[i] - e0 * fade;
-        if (tied) { /* A = g d1/2 + q, B = -2 q/d1 with q = k d1^2/(4 M) */
-            y -= 0.5 * KIT_GRAVITY * d1 * a;
-            a -= 2.0 * b / d1;
-            b = 0.0;
-        }
-        aa += a * a;
-        ab += a * b;
-        bb += b * b;
-        ay += a * y;
-        by += b * y;
-        yy += y * y;
-    }
-    double det = aa * bb - ab * ab, A = tied ? ay / aa : (ay * bb - by * ab) / det,
-           B = tied ? 0.0 : (by * aa - ay * ab) / det;
-    double sum = yy - 2.0 * (A * ay + B * by) + A * A * aa + 2.0 * A * B * ab + B * B * bb;
-    return sqrt(fmax(sum, 0.0) / trace_count);
-}
-
-static void durian_fit(const char *ground, double speed, double *free_share, double *tied_share) {
-    MildMaterial m = kit_preset(ground);
-    m.bed_depth = 10.0;
-    MildSole *sole = kit_plate(11, 7);
-    const double mass = 20.0;
-    double best[2] = {INFINITY, INFINITY};
-    drop(&m, sole, mass, speed, 2e-5);
-    for (double d = 2e-4; d < 2.0; d *= 1.01) {
-        for (int tied = 0; tied < 2; tied++) {
-            best[tied] = fmin(best[tied], durian_miss(d, tied));
-        }
-    }
-    *free_share = best[0] / trace_energy[0];
-    *tied_share = best[1] / trace_energy[0];
-    mild_sole_destroy(sole);
-}
-
-TEST(test_durian_sand) {
-    static const double speed[4] = {0.5, 1.0, 2.0, 4.0};
-    static const char *const sand[2] = {"sand_loose", "sand_dense"};
-    double worst[2] = {0};
-    for (int g = 0; g < 2; g++) {
-        for (int v = 0; v < 4; v++) {
-            double found[2];
-            durian_fit(sand[g], speed[v], &found[0], &found[1]);
-            for (int i = 0; i < 2; i++) {
-                worst[i] = fmax(worst[i], found[i]);
-            }
-        }
-    }
-    expect_below("sand presets: rms of the form with A, B, d1 free, by K0", worst[0], 0.10);
-    expect_below("tied to the force law", worst[1], 0.12);
-}
-
 /* ---- Uehara ---- */
 
 /* Depth of a cube of edge D and density rho that falls from rest, H from there to where it stops.
