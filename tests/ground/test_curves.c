@@ -74,49 +74,34 @@ static double pressure(const MildMaterial *m, double depth) {
     return 1e-3 * mild_element_law(m, KIT_PITCH, depth).force / (KIT_PITCH * KIT_PITCH);
 }
 
-/* Wong 2008, table 2.3, and the Lunar Sourcebook: friction angle and cohesion. Friction is held by
- * shear alone, over a bed that is out of reach. */
-TEST(test_soils) {
-    static const struct {
-        const char *name;
-        double angle, cohesion; /* [degrees], [N/m^2] */
-    } table[5] = {{"dry_sand", 28.0, 1040.0},
-                  {"sandy_loam", 29.0, 1720.0},
-                  {"clay", 13.0, 4140.0},
-                  {"snow", 19.7, 1030.0},
-                  {"lunar_soil", 35.0, 170.0}};
-    for (int i = 0; i < 5; i++) {
-        MildMaterial m = mild_material_default();
-        assert_true(mild_material_preset(table[i].name, &m));
-        assert_true(fabs(atan(m.mu) * 180.0 / acos(-1.0) - table[i].angle) < 1e-9);
-        assert_true(m.cohesion == table[i].cohesion);
-        assert_true(m.k_drift == 0.0 && m.b_drift == 0.0 && m.bed_depth >= 1.0);
-        assert_true(m.shear_length >= 0.005 && m.shear_length <= 0.05);
-    }
-}
-
-/* (k_c/b + k_phi) z^n with a calculator, b = 0.1 m. */
+/* Wong 2008, table 2.3, and the Lunar Sourcebook: friction angle and cohesion, and (k_c/b + k_phi)
+ * z^n with a calculator, b = 0.1 m. Friction is held by shear alone, over a bed that is out of
+ * reach. */
 TEST(test_published) {
     static const struct {
         const char *name;
-        double depth;    /* [m] */
-        double pressure; /* [kPa] */
+        double angle, cohesion; /* [degrees], [N/m^2] */
+        double depth, pressure; /* [m], [kPa] */
     } table[] = {
-        {"dry_sand", 0.01, 9.7061},   /* (9.9 + 1528.43) 0.01^1.1 = 1538.33 x 0.0063096 */
-        {"dry_sand", 0.05, 57.007},   /* 1538.33 x 0.05 x 0.74113 */
-        {"sandy_loam", 0.02, 101.39}, /* (52.7 + 1515.04) x 0.0646745 */
-        {"clay", 0.01, 82.405},       /* (131.9 + 692.15) x 0.1 */
-        {"snow", 0.1, 6.0389},        /* (43.7 + 196.72) x 0.0251189 */
-        {"lunar_soil", 0.02, 16.68},  /* (14 + 820) x 0.02 */
+        {"dry_sand", 28.0, 1040.0, 0.01, 9.7061},   /* (9.9 + 1528.43) 0.01^1.1 */
+        {"dry_sand", 28.0, 1040.0, 0.05, 57.007},   /* 1538.33 x 0.05 x 0.74113 */
+        {"sandy_loam", 29.0, 1720.0, 0.02, 101.39}, /* (52.7 + 1515.04) x 0.0646745 */
+        {"clay", 13.0, 4140.0, 0.01, 82.405},       /* (131.9 + 692.15) x 0.1 */
+        {"snow", 19.7, 1030.0, 0.1, 6.0389},        /* (43.7 + 196.72) x 0.0251189 */
+        {"lunar_soil", 35.0, 170.0, 0.02, 16.68},   /* (14 + 820) x 0.02 */
     };
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
         MildMaterial m;
         MildError error = {0};
         assert_true(mild_material_preset(table[i].name, &m));
-        assert_int_equal(mild_material_check(&m, &error), MILD_OK);
+        expect_good(mild_material_check(&m, &error) == MILD_OK, &error);
+        assert_int_equal(m.model, MILD_MODEL_BEKKER);
+        expect_near("angle", atan(m.mu) * 180.0 / acos(-1.0), table[i].angle, 1e-9);
+        assert_true(m.cohesion == table[i].cohesion);
+        assert_true(m.k_drift == 0.0 && m.b_drift == 0.0 && m.bed_depth >= 1.0);
+        assert_true(m.shear_length >= 0.005 && m.shear_length <= 0.05);
         assert_true(m.plate_width == 0); /* that of the sole */
         m.plate_width = 0.1;
-        assert_int_equal(m.model, MILD_MODEL_BEKKER);
         expect_near(table[i].name, pressure(&m, table[i].depth), table[i].pressure,
                     2e-4 * table[i].pressure);
     }
