@@ -314,6 +314,39 @@ TEST(test_drag) {
     expect_below("F/F0 against 1/(1 + s/(j0 + g u))", worst, 1e-9);
 }
 
+/* Fresh penetration gives the support back: 1 - lambda falls as exp(-da/u0), where u0 grows with
+ * the depth as j0 does. Small steps: the share is held in each. */
+TEST(test_regain) {
+    for (int grows = 0; grows < 2; grows++) {
+        MildSole *sole = kit_rectangle(0.12, 0.06, 0.01, 0);
+        MildMaterial m = grains(0.104);
+        m.slip_length = 0.0019;
+        m.regain_length = 0.00068;
+        m.slip_growth = grows ? 0.4 : 0;
+        Kit kit;
+        kit_open(&kit, 1, sole, NULL, &m, 1e-3);
+        press_to(&kit, 0.02, 200);
+        for (int i = 0; i < 40; i++) {
+            lead(&kit, 0.1, 0, 0);
+            kit_advance(&kit);
+        }
+        const double j0 = m.slip_length + 0.02 * m.slip_growth;
+        const double lost = 1 - 1 / (1 + 0.004 / j0);
+        double worst = 0.0, depth = 0.02, spent = 0.0;
+        for (int i = 0; i < 2000; i++) {
+            lead(&kit, 0, 0.001, 0);
+            kit_advance(&kit);
+            depth += 1e-6;
+            spent += 1e-6 / (m.regain_length * (1 + depth * m.slip_growth / m.slip_length));
+            const double wanted = (1 - lost * exp(-spent)) * level_force(sole, &m, depth);
+            worst = i > 200 ? fmax(worst, fabs(kit.result.foot[0].force[2] / wanted - 1)) : worst;
+        }
+        expect_below("regained support", worst, 0.06); /* the elastic travel takes its part */
+        kit_close(&kit);
+        mild_sole_destroy(sole);
+    }
+}
+
 /* ---- energy: closed motions with slip and tilt give nothing ---- */
 
 static int closed_count = 300, closed_first, closed_plain;
