@@ -20,14 +20,13 @@ for march in x86-64-v3 x86-64-v4; do
         -DMILD_MARCH=$march -DMILD_ENGINE_SIZES="$sizes" -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
         -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' >/dev/null
     cmake --build "build/$march" --parallel "$jobs" --target mild mild_envs gpu_test_gpu gpu_test_parts \
-        batch_test_batch batch_test_points ranks_test_ranks >/dev/null
+        batch_test_batch ranks_test_ranks >/dev/null
     strip -o "$bundle/bin/mild-$march" "build/$march/mild"
     sizes=$PWD/build/$march/src/engine_sizes
 done
 strip -o "$bundle/bin/test_gpu" build/x86-64-v3/tests/gpu_test_gpu
 strip -o "$bundle/bin/test_parts" build/x86-64-v3/tests/gpu_test_parts
 strip -o "$bundle/bin/test_batch" build/x86-64-v3/tests/batch_test_batch
-strip -o "$bundle/bin/test_points" build/x86-64-v3/tests/batch_test_points
 strip -o "$bundle/bin/test_ranks" build/x86-64-v3/tests/ranks_test_ranks
 
 # Open MPI for one machine: it finds its plugins and texts below OPAL_PREFIX, as below its own prefix, and its PMIx those in

@@ -5,12 +5,13 @@
 #include "batch_kit.h"
 #include "ground/map_kit.h"
 #include "ground/surface_kit.h"
+#include "points_kit.h"
 
 enum { ROBOTS = 48, STEPS = 30, MATERIALS = 12, LABELS = 3, ROWS = 6 * MILD_FEET_MAX };
 
 enum { SHELLS = 5 };
 
-static MildSole *left, *right, *center, *plate, *shell[SHELLS];
+static MildSole *left, *right, *center, *plate, *small_plate, *shell[SHELLS];
 
 /* A wheel that turns about y: a closed mesh of its rim and its two sides. */
 static inline MildSole *make_wheel(double radius, double breadth) {
@@ -51,6 +52,7 @@ static inline int open_soles(void **state) {
     right = kit_sole(1, 77);
     center = mild_sole_concentric(left, NULL);
     plate = kit_plate(4, 5);
+    small_plate = kit_plate(2, 4);
     const MildShape capsule = surface_capsule(0.04, 0.09), sphere = surface_sphere(0.07);
     MildShape shin = surface_box(0.05, 0.04, 0.1), base = surface_box(0.12, 0.08, 0.04);
     shin.pos[0] = 0.03; /* the frame's origin is not its middle */
@@ -65,7 +67,7 @@ static inline int open_soles(void **state) {
 
 static inline int close_soles(void **state) {
     (void)state;
-    MildSole *const all[] = {left, right, center, plate};
+    MildSole *const all[] = {left, right, center, plate, small_plate};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
         mild_sole_destroy(all[i]);
     }
@@ -101,6 +103,7 @@ typedef struct {
     int labels;
     Kit kit[ROBOTS];
     int pushed; /* bool: by random forces, and shells hang together */
+    int points; /* bool: small plates that transmit no moment; every eighth robot is in the air */
     uint64_t random;
 } Herd;
 
@@ -190,17 +193,24 @@ static inline void herd_place(Herd *herd, int r) {
     }
 }
 
-static inline void herd_open(Herd *herd, const Shape *shape) {
+/* Bool: a robot of points whose feet are in the air. */
+static inline int in_air(int robot) {
+    return robot % 8 == 7;
+}
+
+static inline void herd_open_as(Herd *herd, const Shape *shape, int points) {
     static const double heights[3] = {0.0, 0.3, -0.2};
     const int concentric = mild_model_is_concentric(shape->model);
     herd->feet = shape->feet;
     herd->shells = shape->shells;
     herd->random = 5;
     herd->pushed = 1;
+    herd->points = points;
     herd->map = herd_map(shape, &herd->labels);
     for (int f = 0; f < shape->feet; f++) {
         const int planes = shape->feet - shape->shells;
         herd->soles[f] = f >= planes  ? shell[(f - planes) % SHELLS]
+                         : points     ? small_plate
                          : concentric ? center
                          : planes > 2 ? plate
                          : f          ? right
@@ -234,13 +244,17 @@ static inline void herd_open(Herd *herd, const Shape *shape) {
         kit_random_state(kit, &herd->random);
         kit->terrain.height = heights[r % 3];
         for (int f = 0; f < kit->feet; f++) {
-            kit->input.position[f][2] += heights[r % 3] + 0.01;
+            kit->input.position[f][2] += heights[r % 3] + (points && in_air(r) ? 5.0 : 0.01);
             kit->mass[f] = kit_uniform(&herd->random, 3.0, 40.0);
             kit->inertia[f] = kit->mass[f] * kit_uniform(&herd->random, 0.02, 0.1);
         }
         herd_throw(herd, r);
         herd_place(herd, r);
     }
+}
+
+static inline void herd_open(Herd *herd, const Shape *shape) {
+    herd_open_as(herd, shape, 0);
 }
 
 static inline void herd_close(Herd *herd) {
@@ -267,6 +281,9 @@ static inline void herd_solve(Herd *herd, Arrays *a) {
             herd_tie(herd, kit);
         }
         kit_free(kit, (const double(*)[3])force);
+        if (herd->points) {
+            kit_points(kit, &herd->random);
+        }
         kit_solve(kit);
         to_float(a->position + r * 3 * feet, kit->input.position[0], 3 * feet);
         to_float(a->rotation + r * 9 * feet, kit->input.rotation[0], 9 * feet);
@@ -296,23 +313,25 @@ typedef struct {
     int elements;   /* bool: they are asked for */
 } Side;
 
-static inline void side_open_step(Side *side, const Herd *herd, int device, double dt) {
+/* def: dt and device, and what else is not the default. */
+static inline void side_open_as(Side *side, const Herd *herd, MildBatchDef def) {
     MildError error = {0};
-    const MildBatchDef def = {
-        .robots = ROBOTS, .feet = herd->feet, .soles = herd->soles, .dt = dt, .device = device};
+    def.robots = ROBOTS;
+    def.feet = herd->feet;
+    def.soles = herd->soles;
     side->batch = mild_batch_create(&def, &error);
     if (!side->batch || mild_batch_set_materials(side->batch, herd->material, MATERIALS, &error) ||
         mild_batch_set_map(side->batch, herd->map, &error)) {
         fail_msg("%s", error.text);
     }
-    side->arrays = device == MILD_BATCH_HOST ? calloc(1, sizeof(Arrays))
-                                             : device_alloc(device, sizeof(Arrays), &error);
+    side->arrays = def.device == MILD_BATCH_HOST ? calloc(1, sizeof(Arrays))
+                                                 : device_alloc(def.device, sizeof(Arrays), &error);
     assert_non_null(side->arrays);
     side->elements = herd->shells == 0;
 }
 
 static inline void side_open(Side *side, const Herd *herd, int device) {
-    side_open_step(side, herd, device, 5e-3);
+    side_open_as(side, herd, (MildBatchDef){.dt = 5e-3, .device = device});
 }
 
 static inline void side_copy(const Side *side, void *to, const void *from, size_t bytes) {

@@ -157,7 +157,7 @@ TEST(bodies_roll_and_rest_as_on_the_ground) {
         double load = 0;
         errors.count = twists.count = moments.count = reports.count = 0;
         herd_bodies(&herd, i % BODIES, i < BODIES ? i : BODIES - 1);
-        side_open_step(&side, &herd, MILD_BATCH_HOST, 2.5e-3);
+        side_open_as(&side, &herd, (MildBatchDef){.dt = 2.5e-3, .device = MILD_BATCH_HOST});
         for (int s = 0; s < STEPS; s++) {
             for (int n = 0; n < 4; n++) { /* 0.3 s, of which every fourth step is compared */
                 herd_solve(&herd, &arrays);
@@ -213,6 +213,121 @@ TEST(device_and_host_agree) {
         side_close(&device);
         side_close(&again);
         herd_close(&herd);
+    }
+}
+
+/* ---- feet that transmit no moment ---- */
+
+static const Shape points[] = {
+    {"four points", 4, MILD_MODEL_MILD, MILD_MAP_FLAT, MILD_PATTERN_NONE, 0},
+    {"three points", 3, MILD_MODEL_MILD, MILD_MAP_FLAT, MILD_PATTERN_NONE, 0},
+    {"points, ecc_spring", 4, MILD_MODEL_ECC_SPRING, MILD_MAP_FLAT, MILD_PATTERN_NONE, 0},
+    {"points, ecc_quasi", 4, MILD_MODEL_ECC_QUASI, MILD_MAP_FLAT, MILD_PATTERN_NONE, 0},
+    {"points, ecc_quasi_3d", 4, MILD_MODEL_ECC_QUASI_3D, MILD_MAP_FLAT, MILD_PATTERN_NONE, 0},
+    {"points, bekker", 4, MILD_MODEL_BEKKER, MILD_MAP_FLAT, MILD_PATTERN_NONE, 0},
+    {"three points, hunt_crossley", 3, MILD_MODEL_HUNT_CROSSLEY, MILD_MAP_FLAT, MILD_PATTERN_NONE,
+     0},
+    {"points, rough", 4, MILD_MODEL_MILD, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0},
+    {"three points, waves, bekker", 3, MILD_MODEL_BEKKER, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0},
+};
+enum { POINTS = sizeof points / sizeof *points };
+
+/* All results against those of the version for all feet. */
+static void against_rows(Errors *errors, const Side *side) {
+    const int feet = herd.feet, rows = 6 * feet;
+    const int elements = 4 * feet * mild_batch_stride(side->batch);
+    const int counts[4] = {rows, rows, feet * (int)(sizeof *arrays.foot / sizeof(float)), elements};
+    for (int r = 0; r < ROBOTS; r++) {
+        const float *const found[4] = {arrays.wrench + rows * r, arrays.after + rows * r,
+                                       (const float *)&arrays.foot[feet * r],
+                                       arrays.elements + elements * r};
+        const float *const wanted[4] = {other.wrench + rows * r, other.after + rows * r,
+                                        (const float *)&other.foot[feet * r],
+                                        other.elements + elements * r};
+        double a[4 * MILD_FEET_MAX * 8], b[4 * MILD_FEET_MAX * 8];
+        for (int n = 0; n < 4; n++) {
+            for (int i = 0; i < counts[n]; i++) {
+                a[i] = found[n][i];
+                b[i] = wanted[n][i];
+            }
+            add_error(errors, a, b, counts[n]);
+        }
+        for (int i = 0; i < rows && in_air(r); i++) { /* nothing acts, and the feet move on */
+            assert_true(arrays.wrench[rows * r + i] == 0.0f);
+            assert_true(arrays.after[rows * r + i] == arrays.free_velocity[rows * r + i]);
+            assert_true(arrays.iterations[r] == 0 && arrays.residual[r] == 0.0f);
+        }
+    }
+}
+
+/* A step by the version for points, wrenches and twists written over the input. */
+static void step_over(const Side *side, Arrays *a) {
+    MildError error = {0};
+    Arrays *d = side->arrays;
+    const MildBatchInput input = input_of(d);
+    const MildBatchOutput output = {d->velocity, d->free_velocity, NULL, NULL, NULL, NULL};
+    side_copy(side, d, a, sizeof *a);
+    expect_good(mild_batch_step(side->batch, &input, &output, 0, NULL, &error) == MILD_OK, &error);
+    side_copy(side, a, d, sizeof *a);
+}
+
+/* limit: of Newton steps; 0: the default. */
+static void points_on(const Shape *shape, int device, int limit) {
+    static Errors forces, rows;
+    static Arrays over;
+    Side alone, all;
+    int steps = 0, other_steps = 0;
+    const MildBatchDef def = {.dt = 5e-3, .device = device, .max_iterations = limit};
+    MildBatchDef of_points = def;
+    of_points.points = 1;
+    herd_open_as(&herd, shape, 1);
+    side_open_as(&alone, &herd, of_points);
+    side_open_as(&all, &herd, def);
+    const int n = 6 * herd.feet;
+    forces.count = rows.count = 0;
+    for (int s = 0; s < some_steps(); s++) {
+        herd_solve(&herd, &arrays);
+        side_step(&all, &arrays, 1);
+        other = over = arrays;
+        for (int i = 0; i < ROBOTS * n * n; i++) { /* what A has for moments is not read */
+            const int moment = i / n % n % 6 >= 3 || i % n % 6 >= 3;
+            arrays.inverse_inertia[i] = moment ? NAN : arrays.inverse_inertia[i];
+        }
+        step_over(&alone, &over);
+        side_step(&alone, &arrays, 1);
+        const size_t bytes = ROBOTS * (size_t)n * sizeof(float);
+        assert_memory_equal(over.velocity, arrays.wrench, bytes);
+        assert_memory_equal(over.free_velocity, arrays.after, bytes);
+        against_ground(&forces, &herd, &arrays);
+        against_rows(&rows, &alone);
+        for (int r = 0; r < ROBOTS; r++) {
+            steps += arrays.iterations[r];
+            other_steps += other.iterations[r];
+        }
+        herd_advance(&herd);
+        side_follow(&alone, &herd);
+        side_follow(&all, &herd);
+    }
+    if (!limit) {
+        check_errors(shape->name, &forces, 2e-5, 3e-2);
+    }
+    check_errors("    against all rows", &rows, 5e-6, 1e-2);
+    assert_true(steps > 0 && abs(steps - other_steps) <= 2 + other_steps / 100);
+    side_close(&alone);
+    side_close(&all);
+    herd_close(&herd);
+}
+
+TEST(points_have_the_results_of_all_rows) {
+    for (int device = MILD_BATCH_HOST; device <= 0; device++) {
+        if (device >= 0 && !has_device()) {
+            continue;
+        }
+        for (int i = 0; i < POINTS; i++) {
+            points_on(&points[i], device, 0);
+        }
+        points_on(&points[0], device, 1);
+        points_on(&points[0], device, 3);
     }
 }
 
@@ -403,15 +518,15 @@ TEST(reset_load_and_store) {
 }
 
 /* A robot whose materials are not in the table gets no numbers; the others are left alone. */
-static void unknown_on(const Shape *shape, int device) {
+static void unknown_on(const Shape *shape, int device, int of_points) {
     Side side;
-    herd_open(&herd, shape);
+    herd_open_as(&herd, shape, of_points);
     for (int r = 0; r < ROBOTS; r++) {
         double *at = herd.kit[r].input.position[0]; /* in the ground */
         const double top = mild_terrain_height_at(&herd.kit[r].terrain, at[0], at[1]);
         at[2] = shape->shells < shape->feet ? at[2] - 0.04 : top + 0.02;
     }
-    side_open(&side, &herd, device);
+    side_open_as(&side, &herd, (MildBatchDef){.dt = 5e-3, .device = device, .points = of_points});
     herd_solve(&herd, &arrays);
     side_step(&side, &arrays, 0);
     other = arrays;
@@ -439,8 +554,10 @@ TEST(unknown_material) {
             continue;
         }
         for (int i = 0; i < SOME; i++) {
-            unknown_on(some[i], device);
+            unknown_on(some[i], device, 0);
         }
+        unknown_on(&points[0], device, 1);
+        unknown_on(&points[7], device, 1);
     }
 }
 

@@ -1,14 +1,8 @@
 /* The contact step as a warp does it against mild_ground_solve and mild_ground_advance: the same
  * code in double and in float, of one, two and four feet, on level ground and on maps. */
-#include "batch_kit.h"
-#include "case_law.h"
+#include "case_kit.h"
 #include "ground/batch/contact.h"
-#include "ground/law/begin.h"
-#include "ground/law/models.h"
-#include "ground/map_kit.h"
 #include "ground/sole/sole.h"
-#include "ground/step/scratch.h"
-#include "ground/terrain/grid.h"
 #include "points_kit.h"
 #include "round.h"
 
@@ -34,30 +28,15 @@ static int close_soles(void **state) {
     return 0;
 }
 
-static void case_memory(ContactCase *c, const MildGround *ground, int into) {
+static void case_memory(ContactCase *c, const MildGround *ground) {
     for (int f = 0; f < c->feet; f++) {
         const Memory memory = ground_memory(ground, f);
-        const double *const all[CASE_MEMORY] = {
-            memory.depth_max,      memory.middle,    memory.front_speed, memory.drift,
-            memory.pending_x,      memory.pending_y, memory.held_x,      memory.held_y,
-            memory.held_stiffness, memory.worn};
-        for (int n = 0; n < CASE_MEMORY && into; n++) {
+        double *all[CASE_MEMORY];
+        memory_arrays(&memory, all);
+        for (int n = 0; n < CASE_MEMORY; n++) {
             memcpy(c->memory[n][f], all[n], (size_t)c->elements[f] * sizeof(double));
         }
     }
-}
-
-/* The map of a kit. Its labels must live as long as the case. */
-static void case_map(ContactCase *c, const MildTerrain *terrain) {
-    static unsigned char labels[1 << 16];
-    const MildMap *map = terrain->map;
-    c->map = map_view(map);
-    for (int i = 0; map->label && i < map->labels.columns * map->labels.rows; i++) {
-        labels[i] = map->label[i].first;
-    }
-    c->map.label = map->label ? labels : NULL;
-    c->map_origin[0] = terrain->map_x;
-    c->map_origin[1] = terrain->map_y;
 }
 
 /* Of ContactCase. With 0 the steps of Newton's method are those of mild/ground.h. */
@@ -72,7 +51,7 @@ static void case_of(ContactCase *c, const Kit *kit, int groups, int per, double 
     memcpy(c->plane, before.plane, sizeof c->plane);
     memcpy(c->last, before.last, sizeof c->last);
     if (kit->terrain.map) {
-        case_map(c, &kit->terrain);
+        case_map(&c->map, c->map_origin, &kit->terrain);
     }
     c->feet = kit->feet;
     c->groups = groups;
@@ -103,7 +82,7 @@ static void case_of(ContactCase *c, const Kit *kit, int groups, int per, double 
     for (int m = 0; m < kit->terrain.material_count; m++) {
         case_law(&c->material[m], &kit->terrain.materials[m], kit->soles[0]);
     }
-    case_memory(c, kit->ground, 1);
+    case_memory(c, kit->ground);
 }
 
 enum { STEPS_MAX = 100000, WALK_STEPS = 40 };
@@ -116,28 +95,11 @@ typedef struct {
     double force[STEPS_MAX];
 } Worst;
 
-/* Of the forces' errors, the one that a share of them does not exceed. */
-static double quantile(Worst *w, double share) {
-    qsort(w->force, (size_t)w->steps, sizeof *w->force, ascending);
-    return w->force[(int)(share * (w->steps - 1))];
-}
-
 /* The forces' error that one walk in twenty, and at least one, may exceed. Errors are alike within
  * a walk: where one goes another way for a rounding, all of its steps from there on are apart. */
 static double usual_worst(Worst *w) {
-    const int apart = w->steps / 20 > WALK_STEPS ? w->steps / 20 : WALK_STEPS;
-    const int last = w->steps - 1 - apart;
-    qsort(w->force, (size_t)w->steps, sizeof *w->force, ascending);
-    return w->force[last > 0 ? last : 0];
-}
-
-static double distance(const double *a, const double *b, int count, double scale) {
-    double apart = 0.0, size = 0.0;
-    for (int i = 0; i < count; i++) {
-        apart += (a[i] - b[i]) * (a[i] - b[i]);
-        size += b[i] * b[i];
-    }
-    return sqrt(apart) / (sqrt(size) + scale);
+    const double left_out = fmax(0.05, (double)WALK_STEPS / w->steps);
+    return quantile(w->force, w->steps, fmax(1.0 - left_out, 0.0));
 }
 
 /* [m] Depths as the law takes them: on uneven ground not below the last step's plane. */
@@ -156,25 +118,25 @@ static void compare(Worst *worst, const ContactCase *c, Kit *kit) {
         const MildFootResult *foot = &kit->result.foot[f];
         memcpy(force + 3 * f, c->wrench + 6 * f, 3 * sizeof(double));
         memcpy(wanted + 3 * f, foot->force, 3 * sizeof(double));
-        worst->wrench = fmax(worst->wrench, distance(c->wrench + 6 * f + 3, foot->torque, 3, 1.0));
+        worst->wrench = worse(worst->wrench, apart(c->wrench + 6 * f + 3, foot->torque, 3, 1.0));
         if (foot->contacts > 0 && foot->force[2] > 1.0) {
             const double depths[2] = {foot->depth_max, foot->depth_mean};
-            worst->foot = fmax(worst->foot, distance(c->foot[f], foot->pressure_center, 3, 0.1));
-            worst->foot = fmax(worst->foot, distance(c->foot[f] + 3, depths, 2, 1e-3));
+            worst->foot = worse(worst->foot, apart(c->foot[f], foot->pressure_center, 3, 0.1));
+            worst->foot = worse(worst->foot, apart(c->foot[f] + 3, depths, 2, 1e-3));
         }
         const MildElements elements = mild_scratch_elements(kit->scratch, f);
         const double *const all[4] = {kit_depths(kit, f), elements.normal, elements.tangent_x,
                                       elements.tangent_y};
         for (int n = 0; n < 4; n++) {
-            worst->element = fmax(
-                worst->element, distance(c->element[n][f], all[n], c->elements[f], n ? 1.0 : 1e-3));
+            worst->element = fmax(worst->element,
+                                  apart(c->element[n][f], all[n], c->elements[f], n ? 1.0 : 1e-3));
         }
     }
-    const double apart = distance(force, wanted, 3 * c->feet, 1.0);
-    worst->wrench = fmax(worst->wrench, apart);
+    const double gap = apart(force, wanted, 3 * c->feet, 1.0);
+    worst->wrench = worse(worst->wrench, gap);
     assert_true(worst->steps < STEPS_MAX);
-    worst->force[worst->steps] = apart;
-    worst->twist = fmax(worst->twist, distance(c->after, kit->result.velocity, 6 * c->feet, 0.01));
+    worst->force[worst->steps] = gap;
+    worst->twist = worse(worst->twist, apart(c->after, kit->result.velocity, 6 * c->feet, 0.01));
     worst->steps++;
     if (c->iterations >
         0) { /* where nothing touches, the ground counts one step and a batch none */
@@ -195,19 +157,15 @@ static void run_with_rows(Worst *worst, const ContactCase *c, void (*run)(Contac
 }
 
 static void compare_memory(Worst *worst, const ContactCase *c, const Kit *kit) {
-    static const double scale[CASE_MEMORY] = {1e-3, 1e-3, 0.1, 1e-3, 1e-5,
-                                              1e-5, 1.0,  1.0, 1e4,  1.0};
     for (int f = 0; f < c->feet; f++) {
         const Memory memory = ground_memory(kit->ground, f);
-        const double *const all[CASE_MEMORY] = {
-            memory.depth_max,      memory.middle,    memory.front_speed, memory.drift,
-            memory.pending_x,      memory.pending_y, memory.held_x,      memory.held_y,
-            memory.held_stiffness, memory.worn};
+        double *all[CASE_MEMORY];
+        memory_arrays(&memory, all);
         for (int n = 0; n < CASE_MEMORY; n++) {
             for (int e = 0; e < c->elements[f]; e++) {
                 const int lifted = !(memory.depth_max[e] > 0.0);
                 const double a = c->memory[n][f][e], b = lifted && n == 1 ? a : all[n][e];
-                worst->memory = fmax(worst->memory, fabs(a - b) / (fabs(b) + scale[n]));
+                worst->memory = worse(worst->memory, fabs(a - b) / (fabs(b) + memory_scale[n]));
             }
         }
     }
@@ -231,7 +189,7 @@ static void compare_planes(Worst *worst, const ContactCase *c, const Kit *kit) {
                                  c->last[2][f] - c->last[3][f];
             const double found[3] = {plane, x, y};
             const double wanted[3] = {memory.plane[e], memory.slope_x[e], memory.slope_y[e]};
-            worst->memory = fmax(worst->memory, distance(found, wanted, 3, 0.1));
+            worst->memory = worse(worst->memory, apart(found, wanted, 3, 0.1));
         }
     }
 }
@@ -240,8 +198,8 @@ static void worst_print(const char *name, Worst *w) {
     print_message(
         "%-28s %5d steps, %d left out: force median %.1e, 95 %% %.1e; worst: wrench "
         "%.1e, twist %.1e, foot %.1e, elements %.1e, memory %.1e; Newton steps %.2f (%.2f)\n",
-        name, w->steps, w->unsolved, quantile(w, 0.5), usual_worst(w), w->wrench, w->twist, w->foot,
-        w->element, w->memory, (double)w->iterations / w->steps,
+        name, w->steps, w->unsolved, quantile(w->force, w->steps, 0.5), usual_worst(w), w->wrench,
+        w->twist, w->foot, w->element, w->memory, (double)w->iterations / w->steps,
         (double)w->iterations_ground / w->steps);
 }
 
@@ -319,94 +277,195 @@ static void walk(Kit *kit, uint64_t *random, int steps, double tolerance, int gr
 typedef struct {
     const char *name;
     int feet, groups, per;
-    MildModel model;
-    int points; /* MOMENTS to LIFTED */
-} Shape;
+    MildModel model; /* on a map of the material of label 1 */
+    int points;      /* MOMENTS to LIFTED */
+    int kind;        /* of the map, or LEVEL: none */
+    MildPattern pattern;
+    double far; /* [m] of the feet from the origin */
+    int exact;  /* bool: they are where a float can resolve */
+} Place;
 
-static const Shape shapes[] = {
-    {"two feet of 77", 2, 2, 5, MILD_MODEL_MILD, MOMENTS},
-    {"one foot of 77", 1, 1, 3, MILD_MODEL_MILD, MOMENTS},
-    {"one foot of 77, few lanes", 1, 2, 5, MILD_MODEL_MILD, MOMENTS},
-    {"four plates of 20", 4, 4, 4, MILD_MODEL_MILD, MOMENTS},
-    {"three plates of 20", 3, 4, 4, MILD_MODEL_MILD, MOMENTS},
-    {"two feet, spare lanes", 2, 2, 8, MILD_MODEL_MILD, MOMENTS},
-    {"four points", 4, 4, 1, MILD_MODEL_MILD, POINTS},
-    {"three points", 3, 4, 1, MILD_MODEL_MILD, POINTS},
-    {"two points", 2, 2, 1, MILD_MODEL_MILD, POINTS},
-    {"one point", 1, 1, 1, MILD_MODEL_MILD, POINTS},
-    {"four points, bekker", 4, 4, 1, MILD_MODEL_BEKKER, POINTS},
-    {"four points alone", 4, 4, 1, MILD_MODEL_MILD, POINTS_ALONE},
-    {"three points alone", 3, 4, 1, MILD_MODEL_MILD, POINTS_ALONE},
-    {"four points alone, bekker", 4, 4, 1, MILD_MODEL_BEKKER, POINTS_ALONE},
-    {"four points alone, ecc_quasi_3d", 4, 4, 1, MILD_MODEL_ECC_QUASI_3D, POINTS_ALONE},
-    {"four small plates", 4, 4, 1, MILD_MODEL_MILD, MOMENTS},
-    {"con_cone", 2, 2, 1, MILD_MODEL_CON_CONE, MOMENTS},
-    {"con_spring", 2, 2, 1, MILD_MODEL_CON_SPRING, MOMENTS},
-    {"ecc_spring", 2, 2, 5, MILD_MODEL_ECC_SPRING, MOMENTS},
-    {"ecc_quasi", 2, 2, 5, MILD_MODEL_ECC_QUASI, MOMENTS},
-    {"ecc_quasi_3d", 2, 2, 5, MILD_MODEL_ECC_QUASI_3D, MOMENTS},
-    {"ecc_quasi_3d, four plates", 4, 4, 4, MILD_MODEL_ECC_QUASI_3D, MOMENTS},
-    {"bekker", 2, 2, 5, MILD_MODEL_BEKKER, MOMENTS},
-    {"hunt_crossley", 2, 2, 5, MILD_MODEL_HUNT_CROSSLEY, MOMENTS},
-    {"mild_merged, slips", 2, 2, 5, MILD_MODEL_MILD_MERGED, MOMENTS},
-    {"one in the air", 2, 2, 5, MILD_MODEL_MILD, LIFTED},
-    {"ecc_quasi_3d, one in the air", 2, 2, 5, MILD_MODEL_ECC_QUASI_3D, LIFTED},
-    {"mild_merged, one in the air", 2, 2, 5, MILD_MODEL_MILD_MERGED, LIFTED},
-    {"mild_merged, one foot", 1, 1, 3, MILD_MODEL_MILD_MERGED, MOMENTS},
-    {"mild_merged, four plates", 4, 4, 4, MILD_MODEL_MILD_MERGED, MOMENTS},
-    {"mild_merged, four points", 4, 4, 1, MILD_MODEL_MILD_MERGED, POINTS_ALONE},
+enum { LEVEL = -1 };
+
+static const Place places[] = {
+    {"two feet of 77", 2, 2, 5, MILD_MODEL_MILD, MOMENTS, LEVEL, 0, 0, 0},
+    {"one foot of 77", 1, 1, 3, MILD_MODEL_MILD, MOMENTS, LEVEL, 0, 0, 0},
+    {"one foot of 77, few lanes", 1, 2, 5, MILD_MODEL_MILD, MOMENTS, LEVEL, 0, 0, 0},
+    {"four plates of 20", 4, 4, 4, MILD_MODEL_MILD, MOMENTS, LEVEL, 0, 0, 0},
+    {"three plates of 20", 3, 4, 4, MILD_MODEL_MILD, MOMENTS, LEVEL, 0, 0, 0},
+    {"two feet, spare lanes", 2, 2, 8, MILD_MODEL_MILD, MOMENTS, LEVEL, 0, 0, 0},
+    {"four points", 4, 4, 1, MILD_MODEL_MILD, POINTS, LEVEL, 0, 0, 0},
+    {"three points", 3, 4, 1, MILD_MODEL_MILD, POINTS, LEVEL, 0, 0, 0},
+    {"two points", 2, 2, 1, MILD_MODEL_MILD, POINTS, LEVEL, 0, 0, 0},
+    {"one point", 1, 1, 1, MILD_MODEL_MILD, POINTS, LEVEL, 0, 0, 0},
+    {"four points, bekker", 4, 4, 1, MILD_MODEL_BEKKER, POINTS, LEVEL, 0, 0, 0},
+    {"four points alone", 4, 4, 1, MILD_MODEL_MILD, POINTS_ALONE, LEVEL, 0, 0, 0},
+    {"three points alone", 3, 4, 1, MILD_MODEL_MILD, POINTS_ALONE, LEVEL, 0, 0, 0},
+    {"four points alone, bekker", 4, 4, 1, MILD_MODEL_BEKKER, POINTS_ALONE, LEVEL, 0, 0, 0},
+    {"four points alone, ecc_quasi_3d", 4, 4, 1, MILD_MODEL_ECC_QUASI_3D, POINTS_ALONE, LEVEL, 0, 0,
+     0},
+    {"four small plates", 4, 4, 1, MILD_MODEL_MILD, MOMENTS, LEVEL, 0, 0, 0},
+    {"con_cone", 2, 2, 1, MILD_MODEL_CON_CONE, MOMENTS, LEVEL, 0, 0, 0},
+    {"con_spring", 2, 2, 1, MILD_MODEL_CON_SPRING, MOMENTS, LEVEL, 0, 0, 0},
+    {"ecc_spring", 2, 2, 5, MILD_MODEL_ECC_SPRING, MOMENTS, LEVEL, 0, 0, 0},
+    {"ecc_quasi", 2, 2, 5, MILD_MODEL_ECC_QUASI, MOMENTS, LEVEL, 0, 0, 0},
+    {"ecc_quasi_3d", 2, 2, 5, MILD_MODEL_ECC_QUASI_3D, MOMENTS, LEVEL, 0, 0, 0},
+    {"ecc_quasi_3d, four plates", 4, 4, 4, MILD_MODEL_ECC_QUASI_3D, MOMENTS, LEVEL, 0, 0, 0},
+    {"bekker", 2, 2, 5, MILD_MODEL_BEKKER, MOMENTS, LEVEL, 0, 0, 0},
+    {"hunt_crossley", 2, 2, 5, MILD_MODEL_HUNT_CROSSLEY, MOMENTS, LEVEL, 0, 0, 0},
+    {"mild_merged, slips", 2, 2, 5, MILD_MODEL_MILD_MERGED, MOMENTS, LEVEL, 0, 0, 0},
+    {"one in the air", 2, 2, 5, MILD_MODEL_MILD, LIFTED, LEVEL, 0, 0, 0},
+    {"ecc_quasi_3d, one in the air", 2, 2, 5, MILD_MODEL_ECC_QUASI_3D, LIFTED, LEVEL, 0, 0, 0},
+    {"mild_merged, one in the air", 2, 2, 5, MILD_MODEL_MILD_MERGED, LIFTED, LEVEL, 0, 0, 0},
+    {"mild_merged, one foot", 1, 1, 3, MILD_MODEL_MILD_MERGED, MOMENTS, LEVEL, 0, 0, 0},
+    {"mild_merged, four plates", 4, 4, 4, MILD_MODEL_MILD_MERGED, MOMENTS, LEVEL, 0, 0, 0},
+    {"mild_merged, four points", 4, 4, 1, MILD_MODEL_MILD_MERGED, POINTS_ALONE, LEVEL, 0, 0, 0},
+    {"slope", 2, 2, 5, MILD_MODEL_MILD, MOMENTS, MILD_MAP_SLOPE, MILD_PATTERN_NONE, 0, 1},
+    {"steps", 2, 2, 5, MILD_MODEL_MILD, MOMENTS, MILD_MAP_STEPS, MILD_PATTERN_NONE, 0, 1},
+    {"waves", 1, 1, 3, MILD_MODEL_MILD, MOMENTS, MILD_MAP_WAVES, MILD_PATTERN_NONE, 0, 1},
+    {"rough", 4, 4, 4, MILD_MODEL_MILD, MOMENTS, MILD_MAP_ROUGH, MILD_PATTERN_NONE, 0, 1},
+    {"image", 3, 4, 4, MILD_MODEL_MILD, MOMENTS, MILD_MAP_IMAGE, MILD_PATTERN_NONE, 0, 1},
+    {"mixed", 2, 2, 5, MILD_MODEL_MILD, MOMENTS, MILD_MAP_MIXED, MILD_PATTERN_NONE, 0, 1},
+    {"level, stripes", 2, 2, 8, MILD_MODEL_MILD, MOMENTS, MILD_MAP_FLAT, MILD_PATTERN_STRIPES, 0,
+     1},
+    {"rough, checker", 2, 2, 5, MILD_MODEL_MILD, MOMENTS, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0,
+     1},
+    {"image, image", 2, 2, 5, MILD_MODEL_MILD, MOMENTS, MILD_MAP_IMAGE, MILD_PATTERN_IMAGE, 0, 1},
+    {"waves, springs too", 2, 2, 5, MILD_MODEL_ECC_SPRING, MOMENTS, MILD_MAP_WAVES,
+     MILD_PATTERN_CHECKER, 0, 1},
+    {"waves, ecc_quasi too", 2, 2, 5, MILD_MODEL_ECC_QUASI, MOMENTS, MILD_MAP_WAVES,
+     MILD_PATTERN_CHECKER, 0, 1},
+    {"rough, ecc_quasi_3d too", 2, 2, 5, MILD_MODEL_ECC_QUASI_3D, MOMENTS, MILD_MAP_ROUGH,
+     MILD_PATTERN_CHECKER, 0, 1},
+    {"waves, bekker too", 2, 2, 5, MILD_MODEL_BEKKER, MOMENTS, MILD_MAP_WAVES, MILD_PATTERN_CHECKER,
+     0, 1},
+    {"waves, hunt_crossley too", 2, 2, 5, MILD_MODEL_HUNT_CROSSLEY, MOMENTS, MILD_MAP_WAVES,
+     MILD_PATTERN_CHECKER, 0, 1},
+    {"rough, mild_merged too", 2, 2, 5, MILD_MODEL_MILD_MERGED, MOMENTS, MILD_MAP_ROUGH,
+     MILD_PATTERN_CHECKER, 0, 1},
+    {"slope, mild_merged too", 4, 4, 4, MILD_MODEL_MILD_MERGED, MOMENTS, MILD_MAP_SLOPE,
+     MILD_PATTERN_STRIPES, 0, 1},
+    {"slope, 50 m away", 2, 2, 5, MILD_MODEL_MILD, MOMENTS, MILD_MAP_SLOPE, MILD_PATTERN_STRIPES,
+     50, 1},
+    {"rough, 50 m away", 2, 2, 5, MILD_MODEL_MILD, MOMENTS, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER,
+     50, 1},
+    {"image, 50 m away", 2, 2, 5, MILD_MODEL_MILD, MOMENTS, MILD_MAP_IMAGE, MILD_PATTERN_IMAGE, 50,
+     1},
+    {"rough, 50 m, anywhere", 2, 2, 5, MILD_MODEL_MILD, MOMENTS, MILD_MAP_ROUGH, MILD_PATTERN_NONE,
+     50, 0},
+    {"rough, four points", 4, 4, 1, MILD_MODEL_MILD, POINTS, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER,
+     0, 1},
+    {"rough, four points alone", 4, 4, 1, MILD_MODEL_MILD, POINTS_ALONE, MILD_MAP_ROUGH,
+     MILD_PATTERN_CHECKER, 0, 1},
+    {"waves, four points alone, bekker too", 4, 4, 1, MILD_MODEL_BEKKER, POINTS_ALONE,
+     MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1},
 };
-enum { SHAPES = sizeof shapes / sizeof *shapes };
+enum { PLACES = sizeof places / sizeof *places };
 
-/* Ground where slip costs support, three times in four. */
-static void wears(MildMaterial *m, uint64_t *random) {
-    m->slip_length = kit_index(random, 4) ? kit_uniform(random, 1e-3, 5e-3) : 0.0;
-    m->regain_length = kit_uniform(random, 2e-3, 2e-2);
-    m->grip = kit_index(random, 2) ? kit_uniform(random, 0.05, 0.5) : 0.0;
-    uint64_t own = *random;
-    m->slip_growth = kit_index(&own, 2) ? kit_uniform(&own, 0.0, 0.1) : 0.0;
+enum { IMAGE = 24 };
+
+static MildMap *place_map(const Place *place, uint64_t *random) {
+    static double heights[IMAGE * IMAGE];
+    static unsigned char labels[IMAGE * (IMAGE - 1)];
+    MildMapDef def = shape((MildMapKind)place->kind, 0.03, 0.5);
+    for (int i = 0; i < IMAGE * IMAGE; i++) {
+        heights[i] = kit_uniform(random, 0.0, 1.0);
+        labels[i % (IMAGE * (IMAGE - 1))] = (unsigned char)kit_index(random, CASE_LABELS);
+    }
+    def.size = 4.0;
+    def.slope = 0.3;
+    def.seed = (uint64_t)kit_index(random, 1000);
+    def.patches = (int)place->pattern;
+    def.patch_size = 0.07;
+    def.patch_count = CASE_LABELS;
+    def.heights = heights;
+    def.height_columns = IMAGE;
+    def.height_rows = IMAGE - 1;
+    def.labels = labels;
+    def.label_columns = IMAGE - 1;
+    def.label_rows = IMAGE;
+    if (place->kind == MILD_MAP_IMAGE) { /* 0.92 m wide: some feet reach over its border */
+        def.cell = 0.04;
+        def.patch_size = 0.04;
+    }
+    if (place->kind == MILD_MAP_MIXED) {
+        def.size = 10.0;
+    }
+    return make_map(&def);
 }
 
-static MildSole *shape_sole(const Shape *shape, int side) {
-    if (mild_model_is_concentric(shape->model)) {
+/* On level ground, or on the map at a random place; a little above it. */
+static void stand_above(Kit *kit, const Place *place, uint64_t *random) {
+    const int level = place->kind == LEVEL;
+    const double beside = place->kind == MILD_MAP_MIXED ? 5.0 : 0.4; /* on any tile */
+    kit->terrain.height = level ? 0.0 : kit_uniform(random, -0.5, 0.5);
+    if (!level) {
+        kit->terrain.map_x = kit_uniform(random, -beside, beside);
+        kit->terrain.map_y = kit_uniform(random, -beside, beside);
+        kit->terrain.map_x += place->kind == MILD_MAP_IMAGE ? place->far : 0; /* does not repeat */
+    }
+    for (int f = 0; f < kit->feet; f++) {
+        double *at = kit->input.position[f];
+        at[0] += place->far;
+        at[2] += 0.01 + mild_terrain_height_at(&kit->terrain, at[0], at[1]);
+        at[2] += level ? 0.0 : 0.01;
+        kit->mass[f] = kit_uniform(random, 3.0, 40.0);
+        kit->inertia[f] = kit->mass[f] * kit_uniform(random, 0.02, 0.1);
+    }
+    kit->terrain.height += level ? kit_uniform(random, -0.002, 0.002) : 0.0;
+    kit_round(&kit->terrain.height, 1);
+    kit_round(&kit->terrain.map_x, 1);
+    kit_round(&kit->terrain.map_y, 1);
+}
+
+static MildSole *place_sole(const Place *place, int side) {
+    if (mild_model_is_concentric(place->model)) {
         return centers[side];
     }
-    if (shape->per == 1) {
+    if (place->per == 1) {
         return small_plate;
     }
-    return shape->feet > 2 ? plate : side ? right : left;
+    return place->feet > 2 ? plate : side ? right : left;
 }
 
-static void run_shape(const Shape *shape, int walks, double tolerance, void (*run)(ContactCase *),
+static MildMaterial place_material(const Place *place, int label, int walk, uint64_t *random) {
+    const int level = place->kind == LEVEL;
+    MildMaterial m = kit_material(random);
+    m.passive = !level || walk % 4 > 0;
+    if (place->model == MILD_MODEL_MILD_MERGED && (level || label % 2)) {
+        m.model = (level ? walk % 3 > 0 : label == 1) ? MILD_MODEL_MILD_MERGED : MILD_MODEL_MILD;
+        const int slips = kit_index(random, 4) > 0;
+        wears(&m, slips, random);
+    } else if ((level || label == 1) && place->model != MILD_MODEL_MILD) {
+        m = matched(place->model, left);
+    }
+    return m;
+}
+
+static void run_place(const Place *place, int walks, double tolerance, void (*run)(ContactCase *),
                       Worst *worst) {
     static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
-    uint64_t random = 11;
+    uint64_t random = place->kind == LEVEL ? 11 : 12;
     for (int w = 0; w < walks; w++) {
+        const int labels = place->kind == LEVEL ? 1 : CASE_LABELS;
+        MildMaterial m[CASE_LABELS];
         Kit kit;
-        MildMaterial m = kit_material(&random), rival;
-        m.passive = w % 4 > 0;
-        if (shape->model == MILD_MODEL_MILD_MERGED) {
-            m.model = w % 3 > 0 ? MILD_MODEL_MILD_MERGED : MILD_MODEL_MILD;
-            wears(&m, &random);
-        } else if (shape->model != MILD_MODEL_MILD) {
-            m = mild_material_default();
-            assert_int_equal(mild_model_match(shape->model, &m, left, 150.0, &rival, NULL),
-                             MILD_OK);
-            m = rival;
+        for (int label = 0; label < labels; label++) {
+            m[label] = place_material(place, label, w, &random);
         }
-        kit_open(&kit, shape->feet, shape_sole(shape, 0), shape_sole(shape, 1), &m,
+        MildMap *map = place->kind == LEVEL ? NULL : place_map(place, &random);
+        kit_open(&kit, place->feet, place_sole(place, 0), place_sole(place, 1), &m[0],
                  steps[kit_index(&random, 3)]);
-        kit_random_state(&kit, &random);
-        for (int f = 0; f < kit.feet; f++) {
-            kit.input.position[f][2] += 0.01; /* begins by touching down */
-            kit.mass[f] = kit_uniform(&random, 3.0, 40.0);
-            kit.inertia[f] = kit.mass[f] * kit_uniform(&random, 0.02, 0.1);
-        }
+        memcpy(kit.terrain.materials, m, (size_t)labels * sizeof *m);
+        kit.terrain.material_count = labels;
+        kit.terrain.map = map;
         kit.input.tolerance = fmin(tolerance, 1e-11);
-        kit.terrain.height = kit_uniform(&random, -0.002, 0.002);
-        walk(&kit, &random, WALK_STEPS, tolerance, shape->groups, shape->per, shape->points, 0, run,
-             worst);
+        kit_random_state(&kit, &random);
+        stand_above(&kit, place, &random);
+        walk(&kit, &random, WALK_STEPS, tolerance, place->groups, place->per, place->points,
+             place->exact, run, worst);
         kit_close(&kit);
+        mild_map_destroy(map);
     }
 }
 
@@ -422,28 +481,32 @@ static int same_steps(int points, const Worst *worst) {
 
 /* Without steps that begin; with them, on another way to the same solution, sought closer. */
 TEST(double_text_is_the_ground) {
-    for (int i = 0; i < 2 * SHAPES; i++) {
+    for (int i = 0; i < 2 * PLACES; i++) {
+        const Place *place = &places[i % PLACES];
         static Worst worst;
         worst = (Worst){0};
-        begins = i < SHAPES ? 0 : CONTACT_BEGINS;
-        run_shape(&shapes[i % SHAPES], kit_draws(8), begins ? 1e-12 : 1e-11, contact_case_double,
-                  &worst);
-        worst_print(shapes[i % SHAPES].name, &worst);
+        begins = i < PLACES ? 0 : CONTACT_BEGINS;
+        run_place(place, kit_draws(8), begins ? 1e-12 : 1e-11,
+                  place->kind == LEVEL ? contact_case_double : contact_map_double, &worst);
+        worst_print(place->name, &worst);
         assert_true(worst.wrench < 1e-10 && worst.twist < 1e-10 && worst.foot < 1e-10);
         assert_true(worst.element < 1e-6 && worst.memory < 1e-7);
         assert_true(worst.unsolved < worst.steps / 20);
-        assert_true(begins || same_steps(shapes[i % SHAPES].points, &worst));
+        assert_true(begins || same_steps(place->points, &worst));
     }
 }
 
 TEST(float_text_is_near_it) {
     begins = CONTACT_BEGINS;
-    for (int i = 0; i < SHAPES; i++) {
+    for (int i = 0; i < PLACES; i++) {
+        const Place *place = &places[i];
         static Worst worst;
         worst = (Worst){0};
-        run_shape(&shapes[i], kit_draws(8), 1e-4, contact_case_float, &worst);
-        worst_print(shapes[i].name, &worst);
-        assert_true(quantile(&worst, 0.5) < 1e-5 && usual_worst(&worst) < 1e-3);
+        run_place(place, kit_draws(8), 1e-4,
+                  place->kind == LEVEL ? contact_case_float : contact_map_float, &worst);
+        worst_print(place->name, &worst);
+        assert_true(quantile(worst.force, worst.steps, 0.5) < (place->exact ? 3e-6 : 1e-5));
+        assert_true(usual_worst(&worst) < 1e-3);
         assert_true(worst.twist < 5e-3 && worst.unsolved < worst.steps / 20);
         assert_true(worst.memory < 10.0); /* nothing has run away */
     }
@@ -484,186 +547,6 @@ TEST(float_text_solves_feet_that_are_held) {
     }
     print_message("held: %d of %d steps are not solved\n", unsolved, steps);
     assert_true(unsolved <= steps / 200);
-}
-
-/* ---- maps ---- */
-
-typedef struct {
-    const char *name;
-    int feet, groups, per;
-    MildMapKind kind;
-    MildPattern pattern;
-    double far;      /* [m] of the feet from the origin */
-    int exact;       /* bool: they are where a float can resolve */
-    MildModel other; /* of the material of label 1 */
-    int points;      /* as in Shape */
-} Relief;
-
-static const Relief reliefs[] = {
-    {"slope", 2, 2, 5, MILD_MAP_SLOPE, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD, MOMENTS},
-    {"steps", 2, 2, 5, MILD_MAP_STEPS, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD, MOMENTS},
-    {"waves", 1, 1, 3, MILD_MAP_WAVES, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD, MOMENTS},
-    {"rough", 4, 4, 4, MILD_MAP_ROUGH, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD, MOMENTS},
-    {"image", 3, 4, 4, MILD_MAP_IMAGE, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD, MOMENTS},
-    {"mixed", 2, 2, 5, MILD_MAP_MIXED, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD, MOMENTS},
-    {"level, stripes", 2, 2, 8, MILD_MAP_FLAT, MILD_PATTERN_STRIPES, 0, 1, MILD_MODEL_MILD,
-     MOMENTS},
-    {"rough, checker", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1, MILD_MODEL_MILD,
-     MOMENTS},
-    {"image, image", 2, 2, 5, MILD_MAP_IMAGE, MILD_PATTERN_IMAGE, 0, 1, MILD_MODEL_MILD, MOMENTS},
-    {"waves, springs too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1,
-     MILD_MODEL_ECC_SPRING, MOMENTS},
-    {"waves, ecc_quasi too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1,
-     MILD_MODEL_ECC_QUASI, MOMENTS},
-    {"rough, ecc_quasi_3d too", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1,
-     MILD_MODEL_ECC_QUASI_3D, MOMENTS},
-    {"waves, bekker too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1, MILD_MODEL_BEKKER,
-     MOMENTS},
-    {"waves, hunt_crossley too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1,
-     MILD_MODEL_HUNT_CROSSLEY, MOMENTS},
-    {"rough, mild_merged too", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1,
-     MILD_MODEL_MILD_MERGED, MOMENTS},
-    {"slope, mild_merged too", 4, 4, 4, MILD_MAP_SLOPE, MILD_PATTERN_STRIPES, 0, 1,
-     MILD_MODEL_MILD_MERGED, MOMENTS},
-    {"slope, 50 m away", 2, 2, 5, MILD_MAP_SLOPE, MILD_PATTERN_STRIPES, 50, 1, MILD_MODEL_MILD,
-     MOMENTS},
-    {"rough, 50 m away", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 50, 1, MILD_MODEL_MILD,
-     MOMENTS},
-    {"image, 50 m away", 2, 2, 5, MILD_MAP_IMAGE, MILD_PATTERN_IMAGE, 50, 1, MILD_MODEL_MILD,
-     MOMENTS},
-    {"rough, 50 m, anywhere", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_NONE, 50, 0, MILD_MODEL_MILD,
-     MOMENTS},
-    {"rough, four points", 4, 4, 1, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1, MILD_MODEL_MILD,
-     POINTS},
-    {"rough, four points alone", 4, 4, 1, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1,
-     MILD_MODEL_MILD, POINTS_ALONE},
-    {"waves, four points alone, bekker too", 4, 4, 1, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1,
-     MILD_MODEL_BEKKER, POINTS_ALONE},
-};
-enum { RELIEFS = sizeof reliefs / sizeof *reliefs };
-
-enum { IMAGE = 24 };
-
-static MildMap *relief_map(const Relief *relief, uint64_t *random) {
-    static double heights[IMAGE * IMAGE];
-    static unsigned char labels[IMAGE * (IMAGE - 1)];
-    MildMapDef def = shape(relief->kind, 0.03, 0.5);
-    for (int i = 0; i < IMAGE * IMAGE; i++) {
-        heights[i] = kit_uniform(random, 0.0, 1.0);
-        labels[i % (IMAGE * (IMAGE - 1))] = (unsigned char)kit_index(random, CASE_LABELS);
-    }
-    def.size = 4.0;
-    def.slope = 0.3;
-    def.seed = (uint64_t)kit_index(random, 1000);
-    def.patches = (int)relief->pattern;
-    def.patch_size = 0.07;
-    def.patch_count = CASE_LABELS;
-    def.heights = heights;
-    def.height_columns = IMAGE;
-    def.height_rows = IMAGE - 1;
-    def.labels = labels;
-    def.label_columns = IMAGE - 1;
-    def.label_rows = IMAGE;
-    if (relief->kind == MILD_MAP_IMAGE) { /* 0.92 m wide: some feet reach over its border */
-        def.cell = 0.04;
-        def.patch_size = 0.04;
-    }
-    if (relief->kind == MILD_MAP_MIXED) {
-        def.size = 10.0;
-    }
-    return make_map(&def);
-}
-
-/* On the map at a random place, a little above it. */
-static void stand_above(Kit *kit, const Relief *relief, uint64_t *random) {
-    kit->terrain.height = kit_uniform(random, -0.5, 0.5);
-    kit->terrain.map_x = kit_uniform(random, -0.4, 0.4);
-    kit->terrain.map_y = kit_uniform(random, -0.4, 0.4);
-    if (relief->kind == MILD_MAP_IMAGE) { /* it does not repeat */
-        kit->terrain.map_x += relief->far;
-    }
-    if (relief->kind == MILD_MAP_MIXED) { /* on any tile */
-        kit->terrain.map_x = kit_uniform(random, -5.0, 5.0);
-        kit->terrain.map_y = kit_uniform(random, -5.0, 5.0);
-    }
-    for (int f = 0; f < kit->feet; f++) {
-        double *at = kit->input.position[f];
-        at[0] += relief->far;
-        at[2] += 0.02 + mild_terrain_height_at(&kit->terrain, at[0], at[1]);
-        kit->mass[f] = kit_uniform(random, 3.0, 40.0);
-        kit->inertia[f] = kit->mass[f] * kit_uniform(random, 0.02, 0.1);
-    }
-    kit_round(&kit->terrain.height, 1);
-    kit_round(&kit->terrain.map_x, 1);
-    kit_round(&kit->terrain.map_y, 1);
-}
-
-static MildMaterial relief_material(const Relief *relief, int label, uint64_t *random) {
-    const MildMaterial sand = mild_material_default();
-    MildMaterial m = kit_material(random);
-    if (relief->other == MILD_MODEL_MILD_MERGED && label % 2) {
-        m.model = label == 1 ? MILD_MODEL_MILD_MERGED : MILD_MODEL_MILD;
-        wears(&m, random);
-    } else if (label == 1 && relief->other != MILD_MODEL_MILD) {
-        assert_int_equal(mild_model_match(relief->other, &sand, left, 150.0, &m, NULL), MILD_OK);
-    }
-    return m;
-}
-
-static void run_relief(const Relief *relief, int walks, double tolerance,
-                       void (*run)(ContactCase *), Worst *worst) {
-    static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
-    uint64_t random = 12;
-    MildSole *const many = relief->points ? small_plate : plate;
-    MildSole *const soles[2] = {relief->feet > 2 ? many : left, relief->feet > 2 ? many : right};
-    for (int w = 0; w < walks; w++) {
-        Kit kit;
-        MildMaterial m[CASE_LABELS];
-        for (int label = 0; label < CASE_LABELS; label++) {
-            m[label] = relief_material(relief, label, &random);
-        }
-        MildMap *map = relief_map(relief, &random);
-        kit_open(&kit, relief->feet, soles[0], soles[1], &m[0], steps[kit_index(&random, 3)]);
-        kit.terrain.material_count = CASE_LABELS;
-        memcpy(kit.terrain.materials, m, sizeof m);
-        kit.terrain.map = map;
-        kit.input.tolerance = fmin(tolerance, 1e-11);
-        kit_random_state(&kit, &random);
-        stand_above(&kit, relief, &random);
-        walk(&kit, &random, WALK_STEPS, tolerance, relief->groups, relief->per, relief->points,
-             relief->exact, run, worst);
-        kit_close(&kit);
-        mild_map_destroy(map);
-    }
-}
-
-TEST(double_text_is_the_ground_on_maps) {
-    for (int i = 0; i < 2 * RELIEFS; i++) {
-        static Worst worst;
-        worst = (Worst){0};
-        begins = i < RELIEFS ? 0 : CONTACT_BEGINS;
-        run_relief(&reliefs[i % RELIEFS], kit_draws(8), begins ? 1e-12 : 1e-11, contact_map_double,
-                   &worst);
-        worst_print(reliefs[i % RELIEFS].name, &worst);
-        assert_true(worst.wrench < 1e-10 && worst.twist < 1e-10 && worst.foot < 1e-10);
-        assert_true(worst.element < 1e-6 && worst.memory < 1e-7);
-        assert_true(worst.unsolved < worst.steps / 20);
-        assert_true(begins || same_steps(reliefs[i].points, &worst));
-    }
-}
-
-TEST(float_text_is_near_it_on_maps) {
-    begins = CONTACT_BEGINS;
-    for (int i = 0; i < RELIEFS; i++) {
-        static Worst worst;
-        worst = (Worst){0};
-        run_relief(&reliefs[i], kit_draws(8), 1e-4, contact_map_float, &worst);
-        worst_print(reliefs[i].name, &worst);
-        assert_true(quantile(&worst, 0.5) < (reliefs[i].exact ? 3e-6 : 1e-5));
-        assert_true(usual_worst(&worst) < 1e-3);
-        assert_true(worst.twist < 5e-3 && worst.unsolved < worst.steps / 20);
-        assert_true(worst.memory < 10.0);
-    }
 }
 
 TEST_MAIN(open_soles, close_soles)

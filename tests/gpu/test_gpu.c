@@ -377,94 +377,6 @@ TEST(returns_are_those_of_the_cpu) {
     }
 }
 
-/* The device and the CPU choose the same samples in the same order. */
-static void compare_order(const Learner *gpu, const Learner *cpu, const PpoDef *def, int envs) {
-    const int samples = def->steps * envs;
-    int *order = malloc((size_t)samples * sizeof *order);
-    assert_non_null(order);
-    cudaMemcpyAsync(order, gpu->gpu->substitute, (size_t)samples * sizeof *order,
-                    cudaMemcpyDeviceToHost, gpu->gpu->queue.stream);
-    assert_int_equal(cudaStreamSynchronize(gpu->gpu->queue.stream), cudaSuccess);
-    assert_memory_equal(order, cpu->ppo->substitute, (size_t)samples * sizeof *order);
-    int cut[PPO_SHARDS_MAX + 1];
-    const int last =
-        order_cuts(def->shards, def->steps, envs, def->minibatches - 1, def->minibatches, cut);
-    cudaMemcpyAsync(order, gpu->gpu->order, (size_t)last * sizeof *order, cudaMemcpyDeviceToHost,
-                    gpu->gpu->queue.stream);
-    assert_int_equal(cudaStreamSynchronize(gpu->gpu->queue.stream), cudaSuccess);
-    assert_memory_equal(order, cpu->ppo->order, (size_t)last * sizeof *order);
-    free(order);
-}
-
-static void compare_samples(const PpoBatch *a, const PpoBatch *b, int samples) {
-    for (int i = 0; i < samples; i++) {
-        assert_true(fabs((double)a->advantage[i] - (double)b->advantage[i]) < 1e-4);
-        assert_true(fabs((double)a->returns[i] - (double)b->returns[i]) < 1e-4);
-    }
-}
-
-/* Two updates from the same rollout: arrays, order, decisions, and how far the parameters move. */
-static double compare_update(const PolicyDef *policy, const PpoDef *def, int envs, int rows,
-                             int fault) {
-    Learner cpu, gpu;
-    double apart = 0.0, moved = 0.0;
-    learner_open(&cpu, ON_CPU, policy, def, envs, 0);
-    learner_open(&gpu, RESIDENT, policy, def, envs, rows);
-    Learner *const both[] = {&cpu, &gpu};
-    const Network *n = &cpu.policy->network;
-    const size_t bytes = (size_t)n->count * sizeof(float);
-    float *before = malloc(bytes), *steps[2] = {malloc(bytes), malloc(bytes)};
-    assert_true(before && steps[0] && steps[1]);
-    for (int round = 0; round < 2; round++) { /* the second one may be a graph's */
-        PpoReport report[2];
-        memcpy(gpu.policy->parameters, cpu.policy->parameters, bytes);
-        for (int k = 0; k < 2; k++) {
-            learner_fill_parameters(both[k], 3);
-            learner_fill_rollout(both[k], 3 + (uint64_t)round);
-        }
-        memcpy(before, cpu.policy->parameters, bytes);
-        act_both(&cpu, &gpu, &apart);
-        for (int k = 0; k < 2; k++) {
-            spoil(&both[k]->batch, n, fault);
-            learner_write(both[k]);
-            report[k] = learner_update(both[k]);
-            learner_pull(both[k]);
-            learner_read(both[k]);
-            for (int64_t i = 0; i < n->count; i++) {
-                steps[k][i] = both[k]->policy->parameters[i] - before[i];
-            }
-        }
-        compare_reports(&report[1], &report[0], 1e-4);
-        assert_int_equal(report[0].skipped > 0, fault >= NOT_FINITE);
-        compare_samples(&gpu.batch, &cpu.batch, def->steps * envs);
-        compare_order(&gpu, &cpu, def, envs);
-        assert_int_equal(gpu.ppo->adam_steps, cpu.ppo->adam_steps);
-        assert_int_equal(gpu.ppo->iteration, cpu.ppo->iteration);
-        /* the next rollout begins with the same rows */
-        assert_memory_equal(gpu.ppo->start.history, cpu.ppo->start.history,
-                            (size_t)envs * (size_t)n->history * sizeof(float));
-        assert_memory_equal(gpu.ppo->start.frame, cpu.ppo->start.frame,
-                            (size_t)envs * (size_t)n->def.observation * sizeof(float));
-        if (fault == STARVED) {
-            assert_memory_equal(steps[1], steps[0], bytes);
-        } else {
-            worse(&moved, distance(steps[1], steps[0], n->count));
-        }
-        worse(&apart, distance(gpu.ppo->first, cpu.ppo->first, n->count));
-        if (def->average > 0.0) {
-            worse(&apart, distance(policy_parameters(gpu.ppo->average),
-                                   policy_parameters(cpu.ppo->average), n->count));
-        }
-    }
-    assert_true(apart < 1e-4);
-    free(before);
-    free(steps[0]);
-    free(steps[1]);
-    learner_close(&cpu);
-    learner_close(&gpu);
-    return moved;
-}
-
 /* A step of Adam moves a parameter by rate * m / sqrt(v). With v from a run that has learned, that
  * is smooth in the gradient, whose rounding is 1e-5 of its size. Every step begins where the last
  * one ended, so the differences add up; 1e-3 of the way is far above that and far below any step
@@ -475,7 +387,8 @@ TEST(updates_are_those_of_the_cpu) {
     double worst = 0.0;
     def.average = 0.9;
     for (int fault = 0; fault < FAULTS; fault++) {
-        worse(&worst, compare_update(&policy, &def, 37, fault == NOTHING ? 100 : 0, fault));
+        worse(&worst,
+              compare_update(RESIDENT, &policy, &def, 37, fault == NOTHING ? 100 : 0, fault, NULL));
     }
     def.decoder_target = PPO_TARGET_NEWEST;
     def.average = 0.0;
@@ -484,13 +397,13 @@ TEST(updates_are_those_of_the_cpu) {
     def.max_gradient_norm = 0.05;
     def.std_min = 0.99; /* the noise meets its floor at a step and its ceiling at the end */
     def.std_max[0] = def.std_max[1] = 0.7;
-    worse(&worst, compare_update(&policy, &def, 5, 0, NOTHING));
+    worse(&worst, compare_update(RESIDENT, &policy, &def, 5, 0, NOTHING, NULL));
     def = ppo_def_default();
     def.minibatches = def.epochs = 1;
-    worse(&worst, compare_update(&policy, &def, MANY, 0, NOTHING));
+    worse(&worst, compare_update(RESIDENT, &policy, &def, MANY, 0, NOTHING, NULL));
     def = ppo_def_default();
     def.shards = PPO_SHARDS_MAX; /* some of no environment */
-    worse(&worst, compare_update(&policy, &def, 37, 0, INVALID));
+    worse(&worst, compare_update(RESIDENT, &policy, &def, 37, 0, INVALID, NULL));
     def = ppo_def_default();
     for (int target = 0; target < PPO_TARGETS; target++) {
         for (int noise = 0; noise < 2; noise++) {
@@ -499,14 +412,14 @@ TEST(updates_are_those_of_the_cpu) {
             def.target_noise = noise;
             def.sample_latent = noise;
             ppo_set_decoder(&def, 4, 3, &other);
-            worse(&worst, compare_update(&other, &def, 5, 0, INVALID));
+            worse(&worst, compare_update(RESIDENT, &other, &def, 5, 0, INVALID, NULL));
         }
     }
 #ifndef EMULATED
     PolicyDef full = policy_def_default();
     def = ppo_def_default();
-    worse(&worst, compare_update(&full, &def, 256, 0, NOTHING));
-    worse(&worst, compare_update(&full, &def, 256, 0, INVALID));
+    worse(&worst, compare_update(RESIDENT, &full, &def, 256, 0, NOTHING, NULL));
+    worse(&worst, compare_update(RESIDENT, &full, &def, 256, 0, INVALID, NULL));
 #endif
     print_message("way of the parameters in an update, against the CPU's: %.1e (relative)\n",
                   worst);
@@ -522,19 +435,20 @@ TEST(updates_of_muon_are_those_of_the_cpu) {
     def.optimizer = PPO_OPTIMIZER_MUON;
     def.average = 0.9;
     for (int fault = 0; fault < FAULTS; fault++) {
-        worse(&worst, compare_update(&policy, &def, 37, fault == NOTHING ? 100 : 0, fault));
+        worse(&worst,
+              compare_update(RESIDENT, &policy, &def, 37, fault == NOTHING ? 100 : 0, fault, NULL));
     }
     def.max_gradient_norm = 0.05;
-    worse(&worst, compare_update(&policy, &def, 5, 0, NOTHING));
+    worse(&worst, compare_update(RESIDENT, &policy, &def, 5, 0, NOTHING, NULL));
     policy.actor_hidden[1] = policy.critic_hidden[1] = policy.encoder_hidden[1] =
         policy.decoder_hidden[1] = 0; /* no matrix between hidden layers */
     policy.actor_hidden[2] = policy.critic_hidden[2] = 0;
-    worse(&worst, compare_update(&policy, &def, 5, 0, NOTHING));
+    worse(&worst, compare_update(RESIDENT, &policy, &def, 5, 0, NOTHING, NULL));
 #ifndef EMULATED
     PolicyDef full = policy_def_default();
     def = ppo_def_default();
     def.optimizer = PPO_OPTIMIZER_MUON;
-    worse(&worst, compare_update(&full, &def, 256, 0, NOTHING));
+    worse(&worst, compare_update(RESIDENT, &full, &def, 256, 0, NOTHING, NULL));
 #endif
     print_message("way of the parameters in an update by Muon, against the CPU's: %.1e "
                   "(relative)\n",

@@ -31,6 +31,14 @@ static inline int kit_finest(void) {
     return getenv("MILD_TEST_DRAWS") != NULL;
 }
 
+/* Prints what was measured, and fails unless it is below a bound; NaN fails. */
+static inline void expect_below(const char *what, double got, double bound) {
+    print_message("%s: %.3g, bound %.3g\n", what, got, bound);
+    if (!(got < bound)) {
+        fail_msg("%s: %.12g instead of less than %.3g", what, got, bound);
+    }
+}
+
 static inline void kit_vector(uint64_t *random, double size, double *x) {
     for (int k = 0; k < 3; k++) {
         x[k] = kit_uniform(random, -size, size);
@@ -278,6 +286,38 @@ static inline double kit_led(Kit *kit, double last[6], const double twist[6]) {
     return work;
 }
 
+/* [J] What the ground gives to the one foot of a kit that is led through knots of depth, x, pitch
+ * and roll and back to the first, in so many steps from one to the next. rest: [m] height of the
+ * foot's frame at the depth 0. *work: the sum of the works' sizes. */
+static inline double kit_led_through(Kit *kit, double (*knot)[4], int knots, int parts, double rest,
+                                     double *work) {
+    const double dt = kit->input.dt;
+    double given = 0.0, last[6] = {0};
+    *work = 0.0;
+    for (int k = 0; k < knots; k++) {
+        const double *from = knot[k], *to = knot[(k + 1) % knots];
+        for (int i = 0; i < parts; i++) {
+            double at[4], rate[4];
+            for (int j = 0; j < 4; j++) {
+                at[j] = from[j] + (to[j] - from[j]) * i / parts;
+                rate[j] = (to[j] - from[j]) / parts / dt;
+            }
+            /* about y, then x; the pose is set again in each step, which carries it within its own
+             * error */
+            const double cy = cos(at[2]), sy = sin(at[2]), cx = cos(at[3]), sx = sin(at[3]);
+            const double R[9] = {cy, sy * sx, sy * cx, 0, cx, -sx, -sy, cy * sx, cy * cx};
+            memcpy(kit->input.rotation[0], R, sizeof R);
+            kit->input.position[0][0] = at[1];
+            kit->input.position[0][2] = rest - at[0];
+            const double twist[6] = {rate[1], 0, -rate[0], rate[3] * cy, rate[2], -rate[3] * sy};
+            const double w = kit_led(kit, last, twist);
+            given += w;
+            *work += fabs(w);
+        }
+    }
+    return given;
+}
+
 /* [J] Of the body on the first foot at the foot's twist. */
 static inline double kit_kinetic(const Kit *kit, const double *V) {
     double r[3], swing[3], sum = 0.0;
@@ -367,6 +407,73 @@ static inline void kit_random_state(Kit *kit, uint64_t *random) {
             kit->input.velocity[f][3 + k] = fast * kit_uniform(random, -2.0, 2.0);
         }
     }
+}
+
+/* First stop [m] from dK/du = (M g - F_g - d w - 2 c_d m_a' K)/(M + m_a), the exact impact
+ * equation, by small steps. */
+static inline double kit_exact_stop(const MildMaterial *m, const MildSole *sole, double mass,
+                                    double speed) {
+    const double step = 5e-6;
+    double energy = 0.5 * speed * speed, before = energy, u = 0.0;
+    for (; energy > 0.0; u += step) {
+        before = energy;
+        MildElementLaw law = mild_sole_law(m, sole, u + 0.5 * step);
+        double drag = 2.0 * m->c_d * law.added_mass_per_depth,
+               weight = mass * KIT_GRAVITY - (law.force + law.damping * sqrt(2.0 * energy));
+        double inert = mass + law.added_mass;
+        energy = (energy * (1.0 - 0.5 * step * drag / inert) + step * weight / inert) /
+                 (1.0 + 0.5 * step * drag / inert);
+    }
+    return u + step * energy / (before - energy); /* within the last step, where nothing is left */
+}
+
+/* What a foot showed that was thrown and shaken, over all cycles from touch to lift-off. */
+typedef struct {
+    int cycles, missed;  /* missed: steps that did not converge */
+    double worst, share; /* [J], [-] most energy gained in a cycle, and by the energy exchanged */
+    int draw;            /* of the worst */
+} Shaken;
+
+/* Shakes the first foot at random for a time: between touch and lift-off the ground takes energy. */
+static inline void kit_shake(Kit *kit, double seconds, uint64_t *random, int draw, Shaken *all) {
+    const double weight = kit->mass[0] * KIT_GRAVITY, spring = kit_uniform(random, 2.0, 8.0);
+    double work = 0.0, taken = 0.0, shake[3], force[1][3];
+    int missed = 0;
+    for (int k = 0; k < 3; k++) {
+        shake[k] = kit_uniform(random, 0.0, 1.0);
+    }
+    for (int s = 0; s < (int)(seconds / kit->input.dt); s++) {
+        const double t = s * kit->input.dt;
+        double before[6];
+        memcpy(before, kit->input.velocity[0], sizeof before);
+        for (int k = 0; k < 3; k++) {
+            force[0][k] = weight * (k == 2 ? 1.5 * sin(spring * t * 6.28) + 0.8 * shake[2] * t
+                                           : shake[k] * sin(20 * t));
+        }
+        kit_step(kit, (const double(*)[3])force);
+        const double w = kit_work(kit, 0, before);
+        missed += !kit->result.converged;
+        work += w;
+        taken += fabs(w);
+        if (!kit_lifted(kit) || taken == 0.0) {
+            continue;
+        }
+        all->draw = all->cycles == 0 || work > all->worst ? draw : all->draw;
+        all->worst = all->cycles == 0 ? work : fmax(all->worst, work);
+        all->share = taken > 1e-6 ? fmax(all->share, work / taken) : all->share;
+        all->missed += missed;
+        all->cycles++; /* closed */
+        work = taken = 0.0;
+        missed = 0;
+    }
+}
+
+static inline void kit_shaken(const char *name, const Shaken *all, int cycles) {
+    print_message("%s: %d closed cycles, most energy gained %.2e J (draw %d), %.2e of what was "
+                  "exchanged at most; %d steps did not converge\n",
+                  name, all->cycles, all->worst, all->draw, all->share, all->missed);
+    assert_true(all->cycles > cycles);
+    assert_true(all->worst < 1e-9);
 }
 
 /* Asserts that motions first .. first + count - 1, from the air to the air, give no energy. motion:

@@ -93,12 +93,6 @@ static int problem_on(Kit *kit, uint64_t *random, int small, const MildMaterial 
     return problem_solve(kit, random);
 }
 
-static int random_problem(Kit *kit, uint64_t *random, int small) {
-    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
-    MildMaterial m = kit_material(random);
-    return problem_on(kit, random, small ? 2 : 0, &m, steps[kit_index(random, 3)]);
-}
-
 /* The problem of that number: a third on sand with its drag and added mass, a third on small soles;
  * a fifth of all on a firm bed that a foot can reach. */
 static int numbered_problem(Kit *kit, int number) {

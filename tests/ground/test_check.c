@@ -1,6 +1,7 @@
 /* mild_contact_check: random problems pass, in double and rounded to float, and each fault has its
  * message. */
 #include "map_kit.h"
+#include "surface_kit.h"
 
 #include "round.h"
 
@@ -167,15 +168,21 @@ TEST(places) {
     mild_map_destroy(map);
 }
 
-/* A scratch for other soles than the ground's: nothing is computed, and nothing written. */
+/* A scratch for other soles than the ground's, of which the last is a shell of as many elements:
+ * nothing is computed, and nothing written. */
 TEST(another_scratch) {
     static Kit kit;
     uint64_t random = 4;
+    Plate36 plate;
     const MildMaterial foam = kit_material(&random);
-    MildSole *small = kit_plate(4, 5);
-    const MildSole *const others[] = {small, small};
-    const MildSole *const three[] = {soles[0], soles[1], small};
+    const MildShape shape = surface_plate(5, 4, KIT_SOLE_Z, &plate);
+    MildSole *small = kit_plate(5, 4), *face = surface_make(&shape, 1, KIT_PITCH);
+    const MildSole *const others[][3] = {
+        {soles[0]}, {soles[0], soles[1]}, {soles[0], small, small}, {soles[0], face}};
+    static const int feet[] = {1, 2, 3, 2};
+    const MildSole *const own[2] = {soles[0], small};
     kit_open(&kit, 2, soles[0], soles[1], &foam, 1e-3);
+    kit_soles(&kit, own);
     kit_random_state(&kit, &random);
     kit_random_inertia(&kit, &random, 12);
     kit_free(&kit, NULL);
@@ -183,12 +190,12 @@ TEST(another_scratch) {
     kit_advance(&kit);
     char *before = malloc(kit.bytes);
     memcpy(before, kit.ground, kit.bytes);
-    for (int feet = 1; feet <= 3; feet++) {
-        MildScratch *scratch = mild_scratch_create(feet < 3 ? others : three, feet, NULL);
+    for (int i = 0; i < 4; i++) {
+        MildScratch *scratch = mild_scratch_create(others[i], feet[i], NULL);
         mild_ground_solve(kit.ground, &kit.terrain, &kit.input, scratch, &kit.result);
         assert_int_equal(kit.result.converged, 0);
         assert_memory_equal(kit.result.velocity, kit.input.free_velocity,
-                            6 * (size_t)feet * sizeof(double));
+                            6 * (size_t)(feet[i] < 2 ? 1 : 2) * sizeof(double));
         mild_ground_advance(kit.ground, &kit.terrain, &kit.input, scratch, &kit.result);
         assert_memory_equal(kit.ground, before, kit.bytes);
         mild_scratch_destroy(scratch);
@@ -196,6 +203,7 @@ TEST(another_scratch) {
     free(before);
     kit_close(&kit);
     mild_sole_destroy(small);
+    mild_sole_destroy(face);
 }
 
 /* A ground that walked over waves and was reset is that of the first day, byte by byte. */

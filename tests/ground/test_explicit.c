@@ -142,41 +142,4 @@ TEST(drift_is_printed) {
     kit_close(&kit);
 }
 
-/* [J] What the ground takes of a plate that is led down by 20 mm and up again, over what it took
- * on the way down. */
-static double kept(MildSolver solver) {
-    const double dt = 1e-3, way = 0.02;
-    const int steps = 40;
-    Kit kit;
-    double down = 0.0, up = 0.0;
-    open_kit(&kit, 0.0, dt);
-    kit.input.solver = solver;
-    kit.terrain.materials[0].recovery = 0.0;
-    kit.terrain.materials[0].c_d = 0.5; /* no drag: the forces of a slow way */
-    kit.terrain.materials[0].c_g = 0.0;
-    memset(kit.A, 0, sizeof kit.A); /* led: no force moves it */
-    for (int i = 0; i < 2 * steps; i++) {
-        const double w = (i < steps ? 1 : -1) * way / (steps * dt);
-        const int at = i < steps ? i : 2 * steps - i;
-        kit.input.position[0][2] = -way * at / steps - mild_sole_z(plate);
-        memset(kit.input.free_velocity, 0, sizeof kit.input.free_velocity);
-        kit.input.velocity[0][2] = kit.input.free_velocity[2] = -w;
-        kit_solve(&kit);
-        *(i < steps ? &down : &up) += kit.result.foot[0].force[2] * w * dt;
-        mild_ground_advance(kit.ground, &kit.terrain, &kit.input, kit.scratch, &kit.result);
-    }
-    kit_close(&kit);
-    return (down + up) / down;
-}
-
-/* Sand keeps the work of a footprint; the printed force gives it back, and by a step's delay more
- * than it took. */
-TEST(work_comes_back) {
-    const double newton = kept(MILD_SOLVER_NEWTON), literal = kept(MILD_SOLVER_EXPLICIT);
-    print_message("of the work of an imprint the ground keeps: newton %.3f, explicit %.3f\n",
-                  newton, literal);
-    assert_true(newton > 0.99);
-    assert_true(literal < 0.0 && literal > -0.2);
-}
-
 TEST_MAIN(open_plate, close_plate)

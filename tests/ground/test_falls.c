@@ -1,9 +1,10 @@
-/* A rigid body with one or two feet falls out of the air. The ground has stored nothing, so its
- * work on the body is never above 0, but for bodies of some grams that bounce within one step.
- * Bodies and materials are those of robots, or anything that a file may say: 1 g to 100 t, numbers
- * at the ends of their ranges. Arguments: number of falls of each kind (default 300) and the first
- * seed (default 1); docs/testing.md says how many ran. */
-#include "ground_kit.h"
+/* A rigid body falls out of the air, on one or two feet or covered with elements. The ground has
+ * stored nothing, so its work on the body is never above 0, but for bodies of some grams that bounce
+ * within one step. Bodies and materials are those of robots, or anything that a file may say: 1 g to
+ * 100 t, numbers at the ends of their ranges. Covered are boxes, capsules, wedges and bodies of
+ * several parts, on every model and terrain, with and without imprints. Arguments: number of falls
+ * of each kind (default 300) and the first seed (default 1); docs/testing.md says how many ran. */
+#include "surface_kit.h"
 
 #define TURN_MOST 0.1 /* [rad] in a step; beyond it the way of a foot is not its twist */
 
@@ -15,7 +16,7 @@ static uint64_t first = 1;
 static const uint64_t gained[] = {5600196899747356623u, 11946568640844011236u,
                                   11528350181609327934u, 17625946322630040638u};
 
-enum { ROBOT, ANY, KINDS };
+enum { ROBOT, ANY, COVERED, KINDS };
 
 typedef struct {
     Kit kit;
@@ -304,11 +305,30 @@ static Fall body_fall(Body *b, int steps) {
 
 typedef struct {
     int falls, refused, steps, unsolved; /* unsolved: falls with such a step, not judged */
+    int touched;                         /* covered bodies that came down */
     int spun, spun_gained;               /* falls that turn by more than TURN_MOST in a step */
     double spun_worst, spun_least;       /* [-], [rad] smallest such turn that gained */
     double worst;                        /* [-] of the others */
     uint64_t seed;                       /* of the worst */
 } Falls;
+
+static void judge(Falls *all, const Fall *fall, int steps, uint64_t seed) {
+    all->falls++;
+    all->steps += steps;
+    if (fall->unsolved) {
+        all->unsolved++;
+    } else if (fall->turn > TURN_MOST) {
+        all->spun++;
+        all->spun_worst = fmax(all->spun_worst, fall->gain);
+        if (fall->gain > 1e-9) {
+            all->spun_gained++;
+            all->spun_least = fmin(all->spun_least, fall->turn);
+        }
+    } else if (fall->gain > all->worst) {
+        all->worst = fall->gain;
+        all->seed = seed;
+    }
+}
 
 static void fall_once(uint64_t seed, int kind, Falls *all) {
     Body body;
@@ -319,22 +339,174 @@ static void fall_once(uint64_t seed, int kind, Falls *all) {
     }
     const int steps = 60 + choose(&random, 60);
     const Fall fall = body_fall(&body, steps);
-    all->falls++;
-    all->steps += steps;
-    if (fall.unsolved) {
-        all->unsolved++;
-    } else if (fall.turn > TURN_MOST) {
-        all->spun++;
-        all->spun_worst = fmax(all->spun_worst, fall.gain);
-        if (fall.gain > 1e-9) {
-            all->spun_gained++;
-            all->spun_least = fmin(all->spun_least, fall.turn);
-        }
-    } else if (fall.gain > all->worst) {
-        all->worst = fall.gain;
-        all->seed = seed;
-    }
+    judge(all, &fall, steps, seed);
     body_close(&body);
+}
+
+/* ---- bodies covered with elements ---- */
+
+typedef struct {
+    Kit kit;
+    MildSole *sole;
+    MildMap *map;
+} Covered;
+
+static MildMaterial covered_material(uint64_t *random) {
+    static const MildModel models[] = {
+        MILD_MODEL_MILD,          MILD_MODEL_MILD,         MILD_MODEL_ECC_SPRING,
+        MILD_MODEL_ECC_QUASI,     MILD_MODEL_ECC_QUASI_3D, MILD_MODEL_BEKKER,
+        MILD_MODEL_HUNT_CROSSLEY, MILD_MODEL_MILD_MERGED,  MILD_MODEL_MILD_MERGED};
+    MildMaterial m = kit_material(random);
+    m.model = (int)models[kit_index(random, 9)];
+    if (m.model == MILD_MODEL_MILD_MERGED) {
+        m.recovery = kit_index(random, 2) ? 0.0 : m.recovery;
+        m.slip_length = kit_index(random, 2) ? pow(10.0, kit_uniform(random, -3.5, -1.0)) : 0.0;
+        m.regain_length = pow(10.0, kit_uniform(random, -4.0, -2.0));
+        m.grip = kit_index(random, 2) ? kit_uniform(random, 0.0, 0.3) : 0.0;
+    }
+    m.zeta = kit_uniform(random, 0.05, 1.5);
+    if (m.model == MILD_MODEL_BEKKER || m.model == MILD_MODEL_HUNT_CROSSLEY) {
+        m.exponent = kit_uniform(random, 0.4, 2.0);
+        m.k_c = kit_uniform(random, 0.0, 50e3);
+        m.k_phi = pow(10.0, kit_uniform(random, 4.5, 6.0));
+        uint64_t own = *random;
+        if (kit_index(&own, 3) == 0) { /* of a small body the modulus is below 0 then */
+            m.k_c = kit_uniform(&own, -0.1, 0.0) * m.k_phi;
+        }
+        m.cohesion = kit_uniform(random, 0.0, 10e3);
+        m.shear_length = kit_uniform(random, 0.001, 0.05);
+        m.dissipation = kit_uniform(random, 0.0, 5.0);
+    }
+    if (kit_index(random, 3) == 0) {
+        m.mu = m.k_drift = m.b_drift = 0.0; /* nothing but the normal force takes energy */
+    }
+    m.passive = 1;
+    return m;
+}
+
+static MildSole *covered_sole(uint64_t *random) {
+    static double vertices[18];
+    MildShape shapes[3];
+    const int count = 1 + kit_index(random, 3);
+    for (int i = 0; i < count; i++) {
+        double size[3];
+        for (int k = 0; k < 3; k++) {
+            size[k] = kit_spread(random, 0.02, 0.15);
+        }
+        switch (kit_index(random, 4)) {
+        case 0: shapes[i] = surface_box(size[0], size[1], size[2]); break;
+        case 1: shapes[i] = surface_capsule(0.5 * size[0], size[1]); break;
+        case 2: shapes[i] = surface_sphere(size[0]); break;
+        default: shapes[i] = surface_wedge(size[0], size[1], size[2], vertices); break;
+        }
+        kit_vector(random, 0.1, shapes[i].pos);
+        kit_vector(random, 1.0, shapes[i].quat + 1);
+        shapes[i].quat[0] = kit_uniform(random, -1.0, 1.0);
+    }
+    return surface_make(shapes, count, kit_spread(random, 0.015, 0.05));
+}
+
+/* Level, uneven, in patches, or both. */
+static void covered_terrain(Covered *b, uint64_t *random) {
+    static const MildMapKind shapes[4] = {MILD_MAP_SLOPE, MILD_MAP_STEPS, MILD_MAP_WAVES,
+                                          MILD_MAP_ROUGH};
+    const int kind = kit_index(random, 4);
+    b->kit.terrain.height = kit_uniform(random, -1, 1);
+    if (kind == 0) {
+        return;
+    }
+    MildMapDef def = mild_map_def_default();
+    def.kind = kind & 1 ? (int)shapes[kit_index(random, 4)] : MILD_MAP_FLAT;
+    def.cell = kit_uniform(random, 0.01, 0.03);
+    def.size = 1.0;
+    def.amplitude = kit_uniform(random, 0.0, 0.03);
+    def.wavelength = kit_uniform(random, 0.1, 0.8);
+    def.slope = kit_uniform(random, -0.4, 0.4);
+    def.seed = (uint64_t)kit_index(random, 1000);
+    if (kind & 2) {
+        while (b->kit.terrain.material_count < 4) {
+            b->kit.terrain.materials[b->kit.terrain.material_count++] = covered_material(random);
+        }
+        def.patches = MILD_PATTERN_STRIPES + kit_index(random, 2);
+        def.patch_size = kit_uniform(random, 0.03, 0.2);
+        def.patch_count = 3;
+        def.border = kit_index(random, 4) ? kit_uniform(random, 0.01, def.patch_size) : 0.0;
+    }
+    MildError error = {0};
+    b->map = mild_map_create(&def, &error);
+    if (!b->map || mild_terrain_set_map(&b->kit.terrain, b->map, &error) != MILD_OK) {
+        fail_msg("%s", error.text);
+    }
+}
+
+/* Lowest point of the body over the ground under it. */
+static double clearance(const Covered *b) {
+    const double *R = b->kit.input.rotation[0], *p = b->kit.input.position[0];
+    double least = INFINITY;
+    for (int e = 0; e < mild_sole_elements(b->sole); e++) {
+        const double in[3] = {mild_sole_x(b->sole)[e], mild_sole_y(b->sole)[e],
+                              mild_sole_surface_z(b->sole)[e]};
+        double at[3];
+        for (int k = 0; k < 3; k++) {
+            at[k] = p[k] + R[3 * k] * in[0] + R[3 * k + 1] * in[1] + R[3 * k + 2] * in[2];
+        }
+        least = fmin(least, at[2] - mild_terrain_height_at(&b->kit.terrain, at[0], at[1]));
+    }
+    return least;
+}
+
+static void covered_draw(Covered *b, uint64_t *random) {
+    memset(b, 0, sizeof *b);
+    b->sole = covered_sole(random);
+    const MildMaterial m = covered_material(random);
+    kit_open(&b->kit, 1, b->sole, NULL, &m, kit_spread(random, 5e-4, 2e-3));
+    kit_prints(&b->kit, kit_index(random, 2) ? 0 : 8 * (1 + kit_index(random, 8)));
+    covered_terrain(b, random);
+    Kit *kit = &b->kit;
+    kit->mass[0] = kit_spread(random, 0.3, 40.0);
+    kit->inertia[0] = kit->mass[0] * kit_spread(random, 1e-3, 0.02);
+    kit_vector(random, 0.05, kit->center[0]);
+    double turn[3];
+    kit_vector(random, 3.0, turn);
+    kit_rotate(kit->input.rotation[0], turn);
+    kit_vector(random, 1.0, kit->input.position[0]);
+    kit->input.position[0][2] += kit_spread(random, 1e-4, 0.2) - clearance(b);
+    kit_vector(random, 1.5, kit->input.velocity[0]);
+    kit->input.velocity[0][2] -= 1.5;
+    kit_vector(random, 8.0, kit->input.velocity[0] + 3);
+}
+
+static void covered_close(Covered *b) {
+    kit_close(&b->kit);
+    mild_sole_destroy(b->sole);
+    mild_map_destroy(b->map);
+}
+
+static void covered_fall(uint64_t seed, Falls *all) {
+    Covered body;
+    uint64_t random = seed;
+    covered_draw(&body, &random);
+    Kit *kit = &body.kit;
+    const int steps = 100 + kit_index(&random, 200);
+    double work = 0.0, energy = kit_kinetic(kit, kit->input.velocity[0]);
+    Fall fall = {0};
+    int touched = 0;
+    for (int s = 0; s < steps; s++) {
+        kit_inverse_inertia(kit);
+        kit_free(kit, NULL);
+        kit_solve(kit);
+        fall.unsolved += !kit->result.converged;
+        touched |= kit->result.foot[0].contacts > 0;
+        work += kit_work(kit, 0, kit->input.free_velocity);
+        kit_advance(kit);
+        const double *V = kit->input.velocity[0];
+        fall.turn = fmax(fall.turn, kit->input.dt * sqrt(V[3] * V[3] + V[4] * V[4] + V[5] * V[5]));
+        energy = fmax(energy, kit_kinetic(kit, V));
+        fall.gain = fmax(fall.gain, work / energy);
+    }
+    all->touched += touched;
+    judge(all, &fall, steps, seed);
+    covered_close(&body);
 }
 
 static void falls_print(const char *name, const Falls *all) {
@@ -348,15 +520,20 @@ static void falls_print(const char *name, const Falls *all) {
 }
 
 TEST(falls_gain_nothing) {
-    static const char *const names[KINDS] = {"robots", "anything"};
+    static const char *const names[KINDS] = {"robots", "anything", "covered bodies"};
     for (int kind = 0; kind < KINDS; kind++) {
         Falls all = {.spun_least = INFINITY};
         for (int i = 0; i < falls; i++) {
-            fall_once((first + (uint64_t)i) * 1000003u + 7919u, kind, &all);
+            const uint64_t seed = (first + (uint64_t)i) * 1000003u + 7919u;
+            if (kind == COVERED) {
+                covered_fall(seed, &all);
+            } else {
+                fall_once(seed, kind, &all);
+            }
         }
         falls_print(names[kind], &all);
-        assert_true(all.falls > falls / 2);
-        assert_true(all.unsolved <= 1 + all.falls / 200);
+        assert_true((kind == COVERED ? all.touched : all.falls) > falls / 2);
+        assert_true(all.unsolved <= 1 + all.falls / (kind == COVERED ? 100 : 200));
         assert_true(all.worst < 1e-9);
     }
 }

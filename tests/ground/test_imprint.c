@@ -128,9 +128,6 @@ TEST(test_against_an_array) {
             worst = fmax(worst, fabs(stamp_at(&stamp, x, y) - deepest[i][j]));
         }
     }
-    print_message(
-        "imprints against an array, %d presses: cells off by %.1e m, elements by %.1e m\n", lasting,
-        worst, mean);
     assert_true(lasting > 200);
     assert_true(worst > 0.0 && worst <= 0.5e-5 + 1e-12);
     assert_true(mean > 0.0 && mean <= 0.5e-5 + 1e-12);
@@ -172,7 +169,6 @@ TEST(test_sets) {
         const double depth = stamp_at(&stamp, (n % 8 - 3.5) * EDGE, (n / 8 - 1.5) * EDGE);
         kept += fabs(depth - 1e-3 * (n + 1)) < 1e-9;
     }
-    print_message("128 tiles keep %d of 40\n", kept);
     assert_int_equal(kept, 40);
     stamp_close(&stamp);
 }

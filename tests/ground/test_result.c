@@ -61,8 +61,8 @@ TEST(test_one_element_carries_all) {
         }
         mild_sole_destroy(sole);
     }
-    print_message("one element: zmp, pressure centre and torque off by %.1e at most\n", worst);
-    assert_true(worst < 1e-9 && least > 1e-3);
+    expect_below("zero moment points, pressure centre, torque of one element", worst, 1e-9);
+    assert_true(least > 1e-3);
 }
 
 /* Many elements, tilted so that some are loaded: about zmp_sole, which lies in the height of the
@@ -105,9 +105,8 @@ TEST(test_zmp_takes_the_horizontal_torque) {
         }
         kit_close(&kit);
     }
-    print_message("zmp of %d tilted soles: torque that is left %.1e m times the force\n", loaded,
-                  worst);
-    assert_true(loaded > 100 && worst < 1e-9);
+    expect_below("torque that is left, by the force [m]", worst, 1e-9);
+    assert_true(loaded > 100);
     mild_sole_destroy(sole);
 }
 
@@ -126,8 +125,6 @@ TEST(test_depths_of_the_loaded_elements) {
     kit.input.velocity[0][2] = kit.input.free_velocity[2] = -speed;
     kit_solve(&kit);
     const MildFootResult *r = &kit.result.foot[0];
-    print_message("tilted plate: %d of 4 loaded, deepest %.3f mm, mean %.3f mm\n", r->contacts,
-                  1e3 * r->depth_max, 1e3 * r->depth_mean);
     assert_int_equal(r->contacts, 2);
     assert_true(fabs(r->area - 2 * KIT_PITCH * KIT_PITCH) < 1e-12);
     double move = speed * 1e-3; /* depths of the step's start or end */
@@ -141,54 +138,11 @@ TEST(test_depths_of_the_loaded_elements) {
     mild_sole_destroy(sole);
 }
 
-/* A set of eight tiles keeps eight places: the ninth takes the oldest one's, and no other's.
- * Each is pressed to 10 mm in steps of 1 mm, and a step remembers its middle: 9.5 mm. */
-TEST(test_prints_keep_what_they_were_given) {
-    MildSole *sole = kit_plate(1, 1);
-    const MildSole *soles[1] = {sole};
-    MildMaterial sand = mild_material_default();
-    size_t none = mild_ground_bytes_imprints(soles, 1, 0);
-    /* a tile: 64 depths of two bytes and eight bytes of place and time */
-    assert_int_equal(mild_ground_bytes_imprints(soles, 1, 8) - none, 8 * 136);
-    assert_int_equal(mild_ground_bytes_imprints(soles, 1, 1) - none, 8 * 136);
-    assert_int_equal(mild_ground_bytes_imprints(soles, 1, 9) - none, 16 * 136);
-    assert_int_equal(mild_ground_bytes_imprints(soles, 1, 128) - none, 128 * 136);
-    assert_int_equal(mild_ground_bytes_imprints(soles, 1, -3) - none, 0);
-    for (int places = 8; places <= 10; places++) {
-        Kit kit;
-        kit_open(&kit, 1, sole, NULL, &sand, 1e-3);
-        kit_prints(&kit, 8);
-        /* tiles are four pitches wide; 0.3 pitches beside the middle of every twentieth one */
-        const double at = 2.3 * KIT_PITCH, apart = 80 * KIT_PITCH;
-        for (int n = 0; n < places; n++) {
-            kit.input.position[0][0] = at + apart * n;
-            kit.input.position[0][1] = at;
-            for (int s = 0; s <= 20; s++) {
-                double z = -KIT_SOLE_Z - 1e-3 * (s <= 10 ? s : 18 - s);
-                kit.input.velocity[0][2] = kit.input.free_velocity[2] =
-                    (z - kit.input.position[0][2]) / kit.input.dt;
-                kit_solve(&kit);
-                kit_advance(&kit);
-                kit.input.position[0][2] = z;
-            }
-        }
-        int kept = 0;
-        for (int n = 0; n < places; n++) {
-            double depth = mild_ground_imprint_at(kit.ground, at + apart * n, at);
-            assert_true(n < places - 8 ? depth == 0.0 : fabs(depth - 0.0095) < 1.1e-5);
-            kept += depth > 0.0;
-        }
-        assert_int_equal(kept, 8);
-        kit_close(&kit);
-    }
-    mild_sole_destroy(sole);
-}
-
 /* Forces whose square is 0 or infinite, and torques beside next to no force, have a finite axis. */
 TEST(test_axis_is_finite) {
     MildSole *sole = kit_sole(0, 77);
     uint64_t random = 3;
-    int loaded = 0, tiny = 0;
+    int loaded = 0;
     for (int draw = 0; draw < 3000; draw++) {
         MildMaterial m = kit_material(&random);
         Kit kit;
@@ -205,13 +159,9 @@ TEST(test_axis_is_finite) {
             sum += 0.0 * r->zmp_axis[k] + 0.0 * r->pressure_center[k] + 0.0 * r->force[k];
         }
         assert_true(!kit.result.converged || sum == 0.0);
-        const double *F = r->force, size = fabs(F[0]) + fabs(F[1]) + fabs(F[2]);
         loaded += kit.result.converged && r->contacts > 0;
-        tiny += kit.result.converged && size > 0.0 && size < 1e-160;
         kit_close(&kit);
     }
-    print_message("%d loaded soles, %d with a force whose square is 0: every point finite\n",
-                  loaded, tiny);
     mild_sole_destroy(sole);
     assert_true(loaded > 300);
 }

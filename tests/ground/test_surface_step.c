@@ -1,4 +1,4 @@
-/* Contact steps of shells: against plane soles, closed forms, differences, closed motions. */
+/* Contact steps of shells: against plane soles, closed forms, differences. */
 #include "surface_kit.h"
 
 #include "ground/step/step.h"
@@ -94,12 +94,9 @@ TEST(a_face_is_a_sole) {
         kit_close(&one);
         kit_close(&two);
     }
-    print_message("a face against a sole: %d steps, %d with as many loaded, %d loaded elements, "
-                  "worst difference %.1e\n",
-                  steps, alike, loaded, worst);
+    expect_below("a face against a sole", worst, 1e-9);
     assert_true(alike > 0.99 * steps);
     assert_true(loaded > 15 * 1000);
-    assert_true(worst < 1e-9);
     mild_sole_destroy(face);
     mild_sole_destroy(sole);
 }
@@ -166,12 +163,6 @@ TEST(pressed_shapes_agree_with_closed_forms) {
             const double want = sphere_force(m, pitch, radius, sunk);
             const double lies = held_force(capsule, m, side, radius - sunk);
             const double flat = cylinder_force(m, pitch, radius, 2 * half, sunk) + want;
-            print_message("%s sunk by %.2f m: sphere %.3f N (%.3f N), capsule on its side %.3f N "
-                          "(%.3f N)\n",
-                          g == 0   ? "springs"
-                          : g == 1 ? "sand"
-                                   : "foam",
-                          sunk, got, want, lies, flat);
             expect_near("sphere", got, want, 0.015 * want);
             expect_near("capsule", lies, flat, 0.015 * flat);
         }
@@ -216,7 +207,7 @@ TEST(hessian_is_the_derivative) {
     MildSole *body = block();
     uint64_t random = 8;
     double worst = 0.0;
-    int compared = 0, kinks = 0;
+    int compared = 0;
     for (int draw = 0; draw < 60; draw++) {
         const MildMaterial m = any_material(&random, draw);
         Kit kit;
@@ -255,101 +246,17 @@ TEST(hessian_is_the_derivative) {
                 twist[c] = kit.result.velocity[c];
             }
             for (int r = 0; r < 6; r++) {
-                if (fabs(slope[0][r] - slope[1][r]) > 1e-6 * size) {
-                    kinks++;
-                    continue;
+                if (fabs(slope[0][r] - slope[1][r]) <= 1e-6 * size) {
+                    compared++;
+                    worst = fmax(worst, fabs(H[c / 6][6 * r + c % 6] - slope[0][r]) / size);
                 }
-                compared++;
-                worst = fmax(worst, fabs(H[c / 6][6 * r + c % 6] - slope[0][r]) / size);
             }
         }
         kit_close(&kit);
     }
-    print_message("hessian: %d entries within %.1e of differences, %d near kinks\n", compared,
-                  worst, kinks);
+    expect_below("entries of the Hessian against differences", worst, 1e-5);
     assert_true(compared > 1500);
-    assert_true(worst < 1e-5);
     mild_sole_destroy(body);
-}
-
-/* Led by hand around closed motions: [J] that the ground gives in a round after the first, and by
- * how much of what it has taken. */
-static double led_round(Kit *kit, int rounds, int steps, double angle, const double *axis,
-                        double forth, double *taken) {
-    double last = 0.0;
-    for (int round = 0; round < rounds; round++) {
-        last = *taken = 0.0;
-        for (int s = 0; s < steps; s++) {
-            double before[6];
-            memcpy(before, kit->input.velocity[0], sizeof before);
-            const double phase = 2 * pi * (s + 0.5) / steps;
-            for (int k = 0; k < 3; k++) {
-                kit->input.free_velocity[3 + k] = angle / steps / kit->input.dt * axis[k];
-            }
-            kit->input.free_velocity[0] = forth / steps / kit->input.dt;
-            kit->input.free_velocity[2] = 0.004 * 2 * pi / steps / kit->input.dt * cos(phase);
-            kit_solve(kit);
-            assert_int_equal(kit->result.converged, 1);
-            const double work = kit_work(kit, 0, before);
-            last += work;
-            *taken += fabs(work);
-            kit_advance(kit);
-        }
-    }
-    return last;
-}
-
-/* Closed motions: a buried block that turns fully about any axis, and a capsule that rolls on. */
-TEST(closed_motions_give_nothing) {
-    const MildShape rod = surface_capsule(0.05, 0.1);
-    MildSole *bodies[2] = {block(), surface_make(&rod, 1, 0.012)};
-    uint64_t random = 17;
-    double worst = -INFINITY, least = INFINITY;
-    int count = 0;
-    for (int draw = 0; draw < 24; draw++) {
-        const int rolls = draw % 2;
-        MildMaterial m = any_material(&random, draw / 2);
-        m.recovery = draw / 6 % 2 ? m.recovery : draw / 12;
-        if (draw % 3 == 0) {
-            m.mu = m.k_drift = m.b_drift = 0.0;
-        }
-        m.passive = 1;
-        double axis[3] = {0.0, 1.0, 0.0}, side[3] = {0.5 * pi, 0.0, 0.0}, taken = 0.0;
-        Kit kit;
-        kit_open(&kit, 1, bodies[rolls], NULL, &m, 1e-3);
-        if (draw % 4 > 1) {
-            kit_prints(&kit, 64);
-        }
-        if (rolls) {
-            kit_rotate(kit.input.rotation[0], side);
-            kit.input.position[0][2] = 0.03;
-        } else {
-            double length = 0.0;
-            for (int k = 0; k < 3; k++) {
-                axis[k] = kit_uniform(&random, -1.0, 1.0);
-                length += axis[k] * axis[k];
-            }
-            for (int k = 0; k < 3; k++) {
-                axis[k] /= sqrt(length);
-            }
-            kit.input.position[0][2] = kit_uniform(&random, -0.1, 0.05);
-        }
-        const double given =
-            led_round(&kit, 2, 2000, 2 * pi, axis, rolls ? 2 * pi * 0.05 : 0.0, &taken);
-        if (taken > 0.0) {
-            worst = fmax(worst, given / taken);
-            least = fmin(least, given / taken);
-            count++;
-        }
-        kit_close(&kit);
-    }
-    print_message("closed motions: %d, of the work done the ground gives %.2e at most, %.2f at "
-                  "least\n",
-                  count, worst, least);
-    assert_true(count > 20);
-    assert_true(worst < 0.0);
-    mild_sole_destroy(bodies[0]);
-    mild_sole_destroy(bodies[1]);
 }
 
 /* A box lies on elastic or plastic ground, turns over without being moved, and turns back: what
@@ -388,9 +295,6 @@ TEST(a_buried_face_begins_without_force) {
             kit_advance(&kit);
         }
         const double again = kit.result.foot[0].force[2];
-        print_message("recovery %d: %.1f N, turned over %.1e N, 1 mm deeper %.1f N, lifted and "
-                      "pressed again %.1f N\n",
-                      elastic, first, turned, deeper, again);
         assert_true(first > 10.0);
         assert_true(fabs(turned) < 1e-6 * first);
         assert_true(elastic ? deeper == 0.0 : deeper > first);
@@ -431,9 +335,6 @@ static void beside_an_imprint(MildSole *box) {
     const double beside = kit.result.foot[0].force[2];
     kit_advance(&kit);
     kit_solve(&kit);
-    print_message(
-        "pressed %.1f N, lifted by 2 mm %.1f N, moved onto foam %.1f N, and again %.1f N\n",
-        pressed, lifted, beside, kit.result.foot[0].force[2]);
     assert_true(pressed > 100.0 && lifted == 0.0 && beside == 0.0);
     assert_true(kit.result.foot[0].force[2] == 0.0);
     /* It presses again once it has come out. */
@@ -486,8 +387,6 @@ TEST(elastic_ground_keeps_no_print_of_a_face) {
         mild_ground_solve(kit.ground, &kit.terrain, &kit.input, scratch, &kit.result);
         mild_ground_advance(kit.ground, &kit.terrain, &kit.input, scratch, &kit.result);
         const double print = mild_ground_imprint_at(kit.ground, 0.01, 0.01);
-        print_message("%s, %s scratch: print %.2f mm\n", is_elastic ? "elastic" : "plastic",
-                      is_fresh ? "fresh" : "the same", 1e3 * print);
         assert_true(is_elastic ? print == 0 : print > 0.001);
         mild_scratch_destroy(other);
         kit_close(&kit);
@@ -539,7 +438,6 @@ TEST(a_share_is_kept) {
     kit_rotate(kit.input.rotation[0], tilt);
     kit.input.position[0][2] = -0.04;
     kit_solve(&kit);
-    const double tilted = kit.result.foot[0].force[2];
     kit_advance(&kit);
     kit_rotate(kit.input.rotation[0], back);
     kit_solve(&kit);
@@ -547,8 +445,6 @@ TEST(a_share_is_kept) {
     mild_ground_reset(kit.ground);
     kit_solve(&kit);
     const double level = kit.result.foot[0].force[2];
-    print_message("tilted by 60 degrees %.3f N, then level %.3f N, set down level %.3f N\n", tilted,
-                  kept, level);
     expect_near("kept", kept / level, 0.5, 1e-9);
     kit_close(&kit);
     mild_sole_destroy(face);
@@ -596,25 +492,6 @@ TEST(states_are_copied) {
     kit_close(&two);
     mild_sole_destroy(body);
     mild_sole_destroy(plate);
-}
-
-/* A scratch of a plane sole with as many elements does not fit the ground of a shell. */
-TEST(a_scratch_of_soles_does_not_fit) {
-    Plate36 plate;
-    const MildShape shape = surface_plate(3, 2, 0.0, &plate);
-    MildSole *face = surface_make(&shape, 1, KIT_PITCH), *sole = kit_plate(3, 2);
-    const MildMaterial m = mild_material_default();
-    Kit one, two;
-    kit_open(&one, 1, face, NULL, &m, 1e-3);
-    kit_open(&two, 1, sole, NULL, &m, 1e-3);
-    mild_ground_solve(one.ground, &one.terrain, &one.input, two.scratch, &one.result);
-    assert_int_equal(one.result.converged, 0);
-    mild_ground_solve(two.ground, &one.terrain, &one.input, one.scratch, &one.result);
-    assert_int_equal(one.result.converged, 0);
-    kit_close(&one);
-    kit_close(&two);
-    mild_sole_destroy(face);
-    mild_sole_destroy(sole);
 }
 
 /* Far above the ground nothing is listed, and the elements say so. */
