@@ -2,8 +2,6 @@
  * that moves both legs, a neck that moves none, one flat and one round foot, shells of every kind:
  * what the code finds out about it, its feet against the engine's Jacobians, its step against the
  * engine's. And what makes it refused. */
-#include <unistd.h>
-
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"
@@ -59,21 +57,12 @@ static const char ini[] =
 /* robot.ini's joint i in the engine. */
 static const int dof_of[JOINTS] = {12, 11, 10, 9, 8, 7, 6};
 
-static char folder[] = "/tmp/mild_walker_XXXXXX";
-static char xml_path[64], ini_path[64];
 static Robot *robot;
 
 static int setup(void **unused) {
     (void)unused;
     MildError error = {0};
-    if (!mkdtemp(folder)) {
-        return 1;
-    }
-    snprintf(xml_path, sizeof xml_path, "%s/walker.xml", folder);
-    snprintf(ini_path, sizeof ini_path, "%s/robot.ini", folder);
-    kit_write_text(xml_path, mjcf);
-    kit_write_text(ini_path, ini);
-    robot = robot_create(folder, &error);
+    robot = kit_robot_of("walker.xml", mjcf, ini, &error);
     expect_good(robot && !error.text[0], &error);
     return 0;
 }
@@ -81,9 +70,7 @@ static int setup(void **unused) {
 static int teardown(void **unused) {
     (void)unused;
     robot_destroy(robot);
-    unlink(xml_path);
-    unlink(ini_path);
-    return rmdir(folder);
+    return 0;
 }
 
 /* ---- what is known of it ---- */
@@ -329,46 +316,60 @@ static MildTerrain sunk(MildMap *map) {
     return terrain;
 }
 
+/* The feet of a workspace at a state, its clearance above the ground already measured. Returns the
+ * lowest point of a sole [m]. */
+static double check_feet(RobotSim *sim, const RobotState *state, const MildTerrain *terrain) {
+    const mjModel *m = robot_sim_model(sim);
+    const double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    mjData *d = engine_at(m, state);
+    double j[ROWS * NV], twist[ROWS], least = 1e9;
+    dense_jacobian(m, d, j);
+    mju_mulMatVec(twist, j, d->qvel, ROWS, NV);
+    for (int f = 0; f < FEET; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        const double *turn = f == ROUND ? identity : d->xmat + 9 * robot_foot_body(robot, f);
+        double point[3], middle[3];
+        reference_point(m, d, f, point);
+        memcpy(middle, point, sizeof middle);
+        const double lowest = f == FLAT
+                                  ? measure_flat(d, terrain, point, middle)
+                                  : point[2] - mild_terrain_height_at(terrain, point[0], point[1]);
+        expect_entry("height", f, foot->sole_height, lowest, 1e-12);
+        least = fmin(least, lowest);
+        for (int k = 0; k < 9; k++) {
+            expect_entry("rotation", k, foot->rotation[k], turn[k], 1e-12);
+        }
+        for (int k = 0; k < 3; k++) {
+            expect_entry("reference", k, foot->position[k], point[k], 1e-12);
+            expect_entry("middle", k, foot->sole_center[k], middle[k], 1e-12);
+        }
+        for (int k = 0; k < 6; k++) {
+            expect_entry("twist", k, foot->velocity[k], twist[6 * f + k], 1e-12);
+        }
+    }
+    mj_deleteData(d);
+    return least;
+}
+
+/* After a load, and after a step through the air. */
 TEST(test_feet) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
     RobotVariation nominal = robot_variation_nominal();
+    MildGround *ground = kit_ground(robot);
     MildMap *map = waves();
-    const mjModel *m = robot_sim_model(sim);
-    const double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     for (uint32_t draw = 0; draw < 20; draw++) {
         const MildTerrain terrain = sunk(draw % 2 ? map : NULL);
+        const double torque[JOINTS] = {0};
         RobotState state = draw_state(draw, 1);
         robot_sim_load(sim, &state, &nominal);
         const double clearance = robot_sim_sole_clearance(sim, &terrain);
-        mjData *d = engine_at(m, &state);
-        double j[ROWS * NV], twist[ROWS];
-        dense_jacobian(m, d, j);
-        mju_mulMatVec(twist, j, d->qvel, ROWS, NV);
-        double lowest[FEET];
-        for (int f = 0; f < FEET; f++) {
-            const RobotFoot *foot = robot_sim_foot(sim, f);
-            double point[3], middle[3];
-            reference_point(m, d, f, point);
-            memcpy(middle, point, sizeof middle);
-            lowest[f] = f == FLAT ? measure_flat(d, &terrain, point, middle)
-                                  : point[2] - mild_terrain_height_at(&terrain, point[0], point[1]);
-            expect_entry("height", f, foot->sole_height, lowest[f], 1e-12);
-            const double *turn = f == ROUND ? identity : d->xmat + 9 * robot_foot_body(robot, f);
-            for (int k = 0; k < 9; k++) {
-                expect_entry("rotation", k, foot->rotation[k], turn[k], 1e-12);
-            }
-            for (int k = 0; k < 3; k++) {
-                expect_entry("reference", k, foot->position[k], point[k], 1e-12);
-                expect_entry("middle", k, foot->sole_center[k], middle[k], 1e-12);
-            }
-            for (int k = 0; k < 6; k++) {
-                expect_entry("twist", k, foot->velocity[k], twist[6 * f + k], 1e-12);
-            }
-        }
-        expect_entry("clearance", 0, clearance, fmin(lowest[0], lowest[1]), 1e-12);
-        mj_deleteData(d);
+        expect_entry("clearance", 0, clearance, check_feet(sim, &state, &terrain), 1e-12);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+        robot_sim_store(sim, &state);
+        check_feet(sim, &state, &terrain);
     }
+    free(ground);
     mild_map_destroy(map);
     robot_sim_destroy(sim);
 }
@@ -421,7 +422,8 @@ TEST(test_map) {
     robot_sim_destroy(sim);
 }
 
-/* In the air on soft ground, and falling onto rigid ground: the engine's own step. */
+/* In the air on soft ground, and falling onto rigid ground, pushed, with a joint beyond its limit:
+ * the engine's own step, under xfrc_applied. */
 static void step_is_the_engines(int rigid, double height, int steps) {
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, 0.001, &error);
@@ -431,11 +433,15 @@ static void step_is_the_engines(int rigid, double height, int steps) {
     MildTerrain terrain = mild_terrain_uniform(&sand);
     MildGround *ground = kit_ground(robot);
     const mjModel *m = robot_sim_model(sim);
+    const double push[6] = {30, -45, 40, -5, 6, -7};
+    const int base = mj_name2id(m, mjOBJ_BODY, "torso");
     double worst = 0;
     int contacts[FEET] = {0};
     for (uint32_t draw = 0; draw < 8; draw++) {
         RobotState state = draw_state(draw, 1), after;
         double torque[JOINTS];
+        const int beyond = (int)draw % JOINTS;
+        state.qpos[7 + beyond] = robot_joint_high(robot)[beyond] + 0.01;
         robot_sim_load(sim, &state, &variation);
         state.qpos[2] += height - robot_sim_sole_clearance(sim, &terrain);
         robot_sim_load(sim, &state, &variation);
@@ -444,9 +450,10 @@ static void step_is_the_engines(int rigid, double height, int steps) {
             torque[i] = 2 * (i - 3);
             d->qfrc_applied[dof_of[i]] = torque[i];
         }
+        memcpy(d->xfrc_applied + 6 * base, push, sizeof push);
         for (int t = 0; t < steps; t++) {
             mj_step(m, d);
-            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+            assert_int_equal(robot_sim_step(sim, torque, push, &terrain, ground), 0);
             contacts[0] += robot_sim_contact(sim)->foot[0].contacts > 0;
             contacts[1] += robot_sim_contact(sim)->foot[1].contacts > 0;
         }
@@ -457,6 +464,9 @@ static void step_is_the_engines(int rigid, double height, int steps) {
         }
         for (int i = 0; i < 7; i++) {
             worst = fmax(worst, fabs(after.qpos[i] - d->qpos[i]));
+        }
+        for (int i = 0; i < 6; i++) {
+            worst = fmax(worst, fabs(after.qvel[i] - d->qvel[i]));
         }
         mj_deleteData(d);
     }
@@ -551,112 +561,94 @@ TEST(test_other_numbers) {
     expect_spoilt(m->key_qpos + 2 * NQ - 1, "x.xml key down qpos inf");
 }
 
-static void write_edited(const char *path, const char *text, const char *from, const char *to) {
-    char edited[8192];
-    const char *at = from ? strstr(text, from) : NULL;
-    if (!at) {
-        kit_write_text(path, text);
-        return;
-    }
-    snprintf(edited, sizeof edited, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from));
-    kit_write_text(path, edited);
-}
-
 /* With `from` written as `to` in one of the two texts: an error of that status; MILD_OK:
  * accepted. */
-static void try_robot(const char *from, const char *to, MildStatus status, const char *names) {
-    MildError error = {0};
-    assert_true((strstr(mjcf, from) != NULL) != (strstr(ini, from) != NULL));
-    write_edited(xml_path, mjcf, from, to);
-    write_edited(ini_path, ini, from, to);
-    Robot *made = robot_create(folder, &error);
-    if (status == MILD_OK && (!made || error.text[0])) {
-        fail_msg("refused: %s", error.text);
+typedef struct {
+    const char *from, *to;
+    MildStatus status;
+    const char *names;
+} Change;
+
+static const Change changes[] = {
+    /* bodies and joints that the two texts name */
+    {"<freejoint/>", "<joint axis='0 0 1'/>", MILD_ERROR_FORMAT, "walker.xml torso"},
+    {"base = torso", "base = pelvis", MILD_ERROR_FORMAT, "walker.xml pelvis"},
+    {"base = torso", "base = chest", MILD_ERROR_FORMAT, "walker.xml chest [robot] base"},
+    {"body = foot_l", "body = foot", MILD_ERROR_FORMAT, "walker.xml foot [foot.flat]"},
+    {"knee = shank_l", "knee = none", MILD_ERROR_FORMAT, "walker.xml none [foot.flat]"},
+    {"body = toe_r", "body = foot_l", MILD_ERROR_FORMAT, "robot.ini flat ball"},
+    {"body = toe_r", "body = torso", MILD_ERROR_FORMAT, "walker.xml torso [foot.ball]"},
+    {"body = toe_r", "body = world", MILD_ERROR_FORMAT, "walker.xml world [foot.ball]"},
+    {"body = toe_r", "body = pelvis", MILD_ERROR_FORMAT, "belt shells covers ball"},
+    {"body = toe_r\nknee = shank_r\nmirror = flat\noffset = 0.6\nshape = round\n"
+     "center = 0.01 0.02 -0.03",
+     "body = pelvis\nknee = shank_r\nmirror = flat\noffset = 0.6\nshape = round\n"
+     "center = 0 0 -0.2",
+     MILD_OK, NULL}, /* one joint is enough */
+    {"joint name='neck'", "joint name='nek'", MILD_ERROR_FORMAT, "walker.xml neck [joints] names"},
+    {"<body name='head' pos='0 0 0.5'>",
+     "<body name='head' pos='0 0 0.5'><joint name='nod' axis='0 1 0'/>", MILD_ERROR_FORMAT,
+     "walker.xml nod [joints] names"},
+    /* ranges, torques, poses */
+    {"name='ankle_l'", "name='ankle_l' range='-3.2 3.2'", MILD_ERROR_FORMAT,
+     "walker.xml ankle_l [foot.flat]"},
+    {"name='ankle_l'", "name='ankle_l' range='-3.1 3.1'", MILD_OK, NULL},
+    {"name='knee_r'", "name='knee_r' range='-4 4'", MILD_OK, NULL}, /* above a round foot */
+    {"range='-2 2' ", "", MILD_ERROR_FORMAT, "walker.xml range actuatorfrcrange [joints] effort"},
+    {"<default><joint actuatorfrcrange='-50 50'", "<default><joint", MILD_ERROR_FORMAT,
+     "walker.xml range actuatorfrcrange [joints] effort"},
+    {"effort = 0 0 33 0 0 0.5 0", "effort = 1 1 1 1 1 1 1", MILD_OK, NULL},
+    {"pose = 0 0.5", "pose = 2.1 0.5", MILD_ERROR_RANGE, "[joints] pose 2.1 neck -2 2"},
+    {"pose = 0 0.5", "pose = -2.1 0.5", MILD_ERROR_RANGE, "[joints] pose -2.1 neck -2 2"},
+    {"pose = 0 0.5", "pose = 2 0.5", MILD_OK, NULL},
+    {"-0.2 0.4 -0.2", "-0.181 0.4 -0.2", MILD_OK, NULL}, /* 0.019 rad off level */
+    {"-0.2 0.4 -0.2", "-0.179 0.4 -0.2", MILD_ERROR_FORMAT, "[foot.flat] [joints] pose"},
+    {"pitch = 0.02", "pitch = 0.5", MILD_ERROR_RANGE, "robot.ini [foot.flat] sole.pitch"},
+    /* shells */
+    {"shells = chest belt bone", "shells = chest belts bone", MILD_ERROR_FORMAT,
+     "walker.xml belts [robot] shells"},
+    {"type='capsule' size='0.04 0.15' mass='2' ", "type='cylinder' size='0.04 0.15' mass='2' ",
+     MILD_ERROR_FORMAT, "walker.xml bone [robot] shells"},
+    {"<body name='thigh_l'", "<body", MILD_ERROR_FORMAT, "walker.xml bone"},
+    /* what the step does not have */
+    {"</worldbody>", "</worldbody><equality><joint joint1='hip_l' joint2='hip_r'/></equality>",
+     MILD_ERROR_FORMAT, "walker.xml equality"},
+    {"</worldbody>", "</worldbody><tendon><fixed><joint joint='hip_l' coef='1'/></fixed></tendon>",
+     MILD_ERROR_FORMAT, "walker.xml tendons"},
+    {"name='neck' axis='1 0 0'", "name='neck' type='slide' axis='1 0 0'", MILD_ERROR_FORMAT,
+     "walker.xml neck"},
+    {"name='neck'", "name='neck' frictionloss='0.1'", MILD_ERROR_FORMAT,
+     "walker.xml neck frictionloss"},
+    {"name='neck'", "name='neck' damping='0.1'", MILD_ERROR_FORMAT, "walker.xml neck damping"},
+    {"name='neck'", "name='neck' stiffness='0.1'", MILD_ERROR_FORMAT, "walker.xml neck stiffness"},
+    {"<light", "<body name='post'><geom size='0.1'/></body><light", MILD_OK, NULL},
+    {"<motor joint='waist'/>", "", MILD_OK, NULL},
+    {"<body name='toe_r' pos='0 0 -0.3'><geom type='sphere' size='0.03' mass='0.2'/></body>",
+     "<body name='toe_r' pos='0 0 -0.3'/>", MILD_OK, NULL}, /* its parent has the mass */
+    /* what MuJoCo does not read */
+    {"model = walker.xml", "model = none.xml", MILD_ERROR_FORMAT, "none.xml"},
+    {"</worldbody>", "", MILD_ERROR_FORMAT, "walker.xml"},
+    {"axis='1 0 0'", "axis='0 0 0'", MILD_ERROR_FORMAT, "walker.xml neck"},
+};
+
+TEST(test_changes) {
+    for (size_t i = 0; i < sizeof changes / sizeof *changes; i++) {
+        const Change *change = &changes[i];
+        const int of_model = strstr(mjcf, change->from) != NULL;
+        MildError error = {0};
+        assert_true(of_model != (strstr(ini, change->from) != NULL));
+        char *edited = kit_replaced(of_model ? mjcf : ini, change->from, change->to);
+        Robot *made =
+            kit_robot_of("walker.xml", of_model ? edited : mjcf, of_model ? ini : edited, &error);
+        if (change->status == MILD_OK) {
+            expect_good(made && !error.text[0], &error);
+        } else {
+            assert_null(made);
+            assert_error(&error, change->status, change->names);
+        }
+        robot_destroy(made);
+        free(edited);
     }
-    if (status != MILD_OK) {
-        assert_null(made);
-        assert_error(&error, status, names);
-    }
-    robot_destroy(made);
-}
-
-TEST(test_refused) {
-    try_robot("<freejoint/>", "<joint axis='0 0 1'/>", MILD_ERROR_FORMAT, "walker.xml torso");
-    try_robot("base = torso", "base = pelvis", MILD_ERROR_FORMAT, "walker.xml pelvis");
-    try_robot("base = torso", "base = chest", MILD_ERROR_FORMAT, "walker.xml chest [robot] base");
-    try_robot("body = foot_l", "body = foot", MILD_ERROR_FORMAT, "walker.xml foot [foot.flat]");
-    try_robot("knee = shank_l", "knee = none", MILD_ERROR_FORMAT, "walker.xml none [foot.flat]");
-    try_robot("body = toe_r", "body = foot_l", MILD_ERROR_FORMAT, "robot.ini flat ball");
-    try_robot("name='ankle_l'", "name='ankle_l' range='-3.2 3.2'", MILD_ERROR_FORMAT,
-              "walker.xml ankle_l [foot.flat]");
-    try_robot("name='ankle_l'", "name='ankle_l' range='-3.1 3.1'", MILD_OK, NULL);
-    try_robot("name='knee_r'", "name='knee_r' range='-4 4'", MILD_OK,
-              NULL); /* above a round foot */
-    try_robot("body = toe_r", "body = torso", MILD_ERROR_FORMAT, "walker.xml torso [foot.ball]");
-    try_robot("body = toe_r", "body = world", MILD_ERROR_FORMAT, "walker.xml world [foot.ball]");
-    try_robot("body = toe_r\nknee = shank_r\nmirror = flat\noffset = 0.6\nshape = round\n"
-              "center = 0.01 0.02 -0.03",
-              "body = pelvis\nknee = shank_r\nmirror = flat\noffset = 0.6\nshape = round\n"
-              "center = 0 0 -0.2",
-              MILD_OK, NULL); /* one joint is enough */
-    try_robot("body = toe_r", "body = pelvis", MILD_ERROR_FORMAT, "belt shells covers ball");
-    try_robot("name='neck' axis='1 0 0'", "name='neck' type='slide' axis='1 0 0'",
-              MILD_ERROR_FORMAT, "walker.xml neck");
-    try_robot("joint name='neck'", "joint name='nek'", MILD_ERROR_FORMAT,
-              "walker.xml neck [joints] names");
-    try_robot("<motor joint='waist'/>", "", MILD_OK, NULL);
-    try_robot("names = neck knee_r hip_r ankle_l knee_l hip_l waist\n"
-              "mirror = neck knee_l hip_l ankle_l knee_r hip_r waist\n"
-              "mirror_sign = -1 1 1 1 1 1 -1\npose = 0 0.5 -0.25 -0.2 0.4 -0.2 0\n"
-              "kp = 1 2 3 4 5 6 7\nkd = 0.1 0.2 0.3 0.4 0.5 0.6 0.7\neffort = 0 0 33 0 0 0.5 0\n"
-              "speed = 1 2 3 4 5 6 7\nswing = 0 2 -1 -1 2 -1 0\nstill = 1 0 0 0 0 0 1\n",
-              "names = knee_r hip_r ankle_l knee_l hip_l waist\n"
-              "mirror = knee_l hip_l ankle_l knee_r hip_r waist\n"
-              "mirror_sign = 1 1 1 1 1 -1\npose = 0.5 -0.25 -0.2 0.4 -0.2 0\n"
-              "kp = 2 3 4 5 6 7\nkd = 0.2 0.3 0.4 0.5 0.6 0.7\n",
-              MILD_ERROR_FORMAT, "walker.xml neck [joints] names");
-}
-
-TEST(test_numbers_refused) {
-    try_robot("range='-2 2' ", "", MILD_ERROR_FORMAT,
-              "walker.xml range actuatorfrcrange [joints] effort");
-    try_robot("<default><joint actuatorfrcrange='-50 50'", "<default><joint", MILD_ERROR_FORMAT,
-              "walker.xml range actuatorfrcrange [joints] effort");
-    try_robot("effort = 0 0 33 0 0 0.5 0", "effort = 1 1 1 1 1 1 1", MILD_OK, NULL);
-    try_robot("shells = chest belt bone", "shells = chest belts bone", MILD_ERROR_FORMAT,
-              "walker.xml belts [robot] shells");
-    try_robot("type='capsule' size='0.04 0.15' mass='2' ",
-              "type='cylinder' size='0.04 0.15' mass='2' ", MILD_ERROR_FORMAT,
-              "walker.xml bone [robot] shells");
-    try_robot("<body name='thigh_l'", "<body", MILD_ERROR_FORMAT, "walker.xml bone");
-    try_robot("pose = 0 0.5", "pose = 2.1 0.5", MILD_ERROR_RANGE, "[joints] pose 2.1 neck -2 2");
-    try_robot("pose = 0 0.5", "pose = -2.1 0.5", MILD_ERROR_RANGE, "[joints] pose -2.1 neck -2 2");
-    try_robot("pose = 0 0.5", "pose = 2 0.5", MILD_OK, NULL);
-    try_robot("-0.2 0.4 -0.2", "-0.181 0.4 -0.2", MILD_OK, NULL); /* 0.019 rad off level */
-    try_robot("-0.2 0.4 -0.2", "-0.179 0.4 -0.2", MILD_ERROR_FORMAT, "[foot.flat] [joints] pose");
-    try_robot("pitch = 0.02", "pitch = 0.5", MILD_ERROR_RANGE, "robot.ini [foot.flat] sole.pitch");
-}
-
-TEST(test_unsupported) {
-    try_robot("</worldbody>",
-              "</worldbody><equality><joint joint1='hip_l' joint2='hip_r'/></equality>",
-              MILD_ERROR_FORMAT, "walker.xml equality");
-    try_robot("</worldbody>",
-              "</worldbody><tendon><fixed><joint joint='hip_l' coef='1'/></fixed></tendon>",
-              MILD_ERROR_FORMAT, "walker.xml tendons");
-    try_robot("name='neck'", "name='neck' frictionloss='0.1'", MILD_ERROR_FORMAT,
-              "walker.xml neck frictionloss");
-    try_robot("name='neck'", "name='neck' damping='0.1'", MILD_ERROR_FORMAT,
-              "walker.xml neck damping");
-    try_robot("name='neck'", "name='neck' stiffness='0.1'", MILD_ERROR_FORMAT,
-              "walker.xml neck stiffness");
-    try_robot("<light", "<body name='post'><geom size='0.1'/></body><light", MILD_OK, NULL);
-    try_robot(
-        "<body name='toe_r' pos='0 0 -0.3'><geom type='sphere' size='0.03' mass='0.2'/></body>",
-        "<body name='toe_r' pos='0 0 -0.3'/>", MILD_OK, NULL); /* its parent has the mass */
-    try_robot("model = walker.xml", "model = none.xml", MILD_ERROR_FORMAT, "none.xml");
-    try_robot("</worldbody>", "", MILD_ERROR_FORMAT, "walker.xml");
-    try_robot("axis='1 0 0'", "axis='0 0 0'", MILD_ERROR_FORMAT, "walker.xml neck");
 }
 
 TEST_MAIN(setup, teardown)
