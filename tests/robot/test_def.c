@@ -1,10 +1,13 @@
 /* robot.ini as text: every key of a made-up robot comes back, defaults included; what is missing,
- * twice, too much or inconsistent is refused with the line or the key in the message. */
+ * twice, too much or inconsistent is refused with the line or the key in the message. And robots by
+ * name. */
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "files.h"
 #include "robot/def.h"
+#include "robot/robot.h"
+#include "sa01.h"
 
 /* Two flat feet that alternate; numbers all different. Keys with defaults are left out of it. */
 static const char plain[] = "; a comment\n"
@@ -529,6 +532,50 @@ TEST(test_files) {
     deep[1013] = 'x';
     deep[1014] = '\0';
     refuse_folder(deep, MILD_ERROR_ARGUMENT, "path robot.ini");
+}
+
+/* ---- robots by name ---- */
+
+TEST(test_list) {
+    char names[ROBOT_LISTED_MAX][ROBOT_LISTED_SIZE];
+    int count = robot_list(names, ROBOT_LISTED_MAX), found = 0;
+    assert_true(count >= 1 && count < ROBOT_LISTED_MAX);
+    for (int i = 0; i < count; i++) {
+        char ini[5000];
+        snprintf(ini, sizeof ini, "%s/robots/%s/robot.ini", MILD_SOURCE_DIR, names[i]);
+        assert_int_equal(access(ini, R_OK), 0);
+        assert_true(i == 0 || strcmp(names[i - 1], names[i]) < 0);
+        found += strcmp(names[i], "sa01") == 0;
+    }
+    assert_int_equal(found, 1);
+    assert_int_equal(robot_list(names, 0), 0);
+    assert_int_equal(robot_list(names, 1), 1);
+}
+
+TEST(test_open) {
+    MildError error = {0};
+    Robot *by_name = robot_open("sa01", &error), *by_folder = robot_open(SA01, &error);
+    assert_non_null(by_name);
+    assert_non_null(by_folder);
+    assert_string_equal(robot_name(by_name), "sa01");
+    assert_string_equal(robot_name(by_folder), "sa01");
+    robot_destroy(by_name);
+    robot_destroy(by_folder);
+}
+
+static void refuse_name(const char *name, MildStatus status, const char *names) {
+    MildError error = {0};
+    assert_null(robot_open(name, &error));
+    assert_error(&error, status, names);
+}
+
+TEST(test_names_refused) {
+    refuse_name("sa02", MILD_ERROR_ARGUMENT, "sa02 sa01");
+    refuse_name("sa0", MILD_ERROR_ARGUMENT, "sa0 sa01");
+    refuse_name("", MILD_ERROR_ARGUMENT, "robot");
+    refuse_name("./no/such", MILD_ERROR_IO, "./no/such/robot.ini");
+    refuse_name(".", MILD_ERROR_IO, "./robot.ini");
+    robot_destroy(NULL);
 }
 
 TEST_MAIN(NULL, NULL)
