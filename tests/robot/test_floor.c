@@ -1,5 +1,5 @@
 /* Shells that stand on rigid ground, by MuJoCo: against mj_step with the geoms of the robot's file
- * on a plane. The batch engine's step is held to this one in engine/test_floor.c. */
+ * on a plane. The batch engine's step is held to this one in engine/test_shells.c. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
