@@ -14,10 +14,6 @@
 
 enum { STEPS = 70, ENVS = 50, SAMPLES = STEPS * ENVS };
 
-static const int mirror_o[] = {0, 2, 1, 4, 3}, mirror_a[] = {1, 0};
-static const float sign_o[] = {-1, 1, 1, -1, -1}, sign_a[] = {-1, -1};
-static const PpoMirror mirror = {mirror_o, sign_o, mirror_a, sign_a};
-
 typedef struct {
     Policy *policy;
     Pool *pool;
@@ -30,6 +26,7 @@ static void case_open(Case *c, double mirror_share, int target) {
     MildError error = {0};
     PolicyDef policy_def = small_def();
     PpoDef def = ppo_def_default();
+    const PpoMirror mirror = small_mirror();
     def.decoder_target = target;
     ppo_set_decoder(&def, 4, 2, &policy_def);
     def.steps = STEPS;

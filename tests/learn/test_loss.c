@@ -14,10 +14,6 @@
 #define ROWS 40
 #define MIRRORED 20
 
-static const int mirror_o[] = {0, 2, 1, 4, 3}, mirror_a[] = {1, 0};
-static const float sign_o[] = {-1, 1, 1, -1, -1}, sign_a[] = {-1, -1};
-static const PpoMirror mirror = {mirror_o, sign_o, mirror_a, sign_a};
-
 static PpoDef reference_def(void) {
     PpoDef def = ppo_def_default();
     def.clip = 0.2;
@@ -35,6 +31,7 @@ typedef struct {
     LossContext context;
     LossChunk chunk;
     LossSums sums;
+    PpoMirror mirror;
     float *parameters, *gradient, *block;
 } Case;
 
@@ -42,6 +39,7 @@ static void case_open(Case *c, PolicyDef policy_def) {
     MildError error = {0};
     memset(c, 0, sizeof *c);
     c->def = reference_def();
+    c->mirror = small_mirror();
     assert_int_equal(network_layout(&c->network, &policy_def, &error), MILD_OK);
     c->parameters = calloc((size_t)c->network.count, sizeof(float));
     c->gradient = calloc((size_t)c->network.count, sizeof(float));
@@ -53,7 +51,7 @@ static void case_open(Case *c, PolicyDef policy_def) {
     c->chunk.mirrored = MIRRORED;
     c->context = (LossContext){.def = &c->def,
                                .network = &c->network,
-                               .mirror = &mirror,
+                               .mirror = &c->mirror,
                                .parameters = c->parameters,
                                .sample_weight = 1.0f / ROWS,
                                .mirror_weight = 1.0f / MIRRORED};
@@ -94,25 +92,6 @@ static void assert_near(const char *what, double ours, double theirs, double tol
 }
 
 /* ---- the loss in double, straight from its formulas ---- */
-
-static void mlp_double(const Mlp *mlp, const double *p, const double *x, double *y) {
-    double in[64], out[64];
-    memcpy(in, x, (size_t)mlp->layer[0].in * sizeof *x);
-    for (int l = 0; l < mlp->layers; l++) {
-        const MlpLayer *layer = &mlp->layer[l];
-        for (int i = 0; i < layer->out; i++) {
-            out[i] = p[layer->bias + i];
-            for (int j = 0; j < layer->in; j++) {
-                out[i] += p[layer->weight + i * layer->in + j] * in[j];
-            }
-            if (l < mlp->layers - 1 && out[i] < 0.0) {
-                out[i] = expm1(out[i]);
-            }
-        }
-        memcpy(in, out, (size_t)layer->out * sizeof *out);
-    }
-    memcpy(y, out, (size_t)mlp->layer[mlp->layers - 1].out * sizeof *y);
-}
 
 /* Numbers that encoder and actor see: of frames that end with the clock, with 0 in its place if
  * they are not to see it. */
@@ -228,7 +207,8 @@ static double loss_double(const Case *c, const double *p, LossSums *sums) {
             int f = i / d->observation * d->observation, k = i % d->observation;
             history[i] = c->chunk.history[r * n->history + i];
             image[i] =
-                (double)sign_o[k] * (double)c->chunk.history[r * n->history + f + mirror_o[k]];
+                (double)c->mirror.observation_sign[k] *
+                (double)c->chunk.history[r * n->history + f + c->mirror.observation_index[k]];
         }
         const float *noise = c->chunk.outputs.noise ? c->chunk.noise + r * d->latent : NULL;
         act_double(n, p, history, noise, heads, mean);
@@ -237,7 +217,8 @@ static double loss_double(const Case *c, const double *p, LossSums *sums) {
         noise = noise && r < MIRRORED ? noise + ROWS * d->latent : noise;
         act_double(n, p, image, noise, heads, turned);
         for (int j = 0; r < MIRRORED && j < d->actions; j++) {
-            const double gap = mean[j] - (double)sign_a[j] * turned[mirror_a[j]];
+            const double gap =
+                mean[j] - (double)c->mirror.action_sign[j] * turned[c->mirror.action_index[j]];
             sums->mirror += gap * gap / d->actions;
             loss += c->def.mirror_weight * gap * gap / (MIRRORED * d->actions);
         }

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "learn/adam.h"
-#include "learn/mlp.h"
 #include "learn/noise.h"
 #include "learn/ppo.h"
 #include "learn/ppo_gradient.h"
@@ -36,33 +35,6 @@ TEST(test_elementwise_functions) {
     assert_true(vector_elu(0.0f) == 0.0f && vector_log(1.0f) == 0.0f && vector_exp(0.0f) == 1.0f);
     assert_true(isnan(vector_elu(NAN)) && isnan(vector_exp(NAN)));
     assert_true(vector_elu(-INFINITY) == -1.0f && vector_elu(1e30f) == 1e30f);
-}
-
-/* A network with softsign, rows of it, from its equations. */
-TEST(test_softsign_network) {
-    enum { ROWS = 5, IN = 3, HIDDEN = 4 };
-    Mlp mlp = {0};
-    const int hidden[POLICY_LAYERS_MAX] = {HIDDEN};
-    float parameters[64], x[ROWS * IN], y[2][ROWS * HIDDEN];
-    assert_true(mlp_layout(&mlp, IN, hidden, 1, 0) <= 64);
-    mlp.activation = MLP_SOFTSIGN;
-    Random random = random_at(31, 0, 0);
-    fill_normal(parameters, 64, 1.0, &random);
-    fill_normal(x, ROWS * IN, 1.0, &random);
-    const MlpOutputs outputs = {{y[0], y[1]}};
-    const float *result = mlp_forward(&mlp, parameters, ROWS, x, IN, &outputs);
-    const MlpLayer *first = &mlp.layer[0], *last = &mlp.layer[1];
-    for (int r = 0; r < ROWS; r++) {
-        double wanted = (double)parameters[last->bias];
-        for (int i = 0; i < HIDDEN; i++) {
-            double sum = (double)parameters[first->bias + i];
-            for (int j = 0; j < IN; j++) {
-                sum += (double)parameters[first->weight + i * IN + j] * (double)x[r * IN + j];
-            }
-            wanted += (double)parameters[last->weight + i] * sum / (1.0 + fabs(sum));
-        }
-        assert_true(fabs((double)result[r] - wanted) < 1e-5);
-    }
 }
 
 /* The noise's angle: sine and cosine of pi a over its whole range. */

@@ -353,14 +353,11 @@ TEST(report_has_means) {
     run_close(&run);
 }
 
-static const int mirror_o[] = {0, 2, 1, 4, 3}, mirror_a[] = {1, 0};
-static const float sign_o[] = {-1, 1, 1, -1, -1}, sign_a[] = {-1, -1};
-static const PpoMirror mirror = {mirror_o, sign_o, mirror_a, sign_a};
-
 /* Half of each shard's samples have an image: five shards of 6 samples, three without any. */
 TEST(mirror_is_averaged_over_the_images) {
     Run run;
     PpoDef def = plain_def();
+    const PpoMirror mirror = small_mirror();
     run_open(&run, def, &mirror);
     run.script.sums.mirror = 0.8; /* times 30 samples: a sum of 24 */
     PpoReport report = update(&run);
@@ -406,17 +403,7 @@ TEST(values_and_explained_variance) {
         assert_close("normalised", (double)b->advantage[i], i % 2 ? 1.0 : -1.0, 1e-6);
         assert_true(b->returns[i] == (float)(i % 2));
     }
-    run_close(&run);
-}
-
-/* With values that carry half of the return the other half remains: 1 - (1/2)^2. */
-TEST(explained_variance_of_half) {
-    Run run;
-    PpoDef def = plain_def();
-    def.gamma = 0.0;
-    run_open(&run, def, NULL);
-    run.script.half_rewards = 1;
-    PpoBatch *b = ppo_batch(run.ppo);
+    run.script.half_rewards = 1; /* the other half remains: 1 - (1/2)^2 */
     for (int i = 0; i < SAMPLES; i++) {
         b->reward[i] = (float)(i * i % 7);
     }
