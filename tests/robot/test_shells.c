@@ -1,5 +1,6 @@
-/* Shells that stand on soft ground carry the robot. That in the air they change no bit of a step is
- * in plugin/test_body.c, that the ground under all bodies only takes energy in test_fallen.c. */
+/* Shells that stand on soft ground carry the robot. That in the air, and where they do not stand,
+ * they change no bit of a step is in plugin/test_body.c and env/test_shells.c, that the ground under
+ * all bodies only takes energy in test_fallen.c. */
 #include "all_robots.h"
 
 #define FILES MILD_SOURCE_DIR "/robots/sa01"
@@ -14,55 +15,6 @@ static void hold_pose(const Robot *robot, const RobotSim *sim, double stiffness,
         torque[j] = stiffness * effort[j] * (error - 0.03 * robot_sim_qvel(sim)[6 + j]);
         torque[j] = fmax(fmin(torque[j], effort[j]), -effort[j]);
     }
-}
-
-/* ---- a variation without ---- */
-
-/* Positions after a limp robot has fallen, and the greatest load on its shells [N]. */
-static void fall_limp(Robot *robot, int shells, const RobotVariation *variation,
-                      double qpos[ROBOT_NQ_MAX], double *load) {
-    Random random = random_at(1, 0, 5);
-    robot_set_shells(robot, shells);
-    RobotSim *sim = robot_sim_create(robot, 0.0025, NULL);
-    MildGround *ground = kit_ground(robot);
-    MildTerrain terrain = kit_terrain("foam45");
-    const double torque[ROBOT_JOINTS_MAX] = {0};
-    const RobotState state = random_pose(robot, 0.25, &random);
-    robot_sim_load(sim, &state, variation);
-    *load = 0;
-    for (int s = 0; s < 80; s++) {
-        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
-        *load = fmax(*load, robot_sim_shell_load(sim));
-    }
-    memcpy(qpos, robot_sim_qpos(sim), ROBOT_NQ_MAX * sizeof *qpos);
-    free(ground);
-    robot_sim_destroy(sim);
-}
-
-/* On either ground no bit differs from a robot without shells. */
-TEST(a_variation_has_none) {
-    for (int k = 0; k < 2 * ROBOTS; k++) {
-        double without[ROBOT_NQ_MAX], none[ROBOT_NQ_MAX], with[ROBOT_NQ_MAX], load;
-        RobotVariation variation = robot_variation_nominal();
-        variation.rigid = k & 1;
-        fall_limp(robots[k / 2], 0, &variation, without, &load);
-        fall_limp(robots[k / 2], 1, &variation, with, &load);
-        assert_true(load > 10);
-        assert_memory_not_equal(with, without, sizeof with);
-        variation.shells_stand = 0;
-        fall_limp(robots[k / 2], 1, &variation, none, &load);
-        assert_memory_equal(none, without, sizeof none);
-        assert_true(load == 0);
-    }
-}
-
-/* A concentric model has one element for a sole, and none for a shell. */
-TEST(concentric_models_have_none) {
-    robot_set_shells(robots[0], 1);
-    robot_set_model(robots[0], MILD_MODEL_CON_CONE);
-    assert_int_equal(robot_bodies(robots[0]), robot_feet(robots[0]));
-    robot_set_model(robots[0], MILD_MODEL_MILD);
-    assert_true(robot_bodies(robots[0]) > robot_feet(robots[0]));
 }
 
 /* The law under a shell is that of the feet's elements, whatever the distance of its own; its area

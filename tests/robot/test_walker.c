@@ -75,29 +75,25 @@ static int teardown(void **unused) {
 
 /* ---- what is known of it ---- */
 
+/* What is found out about the joints, and what the table of the task has of robot.ini. */
 TEST(test_joints) {
+    const RobotTable *table = robot_table(robot);
     const int foot[JOINTS] = {-1, ROUND, ROUND, FLAT, FLAT, FLAT, -1};
     const int image[JOINTS] = {0, 4, 5, 3, 1, 2, 6};
-    const double sign[JOINTS] = {-1, 1, 1, 1, 1, 1, -1};
-    const double pose[JOINTS] = {0, 0.5, -0.25, -0.2, 0.4, -0.2, 0};
     const double effort[JOINTS] = {50, 60, 33, 50, 50, 0.5, 50};
-    const double swing[JOINTS] = {0, 2, -1, -1, 2, -1, 0}, still[JOINTS] = {1, 0, 0, 0, 0, 0, 1};
+    const double pose[JOINTS] = {0, 0.5, -0.25, -0.2, 0.4, -0.2, 0};
+    const double swing[JOINTS] = {0, 2, -1, -1, 2, -1, 0};
     for (int i = 0; i < JOINTS; i++) {
         assert_int_equal(robot_joint_dof(robot)[i], dof_of[i]);
         assert_int_equal(robot_joint_foot(robot)[i], foot[i]);
         assert_int_equal(robot_mirror_joint(robot)[i], image[i]);
-        expect_entry("mirror_sign", i, robot_mirror_sign(robot)[i], sign[i], 0);
-        expect_entry("pose", i, robot_default_pose(robot)[i], pose[i], 0);
         expect_entry("low", i, robot_joint_low(robot)[i], i == 2 ? -1.5 : -2, 0);
         expect_entry("high", i, robot_joint_high(robot)[i], i == 2 ? 1.4 : 2, 0);
-        expect_entry("effort", i, robot_effort(robot)[i], effort[i], 0);
-        expect_entry("speed", i, robot_speed(robot)[i], i + 1, 0);
-        expect_entry("kp", i, robot_kp(robot)[i], i + 1, 0);
-        expect_entry("kd", i, robot_kd(robot)[i], 0.1 * (i + 1), 1e-12);
-        expect_entry("stand_kp", i, robot_stand_kp(robot)[i], i + 1, 0);
-        expect_entry("stand_kd", i, robot_stand_kd(robot)[i], 0.1 * (i + 1), 1e-12);
-        expect_entry("swing", i, robot_swing(robot)[i], swing[i], 0);
-        expect_entry("still", i, robot_table(robot)->still[i], still[i], 0);
+        expect_entry("effort", i, table->effort[i], effort[i], 0);
+        expect_entry("pose", i, table->default_pose[i], pose[i], 0);
+        expect_entry("speed", i, table->speed[i], i + 1, 0);
+        expect_entry("swing", i, table->swing[i], swing[i], 0);
+        expect_entry("still", i, table->still[i], i == 0 || i == JOINTS - 1, 0);
     }
 }
 
