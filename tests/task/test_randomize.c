@@ -307,31 +307,39 @@ TEST(ranges_of_grounds) {
     free(env);
 }
 
-/* k_D and b_D from ranges move no other draw; passive = false leaves c_g and c_d as drawn, those of
- * presets too. */
-TEST(drift_and_energy) {
+/* The ground of the same episode with other keys. */
+static MildMaterial drawn_with(const TaskDef *with) {
+    task_env_draw(env, with, robot);
+    return task_env_rest(env)->terrain.materials[0];
+}
+
+/* k_D and b_D from ranges, and slip that costs support on the share that was asked for of the
+ * grounds that stay dented, move no other draw; passive = false leaves c_g and c_d as drawn, those
+ * of presets too. */
+TEST(drift_energy_and_slip) {
     open_env();
     clear_columns();
     def.randomize.rigid_share = 0;
     def.randomize.preset_jitter = 0.02;
-    TaskDef wide = def;
+    TaskDef wide = def, slips = def;
     const double k_drift[2] = {50, 900}, b_drift[2] = {0.02, 0.2};
+    const double length[2] = {0.002, 0.003}, grip[2] = {0.1, 0.15};
     memcpy(wide.randomize.k_drift, k_drift, sizeof k_drift);
     memcpy(wide.randomize.b_drift, b_drift, sizeof b_drift);
     wide.randomize.passive = 0;
-    int drawn = 0, apart = 0;
+    slips.randomize.preset_share = 0;
+    slips.randomize.slip_share = 0.4;
+    memcpy(slips.randomize.slip_length, length, sizeof length);
+    memcpy(slips.randomize.grip, grip, sizeof grip);
+    int drawn = 0, dented = 0, slipping = 0;
     for (int t = 0; t < DRAWS; t++) {
         draw_next();
-        const MildMaterial plain = task_env_rest(env)->terrain.materials[0];
+        MildMaterial plain = task_env_rest(env)->terrain.materials[0], m = drawn_with(&wide);
         double factor[7];
-        assert_true(plain.passive);
-        task_env_draw(env, &wide, robot);
-        MildMaterial m = task_env_rest(env)->terrain.materials[0];
-        assert_false(m.passive);
+        assert_true(plain.passive && !m.passive);
         if (preset_of(&plain, factor) < 0) {
             note("k_drift", -1, 50, 900, m.k_drift);
             note("b_drift", -1, 0.02, 0.2, m.b_drift);
-            apart += fabs((m.k_drift - 50) / 850 - (m.b_drift - 0.02) / 0.18) > 0.01;
             m.k_drift = plain.k_drift;
             m.b_drift = plain.b_drift;
             drawn++;
@@ -340,44 +348,26 @@ TEST(drift_and_energy) {
         assert_memory_equal(&m, &plain, sizeof m);
     }
     expect_columns();
-    assert_true(drawn > DRAWS / 3 && apart > 0.95 * drawn);
-    free(env);
-}
-
-/* Slip costs support on the share that was asked for of the grounds that stay dented, and moves no
- * other draw. */
-TEST(slip_on_a_share) {
-    open_env();
+    assert_true(drawn > DRAWS / 3);
     clear_columns();
-    def.randomize.rigid_share = def.randomize.preset_share = 0;
-    TaskDef slips = def;
-    const double length[2] = {0.002, 0.003}, grip[2] = {0.1, 0.15};
-    slips.randomize.slip_share = 0.4;
-    memcpy(slips.randomize.slip_length, length, sizeof length);
-    memcpy(slips.randomize.grip, grip, sizeof grip);
-    int dented = 0, slipping = 0, apart = 0;
+    def.randomize.preset_share = 0;
     for (int t = 0; t < DRAWS; t++) {
         draw_next();
-        const MildMaterial plain = task_env_rest(env)->terrain.materials[0];
+        MildMaterial plain = task_env_rest(env)->terrain.materials[0], m = drawn_with(&slips);
         assert_true(plain.slip_length == 0 && plain.grip == 0);
-        task_env_draw(env, &slips, robot);
-        MildMaterial m = task_env_rest(env)->terrain.materials[0];
         dented += m.recovery <= 0.2;
         if (m.slip_length > 0) {
             assert_true(m.recovery <= 0.2);
             note("slip_length", -1, 0.002, 0.003, m.slip_length);
             note("grip", -1, 0.1, 0.15, m.grip);
-            apart += fabs((m.slip_length - 0.002) / 0.001 - (m.grip - 0.1) / 0.05) > 0.01;
-            m.slip_length = plain.slip_length;
-            m.grip = plain.grip;
+            m.slip_length = m.grip = 0;
             slipping++;
         }
         assert_memory_equal(&m, &plain, sizeof m);
     }
     expect_columns();
-    assert_true(dented > DRAWS / 6 && apart > 0.95 * slipping);
-    double share = (double)slipping / dented;
-    assert_true(fabs(share - 0.4) < 4 * sqrt(0.4 * 0.6 / dented));
+    assert_true(dented > DRAWS / 6);
+    expect_share("slip", slipping, dented, 0.4);
     free(env);
 }
 
@@ -664,46 +654,29 @@ TEST(commands_that_grow) {
     rig_close(&rig);
 }
 
-/* What the last episode left is gone. */
+/* What the last episode left is gone: every byte is as in an environment that has none, but for the
+ * level of help and the highest command, which live on. */
 TEST(nothing_is_left) {
-    Rig rig;
     TaskDef start_def = task_def_default();
-    rig_open(&rig, &start_def, 11, 0);
-    task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
     const float action[SA01_JOINTS] = {1, 2, 3};
+    Rig rig, fresh;
+    rig_open(&rig, &start_def, 11, 0);
+    rig_open(&fresh, &start_def, 11, 0);
+    task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
     for (int t = 0; t < 5; t++) {
         rig_step(&rig, action);
         rig.env->push[t] = rig.env->air_time[0] = rig.env->air_time[1] = 0.3;
     }
-    rig.env->assist_level = 0.7;
-    rig.env->command_most = 2;
+    rig.env->assist_level = fresh.env->assist_level = 0.7;
+    rig.env->command_most = fresh.env->command_most = 2;
+    fresh.env->tick = rig.env->tick;
     task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
-    for (int i = 0; i < 6; i++) {
-        expect_entry("push", i, rig.env->push[i], 0, 0);
-    }
-    for (int i = 0; i < 3; i++) {
-        expect_entry("smooth", i, rig.env->smooth_velocity[i], 0, 0);
-        expect_entry("command_seen", i, rig.env->command_seen[i], rig.env->command[i], 0);
-        for (int k = 0; k < SA01_JOINTS; k++) {
-            expect_entry("action", k, (double)rig.env->action[i][k], 0, 0);
-        }
-    }
-    for (int i = 0; i < SA01_JOINTS; i++) {
-        expect_entry("joint_speed", i, rig.env->joint_speed[i], 0, 0);
-    }
-    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
-        expect_entry("term_sum", i, rig.env->term_sum[i], 0, 0);
-    }
-    expect_near("air_time", rig.env->air_time[0] + rig.env->air_time[1], 0, 0);
-    expect_near("reward_sum", rig.env->reward_sum, 0, 0);
-    expect_near("speed_error_sum", rig.env->speed_error_sum, 0, 0);
-    expect_near("the level of help lives on", rig.env->assist_level, 0.7, 0);
-    expect_near("and the highest command", rig.env->command_most, 2, 0);
-    MildGround *fresh = aligned_alloc(64, mild_ground_size(task_env_ground(rig.env)));
-    mild_ground_init_imprints(fresh, robot_soles(robot), SA01_FEET, 0);
-    assert_memory_equal(fresh, task_env_ground(rig.env), mild_ground_size(fresh));
-    free(fresh);
+    task_env_reset(fresh.env, &fresh.def, robot, fresh.sim, &fresh.view);
+    memset(rig.env->torque, 0, sizeof rig.env->torque); /* is written before it is read */
+    rig.env->oldest = fresh.env->oldest;                /* all frames of the ring are the same */
+    assert_memory_equal(rig.env, fresh.env, task_env_bytes(&rig.def, robot));
     rig_close(&rig);
+    rig_close(&fresh);
 }
 
 /* eval and play: yaw 0, the command stays, the episode begins at its start. */
