@@ -125,15 +125,6 @@ TEST(singular_values_come_near_one) {
     }
 }
 
-/* Gradients 1 and -2, by hand: momentum 1, then 0.95 - 2; with Nesterov's look ahead. */
-TEST(direction_looks_ahead) {
-    float momentum = 0.0f;
-    assert_true(fabs((double)muon_direction(1.0f, &momentum) - 1.95) < 1e-6);
-    assert_true(momentum == 1.0f);
-    assert_true(fabs((double)muon_direction(-2.0f, &momentum) + 2.9975) < 1e-6);
-    assert_true(fabs((double)momentum + 1.05) < 1e-6);
-}
-
 /* One direction becomes f(1) long and makes no other; nothing stays nothing. */
 TEST(directions_that_are_missing_stay_so) {
     const MuonMatrix m = {.rows = 12, .columns = 30};

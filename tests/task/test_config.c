@@ -75,6 +75,15 @@ TEST(refused) {
     def.randomize.rigid_share = 0.6;
     check_bad_task(&def, "rigid_share preset_share 1");
     def = task_def_default();
+    def = task_def_default();
+    def.shells_stand = 0; /* which a lying robot needs */
+    def.start = TASK_START_BACK;
+    check_bad_task(&def, "task.start task.shells_stand");
+    def.start = TASK_START_STAND;
+    def.may_lie = 1;
+    check_bad_task(&def, "task.may_lie task.shells_stand");
+    def = task_def_default();
+    def.shells_stand = 0;
     def.randomize.rigid_share = 0.5;
     def.vx[0] = def.vx[1];
     assert_int_equal(task_def_check(&def, &error), MILD_OK);

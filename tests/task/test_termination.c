@@ -127,27 +127,6 @@ TEST(base_touches) {
     rig_close(&rig);
 }
 
-/* A robot may lie in the episodes in which its shells stand. */
-TEST(lies_where_shells_stand) {
-    open_limp();
-    rig.def.may_lie = 1;
-    robot_set_shells(robot, 1);
-    for (int stand = 0; stand < 2; stand++) {
-        rig.env->variation.shells_stand = stand;
-        RobotState state = kit_state(2);
-        kit_turn(state.qpos, 0.7, 0, 1.5);
-        expect_cause("tilted", step_from(&state, 10), !stand, TASK_END_tilt);
-        state = folded();
-        rig.def.tilt_limit = 3.1;
-        kit_turn(state.qpos, 0.3, -1.0, 0.1);
-        state.qpos[2] -= 1e-2 + lowest_of_box(&state, "base_link_box");
-        expect_cause("on its back", step_from(&state, 10), !stand, TASK_END_base);
-        rig.def.tilt_limit = 1;
-    }
-    robot_set_shells(robot, 0);
-    rig_close(&rig);
-}
-
 /* One knee on the ground, the other leg stretched up and forward. */
 static void shank_touches(int leg, const char *box) {
     open_limp();
