@@ -275,15 +275,13 @@ TEST(test_missing) {
         snprintf(names, sizeof names, "[robot] %s", robot[i]);
         refuse(line, "\n; = ", names);
     }
-    static const char *const foot[] = {"body", "knee", "mirror", "offset", "shape"};
+    static const char *const foot[][2] = {{"body = rf\n", "[foot.r] body"},
+                                          {"knee = rk\n", "[foot.r] knee"},
+                                          {"mirror = l\n", "[foot.r] mirror"},
+                                          {"offset = 0.75\n", "[foot.r] offset"},
+                                          {"shape = round\n", "[foot.r] shape"}};
     for (int i = 0; i < 5; i++) {
-        char line[64], names[64];
-        snprintf(line, sizeof line, "\n%s = ", foot[i]);
-        const char *at = strstr(strstr(plain, "[foot.r]"), line);
-        snprintf(edited, sizeof edited, "%.*s\n; = %s", (int)(at - plain), plain,
-                 at + strlen(line));
-        snprintf(names, sizeof names, "[foot.r] %s", foot[i]);
-        refuse_text(edited, names);
+        refuse(foot[i][0], "", foot[i][1]);
     }
     const char *feet = strstr(plain, "[foot.l]");
     snprintf(edited, sizeof edited, "%.*s", (int)(feet - plain), plain);

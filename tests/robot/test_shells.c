@@ -101,24 +101,6 @@ static Robot *with_mesh(const char *faces, MildError *error) {
     return robot;
 }
 
-/* [N] on the shells after a step in some deep pose. */
-static double load_in(Robot *robot, uint32_t draw) {
-    Random random = random_at(1, 0, draw);
-    const RobotVariation nominal = robot_variation_nominal();
-    robot_set_shells(robot, 1);
-    RobotSim *sim = robot_sim_create(robot, 0.0025, NULL);
-    MildGround *ground = kit_ground(robot);
-    MildTerrain terrain = kit_terrain("foam45");
-    double torque[ROBOT_JOINTS_MAX] = {0};
-    const RobotState state = random_pose(robot, 0.25, &random);
-    robot_sim_load(sim, &state, &nominal);
-    assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
-    const double load = robot_sim_shell_load(sim);
-    free(ground);
-    robot_sim_destroy(sim);
-    return load;
-}
-
 /* Corner c of the box of a shell [m]. */
 static void corner_of(const RobotShell *shell, int c, double at[3]) {
     const double way[3] = {(c & 1 ? 1 : -1) * shell->half[0], (c & 2 ? 1 : -1) * shell->half[1],
@@ -127,7 +109,7 @@ static void corner_of(const RobotShell *shell, int c, double at[3]) {
     mju_addTo3(at, shell->center);
 }
 
-/* Same corners, same area, same load as the box that it is. */
+/* Same corners, same area as the box that it is, on the same limb. */
 TEST(a_mesh_is_a_shell) {
     MildError error = {0};
     Robot *mesh = with_mesh("0 2 1  0 3 2  4 5 6  4 6 7  0 1 5  0 5 4  1 2 6  1 6 5  2 3 7  2 7 6  "
@@ -146,21 +128,13 @@ TEST(a_mesh_is_a_shell) {
         }
         assert_true(nearest < 1e-6);
     }
-    double load = 0, apart = 0;
-    for (uint32_t i = 0; i < 40; i++) {
-        const double a = load_in(robots[0], i);
-        load += a / 40;
-        apart += fabs(a - load_in(mesh, i)) / 40;
-    }
+    robot_set_shells(mesh, 1);
     const MildSole *surface = robot_soles(mesh)[shell->limb];
     double area = 0;
     for (int i = 0; i < mild_sole_elements(surface); i++) {
         area += mild_sole_surface_area(surface)[i];
     }
-    area /= 4 * 0.05 * 0.28 + 2 * 0.05 * 0.05;
-    print_message("area off by %.1e, a load of %.0f N by %.2f %%\n", area - 1, load,
-                  100 * apart / load);
-    assert_true(fabs(area - 1) < 1e-5 && load > 100 && apart < 0.05 * load);
+    expect_near("area", area / (4 * 0.05 * 0.28 + 2 * 0.05 * 0.05), 1, 1e-5);
     robot_destroy(mesh);
 }
 
