@@ -2,7 +2,7 @@
  * over 10^4 episodes, shares within their binomial bounds; the sinkage limit; model matching; the
  * start; commands. */
 #include "sa01.h"
-#include "task_oracle.h"
+#include "task_kit.h"
 
 enum { DRAWS = 10000, COLUMNS_MAX = 160 };
 
