@@ -57,17 +57,26 @@ static const char ini[] =
 static const int dof_of[JOINTS] = {12, 11, 10, 9, 8, 7, 6};
 
 static Robot *robot;
+static RobotSim *sim; /* at 1 ms */
+static MildGround *ground;
+static RobotVariation nominal;
 
 static int setup(void **unused) {
     (void)unused;
     MildError error = {0};
     robot = kit_robot_of("walker.xml", mjcf, ini, &error);
     expect_good(robot && !error.text[0], &error);
+    sim = robot_sim_create(robot, 0.001, &error);
+    expect_good(sim != NULL, &error);
+    ground = kit_ground(robot);
+    nominal = robot_variation_nominal();
     return 0;
 }
 
 static int teardown(void **unused) {
     (void)unused;
+    free(ground);
+    robot_sim_destroy(sim);
     robot_destroy(robot);
     return 0;
 }
@@ -122,9 +131,6 @@ TEST(test_stand_height) {
     double flat = 0.1 + 0.6 * cos(0.2) + 0.05;
     double ball = 0.1 + 0.6 * cos(0.25) + 0.03 * cos(0.25) + 0.01 * sin(0.25) + 0.04;
     expect_entry("stand height", 0, robot_stand_height(robot), fmax(flat, ball), 1e-12);
-    MildError error = {0};
-    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
-    assert_non_null(sim);
     expect_entry("lowest sole", 0,
                  fmin(robot_sim_foot(sim, 0)->sole_height, robot_sim_foot(sim, 1)->sole_height), 0,
                  1e-12);
@@ -132,7 +138,6 @@ TEST(test_stand_height) {
                  robot_stand_height(robot) - flat, 1e-12);
     expect_entry("ball", 0, robot_sim_foot(sim, ROUND)->sole_height,
                  robot_stand_height(robot) - ball, 1e-12);
-    robot_sim_destroy(sim);
 }
 
 /* A round foot is a disc of the sphere's cross section; rasters whatever the model. */
@@ -191,8 +196,6 @@ static void check_rigid_ground(const mjModel *m) {
 /* What a step does not need is not in its model: one plane, the feet's corners and one geom of each
  * body with shells remain. */
 TEST(test_models) {
-    MildError error = {0};
-    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
     const mjModel *m = robot_sim_model(sim), *whole = robot_visual_model(robot);
     assert_int_equal(whole->ngeom, 9);
     assert_int_equal(whole->nu, 1);
@@ -214,7 +217,6 @@ TEST(test_models) {
         }
     }
     check_rigid_ground(m);
-    robot_sim_destroy(sim);
 }
 
 /* ---- against the engine ---- */
@@ -313,7 +315,7 @@ static MildTerrain sunk(MildMap *map) {
 
 /* The feet of a workspace at a state, its clearance above the ground already measured. Returns the
  * lowest point of a sole [m]. */
-static double check_feet(RobotSim *sim, const RobotState *state, const MildTerrain *terrain) {
+static double check_feet(const RobotState *state, const MildTerrain *terrain) {
     const mjModel *m = robot_sim_model(sim);
     const double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     mjData *d = engine_at(m, state);
@@ -348,10 +350,6 @@ static double check_feet(RobotSim *sim, const RobotState *state, const MildTerra
 
 /* After a load, and after a step through the air. */
 TEST(test_feet) {
-    MildError error = {0};
-    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
-    RobotVariation nominal = robot_variation_nominal();
-    MildGround *ground = kit_ground(robot);
     MildMap *map = waves();
     for (uint32_t draw = 0; draw < 20; draw++) {
         const MildTerrain terrain = sunk(draw % 2 ? map : NULL);
@@ -359,14 +357,12 @@ TEST(test_feet) {
         RobotState state = draw_state(draw, 1);
         robot_sim_load(sim, &state, &nominal);
         const double clearance = robot_sim_sole_clearance(sim, &terrain);
-        expect_entry("clearance", 0, clearance, check_feet(sim, &state, &terrain), 1e-12);
+        expect_entry("clearance", 0, clearance, check_feet(&state, &terrain), 1e-12);
         assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
         robot_sim_store(sim, &state);
-        check_feet(sim, &state, &terrain);
+        check_feet(&state, &terrain);
     }
-    free(ground);
     mild_map_destroy(map);
-    robot_sim_destroy(sim);
 }
 
 /* A ground that answers each step with given wrenches and keeps what the step asked of it: the
@@ -395,9 +391,8 @@ static int given_solve(void *self, const MildTerrain *terrain, MildGround *groun
 }
 
 /* A step without torques from a state, on this ground. Returns whether it diverged. */
-static int given_step(Given *given, RobotSim *sim, const RobotState *state) {
+static int given_step(Given *given, const RobotState *state) {
     static const double limp[ROBOT_JOINTS_MAX];
-    const RobotVariation nominal = robot_variation_nominal();
     const MildMaterial material = mild_material_default();
     const MildTerrain terrain = mild_terrain_uniform(&material);
     const RobotGround ground = {given_solve, given};
@@ -410,12 +405,11 @@ static int given_step(Given *given, RobotSim *sim, const RobotState *state) {
 
 /* What wrenches of the ground do, after a step without. j: J of both feet, solved: its rows times
  * M^-1. */
-static void check_wrench(RobotSim *sim, const RobotState *state, const double *j,
-                         const double *solved) {
+static void check_wrench(const RobotState *state, const double *j, const double *solved) {
     Given given = {.feet = 0};
     const mjData *d = robot_sim_data(sim);
     double by_force[NV], by_change[NV], force[NV], rate[NV], sum[ROWS];
-    assert_int_equal(given_step(&given, sim, state), 0);
+    assert_int_equal(given_step(&given, state), 0);
     memcpy(force, d->qfrc_smooth, sizeof force);
     memcpy(rate, d->qvel, sizeof rate);
     mju_mulMatVec(sum, j, rate, ROWS, NV);
@@ -425,7 +419,7 @@ static void check_wrench(RobotSim *sim, const RobotState *state, const double *j
     for (int r = 0; r < ROWS; r++) {
         given.wrench[r / 6][r % 6] = sin(1.0 + r);
     }
-    assert_int_equal(given_step(&given, sim, state), 0);
+    assert_int_equal(given_step(&given, state), 0);
     mju_mulMatTVec(by_force, j, given.wrench[0], ROWS, NV);
     mju_mulMatTVec(by_change, solved, given.wrench[0], ROWS, NV);
     for (int i = 0; i < NV; i++) {
@@ -436,14 +430,12 @@ static void check_wrench(RobotSim *sim, const RobotState *state, const double *j
 }
 
 TEST(test_map) {
-    MildError error = {0};
-    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
     const mjModel *m = robot_sim_model(sim);
     Given given = {.feet = 0};
     for (uint32_t draw = 0; draw < 20; draw++) {
         RobotState state = draw_state(draw, 1);
         mjData *d = engine_at(m, &state);
-        assert_int_equal(given_step(&given, sim, &state), 0);
+        assert_int_equal(given_step(&given, &state), 0);
         double j[ROWS * NV], solved[ROWS * NV], wanted[ROWS * ROWS];
         dense_jacobian(m, d, j);
         mj_solveM(m, d, solved, j, ROWS);
@@ -452,22 +444,18 @@ TEST(test_map) {
             expect_entry("inverse inertia", i, given.inverse_inertia[i], wanted[i],
                          1e-10 * (1 + fabs(wanted[i])));
         }
-        check_wrench(sim, &state, j, solved);
+        check_wrench(&state, j, solved);
         mj_deleteData(d);
     }
-    robot_sim_destroy(sim);
 }
 
 /* In the air on soft ground, and falling onto rigid ground, pushed, with a joint beyond its limit:
  * the engine's own step, under xfrc_applied. */
 static void step_is_the_engines(int rigid, double height, int steps) {
-    MildError error = {0};
-    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
     RobotVariation variation = robot_variation_nominal();
     variation.rigid = rigid;
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
-    MildGround *ground = kit_ground(robot);
     const mjModel *m = robot_sim_model(sim);
     const double push[6] = {30, -45, 40, -5, 6, -7};
     const int base = mj_name2id(m, mjOBJ_BODY, "torso");
@@ -510,8 +498,6 @@ static void step_is_the_engines(int rigid, double height, int steps) {
                   rigid ? "rigid" : "soft, in the air", worst, contacts[0], contacts[1]);
     assert_true(worst < 1e-9);
     assert_true(rigid ? contacts[0] > 20 && contacts[1] > 20 : contacts[0] + contacts[1] == 0);
-    free(ground);
-    robot_sim_destroy(sim);
 }
 
 TEST(test_steps) {
@@ -537,9 +523,6 @@ static double lowest_of(const mjModel *m, const mjData *d, const char *name, dou
 
 TEST(test_shells) {
     static const char *const names[3] = {"chest", "belt", "bone"};
-    MildError error = {0};
-    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
-    RobotVariation nominal = robot_variation_nominal();
     MildMap *map = waves();
     const MildTerrain terrain = sunk(map);
     const mjModel *m = robot_visual_model(robot);
@@ -569,7 +552,6 @@ TEST(test_shells) {
                   least_of[2]);
     assert_true(least_of[0] > 5 && least_of[1] > 5 && least_of[2] > 5);
     mild_map_destroy(map);
-    robot_sim_destroy(sim);
 }
 
 /* ---- refusals ---- */
