@@ -77,7 +77,7 @@ static void refuse(const FitDef *def, int count, MildStatus status, const char *
 
 #define SHAPE_AND_MASS "alpha nu c_g c_d phi rho"
 
-static double is_near(FitResult *result, const char *name, double truth) {
+static void is_near(FitResult *result, const char *name, double truth) {
     const FitValue *value = value_of(result, name);
     const double error = fabs(value->value / truth - 1);
     if (value->state != FIT_FITTED || !(error < 1e-4) || value->low > truth ||
@@ -85,7 +85,6 @@ static double is_near(FitResult *result, const char *name, double truth) {
         fail_msg("%s = %g in %g .. %g, state %d, not %g", name, value->value, value->low,
                  value->high, (int)value->state, truth);
     }
-    return error;
 }
 
 /* Without noise and with nothing held, the truth comes back as far as a slow press determines it:
@@ -93,7 +92,6 @@ static double is_near(FitResult *result, const char *name, double truth) {
 TEST(exact) {
     static const char *const undetermined[] = {"sigma_cone", "alpha", "nu", "c_g",
                                                "c_d",        "phi",   "rho"};
-    double worst = 0;
     for (int g = 0; g < PAPER_PRESETS; g++) {
         const FitDef truth = plate(mild_material_preset_name(g));
         FitDef def = {.plate = {truth.plate[0]}, .plates = 1, .material = mild_material_default()};
@@ -101,17 +99,15 @@ TEST(exact) {
         def.material.bed_depth = 10;
         press_exactly(&truth, points, ROWS, 0.04, 0.01, 0);
         FitResult result = run(&def, ROWS);
-        worst = fmax(worst, is_near(&result, "k_pen", m->k_pen));
-        worst =
-            fmax(worst, is_near(&result, "sigma_cone/cos(alpha)", m->sigma_cone / cos(m->alpha)));
-        worst = fmax(worst, is_near(&result, "tan(alpha)/nu", tan(m->alpha) / m->nu));
+        is_near(&result, "k_pen", m->k_pen);
+        is_near(&result, "sigma_cone/cos(alpha)", m->sigma_cone / cos(m->alpha));
+        is_near(&result, "tan(alpha)/nu", tan(m->alpha) / m->nu);
         for (int i = 0; i < 7; i++) {
             const FitValue *value = value_of(&result, undetermined[i]);
             assert_int_equal(value->state, FIT_TIED);
             assert_true(isnan(value->value) && isnan(value->low) && isnan(value->high));
         }
     }
-    printf("no noise, nothing held: worst error %.1e\n", worst);
 }
 
 /* What is held turns the combinations into parameters: with alpha both parts of the cone, with phi
@@ -239,8 +235,6 @@ TEST(plates) {
             points[i].plate = 1;
         }
         result = run(&truth, 2 * ROWS);
-        print_message("%s: residual with one plate for both %.2f of the force\n", grounds[g],
-                      result.residual_share);
         assert_true(result.residual_share > 0.1);
     }
 }
@@ -343,8 +337,6 @@ TEST(merged_plates) {
     assert_true(result.residual_share < 1e-6);
     def.material.model = MILD_MODEL_MILD;
     result = run(&def, 2 * ROWS);
-    print_message("discs on the record of merged cones: residual %.3f of the force\n",
-                  result.residual_share);
     assert_true(result.residual_share > 0.01);
     mild_sole_destroy(soles[0]);
     mild_sole_destroy(soles[1]);
@@ -375,9 +367,9 @@ TEST(interval_linear) {
         const FitValue *k_pen = value_of(&result, "k_pen");
         const double low = (k_pen->value - k_pen->low) / half,
                      high = (k_pen->high - k_pen->value) / half;
-        printf("a spring: half widths %.4f and %.4f of the formula's\n", low, high);
-        assert_true(fabs(k_pen->value / (xy / xx) - 1) < 1e-9);
-        assert_true(fabs(low - 1) < 5e-3 && fabs(high - 1) < 5e-3);
+        expect_near("value", k_pen->value / (xy / xx), 1, 1e-9);
+        expect_near("half width below", low, 1, 5e-3);
+        expect_near("half width above", high, 1, 5e-3);
     }
 }
 
@@ -399,9 +391,8 @@ TEST(interval_many) {
     FitResult result = fit_of(&truth, many, COUNT);
     const FitValue *k_pen = value_of(&result, "k_pen");
     const double half = 1.95996 * sqrt((yy - xy * xy / xx) / COUNT / xx);
-    printf("50 000 rows: %.4f of the width\n", (k_pen->high - k_pen->low) / (2 * half));
-    assert_true(fabs(k_pen->value / (xy / xx) - 1) < 1e-6);
-    assert_true(fabs((k_pen->high - k_pen->low) / (2 * half) - 1) < 0.03);
+    expect_near("value", k_pen->value / (xy / xx), 1, 1e-6);
+    expect_near("width", (k_pen->high - k_pen->low) / (2 * half), 1, 0.03);
     assert_true(result.points == COUNT && fabs(result.rows / COUNT - 1) < 1e-9);
 
     /* fifty records of a curve: no mean is of the end of one and the start of the next */
@@ -410,8 +401,7 @@ TEST(interval_many) {
         press_exactly(&truth, many + record * ROWS, ROWS, 0.04, 0.01, 0);
     }
     result = fit_of(&truth, many, COUNT);
-    printf("fifty records: residual %.1e of the force\n", result.residual_share);
-    assert_true(result.residual_share < 1e-6);
+    expect_near("residual of fifty records", result.residual_share, 0, 1e-6);
 }
 
 /* Least sum of squares of a slow press for a given u_f, and the coefficients: the force is linear
@@ -456,12 +446,10 @@ TEST(interval_profile) {
     }
     FitResult result = run(&truth, ROWS);
     const FitValue *shape = value_of(&result, "tan(alpha)/nu");
-    printf("tan(alpha)/nu %.4f in %.4f .. %.4f; a search finds %.4f in %.4f .. %.4f\n",
-           shape->value, shape->low, shape->high, best / R, end[0] / R, end[1] / R);
     assert_int_equal(shape->state, FIT_FITTED);
-    assert_true(fabs(shape->value / (best / R) - 1) < 1e-3);
-    assert_true(fabs((shape->value - shape->low) / (best - end[0]) * R - 1) < 0.05);
-    assert_true(fabs((shape->high - shape->value) / (end[1] - best) * R - 1) < 0.05);
+    expect_near("value", shape->value / (best / R), 1, 1e-3);
+    expect_near("below", (shape->value - shape->low) / (best - end[0]) * R, 1, 0.05);
+    expect_near("above", (shape->high - shape->value) / (end[1] - best) * R, 1, 0.05);
     assert_true(shape->high - shape->value > 1.05 * (shape->value - shape->low));
 }
 
@@ -496,7 +484,6 @@ TEST(undetermined) {
         assert_int_equal(value_of(&result, "alpha")->state, FIT_TIED);
         fitted += value_of(&result, "tan(alpha)/nu")->state == FIT_FITTED;
     }
-    printf("2 mm deep: tan(alpha)/nu seems to be determined in %d of 20\n", fitted);
     assert_true(fitted <= 4);
 }
 
@@ -557,9 +544,8 @@ TEST(neighbours) {
     FitResult slow = run(&def, ROWS);
     press(&def, points, ROWS, 0.04, 0.01, NOISE_OF_PEAK, 5);
     FitResult white = run(&def, ROWS);
-    printf("slow noise: correlation %.3f, %.0f rows of %d\n", slow.neighbours, slow.rows, ROWS);
-    assert_true(fabs(slow.neighbours - 0.8) < 0.06);
-    assert_true(fabs(slow.rows / (ROWS / 9.0) - 1) < 0.35);
+    expect_near("correlation", slow.neighbours, 0.8, 0.06);
+    expect_near("rows", slow.rows / (ROWS / 9.0), 1, 0.35);
     assert_true(white.neighbours == 0 && white.rows == ROWS);
 
     def.material.model = MILD_MODEL_ECC_SPRING; /* concave data */

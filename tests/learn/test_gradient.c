@@ -157,9 +157,9 @@ static void check_minibatch(Case *c, int count, uint32_t draw, double share) {
         loss = fmax(loss, apart(ours[k], theirs[k]));
         assert_true(theirs[k] != 0.0 || images == 0);
     }
-    print_message("%4d samples, %4d images: worst gradient %.1e, norm %.1e, sums %.1e\n", count,
-                  images, worst, apart(norm, sqrt(squares)), loss);
-    assert_true(worst < 2e-5 && apart(norm, sqrt(squares)) < 1e-5 && loss < 1e-5);
+    expect_near("gradient", worst, 0, 2e-5);
+    expect_near("norm", apart(norm, sqrt(squares)), 0, 1e-5);
+    expect_near("sums", loss, 0, 1e-5);
     free(which);
     free(rows);
     free(sum);

@@ -116,8 +116,6 @@ TEST(singular_values_come_near_one) {
                 x[k * (m.columns + 1)] += (float)(5.0 * scales[s]);
             }
             const Found found = orthogonalise(&m, x);
-            print_message("%2d x %2d, %.0e: singular values %.3f .. %.3f, %.1e from U f(S) V^T\n",
-                          m.rows, m.columns, scales[s], found.least, found.most, found.apart);
             assert_true(found.smallest > 0.0015);
             assert_true(found.least > 0.6 && found.most < 1.3);
             assert_true(found.apart < (scales[s] < 1.0 ? 1e-3 : 1e-5)); /* Jordan's 1e-7 */

@@ -30,8 +30,9 @@ TEST(test_elementwise_functions) {
         double exact = log((double)at);
         worst_log = fmax(worst_log, fabs((double)vector_log(at) - exact) / fmax(1.0, fabs(exact)));
     }
-    print_message("worst: exp %.1e, elu %.1e, log %.1e\n", worst_exp, worst_elu, worst_log);
-    assert_true(worst_exp < 4e-7 && worst_elu < 4e-7 && worst_log < 3e-7);
+    expect_near("exp", worst_exp, 0, 4e-7);
+    expect_near("elu", worst_elu, 0, 4e-7);
+    expect_near("log", worst_log, 0, 3e-7);
     assert_true(vector_elu(0.0f) == 0.0f && vector_log(1.0f) == 0.0f && vector_exp(0.0f) == 1.0f);
     assert_true(isnan(vector_elu(NAN)) && isnan(vector_exp(NAN)));
     assert_true(vector_elu(-INFINITY) == -1.0f && vector_elu(1e30f) == 1e30f);
@@ -46,8 +47,7 @@ TEST(test_half_turn) {
         worst = fmax(worst, fabs((double)noise_sin(a) - sin(angle)));
         worst = fmax(worst, fabs((double)noise_cos(a) - cos(angle)));
     }
-    print_message("sine and cosine of half a turn: worst %.1e\n", worst);
-    assert_true(worst < 3e-7);
+    expect_near("sine and cosine of half a turn", worst, 0, 3e-7);
 }
 
 /* A product that the library refuses is not a number everywhere, so that the update is dropped; and
@@ -88,12 +88,13 @@ TEST(test_noise_is_normal) {
         pairs += i > 1 ? fabs(v) * fabs((double)x[i - 2]) / COUNT : 0.0;
         tail += fabs(v) > 3.0;
     }
-    print_message("moments %.4f %.4f %.4f %.4f, neighbours %.4f, beyond 3 sigma %.5f\n", moment[1],
-                  moment[2], moment[3], moment[4], neighbours, (double)tail / COUNT);
-    assert_true(fabs(moment[1]) < 5e-3 && fabs(moment[2] - 1.0) < 7e-3 && fabs(moment[3]) < 2e-2 &&
-                fabs(moment[4] - 3.0) < 5e-2);
-    assert_true(fabs(neighbours) < 5e-3 && fabs(pairs - 2.0 / 3.14159265) < 5e-3);
-    assert_true(fabs((double)tail / COUNT - 0.0027) < 3e-4);
+    expect_near("mean", moment[1], 0, 5e-3);
+    expect_near("variance", moment[2], 1, 7e-3);
+    expect_near("third moment", moment[3], 0, 2e-2);
+    expect_near("fourth moment", moment[4], 3, 5e-2);
+    expect_near("neighbours", neighbours, 0, 5e-3);
+    expect_near("neighbours of pairs", pairs, 2 / 3.14159265, 5e-3);
+    expect_near("beyond 3 sigma", (double)tail / COUNT, 0.0027, 3e-4);
     free(x);
 }
 
@@ -134,8 +135,7 @@ TEST(test_adam) {
             worst = fmax(worst, fabs(pd[i] - (double)p[i]));
         }
     }
-    print_message("Adam, 50 steps: worst %.1e\n", worst);
-    assert_true(worst < 5e-6);
+    expect_near("Adam, 50 steps", worst, 0, 5e-6);
 }
 
 #define STEPS 30
@@ -199,9 +199,9 @@ TEST(test_advantages) {
                             ? fabs((direct[i] - sum) / sqrt(squares) - (double)b->advantage[i])
                             : 0.0);
     }
-    print_message("worst: return %.1e, normalised advantage %.1e over %d samples\n", worst, gap,
-                  valid);
-    assert_true(worst < 1e-5 && gap < 1e-5 && fabs(report.advantage_std - sqrt(squares)) < 1e-5);
+    expect_near("return", worst, 0, 1e-5);
+    expect_near("normalised advantage", gap, 0, 1e-5);
+    expect_near("deviation", report.advantage_std, sqrt(squares), 1e-5);
     ppo_destroy(ppo);
     policy_destroy(policy);
     pool_destroy(pool);

@@ -155,7 +155,6 @@ TEST(the_upper_body_by_hand) {
         total += links[i % LEG].mass;
     }
     expect_near("mass", robot_total_mass(robot), total, 1e-9);
-    print_message("base %.3f kg, centre %.4f %.4f %.4f m\n", mass, center[0], center[1], center[2]);
     robot_sim_destroy(sim);
 }
 

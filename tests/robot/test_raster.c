@@ -43,9 +43,7 @@ TEST(moments_are_those_of_the_own) {
             assert_int_equal(mild_sole_elements(robot_soles(robot)[f]), counts[c]);
             worst = fmax(worst, worst_integral(robot_soles(robot)[f], robot_rasters(robot)[f]));
         }
-        print_message("%d elements: area, centroid and moments within %.1e, bound 1e-12\n",
-                      counts[c], worst);
-        assert_true(worst < 1e-12);
+        expect_entry("area, centroid and moments", c, worst, 0, 1e-12);
     }
     /* the robot's own count is its own raster, and so is 0 */
     for (int k = 0; k < 2; k++) {
@@ -75,9 +73,8 @@ TEST(elements_cover_the_sole) {
             apart = fmax(apart, nearest);
             mirrored = fmax(mirrored, image);
         }
-        print_message("%d elements: %.1f mm from the own, mirrored within %.1e m\n", counts[c],
-                      1e3 * apart, mirrored);
-        assert_true(apart < 0.71 * 0.0195 && mirrored < 1e-12);
+        expect_entry("from the own", c, apart, 0, 0.71 * 0.0195);
+        expect_entry("mirrored", c, mirrored, 0, 1e-12);
     }
     robot_set_elements(robot, 0, NULL);
 }

@@ -124,7 +124,6 @@ TEST(each_is_as_alone) {
         rig_close(&alone[e]);
     }
     close_many();
-    print_message("%d environments alone and together: the same, %d episodes ended\n", ENVS, ends);
     assert_true(ends >= ENVS);
 }
 
@@ -215,8 +214,6 @@ TEST(statistics) {
         level += env->assist_level * env->assist_draw / ENVS;
     }
     EnvsStats stats = kit_stats(many.envs, ENVS);
-    print_message("%d episodes, %d falls, %d diverged\n", stats.episodes, stats.falls,
-                  stats.diverged);
     assert_true(sum.falls >= 2 && sum.diverged >= 1 && sum.episodes > sum.falls);
     assert_int_equal(stats.episodes, sum.episodes);
     assert_int_equal(stats.falls, sum.falls);

@@ -31,7 +31,6 @@ TEST(printed_and_read) {
     MildError error = {0};
     TaskDef from = changed(), to = task_def_default();
     task_policy_keys_print(&from, text, sizeof text);
-    print_message("%s\n", text);
     assert_int_equal(task_policy_keys_read(&to, text, &error), MILD_OK);
     from.physics_dt = task_def_default().physics_dt; /* no matter of the policy's */
     assert_memory_equal(&to, &from, sizeof to);

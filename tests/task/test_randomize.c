@@ -77,7 +77,6 @@ static void expect_uniform(const Column *c) {
 
 /* No two columns follow each other: correlation below 5.5 standard deviations of 1/sqrt(n). */
 static void expect_independent(void) {
-    double worst = 0;
     static double unit[COLUMNS_MAX][DRAWS];
     for (int c = 0; c < column_count; c++) {
         double width = columns[c].high - columns[c].low;
@@ -98,10 +97,8 @@ static void expect_independent(void) {
                 fail_msg("%s follows %s: correlation %.3f", columns[a].name, columns[b].name,
                          correlation);
             }
-            worst = fmax(worst, fabs(correlation));
         }
     }
-    print_message("%d quantities, largest correlation of two %.3f\n", column_count, worst);
 }
 
 static void expect_columns(void) {
@@ -405,7 +402,7 @@ TEST(limit_of_sinkage) {
     def.randomize.rigid_share = def.randomize.preset_share = def.randomize.patch_share = 0;
     def.randomize.model = MILD_MODEL_MILD;
     const MildSole *sole = robot_rasters(robot)[0];
-    double weight = 2 * robot_foot_load(robot), deepest = 0;
+    double weight = 2 * robot_foot_load(robot);
     int stiffened = 0, draws = 1000;
     for (int t = 0; t < draws; t++) {
         def.randomize.sinkage_max = 1;
@@ -420,7 +417,6 @@ TEST(limit_of_sinkage) {
         expect_near("one factor", limited.sigma_cone / as_drawn.sigma_cone, factor, 1e-9 * factor);
         limited.bed_depth = 10;
         double after = mild_sole_sinkage(sole, &limited, weight);
-        deepest = fmax(deepest, after);
         if (before > 0.0701) {
             expect_near("stiffened", after, 0.07, 2e-4);
             stiffened++;
@@ -428,7 +424,6 @@ TEST(limit_of_sinkage) {
             expect_near("left alone", factor, 1, 0);
         }
     }
-    print_message("sinkage: %d of %d stiffened, deepest %.4f m\n", stiffened, draws, deepest);
     assert_true(stiffened > draws / 20 && stiffened < draws / 2);
     free(env);
 }
@@ -470,7 +465,7 @@ TEST(stripes) {
 TEST(models_are_matched) {
     open_env();
     def.randomize.rigid_share = def.randomize.patch_share = 0;
-    double load = robot_foot_load(robot), worst = 0;
+    double load = robot_foot_load(robot);
     for (int model = 0; model < MILD_MODELS; model++) {
         for (int t = 0; t < 20; t++) {
             env->tick = (uint32_t)(1000 + t);
@@ -494,14 +489,12 @@ TEST(models_are_matched) {
             }
             assert_int_equal(m->model, model);
             double got = mild_sole_sinkage(robot_soles(robot)[0], m, load);
-            worst = fmax(worst, fabs(got - wanted));
             expect_near(mild_model_names[model], got, wanted, 1e-4);
             /* resistive force theory has tangential forces of its own */
             int quasi = model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D;
             expect_near("friction", m->mu, quasi ? 0 : mild.mu, 0);
         }
     }
-    print_message("matched models: worst difference of sinkage %.1e m\n", worst);
     robot_set_model(robot, MILD_MODEL_MILD);
     free(env);
 }

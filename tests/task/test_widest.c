@@ -113,7 +113,6 @@ TEST(steps) {
         }
         assert_true(isnan(rows[k][width[k]]));
     }
-    print_message("four feet carry %.2f of the weight\n", load);
     expect_near("load", load, 1, 0.3);
     robot_sim_destroy(sim);
     free(env);
