@@ -144,58 +144,39 @@ static int hand(double yaw, double pitch, double roll, double wrench[6]) {
                        robot_sim_qvel(rig.sim), wrench);
 }
 
-static void expect_wrench(const char *what, const double *got, double fx, double fy, double fz,
-                          double tx, double ty) {
-    const double wanted[6] = {fx, fy, fz, tx, ty, 0};
-    for (int i = 0; i < 6; i++) {
-        expect_entry(what, i, got[i], wanted[i], 1e-6);
-    }
-}
-
 /* With a share of 0.4: half of 33.113 kg is 64.97 N; 100 N s/m up to 30 N; 300 N m/rad, 30 N m
  * s/rad.
  */
 TEST_WITH(wrench_by_hand, open_first, close_rig) {
+    static const struct {
+        const char *what;
+        double command[2], qvel[6], yaw, pitch, roll; /* qvel: angular in base axes */
+        double fx, fy, tx, ty;
+    } rows[] = {
+        {"at rest, upright", {0}, {0}, 0, 0, 0, 0, 0, 0, 0},
+        {"0.2 m/s missing", {0.2}, {0}, 0, 0, 0, 8, 0, 0, 0},
+        {"at most 30 N", {-0.9}, {0}, 0, 0, 0, -12, 0, 0, 0},
+        {"forward is along the heading", {0.2}, {0}, 0.5 * KIT_PI, 0, 0, 0, 8, 0, 0},
+        {"left of the heading", {0, 0.1}, {0}, 0.5 * KIT_PI, 0, 0, -4, 0, 0, 0},
+        {"against the speed", {0}, {0.1, -0.25, 3}, 0, 0, 0, -4, 10, 0, 0},
+        {"leaning to the right", {0}, {0}, 0, 0, 0.1, 0, 0, -11.98001000, 0}, /* 120 sin 0.1 */
+        {"leaning forward", {0}, {0}, 0, 0.1, 0, 0, 0, 0, -11.98001000},
+        {"leaning forward, heading y", {0}, {0}, 0.5 * KIT_PI, 0.1, 0, 0, 0, 11.98001000, 0},
+        {"against the turning", {0}, {0, 0, 0, 0.5, -0.25, 7}, 0, 0, 0, 0, 0, -6, 3},
+        {"the same, heading y", {0}, {0, 0, 0, 0.5, -0.25, 7}, 0.5 * KIT_PI, 0, 0, 0, 0, -3, -6},
+    };
     help(0.5, 0.8);
     double weight = 0.4 * 0.5 * 9.81 * robot_total_mass(robot), w[6];
     expect_near("half the weight", weight, 64.968, 2e-3);
-    memset(rig.env->robot.qvel, 0, sizeof rig.env->robot.qvel);
-    rig.env->command[0] = rig.env->command[1] = 0;
-    assert_true(hand(0, 0, 0, w));
-    expect_wrench("at rest, upright", w, 0, 0, weight, 0, 0);
-    rig.env->command[0] = 0.2;
-    hand(0, 0, 0, w);
-    expect_wrench("0.2 m/s missing", w, 8, 0, weight, 0, 0);
-    rig.env->command[0] = -0.9;
-    hand(0, 0, 0, w);
-    expect_wrench("at most 30 N", w, -12, 0, weight, 0, 0);
-    rig.env->command[0] = 0.2;
-    hand(0.5 * KIT_PI, 0, 0, w);
-    expect_wrench("forward is along the heading", w, 0, 8, weight, 0, 0);
-    rig.env->command[0] = 0;
-    rig.env->command[1] = 0.1;
-    hand(0.5 * KIT_PI, 0, 0, w);
-    expect_wrench("left of the heading", w, -4, 0, weight, 0, 0);
-    rig.env->command[1] = 0;
-    rig.env->robot.qvel[0] = 0.1;
-    rig.env->robot.qvel[1] = -0.25;
-    rig.env->robot.qvel[2] = 3;
-    hand(0, 0, 0, w);
-    expect_wrench("against the speed", w, -4, 10, weight, 0, 0);
-    memset(rig.env->robot.qvel, 0, sizeof rig.env->robot.qvel);
-    hand(0, 0, 0.1, w); /* 120 sin 0.1 = 11.98001000 */
-    expect_wrench("leaning to the right", w, 0, 0, weight, -11.98001000, 0);
-    hand(0, 0.1, 0, w);
-    expect_wrench("leaning forward", w, 0, 0, weight, 0, -11.98001000);
-    hand(0.5 * KIT_PI, 0.1, 0, w);
-    expect_wrench("leaning forward, heading y", w, 0, 0, weight, 11.98001000, 0);
-    rig.env->robot.qvel[3] = 0.5; /* base axes */
-    rig.env->robot.qvel[4] = -0.25;
-    rig.env->robot.qvel[5] = 7;
-    hand(0, 0, 0, w);
-    expect_wrench("against the turning", w, 0, 0, weight, -6, 3);
-    hand(0.5 * KIT_PI, 0, 0, w);
-    expect_wrench("the same, heading y", w, 0, 0, weight, -3, -6);
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        memcpy(rig.env->command, rows[i].command, sizeof rows[i].command);
+        memcpy(rig.env->robot.qvel, rows[i].qvel, sizeof rows[i].qvel);
+        assert_true(hand(rows[i].yaw, rows[i].pitch, rows[i].roll, w));
+        const double wanted[6] = {rows[i].fx, rows[i].fy, weight, rows[i].tx, rows[i].ty, 0};
+        for (int k = 0; k < 6; k++) {
+            expect_entry(rows[i].what, k, w[k], wanted[k], 1e-6);
+        }
+    }
     rig.def.assist = 0;
     assert_false(hand(0, 0, 0, w));
     rig.def.assist = 1;
