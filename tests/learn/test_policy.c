@@ -100,7 +100,6 @@ TEST(test_answers) {
     enum { ROWS = 300 };
     static float history[ROWS * 15], actions[ROWS * 2], estimates[ROWS * 6], latent[ROWS * 4],
         critic[ROWS * 7], values[ROWS];
-    double worst = 0.0;
     Policy *policy = small_policy(9);
     const Network *n = &policy->network;
     double *p = malloc((size_t)n->count * sizeof *p);
@@ -124,24 +123,23 @@ TEST(test_answers) {
         memcpy(input, x + 10, 5 * sizeof *x);
         for (int i = 0; i < 6; i++) {
             input[5 + i] = heads[i];
-            worst = fmax(worst, fabs((double)estimates[r * 6 + i] - heads[i]));
+            expect_entry("estimate", i, (double)estimates[r * 6 + i], heads[i], 3e-5);
         }
         for (int i = 0; i < 4; i++) {
             int each = n->def.modulation_per_dimension;
             input[11 + i] = theta[each ? i : 0] * heads[6 + i] + theta[each ? 4 + i : 1];
-            worst = fmax(worst, fabs((double)latent[r * 4 + i] - input[11 + i]));
+            expect_entry("latent", i, (double)latent[r * 4 + i], input[11 + i], 3e-5);
         }
         mlp_double(&n->actor, p, input, mean);
         for (int i = 0; i < 2; i++) {
-            worst = fmax(worst, fabs((double)actions[r * 2 + i] - mean[i]));
+            expect_entry("action", i, (double)actions[r * 2 + i], mean[i], 3e-5);
         }
         for (int i = 0; i < 7; i++) {
             x[i] = (double)critic[r * 7 + i];
         }
         mlp_double(&n->critic, p, x, value);
-        worst = fmax(worst, fabs((double)values[r] - value[0]));
+        expect_entry("value", r, (double)values[r], value[0], 3e-5);
     }
-    expect_near("answers against their equations", worst, 0, 3e-5);
     free(p);
     policy_destroy(policy);
 }

@@ -28,7 +28,6 @@ TEST(mirrored_legs) {
         const Robot *robot = robots[r];
         RobotSim *sim = robot_sim_create(robot, 0.001, NULL);
         Random random = random_at(3, (uint32_t)r, 0);
-        double worst = 0;
         for (int draw = 0; draw < 20; draw++) {
             RobotState state = random_pose(robot, 1, &random), image;
             double center[ROBOT_FEET_MAX][3];
@@ -46,11 +45,10 @@ TEST(mirrored_legs) {
             for (int f = 0; f < robot_feet(robot); f++) {
                 const double *other = robot_sim_foot(sim, f ^ 1)->sole_center;
                 for (int k = 0; k < 3; k++) {
-                    worst = fmax(worst, fabs(center[f][k] - (k == 1 ? -1 : 1) * other[k]));
+                    expect_near(names[r], center[f][k], (k == 1 ? -1 : 1) * other[k], 1e-9);
                 }
             }
         }
-        expect_near(names[r], worst, 0, 1e-9);
         robot_sim_destroy(sim);
     }
 }
@@ -102,19 +100,16 @@ TEST(distance_is_mujocos) {
         mjData *d = mj_makeData(legged[r]->visual);
         RobotSim *sim = robot_sim_create(legged[r], 0.0025, NULL);
         Random random = random_at(61, (uint32_t)r, 0);
-        double worst = 0;
         int overlaps = 0;
         for (int n = 0; n < POSES; n++) {
             const RobotState state = random_pose(legged[r], 2, &random);
             robot_sim_load(sim, &state, &nominal);
             const double own = robot_sim_leg_distance(sim);
             const double distance = geom_distance(legged[r], &state, d);
-            worst = fmax(worst, fabs(own - distance));
+            expect_near(names[r], own, distance, 2e-5);
             overlaps += distance < 0;
         }
-        printf("%s: distances differ from MuJoCo's by %.1e m at most; %d of %d poses overlap\n",
-               names[r], worst, overlaps, POSES);
-        assert_true(worst < 2e-5 && overlaps > POSES / 100 && overlaps < POSES);
+        assert_true(overlaps > POSES / 100 && overlaps < POSES);
         robot_sim_destroy(sim);
         mj_deleteData(d);
     }
