@@ -7,16 +7,6 @@
 
 enum { STAND_STEPS = 400 };
 
-/* Torques that hold the default pose. */
-static void hold_pose(const Robot *robot, const RobotSim *sim, double stiffness, double *torque) {
-    const double *pose = robot_default_pose(robot), *effort = robot_effort(robot);
-    for (int j = 0; j < robot_joints(robot); j++) {
-        const double error = pose[j] - robot_sim_qpos(sim)[7 + j];
-        torque[j] = stiffness * effort[j] * (error - 0.03 * robot_sim_qvel(sim)[6 + j]);
-        torque[j] = fmax(fmin(torque[j], effort[j]), -effort[j]);
-    }
-}
-
 /* The law under a shell is that of the feet's elements, whatever the distance of its own; its area
  * is that of the geoms: the two boxes of SA01's shanks, 5 x 5 x 28 cm. */
 TEST(they_have_the_law_of_the_feet) {
@@ -56,7 +46,8 @@ TEST(they_carry_a_robot_that_lies) {
         robot_sim_load(sim, &state, &nominal);
         double torque[ROBOT_JOINTS_MAX], shells = 0, feet = 0;
         for (int s = 0; s < 4 * STAND_STEPS; s++) {
-            hold_pose(robot, sim, 2, torque);
+            hold_pose(robot, robot_default_pose(robot), 2, robot_sim_qpos(sim), robot_sim_qvel(sim),
+                      torque);
             assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
             if (s >= 3 * STAND_STEPS) {
                 shells += robot_sim_shell_load(sim) / STAND_STEPS;

@@ -196,21 +196,75 @@ TEST(gait) {
     }
 }
 
-TEST(slip) {
-    TaskMotion *m = new_scene();
-    m->foot_speed[1] = 0.7;
-    expect_term(REWARD_slip, "only the foot in the air moves", 0);
-    m->foot_speed[0] = 0.3;
-    expect_term(REWARD_slip, "the left slips", -0.03);
-    m->contact[1] = 1;
-    expect_term(REWARD_slip, "both slip", -0.1);
+/* Terms of one number of the motion, each changed alone in the scene. */
+TEST(one_number) {
+    static const struct {
+        int term;
+        const char *motion;
+        size_t number;
+        Real value;
+        double wanted;
+    } rows[] = {
+        {REWARD_slip, "the foot in the air moves", offsetof(TaskMotion, foot_speed[1]), 0.7, 0},
+        {REWARD_slip, "the left slips", offsetof(TaskMotion, foot_speed[0]), 0.3, -0.03},
+        {REWARD_base_acceleration, "steady", offsetof(TaskMotion, twist_change), 0, 0.2},
+        {REWARD_base_acceleration, "a jolt", offsetof(TaskMotion, twist_change), 0.5, 0.0446260320},
+        {REWARD_base_height, "nominal", offsetof(TaskMotion, base_height), 0.83, 0.2},
+        {REWARD_base_height, "too high", offsetof(TaskMotion, base_height), 0.84, 0.0735758882},
+        {REWARD_base_height, "too low", offsetof(TaskMotion, base_height), 0.82, 0.0735758882},
+        {REWARD_feet_distance, "within", offsetof(TaskMotion, foot_distance), 0.2, 0.2},
+        {REWARD_feet_distance, "near", offsetof(TaskMotion, foot_distance), 0.12, 0.1367879441},
+        {REWARD_feet_distance, "far", offsetof(TaskMotion, foot_distance), 0.28, 0.1135335283},
+        {REWARD_feet_distance, "crossed", offsetof(TaskMotion, foot_distance), -0.9, 0.1},
+        {REWARD_feet_distance, "knees near", offsetof(TaskMotion, knee_distance), 0.11, 0.2},
+        {REWARD_knee_distance, "near", offsetof(TaskMotion, knee_distance), 0.11, 0.1367879441},
+        {REWARD_knee_distance, "far", offsetof(TaskMotion, knee_distance), 0.28, 0.1135335283},
+        {REWARD_knee_distance, "feet near", offsetof(TaskMotion, foot_distance), 0.12, 0.2},
+        {REWARD_collision, "feet apart", offsetof(TaskMotion, foot_distance), 0.141, 0},
+        {REWARD_collision, "feet", offsetof(TaskMotion, foot_distance), 0.139, -1},
+        {REWARD_collision, "knees apart", offsetof(TaskMotion, knee_distance), 0.121, 0},
+        {REWARD_collision, "knees", offsetof(TaskMotion, knee_distance), 0.119, -1},
+        {REWARD_air_time, "no touchdown", offsetof(TaskMotion, landed_air_time), 0, 0},
+        {REWARD_air_time, "0.3 s, in one step", offsetof(TaskMotion, landed_air_time), 0.3, 30},
+        {REWARD_contact_force, "500 N", offsetof(TaskMotion, foot_force[0]), 500, 0},
+        {REWARD_contact_force, "700 N", offsetof(TaskMotion, foot_force[0]), 700, -4},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        char *motion = (char *)new_scene();
+        memcpy(motion + rows[i].number, &rows[i].value, sizeof rows[i].value);
+        expect_term(rows[i].term, rows[i].motion, rows[i].wanted);
+    }
 }
 
-TEST(base_acceleration) {
+/* What two feet add up to, and keys that go before the robot's. */
+TEST(feet_and_keys) {
     TaskMotion *m = new_scene();
-    expect_term(REWARD_base_acceleration, "steady", 0.2);
-    m->twist_change = 0.5;
-    expect_term(REWARD_base_acceleration, "a jolt of 0.5", 0.0446260320);
+    m->foot_speed[0] = 0.3;
+    m->foot_speed[1] = 0.7;
+    m->contact[1] = 1;
+    expect_term(REWARD_slip, "both slip", -0.1);
+    m->foot_force[0] = 700;
+    m->foot_force[1] = 1000;
+    expect_term(REWARD_contact_force, "700 and 1000 N: 200 and 400 count", -12);
+    set_command(3, 0, 0); /* a run's feet bear 0.5/0.4 of that */
+    scene.def.stance_share[0] = 0.4;
+    expect_term(REWARD_contact_force, "700 and 1000 N: 75 and 375 count", -9);
+    m = new_scene();
+    m->landed_air_time = 0.3;
+    m->standing = 1;
+    expect_term(REWARD_air_time, "standing", 0);
+    m->base_height = scene.def.reward.nominal_height = 0.82;
+    expect_term(REWARD_base_height, "another nominal height", 0.2);
+    const double feet[2] = {0, 0.19}, knees[2] = {0.05, 0.27};
+    memcpy(scene.def.reward.feet_range, feet, sizeof feet);
+    memcpy(scene.def.reward.knee_range, knees, sizeof knees);
+    m->knee_distance = 0.28;
+    expect_term(REWARD_feet_distance, "10 mm beyond the key's", 0.1367879441);
+    expect_term(REWARD_knee_distance, "10 mm beyond the key's", 0.1367879441);
+    m->foot_distance = 0.01;
+    m->knee_distance = 0.06;
+    expect_term(REWARD_feet_distance, "within the key's", 0.2);
+    expect_term(REWARD_knee_distance, "within the key's", 0.2);
 }
 
 /* joint 0: 0.5^2 + (1 - 1 - 0.25)^2 = 0.3125; joint 11: 0.75^2 + (-0.25 - 1 + 0.125)^2 = 1.828125.
@@ -275,45 +329,6 @@ TEST(default_pose) {
     expect_term(REWARD_default_pose, "bent knee", 1.194);
 }
 
-TEST(base_height) {
-    TaskMotion *m = new_scene();
-    expect_term(REWARD_base_height, "nominal", 0.2);
-    m->base_height = 0.84;
-    expect_term(REWARD_base_height, "10 mm too high", 0.0735758882);
-    m->base_height = 0.82;
-    expect_term(REWARD_base_height, "10 mm too low", 0.0735758882);
-    scene.def.reward.nominal_height = 0.82;
-    expect_term(REWARD_base_height, "another nominal height", 0.2);
-}
-
-TEST(distances) {
-    TaskMotion *m = new_scene();
-    expect_term(REWARD_feet_distance, "within", 0.2);
-    expect_term(REWARD_knee_distance, "within", 0.2);
-    m->foot_distance = 0.12;
-    expect_term(REWARD_feet_distance, "10 mm too near", 0.1367879441);
-    m->foot_distance = 0.28;
-    expect_term(REWARD_feet_distance, "20 mm too far", 0.1135335283);
-    m->foot_distance = -0.9;
-    expect_term(REWARD_feet_distance, "crossed", 0.1);
-    expect_term(REWARD_knee_distance, "the feet are another term's", 0.2);
-    m->foot_distance = 0.2;
-    m->knee_distance = 0.11;
-    expect_term(REWARD_knee_distance, "10 mm too near", 0.1367879441);
-    m->knee_distance = 0.28;
-    expect_term(REWARD_knee_distance, "20 mm too far", 0.1135335283);
-    expect_term(REWARD_feet_distance, "the knees are another term's", 0.2);
-    const double feet[2] = {0, 0.19}, knees[2] = {0.05, 0.27}; /* keys go before the robot's */
-    memcpy(scene.def.reward.feet_range, feet, sizeof feet);
-    memcpy(scene.def.reward.knee_range, knees, sizeof knees);
-    expect_term(REWARD_feet_distance, "10 mm beyond the key's", 0.1367879441);
-    expect_term(REWARD_knee_distance, "10 mm beyond the key's", 0.1367879441);
-    m->foot_distance = 0.01;
-    m->knee_distance = 0.06;
-    expect_term(REWARD_feet_distance, "within the key's", 0.2);
-    expect_term(REWARD_knee_distance, "within the key's", 0.2);
-}
-
 /* abs sum 0.07, norm 0.05: 1.5 (e^-0.7 + e^-0.2)/2. */
 TEST(orientation) {
     TaskMotion *m = new_scene();
@@ -324,15 +339,6 @@ TEST(orientation) {
     m->gravity[0] = -0.03;
     m->gravity[1] = 0.04;
     expect_term(REWARD_orientation, "tilted the other way", 0.9864870427);
-}
-
-TEST(air_time) {
-    TaskMotion *m = new_scene();
-    expect_term(REWARD_air_time, "no touchdown", 0);
-    m->landed_air_time = 0.3;
-    expect_term(REWARD_air_time, "0.3 s in the air, paid in one step of 0.01 s", 30);
-    m->standing = 1;
-    expect_term(REWARD_air_time, "standing", 0);
 }
 
 /* 0.25 (e^(-10 0.04) + e^(-5 0.5)). */
@@ -346,20 +352,6 @@ TEST(base_motion) {
     m->omega[0] = 0.3;
     m->omega[1] = -0.4;
     expect_term(REWARD_base_motion, "bobbing and rocking", 0.1881012612);
-}
-
-TEST(contact_force) {
-    TaskMotion *m = new_scene();
-    m->foot_force[0] = 500;
-    m->foot_force[1] = 20;
-    expect_term(REWARD_contact_force, "up to 500 N", 0);
-    m->foot_force[0] = 700;
-    expect_term(REWARD_contact_force, "700 N", -4);
-    m->foot_force[1] = 1000;
-    expect_term(REWARD_contact_force, "700 and 1000 N: 200 and 400 count", -12);
-    set_command(3, 0, 0); /* a run's feet bear 0.5/0.4 of that */
-    scene.def.stance_share[0] = 0.4;
-    expect_term(REWARD_contact_force, "700 and 1000 N: 75 and 375 count", -9);
 }
 
 TEST(efforts) {
@@ -380,20 +372,6 @@ TEST(efforts) {
     expect_term(REWARD_power, "no weight", 0);
     scene.def.reward.weight[REWARD_power] = -0.01;
     expect_term(REWARD_power, "90 and 160 W", -2.5);
-}
-
-TEST(collision) {
-    TaskMotion *m = new_scene();
-    expect_term(REWARD_collision, "apart", 0);
-    m->foot_distance = 0.141;
-    m->knee_distance = 0.121;
-    expect_term(REWARD_collision, "just apart", 0);
-    m->foot_distance = 0.139;
-    expect_term(REWARD_collision, "feet", -1);
-    m->knee_distance = 0.119;
-    expect_term(REWARD_collision, "feet and knees", -2);
-    m->foot_distance = 0.2;
-    expect_term(REWARD_collision, "knees", -1);
 }
 
 /* Of the scene: f(0) f(0) 2 + 1.1 + 0 + 1.4 - 0 + 0.2 - 0 + 0.09001505 (stiff leg) + 1.2 + 3 times
