@@ -5,7 +5,7 @@
 
 TEST(standing_commands) {
     TaskDef def = task_def_default();
-    const double none[3] = {0}, small[3] = {0.0999, -0.0999, 0.0999};
+    const double none[TASK_COMMANDS] = {0}, small[TASK_COMMANDS] = {0.0999, -0.0999, 0.0999};
     assert_true(task_is_standing(&def, none));
     assert_true(task_is_standing(&def, small));
     for (int i = 0; i < 3; i++) {
@@ -53,7 +53,7 @@ static TaskFoot foot_at(const TaskDef *def, double phase, const double *command,
  * the speeds between a walk and a run have a share of 0.425. */
 TEST(run) {
     TaskDef def = task_def_default();
-    const double fast[3] = {3, 0, 0}, half[3] = {-2, 0, 0};
+    const double fast[TASK_COMMANDS] = {3}, half[TASK_COMMANDS] = {-2};
     def.stance_share[0] = 0.35;
     expect_near("walk", task_gait_share(&def, ahead), 0.5, 0);
     expect_near("between", task_gait_share(&def, half), 0.425, 1e-12);
