@@ -192,13 +192,20 @@ TEST(test_no_allocation) {
     assert_int_equal(allocations, before);
 }
 
+static void refuse_log(const char *path, const char *behind) {
+    BeliefLog log;
+    MildError error = {0};
+    char names[64];
+    snprintf(names, sizeof names, "%s%s", path, behind);
+    assert_refused(belief_log_read(path, 0, &log, &error), MILD_ERROR_FORMAT, &error, names);
+}
+
 /* What a log cannot be says its line; a log that was written is read back. */
 TEST(test_log) {
     char path[] = "/tmp/belief_XXXXXX";
     BeliefLog log;
     MildError error = {0};
     float frame[BELIEF_FRAME];
-    char names[64];
     const int descriptor = mkstemp(path);
     assert_true(descriptor >= 0);
     FILE *file = fdopen(descriptor, "w");
@@ -216,21 +223,17 @@ TEST(test_log) {
     file = fopen(path, "a");
     belief_log_print(file, 0.08, frame);
     fclose(file);
-    assert_int_equal(belief_log_read(path, 0, &log, &error), MILD_ERROR_FORMAT);
-    snprintf(names, sizeof names, "%s:9 time_s 0.08", path);
-    assert_error(&error, MILD_ERROR_FORMAT, names);
+    refuse_log(path, ":9 time_s 0.08");
     file = fopen(path, "w");
     belief_log_print_header(file);
     fprintf(file, "0,1,2,nan\n");
     fclose(file);
-    assert_int_equal(belief_log_read(path, 0, &log, &error), MILD_ERROR_FORMAT);
-    snprintf(names, sizeof names, "%s:2 column 4", path);
-    assert_error(&error, MILD_ERROR_FORMAT, names);
+    refuse_log(path, ":2 column 4");
     file = fopen(path, "w");
     fprintf(file, "depth_m,force_n\n1,2\n");
     fclose(file);
     assert_false(belief_log_is(path));
-    assert_int_equal(belief_log_read(path, 0, &log, &error), MILD_ERROR_FORMAT);
+    refuse_log(path, "");
     remove(path);
 }
 

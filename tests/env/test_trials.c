@@ -2,6 +2,7 @@
  * chose, samples say what its physics steps did, and by MuJoCo one that fell stays as it is. */
 #include "env/envs.h"
 #include "env/task/task.h"
+#include "episode.h"
 #include "kit.h"
 #include "mild/batch.h"
 #include "sa01.h"
@@ -165,6 +166,54 @@ TEST(samples_of_both_are_alike) {
     step(envs);
     assert_int_equal(at.sample[0][0].valid, 7); /* no longer written */
     envs_destroy(envs);
+}
+
+static void check_episode(Envs *envs, int i, int t) {
+    const Episode is = episode_of(envs, i);
+    assert_true(is.index == trial[i].stream && is.ground[0] == trial[i].ground);
+    assert_true(is.map[0] == 0 && is.map[1] == 0 && is.rigid == trial[i].rigid);
+    expect_near("friction", is.friction, 0.8, 1e-7);
+    for (int k = 0; k < 3; k++) {
+        expect_near("command", is.command[k], at.command[i][k], 1e-7);
+    }
+    assert_true(t > 0 || (is.step == 0 && is.qpos[6] == 0));
+}
+
+/* In every episode, and above the middle of a map. One that is thrown diverges in the first physics
+ * step of the next policy step. */
+TEST(batch_does_what_was_chosen) {
+    MildMapDef waves = mild_map_def_default();
+    waves.kind = MILD_MAP_WAVES;
+    MildMap *map = mild_map_create(&waves, NULL);
+    MildTerrain above = terrain[0];
+    assert_int_equal(mild_terrain_set_map(&above, map, NULL), MILD_OK);
+    def.map = map;
+    Envs *envs = start(1, (EnvsDrive){0});
+    const Episode first = episode_of(envs, 0), third = episode_of(envs, 2);
+    assert_memory_equal(first.qpos + 7, third.qpos + 7, SA01_JOINTS * sizeof *first.qpos);
+    for (int t = 0; t <= 130; t++) { /* falls begin further episodes */
+        for (int i = 0; i < TRIALS; i++) {
+            check_episode(envs, i, t);
+        }
+        step(envs);
+        for (int i = 0; i < TRIALS; i++) {
+            for (int k = 0; k < PHYSICS_STEPS; k++) {
+                const EnvsSample *sample = &at.sample[i][k];
+                const double *base = sample->base;
+                assert_true(sample->valid);
+                expect_near("above the map", sample->above,
+                            base[2] - mild_terrain_height_at(&above, base[0], base[1]), 1e-5);
+            }
+        }
+    }
+    episode_throw(envs, 2, 1e4);
+    step(envs);
+    for (int i = 0; i < TRIALS; i++) {
+        assert_true(at.valid[i] == (i != 2) && at.sample[i][0].valid == (i != 2));
+    }
+    envs_destroy(envs);
+    def.map = NULL;
+    mild_map_destroy(map);
 }
 
 /* Torques of a controller: 3 + i N m on joint 2 of environment i. */

@@ -122,104 +122,29 @@ TEST(numbers_of_the_environments) {
     mild_envs_close(envs);
 }
 
-/* The batch engine on the CPU sees what MuJoCo sees, within the rounding of float. */
+/* The batch engine on the CPU sees what MuJoCo sees, within the rounding of float. It does not report
+ * the ends of episodes, and says so; what MuJoCo reports of them: python/test_envs. */
 TEST(batch_engine) {
-    static Rows a, b;
+    static Rows a, b, last;
     const char *batch[KEYS];
     memcpy(batch, keys, sizeof batch);
     batch[KEYS - 1] = "train.robots=batch";
     MildEnvs *mujoco = open_envs(keys, KEYS), *engine = open_envs(batch, KEYS);
     const EnvsView first = view_of(&a), second = {b.history[0], NULL, NULL, b.frame[0]};
+    MildError error = {0};
     assert_int_equal(mild_envs_reset(mujoco, &first, NULL, NULL), MILD_OK);
     assert_int_equal(mild_envs_reset(engine, &second, NULL, NULL), MILD_OK);
     for (int n = 0; n < ENVS * SA01_OBSERVATION; n++) {
         const int e = n / SA01_OBSERVATION, i = n % SA01_OBSERVATION;
         assert_true(fabsf(a.frame[e][i] - b.frame[e][i]) < 1e-4F);
     }
+    const float action[ENVS][SA01_JOINTS] = {{0}};
+    EnvsStep step = step_of(action[0], &b);
+    step.last = view_of(&last);
+    assert_int_equal(mild_envs_step(engine, &step, NULL, &error), MILD_ERROR_ARGUMENT);
+    assert_error(&error, MILD_ERROR_ARGUMENT, "train.robots mujoco");
     mild_envs_close(mujoco);
     mild_envs_close(engine);
-}
-
-/* Steps an environment without a reset up to the end of its episode: the step of it, and the
- * history there. */
-static int play_alone(Plain *plain, int e, float history[SA01_HISTORY], TaskStep *end) {
-    const TaskDef *def = &plain->def.task;
-    RobotSim *sim = robot_sim_create(plain->robot, def->physics_dt, NULL);
-    TaskEnv *env = aligned_alloc(64, (task_env_bytes(def, plain->robot) + 63) / 64 * 64);
-    assert_true(sim && env);
-    const EnvsView view = {.history = history};
-    task_env_init(env, def, plain->robot, 7, (uint32_t)e);
-    task_env_reset(env, def, plain->robot, sim, &view);
-    int t = 0;
-    do {
-        float action[ENVS][SA01_JOINTS];
-        draw_actions(t++, action);
-        *end = task_env_step(env, def, plain->robot, sim, action[e], 0, &view, NULL);
-    } while (!end->done);
-    free(env);
-    robot_sim_destroy(sim);
-    return t - 1;
-}
-
-/* The end of an episode is reported without changing what follows. */
-TEST(ends) {
-    static Plain plain;
-    static Rows a, b, last;
-    static float terms[ENVS][TASK_REWARD_COUNT];
-    MildEnvs *reporting = open_envs(keys, KEYS), *silent = open_envs(keys, KEYS);
-    const EnvsView first = view_of(&a), second = view_of(&b);
-    assert_int_equal(mild_envs_reset(reporting, &first, NULL, NULL), MILD_OK);
-    assert_int_equal(mild_envs_reset(silent, &second, NULL, NULL), MILD_OK);
-    open_plain(&plain);
-    int seen[ENVS] = {0}, compared = 0;
-    for (int t = 0; t < 24 * STEPS && compared < ENVS; t++) {
-        float action[ENVS][SA01_JOINTS];
-        draw_actions(t, action);
-        EnvsStep step = step_of(action[0], &a);
-        const EnvsStep plainly = step_of(action[0], &b);
-        step.last = view_of(&last);
-        step.terms = terms[0];
-        memset(&last, 0xff, sizeof last);
-        assert_int_equal(mild_envs_step(reporting, &step, NULL, NULL), MILD_OK);
-        assert_int_equal(mild_envs_step(silent, &plainly, NULL, NULL), MILD_OK);
-        assert_memory_equal(&a, &b, sizeof a);
-        for (int e = 0; e < ENVS; e++) {
-            assert_true(a.done[e] || isnan(last.history[e][0])); /* others are left alone */
-            if (!a.done[e] || seen[e]++) {
-                continue;
-            }
-            float history[SA01_HISTORY];
-            TaskStep alone;
-            assert_int_equal(play_alone(&plain, e, history, &alone), t);
-            assert_memory_equal(last.history[e], history, sizeof history);
-            assert_memory_equal(last.frame[e], &history[SA01_HISTORY - SA01_OBSERVATION],
-                                sizeof last.frame[e]);
-            assert_memory_equal(terms[e], alone.episode_terms, sizeof terms[e]);
-            assert_memory_not_equal(a.history[e], history, sizeof history);
-            compared++;
-        }
-    }
-    assert_int_equal(compared, ENVS);
-    close_plain(&plain);
-    mild_envs_close(reporting);
-    mild_envs_close(silent);
-}
-
-/* The batch engine does not report it, and says so. */
-TEST(no_ends) {
-    static Rows rows, last;
-    const char *batch[KEYS];
-    memcpy(batch, keys, sizeof batch);
-    batch[KEYS - 1] = "train.robots=batch";
-    MildEnvs *envs = open_envs(batch, KEYS);
-    float action[ENVS][SA01_JOINTS] = {{0}};
-    EnvsStep step = step_of(action[0], &rows);
-    step.last = view_of(&last);
-    MildError error = {0};
-    assert_int_equal(mild_envs_reset(envs, &step.next, NULL, NULL), MILD_OK);
-    assert_int_equal(mild_envs_step(envs, &step, NULL, &error), MILD_ERROR_ARGUMENT);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "train.robots mujoco");
-    mild_envs_close(envs);
 }
 
 TEST(mirror) {

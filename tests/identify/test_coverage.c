@@ -3,7 +3,7 @@
  * take 90 s and have a standard deviation of 1.5 %. Prints a table: for each kind of noise the
  * share of intervals that hold the truth and, in brackets, that are bounded on both sides. */
 #include "base/random.h"
-#include "eq5.h"
+#include "fit_kit.h"
 
 enum { ROWS = 300, RECORDS = 3, NOISES = 3 };
 typedef enum { NOISE_PEAK, NOISE_ROW, NOISE_SLOW } Noise;
@@ -57,8 +57,6 @@ static FitResult press_and_fit(const Case *c, Noise noise, int draw) {
                   .plates = 1,
                   .material = c->material};
     Random random = random_at((uint64_t)(1000 + draw), (uint32_t)noise, (uint32_t)c->number);
-    FitResult result;
-    MildError error = {0};
     if (mild_model_is_concentric((MildModel)c->material.model)) {
         def.plate[0] = (FitPlate){.elements = 1, .pitch = sqrt(55) * 0.0195, .width = 0.1};
     }
@@ -70,8 +68,7 @@ static FitResult press_and_fit(const Case *c, Noise noise, int draw) {
         }
         noise_add(points + r * ROWS, noise, &random);
     }
-    expect_good(fit_run(&def, points, c->records * ROWS, &result, &error) == MILD_OK, &error);
-    return result;
+    return fit_of(&def, points, c->records * ROWS);
 }
 
 /* Combinations by their names. */

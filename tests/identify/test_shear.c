@@ -2,9 +2,8 @@
  * line, written here by themselves; a ring's torque by a sum over many thin rings; noisy records
  * whose intervals hold the truth; and what one record alone cannot determine. */
 #include "base/random.h"
-#include "identify/fit.h"
+#include "fit_kit.h"
 #include "identify/fit_csv.h"
-#include "kit.h"
 #include "unnamed_file.h"
 
 enum { ROWS = 200, DRAWS = 100 };
@@ -47,21 +46,8 @@ static FitDef shear_def(void) {
     return def;
 }
 
-static FitValue *value_of(FitResult *result, const char *name) {
-    for (int i = 0; i < result->parameters; i++) {
-        if (strcmp(result->parameter[i].name, name) == 0) {
-            return &result->parameter[i];
-        }
-    }
-    fail_msg("no %s", name);
-    return NULL;
-}
-
 static FitResult run(const FitDef *def, int count) {
-    FitResult result;
-    MildError error = {0};
-    expect_good(fit_run(def, points, count, &result, &error) == MILD_OK, &error);
-    return result;
+    return fit_of(def, points, count);
 }
 
 static void expect_fitted(FitResult *result, const char *name, double wanted, double share) {

@@ -1,6 +1,6 @@
-/* Memory runs out at the n-th allocation, for every n: an error each time, nothing lost, nothing
- * leaked; and acting and learning allocate nothing of their own. The allocator of this executable
- * counts and fails. */
+/* Memory runs out at the n-th allocation, for every n, while files are written and read: an error
+ * each time, nothing lost, nothing leaked; and acting and learning allocate nothing of their own.
+ * The allocator of this executable counts and fails. What is created: train/test_allocation. */
 #include "check.h"
 
 #include <errno.h>
@@ -96,40 +96,7 @@ static int fail_each(int (*attempt)(void)) {
     return 0;
 }
 
-static int attempt_policy(void) {
-    MildError error = {0};
-    PolicyDef def = small_def();
-    Policy *policy = policy_create(&def, 1, &error);
-    assert_true(policy || error.status == MILD_ERROR_MEMORY);
-    policy_destroy(policy);
-    return policy != NULL;
-}
-
-static Policy *shared_policy;
-static Pool *shared_pool;
 static Ppo *shared_ppo;
-
-static Ppo *create_ppo(MildError *error) {
-    static const int index[5] = {0, 1, 2, 3, 4};
-    static const float sign[5] = {1, 1, 1, 1, 1};
-    const PpoMirror mirror = {index, sign, index, sign};
-    PpoDef def = ppo_def_default();
-    return ppo_create(&def, shared_policy, shared_pool, &mirror, 4, 1, error);
-}
-
-static int attempt_ppo(void) {
-    MildError error = {0};
-    Ppo *ppo = create_ppo(&error);
-    assert_true(ppo || error.status == MILD_ERROR_MEMORY);
-    ppo_destroy(ppo);
-    return ppo != NULL;
-}
-
-static int attempt_pool(void) {
-    Pool *pool = pool_create(1);
-    pool_destroy(pool);
-    return pool != NULL;
-}
 
 static int attempt_save(void) {
     MildError error = {0};
@@ -154,21 +121,19 @@ TEST(test_every_allocation_may_fail) {
         skip();
     }
     MildError error = {0};
-    PolicyDef def = small_def();
-    shared_policy = policy_create(&def, 1, &error);
-    shared_pool = pool_create(1);
-    shared_ppo = create_ppo(&error);
-    assert_true(shared_policy && shared_pool && shared_ppo);
-    int policy = fail_each(attempt_policy), ppo = fail_each(attempt_ppo),
-        pool = fail_each(attempt_pool);
-    int save = fail_each(attempt_save);
+    const PolicyDef policy_def = small_def();
+    const PpoDef def = ppo_def_default();
+    Policy *policy = policy_create(&policy_def, 1, &error);
+    Pool *pool = pool_create(1);
+    shared_ppo = ppo_create(&def, policy, pool, NULL, 4, 1, &error);
+    assert_non_null(shared_ppo);
+    const int save = fail_each(attempt_save);
     assert_true(attempt_save());
-    int load_policy = fail_each(attempt_load_policy), load = fail_each(attempt_load);
-    print_message("allocations: policy %d, ppo %d, pool %d, save %d, load policy %d, resume %d\n",
-                  policy, ppo, pool, save, load_policy, load);
+    const int load_policy = fail_each(attempt_load_policy), load = fail_each(attempt_load);
+    print_message("allocations: save %d, load policy %d, resume %d\n", save, load_policy, load);
     ppo_destroy(shared_ppo);
-    policy_destroy(shared_policy);
-    pool_destroy(shared_pool);
+    policy_destroy(policy);
+    pool_destroy(pool);
     unlink(PATH);
 }
 
@@ -177,12 +142,12 @@ TEST(test_every_allocation_may_fail) {
 static void check_survival(int optimizer) {
     MildError error = {0};
     PolicyDef def = policy_def_default();
-    shared_policy = policy_create(&def, 1, &error);
-    shared_pool = pool_create(1);
+    Policy *policy = policy_create(&def, 1, &error);
+    Pool *pool = pool_create(1);
     PpoDef ppo_def = ppo_def_default();
     ppo_def.epochs = 1;
     ppo_def.optimizer = optimizer;
-    Ppo *ppo = ppo_create(&ppo_def, shared_policy, shared_pool, NULL, 4, 1, &error);
+    Ppo *ppo = ppo_create(&ppo_def, policy, pool, NULL, 4, 1, &error);
     assert_non_null(ppo);
     PpoReport report;
     for (int n = -1; n < 3; n++) { /* first once with memory: oneDNN generates its kernels */
@@ -194,13 +159,13 @@ static void check_survival(int optimizer) {
         ppo_update(ppo, &report);
         atomic_store(&fail_at, -1);
         assert_true(n < 0 || atomic_load(&live) == before);
-        for (int64_t i = 0; i < policy_parameter_count(shared_policy); i++) {
-            assert_true(isfinite(policy_parameters(shared_policy)[i]));
+        for (int64_t i = 0; i < policy_parameter_count(policy); i++) {
+            assert_true(isfinite(policy_parameters(policy)[i]));
         }
     }
     ppo_destroy(ppo);
-    policy_destroy(shared_policy);
-    pool_destroy(shared_pool);
+    policy_destroy(policy);
+    pool_destroy(pool);
 }
 
 TEST(test_learning_survives_without_memory) {

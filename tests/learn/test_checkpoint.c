@@ -11,48 +11,20 @@
 
 #define PATH "build_test_checkpoint.safetensors"
 
-typedef struct {
-    Policy *policy;
-    Pool *pool;
-    Ppo *ppo;
-    Toy toy;
-} Run;
-
-static void run_open(Run *run, const PolicyDef *policy_def, const PpoDef *def) {
-    MildError error = {0};
-    PpoMirror mirror = toy_mirror();
-    run->policy = policy_create(policy_def, 5, &error);
-    run->pool = pool_create(1);
-    assert_non_null(run->policy);
-    run->ppo = ppo_create(def, run->policy, run->pool, &mirror, 4, 11, &error);
-    assert_non_null(run->ppo);
-    toy_start(&run->toy, run->ppo);
+static void run_open(ToyRun *run, PolicyDef policy_def, PpoDef def) {
+    toy_run_open(run, 1, 4, policy_def, def);
 }
 
-static void run_open_toy(Run *run) {
-    PolicyDef policy_def = toy_policy_def();
-    PpoDef def = toy_ppo_def();
-    run_open(run, &policy_def, &def);
+static void run_open_toy(ToyRun *run) {
+    run_open(run, toy_policy_def(), toy_ppo_def());
 }
 
-static void run_close(Run *run) {
-    ppo_destroy(run->ppo);
-    policy_destroy(run->policy);
-    pool_destroy(run->pool);
-}
-
-static void run_iterate(Run *run) {
-    PpoReport report;
-    toy_rollout(&run->toy, run->ppo);
-    ppo_update(run->ppo, &report);
-}
-
-static void save(const Run *run) {
+static void save(const ToyRun *run) {
     MildError error = {0};
     assert_int_equal(ppo_save(run->ppo, PATH, NULL, 0, "toy", &error), MILD_OK);
 }
 
-static void check_bad_checkpoint(Run *run, MildStatus status, const char *names) {
+static void check_bad_checkpoint(ToyRun *run, MildStatus status, const char *names) {
     MildError error = {0};
     const size_t bytes = (size_t)policy_parameter_count(run->policy) * sizeof(float);
     float *before = malloc(bytes);
@@ -91,10 +63,10 @@ TEST(bad_numbers_are_refused) {
     PolicyDef policy_def = toy_policy_def();
     PpoDef def = toy_ppo_def();
     def.average = 0.9;
-    Run run, other;
-    run_open(&run, &policy_def, &def);
-    run_open(&other, &policy_def, &def);
-    run_iterate(&run);
+    ToyRun run, other;
+    run_open(&run, policy_def, def);
+    run_open(&other, policy_def, def);
+    toy_run_iterate(&run, 1);
     float *const weights[] = {run.ppo->first + 3, run.ppo->second + 4,
                               policy_parameters(run.ppo->average) + 5,
                               policy_parameters(run.policy) + 6};
@@ -128,30 +100,37 @@ TEST(bad_numbers_are_refused) {
     save(&run);
     assert_int_equal(ppo_load(other.ppo, PATH, NULL, 0, &error), MILD_OK);
     unlink(PATH);
-    run_close(&run);
-    run_close(&other);
+    toy_run_close(&run);
+    toy_run_close(&other);
 }
 
-/* A network of another shape is refused with both shapes; another note or first noise is none. */
+/* A network of another shape, or of other environments, is refused with both sizes; another first
+ * noise is none. A policy alone is no checkpoint. */
 TEST(another_network_is_refused) {
     MildError error = {0};
     PolicyDef wider = toy_policy_def(), louder = toy_policy_def();
     PpoDef def = toy_ppo_def();
     wider.actor_hidden[1] = 33;
     louder.init_std *= 0.5;
-    Run run, other, same;
+    ToyRun run, other, more, same;
     run_open_toy(&run);
-    run_open(&other, &wider, &def);
-    run_open(&same, &louder, &def);
+    run_open(&other, wider, def);
+    toy_run_open(&more, 1, 8, toy_policy_def(), def);
+    run_open(&same, louder, def);
     save(&run);
     check_bad_checkpoint(&other, MILD_ERROR_ARGUMENT, "policy.actor_hidden 32 33");
+    check_bad_checkpoint(&more, MILD_ERROR_ARGUMENT, "train.history 192 384");
     assert_int_equal(ppo_load(same.ppo, PATH, NULL, 0, &error), MILD_OK);
     assert_memory_equal(policy_parameters(run.policy), policy_parameters(same.policy),
                         (size_t)policy_parameter_count(run.policy) * sizeof(float));
+    assert_int_equal(policy_save(run.policy, PATH, "", &error), MILD_OK);
+    check_bad_checkpoint(&run, MILD_ERROR_ARGUMENT, "kind policy checkpoint");
     unlink(PATH);
-    run_close(&run);
-    run_close(&other);
-    run_close(&same);
+    check_bad_checkpoint(&run, MILD_ERROR_IO, PATH);
+    toy_run_close(&run);
+    toy_run_close(&other);
+    toy_run_close(&more);
+    toy_run_close(&same);
 }
 
 /* The moments of one optimiser are none to the other. */
@@ -159,21 +138,21 @@ TEST(another_optimizer_is_refused) {
     MildError error = {0};
     PolicyDef policy_def = toy_policy_def();
     PpoDef def = toy_ppo_def();
-    Run adam, muon, again;
+    ToyRun adam, muon, again;
     run_open_toy(&adam);
     def.optimizer = PPO_OPTIMIZER_MUON;
-    run_open(&muon, &policy_def, &def);
-    run_open(&again, &policy_def, &def);
-    run_iterate(&muon);
+    run_open(&muon, policy_def, def);
+    run_open(&again, policy_def, def);
+    toy_run_iterate(&muon, 1);
     save(&adam);
     check_bad_checkpoint(&muon, MILD_ERROR_ARGUMENT, "ppo.optimizer adam muon");
     save(&muon);
     check_bad_checkpoint(&adam, MILD_ERROR_ARGUMENT, "ppo.optimizer muon adam");
     assert_int_equal(ppo_load(again.ppo, PATH, NULL, 0, &error), MILD_OK);
     unlink(PATH);
-    run_close(&adam);
-    run_close(&muon);
-    run_close(&again);
+    toy_run_close(&adam);
+    toy_run_close(&muon);
+    toy_run_close(&again);
 }
 
 /* What resuming needs must be there, of its size, under its name. */
@@ -182,7 +161,7 @@ TEST(missing_parts_are_refused) {
         "train.counters", "train.learning_rate", "train.first_moment", "train.second_moment",
         "train.history",  "train.critic",        "train.target",       "train.frame",
     };
-    Run run;
+    ToyRun run;
     run_open_toy(&run);
     for (size_t k = 0; k < sizeof parts / sizeof *parts; k++) {
         char from[64], to[64];
@@ -205,7 +184,7 @@ TEST(missing_parts_are_refused) {
     swap_text("\"policy.actions\":\"2\"", "\"policy.actions\":\"0\"");
     check_bad_checkpoint(&run, MILD_ERROR_FORMAT, "policy.actions 0 1 64");
     unlink(PATH);
-    run_close(&run);
+    toy_run_close(&run);
 }
 
 /* A run without averages goes on as one with averages, which start from its weights, and back. */
@@ -213,21 +192,21 @@ TEST(averages_come_and_go) {
     MildError error = {0};
     PolicyDef policy_def = toy_policy_def();
     PpoDef def = toy_ppo_def();
-    Run plain, averaged, again;
-    run_open(&plain, &policy_def, &def);
+    ToyRun plain, averaged, again;
+    run_open(&plain, policy_def, def);
     def.average = 0.9;
-    run_open(&averaged, &policy_def, &def);
-    run_open(&again, &policy_def, &def);
+    run_open(&averaged, policy_def, def);
+    run_open(&again, policy_def, def);
     const size_t bytes = (size_t)policy_parameter_count(plain.policy) * sizeof(float);
     assert_int_equal(ppo_bytes(averaged.ppo) - ppo_bytes(plain.ppo), bytes);
     assert_true(ppo_bytes(plain.ppo) > (8 + 2) * bytes); /* gradients and two moments */
-    run_iterate(&plain);
-    run_iterate(&averaged);
+    toy_run_iterate(&plain, 1);
+    toy_run_iterate(&averaged, 1);
     save(&plain);
     assert_int_equal(ppo_load(averaged.ppo, PATH, NULL, 0, &error), MILD_OK);
     assert_memory_equal(policy_parameters(plain.policy),
                         policy_parameters(ppo_average(averaged.ppo)), bytes);
-    run_iterate(&averaged);
+    toy_run_iterate(&averaged, 1);
     save(&averaged);
     assert_int_equal(ppo_load(again.ppo, PATH, NULL, 0, &error), MILD_OK);
     assert_memory_equal(policy_parameters(ppo_average(averaged.ppo)),
@@ -237,44 +216,39 @@ TEST(averages_come_and_go) {
     assert_int_equal(ppo_load(plain.ppo, PATH, NULL, 0, &error), MILD_OK);
     assert_memory_equal(policy_parameters(averaged.policy), policy_parameters(plain.policy), bytes);
     unlink(PATH);
-    run_close(&plain);
-    run_close(&averaged);
-    run_close(&again);
+    toy_run_close(&plain);
+    toy_run_close(&averaged);
+    toy_run_close(&again);
 }
 
 /* With more minibatches than samples in a stratum most shards are empty: what the minibatch before
  * left in them must not count. A run that resumed here has nothing left there. */
 TEST(empty_shards_are_empty) {
     MildError error = {0};
-    Run run, fresh;
+    ToyRun run, fresh;
     PolicyDef policy_def = toy_policy_def();
     PpoDef def = toy_ppo_def();
     def.minibatches = 7; /* the first of them has no sample of 5 steps */
     def.steps = 5;
-    run_open(&run, &policy_def, &def);
-    run_open(&fresh, &policy_def, &def);
-    run_iterate(&run);
+    run_open(&run, policy_def, def);
+    run_open(&fresh, policy_def, def);
+    toy_run_iterate(&run, 1);
     save(&run);
     assert_int_equal(ppo_load(fresh.ppo, PATH, NULL, 0, &error), MILD_OK);
     fresh.toy = run.toy;
-    Run *const runs[2] = {&run, &fresh};
-    for (int k = 0; k < 2; k++) {
-        PpoReport report;
-        toy_rollout(&runs[k]->toy, runs[k]->ppo);
-        ppo_update(runs[k]->ppo, &report);
-        assert_int_equal(report.skipped, 0);
-    }
+    assert_int_equal(toy_run_iterate(&run, 1).skipped, 0);
+    assert_int_equal(toy_run_iterate(&fresh, 1).skipped, 0);
     assert_memory_equal(policy_parameters(run.policy), policy_parameters(fresh.policy),
                         (size_t)policy_parameter_count(run.policy) * sizeof(float));
     unlink(PATH);
-    run_close(&run);
-    run_close(&fresh);
+    toy_run_close(&run);
+    toy_run_close(&fresh);
 }
 
 /* A note that has no room is cut, not left out; with no room at all nothing is written. */
 TEST(notes_are_cut) {
     MildError error = {0};
-    Run run;
+    ToyRun run;
     run_open_toy(&run);
     save(&run);
     for (int size = 0; size <= 5; size++) {
@@ -287,7 +261,7 @@ TEST(notes_are_cut) {
         assert_string_equal(note, size > 0 ? wanted : "????");
     }
     unlink(PATH);
-    run_close(&run);
+    toy_run_close(&run);
 }
 
 TEST_MAIN(NULL, NULL)

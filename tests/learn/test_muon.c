@@ -116,22 +116,11 @@ TEST(singular_values_come_near_one) {
                 x[k * (m.columns + 1)] += (float)(5.0 * scales[s]);
             }
             const Found found = orthogonalise(&m, x);
-            print_message("%2d x %2d, %.0e: singular values %.3f .. %.3f, %.1e from U f(S) V^T\n",
-                          m.rows, m.columns, scales[s], found.least, found.most, found.apart);
             assert_true(found.smallest > 0.0015);
             assert_true(found.least > 0.6 && found.most < 1.3);
             assert_true(found.apart < (scales[s] < 1.0 ? 1e-3 : 1e-5)); /* Jordan's 1e-7 */
         }
     }
-}
-
-/* Gradients 1 and -2, by hand: momentum 1, then 0.95 - 2; with Nesterov's look ahead. */
-TEST(direction_looks_ahead) {
-    float momentum = 0.0f;
-    assert_true(fabs((double)muon_direction(1.0f, &momentum) - 1.95) < 1e-6);
-    assert_true(momentum == 1.0f);
-    assert_true(fabs((double)muon_direction(-2.0f, &momentum) + 2.9975) < 1e-6);
-    assert_true(fabs((double)momentum + 1.05) < 1e-6);
 }
 
 /* One direction becomes f(1) long and makes no other; nothing stays nothing. */

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "learn/adam.h"
-#include "learn/mlp.h"
 #include "learn/noise.h"
 #include "learn/ppo.h"
 #include "learn/ppo_gradient.h"
@@ -17,65 +16,32 @@
 extern int omp_get_max_threads(void); /* clang comes without omp.h */
 
 TEST(test_elementwise_functions) {
-    double worst_exp = 0.0, worst_log = 0.0, worst_elu = 0.0;
     for (double x = -87.0; x < 88.0; x += 1e-3) {
         float at = (float)x;
-        worst_exp = fmax(worst_exp, fabs((double)vector_exp(at) / exp((double)at) - 1.0));
+        expect_near("exp", (double)vector_exp(at) / exp((double)at), 1, 4e-7);
         double elu = at > 0.0f ? (double)at : expm1((double)at);
-        worst_elu = fmax(worst_elu, fabs((double)vector_elu(at) - elu) / fmax(1.0, fabs(elu)));
+        expect_near("elu", (double)vector_elu(at), elu, 4e-7 * fmax(1.0, fabs(elu)));
         double slope = at > 0.0f ? 1.0 : exp((double)at);
-        worst_elu = fmax(worst_elu, fabs((double)vector_elu_slope(vector_elu(at)) - slope));
+        expect_near("elu's slope", (double)vector_elu_slope(vector_elu(at)), slope, 4e-7);
     }
     for (double x = 1e-30; x < 1e30; x *= 1.001) {
         float at = (float)x;
         double exact = log((double)at);
-        worst_log = fmax(worst_log, fabs((double)vector_log(at) - exact) / fmax(1.0, fabs(exact)));
+        expect_near("log", (double)vector_log(at), exact, 3e-7 * fmax(1.0, fabs(exact)));
     }
-    print_message("worst: exp %.1e, elu %.1e, log %.1e\n", worst_exp, worst_elu, worst_log);
-    assert_true(worst_exp < 4e-7 && worst_elu < 4e-7 && worst_log < 3e-7);
     assert_true(vector_elu(0.0f) == 0.0f && vector_log(1.0f) == 0.0f && vector_exp(0.0f) == 1.0f);
     assert_true(isnan(vector_elu(NAN)) && isnan(vector_exp(NAN)));
     assert_true(vector_elu(-INFINITY) == -1.0f && vector_elu(1e30f) == 1e30f);
 }
 
-/* A network with softsign, rows of it, from its equations. */
-TEST(test_softsign_network) {
-    enum { ROWS = 5, IN = 3, HIDDEN = 4 };
-    Mlp mlp = {0};
-    const int hidden[POLICY_LAYERS_MAX] = {HIDDEN};
-    float parameters[64], x[ROWS * IN], y[2][ROWS * HIDDEN];
-    assert_true(mlp_layout(&mlp, IN, hidden, 1, 0) <= 64);
-    mlp.activation = MLP_SOFTSIGN;
-    Random random = random_at(31, 0, 0);
-    fill_normal(parameters, 64, 1.0, &random);
-    fill_normal(x, ROWS * IN, 1.0, &random);
-    const MlpOutputs outputs = {{y[0], y[1]}};
-    const float *result = mlp_forward(&mlp, parameters, ROWS, x, IN, &outputs);
-    const MlpLayer *first = &mlp.layer[0], *last = &mlp.layer[1];
-    for (int r = 0; r < ROWS; r++) {
-        double wanted = (double)parameters[last->bias];
-        for (int i = 0; i < HIDDEN; i++) {
-            double sum = (double)parameters[first->bias + i];
-            for (int j = 0; j < IN; j++) {
-                sum += (double)parameters[first->weight + i * IN + j] * (double)x[r * IN + j];
-            }
-            wanted += (double)parameters[last->weight + i] * sum / (1.0 + fabs(sum));
-        }
-        assert_true(fabs((double)result[r] - wanted) < 1e-5);
-    }
-}
-
 /* The noise's angle: sine and cosine of pi a over its whole range. */
 TEST(test_half_turn) {
-    double worst = 0.0;
     for (int i = -5000; i < 5000; i++) {
         float a = (float)i / 10000.0f;
         double angle = 3.14159265358979323846 * (double)a;
-        worst = fmax(worst, fabs((double)noise_sin(a) - sin(angle)));
-        worst = fmax(worst, fabs((double)noise_cos(a) - cos(angle)));
+        expect_near("sine", (double)noise_sin(a), sin(angle), 3e-7);
+        expect_near("cosine", (double)noise_cos(a), cos(angle), 3e-7);
     }
-    print_message("sine and cosine of half a turn: worst %.1e\n", worst);
-    assert_true(worst < 3e-7);
 }
 
 /* A product that the library refuses is not a number everywhere, so that the update is dropped; and
@@ -116,12 +82,13 @@ TEST(test_noise_is_normal) {
         pairs += i > 1 ? fabs(v) * fabs((double)x[i - 2]) / COUNT : 0.0;
         tail += fabs(v) > 3.0;
     }
-    print_message("moments %.4f %.4f %.4f %.4f, neighbours %.4f, beyond 3 sigma %.5f\n", moment[1],
-                  moment[2], moment[3], moment[4], neighbours, (double)tail / COUNT);
-    assert_true(fabs(moment[1]) < 5e-3 && fabs(moment[2] - 1.0) < 7e-3 && fabs(moment[3]) < 2e-2 &&
-                fabs(moment[4] - 3.0) < 5e-2);
-    assert_true(fabs(neighbours) < 5e-3 && fabs(pairs - 2.0 / 3.14159265) < 5e-3);
-    assert_true(fabs((double)tail / COUNT - 0.0027) < 3e-4);
+    expect_near("mean", moment[1], 0, 5e-3);
+    expect_near("variance", moment[2], 1, 7e-3);
+    expect_near("third moment", moment[3], 0, 2e-2);
+    expect_near("fourth moment", moment[4], 3, 5e-2);
+    expect_near("neighbours", neighbours, 0, 5e-3);
+    expect_near("neighbours of pairs", pairs, 2 / 3.14159265, 5e-3);
+    expect_near("beyond 3 sigma", (double)tail / COUNT, 0.0027, 3e-4);
     free(x);
 }
 
@@ -144,7 +111,7 @@ TEST(test_noise_depends_on_key_and_place_only) {
 TEST(test_adam) {
     enum { COUNT = 37 };
     float p[COUNT], m[COUNT] = {0}, v[COUNT] = {0}, g[COUNT];
-    double pd[COUNT], md[COUNT] = {0}, vd[COUNT] = {0}, worst = 0.0;
+    double pd[COUNT], md[COUNT] = {0}, vd[COUNT] = {0};
     Random random = random_at(1, 2, 3);
     fill_normal(p, COUNT, 1.0, &random);
     for (int i = 0; i < COUNT; i++) {
@@ -159,11 +126,9 @@ TEST(test_adam) {
             vd[i] = 0.999 * vd[i] + 0.001 * grad * grad;
             pd[i] -=
                 0.01 * (md[i] / (1.0 - pow(0.9, t))) / (sqrt(vd[i] / (1.0 - pow(0.999, t))) + 1e-8);
-            worst = fmax(worst, fabs(pd[i] - (double)p[i]));
+            expect_entry("Adam", i, (double)p[i], pd[i], 5e-6);
         }
     }
-    print_message("Adam, 50 steps: worst %.1e\n", worst);
-    assert_true(worst < 5e-6);
 }
 
 #define STEPS 30
@@ -207,14 +172,14 @@ TEST(test_advantages) {
     }
     PpoReport report = {0};
     ppo_returns(ppo, &report);
-    double sum = 0.0, squares = 0.0, worst = 0.0, gap = 0.0, direct[STEPS * ENVS];
+    double sum = 0.0, squares = 0.0, direct[STEPS * ENVS];
     int valid = 0;
     for (int i = 0; i < STEPS * ENVS; i++) {
         valid += b->valid[i];
         assert_true(b->valid[i] || (b->advantage[i] == 0.0f && b->returns[i] == 0.0f));
         if (b->valid[i]) {
             direct[i] = advantage_by_sum(&def, b, i / ENVS, i % ENVS);
-            worst = fmax(worst, fabs(direct[i] + (double)b->value[i] - (double)b->returns[i]));
+            expect_near("return", (double)b->returns[i], direct[i] + (double)b->value[i], 1e-5);
             sum += direct[i];
         }
     }
@@ -223,13 +188,10 @@ TEST(test_advantages) {
         squares += b->valid[i] ? pow(direct[i] - sum, 2) / valid : 0.0;
     }
     for (int i = 0; i < STEPS * ENVS; i++) {
-        gap = fmax(gap, b->valid[i]
-                            ? fabs((direct[i] - sum) / sqrt(squares) - (double)b->advantage[i])
-                            : 0.0);
+        const double wanted = b->valid[i] ? (direct[i] - sum) / sqrt(squares) : 0.0;
+        expect_near("normalised advantage", (double)b->advantage[i], wanted, 1e-5);
     }
-    print_message("worst: return %.1e, normalised advantage %.1e over %d samples\n", worst, gap,
-                  valid);
-    assert_true(worst < 1e-5 && gap < 1e-5 && fabs(report.advantage_std - sqrt(squares)) < 1e-5);
+    expect_near("deviation", report.advantage_std, sqrt(squares), 1e-5);
     ppo_destroy(ppo);
     policy_destroy(policy);
     pool_destroy(pool);

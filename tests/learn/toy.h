@@ -133,4 +133,41 @@ static inline void toy_rollout(Toy *toy, Ppo *ppo) {
     }
 }
 
+/* A learner on it. */
+typedef struct {
+    Policy *policy;
+    Pool *pool;
+    Ppo *ppo;
+    Toy toy;
+} ToyRun;
+
+static inline void toy_run_open(ToyRun *run, int threads, int envs, PolicyDef policy_def,
+                                PpoDef def) {
+    MildError error = {0};
+    PpoMirror mirror = toy_mirror();
+    ppo_set_decoder(&def, 2, 2, &policy_def); /* the speeds, if any */
+    run->policy = policy_create(&policy_def, 5, &error);
+    run->pool = pool_create(threads);
+    assert_non_null(run->policy);
+    assert_non_null(run->pool);
+    run->ppo = ppo_create(&def, run->policy, run->pool, &mirror, envs, 11, &error);
+    assert_non_null(run->ppo);
+    toy_start(&run->toy, run->ppo);
+}
+
+static inline void toy_run_close(ToyRun *run) {
+    ppo_destroy(run->ppo);
+    policy_destroy(run->policy);
+    pool_destroy(run->pool);
+}
+
+static inline PpoReport toy_run_iterate(ToyRun *run, int count) {
+    PpoReport report = {0};
+    for (int i = 0; i < count; i++) {
+        toy_rollout(&run->toy, run->ppo);
+        ppo_update(run->ppo, &report);
+    }
+    return report;
+}
+
 #endif

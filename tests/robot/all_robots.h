@@ -41,4 +41,15 @@ static inline RobotState random_pose(const Robot *robot, double height, Random *
     return state;
 }
 
+/* Torques that hold a pose, with a stiffness of some of the effort a radian. qpos, qvel: in the
+ * robot's order */
+static inline void hold_pose(const Robot *robot, const double *pose, double stiffness,
+                             const double *qpos, const double *qvel, double *torque) {
+    for (int j = 0; j < robot->def.joints; j++) {
+        const double error = pose[j] - qpos[7 + j] - 0.03 * qvel[6 + j];
+        torque[j] = stiffness * robot->effort[j] * error;
+        torque[j] = fmax(fmin(torque[j], robot->effort[j]), -robot->effort[j]);
+    }
+}
+
 #endif

@@ -51,7 +51,6 @@ TEST(test_every_element) {
         {"size", m->geom_size, geoms, 3, mjOBJ_GEOM, 0, 0},
         {"friction", m->geom_friction, geoms, 3, mjOBJ_GEOM, 0, 0},
     };
-    int spoilt = 0;
     for (size_t a = 0; a < sizeof arrays / sizeof *arrays; a++) {
         for (int i = 0; i < arrays[a].rows * arrays[a].width; i++) {
             int row = i / arrays[a].width, id = arrays[a].is_dof ? m->dof_jntid[row] : row;
@@ -64,10 +63,8 @@ TEST(test_every_element) {
                 snprintf(names, sizeof names, "%s %s", arrays[a].what, name ? name : number);
                 check_number(&arrays[a].array[i], -0.01, names);
             }
-            spoilt++;
         }
     }
-    print_message("%d elements of %zu arrays spoilt\n", spoilt, sizeof arrays / sizeof *arrays);
     assert_int_equal(robot_check_model(m, "robot.xml", NULL), MILD_OK);
 }
 
@@ -99,26 +96,20 @@ TEST(test_limits) {
 
 /* The same from a file; and a file that would never end. */
 TEST(test_files) {
-    static const char *const bad[] = {"  nan", "  inf", "-0.04"}; /* as long as what they replace */
-    char folder[] = "/tmp/mild_test_check_XXXXXX", path[64], ini[64];
+    static const char *const bad[] = {"nan", "inf", "-0.04"};
+    char folder[] = "/tmp/mild_test_check_XXXXXX", path[64], ini[64], to[32];
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        MildError error = {0};
+        snprintf(to, sizeof to, "armature=\"%s\"", bad[i]);
+        assert_null(
+            kit_robot_changed(SA01, "sa01.xml", "sa01.xml", "armature=\"0.042\"", to, &error));
+        assert_error(&error, MILD_ERROR_RANGE, "leg_l1_joint armature");
+    }
+    MildError error = {0};
     assert_non_null(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/sa01.xml", folder);
     snprintf(ini, sizeof ini, "%s/robot.ini", folder);
     assert_int_equal(symlink(SA01 "/robot.ini", ini), 0);
-    char *text = kit_read(SA01 "/sa01.xml", NULL);
-    char *armature = strstr(text, "armature=\"0.042\"");
-    assert_non_null(armature);
-    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-        MildError error = {0};
-        memcpy(armature + strlen("armature=\""), bad[i], 5);
-        kit_write_text(path, text);
-        assert_null(robot_create(folder, &error));
-        print_message("%s\n", error.text);
-        assert_error(&error, MILD_ERROR_RANGE, "leg_l1_joint armature");
-    }
-    free(text);
-    MildError error = {0};
-    unlink(path);
     assert_int_equal(mkfifo(path, 0600), 0);
     alarm(20); /* a reader that waits at the pipe ends the test */
     assert_null(robot_create(folder, &error));

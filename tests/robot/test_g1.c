@@ -1,18 +1,16 @@
-/* The biped robots/g1 against the published numbers of g1.json: its fixed upper body by hand, its
- * geometry, its mirror image, and the stand controller on every ground. */
+/* The biped robots/g1 against the published numbers of g1.json: its fixed upper body by hand, and
+ * its geometry. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #define MODEL MILD_SOURCE_DIR "/robots/g1"
 #include "numbers.h"
-#include "stand_kit.h"
+#include "robot_kit.h"
 
 #include <mujoco/mujoco.h>
 
-#include "mild/map.h"
-
-enum { FEET = 2, JOINTS = 12, LEG = 6, NV = 18, X = 0, Y = 1, Z = 2 };
+enum { FEET = 2, JOINTS = 12, LEG = 6 };
 
 /* ---- the upper body ---- */
 
@@ -157,7 +155,6 @@ TEST(the_upper_body_by_hand) {
         total += links[i % LEG].mass;
     }
     expect_near("mass", robot_total_mass(robot), total, 1e-9);
-    print_message("base %.3f kg, centre %.4f %.4f %.4f m\n", mass, center[0], center[1], center[2]);
     robot_sim_destroy(sim);
 }
 
@@ -183,9 +180,6 @@ TEST(the_pose_by_hand) {
     assert_int_equal(robot_points(robot), 0);
     expect_near("height", robot_stand_height(robot), drop, 1e-6);
     RobotSim *sim = new_sim(0.001);
-    RobotState state = stand_state(stand, 0, 0.0);
-    RobotVariation nominal = robot_variation_nominal();
-    robot_sim_load(sim, &state, &nominal);
     for (int f = 0; f < FEET; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
         expect_near("foot's x", foot->position[0], x, 1e-6);
@@ -215,63 +209,6 @@ TEST(motors_and_gait) {
                 fabs(robot_table(robot)->gait_offset[0] - robot_table(robot)->gait_offset[1]), 0.5,
                 0);
     robot_sim_destroy(sim);
-}
-
-/* Mirrored angles put the other foot at the mirrored place. */
-TEST(the_mirror_image) {
-    RobotSim *sim = new_sim(0.001);
-    RobotVariation nominal = robot_variation_nominal();
-    double worst = 0;
-    for (uint32_t draw = 0; draw < 20; draw++) {
-        Random r = random_at(3, draw, 0);
-        RobotState state = stand_state(stand, 0, 0.0), image = state;
-        double position[FEET][3];
-        for (int i = 0; i < JOINTS; i++) {
-            state.qpos[7 + i] += random_uniform(&r, -0.25, 0.25);
-        }
-        for (int i = 0; i < JOINTS; i++) {
-            image.qpos[7 + robot_mirror_joint(robot)[i]] =
-                robot_mirror_sign(robot)[i] * state.qpos[7 + i];
-        }
-        robot_sim_load(sim, &state, &nominal);
-        for (int f = 0; f < FEET; f++) {
-            memcpy(position[f], robot_sim_foot(sim, f)->sole_center, sizeof position[f]);
-        }
-        robot_sim_load(sim, &image, &nominal);
-        for (int f = 0; f < FEET; f++) {
-            const double *other = robot_sim_foot(sim, 1 - f)->sole_center;
-            for (int k = 0; k < 3; k++) {
-                worst = fmax(worst, fabs(position[f][k] - (k == 1 ? -1 : 1) * other[k]));
-            }
-        }
-    }
-    print_message("mirrored feet off by %.1e m\n", worst);
-    assert_true(worst < 1e-9);
-    robot_sim_destroy(sim);
-}
-
-/* ---- standing ---- */
-
-/* Four seconds. material: NULL for rigid ground. */
-static void stand_on(const char *name, const MildMaterial *material) {
-    const KitStand how = {.material = material, .dt = 0.0025, .seconds = 4, .tail = 1};
-    const Standing r = kit_stand(&how);
-    const double rest = kit_sinkage(material), depth = material ? r.depth : 0;
-    print_message("%-11s load %.5f, depth %5.1f of %5.1f mm, still %.1e\n", name, r.load,
-                  1e3 * depth, 1e3 * rest, r.speed);
-    assert_true(r.stands);
-    expect_near("load", r.load, 1, 0.01);
-    expect_near("upright", cos(r.tilt), 1, 0.005);
-    expect_near("depth", depth, rest, 0.15 * rest);
-    assert_true(r.speed < 0.02);
-}
-
-TEST(stands_everywhere) {
-    stand_on("rigid", NULL);
-    for (int g = 0; g < mild_material_preset_count(); g++) {
-        MildMaterial material = kit_preset(mild_material_preset_name(g));
-        stand_on(mild_material_preset_name(g), &material);
-    }
 }
 
 TEST_MAIN(open_numbers, close_numbers)

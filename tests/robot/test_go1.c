@@ -1,12 +1,11 @@
-/* The quadruped robots/go1 against the published numbers of go1.json: its geometry by hand, and the
- * stand controller on every ground. */
+/* The quadruped robots/go1 against the published numbers of go1.json: its geometry by hand. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #define MODEL MILD_SOURCE_DIR "/robots/go1"
 #include "numbers.h"
-#include "stand_kit.h"
+#include "robot_kit.h"
 
 enum { FEET = 4, JOINTS = 12, FL = 0, FR = 1, RL = 2, RR = 3 };
 
@@ -62,9 +61,6 @@ TEST(the_pose_by_hand) {
     expect_near("load of a foot", robot_foot_load(robot), weight / FEET, 1e-6);
     expect_near("height", robot_stand_height(robot), height, 1e-9);
     RobotSim *sim = new_sim(0.001);
-    RobotState state = stand_state(stand, 0, 0.0);
-    RobotVariation nominal = robot_variation_nominal();
-    robot_sim_load(sim, &state, &nominal);
     for (int f = 0; f < FEET; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
         expect_near("foot's x", foot->position[0], front[f] * x, 1e-9);
@@ -98,47 +94,6 @@ TEST(efforts_speeds_and_gait) {
     expect_near("shift",
                 fabs(robot_table(robot)->gait_offset[FL] - robot_table(robot)->gait_offset[FR]),
                 0.5, 0);
-}
-
-/* ---- standing ---- */
-
-static int is_up(const RobotSim *sim, const MildTerrain *terrain) {
-    return kit_tilt(robot_sim_base_rotation(sim)) < 0.5 &&
-           robot_sim_base_clearance(sim, terrain) > 0;
-}
-
-/* Four seconds; a push [N] for 0.1 s after the first. material: NULL for rigid ground. */
-static void check(const char *name, const MildMaterial *material, double dt, const double push[6]) {
-    KitStand how = {.material = material, .dt = dt, .seconds = 4, .tail = 1, .up = is_up};
-    memcpy(how.push, push, sizeof how.push);
-    const Standing r = kit_stand(&how);
-    const double depth = material ? r.depth : 0;
-    print_message("%-11s %.1f ms push %3.0f %3.0f N %s load %.5f, least foot %.2f, depth %5.1f of "
-                  "%5.1f mm, moved %4.1f mm, tilt %.4f rad, still %.4f\n",
-                  name, 1e3 * dt, push[0], push[1], r.stands ? "stands" : "FELL  ", r.load, r.share,
-                  1e3 * depth, 1e3 * r.rest, 1e3 * r.moved, r.tilt, r.speed);
-    assert_true(r.stands);
-    expect_near("load", r.load, 1, 0.01);
-    assert_true(r.share > 0.5);
-    assert_true(r.tilt < 0.1);
-    assert_true(r.speed < 0.3); /* still swaying after the push */
-    expect_near("height", r.height + depth, robot_stand_height(robot), 0.01);
-    if (push[0] != 0 || push[1] != 0) {
-        assert_true(r.moved > 2e-3);
-    } else if (material) {
-        assert_true(fabs(depth - r.rest) < 0.15 * r.rest);
-    }
-}
-
-TEST(stands_and_is_pushed_everywhere) {
-    static const double pushes[3][6] = {{0}, {40, 0}, {0, 25}};
-    for (int p = 0; p < 3; p++) {
-        check("rigid", NULL, 0.001, pushes[p]);
-        for (int g = 0; g < mild_material_preset_count(); g++) {
-            MildMaterial material = kit_preset(mild_material_preset_name(g));
-            check(mild_material_preset_name(g), &material, p == 0 ? 0.0025 : 0.001, pushes[p]);
-        }
-    }
 }
 
 TEST_MAIN(open_numbers, close_numbers)

@@ -125,9 +125,7 @@ TEST(test_load) {
         double depth[STEPS];
         for (int s = 0; s < STEPS; s++) {
             depth[s] = stool_depth(stool, material_name[m], time_step[s]);
-            print_message("%-10s %.0f ms: %.3f mm deep\n", material_name[m], 1e3 * time_step[s],
-                          1e3 * depth[s]);
-            assert_true(fabs(depth[s] - depth[0]) < 0.02 * depth[0]);
+            expect_entry(material_name[m], s, depth[s], depth[0], 0.02 * depth[0]);
         }
         assert_true(m > 0 || fabs(depth[0] - wanted) < 0.05 * wanted);
     }
@@ -153,7 +151,6 @@ static double pressed(const Robot *stool, const char *material, double dt) {
     const double *now = robot_sim_qpos(on.sim);
     const double moved = hypot(now[0] - at[0], now[1] - at[1]);
     assert_true(robot_sim_base_rotation(on.sim)[8] > 0.95);
-    print_message("%-10s %.0f ms: moves %.2g m\n", material, 1e3 * dt, moved);
     step_off(&on);
     return moved;
 }
@@ -164,7 +161,8 @@ TEST(test_pressed) {
     Robot *stool = make_stool("0 1 0", "0 1 0", "0.1", "-0.4");
     for (int m = 0; m < MATERIALS; m++) {
         for (int s = 0; s < STEPS; s++) {
-            assert_true(pressed(stool, material_name[m], time_step[s]) < 0.01);
+            expect_entry(material_name[m], s, pressed(stool, material_name[m], time_step[s]), 0,
+                         0.01);
         }
     }
     robot_destroy(stool);

@@ -162,8 +162,6 @@ TEST(test_angles) {
             "body = foot\nknee = leg\nmirror = one\noffset = 0\nshape = round\n"
             "center = 0 0 -0.05\nradius = 0.02\n",
             &error);
-        print_message("%s, %s and %s: %s\n", cases[i].unit, cases[i].one, cases[i].other,
-                      two ? "taken" : error.text);
         assert_int_equal(!two, cases[i].names != NULL);
         if (!two) {
             assert_error(&error, MILD_ERROR_RANGE, cases[i].names);

@@ -1,5 +1,6 @@
-/* What a workspace reports of a step, against the engine's own functions on data of their own: feet
- * and forces of rigid contact; its limits and its clock. */
+/* What a workspace reports of a step of SA01, against the engine's own functions on data of their
+ * own: momentum, forces of rigid contact, steps on tilted planes; its limits and its clock. Its feet
+ * and its steps without contact: test_walker.c. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,31 +10,31 @@
 #include <mujoco/mujoco.h>
 
 #include "robot/phases.h"
-#include "sa01_sole.h"
+#include "widest.h"
 
 static const char *const feet[SA01_FEET] = {"leg_l6_link", "leg_r6_link"};
 /* Middle of each sole's bounds in its foot's frame: 60 mm ahead, 5.5 mm outward, 55 mm below. */
 static const double middle[SA01_FEET][3] = {{0.06, 0.0055, -0.055}, {0.06, -0.0055, -0.055}};
 
 /* Anywhere, turned any way about z and up to `tilt` otherwise, bent within the joints' ranges. */
-static RobotState draw_state(uint32_t draw, double height, double tilt) {
+static RobotState draw_state(const Robot *of, uint32_t draw, double height, double tilt) {
     Random r = random_at(41, draw, 0);
     RobotState state = {.qpos = {random_uniform(&r, -1, 1), random_uniform(&r, -1, 1), height}};
     double angle[3] = {random_uniform(&r, -tilt, tilt), random_uniform(&r, -tilt, tilt),
                        random_uniform(&r, -3.1, 3.1)};
     mju_euler2Quat(state.qpos + 3, angle, "XYZ");
-    for (int i = 0; i < SA01_JOINTS; i++) {
-        double low = robot_joint_low(robot)[i], high = robot_joint_high(robot)[i];
-        double q = robot_default_pose(robot)[i] + random_uniform(&r, -0.15, 0.15);
+    for (int i = 0; i < robot_joints(of); i++) {
+        double low = robot_joint_low(of)[i], high = robot_joint_high(of)[i];
+        double q = robot_default_pose(of)[i] + random_uniform(&r, -0.15, 0.15);
         state.qpos[7 + i] = fmin(fmax(q, low + 0.01), high - 0.01);
     }
-    for (int i = 0; i < SA01_NV; i++) {
+    for (int i = 0; i < 6 + robot_joints(of); i++) {
         state.qvel[i] = random_uniform(&r, -1, 1);
     }
     return state;
 }
 
-/* Data of their own at a pose of the sim's model, or of the whole file's. */
+/* Data of their own at a pose of the sim's model. */
 static mjData *engine_at(const mjModel *m, const double *qpos, const double *qvel) {
     mjData *d = mj_makeData(m);
     memcpy(d->qpos, qpos, sizeof(double) * SA01_NQ);
@@ -53,8 +54,6 @@ static MildMap *waves(void) {
     return map;
 }
 
-/* ---- feet ---- */
-
 /* Velocity of a point that moves with a body. */
 static void point_velocity(const mjModel *m, const mjData *d, int body, const double point[3],
                            double linear[3], double angular[3]) {
@@ -64,112 +63,95 @@ static void point_velocity(const mjModel *m, const mjData *d, int body, const do
     mju_mulMatVec(angular, jr, d->qvel, 3, SA01_NV);
 }
 
-/* [m] Lowest point of foot f's outline above the ground. */
-static double lowest_point(const mjModel *m, const mjData *d, int f, const MildTerrain *terrain) {
-    int body = mj_name2id(m, mjOBJ_BODY, feet[f]);
-    double least = 1e9;
-    for (int i = 0; i < 2 * SA01_OUTLINE_ROWS; i++) {
-        const double *row = sa01_outline[i / 2], side = f == SA01_LEFT ? 1 : -1;
-        const double local[3] = {row[0], side * row[1 + i % 2], -0.055};
-        double at[3];
-        mju_mulMatVec3(at, d->xmat + 9 * body, local);
-        mju_addTo3(at, d->xpos + 3 * body);
-        double ground = terrain ? mild_terrain_height_at(terrain, at[0], at[1]) : 0;
-        least = fmin(least, at[2] - ground);
-    }
-    return least;
-}
-
-static void check_foot(const RobotSim *sim, const mjModel *m, const mjData *d, int f) {
-    const RobotFoot *foot = robot_sim_foot(sim, f);
-    int body = mj_name2id(m, mjOBJ_BODY, feet[f]);
-    double center[3], twist[6], at_center[3], turning[3];
-    const double *ankle = d->xpos + 3 * body;
-    mju_mulMatVec3(center, d->xmat + 9 * body, middle[f]);
-    mju_addTo3(center, ankle);
-    point_velocity(m, d, body, ankle, twist, twist + 3);
-    point_velocity(m, d, body, center, at_center, turning);
-    for (int k = 0; k < 3; k++) {
-        expect_entry("ankle", k, foot->position[k], ankle[k], 1e-12);
-        expect_entry("sole's centre", k, foot->sole_center[k], center[k], 1e-4);
-        expect_entry("its velocity", k, foot->sole_center_velocity[k], at_center[k], 1e-3);
-        expect_entry("force before a step", k, foot->force[k], 0, 0);
-    }
-    for (int k = 0; k < 9; k++) {
-        expect_entry("foot's rotation", k, foot->rotation[k], d->xmat[9 * body + k], 1e-12);
-    }
-    for (int k = 0; k < 6; k++) {
-        expect_entry("twist", k, foot->velocity[k], twist[k], 1e-12);
-    }
-}
-
-/* After a step: the pose's quantities are those of its end, heights those above its ground. */
-TEST(test_feet_after_a_step) {
-    RobotSim *sim = new_sim(0.0025);
-    RobotVariation nominal = robot_variation_nominal();
-    MildMap *map = waves();
-    MildTerrain wavy = kit_terrain("grass");
-    wavy.map = map, wavy.height = -0.2;
-    MildGround *ground = kit_ground(robot);
-    const mjModel *m = robot_sim_model(sim);
-    for (uint32_t draw = 0; draw < 5; draw++) {
-        RobotState state = draw_state(draw, 1.5, 0.2);
-        double torque[SA01_JOINTS] = {0};
-        robot_sim_load(sim, &state, &nominal);
-        assert_int_equal(robot_sim_step(sim, torque, NULL, &wavy, ground), 0);
-        mjData *d = engine_at(m, robot_sim_qpos(sim), robot_sim_qvel(sim));
-        for (int f = 0; f < SA01_FEET; f++) {
-            check_foot(sim, m, d, f);
-            expect_entry("height", f, robot_sim_foot(sim, f)->sole_height,
-                         lowest_point(m, d, f, &wavy), 1e-12);
-        }
-        mj_deleteData(d);
-    }
-    free(ground);
-    mild_map_destroy(map);
-    robot_sim_destroy(sim);
-}
-
 /* ---- steps ---- */
 
-/* In the air our soft step is the engine's, joints beyond their limits included. */
-TEST(test_soft_step_in_the_air) {
-    RobotSim *sim = new_sim(0.001);
-    RobotVariation nominal = robot_variation_nominal();
-    MildTerrain terrain = kit_terrain("sand_loose");
+/* Near the ground, a little turned and bent, in motion. */
+static RobotState random_state(uint32_t draw) {
+    Random random = random_at(11, draw, 0);
+    RobotState state = {.qpos = {0, 0, robot_stand_height(robot) - 0.005, 1}};
+    for (int k = 3; k < 7; k++) {
+        state.qpos[k] += random_uniform(&random, -0.1, 0.1);
+    }
+    mju_normalize4(state.qpos + 3);
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        state.qpos[7 + i] = robot_default_pose(robot)[i] + random_uniform(&random, -0.1, 0.1);
+    }
+    for (int i = 0; i < SA01_NV; i++) {
+        state.qvel[i] = random_uniform(&random, -0.5, 0.5);
+    }
+    return state;
+}
+
+/* Momentum, and angular momentum about the centre of mass, of these speeds at this pose. */
+static void momentum(RobotSim *sim, const double *qpos, const double *qvel, double out[6],
+                     double center[3]) {
+    const mjModel *m = robot_sim_model(sim);
+    mjData *d = engine_at(m, qpos, qvel);
+    mj_subtreeVel(m, d);
+    for (int k = 0; k < 3; k++) {
+        out[k] = m->body_subtreemass[1] * d->subtree_linvel[3 + k];
+        out[3 + k] = d->subtree_angmom[3 + k];
+        center[k] = d->subtree_com[3 + k];
+    }
+    mj_deleteData(d);
+}
+
+/* wrench += a force and a torque at `point`, about `center`. */
+static void add_wrench(double wrench[6], const double *force, const double *torque,
+                       const double *point, const double *center) {
+    double arm[3], moment[3];
+    mju_sub3(arm, point, center);
+    mju_cross(moment, arm, force);
+    mju_addTo3(wrench, force);
+    mju_addTo3(wrench + 3, torque);
+    mju_addTo3(wrench + 3, moment);
+}
+
+/* Change of both momenta = dt (weight, push, feet), in contact and in the air. Exact at the pose of
+ * the step's start and from rest: a step from there has no other terms. */
+TEST(test_momentum) {
+    RobotSim *sim = new_sim(0.0005);
+    MildTerrain terrain = kit_terrain("foam60");
     MildGround *ground = kit_ground(robot);
-    mjModel *m = robot_sim_model(sim);
-    double worst = 0;
-    for (int joint = -1; joint < 2 * SA01_JOINTS; joint++) {
-        RobotState state = draw_state(7, 3, 0.5);
-        int j = joint / 2;
-        if (joint >= 0) {
-            state.qpos[7 + j] =
-                joint % 2 ? robot_joint_low(robot)[j] - 0.01 : robot_joint_high(robot)[j] + 0.01;
-        }
-        double torque[SA01_JOINTS];
+    RobotVariation nominal = robot_variation_nominal();
+    const double push[6] = {30, -20, 10, 4, -5, 6}, at_rest[SA01_NV] = {0};
+    double largest[6] = {0};
+    int loaded = 0;
+    for (uint32_t draw = 0; draw < 20; draw++) {
+        RobotState state = random_state(draw);
+        state.qpos[2] += draw % 2 ? 0.5 : 0.0;
+        memset(state.qvel, 0, sizeof state.qvel);
+        robot_sim_load(sim, &state, &nominal);
+        mild_ground_reset(ground);
+        double torque[SA01_JOINTS], before[6], after[6], center[3], wrench[6] = {0}, base[3];
         for (int i = 0; i < SA01_JOINTS; i++) {
             torque[i] = 3.0 - i;
         }
-        mj_resetData(m, robot_sim_data(sim));
-        robot_sim_load(sim, &state, &nominal);
-        mjData *d = mj_makeData(m);
-        memcpy(d->qpos, state.qpos, sizeof state.qpos);
-        memcpy(d->qvel, state.qvel, sizeof state.qvel);
-        for (int i = 0; i < 4; i++) {
-            memcpy(d->qfrc_applied + 6, torque, sizeof torque);
-            mj_step(m, d);
-            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+        memcpy(base, ((const mjData *)robot_sim_data(sim))->xipos + 3, sizeof base);
+        momentum(sim, state.qpos, at_rest, before, center);
+        add_wrench(wrench, push, push + 3, base, center);
+        wrench[2] -= 9.81 * robot_total_mass(robot);
+        double ankle[SA01_FEET][3];
+        for (int f = 0; f < SA01_FEET; f++) {
+            memcpy(ankle[f], robot_sim_foot(sim, f)->position, sizeof ankle[f]);
         }
-        for (int i = 0; i < SA01_NV; i++) {
-            worst = fmax(worst, fabs(d->qvel[i] - robot_sim_qvel(sim)[i]));
-            expect_entry("position", i, robot_sim_qpos(sim)[i], d->qpos[i], 1e-10);
+        assert_int_equal(robot_sim_step(sim, torque, push, &terrain, ground), 0);
+        for (int f = 0; f < SA01_FEET; f++) {
+            const RobotFoot *foot = robot_sim_foot(sim, f);
+            loaded += foot->force[2] > 1;
+            add_wrench(wrench, foot->force, foot->torque, ankle[f], center);
         }
-        expect_entry("time", joint, ((const mjData *)robot_sim_data(sim))->time, 0.004, 1e-12);
-        mj_deleteData(d);
+        momentum(sim, state.qpos, robot_sim_qvel(sim), after, center);
+        for (int k = 0; k < 6; k++) {
+            double change = after[k] - before[k];
+            largest[k] = fmax(largest[k], fabs(change));
+            expect_entry("momentum", k, change, robot_sim_dt(sim) * wrench[k], 1e-12);
+        }
     }
-    print_message("soft step in the air against mj_step: worst %.1e\n", worst);
-    assert_true(worst < 1e-9);
+    for (int k = 0; k < 6; k++) {
+        assert_true(largest[k] > 0.01);
+    }
+    assert_true(loaded >= 10);
     free(ground);
     robot_sim_destroy(sim);
 }
@@ -182,7 +164,7 @@ TEST(test_step_moves_the_ground) {
     MildTerrain terrain = kit_terrain("sand_loose");
     MildGround *ground = kit_ground(robot), *other = kit_ground(robot), *virgin = kit_ground(robot);
     size_t bytes = mild_ground_size(ground);
-    RobotState state = draw_state(2, 1, 0.05);
+    RobotState state = draw_state(robot, 2, 1, 0.05);
     double torque[SA01_JOINTS] = {0};
     robot_sim_load(sim, &state, &nominal);
     state.qpos[2] -= robot_sim_sole_clearance(sim, &terrain) + 0.005;
@@ -205,20 +187,25 @@ TEST(test_step_moves_the_ground) {
     robot_sim_destroy(sim);
 }
 
-/* Speeds up to 1000 are numbers, beyond they went bad. */
-TEST(test_fastest) {
+/* Speeds up to 1000 are numbers; beyond, and under bad torques, they went bad. */
+TEST(test_bad_numbers) {
+    static const struct {
+        double speed, torque;
+        int bad;
+    } cases[] = {{999, 0, 0}, {-999, 0, 0}, {1001, 0, 1}, {-1001, 0, 1},
+                 {0, NAN, 1}, {0, 1e9, 1},  {0, 0, 0}};
     RobotSim *sim = new_sim(0.001);
     RobotVariation nominal = robot_variation_nominal();
     MildTerrain terrain = kit_terrain("sand_loose");
     MildGround *ground = kit_ground(robot);
-    const double speeds[4] = {999, -999, 1001, -1001};
-    for (int i = 0; i < 4; i++) {
-        RobotState state = draw_state(3, 50, 0);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        RobotState state = draw_state(robot, 3, 50, 0);
         double torque[SA01_JOINTS] = {0};
         memset(state.qvel, 0, sizeof state.qvel);
-        state.qvel[i / 2 ? 1 : 0] = speeds[i];
+        state.qvel[1] = cases[i].speed;
+        torque[3] = cases[i].torque;
         robot_sim_load(sim, &state, &nominal);
-        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), i >= 2);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), cases[i].bad);
     }
     free(ground);
     robot_sim_destroy(sim);
@@ -230,7 +217,7 @@ TEST(test_load_and_store) {
     RobotVariation nominal = robot_variation_nominal();
     MildTerrain terrain = kit_terrain("sand_loose");
     MildGround *ground = kit_ground(robot);
-    RobotState state = draw_state(2, 1, 0.1), back;
+    RobotState state = draw_state(robot, 2, 1, 0.1), back;
     double torque[SA01_JOINTS] = {0};
     robot_sim_load(sim, &state, &nominal);
     state.qpos[2] -= robot_sim_sole_clearance(sim, &terrain) + 0.01; /* a foot 10 mm deep */
@@ -300,7 +287,7 @@ TEST(test_phases) {
         RobotSim *sim = new_sim(0.001);
         RobotPhases phases = {0};
         double torque[SA01_JOINTS] = {0};
-        RobotState state = draw_state(2, 0.8, 0.1);
+        RobotState state = draw_state(robot, 2, 0.8, 0.1);
         variation.rigid = rigid;
         robot_sim_load(sim, &state, &variation);
         robot_sim_time_phases(sim, &phases);
@@ -464,7 +451,7 @@ TEST(test_rigid_contact) {
     int loaded[SA01_FEET] = {0}, partly = 0;
     for (uint32_t draw = 0; draw < 12; draw++) {
         const MildTerrain *terrain = draw % 2 ? &level : &wavy;
-        RobotState state = draw_state(draw, 1, 0.1);
+        RobotState state = draw_state(robot, draw, 1, 0.1);
         robot_sim_load(sim, &state, &rigid);
         state.qpos[2] -= robot_sim_sole_clearance(sim, terrain) + 0.003;
         robot_sim_load(sim, &state, &rigid);
@@ -472,12 +459,122 @@ TEST(test_rigid_contact) {
             partly += check_rigid_step(sim, terrain, loaded);
         }
     }
-    print_message(
-        "rigid contact: feet loaded in %d and %d of 300 steps, %d times on some corners\n",
-        loaded[0], loaded[1], partly);
     assert_true(loaded[0] > 50 && loaded[1] > 50 && partly > 50);
     mild_map_destroy(map);
     robot_sim_destroy(sim);
+}
+
+/* A plane of these rises per metre, whose heights a float holds exactly. */
+static MildMap *plane_map(double along_x, double along_y) {
+    enum { EDGE = 9 };
+    double heights[EDGE * EDGE];
+    for (int r = 0; r < EDGE; r++) {
+        for (int c = 0; c < EDGE; c++) {
+            heights[EDGE * r + c] = along_x * (c - EDGE / 2) + along_y * (EDGE / 2 - r);
+        }
+    }
+    MildMapDef def = mild_map_def_default();
+    def.kind = MILD_MAP_IMAGE;
+    def.amplitude = def.cell = 1;
+    def.heights = heights;
+    def.height_columns = def.height_rows = EDGE;
+    MildMap *map = mild_map_create(&def, NULL);
+    assert_non_null(map);
+    return map;
+}
+
+/* A slope is the engine's own floor, tilted, also where it is so steep that the engine takes other
+ * tangents: robots dropped onto the plane, limp. */
+TEST(test_any_plane_is_the_engine) {
+    static const double planes[][2] = {{0, 0.25}, {0.25, -0.5}, {0, 0.75}, {-0.25, -1}, {0, 1.5}};
+    int contacts = 0;
+    for (uint32_t draw = 0; draw < 10; draw++) {
+        const double *rise = planes[draw % 5];
+        double length = sqrt(1 + rise[0] * rise[0] + rise[1] * rise[1]);
+        const double normal[3] = {-rise[0] / length, -rise[1] / length, 1 / length};
+        MildMap *map = plane_map(rise[0], rise[1]);
+        MildTerrain terrain = kit_terrain("sand_loose");
+        terrain.map = map;
+        RobotSim *sim = new_sim(0.001);
+        mjModel *m = robot_sim_model(sim);
+        mjData *engine = mj_makeData(m);
+        RobotState state = random_state(draw);
+        RobotVariation rigid = robot_variation_nominal();
+        int floor = mj_name2id(m, mjOBJ_GEOM, "floor");
+        rigid.rigid = 1;
+        rigid.rigid_friction = 0.6;
+        mju_quatZ2Vec(m->geom_quat + 4 * floor, normal);
+        m->geom_sameframe[floor] = mjSAMEFRAME_NONE;
+        robot_sim_load(sim, &state, &rigid);
+        state.qpos[2] -= robot_sim_sole_clearance(sim, &terrain) - 0.001;
+        robot_sim_load(sim, &state, &rigid);
+        memcpy(engine->qpos, state.qpos, sizeof state.qpos);
+        memcpy(engine->qvel, state.qvel, sizeof state.qvel);
+        for (int i = 0; i < 150; i++) {
+            double torque[SA01_JOINTS] = {0};
+            mj_step(m, engine);
+            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
+            contacts += robot_sim_contact(sim)->foot[0].contacts;
+            contacts += robot_sim_contact(sim)->foot[1].contacts;
+        }
+        for (int i = 0; i < SA01_NQ; i++) {
+            expect_entry("position", i, robot_sim_qpos(sim)[i], engine->qpos[i], 1e-9);
+        }
+        mj_deleteData(engine);
+        robot_sim_destroy(sim);
+        mild_map_destroy(map);
+    }
+    assert_true(contacts > 1000);
+}
+
+/* ---- four feet ---- */
+
+/* Least of both mirrored pairs: feet, then knees, left less right along the base's left; 0 when the
+ * base points straight up. */
+TEST(test_distances) {
+    MildError error = {0};
+    Robot *widest = widest_open(&error);
+    expect_good(widest != NULL, &error);
+    RobotSim *sim = robot_sim_create(widest, 0.001, &error);
+    assert_non_null(sim);
+    RobotVariation nominal = robot_variation_nominal();
+    const mjData *d = robot_sim_data(sim);
+    const mjModel *m = robot_sim_model(sim);
+    int which[2] = {0};
+    for (uint32_t draw = 0; draw < 20; draw++) {
+        RobotState state = draw_state(widest, draw, 3, 1);
+        robot_sim_load(sim, &state, &nominal);
+        const double x[3] = {1, 0, 0}, z[3] = {0, 0, 1};
+        double ahead[3], left[3], feet[2], knees[2];
+        mju_rotVecQuat(ahead, x, state.qpos + 3);
+        ahead[2] = 0;
+        mju_normalize3(ahead);
+        mju_cross(left, z, ahead);
+        for (int pair = 0; pair < 2; pair++) {
+            double between[3];
+            char name[2][8];
+            mju_sub3(between, robot_sim_foot(sim, 2 * pair)->sole_center,
+                     robot_sim_foot(sim, 2 * pair + 1)->sole_center);
+            feet[pair] = mju_dot3(between, left);
+            for (int side = 0; side < 2; side++) {
+                snprintf(name[side], sizeof name[side], "b%d5", 2 * pair + side);
+            }
+            mju_sub3(between, d->xpos + 3 * mj_name2id(m, mjOBJ_BODY, name[0]),
+                     d->xpos + 3 * mj_name2id(m, mjOBJ_BODY, name[1]));
+            knees[pair] = mju_dot3(between, left);
+        }
+        which[feet[0] < feet[1]]++;
+        assert_true(fabs(robot_sim_foot_distance(sim) - fmin(feet[0], feet[1])) < 1e-12);
+        assert_true(fabs(robot_sim_knee_distance(sim) - fmin(knees[0], knees[1])) < 1e-12);
+    }
+    assert_true(which[0] > 2 && which[1] > 2);
+    RobotState up = draw_state(widest, 0, 3, 1);
+    const double nose_up[4] = {sqrt(0.5), 0, -sqrt(0.5), 0};
+    memcpy(up.qpos + 3, nose_up, sizeof nose_up);
+    robot_sim_load(sim, &up, &nominal);
+    assert_true(robot_sim_knee_distance(sim) == 0 && robot_sim_foot_distance(sim) == 0);
+    robot_sim_destroy(sim);
+    assert_int_equal(widest_close(widest), 0);
 }
 
 TEST_MAIN(setup, teardown)

@@ -102,18 +102,4 @@ TEST(test_numbers) {
     robot_sim_destroy(fresh);
 }
 
-/* The nominal variation is the file's robot: 1, 1, 0.8, nothing added, soft ground. */
-TEST(test_nominal) {
-    RobotVariation v = robot_variation_nominal();
-    assert_true(v.base_mass_add == 0 && v.armature_scale == 1 && v.rigid_friction == 0.8);
-    assert_true(v.rigid_time == 0);
-    assert_int_equal(v.rigid, 0);
-    for (int k = 0; k < 3; k++) {
-        assert_true(v.com_offset[k] == 0);
-    }
-    for (int i = 0; i <= SA01_JOINTS; i++) {
-        assert_true(v.link_mass_scale[i] == 1);
-    }
-}
-
 TEST_MAIN(setup, teardown)

@@ -113,4 +113,20 @@ static inline Oracle rig_place(Rig *rig, uint32_t draw) {
     return oracle_of(rig->sim);
 }
 
+/* ---- the environment of a case ---- */
+
+static Rig rig;
+
+static inline int open_quiet(void **state) {
+    (void)state;
+    rig_open_quiet(&rig, 0.5);
+    return 0;
+}
+
+static inline int close_rig(void **state) {
+    (void)state;
+    rig_close(&rig);
+    return 0;
+}
+
 #endif

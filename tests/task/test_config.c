@@ -1,121 +1,6 @@
-/* Defaults and ranges of the task's keys: configs/default.ini says them once more, in figures. */
+/* What the task's keys do together: the nominal task, what is refused, gains and limits as texts.
+ * Defaults and ranges: config/test_config. */
 #include "task_kit.h"
-
-#include "env/task/terrain.h"
-
-static FILE *ini;
-
-static void rewind_to_section(const char *section) {
-    char line[512], wanted[64];
-    snprintf(wanted, sizeof wanted, "[%s]\n", section);
-    rewind(ini);
-    do {
-        assert_non_null(fgets(line, sizeof line, ini));
-    } while (strcmp(line, wanted) != 0);
-}
-
-/* "(-3 .. 3)" at the end of a help line. */
-static int range_of(const char *help, double *low, double *high) {
-    const char *open = strrchr(help, '(');
-    return open && sscanf(open, "(%lf .. %lf)", low, high) == 2;
-}
-
-/* "(first, second, ...)" at the end of a help line: the field's names in order. */
-static void expect_names(const MildField *field, const char *help, const void *def,
-                         const char *value) {
-    const char *at = strrchr(help, '(');
-    assert_non_null(at);
-    for (int i = 0; i <= (int)field->max; i++) {
-        size_t length = strlen(field->names[i]);
-        assert_memory_equal(at + 1, field->names[i], length);
-        at += 1 + length;
-        assert_true(*at == (i == (int)field->max ? ')' : ','));
-        at += *at == ',';
-    }
-    const int chosen = *(const int *)(const void *)((const char *)def + field->offset);
-    size_t length = strlen(field->names[chosen]);
-    assert_memory_equal(value, field->names[chosen], length);
-    assert_true(value[length] == '\n' && field->min == 0);
-}
-
-/* The line's values are the defaults, all of them and no more. */
-static void expect_default(const MildField *field, const void *def, const char *value) {
-    const char *at = (const char *)def + field->offset;
-    for (int i = 0; i < field->count; i++) {
-        char *end;
-        double got;
-        double wanted = strtod(value, &end);
-        if (field->type == MILD_FIELD_DOUBLE) {
-            got = ((const double *)(const void *)at)[i];
-        } else if (field->type == MILD_FIELD_UINT64) {
-            got = (double)((const uint64_t *)(const void *)at)[i];
-        } else {
-            got = ((const int *)(const void *)at)[i];
-        }
-        if (field->type == MILD_FIELD_BOOL) {
-            assert_true(field->min == 0 && field->max == 1);
-            wanted = strncmp(value, "true", 4) == 0;
-            end += wanted > 0 ? 4 : 5;
-        }
-        expect_entry(field->name, i, got, wanted, 1e-12 * fabs(wanted));
-        assert_true(end > value);
-        value = end;
-    }
-    assert_true(*value == '\n');
-}
-
-static void expect_text(const MildField *field, const void *def, const char *value) {
-    const char *text = (const char *)def + field->offset;
-    assert_memory_equal(value, text, strlen(text));
-    assert_true(value[strlen(text)] == '\n');
-}
-
-/* Every field has its lines in the file's order: help with the range, then name = value. */
-static void check_section(const char *section, const MildField *fields, int count,
-                          const void *def) {
-    rewind_to_section(section);
-    int ranges = 0;
-    for (int i = 0; i < count; i++) {
-        char help[512], line[512];
-        assert_non_null(fgets(help, sizeof help, ini));
-        assert_non_null(fgets(line, sizeof line, ini));
-        size_t name = strlen(fields[i].name);
-        if (strncmp(line, fields[i].name, name) != 0 || strncmp(line + name, " = ", 3) != 0) {
-            fail_msg("%s.%s is not where default.ini has it: %s", section, fields[i].name, line);
-        }
-        const char *value = line + name + 3;
-        if (fields[i].type == MILD_FIELD_NAME) {
-            expect_names(&fields[i], help, def, value);
-        } else if (fields[i].type == MILD_FIELD_TEXT) {
-            expect_text(&fields[i], def, value);
-        } else {
-            expect_default(&fields[i], def, value);
-        }
-        double low, high;
-        if (range_of(help, &low, &high)) {
-            expect_near(fields[i].name, fields[i].min, low, 1e-12);
-            expect_near(fields[i].name, fields[i].max, high, 1e-12 * fabs(high));
-            ranges++;
-        }
-    }
-    assert_true(ranges >= count / 2);
-}
-
-TEST(defaults) {
-    ini = fopen(MILD_SOURCE_DIR "/configs/default.ini", "r");
-    assert_non_null(ini);
-    TaskDef def = task_def_default();
-    check_section("task", task_fields, task_field_count, &def);
-    check_section("reward", reward_fields, reward_field_count, &def.reward);
-    check_section("randomize", randomize_fields, randomize_field_count, &def.randomize);
-    TerrainDef terrain = terrain_def_default();
-    int count;
-    const MildField *fields = terrain_fields(&count);
-    check_section("terrain", fields, count, &terrain);
-    fclose(ini);
-}
-
-/* ---- the nominal task ---- */
 
 /* What task_def_make_nominal leaves of a random key: [0] and, of a range, [1]. */
 static const struct {
@@ -190,6 +75,15 @@ TEST(refused) {
     def.randomize.rigid_share = 0.6;
     check_bad_task(&def, "rigid_share preset_share 1");
     def = task_def_default();
+    def = task_def_default();
+    def.shells_stand = 0; /* which a lying robot needs */
+    def.start = TASK_START_BACK;
+    check_bad_task(&def, "task.start task.shells_stand");
+    def.start = TASK_START_STAND;
+    def.may_lie = 1;
+    check_bad_task(&def, "task.may_lie task.shells_stand");
+    def = task_def_default();
+    def.shells_stand = 0;
     def.randomize.rigid_share = 0.5;
     def.vx[0] = def.vx[1];
     assert_int_equal(task_def_check(&def, &error), MILD_OK);

@@ -6,8 +6,6 @@
 
 #define STEPS_MAX 20
 
-static Rig rig;
-
 /* What each physics step of a policy period saw. Entry 0 is the state before the first one. */
 typedef struct {
     int count;
@@ -72,6 +70,12 @@ static void open_with_dt(double dt) {
     rig_start(&rig, 0.5, 0, 0);
 }
 
+static int open_usual(void **state) {
+    (void)state;
+    open_with_dt(0.0025);
+    return 0;
+}
+
 /* kp (q0 + scale a + offset - q) - kd qd with the gains of docs/task.md section 4, by joint. */
 static double wanted_torque(int i, const double *pose, double action, int k) {
     const double kp[LEG_JOINTS] = {50, 50, 70, 70, 20, 20}, kd[LEG_JOINTS] = {5, 5, 7, 7, 0.2, 0.2};
@@ -84,8 +88,7 @@ static double wanted_torque(int i, const double *pose, double action, int k) {
 }
 
 /* The torques of a drive take the place of the PD's at every physics step, within the limits. */
-TEST(drive) {
-    open_with_dt(0.0025);
+TEST_WITH(drive, open_usual, close_rig) {
     int calls = 0;
     const TaskDrive asked = {ask_torque, &calls};
     const TaskCallback callback = {note_step, NULL, &asked};
@@ -99,13 +102,11 @@ TEST(drive) {
             assert_true(trace.torque[k][i] == wanted);
         }
     }
-    rig_close(&rig);
 }
 
 /* Gains, strengths and offsets of every joint apart; some torques at their limits of 119 and 20.4
  * N m. */
-TEST(torque) {
-    open_with_dt(0.0025);
+TEST_WITH(torque, open_usual, close_rig) {
     int clipped = 0;
     for (uint32_t draw = 0; draw < 10; draw++) {
         RobotState state = kit_moving_state(2, draw);
@@ -130,7 +131,6 @@ TEST(torque) {
         }
     }
     assert_true(clipped > 20);
-    rig_close(&rig);
 }
 
 static const int *counted; /* the state of the motors below */
@@ -189,8 +189,7 @@ TEST(motors) {
 }
 
 /* +-8; what is no number becomes -8. The two actions before are kept. */
-TEST(action_is_clipped) {
-    open_with_dt(0.0025);
+TEST_WITH(action_is_clipped, open_usual, close_rig) {
     float action[SA01_JOINTS] = {9, -9, NAN, 7.5f, -7.5f, INFINITY};
     const float wanted[6] = {8, -8, -8, 7.5f, -7.5f, 8};
     float first[SA01_JOINTS] = {0.25f, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, -0.5f};
@@ -208,7 +207,6 @@ TEST(action_is_clipped) {
     rig.def.action_clip = 0.5;
     rig_step(&rig, action);
     assert_true(rig.env->action[0][0] == 0.5f && rig.env->action[0][1] == -0.5f);
-    rig_close(&rig);
 }
 
 /* The new action acts from physics step `lag` on, before it the previous one. */
@@ -328,8 +326,7 @@ TEST(latencies) {
 }
 
 /* Redrawn every 8 s; the policy sees it one policy step after it is in force. */
-TEST(command_is_seen_late) {
-    open_with_dt(0.0025);
+TEST_WITH(command_is_seen_late, open_usual, close_rig) {
     rig.env->command_frozen = 0;
     rig.def.command_interval = 0.05;
     rig.def.standing_share = 0;
@@ -346,7 +343,6 @@ TEST(command_is_seen_late) {
             expect_entry("seen", i, (double)rig.frame[3 + i], before[i] * (i < 2 ? 2 : 1), 1e-6);
         }
     }
-    rig_close(&rig);
 }
 
 /* 0.125 s are 12.5 policy steps: 13, for the command, the push and the end of an episode. */
@@ -375,8 +371,7 @@ TEST(intervals_are_rounded) {
 }
 
 /* 0.01 s of a period of 0.8 s is 1/80. */
-TEST(clock_runs) {
-    open_with_dt(0.0025);
+TEST_WITH(clock_runs, open_usual, close_rig) {
     rig.env->phase = 0.503;
     for (int t = 1; t <= 100; t++) {
         RobotState state = kit_state(2);
@@ -400,12 +395,10 @@ TEST(clock_runs) {
     before = rig.env->phase;
     rig_step(&rig, NULL);
     expect_near("a fast command", rig.env->phase, before + 0.02, 1e-12);
-    rig_close(&rig);
 }
 
 /* A phase and a state of the step's end: the reward's clock is that of the action. */
-TEST(reward_follows_the_clock_of_the_action) {
-    open_with_dt(0.0025);
+TEST_WITH(reward_follows_the_clock_of_the_action, open_usual, close_rig) {
     RobotState state = kit_state(2);
     put(&state); /* in the air: no contact; left scheduled to stand, right to swing */
     rig.env->phase = 0.499;
@@ -416,12 +409,10 @@ TEST(reward_follows_the_clock_of_the_action) {
     put(&state);
     rig_step(&rig, NULL);
     expect_near("gait", rig.env->term_sum[REWARD_gait], 0.014 + 0.0049, 1e-9);
-    rig_close(&rig);
 }
 
 /* The torque of the last physics step is the one that the reward sees. */
-TEST(reward_sees_the_torque) {
-    open_with_dt(0.0025);
+TEST_WITH(reward_sees_the_torque, open_usual, close_rig) {
     RobotState state = kit_moving_state(2, 5);
     put(&state);
     const float action[SA01_JOINTS] = {1, 1, 1, 1, 1, 1};
@@ -433,12 +424,10 @@ TEST(reward_sees_the_torque) {
     }
     expect_near("torque", rig.env->term_sum[REWARD_torque], -1e-12 * sum, 1e-15 * sum);
     expect_near("joint speed", rig.env->term_sum[REWARD_joint_speed], -1e-7 * speed, 1e-10 * speed);
-    rig_close(&rig);
 }
 
 /* The sweeps and the fast solver are the user's choice, with the task's tolerance. */
-TEST(solver_follows_the_keys) {
-    open_with_dt(0.0025);
+TEST_WITH(solver_follows_the_keys, open_usual, close_rig) {
     for (int newton = 0; newton < 2; newton++) {
         rig.def.solver = newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL;
         rig.def.contact_tolerance = newton ? 1e-3 : 1e-5;
@@ -449,7 +438,6 @@ TEST(solver_follows_the_keys) {
         expect_near("tolerance", input->tolerance, newton ? 1e-3 : 1e-5, 0);
         assert_int_equal(input->max_iterations, 30 + newton);
     }
-    rig_close(&rig);
 }
 
 /* 88 N m up to 22 rad/s, half of it half way to 32 rad/s, none from there on; a brake has all. */

@@ -4,7 +4,8 @@
 
 #include "envs_kit.h"
 
-enum { ENVS = 6 };
+/* A part of more environments: the number selects the random numbers. */
+enum { ENVS = 6, FIRST = 70, SEED = 21 };
 
 typedef struct {
     Pool *pool;
@@ -26,20 +27,20 @@ static EnvsView all_views(void) {
     return (EnvsView){many.history[0], many.critic[0], many.estimate[0], many.frame[0]};
 }
 
-static void open_from(const TaskDef *def, int threads, uint32_t first) {
+static void open_many(const TaskDef *def, int threads) {
     MildError error = {0};
     memset(&many, 0, sizeof many);
     many.pool = pool_create(threads);
-    const EnvsDef of = {
-        .task = def, .robot = robot, .pool = many.pool, .count = ENVS, .first = first, .seed = 21};
+    const EnvsDef of = {.task = def,
+                        .robot = robot,
+                        .pool = many.pool,
+                        .count = ENVS,
+                        .first = FIRST,
+                        .seed = SEED};
     many.envs = envs_create(&of, &error);
     assert_non_null(many.envs);
     const EnvsView view = all_views();
     envs_reset(many.envs, &view, NULL, &error);
-}
-
-static void open_many(const TaskDef *def, int threads) {
-    open_from(def, threads, 0);
 }
 
 static void close_many(void) {
@@ -88,38 +89,41 @@ static void expect_row(int e, const Rig *alone) {
     }
 }
 
+/* Environment e with data of its own. */
+static void open_alone(Rig *alone, const TaskDef *def, int e) {
+    rig_open(alone, def, SEED, (uint32_t)(FIRST + e));
+    task_env_reset(alone->env, def, robot, alone->sim, &alone->view);
+}
+
+static TaskStep step_alone(Rig *alone, const TaskDef *def, int e) {
+    return task_env_step(alone->env, def, robot, alone->sim, many.action[e], 1, &alone->view, NULL);
+}
+
 TEST(each_is_as_alone) {
+    static Rig alone[ENVS];
     TaskDef def = task_def_default();
+    int ends = 0;
     def.episode = 0.1; /* ends while we look: the next episode begins by itself */
     open_many(&def, 2);
     for (int e = 0; e < ENVS; e++) {
-        Rig alone;
-        rig_open(&alone, &def, 21, (uint32_t)e);
-        task_env_reset(alone.env, &def, robot, alone.sim, &alone.view);
-        expect_row(e, &alone);
-        rig_close(&alone);
+        open_alone(&alone[e], &def, e);
+        expect_row(e, &alone[e]);
     }
-    close_many();
-    int ends = 0;
-    for (int e = 0; e < ENVS; e++) {
-        Rig alone;
-        open_many(&def, 2);
-        rig_open(&alone, &def, 21, (uint32_t)e);
-        task_env_reset(alone.env, &def, robot, alone.sim, &alone.view);
-        for (int t = 0; t < 14; t++) {
-            draw_actions(t);
-            step_many();
-            TaskStep step = task_env_step(alone.env, &def, robot, alone.sim, many.action[e], 1,
-                                          &alone.view, NULL);
+    for (int t = 0; t < 14; t++) {
+        draw_actions(t);
+        step_many();
+        for (int e = 0; e < ENVS; e++) {
+            const TaskStep step = step_alone(&alone[e], &def, e);
             assert_true(many.reward[e] == step.reward && many.done[e] == step.done);
             assert_true(many.timeout[e] == step.timeout && many.valid[e] == step.valid);
-            expect_row(e, &alone);
+            expect_row(e, &alone[e]);
             ends += step.done;
         }
-        rig_close(&alone);
-        close_many();
     }
-    print_message("%d environments alone and together: the same, %d episodes ended\n", ENVS, ends);
+    for (int e = 0; e < ENVS; e++) {
+        rig_close(&alone[e]);
+    }
+    close_many();
     assert_true(ends >= ENVS);
 }
 
@@ -167,13 +171,11 @@ static void disturb(TaskEnv *env, int e, int step) {
 
 static void account_alone(const TaskDef *def, int e, int steps, Account *sum) {
     Rig alone;
-    rig_open(&alone, def, 21, (uint32_t)e);
-    task_env_reset(alone.env, def, robot, alone.sim, &alone.view);
+    open_alone(&alone, def, e);
     for (int t = 0; t < steps; t++) {
         draw_actions(t);
         disturb(alone.env, e, t);
-        TaskStep step =
-            task_env_step(alone.env, def, robot, alone.sim, many.action[e], 1, &alone.view, NULL);
+        const TaskStep step = step_alone(&alone, def, e);
         sum->diverged += !step.valid;
         if (step.done) {
             sum->episodes++;
@@ -212,8 +214,6 @@ TEST(statistics) {
         level += env->assist_level * env->assist_draw / ENVS;
     }
     EnvsStats stats = kit_stats(many.envs, ENVS);
-    print_message("%d episodes, %d falls, %d diverged\n", stats.episodes, stats.falls,
-                  stats.diverged);
     assert_true(sum.falls >= 2 && sum.diverged >= 1 && sum.episodes > sum.falls);
     assert_int_equal(stats.episodes, sum.episodes);
     assert_int_equal(stats.falls, sum.falls);
@@ -232,42 +232,6 @@ TEST(statistics) {
     assert_true(isnan(stats.speed_error) &&
                 isnan(stats.terms[0])); /* of nothing there is no mean */
     expect_near("help again", stats.assist, level, 1e-12);
-    close_many();
-}
-
-/* An episode that ends at its first step of all lives 10 ms, one that never lived divides
- * nothing. */
-TEST(an_episode_of_one_step) {
-    TaskDef def = kit_quiet_def();
-    open_many(&def, 1);
-    TaskEnv *env = env_of(4);
-    env->step = env->step_first = env->step_limit - 1;
-    step_many();
-    assert_true(many.done[4] && many.timeout[4] && !many.done[3] && !many.timeout[3]);
-    EnvsStats stats = kit_stats(many.envs, ENVS);
-    assert_int_equal(stats.episodes, 1);
-    assert_int_equal(stats.falls, 0);
-    expect_near("length", stats.length, 0.01, 1e-15);
-    double sum = 0;
-    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
-        sum += stats.terms[i];
-    }
-    expect_near("terms per second", 0.01 * sum, (double)many.reward[4], 1e-7);
-    expect_near("reward", stats.reward, (double)many.reward[4], 1e-7);
-    close_many();
-}
-
-/* Environments that are a part of more: the number selects the random numbers. */
-TEST(numbered_from) {
-    const TaskDef def = task_def_default();
-    open_from(&def, 2, 70);
-    for (int e = 0; e < ENVS; e++) {
-        Rig alone;
-        rig_open(&alone, &def, 21, (uint32_t)(70 + e));
-        task_env_reset(alone.env, &def, robot, alone.sim, &alone.view);
-        expect_row(e, &alone);
-        rig_close(&alone);
-    }
     close_many();
 }
 

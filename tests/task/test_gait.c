@@ -1,10 +1,11 @@
-/* Gait clock, schedule, wanted height and reference motion, by hand (docs/task.md section 7). */
+/* Gait clock, standing commands, runs and other gaits, by hand (docs/task.md section 7). Schedule,
+ * wanted height and reference motion of a walk: test_widest.c. */
 #include "sa01.h"
 #include "task_kit.h"
 
 TEST(standing_commands) {
     TaskDef def = task_def_default();
-    const double none[3] = {0}, small[3] = {0.0999, -0.0999, 0.0999};
+    const double none[TASK_COMMANDS] = {0}, small[TASK_COMMANDS] = {0.0999, -0.0999, 0.0999};
     assert_true(task_is_standing(&def, none));
     assert_true(task_is_standing(&def, small));
     for (int i = 0; i < 3; i++) {
@@ -42,87 +43,17 @@ TEST(slow_clock) {
     expect_near("below", task_gait_period(&def, command), 1.0, 1e-12);
 }
 
-static const double ahead[TASK_COMMANDS] = {0.6}, still[TASK_COMMANDS] = {0};
+static const double ahead[TASK_COMMANDS] = {0.6};
 
 static TaskFoot foot_at(const TaskDef *def, double phase, const double *command, int foot) {
     return task_gait_foot(def, robot_table(robot), phase, command, foot);
-}
-
-/* Left stands in the first half of the period, right in the second. */
-TEST(schedule) {
-    const TaskDef def = task_def_default();
-    const double first[] = {0, 0.01, 0.25, 0.4999}, second[] = {0.5, 0.51, 0.75, 0.9999};
-    for (int i = 0; i < 4; i++) {
-        assert_true(foot_at(&def, first[i], ahead, SA01_LEFT).stance);
-        assert_false(foot_at(&def, first[i], ahead, SA01_RIGHT).stance);
-        assert_false(foot_at(&def, second[i], ahead, SA01_LEFT).stance);
-        assert_true(foot_at(&def, second[i], ahead, SA01_RIGHT).stance);
-        for (int foot = 0; foot < SA01_FEET; foot++) {
-            assert_true(foot_at(&def, first[i], still, foot).stance);
-            assert_true(foot_at(&def, second[i], still, foot).stance);
-        }
-    }
-}
-
-/* 0.1 sin(pi s): s = 0.1, 0.2, 0.5 of the swing. */
-TEST(wanted_height) {
-    TaskDef def = task_def_default();
-    const double s[] = {0.1, 0.2, 0.5, 0.9},
-                 wanted[] = {0.0309016994, 0.0587785252, 0.1, 0.0309016994};
-    for (int i = 0; i < 4; i++) {
-        double phase = 0.5 * s[i];
-        expect_entry("right", i, foot_at(&def, phase, ahead, SA01_RIGHT).height, wanted[i], 1e-9);
-        expect_entry("left", i, foot_at(&def, phase + 0.5, ahead, SA01_LEFT).height, wanted[i],
-                     1e-9);
-        expect_entry("left in stance", i, foot_at(&def, phase, ahead, SA01_LEFT).height, 0, 0);
-        expect_entry("right in stance", i, foot_at(&def, phase + 0.5, ahead, SA01_RIGHT).height, 0,
-                     0);
-        expect_entry("standing", i, foot_at(&def, phase, still, SA01_RIGHT).height, 0, 0);
-    }
-    expect_near("lift-off", foot_at(&def, 0, ahead, SA01_RIGHT).height, 0, 0);
-    def.swing_apex = 0.06;
-    expect_near("apex", foot_at(&def, 0.25, ahead, SA01_RIGHT).height, 0.06, 1e-12);
-}
-
-/* Which joints bend, by how much; all others keep the pose. */
-static void expect_reference(const TaskDef *def, double phase, int standing, int leg, double bend) {
-    const double *pose = robot_default_pose(robot);
-    double q[SA01_JOINTS];
-    for (int i = 0; i < robot_joints(robot); i++) {
-        q[i] = task_gait_reference(def, robot_table(robot), phase, standing ? still : ahead, i);
-    }
-    for (int i = 0; i < SA01_JOINTS; i++) {
-        int joint = i % LEG_JOINTS;
-        double turn = i / LEG_JOINTS != leg                        ? 0
-                      : joint == KNEE                              ? 2 * bend
-                      : joint == HIP_PITCH || joint == ANKLE_PITCH ? -bend
-                                                                   : 0;
-        expect_entry("reference", i, q[i], pose[i] + turn, 1e-8);
-    }
-}
-
-TEST(reference) {
-    TaskDef def = task_def_default();
-    expect_reference(&def, 0.25, 0, 1, 0.4);
-    expect_reference(&def, 0.75, 0, 0, 0.4);
-    expect_reference(&def, 1.0 / 12, 0, 1, 0.2); /* sin 30 degrees */
-    expect_reference(&def, 7.0 / 12, 0, 0, 0.2);
-    expect_reference(&def, 0.25, 1, 1, 0);
-    expect_reference(&def, 0.0159, 0, 1, 0); /* sin = 0.0997: double support */
-    expect_reference(&def, 0.0161, 0, 1, 0.0403947365);
-    expect_reference(&def, 0.9839, 0, 0, 0.0403947365);
-    expect_reference(&def, 0.9841, 0, 0, 0);
-    def.reward.reference_amplitude = 0.26;
-    expect_reference(&def, 0.25, 0, 1, 0.26);
-    def.double_support = 0.6;
-    expect_reference(&def, 1.0 / 12, 0, 1, 0);
 }
 
 /* Of a run the same, in stance for share = 0.35 - by hand: s = (phase - lift-off)/0.65, and half of
  * the speeds between a walk and a run have a share of 0.425. */
 TEST(run) {
     TaskDef def = task_def_default();
-    const double fast[3] = {3, 0, 0}, half[3] = {-2, 0, 0};
+    const double fast[TASK_COMMANDS] = {3}, half[TASK_COMMANDS] = {-2};
     def.stance_share[0] = 0.35;
     expect_near("walk", task_gait_share(&def, ahead), 0.5, 0);
     expect_near("between", task_gait_share(&def, half), 0.425, 1e-12);

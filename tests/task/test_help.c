@@ -3,8 +3,6 @@
 #include "sa01.h"
 #include "task_oracle.h"
 
-static Rig rig;
-
 static void open_in_the_air(uint32_t index) {
     TaskDef def = kit_quiet_def();
     def.crossing_limit = -1;
@@ -12,6 +10,12 @@ static void open_in_the_air(uint32_t index) {
     rig_go_limp(&rig);
     rig_start(&rig, 0.5, 0, 0);
     kit_put(rig.env, kit_state(3));
+}
+
+static int open_first(void **state) {
+    (void)state;
+    open_in_the_air(0);
+    return 0;
 }
 
 static int is_pushed(const double before[6]) {
@@ -64,9 +68,8 @@ TEST(schedule) {
 }
 
 /* A jump of the base's velocity: x and y +-0.4 m/s, about each axis +-0.6 rad/s, z none. */
-TEST(size_and_independence) {
+TEST_WITH(size_and_independence, open_first, close_rig) {
     enum { PUSHES = 2000 };
-    open_in_the_air(0);
     rig.def.randomize.push_interval = 0.01;
     double sum[6] = {0}, square[6] = {0}, product[6][6] = {{0}}, low[6] = {0}, high[6] = {0};
     for (int t = 0; t < PUSHES; t++) {
@@ -96,13 +99,11 @@ TEST(size_and_independence) {
                          5 * sigma * size[j] / sqrt(3) / sqrt(PUSHES));
         }
     }
-    rig_close(&rig);
 }
 
 /* The push is added to the base's velocity before the step, then fades in the critic's view
  * only. */
-TEST(push_is_a_velocity_jump) {
-    open_in_the_air(0);
+TEST_WITH(push_is_a_velocity_jump, open_first, close_rig) {
     RobotState state = kit_moving_state(3, 4), pushed;
     rig.def.randomize.push_interval = 0.01;
     rig.env->step = 5;
@@ -124,7 +125,6 @@ TEST(push_is_a_velocity_jump) {
         expect_entry("faded", i, rig.env->push[i], 0.95 * push[i], 1e-15);
         expect_entry("critic", 70 + i, (double)rig.critic[70 + i], 0.95 * push[i], 1e-7);
     }
-    rig_close(&rig);
 }
 
 /* ---- helping hand ---- */
@@ -144,70 +144,48 @@ static int hand(double yaw, double pitch, double roll, double wrench[6]) {
                        robot_sim_qvel(rig.sim), wrench);
 }
 
-static void expect_wrench(const char *what, const double *got, double fx, double fy, double fz,
-                          double tx, double ty) {
-    const double wanted[6] = {fx, fy, fz, tx, ty, 0};
-    for (int i = 0; i < 6; i++) {
-        expect_entry(what, i, got[i], wanted[i], 1e-6);
-    }
-}
-
 /* With a share of 0.4: half of 33.113 kg is 64.97 N; 100 N s/m up to 30 N; 300 N m/rad, 30 N m
  * s/rad.
  */
-TEST(wrench_by_hand) {
-    open_in_the_air(0);
+TEST_WITH(wrench_by_hand, open_first, close_rig) {
+    static const struct {
+        const char *what;
+        double command[2], qvel[6], yaw, pitch, roll; /* qvel: angular in base axes */
+        double fx, fy, tx, ty;
+    } rows[] = {
+        {"at rest, upright", {0}, {0}, 0, 0, 0, 0, 0, 0, 0},
+        {"0.2 m/s missing", {0.2}, {0}, 0, 0, 0, 8, 0, 0, 0},
+        {"at most 30 N", {-0.9}, {0}, 0, 0, 0, -12, 0, 0, 0},
+        {"forward is along the heading", {0.2}, {0}, 0.5 * KIT_PI, 0, 0, 0, 8, 0, 0},
+        {"left of the heading", {0, 0.1}, {0}, 0.5 * KIT_PI, 0, 0, -4, 0, 0, 0},
+        {"against the speed", {0}, {0.1, -0.25, 3}, 0, 0, 0, -4, 10, 0, 0},
+        {"leaning to the right", {0}, {0}, 0, 0, 0.1, 0, 0, -11.98001000, 0}, /* 120 sin 0.1 */
+        {"leaning forward", {0}, {0}, 0, 0.1, 0, 0, 0, 0, -11.98001000},
+        {"leaning forward, heading y", {0}, {0}, 0.5 * KIT_PI, 0.1, 0, 0, 0, 11.98001000, 0},
+        {"against the turning", {0}, {0, 0, 0, 0.5, -0.25, 7}, 0, 0, 0, 0, 0, -6, 3},
+        {"the same, heading y", {0}, {0, 0, 0, 0.5, -0.25, 7}, 0.5 * KIT_PI, 0, 0, 0, 0, -3, -6},
+    };
     help(0.5, 0.8);
     double weight = 0.4 * 0.5 * 9.81 * robot_total_mass(robot), w[6];
     expect_near("half the weight", weight, 64.968, 2e-3);
-    memset(rig.env->robot.qvel, 0, sizeof rig.env->robot.qvel);
-    rig.env->command[0] = rig.env->command[1] = 0;
-    assert_true(hand(0, 0, 0, w));
-    expect_wrench("at rest, upright", w, 0, 0, weight, 0, 0);
-    rig.env->command[0] = 0.2;
-    hand(0, 0, 0, w);
-    expect_wrench("0.2 m/s missing", w, 8, 0, weight, 0, 0);
-    rig.env->command[0] = -0.9;
-    hand(0, 0, 0, w);
-    expect_wrench("at most 30 N", w, -12, 0, weight, 0, 0);
-    rig.env->command[0] = 0.2;
-    hand(0.5 * KIT_PI, 0, 0, w);
-    expect_wrench("forward is along the heading", w, 0, 8, weight, 0, 0);
-    rig.env->command[0] = 0;
-    rig.env->command[1] = 0.1;
-    hand(0.5 * KIT_PI, 0, 0, w);
-    expect_wrench("left of the heading", w, -4, 0, weight, 0, 0);
-    rig.env->command[1] = 0;
-    rig.env->robot.qvel[0] = 0.1;
-    rig.env->robot.qvel[1] = -0.25;
-    rig.env->robot.qvel[2] = 3;
-    hand(0, 0, 0, w);
-    expect_wrench("against the speed", w, -4, 10, weight, 0, 0);
-    memset(rig.env->robot.qvel, 0, sizeof rig.env->robot.qvel);
-    hand(0, 0, 0.1, w); /* 120 sin 0.1 = 11.98001000 */
-    expect_wrench("leaning to the right", w, 0, 0, weight, -11.98001000, 0);
-    hand(0, 0.1, 0, w);
-    expect_wrench("leaning forward", w, 0, 0, weight, 0, -11.98001000);
-    hand(0.5 * KIT_PI, 0.1, 0, w);
-    expect_wrench("leaning forward, heading y", w, 0, 0, weight, 11.98001000, 0);
-    rig.env->robot.qvel[3] = 0.5; /* base axes */
-    rig.env->robot.qvel[4] = -0.25;
-    rig.env->robot.qvel[5] = 7;
-    hand(0, 0, 0, w);
-    expect_wrench("against the turning", w, 0, 0, weight, -6, 3);
-    hand(0.5 * KIT_PI, 0, 0, w);
-    expect_wrench("the same, heading y", w, 0, 0, weight, -3, -6);
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        memcpy(rig.env->command, rows[i].command, sizeof rows[i].command);
+        memcpy(rig.env->robot.qvel, rows[i].qvel, sizeof rows[i].qvel);
+        assert_true(hand(rows[i].yaw, rows[i].pitch, rows[i].roll, w));
+        const double wanted[6] = {rows[i].fx, rows[i].fy, weight, rows[i].tx, rows[i].ty, 0};
+        for (int k = 0; k < 6; k++) {
+            expect_entry(rows[i].what, k, w[k], wanted[k], 1e-6);
+        }
+    }
     rig.def.assist = 0;
     assert_false(hand(0, 0, 0, w));
     rig.def.assist = 1;
     rig.env->assist_level = 0;
     assert_false(hand(0, 0, 0, w));
-    rig_close(&rig);
 }
 
 /* In the air the whole robot falls with half of gravity, and with all of it alone. */
-TEST(hand_acts_in_the_step) {
-    open_in_the_air(0);
+TEST_WITH(hand_acts_in_the_step, open_first, close_rig) {
     rig.env->command[0] = 0;
     for (int helped = 0; helped < 2; helped++) {
         kit_put(rig.env, kit_state(3));
@@ -223,12 +201,10 @@ TEST(hand_acts_in_the_step) {
         expect_near("fall in 10 ms", d->subtree_linvel[2], helped ? -0.04905 : -0.0981, 1e-3);
         mj_deleteData(d);
     }
-    rig_close(&rig);
 }
 
 /* 1.3 times the share of the way from the default pose to the reference. */
-TEST(led_pose) {
-    open_in_the_air(0);
+TEST_WITH(led_pose, open_first, close_rig) {
     const double *rest = robot_default_pose(robot);
     double pose[SA01_JOINTS];
     help(0.5, 0.8);
@@ -251,12 +227,10 @@ TEST(led_pose) {
         pose[i] = task_assist_pose(rig.env, &rig.def, robot_table(robot), i);
     }
     assert_memory_equal(pose, rest, sizeof pose);
-    rig_close(&rig);
 }
 
 /* Actions are added to the led pose. */
-TEST(torque_follows_the_led_pose) {
-    open_in_the_air(0);
+TEST_WITH(torque_follows_the_led_pose, open_first, close_rig) {
     task_env_rest(rig.env)->gains.kp[KNEE] = task_env_rest(rig.env)->gains.kp[LEG_JOINTS + KNEE] =
         10;
     rig.env->phase = 0.25;
@@ -270,13 +244,11 @@ TEST(torque_follows_the_led_pose) {
     rig.def.assist = 0;
     rig_step(&rig, NULL);
     assert_true(fabs(rig.env->robot.qvel[6 + 9]) < 0.01);
-    rig_close(&rig);
 }
 
 /* After 2 s on its feet a step takes 1/800 of the level; a fall makes it 1.3 times as much and 0.01
  * more, at most 1. */
-TEST(level_of_help) {
-    open_in_the_air(0);
+TEST_WITH(level_of_help, open_first, close_rig) {
     TaskEnv *env = rig.env;
     env->assist_level = 0.5;
     env->step_first = 100;
@@ -305,12 +277,10 @@ TEST(level_of_help) {
     expect_near("share", task_assist_share(env, &rig.def), 0.35, 1e-12);
     rig.def.assist = 0;
     expect_near("off", task_assist_share(env, &rig.def), 0, 0);
-    rig_close(&rig);
 }
 
 /* The step adapts it: at a fall, with time on its feet, at a time-out not as at a fall. */
-TEST(level_follows_the_episode) {
-    open_in_the_air(0);
+TEST_WITH(level_follows_the_episode, open_first, close_rig) {
     TaskEnv *env = rig.env;
     assert_true(env->assist_level == 1);
     env->assist_level = 0.5;
@@ -328,7 +298,6 @@ TEST(level_follows_the_episode) {
     kit_turn(env->robot.qpos, 0, 1.3, 0);
     assert_true(rig_step(&rig, NULL).done);
     expect_near("fall", env->assist_level, 0.66, 1e-12);
-    rig_close(&rig);
 }
 
 TEST_MAIN(kit_setup, kit_teardown)

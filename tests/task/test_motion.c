@@ -5,8 +5,6 @@
 
 #define TOLERANCE 1e-9
 
-static Rig rig;
-
 static TaskMotion describe_step(const double *torque) {
     RobotReading reading;
     task_env_read(rig.env, rig.sim, &reading);
@@ -18,8 +16,7 @@ static TaskMotion describe(void) {
     return describe_step(torque);
 }
 
-TEST(base_and_joints) {
-    rig_open_quiet(&rig, 0.5);
+TEST_WITH(base_and_joints, open_quiet, close_rig) {
     for (uint32_t draw = 0; draw < 20; draw++) {
         Oracle o = rig_place(&rig, draw);
         double torque[SA01_JOINTS];
@@ -44,48 +41,33 @@ TEST(base_and_joints) {
         assert_ptr_equal(m.env, rig.env);
         assert_ptr_equal(m.def, &rig.def);
     }
-    rig_close(&rig);
 }
 
-/* Differences of 0.1, 0.2, 0.2 m/s and 0.4 rad/s: norm 0.5; each component counts. */
-TEST(change_of_twist) {
-    rig_open_quiet(&rig, 0.5);
+/* Of differences of 0.1, -0.2, 0.2 m/s and -0.4 rad/s the norm is 0.5, that of the linear part alone
+ * 0.3; each component counts. */
+TEST_WITH(change_of_twist, open_quiet, close_rig) {
     const double step[6] = {0.1, -0.2, 0.2, 0, -0.4, 0};
-    for (int k = -1; k < 6; k++) {
-        rig_place(&rig, 3);
-        double wanted = k < 0 ? 0.5 : 0.3;
-        for (int i = 0; i < 6; i++) {
-            double change = k < 0 ? step[i] : i == k ? 0.3 : 0;
-            rig.env->base_twist[i] = rig.env->robot.qvel[i] - change;
+    for (int linear = 0; linear < 2; linear++) {
+        rig.def.reward.acceleration_form =
+            linear ? TASK_ACCELERATION_LINEAR : TASK_ACCELERATION_TWIST;
+        for (int k = -1; k < 6; k++) {
+            rig_place(&rig, 3);
+            for (int i = 0; i < 6; i++) {
+                double change = k < 0 ? step[i] : i == k ? 0.3 : 0;
+                rig.env->base_twist[i] = rig.env->robot.qvel[i] - change;
+            }
+            const double wanted = linear && k >= 3 ? 0 : k < 0 && !linear ? 0.5 : 0.3;
+            expect_entry("twist_change", k, describe().twist_change, wanted, TOLERANCE);
+            for (int i = 0; i < 6; i++) {
+                expect_entry("base_twist", i, rig.env->base_twist[i], rig.env->robot.qvel[i], 0);
+            }
+            expect_near("the next one", describe().twist_change, 0, 0);
         }
-        expect_entry("twist_change", k, describe().twist_change, wanted, TOLERANCE);
-        for (int i = 0; i < 6; i++) {
-            expect_entry("base_twist", i, rig.env->base_twist[i], rig.env->robot.qvel[i], 0);
-        }
-        expect_near("the next one", describe().twist_change, 0, 0);
     }
-    rig_close(&rig);
-}
-
-/* The linear part alone: 0.1, 0.2, 0.2 m/s have the norm 0.3, whatever the base turns. */
-TEST(change_of_velocity) {
-    rig_open_quiet(&rig, 0.5);
-    rig.def.reward.acceleration_form = TASK_ACCELERATION_LINEAR;
-    const double step[6] = {0.1, -0.2, 0.2, 3, -0.4, 1};
-    rig_place(&rig, 3);
-    for (int i = 0; i < 6; i++) {
-        rig.env->base_twist[i] = rig.env->robot.qvel[i] - step[i];
-    }
-    expect_near("velocity", describe().twist_change, 0.3, TOLERANCE);
-    for (int i = 0; i < 6; i++) {
-        expect_entry("base_twist", i, rig.env->base_twist[i], rig.env->robot.qvel[i], 0);
-    }
-    rig_close(&rig);
 }
 
 /* One step of 0.01 s moves a mean over 0.4 s by a fortieth of the way. */
-TEST(smoothed_velocity) {
-    rig_open_quiet(&rig, 0.5);
+TEST_WITH(smoothed_velocity, open_quiet, close_rig) {
     Oracle o = rig_place(&rig, 4);
     const double before[3] = {0.3, -0.2, 0.7}, now[3] = {o.heading[0], o.heading[1], o.omega[2]};
     memcpy(rig.env->smooth_velocity, before, sizeof before);
@@ -99,11 +81,9 @@ TEST(smoothed_velocity) {
     for (int i = 0; i < 3; i++) {
         expect_entry("not smoothed", i, rig.env->smooth_velocity[i], now[i], TOLERANCE);
     }
-    rig_close(&rig);
 }
 
-TEST(feet_and_knees) {
-    rig_open_quiet(&rig, 0.5);
+TEST_WITH(feet_and_knees, open_quiet, close_rig) {
     for (uint32_t draw = 0; draw < 20; draw++) {
         Oracle o = rig_place(&rig, draw);
         oracle_set_force(rig.sim, 0, 3, -4, 12);
@@ -119,12 +99,10 @@ TEST(feet_and_knees) {
         expect_near("foot_distance", m.foot_distance, o.foot_distance, TOLERANCE);
         expect_near("knee_distance", m.knee_distance, o.knee_distance, TOLERANCE);
     }
-    rig_close(&rig);
 }
 
 /* Above the soles that stand by the clock: left at phase 1/4, right at 3/4, both when standing. */
-TEST(schedule) {
-    rig_open_quiet(&rig, 0.5);
+TEST_WITH(schedule, open_quiet, close_rig) {
     Oracle o = rig_place(&rig, 5);
     double z = rig.env->robot.qpos[2];
     rig.env->phase = 0.25;
@@ -150,29 +128,10 @@ TEST(schedule) {
     expect_near("base above both", m.base_height, z - 0.5 * (o.sole[0][2] + o.sole[1][2]),
                 TOLERANCE);
     expect_near("wanted left", m.wanted[0].height, 0, 0);
-    rig_close(&rig);
-}
-
-/* abs(sin) < 0.1 up to a phase of 0.01594. */
-TEST(double_support) {
-    rig_open_quiet(&rig, 0.5);
-    rig_place(&rig, 6);
-    const double phase[] = {0, 0.0159, 0.0160, 0.4840, 0.4841, 0.5159, 0.5160, 0.9840, 0.9841};
-    const int either[] = {1, 1, 0, 0, 1, 1, 0, 0, 1};
-    for (int i = 0; i < 9; i++) {
-        rig.env->phase = phase[i];
-        TaskMotion m = describe();
-        assert_true(m.wanted[0].either == either[i] && m.wanted[1].either == either[i]);
-    }
-    memset(rig.env->command, 0, sizeof rig.env->command);
-    TaskMotion m = describe();
-    assert_true(!m.wanted[0].either && !m.wanted[1].either); /* standing: both are to be down */
-    rig_close(&rig);
 }
 
 /* Contact is a vertical force above 5 N; sideways forces are none. */
-TEST(contact_and_air_time) {
-    rig_open_quiet(&rig, 0.5);
+TEST_WITH(contact_and_air_time, open_quiet, close_rig) {
     rig_place(&rig, 7);
     rig.env->air_time[0] = 0.30;
     rig.env->air_time[1] = 0.10;
@@ -200,7 +159,6 @@ TEST(contact_and_air_time) {
     rig.env->command_seen[1] = rig.env->command_seen[2] = 0;
     rig.def.gait_slowing = 0.5;
     expect_near("under a slow clock", describe().landed_air_time, 0.75, TOLERANCE);
-    rig_close(&rig);
 }
 
 TEST_MAIN(kit_setup, kit_teardown)

@@ -5,7 +5,6 @@
 
 #define TOLERANCE 2e-6 /* [-] of a float of about 10 */
 
-static Rig rig;
 static const double flat_scale[3] = {2, 2, 1}; /* of the command */
 
 /* Readings that differ from the truth, so that one sees who looks at which. */
@@ -79,8 +78,7 @@ static void expect_frame(const char *what, const float *frame, const double omeg
 static const double clock_at_03[2] = {0.9510565163, -0.3090169944}, no_clock[2] = {0, 0};
 
 /* The actor sees the readings, the critic the truth. */
-TEST(frame) {
-    rig_open_quiet(&rig, 0.5);
+TEST_WITH(frame, open_quiet, close_rig) {
     TaskSensors reading = other_reading();
     for (uint32_t draw = 0; draw < 10; draw++) {
         Oracle o = rig_place(&rig, draw);
@@ -91,12 +89,10 @@ TEST(frame) {
         expect_frame("critic", rig.critic, o.omega, o.gravity, rig.env->robot.qpos + 7,
                      rig.env->robot.qvel + 6, clock_at_03);
     }
-    rig_close(&rig);
 }
 
 /* Off by key, and (0, 0) while the command that the policy sees stands. */
-TEST(the_clock) {
-    rig_open_quiet(&rig, 0.5);
+TEST_WITH(the_clock, open_quiet, close_rig) {
     TaskSensors reading = other_reading();
     Oracle o = rig_place(&rig, 1);
     fill_env(rig.env);
@@ -116,12 +112,10 @@ TEST(the_clock) {
                  no_clock);
     expect_frame("no clock", rig.critic, o.omega, o.gravity, rig.env->robot.qpos + 7,
                  rig.env->robot.qvel + 6, no_clock);
-    rig_close(&rig);
 }
 
 /* Base velocity times 4, sole velocities, heights above the ground times 10; or as the keys say. */
-TEST(estimates) {
-    rig_open_quiet(&rig, 0.5);
+TEST_WITH(estimates, open_quiet, close_rig) {
     TaskSensors reading = other_reading();
     double velocity_scale = 4, height_scale = 10;
     for (uint32_t draw = 0; draw < 10; draw++) {
@@ -145,13 +139,11 @@ TEST(estimates) {
                          5 * TOLERANCE);
         }
     }
-    rig_close(&rig);
 }
 
 /* Force in the base frame over 300 N, within +-5; contact; scheduled stance; mean depth times 10.
  */
-TEST(feet_of_the_critic) {
-    rig_open_quiet(&rig, 0.5);
+TEST_WITH(feet_of_the_critic, open_quiet, close_rig) {
     TaskSensors reading = other_reading();
     for (uint32_t draw = 0; draw < 10; draw++) {
         Oracle o = rig_place(&rig, draw);
@@ -174,11 +166,9 @@ TEST(feet_of_the_critic) {
             expect_entry("depth", f, (double)seen[5], 0.3 + 0.1 * f, TOLERANCE);
         }
     }
-    rig_close(&rig);
 }
 
-TEST(limits_of_the_critic) {
-    rig_open_quiet(&rig, 0.5);
+TEST_WITH(limits_of_the_critic, open_quiet, close_rig) {
     RobotState state = kit_state(1.2);
     kit_load(rig.sim, &state, rig.env);
     TaskSensors reading = other_reading();
@@ -198,7 +188,6 @@ TEST(limits_of_the_critic) {
     memset(rig.env->command, 0, sizeof rig.env->command);
     look(&reading);
     assert_true(rig.critic[62] == 1 && rig.critic[68] == 1); /* standing: both scheduled down */
-    rig_close(&rig);
 }
 
 /* Two materials, each of its numbers different; the second lies where the base is. */
@@ -224,8 +213,7 @@ static MildTerrain two_materials(double x, double y) {
     return terrain;
 }
 
-TEST(episode_of_the_critic) {
-    rig_open_quiet(&rig, 0.5);
+TEST_WITH(episode_of_the_critic, open_quiet, close_rig) {
     TaskSensors reading = other_reading();
     rig_place(&rig, 12);
     fill_env(rig.env);
@@ -256,7 +244,6 @@ TEST(episode_of_the_critic) {
     rig.def.assist = 0;
     look(&reading);
     expect_near("nobody helps", (double)rig.critic[100], 0, 0);
-    rig_close(&rig);
 }
 
 /* The one element of a concentric sole is shown as one of the raster's 77 cells. */
@@ -284,8 +271,7 @@ TEST(concentric_ground) {
 }
 
 /* After a step on the ground: the forces and the depth are those of the step's contact. */
-TEST(contact_reaches_the_critic) {
-    rig_open_quiet(&rig, 0.5);
+TEST_WITH(contact_reaches_the_critic, open_quiet, close_rig) {
     for (int t = 0; t < 20; t++) {
         rig_step(&rig, NULL);
     }
@@ -306,7 +292,6 @@ TEST(contact_reaches_the_critic) {
     }
     assert_memory_equal(rig.frame, rig.critic,
                         SA01_OBSERVATION * sizeof *rig.frame); /* neither noise nor latency */
-    rig_close(&rig);
 }
 
 /* ---- noise ---- */
@@ -316,9 +301,8 @@ static double noise_limit(int i) {
 }
 
 /* Uniform: both ends nearly reached, mean 0, variance limit^2/3, no entry follows another. */
-TEST(noise) {
+TEST_WITH(noise, open_quiet, close_rig) {
     enum { DRAWS = 20000 };
-    rig_open_quiet(&rig, 0.5);
     TaskSensors reading = other_reading();
     rig_place(&rig, 13);
     fill_env(rig.env);
@@ -359,13 +343,12 @@ TEST(noise) {
             }
         }
     }
-    print_message("noise: largest correlation of two entries %.3f\n", worst);
-    assert_true(worst < 0.07); /* 5 sigma of 5000 draws */
-    look(&reading);            /* the critic sees none of it */
+    expect_near("noise: largest correlation of two entries", worst, 0,
+                0.07); /* 5 sigma of 5000 draws */
+    look(&reading);    /* the critic sees none of it */
     Oracle o = oracle_of(rig.sim);
     expect_frame("critic", rig.critic, o.omega, o.gravity, rig.env->robot.qpos + 7,
                  rig.env->robot.qvel + 6, clock_at_03);
-    rig_close(&rig);
 }
 
 /* ---- history ---- */

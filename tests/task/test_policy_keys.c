@@ -31,17 +31,9 @@ TEST(printed_and_read) {
     MildError error = {0};
     TaskDef from = changed(), to = task_def_default();
     task_policy_keys_print(&from, text, sizeof text);
-    print_message("%s\n", text);
     assert_int_equal(task_policy_keys_read(&to, text, &error), MILD_OK);
-    assert_true(to.gait_period == 0.7 && to.standing_below == 0.2 && to.clock == 0);
-    assert_true(to.gait_slowing == 0.4 && to.gait_slow_below == 0.9);
-    assert_true(to.history_stride == 3 && to.velocity_scale == 2 && to.height_scale == 5);
-    assert_true(to.action_scale == 0.3 && to.action_clip == 7);
-    assert_string_equal(to.torque_share, SHARES);
-    assert_true(to.torque_hold == 1);
-    assert_string_equal(to.kp, GAINS);
-    assert_string_equal(to.kd, "1.5");
-    assert_true(to.physics_dt == task_def_default().physics_dt); /* no matter of the policy's */
+    from.physics_dt = task_def_default().physics_dt; /* no matter of the policy's */
+    assert_memory_equal(&to, &from, sizeof to);
     assert_int_equal(task_policy_keys_read(&to, "shell_depth = 0.06; clock = true", &error),
                      MILD_OK);
     assert_true(to.clock == 1); /* the key before it has no effect any more */

@@ -2,7 +2,7 @@
  * over 10^4 episodes, shares within their binomial bounds; the sinkage limit; model matching; the
  * start; commands. */
 #include "sa01.h"
-#include "task_oracle.h"
+#include "task_kit.h"
 
 enum { DRAWS = 10000, COLUMNS_MAX = 160 };
 
@@ -77,7 +77,6 @@ static void expect_uniform(const Column *c) {
 
 /* No two columns follow each other: correlation below 5.5 standard deviations of 1/sqrt(n). */
 static void expect_independent(void) {
-    double worst = 0;
     static double unit[COLUMNS_MAX][DRAWS];
     for (int c = 0; c < column_count; c++) {
         double width = columns[c].high - columns[c].low;
@@ -98,10 +97,8 @@ static void expect_independent(void) {
                 fail_msg("%s follows %s: correlation %.3f", columns[a].name, columns[b].name,
                          correlation);
             }
-            worst = fmax(worst, fabs(correlation));
         }
     }
-    print_message("%d quantities, largest correlation of two %.3f\n", column_count, worst);
 }
 
 static void expect_columns(void) {
@@ -307,31 +304,39 @@ TEST(ranges_of_grounds) {
     free(env);
 }
 
-/* k_D and b_D from ranges move no other draw; passive = false leaves c_g and c_d as drawn, those of
- * presets too. */
-TEST(drift_and_energy) {
+/* The ground of the same episode with other keys. */
+static MildMaterial drawn_with(const TaskDef *with) {
+    task_env_draw(env, with, robot);
+    return task_env_rest(env)->terrain.materials[0];
+}
+
+/* k_D and b_D from ranges, and slip that costs support on the share that was asked for of the
+ * grounds that stay dented, move no other draw; passive = false leaves c_g and c_d as drawn, those
+ * of presets too. */
+TEST(drift_energy_and_slip) {
     open_env();
     clear_columns();
     def.randomize.rigid_share = 0;
     def.randomize.preset_jitter = 0.02;
-    TaskDef wide = def;
+    TaskDef wide = def, slips = def;
     const double k_drift[2] = {50, 900}, b_drift[2] = {0.02, 0.2};
+    const double length[2] = {0.002, 0.003}, grip[2] = {0.1, 0.15};
     memcpy(wide.randomize.k_drift, k_drift, sizeof k_drift);
     memcpy(wide.randomize.b_drift, b_drift, sizeof b_drift);
     wide.randomize.passive = 0;
-    int drawn = 0, apart = 0;
+    slips.randomize.preset_share = 0;
+    slips.randomize.slip_share = 0.4;
+    memcpy(slips.randomize.slip_length, length, sizeof length);
+    memcpy(slips.randomize.grip, grip, sizeof grip);
+    int drawn = 0, dented = 0, slipping = 0;
     for (int t = 0; t < DRAWS; t++) {
         draw_next();
-        const MildMaterial plain = task_env_rest(env)->terrain.materials[0];
+        MildMaterial plain = task_env_rest(env)->terrain.materials[0], m = drawn_with(&wide);
         double factor[7];
-        assert_true(plain.passive);
-        task_env_draw(env, &wide, robot);
-        MildMaterial m = task_env_rest(env)->terrain.materials[0];
-        assert_false(m.passive);
+        assert_true(plain.passive && !m.passive);
         if (preset_of(&plain, factor) < 0) {
             note("k_drift", -1, 50, 900, m.k_drift);
             note("b_drift", -1, 0.02, 0.2, m.b_drift);
-            apart += fabs((m.k_drift - 50) / 850 - (m.b_drift - 0.02) / 0.18) > 0.01;
             m.k_drift = plain.k_drift;
             m.b_drift = plain.b_drift;
             drawn++;
@@ -340,44 +345,26 @@ TEST(drift_and_energy) {
         assert_memory_equal(&m, &plain, sizeof m);
     }
     expect_columns();
-    assert_true(drawn > DRAWS / 3 && apart > 0.95 * drawn);
-    free(env);
-}
-
-/* Slip costs support on the share that was asked for of the grounds that stay dented, and moves no
- * other draw. */
-TEST(slip_on_a_share) {
-    open_env();
+    assert_true(drawn > DRAWS / 3);
     clear_columns();
-    def.randomize.rigid_share = def.randomize.preset_share = 0;
-    TaskDef slips = def;
-    const double length[2] = {0.002, 0.003}, grip[2] = {0.1, 0.15};
-    slips.randomize.slip_share = 0.4;
-    memcpy(slips.randomize.slip_length, length, sizeof length);
-    memcpy(slips.randomize.grip, grip, sizeof grip);
-    int dented = 0, slipping = 0, apart = 0;
+    def.randomize.preset_share = 0;
     for (int t = 0; t < DRAWS; t++) {
         draw_next();
-        const MildMaterial plain = task_env_rest(env)->terrain.materials[0];
+        MildMaterial plain = task_env_rest(env)->terrain.materials[0], m = drawn_with(&slips);
         assert_true(plain.slip_length == 0 && plain.grip == 0);
-        task_env_draw(env, &slips, robot);
-        MildMaterial m = task_env_rest(env)->terrain.materials[0];
         dented += m.recovery <= 0.2;
         if (m.slip_length > 0) {
             assert_true(m.recovery <= 0.2);
             note("slip_length", -1, 0.002, 0.003, m.slip_length);
             note("grip", -1, 0.1, 0.15, m.grip);
-            apart += fabs((m.slip_length - 0.002) / 0.001 - (m.grip - 0.1) / 0.05) > 0.01;
-            m.slip_length = plain.slip_length;
-            m.grip = plain.grip;
+            m.slip_length = m.grip = 0;
             slipping++;
         }
         assert_memory_equal(&m, &plain, sizeof m);
     }
     expect_columns();
-    assert_true(dented > DRAWS / 6 && apart > 0.95 * slipping);
-    double share = (double)slipping / dented;
-    assert_true(fabs(share - 0.4) < 4 * sqrt(0.4 * 0.6 / dented));
+    assert_true(dented > DRAWS / 6);
+    expect_share("slip", slipping, dented, 0.4);
     free(env);
 }
 
@@ -415,7 +402,7 @@ TEST(limit_of_sinkage) {
     def.randomize.rigid_share = def.randomize.preset_share = def.randomize.patch_share = 0;
     def.randomize.model = MILD_MODEL_MILD;
     const MildSole *sole = robot_rasters(robot)[0];
-    double weight = 2 * robot_foot_load(robot), deepest = 0;
+    double weight = 2 * robot_foot_load(robot);
     int stiffened = 0, draws = 1000;
     for (int t = 0; t < draws; t++) {
         def.randomize.sinkage_max = 1;
@@ -430,7 +417,6 @@ TEST(limit_of_sinkage) {
         expect_near("one factor", limited.sigma_cone / as_drawn.sigma_cone, factor, 1e-9 * factor);
         limited.bed_depth = 10;
         double after = mild_sole_sinkage(sole, &limited, weight);
-        deepest = fmax(deepest, after);
         if (before > 0.0701) {
             expect_near("stiffened", after, 0.07, 2e-4);
             stiffened++;
@@ -438,7 +424,6 @@ TEST(limit_of_sinkage) {
             expect_near("left alone", factor, 1, 0);
         }
     }
-    print_message("sinkage: %d of %d stiffened, deepest %.4f m\n", stiffened, draws, deepest);
     assert_true(stiffened > draws / 20 && stiffened < draws / 2);
     free(env);
 }
@@ -480,7 +465,7 @@ TEST(stripes) {
 TEST(models_are_matched) {
     open_env();
     def.randomize.rigid_share = def.randomize.patch_share = 0;
-    double load = robot_foot_load(robot), worst = 0;
+    double load = robot_foot_load(robot);
     for (int model = 0; model < MILD_MODELS; model++) {
         for (int t = 0; t < 20; t++) {
             env->tick = (uint32_t)(1000 + t);
@@ -504,14 +489,12 @@ TEST(models_are_matched) {
             }
             assert_int_equal(m->model, model);
             double got = mild_sole_sinkage(robot_soles(robot)[0], m, load);
-            worst = fmax(worst, fabs(got - wanted));
             expect_near(mild_model_names[model], got, wanted, 1e-4);
             /* resistive force theory has tangential forces of its own */
             int quasi = model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D;
             expect_near("friction", m->mu, quasi ? 0 : mild.mu, 0);
         }
     }
-    print_message("matched models: worst difference of sinkage %.1e m\n", worst);
     robot_set_model(robot, MILD_MODEL_MILD);
     free(env);
 }
@@ -664,46 +647,29 @@ TEST(commands_that_grow) {
     rig_close(&rig);
 }
 
-/* What the last episode left is gone. */
+/* What the last episode left is gone: every byte is as in an environment that has none, but for the
+ * level of help and the highest command, which live on. */
 TEST(nothing_is_left) {
-    Rig rig;
     TaskDef start_def = task_def_default();
-    rig_open(&rig, &start_def, 11, 0);
-    task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
     const float action[SA01_JOINTS] = {1, 2, 3};
+    Rig rig, fresh;
+    rig_open(&rig, &start_def, 11, 0);
+    rig_open(&fresh, &start_def, 11, 0);
+    task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
     for (int t = 0; t < 5; t++) {
         rig_step(&rig, action);
         rig.env->push[t] = rig.env->air_time[0] = rig.env->air_time[1] = 0.3;
     }
-    rig.env->assist_level = 0.7;
-    rig.env->command_most = 2;
+    rig.env->assist_level = fresh.env->assist_level = 0.7;
+    rig.env->command_most = fresh.env->command_most = 2;
+    fresh.env->tick = rig.env->tick;
     task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
-    for (int i = 0; i < 6; i++) {
-        expect_entry("push", i, rig.env->push[i], 0, 0);
-    }
-    for (int i = 0; i < 3; i++) {
-        expect_entry("smooth", i, rig.env->smooth_velocity[i], 0, 0);
-        expect_entry("command_seen", i, rig.env->command_seen[i], rig.env->command[i], 0);
-        for (int k = 0; k < SA01_JOINTS; k++) {
-            expect_entry("action", k, (double)rig.env->action[i][k], 0, 0);
-        }
-    }
-    for (int i = 0; i < SA01_JOINTS; i++) {
-        expect_entry("joint_speed", i, rig.env->joint_speed[i], 0, 0);
-    }
-    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
-        expect_entry("term_sum", i, rig.env->term_sum[i], 0, 0);
-    }
-    expect_near("air_time", rig.env->air_time[0] + rig.env->air_time[1], 0, 0);
-    expect_near("reward_sum", rig.env->reward_sum, 0, 0);
-    expect_near("speed_error_sum", rig.env->speed_error_sum, 0, 0);
-    expect_near("the level of help lives on", rig.env->assist_level, 0.7, 0);
-    expect_near("and the highest command", rig.env->command_most, 2, 0);
-    MildGround *fresh = aligned_alloc(64, mild_ground_size(task_env_ground(rig.env)));
-    mild_ground_init_imprints(fresh, robot_soles(robot), SA01_FEET, 0);
-    assert_memory_equal(fresh, task_env_ground(rig.env), mild_ground_size(fresh));
-    free(fresh);
+    task_env_reset(fresh.env, &fresh.def, robot, fresh.sim, &fresh.view);
+    memset(rig.env->torque, 0, sizeof rig.env->torque); /* is written before it is read */
+    rig.env->oldest = fresh.env->oldest;                /* all frames of the ring are the same */
+    assert_memory_equal(rig.env, fresh.env, task_env_bytes(&rig.def, robot));
     rig_close(&rig);
+    rig_close(&fresh);
 }
 
 /* eval and play: yaw 0, the command stays, the episode begins at its start. */

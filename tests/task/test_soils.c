@@ -7,6 +7,27 @@
 
 enum { DRAWS = 4000 };
 
+static char folder[] = "/tmp/mild_soils_XXXXXX", path[64]; /* of a file for a soil */
+
+static int setup(void **state) {
+    if (!mkdtemp(folder)) {
+        return 1;
+    }
+    snprintf(path, sizeof path, "%s/a.ini", folder);
+    return kit_setup(state);
+}
+
+static int teardown(void **state) {
+    unlink(path);
+    rmdir(folder);
+    return kit_teardown(state);
+}
+
+static void write_soil(const MildMaterial *soil) {
+    MildError error = {0};
+    expect_good(soil_write(soil, NULL, path, &error) == MILD_OK, &error);
+}
+
 static TaskDef def_of(const char *presets, int model) {
     TaskDef def = task_def_default();
     snprintf(def.randomize.presets, sizeof def.randomize.presets, "%s", presets);
@@ -60,22 +81,18 @@ TEST(what_is_read) {
 
 /* Draws of a preset and a file of the same model: half each, each number within its jitter. */
 TEST(what_is_drawn) {
-    char folder[] = "/tmp/mild_soils_XXXXXX", path[40];
     MildMaterial soil[2];
     TaskSoils soils;
     MildError error = {0};
     Pool *pool = pool_create(1);
-    assert_non_null(mkdtemp(folder));
-    snprintf(path, sizeof path, "%s/a.ini", folder);
     assert_true(mild_material_preset("clay", &soil[0]) && mild_material_preset("snow", &soil[1]));
     soil[1].shear_length = 0.033;
-    assert_int_equal(soil_write(&soil[1], NULL, path, &error), MILD_OK);
+    write_soil(&soil[1]);
     char names[100];
     snprintf(names, sizeof names, "clay,%s", path);
     TaskDef def = def_of(names, MILD_MODEL_BEKKER);
     assert_int_equal(task_soils_open(&def, robot, &soils, &error), MILD_OK);
     unlink(path); /* read once */
-    rmdir(folder);
     TaskGrounds *grounds = task_grounds_create(&def, robot, DRAWS, 3, pool, &error);
     assert_non_null(grounds);
     int snow = 0;
@@ -107,17 +124,14 @@ TEST(what_is_drawn) {
 /* k_c below 0 is drawn with the factor of k_phi, so that the modulus under every sole keeps its
  * sign. Ground that does not bear the robot's feet is refused. */
 TEST(pressure_that_grows_with_the_sole) {
-    char folder[] = "/tmp/mild_soils_XXXXXX", path[64];
     MildError error = {0};
     MildMaterial soil;
     TaskSoils soils;
     Pool *pool = pool_create(1);
     const double width = mild_sole_width(robot_rasters(robot)[0]);
-    assert_non_null(mkdtemp(folder));
-    snprintf(path, sizeof path, "%s/a.ini", folder);
     assert_true(mild_material_preset("clay", &soil));
     soil.k_c = -0.98 * width * soil.k_phi;
-    assert_int_equal(soil_write(&soil, NULL, path, &error), MILD_OK);
+    write_soil(&soil);
     TaskDef def = def_of(path, MILD_MODEL_BEKKER);
     assert_int_equal(task_soils_open(&def, robot, &soils, &error), MILD_OK);
     TaskGrounds *grounds = task_grounds_create(&def, robot, 200, 3, pool, &error);
@@ -127,11 +141,9 @@ TEST(pressure_that_grows_with_the_sole) {
         assert_true(fabs(m->k_c / m->k_phi / (soil.k_c / soil.k_phi) - 1) < 1e-12);
     }
     soil.k_c = -1.02 * width * soil.k_phi;
-    assert_int_equal(soil_write(&soil, NULL, path, &error), MILD_OK);
+    write_soil(&soil);
     check_bad_soils(path, MILD_MODEL_BEKKER, MILD_ERROR_RANGE,
                     "randomize.presets a.ini ground.k_c ground.plate_width");
-    unlink(path);
-    rmdir(folder);
     task_grounds_destroy(grounds);
     pool_destroy(pool);
 }
@@ -168,4 +180,4 @@ TEST(what_is_matched) {
     pool_destroy(pool);
 }
 
-TEST_MAIN(kit_setup, kit_teardown)
+TEST_MAIN(setup, teardown)

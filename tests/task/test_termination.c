@@ -3,13 +3,13 @@
 #include "sa01.h"
 #include "task_oracle.h"
 
-static Rig rig;
-
-static void open_limp(void) {
+static int open_limp(void **state) {
+    (void)state;
     TaskDef def = kit_quiet_def();
     rig_open(&rig, &def, 3, 0);
     rig_go_limp(&rig);
     rig_start(&rig, 0.5, 0, 0);
+    return 0;
 }
 
 /* One step from this state at the given step of the episode. */
@@ -44,8 +44,7 @@ static void expect_fall(const char *what, TaskStep step) {
 }
 
 /* Past the limit in every direction it is the end, short of it in none; heading does not matter. */
-TEST(tilt) {
-    open_limp();
+TEST_WITH(tilt, open_limp, close_rig) {
     rig.def.crossing_limit = -1; /* upside down the left foot is on the right */
     const double limits[] = {1.0, 0.4, 2.0};
     for (int l = 0; l < 3; l++) {
@@ -61,7 +60,6 @@ TEST(tilt) {
             }
         }
     }
-    rig_close(&rig);
 }
 
 /* [m] lowest point of a box geom above z = 0, from the file's shapes. */
@@ -108,8 +106,7 @@ static RobotState folded(void) {
     return state;
 }
 
-TEST(base_touches) {
-    open_limp();
+TEST_WITH(base_touches, open_limp, close_rig) {
     rig.def.tilt_limit = 3.1;
     RobotState state = folded();
     kit_turn(state.qpos, 0.3, -1.0, 0.1); /* on its back, legs up */
@@ -124,33 +121,11 @@ TEST(base_touches) {
         rig.env->variation.rigid = k >> 1;
         touch(&state, "base_link_box", 0, "base on either ground", TASK_END_base);
     }
-    rig_close(&rig);
-}
-
-/* A robot may lie in the episodes in which its shells stand. */
-TEST(lies_where_shells_stand) {
-    open_limp();
-    rig.def.may_lie = 1;
-    robot_set_shells(robot, 1);
-    for (int stand = 0; stand < 2; stand++) {
-        rig.env->variation.shells_stand = stand;
-        RobotState state = kit_state(2);
-        kit_turn(state.qpos, 0.7, 0, 1.5);
-        expect_cause("tilted", step_from(&state, 10), !stand, TASK_END_tilt);
-        state = folded();
-        rig.def.tilt_limit = 3.1;
-        kit_turn(state.qpos, 0.3, -1.0, 0.1);
-        state.qpos[2] -= 1e-2 + lowest_of_box(&state, "base_link_box");
-        expect_cause("on its back", step_from(&state, 10), !stand, TASK_END_base);
-        rig.def.tilt_limit = 1;
-    }
-    robot_set_shells(robot, 0);
-    rig_close(&rig);
 }
 
 /* One knee on the ground, the other leg stretched up and forward. */
 static void shank_touches(int leg, const char *box) {
-    open_limp();
+    open_limp(NULL);
     rig.def.crossing_limit = -1;
     RobotState state = kit_state(0);
     double *down = state.qpos + 7 + LEG_JOINTS * leg;
@@ -203,8 +178,7 @@ TEST(shanks_touch) {
 }
 
 /* Feet on the wrong side of each other, or nearer than asked; knees do not count. */
-TEST(crossing) {
-    open_limp();
+TEST_WITH(crossing, open_limp, close_rig) {
     RobotState state = kit_state(2);
     kit_turn(state.qpos, 2.2, 0, 0);
     expect_alive("feet apart", step_from(&state, 10));
@@ -223,12 +197,10 @@ TEST(crossing) {
     expect_fall("crossed", step_from(&state, 10));
     rig.def.crossing_limit = -0.9;
     expect_alive("allowed to cross", step_from(&state, 10));
-    rig_close(&rig);
 }
 
 /* Beyond either end of its range by more than the margin, each joint alone. */
-TEST(broken_joint) {
-    open_limp();
+TEST_WITH(broken_joint, open_limp, close_rig) {
     rig.def.crossing_limit = -1;
     for (int k = 0; k < 4 * SA01_JOINTS; k++) {
         const int joint = k / 4, high = k / 2 % 2, past = k % 2;
@@ -246,12 +218,11 @@ TEST(broken_joint) {
                  sign * (rig.env->robot.qpos[7 + joint] - limit[joint]) < TASK_JOINT_BROKEN);
         expect_cause(robot_joint_name(robot, joint), step, past, TASK_END_joint);
     }
-    rig_close(&rig);
 }
 
 /* 24 s are 2400 steps. A fall at the last step is a fall. */
 TEST(timeout) {
-    open_limp();
+    open_limp(NULL);
     RobotState state = kit_state(2);
     assert_int_equal(rig.env->step_limit, 2400);
     expect_alive("step 2399", step_from(&state, 2398));

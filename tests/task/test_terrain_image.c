@@ -170,7 +170,6 @@ TEST(test_refused) {
         bytes[at] ^= 0x55;
     }
     free(bytes);
-    print_message("%zu bytes of picture: %d damaged ones refused\n", size, refused);
     assert_true(refused > (int)size / 7);
 }
 
@@ -190,27 +189,17 @@ TEST(test_terrain) {
     snprintf(def.labels, sizeof def.labels, "%s", path);
     MildError error = {0};
     MildMap *map;
-    MildStatus status = terrain_make(&def, 2, &map, &error);
-    expect_good(status == MILD_OK, &error);
+    expect_good(terrain_make(&def, 2, &map, &error) == MILD_OK, &error);
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
     assert_int_equal(mild_terrain_set_map(&terrain, map, &error),
                      MILD_ERROR_ARGUMENT); /* two labels, one material */
     terrain.materials[terrain.material_count++] = sand;
     assert_int_equal(mild_terrain_set_map(&terrain, map, &error), MILD_OK);
-    double worst = 0;
     for (double x = -1.8; x <= 1.8; x += 0.01) {
-        worst = fmax(worst, fabs(mild_terrain_height_at(&terrain, x, 0.3) - 0.05 * (x + 1.8)));
+        expect_near("ramp", mild_terrain_height_at(&terrain, x, 0.3), 0.05 * (x + 1.8), 1e-7);
     }
-    print_message("ramp of a picture: off by %.1e m\n", worst);
-    assert_true(worst < 1e-7);
-    assert_int_equal(mild_terrain_material_at(&terrain, -1.0, 0), 0);
-    assert_int_equal(mild_terrain_material_at(&terrain, 1.7, 0), 1);
     mild_map_destroy(map);
-    def.labels[0] = '\0';
-    assert_true(terrain_make(&def, 2, &map, &error) != MILD_OK);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "terrain.labels");
-    assert_null(map);
 }
 
 static void refuse_terrain(const TerrainDef *def, MildStatus status, const char *names) {

@@ -109,26 +109,6 @@ TEST_WITH(test_crc32c, make_folder, remove_folder) {
     assert_int_equal(check_frames(NULL, NULL), 1); /* the version */
 }
 
-TEST_WITH(test_records, make_folder, remove_folder) {
-    enum { TAGS = 2000 };
-    static char names[TAGS][32];
-    static const char *tags[TAGS];
-    static double values[TAGS];
-    int scalars = 0;
-    MildError error = {0};
-    for (int i = 0; i < TAGS; i++) {
-        snprintf(names[i], sizeof names[i], "group/%d", i);
-        tags[i] = names[i];
-        values[i] = i;
-    }
-    Log *log = log_open(folder, tags, TAGS, -1, &error);
-    assert_non_null(log);
-    assert_int_equal(log_row(log, 1LL << 40, values, &error), MILD_OK);
-    log_close(log);
-    assert_true(check_frames("group/", &scalars) >= 3);
-    assert_int_equal(scalars, TAGS);
-}
-
 TEST_WITH(test_csv_resume, make_folder, remove_folder) {
     static const char *const columns[] = {"reward/gait", "rate"};
     char path[PATH_SIZE], text[1024];
@@ -326,6 +306,7 @@ TEST_WITH(test_scalars, make_folder, remove_folder) {
     static const char *columns[COLUMNS];
     static double values[COLUMNS], rows[ROWS][1 + COLUMNS];
     const double start = (double)time(NULL);
+    int scalars = 0;
     char path[PATH_SIZE];
     MildError error = {0};
     for (int i = 0; i < COLUMNS; i++) {
@@ -340,6 +321,8 @@ TEST_WITH(test_scalars, make_folder, remove_folder) {
         assert_int_equal(log_row(log, 200 + 3 * row, values, &error), MILD_OK);
     }
     log_close(log);
+    assert_true(check_frames("group/", &scalars) > ROWS);
+    assert_int_equal(scalars, ROWS * (COLUMNS - 1));
     path_join(folder, "log.csv", path, NULL);
     read_rows(path, rows[0], ROWS * (1 + COLUMNS));
     find_events(path);

@@ -1,4 +1,7 @@
-/* Training robots other than the default: train.robot chooses, the policy remembers. */
+/* Training on every ground model, with other robots than the default, and with the batch engine, here
+ * on the CPU: train.robot chooses, the policy remembers, runs repeat, and either kind of robots goes
+ * on from the other's checkpoint. */
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "control/controller.h"
@@ -6,53 +9,149 @@
 #include "learn/values.h"
 #include "run/train/trainer.h"
 
-#define POLICY "build_test_robot.safetensors"
-#define CHECKPOINT "build_test_robot_checkpoint.safetensors"
+#define POLICY "build_test_trainer.safetensors"
+#define CHECKPOINT "build_test_trainer_checkpoint.safetensors"
+
+enum { ENVS = 8, STEPS = 8 };
 
 static ExperimentDef small_def(const char *robot) {
     ExperimentDef def = experiment_def_default();
     strcpy(def.train.robot, robot);
-    def.train.envs = 8;
+    def.train.envs = ENVS;
     def.train.threads = 2;
-    def.ppo.steps = 8;
+    def.train.grounds = 32;
+    def.ppo.steps = STEPS;
     return def;
 }
 
-static Trainer *trainer_of(const char *robot) {
+static Trainer *create(const ExperimentDef *def) {
     MildError error = {0};
-    const ExperimentDef def = small_def(robot);
-    Trainer *trainer = train_create(&def, &error);
+    Trainer *trainer = train_create(def, &error);
     expect_good(trainer != NULL, &error);
     return trainer;
 }
 
-/* Two iterations of the quadruped: every loss finite, the weights moved. */
-TEST(a_quadruped_trains) {
+static Trainer *trainer_of(const char *robot) {
+    const ExperimentDef def = small_def(robot);
+    return create(&def);
+}
+
+static size_t bytes_of(Trainer *trainer) {
+    return (size_t)policy_parameter_count(train_policy(trainer)) * sizeof(float);
+}
+
+/* Iterations whose losses are finite and move the weights. Returns the reward of a step in the last
+ * of them. */
+static double iterate(Trainer *trainer, int iterations) {
+    const float *weights = policy_parameters(train_policy(trainer));
+    float *before = malloc(bytes_of(trainer));
+    TrainReport report = {0};
     MildError error = {0};
-    Trainer *trainer = trainer_of("go1");
-    assert_string_equal(policy_def(train_policy(trainer))->robot, "go1");
-    assert_int_equal(policy_def(train_policy(trainer))->feet_velocity_count, 3 * 4);
-    assert_int_equal(policy_def(train_policy(trainer))->estimates, 3 + 4 * 4);
-    const float before = policy_parameters(train_policy(trainer))[0];
-    for (int i = 0; i < 2; i++) {
-        TrainReport report;
-        assert_int_equal(train_iterate(trainer, &report, &error), MILD_OK);
-        const double losses[] = {
-            report.ppo.surrogate,        report.ppo.value_loss,         report.ppo.entropy,
-            report.ppo.mirror,           report.ppo.vae_reconstruction, report.ppo.vae_kl,
-            report.ppo.estimate_loss[0], report.ppo.estimate_loss[1],   report.ppo.estimate_loss[2],
-            report.reward_per_step};
+    assert_non_null(before);
+    for (int i = 0; i < iterations; i++) {
+        const PpoReport *ppo = &report.ppo;
+        memcpy(before, weights, bytes_of(trainer));
+        expect_good(train_iterate(trainer, &report, &error) == MILD_OK, &error);
+        const double losses[] = {ppo->surrogate,
+                                 ppo->value_loss,
+                                 ppo->entropy,
+                                 ppo->kl,
+                                 ppo->mirror,
+                                 ppo->vae_kl,
+                                 ppo->estimate_loss[0],
+                                 ppo->estimate_loss[1],
+                                 ppo->estimate_loss[2],
+                                 ppo->gradient_norm,
+                                 ppo->vae_reconstruction,
+                                 report.reward_per_step};
         for (size_t k = 0; k < sizeof losses / sizeof *losses; k++) {
             print_message("%s%.3g", k ? " " : "losses ", losses[k]);
             assert_true(isfinite(losses[k]));
         }
         print_message("\n");
-        assert_true(report.ppo.value_loss > 0 && report.ppo.vae_reconstruction > 0);
-        assert_true(report.ppo.skipped == 0 && report.episodes.diverged == 0);
+        assert_true(ppo->value_loss > 0 && ppo->vae_reconstruction > 0 && ppo->gradient_norm > 0);
+        assert_true(ppo->skipped == 0 && report.episodes.diverged == 0);
+        assert_true(report.episodes.steps == ENVS * STEPS && report.reward_per_step > 0);
+        assert_true(report.episodes.assist > 0.5); /* they have just begun */
+        assert_memory_not_equal(before, weights, bytes_of(trainer));
     }
-    assert_true(policy_parameters(train_policy(trainer))[0] != before);
+    free(before);
+    return report.reward_per_step;
+}
+
+TEST(every_model_is_trained_on) {
+    double reward[MILD_MODELS];
+    for (int model = 0; model < MILD_MODELS; model++) {
+        ExperimentDef def = small_def("sa01");
+        def.task.randomize.model = model;
+        def.task.randomize.rigid_share = 0; /* every robot stands on the model */
+        Trainer *trainer = create(&def);
+        reward[model] = iterate(trainer, 2);
+        assert_int_equal(train_iteration(trainer), 2);
+        for (int other = 0; other < model; other++) { /* the ground was another one */
+            assert_true(reward[other] != reward[model]);
+        }
+        train_destroy(trainer);
+    }
+}
+
+TEST(a_quadruped_trains) {
+    Trainer *trainer = trainer_of("go1");
+    const PolicyDef *def = policy_def(train_policy(trainer));
+    assert_string_equal(def->robot, "go1");
+    assert_true(def->feet_velocity_count == 3 * 4 && def->estimates == 3 + 4 * 4);
+    iterate(trainer, 2);
     train_destroy(trainer);
 }
+
+/* ---- the batch engine ---- */
+
+static Trainer *trainer_with(TrainRobots robots) {
+    ExperimentDef def = small_def("sa01");
+    def.train.robots = (int)robots;
+    def.task.physics_dt = 0.005;
+    return create(&def);
+}
+
+static void expect_same(Trainer *a, Trainer *b) {
+    assert_int_equal(train_iteration(a), train_iteration(b));
+    assert_memory_equal(policy_parameters(train_policy(a)), policy_parameters(train_policy(b)),
+                        bytes_of(a));
+}
+
+TEST(runs_repeat) {
+    Trainer *a = trainer_with(TRAIN_ROBOTS_BATCH), *b = trainer_with(TRAIN_ROBOTS_BATCH);
+    iterate(a, 2);
+    iterate(b, 2);
+    expect_same(a, b);
+    train_destroy(a);
+    train_destroy(b);
+}
+
+TEST(checkpoints_change_robots) {
+    MildError error = {0};
+    const TrainRobots way[] = {TRAIN_ROBOTS_BATCH, TRAIN_ROBOTS_BATCH, TRAIN_ROBOTS_MUJOCO,
+                               TRAIN_ROBOTS_BATCH};
+    struct stat file;
+    Trainer *before = trainer_with(way[0]);
+    iterate(before, 1);
+    for (int i = 1; i < 4; i++) {
+        Trainer *now = trainer_with(way[i]);
+        assert_int_equal(train_save(before, CHECKPOINT, "test", &error), MILD_OK);
+        assert_int_equal(stat(CHECKPOINT, &file), 0);
+        assert_true(file.st_size < 16 << 20);
+        assert_int_equal(train_load(now, CHECKPOINT, &error), MILD_OK);
+        expect_same(before, now);
+        iterate(now, 1);
+        assert_int_equal(train_iteration(now), 1 + i);
+        train_destroy(before);
+        before = now;
+    }
+    train_destroy(before);
+    unlink(CHECKPOINT);
+}
+
+/* ---- files ---- */
 
 /* A policy and a checkpoint of one robot are refused on another, in one line with both names. */
 TEST(another_robots_policy_is_refused) {
@@ -65,13 +164,11 @@ TEST(another_robots_policy_is_refused) {
     controller_destroy(&controller);
     assert_int_equal(controller_learned(POLICY, robot[1], NULL, 1, &controller, &error),
                      MILD_ERROR_FORMAT);
-    print_message("%s\n", error.text);
     assert_error(&error, MILD_ERROR_FORMAT, POLICY " go1 sa01");
     assert_null(controller.self);
     assert_int_equal(train_save(go1, CHECKPOINT, "test", &error), MILD_OK);
     assert_int_equal(train_load(go1, CHECKPOINT, &error), MILD_OK);
     assert_int_equal(train_load(sa01, CHECKPOINT, &error), MILD_ERROR_ARGUMENT);
-    print_message("%s\n", error.text);
     assert_error(&error, MILD_ERROR_ARGUMENT, CHECKPOINT " robot go1 sa01");
     unlink(POLICY);
     unlink(CHECKPOINT);
@@ -123,13 +220,6 @@ TEST(the_decoder_is_that_of_the_target) {
     }
 }
 
-TEST(an_unknown_robot_is_named) {
-    MildError error = {0};
-    const ExperimentDef def = small_def("sa02");
-    assert_null(train_create(&def, &error));
-    assert_error(&error, MILD_ERROR_ARGUMENT, "train.robot sa02 sa01");
-}
-
 /* The same actions, values and noise. */
 static void check_all_but_decoder(Policy *a, Policy *b) {
     enum { ROWS = 3 };
@@ -155,23 +245,20 @@ static void check_all_but_decoder(Policy *a, Policy *b) {
 TEST(a_run_begins_with_a_policy) {
     MildError error = {0};
     ExperimentDef def = small_def("sa01");
-    Trainer *first = train_create(&def, &error);
-    assert_non_null(first);
+    Trainer *first = create(&def);
+    const size_t bytes = bytes_of(first);
     assert_int_equal(policy_save(train_policy(first), POLICY, "test", &error), MILD_OK);
-    const size_t bytes = (size_t)policy_parameter_count(train_policy(first)) * sizeof(float);
     for (int given = 0; given < 2; given++) {
         def.train.seed = 2;
         strcpy(def.train.start, given ? POLICY : "");
-        Trainer *second = train_create(&def, &error);
-        assert_non_null(second);
+        Trainer *second = create(&def);
         assert_int_equal(memcmp(policy_parameters(train_policy(second)),
                                 policy_parameters(train_policy(first)), bytes) == 0,
                          given);
         train_destroy(second);
     }
     def.ppo.decoder_target = PPO_TARGET_GROUND; /* 13 numbers in the place of a frame's 47 */
-    Trainer *second = train_create(&def, &error);
-    assert_non_null(second);
+    Trainer *second = create(&def);
     check_all_but_decoder(train_policy(second), train_policy(first));
     train_destroy(second);
     def.policy.actor_hidden[0] += 8;
@@ -181,11 +268,13 @@ TEST(a_run_begins_with_a_policy) {
     def = small_def("go1");
     strcpy(def.train.start, POLICY);
     assert_null(train_create(&def, &error));
-    print_message("%s\n", error.text);
     assert_error(&error, MILD_ERROR_FORMAT, "train.start " POLICY);
     strcpy(def.train.start, "no/such/file");
     assert_null(train_create(&def, &error));
     assert_error(&error, MILD_ERROR_IO, "train.start no/such/file");
+    def = small_def("sa02");
+    assert_null(train_create(&def, &error));
+    assert_error(&error, MILD_ERROR_ARGUMENT, "train.robot sa02 sa01");
     unlink(POLICY);
 }
 
