@@ -355,26 +355,47 @@ class Fit(unittest.TestCase):
                 mild.GroundFit(sizes[0], model="bekker").fit(X[0], y[0]).save(path)
             self.assertEqual(mild.Material(path), found)
 
+    def sinking_slide(self, material, depth):
+        """A square of 0.1 m is pressed to a depth and slides 30 mm under the load that it has: along, depth, up, along of the force."""
+        ground, table = mild.Ground([mild.Sole.plate(0.1, 0.1)], material, dt=1e-3), []
+        at, speed, mass = np.zeros(2), np.array([0.0, -0.05]), 0.0  # along and up
+        ground.inverse_inertia[:], ground.rotation[0] = 0.0, np.eye(3)
+        for step in range(round(depth / 5e-5) + 600):
+            if step == round(depth / 5e-5):
+                mass, speed = ground.force[0, 2] / 9.81, np.array([0.05, 0.0])
+            ground.inverse_inertia[2, 2] = 1 / mass if mass else 0.0
+            ground.position[0] = at[0], 0, at[1]
+            ground.velocity[0] = ground.free_velocity[0] = speed[0], 0, speed[1], 0, 0, 0
+            ground.free_velocity[0, 2] -= 9.81e-3 if mass else 0.0
+            ground.solve()
+            ground.advance()
+            speed[1] = ground.new_velocity[0, 2] if mass else speed[1]
+            at += 1e-3 * speed
+            table.append((at[0], -at[1], ground.force[0, 2], ground.force[0, 0]))
+        return np.array(table)
+
     def test_drags(self):
-        """A plate that slides gives slip_length and grip back; what no number of the record says stays open."""
+        """A plate that slides gives slip_length and grip back, and one that sinks meanwhile regain_length."""
         truth = mild.Material("sand_loose", slip_growth=0, slip_length=0.003, regain_length=0.0012, grip=0.13, recovery=0, phi=0.6, rho=2500)
         truth.model = "mild_merged"
         plate, hold = (0.1, 0.1), {name: getattr(truth, name) for name in ("alpha", "c_g", "c_d", "phi", "rho", "mu")}
         press, slide = (mild.press(truth, mild.Sole.plate(*plate), **keys) for keys in ({"depth": 0.03}, {"depth": 0.015, "drag": 0.03}))
         X, y = mild.loading(press.time, press.depth, press.force)
-        table = np.column_stack([slide.x, slide.depth, slide.force, slide.force_x])
-        fit = mild.GroundFit(plate, "mild_merged", hold=hold).fit(X, y, drags=[(plate, table)])
-        self.assertAlmostEqual(fit.parameters_["slip_length"], 0.003, delta=3e-5)
-        self.assertAlmostEqual(fit.parameters_["grip"], 0.13, delta=1.3e-3)
-        self.assertEqual(fit.states_["regain_length"], "no_effect")
+        level, sinking = np.column_stack([slide.x, slide.depth, slide.force, slide.force_x]), self.sinking_slide(truth, 0.015)
+        self.assertGreater(sinking[-1, 1], 0.022)
+        fit = mild.GroundFit(plate, "mild_merged", hold=hold)
+        self.assertEqual(fit.fit(X, y, drags=[(plate, level)]).states_["regain_length"], "no_effect")
+        fit.fit(X, y, drags=[(plate, level), (plate, sinking)])
+        for name, within in (("slip_length", 6e-5), ("grip", 2.6e-3), ("regain_length", 1e-4)):
+            self.assertAlmostEqual(fit.parameters_[name], getattr(truth, name), delta=within)
         self.assertLess(fit.drag_residual_, 0.02 * slide.force.max())
         self.assertEqual(fit.material_.slip_length, fit.parameters_["slip_length"])
-        for wrong, name in (([(plate, table[:, :3])], "shape"), ([(plate, table[:5])], "slide"), ([1], "plate"), ([(3, table)], "plate"),
-                            ([(plate, table)] * 17, "16")):
+        for wrong, name in (([(plate, level[:, :3])], "shape"), ([(plate, level[:5])], "slide"), ([1], "plate"), ([(3, level)], "plate"),
+                            ([(plate, level)] * 17, "16")):
             with self.assertRaisesRegex((ValueError, TypeError), name):
                 fit.fit(X, y, drags=wrong)
         with self.assertRaisesRegex(ValueError, "bekker"):
-            mild.GroundFit(plate, "bekker").fit(X, y, drags=[(plate, table)])
+            mild.GroundFit(plate, "bekker").fit(X, y, drags=[(plate, level)])
 
     def test_estimator(self):
         fit = mild.GroundFit(model="bekker")
