@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Training and evaluation as a user runs them, on tiny networks: a resumed run equals one left alone, a full disk loses
-# nothing, a run folder cannot be taken twice, the evaluation's JSON keeps its contract. Usage: test_train.sh PATH_TO_MILD
+# nothing, a run folder cannot be taken twice. Usage: test_train.sh PATH_TO_MILD
 source "$(dirname "$0")/../kit.sh" "$1"
 
 good() {
@@ -90,20 +90,9 @@ bad "nowhere.safetensors" "$mild" eval --policy nowhere.safetensors
 bad "foam54 foam60" "$mild" eval --policy whole/policy.safetensors --ground rigid,foam54
 bad "rigidd rigid" "$mild" eval --policy whole/policy.safetensors --ground rubber+rigidd
 
-# the evaluation's JSON: its keys, in the contract's order, and numbers as they must be
+# the same rows with another number of threads; test_schema.sh has what is in them
 good "$mild" eval --policy whole/policy.safetensors --ground rigid,rubber+sand_loose --speed 0,0.6 --trials 2 --seconds 3 \
     --json eval.json
-json=$(tr -d ' \t\n' <eval.json)
-number='-\?[0-9][0-9.e+-]*' measured='\(-\?[0-9][0-9.e+-]*\|null\)'
-row='{"ground":"[a-z0-9_+]*"'
-for key in speed trials success; do row+=",\"$key\":$number"; done
-for key in velocity cot; do row+=",\"$key\":$measured"; done
-row+=",\"torque_max\":$number"
-for key in clearance penetration drift; do row+=",\"$key\":$measured"; done
-row+=",\"energy\":$number"
-row+="\(,\"[a-z_]*\":$measured\)*,\"start\":\"stand\",\"ends\":{[a-z_\":0-9,]*},\"each\":\[{[^]]*}\]}" # test_schema.sh has the rest
-grep -qx "{\"policy\":\"whole/policy.safetensors\",\"robot\":\"sa01\",\"model\":\"own\",\"version\":\"[0-9.]*[^\"]*\",\"rows\":\[$row\(,$row\)\{3\}\]}" \
-    <<<"$json" || fail "eval.json: $json"
 good "$mild" eval --policy whole/policy.safetensors --ground rigid,rubber+sand_loose --speed 0,0.6 --trials 2 --seconds 3 \
     --threads 1 --json again.json
 same eval.json again.json
