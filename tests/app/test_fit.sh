@@ -13,12 +13,6 @@ value() {
     tr -d " \t\n" <"$1" | sed -n "s/.*\"$2\":{\"value\":\([^,]*\),.*/\1/p"
 }
 
-# near NAME VALUE TRUTH PERCENT
-near() {
-    awk -v v="$2" -v t="$3" -v p="$4" -v n="$1" 'BEGIN { e = 100 * (v / t - 1); printf "%-24s %6.2f %%\n", n, e
-        exit !(v != "" && e < p && e > -p) }' || fail "$1: '$2' is not within $4 % of $3"
-}
-
 # refuse NAMES COMMAND...: bad, with everything that could be written asked for.
 refuse() {
     bad "$@" --json out.json --figure out.png

@@ -6,9 +6,7 @@ source "$(dirname "$0")/../kit.sh" "$1"
 home=$(realpath "$(dirname "$mild")/..")
 [ -d "$home/robots" ] || home=$(realpath "$(dirname "$0")/../..")
 
-tiny=(--train.envs=4 --train.minutes=0 --train.threads=1 --train.checkpoint_every=1 --train.iterations=1 --ppo.steps=4
-    --policy.actor_hidden=32,0,0,0 --policy.critic_hidden=32,0,0,0 --policy.encoder_hidden=32,0,0,0
-    --policy.decoder_hidden=32,0,0,0)
+tiny=(--train.envs=4 --train.minutes=0 --train.threads=1 --train.checkpoint_every=1 --train.iterations=1 --ppo.steps=4 "${small_nets[@]}")
 
 # sums FOLDER...: what the folders hold, links and pipes as such
 sums() {
