@@ -105,15 +105,10 @@ static void zero_act(void *self, int rows, TaskEnv *const *envs, float *actions)
     memset(actions, 0, sizeof *actions * (size_t)rows * SA01_JOINTS);
 }
 
-static void zero_destroy(void *self) {
-    (void)self;
-}
-
 static EvalRow run(Zero *zero, const char *ground, EvalDef eval, int threads) {
     MildError error = {0};
     *zero = (Zero){0};
-    Controller controller = {
-        .self = zero, .name = "zero", .act = zero_act, .destroy = zero_destroy};
+    Controller controller = {.self = zero, .name = "zero", .act = zero_act};
     Pool *pool = pool_create(threads);
     Scene scene;
     EvalRow row;
@@ -347,8 +342,7 @@ static void run_rows(const Scene *scenes, int scene_count, const double *speeds,
                      EvalRow *rows, EvalTrial *each) {
     MildError error = {0};
     Zero zero = {0};
-    Controller controller = {
-        .self = &zero, .name = "zero", .act = zero_act, .destroy = zero_destroy};
+    Controller controller = {.self = &zero, .name = "zero", .act = zero_act};
     Pool *pool = pool_create(2);
     const EvalDef eval = {.trials = OF_ROW, .seconds = 1.5, .push = 1, .seed = 1};
     EvalRun run = kit_row(&def, pool, &controller, scenes, &eval);
@@ -419,8 +413,7 @@ static int fail_to_answer(void *self, const MildTerrain *terrain, MildGround *gr
 TEST(a_diverged_trial_has_not_succeeded) {
     MildError error = {0};
     Zero zero = {0};
-    Controller controller = {
-        .self = &zero, .name = "zero", .act = zero_act, .destroy = zero_destroy};
+    Controller controller = {.self = &zero, .name = "zero", .act = zero_act};
     Pool *pool = pool_create(1);
     Failing failing[3] = {{-1}, {10}, {-1}};
     RobotGround ground[3];
