@@ -56,3 +56,34 @@ bad() {
     named "${kept[*]}" "$names" || fail "not all of '$names' in the error of: $* -> $errors"
     [ "$(find .)" = "$before" ] || fail "files came or went: $*"
 }
+
+# good COMMAND...: exit code 0; what it prints is in $output.
+good() {
+    output=$("$@" 2>&1 </dev/null) || fail "exit $?: $* -> $output"
+}
+
+# near NAME VALUE TRUTH PERCENT
+near() {
+    awk -v v="$2" -v t="$3" -v p="$4" -v n="$1" 'BEGIN { e = 100 * (v / t - 1); printf "%-36s %6.2f %%\n", n, e
+        exit !(v != "" && e < p && e > -p) }' || fail "$1: '$2' is not within $4 % of $3"
+}
+
+# ---- trainings ----
+
+small_nets=(--policy.actor_hidden=32,0,0,0 --policy.critic_hidden=32,0,0,0 --policy.encoder_hidden=32,0,0,0
+    --policy.decoder_hidden=32,0,0,0)
+
+# All but the header of a safetensors file, whose note names the command.
+numbers() {
+    tail -c +$(($(od -An -t u8 -N 8 "$1") + 9)) "$1"
+}
+
+same_numbers() {
+    cmp <(numbers "$1") <(numbers "$2") || fail "$1 and $2 differ"
+}
+
+# log_numbers FOLDER FORMAT: the log without the columns with the time it took.
+log_numbers() {
+    awk -F, -v format="$2," 'NR == 1 { for (i = 1; i <= NF; i++) timed[i] = $i ~ /^rate\// }
+        { for (i = 1; i <= NF; i++) if (!timed[i]) printf format, $i; print "" }' "$1/log.csv"
+}

@@ -80,8 +80,7 @@ for command in --help --version "info grounds" "info config" "info build" "press
 done
 
 # a run folder has one owner
-tiny=(--train.envs=4 --train.minutes=0 --train.threads=1 --ppo.steps=8 --policy.actor_hidden=32,0,0,0
-    --policy.critic_hidden=32,0,0,0 --policy.encoder_hidden=32,0,0,0 --policy.decoder_hidden=32,0,0,0)
+tiny=(--train.envs=4 --train.minutes=0 --train.threads=1 --ppo.steps=8 "${small_nets[@]}")
 wait_for() {
     for ((i = 0; i < 300; i++)); do
         [ -e "$1" ] && return

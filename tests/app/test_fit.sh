@@ -13,12 +13,6 @@ value() {
     tr -d " \t\n" <"$1" | sed -n "s/.*\"$2\":{\"value\":\([^,]*\),.*/\1/p"
 }
 
-# near NAME VALUE TRUTH PERCENT
-near() {
-    awk -v v="$2" -v t="$3" -v p="$4" -v n="$1" 'BEGIN { e = 100 * (v / t - 1); printf "%-24s %6.2f %%\n", n, e
-        exit !(v != "" && e < p && e > -p) }' || fail "$1: '$2' is not within $4 % of $3"
-}
-
 # refuse NAMES COMMAND...: bad, with everything that could be written asked for.
 refuse() {
     bad "$@" --json out.json --figure out.png
@@ -117,7 +111,6 @@ bad "ground.k_c 0.04 0.0433432 ground.plate_width" "$mild" press --ground clay -
 bad "ground.k_c -90000 0.13003 ground.plate_width" "$mild" eval --ground clay --ground.k_c=-90000 --controller stand --trials 1 --seconds 1
 refuse "fit k_c k_phi 0.1" "$mild" fit narrow.csv --plate 0.15,0.1 --model bekker --hold k_c=-500,k_phi=4900
 refuse "--plate 2 1" "$mild" fit small.csv --plate 0.15,0.1 --plate 0.3,0.1
-refuse "--plate 2 3" "$mild" fit small.csv large.csv small.csv --plate 0.15,0.1 --plate 0.3,0.1
 refuse "--plate 3" "$mild" fit small.csv --plate 0.15,0.1,0.1
 refuse "--hold plate_width --plate" "$mild" fit wide.csv --plate 0.3,0.2 --model bekker --hold plate_width=0.1
 
@@ -150,8 +143,6 @@ refuse "--fit --hold-from" "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pen
 refuse "sand_lose sand_loose" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold-from sand_lose
 refuse "--hold-from --hold" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold-from clay
 refuse "--hold 2 0.1 1.5" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha=2
-refuse "--hold c_g -1 0 50" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold c_g=-1
-refuse "--hold c_d 0.1 0.5 100" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold c_d=0.1
 refuse "alpha --hold NAME=VALUE" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha
 refuse "alpha=nan --hold NAME=VALUE" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha=nan
 refuse "mu nu --hold" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold mu=0.5
@@ -163,10 +154,7 @@ refuse "bekkr bekker" "${fit[@]}" sand_loose.csv "${plate[@]}" --model bekkr
 refuse "--model" "${fit[@]}" sand_loose.csv "${plate[@]}" --model rigid
 edit '{ print $1, $2 }' && refuse "bad.csv:1 force_n" "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR == 9 { $3 = "nan" } { print }' && refuse "bad.csv:9 force_n nan" "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $2 = "" } { print }' && refuse "bad.csv:9 depth_m" "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR == 9 { print $1; next } { print }' && refuse "bad.csv:9 depth_m" "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $2 = "1 mm" } { print }' && refuse "bad.csv:9 depth_m mm" "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $3 = "1e999" } { print }' && refuse "bad.csv:9 force_n 1e999" "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR == 9 { $3 = "12,5" } { print }' && refuse "bad.csv:9 9 8" "${fit[@]}" bad.csv "${plate[@]}"
 awk 'BEGIN { print "depth_m,force_n"; for (i = 0; i <= 1000000; i++) print i * 1e-8 "," i }' >bad.csv
 refuse "bad.csv:1000002 1000000" "${fit[@]}" bad.csv "${plate[@]}"

@@ -21,7 +21,6 @@ while read -r key _; do
 done < <("$mild" info config)
 [ "$keys" -gt 80 ] || fail "only $keys keys"
 bad "--train.envs=-1 train.envs" "$mild" train --out run --train.envs=-1
-bad "--ppo.clip=-0.2 ppo.clip" "$mild" train --out run --ppo.clip=-0.2
 bad "--task.physics_dt=inf task.physics_dt" "$mild" train --out run --task.physics_dt=inf
 bad "--policy.actor_hidden=32,-1,0,0 policy.actor_hidden" "$mild" train --out run --policy.actor_hidden=32,-1,0,0
 

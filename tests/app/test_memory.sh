@@ -61,9 +61,8 @@ for n in $(seq $((total - 40)) 2 "$total"); do
 done
 
 # a training, whose matrix products are a C++ library's: no abort
-tiny=(--train.envs=4 --train.minutes=0 --train.threads=1 --train.iterations=1 --ppo.steps=4 --policy.actor_hidden=32,0,0,0
-    --policy.critic_hidden=32,0,0,0 --policy.encoder_hidden=32,0,0,0 --policy.decoder_hidden=32,0,0,0)
-train=("$mild" train --out trained "${tiny[@]}")
+tiny=(--train.envs=4 --train.minutes=0 --train.threads=1 --train.iterations=1 --ppo.steps=4)
+train=("$mild" train --out trained "${tiny[@]}" "${small_nets[@]}")
 total=$(count "${train[@]}")
 for share in {1..40}; do # the networks work in the last tenth of its allocations
     for on in '' 1; do

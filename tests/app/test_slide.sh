@@ -26,12 +26,6 @@ number() {
     tr -d " \t\n" <"$1" | sed -n "s/.*\"$2\":{\([^}]*\)}.*/\1/p" | tr , '\n' | sed -n "s/^\"$3\"://p"
 }
 
-# near NAME VALUE TRUTH PERCENT
-near() {
-    awk -v v="$2" -v t="$3" -v p="$4" -v n="$1" 'BEGIN { e = 100 * (v / t - 1); printf "%-36s %6.2f %%\n", n, e
-        exit !(v != "" && e < p && e > -p) }' || fail "$1: '$2' is not within $4 % of $3"
-}
-
 # holds NAME FILE TRUTH: the 95 % interval does.
 holds() {
     awk -v low="$(number "$2" "$1" low)" -v high="$(number "$2" "$1" high)" -v t="$3" 'BEGIN { exit !(low != "" && low <= t && t <= high) }'

@@ -1,5 +1,6 @@
 /* Files and texts of layer base: what is read and what is refused, written whole or not at all,
  * told apart, locked. */
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -51,17 +52,57 @@ TEST(test_only_regular_files_are_read) {
     assert_int_equal(error.status, MILD_ERROR_FORMAT);
 }
 
-TEST(test_write_whole_or_not) {
+TEST(test_write) {
+    static const char *const nowhere[] = {"no/file", "/dev/full", "."}; /* full, as a disk is */
+    char name[PATH_SIZE];
     MildError error = {0};
-    assert_int_equal(file_write("file", "old", 3, &error), MILD_OK);
-    assert_int_equal(file_write("file", "newer", 5, &error), MILD_OK);
-    assert_holds("file", "newer");
-    assert_int_equal(file_write("/dev/full", "x", 1, &error), MILD_ERROR_IO); /* as a full disk */
-    assert_error(&error, MILD_ERROR_IO, "/dev/full");
+    assert_int_equal(file_write("file", "first", 5, &error), MILD_OK);
+    assert_holds("file", "first");
+    assert_int_equal(file_write("file", "2nd", 3, &error), MILD_OK); /* shorter: nothing remains */
+    assert_holds("file", "2nd");
+    assert_int_equal(file_write("file", "", 0, &error), MILD_OK);
+    assert_holds("file", "");
     assert_int_equal(file_write("/dev/null", "x", 1, &error), MILD_OK);
-    assert_int_equal(file_write("/dev/full/x", "x", 1, &error), MILD_ERROR_IO);
-    assert_int_equal(path_make_folder("file", &error), MILD_ERROR_IO);
-    assert_int_equal(path_make_folder("file/below", &error), MILD_ERROR_IO);
+    for (size_t i = 0; i < sizeof nowhere / sizeof *nowhere; i++) {
+        assert_int_equal(file_write(nowhere[i], "x", 1, &error), MILD_ERROR_IO);
+        assert_error(&error, MILD_ERROR_IO, nowhere[i]);
+    }
+    memset(name, 'n', sizeof name);
+    name[PATH_SIZE - 1] = '\0';
+    assert_int_equal(file_write(name, "x", 1, &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(file_write("", "x", 1, &error), MILD_ERROR_ARGUMENT);
+}
+
+/* What can be written is found out without a trace. */
+TEST(test_check_write) {
+    MildError error = {0};
+    assert_int_equal(file_check_write("to_be", &error), MILD_OK);
+    assert_int_not_equal(access("to_be", F_OK), 0);
+    assert_int_equal(file_write("kept", "kept", 4, &error), MILD_OK);
+    assert_int_equal(file_check_write("kept", &error), MILD_OK);
+    assert_holds("kept", "kept");
+    assert_int_equal(file_check_write("/dev/null", &error), MILD_OK);
+    assert_int_equal(file_check_write("", &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(file_check_write("no/file", &error), MILD_ERROR_IO);
+    assert_int_equal(file_check_write("/proc/self/maps", &error), MILD_ERROR_IO);
+    assert_int_equal(file_check_write(folder, &error), MILD_ERROR_IO);
+    assert_error(&error, MILD_ERROR_IO, folder);
+}
+
+/* A pipe is written to and stays one. */
+TEST(test_pipe) {
+    MildError error = {0};
+    char read_back[8] = "";
+    struct stat info;
+    assert_int_equal(mkfifo("written_pipe", 0600), 0);
+    const int reader = open("written_pipe", O_RDONLY | O_NONBLOCK);
+    assert_true(reader >= 0);
+    assert_int_equal(file_check_write("written_pipe", &error), MILD_OK);
+    assert_int_equal(file_write("written_pipe", "hello", 5, &error), MILD_OK);
+    assert_int_equal(read(reader, read_back, sizeof read_back), 5);
+    assert_string_equal(read_back, "hello");
+    assert_true(stat("written_pipe", &info) == 0 && S_ISFIFO(info.st_mode));
+    close(reader);
 }
 
 /* Temporary files never take a name that is in use. */
@@ -150,14 +191,6 @@ TEST(test_own) {
     for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
         assert_int_equal(file_check_own(refused[i], &error), MILD_ERROR_IO);
     }
-}
-
-TEST(test_beside) {
-    char path[PATH_SIZE];
-    assert_int_equal(path_beside("runs/a.png", "_fit.csv", path, NULL), MILD_OK);
-    assert_string_equal(path, "runs/a_fit.csv");
-    assert_int_equal(path_beside("runs.d/a", ".csv", path, NULL), MILD_OK);
-    assert_string_equal(path, "runs.d/a.csv");
 }
 
 /* Whether another process gets the lock; it ends with the lock held, as if killed. */

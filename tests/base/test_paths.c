@@ -1,5 +1,4 @@
-/* Paths and files written whole or not at all. */
-#include <fcntl.h>
+/* Paths: joined, beside each other and the program, data, folders that are made. */
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -28,16 +27,6 @@ static const char *in_folder(const char *name) {
     return path[turn];
 }
 
-static void expect_file(const char *path, const char *content) {
-    char read[64] = "";
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    size_t size = fread(read, 1, sizeof read - 1, file);
-    fclose(file);
-    assert_int_equal(size, strlen(content));
-    assert_string_equal(read, content);
-}
-
 TEST(test_join) {
     char path[PATH_SIZE], name[PATH_SIZE];
     MildError error = {0};
@@ -51,6 +40,14 @@ TEST(test_join) {
     name[PATH_SIZE - 2] = '\0';
     assert_int_equal(path_join("a", name, path, &error), MILD_ERROR_ARGUMENT);
     assert_error(&error, MILD_ERROR_ARGUMENT, "a");
+}
+
+TEST(test_beside) {
+    char path[PATH_SIZE];
+    assert_int_equal(path_beside("runs/a.png", "_fit.csv", path, NULL), MILD_OK);
+    assert_string_equal(path, "runs/a_fit.csv");
+    assert_int_equal(path_beside("runs.d/a", ".csv", path, NULL), MILD_OK);
+    assert_string_equal(path, "runs.d/a.csv");
 }
 
 TEST(test_beside_the_program) {
@@ -127,66 +124,6 @@ TEST(test_make_folder) {
     rmdir(in_folder("a/b/c"));
     rmdir(in_folder("a/b"));
     rmdir(in_folder("a"));
-}
-
-TEST(test_write) {
-    MildError error = {0};
-    const char *path = in_folder("file");
-    assert_int_equal(file_write(path, "first", 5, &error), MILD_OK);
-    expect_file(path, "first");
-    assert_int_equal(file_write(path, "2nd", 3, &error), MILD_OK); /* shorter: nothing remains */
-    expect_file(path, "2nd");
-    assert_int_equal(file_write(path, "", 0, &error), MILD_OK);
-    expect_file(path, "");
-    remove(path);
-    assert_int_equal(file_write("", "x", 1, &error), MILD_ERROR_ARGUMENT);
-    assert_int_equal(file_write(in_folder("no/file"), "x", 1, &error), MILD_ERROR_IO);
-    assert_error(&error, MILD_ERROR_IO, in_folder("no/file"));
-    assert_int_equal(file_write("/dev/full", "x", 1, &error), MILD_ERROR_IO);
-    assert_error(&error, MILD_ERROR_IO, "/dev/full");
-    assert_int_equal(file_write("/dev/null", "x", 1, &error), MILD_OK);
-    assert_int_equal(file_write(folder, "x", 1, &error), MILD_ERROR_IO);
-    assert_error(&error, MILD_ERROR_IO, folder);
-}
-
-/* A pipe is written to and stays one. */
-TEST(test_pipe) {
-    MildError error = {0};
-    const char *path = in_folder("pipe");
-    char read_back[8] = "";
-    struct stat info;
-    assert_int_equal(mkfifo(path, 0600), 0);
-    int reader = open(path, O_RDONLY | O_NONBLOCK);
-    assert_true(reader >= 0);
-    assert_int_equal(file_check_write(path, &error), MILD_OK);
-    assert_int_equal(file_write(path, "hello", 5, &error), MILD_OK);
-    assert_int_equal(read(reader, read_back, sizeof read_back), 5);
-    assert_string_equal(read_back, "hello");
-    assert_true(stat(path, &info) == 0 && S_ISFIFO(info.st_mode));
-    close(reader);
-    remove(path);
-}
-
-TEST(test_check_write) {
-    MildError error = {0};
-    const char *path = in_folder("file");
-    assert_int_equal(file_check_write(path, &error), MILD_OK);
-    assert_int_not_equal(access(path, F_OK), 0); /* nothing is left behind */
-    assert_int_equal(file_write(path, "kept", 4, &error), MILD_OK);
-    assert_int_equal(file_check_write(path, &error), MILD_OK);
-    expect_file(path, "kept");
-    remove(path);
-    assert_int_equal(file_check_write("", &error), MILD_ERROR_ARGUMENT);
-    assert_int_equal(file_check_write(in_folder("no/file"), &error), MILD_ERROR_IO);
-    assert_int_equal(file_check_write(folder, &error), MILD_ERROR_IO);
-    assert_error(&error, MILD_ERROR_IO, folder);
-    assert_int_equal(file_check_write("/dev/null", &error), MILD_OK);
-    assert_int_not_equal(file_check_write("/proc/self/maps", &error), MILD_OK);
-    char name[PATH_SIZE];
-    memset(name, 'n', sizeof name);
-    name[PATH_SIZE - 1] = '\0';
-    assert_int_equal(file_check_write(name, &error), MILD_ERROR_ARGUMENT);
-    assert_int_equal(file_write(name, "x", 1, &error), MILD_ERROR_ARGUMENT);
 }
 
 TEST_MAIN(make_folder, remove_folder)

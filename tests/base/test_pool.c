@@ -147,13 +147,4 @@ TEST(test_clocks) {
     assert_true(clock_thread_seconds() - busy > 1e-4);
 }
 
-TEST(test_clock_moves_forward) {
-    double last = clock_seconds();
-    for (int i = 0; i < 1000; i++) {
-        double now = clock_seconds();
-        assert_true(now >= last);
-        last = now;
-    }
-}
-
 TEST_MAIN(NULL, NULL)

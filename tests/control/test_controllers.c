@@ -127,33 +127,4 @@ TEST(stand_acts_as_the_stand) {
     }
 }
 
-/* Five seconds through the whole environment. */
-TEST(stand_stands) {
-    static const char *const robots[] = {"sa01", "go1", "g1"};
-    for (int r = 0; r < 3; r++) {
-        Scene scene;
-        EnvsView none = {0};
-        float action[ROBOT_JOINTS_MAX];
-        scene_open(&scene, robots[r], "stand");
-        for (int t = 0; t < 500; t++) {
-            scene.controller.act(scene.controller.self, 1, &scene.env, action);
-            TaskStep step = task_env_step(scene.env, &scene.def, scene.robot, scene.sim, action, 0,
-                                          &none, NULL);
-            if (step.done) {
-                fail_msg("%s fell after %.2f s", robots[r], TASK_PERIOD * t);
-            }
-        }
-        double load = 0;
-        for (int f = 0; f < robot_feet(scene.robot); f++) {
-            load += robot_sim_foot(scene.sim, f)->force[2] /
-                    (robot_feet(scene.robot) * robot_foot_load(scene.robot));
-        }
-        print_message("%s: load %.4f of the weight, upright %.6f\n", robots[r], load,
-                      robot_sim_base_rotation(scene.sim)[8]);
-        assert_true(fabs(load - 1) < 0.02);
-        assert_true(robot_sim_base_rotation(scene.sim)[8] > 0.99);
-        scene_close(&scene);
-    }
-}
-
 TEST_MAIN(NULL, NULL)

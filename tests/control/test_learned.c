@@ -110,30 +110,6 @@ TEST(acts_as_its_policy) {
     unlink(PATH);
 }
 
-/* The same history gives the same action after anything else: bit for bit. */
-TEST(remembers_nothing) {
-    MildError error = {0};
-    PolicyDef def = task_policy_def();
-    policy_destroy(save_policy(&def));
-    TaskEnv *envs[ENVS];
-    for (int e = 0; e < ENVS; e++) {
-        envs[e] = made[e];
-    }
-    Controller controller = {0};
-    assert_int_equal(controller_learned(PATH, robot, NULL, ENVS, &controller, &error), MILD_OK);
-    float first[ENVS * SA01_JOINTS], other[ENVS * SA01_JOINTS], again[ENVS * SA01_JOINTS];
-    fill_histories(envs, 0);
-    controller.act(controller.self, ENVS, envs, first);
-    fill_histories(envs, 1);
-    controller.act(controller.self, ENVS, envs, other);
-    fill_histories(envs, 0);
-    controller.act(controller.self, ENVS, envs, again);
-    assert_memory_equal(first, again, sizeof first);
-    assert_memory_not_equal(first, other, sizeof first);
-    controller_destroy(&controller);
-    unlink(PATH);
-}
-
 /* ---- parts taken out ---- */
 
 static double worst_gap(const float *a, const float *b, int count) {
@@ -235,20 +211,6 @@ TEST(parts_are_taken_out) {
     unlink(PATH);
 }
 
-TEST(parts_have_names) {
-    MildError error = {0};
-    Ablation part = ABLATION_none;
-    const LearnedInside *inside;
-    Controller other = {.name = "other"};
-    assert_int_equal(ablation_find("estimates", &part, &error), MILD_OK);
-    assert_int_equal(part, ABLATION_estimates);
-    assert_int_equal(ablation_find("none", &part, &error), MILD_ERROR_ARGUMENT);
-    assert_int_equal(ablation_find("histroy", &part, &error), MILD_ERROR_ARGUMENT);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "--ablate histroy history");
-    assert_int_equal(learned_watch(&other, &inside, &error), MILD_ERROR_ARGUMENT);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "other --controller learned");
-}
-
 /* Whose shape is not the task's is refused with both shapes named, and nothing is made. */
 TEST(another_shape_is_refused) {
     static const char *const names[3] = {PATH " 46 6 sa01 47 12", PATH " 47 5 sa01 6 12",
@@ -267,32 +229,6 @@ TEST(another_shape_is_refused) {
         assert_error(&error, MILD_ERROR_FORMAT, names[wrong]);
         unlink(PATH);
     }
-}
-
-/* Any controller's own destroy is called, once, with what is its own. */
-static void count(void *self) {
-    ++*(int *)self;
-}
-
-TEST(destroy_is_called_once) {
-    int calls = 0;
-    Controller controller = {.self = &calls, .destroy = count};
-    controller_destroy(&controller);
-    assert_int_equal(calls, 1);
-    controller_destroy(&controller);
-    assert_int_equal(calls, 1);
-}
-
-TEST(a_missing_file_is_named) {
-    MildError error = {0};
-    Controller controller = {0};
-    assert_int_equal(
-        controller_learned("no/policy.safetensors", robot, NULL, 1, &controller, &error),
-        MILD_ERROR_IO);
-    assert_error(&error, MILD_ERROR_IO, "no/policy.safetensors");
-    assert_int_not_equal(
-        controller_learned("no/policy.safetensors", robot, NULL, 1, &controller, NULL), MILD_OK);
-    assert_null(controller.self);
 }
 
 TEST_MAIN(setup, teardown)

@@ -10,7 +10,6 @@ typedef struct {
     SpeedHoldDef def;
     SpeedHold hold;
     double factor;      /* speed over command, of both directions */
-    double bias;        /* estimate over speed */
     double sway, noise; /* [m/s] of the estimate */
     double wanted[3], command[3];
     int step;
@@ -20,7 +19,6 @@ typedef struct {
 static Walker walker_at(double wanted, double factor) {
     return (Walker){.def = {.gain = 0.1, .scale = 4, .clock = CLOCK},
                     .factor = factor,
-                    .bias = 1,
                     .wanted = {wanted},
                     .command = {wanted},
                     .random = random_at(7, 0, 0)};
@@ -33,7 +31,7 @@ static void walk(Walker *w, int steps) {
         frame[CLOCK] = (float)sin(phase);
         frame[CLOCK + 1] = (float)cos(phase);
         for (int i = 0; i < 2; i++) {
-            const double v = w->bias * w->factor * w->command[i] + w->sway * sin(2 * phase) +
+            const double v = w->factor * w->command[i] + w->sway * sin(2 * phase) +
                              w->noise * (2 * random_unit(&w->random) - 1);
             estimates[i] = (float)(w->def.scale * v);
         }
@@ -54,13 +52,6 @@ TEST(a_slow_walk_comes_to_its_speed) {
         expect_near("speed", w.factor * w.command[0], w.wanted[0], 0.01 * 0.5);
         expect_near("yaw", w.command[2], 0, 0);
     }
-}
-
-TEST(it_goes_as_fast_as_it_believes) {
-    Walker w = walker_at(0.5, 0.9);
-    w.bias = 1.04;
-    walk(&w, CYCLE * 60);
-    expect_near("speed", w.factor * w.command[0], 0.5 / 1.04, 1e-3);
 }
 
 /* The factor is the same in each cycle; its weight grows. */

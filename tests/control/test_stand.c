@@ -1,5 +1,5 @@
 /* The balanced stand: its pose and torques against statics, its answer to a tilt against geometry,
- * the same whichever way the robot looks; and it stands. */
+ * the same whichever way the robot looks. That it stands: robot/test_stand. */
 #include <mujoco/mujoco.h>
 
 #include "base/random.h"
@@ -334,33 +334,6 @@ TEST(test_heading) {
         }
         printf("%s: looking elsewhere it answers by %.1e rad another way\n", names[r], worst);
         assert_true(worst < 1e-9);
-    }
-}
-
-/* Lets go on soft ground: after a second the base is upright and where it was. */
-TEST(test_stands) {
-    static const char *const grounds[] = {"foam60", "grass", "foam25"};
-    const Robot *robot = robots[0];
-    for (int g = 0; g < 3; g++) {
-        MildMaterial m = kit_preset(grounds[g]);
-        MildTerrain terrain = mild_terrain_uniform(&m);
-        double sinkage = mild_sole_sinkage(robot_soles(robot)[0], &m, robot_foot_load(robot));
-        RobotState rest = stand_state(stands[0], 1, sinkage);
-        RobotSim *sim = sim_at(robot, &rest);
-        MildGround *ground = kit_ground(robot);
-        for (int s = 0; s < 1500; s++) {
-            double torque[ROBOT_JOINTS_MAX];
-            stand_torque(stands[0], sim, 1, torque);
-            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
-        }
-        const double *q = robot_sim_qpos(sim), *turn = robot_sim_base_rotation(sim);
-        double tilt = acos(fmin(turn[8], 1)), lean = lean_of(&rest);
-        printf("%s: after 1.5 s at %.1f mm, %.1f mm below, tilted %.4f rad (leant %.4f)\n",
-               grounds[g], 1e3 * (q[0] - rest.qpos[0]), 1e3 * (rest.qpos[2] - q[2]), tilt, lean);
-        assert_true(fabs(tilt - fabs(lean)) < 0.03 && fabs(q[0] - rest.qpos[0]) < 0.03);
-        assert_true(fabs(q[2] - rest.qpos[2]) < 0.02);
-        robot_sim_destroy(sim);
-        free(ground);
     }
 }
 

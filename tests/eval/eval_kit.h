@@ -30,6 +30,13 @@ static inline int kit_setup(void **state) {
     return !ready;
 }
 
+/* No action, for every row. */
+static inline void kit_zero_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
+    (void)self;
+    (void)envs;
+    memset(actions, 0, (size_t)rows * SA01_JOINTS * sizeof *actions);
+}
+
 /* One row by MuJoCo; *eval must outlive it. */
 static inline EvalRun kit_row(const TaskDef *task, Pool *pool, Controller *controller,
                               const Scene *scene, const EvalDef *eval) {

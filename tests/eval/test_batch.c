@@ -26,15 +26,9 @@ static void zero_act_on(void *self, int rows, const float *history, float *actio
     memset(actions, 0, sizeof *actions * (size_t)rows * SA01_JOINTS);
 }
 
-static void zero_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
-    (void)self;
-    (void)envs;
-    memset(actions, 0, sizeof *actions * (size_t)rows * SA01_JOINTS);
-}
-
 static Controller zero_controller(Asked *asked) {
     *asked = (Asked){0};
-    return (Controller){.self = asked, .name = "zero", .act = zero_act, .act_on = zero_act_on};
+    return (Controller){.self = asked, .name = "zero", .act = kit_zero_act, .act_on = zero_act_on};
 }
 
 static Controller walker(Pool *pool, int rows) {

@@ -70,22 +70,12 @@ MildStatus __wrap_envs_step(Envs *envs, const EnvsStep *step, MildStream stream,
     return status;
 }
 
-static void zero_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
-    (void)self;
-    (void)envs;
-    memset(actions, 0, (size_t)rows * SA01_JOINTS * sizeof *actions);
-}
-
-static void zero_destroy(void *self) {
-    (void)self;
-}
-
 /* The text that two trials write; NULL: they failed. */
 static char *write_feet(MildError *error) {
     static const EvalDef start = {
         .speed = 0.3, .trials = TRIALS, .seconds = PERIODS * TASK_PERIOD, .seed = 1};
     EvalDef eval = start;
-    Controller controller = {.name = "zero", .act = zero_act, .destroy = zero_destroy};
+    Controller controller = {.name = "zero", .act = kit_zero_act};
     TaskDef task = def;
     Scene scene;
     EvalRow row;

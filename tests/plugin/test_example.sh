@@ -29,8 +29,7 @@ same go1 go1 go1 grass 0.005 Euler 0.004
 same g1 g1 g1 grass 0.002 Euler 0.004
 same g1 g1 g1 foam45 0.002 discrete 0.02
 
-# --time, by a clock that only mj_step moves; mistakes are one line
-"$python" "$root/tests/plugin/time_steps.py" "$root" || fail "--time"
+# mistakes are one line
 walk() { "$python" "$root/scripts/plugin_walk.py" "$@"; }
 bad "plugin_walk.py: robots/go1/robot.ini corners" walk go1 --time
 bad "plugin_walk.py: --step 0.003 0.01" walk sa01 --step 0.003

@@ -197,42 +197,4 @@ TEST(disagreement_is_said) {
     mj_deleteModel(m);
 }
 
-/* In the air a model moves as it does without the plugin. */
-TEST(air_is_as_without) {
-    static const int integrators[] = {mjINT_EULER, mjINT_IMPLICITFAST, mjINT_IMPLICIT,
-                                      mjINT_DISCRETE};
-    for (int c = 0; c < CASES; c++) {
-        for (int k = 0; k < 4; k++) {
-            char body[4000], text[6000];
-            double worst = 0;
-            if (k == 0 && !is_mild(&cases[c])) {
-                continue;
-            }
-            mjModel *m = leg(&cases[c], 0.001, "Euler", "foam45");
-            snprintf(body, sizeof body, LEG, cases[c].joints[0], cases[c].joints[1],
-                     cases[c].joints[2]);
-            snprintf(text, sizeof text, "<mujoco><option timestep='0.001'/>%s%s</mujoco>", body,
-                     cases[c].rest);
-            mjModel *without = kit_model(text);
-            m->opt.integrator = without->opt.integrator = integrators[k];
-            mjData *d = mj_makeData(m), *e = mj_makeData(without);
-            start(m, d);
-            start(without, e);
-            d->qpos[2] = e->qpos[2] = 5;
-            for (int i = 0; i < 300; i++) {
-                mj_step(m, d);
-                mj_step(without, e);
-            }
-            for (int i = 0; i < m->nq; i++) {
-                worst = fmax(worst, fabs(d->qpos[i] - e->qpos[i]));
-            }
-            assert_true(worst < 1e-12);
-            mj_deleteData(d);
-            mj_deleteData(e);
-            mj_deleteModel(m);
-            mj_deleteModel(without);
-        }
-    }
-}
-
 TEST_MAIN(kit_setup, NULL)

@@ -190,31 +190,6 @@ TEST(threads_agree) {
     mj_deleteModel(m);
 }
 
-/* Any bytes in the place of the state are noticed, said and replaced. */
-TEST(foreign_state_is_reset) {
-    mjModel *m = hopper(MOTOR);
-    mjData *d = mj_makeData(m), *fresh = mj_makeData(m);
-    for (int round = 0; round < 4; round++) {
-        mj_resetData(m, d);
-        steps(m, d, 100);
-        unsigned char *bytes = (unsigned char *)d->plugin_state;
-        const int size = (int)m->npluginstate * (int)sizeof(double);
-        if (round == 0) {
-            memset(bytes, 0, (size_t)size);
-        }
-        for (int i = 0; i < size && round > 0; i++) {
-            bytes[i] = (unsigned char)(i * 37 + round * 101);
-        }
-        kit_messages = 0;
-        mj_step(m, d);
-        assert_int_equal(kit_messages, 1);
-        assert_names(kit_said, "state");
-    }
-    mj_deleteData(d);
-    mj_deleteData(fresh);
-    mj_deleteModel(m);
-}
-
 /* ---- a state that changes at any moment ---- */
 
 static uint64_t random_bits(uint64_t *seed) {
@@ -295,7 +270,7 @@ TEST(changed_states_are_survived) {
         }
         kit_messages = 0;
         step_changed(m, d, past, other, (size_t)n->npluginstate * sizeof(mjtNum), &scene, &seed);
-        resets += kit_messages > 0;
+        resets += kit_messages > 0 && kit_named(kit_said, "state");
         loaded += pressed(m, d) > 0;
         mj_step(m, d);
     }

@@ -20,11 +20,11 @@ typedef struct {
     mjvOption option;
 } Shown;
 
-/* A plate at (x, y) on ground with these keys. */
-static void show(Shown *shown, const char *keys, const char *asset, const char *geom, double x,
-                 double y) {
+/* A plate at (x, y) on a ground with these keys. */
+static void show_on(Shown *shown, const char *ground, const char *keys, const char *asset,
+                    const char *geom, double x, double y) {
     char head[1500], text[3000];
-    kit_head(head, sizeof head, 0.002, "Euler", "plate", "sand_loose", keys);
+    kit_head(head, sizeof head, 0.002, "Euler", "plate", ground, keys);
     snprintf(text, sizeof text,
              "%s%s<worldbody>%s<body name='plate' pos='%g %g 0.3'><freejoint/><geom type='box' "
              "size='.1 .05 .01' mass='3' contype='0' conaffinity='0'/></body></worldbody></mujoco>",
@@ -35,6 +35,11 @@ static void show(Shown *shown, const char *keys, const char *asset, const char *
     mjv_defaultScene(&shown->scene);
     mjv_defaultOption(&shown->option);
     mjv_makeScene(shown->m, &shown->scene, 4000);
+}
+
+static void show(Shown *shown, const char *keys, const char *asset, const char *geom, double x,
+                 double y) {
+    show_on(shown, "sand_loose", keys, asset, geom, x, y);
 }
 
 static void update(Shown *shown) {
@@ -222,19 +227,8 @@ TEST(a_floor_has_patches) {
 TEST(patterns_have_colours) {
     Shown shown;
     int sand = 0, grass = 0;
-    char head[1500], text[3000];
-    kit_head(head, sizeof head, 0.002, "Euler", "plate", "sand_loose grass",
-             CONFIG("surface", "1") CONFIG("terrain.patches", "stripes"));
-    snprintf(text, sizeof text,
-             "%s<worldbody><body name='plate' pos='0 0 0.3'><freejoint/><geom type='box' "
-             "size='.1 .05 .01' mass='3' contype='0' conaffinity='0'/></body></worldbody></mujoco>",
-             head);
-    shown.m = kit_model(text);
-    shown.d = mj_makeData(shown.m);
-    mj_forward(shown.m, shown.d);
-    mjv_defaultScene(&shown.scene);
-    mjv_defaultOption(&shown.option);
-    mjv_makeScene(shown.m, &shown.scene, 4000);
+    show_on(&shown, "sand_loose grass", CONFIG("surface", "1") CONFIG("terrain.patches", "stripes"),
+            "", "", 0, 0);
     update(&shown);
     for (int i = 0; i < shown.scene.ngeom; i++) {
         const mjvGeom *g = &shown.scene.geoms[i];

@@ -1,12 +1,10 @@
 """The batch ground on tensors of a CUDA device, over DLPack, beside the one on the CPU. Needs PyTorch; without a device it runs
 what the CPU can do. check_cuda.py [--time 4096,16384] [tests]: --time measures steps instead."""
 import importlib.util
-import os
 import sys
 import time
 import unittest
 
-import numpy as np
 import torch
 
 import mild
@@ -67,12 +65,12 @@ def apart(found, wanted):
 
 
 class Numbers(unittest.TestCase):
-    def follow(self, robots, labels):
-        """Robots in their random ways over steps that are kept and steps that are not."""
+    def test_map_of_labels(self):
+        """Robots in their random ways over steps that are kept and steps that are not, on a map of two grounds each."""
+        robots, labels = 512, 2
         batch, host = make_batch(robots), make_batch(robots, "cpu")
-        if labels > 1:
-            batch.set_map(mild.Map("slope", **STRIPES))
-            host.set_map(mild.Map("slope", **STRIPES))
+        batch.set_map(mild.Map("slope", **STRIPES))
+        host.set_map(mild.Map("slope", **STRIPES))
         wrenches, velocities, touching = [], [], 0
         for step in range(8):
             inputs, advance = random_inputs(robots, step, labels), step % 3 != 2
@@ -89,36 +87,9 @@ class Numbers(unittest.TestCase):
         for name, errors in (("wrench", wrenches), ("velocity", velocities)):
             errors = torch.cat(errors).sort().values
             middle, high, worst = (errors[int(share * (len(errors) - 1))].item() for share in (0.5, 0.99, 1))
-            print(f"{DEVICE}, labels {labels}, {name}: median {middle:.1e}, 99 % {high:.1e}, worst {worst:.1e}")
+            print(f"{DEVICE}, {name}: median {middle:.1e}, 99 % {high:.1e}, worst {worst:.1e}")
             self.assertLess(middle, 1e-5)
             self.assertLess(high, 1e-2)
-
-    def test_level_ground(self):
-        self.follow(512, 1)
-
-    def test_map_of_labels(self):
-        self.follow(512, 2)
-
-    def test_single_grounds(self):
-        """The same as grounds of the CPU in double, one a robot."""
-        batch, worst = make_batch(24), []
-        material = random_inputs(24, 0)["material"]
-        grounds = [mild.Ground(SOLES, mild.Terrain([MATERIALS[index]], height=0.01), DT) for index in material]
-        for step in range(4):
-            inputs, found = random_inputs(24, step) | {"material": material, "height": torch.full((24,), 0.01)}, new_outputs(batch)
-            del inputs["map_origin"]
-            batch.step(**there(inputs), **found, stream=stream())
-            for i, ground in enumerate(grounds):
-                for name in ("position", "rotation", "velocity", "inverse_inertia", "free_velocity"):
-                    getattr(ground, name)[:] = inputs[name][i].numpy()
-                ground.solve()
-                wrench = torch.from_numpy(np.hstack([ground.force, ground.torque])).flatten()
-                worst.append(((found["wrench"][i].cpu().flatten() - wrench).norm() / (wrench.norm() + 1)).item())
-                ground.advance()
-        worst.sort()
-        print(f"{DEVICE} and single grounds: median {worst[len(worst) // 2]:.1e}, worst {worst[-1]:.1e}")
-        self.assertLess(worst[len(worst) // 2], 1e-4)
-        self.assertLess(worst[len(worst) * 9 // 10], 1e-2)
 
     def test_solve_and_advance(self):
         """A step that is not kept may be repeated: the same bits. One that is kept leaves prints."""
@@ -134,21 +105,6 @@ class Numbers(unittest.TestCase):
         batch.step(**inputs, **after, advance=False, stream=stream())
         self.assertTrue(torch.equal(once["wrench"][:32], after["wrench"][:32]))
         self.assertFalse(torch.equal(once["wrench"][32:], after["wrench"][32:]))
-
-    def test_load_and_store(self):
-        """What the ground under a robot remembers goes to a ground of the CPU and into another batch, which goes on with it."""
-        batch, other, inputs = make_batch(4), make_batch(4), there(random_inputs(4, 2))
-        inputs["position"][..., 2] = -0.02
-        batch.step(**inputs, **new_outputs(batch), stream=stream())
-        for robot in range(4):
-            ground = mild.Ground(SOLES, MATERIALS[inputs["material"][robot]], DT)
-            batch.store(robot, ground)
-            self.assertGreater(ground.element_depths(0).max(), 0.005)
-            other.load(robot, ground)
-        next_inputs, one, two = there(random_inputs(4, 3)) | {"material": inputs["material"]}, new_outputs(batch), new_outputs(other)
-        batch.step(**next_inputs, **one, stream=stream())
-        other.step(**next_inputs, **two, stream=stream())
-        self.assertLess(apart(two["wrench"], one["wrench"])[-1].item(), 1e-4)
 
 
 class Tensors(unittest.TestCase):
@@ -242,22 +198,6 @@ class Device(unittest.TestCase):
         self.batch.step(**{name: cupy.asarray(tensor) for name, tensor in self.inputs.items()}, **found, advance=False)
         cupy.cuda.get_current_stream().synchronize()
         self.assertTrue(torch.equal(torch.from_dlpack(found["wrench"]), self.wanted["wrench"]))
-
-    @unittest.skipUnless(importlib.util.find_spec("jax"), "no JAX")
-    def test_jax(self):
-        """Arrays of JAX are inputs; they cannot be written."""
-        os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")
-        import jax
-        try:
-            place = jax.devices("cuda")[0]
-        except RuntimeError:
-            self.skipTest("JAX without CUDA")
-        found = new_outputs(self.batch)
-        arrays = {name: jax.device_put(tensor.cpu().numpy(), place) for name, tensor in self.inputs.items()}
-        jax.block_until_ready(arrays)
-        self.batch.step(**arrays, **found, advance=False)
-        torch.cuda.synchronize()
-        self.assertTrue(torch.equal(found["wrench"], self.wanted["wrench"]))
 
 
 def measure(robots):

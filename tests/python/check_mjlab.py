@@ -67,6 +67,7 @@ class Tasks(unittest.TestCase):
         env = standing("Go1", ["rubber", "sand_loose"], 15)
         soft, scan, sites = env.soft_ground, env.scene["foot_height_scan"], wp.to_torch(env.sim.wp_data.site_xpos)[:, env.soft_ground.sites, 2]
         self.assertTrue((soft.shape[..., 5] > 0).all())
+        self.assertTrue((env.scene["feet_ground_contact"].data.found > 0).all())
         deep = soft.shape[..., 4].clone()
         torch.testing.assert_close(scan.data.heights, soft.radius - deep / 2, atol=2e-3, rtol=0)
         self.assertGreater(deep[1].min(), 0.02)

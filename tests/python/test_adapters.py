@@ -108,23 +108,6 @@ class Ends(unittest.TestCase):
         self.follow(step)
         env.close()
 
-    def test_gym_single(self):
-        """The same of one robot, which is reset by hand; time for the one that falls."""
-        for which in (0, ENVS - 1):
-            env = gym.Env(overrides={**KEYS, "task.episode": 20 if which else 0.5})
-            lengths = []
-            for _ in range(5):
-                env.reset(seed=None if lengths else 1)
-                over = [False, False]
-                for length in range(1, 4 * LENGTH):
-                    over = list(env.step(actions_of(length)[which])[2:4])
-                    if any(over):
-                        break
-                lengths.append(length)
-                self.assertEqual(over, [which > 0, which == 0])
-            self.assertTrue(which > 0 or max(lengths) <= LENGTH)
-            env.close()
-
     def test_rsl_rl(self):
         env = rsl_rl.Env(ENVS, overrides=KEYS)
         self.assertEqual(env.max_episode_length, LENGTH)

@@ -34,7 +34,7 @@ class Names(unittest.TestCase):
         """Each robot by its name passes Gymnasium's own check, on a ground of its own too."""
         joints = {"SA01": 12, "G1": 12, "Go1": 12}
         for name, count in joints.items():
-            for keys in ({}, {"ground": "grass", "max_episode_steps": 100}):
+            for keys in ({}, {"ground": "grass", "max_episode_steps": 100, "observation": "frame"}):
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")  # that spaces are not -1 .. 1
                     env = gymnasium.make(f"mild/{name}-v0", **keys)

@@ -351,52 +351,6 @@ class Networks(unittest.TestCase):
             with self.assertRaisesRegex(RuntimeError, r"pip install mildground\[trial\]"):
                 networks.load(file.name, Description(stander()))
 
-    def test_real_state(self):
-        """The stand-in's network as a file, by the onnx and onnxruntime of where they are: two states, one of whole numbers."""
-        try:
-            import onnx
-            import onnxruntime  # noqa: F401
-        except ImportError:
-            self.skipTest("onnx and onnxruntime are not installed")
-        value, helper = onnx.helper.make_tensor_value_info, onnx.helper
-        one = [helper.make_tensor("one", onnx.TensorProto.FLOAT, [1], [1.0]), helper.make_tensor("two", onnx.TensorProto.INT64, [1], [2])]
-        nodes = [helper.make_node("Add", ["obs", "h_in"], ["actions"]), helper.make_node("Add", ["h_in", "one"], ["h_out"]),
-                 helper.make_node("Add", ["n_in", "two"], ["n_out"])]
-        real, whole = onnx.TensorProto.FLOAT, onnx.TensorProto.INT64
-        graph = helper.make_graph(nodes, "counter", [value("obs", real, [1, 2]), value("h_in", real, [1, 2]), value("n_in", whole, [1])],
-                                  [value("actions", real, [1, 2]), value("h_out", real, [1, 2]), value("n_out", whole, [1])], one)
-        with tempfile.TemporaryDirectory() as folder:
-            onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), folder + "/p.onnx")
-            for keys in ({}, {"state": "n_in>n_out h_in>h_out", "input": "obs", "output": "actions"}):
-                network = networks.load(folder + "/p.onnx", Description(stander(policy=keys)))
-                for _ in range(2):
-                    network.reset()
-                    self.assertEqual([network.act(np.array([1, 5], np.float32)).tolist() for _ in range(3)], [[1, 5], [2, 6], [3, 7]])
-                self.assertEqual(network.state["n_in"].tolist(), [6])
-
-    def test_torch(self):
-        """A module with state in its buffers begins anew."""
-        try:
-            import torch
-        except ImportError:
-            self.skipTest("torch is not installed")
-
-        class Counter(torch.nn.Module):
-            def __init__(self):
-                super().__init__()
-                self.register_buffer("count", torch.zeros(1))
-
-            def forward(self, x):
-                self.count += 1
-                return x[:, :2] + self.count
-
-        with tempfile.TemporaryDirectory() as folder:
-            torch.jit.script(Counter()).save(folder + "/p.pt")
-            network = networks.load(folder + "/p.pt", Description(stander()))
-            for _ in range(2):
-                network.reset()
-                self.assertEqual([network.act(np.zeros(3, np.float32)).tolist() for _ in range(2)], [[1, 1], [2, 2]])
-
     def test_checkpoint(self):
         """A learner's checkpoint is no policy; seen without torch."""
         with tempfile.TemporaryDirectory() as folder:

@@ -141,9 +141,7 @@ assert not list(out.rglob("*.safetensors"))
 # ---- numbers that were changed ----
 rows = [row["id"] for row in whole["rows"]]
 changed(out, edit(rows=(rows.index("step/newton"), "value", 4.0)), "rows do not follow")
-changed(out, edit(rows=(rows.index("step/newton"), "rounds", {"1": 4.0, "2": 6})), "rows do not follow")
 changed(out, edit(ratios=(0, "value", 0.55)), "ratios do not follow")
-changed(out, edit(bars=(0, "reached", True)), "bars do not follow")
 changed(out, edit(runs=(0, "command", "MILD bench step --task.physics_dt=0.001")), "another command")
 changed(out, lambda x: (x / "raw/step/2/rows.json").write_text((x / "raw/step/2/rows.json").read_text().replace("6", "4")), "raw output of step, round 2")
 changed(out, lambda x: (x / "record.md").write_text(page.replace("| 0.750 |", "| 0.550 |")), "the page has other numbers")
@@ -158,7 +156,6 @@ def without(key, name):
     return change
 
 
-changed(out, without("missing", "mjlab"), "mjlab was neither run nor named as missing")
 changed(out, without("missing", "nanog1"), "nanog1")
 changed(out, without("runs", "mjwarp_16384"), "mjwarp_16384 was neither run")
 
@@ -214,7 +211,6 @@ one_line("nosuch", "run", work / "new", "--only", "nosuch", "--mild", made)
 one_line("nosuch", "run", work / "new", "--mild", work / "nosuch")
 one_line("no record.json", "check", work / "new")
 one_line("has no record", "history", "--file", work / "none")
-one_line("mild bench record out/record")  # no folder
 one_line("mild bench record out/record", "run")
 one_line("--rounds 0", work / "new", "--rounds", 0)
 one_line("--wrong", work / "new", "--wrong")

@@ -1,6 +1,5 @@
-"""A robot's side of the packets of lab/drive/README.md, by Python's standard library alone: for test_attack.py and attack.py."""
+"""A robot's side of the packets of lab/drive/README.md, by Python's standard library alone: for attack.py and test_edges.py."""
 
-import hashlib
 import json
 import os
 import pathlib
@@ -18,27 +17,26 @@ HEAD = struct.Struct("<4s4BIIQQQI")
 WAIT, WALK, HOLD, DAMP, END = range(5)
 
 
-def robot_id(name):
-    """CRC-32 of the joints' names, read from robot.ini by itself."""
-    text = (ROOT / "robots" / name / "robot.ini").read_text(encoding="utf-8")
+def robot_id():
+    """CRC-32 of SA01's joints' names, read from robot.ini by itself."""
+    text = (ROOT / "robots/sa01/robot.ini").read_text(encoding="utf-8")
     names = re.search(r"^names\s*=((?:.*\n)(?:[ \t]+.*\n)*)", text, re.M).group(1).split()
     return zlib.crc32("\n".join(names).encode())
 
 
-SA01 = robot_id("sa01")
+SA01 = robot_id()
 
 
-def seal(body, key=None):
-    return body + (hashlib.blake2b(body, key=key, digest_size=16).digest() if key else struct.pack("<I", zlib.crc32(body)))
+def seal(body):
+    return body + struct.pack("<I", zlib.crc32(body))
 
 
-def target(packet, key=None):
+def target(packet):
     """The parts of a packet of targets, whose seal must be right."""
-    size = 16 if key else 4
-    assert seal(packet[:-size], key) == packet, "a target with a wrong seal"
+    assert seal(packet[:-4]) == packet, "a target with a wrong seal"
     magic, version, kind, n, mode, sequence, answers, clock, session, peer, robot = HEAD.unpack(packet[: HEAD.size])
     assert (magic, version, kind, robot) == (b"MILD", 2, 2, SA01)
-    numbers = struct.unpack(f"<{4 * n}f", packet[HEAD.size : -size])
+    numbers = struct.unpack(f"<{4 * n}f", packet[HEAD.size : -4])
     parts = [numbers[i * n : (i + 1) * n] for i in range(4)]
     return dict(zip(("angle", "kp", "kd", "limit"), parts), mode=mode, sequence=sequence, session=session, peer=peer)
 
@@ -46,28 +44,24 @@ def target(packet, key=None):
 class Robot:
     """A socket that sends states, and answers the runner's session once it has heard it."""
 
-    def __init__(self, port, key=None, robot=SA01, answers=True):
+    def __init__(self, port, answers=True):
         self.to = ("127.0.0.1", port)
-        self.key, self.robot, self.answers = key, robot, answers
+        self.answers = answers
         self.session = int.from_bytes(os.urandom(8), "little") | 1
         self.peer = self.sequence = self.bytes_in = self.bytes_out = 0
-        self.targets, self.sent = [], []
+        self.targets = []
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
         self.socket.setblocking(False)
 
-    def state(self, sequence=None, clock=None, q=None, qd=None, quaternion=(1, 0, 0, 0), omega=(0, 0, 0), mode=WALK, n=12, version=2):
-        clock = int((time.monotonic() if clock is None else clock) * 1e6) & (2**64 - 1)
-        sequence = self.sequence if sequence is None else sequence
-        head = HEAD.pack(b"MILD", version, 1, n, mode, sequence & 0xFFFFFFFF, 0, clock, self.session, self.peer, self.robot)
-        flicker = 1e-6 * (sequence & 1)  # of the last bits, as real sensors do: what repeats itself damps
-        q, qd = [angle + flicker for angle in (q or POSE)[:n]], (qd or [0] * 12)[:n]
-        return seal(head + struct.pack(f"<{7 + 2 * n}f", *quaternion, *omega[:2], omega[2] + flicker, *q, *qd), self.key)
+    def state(self):
+        head = HEAD.pack(b"MILD", 2, 1, 12, WALK, self.sequence, 0, int(time.monotonic() * 1e6), self.session, self.peer, SA01)
+        flicker = 1e-6 * (self.sequence & 1)  # of the last bits, as real sensors do: what repeats itself damps
+        return seal(head + struct.pack("<31f", 1, 0, 0, 0, 0, 0, flicker, *[angle + flicker for angle in POSE], *[0] * 12))
 
     def send(self, packet):
         self.socket.sendto(packet, self.to)
         self.bytes_out += len(packet)
-        self.sent.append(packet)
 
     def listen(self):
         """The targets that have come since."""
@@ -78,19 +72,19 @@ class Robot:
             except (BlockingIOError, ConnectionRefusedError):
                 break
             self.bytes_in += len(packet)
-            new.append(target(packet, self.key))
+            new.append(target(packet))
             if self.answers and self.peer == 0:
                 self.peer = new[-1]["session"]
         self.targets += new
         return new
 
-    def walk(self, count, period=0.005, **changes):
-        """Sends so many states, with `changes`, and returns the targets that came in that time."""
+    def walk(self, count):
+        """Sends so many states, and returns the targets that came in that time."""
         new = []
         for _ in range(count):
             self.sequence += 1
-            self.send(self.state(**changes))
-            time.sleep(period)
+            self.send(self.state())
+            time.sleep(0.005)
             new += self.listen()
         return new
 

@@ -251,12 +251,9 @@ assert run.wait(60) == 2
 assert "damped: by key or button" in run.stderr.read()
 PY
 
-# all that they wrote fits its schema, and the check sees what does not
-fits() { "$python" "$tests/../../../tests/app/schema.py" "$tests/../../../docs/schema/drive.json" "$@"; }
-fits ./*.json || fail "JSON that does not fit docs/schema/drive.json"
-sed 's/"lost":.*/"lost": 0.5,/' walk.json >bad.json && ! fits bad.json >/dev/null || fail "half a lost state fits the schema"
-sed 's/"fallen":.*/"fallen": 0,/' walk_robot.json >bad.json && ! fits bad.json >/dev/null || fail "0 is no boolean"
-rm bad.json
+# all that they wrote fits its schema
+"$python" "$tests/../../../tests/app/schema.py" "$tests/../../../docs/schema/drive.json" ./*.json ||
+    fail "JSON that does not fit docs/schema/drive.json"
 
 bad "127.0.0.1:9 0.2" "$mild" drive --simulate --connect 127.0.0.1:9 --patience 0.2 --json x.json
 bad "9870 --listen" "$mild" drive --listen 9870
@@ -274,19 +271,13 @@ bad walk.onnx "$mild" drive --policy walk.onnx
 expect 2 'drive: walk.onnx: .*`mild trial ROBOT.xml walk.onnx --describe LAYOUT`' "$mild" drive --policy walk.onnx
 bad "nosuch.ini" "$mild" drive --simulate --ground nosuch.ini
 bad "sa01 go1 --robot --policy" "$mild" drive --robot go1 --policy "$tests/../../../policies/mild.safetensors"
-head -c 31 key >short
-cp key open && chmod 644 open
-bad "--key 31 32 64" "$mild" drive --key short
-bad "--key 600" "$mild" drive --simulate --key open
 bad "no_such" "$mild" drive --key no_such
 bad "drive ." "$mild" drive --key .
 bad "127.0.0.1:x --peer" "$mild" drive --peer 127.0.0.1:x
 bad "--peer" "$mild" drive --peer 0.0.0.0
 bad "--connect 192.0.2.1:9870 --bind" "$mild" drive --simulate --connect 192.0.2.1:9870
 bad "--bind 192.0.2.1" "$mild" drive --simulate --bind 192.0.2.1
-rm key other short open
-bad "--gamepad /dev/input/none" "$mild" drive --listen 127.0.0.1:0 --gamepad /dev/input/none
-bad "--gamepad /dev/null" "$mild" drive --listen 127.0.0.1:0 --gamepad /dev/null
+rm key other
 bad "--gamepad ." "$mild" drive --listen 127.0.0.1:0 --gamepad .
 for given in --policy=x --listen=x --command=0,0,0 --gamepad=x --no-keys --late=0.02 --damp-after=1 --speed-limit=30 --angle-limit=0.2 \
     --torque-share=1 --peer=127.0.0.1 --turn-limit=1 --glitch=0.1 --stall-after=1; do
