@@ -153,7 +153,8 @@ static EnvsView view_of(const Walks *w) {
 static MildStatus start(Walks *w, MildError *error) {
     const EnvsView first = view_of(w);
     for (int i = 0; i < w->def->count; i++) {
-        memcpy(w->command + TASK_COMMANDS * (size_t)i, w->def->walk[i].command[0], 3 * sizeof(double));
+        memcpy(w->command + TASK_COMMANDS * (size_t)i, w->def->walk[i].command[0],
+               3 * sizeof(double));
     }
     MildStatus status = envs_set_commands(w->envs, w->command, error);
     return status == MILD_OK ? envs_reset(w->envs, &first, NULL, error) : status;

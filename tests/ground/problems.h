@@ -95,7 +95,7 @@ static int problem_on(Kit *kit, uint64_t *random, int small, const MildMaterial 
 
 /* The problem of that number: a third on sand with its drag and added mass, a third on small soles;
  * a fifth of all on a firm bed that a foot can reach. */
-static int numbered_problem(Kit *kit, int number) {
+static inline int numbered_problem(Kit *kit, int number) {
     static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
     uint64_t random = (uint64_t)number * 1000003u + 28;
     MildMaterial m = kit_material(&random), sand = mild_material_default();

@@ -1,8 +1,8 @@
 /* Contact steps of shells: against plane soles, closed forms, differences. */
 #include "surface_kit.h"
 
-#include "ground/step/step.h"
 #include "ground/step/scratch.h"
+#include "ground/step/step.h"
 
 /* A random material of each model in turn. */
 static MildMaterial any_material(uint64_t *random, int index) {

@@ -32,8 +32,8 @@
 
 #include "all_robots.h"
 #include "ground/law/frame.h"
-#include "ground/step/step.h"
 #include "ground/step/scratch.h"
+#include "ground/step/step.h"
 
 static const double seconds = 0.6; /* of a fall */
 static int falls = 270;
