@@ -364,6 +364,39 @@ TEST(flight_and_loads) {
     assert_true(isnan(row.at_limit));
 }
 
+/* Flights of 1/4 s in each second, 0.2 m and from 3 s on 0.4 m above the 0.6 m at which the centre of
+ * mass was after a second; it is lower in stance. One of 1/32 s is no jump, and what comes before 2 s
+ * does not count. */
+TEST(rise_of_jumps) {
+    const EvalDef eval = {.jump = 0.3, .trials = 1, .seconds = 4};
+    const uint8_t ran = TASK_END_time;
+    char line[256];
+    Script s;
+    Measure m;
+    EvalRow row;
+    script_start(&s);
+    measure_start(&m, DT);
+    for (int k = 0; k < STEPS(4); k++) {
+        const int since = k % STEPS(1);
+        const int flies = since >= STEPS(0.5) && since < STEPS(0.75);
+        const int hops = since >= STEPS(0.875) && since < STEPS(0.90625);
+        const double apex = k < STEPS(2) ? 9 : k < STEPS(3) ? 0.8 : 1;
+        for (int f = 0; f < SA01_FEET; f++) {
+            s.sample.foot[f].load = flies || hops ? 0 : 100;
+        }
+        s.sample.mass_center[2] = k < STEPS(1) ? 0.6 : flies ? apex - 0.001 * (since % 2) : 0.4;
+        measure_sample(&m, &s.sample);
+    }
+    eval_summarise(&row, "foam45", &eval, &m, &ran, 400, NULL);
+    assert_int_equal(m.flights, 2);
+    expect_near("rise", row.rise, 0.3, 1e-12);
+    eval_print_row(&row, line, sizeof line);
+    assert_non_null(strstr(line, "  rise 0.300 m"));
+    row.rise = NAN; /* of the batch engine */
+    eval_print_row(&row, line, sizeof line);
+    assert_null(strstr(line, "rise"));
+}
+
 /* Contact is more than 5 N. */
 TEST(contact_is_a_load_above_five_newton) {
     for (int loaded = 0; loaded < 2; loaded++) {

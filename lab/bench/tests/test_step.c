@@ -189,7 +189,7 @@ TEST(test_walk_rows) {
     expect_near("rigid", 1e-6 * value_of(&report, "rigid_engine_rigid"), 2 + walks, 1e-9);
     assert_int_equal(report.count, GROUNDS * 8 + 1);
     print_message("the floor at %.1f mm\n", 1e3 * lowest_floor);
-    assert_true(lowest_floor < -5e-3 && lowest_floor > -150e-3);
+    assert_true(lowest_floor < -5e-3 && lowest_floor > -170e-3); /* a bed at 150 mm yields */
     is_false = 0;
     walks = 0;
 }

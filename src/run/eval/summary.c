@@ -231,7 +231,7 @@ static void print_loads(const EvalRow *row, char *text, size_t size) {
     if (row->flight >= 0.01) {
         used = snprintf(text, size, "  flight %.0f %%", 100 * row->flight);
     }
-    if (row->jump > 0) {
+    if (row->jump > 0 && !isnan(row->rise)) {
         used += snprintf(text + used, size - (size_t)used, "  rise %.3f m", row->rise);
     }
     if (row->at_limit >= 0.01) {
