@@ -526,7 +526,7 @@ void mild_ground_change(MildGround *ground, const MildTerrain *from, const MildT
 /* What mild_ground_derivative is asked for: arrays of the caller, NULL for what is not wanted.
  * Matrices are row major. W: force and torque of each foot as in MildFootResult, row 6 f + i. V:
  * twists after the step. Rows and columns of a foot that touches nothing are 0, and of dV/dV_free
- * those of the identity. */
+ * its columns are those of the identity. */
 typedef struct {
     /* [N s/m, N s, N m s] [feet][6][6] dW/dV of each foot: the law alone, by a twist that is given,
      * as inverse dynamics needs. Exact. */

@@ -78,6 +78,9 @@ static void begin_episode(Runner *r) {
 }
 
 Runner *runner_create(const RunnerDef *def, MildError *error) {
+    if (task_def_check_no_jump(def->task, "drive", error) != MILD_OK) {
+        return NULL;
+    }
     Runner *r = calloc(1, sizeof *r);
     if (!r) {
         mild_fail(error, MILD_ERROR_MEMORY, "out of memory");

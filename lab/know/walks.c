@@ -19,7 +19,7 @@ typedef struct {
     EnvsSample *sample;   /* [count][samples] */
     float *frame, *critic, *history, *action, *reward;
     uint8_t *done, *timeout, *valid, *over;
-    double *command; /* [count][3] */
+    double *command; /* [count][TASK_COMMANDS] */
     int samples, steps;
 } Walks;
 

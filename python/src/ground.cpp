@@ -405,7 +405,10 @@ static void bind_input(nb::class_<Ground> &type) {
                      "rad/s]: (feet, 6).")
         .def_prop_rw(
             "dt", [](Ground &ground) { return ground.input.dt; },
-            [](Ground &ground, double dt) { ground.input.dt = positive(dt, "dt"); },
+            [](Ground &ground, double dt) {
+                ground.input.dt = positive(dt, "dt");
+                ground.solved = false;
+            },
             "Time step [s].")
         .def_prop_rw(
             "terrain", [](Ground &ground) { return ground.terrain; },

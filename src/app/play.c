@@ -76,11 +76,16 @@ static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const 
 }
 
 static void set_command(PlayWalk *walk) {
+    const double jump = walk->play->jump;
+    if (jump > 0 && walk->play->time < MEASURE_SETTLED) {
+        eval_command(walk->env, 0, 0);
+        return;
+    }
     eval_command(walk->env, walk->command[0], walk->command[1]);
     if (walk->steer) {
         memcpy(walk->env->command, walk->command, sizeof walk->command);
     }
-    walk->env->command[TASK_RISE] = walk->play->time < MEASURE_SETTLED ? 0 : walk->play->jump;
+    walk->env->command[TASK_RISE] = jump;
 }
 
 static void start(PlayWalk *walk) {

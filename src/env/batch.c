@@ -16,6 +16,8 @@ _Static_assert(ENVS_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fil
  * with 4096 and 2 % with 65 536. 16 384 walking robots make 12.1 M steps a second in three, 12.0 M
  * in four and 11.7 M in six (one H100). The CPU steps them in turn, so that its tests see them. */
 enum { SLICES = 3 };
+/* [B] of a saved block and of each of its rows. */
+enum { BLOCK_ALIGN = 16 };
 
 typedef struct {
     Envs base;
@@ -422,7 +424,7 @@ static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
         }
     }
     all.trial = all.trial ? all.trial + first : NULL;
-    all.command = all.command ? all.command + 3 * first : NULL;
+    all.command = all.command ? all.command + TASK_COMMANDS * first : NULL;
     all.sample = all.sample ? all.sample + first * (size_t)b->base.physics_steps : NULL;
     return all;
 }
@@ -721,7 +723,7 @@ static size_t fork_rows(const Batch *b, int own_ground, EnvsFork *fork) {
             fork->row[fork->count].bytes = rows[i].bytes;
             fork->row[fork->count].place = place;
             fork->count++;
-            place += (rows[i].bytes + 15) / 16 * 16;
+            place += (rows[i].bytes + BLOCK_ALIGN - 1) / BLOCK_ALIGN * BLOCK_ALIGN;
         }
     }
     return place;
@@ -737,6 +739,14 @@ static MildStatus save(Envs *envs, int first, int count, void *blocks, MildStrea
     const Batch *b = own(envs);
     EnvsFork fork;
     const size_t stride = fork_rows(b, 0, &fork);
+    if (first < 0 || count < 1 || first > b->arrays.envs - count) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "save: environments %d .. %d of %d", first,
+                         first + count - 1, b->arrays.envs);
+    }
+    if ((uintptr_t)blocks % BLOCK_ALIGN) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "save: blocks must begin at a multiple of %d",
+                         BLOCK_ALIGN);
+    }
     fork.stride = stride;
     fork.block = blocks;
     for (int r = 0; r < fork.count; r++) {
@@ -766,6 +776,10 @@ static MildStatus fork_all(Envs *envs, const void *blocks, int count, size_t str
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "fork: a block of %zu bytes, but these environments' has %zu", stride,
                          least);
+    }
+    if ((uintptr_t)blocks % BLOCK_ALIGN || stride % BLOCK_ALIGN) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "fork: blocks must begin at multiples of %d",
+                         BLOCK_ALIGN);
     }
     fork.block = (char *)(uintptr_t)blocks; /* which are read */
     fork.stride = stride;

@@ -568,6 +568,8 @@ MILD_HD void env_move_rows(const EnvsFork *fork, long robot, int save, int lane,
 
 /* What a fork leaves to the environment. */
 typedef struct {
+    TaskShape shape;
+    uint32_t held;
     uint64_t seed;
     uint32_t index, tick, tick_first;
     Real tally[TALLY_KEPT];
@@ -580,6 +582,8 @@ typedef struct {
 MILD_HD EnvKept env_keep(const EnvsArrays *all, long robot) {
     const TaskEnv *env = env_at(all, robot);
     EnvKept kept;
+    kept.shape = env->shape;
+    kept.held = env->held;
     kept.seed = env->seed;
     kept.index = env->index;
     kept.tick = env->tick;
@@ -596,7 +600,8 @@ MILD_HD EnvKept env_keep(const EnvsArrays *all, long robot) {
     return kept;
 }
 
-/* Sets a robot down on its own ground: the lowest sole is as deep as one that stands. */
+/* Sets a robot down on its own ground, which is level and of one material: its lowest sole below
+ * the surface becomes as deep as one that stands; one in the air is lowered by that depth. */
 MILD_HD void env_set_down(const EnvsArrays *all, long robot, TaskEnv *env) {
     const RobotReading *reading = env_reading(env_robot_at(all, robot));
     const int ground = env->ground[env_first_label(all, robot)];
@@ -612,6 +617,9 @@ MILD_HD void env_set_down(const EnvsArrays *all, long robot, TaskEnv *env) {
 MILD_HD void env_take_back(const EnvsArrays *all, const EnvsFork *fork, long robot,
                            const EnvKept *kept) {
     TaskEnv *env = env_at(all, robot);
+    env->shape = kept->shape;
+    env->held = kept->held;
+    env->oldest %= kept->held;
     env->seed = kept->seed;
     env->index = kept->index;
     env->tick = kept->tick;

@@ -476,6 +476,14 @@ MildStatus task_set_robot(const TaskDef *def, Robot *robot, MildError *error) {
                                          def->sole_elements, cause.text);
 }
 
+MildStatus task_def_check_no_jump(const TaskDef *def, const char *what, MildError *error) {
+    return def->jump[1] > 0 ? mild_fail(error, MILD_ERROR_ARGUMENT,
+                                        "%s: the policy was trained to jump (task.jump); train, "
+                                        "eval and play command jumps",
+                                        what)
+                            : MILD_OK;
+}
+
 MildStatus task_def_check(const TaskDef *def, MildError *error) {
     MildStatus status = check_section(task_fields, task_field_count, def, "task", error);
     if (status == MILD_OK) {
@@ -493,6 +501,10 @@ MildStatus task_def_check(const TaskDef *def, MildError *error) {
         return mild_fail(error, MILD_ERROR_RANGE,
                          "task.physics_dt: %g s is not a whole multiple of %g", TASK_PERIOD,
                          def->physics_dt);
+    }
+    if (status == MILD_OK && def->jump[0] > def->jump[1]) {
+        return mild_fail(error, MILD_ERROR_RANGE, "task.jump: %g is above %g", def->jump[0],
+                         def->jump[1]);
     }
     if (status == MILD_OK && def->contact_float &&
         (def->solver != MILD_SOLVER_NEWTON || def->contact_tolerance < FLOAT_GROUND_TOLERANCE)) {

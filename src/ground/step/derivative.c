@@ -486,6 +486,10 @@ derivative_check(const MildGround *ground, const MildTerrain *terrain,
                          "derivative: material = %d, but the terrain has %d", derivative->material,
                          terrain->material_count);
     }
+    if (derivative->wrench_by_material && (derivative->field_count < 0 || !derivative->field)) {
+        return mild_fail(error, MILD_ERROR_RANGE, "derivative: field_count = %d, without a field",
+                         derivative->field_count);
+    }
     for (int c = 0; derivative->wrench_by_material && c < derivative->field_count; c++) {
         if (!field_is_number(derivative->field[c])) {
             return mild_fail(error, MILD_ERROR_RANGE,

@@ -171,6 +171,7 @@ static void measure_contact(Measure *m, const EnvsSample *sample) {
 static void measure_steady(Measure *m, const EnvsSample *sample, double yaw, double power_abs) {
     if (m->steady_time == 0) {
         memcpy(m->start, m->base, sizeof m->start);
+        m->flying = NAN; /* a flight that is under way does not count */
     }
     memcpy(m->end, sample->base, sizeof m->end);
     double x = sample->base[0] - m->base[0], y = sample->base[1] - m->base[1];
