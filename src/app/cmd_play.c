@@ -476,8 +476,8 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
         {"speed", CLI_NUMBER, &c->play.speed, -4, 4, "V",
          "[m/s] commanded forward speed (default 0.6; 0 for a controller that stands)"},
         {"jump", CLI_NUMBER, &c->play.jump, 0, 1, "H",
-         "[m] commanded rise of jumps, one after the other from 1 s on; --speed is their mean speed "
-         "(default 0)"},
+         "[m] commanded rise of jumps, one after the other from 1 s on; --speed is their mean "
+         "speed (default 0)"},
         {"seconds", CLI_NUMBER, &c->play.seconds, 0, 3600, "T",
          "[s] length of the walk; 0: long enough for the course (default 0)"},
         {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S",

@@ -1,12 +1,9 @@
 #define MILD_REAL_FLOAT
-#include "env/backend.h"
+#include "env/batch_inside.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "device/device.h"
-#include "env/kernels.h"
-#include "ground/batch/bodies_batch.h"
 #include "ground/law/law.h"
 #include "robot/engine/read.h"
 
@@ -16,40 +13,6 @@ _Static_assert(ENVS_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fil
  * with 4096 and 2 % with 65 536. 16 384 walking robots make 12.1 M steps a second in three, 12.0 M
  * in four and 11.7 M in six (one H100). The CPU steps them in turn, so that its tests see them. */
 enum { SLICES = 3 };
-/* [B] of a saved block and of each of its rows. */
-enum { BLOCK_ALIGN = 16 };
-
-typedef struct {
-    Envs base;
-    EnvsArrays arrays; /* their memory is the device's */
-    MildBatch *ground;
-    BatchBodies bodies; /* with shells that stand; all 0: none */
-    DeviceFork *fork;   /* streams of all slices but the first, on a GPU; else NULL */
-    int slices;         /* of the robots */
-    TaskShape shape;
-    size_t labels;              /* of the map, 1 without */
-    const EnvsKernels *kernels; /* NULL: on the host */
-    void *block;                /* where the arrays are, but for task and model */
-    EnvsGround *drawn;          /* of the device: the grounds of EnvsTask */
-    void *trials;               /* where those of trials are */
-    Pool *pool;                 /* of the host */
-    int device;
-    size_t robot;  /* [B] of EnvRobot */
-    size_t shells; /* [B] of EnvShells */
-    size_t bytes;  /* of the device, without the ground */
-} Batch;
-
-static Batch *own(Envs *envs) {
-    return (Batch *)(void *)envs;
-}
-
-static const Batch *own_const(const Envs *envs) {
-    return (const Batch *)(const void *)envs;
-}
-
-static MildStatus checked(const char *why, MildError *error) {
-    return why ? mild_fail(error, MILD_ERROR_IO, "GPU: robots: %s", why) : MILD_OK;
-}
 
 /* ---- creation ---- */
 
@@ -128,26 +91,7 @@ static size_t inertia_numbers(size_t feet) {
     return 6 * feet * (6 * feet + 1) / 2;
 }
 
-/* What a fork does with an array. */
-typedef enum {
-    ROW_STATE,  /* it is copied */
-    ROW_GROUND, /* it is copied, unless environments keep their own ground */
-    ROW_WORK    /* it is left: nothing in it outlasts a policy step */
-} RowKind;
-
-/* An array with a row for each environment. */
-typedef struct {
-    void *at;     /* pointer to the array's pointer */
-    size_t bytes; /* of a row; 0: there is no such array */
-    RowKind kind;
-} Row;
-
-/* The arrays that take_arrays allocates, state first, and behind them those of the ground. Whatever
- * an environment has between two policy steps is here: slices, saves and forks follow this table. */
-enum { ROWS_TAKEN = 19, ROWS = ROWS_TAKEN + 3 };
-_Static_assert((int)ROWS <= (int)ENVS_ROWS_MAX, "room for every row");
-
-static void list_rows(const Batch *b, EnvsArrays *all, BatchArrays *ground, Row rows[ROWS]) {
+void batch_list_rows(const Batch *b, EnvsArrays *all, BatchArrays *ground, Row rows[ROWS]) {
     const size_t feet = (size_t)b->shape.feet;
     const size_t shells = b->bodies.setup ? 1 : 0;
     EnvsContact *contact = &all->contact;
@@ -193,7 +137,7 @@ static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
     all->stride = of.stride;
     b->robot = of.robot;
     b->shells = of.shells;
-    list_rows(b, all, &ground, rows);
+    batch_list_rows(b, all, &ground, rows);
     size_t bytes = whole_lines(tally);
     for (int i = 0; i < ROWS_TAKEN; i++) {
         bytes += whole_lines(envs * rows[i].bytes);
@@ -414,7 +358,7 @@ static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
     BatchArrays ground = b->ground->arrays; /* batch_slice has its own */
     Row rows[ROWS];
     all.envs = count;
-    list_rows(b, &all, &ground, rows);
+    batch_list_rows(b, &all, &ground, rows);
     for (int i = 0; i < ROWS; i++) {
         char *at;
         memcpy(&at, rows[i].at, sizeof at);
@@ -448,15 +392,6 @@ static Slice slice_of(const Batch *b, const EnvsStep *step, int i, MildStream st
 
 /* ---- steps on the CPU ---- */
 
-/* One call, for the threads of the host. */
-typedef struct {
-    const EnvsArrays *arrays;
-    const EnvsStep *step;
-    int part;
-    const EnvsFork *fork;
-    const EnvsMotion *motion;
-} Call;
-
 static void begin_piece(void *context, int piece, int thread) {
     (void)thread;
     envs_host_begin(((const Call *)context)->arrays, piece);
@@ -489,18 +424,6 @@ static void first_piece(void *context, int piece, int thread) {
     const Call *call = context;
     (void)thread;
     envs_host_first(call->arrays, call->step, piece);
-}
-
-static void fork_piece(void *context, int piece, int thread) {
-    const Call *call = context;
-    (void)thread;
-    envs_host_fork(call->arrays, call->fork, piece);
-}
-
-static void read_piece(void *context, int piece, int thread) {
-    const Call *call = context;
-    (void)thread;
-    envs_host_read(call->arrays, call->motion, piece);
 }
 
 /* ---- steps ---- */
@@ -703,109 +626,6 @@ static void set_samples(Envs *envs, EnvsSample *sample) {
     own(envs)->arrays.sample = sample;
 }
 
-/* ---- save and fork ---- */
-
-/* The rows of a block, those of the ground last, so that a fork without them reads its beginning.
- * Returns its bytes. */
-static size_t fork_rows(const Batch *b, int own_ground, EnvsFork *fork) {
-    EnvsArrays all = b->arrays;
-    BatchArrays ground = b->ground->arrays;
-    Row rows[ROWS];
-    size_t place = 0;
-    list_rows(b, &all, &ground, rows);
-    *fork = (EnvsFork){.own_ground = own_ground, .group = 1};
-    for (int kind = ROW_STATE; kind <= (own_ground ? ROW_STATE : ROW_GROUND); kind++) {
-        for (int i = 0; i < ROWS; i++) {
-            if ((int)rows[i].kind != kind || rows[i].bytes == 0) {
-                continue;
-            }
-            memcpy(&fork->row[fork->count].at, rows[i].at, sizeof(char *));
-            fork->row[fork->count].bytes = rows[i].bytes;
-            fork->row[fork->count].place = place;
-            fork->count++;
-            place += (rows[i].bytes + BLOCK_ALIGN - 1) / BLOCK_ALIGN * BLOCK_ALIGN;
-        }
-    }
-    return place;
-}
-
-static size_t block_bytes(const Envs *envs, int own_ground) {
-    EnvsFork fork;
-    return fork_rows(own_const(envs), own_ground, &fork);
-}
-
-static MildStatus save(Envs *envs, int first, int count, void *blocks, MildStream stream,
-                       MildError *error) {
-    const Batch *b = own(envs);
-    EnvsFork fork;
-    const size_t stride = fork_rows(b, 0, &fork);
-    if (first < 0 || count < 1 || first > b->arrays.envs - count) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "save: environments %d .. %d of %d", first,
-                         first + count - 1, b->arrays.envs);
-    }
-    if ((uintptr_t)blocks % BLOCK_ALIGN) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "save: blocks must begin at a multiple of %d",
-                         BLOCK_ALIGN);
-    }
-    fork.stride = stride;
-    fork.block = blocks;
-    for (int r = 0; r < fork.count; r++) {
-        fork.row[r].at += (size_t)first * fork.row[r].bytes;
-    }
-    if (b->kernels) {
-        return checked(b->kernels->save(&b->arrays, &fork, count, stream), error);
-    }
-    for (int i = 0; i < count; i++) {
-        envs_host_save(&fork, i);
-    }
-    return MILD_OK;
-}
-
-static MildStatus fork_all(Envs *envs, const void *blocks, int count, size_t stride, int own_ground,
-                           MildStream stream, MildError *error) {
-    const Batch *b = own(envs);
-    EnvsFork fork;
-    Call call = {.arrays = &b->arrays, .fork = &fork};
-    const size_t least = fork_rows(b, own_ground, &fork);
-    if (count < 1 || b->arrays.envs % count != 0) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "fork: %d environments are not a multiple of %d blocks", b->arrays.envs,
-                         count);
-    }
-    if (own_ground ? stride < least : stride != least) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "fork: a block of %zu bytes, but these environments' has %zu", stride,
-                         least);
-    }
-    if ((uintptr_t)blocks % BLOCK_ALIGN || stride % BLOCK_ALIGN) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "fork: blocks must begin at multiples of %d",
-                         BLOCK_ALIGN);
-    }
-    fork.block = (char *)(uintptr_t)blocks; /* which are read */
-    fork.stride = stride;
-    fork.group = b->arrays.envs / count;
-    MildStatus status = MILD_OK;
-    if (b->kernels) {
-        status = checked(b->kernels->fork(&b->arrays, &fork, stream), error);
-    } else {
-        pool_run(b->pool, b->arrays.envs, fork_piece, &call);
-    }
-    return status == MILD_OK && own_ground
-               ? mild_batch_reset(b->ground, b->arrays.reset, stream, error)
-               : status;
-}
-
-static MildStatus read_motion(Envs *envs, const EnvsMotion *motion, MildStream stream,
-                              MildError *error) {
-    const Batch *b = own(envs);
-    Call call = {.arrays = &b->arrays, .motion = motion};
-    if (b->kernels) {
-        return checked(b->kernels->read(&b->arrays, motion, stream), error);
-    }
-    pool_run(b->pool, b->arrays.envs, read_piece, &call);
-    return MILD_OK;
-}
-
 static const EnvsBackend backend = {.destroy = destroy,
                                     .reset = reset,
                                     .step = step,
@@ -816,10 +636,10 @@ static const EnvsBackend backend = {.destroy = destroy,
                                     .memory = memory,
                                     .set_commands = set_commands,
                                     .set_samples = set_samples,
-                                    .block_bytes = block_bytes,
-                                    .save = save,
-                                    .fork = fork_all,
-                                    .read = read_motion};
+                                    .block_bytes = batch_block_bytes,
+                                    .save = batch_save,
+                                    .fork = batch_fork,
+                                    .read = batch_read};
 
 /* Those of trials, with the depth of a robot that stands on them. NULL: out of memory. */
 static TaskGrounds *trial_grounds(const EnvsDef *def, MildError *error) {

@@ -1,7 +1,8 @@
 /* Bodies whose shells stand on the ground, in the engine and by MuJoCo: robots fall, and in each
  * step the engine begins where MuJoCo's robot is. On soft ground pose, twist, V_free and A of feet
  * and bodies are the same, and so is the next velocity under the same wrenches; on rigid ground,
- * level or in waves, the next velocity, the feet's wrenches and the load on the shells. In double. */
+ * level or in waves, the next velocity, the feet's wrenches and the load on the shells. In double.
+ */
 #include <stdio.h>
 
 #include "base/random.h"

@@ -122,8 +122,8 @@ TEST(numbers_of_the_environments) {
     mild_envs_close(envs);
 }
 
-/* The batch engine on the CPU sees what MuJoCo sees, within the rounding of float. It does not report
- * the ends of episodes, and says so; what MuJoCo reports of them: python/test_envs. */
+/* The batch engine on the CPU sees what MuJoCo sees, within the rounding of float. It does not
+ * report the ends of episodes, and says so; what MuJoCo reports of them: python/test_envs. */
 TEST(batch_engine) {
     static Rows a, b, last;
     const char *batch[KEYS];

@@ -434,7 +434,8 @@ typedef struct {
     int draw;            /* of the worst */
 } Shaken;
 
-/* Shakes the first foot at random for a time: between touch and lift-off the ground takes energy. */
+/* Shakes the first foot at random for a time: between touch and lift-off the ground takes energy.
+ */
 static inline void kit_shake(Kit *kit, double seconds, uint64_t *random, int draw, Shaken *all) {
     const double weight = kit->mass[0] * KIT_GRAVITY, spring = kit_uniform(random, 2.0, 8.0);
     double work = 0.0, taken = 0.0, shake[3], force[1][3];

@@ -1,9 +1,10 @@
 /* A rigid body falls out of the air, on one or two feet or covered with elements. The ground has
- * stored nothing, so its work on the body is never above 0, but for bodies of some grams that bounce
- * within one step. Bodies and materials are those of robots, or anything that a file may say: 1 g to
- * 100 t, numbers at the ends of their ranges. Covered are boxes, capsules, wedges and bodies of
- * several parts, on every model and terrain, with and without imprints. Arguments: number of falls
- * of each kind (default 300) and the first seed (default 1); docs/testing.md says how many ran. */
+ * stored nothing, so its work on the body is never above 0, but for bodies of some grams that
+ * bounce within one step. Bodies and materials are those of robots, or anything that a file may
+ * say: 1 g to 100 t, numbers at the ends of their ranges. Covered are boxes, capsules, wedges and
+ * bodies of several parts, on every model and terrain, with and without imprints. Arguments: number
+ * of falls of each kind (default 300) and the first seed (default 1); docs/testing.md says how many
+ * ran. */
 #include "surface_kit.h"
 
 #define TURN_MOST 0.1 /* [rad] in a step; beyond it the way of a foot is not its twist */

@@ -154,9 +154,9 @@ TEST(test_sole_refused) {
     }
 }
 
-/* Every number of a foot's input in turn becomes NaN, infinite or huge: the step comes back, what it
- * calls converged is finite, and the ground keeps its bytes where it is not. Then the scratch solves
- * the sound step as before. The fuzz target tests/fuzz/fuzz_solve.c goes further. */
+/* Every number of a foot's input in turn becomes NaN, infinite or huge: the step comes back, what
+ * it calls converged is finite, and the ground keeps its bytes where it is not. Then the scratch
+ * solves the sound step as before. The fuzz target tests/fuzz/fuzz_solve.c goes further. */
 TEST(test_hostile_numbers) {
     static const double hostile[] = {NAN, INFINITY, -INFINITY, 1e300, -1e300};
     static const int counts[] = {3, 9, 6, 36, 6};

@@ -71,8 +71,8 @@ TEST(test_firm_bed) {
 }
 
 /* The numbers of the presets as the specification and docs/model.md section 10 give them, and how
- * deep a robot of 40 kg sinks on two feet and on one; foams and rubber weigh grams and have no added
- * mass. */
+ * deep a robot of 40 kg sinks on two feet and on one; foams and rubber weigh grams and have no
+ * added mass. */
 TEST(test_presets) {
     static const struct {
         const char *name;

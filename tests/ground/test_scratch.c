@@ -1,5 +1,5 @@
-/* What must not matter to the last bit: which ground a scratch served before, good or bad, and where
- * a ground's block lies. */
+/* What must not matter to the last bit: which ground a scratch served before, good or bad, and
+ * where a ground's block lies. */
 #include "ground_kit.h"
 
 enum { ROBOTS = 6 };

@@ -1,5 +1,5 @@
-/* Parameters from presses: they come back, the intervals of noisy ones are those of formulas and of a
- * search that knows nothing of the fit, and what the data leave open has no value. Every noise is
+/* Parameters from presses: they come back, the intervals of noisy ones are those of formulas and of
+ * a search that knows nothing of the fit, and what the data leave open has no value. Every noise is
  * seeded. test_coverage.c counts how often the intervals hold the truth. */
 #include <float.h>
 

@@ -1,6 +1,6 @@
 /* Shells that stand on soft ground carry the robot. That in the air, and where they do not stand,
- * they change no bit of a step is in plugin/test_body.c and env/test_shells.c, that the ground under
- * all bodies only takes energy in test_fallen.c. */
+ * they change no bit of a step is in plugin/test_body.c and env/test_shells.c, that the ground
+ * under all bodies only takes energy in test_fallen.c. */
 #include "all_robots.h"
 
 #define FILES MILD_SOURCE_DIR "/robots/sa01"

@@ -1,6 +1,6 @@
 /* What a workspace reports of a step of SA01, against the engine's own functions on data of their
- * own: momentum, forces of rigid contact, steps on tilted planes; its limits and its clock. Its feet
- * and its steps without contact: test_walker.c. */
+ * own: momentum, forces of rigid contact, steps on tilted planes; its limits and its clock. Its
+ * feet and its steps without contact: test_walker.c. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -43,8 +43,8 @@ TEST_WITH(base_and_joints, open_quiet, close_rig) {
     }
 }
 
-/* Of differences of 0.1, -0.2, 0.2 m/s and -0.4 rad/s the norm is 0.5, that of the linear part alone
- * 0.3; each component counts. */
+/* Of differences of 0.1, -0.2, 0.2 m/s and -0.4 rad/s the norm is 0.5, that of the linear part
+ * alone 0.3; each component counts. */
 TEST_WITH(change_of_twist, open_quiet, close_rig) {
     const double step[6] = {0.1, -0.2, 0.2, 0, -0.4, 0};
     for (int linear = 0; linear < 2; linear++) {

@@ -58,8 +58,8 @@ static void set_command(double vx, double vy, double wz) {
     scene.env.command[2] = wz;
 }
 
-/* Of an error e the mean of a wide and a narrow curve, f(e) = (1 - n) exp(-5 e^2) + n exp(-10 e), by
- * hand: with n = 1/2, f(0.2) = (e^-0.2 + e^-2)/2 = 0.47703302, f(0.1) = 0.65955443 and f(0.4) =
+/* Of an error e the mean of a wide and a narrow curve, f(e) = (1 - n) exp(-5 e^2) + n exp(-10 e),
+ * by hand: with n = 1/2, f(0.2) = (e^-0.2 + e^-2)/2 = 0.47703302, f(0.1) = 0.65955443 and f(0.4) =
  * 0.23382230. n = 0 is the paper's. Commanded are 0.6 and 0.1 m/s and -0.3 rad/s. */
 TEST(tracking) {
     static const struct {
@@ -127,9 +127,9 @@ TEST(upright_rise_and_gate) {
 }
 
 /* The left foot stands, the right is to be at 0.08 m. By hand, times 2.4: (pi/2) clip(h)/0.10 of
- * lift, where what is above the wanted height is taken off again; of rise the same from the print of
- * the foot that stands, (pi/2) clip(h + 0.06, 0, 0.14)/0.16; of error the paper's |h_des - h|, which
- * is paid for. */
+ * lift, where what is above the wanted height is taken off again; of rise the same from the print
+ * of the foot that stands, (pi/2) clip(h + 0.06, 0, 0.14)/0.16; of error the paper's |h_des - h|,
+ * which is paid for. */
 TEST(feet_clearance) {
     static const struct {
         const char *motion;
@@ -172,8 +172,8 @@ TEST(feet_clearance) {
     expect_term(REWARD_feet_clearance, "two feet, error", 0.096);
 }
 
-/* 1.4 times the mean of 1 of a foot that matches and -0.3 of one that does not; the paper's is their
- * sum, 1.3 (feet that match) - 0.3. */
+/* 1.4 times the mean of 1 of a foot that matches and -0.3 of one that does not; the paper's is
+ * their sum, 1.3 (feet that match) - 0.3. */
 TEST(gait) {
     static const struct {
         const char *motion;

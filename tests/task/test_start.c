@@ -1,5 +1,6 @@
-/* Episodes of the Go1 that begin lying: how high its geoms are, how attitudes and joints are spread, which episodes begin so, that the motors then only damp, and
- * what ends an episode of a robot that may lie. */
+/* Episodes of the Go1 that begin lying: how high its geoms are, how attitudes and joints are
+ * spread, which episodes begin so, that the motors then only damp, and what ends an episode of a
+ * robot that may lie. */
 #include <mujoco/mujoco.h>
 
 #include "env/task/task.h"

@@ -1,6 +1,6 @@
-/* Training on every ground model, with other robots than the default, and with the batch engine, here
- * on the CPU: train.robot chooses, the policy remembers, runs repeat, and either kind of robots goes
- * on from the other's checkpoint. */
+/* Training on every ground model, with other robots than the default, and with the batch engine,
+ * here on the CPU: train.robot chooses, the policy remembers, runs repeat, and either kind of
+ * robots goes on from the other's checkpoint. */
 #include <sys/stat.h>
 #include <unistd.h>
 

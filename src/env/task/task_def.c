@@ -180,8 +180,8 @@ const MildField task_fields[] = {
     T(vx_start, D, 1, 0.1, 4,
       "[m/s] highest forward command of a new robot; it grows as commands near it are followed"),
     T(jump, D, 2, 0, 1,
-      "[m] rise of the base that a command to jump asks for, low and high; every command but that to "
-      "stand is one, and vx, vy, wz are the means over its jumps; 0 0: the robot does not jump"),
+      "[m] rise of the base that a command to jump asks for, low and high; every command but that "
+      "to stand is one, and vx, vy, wz are the means over its jumps; 0 0: the robot does not jump"),
     T(jump_start, D, 1, 0.01, 1,
       "[m] highest rise of a new robot; it grows, in the place of vx_start, as jumps succeed"),
     T(jump_stance, D, 1, 0.1, 3, "[s] time on the feet between two jumps"),

@@ -240,7 +240,8 @@ void task_def_make_nominal(TaskDef *def);
 MildStatus task_def_check(const TaskDef *def, MildError *error);
 /* Fails for a task with jumps, which `what` does not command. */
 MildStatus task_def_check_no_jump(const TaskDef *def, const char *what, MildError *error);
-/* The same as task_def_check, that the lists of gains fit the robot, and that a file of an actuator has been read. */
+/* The same as task_def_check, that the lists of gains fit the robot, and that a file of an actuator
+ * has been read. */
 MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildError *error);
 /* robot_set_gait and robot_set_elements by the def. */
 MildStatus task_set_robot(const TaskDef *def, Robot *robot, MildError *error);

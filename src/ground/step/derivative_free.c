@@ -1,5 +1,5 @@
-/* By how much the impulses of a foot depend on the free motion at fixed twists. Its loop is compiled
- * as those of pass.c. */
+/* By how much the impulses of a foot depend on the free motion at fixed twists. Its loop is
+ * compiled as those of pass.c. */
 #define POWER_CALLED /* power.h: no vector loop here needs a power */
 #include "ground/step/derivative_free.h"
 
@@ -8,8 +8,8 @@
 #include "ground/step/step.h"
 
 /* [kg] Derivative of an element's normal impulse with respect to the downward speed of the free
- * motion, at the new downward speed `speed`. rate: 1/dt. before, free: its downward speed before the step, and
- * of the free motion. With h the entry speed, D the coefficient of the growth r,
+ * motion, at the new downward speed `speed`. rate: 1/dt. before, free: its downward speed before
+ * the step, and of the free motion. With h the entry speed, D the coefficient of the growth r,
  *
  *     dh/dfree = (a - m0)/(dt h)                       where the free motion speeds it up
  *     dD/dh    = entry_drag + s' (h - w)^2 + 2 s (h - w),   s = extra (stop - 1/2)/h

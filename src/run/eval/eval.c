@@ -31,8 +31,8 @@ static void hold_heading(const double quaternion[4], double speed, double sidewa
 }
 
 /* The command at a time of a trial [s] for a robot with the orientation `quaternion` (w x y z):
- * that of eval_command, with `turn` where it is not 0, and none from the stop on. A robot that is to
- * jump stands first, so that its rise has a measure, and then holds its heading. */
+ * that of eval_command, with `turn` where it is not 0, and none from the stop on. A robot that is
+ * to jump stands first, so that its rise has a measure, and then holds its heading. */
 static void direct(const EvalDef *eval, double speed, double time, const double quaternion[4],
                    double command[TASK_COMMANDS]) {
     const int stands = eval->jump > 0 && time < MEASURE_SETTLED;
