@@ -74,7 +74,7 @@ void batch_list_rows(const Batch *b, EnvsArrays *all, BatchArrays *ground, Row r
 size_t batch_block_bytes(const Envs *envs, int own_ground);
 MildStatus batch_save(Envs *envs, int first, int count, void *blocks, MildStream stream,
                       MildError *error);
-MildStatus batch_fork(Envs *envs, const void *blocks, int count, size_t bytes, int own_ground,
+MildStatus batch_fork(Envs *envs, const void *blocks, int count, size_t stride, int own_ground,
                       MildStream stream, MildError *error);
 MildStatus batch_read(Envs *envs, const EnvsMotion *motion, MildStream stream, MildError *error);
 
