@@ -76,7 +76,6 @@ static void slot_set_law(Slots *s, int i, const SlotLaw *from) {
     s->whole_mu[i] = share->mu;
     s->ahead[i] = 0.0;
     s->share[i] = 1.0;
-    s->power[0][i] = s->power[1][i] = s->elastic[0][i] = s->elastic[1][i] = 0.0;
     s->exit_drag[i] = law_exit_drag(&from->law);
     s->entry_drag[i] = law_entry_drag(&from->law);
     s->strength[i] = from->law.line_stiffness;

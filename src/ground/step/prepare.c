@@ -227,6 +227,15 @@ static void foot_slots(FootScratch *foot, const MildGround *ground, int f,
     }
 }
 
+/* Powers of the depth of the last step: the loop for any law multiplies those that no material of
+ * the foot has by 0, which a NaN outlives. */
+static void slots_forget_powers(const FootScratch *foot) {
+    for (Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+        memset(s->power, 0, sizeof s->power);
+        memset(s->elastic, 0, sizeof s->elastic);
+    }
+}
+
 static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
                          const MildTerrain *terrain, const MildContactInput *input) {
     const Memory memory = ground_memory(ground, f);
@@ -237,6 +246,9 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
         shell_slots(foot, ground, f, terrain, &memory, &moves, input->dt);
     } else {
         foot_slots(foot, ground, f, terrain, &memory, R, &moves);
+    }
+    if (foot->curves & (LAW_POWER | LAW_ELASTIC) || !(foot->curves & (LAW_CONE | LAW_HEAP))) {
+        slots_forget_powers(foot);
     }
     foot_frame(foot, terrain, R);
     double before[6], after[6];
