@@ -14,7 +14,7 @@ import nbformat
 source, out = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
 sys.path[:0] = [str(source / "scripts"), str(source / "tests/install")]
 import notebook  # noqa: E402
-from test_tutorials import shorten  # noqa: E402
+from test_tutorials import SHORT, shorten  # noqa: E402
 
 BIN = pathlib.Path(sys.executable).parent  # not resolved: of the environment
 PAGES = ["your-simulator", "your-robot", "your-soil", "train-on-a-gpu", "deploy"]

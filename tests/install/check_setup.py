@@ -7,7 +7,7 @@ import pathlib
 import sys
 import tempfile
 
-from test_tutorials import Wrong, follow
+from test_tutorials import Wrong, check_itself, follow
 
 source = pathlib.Path(sys.argv[1]).resolve()
 with tempfile.TemporaryDirectory() as folder:
@@ -19,6 +19,7 @@ with tempfile.TemporaryDirectory() as folder:
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL", "MILD", "DISPLAY", "WAYLAND"))}
     environment.update(HOME=folder, PATH=f"{home / 'bin'}:/usr/bin:/bin", PIP_DISABLE_PIP_VERSION_CHECK="1")
     try:
+        check_itself()
         count = follow(source, "README", home, environment)
     except Wrong as wrong:
         sys.exit(f"FAIL: docs/tutorials/README.md: {wrong}")

@@ -161,6 +161,31 @@ def run_commands(tree, steps, jobs):
             check_rewards(tree, step[1])
 
 
+def check_itself(work):
+    """What this test is for is seen: a line that is not there, a block without a place, a reward that counts nowhere."""
+    (work / "one.c").write_text("int a;\nint b;\nint b;\n", encoding="utf-8")
+    for before in ("int c;", "int b;"):
+        try:
+            insert(work / "one.c", before, "int d;")
+        except Wrong:
+            continue
+        raise Wrong(f"a line that is there not once is no fault: {before}")
+    (work / "log.csv").write_text("reward/a,reward/b\nnan,nan\n0,-0.5\n", encoding="utf-8")
+    check_rewards(work, "mild train --out . --reward.b=-1")
+    try:
+        check_rewards(work, "mild train --out . --reward.a=1")
+    except Wrong:
+        pass
+    else:
+        raise Wrong("a reward of nan and 0 is no fault")
+    try:
+        recipes("## A reward\n\nHere:\n\n```c\nint a;\n```\n")
+    except Wrong as wrong:
+        if "does not say where" in str(wrong):
+            return
+    raise Wrong("a block without a place is no fault")
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("source", type=pathlib.Path)
@@ -171,6 +196,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         work = pathlib.Path(folder)
         try:
+            check_itself(work)
             found = recipes((source / "CONTRIBUTING.md").read_text(encoding="utf-8"),
                             ("A ground model", (source / "docs/tutorials/add-a-model.md").read_text(encoding="utf-8")))
             tree = work / "tree"

@@ -32,4 +32,16 @@ done
 [ -s targets ] || fail "no page runs build/mild after a target of make"
 
 python3 "$source/scripts/drawings.py" --check || fail "drawings"
+mkdir -p tree/docs tree/scripts
+cp "$source/scripts/drawings.py" tree/scripts/
+cp "$source"/docs/*.svg tree/docs/
+cp -r "$source/src" tree/src
+sees() {
+    python3 tree/scripts/drawings.py --check 2>said && fail "the check does not see: $1"
+    grep -q "$1" said || fail "the check says $(cat said) of: $1"
+}
+echo '#include "view/view.h"' >>tree/src/control/controller.h
+sees 'house.svg is not what src is'
+mkdir tree/src/attic
+sees 'attic: a folder of src without a row'
 finish "README.md: $lines lines, $words words; $(ls "$source"/docs/*.md | wc -l) pages"

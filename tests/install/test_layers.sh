@@ -54,4 +54,23 @@ calls "$@" >"$work/calls"
 [ "$(includes '*.[ch]' "$source/src" | wc -l)" -gt 200 ] || fail "no includes found in $source/src"
 check "$source/src" "$source/lab" || fail "see above"
 
+# The check sees what it is for.
+mkdir -p "$work/wrong/base" "$work/wrong/ground" "$work/wrong/robot"
+sees() {
+    ! check "$work/wrong" >"$work/said" || fail "the check does not see: $1"
+    grep -q "^$1 need" "$work/said" || fail "the check says $(cat "$work/said") of: $1"
+    rm -f "$work"/wrong/*/*
+}
+echo '#include "ground/a.h"' >"$work/wrong/base/up.c"
+echo '#include "base/up.h"' >"$work/wrong/ground/a.h"
+sees layers
+echo '#include "robot/b.h"' >"$work/wrong/robot/a.h"
+echo '#include "robot/a.h"' >"$work/wrong/robot/b.h"
+sees headers
+echo '#include "ground/b.h"' >"$work/wrong/ground/a.h"
+echo '#include "ground/a.h"' >"$work/wrong/ground/b.c"
+sees files
+echo 'ground/b ground/a' >>"$work/calls"
+echo '#include "ground/b.h"' >"$work/wrong/ground/a.h"
+sees files
 echo "$(includes '*.[ch]' "$source/src" "$source/lab" | sort -u | wc -l) includes, $(sort -u "$work/calls" | wc -l) calls: all one way"

@@ -134,6 +134,22 @@ def look_for_picture(source, page, work):
         raise Wrong(f"no picture {''.join(picture)} was made")
 
 
+def check_itself():
+    """What this test is for is seen."""
+    differ = [("a 1.00", "a 1.06"), ("a 1", "b 1"), ("a", "a\nb"), ("a\nb", "a"), ("a\n...\nc", "a\nb"), ("1 mm", "1 m"), ("3/3", "2/3"),
+              ("3/3 1 +- 0.1", "2/3 1 +- 0.1"), ("3/3 1.0 +- 0.10", "3/3 1.2 +- 0.10"), ("3/3 1.0 +- 0.10", "3/3 1.0 +- 0.16"),
+              ("1.0 m/s yes", "1.2 m/s yes"), ("1.0 m/s yes", "1.0 m/s no"), ("9.0 1.0 m/s", "6.0 1.0 m/s")]
+    equal = [("a 1.00", "a   1.02"), ("0.01", "0.02"), ("a\n...", "a\nb\nc"), ("...\nc 5e+05", "a\nc 5.1e+05"),
+             ("3/3 1.0 +- 0.10 9", "3/3 1.1 +- 0.06 5"), ("1.0 m/s yes 9", "1.1 m/s yes 5")]
+    for wanted, printed in differ:
+        if compare(wanted, printed) is None:
+            raise Wrong(f"the test does not distinguish {wanted!r} from {printed!r}")
+    for wanted, printed in equal:
+        if compare(wanted, printed) is not None:
+            raise Wrong(f"the test distinguishes {wanted!r} from {printed!r}")
+
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("source", type=pathlib.Path)
@@ -152,6 +168,7 @@ def main():
         work = args.keep or folder / "work"
         work.mkdir(parents=True, exist_ok=True)
         try:
+            check_itself()
             count = follow(args.source.resolve(), args.page, work, environment)
             look_for_picture(args.source.resolve(), args.page, work)
         except Wrong as wrong:
