@@ -42,7 +42,7 @@ TEST(sizes) {
     MildMapDef waves = mild_map_def_default();
     waves.kind = MILD_MAP_WAVES;
     const size_t level = measure(NULL), map = measure(&waves);
-    assert_true(level <= 12288 && map <= 14960);
+    assert_true(level <= 12288 && map <= 14900);
     assert_int_equal(map - level, (4 * 160 + 32) * sizeof(float)); /* the ground's */
 }
 

@@ -84,7 +84,7 @@ static double wanted_torque(int i, const double *pose, double action, int k) {
     double tau = kp[j] * rig.env->kp_scale[i] *
                      (pose[i] + 0.5 * action + rig.env->motor_offset[i] - trace.q[k][i]) -
                  kd[j] * rig.env->kd_scale[i] * trace.qd[k][i];
-    return fmin(fmax(tau * rig.env->strength[i], -limit[j]), limit[j]);
+    return fmin(fmax(tau * rig.env->strength, -limit[j]), limit[j]);
 }
 
 /* The torques of a drive take the place of the PD's at every physics step, within the limits. */
@@ -112,10 +112,10 @@ TEST_WITH(torque, open_usual, close_rig) {
         RobotState state = kit_moving_state(2, draw);
         put(&state);
         float action[SA01_JOINTS];
+        rig.env->strength = 1 + 0.01 * draw;
         for (int i = 0; i < SA01_JOINTS; i++) {
             rig.env->kp_scale[i] = 0.9 + 0.01 * i;
             rig.env->kd_scale[i] = 1.1 - 0.01 * i;
-            rig.env->strength[i] = 1 + 0.005 * i;
             rig.env->motor_offset[i] = 0.005 * (i - 4);
             action[i] = 0.125f * (float)((int)((5 * draw + 7 * (uint32_t)i) % 60) - 30);
         }
@@ -161,9 +161,9 @@ TEST(motors) {
         rig_open(&rig, &def, 3, 0);
         rig_start(&rig, 0.5, 0, 0);
         rig.env->lag_command = 2;
+        rig.env->strength = 1.06;
         float action[2][SA01_JOINTS];
         for (int i = 0; i < SA01_JOINTS; i++) {
-            rig.env->strength[i] = 1 + 0.01 * i;
             rig.env->motor_offset[i] = 0.01 * i;
             action[0][i] = 0.1f * (float)(i + 1);
             action[1][i] = -0.05f * (float)(i + 2);
@@ -176,8 +176,7 @@ TEST(motors) {
             for (int i = 0; i < SA01_JOINTS && !(hold && late); i++) {
                 const double target =
                     robot_default_pose(robot)[i] + 0.5 * (double)action[!late][i] + 0.01 * i;
-                const double wanted =
-                    (1 + 0.01 * i) * (i == 0 ? 1000 : 10) * (target - trace.q[from][i]);
+                const double wanted = 1.06 * (i == 0 ? 1000 : 10) * (target - trace.q[from][i]);
                 expect_entry("torque", i, trace.torque[k][i], fmin(fmax(wanted, -119), 119), 1e-9);
             }
         }

@@ -41,9 +41,7 @@ static void fill_env(TaskEnv *env) {
         env->variation.com_offset[i] = 0.002 * (i + 1);
         env->smooth_velocity[i] = 0.4 - 0.3 * i;
     }
-    for (int i = 0; i < SA01_JOINTS; i++) {
-        env->strength[i] = 0.93;
-    }
+    env->strength = 0.93;
     env->lag_command = 1;
     env->lag_motor = 2;
     env->lag_imu = 3;

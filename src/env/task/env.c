@@ -268,7 +268,7 @@ static void joint_torque(TaskEnv *env, const TaskDef *def, const TaskMotor *moto
         def->motors->torque(def->motors->self, motors_of(env), error, qd, asked);
     }
     for (int i = 0; act && i < env->shape.joints; i++) {
-        env->torque[i] = def->motors ? limited(&motor[i], env->strength[i] * asked[i], qd[i])
+        env->torque[i] = def->motors ? limited(&motor[i], env->strength * asked[i], qd[i])
                                      : task_torque(&motor[i], late, q[i], qd[i]);
     }
 }

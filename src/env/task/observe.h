@@ -160,7 +160,7 @@ MILD_HD_FN void observe_episode(const TaskEnv *env, const TaskDef *def, const Ro
         out[6] = (float)(variation->base_mass_add / 4);
         rest[0] = (float)variation->rigid;
         rest[1] = (float)reading->above;
-        rest[2] = (float)env->strength[0];
+        rest[2] = (float)env->strength;
         rest[3] = (float)variation->armature_scale;
         rest[4] = (float)(env->lag_command * step);
         rest[5] = (float)(env->lag_motor * step);

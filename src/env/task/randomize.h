@@ -64,12 +64,11 @@ MILD_HD_FN void task_draw_robot(TaskEnv *env, const TaskDef *def, Random r) {
             i <= env->shape.joints ? (Real)task_draw(&own, z->link_mass) : 1;
     }
     r = random_after(r, env->shape.joints + 1);
-    double strength = task_draw(&r, z->strength);
+    env->strength = task_draw(&r, z->strength);
     for (int i = tile_lane(); i < env->shape.joints; i += TILE) {
         Random own = random_after(r, 3 * i);
         env->kp_scale[i] = task_draw(&own, z->gain);
         env->kd_scale[i] = task_draw(&own, z->gain);
-        env->strength[i] = strength;
         env->motor_offset[i] = task_spread(&own, z->motor_offset);
     }
     r = random_after(r, 3 * env->shape.joints);

@@ -155,7 +155,7 @@ typedef struct {
     int ground[MILD_MATERIALS_MAX];      /* of TaskDef.grounds, by label; unused without them */
     Real kp_scale[TASK_JOINTS];          /* [-] */
     Real kd_scale[TASK_JOINTS];          /* [-] */
-    Real strength[TASK_JOINTS];          /* [-] of the torque */
+    Real strength;                       /* [-] of all torques */
     Real motor_offset[TASK_JOINTS];      /* [rad] */
     int lag_command, lag_motor, lag_imu; /* [physics steps] */
     double assist_level; /* [-] level of assistance: decays while on its feet, rises with falls;

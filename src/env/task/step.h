@@ -246,9 +246,8 @@ MILD_HD_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Ro
     for (int late = 0; late < 2; late++) {
         motor.target[late] = rest + scale * (double)env->action[late][i] + env->motor_offset[i];
     }
-    motor.kp =
-        task_is_limp(env, def) ? 0 : env->strength[i] * REAL(gains->kp[i]) * env->kp_scale[i];
-    motor.kd = env->strength[i] * REAL(gains->kd[i]) * env->kd_scale[i];
+    motor.kp = task_is_limp(env, def) ? 0 : env->strength * REAL(gains->kp[i]) * env->kp_scale[i];
+    motor.kd = env->strength * REAL(gains->kd[i]) * env->kd_scale[i];
     motor.limit = gains->limit[i];
     motor.fastest = robot->speed[i];
     motor.full = robot->full_speed[i];
