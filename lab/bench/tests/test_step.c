@@ -189,7 +189,8 @@ TEST(test_walk_rows) {
     expect_near("rigid", 1e-6 * value_of(&report, "rigid_engine_rigid"), 2 + walks, 1e-9);
     assert_int_equal(report.count, GROUNDS * 8 + 1);
     print_message("the floor at %.1f mm\n", 1e3 * lowest_floor);
-    assert_true(lowest_floor < -5e-3 && lowest_floor > -170e-3); /* a bed at 150 mm yields */
+    /* The bed lies at 150 mm, and yields by 8 mm where eight elements of 19 kN/m bear 1200 N. */
+    assert_true(lowest_floor < -5e-3 && lowest_floor > -158e-3);
     is_false = 0;
     walks = 0;
 }

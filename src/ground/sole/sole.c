@@ -22,13 +22,6 @@ typedef struct {
     int rows;         /* along y */
 } Raster;
 
-typedef struct {
-    double low[2];    /* [m] lower corner of the bounding box */
-    double high[2];   /* [m] upper corner */
-    double area;      /* [m^2] */
-    double center[2]; /* [m] centroid */
-} Outline;
-
 static Outline outline_measure(const MildSoleDef *def) {
     Outline outline = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}, 0.0, {0.0, 0.0}};
     for (int i = 0; i < def->points; i++) {
@@ -374,10 +367,8 @@ static MildSole *sole_raster(const MildSoleDef *def, MildError *error) {
             sole = sole_from_cells(def, &outline, &raster, cells, chosen);
         }
         if (sole) {
-            const EdgeBox box = {
-                outline.area, {outline.low[0], outline.low[1]}, {outline.high[0], outline.high[1]}};
             double *x = sole->values;
-            sole_edges(def, &box, chosen, x, x + chosen, x + SOLE_EDGE * chosen,
+            sole_edges(def, &outline, chosen, x, x + chosen, x + SOLE_EDGE * chosen,
                        x + SOLE_SPREAD * chosen, (int *)work);
         }
     }

@@ -71,31 +71,31 @@ static void cell_edge(const MildSoleDef *def, double x, double y, int *near, dou
 
 /* [m] Mean over the outline, by cells of the sole's raster, in which the point (x, y) is a
  * centre. */
-static double outline_mean(const MildSoleDef *def, const EdgeBox *box, double x, double y,
+static double outline_mean(const MildSoleDef *def, const Outline *outline, double x, double y,
                            int *work) {
     const double pitch = def->pitch;
     double sum = 0.0, mean, spread;
-    double cx = x - ceil((x - box->low[0]) / pitch) * pitch;
-    while (cx < box->high[0] + pitch) {
-        double cy = y - ceil((y - box->low[1]) / pitch) * pitch;
-        while (cy < box->high[1] + pitch) {
+    double cx = x - ceil((x - outline->low[0]) / pitch) * pitch;
+    while (cx < outline->high[0] + pitch) {
+        double cy = y - ceil((y - outline->low[1]) / pitch) * pitch;
+        while (cy < outline->high[1] + pitch) {
             cell_edge(def, cx, cy, work, &mean, &spread);
             sum += mean * pitch * pitch;
             cy += pitch;
         }
         cx += pitch;
     }
-    return sum / box->area;
+    return sum / outline->area;
 }
 
-void sole_edges(const MildSoleDef *def, const EdgeBox *box, int n, const double *x, const double *y,
-                double *edge, double *spread, int *work) {
+void sole_edges(const MildSoleDef *def, const Outline *outline, int n, const double *x,
+                const double *y, double *edge, double *spread, int *work) {
     double sum = 0.0;
     for (int i = 0; i < n; i++) {
         cell_edge(def, x[i], y[i], work, &edge[i], &spread[i]);
         sum += edge[i] / n;
     }
-    const double scale = outline_mean(def, box, x[0], y[0], work) / sum;
+    const double scale = outline_mean(def, outline, x[0], y[0], work) / sum;
     for (int i = 0; i < n && isfinite(scale); i++) {
         edge[i] *= scale;
         spread[i] *= scale;
