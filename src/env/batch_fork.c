@@ -54,8 +54,8 @@ MildStatus batch_save(Envs *envs, int first, int count, void *blocks, MildStream
     EnvsFork fork;
     const size_t stride = fork_rows(b, 0, &fork);
     if (first < 0 || count < 1 || first > b->arrays.envs - count) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "save: environments %d .. %d of %d", first,
-                         first + count - 1, b->arrays.envs);
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "save: %d environments from %d on, of %d",
+                         count, first, b->arrays.envs);
     }
     if ((uintptr_t)blocks % BLOCK_ALIGN) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "save: blocks must begin at a multiple of %d",

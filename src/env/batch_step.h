@@ -613,6 +613,11 @@ MILD_HD void env_set_down(const EnvsArrays *all, long robot, TaskEnv *env) {
     env->robot.qpos[2] -= env->variation.rigid ? 0 : (Real)all->task->ground[ground].depth;
 }
 
+/* An index within `count`, whatever a block that was never saved holds. */
+MILD_HD int env_within(int index, int count) {
+    return (int)((uint32_t)index % (uint32_t)count);
+}
+
 /* By one thread, after the rows. */
 MILD_HD void env_take_back(const EnvsArrays *all, const EnvsFork *fork, long robot,
                            const EnvKept *kept) {
@@ -626,6 +631,13 @@ MILD_HD void env_take_back(const EnvsArrays *all, const EnvsFork *fork, long rob
     env->tick_first = kept->tick_first;
     for (int i = 0; i < TALLY_KEPT; i++) {
         env_robot_at(all, robot)->tally[i] = kept->tally[i];
+    }
+    EnvRobot *own = env_robot_at(all, robot);
+    own->label = env_within(own->label, all->task->labels);
+    for (int label = 0; !fork->own_ground && label < all->task->labels; label++) {
+        int *material = &all->material[robot * all->task->labels + label];
+        *material = env_within(*material, all->task->grounds);
+        env->ground[label] = env_within(env->ground[label], all->task->grounds);
     }
     if (!fork->own_ground) {
         return;

@@ -1,5 +1,7 @@
 /* Environments of the batch engine that are saved and forked: from then on all of a group do what
  * the saved one does, to the last bit. */
+#include <limits.h>
+
 #include "base/random.h"
 #include "env/backend.h"
 #include "env/task/state.h"
@@ -250,6 +252,16 @@ TEST(refuses_what_does_not_fit) {
                    &error, "6 4");
     assert_refused(envs_fork(both.b.envs, blocks, 2, bytes - 16, 0, NULL, &error),
                    MILD_ERROR_ARGUMENT, &error, "block");
+    assert_refused(envs_fork(both.b.envs, blocks + 4, 1, bytes, 0, NULL, &error),
+                   MILD_ERROR_ARGUMENT, &error, "multiples 16");
+    assert_refused(envs_save(both.a.envs, 0, 1, blocks + 4, NULL, &error), MILD_ERROR_ARGUMENT,
+                   &error, "multiple 16");
+    assert_refused(envs_save(both.a.envs, 1, INT_MAX, blocks, NULL, &error), MILD_ERROR_ARGUMENT,
+                   &error, "environments");
+    memset(blocks, 0x5a, SAVED * bytes); /* never saved: its numbers are wild, its places are not */
+    expect_good(envs_fork(both.b.envs, blocks, SAVED, bytes, 0, NULL, &error) == MILD_OK, &error);
+    draw_side(&both.b, 1, MANY / SAVED);
+    step_side(&both.b);
     envs_destroy(both.b.envs);
     both.b.envs = open_side(&def, 1, 0, 0);
     assert_true(envs_block_bytes(both.b.envs, 0) == 0);

@@ -43,7 +43,8 @@ static Envs *start(int batch, EnvsDrive drive) {
     memset(&at, 0, sizeof at);
     for (int i = 0; i < TRIALS; i++) {
         at.command[i][0] = 0.1 * i;
-        at.command[i][2] = -0.2;
+        at.command[i][TASK_TURN] = -0.2;
+        at.command[i][TASK_RISE] = 0.02;
     }
     Envs *envs = envs_create(&of, &error);
     if (!envs || envs_set_commands(envs, at.command[0], &error) != MILD_OK ||
