@@ -364,11 +364,11 @@ TEST(flight_and_loads) {
     assert_true(isnan(row.at_limit));
 }
 
-/* Flights of 1/4 s in each second, 0.2 m and from 3 s on 0.4 m above the 0.6 m at which the centre
- * of mass was after a second; it is lower in stance. One of 1/32 s is no jump, and what comes
- * before 2 s does not count. */
+/* Flights of 1/4 s about each second, 0.2 m and from 3.5 s on 0.4 m above the 0.6 m at which the
+ * centre of mass was after a second; it is lower in stance. One of 1/32 s is no jump, and one that
+ * is under way at 2 s does not count. */
 TEST(rise_of_jumps) {
-    const EvalDef eval = {.jump = 0.3, .trials = 1, .seconds = 4};
+    const EvalDef eval = {.jump = 0.3, .trials = 1, .seconds = 4.5};
     const uint8_t ran = TASK_END_time;
     char line[256];
     Script s;
@@ -376,11 +376,11 @@ TEST(rise_of_jumps) {
     EvalRow row;
     script_start(&s);
     measure_start(&m, DT);
-    for (int k = 0; k < STEPS(4); k++) {
-        const int since = k % STEPS(1);
+    for (int k = 0; k < STEPS(4.5); k++) {
+        const int since = (k + STEPS(0.625)) % STEPS(1);
         const int flies = since >= STEPS(0.5) && since < STEPS(0.75);
         const int hops = since >= STEPS(0.875) && since < STEPS(0.90625);
-        const double apex = k < STEPS(2) ? 9 : k < STEPS(3) ? 0.8 : 1;
+        const double apex = k < STEPS(2.5) ? 9 : k < STEPS(3.5) ? 0.8 : 1;
         for (int f = 0; f < SA01_FEET; f++) {
             s.sample.foot[f].load = flies || hops ? 0 : 100;
         }

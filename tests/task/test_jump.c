@@ -82,11 +82,13 @@ TEST(jumps_that_grow) {
     Rig rig;
     TaskDef def = jump_def();
     def.jump_start = 0.1;
-    def.standing_share = 0;
+    def.standing_share = def.backward_share = 0;
+    def.vx[0] = 0.5; /* above the rise, which does not bound it */
     rig_open(&rig, &def, 11, 0);
     task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
     expect_near("a new robot", rig.env->command_most, 0.1, 0);
     assert_true(rig.env->command[TASK_RISE] <= 0.1 && rig.env->command[TASK_RISE] > 0);
+    assert_true(rig.env->command[TASK_FORWARD] > 0.5);
     for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
         rig.env->command_most = 0.2;
         rig.env->command[TASK_RISE] = rows[k][0];
