@@ -59,11 +59,17 @@ TEST(reward_of_a_jump) {
                 {0.5, RISE - 0.05, 0.36787944},
                 {0.5, RISE + 0.1, 0.13533528},
                 {0.75, 0.75 * RISE, 1}};
+    def.reward.tracking_narrow = 0.25, def.reward.tracking_sharpness = 3;
+    def.reward.tracking_width = 0.2;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         env.phase = (STANCE + rows[i].time * FLIGHT) / PERIOD;
         motion.rise = rows[i].rise;
         expect_entry("jump", (int)i, reward_jump(&motion), rows[i].wanted, 1e-7);
     }
+    /* 0.3 m/s too fast: 0.75 exp(-0.27) + 0.25 exp(-1.5) of the last row. */
+    env.command[TASK_FORWARD] = 0.4;
+    env.smooth_velocity[0] = 0.7;
+    expect_near("speed", reward_jump(&motion), 0.62831716, 1e-7);
     env.phase = 0.9 * STANCE / PERIOD;
     expect_near("in stance", reward_jump(&motion), 0, 0);
     env.command[TASK_RISE] = 0;
@@ -83,12 +89,13 @@ TEST(jumps_that_grow) {
     TaskDef def = jump_def();
     def.jump_start = 0.1;
     def.standing_share = def.backward_share = 0;
-    def.vx[0] = 0.5; /* above the rise, which does not bound it */
+    def.vx[0] = 0.1;
+    def.vx[1] = 2; /* of which a robot has the share that its rise has of 0.5 m: 0.4 m/s */
     rig_open(&rig, &def, 11, 0);
     task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
     expect_near("a new robot", rig.env->command_most, 0.1, 0);
     assert_true(rig.env->command[TASK_RISE] <= 0.1 && rig.env->command[TASK_RISE] > 0);
-    assert_true(rig.env->command[TASK_FORWARD] > 0.5);
+    assert_true(rig.env->command[TASK_FORWARD] > 0.1 && rig.env->command[TASK_FORWARD] <= 0.4);
     for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
         rig.env->command_most = 0.2;
         rig.env->command[TASK_RISE] = rows[k][0];
@@ -100,6 +107,7 @@ TEST(jumps_that_grow) {
         expect_entry("growth", (int)k, rig.env->command_most - 0.2, rows[k][2], 1e-12);
         assert_true(rig.env->command[TASK_RISE] <= rig.env->command_most);
         assert_true(rig.env->command[TASK_RISE] >= def.jump[0]);
+        assert_true(rig.env->command[TASK_FORWARD] <= 4 * rig.env->command_most);
     }
     rig_close(&rig);
 }

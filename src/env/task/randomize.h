@@ -123,9 +123,10 @@ MILD_HD_FN void task_draw_command(TaskEnv *env, const TaskDef *def) {
     kind -= def->standing_share;
     const int jumps = def->jump[1] > 0;
     const double most = env->command_most;
-    env->command[0] = kind < def->backward_share
-                          ? task_draw(&r, def->backward_vx)
-                          : task_draw_below(&r, def->vx, jumps ? def->vx[1] : most);
+    env->command[0] =
+        kind < def->backward_share
+            ? task_draw(&r, def->backward_vx)
+            : task_draw_below(&r, def->vx, jumps ? def->vx[1] * most / def->jump[1] : most);
     if (random_unit(&r) >= def->straight_share) {
         env->command[1] = task_draw(&r, def->vy);
         env->command[2] = task_draw(&r, def->wz);

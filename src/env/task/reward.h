@@ -225,7 +225,8 @@ MILD_HD_FN Real reward_rise(const TaskMotion *m) {
 }
 
 /* The base is to fly as free fall does. With the rise h of the command it leaves the ground at
- * w = sqrt(2 g h), and after a time t of its flight it has risen by w t - g t^2/2. */
+ * w = sqrt(2 g h), and after a time t of its flight it has risen by w t - g t^2/2. The speed is a
+ * factor: as a term of its own it is neglected, or bought with lower jumps. */
 MILD_HD_FN Real reward_jump(const TaskMotion *m) {
     const Real *command = m->env->command;
     const double share = task_gait_share(m->def, command), phase = m->env->phase;
@@ -235,7 +236,8 @@ MILD_HD_FN Real reward_jump(const TaskMotion *m) {
     const double t = (phase - share) * task_gait_period(m->def, command);
     const double w = task_sqrt(2 * GAIT_GRAVITY * command[TASK_RISE]);
     const Real e = m->rise - REAL(w * t - 0.5 * GAIT_GRAVITY * t * t);
-    return task_exp(-fabs(e) / REAL(0.05));
+    return task_exp(-fabs(e) / REAL(0.05)) *
+           reward_tracking(m, m->env->smooth_velocity[TASK_FORWARD] - command[TASK_FORWARD]);
 }
 
 /* [-] By what all terms with a positive weight but upright are multiplied, so that a robot that

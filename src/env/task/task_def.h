@@ -51,8 +51,8 @@ typedef struct Robot Robot;
       "(1 - g_z)/2, g_z: unit gravity along the base's z axis; 1 upright, 0 on its back")          \
     X(rise, 0, "the height above the stance soles over the nominal one, in [0, 1]")                \
     X(jump, 0,                                                                                     \
-      "exp(-|e|/0.05 m) in the flight of a jump, e: the base's height less that of the free "      \
-      "flight which the clock asks for")                                                           \
+      "exp(-|e|/0.05 m) f(v_x - command) in the flight of a jump, e: the base's height less that " \
+      "of the free flight which the clock asks for; f: see linear_velocity")                       \
     X(collision, -1.0,                                                                             \
       "feet or knees being closer than feet_least, knee_least of robot.ini (vendor)")
 
