@@ -142,7 +142,7 @@ static void act_chunk(const PolicyJob *job, int first, int rows, NetworkOutputs 
                                                 job->input + (int64_t)first * network->history,
                                                 job->instead, outputs);
     const float *heads = network_heads(network, outputs);
-    const int modulated = def->observation + def->estimates;
+    const int modulated = network->newest + def->estimates;
     // NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): one without values wants actions
     memcpy(job->actions + (int64_t)first * def->actions, mean,
            (size_t)rows * (size_t)def->actions * sizeof *mean);
