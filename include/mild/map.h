@@ -31,9 +31,9 @@ MILD_API_BEGIN
                          per metre, and waves, steps and rough ground of a share of `amplitude`,   \
                          which fade out over the last half metre. Seed and tile give relief and    \
                          share, which is uniform in [0.25, 1]. */                                  \
-    ROW(BLOCKS, blocks) /* level squares of edge `wavelength`, one of them around the origin, at   \
-                           random heights from 0 to the lesser of amplitude and slope |x| of their \
-                           middle; slope 0: to amplitude; repeats after `size` */
+    ROW(BLOCKS, blocks) /* level squares of edge `wavelength`, one of them around the origin, each \
+                           at random at 0, half or all of a height: the lesser of amplitude and    \
+                           slope |x| of its middle; slope 0: amplitude; repeats after `size` */
 /* clang-format on */
 
 /* A row's enumerator: MILD_MAP_FLAT and so on. */

@@ -84,7 +84,8 @@ static double height_blocks(const MildMapDef *def, double x, double y) {
     const int j = grid_place(y / def->size * blocks + 0.5, blocks, 1).cell;
     const double from = (i < blocks - i ? i : blocks - i) * def->size / blocks;
     const double bound = def->slope == 0.0 ? def->amplitude : fabs(def->slope) * from;
-    return 0.5 * fmin(bound, def->amplitude) * (1.0 + lattice_height(def->seed, i, j));
+    const double level = floor(1.5 * (1.0 + lattice_height(def->seed, i, j))); /* 0, 1 or 2 */
+    return 0.5 * fmin(bound, def->amplitude) * level;
 }
 
 static MildStatus shape_allocate(MildMap *map, double columns, double rows, double cell_x,
