@@ -21,12 +21,9 @@ static MildStatus rows_open(Rows *rows, const ExperimentDef *def, int device, Mi
     struct {
         float **at;
         int width;
-    } all[] = {{&rows->history, policy_history(p)},
-               {&rows->critic, p->critic_input},
-               {&rows->estimate, p->estimates},
-               {&rows->frame, p->observation},
-               {&rows->action, p->actions},
-               {&rows->reward, 1}};
+    } all[] = {{&rows->history, policy_history(p)}, {&rows->critic, p->critic_input},
+               {&rows->estimate, p->estimates},     {&rows->frame, p->observation},
+               {&rows->action, p->actions},         {&rows->reward, 1}};
     rows->device = device;
     int good = 1;
     for (size_t i = 0; good && i < sizeof all / sizeof *all; i++) {

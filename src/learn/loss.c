@@ -273,10 +273,9 @@ void loss_actor(const LossContext *c, LossChunk *chunk, float *gradient, float b
     mlp_backward(&n->decoder, c->parameters, chunk->rows, chunk->decoder_input, n->decoder_input,
                  &chunk->decoder, chunk->d_decoded, chunk->work, gradient, beta,
                  (MlpInputGradient){chunk->d_decoder_input, 0, n->decoder_input});
-    mlp_backward(
-        &n->actor, c->parameters, all, out->actor_input, n->actor_input, &out->actor, chunk->d_mean,
-        chunk->work, gradient, beta,
-        (MlpInputGradient){chunk->d_actor_input, n->newest, def->estimates + def->latent});
+    mlp_backward(&n->actor, c->parameters, all, out->actor_input, n->actor_input, &out->actor,
+                 chunk->d_mean, chunk->work, gradient, beta,
+                 (MlpInputGradient){chunk->d_actor_input, n->newest, def->estimates + def->latent});
     modulation_backward(c, chunk, all, heads);
     mlp_backward(&n->modulation, c->parameters, all, out->modulation_input, n->feet + n->clock,
                  &out->modulation, chunk->d_theta, chunk->work, gradient, beta,

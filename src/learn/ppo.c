@@ -56,8 +56,7 @@ static int take_mirror(Ppo *ppo, const PpoMirror *mirror) {
         return 0;
     }
     memcpy(ppo->mirror_index, mirror->observation_index, newest * sizeof *ppo->mirror_index);
-    memcpy(ppo->mirror_index + newest, mirror->action_index,
-           actions * sizeof *ppo->mirror_index);
+    memcpy(ppo->mirror_index + newest, mirror->action_index, actions * sizeof *ppo->mirror_index);
     memcpy(ppo->mirror_sign, mirror->observation_sign, newest * sizeof *ppo->mirror_sign);
     memcpy(ppo->mirror_sign + newest, mirror->action_sign, actions * sizeof *ppo->mirror_sign);
     ppo->mirror = (PpoMirror){ppo->mirror_index, ppo->mirror_sign, ppo->mirror_index + newest,

@@ -92,8 +92,7 @@ static void assert_near(const char *what, double ours, double theirs, double tol
  * they are not to see it, and of the scan behind them. */
 static void seen_double(const PolicyDef *d, const double *frames, int count, double *seen) {
     for (int i = 0; i < count * d->observation + d->scan; i++) {
-        const int is_clock =
-            i < count * d->observation && i % d->observation >= d->observation - 2;
+        const int is_clock = i < count * d->observation && i % d->observation >= d->observation - 2;
         seen[i] = is_clock && !d->actor_phase ? 0.0 : frames[i];
     }
 }

@@ -225,7 +225,7 @@ TEST(scans_that_are_too_large) {
     def.scan = 64;
     assert_refused(task_def_check(&def, &error), MILD_ERROR_RANGE, &error, "task.scan_pitch");
     assert_refused(task_def_check_plain(&def, "drive", &error), MILD_ERROR_ARGUMENT, &error,
-                 "task.scan");
+                   "task.scan");
     def.scan = 0;
     assert_int_equal(task_def_check_plain(&def, "drive", &error), MILD_OK);
 }

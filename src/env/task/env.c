@@ -170,7 +170,8 @@ static void read_scan(TaskEnv *env, const TaskDef *def, const Robot *robot, cons
         double height = mild_terrain_height_at(terrain, x, y) - at[2];
         if (def->imprint_tiles > 0 && !env->variation.rigid) {
             const int material = mild_terrain_material_at(terrain, x, y);
-            height -= (1 - terrain->materials[material].recovery) * mild_ground_imprint_at(ground, x, y);
+            height -=
+                (1 - terrain->materials[material].recovery) * mild_ground_imprint_at(ground, x, y);
         }
         to[n] = task_scan_number(env, def, robot_table(robot), scan, n, height);
     }

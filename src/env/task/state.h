@@ -69,8 +69,8 @@ enum { /* of a robot with ROBOT_JOINTS_MAX joints and ROBOT_FEET_MAX feet */
        TASK_OBSERVATION_MAX = 9 + 3 * ROBOT_JOINTS_MAX + TASK_FRAME_LAST,
        TASK_HISTORY_MAX = TASK_FRAMES * TASK_OBSERVATION_MAX + TASK_SCAN_MAX,
        TASK_ESTIMATES_MAX = 3 + 4 * ROBOT_FEET_MAX,
-       TASK_CRITIC_MAX = TASK_OBSERVATION_MAX + TASK_ESTIMATES_MAX + 6 * ROBOT_FEET_MAX + 34 +
-                         TASK_SCAN_MAX
+       TASK_CRITIC_MAX =
+           TASK_OBSERVATION_MAX + TASK_ESTIMATES_MAX + 6 * ROBOT_FEET_MAX + 34 + TASK_SCAN_MAX
 };
 TaskShape task_shape(const TaskDef *def, const Robot *robot);
 MILD_HD_FN float *task_row(float *rows, long i, int width) {

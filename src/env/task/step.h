@@ -34,9 +34,9 @@ MILD_HD_FN uint32_t task_frames_held(const TaskDef *def) {
 MILD_HD_FN size_t task_env_head_bytes(const TaskShape *shape, uint32_t held) {
     const size_t frames = held * (size_t)shape->observation * sizeof(TaskFrame);
     return task_whole_lines(sizeof(TaskEnv) +
-                            (shape->scan > 0 ? task_scan_place(frames) +
-                                                   TASK_SCAN_POSES * sizeof(TaskScanPose)
-                                             : frames));
+                            (shape->scan > 0
+                                 ? task_scan_place(frames) + TASK_SCAN_POSES * sizeof(TaskScanPose)
+                                 : frames));
 }
 
 /* A new environment. */

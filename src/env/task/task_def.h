@@ -194,10 +194,10 @@ typedef struct {
     int clock;              /* bool: clock in the observation */
     int observe_noise;      /* bool */
     double noise_q, noise_qd, noise_omega, noise_gravity; /* +- uniform, qd after scaling */
-    int scan;             /* points across the height scan (scan.h); 0: there is none */
-    double scan_ahead[2]; /* [m] rearmost and foremost points, from the base */
-    double scan_pitch;    /* [m] from point to point */
-    int scan_hold;        /* policy steps from one scan to the next */
+    int scan;              /* points across the height scan (scan.h); 0: there is none */
+    double scan_ahead[2];  /* [m] rearmost and foremost points, from the base */
+    double scan_pitch;     /* [m] from point to point */
+    int scan_hold;         /* policy steps from one scan to the next */
     double velocity_scale; /* [-] of the base velocity among the estimates. 0.05 m/s is a tenth of a
                               slow walk, so it must matter to the regression and to the actor */
     double height_scale; /* [-] of the feet heights, so that centimetres count as much as velocities

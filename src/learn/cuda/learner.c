@@ -206,8 +206,8 @@ enum { CARRIED = 4 };
 static void carried(const Network *n, const PpoBatch *b, int t, float *at[CARRIED],
                     size_t bytes[CARRIED]) {
     float *const arrays[CARRIED] = {b->history, b->critic, b->target, b->frame};
-    const int widths[CARRIED] = {policy_history(&n->def), n->def.critic_input,
-                                 n->def.estimates, n->def.observation};
+    const int widths[CARRIED] = {policy_history(&n->def), n->def.critic_input, n->def.estimates,
+                                 n->def.observation};
     for (int i = 0; i < CARRIED; i++) {
         const size_t floats = (size_t)b->envs * (size_t)widths[i];
         at[i] = arrays[i] + (size_t)t * floats;
